@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Length and cyclomatic complexity of every function, counted by lizard."""
+
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import lizard
+from tree import Violation, files, run
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Most lines (comments included) and paths of a function below a folder."""
+
+    folder: str
+    suffix: str
+    lines: int
+    complexity: int
+
+
+LIMITS = (
+    Limit("firmware", ".c", 40, 10),
+    Limit("firmware", ".h", 40, 10),
+    Limit("hal", ".c", 40, 20),
+    Limit("tests/plant", ".c", 40, 20),
+    Limit("tools", ".py", 60, 20),
+    Limit("tests", ".py", 60, 20),
+)
+# A configuration's check is one chain of comparisons: many paths, nothing to lose one's way in.
+VALIDATOR, VALIDATOR_COMPLEXITY = "_valid", 30
+
+
+def limit_for(path: Path) -> Limit | None:
+    """The limit of the first folder that holds the file."""
+    for limit in LIMITS:
+        if path.suffix == limit.suffix and path.is_relative_to(limit.folder):
+            return limit
+    return None
+
+
+def check(root: Path) -> Iterator[Violation]:
+    """Every function of every file with a limit."""
+    for path in files(root, ".c", ".h", ".py"):
+        limit = limit_for(path)
+        if limit is None:
+            continue
+        for function in lizard.analyze_file(str(root / path)).function_list:
+            if function.length > limit.lines:
+                yield Violation(path, function.start_line,
+                                f"{function.name}: {function.length} lines, at most {limit.lines}")  # fmt: skip
+            is_validator = function.name.endswith(VALIDATOR)
+            most = VALIDATOR_COMPLEXITY if is_validator else limit.complexity
+            if function.cyclomatic_complexity > most:
+                yield Violation(path, function.start_line,
+                                f"{function.name}: complexity {function.cyclomatic_complexity}, "
+                                f"at most {most}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.exit(run(check, "function length and complexity"))

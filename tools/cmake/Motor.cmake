@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+# From a motor's folder (motor.toml, flux map) to the libraries for that motor.
+
+function(_fluxtrue_motor_tool output)
+    set(${output} ${CMAKE_COMMAND} -E env
+        "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1
+        "${FLUXTRUE_PYTHON}" -m fluxtrue_tools motor PARENT_SCOPE)
+endfunction()
+
+# Object library motor_<name>: the generated tables, in <build>/motors/<name>.
+function(_fluxtrue_motor_tables name folder out)
+    file(GLOB_RECURSE tool CONFIGURE_DEPENDS
+        "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/motor/*")
+    list(FILTER tool EXCLUDE REGEX "__pycache__")
+    file(GLOB data CONFIGURE_DEPENDS "${folder}/*.toml" "${folder}/*.csv")
+    set(sources "${out}/motor_tables.c")
+    if(NOT CMAKE_CROSSCOMPILING)
+        list(APPEND sources "${out}/motor_si.c")
+    endif()
+    _fluxtrue_motor_tool(motor_tool)
+    add_custom_command(
+        OUTPUT "${out}/motor_tables.c" "${out}/motor_si.c"
+        BYPRODUCTS "${out}/motor.json" "${out}/report.txt"
+        COMMAND ${motor_tool} build "${folder}" --out "${out}" --no-report
+        DEPENDS ${data} ${tool}
+        COMMENT "Generating the tables of motor ${name}"
+        VERBATIM)
+    add_library(motor_${name} OBJECT ${sources})
+    target_link_libraries(motor_${name} PRIVATE fluxtrue_strict fluxtrue_app)
+    if(NOT CMAKE_CROSSCOMPILING)
+        target_include_directories(motor_${name} PRIVATE
+            "${CMAKE_SOURCE_DIR}/tests" "${CMAKE_SOURCE_DIR}/tests/support")
+    endif()
+endfunction()
+
+# fluxtrue_add_motor(<name> <folder>)
+#   motor_<name>          object library with the tables
+#   fluxtrue_sil_<name>   host: <build>/motors/<name>/libfluxtrue_sil.so
+#   fluxtrue_sim_<name>   host: <build>/motors/<name>/libfluxtrue_sim.so
+function(fluxtrue_add_motor name folder)
+    set(out "${CMAKE_BINARY_DIR}/motors/${name}")
+    _fluxtrue_motor_tables(${name} "${folder}" "${out}")
+    if(TARGET fluxtrue_hal_host)
+        fluxtrue_shared(fluxtrue_sil_${name} fluxtrue_sil "${out}"
+            fluxtrue_hal_host motor_${name} fluxtrue_app)
+    endif()
+    if(TARGET fluxtrue_hal_host AND TARGET fluxtrue_sim_runner)
+        fluxtrue_shared(fluxtrue_sim_${name} fluxtrue_sim "${out}"
+            fluxtrue_sim_runner fluxtrue_hal_host motor_${name}
+            fluxtrue_plant fluxtrue_twin fluxtrue_app)
+    endif()
+endfunction()
+
+# fluxtrue_build_for(<folder>): the firmware for one machine, any folder on disk.
+#   host      <build>/libfluxtrue_sil.so
+#   target    <build>/libfluxtrue.a: all layers and the machine's tables
+function(fluxtrue_build_for folder)
+    file(REAL_PATH "${folder}" folder)
+    cmake_path(GET folder FILENAME name)
+    if(NOT (TARGET motor_${name} AND EXISTS "${CMAKE_SOURCE_DIR}/firmware/motors/${name}"
+            AND folder PATH_EQUAL "${CMAKE_SOURCE_DIR}/firmware/motors/${name}"))
+        _fluxtrue_motor_tool(motor_tool)
+        execute_process(COMMAND ${motor_tool} check "${folder}"
+            RESULT_VARIABLE failed OUTPUT_QUIET ERROR_VARIABLE message
+            ERROR_STRIP_TRAILING_WHITESPACE)
+        if(failed)
+            message(FATAL_ERROR "FLUXTRUE_MOTOR=${folder}\n${message}")
+        endif()
+        set(name selected)
+        fluxtrue_add_motor(${name} "${folder}")
+    endif()
+    if(CMAKE_CROSSCOMPILING)
+        get_property(layers GLOBAL PROPERTY FLUXTRUE_LAYERS)
+        list(TRANSFORM layers REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
+        add_library(fluxtrue STATIC ${objects} $<TARGET_OBJECTS:motor_${name}>)
+        target_link_libraries(fluxtrue INTERFACE fluxtrue_app)
+        set_target_properties(fluxtrue PROPERTIES
+            ARCHIVE_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}" LINKER_LANGUAGE C)
+    elseif(TARGET fluxtrue_hal_host)
+        fluxtrue_shared(fluxtrue_sil fluxtrue_sil "${CMAKE_BINARY_DIR}"
+            fluxtrue_hal_host motor_${name} fluxtrue_app)
+    endif()
+endfunction()

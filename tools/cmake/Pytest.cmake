@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+# Tests written in Python, and the checkers of tools/checks, as ctest tests.
+
+set(FLUXTRUE_TEST_ENVIRONMENT
+    "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1 MPLBACKEND=Agg
+    "FLUXTRUE_BUILD_DIR=${CMAKE_BINARY_DIR}")
+if(FLUXTRUE_SANITIZE)
+    # Python itself is not instrumented: the sanitizer must be there before our library is loaded,
+    # and what the interpreter leaks at exit is not our concern.
+    execute_process(COMMAND "${CMAKE_C_COMPILER}" -print-file-name=libasan.so
+        OUTPUT_VARIABLE libasan OUTPUT_STRIP_TRAILING_WHITESPACE)
+    set(FLUXTRUE_PRELOAD "LD_PRELOAD=${libasan}" ASAN_OPTIONS=detect_leaks=0)
+endif()
+
+function(_fluxtrue_python_test name labels timeout)
+    if(NOT timeout)
+        set(timeout 600)
+    endif()
+    set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout}
+        ENVIRONMENT "${FLUXTRUE_TEST_ENVIRONMENT}")
+endfunction()
+
+# fluxtrue_pytest(NAME <n> PATH <file or folder> [ARGS <pytest argument> ...] [LABELS <label> ...]
+#                 [TIMEOUT <s>])
+function(fluxtrue_pytest)
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;PATH;TIMEOUT" "ARGS;LABELS")
+    if(arg_UNPARSED_ARGUMENTS OR NOT arg_NAME OR NOT arg_PATH)
+        message(FATAL_ERROR "fluxtrue_pytest: NAME and PATH wanted; unknown: "
+                            "${arg_UNPARSED_ARGUMENTS}")
+    endif()
+    if(FLUXTRUE_TESTS STREQUAL OFF)
+        return()
+    endif()
+    cmake_path(ABSOLUTE_PATH arg_PATH BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
+    add_test(NAME ${arg_NAME}
+        COMMAND "${CMAKE_COMMAND}" -E env ${FLUXTRUE_PRELOAD}
+            "${FLUXTRUE_PYTHON}" -m pytest -q -c "${CMAKE_SOURCE_DIR}/tests/pytest.ini"
+            -p no:cacheprovider ${arg_ARGS} "${arg_PATH}"
+        WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
+    _fluxtrue_python_test(${arg_NAME} "${arg_LABELS}" "${arg_TIMEOUT}")
+endfunction()
+
+# fluxtrue_check(NAME <n> SCRIPT <file of tools/checks> [ARGS <argument> ...])
+function(fluxtrue_check)
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;SCRIPT" "ARGS")
+    if(FLUXTRUE_TESTS STREQUAL OFF)
+        return()
+    endif()
+    add_test(NAME ${arg_NAME}
+        COMMAND "${FLUXTRUE_PYTHON}" "${CMAKE_SOURCE_DIR}/tools/checks/${arg_SCRIPT}" ${arg_ARGS}
+        WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
+    _fluxtrue_python_test(${arg_NAME} check 60)
+endfunction()

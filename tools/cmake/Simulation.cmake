@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+# What the simulation on the host is made of. A part whose folder is empty is left out.
+#   fluxtrue_hal_host    the firmware as a library for any plant (hal/host)
+#   fluxtrue_plant       the simulated drive: knows nothing of the firmware (tests/plant)
+#   fluxtrue_twin        the controller again in double precision (tests/support/twin)
+#   fluxtrue_sim_runner  plant with firmware or twin, period by period (tests/loop/runner)
+
+# fluxtrue_part(<name> <library type> <folder> [<include folder> ...])
+function(fluxtrue_part name type folder)
+    file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_SOURCE_DIR}/${folder}/*.c")
+    if(sources)
+        add_library(${name} ${type} ${sources})
+        target_include_directories(${name} PUBLIC ${ARGN})
+        target_link_libraries(${name} PRIVATE fluxtrue_strict)
+    endif()
+endfunction()
+
+set(tests "${CMAKE_SOURCE_DIR}/tests")
+set(firmware "${CMAKE_SOURCE_DIR}/firmware")
+
+# Object libraries where the exported functions must be kept although nothing calls them.
+fluxtrue_part(fluxtrue_hal_host OBJECT hal/host "${firmware}" "${CMAKE_SOURCE_DIR}")
+fluxtrue_part(fluxtrue_plant STATIC tests/plant "${tests}" "${tests}/plant")
+fluxtrue_part(fluxtrue_twin STATIC tests/support/twin "${tests}" "${tests}/support" "${firmware}")
+fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
+    "${tests}" "${tests}/support" "${firmware}" "${CMAKE_SOURCE_DIR}")
+
+# Everything the tools load at run time: what tools/demo builds.
+add_custom_target(fluxtrue_libraries)
+
+# fluxtrue_shared(<target> <output name> <folder> <library or object library> ...)
+function(fluxtrue_shared target output folder)
+    add_library(${target} SHARED)
+    foreach(part IN LISTS ARGN)
+        if(TARGET ${part})
+            get_target_property(type ${part} TYPE)
+            if(type STREQUAL OBJECT_LIBRARY)
+                target_sources(${target} PRIVATE $<TARGET_OBJECTS:${part}>)
+            else()
+                target_link_libraries(${target} PRIVATE ${part})
+            endif()
+        endif()
+    endforeach()
+    target_link_libraries(${target} PRIVATE m)
+    target_link_options(${target} PRIVATE
+        $<$<NOT:$<BOOL:${FLUXTRUE_SANITIZE}>>:-Wl,--no-undefined>)
+    set_target_properties(${target} PROPERTIES LINKER_LANGUAGE C
+        OUTPUT_NAME ${output} LIBRARY_OUTPUT_DIRECTORY "${folder}")
+    add_dependencies(fluxtrue_libraries ${target})
+endfunction()

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+# Unit tests in C with Unity, mocks of the hardware interface with CMock.
+
+find_program(FLUXTRUE_RUBY ruby)
+set(unity "${FLUXTRUE_CMOCK}/vendor/unity")
+set(FLUXTRUE_UNIT_TESTS ON)
+if(FLUXTRUE_TESTS STREQUAL OFF)
+    set(FLUXTRUE_UNIT_TESTS OFF)
+elseif(NOT EXISTS "${unity}/src/unity.c" OR NOT FLUXTRUE_RUBY)
+    if(FLUXTRUE_TESTS STREQUAL ON)
+        message(FATAL_ERROR "No Ruby, or no CMock at ${FLUXTRUE_CMOCK}: run tools/setup first")
+    endif()
+    message(STATUS "Unit tests are left out: no CMock or no Ruby (tools/setup gets both)")
+    set(FLUXTRUE_UNIT_TESTS OFF)
+endif()
+
+if(FLUXTRUE_UNIT_TESTS)
+    add_library(fluxtrue_unity STATIC "${unity}/src/unity.c" "${FLUXTRUE_CMOCK}/src/cmock.c")
+    target_include_directories(fluxtrue_unity SYSTEM PUBLIC "${unity}/src" "${FLUXTRUE_CMOCK}/src")
+    target_compile_definitions(fluxtrue_unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
+    target_compile_options(fluxtrue_unity PRIVATE -w)
+    # Written only when it changes: every mock and runner depends on it.
+    file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/cmock.yml" @ONLY CONTENT [[
+:cmock:
+  :mock_prefix: mock_
+  :plugins:
+    - :ignore
+    - :ignore_arg
+    - :expect_any_args
+    - :return_thru_ptr
+    - :array
+    - :callback
+  :treat_inlines: :include
+  :treat_externs: :include
+  :when_ptr: :compare_data
+]])
+endif()
+
+# The mock of one header, and, because inline functions are mocked too, a copy of the header
+# without their bodies that must be found before the real one.
+function(_fluxtrue_mock header folder sources)
+    cmake_path(GET header PARENT_PATH sub)
+    cmake_path(GET header STEM stem)
+    set(mock "${folder}/${sub}/mock_${stem}.c")
+    add_custom_command(
+        OUTPUT "${mock}"
+        BYPRODUCTS "${folder}/${sub}/mock_${stem}.h"
+        COMMAND "${CMAKE_COMMAND}" -E make_directory "${folder}/${sub}"
+        COMMAND "${FLUXTRUE_RUBY}" -W0 "${FLUXTRUE_CMOCK}/lib/cmock.rb"
+            "-o${CMAKE_BINARY_DIR}/cmock.yml" "--mock_path=${folder}" "--subdir=${sub}"
+            "${CMAKE_SOURCE_DIR}/${header}"
+        DEPENDS "${CMAKE_SOURCE_DIR}/${header}" "${CMAKE_BINARY_DIR}/cmock.yml"
+        COMMENT "Mocking ${header}"
+        VERBATIM)
+    set_source_files_properties("${mock}" PROPERTIES COMPILE_OPTIONS -w)
+    set(${sources} "${mock}" PARENT_SCOPE)
+endfunction()
+
+# fluxtrue_unity_test(NAME <n> SOURCES <test.c> [<more.c> ...] [LIBS <layer or library> ...]
+#                     [MOCKS hal/adc.h ...] [MOTOR <shipped motor>] [INCLUDES <folder> ...]
+#                     [DEFINITIONS <D> ...] [LABELS <label> ...] [TIMEOUT <s>])
+# The first source holds the test functions. LIBS: fx, signal, ... or any target. Label: unit.
+function(fluxtrue_unity_test)
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;MOTOR;TIMEOUT"
+        "SOURCES;LIBS;MOCKS;INCLUDES;DEFINITIONS;LABELS")
+    if(arg_UNPARSED_ARGUMENTS OR NOT arg_NAME OR NOT arg_SOURCES)
+        message(FATAL_ERROR "fluxtrue_unity_test: NAME and SOURCES wanted; unknown: "
+                            "${arg_UNPARSED_ARGUMENTS}")
+    endif()
+    if(NOT FLUXTRUE_UNIT_TESTS)
+        return()
+    endif()
+    set(folder "${CMAKE_CURRENT_BINARY_DIR}/${arg_NAME}.generated")
+    list(POP_FRONT arg_SOURCES test)
+    cmake_path(ABSOLUTE_PATH test BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
+    set(runner "${folder}/runner.c")
+    add_custom_command(
+        OUTPUT "${runner}"
+        COMMAND "${CMAKE_COMMAND}" -E make_directory "${folder}"
+        COMMAND "${FLUXTRUE_RUBY}" -W0 "${unity}/auto/generate_test_runner.rb"
+            "${CMAKE_BINARY_DIR}/cmock.yml" "${test}" "${runner}"
+        DEPENDS "${test}" "${CMAKE_BINARY_DIR}/cmock.yml"
+        COMMENT "Test runner of ${arg_NAME}"
+        VERBATIM)
+    set_source_files_properties("${runner}" PROPERTIES COMPILE_OPTIONS -w)
+    set(mocks "")
+    foreach(header IN LISTS arg_MOCKS)
+        _fluxtrue_mock("${header}" "${folder}" mock)
+        list(APPEND mocks "${mock}")
+    endforeach()
+
+    add_executable(${arg_NAME} "${test}" ${arg_SOURCES} "${runner}" ${mocks})
+    target_include_directories(${arg_NAME} BEFORE PRIVATE "${folder}")
+    target_include_directories(${arg_NAME} PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}"
+        "${CMAKE_SOURCE_DIR}/firmware" "${CMAKE_SOURCE_DIR}/tests"
+        "${CMAKE_SOURCE_DIR}/tests/support" "${CMAKE_SOURCE_DIR}" ${arg_INCLUDES})
+    target_compile_definitions(${arg_NAME} PRIVATE ${arg_DEFINITIONS})
+    # The generated runner calls the test functions by name: they have no prototypes.
+    set_source_files_properties("${test}" PROPERTIES COMPILE_OPTIONS -Wno-missing-prototypes)
+    if(arg_MOTOR)
+        target_sources(${arg_NAME} PRIVATE $<TARGET_OBJECTS:motor_${arg_MOTOR}>)
+    endif()
+    foreach(library IN LISTS arg_LIBS)
+        if(TARGET fluxtrue_${library})
+            set(library fluxtrue_${library})
+        elseif(NOT TARGET ${library} AND NOT library STREQUAL m)
+            message(FATAL_ERROR "fluxtrue_unity_test(${arg_NAME}): no library '${library}'")
+        endif()
+        target_link_libraries(${arg_NAME} PRIVATE ${library})
+    endforeach()
+    target_link_libraries(${arg_NAME} PRIVATE fluxtrue_unity m)
+    target_link_libraries(${arg_NAME} PRIVATE fluxtrue_strict fluxtrue_covered)
+
+    if(NOT arg_LABELS)
+        set(arg_LABELS unit)
+    endif()
+    if(NOT arg_TIMEOUT)
+        set(arg_TIMEOUT 120)
+    endif()
+    add_test(NAME ${arg_NAME} COMMAND ${arg_NAME})
+    set_tests_properties(${arg_NAME} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+endfunction()

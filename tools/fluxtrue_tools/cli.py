@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: one group whose commands are imported only when they are used."""
+
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+import click
+
+from fluxtrue_tools.errors import FluxtrueError
+
+# Name: (module, command in it, one line for --help). Importing them all would cost a second.
+COMMANDS = {
+    "demo": ("fluxtrue_tools.demo.cli", "demo", "The paper's experiments and ours, with a report."),
+    "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
+    "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
+    "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
+}
+# Done by tools/fluxtrue itself, before Python; listed here for --help.
+SHELL_COMMANDS = {"test": "Set up, build and test everything: tools/test."}
+
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 130
+EXIT_BROKEN_PIPE = 1  # as click does
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands by name and imports one when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, name, _ = COMMANDS[cmd_name]
+        command = getattr(importlib.import_module(module), name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            allowed = ", ".join([*COMMANDS, *SHELL_COMMANDS])
+            raise FluxtrueError(f"unknown command '{args[0]}', allowed: {allowed}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        rows = [(name, text) for name, (_, _, text) in COMMANDS.items()]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows + list(SHELL_COMMANDS.items()))
+
+
+HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
+
+
+@click.command(cls=LazyGroup, name="fluxtrue", context_settings=HELP_OPTIONS)
+def main() -> None:
+    """Fluxtrue: torque control that stays true when the machine changes."""
+
+
+def _usage(error: click.ClickException) -> str:
+    text = " ".join(error.format_message().split()).rstrip(".")
+    context = getattr(error, "ctx", None)
+    return f"{text} (see '{context.command_path} --help')" if context else text
+
+
+def _broken_pipe() -> int:
+    # The reader has gone: nothing more can be said on this stream, not even at exit.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return EXIT_BROKEN_PIPE
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command and turn its outcome into an exit code."""
+    try:
+        result = main.main(args=list(arguments), prog_name="fluxtrue", standalone_mode=False)
+        sys.stdout.flush()
+        return result if isinstance(result, int) else 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return EXIT_ERROR
+    except click.ClickException as error:
+        click.echo(f"error: {_usage(error)}", err=True)
+        return EXIT_ERROR
+    except FluxtrueError as error:
+        click.echo(f"error: {error}", err=True)
+        return EXIT_ERROR
+    except (click.Abort, KeyboardInterrupt):
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        return _broken_pipe()

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tools raise for their users."""
+
+
+class FluxtrueError(Exception):
+    """Something the user can put right.
+
+    The text is one line naming file, field, value and what was allowed. The command line prints
+    it and exits with 2; every other exception is a bug and shows its traceback.
+    """
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().split())
