@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef FX_ARCH_H
+#define FX_ARCH_H
+
+/** One Cortex-M4 DSP instruction per function, or the same bits from portable C.
+ *   The two halves of this header must agree bit for bit; a test runs both on the same vectors.
+ * Source   docs/theory/fixed-point.md (FX-4) to (FX-8); Arm v7-M ARM, section A7.7
+ * Units    raw integers; the formats are in fx/format.h and fx/q.h, the only users
+ * Range    every argument; sums of multiply-accumulates wrap modulo 2^32 as the instruction does
+ * Rounding *_r: half up; smulwb, smlawb: towards minus infinity
+ * Errors   none
+ * Context  any; one instruction each */
+
+#include <stdint.h>
+
+_Static_assert((-1 >> 1) == -1, "arithmetic right shift expected");
+
+/* Wrapping sums go through uint32_t: a signed overflow would be undefined. */
+static inline int32_t fx_arch_add_wrap(int32_t a, int32_t b)
+{
+    return (int32_t)((uint32_t)a + (uint32_t)b);
+}
+
+/* Written in plain C on both sides: gcc picks MLA or SMLABB, whichever needs no sign extension. */
+static inline int32_t fx_arch_smlabb(int16_t a, int16_t b, int32_t acc)
+{
+    return fx_arch_add_wrap(acc, (int32_t)a * b);
+}
+
+#if defined(__ARM_FEATURE_DSP)
+
+#include <arm_acle.h>
+
+static inline int32_t fx_arch_qadd(int32_t a, int32_t b)
+{
+    return __qadd(a, b);
+}
+
+static inline int32_t fx_arch_qsub(int32_t a, int32_t b)
+{
+    return __qsub(a, b);
+}
+
+/* gcc's __ssat and __usat convert from unsigned inside the macro, out of our reach. */
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wsign-conversion"
+static inline int16_t fx_arch_ssat16(int32_t x)
+{
+    const int32_t y = __ssat(x, 16);
+    /* Tells the compiler the range, which saves the SXTH after every narrowing. */
+    if ((y < INT16_MIN) || (y > INT16_MAX)) {
+        __builtin_unreachable();
+    }
+    return (int16_t)y;
+}
+
+static inline uint32_t fx_arch_usat17(int32_t x)
+{
+    return (uint32_t)__usat(x, 17);
+}
+#pragma GCC diagnostic pop
+
+static inline int32_t fx_arch_smulwb(int32_t a, int16_t b)
+{
+    int32_t y;
+    __asm__("smulwb %0, %1, %2" : "=r"(y) : "r"(a), "r"((int32_t)b));
+    return y;
+}
+
+static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
+{
+    return __smlawb(a, b, acc);
+}
+
+static inline int32_t fx_arch_smmul_r(int32_t a, int32_t b)
+{
+    int32_t y;
+    __asm__("smmulr %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
+    return y;
+}
+
+static inline int32_t fx_arch_smmla_r(int32_t a, int32_t b, int32_t acc)
+{
+    int32_t y;
+    __asm__("smmlar %0, %1, %2, %3" : "=r"(y) : "r"(a), "r"(b), "r"(acc));
+    return y;
+}
+
+static inline int32_t fx_arch_smmls_r(int32_t a, int32_t b, int32_t acc)
+{
+    int32_t y;
+    __asm__("smmlsr %0, %1, %2, %3" : "=r"(y) : "r"(a), "r"(b), "r"(acc));
+    return y;
+}
+
+static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
+{
+    uint32_t y;
+    __asm__("pkhbt %0, %1, %2, lsl #16" : "=r"(y) : "r"(lo), "r"(hi));
+    return y;
+}
+
+static inline int32_t fx_arch_smuad(uint32_t a, uint32_t b)
+{
+    return __smuad((int16x2_t)a, (int16x2_t)b);
+}
+
+static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)
+{
+    return __smlad((int16x2_t)a, (int16x2_t)b, acc);
+}
+
+#else
+#include "fx/arch_portable.h"
+#endif
+
+#endif

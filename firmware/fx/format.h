@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef FX_FORMAT_H
+#define FX_FORMAT_H
+
+/** Fixed-point formats: constants, saturation, addition, narrowing, shifts, limits.
+ *   value = integer / 2^15 (q15), / 2^31 (q31), / 2^16 (q16: a gain). Users include fx/q.h.
+ * Source   docs/theory/fixed-point.md (FX-1) to (FX-3), (FX-9)
+ * Units    q15, q31: per unit, [-1, 1); q16: gain, [-32768, 32768)
+ * Range    every argument of every function, unless its comment says otherwise
+ * Rounding half up (towards plus infinity); saturation to the nearest end of the format
+ * Errors   none: saturation is the defined result, detect it by comparison where it matters
+ * Context  any; 1 to 4 instructions each, no loop, no division */
+
+#include <stdint.h>
+
+#include "fx/arch.h"
+
+typedef int16_t q15_t;
+typedef int32_t q31_t;
+typedef int32_t q16_t;
+
+#define Q15_MAX ((q15_t)INT16_MAX)
+#define Q15_MIN ((q15_t)INT16_MIN)
+#define Q31_MAX ((q31_t)INT32_MAX)
+#define Q31_MIN ((q31_t)INT32_MIN)
+#define Q16_ONE ((q16_t)65536)
+
+/* Compile-time constants only: rounded half away from zero, saturated. Never with a variable:
+ * they would drag floating point into the firmware. */
+#define FX_CONST(x, one, lo, hi) \
+    (((x) * (one) >= (hi)) ? (hi) \
+     : ((x) * (one) <= (lo)) ? (lo) \
+                             : ((x) * (one) + (((x) < 0.0) ? -0.5 : 0.5)))
+#define Q15(x) ((q15_t)FX_CONST((double)(x), 32768.0, -32768.0, 32767.0))
+#define Q31(x) ((q31_t)FX_CONST((double)(x), 2147483648.0, -2147483648.0, 2147483647.0))
+#define Q16(x) ((q16_t)FX_CONST((double)(x), 65536.0, -2147483648.0, 2147483647.0))
+
+static inline q15_t fx_sat_q15(int32_t x)
+{
+    return fx_arch_ssat16(x);
+}
+
+static inline q31_t fx_sat_q31(int64_t x)
+{
+    const int32_t high = (int32_t)(x >> 32);
+    const int32_t low = (int32_t)(uint32_t)((uint64_t)x & 0xFFFFFFFFU);
+    /* In range exactly when the upper word is the sign extension of the lower. */
+    return (high == (low >> 31)) ? low : ((high >> 31) ^ INT32_MAX);
+}
+
+static inline q15_t fx_add_q15(q15_t a, q15_t b)
+{
+    return fx_sat_q15((int32_t)a + b);
+}
+
+static inline q15_t fx_sub_q15(q15_t a, q15_t b)
+{
+    return fx_sat_q15((int32_t)a - b);
+}
+
+static inline q15_t fx_neg_q15(q15_t a)
+{
+    return fx_sat_q15(-(int32_t)a);
+}
+
+static inline q15_t fx_abs_q15(q15_t a)
+{
+    return fx_sat_q15((a < 0) ? -(int32_t)a : a);
+}
+
+static inline q31_t fx_add_q31(q31_t a, q31_t b)
+{
+    return fx_arch_qadd(a, b);
+}
+
+static inline q31_t fx_sub_q31(q31_t a, q31_t b)
+{
+    return fx_arch_qsub(a, b);
+}
+
+static inline q31_t fx_neg_q31(q31_t a)
+{
+    return fx_arch_qsub(0, a);
+}
+
+static inline q31_t fx_abs_q31(q31_t a)
+{
+    const int32_t sign = a >> 31;
+    return fx_arch_qsub(a ^ sign, sign); /* ones' complement plus one, saturated */
+}
+
+/* The narrowing of a Q30 accumulator. The rounding half is added with saturation, so the whole
+ * int32_t range is allowed: an accumulator of |sum| < 2 per unit needs no further proof. */
+static inline q15_t fx_round_q15(int32_t q30)
+{
+    return fx_sat_q15(fx_arch_qadd(q30, 0x4000) >> 15);
+}
+
+static inline q15_t fx_q15_from_q31(q31_t x)
+{
+    return (q15_t)(fx_arch_qadd(x, 0x8000) >> 16);
+}
+
+static inline q31_t fx_q31_from_q15(q15_t x)
+{
+    return (q31_t)x * 65536;
+}
+
+static inline int32_t fx_min_s32(int32_t a, int32_t b)
+{
+    return (a < b) ? a : b;
+}
+
+static inline int32_t fx_max_s32(int32_t a, int32_t b)
+{
+    return (a > b) ? a : b;
+}
+
+/* Limits: hi wins should the caller pass lo > hi. */
+static inline q31_t fx_clamp_q31(q31_t x, q31_t lo, q31_t hi)
+{
+    return fx_min_s32(fx_max_s32(x, lo), hi);
+}
+
+static inline q15_t fx_clamp_q15(q15_t x, q15_t lo, q15_t hi)
+{
+    return (q15_t)fx_clamp_q31(x, lo, hi);
+}
+
+/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). */
+static inline q31_t fx_shl_q31(q31_t x, unsigned n)
+{
+    const q31_t limit = (x >> 31) ^ INT32_MAX;
+    if (n > 31U) {
+        return (x == 0) ? 0 : limit;
+    }
+    const int32_t y = (int32_t)((uint32_t)x << n);
+    return ((y >> n) == x) ? y : limit;
+}
+
+/* x / 2^n, half up; adds the bit below the cut instead of a half, so nothing can overflow. */
+static inline int32_t fx_shr_round(int32_t x, unsigned n)
+{
+    if ((n == 0U) || (n > 31U)) {
+        return (n == 0U) ? x : 0; /* |x| / 2^32 <= 1/2, and -1/2 rounds up to 0 */
+    }
+    return (x >> n) + ((x >> (n - 1U)) & 1);
+}
+
+#endif

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef FX_Q_H
+#define FX_Q_H
+
+/** The fixed-point formats (fx/format.h) and their products: exact, rounded, accumulated, dual.
+ *   The comment of each states the format sum; narrow once, at the end, with fx_round_q15().
+ * Source   docs/theory/fixed-point.md (FX-4) to (FX-8)
+ * Units    per unit; gains in q16
+ * Range    every argument, except that the multiply-accumulates (mac, mulhi_add, mulhi_sub, dot2)
+ *          wrap modulo 2^32: the caller proves that its sum stays inside int32_t
+ * Rounding half up, 1/2 LSB of the result; fx_mul_q31_q15 and fx_mac_q31_q15 truncate towards minus
+ *          infinity (bias 1/2 LSB of Q30): never feed an integrator with them
+ * Errors   none
+ * Context  any; 1 to 3 instructions, fx_mul_q31 8, fx_mul_gain_q31 10 */
+
+#include "fx/format.h"
+
+/* Two q15 values in one word, low half first, as they lie in memory. */
+typedef uint32_t fx_pair_t;
+
+/* Q15 * Q15 = Q30, exact: |-1 * -1| = 2^30 fits. */
+static inline int32_t fx_mul_q30(q15_t a, q15_t b)
+{
+    return (int32_t)a * b;
+}
+
+/* acc + Q15 * Q15, Q30. */
+static inline int32_t fx_mac_q30(int32_t acc, q15_t a, q15_t b)
+{
+    return fx_arch_smlabb(a, b, acc);
+}
+
+/* Q15 * Q15 = Q30 -> Q15; only -1 * -1 saturates. 2^30 + 2^14 cannot overflow. */
+static inline q15_t fx_mul_q15(q15_t a, q15_t b)
+{
+    return fx_sat_q15(fx_mac_q30(0x4000, a, b) >> 15);
+}
+
+/* (a * b) / 2^32, half up: Q31 * Q31 = Q30, Q16 * Q31 = Q15, Q16 * Q16 = Q0. */
+static inline int32_t fx_mulhi(int32_t a, int32_t b)
+{
+    return fx_arch_smmul_r(a, b);
+}
+
+/* acc + (a * b) / 2^32, half up. */
+static inline int32_t fx_mulhi_add(int32_t acc, int32_t a, int32_t b)
+{
+    return fx_arch_smmla_r(a, b, acc);
+}
+
+/* acc - (a * b) / 2^32, half up after the subtraction. */
+static inline int32_t fx_mulhi_sub(int32_t acc, int32_t a, int32_t b)
+{
+    return fx_arch_smmls_r(a, b, acc);
+}
+
+/* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. */
+static inline q31_t fx_mul_q31(q31_t a, q31_t b)
+{
+    const int64_t q62 = (int64_t)a * b + INT64_C(0x40000000);
+    return ((int32_t)(q62 >> 32) == 0x40000000) ? Q31_MAX : (q31_t)(q62 >> 31);
+}
+
+/* Q31 * Q15 = Q46 -> Q30, truncated. */
+static inline int32_t fx_mul_q31_q15(q31_t a, q15_t b)
+{
+    return fx_arch_smulwb(a, b);
+}
+
+/* acc + Q31 * Q15, Q30, truncated. */
+static inline int32_t fx_mac_q31_q15(int32_t acc, q31_t a, q15_t b)
+{
+    return fx_arch_smlawb(a, b, acc);
+}
+
+/* Q16 * Q15 = Q31 -> Q15. Shifting x up by 16 lets SMMULR round: (g x 2^16 + 2^31) / 2^32. */
+static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
+{
+    return fx_sat_q15(fx_mulhi(gain, (int32_t)x * 65536));
+}
+
+/* Q16 * Q31 = Q47 -> Q31. */
+static inline q31_t fx_mul_gain_q31(q16_t gain, q31_t x)
+{
+    return fx_sat_q31(((int64_t)gain * x + 0x8000) >> 16);
+}
+
+static inline fx_pair_t fx_pair(q15_t lo, q15_t hi)
+{
+    return fx_arch_pkhbt(lo, hi);
+}
+
+/* a.lo * b.lo + a.hi * b.hi, Q30; wraps only when all four are -1. */
+static inline int32_t fx_dot2(fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_smuad(a, b);
+}
+
+/* acc + a.lo * b.lo + a.hi * b.hi, Q30. */
+static inline int32_t fx_dot2_acc(int32_t acc, fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_smlad(a, b, acc);
+}
+
+#endif
