@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TYPES_SAMPLES_H
+#define TYPES_SAMPLES_H
+/** What crosses the hardware seam every period: converter counts in, duties out.
+ * Source   docs/architecture.md, the HAL seam
+ * Units    counts of an adc_bits converter, right-aligned; duties with 2^15 = 1.0
+ * Range    duties 0 ... 32768
+ * Context  values only */
+#include <stdint.h>
+
+typedef struct {
+    uint16_t i_a, i_b, i_c; /* mid scale is zero current, positive into the motor */
+    uint16_t v_dc;
+} adc_counts_t;
+
+typedef struct {
+    uint16_t a, b, c; /* 32768: upper switch on for the whole period */
+} duty_t;
+
+#endif
