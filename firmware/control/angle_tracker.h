@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_ANGLE_TRACKER_H
+#define CONTROL_ANGLE_TRACKER_H
+/** Electrical angle and speed from a mechanical angle: second-order tracking loop.
+ *   theta_e = p theta_m + offset;  e = theta_e - theta~;  w += k_i e;  theta~ += w + k_p e
+ *   k_p = 2 w_n T_s, k_i = (w_n T_s)^2: both poles at -w_n (critical damping).
+ * Source   docs/theory/angle-tracker.md (AT-1) ... (AT-4)
+ * Units    angles as fractions of a turn times 2^32 (wrap is intended); omega_q31 per unit of omega_b
+ * Range    |omega| < 1; turn_to_pu is 2^31/(turns of 2^32 per period at omega_b), Q15.16
+ * Rounding speed half up to 1 LSB of 2^-32 turn per period
+ * Errors   none; a jump of more than max_step per period is reported in jumped and counted by the monitor
+ * Context  fast ISR; no division, no loop */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "fx/q.h"
+
+typedef struct {
+    uint32_t pole_pairs;
+    uint32_t offset;       /* electrical, 2^32 = one turn */
+    q31_t kp;
+    q31_t ki;
+    q16_t turn_to_pu;
+    uint32_t max_step;     /* largest credible |e| in one period, 2^32 = one turn */
+} angle_tracker_config_t;
+
+typedef struct {
+    uint32_t theta;  /* tracked electrical angle */
+    int32_t step;    /* tracked electrical advance per period, 2^32 = one turn */
+    uint8_t samples; /* the first two samples set angle and speed directly; then 2 */
+} angle_tracker_state_t;
+
+typedef struct {
+    uint32_t theta_e; /* measured electrical angle (not the tracked one: no lag) */
+    int32_t step;     /* electrical advance per period */
+    q31_t omega_q31;
+    bool jumped;
+} angle_t;
+
+angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
+
+#endif

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/current_control.h"
+
+#include "fx/q.h"
+#include "fx/sqrt.h"
+
+typedef struct {
+    q15_t error; /* psi* - psi */
+    int32_t u;   /* before the limiter, Q15 */
+} axis_t;
+
+void current_control_reset(current_control_state_t *state)
+{
+    *state = (current_control_state_t){0};
+}
+
+/* f = psi* - (1 - b)(l i*) + (r/sigma) i*; lift is psi* less the magnet's share (CC-5). */
+static q15_t weighted(const current_control_config_t *config, q15_t psi, q15_t lift, q15_t i_ref)
+{
+    const int32_t less = lift - fx_mul_q15(config->setpoint_weight, lift);
+    return fx_sat_q15(psi - less + fx_mul_gain_q15(config->drop_gain, i_ref));
+}
+
+current_target_t current_control_target(const current_control_config_t *config, dq_t i_ref, const flux_point_t *at_ref)
+{
+    return (current_target_t){
+        .psi = {at_ref->psi_d, at_ref->psi_q},
+        .weighted = {weighted(config, at_ref->psi_d, fx_sub_q15(at_ref->psi_d, at_ref->psi_f0), i_ref.d),
+                     weighted(config, at_ref->psi_q, at_ref->psi_q, i_ref.q)},
+    };
+}
+
+/* One axis without limits: u = sigma (f - psi) + s + feed-forward (CC-4). Q16 * Q31 = Q15. */
+static axis_t axis(const current_control_config_t *config, q15_t target, q15_t weighted_target, q15_t psi, q31_t s,
+                   int32_t forward_q30)
+{
+    const int32_t slow = fx_add_q31(s >> 1, forward_q30); /* Q30 */
+    return (axis_t){
+        .error = fx_sub_q15(target, psi),
+        .u = fx_mulhi(config->sigma_gain, fx_sub_q15(weighted_target, psi) * 65536) + fx_shr_round(slow, 15),
+    };
+}
+
+/* s += sigma a_i e; held while the limiter cuts this axis and e pushes further out (CC-10). Q15 * Q15 = Q30, twice. */
+static q31_t integrate(const current_control_config_t *config, const axis_t *a, q31_t s, int32_t limited_u)
+{
+    const bool outward = (a->u > limited_u && a->error > 0) || (a->u < limited_u && a->error < 0);
+    const int32_t step_q30 = outward ? 0 : fx_mul_q30(config->integral_gain, a->error);
+    return fx_add_q31(s, fx_add_q31(step_q30, step_q30));
+}
+
+dq_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
+                          const current_control_in_t *in)
+{
+    const flux_point_t *flux = in->flux;
+    const current_target_t *to = in->target;
+    const q15_t psi_d = fx_add_q15(flux->psi_d, in->psi_delta);
+    const axis_t d = axis(config, to->psi.d, to->weighted.d, flux->psi_d, state->s_d, -fx_mul_q30(in->omega, flux->psi_q));
+    const axis_t q = axis(config, to->psi.q, to->weighted.q, flux->psi_q, state->s_q, fx_mul_q30(in->omega, psi_d));
+
+    const int32_t v_max = fx_mul_q15(config->v_ratio, in->v_dc);
+    const int32_t u_d = fx_clamp_q31(d.u, -v_max, v_max);
+    int32_t u_q = fx_clamp_q31(q.u, -v_max, v_max);
+    const int32_t room = v_max * v_max - u_d * u_d; /* Q30 */
+    if (u_q * u_q > room) {
+        const int32_t q_max = fx_sqrt_q30((uint32_t)room);
+        u_q = fx_clamp_q31(u_q, -q_max, q_max);
+    }
+
+    state->limited = (u_d != d.u) || (u_q != q.u);
+    state->s_d = integrate(config, &d, state->s_d, u_d);
+    state->s_q = integrate(config, &q, state->s_q, u_q);
+    return (dq_t){(q15_t)u_d, (q15_t)u_q};
+}

@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_CURRENT_CONTROL_H
+#define CONTROL_CURRENT_CONTROL_H
+/** Current control in the rotor frame: one PI per axis, decoupled by the tables and the identified flux.
+ *   u_d = sigma (f_d - psi_d) + s_d - w psi_q,          s_d += sigma a_i (psi_d* - psi_d)
+ *   u_q = sigma (f_q - psi_q) + s_q + w (psi_d + dpsi), s_q += sigma a_i (psi_q* - psi_q)
+ *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i*  (set-point weight b, resistive drop fed forward)
+ * The error is taken in flux linkage: sigma (psi* - psi) is sigma l (i* - i) with l the incremental inductance between the
+ * two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
+ *   sigma = 1/(2 T_d), T_d = 1.5 T_s;  an axis's integrator holds while the voltage circle cuts it and its error pushes out.
+ *   |u| <= v_ratio v_dc: u_d keeps its share first, u_q gets sqrt(v_max^2 - u_d^2).
+ * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
+ * Units    per unit
+ * Range    sigma_gain = sigma/omega_b in Q15.16; b, a_i in q15; |omega| < 1
+ * Rounding half up: 1/2 LSB q15 in u, 1/2 LSB q31 per step in s
+ * Errors   saturates and says so in limited; no fault of its own
+ * Context  step: fast ISR, one square root only while limited; target: 1 kHz task */
+#include <stdbool.h>
+
+#include "control/flux_table_types.h"
+#include "types/frames.h"
+
+typedef struct {
+    q16_t sigma_gain;
+    q16_t drop_gain;       /* r/sigma_gain: flux that asks for the resistive drop */
+    q15_t setpoint_weight; /* b = w_c/(w_c + a) */
+    q15_t integral_gain;   /* sigma_gain a_i */
+    q15_t v_ratio;         /* usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
+} current_control_config_t;
+
+/** Where the current shall go, in flux linkage. */
+typedef struct {
+    dq_t psi;      /* psi*: what the integrators follow */
+    dq_t weighted; /* f: what the proportional part follows */
+} current_target_t;
+
+typedef struct {
+    q31_t s_d, s_q;
+    bool limited; /* the circle cut the voltage in the last step */
+} current_control_state_t;
+
+typedef struct {
+    const current_target_t *target;
+    const flux_point_t *flux; /* at the measured current */
+    q15_t omega;
+    q15_t psi_delta; /* identified flux minus the table's */
+    q15_t v_dc;
+} current_control_in_t;
+
+void current_control_reset(current_control_state_t *state);
+current_target_t current_control_target(const current_control_config_t *config, dq_t i_ref, const flux_point_t *at_ref);
+dq_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
+                          const current_control_in_t *in);
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_FLUX_TABLE_H
+#define CONTROL_FLUX_TABLE_H
+/** The L_d/L_q look-up service: everything a saturating machine's other stages need to know at (i_d, i_q).
+ *   psi_d = l_d(i_d,|i_q|) i_d + psi_f0(|i_q|),  psi_q = l_q(i_d,|i_q|) i_q, bilinear in the tabulated quantities
+ * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6); the 2014 paper's look-up of L_d, L_q (section 1)
+ * Units    currents per unit of I_b; results as in flux_table_types.h
+ * Range    i_d, i_q anywhere in q15; outside the grid the edge is used and flagged
+ * Rounding 1 LSB q15 per interpolated quantity, plus 1/2 LSB in each product
+ * Errors   clamped; flux_table_valid() rejects a bad table at start-up
+ * Context  fast ISR, once per period; no division, no loop */
+#include <stdint.h>
+
+#include "control/flux_table_types.h"
+#include "fx/lookup.h"
+#include "types/frames.h"
+
+typedef struct {
+    fx_grid_t grid;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
+    uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
+    const int16_t *l_d, *l_q, *l_qq, *g_d, *g_q; /* [ix * ny + iy] */
+    const int16_t *psi_f0; /* [ix * ny + iy], the same in every row: one cell serves all look-ups */
+} flux_table_config_t;
+
+bool flux_table_valid(const flux_table_config_t *config);
+flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i);
+
+#endif

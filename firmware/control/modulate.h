@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_MODULATE_H
+#define CONTROL_MODULATE_H
+/** From a dq voltage to three duties: space-vector modulation by min-max zero sequence, up to the hexagon.
+ *   u_ab = rot(theta + 1.5 w T_s) u_dq;  v_x = u_x/v_dc;  d_x = 1/2 + v_x - (max v + min v)/2 + c_x
+ *   c_x: dead-time compensation of phase x by its predicted current, a straight line inside +-i_knee, constant outside
+ *   beyond the hexagon the vector is shortened, its direction kept; pulses shorter than min_pulse snap to the nearer of {0, min_pulse}.
+ *   acted: the voltage that the limited duties make once the inverter has taken c_x away, in the frame it acts in.
+ * Source   docs/theory/modulation.md (MO-1) ... (MO-9)
+ * Units    u per unit of V_b; duties with 2^15 = 1.0; dead_time = t_dead f_pwm in duty units times the compensated fraction
+ * Range    v_dc >= v_dc_min (below it the minimum is used)
+ * Rounding 1 LSB of duty (2^-15)
+ * Errors   limited says that acted differs from the command by more than rounding
+ * Context  fast ISR; one bounded hardware division */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "fx/trig.h"
+#include "types/frames.h"
+#include "types/samples.h"
+
+typedef struct {
+    q15_t dead_time;      /* compensated duty error of one phase */
+    q16_t knee_gain;      /* 1/i_knee: 1.0 reached at the end of the straight line */
+    q15_t min_pulse;      /* shortest pulse the bridge makes, in duty */
+    q15_t v_dc_min;       /* floor for the normalisation */
+} modulate_config_t;
+
+typedef struct {
+    dq_t u;        /* commanded voltage */
+    dq_t i;        /* currents for the polarity */
+    fx_sincos_t advanced; /* sine and cosine of the angle at the middle of the acting period */
+    q15_t v_dc;
+} modulate_in_t;
+
+typedef struct {
+    duty_t duty;
+    dq_t acted;
+    bool limited;
+} modulate_out_t;
+
+modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in);
+
+#endif

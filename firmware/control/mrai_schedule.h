@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_MRAI_SCHEDULE_H
+#define CONTROL_MRAI_SCHEDULE_H
+/** Gates, speed and current normalisation and quality of the identification: the slow half of control/mrai.h.
+ *   flux gate        |w| >= w_min and |i| >= i_min: without current the dead time swallows any voltage and proves nothing
+ *   resistance gate  the same, and |w| <= w_r_max
+ *   quality          first-order filter towards 1 - |drift|/drift_full while the gate is open, towards 0 while closed or
+ *                    clamped; drift = change of the identified parameter per step: what the adaptation still has to do
+ * Source   docs/theory/mrai.md (MR-12) ... (MR-18)
+ * Units    as in control/mrai.h; quality 0 ... 1 in q15
+ * Errors   reciprocal of a gated quantity only: bounded
+ * Context  1 kHz task */
+#include "control/mrai.h"
+
+typedef struct {
+    q15_t psi_quality, r_quality;
+    q31_t psi_last, r_last; /* identified values at the last step */
+} mrai_quality_t;
+
+typedef struct {
+    const mrai_in_t *sample; /* latest operating point */
+    const mrai_state_t *identifier;
+    bool enabled; /* identification wanted and the bridge on */
+} mrai_schedule_in_t;
+
+mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *quality, const mrai_schedule_in_t *in);
+
+#endif

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SAFETY_MONITOR_H
+#define SAFETY_MONITOR_H
+/** Sample monitors of the fast ISR: pure decisions from one set of samples and a few counters.
+ *   over-current  any |i_x| > i_trip in one sample;          over-voltage  v_dc > v_max for 2 samples
+ *   under-voltage v_dc < v_min for 10 samples;               current sum   |i_a + i_b + i_c| > sum_max for 5 samples
+ *   angle         3 implausible jumps in a row
+ * Source   docs/architecture.md, fault table
+ * Units    per unit
+ * Range    i_trip < 0.8: the trip comes before the converter's end stop
+ * Errors   returns the set of faults that are confirmed now; latching is the supervisor's business
+ * Context  fast ISR; no division, no loop */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "types/frames.h"
+
+enum {
+    FAULT_OVER_CURRENT = 1u << 0,
+    FAULT_OVER_VOLTAGE = 1u << 1,
+    FAULT_UNDER_VOLTAGE = 1u << 2,
+    FAULT_CURRENT_SUM = 1u << 3,
+    FAULT_ANGLE = 1u << 4,
+    FAULT_INPUT = 1u << 5,     /* the HAL delivered something that is no number */
+    FAULT_OVERRUN = 1u << 6,   /* the identification did not finish within its period, 3 in a row */
+    FAULT_CONFIG = 1u << 7     /* start-up check of the motor data failed */
+};
+
+typedef struct {
+    q15_t i_trip;
+    q15_t v_max, v_min;
+    q15_t sum_max;
+} monitor_config_t;
+
+typedef struct {
+    uint8_t over_voltage, under_voltage, current_sum, angle;
+} monitor_state_t;
+
+typedef struct {
+    abc_t i;
+    q15_t v_dc;
+    bool angle_jumped;
+} monitor_in_t;
+
+uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in);
+
+#endif
