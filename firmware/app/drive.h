@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef APP_DRIVE_H
+#define APP_DRIVE_H
+/** One drive: configuration, the state of every stage, and the three activities that run it.
+ *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), then pends mrai_isr
+ *   mrai_isr  each PWM period, below the fast ISR: identification and torque estimate
+ *   task_1khz every tenth period, below both: request, torque loop, current reference, identification schedule, supervision
+ * Source   docs/architecture.md
+ * Units    per unit of motor.bases
+ * Errors   latched in faults; the gates open in the same period
+ * Context  all state lives here: several drives run in one process */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/exchange.h"
+#include "app/motor.h"
+#include "control/mrai_schedule.h"
+#include "control/torque_estimate.h"
+
+/** What the outside asks. Writer: one (communication or test); each field is one word, read by the 1 kHz task. */
+typedef struct {
+    q15_t torque;
+    dq_t i_ref;          /* current mode only */
+    bool enable;
+    bool current_mode;   /* commissioning: i_ref directly, no torque path */
+    bool torque_loop;
+    bool identification;
+    bool fault_reset;    /* taken and cleared by the task while enable is off */
+} request_t;
+
+typedef enum { RUN_STATE_OFF = 0, RUN_STATE_RUN = 1, RUN_STATE_FAULT = 2 } run_state_t;
+
+/** Written by the fast ISR alone. */
+typedef struct {
+    angle_tracker_state_t angle_tracker;
+    current_control_state_t current_control;
+    monitor_state_t monitor;
+    modulate_out_t modulated;    /* acts during the next period */
+    dq_t acting;                 /* acts during this period */
+    uint8_t periods_on;          /* since the gates closed, saturates at 2: then acting is known */
+    uint8_t overruns_in_a_row;
+    uint32_t overruns;
+    uint32_t pended;             /* identifications asked for */
+    volatile uint32_t faults;    /* set here (and by drive_raise_fault), cleared by the task while off */
+} fast_state_t;
+
+/** Written by the MRAI ISR alone; psi_delta_q15 is one half word for the fast ISR. */
+typedef struct {
+    mrai_state_t mrai;
+    torque_estimate_state_t torque;
+    volatile uint32_t finished;
+    volatile q15_t psi_delta_q15;
+} slow_state_t;
+
+/** Written by the 1 kHz task alone. */
+typedef struct {
+    torque_loop_state_t torque_loop;
+    mrai_quality_t quality;
+    current_reference_t reference;
+    q15_t torque_command; /* after limit and slew */
+    q15_t torque_request; /* after the torque loop */
+    run_state_t run_state;
+} task_state_t;
+
+typedef struct {
+    motor_t motor; /* a copy in RAM: calibration changes it, the flash original never */
+    request_t request;
+    fast_state_t fast;
+    slow_state_t slow;
+    task_state_t task;
+    sample_box_t samples;
+    command_box_t commands;
+    schedule_box_t schedules;
+} drive_t;
+
+void drive_init(drive_t *drive, const motor_t *source);
+void drive_raise_fault(drive_t *drive, uint32_t fault);
+void drive_identification_reset(drive_t *drive);
+
+void fast_isr(drive_t *drive);
+void mrai_isr(drive_t *drive);
+void task_1khz(drive_t *drive);
+
+#endif

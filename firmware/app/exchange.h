@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef APP_EXCHANGE_H
+#define APP_EXCHANGE_H
+/** The two boxes through which priorities exchange data; each has one writer.
+ *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
+ *   Upwards (task to fast ISR) the reader cannot be interrupted by its writer: one read is enough.
+ *   Downwards (fast ISR to MRAI ISR and task) the reader may be: it reads again if two writes came in between.
+ * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
+ * Errors   none
+ * Context  stated per box */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "control/current_control.h"
+#include "control/mrai.h"
+#include "types/frames.h"
+
+/** One period as the fast ISR saw it. Writer: fast ISR. Readers: MRAI ISR, 1 kHz task. */
+typedef struct {
+    mrai_in_t mrai;
+    q15_t v_dc;
+    bool acting;          /* mrai.u really acted: the bridge was on when it was computed and is on now */
+    bool voltage_limited; /* circle or hexagon cut the voltage */
+} sample_t;
+
+typedef struct {
+    sample_t slot[2];
+    volatile uint32_t generation;
+} sample_box_t;
+
+/** What the task asks of the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
+typedef struct {
+    current_target_t target;
+    bool run;
+} command_t;
+
+typedef struct {
+    command_t slot[2];
+    volatile uint32_t generation;
+} command_box_t;
+
+/** Factors of the identification. Writer: 1 kHz task. Reader: MRAI ISR. */
+typedef struct {
+    mrai_schedule_t slot[2];
+    volatile uint32_t generation;
+} schedule_box_t;
+
+/* The compiler must not move the slot's stores behind the generation's. */
+static inline void exchange_barrier(void)
+{
+    __asm__ volatile("" ::: "memory");
+}
+
+static inline sample_t *sample_box_begin(sample_box_t *box)
+{
+    return &box->slot[(box->generation + 1U) & 1U];
+}
+
+static inline void sample_box_publish(sample_box_t *box)
+{
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline sample_t sample_box_read(const sample_box_t *box)
+{
+    sample_t copy;
+    uint32_t seen;
+    do {
+        seen = box->generation;
+        exchange_barrier();
+        copy = box->slot[seen & 1U];
+        exchange_barrier();
+    } while (box->generation - seen > 1U);
+    return copy;
+}
+
+static inline void command_box_write(command_box_t *box, command_t command)
+{
+    box->slot[(box->generation + 1U) & 1U] = command;
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline command_t command_box_read(const command_box_t *box)
+{
+    return box->slot[box->generation & 1U];
+}
+
+static inline void schedule_box_write(schedule_box_t *box, mrai_schedule_t schedule)
+{
+    box->slot[(box->generation + 1U) & 1U] = schedule;
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline const mrai_schedule_t *schedule_box_read(const schedule_box_t *box)
+{
+    return &box->slot[box->generation & 1U];
+}
+
+#endif

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef APP_MOTOR_H
+#define APP_MOTOR_H
+/** Everything that depends on the machine and its inverter: one constant, generated from motor.toml and the flux map.
+ * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
+ * Errors   motor_valid() checks tables and limits at start-up
+ * Context  const data in flash */
+#include "control/angle_tracker.h"
+#include "control/current_control.h"
+#include "control/current_reference.h"
+#include "control/flux_table.h"
+#include "control/measure.h"
+#include "control/modulate.h"
+#include "control/mrai.h"
+#include "control/torque_loop.h"
+#include "safety/monitor.h"
+#include "types/bases.h"
+
+typedef struct {
+    const char *name;
+    bases_t bases;
+    uint8_t adc_bits;
+    float current_full_scale_A;
+    float v_dc_full_scale_V;
+    float torque_max_Nm;
+    float psi_f_Vs;            /* table value at no current: psi_f^ = psi_f_Vs + dpsi */
+    float r_ohm_20;
+    float dead_time_s;         /* of the bridge: modulate.dead_time compensates a fraction of it */
+    q15_t torque_max;
+    q15_t torque_slew;         /* per 1 kHz step; Q15_MAX = open */
+    measure_config_t measure;
+    angle_tracker_config_t angle_tracker;
+    flux_table_config_t flux_table;
+    current_control_config_t current_control;
+    modulate_config_t modulate;
+    mrai_config_t mrai;
+    torque_loop_config_t torque_loop;
+    current_reference_config_t current_reference;
+    monitor_config_t monitor;
+} motor_t;
+
+extern const motor_t motor;
+
+bool motor_valid(const motor_t *motor);
+
+#endif

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/drive.h"
+#include "fx/vec.h"
+#include "signal/rate_limit.h"
+
+static run_state_t supervise(drive_t *drive)
+{
+    if (drive->request.fault_reset) {
+        drive->request.fault_reset = false;
+        if (!drive->request.enable) {
+            drive->fast.faults = drive->fast.faults & FAULT_CONFIG; /* bad motor data stay bad */
+        }
+    }
+    if (drive->fast.faults != 0) {
+        return RUN_STATE_FAULT;
+    }
+    return drive->request.enable ? RUN_STATE_RUN : RUN_STATE_OFF;
+}
+
+/* Request -> limits -> slew -> torque loop -> what the current reference is asked for. */
+static q15_t torque_path(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const motor_t *m = &drive->motor;
+    const q15_t most = m->torque_max;
+    const q15_t wanted = fx_clamp_q15(drive->request.torque, fx_neg_q15(most), most);
+
+    task->torque_command = rate_limit_step(task->torque_command, wanted, m->torque_slew);
+    const torque_loop_in_t loop = {
+        .command = task->torque_command,
+        .estimate = drive->slow.torque.mean,
+        .enabled = drive->request.torque_loop,
+        .limited = task->reference.limited || sample->voltage_limited,
+    };
+    return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
+}
+
+static dq_t references(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    task->torque_request = torque_path(drive, sample);
+    const current_reference_in_t in = {
+        .torque = task->torque_request,
+        .v_dc = sample->v_dc,
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
+    };
+    task->reference = current_reference_step(&drive->motor.current_reference, &in);
+    return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
+}
+
+static void rest(task_state_t *task)
+{
+    task->torque_loop = (torque_loop_state_t){0};
+    task->reference = (current_reference_t){0};
+    task->torque_command = 0;
+    task->torque_request = 0;
+}
+
+void task_1khz(drive_t *drive)
+{
+    task_state_t *task = &drive->task;
+    const sample_t sample = sample_box_read(&drive->samples);
+    task->run_state = supervise(drive);
+
+    command_t command = {.run = task->run_state == RUN_STATE_RUN};
+    if (command.run) {
+        const dq_t i_ref = references(drive, &sample);
+        const flux_point_t at_ref = flux_table_step(&drive->motor.flux_table, i_ref);
+        command.target = current_control_target(&drive->motor.current_control, i_ref, &at_ref);
+    } else {
+        rest(task);
+    }
+    command_box_write(&drive->commands, command);
+
+    const mrai_schedule_in_t schedule = {
+        .sample = &sample.mrai,
+        .identifier = &drive->slow.mrai,
+        .enabled = drive->request.identification && sample.acting,
+    };
+    schedule_box_write(&drive->schedules, mrai_schedule_step(&drive->motor.mrai, &task->quality, &schedule));
+}

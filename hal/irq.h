@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_IRQ_H
+#define HAL_IRQ_H
+/** Pends the identification interrupt, which runs below the fast ISR and above the 1 kHz task.
+ * Source   docs/architecture.md, priorities
+ * Errors   none; pending an interrupt that is already pending is one interrupt
+ * Context  fast ISR, once per period */
+
+void hal_irq_pend_mrai(void);
+
+#endif

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_PWM_H
+#define HAL_PWM_H
+/** Three-phase bridge: duties for the next period, and the gates.
+ * Source   docs/howto/port.md
+ * Units    duty with 2^15 = 1.0 (0 ... 32768); the port turns it into timer ticks and takes it over synchronously
+ * Errors   none; duties are always in range
+ * Context  fast ISR, once per period; enable(true) takes effect together with the duties written in the same period,
+ *          enable(false) at once */
+#include <stdbool.h>
+
+#include "types/samples.h"
+
+void hal_pwm_write(duty_t duty);
+void hal_pwm_enable(bool on);
+
+#endif
