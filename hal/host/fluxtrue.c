@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/host/fluxtrue.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "hal/host/instance.h"
+#include "hal/host/port.h"
+
+#define PERIODS_PER_TASK 10U
+#define TURN_RAD 6.283185307179586
+#define DUTY_ONE 32768.0
+
+/* Beyond these no sensor of a traction drive delivers: a unit mix-up or garbage, not a measurement. */
+#define CURRENT_CREDIBLE_A 1e5
+#define VOLTAGE_CREDIBLE_V 1e5
+#define ANGLE_CREDIBLE_RAD 1e9
+#define TEMPERATURE_MIN_C (-100.0)
+#define TEMPERATURE_MAX_C 500.0
+
+fluxtrue_t *fluxtrue_create(void)
+{
+    fluxtrue_t *instance = calloc(1, sizeof *instance);
+    if (instance) {
+        drive_init(&instance->drive, &motor);
+        instance->winding_C = 20.0;
+    }
+    return instance;
+}
+
+void fluxtrue_destroy(fluxtrue_t *drive)
+{
+    free(drive);
+}
+
+/* Written so that a NaN fails: every comparison with it is false. */
+static bool credible(const double in[6])
+{
+    for (int k = 0; k < 3; k++) {
+        if (!(fabs(in[k]) <= CURRENT_CREDIBLE_A)) {
+            return false;
+        }
+    }
+    return in[3] >= -VOLTAGE_CREDIBLE_V && in[3] <= VOLTAGE_CREDIBLE_V && fabs(in[4]) <= ANGLE_CREDIBLE_RAD &&
+           in[5] >= TEMPERATURE_MIN_C && in[5] <= TEMPERATURE_MAX_C;
+}
+
+static uint16_t to_count(double share, unsigned bits)
+{
+    const double top = (double)(1U << bits) - 1.0;
+    return (uint16_t)fmin(fmax(floor(share * (top + 1.0) + 0.5), 0.0), top);
+}
+
+static void take_samples(fluxtrue_t *d, const double in[6])
+{
+    const motor_t *m = &d->drive.motor;
+    const double span_A = 2.0 * (double)m->current_full_scale_A;
+    const double turns = in[4] / TURN_RAD;
+    d->counts = (adc_counts_t){
+        .i_a = to_count(in[0] / span_A + 0.5, m->adc_bits),
+        .i_b = to_count(in[1] / span_A + 0.5, m->adc_bits),
+        .i_c = to_count(in[2] / span_A + 0.5, m->adc_bits),
+        .v_dc = to_count(in[3] / (double)m->v_dc_full_scale_V, m->adc_bits),
+    };
+    d->theta_m = (uint32_t)((turns - floor(turns)) * 4294967295.0);
+    d->winding_C = in[5];
+}
+
+static void run_period(fluxtrue_t *d)
+{
+    host_port_select(d);
+    fast_isr(&d->drive);
+    if (d->mrai_pending) {
+        d->mrai_pending = false;
+        mrai_isr(&d->drive);
+    }
+    d->periods++;
+    if (d->periods % PERIODS_PER_TASK == 0) {
+        task_1khz(&d->drive);
+    }
+    host_port_select(NULL);
+}
+
+void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4])
+{
+    if (credible(in)) {
+        take_samples(drive, in);
+    } else {
+        /* The last good samples stay: filters and observers keep their sense, only the gates open. */
+        drive_raise_fault(&drive->drive, FAULT_INPUT);
+    }
+    run_period(drive);
+    out[0] = drive->duty.a / DUTY_ONE;
+    out[1] = drive->duty.b / DUTY_ONE;
+    out[2] = drive->duty.c / DUTY_ONE;
+    out[3] = drive->gates ? 1.0 : 0.0;
+}

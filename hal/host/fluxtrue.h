@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_HOST_FLUXTRUE_H
+#define HAL_HOST_FLUXTRUE_H
+/** Software in the loop: the firmware as a library, for any plant that can call C.
+ *   One call to fluxtrue_step() is one PWM period: samples in, the duties for the next period out.
+ * Source   docs/howto/software-in-the-loop.md
+ * Units    SI; the names of fluxtrue_set() and fluxtrue_get() end in their unit
+ * Errors   fluxtrue_set() answers a negative code; fluxtrue_get() of an unknown name is NaN;
+ *          non-finite or impossible samples open the gates and set a fault bit
+ * Context  any number of instances in one process; one thread per instance at a time */
+#if defined(__GNUC__)
+#define FLUXTRUE_API __attribute__((visibility("default")))
+#else
+#define FLUXTRUE_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { FLUXTRUE_OK = 0, FLUXTRUE_UNKNOWN_NAME = -1, FLUXTRUE_OUT_OF_RANGE = -2, FLUXTRUE_READ_ONLY = -3 };
+
+typedef struct fluxtrue fluxtrue_t;
+
+/** A new drive with the motor compiled in; NULL when out of memory. */
+FLUXTRUE_API fluxtrue_t *fluxtrue_create(void);
+FLUXTRUE_API void fluxtrue_destroy(fluxtrue_t *drive);
+/** FLUXTRUE_OK, or why not; a refused value changes nothing. */
+FLUXTRUE_API int fluxtrue_set(fluxtrue_t *drive, const char *name, double value);
+/** The value now; NaN for an unknown name. */
+FLUXTRUE_API double fluxtrue_get(const fluxtrue_t *drive, const char *name);
+/** The names one by one, NULL after the last and for a negative index. */
+FLUXTRUE_API const char *fluxtrue_name(int index);
+/** in: ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start.
+ *  out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1. */
+FLUXTRUE_API void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,238 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "hal/host/calibration.h"
+#include "hal/host/instance.h"
+
+typedef double (*get_fn)(const fluxtrue_t *);
+typedef void (*set_fn)(fluxtrue_t *, double);
+
+typedef struct {
+    const char *name;
+    get_fn get;
+    set_fn set; /* NULL: read only */
+    double lo, hi;
+} parameter_t;
+
+static double pu15(q15_t x, float base)
+{
+    return (double)x / 32768.0 * (double)base;
+}
+
+static double pu31(q31_t x, float base)
+{
+    return (double)x / 2147483648.0 * (double)base;
+}
+
+static q15_t to_pu15(double x, float base)
+{
+    return fx_sat_q15((int32_t)lrint(fmin(fmax(x / (double)base, -1.0), 1.0) * 32768.0));
+}
+
+static const bases_t *bases(const fluxtrue_t *d)
+{
+    return &d->drive.motor.bases;
+}
+
+static const sample_t *sample(const fluxtrue_t *d)
+{
+    return &d->drive.samples.slot[d->drive.samples.generation & 1U];
+}
+
+#define GETTER(name, expression) \
+    static double get_##name(const fluxtrue_t *d) \
+    { \
+        return (double)(expression); \
+    }
+
+GETTER(torque_command, d->torque_command_Nm)
+GETTER(enable, d->drive.request.enable)
+GETTER(torque_loop, d->drive.request.torque_loop)
+GETTER(identification, d->drive.request.identification)
+GETTER(fault_reset, d->drive.request.fault_reset)
+GETTER(current_mode, d->drive.request.current_mode)
+GETTER(torque_estimate, pu15(d->drive.slow.torque.mean, bases(d)->torque_Nm))
+GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
+GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
+GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
+GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
+GETTER(psi_f, (double)d->drive.motor.psi_f_Vs + pu31(d->drive.slow.mrai.psi_delta, bases(d)->flux_Vs))
+GETTER(r, (double)d->drive.motor.r_ohm_20 + pu31(d->drive.slow.mrai.r_delta, bases(d)->resistance_ohm))
+GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
+GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
+GETTER(psi_clamped, d->drive.slow.mrai.psi_clamped)
+GETTER(r_clamped, d->drive.slow.mrai.r_clamped)
+GETTER(id, pu15(sample(d)->mrai.i.d, bases(d)->current_A))
+GETTER(iq, pu15(sample(d)->mrai.i.q, bases(d)->current_A))
+GETTER(ud, pu15(d->drive.fast.modulated.acted.d, bases(d)->voltage_V))
+GETTER(uq, pu15(d->drive.fast.modulated.acted.q, bases(d)->voltage_V))
+GETTER(v_dc, pu15(sample(d)->v_dc, bases(d)->voltage_V))
+GETTER(fault_word, d->drive.fast.faults)
+GETTER(voltage_limited, sample(d)->voltage_limited)
+GETTER(table_clamped, sample(d)->mrai.flux.clamped)
+GETTER(overruns, d->drive.fast.overruns)
+GETTER(run_state, d->drive.task.run_state)
+GETTER(winding, d->winding_C)
+
+static double get_speed(const fluxtrue_t *d)
+{
+    const double omega_m = pu31(sample(d)->mrai.omega, bases(d)->omega_rad_s) / d->drive.motor.angle_tracker.pole_pairs;
+    return omega_m * 60.0 / 6.283185307179586;
+}
+
+/* In current mode the command is the request; else it is what the reference stage answered. */
+static dq_t reference_of(const fluxtrue_t *d)
+{
+    return d->drive.request.current_mode ? d->drive.request.i_ref : d->drive.task.reference.i_ref;
+}
+
+GETTER(id_ref, pu15(reference_of(d).d, bases(d)->current_A))
+GETTER(iq_ref, pu15(reference_of(d).q, bases(d)->current_A))
+
+static void set_torque(fluxtrue_t *d, double x)
+{
+    d->torque_command_Nm = x;
+    d->drive.request.torque = to_pu15(x, bases(d)->torque_Nm);
+}
+
+static void set_enable(fluxtrue_t *d, double x)
+{
+    d->drive.request.enable = x != 0.0;
+}
+
+static void set_torque_loop(fluxtrue_t *d, double x)
+{
+    d->drive.request.torque_loop = x != 0.0;
+}
+
+static void set_identification(fluxtrue_t *d, double x)
+{
+    d->drive.request.identification = x != 0.0;
+}
+
+static void set_fault_reset(fluxtrue_t *d, double x)
+{
+    d->drive.request.fault_reset = x != 0.0;
+}
+
+static void set_current_mode(fluxtrue_t *d, double x)
+{
+    d->drive.request.current_mode = x != 0.0;
+}
+
+static void set_id_ref(fluxtrue_t *d, double x)
+{
+    d->drive.request.i_ref.d = to_pu15(x, bases(d)->current_A);
+}
+
+static void set_iq_ref(fluxtrue_t *d, double x)
+{
+    d->drive.request.i_ref.q = to_pu15(x, bases(d)->current_A);
+}
+
+static void set_identification_reset(fluxtrue_t *d, double x)
+{
+    if (x != 0.0) {
+        drive_identification_reset(&d->drive);
+    }
+}
+
+static double get_zero(const fluxtrue_t *d)
+{
+    (void)d;
+    return 0.0;
+}
+
+/* The range of torque and current is the motor's own: see limits_of(). */
+static const parameter_t parameters[] = {
+    {"torque_command_Nm", get_torque_command, set_torque, -INFINITY, INFINITY},
+    {"enable", get_enable, set_enable, 0.0, 1.0},
+    {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
+    {"identification", get_identification, set_identification, 0.0, 1.0},
+    {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
+    {"identification_reset", get_zero, set_identification_reset, 0.0, 1.0},
+    {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
+    {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
+    {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},
+    {"torque_slew_Nm_per_s", calibration_get_torque_slew, calibration_set_torque_slew, 0.0, 1e6},
+    {"observer_m", calibration_get_observer_m, calibration_set_observer_m, 2.0, 4.0},
+    {"flux_bandwidth_rad_s", calibration_get_flux_bandwidth, calibration_set_flux_bandwidth, 0.0, 500.0},
+    {"resistance_bandwidth_rad_s", calibration_get_resistance_bandwidth, calibration_set_resistance_bandwidth, 0.0, 75.0},
+    {"torque_loop_bandwidth_rad_s", calibration_get_torque_loop, calibration_set_torque_loop, 0.0, 500.0},
+    {"dead_time_compensation", calibration_get_dead_time, calibration_set_dead_time, 0.0, 1.0},
+    {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},
+    {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
+    {"torque_request_Nm", get_torque_request, NULL, 0, 0},
+    {"torque_max_Nm", get_torque_max, NULL, 0, 0},
+    {"torque_correction", get_torque_correction, NULL, 0, 0},
+    {"psi_f_Vs", get_psi_f, NULL, 0, 0},
+    {"r_ohm", get_r, NULL, 0, 0},
+    {"psi_quality", get_psi_quality, NULL, 0, 0},
+    {"r_quality", get_r_quality, NULL, 0, 0},
+    {"psi_clamped", get_psi_clamped, NULL, 0, 0},
+    {"r_clamped", get_r_clamped, NULL, 0, 0},
+    {"id_A", get_id, NULL, 0, 0},
+    {"iq_A", get_iq, NULL, 0, 0},
+    {"ud_V", get_ud, NULL, 0, 0},
+    {"uq_V", get_uq, NULL, 0, 0},
+    {"vdc_V", get_v_dc, NULL, 0, 0},
+    {"speed_rpm", get_speed, NULL, 0, 0},
+    {"fault_word", get_fault_word, NULL, 0, 0},
+    {"voltage_limited", get_voltage_limited, NULL, 0, 0},
+    {"table_clamped", get_table_clamped, NULL, 0, 0},
+    {"mrai_overruns", get_overruns, NULL, 0, 0},
+    {"run_state", get_run_state, NULL, 0, 0},
+    {"winding_C", get_winding, NULL, 0, 0},
+};
+
+#define PARAMETERS ((int)(sizeof parameters / sizeof parameters[0]))
+
+static const parameter_t *find(const char *name)
+{
+    for (int k = 0; name && k < PARAMETERS; k++) {
+        if (strcmp(name, parameters[k].name) == 0) {
+            return &parameters[k];
+        }
+    }
+    return NULL;
+}
+
+/* Torque and current requests are bounded by what the motor data allow. */
+static double bound_of(const fluxtrue_t *d, const parameter_t *p)
+{
+    if (p->set == set_torque) {
+        return (double)d->drive.motor.torque_max_Nm;
+    }
+    return pu15(d->drive.motor.current_reference.i_max, bases(d)->current_A);
+}
+
+int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
+{
+    const parameter_t *p = find(name);
+    if (!p) {
+        return FLUXTRUE_UNKNOWN_NAME;
+    }
+    if (!p->set) {
+        return FLUXTRUE_READ_ONLY;
+    }
+    const double hi = isinf(p->hi) ? bound_of(drive, p) : p->hi;
+    const double lo = isinf(p->lo) ? -hi : p->lo;
+    if (!(value >= lo && value <= hi)) {
+        return FLUXTRUE_OUT_OF_RANGE;
+    }
+    p->set(drive, value);
+    return FLUXTRUE_OK;
+}
+
+double fluxtrue_get(const fluxtrue_t *drive, const char *name)
+{
+    const parameter_t *p = find(name);
+    return p ? p->get(drive) : (double)NAN;
+}
+
+const char *fluxtrue_name(int index)
+{
+    return (index >= 0 && index < PARAMETERS) ? parameters[index].name : NULL;
+}

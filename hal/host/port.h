@@ -1,0 +1,10 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_HOST_PORT_H
+#define HAL_HOST_PORT_H
+/** Chooses the instance whose registers the HAL functions see in this thread.
+ * Context  fluxtrue_step() only */
+#include "hal/host/instance.h"
+
+void host_port_select(fluxtrue_t *instance);
+
+#endif
