@@ -25,10 +25,7 @@ q31_t fx_div_q31(int32_t num, int32_t den)
     const uint32_t d = (den < 0) ? (0U - (uint32_t)den) : (uint32_t)den;
     const int32_t sign = (num ^ den) >> 31;
     if (n >= d) {
-        if (n == 0U) {
-            return 0;
-        }
-        return ((den == 0) ? (num >> 31) : sign) ^ INT32_MAX;
+        return (n == 0U) ? 0 : (sign ^ INT32_MAX);
     }
     /* n < d keeps its order under the common shift; n / d * 2^32 is halved when rounded. */
     const unsigned shift = (unsigned)__builtin_clz(d);

@@ -8,7 +8,7 @@
  * Range    every argument; negative q31 gives 0, q30 of 1 and more gives Q15_MAX
  * Rounding below 1 LSB of the result: 0.69 (q30), 0.87 (q31)
  * Errors   none
- * Context  any; 21 (q30) and 30 (q31) instructions as a call, no division, no loop */
+ * Context  any; 21 (q30) and 29 (q31) instructions as a call, no division, no loop */
 
 #include "fx/q.h"
 
@@ -52,8 +52,8 @@ static inline q31_t fx_sqrt_q31(q31_t x)
     const int32_t step = fx_mulhi(residual, inverse); /* Q44 * Q29 = Q41, halved: Q42 */
     const uint32_t fine = (root << 9) + (uint32_t)((step + 0x400) >> 11);
     const unsigned scale = shift >> 1;
-    const uint32_t y = (fine + ((1U << scale) >> 1)) >> scale;
-    return (int32_t)(y - (y >> 31)); /* sqrt(Q31_MAX) rounds to 1 */
+    /* The Newton step errs downwards only, so even the root of Q31_MAX stays below 1. */
+    return (int32_t)((fine + ((1U << scale) >> 1)) >> scale);
 }
 
 #endif

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("O3") /* 2^33 sums: the plain loop takes twice as long */
+#endif
+
+#include <math.h>
+
+#include "fx/q.h"
+#include "fx_vectors.h"
+#include "unity.h"
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+/* The number of b in [from, to] for which f(a, b) is not a + slope * b, or not the constant a. */
+#define COUNT_WRONG(f, a, from, to, expected) \
+    do { \
+        for (int32_t b = (from); b <= (to); b++) { \
+            wrong += ((f)((q15_t)(a), (q15_t)b) != (expected)) ? 1 : 0; \
+        } \
+    } while (0)
+
+static int32_t smaller(int32_t a, int32_t b)
+{
+    return (a < b) ? a : b;
+}
+
+static int32_t larger(int32_t a, int32_t b)
+{
+    return (a > b) ? a : b;
+}
+
+/* For one a the sum is, as b rises, the minimum, then a + b, then the maximum: no clamp formula. */
+void test_adding_is_exact_or_saturated_for_every_pair_of_q15(void)
+{
+    const int32_t stride = exhaustive_is_affordable() ? 1 : 251;
+    for (int32_t a = -32768; a <= 32767; a += stride) {
+        const int32_t first = larger(-32768 - a, -32768);
+        const int32_t last = smaller(32767 - a, 32767);
+        int32_t wrong = 0;
+        COUNT_WRONG(fx_add_q15, a, -32768, first - 1, -32768);
+        COUNT_WRONG(fx_add_q15, a, first, last, a + b);
+        COUNT_WRONG(fx_add_q15, a, last + 1, 32767, 32767);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(0, wrong, "wrong sums");
+    }
+}
+
+void test_subtracting_is_exact_or_saturated_for_every_pair_of_q15(void)
+{
+    const int32_t stride = exhaustive_is_affordable() ? 1 : 251;
+    for (int32_t a = -32768; a <= 32767; a += stride) {
+        const int32_t first = larger(a - 32767, -32768);
+        const int32_t last = smaller(a + 32768, 32767);
+        int32_t wrong = 0;
+        COUNT_WRONG(fx_sub_q15, a, -32768, first - 1, 32767);
+        COUNT_WRONG(fx_sub_q15, a, first, last, a - b);
+        COUNT_WRONG(fx_sub_q15, a, last + 1, 32767, -32768);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(0, wrong, "wrong differences");
+    }
+}
+
+void test_negation_and_magnitude_of_every_q15_saturate_only_at_minus_one(void)
+{
+    TEST_ASSERT_EQUAL_INT16(32767, fx_neg_q15(Q15_MIN));
+    TEST_ASSERT_EQUAL_INT16(32767, fx_abs_q15(Q15_MIN));
+    for (int32_t a = -32767; a <= 32767; a++) {
+        expect_equal("fx_neg_q15", a, 0, fx_neg_q15((q15_t)a), -a);
+        expect_equal("fx_abs_q15", a, 0, fx_abs_q15((q15_t)a), (a < 0) ? -a : a);
+    }
+}
+
+void test_saturation_to_q15_leaves_the_range_alone_and_stops_at_its_ends(void)
+{
+    for (int32_t x = -32768; x <= 32767; x++) {
+        expect_equal("fx_sat_q15", x, 0, fx_sat_q15(x), x);
+    }
+    for (int32_t i = 0; i < 1000000; i++) {
+        const int32_t x = (i < CORNERS) ? corner[i] : random_s32();
+        expect_equal("fx_sat_q15", x, 0, fx_sat_q15(x), (int64_t)clip(x, -32768.0L, 32767.0L));
+    }
+}
+
+void test_saturation_to_q31_leaves_the_range_alone_and_stops_at_its_ends(void)
+{
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_sat_q31(INT64_MAX));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_sat_q31(INT64_MIN));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_sat_q31(INT64_C(0x80000000)));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_sat_q31(INT64_C(-0x80000001)));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_sat_q31(INT64_C(0xFFFFFFFF)));
+    for (int32_t i = 0; i < 1000000; i++) {
+        const int64_t x = ((int64_t)random_s32() * 8) + (random_s32() % 8);
+        const int64_t want = (x > INT32_MAX) ? INT32_MAX : (x < INT32_MIN) ? INT32_MIN : x;
+        expect_equal("fx_sat_q31", x, 0, fx_sat_q31(x), want);
+    }
+}
+
+static void q31_pair(int32_t a, int32_t b)
+{
+    const long double sum = clip((long double)a + b, INT32_MIN, INT32_MAX);
+    const long double difference = clip((long double)a - b, INT32_MIN, INT32_MAX);
+    expect_equal("fx_add_q31", a, b, fx_add_q31(a, b), (int64_t)sum);
+    expect_equal("fx_sub_q31", a, b, fx_sub_q31(a, b), (int64_t)difference);
+    expect_equal("fx_min_s32", a, b, fx_min_s32(a, b), (int64_t)fminl(a, b));
+    expect_equal("fx_max_s32", a, b, fx_max_s32(a, b), (int64_t)fmaxl(a, b));
+}
+
+void test_q31_sums_and_extremes_agree_with_long_double(void)
+{
+    for (int32_t i = 0; i < CORNERS; i++) {
+        for (int32_t j = 0; j < CORNERS; j++) {
+            q31_pair(corner[i], corner[j]);
+        }
+    }
+    for (int32_t i = 0; i < 1000000; i++) {
+        q31_pair(random_s32(), random_s32());
+    }
+}
+
+void test_q31_negation_and_magnitude_saturate_only_at_minus_one(void)
+{
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_neg_q31(INT32_MIN));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_abs_q31(INT32_MIN));
+    for (int32_t i = 1; i < 100000; i++) {
+        const int32_t a = (i < CORNERS) ? corner[i] : random_s32();
+        if (a != INT32_MIN) {
+            expect_equal("fx_neg_q31", a, 0, fx_neg_q31(a), -(int64_t)a);
+            expect_equal("fx_abs_q31", a, 0, fx_abs_q31(a), (a < 0) ? -(int64_t)a : a);
+        }
+    }
+}
+
+void test_narrowing_rounds_half_up_and_never_wraps_over_all_of_int32(void)
+{
+    TEST_ASSERT_EQUAL_INT16(32767, fx_round_q15(INT32_MAX));
+    TEST_ASSERT_EQUAL_INT16(-32768, fx_round_q15(INT32_MIN));
+    TEST_ASSERT_EQUAL_INT16(1, fx_round_q15(0x4000));   /* +1/2 LSB */
+    TEST_ASSERT_EQUAL_INT16(0, fx_round_q15(-0x4000));  /* -1/2 LSB */
+    TEST_ASSERT_EQUAL_INT16(-1, fx_round_q15(-0x4001)); /* just below */
+    TEST_ASSERT_EQUAL_INT16(32767, fx_q15_from_q31(INT32_MAX));
+    for (int32_t i = 0; i < 2000000; i++) {
+        const int32_t x = (i < CORNERS) ? corner[i] : random_s32();
+        const long double q15 = clip(half_up(x / 32768.0L), -32768.0L, 32767.0L);
+        const long double q31 = clip(half_up(x / 65536.0L), -32768.0L, 32767.0L);
+        expect_equal("fx_round_q15", x, 0, fx_round_q15(x), (int64_t)q15);
+        expect_equal("fx_q15_from_q31", x, 0, fx_q15_from_q31(x), (int64_t)q31);
+    }
+}
+
+void test_every_q15_survives_the_way_to_q31_and_back(void)
+{
+    for (int32_t x = -32768; x <= 32767; x++) {
+        expect_equal("fx_q31_from_q15", x, 0, fx_q31_from_q15((q15_t)x), (int64_t)x * 65536);
+        expect_equal("back", x, 0, fx_q15_from_q31(fx_q31_from_q15((q15_t)x)), x);
+    }
+}
+
+void test_limits_hold_between_their_ends_and_the_upper_wins_when_crossed(void)
+{
+    TEST_ASSERT_EQUAL_INT16(-5, fx_clamp_q15(-5, -10, 10));
+    TEST_ASSERT_EQUAL_INT16(-10, fx_clamp_q15(Q15_MIN, -10, 10));
+    TEST_ASSERT_EQUAL_INT16(10, fx_clamp_q15(Q15_MAX, -10, 10));
+    TEST_ASSERT_EQUAL_INT16(-10, fx_clamp_q15(0, 10, -10));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_clamp_q31(INT32_MIN, INT32_MIN, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(7, fx_clamp_q31(INT32_MIN, 7, INT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(-7, fx_clamp_q31(INT32_MAX, INT32_MIN, -7));
+}
+
+static void shift_both_ways(int32_t x, unsigned n)
+{
+    const long double scale = ldexpl(1.0L, (int)n);
+    const long double up = clip(x * scale, INT32_MIN, INT32_MAX);
+    expect_equal("fx_shl_q31", x, n, fx_shl_q31(x, n), (int64_t)up);
+    expect_equal("fx_shr_round", x, n, fx_shr_round(x, n), (int64_t)half_up(x / scale));
+}
+
+/* Up to 40: a count beyond the word's width is where C itself is undefined. */
+void test_shifts_of_any_count_saturate_upwards_and_round_half_up_downwards(void)
+{
+    for (unsigned n = 0U; n <= 40U; n++) {
+        for (int32_t i = 0; i < CORNERS; i++) {
+            shift_both_ways(corner[i], n);
+        }
+        for (int32_t i = 0; i < 50000; i++) {
+            shift_both_ways(random_s32(), n);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT32(0, fx_shr_round(INT32_MIN, UINT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_shl_q31(-1, UINT32_MAX));
+    TEST_ASSERT_EQUAL_INT32(0, fx_shl_q31(0, UINT32_MAX));
+}
+
+void test_constants_are_rounded_and_stop_at_the_ends_of_their_format(void)
+{
+    static const q15_t half = Q15(0.5); /* usable where C wants a constant */
+    TEST_ASSERT_EQUAL_INT16(16384, half);
+    TEST_ASSERT_EQUAL_INT16(32767, Q15(1.0));
+    TEST_ASSERT_EQUAL_INT16(-32768, Q15(-1.0));
+    TEST_ASSERT_EQUAL_INT16(-32768, Q15(-7));
+    TEST_ASSERT_EQUAL_INT16(32767, Q15(0.99999));
+    TEST_ASSERT_EQUAL_INT16(-3277, Q15(-0.1)); /* -3276.8 */
+    TEST_ASSERT_EQUAL_INT16(3277, Q15(0.1));
+    TEST_ASSERT_EQUAL_INT16(1638, Q15(0.05)); /* 1638.4 */
+    TEST_ASSERT_EQUAL_INT16(1, Q15(0.5 / 32768));
+    TEST_ASSERT_EQUAL_INT16(0, Q15(0.49 / 32768));
+    TEST_ASSERT_EQUAL_INT16(-1, Q15(-0.5 / 32768));
+    TEST_ASSERT_EQUAL_INT16(0, Q15(-0.49 / 32768));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, Q31(1));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, Q31(-1));
+    TEST_ASSERT_EQUAL_INT32(0x40000000, Q31(0.5));
+    TEST_ASSERT_EQUAL_INT32(-214748365, Q31(-0.1)); /* -214748364.8 */
+    TEST_ASSERT_EQUAL_INT32(Q16_ONE, Q16(1));
+    TEST_ASSERT_EQUAL_INT32(-98304, Q16(-1.5));
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, Q16(32768.0));
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, Q16(-1e9));
+}

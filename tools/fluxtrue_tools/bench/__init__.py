@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cost and accuracy of the building blocks, measured on an emulated Cortex-M4.
+
+A benchmark reports and asserts nothing: the bounds are held by tests/target. To measure another
+function, build an ELF that contains it (build.build_target), put its arguments into memory
+(Machine.place) and count a call (Machine.count); Case and measure() do that for whole lists.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fluxtrue_tools.bench.build import FX_SOURCES, build_target
+from fluxtrue_tools.bench.fx_cases import Case, cases
+from fluxtrue_tools.bench.machine import Machine
+from fluxtrue_tools.bench.peers import PEERS
+
+__all__ = ["Case", "Machine", "Result", "call_overhead", "measure", "run", "table"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Instructions issued by one function over its cases, without the return to the caller."""
+
+    name: str
+    title: str
+    group: str
+    calls: int
+    minimum: int
+    average: float
+    maximum: int
+    error: float | None
+    unit: str
+
+
+def call_overhead(machine: Machine) -> int:
+    """What a function that does nothing issues: its return."""
+    return machine.count("bench_nothing", 0)[1]
+
+
+def measure(machine: Machine, what: Iterable[Case], overhead: int) -> list[Result]:
+    """Call every case's function with all of its rows."""
+    results = []
+    for case in what:
+        calls = [machine.count(f"bench_{case.name}", *map(int, row)) for row in case.rows]
+        issued = np.array([number for _, number in calls]) - overhead
+        error = None
+        if case.error is not None:
+            values = np.array([value for value, _ in calls], dtype=np.uint64).astype(np.int64)
+            error = float(case.error(case.rows, values).max())
+        results.append(
+            Result(case.name, case.title, case.group, len(calls), int(issued.min()),
+                   float(issued.mean()), int(issued.max()), error, case.unit)  # fmt: skip
+        )
+    return results
+
+
+def _error(error: float | None, unit: str) -> str:
+    return "" if error is None else f"{error:.2g} {unit}"
+
+
+def table(results: Iterable[Result], overhead: int) -> str:
+    """The figures as text, peers below the function they compare with."""
+    peers = list(PEERS)
+    lines = [
+        "Instructions issued on an emulated Cortex-M4 (simulation; instructions are not cycles).",
+        f"Not counted: {overhead} for the return; counted: registers saved by the called function.",
+        "",
+        f"{'function':<42}{'min':>5}{'avg':>8}{'max':>5}  largest error",
+    ]
+    ours = list(results)
+    for place, result in enumerate(ours):
+        lines.append(
+            f"{result.title:<42}{result.minimum:>5}{result.average:>8.1f}{result.maximum:>5}"
+            f"  {_error(result.error, result.unit)}".rstrip()
+        )
+        if any(later.group == result.group for later in ours[place + 1 :]):
+            continue
+        for peer in (peer for peer in peers if peer.function == result.group):
+            label = f"  {peer.name}, {peer.source}"
+            lines.append(
+                f"{label:<50}{peer.instructions:>5}       {_error(peer.error, peer.unit)}".rstrip()
+            )
+    return "\n".join(lines)
+
+
+def run(build_dir: Path, out: Path | None = None) -> list[Result]:
+    """Build for the target, measure, print the table and, if wanted, write it as JSON."""
+    machine = Machine(build_target(build_dir / "bench" / "fx.elf", FX_SOURCES))
+    overhead = call_overhead(machine)
+    results = measure(machine, cases(), overhead)
+    print(table(results, overhead))
+    if out is not None:
+        data = {"call_overhead": overhead, "functions": [asdict(result) for result in results]}
+        out.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    return results

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiles C files for the emulated Cortex-M4, and the same files for this computer."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from fluxtrue_tools.bench.machine import CODE, DATA
+from fluxtrue_tools.errors import FluxtrueError
+
+ROOT = Path(__file__).resolve().parents[3]
+FIRMWARE = ROOT / "firmware"
+FX_SOURCES = (Path(__file__).with_name("fx_kernels.c"), *sorted((FIRMWARE / "fx").glob("*.c")))
+ARM_CC = "arm-none-eabi-gcc"
+ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
+
+
+def have_arm_compiler() -> bool:
+    """True if the cross compiler is on the PATH."""
+    return shutil.which(ARM_CC) is not None
+
+
+def _run(command: Sequence[str], output: Path) -> Path:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise FluxtrueError(f"cannot compile {output.name}: {done.stderr.strip()[:600]}")
+    return output
+
+
+def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:
+    """An ELF file without start-up code: its functions are called one by one."""
+    if not have_arm_compiler():
+        raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
+    link = (
+        "-nostartfiles",
+        "--specs=nano.specs",
+        f"-Wl,-Ttext={CODE[0] + 0x1000:#x},-Tdata={DATA[0]:#x},-e,0",
+    )
+    files = [str(path) for path in sources]
+    return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *files, *link, "-o", str(output)], output)
+
+
+def build_host(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:
+    """The same functions in a shared library."""
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        raise FluxtrueError("gcc not found: install gcc or run tools/setup")
+    files = [str(path) for path in sources]
+    command = [compiler, *COMMON, *flags, "-fPIC", "-shared", *files, "-lm", "-o", str(output)]
+    return _run(command, output)

@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Every function of firmware/fx behind a call, for counting instructions and for comparing the two
+ * sides of fx/arch.h. bench_<name> has the function's own argument types, so that the count holds
+ * no conversion; batch_<name> runs it over n rows of three integers. */
+#include "fx/div.h"
+#include "fx/lookup.h"
+#include "fx/q.h"
+#include "fx/trig.h"
+#include "fx/vec.h"
+
+typedef uint32_t u32;
+
+#define BATCH(name, call) \
+    void batch_##name(const int32_t (*row)[3], int64_t *out, u32 n); \
+    void batch_##name(const int32_t (*row)[3], int64_t *out, u32 n) \
+    { \
+        for (u32 i = 0U; i < n; i++) { \
+            out[i] = (int64_t)(call); \
+        } \
+    }
+#define KERNEL1(name, R, A, result) \
+    R bench_##name(A a); \
+    __attribute__((noinline)) R bench_##name(A a) \
+    { \
+        return result; \
+    } \
+    BATCH(name, bench_##name((A)row[i][0]))
+#define KERNEL2(name, R, A, B, result) \
+    R bench_##name(A a, B b); \
+    __attribute__((noinline)) R bench_##name(A a, B b) \
+    { \
+        return result; \
+    } \
+    BATCH(name, bench_##name((A)row[i][0], (B)row[i][1]))
+#define KERNEL3(name, R, A, B, C, result) \
+    R bench_##name(A a, B b, C c); \
+    __attribute__((noinline)) R bench_##name(A a, B b, C c) \
+    { \
+        return result; \
+    } \
+    BATCH(name, bench_##name((A)row[i][0], (B)row[i][1], (C)row[i][2]))
+
+/* What a call alone costs: subtracted from every count. */
+KERNEL1(nothing, int32_t, int32_t, a)
+
+KERNEL1(sat_q15, q15_t, int32_t, fx_sat_q15(a))
+KERNEL2(sat_q31, q31_t, int32_t, int32_t, fx_sat_q31((int64_t)a * 8 + (b & 7)))
+KERNEL2(add_q15, q15_t, q15_t, q15_t, fx_add_q15(a, b))
+KERNEL2(sub_q15, q15_t, q15_t, q15_t, fx_sub_q15(a, b))
+KERNEL1(neg_q15, q15_t, q15_t, fx_neg_q15(a))
+KERNEL1(abs_q15, q15_t, q15_t, fx_abs_q15(a))
+KERNEL2(add_q31, q31_t, q31_t, q31_t, fx_add_q31(a, b))
+KERNEL2(sub_q31, q31_t, q31_t, q31_t, fx_sub_q31(a, b))
+KERNEL1(neg_q31, q31_t, q31_t, fx_neg_q31(a))
+KERNEL1(abs_q31, q31_t, q31_t, fx_abs_q31(a))
+KERNEL1(round_q15, q15_t, int32_t, fx_round_q15(a))
+KERNEL1(q15_from_q31, q15_t, q31_t, fx_q15_from_q31(a))
+KERNEL1(q31_from_q15, q31_t, q15_t, fx_q31_from_q15(a))
+KERNEL2(mul_q15, q15_t, q15_t, q15_t, fx_mul_q15(a, b))
+KERNEL2(mul_q30, int32_t, q15_t, q15_t, fx_mul_q30(a, b))
+KERNEL3(mac_q30, int32_t, int32_t, q15_t, q15_t, fx_mac_q30(a, b, c))
+KERNEL2(mulhi, int32_t, int32_t, int32_t, fx_mulhi(a, b))
+KERNEL3(mulhi_add, int32_t, int32_t, int32_t, int32_t, fx_mulhi_add(a, b, c))
+KERNEL3(mulhi_sub, int32_t, int32_t, int32_t, int32_t, fx_mulhi_sub(a, b, c))
+KERNEL2(mul_q31, q31_t, q31_t, q31_t, fx_mul_q31(a, b))
+KERNEL2(mul_q31_q15, int32_t, q31_t, q15_t, fx_mul_q31_q15(a, b))
+KERNEL3(mac_q31_q15, int32_t, int32_t, q31_t, q15_t, fx_mac_q31_q15(a, b, c))
+KERNEL2(mul_gain_q15, q15_t, q16_t, q15_t, fx_mul_gain_q15(a, b))
+KERNEL2(mul_gain_q31, q31_t, q16_t, q31_t, fx_mul_gain_q31(a, b))
+KERNEL2(shl_q31, q31_t, q31_t, u32, fx_shl_q31(a, b & 63U))
+KERNEL2(shr_round, int32_t, int32_t, u32, fx_shr_round(a, b & 63U))
+KERNEL1(shl_q31_by_3, q31_t, q31_t, fx_shl_q31(a, 3U))
+KERNEL1(shr_round_by_3, int32_t, int32_t, fx_shr_round(a, 3U))
+KERNEL3(clamp_q15, q15_t, q15_t, q15_t, q15_t, fx_clamp_q15(a, b, c))
+KERNEL3(clamp_q31, q31_t, q31_t, q31_t, q31_t, fx_clamp_q31(a, b, c))
+KERNEL2(pair, u32, q15_t, q15_t, fx_pair(a, b))
+KERNEL2(dot2, int32_t, fx_pair_t, fx_pair_t, fx_dot2(a, b))
+KERNEL3(dot2_acc, int32_t, int32_t, fx_pair_t, fx_pair_t, fx_dot2_acc(a, b, c))
+KERNEL2(div_s32, int32_t, int32_t, int32_t, fx_div_s32(a, b))
+KERNEL2(div_q15, q15_t, q15_t, q15_t, fx_div_q15(a, b))
+KERNEL2(div_q31, q31_t, int32_t, int32_t, fx_div_q31(a, b))
+KERNEL1(reciprocal_q16, q16_t, q15_t, fx_reciprocal_q16(a))
+KERNEL1(sqrt_q30, q15_t, u32, fx_sqrt_q30(a))
+KERNEL1(sqrt_q31, q31_t, q31_t, fx_sqrt_q31(a))
+KERNEL2(magnitude, q15_t, q15_t, q15_t, fx_magnitude(a, b))
+KERNEL2(atan2, u32, q15_t, q15_t, fx_atan2(a, b))
+/* As an inlined caller has them: each in a register of its own (r0 and r1). */
+static inline int64_t sincos_in_registers(uint16_t angle)
+{
+    const fx_sincos_t unit = fx_sincos(angle);
+    const u32 low = (u32)unit.sin;
+    const u32 high = (u32)unit.cos;
+    return (int64_t)(((uint64_t)high << 32) | low);
+}
+KERNEL1(sincos, int64_t, uint16_t, sincos_in_registers(a))
+/* As a called function returns them: packed into r0. */
+fx_sincos_t bench_sincos_struct(uint16_t a);
+__attribute__((noinline)) fx_sincos_t bench_sincos_struct(uint16_t a)
+{
+    return fx_sincos(a);
+}
+
+/* Any numbers do, as long as a wrong weight or a wrong corner shows. */
+static const int16_t values[60] = {
+    -32768, 32767,  -32768, 0,     12345, -23456, 32767,  1,     -1,    7777,   -8888, 9999,
+    100,    -200,   300,    -400,  500,   -600,   700,    -800,  900,   -1000,  1100,  -1200,
+    32767,  32767,  -32768, -32768, 0,    0,      16384,  -16384, 8192, -8192,  4096,  -4096,
+    3,      -5,     17,     -257,  4097,  -65,    -30000, 30000, 2500,  -2500,  111,   -222,
+    333,    -444,   555,    -666,  777,   -888,   999,    -1111, 2222,  -3333,  4444,  -5555,
+};
+static const fx_lut1_t line = {values, -32768, 11, 33};
+static const fx_lut2_t plane = {values, -32768, 0, 12, 13, 9, 5};
+static const fx_grid_t grid = {-32768, 0, 12, 13, 9, 5};
+
+static inline int32_t lookup1(int32_t x)
+{
+    bool clamped;
+    const int32_t z = fx_lookup1(&line, x, &clamped);
+    return clamped ? ~z : z;
+}
+
+static inline int32_t lookup2(int32_t x, int32_t y)
+{
+    bool clamped;
+    const int32_t z = fx_lookup2(&plane, x, y, &clamped);
+    return clamped ? ~z : z;
+}
+
+/* The grid by pointer, as configurations have it: nothing about it is known when compiling. */
+static const fx_grid_t *volatile grid_pointer = &grid;
+
+static inline int32_t one_table(const fx_grid_t *g, int32_t x, int32_t y)
+{
+    const fx_cell_t cell = fx_cell(g, x, y);
+    const int32_t z = fx_cell_interp(values, g->ny, cell);
+    return cell.clamped ? ~z : z;
+}
+
+static inline int32_t five_tables(const fx_grid_t *g, int32_t x, int32_t y)
+{
+    const fx_cell_t cell = fx_cell(g, x, y);
+    int32_t z = fx_cell_interp(values, g->ny, cell);
+    z += fx_cell_interp(&values[1], g->ny, cell);
+    z += fx_cell_interp(&values[2], g->ny, cell);
+    z += fx_cell_interp(&values[3], g->ny, cell);
+    z += fx_cell_interp(&values[4], g->ny, cell);
+    return cell.clamped ? ~z : z;
+}
+
+KERNEL1(lookup1, int32_t, int32_t, lookup1(a))
+KERNEL2(lookup2, int32_t, int32_t, int32_t, lookup2(a, b))
+KERNEL2(one_table, int32_t, int32_t, int32_t, one_table(grid_pointer, a, b))
+KERNEL2(five_tables, int32_t, int32_t, int32_t, five_tables(grid_pointer, a, b))
