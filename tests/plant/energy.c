@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "energy.h"
+
+void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to,
+                     const double u_s[2], const double i_s[2], double h)
+{
+    double swept = 0.0;
+    for (int k = 0; k < 2; k++) {
+        e->electrical += 1.5 * h * u_s[k] * i_s[k];
+        e->copper += 1.5 * h * m->r_ohm * i_s[k] * i_s[k];
+        e->field += 0.75 * (from->im_dq[k] + to->im_dq[k]) * (to->psi_dq[k] - from->psi_dq[k]);
+    }
+    swept += (from->psi_s[0] + to->psi_s[0]) * (to->psi_s[1] - from->psi_s[1]);
+    swept -= (from->psi_s[1] + to->psi_s[1]) * (to->psi_s[0] - from->psi_s[0]);
+    e->iron += 0.75 * m->iron_A_per_Vs * swept;
+}
+
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms,
+                     double h)
+{
+    e->torque += h * torque_Nm;
+    e->torque_shaft += h * (torque_Nm - viscous_Nms * speed_rad_s);
+    e->mechanical += h * torque_Nm * speed_rad_s;
+}
+
+void energy_voltage(energy_t *e, const double u_s[2], turn_t mid, double half_rad, double h)
+{
+    double u_dq[2];
+    const double sinc = sinc_of(half_rad);
+    to_rotor(mid, u_s, u_dq);
+    e->u_dq[0] += h * sinc * u_dq[0];
+    e->u_dq[1] += h * sinc * u_dq[1];
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef PLANT_ENERGY_H
+#define PLANT_ENERGY_H
+/** Where the energy goes, substep by substep:
+ *   dc = inverter + electrical,  electrical = copper + iron + mechanical + field
+ * Source   docs/theory/plant.md (PL-20)
+ * Units    J over a period; the mean voltage and torque as integrals
+ * Rounding each term is integrated by itself: the balance closes to second order, not trivially
+ * Context  simulation only */
+#include "machine.h"
+
+typedef struct {
+    double psi_s[2], psi_dq[2], im_dq[2], torque_Nm;
+} instant_t;
+
+typedef struct {
+    double u_dq[2], torque, torque_shaft; /* integrals over time */
+    double dc, electrical, copper, iron, mechanical, field;
+} energy_t;
+
+static inline instant_t energy_instant(const machine_t *m)
+{
+    return (instant_t){.psi_s = {m->psi_s[0], m->psi_s[1]},
+                       .psi_dq = {m->psi_dq[0], m->psi_dq[1]},
+                       .im_dq = {m->im_dq[0], m->im_dq[1]},
+                       .torque_Nm = machine_torque(m)};
+}
+
+/** Adds a substep of length h from one instant to the other, with its mid-point current i_s. */
+void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to,
+                     const double u_s[2], const double i_s[2], double h);
+
+/** The mechanical part: mean torque of the substep, speed in its middle. */
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms,
+                     double h);
+
+/** Mean of the constant u_s over the substep in the rotor frame that turns by 2 x half_rad. */
+void energy_voltage(energy_t *e, const double u_s[2], turn_t mid, double half_rad, double h);
+
+#endif

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "inverter.h"
+
+#include "flux_solve.h"
+
+/* Half the current that recharges the switches' output capacitance within the dead time (PL-12). */
+#define SWITCHING_ZONE_A 0.05
+/* A broken lead holds its current at zero against any voltage. */
+#define OPEN_LEAD_V 1e6
+#define SWEEPS 60
+#define SWEEP_END_V 1e-7
+
+static double clamp(double x, double lo, double hi)
+{
+    return x < lo ? lo : (x > hi ? hi : x);
+}
+
+static void leg_off(inverter_t *v, int x)
+{
+    v->duty[x] = 0.5;
+    v->hi_d[x] = v->lo_d[x] = 0.5;
+    v->zone_A[x] = 0.0;
+}
+
+/* A pulse narrower than the dead time disappears: the loss is never larger than the pulse. */
+static void leg_on(inverter_t *v, int x, double duty, double dead)
+{
+    const double d = duty != duty ? 0.5 : clamp(duty, 0.0, 1.0);
+    const int switching = d > 0.0 && d < 1.0;
+    v->duty[x] = d;
+    v->hi_d[x] = switching ? fmin(dead, d) : 0.0;
+    v->lo_d[x] = switching ? fmin(dead, 1.0 - d) : 0.0;
+    v->zone_A[x] = SWITCHING_ZONE_A;
+}
+
+void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on,
+                  double vdc_V)
+{
+    const double dead = p->ideal_inverter ? 0.0 : p->dead_time_s * p->pwm_hz;
+    const double drop = p->ideal_inverter ? 0.0 : p->device_drop_V;
+    v->exact = 1;
+    for (int x = 0; x < 3; x++) {
+        if (gates_on) {
+            leg_on(v, x, duty[x], dead);
+        } else {
+            leg_off(v, x);
+        }
+        v->hi_V[x] = v->hi_d[x] * vdc_V + drop;
+        v->lo_V[x] = v->lo_d[x] * vdc_V + drop;
+        if (p->phase_open[x]) {
+            v->duty[x] = 0.5;
+            v->hi_d[x] = v->lo_d[x] = 0.0;
+            v->hi_V[x] = v->lo_V[x] = OPEN_LEAD_V;
+            v->zone_A[x] = 0.0;
+        }
+        v->error_V[x] = clamp(v->error_V[x], -v->lo_V[x], v->hi_V[x]);
+        v->exact &= v->hi_V[x] == 0.0 && v->lo_V[x] == 0.0;
+    }
+}
+
+static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], double u_s[2])
+{
+    double leg[3];
+    for (int x = 0; x < 3; x++) {
+        leg[x] = vdc_V * v->duty[x] - error_V[x];
+    }
+    from_phases(leg, u_s);
+}
+
+/* Do the currents keep the signs that the errors were chosen for, outside the zone? */
+static int consistent(const inverter_t *v, const double error_V[3], const double i_abc[3])
+{
+    for (int x = 0; x < 3; x++) {
+        if (v->hi_V[x] + v->lo_V[x] > 0.0 &&
+            !(error_V[x] > 0.0 ? i_abc[x] > v->zone_A[x] : i_abc[x] < -v->zone_A[x])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* di_abc = -gain x error_V over one substep (PL-13). */
+static void current_gain(const machine_t *m, double h, turn_t end, double gain[3][3])
+{
+    for (int y = 0; y < 3; y++) {
+        double dq[2], di[2], ab[2], abc[3];
+        to_rotor(end, phase_axis[y], dq);
+        flux_divide(m->jac, dq, di);
+        to_stationary(end, di, ab);
+        to_phases(ab, abc);
+        for (int x = 0; x < 3; x++) {
+            gain[x][y] = abc[x] * h * (2.0 / 3.0);
+        }
+    }
+}
+
+/* The frequent case in closed form: three equal legs that hold all currents at zero, or inside the
+ * zone. (h J^-1 + zone/bound) e = i_free, in the rotor frame; without a zone the common mode is
+ * free. 0 when a leg would have to go beyond its bound. */
+static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, const double free_A[3])
+{
+    const double bound = v->hi_V[0], *jac = m->jac;
+    for (int x = 0; x < 3; x++) {
+        if (v->hi_V[x] != bound || v->lo_V[x] != bound) {
+            return 0;
+        }
+    }
+    const double soft = v->zone_A[0] / bound; /* no bound at all: the legs were exact */
+    const double per_det = h / (jac[0] * jac[3] - jac[1] * jac[2]);
+    const double a[4] = {jac[3] * per_det + soft, -jac[1] * per_det, -jac[2] * per_det,
+                         jac[0] * per_det + soft};
+    double ab[2], dq[2], error_dq[2], e[3];
+    from_phases(free_A, ab);
+    to_rotor(end, ab, dq);
+    flux_divide(a, dq, error_dq);
+    to_stationary(end, error_dq, ab);
+    to_phases(ab, e);
+    const double top = fmax(e[0], fmax(e[1], e[2])), bottom = fmin(e[0], fmin(e[1], e[2]));
+    const double shift = soft > 0.0 ? 0.0 : -0.5 * (top + bottom);
+    if (top + shift > bound || bottom + shift < -bound) {
+        return 0;
+    }
+    for (int x = 0; x < 3; x++) {
+        v->error_V[x] = e[x] + shift;
+    }
+    return 1;
+}
+
+/* Projected Gauss-Seidel on the three legs; free_A: the end currents with no error at all. */
+static void solve_errors(inverter_t *v, double gain[3][3], const double free_A[3])
+{
+    double moved = 1.0;
+    for (int n = 0; n < SWEEPS && moved > SWEEP_END_V; n++) {
+        moved = 0.0;
+        for (int x = 0; x < 3; x++) {
+            const double *g = gain[x], *e = v->error_V;
+            const double drive =
+                free_A[x] - (g[0] * e[0] + g[1] * e[1] + g[2] * e[2]) + g[x] * e[x];
+            const double bound = drive > 0.0 ? v->hi_V[x] : v->lo_V[x];
+            if (bound > 0.0) {
+                const double now = clamp(drive / (g[x] + v->zone_A[x] / bound), -bound, bound);
+                moved = fmax(moved, fabs(now - e[x]));
+                v->error_V[x] = now;
+            } else {
+                v->error_V[x] = 0.0;
+            }
+        }
+    }
+}
+
+void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start,
+                      turn_t end, double u_s[2], double i_end_dq[2])
+{
+    double i[2], i_s[2], i_abc[3], error_V[3] = {0.0, 0.0, 0.0}, gain[3][3], free_A[3];
+    if (!v->exact) {
+        machine_current(m, i);
+        to_stationary(start, i, i_s);
+        to_phases(i_s, i_abc);
+        for (int x = 0; x < 3; x++) {
+            error_V[x] = i_abc[x] > 0.0 ? v->hi_V[x] : -v->lo_V[x];
+        }
+    }
+    voltage(v, vdc_V, error_V, u_s);
+    machine_predict(m, u_s, h, start, end, i_end_dq);
+    if (!v->exact) {
+        to_stationary(end, i_end_dq, i_s);
+        to_phases(i_s, i_abc);
+        if (!consistent(v, error_V, i_abc)) {
+            current_gain(m, h, end, gain);
+            for (int x = 0; x < 3; x++) {
+                free_A[x] = i_abc[x] + gain[x][0] * error_V[0] + gain[x][1] * error_V[1] +
+                            gain[x][2] * error_V[2];
+            }
+            if (!hold_all(v, m, h, end, free_A)) {
+                solve_errors(v, gain, free_A);
+            }
+            voltage(v, vdc_V, v->error_V, u_s);
+            machine_predict(m, u_s, h, start, end, i_end_dq);
+            return;
+        }
+    }
+    for (int x = 0; x < 3; x++) {
+        v->error_V[x] = error_V[x];
+    }
+}
+
+double inverter_dc_current(const inverter_t *v, const double i_abc[3])
+{
+    double sum = 0.0;
+    for (int x = 0; x < 3; x++) {
+        const double e = v->error_V[x], bound = e > 0.0 ? v->hi_V[x] : v->lo_V[x];
+        const double loss = e > 0.0 ? v->hi_d[x] : v->lo_d[x];
+        sum += (v->duty[x] - (bound > 0.0 ? e / bound * loss : 0.0)) * i_abc[x];
+    }
+    return sum;
+}

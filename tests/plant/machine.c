@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "machine.h"
+
+#include "flux_solve.h"
+
+#include <string.h>
+
+/* Below this electrical speed the hysteresis torque changes sign gradually (PL-8). */
+#define IRON_SIGN_RAD_S 1.0
+
+static flux_model_t model_of(const machine_t *m, const plant_params_t *p, const plant_map_t *map)
+{
+    const double magnet =
+        p->magnet_scale * (1.0 + p->magnet_temp_coeff_per_K * (p->rotor_C - 20.0));
+    const double nominal = map != NULL ? m->psi_nominal_Vs : p->psi_f_Vs;
+    const double cross = map != NULL ? p->cross_saturation_scale : 0.0;
+    return (flux_model_t){.map = map,
+                          .ld_H = p->ld_H * p->ld_slope_scale,
+                          .lq_H = p->lq_H * p->lq_scale,
+                          .slope = p->ld_slope_scale,
+                          .cross = cross - p->ld_slope_scale,
+                          .q = p->lq_scale,
+                          .offset_Vs = (magnet - cross) * nominal,
+                          .psi_f_Vs = magnet * nominal};
+}
+
+static void model_flux(const void *context, const double i[2], double psi[2], double jac[4])
+{
+    const flux_model_t *f = context;
+    if (f->map == NULL) {
+        jac[0] = f->ld_H;
+        jac[1] = jac[2] = 0.0;
+        jac[3] = f->lq_H;
+        psi[0] = f->ld_H * i[0] + f->offset_Vs;
+        psi[1] = f->lq_H * i[1];
+        return;
+    }
+    double psi_d, psi_q, slope_H;
+    plant_map_flux(f->map, i[0], i[1], &psi_d, &psi_q, jac);
+    psi[0] = f->slope * psi_d + f->offset_Vs;
+    psi[1] = f->q * psi_q;
+    jac[0] *= f->slope;
+    jac[1] *= f->slope;
+    jac[2] *= f->q;
+    jac[3] *= f->q;
+    if (f->cross != 0.0) {
+        psi[0] += f->cross * plant_map_axis_flux(f->map, i[1], &slope_H);
+        jac[1] += f->cross * slope_H;
+    }
+}
+
+/* im_dq holds a start that is a Newton step old at most: one evaluation and a correction do,
+ * unless the residual says that quadratic convergence is not yet below the tolerance. */
+static void find_current(machine_t *m)
+{
+    double psi[2], r[2], step[2];
+    model_flux(&m->flux, m->im_dq, psi, m->jac);
+    r[0] = m->psi_dq[0] - psi[0];
+    r[1] = m->psi_dq[1] - psi[1];
+    flux_divide(m->jac, r, step);
+    m->im_dq[0] += step[0];
+    m->im_dq[1] += step[1];
+    if (!(fabs(step[0]) + fabs(step[1]) < 1e-3) &&
+        flux_solve(model_flux, &m->flux, m->psi_dq, m->im_dq, m->jac) != 0) {
+        m->failures++;
+    }
+}
+
+static void set_flux_from_current(machine_t *m, turn_t turn)
+{
+    model_flux(&m->flux, m->im_dq, m->psi_dq, m->jac);
+    to_stationary(turn, m->psi_dq, m->psi_s);
+}
+
+void machine_create(machine_t *m, const plant_params_t *p, const plant_map_t *map)
+{
+    double psi_q;
+    memset(m, 0, sizeof *m);
+    if (map != NULL) {
+        plant_map_flux(map, 0.0, 0.0, &m->psi_nominal_Vs, &psi_q, NULL);
+    }
+    m->flux = model_of(m, p, map);
+}
+
+static int same_model(const flux_model_t *a, const flux_model_t *b)
+{
+    return a->ld_H == b->ld_H && a->lq_H == b->lq_H && a->slope == b->slope &&
+           a->cross == b->cross && a->q == b->q && a->offset_Vs == b->offset_Vs &&
+           a->psi_f_Vs == b->psi_f_Vs;
+}
+
+void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double omega_e)
+{
+    const double w = omega_e;
+    m->pole_pairs = p->pole_pairs;
+    m->r_ohm = p->r_ohm_20 * (1.0 + p->r_temp_coeff_per_K * (p->winding_C - 20.0));
+    m->iron_A_per_Vs =
+        (p->iron_k_h * w / sqrt(w * w + IRON_SIGN_RAD_S * IRON_SIGN_RAD_S) + p->iron_k_e * w) / 1.5;
+    const flux_model_t now = model_of(m, p, m->flux.map);
+    if (same_model(&now, &m->flux)) {
+        return;
+    }
+    m->flux = now;
+    if (p->magnet_step_keeps_current) {
+        set_flux_from_current(m, turn);
+    } else if (flux_solve(model_flux, &m->flux, m->psi_dq, m->im_dq, m->jac) != 0) {
+        m->failures++;
+    }
+}
+
+void machine_set_current(machine_t *m, const double im_dq[2], turn_t turn)
+{
+    m->im_dq[0] = im_dq[0];
+    m->im_dq[1] = im_dq[1];
+    set_flux_from_current(m, turn);
+}
+
+void machine_current(const machine_t *m, double i_dq[2])
+{
+    i_dq[0] = m->im_dq[0] - m->iron_A_per_Vs * m->psi_dq[1];
+    i_dq[1] = m->im_dq[1] + m->iron_A_per_Vs * m->psi_dq[0];
+}
+
+void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end,
+                     double i_dq[2])
+{
+    double i[2], i_s[2], psi[2], r[2], step[2];
+    machine_current(m, i);
+    to_stationary(start, i, i_s);
+    for (int k = 0; k < 2; k++) {
+        psi[k] = m->psi_s[k] + h * (u_s[k] - m->r_ohm * i_s[k]);
+    }
+    to_rotor(end, psi, psi);
+    r[0] = psi[0] - m->psi_dq[0];
+    r[1] = psi[1] - m->psi_dq[1];
+    flux_divide(m->jac, r, step);
+    i_dq[0] = m->im_dq[0] + step[0] - m->iron_A_per_Vs * psi[1];
+    i_dq[1] = m->im_dq[1] + step[1] + m->iron_A_per_Vs * psi[0];
+}
+
+void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end)
+{
+    double r[2], step[2], before[2] = {m->psi_dq[0], m->psi_dq[1]};
+    for (int k = 0; k < 2; k++) {
+        m->psi_s[k] += h * (u_s[k] - m->r_ohm * i_mid_s[k]);
+    }
+    to_rotor(end, m->psi_s, m->psi_dq);
+    r[0] = m->psi_dq[0] - before[0];
+    r[1] = m->psi_dq[1] - before[1];
+    flux_divide(m->jac, r, step);
+    m->im_dq[0] += step[0];
+    m->im_dq[1] += step[1];
+    find_current(m);
+}
+
+double machine_torque(const machine_t *m)
+{
+    return 1.5 * m->pole_pairs * (m->psi_dq[0] * m->im_dq[1] - m->psi_dq[1] * m->im_dq[0]);
+}

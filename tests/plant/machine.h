@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef PLANT_MACHINE_H
+#define PLANT_MACHINE_H
+/** Electrical machine: flux linkage as the state, in the stationary frame.
+ *   dpsi_s/dt = u_s - R i_s,  i_m = map^-1(psi),  i = i_m + i_fe
+ *   T = 1.5 p (psi_d i_qm - psi_q i_dm)
+ * Source   docs/theory/plant.md (PL-4) ... (PL-10)
+ * Units    SI, amplitude-invariant; _s stationary frame, _dq rotor frame
+ * Rounding second order in the substep
+ * Errors   counts the substeps whose currents could not be found (residual above 1e-10 Vs)
+ * Context  simulation only */
+#include "plant_map.h"
+#include "plant_params.h"
+#include "rotor.h"
+
+/* The perturbed flux functions (PL-4). */
+typedef struct {
+    const plant_map_t *map;     /* NULL: constants */
+    double ld_H, lq_H;          /* constants, scales included */
+    double slope, cross, q;     /* ld_slope_scale, cross - slope, lq_scale */
+    double offset_Vs, psi_f_Vs; /* added to psi_d; psi_d at zero current */
+} flux_model_t;
+
+typedef struct {
+    flux_model_t flux;
+    double psi_nominal_Vs; /* psi_d(0, 0) of the map */
+    double pole_pairs, r_ohm;
+    double iron_A_per_Vs; /* i_fe = j psi times this (PL-8) */
+    double psi_s[2];
+    double psi_dq[2], im_dq[2], jac[4]; /* of the present instant; jac of the last iterate */
+    long failures;
+} machine_t;
+
+void machine_create(machine_t *m, const plant_params_t *p, const plant_map_t *map);
+
+/** Takes over changed parameters; turn is the present rotor angle. */
+void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double omega_e);
+
+void machine_set_current(machine_t *m, const double im_dq[2], turn_t turn);
+
+/** Terminal current in the rotor frame at the present instant. */
+void machine_current(const machine_t *m, double i_dq[2]);
+
+/** Terminal current at the end of a substep with voltage u_s, linearised. */
+void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end,
+                     double i_dq[2]);
+
+/** One substep of length h; i_mid_s: the terminal current in its middle. */
+void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end);
+
+double machine_torque(const machine_t *m);
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef PLANT_MECHANICS_H
+#define PLANT_MECHANICS_H
+/** Rotor: imposed speed, or inertia with an active load.
+ *   J dw/dt = T - T_load - B w,  dtheta/dt = w
+ * Source   docs/theory/plant.md (PL-15), (PL-16)
+ * Units    rad/s and rad, mechanical
+ * Rounding second order in the substep (mid-point speed, trapezoidal torque)
+ * Context  simulation only */
+#include "plant_params.h"
+
+typedef struct {
+    double speed_rad_s, theta_m_rad; /* theta in [0, 2 pi) */
+} mechanics_t;
+
+void mechanics_set(mechanics_t *m, double theta_m_rad, double speed_rad_s);
+
+/** Speed in the middle of the coming substep. */
+double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm,
+                           double h);
+
+/** Ends the substep that ran at mid_rad_s with the mean air-gap torque. */
+void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm,
+                    double h);
+
+double wrap_turn(double angle_rad);
+
+#endif

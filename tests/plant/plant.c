@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "plant.h"
+
+#include "energy.h"
+#include "inverter.h"
+#include "machine.h"
+#include "mechanics.h"
+#include "sensors.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define TWO_PI 6.28318530717958647693
+
+struct plant {
+    plant_params_t params;
+    machine_t machine;
+    inverter_t inverter;
+    mechanics_t mechanics;
+    sensors_t sensors;
+    plant_truth_t truth;
+};
+
+static turn_t rotor_turn(const plant_t *plant)
+{
+    const double theta_e = plant->params.pole_pairs * plant->mechanics.theta_m_rad;
+    return (turn_t){cos(theta_e), sin(theta_e)};
+}
+
+static double vdc_at(const plant_params_t *p, double time_s)
+{
+    if (p->vdc_ripple_V == 0.0) {
+        return p->vdc_V;
+    }
+    return p->vdc_V + p->vdc_ripple_V * sin(TWO_PI * p->vdc_ripple_hz * time_s);
+}
+
+/* Brings the model up to date with the live parameters; returns the rotor's orientation. */
+static turn_t update(plant_t *plant)
+{
+    const plant_params_t *p = &plant->params;
+    if (p->imposed_speed) {
+        plant->mechanics.speed_rad_s = p->speed_rad_s;
+    }
+    const turn_t turn = rotor_turn(plant);
+    machine_update(&plant->machine, p, turn, p->pole_pairs * plant->mechanics.speed_rad_s);
+    return turn;
+}
+
+static void instant_truth(plant_t *plant, turn_t turn)
+{
+    const machine_t *m = &plant->machine;
+    plant_truth_t *t = &plant->truth;
+    double i_dq[2], i_s[2];
+    machine_current(m, i_dq);
+    to_stationary(turn, i_dq, i_s);
+    to_phases(i_s, t->i_abc_A);
+    t->i_d_A = i_dq[0];
+    t->i_q_A = i_dq[1];
+    t->i_dm_A = m->im_dq[0];
+    t->i_qm_A = m->im_dq[1];
+    t->psi_d_Vs = m->psi_dq[0];
+    t->psi_q_Vs = m->psi_dq[1];
+    t->torque_Nm = machine_torque(m);
+    t->speed_rad_s = plant->mechanics.speed_rad_s;
+    t->speed_rpm = t->speed_rad_s * 60.0 / TWO_PI;
+    t->theta_m_rad = plant->mechanics.theta_m_rad;
+    t->theta_e_rad = wrap_turn(t->theta_m_rad * plant->params.pole_pairs);
+    t->r_ohm = m->r_ohm;
+    t->psi_f_Vs = m->flux.psi_f_Vs;
+    t->vdc_V = vdc_at(&plant->params, t->time_s);
+    t->inversion_failures = m->failures;
+}
+
+plant_t *plant_create(const plant_params_t *params, const plant_map_t *map)
+{
+    if (plant_params_bad_field(params, map != NULL) != NULL) {
+        return NULL;
+    }
+    plant_t *plant = calloc(1, sizeof *plant);
+    if (plant == NULL) {
+        return NULL;
+    }
+    plant->params = *params;
+    machine_create(&plant->machine, params, map);
+    sensors_create(&plant->sensors, params);
+    plant_set_state(plant, 0.0, 0.0, params->theta_m_rad, params->speed_rad_s);
+    return plant;
+}
+
+void plant_destroy(plant_t *plant)
+{
+    free(plant);
+}
+
+plant_params_t *plant_params(plant_t *plant)
+{
+    return &plant->params;
+}
+
+const plant_truth_t *plant_truth(const plant_t *plant)
+{
+    return &plant->truth;
+}
+
+void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad,
+                     double speed_rad_s)
+{
+    const double time_s = plant->truth.time_s, im_dq[2] = {id_A, iq_A};
+    if (plant->params.imposed_speed) {
+        plant->params.speed_rad_s = speed_rad_s;
+    }
+    mechanics_set(&plant->mechanics, theta_m_rad, speed_rad_s);
+    const turn_t turn = update(plant);
+    machine_set_current(&plant->machine, im_dq, turn);
+    memset(&plant->truth, 0, sizeof plant->truth);
+    plant->truth.time_s = time_s;
+    instant_truth(plant, turn);
+}
+
+void plant_sample(plant_t *plant, plant_sensors_t *sensors)
+{
+    instant_truth(plant, update(plant));
+    sensors_sample(&plant->sensors, &plant->params, &plant->truth, sensors);
+}
+
+static void substep(plant_t *plant, turn_t *turn, double vdc_V, double h, energy_t *sum)
+{
+    const plant_params_t *p = &plant->params;
+    machine_t *m = &plant->machine;
+    const instant_t from = energy_instant(m);
+    const double mid_rad_s = mechanics_mid_speed(&plant->mechanics, p, from.torque_Nm, h);
+    const double half_rad = 0.5 * h * p->pole_pairs * mid_rad_s;
+    const turn_t half = turn_of(half_rad), mid = turn_add(*turn, half), end = turn_add(mid, half);
+    double u_s[2], i_dq[2], i_end[2], i_s[2], i_abc[3];
+
+    machine_current(m, i_dq);
+    inverter_voltage(&plant->inverter, m, vdc_V, h, *turn, end, u_s, i_end);
+    i_dq[0] = 0.5 * (i_dq[0] + i_end[0]);
+    i_dq[1] = 0.5 * (i_dq[1] + i_end[1]);
+    to_stationary(mid, i_dq, i_s);
+    to_phases(i_s, i_abc);
+    machine_step(m, u_s, i_s, h, end);
+
+    const instant_t to = energy_instant(m);
+    const double torque_Nm = 0.5 * (from.torque_Nm + to.torque_Nm);
+    mechanics_step(&plant->mechanics, p, mid_rad_s, torque_Nm, h);
+    energy_voltage(sum, u_s, mid, half_rad, h);
+    energy_electric(sum, m, &from, &to, u_s, i_s, h);
+    energy_mechanic(sum, torque_Nm, mid_rad_s, p->viscous_Nms, h);
+    sum->dc += h * vdc_V * inverter_dc_current(&plant->inverter, i_abc);
+    *turn = end;
+}
+
+static void mean_truth(plant_truth_t *t, const energy_t *sum, double vdc_V, double period_s)
+{
+    t->u_d_V = sum->u_dq[0] / period_s;
+    t->u_q_V = sum->u_dq[1] / period_s;
+    t->torque_mean_Nm = sum->torque / period_s;
+    t->torque_shaft_mean_Nm = sum->torque_shaft / period_s;
+    t->idc_A = sum->dc / vdc_V / period_s;
+    t->copper_W = sum->copper / period_s;
+    t->iron_W = sum->iron / period_s;
+    t->mechanical_W = sum->mechanical / period_s;
+    t->electrical_W = sum->electrical / period_s;
+    t->inverter_W = (sum->dc - sum->electrical) / period_s;
+    t->e_dc_J += sum->dc;
+    t->e_electrical_J += sum->electrical;
+    t->e_copper_J += sum->copper;
+    t->e_iron_J += sum->iron;
+    t->e_mechanical_J += sum->mechanical;
+    t->e_field_J += sum->field;
+}
+
+void plant_advance(plant_t *plant, const double duty[3], int gates_on)
+{
+    const plant_params_t *p = &plant->params;
+    const double period_s = 1.0 / p->pwm_hz;
+    const int n = p->substeps < 10 ? 10 : p->substeps;
+    const double vdc_V = vdc_at(p, plant->truth.time_s + 0.5 * period_s);
+    energy_t sum = {0};
+    turn_t turn = update(plant);
+    inverter_set(&plant->inverter, p, duty, gates_on, vdc_V);
+    for (int k = 0; k < n; k++) {
+        substep(plant, &turn, vdc_V, period_s / n, &sum);
+    }
+    mean_truth(&plant->truth, &sum, vdc_V, period_s);
+    plant->truth.time_s += period_s;
+    instant_truth(plant, rotor_turn(plant));
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef PLANT_PLANT_H
+#define PLANT_PLANT_H
+/** The simulated traction drive: inverter, machine, mechanics, sensors; the oracle of every test.
+ *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-20)
+ * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
+ * Errors   plant_create() returns NULL for bad parameters or no memory
+ * Context  simulation only, double precision; one instance per drive, no global state.
+ *          One period: plant_sample() at its start, then plant_advance() with the duties that
+ *          act in it. The computation delay belongs to the caller. */
+#include <stdint.h>
+
+#include "plant_map.h"
+#include "plant_params.h"
+
+typedef struct plant plant_t;
+
+typedef struct {
+    double ia_A, ib_A,
+        ic_A;           /* as the chain delivers them: gain, offset, noise, quantised, saturated */
+    int32_t i_count[3]; /* converter counts, mid-scale is zero current */
+    double vdc_V;
+    int32_t vdc_count;
+    double theta_m_rad; /* [0, 2 pi) */
+    int32_t theta_count;
+    double t_winding_C;
+} plant_sensors_t;
+
+typedef struct {
+    double time_s;
+    /* at this instant */
+    double i_d_A, i_q_A, i_abc_A[3]; /* terminal currents */
+    double i_dm_A, i_qm_A;           /* magnetising currents: terminal less the iron-loss branch */
+    double psi_d_Vs, psi_q_Vs;
+    double torque_Nm; /* air gap */
+    double speed_rad_s, speed_rpm, theta_m_rad, theta_e_rad;
+    double r_ohm, psi_f_Vs, vdc_V;
+    long inversion_failures; /* substeps whose currents missed the tolerance; 0 in a sound run */
+    /* mean over the last period */
+    double u_d_V, u_q_V;                         /* terminal voltage in the turning rotor frame */
+    double torque_mean_Nm, torque_shaft_mean_Nm; /* shaft: less the viscous friction */
+    double idc_A;
+    double copper_W, iron_W, mechanical_W, electrical_W, inverter_W;
+    /* integrals since creation or plant_set_state() */
+    double e_dc_J, e_electrical_J, e_copper_J, e_iron_J, e_mechanical_J;
+    double e_field_J; /* 1.5 integral of i . dpsi in the rotor frame */
+} plant_truth_t;
+
+/** The map is borrowed and must outlive the plant; NULL: ld_H, lq_H, psi_f_Vs are used.
+ * Starts with magnetising current 0. NULL: bad parameters or no memory. */
+plant_t *plant_create(const plant_params_t *params, const plant_map_t *map);
+void plant_destroy(plant_t *plant);
+
+/** Live: what is written here acts from the next plant_sample() or plant_advance() on. */
+plant_params_t *plant_params(plant_t *plant);
+
+/** Puts the machine into a given state (magnetising currents; an imposed speed becomes this one)
+ * and clears the energy integrals; time runs on. */
+void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad,
+                     double speed_rad_s);
+
+void plant_sample(plant_t *plant, plant_sensors_t *sensors);
+
+/** One PWM period; duty 0..1 (clamped, NaN counts as 0.5). Gates off: the diodes conduct. */
+void plant_advance(plant_t *plant, const double duty[3], int gates_on);
+
+const plant_truth_t *plant_truth(const plant_t *plant);
+
+#endif

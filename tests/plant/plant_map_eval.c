@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "flux_solve.h"
+#include "plant_map_impl.h"
+
+/* Where a current lies on an axis: the cell, the local coordinate held inside it, and how far
+ * beyond the edge (in cells, 0 inside). */
+typedef struct {
+    int k;
+    double t, beyond, per_h;
+} spot_t;
+
+static inline spot_t locate(const map_axis_t *axis, double x)
+{
+    const double *node = axis->node;
+    double guess = (x - node[0]) * axis->per_step;
+    int k = guess > 0.0 ? (guess < axis->n - 2 ? (int)guess : axis->n - 2) : 0; /* NaN: 0 */
+    while (k > 0 && x < node[k]) {
+        k--;
+    }
+    while (k < axis->n - 2 && x >= node[k + 1]) {
+        k++;
+    }
+    double per_h = 1.0 / (node[k + 1] - node[k]);
+    double t = (x - node[k]) * per_h;
+    double held = t < 0.0 ? 0.0 : (t > 1.0 ? 1.0 : t);
+    return (spot_t){.k = k, .t = held, .beyond = t - held, .per_h = per_h};
+}
+
+void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs,
+                    double *psi_q_Vs, double jac[4])
+{
+    const spot_t d = locate(&map->d, id_A), q = locate(&map->q, iq_A);
+    const map_cell_t *cell = &map->cell[d.k * (map->q.n - 1) + q.k];
+    const double t = d.t, u = q.t;
+    double psi[2], by_d[2], by_q[2];
+    for (int a = 0; a < 2; a++) {
+        double p[4], pu[4];
+        for (int i = 0; i < 4; i++) {
+            double c1 = cell->c[i][1][a], c2 = cell->c[i][2][a], c3 = cell->c[i][3][a];
+            p[i] = cell->c[i][0][a] + u * (c1 + u * (c2 + u * c3));
+            pu[i] = c1 + u * (2.0 * c2 + u * 3.0 * c3);
+        }
+        double f = p[0] + t * (p[1] + t * (p[2] + t * p[3]));
+        double ft = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]);
+        double fu = pu[0] + t * (pu[1] + t * (pu[2] + t * pu[3]));
+        double ftu = pu[1] + t * (2.0 * pu[2] + t * 3.0 * pu[3]);
+        /* the tangent of every section beyond the edge (PL-2) */
+        psi[a] = f + d.beyond * ft + q.beyond * (fu + d.beyond * ftu);
+        by_d[a] = (ft + q.beyond * ftu) * d.per_h;
+        by_q[a] = (fu + d.beyond * ftu) * q.per_h;
+    }
+    *psi_d_Vs = psi[0];
+    *psi_q_Vs = psi[1];
+    if (jac != NULL) {
+        jac[0] = by_d[0];
+        jac[1] = by_q[0];
+        jac[2] = by_d[1];
+        jac[3] = by_q[1];
+    }
+}
+
+double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H)
+{
+    const spot_t q = locate(&map->q, iq_A);
+    const double *c = map->zero[q.k], u = q.t;
+    double slope = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
+    *slope_H = slope * q.per_h;
+    return c[0] + u * (c[1] + u * (c[2] + u * c[3])) + q.beyond * slope;
+}
+
+static void map_flux(const void *map, const double i[2], double psi[2], double jac[4])
+{
+    plant_map_flux(map, i[0], i[1], &psi[0], &psi[1], jac);
+}
+
+int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A,
+                     double *iq_A)
+{
+    const double psi[2] = {psi_d_Vs, psi_q_Vs};
+    double i[2] = {*id_A, *iq_A}, jac[4];
+    int failed = flux_solve(map_flux, map, psi, i, jac);
+    *id_A = i[0];
+    *iq_A = i[1];
+    return failed;
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef PLANT_PLANT_PARAMS_H
+#define PLANT_PLANT_PARAMS_H
+/** Every number that describes the simulated drive. All may change at run time, between periods.
+ * Source   docs/theory/plant.md
+ * Units    SI; angles in radians, electrical where the comment says so; temperatures in degrees C
+ * Errors   plant_params_bad_field() names what plant_create() refuses; later changes go unchecked
+ * Context  simulation only */
+#include <stdint.h>
+
+typedef struct {
+    /* machine */
+    double pole_pairs;
+    double r_ohm_20, r_temp_coeff_per_K, winding_C;          /* (PL-5) */
+    double ld_H, lq_H, psi_f_Vs;                             /* used when there is no map */
+    double magnet_scale;                                     /* of psi_f = psi_d(0, 0), (PL-4) */
+    double magnet_temp_coeff_per_K, rotor_C;                 /* further factor on psi_f, (PL-4) */
+    double lq_scale, ld_slope_scale, cross_saturation_scale; /* (PL-4) */
+    double iron_k_h, iron_k_e;     /* W/(rad/s Vs^2), W/(rad/s Vs)^2, (PL-8) */
+    int magnet_step_keeps_current; /* 0: flux linkage is continuous; 1: current is, (PL-6) */
+    /* inverter */
+    double vdc_V, vdc_ripple_V, vdc_ripple_hz;
+    double pwm_hz, dead_time_s, device_drop_V;
+    int substeps;       /* per PWM period, at least 10 */
+    int ideal_inverter; /* no dead time, no device drop */
+    int phase_open[3];  /* the motor lead is broken */
+    /* sensors */
+    double current_full_scale_A; /* the converter spans -full scale ... +full scale */
+    int adc_bits;
+    double current_gain[3], current_offset_A[3], current_noise_A_rms;
+    int current_quantise;
+    int current_stuck[3]; /* repeats its last sample */
+    int current_open[3];  /* input pulled down: reads the negative full scale */
+    double vdc_full_scale_V, vdc_gain;
+    int vdc_quantise;
+    double angle_offset_rad;             /* electrical */
+    double angle_h1_rad, angle_h1_phase; /* electrical amplitude, per turn of the resolver */
+    double angle_h2_rad, angle_h2_phase; /* the same, twice per turn of the resolver */
+    double resolver_pole_pairs;          /* resolver turns per mechanical turn */
+    int angle_bits;                      /* of a mechanical turn; 0: not quantised */
+    double angle_delay_s;
+    int angle_stuck;
+    /* mechanics */
+    int imposed_speed;
+    double speed_rad_s;                        /* mechanical: imposed, or the initial one */
+    double theta_m_rad;                        /* initial rotor angle */
+    double inertia_kgm2, load_Nm, viscous_Nms; /* load_Nm > 0 brakes a positive speed */
+    uint64_t seed;                             /* taken at creation */
+} plant_params_t;
+
+/** Neutral values: unit gains and scales, no imperfection, 10 substeps, speed imposed 0, 20 C.
+ * Machine, inverter and sensor ranges stay 0 and must be given: plant_create() refuses them. */
+void plant_params_default(plant_params_t *params);
+
+/** NULL when plant_create() would accept the parameters, else the name of the first bad field. */
+const char *plant_params_bad_field(const plant_params_t *params, int has_map);
+
+#endif

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "sensors.h"
+
+#include "mechanics.h"
+
+#include <math.h>
+#include <string.h>
+
+#define TWO_PI 6.28318530717958647693
+
+static double clamp(double x, double lo, double hi)
+{
+    return x < lo ? lo : (x > hi ? hi : x);
+}
+
+void sensors_create(sensors_t *s, const plant_params_t *p)
+{
+    memset(s, 0, sizeof *s);
+    random_seed(&s->rng, p->seed);
+    for (int x = 0; x < 3; x++) {
+        s->current_count[x] = (int32_t)1 << (p->adc_bits - 1);
+    }
+    s->theta_m_rad = wrap_turn(p->theta_m_rad);
+}
+
+/* (PL-17): the top code is one step below the full scale, as in a converter. */
+static void sample_current(sensors_t *s, const plant_params_t *p, int x, double i_A)
+{
+    const double mid = ldexp(1.0, p->adc_bits - 1), step = p->current_full_scale_A / mid;
+    const double noise = random_normal(&s->rng) * p->current_noise_A_rms;
+    double code = (i_A * p->current_gain[x] + p->current_offset_A[x] + noise) / step;
+    if (p->current_open[x]) {
+        code = -mid;
+    }
+    code = clamp(code, -mid, mid - 1.0);
+    const double whole = floor(code + 0.5);
+    if (!p->current_stuck[x]) {
+        s->current_A[x] = (p->current_quantise ? whole : code) * step;
+        s->current_count[x] = (int32_t)(whole + mid);
+    }
+}
+
+static void sample_vdc(const plant_params_t *p, double vdc_V, plant_sensors_t *out)
+{
+    const double codes = ldexp(1.0, p->adc_bits), step = p->vdc_full_scale_V / codes;
+    const double code = clamp(vdc_V * p->vdc_gain / step, 0.0, codes - 1.0);
+    const double whole = floor(code + 0.5);
+    out->vdc_V = (p->vdc_quantise ? whole : code) * step;
+    out->vdc_count = (int32_t)whole;
+}
+
+/* (PL-18), (PL-19) */
+static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth)
+{
+    const double theta = truth->theta_m_rad - truth->speed_rad_s * p->angle_delay_s;
+    const double turn = p->resolver_pole_pairs * theta;
+    double error = p->angle_offset_rad;
+    if (p->angle_h1_rad != 0.0) {
+        error += p->angle_h1_rad * sin(turn + p->angle_h1_phase);
+    }
+    if (p->angle_h2_rad != 0.0) {
+        error += p->angle_h2_rad * sin(2.0 * turn + p->angle_h2_phase);
+    }
+    const double measured = wrap_turn(theta + error / p->pole_pairs);
+    if (p->angle_bits > 0) {
+        const double codes = ldexp(1.0, p->angle_bits);
+        const double whole = fmod(floor(measured / TWO_PI * codes + 0.5), codes);
+        s->theta_count = (int32_t)whole;
+        s->theta_m_rad = whole / codes * TWO_PI;
+    } else {
+        s->theta_count = 0;
+        s->theta_m_rad = measured;
+    }
+}
+
+void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth,
+                    plant_sensors_t *out)
+{
+    for (int x = 0; x < 3; x++) {
+        sample_current(s, p, x, truth->i_abc_A[x]);
+        out->i_count[x] = s->current_count[x];
+    }
+    out->ia_A = s->current_A[0];
+    out->ib_A = s->current_A[1];
+    out->ic_A = s->current_A[2];
+    sample_vdc(p, truth->vdc_V, out);
+    if (!p->angle_stuck) {
+        sample_angle(s, p, truth);
+    }
+    out->theta_m_rad = s->theta_m_rad;
+    out->theta_count = s->theta_count;
+    out->t_winding_C = p->winding_C;
+}

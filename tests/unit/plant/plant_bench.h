@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef UNIT_PLANT_PLANT_BENCH_H
+#define UNIT_PLANT_PLANT_BENCH_H
+/** Machines and small drives that the plant's tests share.
+ * Units    SI
+ * Context  tests only */
+#include "plant.h"
+
+#include <complex.h>
+
+#define PI 3.14159265358979323846
+#define TWO_PI (2.0 * PI)
+
+/** A salient machine of constants: 3 pole pairs, 20 mohm, 0.2 mH, 0.5 mH, 84 mVs, ideal legs. */
+plant_params_t bench_params(void);
+
+/* A saturating, cross-coupled machine whose fluxes are quadratic in each current, so that the
+ * interpolation is exact, with a co-energy in closed form:
+ *   W' = F i_d + A i_d^2/2 - C i_d^3/3 + B i_q^2/2 - X i_d i_q^2 */
+#define POLY_F 0.07
+#define POLY_A 0.3e-3
+#define POLY_C 4e-7
+#define POLY_B 0.9e-3
+#define POLY_X 3e-7
+void poly_flux(double id, double iq, double psi[2]);
+double poly_field_energy(double id, double iq);
+plant_map_t *poly_map(void);
+
+/** The measured map of the shipped machine, made symmetric in i_q; NULL when it cannot be read. */
+plant_map_t *hsm1_map(void);
+
+/** Duties that give the stationary-frame voltage u with an ideal inverter. */
+void bench_duty(double complex u, double vdc_V, double duty[3]);
+
+/** One period with the voltage of rotor-frame value u in the period's middle. */
+void bench_drive(plant_t *plant, double complex u_dq);
+
+#endif
