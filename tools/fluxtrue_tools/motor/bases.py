@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Per-unit bases, docs/scaling.md (SC-1) to (SC-9)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.config import MotorConfig
+from fluxtrue_tools.motor.flux_model import FluxModel, flux
+
+VOLTAGE_PER_VDC = 1.5
+VOLTAGE_STEP_V = 10.0
+OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05)  # the first that fits
+FLUX_USE_MAX = 0.97  # of psi_b, by the largest flux on the i_max circle
+STEP_USE_MAX = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
+
+
+@dataclass(frozen=True)
+class Bases:
+    """SI value of 1 per unit; the fields of bases_t."""
+
+    voltage_V: float
+    current_A: float
+    omega_rad_s: float
+    flux_Vs: float
+    resistance_ohm: float
+    inductance_H: float
+    torque_Nm: float
+    period_s: float
+
+
+def flux_max(model: FluxModel, i_max_A: float) -> float:
+    """Largest |psi| on the i_max half circle i_d <= 0, and of the magnet alone."""
+    angle = np.linspace(0.5 * np.pi, np.pi, 181)
+    rim = flux(model, i_max_A * np.cos(angle), i_max_A * np.sin(angle))
+    return float(max(rim.max(), flux(model, 0.0, 0.0)))
+
+
+def inductance_min(model: FluxModel, i_max_A: float) -> float:
+    """Smallest incremental inductance of both axes inside the i_max circle, i_d <= 0."""
+    d, q = np.meshgrid(np.linspace(-i_max_A, 0, 101), np.linspace(0, i_max_A, 101), indexing="ij")
+    inside = np.hypot(d, q) <= i_max_A * (1 + 1e-9)
+    return float(min(model.psi_d(d, q, nd=1)[inside].min(), model.psi_q(d, q, nq=1)[inside].min()))
+
+
+def _voltage(config: MotorConfig, psi_max_Vs: float, omega_rad_s: float) -> float:
+    """1.5 vdc, or more where the machine's flux would not fit psi_b = V_b/omega_b."""
+    normal = VOLTAGE_PER_VDC * config.inverter.vdc_V
+    needed = psi_max_Vs * omega_rad_s / FLUX_USE_MAX
+    return normal if needed <= normal else VOLTAGE_STEP_V * math.ceil(needed / VOLTAGE_STEP_V)
+
+
+def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
+    """The bases of one machine and its inverter; the speed reserve gives way before anything saturates."""
+    current, period = config.inverter.current_full_scale_A, 1.0 / config.inverter.pwm_hz
+    psi_max = flux_max(model, config.machine.i_max_A)
+    l_min = inductance_min(model, config.machine.i_max_A)
+    voltage_max = STEP_USE_MAX * l_min * current / period
+    for ratio in OMEGA_PER_OMEGA_MAX:
+        omega = ratio * config.omega_max_rad_s
+        voltage = _voltage(config, psi_max, omega)
+        if voltage <= voltage_max:
+            break
+    else:
+        raise FluxtrueError(f"motor '{config.machine.name}': incremental inductance {l_min:.3g} H is too small: "
+                            f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
+                            f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
+                            f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)")
+    impedance = voltage / current
+    return Bases(
+        voltage_V=voltage,
+        current_A=current,
+        omega_rad_s=omega,
+        flux_Vs=voltage / omega,
+        resistance_ohm=impedance,
+        inductance_H=impedance / omega,
+        torque_Nm=1.5 * config.machine.pole_pairs * voltage / omega * current,
+        period_s=period,
+    )

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""motor.toml: its keys, their ranges, and one clear line when something is wrong."""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from fluxtrue_tools.errors import FluxtrueError
+
+FILE_NAME = "motor.toml"
+
+TRIP_PER_I_MAX = 1.2
+TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
+FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
+ANGLE_PER_PERIOD_MAX = 0.6  # rad: beyond it the observer and the sampled controller lose their margins
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class Machine(_Section):
+    """[machine]"""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.+-]{0,47}$")]
+    pole_pairs: Annotated[int, Field(ge=1, le=50)]
+    r_ohm: Annotated[float, Field(gt=0, le=100)]
+    r_temp_coeff_per_K: Annotated[float, Field(ge=0, le=0.02)]
+    i_max_A: Annotated[float, Field(gt=0, le=5000)]
+    torque_max_Nm: Annotated[float, Field(gt=0, le=100000)]
+    speed_max_rpm: Annotated[float, Field(gt=0, le=200000)]
+    inertia_kgm2: Annotated[float, Field(gt=0, le=1000)]
+    iron_loss_hysteresis: Annotated[float, Field(ge=0, le=1e4)] = 0.0
+    iron_loss_eddy: Annotated[float, Field(ge=0, le=1e3)] = 0.0
+    flux_map: Annotated[str, Field(min_length=1, max_length=255)] | None = None
+    ld_H: Annotated[float, Field(gt=0, le=1)] | None = None
+    lq_H: Annotated[float, Field(gt=0, le=1)] | None = None
+    psi_f_Vs: Annotated[float, Field(gt=0, le=100)] | None = None
+
+
+class Inverter(_Section):
+    """[inverter]"""
+
+    vdc_V: Annotated[float, Field(ge=5, le=2000)]
+    pwm_hz: Annotated[float, Field(ge=1000, le=100000)]
+    dead_time_s: Annotated[float, Field(ge=0, le=2e-5)]
+    current_full_scale_A: Annotated[float, Field(gt=0, le=10000)]
+    adc_bits: Annotated[int, Field(ge=8, le=16)]
+    device_drop_V: Annotated[float, Field(ge=0, le=10)] = 0.0
+    min_pulse_s: Annotated[float, Field(ge=0, le=2e-5)] | None = None
+    v_dc_full_scale_V: Annotated[float, Field(gt=0, le=4000)] | None = None
+
+
+class Control(_Section):
+    """[control], all optional"""
+
+    observer_m: Annotated[float, Field(ge=2, le=4)] = 3.0
+    flux_bandwidth_rad_s: Annotated[float, Field(gt=0, le=1000)] = 30.0
+    resistance_bandwidth_rad_s: Annotated[float, Field(gt=0, le=100)] = 10.0
+    torque_loop_bandwidth_rad_s: Annotated[float, Field(gt=0, le=300)] = 50.0
+    torque_authority: Annotated[float, Field(gt=0, le=0.9)] = 0.3
+    torque_slew_Nm_per_s: Annotated[float, Field(ge=0, le=1e7)] = 0.0
+    dead_time_compensation: Annotated[float, Field(ge=0, le=1)] = 1.0
+
+
+class MotorConfig(_Section):
+    """The whole file."""
+
+    machine: Machine
+    inverter: Inverter
+    control: Control = Control()
+
+    @property
+    def min_pulse_s(self) -> float:
+        given = self.inverter.min_pulse_s
+        return self.inverter.dead_time_s if given is None else given
+
+    @property
+    def v_dc_full_scale_V(self) -> float:
+        given = self.inverter.v_dc_full_scale_V
+        return 1.5 * self.inverter.vdc_V if given is None else given
+
+    @property
+    def i_trip_A(self) -> float:
+        full_scale = self.inverter.current_full_scale_A
+        return min(TRIP_PER_I_MAX * self.machine.i_max_A, TRIP_PER_FULL_SCALE * full_scale)
+
+    @property
+    def omega_max_rad_s(self) -> float:
+        """Electrical angular frequency at speed_max_rpm."""
+        return self.machine.pole_pairs * self.machine.speed_max_rpm * 2 * math.pi / 60
+
+
+def _number(value: float) -> str:
+    return f"{value:g}"
+
+
+def _range_text(metadata: list[Any]) -> str:
+    """The limits of a field in words, from the annotations the validation itself uses."""
+    low = high = ""
+    for item in metadata:
+        for limit, text in (("ge", "from {}"), ("gt", "above {}")):
+            if getattr(item, limit, None) is not None:
+                low = text.format(_number(getattr(item, limit)))
+        if getattr(item, "le", None) is not None:
+            high = _number(item.le)
+    if low and high:
+        return f"{low} up to {high}" if low.startswith("above") else f"{low} to {high}"
+    return low
+
+
+def _allowed(section: type[BaseModel], key: str) -> str:
+    field = section.model_fields[key]
+    metadata, kind = list(field.metadata), field.annotation
+    for part in getattr(kind, "__args__", ()):  # X | None
+        if part is not type(None):
+            metadata += list(getattr(part, "__metadata__", ()))
+            kind = getattr(part, "__origin__", part)
+    if kind is str:
+        if key == "name":
+            return "1 to 48 letters, digits, spaces or _ . + -"
+        return "a text"
+    noun = "a whole number" if kind is int else "a finite number"
+    return f"{noun} {_range_text(metadata)}".rstrip()
+
+
+def _section_of(name: str) -> type[BaseModel] | None:
+    return {"machine": Machine, "inverter": Inverter, "control": Control}.get(name)
+
+
+def _message(error: dict[str, Any]) -> str:
+    location = [str(part) for part in error["loc"]]
+    section = _section_of(location[0]) if location else None
+    name = ".".join(location[:2])
+    kind = error["type"]
+    if kind == "extra_forbidden":
+        owner = section if len(location) > 1 and section else MotorConfig
+        allowed = ", ".join(owner.model_fields)
+        return f"{name}: unknown key, allowed: {allowed}"
+    if kind == "missing":
+        if len(location) > 1 and section:
+            return f"{name}: missing, wanted: {_allowed(section, location[1])}"
+        return f"[{name}]: section missing"
+    if section and len(location) > 1:
+        return f"{name} = {error['input']!r}, allowed: {_allowed(section, location[1])}"
+    return f"{name} = {error['input']!r}, allowed: a section [{name}]"
+
+
+def _fail(path: Path, text: str) -> None:
+    raise FluxtrueError(f"{path}: {text}")
+
+
+def _check_flux_source(path: Path, machine: Machine) -> None:
+    constants = {"ld_H": machine.ld_H, "lq_H": machine.lq_H, "psi_f_Vs": machine.psi_f_Vs}
+    given = [key for key, value in constants.items() if value is not None]
+    if machine.flux_map is not None and given:
+        _fail(path, f"machine.flux_map and machine.{given[0]}: give either flux_map or "
+                    "ld_H, lq_H and psi_f_Vs, not both")
+    if machine.flux_map is None and len(given) != len(constants):
+        missing = next(key for key in constants if key not in given)
+        _fail(path, f"machine.{missing}: missing, give either flux_map or "
+                    "all of ld_H, lq_H and psi_f_Vs")
+
+
+def _check_speed(path: Path, config: MotorConfig) -> None:
+    step = config.omega_max_rad_s / config.inverter.pwm_hz
+    if step > ANGLE_PER_PERIOD_MAX:
+        limit = ANGLE_PER_PERIOD_MAX * config.inverter.pwm_hz * 60 / (2 * math.pi * config.machine.pole_pairs)
+        _fail(path, f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
+                    f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)")
+
+
+def _check_currents(path: Path, config: MotorConfig) -> None:
+    full_scale, i_max = config.inverter.current_full_scale_A, config.machine.i_max_A
+    if full_scale < FULL_SCALE_PER_I_MAX * i_max:
+        _fail(path, f"inverter.current_full_scale_A = {full_scale:g}, allowed: from {FULL_SCALE_PER_I_MAX * i_max:g} "
+                    f"({FULL_SCALE_PER_I_MAX} * i_max_A: the over-current trip lies above i_max_A "
+                    "and below 80 % of full scale)")
+    if full_scale > 20 * i_max:
+        _fail(path, f"inverter.current_full_scale_A = {full_scale:g}, allowed: up to {20 * i_max:g} "
+                    "(20 * i_max_A: beyond it the measurement has no resolution left)")
+
+
+def _check_inverter(path: Path, config: MotorConfig) -> None:
+    inverter = config.inverter
+    for key, value in (("dead_time_s", inverter.dead_time_s), ("min_pulse_s", config.min_pulse_s)):
+        limit = 0.1 / inverter.pwm_hz
+        if value > limit:
+            _fail(path, f"inverter.{key} = {value:g}, allowed: up to {limit:g} (10 % of the PWM period)")
+    if config.v_dc_full_scale_V < 1.3 * inverter.vdc_V:
+        _fail(path, f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g}, allowed: from "
+                    f"{1.3 * inverter.vdc_V:g} (1.3 * vdc_V: the over-voltage trip lies below it)")
+    if inverter.device_drop_V > 0.05 * inverter.vdc_V:
+        _fail(path, f"inverter.device_drop_V = {inverter.device_drop_V:g}, allowed: up to "
+                    f"{0.05 * inverter.vdc_V:g} (5 % of vdc_V)")
+
+
+def _check_drop(path: Path, config: MotorConfig) -> None:
+    machine = config.machine
+    drop, limit = machine.r_ohm * machine.i_max_A, 0.3 * config.inverter.vdc_V
+    if drop > limit:
+        _fail(path, f"machine.r_ohm = {machine.r_ohm:g} drops {drop:.3g} V at i_max_A, allowed: up to "
+                    f"{limit:.3g} V (30 % of vdc_V)")
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise FluxtrueError(f"{path}: no such file; a motor is a folder with {FILE_NAME}") from None
+    except NotADirectoryError:
+        raise FluxtrueError(f"{path.parent}: not a folder; a motor is a folder with {FILE_NAME}") from None
+    except OSError as error:
+        raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise FluxtrueError(f"{path}: not UTF-8 text") from None
+    except tomllib.TOMLDecodeError as error:
+        raise FluxtrueError(f"{path}: not valid TOML: {error}") from None
+
+
+def load_config(folder: Path) -> MotorConfig:
+    """Read and validate <folder>/motor.toml."""
+    path = folder / FILE_NAME
+    data = _read_toml(path)
+    try:
+        config = MotorConfig.model_validate(data)
+    except ValidationError as error:
+        raise FluxtrueError(f"{path}: {_message(dict(error.errors()[0]))}") from None
+    _check_flux_source(path, config.machine)
+    _check_speed(path, config)
+    _check_currents(path, config)
+    _check_inverter(path, config)
+    _check_drop(path, config)
+    return config

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every derived number of one motor in SI: gains, limits, thresholds. The only place where they are chosen."""
+
+import math
+from dataclasses import dataclass
+
+from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.config import MotorConfig
+from fluxtrue_tools.motor.flux_model import FluxModel
+
+TASK_S = 1e-3
+
+DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
+CLOSED_LOOP_SHARE = 0.9
+V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
+V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
+
+TRACKER_BANDWIDTH_RAD_S = 300.0
+TRACKER_JUMP_TURNS = 1 / 16
+
+KNEE_LSB = 4
+
+PSI_DELTA_MIN, PSI_DELTA_MAX = -0.35, 0.15  # of psi_f
+R_DELTA_MIN, R_DELTA_MAX = -0.5, 1.0  # of R at 20 C
+DEAD_TIME_RESIDUAL = 0.1  # share of the dead-time voltage that may stay uncompensated ...
+DEAD_TIME_CURRENT = 0.1  # ... at this share of i_max, where it looks like a resistance
+OMEGA_MIN_RAD_S, OMEGA_MIN_SHARE = 200.0, 0.05
+OMEGA_R_MAX_SHARE = 0.6
+I_MIN_SHARE = 0.04
+PROPORTIONAL_MAX_PERIODS = 127.0
+PSI_DRIFT_SHARE, R_DRIFT_SHARE = 0.05, 0.2
+QUALITY_TIME_S = 0.05
+
+TORQUE_MODEL_RATE = 0.4
+TORQUE_MIN_SHARE = 0.1
+
+V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
+SUM_MAX_PER_FULL_SCALE = 0.05
+
+
+@dataclass(frozen=True)
+class Derived:
+    """Names as in motor_si_t."""
+
+    psi_f_Vs: float
+    tracker_bandwidth_rad_s: float
+    tracker_jump_turns: float
+    sigma_rad_s: float
+    setpoint_weight: float
+    integral_ratio: float
+    v_ratio: float
+    dead_time_duty: float
+    knee_A: float
+    min_pulse_duty: float
+    v_dc_min_V: float
+    observer_s_rad_s: float
+    flux_proportional: float
+    resistance_proportional: float
+    psi_delta_min_Vs: float
+    psi_delta_max_Vs: float
+    r_delta_min_ohm: float
+    r_delta_max_ohm: float
+    omega_min_rad_s: float
+    omega_r_max_rad_s: float
+    i_min_A: float
+    innovation_full_Vs: float
+    psi_drift_full_Vs: float
+    r_drift_full_ohm: float
+    quality_rate: float
+    torque_ki: float
+    torque_kp: float
+    torque_model_rate: float
+    torque_min_Nm: float
+    torque_slew_Nm: float
+    ref_v_ratio: float
+    i_trip_A: float
+    v_max_V: float
+    v_min_V: float
+    sum_max_A: float
+
+
+def _current_control(period_s: float) -> dict[str, float]:
+    sigma = 1.0 / (2.0 * DELAY_PERIODS * period_s)
+    w_c, a = CLOSED_LOOP_SHARE * sigma, (1.0 - CLOSED_LOOP_SHARE) * sigma
+    return {"sigma_rad_s": sigma, "setpoint_weight": w_c / (w_c + a),
+            "integral_ratio": w_c * a * period_s / sigma, "v_ratio": V_RATIO_CONTROL}
+
+
+def _modulation(config: MotorConfig) -> dict[str, float]:
+    inverter = config.inverter
+    # A device drop acts like dead time: a leg voltage against its current.
+    duty = inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V / inverter.vdc_V
+    lsb_A = 2.0 * inverter.current_full_scale_A / (1 << inverter.adc_bits)
+    return {"dead_time_duty": duty * config.control.dead_time_compensation,
+            "knee_A": KNEE_LSB * lsb_A,
+            "min_pulse_duty": config.min_pulse_s * inverter.pwm_hz,
+            "v_dc_min_V": V_FLOOR_PER_VDC * inverter.vdc_V}
+
+
+def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_f_Vs: float) -> dict[str, float]:
+    machine, control, inverter = config.machine, config.control, config.inverter
+    l_d, l_q = float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1))
+    s = control.observer_m * machine.r_ohm * (1.0 / l_d + 1.0 / l_q)
+    # The zero of each law lies on the observer's poles, so that the proportional part damps them.
+    periods = min(2.0 / (s * period_s), PROPORTIONAL_MAX_PERIODS)
+    v_dead = 4.0 / math.pi * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz
+    looks_like = DEAD_TIME_RESIDUAL * v_dead / (DEAD_TIME_CURRENT * machine.i_max_A)
+    return {
+        "observer_s_rad_s": s, "flux_proportional": periods, "resistance_proportional": periods,
+        "psi_delta_min_Vs": PSI_DELTA_MIN * psi_f_Vs, "psi_delta_max_Vs": PSI_DELTA_MAX * psi_f_Vs,
+        "r_delta_min_ohm": R_DELTA_MIN * machine.r_ohm,
+        "r_delta_max_ohm": R_DELTA_MAX * machine.r_ohm + looks_like,
+        "omega_min_rad_s": min(OMEGA_MIN_RAD_S, OMEGA_MIN_SHARE * config.omega_max_rad_s),
+        "omega_r_max_rad_s": OMEGA_R_MAX_SHARE * config.omega_max_rad_s,
+        "i_min_A": I_MIN_SHARE * machine.i_max_A,
+        "innovation_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs,
+        "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * TASK_S,
+        "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * TASK_S,
+        "quality_rate": 1.0 - math.exp(-TASK_S / QUALITY_TIME_S),
+    }
+
+
+def _torque_loop(config: MotorConfig) -> dict[str, float]:
+    control = config.control
+    return {"torque_ki": control.torque_loop_bandwidth_rad_s * TASK_S, "torque_kp": 0.0,
+            "torque_model_rate": TORQUE_MODEL_RATE,
+            "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
+            "torque_slew_Nm": control.torque_slew_Nm_per_s * TASK_S}
+
+
+def _monitors(config: MotorConfig) -> dict[str, float]:
+    inverter = config.inverter
+    return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
+            "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
+            "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A}
+
+
+def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
+    """All derived numbers of one motor."""
+    psi_f = float(model.psi_d(0.0, 0.0))
+    return Derived(
+        psi_f_Vs=psi_f,
+        tracker_bandwidth_rad_s=TRACKER_BANDWIDTH_RAD_S,
+        tracker_jump_turns=TRACKER_JUMP_TURNS,
+        ref_v_ratio=V_RATIO_REFERENCE,
+        **_current_control(bases.period_s),
+        **_modulation(config),
+        **_identification(config, model, bases.period_s, psi_f),
+        **_torque_loop(config),
+        **_monitors(config),
+    )
+
+
+def reference_flux_low(config: MotorConfig) -> float:
+    """psi_avail at top speed on a dc link of 60 %: the lower end of the reference tables."""
+    return 0.6 * config.inverter.vdc_V * V_RATIO_REFERENCE / config.omega_max_rad_s

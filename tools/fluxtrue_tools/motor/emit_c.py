@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The two generated C files: motor_tables.c for the firmware, motor_si.c for its double-precision twin."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
+
+Row = tuple[str, object, str]  # member, literal, comment
+
+COLUMNS = 100
+INDENT = "    "
+
+
+def _float(value: float) -> str:
+    """A float literal that reads back as the nearest float."""
+    text = str(np.float32(value))
+    return (text if "." in text or "e" in text else text + ".0") + "f"
+
+
+def _double(value: float) -> str:
+    return repr(float(value))
+
+
+def _wrap(values: Sequence[str]) -> list[str]:
+    lines, line = [], INDENT
+    for value in values:
+        item = value + ", "
+        if len(line) + len(item) - 1 > COLUMNS:
+            lines.append(line.rstrip())
+            line = INDENT
+        line += item
+    lines.append(line.rstrip())
+    return lines
+
+
+def _table(kind: str, name: str, values: NDArray[np.generic], comment: str) -> str:
+    """One static table, a blank-free block per row of the grid."""
+    rows = np.atleast_2d(values)
+    lines = [f"/* {comment} */", f"static const {kind} {name}[{values.size}] = {{"]
+    for row in rows:
+        lines += _wrap([str(int(v)) if kind == "int16_t" else _double(float(v)) for v in row])
+    return "\n".join([*lines, "};", ""])
+
+
+def _struct(rows: Sequence[Row], indent: str) -> list[str]:
+    out = []
+    for member, literal, comment in rows:
+        if isinstance(literal, list):
+            out += [f"{indent}.{member} = {{", *_struct(literal, indent + INDENT), f"{indent}}},"]
+        else:
+            line = f"{indent}.{member} = {literal},"
+            out.append(f"{line} /* {comment} */" if comment else line)
+    return out
+
+
+def _head(motor: Motor, include: str) -> str:
+    return (f"/* SPDX-License-Identifier: Apache-2.0 */\n"
+            f"/* Motor '{motor.config.machine.name}'. Generated from motor.toml by `tools/fluxtrue motor build`; "
+            f"do not edit. */\n#include \"{include}\"\n")
+
+
+def _bases(bases: Bases) -> list[Row]:
+    return [(name, _float(getattr(bases, name)), "") for name in Bases.__dataclass_fields__]
+
+
+def _measure(motor: Motor) -> list[Row]:
+    gain = u16(motor.config.v_dc_full_scale_V / motor.bases.voltage_V, Q15_ONE, "v_dc_full_scale_V/V_b")
+    return [("shift", f"{16 - motor.config.inverter.adc_bits}u", ""),
+            ("offset", "{32768, 32768, 32768}", "16-bit counts"),
+            ("gain_q14", "{16384, 16384, 16384}", "1.0"),
+            ("v_dc_gain_q15", f"{gain}u", f"{motor.config.v_dc_full_scale_V:g} V full scale")]
+
+
+def _tracker(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    w_ts = d.tracker_bandwidth_rad_s * b.period_s
+    to_pu = math.pi / (b.omega_rad_s * b.period_s)
+    return [("pole_pairs", f"{motor.config.machine.pole_pairs}u", ""), ("offset", "0u", ""),
+            ("kp", q31(2 * w_ts, "tracker kp"), f"2 w_n T_s, w_n = {d.tracker_bandwidth_rad_s:g} rad/s"),
+            ("ki", q31(w_ts**2, "tracker ki"), "(w_n T_s)^2"),
+            ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
+            ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn")]
+
+
+def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
+    return [("x0", x0, ""), ("y0", y0, ""), ("x_shift", f"{shift}u", ""), ("y_shift", f"{shift}u", ""),
+            ("nx", f"{shape[0]}u", ""), ("ny", f"{shape[1]}u", "")]
+
+
+def _flux_table(motor: Motor) -> list[Row]:
+    tables = motor.tables
+    names = ("l_d", "l_q", "l_qq", "g_d", "g_q", "psi_f0")
+    return [("grid", _grid(tables.x0, 0, tables.shift, tables.l_d_H.shape), ""),
+            ("l_shift", f"{tables.l_shift}u", ""), *((name, f"table_{name}", "") for name in names)]
+
+
+def _current_control(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    sigma = d.sigma_rad_s / b.omega_rad_s
+    r_pu = motor.config.machine.r_ohm / b.resistance_ohm
+    return [("sigma_gain", q16(sigma, "sigma_gain"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
+            ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
+            ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
+            ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
+            ("v_ratio", q15(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}")]
+
+
+def _modulate(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("dead_time", q15(d.dead_time_duty, "dead_time"), f"{d.dead_time_duty:.6g} duty"),
+            ("knee_gain", q16(b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
+            ("min_pulse", q15(d.min_pulse_duty, "min_pulse"), f"{d.min_pulse_duty:.6g} duty"),
+            ("v_dc_min", q15(d.v_dc_min_V / b.voltage_V, "v_dc_min"), f"{d.v_dc_min_V:g} V")]
+
+
+def _mrai_gains(motor: Motor) -> list[Row]:
+    d, b, control = motor.derived, motor.bases, motor.config.control
+    r0 = motor.config.machine.r_ohm / b.resistance_ohm
+    return [
+        ("r0", q31(r0, "r0"), "R at 20 C"),
+        ("pole_gain", q31(control.observer_m * r0 / 2, "pole_gain"), f"m R_0/2, m = {control.observer_m:g}"),
+        ("l_shift", f"{motor.tables.l_shift}u", ""),
+        ("rate_gain_q26", str(round(2**26 / (b.omega_rad_s * b.period_s))), "1/(omega_b T_s)"),
+        ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
+         f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
+        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s * b.period_s, "resistance_gain"),
+         f"2 k_r T_s, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
+        ("flux_proportional", q16(d.flux_proportional, "flux_proportional"), f"{d.flux_proportional:.6g} periods"),
+        ("resistance_proportional", q16(d.resistance_proportional, "resistance_proportional"),
+         f"{d.resistance_proportional:.6g} periods"),
+    ]
+
+
+def _mrai_limits(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [
+        ("psi_delta_min", q31(d.psi_delta_min_Vs / b.flux_Vs, "psi_delta_min"), f"{d.psi_delta_min_Vs:.6g} Vs"),
+        ("psi_delta_max", q31(d.psi_delta_max_Vs / b.flux_Vs, "psi_delta_max"), f"{d.psi_delta_max_Vs:.6g} Vs"),
+        ("r_delta_min", q31(d.r_delta_min_ohm / b.resistance_ohm, "r_delta_min"), f"{d.r_delta_min_ohm:.6g} ohm"),
+        ("r_delta_max", q31(d.r_delta_max_ohm / b.resistance_ohm, "r_delta_max"), f"{d.r_delta_max_ohm:.6g} ohm"),
+        ("omega_min", q15(d.omega_min_rad_s / b.omega_rad_s, "omega_min"), f"{d.omega_min_rad_s:.6g} rad/s"),
+        ("omega_r_max", q15(d.omega_r_max_rad_s / b.omega_rad_s, "omega_r_max"), f"{d.omega_r_max_rad_s:.6g} rad/s"),
+        ("i_min", q15(d.i_min_A / b.current_A, "i_min"), f"{d.i_min_A:.6g} A"),
+        ("sinc_gain", q31((b.omega_rad_s * b.period_s) ** 2 / 24, "sinc_gain"), "(omega_b T_s)^2/24"),
+        ("psi_drift_full", q31(d.psi_drift_full_Vs / b.flux_Vs, "psi_drift_full"), f"{d.psi_drift_full_Vs:.6g} Vs"),
+        ("r_drift_full", q31(d.r_drift_full_ohm / b.resistance_ohm, "r_drift_full"), f"{d.r_drift_full_ohm:.6g} ohm"),
+        ("quality_rate", q15(d.quality_rate, "quality_rate"), f"{d.quality_rate:.6g}"),
+    ]
+
+
+def _torque_loop(motor: Motor) -> list[Row]:
+    d, control = motor.derived, motor.config.control
+    return [("ki", q15(d.torque_ki, "torque ki"), f"{control.torque_loop_bandwidth_rad_s:g} rad/s"),
+            ("kp", q15(d.torque_kp, "torque kp"), ""),
+            ("model_rate", q15(d.torque_model_rate, "model_rate"), f"{d.torque_model_rate:g}"),
+            ("authority", q15(control.torque_authority, "authority"), f"{control.torque_authority:g}"),
+            ("torque_min", q15(d.torque_min_Nm / motor.bases.torque_Nm, "torque_min"), f"{d.torque_min_Nm:.6g} N·m")]
+
+
+def _current_reference(motor: Motor) -> list[Row]:
+    refs, b = motor.references, motor.bases
+    lut: list[Row] = [("y", "table_ref_torque_max", ""), ("x0", refs.y0, ""), ("shift", f"{refs.shift}u", ""),
+                      ("n", f"{len(refs.psi_Vs)}u", "")]
+    return [("grid", _grid(0, refs.y0, refs.shift, refs.id_A.shape), ""),
+            ("i_d", "table_ref_i_d", ""), ("i_q", "table_ref_i_q", ""), ("torque_max", lut, ""),
+            ("v_ratio", q15(motor.derived.ref_v_ratio, "ref v_ratio"), f"{motor.derived.ref_v_ratio:.6g}"),
+            ("r_pu", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r_pu"), "R at 20 C"),
+            ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"),
+             f"{motor.config.machine.i_max_A:g} A")]
+
+
+def _monitor(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
+            ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
+            ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
+            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A")]
+
+
+def _torque_slew(motor: Motor) -> tuple[str, str]:
+    slew = motor.derived.torque_slew_Nm / motor.bases.torque_Nm
+    if slew <= 0 or slew >= 1:
+        return "Q15_MAX", "open"
+    return str(max(q15(slew, "torque_slew"), 1)), f"{motor.config.control.torque_slew_Nm_per_s:g} N·m/s"
+
+
+def _motor(motor: Motor) -> list[Row]:
+    machine, inverter, b = motor.config.machine, motor.config.inverter, motor.bases
+    return [
+        ("name", f'"{machine.name}"', ""), ("bases", _bases(b), ""),
+        ("adc_bits", f"{inverter.adc_bits}u", ""),
+        ("current_full_scale_A", _float(inverter.current_full_scale_A), ""),
+        ("v_dc_full_scale_V", _float(motor.config.v_dc_full_scale_V), ""),
+        ("torque_max_Nm", _float(machine.torque_max_Nm), ""),
+        ("psi_f_Vs", _float(motor.derived.psi_f_Vs), ""),
+        ("r_ohm_20", _float(machine.r_ohm), ""),
+        ("dead_time_s", _float(inverter.dead_time_s), ""),
+        ("torque_max", q15(machine.torque_max_Nm / b.torque_Nm, "torque_max"), f"{machine.torque_max_Nm:g} N·m"),
+        ("torque_slew", *_torque_slew(motor)),
+        ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
+        ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
+        ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
+        ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
+        ("monitor", _monitor(motor), ""),
+    ]
+
+
+def _q15_tables(motor: Motor) -> list[str]:
+    b, tables, refs = motor.bases, motor.tables, motor.references
+    l_unit = f"{b.inductance_H * 2**tables.l_shift / Q15_ONE:.6g} H per count"
+    psi_unit = f"{b.flux_Vs / Q15_ONE:.6g} Vs per count"
+    i_unit = f"{b.current_A / Q15_ONE:.6g} A per count"
+    grid = (f"rows i_d = {tables.id_A[0]:g} ... {tables.id_A[-1]:g} A, columns |i_q| = 0 ... {tables.iq_A[-1]:g} A, "
+            f"every {tables.iq_A[1]:g} A")
+    comments = {"l_d": f"apparent L_d, {l_unit}", "l_q": f"apparent L_q, {l_unit}",
+                "l_qq": f"incremental L_q, {l_unit}",
+                "g_d": "omega_b T_s/l_dd, 2^-15 per count", "g_q": "omega_b T_s/l_qq, 2^-15 per count",
+                "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
+    out = [f"/* Flux tables: {grid}. */\n"]
+    out += [_table("int16_t", f"table_{name}", tables.stored[name], text) for name, text in comments.items()]
+    out.append(f"/* Current references: rows |T| = 0 ... {refs.torque_Nm[-1]:.6g} N·m "
+               f"every {refs.torque_Nm[1]:.6g} N·m, columns\n"
+               f" * available flux {refs.psi_Vs[0]:.6g} ... {refs.psi_Vs[-1]:.6g} Vs every "
+               f"{refs.psi_Vs[1] - refs.psi_Vs[0]:.6g} Vs. */\n")
+    out.append(_table("int16_t", "table_ref_i_d", refs.stored["i_d"], i_unit))
+    out.append(_table("int16_t", "table_ref_i_q", refs.stored["i_q"], i_unit))
+    out.append(_table("int16_t", "table_ref_torque_max", refs.stored["torque_max"],
+                      f"{b.torque_Nm / Q15_ONE:.6g} N·m per count"))
+    return out
+
+
+def motor_tables_c(motor: Motor) -> str:
+    """motor_tables.c."""
+    body = "\n".join(_struct(_motor(motor), INDENT))
+    return "\n".join([_head(motor, "app/motor.h"), *_q15_tables(motor), f"const motor_t motor = {{\n{body}\n}};\n"])
+
+
+_SI_DERIVED = (
+    "tracker_bandwidth_rad_s", "sigma_rad_s", "setpoint_weight", "integral_ratio", "v_ratio", "dead_time_duty",
+    "knee_A", "min_pulse_duty", "v_dc_min_V", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
+    "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
+    "innovation_full_Vs", "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
+    "torque_slew_Nm", "ref_v_ratio", "i_trip_A", "v_max_V", "v_min_V", "sum_max_A", "psi_f_Vs",
+)
+
+
+def _si_rows(motor: Motor) -> list[Row]:
+    machine, inverter, control, b = (motor.config.machine, motor.config.inverter, motor.config.control, motor.bases)
+    tables, refs = motor.tables, motor.references
+    numbers: dict[str, float] = {
+        "r_ohm_20": machine.r_ohm, "period_s": b.period_s, "i_base_A": b.current_A, "v_base_V": b.voltage_V,
+        "omega_base_rad_s": b.omega_rad_s, "current_full_scale_A": inverter.current_full_scale_A,
+        "v_dc_full_scale_V": motor.config.v_dc_full_scale_V, "id0_A": tables.id_A[0],
+        "did_A": tables.id_A[1] - tables.id_A[0], "diq_A": tables.iq_A[1], "observer_m": control.observer_m,
+        "flux_bandwidth_rad_s": control.flux_bandwidth_rad_s,
+        "resistance_bandwidth_rad_s": control.resistance_bandwidth_rad_s,
+        "torque_authority": control.torque_authority, "torque_max_Nm": machine.torque_max_Nm,
+        "torque_step_Nm": refs.torque_Nm[1], "psi0_Vs": refs.psi_Vs[0], "psi_step_Vs": refs.psi_Vs[1] - refs.psi_Vs[0],
+        "i_max_A": machine.i_max_A,
+    }
+    numbers |= {name: getattr(motor.derived, name) for name in _SI_DERIVED}
+    counts = {"pole_pairs": machine.pole_pairs, "adc_bits": inverter.adc_bits, "nd": len(tables.id_A),
+              "nq": len(tables.iq_A), "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
+    pointers = ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs", "ref_id_A", "ref_iq_A", "ref_torque_max_Nm")
+    return [*((k, v, "") for k, v in counts.items()), *((k, _double(v), "") for k, v in numbers.items()),
+            *((name, f"table_{name}", "") for name in pointers)]
+
+
+def motor_si_c(motor: Motor) -> str:
+    """motor_si.c."""
+    tables, refs = motor.tables, motor.references
+    arrays = {"l_d_H": tables.l_d_H, "l_q_H": tables.l_q_H, "l_dd_H": tables.l_dd_H, "l_qq_H": tables.l_qq_H,
+              "psi_f0_Vs": tables.psi_f0_Vs, "ref_id_A": refs.id_A, "ref_iq_A": refs.iq_A,
+              "ref_torque_max_Nm": refs.torque_max_Nm}
+    blocks = [_table("double", f"table_{name}", values, name.rsplit("_", 1)[1] + ", unquantised")
+              for name, values in arrays.items()]
+    body = "\n".join(_struct(_si_rows(motor), INDENT))
+    return "\n".join([_head(motor, "twin/motor_si.h"), *blocks, f"const motor_si_t motor_si = {{\n{body}\n}};\n"])

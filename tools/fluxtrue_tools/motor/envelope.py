@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Torque over speed: what the references allow at the planned share of the dc voltage."""
+
+import numpy as np
+
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.motor.motor import Motor
+
+
+def torque_envelope(motor: Motor, speed_rpm: Array) -> Array:
+    """T_max at each speed, from psi_avail = (v_ratio vdc - R i_max)/w, before torque_max_Nm cuts it."""
+    machine = motor.config.machine
+    omega = np.maximum(speed_rpm * machine.pole_pairs * 2 * np.pi / 60, 1e-6)
+    volts = motor.derived.ref_v_ratio * motor.config.inverter.vdc_V - machine.r_ohm * machine.i_max_A
+    return motor.limits.torque_max(np.minimum(volts / omega, 10.0 * motor.bases.flux_Vs))

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report's figures."""
+
+from collections.abc import Callable
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+import numpy as np  # noqa: E402
+from matplotlib.axes import Axes  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+
+from fluxtrue_tools.motor.envelope import torque_envelope  # noqa: E402
+from fluxtrue_tools.motor.flux_model import Array, flux, torque  # noqa: E402
+from fluxtrue_tools.motor.flux_tables import error_plane  # noqa: E402
+from fluxtrue_tools.motor.motor import Motor  # noqa: E402
+from fluxtrue_tools.motor.references import lookup_references  # noqa: E402
+from fluxtrue_tools.motor.quantise import Q15_ONE  # noqa: E402
+
+POINTS = 121
+
+
+def _plane(motor: Motor, both_halves: bool) -> tuple[Array, Array]:
+    i_max = motor.config.machine.i_max_A
+    q_low = -i_max if both_halves else 0.0
+    return np.meshgrid(np.linspace(-i_max, 0, POINTS), np.linspace(q_low, i_max, 2 * POINTS - 1), indexing="ij")
+
+
+def _filled(axes: Axes, motor: Motor, d: Array, q: Array, z: Array, title: str) -> None:
+    z = np.where(np.hypot(d, q) <= motor.config.machine.i_max_A * 1.0001, z, np.nan)
+    low, high = float(np.nanmin(z)), float(np.nanmax(z))
+    if high - low < 1e-9 * max(abs(high), 1.0):
+        axes.text(0.5, 0.5, f"{high:.4g} everywhere", transform=axes.transAxes, ha="center")
+        axes.set_xlim(d.min(), d.max())
+        axes.set_ylim(q.min(), q.max())
+    else:
+        shown = axes.contourf(d, q, z, levels=16, cmap="viridis")
+        axes.figure.colorbar(shown, ax=axes)
+    axes.set(title=title, xlabel="i_d, A", ylabel="i_q, A")
+
+
+def _grid(motor: Motor, panels: list[tuple[str, Callable[[Array, Array], Array]]], both_halves: bool) -> Figure:
+    rows = (len(panels) + 1) // 2
+    figure, axes = plt.subplots(rows, 2, figsize=(11, 4.2 * rows), layout="constrained", squeeze=False)
+    d, q = _plane(motor, both_halves)
+    for ax, (title, f) in zip(axes.flat, panels, strict=False):
+        _filled(ax, motor, d, q, f(d, q), title)
+    return figure
+
+
+def flux_figure(motor: Motor) -> Figure:
+    """psi_d, psi_q over the current circle, symmetrised."""
+    m = motor.model
+    return _grid(motor, [("psi_d, mVs", lambda d, q: 1e3 * m.psi_d(d, q)),
+                         ("psi_q, mVs", lambda d, q: 1e3 * m.psi_q(d, q))], True)
+
+
+def inductance_figure(motor: Motor) -> Figure:
+    """Apparent and incremental inductances."""
+    m = motor.model
+
+    def l_d(d: Array, q: Array) -> Array:
+        near = np.minimum(d, -1e-3 * motor.config.machine.i_max_A)
+        return 1e6 * (m.psi_d(near, q) - m.psi_d(0.0, q)) / near
+
+    def l_q(d: Array, q: Array) -> Array:
+        near = np.maximum(q, 1e-3 * motor.config.machine.i_max_A)
+        return 1e6 * m.psi_q(d, near) / near
+
+    return _grid(motor, [("L_d apparent, uH", l_d), ("L_q apparent, uH", l_q),
+                         ("L_d incremental, uH", lambda d, q: 1e6 * m.psi_d(d, q, nd=1)),
+                         ("L_q incremental, uH", lambda d, q: 1e6 * m.psi_q(d, q, nq=1))], False)
+
+
+def _lines(axes: Axes, d: Array, q: Array, z: Array, colour: str, label: str) -> None:
+    lines = axes.contour(d, q, z, levels=10, colors=colour, linewidths=0.6)
+    axes.clabel(lines, fontsize=6)
+    axes.plot([], [], color=colour, linewidth=0.6, label=label)
+
+
+def _mtpv(motor: Motor) -> tuple[Array, Array]:
+    """Contour ends that lie inside the circle: the voltage, not the current, limits the torque there."""
+    torques = np.linspace(0.0, motor.solver.torque_top_Nm * 0.999, 60)
+    ends = [(c.id_A[-1], c.iq_A[-1]) for c in motor.solver.contours(torques)]
+    inside = [(d, q) for d, q in ends if np.hypot(d, q) < 0.995 * motor.config.machine.i_max_A]
+    d, q = zip(*inside, strict=True) if inside else ((), ())
+    return np.array(d), np.array(q)
+
+
+def loci_figure(motor: Motor) -> Figure:
+    """MTPA, field weakening and MTPV with torque and flux contours, and the stored references."""
+    figure, axes = plt.subplots(figsize=(9, 8), layout="constrained")
+    d, q = _plane(motor, False)
+    inside = np.hypot(d, q) <= motor.config.machine.i_max_A
+    t = torque(motor.model, motor.config.machine.pole_pairs, d, q)
+    _lines(axes, d, q, np.where(inside, t, np.nan), "tab:gray", "torque, N·m")
+    _lines(axes, d, q, np.where(inside, 1e3 * flux(motor.model, d, q), np.nan), "tab:blue", "|psi|, mVs")
+    angle = np.linspace(np.pi / 2, np.pi, 100)
+    i_max = motor.config.machine.i_max_A
+    axes.plot(i_max * np.cos(angle), i_max * np.sin(angle), "k", label="current limit")
+    contours = motor.solver.contours(np.linspace(0, motor.solver.torque_top_Nm * 0.999, 60))
+    axes.plot([c.id_A[0] for c in contours], [c.iq_A[0] for c in contours], "tab:green", lw=2.5, label="MTPA")
+    axes.plot(*_mtpv(motor), "tab:red", lw=2.5, label="MTPV")
+    _stored_loci(axes, motor)
+    axes.set(xlabel="i_d, A", ylabel="i_q, A", xlim=(-1.02 * i_max, 0.03 * i_max), ylim=(0, 1.02 * i_max))
+    axes.set_aspect("equal")
+    axes.legend(loc="upper left", fontsize=8)
+    return figure
+
+
+def _stored_loci(axes: Axes, motor: Motor) -> None:
+    """References as the firmware reads them, at some available fluxes."""
+    refs, b = motor.references, motor.bases
+    for k, psi in enumerate(np.linspace(refs.psi_Vs[0], refs.psi_Vs[-1], 7)):
+        t = np.linspace(0, float(np.interp(psi, refs.psi_Vs, refs.torque_max_Nm)), 80)
+        counts = np.round(t / b.torque_Nm * Q15_ONE).astype(np.int64)
+        level = np.full_like(counts, round(psi / b.flux_Vs * Q15_ONE))
+        i_d, i_q = (x / Q15_ONE * b.current_A for x in lookup_references(refs, counts, level))
+        axes.plot(i_d, i_q, "--", color="tab:orange", lw=1, label="stored references" if k == 0 else None)
+
+
+def envelope_figure(motor: Motor) -> Figure:
+    """Torque and power over speed."""
+    machine = motor.config.machine
+    figure, axes = plt.subplots(figsize=(9, 4.5), layout="constrained")
+    speed = np.linspace(0, machine.speed_max_rpm, 300)
+    possible = torque_envelope(motor, speed)
+    limited = np.minimum(possible, machine.torque_max_Nm)
+    axes.plot(speed, possible, "tab:gray", ls=":", label="current and voltage")
+    axes.plot(speed, limited, "tab:green", lw=2, label="with torque_max_Nm")
+    axes.set(xlabel="speed, rpm", ylabel="torque, N·m", ylim=(0, None), xlim=(0, machine.speed_max_rpm))
+    power = axes.twinx()
+    power.plot(speed, limited * speed * 2 * np.pi / 60 / 1e3, "tab:blue", lw=1, label="shaft power, kW (no losses)")
+    power.set(ylabel="kW", ylim=(0, None))
+    axes.set_title(f"{motor.config.inverter.vdc_V:g} V, of which the references plan "
+                   f"{motor.derived.ref_v_ratio:.3f} as phase peak")
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    return figure
+
+
+def error_figure(motor: Motor) -> Figure:
+    """What the quantised, bilinear look-up adds to the map."""
+    d, q, e_d, e_q, e_t = error_plane(motor.tables, motor.model, motor.bases, motor.config.machine.i_max_A,
+                                      motor.config.machine.pole_pairs)
+    figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), layout="constrained")
+    for ax, z, title in zip(axes, (1e6 * e_d, 1e6 * e_q, e_t),
+                            ("psi_d error, uVs", "psi_q error, uVs", "torque error, N·m"), strict=True):
+        _filled(ax, motor, d, q, z, title)
+    return figure
+
+
+FIGURES: dict[str, tuple[str, Callable[[Motor], Figure]]] = {
+    "plot_flux.png": ("Flux linkages (symmetrised)", flux_figure),
+    "plot_inductances.png": ("Inductances", inductance_figure),
+    "plot_loci.png": ("Current references: MTPA, field weakening, MTPV", loci_figure),
+    "plot_envelope.png": ("Torque-speed envelope", envelope_figure),
+    "plot_error.png": ("Table error against the map", error_figure),
+}

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report as text: what was read, what was changed, how good the tables are."""
+
+from dataclasses import asdict
+
+from fluxtrue_tools.motor.motor import Motor
+
+Lines = list[str]
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2f} %"
+
+
+def _machine(motor: Motor) -> Lines:
+    machine, inverter = motor.config.machine, motor.config.inverter
+    flux = "constants" if motor.flux_map is None else f"map {machine.flux_map}"
+    l_d, l_q = float(motor.model.psi_d(0.0, 0.0, nd=1)), float(motor.model.psi_q(0.0, 0.0, nq=1))
+    return [
+        f"motor {machine.name}: {machine.pole_pairs} pole pairs, {flux}",
+        f"  at no current      psi_f {1e3 * motor.derived.psi_f_Vs:.2f} mVs, L_d {1e6 * l_d:.0f} uH, "
+        f"L_q {1e6 * l_q:.0f} uH, R {1e3 * machine.r_ohm:g} mohm (20 C)",
+        f"  limits             {machine.i_max_A:g} A, {machine.torque_max_Nm:g} N·m of "
+        f"{motor.solver.torque_top_Nm:.1f} on the circle, {machine.speed_max_rpm:g} rpm",
+        f"  inverter           {inverter.vdc_V:g} V, {inverter.pwm_hz:g} Hz, "
+        f"dead time {1e6 * inverter.dead_time_s:g} us, "
+        f"current full scale {inverter.current_full_scale_A:g} A, {inverter.adc_bits} bits, "
+        f"over-current trip {motor.derived.i_trip_A:g} A",
+    ]
+
+
+def _map(motor: Motor) -> Lines:
+    flux_map = motor.flux_map
+    if flux_map is None:
+        return ["flux map: none, constant inductances"]
+    s = flux_map.symmetry
+    preserved = getattr(motor.model, "shape_preserving", False)
+    how = ("shape-preserving cubics (a plain cubic spline would overshoot this map)" if preserved
+           else "bicubic spline through every node, monotone between them too")
+    lines = [
+        f"flux map: {len(flux_map.id_A)} x {len(flux_map.iq_A)} nodes after symmetrising, id {flux_map.id_A[0]:g} ... "
+        f"{flux_map.id_A[-1]:g} A, iq {flux_map.iq_A[0]:g} ... {flux_map.iq_A[-1]:g} A",
+        f"  covered            {s.source}",
+        f"  removed            psi_d max {1e3 * s.psi_d_max_Vs:.3f} mVs, rms {1e3 * s.psi_d_rms_Vs:.3f} mVs "
+        "(odd part in i_q)",
+        f"                     psi_q max {1e3 * s.psi_q_max_Vs:.3f} mVs, rms {1e3 * s.psi_q_rms_Vs:.3f} mVs "
+        f"({'even part in i_q' if s.source.startswith('both') else 'its value at i_q = 0, per i_d'})",
+        f"  interpolation      {how}",
+    ]
+    if flux_map.id_A[-1] < motor.tables.id_A[-1]:
+        lines.append(f"  extended           to id = {motor.tables.id_A[-1]:g} A, one table node, "
+                     "along the edge's slope")
+    return lines
+
+
+def _tables(motor: Motor) -> Lines:
+    t, e, torque_max = motor.tables, motor.table_error, motor.config.machine.torque_max_Nm
+    return [
+        f"flux tables: {len(t.stored)} of {len(t.id_A)} x {len(t.iq_A)} nodes every {t.iq_A[1]:g} A, "
+        f"inductances to 2^{t.l_shift} L_b",
+        f"  error against map  torque max {e.torque_max_Nm:.3f} N·m "
+        f"({_percent(e.torque_max_Nm / torque_max)} of torque_max), "
+        f"rms {e.torque_rms_Nm:.3f} N·m (firmware look-up, i_max circle)",
+        f"                     psi_d max {1e3 * e.psi_d_max_Vs:.3f} mVs, psi_q max {1e3 * e.psi_q_max_Vs:.3f} mVs",
+    ]
+
+
+def _references(motor: Motor) -> Lines:
+    r, e, torque_max = motor.references, motor.reference_errors, motor.config.machine.torque_max_Nm
+    reach = float(motor.limits.psi_min_Vs[0])
+    lines = [
+        f"current references: {len(r.torque_Nm)} x {len(r.psi_Vs)} nodes, every {r.torque_Nm[1]:.3g} N·m and "
+        f"{1e3 * (r.psi_Vs[1] - r.psi_Vs[0]):.3g} mVs from {1e3 * r.psi_Vs[0]:.3g} mVs",
+        f"  error, MTPA        torque max {e.torque_mtpa_max_Nm:.3f} N·m "
+        f"({_percent(e.torque_mtpa_max_Nm / torque_max)} of torque_max)",
+        f"  error, weakening   torque max {e.torque_weak_max_Nm:.3f} N·m, rms {e.torque_weak_rms_Nm:.3f} N·m; flux "
+        f"{_percent(e.flux_excess)} beyond the available at worst",
+        f"  current            {_percent(max(e.current_excess, 0.0))} beyond i_max at worst",
+    ]
+    if reach > r.psi_Vs[0]:
+        lines.append(f"  note               this machine cannot go below {1e3 * reach:.3g} mVs within i_max: at top "
+                     "speed and a low dc voltage its back-EMF exceeds what the references can weaken")
+    return lines
+
+
+def _bases(motor: Motor) -> Lines:
+    names = asdict(motor.bases)
+    text = ", ".join(f"{name} {value:.6g}" for name, value in names.items())
+    ratio = motor.bases.omega_rad_s / motor.config.omega_max_rad_s
+    return [f"bases: {text}", f"  speed reserve      {_percent(ratio - 1)} above speed_max_rpm"]
+
+
+def report_text(motor: Motor) -> str:
+    """report.txt."""
+    parts = [_machine(motor), _map(motor), _tables(motor), _references(motor), _bases(motor),
+             [f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
+              "references "
+              f"= {motor.flash_bytes} bytes"]]
+    return "\n".join(line for part in parts for line in part) + "\n"
