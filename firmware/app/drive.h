@@ -37,7 +37,7 @@ typedef struct {
     monitor_state_t monitor;
     modulate_out_t modulated;    /* acts during the next period */
     dq_t acting;                 /* acts during this period */
-    uint8_t periods_on;          /* since the gates closed, saturates at 2: then acting is known */
+    uint8_t periods_on;          /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
     uint32_t overruns;
     uint32_t pended;             /* identifications asked for */

@@ -19,7 +19,7 @@
 typedef struct {
     mrai_in_t mrai;
     q15_t v_dc;
-    bool acting;          /* mrai.u really acted: the bridge was on when it was computed and is on now */
+    bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
 } sample_t;
 

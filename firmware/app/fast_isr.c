@@ -8,6 +8,7 @@
 
 #define DUTY_MIDDLE 16384
 #define OVERRUNS_TO_FAULT 3
+#define PERIODS_TO_ACT 3
 
 typedef struct {
     measure_t measured;
@@ -50,7 +51,7 @@ static void publish(drive_t *drive, const instant_t *now)
     *sample_box_begin(&drive->samples) = (sample_t){
         .mrai = {.i = now->i, .u = fast->acting, .flux = now->flux, .omega = now->angle.omega_q31},
         .v_dc = now->measured.v_dc,
-        .acting = fast->periods_on >= 2,
+        .acting = fast->periods_on >= PERIODS_TO_ACT,
         .voltage_limited = fast->current_control.limited || fast->modulated.limited,
     };
     sample_box_publish(&drive->samples);
@@ -85,7 +86,7 @@ static void bridge_on(drive_t *drive, const instant_t *now, const current_target
     fast->modulated = modulate_step(&m->modulate, &modulation);
     hal_pwm_write(fast->modulated.duty);
     hal_pwm_enable(true);
-    fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, 2);
+    fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 
 void fast_isr(drive_t *drive)

@@ -4,6 +4,10 @@
 #include "fx/q.h"
 #include "fx/sqrt.h"
 
+/* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that binds the d axis,
+ * and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
+#define D_RESERVE_SHIFT 5
+
 typedef struct {
     q15_t error; /* psi* - psi */
     int32_t u;   /* before the limiter, Q15 */
@@ -59,7 +63,8 @@ dq_t current_control_step(const current_control_config_t *config, current_contro
     const axis_t q = axis(config, to->psi.q, to->weighted.q, flux->psi_q, state->s_q, fx_mul_q30(in->omega, psi_d));
 
     const int32_t v_max = fx_mul_q15(config->v_ratio, in->v_dc);
-    const int32_t u_d = fx_clamp_q31(d.u, -v_max, v_max);
+    const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
+    const int32_t u_d = fx_clamp_q31(d.u, -d_max, d_max);
     int32_t u_q = fx_clamp_q31(q.u, -v_max, v_max);
     const int32_t room = v_max * v_max - u_d * u_d; /* Q30 */
     if (u_q * u_q > room) {

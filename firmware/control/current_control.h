@@ -8,7 +8,7 @@
  * The error is taken in flux linkage: sigma (psi* - psi) is sigma l (i* - i) with l the incremental inductance between the
  * two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s;  an axis's integrator holds while the voltage circle cuts it and its error pushes out.
- *   |u| <= v_ratio v_dc: u_d keeps its share first, u_q gets sqrt(v_max^2 - u_d^2).
+ *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2).
  * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
  * Units    per unit
  * Range    sigma_gain = sigma/omega_b in Q15.16; b, a_i in q15; |omega| < 1

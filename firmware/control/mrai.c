@@ -89,10 +89,9 @@ static void adapt_resistance(const mrai_config_t *config, const mrai_schedule_t 
     state->r_clamped = adapt(&law, &state->r_delta, &state->r_used, fx_clamp_q31(step_q25, -(1 << 24), (1 << 24) - 1) * 64);
 }
 
-/* u/sinc + rotational - R~ i~ on one axis, mean over the period, Q30, saturating. */
-static int32_t driving_voltage(q15_t u, q15_t gain, q31_t r, int32_t i_hat, int32_t rotational)
+/* u/sinc + rotational - drop on one axis, mean over the period, Q30, saturating; the drop in Q29 is taken twice. */
+static int32_t driving_voltage(q15_t u, q15_t gain, int32_t drop, int32_t rotational)
 {
-    const int32_t drop = fx_mulhi(r, i_hat); /* Q31 * Q30 = Q29: taken twice */
     const int32_t v = fx_add_q31(fx_mac_q30(u * 32768, u, gain), rotational);
     return fx_sub_q31(fx_sub_q31(v, drop), drop);
 }
@@ -111,19 +110,26 @@ static int32_t advance(int32_t e, int32_t x, q31_t g, int32_t correction_q29)
     return fx_clamp_q31(fx_add_q31(e, fx_add_q31(half, half)), -ERROR_BOUND, ERROR_BOUND - 1);
 }
 
+/* R_0 i + dR i~ (MR-6): R_0 acts on the measured current, else it would add its own R_0/L to the placed poles. Q29. */
+static int32_t resistive_drop(const mrai_config_t *config, const mrai_state_t *state, int32_t i_hat, int32_t e)
+{
+    return fx_mulhi_add(fx_mulhi(state->r_used, i_hat), config->r0, fx_add_q31(i_hat, e));
+}
+
 /* The voltage equation over the period that ends with this sample (MR-6); trapezoidal means make it exact in steady state. */
 static void observe(const mrai_config_t *config, q15_t voltage_gain, mrai_state_t *state, const mrai_in_t *in, pair_t g,
                     pair_t i_hat, pair_t s2e)
 {
     const flux_point_t *flux = &in->flux;
-    const q31_t r = fx_add_q31(config->r0, state->r_used);
     const q31_t psi_d = fx_add_q31((flux->psi_d + state->psi.d) * 32768, state->psi_used);
     const int32_t v_d = fx_mulhi(in->omega, (flux->psi_q + state->psi.q) * 32768);
     const int32_t v_q = -fx_mulhi(in->omega, psi_d);
+    const int32_t drop_d = resistive_drop(config, state, i_hat.d, state->e_d_q30);
+    const int32_t drop_q = resistive_drop(config, state, i_hat.q, state->e_q_q30);
     const int32_t x_d = fx_sub_q31(flux_rate(config, flux->psi_d, state->psi.d),
-                                   driving_voltage(state->u.d, voltage_gain, r, i_hat.d, v_d));
+                                   driving_voltage(state->u.d, voltage_gain, drop_d, v_d));
     const int32_t x_q = fx_sub_q31(flux_rate(config, flux->psi_q, state->psi.q),
-                                   driving_voltage(state->u.q, voltage_gain, r, i_hat.q, v_q));
+                                   driving_voltage(state->u.q, voltage_gain, drop_q, v_q));
     state->e_d_q30 = advance(state->e_d_q30, x_d, g.d, s2e.q - s2e.d);
     state->e_q_q30 = advance(state->e_q_q30, x_q, g.q, -s2e.d - s2e.q);
 }
@@ -134,7 +140,8 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
     const pair_t g = {(in->flux.g_d + state->g.d) * 32768, (in->flux.g_q + state->g.q) * 32768};
     const pair_t i_hat = {(in->i.d + state->i.d) * 16384 - state->e_d_q30, (in->i.q + state->i.q) * 16384 - state->e_q_q30};
     const pair_t s2e = weighted_error(config, g, (pair_t){state->e_d_q30, state->e_q_q30});
-    const pair_t innovation = {s2e.d * INNOVATION_SCALE, s2e.q * INNOVATION_SCALE};
+    const pair_t innovation = {fx_clamp_q31(s2e.d, -INNOVATION_BOUND, INNOVATION_BOUND - 1) * INNOVATION_SCALE,
+                               fx_clamp_q31(s2e.q, -INNOVATION_BOUND, INNOVATION_BOUND - 1) * INNOVATION_SCALE};
 
     adapt_flux(config, schedule, state, in->flux.l_qq, innovation.q);
     adapt_resistance(config, schedule, state, g, i_hat, innovation);

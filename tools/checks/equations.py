@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 r"""Every equation number that is cited is defined exactly once, on the page that owns its prefix.
 
-A definition is \tag{MR-7}, or a bold **(MR-7)** where the text itself is the equation.
+A definition is \tag{MR-7}; in an indented block a number at the left margin, two blanks before the
+equation, or at the right one, two blanks after it; or a bold **(MR-7)** where the text itself is it.
 """
 
 import re
@@ -31,7 +32,9 @@ SUFFIXES = (".c", ".h", ".py", ".md", ".toml", ".cmake", ".txt", ".rb", ".sh")
 EXEMPT = {Path("tools/checks/equations.py"), Path("tests/tools/test_equations.py")}
 
 NUMBER = rf"({'|'.join(PAGES)})-(\d+)"
-DEFINITION = re.compile(rf"\\tag\{{{NUMBER}\}}|\*\*\({NUMBER}\)\*\*")
+DEFINITION = re.compile(
+    rf"\\tag\{{{NUMBER}\}}|\*\*\({NUMBER}\)\*\*|^ {{4,}}\({NUMBER}\) {{2,}}\S|\S {{2,}}\({NUMBER}\)\s*$"
+)
 CITED = re.compile(rf"\b{NUMBER}\b")
 RANGE = re.compile(rf"\({NUMBER}\)\s*(?:\.\.\.|…|–|-|to|bis)\s*\({NUMBER}\)")
 
@@ -66,8 +69,8 @@ def equation(prefix: str, number: str) -> Equation:
 def defined_in(line: str) -> Iterator[Equation]:
     """All definitions in a line."""
     for match in DEFINITION.finditer(line):
-        tag_prefix, tag_number, bold_prefix, bold_number = match.groups()
-        yield equation(tag_prefix or bold_prefix, tag_number or bold_number)
+        prefix, number = (group for group in match.groups() if group is not None)
+        yield equation(prefix, number)
 
 
 def cited_in(line: str) -> Iterator[Equation]:

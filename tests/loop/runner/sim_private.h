@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef LOOP_RUNNER_SIM_PRIVATE_H
+#define LOOP_RUNNER_SIM_PRIVATE_H
+/** What the two halves of the runner share. Context: host. */
+#include "hal/host/fluxtrue.h"
+#include "plant/plant.h"
+#include "sim.h"
+#include "twin/twin.h"
+
+enum { CHANNELS_MAX = 64, RAMPS_MAX = 8, NAME_MAX_LENGTH = 48 };
+
+typedef enum { FROM_TRUTH, FROM_PLANT, FROM_CONTROLLER } source_t;
+
+typedef struct {
+    source_t source;
+    int index;
+    double sum;
+    char name[NAME_MAX_LENGTH];
+} channel_t;
+
+typedef struct {
+    int plant_index; /* -1: the controller's */
+    double from, to;
+    char name[NAME_MAX_LENGTH];
+} ramp_t;
+
+struct sim {
+    fluxtrue_t *firmware;
+    twin_t *twin; /* one of the two */
+    plant_params_t params;
+    plant_map_t *map;
+    plant_t *plant;
+    double duty[3];
+    int gates_on;
+    int periods_per_ms;
+    channel_t channel[CHANNELS_MAX];
+    int channels, every, in_row;
+    ramp_t ramp[RAMPS_MAX];
+    int ramps;
+};
+
+int sim_controller_set(sim_t *sim, const char *name, double value);
+double sim_controller_get(const sim_t *sim, const char *name);
+
+#endif

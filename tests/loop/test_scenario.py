@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenario files: what is taken, what is refused and how, what a profile means."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim import library as lib
+from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.sim.run import simulate, value_at
+from fluxtrue_tools.sim.scenario import Plant, Profile, Scenario, parse
+
+HEAD = 'motor = "hsm1"\nduration_s = 0.05\n'
+ELSEWHERE = {  # plant fields that a scenario gives in another place, or the motor alone
+    "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
+    "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
+}  # fmt: skip
+
+
+def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
+    inside = {
+        re.sub(r"_[abc]$", "", name.removeprefix("plant."))
+        for name in lib.plant_names(hsm1.library)
+        if name.startswith("plant.")
+    }
+    assert set(Plant.model_fields) == inside - ELSEWHERE
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "motor: this field is required"),
+        ('motor = "hsm1"', "duration_s: this field is required"),
+        ('motor = ""\nduration_s = 1', "motor = ''"),
+        ("motor = 3\nduration_s = 1", "motor = 3"),
+        ('motor = "hsm1"\nduration_s = 0', "duration_s = 0"),
+        ('motor = "hsm1"\nduration_s = nan', "duration_s = nan"),
+        ('motor = "hsm1"\nduration_s = inf', "duration_s = inf"),
+        ('motor = "hsm1"\nduration_s = "1"', "duration_s = '1'"),
+        ('motor = "hsm1"\nduration_s = true', "duration_s = True"),
+        ('motor = "hsm1"\nduration_s = 1e9', "duration_s = 1000000000.0"),
+        (HEAD + "seed = -1", "seed = -1"),
+        (HEAD + "seed = 1.5", "seed = 1.5"),
+        (HEAD + "sped = 3", "sped: unknown field, allowed: motor, duration_s"),
+        (HEAD + "[plant]\nnoise = 1", "plant.noise: unknown field, allowed: r_ohm_20"),
+        (HEAD + "[plant]\nr_ohm_20 = -1", "plant.r_ohm_20 = -1"),
+        (HEAD + "[plant]\nsubsteps = 5", "plant.substeps = 5"),
+        (HEAD + "[plant]\nideal_inverter = 1", "plant.ideal_inverter = 1"),
+        (HEAD + "[plant]\ncurrent_gain = [1, 1]", "plant.current_gain"),
+        (HEAD + '[controller]\nkind = "double"', "controller.kind = 'double'"),
+        (HEAD + '[controller]\nobserver_m = "3"', "controller.observer_m = '3'"),
+        (HEAD + "[profile]\ntorque_Nm = [[0, 1], [1]]", "profile.torque_Nm"),
+        (HEAD + "[profile]\ntorque_Nm = []", "allowed: a number, or a list of [t, value]"),
+        (HEAD + "[profile]\ntorque_Nm = [[1, 0], [0, 1]]", "go backwards"),
+        (HEAD + "[profile]\ntorque_Nm = [[-1, 0], [0, 1]]", "must not be negative"),
+        (HEAD + "[profile]\ntorque_Nm = [[0, nan]]", "profile.torque_Nm"),
+        (HEAD + "[profile]\ntorque_Nm = [[0, 1], [0, 2], [0, 3]]", "at most two points"),
+        (HEAD + "[mechanics]\nmode = 'free'", "mechanics.mode = 'free'"),
+        (HEAD + "[mechanics]\nmode = 'inertia'\n[profile]\nspeed_rpm = [[0, 0], [1, 1]]", "initial speed"),
+        (HEAD + "[[event]]\nt = 1\nset = { enable = false }", "event.0.t = 1: after the end"),
+        (HEAD + "[[event]]\nt = 0", "event.0.set: this field is required"),
+        (HEAD + "[[event]]\nt = 0\nset = {}", "event.0.set"),
+        (HEAD + "[[event]]\nt = 0\nset = { enable = 'no' }", "event.0.set.enable = 'no'"),
+        (HEAD + "[[event]]\nt = 0\nsets = { enable = 1 }", "event.0"),
+        (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.03", "window: 0.04 to 0.03 s"),
+        (HEAD + "[window]\nto_s = 1", "window"),
+        (
+            HEAD + "[profile]\nmagnet_scale = [[0, 1], [1, 0.9]]\n"
+            "[[event]]\nt = 0\nset = { 'plant.magnet_scale' = 1 }",
+            "the profile drives it",
+        ),
+        ("motor = ", "not TOML"),
+    ],
+)
+def test_a_bad_scenario_is_refused_in_one_line_that_names_file_and_field(text: str, message: str) -> None:
+    with pytest.raises(FluxtrueError) as refusal:
+        parse(text, "bad.toml")
+    line = str(refusal.value)
+    assert line.startswith("bad.toml: ")
+    assert message in line
+    assert "\n" not in line and len(line) < 1200
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[controller]\nobserver_n = 3", "observer_n = 3: no such name, allowed: observer_m"),
+        ("[controller]\nobserver_m = 30", "observer_m = 30: out of range"),
+        ("[controller]\npsi_f_Vs = 0.07", "psi_f_Vs = 0.07: read only"),
+        ("[profile]\ntorque_Nm = 1e6", "torque_command_Nm = 1e+06: out of range"),
+        ("[profile]\ntorque_Nm = [[0, 0], [0.04, 1e6]]", "torque_command_Nm = 1e+06: out of range"),
+        ("[plant]\ndead_time_s = 1", "plant.dead_time_s = 1: out of range"),
+        ("[[event]]\nt = 0.01\nset = { 'plant.vdc' = 3 }", "plant.vdc: no such name, allowed: plant.vdc_V"),
+        ("[[event]]\nt = 0.01\nset = { 'plant.vdc_V' = -3 }", "plant.vdc_V = -3: out of range"),
+    ],
+)
+def test_what_only_the_library_can_know_is_refused_in_one_line_too(
+    hsm1: Motor, text: str, message: str
+) -> None:
+    with pytest.raises(FluxtrueError) as refusal:
+        simulate(parse(HEAD + text, "bad.toml"), hsm1, where="bad.toml")
+    line = str(refusal.value)
+    assert line.startswith("bad.toml: ")
+    assert message in line
+
+
+def test_a_profile_is_linear_between_points_and_jumps_between_equal_times() -> None:
+    points = ((0.5, 1.0), (1.0, 3.0), (1.0, 7.0), (2.0, 5.0))
+    expected = {
+        (0.0, True): 1.0, (0.5, False): 1.0, (0.75, True): 2.0, (1.0, False): 3.0,
+        (1.0, True): 7.0, (1.5, False): 6.0, (2.0, False): 5.0, (2.0, True): 5.0, (9.0, True): 5.0,
+    }  # fmt: skip
+    for (now, after), value in expected.items():
+        assert value_at(points, now, after) == pytest.approx(value), (now, after)
+
+
+def test_profiles_reach_plant_and_controller(hsm1: Motor) -> None:
+    scenario = Scenario.model_validate(
+        {
+            "motor": "hsm1",
+            "duration_s": 0.4,
+            "profile": {
+                "torque_Nm": [[0, 0], [0.1, 20], [0.1, 40]],
+                "speed_rpm": [[0, 0], [0.2, 1000]],
+                "vdc_V": [[0, 350], [0.4, 300]],
+                "winding_C": [[0, 20], [0.4, 120]],
+                "magnet_scale": [[0, 1.0], [0.2, 1.0], [0.2, 0.9]],
+            },
+        }
+    )
+    run = simulate(scenario, hsm1)
+    assert len(run.rows) == 400
+    now = run["time_s"]
+    assert np.allclose(now, 1e-3 * np.arange(1, 401), atol=1e-9)
+    # A row is the mean of ten periods: half a row's slope of tolerance.
+    assert np.allclose(run["true_speed_rpm"], np.minimum(now / 0.2, 1.0) * 1000.0, atol=5.0)
+    assert np.allclose(run["true_vdc_V"], 350.0 - 125.0 * now, atol=0.2)
+    assert run["true_r_ohm"][-1] == pytest.approx(0.018 * (1 + 0.00393 * 100.0), rel=2e-3)
+    flux = run["true_psi_f_Vs"]
+    assert flux[-1] / flux[0] == pytest.approx(0.9, rel=1e-6)
+    assert np.count_nonzero(np.diff(flux)) == 1
+    command = run["torque_command_Nm"]
+    assert command[98] == pytest.approx(20.0 * 0.098 / 0.1, abs=0.25)
+    assert set(command[101:]) == {40.0}
+
+
+def test_events_change_plant_and_controller_at_their_time(hsm1: Motor) -> None:
+    scenario = parse(
+        'motor = "hsm1"\nduration_s = 0.3\n[profile]\ntorque_Nm = 30\nspeed_rpm = 500\n'
+        "[[event]]\nt = 0.2\nset = { enable = false }\n"
+        "[[event]]\nt = 0.1\nset = { 'plant.magnet_scale' = 0.9, torque_loop = false }",
+        "events.toml",
+    )
+    run = simulate(scenario, hsm1)
+    now, flux = run["time_s"], run["true_psi_f_Vs"]
+    assert flux[now < 0.0995].max() == flux[now < 0.0995].min()
+    assert flux[now > 0.1015] / flux[0] == pytest.approx(0.9)
+    assert run["run_state"][now < 0.1995][-1] == 1.0
+    assert run["run_state"][now > 0.2025][0] == 0.0
+
+
+def test_an_inertia_turns_with_what_the_machine_gives(hsm1: Motor) -> None:
+    run = simulate(
+        parse(
+            'motor = "hsm1"\nduration_s = 1\n[profile]\ntorque_Nm = 30\nload_Nm = 10\n'
+            '[mechanics]\nmode = "inertia"\ninertia_kgm2 = 0.2',
+            "inertia.toml",
+        ),
+        hsm1,
+    )
+    # (T - load)/J over the run, with the torque the plant itself reports.
+    gained = float(np.sum(run["true_torque_Nm"] - 10.0)) * 1e-3 / 0.2 * 60.0 / math.tau
+    assert run["true_speed_rpm"][-1] == pytest.approx(gained, rel=5e-3)
+    assert gained > 800.0
+
+
+def test_the_defaults_are_a_drive_with_nothing_wrong() -> None:
+    scenario = parse(HEAD, "plain.toml")
+    assert scenario.plant.values() == {}
+    assert scenario.profile == Profile()
+    assert scenario.averaged() == (0.0, 0.05)
+    assert scenario.controller.values() == {"torque_loop": 1.0, "identification": 1.0, "enable": 1.0}

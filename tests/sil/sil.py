@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""libfluxtrue_sil.so by ctypes, as a stranger with only the header would bind it."""
+
+import ctypes
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
+OK, UNKNOWN_NAME, OUT_OF_RANGE, READ_ONLY = 0, -1, -2, -3
+
+
+def library_path(motor: str) -> Path:
+    """The library of a shipped motor."""
+    return BUILD / "motors" / motor / "libfluxtrue_sil.so"
+
+
+def load(motor: str) -> ctypes.CDLL:
+    """The library with the header's prototypes."""
+    library = ctypes.CDLL(str(library_path(motor)))
+    pointer, text, number = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double
+    library.fluxtrue_create.restype = pointer
+    library.fluxtrue_create.argtypes = []
+    library.fluxtrue_destroy.restype = None
+    library.fluxtrue_destroy.argtypes = [pointer]
+    library.fluxtrue_set.argtypes = [pointer, text, number]
+    library.fluxtrue_get.restype = number
+    library.fluxtrue_get.argtypes = [pointer, text]
+    library.fluxtrue_name.restype = text
+    library.fluxtrue_name.argtypes = [ctypes.c_int]
+    library.fluxtrue_step.restype = None
+    library.fluxtrue_step.argtypes = [pointer, number * 6, number * 4]
+    return library
+
+
+class Drive:
+    """One instance."""
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self.library = library
+        self.handle = library.fluxtrue_create()
+        assert self.handle
+
+    def close(self) -> None:
+        """Free it."""
+        self.library.fluxtrue_destroy(self.handle)
+        self.handle = None
+
+    def set(self, name: str, value: float) -> int:
+        """The library's code."""
+        return int(self.library.fluxtrue_set(self.handle, name.encode(), value))
+
+    def get(self, name: str) -> float:
+        """The library's number."""
+        return float(self.library.fluxtrue_get(self.handle, name.encode()))
+
+    def step(self, sample: Sequence[float]) -> tuple[float, float, float, float]:
+        """One PWM period."""
+        out = (ctypes.c_double * 4)(9.0, 9.0, 9.0, 9.0)
+        self.library.fluxtrue_step(self.handle, (ctypes.c_double * 6)(*sample), out)
+        return tuple(out)
+
+
+def names(library: ctypes.CDLL) -> list[str]:
+    """As fluxtrue_name() enumerates them."""
+    found: list[str] = []
+    while (name := library.fluxtrue_name(len(found))) is not None:
+        found.append(name.decode())
+        assert len(found) < 1000
+    return found

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TWIN_MOTOR_SI_H
+#define TWIN_MOTOR_SI_H
+/** The same machine data as app/motor.h, in SI doubles and before any quantisation: what the double-precision twin runs on.
+ *   Written beside the fixed-point tables by `tools/fluxtrue motor build`; shares no number format with the firmware.
+ * Units    SI, electrical rad/s, per-second gains */
+
+typedef struct {
+    int pole_pairs;
+    double r_ohm_20, psi_f_Vs, period_s;
+    double i_base_A, v_base_V, omega_base_rad_s; /* only to state per-unit results */
+    double current_full_scale_A, v_dc_full_scale_V;
+    int adc_bits;
+    /* angle tracker */
+    double tracker_bandwidth_rad_s;
+    /* flux tables: node (ix, iy) is i_d = id0_A + ix did_A, |i_q| = iy diq_A; row-major [ix * nq + iy] */
+    int nd, nq;
+    double id0_A, did_A, diq_A;
+    const double *l_d_H, *l_q_H, *l_dd_H, *l_qq_H, *psi_f0_Vs;
+    /* current control */
+    double sigma_rad_s, setpoint_weight, integral_ratio, v_ratio;
+    /* modulation */
+    double dead_time_duty, knee_A, min_pulse_duty, v_dc_min_V;
+    /* identification */
+    double observer_m, flux_bandwidth_rad_s, resistance_bandwidth_rad_s;
+    double flux_proportional, resistance_proportional; /* k_P/k_I in periods */
+    double psi_delta_min_Vs, psi_delta_max_Vs, r_delta_min_ohm, r_delta_max_ohm;
+    double omega_min_rad_s, omega_r_max_rad_s, i_min_A;
+    double innovation_full_Vs, quality_rate;
+    /* torque loop, per 1 kHz step */
+    double torque_ki, torque_kp, torque_model_rate, torque_authority, torque_min_Nm;
+    double torque_max_Nm, torque_slew_Nm; /* slew per 1 kHz step, <= 0: open */
+    /* current references: torque node ix torque_step_Nm, flux node psi0_Vs + iy psi_step_Vs, row-major [ix * ref_npsi + iy] */
+    int ref_nt, ref_npsi;
+    double torque_step_Nm, psi0_Vs, psi_step_Vs;
+    const double *ref_id_A, *ref_iq_A;
+    const double *ref_torque_max_Nm; /* [ref_npsi] */
+    double ref_v_ratio, i_max_A;
+    /* monitors */
+    double i_trip_A, v_max_V, v_min_V, sum_max_A;
+} motor_si_t;
+
+extern const motor_si_t motor_si;
+
+#endif

@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+#include <stdlib.h>
+
+#include "twin/twin_private.h"
+
+twin_t *twin_create(void)
+{
+    twin_t *twin = calloc(1, sizeof *twin);
+    if (twin != NULL) {
+        twin->motor = motor_si;
+        twin->compensation = 1.0;
+        twin->torque_loop = true;
+        twin->identification = true;
+        twin->schedule.voltage_scale = 1.0;
+    }
+    return twin;
+}
+
+void twin_destroy(twin_t *twin)
+{
+    free(twin);
+}
+
+/* Confirmed after `samples` in a row. */
+static bool confirmed(int *count, bool now, int samples)
+{
+    *count = now ? *count + 1 : 0;
+    return *count >= samples;
+}
+
+static unsigned faults(const motor_si_t *m, twin_monitor_t *state, twin_abc_t i, double v_dc)
+{
+    const double peak = fmax(fabs(i.a), fmax(fabs(i.b), fabs(i.c)));
+    unsigned word = (peak > m->i_trip_A) ? TWIN_FAULT_OVER_CURRENT : 0U;
+    if (confirmed(&state->over_voltage, v_dc > m->v_max_V, 2)) {
+        word |= TWIN_FAULT_OVER_VOLTAGE;
+    }
+    if (confirmed(&state->under_voltage, v_dc < m->v_min_V, 10)) {
+        word |= TWIN_FAULT_UNDER_VOLTAGE;
+    }
+    if (confirmed(&state->current_sum, fabs(i.a + i.b + i.c) > m->sum_max_A, 5)) {
+        word |= TWIN_FAULT_CURRENT_SUM;
+    }
+    return word;
+}
+
+/* --- the 1 kHz task --------------------------------------------------------------------------- */
+
+static void supervise(twin_t *twin)
+{
+    if (twin->fault_reset) {
+        twin->fault_reset = false;
+        twin->fault_word = twin->enable ? twin->fault_word : 0U;
+    }
+    if (twin->fault_word != 0U) {
+        twin->run_state = TWIN_FAULT;
+    } else {
+        twin->run_state = twin->enable ? TWIN_RUN : TWIN_READY;
+    }
+}
+
+static double slew(double from, double to, double step)
+{
+    return (step > 0.0) ? from + twin_clamp(to - from, -step, step) : to;
+}
+
+static bool voltage_limited(const twin_t *twin)
+{
+    return twin->current.limited || twin->modulation_limited;
+}
+
+static void torque_path(twin_t *twin)
+{
+    const double most = twin->motor.torque_max_Nm;
+    twin->slewed = slew(twin->slewed, twin_clamp(twin->torque_command, -most, most),
+                        twin->motor.torque_slew_Nm);
+    const twin_torque_in_t torque = {
+        .command = twin->slewed,
+        .estimate = twin->torque_mean.mean,
+        .enabled = twin->torque_loop,
+        .limited = voltage_limited(twin) || twin->reference.limited,
+    };
+    const twin_reference_in_t request = {
+        .torque = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
+        .v_dc = twin->v_dc,
+        .omega = twin->sample.omega,
+        .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
+    };
+    twin->reference = twin_current_reference(&twin->motor, &request);
+}
+
+static void task(twin_t *twin)
+{
+    supervise(twin);
+    if (twin->run_state == TWIN_RUN) {
+        torque_path(twin);
+        twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command}
+                                         : twin->reference.i_ref;
+        twin->target = twin_current_target(&twin->motor, twin->i_ref);
+    } else {
+        twin->slewed = 0.0;
+        twin->torque_state = (twin_torque_state_t){0};
+        twin->reference = (twin_reference_t){0};
+        twin->i_ref = (twin_dq_t){0.0, 0.0};
+    }
+    twin->schedule = twin_mrai_schedule(&twin->motor, &twin->quality, &twin->sample, &twin->mrai,
+                                        twin->identification && (twin->periods_on >= 3));
+}
+
+/* --- every period ----------------------------------------------------------------------------- */
+
+static void identify(twin_t *twin)
+{
+    const twin_mrai_in_t *now = &twin->sample;
+    if (twin->periods_on >= 3) { /* else the voltage of the period that has passed was not ours */
+        twin_mrai(&twin->motor, &twin->schedule, &twin->mrai, now);
+    } else {
+        twin_mrai_reset(&twin->mrai, now);
+    }
+    (void)twin_torque_estimate(&twin->torque_mean, twin_torque(&twin->motor, now->i, &now->flux,
+                                                               twin->mrai.psi_delta));
+}
+
+static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
+{
+    const twin_mrai_in_t *now = &twin->sample;
+    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->mrai.psi_delta,
+                                       twin->v_dc};
+    motor_si_t motor = twin->motor;
+    motor.dead_time_duty *= twin->compensation;
+    twin->u = twin_current_control(&motor, &twin->current, &request);
+    const twin_modulate_in_t voltage = {twin->u, now->i, angle->theta + 1.5 * angle->step,
+                                        twin->v_dc};
+    const twin_modulate_t m = twin_modulate(&motor, &voltage);
+    twin->acted = m.acted;
+    twin->modulation_limited = m.limited;
+    twin->periods_on = (twin->periods_on < 3) ? twin->periods_on + 1 : 3;
+    for (int x = 0; x < 3; x++) {
+        out[x] = m.duty[x];
+    }
+    out[3] = 1.0;
+}
+
+static void bridge_off(twin_t *twin, double out[4])
+{
+    twin->u = (twin_dq_t){0.0, 0.0};
+    twin->acted = (twin_dq_t){0.0, 0.0};
+    twin->current = (twin_current_state_t){0};
+    twin->modulation_limited = false;
+    twin->periods_on = 0;
+    out[0] = out[1] = out[2] = 0.5;
+    out[3] = 0.0;
+}
+
+static void sample(twin_t *twin, const double in[6])
+{
+    for (int n = 0; n < 6; n++) {
+        if (!isfinite(in[n])) {
+            twin->fault_word |= TWIN_FAULT_INPUT;
+            return; /* the last good samples stay */
+        }
+    }
+    twin->last_i = (twin_abc_t){in[0], in[1], in[2]};
+    twin->v_dc = in[3];
+    twin->last_theta_m = in[4];
+}
+
+void twin_step(twin_t *twin, const double in[6], double out[4])
+{
+    sample(twin, in);
+    const twin_angle_t angle = twin_angle_tracker(&twin->motor, &twin->tracker, twin->last_theta_m);
+    twin->sample.i = twin_park(twin_clarke(twin->last_i), angle.theta);
+    twin->sample.u = twin->acted; /* computed in the last period, acts in this one */
+    twin->sample.omega = angle.omega;
+    twin->sample.flux = twin_flux_table(&twin->motor, twin->sample.i);
+    const unsigned found = faults(&twin->motor, &twin->monitor, twin->last_i, twin->v_dc);
+    const bool run = twin->run_state == TWIN_RUN;
+    twin->fault_word |= run ? found : found & ~(unsigned)TWIN_FAULT_UNDER_VOLTAGE;
+    if (run && (twin->fault_word == 0U)) {
+        bridge_on(twin, &angle, out);
+    } else {
+        bridge_off(twin, out);
+    }
+    identify(twin);
+    twin->periods++;
+    if (twin->periods % TWIN_TASK_PERIODS == 0) {
+        task(twin);
+    }
+}

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "twin/twin_stages.h"
+
+static void remember(twin_mrai_state_t *state, const twin_mrai_in_t *in)
+{
+    state->last = *in;
+}
+
+void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
+{
+    state->e = (twin_dq_t){0.0, 0.0};
+    state->psi_used = state->psi_delta;
+    state->r_used = state->r_delta;
+    remember(state, in);
+}
+
+/* One adaptation law: proportional and integral part, the integral inside its limits. */
+static double adapt(double step, double proportional, double lo, double hi, double *integral,
+                    bool *clamped)
+{
+    const double next = *integral + step;
+    *integral = twin_clamp(next, lo, hi);
+    *clamped = (next < lo) || (next > hi);
+    return *integral + proportional * step;
+}
+
+/* The voltage equation over the period that has just passed, in means and differences of its two
+ * ends; the observer error takes the share of it that its poles leave. */
+static void observe(const motor_si_t *motor, double scale, twin_mrai_state_t *state,
+                    const twin_mrai_in_t *in, twin_dq_t g, twin_dq_t i_hat, double s2)
+{
+    const twin_flux_t *f = &in->flux, *f0 = &state->last.flux;
+    const double r0 = motor->r_ohm_20, dr = state->r_used, t = motor->period_s;
+    /* R_0 acts on the measured current: on the model's it would add R_0/L to the placed poles. */
+    const twin_dq_t i = {0.5 * (in->i.d + state->last.i.d), 0.5 * (in->i.q + state->last.i.q)};
+    const double psi_d = 0.5 * (f->psi_d + f0->psi_d) + state->psi_used;
+    const double psi_q = 0.5 * (f->psi_q + f0->psi_q);
+    const double ud = scale * state->last.u.d + in->omega * psi_q - r0 * i.d - dr * i_hat.d;
+    const double uq = scale * state->last.u.q - in->omega * psi_d - r0 * i.q - dr * i_hat.q;
+    const twin_dq_t e = state->e;
+    state->e.d = e.d + g.d * ((f->psi_d - f0->psi_d) / t - ud) + s2 * (e.q - e.d);
+    state->e.q = e.q + g.q * ((f->psi_q - f0->psi_q) / t - uq) - s2 * (e.d + e.q);
+}
+
+void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
+               twin_mrai_state_t *state, const twin_mrai_in_t *in)
+{
+    const twin_mrai_in_t *last = &state->last;
+    const twin_dq_t g = {0.5 * (in->flux.g_d + last->flux.g_d),
+                         0.5 * (in->flux.g_q + last->flux.g_q)};
+    /* S T_s/2 with S = m R (1/L_d + 1/L_q): independent of the speed. */
+    const double s2 = 0.5 * motor->observer_m * motor->r_ohm_20 * (g.d + g.q);
+    const twin_dq_t e = state->e;
+    const twin_dq_t i_hat = {0.5 * (in->i.d + last->i.d) - e.d, 0.5 * (in->i.q + last->i.q) - e.q};
+    const double flux_step = -schedule->flux_gain * s2 * in->flux.l_qq * e.q;
+    const double resistance_step =
+        -schedule->resistance_gain * s2 * (i_hat.d * e.d * g.d + i_hat.q * e.q * g.q);
+    state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs,
+                            motor->psi_delta_max_Vs, &state->psi_delta, &state->psi_clamped);
+    state->r_used = adapt(resistance_step, motor->resistance_proportional, motor->r_delta_min_ohm,
+                          motor->r_delta_max_ohm, &state->r_delta, &state->r_clamped);
+    observe(motor, schedule->voltage_scale, state, in, g, i_hat, s2);
+    remember(state, in);
+}
+
+static double sinc(double x)
+{
+    return (fabs(x) < 1e-9) ? 1.0 : sin(x) / x;
+}
+
+/* The drift of a parameter per step shows what the adaptation still has to do. */
+static double quality(double now, double rate, bool known, double drift, double full)
+{
+    const double target = known ? twin_clamp(1.0 - fabs(drift) / full, 0.0, 1.0) : 0.0;
+    return now + rate * (target - now);
+}
+
+static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
+                  bool flux_open, bool r_open)
+{
+    const double task_s = TWIN_TASK_PERIODS * motor->period_s;
+    const double psi_full = 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * task_s;
+    const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * task_s;
+    q->psi_quality = quality(q->psi_quality, motor->quality_rate, flux_open && !now->psi_clamped,
+                             now->psi_delta - q->psi_last, psi_full);
+    q->r_quality = quality(q->r_quality, motor->quality_rate, r_open && !now->r_clamped,
+                           now->r_delta - q->r_last, r_full);
+    q->psi_last = now->psi_delta;
+    q->r_last = now->r_delta;
+}
+
+twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quality_t *quality_state,
+                                        const twin_mrai_in_t *sample,
+                                        const twin_mrai_state_t *identifier, bool enabled)
+{
+    const double w = sample->omega;
+    const double magnitude = hypot(sample->i.d, sample->i.q);
+    const bool flux_open =
+        enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
+    const bool r_open = flux_open && (fabs(w) <= motor->omega_r_max_rad_s);
+    const double a = sample->i.d * sample->flux.g_d;
+    const double b = sample->i.q * sample->flux.g_q;
+    judge(motor, quality_state, identifier, flux_open, r_open);
+    return (twin_mrai_schedule_t){
+        .flux_gain = flux_open ? 2.0 * motor->flux_bandwidth_rad_s / w : 0.0,
+        .resistance_gain = r_open ? 2.0 * motor->resistance_bandwidth_rad_s * motor->period_s /
+                                        (a * a + b * b)
+                                  : 0.0,
+        .voltage_scale = 1.0 / sinc(0.5 * w * motor->period_s),
+    };
+}

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TWIN_PRIVATE_H
+#define TWIN_PRIVATE_H
+/** The controller object behind twin.h: what its step and its names share. */
+#include <stdint.h>
+
+#include "twin/twin.h"
+
+enum { TWIN_READY = 0, TWIN_RUN = 1, TWIN_FAULT = 2 };
+
+enum {
+    TWIN_FAULT_OVER_CURRENT = 1 << 0,
+    TWIN_FAULT_OVER_VOLTAGE = 1 << 1,
+    TWIN_FAULT_UNDER_VOLTAGE = 1 << 2,
+    TWIN_FAULT_CURRENT_SUM = 1 << 3,
+    TWIN_FAULT_INPUT = 1 << 5
+};
+
+typedef struct {
+    int over_voltage, under_voltage, current_sum;
+} twin_monitor_t;
+
+struct twin {
+    motor_si_t motor; /* a copy: twin_set() may change it */
+    /* commands */
+    double torque_command, id_command, iq_command, compensation;
+    bool enable, torque_loop, identification, current_mode;
+    /* state */
+    int run_state; /* of the 1 kHz task */
+    bool fault_reset;
+    unsigned long periods;
+    unsigned fault_word;
+    twin_monitor_t monitor;
+    twin_angle_state_t tracker;
+    twin_current_state_t current;
+    twin_mrai_state_t mrai;
+    twin_mrai_schedule_t schedule;
+    twin_mrai_quality_t quality;
+    twin_torque_estimate_t torque_mean;
+    twin_torque_state_t torque_state;
+    double slewed;
+    bool modulation_limited;
+    int periods_on; /* since the gates closed, saturates at 3 */
+    /* latest signals */
+    twin_mrai_in_t sample; /* its u acts during the present period */
+    twin_dq_t i_ref, u, acted;
+    twin_target_t target;
+    twin_reference_t reference;
+    twin_abc_t last_i; /* good samples, kept when an implausible one comes */
+    double last_theta_m;
+    double v_dc;
+};
+
+#endif

@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TWIN_STAGES_H
+#define TWIN_STAGES_H
+/** The control chain stage by stage in SI doubles: what each fixed-point stage is held to.
+ *   Written from the equations of docs/theory; no header, format or scaling is shared with the firmware.
+ * Source   docs/theory: current-control, angle-tracker, flux-tables, modulation, mrai, torque-loop, current-reference
+ * Units    SI, peak phase quantities, electrical angles; the configuration of every stage is motor_si_t
+ * Errors   none: a twin neither rounds nor saturates, except where the equation itself has a limit
+ * Context  tests and simulation on a host */
+#include <stdbool.h>
+
+#include "twin/motor_si.h"
+
+typedef struct {
+    double a, b, c;
+} twin_abc_t;
+
+typedef struct {
+    double alpha, beta;
+} twin_ab_t;
+
+typedef struct {
+    double d, q;
+} twin_dq_t;
+
+/* --- transforms ------------------------------------------------------------------------------ */
+twin_ab_t twin_clarke(twin_abc_t x);
+twin_abc_t twin_clarke_inverse(twin_ab_t x);
+twin_dq_t twin_park(twin_ab_t x, double theta_rad);
+twin_ab_t twin_park_inverse(twin_dq_t x, double theta_rad);
+double twin_wrap(double angle_rad); /* to [-pi, pi) */
+double twin_clamp(double x, double lo, double hi);
+
+/* Bilinear on a regular grid, row-major [ix * ny + iy]; outside, the edge. */
+typedef struct {
+    double x0, dx, y0, dy;
+    int nx, ny;
+} twin_grid_t;
+
+double twin_lookup(const twin_grid_t *grid, const double *values, double x, double y);
+bool twin_outside(const twin_grid_t *grid, double x, double y);
+
+/* --- measurement and angle ------------------------------------------------------------------- */
+typedef struct {
+    double offset[3]; /* counts at zero current */
+    double gain[3];
+    double v_dc_gain;
+} twin_measure_config_t;
+
+typedef struct {
+    twin_abc_t i;
+    double v_dc;
+} twin_measure_t;
+
+/* counts: i_a, i_b, i_c, v_dc of a converter of motor->adc_bits. */
+twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t *config,
+                            const double counts[4]);
+
+typedef struct {
+    double theta, step; /* rad, rad per period */
+    int samples;        /* the first two set angle and speed directly */
+} twin_angle_state_t;
+
+typedef struct {
+    double theta, step, omega; /* measured angle; tracked advance per period and speed */
+} twin_angle_t;
+
+twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state,
+                                double theta_m_rad);
+
+/* --- flux tables ----------------------------------------------------------------------------- */
+typedef struct {
+    double l_d, l_q, l_dd, l_qq; /* H */
+    double g_d, g_q;             /* A per V and period: T_s/l_dd, T_s/l_qq */
+    double psi_f0, psi_d, psi_q; /* V s, nominal magnet */
+    bool clamped;
+} twin_flux_t;
+
+twin_flux_t twin_flux_table(const motor_si_t *motor, twin_dq_t i);
+
+/* --- current control and modulation ---------------------------------------------------------- */
+typedef struct {
+    twin_dq_t s; /* V */
+    bool limited;
+} twin_current_state_t;
+
+/* Where the current shall go, in flux linkage: what the integral and the proportional part follow. */
+typedef struct {
+    twin_dq_t psi, weighted;
+} twin_target_t;
+
+typedef struct {
+    twin_target_t target;
+    const twin_flux_t *flux; /* at the measured current */
+    double omega, psi_delta, v_dc;
+} twin_current_in_t;
+
+twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref);
+
+twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state,
+                               const twin_current_in_t *in);
+
+typedef struct {
+    twin_dq_t u, i;
+    double theta; /* the angle at the middle of the acting period */
+    double v_dc;
+} twin_modulate_in_t;
+
+typedef struct {
+    double duty[3];
+    twin_dq_t acted;
+    bool limited;
+} twin_modulate_t;
+
+twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t *in);
+
+/* --- identification -------------------------------------------------------------------------- */
+typedef struct {
+    double flux_gain;       /* 2 k_psi/w, 0 while the gate is closed */
+    double resistance_gain; /* 2 k_r T_s/norm, 0 while the gate is closed */
+    double voltage_scale;   /* 1/sinc(w T_s/2) */
+} twin_mrai_schedule_t;
+
+typedef struct {
+    twin_dq_t i, u;
+    twin_flux_t flux;
+    double omega;
+} twin_mrai_in_t;
+
+typedef struct {
+    twin_dq_t e;         /* observer error */
+    twin_mrai_in_t last; /* the other end of the period that has just passed */
+    double psi_delta, r_delta;
+    double psi_used, r_used;
+    bool psi_clamped, r_clamped;
+} twin_mrai_state_t;
+
+typedef struct {
+    double psi_quality, r_quality;
+    double psi_last, r_last; /* identified values at the last step */
+} twin_mrai_quality_t;
+
+void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in);
+void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
+               twin_mrai_state_t *state, const twin_mrai_in_t *in);
+twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quality_t *quality_state,
+                                        const twin_mrai_in_t *sample,
+                                        const twin_mrai_state_t *identifier, bool enabled);
+
+/* --- torque ---------------------------------------------------------------------------------- */
+enum { TWIN_TASK_PERIODS = 10 };
+
+typedef struct {
+    double sum, mean;
+    int count;
+} twin_torque_estimate_t;
+
+double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux, double psi_delta);
+double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm);
+
+typedef struct {
+    double correction, model;
+    bool saturated;
+} twin_torque_state_t;
+
+typedef struct {
+    double command, estimate;
+    bool enabled, limited;
+} twin_torque_in_t;
+
+double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
+                        const twin_torque_in_t *in);
+
+typedef struct {
+    double torque, v_dc, omega, i_magnitude;
+} twin_reference_in_t;
+
+typedef struct {
+    twin_dq_t i_ref;
+    double torque_max;
+    bool limited;
+} twin_reference_t;
+
+twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in);
+
+#endif

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "twin/twin_stages.h"
+
+double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux, double psi_delta)
+{
+    return 1.5 * motor->pole_pairs * ((flux->psi_d + psi_delta) * i.q - flux->psi_q * i.d);
+}
+
+double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm)
+{
+    state->sum += torque_Nm;
+    state->count++;
+    if (state->count == TWIN_TASK_PERIODS) {
+        state->mean = state->sum / TWIN_TASK_PERIODS;
+        state->sum = 0.0;
+        state->count = 0;
+    }
+    return state->mean;
+}
+
+double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
+                        const twin_torque_in_t *in)
+{
+    const double room = motor->torque_authority * fabs(in->command);
+    const double direction = (in->command > 0.0) - (in->command < 0.0);
+    state->model += motor->torque_model_rate * (in->command - state->model);
+    const double e = state->model - in->estimate;
+    double p = 0.0;
+    if (!in->enabled) {
+        state->correction -= motor->torque_ki * state->correction;
+    } else {
+        p = motor->torque_kp * e;
+        if (!(in->limited && (e * direction > 0.0))) {
+            /* More than 100 % of error is no measurement: it may not move the ratio faster. */
+            const double relative = e * direction / fmax(fabs(in->command), motor->torque_min_Nm);
+            state->correction += motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
+        }
+    }
+    state->saturated = fabs(state->correction) >= motor->torque_authority;
+    state->correction =
+        twin_clamp(state->correction, -motor->torque_authority, motor->torque_authority);
+    const double wanted = in->command * state->correction + p;
+    return in->command + twin_clamp(wanted, -room, room);
+}
+
+twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in)
+{
+    const twin_grid_t grid = {0.0,          motor->torque_step_Nm, motor->psi0_Vs, motor->psi_step_Vs,
+                              motor->ref_nt, motor->ref_npsi};
+    const twin_grid_t row = {0.0, 1.0, motor->psi0_Vs, motor->psi_step_Vs, 1, motor->ref_npsi};
+    const double psi_top = motor->psi0_Vs + motor->psi_step_Vs * (motor->ref_npsi - 1);
+    const double u = motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude;
+    const double w = fabs(in->omega);
+    const double psi = (u >= w * psi_top) ? psi_top : fmax(u, 0.0) / w;
+    const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi);
+    const double t = fmin(fabs(in->torque), t_max);
+    const double iq = twin_lookup(&grid, motor->ref_iq_A, t, psi);
+    return (twin_reference_t){
+        .i_ref = {twin_lookup(&grid, motor->ref_id_A, t, psi), (in->torque < 0.0) ? -iq : iq},
+        .torque_max = t_max,
+        .limited = fabs(in->torque) > t_max,
+    };
+}

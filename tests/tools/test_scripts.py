@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shell scripts from any folder, in a path with spaces, without network and without root."""
+
+import fcntl
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+TOOLS = Path(__file__).resolve().parents[2] / "tools"
+SCRIPTS = ("setup", "test", "demo", "fluxtrue", "common.sh")
+# What the scripts use besides the programs they look for.
+BASICS = (
+    "bash", "sh", "env", "dirname", "readlink", "mkdir", "cat", "sha256sum", "flock", "sed", "grep",
+    "sort", "head", "tail", "xargs", "mktemp", "rm", "mv", "find", "awk", "printf", "echo", "id",
+)  # fmt: skip
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of tools/ below a path with spaces, its Python environment in place."""
+    root = tmp_path / "a path" / "with  spaces"
+    shutil.copytree(TOOLS, root / "tools", ignore=shutil.ignore_patterns("__pycache__"))
+    environment = root / "build" / "venv"
+    (environment / "bin").mkdir(parents=True)
+    python = environment / "bin" / "python"
+    python.write_text('#!/bin/sh\nprintf "%s|" python "$@"\n')
+    python.chmod(0o755)
+    with (root / "tools" / "requirements.txt").open("rb") as pinned:
+        stamp = subprocess.run(["sha256sum"], stdin=pinned, capture_output=True, check=True)
+    (environment / "stamp").write_bytes(stamp.stdout)
+    return root
+
+
+def stub(folder: Path, name: str, text: str) -> None:
+    """A program that stands in for the real one."""
+    folder.mkdir(exist_ok=True)
+    path = folder / name
+    path.unlink(missing_ok=True)
+    path.write_text("#!/bin/sh\n" + text + "\n")
+    path.chmod(0o755)
+
+
+@pytest.fixture
+def bare_path(tmp_path: Path) -> Path:
+    """A PATH with everything the demonstration needs, but Ninja; apt-get has no network."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    for name in (*BASICS, "gcc", "cmake"):
+        found = shutil.which(name)
+        assert found, name
+        (folder / name).symlink_to(found)
+    stub(folder, "apt-get", 'echo "E: Unable to fetch some archives" >&2; exit 100')
+    return folder
+
+
+def run(root: Path, script: str, *arguments: str, **options) -> subprocess.CompletedProcess[str]:
+    """A script of the copy, started from the root of the file system."""
+    environment = {key: value for key, value in os.environ.items() if key != "FLUXTRUE_LOCK"}
+    environment.update(options.pop("env", {}))
+    return subprocess.run([str(root / "tools" / script), *arguments], cwd="/", env=environment,
+                          stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+                          timeout=60, **options)  # fmt: skip
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_bash_accepts_the_script(script: str) -> None:
+    subprocess.run(["bash", "-n", str(TOOLS / script)], check=True)
+
+
+def test_a_finished_set_up_is_silent_and_uses_no_package_manager(
+    checkout: Path, bare_path: Path
+) -> None:
+    stub(bare_path, "ninja", "exit 0")
+    done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_an_unknown_part_is_one_line(checkout: Path) -> None:
+    done = run(checkout, "setup", "everything")
+    assert done.returncode == 2
+    assert done.stderr == "error: tools/setup: unknown part 'everything', allowed: demo, test\n"
+
+
+def test_without_network_the_missing_package_is_named(checkout: Path, bare_path: Path) -> None:
+    stub(bare_path, "id", "echo 0")
+    done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
+    assert done.returncode == 2
+    progress, error = done.stderr.splitlines()
+    assert progress == "installing Debian packages: ninja-build"
+    assert error.startswith("error: cannot install the Debian packages ninja-build")
+    assert "E: Unable to fetch some archives" in error
+
+
+def test_without_root_the_missing_package_is_named(checkout: Path, bare_path: Path) -> None:
+    stub(bare_path, "id", "echo 1000")
+    done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
+    assert done.returncode == 2
+    assert done.stderr == (
+        "error: missing packages, and no root rights to install them: ninja-build\n"
+    )
+
+
+def test_a_failed_python_set_up_leaves_nothing_behind(checkout: Path, bare_path: Path) -> None:
+    stub(bare_path, "ninja", "exit 0")
+    shutil.rmtree(checkout / "build" / "venv")
+    (checkout / "tools" / "requirements.txt").write_text("no_such_package_of_ours==1.0\n")
+    offline = {"PATH": str(bare_path), "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": ""}
+    done = run(checkout, "setup", "demo", env=offline)
+    assert done.returncode == 2
+    assert "error: cannot install tools/requirements.txt" in done.stderr
+    assert "no_such_package_of_ours" in done.stderr
+    assert sorted(path.name for path in (checkout / "build").iterdir()) == [".lock", "setup.log"]
+
+
+def test_a_second_command_waits_for_the_first(checkout: Path, bare_path: Path) -> None:
+    stub(bare_path, "ninja", "exit 0")
+    environment = {key: value for key, value in os.environ.items() if key != "FLUXTRUE_LOCK"}
+    with (checkout / "build" / ".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with subprocess.Popen([str(checkout / "tools" / "setup"), "demo"], text=True,
+                              env=environment | {"PATH": str(bare_path)},
+                              stderr=subprocess.PIPE) as waiting:  # fmt: skip
+            assert waiting.stderr is not None
+            assert waiting.stderr.readline().startswith("waiting for another tools/ command")
+            assert waiting.poll() is None
+            fcntl.flock(lock, fcntl.LOCK_UN)
+            assert waiting.wait(timeout=60) == 0
+
+
+def test_the_launcher_passes_its_arguments_on_untouched(checkout: Path) -> None:
+    done = run(checkout, "fluxtrue", "motor", "check", "my motor", "*")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "python|-m|fluxtrue_tools|motor|check|my motor|*|"
+
+
+def test_the_launcher_works_through_a_link(checkout: Path, tmp_path: Path) -> None:
+    link = tmp_path / "fluxtrue"
+    link.symlink_to(checkout / "tools" / "fluxtrue")
+    done = subprocess.run([str(link), "motor"], capture_output=True, text=True, check=False)
+    assert done.stdout == "python|-m|fluxtrue_tools|motor|"
+
+
+def test_a_build_that_fails_is_reported_with_its_log(checkout: Path) -> None:
+    done = run(checkout, "demo", "--build-only")
+    assert done.returncode == 2
+    assert done.stderr.splitlines()[-1].startswith("error: the build failed (see ")
+
+
+def test_a_build_folder_that_cannot_be_made_is_one_line(checkout: Path) -> None:
+    shutil.rmtree(checkout / "build")
+    (checkout / "build").write_text("in the way")
+    done = run(checkout, "setup", "demo")
+    assert done.returncode == 2
+    assert done.stderr == f"error: cannot create {checkout / 'build'}\n"
+
+
+def test_the_whole_test_run_explains_itself(checkout: Path) -> None:
+    done = run(checkout, "test", "--help")
+    assert done.returncode == 0
+    assert done.stdout.startswith("Set up, build and test everything:")

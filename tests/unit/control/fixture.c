@@ -1,0 +1,286 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fixture.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "unity.h"
+
+/* Assumed data of an invented machine in a 350 V, 300 A, 10 kHz inverter. */
+enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
+
+static const double period = 1e-4;
+static const int cell = 2048; /* counts of q15 between table nodes: 1/16 of the current base */
+
+static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g_d[NX * NY], g_q[NX * NY];
+static int16_t psi_f0[NX * NY], ref_d[NT * NPSI], ref_q[NT * NPSI], ref_max[NPSI];
+static double si_l_d[NX * NY], si_l_q[NX * NY], si_l_dd[NX * NY], si_l_qq[NX * NY];
+static double si_psi_f0[NX * NY], si_ref_d[NT * NPSI], si_ref_q[NT * NPSI], si_ref_max[NPSI];
+
+static int16_t q15_of(double x)
+{
+    const double n = floor(x * 32768.0 + 0.5);
+    return (int16_t)fmin(fmax(n, -32768.0), 32767.0);
+}
+
+static int32_t q31_of(double x)
+{
+    const double n = floor(x * 2147483648.0 + 0.5);
+    return (int32_t)fmin(fmax(n, -2147483648.0), 2147483647.0);
+}
+
+static int32_t q16_of(double x)
+{
+    return (int32_t)floor(x * 65536.0 + 0.5);
+}
+
+static void bases(fixture_t *f)
+{
+    f->i = 300.0;
+    f->v = 1.5 * 350.0;
+    f->w = 1.25 * POLE_PAIRS * 10000.0 * 3.14159265358979323846 / 30.0;
+    f->psi = f->v / f->w;
+    f->z = f->v / f->i;
+    f->l = f->z / f->w;
+    f->t = 1.5 * POLE_PAIRS * f->psi * f->i;
+}
+
+/* Inductances that fall with the current; all of them below 4 L_b. */
+static void machine_at(double id, double iq, double l[4], double *flux)
+{
+    const double soft = 1.0 / sqrt(1.0 + 4.0 * iq * iq);
+    l[0] = 0.95 + 0.2 * id + 0.1 * iq;
+    l[1] = 3.7 * soft * (1.0 + 0.1 * id);
+    l[2] = 0.95 + 0.4 * id + 0.1 * iq;
+    l[3] = l[1] * soft * soft + 0.2;
+    *flux = 0.53 - 0.12 * iq * iq;
+}
+
+static void flux_tables(fixture_t *f)
+{
+    for (int n = 0; n < NX * NY; n++) {
+        double l[4];
+        double flux;
+        machine_at(-(NX - 1 - n / NY) / 16.0, (n % NY) / 16.0, l, &flux);
+        l_d[n] = q15_of(ldexp(l[0], -L_SHIFT));
+        l_q[n] = q15_of(ldexp(l[1], -L_SHIFT));
+        l_qq[n] = q15_of(ldexp(l[3], -L_SHIFT));
+        psi_f0[n] = q15_of(flux);
+        const double scale = ldexp(f->l, L_SHIFT);
+        si_l_d[n] = from_q15(l_d[n]) * scale;
+        si_l_q[n] = from_q15(l_q[n]) * scale;
+        si_l_dd[n] = l[2] * f->l;
+        si_l_qq[n] = from_q15(l_qq[n]) * scale;
+        si_psi_f0[n] = from_q15(psi_f0[n]) * f->psi;
+        g_d[n] = q15_of(period * f->z / si_l_dd[n]);
+        g_q[n] = q15_of(period * f->z / si_l_qq[n]);
+    }
+    f->flux_table = (flux_table_config_t){
+        .grid = {-(NX - 1) * cell, 0, 11, 11, NX, NY},
+        .l_shift = L_SHIFT,
+        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g_d = g_d, .g_q = g_q,
+        .psi_f0 = psi_f0,
+    };
+    f->si.nd = NX;
+    f->si.nq = NY;
+    f->si.id0_A = -(NX - 1) / 16.0 * f->i;
+    f->si.did_A = f->si.diq_A = f->i / 16.0;
+    f->si.l_d_H = si_l_d;
+    f->si.l_q_H = si_l_q;
+    f->si.l_dd_H = si_l_dd;
+    f->si.l_qq_H = si_l_qq;
+    f->si.psi_f0_Vs = si_psi_f0;
+}
+
+/* Not an optimum, but the shape of one: more -i_d for more torque and for less flux. */
+static void reference_tables(fixture_t *f)
+{
+    for (int ix = 0; ix < NT; ix++) {
+        for (int iy = 0; iy < NPSI; iy++) {
+            const int n = ix * NPSI + iy;
+            const double t = ix / 16.0;
+            const double psi = (iy + 2) / 16.0;
+            ref_d[n] = q15_of(-0.5 * t - 0.2 * (0.7 - psi) * t);
+            ref_q[n] = q15_of(1.1 * t - 0.2 * t * t);
+            si_ref_d[n] = from_q15(ref_d[n]) * f->i;
+            si_ref_q[n] = from_q15(ref_q[n]) * f->i;
+            ref_max[iy] = q15_of(0.2 + 0.4 * psi);
+            si_ref_max[iy] = from_q15(ref_max[iy]) * f->t;
+        }
+    }
+    f->current_reference = (current_reference_config_t){
+        .grid = {0, 2 * cell, 11, 11, NT, NPSI},
+        .i_d = ref_d, .i_q = ref_q,
+        .torque_max = {ref_max, 2 * cell, 11, NPSI},
+        .v_ratio = q15_of(0.55),
+        .r_pu = 674,
+        .i_max = q15_of(0.95),
+    };
+    f->si.ref_nt = NT;
+    f->si.ref_npsi = NPSI;
+    f->si.torque_step_Nm = f->t / 16.0;
+    f->si.psi0_Vs = f->psi / 8.0;
+    f->si.psi_step_Vs = f->psi / 16.0;
+    f->si.ref_id_A = si_ref_d;
+    f->si.ref_iq_A = si_ref_q;
+    f->si.ref_torque_max_Nm = si_ref_max;
+    f->si.ref_v_ratio = from_q15(q15_of(0.55));
+    f->si.i_max_A = from_q15(q15_of(0.95)) * f->i;
+}
+
+static void inputs(fixture_t *f)
+{
+    const double wn = 600.0 * period;
+    const double turns = f->w * period / (2.0 * 3.14159265358979323846);
+    f->angle_tracker = (angle_tracker_config_t){
+        .pole_pairs = POLE_PAIRS,
+        .kp = q31_of(2.0 * wn),
+        .ki = q31_of(wn * wn),
+        .turn_to_pu = q16_of(0.5 / turns),
+        .max_step = 1u << 29,
+    };
+    f->si.pole_pairs = POLE_PAIRS;
+    f->si.period_s = period;
+    f->si.tracker_bandwidth_rad_s = 600.0;
+    f->si.r_ohm_20 = 674.0 / 65536.0 * f->z;
+    f->si.psi_f_Vs = from_q15(psi_f0[0]) * f->psi;
+    f->si.i_base_A = f->si.current_full_scale_A = f->i;
+    f->si.v_base_V = f->v;
+    f->si.omega_base_rad_s = f->w;
+    f->si.v_dc_full_scale_V = 500.0;
+    f->si.adc_bits = 12;
+}
+
+static void voltage(fixture_t *f)
+{
+    const double sigma = 1.0 / (3.0 * period) / f->w;
+    f->current_control = (current_control_config_t){
+        .sigma_gain = q16_of(sigma),
+        .drop_gain = q16_of(674.0 / 65536.0 / sigma),
+        .setpoint_weight = q15_of(0.7),
+        .integral_gain = q15_of(0.05 * sigma),
+        .v_ratio = q15_of(0.57),
+    };
+    f->si.sigma_rad_s = f->current_control.sigma_gain / 65536.0 * f->w;
+    f->si.setpoint_weight = from_q15(f->current_control.setpoint_weight);
+    f->si.integral_ratio = from_q15(f->current_control.integral_gain) /
+                           (f->current_control.sigma_gain / 65536.0);
+    f->si.v_ratio = from_q15(f->current_control.v_ratio);
+    f->modulate = (modulate_config_t){
+        .dead_time = q15_of(0.02),
+        .knee_gain = q16_of(100.0),
+        .min_pulse = q15_of(0.01),
+        .v_dc_min = q15_of(0.1),
+    };
+    f->si.dead_time_duty = from_q15(f->modulate.dead_time);
+    f->si.knee_A = f->i / 100.0;
+    f->si.min_pulse_duty = from_q15(f->modulate.min_pulse);
+    f->si.v_dc_min_V = from_q15(f->modulate.v_dc_min) * f->v;
+}
+
+static void identification(fixture_t *f)
+{
+    const double r0 = 674.0 / 65536.0;
+    const double m = 3.0, k_psi = 60.0, k_r = 20.0;
+    f->mrai = (mrai_config_t){
+        .r0 = q31_of(r0),
+        .pole_gain = q31_of(0.5 * m * r0),
+        .l_shift = L_SHIFT,
+        .flux_gain = q31_of(2.0 * k_psi / f->w),
+        .resistance_gain = q31_of(2.0 * k_r * period),
+        .flux_proportional = q16_of(20.0),
+        .resistance_proportional = q16_of(20.0),
+        .psi_delta_min = q31_of(-0.25),
+        .psi_delta_max = q31_of(0.125),
+        .r_delta_min = q31_of(-0.5 * r0),
+        .r_delta_max = q31_of(2.0 * r0),
+        .omega_min = q15_of(0.05),
+        .omega_r_max = q15_of(0.6),
+        .i_min = q15_of(0.05),
+        .rate_gain_q26 = (int32_t)floor(67108864.0 / (f->w * period) + 0.5),
+        .sinc_gain = q31_of(f->w * period * f->w * period / 24.0),
+        .psi_drift_full = q31_of(0.05 * from_q15(psi_f0[0]) * k_psi * 1e-3),
+        .r_drift_full = q31_of(0.2 * r0 * k_r * 1e-3),
+        .quality_rate = q15_of(0.02),
+    };
+    f->si.observer_m = m;
+    f->si.flux_bandwidth_rad_s = k_psi;
+    f->si.resistance_bandwidth_rad_s = k_r;
+    f->si.flux_proportional = 20.0;
+    f->si.resistance_proportional = 20.0;
+    f->si.psi_delta_min_Vs = -0.25 * f->psi;
+    f->si.psi_delta_max_Vs = 0.125 * f->psi;
+    f->si.r_delta_min_ohm = from_q31(f->mrai.r_delta_min) * f->z;
+    f->si.r_delta_max_ohm = from_q31(f->mrai.r_delta_max) * f->z;
+    f->si.omega_min_rad_s = from_q15(f->mrai.omega_min) * f->w;
+    f->si.omega_r_max_rad_s = from_q15(f->mrai.omega_r_max) * f->w;
+    f->si.i_min_A = from_q15(f->mrai.i_min) * f->i;
+    f->si.quality_rate = from_q15(f->mrai.quality_rate);
+}
+
+static void torque(fixture_t *f)
+{
+    f->torque_loop = (torque_loop_config_t){
+        .ki = q15_of(0.03),
+        .kp = q15_of(0.1),
+        .model_rate = q15_of(0.25),
+        .authority = q15_of(0.4),
+        .torque_min = q15_of(0.02),
+    };
+    f->si.torque_ki = from_q15(f->torque_loop.ki);
+    f->si.torque_kp = from_q15(f->torque_loop.kp);
+    f->si.torque_model_rate = from_q15(f->torque_loop.model_rate);
+    f->si.torque_authority = from_q15(f->torque_loop.authority);
+    f->si.torque_min_Nm = from_q15(f->torque_loop.torque_min) * f->t;
+    f->si.torque_max_Nm = 0.6 * f->t;
+}
+
+fixture_t fixture(void)
+{
+    fixture_t f = {0};
+    bases(&f);
+    flux_tables(&f);
+    reference_tables(&f);
+    inputs(&f);
+    voltage(&f);
+    identification(&f);
+    torque(&f);
+    return f;
+}
+
+void worst_note(worst_t *worst, double error, const char *format, ...)
+{
+    /* The negation lets a NaN through as the worst of all. */
+    if ((worst->where[0] == '\0') || !(fabs(error) <= worst->error)) {
+        va_list arguments;
+        va_start(arguments, format);
+        (void)vsnprintf(worst->where, sizeof worst->where, format, arguments);
+        va_end(arguments);
+        worst->error = fabs(error);
+    }
+}
+
+void worst_assert(const worst_t *worst, double tolerance, int line)
+{
+    char message[300];
+    (void)snprintf(message, sizeof message, "%.6g off, allowed %.6g, at %s", worst->error, tolerance,
+                   worst->where);
+    UNITY_TEST_ASSERT(worst->error <= tolerance, line, message);
+}
+
+uint32_t random_u32(uint64_t *state)
+{
+    uint64_t x = *state;
+    x ^= x >> 12;
+    x ^= x << 25;
+    x ^= x >> 27;
+    *state = x;
+    return (uint32_t)((x * UINT64_C(0x2545F4914F6CDD1D)) >> 32);
+}
+
+int32_t random_in(uint64_t *state, int32_t lo, int32_t hi)
+{
+    const uint64_t span = (uint64_t)((int64_t)hi - lo) + 1U;
+    return (int32_t)(lo + (int64_t)((random_u32(state) * span) >> 32));
+}

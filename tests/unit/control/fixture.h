@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef UNIT_CONTROL_FIXTURE_H
+#define UNIT_CONTROL_FIXTURE_H
+/** One invented saturating machine, twice: as fixed-point configurations and as the SI data of the twin.
+ *   The SI side is made from the rounded fixed-point constants, so that a test's tolerance is that of
+ *   the arithmetic alone. The conversions are this file's own, from the units stated in the headers.
+ * Units    bases in SI; q15 helpers in counts */
+#include <stdint.h>
+
+#include "control/angle_tracker.h"
+#include "control/current_control.h"
+#include "control/current_reference.h"
+#include "control/flux_table.h"
+#include "control/modulate.h"
+#include "control/mrai.h"
+#include "control/torque_loop.h"
+#include "twin/twin_stages.h"
+
+typedef struct {
+    double i, v, w, psi, z, l, t; /* bases */
+    motor_si_t si;
+    angle_tracker_config_t angle_tracker;
+    flux_table_config_t flux_table;
+    current_control_config_t current_control;
+    modulate_config_t modulate;
+    mrai_config_t mrai;
+    torque_loop_config_t torque_loop;
+    current_reference_config_t current_reference;
+} fixture_t;
+
+/* A fresh copy each time: tests may change it. */
+fixture_t fixture(void);
+
+/* The largest deviation of a sweep and where it was: one readable failure instead of thousands. */
+typedef struct {
+    double error;
+    char where[200];
+} worst_t;
+
+void worst_note(worst_t *worst, double error, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+void worst_assert(const worst_t *worst, double tolerance, int line);
+#define ASSERT_WORST(worst, tolerance) worst_assert(&(worst), (tolerance), __LINE__)
+
+/* Reproducible random numbers, uniform in [lo, hi] (xorshift64*). */
+uint32_t random_u32(uint64_t *state);
+int32_t random_in(uint64_t *state, int32_t lo, int32_t hi);
+
+static inline double from_q15(int32_t x)
+{
+    return x / 32768.0;
+}
+
+static inline double from_q31(int32_t x)
+{
+    return x / 2147483648.0;
+}
+
+#endif

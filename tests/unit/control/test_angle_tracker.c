@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/angle_tracker.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static angle_tracker_state_t state;
+
+static const double turn = 4294967296.0;
+static const double two_pi = 6.283185307179586476925;
+
+void setUp(void)
+{
+    f = fixture();
+    state = (angle_tracker_state_t){0};
+}
+
+void tearDown(void)
+{
+}
+
+static angle_t step(uint32_t theta_m)
+{
+    return angle_tracker_step(&f.angle_tracker, &state, theta_m);
+}
+
+void test_the_electrical_angle_is_pole_pairs_times_mechanical_plus_offset_and_wraps(void)
+{
+    f.angle_tracker.offset = 0x12345678u;
+    TEST_ASSERT_EQUAL_HEX32(0x12345678u, step(0).theta_e);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000000u + 0x12345678u, step(0x40000000u).theta_e);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFDu + 0x12345678u, step(0xFFFFFFFFu).theta_e);
+}
+
+/* 0.8 omega_b is 0.05 turn per period: p times an eighth of a mechanical step each. */
+void test_the_second_sample_already_knows_the_speed_and_no_cycle_is_slipped(void)
+{
+    const uint32_t advance = (uint32_t)(0.05 / 3.0 * turn);
+    (void)step(0xF0000000u);
+    TEST_ASSERT_EQUAL_INT(0, state.step);
+    const angle_t y = step(0xF0000000u + advance);
+    TEST_ASSERT_EQUAL_INT((int32_t)(3U * advance), y.step);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.8, from_q31(y.omega_q31)); /* turn_to_pu in Q15.16: 2e-6 */
+    TEST_ASSERT_FALSE(y.jumped);
+}
+
+/* The error of one sample is a multiple of k_i e, rounded to 2 LSB. A type-2 loop has no error on a ramp. */
+void test_a_ramp_is_tracked_without_a_speed_error_in_both_directions(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state = (angle_tracker_state_t){0};
+        const int32_t advance = sign * 12345678;
+        uint32_t theta = 77;
+        for (int n = 0; n < 2000; n++) {
+            (void)step(theta);
+            theta += (uint32_t)advance;
+        }
+        TEST_ASSERT_INT_WITHIN(4, 3 * advance, step(theta).step);
+    }
+}
+
+void test_a_speed_step_settles_with_both_poles_at_the_configured_bandwidth(void)
+{
+    (void)step(0);
+    (void)step(0);
+    const uint32_t advance = 20000000u;
+    uint32_t theta = 0;
+    double worst_overshoot = 0.0;
+    for (int n = 0; n < 400; n++) {
+        theta += advance;
+        const angle_t y = step(theta);
+        worst_overshoot = fmax(worst_overshoot, y.step / (3.0 * advance));
+        if (n == 99) { /* 10 ms are six time constants: (1 + 6) e^-6 = 1.7 % are missing; w_n T_s = 0.06 spreads the poles */
+            TEST_ASSERT_DOUBLE_WITHIN(0.003, 1.0 - 0.01735, y.step / (3.0 * advance));
+        }
+    }
+    /* Two equal real poles and no zero: no overshoot but the rounding. */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, worst_overshoot);
+}
+
+/* Gains in q31 (5e-10) on an error below 0.1 turn, a rounding of 2 LSB each of which decays: < 100 LSB. */
+void test_a_noisy_accelerating_rotor_gives_the_twins_angle_and_speed(void)
+{
+    twin_angle_state_t twin = {0};
+    worst_t worst = {0};
+    uint64_t seed = 31;
+    double theta = 0.0;
+    for (int n = 0; n < 200000; n++) {
+        theta += 0.15 / 3.0 * sin(n * 1e-4); /* up to 0.38 omega_b either way */
+        const int64_t noise = random_in(&seed, -1000000, 1000000);
+        const uint32_t raw = (uint32_t)((int64_t)floor(fmod(theta, two_pi) / two_pi * turn) + noise);
+        const angle_t y = step(raw);
+        const twin_angle_t t = twin_angle_tracker(&f.si, &twin, raw / turn * two_pi);
+        worst_note(&worst, y.step - t.step / two_pi * turn, "step of period %d", n);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.0, twin_wrap(y.theta_e / turn * two_pi - t.theta));
+    }
+    ASSERT_WORST(worst, 100.0);
+}
+
+void test_the_speed_scale_is_one_at_omega_b(void)
+{
+    for (int n = -15; n <= 15; n++) {
+        const double advance = n / 16.0 * f.w * 1e-4 / two_pi * turn / 3.0;
+        state = (angle_tracker_state_t){0};
+        (void)step(0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, n / 16.0, from_q31(step((uint32_t)(int32_t)lround(advance)).omega_q31));
+    }
+}
+
+void test_a_jump_beyond_the_credible_step_is_reported_and_a_smaller_one_is_not(void)
+{
+    (void)step(0);
+    (void)step(0);
+    const uint32_t limit = f.angle_tracker.max_step / 3U;
+    TEST_ASSERT_FALSE(step(limit).jumped);
+    state = (angle_tracker_state_t){.samples = 2};
+    TEST_ASSERT_TRUE(step(limit + 1U).jumped);
+    state = (angle_tracker_state_t){.samples = 2};
+    TEST_ASSERT_TRUE(step(0U - limit - 1U).jumped);
+    state = (angle_tracker_state_t){.samples = 2};
+    f.angle_tracker.max_step = 0x7FFFFFFEu;
+    f.angle_tracker.pole_pairs = 1;
+    TEST_ASSERT_TRUE(step(0x80000000u).jumped); /* half a turn: -2^31 has no positive */
+}
+
+/* k_i e below half an LSB may not creep: an error of one LSB must not build up speed. */
+void test_a_resting_rotor_with_one_lsb_of_jitter_keeps_its_speed_at_zero(void)
+{
+    (void)step(1000);
+    (void)step(1000);
+    for (int n = 0; n < 1000000; n++) {
+        (void)step(1000U + (uint32_t)(n & 1));
+    }
+    TEST_ASSERT_INT_WITHIN(16, 0, state.step);
+}

@@ -1,0 +1,340 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/current_control.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static current_control_state_t state;
+static current_target_t target;
+static flux_point_t flux;
+static current_control_in_t in;
+
+void setUp(void)
+{
+    f = fixture();
+    current_control_reset(&state);
+    flux = flux_table_step(&f.flux_table, (dq_t){-4000, 6000});
+    target = (current_target_t){{flux.psi_d, flux.psi_q}, {flux.psi_d, flux.psi_q}}; /* no error at all */
+    in = (current_control_in_t){.target = &target, .flux = &flux, .v_dc = 21845 /* 350 V */};
+}
+
+void tearDown(void)
+{
+}
+
+static dq_t step(void)
+{
+    return current_control_step(&f.current_control, &state, &in);
+}
+
+static twin_dq_t si_psi(dq_t psi)
+{
+    return (twin_dq_t){from_q15(psi.d) * f.psi, from_q15(psi.q) * f.psi};
+}
+
+/* The twin on exactly what the stage was given: the rounded fluxes. Its answer in LSB of q15. */
+static twin_dq_t twin_step(twin_current_state_t *twin)
+{
+    const twin_dq_t psi = si_psi((dq_t){flux.psi_d, flux.psi_q});
+    const twin_flux_t si = {.psi_d = psi.d, .psi_q = psi.q};
+    const twin_current_in_t t = {{si_psi(target.psi), si_psi(target.weighted)}, &si, from_q15(in.omega) * f.w,
+                                 from_q15(in.psi_delta) * f.psi, from_q15(in.v_dc) * f.v};
+    const twin_dq_t u = twin_current_control(&f.si, twin, &t);
+    return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
+}
+
+static dq_t random_dq(uint64_t *seed, int largest)
+{
+    return (dq_t){(q15_t)random_in(seed, -largest, largest), (q15_t)random_in(seed, -largest, largest)};
+}
+
+/* --- the target ------------------------------------------------------------------------------ */
+
+/* psi* is the tables' (4 LSB, see their own test); the weighted one adds two roundings and (1 - b) of those. */
+void test_the_target_of_every_reference_follows_the_twin(void)
+{
+    worst_t worst = {0};
+    for (int d = -32768; d <= 0; d += 311) {
+        for (int q = -32768; q <= 32767; q += 313) {
+            const dq_t i = {(q15_t)d, (q15_t)q};
+            const flux_point_t at = flux_table_step(&f.flux_table, i);
+            const current_target_t y = current_control_target(&f.current_control, i, &at);
+            const twin_target_t t = twin_current_target(&f.si, (twin_dq_t){from_q15(d) * f.i, from_q15(q) * f.i});
+            const double lsb = 32768.0 / f.psi;
+            worst_note(&worst, y.psi.d - t.psi.d * lsb, "psi_d of %d %d", d, q);
+            worst_note(&worst, y.psi.q - twin_clamp(t.psi.q * lsb, -32768, 32767), "psi_q of %d %d", d, q);
+            worst_note(&worst, y.weighted.d - t.weighted.d * lsb, "f_d of %d %d", d, q);
+            if (fabs(t.psi.q * lsb) < 32760.0) {
+                worst_note(&worst, y.weighted.q - t.weighted.q * lsb, "f_q of %d %d", d, q);
+            }
+        }
+    }
+    ASSERT_WORST(worst, 6.0);
+}
+
+void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
+{
+    const flux_point_t at = flux_table_step(&f.flux_table, (dq_t){0, 0});
+    const current_target_t y = current_control_target(&f.current_control, (dq_t){0, 0}, &at);
+    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.psi.d);
+    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.weighted.d);
+    TEST_ASSERT_EQUAL_INT(0, y.psi.q);
+    TEST_ASSERT_EQUAL_INT(0, y.weighted.q);
+}
+
+/* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of i*. */
+void test_the_set_point_weight_takes_of_the_currents_share_only(void)
+{
+    const flux_point_t at = {.psi_d = 10000, .psi_q = 8000, .psi_f0 = 17000};
+    f.current_control.setpoint_weight = 16384;
+    f.current_control.drop_gain = 8192;
+    const current_target_t y = current_control_target(&f.current_control, (dq_t){-4000, 2000}, &at);
+    TEST_ASSERT_EQUAL_INT(10000 + 3500 - 500, y.weighted.d);
+    TEST_ASSERT_EQUAL_INT(8000 - 4000 + 250, y.weighted.q);
+    TEST_ASSERT_EQUAL_INT(10000, y.psi.d);
+    TEST_ASSERT_EQUAL_INT(8000, y.psi.q);
+}
+
+/* --- the step -------------------------------------------------------------------------------- */
+
+/* |psi* - psi| and psi_d + dpsi stay below 1 here: beyond, the stage saturates them.
+ * u: 0.5 LSB of the product, 0.5 of the sum, 0.5 of v_max. On the arc u_q = sqrt(v^2 - u_d^2) magnifies 1 LSB
+ * of u_d by u_d/u_q, hence the corner that is checked by |u| instead. */
+void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
+{
+    worst_t worst = {0};
+    worst_t circle = {0};
+    worst_t integrator = {0};
+    uint64_t seed = 51;
+    for (int n = 0; n < 400000; n++) {
+        const int largest = (n % 2) ? 16383 : 4000;
+        const dq_t psi = random_dq(&seed, largest);
+        flux.psi_d = psi.d;
+        flux.psi_q = psi.q;
+        target = (current_target_t){random_dq(&seed, largest), random_dq(&seed, largest)};
+        in.omega = (q15_t)random_in(&seed, -32767, 32767);
+        in.psi_delta = (q15_t)random_in(&seed, -3000, 3000);
+        in.v_dc = (q15_t)random_in(&seed, 0, 32767);
+        state = (current_control_state_t){random_in(&seed, -900000000, 900000000), random_in(&seed, -900000000, 900000000), false};
+        twin_current_state_t twin = {{from_q31(state.s_d) * f.v, from_q31(state.s_q) * f.v}, false};
+        const dq_t u = step();
+        const twin_dq_t t = twin_step(&twin);
+        worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, in.omega, in.v_dc);
+        if (fabs(t.d) < fabs(t.q)) {
+            worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q, in.omega, in.v_dc);
+        }
+        worst_note(&circle, fmax(hypot(u.d, u.q) - f.si.v_ratio * in.v_dc, 0.0), "|u| %d %d v %d", u.d, u.q, in.v_dc);
+        if (state.limited == twin.limited && fabs(t.d) < fabs(t.q)) {
+            worst_note(&integrator, from_q31(state.s_d) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
+        }
+    }
+    ASSERT_WORST(worst, 3.0);
+    ASSERT_WORST(circle, 1.5); /* 0.5 of v_max, 1 of the root */
+    ASSERT_WORST(integrator, 1e-8); /* the step is exact in q31 */
+}
+
+/* Without limit the two integrators do the same sums; the stage's are exact. */
+void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
+{
+    worst_t worst = {0};
+    uint64_t seed = 52;
+    twin_current_state_t twin = {0};
+    in.v_dc = 32767;
+    for (int n = 0; n < 10000; n++) {
+        target.psi = (dq_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)), (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
+        (void)step();
+        (void)twin_step(&twin);
+        worst_note(&worst, from_q31(state.s_d) - twin.s.d / f.v, "s_d of period %d", n);
+        worst_note(&worst, from_q31(state.s_q) - twin.s.q / f.v, "s_q of period %d", n);
+        TEST_ASSERT_FALSE(state.limited);
+    }
+    ASSERT_WORST(worst, 1e-9);
+}
+
+/* Alternating +-1 LSB is no error: a truncating step would drift by 1e6/2 LSB of its own unit. */
+void test_a_million_periods_of_one_lsb_ripple_do_not_bias_the_integrators(void)
+{
+    const dq_t rest = target.psi;
+    for (int n = 0; n < 1000000; n++) {
+        const int e = (n & 1) ? 1 : -1;
+        target.psi = (dq_t){(q15_t)(rest.d + e), (q15_t)(rest.q + e)};
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_q);
+}
+
+/* One LSB of flux for 10^4 periods: the exact ramp N sigma a_i 2^-15, bit for bit. */
+void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
+{
+    target.psi.q = (q15_t)(target.psi.q + 1);
+    for (int n = 0; n < 10000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(10000 * 2 * f.current_control.integral_gain, state.s_q);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
+}
+
+void test_at_standstill_without_error_nothing_but_the_integrator_is_put_out(void)
+{
+    state.s_d = 1000 * 65536;
+    state.s_q = -2000 * 65536;
+    const dq_t u = step();
+    TEST_ASSERT_EQUAL_INT(1000, u.d);
+    TEST_ASSERT_EQUAL_INT(-2000, u.q);
+    TEST_ASSERT_EQUAL_INT32(1000 * 65536, state.s_d);
+}
+
+/* u_d = -w psi_q, u_q = w (psi_d + dpsi), by hand: w = 1/2, so half of the fluxes. */
+void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
+{
+    in.omega = 16384;
+    in.psi_delta = 1000;
+    in.v_dc = 32767;
+    flux.psi_d = target.psi.d = target.weighted.d = 10000;
+    flux.psi_q = target.psi.q = target.weighted.q = 6000;
+    dq_t u = step();
+    TEST_ASSERT_INT_WITHIN(1, -3000, u.d);
+    TEST_ASSERT_INT_WITHIN(1, 5500, u.q);
+    in.omega = -16384;
+    u = step();
+    TEST_ASSERT_INT_WITHIN(1, 3000, u.d);
+    TEST_ASSERT_INT_WITHIN(1, -5500, u.q);
+}
+
+/* sigma/omega_b = 1/(3 T_s omega_b) = 0.8488; the proportional part follows f, the integral part psi*. */
+void test_the_proportional_part_follows_the_weighted_target_and_the_integral_part_the_target(void)
+{
+    target.weighted.d = (q15_t)(flux.psi_d + 1000);
+    TEST_ASSERT_INT_WITHIN(1, 849, step().d);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
+    target.weighted.d = flux.psi_d;
+    target.psi.d = (q15_t)(flux.psi_d + 1000);
+    TEST_ASSERT_EQUAL_INT(0, step().d);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0 / 32768.0 * from_q15(f.current_control.integral_gain), from_q31(state.s_d));
+}
+
+/* 3 : 4 : 5 by hand. 1 LSB of u_d is 4 of u_q at the end. */
+void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the_circle(void)
+{
+    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state.s_d = (v_max * 3 / 5) * 65536;
+        state.s_q = sign * 32767 * 65536;
+        dq_t u = step();
+        TEST_ASSERT_INT_WITHIN(1, v_max * 3 / 5, u.d);
+        TEST_ASSERT_INT_WITHIN(2, sign * v_max * 4 / 5, u.q);
+        TEST_ASSERT_TRUE(state.limited);
+        state.s_d = -32767 * 65536;
+        u = step();
+        /* 31/32 of the circle at most: the q axis keeps sqrt(1 - (31/32)^2) = 0.248 of it to get out of there. */
+        TEST_ASSERT_INT_WITHIN(1, -v_max * 31 / 32, u.d);
+        TEST_ASSERT_INT_WITHIN(8, sign * (int)(0.24804 * v_max), u.q);
+    }
+}
+
+void test_a_voltage_on_the_circle_is_not_called_limited(void)
+{
+    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
+    state.s_q = v_max * 65536;
+    TEST_ASSERT_EQUAL_INT(v_max, step().q);
+    TEST_ASSERT_FALSE(state.limited);
+    state.s_q = (v_max + 1) * 65536;
+    TEST_ASSERT_EQUAL_INT(v_max, step().q);
+    TEST_ASSERT_TRUE(state.limited);
+}
+
+/* Ten seconds against the limit must not add a thing; afterwards the axis leaves it within one period. */
+void test_the_integrator_is_held_at_the_limit_and_recovers_at_once(void)
+{
+    const int v_max = (f.current_control.v_ratio * 4000 + 16384) >> 15;
+    in.v_dc = 4000;
+    const q15_t rest = target.psi.q;
+    target.psi.q = target.weighted.q = (q15_t)(rest + 200);
+    for (int n = 0; n < 5000; n++) { /* winds up from inside, as far as it ever can */
+        (void)step();
+    }
+    const q31_t held = state.s_q;
+    for (int n = 0; n < 100000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_TRUE(state.limited);
+    TEST_ASSERT_EQUAL_INT32(held, state.s_q);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(v_max + 1, held >> 16);
+    target.psi.q = target.weighted.q = (q15_t)(rest - 200);
+    TEST_ASSERT_LESS_THAN_INT(v_max, step().q);
+    TEST_ASSERT_LESS_THAN_INT32(held, state.s_q);
+}
+
+/* The error that leads back is integrated although the axis is cut: otherwise it would stick there. */
+void test_an_error_that_leads_away_from_the_limit_is_integrated_in_both_signs(void)
+{
+    const q15_t rest = target.psi.d;
+    in.v_dc = 4000;
+    state.s_d = 20000 * 65536;
+    target.psi.d = (q15_t)(rest - 10);
+    (void)step();
+    TEST_ASSERT_LESS_THAN_INT32(20000 * 65536, state.s_d);
+    state.s_d = 20000 * 65536;
+    target.psi.d = (q15_t)(rest + 10);
+    (void)step();
+    TEST_ASSERT_EQUAL_INT32(20000 * 65536, state.s_d);
+    state.s_d = -20000 * 65536;
+    (void)step();
+    TEST_ASSERT_GREATER_THAN_INT32(-20000 * 65536, state.s_d);
+    state.s_d = -20000 * 65536;
+    target.psi.d = (q15_t)(rest - 10);
+    (void)step();
+    TEST_ASSERT_EQUAL_INT32(-20000 * 65536, state.s_d);
+}
+
+/* Each axis is held for its own cut only: u_d at its limit must not stop the q integrator from unwinding. */
+void test_one_axis_at_the_limit_does_not_hold_the_other(void)
+{
+    in.v_dc = 4000;
+    state.s_d = 1000 * 65536;
+    state.s_q = 20000 * 65536;
+    target.psi.d = (q15_t)(target.psi.d + 10);
+    target.psi.q = (q15_t)(target.psi.q + 10);
+    (void)step();
+    TEST_ASSERT_GREATER_THAN_INT32(1000 * 65536, state.s_d);
+    TEST_ASSERT_EQUAL_INT32(20000 * 65536, state.s_q);
+}
+
+void test_without_dc_voltage_nothing_is_put_out(void)
+{
+    in.v_dc = 0;
+    target.weighted = (dq_t){-20000, 20000};
+    const dq_t u = step();
+    TEST_ASSERT_EQUAL_INT(0, u.d);
+    TEST_ASSERT_EQUAL_INT(0, u.q);
+    TEST_ASSERT_TRUE(state.limited);
+}
+
+void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(void)
+{
+    for (int n = 0; n < 512; n++) {
+        const q15_t end[2] = {INT16_MAX, INT16_MIN};
+        flux.psi_d = end[n & 1];
+        flux.psi_q = end[(n >> 1) & 1];
+        target.psi = (dq_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
+        target.weighted = (dq_t){end[(n >> 4) & 1], end[(n >> 5) & 1]};
+        in.omega = end[(n >> 6) & 1];
+        in.psi_delta = end[(n >> 7) & 1];
+        state.s_d = state.s_q = (n & 256) ? INT32_MIN : INT32_MAX;
+        in.v_dc = 32767;
+        const dq_t u = step();
+        TEST_ASSERT_TRUE(hypot(u.d, u.q) <= f.si.v_ratio * 32767 + 1.5);
+    }
+}
+
+void test_reset_forgets_everything(void)
+{
+    state = (current_control_state_t){1, 2, true};
+    current_control_reset(&state);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_q);
+    TEST_ASSERT_FALSE(state.limited);
+}

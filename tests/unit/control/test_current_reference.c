@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/current_reference.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static current_reference_in_t in;
+
+void setUp(void)
+{
+    f = fixture();
+    in = (current_reference_in_t){.torque = 4096, .v_dc = 21845, .omega = 1000};
+}
+
+void tearDown(void)
+{
+}
+
+static current_reference_t step(void)
+{
+    return current_reference_step(&f.current_reference, &in);
+}
+
+/* At low speed every voltage is enough: the last row of the table, maximum torque per ampere. */
+void test_at_low_speed_a_node_gives_the_tabulated_mtpa_currents(void)
+{
+    for (int ix = 0; ix < 7; ix++) {
+        in.torque = (q15_t)(ix * 2048);
+        const current_reference_t y = step();
+        const int n = ix * f.current_reference.grid.ny + f.current_reference.grid.ny - 1;
+        TEST_ASSERT_EQUAL_INT(f.current_reference.i_d[n], y.i_ref.d);
+        TEST_ASSERT_EQUAL_INT(f.current_reference.i_q[n], y.i_ref.q);
+        TEST_ASSERT_FALSE(y.limited);
+    }
+}
+
+void test_i_q_takes_the_sign_of_the_torque_and_i_d_does_not(void)
+{
+    const current_reference_t motor = step();
+    in.torque = -4096;
+    const current_reference_t generator = step();
+    TEST_ASSERT_EQUAL_INT(motor.i_ref.d, generator.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(-motor.i_ref.q, generator.i_ref.q);
+    TEST_ASSERT_LESS_THAN_INT(0, motor.i_ref.d);
+    TEST_ASSERT_GREATER_THAN_INT(0, motor.i_ref.q);
+}
+
+void test_the_direction_of_rotation_does_not_matter(void)
+{
+    in.omega = 20000;
+    const current_reference_t forward = step();
+    in.omega = -20000;
+    const current_reference_t backward = step();
+    TEST_ASSERT_EQUAL_INT(forward.i_ref.d, backward.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(forward.i_ref.q, backward.i_ref.q);
+}
+
+/* By hand: v_ratio v_dc = 0.55 * 0.6667 = 0.3667; w = 0.8 leaves 0.4583: between flux nodes 5 and 6. */
+void test_the_available_flux_is_the_planned_voltage_over_the_speed(void)
+{
+    in.omega = 26214;
+    in.torque = 0;
+    const double psi = 0.55 * 21845.0 / 32768.0 / 0.8;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * psi) * 32768.0, step().torque_max); /* the fixture's own line */
+    in.i_magnitude = 16384; /* takes r/2 = 0.00514 of the voltage */
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * (psi - 0.5 * 674.0 / 65536.0 / 0.8)) * 32768.0, step().torque_max);
+}
+
+void test_torque_beyond_the_limit_is_cut_to_it_and_flagged(void)
+{
+    in.omega = 26214;
+    in.torque = 32767;
+    const current_reference_t cut = step();
+    TEST_ASSERT_TRUE(cut.limited);
+    in.torque = cut.torque_max;
+    const current_reference_t full = step();
+    TEST_ASSERT_FALSE(full.limited);
+    TEST_ASSERT_EQUAL_INT(full.i_ref.d, cut.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(full.i_ref.q, cut.i_ref.q);
+    in.torque = (q15_t)(-cut.torque_max - 1);
+    TEST_ASSERT_TRUE(step().limited);
+    in.torque = INT16_MIN;
+    TEST_ASSERT_EQUAL_INT(-full.i_ref.q, step().i_ref.q);
+}
+
+void test_flux_below_the_table_is_flagged_and_uses_its_edge(void)
+{
+    in.v_dc = 3000;
+    in.omega = 32767;
+    in.torque = 100;
+    const current_reference_t y = step();
+    TEST_ASSERT_TRUE(y.limited);
+    in.v_dc = 0;
+    TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
+    in.v_dc = 100; /* less than the resistive drop: no negative flux */
+    in.i_magnitude = 32767;
+    TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
+    in.v_dc = -200;
+    TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
+}
+
+void test_standstill_divides_by_nothing(void)
+{
+    in.omega = 0;
+    const current_reference_t rest = step();
+    in.omega = 1;
+    TEST_ASSERT_EQUAL_INT(step().i_ref.q, rest.i_ref.q);
+    TEST_ASSERT_FALSE(rest.limited);
+    in.v_dc = 0;
+    TEST_ASSERT_TRUE(step().limited);
+    in.omega = INT16_MIN;
+    in.v_dc = INT16_MAX;
+    (void)step();
+}
+
+/* psi: 1/2 LSB of quotient, 1 LSB of the drop over |w| -> below 1.5/0.1; slopes of i over psi below 0.2. */
+void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
+{
+    worst_t worst = {0};
+    uint64_t seed = 111;
+    for (int n = 0; n < 300000; n++) {
+        in = (current_reference_in_t){(q15_t)random_in(&seed, -16000, 16000), (q15_t)random_in(&seed, 8000, 32767),
+                                      (q15_t)random_in(&seed, 3000, 32767), (q15_t)random_in(&seed, 0, 30000)};
+        in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
+        const twin_reference_in_t t = {from_q15(in.torque) * f.t, from_q15(in.v_dc) * f.v, from_q15(in.omega) * f.w,
+                                       from_q15(in.i_magnitude) * f.i};
+        const current_reference_t y = step();
+        const twin_reference_t s = twin_current_reference(&f.si, &t);
+        worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque, in.v_dc, in.omega);
+        worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d", in.torque, in.v_dc, in.omega);
+        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque, in.v_dc, in.omega);
+    }
+    ASSERT_WORST(worst, 8.0);
+}
+
+void test_the_current_circle_cuts_i_q_and_keeps_i_d(void)
+{
+    f.current_reference.i_max = 7000;
+    in.torque = 8192;
+    const current_reference_t y = step();
+    const current_reference_config_t open = fixture().current_reference;
+    const current_reference_t free = current_reference_step(&open, &in);
+    TEST_ASSERT_EQUAL_INT(free.i_ref.d, y.i_ref.d);
+    TEST_ASSERT_DOUBLE_WITHIN(1.5, 7000.0, hypot(y.i_ref.d, y.i_ref.q));
+    f.current_reference.i_max = 3000; /* less than i_d alone */
+    const current_reference_t d_only = step();
+    TEST_ASSERT_EQUAL_INT(-3000, d_only.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(0, d_only.i_ref.q);
+    in.torque = -8192;
+    TEST_ASSERT_EQUAL_INT(0, step().i_ref.q);
+}
+
+void test_a_complete_table_is_accepted_and_a_broken_one_rejected(void)
+{
+    static int16_t bad[81];
+    current_reference_config_t c = f.current_reference;
+    TEST_ASSERT_TRUE(current_reference_valid(&c));
+    c.i_d = 0;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.i_q = 0;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.torque_max.y = 0;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.grid.nx = 1;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.grid.ny = 1;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.i_max = 0;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.i_d = bad;
+    TEST_ASSERT_TRUE(current_reference_valid(&c));
+    bad[80] = 1;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.i_q = bad;
+    TEST_ASSERT_TRUE(current_reference_valid(&c));
+    bad[80] = -1;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+}

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/flux_table.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+
+void setUp(void)
+{
+    f = fixture();
+}
+
+void tearDown(void)
+{
+}
+
+static twin_dq_t amperes(dq_t i)
+{
+    return (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i};
+}
+
+/* Table values: one rounding (0.5) and the weights' 2^-15 of the twist, below 0.1 here.
+ * psi = psi_f0 + l i: half an LSB of l times |i| < 1 and the shift 2^l_shift = 4: 4 (0.6) + 0.6 + 0.5. */
+static void hold_to_twin(worst_t *value, worst_t *flux, dq_t i)
+{
+    const flux_point_t y = flux_table_step(&f.flux_table, i);
+    const twin_flux_t t = twin_flux_table(&f.si, amperes(i));
+    const double l = 32768.0 / f.l / (1 << f.flux_table.l_shift);
+    const double g = 32768.0 * f.z;
+    const double psi = 32768.0 / f.psi;
+    worst_note(value, y.l_d - t.l_d * l, "l_d of %d %d", i.d, i.q);
+    worst_note(value, y.l_q - t.l_q * l, "l_q of %d %d", i.d, i.q);
+    worst_note(value, y.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
+    worst_note(value, y.psi_f0 - t.psi_f0 * psi, "psi_f0 of %d %d", i.d, i.q);
+    /* The node of g is itself rounded. */
+    worst_note(value, fmax(fabs(y.g_d - t.g_d * g) - 0.5, 0.0), "g_d of %d %d", i.d, i.q);
+    worst_note(value, fmax(fabs(y.g_q - t.g_q * g) - 0.5, 0.0), "g_q of %d %d", i.d, i.q);
+    worst_note(flux, y.psi_d - twin_clamp(t.psi_d * psi, -32768, 32767), "psi_d of %d %d", i.d, i.q);
+    worst_note(flux, y.psi_q - twin_clamp(t.psi_q * psi, -32768, 32767), "psi_q of %d %d", i.d, i.q);
+    TEST_ASSERT_EQUAL(t.clamped, y.clamped);
+}
+
+void test_the_whole_current_plane_follows_the_twin(void)
+{
+    worst_t value = {0};
+    worst_t flux = {0};
+    uint64_t seed = 41;
+    for (int d = -32768; d <= 32767; d += 257) {
+        for (int q = -32768; q <= 32767; q += 255) {
+            hold_to_twin(&value, &flux, (dq_t){(q15_t)d, (q15_t)q});
+        }
+    }
+    for (int n = 0; n < 100000; n++) {
+        hold_to_twin(&value, &flux, (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
+    }
+    hold_to_twin(&value, &flux, (dq_t){INT16_MIN, INT16_MIN});
+    hold_to_twin(&value, &flux, (dq_t){INT16_MAX, INT16_MIN});
+    ASSERT_WORST(value, 0.6);
+    ASSERT_WORST(flux, 3.6);
+}
+
+void test_a_node_gives_exactly_what_is_tabulated(void)
+{
+    for (int ix = 0; ix < f.flux_table.grid.nx; ix++) {
+        for (int iy = 0; iy < f.flux_table.grid.ny; iy++) {
+            const int n = ix * f.flux_table.grid.ny + iy;
+            const dq_t i = {(q15_t)(f.flux_table.grid.x0 + ix * 2048), (q15_t)(iy * 2048)};
+            const flux_point_t y = flux_table_step(&f.flux_table, i);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], y.l_d);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_q[n], y.l_q);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_qq[n], y.l_qq);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.g_d[n], y.g_d);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.g_q[n], y.g_q);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[n], y.psi_f0);
+            TEST_ASSERT_FALSE(y.clamped);
+        }
+    }
+}
+
+/* psi_d is even in i_q; psi_q is odd, to the one LSB by which half-up rounding differs for -x. */
+void test_the_half_planes_mirror_each_other(void)
+{
+    uint64_t seed = 42;
+    for (int n = 0; n < 50000; n++) {
+        const dq_t i = {(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32767, 32767)};
+        const flux_point_t a = flux_table_step(&f.flux_table, i);
+        const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){i.d, (q15_t)-i.q});
+        TEST_ASSERT_EQUAL_INT(a.psi_d, b.psi_d);
+        TEST_ASSERT_EQUAL_INT(a.l_qq, b.l_qq);
+        TEST_ASSERT_INT_WITHIN(1, -a.psi_q, b.psi_q);
+    }
+}
+
+void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(void)
+{
+    const int edge_d = f.flux_table.grid.x0;
+    const int edge_q = 14 * 2048;
+    const dq_t inside[4] = {{(q15_t)edge_d, 0}, {0, 0}, {-1000, (q15_t)edge_q}, {-1000, (q15_t)-edge_q}};
+    const dq_t outside[4] = {{(q15_t)(edge_d - 1), 0}, {1, 0}, {-1000, (q15_t)(edge_q + 1)}, {-1000, (q15_t)(-edge_q - 1)}};
+    for (int n = 0; n < 4; n++) {
+        const flux_point_t a = flux_table_step(&f.flux_table, inside[n]);
+        const flux_point_t b = flux_table_step(&f.flux_table, outside[n]);
+        TEST_ASSERT_FALSE(a.clamped);
+        TEST_ASSERT_TRUE(b.clamped);
+        TEST_ASSERT_EQUAL_INT(a.l_d, b.l_d);
+        TEST_ASSERT_EQUAL_INT(a.l_qq, b.l_qq);
+    }
+}
+
+/* Continuity: a neighbour one count away may differ by the slope only, never by a cell. */
+void test_there_is_no_step_at_a_cell_boundary(void)
+{
+    for (int q = -20000; q < 20000; q++) {
+        const flux_point_t a = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)q});
+        const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)(q + 1)});
+        TEST_ASSERT_INT_WITHIN(2, a.l_q, b.l_q);
+        TEST_ASSERT_INT_WITHIN(8, a.psi_q, b.psi_q); /* l_q below 4, doubled by the slope of l_q, roundings */
+    }
+}
+
+void test_a_table_that_is_complete_and_positive_is_accepted(void)
+{
+    TEST_ASSERT_TRUE(flux_table_valid(&f.flux_table));
+}
+
+void test_a_table_that_would_break_a_later_stage_is_rejected(void)
+{
+    static int16_t bad[256];
+    const int16_t **const pointers[6] = {&f.flux_table.l_d, &f.flux_table.l_q, &f.flux_table.l_qq, &f.flux_table.g_d,
+                                         &f.flux_table.g_q, &f.flux_table.psi_f0};
+    for (int n = 0; n < 6; n++) {
+        const int16_t *good = *pointers[n];
+        *pointers[n] = 0;
+        TEST_ASSERT_FALSE(flux_table_valid(&f.flux_table));
+        *pointers[n] = good;
+    }
+    for (int n = 1; n < 5; n++) { /* all inductances but l_d, which may change its sign near i_d = 0 */
+        const int16_t *good = *pointers[n];
+        for (int k = 0; k < 225; k++) {
+            bad[k] = good[k];
+        }
+        bad[224] = 0;
+        *pointers[n] = bad;
+        TEST_ASSERT_FALSE(flux_table_valid(&f.flux_table));
+        bad[224] = -1;
+        TEST_ASSERT_FALSE(flux_table_valid(&f.flux_table));
+        *pointers[n] = good;
+    }
+}
+
+void test_a_grid_without_a_cell_or_with_an_impossible_shift_is_rejected(void)
+{
+    flux_table_config_t c = f.flux_table;
+    c.grid.nx = 1;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.grid.ny = 1;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.grid.y0 = 1;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.l_shift = 15;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+}
+
+void test_flux_beyond_the_base_saturates(void)
+{
+    static int16_t large[225];
+    for (int k = 0; k < 225; k++) {
+        large[k] = 32767;
+    }
+    f.flux_table.l_q = f.flux_table.psi_f0 = f.flux_table.l_d = large;
+    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_t){0, 20000}).psi_q);
+    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_t){0, -20000}).psi_q);
+    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_t){1000, 0}).psi_d);
+    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_t){-28672, 0}).psi_d);
+}

@@ -1,0 +1,205 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/mrai_schedule.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static mrai_quality_t quality;
+static mrai_state_t identifier;
+static mrai_in_t sample;
+
+void setUp(void)
+{
+    f = fixture();
+    quality = (mrai_quality_t){0};
+    identifier = (mrai_state_t){0};
+    sample = (mrai_in_t){.i = {-9000, 12000}, .omega = 0x20000000};
+    sample.flux = flux_table_step(&f.flux_table, sample.i);
+}
+
+void tearDown(void)
+{
+}
+
+static mrai_schedule_t step(bool enabled)
+{
+    const mrai_schedule_in_t in = {&sample, &identifier, enabled};
+    return mrai_schedule_step(&f.mrai, &quality, &in);
+}
+
+static void at(int id, int iq, int omega)
+{
+    sample.i = (dq_t){(q15_t)id, (q15_t)iq};
+    sample.flux = flux_table_step(&f.flux_table, sample.i);
+    sample.omega = omega * 65536;
+}
+
+/* Gains only: the quotient of flux_gain in Q16 truncates at 1 of 2000/|w|, the norm in Q21 rounds at 1 of its own
+ * size (i g)^2 2^21, its factors at 1/2 LSB of q15 each. Where the gain passes 32 it saturates. */
+void test_the_factors_follow_the_twin_over_speed_and_current(void)
+{
+    worst_t flux = {0};
+    worst_t resistance = {0};
+    worst_t voltage = {0};
+    uint64_t seed = 81;
+    for (int n = 0; n < 200000; n++) {
+        at(random_in(&seed, -28000, 0), random_in(&seed, -28000, 28000), random_in(&seed, -32768, 32767));
+        twin_mrai_quality_t q = {0};
+        const twin_mrai_state_t idle = {0};
+        twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i}, .omega = from_q31(sample.omega) * f.w};
+        t.flux.g_d = from_q15(sample.flux.g_d) / f.z;
+        t.flux.g_q = from_q15(sample.flux.g_q) / f.z;
+        const mrai_schedule_t y = step(true);
+        const twin_mrai_schedule_t s = twin_mrai_schedule(&f.si, &q, &t, &idle, true);
+        const double flux_now = y.flux_step_q28 / 268435456.0 / (1 << f.mrai.l_shift);
+        const double r_now = y.resistance_step_q26 / 67108864.0 * f.z * f.z / (f.i * f.i);
+        const double magnitude = hypot(sample.i.d, sample.i.q);
+        worst_note(&voltage, from_q15(y.voltage_gain) - (s.voltage_scale - 1.0), "w %d", sample.omega);
+        if (fabs(magnitude - f.mrai.i_min) < 1.5) {
+            continue; /* the magnitude is rounded: either side is right */
+        }
+        TEST_ASSERT_EQUAL(s.flux_gain != 0.0, y.flux_step_q28 != 0);
+        if (s.flux_gain != 0.0) {
+            worst_note(&flux, flux_now / s.flux_gain - 1.0, "w %d", sample.omega);
+        }
+        TEST_ASSERT_EQUAL(s.resistance_gain != 0.0, y.resistance_step_q26 != 0);
+        if (y.resistance_step_q26 != 0 && y.resistance_step_q26 != INT32_MAX) {
+            worst_note(&resistance, r_now / s.resistance_gain - 1.0, "i %d %d", sample.i.d, sample.i.q);
+        }
+    }
+    ASSERT_WORST(flux, 6e-4);
+    ASSERT_WORST(resistance, 0.02);
+    ASSERT_WORST(voltage, 1.5 / 32768.0); /* 1/2 LSB, and 7/360 (w T_s/2)^4 = 3e-5 of the series at omega_b */
+}
+
+void test_disabled_identification_closes_both_gates_but_not_the_voltage_correction(void)
+{
+    at(-9000, 12000, 16000);
+    const mrai_schedule_t on = step(true);
+    const mrai_schedule_t off = step(false);
+    TEST_ASSERT_NOT_EQUAL(0, on.flux_step_q28);
+    TEST_ASSERT_NOT_EQUAL(0, on.resistance_step_q26);
+    TEST_ASSERT_EQUAL_INT32(0, off.flux_step_q28);
+    TEST_ASSERT_EQUAL_INT32(0, off.resistance_step_q26);
+    TEST_ASSERT_EQUAL_INT(on.voltage_gain, off.voltage_gain);
+    TEST_ASSERT_GREATER_THAN_INT(0, on.voltage_gain);
+}
+
+void test_the_flux_gate_opens_at_its_speed_in_both_directions(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        at(-9000, 12000, sign * f.mrai.omega_min);
+        TEST_ASSERT_TRUE(sign * step(true).flux_step_q28 > 0);
+        at(-9000, 12000, sign * (f.mrai.omega_min - 1));
+        TEST_ASSERT_EQUAL_INT32(0, step(true).flux_step_q28);
+        TEST_ASSERT_EQUAL_INT32(0, step(true).resistance_step_q26);
+    }
+}
+
+void test_both_gates_need_current_and_the_resistance_gate_not_too_much_speed(void)
+{
+    at(0, f.mrai.i_min, 5000);
+    TEST_ASSERT_TRUE(step(true).resistance_step_q26 > 0);
+    TEST_ASSERT_TRUE(step(true).flux_step_q28 > 0);
+    at(0, f.mrai.i_min - 1, 5000);
+    TEST_ASSERT_EQUAL_INT32(0, step(true).resistance_step_q26);
+    TEST_ASSERT_EQUAL_INT32(0, step(true).flux_step_q28);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        at(-9000, 12000, sign * f.mrai.omega_r_max);
+        TEST_ASSERT_TRUE(step(true).resistance_step_q26 > 0);
+        at(-9000, 12000, sign * (f.mrai.omega_r_max + 1));
+        TEST_ASSERT_EQUAL_INT32(0, step(true).resistance_step_q26);
+        TEST_ASSERT_NOT_EQUAL(0, step(true).flux_step_q28);
+    }
+}
+
+/* Without a current gate the norm may be nothing at all: the reciprocal saturates, it does not trap. */
+void test_no_current_and_no_gate_saturate_the_factor(void)
+{
+    f.mrai.i_min = 0;
+    at(0, 0, 5000);
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, step(true).resistance_step_q26);
+    f.mrai.flux_gain = INT32_MAX;
+    TEST_ASSERT_EQUAL_INT32(INT32_MAX, step(true).flux_step_q28);
+    at(0, 0, -5000);
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, step(true).flux_step_q28);
+}
+
+/* 1 - 0.98^n: after 35 steps half, after 500 all but 4e-5; rounding to q15 stops at 1/2 LSB/0.02 = 25 LSB. */
+void test_a_parameter_at_rest_gains_quality_at_the_filters_rate(void)
+{
+    at(-9000, 12000, 16000);
+    for (int n = 0; n < 35; n++) {
+        (void)step(true);
+    }
+    TEST_ASSERT_INT_WITHIN(200, 16600, quality.psi_quality); /* 1 - 0.98^35 = 0.507 */
+    TEST_ASSERT_INT_WITHIN(200, 16600, quality.r_quality);
+    for (int n = 0; n < 800; n++) {
+        (void)step(true);
+    }
+    TEST_ASSERT_INT_WITHIN(40, 32767, quality.psi_quality);
+    TEST_ASSERT_INT_WITHIN(40, 32767, quality.r_quality);
+}
+
+void test_a_parameter_that_still_moves_has_no_quality_and_a_slow_one_has_its_share(void)
+{
+    at(-9000, 12000, 16000);
+    for (int n = 0; n < 1000; n++) {
+        identifier.psi_delta += f.mrai.psi_drift_full / 4; /* the drift wraps nothing: 1000 steps of 2e-4 */
+        identifier.r_delta -= 2 * f.mrai.r_drift_full / 2;
+        (void)step(true);
+    }
+    TEST_ASSERT_INT_WITHIN(60, 24575, quality.psi_quality);
+    TEST_ASSERT_INT_WITHIN(60, 0, quality.r_quality);
+}
+
+void test_closed_gates_and_clamped_parameters_lose_their_quality(void)
+{
+    at(-9000, 12000, 16000);
+    quality.psi_quality = quality.r_quality = 32767;
+    identifier.psi_clamped = true;
+    for (int n = 0; n < 1000; n++) {
+        (void)step(true);
+    }
+    TEST_ASSERT_INT_WITHIN(40, 0, quality.psi_quality);
+    TEST_ASSERT_INT_WITHIN(40, 32767, quality.r_quality);
+    identifier.psi_clamped = false;
+    identifier.r_clamped = true;
+    for (int n = 0; n < 1000; n++) {
+        (void)step(true);
+    }
+    TEST_ASSERT_INT_WITHIN(40, 32767, quality.psi_quality);
+    TEST_ASSERT_INT_WITHIN(40, 0, quality.r_quality);
+    identifier.r_clamped = false;
+    quality.r_quality = 32767;
+    for (int n = 0; n < 1000; n++) {
+        (void)step(false);
+    }
+    TEST_ASSERT_INT_WITHIN(40, 0, quality.psi_quality);
+    TEST_ASSERT_INT_WITHIN(40, 0, quality.r_quality);
+}
+
+void test_the_quality_follows_the_twins_through_a_drive(void)
+{
+    twin_mrai_quality_t twin = {0};
+    worst_t worst = {0};
+    uint64_t seed = 82;
+    for (int n = 0; n < 20000; n++) {
+        if (n % 500 == 0) {
+            at(random_in(&seed, -20000, 0), random_in(&seed, -20000, 20000), random_in(&seed, -32000, 32000));
+        }
+        identifier.psi_delta += random_in(&seed, -2 * f.mrai.psi_drift_full, 2 * f.mrai.psi_drift_full);
+        identifier.r_delta += random_in(&seed, -f.mrai.r_drift_full, f.mrai.r_drift_full);
+        identifier.psi_delta = fx_clamp_q31(identifier.psi_delta, -400000000, 200000000);
+        const twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i}, .omega = from_q31(sample.omega) * f.w,
+                                  .flux = {.g_d = 1e-4, .g_q = 1e-4}};
+        const twin_mrai_state_t state = {.psi_delta = from_q31(identifier.psi_delta) * f.psi, .r_delta = from_q31(identifier.r_delta) * f.z};
+        (void)step(true);
+        (void)twin_mrai_schedule(&f.si, &twin, &t, &state, true);
+        worst_note(&worst, quality.psi_quality - twin.psi_quality * 32768.0, "psi, step %d", n);
+        worst_note(&worst, quality.r_quality - twin.r_quality * 32768.0, "r, step %d", n);
+    }
+    ASSERT_WORST(worst, 60.0); /* the filter's dead band of 25 LSB, and the 1e-3 of drift_full in q31 */
+}

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "control/torque_loop.h"
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static torque_loop_state_t state;
+static torque_loop_in_t in;
+
+void setUp(void)
+{
+    f = fixture();
+    state = (torque_loop_state_t){0};
+    in = (torque_loop_in_t){.enabled = true};
+}
+
+void tearDown(void)
+{
+}
+
+static q15_t step(void)
+{
+    return torque_loop_step(&f.torque_loop, &state, &in);
+}
+
+/* A plant whose torque is a fixed share of the request, one period late. */
+static q15_t run(double share, int steps)
+{
+    q15_t request = 0;
+    for (int n = 0; n < steps; n++) {
+        request = step();
+        in.estimate = (q15_t)lround(share * request);
+    }
+    return request;
+}
+
+void test_switched_off_the_command_passes_unchanged(void)
+{
+    in.enabled = false;
+    for (int c = -32768; c <= 32767; c += 111) {
+        in.command = (q15_t)c;
+        in.estimate = (q15_t)(c / 2);
+        TEST_ASSERT_EQUAL_INT(c, step());
+    }
+}
+
+/* A machine that makes 8.75 % too little is asked for 1/(1 - 0.0875) of the command. */
+void test_the_correction_makes_the_estimate_equal_the_command(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state = (torque_loop_state_t){0};
+        in.estimate = 0;
+        in.command = (q15_t)(sign * 10000);
+        (void)run(0.9125, 2000);
+        TEST_ASSERT_INT_WITHIN(2, in.command, in.estimate);
+        TEST_ASSERT_DOUBLE_WITHIN(3e-4, 1.0 / 0.9125 - 1.0, from_q31(state.correction));
+        TEST_ASSERT_FALSE(state.saturated);
+    }
+}
+
+/* x is a ratio: learnt at 100 it serves at 30 and in the other direction at once. */
+void test_what_was_learnt_at_one_torque_serves_at_another_and_in_the_other_direction(void)
+{
+    in.command = 10000;
+    (void)run(0.9125, 2000);
+    in.enabled = true;
+    in.command = in.estimate = -3000;
+    state.model = -3000 * 65536; /* settled: only x acts */
+    TEST_ASSERT_INT_WITHIN(2, -3288, step());
+}
+
+/* ki e/|T*|: the error dies with ki = 0.03 per ms whatever the torque; kp and the model left out here. */
+void test_the_loop_is_equally_fast_at_every_torque(void)
+{
+    f.torque_loop.kp = 0;
+    for (int c = 1000; c <= 16000; c *= 2) {
+        state = (torque_loop_state_t){.model = c * 65536};
+        in.command = (q15_t)c;
+        in.estimate = (q15_t)lround(0.8 * c);
+        (void)run(0.8, 42); /* 1/(0.8 ki) */
+        TEST_ASSERT_DOUBLE_WITHIN(0.012, 0.25 * 0.632, from_q31(state.correction));
+    }
+}
+
+void test_a_step_of_a_perfect_machine_excites_no_integrator(void)
+{
+    /* T^ follows as the model does: first order with model_rate. */
+    double torque = 0.0;
+    in.command = 12000;
+    for (int n = 0; n < 200; n++) {
+        torque += from_q15(f.torque_loop.model_rate) * (12000.0 - torque);
+        in.estimate = (q15_t)lround(torque);
+        TEST_ASSERT_INT_WITHIN(1, 12000, step());
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, from_q31(state.correction));
+}
+
+void test_switching_on_and_off_is_bumpless(void)
+{
+    in.command = 10000;
+    in.enabled = false;
+    (void)run(0.95, 100);
+    in.enabled = true;
+    /* kp e of a settled 5 % error and one step of the integrator: 0.1 * 500 + 0.03 * 500 */
+    const q15_t first = step();
+    TEST_ASSERT_INT_WITHIN(66, 10000, first);
+    (void)run(0.95, 2000);
+    const q15_t before = step();
+    in.enabled = false;
+    const q15_t after = step();
+    TEST_ASSERT_INT_WITHIN(20, before, after); /* ki x T* = 0.03 * 526 */
+    (void)run(0.95, 2000);
+    TEST_ASSERT_INT_WITHIN(1, 10000, step());
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, from_q31(state.correction));
+}
+
+/* 0.4 of the command, whatever the estimate says; the integrator stays inside and comes back at once. */
+void test_the_authority_bounds_the_request_and_the_integrator(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state = (torque_loop_state_t){0};
+        in.command = (q15_t)(sign * 10000);
+        in.estimate = 0;
+        for (int n = 0; n < 3000; n++) {
+            TEST_ASSERT_INT_WITHIN(4001, in.command, step());
+        }
+        TEST_ASSERT_INT_WITHIN(1, sign * 14000, step());
+        TEST_ASSERT_TRUE(state.saturated);
+        TEST_ASSERT_INT_WITHIN(1, f.torque_loop.authority, state.correction >> 16);
+        in.estimate = (q15_t)(sign * 15000);
+        (void)step();
+        (void)step();
+        TEST_ASSERT_FALSE(state.saturated);
+        TEST_ASSERT_LESS_THAN_INT(f.torque_loop.authority * 65536, state.correction);
+    }
+}
+
+void test_the_lower_bound_of_the_authority_holds_as_well(void)
+{
+    in.command = 10000;
+    in.estimate = 32767;
+    for (int n = 0; n < 3000; n++) {
+        TEST_ASSERT_TRUE(step() >= 5999);
+    }
+    TEST_ASSERT_INT_WITHIN(1, 6000, step());
+    TEST_ASSERT_TRUE(state.saturated);
+}
+
+/* While voltage or current are at their limit, asking for more would only wind up; asking for less may act. */
+void test_the_correction_is_held_while_limited_and_asked_for_more(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state = (torque_loop_state_t){.correction = 100000000, .model = sign * 10000 * 65536};
+        in.command = (q15_t)(sign * 10000);
+        in.limited = true;
+        in.estimate = (q15_t)(sign * 8000);
+        for (int n = 0; n < 1000; n++) {
+            (void)step();
+        }
+        TEST_ASSERT_EQUAL_INT32(100000000, state.correction);
+        in.estimate = (q15_t)(sign * 12000);
+        (void)step();
+        TEST_ASSERT_LESS_THAN_INT32(100000000, state.correction);
+    }
+}
+
+/* Nothing asked for, nothing corrected: a torque estimate's offset must not creep in at standstill. */
+void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
+{
+    state.correction = 123456789;
+    in.command = 0;
+    in.estimate = 900;
+    for (int n = 0; n < 1000; n++) {
+        TEST_ASSERT_EQUAL_INT(0, step());
+    }
+    TEST_ASSERT_EQUAL_INT32(123456789, state.correction);
+}
+
+/* Below T_min the relative error is that of T_min: no division by a vanishing command. */
+void test_small_commands_learn_slower_instead_of_louder(void)
+{
+    f.torque_loop.kp = 0;
+    in.command = 65; /* a tenth of T_min = 655 */
+    in.estimate = 0;
+    state.model = 65 * 65536;
+    (void)step();
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 65.0 / 655.0, from_q31(state.correction));
+}
+
+void test_one_lsb_of_alternating_error_does_not_walk_in_a_million_steps(void)
+{
+    in.command = 10000;
+    state.model = 10000 * 65536;
+    for (int n = 0; n < 1000000; n++) {
+        in.estimate = (q15_t)(10000 + ((n & 1) ? 1 : -1));
+        (void)step();
+    }
+    /* 1/10000 in q15 rounds to 3 either way */
+    TEST_ASSERT_INT_WITHIN((unsigned)(2 * 3 * f.torque_loop.ki), 0, state.correction);
+}
+
+void test_random_commands_and_estimates_follow_the_twin(void)
+{
+    twin_torque_state_t twin = {0};
+    worst_t request = {0};
+    worst_t correction = {0};
+    uint64_t seed = 101;
+    for (int n = 0; n < 50000; n++) {
+        if (n % 100 == 0) {
+            in.command = (q15_t)random_in(&seed, -18000, 18000);
+            in.enabled = random_in(&seed, 0, 5) != 0;
+            in.limited = random_in(&seed, 0, 3) == 0;
+            in.command = (random_in(&seed, 0, 9) == 0) ? 0 : in.command;
+        }
+        in.estimate = (q15_t)(0.93 * in.command + random_in(&seed, -200, 200));
+        const twin_torque_in_t t = {from_q15(in.command) * f.t, from_q15(in.estimate) * f.t, in.enabled, in.limited};
+        const q15_t r = step();
+        const double expected = twin_torque_loop(&f.si, &twin, &t);
+        worst_note(&request, r - expected / f.t * 32768.0, "step %d, command %d", n, in.command);
+        worst_note(&correction, from_q31(state.correction) - twin.correction, "step %d, command %d", n, in.command);
+    }
+    /* T_m and the division round to q15: 1 LSB of 655 in e/T_min at worst, 1.5e-3 times ki, averaged over 1/ki. */
+    ASSERT_WORST(correction, 1.5e-3);
+    ASSERT_WORST(request, 30.0); /* 1.5e-3 of 18000 */
+}
+
+void test_no_corner_wraps_or_leaves_the_authority(void)
+{
+    static const int16_t corner[5] = {INT16_MIN, -1, 0, 1, INT16_MAX};
+    for (int n = 0; n < 5 * 5 * 4 * 3; n++) {
+        in = (torque_loop_in_t){corner[n % 5], corner[n / 5 % 5], (n / 25) & 1, (n / 50) & 1};
+        state.correction = (n / 100 == 0) ? INT32_MIN : (n / 100 == 1) ? 0 : INT32_MAX;
+        state.model = (n & 1) ? INT32_MIN : INT32_MAX;
+        const int r = step();
+        const int room = (int)(0.4 * fabs((double)in.command)) + 2;
+        TEST_ASSERT_INT_WITHIN((unsigned)room, in.command, r);
+    }
+}

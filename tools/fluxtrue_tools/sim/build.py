@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the simulation library of a motor is, and how it gets there."""
+
+import contextlib
+import fcntl
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from fluxtrue_tools.errors import FluxtrueError
+
+ROOT = Path(__file__).resolve().parents[3]
+SHIPPED = ROOT / "firmware" / "motors"
+LIBRARY = "libfluxtrue_sim.so"
+SIL_LIBRARY = "libfluxtrue_sil.so"
+_STEP = re.compile(r"^\[(\d+)/(\d+)\]")
+
+
+@dataclass(frozen=True)
+class MotorFolder:
+    """The libraries and data built for one machine."""
+
+    name: str
+    folder: Path
+
+    @property
+    def library(self) -> Path:
+        """Plant, firmware and twin: libfluxtrue_sim.so."""
+        return self.folder / LIBRARY
+
+    @property
+    def sil(self) -> Path:
+        """The firmware alone: libfluxtrue_sil.so."""
+        return self.folder / SIL_LIBRARY
+
+    @property
+    def data(self) -> Path:
+        """What the motor tool found out: motor.json."""
+        return self.folder / "motor.json"
+
+
+def shipped_names() -> list[str]:
+    """The motors that come with the project."""
+    return sorted(path.parent.name for path in SHIPPED.glob("*/motor.toml"))
+
+
+def locate(motor: str, base: Path) -> tuple[str, Path]:
+    """Name and folder of a shipped motor, or of a folder with a motor.toml, relative to `base`."""
+    if motor in shipped_names():
+        return motor, SHIPPED / motor
+    folder = (base / Path(motor).expanduser()).resolve()
+    if not (folder / "motor.toml").is_file():
+        shipped = ", ".join(shipped_names())
+        raise FluxtrueError(f"motor '{motor}': neither a folder with a motor.toml nor one of {shipped}")
+    return folder.name, folder
+
+
+@contextlib.contextmanager
+def _build_lock() -> Iterator[None]:
+    """The lock that the scripts in tools/ use, too: one build at a time."""
+    build = ROOT / "build"
+    if os.environ.get("FLUXTRUE_LOCK") == str(build):
+        yield
+        return
+    build.mkdir(exist_ok=True)
+    with (build / ".lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _run(command: list[str], log: Path, label: str) -> None:
+    """Run a build command with its output in a log and a counter on a terminal."""
+    show = sys.stderr.isatty()
+    shown = False
+    with (
+        log.open("a") as file,
+        subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        ) as process,
+    ):
+        assert process.stdout is not None
+        for line in process.stdout:
+            file.write(line)
+            if show and (step := _STEP.match(line)):
+                print(f"\r{label}: {step[1]} of {step[2]} ", end="", file=sys.stderr, flush=True)
+                shown = True
+    if shown:
+        print("\r\033[K", end="", file=sys.stderr, flush=True)
+    if process.returncode != 0:
+        raise FluxtrueError(f"{label}: '{' '.join(command)}' failed, see {log}")
+
+
+def _configure(build_dir: Path, folder: Path | None, log: Path) -> None:
+    if (build_dir / "build.ninja").is_file():
+        return
+    command = ["cmake", "--preset", "host", "-B", str(build_dir)]
+    if folder is not None:
+        command += [f"-DFLUXTRUE_MOTOR={folder}", "-DFLUXTRUE_TESTS=OFF"]
+    _run(command, log, f"configuring {build_dir.name}")
+
+
+def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
+    target = "selected" if folder is not None else name
+    build_dir.mkdir(parents=True, exist_ok=True)
+    log = build_dir / "simulation.log"
+    with _build_lock():
+        log.unlink(missing_ok=True)
+        _configure(build_dir, folder, log)
+        targets = [f"fluxtrue_sim_{target}", f"fluxtrue_sil_{target}"]
+        command = ["cmake", "--build", str(build_dir), "-j2", "--target", *targets]
+        _run(command, log, f"building the simulation of motor {name}")
+    return MotorFolder(name, build_dir / "motors" / target)
+
+
+def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None) -> MotorFolder:
+    """The built motor. A given build folder is used as it is; else build/ is brought up to date."""
+    name, folder = locate(motor, base or Path.cwd())
+    is_shipped = folder == SHIPPED / name
+    if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
+        build_dir = Path(os.environ["FLUXTRUE_BUILD_DIR"])
+    if build_dir is not None and (is_shipped or _selected(build_dir) == folder):
+        target = name if is_shipped else "selected"
+        built = MotorFolder(name, build_dir / "motors" / target)
+        if not built.library.is_file():
+            raise FluxtrueError(
+                f"{built.library} is missing: cmake --build {build_dir} --target fluxtrue_sim_{target}"
+            )
+        return built
+    if is_shipped:
+        return _make(name, ROOT / "build" / "host", None)
+    tag = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
+    return _make(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
+
+
+def _selected(build_dir: Path) -> Path | None:
+    """The motor folder a build folder was configured for."""
+    cache = build_dir / "CMakeCache.txt"
+    if not cache.is_file():
+        return None
+    found = re.search(r"^FLUXTRUE_MOTOR:\w+=(.*)$", cache.read_text(), re.MULTILINE)
+    return Path(found[1]).resolve() if found else None
