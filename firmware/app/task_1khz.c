@@ -29,7 +29,7 @@ static q15_t torque_path(drive_t *drive, const sample_t *sample)
     const torque_loop_in_t loop = {
         .command = task->torque_command,
         .estimate = drive->slow.torque.mean,
-        .enabled = drive->request.torque_loop,
+        .enabled = drive->request.torque_loop && !drive->request.current_mode,
         .limited = task->reference.limited || sample->voltage_limited,
     };
     return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);

@@ -45,11 +45,12 @@ static axis_t axis(const current_control_config_t *config, q15_t target, q15_t w
     };
 }
 
-/* s += sigma a_i e; held while the limiter cuts this axis and e pushes further out (CC-10). Q15 * Q15 = Q30, twice. */
+/* s += sigma a_i e + a T_s (u_limited - u): what the circle cut away is no error to be integrated (CC-10).
+ * Two products of Q15 * Q15 = Q30, both gains below 1/2, counted twice for Q31. */
 static q31_t integrate(const current_control_config_t *config, const axis_t *a, q31_t s, int32_t limited_u)
 {
-    const bool outward = (a->u > limited_u && a->error > 0) || (a->u < limited_u && a->error < 0);
-    const int32_t step_q30 = outward ? 0 : fx_mul_q30(config->integral_gain, a->error);
+    const q15_t cut = fx_sat_q15(limited_u - a->u);
+    const int32_t step_q30 = fx_mac_q30(fx_mul_q30(config->integral_gain, a->error), config->tracking_gain, cut);
     return fx_add_q31(s, fx_add_q31(step_q30, step_q30));
 }
 

@@ -7,7 +7,8 @@
  *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i*  (set-point weight b, resistive drop fed forward)
  * The error is taken in flux linkage: sigma (psi* - psi) is sigma l (i* - i) with l the incremental inductance between the
  * two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
- *   sigma = 1/(2 T_d), T_d = 1.5 T_s;  an axis's integrator holds while the voltage circle cuts it and its error pushes out.
+ *   sigma = 1/(2 T_d), T_d = 1.5 T_s.  While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if
+ * the reference had been one that the voltage can follow, and no slow tail remains.
  *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2).
  * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
  * Units    per unit
@@ -24,7 +25,8 @@ typedef struct {
     q16_t sigma_gain;
     q16_t drop_gain;       /* r/sigma_gain: flux that asks for the resistive drop */
     q15_t setpoint_weight; /* b = w_c/(w_c + a) */
-    q15_t integral_gain;   /* sigma_gain a_i */
+    q15_t integral_gain;   /* sigma_gain a_i < 1/2 */
+    q15_t tracking_gain;   /* a T_s = a_i/b < 1/2 */
     q15_t v_ratio;         /* usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
 } current_control_config_t;
 

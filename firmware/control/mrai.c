@@ -22,7 +22,7 @@ typedef struct {
 bool mrai_valid(const mrai_config_t *config)
 {
     const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->pole_gain <= Q31(0.25) && config->flux_gain >= 0 &&
-                       config->resistance_gain >= 0 && config->flux_proportional >= 0 &&
+                       config->resistance_gain >= 0 && config->resistance_gain <= Q31(1.0 / 32.0) && config->flux_proportional >= 0 &&
                        config->flux_proportional <= PROPORTIONAL_MAX && config->resistance_proportional >= 0 &&
                        config->resistance_proportional <= PROPORTIONAL_MAX;
     const bool limits = config->psi_delta_min < config->psi_delta_max && config->r_delta_min < config->r_delta_max &&

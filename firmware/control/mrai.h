@@ -26,7 +26,7 @@ typedef struct {
     q31_t pole_gain;       /* m R_0/2 <= 0.25: s2 = pole_gain (g_d + g_q) */
     uint8_t l_shift;       /* of the flux tables */
     q31_t flux_gain;       /* 2 k_psi/omega_b */
-    q31_t resistance_gain; /* 2 k_r T_s */
+    q31_t resistance_gain; /* 2 k_r T_s <= 1/32 */
     q16_t flux_proportional;       /* k_P/k_I of the flux law, in periods, < 128 */
     q16_t resistance_proportional; /* k_P/k_I of the resistance law, in periods, < 128 */
     q31_t psi_delta_min, psi_delta_max;

@@ -5,19 +5,22 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 
+/* Of the drift that means quality 0, which is that of an error of 5 %: the flux is within 1 %. */
+#define PSI_SETTLED Q15(0.2)
+
 /* 2 k_psi 2^l_shift/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's edge. */
 static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 {
     return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U + config->l_shift);
 }
 
-/* 2 k_r T_s/((i_d g_d)^2 + (i_q g_q)^2) in Q26 (MR-10): (Q31 2^6)/(Q30 2^-9) = Q16, shifted up with saturation. */
+/* 2 k_r T_s/((i_d g_d)^2 + (i_q g_q)^2) in Q26 (MR-10): (Q31 2^5)/(Q30 2^-9) = Q15, shifted up with saturation. */
 static int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
 {
     const q15_t d = fx_mul_q15(sample->i.d, sample->flux.g_d);
     const q15_t q = fx_mul_q15(sample->i.q, sample->flux.g_q);
     const int32_t norm = fx_shr_round(fx_mac_q30(fx_mul_q30(d, d), q, q), 9);
-    return fx_shl_q31(fx_div_s32(fx_shl_q31(config->resistance_gain, 6), fx_max_s32(norm, 1)), 10);
+    return fx_shl_q31(fx_div_s32(fx_shl_q31(config->resistance_gain, 5), fx_max_s32(norm, 1)), 11);
 }
 
 /* 1/sinc(w T_s/2) - 1 to second order (MR-5): the sampled flux is u/(w sinc), not u/w. */
@@ -26,11 +29,16 @@ static q15_t voltage_gain(const mrai_config_t *config, q31_t omega)
     return fx_q15_from_q31(fx_mul_q31(config->sinc_gain, fx_mul_q31(omega, omega)));
 }
 
-/* First-order filter towards 1 - |drift|/full, or towards 0 where nothing can be known (MR-18). */
-static q15_t quality_step(q15_t quality, q15_t rate, bool known, q31_t drift, q31_t full)
+/* |drift|/full: what the adaptation still has to do, 1 and more is 1 (MR-18). */
+static q15_t missing(q31_t drift, q31_t full)
 {
-    const q15_t missing = fx_q15_from_q31(fx_div_q31(fx_abs_q31(drift), full));
-    const int32_t target = known ? Q15_MAX - missing : 0;
+    return fx_q15_from_q31(fx_div_q31(fx_abs_q31(drift), full));
+}
+
+/* First-order filter towards 1 - missing, or towards 0 where nothing can be known (MR-18). */
+static q15_t quality_step(q15_t quality, q15_t rate, bool known, q15_t missing_now)
+{
+    const int32_t target = known ? Q15_MAX - missing_now : 0;
     return fx_add_q15(quality, fx_mul_q15(rate, fx_sat_q15(target - quality)));
 }
 
@@ -39,14 +47,18 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
     const q15_t omega = fx_q15_from_q31(in->sample->omega);
     const q15_t speed = fx_abs_q15(omega);
     const q15_t current = fx_magnitude(in->sample->i.d, in->sample->i.q);
-    const bool flux_open = in->enabled && speed >= config->omega_min && current >= config->i_min;
-    const bool resistance_open = flux_open && speed <= config->omega_r_max;
     const mrai_state_t *now = in->identifier;
+    const bool flux_open = in->enabled && speed >= config->omega_min && current >= config->i_min;
+    /* Seen through a wrong flux, the resistance law walks off to its limit: it waits until the flux has settled. */
+    const q15_t psi_missing = missing(fx_sub_q31(now->psi_delta, quality->psi_last), config->psi_drift_full);
+    const q15_t r_missing = missing(fx_sub_q31(now->r_delta, quality->r_last), config->r_drift_full);
+    const bool settled = psi_missing <= PSI_SETTLED;
+    const bool resistance_open = flux_open && settled && speed <= config->omega_r_max;
 
     quality->psi_quality = quality_step(quality->psi_quality, config->quality_rate, flux_open && !now->psi_clamped,
-                                        fx_sub_q31(now->psi_delta, quality->psi_last), config->psi_drift_full);
+                                        psi_missing);
     quality->r_quality = quality_step(quality->r_quality, config->quality_rate, resistance_open && !now->r_clamped,
-                                      fx_sub_q31(now->r_delta, quality->r_last), config->r_drift_full);
+                                      r_missing);
     quality->psi_last = now->psi_delta;
     quality->r_last = now->r_delta;
 

@@ -3,7 +3,7 @@
 #define CONTROL_MRAI_SCHEDULE_H
 /** Gates, speed and current normalisation and quality of the identification: the slow half of control/mrai.h.
  *   flux gate        |w| >= w_min and |i| >= i_min: without current the dead time swallows any voltage and proves nothing
- *   resistance gate  the same, and |w| <= w_r_max
+ *   resistance gate  the same, |w| <= w_r_max, and the flux has settled: its drift is that of an error below 1 %
  *   quality          first-order filter towards 1 - |drift|/drift_full while the gate is open, towards 0 while closed or
  *                    clamped; drift = change of the identified parameter per step: what the adaptation still has to do
  * Source   docs/theory/mrai.md (MR-12) ... (MR-18)

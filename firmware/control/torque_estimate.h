@@ -12,6 +12,7 @@
 #include "control/flux_table_types.h"
 #include "types/frames.h"
 
+/** Periods of one mean, and of one step of the slow task. */
 #define TORQUE_ESTIMATE_PERIODS 10
 
 typedef struct {

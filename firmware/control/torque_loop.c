@@ -10,12 +10,13 @@ static q31_t product_q31(q15_t a, q15_t b)
     return fx_shl_q31(fx_mul_q30(a, b), 1);
 }
 
-/* T_m follows T* as the closed current loop will: only what is left is the tables' error (TL-4). */
+/* T_m follows T* as the closed current loop will: only what is left is the tables' error (TL-4). The estimate is the mean of
+ * the millisecond that has passed, so it meets the model of before this step. */
 static q15_t model_error(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)
 {
     const q15_t model = fx_q15_from_q31(state->model);
     state->model = fx_add_q31(state->model, product_q31(config->model_rate, fx_sub_q15(in->command, model)));
-    return fx_sub_q15(fx_q15_from_q31(state->model), in->estimate);
+    return fx_sub_q15(model, in->estimate);
 }
 
 /* e/max(|T*|, T_min) with the sign of T*: positive asks for more torque in the commanded direction (TL-5). */

@@ -7,7 +7,6 @@
 #include "hal/host/instance.h"
 #include "hal/host/port.h"
 
-#define PERIODS_PER_TASK 10U
 #define TURN_RAD 6.283185307179586
 #define DUTY_ONE 32768.0
 
@@ -75,7 +74,7 @@ static void run_period(fluxtrue_t *d)
         mrai_isr(&d->drive);
     }
     d->periods++;
-    if (d->periods % PERIODS_PER_TASK == 0) {
+    if (d->periods % TORQUE_ESTIMATE_PERIODS == 0) {
         task_1khz(&d->drive);
     }
     host_port_select(NULL);

@@ -159,7 +159,7 @@ static const parameter_t parameters[] = {
     {"torque_slew_Nm_per_s", calibration_get_torque_slew, calibration_set_torque_slew, 0.0, 1e6},
     {"observer_m", calibration_get_observer_m, calibration_set_observer_m, 2.0, 4.0},
     {"flux_bandwidth_rad_s", calibration_get_flux_bandwidth, calibration_set_flux_bandwidth, 0.0, 500.0},
-    {"resistance_bandwidth_rad_s", calibration_get_resistance_bandwidth, calibration_set_resistance_bandwidth, 0.0, 75.0},
+    {"resistance_bandwidth_rad_s", calibration_get_resistance_bandwidth, calibration_set_resistance_bandwidth, 0.0, 150.0},
     {"torque_loop_bandwidth_rad_s", calibration_get_torque_loop, calibration_set_torque_loop, 0.0, 500.0},
     {"dead_time_compensation", calibration_get_dead_time, calibration_set_dead_time, 0.0, 1.0},
     {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},

@@ -78,7 +78,7 @@ static void torque_path(twin_t *twin)
     const twin_torque_in_t torque = {
         .command = twin->slewed,
         .estimate = twin->torque_mean.mean,
-        .enabled = twin->torque_loop,
+        .enabled = twin->torque_loop && !twin->current_mode,
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
     const twin_reference_in_t request = {

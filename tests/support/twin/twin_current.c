@@ -3,15 +3,14 @@
 
 #include "twin/twin_stages.h"
 
-/* One axis: the limited voltage; the integrator stands still while the limit cuts and e pushes out. */
-static double axis(double u, double u_max, double e, double gain, double *s, bool *limited)
+/* One axis: the limited voltage; the integrator follows a reference that the voltage can realise. */
+static double axis(const motor_si_t *motor, double u, double u_max, double e, double *s,
+                   bool *limited)
 {
     const double limited_u = twin_clamp(u, -u_max, u_max);
-    const bool cut = fabs(u) > u_max;
-    if (!cut || (e * u < 0.0)) {
-        *s += gain * e;
-    }
-    *limited = *limited || cut;
+    const double realisable = e + (limited_u - u) / (motor->sigma_rad_s * motor->setpoint_weight);
+    *s += motor->sigma_rad_s * motor->integral_ratio * realisable;
+    *limited = *limited || (fabs(u) > u_max);
     return limited_u;
 }
 
@@ -37,11 +36,10 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q +
                       in->omega * (f->psi_d + in->psi_delta);
     const double u_max = motor->v_ratio * in->v_dc;
-    const double gain = sigma * motor->integral_ratio;
     twin_dq_t u;
     state->limited = false;
-    u.d = axis(ud, 31.0 / 32.0 * u_max, to->psi.d - f->psi_d, gain, &state->s.d, &state->limited);
-    u.q = axis(uq, sqrt(u_max * u_max - u.d * u.d), to->psi.q - f->psi_q, gain, &state->s.q,
+    u.d = axis(motor, ud, 31.0 / 32.0 * u_max, to->psi.d - f->psi_d, &state->s.d, &state->limited);
+    u.q = axis(motor, uq, sqrt(u_max * u_max - u.d * u.d), to->psi.q - f->psi_q, &state->s.q,
                &state->limited);
     return u;
 }

@@ -77,11 +77,17 @@ static double quality(double now, double rate, bool known, double drift, double 
     return now + rate * (target - now);
 }
 
+static double psi_full_drift(const motor_si_t *motor)
+{
+    return 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * TWIN_TASK_PERIODS *
+           motor->period_s;
+}
+
 static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
                   bool flux_open, bool r_open)
 {
     const double task_s = TWIN_TASK_PERIODS * motor->period_s;
-    const double psi_full = 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * task_s;
+    const double psi_full = psi_full_drift(motor);
     const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * task_s;
     q->psi_quality = quality(q->psi_quality, motor->quality_rate, flux_open && !now->psi_clamped,
                              now->psi_delta - q->psi_last, psi_full);
@@ -99,7 +105,10 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
     const double magnitude = hypot(sample->i.d, sample->i.q);
     const bool flux_open =
         enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
-    const bool r_open = flux_open && (fabs(w) <= motor->omega_r_max_rad_s);
+    const double psi_drift = identifier->psi_delta - quality_state->psi_last;
+    const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
+    const bool r_open = flux_open && settled &&
+                        (fabs(w) <= motor->omega_r_max_rad_s);
     const double a = sample->i.d * sample->flux.g_d;
     const double b = sample->i.q * sample->flux.g_q;
     judge(motor, quality_state, identifier, flux_open, r_open);

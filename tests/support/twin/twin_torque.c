@@ -25,8 +25,9 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
 {
     const double room = motor->torque_authority * fabs(in->command);
     const double direction = (in->command > 0.0) - (in->command < 0.0);
-    state->model += motor->torque_model_rate * (in->command - state->model);
+    /* The estimate is the mean of the time that has passed: it meets the model of before this step. */
     const double e = state->model - in->estimate;
+    state->model += motor->torque_model_rate * (in->command - state->model);
     double p = 0.0;
     if (!in->enabled) {
         state->correction -= motor->torque_ki * state->correction;

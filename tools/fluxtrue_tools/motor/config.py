@@ -198,6 +198,12 @@ def _check_inverter(path: Path, config: MotorConfig) -> None:
                     f"{0.05 * inverter.vdc_V:g} (5 % of vdc_V)")
 
 
+def _check_bandwidth(path: Path, config: MotorConfig) -> None:
+    bandwidth, limit = config.control.resistance_bandwidth_rad_s, config.inverter.pwm_hz / 64
+    if bandwidth > limit:
+        _fail(path, f"control.resistance_bandwidth_rad_s = {bandwidth:g}, allowed: up to {limit:g} (pwm_hz / 64)")
+
+
 def _check_drop(path: Path, config: MotorConfig) -> None:
     machine = config.machine
     drop, limit = machine.r_ohm * machine.i_max_A, 0.3 * config.inverter.vdc_V
@@ -234,4 +240,5 @@ def load_config(folder: Path) -> MotorConfig:
     _check_currents(path, config)
     _check_inverter(path, config)
     _check_drop(path, config)
+    _check_bandwidth(path, config)
     return config

@@ -8,10 +8,10 @@ from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
 
-TASK_S = 1e-3
+TASK_PERIODS = 10  # the slow task runs every tenth PWM period: 1 kHz at 10 kHz
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
-CLOSED_LOOP_SHARE = 0.9
+CLOSED_LOOP_SHARE = 0.8
 V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
 
@@ -31,7 +31,7 @@ PROPORTIONAL_MAX_PERIODS = 127.0
 PSI_DRIFT_SHARE, R_DRIFT_SHARE = 0.05, 0.2
 QUALITY_TIME_S = 0.05
 
-TORQUE_MODEL_RATE = 0.4
+TORQUE_MODEL_RATE = 0.6
 TORQUE_MIN_SHARE = 0.1
 
 V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
@@ -104,6 +104,7 @@ def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_
     # The zero of each law lies on the observer's poles, so that the proportional part damps them.
     periods = min(2.0 / (s * period_s), PROPORTIONAL_MAX_PERIODS)
     v_dead = 4.0 / math.pi * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz
+    task_s = TASK_PERIODS * period_s
     looks_like = DEAD_TIME_RESIDUAL * v_dead / (DEAD_TIME_CURRENT * machine.i_max_A)
     return {
         "observer_s_rad_s": s, "flux_proportional": periods, "resistance_proportional": periods,
@@ -114,18 +115,18 @@ def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_
         "omega_r_max_rad_s": OMEGA_R_MAX_SHARE * config.omega_max_rad_s,
         "i_min_A": I_MIN_SHARE * machine.i_max_A,
         "innovation_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs,
-        "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * TASK_S,
-        "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * TASK_S,
-        "quality_rate": 1.0 - math.exp(-TASK_S / QUALITY_TIME_S),
+        "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * task_s,
+        "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * task_s,
+        "quality_rate": 1.0 - math.exp(-task_s / QUALITY_TIME_S),
     }
 
 
 def _torque_loop(config: MotorConfig) -> dict[str, float]:
-    control = config.control
-    return {"torque_ki": control.torque_loop_bandwidth_rad_s * TASK_S, "torque_kp": 0.0,
+    control, task_s = config.control, TASK_PERIODS / config.inverter.pwm_hz
+    return {"torque_ki": control.torque_loop_bandwidth_rad_s * task_s, "torque_kp": 0.0,
             "torque_model_rate": TORQUE_MODEL_RATE,
             "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
-            "torque_slew_Nm": control.torque_slew_Nm_per_s * TASK_S}
+            "torque_slew_Nm": control.torque_slew_Nm_per_s * task_s}
 
 
 def _monitors(config: MotorConfig) -> dict[str, float]:

@@ -108,6 +108,7 @@ def _current_control(motor: Motor) -> list[Row]:
             ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
             ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
             ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
+            ("tracking_gain", q15(d.integral_ratio / d.setpoint_weight, "tracking_gain"), "integral ratio over weight"),
             ("v_ratio", q15(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}")]
 
 
