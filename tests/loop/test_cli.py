@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.sim.run import simulate
 from fluxtrue_tools.sim.scenario import read

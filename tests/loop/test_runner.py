@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.library import Loop, LoopError
 from fluxtrue_tools.sim.motor import Motor

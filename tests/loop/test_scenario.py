@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.motor import Motor

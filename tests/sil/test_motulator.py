@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fluxtrue_tools.demo.grid import allowed_percent
 from motulator.drive import model
 from motulator.drive.utils import SynchronousMachinePars
 from sil import OK, Drive, load
-
-from fluxtrue_tools.demo.grid import allowed_percent
 
 PERIOD_S = 1e-4
 RAMP_S = 0.1

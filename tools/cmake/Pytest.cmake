@@ -9,7 +9,10 @@ if(FLUXTRUE_SANITIZE)
     # and what the interpreter leaks at exit is not our concern.
     execute_process(COMMAND "${CMAKE_C_COMPILER}" -print-file-name=libasan.so
         OUTPUT_VARIABLE libasan OUTPUT_STRIP_TRAILING_WHITESPACE)
-    set(FLUXTRUE_PRELOAD "LD_PRELOAD=${libasan}" ASAN_OPTIONS=detect_leaks=0)
+    # Without the C++ library beside it the sanitizer dies of the first exception that SciPy throws.
+    execute_process(COMMAND "${CMAKE_C_COMPILER}" -print-file-name=libstdc++.so.6
+        OUTPUT_VARIABLE libstdcxx OUTPUT_STRIP_TRAILING_WHITESPACE)
+    set(FLUXTRUE_PRELOAD "LD_PRELOAD=${libasan}:${libstdcxx}" ASAN_OPTIONS=detect_leaks=0)
 endif()
 
 function(_fluxtrue_python_test name labels timeout)

@@ -112,3 +112,9 @@ def test_the_command_line_says_it_in_one_line_and_writes_nothing(cli, write, tmp
     assert result.stderr.count("\n") == 1 and result.stderr.startswith("error: ")
     assert str(Path(bad, "motor.toml")) in result.stderr
     assert not out.exists()
+
+
+def test_the_example_in_the_guide_is_a_valid_motor(folder):
+    guide = (Path(__file__).resolve().parents[3] / "docs/howto/bring-your-motor.md").read_text(encoding="utf-8")
+    (folder / "motor.toml").write_text(guide.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    assert load_config(folder).machine.name == "my motor"

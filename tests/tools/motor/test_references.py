@@ -152,3 +152,17 @@ def test_a_machine_that_cannot_weaken_enough_is_told(write):
 
     text = report_text(load_motor(write(machine={"ld_H": 0.15e-3, "lq_H": 0.2e-3, "torque_max_Nm": 100.0})))
     assert "cannot go below" in text
+
+
+def test_flux_that_no_current_can_reach_does_not_count_as_an_error_of_the_table(write):
+    """Smallest |psi| within 250 A is 46.5 mVs: below it the table can only do its best."""
+    motor = load_motor(write(machine={"ld_H": 0.15e-3, "lq_H": 0.2e-3, "torque_max_Nm": 100.0}))
+    assert motor.references.psi_Vs[0] < 0.0465 < motor.references.psi_Vs[-1]
+    assert motor.references.torque_max_Nm[0] == 0.0
+    assert motor.reference_errors.flux_excess < 0.02
+
+
+def test_the_tightest_allowed_full_scale_still_holds_the_reference_tables(write):
+    motor = load_motor(write(inverter={"current_full_scale_A": 1.35 * 250.0, "pwm_hz": 16000.0}))
+    assert motor.reference_errors.current_excess <= 0.005
+    assert motor.references.stored["i_d"].min() >= -32768

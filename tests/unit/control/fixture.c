@@ -160,6 +160,7 @@ static void voltage(fixture_t *f)
         .drop_gain = q16_of(674.0 / 65536.0 / sigma),
         .setpoint_weight = q15_of(0.7),
         .integral_gain = q15_of(0.05 * sigma),
+        .tracking_gain = q15_of(0.05 / 0.7),
         .v_ratio = q15_of(0.57),
     };
     f->si.sigma_rad_s = f->current_control.sigma_gain / 65536.0 * f->w;

@@ -86,13 +86,13 @@ void test_the_loop_is_equally_fast_at_every_torque(void)
 
 void test_a_step_of_a_perfect_machine_excites_no_integrator(void)
 {
-    /* T^ follows as the model does: first order with model_rate. */
+    /* T^ follows as the model does, first order with model_rate, and tells of the time that has passed. */
     double torque = 0.0;
     in.command = 12000;
     for (int n = 0; n < 200; n++) {
-        torque += from_q15(f.torque_loop.model_rate) * (12000.0 - torque);
         in.estimate = (q15_t)lround(torque);
         TEST_ASSERT_INT_WITHIN(1, 12000, step());
+        torque += from_q15(f.torque_loop.model_rate) * (12000.0 - torque);
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, from_q31(state.correction));
 }
@@ -152,7 +152,7 @@ void test_the_lower_bound_of_the_authority_holds_as_well(void)
 void test_the_correction_is_held_while_limited_and_asked_for_more(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        state = (torque_loop_state_t){.correction = 100000000, .model = sign * 10000 * 65536};
+        state = (torque_loop_state_t){.correction = 100000000, .model = (sign > 0) ? 655360000 : -655360000};
         in.command = (q15_t)(sign * 10000);
         in.limited = true;
         in.estimate = (q15_t)(sign * 8000);

@@ -14,8 +14,7 @@ from fluxtrue_tools.demo.experiment import Result
 from fluxtrue_tools.demo.grid import TWIN_PERCENT, allowed_percent
 from fluxtrue_tools.demo.paper import SETTLED
 from fluxtrue_tools.demo.step import STEP_S
-from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH, finish, flux, torque
-from fluxtrue_tools.sim.plot import resistance
+from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH, finish, flux, resistance, torque
 from fluxtrue_tools.sim.run import Recording
 
 GAIN_COLOURS = {"slow": SECOND, "medium": ESTIMATE, "fast": "#6a994e"}

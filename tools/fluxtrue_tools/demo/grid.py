@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measured machine in four quadrants with everything wrong at once; firmware and twin."""
 
+import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-import os
 from typing import Any, Final
 
 from fluxtrue_tools.demo.experiment import Bench, Bound, Result, number, run

@@ -134,7 +134,13 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None)
     if is_shipped:
         return _make(name, ROOT / "build" / "host", None)
     tag = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
-    return _make(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
+    try:
+        return _make(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
+    except FluxtrueError:
+        from fluxtrue_tools.motor.motor import load_motor
+
+        load_motor(folder)  # bad motor data explain themselves better than a build log
+        raise
 
 
 def _selected(build_dir: Path) -> Path | None:

@@ -34,7 +34,8 @@ def sim(
 ) -> None:
     """Run a SCENARIO (TOML): the simulated drive with the firmware, or with its twin."""
     from fluxtrue_tools.sim import motor as motors
-    from fluxtrue_tools.sim import output, scenario as scenarios
+    from fluxtrue_tools.sim import output
+    from fluxtrue_tools.sim import scenario as scenarios
     from fluxtrue_tools.sim.run import simulate
 
     if plot is not None and plot.suffix.lower() not in PLOTS:

@@ -3,6 +3,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -14,7 +15,7 @@ from fluxtrue_tools.sim.output import atomic
 from fluxtrue_tools.sim.run import Recording
 
 COMMAND, TRUTH, ESTIMATE, SECOND = "#7f7f7f", "#1f4e79", "#d1495b", "#edae49"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.spines.right": False,
     "axes.spines.top": False,

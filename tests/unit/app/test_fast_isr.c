@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "seam.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    seam_start();
+}
+
+void tearDown(void)
+{
+}
+
+static const sample_t *published(void)
+{
+    return &drive.samples.slot[drive.samples.generation & 1U];
+}
+
+void test_a_period_samples_then_switches_then_pends_the_identification_once(void)
+{
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+p", seam.log);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+p", seam.log);
+}
+
+/* Off means off first: the gates open before anything else is written. */
+void test_while_off_the_gates_open_first_and_the_duties_rest_in_the_middle(void)
+{
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("ar-wp", seam.log);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.c);
+}
+
+void test_an_over_current_opens_the_gates_in_the_same_period_and_stays_latched(void)
+{
+    seam_run();
+    seam_periods(3);
+    TEST_ASSERT_TRUE(seam.gates);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("ar-wp", seam.log);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    seam_current(0.0, 0.0, 0.0);
+    seam_periods(100);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+}
+
+void test_a_fault_raised_elsewhere_opens_the_gates_with_the_next_period(void)
+{
+    seam_run();
+    seam_periods(3);
+    drive_raise_fault(&drive, FAULT_INPUT);
+    seam_period();
+    TEST_ASSERT_FALSE(seam.gates);
+}
+
+void test_an_unpowered_dc_link_is_a_fault_only_while_switching(void)
+{
+    seam_voltage(0.0);
+    seam_periods(50);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_UNDER_VOLTAGE, drive.fast.faults);
+    TEST_ASSERT_FALSE(seam.gates);
+}
+
+void test_an_over_voltage_while_off_is_a_fault_too(void)
+{
+    seam_voltage(500.0);
+    seam_periods(2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+}
+
+/* One jump is not a fault; the tracker needs some periods to agree with the new angle again. */
+void test_an_angle_that_jumps_three_times_in_a_row_is_a_fault(void)
+{
+    seam_periods(5);
+    seam.theta_m = 0x40000000u / 3U;
+    seam_period();
+    seam.theta_m = 0;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    for (int n = 0; n < 3; n++) {
+        seam.theta_m += 0x30000000u;
+        seam_period();
+    }
+    TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, drive.fast.faults);
+}
+
+/* The voltage of period k acts in period k + 1: what is published is the previous period's. */
+void test_the_published_voltage_is_the_one_that_acts_now(void)
+{
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_INT(0, published()->mrai.u.d);
+    drive.fast.modulated.acted = (dq_t){1234, -567};
+    seam_period();
+    TEST_ASSERT_EQUAL_INT(1234, published()->mrai.u.d);
+    TEST_ASSERT_EQUAL_INT(-567, published()->mrai.u.q);
+}
+
+/* The duties of period 1 act in 2; the first period whose voltage is known from end to end ends with sample 3. */
+void test_the_identification_gets_voltages_only_after_the_bridge_has_acted_for_a_whole_period(void)
+{
+    seam_run();
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_TRUE(published()->acting);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    TEST_ASSERT_EQUAL_INT(0, published()->mrai.u.d);
+}
+
+void test_the_samples_are_published_in_the_rotors_frame(void)
+{
+    seam.theta_m = 0x40000000u / 3U; /* 90 electrical degrees: the current of phase a is -i_q */
+    seam_current(100.0, -50.0, -50.0);
+    seam_periods(3);
+    const double lsb = 400.0 / 32768.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 0.0, published()->mrai.i.d * lsb);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, -100.0, published()->mrai.i.q * lsb);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 350.0, published()->v_dc * 540.0 / 32768.0);
+}
+
+/* An identification that does not finish: the sample is still published, the third in a row is a fault. */
+void test_three_unfinished_identifications_in_a_row_are_an_overrun(void)
+{
+    seam_run();
+    fast_isr(&drive);
+    mrai_isr(&drive);
+    for (int n = 0; n < 3; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+        seam.log[0] = '\0';
+        fast_isr(&drive);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    fast_isr(&drive);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVERRUN, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(3, drive.fast.overruns);
+    fast_isr(&drive);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(3, drive.fast.overruns_in_a_row);
+}
+
+void test_an_identification_that_is_late_now_and_then_is_counted_and_forgiven(void)
+{
+    seam_run();
+    for (int n = 0; n < 9; n++) {
+        seam.log[0] = '\0';
+        fast_isr(&drive);
+        if (n % 3 == 2) {
+            mrai_isr(&drive);
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(6, drive.fast.overruns);
+}
+
+void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
+{
+    seam_run();
+    seam_periods(3);
+    drive.fast.current_control.s_q = 500000000;
+    drive.request.enable = false;
+    task_1khz(&drive);
+    seam_period();
+    TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_q);
+    TEST_ASSERT_FALSE(seam.gates);
+    seam_run();
+    seam_period();
+    TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* only what the noise-free zero current asks for */
+}
+
+void test_a_voltage_at_its_limit_is_told_to_the_task(void)
+{
+    seam_run();
+    seam_periods(2);
+    TEST_ASSERT_FALSE(published()->voltage_limited);
+    drive.fast.current_control.s_q = 2000000000;
+    seam_period();
+    TEST_ASSERT_TRUE(published()->voltage_limited);
+}
+
+void test_two_drives_in_one_process_do_not_share_a_thing(void)
+{
+    static drive_t other;
+    drive_init(&other, &motor);
+    seam_run();
+    seam_periods(3);
+    seam.log[0] = '\0';
+    fast_isr(&other);
+    TEST_ASSERT_FALSE(seam.gates); /* the other one is off */
+    TEST_ASSERT_EQUAL_INT(1, other.fast.pended);
+    TEST_ASSERT_EQUAL_INT(3, drive.fast.pended);
+}

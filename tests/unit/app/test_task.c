@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "seam.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    seam_start();
+    seam_periods(3); /* a sample with 350 V is there */
+}
+
+void tearDown(void)
+{
+}
+
+static const command_t *command(void)
+{
+    return &drive.commands.slot[drive.commands.generation & 1U];
+}
+
+static const mrai_schedule_t *schedule(void)
+{
+    return &drive.schedules.slot[drive.schedules.generation & 1U];
+}
+
+void test_the_shipped_motor_is_valid_and_starts_off(void)
+{
+    TEST_ASSERT_TRUE(motor_valid(&motor));
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+void test_enable_runs_and_disable_stops(void)
+{
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, drive.task.run_state);
+    TEST_ASSERT_TRUE(command()->run);
+    drive.request.enable = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+void test_a_fault_is_reset_only_while_enable_is_off(void)
+{
+    seam_run();
+    drive_raise_fault(&drive, FAULT_OVER_CURRENT);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+    drive.request.fault_reset = true;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    TEST_ASSERT_FALSE(drive.request.fault_reset); /* taken, refused, not kept for later */
+    drive.request.enable = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    drive.request.fault_reset = true;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+}
+
+void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
+{
+    static motor_t bad;
+    bad = motor;
+    bad.monitor.i_trip = 26215; /* 0.8: would trip after the converter's end stop */
+    drive_init(&drive, &bad);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    drive.request.fault_reset = true;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+}
+
+#define BAD(statement) \
+    do { \
+        motor_t m = motor; \
+        statement; \
+        TEST_ASSERT_FALSE_MESSAGE(motor_valid(&m), #statement); \
+    } while (0)
+
+void test_every_part_of_the_motor_data_is_checked(void)
+{
+    BAD(m.flux_table.l_q = 0);
+    BAD(m.current_reference.i_d = 0);
+    BAD(m.torque_max = 0);
+    BAD(m.monitor.i_trip = 0);
+    BAD(m.monitor.v_min = m.monitor.v_max);
+    BAD(m.mrai.r0 = 0);
+    BAD(m.modulate.v_dc_min = 0);
+}
+
+void test_the_torque_request_is_limited_and_slewed(void)
+{
+    drive.motor.torque_slew = 100;
+    drive.request.torque = INT16_MAX;
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(100, drive.task.torque_command);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(200, drive.task.torque_command);
+    for (int n = 0; n < 500; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT(motor.torque_max, drive.task.torque_command);
+    drive.motor.torque_slew = Q15_MAX;
+    drive.request.torque = INT16_MIN;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_command);
+}
+
+void test_stopping_forgets_the_slew_and_the_correction(void)
+{
+    drive.request.torque = 5000;
+    seam_run();
+    drive.task.torque_loop.correction = 300000000;
+    drive.request.enable = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.torque_command);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.reference.i_ref.q);
+}
+
+void test_the_target_handed_down_is_the_flux_of_the_current_reference(void)
+{
+    drive.request.torque = 5000;
+    seam_run();
+    const dq_t i = drive.task.reference.i_ref;
+    TEST_ASSERT_GREATER_THAN_INT(0, i.q);
+    TEST_ASSERT_LESS_THAN_INT(0, i.d);
+    const flux_point_t at = flux_table_step(&motor.flux_table, i);
+    TEST_ASSERT_EQUAL_INT(at.psi_d, command()->target.psi.d);
+    TEST_ASSERT_EQUAL_INT(at.psi_q, command()->target.psi.q);
+}
+
+void test_in_current_mode_the_requested_currents_are_the_target(void)
+{
+    drive.request.torque = 5000;
+    drive.request.current_mode = true;
+    drive.request.i_ref = (dq_t){-1000, -2000};
+    seam_run();
+    const flux_point_t at = flux_table_step(&motor.flux_table, (dq_t){-1000, -2000});
+    TEST_ASSERT_EQUAL_INT(at.psi_d, command()->target.psi.d);
+    TEST_ASSERT_EQUAL_INT(at.psi_q, command()->target.psi.q);
+}
+
+/* The torque does not follow the request there: the torque loop must not take that for its own fault. */
+void test_in_current_mode_the_torque_loop_does_not_wind_up(void)
+{
+    drive.request.torque = 5000;
+    drive.request.current_mode = true;
+    seam_run();
+    for (int n = 0; n < 1000; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+}
+
+void test_the_torque_loop_can_be_switched_off(void)
+{
+    drive.request.torque = 5000;
+    drive.request.torque_loop = false;
+    seam_run();
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT(5000, drive.task.torque_request);
+    drive.request.torque_loop = true;
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(5000, drive.task.torque_request); /* the estimate is 0: more is wanted */
+}
+
+static void sample_at(double omega_pu, bool acting, bool limited)
+{
+    sample_t *s = sample_box_begin(&drive.samples);
+    *s = (sample_t){.mrai = {.i = {-3000, 5000}, .omega = (q31_t)(omega_pu * 2147483647.0)}, .v_dc = 21238,
+                    .acting = acting, .voltage_limited = limited};
+    s->mrai.flux = flux_table_step(&motor.flux_table, s->mrai.i);
+    sample_box_publish(&drive.samples);
+}
+
+void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)
+{
+    seam_run();
+    sample_at(0.3, false, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, schedule()->flux_step_q28);
+    sample_at(0.3, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_NOT_EQUAL(0, schedule()->flux_step_q28);
+    drive.request.identification = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, schedule()->flux_step_q28);
+}
+
+void test_the_voltage_limit_holds_the_torque_loop(void)
+{
+    drive.request.torque = 5000;
+    seam_run();
+    sample_at(0.3, true, true);
+    drive.task.torque_loop = (torque_loop_state_t){.model = 5000 * 65536};
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+    sample_at(0.3, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
+}
+
+/* --- the boxes ------------------------------------------------------------------------------- */
+
+void test_what_is_being_written_is_not_seen_before_it_is_published(void)
+{
+    sample_at(0.1, true, false);
+    sample_t *next = sample_box_begin(&drive.samples);
+    next->v_dc = 77;
+    TEST_ASSERT_EQUAL_INT(21238, sample_box_read(&drive.samples).v_dc);
+    sample_box_publish(&drive.samples);
+    TEST_ASSERT_EQUAL_INT(77, sample_box_read(&drive.samples).v_dc);
+}
+
+void test_the_boxes_survive_the_wrap_of_their_generation(void)
+{
+    drive.samples.generation = UINT32_MAX - 2U;
+    drive.commands.generation = UINT32_MAX - 2U;
+    drive.schedules.generation = UINT32_MAX - 2U;
+    for (int n = 0; n < 6; n++) {
+        sample_at(0.01 * n, true, false);
+        TEST_ASSERT_EQUAL_INT32((q31_t)(0.01 * n * 2147483647.0), sample_box_read(&drive.samples).mrai.omega);
+        command_box_write(&drive.commands, (command_t){.run = n & 1});
+        TEST_ASSERT_EQUAL(n & 1, command_box_read(&drive.commands).run);
+        schedule_box_write(&drive.schedules, (mrai_schedule_t){.flux_step_q28 = n});
+        TEST_ASSERT_EQUAL_INT(n, schedule_box_read(&drive.schedules)->flux_step_q28);
+    }
+}
