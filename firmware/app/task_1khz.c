@@ -63,11 +63,13 @@ void task_1khz(drive_t *drive)
     const sample_t sample = sample_box_read(&drive->samples);
     task->run_state = supervise(drive);
 
+    mrai_in_t next = sample.mrai;
+
     command_t command = {.run = task->run_state == RUN_STATE_RUN};
     if (command.run) {
-        const dq_t i_ref = references(drive, &sample);
-        const flux_point_t at_ref = flux_table_step(&drive->motor.flux_table, i_ref);
-        command.target = current_control_target(&drive->motor.current_control, i_ref, &at_ref);
+        next.i = references(drive, &sample);
+        next.flux = flux_table_step(&drive->motor.flux_table, next.i);
+        command.target = current_control_target(&drive->motor.current_control, next.i, &next.flux);
     } else {
         rest(task);
     }
@@ -75,6 +77,7 @@ void task_1khz(drive_t *drive)
 
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
+        .next = &next,
         .identifier = &drive->slow.mrai,
         .enabled = drive->request.identification && sample.acting,
     };

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current_control.h"
 
+#include "fx/div.h"
 #include "fx/q.h"
 #include "fx/sqrt.h"
+#include "fx/vec.h"
 
 /* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that binds the d axis,
  * and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
 #define D_RESERVE_SHIFT 5
+#define LONGEST 45874 /* 1.4 pu: its half, squared twice, keeps a length below 1 */
 
 typedef struct {
     q15_t error; /* psi* - psi */
@@ -54,6 +57,38 @@ static q31_t integrate(const current_control_config_t *config, const axis_t *a, 
     return fx_add_q31(s, fx_add_q31(step_q30, step_q30));
 }
 
+/* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length below 1. */
+static dq_t shortened(const axis_t *d, const axis_t *q, int32_t v_max)
+{
+    const int32_t u_d = fx_clamp_q31(d->u, -LONGEST, LONGEST);
+    const int32_t u_q = fx_clamp_q31(q->u, -LONGEST, LONGEST);
+    const int32_t half = fx_magnitude((q15_t)(u_d / 2), (q15_t)(u_q / 2));
+    const int32_t share = fx_div_s32(v_max * 16384, half); /* Q15 * Q14 / Q15 of half = Q15, <= 1 */
+    return (dq_t){(q15_t)((u_d * share + 0x4000) >> 15), (q15_t)((u_q * share + 0x4000) >> 15)};
+}
+
+/* Inside the circle as wanted. Beyond it the d axis comes first while it takes flux away (CC-11). While it asks for flux back, the
+ * q axis may be what holds that flux: a cut that served d first would leave both where they are, at any torque. */
+static dq_t limit(const axis_t *d, const axis_t *q, int32_t v_max)
+{
+    const bool more_flux = d->error > 0;
+    const int32_t d_max = more_flux ? v_max : v_max - (v_max >> D_RESERVE_SHIFT);
+    const int32_t u_d = fx_clamp_q31(d->u, -d_max, d_max);
+    int32_t u_q = fx_clamp_q31(q->u, -v_max, v_max);
+    const int32_t room = v_max * v_max - u_d * u_d; /* Q30 */
+    if (u_d == d->u && u_q * u_q <= room && u_q == q->u) {
+        return (dq_t){(q15_t)u_d, (q15_t)u_q};
+    }
+    if (more_flux) {
+        return shortened(d, q, v_max);
+    }
+    if (u_q * u_q > room) {
+        const int32_t q_max = fx_sqrt_q30((uint32_t)room);
+        u_q = fx_clamp_q31(u_q, -q_max, q_max);
+    }
+    return (dq_t){(q15_t)u_d, (q15_t)u_q};
+}
+
 dq_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
                           const current_control_in_t *in)
 {
@@ -63,18 +98,9 @@ dq_t current_control_step(const current_control_config_t *config, current_contro
     const axis_t d = axis(config, to->psi.d, to->weighted.d, flux->psi_d, state->s_d, -fx_mul_q30(in->omega, flux->psi_q));
     const axis_t q = axis(config, to->psi.q, to->weighted.q, flux->psi_q, state->s_q, fx_mul_q30(in->omega, psi_d));
 
-    const int32_t v_max = fx_mul_q15(config->v_ratio, in->v_dc);
-    const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
-    const int32_t u_d = fx_clamp_q31(d.u, -d_max, d_max);
-    int32_t u_q = fx_clamp_q31(q.u, -v_max, v_max);
-    const int32_t room = v_max * v_max - u_d * u_d; /* Q30 */
-    if (u_q * u_q > room) {
-        const int32_t q_max = fx_sqrt_q30((uint32_t)room);
-        u_q = fx_clamp_q31(u_q, -q_max, q_max);
-    }
-
-    state->limited = (u_d != d.u) || (u_q != q.u);
-    state->s_d = integrate(config, &d, state->s_d, u_d);
-    state->s_q = integrate(config, &q, state->s_q, u_q);
-    return (dq_t){(q15_t)u_d, (q15_t)u_q};
+    const dq_t u = limit(&d, &q, fx_mul_q15(config->v_ratio, in->v_dc));
+    state->limited = (u.d != d.u) || (u.q != q.u);
+    state->s_d = integrate(config, &d, state->s_d, u.d);
+    state->s_q = integrate(config, &q, state->s_q, u.q);
+    return u;
 }

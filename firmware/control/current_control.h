@@ -9,13 +9,14 @@
  * two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s.  While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if
  * the reference had been one that the voltage can follow, and no slow tail remains.
- *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2).
+ *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2); while d asks for more
+ * flux (psi_d* > psi_d) the vector is shortened instead, else u_q could never shed the flux that binds u_d.
  * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
  * Units    per unit
- * Range    sigma_gain = sigma/omega_b in Q15.16; b, a_i in q15; |omega| < 1
+ * Range    sigma_gain = sigma/omega_b in Q15.16; b, a_i in q15; |omega| < 1; v_ratio < 0.7
  * Rounding half up: 1/2 LSB q15 in u, 1/2 LSB q31 per step in s
  * Errors   saturates and says so in limited; no fault of its own
- * Context  step: fast ISR, one square root only while limited; target: 1 kHz task */
+ * Context  step: fast ISR, one square root and at most one division only while limited; target: 1 kHz task */
 #include <stdbool.h>
 
 #include "control/flux_table_types.h"

@@ -64,7 +64,8 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
 
     return (mrai_schedule_t){
         .flux_step_q28 = flux_open ? flux_step(config, omega) : 0,
-        .resistance_step_q26 = resistance_open ? resistance_step(config, in->sample) : 0,
+        .resistance_step_q26 =
+            resistance_open ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
         .voltage_gain = voltage_gain(config, in->sample->omega),
     };
 }

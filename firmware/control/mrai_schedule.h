@@ -19,6 +19,7 @@ typedef struct {
 
 typedef struct {
     const mrai_in_t *sample; /* latest operating point */
+    const mrai_in_t *next;   /* the one just commanded: i and flux count; the gain must suit both, as a step takes less than a task */
     const mrai_state_t *identifier;
     bool enabled; /* identification wanted and the bridge on */
 } mrai_schedule_in_t;

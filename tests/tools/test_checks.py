@@ -107,7 +107,7 @@ def test_a_planted_include_against_the_layers_is_found(
         ("docs/bad.md", "see ../shared/theory.md", "'../shared'"),
         ("docs/bad.md", "see /work/here", "'/work/'"),
         ("docs/bad.md", "as the previous session did", "session"),
-        ("firmware/fx/bad.c", "/* " + "x" * 120 + " */", "columns"),
+        ("firmware/fx/bad.c", "/* " + "x" * 160 + " */", "columns"),
         ("firmware/fx/bad.c", "\n" * 151, "at most 150"),
         ("firmware/signal/bad.c", "\n" * 121, "at most 120"),
         ("firmware/control/bad.c", "\n" * 201, "at most 200"),

@@ -92,19 +92,22 @@ static void torque_path(twin_t *twin)
 
 static void task(twin_t *twin)
 {
+    twin_mrai_in_t next = twin->sample;
     supervise(twin);
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command}
                                          : twin->reference.i_ref;
         twin->target = twin_current_target(&twin->motor, twin->i_ref);
+        next.i = twin->i_ref;
+        next.flux = twin_flux_table(&twin->motor, next.i);
     } else {
         twin->slewed = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
         twin->reference = (twin_reference_t){0};
         twin->i_ref = (twin_dq_t){0.0, 0.0};
     }
-    twin->schedule = twin_mrai_schedule(&twin->motor, &twin->quality, &twin->sample, &twin->mrai,
+    twin->schedule = twin_mrai_schedule(&twin->motor, &twin->quality, &twin->sample, &next, &twin->mrai,
                                         twin->identification && (twin->periods_on >= 3));
 }
 

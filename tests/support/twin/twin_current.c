@@ -3,15 +3,24 @@
 
 #include "twin/twin_stages.h"
 
-/* One axis: the limited voltage; the integrator follows a reference that the voltage can realise. */
-static double axis(const motor_si_t *motor, double u, double u_max, double e, double *s,
-                   bool *limited)
+/* The integrator of one axis follows a reference that the voltage can realise. */
+static double integral(const motor_si_t *motor, double e, double cut)
 {
-    const double limited_u = twin_clamp(u, -u_max, u_max);
-    const double realisable = e + (limited_u - u) / (motor->sigma_rad_s * motor->setpoint_weight);
-    *s += motor->sigma_rad_s * motor->integral_ratio * realisable;
-    *limited = *limited || (fabs(u) > u_max);
-    return limited_u;
+    const double realisable = e + cut / (motor->sigma_rad_s * motor->setpoint_weight);
+    return motor->sigma_rad_s * motor->integral_ratio * realisable;
+}
+
+/* The circle: d first while it takes flux away, the direction of the whole while it asks for flux back. */
+static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux)
+{
+    const double length = hypot(u.d, u.q);
+    if (more_flux) {
+        const double share = (length > u_max) ? u_max / length : 1.0;
+        return (twin_dq_t){share * u.d, share * u.q};
+    }
+    const double d = twin_clamp(u.d, -31.0 / 32.0 * u_max, 31.0 / 32.0 * u_max);
+    const double room = sqrt(u_max * u_max - d * d);
+    return (twin_dq_t){d, twin_clamp(u.q, -room, room)};
 }
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
@@ -35,12 +44,11 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - in->omega * f->psi_q;
     const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q +
                       in->omega * (f->psi_d + in->psi_delta);
-    const double u_max = motor->v_ratio * in->v_dc;
-    twin_dq_t u;
-    state->limited = false;
-    u.d = axis(motor, ud, 31.0 / 32.0 * u_max, to->psi.d - f->psi_d, &state->s.d, &state->limited);
-    u.q = axis(motor, uq, sqrt(u_max * u_max - u.d * u.d), to->psi.q - f->psi_q, &state->s.q,
-               &state->limited);
+    const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
+    const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0);
+    state->limited = (u.d != ud) || (u.q != uq);
+    state->s.d += integral(motor, e.d, u.d - ud);
+    state->s.q += integral(motor, e.q, u.q - uq);
     return u;
 }
 

@@ -83,6 +83,14 @@ static double psi_full_drift(const motor_si_t *motor)
            motor->period_s;
 }
 
+/* What the resistance law divides by. */
+static double excitation(const twin_mrai_in_t *at)
+{
+    const double a = at->i.d * at->flux.g_d;
+    const double b = at->i.q * at->flux.g_q;
+    return a * a + b * b;
+}
+
 static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
                   bool flux_open, bool r_open)
 {
@@ -98,7 +106,7 @@ static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mr
 }
 
 twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quality_t *quality_state,
-                                        const twin_mrai_in_t *sample,
+                                        const twin_mrai_in_t *sample, const twin_mrai_in_t *next,
                                         const twin_mrai_state_t *identifier, bool enabled)
 {
     const double w = sample->omega;
@@ -109,13 +117,13 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
     const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
     const bool r_open = flux_open && settled &&
                         (fabs(w) <= motor->omega_r_max_rad_s);
-    const double a = sample->i.d * sample->flux.g_d;
-    const double b = sample->i.q * sample->flux.g_q;
+    /* A current step is over before the next task: the gain must suit both of its ends. */
+    const double norm = fmax(excitation(sample), excitation(next));
     judge(motor, quality_state, identifier, flux_open, r_open);
     return (twin_mrai_schedule_t){
         .flux_gain = flux_open ? 2.0 * motor->flux_bandwidth_rad_s / w : 0.0,
         .resistance_gain = r_open ? 2.0 * motor->resistance_bandwidth_rad_s * motor->period_s /
-                                        (a * a + b * b)
+                                        norm
                                   : 0.0,
         .voltage_scale = 1.0 / sinc(0.5 * w * motor->period_s),
     };

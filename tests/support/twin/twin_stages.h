@@ -144,7 +144,7 @@ void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in);
 void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
                twin_mrai_state_t *state, const twin_mrai_in_t *in);
 twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quality_t *quality_state,
-                                        const twin_mrai_in_t *sample,
+                                        const twin_mrai_in_t *sample, const twin_mrai_in_t *next,
                                         const twin_mrai_state_t *identifier, bool enabled);
 
 /* --- torque ---------------------------------------------------------------------------------- */

@@ -114,7 +114,7 @@ void test_the_whole_drive_switches_as_its_twin_backwards_and_braking(void)
 
 void test_the_whole_drive_switches_as_its_twin_in_field_weakening(void)
 {
-    drive_at(7000.0, 40.0);
+    drive_at(5000.0, 40.0);
 }
 
 void test_both_open_the_gates_in_the_same_period(void)

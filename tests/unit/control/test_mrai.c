@@ -593,6 +593,7 @@ void test_a_configuration_outside_its_proven_range_is_rejected(void)
     REJECTED(pole_gain, Q31(0.25) + 1);
     REJECTED(flux_gain, -1);
     REJECTED(resistance_gain, -1);
+    REJECTED(resistance_gain, Q31(1.0 / 32.0) + 1);
     REJECTED(flux_proportional, -1);
     REJECTED(flux_proportional, 128 * 65536);
     REJECTED(resistance_proportional, -1);

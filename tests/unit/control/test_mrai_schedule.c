@@ -25,7 +25,7 @@ void tearDown(void)
 
 static mrai_schedule_t step(bool enabled)
 {
-    const mrai_schedule_in_t in = {&sample, &identifier, enabled};
+    const mrai_schedule_in_t in = {&sample, &sample, &identifier, enabled};
     return mrai_schedule_step(&f.mrai, &quality, &in);
 }
 
@@ -52,7 +52,7 @@ void test_the_factors_follow_the_twin_over_speed_and_current(void)
         t.flux.g_d = from_q15(sample.flux.g_d) / f.z;
         t.flux.g_q = from_q15(sample.flux.g_q) / f.z;
         const mrai_schedule_t y = step(true);
-        const twin_mrai_schedule_t s = twin_mrai_schedule(&f.si, &q, &t, &idle, true);
+        const twin_mrai_schedule_t s = twin_mrai_schedule(&f.si, &q, &t, &t, &idle, true);
         const double flux_now = y.flux_step_q28 / 268435456.0 / (1 << f.mrai.l_shift);
         const double r_now = y.resistance_step_q26 / 67108864.0 * f.z * f.z / (f.i * f.i);
         const double magnitude = hypot(sample.i.d, sample.i.q);
@@ -155,6 +155,22 @@ void test_a_parameter_that_still_moves_has_no_quality_and_a_slow_one_has_its_sha
     TEST_ASSERT_INT_WITHIN(60, 0, quality.r_quality);
 }
 
+/* 1000 against 12000 counts of i_q: the gain of the small current would meet the large one 144 times too strong. */
+void test_the_resistance_gain_suits_the_current_now_and_the_one_just_commanded(void)
+{
+    f.mrai.i_min = 0;
+    at(0, 1000, 16000);
+    const mrai_in_t small = sample;
+    const int32_t slow = step(true).resistance_step_q26;
+    at(0, 12000, 16000);
+    const int32_t fast = step(true).resistance_step_q26;
+    TEST_ASSERT_TRUE(slow / 20 > fast); /* saturated, else 144 */
+    const mrai_schedule_in_t up = {&small, &sample, &identifier, true};
+    TEST_ASSERT_EQUAL_INT32(fast, mrai_schedule_step(&f.mrai, &quality, &up).resistance_step_q26);
+    const mrai_schedule_in_t down = {&sample, &small, &identifier, true};
+    TEST_ASSERT_EQUAL_INT32(fast, mrai_schedule_step(&f.mrai, &quality, &down).resistance_step_q26);
+}
+
 /* Through a wrong flux the resistance would be seen wrong as well. */
 void test_the_resistance_law_waits_until_the_flux_has_settled(void)
 {
@@ -213,7 +229,7 @@ void test_the_quality_follows_the_twins_through_a_drive(void)
                                   .flux = {.g_d = 1e-4, .g_q = 1e-4}};
         const twin_mrai_state_t state = {.psi_delta = from_q31(identifier.psi_delta) * f.psi, .r_delta = from_q31(identifier.r_delta) * f.z};
         (void)step(true);
-        (void)twin_mrai_schedule(&f.si, &twin, &t, &state, true);
+        (void)twin_mrai_schedule(&f.si, &twin, &t, &t, &state, true);
         worst_note(&worst, quality.psi_quality - twin.psi_quality * 32768.0, "psi, step %d", n);
         worst_note(&worst, quality.r_quality - twin.r_quality * 32768.0, "r, step %d", n);
     }
