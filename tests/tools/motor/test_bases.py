@@ -110,4 +110,10 @@ def test_options_reach_the_tables(write):
     assert c["min_pulse"] / 32768 == pytest.approx(0.04, abs=2**-15)
     assert c["torque_slew"] / 32768 * motor.bases.torque_Nm == pytest.approx(1.0, rel=0.01)
     assert c["authority"] / 32768 == pytest.approx(0.2, abs=2**-15)
-    assert "Q15_MAX, /* open */" in motor_tables_c(load_motor(write()))
+    assert "Q15_MAX, /* open */" in motor_tables_c(load_motor(write(control={"torque_slew_Nm_per_s": 0.0})))
+
+
+def test_without_a_slew_limit_given_all_the_torque_takes_ten_milliseconds(write):
+    motor = load_motor(write())
+    step_Nm = members(motor_tables_c(motor))["torque_slew"] / 32768 * motor.bases.torque_Nm
+    assert 10 * step_Nm == pytest.approx(motor.config.machine.torque_max_Nm, rel=0.01)

@@ -15,6 +15,7 @@ FILE_NAME = "motor.toml"
 TRIP_PER_I_MAX = 1.2
 TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
+SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 ANGLE_PER_PERIOD_MAX = 0.6  # rad: beyond it the observer and the sampled controller lose their margins
 
 
@@ -62,7 +63,7 @@ class Control(_Section):
     resistance_bandwidth_rad_s: Annotated[float, Field(gt=0, le=100)] = 10.0
     torque_loop_bandwidth_rad_s: Annotated[float, Field(gt=0, le=300)] = 50.0
     torque_authority: Annotated[float, Field(gt=0, le=0.9)] = 0.3
-    torque_slew_Nm_per_s: Annotated[float, Field(ge=0, le=1e7)] = 0.0
+    torque_slew_Nm_per_s: Annotated[float, Field(ge=0, le=1e7)] | None = None
     dead_time_compensation: Annotated[float, Field(ge=0, le=1)] = 1.0
 
 
@@ -82,6 +83,12 @@ class MotorConfig(_Section):
     def v_dc_full_scale_V(self) -> float:
         given = self.inverter.v_dc_full_scale_V
         return 1.5 * self.inverter.vdc_V if given is None else given
+
+    @property
+    def torque_slew_Nm_per_s(self) -> float:
+        """0 is open. By default all the torque in 10 ms: a full reversal in deep field weakening then stays below the trip."""
+        given = self.control.torque_slew_Nm_per_s
+        return SLEW_PER_TORQUE_MAX * self.machine.torque_max_Nm if given is None else given
 
     @property
     def i_trip_A(self) -> float:

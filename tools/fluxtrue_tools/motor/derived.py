@@ -126,7 +126,7 @@ def _torque_loop(config: MotorConfig) -> dict[str, float]:
     return {"torque_ki": control.torque_loop_bandwidth_rad_s * task_s, "torque_kp": 0.0,
             "torque_model_rate": TORQUE_MODEL_RATE,
             "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
-            "torque_slew_Nm": control.torque_slew_Nm_per_s * task_s}
+            "torque_slew_Nm": config.torque_slew_Nm_per_s * task_s}
 
 
 def _monitors(config: MotorConfig) -> dict[str, float]:

@@ -188,7 +188,7 @@ def _torque_slew(motor: Motor) -> tuple[str, str]:
     slew = motor.derived.torque_slew_Nm / motor.bases.torque_Nm
     if slew <= 0 or slew >= 1:
         return "Q15_MAX", "open"
-    return str(max(q15(slew, "torque_slew"), 1)), f"{motor.config.control.torque_slew_Nm_per_s:g} N·m/s"
+    return str(max(q15(slew, "torque_slew"), 1)), f"{motor.config.torque_slew_Nm_per_s:g} N·m/s"
 
 
 def _motor(motor: Motor) -> list[Row]:
