@@ -13,6 +13,7 @@
 /* Beyond these no sensor of a traction drive delivers: a unit mix-up or garbage, not a measurement. */
 #define CURRENT_CREDIBLE_A 1e5
 #define VOLTAGE_CREDIBLE_V 1e5
+#define VOLTAGE_NEGATIVE_SHARE 0.05 /* of full scale: an offset of the sensor, not a reversed dc link */
 #define ANGLE_CREDIBLE_RAD 1e9
 #define TEMPERATURE_MIN_C (-100.0)
 #define TEMPERATURE_MAX_C 500.0
@@ -33,14 +34,15 @@ void fluxtrue_destroy(fluxtrue_t *drive)
 }
 
 /* Written so that a NaN fails: every comparison with it is false. */
-static bool credible(const double in[6])
+static bool credible(const motor_t *m, const double in[6])
 {
+    const double v_min_V = -VOLTAGE_NEGATIVE_SHARE * (double)m->v_dc_full_scale_V;
     for (int k = 0; k < 3; k++) {
         if (!(fabs(in[k]) <= CURRENT_CREDIBLE_A)) {
             return false;
         }
     }
-    return in[3] >= -VOLTAGE_CREDIBLE_V && in[3] <= VOLTAGE_CREDIBLE_V && fabs(in[4]) <= ANGLE_CREDIBLE_RAD &&
+    return in[3] >= v_min_V && in[3] <= VOLTAGE_CREDIBLE_V && fabs(in[4]) <= ANGLE_CREDIBLE_RAD &&
            in[5] >= TEMPERATURE_MIN_C && in[5] <= TEMPERATURE_MAX_C;
 }
 
@@ -82,7 +84,7 @@ static void run_period(fluxtrue_t *d)
 
 void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4])
 {
-    if (credible(in)) {
+    if (credible(&drive->drive.motor, in)) {
         take_samples(drive, in);
     } else {
         /* The last good samples stay: filters and observers keep their sense, only the gates open. */

@@ -115,6 +115,14 @@ def test_a_sample_that_is_no_number_opens_the_gates_at_once_and_leaves_a_fault_b
     assert {drive.step(IDLE)[3] for _ in range(50)} == {0.0}
 
 
+def test_a_reversed_dc_link_is_no_measurement(make: Callable[[], Drive]) -> None:
+    drive = running(make())
+    sample = list(IDLE)
+    sample[INPUTS.index("vdc_V")] = -50.0
+    assert drive.step(sample)[3] == 0.0
+    assert drive.get("fault_word") != 0.0
+
+
 def test_after_a_bad_sample_the_drive_works_again_when_the_fault_is_reset(
     library: ctypes.CDLL, make: Callable[[], Drive]
 ) -> None:

@@ -39,7 +39,7 @@ class Firmware:
 
 def shaft(speed_rpm: float, torque_Nm: float) -> tuple[float, float]:
     """Mean torque of motulator's machine without and with the torque loop."""
-    # The paper's machine, magnets 15 % weaker, winding 25 % warmer than the firmware has it.
+    # The paper's machine, magnets 15 % weaker, resistance 25 % higher than the firmware has it.
     parameters = SynchronousMachinePars(n_p=4, R_s=0.025, L_d=0.2e-3, L_q=0.5e-3, psi_f=MAGNET * 0.084)
     final = speed_rpm * math.tau / 60.0
     drive = model.Drive(
