@@ -41,6 +41,7 @@ typedef struct {
     uint8_t overruns_in_a_row;
     uint32_t overruns;
     uint32_t pended;             /* identifications asked for */
+    sample_t lost;               /* takes the sample of a period that finds both slots in use */
     volatile uint32_t faults;    /* set here (and by drive_raise_fault), cleared by the task while off */
 } fast_state_t;
 

@@ -4,7 +4,8 @@
 /** The two boxes through which priorities exchange data; each has one writer.
  *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
  *   Upwards (task to fast ISR) the reader cannot be interrupted by its writer: one read is enough.
- *   Downwards (fast ISR to MRAI ISR and task) the reader may be: it reads again if two writes came in between.
+ *   Downwards (fast ISR to MRAI ISR and task) the reader may be: the task reads again if two writes came in between;
+ *   the MRAI ISR says when it has finished, and until then only the other slot is written.
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Errors   none
  * Context  stated per box */
@@ -18,7 +19,7 @@
 /** One period as the fast ISR saw it. Writer: fast ISR. Readers: MRAI ISR, 1 kHz task. */
 typedef struct {
     mrai_in_t mrai;
-    q15_t v_dc;
+    int32_t v_dc;
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
 } sample_t;
@@ -75,6 +76,12 @@ static inline sample_t sample_box_read(const sample_box_t *box)
     return copy;
 }
 
+/* In place, for the MRAI ISR: the fast ISR leaves a slot alone until it has finished with it. */
+static inline const sample_t *sample_box_look(const sample_box_t *box)
+{
+    return &box->slot[box->generation & 1U];
+}
+
 static inline void command_box_write(command_box_t *box, command_t command)
 {
     box->slot[(box->generation + 1U) & 1U] = command;
@@ -82,9 +89,9 @@ static inline void command_box_write(command_box_t *box, command_t command)
     box->generation = box->generation + 1U;
 }
 
-static inline command_t command_box_read(const command_box_t *box)
+static inline const command_t *command_box_read(const command_box_t *box)
 {
-    return box->slot[box->generation & 1U];
+    return &box->slot[box->generation & 1U];
 }
 
 static inline void schedule_box_write(schedule_box_t *box, mrai_schedule_t schedule)

@@ -10,51 +10,56 @@
 #define OVERRUNS_TO_FAULT 3
 #define PERIODS_TO_ACT 3
 
+/* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
-    measure_t measured;
+    abc_t i;
     angle_t angle;
-    fx_sincos_t at;       /* now: the frame of the samples */
     fx_sincos_t advanced; /* the middle of the period in which the duties will act: 1.5 periods ahead */
-    dq_t i;
-    flux_point_t flux;
 } instant_t;
 
-static instant_t observe(drive_t *drive)
+static instant_t observe(drive_t *drive, sample_t *sample)
 {
     adc_counts_t counts;
-    instant_t now;
     hal_adc_read(&counts);
-    now.measured = measure_step(&drive->motor.measure, &counts);
-    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
-    const uint32_t ahead = now.angle.theta_e + (uint32_t)now.angle.step + (uint32_t)(now.angle.step >> 1);
-    now.at = fx_sincos((uint16_t)((now.angle.theta_e + 0x8000U) >> 16));
-    now.advanced = fx_sincos((uint16_t)((ahead + 0x8000U) >> 16));
-    now.i = park(clarke(now.measured.i), now.at);
-    now.flux = flux_table_step(&drive->motor.flux_table, now.i);
-    return now;
+    const measure_t measured = measure_step(&drive->motor.measure, &counts);
+    const angle_t angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
+    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
+    const fx_sincos_t at = fx_sincos((uint16_t)((angle.theta_e + 0x8000U) >> 16)); /* the frame of the samples */
+    const dq_t i = park(clarke(measured.i), at);
+    sample->mrai.i = i;
+    sample->mrai.omega = angle.omega_q31;
+    sample->v_dc = measured.v_dc;
+    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
+    return (instant_t){measured.i, angle, fx_sincos((uint16_t)((ahead + 0x8000U) >> 16))};
 }
 
-/* Hands this period to the identification, and notices when it has not finished the last one. */
-static void publish(drive_t *drive, const instant_t *now)
+/* Counts the periods that find the identification still busy. */
+static void watch(drive_t *drive, uint32_t unfinished)
 {
     fast_state_t *fast = &drive->fast;
-    if (drive->slow.finished != fast->pended) {
-        fast->overruns++;
-        fast->overruns_in_a_row++;
-        if (fast->overruns_in_a_row >= OVERRUNS_TO_FAULT) {
-            fast->overruns_in_a_row = OVERRUNS_TO_FAULT;
-            drive_raise_fault(drive, FAULT_OVERRUN);
-        }
-    } else {
+    if (unfinished == 0U) {
         fast->overruns_in_a_row = 0;
+        return;
     }
-    *sample_box_begin(&drive->samples) = (sample_t){
-        .mrai = {.i = now->i, .u = fast->acting, .flux = now->flux, .omega = now->angle.omega_q31},
-        .v_dc = now->measured.v_dc,
-        .acting = fast->periods_on >= PERIODS_TO_ACT,
-        .voltage_limited = fast->current_control.limited || fast->modulated.limited,
-    };
-    sample_box_publish(&drive->samples);
+    fast->overruns++;
+    fast->overruns_in_a_row++;
+    if (fast->overruns_in_a_row >= OVERRUNS_TO_FAULT) {
+        fast->overruns_in_a_row = OVERRUNS_TO_FAULT;
+        drive_raise_fault(drive, FAULT_OVERRUN);
+    }
+}
+
+/* Hands this period to the identification. One that is two periods late still reads the slot whose turn it is: that period is lost. */
+static void publish(drive_t *drive, sample_t *sample)
+{
+    fast_state_t *fast = &drive->fast;
+    sample->mrai.u = fast->acting;
+    sample->acting = fast->periods_on >= PERIODS_TO_ACT;
+    sample->voltage_limited = fast->current_control.limited || fast->modulated.limited;
+    watch(drive, fast->pended - drive->slow.finished);
+    if (sample != &fast->lost) {
+        sample_box_publish(&drive->samples);
+    }
     fast->pended++;
     hal_irq_pend_mrai();
 }
@@ -69,39 +74,44 @@ static void bridge_off(drive_t *drive)
     drive->fast.periods_on = 0;
 }
 
-static void bridge_on(drive_t *drive, const instant_t *now, const current_target_t *target)
+static void bridge_on(drive_t *drive, const sample_t *sample, const instant_t *now, const current_target_t *target)
 {
     fast_state_t *fast = &drive->fast;
     const motor_t *m = &drive->motor;
     const current_control_in_t control = {
         .target = target,
-        .flux = &now->flux,
+        .flux = &sample->mrai.flux,
         .omega = fx_q15_from_q31(now->angle.omega_q31),
         .psi_delta = drive->slow.psi_delta_q15,
-        .v_dc = now->measured.v_dc,
+        .v_dc = sample->v_dc,
     };
     fast->acting = fast->modulated.acted;
     const dq_t u = current_control_step(&m->current_control, &fast->current_control, &control);
-    const modulate_in_t modulation = {.u = u, .i = now->i, .advanced = now->advanced, .v_dc = now->measured.v_dc};
-    fast->modulated = modulate_step(&m->modulate, &modulation);
+    const modulate_in_t modulation = {.u = u, .i = sample->mrai.i, .advanced = now->advanced, .v_dc = sample->v_dc};
+    modulate_step(&m->modulate, &modulation, &fast->modulated);
     hal_pwm_write(fast->modulated.duty);
     hal_pwm_enable(true);
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 
-void fast_isr(drive_t *drive)
+/* Everything the period needs is compiled into the one interrupt, with a compiler that sees all files. */
+__attribute__((flatten)) void fast_isr(drive_t *drive)
 {
-    const instant_t now = observe(drive);
-    const command_t command = command_box_read(&drive->commands);
-    const monitor_in_t seen = {now.measured.i, now.measured.v_dc, now.angle.jumped};
+    const bool late = drive->fast.pended - drive->slow.finished > 1U;
+    sample_t *sample = late ? &drive->fast.lost : sample_box_begin(&drive->samples);
+    const instant_t now = observe(drive, sample);
+    const command_t *command = command_box_read(&drive->commands);
+    const monitor_in_t seen = {now.i, sample->v_dc, now.angle.jumped};
 
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
-    drive_raise_fault(drive, command.run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
-    if (command.run && drive->fast.faults == 0) {
-        bridge_on(drive, &now, &command.target);
+    if (faults != 0) {
+        drive_raise_fault(drive, command->run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
+    }
+    if (command->run && drive->fast.faults == 0) {
+        bridge_on(drive, sample, &now, &command->target);
     } else {
         bridge_off(drive);
     }
-    publish(drive, &now);
+    publish(drive, sample);
 }

@@ -41,9 +41,9 @@ static dq_t references(drive_t *drive, const sample_t *sample)
     task->torque_request = torque_path(drive, sample);
     const current_reference_in_t in = {
         .torque = task->torque_request,
-        .v_dc = sample->v_dc,
+        .v_dc = (q15_t)sample->v_dc,
         .omega = fx_q15_from_q31(sample->mrai.omega),
-        .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
+        .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;

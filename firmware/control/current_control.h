@@ -47,7 +47,7 @@ typedef struct {
     const flux_point_t *flux; /* at the measured current */
     q15_t omega;
     q15_t psi_delta; /* identified flux minus the table's */
-    q15_t v_dc;
+    int32_t v_dc;
 } current_control_in_t;
 
 void current_control_reset(current_control_state_t *state);

@@ -50,7 +50,7 @@ current_reference_t current_reference_step(const current_reference_config_t *con
     const q15_t i_d = (q15_t)fx_cell_interp(config->i_d, config->grid.ny, cell);
     const q15_t i_q = (q15_t)fx_cell_interp(config->i_q, config->grid.ny, cell);
     dq_t i_ref = inside_circle(i_d, i_q, config->i_max);
-    i_ref.q = (in->torque < 0) ? fx_neg_q15(i_ref.q) : i_ref.q;
+    i_ref.q = (in->torque < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
         .torque_max = torque_max,

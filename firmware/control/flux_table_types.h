@@ -4,18 +4,19 @@
 /** What the flux-table service answers for one operating point; the value other stages consume.
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
  * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full voltage must not reach I_b
+ * Range    q15 in a word each: halfwords would cost an extension at every use
  * Context  values only */
 #include <stdbool.h>
 
 #include "fx/q.h"
 
 typedef struct {
-    q15_t l_d, l_q;   /* apparent: psi_d - psi_f0 = l_d i_d, psi_q = l_q i_q */
-    q15_t l_qq;       /* incremental: d psi_q/d i_q */
-    q15_t g_d, g_q;   /* inverse incremental, as the observer wants them: current step per voltage and period */
-    q15_t psi_f0;     /* psi_d at i_d = 0 for this i_q, nominal magnet */
-    q15_t psi_d;      /* psi_f0 + l_d i_d, nominal magnet */
-    q15_t psi_q;      /* l_q i_q */
+    int32_t l_d, l_q; /* apparent: psi_d - psi_f0 = l_d i_d, psi_q = l_q i_q */
+    int32_t l_qq;     /* incremental: d psi_q/d i_q */
+    int32_t g_d, g_q; /* inverse incremental, as the observer wants them: current step per voltage and period */
+    int32_t psi_f0;   /* psi_d at i_d = 0 for this i_q, nominal magnet */
+    int32_t psi_d;    /* psi_f0 + l_d i_d, nominal magnet */
+    int32_t psi_q;    /* l_q i_q */
     bool clamped;     /* the point lay outside the table; the edge was used */
 } flux_point_t;
 

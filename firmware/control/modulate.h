@@ -21,16 +21,16 @@
 
 typedef struct {
     q15_t dead_time;      /* compensated duty error of one phase */
-    q16_t knee_gain;      /* 1/i_knee: 1.0 reached at the end of the straight line */
+    q16_t knee_gain;      /* 1/i_knee < 2^13: 1.0 reached at the end of the straight line */
     q15_t min_pulse;      /* shortest pulse the bridge makes, in duty */
-    q15_t v_dc_min;       /* floor for the normalisation */
+    q15_t v_dc_min;       /* floor for the normalisation, at least 2 */
 } modulate_config_t;
 
 typedef struct {
     dq_t u;        /* commanded voltage */
     dq_t i;        /* currents for the polarity */
     fx_sincos_t advanced; /* sine and cosine of the angle at the middle of the acting period */
-    q15_t v_dc;
+    int32_t v_dc;
 } modulate_in_t;
 
 typedef struct {
@@ -39,6 +39,6 @@ typedef struct {
     bool limited;
 } modulate_out_t;
 
-modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in);
+void modulate_step(const modulate_config_t *config, const modulate_in_t *in, modulate_out_t *out);
 
 #endif

@@ -17,8 +17,8 @@ static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 /* 2 k_r T_s/((i_d g_d)^2 + (i_q g_q)^2) in Q26 (MR-10): (Q31 2^5)/(Q30 2^-9) = Q15, shifted up with saturation. */
 static int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
 {
-    const q15_t d = fx_mul_q15(sample->i.d, sample->flux.g_d);
-    const q15_t q = fx_mul_q15(sample->i.q, sample->flux.g_q);
+    const q15_t d = fx_mul_q15((q15_t)sample->i.d, (q15_t)sample->flux.g_d);
+    const q15_t q = fx_mul_q15((q15_t)sample->i.q, (q15_t)sample->flux.g_q);
     const int32_t norm = fx_shr_round(fx_mac_q30(fx_mul_q30(d, d), q, q), 9);
     return fx_shl_q31(fx_div_s32(fx_shl_q31(config->resistance_gain, 5), fx_max_s32(norm, 1)), 11);
 }
@@ -46,7 +46,7 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
 {
     const q15_t omega = fx_q15_from_q31(in->sample->omega);
     const q15_t speed = fx_abs_q15(omega);
-    const q15_t current = fx_magnitude(in->sample->i.d, in->sample->i.q);
+    const q15_t current = fx_magnitude((q15_t)in->sample->i.d, (q15_t)in->sample->i.q);
     const mrai_state_t *now = in->identifier;
     const bool flux_open = in->enabled && speed >= config->omega_min && current >= config->i_min;
     /* Seen through a wrong flux, the resistance law walks off to its limit: it waits until the flux has settled. */

@@ -8,8 +8,8 @@
 
 q15_t torque_estimate_step(torque_estimate_state_t *state, dq_t i, const flux_point_t *flux, q31_t psi_delta)
 {
-    const q15_t psi_d = fx_add_q15(flux->psi_d, fx_q15_from_q31(psi_delta));
-    const q15_t t = fx_round_q15(fx_sub_q31(fx_mul_q30(psi_d, i.q), fx_mul_q30(flux->psi_q, i.d)));
+    const int32_t psi_d = fx_sat_q15_word(flux->psi_d + fx_q15_from_q31(psi_delta));
+    const q15_t t = fx_round_q15(fx_sub_q31(psi_d * i.q, flux->psi_q * i.d));
 
     state->sum += t;
     state->count++;

@@ -54,11 +54,35 @@ static inline int16_t fx_arch_ssat16(int32_t x)
     return (int16_t)y;
 }
 
+/* In a word; the builtin lets the compiler fold a shift into the instruction. */
+static inline int32_t fx_arch_ssat16_word(int32_t x)
+{
+    return __ssat(x, 16);
+}
+
 static inline uint32_t fx_arch_usat17(int32_t x)
 {
     return (uint32_t)__usat(x, 17);
 }
 #pragma GCC diagnostic pop
+
+/* The width must be a constant once everything is inlined: it is part of the instruction. */
+__attribute__((always_inline)) static inline int32_t fx_arch_ssat(int32_t x, unsigned bits)
+{
+    int32_t y;
+    __asm__("ssat %0, %1, %2" : "=r"(y) : "n"(bits), "r"(x));
+    return y;
+}
+
+static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
+{
+    return __qadd(a, __qadd(b, b));
+}
+
+static inline int32_t fx_arch_qdsub(int32_t a, int32_t b)
+{
+    return __qsub(a, __qadd(b, b));
+}
 
 static inline int32_t fx_arch_smulwb(int32_t a, int16_t b)
 {

@@ -31,6 +31,28 @@ static inline int16_t fx_arch_ssat16(int32_t x)
     return (int16_t)((low > INT16_MAX) ? INT16_MAX : low);
 }
 
+static inline int32_t fx_arch_ssat(int32_t x, unsigned bits)
+{
+    const int32_t high = (int32_t)((UINT32_C(1) << (bits - 1U)) - 1U);
+    const int32_t low = (x < -high - 1) ? (-high - 1) : x;
+    return (low > high) ? high : low;
+}
+
+static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
+{
+    return fx_arch_qadd(a, fx_arch_qadd(b, b));
+}
+
+static inline int32_t fx_arch_qdsub(int32_t a, int32_t b)
+{
+    return fx_arch_qsub(a, fx_arch_qadd(b, b));
+}
+
+static inline int32_t fx_arch_ssat16_word(int32_t x)
+{
+    return fx_arch_ssat16(x);
+}
+
 static inline uint32_t fx_arch_usat17(int32_t x)
 {
     const int32_t low = (x < 0) ? 0 : x;

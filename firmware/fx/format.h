@@ -40,6 +40,18 @@ static inline q15_t fx_sat_q15(int32_t x)
     return fx_arch_ssat16(x);
 }
 
+/* As fx_sat_q15(), the result kept in a word: what is used at once needs no second extension. */
+static inline int32_t fx_sat_q15_word(int32_t x)
+{
+    return fx_arch_ssat16_word(x);
+}
+
+/* Into [-2^(bits-1), 2^(bits-1) - 1]; bits is a constant of 1 to 32. */
+__attribute__((always_inline)) static inline int32_t fx_sat_bits(int32_t x, unsigned bits)
+{
+    return fx_arch_ssat(x, bits);
+}
+
 static inline q31_t fx_sat_q31(int64_t x)
 {
     const int32_t high = (int32_t)(x >> 32);
@@ -76,6 +88,17 @@ static inline q31_t fx_add_q31(q31_t a, q31_t b)
 static inline q31_t fx_sub_q31(q31_t a, q31_t b)
 {
     return fx_arch_qsub(a, b);
+}
+
+/* a + 2 b and a - 2 b, both steps saturating. */
+static inline q31_t fx_add2_q31(q31_t a, q31_t b)
+{
+    return fx_arch_qdadd(a, b);
+}
+
+static inline q31_t fx_sub2_q31(q31_t a, q31_t b)
+{
+    return fx_arch_qdsub(a, b);
 }
 
 static inline q31_t fx_neg_q31(q31_t a)

@@ -46,9 +46,11 @@ typedef struct {
 } fx_grid_t;
 
 typedef struct {
-    uint32_t index; /* of the corner z00 */
-    fx_pair_t w0;   /* weights of z00 and z01 = z[index + 1] */
-    fx_pair_t w1;   /* weights of z10 = z[index + ny] and z11 */
+    uint32_t index;  /* of the corner z00 */
+    uint32_t column; /* of that corner: for tables that depend on y alone */
+    fx_pair_t w0;    /* weights of z00 and z01 = z[index + 1] */
+    fx_pair_t w1;    /* weights of z10 = z[index + ny] and z11 */
+    fx_pair_t wy;    /* w0 + w1: of z[column] and z[column + 1] */
     bool clamped;
 } fx_cell_t;
 
@@ -62,15 +64,23 @@ static inline bool fx_axis_valid(unsigned shift, uint32_t n)
     return (n >= 2U) && (n <= 255U) && (shift <= 14U) && (((n - 1U) << shift) < 0x20000U);
 }
 
-static inline fx_axis_t fx_axis(int32_t x, int32_t x0, unsigned shift, uint32_t n)
+/* From a distance of 0 to 2^17 - 1 to the first grid point. */
+static inline fx_axis_t fx_axis_right(uint32_t offset, unsigned shift, uint32_t n)
 {
-    const int32_t offset = fx_sub_q31(x, x0);
-    const uint32_t cells = (fx_arch_usat17(offset) << 14) >> shift;
+    const uint32_t cells = (offset << 14) >> shift;
     /* One count short of the last point, so that a cell always has a right-hand neighbour. */
     const uint32_t last = (n << 14) - 0x4001U;
     const uint32_t position = (cells > last) ? last : cells;
     /* The last point itself, one count above, is inside. */
-    return (fx_axis_t){position, ((uint32_t)offset >> 31) | ((cells - position) >> 1)};
+    return (fx_axis_t){position, (cells - position) >> 1};
+}
+
+static inline fx_axis_t fx_axis(int32_t x, int32_t x0, unsigned shift, uint32_t n)
+{
+    const int32_t offset = fx_sub_q31(x, x0);
+    fx_axis_t axis = fx_axis_right(fx_arch_usat17(offset), shift, n);
+    axis.outside |= (uint32_t)offset >> 31;
+    return axis;
 }
 
 /* (1 - w, w) in Q14 for both halves at once; nothing carries between them. */
@@ -95,24 +105,35 @@ static inline q15_t fx_lookup1(const fx_lut1_t *lut, int32_t x, bool *clamped)
     return (q15_t)(fx_dot2_acc(0x2000, fx_load_pair(&lut->y[a.position >> 14]), weights) >> 14);
 }
 
-static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
+static inline fx_cell_t fx_cell_at(fx_axis_t ax, fx_axis_t ay, uint32_t ny)
 {
-    const fx_axis_t ax = fx_axis(x, grid->x0, grid->x_shift, grid->nx);
-    const fx_axis_t ay = fx_axis(y, grid->y0, grid->y_shift, grid->ny);
     const uint32_t wx = ax.position & 0x3FFFU;
     const uint32_t wy = ay.position & 0x3FFFU;
     /* One product, the other three by subtraction: the four always sum to 2^14 (FX-29). */
     const uint32_t w11 = ((wx * wy) + 0x2000U) >> 14;
     const fx_pair_t w1 = wx + (w11 << 16) - w11; /* (wx - w11, w11) */
-    return (fx_cell_t){((ax.position >> 14) * grid->ny) + (ay.position >> 14),
-                       fx_weights(wy) - w1, w1, (ax.outside | ay.outside) != 0U};
+    const fx_pair_t w = fx_weights(wy);
+    const uint32_t column = ay.position >> 14;
+    return (fx_cell_t){((ax.position >> 14) * ny) + column, column, w - w1, w1, w,
+                       (ax.outside | ay.outside) != 0U};
+}
+
+static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
+{
+    return fx_cell_at(fx_axis(x, grid->x0, grid->x_shift, grid->nx),
+                      fx_axis(y, grid->y0, grid->y_shift, grid->ny), grid->ny);
 }
 
 static inline int32_t fx_cell_interp(const int16_t *z, uint32_t ny, fx_cell_t cell)
 {
-    const int16_t *corner = &z[cell.index];
-    const int32_t acc = fx_dot2_acc(0x2000, fx_load_pair(corner), cell.w0);
-    return fx_dot2_acc(acc, fx_load_pair(&corner[ny]), cell.w1) >> 14;
+    const int32_t acc = fx_dot2_acc(0x2000, fx_load_pair(&z[cell.index]), cell.w0);
+    return fx_dot2_acc(acc, fx_load_pair(&z[cell.index + ny]), cell.w1) >> 14;
+}
+
+/* A table of y alone: what fx_cell_interp() would give if every row were the same. */
+static inline int32_t fx_cell_interp_y(const int16_t *z, fx_cell_t cell)
+{
+    return fx_dot2_acc(0x2000, fx_load_pair(&z[cell.column]), cell.wy) >> 14;
 }
 
 static inline q15_t fx_lookup2(const fx_lut2_t *lut, int32_t x, int32_t y, bool *clamped)

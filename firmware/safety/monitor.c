@@ -12,16 +12,28 @@ static uint32_t confirm(uint8_t *count, bool bad, uint8_t limit, uint32_t fault)
     return (*count >= limit) ? fault : 0;
 }
 
+/* |x| > limit without taking the absolute value. */
+static bool beyond(int32_t x, int32_t limit)
+{
+    return (uint32_t)(x + limit) > 2U * (uint32_t)limit;
+}
+
 uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in)
 {
     const abc_t i = in->i;
-    const int32_t highest = fx_max_s32(fx_abs_q15(i.a), fx_max_s32(fx_abs_q15(i.b), fx_abs_q15(i.c)));
-    const int32_t sum = fx_abs_q31(i.a + i.b + i.c);
-
-    uint32_t faults = (highest > config->i_trip) ? FAULT_OVER_CURRENT : 0;
-    faults |= confirm(&state->over_voltage, in->v_dc > config->v_max, OVER_VOLTAGE_SAMPLES, FAULT_OVER_VOLTAGE);
-    faults |= confirm(&state->under_voltage, in->v_dc < config->v_min, UNDER_VOLTAGE_SAMPLES, FAULT_UNDER_VOLTAGE);
-    faults |= confirm(&state->current_sum, sum > config->sum_max, CURRENT_SUM_SAMPLES, FAULT_CURRENT_SUM);
+    const int32_t trip = config->i_trip;
+    const bool over_current = beyond(i.a, trip) || beyond(i.b, trip) || beyond(i.c, trip);
+    const bool over_voltage = in->v_dc > config->v_max;
+    const bool under_voltage = in->v_dc < config->v_min;
+    const bool unbalanced = beyond(i.a + i.b + i.c, config->sum_max);
+    if (!(over_current || over_voltage || under_voltage || unbalanced || in->angle_jumped || state->counting)) {
+        return 0;
+    }
+    uint32_t faults = over_current ? FAULT_OVER_CURRENT : 0;
+    faults |= confirm(&state->over_voltage, over_voltage, OVER_VOLTAGE_SAMPLES, FAULT_OVER_VOLTAGE);
+    faults |= confirm(&state->under_voltage, under_voltage, UNDER_VOLTAGE_SAMPLES, FAULT_UNDER_VOLTAGE);
+    faults |= confirm(&state->current_sum, unbalanced, CURRENT_SUM_SAMPLES, FAULT_CURRENT_SUM);
     faults |= confirm(&state->angle, in->angle_jumped, ANGLE_SAMPLES, FAULT_ANGLE);
+    state->counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
     return faults;
 }

@@ -34,11 +34,12 @@ typedef struct {
 
 typedef struct {
     uint8_t over_voltage, under_voltage, current_sum, angle;
+    bool counting; /* one of them is not zero: else a good sample has nothing to do */
 } monitor_state_t;
 
 typedef struct {
     abc_t i;
-    q15_t v_dc;
+    int32_t v_dc;
     bool angle_jumped;
 } monitor_in_t;
 

@@ -16,7 +16,7 @@ typedef struct {
     double lo, hi;
 } parameter_t;
 
-static double pu15(q15_t x, float base)
+static double pu15(int32_t x, float base)
 {
     return (double)x / 32768.0 * (double)base;
 }

@@ -58,8 +58,12 @@ void test_measurement_and_angle_are_the_si_values(void)
 {
     const double turns_at_base = w_b * motor_si.period_s / (2.0 * 3.14159265358979323846);
     const double wn = motor_si.tracker_bandwidth_rad_s * motor_si.period_s;
-    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc_gain_q15 / 32768.0, 1.0 / 32768.0);
-    TEST_ASSERT_EQUAL_INT(16 - motor_si.adc_bits, motor.measure.shift);
+    const double lsb = 65536.0 / (1 << motor_si.adc_bits); /* of the converter, in 16-bit counts */
+    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc_scale / lsb / 32768.0, 1.0 / 32768.0);
+    for (int phase = 0; phase < 3; phase++) {
+        TEST_ASSERT_EQUAL_INT((int)(lsb * 16384.0), motor.measure.scale[phase]);
+        TEST_ASSERT_EQUAL_INT(8192 - 32768 * 16384, motor.measure.bias[phase]);
+    }
     TEST_ASSERT_EQUAL_INT(motor_si.pole_pairs, motor.angle_tracker.pole_pairs);
     HELD(2.0 * wn, q31(motor.angle_tracker.kp), q31(1));
     HELD(wn * wn, q31(motor.angle_tracker.ki), q31(1));

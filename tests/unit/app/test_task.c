@@ -238,7 +238,7 @@ void test_the_boxes_survive_the_wrap_of_their_generation(void)
         sample_at(0.01 * n, true, false);
         TEST_ASSERT_EQUAL_INT32((q31_t)(0.01 * n * 2147483647.0), sample_box_read(&drive.samples).mrai.omega);
         command_box_write(&drive.commands, (command_t){.run = n & 1});
-        TEST_ASSERT_EQUAL(n & 1, command_box_read(&drive.commands).run);
+        TEST_ASSERT_EQUAL(n & 1, command_box_read(&drive.commands)->run);
         schedule_box_write(&drive.schedules, (mrai_schedule_t){.flux_step_q28 = n});
         TEST_ASSERT_EQUAL_INT(n, schedule_box_read(&drive.schedules)->flux_step_q28);
     }

@@ -310,7 +310,7 @@ void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
 {
     const int v_max = (f.current_control.v_ratio * 4000 + 16384) >> 15;
     in.v_dc = 4000;
-    const q15_t rest = target.psi.q;
+    const int32_t rest = target.psi.q;
     target.psi.q = target.weighted.q = (q15_t)(rest + 200);
     for (int n = 0; n < 5000; n++) {
         (void)step();

@@ -34,7 +34,9 @@ static void at_angle(int32_t fraction)
 
 static modulate_out_t step(void)
 {
-    return modulate_step(&f.modulate, &in);
+    modulate_out_t out;
+    modulate_step(&f.modulate, &in, &out);
+    return out;
 }
 
 static twin_modulate_t twin_step(void)

@@ -44,6 +44,11 @@ typedef uint32_t u32;
 KERNEL1(nothing, int32_t, int32_t, a)
 
 KERNEL1(sat_q15, q15_t, int32_t, fx_sat_q15(a))
+KERNEL1(sat_q15_word, int32_t, int32_t, fx_sat_q15_word(a))
+KERNEL1(sat_bits_23, int32_t, int32_t, fx_sat_bits(a, 23))
+KERNEL1(sat_bits_31, int32_t, int32_t, fx_sat_bits(a, 31))
+KERNEL2(add2_q31, q31_t, q31_t, q31_t, fx_add2_q31(a, b))
+KERNEL2(sub2_q31, q31_t, q31_t, q31_t, fx_sub2_q31(a, b))
 KERNEL2(sat_q31, q31_t, int32_t, int32_t, fx_sat_q31((int64_t)a * 8 + (b & 7)))
 KERNEL2(add_q15, q15_t, q15_t, q15_t, fx_add_q15(a, b))
 KERNEL2(sub_q15, q15_t, q15_t, q15_t, fx_sub_q15(a, b))

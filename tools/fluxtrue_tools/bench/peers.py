@@ -38,3 +38,27 @@ PEERS = (
     Peer("sqrt", "arm_sqrt_q31", CMSIS, 58, 2e-9, "of 1"),
     Peer("divide", "arm_divide_q15", CMSIS, 78),
 )
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A whole control tick of another project."""
+
+    source: str
+    content: str
+    average: int
+    maximum: int
+
+
+# 1000 ticks in closed loop each, in the same emulation; none has tables or identifies anything.
+LOOPS = (
+    Loop("teslabs/spinner 06be152", "float: sincos, 2 PID, clamp, SVM", 206, 208),
+    Loop("CMSIS-DSP ec1bb75 composed", "q31: sincos, transforms, 2 PID; no SVM", 231, 231),
+    Loop(ST, "q15: 3 shunts, 2 PI, circle limit, SVPWM", 305, 309),
+    Loop(OPENINVERTER, "fixed: 2 PI, q limit, SVPWM", 310, 314),
+    Loop("ODrive f9b5419", "float: PI, limit, SVM; no decoupling", 415, 424),
+    Loop("hoverboard-FOC a0751d5", "fixed: hall position, 2 PI, limits", 542, 670),
+    Loop("VESC b9d287b", "float: + decoupling, dead time, filters", 561, 563),
+    Loop("moteus db1a762", "float: filters, PI, feed-forward, SVM", 684, 684),
+    Loop("SimpleFOC 7f9c45f", "float: sensor, 2 sincos, 2 PID, SVPWM", 763, 792),
+)

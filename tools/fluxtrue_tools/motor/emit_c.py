@@ -71,10 +71,12 @@ def _bases(bases: Bases) -> list[Row]:
 
 def _measure(motor: Motor) -> list[Row]:
     gain = u16(motor.config.v_dc_full_scale_V / motor.bases.voltage_V, Q15_ONE, "v_dc_full_scale_V/V_b")
-    return [("shift", f"{16 - motor.config.inverter.adc_bits}u", ""),
-            ("offset", "{32768, 32768, 32768}", "16-bit counts"),
-            ("gain_q14", "{16384, 16384, 16384}", "1.0"),
-            ("v_dc_gain_q15", f"{gain}u", f"{motor.config.v_dc_full_scale_V:g} V full scale")]
+    shift = 16 - motor.config.inverter.adc_bits
+    unity, middle = 1 << 14, 1 << 15
+    return [("scale", "{" + ", ".join([str(unity << shift)] * 3) + "}", f"gain 1.0 in Q14, times 2^{shift}"),
+            ("bias", "{" + ", ".join([str((1 << 13) - middle * unity)] * 3) + "}", "2^13 - 32768 counts * gain"),
+            ("v_dc_scale", f"{gain << shift}u",
+             f"{motor.config.v_dc_full_scale_V:g} V full scale in Q15, times 2^{shift}")]
 
 
 def _tracker(motor: Motor) -> list[Row]:
@@ -224,7 +226,9 @@ def _q15_tables(motor: Motor) -> list[str]:
                 "g_d": "omega_b T_s/l_dd, 2^-15 per count", "g_q": "omega_b T_s/l_qq, 2^-15 per count",
                 "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
     out = [f"/* Flux tables: {grid}. */\n"]
-    out += [_table("int16_t", f"table_{name}", tables.stored[name], text) for name, text in comments.items()]
+    # psi_f0 depends on i_q alone: one row of it is enough.
+    out += [_table("int16_t", f"table_{name}", tables.stored[name][:1] if name == "psi_f0" else tables.stored[name], text)
+            for name, text in comments.items()]
     out.append(f"/* Current references: rows |T| = 0 ... {refs.torque_Nm[-1]:.6g} N·m "
                f"every {refs.torque_Nm[1]:.6g} N·m, columns\n"
                f" * available flux {refs.psi_Vs[0]:.6g} ... {refs.psi_Vs[-1]:.6g} Vs every "

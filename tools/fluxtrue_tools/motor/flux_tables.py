@@ -15,7 +15,7 @@ from fluxtrue_tools.motor.quantise import Q15_ONE, q15_table, shift_for
 SHIFT_COARSE, SHIFT_FINE = 10, 8
 ERROR_WANTED = 0.002  # of torque_max
 NODES_MAX = 255
-SHIFT_MAX = 14
+SHIFT_MAX = 13
 
 IntTable = NDArray[np.int64]
 
@@ -38,7 +38,8 @@ class FluxTables:
 
     @property
     def flash_bytes(self) -> int:
-        return sum(2 * table.size for table in self.stored.values())
+        """psi_f0 depends on i_q alone: one row of it is stored."""
+        return sum(2 * (table[:1] if name == "psi_f0" else table).size for name, table in self.stored.items())
 
 
 @dataclass(frozen=True)

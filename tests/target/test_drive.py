@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole drive on an emulated Cortex-M4: the same bits as on this computer, period by period."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.bench import build, drive
+
+ENOUGH = 2000
+
+
+class Recorder(drive.Target):
+    """Keeps every call, so that another processor can be given the same."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.calls: list[tuple[str, tuple[int, ...]]] = []
+
+    def call(self, symbol: str, *arguments: int) -> int:
+        self.calls.append((symbol, arguments))
+        return super().call(symbol, *arguments)
+
+
+def _run(processor: drive.Processor) -> list[list[int]]:
+    """Outputs after every period of the closed loop."""
+    trace = []
+    for _ in drive.periods(processor):
+        processor.call("bench_fast_isr")
+        processor.call("bench_mrai_isr")
+        trace.append(processor.outputs())
+    return trace
+
+
+@pytest.fixture(scope="module")
+def recorder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recorder, list[list[int]]]:
+    if not build.have_arm_compiler():
+        pytest.skip(f"{build.ARM_CC} is not installed: nothing is compiled for the target")
+    target = Recorder(drive.build_drive(tmp_path_factory.mktemp("target")))
+    return target, _run(target)
+
+
+def test_target_and_host_agree_bit_for_bit_through_a_drive_cycle(
+    recorder: tuple[Recorder, list[list[int]]], tmp_path: Path
+) -> None:
+    target, there = recorder
+    # Undefined behaviour on the way ends the run with a message.
+    flags = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
+    host = drive.Host(drive.build_drive_host(tmp_path, flags))
+    here = []
+    for symbol, arguments in target.calls:
+        host.call(symbol, *arguments)
+        if symbol == "bench_mrai_isr":
+            here.append(host.outputs())
+    assert len(there) >= ENOUGH
+    differing = [k for k, (a, b) in enumerate(zip(here, there, strict=True)) if a != b]
+    assert not differing, f"period {differing[0]}: host {here[differing[0]]}, target {there[differing[0]]}"
+
+
+def test_the_cycle_drives_both_ways_meets_the_limit_and_ends_without_a_fault(
+    recorder: tuple[Recorder, list[list[int]]],
+) -> None:
+    _, trace = recorder
+    gates, faults = 3, 13
+    settled = trace[drive.WARM_UP :]
+    assert all(row[gates] == 1 for row in settled)
+    assert trace[-1][faults] == 0
+    assert min(row[5] for row in settled) < -2000 < 2000 < max(row[5] for row in settled)  # i_q
+    assert len({tuple(row[:3]) for row in settled}) > ENOUGH // 2
+    acted = [row[9] ** 2 + row[10] ** 2 for row in settled]  # u_d, u_q
+    assert max(acted) > (0.55 * 350 / 525 * 32768) ** 2
+    assert max(abs(row[16]) for row in settled) > 0  # the magnet is being identified

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The drive's own cost: fast ISR, MRAI ISR and their stages on the emulated Cortex-M4.
+
+The firmware runs in closed loop with a small linear machine of this file's own, sampled once per
+period: torque steps in both directions at constant speed, then a run-up into the voltage limit.
+Nothing of the machine is meant to be accurate; it only keeps currents and duties where a drive's are.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from fluxtrue_tools.bench.build import FIRMWARE, ROOT, build_host, build_target
+from fluxtrue_tools.bench.machine import Machine
+from fluxtrue_tools.motor.build import build as build_motor
+
+LTO = ("-flto",)
+OUTPUTS = 20
+SUB_STEPS = 10
+TORQUE = 13653  # q15 of the base: about 100 N·m of hsm1
+TORQUES = (TORQUE, -TORQUE // 2, TORQUE // 3, TORQUE)
+PERIODS, RUN_UP_FROM, WARM_UP, STEP_PERIODS = 2400, 1600, 100, 200
+RPM, RPM_TOP = 3000.0, 6500.0
+
+
+class Processor(Protocol):
+    """Where the program runs."""
+
+    def call(self, symbol: str, *arguments: int) -> int: ...
+
+    def outputs(self) -> list[int]: ...
+
+
+class Target:
+    """The emulated core."""
+
+    def __init__(self, path: Path) -> None:
+        self.machine = Machine(path)
+
+    def call(self, symbol: str, *arguments: int) -> int:
+        return self.machine.call(symbol, *arguments)
+
+    def outputs(self) -> list[int]:
+        address = self.machine.call("drive_outputs") & 0xFFFF_FFFF
+        return np.frombuffer(self.machine.read(address, 4 * OUTPUTS), dtype="<i4").tolist()
+
+
+class Host:
+    """This computer, from the same sources."""
+
+    def __init__(self, path: Path) -> None:
+        self.library = ctypes.CDLL(str(path))
+        self.library.drive_outputs.restype = ctypes.POINTER(ctypes.c_int32)
+
+    def call(self, symbol: str, *arguments: int) -> int:
+        getattr(self.library, symbol)(*(ctypes.c_uint32(a & 0xFFFF_FFFF) for a in arguments))
+        return 0
+
+    def outputs(self) -> list[int]:
+        return list(self.library.drive_outputs()[:OUTPUTS])
+
+
+def sources(folder: Path) -> list[Path]:
+    """All of the firmware with the tables of hsm1, which are generated into the folder."""
+    build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
+    firmware = [path for layer in ("fx", "signal", "control", "safety", "app") for path in (FIRMWARE / layer).glob("*.c")]
+    return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
+
+
+def build_drive(folder: Path) -> Path:
+    """The program for the target, optimised across files as the m4f preset does."""
+    return build_target(folder / "drive.elf", sources(folder), (*LTO, f"-I{ROOT}"))
+
+
+def build_drive_host(folder: Path, flags: tuple[str, ...] = ()) -> Path:
+    """The same program as a shared library."""
+    return build_host(folder / "drive.so", sources(folder), (f"-I{ROOT}", *flags))
+
+
+@dataclass
+class Load:
+    """A permanent-magnet machine with constant inductances on an average-value inverter."""
+
+    l_d: float = 454e-6
+    l_q: float = 1.2e-3
+    psi_f: float = 0.0717
+    r: float = 0.018
+    pole_pairs: int = 3
+    v_dc: float = 350.0
+    period_s: float = 1e-4
+    theta: float = 0.0
+    psi: list[float] = field(default_factory=lambda: [0.0717, 0.0])
+
+    def currents(self) -> tuple[float, float]:
+        return (self.psi[0] - self.psi_f) / self.l_d, self.psi[1] / self.l_q
+
+    def phases(self) -> list[float]:
+        i_d, i_q = self.currents()
+        return [i_d * math.cos(self.theta - x) - i_q * math.sin(self.theta - x)
+                for x in (0.0, 2 * math.pi / 3, -2 * math.pi / 3)]  # fmt: skip
+
+    def theta_m(self) -> int:
+        return int(self.theta / (2 * math.pi * self.pole_pairs) * 2**32) & 0xFFFF_FFFF
+
+    def run(self, duty: list[int], gates: bool, omega: float) -> None:
+        """One period; with the gates closed the rotor turns and no current flows."""
+        a, b, c = (d / 32768.0 * self.v_dc for d in duty)
+        alpha, beta = (2 * a - b - c) / 3, (b - c) / math.sqrt(3)
+        step = self.period_s / SUB_STEPS
+        for _ in range(SUB_STEPS):
+            cos, sin = math.cos(self.theta), math.sin(self.theta)
+            if gates:
+                i_d, i_q = self.currents()
+                u_d, u_q = alpha * cos + beta * sin, beta * cos - alpha * sin
+                rate_d = u_d - self.r * i_d + omega * self.psi[1]
+                rate_q = u_q - self.r * i_q - omega * self.psi[0]
+                self.psi = [self.psi[0] + step * rate_d, self.psi[1] + step * rate_q]
+            self.theta += step * omega
+
+
+def _counts(amperes: float, noise: float) -> int:
+    return min(max(round(((amperes + noise) / 800.0 + 0.5) * 4096), 0), 4095)
+
+
+def periods(drive: Processor, seed: int = 1) -> Iterator[int]:
+    """Run the drive against the machine: after each yield the ISRs of that period are wanted."""
+    rng = np.random.default_rng(seed)
+    load = Load()
+    duty, gates = [16384] * 3, False
+    drive.call("drive_start")
+    for k in range(PERIODS):
+        rpm = RPM + (RPM_TOP - RPM) * max(k - RUN_UP_FROM, 0) / (PERIODS - RUN_UP_FROM)
+        a, b, c = (_counts(i, rng.normal(0.0, 0.5)) for i in load.phases())
+        drive.call("drive_request", TORQUES[(k // STEP_PERIODS) % len(TORQUES)], 1)
+        drive.call("drive_sample", a | b << 16, c | int(load.v_dc / 525.0 * 4096) << 16, load.theta_m())
+        yield k
+        acting = duty, gates
+        if k % 10 == 9:
+            drive.call("bench_task")
+        state = drive.outputs()
+        duty, gates = state[:3], bool(state[3])
+        load.run(*acting, rpm * math.pi / 30 * load.pole_pairs)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Instructions of one stage over the run."""
+
+    name: str  # bench_<name>
+    title: str
+    minimum: int
+    average: float
+    maximum: int
+
+
+TITLES = {
+    "current_tick": "current control, counts to duties",
+    "flux_table": "flux tables, all outputs",
+    "mrai": "MRAI",
+    "torque_estimate": "torque estimate",
+    "fast_isr": "fast ISR, with monitors and exchange",
+    "mrai_isr": "MRAI ISR",
+    "both": "both ISRs: the whole 10 kHz work",
+}
+
+
+def measure_drive(path: Path) -> tuple[list[Stage], int, int]:
+    """Stages, counted periods, and how many of them had the voltage limited."""
+    target = Target(path)
+    machine = target.machine
+    overhead = machine.count("bench_nothing")[1]
+    seen: dict[str, list[int]] = {name: [] for name in TITLES}
+    limited = 0
+    for k in periods(target):
+        issued = {}
+        machine.call("drive_copy")
+        for name in ("flux_table", "mrai", "torque_estimate", "current_tick", "fast_isr", "mrai_isr"):
+            issued[name] = machine.count(f"bench_{name}")[1] - overhead
+        issued["both"] = issued["fast_isr"] + issued["mrai_isr"]
+        if k < WARM_UP:
+            continue
+        limited += machine.call("drive_limited") & 1
+        for name, number in issued.items():
+            seen[name].append(number)
+    stages = [Stage(name, title, min(seen[name]), float(np.mean(seen[name])), max(seen[name]))
+              for name, title in TITLES.items()]  # fmt: skip
+    return stages, PERIODS - WARM_UP, limited

@@ -1,0 +1,174 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* One drive on a hardware interface made of variables, and its stages as functions of their own.
+ * The stages work on a copy of the drive: they see the state that the interrupt will see, and
+ * leave none behind. Compiled for the target and, for comparison, for this computer. */
+#include "app/drive.h"
+#include "control/transform.h"
+#include "hal/adc.h"
+#include "hal/angle.h"
+#include "hal/irq.h"
+#include "hal/pwm.h"
+
+/* Called by name only; a stage is compiled as one piece, as it is in the interrupt. */
+#define CALLED __attribute__((used, externally_visible, noinline))
+#define STAGE __attribute__((used, externally_visible, noinline, flatten))
+
+enum { OUTPUTS = 20 };
+
+void drive_start(void);
+void drive_request(int32_t torque, uint32_t enable);
+void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m);
+void drive_copy(void);
+uint32_t drive_limited(void);
+const int32_t *drive_outputs(void);
+void bench_nothing(void);
+void bench_fast_isr(void);
+void bench_mrai_isr(void);
+void bench_task(void);
+void bench_flux_table(void);
+void bench_mrai(void);
+void bench_torque_estimate(void);
+void bench_current_tick(void);
+
+static struct {
+    adc_counts_t counts;
+    uint32_t theta_m;
+    duty_t duty;
+    bool gates;
+} port;
+static drive_t drive;
+static drive_t copy;
+static flux_point_t flux;
+static int32_t outputs[OUTPUTS];
+
+void hal_adc_read(adc_counts_t *counts)
+{
+    *counts = port.counts;
+}
+
+uint32_t hal_angle_read(void)
+{
+    return port.theta_m;
+}
+
+void hal_pwm_write(duty_t duty)
+{
+    port.duty = duty;
+}
+
+void hal_pwm_enable(bool on)
+{
+    port.gates = on;
+}
+
+void hal_irq_pend_mrai(void)
+{
+}
+
+CALLED void drive_start(void)
+{
+    drive_init(&drive, &motor);
+}
+
+CALLED void drive_request(int32_t torque, uint32_t enable)
+{
+    drive.request.torque = (q15_t)torque;
+    drive.request.enable = enable != 0U;
+}
+
+CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
+{
+    port.counts = (adc_counts_t){(uint16_t)i_ab, (uint16_t)(i_ab >> 16), (uint16_t)i_c_v_dc, (uint16_t)(i_c_v_dc >> 16)};
+    port.theta_m = theta_m;
+}
+
+CALLED void drive_copy(void)
+{
+    copy = drive;
+}
+
+CALLED uint32_t drive_limited(void)
+{
+    return (drive.fast.current_control.limited || drive.fast.modulated.limited) ? 1U : 0U;
+}
+
+/* Duties and gates first, then everything that lives on from one period to the next. */
+CALLED const int32_t *drive_outputs(void)
+{
+    const fast_state_t *fast = &drive.fast;
+    const mrai_state_t *mrai = &drive.slow.mrai;
+    const sample_t *sample = sample_box_look(&drive.samples);
+    const int32_t all[OUTPUTS] = {
+        port.duty.a, port.duty.b, port.duty.c, port.gates,
+        sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
+        fast->modulated.acted.d, fast->modulated.acted.q, fast->current_control.s_d, fast->current_control.s_q,
+        (int32_t)fast->faults, mrai->e_d_q30, mrai->e_q_q30, mrai->psi_delta, mrai->r_delta,
+        drive.slow.torque.sum, drive.slow.torque.mean,
+    };
+    for (int k = 0; k < OUTPUTS; k++) {
+        outputs[k] = all[k];
+    }
+    return outputs;
+}
+
+CALLED void bench_nothing(void)
+{
+    __asm__ volatile("");
+}
+
+CALLED void bench_fast_isr(void)
+{
+    fast_isr(&drive);
+}
+
+CALLED void bench_mrai_isr(void)
+{
+    mrai_isr(&drive);
+}
+
+CALLED void bench_task(void)
+{
+    task_1khz(&drive);
+}
+
+/* From the measured currents to every table output, in memory. */
+STAGE void bench_flux_table(void)
+{
+    flux = flux_table_step(&copy.motor.flux_table, sample_box_look(&copy.samples)->mrai.i);
+}
+
+STAGE void bench_mrai(void)
+{
+    const mrai_schedule_t *schedule = schedule_box_read(&copy.schedules);
+    mrai_step(&copy.motor.mrai, schedule, &copy.slow.mrai, &sample_box_look(&copy.samples)->mrai);
+}
+
+STAGE void bench_torque_estimate(void)
+{
+    const mrai_in_t *in = &sample_box_look(&copy.samples)->mrai;
+    (void)torque_estimate_step(&copy.slow.torque, in->i, &in->flux, copy.slow.mrai.psi_delta);
+}
+
+/* From converter counts and angle to duties; what the tables answer was found before. */
+STAGE void bench_current_tick(void)
+{
+    const motor_t *m = &copy.motor;
+    const measure_t measured = measure_step(&m->measure, &port.counts);
+    const angle_t angle = angle_tracker_step(&m->angle_tracker, &copy.fast.angle_tracker, port.theta_m);
+    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
+    const fx_sincos_t at = fx_sincos((uint16_t)((angle.theta_e + 0x8000U) >> 16));
+    const current_control_in_t control = {
+        .target = &command_box_read(&copy.commands)->target,
+        .flux = &flux,
+        .omega = fx_q15_from_q31(angle.omega_q31),
+        .psi_delta = copy.slow.psi_delta_q15,
+        .v_dc = measured.v_dc,
+    };
+    const modulate_in_t modulation = {
+        .u = current_control_step(&m->current_control, &copy.fast.current_control, &control),
+        .i = park(clarke(measured.i), at),
+        .advanced = fx_sincos((uint16_t)((ahead + 0x8000U) >> 16)),
+        .v_dc = measured.v_dc,
+    };
+    modulate_step(&m->modulate, &modulation, &copy.fast.modulated);
+}
