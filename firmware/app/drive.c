@@ -20,12 +20,3 @@ void drive_raise_fault(drive_t *drive, uint32_t fault)
 {
     drive->fast.faults = drive->fast.faults | fault;
 }
-
-void drive_identification_reset(drive_t *drive)
-{
-    const sample_t sample = sample_box_read(&drive->samples);
-    drive->slow.mrai = (mrai_state_t){0};
-    mrai_reset(&drive->slow.mrai, &sample.mrai); /* the period in progress goes on from this sample, not from zero flux */
-    drive->slow.psi_delta_q15 = 0;
-    drive->task.quality = (mrai_quality_t){0};
-}

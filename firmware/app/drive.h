@@ -25,12 +25,13 @@ typedef struct {
     bool current_mode;   /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
     bool identification;
-    bool fault_reset;    /* taken and cleared by the task while enable is off */
+    uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
+    uint32_t identification_resets; /* counted up: what was identified is forgotten once */
 } request_t;
 
 typedef enum { RUN_STATE_OFF = 0, RUN_STATE_RUN = 1, RUN_STATE_FAULT = 2 } run_state_t;
 
-/** Written by the fast ISR alone. */
+/** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */
 typedef struct {
     angle_tracker_state_t angle_tracker;
     current_control_state_t current_control;
@@ -42,13 +43,15 @@ typedef struct {
     uint32_t overruns;
     uint32_t pended;             /* identifications asked for */
     sample_t lost;               /* takes the sample of a period that finds both slots in use */
-    volatile uint32_t faults;    /* set here (and by drive_raise_fault), cleared by the task while off */
+    uint32_t fault_resets;       /* of the command, as far as done */
+    volatile uint32_t faults;    /* latched */
 } fast_state_t;
 
 /** Written by the MRAI ISR alone; psi_delta_q15 is one half word for the fast ISR. */
 typedef struct {
     mrai_state_t mrai;
     torque_estimate_state_t torque;
+    uint32_t identification_resets; /* of the request, as far as done */
     volatile uint32_t finished;
     volatile q15_t psi_delta_q15;
 } slow_state_t;
@@ -61,6 +64,9 @@ typedef struct {
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
     run_state_t run_state;
+    uint32_t fault_resets_asked;    /* of the request, as far as seen */
+    uint32_t fault_resets;          /* passed on to the fast ISR */
+    uint32_t identification_resets; /* of the request, as far as the quality is concerned */
 } task_state_t;
 
 typedef struct {
@@ -76,7 +82,6 @@ typedef struct {
 
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
-void drive_identification_reset(drive_t *drive);
 
 void fast_isr(drive_t *drive);
 void mrai_isr(drive_t *drive);

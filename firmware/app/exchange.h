@@ -33,6 +33,7 @@ typedef struct {
 typedef struct {
     current_target_t target;
     bool run;
+    uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
 } command_t;
 
 typedef struct {

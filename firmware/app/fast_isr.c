@@ -56,7 +56,6 @@ static void publish(drive_t *drive, sample_t *sample)
     sample->mrai.u = fast->acting;
     sample->acting = fast->periods_on >= PERIODS_TO_ACT;
     sample->voltage_limited = fast->current_control.limited || fast->modulated.limited;
-    watch(drive, fast->pended - drive->slow.finished);
     if (sample != &fast->lost) {
         sample_box_publish(&drive->samples);
     }
@@ -94,13 +93,24 @@ static void bridge_on(drive_t *drive, const sample_t *sample, const instant_t *n
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 
+/* A reset comes before this period's monitors: what is still wrong is latched again at once. Bad motor data stay bad. */
+static void forget_faults(drive_t *drive, uint32_t asked)
+{
+    if (drive->fast.fault_resets != asked) {
+        drive->fast.fault_resets = asked;
+        drive->fast.faults = drive->fast.faults & FAULT_CONFIG;
+    }
+}
+
 /* Everything the period needs is compiled into the one interrupt, with a compiler that sees all files. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
-    const bool late = drive->fast.pended - drive->slow.finished > 1U;
-    sample_t *sample = late ? &drive->fast.lost : sample_box_begin(&drive->samples);
+    const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
+    sample_t *sample = (unfinished > 1U) ? &drive->fast.lost : sample_box_begin(&drive->samples);
     const instant_t now = observe(drive, sample);
     const command_t *command = command_box_read(&drive->commands);
+    forget_faults(drive, command->fault_resets);
+    watch(drive, unfinished);
     const monitor_in_t seen = {now.i, sample->v_dc, now.angle.jumped};
 
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);

@@ -7,7 +7,11 @@ void mrai_isr(drive_t *drive)
     const uint32_t asked = drive->fast.pended;
     const sample_t *sample = sample_box_look(&drive->samples);
 
-    if (sample->acting) {
+    if (drive->request.identification_resets != slow->identification_resets) {
+        slow->identification_resets = drive->request.identification_resets;
+        slow->mrai = (mrai_state_t){0};
+        mrai_reset(&slow->mrai, &sample->mrai); /* goes on from this sample, not from zero flux */
+    } else if (sample->acting) {
         mrai_step(&drive->motor.mrai, schedule_box_read(&drive->schedules), &slow->mrai, &sample->mrai);
     } else {
         mrai_reset(&slow->mrai, &sample->mrai); /* the bridge was off: its voltage is not ours, only the currents are known */

@@ -5,16 +5,20 @@
 
 static run_state_t supervise(drive_t *drive)
 {
-    if (drive->request.fault_reset) {
-        drive->request.fault_reset = false;
-        if (!drive->request.enable) {
-            drive->fast.faults = drive->fast.faults & FAULT_CONFIG; /* bad motor data stay bad */
-        }
+    const request_t *request = &drive->request;
+    task_state_t *task = &drive->task;
+    if (request->fault_resets != task->fault_resets_asked) {
+        task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not kept for later */
+        task->fault_resets += request->enable ? 0U : 1U;
+    }
+    if (request->identification_resets != task->identification_resets) {
+        task->identification_resets = request->identification_resets;
+        task->quality = (mrai_quality_t){0};
     }
     if (drive->fast.faults != 0) {
         return RUN_STATE_FAULT;
     }
-    return drive->request.enable ? RUN_STATE_RUN : RUN_STATE_OFF;
+    return request->enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* Request -> limits -> slew -> torque loop -> what the current reference is asked for. */
@@ -65,7 +69,7 @@ void task_1khz(drive_t *drive)
 
     mrai_in_t next = sample.mrai;
 
-    command_t command = {.run = task->run_state == RUN_STATE_RUN};
+    command_t command = {.run = task->run_state == RUN_STATE_RUN, .fault_resets = task->fault_resets};
     if (command.run) {
         next.i = references(drive, &sample);
         next.flux = flux_table_step(&drive->motor.flux_table, next.i);

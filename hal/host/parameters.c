@@ -51,7 +51,9 @@ GETTER(torque_command, d->torque_command_Nm)
 GETTER(enable, d->drive.request.enable)
 GETTER(torque_loop, d->drive.request.torque_loop)
 GETTER(identification, d->drive.request.identification)
-GETTER(fault_reset, d->drive.request.fault_reset)
+/* 1 until the task has taken it. */
+GETTER(fault_reset, d->drive.request.fault_resets != d->drive.task.fault_resets_asked)
+GETTER(identification_reset, d->drive.request.identification_resets != d->drive.slow.identification_resets)
 GETTER(current_mode, d->drive.request.current_mode)
 GETTER(torque_estimate, pu15(d->drive.slow.torque.mean, bases(d)->torque_Nm))
 GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
@@ -114,7 +116,7 @@ static void set_identification(fluxtrue_t *d, double x)
 
 static void set_fault_reset(fluxtrue_t *d, double x)
 {
-    d->drive.request.fault_reset = x != 0.0;
+    d->drive.request.fault_resets += (x != 0.0) ? 1U : 0U;
 }
 
 static void set_current_mode(fluxtrue_t *d, double x)
@@ -134,15 +136,7 @@ static void set_iq_ref(fluxtrue_t *d, double x)
 
 static void set_identification_reset(fluxtrue_t *d, double x)
 {
-    if (x != 0.0) {
-        drive_identification_reset(&d->drive);
-    }
-}
-
-static double get_zero(const fluxtrue_t *d)
-{
-    (void)d;
-    return 0.0;
+    d->drive.request.identification_resets += (x != 0.0) ? 1U : 0U;
 }
 
 /* The range of torque and current is the motor's own: see limits_of(). */
@@ -152,7 +146,7 @@ static const parameter_t parameters[] = {
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
     {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
-    {"identification_reset", get_zero, set_identification_reset, 0.0, 1.0},
+    {"identification_reset", get_identification_reset, set_identification_reset, 0.0, 1.0},
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
     {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
     {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},

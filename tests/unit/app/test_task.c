@@ -26,6 +26,13 @@ static const mrai_schedule_t *schedule(void)
     return &drive.schedules.slot[drive.schedules.generation & 1U];
 }
 
+/* What the task asks is done by the fast ISR of the next period. */
+static void task_and_period(void)
+{
+    task_1khz(&drive);
+    seam_period();
+}
+
 void test_the_shipped_motor_is_valid_and_starts_off(void)
 {
     TEST_ASSERT_TRUE(motor_valid(&motor));
@@ -53,17 +60,29 @@ void test_a_fault_is_reset_only_while_enable_is_off(void)
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
     TEST_ASSERT_FALSE(command()->run);
-    drive.request.fault_reset = true;
-    task_1khz(&drive);
-    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
-    TEST_ASSERT_FALSE(drive.request.fault_reset); /* taken, refused, not kept for later */
+    drive.request.fault_resets++; /* taken, refused, not kept for later */
+    task_and_period();
     drive.request.enable = false;
-    task_1khz(&drive);
+    task_and_period();
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
-    drive.request.fault_reset = true;
-    task_1khz(&drive);
-    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    drive.request.fault_resets++;
+    task_and_period();
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    task_and_period();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+}
+
+void test_a_fault_that_is_still_there_is_latched_again_at_once(void)
+{
+    seam_run();
+    seam.counts.i_a = 4095;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults & FAULT_OVER_CURRENT);
+    drive.request.enable = false;
+    drive.request.fault_resets++;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults & FAULT_OVER_CURRENT);
 }
 
 void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
@@ -73,8 +92,8 @@ void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
     bad.monitor.i_trip = 26215; /* 0.8: would trip after the converter's end stop */
     drive_init(&drive, &bad);
     TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
-    drive.request.fault_reset = true;
-    task_1khz(&drive);
+    drive.request.fault_resets++;
+    task_and_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
     seam_run();
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
