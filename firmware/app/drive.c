@@ -1,11 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
 
+static bool control_valid(const motor_t *m)
+{
+    const current_control_config_t *c = &m->current_control;
+    return c->sigma_gain > 0 && c->setpoint_weight > 0 && c->integral_gain >= 0 && c->integral_gain < Q15(0.5) &&
+           c->tracking_gain >= 0 && c->tracking_gain < Q15(0.5) && c->v_ratio > 0 && c->v_ratio < Q15(0.7) &&
+           m->torque_loop.authority > 0 && m->torque_loop.torque_min > 0 && m->modulate.v_dc_min > 1 &&
+           m->modulate.knee_gain > 0 && m->modulate.knee_gain < (1 << 29);
+}
+
 bool motor_valid(const motor_t *m)
 {
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
-           mrai_valid(&m->mrai) && m->modulate.v_dc_min > 1 && m->modulate.knee_gain > 0 && m->modulate.knee_gain < (1 << 29);
+           m->monitor.sum_max > 0 && mrai_valid(&m->mrai) && control_valid(m);
 }
 
 void drive_init(drive_t *drive, const motor_t *source)

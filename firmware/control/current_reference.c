@@ -10,7 +10,9 @@
 bool current_reference_valid(const current_reference_config_t *config)
 {
     const fx_grid_t *grid = &config->grid;
-    if (!config->i_d || !config->i_q || !config->torque_max.y || grid->nx < 2 || grid->ny < 2 || config->i_max <= 0) {
+    const bool axes = fx_axis_valid(grid->x_shift, grid->nx) && fx_axis_valid(grid->y_shift, grid->ny) &&
+                      fx_axis_valid(config->torque_max.shift, config->torque_max.n);
+    if (!config->i_d || !config->i_q || !config->torque_max.y || !axes || config->i_max <= 0) {
         return false;
     }
     for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {

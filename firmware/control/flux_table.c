@@ -9,7 +9,9 @@ bool flux_table_valid(const flux_table_config_t *config)
 {
     const fx_grid_t *grid = &config->grid;
     const bool tables = config->l_d && config->l_q && config->l_qq && config->g_d && config->g_q && config->psi_f0;
-    if (!tables || grid->nx < 2 || grid->ny < 2 || grid->y0 != 0 || grid->y_shift != grid->x_shift || config->l_shift > 13) {
+    const bool axes = fx_axis_valid(grid->x_shift, grid->nx) && fx_axis_valid(grid->y_shift, grid->ny) &&
+                      grid->y0 == 0 && grid->y_shift == grid->x_shift;
+    if (!tables || !axes || config->l_shift > 13) {
         return false;
     }
     for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {

@@ -115,6 +115,15 @@ void test_every_part_of_the_motor_data_is_checked(void)
     BAD(m.monitor.v_min = m.monitor.v_max);
     BAD(m.mrai.r0 = 0);
     BAD(m.modulate.v_dc_min = 0);
+    BAD(m.modulate.knee_gain = 0);
+    BAD(m.monitor.sum_max = 0);
+    BAD(m.current_control.sigma_gain = 0);
+    BAD(m.current_control.setpoint_weight = 0);
+    BAD(m.current_control.integral_gain = 16384);
+    BAD(m.current_control.tracking_gain = 16384);
+    BAD(m.current_control.v_ratio = 0);
+    BAD(m.torque_loop.authority = 0);
+    BAD(m.torque_loop.torque_min = 0);
 }
 
 void test_the_torque_request_is_limited_and_slewed(void)

@@ -172,6 +172,12 @@ void test_a_complete_table_is_accepted_and_a_broken_one_rejected(void)
     c.grid.ny = 1;
     TEST_ASSERT_FALSE(current_reference_valid(&c));
     c = f.current_reference;
+    c.torque_max.n = 1;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
+    c.torque_max.shift = 15;
+    TEST_ASSERT_FALSE(current_reference_valid(&c));
+    c = f.current_reference;
     c.i_max = 0;
     TEST_ASSERT_FALSE(current_reference_valid(&c));
     c = f.current_reference;

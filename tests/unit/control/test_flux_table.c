@@ -162,6 +162,12 @@ void test_a_grid_without_a_cell_or_with_an_impossible_shift_is_rejected(void)
     c.grid.y0 = 1;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
+    c.grid.x_shift = c.grid.y_shift = 15;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.grid.x_shift++;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
     c.l_shift = 15;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
 }
