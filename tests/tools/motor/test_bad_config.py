@@ -44,6 +44,10 @@ BAD = [
     ({"inverter": {"v_dc_full_scale_V": 400.0}}, ["inverter.v_dc_full_scale_V = 400", "455"]),
     ({"inverter": {"v_dc_full_scale_V": 3000.0}}, ["v_dc_full_scale_V"]),
     ({"inverter": {"device_drop_V": 9.0}, "machine": {}}, None),  # 9 V of 350 V: allowed
+    ({"machine": {"ld_H": 0.0}}, ["machine.ld_H = 0.0", "above 0 up to 1"]),
+    ({"inverter": {"min_pulse_s": -1.0}}, ["inverter.min_pulse_s = -1.0", "from 0 to 2e-05"]),
+    ({"machine": {"flux_map": '""'}}, ["machine.flux_map = ''", "1 to 255 characters"]),
+    ({"machine": {"r_ohm": "9" * 400}}, ["machine.r_ohm = 999", "...", "above 0 up to 100"]),
     ({"machine": {"ld_H": 5e-6}}, ["5e-06 H is too small", "raise pwm_hz or current_full_scale_A"]),
 ]
 

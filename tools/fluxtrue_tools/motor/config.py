@@ -12,6 +12,8 @@ from fluxtrue_tools.errors import FluxtrueError
 
 FILE_NAME = "motor.toml"
 
+SHOWN_MAX = 60  # characters of a bad value in a message
+
 TRIP_PER_I_MAX = 1.2
 TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
@@ -124,12 +126,13 @@ def _allowed(section: type[BaseModel], key: str) -> str:
     metadata, kind = list(field.metadata), field.annotation
     for part in getattr(kind, "__args__", ()):  # X | None
         if part is not type(None):
-            metadata += list(getattr(part, "__metadata__", ()))
+            for item in getattr(part, "__metadata__", ()):
+                metadata += getattr(item, "metadata", [item])  # pydantic keeps the limits one level down
             kind = getattr(part, "__origin__", part)
     if kind is str:
         if key == "name":
             return "1 to 48 letters, digits, spaces or _ . + -"
-        return "a text"
+        return "1 to 255 characters"
     noun = "a whole number" if kind is int else "a finite number"
     return f"{noun} {_range_text(metadata)}".rstrip()
 
@@ -151,9 +154,11 @@ def _message(error: dict[str, Any]) -> str:
         if len(location) > 1 and section:
             return f"{name}: missing, wanted: {_allowed(section, location[1])}"
         return f"[{name}]: section missing"
+    shown = repr(error["input"])
+    shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX - 3]}..."
     if section and len(location) > 1:
-        return f"{name} = {error['input']!r}, allowed: {_allowed(section, location[1])}"
-    return f"{name} = {error['input']!r}, allowed: a section [{name}]"
+        return f"{name} = {shown}, allowed: {_allowed(section, location[1])}"
+    return f"{name} = {shown}, allowed: a section [{name}]"
 
 
 def _fail(path: Path, text: str) -> None:
@@ -221,7 +226,7 @@ def _check_drop(path: Path, config: MotorConfig) -> None:
 
 def _read_toml(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise FluxtrueError(f"{path}: no such file; a motor is a folder with {FILE_NAME}") from None
     except NotADirectoryError:
