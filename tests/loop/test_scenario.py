@@ -72,6 +72,9 @@ def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
             "the profile drives it",
         ),
         ("motor = ", "not TOML"),
+        (HEAD + "seed = " + "9" * 5000, "not TOML"),
+        (HEAD + "[profile]\ntorque_Nm = 1" + "0" * 400, "profile.torque_Nm.0.1 = inf"),
+        (HEAD + "[profile]\ntorque_Nm = [[0, 1" + "0" * 400 + "]]", "profile.torque_Nm"),
     ],
 )
 def test_a_bad_scenario_is_refused_in_one_line_that_names_file_and_field(text: str, message: str) -> None:

@@ -52,6 +52,17 @@ BAD = [
 ]
 
 
+def test_a_byte_order_mark_is_no_error(write):
+    path = write() / "motor.toml"
+    path.write_text("\ufeff" + path.read_text(encoding="utf-8"), encoding="utf-8")
+    assert load_config(path.parent).machine.name == "bench"
+
+
+def test_a_number_of_thousands_of_digits_is_refused(write):
+    with pytest.raises(FluxtrueError, match="not valid TOML"):
+        load_config(write(machine={"pole_pairs": "9" * 5000}))
+
+
 @pytest.mark.parametrize(("changes", "words"), [case for case in BAD if case[1]])
 def test_a_bad_value_is_named_with_file_field_value_and_range(write, changes, words):
     with pytest.raises(FluxtrueError) as error:

@@ -235,7 +235,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise FluxtrueError(f"{path}: not UTF-8 text") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
         raise FluxtrueError(f"{path}: not valid TOML: {error}") from None
 
 

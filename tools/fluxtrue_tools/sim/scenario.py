@@ -17,7 +17,12 @@ class _Strict(BaseModel):
 
 def _number(value: Any) -> Any:
     """TOML tells 1 from 1.0; nobody who writes a speed of 1000 means anything by it."""
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 Number = Annotated[float, BeforeValidator(_number)]
@@ -36,7 +41,7 @@ def _points(value: Any) -> Any:
             isinstance(point, list)
             and len(point) == 2
             and all(isinstance(x, int | float) and not isinstance(x, bool) for x in point)
-            and all(math.isfinite(x) for x in point)
+            and all(math.isfinite(_number(x)) for x in point)
         ):
             raise ValueError("allowed: a number, or a list of [t, value]")
         points.append((float(point[0]), float(point[1])))
@@ -255,16 +260,16 @@ def parse(text: str, name: str) -> Scenario:
     """A scenario from TOML text; `name` is for messages."""
     try:
         return Scenario.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise FluxtrueError(f"{name}: not TOML: {error}") from error
     except ValidationError as error:
         raise FluxtrueError(f"{name}: {_explain(error)}") from error
+    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
+        raise FluxtrueError(f"{name}: not TOML: {error}") from error
 
 
 def read(path: Path) -> Scenario:
     """A scenario file."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
