@@ -31,6 +31,7 @@ BAD = [
     (GOOD.replace("psi_q_Vs", "psi_d_Vs"), ["psi_d_Vs found 2 times"]),
     (changed(5, "-300.0,150.0,nan,0.075"), ["flux_map.csv:5", "psi_d_Vs = nan", "finite"]),
     (changed(5, "-300.0,inf,0.024,0.075"), ["flux_map.csv:5", "iq_A = inf", "finite"]),
+    (changed(5, "-300.0,150.0,0_1,0.075"), ["flux_map.csv:5", "psi_d_Vs = '0_1'", "a number"]),
     (changed(5, "-300.0,150.0,abc,0.075"), ["flux_map.csv:5", "psi_d_Vs = 'abc'", "a number"]),
     (changed(5, "-300.0,150.0,0.024"), ["flux_map.csv:5", "3 columns", "4 as in the header"]),
     (changed(5, "-300.0,150.0,,0.075"), ["flux_map.csv:5", "psi_d_Vs = ''"]),
@@ -75,3 +76,10 @@ def test_a_map_that_is_a_folder_or_no_text_is_refused(write, folder):
     (folder / "flux_map.csv").mkdir()
     with pytest.raises(FluxtrueError, match="cannot be read"):
         load_motor(folder)
+
+
+@pytest.mark.parametrize(("name", "word"), [("/dev/zero", "not a file"), (".", "not a file"),
+                                            ("a\\u0000b", "machine.flux_map = ")])
+def test_a_map_that_is_no_file_is_refused_and_not_read_for_ever(write, name, word):
+    with pytest.raises(FluxtrueError, match=word):
+        load_motor(write(machine={"flux_map": f'"{name}"', "ld_H": None, "lq_H": None, "psi_f_Vs": None}))

@@ -3,6 +3,7 @@
 
 import csv
 import math
+import stat
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from fluxtrue_tools.motor.flux_model import Array, SplineModel
 COLUMNS = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
 NODES_MIN = 4
 ROWS_MAX = 1_000_000
+SIZE_MAX = 200_000_000  # bytes
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class _Grid:
 
 def _number(path: Path, line: int, column: str, text: str) -> float:
     try:
-        value = float(text)
+        value = float(text.replace("_", "?"))  # Python would take 1_0 for 10
     except ValueError:
         raise FluxtrueError(f"{path}:{line}: {column} = '{text.strip()[:40]}', allowed: a number") from None
     if not math.isfinite(value):
@@ -58,13 +60,20 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
 
 def _lines(path: Path) -> list[tuple[int, str]]:
     try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise FluxtrueError(f"{path}: cannot be read: not a file")
+        if status.st_size > SIZE_MAX:
+            raise FluxtrueError(f"{path}: {status.st_size} bytes, allowed: up to {SIZE_MAX}")
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise FluxtrueError(f"{path}: no such file, named by machine.flux_map") from None
+    except ValueError as error:
+        if isinstance(error, UnicodeDecodeError):
+            raise FluxtrueError(f"{path}: not UTF-8 text") from None
+        raise FluxtrueError(f"machine.flux_map = {path.name!r}: {error}") from None  # a NUL in the name
     except OSError as error:
         raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FluxtrueError(f"{path}: not UTF-8 text") from None
     numbered = enumerate(text.splitlines(), start=1)
     return [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
 
