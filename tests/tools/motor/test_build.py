@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import MOTORS, ROOT
 
+from fluxtrue_tools.cli import run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.build import build
 from fluxtrue_tools.motor.flux_tables import lookup_flux
@@ -103,6 +104,18 @@ def test_check_prints_the_report_and_what_symmetrising_removed(cli):
     assert (result.returncode, result.stderr) == (0, "")
     for words in ("psi_d max 0.919 mVs", "psi_q max 10.649 mVs", "error against map", "flash: ", "MTPA"):
         assert words in result.stdout
+
+
+def test_check_refuses_what_build_refuses_and_both_name_the_file(write, tmp_path, monkeypatch, capsys):
+    def unfit(motor):
+        raise FluxtrueError("gain = 2 does not fit")
+
+    monkeypatch.setattr("fluxtrue_tools.motor.build.motor_tables_c", unfit)
+    folder = write()
+    for arguments in (["check"], ["build", "--out", str(tmp_path / "out")]):
+        assert run(["motor", *arguments, str(folder)]) == 2
+        assert capsys.readouterr().err == f"error: {folder / 'motor.toml'}: gain = 2 does not fit\n"
+    assert not (tmp_path / "out").exists()
 
 
 def test_check_writes_plots_only_when_asked(cli, write, tmp_path):

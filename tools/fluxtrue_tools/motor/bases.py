@@ -64,7 +64,7 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
         if voltage <= voltage_max:
             break
     else:
-        raise FluxtrueError(f"motor '{config.machine.name}': incremental inductance {l_min:.3g} H is too small: "
+        raise FluxtrueError(f"incremental inductance {l_min:.3g} H is too small: "
                             f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
                             f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
                             f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)")

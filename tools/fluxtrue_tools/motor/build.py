@@ -11,14 +11,15 @@ from pathlib import Path
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.emit_c import motor_si_c, motor_tables_c
 from fluxtrue_tools.motor.emit_json import motor_json
-from fluxtrue_tools.motor.motor import Motor, load_motor
+from fluxtrue_tools.motor.motor import Motor, load_motor, naming
 from fluxtrue_tools.motor.report import report_text
 
 HTML_NAME = "report.html"
 PLOT_PATTERN = "plot_*.png"
 
 
-def _files(motor: Motor) -> dict[str, str]:
+def generate(motor: Motor) -> dict[str, str]:
+    """Every file as text; refuses numbers that do not fit the firmware's formats."""
     return {"motor_tables.c": motor_tables_c(motor), "motor_si.c": motor_si_c(motor),
             "motor.json": motor_json(motor), "report.txt": report_text(motor)}
 
@@ -42,7 +43,8 @@ def _staging(out: Path) -> Iterator[Path]:
 def build(folder: Path, out: Path, report: bool) -> Motor:
     """Generate everything for one motor. Old files stay until every new one is complete."""
     motor = load_motor(folder)
-    files = _files(motor)
+    with naming(folder):
+        files = generate(motor)
     with _staging(out) as staging:
         for name, text in files.items():
             (staging / name).write_text(text, encoding="utf-8")

@@ -16,15 +16,17 @@ def motor() -> None:
 @click.option("--plots", type=click.Path(path_type=Path), metavar="DIR", help="Write the plots there too.")
 def check(folder: Path, plots: Path | None) -> None:
     """Validate FOLDER (motor.toml and its flux map) and print the report."""
-    from fluxtrue_tools.motor.motor import load_motor
-    from fluxtrue_tools.motor.report import report_text
+    from fluxtrue_tools.motor.build import generate
+    from fluxtrue_tools.motor.motor import load_motor, naming
 
     resolved = load_motor(folder)
+    with naming(folder):
+        files = generate(resolved)  # what build refuses, check must refuse
     if plots is not None:
         from fluxtrue_tools.motor.html import write_plots
 
         write_plots(resolved, plots)
-    click.echo(report_text(resolved), nl=False)
+    click.echo(files["report.txt"], nl=False)
 
 
 @motor.command()

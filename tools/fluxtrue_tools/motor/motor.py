@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One motor, resolved: configuration, flux model, bases, tables, gains."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +37,17 @@ class Motor:
         return self.tables.flash_bytes + self.references.flash_bytes
 
 
+@contextmanager
+def naming(folder: Path) -> Iterator[None]:
+    """Complaints about derived numbers begin with the file whose values they come from."""
+    path = folder / FILE_NAME
+    try:
+        yield
+    except FluxtrueError as error:
+        text = str(error)
+        raise error if text.startswith(str(path)) else FluxtrueError(f"{path}: {text}") from None
+
+
 def _model(folder: Path, config: MotorConfig) -> tuple[FluxMap | None, FluxModel]:
     machine = config.machine
     if machine.flux_map is None:
@@ -56,10 +69,13 @@ def load_motor(folder: Path) -> Motor:
     config = load_config(folder)
     flux_map, model = _model(folder, config)
     machine = config.machine
-    bases = make_bases(config, model)
-    solver = Solver(model, machine.pole_pairs, machine.i_max_A)
-    _check_torque(folder, config, solver)
-    tables, table_error = make_flux_tables(model, bases, machine.i_max_A, machine.pole_pairs, machine.torque_max_Nm)
-    references, limits, errors = make_references(solver, bases, reference_flux_low(config), machine.torque_max_Nm)
-    return Motor(config, flux_map, model, bases, derive(config, model, bases), tables, table_error, solver,
-                 references, limits, errors)
+    with naming(folder):
+        bases = make_bases(config, model)
+        solver = Solver(model, machine.pole_pairs, machine.i_max_A)
+        _check_torque(folder, config, solver)
+        tables, table_error = make_flux_tables(model, bases, machine.i_max_A, machine.pole_pairs,
+                                               machine.torque_max_Nm)
+        references, limits, errors = make_references(solver, bases, reference_flux_low(config),
+                                                     machine.torque_max_Nm)
+        return Motor(config, flux_map, model, bases, derive(config, model, bases), tables, table_error, solver,
+                     references, limits, errors)
