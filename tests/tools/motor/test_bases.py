@@ -46,6 +46,21 @@ def test_hsm1_gets_a_higher_voltage_and_less_speed_reserve_so_that_its_flux_fits
     assert b.flux_Vs == pytest.approx(0.163702, rel=1e-5)
 
 
+@pytest.mark.parametrize("speed_max_rpm", [600.0, 300.0, 10.0])
+def test_a_slow_machine_gets_a_speed_base_that_its_flux_and_the_gains_fit(write, speed_max_rpm):
+    """|psi| is largest at i_d = 0, i_q = 250 A: hypot(84, 125) mVs. That is 0.3 of psi_b = 525 V/omega_b.
+
+    The references begin below the largest MTPA flux although 0.6 V_dc at this speed would carry far more,
+    and are as good as a fast machine's.
+    """
+    motor = load_motor(write(machine={"speed_max_rpm": speed_max_rpm}))
+    assert motor.bases.omega_rad_s == pytest.approx(0.3 * 525.0 / math.hypot(0.084, 0.125), rel=1e-6)
+    assert motor.bases.omega_rad_s >= motor.config.omega_max_rad_s * 1.25
+    assert motor.references.psi_Vs[0] < motor.limits.psi_mtpa_Vs.max() < motor.bases.flux_Vs
+    assert motor.reference_errors.torque_mtpa_max_Nm < 0.002 * motor.config.machine.torque_max_Nm
+    motor_tables_c(motor)
+
+
 def test_the_generated_bases_are_consistent_to_float_accuracy(motor):
     c = members(motor_tables_c(motor))
     eps = 2.0**-23

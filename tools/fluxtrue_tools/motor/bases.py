@@ -12,7 +12,9 @@ from fluxtrue_tools.motor.flux_model import FluxModel, flux
 
 VOLTAGE_PER_VDC = 1.5
 VOLTAGE_STEP_V = 10.0
-OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05)  # the first that fits
+OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05, 1.02)  # the first that fits
+OMEGA_MIN_PER_PWM = 0.02  # rad/s per Hz: below it the current controller's integral gain leaves its format
+FLUX_USE_MIN = 0.3  # of psi_b, by the largest flux: less leaves torque and tables without resolution
 FLUX_USE_MAX = 0.97  # of psi_b, by the largest flux on the i_max circle
 STEP_USE_MAX = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
 
@@ -58,8 +60,10 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
     psi_max = flux_max(model, config.machine.i_max_A)
     l_min = inductance_min(model, config.machine.i_max_A)
     voltage_max = STEP_USE_MAX * l_min * current / period
+    omega_min = max(OMEGA_MIN_PER_PWM * config.inverter.pwm_hz,
+                    FLUX_USE_MIN * VOLTAGE_PER_VDC * config.inverter.vdc_V / psi_max)
     for ratio in OMEGA_PER_OMEGA_MAX:
-        omega = ratio * config.omega_max_rad_s
+        omega = max(ratio * config.omega_max_rad_s, omega_min)
         voltage = _voltage(config, psi_max, omega)
         if voltage <= voltage_max:
             break

@@ -236,8 +236,8 @@ def _sample(solver: Solver, limits: Limits, torque_Nm: Array, psi_Vs: Array) -> 
 
 def _psi_range(limits: Limits, unit: float, psi_low_Vs: float) -> tuple[int, int]:
     """First and last node in units of the node spacing."""
-    first = max(int(psi_low_Vs / unit), 1)
-    last = max(math.ceil(float(limits.psi_mtpa_Vs.max()) / unit), first + 1)
+    last = max(math.ceil(float(limits.psi_mtpa_Vs.max()) / unit), 2)
+    first = min(max(int(psi_low_Vs / unit), 1), last - 1)  # a slow machine never needs less than its MTPA flux
     return first, last
 
 
