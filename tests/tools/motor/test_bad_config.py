@@ -17,8 +17,11 @@ BAD = [
     ({"machine": {"pole_pairs": 2.5}}, ["machine.pole_pairs = 2.5", "whole number"]),
     ({"machine": {"pole_pairs": "true"}}, ["machine.pole_pairs = True", "whole number"]),
     ({"machine": {"pole_pairs": '"4"'}}, ["machine.pole_pairs = '4'", "whole number"]),
-    ({"machine": {"r_ohm": 0.0}}, ["machine.r_ohm = 0.0", "above 0"]),
-    ({"machine": {"r_ohm": -0.02}}, ["machine.r_ohm = -0.02", "above 0"]),
+    ({"machine": {"r_ohm": 0.0}}, ["machine.r_ohm = 0.0", "from 1e-05"]),
+    ({"machine": {"r_ohm": -0.02}}, ["machine.r_ohm = -0.02", "from 1e-05"]),
+    ({"machine": {"r_ohm": 1e-320}}, ["machine.r_ohm = 1e-320", "from 1e-05"]),
+    ({"machine": {"torque_max_Nm": 1e-9}}, ["machine.torque_max_Nm = 1e-09", "from 1.579", "1 % of the torque"]),
+    ({"control": {"flux_bandwidth_rad_s": 1e-9}}, ["control.flux_bandwidth_rad_s = 1e-09", "from 0.1 to 1000"]),
     ({"machine": {"r_ohm": "nan"}}, ["machine.r_ohm = nan", "finite number"]),
     ({"machine": {"speed_max_rpm": "inf"}}, ["machine.speed_max_rpm = inf", "finite number"]),
     ({"machine": {"r_ohm": 5.0}}, ["machine.r_ohm = 5", "30 % of vdc_V"]),
@@ -47,7 +50,7 @@ BAD = [
     ({"machine": {"ld_H": 0.0}}, ["machine.ld_H = 0.0", "above 0 up to 1"]),
     ({"inverter": {"min_pulse_s": -1.0}}, ["inverter.min_pulse_s = -1.0", "from 0 to 2e-05"]),
     ({"machine": {"flux_map": '""'}}, ["machine.flux_map = ''", "1 to 255 characters"]),
-    ({"machine": {"r_ohm": "9" * 400}}, ["machine.r_ohm = 999", "...", "above 0 up to 100"]),
+    ({"machine": {"r_ohm": "9" * 400}}, ["machine.r_ohm = 999", "...", "from 1e-05 to 100"]),
     ({"machine": {"ld_H": 5e-6}}, ["5e-06 H is too small", "raise pwm_hz or current_full_scale_A"]),
 ]
 

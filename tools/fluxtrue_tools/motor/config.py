@@ -30,12 +30,12 @@ class Machine(_Section):
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.+-]{0,47}$")]
     pole_pairs: Annotated[int, Field(ge=1, le=50)]
-    r_ohm: Annotated[float, Field(gt=0, le=100)]
+    r_ohm: Annotated[float, Field(ge=1e-5, le=100)]
     r_temp_coeff_per_K: Annotated[float, Field(ge=0, le=0.02)]
     i_max_A: Annotated[float, Field(gt=0, le=5000)]
     torque_max_Nm: Annotated[float, Field(gt=0, le=100000)]
-    speed_max_rpm: Annotated[float, Field(gt=0, le=200000)]
-    inertia_kgm2: Annotated[float, Field(gt=0, le=1000)]
+    speed_max_rpm: Annotated[float, Field(ge=1, le=200000)]
+    inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1000)]
     iron_loss_hysteresis: Annotated[float, Field(ge=0, le=1e4)] = 0.0
     iron_loss_eddy: Annotated[float, Field(ge=0, le=1e3)] = 0.0
     flux_map: Annotated[str, Field(min_length=1, max_length=255)] | None = None
@@ -61,10 +61,10 @@ class Control(_Section):
     """[control], all optional"""
 
     observer_m: Annotated[float, Field(ge=2, le=4)] = 3.0
-    flux_bandwidth_rad_s: Annotated[float, Field(gt=0, le=1000)] = 30.0
-    resistance_bandwidth_rad_s: Annotated[float, Field(gt=0, le=100)] = 10.0
-    torque_loop_bandwidth_rad_s: Annotated[float, Field(gt=0, le=300)] = 50.0
-    torque_authority: Annotated[float, Field(gt=0, le=0.9)] = 0.3
+    flux_bandwidth_rad_s: Annotated[float, Field(ge=0.1, le=1000)] = 30.0
+    resistance_bandwidth_rad_s: Annotated[float, Field(ge=0.1, le=100)] = 10.0
+    torque_loop_bandwidth_rad_s: Annotated[float, Field(ge=0.1, le=300)] = 50.0
+    torque_authority: Annotated[float, Field(ge=0.01, le=0.9)] = 0.3
     torque_slew_Nm_per_s: Annotated[float, Field(ge=0, le=1e7)] | None = None
     dead_time_compensation: Annotated[float, Field(ge=0, le=1)] = 1.0
 

@@ -16,6 +16,9 @@ from fluxtrue_tools.motor.flux_tables import FluxTables, TableError, make_flux_t
 from fluxtrue_tools.motor.references import Limits, ReferenceErrors, References, Solver, make_references
 
 
+TORQUE_SHARE_MIN = 0.01  # of the torque at i_max: less is a slip of the units, and below the formats' resolution
+
+
 @dataclass(frozen=True)
 class Motor:
     """Everything the generators and the report need."""
@@ -62,6 +65,10 @@ def _check_torque(folder: Path, config: MotorConfig, solver: Solver) -> None:
     if machine.torque_max_Nm > solver.torque_top_Nm:
         raise FluxtrueError(f"{folder / FILE_NAME}: machine.torque_max_Nm = {machine.torque_max_Nm:g}, allowed: up to "
                             f"{solver.torque_top_Nm:.4g}, all the torque there is at i_max_A = {machine.i_max_A:g}")
+    if machine.torque_max_Nm < TORQUE_SHARE_MIN * solver.torque_top_Nm:
+        raise FluxtrueError(f"{folder / FILE_NAME}: machine.torque_max_Nm = {machine.torque_max_Nm:g}, allowed: from "
+                            f"{TORQUE_SHARE_MIN * solver.torque_top_Nm:.4g}, 1 % of the torque at i_max_A = "
+                            f"{machine.i_max_A:g}")
 
 
 def load_motor(folder: Path) -> Motor:
