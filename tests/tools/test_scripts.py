@@ -161,3 +161,19 @@ def test_the_whole_test_run_explains_itself(checkout: Path) -> None:
     done = run(checkout, "test", "--help")
     assert done.returncode == 0
     assert done.stdout.startswith("Set up, build and test everything:")
+
+
+@pytest.mark.parametrize("script", ["setup", "test", "demo", "fluxtrue"])
+def test_a_link_to_a_script_finds_its_checkout(checkout: Path, tmp_path: Path, script: str) -> None:
+    link = tmp_path / "link"
+    link.symlink_to(checkout / "tools" / script)
+    done = subprocess.run([link, "--help"], capture_output=True, text=True, check=False)
+    assert "common.sh" not in done.stderr
+
+
+def test_what_a_killed_set_up_left_is_removed_by_the_next(checkout: Path, bare_path: Path) -> None:
+    stub(bare_path, "ninja", "exit 0")
+    (checkout / "build" / ".setup.AbCdEf" / "venv").mkdir(parents=True)
+    done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
+    assert done.returncode == 0, done.stderr
+    assert not list((checkout / "build").glob(".setup.*"))
