@@ -3,16 +3,19 @@
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
+from fluxtrue_tools.sim.build import locate
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.sim.run import simulate, value_at
 from fluxtrue_tools.sim.scenario import Plant, Profile, Scenario, parse
 
 HEAD = 'motor = "hsm1"\nduration_s = 0.05\n'
+MOVING = "[profile]\ntorque_Nm = 50\nspeed_rpm = 1500\n"
 ELSEWHERE = {  # plant fields that a scenario gives in another place, or the motor alone
     "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
@@ -62,6 +65,9 @@ def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
         (HEAD + "[[event]]\nt = 1\nset = { enable = false }", "event.0.t = 1: after the end"),
         (HEAD + "[[event]]\nt = 0", "event.0.set: this field is required"),
         (HEAD + "[[event]]\nt = 0\nset = {}", "event.0.set"),
+        (HEAD + "[event]\nt = 0\nset = { enable = true }", "allowed: tables [[event]]"),
+        (HEAD + "[plant]\nsubsteps = 100000", "plant.substeps = 100000"),
+        (HEAD + "[controller]\n'plant.r_ohm_20' = 1", "plant.r_ohm_20 is not the controller's"),
         (HEAD + "[[event]]\nt = 0\nset = { enable = 'no' }", "event.0.set.enable = 'no'"),
         (HEAD + "[[event]]\nt = 0\nsets = { enable = 1 }", "event.0"),
         (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.03", "window: 0.04 to 0.03 s"),
@@ -185,3 +191,47 @@ def test_the_defaults_are_a_drive_with_nothing_wrong() -> None:
     assert scenario.profile == Profile()
     assert scenario.averaged() == (0.0, 0.05)
     assert scenario.controller.values() == {"torque_loop": 1.0, "identification": 1.0, "enable": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('motor = "hsm1"\nduration_s = 1e-9', "record_every_s = 0.001: no row in the window"),
+        ('motor = "hsm1"\nduration_s = 3e-4', "no row in the window 0 to 0.0003 s"),
+        (HEAD + "record_every_s = 0.06", "record_every_s = 0.06: no row"),
+        (HEAD + "record_every_s = 1e300", "record_every_s = 1e+300: no row"),
+        (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.0402", "no row in the window 0.04 to 0.0402 s"),
+        (HEAD + "[window]\nfrom_s = 0.0498\nto_s = 0.05", "no row in the window"),
+        # Three pole pairs at 10 kHz: half an electrical turn per period is 100 000 rpm.
+        (HEAD + "[profile]\nspeed_rpm = 1e9", "profile.speed_rpm = 1e+09, allowed: up to 100000"),
+        (HEAD + "[profile]\nspeed_rpm = [[0, 0], [0.1, -1e6]]", "profile.speed_rpm = -1e+06, allowed"),
+        (HEAD + MOVING + "winding_C = 1e9", "left the range of numbers"),
+        (HEAD + MOVING + "[plant]\nr_ohm_20 = 1e9", "left the range of numbers"),
+    ],
+)
+def test_what_cannot_be_simulated_or_averaged_is_refused_in_one_line(hsm1: Motor, text: str, message: str) -> None:
+    with pytest.raises(FluxtrueError) as refusal:
+        simulate(parse(text, "bad.toml"), hsm1, where="bad.toml")
+    line = str(refusal.value)
+    assert line.startswith("bad.toml: ") and message in line, line
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'motor = "hsm1"\nduration_s = 1e-3',
+        'motor = "hsm1"\nduration_s = 1e-4\nrecord_every_s = 1e-4',
+        HEAD + "record_every_s = 0.05",
+        HEAD + "[window]\nfrom_s = 0.049\nto_s = 0.05",
+        HEAD + "record_every_s = 1e-9",
+    ],
+)
+def test_a_window_of_one_row_has_a_mean(hsm1: Motor, text: str) -> None:
+    run = simulate(parse(text, "short.toml"), hsm1)
+    assert math.isfinite(run.mean("true_torque_Nm"))
+
+
+@pytest.mark.parametrize("motor", ["a\x00b", "~nobody-of-that-name/x"])
+def test_a_motor_that_is_no_path_is_refused(motor: str, tmp_path: Path) -> None:
+    with pytest.raises(FluxtrueError, match="^motor "):
+        locate(motor, tmp_path)

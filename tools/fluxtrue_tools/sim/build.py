@@ -53,7 +53,10 @@ def locate(motor: str, base: Path) -> tuple[str, Path]:
     """Name and folder of a shipped motor, or of a folder with a motor.toml, relative to `base`."""
     if motor in shipped_names():
         return motor, SHIPPED / motor
-    folder = (base / Path(motor).expanduser()).resolve()
+    try:
+        folder = (base / Path(motor).expanduser()).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, a NUL
+        raise FluxtrueError(f"motor {motor!r}: {error}") from None
     if not (folder / "motor.toml").is_file():
         shipped = ", ".join(shipped_names())
         raise FluxtrueError(f"motor '{motor}': neither a folder with a motor.toml nor one of {shipped}")

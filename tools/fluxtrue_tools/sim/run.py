@@ -182,6 +182,40 @@ def _start(scenario: Scenario, motor: Motor, where: str) -> lib.Loop:
     return loop
 
 
+def _check_rows(scenario: Scenario, period_s: float, where: str) -> int:
+    """PWM periods per row; the window must have a row to average."""
+    wanted, (first, last) = scenario.record_every_s, scenario.averaged()
+    every = max(1, round(min(wanted, 2.0 * scenario.duration_s) / period_s))
+    row_s = every * period_s
+    rows = min(round(scenario.duration_s / period_s) // every, math.ceil((last + 0.5 * wanted) / row_s) - 1)
+    if rows < 1 or rows * row_s <= first + 0.5 * wanted:
+        raise FluxtrueError(
+            f"{where}: record_every_s = {wanted:g}: no row in the window {first:g} to {last:g} s (PWM period "
+            f"{period_s:g} s), allowed: one row at least"
+        )
+    return every
+
+
+def _check_speed(scenario: Scenario, motor: Motor, period_s: float, where: str) -> None:
+    """Beyond half an electrical turn per period a sampled angle says nothing of the speed."""
+    limit = 60.0 / (2.0 * period_s * motor.plant["pole_pairs"])
+    for _, speed in scenario.profile.speed_rpm:
+        if abs(speed) > limit:
+            raise FluxtrueError(
+                f"{where}: profile.speed_rpm = {speed:g}, allowed: up to {limit:g} (half an electrical turn per period)"
+            )
+
+
+def _check_finite(columns: list[str], rows: NDArray[np.float64], where: str) -> None:
+    bad = np.argwhere(~np.isfinite(rows))
+    if bad.size:
+        row, column = bad[0]
+        raise FluxtrueError(
+            f"{where}: the simulation left the range of numbers ({columns[column]} = {rows[row, column]:g} in row "
+            f"{row + 1}): a value in [plant], [profile], [mechanics] or an event is absurd"
+        )
+
+
 def simulate(
     scenario: Scenario,
     motor: Motor,
@@ -194,14 +228,16 @@ def simulate(
     loop = _start(scenario, motor, where)
     begin = time.perf_counter()
     with loop:
-        every = max(1, round(scenario.record_every_s / loop.period_s))
-        loop.record(channels, every)
+        _check_speed(scenario, motor, loop.period_s, where)
+        loop.record(channels, _check_rows(scenario, loop.period_s, where))
         try:
             rows = _run(scenario, loop, progress)
         except lib.LoopError as error:
             raise _refused(error, motor, where) from error
     wall = time.perf_counter() - begin
-    return Recording(scenario, motor, [column_name(c) for c in channels], rows, wall)
+    columns = [column_name(c) for c in channels]
+    _check_finite(columns, rows, where)
+    return Recording(scenario, motor, columns, rows, wall)
 
 
 def _run(

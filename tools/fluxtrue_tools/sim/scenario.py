@@ -80,6 +80,13 @@ class Controller(BaseModel):
     torque_loop: bool = True
     identification: bool = True
 
+    @model_validator(mode="after")
+    def _no_plant(self) -> "Controller":
+        for name in self.__pydantic_extra__ or {}:
+            if "." in name:
+                raise ValueError(f"{name} is not the controller's, allowed: names without a dot; [plant] has the plant's")
+        return self
+
     def values(self) -> dict[str, float]:
         """Names and numbers as the controller takes them."""
         flags = {name: float(getattr(self, name)) for name in ("torque_loop", "identification")}
@@ -129,7 +136,7 @@ class Plant(_Strict):
     vdc_ripple_hz: NotNegative | None = None
     dead_time_s: NotNegative | None = None
     device_drop_V: NotNegative | None = None
-    substeps: Annotated[int, Field(ge=10, le=100000)] | None = None
+    substeps: Annotated[int, Field(ge=10, le=1000)] | None = None
     ideal_inverter: bool | None = None
     phase_open: ThreeFlags | None = None
     current_full_scale_A: Positive | None = None
@@ -172,6 +179,12 @@ class Event(_Strict):
     set: dict[str, Annotated[float, BeforeValidator(_flag)]] = Field(min_length=1)
 
 
+def _events(value: Any) -> Any:
+    if not isinstance(value, list):
+        raise ValueError("allowed: tables [[event]]")
+    return tuple(value)
+
+
 class Window(_Strict):
     """What the summary averages; left out: the last 0.3 s."""
 
@@ -190,7 +203,7 @@ class Scenario(_Strict):
     profile: Profile = Profile()
     mechanics: Mechanics = Mechanics()
     plant: Plant = Plant()
-    event: Annotated[tuple[Event, ...], BeforeValidator(lambda v: tuple(v) if isinstance(v, list) else v)] = ()
+    event: Annotated[tuple[Event, ...], BeforeValidator(_events)] = ()
     window: Window = Window()
 
     @model_validator(mode="after")
