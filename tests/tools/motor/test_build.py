@@ -85,8 +85,9 @@ def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(wr
     for plot in plots:
         assert f'src="{plot}"' in page
         assert (out / plot).read_bytes().startswith(b"\x89PNG")
+    (out / "plot_of_the_user.png").write_bytes(b"")
     build(write(), out, report=False)
-    assert names(out) == PLAIN
+    assert names(out) == PLAIN | {"plot_of_the_user.png"}
 
 
 def test_motor_json_is_complete_and_plain_json(tmp_path):

@@ -15,7 +15,7 @@ from fluxtrue_tools.motor.motor import Motor, load_motor, naming
 from fluxtrue_tools.motor.report import report_text
 
 HTML_NAME = "report.html"
-PLOT_PATTERN = "plot_*.png"
+PLOT_NAMES = tuple(f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci"))
 
 
 def generate(motor: Motor) -> dict[str, str]:
@@ -53,7 +53,7 @@ def build(folder: Path, out: Path, report: bool) -> Motor:
 
             write_report(motor, files["report.txt"], staging)
         new = {path.name for path in staging.iterdir()}
-        for stale in [out / HTML_NAME, *out.glob(PLOT_PATTERN)]:
+        for stale in (out / name for name in (HTML_NAME, *PLOT_NAMES)):
             if stale.name not in new:
                 stale.unlink(missing_ok=True)  # plots of an older build would be taken for these tables'
         for name in sorted(new):
