@@ -63,6 +63,9 @@ def test_a_plot_takes_its_format_from_its_name(tmp_path: Path, scenario: Path, s
     ("text", "arguments", "message"),
     [
         (GOOD, ["--plot", "run.gif"], "allowed: a file ending in .png, .svg, .pdf"),
+        (GOOD, ["--json", "/dev/null"], "/dev/null: is a device or a pipe, allowed: a file name"),
+        (GOOD, ["--json", "./out.csv"], "out.csv: given twice"),
+        (GOOD, ["--motor", "a;b"], "motor 'a;b': allowed: a path without"),
         (GOOD, ["--out", "missing/run.csv"], "missing/run.csv: cannot be written"),
         (GOOD, ["--motor", "hsm2"], "motor 'hsm2': neither a folder with a motor.toml nor one of hsm1, paper"),
         (GOOD, ["--build-dir", "empty"], "libfluxtrue_sim.so is missing: cmake --build"),

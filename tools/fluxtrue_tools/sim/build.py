@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "firmware" / "motors"
 LIBRARY = "libfluxtrue_sim.so"
 SIL_LIBRARY = "libfluxtrue_sil.so"
+UNUSABLE = ';"$\\'
 _STEP = re.compile(r"^\[(\d+)/(\d+)\]")
 
 
@@ -53,6 +54,8 @@ def locate(motor: str, base: Path) -> tuple[str, Path]:
     """Name and folder of a shipped motor, or of a folder with a motor.toml, relative to `base`."""
     if motor in shipped_names():
         return motor, SHIPPED / motor
+    if set(motor) & set(UNUSABLE):
+        raise FluxtrueError(f"motor {motor!r}: allowed: a path without {' '.join(UNUSABLE)} (CMake's own signs)")
     try:
         folder = (base / Path(motor).expanduser()).resolve()
     except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, a NUL

@@ -46,11 +46,15 @@ def write_text(path: Path, text: str) -> None:
 
 def check_writable(*paths: Path | None) -> None:
     """Find out before a long run, not after it."""
-    for path in paths:
-        if path is None:
-            continue
+    given = [path for path in paths if path is not None]
+    for path in given:
         if path.is_dir():
             raise FluxtrueError(f"{path}: is a folder, allowed: a file name")
+        # A new file takes the name at the end: of /dev/null, too, for those who may.
+        if path.exists() and not path.is_file():
+            raise FluxtrueError(f"{path}: is a device or a pipe, allowed: a file name")
+        if sum(path.resolve() == other.resolve() for other in given) > 1:
+            raise FluxtrueError(f"{path}: given twice, allowed: another name for every output")
         if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
             raise FluxtrueError(f"{path}: cannot be written (no such folder, or not allowed)")
 
