@@ -4,7 +4,8 @@
 /** One drive: configuration, the state of every stage, and the three activities that run it.
  *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), then pends mrai_isr
  *   mrai_isr  each PWM period, below the fast ISR: identification and torque estimate
- *   task_1khz every tenth period, below both: request, torque loop, current reference, identification schedule, supervision
+ *   task_1khz every tenth period, below both: request, torque loop, current reference, identification schedule,
+ *     supervision
  * Source   docs/architecture.md
  * Units    per unit of motor.bases
  * Errors   latched in faults; the gates open in the same period
@@ -38,7 +39,7 @@ typedef struct {
     monitor_state_t monitor;
     modulate_out_t modulated;    /* acts during the next period */
     dq_t acting;                 /* acts during this period */
-    uint8_t periods_on;          /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
+    uint8_t periods_on; /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
     uint32_t overruns;
     uint32_t pended;             /* identifications asked for */

@@ -49,7 +49,8 @@ static void watch(drive_t *drive, uint32_t unfinished)
     }
 }
 
-/* Hands this period to the identification. One that is two periods late still reads the slot whose turn it is: that period is lost. */
+/* Hands this period to the identification. One that is two periods late still reads the slot whose turn it is:
+ * that period is lost. */
 static void publish(drive_t *drive, sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
@@ -93,7 +94,8 @@ static void bridge_on(drive_t *drive, const sample_t *sample, const instant_t *n
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 
-/* A reset comes before this period's monitors: what is still wrong is latched again at once. Bad motor data stay bad. */
+/* A reset comes before this period's monitors: what is still wrong is latched again at once.
+ * Bad motor data stay bad. */
 static void forget_faults(drive_t *drive, uint32_t asked)
 {
     if (drive->fast.fault_resets != asked) {

@@ -14,7 +14,8 @@ void mrai_isr(drive_t *drive)
     } else if (sample->acting) {
         mrai_step(&drive->motor.mrai, schedule_box_read(&drive->schedules), &slow->mrai, &sample->mrai);
     } else {
-        mrai_reset(&slow->mrai, &sample->mrai); /* the bridge was off: its voltage is not ours, only the currents are known */
+        /* The bridge was off: its voltage is not ours, only the currents are known. */
+        mrai_reset(&slow->mrai, &sample->mrai);
     }
     slow->psi_delta_q15 = fx_q15_from_q31(slow->mrai.psi_delta);
     (void)torque_estimate_step(&slow->torque, sample->mrai.i, &sample->mrai.flux, slow->mrai.psi_delta);

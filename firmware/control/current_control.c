@@ -6,8 +6,8 @@
 #include "fx/sqrt.h"
 #include "fx/vec.h"
 
-/* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that binds the d axis,
- * and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
+/* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that
+ * binds the d axis, and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
 #define D_RESERVE_SHIFT 5
 #define LONGEST 45874 /* 1.4 pu: its half, squared twice, keeps a length below 1 */
 
@@ -56,7 +56,8 @@ static q31_t integrate(const current_control_config_t *config, const axis_t *a, 
     return fx_add2_q31(s, config->integral_gain * a->error + config->tracking_gain * cut);
 }
 
-/* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length below 1. */
+/* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length
+ * below 1. */
 static dq_t shortened(axis_t d, axis_t q, int32_t v_max)
 {
     const int32_t u_d = fx_clamp_q31(d.u, -LONGEST, LONGEST);
@@ -66,8 +67,9 @@ static dq_t shortened(axis_t d, axis_t q, int32_t v_max)
     return (dq_t){(u_d * share + 0x4000) >> 15, (u_q * share + 0x4000) >> 15};
 }
 
-/* Inside the circle as wanted. Beyond it the d axis comes first while it takes flux away (CC-11). While it asks for flux back, the
- * q axis may be what holds that flux: a cut that served d first would leave both where they are, at any torque. */
+/* Inside the circle as wanted. Beyond it the d axis comes first while it takes flux away (CC-11). While it asks for
+ * flux back, the q axis may be what holds that flux: a cut that served d first would leave both where they are, at
+ * any torque. */
 static __attribute__((noinline)) dq_t limit(axis_t d, axis_t q, int32_t v_max)
 {
     const bool more_flux = d.error > 0;
@@ -94,7 +96,8 @@ static bool inside(int32_t u_d, int32_t u_q, int32_t v_max)
     const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
     const int32_t d = fx_sat_q15_word(u_d);
     const int32_t q = fx_sat_q15_word(u_q);
-    return (uint32_t)(d * d) + (uint32_t)(q * q) <= (uint32_t)(v_max * v_max) && (uint32_t)(u_d + d_max) <= 2U * (uint32_t)d_max;
+    return (uint32_t)(d * d) + (uint32_t)(q * q) <= (uint32_t)(v_max * v_max) &&
+           (uint32_t)(u_d + d_max) <= 2U * (uint32_t)d_max;
 }
 
 dq_t current_control_step(const current_control_config_t *config, current_control_state_t *state,

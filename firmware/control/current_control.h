@@ -5,12 +5,14 @@
  *   u_d = sigma (f_d - psi_d) + s_d - w psi_q,          s_d += sigma a_i (psi_d* - psi_d)
  *   u_q = sigma (f_q - psi_q) + s_q + w (psi_d + dpsi), s_q += sigma a_i (psi_q* - psi_q)
  *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i*  (set-point weight b, resistive drop fed forward)
- * The error is taken in flux linkage: sigma (psi* - psi) is sigma l (i* - i) with l the incremental inductance between the
- * two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
- *   sigma = 1/(2 T_d), T_d = 1.5 T_s.  While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if
- * the reference had been one that the voltage can follow, and no slow tail remains.
- *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2); while d asks for more
- * flux (psi_d* > psi_d) the vector is shortened instead, else u_q could never shed the flux that binds u_d.
+ * The error is taken in flux linkage: sigma (psi* - psi) is sigma l (i* - i) with l the incremental inductance
+ * between the two points, so the gain is scheduled over the whole step and a step into saturation does not overshoot.
+ *   sigma = 1/(2 T_d), T_d = 1.5 T_s
+ * While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if the reference had been one
+ * that the voltage can follow, and no slow tail remains.
+ *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2)
+ * While d asks for more flux (psi_d* > psi_d) the vector is shortened instead, else u_q could never shed the flux
+ * that binds u_d.
  * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
  * Units    per unit
  * Range    sigma_gain = sigma/omega_b in Q15.16; b, a_i in q15; |omega| < 1; v_ratio < 0.7

@@ -3,7 +3,8 @@
 #define CONTROL_FLUX_TABLE_TYPES_H
 /** What the flux-table service answers for one operating point; the value other stages consume.
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
- * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full voltage must not reach I_b
+ * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full
+ *          voltage must not reach I_b
  * Range    q15 in a word each: halfwords would cost an extension at every use
  * Context  values only */
 #include <stdbool.h>

@@ -15,7 +15,8 @@ measure_t measure_step(const measure_config_t *config, const adc_counts_t *count
     /* 16-bit count * Q15 gain = 31 bits; a full count is one full scale, hence the extra bit. */
     const uint32_t v_dc = (counts->v_dc * config->v_dc_scale + 0x8000U) >> 16;
     return (measure_t){
-        .i = {phase_current(config, counts->i_a, 0), phase_current(config, counts->i_b, 1), phase_current(config, counts->i_c, 2)},
+        .i = {phase_current(config, counts->i_a, 0), phase_current(config, counts->i_b, 1),
+              phase_current(config, counts->i_c, 2)},
         .v_dc = fx_sat_q15_word((int32_t)v_dc),
     };
 }

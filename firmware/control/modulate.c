@@ -97,9 +97,11 @@ static dq_t acting_voltage(duty_t duty, phases_t c, const cut_t *cut)
 }
 
 /* Pulses snap, and acted says what they make. */
-static __attribute__((noinline, cold)) void limit(const modulate_config_t *config, const cut_t *cut, modulate_out_t *out)
+static __attribute__((noinline, cold)) void limit(const modulate_config_t *config, const cut_t *cut,
+                                                  modulate_out_t *out)
 {
-    const phases_t c = {fx_mul_q15(config->dead_time, (q15_t)cut->sign.a), fx_mul_q15(config->dead_time, (q15_t)cut->sign.b),
+    const phases_t c = {fx_mul_q15(config->dead_time, (q15_t)cut->sign.a),
+                        fx_mul_q15(config->dead_time, (q15_t)cut->sign.b),
                         fx_mul_q15(config->dead_time, (q15_t)cut->sign.c)};
     out->duty = (duty_t){realisable(cut->want.a, config->min_pulse), realisable(cut->want.b, config->min_pulse),
                          realisable(cut->want.c, config->min_pulse)};
@@ -133,7 +135,8 @@ void modulate_step(const modulate_config_t *config, const modulate_in_t *in, mod
                            (x.c + shift + dead_time * sign.c) >> 15};
 
     const int32_t pulse = config->min_pulse;
-    if (span <= SPAN_MAX_Q30 && v_dc == in->v_dc && within(want.a, pulse) && within(want.b, pulse) && within(want.c, pulse)) {
+    if (span <= SPAN_MAX_Q30 && v_dc == in->v_dc && within(want.a, pulse) && within(want.b, pulse) &&
+        within(want.c, pulse)) {
         out->duty = (duty_t){(uint16_t)want.a, (uint16_t)want.b, (uint16_t)want.c};
         out->acted = in->u;
         out->limited = false;

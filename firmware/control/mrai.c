@@ -3,7 +3,8 @@
 
 #include "fx/q.h"
 
-/* The slow observer poles make e = w dpsi/(2 S L_q) large: 0.6 pu for a magnet 15 % weak at full speed. A tighter bound winds up. */
+/* The slow observer poles make e = w dpsi/(2 S L_q) large: 0.6 pu for a magnet 15 % weak at full speed. A tighter
+ * bound winds up. */
 #define ERROR_BITS 31
 /* |s2 e| < 1/16 in the laws: 5 more bits fit, and the small steps of the adaptation keep theirs. */
 #define INNOVATION_BITS 26
@@ -29,15 +30,16 @@ typedef struct {
 
 bool mrai_valid(const mrai_config_t *config)
 {
-    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->pole_gain <= Q31(0.25) && config->flux_gain >= 0 &&
-                       config->resistance_gain >= 0 && config->resistance_gain <= Q31(1.0 / 32.0) && config->flux_proportional >= 0 &&
+    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->pole_gain <= Q31(0.25) &&
+                       config->flux_gain >= 0 && config->resistance_gain >= 0 &&
+                       config->resistance_gain <= Q31(1.0 / 32.0) && config->flux_proportional >= 0 &&
                        config->flux_proportional <= PROPORTIONAL_MAX && config->resistance_proportional >= 0 &&
                        config->resistance_proportional <= PROPORTIONAL_MAX;
     const bool limits = config->psi_delta_min < config->psi_delta_max && config->r_delta_min < config->r_delta_max &&
                         config->psi_delta_min >= Q31(-0.5) && config->psi_delta_max <= Q31(0.5) &&
                         config->r_delta_min >= Q31(-0.5) && config->r_delta_max <= Q31(0.5);
-    return gains && limits && config->rate_gain_q26 > 0 && config->omega_min > 0 && config->l_shift <= 14 && config->psi_drift_full > 0 &&
-           config->r_drift_full > 0;
+    return gains && limits && config->rate_gain_q26 > 0 && config->omega_min > 0 && config->l_shift <= 14 &&
+           config->psi_drift_full > 0 && config->r_drift_full > 0;
 }
 
 static void remember(mrai_state_t *state, const mrai_in_t *in)
@@ -121,8 +123,10 @@ static int32_t resistive_drop(const mrai_config_t *config, q31_t r_used, int32_t
     return fx_mulhi_add(fx_mulhi(r_used, i_hat), config->r0, i);
 }
 
-/* The voltage equation over the period that ends with this sample (MR-6); trapezoidal means make it exact in steady state. */
-static void observe(const mrai_config_t *config, int32_t voltage_gain, mrai_state_t *state, const mrai_in_t *in, const mean_t *mean)
+/* The voltage equation over the period that ends with this sample (MR-6); trapezoidal means make it exact in steady
+ * state. */
+static void observe(const mrai_config_t *config, int32_t voltage_gain, mrai_state_t *state, const mrai_in_t *in,
+                    const mean_t *mean)
 {
     const flux_point_t *flux = &in->flux;
     const q31_t psi_d = fx_add_q31((flux->psi_d + state->psi.d) * 32768, state->psi_used);

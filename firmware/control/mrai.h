@@ -2,19 +2,22 @@
 #ifndef CONTROL_MRAI_H
 #define CONTROL_MRAI_H
 /** Model reference adaptive identification of stator resistance and magnet flux.
- *   Full-order current observer, poles at -S/2 +- jS/2, S = m R_0 (1/L_d + 1/L_q), carried as its error e = i - i~, so that the
- *   derivative of the current enters as the change of the table's flux: exact through saturation, cross coupling included.
+ *   Full-order current observer, poles at -S/2 +- jS/2, S = m R_0 (1/L_d + 1/L_q), carried as its error e = i - i~,
+ *   so that the derivative of the current enters as the change of the table's flux: exact through saturation, cross
+ *   coupling included.
  *     e_d += g_d (dpsi_d/T_s - (u_d + w psi_q - R_0 i_d - dR i_d~)) + s2 (e_q - e_d)
- *     e_q += g_q (dpsi_q/T_s - (u_q - w psi_d - R_0 i_q - dR i_q~)) - s2 (e_d + e_q),   s2 = S T_s/2, means over the period:
- *   g too, else the noise of a sample would meet itself in g and dpsi and become a bias
+ *     e_q += g_q (dpsi_q/T_s - (u_q - w psi_d - R_0 i_q - dR i_q~)) - s2 (e_d + e_q),   s2 = S T_s/2
+ *   with means over the period; g too, else the noise of a sample would meet itself in g and dpsi and become a bias.
  *   Adaptation, proportional and integral, normalised so that k_psi, k_r are bandwidths at every speed and current:
  *     dpsi -= 2 k_psi s2 (l_q/w) e_q,   dR -= 2 k_r T_s s2 (i_d~ e_d g_d + i_q~ e_q g_q)/((i_d~ g_d)^2 + (i_q~ g_q)^2)
  * Source   docs/theory/mrai.md (MR-1) ... (MR-18); the 2014 paper's (3), (6), (7), (8), (11) with k2, k3 corrected
  * Units    per unit; dpsi is the deviation from the table's psi_f0, dR from R_0 (20 C)
- * Range    |w| < 1, |i| < 1, errors clamped to 1 pu, s2 e to 1/16 in the laws; results clamped to [psi_min, psi_max], [r_min, r_max] and flagged there
+ * Range    |w| < 1, |i| < 1, errors clamped to 1 pu, s2 e to 1/16 in the laws; results clamped to [psi_min, psi_max],
+ *          [r_min, r_max] and flagged there
  * Rounding state LSB 2^-30 pu (errors), 2^-31 pu (parameters); steps rounded half up where they accumulate
  * Errors   clamps are flagged; a closed gate freezes the parameter, the observer goes on
- * Context  MRAI ISR, each period, below the current ISR; mrai_schedule_step() in the 1 kHz task; no division in the step */
+ * Context  MRAI ISR, each period, below the current ISR; mrai_schedule_step() in the 1 kHz task; no division in the
+ *          step */
 #include <stdbool.h>
 #include <stdint.h>
 

@@ -8,7 +8,8 @@
 /* Of the drift that means quality 0, which is that of an error of 5 %: the flux is within 1 %. */
 #define PSI_SETTLED Q15(0.2)
 
-/* 2 k_psi 2^l_shift/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's edge. */
+/* 2 k_psi 2^l_shift/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the
+ * gate's edge. */
 static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 {
     return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U + config->l_shift);

@@ -2,10 +2,10 @@
 #ifndef CONTROL_MRAI_SCHEDULE_H
 #define CONTROL_MRAI_SCHEDULE_H
 /** Gates, speed and current normalisation and quality of the identification: the slow half of control/mrai.h.
- *   flux gate        |w| >= w_min and |i| >= i_min: without current the dead time swallows any voltage and proves nothing
+ *   flux gate        |w| >= w_min and |i| >= i_min: without current the dead time swallows any voltage
  *   resistance gate  the same, |w| <= w_r_max, and the flux has settled: its drift is that of an error below 1 %
- *   quality          first-order filter towards 1 - |drift|/drift_full while the gate is open, towards 0 while closed or
- *                    clamped; drift = change of the identified parameter per step: what the adaptation still has to do
+ *   quality          first-order filter towards 1 - |drift|/drift_full while the gate is open, towards 0 while
+ *                    closed or clamped; drift = change of the identified parameter per step: what is still to do
  * Source   docs/theory/mrai.md (MR-12) ... (MR-18)
  * Units    as in control/mrai.h; quality 0 ... 1 in q15
  * Errors   reciprocal of a gated quantity only: bounded
@@ -19,7 +19,8 @@ typedef struct {
 
 typedef struct {
     const mrai_in_t *sample; /* latest operating point */
-    const mrai_in_t *next;   /* the one just commanded: i and flux count; the gain must suit both, as a step takes less than a task */
+    /* The one just commanded: i and flux count. The gain must suit both, as a step takes less than a task. */
+    const mrai_in_t *next;
     const mrai_state_t *identifier;
     bool enabled; /* identification wanted and the bridge on */
 } mrai_schedule_in_t;

@@ -10,8 +10,8 @@ static q31_t product_q31(q15_t a, q15_t b)
     return fx_shl_q31(fx_mul_q30(a, b), 1);
 }
 
-/* T_m follows T* as the closed current loop will: only what is left is the tables' error (TL-4). The estimate is the mean of
- * the millisecond that has passed, so it meets the model of before this step. */
+/* T_m follows T* as the closed current loop will: only what is left is the tables' error (TL-4). The estimate is the
+ * mean of the millisecond that has passed, so it meets the model of before this step. */
 static q15_t model_error(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)
 {
     const q15_t model = fx_q15_from_q31(state->model);

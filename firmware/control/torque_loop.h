@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CONTROL_TORQUE_LOOP_H
 #define CONTROL_TORQUE_LOOP_H
-/** Torque closed loop: a relative correction of the torque request, so that what was learnt at one torque serves at another.
+/** Torque closed loop: a relative correction of the torque request, so that what was learnt at one torque
+ * serves at another.
  *   r = T* (1 + x) + k_p e,  e = T_m - T^,  x += k_i e / max(|T*|, T_min) sign(T*),  |r - T*| <= authority |T*|
  *   T_m = T* through the closed loop's own first-order response: a step excites no integrator.
- *   x is held while voltage or current limit is active and e asks for more; switched off it leaks to 0 at the loop's own rate.
+ *   x is held while voltage or current limit is active and e asks for more; switched off it leaks to 0 at the
+ *   loop's own rate.
  * Source   docs/theory/torque-loop.md (TL-3) ... (TL-9)
  * Units    per unit of T_b; x is a ratio
  * Range    authority (0, 1); |T*| < 1; the relative error e / max(|T*|, T_min) is limited to 1

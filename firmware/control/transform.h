@@ -2,7 +2,8 @@
 #ifndef CONTROL_TRANSFORM_H
 #define CONTROL_TRANSFORM_H
 /** Changes of reference frame, amplitude-invariant.
- *   Clarke  alpha = (2a - b - c)/3, beta = (b - c)/sqrt(3)      Park  d = alpha cos + beta sin, q = beta cos - alpha sin
+ *   Clarke  alpha = (2a - b - c)/3, beta = (b - c)/sqrt(3)
+ *   Park  d = alpha cos + beta sin, q = beta cos - alpha sin
  *   inverse Clarke  a = alpha, b,c = -alpha/2 +- sqrt(3)/2 beta
  * Source   docs/theory/current-control.md (CC-1)
  * Units    per unit
@@ -31,7 +32,8 @@ static inline ab_t clarke(abc_t x)
 
 static inline dq_t park(ab_t x, fx_sincos_t at)
 {
-    return (dq_t){transform_round(x.alpha * at.cos + x.beta * at.sin), transform_round(x.beta * at.cos - x.alpha * at.sin)};
+    return (dq_t){transform_round(x.alpha * at.cos + x.beta * at.sin),
+                  transform_round(x.beta * at.cos - x.alpha * at.sin)};
 }
 
 static inline ab_t inverse_park_q30(dq_t x, fx_sincos_t at)

@@ -12,7 +12,7 @@
  * Rounding half up, 1/2 LSB, plus 2^-15 of the cell's twist |z00 - z01 - z10 + z11|; on the
  *          last grid point 2^-14 of the step across the cell before it
  * Errors   outside the grid: *clamped (or .clamped) is true, else false
- * Context  any; fx_cell about 44 instructions, each fx_cell_interp 6, all branch-free */
+ * Context  any; fx_cell about 49 instructions, each fx_cell_interp 7, all branch-free */
 
 #include <stdbool.h>
 #include <string.h>

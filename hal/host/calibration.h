@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_HOST_CALIBRATION_H
 #define HAL_HOST_CALIBRATION_H
-/** Tuning in SI: turns bandwidths and rates into the fixed-point gains of the drive's own copy of the motor data, and back.
- * Source   docs/theory/mrai.md (MR-7), (MR-9), (MR-10); docs/theory/torque-loop.md (TL-5), (TL-10); docs/theory/modulation.md (MO-6)
+/** Tuning in SI: turns bandwidths and rates into the fixed-point gains of the drive's own copy of the
+ * motor data, and back.
+ * Source   docs/theory/mrai.md (MR-7), (MR-9), (MR-10); docs/theory/torque-loop.md (TL-5), (TL-10);
+ *          docs/theory/modulation.md (MO-6)
  * Units    stated by each name in hal/host/parameters.c, which also checks the ranges
  * Context  between two periods */
 #include "hal/host/fluxtrue.h"

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_MOTOR_SI_H
 #define TWIN_MOTOR_SI_H
-/** The same machine data as app/motor.h, in SI doubles and before any quantisation: what the double-precision twin runs on.
+/** The same machine data as app/motor.h, in SI doubles and before any quantisation: what the double-precision twin
+ * runs on.
  *   Written beside the fixed-point tables by `tools/fluxtrue motor build`; shares no number format with the firmware.
  * Units    SI, electrical rad/s, per-second gains */
 
@@ -26,11 +27,12 @@ typedef struct {
     double flux_proportional, resistance_proportional; /* k_P/k_I in periods */
     double psi_delta_min_Vs, psi_delta_max_Vs, r_delta_min_ohm, r_delta_max_ohm;
     double omega_min_rad_s, omega_r_max_rad_s, i_min_A;
-    double innovation_full_Vs, quality_rate;
+    double quality_rate;
     /* torque loop, per 1 kHz step */
     double torque_ki, torque_kp, torque_model_rate, torque_authority, torque_min_Nm;
     double torque_max_Nm, torque_slew_Nm; /* slew per 1 kHz step, <= 0: open */
-    /* current references: torque node ix torque_step_Nm, flux node psi0_Vs + iy psi_step_Vs, row-major [ix * ref_npsi + iy] */
+    /* current references: torque node ix torque_step_Nm, flux node psi0_Vs + iy psi_step_Vs, row-major [ix * ref_npsi
+     * + iy] */
     int ref_nt, ref_npsi;
     double torque_step_Nm, psi0_Vs, psi_step_Vs;
     const double *ref_id_A, *ref_iq_A;

@@ -20,7 +20,8 @@ static void publish(bool acting)
 {
     sample_t *s = sample_box_begin(&drive.samples);
     const dq_t i = {-3000, 5000};
-    *s = (sample_t){.mrai = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666}, .acting = acting};
+    const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
+    *s = (sample_t){.mrai = in, .acting = acting};
     s->mrai.u.d = (q15_t)(-0.3 * s->mrai.flux.psi_q - 0.0133 * 3000);
     s->mrai.u.q = (q15_t)(0.3 * (s->mrai.flux.psi_d - 1500) + 0.0133 * 5000); /* a weak magnet */
     sample_box_publish(&drive.samples);

@@ -72,7 +72,8 @@ void test_a_speed_step_settles_with_both_poles_at_the_configured_bandwidth(void)
         theta += advance;
         const angle_t y = step(theta);
         worst_overshoot = fmax(worst_overshoot, y.step / (3.0 * advance));
-        if (n == 99) { /* 10 ms are six time constants: (1 + 6) e^-6 = 1.7 % are missing; w_n T_s = 0.06 spreads the poles */
+        if (n ==
+            99) { /* 10 ms are six time constants: (1 + 6) e^-6 = 1.7 % are missing; w_n T_s = 0.06 spreads the poles */
             TEST_ASSERT_DOUBLE_WITHIN(0.003, 1.0 - 0.01735, y.step / (3.0 * advance));
         }
     }

@@ -84,7 +84,8 @@ void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
     TEST_ASSERT_EQUAL_INT(0, y.weighted.q);
 }
 
-/* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of i*. */
+/* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of
+ * i*. */
 void test_the_set_point_weight_takes_of_the_currents_share_only(void)
 {
     const flux_point_t at = {.psi_d = 10000, .psi_q = 8000, .psi_f0 = 17000};
@@ -118,14 +119,16 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         in.omega = (q15_t)random_in(&seed, -32767, 32767);
         in.psi_delta = (q15_t)random_in(&seed, -3000, 3000);
         in.v_dc = (q15_t)random_in(&seed, 0, 32767);
-        state = (current_control_state_t){random_in(&seed, -900000000, 900000000), random_in(&seed, -900000000, 900000000), false};
+        state = (current_control_state_t){random_in(&seed, -900000000, 900000000),
+                                          random_in(&seed, -900000000, 900000000), false};
         twin_current_state_t twin = {{from_q31(state.s_d) * f.v, from_q31(state.s_q) * f.v}, false};
         const dq_t u = step();
         const twin_dq_t t = twin_step(&twin);
         worst_note(&circle, fmax(hypot(u.d, u.q) - f.si.v_ratio * in.v_dc, 0.0), "|u| %d %d v %d", u.d, u.q, in.v_dc);
         worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, in.omega, in.v_dc);
         if (fabs(t.d) < fabs(t.q) || target.psi.d > psi.d) {
-            worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q, in.omega, in.v_dc);
+            worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
+                       in.omega, in.v_dc);
         }
         if (state.limited == twin.limited && fabs(t.d) < fabs(t.q)) {
             worst_note(&integrator, from_q31(state.s_d) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
@@ -144,7 +147,8 @@ void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
     twin_current_state_t twin = {0};
     in.v_dc = 32767;
     for (int n = 0; n < 10000; n++) {
-        target.psi = (dq_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)), (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
+        target.psi = (dq_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)),
+                            (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
         (void)step();
         (void)twin_step(&twin);
         worst_note(&worst, from_q31(state.s_d) - twin.s.d / f.v, "s_d of period %d", n);
@@ -259,7 +263,8 @@ void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
     TEST_ASSERT_FALSE(state.limited);
 }
 
-/* A machine that brakes at high speed with the flux that the voltage just holds, and is then asked for none: flux in the
+/* A machine that brakes at high speed with the flux that the voltage just holds, and is then asked for none: flux in
+ * the
  * stator's own equations, dpsi/dt = u - j w psi, far from the reference. Serving d first it would stay for ever at
  * u = (0.97, -0.25) v_max with this flux. Every corner of the ring must come home. */
 void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)

@@ -130,7 +130,8 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
         const twin_reference_t s = twin_current_reference(&f.si, &t);
         worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque, in.v_dc, in.omega);
         worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d", in.torque, in.v_dc, in.omega);
-        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque, in.v_dc, in.omega);
+        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque, in.v_dc,
+                   in.omega);
     }
     ASSERT_WORST(worst, 8.0);
 }

@@ -53,7 +53,8 @@ void test_the_whole_current_plane_follows_the_twin(void)
         }
     }
     for (int n = 0; n < 100000; n++) {
-        hold_to_twin(&value, &flux, (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
+        hold_to_twin(&value, &flux,
+                     (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
     }
     hold_to_twin(&value, &flux, (dq_t){INT16_MIN, INT16_MIN});
     hold_to_twin(&value, &flux, (dq_t){INT16_MAX, INT16_MIN});
@@ -98,7 +99,8 @@ void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(
     const int edge_d = f.flux_table.grid.x0;
     const int edge_q = 14 * 2048;
     const dq_t inside[4] = {{(q15_t)edge_d, 0}, {0, 0}, {-1000, (q15_t)edge_q}, {-1000, (q15_t)-edge_q}};
-    const dq_t outside[4] = {{(q15_t)(edge_d - 1), 0}, {1, 0}, {-1000, (q15_t)(edge_q + 1)}, {-1000, (q15_t)(-edge_q - 1)}};
+    const dq_t outside[4] = {
+        {(q15_t)(edge_d - 1), 0}, {1, 0}, {-1000, (q15_t)(edge_q + 1)}, {-1000, (q15_t)(-edge_q - 1)}};
     for (int n = 0; n < 4; n++) {
         const flux_point_t a = flux_table_step(&f.flux_table, inside[n]);
         const flux_point_t b = flux_table_step(&f.flux_table, outside[n]);

@@ -101,8 +101,10 @@ void test_the_zero_sequence_centres_the_outer_legs(void)
         at_angle(random_in(&seed, 0, 65535));
         in.u = (dq_t){(q15_t)random_in(&seed, -8000, 8000), (q15_t)random_in(&seed, -8000, 8000)};
         const modulate_out_t y = step();
-        const int hi = (y.duty.a > y.duty.b) ? ((y.duty.a > y.duty.c) ? y.duty.a : y.duty.c) : ((y.duty.b > y.duty.c) ? y.duty.b : y.duty.c);
-        const int lo = (y.duty.a < y.duty.b) ? ((y.duty.a < y.duty.c) ? y.duty.a : y.duty.c) : ((y.duty.b < y.duty.c) ? y.duty.b : y.duty.c);
+        const int hi = (y.duty.a > y.duty.b) ? ((y.duty.a > y.duty.c) ? y.duty.a : y.duty.c)
+                                             : ((y.duty.b > y.duty.c) ? y.duty.b : y.duty.c);
+        const int lo = (y.duty.a < y.duty.b) ? ((y.duty.a < y.duty.c) ? y.duty.a : y.duty.c)
+                                             : ((y.duty.b < y.duty.c) ? y.duty.b : y.duty.c);
         TEST_ASSERT_INT_WITHIN(1, 32768, hi + lo);
     }
 }
@@ -125,11 +127,16 @@ void test_inside_the_hexagon_every_duty_follows_the_twin(void)
         const modulate_out_t y = step();
         const twin_modulate_t t = twin_step();
         /* The straight line of the compensation is steep: 1 LSB of current is 0.07 LSB of duty. */
-        worst_note(&worst, y.duty.a - t.duty[0] * 32768, "a, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
-        worst_note(&worst, y.duty.b - t.duty[1] * 32768, "b, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
-        worst_note(&worst, y.duty.c - t.duty[2] * 32768, "c, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
-        worst_note(&acted, y.acted.d - t.acted.d / f.v * 32768, "acted d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
-        worst_note(&acted, y.acted.q - t.acted.q / f.v * 32768, "acted q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
+        worst_note(&worst, y.duty.a - t.duty[0] * 32768, "a, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc,
+                   in.i.d, in.i.q, theta);
+        worst_note(&worst, y.duty.b - t.duty[1] * 32768, "b, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc,
+                   in.i.d, in.i.q, theta);
+        worst_note(&worst, y.duty.c - t.duty[2] * 32768, "c, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc,
+                   in.i.d, in.i.q, theta);
+        worst_note(&acted, y.acted.d - t.acted.d / f.v * 32768, "acted d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
+                   in.v_dc, in.i.d, in.i.q, theta);
+        worst_note(&acted, y.acted.q - t.acted.q / f.v * 32768, "acted q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
+                   in.v_dc, in.i.d, in.i.q, theta);
     }
     ASSERT_WORST(worst, 7.0);
     ASSERT_WORST(acted, 4.0);
@@ -276,8 +283,10 @@ void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
             continue; /* a duty that meets its rail by coincidence, one in 2^15, passes for a switching one */
         }
         if (jump < 12.0) { /* else the two stand on different sides of a snap, the shortest pulse of 983 LSB apart */
-            worst_note(&worst, y.acted.d - t.acted.d / f.v * 32768, "d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
-            worst_note(&worst, y.acted.q - t.acted.q / f.v * 32768, "q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q, in.v_dc, in.i.d, in.i.q, theta);
+            worst_note(&worst, y.acted.d - t.acted.d / f.v * 32768, "d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
+                       in.v_dc, in.i.d, in.i.q, theta);
+            worst_note(&worst, y.acted.q - t.acted.q / f.v * 32768, "q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
+                       in.v_dc, in.i.d, in.i.q, theta);
         } else {
             TEST_ASSERT_DOUBLE_WITHIN(12.0, 983.0, jump);
         }

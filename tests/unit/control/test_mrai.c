@@ -83,7 +83,8 @@ static void open_flux_gate(const mrai_in_t *in)
 {
     const double w = from_q31(in->omega);
     twin_schedule.flux_gain = 2.0 * f.si.flux_bandwidth_rad_s / (w * f.w);
-    schedule.flux_step_q28 = (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0 * (1 << f.mrai.l_shift));
+    schedule.flux_step_q28 =
+        (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0 * (1 << f.mrai.l_shift));
 }
 
 static void open_resistance_gate(const mrai_in_t *in)
@@ -156,7 +157,8 @@ void test_the_fixed_point_error_dynamics_are_the_same_at_every_speed(void)
 }
 
 /* The paper prints k2 + w L_q/L_d = k3 + w L_d/L_q = sqrt(m^2/2 R^2/(L_d L_q) + (m^2+m)/4 (R^2/L_d^2 + R^2/L_q^2)).
- * Its own condition (11) is then missed by m R^2 (L_d^2 + L_q^2)/(4 L_d^2 L_q^2); with m/2 (R/L_d + R/L_q) it is met. */
+ * Its own condition (11) is then missed by m R^2 (L_d^2 + L_q^2)/(4 L_d^2 L_q^2); with m/2 (R/L_d + R/L_q) it is met.
+ * */
 void test_the_printed_gains_miss_the_papers_own_pole_condition_and_the_corrected_ones_meet_it(void)
 {
     for (int m = 2; m <= 4; m++) {
@@ -237,16 +239,21 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
         twin_schedule.voltage_scale = 1.0 + from_q15(schedule.voltage_gain);
         state = (mrai_state_t){.psi_delta = random_in(&seed, f.mrai.psi_delta_min / 2, f.mrai.psi_delta_max / 2),
                                .r_delta = random_in(&seed, f.mrai.r_delta_min / 2, f.mrai.r_delta_max / 2)};
-        twin = (twin_mrai_state_t){.psi_delta = from_q31(state.psi_delta) * f.psi, .r_delta = from_q31(state.r_delta) * f.z};
+        twin = (twin_mrai_state_t){.psi_delta = from_q31(state.psi_delta) * f.psi,
+                                   .r_delta = from_q31(state.r_delta) * f.z};
         rest(&last);
         error(random_in(&seed, -200, 200) * 1e-3, random_in(&seed, -200, 200) * 1e-3);
         both(&in);
         if (fabs(twin.e.d) < 0.99 * f.i && fabs(twin.e.q) < 0.99 * f.i) { /* beyond, the stage limits the error */
-            worst_note(&current, state.e_d_q30 - twin.e.d / f.i * q30, "e_d of i %d %d u %d %d w %.3f", in.i.d, in.i.q, last.u.d, last.u.q, w);
-            worst_note(&current, state.e_q_q30 - twin.e.q / f.i * q30, "e_q of i %d %d u %d %d w %.3f", in.i.d, in.i.q, last.u.d, last.u.q, w);
+            worst_note(&current, state.e_d_q30 - twin.e.d / f.i * q30, "e_d of i %d %d u %d %d w %.3f", in.i.d, in.i.q,
+                       last.u.d, last.u.q, w);
+            worst_note(&current, state.e_q_q30 - twin.e.q / f.i * q30, "e_q of i %d %d u %d %d w %.3f", in.i.d, in.i.q,
+                       last.u.d, last.u.q, w);
         }
-        worst_note(&psi, from_q31(state.psi_delta) - twin.psi_delta / f.psi, "psi of i %d %d w %.3f", in.i.d, in.i.q, w);
-        worst_note(&psi, from_q31(state.psi_used) - twin.psi_used / f.psi, "psi used of i %d %d w %.3f", in.i.d, in.i.q, w);
+        worst_note(&psi, from_q31(state.psi_delta) - twin.psi_delta / f.psi, "psi of i %d %d w %.3f", in.i.d, in.i.q,
+                   w);
+        worst_note(&psi, from_q31(state.psi_used) - twin.psi_used / f.psi, "psi used of i %d %d w %.3f", in.i.d, in.i.q,
+                   w);
         worst_note(&r, from_q31(state.r_delta) - twin.r_delta / f.z, "r of i %d %d w %.3f", in.i.d, in.i.q, w);
         TEST_ASSERT_EQUAL(twin.psi_clamped, state.psi_clamped);
         TEST_ASSERT_EQUAL(twin.r_clamped, state.r_clamped);
@@ -554,8 +561,8 @@ void test_no_corner_of_the_input_wraps_a_state(void)
                         .omega = random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX};
         in.flux = (flux_point_t){.l_qq = 32767, .g_d = 32767, .g_q = 32767,
                                  .psi_d = corner[random_in(&seed, 0, 3)], .psi_q = corner[random_in(&seed, 0, 3)]};
-        schedule = (mrai_schedule_t){random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX, random_in(&seed, 0, 1) ? 0 : INT32_MAX,
-                                     random_in(&seed, 0, 1) ? 0 : 32767};
+        schedule = (mrai_schedule_t){random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX,
+                                     random_in(&seed, 0, 1) ? 0 : INT32_MAX, random_in(&seed, 0, 1) ? 0 : 32767};
         f.mrai.pole_gain = Q31(0.25);
         f.mrai.flux_proportional = f.mrai.resistance_proportional = 128 * 65536 - 1;
         mrai_step(&f.mrai, &schedule, &state, &in);

@@ -48,7 +48,8 @@ void test_the_factors_follow_the_twin_over_speed_and_current(void)
         at(random_in(&seed, -28000, 0), random_in(&seed, -28000, 28000), random_in(&seed, -32768, 32767));
         twin_mrai_quality_t q = {0};
         const twin_mrai_state_t idle = {0};
-        twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i}, .omega = from_q31(sample.omega) * f.w};
+        twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i},
+                            .omega = from_q31(sample.omega) * f.w};
         t.flux.g_d = from_q15(sample.flux.g_d) / f.z;
         t.flux.g_q = from_q15(sample.flux.g_q) / f.z;
         const mrai_schedule_t y = step(true);
@@ -222,12 +223,15 @@ void test_the_quality_follows_the_twins_through_a_drive(void)
         }
         /* Shares of the full drift, none of them near the 0.2 that lets the resistance law begin. */
         static const double share[8] = {0.0, 0.05, 0.1, -0.15, 0.3, -0.6, 0.9, 1.7};
-        identifier.psi_delta += (q31_t)(share[random_in(&seed, 0, 7)] * (random_in(&seed, 0, 1) ? 1 : -1) * f.mrai.psi_drift_full);
+        identifier.psi_delta +=
+            (q31_t)(share[random_in(&seed, 0, 7)] * (random_in(&seed, 0, 1) ? 1 : -1) * f.mrai.psi_drift_full);
         identifier.r_delta += random_in(&seed, -f.mrai.r_drift_full, f.mrai.r_drift_full);
         identifier.psi_delta = fx_clamp_q31(identifier.psi_delta, -400000000, 200000000);
-        const twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i}, .omega = from_q31(sample.omega) * f.w,
+        const twin_mrai_in_t t = {.i = {from_q15(sample.i.d) * f.i, from_q15(sample.i.q) * f.i},
+                                  .omega = from_q31(sample.omega) * f.w,
                                   .flux = {.g_d = 1e-4, .g_q = 1e-4}};
-        const twin_mrai_state_t state = {.psi_delta = from_q31(identifier.psi_delta) * f.psi, .r_delta = from_q31(identifier.r_delta) * f.z};
+        const twin_mrai_state_t state = {.psi_delta = from_q31(identifier.psi_delta) * f.psi,
+                                         .r_delta = from_q31(identifier.r_delta) * f.z};
         (void)step(true);
         (void)twin_mrai_schedule(&f.si, &twin, &t, &t, &state, true);
         worst_note(&worst, quality.psi_quality - twin.psi_quality * 32768.0, "psi, step %d", n);

@@ -41,12 +41,15 @@ void test_every_operating_point_follows_the_twin(void)
     uint64_t seed = 91;
     for (int n = 0; n < 200000; n++) {
         const dq_t i = {(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)};
-        const flux_point_t flux = {.psi_d = (q15_t)random_in(&seed, -20000, 20000), .psi_q = (q15_t)random_in(&seed, -32768, 32767)};
+        const flux_point_t flux = {.psi_d = (q15_t)random_in(&seed, -20000, 20000),
+                                   .psi_q = (q15_t)random_in(&seed, -32768, 32767)};
         const q31_t delta = random_in(&seed, -500000000, 500000000);
         const twin_flux_t si = {.psi_d = from_q15(flux.psi_d) * f.psi, .psi_q = from_q15(flux.psi_q) * f.psi};
-        const double t = twin_torque(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, &si, from_q31(delta) * f.psi);
+        const double t =
+            twin_torque(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, &si, from_q31(delta) * f.psi);
         const q15_t y = torque_estimate_step(&state, i, &flux, delta);
-        worst_note(&worst, y - twin_clamp(t / f.t * 32768.0, -32768, 32767), "i %d %d psi %d %d", i.d, i.q, flux.psi_d, flux.psi_q);
+        worst_note(&worst, y - twin_clamp(t / f.t * 32768.0, -32768, 32767), "i %d %d psi %d %d", i.d, i.q, flux.psi_d,
+                   flux.psi_q);
     }
     ASSERT_WORST(worst, 1.0);
 }

@@ -47,7 +47,8 @@ void test_clarke_ignores_a_common_current_to_one_lsb(void)
     }
 }
 
-/* The angle of a is exact in the twin; sine and cosine are each good to 1.05 LSB, so |v| 1.05 sqrt(2) at most, plus 0.5. */
+/* The angle of a is exact in the twin; sine and cosine are each good to 1.05 LSB, so |v| 1.05 sqrt(2) at most, plus
+ * 0.5. */
 void test_park_and_its_inverse_follow_the_twin_at_every_angle(void)
 {
     worst_t worst = {0};

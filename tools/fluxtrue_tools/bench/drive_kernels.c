@@ -78,7 +78,8 @@ CALLED void drive_request(int32_t torque, uint32_t enable)
 
 CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 {
-    port.counts = (adc_counts_t){(uint16_t)i_ab, (uint16_t)(i_ab >> 16), (uint16_t)i_c_v_dc, (uint16_t)(i_c_v_dc >> 16)};
+    port.counts =
+        (adc_counts_t){(uint16_t)i_ab, (uint16_t)(i_ab >> 16), (uint16_t)i_c_v_dc, (uint16_t)(i_c_v_dc >> 16)};
     port.theta_m = theta_m;
 }
 

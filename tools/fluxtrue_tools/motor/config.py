@@ -88,7 +88,7 @@ class MotorConfig(_Section):
 
     @property
     def torque_slew_Nm_per_s(self) -> float:
-        """0 is open. By default all the torque in 10 ms: a full reversal in deep field weakening then stays below the trip."""
+        """0 is open; by default all torque in 10 ms: a full reversal in field weakening then stays below the trip."""
         given = self.control.torque_slew_Nm_per_s
         return SLEW_PER_TORQUE_MAX * self.machine.torque_max_Nm if given is None else given
 

@@ -63,7 +63,6 @@ class Derived:
     omega_min_rad_s: float
     omega_r_max_rad_s: float
     i_min_A: float
-    innovation_full_Vs: float
     psi_drift_full_Vs: float
     r_drift_full_ohm: float
     quality_rate: float
@@ -114,7 +113,6 @@ def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_
         "omega_min_rad_s": min(OMEGA_MIN_RAD_S, OMEGA_MIN_SHARE * config.omega_max_rad_s),
         "omega_r_max_rad_s": OMEGA_R_MAX_SHARE * config.omega_max_rad_s,
         "i_min_A": I_MIN_SHARE * machine.i_max_A,
-        "innovation_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs,
         "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * task_s,
         "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * task_s,
         "quality_rate": 1.0 - math.exp(-task_s / QUALITY_TIME_S),

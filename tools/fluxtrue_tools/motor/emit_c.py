@@ -227,7 +227,8 @@ def _q15_tables(motor: Motor) -> list[str]:
                 "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
     out = [f"/* Flux tables: {grid}. */\n"]
     # psi_f0 depends on i_q alone: one row of it is enough.
-    out += [_table("int16_t", f"table_{name}", tables.stored[name][:1] if name == "psi_f0" else tables.stored[name], text)
+    rows = {name: values[:1] if name == "psi_f0" else values for name, values in tables.stored.items()}
+    out += [_table("int16_t", f"table_{name}", rows[name], text)
             for name, text in comments.items()]
     out.append(f"/* Current references: rows |T| = 0 ... {refs.torque_Nm[-1]:.6g} N·m "
                f"every {refs.torque_Nm[1]:.6g} N·m, columns\n"
@@ -250,7 +251,7 @@ _SI_DERIVED = (
     "tracker_bandwidth_rad_s", "sigma_rad_s", "setpoint_weight", "integral_ratio", "v_ratio", "dead_time_duty",
     "knee_A", "min_pulse_duty", "v_dc_min_V", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
     "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
-    "innovation_full_Vs", "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
+    "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
     "torque_slew_Nm", "ref_v_ratio", "i_trip_A", "v_max_V", "v_min_V", "sum_max_A", "psi_f_Vs",
 )
 

@@ -84,7 +84,9 @@ class Controller(BaseModel):
     def _no_plant(self) -> "Controller":
         for name in self.__pydantic_extra__ or {}:
             if "." in name:
-                raise ValueError(f"{name} is not the controller's, allowed: names without a dot; [plant] has the plant's")
+                raise ValueError(
+                    f"{name} is not the controller's, allowed: names without a dot; [plant] has the plant's"
+                )
         return self
 
     def values(self) -> dict[str, float]:
