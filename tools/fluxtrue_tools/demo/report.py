@@ -55,7 +55,7 @@ def rows(demonstration: Demonstration) -> list[Row]:
 
 def terminal(demonstration: Demonstration) -> str:
     """Plain text, as wide as it needs to be."""
-    cells = [("experiment", "figure of merit", "measured", "allowed", "")]
+    cells = [("experiment", "figure of merit", "simulated", "allowed", "")]
     cells += [
         (r.experiment, r.what, r.value, r.allowed, "met" if r.met else "MISSED")
         for r in rows(demonstration)
