@@ -32,7 +32,7 @@ MAX_LINES = (
 
 SOURCES = {".c", ".h", ".py", ".cmake", ".toml", ".txt"}
 SPDX = "SPDX-License-Identifier: Apache-2.0"
-# The style is 100; a table of test vectors or a docstring's row may need more.
+# As in .clang-format and .editorconfig.
 MAX_COLUMNS = 120
 
 # Marks of unfinished work, and of the place where a text was written rather than of the project.
