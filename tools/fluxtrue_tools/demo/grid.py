@@ -147,9 +147,9 @@ def _twin_result(points: list[dict[str, float]]) -> Result:
 
 
 def story(bench: Bench) -> Recording:
-    """3000 rpm, 80 N·m: the magnets weaken from 0.2 to 0.5 s, the loop is closed at 0.8 s."""
-    spec = scenario(3000.0, 80.0, False, "firmware")
-    spec["duration_s"] = 1.2
+    """3000 rpm, 40 N·m: the magnets weaken from 0.2 to 0.5 s, the loop is closed at 0.8 s."""
+    spec = scenario(3000.0, 40.0, False, "firmware")
+    spec["duration_s"] = 1.6
     spec["profile"] |= {"magnet_scale": [[0, 1.0], [0.2, 1.0], [0.5, MAGNET_SCALE]]}
     spec["event"] = [{"t": 0.8, "set": {"torque_loop": True, "identification": True}}]
     return run(bench.hsm1, spec)

@@ -98,7 +98,7 @@ def _figures(demonstration: Demonstration) -> dict[str, str]:
     gains = [_result(demonstration, f"paper-fig3-4 {name}") for name in paper.GAIN_SETS]
     weak = [(0.2, 0.5, "magnets weaken", LOST), (0.5, 0.8, "tables alone", OPEN)]
     drawn = {
-        "story": figures.story(demonstration.story, [*weak, (0.8, 1.2, "torque loop closed", CLOSED)]),
+        "story": figures.story(demonstration.story, [*weak, (0.8, 1.6, "torque loop closed", CLOSED)]),
         "gains": figures.gain_sets(gains),
         "fig7": figures.fig7(_result(demonstration, "paper-fig7").runs["fig7"]),
         "fig8": figures.story(
@@ -115,9 +115,9 @@ def _figures(demonstration: Demonstration) -> dict[str, str]:
 def _headline(demonstration: Demonstration) -> str:
     run = demonstration.story
     assert run is not None
-    command = run.mean("torque_command_Nm", (0.9, 1.2))
+    command = run.mean("torque_command_Nm", (0.9, 1.6))
     lost = run.mean("true_torque_Nm", (0.65, 0.8))
-    back = run.mean("true_torque_Nm", (1.0, 1.2))
+    back = run.mean("true_torque_Nm", (1.3, 1.6))
     return (
         f"A measured traction machine at 3000 rpm is asked for {command:.0f} N·m. Its magnets lose 15 % of their "
         f"flux: the shaft gets {lost:.1f} N·m ({100 * (lost / command - 1):+.1f} %). At 0.8 s the firmware starts "
