@@ -18,7 +18,8 @@
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
 
-/** What the outside asks. Writer: one (communication or test); each field is one word, read by the 1 kHz task. */
+/** What the outside asks. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
+ * the MRAI ISR; every field is aligned and read word by word. */
 typedef struct {
     q15_t torque;
     dq_t i_ref;          /* current mode only */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef APP_EXCHANGE_H
 #define APP_EXCHANGE_H
-/** The two boxes through which priorities exchange data; each has one writer.
+/** The boxes through which priorities exchange data; each has one writer.
  *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
- *   Upwards (task to fast ISR) the reader cannot be interrupted by its writer: one read is enough.
+ *   Upwards (task to the ISRs) the reader cannot be interrupted by its writer: one read is enough.
  *   Downwards (fast ISR to MRAI ISR and task) the reader may be: the task reads again if two writes came in between;
  *   the MRAI ISR says when it has finished, and until then only the other slot is written.
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes

@@ -3,8 +3,8 @@
 
 #include "fx/q.h"
 
-/* The slow observer poles make e = w dpsi/(2 S L_q) large: 0.6 pu for a magnet 15 % weak at full speed. A tighter
- * bound winds up. */
+/* The slow observer poles make e = w dpsi/(S L_q) large: 0.8 pu for a magnet 15 % weak at full speed on hsm1. A
+ * tighter bound winds up. */
 #define ERROR_BITS 31
 /* |s2 e| < 1/16 in the laws: 5 more bits fit, and the small steps of the adaptation keep theirs. */
 #define INNOVATION_BITS 26

@@ -27,16 +27,6 @@ typedef struct {
 } fx_lut1_t;
 
 typedef struct {
-    const int16_t *z; /* row-major: z[ix * ny + iy] */
-    int32_t x0;
-    int32_t y0;
-    uint8_t x_shift;
-    uint8_t y_shift;
-    uint8_t nx;
-    uint8_t ny;
-} fx_lut2_t;
-
-typedef struct {
     int32_t x0;
     int32_t y0;
     uint8_t x_shift;
@@ -44,6 +34,11 @@ typedef struct {
     uint8_t nx;
     uint8_t ny;
 } fx_grid_t;
+
+typedef struct {
+    const int16_t *z; /* row-major: z[ix * ny + iy] */
+    fx_grid_t grid;
+} fx_lut2_t;
 
 typedef struct {
     uint32_t index;  /* of the corner z00 */
@@ -138,10 +133,9 @@ static inline int32_t fx_cell_interp_y(const int16_t *z, fx_cell_t cell)
 
 static inline q15_t fx_lookup2(const fx_lut2_t *lut, int32_t x, int32_t y, bool *clamped)
 {
-    const fx_grid_t grid = {lut->x0, lut->y0, lut->x_shift, lut->y_shift, lut->nx, lut->ny};
-    const fx_cell_t cell = fx_cell(&grid, x, y);
+    const fx_cell_t cell = fx_cell(&lut->grid, x, y);
     *clamped = cell.clamped;
-    return (q15_t)fx_cell_interp(lut->z, lut->ny, cell);
+    return (q15_t)fx_cell_interp(lut->z, lut->grid.ny, cell);
 }
 
 #endif

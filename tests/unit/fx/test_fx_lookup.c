@@ -39,13 +39,13 @@ static long double bilinear(const fx_lut2_t *lut, int32_t x, int32_t y, long dou
     int ix;
     int iy;
     bool outside_y;
-    const long double u = place(x, lut->x0, lut->x_shift, lut->nx, &ix, outside);
-    const long double v = place(y, lut->y0, lut->y_shift, lut->ny, &iy, &outside_y);
-    const int16_t *z = &lut->z[(ix * lut->ny) + iy];
+    const long double u = place(x, lut->grid.x0, lut->grid.x_shift, lut->grid.nx, &ix, outside);
+    const long double v = place(y, lut->grid.y0, lut->grid.y_shift, lut->grid.ny, &iy, &outside_y);
+    const int16_t *z = &lut->z[(ix * lut->grid.ny) + iy];
     const long double z00 = z[0];
     const long double z01 = z[1];
-    const long double z10 = z[lut->ny];
-    const long double z11 = z[lut->ny + 1];
+    const long double z10 = z[lut->grid.ny];
+    const long double z11 = z[lut->grid.ny + 1];
     *outside = *outside || outside_y;
     *allowed = 0.5L + (fabsl(z00 - z01 - z10 + z11) / 32768.0L);
     *allowed += (u == 1.0L) ? fmaxl(fabsl(z10 - z00), fabsl(z11 - z01)) / 16384.0L : 0.0L;
@@ -71,17 +71,17 @@ void test_bilinear_look_up_agrees_with_long_double_inside_and_outside_any_grid(v
     for (unsigned shift = 0U; shift <= 14U; shift++) {
         const uint8_t other = (uint8_t)(14U - shift);
         const fx_lut2_t lut = {
-            table, -3 * (1 << shift), 1 - (1 << other), (uint8_t)shift, other, NX, NY};
+            table, {-3 * (1 << shift), 1 - (1 << other), (uint8_t)shift, other, NX, NY}};
         for (int32_t i = 0; i < 20000; i++) {
             const int32_t wide = (NX + 2) << shift;
-            const int32_t x = lut.x0 - (1 << shift) + (int32_t)(random_u32() % (uint32_t)wide);
-            const int32_t y = lut.y0 - (1 << other) +
+            const int32_t x = lut.grid.x0 - (1 << shift) + (int32_t)(random_u32() % (uint32_t)wide);
+            const int32_t y = lut.grid.y0 - (1 << other) +
                               (int32_t)(random_u32() % ((NY + 2U) << other));
             check2(&lut, x, y);
         }
         for (int32_t i = 0; i < CORNERS; i++) {
-            check2(&lut, corner[i], lut.y0 + 1);
-            check2(&lut, lut.x0 + 1, corner[i]);
+            check2(&lut, corner[i], lut.grid.y0 + 1);
+            check2(&lut, lut.grid.x0 + 1, corner[i]);
             check2(&lut, corner[i], corner[CORNERS - 1 - i]);
         }
     }
@@ -89,7 +89,7 @@ void test_bilinear_look_up_agrees_with_long_double_inside_and_outside_any_grid(v
 
 void test_an_origin_at_the_end_of_int32_neither_wraps_nor_unflags(void)
 {
-    const fx_lut2_t low = {table, INT32_MIN, INT32_MAX - 100, 4, 5, NX, NY};
+    const fx_lut2_t low = {table, {INT32_MIN, INT32_MAX - 100, 4, 5, NX, NY}};
     for (int32_t i = 0; i < CORNERS; i++) {
         check2(&low, corner[i], INT32_MAX);
         check2(&low, INT32_MIN + 17, corner[i]);
@@ -98,12 +98,12 @@ void test_an_origin_at_the_end_of_int32_neither_wraps_nor_unflags(void)
 
 void test_grid_points_give_their_own_value_and_no_flag(void)
 {
-    const fx_lut2_t lut = {table, -32768, 0, 13, 11, NX, NY};
+    const fx_lut2_t lut = {table, {-32768, 0, 13, 11, NX, NY}};
     for (int32_t ix = 0; ix < NX; ix++) {
         for (int32_t iy = 0; iy < NY; iy++) {
             bool clamped = true;
             const int32_t want = table[(ix * NY) + iy];
-            const int32_t got = fx_lookup2(&lut, lut.x0 + (ix << 13), iy << 11, &clamped);
+            const int32_t got = fx_lookup2(&lut, lut.grid.x0 + (ix << 13), iy << 11, &clamped);
             TEST_ASSERT_FALSE(clamped);
             /* The last row and column lie 2^-14 of a step inside: steps here are up to 2^16. */
             TEST_ASSERT_INT32_WITHIN(((ix == NX - 1) || (iy == NY - 1)) ? 8 : 0, want, got);
@@ -113,12 +113,14 @@ void test_grid_points_give_their_own_value_and_no_flag(void)
 
 void test_one_count_beyond_the_grid_is_flagged_on_every_side(void)
 {
-    const fx_lut2_t lut = {table, -100, 50, 14, 14, NX, NY};
-    const int32_t right = lut.x0 + ((NX - 1) << 14);
-    const int32_t top = lut.y0 + ((NY - 1) << 14);
+    const fx_lut2_t lut = {table, {-100, 50, 14, 14, NX, NY}};
+    const int32_t right = lut.grid.x0 + ((NX - 1) << 14);
+    const int32_t top = lut.grid.y0 + ((NY - 1) << 14);
     bool clamped = false;
-    const int32_t point[6][3] = {{lut.x0, lut.y0, 0}, {right, top, 0},         {lut.x0 - 1, top, 1},
-                                 {right + 1, top, 1}, {right, lut.y0 - 1, 1}, {lut.x0, top + 1, 1}};
+    const int32_t left = lut.grid.x0;
+    const int32_t bottom = lut.grid.y0;
+    const int32_t point[6][3] = {{left, bottom, 0},   {right, top, 0},          {left - 1, top, 1},
+                                 {right + 1, top, 1}, {right, bottom - 1, 1}, {left, top + 1, 1}};
     for (int i = 0; i < 6; i++) {
         (void)fx_lookup2(&lut, point[i][0], point[i][1], &clamped);
         TEST_ASSERT_EQUAL_INT32(point[i][2], clamped);
@@ -133,7 +135,7 @@ void test_a_constant_table_gives_its_constant_everywhere(void)
         for (int i = 0; i < MAX_POINTS; i++) {
             table[i] = value[k];
         }
-        const fx_lut2_t lut = {table, 0, 0, 14, 12, NX, NY};
+        const fx_lut2_t lut = {table, {0, 0, 14, 12, NX, NY}};
         for (int32_t i = 0; i < 300000; i++) {
             bool clamped;
             const int32_t x = (int32_t)(random_u32() & 0xFFFFU);
@@ -170,7 +172,7 @@ void test_the_four_weights_are_never_negative_and_sum_to_one(void)
 void test_one_cell_serves_several_tables_on_one_grid(void)
 {
     const fx_grid_t grid = {-512, 0, 8, 7, NX, NY};
-    const fx_lut2_t lut = {&table[7], -512, 0, 8, 7, NX, NY}; /* an odd address: unaligned loads */
+    const fx_lut2_t lut = {&table[7], grid}; /* an odd address: unaligned loads */
     for (int32_t i = 0; i < 100000; i++) {
         const int32_t x = (int32_t)(random_u32() % 2000U) - 700;
         const int32_t y = (int32_t)(random_u32() % 700U) - 100;

@@ -114,7 +114,7 @@ static const int16_t values[60] = {
     333,    -444,   555,    -666,  777,   -888,   999,    -1111, 2222,  -3333,  4444,  -5555,
 };
 static const fx_lut1_t line = {values, -32768, 11, 33};
-static const fx_lut2_t plane = {values, -32768, 0, 12, 13, 9, 5};
+static const fx_lut2_t plane = {values, {-32768, 0, 12, 13, 9, 5}};
 static const fx_grid_t grid = {-32768, 0, 12, 13, 9, 5};
 
 static inline int32_t lookup1(int32_t x)
