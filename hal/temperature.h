@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_TEMPERATURE_H
+#define HAL_TEMPERATURE_H
+/** Slow sensors: winding (NTC) and inverter.
+ * Source   docs/howto/port.md
+ * Units    tenths of a degree Celsius
+ * Errors   HAL_TEMPERATURE_UNKNOWN: no sensor, or one that is broken or shorted
+ * Context  1 kHz task */
+#include <stdint.h>
+
+#define HAL_TEMPERATURE_UNKNOWN INT16_MIN
+
+int16_t hal_temperature_winding_dC(void);
+int16_t hal_temperature_inverter_dC(void);
+
+#endif
