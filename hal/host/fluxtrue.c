@@ -18,12 +18,17 @@
 #define TEMPERATURE_MIN_C (-100.0)
 #define TEMPERATURE_MAX_C 500.0
 
+void fluxtrue_init(fluxtrue_t *instance)
+{
+    *instance = (fluxtrue_t){.winding_C = 20.0};
+    drive_init(&instance->drive, &motor);
+}
+
 fluxtrue_t *fluxtrue_create(void)
 {
-    fluxtrue_t *instance = calloc(1, sizeof *instance);
+    fluxtrue_t *instance = malloc(sizeof *instance);
     if (instance) {
-        drive_init(&instance->drive, &motor);
-        instance->winding_C = 20.0;
+        fluxtrue_init(instance);
     }
     return instance;
 }

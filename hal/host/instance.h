@@ -22,4 +22,7 @@ struct fluxtrue {
     double torque_command_Nm; /* as set: what get answers before the task has taken it over */
 };
 
+/** As fluxtrue_create() leaves it, in memory of the caller's. */
+void fluxtrue_init(fluxtrue_t *instance);
+
 #endif
