@@ -17,10 +17,11 @@
 #define ANGLE_CREDIBLE_RAD 1e9
 #define TEMPERATURE_MIN_C (-100.0)
 #define TEMPERATURE_MAX_C 500.0
+#define AMBIENT_C 20.0
 
 void fluxtrue_init(fluxtrue_t *instance)
 {
-    *instance = (fluxtrue_t){.winding_C = 20.0};
+    *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
     drive_init(&instance->drive, &motor);
 }
 
@@ -82,7 +83,11 @@ static void run_period(fluxtrue_t *d)
     }
     d->periods++;
     if (d->periods % TORQUE_ESTIMATE_PERIODS == 0) {
-        task_1khz(&d->drive);
+        if (d->on_bus) {
+            ecu_task_1khz(&d->ecu);
+        } else {
+            task_1khz(&d->drive);
+        }
     }
     host_port_select(NULL);
 }
