@@ -134,16 +134,20 @@ static void do_names(bench_t *bench, int client, const arguments_t *a)
     size_t used = 2;
     (void)a;
     const char *name;
+    for (int i = 0; (name = stand_name(i)) != NULL; i++) {
+        used += (size_t)snprintf(text + used, sizeof text - used, " %s", name);
+    }
     for (int i = 0; (name = sim_name(i)) != NULL && used + strlen(name) + 2U < sizeof text; i++) {
         used += (size_t)snprintf(text + used, sizeof text - used, " %s", name);
     }
     say(bench, client, "%s", text);
 }
 
-/* The firmware's own names may be read but not written: on a bench the ECU is asked over CAN. */
-static bool settable(const char *name)
+/* The dc voltage is the battery's and the switches'. */
+static bool settable(const vecu_t *vecu, const char *name)
 {
-    return strncmp(name, "plant.", 6) == 0 || strncmp(name, "board.", 6) == 0;
+    return strcmp(name, "plant.vdc_V") != 0 && !isnan(vecu_get(vecu, name)) &&
+           (strncmp(name, "plant.", 6) == 0 || strncmp(name, "board.", 6) == 0);
 }
 
 static void do_set(bench_t *bench, int client, const arguments_t *a)
@@ -154,7 +158,7 @@ static void do_set(bench_t *bench, int client, const arguments_t *a)
         return;
     }
     for (int i = 1; i < a->count; i += 2) {
-        if (!settable(a->word[i]) || isnan(sim_get(bench->vecu->sim, a->word[i]))) {
+        if (!settable(bench->vecu, a->word[i])) {
             REFUSE("set: '%s' is no name that can be set", a->word[i]);
             return;
         }
@@ -165,7 +169,7 @@ static void do_set(bench_t *bench, int client, const arguments_t *a)
     }
     for (int i = 1; i < a->count; i += 2) {
         (void)number(a->word[i + 1], &value);
-        if (sim_set(bench->vecu->sim, a->word[i], value) != SIM_OK) {
+        if (!vecu_set(bench->vecu, a->word[i], value)) {
             REFUSE("set: %s = %s is out of range%s", a->word[i], a->word[i + 1],
                    i > 1 ? "; what stood before it has been set" : "");
             return;
@@ -183,7 +187,7 @@ static void do_get(bench_t *bench, int client, const arguments_t *a)
         return;
     }
     for (int i = 1; i < a->count; i++) {
-        const double value = sim_get(bench->vecu->sim, a->word[i]);
+        const double value = vecu_get(bench->vecu, a->word[i]);
         if (isnan(value)) {
             REFUSE("get: unknown name '%s'", a->word[i]);
             return;
@@ -197,19 +201,18 @@ static void do_ramp(bench_t *bench, int client, const arguments_t *a)
 {
     double to;
     uint64_t periods;
-    if (a->count != 5 || !settable(a->word[1]) || !number(a->word[2], &to) ||
+    if (a->count != 5 || !settable(bench->vecu, a->word[1]) || !number(a->word[2], &to) ||
         !duration(bench, a->word[3], a->word[4], &periods) || strlen(a->word[1]) >= NAME_SIZE) {
         REFUSE("ramp: wanted <name> <value> <n> <unit>");
         return;
     }
-    sim_t *sim = bench->vecu->sim;
-    const double from = sim_get(sim, a->word[1]);
-    if (bench->ramps == RAMPS_MAX || isnan(from) || sim_set(sim, a->word[1], to) != SIM_OK) {
+    const double from = vecu_get(bench->vecu, a->word[1]);
+    if (bench->ramps == RAMPS_MAX || !vecu_set(bench->vecu, a->word[1], to)) {
         REFUSE("ramp: %s to %s: %s", a->word[1], a->word[2],
-               bench->ramps == RAMPS_MAX ? "too many ramps at a time" : "unknown name or out of range");
+               bench->ramps == RAMPS_MAX ? "too many ramps at a time" : "out of range");
         return;
     }
-    (void)sim_set(sim, a->word[1], from); /* every value between two allowed ones is allowed */
+    (void)vecu_set(bench->vecu, a->word[1], from); /* every value between two allowed ones is allowed */
     bench_ramp_t *ramp = &bench->ramp[bench->ramps++];
     const uint64_t now = bench->vecu->now_ns;
     *ramp = (bench_ramp_t){.from = from, .to = to, .begin_ns = now, .end_ns = now + periods * bench->vecu->period_ns};
@@ -364,7 +367,7 @@ static void ramps_apply(bench_t *bench)
         const bench_ramp_t *r = &bench->ramp[i];
         const bool over = now >= r->end_ns;
         const double share = over ? 1.0 : (double)(now - r->begin_ns) / (double)(r->end_ns - r->begin_ns);
-        (void)sim_set(bench->vecu->sim, r->name, r->from + share * (r->to - r->from));
+        (void)vecu_set(bench->vecu, r->name, r->from + share * (r->to - r->from));
         if (over) {
             bench->ramp[i] = bench->ramp[--bench->ramps];
         }

@@ -3,8 +3,8 @@
 #define VECU_BENCH_H
 /** The bench channel: what a test stand does that is not on CAN. One command per line, one answer per command:
  *   hello                             who we are
- *   names                             every name of the plant and of its truth
- *   set <name> <value> [...]          plant parameters and faults, from the next period on
+ *   names                             every name of the board, the plant and its truth
+ *   set <name> <value> [...]          "plant." and "board.": parameters and faults, from the next period on
  *   get <name> [...]
  *   ramp <name> <value> <n> <unit>    linearly during the runs to come
  *   record <periods> <name> [...]     during a run one line "row <value> ..." each so many periods; "record off"

@@ -30,7 +30,7 @@ static uint32_t rank(const can_frame_t *frame)
 bool can_bus_post(can_bus_t *bus, int node, const can_frame_t *frame, uint64_t now_ns)
 {
     can_bus_node_t *n = &bus->node[node];
-    if (n->count == CAN_BUS_QUEUE) {
+    if (n->count == (node == CAN_BUS_ECU ? (uint32_t)CAN_BUS_MAILBOXES : (uint32_t)CAN_BUS_QUEUE)) {
         bus->counts.lost++;
         return false;
     }

@@ -14,7 +14,7 @@
 
 #include "types/can_frame.h"
 
-enum { CAN_BUS_NODES = 17, CAN_BUS_QUEUE = 1024, CAN_BUS_ECU = 0 };
+enum { CAN_BUS_NODES = 17, CAN_BUS_QUEUE = 1024, CAN_BUS_ECU = 0, CAN_BUS_MAILBOXES = 16 /* of the ECU */ };
 #define CAN_BUS_WINDOW_NS 100000000ULL /* the load is counted in windows of 100 ms */
 #define CAN_BUS_LOAD_MAX 0.7           /* beyond it low priorities wait for long: flagged */
 

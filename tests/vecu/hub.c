@@ -160,6 +160,11 @@ void hub_run(hub_t *hub, uint64_t now_ns)
     }
 }
 
+bool hub_has_room(const hub_t *hub)
+{
+    return hub->bus.node[CAN_BUS_ECU].count < (uint32_t)CAN_BUS_MAILBOXES;
+}
+
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns)
 {
     const bool taken = can_bus_post(&hub->bus, CAN_BUS_ECU, frame, now_ns);

@@ -38,6 +38,8 @@ void hub_poll(hub_t *hub, uint64_t now_ns, int timeout_ms);
 /** Lets the bus run until now: frames that have passed by are handed to everybody but their sender. */
 void hub_run(hub_t *hub, uint64_t now_ns);
 
+/** Whether hub_send() would take a frame. */
+bool hub_has_room(const hub_t *hub);
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns);
 bool hub_receive(hub_t *hub, can_frame_t *frame);
 

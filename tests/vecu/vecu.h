@@ -12,10 +12,12 @@
 
 #include "hub.h"
 #include "loop/runner/sim.h"
+#include "stand.h"
 
 typedef struct {
     hub_t *hub;
     sim_t *sim;
+    stand_t stand;
     uint64_t now_ns, period_ns;
     uint64_t seed;
     uint64_t duty_hash;    /* FNV-1a of every duty and gate state since the hash was last asked for */
@@ -27,6 +29,10 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed);
 void vecu_destroy(vecu_t *vecu);
 /** One PWM period; answers whether `row` (SIM_API sim_record) has been written. */
 bool vecu_step(vecu_t *vecu, double *row);
+/** Everything that has a name: "plant.", "truth.", "board.", and the firmware's (to be read only: on a bench the ECU is asked
+ * over CAN). False and NaN: unknown, read only or out of range. */
+bool vecu_set(vecu_t *vecu, const char *name, double value);
+double vecu_get(const vecu_t *vecu, const char *name);
 /** The hash, which starts anew. */
 uint64_t vecu_take_hash(vecu_t *vecu);
 
