@@ -58,6 +58,16 @@ class Trace:
 
 
 @dataclass
+class Expected:
+    """What a test provokes and the check after it must not complain about."""
+
+    faults: bool = False
+    load: bool = False  # of the bus
+    frames: bool = False  # cyclic frames that come late or not at all
+    counters: set[str] = field(default_factory=set)
+
+
+@dataclass
 class Frame:
     """One frame as received."""
 
@@ -94,6 +104,7 @@ class Rig:
         self.keep_frames = True
         self.counted: dict[str, int] = defaultdict(int)
         self.trace = Trace([])
+        self.expected = Expected()
 
     # What the DBC says.
 
@@ -168,21 +179,23 @@ class Rig:
         sender = self._senders[COMMAND]
         sender.counter = (sender.counter + count) % e2e.COUNTERS
 
+    def _is_due(self, name: str) -> bool:
+        """Whether a cyclic message must go out now; its next time is noted."""
+        if self._due[name] > self.now_s + EXACT:
+            return False
+        self._due[name] = max(self._due[name], self.now_s - EXACT) + self.cycle_s(name)
+        return True
+
     def _send_due(self) -> None:
         if not self.is_sending:
-            self._due = {name: max(due_s, self.now_s) for name, due_s in self._due.items()}
             return
-        now_s = self.now_s
-        if self._due[COMMAND] <= now_s + EXACT:
+        if self._is_due(COMMAND):
             self.send(self._command_id, self.next_command())
-            self._due[COMMAND] += self.cycle_s(COMMAND)
-        if self._due[LIMITS] <= now_s + EXACT:
-            if self.power_limits_kW is not None:
-                drive, regen = self.power_limits_kW
-                signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
-                data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
-                self.send(self._limits_id, data)
-            self._due[LIMITS] += self.cycle_s(LIMITS)
+        if self._is_due(LIMITS) and self.power_limits_kW is not None:
+            drive, regen = self.power_limits_kW
+            signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
+            data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
+            self.send(self._limits_id, data)
 
     # Receiving.
 

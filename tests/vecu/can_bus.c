@@ -116,3 +116,9 @@ bool can_bus_next(can_bus_t *bus, uint64_t until_ns, can_bus_passed_t *passed)
     *passed = (can_bus_passed_t){bus->frame, bus->from, bus->free_ns};
     return true;
 }
+
+void can_bus_silence_ecu(can_bus_t *bus)
+{
+    bus->node[CAN_BUS_ECU].count = 0;
+    bus->flying = bus->flying && bus->from != CAN_BUS_ECU;
+}

@@ -58,5 +58,7 @@ uint32_t can_bus_bits(const can_frame_t *frame);
 bool can_bus_post(can_bus_t *bus, int node, const can_frame_t *frame, uint64_t now_ns);
 /** The next frame that has passed by `until`; false: none. */
 bool can_bus_next(can_bus_t *bus, uint64_t until_ns, can_bus_passed_t *passed);
+/** The ECU is switched off: what it was sending and had queued is lost. */
+void can_bus_silence_ecu(can_bus_t *bus);
 
 #endif

@@ -43,6 +43,9 @@ bool hub_has_room(const hub_t *hub);
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns);
 bool hub_receive(hub_t *hub, can_frame_t *frame);
 
+/** The ECU is switched off: nothing of its own is on the bus any more, and it has heard nothing. */
+void hub_forget_ecu(hub_t *hub);
+
 /** What passed between us and the client whose side of the connection has this port: frames it sent, good or bad, and
  * frames sent to it. False: no such client. A client that knows its own port has read the greetings: frames flow at once. */
 bool hub_client_counts(hub_t *hub, uint16_t peer, uint64_t *received, uint64_t *sent);

@@ -35,6 +35,9 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)
 {
     sim_destroy(vecu->sim);
+    if (vecu->hub != NULL) {
+        hub_forget_ecu(vecu->hub);
+    }
     fluxtrue_init(&the_ecu);
     can_host_attach(&the_ecu);
     vecu->sim = sim_create_around(&the_ecu);
