@@ -2,7 +2,6 @@
 """One suite for the virtual ECU and for a bench: which bus, which plant, and what is looked at after every test."""
 
 import logging
-import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from fluxtrue_tools.vecu.mdf import BusLog
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 import health
+from clients import client_port, connect
 from report import Figures, Report
 from rig import Rig
 
@@ -74,17 +74,6 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """The report is written even after failures."""
     session.config.stash[REPORT].write()
-
-
-def client_port(bus: can.BusABC) -> int:
-    """Our side of a socketcand connection: how the bench channel knows us. 0: another interface."""
-    connection = getattr(bus, "_SocketCanDaemonBus__socket", None)
-    return int(connection.getsockname()[1]) if isinstance(connection, socket.socket) else 0
-
-
-def connect(port: int) -> can.BusABC:
-    """A socketcand client of our own virtual ECU."""
-    return can.Bus(interface="socketcand", channel="can0", host=HOST, port=port, tcp_tune=True)
 
 
 @pytest.fixture(scope="session")

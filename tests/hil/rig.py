@@ -23,6 +23,7 @@ COMMAND = "VCU_TorqueCommand"
 LIMITS = "VCU_BatteryLimits"
 STATUS = "INV_Status"
 MS = 1e-3
+RPM = 2.0 * np.pi / 60.0  # rad/s
 EXACT = 1e-9  # s: a step's end and a frame's due time are the same instant
 
 
@@ -258,6 +259,11 @@ class Rig:
         self.ask(enable=True)
         self.wait_for("run")
         self.ask(torque_Nm=torque_Nm)
+
+    def turn(self, speed_rpm: float, seconds: float = 0.3) -> None:
+        """The dynamometer brings the shaft to this speed; a jump would be an angle fault."""
+        self.stand.ramp("plant.speed_rad_s", speed_rpm * RPM, seconds)
+        self.advance(seconds + 0.1)
 
     def record(self, names: Sequence[str], periods: int = 10) -> Trace:
         """The plant's truth from now on: a row each so many PWM periods."""
