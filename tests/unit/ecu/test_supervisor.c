@@ -367,8 +367,16 @@ void test_a_reset_does_not_forget_what_is_still_there(void)
     in.gate_fault = true;
     (void)step();
     reset();
-    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, s.faults);
+    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault); /* seen at once; the drive's needs its own reset first */
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
+    setUp();
+    to_fault();
+    in.enable = false;
+    (void)step();
+    reset();
+    TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
     TEST_ASSERT_EQUAL_UINT8(1, s.first_fault); /* the drive's fault never went: it is told again */
 }
 
