@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/store.h"
 
-#include "safety/crc32.h"
+#include "signal/crc32.h"
 
 #define CHUNK 64U /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
 

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "app/store.h"
-#include "safety/crc32.h"
+#include "signal/crc32.h"
 #include "unity.h"
 
 #define LAYOUT 0x46540001U

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#ifndef SAFETY_CRC32_H
-#define SAFETY_CRC32_H
+#ifndef SIGNAL_CRC32_H
+#define SIGNAL_CRC32_H
 /** CRC-32 of stored records and of the tables in flash.
  *   polynomial 0x04C11DB7, bits reflected, start value and final inversion 0xFFFFFFFF; "123456789" gives 0xCBF43926
  * Source   IEEE 802.3; the same as zlib's crc32(), with which tools compute it

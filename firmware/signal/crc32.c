@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "safety/crc32.h"
+#include "signal/crc32.h"
 
 /* Of the sixteen half bytes. */
 static const uint32_t half_byte[16] = {
