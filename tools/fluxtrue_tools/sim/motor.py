@@ -32,7 +32,7 @@ class Motor:
         return lib.controller_names(self.library) + plant
 
 
-def _plant(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float]:
+def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float]:
     """The drive as its data sheet has it: its dead time and its converter, nothing wrong."""
     return {
         "pole_pairs": machine["pole_pairs"],
@@ -61,7 +61,7 @@ def _read(folder: MotorFolder) -> Motor:
         folder=folder,
         library=lib.load(folder.library),
         flux_map=None if flux_map is None else lib.FluxMap(*(flux_map[axis] for axis in axes)),
-        plant=_plant(machine, data["inverter"]),
+        plant=plant_parameters(machine, data["inverter"]),
         inertia_kgm2=machine["inertia_kgm2"],
         torque_max_Nm=machine["torque_max_Nm"],
         psi_f_Vs=machine["psi_f_Vs"],
