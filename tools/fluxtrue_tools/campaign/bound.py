@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The information bound: what a perfect linear estimator could reach with the same data, docs/theory/information-bound.md
+"""What a perfect linear estimator could reach with the same data, docs/theory/information-bound.md.
 
 Units    torque error in percent of max(|command|, a tenth of rated), one standard deviation
 """

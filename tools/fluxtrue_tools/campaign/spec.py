@@ -136,7 +136,7 @@ class Check(_Strict):
     reference: str = "tables"
     band_rpm: Positive = 5000.0
     count_nonzero: Annotated[tuple[str, ...], BeforeValidator(_list)] = ("psi_clamped", "r_clamped")
-    oscillation_share: Positive = 0.05
+    oscillation_share: Positive = 0.1
     limits: Limits = Limits()
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A campaign's outcome as text."""
 
+import pandas as pd
+
 from fluxtrue_tools.campaign.score import BANDS, CRAWL, Score, bounds
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.demo.experiment import Bound
@@ -56,3 +58,22 @@ def promises(campaign: Campaign, scores: list[Score]) -> list[tuple[str, Bound]]
     """The bounds of the checked controllers."""
     checked = campaign.check.controllers
     return [(s.controller, bound) for s in scores if s.controller in checked for bound in bounds(campaign, s)]
+
+
+def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
+    """One case: its plant, then every window with all controllers side by side. Ten digits: it must reproduce."""
+    first = table.iloc[0]
+    plant = "\n".join(f"{name.removeprefix('plant_')} = {first[name]:.10g}"
+                      for name in table.columns if name.startswith("plant_"))  # fmt: skip
+    names = [controller.name for controller in campaign.controller]
+    cells: list[tuple[str, ...]] = [("window", "rpm", "command N·m", *(f"{name} N·m" for name in names),
+                                     *(f"{name} %" for name in names), "bound %")]  # fmt: skip
+    for window, rows in table.groupby("window"):
+        rows = rows.set_index("controller")
+        bound = rows["bound_percent"].max()
+        cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_command_Nm'].iloc[0]:.3f}",
+                      *(f"{rows['torque_Nm'][name]:.10g}" for name in names),
+                      *(f"{rows['error_percent'][name]:+.2f}" for name in names), f"{bound:.2f}"))  # fmt: skip
+    faults = table.groupby("controller", sort=False)["run_fault_word"].first()
+    tripped = ", ".join(f"{name}: fault word {word}" for name, word in faults.items() if word) or "no trip"
+    return f"{plant}\n\n{_columns(cells)}\n\n{tripped}"
