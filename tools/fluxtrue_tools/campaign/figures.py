@@ -42,8 +42,17 @@ def _colours(campaign: Campaign) -> dict[str, str]:
 
 
 def _speed_edges(table: pd.DataFrame) -> np.ndarray:
-    speed = table["speed_rpm"].abs()
+    speed = table.loc[table["band"] != CRAWL, "speed_rpm"].abs()
     return np.geomspace(speed.min() * 0.999, speed.max() * 1.001, SPEED_BINS + 1)
+
+
+def _plain_ticks(axes: Any, edges: np.ndarray) -> None:
+    """A logarithmic axis with the numbers that people use."""
+    wanted = [n for n in (300, 500, 1000, 2000, 3000, 5000, 10000) if edges[0] <= n <= edges[-1] * 1.01]
+    axes.set_xscale("log")
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_xticks(wanted, [str(n) for n in wanted])
+    axes.minorticks_off()
 
 
 @_styled
@@ -65,7 +74,7 @@ def maps(campaign: Campaign, table: pd.DataFrame) -> Figure:
         with np.errstate(invalid="ignore", divide="ignore"):
             error = np.sqrt(total / count).T
         mesh = axis.pcolormesh(speeds, torques, error, cmap="viridis_r", vmin=0.0, vmax=SCALE_PERCENT)
-        axis.set_xscale("log")
+        _plain_ticks(axis, speeds)
         axis.set_title(name, loc="left")
         axis.set_xlabel("speed, rpm")
         axis.grid(visible=False)
@@ -88,8 +97,8 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
         axes.plot(middle, [e for e, _ in found], color=colour, marker="o", ms=3, label=name)
         if np.isfinite([b for _, b in found]).any():
             axes.plot(middle, [b for _, b in found], color=colour, ls=":", label=f"information bound, {name}'s data")
-    axes.set_xscale("log")
     axes.set_yscale("log")
+    _plain_ticks(axes, edges)
     axes.set_xlabel("speed, rpm")
     axes.set_ylabel("rms torque error, %")
     axes.legend()
@@ -120,7 +129,8 @@ def histograms(campaign: Campaign, table: pd.DataFrame) -> Figure:
 def _series(axes: Any, trace: Trace, colour: str, name: str) -> None:
     every = np.concatenate([trace.drive, *trace.windows])
     column = trace.columns.index
-    now = every[:, column("truth.time_s")]
+    start = trace.drive[-1, column("truth.time_s")] if len(trace.drive) else 0.0
+    now = every[:, column("truth.time_s")] - start
     axes[1].plot(now, every[:, column("truth.torque_mean_Nm")], color=colour, lw=0.7, label=f"{name}: air gap")
     command, torque = (every[:, column(c)] for c in ("torque_command_Nm", "truth.torque_mean_Nm"))
     axes[2].plot(now, torque - command, color=colour, lw=0.7, label=name)
@@ -142,6 +152,6 @@ def case_figure(campaign: Campaign, traces: dict[str, Trace], title: str) -> Fig
             axis.set_ylim(-15.0, 15.0)
             axis.axhline(0.0, color=COMMAND, lw=0.6)
         axes[0].legend(loc="upper left")
-        axes[-1].set_xlabel("time of each controller's run, s (those without a warm-up start with the windows)")
+        axes[-1].set_xlabel("time, s (0: the warm-up drive ends, the windows begin)")
         figure.suptitle(title, fontsize=11)
     return figure

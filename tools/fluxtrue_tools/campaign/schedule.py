@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who runs the cases: a process on each core, or the workers of an existing Dask cluster."""
 
+import ctypes
 import os
+import signal
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
@@ -9,11 +12,19 @@ from typing import Any
 from fluxtrue_tools.errors import FluxtrueError
 
 Task = Callable[[int], Any]
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def _worker() -> None:
+    """The parent alone answers Ctrl-C; and nobody is left waiting when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[int, Any]]:
     """(case, result) in the order they finish."""
-    pool = ProcessPoolExecutor(max_workers=workers or len(os.sched_getaffinity(0)))
+    pool = ProcessPoolExecutor(max_workers=workers or len(os.sched_getaffinity(0)), initializer=_worker)
     try:
         waiting = {pool.submit(task, case): case for case in cases}
         for future in as_completed(waiting):

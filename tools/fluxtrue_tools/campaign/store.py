@@ -36,6 +36,8 @@ class Store:
             self._cases.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FluxtrueError(f"--out {self.folder}: cannot be made ({error.strerror})") from error
+        for scratch in self._cases.glob(".case-*"):  # of a run that was killed
+            scratch.unlink(missing_ok=True)
         if not path.is_file():
             write_text(path, json.dumps(manifest, indent=1) + "\n")
             return
