@@ -41,17 +41,13 @@ class Machine:
         return self.motor.torque_max_Nm
 
 
-def _nominal(given: Nominal, data: dict[str, dict[str, float]], where: str) -> Nominal:
-    """The motor's data go first: the firmware knows them. A file that contradicts them is wrong."""
+def _nominal(given: Nominal, data: dict[str, dict[str, float]]) -> Nominal:
+    """The motor's data go first: the firmware is built from them."""
     known = {
         "device_drop_V": data["inverter"]["device_drop_V"],
         "iron_k_h": data["machine"].get("iron_loss_hysteresis", 0.0),
         "iron_k_e": data["machine"].get("iron_loss_eddy", 0.0),
     }
-    for name, value in known.items():
-        asked = getattr(given, name)
-        if value and asked and value != asked:
-            raise FluxtrueError(f"{where}: nominal.{name} = {asked:g}, allowed: left out, or the motor's {value:g}")
     return Nominal(**{name: value or getattr(given, name) for name, value in known.items()})
 
 
@@ -66,7 +62,7 @@ def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine
         if grid is None
         else SplineModel(*(np.asarray(grid[axis], dtype=float) for axis in axes))
     )
-    nominal = _nominal(campaign.nominal, data, where)
+    nominal = _nominal(campaign.nominal, data)
     low = campaign.spread.device_drop_error_V[0]
     if nominal.device_drop_V + low < 0.0:
         raise FluxtrueError(

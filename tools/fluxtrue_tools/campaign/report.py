@@ -11,7 +11,7 @@ import pandas as pd
 
 from fluxtrue_tools.campaign import figures
 from fluxtrue_tools.campaign.score import BANDS, CRAWL, Score, band_of
-from fluxtrue_tools.campaign.spec import Campaign
+from fluxtrue_tools.campaign.spec import Campaign, Nominal
 from fluxtrue_tools.campaign.terminal import band_name
 from fluxtrue_tools.demo.experiment import Bound, number
 
@@ -64,7 +64,7 @@ def summary(campaign: Campaign, table: pd.DataFrame, scores: list[Score],
 
 
 def html(campaign: Campaign, table: pd.DataFrame, scores: list[Score], promised: list[tuple[str, Bound]],
-         command: str) -> str:  # fmt: skip
+         nominal: Nominal, command: str) -> str:  # fmt: skip
     """The page, with its figures inside."""
     table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
     shown = campaign.check.controllers or [c.name for c in campaign.controller if c.warm_up]
@@ -83,4 +83,5 @@ def html(campaign: Campaign, table: pd.DataFrame, scores: list[Score], promised:
         figures={name: _image(draw(campaign, table)) for name, draw in drawn.items()},
         worst={name: worst_cases(table, name, command) for name in shown},
         spread=campaign.spread.model_dump(),
+        nominal=nominal.model_dump(),
     )

@@ -57,7 +57,8 @@ def _simulate(job: Job, store: Store, scheduler: str | None, workers: int | None
 
 def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
     """The text for the terminal, and whether every bound is met."""
-    check_names(job.campaign, make_machine(job.folder, job.campaign, job.where), job.where)
+    machine = make_machine(job.folder, job.campaign, job.where)
+    check_names(job.campaign, machine, job.where)
     store = Store(job.out)
     store.open(_manifest(job), fresh)
     _simulate(job, store, scheduler, workers)
@@ -66,7 +67,8 @@ def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) 
     promised = terminal.promises(job.campaign, scores)
     data = report.summary(job.campaign, table, scores, promised)
     write_text(job.out / "summary.json", json_text(data))
-    write_text(job.out / "report.html", report.html(job.campaign, table, scores, promised, job.command))
+    page = report.html(job.campaign, table, scores, promised, machine.nominal, job.command)
+    write_text(job.out / "report.html", page)
     parts = [terminal.figures_table(job.campaign, scores), terminal.trouble_table(job.campaign, scores)]
     parts += [terminal.bounds_table(promised)] if promised else []
     parts.append(str(job.out / "report.html"))
