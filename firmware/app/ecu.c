@@ -20,6 +20,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
     const q31_t full = source->torque_max * 65536;
     *ecu = (ecu_t){0};
     drive_init(&ecu->drive, source);
+    xcp_access_init(&ecu->xcp, &ecu->drive, (uint32_t)hal_system_reset_cause());
     ecu->arbitration = (arbitrate_config_t){
         .slew = full / SLEW_STEPS,
         .jerk = full / SLEW_STEPS / JERK_STEPS,
@@ -33,7 +34,11 @@ static void receive(ecu_t *ecu)
 {
     can_frame_t frame;
     for (int n = 0; n < FRAMES_PER_TASK && hal_can_receive(&frame); n++) {
-        (void)can_rx_frame(&ecu->rx, &frame);
+        if (frame.id == XCP_ID_COMMAND && !frame.extended) {
+            xcp_access_receive(&ecu->xcp, &frame);
+        } else {
+            (void)can_rx_frame(&ecu->rx, &frame);
+        }
     }
     can_rx_tick(&ecu->rx);
 }
@@ -95,6 +100,15 @@ static void send(ecu_t *ecu)
     }
 }
 
+/* Behind the cyclic frames, and only while mailboxes are free: what waits is sent a millisecond later. */
+static void send_xcp(ecu_t *ecu)
+{
+    can_frame_t frame;
+    while (xcp_access_next(&ecu->xcp, &frame) && hal_can_send(&frame)) {
+        xcp_access_sent(&ecu->xcp);
+    }
+}
+
 void ecu_task_1khz(ecu_t *ecu)
 {
     receive(ecu);
@@ -105,5 +119,7 @@ void ecu_task_1khz(ecu_t *ecu)
     ask_drive(ecu);
     task_1khz(&ecu->drive);
     guard(ecu);
+    xcp_access_step(&ecu->xcp, &ecu->drive);
     send(ecu);
+    send_xcp(ecu);
 }

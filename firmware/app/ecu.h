@@ -12,6 +12,7 @@
 #include "app/arbitrate.h"
 #include "app/drive.h"
 #include "app/supervisor.h"
+#include "app/xcp_access.h"
 #include "comm/can_rx.h"
 #include "comm/can_tx.h"
 
@@ -37,6 +38,7 @@ typedef struct {
     liveness_t liveness;
     settling_t settling;
     uint16_t not_sent;
+    xcp_access_t xcp;
 } ecu_t;
 
 void ecu_init(ecu_t *ecu, const motor_t *source);

@@ -12,8 +12,8 @@
 #define FNV_START 14695981039346656037ULL
 #define FNV_PRIME 1099511628211ULL
 
-/* Not on the heap: with a program at a fixed address a calibration tool finds it where the ELF file says. */
-static fluxtrue_t the_ecu;
+/* Not on the heap: in a program at a fixed address a calibration tool finds it where the ELF file says, by this name. */
+static fluxtrue_t ecu;
 
 static const char *plant_set_up(sim_t *sim, uint64_t seed)
 {
@@ -38,9 +38,9 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
     if (vecu->hub != NULL) {
         hub_forget_ecu(vecu->hub);
     }
-    fluxtrue_init(&the_ecu);
-    can_host_attach(&the_ecu);
-    vecu->sim = sim_create_around(&the_ecu);
+    fluxtrue_init(&ecu);
+    can_host_attach(&ecu);
+    vecu->sim = sim_create_around(&ecu);
     if (vecu->sim == NULL) {
         return "out of memory";
     }
@@ -72,13 +72,13 @@ static void hash_word(vecu_t *vecu, uint32_t word)
 /* The switches as the last task has set them, and the lines it will read. */
 static void stand_step(vecu_t *vecu)
 {
-    const bool *on = the_ecu.board.output;
+    const bool *on = ecu.board.output;
     const dc_link_switches_t switches = {on[BOARD_PRECHARGE], on[BOARD_MAIN_CONTACTOR], on[BOARD_DISCHARGE]};
     const double v_V = dc_link_step(&vecu->stand.dc, switches, sim_get(vecu->sim, "plant.vdc_V"),
                                     sim_get(vecu->sim, "truth.idc_A"), 1e-9 * (double)vecu->period_ns);
     (void)sim_set(vecu->sim, "plant.vdc_V", v_V);
-    the_ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
-    the_ecu.board.inverter_C = vecu->stand.inverter_C;
+    ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
+    ecu.board.inverter_C = vecu->stand.inverter_C;
 }
 
 static void exchange_in(vecu_t *vecu)
@@ -86,14 +86,14 @@ static void exchange_in(vecu_t *vecu)
     can_frame_t frame;
     hub_run(vecu->hub, vecu->now_ns);
     while (hub_receive(vecu->hub, &frame)) {
-        (void)can_host_put(&the_ecu, &frame);
+        (void)can_host_put(&ecu, &frame);
     }
 }
 
 static void exchange_out(vecu_t *vecu)
 {
     can_frame_t frame;
-    while (hub_has_room(vecu->hub) && can_host_take(&the_ecu, &frame)) {
+    while (hub_has_room(vecu->hub) && can_host_take(&ecu, &frame)) {
         (void)hub_send(vecu->hub, &frame, vecu->now_ns);
     }
 }
@@ -104,8 +104,8 @@ bool vecu_step(vecu_t *vecu, double *row)
     stand_step(vecu);
     const bool written = sim_run(vecu->sim, 1, row, 1) > 0;
     vecu->now_ns += vecu->period_ns;
-    hash_word(vecu, the_ecu.duty.a | (uint32_t)the_ecu.duty.b << 16);
-    hash_word(vecu, the_ecu.duty.c | (the_ecu.gates ? 1U << 16 : 0U));
+    hash_word(vecu, ecu.duty.a | (uint32_t)ecu.duty.b << 16);
+    hash_word(vecu, ecu.duty.c | (ecu.gates ? 1U << 16 : 0U));
     exchange_out(vecu);
     return written;
 }

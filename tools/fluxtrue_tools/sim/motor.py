@@ -52,7 +52,8 @@ def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[
     }
 
 
-def _read(folder: MotorFolder) -> Motor:
+def read(folder: MotorFolder) -> Motor:
+    """What lies in a built motor's folder."""
     data = json.loads(folder.data.read_text(encoding="utf-8"))
     machine, flux_map = data["machine"], data["map"]
     axes = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
@@ -73,6 +74,6 @@ def load(motor: str, build_dir: Path | None = None, base: Path | None = None) ->
     """A shipped motor or a folder with a motor.toml, built if need be."""
     folder = prepare(motor, build_dir, base)
     try:
-        return _read(folder)
+        return read(folder)
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise FluxtrueError(f"{folder.data}: not what the motor tool writes ({error!r})") from error
