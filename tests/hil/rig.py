@@ -84,8 +84,9 @@ class Rig:
     ) -> None:
         self.bus, self.database, self._stand, self._port = bus, database, stand, port
         self.by_name = {message.name: message for message in database.messages}
-        self.by_id = {message.frame_id: message for message in database.messages}
         self._command_id, self._limits_id = self.by_name[COMMAND].frame_id, self.by_name[LIMITS].frame_id
+        self._encoded: dict[Command, bytes] = {}
+        self._inverters = {m.frame_id: m.name for m in database.messages if "INV" in m.senders}
         self.listeners: list[Callable[[can.Message], None]] = []
         self.sent = 0
         self._heard = 0
@@ -169,7 +170,9 @@ class Rig:
 
     def encode(self, command: Command) -> bytes:
         """A command's frame without protection."""
-        return bytes(self.by_name[COMMAND].encode(command.signals()))
+        if command not in self._encoded:
+            self._encoded[command] = bytes(self.by_name[COMMAND].encode(command.signals()))
+        return self._encoded[command]
 
     def next_command(self) -> bytes:
         """The protected frame that is next in turn."""
@@ -205,16 +208,16 @@ class Rig:
             return
         for listener in self.listeners:
             listener(message)
-        known = self.by_id.get(message.arbitration_id)
-        if known is None or message.is_extended_id or "INV" not in known.senders:
+        name = self._inverters.get(message.arbitration_id)
+        if name is None or message.is_extended_id:
             return
         frame = Frame(message.timestamp, bytes(message.data))
-        self.counted[known.name] += 1
-        self.last[known.name] = frame
-        if known.name == STATUS:
+        self.counted[name] += 1
+        self.last[name] = frame
+        if name == STATUS:
             self.status_protection.take(frame.data)
         if self.keep_frames:
-            self.frames[known.name].append(frame)
+            self.frames[name].append(frame)
 
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
         """Signals; choices stay numbers."""
