@@ -34,7 +34,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--can-interface", help="python-can interface: socketcand, socketcan, pcan, kvaser ...")
     group.addoption("--can-channel", default="can0", help="its channel")
     group.addoption("--can-option", action="append", default=[], metavar="NAME=VALUE",
-                    help="further argument of can.Bus, for example host=127.0.0.1, port=29536, bitrate=500000")  # fmt: skip
+                    help="further argument of can.Bus, for example host=127.0.0.1, bitrate=500000")  # fmt: skip
     group.addoption("--bench", metavar="HOST:PORT", help="bench channel of the plant behind that interface")
     group.addoption("--report", default=str(ROOT / "build" / "hil"), help="folder for report.html and bus.mf4")
     group.addoption("--soak-minutes", type=float, default=30.0, help="simulated length of the soak test")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """AUTOSAR end-to-end profile 11A once more, from the specification, by polynomial division instead of a table.
 
-The CRC is the remainder of (data id low, data id high, bytes 1 ... n) x^8 divided by the SAE J1850 polynomial. The profile
-undoes the standard's start value and final inversion: both are 0 here.
+The CRC is the remainder of (data id low, data id high, bytes 1 ... n) x^8 divided by the SAE J1850 polynomial. The
+profile undoes the standard's start value and final inversion: both are 0 here.
 """
 
 from dataclasses import dataclass

@@ -53,7 +53,9 @@ def missed(rig: Rig, name: str, jitter_s: float) -> list[str]:
     cycle_s = rig.cycle_s(name)
     gaps = [b - a for a, b in zip(times, times[1:], strict=False)]
     bad = [gap for gap in gaps if abs(gap - cycle_s) > jitter_s]
-    return [f"{name}: {len(bad)} of {len(gaps)} periods are not {1e3 * cycle_s:g} ms, e.g. {1e3 * bad[0]:.2f} ms"] if bad else []
+    if not bad:
+        return []
+    return [f"{name}: {len(bad)} of {len(gaps)} periods are not {1e3 * cycle_s:g} ms, e.g. {1e3 * bad[0]:.2f} ms"]
 
 
 def _frames(rig: Rig) -> list[str]:

@@ -55,7 +55,9 @@ def test_the_machine_gives_what_it_can_where_more_is_asked_for(rig: Rig, figures
     figures.promise("shaft less what the bus calls available", 100.0 * (truth_Nm / told_Nm - 1.0), 10.0, "%")
 
 
-LIMITS_MISSING = pytest.mark.xfail(reason="the bus's power limits and the temperatures do not reach the torque limits yet", strict=True)
+LIMITS_MISSING = pytest.mark.xfail(
+    reason="the bus's power limits and the temperatures do not reach the torque limits yet", strict=True
+)
 
 
 @LIMITS_MISSING

@@ -19,15 +19,15 @@ pytestmark = pytest.mark.program
 MALFORMED = (
     b"< send >", b"< send 123 >", b"< send 800 0  >", b"< send 20000000 0  >", b"< send 123 9 0 0 0 0 0 0 0 0 0 >",
     b"< send 123 2 1 >", b"< send 123 1 1 2 >", b"< send 123 1 100 >", b"< send 123 1 g >", b"< send -1 0  >",
-    b"< send 1234 0  >", b"< bcm >", b"< >", b"<>", b"rubbish", b"< send 123 1 1", b"<<<<", b"\0\0\0", b"< se\0nd 123 0 >",
-    b"<" + b"x" * 5000, b"< send " + b"0" * 3000 + b" >",
+    b"< send 1234 0  >", b"< bcm >", b"< >", b"<>", b"rubbish", b"< send 123 1 1", b"<<<<", b"\0\0\0",
+    b"< se\0nd 123 0 >", b"<" + b"x" * 5000, b"< send " + b"0" * 3000 + b" >",
 )  # fmt: skip
 BAD_COMMANDS = (
-    "nonsense", "set", "set plant.vdc_V 1", "set plant.speed_rad_s", "set plant.speed_rad_s nan", "set plant.r_ohm_20 -1",
-    "set plant.speed_rad_s 1e999", "set enable 1", "set torque_command_Nm 100", "get", "get nothing", "run", "run 1", "run -1 ms",
-    "run nan s", "run 1 fortnight", "run 1e30 s", "run 1 ms 99999 0", "run 1 ms 1 0", "record", "record 0 truth.torque_Nm",
-    "record 1 nothing", "record x truth.torque_Nm", "ramp", "ramp plant.speed_rad_s 1 1", "ramp plant.nothing 1 1 s",
-    "reset minus", "reset 1 2", "set " + "plant.load_Nm 0 " * 40, "x" * 1000,
+    "nonsense", "set", "set plant.vdc_V 1", "set plant.speed_rad_s", "set plant.speed_rad_s nan",
+    "set plant.r_ohm_20 -1", "set plant.speed_rad_s 1e999", "set enable 1", "set torque_command_Nm 100", "get",
+    "get nothing", "run", "run 1", "run -1 ms", "run nan s", "run 1 fortnight", "run 1e30 s", "run 1 ms 99999 0",
+    "run 1 ms 1 0", "record", "record 0 truth.torque_Nm", "record 1 nothing", "record x truth.torque_Nm", "ramp",
+    "ramp plant.speed_rad_s 1 1", "ramp plant.nothing 1 1 s", "reset minus", "reset 1 2", "set " + "plant.load_Nm 0 " * 40, "x" * 1000,
 )  # fmt: skip
 
 
@@ -156,7 +156,7 @@ def test_a_client_that_never_reads_is_let_go_and_the_run_goes_on(ecu: VirtualEcu
     deaf.connect((HOST, ecu.can_port))
     greet(deaf)
     stand.run(0.0, deaf.getsockname()[1], 0)
-    stand.run(80_000.0)  # more than 40 000 frames of 45 characters
+    stand.run(30_000.0)  # more than 15 000 frames of 45 characters
     assert stand.counters()["slow_clients"] == 1.0
     deaf.close()
 

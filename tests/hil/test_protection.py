@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """End-to-end protection against an attacker that knows everything but the CRC.
 
-Why no corruption of one or two bits can be taken for a good frame: the CRC is linear, so a corruption e(x) of the 64 bits
-of a frame (7 bytes of data, then the CRC) goes unnoticed if and only if p(x) = x^8 + x^4 + x^3 + x^2 + 1 divides e(x).
-p is primitive: x has order 255 modulo p, a fact test_the_proof_holds() computes. One bit is e = x^i, which p never
-divides; two are e = x^i (x^k + 1) with 1 <= k <= 63 < 255, and p divides x^k + 1 only if 255 divides k. The data id is a
-constant in front and cancels. Corruptions of three and more bits pass with a probability of about 2^-8 each; then
-counter and range checks stand behind the CRC.
+Why no corruption of one or two bits can be taken for a good frame: the CRC is linear, so a corruption e(x) of the 64
+bits of a frame (7 bytes of data, then the CRC) goes unnoticed if and only if p(x) = x^8 + x^4 + x^3 + x^2 + 1 divides
+e(x). p is primitive: x has order 255 modulo p, a fact test_the_proof_holds() computes. One bit is e = x^i, which p
+never divides; two are e = x^i (x^k + 1) with 1 <= k <= 63 < 255, and p divides x^k + 1 only if 255 divides k. The data
+id is a constant in front and cancels. Corruptions of three and more bits pass with a probability of about 2^-8 each;
+then counter and range checks stand behind the CRC.
 """
 
 from collections.abc import Callable

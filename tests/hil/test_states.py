@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state machine as the bus sees it: the way to torque and back, requests that are refused, faults and their reset."""
+"""The state machine as the bus sees it: the way to torque and back, refused requests, faults and their reset."""
 
 from typing import Any
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_CAN_BUS_H
 #define VECU_CAN_BUS_H
-/** A classic CAN bus in simulated time: frames queue at their nodes, the lowest identifier among the heads of the queues
- * goes next, and every frame occupies the wire for its length with the most stuff bits its kind can need:
+/** A classic CAN bus in simulated time: frames queue at their nodes, the lowest identifier among the heads of the
+ * queues goes next, and every frame occupies the wire for its length with the most stuff bits its kind can need:
  *   (VB-1)  bits = 47 + 8 n + floor((33 + 8 n)/4)    standard identifier, n data bytes, 3 bits between frames included
  *   (VB-2)  bits = 67 + 8 n + floor((53 + 8 n)/4)    extended
  * Source   ISO 11898-1; g + 8n bits are open to stuffing (g = 34 or 54), at most one stuff bit after each 4 of them

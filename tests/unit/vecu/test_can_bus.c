@@ -41,7 +41,7 @@ static void next_is(uint32_t id, uint64_t end_ns)
     TEST_ASSERT_EQUAL_UINT64(end_ns, passed.end_ns);
 }
 
-/* Worst cases from the literature on CAN schedulability (Davis, Burns, Bril, Lukkien 2007): 55 + 10 n and 80 + 10 n bit. */
+/* Davis, Burns, Bril, Lukkien, Controller Area Network schedulability analysis, 2007: 55 + 10 n and 80 + 10 n bit. */
 void test_a_frame_is_as_long_as_its_worst_case(void)
 {
     for (uint8_t n = 0; n <= 8; n++) {
