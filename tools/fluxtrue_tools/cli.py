@@ -16,6 +16,7 @@ COMMANDS = {
     "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
+    "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
 }
 # Done by tools/fluxtrue itself, before Python; listed here for --help.
 SHELL_COMMANDS = {"test": "Set up, build and test everything: tools/test."}
