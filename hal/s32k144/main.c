@@ -121,7 +121,8 @@ static void start(void)
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-int main(void)
+/* Not part of the reset handler: its floating-point instructions must not move before the FPU is on. */
+__attribute__((noinline)) int main(void)
 {
     data_damaged = !image_valid();
     drive_init(&the_drive, &motor);
