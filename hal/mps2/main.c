@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the task. */
+/* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the
+ * task. */
 #include "app/drive.h"
 #include "hal/adc.h"
 #include "hal/angle.h"

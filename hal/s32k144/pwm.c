@@ -12,8 +12,9 @@
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
 #define FTM0_INIT_TRIGGER 22U
 
-#define PAIR(n) \
-    (FTM_COMBINE_COMBINE##n | FTM_COMBINE_COMP##n | FTM_COMBINE_DTEN##n | FTM_COMBINE_SYNCEN##n | FTM_COMBINE_FAULTEN##n)
+#define PAIR(n)                                                                                         \
+    (FTM_COMBINE_COMBINE##n | FTM_COMBINE_COMP##n | FTM_COMBINE_DTEN##n | FTM_COMBINE_SYNCEN##n | \
+     FTM_COMBINE_FAULTEN##n)
 #define LOAD (FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC)
 #define ENABLED                                                                                                    \
     (FTM_SC_PWMEN0 | FTM_SC_PWMEN1 | FTM_SC_PWMEN2 | FTM_SC_PWMEN3 | FTM_SC_PWMEN4 | FTM_SC_PWMEN5 | FTM_SC_PWMEN6)
