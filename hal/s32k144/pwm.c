@@ -15,7 +15,8 @@
 #define PAIR(n)                                                                                         \
     (FTM_COMBINE_COMBINE##n | FTM_COMBINE_COMP##n | FTM_COMBINE_DTEN##n | FTM_COMBINE_SYNCEN##n | \
      FTM_COMBINE_FAULTEN##n)
-#define LOAD (FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC)
+/* Compare values at the next start by SWSYNC, the output mask by TRIG0, which a write without it would disarm. */
+#define LOAD (FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC | FTM_SYNC_TRIG0)
 #define ENABLED                                                                                                    \
     (FTM_SC_PWMEN0 | FTM_SC_PWMEN1 | FTM_SC_PWMEN2 | FTM_SC_PWMEN3 | FTM_SC_PWMEN4 | FTM_SC_PWMEN5 | FTM_SC_PWMEN6)
 
@@ -52,7 +53,7 @@ static void open_gates(void)
 {
     FTM0->SWOCTRL = SIX_OUTPUTS;
     FTM0->OUTMASK = SIX_OUTPUTS;
-    FTM0->SYNC = LOAD | FTM_SYNC_TRIG0;
+    FTM0->SYNC = LOAD;
 }
 
 /* On: still masked until the next start, which takes over mask and duties together. */
@@ -64,7 +65,7 @@ static void close_gates(void)
     core_irq_enable(IRQ_FTM0_FAULT);
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = 0;
-    FTM0->SYNC = LOAD | FTM_SYNC_TRIG0;
+    FTM0->SYNC = LOAD;
 }
 
 void pwm_init(const pwm_config_t *config)
@@ -82,12 +83,12 @@ void pwm_init(const pwm_config_t *config)
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
     gates = false;
-    FTM0->FMS = FTM_FMS_WPEN;
 }
 
 void pwm_start(void)
 {
     FTM0->SC = ENABLED | FTM_SC_CLKS(SYSTEM_CLOCK);
+    FTM0->FMS = FTM_FMS_WPEN; /* not before: it protects CLKS, too */
 }
 
 /* First and last tick of the upper switch's pulse, in the middle of the period; beyond MOD there is no match. */

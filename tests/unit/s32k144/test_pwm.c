@@ -65,15 +65,27 @@ void test_compare_values_are_released_together_after_the_last(void)
 {
     FTM0->SYNC = 0;
     hal_pwm_write((duty_t){1, 2, 3});
-    TEST_ASSERT_EQUAL_HEX32(FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC, FTM0->SYNC);
+    TEST_ASSERT_EQUAL_HEX32(FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC | FTM_SYNC_TRIG0, FTM0->SYNC);
 }
 
 void test_start_up_leaves_the_gates_open_and_the_configuration_locked(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
-    TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
     TEST_ASSERT_EQUAL_UINT32(PERIOD - 1U, FTM0->MOD);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->FMS); /* or the counter could not be started */
+    pwm_start();
+    TEST_ASSERT_BITS_HIGH(FTM_SC_CLKS(1), FTM0->SC);
+    TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
+}
+
+/* Opening is followed by duties in the same period: their write must not disarm the mask's trigger. */
+void test_duties_written_after_opening_leave_the_mask_armed(void)
+{
+    hal_pwm_enable(true);
+    hal_pwm_enable(false);
+    hal_pwm_write((duty_t){16384, 16384, 16384});
+    TEST_ASSERT_BITS_HIGH(FTM_SYNC_TRIG0, FTM0->SYNC);
 }
 
 /* 2 us at 112 MHz: 224 = 3 * 64 + 32. */

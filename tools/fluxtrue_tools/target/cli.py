@@ -19,8 +19,7 @@ def target() -> None:
 @click.argument("svd", type=PATH)
 @click.option("--list", "wanted", type=PATH, required=True, help="The registers the port uses (TOML).")
 @click.option("--header", "header_path", type=PATH, required=True, help="C header to write.")
-@click.option("--json", "json_path", type=PATH, help="The same facts for an emulator.")
-def registers(svd: Path, wanted: Path, header_path: Path, json_path: Path | None) -> None:
+def registers(svd: Path, wanted: Path, header_path: Path) -> None:
     """Write the header with the registers a port uses, from the maker's SVD file."""
     from fluxtrue_tools.target import registers as generator
     from fluxtrue_tools.target.svd import Device
@@ -29,8 +28,6 @@ def registers(svd: Path, wanted: Path, header_path: Path, json_path: Path | None
     names = generator.load(wanted)
     chosen = generator.choose(names, device, wanted)
     header_path.write_text(generator.header(names, device, chosen, wanted), encoding="utf-8")
-    if json_path is not None:
-        json_path.write_text(generator.facts(device, chosen), encoding="utf-8")
 
 
 @target.command()

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One C header with the registers a port uses, and the same facts as JSON for an emulator."""
+"""One C header with the registers a port uses, from the maker's description."""
 
 from __future__ import annotations
 
-import json
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -145,22 +144,3 @@ def header(wanted: Wanted, device: Device, chosen: list[Chosen], path: Path) -> 
         lines += _instances(one, device, fake=False)
     return "\n".join([*lines, "#endif", "", "#endif", ""])
 
-
-def facts(device: Device, chosen: list[Chosen]) -> str:
-    """Every register of every instance, for an emulator: place, reset value, which bits exist."""
-    rows = []
-    for one in chosen:
-        for instance in one.block.instances:
-            known = device.registers(instance)
-            for register, _ in one.registers:
-                for k in range(register.count):
-                    member = known.get(f"{register.name}{k}", register) if register.count > 1 else register
-                    rows.append({
-                        "peripheral": instance, "register": member.name,
-                        "address": device.base(instance) + register.offset + k * register.size,
-                        "bits": register.bits, "access": register.access,
-                        "reset": member.reset, "defined": member.defined,
-                        "fields": {f.name: [f.lsb, f.width, f.access] for f in member.fields},
-                    })  # fmt: skip
-    text = ",\n".join(json.dumps(row) for row in rows)
-    return f'{{"device": "{device.name}", "version": "{device.version}", "registers": [\n{text}\n]}}\n'

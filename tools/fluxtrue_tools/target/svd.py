@@ -41,14 +41,6 @@ class Register:
     def size(self) -> int:
         return self.bits // 8
 
-    @property
-    def defined(self) -> int:
-        """All bits that are not reserved."""
-        mask = 0
-        for field in self.fields:
-            mask |= field.mask
-        return mask or (1 << self.bits) - 1
-
 
 class Device:
     """The peripherals of one SVD file."""
