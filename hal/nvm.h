@@ -6,7 +6,8 @@
  * Source   docs/howto/port.md
  * Units    bytes; program() writes whole multiples of HAL_NVM_UNIT at multiples of it, once after each erase
  * Errors   false: out of the slot's range, not erased, or the hardware reported a failure
- * Context  background, below every interrupt: erase and program may take milliseconds but must not stop the interrupts */
+ * Context  background, below every interrupt: erase and program may take milliseconds but must not stop the
+ *          interrupts */
 #include <stdbool.h>
 #include <stdint.h>
 

@@ -17,13 +17,19 @@
 #define ANGLE_CREDIBLE_RAD 1e9
 #define TEMPERATURE_MIN_C (-100.0)
 #define TEMPERATURE_MAX_C 500.0
+#define AMBIENT_C 20.0
+
+void fluxtrue_init(fluxtrue_t *instance)
+{
+    *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
+    drive_init(&instance->drive, &motor);
+}
 
 fluxtrue_t *fluxtrue_create(void)
 {
-    fluxtrue_t *instance = calloc(1, sizeof *instance);
+    fluxtrue_t *instance = malloc(sizeof *instance);
     if (instance) {
-        drive_init(&instance->drive, &motor);
-        instance->winding_C = 20.0;
+        fluxtrue_init(instance);
     }
     return instance;
 }
@@ -77,7 +83,11 @@ static void run_period(fluxtrue_t *d)
     }
     d->periods++;
     if (d->periods % TORQUE_ESTIMATE_PERIODS == 0) {
-        task_1khz(&d->drive);
+        if (d->on_bus) {
+            ecu_task_1khz(&d->ecu);
+        } else {
+            task_1khz(&d->drive);
+        }
     }
     host_port_select(NULL);
 }

@@ -3,15 +3,40 @@
 #define HAL_HOST_INSTANCE_H
 /** One software-in-the-loop drive: the firmware's drive and the port's registers.
  * Source   docs/howto/software-in-the-loop.md
- * Context  private to hal/host */
+ * Context  private to hal/host and to the virtual ECU, which gives the instance a fixed address */
 #include <stdbool.h>
+#include <stddef.h>
 
-#include "app/drive.h"
+#include "app/ecu.h"
+#include "hal/board.h"
 #include "hal/host/fluxtrue.h"
 #include "types/samples.h"
 
+#define CAN_HOST_QUEUE 64U
+
+typedef struct {
+    can_frame_t frames[CAN_HOST_QUEUE];
+    uint32_t put, taken; /* counted up */
+} can_queue_t;
+
+typedef struct {
+    can_queue_t received, sent;
+    uint32_t lost, bus_off;
+    bool output[BOARD_OUTPUTS];
+    bool gate_fault;
+    bool winding_broken, inverter_broken; /* no reading */
+    double inverter_C;
+    bool watchdog_started;
+    uint32_t watchdog_services;
+} host_board_t;
+
 struct fluxtrue {
-    drive_t drive;
+    union {
+        drive_t drive; /* also without a bus */
+        ecu_t ecu;     /* begins with the drive */
+    };
+    bool on_bus; /* ecu_task_1khz() runs instead of task_1khz() */
+    host_board_t board;
     adc_counts_t counts;
     uint32_t theta_m;
     double winding_C;
@@ -21,5 +46,10 @@ struct fluxtrue {
     uint32_t periods; /* since creation: every tenth runs the 1 kHz task */
     double torque_command_Nm; /* as set: what get answers before the task has taken it over */
 };
+
+_Static_assert(offsetof(ecu_t, drive) == 0, "the drive must be where a port without a bus looks for it");
+
+/** As fluxtrue_create() leaves it, in memory of the caller's. */
+void fluxtrue_init(fluxtrue_t *instance);
 
 #endif

@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "hal/host/calibration.h"
+#include "app/calibration.h"
 #include "hal/host/instance.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
@@ -150,13 +150,6 @@ static const parameter_t parameters[] = {
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
     {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
     {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},
-    {"torque_slew_Nm_per_s", calibration_get_torque_slew, calibration_set_torque_slew, 0.0, 1e6},
-    {"observer_m", calibration_get_observer_m, calibration_set_observer_m, 2.0, 4.0},
-    {"flux_bandwidth_rad_s", calibration_get_flux_bandwidth, calibration_set_flux_bandwidth, 0.0, 500.0},
-    {"resistance_bandwidth_rad_s", calibration_get_resistance_bandwidth, calibration_set_resistance_bandwidth, 0.0,
-     150.0},
-    {"torque_loop_bandwidth_rad_s", calibration_get_torque_loop, calibration_set_torque_loop, 0.0, 500.0},
-    {"dead_time_compensation", calibration_get_dead_time, calibration_set_dead_time, 0.0, 1.0},
     {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},
     {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
     {"torque_request_Nm", get_torque_request, NULL, 0, 0},
@@ -203,11 +196,35 @@ static double bound_of(const fluxtrue_t *d, const parameter_t *p)
     return pu15(d->drive.motor.current_reference.i_max, bases(d)->current_A);
 }
 
+/* CALIBRATION_COUNT: no such name. */
+static calibration_id_t find_calibration(const char *name)
+{
+    for (int k = 0; name && k < (int)CALIBRATION_COUNT; k++) {
+        if (strcmp(name, calibration_info[k].name) == 0) {
+            return (calibration_id_t)k;
+        }
+    }
+    return CALIBRATION_COUNT;
+}
+
+static int set_calibration(fluxtrue_t *drive, const char *name, double value)
+{
+    const calibration_id_t id = find_calibration(name);
+    if (id == CALIBRATION_COUNT) {
+        return FLUXTRUE_UNKNOWN_NAME;
+    }
+    if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi)) {
+        return FLUXTRUE_OUT_OF_RANGE;
+    }
+    calibration_put(&drive->drive.motor, id, (float)value);
+    return FLUXTRUE_OK;
+}
+
 int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
 {
     const parameter_t *p = find(name);
     if (!p) {
-        return FLUXTRUE_UNKNOWN_NAME;
+        return set_calibration(drive, name, value);
     }
     if (!p->set) {
         return FLUXTRUE_READ_ONLY;
@@ -224,10 +241,17 @@ int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
 double fluxtrue_get(const fluxtrue_t *drive, const char *name)
 {
     const parameter_t *p = find(name);
-    return p ? p->get(drive) : (double)NAN;
+    if (p) {
+        return p->get(drive);
+    }
+    const calibration_id_t id = find_calibration(name);
+    return (id == CALIBRATION_COUNT) ? (double)NAN : (double)calibration_get(&drive->drive.motor, id);
 }
 
 const char *fluxtrue_name(int index)
 {
-    return (index >= 0 && index < PARAMETERS) ? parameters[index].name : NULL;
+    if (index < 0 || index >= PARAMETERS + (int)CALIBRATION_COUNT) {
+        return NULL;
+    }
+    return (index < PARAMETERS) ? parameters[index].name : calibration_info[index - PARAMETERS].name;
 }

@@ -1,10 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/host/port.h"
 
+#include <math.h>
+
 #include "hal/adc.h"
 #include "hal/angle.h"
+#include "hal/board.h"
+#include "hal/can.h"
+#include "hal/host/can_host.h"
 #include "hal/irq.h"
 #include "hal/pwm.h"
+#include "hal/system.h"
+#include "hal/temperature.h"
+#include "hal/watchdog.h"
 
 /* The HAL's functions have no instance argument; a thread serves one instance at a time. */
 static _Thread_local fluxtrue_t *active;
@@ -37,4 +45,65 @@ void hal_pwm_enable(bool on)
 void hal_irq_pend_mrai(void)
 {
     active->mrai_pending = true;
+}
+
+bool hal_can_receive(can_frame_t *frame)
+{
+    return can_host_receive(active, frame);
+}
+
+bool hal_can_send(const can_frame_t *frame)
+{
+    return can_host_send(active, frame);
+}
+
+uint32_t hal_can_lost(void)
+{
+    return active->board.lost;
+}
+
+uint32_t hal_can_bus_off(void)
+{
+    return active->board.bus_off;
+}
+
+void hal_board_set(board_output_t output, bool on)
+{
+    active->board.output[output] = on;
+}
+
+bool hal_board_gate_fault(void)
+{
+    return active->board.gate_fault;
+}
+
+int16_t hal_temperature_winding_dC(void)
+{
+    return active->board.winding_broken ? HAL_TEMPERATURE_UNKNOWN : (int16_t)lrint(active->winding_C * 10.0);
+}
+
+int16_t hal_temperature_inverter_dC(void)
+{
+    return active->board.inverter_broken ? HAL_TEMPERATURE_UNKNOWN : (int16_t)lrint(active->board.inverter_C * 10.0);
+}
+
+void hal_watchdog_start(void)
+{
+    active->board.watchdog_started = true;
+}
+
+void hal_watchdog_service(void)
+{
+    active->board.watchdog_services++;
+}
+
+/* A process on a PC has no stack of its own to measure, and no reset. */
+uint32_t hal_system_stack_unused(void)
+{
+    return 0;
+}
+
+reset_cause_t hal_system_reset_cause(void)
+{
+    return RESET_POWER_ON;
 }

@@ -97,13 +97,13 @@ def run_python(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
 def test_help_lists_every_command_without_importing_any() -> None:
     done = run_python("--help")
     assert done.returncode == 0
-    for name in ("demo", "sim", "motor", "bench", "test"):
+    for name in ("demo", "sim", "vecu", "motor", "bench", "test"):
         assert f"\n  {name} " in done.stdout
     probe = "import sys, fluxtrue_tools.cli; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", probe], check=False).returncode == 0
 
 
-@pytest.mark.parametrize("name", ["demo", "sim", "motor", "bench"])
+@pytest.mark.parametrize("name", ["demo", "sim", "vecu", "motor", "bench"])
 def test_every_command_has_help(name: str) -> None:
     done = run_python(name, "--help")
     assert (done.returncode, done.stderr) == (0, "")

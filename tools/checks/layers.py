@@ -42,7 +42,8 @@ LAYERS = (
     Layer("firmware/control", ("firmware/fx", "firmware/types", "firmware/signal"),
           stages=PIPELINE),
     Layer("firmware/safety", ("firmware/fx", "firmware/types", "firmware/signal"), stages=()),
-    Layer("firmware/comm", ("firmware/fx", "firmware/types")),
+    Layer("firmware/comm", ("firmware/fx", "firmware/types", "firmware/signal"),
+          FREESTANDING | {"string.h"}),
     Layer("firmware/app", ("firmware/fx", "firmware/types", "firmware/signal",
                            "firmware/control", "firmware/safety", "firmware/comm", "hal"),
           FREESTANDING | {"string.h"}),
@@ -52,6 +53,9 @@ LAYERS = (
     Layer("tests/plant", (), HOSTED),
     Layer("tests/support/twin", (), HOSTED),
 )  # fmt: skip
+
+# Written by the build from firmware/comm/fluxtrue.dbc.
+GENERATED = {"bus/bus.h": ("firmware/comm",), "bus/signals.h": ("firmware/comm",)}
 
 # Changes of frame are inline arithmetic on value types, not a stage with a state.
 VALUE_HEADERS = {"transform"}
@@ -111,6 +115,8 @@ def resolve(root: Path, path: Path, name: str) -> Path | None:
 
 def project_problem(root: Path, layer: Layer, path: Path, name: str) -> str | None:
     """Why an include of the project's own file is not allowed."""
+    if name in GENERATED:
+        return None if layer.folder in GENERATED[name] else f"{layer.folder} may not include the generated {name}"
     target = resolve(root, path, name)
     if target is None:
         return f'"{name}" is not a file of the project'

@@ -26,8 +26,8 @@ DIVISIONS = {
     "mrai_schedule.c": 3,
     "torque_loop.c": 1,
 }
-# A part of app/ with the layers' rules, except that app/ may own state.
-INTERRUPTS = re.compile(r"_isr\.c")
+# Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
+TASK_LAYERS = {"comm": re.compile(r"^e2e\.c"), "app": re.compile(r"_isr\.c")}
 
 MUTABLE = re.compile(r"^(\.data(?!\.rel\.ro)|\.bss|\.tdata|\.tbss|\*COM\*)")
 SYMBOL = re.compile(r"^[0-9a-f]+ .{7} (\S+)\t([0-9a-f]+)\s+(\S+)$")
@@ -41,8 +41,8 @@ FLOATS = re.compile(r"v[a-z]")
 FLOAT_CALL = re.compile(
     r"__aeabi_(f|d|i2|ui2|l2|ul2)|(sqrt|sin|cos|tan|atan2?|pow|exp|log|floor|ceil|fabs)f?$"
 )
-# The port's functions, and what gcc emits calls to on its own.
-FROM_OUTSIDE = re.compile(r"hal_\w+$|mem(cpy|set|move|cmp)$|__aeabi_\w+$")
+# The port's functions, what gcc emits calls to on its own, and the rounding of the bus's encoders (1 kHz task).
+FROM_OUTSIDE = re.compile(r"hal_\w+$|mem(cpy|set|move|cmp)$|__aeabi_\w+$|roundf$")
 
 
 def output(*command: str) -> list[str]:
@@ -124,7 +124,7 @@ def check(build: Path, target: bool) -> Iterator[Violation]:
     """All layers of one build folder."""
     prefix = "arm-none-eabi-" if target else ""
     found = 0
-    for layer in (*LAYERS, "app"):
+    for layer in (*LAYERS, *TASK_LAYERS):
         archive = build / "firmware" / f"libfluxtrue_{layer}.a"
         if not archive.exists():
             continue
@@ -132,8 +132,7 @@ def check(build: Path, target: bool) -> Iterator[Violation]:
         if layer != "app":
             yield from mutable_state(archive, prefix)
         if target:
-            members = INTERRUPTS if layer == "app" else re.compile("")
-            yield from costly_code(archive, prefix, members)
+            yield from costly_code(archive, prefix, TASK_LAYERS.get(layer, re.compile("")))
     whole = build / "libfluxtrue.a"
     if target and whole.exists():
         yield from unresolved(whole, prefix)

@@ -40,6 +40,7 @@ endfunction()
 #   motor_<name>          object library with the tables
 #   fluxtrue_sil_<name>   host: <build>/motors/<name>/libfluxtrue_sil.so
 #   fluxtrue_sim_<name>   host: <build>/motors/<name>/libfluxtrue_sim.so
+#   fluxtrue_vecu_<name>  host: <build>/motors/<name>/fluxtrue_vecu
 function(fluxtrue_add_motor name folder)
     set(out "${CMAKE_BINARY_DIR}/motors/${name}")
     _fluxtrue_motor_tables(${name} "${folder}" "${out}")
@@ -51,6 +52,8 @@ function(fluxtrue_add_motor name folder)
         fluxtrue_shared(fluxtrue_sim_${name} fluxtrue_sim "${out}"
             fluxtrue_sim_runner fluxtrue_hal_host motor_${name}
             fluxtrue_plant fluxtrue_twin fluxtrue_app)
+        fluxtrue_vecu(${name} "${out}" fluxtrue_vecu_parts fluxtrue_sim_runner fluxtrue_hal_host
+            motor_${name} fluxtrue_plant fluxtrue_twin fluxtrue_app)
     endif()
 endfunction()
 

@@ -4,6 +4,7 @@
 #   fluxtrue_plant       the simulated drive: knows nothing of the firmware (tests/plant)
 #   fluxtrue_twin        the controller again in double precision (tests/support/twin)
 #   fluxtrue_sim_runner  plant with firmware or twin, period by period (tests/loop/runner)
+#   fluxtrue_vecu_parts  the virtual ECU's bus, sockets and bench channel (tests/vecu)
 
 # fluxtrue_part(<name> <library type> <folder> [<include folder> ...])
 function(fluxtrue_part name type folder)
@@ -24,6 +25,8 @@ fluxtrue_part(fluxtrue_plant STATIC tests/plant "${tests}" "${tests}/plant")
 fluxtrue_part(fluxtrue_twin STATIC tests/support/twin "${tests}" "${tests}/support" "${firmware}")
 fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
     "${tests}" "${tests}/support" "${firmware}" "${CMAKE_SOURCE_DIR}")
+fluxtrue_part(fluxtrue_vecu_parts OBJECT tests/vecu
+    "${tests}" "${tests}/vecu" "${firmware}" "${CMAKE_SOURCE_DIR}")
 
 # Everything the tools load at run time: what tools/demo builds.
 add_custom_target(fluxtrue_libraries)
@@ -46,5 +49,34 @@ function(fluxtrue_shared target output folder)
         $<$<NOT:$<BOOL:${FLUXTRUE_SANITIZE}>>:-Wl,--no-undefined>)
     set_target_properties(${target} PROPERTIES LINKER_LANGUAGE C
         OUTPUT_NAME ${output} LIBRARY_OUTPUT_DIRECTORY "${folder}")
+    add_dependencies(fluxtrue_libraries ${target})
+endfunction()
+
+# fluxtrue_vecu(<name> <folder> <library or object library> ...)
+#   fluxtrue_vecu_<name>   <folder>/fluxtrue_vecu: application and plant in one process, at a fixed address so that
+#                          calibration tools find its variables where the ELF file says
+function(fluxtrue_vecu name folder)
+    file(GLOB tool CONFIGURE_DEPENDS "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/vecu/emit.py"
+        "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/sim/motor.py")
+    add_custom_command(OUTPUT "${folder}/machine_data.c"
+        COMMAND ${CMAKE_COMMAND} -E env "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1
+            "${FLUXTRUE_PYTHON}" -m fluxtrue_tools.vecu.emit "${folder}/motor.json" "${folder}/machine_data.c"
+        DEPENDS "${folder}/motor_tables.c" ${tool}
+        COMMENT "Generating the plant of motor ${name}"
+        VERBATIM)
+    set(target fluxtrue_vecu_${name})
+    add_executable(${target} "${folder}/machine_data.c")
+    target_include_directories(${target} PRIVATE "${CMAKE_SOURCE_DIR}/tests/vecu")
+    foreach(part IN LISTS ARGN)
+        get_target_property(type ${part} TYPE)
+        if(type STREQUAL OBJECT_LIBRARY)
+            target_sources(${target} PRIVATE $<TARGET_OBJECTS:${part}>)
+        else()
+            target_link_libraries(${target} PRIVATE ${part})
+        endif()
+    endforeach()
+    target_link_libraries(${target} PRIVATE m)
+    target_link_options(${target} PRIVATE -no-pie)
+    set_target_properties(${target} PROPERTIES OUTPUT_NAME fluxtrue_vecu RUNTIME_OUTPUT_DIRECTORY "${folder}")
     add_dependencies(fluxtrue_libraries ${target})
 endfunction()

@@ -13,8 +13,11 @@ from fluxtrue_tools.errors import FluxtrueError
 # Name: (module, command in it, one line for --help). Importing them all would cost a second.
 COMMANDS = {
     "demo": ("fluxtrue_tools.demo.cli", "demo", "The paper's experiments and ours, with a report."),
+    "campaign": ("fluxtrue_tools.campaign.cli", "campaign", "Many random plants: how true is the torque?"),
     "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
+    "vecu": ("fluxtrue_tools.vecu.cli", "vecu", "The virtual ECU: a CAN bus to talk to."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
+    "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
     "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
 }

@@ -28,6 +28,18 @@ sim_t *sim_create(int controller)
     return sim;
 }
 
+sim_t *sim_create_around(fluxtrue_t *firmware)
+{
+    sim_t *sim = calloc(1, sizeof *sim);
+    if (sim != NULL) {
+        sim->firmware = firmware;
+        sim->borrowed = 1;
+        plant_params_default(&sim->params);
+        sim->every = 1;
+    }
+    return sim;
+}
+
 void sim_destroy(sim_t *sim)
 {
     if (sim == NULL) {
@@ -37,7 +49,7 @@ void sim_destroy(sim_t *sim)
     plant_map_destroy(sim->map);
     if (sim->twin != NULL) {
         twin_destroy(sim->twin);
-    } else {
+    } else if (!sim->borrowed) {
         fluxtrue_destroy(sim->firmware);
     }
     free(sim);

@@ -25,9 +25,12 @@ enum {
 };
 
 typedef struct sim sim_t;
+struct fluxtrue; /* hal/host/instance.h */
 
 /** NULL: unknown controller or out of memory. */
 SIM_API sim_t *sim_create(int controller);
+/** The same with firmware that belongs to the caller and outlives the simulation. */
+SIM_API sim_t *sim_create_around(struct fluxtrue *firmware);
 SIM_API void sim_destroy(sim_t *sim);
 /** The machine's flux map, full plane, row-major [i_d][i_q]; copied. Without one the machine has
  * constant inductances. */

@@ -26,6 +26,7 @@ typedef struct {
 
 struct sim {
     fluxtrue_t *firmware;
+    int borrowed; /* the firmware is the caller's */
     twin_t *twin; /* one of the two */
     plant_params_t params;
     plant_map_t *map;

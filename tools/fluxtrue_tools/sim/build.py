@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "firmware" / "motors"
 LIBRARY = "libfluxtrue_sim.so"
 SIL_LIBRARY = "libfluxtrue_sil.so"
+VECU = "fluxtrue_vecu"
 UNUSABLE = ';"$\\'
 _STEP = re.compile(r"^\[(\d+)/(\d+)\]")
 
@@ -38,6 +39,11 @@ class MotorFolder:
     def sil(self) -> Path:
         """The firmware alone: libfluxtrue_sil.so."""
         return self.folder / SIL_LIBRARY
+
+    @property
+    def vecu(self) -> Path:
+        """Application and plant as a program that serves a CAN bus."""
+        return self.folder / VECU
 
     @property
     def data(self) -> Path:
@@ -117,7 +123,7 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
     with _build_lock():
         log.unlink(missing_ok=True)
         _configure(build_dir, folder, log)
-        targets = [f"fluxtrue_sim_{target}", f"fluxtrue_sil_{target}"]
+        targets = [f"fluxtrue_sim_{target}", f"fluxtrue_sil_{target}", f"fluxtrue_vecu_{target}"]
         command = ["cmake", "--build", str(build_dir), "-j2", "--target", *targets]
         _run(command, log, f"building the simulation of motor {name}")
     return MotorFolder(name, build_dir / "motors" / target)

@@ -32,7 +32,7 @@ class Motor:
         return lib.controller_names(self.library) + plant
 
 
-def _plant(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float]:
+def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float]:
     """The drive as its data sheet has it: its dead time and its converter, nothing wrong."""
     return {
         "pole_pairs": machine["pole_pairs"],
@@ -52,7 +52,8 @@ def _plant(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float
     }
 
 
-def _read(folder: MotorFolder) -> Motor:
+def read(folder: MotorFolder) -> Motor:
+    """What lies in a built motor's folder."""
     data = json.loads(folder.data.read_text(encoding="utf-8"))
     machine, flux_map = data["machine"], data["map"]
     axes = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
@@ -61,7 +62,7 @@ def _read(folder: MotorFolder) -> Motor:
         folder=folder,
         library=lib.load(folder.library),
         flux_map=None if flux_map is None else lib.FluxMap(*(flux_map[axis] for axis in axes)),
-        plant=_plant(machine, data["inverter"]),
+        plant=plant_parameters(machine, data["inverter"]),
         inertia_kgm2=machine["inertia_kgm2"],
         torque_max_Nm=machine["torque_max_Nm"],
         psi_f_Vs=machine["psi_f_Vs"],
@@ -73,6 +74,6 @@ def load(motor: str, build_dir: Path | None = None, base: Path | None = None) ->
     """A shipped motor or a folder with a motor.toml, built if need be."""
     folder = prepare(motor, build_dir, base)
     try:
-        return _read(folder)
+        return read(folder)
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise FluxtrueError(f"{folder.data}: not what the motor tool writes ({error!r})") from error

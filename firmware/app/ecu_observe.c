@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/ecu_private.h"
+
+#define LATE_PERIODS (TORQUE_ESTIMATE_PERIODS + TORQUE_ESTIMATE_PERIODS / 2)
+#define IN_A_ROW 3U
+#define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
+#define SETTLED_BAND Q15(0.01)  /* of V_b */
+#define SETTLED_MS 50U
+#define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with the gates off, is an offset or a broken sensor */
+#define SQRT3 1.7320508F
+
+enum { DERATING_NONE = 0, DERATING_LIMITS_LOST = 7 };
+
+static void count(uint16_t *counter)
+{
+    if (*counter < UINT16_MAX) {
+        (*counter)++;
+    }
+}
+
+static uint8_t in_a_row(uint8_t before, bool again)
+{
+    return again ? (uint8_t)((before < IN_A_ROW) ? before + 1U : IN_A_ROW) : 0U;
+}
+
+void ecu_watch(ecu_t *ecu)
+{
+    liveness_t *seen = &ecu->liveness;
+    const uint32_t pended = ecu->drive.fast.pended;
+    const uint32_t finished = ecu->drive.slow.finished;
+    const bool late = seen->started && pended - seen->pended >= LATE_PERIODS;
+    seen->late_in_a_row = in_a_row(seen->late_in_a_row, late);
+    seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, pended == seen->pended || finished == seen->finished);
+    if (late) {
+        count(&seen->task_overruns);
+    }
+    seen->pended = pended;
+    seen->finished = finished;
+}
+
+static bool settled(settling_t *settling, int32_t v_dc)
+{
+    const int32_t away = v_dc - settling->reference;
+    if (away > SETTLED_BAND || away < -SETTLED_BAND) {
+        *settling = (settling_t){.reference = v_dc};
+    } else if (settling->ms < SETTLED_MS) {
+        settling->ms++;
+    }
+    return settling->ms >= SETTLED_MS;
+}
+
+/* With the gates off there is no current; while they switch, the monitors watch. */
+static bool plausible(const drive_t *drive, const sample_t *sample)
+{
+    const dq_t i = sample->mrai.i;
+    const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
+    return drive->fast.pended != 0U && (idle || drive->request.enable);
+}
+
+/* sqrt(3) w psi: the peak of the line voltage that the turning magnet makes. */
+static bool is_slow(const drive_t *drive, q31_t omega)
+{
+    const float v_V = SQRT3 * (float)omega / 2147483648.0F * drive->motor.bases.omega_rad_s * drive->motor.psi_f_Vs;
+    return v_V < TOUCH_SAFE_V && v_V > -TOUCH_SAFE_V;
+}
+
+static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
+{
+    const float share = torque_Nm / ecu->drive.motor.bases.torque_Nm;
+    return (share >= 1.0F) ? Q15_MAX : (share <= -1.0F) ? (q15_t)-Q15_MAX : (q15_t)(share * 32767.0F);
+}
+
+static bool limits_lost(const ecu_t *ecu)
+{
+    return ecu->rx.limits_channel.seen && !ecu->rx.limits_channel.alive;
+}
+
+supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
+{
+    const drive_t *drive = &ecu->drive;
+    const bus_command_t *command = &ecu->rx.command;
+    const sample_t sample = sample_box_read(&drive->samples);
+    const float v_dc_V = (float)sample.v_dc / 32768.0F * drive->motor.bases.voltage_V;
+    return (supervisor_in_t){
+        .drive_faults = drive->fast.faults,
+        .alive = ecu->rx.command_channel.alive,
+        .failed = ecu->rx.command_channel.failed,
+        .torque_mode = command->mode == COMMAND_MODE_TORQUE,
+        .current_mode = command->mode == COMMAND_MODE_CURRENT,
+        .enable = command->enable,
+        .reset = command->fault_reset,
+        .request_is_zero = fx_abs_q15(per_unit(ecu, command->torque_Nm)) <= ecu->arbitration.dead_band,
+        .torque_is_zero = ecu->torque.torque == 0,
+        .dc_in_range = sample.v_dc >= drive->motor.monitor.v_min && sample.v_dc <= drive->motor.monitor.v_max,
+        .dc_settled = settled(&ecu->settling, sample.v_dc),
+        .dc_safe = v_dc_V < TOUCH_SAFE_V,
+        .sensors_plausible = plausible(drive, &sample),
+        .slow = is_slow(drive, sample.mrai.omega),
+        .derated = limits_lost(ecu),
+        .gate_fault = gate_fault,
+        .task_late = ecu->liveness.late_in_a_row >= IN_A_ROW,
+        .stalled = ecu->liveness.stalled_in_a_row >= IN_A_ROW,
+    };
+}
+
+arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
+{
+    const bus_command_t *command = &ecu->rx.command;
+    const supervisor_t *supervisor = &ecu->supervisor;
+    const bool lost = limits_lost(ecu);
+    return (arbitrate_in_t){
+        .request = per_unit(ecu, command->torque_Nm),
+        .limit_drive = lost ? (q15_t)0 : per_unit(ecu, command->limit_drive_Nm),
+        .limit_regen = lost ? (q15_t)0 : per_unit(ecu, command->limit_regen_Nm),
+        .omega = sample_box_read(&ecu->drive.samples).mrai.omega,
+        .run = supervisor_outputs[supervisor->state].run,
+        .stop = !supervisor->enabled,
+        .drop = !ecu->rx.command_channel.alive || supervisor->faults != 0U,
+    };
+}
+
+void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
+{
+    const can_rx_t *rx = &ecu->rx;
+    const supervisor_t *s = &ecu->supervisor;
+    diagnostics_t *d = &telemetry->diagnostics;
+    telemetry->state = s->state;
+    telemetry->ecu_faults = s->faults;
+    telemetry->first_fault = s->first_fault;
+    telemetry->fault_count = s->fault_count;
+    telemetry->refused_reason = s->refused;
+    telemetry->refused_count = s->refused_count;
+    telemetry->derating_reason = limits_lost(ecu) ? DERATING_LIMITS_LOST : DERATING_NONE;
+    d->crc_errors = rx->count[RX_CRC];
+    d->repeated = rx->count[RX_REPEATED];
+    d->jumps = rx->count[RX_JUMP];
+    d->length_errors = rx->count[RX_LENGTH];
+    d->range_errors = rx->count[RX_RANGE];
+    d->id_errors = rx->count[RX_ID];
+    d->ignored = rx->count[RX_IGNORED];
+    d->time_outs = rx->time_outs;
+    d->accepted = rx->accepted;
+    d->skipped = rx->skipped;
+    d->not_sent = ecu->not_sent;
+    d->task_overruns = ecu->liveness.task_overruns;
+    d->watchdog_held = ecu->liveness.held;
+}

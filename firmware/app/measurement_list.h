@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef APP_MEASUREMENT_LIST_H
+#define APP_MEASUREMENT_LIST_H
+/** What a calibration tool may record: one snapshot per millisecond.
+ *   X(name, type, base, expression, text); the physical value is raw * base / 2^15, or raw itself without a base
+ *   (NONE). d is the drive.
+ * Source   docs/howto/xcp.md
+ * Units    a name ends in its unit
+ * Context  app/measurements.c fills it, app/a2l.c describes it to tools */
+
+#define MEASUREMENT_LIST(X) \
+    X(i_d_A, S16, CURRENT, MEASURED(d).mrai.i.d, "Current along the magnet") \
+    X(i_q_A, S16, CURRENT, MEASURED(d).mrai.i.q, "Current across the magnet") \
+    X(i_d_ref_A, S16, CURRENT, (d)->task.reference.i_ref.d, "Reference of i_d") \
+    X(i_q_ref_A, S16, CURRENT, (d)->task.reference.i_ref.q, "Reference of i_q") \
+    X(u_d_V, S16, VOLTAGE, (d)->fast.modulated.acted.d, "Voltage that acts, d") \
+    X(u_q_V, S16, VOLTAGE, (d)->fast.modulated.acted.q, "Voltage that acts, q") \
+    X(v_dc_V, S16, VOLTAGE, MEASURED(d).v_dc, "Measured dc voltage") \
+    X(torque_command_Nm, S16, TORQUE, (d)->task.torque_command, "Torque command behind limit and slew") \
+    X(torque_request_Nm, S16, TORQUE, (d)->task.torque_request, "Torque asked of the current reference") \
+    X(torque_estimate_Nm, S16, TORQUE, (d)->slow.torque.mean, "Estimated air-gap torque") \
+    X(psi_quality, S16, ONE, (d)->task.quality.psi_quality, "Quality of the identified flux") \
+    X(r_quality, S16, ONE, (d)->task.quality.r_quality, "Quality of the identified resistance") \
+    X(speed_rpm, F32, NONE, measured_speed_rpm(d), "Speed of the rotor") \
+    X(psi_f_Vs, F32, NONE, measured_psi_f_Vs(d), "Identified magnet flux") \
+    X(r_ohm, F32, NONE, measured_r_ohm(d), "Identified resistance") \
+    X(fault_word, U32, NONE, (d)->fast.faults, "Latched faults, one bit each") \
+    X(mrai_overruns, U32, NONE, (d)->fast.overruns, "Periods in which the identification was late")
+
+#endif

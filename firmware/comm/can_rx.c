@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "comm/can_rx.h"
+
+#include "bus/signals.h"
+
+#define WINDOW_MASK 0x3FFU /* ten frames */
+#define BAD_TO_FAIL 3U
+
+static const uint16_t data_ids[] = {
+#define DATA_ID(name, NAME) BUS_##NAME##_DATA_ID,
+    BUS_PROTECTED(DATA_ID)
+#undef DATA_ID
+};
+
+static void count(uint16_t *counter)
+{
+    if (*counter < UINT16_MAX) {
+        (*counter)++;
+    }
+}
+
+/* A CRC that is wrong here may be right for another message: then it is the identifier that is wrong. */
+static bool is_of_another(const can_frame_t *frame)
+{
+    for (unsigned n = 0; n < sizeof data_ids / sizeof data_ids[0]; n++) {
+        if (frame->data[0] == e2e_crc(data_ids[n], frame)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static rx_result_t check(uint16_t data_id, rx_channel_t *channel, const can_frame_t *frame)
+{
+    switch (e2e_check(data_id, &channel->e2e, frame)) {
+    case E2E_OK:
+    case E2E_SKIPPED:
+        return RX_ACCEPTED;
+    case E2E_FIRST:
+        return RX_SYNCED;
+    case E2E_REPEATED:
+        return RX_REPEATED;
+    case E2E_JUMP:
+        return RX_JUMP;
+    case E2E_CRC:
+        return is_of_another(frame) ? RX_ID : RX_CRC;
+    case E2E_WRONG_LENGTH:
+    default:
+        return RX_LENGTH;
+    }
+}
+
+static bool take_command(can_rx_t *rx, const can_frame_t *frame)
+{
+    struct bus_vcu_torque_command_t m;
+    if (bus_vcu_torque_command_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_command_in_range(&m)) {
+        return false;
+    }
+    rx->command = (bus_command_t){
+        .enable = m.enable != 0U,
+        .fault_reset = m.fault_reset != 0U,
+        .mode = (command_mode_t)m.mode,
+        .torque_Nm = bus_vcu_torque_command_torque_request_decode(m.torque_request),
+        .limit_drive_Nm = bus_vcu_torque_command_torque_limit_drive_decode(m.torque_limit_drive),
+        .limit_regen_Nm = bus_vcu_torque_command_torque_limit_regen_decode(m.torque_limit_regen),
+    };
+    rx->accepted++;
+    return true;
+}
+
+static bool take_limits(can_rx_t *rx, const can_frame_t *frame)
+{
+    struct bus_vcu_battery_limits_t m;
+    if (bus_vcu_battery_limits_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_battery_limits_in_range(&m)) {
+        return false;
+    }
+    rx->limits = (bus_power_limits_t){
+        .drive_kW = bus_vcu_battery_limits_power_limit_drive_decode(m.power_limit_drive),
+        .regen_kW = bus_vcu_battery_limits_power_limit_regen_decode(m.power_limit_regen),
+    };
+    return true;
+}
+
+static unsigned ones(unsigned bits)
+{
+    unsigned sum = 0;
+    for (; bits != 0U; bits &= bits - 1U) {
+        sum++;
+    }
+    return sum;
+}
+
+/* The first frame proves nothing: it is neither good nor bad. */
+static void record(rx_channel_t *channel, rx_result_t result)
+{
+    if (result == RX_ACCEPTED) {
+        channel->age_ms = 0;
+        channel->alive = true;
+        channel->seen = true;
+    }
+    if (result != RX_SYNCED) {
+        const unsigned bad = (result != RX_ACCEPTED) ? 1U : 0U;
+        channel->bad = (uint16_t)(((unsigned)channel->bad << 1 | bad) & WINDOW_MASK);
+        channel->failed = ones(channel->bad) >= BAD_TO_FAIL;
+    }
+}
+
+static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
+{
+    const bool is_command = frame->id == BUS_VCU_TORQUE_COMMAND_FRAME_ID;
+    if (!is_command && frame->id != BUS_VCU_BATTERY_LIMITS_FRAME_ID) {
+        return RX_IGNORED;
+    }
+    if (frame->extended) {
+        return RX_ID; /* another sender's, not a bad frame of ours */
+    }
+    rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
+    const uint8_t before = channel->e2e.counter;
+    rx_result_t result =
+        check(is_command ? BUS_VCU_TORQUE_COMMAND_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel, frame);
+    if (result == RX_ACCEPTED) {
+        const bool taken = is_command ? take_command(rx, frame) : take_limits(rx, frame);
+        const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;
+        result = taken ? RX_ACCEPTED : RX_RANGE;
+        if (!next) {
+            count(&rx->skipped);
+        }
+    }
+    record(channel, result);
+    return result;
+}
+
+rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame)
+{
+    const rx_result_t result = receive(rx, frame);
+    count(&rx->count[result]);
+    return result;
+}
+
+/* True in the millisecond in which the message times out. */
+static bool grow_old(rx_channel_t *channel, uint16_t time_out_ms)
+{
+    if (!channel->alive) {
+        return false;
+    }
+    channel->age_ms++;
+    if (channel->age_ms < time_out_ms) {
+        return false;
+    }
+    channel->alive = false;
+    channel->e2e.synced = false;
+    return true;
+}
+
+void can_rx_tick(can_rx_t *rx)
+{
+    if (grow_old(&rx->command_channel, BUS_VCU_TORQUE_COMMAND_TIME_OUT_MS)) {
+        rx->command = (bus_command_t){.mode = rx->command.mode};
+        count(&rx->time_outs);
+    }
+    if (grow_old(&rx->limits_channel, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
+        rx->limits = (bus_power_limits_t){0};
+    }
+}

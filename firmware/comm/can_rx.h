@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef COMM_CAN_RX_H
+#define COMM_CAN_RX_H
+/** What the bus may ask: the protected messages, each with its checks, its age and its record of bad frames.
+ *   A frame counts only if length, CRC and data id, counter and the range of every signal are right.
+ *   alive   a frame was accepted less than the message's time-out ago
+ *   failed  three of the last ten frames with this identifier were bad
+ *   After a time-out the next frame only synchronises the counter, the one after it may be accepted.
+ * Source   firmware/comm/fluxtrue.dbc; docs/howto/can.md
+ * Units    SI, as the DBC says
+ * Range    accepted values lie within the DBC's ranges
+ * Errors   one counter per kind of violation, saturating; a refused frame changes nothing else
+ * Context  1 kHz task: can_rx_frame() for each frame, then can_rx_tick() once */
+#include "comm/e2e.h"
+
+typedef enum { COMMAND_MODE_OFF = 0, COMMAND_MODE_TORQUE = 1, COMMAND_MODE_CURRENT = 2 } command_mode_t;
+
+typedef struct {
+    bool enable;
+    bool fault_reset;
+    command_mode_t mode;
+    float torque_Nm;
+    float limit_drive_Nm, limit_regen_Nm; /* magnitudes */
+} bus_command_t;
+
+typedef struct {
+    float drive_kW, regen_kW; /* magnitudes, at the dc terminals */
+} bus_power_limits_t;
+
+typedef enum {
+    RX_ACCEPTED = 0,
+    RX_SYNCED,  /* the first frame: right, not used */
+    RX_REPEATED,
+    RX_JUMP,
+    RX_CRC,
+    RX_LENGTH,
+    RX_RANGE,
+    RX_ID,      /* the CRC of another protected message, or an extended identifier */
+    RX_IGNORED, /* an identifier that means nothing here */
+    RX_RESULTS
+} rx_result_t;
+
+/** One protected message. */
+typedef struct {
+    e2e_state_t e2e;
+    uint16_t age_ms;
+    uint16_t bad; /* the last ten frames, one bit each */
+    bool alive;
+    bool failed;
+    bool seen; /* accepted once since start-up */
+} rx_channel_t;
+
+typedef struct {
+    rx_channel_t command_channel, limits_channel;
+    bus_command_t command;     /* after a time-out: disabled, no torque, the mode stays */
+    bus_power_limits_t limits; /* after a time-out: zero */
+    uint16_t count[RX_RESULTS];
+    uint16_t accepted; /* torque commands, wraps */
+    uint16_t skipped;
+    uint16_t time_outs;
+} can_rx_t;
+
+rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame);
+void can_rx_tick(can_rx_t *rx);
+
+#endif

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "comm/can_tx.h"
+
+#include "bus/signals.h"
+#include "comm/e2e.h"
+
+typedef struct {
+    uint16_t id;
+    uint16_t cycle_ms;
+    uint16_t data_id; /* 0: not protected */
+    message_encoder_t encode;
+} tx_message_t;
+
+static const tx_message_t messages[] = {
+#define SENT(name, NAME) {BUS_##NAME##_FRAME_ID, BUS_##NAME##_CYCLE_MS, BUS_##NAME##_DATA_ID, message_##name},
+    BUS_SENT(SENT)
+#undef SENT
+};
+
+#define MESSAGES (sizeof messages / sizeof messages[0])
+
+void can_tx_begin(can_tx_t *tx)
+{
+    tx->time_ms++;
+    tx->next = 0;
+}
+
+/* The place in the list is the phase: the list has more entries than the shortest cycle has milliseconds, so that two
+ * meet at most. */
+static bool is_due(const can_tx_t *tx, unsigned index)
+{
+    return tx->time_ms % messages[index].cycle_ms == index % messages[index].cycle_ms;
+}
+
+tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)
+{
+    while (tx->next < MESSAGES) {
+        const unsigned index = tx->next;
+        const tx_message_t *message = &messages[index];
+        tx->next++;
+        if (!is_due(tx, index)) {
+            continue;
+        }
+        *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};
+        if (!message->encode(telemetry, frame->data)) {
+            return TX_NOT_A_NUMBER;
+        }
+        if (message->data_id != 0U) {
+            e2e_protect(message->data_id, &tx->status_counter, frame);
+        }
+        return TX_FRAME;
+    }
+    return TX_NONE;
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef COMM_MESSAGES_H
+#define COMM_MESSAGES_H
+/** What the drive tells the bus, in physical units, and its encoding.
+ *   Every value is clamped to the DBC's range of its signal; one that is no number refuses the whole frame.
+ * Source   firmware/comm/fluxtrue.dbc
+ * Units    SI or as the names say; signs as in the DBC
+ * Rounding to nearest in the DBC's scale
+ * Errors   encoders answer false for a value that is not finite: the frame must not be sent
+ * Context  1 kHz task */
+#include <stdbool.h>
+#include <stdint.h>
+
+#define MESSAGE_LENGTH 8U
+
+typedef struct {
+    uint32_t crc_errors, repeated, jumps, length_errors, range_errors, id_errors, time_outs, accepted, skipped;
+    uint32_t lost_frames, not_sent, ignored, bus_off;
+    uint32_t isr_overruns, task_overruns, stack_unused_bytes, reset_cause, watchdog_held;
+} diagnostics_t;
+
+typedef struct {
+    uint32_t state;
+    float torque_estimate_Nm, torque_command_Nm, torque_max_Nm, speed_rpm;
+    float v_dc_V, i_dc_A;
+    uint32_t derating_reason, refused_reason, refused_count;
+    float id_A, iq_A, id_ref_A, iq_ref_A;
+    float psi_f_mVs, r_mohm, psi_quality_percent, r_quality_percent, table_scale_percent;
+    bool psi_clamped, r_clamped;
+    float winding_C, inverter_C;
+    bool winding_valid, inverter_valid;
+    uint32_t drive_faults, ecu_faults, first_fault, fault_count;
+    uint32_t motor_id;
+    diagnostics_t diagnostics;
+} telemetry_t;
+
+typedef bool (*message_encoder_t)(const telemetry_t *telemetry, uint8_t *data);
+
+bool message_inv_status(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_dc_link(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_currents(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_identification(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_temperatures(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_faults(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_diag_protection(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_diag_receive(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_diag_bus(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_diag_task(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_version(const telemetry_t *telemetry, uint8_t *data);
+
+#endif

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An inverter on a bus, in this process: the firmware's library, fed with samples and frames."""
+
+import ctypes
+import os
+from pathlib import Path
+
+import cantools
+from cantools.database.can import Database
+
+from protection import protect
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
+DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
+PERIODS_PER_MS = 10
+COMMAND = "VCU_TorqueCommand"
+LIMITS = "VCU_BatteryLimits"
+
+
+def load_dbc() -> Database:
+    """The one description of the bus."""
+    database = cantools.database.load_file(DBC)
+    assert isinstance(database, Database)
+    return database
+
+
+class Frame(ctypes.Structure):
+    """can_frame_t."""
+
+    _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
+                ("data", ctypes.c_uint8 * 8))  # fmt: skip
+
+
+class Ecu:
+    """One instance, one millisecond at a time."""
+
+    def __init__(self) -> None:
+        self.dbc = load_dbc()
+        self.lib = ctypes.CDLL(str(BUILD / "libfluxtrue_sil.so"))
+        self.lib.fluxtrue_create.restype = ctypes.c_void_p
+        self.lib.fluxtrue_get.restype = ctypes.c_double
+        self.lib.can_host_put.restype = ctypes.c_bool
+        self.lib.can_host_take.restype = ctypes.c_bool
+        self.handle = ctypes.c_void_p(self.lib.fluxtrue_create())
+        self.lib.can_host_attach(self.handle)
+        # ia ib ic in A, dc voltage in V, angle in rad, winding in degrees Celsius
+        self.samples = [0.0, 0.0, 0.0, 0.0, 0.0, 25.0]
+        self.speed_rad_s = 0.0
+        self.out = (ctypes.c_double * 4)()
+        self.time_ms = 0
+        self.counters = {COMMAND: 0, LIMITS: 0}
+        self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequest": 0.0,
+                        "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0}  # fmt: skip
+        self.talking = True
+        self.sent: list[tuple[int, int, bytes]] = []
+        self.last: dict[str, dict] = {}
+
+    def close(self) -> None:
+        """Gives the memory back."""
+        self.lib.fluxtrue_destroy(self.handle)
+
+    def get(self, name: str) -> float:
+        """A value of fluxtrue_get()."""
+        return float(self.lib.fluxtrue_get(self.handle, name.encode()))
+
+    def put(self, identifier: int, data: bytes, extended: bool = False) -> bool:
+        """A frame on the bus."""
+        frame = Frame(identifier, extended, len(data), (ctypes.c_uint8 * 8)(*data))
+        return bool(self.lib.can_host_put(self.handle, ctypes.byref(frame)))
+
+    def encode(self, name: str, values: dict) -> bytes:
+        """A protected message with its next counter."""
+        message = self.dbc.get_message_by_name(name)
+        raw = bytearray(message.encode({"Crc": 0, "Counter": self.counters[name], **values}))
+        self.counters[name] = (self.counters[name] + 1) % 15
+        return protect(int(message.dbc.attributes["E2EDataId"].value), raw)
+
+    def send(self, name: str, values: dict) -> None:
+        """Puts a protected message on the bus."""
+        self.put(self.dbc.get_message_by_name(name).frame_id, self.encode(name, values))
+
+    def step_ms(self) -> None:
+        """One millisecond of simulated time; the command goes out in every tenth."""
+        if self.talking and self.time_ms % 10 == 0:
+            self.send(COMMAND, self.command)
+        for _ in range(PERIODS_PER_MS):
+            self.samples[4] += self.speed_rad_s * 1e-4
+            self.lib.fluxtrue_step(self.handle, (ctypes.c_double * 6)(*self.samples), self.out)
+        self.time_ms += 1
+        frame = Frame()
+        while self.lib.can_host_take(self.handle, ctypes.byref(frame)):
+            data = bytes(frame.data[: frame.length])
+            self.sent.append((self.time_ms, frame.id, data))
+            message = self.dbc.get_message_by_frame_id(frame.id)
+            self.last[message.name] = message.decode(data)
+
+    def run(self, milliseconds: int, **command: object) -> None:
+        """Some time, after a change of the command."""
+        self.command.update(command)
+        for _ in range(milliseconds):
+            self.step_ms()
+
+    @property
+    def state(self) -> str:
+        """As told on the bus."""
+        return str(self.last["INV_Status"]["State"])
+
+    def power_up(self, v_dc_V: float = 350.0) -> None:
+        """To the state run, without torque."""
+        self.run(100)
+        self.run(20, Mode="torque")
+        self.samples[3] = v_dc_V
+        self.run(100)
+        self.run(30, Enable=1)

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The test stand as a test sees it: an ECU on CAN, and perhaps a plant that can be told what to do.
+
+With a bench channel time is simulated: advance() sends the cyclic commands, lets the virtual ECU run and reads what it
+has sent, and nothing depends on how fast the computer is. Without one time is the wall clock's.
+"""
+
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import can
+import cantools.database
+import numpy as np
+from fluxtrue_tools.vecu.channel import Channel
+from numpy.typing import NDArray
+
+import e2e
+
+COMMAND = "VCU_TorqueCommand"
+LIMITS = "VCU_BatteryLimits"
+STATUS = "INV_Status"
+MS = 1e-3
+EXACT = 1e-9  # s: a step's end and a frame's due time are the same instant
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the vehicle asks for, in the DBC's units."""
+
+    enable: bool = False
+    reset: bool = False
+    mode: str = "off"
+    torque_Nm: float = 0.0
+    limit_drive_Nm: float = 1000.0
+    limit_regen_Nm: float = 1000.0
+
+    def signals(self) -> dict[str, Any]:
+        """For cantools; CRC and counter are put in afterwards."""
+        return {
+            "Crc": 0, "Counter": 0, "Enable": int(self.enable), "FaultReset": int(self.reset), "Mode": self.mode,
+            "TorqueRequest": self.torque_Nm, "TorqueLimitDrive": self.limit_drive_Nm,
+            "TorqueLimitRegen": self.limit_regen_Nm,
+        }  # fmt: skip
+
+
+@dataclass
+class Trace:
+    """Rows of a recording of the plant."""
+
+    names: list[str]
+    rows: list[list[float]] = field(default_factory=list)
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return np.asarray(self.rows)[:, self.names.index(name)]
+
+
+@dataclass
+class Frame:
+    """One frame as received."""
+
+    time_s: float
+    data: bytes
+
+
+class Rig:
+    """Bus, DBC, the cyclic commands, and what has been received."""
+
+    def __init__(
+        self, bus: can.BusABC, database: cantools.database.Database, stand: Channel | None, port: int = 0
+    ) -> None:
+        self.bus, self.database, self._stand, self._port = bus, database, stand, port
+        self.by_name = {message.name: message for message in database.messages}
+        self.by_id = {message.frame_id: message for message in database.messages}
+        self._command_id, self._limits_id = self.by_name[COMMAND].frame_id, self.by_name[LIMITS].frame_id
+        self.listeners: list[Callable[[can.Message], None]] = []
+        self.sent = 0
+        self._heard = 0
+        self._now_s = 0.0
+        self.forget()
+
+    def forget(self) -> None:
+        """As after connecting: nothing sent, nothing received."""
+        self.command = Command()
+        self.is_sending = True
+        self.power_limits_kW: tuple[float, float] | None = None
+        self._due: dict[str, float] = {COMMAND: self.now_s, LIMITS: self.now_s}
+        self._senders = {name: e2e.Sender(self.data_id(name)) for name in (COMMAND, LIMITS)}
+        self.status_protection = e2e.Receiver(self.data_id(STATUS))
+        self.frames: dict[str, list[Frame]] = defaultdict(list)
+        self.last: dict[str, Frame] = {}
+        self.keep_frames = True
+        self.counted: dict[str, int] = defaultdict(int)
+        self.trace = Trace([])
+
+    # What the DBC says.
+
+    def data_id(self, name: str) -> int:
+        """Of the end-to-end protection."""
+        return int(self.by_name[name].dbc.attributes["E2EDataId"].value)
+
+    def cycle_s(self, name: str) -> float:
+        """How often a message is sent."""
+        return (self.by_name[name].cycle_time or 0) * MS
+
+    # Time.
+
+    @property
+    def stand(self) -> Channel:
+        """The bench channel; tests that need it carry the marker `plant`."""
+        assert self._stand is not None, "this test needs the marker 'plant'"
+        return self._stand
+
+    @property
+    def has_stand(self) -> bool:
+        """Whether the plant can be told what to do, and time is simulated."""
+        return self._stand is not None
+
+    @property
+    def now_s(self) -> float:
+        """Of the frames' time stamps, as far as this side knows."""
+        return self._now_s if self._stand is not None else time.monotonic()
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass; the commands go out in their cycle."""
+        end_s = self.now_s + seconds
+        while end_s - self.now_s > EXACT:
+            self._send_due()
+            step_to_s = min([end_s, *self._due.values()]) if self.is_sending else end_s
+            self._pass(step_to_s)
+
+    def _pass(self, until_s: float) -> None:
+        if self._stand is None:
+            while (left_s := until_s - time.monotonic()) > 0.0:
+                self._take(self.bus.recv(left_s))
+            return
+        ran = self._stand.run(round(1e3 * (until_s - self._now_s), 6), self._port, self.sent)
+        self._now_s = 1e-9 * ran.now_ns
+        self.trace.rows += ran.rows
+        while self._heard < ran.frames:
+            self._heard += 1
+            message = self.bus.recv(5.0)
+            assert message is not None, "the virtual ECU says it has sent more frames than arrived"
+            self._take(message)
+
+    # Sending.
+
+    def send(self, frame_id: int, data: bytes, extended: bool = False) -> None:
+        """One frame, as it is."""
+        message = can.Message(arbitration_id=frame_id, data=data, is_extended_id=extended, timestamp=self.now_s)
+        self.bus.send(message)
+        self.sent += 1
+        for listener in self.listeners:
+            listener(message)
+
+    def encode(self, command: Command) -> bytes:
+        """A command's frame without protection."""
+        return bytes(self.by_name[COMMAND].encode(command.signals()))
+
+    def next_command(self) -> bytes:
+        """The protected frame that is next in turn."""
+        return self._senders[COMMAND].protect(self.encode(self.command))
+
+    def skip_counters(self, count: int) -> None:
+        """The sender loses count."""
+        sender = self._senders[COMMAND]
+        sender.counter = (sender.counter + count) % e2e.COUNTERS
+
+    def _send_due(self) -> None:
+        if not self.is_sending:
+            self._due = {name: max(due_s, self.now_s) for name, due_s in self._due.items()}
+            return
+        now_s = self.now_s
+        if self._due[COMMAND] <= now_s + EXACT:
+            self.send(self._command_id, self.next_command())
+            self._due[COMMAND] += self.cycle_s(COMMAND)
+        if self._due[LIMITS] <= now_s + EXACT:
+            if self.power_limits_kW is not None:
+                drive, regen = self.power_limits_kW
+                signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
+                data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
+                self.send(self._limits_id, data)
+            self._due[LIMITS] += self.cycle_s(LIMITS)
+
+    # Receiving.
+
+    def _take(self, message: can.Message | None) -> None:
+        if message is None or message.is_error_frame:
+            return
+        for listener in self.listeners:
+            listener(message)
+        known = self.by_id.get(message.arbitration_id)
+        if known is None or message.is_extended_id or "INV" not in known.senders:
+            return
+        frame = Frame(message.timestamp, bytes(message.data))
+        self.counted[known.name] += 1
+        self.last[known.name] = frame
+        if known.name == STATUS:
+            self.status_protection.take(frame.data)
+        if self.keep_frames:
+            self.frames[known.name].append(frame)
+
+    def decode(self, name: str, data: bytes) -> dict[str, Any]:
+        """Signals; choices stay numbers."""
+        return dict(self.by_name[name].decode(data, decode_choices=False))
+
+    def signal(self, name: str, signal: str) -> float:
+        """The newest value."""
+        assert name in self.last, f"no {name} has been received yet"
+        return float(self.decode(name, self.last[name].data)[signal])
+
+    def series(self, name: str, signal: str, since_s: float = 0.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Time stamps and values."""
+        frames = [frame for frame in self.frames[name] if frame.time_s >= since_s]
+        values = [self.decode(name, frame.data)[signal] for frame in frames]
+        return np.asarray([frame.time_s for frame in frames]), np.asarray(values, dtype=np.float64)
+
+    @property
+    def state(self) -> str:
+        """Of the inverter, by its name in the DBC."""
+        signal = self.by_name[STATUS].get_signal_by_name("State")
+        assert signal.choices is not None
+        return str(signal.choices[int(self.signal(STATUS, "State"))])
+
+    # What every test does.
+
+    def ask(self, **changes: Any) -> None:
+        """Change the command that is sent from now on."""
+        self.command = replace(self.command, **changes)
+
+    def wait_for(self, state: str, seconds: float = 2.0) -> float:
+        """Until the status says so; how long it took."""
+        start_s = self.now_s
+        while STATUS not in self.last or self.state != state:
+            assert self.now_s - start_s < seconds, f"state {state} wanted, after {seconds:g} s still {self.state}"
+            self.advance(10 * MS)
+        return self.now_s - start_s
+
+    def start(self, torque_Nm: float = 0.0) -> None:
+        """From standby to run, with a torque request that comes after the gates have closed."""
+        self.ask(mode="torque", enable=False, torque_Nm=0.0)
+        self.wait_for("ready")
+        self.ask(enable=True)
+        self.wait_for("run")
+        self.ask(torque_Nm=torque_Nm)
+
+    def record(self, names: Sequence[str], periods: int = 10) -> Trace:
+        """The plant's truth from now on: a row each so many PWM periods."""
+        self.stand.record(names, periods)
+        self.trace = Trace(list(names))
+        return self.trace
+
+    def power_cycle(self, seed: int = 1) -> None:
+        """ECU and plant from the start; the commands stop being what they were."""
+        self.stand.reset(seed)
+        self.forget()

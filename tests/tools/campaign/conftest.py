@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A campaign that takes seconds, and the machine it runs on."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.campaign.machine import Machine, make_machine
+from fluxtrue_tools.campaign.spec import Campaign, parse
+from fluxtrue_tools.sim.build import prepare
+
+ROOT = Path(__file__).resolve().parents[3]
+SMALL = """
+motor = "hsm1"
+cases = 4
+seed = 7
+[nominal]
+device_drop_V = 1.0
+iron_k_h = 12.2
+iron_k_e = 0.0088
+[plant]
+current_quantise = true
+angle_bits = 12
+[drive]
+duration_s = 2
+[windows]
+speed_rpm = [[500, 6000, 1]]
+low_speed_rpm = [250]
+settle_s = 0.1
+measure_s = 0.05
+[[controller]]
+name = "tables"
+set = { torque_loop = false, identification = false }
+warm_up = false
+[[controller]]
+name = "paper"
+set = { torque_loop = true, identification = true }
+"""
+
+
+@pytest.fixture(scope="session")
+def small() -> Campaign:
+    return parse(SMALL, "small.toml")
+
+
+@pytest.fixture(scope="session")
+def machine(small: Campaign) -> Machine:
+    return make_machine(prepare("hsm1"), small, "small.toml")
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "fluxtrue_tools", "campaign", *map(str, arguments)]
+
+
+def environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+
+
+def campaign(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """The command as a user calls it."""
+    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd, timeout=300,
+                          env=environment(), check=False)  # fmt: skip

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bad campaigns get one line that names file, field, value and what was allowed."""
+
+from pathlib import Path
+
+import pytest
+from conftest import SMALL, campaign
+from fluxtrue_tools.campaign.spec import parse
+from fluxtrue_tools.errors import FluxtrueError
+
+BAD = [
+    ("unknown key", "cases = 4", "cases = 4\nplants = 3", "plants: unknown field, allowed: motor, cases, seed"),
+    ("unknown nested key", "[drive]", "[drive]\nspeed = 3", "drive.speed: unknown field, allowed: duration_s, vehicle"),
+    ("unknown controller key", "warm_up = false", "warmup = false", "controller.0.warmup: unknown field, allowed: name"),
+    ("wrong type", "cases = 4", 'cases = "many"', "cases = 'many'"),
+    ("a fraction of a case", "cases = 4", "cases = 4.5", "cases = 4.5"),
+    ("no case", "cases = 4", "cases = 0", "cases = 0"),
+    ("a negative seed", "seed = 7", "seed = -7", "seed = -7"),
+    ("missing field", "seed = 7", "", "seed: this field is required"),
+    ("not TOML", "seed = 7", "seed = ", "not TOML"),
+    ("not a number", "duration_s = 2", "duration_s = nan", "drive.duration_s"),
+    ("an absurd drive", "duration_s = 2", "duration_s = 1e9", "drive.duration_s"),
+    ("a reversed range", "[drive]", "[spread]\nlq_scale = [1.1, 0.9]\n[drive]", "spread.lq_scale = [1.1, 0.9]: allowed: [low"),
+    ("a range in percent", "[drive]", "[spread]\nlq_scale = [90, 110]\n[drive]", "spread.lq_scale.0 = 90"),
+    ("a range of one number", "[drive]", "[spread]\nlq_scale = 1.0\n[drive]", "spread.lq_scale = 1.0: allowed: [low, high]"),
+    ("a reversed band", "[[500, 6000, 1]]", "[[6000, 500, 1]]", "windows.speed_rpm: 6000 to 500"),
+    ("a band without strata", "[[500, 6000, 1]]", "[[500, 6000]]", "windows.speed_rpm.0"),
+    ("a controller twice", 'name = "paper"', 'name = "tables"', "controller: tables, tables, allowed: every name once"),
+    ("an unknown checked one", "[drive]", '[check]\ncontrollers = ["robust"]\n[drive]', "check.controllers: 'robust', allowed"),
+    ("no reference", "[drive]", '[check]\ncontrollers = ["paper"]\nreference = "x"\n[drive]', "check.reference: 'x', allowed"),
+    ("a plant's typo", "angle_bits = 12", "angle_bit = 12", "plant.angle_bit: unknown field"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
+def test_a_bad_value_is_named_with_what_is_allowed(old: str, new: str, message: str) -> None:
+    assert old in SMALL
+    with pytest.raises(FluxtrueError) as error:
+        parse(SMALL.replace(old, new, 1), "bad.toml")
+    assert str(error.value).startswith("bad.toml: ")
+    assert message in str(error.value)
+
+
+CALLED = [
+    ("a missing file", SMALL, ["nowhere.toml"], "nowhere.toml: cannot be read (No such file or directory)"),
+    ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "motor 'hsm2'"),
+    ("a drop below nothing", SMALL.replace("device_drop_V = 1.0", ""), ["c.toml"], "spread.device_drop_error_V = -0.5"),
+    ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"), ["c.toml"],
+     "controller 'paper': torque_lop = 1: no such name"),
+    ("a value no firmware takes", SMALL.replace("{ torque_loop = true", "{ observer_m = 99, torque_loop = true"),
+     ["c.toml"], "controller 'paper': observer_m = 99: out of range"),
+    ("a flag that is not there", SMALL + '[check]\ncount_nonzero = ["psi_clamp"]', ["c.toml"], "psi_clamp"),
+    ("a case beyond the last", SMALL, ["c.toml", "--case", "4"], "--case 4, allowed: 0 to 3"),
+    ("more cases than there are", SMALL, ["c.toml", "--cases", "5"], "--cases 5, allowed: up to the campaign's 4"),
+    ("a plot of nothing", SMALL, ["c.toml", "--plot", "a.png"], "--plot a.png: allowed together with --case"),
+    ("a plot of no format", SMALL, ["c.toml", "--case", "1", "--plot", "a.gif"], "allowed: a file ending in .png"),
+    ("no scheduler", SMALL, ["c.toml", "--scheduler", "nonsense://x"], "--scheduler nonsense://x"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "arguments", "message"), [c[1:] for c in CALLED], ids=[c[0] for c in CALLED])
+def test_bad_input_ends_in_one_line_exit_2_and_no_results(
+    tmp_path: Path, text: str, arguments: list[str], message: str
+) -> None:
+    (tmp_path / "c.toml").write_text(text)
+    result = campaign(*arguments, "--out", "out", cwd=tmp_path)
+    assert result.returncode == 2, result.stderr
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert not list(tmp_path.glob("out/**/*.parquet"))
+
+
+@pytest.mark.parametrize("name", ["ci", "hsm1-500", "development"])
+def test_the_shipped_campaigns_differ_in_seed_and_size_only(name: str) -> None:
+    folder = Path(__file__).resolve().parents[2] / "loop" / "campaign"
+    read = {n: parse((folder / f"{n}.toml").read_text(), n) for n in ("ci", "hsm1-500", "development")}
+    assert len({campaign.seed for campaign in read.values()}) == 3
+    alike = read[name].model_copy(update={"seed": 0, "cases": 1})
+    assert alike == read["hsm1-500"].model_copy(update={"seed": 0, "cases": 1})

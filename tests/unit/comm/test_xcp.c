@@ -1,0 +1,309 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+#include <string.h>
+
+#include "unity.h"
+#include "xcp_master.h"
+
+void setUp(void)
+{
+    master_reset();
+}
+
+void tearDown(void)
+{
+}
+
+static void write_float(int parameter, float value)
+{
+    master_download(xcp_address(&working[parameter]), &value, 4);
+}
+
+static void ready(void)
+{
+    master_connect();
+    master_unlock();
+}
+
+void test_before_connect_the_slave_is_silent(void)
+{
+    SEND(0xFD);
+    TEST_ASSERT_FALSE(answered);
+    SEND(0xF5, 1);
+    TEST_ASSERT_FALSE(answered);
+    TEST_ASSERT_EQUAL_UINT32(2, slave.counts.ignored);
+}
+
+void test_connect_tells_resources_and_packet_sizes(void)
+{
+    SEND(0xFF, 0);
+    EXPECT(0xFF, 0x05, 0x80, 8, 8, 0, 1, 1);
+    TEST_ASSERT_EQUAL_UINT8(8, last_answer.length);
+}
+
+void test_after_disconnect_the_slave_is_silent_again_and_locked(void)
+{
+    ready();
+    SEND(0xFE);
+    EXPECT(0xFF);
+    SEND(0xFD);
+    TEST_ASSERT_FALSE(answered);
+    master_connect();
+    SEND(0xFD);
+    EXPECT(0xFF, 0x00, 0x01);
+}
+
+void test_an_unknown_command_and_a_short_one_are_told_apart(void)
+{
+    master_connect();
+    SEND(0x01);
+    EXPECT_ERROR(0x20);
+    SEND(0xF3, 0, 0, 0);
+    EXPECT_ERROR(0x21);
+    SEND(0xD2, 0, 0, 0, 0, 0, 0, 0);
+    EXPECT_ERROR(0x20);
+}
+
+void test_synch_answers_with_the_synch_error(void)
+{
+    master_connect();
+    SEND(0xFC);
+    EXPECT_ERROR(0x00);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.counts.refused);
+}
+
+void test_memory_outside_the_areas_cannot_be_read(void)
+{
+    master_connect();
+    SEND(0xF4, 4, 0, 0, AT(&measured[12]));
+    EXPECT(0xFF, 0xAC, 0xAD, 0xAE, 0xAF);
+    SEND(0xF4, 4, 0, 0, AT(&measured[13]));
+    EXPECT_ERROR(0x24);
+    SEND(0xF4, 1, 0, 0, AT(&slave));
+    EXPECT_ERROR(0x24);
+    SEND(0xF4, 7, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF);
+    EXPECT_ERROR(0x24);
+}
+
+void test_upload_goes_on_where_it_stopped(void)
+{
+    master_connect();
+    SEND(0xF6, 0, 0, 0, AT(measured));
+    SEND(0xF5, 7);
+    EXPECT(0xFF, 0xA0, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6);
+    SEND(0xF5, 2);
+    EXPECT(0xFF, 0xA7, 0xA8);
+    TEST_ASSERT_EQUAL_UINT8(3, last_answer.length);
+    SEND(0xF5, 8);
+    EXPECT_ERROR(0x22);
+}
+
+void test_a_write_needs_the_key(void)
+{
+    master_connect();
+    write_float(0, 5.0F);
+    EXPECT_ERROR(0x25);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+    master_unlock();
+    write_float(0, 5.0F);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(5.0F, working[0]);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.generation);
+}
+
+void test_a_wrong_key_ends_the_session_and_the_third_closes_the_door(void)
+{
+    for (int round = 0; round < 3; round++) {
+        master_connect();
+        SEND(0xF8, 0, 1);
+        EXPECT(0xFF, 4);
+        SEND(0xF7, 4, 1, 2, 3, 4);
+        EXPECT_ERROR(0x25);
+        SEND(0xFD);
+        TEST_ASSERT_FALSE(answered);
+    }
+    master_connect();
+    SEND(0xF8, 0, 1);
+    EXPECT_ERROR(0x25);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.counts.locked_out);
+}
+
+void test_a_seed_is_good_for_one_key_and_no_key_comes_without_a_seed(void)
+{
+    master_connect();
+    SEND(0xF7, 4, 0, 0, 0, 0);
+    EXPECT_ERROR(0x29);
+    SEND(0xF8, 0, 1);
+    const uint8_t first = last_answer.data[2];
+    SEND(0xF8, 0, 1);
+    TEST_ASSERT_NOT_EQUAL(first, last_answer.data[2]);
+}
+
+void test_the_limits_themselves_are_allowed_and_what_lies_outside_is_refused(void)
+{
+    const float good[] = {2.0F, 4.0F};
+    const float bad[] = {1.9999998F, 4.0000005F, INFINITY, -INFINITY, NAN};
+    ready();
+    for (unsigned k = 0; k < 2; k++) {
+        write_float(1, good[k]);
+        EXPECT(0xFF);
+        TEST_ASSERT_EQUAL_FLOAT(good[k], working[1]);
+    }
+    for (unsigned k = 0; k < sizeof bad / sizeof bad[0]; k++) {
+        write_float(1, bad[k]);
+        EXPECT_ERROR(0x22);
+        TEST_ASSERT_EQUAL_FLOAT(4.0F, working[1]);
+    }
+}
+
+void test_a_value_acts_only_when_its_last_byte_has_arrived(void)
+{
+    const float value = 7.25F;
+    uint8_t byte[4];
+    memcpy(byte, &value, 4);
+    ready();
+    for (uint32_t k = 0; k < 4; k++) {
+        TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+        master_download(xcp_address(working) + k, &byte[k], 1);
+        EXPECT(0xFF);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(7.25F, working[0]);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.generation);
+}
+
+void test_a_command_that_completes_a_good_and_a_bad_value_stores_neither(void)
+{
+    const float block[2] = {9.0F, 99.0F};
+    uint8_t bytes[8];
+    memcpy(bytes, block, 8);
+    ready();
+    master_download(xcp_address(working), bytes, 2);
+    EXPECT(0xFF);
+    master_download(xcp_address(working) + 2, &bytes[2], 6);
+    EXPECT_ERROR(0x22);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+    TEST_ASSERT_EQUAL_FLOAT(2.0F, working[1]);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.generation);
+}
+
+void test_the_master_may_write_the_whole_page_in_pieces_of_any_size(void)
+{
+    const float page[3] = {0.5F, 2.5F, -0.5F};
+    ready();
+    for (uint32_t at = 0; at < 12; at += 5) {
+        master_download(xcp_address(working) + at, (const uint8_t *)page + at, (uint8_t)((at < 10) ? 5 : 2));
+        EXPECT(0xFF);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(page, working, sizeof page);
+}
+
+void test_no_write_goes_beside_the_page(void)
+{
+    const uint32_t value = 0;
+    ready();
+    master_download(xcp_address(working) + 10, &value, 4);
+    EXPECT_ERROR(0x24);
+    master_download(xcp_address(measured), &value, 4);
+    EXPECT_ERROR(0x24);
+    TEST_ASSERT_EQUAL_HEX8(0xA0, measured[0]);
+}
+
+void test_a_download_that_claims_more_bytes_than_it_has_is_refused(void)
+{
+    ready();
+    SEND(0xF6, 0, 0, 0, AT(working));
+    SEND(0xF0, 4, 0, 0);
+    EXPECT_ERROR(0x21);
+    SEND(0xF0, 0, 0, 0);
+    EXPECT_ERROR(0x21);
+}
+
+void test_the_reference_page_can_be_read_and_not_written(void)
+{
+    const float three = 3.0F;
+    ready();
+    write_float(0, 8.0F);
+    SEND(0xEB, 0x02, 0, 0); /* the master looks at the reference page */
+    EXPECT(0xFF);
+    SEND(0xF4, 4, 0, 0, AT(working));
+    EXPECT(0xFF, 0x00, 0x00, 0x80, 0x3F); /* 1.0 */
+    master_download(xcp_address(&working[0]), &three, 4);
+    EXPECT_ERROR(0x23);
+    TEST_ASSERT_EQUAL_FLOAT(8.0F, working[0]);
+}
+
+void test_the_drive_changes_pages_at_once_and_needs_the_key_for_it(void)
+{
+    ready();
+    write_float(0, 8.0F);
+    const uint32_t before = slave.generation;
+    SEND(0xEB, 0x01, 0, 0);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, xcp_active_page(&slave, &slave_config)[0]);
+    TEST_ASSERT_EQUAL_UINT32(before + 1, slave.generation);
+    SEND(0xEA, 1, 0);
+    EXPECT(0xFF, 0, 0, 0);
+    SEND(0xEA, 2, 0);
+    EXPECT(0xFF, 0, 0, 1);
+    master_connect(); /* locks */
+    SEND(0xEB, 0x01, 0, 1);
+    EXPECT_ERROR(0x25);
+}
+
+void test_pages_and_segments_that_do_not_exist_are_refused(void)
+{
+    ready();
+    SEND(0xEB, 0x03, 1, 0);
+    EXPECT_ERROR(0x28);
+    SEND(0xEB, 0x03, 0, 2);
+    EXPECT_ERROR(0x26);
+    SEND(0xEB, 0x00, 0, 1);
+    EXPECT_ERROR(0x27);
+    SEND(0xEA, 3, 0);
+    EXPECT_ERROR(0x27);
+    SEND(0xEA, 1, 1);
+    EXPECT_ERROR(0x28);
+    SEND(0xE4, 0, 1, 0, 0);
+    EXPECT_ERROR(0x26);
+    SEND(0xE4, 0, 0, 0, 0);
+    EXPECT_ERROR(0x23);
+    SEND(0xE4, 1, 0, 0, 1);
+    EXPECT_ERROR(0x28);
+}
+
+void test_copying_the_reference_page_brings_the_built_in_values_back(void)
+{
+    ready();
+    write_float(0, 8.0F);
+    write_float(2, 4.0F);
+    SEND(0xE4, 0, 0, 0, 1);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+    TEST_ASSERT_EQUAL_FLOAT(3.0F, working[2]);
+}
+
+void test_the_checksum_is_that_of_the_bytes(void)
+{
+    master_connect();
+    memcpy(measured, "123456789", 9);
+    SEND(0xF6, 0, 0, 0, AT(measured));
+    SEND(0xF3, 0, 0, 0, 9, 0, 0, 0);
+    EXPECT(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB); /* the published check value */
+    SEND(0xF6, 0, 0, 0, AT(measured));
+    SEND(0xF3, 0, 0, 0, 0, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xF3, 0, 0, 0, 17, 0, 0, 0);
+    EXPECT_ERROR(0x24);
+}
+
+void test_bytes_that_wait_are_forgotten_with_the_session(void)
+{
+    const float value = 7.25F;
+    ready();
+    master_download(xcp_address(working), &value, 2);
+    EXPECT(0xFF);
+    ready();
+    master_download(xcp_address(working) + 2, (const uint8_t *)&value + 2, 2);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+}

@@ -1,0 +1,289 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <string.h>
+
+#include "unity.h"
+#include "xcp_master.h"
+
+static can_frame_t dto;
+
+void setUp(void)
+{
+    master_reset();
+    master_connect();
+}
+
+void tearDown(void)
+{
+}
+
+static void event(void)
+{
+    xcp_daq_event(&slave.daq, &slave_config.memory);
+}
+
+static bool next(void)
+{
+    if (!xcp_daq_next(&slave.daq, &dto)) {
+        return false;
+    }
+    xcp_daq_sent(&slave.daq);
+    return true;
+}
+
+/* One list of one frame: two bytes of measured[1], one of measured[9]. */
+static void one_list(uint8_t event_number, uint8_t prescaler, uint8_t mode)
+{
+    SEND(0xD6);
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 1);
+    SEND(0xD3, 0, 0, 0, 0, 2);
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    SEND(0xE1, 0xFF, 2, 0, AT(&measured[1]));
+    EXPECT(0xFF);
+    SEND(0xE1, 0xFF, 1, 0, AT(&measured[9]));
+    EXPECT(0xFF);
+    SEND(0xE0, mode, 0, 0, event_number, 0, prescaler, 0);
+    EXPECT(0xFF);
+}
+
+static void start(void)
+{
+    SEND(0xDE, 2, 0, 0);
+    EXPECT(0xFF, 0);
+    SEND(0xDD, 1);
+    EXPECT(0xFF);
+}
+
+void test_a_running_list_sends_its_bytes_each_millisecond(void)
+{
+    one_list(0, 1, 0x10);
+    event();
+    TEST_ASSERT_FALSE(next());
+    start();
+    for (uint16_t ms = 2; ms < 400; ms++) {
+        measured[1] = (uint8_t)ms;
+        event();
+        TEST_ASSERT_TRUE(next());
+        const uint8_t expected[6] = {0, (uint8_t)ms, (uint8_t)(ms >> 8), (uint8_t)ms, 0xA2, 0xA9};
+        TEST_ASSERT_EQUAL_UINT8(6, dto.length);
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(expected, dto.data, 6);
+        TEST_ASSERT_FALSE(next());
+    }
+}
+
+void test_the_slow_raster_comes_every_tenth_millisecond_and_the_prescaler_thins_it(void)
+{
+    const struct {
+        uint8_t event, prescaler;
+        int frames;
+    } cases[] = {{0, 1, 120}, {0, 5, 24}, {1, 1, 12}, {1, 3, 4}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        one_list(cases[k].event, cases[k].prescaler, 0);
+        start();
+        int frames = 0;
+        for (int ms = 0; ms < 120; ms++) {
+            event();
+            frames += next() ? 1 : 0;
+        }
+        TEST_ASSERT_EQUAL_INT(cases[k].frames, frames);
+    }
+}
+
+void test_stopping_selected_lists_or_all_of_them_ends_the_stream(void)
+{
+    for (uint8_t mode = 0; mode <= 2; mode += 2) {
+        one_list(0, 1, 0);
+        start();
+        SEND(0xFD);
+        EXPECT(0xFF, 0x40);
+        SEND(0xDE, 2, 0, 0);
+        SEND(0xDD, mode);
+        EXPECT(0xFF);
+        event();
+        TEST_ASSERT_FALSE(next());
+        SEND(0xFD);
+        EXPECT(0xFF, 0x00);
+    }
+}
+
+void test_a_list_that_does_not_fit_is_dropped_whole_and_announced(void)
+{
+    one_list(0, 1, 0);
+    start();
+    for (int ms = 0; ms < 200; ms++) {
+        event();
+    }
+    int frames = 0;
+    int events = 0;
+    while (next()) {
+        events += dto.data[0] == 0xFD;
+        frames += dto.data[0] == 0;
+    }
+    TEST_ASSERT_EQUAL_INT(XCP_DAQ_QUEUE - 1, frames);
+    TEST_ASSERT_EQUAL_INT(1, events);
+    TEST_ASSERT_EQUAL_UINT32(200 - (XCP_DAQ_QUEUE - 1), slave.daq.overloads);
+    event();
+    TEST_ASSERT_TRUE(next());
+    TEST_ASSERT_EQUAL_HEX8(0, dto.data[0]);
+}
+
+void test_allocation_has_its_order_and_its_limits(void)
+{
+    SEND(0xD4, 0, 0, 0, 1);
+    EXPECT_ERROR(0x29);
+    SEND(0xD3, 0, 0, 0, 0, 1);
+    EXPECT_ERROR(0x29);
+    SEND(0xD5, 0, XCP_DAQ_LISTS + 1, 0);
+    EXPECT_ERROR(0x30);
+    SEND(0xD5, 0, 2, 0);
+    EXPECT(0xFF);
+    SEND(0xD5, 0, 2, 0);
+    EXPECT_ERROR(0x29);
+    SEND(0xD4, 0, 2, 0, 1);
+    EXPECT_ERROR(0x22);
+    SEND(0xD4, 0, 0, 0, XCP_DAQ_ODTS + 1);
+    EXPECT_ERROR(0x30);
+    SEND(0xD4, 0, 0, 0, XCP_DAQ_ODTS);
+    EXPECT(0xFF);
+    SEND(0xD4, 0, 1, 0, 1);
+    EXPECT_ERROR(0x30);
+    SEND(0xD3, 0, 0, 0, 0, 8);
+    EXPECT_ERROR(0x30);
+    SEND(0xD3, 0, 0, 0, XCP_DAQ_ODTS, 1);
+    EXPECT_ERROR(0x22);
+}
+
+void test_more_entries_than_the_pool_has_are_refused(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, XCP_DAQ_ODTS);
+    int granted = 0;
+    for (uint8_t odt = 0; odt < XCP_DAQ_ODTS; odt++) {
+        SEND(0xD3, 0, 0, 0, odt, 7);
+        granted += (last_answer.data[0] == 0xFF) ? 7 : 0;
+    }
+    TEST_ASSERT_EQUAL_INT(XCP_DAQ_ENTRIES / 7 * 7, granted);
+}
+
+void test_a_list_with_a_hole_or_an_overfull_frame_does_not_start(void)
+{
+    SEND(0xD6);
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 1);
+    SEND(0xD3, 0, 0, 0, 0, 2);
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    SEND(0xE1, 0xFF, 4, 0, AT(measured));
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+    SEND(0xE1, 0xFF, 4, 0, AT(measured));
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+}
+
+void test_the_time_stamp_counts_against_the_frame(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 1);
+    SEND(0xD3, 0, 0, 0, 0, 1);
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    SEND(0xE1, 0xFF, 6, 0, AT(measured));
+    SEND(0xE0, 0x10, 0, 0, 0, 0, 1, 0);
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+    SEND(0xE0, 0x00, 0, 0, 0, 0, 1, 0);
+    SEND(0xDE, 1, 0, 0);
+    EXPECT(0xFF, 0);
+}
+
+void test_an_entry_reads_only_what_may_be_read(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 1);
+    SEND(0xD3, 0, 0, 0, 0, 1);
+    SEND(0xE1, 0xFF, 1, 0, AT(measured));
+    EXPECT_ERROR(0x29); /* no pointer yet */
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    SEND(0xE1, 0xFF, 1, 0, AT(&slave));
+    EXPECT_ERROR(0x24);
+    SEND(0xE1, 0x03, 1, 0, AT(measured));
+    EXPECT_ERROR(0x22);
+    SEND(0xE1, 0xFF, 8, 0, AT(measured));
+    EXPECT_ERROR(0x22);
+    SEND(0xE1, 0xFF, 1, 0, AT(measured));
+    EXPECT(0xFF);
+    SEND(0xE1, 0xFF, 1, 0, AT(measured));
+    EXPECT_ERROR(0x29); /* behind the last entry */
+}
+
+void test_a_running_list_cannot_be_changed(void)
+{
+    one_list(0, 1, 0);
+    start();
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    EXPECT_ERROR(0x11);
+    SEND(0xE0, 0, 0, 0, 0, 0, 1, 0);
+    EXPECT_ERROR(0x11);
+}
+
+void test_numbers_that_do_not_exist_are_refused(void)
+{
+    one_list(0, 1, 0);
+    SEND(0xE2, 0, 1, 0, 0, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE0, 0, 0, 0, XCP_DAQ_EVENTS, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE0, 0, 0, 0, 0, 0, 0, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE0, 0x02, 0, 0, 0, 0, 1, 0);
+    EXPECT_ERROR(0x27);
+    SEND(0xDE, 1, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xDE, 3, 0, 0);
+    EXPECT_ERROR(0x27);
+    SEND(0xDD, 3);
+    EXPECT_ERROR(0x27);
+    SEND(0xD7, 0, XCP_DAQ_EVENTS, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xDF, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE3, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+}
+
+void test_a_cleared_list_is_stopped_and_must_be_written_anew(void)
+{
+    one_list(0, 1, 0x10);
+    start();
+    SEND(0xDF, 0, 0, 0);
+    EXPECT(0xFF, 0x50, 0, 0, 0, 0, 1);
+    SEND(0xE3, 0, 0, 0);
+    EXPECT(0xFF);
+    event();
+    TEST_ASSERT_FALSE(next());
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+}
+
+void test_the_slave_describes_its_lists_clock_and_events(void)
+{
+    SEND(0xDA);
+    EXPECT(0xFF, 0x93, XCP_DAQ_LISTS, 0, XCP_DAQ_EVENTS, 0, 0, 0);
+    SEND(0xD9);
+    EXPECT(0xFF, 1, 7, 1, 0, 0x62, 1, 0);
+    event();
+    SEND(0xDC);
+    EXPECT(0xFF, 0, 0, 0, 1, 0, 0, 0);
+    SEND(0xD7, 0, 1, 0);
+    EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 10, 6, 0);
+}
+
+void test_the_end_of_the_session_ends_measuring(void)
+{
+    one_list(0, 1, 0);
+    start();
+    event();
+    SEND(0xFE);
+    TEST_ASSERT_FALSE(next());
+    event();
+    TEST_ASSERT_FALSE(next());
+}

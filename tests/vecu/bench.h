@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef VECU_BENCH_H
+#define VECU_BENCH_H
+/** The bench channel: what a test stand does that is not on CAN. One command per line, one answer per command:
+ *   hello                             who we are
+ *   names                             every name of the board, the plant and its truth
+ *   set <name> <value> [...]          "plant." and "board.": parameters and faults, from the next period on
+ *   get <name> [...]
+ *   ramp <name> <value> <n> <unit>    linearly during the runs to come
+ *   record <periods> <name> [...]     during a run one line "row <value> ..." each so many periods; "record off"
+ *   run <n> <unit> [<port> <count>]   lets time pass; before it, waits until the CAN client with this port has been heard
+ *                                     with so many frames. Answers time in ns and the frames sent to that client so far
+ *   hash                              of all duties and gate states since the last time it was asked for
+ *   counters                          of bus, hub and bench
+ *   reset [<seed>]                    power cycle of ECU and plant
+ *   units: periods, us, ms, s. Answers: "ok ..." or "error <why>"
+ * Source   docs/howto/bench.md
+ * Errors   a refused command changes nothing and is counted
+ * Context  simulation only; several clients, one run at a time: during it the others wait */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "line_server.h"
+#include "vecu.h"
+
+typedef struct bench bench_t;
+
+bench_t *bench_create(uint16_t port, vecu_t *vecu, bool realtime, char *why, size_t size);
+void bench_destroy(bench_t *bench);
+line_server_t *bench_server(bench_t *bench);
+
+/** Carries out what the clients ask for, up to the next run. */
+void bench_service(bench_t *bench);
+/** Lets one period pass if a run is under way, or `anyway`; false: time stands still. */
+bool bench_step(bench_t *bench, bool anyway);
+
+#endif

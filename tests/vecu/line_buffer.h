@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef VECU_LINE_BUFFER_H
+#define VECU_LINE_BUFFER_H
+/** Finds the texts in a stream of bytes: lines, or words between '<' and '>'.
+ * Range    texts of up to LINE_LENGTH characters
+ * Errors   a text that is too long, has a NUL in it, or is interrupted by another '<', and whatever stands between '>' and
+ *          '<' but white space, is dropped and counted
+ * Context  simulation only; pure: the caller reads into bytes[end], line_buffer_room() bytes at most, and advances end */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { LINE_LENGTH = 1023, LINE_BUFFER_SIZE = 4 * (LINE_LENGTH + 1) };
+
+typedef enum { LINE_BY_NEWLINE, LINE_IN_BRACKETS } line_framing_t;
+
+typedef struct {
+    line_framing_t framing;
+    bool skipping; /* the rest of a line that was too long */
+    size_t begin, end;
+    uint64_t dropped;
+    char bytes[LINE_BUFFER_SIZE];
+} line_buffer_t;
+
+/** Moves what is left to the front; bytes that fit behind it. */
+size_t line_buffer_room(line_buffer_t *b);
+/** The next text, without its frame, NUL-terminated; false: none is complete. */
+bool line_buffer_next(line_buffer_t *b, char text[LINE_LENGTH + 1]);
+bool line_buffer_empty(const line_buffer_t *b);
+
+#endif

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "vecu.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "hal/host/can_host.h"
+#include "hal/host/instance.h"
+#include "machine_data.h"
+
+#define DC_LINK_EMPTY_V 1.0 /* the machine model wants a voltage */
+#define FNV_START 14695981039346656037ULL
+#define FNV_PRIME 1099511628211ULL
+
+/* Not on the heap: in a program at a fixed address a calibration tool finds it where the ELF file says, by this name. */
+static fluxtrue_t ecu;
+
+static const char *plant_set_up(sim_t *sim, uint64_t seed)
+{
+    const machine_data_t *m = &machine_data;
+    for (const machine_value_t *v = m->values; v->name != NULL; v++) {
+        if (sim_set(sim, v->name, v->value) != SIM_OK) {
+            return v->name;
+        }
+    }
+    if (sim_set(sim, "plant.seed", (double)seed) != SIM_OK) {
+        return "plant.seed";
+    }
+    if (m->nd > 0 && sim_map(sim, m->id_A, m->nd, m->iq_A, m->nq, m->psi_d_Vs, m->psi_q_Vs) != SIM_OK) {
+        return "flux map";
+    }
+    return sim_start(sim);
+}
+
+const char *vecu_reset(vecu_t *vecu, uint64_t seed)
+{
+    sim_destroy(vecu->sim);
+    fluxtrue_init(&ecu);
+    can_host_attach(&ecu);
+    vecu->sim = sim_create_around(&ecu);
+    if (vecu->sim == NULL) {
+        return "out of memory";
+    }
+    const char *bad = plant_set_up(vecu->sim, seed);
+    if (bad == NULL) {
+        stand_default(&vecu->stand, sim_get(vecu->sim, "plant.vdc_V"));
+        (void)sim_set(vecu->sim, "plant.vdc_V", DC_LINK_EMPTY_V);
+        vecu->period_ns = (uint64_t)llround(1e9 / sim_get(vecu->sim, "plant.pwm_hz"));
+        vecu->seed = seed;
+        vecu->duty_hash = FNV_START;
+        vecu->resets++;
+    }
+    return bad;
+}
+
+void vecu_destroy(vecu_t *vecu)
+{
+    sim_destroy(vecu->sim);
+    vecu->sim = NULL;
+}
+
+static void hash_word(vecu_t *vecu, uint32_t word)
+{
+    for (int i = 0; i < 4; i++) {
+        vecu->duty_hash = (vecu->duty_hash ^ (word >> (8 * i) & 0xFFU)) * FNV_PRIME;
+    }
+}
+
+/* The switches as the last task has set them, and the lines it will read. */
+static void stand_step(vecu_t *vecu)
+{
+    const bool *on = ecu.board.output;
+    const dc_link_switches_t switches = {on[BOARD_PRECHARGE], on[BOARD_MAIN_CONTACTOR], on[BOARD_DISCHARGE]};
+    const double v_V = dc_link_step(&vecu->stand.dc, switches, sim_get(vecu->sim, "plant.vdc_V"),
+                                    sim_get(vecu->sim, "truth.idc_A"), 1e-9 * (double)vecu->period_ns);
+    (void)sim_set(vecu->sim, "plant.vdc_V", v_V);
+    ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
+    ecu.board.inverter_C = vecu->stand.inverter_C;
+}
+
+static void exchange_in(vecu_t *vecu)
+{
+    can_frame_t frame;
+    hub_run(vecu->hub, vecu->now_ns);
+    while (hub_receive(vecu->hub, &frame)) {
+        (void)can_host_put(&ecu, &frame);
+    }
+}
+
+static void exchange_out(vecu_t *vecu)
+{
+    can_frame_t frame;
+    while (hub_has_room(vecu->hub) && can_host_take(&ecu, &frame)) {
+        (void)hub_send(vecu->hub, &frame, vecu->now_ns);
+    }
+}
+
+bool vecu_step(vecu_t *vecu, double *row)
+{
+    exchange_in(vecu);
+    stand_step(vecu);
+    const bool written = sim_run(vecu->sim, 1, row, 1) > 0;
+    vecu->now_ns += vecu->period_ns;
+    hash_word(vecu, ecu.duty.a | (uint32_t)ecu.duty.b << 16);
+    hash_word(vecu, ecu.duty.c | (ecu.gates ? 1U << 16 : 0U));
+    exchange_out(vecu);
+    return written;
+}
+
+bool vecu_set(vecu_t *vecu, const char *name, double value)
+{
+    if (strncmp(name, "board.", 6) == 0) {
+        return stand_set(&vecu->stand, name, value);
+    }
+    return strncmp(name, "plant.", 6) == 0 && sim_set(vecu->sim, name, value) == SIM_OK;
+}
+
+double vecu_get(const vecu_t *vecu, const char *name)
+{
+    return strncmp(name, "board.", 6) == 0 ? stand_get(&vecu->stand, name) : sim_get(vecu->sim, name);
+}
+
+uint64_t vecu_take_hash(vecu_t *vecu)
+{
+    const uint64_t hash = vecu->duty_hash;
+    vecu->duty_hash = FNV_START;
+    return hash;
+}

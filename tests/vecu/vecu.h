@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef VECU_VECU_H
+#define VECU_VECU_H
+/** The virtual ECU: application and plant in one process, period by period, with the ECU's CAN channel on a hub.
+ *   each period: frames that have passed by are received, the firmware computes, the plant advances, frames are sent
+ * Source   docs/howto/bench.md
+ * Units    ns of simulated time since the program's start; a reset does not turn it back
+ * Errors   vecu_reset() answers the name of what is wrong with the machine data, else NULL
+ * Context  simulation only; one instance, because the calibration tools want its state at a fixed address */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "hub.h"
+#include "loop/runner/sim.h"
+#include "stand.h"
+
+typedef struct {
+    hub_t *hub;
+    sim_t *sim;
+    stand_t stand;
+    uint64_t now_ns, period_ns;
+    uint64_t seed;
+    uint64_t duty_hash;    /* FNV-1a of every duty and gate state since the hash was last asked for */
+    uint64_t resets;
+} vecu_t;
+
+/** A power cycle of ECU and plant: everything as at the start, with the plant's random numbers from `seed`. */
+const char *vecu_reset(vecu_t *vecu, uint64_t seed);
+void vecu_destroy(vecu_t *vecu);
+/** One PWM period; answers whether `row` (SIM_API sim_record) has been written. */
+bool vecu_step(vecu_t *vecu, double *row);
+/** Everything that has a name: "plant.", "truth.", "board.", and the firmware's (to be read only: on a bench the ECU is asked
+ * over CAN). False and NaN: unknown, read only or out of range. */
+bool vecu_set(vecu_t *vecu, const char *name, double value);
+double vecu_get(const vecu_t *vecu, const char *name);
+/** The hash, which starts anew. */
+uint64_t vecu_take_hash(vecu_t *vecu);
+
+#endif

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an ELF file of the firmware says about its calibration values and measurements.
+
+The source lists them once (firmware/app/calibration_list.h, measurement_list.h); firmware/app/a2l.c
+puts the lists, with offsets, into a section that is never loaded.
+"""
+
+import re
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from elftools.common.exceptions import ELFError
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from fluxtrue_tools.errors import FluxtrueError
+
+SECTION = ".a2l"
+OBJECT = "ecu"
+MOTOR = "motor"
+# kind, name, text, unit, type, base, lo, hi, offset: a2l_record_t.
+RECORD = struct.Struct("<8s40s80s12s8s12sffI")
+ADDRESS_MAX = 0xFFFFFFFF
+Q15_ONE = 32768.0
+
+
+@dataclass(frozen=True)
+class Value:
+    """One calibratable value or one measurement."""
+
+    name: str
+    text: str
+    unit: str
+    type: str
+    base: str
+    lo: float
+    hi: float
+    address: int
+
+
+@dataclass(frozen=True)
+class Base:
+    """What 2^15 stands for in a per-unit measurement."""
+
+    name: str
+    unit: str
+    full: float
+
+    @property
+    def factor(self) -> float:
+        """Physical value of one step."""
+        return self.full / Q15_ONE
+
+
+@dataclass(frozen=True)
+class Description:
+    """Everything the description file is made from."""
+
+    machine: str
+    values: tuple[Value, ...]
+    measurements: tuple[Value, ...]
+    bases: tuple[Base, ...]
+
+
+def _text(raw: bytes) -> str:
+    return raw.split(b"\0", 1)[0].decode("ascii")
+
+
+def _symbol(elf: ELFFile, path: Path, name: str) -> int:
+    for section in elf.iter_sections():
+        if isinstance(section, SymbolTableSection):
+            for symbol in section.get_symbol_by_name(name) or ():
+                if symbol["st_shndx"] != "SHN_UNDEF":
+                    return int(symbol["st_value"])
+    raise FluxtrueError(f"{path}: no symbol '{name}': not a firmware that serves XCP")
+
+
+def _bytes_at(elf: ELFFile, path: Path, address: int, size: int) -> bytes:
+    for segment in elf.iter_segments("PT_LOAD"):
+        start, length = segment["p_vaddr"], segment["p_filesz"]
+        if start <= address and address + size <= start + length:
+            offset = address - start
+            return bytes(segment.data()[offset : offset + size])
+    raise FluxtrueError(f"{path}: nothing is stored at address {address:#x}")
+
+
+def _records(elf: ELFFile, path: Path) -> list[tuple[str, Value, int]]:
+    section = elf.get_section_by_name(SECTION)
+    if section is None:
+        raise FluxtrueError(f"{path}: no section '{SECTION}': not a firmware that serves XCP")
+    data = bytes(section.data())
+    if len(data) % RECORD.size:
+        raise FluxtrueError(f"{path}: section '{SECTION}' has {len(data)} bytes, "
+                            f"allowed: a multiple of {RECORD.size}")  # fmt: skip
+    records = []
+    for kind, name, text, unit, type_, base, lo, hi, offset in RECORD.iter_unpack(data):
+        value = Value(_text(name), _text(text), _text(unit), _text(type_), _text(base), lo, hi, 0)
+        records.append((_text(kind), value, offset))
+    return records
+
+
+def _unit_of(name: str, unit: str) -> str:
+    """A measurement's name ends in its unit."""
+    match = re.search(r"_(A|V|Nm|Vs|rpm|ohm|C|Hz|W|ms)$", name)
+    return unit or (match.group(1) if match else "")
+
+
+def _placed(value: Value, path: Path, address: int, base: Base | None) -> Value:
+    if not 0 < address <= ADDRESS_MAX:
+        raise FluxtrueError(f"{path}: '{value.name}' lies at {address:#x}, allowed: 32-bit addresses "
+                            "(link at a fixed address)")  # fmt: skip
+    lo, hi = value.lo, value.hi
+    if base is not None:
+        lo, hi = -base.full, base.full * (1.0 - 1.0 / Q15_ONE)
+    elif lo == hi == 0.0:
+        lo, hi = {"U32": (0.0, 4294967295.0), "U8": (0.0, 255.0)}.get(value.type, (-3.4e38, 3.4e38))
+    unit = _unit_of(value.name, value.unit)
+    return Value(value.name, value.text, unit, value.type, value.base, lo, hi, address)
+
+
+def read(path: Path) -> Description:
+    """Description of the firmware in an ELF file."""
+    try:
+        with path.open("rb") as stream:
+            return _describe(ELFFile(stream), path)
+    except OSError as error:
+        raise FluxtrueError(f"{path}: {error.strerror}") from error
+    except (ELFError, UnicodeDecodeError) as error:
+        raise FluxtrueError(f"{path}: not an ELF file of the firmware ({error})") from error
+
+
+def _describe(elf: ELFFile, path: Path) -> Description:
+    records = _records(elf, path)
+    ecu, motor = _symbol(elf, path, OBJECT), _symbol(elf, path, MOTOR)
+    bases = {"ONE": Base("ONE", "", 1.0)}
+    for kind, value, offset in records:
+        if kind == "base":
+            (full,) = struct.unpack("<f", _bytes_at(elf, path, motor + offset, 4))
+            bases[value.name] = Base(value.name, value.unit, full)
+    placed = {
+        wanted: tuple(
+            _placed(value, path, ecu + offset, bases.get(value.base))
+            for kind, value, offset in records if kind == wanted
+        )
+        for wanted in ("value", "measure")
+    }  # fmt: skip
+    return Description("fluxtrue", placed["value"], placed["measure"], tuple(bases.values()))

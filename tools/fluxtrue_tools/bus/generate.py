@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""C from the DBC: cantools' pack and unpack, and on top what it leaves out.
+
+cantools writes bus.[ch]; its encoder neither saturates nor looks for NaN. signals.h adds for every
+signal the node sends a function that clamps to the DBC's range and refuses what is no number, for
+every message it receives the check of all ranges, and the cycle times, time-outs and data ids that
+the DBC holds as attributes. exports.c makes all of it callable from the tests.
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import cantools
+import click
+from cantools.database.can import Database, Message
+from cantools.database.can.c_source import camel_to_snake_case
+from cantools.database.can.signal import Signal
+
+from fluxtrue_tools.errors import FluxtrueError
+
+PREFIX = "bus"
+
+
+def snake(name: str) -> str:
+    """The name cantools gives a message or signal in C."""
+    return str(camel_to_snake_case(name))
+
+
+def attribute(message: Message, name: str) -> int:
+    """An integer attribute of the message, 0 if the DBC does not set it."""
+    found = message.dbc.attributes.get(name) if message.dbc else None
+    return int(found.value) if found else 0
+
+
+def is_count(signal: Signal) -> bool:
+    """A signal without scale and unit is a number of things: it never becomes a float."""
+    return signal.scale == 1 and signal.offset == 0 and not signal.unit
+
+
+def limits(signal: Signal) -> tuple[float, float]:
+    """Smallest and largest value."""
+    if signal.minimum is None or signal.maximum is None:
+        raise FluxtrueError(f"signal {signal.name}: the DBC must give a range [min|max]")
+    return float(signal.minimum), float(signal.maximum)
+
+
+def put(message: Message, signal: Signal) -> str:
+    """The function that writes one signal, clamped."""
+    struct, name = f"{PREFIX}_{snake(message.name)}", snake(signal.name)
+    low, high = limits(signal)
+    head = f"(struct {struct}_t *m, "
+    if is_count(signal):
+        kind = "int32_t" if signal.is_signed else "uint32_t"
+        suffix = "" if signal.is_signed else "U"
+        tests = [f"(x > {int(high)}{suffix}) ? {int(high)}{suffix} : "] if high < 2**32 - 1 else []
+        tests += [f"(x < {int(low)}{suffix}) ? {int(low)}{suffix} : "] if low != 0 or signal.is_signed else []
+        return (f"static inline void {struct}_put_{name}{head}{kind} x)\n{{\n"
+                f"    m->{name} = (__typeof__(m->{name}))({''.join(tests)}x);\n}}\n")  # fmt: skip
+    return (f"static inline bool {struct}_put_{name}{head}float x)\n{{\n"
+            f"    if (!isfinite(x)) {{\n        return false;\n    }}\n"
+            f"    m->{name} = {struct}_{name}_encode((x < {low!r}F) ? {low!r}F : (x > {high!r}F) ? {high!r}F : x);\n"
+            f"    return true;\n}}\n")  # fmt: skip
+
+
+def in_range(message: Message) -> str:
+    """The function that checks every signal of a received message."""
+    struct = f"{PREFIX}_{snake(message.name)}"
+    tests = " &&\n           ".join(
+        f"{struct}_{snake(signal.name)}_is_in_range(m->{snake(signal.name)})" for signal in message.signals)
+    return f"static inline bool {struct}_in_range(const struct {struct}_t *m)\n{{\n    return {tests};\n}}\n"
+
+
+def constants(message: Message) -> str:
+    """What the DBC says about a message beside its signals."""
+    name = f"{PREFIX}_{snake(message.name)}".upper()
+    return "".join(f"#define {name}_{key} {attribute(message, value)}U\n" for key, value in (
+        ("CYCLE_MS", "GenMsgCycleTime"), ("TIME_OUT_MS", "TimeOut"), ("DATA_ID", "E2EDataId")))  # fmt: skip
+
+
+def x_macro(name: str, messages: list[Message]) -> str:
+    """A list of messages to expand: X(lower-case name, upper-case name)."""
+    rows = "".join(f" \\\n    X({snake(message.name)}, {snake(message.name).upper()})" for message in messages)
+    return f"#define {name}(X){rows}\n"
+
+
+def signals_header(sent: list[Message], received: list[Message]) -> str:
+    """The text of signals.h."""
+    parts = ["/* Generated from the DBC by fluxtrue_tools.bus.generate. */\n#ifndef BUS_SIGNALS_H\n"
+             "#define BUS_SIGNALS_H\n#include <math.h>\n\n#include \"bus/bus.h\"\n"]  # fmt: skip
+    parts += [constants(message) for message in (*sent, *received)]
+    protected = [message for message in (*sent, *received) if attribute(message, "E2EDataId")]
+    parts += [x_macro("BUS_SENT", sent), x_macro("BUS_PROTECTED", protected)]
+    parts += [put(message, signal) for message in sent for signal in message.signals]
+    parts += [in_range(message) for message in received]
+    return "\n".join([*parts, "#endif\n"])
+
+
+def exports(sent: list[Message], received: list[Message]) -> Iterator[str]:
+    """exports.c: test_<message>(values, data) packs or unpacks all signals in the DBC's order."""
+    yield '/* Generated for the tests. */\n#include "bus/signals.h"\n#include <stdint.h>\n'
+    yield '#define API __attribute__((visibility("default")))\n'
+    for message in sent:
+        struct = f"{PREFIX}_{snake(message.name)}"
+        yield f"API int test_{snake(message.name)}(const double *v, uint8_t *data);\n"
+        yield f"int test_{snake(message.name)}(const double *v, uint8_t *data)\n{{\n    int taken = 0;\n"
+        yield f"    struct {struct}_t m = {{0}};\n"
+        for index, signal in enumerate(message.signals):
+            call = f"{struct}_put_{snake(signal.name)}(&m, "
+            kind = "int32_t" if signal.is_signed else "uint32_t"
+            yield (f"    {call}({kind})v[{index}]);\n    taken++;\n" if is_count(signal)
+                   else f"    taken += {call}(float)v[{index}]);\n")  # fmt: skip
+        yield f"    {struct}_pack(data, &m, 8);\n    return taken;\n}}\n"
+    for message in received:
+        struct = f"{PREFIX}_{snake(message.name)}"
+        yield f"API int test_{snake(message.name)}(double *v, const uint8_t *data);\n"
+        yield f"int test_{snake(message.name)}(double *v, const uint8_t *data)\n{{\n    struct {struct}_t m;\n"
+        yield f"    {struct}_unpack(&m, data, 8);\n"
+        for index, signal in enumerate(message.signals):
+            yield f"    v[{index}] = (double){struct}_{snake(signal.name)}_decode(m.{snake(signal.name)});\n"
+        yield f"    return {struct}_in_range(&m);\n}}\n"
+
+
+def generate(dbc: Path, out: Path, node: str) -> None:
+    """Writes bus.[ch], signals.h and exports.c to out/bus."""
+    database = cantools.database.load_file(dbc)
+    if not isinstance(database, Database) or node not in [entry.name for entry in database.nodes]:
+        raise FluxtrueError(f"{dbc}: no CAN database with a node '{node}'")
+    folder = out / PREFIX
+    folder.mkdir(parents=True, exist_ok=True)
+    subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--use-float", "--use-round",
+                    "--node", node, "--database-name", PREFIX, "--output-directory", str(folder), str(dbc)],
+                   check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+    sent = [message for message in database.messages if node in message.senders]
+    received = [message for message in database.messages if node in message.receivers]
+    (folder / "signals.h").write_text(signals_header(sent, received), encoding="utf-8")
+    (folder / "exports.c").write_text("".join(exports(sent, received)), encoding="utf-8")
+
+
+@click.command()
+@click.argument("dbc", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.option("--node", default="INV", show_default=True, help="The node the code is for.")
+def main(dbc: Path, out: Path, node: str) -> None:
+    """Write the C code of NODE for the messages of DBC to OUT."""
+    generate(dbc, out, node)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Voltage and torque of a perturbed drive over what its controller measures, docs/theory/information-bound.md.
+
+Units    SI; complex numbers d + jq in the controller's frame; amplitude-invariant
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.campaign.machine import Machine
+from fluxtrue_tools.campaign.sample import Sample
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STATES: Final = ("resistance", "magnet", "lq", "ld_slope", "cross", "dead_time", "device_drop", "vdc_gain",
+                 "current_gain", "angle", "iron")  # fmt: skip
+"""Everything uncertain that acts on means over whole turns; factors, but the drop in V and the angle in rad."""
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Constants of the model."""
+
+    machine: Machine
+    iron_k_h: float
+    iron_k_e: float
+    dead_V: float  # nominal loss of a leg to dead time
+    r_ohm: float  # at the reported temperature
+
+    def split(self, x: Array) -> dict[str, float]:
+        """The state vector by name."""
+        return dict(zip(STATES, x, strict=True))
+
+    def _flux(self, s: dict[str, float], i: Complex) -> Complex:
+        model, i_d, i_q = self.machine.model, i.real, i.imag
+        psi_f, axis = model.psi_d(0.0, 0.0), model.psi_d(0.0, i_q)
+        psi_d = s["magnet"] * psi_f + s["cross"] * (axis - psi_f) + s["ld_slope"] * (model.psi_d(i_d, i_q) - axis)
+        return np.asarray(psi_d + 1j * s["lq"] * model.psi_q(i_d, i_q))
+
+    def _inside(self, s: dict[str, float], i_seen: Complex, omega: Array) -> tuple[Complex, Complex, Complex]:
+        """True current (IB-1), magnetising current (IB-2) and flux."""
+        i = i_seen / s["current_gain"] * np.exp(1j * s["angle"])
+        per_flux = s["iron"] * (self.iron_k_h * np.sign(omega) + self.iron_k_e * omega) / 1.5
+        i_m = i
+        for _ in range(3):  # the iron-loss current is some percent: three steps leave 1e-6 of it
+            i_m = i - 1j * per_flux * self._flux(s, i_m)
+        return i, i_m, self._flux(s, i_m)
+
+    def voltage(self, x: Array, i_seen: Complex, omega: Array) -> Complex:
+        """(IB-3): what the controller has to command, in its frame, for the currents it sees."""
+        s = self.split(x)
+        i, _, psi = self._inside(s, i_seen, omega)
+        lost = 4.0 / np.pi * (s["dead_time"] * self.dead_V + s["device_drop"])
+        u = s["resistance"] * self.r_ohm * i + 1j * omega * psi + lost * i / np.maximum(np.abs(i), 1e-9)
+        return np.asarray(s["vdc_gain"] * u * np.exp(-1j * s["angle"]))
+
+    def torque(self, x: Array, i_seen: Complex, omega: Array) -> Array:
+        """(IB-4): air-gap torque at the currents the controller sees."""
+        _, i_m, psi = self._inside(self.split(x), i_seen, omega)
+        return np.asarray(1.5 * self.machine.pole_pairs * (np.conj(psi) * i_m).imag)
+
+    def seen(self, x: Array, i_true: Complex) -> Complex:
+        """(IB-1) the other way round."""
+        s = self.split(x)
+        return np.asarray(i_true * s["current_gain"] * np.exp(-1j * s["angle"]))
+
+
+def physics_of(machine: Machine, drawn: Sample) -> Physics:
+    """Nominal constants; the resistance is the one that the reported temperature promises."""
+    plant = machine.motor.plant
+    told = machine.motor.r_ohm * (1.0 + machine.r_temp_coeff_per_K * (drawn.plant["winding_C"] - 20.0))
+    dead = machine.vdc_V * plant["dead_time_s"] * plant["pwm_hz"]
+    return Physics(machine, machine.nominal.iron_k_h, machine.nominal.iron_k_e, dead, told)
+
+
+def truth_of(machine: Machine, drawn: Sample) -> Array:
+    """The plant's own state vector."""
+    f = drawn.factors
+    r_told = machine.motor.r_ohm * (1.0 + machine.r_temp_coeff_per_K * (drawn.plant["winding_C"] - 20.0))
+    gain = float(np.mean([f[f"current_gain_{phase}"] for phase in "abc"]))
+    return np.array([
+        machine.motor.r_ohm * f["resistance_scale"] / r_told, f["magnet_scale"], f["lq_scale"], f["ld_slope_scale"],
+        f["cross_saturation_scale"], f["dead_time_scale"], drawn.plant["device_drop_V"], f["vdc_gain"], gain,
+        np.radians(f["angle_offset_deg"]), f["iron_loss_scale"],
+    ])  # fmt: skip

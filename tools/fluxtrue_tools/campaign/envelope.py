@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The largest torque that a plant can give at a speed, and that the firmware allows: decided before anything is run.
+
+Source   the steady-state voltage equations over the nominal map with the plant's own scales (docs/howto/campaign.md)
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.campaign.machine import Machine
+from fluxtrue_tools.motor.derived import V_RATIO_REFERENCE
+
+Array = NDArray[np.float64]
+NODES: Final = 121
+SPEEDS: Final = 41
+MARGIN: Final = 0.97  # of what the plant can give: a controller needs room to correct
+NOTHING_WRONG: Final = {"magnet_scale": 1.0, "lq_scale": 1.0, "ld_slope_scale": 1.0, "cross_saturation_scale": 1.0,
+                        "resistance_scale": 1.0}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Reachable torque over speed."""
+
+    speed_rpm: Array
+    torque_Nm: Array
+
+    def at(self, speed_rpm: float) -> float:
+        """Largest torque at a speed of either direction."""
+        return float(np.interp(abs(speed_rpm), self.speed_rpm, self.torque_Nm))
+
+
+def _largest(machine: Machine, factors: dict[str, float], omega: Array) -> Array:
+    """Largest torque of one plant at every speed, within the current circle and the voltage circle."""
+    i = np.linspace(0.0, machine.i_max_A, NODES)
+    i_d, i_q = (x[np.hypot(*np.meshgrid(i, i)) <= machine.i_max_A] for x in np.meshgrid(-i, i, indexing="ij"))
+    psi_f, axis = machine.model.psi_d(0.0, 0.0), machine.model.psi_d(0.0, i_q)
+    psi_d = (factors["magnet_scale"] * psi_f + factors["cross_saturation_scale"] * (axis - psi_f)
+             + factors["ld_slope_scale"] * (machine.model.psi_d(i_d, i_q) - axis))  # fmt: skip
+    psi_q = factors["lq_scale"] * machine.model.psi_q(i_d, i_q)
+    torque = 1.5 * machine.pole_pairs * (psi_d * i_q - psi_q * i_d)
+    r_ohm, limit = machine.motor.r_ohm * factors["resistance_scale"], V_RATIO_REFERENCE * machine.vdc_V
+    w = omega[:, None]
+    volts = np.hypot(r_ohm * i_d - w * psi_q, r_ohm * i_q + w * psi_d)
+    return np.asarray(np.max(np.where(volts <= limit, torque, 0.0), axis=1))
+
+
+def make_envelope(machine: Machine, factors: dict[str, float]) -> Envelope:
+    """Motoring is the harder direction, its answer serves both. The firmware plans with nominal data: both count."""
+    speed = np.linspace(0.0, machine.speed_max_rpm, SPEEDS)
+    omega = machine.pole_pairs * speed * 2.0 * np.pi / 60.0
+    torque = np.minimum(_largest(machine, NOTHING_WRONG, omega), _largest(machine, factors, omega))
+    return Envelope(speed, np.minimum(MARGIN * torque, machine.rated_Nm))

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report's figures, as SVG text."""
+
+import io
+import os
+from collections.abc import Callable
+from typing import Any, Final
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from fluxtrue_tools.campaign.case import Trace
+from fluxtrue_tools.campaign.score import BANDS, CRAWL, rms
+from fluxtrue_tools.campaign.spec import Campaign
+from fluxtrue_tools.campaign.terminal import band_name
+from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
+
+COLOURS: Final = (SECOND, ESTIMATE, TRUTH, "#6a994e", "#7b2d8b", "#4f4f4f", "#00798c", "#9c6644")
+SPEED_BINS: Final = 13
+TORQUE_BINS: Final = 12
+SCALE_PERCENT: Final = 10.0  # where colours and histograms end
+
+
+def _styled(draw: Callable[..., Figure]) -> Callable[..., str]:
+    def styled(*arguments: Any) -> str:
+        with plt.rc_context(STYLE | {"svg.hashsalt": draw.__name__}):
+            figure = draw(*arguments)
+            stream = io.StringIO()
+            figure.savefig(stream, format="svg")
+            plt.close(figure)
+            return stream.getvalue()
+
+    return styled
+
+
+def _colours(campaign: Campaign) -> dict[str, str]:
+    return dict(zip([c.name for c in campaign.controller], COLOURS, strict=False))
+
+
+def _speed_edges(table: pd.DataFrame) -> np.ndarray:
+    speed = table.loc[table["band"] != CRAWL, "speed_rpm"].abs()
+    return np.geomspace(speed.min() * 0.999, speed.max() * 1.001, SPEED_BINS + 1)
+
+
+def _plain_ticks(axes: Any, edges: np.ndarray) -> None:
+    """A logarithmic axis with the numbers that people use."""
+    wanted = [n for n in (300, 500, 1000, 2000, 3000, 5000, 10000) if edges[0] <= n <= edges[-1] * 1.01]
+    axes.set_xscale("log")
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_xticks(wanted, [str(n) for n in wanted])
+    axes.minorticks_off()
+
+
+@_styled
+def maps(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """rms error over speed and torque: torque counted positive when it drives, whatever the direction."""
+    names = [controller.name for controller in campaign.controller]
+    figure, axes = plt.subplots(1, len(names), figsize=(4.0 * len(names) + 1.0, 4.2), layout="constrained",
+                                sharey=True, squeeze=False)  # fmt: skip
+    speeds = _speed_edges(table)
+    top = table["torque_command_Nm"].abs().max() * 1.001
+    torques = np.linspace(-top, top, TORQUE_BINS + 1)
+    mesh = None
+    for axis, name in zip(axes[0], names, strict=True):
+        rows = table[table["controller"] == name]
+        driving = rows["torque_command_Nm"] * np.sign(rows["speed_rpm"])
+        place = [rows["speed_rpm"].abs(), driving]
+        count, _, _ = np.histogram2d(*place, bins=[speeds, torques])
+        total, _, _ = np.histogram2d(*place, bins=[speeds, torques], weights=rows["error_percent"] ** 2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            error = np.sqrt(total / count).T
+        mesh = axis.pcolormesh(speeds, torques, error, cmap="viridis_r", vmin=0.0, vmax=SCALE_PERCENT)
+        _plain_ticks(axis, speeds)
+        axis.set_title(name, loc="left")
+        axis.set_xlabel("speed, rpm")
+        axis.grid(visible=False)
+    axes[0][0].set_ylabel("torque, N·m (positive drives, negative brakes)")
+    figure.colorbar(mesh, ax=axes[0], label="rms torque error, %", extend="max")
+    return figure
+
+
+@_styled
+def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """rms error and information bound over speed."""
+    figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+    edges = _speed_edges(table)
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    for name, colour in _colours(campaign).items():
+        rows = table[table["controller"] == name]
+        bins = np.digitize(rows["speed_rpm"].abs(), edges) - 1
+        found = [(rms(part["error_percent"]), rms(part["bound_percent"]))
+                 for part in (rows[bins == k] for k in range(SPEED_BINS))]  # fmt: skip
+        axes.plot(middle, [e for e, _ in found], color=colour, marker="o", ms=3, label=name)
+        if np.isfinite([b for _, b in found]).any():
+            axes.plot(middle, [b for _, b in found], color=colour, ls=":", label=f"information bound, {name}'s data")
+    axes.set_yscale("log")
+    _plain_ticks(axes, edges)
+    axes.set_xlabel("speed, rpm")
+    axes.set_ylabel("rms torque error, %")
+    axes.legend()
+    return figure
+
+
+@_styled
+def histograms(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """Before and after: how often which error, band by band."""
+    bands = [band for band in (*BANDS, CRAWL) if (table["band"] == band).any()]
+    figure, axes = plt.subplots(1, len(bands), figsize=(11, 3.6), layout="constrained", sharey=True, squeeze=False)
+    bins = np.linspace(-SCALE_PERCENT, SCALE_PERCENT, 81)
+    for axis, band in zip(axes[0], bands, strict=True):
+        for name, colour in _colours(campaign).items():
+            rows = table[(table["controller"] == name) & (table["band"] == band)]
+            # An error helps or hurts along the torque, whichever sign that has.
+            error = np.clip(rows["error_percent"] * np.sign(rows["torque_command_Nm"]), bins[0], bins[-1])
+            weight = np.full(len(error), 100.0 / max(1, len(error)))
+            axis.hist(error, bins=bins, weights=weight, histtype="step", color=colour, label=name, lw=1.4)
+        axis.set_title(band_name(campaign, band), loc="left")
+        axis.set_xlabel("torque error, % (positive: too much)")
+        axis.set_yscale("log")
+    axes[0][0].set_ylabel("share of windows, %")
+    axes[0][0].legend()
+    return figure
+
+
+def _series(axes: Any, trace: Trace, colour: str, name: str) -> None:
+    every = np.concatenate([trace.drive, *trace.windows])
+    column = trace.columns.index
+    start = trace.drive[-1, column("truth.time_s")] if len(trace.drive) else 0.0
+    now = every[:, column("truth.time_s")] - start
+    axes[1].plot(now, every[:, column("truth.torque_mean_Nm")], color=colour, lw=0.7, label=f"{name}: air gap")
+    command, torque = (every[:, column(c)] for c in ("torque_command_Nm", "truth.torque_mean_Nm"))
+    axes[2].plot(now, torque - command, color=colour, lw=0.7, label=name)
+    axes[3].plot(now, every[:, column("torque_estimate_Nm")] - torque, color=colour, lw=0.7, label=name)
+    axes[0].plot(now, every[:, column("truth.speed_rad_s")] * 60.0 / (2.0 * np.pi), color=colour, lw=0.9, label=name)
+
+
+def case_figure(campaign: Campaign, traces: dict[str, Trace], title: str) -> Figure:
+    """One case over time: speed, torque, error, estimate's error."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(4, 1, figsize=(12, 9), sharex=True, layout="constrained")
+        for name, colour in _colours(campaign).items():
+            if name in traces:
+                _series(axes, traces[name], colour, name)
+        labels = ("speed, rpm", "torque, N·m", "torque less command, N·m", "estimate less torque, N·m")
+        for axis, label in zip(axes, labels, strict=True):
+            axis.set_ylabel(label)
+        for axis in axes[2:]:
+            axis.set_ylim(-15.0, 15.0)
+            axis.axhline(0.0, color=COMMAND, lw=0.6)
+        axes[0].legend(loc="upper left")
+        axes[-1].set_xlabel("time, s (0: the warm-up drive ends, the windows begin)")
+        figure.suptitle(title, fontsize=11)
+    return figure

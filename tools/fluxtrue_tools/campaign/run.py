@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A whole campaign: what is missing is run, then everything is scored, reported and checked. And a single case."""
+
+import hashlib
+import sys
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from tqdm import tqdm
+
+from fluxtrue_tools.campaign import report, schedule, terminal
+from fluxtrue_tools.campaign.case import Trace, check_names, run_case
+from fluxtrue_tools.campaign.machine import machine_of, make_machine
+from fluxtrue_tools.campaign.score import score
+from fluxtrue_tools.campaign.spec import Campaign
+from fluxtrue_tools.campaign.store import Store
+from fluxtrue_tools.sim.build import MotorFolder
+from fluxtrue_tools.sim.output import atomic, json_text, write_text
+
+
+@dataclass(frozen=True)
+class Job:
+    """What to run and where its results go."""
+
+    campaign: Campaign
+    folder: MotorFolder
+    out: Path
+    cases: range
+    where: str  # for messages
+    command: str  # that reproduces {case}
+
+
+def task(name: str, folder: str, text: str, case: int) -> list[dict[str, Any]]:
+    """One case in a worker: everything it needs comes as text."""
+    campaign = Campaign.model_validate_json(text)
+    return run_case(campaign, machine_of(name, folder, text), case)
+
+
+def _manifest(job: Job) -> dict[str, str]:
+    built = job.folder.library.read_bytes() + job.folder.data.read_bytes()
+    return {"campaign file": job.campaign.digest(), "firmware or plant": hashlib.sha256(built).hexdigest()}
+
+
+def _simulate(job: Job, store: Store, scheduler: str | None, workers: int | None) -> None:
+    work = partial(task, job.folder.name, str(job.folder.folder), job.campaign.model_dump_json())
+    todo = store.missing(job.cases)
+    results = schedule.dask(work, todo, scheduler) if scheduler else schedule.local(work, todo, workers)
+    with tqdm(total=len(job.cases), initial=len(job.cases) - len(todo), unit="case",
+              disable=not sys.stderr.isatty()) as bar:  # fmt: skip
+        for case, rows in results:
+            store.save(case, rows)
+            bar.update()
+
+
+def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
+    """The text for the terminal, and whether every bound is met."""
+    machine = make_machine(job.folder, job.campaign, job.where)
+    check_names(job.campaign, machine, job.where)
+    store = Store(job.out)
+    store.open(_manifest(job), fresh)
+    _simulate(job, store, scheduler, workers)
+    table = store.load(job.cases)
+    scores = score(job.campaign, table)
+    promised = terminal.promises(job.campaign, scores)
+    data = report.summary(job.campaign, table, scores, promised)
+    write_text(job.out / "summary.json", json_text(data))
+    page = report.html(job.campaign, table, scores, promised, machine.nominal, job.command)
+    write_text(job.out / "report.html", page)
+    parts = [terminal.figures_table(job.campaign, scores), terminal.trouble_table(job.campaign, scores)]
+    parts += [terminal.bounds_table(promised)] if promised else []
+    parts.append(str(job.out / "report.html"))
+    return "\n\n".join(parts), all(bound.met for _, bound in promised)
+
+
+def one_case(campaign: Campaign, folder: MotorFolder, case: int, plot: Path | None, where: str) -> str:
+    """Its plant and its windows as text, its time series as a picture."""
+    machine = make_machine(folder, campaign, where)
+    check_names(campaign, machine, where)
+    traces: dict[str, Trace] = {}
+    table = pd.DataFrame(run_case(campaign, machine, case, traces.__setitem__))
+    if plot is not None:
+        import matplotlib.pyplot as plt
+
+        from fluxtrue_tools.campaign.figures import case_figure
+
+        sheet = case_figure(campaign, traces, f"{Path(where).stem}, case {case}")
+        with atomic(plot) as scratch:
+            sheet.savefig(scratch, dpi=120)
+        plt.close(sheet)
+    return terminal.case_table(campaign, table)

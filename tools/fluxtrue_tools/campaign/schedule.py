@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who runs the cases: a process on each core, or the workers of an existing Dask cluster."""
+
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from typing import Any
+
+from fluxtrue_tools.errors import FluxtrueError
+
+Task = Callable[[int], Any]
+PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def _worker() -> None:
+    """The parent alone answers Ctrl-C; and nobody is left waiting when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[int, Any]]:
+    """(case, result) in the order they finish."""
+    pool = ProcessPoolExecutor(max_workers=workers or len(os.sched_getaffinity(0)), initializer=_worker)
+    try:
+        waiting = {pool.submit(task, case): case for case in cases}
+        for future in as_completed(waiting):
+            yield waiting[future], future.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def dask(task: Task, cases: list[int], address: str) -> Iterator[tuple[int, Any]]:
+    """The same on a cluster whose workers see this checkout under the same path."""
+    from distributed import Client
+    from distributed import as_completed as dask_completed
+
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise FluxtrueError(f"--scheduler {address}: no scheduler answers ({error})") from error
+    with client:
+        futures = client.map(task, cases, pure=False)
+        case_of = {future.key: case for future, case in zip(futures, cases, strict=True)}
+        for future, result in dask_completed(futures, with_results=True):
+            yield case_of[future.key], result

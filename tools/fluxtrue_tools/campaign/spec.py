@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""campaign.toml: strict, every field with its unit in the name."""
+
+import hashlib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.scenario import NotNegative, Number, Plant, Positive
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def _pair(value: Any) -> Any:
+    """A range [low, high]; a list is a list whatever TOML calls it."""
+    if not isinstance(value, list) or len(value) != 2:
+        raise ValueError("allowed: [low, high]")
+    low, high = value
+    if isinstance(low, int | float) and isinstance(high, int | float) and low > high:
+        raise ValueError("allowed: [low, high] with low up to high")
+    return tuple(value)
+
+
+def _list(value: Any) -> Any:
+    if not isinstance(value, list):
+        raise ValueError("allowed: a list")
+    return tuple(value)
+
+
+def _flag(value: Any) -> Any:
+    return float(value) if isinstance(value, bool | int) else value
+
+
+def _within(low: float, high: float) -> Any:
+    """A range inside given limits: what lies beyond them is a slip of the units."""
+    number = Annotated[Number, Field(ge=low, le=high)]
+    return Annotated[tuple[number, number], BeforeValidator(_pair)]  # type: ignore[valid-type]
+
+
+class Spread(_Strict):
+    """Uniform ranges. Factors of the motor's data, unless the name has a unit."""
+
+    lq_scale: _within(0.5, 2.0) = (0.9, 1.1)
+    ld_slope_scale: _within(0.5, 2.0) = (0.9, 1.1)
+    cross_saturation_scale: _within(0.0, 2.0) = (0.8, 1.2)
+    magnet_scale: _within(0.3, 1.5) = (0.8, 1.05)
+    resistance_scale: _within(0.5, 3.0) = (0.9, 1.7)
+    winding_error_C: _within(-50.0, 50.0) = (-5.0, 5.0)
+    dead_time_scale: _within(0.0, 3.0) = (0.8, 1.2)
+    device_drop_error_V: _within(-5.0, 5.0) = (-0.5, 0.5)
+    vdc_gain: _within(0.9, 1.1) = (0.995, 1.005)
+    current_gain: _within(0.9, 1.1) = (0.995, 1.005)
+    current_offset_share: _within(-0.05, 0.05) = (-0.002, 0.002)
+    angle_offset_deg: _within(-30.0, 30.0) = (-0.5, 0.5)
+    angle_harmonic_deg: _within(0.0, 10.0) = (0.0, 1.0)
+    iron_loss_scale: _within(0.0, 3.0) = (0.7, 1.3)
+
+
+class Nominal(_Strict):
+    """What the spread is about where the motor's data say nothing (or 0)."""
+
+    device_drop_V: NotNegative = 0.0
+    iron_k_h: NotNegative = 0.0
+    iron_k_e: NotNegative = 0.0
+
+
+class Vehicle(_Strict):
+    """Turns a car's speed into the motor's torque and speed."""
+
+    mass_kg: Positive = 1600.0
+    wheel_radius_m: Positive = 0.32
+    gear_ratio: Positive = 9.0
+    rolling_N: NotNegative = 130.0
+    drag_N_per_m2_s2: NotNegative = 0.40
+
+
+class Drive(_Strict):
+    """The warm-up drive that the controller learns from."""
+
+    duration_s: Annotated[Number, Field(ge=1, le=600)] = 60.0
+    vehicle: Vehicle = Vehicle()
+
+
+class Windows(_Strict):
+    """Where torque is measured."""
+
+    speed_rpm: Annotated[
+        tuple[tuple[Positive, Positive, Annotated[int, Field(ge=1, le=100)]], ...],
+        BeforeValidator(lambda v: tuple(tuple(x) if isinstance(x, list) else x for x in _list(v))),
+        Field(min_length=1, max_length=50),
+    ] = ((300.0, 5000.0, 8), (5000.0, 10000.0, 4))
+    low_speed_rpm: Annotated[tuple[Positive, ...], BeforeValidator(_list)] = (50.0, 150.0)
+    torque_min_Nm: Positive = 10.0
+    settle_s: Annotated[Number, Field(ge=0.01, le=10)] = 0.25
+    measure_s: Annotated[Number, Field(ge=0.01, le=10)] = 0.2
+    slew_rpm_per_s: Positive = 10000.0
+
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        for low, high, _ in self.speed_rpm:
+            if low >= high:
+                raise ValueError(f"windows.speed_rpm: {low:g} to {high:g}, allowed: [low, high, strata], low < high")
+        return self
+
+
+class Controller(_Strict):
+    """One way to run the firmware: names and numbers as fluxtrue_set() takes them."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
+    set: dict[str, Annotated[float, BeforeValidator(_flag)]]
+    warm_up: bool = True
+
+
+class Limits(_Strict):
+    """The bounds that `check` holds its controllers to, percent."""
+
+    rms_low: Positive = 0.8
+    p99_low: Positive = 2.5
+    rms_high: Positive = 1.2
+    p99_high: Positive = 3.0
+    no_harm_share: Positive = 99.0
+    no_harm_slack: Positive = 0.5
+    no_harm_floor: Positive = 2.0
+    low_speed_slack: Positive = 1.0
+
+
+class Check(_Strict):
+    """Who is held to the bounds, and against whom harm is measured."""
+
+    controllers: Annotated[tuple[str, ...], BeforeValidator(_list)] = ()
+    reference: str = "tables"
+    band_rpm: Positive = 5000.0
+    count_nonzero: Annotated[tuple[str, ...], BeforeValidator(_list)] = ("psi_clamped", "r_clamped")
+    oscillation_share: Positive = 0.1
+    limits: Limits = Limits()
+
+
+class Campaign(_Strict):
+    """One campaign."""
+
+    motor: str = Field(min_length=1)
+    cases: Annotated[int, Field(ge=1, le=100000)]
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    noise_share: Annotated[Number, Field(ge=0, le=0.1)] = 0.002
+    controller: Annotated[tuple[Controller, ...], BeforeValidator(_list), Field(min_length=1, max_length=8)]
+    spread: Spread = Spread()
+    nominal: Nominal = Nominal()
+    plant: Plant = Plant()
+    drive: Drive = Drive()
+    windows: Windows = Windows()
+    check: Check = Check()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        names = [controller.name for controller in self.controller]
+        if len(set(names)) < len(names):
+            raise ValueError(f"controller: {', '.join(names)}, allowed: every name once")
+        for name in self.check.controllers:
+            if name not in names:
+                raise ValueError(f"check.controllers: '{name}', allowed: {', '.join(names)}")
+        if self.check.controllers and self.check.reference not in names:
+            raise ValueError(f"check.reference: '{self.check.reference}', allowed: {', '.join(names)}")
+        return self
+
+    def digest(self) -> str:
+        """Changes with every value of the file, not with its comments."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+
+
+_ALLOWED = {"missing": "this field is required", "extra_forbidden": "unknown field"}
+
+
+def _fields(location: tuple[int | str, ...]) -> str:
+    """The fields of the table that a bad key is in."""
+    model: Any = Campaign
+    for part in location[:-1]:
+        if isinstance(part, str):
+            model = {"controller": Controller}.get(part) or model.model_fields[part].annotation
+    fields = getattr(model, "model_fields", None)
+    return f", allowed: {', '.join(fields)}" if fields else ""
+
+
+def _explain(error: ValidationError) -> str:
+    """The first complaint as one line: field, value, what is allowed."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"])
+    text = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
+    if not where or (first["type"] == "value_error" and text.startswith(where)):
+        return text
+    if first["type"] in _ALLOWED:
+        return f"{where}: {text}{_fields(first['loc'])}"
+    shown = repr(first["input"])
+    shown = shown if len(shown) <= 60 else shown[:57] + "..."
+    return f"{where} = {shown}: {text[0].lower() + text[1:]}"
+
+
+def parse(text: str, name: str) -> Campaign:
+    """A campaign from TOML text; `name` is for messages."""
+    try:
+        return Campaign.model_validate(tomllib.loads(text))
+    except ValidationError as error:
+        raise FluxtrueError(f"{name}: {_explain(error)}") from error
+    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
+        raise FluxtrueError(f"{name}: not TOML: {error}") from error
+
+
+def read(path: Path) -> Campaign:
+    """A campaign file."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise FluxtrueError(f"{path}: not UTF-8 text") from error
+    return parse(text, str(path))

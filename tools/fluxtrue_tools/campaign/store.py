@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The campaign's folder: one Parquet file per finished case, so that a run can stop anywhere and go on."""
+
+import json
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import pandas as pd
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.output import atomic, write_text
+
+MANIFEST: Final = "campaign.json"
+RESULTS: Final = "results.parquet"
+
+
+@dataclass(frozen=True)
+class Store:
+    """Results on disk."""
+
+    folder: Path
+
+    @property
+    def _cases(self) -> Path:
+        return self.folder / "cases"
+
+    def open(self, manifest: dict[str, Any], fresh: bool) -> None:
+        """Make the folder or go on with it; results of another campaign or another firmware are not mixed in."""
+        path = self.folder / MANIFEST
+        if fresh and path.is_file():
+            shutil.rmtree(self._cases, ignore_errors=True)
+            path.unlink()
+        try:
+            self._cases.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FluxtrueError(f"--out {self.folder}: cannot be made ({error.strerror})") from error
+        for scratch in self._cases.glob(".case-*"):  # of a run that was killed
+            scratch.unlink(missing_ok=True)
+        if not path.is_file():
+            write_text(path, json.dumps(manifest, indent=1) + "\n")
+            return
+        for key, was in self._manifest(path).items():
+            if manifest.get(key) != was:
+                raise FluxtrueError(
+                    f"{path}: these results were made with another {key}, allowed: the same one, another --out, or "
+                    "--fresh to throw them away"
+                )
+
+    @staticmethod
+    def _manifest(path: Path) -> dict[str, Any]:
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise FluxtrueError(f"{path}: not a campaign's manifest ({error})") from error
+        if not isinstance(data, dict):
+            raise FluxtrueError(f"{path}: not a campaign's manifest")
+        return data
+
+    def _path(self, case: int) -> Path:
+        return self._cases / f"case-{case:05d}.parquet"
+
+    def missing(self, cases: range) -> list[int]:
+        """What is still to be run."""
+        return [case for case in cases if not self._path(case).is_file()]
+
+    def save(self, case: int, rows: list[dict[str, Any]]) -> None:
+        """Whole or not at all."""
+        with atomic(self._path(case)) as scratch:
+            pd.DataFrame(rows).to_parquet(scratch, index=False)
+
+    def load(self, cases: range) -> pd.DataFrame:
+        """Every finished case of the range, and the same as one file."""
+        frames = [pd.read_parquet(self._path(case)) for case in cases if self._path(case).is_file()]
+        table = pd.concat(frames, ignore_index=True)
+        with atomic(self.folder / RESULTS) as scratch:
+            table.to_parquet(scratch, index=False)
+        return table

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A campaign's outcome as text."""
+
+import pandas as pd
+
+from fluxtrue_tools.campaign.score import BANDS, CRAWL, Score, bounds
+from fluxtrue_tools.campaign.spec import Campaign
+from fluxtrue_tools.demo.experiment import Bound
+
+
+def _columns(cells: list[tuple[str, ...]]) -> str:
+    widths = [max(len(line[k]) for line in cells) for k in range(len(cells[0]))]
+    lines = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
+    return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
+
+
+def band_name(campaign: Campaign, band: str) -> str:
+    """In words."""
+    split = campaign.check.band_rpm
+    return {"low": f"300…{split:g} rpm", "high": f"above {split:g} rpm", CRAWL: "below 300 rpm"}[band]
+
+
+def figures_table(campaign: Campaign, scores: list[Score]) -> str:
+    """Torque errors of every controller and band."""
+    cells: list[tuple[str, ...]] = [("controller", "band", "windows", "rms %", "p99 %", "worst %", "bound %", "ratio")]
+    for scored in scores:
+        for band in (*BANDS, CRAWL):
+            f = scored.bands[band]
+            cells.append((scored.controller, band_name(campaign, band), str(f.windows), f"{f.rms:.2f}", f"{f.p99:.2f}",
+                          f"{f.worst:.2f}", f"{f.bound_rms:.2f}", f"{f.ratio:.2f}"))  # fmt: skip
+    return _columns(cells)
+
+
+def trouble_table(campaign: Campaign, scores: list[Score]) -> str:
+    """Harm, trips, saturation."""
+    cells: list[tuple[str, ...]] = [("controller", "no harm %", "crawl worse by", "trips", "unstable",
+                                     *campaign.check.count_nonzero)]  # fmt: skip
+    for scored in scores:
+        t = scored.trouble
+        harm = ("-", "-")
+        if scored.harm is not None:
+            harm = (f"{scored.harm.harmless_share:.2f}", f"{scored.harm.crawl_excess:+.2f} %")
+        cells.append((scored.controller, *harm, str(t.trips), str(t.unstable), *map(str, t.saturated.values())))
+    return _columns(cells)
+
+
+def bounds_table(promised: list[tuple[str, Bound]]) -> str:
+    """Met or missed."""
+    cells: list[tuple[str, ...]] = [("controller", "figure of merit", "simulated", "allowed", "")]
+    for name, bound in promised:
+        relation = "≥" if bound.at_least else "≤"
+        cells.append((name, bound.what, f"{bound.value:.4g} {bound.unit}", f"{relation} {bound.limit:g} {bound.unit}",
+                      "met" if bound.met else "MISSED"))  # fmt: skip
+    return _columns(cells)
+
+
+def promises(campaign: Campaign, scores: list[Score]) -> list[tuple[str, Bound]]:
+    """The bounds of the checked controllers."""
+    checked = campaign.check.controllers
+    return [(s.controller, bound) for s in scores if s.controller in checked for bound in bounds(campaign, s)]
+
+
+def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
+    """One case: its plant, then every window with all controllers side by side. Ten digits: it must reproduce."""
+    first = table.iloc[0]
+    plant = "\n".join(f"{name.removeprefix('plant_')} = {first[name]:.10g}"
+                      for name in table.columns if name.startswith("plant_"))  # fmt: skip
+    names = [controller.name for controller in campaign.controller]
+    cells: list[tuple[str, ...]] = [("window", "rpm", "command N·m", *(f"{name} N·m" for name in names),
+                                     *(f"{name} %" for name in names), "bound %")]  # fmt: skip
+    for window, rows in table.groupby("window"):
+        rows = rows.set_index("controller")
+        bound = rows["bound_percent"].max()
+        cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_command_Nm'].iloc[0]:.3f}",
+                      *(f"{rows['torque_Nm'][name]:.10g}" for name in names),
+                      *(f"{rows['error_percent'][name]:+.2f}" for name in names), f"{bound:.2f}"))  # fmt: skip
+    faults = table.groupby("controller", sort=False)["run_fault_word"].first()
+    tripped = ", ".join(f"{name}: fault word {word}" for name, word in faults.items() if word) or "no trip"
+    return f"{plant}\n\n{_columns(cells)}\n\n{tripped}"

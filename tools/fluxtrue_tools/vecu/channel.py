@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bench channel: what a test stand does that is not on CAN. The commands are in tests/vecu/bench.h."""
+
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from fluxtrue_tools.errors import FluxtrueError
+
+TIMEOUT_S = 120.0
+
+
+class BenchRefused(FluxtrueError):
+    """The bench did not do what it was asked for; the text is its own."""
+
+
+@dataclass
+class Ran:
+    """What a run answers: simulated time, frames sent to our CAN connection so far, recorded rows."""
+
+    now_ns: int
+    frames: int
+    rows: list[list[float]] = field(default_factory=list)
+
+
+class Channel:
+    """One connection to the bench port."""
+
+    def __init__(self, host: str, port: int, timeout_s: float = TIMEOUT_S) -> None:
+        try:
+            self._socket = socket.create_connection((host, port), timeout_s)
+        except OSError as error:
+            raise FluxtrueError(f"bench channel {host}:{port}: {error}") from error
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._file = self._socket.makefile("r", encoding="ascii", newline="\n")
+
+    def close(self) -> None:
+        """Leave; the bench goes on."""
+        self._file.close()
+        self._socket.close()
+
+    def send(self, command: str) -> None:
+        """A command whose answer will be read later."""
+        self._socket.sendall(command.encode("ascii") + b"\n")
+
+    def answer(self, rows: list[list[float]] | None = None) -> str:
+        """The answer to the oldest command; rows of a recording go to the list."""
+        for line in self._file:
+            if line.startswith("row "):
+                if rows is not None:
+                    rows.append([float(word) for word in line.split()[1:]])
+            elif line.startswith("ok"):
+                return line[2:].strip()
+            else:
+                raise BenchRefused(f"bench: {line.strip()}")
+        raise FluxtrueError("bench channel: the bench has closed the connection")
+
+    def ask(self, command: str) -> str:
+        """Command and answer."""
+        self.send(command)
+        return self.answer()
+
+    def get(self, *names: str) -> list[float]:
+        """Values by name."""
+        return [float(word) for word in self.ask(f"get {' '.join(names)}").split()]
+
+    def set(self, **values: float) -> None:
+        """Plant parameters, and the board's with a leading board_: set(magnet_scale=0.9, board_gate_fault=1)."""
+        pairs = []
+        for name, value in values.items():
+            full = f"board.{name[6:]}" if name.startswith("board_") else f"plant.{name}"
+            pairs.append(f"{full} {float(value)!r}")
+        self.ask(f"set {' '.join(pairs)}")
+
+    def ramp(self, name: str, value: float, seconds: float) -> None:
+        """Linearly, during the runs to come."""
+        self.ask(f"ramp {name} {value!r} {seconds!r} s")
+
+    def record(self, names: Sequence[str], periods: int = 10) -> None:
+        """Rows that the following runs answer; no names: none."""
+        self.ask(f"record {periods} {' '.join(names)}" if names else "record off")
+
+    def run(self, milliseconds: float, port: int = 0, sent: int = 0) -> Ran:
+        """Let time pass; first wait until the CAN connection with our port has been heard with so many frames."""
+        rows: list[list[float]] = []
+        self.send(f"run {milliseconds!r} ms {port} {sent}")
+        now_ns, frames = self.answer(rows).split()
+        return Ran(int(now_ns), int(frames), rows)
+
+    def counters(self) -> dict[str, float]:
+        """Of bus, hub and bench."""
+        return {name: float(value) for name, value in (pair.split("=") for pair in self.ask("counters").split())}
+
+    def duty_hash(self) -> str:
+        """Of all duties and gate states since it was last asked for."""
+        return self.ask("hash")
+
+    def reset(self, seed: int = 1) -> None:
+        """Power cycle of ECU and plant."""
+        self.ask(f"reset {seed}")
