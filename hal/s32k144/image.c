@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-#include "hal/s32k144/crc32.h"
+#include "signal/crc32.h"
 
 #define SLICE 64U
 
@@ -18,14 +18,14 @@ static uint32_t running = CRC32_START;
 
 bool image_step(void)
 {
-    for (uint32_t k = 0; k < SLICE && at < protected_end; k++) {
-        running = crc32_step(running, *at);
-        at++;
-    }
+    const uint32_t left = (uint32_t)(protected_end - at);
+    const uint32_t now = (left < SLICE) ? left : SLICE;
+    running = crc32_update(running, at, now);
+    at += now;
     if (at < protected_end) {
         return true;
     }
-    const bool good = crc32_end(running) == protected_crc;
+    const bool good = ~running == protected_crc;
     at = protected_start;
     running = CRC32_START;
     return good;

@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drive.h"
+#include "app/ecu.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/can.h"
 #include "hal/s32k144/clock.h"
@@ -20,46 +20,40 @@
 #define STACK_RESERVE 256U /* bytes that must never have been touched */
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
 
-drive_t the_drive;
+ecu_t ecu; /* calibration tools find it by this name */
 static volatile bool data_damaged; /* set by the background, for the fast ISR: it alone raises faults */
+static bool started;               /* the PWM, and with it the fast ISR */
 
 void adc_handler(void)
 {
     angle_begin();
     if (pwm_fault_taken()) {
-        drive_raise_fault(&the_drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
+        drive_raise_fault(&ecu.drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
     }
     if (data_damaged) {
-        drive_raise_fault(&the_drive, FAULT_CONFIG);
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
-    fast_isr(&the_drive);
+    fast_isr(&ecu.drive);
     if (angle_fault()) {
-        drive_raise_fault(&the_drive, FAULT_ANGLE);
+        drive_raise_fault(&ecu.drive, FAULT_ANGLE);
     }
     angle_end();
 }
 
 void mrai_handler(void)
 {
-    mrai_isr(&the_drive);
+    mrai_isr(&ecu.drive);
 }
 
-/* Serviced only while the identification, which the fast ISR pends, goes on; or if it was never started. */
-static void service_watchdog(void)
-{
-    static uint32_t seen;
-    const uint32_t finished = the_drive.slow.finished;
-    if (finished != seen || data_damaged) {
-        hal_watchdog_service();
-    }
-    seen = finished;
-}
-
+/* The application serves the watchdog while the other interrupts advance. Without them, because the data are damaged,
+ * the bus must still be able to say so. */
 void tick_handler(void)
 {
     tick_cleared();
-    service_watchdog();
-    task_1khz(&the_drive);
+    if (!started) {
+        hal_watchdog_service();
+    }
+    ecu_task_1khz(&ecu);
 }
 
 void can_message_handler(void)
@@ -117,6 +111,7 @@ static void start(void)
     tick_start();
     if (!data_damaged) {
         pwm_start();
+        started = true;
     }
     __asm__ volatile("cpsie i" ::: "memory");
 }
@@ -125,19 +120,18 @@ static void start(void)
 __attribute__((noinline)) int main(void)
 {
     data_damaged = !image_valid();
-    drive_init(&the_drive, &motor);
+    ecu_init(&ecu, &motor);
     if (data_damaged) {
-        drive_raise_fault(&the_drive, FAULT_CONFIG);
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
     init_hardware();
     enable_interrupts();
-    hal_watchdog_start();
     start();
     for (;;) {
         if (!image_step()) {
             data_damaged = true;
         }
-        if (stack_unused() < STACK_RESERVE) {
+        if (stack_measure() < STACK_RESERVE) {
             panic();
         }
     }

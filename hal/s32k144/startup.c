@@ -4,6 +4,7 @@
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/wdog.h"
+#include "hal/system.h"
 
 #define STACK_PATTERN 0xC5C5C5C5U
 #define AWAIT_LOOPS 200000U /* 10 ms and more at any clock */
@@ -17,20 +18,40 @@ extern const uint32_t data_load[];
 
 int main(void);
 
-static uint32_t cause;
+static uint32_t cause, unused;
 
-uint32_t reset_cause(void)
+/* The bits of RCM_SRS, the most telling first: a power-on also counts as a low voltage. */
+reset_cause_t hal_system_reset_cause(void)
 {
-    return cause;
+    static const struct {
+        uint32_t bit;
+        reset_cause_t meaning;
+    } known[] = {
+        {RCM_SRS_POR, RESET_POWER_ON},     {RCM_SRS_WDOG, RESET_WATCHDOG}, {RCM_SRS_LOCKUP, RESET_LOCKUP},
+        {RCM_SRS_LOC, RESET_CLOCK},        {RCM_SRS_LOL, RESET_CLOCK},     {RCM_SRS_SW, RESET_SOFTWARE},
+        {RCM_SRS_LVD, RESET_BROWN_OUT},    {RCM_SRS_PIN, RESET_PIN},
+    };
+    for (uint32_t k = 0; k < sizeof known / sizeof known[0]; k++) {
+        if ((cause & known[k].bit) != 0U) {
+            return known[k].meaning;
+        }
+    }
+    return RESET_UNKNOWN;
 }
 
-uint32_t stack_unused(void)
+uint32_t stack_measure(void)
 {
     const volatile uint32_t *word = stack_bottom;
     while (word < stack_top && *word == STACK_PATTERN) {
         word++;
     }
-    return (uint32_t)((uintptr_t)word - (uintptr_t)stack_bottom);
+    unused = (uint32_t)((uintptr_t)word - (uintptr_t)stack_bottom);
+    return unused;
+}
+
+uint32_t hal_system_stack_unused(void)
+{
+    return unused;
 }
 
 _Noreturn void panic(void)

@@ -5,13 +5,11 @@
  * Source   README.md, memory and stack guard
  * Units    bytes
  * Errors   panic(): switches the outputs off and resets the processor; every fault of the core ends there
- * Context  reset_cause(), stack_unused(): any; panic(): any, needs no stack */
+ * Context  stack_measure(): background, looks at every word; panic(): any, needs no stack */
 #include <stdint.h>
 
-/** RCM_SRS of this start. */
-uint32_t reset_cause(void);
-/** Bytes of the stack that nothing has ever touched. */
-uint32_t stack_unused(void);
+/** Bytes of the stack that nothing has ever touched; hal_system_stack_unused() repeats the last answer. */
+uint32_t stack_measure(void);
 _Noreturn void panic(void);
 
 /** Waits until (*word & mask) == value, at most a few milliseconds; panics then. */

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What leaves and enters the processor bit by bit: CAN message buffers, resolver frames, checksum, NTC. */
+/* What leaves and enters the processor bit by bit: CAN message buffers, resolver frames, NTC. */
 #include <math.h>
 #include <string.h>
 
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/can_mailbox.h"
-#include "hal/s32k144/crc32.h"
 #include "hal/s32k144/ntc.h"
 #include "hal/temperature.h"
 #include "unity.h"
@@ -63,16 +62,6 @@ void test_a_resolver_frame_is_the_value_and_then_the_faults(void)
     const ad2s1210_frame_t frame = ad2s1210_decode(0xC0DE48);
     TEST_ASSERT_EQUAL_HEX16(0xC0DE, frame.value);
     TEST_ASSERT_EQUAL_HEX8(AD2S1210_SIGNAL_LOSS | AD2S1210_TRACKING, frame.fault);
-}
-
-/* The check value of the standard: CRC-32 of "123456789". */
-void test_the_checksum_gives_the_standards_check_value(void)
-{
-    uint32_t crc = CRC32_START;
-    for (const char *c = "123456789"; *c; c++) {
-        crc = crc32_step(crc, (uint8_t)*c);
-    }
-    TEST_ASSERT_EQUAL_HEX32(0xCBF43926, crc32_end(crc));
 }
 
 /* Straight lines over 10 K bend away from the beta equation by 0.6 K at most, rounding 0.05 K. */
