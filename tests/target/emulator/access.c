@@ -11,6 +11,17 @@ emu_pins_t *emu_pins(emu_t *emu)
     return &emu->s.pins;
 }
 
+const emu_pins_t *emu_pins_look(const emu_t *emu)
+{
+    return &emu->s.pins;
+}
+
+void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
+{
+    emu->s.pins.gate_fault = gate_fault;
+    emu->s.pins.resolver_fault = resolver_fault;
+}
+
 /* The shaft turns on between two settings. */
 uint32_t emu_angle(const emu_t *emu)
 {

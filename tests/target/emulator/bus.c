@@ -151,7 +151,8 @@ static bool find(emu_t *emu, int p, uint32_t address, uint32_t size, const char 
     place->fact = fact;
     place->value = &emu->s.value[p][r];
     if (!peripheral->models(fact->offset)) {
-        emu_fail(emu, "%s of %s.%s offset 0x%x: the register is not modelled", what, peripheral->name, fact->name, offset);
+        emu_fail(emu, "%s of %s.%s offset 0x%x: the register is not modelled", what, peripheral->name, fact->name,
+                 offset);
     } else if (!clocked(emu, peripheral)) {
         emu_fail(emu, "%s of %s.%s offset 0x%x: the peripheral's clock is off (PCC)", what, peripheral->name,
                  fact->name, offset);

@@ -48,7 +48,8 @@ uint32_t can_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     (void)self;
     if (offset == MCR) {
         const uint32_t off = (stored & MDIS) != 0 ? NOTRDY | LPMACK : 0U;
-        return (stored & ~(NOTRDY | FRZACK | LPMACK | SOFTRST)) | off | (off == 0 && frozen(emu) ? NOTRDY | FRZACK : 0U);
+        const uint32_t halted = off == 0 && frozen(emu) ? NOTRDY | FRZACK : 0U;
+        return (stored & ~(NOTRDY | FRZACK | LPMACK | SOFTRST)) | off | halted;
     }
     return offset == TIMER ? (uint32_t)(emu->s.now / (EMU_TICKS_PER_S / 500000U)) & 0xFFFFU : stored;
 }

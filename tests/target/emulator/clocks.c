@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: sources, dividers, run modes, gates. A source is stable as soon as it is enabled. */
+/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: sources, dividers, run modes, gates. An enabled source is stable at once. */
 #include "emu_private.h"
 
 enum {
@@ -83,9 +83,9 @@ static void core_update(emu_t *emu)
     if (source == 0) {
         emu_fail(emu, "SCG selects clock source %u, which is off or no whole number of ticks", ccr >> 24 & 15U);
     } else if (core < (high ? 30U : 42U) || bus < (high ? 60U : 70U) || flash < (high ? 120U : 126U)) {
-        emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", (uint32_t)(EMU_TICKS_PER_S / core / 1000U),
-                 (uint32_t)(EMU_TICKS_PER_S / bus / 1000U), (uint32_t)(EMU_TICKS_PER_S / flash / 1000U),
-                 high ? "HSRUN" : "RUN");
+        const uint32_t ticks_per_ms = EMU_TICKS_PER_S / 1000U;
+        emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core,
+                 ticks_per_ms / bus, ticks_per_ms / flash, high ? "HSRUN" : "RUN");
     } else {
         emu_core_clock(emu, core);
     }

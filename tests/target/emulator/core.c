@@ -141,7 +141,7 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
         (void)uc_emu_stop(uc);
         return;
     }
-    const block_t block = emu->mode == EMU_COUNTING ? (block_t){.count = 1} : block_at(emu, (uint32_t)address, size);
+    const block_t block = block_at(emu, (uint32_t)address, size);
     if (block.idle) {
         emu->s.now = emu->s.limit; /* waiting in a loop of one branch is sleeping */
         (void)uc_emu_stop(uc);
@@ -160,8 +160,9 @@ static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int siz
 static bool on_unmapped(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
     (void)uc, (void)value;
-    const char *what = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT                               ? "fetch"
-                       : type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT ? "write" : "read";
+    const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
+    const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
+    const char *what = fetch ? "fetch" : write ? "write" : "read";
     emu_fail(user, "%s of %d bytes at 0x%08x, where nothing is or may be changed", what, size, (uint32_t)address);
     return false;
 }

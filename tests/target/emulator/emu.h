@@ -49,7 +49,11 @@ typedef struct {
 EMU_API emu_t *emu_create(const char *elf, int mode, char *error, size_t size);
 EMU_API void emu_destroy(emu_t *emu);
 
+/** To be written now: the shaft turns on from this instant. */
 EMU_API emu_pins_t *emu_pins(emu_t *emu);
+EMU_API const emu_pins_t *emu_pins_look(const emu_t *emu);
+/** Lines that do not belong to an instant. */
+EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 
 /** Runs for at most so many ticks; EMU_CENTRE: FTM0 has just begun a period, its buffered values are loaded, and the

@@ -174,7 +174,8 @@ static void check_bridge(emu_t *emu, const peripheral_t *self, uint32_t offset, 
     emu_bridge_t now;
     emu_bridge(emu, &now);
     if (now.gates && !emu->s.ftm[0].closed) {
-        emu_fail(emu, "write of FTM0 offset 0x%x (0x%x before): the bridge closes in the middle of a period", offset, old);
+        emu_fail(emu, "write of FTM0 offset 0x%x (0x%x before): the bridge closes in the middle of a period", offset,
+                 old);
     }
     emu->s.ftm[0].closed = now.gates;
 }

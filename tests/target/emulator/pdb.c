@@ -73,7 +73,8 @@ static uint64_t next_due(const emu_t *emu, const peripheral_t *self, uint32_t *w
     const uint32_t c1 = bus_get(emu, self, C1);
     uint64_t next = NEVER;
     for (uint32_t i = 0; i < 8U; i++) {
-        const bool on = (c1 >> i & 1U) != 0, delayed = (c1 >> (8U + i) & 1U) != 0, follows = (c1 >> (16U + i) & 1U) != 0;
+        const bool on = (c1 >> i & 1U) != 0, follows = (c1 >> (16U + i) & 1U) != 0;
+        const bool delayed = (c1 >> (8U + i) & 1U) != 0;
         if (!on || follows || (p->fired >> i & 1U) != 0) {
             continue;
         }

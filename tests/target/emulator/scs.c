@@ -37,7 +37,8 @@ static void change(uint32_t *set, uint32_t word, uint32_t bits, bool on)
     for (uint32_t i = 0; i < 32U; i++) {
         const uint32_t vector = 16U + 32U * word + i;
         if ((bits >> i & 1U) != 0) {
-            set[vector / 32U] = on ? set[vector / 32U] | 1U << (vector % 32U) : set[vector / 32U] & ~(1U << (vector % 32U));
+            const uint32_t mask = 1U << (vector % 32U);
+            set[vector / 32U] = on ? set[vector / 32U] | mask : set[vector / 32U] & ~mask;
         }
     }
 }

@@ -36,7 +36,8 @@ uint32_t wdog_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
         return (uint32_t)((emu->s.now - w->start) / clock_ticks(emu, self)) & 0xFFFFU;
     }
     if (offset == CS) {
-        return (stored & ~0xC00U) | (w->configured ? 0x400U : 0U) | (open_for_writing(emu) && !w->configured ? 0x800U : 0U);
+        const uint32_t unlocked = open_for_writing(emu) && !w->configured ? 0x800U : 0U;
+        return (stored & ~0xC00U) | (w->configured ? 0x400U : 0U) | unlocked;
     }
     return stored;
 }
