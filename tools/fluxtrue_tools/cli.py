@@ -14,6 +14,7 @@ from fluxtrue_tools.errors import FluxtrueError
 COMMANDS = {
     "demo": ("fluxtrue_tools.demo.cli", "demo", "The paper's experiments and ours, with a report."),
     "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
+    "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
     "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
