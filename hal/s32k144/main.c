@@ -50,10 +50,15 @@ void mrai_handler(void)
 void tick_handler(void)
 {
     tick_cleared();
+#if DIRECT
+    hal_watchdog_service();
+    task_1khz(&ecu.drive);
+#else
     if (!started) {
         hal_watchdog_service();
     }
     ecu_task_1khz(&ecu);
+#endif
 }
 
 void can_message_handler(void)
@@ -126,6 +131,9 @@ __attribute__((noinline)) int main(void)
     }
     init_hardware();
     enable_interrupts();
+#if DIRECT
+    hal_watchdog_start();
+#endif
     start();
     for (;;) {
         if (!image_step()) {
