@@ -48,7 +48,7 @@ LAYERS = (
                            "firmware/control", "firmware/safety", "firmware/comm", "hal"),
           FREESTANDING | {"string.h"}),
     Layer("hal/host", ("firmware/fx", "firmware/types", "firmware/app", "hal"), HOSTED),
-    Layer("hal/*", ("firmware/fx", "firmware/types", "firmware/app", "hal")),
+    Layer("hal/*", ("firmware/fx", "firmware/types", "firmware/signal", "firmware/app", "hal")),
     Layer("hal", ("firmware/fx", "firmware/types")),
     Layer("tests/plant", (), HOSTED),
     Layer("tests/support/twin", (), HOSTED),

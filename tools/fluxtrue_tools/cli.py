@@ -16,9 +16,11 @@ COMMANDS = {
     "campaign": ("fluxtrue_tools.campaign.cli", "campaign", "Many random plants: how true is the torque?"),
     "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
     "vecu": ("fluxtrue_tools.vecu.cli", "vecu", "The virtual ECU: a CAN bus to talk to."),
+    "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
     "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
+    "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
 }
 # Done by tools/fluxtrue itself, before Python; listed here for --help.
 SHELL_COMMANDS = {"test": "Set up, build and test everything: tools/test."}

@@ -5,38 +5,18 @@
 #include "sim_names.h"
 #include "sim_private.h"
 
-sim_t *sim_create(int controller)
+sim_t *sim_create_with(sim_controller_t controller)
 {
-    if (controller != SIM_FIRMWARE && controller != SIM_TWIN) {
-        return NULL;
-    }
-    sim_t *sim = calloc(1, sizeof *sim);
+    sim_t *sim = controller.self != NULL ? calloc(1, sizeof *sim) : NULL;
     if (sim == NULL) {
+        if (controller.self != NULL) {
+            controller.destroy(controller.self);
+        }
         return NULL;
     }
-    if (controller == SIM_TWIN) {
-        sim->twin = twin_create();
-    } else {
-        sim->firmware = fluxtrue_create();
-    }
-    if (sim->twin == NULL && sim->firmware == NULL) {
-        free(sim);
-        return NULL;
-    }
+    sim->controller = controller;
     plant_params_default(&sim->params);
     sim->every = 1;
-    return sim;
-}
-
-sim_t *sim_create_around(fluxtrue_t *firmware)
-{
-    sim_t *sim = calloc(1, sizeof *sim);
-    if (sim != NULL) {
-        sim->firmware = firmware;
-        sim->borrowed = 1;
-        plant_params_default(&sim->params);
-        sim->every = 1;
-    }
     return sim;
 }
 
@@ -47,12 +27,13 @@ void sim_destroy(sim_t *sim)
     }
     plant_destroy(sim->plant);
     plant_map_destroy(sim->map);
-    if (sim->twin != NULL) {
-        twin_destroy(sim->twin);
-    } else if (!sim->borrowed) {
-        fluxtrue_destroy(sim->firmware);
-    }
+    sim->controller.destroy(sim->controller.self);
     free(sim);
+}
+
+const char *sim_failure(const sim_t *sim)
+{
+    return sim->controller.failure != NULL ? sim->controller.failure(sim->controller.self) : NULL;
 }
 
 int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq,
@@ -88,17 +69,6 @@ const char *sim_start(sim_t *sim)
     return NULL;
 }
 
-int sim_controller_set(sim_t *sim, const char *name, double value)
-{
-    return sim->twin != NULL ? twin_set(sim->twin, name, value)
-                             : fluxtrue_set(sim->firmware, name, value);
-}
-
-double sim_controller_get(const sim_t *sim, const char *name)
-{
-    return sim->twin != NULL ? twin_get(sim->twin, name) : fluxtrue_get(sim->firmware, name);
-}
-
 static const plant_params_t *params_of(const sim_t *sim)
 {
     return sim->plant != NULL ? plant_params(sim->plant) : &sim->params;
@@ -116,7 +86,7 @@ int sim_set(sim_t *sim, const char *name, double value)
     }
     int index = sim_plant_index(name);
     if (index < 0) {
-        return sim_controller_set(sim, name, value);
+        return sim->controller.set(sim->controller.self, name, value);
     }
     plant_params_t trial = *params_of(sim);
     if (!isfinite(value)) {
@@ -141,7 +111,7 @@ double sim_get(const sim_t *sim, const char *name)
     if (index >= 0) {
         return sim->plant != NULL ? sim_truth_read(plant_truth(sim->plant), index) : (double)NAN;
     }
-    return sim_controller_get(sim, name);
+    return sim->controller.get(sim->controller.self, name);
 }
 
 const char *sim_name(int index)

@@ -21,7 +21,8 @@ enum {
     SIM_OUT_OF_RANGE = -2,
     SIM_READ_ONLY = -3,
     SIM_NOT_STARTED = -4,
-    SIM_FULL = -5
+    SIM_FULL = -5,
+    SIM_FAILED = -6
 };
 
 typedef struct sim sim_t;
@@ -55,7 +56,9 @@ SIM_API int sim_record(sim_t *sim, const char *const *names, int count, int ever
  * period, the controller's once per millisecond. */
 SIM_API int sim_ramp(sim_t *sim, const char *name, double from, double to);
 /** Runs; answers the rows written, or a negative code: SIM_FULL when they would not fit (then
- * nothing runs). */
+ * nothing runs), SIM_FAILED when the controller cannot go on. */
 SIM_API int sim_run(sim_t *sim, int periods, double *rows, int capacity_rows);
+/** Why, after SIM_FAILED; else NULL. */
+SIM_API const char *sim_failure(const sim_t *sim);
 
 #endif

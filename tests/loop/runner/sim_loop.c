@@ -21,7 +21,7 @@ static int channel_resolve(const sim_t *sim, const char *name, channel_t *channe
     }
     if (channel->index < 0) {
         channel->source = FROM_CONTROLLER;
-        return isnan(sim_controller_get(sim, name)) ? SIM_UNKNOWN_NAME : SIM_OK;
+        return isnan(sim->controller.get(sim->controller.self, name)) ? SIM_UNKNOWN_NAME : SIM_OK;
     }
     return SIM_OK;
 }
@@ -82,7 +82,8 @@ static void ramps_apply(sim_t *sim, int period, int periods)
         if (ramp->plant_index >= 0) {
             sim_plant_write(plant_params(sim->plant), ramp->plant_index, value);
         } else if (period % sim->periods_per_ms == 0) {
-            (void)sim_controller_set(sim, ramp->name, value); /* both ends were accepted */
+            /* both ends were accepted */
+            (void)sim->controller.set(sim->controller.self, ramp->name, value);
         }
     }
 }
@@ -94,11 +95,7 @@ static void period_run(sim_t *sim)
     const double in[6] = {sensors.ia_A,  sensors.ib_A,        sensors.ic_A,
                           sensors.vdc_V, sensors.theta_m_rad, sensors.t_winding_C};
     double out[4] = {0.5, 0.5, 0.5, 0.0};
-    if (sim->twin != NULL) {
-        twin_step(sim->twin, in, out);
-    } else {
-        fluxtrue_step(sim->firmware, in, out);
-    }
+    sim->controller.step(sim->controller.self, in, out);
     plant_advance(sim->plant, sim->duty, sim->gates_on);
     memcpy(sim->duty, out, sizeof sim->duty);
     sim->gates_on = out[3] > 0.5;
@@ -123,7 +120,7 @@ static void row_write(sim_t *sim, double *row)
     for (int i = 0; i < sim->channels; i++) {
         const channel_t *channel = &sim->channel[i];
         if (channel->source == FROM_CONTROLLER) {
-            row[i] = sim_controller_get(sim, channel->name);
+            row[i] = sim->controller.get(sim->controller.self, channel->name);
         } else if (channel->source == FROM_PLANT) {
             row[i] = sim_plant_read(plant_params(sim->plant), channel->index);
         } else if (sim_truth_averages(channel->index)) {
@@ -158,6 +155,10 @@ int sim_run(sim_t *sim, int periods, double *rows, int capacity_rows)
     for (int period = 0; period < periods; period++) {
         ramps_apply(sim, period, periods);
         period_run(sim);
+        if (sim_failure(sim) != NULL) {
+            sim->ramps = 0;
+            return SIM_FAILED;
+        }
         if (sim->channels > 0 && row_collect(sim)) {
             row_write(sim, rows + (size_t)written * (size_t)sim->channels);
             written++;

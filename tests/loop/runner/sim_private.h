@@ -2,10 +2,9 @@
 #ifndef LOOP_RUNNER_SIM_PRIVATE_H
 #define LOOP_RUNNER_SIM_PRIVATE_H
 /** What the two halves of the runner share. Context: host. */
-#include "hal/host/fluxtrue.h"
 #include "plant/plant.h"
 #include "sim.h"
-#include "twin/twin.h"
+#include "sim_controller.h"
 
 enum { CHANNELS_MAX = 64, RAMPS_MAX = 8, NAME_MAX_LENGTH = 48 };
 
@@ -25,9 +24,7 @@ typedef struct {
 } ramp_t;
 
 struct sim {
-    fluxtrue_t *firmware;
-    int borrowed; /* the firmware is the caller's */
-    twin_t *twin; /* one of the two */
+    sim_controller_t controller;
     plant_params_t params;
     plant_map_t *map;
     plant_t *plant;
@@ -39,8 +36,5 @@ struct sim {
     ramp_t ramp[RAMPS_MAX];
     int ramps;
 };
-
-int sim_controller_set(sim_t *sim, const char *name, double value);
-double sim_controller_get(const sim_t *sim, const char *name);
 
 #endif

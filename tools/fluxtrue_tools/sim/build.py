@@ -73,7 +73,7 @@ def locate(motor: str, base: Path) -> tuple[str, Path]:
 
 
 @contextlib.contextmanager
-def _build_lock() -> Iterator[None]:
+def build_lock() -> Iterator[None]:
     """The lock that the scripts in tools/ use, too: one build at a time."""
     build = ROOT / "build"
     if os.environ.get("FLUXTRUE_LOCK") == str(build):
@@ -85,7 +85,7 @@ def _build_lock() -> Iterator[None]:
         yield
 
 
-def _run(command: list[str], log: Path, label: str) -> None:
+def run_logged(command: list[str], log: Path, label: str) -> None:
     """Run a build command with its output in a log and a counter on a terminal."""
     show = sys.stderr.isatty()
     shown = False
@@ -113,19 +113,19 @@ def _configure(build_dir: Path, folder: Path | None, log: Path) -> None:
     command = ["cmake", "--preset", "host", "-B", str(build_dir)]
     if folder is not None:
         command += [f"-DFLUXTRUE_MOTOR={folder}", "-DFLUXTRUE_TESTS=OFF"]
-    _run(command, log, f"configuring {build_dir.name}")
+    run_logged(command, log, f"configuring {build_dir.name}")
 
 
 def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
     target = "selected" if folder is not None else name
     build_dir.mkdir(parents=True, exist_ok=True)
     log = build_dir / "simulation.log"
-    with _build_lock():
+    with build_lock():
         log.unlink(missing_ok=True)
         _configure(build_dir, folder, log)
         targets = [f"fluxtrue_sim_{target}", f"fluxtrue_sil_{target}", f"fluxtrue_vecu_{target}"]
         command = ["cmake", "--build", str(build_dir), "-j2", "--target", *targets]
-        _run(command, log, f"building the simulation of motor {name}")
+        run_logged(command, log, f"building the simulation of motor {name}")
     return MotorFolder(name, build_dir / "motors" / target)
 
 

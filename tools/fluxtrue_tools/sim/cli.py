@@ -3,11 +3,15 @@
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fluxtrue_tools.errors import FluxtrueError
+
+if TYPE_CHECKING:
+    from fluxtrue_tools.sim.motor import Motor
+    from fluxtrue_tools.sim.scenario import Scenario
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 PLOTS = (".png", ".svg", ".pdf")
@@ -34,16 +38,37 @@ def sim(
 ) -> None:
     """Run a SCENARIO (TOML): the simulated drive with the firmware, or with its twin."""
     from fluxtrue_tools.sim import motor as motors
-    from fluxtrue_tools.sim import output
     from fluxtrue_tools.sim import scenario as scenarios
-    from fluxtrue_tools.sim.run import simulate
+
+    check_outputs(out, json_path, plot)
+    read = scenarios.read(scenario)
+    base = Path.cwd() if motor else scenario.parent
+    built = motors.load(motor or read.motor, build_dir, base)
+    run_and_report(read, built, scenario, out, json_path, plot, read.controller.kind)
+
+
+def check_outputs(out: Path | None, json_path: Path | None, plot: Path | None) -> None:
+    """Complain before a long run, not after it."""
+    from fluxtrue_tools.sim import output
 
     if plot is not None and plot.suffix.lower() not in PLOTS:
         raise FluxtrueError(f"--plot {plot}: allowed: a file ending in {', '.join(PLOTS)}")
     output.check_writable(out, json_path, plot)
-    read = scenarios.read(scenario)
-    base = Path.cwd() if motor else scenario.parent
-    built = motors.load(motor or read.motor, build_dir, base)
+
+
+def run_and_report(
+    read: "Scenario",
+    built: "Motor",
+    scenario: Path,
+    out: Path | None,
+    json_path: Path | None,
+    plot: Path | None,
+    controller: str,
+) -> None:
+    """Run it with a progress bar, write the files asked for, print the table."""
+    from fluxtrue_tools.sim import output
+    from fluxtrue_tools.sim.run import simulate
+
     with click.progressbar(
         length=max(1, round(1e3 * read.duration_s)),
         label=scenario.stem,
@@ -53,7 +78,7 @@ def sim(
         run = simulate(
             read, built, where=str(scenario), progress=lambda s: bar.update(round(1e3 * s))
         )
-    data = output.summary(run)
+    data = output.summary(run) | {"controller": controller}
     if out is not None:
         output.write_text(out, output.csv_text(run))
     if json_path is not None:
@@ -61,7 +86,7 @@ def sim(
     if plot is not None:
         from fluxtrue_tools.sim import plot as plots
 
-        plots.write(run, f"{scenario.stem}: {built.name}, {read.controller.kind}", plot)
+        plots.write(run, f"{scenario.stem}: {built.name}, {controller}", plot)
     click.echo(table(data))
 
 

@@ -15,6 +15,7 @@ CONTROLLERS: Final = {"firmware": 0, "twin": 1}
 UNKNOWN_NAME: Final = -1
 OUT_OF_RANGE: Final = -2
 READ_ONLY: Final = -3
+FAILED: Final = -6
 REASONS: Final = {
     UNKNOWN_NAME: "no such name",
     OUT_OF_RANGE: "out of range",
@@ -43,6 +44,7 @@ _SIGNATURES = {
         ctypes.c_int,
         [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double, ctypes.c_double],
     ),
+    "sim_failure": (ctypes.c_char_p, [ctypes.c_void_p]),
     "sim_run": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_int, _DOUBLES, ctypes.c_int]),
     "fluxtrue_name": (ctypes.c_char_p, [ctypes.c_int]),
 }
@@ -162,6 +164,8 @@ class Loop:
         capacity = periods // self._every + 1
         rows = np.empty((capacity, self._width))
         written = self._library.sim_run(self._sim, periods, _pointer(rows), capacity)
+        if written == FAILED:
+            raise FluxtrueError(self._library.sim_failure(self._sim).decode(errors="replace"))
         if written < 0:
             raise LoopError("run", None, written)
         return rows[:written]

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the
+ * task. */
+#include "app/drive.h"
+#include "hal/adc.h"
+#include "hal/angle.h"
+#include "hal/irq.h"
+#include "hal/mps2/core.h"
+#include "hal/mps2/script.h"
+#include "hal/mps2/semihosting.h"
+#include "hal/pwm.h"
+
+#define TASK_PERIODS 10U
+
+static drive_t the_drive;
+static script_t script;
+static volatile uint32_t done; /* periods */
+static duty_t duties;
+static bool gates;
+
+void hal_adc_read(adc_counts_t *counts)
+{
+    *counts = script_adc(&script);
+}
+
+uint32_t hal_angle_read(void)
+{
+    return script.angle;
+}
+
+void hal_pwm_write(duty_t duty)
+{
+    duties = duty;
+}
+
+void hal_pwm_enable(bool on)
+{
+    gates = on;
+}
+
+void hal_irq_pend_mrai(void)
+{
+    SCB_ICSR = ICSR_PENDSV;
+}
+
+void systick_handler(void)
+{
+    if (done == SCRIPT_PERIODS) {
+        return;
+    }
+    script_next(&script);
+    fast_isr(&the_drive);
+    script_note(&script, duties, gates);
+    done = done + 1U;
+    if (done % TASK_PERIODS == 0U) {
+        NVIC_ISPR0 = 1U << IRQ_TASK;
+    }
+}
+
+void pendsv_handler(void)
+{
+    mrai_isr(&the_drive);
+}
+
+void task_handler(void)
+{
+    script_request(&script, &the_drive.request);
+    task_1khz(&the_drive);
+}
+
+static void start(void)
+{
+    SCB_SHPR3 = PRIORITY_FAST << 24 | PRIORITY_MRAI << 16;
+    NVIC_IPR(IRQ_TASK) = PRIORITY_TASK;
+    NVIC_ISER0 = 1U << IRQ_TASK;
+    SYST_RVR = TICKS_PER_PERIOD - 1U;
+    SYST_CVR = 0;
+    SYST_CSR = SYST_RUN;
+}
+
+__attribute__((noinline)) int main(void)
+{
+    drive_init(&the_drive, &motor);
+    start();
+    while (done < SCRIPT_PERIODS) {
+        __asm__ volatile("wfi" ::: "memory");
+    }
+    semihosting_print_word("low", script.low);
+    semihosting_print_word("high", script.high);
+    semihosting_print_word("differing", script.differing);
+    semihosting_print_word("faults", the_drive.fast.faults);
+    semihosting_print_word("overruns", the_drive.fast.overruns);
+    semihosting_print_word("psi_delta", (uint32_t)the_drive.slow.mrai.psi_delta);
+    semihosting_print_word("r_delta", (uint32_t)the_drive.slow.mrai.r_delta);
+    return 0;
+}

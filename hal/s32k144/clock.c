@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/s32k144/clock.h"
+
+#include "hal/s32k144/registers.h"
+#include "hal/s32k144/startup.h"
+
+#define DIVIDE_BY_1 1U /* of the SOSCDIV and SPLLDIV fields */
+#define DIVIDE_BY_2 2U
+#define DIVIDE_BY_4 3U
+#define SOURCE_SPLL 6U
+#define HSRUN 3U
+#define STATUS_HSRUN 0x80U
+#define PCS_SPLLDIV2 6U
+
+static void start_oscillator(void)
+{
+    SCG->SOSCDIV = SCG_SOSCDIV_SOSCDIV1(DIVIDE_BY_1) | SCG_SOSCDIV_SOSCDIV2(DIVIDE_BY_1);
+    SCG->SOSCCFG = SCG_SOSCCFG_EREFS | SCG_SOSCCFG_RANGE(2); /* crystal, 4 ... 8 MHz */
+    SCG->SOSCCSR = SCG_SOSCCSR_SOSCEN;
+    await(&SCG->SOSCCSR, SCG_SOSCCSR_SOSCVLD, SCG_SOSCCSR_SOSCVLD);
+}
+
+/* 8 MHz / 1 * (12 + 16) / 2 = 112 MHz. */
+static void start_pll(void)
+{
+    SCG->SPLLDIV = SCG_SPLLDIV_SPLLDIV1(DIVIDE_BY_2) | SCG_SPLLDIV_SPLLDIV2(DIVIDE_BY_4);
+    SCG->SPLLCFG = SCG_SPLLCFG_PREDIV(0) | SCG_SPLLCFG_MULT(12);
+    SCG->SPLLCSR = SCG_SPLLCSR_SPLLEN;
+    await(&SCG->SPLLCSR, SCG_SPLLCSR_SPLLVLD, SCG_SPLLCSR_SPLLVLD);
+}
+
+static void enter_high_speed(void)
+{
+    SCG->HCCR = SCG_HCCR_SCS(SOURCE_SPLL) | SCG_HCCR_DIVCORE(0) | SCG_HCCR_DIVBUS(1) | SCG_HCCR_DIVSLOW(3);
+    SMC->PMPROT = SMC_PMPROT_AHSRUN;
+    SMC->PMCTRL = SMC_PMCTRL_RUNM(HSRUN);
+    await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_HSRUN);
+    await(&SCG->CSR, SCG_CSR_SCS_MASK, SCG_CSR_SCS(SOURCE_SPLL));
+}
+
+/* A lost clock resets: the outputs are then inputs, and the gate resistors hold the bridge open. */
+static void guard_clocks(void)
+{
+    SCG->SOSCCSR = SCG_SOSCCSR_SOSCEN | SCG_SOSCCSR_SOSCCM | SCG_SOSCCSR_SOSCCMRE;
+    SCG->SPLLCSR = SCG_SPLLCSR_SPLLEN | SCG_SPLLCSR_SPLLCM | SCG_SPLLCSR_SPLLCMRE;
+}
+
+static void start_cache(void)
+{
+    LMEM->LMEM_PCCCR = LMEM_PCCCR_INVW0 | LMEM_PCCCR_INVW1 | LMEM_PCCCR_GO;
+    await(&LMEM->LMEM_PCCCR, LMEM_PCCCR_GO, 0);
+    LMEM->LMEM_PCCCR = LMEM_PCCCR_ENCACHE;
+}
+
+#define GATE PCC_FLEXCAN0_CGC
+
+/* The source may only change while the gate is closed. */
+static void open_gate(volatile uint32_t *gate)
+{
+    *gate = PCC_FTM0_PCS(PCS_SPLLDIV2);
+    *gate = PCC_FTM0_PCS(PCS_SPLLDIV2) | GATE;
+}
+
+static void open_gates(void)
+{
+    open_gate(&PCC->PCC_ADC0);
+    open_gate(&PCC->PCC_ADC1);
+    open_gate(&PCC->PCC_LPIT);
+    open_gate(&PCC->PCC_LPSPI0);
+    /* These run on the system clock, or choose their own. */
+    PCC->PCC_FTM0 = GATE;
+    PCC->PCC_FTM2 = GATE;
+    PCC->PCC_PDB0 = GATE;
+    PCC->PCC_PDB1 = GATE;
+    PCC->PCC_FlexCAN0 = GATE;
+    PCC->PCC_PORTA = GATE;
+    PCC->PCC_PORTB = GATE;
+    PCC->PCC_PORTC = GATE;
+    PCC->PCC_PORTD = GATE;
+    PCC->PCC_PORTE = GATE;
+}
+
+void clock_init(void)
+{
+    start_oscillator();
+    start_pll();
+    enter_high_speed();
+    guard_clocks();
+    start_cache();
+    open_gates();
+}

@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The image: one drive, the interrupts that run it, and what is done when none of them is due. */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "app/ecu.h"
+#include "hal/s32k144/angle.h"
+#include "hal/s32k144/can.h"
+#include "hal/s32k144/clock.h"
+#include "hal/s32k144/core.h"
+#include "hal/s32k144/image.h"
+#include "hal/s32k144/pins.h"
+#include "hal/s32k144/pwm.h"
+#include "hal/s32k144/registers.h"
+#include "hal/s32k144/sampling.h"
+#include "hal/s32k144/startup.h"
+#include "hal/s32k144/tick.h"
+#include "hal/watchdog.h"
+
+#define STACK_RESERVE 256U /* bytes that must never have been touched */
+#define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
+
+ecu_t ecu; /* calibration tools find it by this name */
+static volatile bool data_damaged; /* set by the background, for the fast ISR: it alone raises faults */
+static bool started;               /* the PWM, and with it the fast ISR */
+
+void adc_handler(void)
+{
+    angle_begin();
+    if (pwm_fault_taken()) {
+        drive_raise_fault(&ecu.drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
+    }
+    if (data_damaged) {
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    }
+    fast_isr(&ecu.drive);
+    if (angle_fault()) {
+        drive_raise_fault(&ecu.drive, FAULT_ANGLE);
+    }
+    angle_end();
+}
+
+void mrai_handler(void)
+{
+    mrai_isr(&ecu.drive);
+}
+
+/* The application serves the watchdog while the other interrupts advance. Without them, because the data are damaged,
+ * the bus must still be able to say so. */
+void tick_handler(void)
+{
+    tick_cleared();
+#if DIRECT
+    hal_watchdog_service();
+    task_1khz(&ecu.drive);
+#else
+    if (!started) {
+        hal_watchdog_service();
+    }
+    ecu_task_1khz(&ecu);
+#endif
+}
+
+void can_message_handler(void)
+{
+    can_message_isr();
+}
+
+void can_bus_off_handler(void)
+{
+    can_bus_off_isr();
+}
+
+void gate_fault_handler(void)
+{
+    pwm_gate_fault_isr();
+}
+
+static void enable(uint32_t irq, uint32_t priority)
+{
+    core_irq_priority(irq, priority);
+    core_irq_enable(irq);
+}
+
+static void enable_interrupts(void)
+{
+    enable(IRQ_FTM0_FAULT, PRIORITY_FAULT);
+    enable(IRQ_ADC0, PRIORITY_FAST);
+    enable(IRQ_MRAI, PRIORITY_MRAI);
+    enable(IRQ_CAN0_ORED_0_15_MB, PRIORITY_CAN);
+    enable(IRQ_CAN0_ORED, PRIORITY_CAN);
+    enable(IRQ_LPIT0_CH0, PRIORITY_TICK);
+}
+
+static uint32_t ticks(float seconds)
+{
+    return (uint32_t)(seconds * (float)CLOCK_CORE_HZ + 0.5F);
+}
+
+static void init_hardware(void)
+{
+    const pwm_config_t pwm = {ticks(motor.bases.period_s), ticks(motor.dead_time_s)};
+    clock_init();
+    pins_init();
+    sampling_init();
+    pwm_init(&pwm);
+    angle_init();
+    tick_init(pwm.period_ticks / PERIPHERAL_PER_CORE);
+    can_init();
+}
+
+/* Damaged data must not be computed with: then the counter, and so the fast ISR, never starts. */
+static void start(void)
+{
+    __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
+    tick_start();
+    if (!data_damaged) {
+        pwm_start();
+        started = true;
+    }
+    __asm__ volatile("cpsie i" ::: "memory");
+}
+
+/* Not part of the reset handler: its floating-point instructions must not move before the FPU is on. */
+__attribute__((noinline)) int main(void)
+{
+    data_damaged = !image_valid();
+    ecu_init(&ecu, &motor);
+    if (data_damaged) {
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    }
+    init_hardware();
+    enable_interrupts();
+#if DIRECT
+    hal_watchdog_start();
+#endif
+    start();
+    for (;;) {
+        if (!image_step()) {
+            data_damaged = true;
+        }
+        if (stack_measure() < STACK_RESERVE) {
+            panic();
+        }
+    }
+}

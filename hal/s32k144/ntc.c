@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/s32k144/ntc.h"
+
+#include "hal/temperature.h"
+
+#define NODES 20
+#define FIRST_DC (-400)
+#define STEP_DC 100
+
+/* Counts at -40, -30 ... 150 degrees: falling. */
+static const uint16_t node[NODES] = {3937, 3814, 3628, 3368, 3038, 2654, 2249, 1854, 1497, 1191,
+                                     941,  741,  584,  462,  368,  295,  238,  194,  159,  132};
+
+int16_t ntc_dC(uint16_t count)
+{
+    if (count > node[0] || count < node[NODES - 1]) {
+        return HAL_TEMPERATURE_UNKNOWN;
+    }
+    int k = 0;
+    while (count < node[k + 1]) {
+        k++;
+    }
+    const int span = node[k] - node[k + 1];
+    const int part = (STEP_DC * (node[k] - count) + span / 2) / span;
+    return (int16_t)(FIRST_DC + STEP_DC * k + part);
+}

@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/pwm.h"
+
+#include "hal/s32k144/core.h"
+#include "hal/s32k144/pwm.h"
+#include "hal/s32k144/registers.h"
+
+#define SYSTEM_CLOCK 1U
+#define ALL_CHANNELS_MANUAL 2U
+#define FAULT_FILTER 4U
+#define SIX_OUTPUTS 0x3FU
+#define SAMPLE_PULSE_TICKS 112U /* 1 us */
+#define FTM0_INIT_TRIGGER 22U
+
+#define PAIR(n)                                                                                         \
+    (FTM_COMBINE_COMBINE##n | FTM_COMBINE_COMP##n | FTM_COMBINE_DTEN##n | FTM_COMBINE_SYNCEN##n | \
+     FTM_COMBINE_FAULTEN##n)
+/* Compare values at the next start by SWSYNC, the output mask by TRIG0, which a write without it would disarm. */
+#define LOAD (FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC | FTM_SYNC_TRIG0)
+#define ENABLED                                                                                                    \
+    (FTM_SC_PWMEN0 | FTM_SC_PWMEN1 | FTM_SC_PWMEN2 | FTM_SC_PWMEN3 | FTM_SC_PWMEN4 | FTM_SC_PWMEN5 | FTM_SC_PWMEN6)
+
+static uint32_t period;
+static bool gates;                        /* as last commanded */
+static volatile bool fault_for_drive, fault_for_board; /* set by the fault interrupt, each taken by its reader */
+
+static void configure_outputs(const pwm_config_t *config)
+{
+    FTM0->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
+    FTM0->CONF = FTM_CONF_BDMMODE(0);
+    FTM0->CNTIN = 0;
+    FTM0->MOD = config->period_ticks - 1U;
+    FTM0->C0SC = FTM_C0SC_ELSB;
+    FTM0->C2SC = FTM_C0SC_ELSB;
+    FTM0->C4SC = FTM_C0SC_ELSB;
+    FTM0->C6SC = FTM_C0SC_ELSB;
+    FTM0->COMBINE = PAIR(0) | PAIR(1) | PAIR(2) | FTM_COMBINE_COMBINE3;
+    FTM0->POL = 0; /* safe: both switches of a pair off */
+    FTM0->DEADTIME = FTM_DEADTIME_DTVAL(config->dead_time_ticks) | FTM_DEADTIME_DTVALEX(config->dead_time_ticks >> 6);
+    FTM0->C6V = SAMPLE_PULSE_TICKS;
+    FTM0->C7V = config->period_ticks;
+}
+
+static void configure_faults(void)
+{
+    FTM0->FLTPOL = FTM_FLTPOL_FLT0POL;
+    FTM0->FLTCTRL = FTM_FLTCTRL_FAULT0EN | FTM_FLTCTRL_FFLTR0EN | FTM_FLTCTRL_FFVAL(FAULT_FILTER);
+    FTM0->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS | FTM_MODE_FAULTM(ALL_CHANNELS_MANUAL) | FTM_MODE_FAULTIE;
+}
+
+/* Off: forced low now, masked from the next start on. */
+static void open_gates(void)
+{
+    FTM0->SWOCTRL = SIX_OUTPUTS;
+    FTM0->OUTMASK = SIX_OUTPUTS;
+    FTM0->SYNC = LOAD;
+}
+
+/* On: still masked until the next start, which takes over mask and duties together. */
+static void close_gates(void)
+{
+    if ((FTM0->FMS & (FTM_FMS_FAULTF | FTM_FMS_FAULTIN)) == FTM_FMS_FAULTF) {
+        FTM0->FMS = FTM_FMS_WPEN; /* clears FAULTF: the fault is over, and the drive has been told */
+    }
+    core_irq_enable(IRQ_FTM0_FAULT);
+    FTM0->OUTMASK = 0;
+    FTM0->SWOCTRL = 0;
+    FTM0->SYNC = LOAD;
+}
+
+void pwm_init(const pwm_config_t *config)
+{
+    period = config->period_ticks;
+    TRGMUX->TRGMUX_FTM0 = TRGMUX_FTM0_SEL0(FTM0_INIT_TRIGGER);
+    configure_outputs(config);
+    configure_faults();
+    FTM0->OUTMASK = SIX_OUTPUTS; /* at once, as long as SYNCHOM is not set */
+    FTM0->SWOCTRL = SIX_OUTPUTS;
+    FTM0->SYNCONF = FTM_SYNCONF_SYNCMODE | FTM_SYNCONF_SWWRBUF | FTM_SYNCONF_HWOM;
+    FTM0->SYNC = FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM;
+    FTM0->EXTTRIG = FTM_EXTTRIG_INITTRIGEN;
+    FTM0->CNT = 0;
+    FTM0->SC = ENABLED;
+    hal_pwm_write((duty_t){16384, 16384, 16384});
+    gates = false;
+}
+
+void pwm_start(void)
+{
+    FTM0->SC = ENABLED | FTM_SC_CLKS(SYSTEM_CLOCK);
+    FTM0->FMS = FTM_FMS_WPEN; /* not before: it protects CLKS, too */
+}
+
+/* First and last tick of the upper switch's pulse, in the middle of the period; beyond MOD there is no match. */
+static inline uint32_t width(uint32_t duty)
+{
+    return (duty * period + 16384U) >> 15;
+}
+
+static inline uint32_t rise(uint32_t ticks)
+{
+    return (ticks == 0U) ? period : (period - ticks) >> 1;
+}
+
+void hal_pwm_write(duty_t duty)
+{
+    const uint32_t a = width(duty.a);
+    const uint32_t b = width(duty.b);
+    const uint32_t c = width(duty.c);
+    FTM0->C0V = rise(a);
+    FTM0->C1V = rise(a) + a;
+    FTM0->C2V = rise(b);
+    FTM0->C3V = rise(b) + b;
+    FTM0->C4V = rise(c);
+    FTM0->C5V = rise(c) + c;
+    FTM0->SYNC = LOAD;
+}
+
+void hal_pwm_enable(bool on)
+{
+    if (on == gates) {
+        return;
+    }
+    gates = on;
+    if (on) {
+        close_gates();
+    } else {
+        open_gates();
+    }
+}
+
+/* The request stays up until FAULTF is cleared, which waits for the gates: so it is masked here. */
+void pwm_gate_fault_isr(void)
+{
+    fault_for_drive = true;
+    fault_for_board = true;
+    core_irq_disable(IRQ_FTM0_FAULT);
+}
+
+bool pwm_fault_reported(void)
+{
+    const bool was = fault_for_board;
+    fault_for_board = false;
+    return was || (FTM0->FMS & FTM_FMS_FAULTIN) != 0U;
+}
+
+bool pwm_fault_taken(void)
+{
+    if (!fault_for_drive) {
+        return false;
+    }
+    fault_for_drive = false;
+    return true;
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_S32K144_PWM_H
+#define HAL_S32K144_PWM_H
+/** FTM0: three complementary pairs with dead time, and the pulse that makes the resolver converter sample.
+ * Source   README.md, PWM
+ * Units    ticks of 112 MHz
+ * Range    period_ticks up to 65535
+ * Context  pwm_init(), pwm_start(): start-up; pwm_fault_reported(): 1 kHz task;
+ *          pwm_gate_fault_isr(): fault interrupt, the timer has already opened the gates */
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+    uint32_t period_ticks;
+    uint32_t dead_time_ticks; /* at most 1023 */
+} pwm_config_t;
+
+void pwm_init(const pwm_config_t *config);
+/** The counter runs from here on; its first period starts now. */
+void pwm_start(void);
+void pwm_gate_fault_isr(void);
+/** True while the fault input is active, and once after it was. */
+bool pwm_fault_reported(void);
+/** A gate fault that the fast ISR has not yet handed to the drive; taken by the call. */
+bool pwm_fault_taken(void);
+
+#endif

@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/s32k144/startup.h"
+
+#include "hal/s32k144/core.h"
+#include "hal/s32k144/registers.h"
+#include "hal/s32k144/wdog.h"
+#include "hal/system.h"
+
+#define STACK_PATTERN 0xC5C5C5C5U
+#define AWAIT_LOOPS 200000U /* 10 ms and more at any clock */
+#define OUTPUTS_OFF 0x3FU
+#define VECTORS (16 + 123)
+
+/* From the linker script. */
+extern uint32_t stack_bottom[], stack_top[];
+extern uint32_t data_start[], data_end[], bss_start[], bss_end[];
+extern const uint32_t data_load[];
+
+int main(void);
+
+static uint32_t cause, unused;
+
+/* The bits of RCM_SRS, the most telling first: a power-on also counts as a low voltage. */
+reset_cause_t hal_system_reset_cause(void)
+{
+    static const struct {
+        uint32_t bit;
+        reset_cause_t meaning;
+    } known[] = {
+        {RCM_SRS_POR, RESET_POWER_ON},     {RCM_SRS_WDOG, RESET_WATCHDOG}, {RCM_SRS_LOCKUP, RESET_LOCKUP},
+        {RCM_SRS_LOC, RESET_CLOCK},        {RCM_SRS_LOL, RESET_CLOCK},     {RCM_SRS_SW, RESET_SOFTWARE},
+        {RCM_SRS_LVD, RESET_BROWN_OUT},    {RCM_SRS_PIN, RESET_PIN},
+    };
+    for (uint32_t k = 0; k < sizeof known / sizeof known[0]; k++) {
+        if ((cause & known[k].bit) != 0U) {
+            return known[k].meaning;
+        }
+    }
+    return RESET_UNKNOWN;
+}
+
+uint32_t stack_measure(void)
+{
+    const volatile uint32_t *word = stack_bottom;
+    while (word < stack_top && *word == STACK_PATTERN) {
+        word++;
+    }
+    unused = (uint32_t)((uintptr_t)word - (uintptr_t)stack_bottom);
+    return unused;
+}
+
+uint32_t hal_system_stack_unused(void)
+{
+    return unused;
+}
+
+_Noreturn void panic(void)
+{
+    FTM0->SWOCTRL = OUTPUTS_OFF; /* before its clock is on, this access faults in turn: the core resets then, too */
+    SCB_AIRCR = AIRCR_RESET;
+    for (;;) {
+    }
+}
+
+void await(const volatile uint32_t *word, uint32_t mask, uint32_t value)
+{
+    for (uint32_t k = 0; k < AWAIT_LOOPS; k++) {
+        if ((*word & mask) == value) {
+            return;
+        }
+    }
+    panic();
+}
+
+/* A fault's cause may be the stack itself: start from a fresh one. */
+__attribute__((naked)) void fault_handler(void)
+{
+    __asm__ volatile("ldr r0, =stack_top\n msr msp, r0\n b panic\n" ::"i"(panic));
+}
+
+static void clear_and_copy(void)
+{
+    const uint32_t *from = data_load;
+    for (uint32_t *to = data_start; to < data_end; to++, from++) {
+        *to = *from;
+    }
+    for (uint32_t *to = bss_start; to < bss_end; to++) {
+        *to = 0;
+    }
+}
+
+/* Everything below the current frame, and a little less. */
+static void paint_stack(void)
+{
+    uint32_t *here;
+    __asm__ volatile("mov %0, sp" : "=r"(here));
+    for (uint32_t *word = stack_bottom; word < here - 8; word++) {
+        *word = STACK_PATTERN;
+    }
+}
+
+__attribute__((used)) void reset_handler(void)
+{
+    wdog_first();
+    SCB_CPACR = SCB_CPACR | CPACR_FPU;
+    __asm__ volatile("dsb\n isb" ::: "memory");
+    paint_stack();
+    clear_and_copy();
+    cause = RCM->SRS;
+    (void)main();
+    panic();
+}
+
+#define EXTERNAL(irq) (16 + (irq))
+
+typedef void (*vector_t)(void);
+
+__attribute__((section(".vectors"), used)) static const vector_t vectors[VECTORS] = {
+    [0] = (vector_t)(uintptr_t)stack_top,
+    [1] = reset_handler,
+    /* No system exception is used, and no interrupt but these: each of the others is a fault. */
+    [2 ... EXTERNAL(IRQ_ADC0) - 1] = fault_handler,
+    [EXTERNAL(IRQ_ADC0)] = adc_handler,
+    [EXTERNAL(IRQ_ADC0) + 1 ... EXTERNAL(IRQ_LPIT0_CH0) - 1] = fault_handler,
+    [EXTERNAL(IRQ_LPIT0_CH0)] = tick_handler,
+    [EXTERNAL(IRQ_LPIT0_CH0) + 1 ... EXTERNAL(IRQ_MRAI) - 1] = fault_handler,
+    [EXTERNAL(IRQ_MRAI)] = mrai_handler,
+    [EXTERNAL(IRQ_MRAI) + 1 ... EXTERNAL(IRQ_CAN0_ORED) - 1] = fault_handler,
+    [EXTERNAL(IRQ_CAN0_ORED)] = can_bus_off_handler,
+    [EXTERNAL(IRQ_CAN0_ORED) + 1 ... EXTERNAL(IRQ_CAN0_ORED_0_15_MB) - 1] = fault_handler,
+    [EXTERNAL(IRQ_CAN0_ORED_0_15_MB)] = can_message_handler,
+    [EXTERNAL(IRQ_CAN0_ORED_0_15_MB) + 1 ... EXTERNAL(IRQ_FTM0_FAULT) - 1] = fault_handler,
+    [EXTERNAL(IRQ_FTM0_FAULT)] = gate_fault_handler,
+    [EXTERNAL(IRQ_FTM0_FAULT) + 1 ... VECTORS - 1] = fault_handler,
+};
+
+/* Keys, protection off, FSEC: not secured, FOPT: as delivered. */
+__attribute__((section(".flash_config"), used)) static const uint32_t flash_config[4] = {
+    0xFFFFFFFFU, 0xFFFFFFFFU, 0xFFFFFFFFU, 0xFFFF7FFEU};

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_S32K144_STARTUP_H
+#define HAL_S32K144_STARTUP_H
+/** From reset to main(), and the way back when nothing can go on.
+ * Source   README.md, memory and stack guard
+ * Units    bytes
+ * Errors   panic(): switches the outputs off and resets the processor; every fault of the core ends there
+ * Context  stack_measure(): background, looks at every word; panic(): any, needs no stack */
+#include <stdint.h>
+
+/** Bytes of the stack that nothing has ever touched; hal_system_stack_unused() repeats the last answer. */
+uint32_t stack_measure(void);
+_Noreturn void panic(void);
+
+/** Waits until (*word & mask) == value, at most a few milliseconds; panics then. */
+void await(const volatile uint32_t *word, uint32_t mask, uint32_t value);
+
+/* Handlers named by the vector table. */
+void reset_handler(void);
+void fault_handler(void);
+void gate_fault_handler(void);
+void adc_handler(void);
+void mrai_handler(void);
+void can_message_handler(void);
+void can_bus_off_handler(void);
+void tick_handler(void);
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/s32k144/tick.h"
+
+#include "hal/s32k144/registers.h"
+
+static uint32_t pwm_ticks;
+
+void tick_init(uint32_t period_ticks)
+{
+    pwm_ticks = period_ticks;
+    LPIT0->MCR = LPIT_MCR_M_CEN;
+    LPIT0->MIER = LPIT_MIER_TIE0;
+    LPIT0->TVAL0 = 9U * period_ticks + period_ticks / 4U - 1U;
+}
+
+/* The second value waits in the timer until the first has expired. The read lets four timer clocks pass. */
+void tick_start(void)
+{
+    LPIT0->TCTRL0 = LPIT_TCTRL0_T_EN;
+    (void)LPIT0->TCTRL0;
+    LPIT0->TVAL0 = 10U * pwm_ticks - 1U;
+}
+
+void tick_cleared(void)
+{
+    LPIT0->MSR = LPIT_MSR_TIF0;
+    (void)LPIT0->MSR; /* the write has arrived before the interrupt returns */
+}

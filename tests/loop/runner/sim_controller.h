@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef LOOP_RUNNER_SIM_CONTROLLER_H
+#define LOOP_RUNNER_SIM_CONTROLLER_H
+/** A controller as the runner sees it: the firmware, its twin, or an emulated processor.
+ *   in:  ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start
+ *   out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1
+ * Errors   set answers a SIM_ code; get of an unknown name is NaN; failure() is NULL, or why no further
+ *          step can be run (it may be left out)
+ * Context  host; owned by the runner, which destroys it */
+#include "sim.h"
+
+typedef struct {
+    void *self;
+    void (*step)(void *self, const double in[6], double out[4]);
+    int (*set)(void *self, const char *name, double value);
+    double (*get)(const void *self, const char *name);
+    const char *(*failure)(const void *self);
+    void (*destroy)(void *self);
+} sim_controller_t;
+
+/** Takes the controller over, also when it answers NULL (out of memory). */
+sim_t *sim_create_with(sim_controller_t controller);
+
+#endif

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The two controllers that come with the runner: the firmware, and its twin. */
+#include "hal/host/fluxtrue.h"
+#include "sim_controller.h"
+#include "twin/twin.h"
+
+#include <stddef.h>
+
+static void firmware_step(void *self, const double in[6], double out[4])
+{
+    fluxtrue_step(self, in, out);
+}
+
+static int firmware_set(void *self, const char *name, double value)
+{
+    return fluxtrue_set(self, name, value);
+}
+
+static double firmware_get(const void *self, const char *name)
+{
+    return fluxtrue_get(self, name);
+}
+
+static void firmware_destroy(void *self)
+{
+    fluxtrue_destroy(self);
+}
+
+/* Firmware of the caller. */
+static void firmware_keep(void *self)
+{
+    (void)self;
+}
+
+static void twin_step_(void *self, const double in[6], double out[4])
+{
+    twin_step(self, in, out);
+}
+
+static int twin_set_(void *self, const char *name, double value)
+{
+    return twin_set(self, name, value);
+}
+
+static double twin_get_(const void *self, const char *name)
+{
+    return twin_get(self, name);
+}
+
+static void twin_destroy_(void *self)
+{
+    twin_destroy(self);
+}
+
+sim_t *sim_create(int controller)
+{
+    if (controller == SIM_FIRMWARE) {
+        return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
+                                                  firmware_destroy});
+    }
+    if (controller == SIM_TWIN) {
+        return sim_create_with(
+            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_});
+    }
+    return NULL;
+}
+
+sim_t *sim_create_around(fluxtrue_t *firmware)
+{
+    return sim_create_with(
+        (sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep});
+}

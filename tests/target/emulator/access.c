@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What tests and tools see of a running emulator. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "emu_private.h"
+
+emu_pins_t *emu_pins(emu_t *emu)
+{
+    emu->s.pins_set_at = emu->s.now;
+    return &emu->s.pins;
+}
+
+const emu_pins_t *emu_pins_look(const emu_t *emu)
+{
+    return &emu->s.pins;
+}
+
+void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
+{
+    emu->s.pins.gate_fault = gate_fault;
+    emu->s.pins.resolver_fault = resolver_fault;
+}
+
+/* The shaft turns on between two settings. */
+uint32_t emu_angle(const emu_t *emu)
+{
+    const int64_t passed = (int64_t)(emu->s.now - emu->s.pins_set_at);
+    return emu->s.pins.angle + (uint32_t)((passed * emu->s.pins.angle_rate) / 65536);
+}
+
+const char *emu_error(const emu_t *emu)
+{
+    return emu->error[0] != '\0' ? emu->error : NULL;
+}
+
+uint64_t emu_now(const emu_t *emu)
+{
+    return emu->s.now;
+}
+
+uint64_t emu_instructions(const emu_t *emu)
+{
+    return emu->s.instructions;
+}
+
+uint32_t emu_resets(const emu_t *emu)
+{
+    return emu->s.resets;
+}
+
+bool emu_read(const emu_t *emu, uint32_t address, void *to, uint32_t size)
+{
+    return uc_mem_read(emu->uc, address, to, size) == UC_ERR_OK;
+}
+
+bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size)
+{
+    return uc_mem_write(emu->uc, address, from, size) == UC_ERR_OK;
+}
+
+uint32_t emu_symbol(const emu_t *emu, const char *name)
+{
+    return elf_symbol(&emu->elf, name, NULL);
+}
+
+uint32_t emu_symbol_size(const emu_t *emu, const char *name)
+{
+    uint32_t size = 0;
+    (void)elf_symbol(&emu->elf, name, &size);
+    return size;
+}
+
+uint64_t emu_register(const emu_t *emu, const char *name)
+{
+    const char *dot = strchr(name, '.');
+    for (int p = 0; dot != NULL && p < peripherals_count; p++) {
+        const size_t length = strlen(peripherals[p].name);
+        if ((size_t)(dot - name) != length || strncmp(name, peripherals[p].name, length) != 0) {
+            continue;
+        }
+        for (int r = 0; r < emu->facts_of[p]->count; r++) {
+            if (strcmp(emu->facts_of[p]->fact[r].name, dot + 1) == 0) {
+                return emu->s.value[p][r];
+            }
+        }
+    }
+    return UINT64_MAX;
+}
+
+void emu_on_exception(emu_t *emu, emu_exception_fn fn, void *user)
+{
+    emu->on_exception = fn;
+    emu->on_exception_user = user;
+}
+
+int emu_active_vector(const emu_t *emu)
+{
+    return emu->s.nvic.nest > 0 ? emu->s.nvic.active[emu->s.nvic.nest - 1] : 0;
+}
+
+void emu_can_port(emu_t *emu, can_port_t *port)
+{
+    emu->can_port = port;
+}
+
+void emu_pend(emu_t *emu, int vector)
+{
+    nvic_pend(emu, vector);
+}
+
+void emu_break_after(emu_t *emu, uint64_t instructions)
+{
+    emu->s.break_at = emu->s.instructions + instructions;
+}
+
+emu_snapshot_t *emu_save(emu_t *emu)
+{
+    emu_snapshot_t *snapshot = calloc(1, sizeof *snapshot);
+    if (snapshot != NULL && uc_context_alloc(emu->uc, &snapshot->context) == UC_ERR_OK) {
+        (void)uc_context_save(emu->uc, snapshot->context);
+        snapshot->state = emu->s;
+        (void)uc_mem_read(emu->uc, RAM_BASE, snapshot->ram, RAM_SIZE);
+    }
+    return snapshot;
+}
+
+void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot)
+{
+    (void)uc_context_restore(emu->uc, snapshot->context);
+    (void)uc_mem_write(emu->uc, RAM_BASE, snapshot->ram, RAM_SIZE);
+    emu->s = snapshot->state;
+    emu->error[0] = '\0';
+}
+
+void emu_snapshot_free(emu_snapshot_t *snapshot)
+{
+    if (snapshot != NULL) {
+        (void)uc_context_free(snapshot->context);
+        free(snapshot);
+    }
+}

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Analogue-to-digital converters. Results are what the pins carry when the conversion ends; they change once per PWM
+ * period, at its begin. A conversion takes SMPLTS + 1 + 30 converter clocks (of the order of the data sheet's). */
+#include "emu_private.h"
+
+enum {
+    SC1 = 0x00, SC1_LAST = 0x3C, CFG1 = 0x40, CFG2 = 0x44, R = 0x48, R_LAST = 0x84, SC2 = 0x90, SC3 = 0x94, TRIM = 0x98,
+    COCO = 0x80, AIEN = 0x40, OFF = 31, CONVERSION = 30, ADC0_IRQ = 39, ADC1_IRQ = 40,
+};
+
+static const peripheral_t *of(int instance)
+{
+    return bus_find(instance == 0 ? "ADC0" : "ADC1");
+}
+
+bool adc_models(uint32_t offset)
+{
+    return offset <= R_LAST || (offset >= SC2 && offset <= 0xE8U);
+}
+
+static void line_update(emu_t *emu, const peripheral_t *self)
+{
+    bool level = false;
+    for (uint32_t at = SC1; at <= SC1_LAST; at += 4U) {
+        level = level || (bus_get(emu, self, at) & (COCO | AIEN)) == (COCO | AIEN);
+    }
+    nvic_line(emu, self->instance == 0 ? ADC0_IRQ : ADC1_IRQ, level);
+}
+
+uint32_t adc_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    if (offset >= R && offset <= R_LAST) {
+        const uint32_t control = offset - R;
+        bus_put(emu, self, control, bus_get(emu, self, control) & ~(uint32_t)COCO);
+        line_update(emu, self);
+    }
+    return stored;
+}
+
+static uint64_t conversion_ticks(emu_t *emu, const peripheral_t *self)
+{
+    const uint32_t cfg1 = bus_get(emu, self, CFG1), sc3 = bus_get(emu, self, SC3);
+    const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (cfg1 >> 5 & 3U);
+    if (clock == 0 || (cfg1 & 3U) != 0) {
+        emu_fail(emu, "%s converts without a clock (PCC, SCG divider 2, CFG1.ADICLK)", self->name);
+        return 1;
+    }
+    if (clock < 67U) { /* 50 MHz */
+        emu_fail(emu, "%s: the converter's clock is above 50 MHz", self->name);
+    }
+    if ((cfg1 >> 2 & 3U) != 1U) {
+        emu_fail(emu, "%s: only 12-bit conversions are modelled (CFG1.MODE = 1)", self->name);
+    }
+    const uint32_t each = (bus_get(emu, self, CFG2) & 0xFFU) + 1U + CONVERSION;
+    return (uint64_t)clock * each * ((sc3 & 4U) != 0 ? 4U << (sc3 & 3U) : 1U);
+}
+
+static void start(emu_t *emu, const peripheral_t *self, int channel)
+{
+    adc_t *a = &emu->s.adc[self->instance];
+    if ((bus_get(emu, self, 4U * (uint32_t)channel) & 31U) == OFF) {
+        return;
+    }
+    a->current = channel + 1;
+    a->done = emu->s.now + conversion_ticks(emu, self);
+    emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
+}
+
+static void calibrate(emu_t *emu, const peripheral_t *self)
+{
+    (void)conversion_ticks(emu, self); /* it needs a clock, too */
+    bus_put(emu, self, SC3, bus_get(emu, self, SC3) & ~0x80U);
+    bus_put(emu, self, SC1, bus_get(emu, self, SC1) | COCO);
+}
+
+void adc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    (void)old;
+    if (offset == SC2 && (value & 0x3CU) != 0) {
+        emu_fail(emu, "write of %s.SC2: comparison and DMA are not modelled", self->name);
+    } else if (offset == SC3 && (value & 0x80U) != 0) {
+        calibrate(emu, self);
+    } else if (offset <= SC1_LAST) {
+        bus_put(emu, self, offset, value & (AIEN | 31U)); /* clears COCO */
+        line_update(emu, self);
+        if (offset == SC1 && (bus_get(emu, self, SC2) & 0x40U) == 0) {
+            start(emu, self, 0);
+        }
+    }
+}
+
+void adc_pretrigger(emu_t *emu, int instance, int channel)
+{
+    const peripheral_t *self = of(instance);
+    if ((bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0 || (bus_get(emu, self, SC2) & 0x40U) == 0) {
+        return;
+    }
+    if (emu->s.adc[instance].current != 0 || (bus_get(emu, self, 4U * (uint32_t)channel) & COCO) != 0) {
+        pdb_sequence_error(emu, instance, channel); /* busy, or the last result was never read */
+    }
+    if (emu->s.adc[instance].current == 0) {
+        start(emu, self, channel);
+    }
+}
+
+void adc_fire(emu_t *emu, int instance)
+{
+    const peripheral_t *self = of(instance);
+    adc_t *a = &emu->s.adc[instance];
+    const int channel = a->current - 1;
+    const uint32_t control = 4U * (uint32_t)channel;
+    const uint32_t input = bus_get(emu, self, control) & 31U;
+    a->current = 0;
+    bus_put(emu, self, R + control, emu->s.pins.adc[instance][input] & 0xFFFU);
+    bus_put(emu, self, control, bus_get(emu, self, control) | COCO);
+    line_update(emu, self);
+    if ((bus_get(emu, self, SC2) & 0x40U) != 0) {
+        pdb_acknowledge(emu, instance, channel);
+    }
+}

@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* FlexCAN0: freeze handshake, legacy receive FIFO without filtering (all masks 0), transmit mailboxes, one frame on the
+ * bus at a time. Bit errors, arbitration and bus off do not happen. */
+#include <string.h>
+
+#include "can_port.h"
+#include "emu_private.h"
+
+enum {
+    MCR = 0x00, CTRL1 = 0x04, TIMER = 0x08, RXMGMASK = 0x10, ECR = 0x1C, ESR1 = 0x20, IMASK1 = 0x28, IFLAG1 = 0x30,
+    CTRL2 = 0x34, RXFGMASK = 0x48, RAM = 0x80, RAM_END = 0x280, BOX = 16, RXIMR = 0x880,
+    CODE_SEND = 12, CODE_DONE = 8, FIRST_SEND_BOX = 8, BOXES = 16,
+    MB_IRQ = 81, FRAME_OVERHEAD_BITS = 47, EXTENDED_OVERHEAD_BITS = 67,
+    FIFO_WARNING = 1 << 6, FIFO_OVERFLOW = 1 << 7, FIFO_FRAME = 1 << 5,
+};
+#define MDIS (1U << 31)
+#define FRZ (1U << 30)
+#define RFEN (1U << 29)
+#define HALT (1U << 28)
+#define NOTRDY (1U << 27)
+#define SOFTRST (1U << 25)
+#define FRZACK (1U << 24)
+#define LPMACK (1U << 20)
+
+static const peripheral_t *can0(void)
+{
+    return bus_find("CAN0");
+}
+
+bool can_models(uint32_t offset)
+{
+    return offset <= ESR1 || offset == IMASK1 || offset == IFLAG1 || offset == CTRL2 || offset == RXFGMASK ||
+           (offset >= RAM && offset < RAM_END) || (offset >= RXIMR && offset < RXIMR + 64U);
+}
+
+static bool frozen(const emu_t *emu)
+{
+    return (bus_get(emu, can0(), MCR) & (FRZ | HALT)) == (FRZ | HALT);
+}
+
+static bool running(const emu_t *emu)
+{
+    return (bus_get(emu, can0(), MCR) & MDIS) == 0 && !frozen(emu);
+}
+
+uint32_t can_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    (void)self;
+    if (offset == MCR) {
+        const uint32_t off = (stored & MDIS) != 0 ? NOTRDY | LPMACK : 0U;
+        const uint32_t halted = off == 0 && frozen(emu) ? NOTRDY | FRZACK : 0U;
+        return (stored & ~(NOTRDY | FRZACK | LPMACK | SOFTRST)) | off | halted;
+    }
+    return offset == TIMER ? (uint32_t)(emu->s.now / (EMU_TICKS_PER_S / 500000U)) & 0xFFFFU : stored;
+}
+
+static void line_update(emu_t *emu)
+{
+    const uint32_t raised = bus_get(emu, can0(), IFLAG1) & bus_get(emu, can0(), IMASK1) & 0xFFFFU;
+    nvic_line(emu, MB_IRQ, raised != 0);
+}
+
+/* ---- receiving ---- */
+
+static uint32_t word_of(const uint8_t *byte)
+{
+    return (uint32_t)byte[0] << 24 | (uint32_t)byte[1] << 16 | (uint32_t)byte[2] << 8 | byte[3];
+}
+
+/* The FIFO's first frame is seen through mailbox 0. */
+static void fifo_show(emu_t *emu)
+{
+    const peripheral_t *self = can0();
+    const can_t *c = &emu->s.can;
+    if (c->fifo_count == 0) {
+        return;
+    }
+    const can_port_frame_t *frame = &c->fifo[0];
+    bus_put(emu, self, RAM, (uint32_t)frame->length << 16 | (frame->extended ? 3U << 21 : 0U));
+    bus_put(emu, self, RAM + 4U, frame->extended ? frame->id : frame->id << 18);
+    bus_put(emu, self, RAM + 8U, word_of(frame->data));
+    bus_put(emu, self, RAM + 12U, word_of(frame->data + 4));
+    bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | FIFO_FRAME);
+    line_update(emu);
+}
+
+void can_frame_arrives(emu_t *emu, const can_port_frame_t *frame)
+{
+    const peripheral_t *self = can0();
+    can_t *c = &emu->s.can;
+    if (!running(emu) || (bus_get(emu, self, MCR) & RFEN) == 0) {
+        return; /* nobody listens */
+    }
+    if (c->fifo_count == EMU_CAN_FIFO) {
+        bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | FIFO_OVERFLOW);
+        line_update(emu);
+        return;
+    }
+    c->fifo[c->fifo_count++] = *frame;
+    if (c->fifo_count == EMU_CAN_FIFO - 1) {
+        bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | FIFO_WARNING);
+    }
+    if (c->fifo_count == 1) {
+        fifo_show(emu);
+    }
+}
+
+static void flags_written(emu_t *emu, uint32_t old, uint32_t value)
+{
+    can_t *c = &emu->s.can;
+    bus_put(emu, can0(), IFLAG1, old & ~value);
+    if ((old & value & FIFO_FRAME) != 0 && c->fifo_count > 0) {
+        c->fifo_count--;
+        memmove(&c->fifo[0], &c->fifo[1], (size_t)c->fifo_count * sizeof c->fifo[0]);
+        fifo_show(emu);
+    }
+    line_update(emu);
+}
+
+/* ---- sending ---- */
+
+static uint32_t box_at(int box)
+{
+    return RAM + BOX * (uint32_t)box;
+}
+
+static can_port_frame_t frame_in(const emu_t *emu, int box)
+{
+    const peripheral_t *self = can0();
+    const uint32_t form = bus_get(emu, self, box_at(box)), id = bus_get(emu, self, box_at(box) + 4U);
+    can_port_frame_t frame = {.extended = (form >> 21 & 1U) != 0, .length = (uint8_t)(form >> 16 & 15U)};
+    frame.id = frame.extended ? id & 0x1FFFFFFFU : id >> 18 & 0x7FFU;
+    frame.length = frame.length > 8U ? 8U : frame.length;
+    for (uint32_t k = 0; k < 8U; k++) {
+        frame.data[k] = (uint8_t)(bus_get(emu, self, box_at(box) + 8U + 4U * (k / 4U)) >> (24U - 8U * (k % 4U)));
+    }
+    return frame;
+}
+
+/* The lowest identifier goes first. */
+static int box_to_send(const emu_t *emu)
+{
+    int best = -1;
+    uint32_t lowest = 0;
+    for (int box = FIRST_SEND_BOX; box < BOXES; box++) {
+        if ((bus_get(emu, can0(), box_at(box)) >> 24 & 15U) != CODE_SEND) {
+            continue;
+        }
+        const uint32_t id = bus_get(emu, can0(), box_at(box) + 4U) & 0x1FFFFFFFU;
+        if (best < 0 || id < lowest) {
+            best = box;
+            lowest = id;
+        }
+    }
+    return best;
+}
+
+/* 8 MHz oscillator or system clock, PRESDIV, and the quanta of one bit. */
+static uint64_t bit_ticks(emu_t *emu)
+{
+    const uint32_t c = bus_get(emu, can0(), CTRL1);
+    const uint32_t clock = (c & 1U << 13) != 0 ? 2U * emu->s.core_ticks : clocks_async_ticks(emu, 1, 2);
+    const uint32_t quanta = 4U + (c & 7U) + (c >> 19 & 7U) + (c >> 16 & 7U);
+    if (clock == 0) {
+        emu_fail(emu, "CAN0 runs without a clock (SOSCDIV2)");
+    }
+    return (uint64_t)clock * ((c >> 24) + 1U) * quanta;
+}
+
+static void send_next(emu_t *emu)
+{
+    can_t *c = &emu->s.can;
+    const int box = running(emu) ? box_to_send(emu) : -1;
+    if (c->sending != 0 || box < 0) {
+        return;
+    }
+    const can_port_frame_t frame = frame_in(emu, box);
+    const uint32_t overhead = frame.extended ? EXTENDED_OVERHEAD_BITS : FRAME_OVERHEAD_BITS;
+    c->sending = box + 1;
+    emu_timer(emu, TIMER_CAN, emu->s.now + bit_ticks(emu) * (overhead + 8U * frame.length));
+}
+
+void can_fire(emu_t *emu)
+{
+    can_t *c = &emu->s.can;
+    const peripheral_t *self = can0();
+    const int box = c->sending - 1;
+    const can_port_frame_t frame = frame_in(emu, box);
+    const uint32_t form = bus_get(emu, self, box_at(box));
+    c->sending = 0;
+    bus_put(emu, self, box_at(box), (form & ~(15U << 24)) | (uint32_t)CODE_DONE << 24);
+    bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | 1U << box);
+    line_update(emu);
+    if (emu->can_port != NULL && emu->can_port->sent != NULL) {
+        emu->can_port->sent(emu->can_port->user, &frame, emu->s.now);
+    }
+    send_next(emu);
+}
+
+/* ---- registers ---- */
+
+static void control_written(emu_t *emu, uint32_t value)
+{
+    if ((value & SOFTRST) != 0 || (value & 0x00004800U) != 0) {
+        emu_fail(emu, "write of CAN0.MCR: soft reset, pretended networking and flexible data rate are not modelled");
+    }
+    send_next(emu);
+}
+
+void can_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    (void)self;
+    const bool only_frozen = offset == CTRL1 || offset == RXMGMASK || offset == RXFGMASK ||
+                             (offset >= RXIMR && offset < RXIMR + 64U);
+    if (only_frozen && running(emu) && old != value) {
+        emu_fail(emu, "write of CAN0 offset 0x%x: it can be written in freeze mode only", offset);
+    }
+    if (offset == RXFGMASK && value != 0) {
+        emu_fail(emu, "write of CAN0.RXFGMASK: the FIFO's filters are not modelled, all pass");
+    }
+    if (offset == IFLAG1) {
+        flags_written(emu, old, value);
+    } else if (offset == IMASK1) {
+        line_update(emu);
+    } else if (offset == ESR1) {
+        bus_put(emu, can0(), ESR1, old & ~value);
+    } else if (offset == MCR) {
+        control_written(emu, value);
+    } else if (offset >= RAM && offset < RAM_END && (offset - RAM) % BOX == 0) {
+        send_next(emu);
+    }
+}

@@ -1,0 +1,347 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "emu_private.h"
+
+enum {
+    FIRC_TICKS = 70, /* 48 MHz: what the core starts with */
+    MMIO_BASE = 0x40000000,
+    MMIO_SIZE = 0x100000,
+    PPB_SIZE = 0x100000,
+    NO_ADDRESS = 0xFFFFFFF0U - 0x20000000U,
+    THUMB_32BIT = 0xE8,
+    BRANCH_TO_ITSELF = 0xE7FE,
+};
+#define PPB_BASE 0xE0000000U
+
+void emu_fail(emu_t *emu, const char *format, ...)
+{
+    if (emu->error[0] == '\0') {
+        char text[ERROR_SIZE / 2];
+        va_list arguments;
+        va_start(arguments, format);
+        (void)vsnprintf(text, sizeof text, format, arguments);
+        va_end(arguments);
+        const uint32_t pc = emu_pc(emu);
+        uint32_t offset;
+        const char *function = elf_function(&emu->elf, pc, &offset);
+        (void)snprintf(emu->error, sizeof emu->error, "%s, pc 0x%08x (%s+0x%x), %.6f s", text, pc, function, offset,
+                       (double)emu->s.now / (double)EMU_TICKS_PER_S);
+    }
+    emu->s.stop = true;
+    (void)uc_emu_stop(emu->uc);
+}
+
+uint32_t emu_pc(const emu_t *emu)
+{
+    uint32_t pc = 0;
+    (void)uc_reg_read(emu->uc, UC_ARM_REG_PC, &pc);
+    return pc;
+}
+
+/* ---- time ---- */
+
+static void limit_update(emu_t *emu, uint64_t end)
+{
+    uint64_t next = end;
+    for (int i = 0; i < TIMERS; i++) {
+        next = emu->s.due[i] < next ? emu->s.due[i] : next;
+    }
+    emu->s.limit = next;
+}
+
+void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due)
+{
+    emu->s.due[timer] = due;
+    if (due < emu->s.limit) {
+        emu->s.limit = due;
+    }
+}
+
+void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle)
+{
+    emu->s.core_ticks = ticks_per_cycle;
+}
+
+static void timers_fire(emu_t *emu)
+{
+    static void (*const fire[TIMERS])(emu_t *, int) = {
+        [TIMER_FTM0] = ftm_fire, [TIMER_FTM2] = ftm_fire, [TIMER_PDB0] = pdb_fire,   [TIMER_PDB1] = pdb_fire,
+        [TIMER_ADC0] = adc_fire, [TIMER_ADC1] = adc_fire, [TIMER_LPIT0] = lpit_fire, [TIMER_LPIT1] = lpit_fire,
+        [TIMER_LPIT2] = lpit_fire, [TIMER_LPIT3] = lpit_fire,
+    };
+    static const uint8_t instance[TIMERS] = {[TIMER_FTM2] = 1, [TIMER_PDB1] = 1, [TIMER_ADC1] = 1,
+                                             [TIMER_LPIT1] = 1, [TIMER_LPIT2] = 2, [TIMER_LPIT3] = 3};
+    for (int i = 0; i < TIMERS; i++) {
+        if (emu->s.due[i] <= emu->s.now) {
+            emu->s.due[i] = NEVER;
+            if (fire[i] != NULL) {
+                fire[i](emu, instance[i]);
+            } else if (i == TIMER_WDOG) {
+                wdog_fire(emu);
+            } else if (i == TIMER_CAN) {
+                can_fire(emu);
+            } else {
+                systick_fire(emu);
+            }
+        }
+    }
+}
+
+/* ---- instructions ---- */
+
+static uint16_t count_instructions(const uint8_t *code, uint32_t size)
+{
+    uint16_t count = 0;
+    for (uint32_t at = 0; at < size; count++) {
+        at += code[at + 1] >= THUMB_32BIT ? 4U : 2U;
+    }
+    return count;
+}
+
+static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
+{
+    block_t *known = address < FLASH_SIZE ? &emu->block[address / 2U] : NULL;
+    if (known != NULL && known->size == size) {
+        return *known;
+    }
+    uint8_t code[4096];
+    block_t block = {.size = (uint16_t)size, .count = 1};
+    if (size <= sizeof code && uc_mem_read(emu->uc, address, code, size) == UC_ERR_OK) {
+        block.count = count_instructions(code, size);
+        block.idle = size == 2U && (code[0] | code[1] << 8) == BRANCH_TO_ITSELF;
+    }
+    if (known != NULL) {
+        *known = block;
+    }
+    return block;
+}
+
+static bool must_stop(const state_t *s)
+{
+    return s->stop || s->now >= s->limit || s->reschedule || s->instructions >= s->break_at;
+}
+
+static bool masks_opened(emu_t *emu)
+{
+    if (emu->s.poll_masks && nvic_best(emu) >= 0) {
+        emu->s.reschedule = true;
+    }
+    return emu->s.reschedule;
+}
+
+/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. */
+static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
+{
+    emu_t *emu = user;
+    if (must_stop(&emu->s) || masks_opened(emu)) {
+        (void)uc_emu_stop(uc);
+        return;
+    }
+    const block_t block = block_at(emu, (uint32_t)address, size);
+    if (block.idle) {
+        emu->s.now = emu->s.limit; /* waiting in a loop of one branch is sleeping */
+        (void)uc_emu_stop(uc);
+        return;
+    }
+    emu->s.instructions += block.count;
+    emu->s.now += (uint64_t)block.count * emu->s.core_ticks * EMU_CYCLES_PER_INSTRUCTION;
+}
+
+/* There before every access to a peripheral, so that the program counter is exact when one is refused. */
+static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+{
+    (void)uc, (void)type, (void)address, (void)size, (void)value, (void)user;
+}
+
+static bool on_unmapped(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+{
+    (void)uc, (void)value;
+    const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
+    const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
+    const char *what = fetch ? "fetch" : write ? "write" : "read";
+    emu_fail(user, "%s of %d bytes at 0x%08x, where nothing is or may be changed", what, size, (uint32_t)address);
+    return false;
+}
+
+enum { EXCEPTION_EXIT = 8 };
+
+static void on_exception(uc_engine *uc, uint32_t number, void *user)
+{
+    emu_t *emu = user;
+    if (number == EXCEPTION_EXIT) {
+        emu->s.exc_return = emu_pc(emu) | 1U;
+        (void)uc_emu_stop(uc);
+    } else {
+        emu_fail(emu, "the core raised exception %u (undefined instruction, SVC or breakpoint)", number);
+    }
+}
+
+static bool asleep(emu_t *emu)
+{
+    uint8_t code[2] = {0, 0};
+    const uint32_t pc = emu_pc(emu);
+    (void)uc_mem_read(emu->uc, pc - 2U, code, 2);
+    return code[0] == 0x30 && code[1] == 0xBF; /* wfi: unicorn stops behind it without a word */
+}
+
+static void run_core(emu_t *emu)
+{
+    state_t *s = &emu->s;
+    s->exc_return = 0;
+    const uc_err code = uc_emu_start(emu->uc, s->pc | 1U, NO_ADDRESS, 0, 0);
+    s->pc = emu_pc(emu);
+    if (code != UC_ERR_OK) {
+        emu_fail(emu, "the core stopped: %s", uc_strerror(code));
+    } else if (s->exc_return != 0) {
+        nvic_return(emu);
+    } else if (!must_stop(s) && asleep(emu)) {
+        s->nvic.sleeping = true;
+    }
+}
+
+int emu_run(emu_t *emu, uint64_t ticks)
+{
+    state_t *s = &emu->s;
+    const uint64_t end = s->now + ticks;
+    ftm_triggers(emu);
+    for (;;) {
+        if (emu->error[0] != '\0') {
+            return EMU_FAILED;
+        }
+        s->stop = s->centre = false;
+        timers_fire(emu);
+        if (s->reset_wanted) {
+            emu_reset(emu, s->reset_cause);
+        }
+        if (s->centre) {
+            return EMU_CENTRE;
+        }
+        if (s->now >= end) {
+            return EMU_LIMIT;
+        }
+        limit_update(emu, end);
+        s->reschedule = false;
+        if (nvic_take(emu)) {
+            s->nvic.sleeping = false;
+        }
+        if (s->instructions >= s->break_at) {
+            s->break_at = NEVER;
+            return EMU_BREAK;
+        }
+        if (s->nvic.sleeping) {
+            s->now = s->now > s->limit ? s->now : s->limit;
+        } else {
+            run_core(emu);
+        }
+    }
+}
+
+void emu_reset(emu_t *emu, uint32_t cause)
+{
+    state_t *s = &emu->s;
+    const state_t old = *s;
+    memset(s, 0, sizeof *s);
+    s->now = old.now;
+    s->instructions = old.instructions;
+    s->break_at = NEVER;
+    s->resets = old.resets + (cause != 0 ? 1U : 0U);
+    s->pins = old.pins;
+    s->pins_set_at = old.pins_set_at;
+    s->reset_cause = cause;
+    for (int i = 0; i < TIMERS; i++) {
+        s->due[i] = NEVER;
+    }
+    s->core_ticks = FIRC_TICKS;
+    bus_reset(emu);
+    nvic_reset(emu);
+    wdog_restart(emu);
+    uint32_t vector[2] = {0, 0}, zero = 0;
+    (void)uc_mem_read(emu->uc, 0, vector, sizeof vector);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_IPSR, &zero);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_CONTROL, &zero);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_PRIMASK, &zero);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_BASEPRI, &zero);
+    (void)uc_reg_write(emu->uc, UC_ARM_REG_SP, &vector[0]);
+    s->pc = vector[1] & ~1U;
+}
+
+/* ---- creation ---- */
+
+static bool maps_create(emu_t *emu)
+{
+    uc_hook hook;
+    uc_engine *uc = emu->uc;
+    void *code = (void *)on_code, *access = (void *)on_access;
+    const int kind = emu->mode == EMU_COUNTING ? UC_HOOK_CODE : UC_HOOK_BLOCK;
+    return uc_mem_map(uc, 0, FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC) == UC_ERR_OK &&
+           uc_mem_map(uc, RAM_BASE, RAM_SIZE, UC_PROT_ALL) == UC_ERR_OK &&
+           uc_mmio_map(uc, MMIO_BASE, MMIO_SIZE, bus_read, emu, bus_write, emu) == UC_ERR_OK &&
+           uc_mmio_map(uc, PPB_BASE, PPB_SIZE, scs_read, emu, scs_write, emu) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, kind, code, emu, 1, 0) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_INTR, (void *)on_exception, emu, 1, 0) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_unmapped, emu, 1, 0) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, MMIO_BASE,
+                       MMIO_BASE + MMIO_SIZE - 1) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, PPB_BASE,
+                       (uint64_t)PPB_BASE + PPB_SIZE - 1U) == UC_ERR_OK;
+}
+
+static const char *program_load(emu_t *emu)
+{
+    elf_segment_t segment;
+    for (int i = 0; elf_segment(&emu->elf, i, &segment); i++) {
+        if (segment.address >= FLASH_SIZE || segment.file_size > FLASH_SIZE - segment.address) {
+            return "has a part that does not lie in the flash";
+        }
+        if (uc_mem_write(emu->uc, segment.address, segment.content, segment.file_size) != UC_ERR_OK) {
+            return "does not fit the flash";
+        }
+    }
+    return NULL;
+}
+
+emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
+{
+    emu_t *emu = calloc(1, sizeof *emu);
+    const char *bad = emu == NULL ? "out of memory" : elf_read(&emu->elf, elf);
+    if (bad == NULL) {
+        emu->mode = (emu_mode_t)mode;
+        emu->block = calloc(FLASH_SIZE / 2, sizeof *emu->block);
+        if (emu->block == NULL || uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &emu->uc) != UC_ERR_OK ||
+            uc_ctl_set_cpu_model(emu->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !maps_create(emu) ||
+            !bus_create(emu)) {
+            bad = "the emulated core cannot be created";
+        } else {
+            uint8_t erased[4096];
+            memset(erased, 0xFF, sizeof erased);
+            for (uint32_t at = 0; at < FLASH_SIZE; at += sizeof erased) {
+                (void)uc_mem_write(emu->uc, at, erased, sizeof erased);
+            }
+            bad = program_load(emu);
+        }
+    }
+    if (bad != NULL) {
+        (void)snprintf(error, size, "%s: %s", elf, bad);
+        emu_destroy(emu);
+        return NULL;
+    }
+    emu_reset(emu, 0);
+    return emu;
+}
+
+void emu_destroy(emu_t *emu)
+{
+    if (emu != NULL) {
+        if (emu->uc != NULL) {
+            (void)uc_close(emu->uc);
+        }
+        bus_destroy(emu);
+        elf_free(&emu->elf);
+        free(emu->block);
+        free(emu);
+    }
+}

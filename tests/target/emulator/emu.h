@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_EMU_H
+#define EMULATOR_EMU_H
+/** An emulated S32K144 that runs an unmodified ELF file: a Cortex-M4F (unicorn) with register-level models of the
+ * peripherals the firmware uses. Time advances by executed instructions (each EMU_CYCLES_PER_INSTRUCTION core cycles:
+ * a convention of the emulation, not a measurement) and by the peripherals' events; a sleeping core jumps to the next.
+ * Source   docs/howto/emulate.md
+ * Units    time in ticks of 1/3.36 GHz: every clock of the chip is a whole number of them
+ * Errors   an access to a register that is not modelled or not clocked, a reserved bit, a fault of the core: the
+ *          emulation stops, emu_error() names peripheral, register, offset and program counter
+ * Context  host; any number of instances, one thread per instance at a time */
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define EMU_TICKS_PER_S 3360000000ULL
+#define EMU_CYCLES_PER_INSTRUCTION 2U
+#define EMU_PWM_CHANNELS 6
+
+#if defined(__GNUC__)
+#define EMU_API __attribute__((visibility("default")))
+#else
+#define EMU_API
+#endif
+
+typedef struct emu emu_t;
+
+typedef enum { EMU_FAST = 0, EMU_COUNTING = 1 } emu_mode_t;
+typedef enum { EMU_LIMIT = 0, EMU_CENTRE = 1, EMU_BREAK = 2, EMU_FAILED = -1 } emu_stop_t;
+
+/** What the pins carry into the chip. */
+typedef struct {
+    uint16_t adc[2][32];     /* 12-bit result of each converter's channel */
+    uint32_t angle;          /* of the shaft, 2^32 = one turn */
+    int32_t angle_rate;      /* 2^-32 turns per tick, 2^16 = 1: the shaft turns on between two settings */
+    bool resolver_fault;
+    bool gate_fault;         /* the gate driver pulls the fault input */
+} emu_pins_t;
+
+/** What the pins of the bridge do: compare values that act in this period, as a share of it. */
+typedef struct {
+    double duty[3];
+    bool gates;              /* all six outputs follow the timer */
+    double dead_time_s;
+    double period_s;
+} emu_bridge_t;
+
+/** NULL: error names why. EMU_COUNTING counts every instruction one by one and allows emu_break_after(). */
+EMU_API emu_t *emu_create(const char *elf, int mode, char *error, size_t size);
+EMU_API void emu_destroy(emu_t *emu);
+
+/** To be written now: the shaft turns on from this instant. */
+EMU_API emu_pins_t *emu_pins(emu_t *emu);
+EMU_API const emu_pins_t *emu_pins_look(const emu_t *emu);
+/** Lines that do not belong to an instant. */
+EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
+EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
+
+/** Runs for at most so many ticks; EMU_CENTRE: FTM0 has just begun a period, its buffered values are loaded, and the
+ * triggers of this instant come with the next call. */
+EMU_API int emu_run(emu_t *emu, uint64_t ticks);
+EMU_API const char *emu_error(const emu_t *emu);
+EMU_API uint64_t emu_now(const emu_t *emu);
+EMU_API uint64_t emu_instructions(const emu_t *emu);
+EMU_API uint32_t emu_resets(const emu_t *emu);
+
+/** Memory as the debugger sees it, and symbols (0: no such symbol). */
+EMU_API bool emu_read(const emu_t *emu, uint32_t address, void *to, uint32_t size);
+EMU_API bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size);
+EMU_API uint32_t emu_symbol(const emu_t *emu, const char *name);
+EMU_API uint32_t emu_symbol_size(const emu_t *emu, const char *name);
+
+/** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
+EMU_API uint64_t emu_register(const emu_t *emu, const char *name);
+
+/** Called when an exception's handler is entered and left (vector number, 16 = first interrupt). */
+typedef void (*emu_exception_fn)(void *user, int vector, bool entered);
+EMU_API void emu_on_exception(emu_t *emu, emu_exception_fn fn, void *user);
+EMU_API int emu_active_vector(const emu_t *emu);
+/** Makes an interrupt pending, as its peripheral would. */
+EMU_API void emu_pend(emu_t *emu, int vector);
+
+/** Everything but the program, in one piece. */
+typedef struct emu_snapshot emu_snapshot_t;
+EMU_API emu_snapshot_t *emu_save(emu_t *emu);
+EMU_API void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot);
+EMU_API void emu_snapshot_free(emu_snapshot_t *snapshot);
+
+/** Counting mode: emu_run() answers EMU_BREAK before the instruction that many from now. */
+EMU_API void emu_break_after(emu_t *emu, uint64_t instructions);
+
+#endif

@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_EMU_PRIVATE_H
+#define EMULATOR_EMU_PRIVATE_H
+/** What the emulator's files share. All that changes while it runs is in state_t, which can be copied.
+ * Context  emulator only */
+#include <unicorn/unicorn.h>
+
+#include "can_port.h"
+#include "elf.h"
+#include "emu.h"
+#include "facts.h"
+
+enum {
+    VECTORS = 16 + 123,
+    VECTOR_WORDS = (VECTORS + 31) / 32,
+    PERIPHERALS_MAX = 40,
+    REGISTERS_MAX = 256,
+    NEST_MAX = 16,
+    ERROR_SIZE = 320,
+    EMU_RDC_A0 = 8, /* pins of port C, hal/s32k144/README.md */
+    EMU_RDC_A1 = 9,
+    EMU_GATE_DRIVER = 3,
+    RAM_BASE = 0x1FFF8000,
+    RAM_SIZE = 0xF000,
+    FLASH_SIZE = 0x80000,
+};
+#define NEVER UINT64_MAX
+
+typedef enum {
+    TIMER_FTM0, TIMER_FTM2, TIMER_PDB0, TIMER_PDB1, TIMER_ADC0, TIMER_ADC1, TIMER_LPIT0, TIMER_LPIT1, TIMER_LPIT2,
+    TIMER_LPIT3, TIMER_WDOG, TIMER_CAN, TIMER_SYSTICK, TIMERS
+} timer_t_;
+
+/* ---- what changes ---- */
+typedef struct {
+    uint32_t pending[VECTOR_WORDS], enabled[VECTOR_WORDS], line[VECTOR_WORDS];
+    uint8_t priority[VECTORS];
+    uint8_t active[NEST_MAX];
+    int nest;
+    uint32_t vtor, aircr, scr, ccr, cpacr, fpccr, fpcar, shcsr, demcr, dwt_ctrl, cyccnt_offset;
+    uint32_t systick_csr, systick_rvr;
+    uint64_t systick_start;
+    bool sleeping;
+} nvic_t;
+
+typedef struct {
+    bool running;
+    uint64_t start;             /* when the counter was last at CNTIN */
+    uint32_t mod, cntin, cv[8]; /* that act; the registers are their buffers */
+    bool software_trigger;
+    uint32_t outmask;           /* acting */
+    bool triggers_due;          /* the instant's triggers wait for the pins */
+    bool fault_latched, tof;
+    bool closed;                /* the bridge, when last looked at */
+    uint32_t quad_offset;
+} ftm_t;
+
+typedef struct {
+    bool running;
+    uint64_t start;
+    uint32_t mod, idly, dly[8]; /* that act: loaded by LDOK */
+    uint32_t fired;
+} pdb_t;
+
+typedef struct {
+    int current; /* SC1 index in conversion + 1, 0: idle */
+    uint64_t done;
+} adc_t;
+
+typedef struct {
+    can_port_frame_t fifo[EMU_CAN_FIFO];
+    int fifo_count;
+    int sending; /* mailbox + 1, 0: the bus is free */
+} can_t;
+
+typedef struct {
+    uint32_t rx[4];
+    uint64_t ready[4];
+    int rx_count;
+    uint64_t busy_until;
+} spi_t;
+
+typedef struct {
+    uint32_t latched; /* angle at the last SAMPLE */
+} rdc_t;
+
+typedef struct {
+    bool unlocked, configured;
+    uint64_t start;
+    uint64_t unlock_end; /* of the time for writing after an unlock */
+} wdog_t;
+
+typedef struct {
+    uint64_t now, limit, due[TIMERS];
+    uint64_t instructions, break_at;
+    uint32_t value[PERIPHERALS_MAX][REGISTERS_MAX];
+    nvic_t nvic;
+    ftm_t ftm[2];
+    pdb_t pdb[2];
+    adc_t adc[2];
+    can_t can;
+    spi_t spi[3];
+    rdc_t rdc;
+    wdog_t wdog;
+    uint32_t core_ticks;   /* per core cycle */
+    uint32_t pc, resets, reset_cause;
+    bool centre, reset_wanted, poll_masks, reschedule, stop;
+    uint32_t exc_return;
+    emu_pins_t pins;
+    uint64_t pins_set_at;
+} state_t;
+
+/* ---- what does not ---- */
+typedef struct peripheral peripheral_t;
+struct peripheral {
+    const char *name;
+    bool (*models)(uint32_t offset);
+    /** NULL: what is stored. */
+    uint32_t (*read)(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored);
+    /** After the store; value: as written, reserved and read-only bits included. */
+    void (*written)(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value);
+    uint16_t gate; /* offset in PCC, 0: always clocked */
+    uint8_t instance;
+    bool narrow;   /* bytes and half words of its registers may be written */
+};
+
+typedef struct {
+    uint16_t size, count;
+    bool idle; /* a branch to itself */
+} block_t;
+
+struct emu {
+    uc_engine *uc;
+    elf_t elf;
+    emu_mode_t mode;
+    const facts_t *facts_of[PERIPHERALS_MAX];
+    int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
+    int16_t page[256];
+    block_t *block;  /* by address / 2 in flash */
+    emu_exception_fn on_exception;
+    void *on_exception_user;
+    can_port_t *can_port;
+    char error[ERROR_SIZE];
+    state_t s;
+};
+
+struct emu_snapshot {
+    uc_context *context;
+    state_t state;
+    uint8_t ram[RAM_SIZE];
+};
+
+/* core.c */
+void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));
+uint32_t emu_pc(const emu_t *emu);
+void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);
+void emu_reset(emu_t *emu, uint32_t cause);
+void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle);
+
+/* bus.c */
+extern const peripheral_t peripherals[];
+extern const int peripherals_count;
+bool bus_create(emu_t *emu);
+void bus_destroy(emu_t *emu);
+void bus_reset(emu_t *emu);
+const peripheral_t *bus_find(const char *name);
+uint32_t bus_get(const emu_t *emu, const peripheral_t *peripheral, uint32_t offset);
+void bus_put(emu_t *emu, const peripheral_t *peripheral, uint32_t offset, uint32_t value);
+
+uint64_t bus_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
+void bus_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
+bool bus_private_read(emu_t *emu, uint32_t address, unsigned size, uint64_t *value);
+bool bus_private_write(emu_t *emu, uint32_t address, unsigned size, uint32_t value);
+
+/* nvic.c */
+void nvic_reset(emu_t *emu);
+void nvic_line(emu_t *emu, int irq, bool level);
+void nvic_pend(emu_t *emu, int vector);
+bool nvic_take(emu_t *emu);
+void nvic_return(emu_t *emu);
+uint64_t scs_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
+void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
+void systick_fire(emu_t *emu);
+int nvic_best(const emu_t *emu);
+
+/* the peripherals' events */
+void ftm_fire(emu_t *emu, int instance);
+void ftm_triggers(emu_t *emu);
+void ftm_fault_input(emu_t *emu);
+void pdb_trigger(emu_t *emu, int instance);
+void pdb_fire(emu_t *emu, int instance);
+void adc_pretrigger(emu_t *emu, int instance, int channel);
+void adc_fire(emu_t *emu, int instance);
+void pdb_acknowledge(emu_t *emu, int instance, int channel);
+void pdb_sequence_error(emu_t *emu, int instance, int channel);
+void wdog_restart(emu_t *emu);
+void lpit_fire(emu_t *emu, int channel);
+void wdog_fire(emu_t *emu);
+void can_fire(emu_t *emu);
+void trgmux_event(emu_t *emu, uint32_t source);
+uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
+uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
+uint32_t emu_angle(const emu_t *emu);
+uint32_t rdc_transfer(emu_t *emu, uint32_t bits);
+
+/* One line per kind of peripheral. */
+#define MODEL(kind) \
+    bool kind##_models(uint32_t offset); \
+    uint32_t kind##_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored); \
+    void kind##_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+MODEL(scg);
+MODEL(pcc);
+MODEL(smc);
+MODEL(pmc);
+MODEL(rcm);
+MODEL(sim);
+MODEL(ftm);
+MODEL(pdb);
+MODEL(adc);
+MODEL(lpit);
+MODEL(lpspi);
+MODEL(can);
+MODEL(wdog);
+MODEL(port);
+MODEL(gpio);
+MODEL(trgmux);
+MODEL(lmem);
+
+#endif

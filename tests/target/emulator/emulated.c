@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "emulated.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "emulated_private.h"
+#include "hal/host/port.h"
+#include "loop/runner/sim_private.h"
+
+#define TURN_RAD 6.283185307179586
+#define ANGLE_ONE 4294967296.0
+#define BOOT_LIMIT_S 0.25
+
+/* ---- sensors to pins ---- */
+
+static uint16_t to_count(double share, unsigned bits)
+{
+    const double top = (double)(1U << bits) - 1.0;
+    return (uint16_t)fmin(fmax(floor(share * (top + 1.0) + 0.5), 0.0), top);
+}
+
+/* A 3435 K thermistor below its own 25-degree resistance, hal/s32k144/ntc.h. */
+static uint16_t ntc_count(double celsius)
+{
+    const double r = exp(3435.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15));
+    return to_count(r / (1.0 + r), 12);
+}
+
+static uint32_t angle_of(double rad)
+{
+    const double turns = rad / TURN_RAD;
+    return (uint32_t)(uint64_t)((turns - floor(turns)) * ANGLE_ONE);
+}
+
+/* The shaft goes on as fast as it came here since the last sample. */
+static void angle_to_pins(emulated_t *e, emu_pins_t *pins, uint32_t angle)
+{
+    const int32_t moved = (int32_t)(angle - pins->angle);
+    const double rate = (double)moved * 65536.0 / e->period_ticks;
+    pins->angle_rate = e->shadow != NULL || fabs(rate) > 2e9 || e->steps == 0 ? 0 : (int32_t)rate;
+    pins->angle = angle;
+}
+
+static void samples_to_pins(emulated_t *e, const double in[6])
+{
+    const motor_t *m = &motor;
+    emu_pins_t *pins = emu_pins(e->emu);
+    const double span_A = 2.0 * (double)m->current_full_scale_A;
+    pins->adc[0][0] = to_count(in[0] / span_A + 0.5, m->adc_bits);
+    pins->adc[1][0] = to_count(in[1] / span_A + 0.5, m->adc_bits);
+    pins->adc[0][1] = to_count(in[2] / span_A + 0.5, m->adc_bits);
+    pins->adc[1][1] = to_count(in[3] / (double)m->v_dc_full_scale_V, m->adc_bits);
+    pins->adc[0][2] = ntc_count(in[5]);
+    pins->adc[1][2] = ntc_count(40.0);
+    angle_to_pins(e, pins, angle_of(in[4]));
+    e->mirror.host->winding_C = in[5];
+}
+
+/* ---- a period ---- */
+
+static void step(void *self, const double in[6], double out[4])
+{
+    emulated_t *e = self;
+    emu_bridge_t bridge;
+    samples_to_pins(e, in);
+    const int stopped = emu_run(e->emu, (uint64_t)(1.01 * e->period_ticks));
+    emu_bridge(e->emu, &bridge);
+    const bool runs = stopped == EMU_CENTRE;
+    for (int x = 0; x < 3; x++) {
+        out[x] = runs ? bridge.duty[x] : 0.5;
+    }
+    out[3] = runs && bridge.gates ? 1.0 : 0.0;
+    e->steps++;
+    if (e->shadow != NULL && runs) {
+        shadow_compare(e);
+    }
+}
+
+static const char *failure(const void *self)
+{
+    return emu_error(((const emulated_t *)self)->emu);
+}
+
+/* ---- names ---- */
+
+static int pin_set(emulated_t *e, const char *name, double value)
+{
+    emu_pins_t *pins = &e->pins_of_board;
+    bool *pin = strcmp(name, "emulator.gate_fault") == 0       ? &pins->gate_fault
+                : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault : NULL;
+    if (strcmp(name, "emulator.shadow") == 0) {
+        return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
+    if (pin == NULL) {
+        return isnan(emulated_get(e, name)) ? SIM_UNKNOWN_NAME : SIM_READ_ONLY;
+    }
+    if (value != 0.0 && value != 1.0) {
+        return SIM_OUT_OF_RANGE;
+    }
+    *pin = value == 1.0;
+    emu_board_pins(e->emu, pins->gate_fault, pins->resolver_fault);
+    return SIM_OK;
+}
+
+static int set(void *self, const char *name, double value)
+{
+    emulated_t *e = self;
+    if (strncmp(name, "emulator.", 9) == 0) {
+        return pin_set(e, name, value);
+    }
+    const int code = mirror_set(&e->mirror, name, value);
+    if (code == SIM_OK && e->shadow != NULL) {
+        shadow_inputs(e);
+    }
+    return code;
+}
+
+double emulated_get(emulated_t *e, const char *name)
+{
+    emu_bridge_t bridge;
+    emu_bridge(e->emu, &bridge);
+    const struct {
+        const char *name;
+        double value;
+    } values[] = {
+        {"emulator.shadow", e->shadow != NULL},
+        {"emulator.compared", (double)e->compared},
+        {"emulator.differing", (double)e->differing},
+        {"emulator.instructions", (double)emu_instructions(e->emu)},
+        {"emulator.resets", (double)emu_resets(e->emu)},
+        {"emulator.time_s", (double)emu_now(e->emu) / (double)EMU_TICKS_PER_S},
+        {"emulator.gate_fault", e->pins_of_board.gate_fault},
+        {"emulator.resolver_fault", e->pins_of_board.resolver_fault},
+        {"emulator.dead_time_s", bridge.dead_time_s},
+        {"emulator.pwm_period_s", bridge.period_s},
+    };
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; i++) {
+        if (strcmp(values[i].name, name) == 0) {
+            return values[i].value;
+        }
+    }
+    return (double)NAN;
+}
+
+static double get(const void *self, const char *name)
+{
+    emulated_t *e = (emulated_t *)(uintptr_t)self; /* the mirror is a cache */
+    return strncmp(name, "emulator.", 9) == 0 ? emulated_get(e, name) : mirror_get(&e->mirror, name);
+}
+
+/* ---- creation ---- */
+
+static void destroy(void *self)
+{
+    emulated_t *e = self;
+    mirror_close(&e->mirror);
+    fluxtrue_destroy(e->shadow);
+    emu_destroy(e->emu);
+    free(e);
+}
+
+/* From reset until the PWM runs, with the shaft at its zero and no current. */
+static const char *boot(emulated_t *e)
+{
+    const double still[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
+    e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
+    samples_to_pins(e, still);
+    const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));
+    if (stopped == EMU_FAILED) {
+        return emu_error(e->emu);
+    }
+    if (stopped != EMU_CENTRE) {
+        return "the image does not start its PWM";
+    }
+    return mirror_same_motor(&e->mirror) ? NULL : "the image was built for another motor than this library";
+}
+
+sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *error, size_t size)
+{
+    emulated_t *e = calloc(1, sizeof *e);
+    if (e == NULL) {
+        (void)snprintf(error, size, "out of memory");
+        return NULL;
+    }
+    e->emu = emu_create(elf, mode, error, size);
+    if (e->emu == NULL) {
+        free(e);
+        return NULL;
+    }
+    const char *bad = mirror_open(&e->mirror, e->emu, layout);
+    bad = bad != NULL ? bad : boot(e);
+    if (bad != NULL) {
+        (void)snprintf(error, size, "%s: %s", elf, bad);
+        destroy(e);
+        return NULL;
+    }
+    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy});
+}
+
+emu_t *sim_emulator(sim_t *sim)
+{
+    return ((emulated_t *)sim->controller.self)->emu;
+}
+
+const char *sim_shadow_difference(sim_t *sim)
+{
+    const emulated_t *e = sim->controller.self;
+    return e->differing > 0 ? e->difference : NULL;
+}

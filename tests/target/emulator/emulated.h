@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_EMULATED_H
+#define EMULATOR_EMULATED_H
+/** The emulated processor as a controller of the closed-loop runner: sensors to pins, compare values to the bridge,
+ * one PWM period per step. Besides the names of the software-in-the-loop library:
+ *   emulator.shadow        set 1: the same firmware, compiled for the host, follows with the same counts and angles and
+ *                          is compared after every period; the angle then stands still between two samples
+ *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
+ *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
+ * Source   docs/howto/emulate.md
+ * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation
+ * Context  host */
+#include "emu.h"
+#include "loop/runner/sim.h"
+
+EMU_API sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *error, size_t size);
+/** The processor inside. */
+EMU_API emu_t *sim_emulator(sim_t *sim);
+/** Where the shadow differed first ("part, period"); NULL: nowhere. */
+EMU_API const char *sim_shadow_difference(sim_t *sim);
+
+#endif

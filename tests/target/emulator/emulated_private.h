@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_EMULATED_PRIVATE_H
+#define EMULATOR_EMULATED_PRIVATE_H
+/** What the emulated controller and its shadow on the host share.
+ * Context  emulator only */
+#include "emu.h"
+#include "mirror.h"
+
+typedef struct {
+    emu_t *emu;
+    mirror_t mirror;
+    emu_pins_t pins_of_board;  /* only the lines that scenarios set */
+    double period_ticks;
+    uint64_t steps;
+    fluxtrue_t *shadow;        /* NULL: not followed */
+    uint64_t compared, differing;
+    char difference[96];
+} emulated_t;
+
+double emulated_get(emulated_t *e, const char *name);
+
+bool shadow_start(emulated_t *e);
+void shadow_inputs(emulated_t *e);
+void shadow_compare(emulated_t *e);
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_LAYOUT_H
+#define EMULATOR_LAYOUT_H
+/** Parts of drive_t that look the same on target and host (no pointers inside, short enumerations), for copying between
+ * the image's memory and a drive_t on the host. Compiled twice: for the target to learn the offsets there.
+ * Source   app/drive.h
+ * Context  emulator only */
+
+/* What the outside writes, and what calibration changes. */
+#define LAYOUT_INPUTS(X) \
+    X(request)           \
+    X(motor.torque_slew) \
+    X(motor.modulate)    \
+    X(motor.mrai)        \
+    X(motor.torque_loop)
+
+/* What the activities write. */
+#define LAYOUT_STATE(X) \
+    X(fast)             \
+    X(slow)             \
+    X(task)             \
+    X(samples)          \
+    X(commands)         \
+    X(schedules)
+
+#define LAYOUT_SYMBOL "ecu" /* its first member is the drive */
+
+#endif

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame arrives when its bits have been
+ * clocked; what the converter answers is fixed when the frame begins. */
+#include "emu_private.h"
+
+enum {
+    CR = 0x10, SR = 0x14, IER = 0x18, DER = 0x1C, CFGR1 = 0x24, CCR = 0x40, FCR = 0x58, FSR = 0x5C, TCR = 0x60,
+    TDR = 0x64, RSR = 0x70, RDR = 0x74, FIFO = 4,
+    MEN = 1, RESET = 2, RTF = 1 << 8, RRF = 1 << 9,
+};
+
+bool lpspi_models(uint32_t offset)
+{
+    return offset <= DER || offset == CFGR1 || offset == CCR || offset >= FCR;
+}
+
+static uint32_t arrived(const emu_t *emu, const spi_t *spi)
+{
+    uint32_t count = 0;
+    while (count < (uint32_t)spi->rx_count && spi->ready[count] <= emu->s.now) {
+        count++;
+    }
+    return count;
+}
+
+static uint32_t receive(emu_t *emu, const peripheral_t *self)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    if (arrived(emu, spi) == 0) {
+        emu_fail(emu, "read of %s.RDR: nothing has been received", self->name);
+        return 0;
+    }
+    const uint32_t word = spi->rx[0];
+    spi->rx_count--;
+    for (int i = 0; i < spi->rx_count; i++) {
+        spi->rx[i] = spi->rx[i + 1];
+        spi->ready[i] = spi->ready[i + 1];
+    }
+    return word;
+}
+
+uint32_t lpspi_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    const uint32_t count = arrived(emu, spi);
+    switch (offset) {
+    case SR: return 1U | (count > (bus_get(emu, self, FCR) >> 16 & 3U) ? 2U : 0U) |
+                    (emu->s.now < spi->busy_until ? 1U << 24 : 0U);
+    case FSR: return count << 16;
+    case RSR: return count == 0 ? 2U : 0U;
+    case RDR: return receive(emu, self);
+    default: return stored;
+    }
+}
+
+static uint64_t frame_ticks(emu_t *emu, const peripheral_t *self, uint32_t bits)
+{
+    const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (bus_get(emu, self, TCR) >> 27 & 7U);
+    const uint32_t ccr = bus_get(emu, self, CCR);
+    const uint32_t gaps = (ccr >> 8 & 0xFFU) + (ccr >> 16 & 0xFFU) + (ccr >> 24 & 0xFFU) + 4U;
+    if (clock == 0) {
+        emu_fail(emu, "%s transfers without a clock (PCC, SCG divider 2)", self->name);
+    }
+    return (uint64_t)clock * (bits * ((ccr & 0xFFU) + 2U) + gaps);
+}
+
+static void transfer(emu_t *emu, const peripheral_t *self)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    const uint32_t bits = (bus_get(emu, self, TCR) & 0xFFFU) + 1U;
+    if ((bus_get(emu, self, CR) & MEN) == 0 || (bus_get(emu, self, CFGR1) & 1U) == 0) {
+        emu_fail(emu, "write of %s.TDR: the module is not an enabled master", self->name);
+    } else if (bits > 32U || spi->rx_count == FIFO) {
+        emu_fail(emu, "write of %s.TDR: %u bits with %d words waiting do not fit", self->name, bits, spi->rx_count);
+    } else {
+        const uint64_t begin = spi->busy_until > emu->s.now ? spi->busy_until : emu->s.now;
+        spi->busy_until = begin + frame_ticks(emu, self, bits);
+        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, bits) : 0xFFFFFFFFU >> (32U - bits);
+        spi->ready[spi->rx_count++] = spi->busy_until;
+    }
+}
+
+void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    if (offset == TDR) {
+        transfer(emu, self);
+    } else if (offset == CR) {
+        spi->rx_count = (value & (RESET | RRF)) != 0 ? 0 : spi->rx_count;
+        bus_put(emu, self, CR, value & ~(uint32_t)(RTF | RRF));
+    } else if (offset == CFGR1 && (old ^ value) != 0 && (bus_get(emu, self, CR) & MEN) != 0) {
+        emu_fail(emu, "write of %s.CFGR1: the module is enabled", self->name);
+    } else if ((offset == IER || offset == DER) && value != 0) {
+        emu_fail(emu, "write of %s offset 0x%x: interrupts and DMA are not modelled", self->name, offset);
+    } else if (offset == TCR && (value & 0x00FF0000U) != 0) {
+        emu_fail(emu, "write of %s.TCR: only single frames of one wire, most significant bit first", self->name);
+    }
+}
+
+/* Normal mode: A1 = 0 position, A1 = 1 velocity; then the fault register. Latched by SAMPLE. */
+uint32_t rdc_transfer(emu_t *emu, uint32_t bits)
+{
+    const uint32_t lines = bus_get(emu, bus_find("PTC"), 0);
+    const bool a0 = (lines >> EMU_RDC_A0 & 1U) != 0, a1 = (lines >> EMU_RDC_A1 & 1U) != 0;
+    if (a0) {
+        emu_fail(emu, "the AD2S1210 is in its configuration mode: not modelled");
+        return 0;
+    }
+    const double turns_per_s = (double)emu->s.pins.angle_rate / 65536.0 / 4294967296.0 * (double)EMU_TICKS_PER_S;
+    const uint32_t value = a1 ? (uint32_t)(int32_t)(turns_per_s / 500.0 * 32768.0) & 0xFFFFU : emu->s.rdc.latched >> 16;
+    const uint32_t frame = value << 8 | (emu->s.pins.resolver_fault ? 0x40U : 0U);
+    return bits >= 24U ? frame << (bits - 24U) : frame >> (24U - bits);
+}

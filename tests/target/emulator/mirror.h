@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef EMULATOR_MIRROR_H
+#define EMULATOR_MIRROR_H
+/** The drive in the emulated memory, seen through the names of the software-in-the-loop library: a drive_t on the
+ * host is kept equal to the one in the image, part by part, and fluxtrue_get(), fluxtrue_set() work on it. Setting
+ * writes the request (or calibration) into the image's memory, as a debugger would: no CAN command is needed.
+ * Source   layout.h
+ * Errors   mirror_open() answers NULL or what is wrong
+ * Context  emulator only; between two runs */
+#include "emu.h"
+#include "hal/host/instance.h"
+
+enum { MIRROR_PARTS_MAX = 16 };
+
+typedef struct {
+    const char *name;
+    uint32_t here, there, size;
+} mirror_part_t;
+
+typedef struct {
+    emu_t *emu;
+    fluxtrue_t *host;
+    uint32_t base;
+    mirror_part_t part[MIRROR_PARTS_MAX];
+    int inputs, parts;
+    uint64_t pulled_at;
+} mirror_t;
+
+const char *mirror_open(mirror_t *mirror, emu_t *emu, const char *layout_file);
+void mirror_close(mirror_t *mirror);
+/** True when the image's calibration is the one compiled in here: it was built for the same motor. */
+bool mirror_same_motor(mirror_t *mirror);
+void mirror_pull(mirror_t *mirror);
+int mirror_set(mirror_t *mirror, const char *name, double value);
+double mirror_get(mirror_t *mirror, const char *name);
+/** Name of the first part that differs from another drive; NULL: none. */
+const char *mirror_differs(mirror_t *mirror, const fluxtrue_t *other);
+
+#endif

@@ -1,0 +1,272 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Exceptions: what is pending, what may interrupt what, entry and return. Every active exception has its frame on the
+ * stack; registers of the floating-point unit are stacked at once, never lazily. */
+#include <string.h>
+
+#include "emu_private.h"
+
+enum {
+    NMI = 2, HARD_FAULT = 3, SYSTICK = 15,
+    FRAME_WORDS = 8, EXTENDED_WORDS = 26,
+    FPCA = 4, SPSEL = 2,
+    LOWEST = 256,
+    XPSR_ALIGNED = 1 << 9, XPSR_VECTOR = 0x1FF,
+};
+
+static const int frame_registers[FRAME_WORDS] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
+                                                 UC_ARM_REG_R12, UC_ARM_REG_LR, UC_ARM_REG_PC, UC_ARM_REG_XPSR};
+
+static uint32_t get(const emu_t *emu, int reg)
+{
+    uint32_t value = 0;
+    (void)uc_reg_read(emu->uc, reg, &value);
+    return value;
+}
+
+static void put(emu_t *emu, int reg, uint32_t value)
+{
+    (void)uc_reg_write(emu->uc, reg, &value);
+}
+
+void nvic_reset(emu_t *emu)
+{
+    nvic_t *n = &emu->s.nvic;
+    memset(n, 0, sizeof *n);
+    n->ccr = 1U << 9;      /* STKALIGN */
+    n->fpccr = 3U << 30;   /* ASPEN, LSPEN */
+    n->aircr = 0xFA050000U;
+}
+
+static bool bit(const uint32_t *set, int vector)
+{
+    return (set[vector / 32] >> (vector % 32) & 1U) != 0;
+}
+
+static void bit_set(uint32_t *set, int vector, bool on)
+{
+    const uint32_t mask = 1U << (vector % 32);
+    set[vector / 32] = on ? set[vector / 32] | mask : set[vector / 32] & ~mask;
+}
+
+/* Group priority: below AIRCR.PRIGROUP nothing preempts. */
+static int priority_of(const nvic_t *n, int vector)
+{
+    if (vector == NMI || vector == HARD_FAULT) {
+        return vector == NMI ? -2 : -1;
+    }
+    return n->priority[vector] & (0xFF & (0xFE << (n->aircr >> 8 & 7U)));
+}
+
+static bool enabled(const nvic_t *n, int vector)
+{
+    return vector < 16 || bit(n->enabled, vector);
+}
+
+/* The pending exception of the highest priority; -1: none. */
+static int first_pending(const nvic_t *n)
+{
+    int best = -1, best_priority = LOWEST;
+    for (int word = 0; word < VECTOR_WORDS; word++) {
+        uint32_t left = n->pending[word];
+        while (left != 0) {
+            const int vector = 32 * word + __builtin_ctz(left);
+            left &= left - 1U;
+            if (enabled(n, vector) && (best < 0 || priority_of(n, vector) < best_priority)) {
+                best = vector;
+                best_priority = priority_of(n, vector);
+            }
+        }
+    }
+    return best;
+}
+
+static int active_priority(const nvic_t *n)
+{
+    int lowest = LOWEST;
+    for (int i = 0; i < n->nest; i++) {
+        const int priority = priority_of(n, n->active[i]);
+        lowest = priority < lowest ? priority : lowest;
+    }
+    return lowest;
+}
+
+static int masked_priority(const emu_t *emu, int priority)
+{
+    const int basepri = (int)(get(emu, UC_ARM_REG_BASEPRI) & 0xF0U);
+    if ((get(emu, UC_ARM_REG_FAULTMASK) & 1U) != 0) {
+        return priority < -1 ? priority : -1;
+    }
+    if ((get(emu, UC_ARM_REG_PRIMASK) & 1U) != 0) {
+        return priority < 0 ? priority : 0;
+    }
+    return basepri != 0 && basepri < priority ? basepri : priority;
+}
+
+/* What may be taken now; -1: nothing. */
+int nvic_best(const emu_t *emu)
+{
+    const int vector = first_pending(&emu->s.nvic);
+    if (vector < 0) {
+        return -1;
+    }
+    const int priority = priority_of(&emu->s.nvic, vector), current = active_priority(&emu->s.nvic);
+    return priority < current && priority < masked_priority(emu, current) ? vector : -1;
+}
+
+static void reconsider(emu_t *emu)
+{
+    const int vector = first_pending(&emu->s.nvic);
+    if (vector >= 0 && priority_of(&emu->s.nvic, vector) < active_priority(&emu->s.nvic)) {
+        emu->s.reschedule = true;
+        (void)uc_emu_stop(emu->uc);
+    }
+}
+
+void nvic_pend(emu_t *emu, int vector)
+{
+    bit_set(emu->s.nvic.pending, vector, true);
+    reconsider(emu);
+}
+
+void nvic_line(emu_t *emu, int irq, bool level)
+{
+    const int vector = 16 + irq;
+    if (level && !bit(emu->s.nvic.line, vector)) {
+        nvic_pend(emu, vector);
+    }
+    bit_set(emu->s.nvic.line, vector, level);
+}
+
+static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uint32_t count)
+{
+    if (uc_mem_write(emu->uc, address, words, 4U * count) == UC_ERR_OK) {
+        return true;
+    }
+    emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", address);
+    return false;
+}
+
+static uint32_t push_frame(emu_t *emu)
+{
+    uint32_t frame[EXTENDED_WORDS] = {0};
+    const bool extended = (get(emu, UC_ARM_REG_CONTROL) & FPCA) != 0;
+    const uint32_t words = extended ? EXTENDED_WORDS : FRAME_WORDS;
+    for (int i = 0; i < FRAME_WORDS; i++) {
+        frame[i] = get(emu, frame_registers[i]);
+    }
+    frame[6] = emu->s.pc;
+    for (int i = 0; extended && i < 16; i++) {
+        frame[FRAME_WORDS + i] = get(emu, UC_ARM_REG_S0 + i);
+    }
+    frame[24] = extended ? get(emu, UC_ARM_REG_FPSCR) : 0U;
+    const uint32_t sp = get(emu, UC_ARM_REG_SP);
+    uint32_t bottom = sp - 4U * words;
+    if ((bottom & 4U) != 0 && (emu->s.nvic.ccr & 1U << 9) != 0) {
+        bottom -= 4U;
+        frame[7] |= XPSR_ALIGNED;
+    }
+    (void)stack_write(emu, bottom, frame, words);
+    put(emu, UC_ARM_REG_SP, bottom);
+    return extended ? 0xFFFFFFE1U : 0xFFFFFFF1U;
+}
+
+static bool unsupported(emu_t *emu)
+{
+    if ((get(emu, UC_ARM_REG_CONTROL) & SPSEL) != 0) {
+        emu_fail(emu, "the process stack is in use: not modelled");
+        return true;
+    }
+    if ((get(emu, UC_ARM_REG_CONTROL) & FPCA) != 0 && (emu->s.nvic.cpacr & 0xF00000U) != 0xF00000U) {
+        emu_fail(emu, "a floating-point instruction ran although CPACR does not allow it");
+        return true;
+    }
+    return false;
+}
+
+static void enter(emu_t *emu, int vector)
+{
+    nvic_t *n = &emu->s.nvic;
+    uint32_t handler = 0;
+    if (unsupported(emu)) {
+        return;
+    }
+    if (n->nest == NEST_MAX) {
+        emu_fail(emu, "more than %d exceptions are active", NEST_MAX);
+        return;
+    }
+    const uint32_t code = push_frame(emu);
+    put(emu, UC_ARM_REG_LR, n->nest == 0 ? code | 8U : code);
+    put(emu, UC_ARM_REG_CONTROL, 0);
+    bit_set(n->pending, vector, false);
+    n->active[n->nest++] = (uint8_t)vector;
+    put(emu, UC_ARM_REG_XPSR, 1U << 24 | (uint32_t)vector);
+    put(emu, UC_ARM_REG_IPSR, (uint32_t)vector);
+    if (uc_mem_read(emu->uc, n->vtor + 4U * (uint32_t)vector, &handler, 4) != UC_ERR_OK || (handler & 1U) == 0) {
+        emu_fail(emu, "vector %d (IRQ %d) has no handler", vector, vector - 16);
+        return;
+    }
+    emu->s.pc = handler & ~1U;
+    emu->s.now += 12U * emu->s.core_ticks; /* TRM: twelve cycles, without wait states */
+    if (emu->on_exception != NULL) {
+        emu->on_exception(emu->on_exception_user, vector, true);
+    }
+}
+
+bool nvic_take(emu_t *emu)
+{
+    const int vector = nvic_best(emu);
+    emu->s.poll_masks = vector < 0 && first_pending(&emu->s.nvic) >= 0 &&
+                        priority_of(&emu->s.nvic, first_pending(&emu->s.nvic)) < active_priority(&emu->s.nvic);
+    if (vector < 0) {
+        return false;
+    }
+    enter(emu, vector);
+    return true;
+}
+
+static bool pop_frame(emu_t *emu, bool extended)
+{
+    uint32_t frame[EXTENDED_WORDS];
+    const uint32_t words = extended ? EXTENDED_WORDS : FRAME_WORDS, sp = get(emu, UC_ARM_REG_SP);
+    if (uc_mem_read(emu->uc, sp, frame, 4U * words) != UC_ERR_OK) {
+        emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", sp);
+        return false;
+    }
+    put(emu, UC_ARM_REG_IPSR, frame[7] & XPSR_VECTOR);
+    for (int i = 0; i < 6; i++) {
+        put(emu, frame_registers[i], frame[i]);
+    }
+    put(emu, UC_ARM_REG_CONTROL, extended ? FPCA : 0U);
+    for (int i = 0; extended && i < 16; i++) {
+        put(emu, UC_ARM_REG_S0 + i, frame[FRAME_WORDS + i]);
+    }
+    if (extended) {
+        put(emu, UC_ARM_REG_FPSCR, frame[24]);
+    }
+    put(emu, UC_ARM_REG_SP, sp + 4U * words + ((frame[7] & XPSR_ALIGNED) != 0 ? 4U : 0U));
+    put(emu, UC_ARM_REG_XPSR, (frame[7] & ~(uint32_t)XPSR_ALIGNED) | 1U << 24);
+    emu->s.pc = frame[6] & ~1U;
+    return true;
+}
+
+void nvic_return(emu_t *emu)
+{
+    nvic_t *n = &emu->s.nvic;
+    const uint32_t code = emu->s.exc_return;
+    if (n->nest == 0 || (code & 0xFFFFFFE7U) != 0xFFFFFFE1U || ((code & 8U) != 0) != (n->nest == 1)) {
+        emu_fail(emu, "0x%08x is no valid exception return with %d exceptions active", code, n->nest);
+        return;
+    }
+    const int vector = n->active[--n->nest];
+    if (!pop_frame(emu, (code & 0x10U) == 0)) {
+        return;
+    }
+    if (bit(n->line, vector)) {
+        bit_set(n->pending, vector, true); /* its cause still stands */
+    }
+    emu->s.now += 10U * emu->s.core_ticks;
+    n->sleeping = n->nest == 0 && (n->scr & 2U) != 0; /* SLEEPONEXIT */
+    if (emu->on_exception != NULL) {
+        emu->on_exception(emu->on_exception_user, vector, false);
+    }
+}

@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* PORT, GPIO and the trigger multiplexer. */
+#include "emu_private.h"
+
+enum {
+    PCR_LAST = 0x7C, GPCLR = 0x80, GPCHR = 0x84, ISFR = 0xA0,
+    PDOR = 0x00, PSOR = 0x04, PCOR = 0x08, PTOR = 0x0C, PDIR = 0x10, PDDR = 0x14,
+    TO_PDB0 = 0x38, TO_PDB1 = 0x3C,
+    FLAG = 1 << 24,
+};
+
+bool port_models(uint32_t offset)
+{
+    return offset <= GPCHR || offset == ISFR;
+}
+
+uint32_t port_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    (void)emu, (void)self, (void)offset;
+    return stored;
+}
+
+static void many(emu_t *emu, const peripheral_t *self, uint32_t first, uint32_t value)
+{
+    for (uint32_t i = 0; i < 16U; i++) {
+        const uint32_t at = 4U * (first + i);
+        if ((value >> (16U + i) & 1U) != 0) {
+            bus_put(emu, self, at, (bus_get(emu, self, at) & ~0xFFFFU) | (value & 0xFFFFU));
+        }
+    }
+}
+
+void port_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    if (offset <= PCR_LAST) {
+        if ((old & 1U << 15) != 0) {
+            emu_fail(emu, "write of %s.PCR%u: the pin is locked", self->name, offset / 4U);
+        }
+        if ((value >> 16 & 15U) != 0) {
+            emu_fail(emu, "write of %s.PCR%u: interrupts of pins are not modelled", self->name, offset / 4U);
+        }
+        bus_put(emu, self, offset, value & ~(uint32_t)FLAG);
+    } else if (offset == GPCLR || offset == GPCHR) {
+        many(emu, self, offset == GPCLR ? 0U : 16U, value);
+    }
+}
+
+bool gpio_models(uint32_t offset)
+{
+    return offset <= PDDR;
+}
+
+uint32_t gpio_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    if (offset == PDIR) {
+        return bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR);
+    }
+    return offset == PSOR || offset == PCOR || offset == PTOR ? 0U : stored;
+}
+
+void gpio_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    (void)old;
+    const uint32_t out = bus_get(emu, self, PDOR);
+    if (offset == PSOR) {
+        bus_put(emu, self, PDOR, out | value);
+    } else if (offset == PCOR) {
+        bus_put(emu, self, PDOR, out & ~value);
+    } else if (offset == PTOR) {
+        bus_put(emu, self, PDOR, out ^ value);
+    }
+}
+
+bool trgmux_models(uint32_t offset)
+{
+    return offset == 0x28 || offset == TO_PDB0 || offset == TO_PDB1;
+}
+
+uint32_t trgmux_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    (void)emu, (void)self, (void)offset;
+    return stored;
+}
+
+void trgmux_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    (void)old, (void)value;
+    if ((bus_get(emu, self, offset) & 0x3FU) != (value & 0x3FU)) {
+        emu_fail(emu, "write of TRGMUX offset 0x%x: the register is locked", offset);
+    }
+}
+
+void trgmux_event(emu_t *emu, uint32_t source)
+{
+    const peripheral_t *self = bus_find("TRGMUX");
+    if ((bus_get(emu, self, TO_PDB0) & 0x3FU) == source) {
+        pdb_trigger(emu, 0);
+    }
+    if ((bus_get(emu, self, TO_PDB1) & 0x3FU) == source) {
+        pdb_trigger(emu, 1);
+    }
+}

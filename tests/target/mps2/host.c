@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The script of hal/mps2 on this computer: the activities called in the order of their priorities. */
+#include <stdio.h>
+
+#include "app/drive.h"
+#include "hal/adc.h"
+#include "hal/angle.h"
+#include "hal/irq.h"
+#include "hal/mps2/script.h"
+#include "hal/pwm.h"
+
+static drive_t drive;
+static script_t script;
+static duty_t duties;
+static bool gates, pending;
+
+void hal_adc_read(adc_counts_t *counts)
+{
+    *counts = script_adc(&script);
+}
+
+uint32_t hal_angle_read(void)
+{
+    return script.angle;
+}
+
+void hal_pwm_write(duty_t duty)
+{
+    duties = duty;
+}
+
+void hal_pwm_enable(bool on)
+{
+    gates = on;
+}
+
+void hal_irq_pend_mrai(void)
+{
+    pending = true;
+}
+
+int main(void)
+{
+    drive_init(&drive, &motor);
+    for (uint32_t k = 1; k <= SCRIPT_PERIODS; k++) {
+        script_next(&script);
+        fast_isr(&drive);
+        script_note(&script, duties, gates);
+        if (pending) {
+            pending = false;
+            mrai_isr(&drive);
+        }
+        if (k % 10U == 0U) {
+            script_request(&script, &drive.request);
+            task_1khz(&drive);
+        }
+    }
+    printf("low=%08x\nhigh=%08x\ndiffering=%08x\nfaults=%08x\noverruns=%08x\n", script.low, script.high,
+           script.differing, drive.fast.faults, drive.fast.overruns);
+    printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)drive.slow.mrai.psi_delta, (unsigned)drive.slow.mrai.r_delta);
+    return 0;
+}

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What leaves and enters the processor bit by bit: CAN message buffers, resolver frames, NTC. */
+#include <math.h>
+#include <string.h>
+
+#include "hal/s32k144/ad2s1210.h"
+#include "hal/s32k144/can_mailbox.h"
+#include "hal/s32k144/ntc.h"
+#include "hal/temperature.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+/* Words by hand: identifier 0x123 << 18 = 0x048C0000, length 8, code 12. */
+void test_a_standard_frame_fills_the_buffer_from_the_top_byte_down(void)
+{
+    const can_frame_t frame = {.id = 0x123, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+    const can_box_t box = can_box_pack(&frame);
+    const uint32_t expected[4] = {0x0C080000, 0x048C0000, 0x01020304, 0x05060708};
+    TEST_ASSERT_EQUAL_HEX32_ARRAY(expected, box.word, 4);
+}
+
+void test_an_extended_frame_says_so(void)
+{
+    const can_frame_t frame = {.id = 0x1ABCDEF0, .extended = true, .length = 0};
+    const can_box_t box = can_box_pack(&frame);
+    TEST_ASSERT_EQUAL_HEX32(0x0C600000, box.word[0]);
+    TEST_ASSERT_EQUAL_HEX32(0x1ABCDEF0, box.word[1]);
+}
+
+void test_what_was_packed_unpacks_to_the_same_frame(void)
+{
+    for (uint8_t length = 0; length <= 8; length++) {
+        can_frame_t frame = {.id = (length & 1U) ? 0x7FFU : 0x1FFFFFFFU, .extended = !(length & 1U), .length = length};
+        for (uint8_t k = 0; k < length; k++) {
+            frame.data[k] = (uint8_t)(0xF0U + k);
+        }
+        const can_box_t box = can_box_pack(&frame);
+        const can_frame_t back = can_box_unpack(&box);
+        TEST_ASSERT_EQUAL_HEX32(frame.id, back.id);
+        TEST_ASSERT_EQUAL(frame.extended, back.extended);
+        TEST_ASSERT_EQUAL_UINT8(length, back.length);
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, back.data, 8);
+    }
+}
+
+void test_impossible_lengths_become_eight_and_a_remote_request_carries_nothing(void)
+{
+    const can_box_t nine = {{15U << 16, 0, 0, 0}};
+    TEST_ASSERT_EQUAL_UINT8(8, can_box_unpack(&nine).length);
+    const can_box_t remote = {{CAN_BOX_REMOTE | 4U << 16, 0, 0xFFFFFFFFU, 0}};
+    TEST_ASSERT_EQUAL_UINT8(0, can_box_unpack(&remote).length);
+    TEST_ASSERT_EQUAL_HEX8(0, can_box_unpack(&remote).data[0]);
+    const can_frame_t long_one = {.id = 0xFFFFFFFFU, .length = 200};
+    TEST_ASSERT_EQUAL_HEX32(0x0C080000, can_box_pack(&long_one).word[0]);
+    TEST_ASSERT_EQUAL_HEX32(0x7FFU << 18, can_box_pack(&long_one).word[1]);
+}
+
+void test_a_resolver_frame_is_the_value_and_then_the_faults(void)
+{
+    const ad2s1210_frame_t frame = ad2s1210_decode(0xC0DE48);
+    TEST_ASSERT_EQUAL_HEX16(0xC0DE, frame.value);
+    TEST_ASSERT_EQUAL_HEX8(AD2S1210_SIGNAL_LOSS | AD2S1210_TRACKING, frame.fault);
+}
+
+/* Straight lines over 10 K bend away from the beta equation by 0.6 K at most, rounding 0.05 K. */
+void test_the_ntc_follows_the_beta_equation_over_its_range(void)
+{
+    for (uint16_t count = 132; count <= 3937; count++) {
+        const double r = count / (4096.0 - count);
+        const double exact_dC = 10.0 * (1.0 / (1.0 / 298.15 + log(r) / 3435.0) - 273.15);
+        TEST_ASSERT_DOUBLE_WITHIN(7.0, exact_dC, ntc_dC(count));
+    }
+}
+
+void test_an_open_or_shorted_ntc_is_unknown(void)
+{
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(4095));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(3938));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(131));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(0));
+}

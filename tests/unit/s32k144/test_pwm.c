@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* FTM0 with variables for registers: what is written, not what the timer makes of it. */
+#include "hal/pwm.h"
+#include "hal/s32k144/core.h"
+#include "hal/s32k144/pwm.h"
+#include "hal/s32k144/registers.h"
+#include "unity.h"
+
+#define PERIOD 11200U
+#define SIX_OUTPUTS 0x3FU
+
+ftm_t fake_FTM0;
+trgmux_t fake_TRGMUX;
+nvic_t fake_nvic;
+
+void setUp(void)
+{
+    fake_FTM0 = (ftm_t){0};
+    fake_nvic = (nvic_t){0};
+    pwm_init(&(pwm_config_t){.period_ticks = PERIOD, .dead_time_ticks = 224});
+}
+
+void tearDown(void)
+{
+    hal_pwm_enable(false);
+    (void)pwm_fault_taken();
+    (void)pwm_fault_reported();
+}
+
+void test_half_duty_is_a_pulse_in_the_middle_half_of_the_period(void)
+{
+    hal_pwm_write((duty_t){16384, 8192, 24576});
+    TEST_ASSERT_EQUAL_UINT32(2800, FTM0->C0V);
+    TEST_ASSERT_EQUAL_UINT32(8400, FTM0->C1V);
+    TEST_ASSERT_EQUAL_UINT32(4200, FTM0->C2V);
+    TEST_ASSERT_EQUAL_UINT32(7000, FTM0->C3V);
+    TEST_ASSERT_EQUAL_UINT32(1400, FTM0->C4V);
+    TEST_ASSERT_EQUAL_UINT32(9800, FTM0->C5V);
+}
+
+void test_no_duty_never_matches_and_full_duty_matches_at_the_start_only(void)
+{
+    hal_pwm_write((duty_t){0, 32768, 1});
+    TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C0V);
+    TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C1V);
+    TEST_ASSERT_EQUAL_UINT32(0, FTM0->C2V);
+    TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C3V);
+    /* 1/32768 of 11200 ticks is a third of a tick: rounds to nothing. */
+    TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C4V);
+}
+
+/* The pulse is within half a tick of duty * 11200 for every duty there is, and inside the period. */
+void test_every_duty_gives_its_width_to_half_a_tick(void)
+{
+    for (uint32_t duty = 0; duty <= 32768U; duty++) {
+        hal_pwm_write((duty_t){(uint16_t)duty, 16384, 16384});
+        const uint32_t ticks = FTM0->C1V - FTM0->C0V;
+        const double error = (double)ticks - (double)duty / 32768.0 * PERIOD;
+        TEST_ASSERT_TRUE(error >= -0.5 && error <= 0.5);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT32(PERIOD, FTM0->C1V);
+    }
+}
+
+void test_compare_values_are_released_together_after_the_last(void)
+{
+    FTM0->SYNC = 0;
+    hal_pwm_write((duty_t){1, 2, 3});
+    TEST_ASSERT_EQUAL_HEX32(FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC | FTM_SYNC_TRIG0, FTM0->SYNC);
+}
+
+void test_start_up_leaves_the_gates_open_and_the_configuration_locked(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
+    TEST_ASSERT_EQUAL_UINT32(PERIOD - 1U, FTM0->MOD);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->FMS); /* or the counter could not be started */
+    pwm_start();
+    TEST_ASSERT_BITS_HIGH(FTM_SC_CLKS(1), FTM0->SC);
+    TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
+}
+
+/* Opening is followed by duties in the same period: their write must not disarm the mask's trigger. */
+void test_duties_written_after_opening_leave_the_mask_armed(void)
+{
+    hal_pwm_enable(true);
+    hal_pwm_enable(false);
+    hal_pwm_write((duty_t){16384, 16384, 16384});
+    TEST_ASSERT_BITS_HIGH(FTM_SYNC_TRIG0, FTM0->SYNC);
+}
+
+/* 2 us at 112 MHz: 224 = 3 * 64 + 32. */
+void test_dead_time_beyond_six_bits_goes_to_the_extension(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(3U << 16 | 32U, FTM0->DEADTIME);
+}
+
+void test_closing_the_gates_waits_for_the_period_and_opening_does_not(void)
+{
+    hal_pwm_enable(true);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->OUTMASK);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->SWOCTRL);
+    TEST_ASSERT_BITS_HIGH(FTM_SYNC_TRIG0 | FTM_SYNC_SYNCHOM, FTM0->SYNC);
+    hal_pwm_enable(false);
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
+}
+
+void test_gates_that_stay_as_they_are_cost_no_register(void)
+{
+    hal_pwm_enable(true);
+    FTM0->OUTMASK = 0x15;
+    FTM0->SWOCTRL = 0x2A;
+    hal_pwm_enable(true);
+    TEST_ASSERT_EQUAL_HEX32(0x15, FTM0->OUTMASK);
+    TEST_ASSERT_EQUAL_HEX32(0x2A, FTM0->SWOCTRL);
+}
+
+void test_a_gate_fault_is_told_once_to_the_drive_and_once_to_the_board(void)
+{
+    pwm_gate_fault_isr();
+    TEST_ASSERT_EQUAL_HEX32(1U << (IRQ_FTM0_FAULT & 31U), NVIC->ICER[IRQ_FTM0_FAULT >> 5]);
+    TEST_ASSERT_TRUE(pwm_fault_taken());
+    TEST_ASSERT_FALSE(pwm_fault_taken());
+    TEST_ASSERT_TRUE(pwm_fault_reported());
+    TEST_ASSERT_FALSE(pwm_fault_reported());
+}
+
+void test_a_fault_that_lasts_keeps_being_reported(void)
+{
+    FTM0->FMS = FTM_FMS_FAULTIN;
+    TEST_ASSERT_TRUE(pwm_fault_reported());
+    TEST_ASSERT_TRUE(pwm_fault_reported());
+}
+
+void test_closing_the_gates_clears_a_fault_only_when_it_is_over(void)
+{
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_FAULTIN | FTM_FMS_WPEN;
+    hal_pwm_enable(true);
+    TEST_ASSERT_BITS_HIGH(FTM_FMS_FAULTF, FTM0->FMS);
+    hal_pwm_enable(false);
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
+    hal_pwm_enable(true);
+    TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
+    TEST_ASSERT_EQUAL_HEX32(1U << (IRQ_FTM0_FAULT & 31U), NVIC->ISER[IRQ_FTM0_FAULT >> 5]);
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The AD2S1210 over a LPSPI of variables: RSR says whether something was received, RDR what. */
+#include <string.h>
+
+#include "hal/angle.h"
+#include "hal/s32k144/angle.h"
+#include "hal/s32k144/pins.h"
+#include "hal/s32k144/registers.h"
+#include "hal/s32k144/resolver.h"
+#include "unity.h"
+
+lpspi_t fake_LPSPI0;
+gpio_t fake_PTC;
+
+static void received(uint32_t frame)
+{
+    const uint32_t not_empty = 0;
+    memcpy((void *)(uintptr_t)&fake_LPSPI0.RSR, &not_empty, sizeof not_empty);
+    memcpy((void *)(uintptr_t)&fake_LPSPI0.RDR, &frame, sizeof frame);
+}
+
+static void nothing_received(void)
+{
+    const uint32_t empty = LPSPI_RSR_RXEMPTY;
+    memcpy((void *)(uintptr_t)&fake_LPSPI0.RSR, &empty, sizeof empty);
+}
+
+void setUp(void)
+{
+    nothing_received();
+    angle_init();
+    received(0);
+    (void)hal_angle_read();
+}
+
+void tearDown(void) {}
+
+void test_the_position_is_the_upper_half_of_the_angle(void)
+{
+    received(0x400000);
+    TEST_ASSERT_EQUAL_HEX32(0x40000000, hal_angle_read());
+    TEST_ASSERT_FALSE(angle_fault());
+}
+
+void test_any_bit_of_the_fault_register_is_a_fault_until_it_is_gone(void)
+{
+    for (uint32_t bit = 0; bit < 8; bit++) {
+        received(0x123400U | 1U << bit);
+        (void)hal_angle_read();
+        TEST_ASSERT_TRUE(angle_fault());
+    }
+    received(0x123400);
+    (void)hal_angle_read();
+    TEST_ASSERT_FALSE(angle_fault());
+}
+
+void test_a_frame_that_does_not_come_is_a_fault_and_the_last_angle_stays(void)
+{
+    received(0xABCD00);
+    (void)hal_angle_read();
+    nothing_received();
+    TEST_ASSERT_EQUAL_HEX32(0xABCD0000, hal_angle_read());
+    TEST_ASSERT_TRUE(angle_fault());
+}
+
+void test_velocity_of_the_period_before_is_kept_and_position_is_asked_for(void)
+{
+    fake_PTC.PCOR = 0;
+    received(0xFF3800);
+    angle_begin();
+    TEST_ASSERT_EQUAL_INT16(-200, resolver_velocity());
+    TEST_ASSERT_EQUAL_HEX32(1U << PIN_RESOLVER_A1, fake_PTC.PCOR);
+    angle_end();
+    TEST_ASSERT_EQUAL_HEX32(1U << PIN_RESOLVER_A1, fake_PTC.PSOR);
+}

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the emulation needs: the motor's libraries, the layout of the target's data, and the image."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fluxtrue_tools.emulate import library
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim import build as sim_build
+from fluxtrue_tools.sim import motor as motors
+from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.target.build import image
+
+ROOT: Final = sim_build.ROOT
+# Scenarios write the request themselves: the image in which no bus does.
+PRESETS: Final = {"encoder": "s32k144-direct", "resolver": "s32k144-resolver-direct"}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A motor, and where its emulation's files are."""
+
+    motor: Motor
+    image: Path
+    layout: Path
+
+    def emulated(self, mode: int = library.FAST) -> Motor:
+        """The motor with the image as its controller."""
+        return library.emulated(self.motor, self.image, self.layout, mode)
+
+
+def prepare(
+    motor: str,
+    elf: Path | None = None,
+    angle: str = "encoder",
+    build_dir: Path | None = None,
+    base: Path | None = None,
+) -> Parts:
+    """Build what is missing. Without `elf` the image is built for the default motor (FLUXTRUE_MOTOR's default)."""
+    built = motors.load(motor, build_dir, base)
+    host = built.folder.folder.parents[1]
+    shared = built.folder.folder / "libfluxtrue_emu.so"
+    if not shared.is_file() or "FLUXTRUE_BUILD_DIR" not in os.environ:
+        log = host / "emulation.log"
+        with sim_build.build_lock():
+            target = f"fluxtrue_emu_{built.folder.folder.name}"
+            sim_build.run_logged(
+                ["cmake", "--build", str(host), "-j2", "--target", target], log, "building the emulation"
+            )
+    if elf is None:
+        elf = image(PRESETS[angle], ROOT / "build" / PRESETS[angle])
+    elif not elf.is_file():
+        raise FluxtrueError(f"--elf {elf}: no such file")
+    return Parts(built, elf.resolve(), host / "emulator" / "layout.bin")

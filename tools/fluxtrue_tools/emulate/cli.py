@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fluxtrue emulate: run a scenario on the emulated microcontroller."""
+
+from pathlib import Path
+
+import click
+
+from fluxtrue_tools.errors import FluxtrueError
+
+_FILE = click.Path(dir_okay=False, path_type=Path)
+DEFAULT = Path(__file__).resolve().parents[3] / "docs" / "howto" / "scenarios" / "warm-up.toml"
+
+
+@click.command()
+@click.option("--scenario", type=_FILE, default=DEFAULT, help="What to run (TOML); left out: warm-up.toml.")
+@click.option("--elf", type=_FILE, help="The image; left out: it is built for the S32K144.")
+@click.option("--angle", type=click.Choice(["encoder", "resolver"]), default="encoder", help="Which image to build.")
+@click.option("--out", type=_FILE, help="Every recorded quantity over time, CSV.")
+@click.option("--json", "json_path", type=_FILE, help="Means over the window and errors, JSON.")
+@click.option("--plot", type=_FILE, help="Torque, currents, flux, resistance: PNG, SVG or PDF.")
+@click.option(
+    "--build-dir",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Take the libraries from this build folder as they are.",
+)
+def emulate(
+    scenario: Path,
+    elf: Path | None,
+    angle: str,
+    out: Path | None,
+    json_path: Path | None,
+    plot: Path | None,
+    build_dir: Path | None,
+) -> None:
+    """Run a scenario with the unmodified S32K144 image on an emulated processor, coupled at its registers."""
+    from fluxtrue_tools.emulate import build
+    from fluxtrue_tools.sim import scenario as scenarios
+    from fluxtrue_tools.sim.cli import check_outputs, run_and_report
+
+    check_outputs(out, json_path, plot)
+    read = scenarios.read(scenario)
+    if read.controller.kind != "firmware":
+        raise FluxtrueError(f"{scenario}: controller.kind = {read.controller.kind!r}, allowed: 'firmware'")
+    parts = build.prepare(read.motor, elf, angle, build_dir, scenario.parent)
+    run_and_report(read, parts.emulated(), scenario, out, json_path, plot, f"emulated {parts.image.name}")
