@@ -103,6 +103,7 @@ class Rig:
         self.status_protection = e2e.Receiver(self.data_id(STATUS))
         self.frames: dict[str, list[Frame]] = defaultdict(list)
         self.last: dict[str, Frame] = {}
+        self.others: dict[int, list[Frame]] = defaultdict(list)  # by identifier: what the DBC does not describe
         self.keep_frames = True
         self.counted: dict[str, int] = defaultdict(int)
         self.trace = Trace([])
@@ -210,6 +211,7 @@ class Rig:
             listener(message)
         name = self._inverters.get(message.arbitration_id)
         if name is None or message.is_extended_id:
+            self.others[message.arbitration_id].append(Frame(message.timestamp, bytes(message.data)))
             return
         frame = Frame(message.timestamp, bytes(message.data))
         self.counted[name] += 1
