@@ -25,7 +25,7 @@ def over(ecu: VirtualEcu, *more: str) -> list[str]:
 
 
 def test_without_a_plant_the_rest_of_the_suite_runs_and_says_what_it_left_out(program: Path, tmp_path: Path) -> None:
-    for _ in range(3):  # in real time a computer that stalls for 30 ms loses the command; what is tested here is the way
+    for _ in range(3):  # in real time a computer that stalls for 30 ms loses the command; not what is tested here
         with VirtualEcu(program, fast=False) as ecu:
             done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", f"--junitxml={tmp_path}/junit.xml",
                          *over(ecu))  # fmt: skip
