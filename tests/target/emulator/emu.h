@@ -72,6 +72,7 @@ EMU_API uint32_t emu_symbol_size(const emu_t *emu, const char *name);
 
 /** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
 EMU_API uint64_t emu_register(const emu_t *emu, const char *name);
+EMU_API bool emu_register_set(emu_t *emu, const char *name, uint32_t value);
 
 /** Called when an exception's handler is entered and left (vector number, 16 = first interrupt). */
 typedef void (*emu_exception_fn)(void *user, int vector, bool entered);

@@ -210,3 +210,9 @@ const char *sim_shadow_difference(sim_t *sim)
     const emulated_t *e = sim->controller.self;
     return e->differing > 0 ? e->difference : NULL;
 }
+
+void sim_shadow_disturb(sim_t *sim)
+{
+    const emulated_t *e = sim->controller.self;
+    e->shadow->drive.slow.mrai.psi_delta ^= 1;
+}
