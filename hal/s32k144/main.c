@@ -118,6 +118,7 @@ static void start(void)
         pwm_start();
         started = true;
     }
+    tick_continue();
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
