@@ -36,7 +36,8 @@ def elf(tmp_path: Path) -> Path:
         pytest.skip(f"{ARM_CC} is not installed")
     (tmp_path / "a.c").write_text(SOURCE)
     (tmp_path / "a.ld").write_text(SCRIPT)
-    subprocess.run([ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-T", "a.ld", "a.c", "-o", "a.elf"], cwd=tmp_path, check=True)
+    command = [ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-T", "a.ld", "a.c", "-o", "a.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True)
     return tmp_path / "a.elf"
 
 
@@ -80,6 +81,7 @@ def test_what_is_no_image_is_refused_and_left_alone(tmp_path: Path) -> None:
 
 def test_an_elf_without_the_marks_is_refused(elf: Path, tmp_path: Path) -> None:
     (tmp_path / "b.c").write_text("void start(void) {}\n")
-    subprocess.run([ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-e", "start", "b.c", "-o", "b.elf"], cwd=tmp_path, check=True)
+    command = [ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-e", "start", "b.c", "-o", "b.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True)
     with pytest.raises(FluxtrueError, match="no symbol 'protected_start'"):
         image.seal(tmp_path / "b.elf")
