@@ -76,11 +76,14 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
 }
 
-/* The counter has been set to CNTIN, by its start or by a write: this, too, is an initialisation trigger. */
-static void initialised(emu_t *emu, const peripheral_t *self)
+/* The counter is at CNTIN and runs: emu_run() returns, so that the pins can be given this instant's values. */
+static void period_begins(emu_t *emu, const peripheral_t *self)
 {
-    if (self->instance == 0 && (bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
-        trgmux_event(emu, INIT_TRIGGER);
+    if (self->instance == 0) {
+        emu->s.ftm[0].triggers_due = true;
+        emu->s.centre = true;
+        emu->s.stop = true;
+        (void)uc_emu_stop(emu->uc);
     }
 }
 
@@ -91,7 +94,7 @@ static void start_or_stop(emu_t *emu, const peripheral_t *self)
     if (wanted && !f->running) {
         f->running = true;
         f->start = emu->s.now;
-        initialised(emu, self);
+        period_begins(emu, self);
         emu_timer(emu, self->instance == 0 ? TIMER_FTM0 : TIMER_FTM2, emu->s.now + period_ticks(emu, self));
     } else if (!wanted) {
         f->running = false;
@@ -200,7 +203,9 @@ static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t 
         }
     } else if (offset == CNT && !decoding(emu, self)) {
         bus_put(emu, self, CNT, bus_get(emu, self, CNTIN));
-        initialised(emu, self);
+        if (self->instance == 0 && (bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
+            trgmux_event(emu, INIT_TRIGGER); /* a write of the counter is an initialisation, too */
+        }
     } else if (offset == CNT) {
         f->quad_offset = 0;
         f->quad_offset = bus_get(emu, self, CNTIN) + bus_get(emu, self, MOD) + 1U - decoded(emu, self);
@@ -288,8 +293,7 @@ void ftm_fire(emu_t *emu, int instance)
             hardware_trigger(emu);
         }
         closed_update(emu);
-        f->triggers_due = true;
-        emu->s.centre = true;
+        period_begins(emu, self);
     }
 }
 
