@@ -19,6 +19,9 @@ typedef struct {
 
 double emulated_get(emulated_t *e, const char *name);
 
+/** What the firmware makes of a shaft that stands still, from whichever sensor the image reads. */
+uint32_t pins_theta(const emulated_t *e);
+
 bool shadow_start(emulated_t *e);
 void shadow_inputs(emulated_t *e);
 void shadow_compare(emulated_t *e);

@@ -12,14 +12,20 @@ enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48 };
 #define PWM_TICK_S (1.0 / 112e6)
 enum { ENCODER_COUNTS = 16384, ENCODER_SHIFT = 18 };
 
+uint32_t pins_theta(const emulated_t *e)
+{
+    const uint32_t angle = emu_pins_look(e->emu)->angle;
+    const bool encoder = (emu_register(e->emu, "FTM2.QDCTRL") & 1U) != 0;
+    const uint64_t count = ((uint64_t)angle * ENCODER_COUNTS) >> 32;
+    return encoder ? (uint32_t)count << ENCODER_SHIFT : angle & 0xFFFF0000U;
+}
+
 static void samples_take(emulated_t *e)
 {
     const emu_pins_t *pins = emu_pins_look(e->emu);
-    const bool encoder = (emu_register(e->emu, "FTM2.QDCTRL") & 1U) != 0;
-    const uint64_t count = ((uint64_t)pins->angle * ENCODER_COUNTS) >> 32;
     e->shadow->counts = (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1],
                                        .v_dc = pins->adc[1][1]};
-    e->shadow->theta_m = encoder ? (uint32_t)count << ENCODER_SHIFT : pins->angle & 0xFFFF0000U;
+    e->shadow->theta_m = pins_theta(e);
 }
 
 static void follow(void *user, int vector, bool entered)
