@@ -22,6 +22,11 @@ void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
     emu->s.pins.resolver_fault = resolver_fault;
 }
 
+bool emu_gate_driver(const emu_t *emu)
+{
+    return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;
+}
+
 /* The shaft turns on between two settings. */
 uint32_t emu_angle(const emu_t *emu)
 {

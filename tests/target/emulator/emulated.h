@@ -6,6 +6,8 @@
  *   emulator.shadow        set 1: the same firmware, compiled for the host, follows with the same counts and angles and
  *                          is compared after every period; the angle then stands still between two samples
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
+ *   emulator.inverter_C    of the second thermistor
+ *   emulator.gate_driver   set 1: the gates close only while the image supplies their driver (board line)
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md
  * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation

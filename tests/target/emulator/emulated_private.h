@@ -12,6 +12,8 @@ typedef struct {
     emu_pins_t pins_of_board;  /* only the lines that scenarios set */
     double period_ticks;
     uint64_t steps;
+    double inverter_C;
+    bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
     uint64_t compared, differing;
     char difference[96];
