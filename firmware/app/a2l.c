@@ -17,8 +17,8 @@ typedef struct {
 } a2l_record_t;
 
 #define VALUE(id, low, high, si, comment) \
-    {.kind = "value", .name = #id, .text = comment, .unit = si, .type = "F32", .base = "NONE", .lo = (low), .hi = (high), \
-     .offset = offsetof(ecu_t, xcp.working) + sizeof(float) * CALIBRATION_##id},
+    {.kind = "value", .name = #id, .text = comment, .unit = si, .type = "F32", .base = "NONE", .lo = (low), \
+     .hi = (high), .offset = offsetof(ecu_t, xcp.working) + sizeof(float) * CALIBRATION_##id},
 #define MEASURE(id, kind_of, base_of, expression, comment) \
     {.kind = "measure", .name = #id, .text = comment, .type = #kind_of, .base = #base_of, \
      .offset = offsetof(ecu_t, xcp.measurements.id)},

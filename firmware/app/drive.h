@@ -38,8 +38,7 @@ typedef struct {
     angle_tracker_state_t angle_tracker;
     current_control_state_t current_control;
     monitor_state_t monitor;
-    modulate_out_t modulated;    /* acts during the next period */
-    dq_t acting;                 /* acts during this period */
+    dq_t coming;                 /* voltage of the next period, which the duties just written will make */
     uint8_t periods_on; /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
     uint32_t overruns;

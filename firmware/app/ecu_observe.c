@@ -107,11 +107,12 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
 {
     const bus_command_t *command = &ecu->rx.command;
     const supervisor_t *supervisor = &ecu->supervisor;
-    const bool lost = limits_lost(ecu);
+    /* Never more than the machine gives: a ramp to zero would first have to come down from beyond. */
+    const q15_t most = limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor.torque_max;
     return (arbitrate_in_t){
         .request = per_unit(ecu, command->torque_Nm),
-        .limit_drive = lost ? (q15_t)0 : per_unit(ecu, command->limit_drive_Nm),
-        .limit_regen = lost ? (q15_t)0 : per_unit(ecu, command->limit_regen_Nm),
+        .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, most),
+        .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, most),
         .omega = sample_box_read(&ecu->drive.samples).mrai.omega,
         .run = supervisor_outputs[supervisor->state].run,
         .stop = !supervisor->enabled,

@@ -12,25 +12,24 @@
 
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
-    abc_t i;
+    adc_counts_t counts;
+    int32_t sum_q27;
     angle_t angle;
-    fx_sincos_t advanced; /* the middle of the period in which the duties will act: 1.5 periods ahead */
 } instant_t;
 
 static instant_t observe(drive_t *drive, sample_t *sample)
 {
-    adc_counts_t counts;
-    hal_adc_read(&counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &counts);
-    const angle_t angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
-    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
-    const fx_sincos_t at = fx_sincos((uint16_t)((angle.theta_e + 0x8000U) >> 16)); /* the frame of the samples */
-    const dq_t i = park(clarke(measured.i), at);
+    instant_t now;
+    hal_adc_read(&now.counts);
+    const measure_t measured = measure_step(&drive->motor.measure, &now.counts);
+    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
+    now.sum_q27 = measured.sum_q27;
+    const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     sample->mrai.i = i;
-    sample->mrai.omega = angle.omega_q31;
+    sample->mrai.omega = now.angle.omega_q31;
     sample->v_dc = measured.v_dc;
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
-    return (instant_t){measured.i, angle, fx_sincos((uint16_t)((ahead + 0x8000U) >> 16))};
+    return now;
 }
 
 /* Counts the periods that find the identification still busy. */
@@ -54,9 +53,7 @@ static void watch(drive_t *drive, uint32_t unfinished)
 static void publish(drive_t *drive, sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
-    sample->mrai.u = fast->acting;
     sample->acting = fast->periods_on >= PERIODS_TO_ACT;
-    sample->voltage_limited = fast->current_control.limited || fast->modulated.limited;
     if (sample != &fast->lost) {
         sample_box_publish(&drive->samples);
     }
@@ -64,33 +61,38 @@ static void publish(drive_t *drive, sample_t *sample)
     hal_irq_pend_mrai();
 }
 
-static void bridge_off(drive_t *drive)
+static void bridge_off(drive_t *drive, sample_t *sample)
 {
     hal_pwm_enable(false);
     hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
     current_control_reset(&drive->fast.current_control);
-    drive->fast.modulated = (modulate_out_t){.duty = {DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE}};
-    drive->fast.acting = (dq_t){0, 0};
+    sample->mrai.u = (dq_t){0, 0};
+    sample->voltage_limited = false;
+    drive->fast.coming = (dq_t){0, 0};
     drive->fast.periods_on = 0;
 }
 
-static void bridge_on(drive_t *drive, const sample_t *sample, const instant_t *now, const current_target_t *target)
+static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, const current_target_t *target)
 {
     fast_state_t *fast = &drive->fast;
     const motor_t *m = &drive->motor;
     const current_control_in_t control = {
         .target = target,
         .flux = &sample->mrai.flux,
-        .omega = fx_q15_from_q31(now->angle.omega_q31),
+        .omega = now->angle.omega_q31,
         .psi_delta = drive->slow.psi_delta_q15,
         .v_dc = sample->v_dc,
     };
-    fast->acting = fast->modulated.acted;
-    const dq_t u = current_control_step(&m->current_control, &fast->current_control, &control);
-    const modulate_in_t modulation = {.u = u, .i = sample->mrai.i, .advanced = now->advanced, .v_dc = sample->v_dc};
-    modulate_step(&m->modulate, &modulation, &fast->modulated);
-    hal_pwm_write(fast->modulated.duty);
+    const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
+    /* The middle of the period in which the duties will act: 1.5 periods ahead. */
+    const uint32_t ahead = now->angle.theta_e + (uint32_t)now->angle.step + (uint32_t)(now->angle.step >> 1);
+    const modulate_in_t modulation = {wanted.u, sample->mrai.i, ahead, sample->v_dc, wanted.clear};
+    const modulate_out_t made = modulate_step(&m->modulate, &modulation);
+    hal_pwm_write(made.duty);
     hal_pwm_enable(true);
+    sample->mrai.u = fast->coming; /* acts now: the duties before these */
+    sample->voltage_limited = wanted.limited || made.limited;
+    fast->coming = made.acted;
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 
@@ -113,7 +115,7 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     const command_t *command = command_box_read(&drive->commands);
     forget_faults(drive, command->fault_resets);
     watch(drive, unfinished);
-    const monitor_in_t seen = {now.i, sample->v_dc, now.angle.jumped};
+    const monitor_in_t seen = {measure_phases(&drive->motor.measure, &now.counts), sample->v_dc, now.angle.jumped};
 
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
@@ -123,7 +125,7 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {
-        bridge_off(drive);
+        bridge_off(drive, sample);
     }
     publish(drive, sample);
 }

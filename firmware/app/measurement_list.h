@@ -13,8 +13,8 @@
     X(i_q_A, S16, CURRENT, MEASURED(d).mrai.i.q, "Current across the magnet") \
     X(i_d_ref_A, S16, CURRENT, (d)->task.reference.i_ref.d, "Reference of i_d") \
     X(i_q_ref_A, S16, CURRENT, (d)->task.reference.i_ref.q, "Reference of i_q") \
-    X(u_d_V, S16, VOLTAGE, (d)->fast.modulated.acted.d, "Voltage that acts, d") \
-    X(u_q_V, S16, VOLTAGE, (d)->fast.modulated.acted.q, "Voltage that acts, q") \
+    X(u_d_V, S16, VOLTAGE, (d)->fast.coming.d, "Voltage of the next period, d") \
+    X(u_q_V, S16, VOLTAGE, (d)->fast.coming.q, "Voltage of the next period, q") \
     X(v_dc_V, S16, VOLTAGE, MEASURED(d).v_dc, "Measured dc voltage") \
     X(torque_command_Nm, S16, TORQUE, (d)->task.torque_command, "Torque command behind limit and slew") \
     X(torque_request_Nm, S16, TORQUE, (d)->task.torque_request, "Torque asked of the current reference") \

@@ -103,12 +103,10 @@ static void note(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
 static void latch(supervisor_t *s, const supervisor_in_t *in)
 {
     const uint16_t now = causes(s, in);
-    if (s->forgetting_ms == 0U) {
-        note(s, in->drive_faults & ~s->drive_faults_seen, now & ~(uint32_t)s->faults);
-        s->drive_faults_seen = in->drive_faults;
-    } else {
-        s->forgetting_ms--;
-    }
+    const bool forgetting = s->forgetting_ms > 0U;
+    note(s, forgetting ? 0U : in->drive_faults & ~s->drive_faults_seen, now & ~(uint32_t)s->faults);
+    s->drive_faults_seen = forgetting ? 0U : in->drive_faults;
+    s->forgetting_ms = forgetting ? (uint8_t)(s->forgetting_ms - 1U) : (uint8_t)0;
     s->faults = (uint16_t)(s->faults | now);
 }
 
@@ -124,9 +122,8 @@ static void follow_reset(supervisor_t *s, const supervisor_in_t *in)
         return;
     }
     s->resets++;
-    s->faults = causes(s, in);
+    s->faults = 0; /* what is still there is new again */
     s->first_fault = 0;
-    s->drive_faults_seen = 0; /* what is still there is new again */
     s->forgetting_ms = FORGETTING_MS;
 }
 

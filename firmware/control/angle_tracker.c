@@ -3,33 +3,41 @@
 
 #include "fx/q.h"
 
-/* The first two samples set angle and speed directly, so that start-up at speed slips no cycle. */
-static __attribute__((noinline, cold)) void start(angle_tracker_state_t *state, uint32_t theta_e)
+static angle_t result(const angle_tracker_config_t *config, uint32_t theta_e, int32_t omega_q30, bool jumped)
 {
-    state->step = (state->samples == 1) ? (int32_t)(theta_e - state->theta) : 0;
-    state->theta = theta_e;
+    return (angle_t){
+        .theta_e = theta_e,
+        .step = fx_mulhi(config->pu_to_turn, omega_q30),
+        .omega_q31 = fx_add_q31(omega_q30, omega_q30),
+        .jumped = jumped,
+    };
+}
+
+/* The first two samples set angle and speed directly, so that start-up at speed slips no cycle: the second one's
+ * error from the prediction, which is the first one, is the advance. */
+static __attribute__((noinline, cold)) void start(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                                  uint32_t theta_e)
+{
+    const int32_t advance = (state->samples == 1) ? (int32_t)(theta_e - state->predicted) : 0;
+    state->omega_q30 = fx_mul_gain_q31(config->turn_to_pu, advance) >> 1;
+    state->predicted = theta_e + (uint32_t)fx_mulhi(config->pu_to_turn, state->omega_q30);
     state->samples++;
 }
 
 angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
-    bool jumped = false;
-
     if (state->samples < 2) {
-        start(state, theta_e);
-    } else {
-        const uint32_t predicted = state->theta + (uint32_t)state->step;
-        const int32_t error = (int32_t)(theta_e - predicted);
-        jumped = (uint32_t)fx_abs_q31(error) > config->max_step;
-        /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
-        state->step = fx_add2_q31(state->step, fx_mulhi(config->ki, error));
-        state->theta = predicted + 2U * (uint32_t)fx_mulhi(config->kp, error);
+        start(config, state, theta_e);
+        return result(config, theta_e, state->omega_q30, false);
     }
-    return (angle_t){
-        .theta_e = theta_e,
-        .step = state->step,
-        .omega_q31 = fx_mul_gain_q31(config->turn_to_pu, state->step),
-        .jumped = jumped,
-    };
+    const uint32_t predicted = state->predicted;
+    const int32_t error = (int32_t)(theta_e - predicted);
+    /* Turns in Q32 * Q29 = Q29, counted twice. */
+    const int32_t omega_q30 = fx_add2_q31(state->omega_q30, fx_mulhi(config->ki_q29, error));
+    const angle_t angle = result(config, theta_e, omega_q30, (uint32_t)fx_abs_q31(error) > config->max_step);
+    /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
+    state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(config->kp, error);
+    state->omega_q30 = omega_q30;
+    return angle;
 }

@@ -5,9 +5,9 @@
  *   theta_e = p theta_m + offset;  e = theta_e - theta~;  w += k_i e;  theta~ += w + k_p e
  *   k_p = 2 w_n T_s, k_i = (w_n T_s)^2: both poles at -w_n (critical damping).
  * Source   docs/theory/angle-tracker.md (AT-1) ... (AT-4)
- * Units    angles as fractions of a turn times 2^32 (wrap is intended); omega_q31 per unit of omega_b
- * Range    |omega| < 1; turn_to_pu is 2^31/(turns of 2^32 per period at omega_b), Q15.16
- * Rounding speed half up to 1 LSB of 2^-32 turn per period
+ * Units    angles as fractions of a turn times 2^32 (wrap is intended); speed per unit of omega_b
+ * Range    tracks up to |omega| < 2, omega_q31 saturates at 1; omega_b T_s < 0.78
+ * Rounding half up: speed to 1 LSB of 2^-29, angle to 1 LSB of 2^-32 turn
  * Errors   none; a jump of more than max_step per period is reported in jumped and counted by the monitor
  * Context  fast ISR; no division, no loop */
 #include <stdbool.h>
@@ -19,15 +19,16 @@ typedef struct {
     uint32_t pole_pairs;
     uint32_t offset;       /* electrical, 2^32 = one turn */
     q31_t kp;
-    q31_t ki;
-    q16_t turn_to_pu;
+    int32_t ki_q29;        /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
+    int32_t pu_to_turn;    /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
+    q16_t turn_to_pu;      /* the way back, pi/(omega_b T_s): for the first samples only */
     uint32_t max_step;     /* largest credible |e| in one period, 2^32 = one turn */
 } angle_tracker_config_t;
 
 typedef struct {
-    uint32_t theta;  /* tracked electrical angle */
-    int32_t step;    /* tracked electrical advance per period, 2^32 = one turn */
-    uint8_t samples; /* the first two samples set angle and speed directly; then 2 */
+    uint32_t predicted; /* tracked electrical angle of the coming sample */
+    int32_t omega_q30;
+    uint8_t samples;    /* the first two samples set angle and speed directly; then 2 */
 } angle_tracker_state_t;
 
 typedef struct {

@@ -9,11 +9,12 @@
 /* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that
  * binds the d axis, and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
 #define D_RESERVE_SHIFT 5
+#define HALF_LSB_Q22 64
 #define LONGEST 45874 /* 1.4 pu: its half, squared twice, keeps a length below 1 */
 
 typedef struct {
     int32_t error; /* psi* - psi, Q15 */
-    int32_t u;     /* before the limiter, Q15 */
+    int32_t u;     /* before the limiter, Q22 */
 } axis_t;
 
 void current_control_reset(current_control_state_t *state)
@@ -33,27 +34,19 @@ current_target_t current_control_target(const current_control_config_t *config, 
 {
     return (current_target_t){
         .psi = {at_ref->psi_d, at_ref->psi_q},
-        .weighted = {weighted(config, at_ref->psi_d, at_ref->psi_f0, i_ref.d),
-                     weighted(config, at_ref->psi_q, 0, i_ref.q)},
+        .weighted_q30 = {weighted(config, at_ref->psi_d, at_ref->psi_f0, i_ref.d) * 32768,
+                         weighted(config, at_ref->psi_q, 0, i_ref.q) * 32768},
     };
 }
 
-/* One axis without limits: u = sigma (f - psi) + s + feed-forward (CC-4). Q16 * Q31 = Q15. */
-static axis_t axis(q16_t sigma, int32_t target, int32_t weighted_target, int32_t psi, q31_t s, int32_t forward_q30)
+/* One axis without limits: u = sigma (f - psi) + s + feed-forward (CC-4), and half an LSB to round q15.
+ * Q24 * Q30 = Q22; the difference of two q15 numbers fits Q30. */
+static axis_t axis(int32_t sigma_q24, int32_t target, int32_t weighted_q30, int32_t psi, int32_t slow_q30)
 {
-    const int32_t slow = fx_add_q31(fx_add_q31(s >> 1, forward_q30), 0x4000) >> 15;
     return (axis_t){
-        .error = fx_sat_q15_word(target - psi),
-        .u = fx_mulhi_add(slow, sigma, fx_sat_q15_word(weighted_target - psi) * 65536),
+        .error = target - psi,
+        .u = fx_mulhi_add(HALF_LSB_Q22, sigma_q24, weighted_q30 - psi * 32768) + (slow_q30 >> 8),
     };
-}
-
-/* s += sigma a_i e + a T_s (u_limited - u): what the circle cut away is no error to be integrated (CC-10).
- * Two products of Q15 * Q15 = Q30, both gains below 1/2, counted twice for Q31. */
-static q31_t integrate(const current_control_config_t *config, const axis_t *a, q31_t s, int32_t limited_u)
-{
-    const int32_t cut = fx_sat_q15_word(limited_u - a->u);
-    return fx_add2_q31(s, config->integral_gain * a->error + config->tracking_gain * cut);
 }
 
 /* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length
@@ -70,7 +63,7 @@ static dq_t shortened(axis_t d, axis_t q, int32_t v_max)
 /* Inside the circle as wanted. Beyond it the d axis comes first while it takes flux away (CC-11). While it asks for
  * flux back, the q axis may be what holds that flux: a cut that served d first would leave both where they are, at
  * any torque. */
-static __attribute__((noinline)) dq_t limit(axis_t d, axis_t q, int32_t v_max)
+static dq_t limit(axis_t d, axis_t q, int32_t v_max)
 {
     const bool more_flux = d.error > 0;
     const int32_t d_max = more_flux ? v_max : v_max - (v_max >> D_RESERVE_SHIFT);
@@ -90,34 +83,54 @@ static __attribute__((noinline)) dq_t limit(axis_t d, axis_t q, int32_t v_max)
     return (dq_t){u_d, u_q};
 }
 
-/* Nothing for the limiter to do: |u_d| <= d_max and |u| <= v_max, which is below 1: saturated squares tell as much. */
-static bool inside(int32_t u_d, int32_t u_q, int32_t v_max)
+/* s += a T_s (u_limited - u): what the circle cut away is no error to be integrated (CC-10). Q15 * Q15 = Q30, a gain
+ * below 1/2 times less than 1. */
+static int32_t track(int32_t s_q30, int32_t gain, int32_t missing)
 {
-    const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
-    const int32_t d = fx_sat_q15_word(u_d);
-    const int32_t q = fx_sat_q15_word(u_q);
-    return (uint32_t)(d * d) + (uint32_t)(q * q) <= (uint32_t)(v_max * v_max) &&
-           (uint32_t)(u_d + d_max) <= 2U * (uint32_t)d_max;
+    return fx_sat_bits(s_q30 + gain * fx_sat_q15_word(missing), 31);
 }
 
-dq_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
-                          const current_control_in_t *in)
+/* s += sigma a_i e: Q15 * Q15 = Q30 with a gain below 1/2. |s| <= 1, so that slow and rotational voltage fit Q30. */
+static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
+{
+    return fx_sat_bits(s_q30 + gain * error, 31);
+}
+
+/* Beyond the circle that is surely clear: perhaps to be cut. What was cut goes to the integrators as well. */
+static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *config, current_control_state_t *state,
+                                               axis_t d, axis_t q, int32_t v_dc)
+{
+    const int32_t v_max = (config->v_ratio * v_dc + 0x4000) >> 15;
+    d.u = d.u >> 7;
+    q.u = q.u >> 7;
+    const dq_t u = limit(d, q, v_max);
+    state->s_d_q30 = track(state->s_d_q30, config->tracking_gain, u.d - d.u);
+    state->s_q_q30 = track(state->s_q_q30, config->tracking_gain, u.q - q.u);
+    return fx_arch_pkhbt(u.d, u.q);
+}
+
+current_control_out_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
+                                           const current_control_in_t *in)
 {
     const flux_point_t *flux = in->flux;
     const current_target_t *to = in->target;
-    const q16_t sigma = config->sigma_gain;
+    const current_control_state_t s = *state;
+    const int32_t omega = in->omega >> 16;
     const int32_t psi_d = fx_sat_q15_word(flux->psi_d + in->psi_delta);
-    const axis_t d = axis(sigma, to->psi.d, to->weighted.d, flux->psi_d, state->s_d, -(in->omega * flux->psi_q));
-    const axis_t q = axis(sigma, to->psi.q, to->weighted.q, flux->psi_q, state->s_q, in->omega * psi_d);
+    /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
+    const axis_t d = axis(config->sigma_q24, to->psi.d, to->weighted_q30.d, flux->psi_d,
+                          s.s_d_q30 - omega * flux->psi_q);
+    const axis_t q = axis(config->sigma_q24, to->psi.q, to->weighted_q30.q, flux->psi_q,
+                          s.s_q_q30 + omega * psi_d);
+    const dq_t u = {fx_sat_q15_word(d.u >> 7), fx_sat_q15_word(q.u >> 7)};
+    *state = (current_control_state_t){integrate(s.s_d_q30, config->integral_gain, d.error),
+                                       integrate(s.s_q_q30, config->integral_gain, q.error)};
 
-    /* A dc voltage below zero is an offset of its sensor: nothing is left to apply. */
-    const int32_t v_max = fx_max_s32((config->v_ratio * in->v_dc + 0x4000) >> 15, 0);
-    dq_t u = {d.u, q.u};
-    if (!inside(d.u, q.u, v_max)) {
-        u = limit(d, q, v_max);
+    const fx_pair_t both = fx_arch_pkhbt(u.d, u.q);
+    if ((uint32_t)fx_dot2(both, both) < (uint32_t)fx_mulhi(config->clear_q32, in->v_dc * in->v_dc)) {
+        return (current_control_out_t){.u = u, .clear = true};
     }
-    state->limited = u.d != d.u || u.q != q.u;
-    state->s_d = integrate(config, &d, state->s_d, u.d);
-    state->s_q = integrate(config, &q, state->s_q, u.q);
-    return u;
+    const fx_pair_t left = cut(config, state, d, q, in->v_dc);
+    const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
+    return (current_control_out_t){.u = is, .limited = is.d != u.d || is.q != u.q};
 }

@@ -7,14 +7,12 @@
 
 bool flux_table_valid(const flux_table_config_t *config)
 {
-    const fx_grid_t *grid = &config->grid;
     const bool tables = config->l_d && config->l_q && config->l_qq && config->g_d && config->g_q && config->psi_f0;
-    const bool axes = fx_axis_valid(grid->x_shift, grid->nx) && fx_axis_valid(grid->y_shift, grid->ny) &&
-                      grid->y0 == 0 && grid->y_shift == grid->x_shift;
-    if (!tables || !axes || config->l_shift > 13) {
+    if (!tables || !fx_mesh_valid(&config->mesh) || config->l_shift > 13) {
         return false;
     }
-    for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {
+    const size_t nodes = (size_t)((config->mesh.x_last >> 14) + 2U) * config->mesh.ny;
+    for (size_t k = 0; k < nodes; k++) {
         if (config->l_q[k] <= 0 || config->l_qq[k] <= 0 || config->g_d[k] <= 0 || config->g_q[k] <= 0) {
             return false;
         }
@@ -24,11 +22,9 @@ bool flux_table_valid(const flux_table_config_t *config)
 
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i)
 {
-    const fx_grid_t *grid = &config->grid;
-    const uint32_t ny = grid->ny;
+    const uint32_t ny = config->mesh.ny;
     const uint32_t magnitude = (uint32_t)((i.q < 0) ? -i.q : i.q);
-    const fx_cell_t cell = fx_cell_at(fx_axis(i.d, grid->x0, grid->x_shift, grid->nx),
-                                      fx_axis_right(magnitude, grid->x_shift, ny), ny);
+    const fx_cell_t cell = fx_mesh_cell(&config->mesh, i.d, magnitude);
     const int32_t l_d = fx_cell_interp(config->l_d, ny, cell);
     const int32_t l_q = fx_cell_interp(config->l_q, ny, cell);
     const int32_t psi_f0 = fx_cell_interp_y(config->psi_f0, cell);

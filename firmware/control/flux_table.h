@@ -16,7 +16,7 @@
 #include "types/frames.h"
 
 typedef struct {
-    fx_grid_t grid;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0, the same spacing */
+    fx_mesh_t mesh;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
     uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
     const int16_t *l_d, *l_q, *l_qq, *g_d, *g_q; /* [ix * ny + iy] */
     const int16_t *psi_f0; /* [iy]: depends on i_q alone */

@@ -3,20 +3,36 @@
 
 #include "fx/q.h"
 
-static int32_t phase_current(const measure_config_t *config, uint32_t count, int phase)
+/* Q27 to q15 in one product: 2^20 times the factor of the transform. */
+#define PER_THREE 349525      /* 2^20/3 */
+#define PER_ROOT_THREE 605396 /* 2^20/sqrt(3) */
+
+static int32_t phase_q27(const measure_config_t *config, uint32_t count, int phase)
 {
-    /* 16 bits * Q14 gain = Q30: both ends fit. Unsigned, so that a count beyond the converter's width wraps. */
-    const uint32_t q29 = count * (uint32_t)config->scale[phase] + (uint32_t)config->bias[phase];
-    return fx_sat_q15_word((int32_t)q29 >> 14);
+    /* 16 bits * gain below 2 in Q12, twice for both signs: 30 bits. Unsigned, so that a count beyond the converter's
+     * width wraps. */
+    return (int32_t)(count * (uint32_t)config->phase[phase].scale + (uint32_t)config->phase[phase].bias);
 }
 
 measure_t measure_step(const measure_config_t *config, const adc_counts_t *counts)
 {
-    /* 16-bit count * Q15 gain = 31 bits; a full count is one full scale, hence the extra bit. */
-    const uint32_t v_dc = (counts->v_dc * config->v_dc_scale + 0x8000U) >> 16;
+    const int32_t a = phase_q27(config, counts->i_a, 0);
+    const int32_t b = phase_q27(config, counts->i_b, 1);
+    const int32_t c = phase_q27(config, counts->i_c, 2);
+    const int32_t others = fx_add_q31(b, c);
+    /* 16-bit count * gain in Q14 = 31 bits; a full count is one full scale, hence the extra bit. */
+    const uint32_t v_dc = counts->v_dc * config->v_dc_scale + 0x4000U;
     return (measure_t){
-        .i = {phase_current(config, counts->i_a, 0), phase_current(config, counts->i_b, 1),
-              phase_current(config, counts->i_c, 2)},
-        .v_dc = fx_sat_q15_word((int32_t)v_dc),
+        .i = {fx_sat_q15_word(fx_mulhi(fx_sub2_q31(others, a), -PER_THREE)),
+              fx_sat_q15_word(fx_mulhi(fx_sub_q31(b, c), PER_ROOT_THREE))},
+        .sum_q27 = fx_add_q31(others, a),
+        .v_dc = fx_usat_q15_word((int32_t)v_dc >> 15),
     };
+}
+
+abc_t measure_phases(const measure_config_t *config, const adc_counts_t *counts)
+{
+    return (abc_t){fx_sat_q15_word(phase_q27(config, counts->i_a, 0) >> 12),
+                   fx_sat_q15_word(phase_q27(config, counts->i_b, 1) >> 12),
+                   fx_sat_q15_word(phase_q27(config, counts->i_c, 2) >> 12)};
 }

@@ -23,7 +23,8 @@
 
 typedef struct {
     q15_t dead_time;      /* compensated duty error of one phase */
-    q16_t knee_gain;      /* 1/i_knee < 2^13: 1.0 reached at the end of the straight line */
+    int32_t knee_q17;     /* 1/i_knee < 2^13: 1.0 reached at the end of the straight line */
+    int32_t knee_side_q17; /* sqrt(3)/2 of it */
     q15_t min_pulse;      /* shortest pulse the bridge makes, in duty */
     q15_t v_dc_min;       /* floor for the normalisation, at least 2 */
 } modulate_config_t;
@@ -31,8 +32,9 @@ typedef struct {
 typedef struct {
     dq_t u;        /* commanded voltage */
     dq_t i;        /* currents for the polarity */
-    fx_sincos_t advanced; /* sine and cosine of the angle at the middle of the acting period */
+    uint32_t theta;     /* electrical angle at the middle of the acting period, 2^32 = one turn */
     int32_t v_dc;
+    bool clear;         /* u is so small that no duty can be out of reach (MO-11); v_dc is then at least 2 */
 } modulate_in_t;
 
 typedef struct {
@@ -41,6 +43,6 @@ typedef struct {
     bool limited;
 } modulate_out_t;
 
-void modulate_step(const modulate_config_t *config, const modulate_in_t *in, modulate_out_t *out);
+modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in);
 
 #endif

@@ -2,16 +2,15 @@
 #ifndef CONTROL_TRANSFORM_H
 #define CONTROL_TRANSFORM_H
 /** Changes of reference frame, amplitude-invariant.
+ *   Park  d = alpha cos + beta sin, q = beta cos - alpha sin;  inverse  alpha = d cos - q sin, beta = d sin + q cos
  *   Clarke  alpha = (2a - b - c)/3, beta = (b - c)/sqrt(3)
- *   Park  d = alpha cos + beta sin, q = beta cos - alpha sin
- *   inverse Clarke  a = alpha, b,c = -alpha/2 +- sqrt(3)/2 beta
  * Source   docs/theory/current-control.md (CC-1)
- * Units    per unit
+ * Units    per unit; the angle as its (cos, sin), fx_rotation()
  * Range    any: the sum of two products stays below 2 less one rounding for every q15 vector and unit sine/cosine;
  *          inverse_park_q30: Q30 in the fields, not rounded
  * Rounding half up once per component, 1/2 LSB q15
  * Errors   saturates
- * Context  fast ISR; 5 to 8 instructions each, no division, no loop */
+ * Context  fast ISR; 3 to 5 instructions each, no division, no loop */
 #include "fx/q.h"
 #include "fx/trig.h"
 #include "types/frames.h"
@@ -30,28 +29,17 @@ static inline ab_t clarke(abc_t x)
     return (ab_t){transform_round(alpha), transform_round(beta)};
 }
 
-static inline dq_t park(ab_t x, fx_sincos_t at)
+static inline dq_t park(ab_t x, fx_pair_t at)
 {
-    return (dq_t){transform_round(x.alpha * at.cos + x.beta * at.sin),
-                  transform_round(x.beta * at.cos - x.alpha * at.sin)};
+    const fx_pair_t v = fx_arch_pkhbt(x.alpha, x.beta);
+    return (dq_t){fx_sat_q15_word(fx_dot2_acc(0x4000, at, v) >> 15),
+                  fx_sat_q15_word(fx_difference2_cross_acc(0x4000, at, v) >> 15)};
 }
 
-static inline ab_t inverse_park_q30(dq_t x, fx_sincos_t at)
+static inline ab_t inverse_park_q30(dq_t x, fx_pair_t at)
 {
-    return (ab_t){x.d * at.cos - x.q * at.sin, x.d * at.sin + x.q * at.cos};
-}
-
-static inline ab_t inverse_park(dq_t x, fx_sincos_t at)
-{
-    const ab_t q30 = inverse_park_q30(x, at);
-    return (ab_t){transform_round(q30.alpha), transform_round(q30.beta)};
-}
-
-static inline abc_t inverse_clarke(ab_t x)
-{
-    const int32_t half_alpha = x.alpha * -16384; /* Q15 * Q15 = Q30 */
-    const int32_t beta = x.beta * Q15(0.86602540378443865);
-    return (abc_t){x.alpha, transform_round(half_alpha + beta), transform_round(half_alpha - beta)};
+    const fx_pair_t v = fx_arch_pkhbt(x.d, x.q);
+    return (ab_t){fx_difference2(v, at), fx_dot2_cross(v, at)};
 }
 
 #endif

@@ -27,6 +27,13 @@ static inline int32_t fx_arch_smlabb(int16_t a, int16_t b, int32_t acc)
     return fx_arch_add_wrap(acc, (int32_t)a * b);
 }
 
+/* The same value, of which the compiler knows nothing: it is kept in a register and not taken apart again. */
+static inline int32_t fx_arch_opaque(int32_t x)
+{
+    __asm__("" : "+r"(x));
+    return x;
+}
+
 #if defined(__ARM_FEATURE_DSP)
 
 #include <arm_acle.h>
@@ -60,6 +67,11 @@ static inline int32_t fx_arch_ssat16_word(int32_t x)
     return __ssat(x, 16);
 }
 
+static inline int32_t fx_arch_usat15_word(int32_t x)
+{
+    return (int32_t)__usat(x, 15);
+}
+
 static inline uint32_t fx_arch_usat17(int32_t x)
 {
     return (uint32_t)__usat(x, 17);
@@ -74,14 +86,19 @@ __attribute__((always_inline)) static inline int32_t fx_arch_ssat(int32_t x, uns
     return y;
 }
 
+/* The compiler makes two instructions of the builtins. */
 static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
 {
-    return __qadd(a, __qadd(b, b));
+    int32_t y;
+    __asm__("qdadd %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
+    return y;
 }
 
 static inline int32_t fx_arch_qdsub(int32_t a, int32_t b)
 {
-    return __qsub(a, __qadd(b, b));
+    int32_t y;
+    __asm__("qdsub %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
+    return y;
 }
 
 static inline int32_t fx_arch_smulwb(int32_t a, int16_t b)
@@ -124,9 +141,31 @@ static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
     return y;
 }
 
+static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
+{
+    uint32_t y;
+    __asm__("pkhtb %0, %1, %2, asr #16" : "=r"(y) : "r"(hi), "r"(lo));
+    return y;
+}
+
 static inline int32_t fx_arch_smuad(uint32_t a, uint32_t b)
 {
     return __smuad((int16x2_t)a, (int16x2_t)b);
+}
+
+static inline int32_t fx_arch_smuadx(uint32_t a, uint32_t b)
+{
+    return __smuadx((int16x2_t)a, (int16x2_t)b);
+}
+
+static inline int32_t fx_arch_smusd(uint32_t a, uint32_t b)
+{
+    return __smusd((int16x2_t)a, (int16x2_t)b);
+}
+
+static inline int32_t fx_arch_smlsdx(uint32_t a, uint32_t b, int32_t acc)
+{
+    return __smlsdx((int16x2_t)a, (int16x2_t)b, acc);
 }
 
 static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)

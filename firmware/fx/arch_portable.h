@@ -53,6 +53,12 @@ static inline int32_t fx_arch_ssat16_word(int32_t x)
     return fx_arch_ssat16(x);
 }
 
+static inline int32_t fx_arch_usat15_word(int32_t x)
+{
+    const int32_t low = (x < 0) ? 0 : x;
+    return (low > INT16_MAX) ? INT16_MAX : low;
+}
+
 static inline uint32_t fx_arch_usat17(int32_t x)
 {
     const int32_t low = (x < 0) ? 0 : x;
@@ -90,6 +96,12 @@ static inline uint32_t fx_arch_pkhbt(int32_t lo, int32_t hi)
     return ((uint32_t)lo & 0xFFFFU) | ((uint32_t)hi << 16);
 }
 
+/* Upper halves of both. */
+static inline uint32_t fx_arch_pkhtb(int32_t hi, int32_t lo)
+{
+    return ((uint32_t)hi & 0xFFFF0000U) | ((uint32_t)lo >> 16);
+}
+
 static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)
 {
     const int32_t low = (int32_t)(int16_t)(a & 0xFFFFU) * (int16_t)(b & 0xFFFFU);
@@ -100,6 +112,26 @@ static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)
 static inline int32_t fx_arch_smuad(uint32_t a, uint32_t b)
 {
     return fx_arch_smlad(a, b, 0);
+}
+
+/* a.lo b.hi + a.hi b.lo */
+static inline int32_t fx_arch_smuadx(uint32_t a, uint32_t b)
+{
+    return fx_arch_smuad(a, (b >> 16) | (b << 16));
+}
+
+/* a.lo b.lo - a.hi b.hi */
+static inline int32_t fx_arch_smusd(uint32_t a, uint32_t b)
+{
+    const int32_t low = (int32_t)(int16_t)(a & 0xFFFFU) * (int16_t)(b & 0xFFFFU);
+    const int32_t high = (int32_t)(int16_t)(a >> 16) * (int16_t)(b >> 16);
+    return low - high; /* at most 2^31 - 2^15 apart */
+}
+
+/* acc + a.lo b.hi - a.hi b.lo */
+static inline int32_t fx_arch_smlsdx(uint32_t a, uint32_t b, int32_t acc)
+{
+    return fx_arch_add_wrap(acc, fx_arch_smusd(a, (b >> 16) | (b << 16)));
 }
 
 #endif

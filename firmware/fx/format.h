@@ -46,6 +46,12 @@ static inline int32_t fx_sat_q15_word(int32_t x)
     return fx_arch_ssat16_word(x);
 }
 
+/* Into [0, Q15_MAX]: what cannot be negative. */
+static inline int32_t fx_usat_q15_word(int32_t x)
+{
+    return fx_arch_usat15_word(x);
+}
+
 /* Into [-2^(bits-1), 2^(bits-1) - 1]; bits is a constant of 1 to 32. */
 __attribute__((always_inline)) static inline int32_t fx_sat_bits(int32_t x, unsigned bits)
 {

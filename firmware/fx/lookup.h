@@ -40,6 +40,17 @@ typedef struct {
     fx_grid_t grid;
 } fx_lut2_t;
 
+/* A grid with one spacing, y from 0, as a look-up in every period wants it. */
+typedef struct {
+    int32_t x0;
+    uint32_t up;             /* 14 - shift */
+    uint32_t x_last, y_last; /* in cells, Q14: one count short of the last point */
+    uint32_t ny;
+} fx_mesh_t;
+
+#define FX_MESH(from, shift, n_x, n_y) \
+    {(from), 14U - (shift), ((n_x) << 14) - 0x4001U, ((n_y) << 14) - 0x4001U, (n_y)}
+
 typedef struct {
     uint32_t index;  /* of the corner z00 */
     uint32_t column; /* of that corner: for tables that depend on y alone */
@@ -117,6 +128,28 @@ static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
 {
     return fx_cell_at(fx_axis(x, grid->x0, grid->x_shift, grid->nx),
                       fx_axis(y, grid->y0, grid->y_shift, grid->ny), grid->ny);
+}
+
+static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
+{
+    return mesh->up <= 14U && fx_axis_valid(14U - mesh->up, (mesh->x_last >> 14) + 2U) &&
+           fx_axis_valid(14U - mesh->up, mesh->ny) && (mesh->x_last & 0x3FFFU) == 0x3FFFU &&
+           mesh->y_last == (mesh->ny << 14) - 0x4001U;
+}
+
+/* fx_cell() of a q15 x and |y|; inside the grid nothing needs to be limited. */
+static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t y)
+{
+    fx_axis_t ax = {(uint32_t)(x - mesh->x0) << mesh->up, 0U};
+    fx_axis_t ay = {y << mesh->up, 0U};
+    if (__builtin_expect(ax.position > mesh->x_last, 0)) { /* a negative one is very large */
+        const uint32_t nearest = (x < mesh->x0) ? 0U : mesh->x_last;
+        ax = (fx_axis_t){nearest, (ax.position - nearest) >> 1};
+    }
+    if (__builtin_expect(ay.position > mesh->y_last, 0)) {
+        ay = (fx_axis_t){mesh->y_last, (ay.position - mesh->y_last) >> 1};
+    }
+    return fx_cell_at(ax, ay, mesh->ny);
 }
 
 static inline int32_t fx_cell_interp(const int16_t *z, uint32_t ny, fx_cell_t cell)

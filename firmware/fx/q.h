@@ -102,4 +102,22 @@ static inline int32_t fx_dot2_acc(int32_t acc, fx_pair_t a, fx_pair_t b)
     return fx_arch_smlad(a, b, acc);
 }
 
+/* a.lo * b.hi + a.hi * b.lo, Q30; wraps only when all four are -1. */
+static inline int32_t fx_dot2_cross(fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_smuadx(a, b);
+}
+
+/* a.lo * b.lo - a.hi * b.hi, Q30. */
+static inline int32_t fx_difference2(fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_smusd(a, b);
+}
+
+/* acc + a.lo * b.hi - a.hi * b.lo, Q30. */
+static inline int32_t fx_difference2_cross_acc(int32_t acc, fx_pair_t a, fx_pair_t b)
+{
+    return fx_arch_smlsdx(a, b, acc);
+}
+
 #endif

@@ -6,7 +6,7 @@
  *   (sin, cos)(a) by rotating the nearest of 512 table points through the remaining angle.
  *   atan2: signed ratio of the smaller to the larger component, table of atan, nearest axis added.
  * Source   docs/theory/fixed-point.md (FX-18) to (FX-25)
- * Units    angles: turn / 2^16 (fx_sincos), turn / 2^32 (fx_atan2); both wrap. sin, cos: q15
+ * Units    angles: turn / 2^16 (fx_sincos), turn / 2^32 (fx_rotation, fx_atan2); all wrap. sin, cos: q15
  * Range    every argument; atan2(0, 0) = 0
  * Rounding sin, cos: 3.2e-5 of full scale (32768), peaks at +1 saturate to 32767
  *          atan2: 2.1e-5 rad, of the angle of the integer pair, for every pair but (0, 0)
@@ -43,6 +43,17 @@ static inline fx_sincos_t fx_sincos(uint16_t angle)
     const int32_t s = fx_mulhi_add(sin0, cos0, delta);
     const int32_t c = fx_mulhi_sub(cos0, sin0, delta);
     return (fx_sincos_t){.sin = (q15_t)(s >> 16), .cos = (q15_t)(c >> 16)};
+}
+
+/* (cos, sin) in one word, low half first, for dual products: fx_sincos() of an angle that is not rounded to 16 bits. */
+static inline fx_pair_t fx_rotation(uint32_t turn)
+{
+    const int32_t *point = &fx_sin_table[(turn + (1U << 22)) >> 23];
+    const int32_t sin0 = point[0];
+    const int32_t cos0 = point[128];
+    /* The signed low 23 bits, as a fraction of 2^32, times 2 pi / 2^9 in Q32. */
+    const int32_t delta = fx_mulhi((int32_t)(turn << 9), 52707179);
+    return fx_arch_pkhtb(fx_mulhi_add(sin0, cos0, delta), fx_mulhi_sub(cos0, sin0, delta));
 }
 
 static inline uint32_t fx_atan2(q15_t y, q15_t x)

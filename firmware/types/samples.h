@@ -4,7 +4,7 @@
 /** What crosses the hardware seam every period: converter counts in, duties out.
  * Source   docs/architecture.md, the HAL seam
  * Units    counts of an adc_bits converter, right-aligned; duties with 2^15 = 1.0
- * Range    duties 0 ... 32768
+ * Range    duties 0 ... 32768, in a word each: a halfword would cost an extension at every use
  * Context  values only */
 #include <stdint.h>
 
@@ -14,7 +14,7 @@ typedef struct {
 } adc_counts_t;
 
 typedef struct {
-    uint16_t a, b, c; /* 32768: upper switch on for the whole period */
+    uint32_t a, b, c; /* 32768: upper switch on for the whole period */
 } duty_t;
 
 #endif

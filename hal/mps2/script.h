@@ -21,7 +21,7 @@ typedef struct {
     uint32_t angle;
     uint32_t low, high; /* the sum */
     uint32_t differing; /* periods whose duty differs from the one before */
-    uint16_t last;
+    uint32_t last;
 } script_t;
 
 void script_next(script_t *script);

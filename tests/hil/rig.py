@@ -23,6 +23,7 @@ COMMAND = "VCU_TorqueCommand"
 LIMITS = "VCU_BatteryLimits"
 STATUS = "INV_Status"
 MS = 1e-3
+RPM = 2.0 * np.pi / 60.0  # rad/s
 EXACT = 1e-9  # s: a step's end and a frame's due time are the same instant
 
 
@@ -58,6 +59,16 @@ class Trace:
 
 
 @dataclass
+class Expected:
+    """What a test provokes and the check after it must not complain about."""
+
+    faults: bool = False
+    load: bool = False  # of the bus
+    frames: bool = False  # cyclic frames that come late or not at all
+    counters: set[str] = field(default_factory=set)
+
+
+@dataclass
 class Frame:
     """One frame as received."""
 
@@ -73,8 +84,9 @@ class Rig:
     ) -> None:
         self.bus, self.database, self._stand, self._port = bus, database, stand, port
         self.by_name = {message.name: message for message in database.messages}
-        self.by_id = {message.frame_id: message for message in database.messages}
         self._command_id, self._limits_id = self.by_name[COMMAND].frame_id, self.by_name[LIMITS].frame_id
+        self._encoded: dict[Command, bytes] = {}
+        self._inverters = {m.frame_id: m.name for m in database.messages if "INV" in m.senders}
         self.listeners: list[Callable[[can.Message], None]] = []
         self.sent = 0
         self._heard = 0
@@ -94,6 +106,7 @@ class Rig:
         self.keep_frames = True
         self.counted: dict[str, int] = defaultdict(int)
         self.trace = Trace([])
+        self.expected = Expected()
 
     # What the DBC says.
 
@@ -157,7 +170,9 @@ class Rig:
 
     def encode(self, command: Command) -> bytes:
         """A command's frame without protection."""
-        return bytes(self.by_name[COMMAND].encode(command.signals()))
+        if command not in self._encoded:
+            self._encoded[command] = bytes(self.by_name[COMMAND].encode(command.signals()))
+        return self._encoded[command]
 
     def next_command(self) -> bytes:
         """The protected frame that is next in turn."""
@@ -168,21 +183,23 @@ class Rig:
         sender = self._senders[COMMAND]
         sender.counter = (sender.counter + count) % e2e.COUNTERS
 
+    def _is_due(self, name: str) -> bool:
+        """Whether a cyclic message must go out now; its next time is noted."""
+        if self._due[name] > self.now_s + EXACT:
+            return False
+        self._due[name] = max(self._due[name], self.now_s - EXACT) + self.cycle_s(name)
+        return True
+
     def _send_due(self) -> None:
         if not self.is_sending:
-            self._due = {name: max(due_s, self.now_s) for name, due_s in self._due.items()}
             return
-        now_s = self.now_s
-        if self._due[COMMAND] <= now_s + EXACT:
+        if self._is_due(COMMAND):
             self.send(self._command_id, self.next_command())
-            self._due[COMMAND] += self.cycle_s(COMMAND)
-        if self._due[LIMITS] <= now_s + EXACT:
-            if self.power_limits_kW is not None:
-                drive, regen = self.power_limits_kW
-                signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
-                data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
-                self.send(self._limits_id, data)
-            self._due[LIMITS] += self.cycle_s(LIMITS)
+        if self._is_due(LIMITS) and self.power_limits_kW is not None:
+            drive, regen = self.power_limits_kW
+            signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
+            data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
+            self.send(self._limits_id, data)
 
     # Receiving.
 
@@ -191,16 +208,16 @@ class Rig:
             return
         for listener in self.listeners:
             listener(message)
-        known = self.by_id.get(message.arbitration_id)
-        if known is None or message.is_extended_id or "INV" not in known.senders:
+        name = self._inverters.get(message.arbitration_id)
+        if name is None or message.is_extended_id:
             return
         frame = Frame(message.timestamp, bytes(message.data))
-        self.counted[known.name] += 1
-        self.last[known.name] = frame
-        if known.name == STATUS:
+        self.counted[name] += 1
+        self.last[name] = frame
+        if name == STATUS:
             self.status_protection.take(frame.data)
         if self.keep_frames:
-            self.frames[known.name].append(frame)
+            self.frames[name].append(frame)
 
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
         """Signals; choices stay numbers."""
@@ -245,6 +262,11 @@ class Rig:
         self.ask(enable=True)
         self.wait_for("run")
         self.ask(torque_Nm=torque_Nm)
+
+    def turn(self, speed_rpm: float, seconds: float = 0.3) -> None:
+        """The dynamometer brings the shaft to this speed; a jump would be an angle fault."""
+        self.stand.ramp("plant.speed_rad_s", speed_rpm * RPM, seconds)
+        self.advance(seconds + 0.1)
 
     def record(self, names: Sequence[str], periods: int = 10) -> Trace:
         """The plant's truth from now on: a row each so many PWM periods."""

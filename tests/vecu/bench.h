@@ -8,8 +8,9 @@
  *   get <name> [...]
  *   ramp <name> <value> <n> <unit>    linearly during the runs to come
  *   record <periods> <name> [...]     during a run one line "row <value> ..." each so many periods; "record off"
- *   run <n> <unit> [<port> <count>]   lets time pass; before it, waits until the CAN client with this port has been heard
- *                                     with so many frames. Answers time in ns and the frames sent to that client so far
+ *   run <n> <unit> [<port> <count>]   lets time pass; before it, waits until the CAN client with this port has been
+ *                                     heard with so many frames. Answers the time in ns and the frames sent to that
+ *                                     client so far
  *   hash                              of all duties and gate states since the last time it was asked for
  *   counters                          of bus, hub and bench
  *   reset [<seed>]                    power cycle of ECU and plant

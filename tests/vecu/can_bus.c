@@ -17,8 +17,8 @@ uint32_t can_bus_bits(const can_frame_t *frame)
     return frame->extended ? 67U + data + (53U + data) / 4U : 47U + data + (33U + data) / 4U;
 }
 
-/* Orders identifiers as the wire does: bit by bit, dominant (0) wins, and of two with the same first 11 bits the standard
- * frame wins. */
+/* Orders identifiers as the wire does: bit by bit, dominant (0) wins, and of two with the same first 11 bits the
+ * standard frame wins. */
 static uint32_t rank(const can_frame_t *frame)
 {
     if (!frame->extended) {
@@ -115,4 +115,10 @@ bool can_bus_next(can_bus_t *bus, uint64_t until_ns, can_bus_passed_t *passed)
     account(bus, bus->free_ns, can_bus_bits(&bus->frame));
     *passed = (can_bus_passed_t){bus->frame, bus->from, bus->free_ns};
     return true;
+}
+
+void can_bus_silence_ecu(can_bus_t *bus)
+{
+    bus->node[CAN_BUS_ECU].count = 0;
+    bus->flying = bus->flying && bus->from != CAN_BUS_ECU;
 }

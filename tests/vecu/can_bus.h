@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_CAN_BUS_H
 #define VECU_CAN_BUS_H
-/** A classic CAN bus in simulated time: frames queue at their nodes, the lowest identifier among the heads of the queues
- * goes next, and every frame occupies the wire for its length with the most stuff bits its kind can need:
+/** A classic CAN bus in simulated time: frames queue at their nodes, the lowest identifier among the heads of the
+ * queues goes next, and every frame occupies the wire for its length with the most stuff bits its kind can need:
  *   (VB-1)  bits = 47 + 8 n + floor((33 + 8 n)/4)    standard identifier, n data bytes, 3 bits between frames included
  *   (VB-2)  bits = 67 + 8 n + floor((53 + 8 n)/4)    extended
  * Source   ISO 11898-1; g + 8n bits are open to stuffing (g = 34 or 54), at most one stuff bit after each 4 of them
@@ -58,5 +58,7 @@ uint32_t can_bus_bits(const can_frame_t *frame);
 bool can_bus_post(can_bus_t *bus, int node, const can_frame_t *frame, uint64_t now_ns);
 /** The next frame that has passed by `until`; false: none. */
 bool can_bus_next(can_bus_t *bus, uint64_t until_ns, can_bus_passed_t *passed);
+/** The ECU is switched off: what it was sending and had queued is lost. */
+void can_bus_silence_ecu(can_bus_t *bus);
 
 #endif

@@ -2,7 +2,8 @@
 #ifndef VECU_DC_LINK_H
 #define VECU_DC_LINK_H
 /** The capacitor between battery and bridge, with its three switches.
- *   (VB-3)  C dv/dt = (V_bat - v)/R_pre [precharge] - v/R_dis [discharge] - i_bridge;  v = V_bat while the contactor is closed
+ *   (VB-3)  C dv/dt = (V_bat - v)/R_pre [precharge] - v/R_dis [discharge] - i_bridge
+ *           v = V_bat while the contactor is closed
  * Units    V, A, s; resistances are given by their time constants with C
  * Range    v >= 1 V: the machine model divides by it
  * Context  simulation only; pure; one step per PWM period, the bridge's current is the last period's mean */

@@ -183,6 +183,12 @@ bool hub_receive(hub_t *hub, can_frame_t *frame)
     return true;
 }
 
+void hub_forget_ecu(hub_t *hub)
+{
+    can_bus_silence_ecu(&hub->bus);
+    hub->count = 0;
+}
+
 bool hub_client_counts(hub_t *hub, uint16_t peer, uint64_t *received, uint64_t *sent)
 {
     for (int i = 0; i < LINE_CLIENTS; i++) {

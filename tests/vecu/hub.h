@@ -5,8 +5,8 @@
  *   each step of simulated time: hub_poll(); hub_run(now); the ECU takes hub_receive() and gives hub_send()
  * Source   docs/howto/bench.md; tests/vecu/can_bus.h for the bus
  * Units    ns of simulated time, which must not go back; frames are stamped with the end of their last bit
- * Errors   hub_create() answers NULL and the reason; hub_send() false: the ECU's queue is full and the frame was not taken.
- *          Texts that are no protocol are dropped and counted
+ * Errors   hub_create() answers NULL and the reason; hub_send() false: the ECU's queue is full and the frame was not
+ *          taken. Texts that are no protocol are dropped and counted
  * Context  simulation only; one thread; knows neither firmware nor plant */
 #include <stdbool.h>
 #include <stddef.h>
@@ -43,8 +43,12 @@ bool hub_has_room(const hub_t *hub);
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns);
 bool hub_receive(hub_t *hub, can_frame_t *frame);
 
+/** The ECU is switched off: nothing of its own is on the bus any more, and it has heard nothing. */
+void hub_forget_ecu(hub_t *hub);
+
 /** What passed between us and the client whose side of the connection has this port: frames it sent, good or bad, and
- * frames sent to it. False: no such client. A client that knows its own port has read the greetings: frames flow at once. */
+ * frames sent to it. False: no such client. A client that knows its own port has read the greetings: frames flow at
+ * once. */
 bool hub_client_counts(hub_t *hub, uint16_t peer, uint64_t *received, uint64_t *sent);
 hub_counts_t hub_counts(const hub_t *hub);
 

@@ -3,9 +3,9 @@
 #define VECU_LINE_BUFFER_H
 /** Finds the texts in a stream of bytes: lines, or words between '<' and '>'.
  * Range    texts of up to LINE_LENGTH characters
- * Errors   a text that is too long, has a NUL in it, or is interrupted by another '<', and whatever stands between '>' and
- *          '<' but white space, is dropped and counted
- * Context  simulation only; pure: the caller reads into bytes[end], line_buffer_room() bytes at most, and advances end */
+ * Errors   a text that is too long, has a NUL in it, or is interrupted by another '<', and whatever stands between
+ *          '>' and '<' but white space, is dropped and counted
+ * Context  simulation only; pure: the caller reads line_buffer_room() bytes at most into bytes[end] and advances end */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>

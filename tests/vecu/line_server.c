@@ -124,6 +124,7 @@ static void client_accept(line_server_t *server)
     struct sockaddr_in from;
     socklen_t size = sizeof from;
     const int on = 1;
+    const int send_size = 1 << 17; /* what does not fit waits with us, where it is counted */
     const int fd = accept(server->listener, (struct sockaddr *)&from, &size);
     if (fd < 0) {
         return;
@@ -132,6 +133,7 @@ static void client_accept(line_server_t *server)
         client_t *c = &server->client[i];
         if (c->fd < 0 && set_nonblocking(fd)) {
             (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+            (void)setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &send_size, sizeof send_size);
             c->fd = fd;
             c->in.framing = server->framing;
             c->peer = ntohs(from.sin_port);

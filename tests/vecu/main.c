@@ -15,8 +15,8 @@
 #include "vecu.h"
 
 enum { EXIT_USAGE = 2, PERIODS_PER_LOOP = 100 };
-#define BACKLOG_MAX ((size_t)1 << 20) /* fast: time waits for a client with more than this to read */
-#define PATIENCE_NS 5000000000LL      /* so long, by the wall clock; then it is disconnected */
+#define BACKLOG_MAX ((size_t)1 << 18) /* fast: time waits for a client with more than this to read */
+#define PATIENCE_NS 2000000000LL      /* so long, by the wall clock; then it is disconnected */
 #define LAG_MAX_NS 200000000LL        /* realtime: a host further behind gives up the rest */
 
 static volatile sig_atomic_t stop;

@@ -12,7 +12,7 @@
 #define FNV_START 14695981039346656037ULL
 #define FNV_PRIME 1099511628211ULL
 
-/* Not on the heap: in a program at a fixed address a calibration tool finds it where the ELF file says, by this name. */
+/* Not on the heap: in a program at a fixed address a calibration tool finds it by this name where the ELF says. */
 static fluxtrue_t ecu;
 
 static const char *plant_set_up(sim_t *sim, uint64_t seed)
@@ -35,6 +35,9 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)
 {
     sim_destroy(vecu->sim);
+    if (vecu->hub != NULL) {
+        hub_forget_ecu(vecu->hub);
+    }
     fluxtrue_init(&ecu);
     can_host_attach(&ecu);
     vecu->sim = sim_create_around(&ecu);

@@ -89,10 +89,10 @@ def test_the_over_current_trip_lies_above_i_max_and_below_80_percent_of_full_sca
 def test_current_control_gains_come_from_the_delay(motor):
     """T_d = 150 us: sigma = 1/300 us = 3333 rad/s. Zero and closed loop share sigma, b is the loop's share."""
     c = members(motor_tables_c(motor))
-    sigma = c["sigma_gain"] / 65536 * motor.bases.omega_rad_s
+    sigma = c["sigma_q24"] / 2**24 * motor.bases.omega_rad_s
     assert sigma == pytest.approx(10000 / 3, rel=1e-4)
     b = c["setpoint_weight"] / 32768
-    ratio = c["integral_gain"] / 32768 / (c["sigma_gain"] / 65536)
+    ratio = c["integral_gain"] / 32768 / (c["sigma_q24"] / 2**24)
     # a_i = w_c a T_s/sigma with w_c = b sigma, a = (1 - b) sigma; sigma T_s = 1/3.
     assert ratio == pytest.approx(b * (1 - b) / 3, rel=0.002)
 

@@ -105,7 +105,7 @@ void test_the_published_voltage_is_the_one_that_acts_now(void)
     seam_run();
     seam_period();
     TEST_ASSERT_EQUAL_INT(0, published()->mrai.u.d);
-    drive.fast.modulated.acted = (dq_t){1234, -567};
+    drive.fast.coming = (dq_t){1234, -567};
     seam_period();
     TEST_ASSERT_EQUAL_INT(1234, published()->mrai.u.d);
     TEST_ASSERT_EQUAL_INT(-567, published()->mrai.u.q);
@@ -176,11 +176,11 @@ void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
 {
     seam_run();
     seam_periods(3);
-    drive.fast.current_control.s_q = 500000000;
+    drive.fast.current_control.s_q_q30 = 250000000;
     drive.request.enable = false;
     task_1khz(&drive);
     seam_period();
-    TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_q);
+    TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_q_q30);
     TEST_ASSERT_FALSE(seam.gates);
     seam_run();
     seam_period();
@@ -193,7 +193,7 @@ void test_a_voltage_at_its_limit_is_told_to_the_task(void)
     seam_run();
     seam_periods(2);
     TEST_ASSERT_FALSE(published()->voltage_limited);
-    drive.fast.current_control.s_q = 2000000000;
+    drive.fast.current_control.s_q_q30 = 1000000000;
     seam_period();
     TEST_ASSERT_TRUE(published()->voltage_limited);
 }

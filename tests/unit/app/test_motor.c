@@ -59,14 +59,15 @@ void test_measurement_and_angle_are_the_si_values(void)
     const double turns_at_base = w_b * motor_si.period_s / (2.0 * 3.14159265358979323846);
     const double wn = motor_si.tracker_bandwidth_rad_s * motor_si.period_s;
     const double lsb = 65536.0 / (1 << motor_si.adc_bits); /* of the converter, in 16-bit counts */
-    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc_scale / lsb / 32768.0, 1.0 / 32768.0);
+    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc_scale / lsb / 16384.0, 1.0 / lsb / 16384.0);
     for (int phase = 0; phase < 3; phase++) {
-        TEST_ASSERT_EQUAL_INT((int)(lsb * 16384.0), motor.measure.scale[phase]);
-        TEST_ASSERT_EQUAL_INT(8192 - 32768 * 16384, motor.measure.bias[phase]);
+        TEST_ASSERT_EQUAL_INT((int)(lsb * 4096.0), motor.measure.phase[phase].scale);
+        TEST_ASSERT_EQUAL_INT(-32768 * 4096, motor.measure.phase[phase].bias);
     }
     TEST_ASSERT_EQUAL_INT(motor_si.pole_pairs, motor.angle_tracker.pole_pairs);
     HELD(2.0 * wn, q31(motor.angle_tracker.kp), q31(1));
-    HELD(wn * wn, q31(motor.angle_tracker.ki), q31(1));
+    HELD(wn * wn / turns_at_base, 4.0 * q31(motor.angle_tracker.ki_q29), 4.0 * q31(1));
+    HELD(8.0 * turns_at_base, q31(motor.angle_tracker.pu_to_turn), q31(1));
     HELD(0.5 / turns_at_base, motor.angle_tracker.turn_to_pu / 65536.0, 1.0 / 65536.0);
 }
 
@@ -74,16 +75,22 @@ void test_current_control_and_modulation_are_the_si_values(void)
 {
     const double sigma = motor_si.sigma_rad_s / w_b;
     HELD(1.0 / (3.0 * motor_si.period_s), motor_si.sigma_rad_s, 1e-9);
-    HELD(sigma, motor.current_control.sigma_gain / 65536.0, 1.0 / 65536.0);
+    HELD(sigma, motor.current_control.sigma_q24 / 16777216.0, 1.0 / 16777216.0);
     HELD(motor_si.r_ohm_20 / z_b / sigma, motor.current_control.drop_gain / 65536.0, 1.0 / 65536.0);
     HELD(motor_si.setpoint_weight, q15(motor.current_control.setpoint_weight), q15(1));
     HELD(sigma * motor_si.integral_ratio, q15(motor.current_control.integral_gain), q15(1));
     HELD(motor_si.v_ratio, q15(motor.current_control.v_ratio), q15(1));
     HELD(motor_si.dead_time_duty, q15(motor.modulate.dead_time), q15(1));
-    HELD(i_b / motor_si.knee_A, motor.modulate.knee_gain / 65536.0, 1.0 / 65536.0);
+    HELD(i_b / motor_si.knee_A, motor.modulate.knee_q17 / 131072.0, 1.0 / 131072.0);
+    HELD(0.5 * sqrt(3.0) * i_b / motor_si.knee_A, motor.modulate.knee_side_q17 / 131072.0, 1.0 / 131072.0);
     HELD(motor_si.min_pulse_duty, q15(motor.modulate.min_pulse), q15(1));
     HELD(motor_si.v_dc_min_V / v_b, q15(motor.modulate.v_dc_min), q15(1));
     TEST_ASSERT_TRUE(motor_si.v_ratio <= 1.0 / sqrt(3.0));
+    /* (MO-11), and 31/32 of the voltage circle: inside, neither stage limits. */
+    const double clear = sqrt(motor.current_control.clear_q32 / 4294967296.0);
+    const double pulse = motor_si.min_pulse_duty + motor_si.dead_time_duty;
+    TEST_ASSERT_TRUE(clear < 31.0 / 32.0 * motor_si.v_ratio && sqrt(3.0) * clear + 2.0 * pulse < 1.0);
+    TEST_ASSERT_TRUE(clear > 0.9 / sqrt(3.0)); /* and that is most of the range */
 }
 
 void test_the_identification_is_the_si_values(void)
@@ -136,7 +143,7 @@ void test_the_flux_tables_say_what_the_unquantised_ones_say(void)
     const double l = 32768.0 * w_b / z_b / (1 << motor.flux_table.l_shift);
     double value = 0.0;
     double flux = 0.0;
-    for (int d = motor.flux_table.grid.x0; d <= 0; d += 101) {
+    for (int d = motor.flux_table.mesh.x0; d <= 0; d += 101) {
         for (int q = -20480; q <= 20480; q += 103) {
             const flux_point_t y = flux_table_step(&motor.flux_table, (dq_t){(q15_t)d, (q15_t)q});
             const twin_flux_t t = twin_flux_table(&motor_si, (twin_dq_t){q15(d) * i_b, q15(q) * i_b});

@@ -115,9 +115,13 @@ void test_every_part_of_the_motor_data_is_checked(void)
     BAD(m.monitor.v_min = m.monitor.v_max);
     BAD(m.mrai.r0 = 0);
     BAD(m.modulate.v_dc_min = 0);
-    BAD(m.modulate.knee_gain = 0);
+    BAD(m.modulate.knee_q17 = 0);
+    BAD(m.modulate.knee_side_q17 = 1 << 30);
     BAD(m.monitor.sum_max = 0);
-    BAD(m.current_control.sigma_gain = 0);
+    BAD(m.current_control.sigma_q24 = 0);
+    BAD(m.current_control.clear_q32 = -1);
+    BAD(m.current_control.clear_q32 = m.current_control.clear_q32 / 4 * 5);
+    BAD(m.modulate.dead_time = 16384);
     BAD(m.current_control.setpoint_weight = 0);
     BAD(m.current_control.integral_gain = 16384);
     BAD(m.current_control.tracking_gain = 16384);

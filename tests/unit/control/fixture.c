@@ -77,7 +77,7 @@ static void flux_tables(fixture_t *f)
         g_q[n] = q15_of(period * f->z / si_l_qq[n]);
     }
     f->flux_table = (flux_table_config_t){
-        .grid = {-(NX - 1) * cell, 0, 11, 11, NX, NY},
+        .mesh = FX_MESH(-(NX - 1) * cell, 11U, (uint32_t)NX, (uint32_t)NY),
         .l_shift = L_SHIFT,
         .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g_d = g_d, .g_q = g_q,
         .psi_f0 = psi_f0,
@@ -136,7 +136,8 @@ static void inputs(fixture_t *f)
     f->angle_tracker = (angle_tracker_config_t){
         .pole_pairs = POLE_PAIRS,
         .kp = q31_of(2.0 * wn),
-        .ki = q31_of(wn * wn),
+        .ki_q29 = q31_of(wn * wn / turns / 4.0),
+        .pu_to_turn = q31_of(8.0 * turns),
         .turn_to_pu = q16_of(0.5 / turns),
         .max_step = 1u << 29,
     };
@@ -156,21 +157,23 @@ static void voltage(fixture_t *f)
 {
     const double sigma = 1.0 / (3.0 * period) / f->w;
     f->current_control = (current_control_config_t){
-        .sigma_gain = q16_of(sigma),
+        .sigma_q24 = q31_of(sigma / 128.0),
         .drop_gain = q16_of(674.0 / 65536.0 / sigma),
         .setpoint_weight = q15_of(0.7),
         .integral_gain = q15_of(0.05 * sigma),
         .tracking_gain = q15_of(0.05 / 0.7),
         .v_ratio = q15_of(0.57),
+        .clear_q32 = q31_of(2.0 * 0.5 * 0.5),
     };
-    f->si.sigma_rad_s = f->current_control.sigma_gain / 65536.0 * f->w;
+    f->si.sigma_rad_s = f->current_control.sigma_q24 / 16777216.0 * f->w;
     f->si.setpoint_weight = from_q15(f->current_control.setpoint_weight);
     f->si.integral_ratio = from_q15(f->current_control.integral_gain) /
-                           (f->current_control.sigma_gain / 65536.0);
+                           (f->current_control.sigma_q24 / 16777216.0);
     f->si.v_ratio = from_q15(f->current_control.v_ratio);
     f->modulate = (modulate_config_t){
         .dead_time = q15_of(0.02),
-        .knee_gain = q16_of(100.0),
+        .knee_q17 = q16_of(200.0),
+        .knee_side_q17 = q16_of(200.0 * 0.86602540378443865),
         .min_pulse = q15_of(0.01),
         .v_dc_min = q15_of(0.1),
     };

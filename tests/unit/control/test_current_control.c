@@ -10,13 +10,19 @@ static current_control_state_t state;
 static current_target_t target;
 static flux_point_t flux;
 static current_control_in_t in;
+static bool limited; /* in the last step() */
+
+static dq_t q30(dq_t x)
+{
+    return (dq_t){x.d * 32768, x.q * 32768};
+}
 
 void setUp(void)
 {
     f = fixture();
     current_control_reset(&state);
     flux = flux_table_step(&f.flux_table, (dq_t){-4000, 6000});
-    target = (current_target_t){{flux.psi_d, flux.psi_q}, {flux.psi_d, flux.psi_q}}; /* no error at all */
+    target = (current_target_t){{flux.psi_d, flux.psi_q}, q30((dq_t){flux.psi_d, flux.psi_q})}; /* no error at all */
     in = (current_control_in_t){.target = &target, .flux = &flux, .v_dc = 21845 /* 350 V */};
 }
 
@@ -26,7 +32,9 @@ void tearDown(void)
 
 static dq_t step(void)
 {
-    return current_control_step(&f.current_control, &state, &in);
+    const current_control_out_t out = current_control_step(&f.current_control, &state, &in);
+    limited = out.limited;
+    return out.u;
 }
 
 static twin_dq_t si_psi(dq_t psi)
@@ -39,7 +47,8 @@ static twin_dq_t twin_step(twin_current_state_t *twin)
 {
     const twin_dq_t psi = si_psi((dq_t){flux.psi_d, flux.psi_q});
     const twin_flux_t si = {.psi_d = psi.d, .psi_q = psi.q};
-    const twin_current_in_t t = {{si_psi(target.psi), si_psi(target.weighted)}, &si, from_q15(in.omega) * f.w,
+    const dq_t weighted = {target.weighted_q30.d / 32768, target.weighted_q30.q / 32768};
+    const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)}, &si, from_q31(in.omega) * f.w,
                                  from_q15(in.psi_delta) * f.psi, from_q15(in.v_dc) * f.v};
     const twin_dq_t u = twin_current_control(&f.si, twin, &t);
     return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
@@ -65,9 +74,9 @@ void test_the_target_of_every_reference_follows_the_twin(void)
             const double lsb = 32768.0 / f.psi;
             worst_note(&worst, y.psi.d - t.psi.d * lsb, "psi_d of %d %d", d, q);
             worst_note(&worst, y.psi.q - twin_clamp(t.psi.q * lsb, -32768, 32767), "psi_q of %d %d", d, q);
-            worst_note(&worst, y.weighted.d - t.weighted.d * lsb, "f_d of %d %d", d, q);
+            worst_note(&worst, y.weighted_q30.d / 32768.0 - t.weighted.d * lsb, "f_d of %d %d", d, q);
             if (fabs(t.psi.q * lsb) < 32760.0) {
-                worst_note(&worst, y.weighted.q - t.weighted.q * lsb, "f_q of %d %d", d, q);
+                worst_note(&worst, y.weighted_q30.q / 32768.0 - t.weighted.q * lsb, "f_q of %d %d", d, q);
             }
         }
     }
@@ -79,9 +88,9 @@ void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
     const flux_point_t at = flux_table_step(&f.flux_table, (dq_t){0, 0});
     const current_target_t y = current_control_target(&f.current_control, (dq_t){0, 0}, &at);
     TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.psi.d);
-    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.weighted.d);
+    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0] * 32768, y.weighted_q30.d);
     TEST_ASSERT_EQUAL_INT(0, y.psi.q);
-    TEST_ASSERT_EQUAL_INT(0, y.weighted.q);
+    TEST_ASSERT_EQUAL_INT(0, y.weighted_q30.q);
 }
 
 /* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of
@@ -92,8 +101,8 @@ void test_the_set_point_weight_takes_of_the_currents_share_only(void)
     f.current_control.setpoint_weight = 16384;
     f.current_control.drop_gain = 8192;
     const current_target_t y = current_control_target(&f.current_control, (dq_t){-4000, 2000}, &at);
-    TEST_ASSERT_EQUAL_INT(10000 + 3500 - 500, y.weighted.d);
-    TEST_ASSERT_EQUAL_INT(8000 - 4000 + 250, y.weighted.q);
+    TEST_ASSERT_EQUAL_INT((10000 + 3500 - 500) * 32768, y.weighted_q30.d);
+    TEST_ASSERT_EQUAL_INT((8000 - 4000 + 250) * 32768, y.weighted_q30.q);
     TEST_ASSERT_EQUAL_INT(10000, y.psi.d);
     TEST_ASSERT_EQUAL_INT(8000, y.psi.q);
 }
@@ -115,13 +124,13 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         const dq_t psi = random_dq(&seed, largest);
         flux.psi_d = psi.d;
         flux.psi_q = psi.q;
-        target = (current_target_t){random_dq(&seed, largest), random_dq(&seed, largest)};
-        in.omega = (q15_t)random_in(&seed, -32767, 32767);
+        target = (current_target_t){random_dq(&seed, largest), q30(random_dq(&seed, largest))};
+        in.omega = random_in(&seed, -32767, 32767) * 65536;
         in.psi_delta = (q15_t)random_in(&seed, -3000, 3000);
         in.v_dc = (q15_t)random_in(&seed, 0, 32767);
-        state = (current_control_state_t){random_in(&seed, -900000000, 900000000),
-                                          random_in(&seed, -900000000, 900000000), false};
-        twin_current_state_t twin = {{from_q31(state.s_d) * f.v, from_q31(state.s_q) * f.v}, false};
+        state = (current_control_state_t){random_in(&seed, -450000000, 450000000),
+                                          random_in(&seed, -450000000, 450000000)};
+        twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
         const dq_t u = step();
         const twin_dq_t t = twin_step(&twin);
         worst_note(&circle, fmax(hypot(u.d, u.q) - f.si.v_ratio * in.v_dc, 0.0), "|u| %d %d v %d", u.d, u.q, in.v_dc);
@@ -130,8 +139,8 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
             worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
                        in.omega, in.v_dc);
         }
-        if (state.limited == twin.limited && fabs(t.d) < fabs(t.q)) {
-            worst_note(&integrator, from_q31(state.s_d) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
+        if (limited == twin.limited && fabs(t.d) < fabs(t.q)) {
+            worst_note(&integrator, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
         }
     }
     ASSERT_WORST(worst, 3.0);
@@ -151,9 +160,9 @@ void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
                             (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
         (void)step();
         (void)twin_step(&twin);
-        worst_note(&worst, from_q31(state.s_d) - twin.s.d / f.v, "s_d of period %d", n);
-        worst_note(&worst, from_q31(state.s_q) - twin.s.q / f.v, "s_q of period %d", n);
-        TEST_ASSERT_FALSE(state.limited);
+        worst_note(&worst, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d of period %d", n);
+        worst_note(&worst, 2.0 * from_q31(state.s_q_q30) - twin.s.q / f.v, "s_q of period %d", n);
+        TEST_ASSERT_FALSE(limited);
     }
     ASSERT_WORST(worst, 1e-9);
 }
@@ -167,8 +176,8 @@ void test_a_million_periods_of_one_lsb_ripple_do_not_bias_the_integrators(void)
         target.psi = (dq_t){(q15_t)(rest.d + e), (q15_t)(rest.q + e)};
         (void)step();
     }
-    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
-    TEST_ASSERT_EQUAL_INT32(0, state.s_q);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_q_q30);
 }
 
 /* One LSB of flux for 10^4 periods: the exact ramp N sigma a_i 2^-15, bit for bit. */
@@ -178,32 +187,33 @@ void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
     for (int n = 0; n < 10000; n++) {
         (void)step();
     }
-    TEST_ASSERT_EQUAL_INT32(10000 * 2 * f.current_control.integral_gain, state.s_q);
-    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
+    TEST_ASSERT_EQUAL_INT32(10000 * f.current_control.integral_gain, state.s_q_q30);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
 }
 
 void test_at_standstill_without_error_nothing_but_the_integrator_is_put_out(void)
 {
-    state.s_d = 1000 * 65536;
-    state.s_q = -2000 * 65536;
+    state.s_d_q30 = 1000 * 32768;
+    state.s_q_q30 = -2000 * 32768;
     const dq_t u = step();
     TEST_ASSERT_EQUAL_INT(1000, u.d);
     TEST_ASSERT_EQUAL_INT(-2000, u.q);
-    TEST_ASSERT_EQUAL_INT32(1000 * 65536, state.s_d);
+    TEST_ASSERT_EQUAL_INT32(1000 * 32768, state.s_d_q30);
 }
 
 /* u_d = -w psi_q, u_q = w (psi_d + dpsi), by hand: w = 1/2, so half of the fluxes. */
 void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
 {
-    in.omega = 16384;
+    in.omega = 16384 * 65536;
     in.psi_delta = 1000;
     in.v_dc = 32767;
-    flux.psi_d = target.psi.d = target.weighted.d = 10000;
-    flux.psi_q = target.psi.q = target.weighted.q = 6000;
+    flux.psi_d = target.psi.d = 10000;
+    flux.psi_q = target.psi.q = 6000;
+    target.weighted_q30 = q30(target.psi);
     dq_t u = step();
     TEST_ASSERT_INT_WITHIN(1, -3000, u.d);
     TEST_ASSERT_INT_WITHIN(1, 5500, u.q);
-    in.omega = -16384;
+    in.omega = -16384 * 65536;
     u = step();
     TEST_ASSERT_INT_WITHIN(1, 3000, u.d);
     TEST_ASSERT_INT_WITHIN(1, -5500, u.q);
@@ -212,13 +222,14 @@ void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
 /* sigma/omega_b = 1/(3 T_s omega_b) = 0.8488; the proportional part follows f, the integral part psi*. */
 void test_the_proportional_part_follows_the_weighted_target_and_the_integral_part_the_target(void)
 {
-    target.weighted.d = (q15_t)(flux.psi_d + 1000);
+    target.weighted_q30.d = (flux.psi_d + 1000) * 32768;
     TEST_ASSERT_INT_WITHIN(1, 849, step().d);
-    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
-    target.weighted.d = flux.psi_d;
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
+    target.weighted_q30.d = flux.psi_d * 32768;
     target.psi.d = (q15_t)(flux.psi_d + 1000);
     TEST_ASSERT_EQUAL_INT(0, step().d);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0 / 32768.0 * from_q15(f.current_control.integral_gain), from_q31(state.s_d));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0 / 32768.0 * from_q15(f.current_control.integral_gain),
+                              2.0 * from_q31(state.s_d_q30));
 }
 
 /* 3 : 4 : 5 by hand. 1 LSB of u_d is 4 of u_q at the end. */
@@ -226,13 +237,13 @@ void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the
 {
     const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
     for (int sign = -1; sign <= 1; sign += 2) {
-        state.s_d = (v_max * 3 / 5) * 65536;
-        state.s_q = (sign > 0) ? INT32_MAX : -INT32_MAX;
+        state.s_d_q30 = (v_max * 3 / 5) * 32768;
+        state.s_q_q30 = (sign > 0) ? (1 << 30) - 1 : -(1 << 30);
         dq_t u = step();
         TEST_ASSERT_INT_WITHIN(1, v_max * 3 / 5, u.d);
         TEST_ASSERT_INT_WITHIN(2, sign * v_max * 4 / 5, u.q);
-        TEST_ASSERT_TRUE(state.limited);
-        state.s_d = -32767 * 65536;
+        TEST_ASSERT_TRUE(limited);
+        state.s_d_q30 = -32767 * 32768;
         u = step();
         /* 31/32 of the circle at most: the q axis keeps sqrt(1 - (31/32)^2) = 0.248 of it to get out of there. */
         TEST_ASSERT_INT_WITHIN(1, -v_max * 31 / 32, u.d);
@@ -244,23 +255,23 @@ void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the
 void test_while_the_d_axis_asks_for_flux_back_the_vector_is_shortened_and_keeps_its_direction(void)
 {
     const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_d = -(v_max * 6 / 5) * 65536;
-    state.s_q = (v_max * 8 / 5) * 65536;
+    state.s_d_q30 = -(v_max * 6 / 5) * 32768;
+    state.s_q_q30 = (v_max * 8 / 5) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
     const dq_t u = step();
     TEST_ASSERT_INT_WITHIN(2, -v_max * 3 / 5, u.d);
     TEST_ASSERT_INT_WITHIN(2, v_max * 4 / 5, u.q);
-    TEST_ASSERT_TRUE(state.limited);
+    TEST_ASSERT_TRUE(limited);
 }
 
 /* All of u_d may go to the axis that asks for flux back, and that is not yet a limit. */
 void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
 {
     const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_d = (v_max - 1) * 65536;
+    state.s_d_q30 = (v_max - 1) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
     TEST_ASSERT_EQUAL_INT(v_max - 1, step().d);
-    TEST_ASSERT_FALSE(state.limited);
+    TEST_ASSERT_FALSE(limited);
 }
 
 /* A machine that brakes at high speed with the flux that the voltage just holds, and is then asked for none: flux in
@@ -278,8 +289,9 @@ void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
         double psi_q = ring * sin(phi);
         twin_dq_t acting = {-w * psi_q, w * psi_d};
         current_control_reset(&state);
-        target.psi = target.weighted = (dq_t){(q15_t)lround(rest.psi_d / f.psi * 32768.0), 0};
-        in.omega = (q15_t)lround(w / f.w * 32768.0);
+        target.psi = (dq_t){(q15_t)lround(rest.psi_d / f.psi * 32768.0), 0};
+        target.weighted_q30 = q30(target.psi);
+        in.omega = (q31_t)lround(w / f.w * 2147483648.0);
         in.psi_delta = 0;
         for (int k = 0; k < 400; k++) { /* 40 ms, one period of delay */
             flux.psi_d = (q15_t)lround(psi_d / f.psi * 32768.0);
@@ -301,12 +313,12 @@ void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
 void test_a_voltage_on_the_circle_is_not_called_limited(void)
 {
     const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_q = v_max * 65536;
+    state.s_q_q30 = v_max * 32768;
     TEST_ASSERT_EQUAL_INT(v_max, step().q);
-    TEST_ASSERT_FALSE(state.limited);
-    state.s_q = (v_max + 1) * 65536;
+    TEST_ASSERT_FALSE(limited);
+    state.s_q_q30 = (v_max + 1) * 32768;
     TEST_ASSERT_EQUAL_INT(v_max, step().q);
-    TEST_ASSERT_TRUE(state.limited);
+    TEST_ASSERT_TRUE(limited);
 }
 
 /* Ten seconds against the limit: the integrator stops where what is cut away balances the error, u = v_max + sigma b e,
@@ -316,20 +328,22 @@ void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
     const int v_max = (f.current_control.v_ratio * 4000 + 16384) >> 15;
     in.v_dc = 4000;
     const int32_t rest = target.psi.q;
-    target.psi.q = target.weighted.q = (q15_t)(rest + 200);
+    target.psi.q = rest + 200;
+    target.weighted_q30 = q30(target.psi);
     for (int n = 0; n < 5000; n++) {
         (void)step();
     }
-    const q31_t held = state.s_q;
+    const q31_t held = state.s_q_q30;
     for (int n = 0; n < 100000; n++) {
         (void)step();
     }
-    TEST_ASSERT_TRUE(state.limited);
-    TEST_ASSERT_INT_WITHIN(65536, held, state.s_q);
-    TEST_ASSERT_INT_WITHIN(2, v_max + lround(0.8488 * 200 * (0.7 - 1.0)), held >> 16);
-    target.psi.q = target.weighted.q = (q15_t)(rest - 200);
+    TEST_ASSERT_TRUE(limited);
+    TEST_ASSERT_INT_WITHIN(32768, held, state.s_q_q30);
+    TEST_ASSERT_INT_WITHIN(2, v_max + lround(0.8488 * 200 * (0.7 - 1.0)), held >> 15);
+    target.psi.q = rest - 200;
+    target.weighted_q30 = q30(target.psi);
     TEST_ASSERT_LESS_THAN_INT(v_max, step().q);
-    TEST_ASSERT_LESS_THAN_INT32(held, state.s_q);
+    TEST_ASSERT_LESS_THAN_INT32(held, state.s_q_q30);
 }
 
 /* By hand: v_max = 2280, 31/32 of it 2209; s = 20000 leaves a cut of 17791, a_i/b = 1/14 of it comes off per period. */
@@ -337,13 +351,13 @@ void test_an_integrator_far_beyond_the_limit_is_led_back_in_both_signs(void)
 {
     in.v_dc = 4000;
     for (int sign = -1; sign <= 1; sign += 2) {
-        state.s_d = (sign > 0) ? 20000 * 65536 : -20000 * 65536;
+        state.s_d_q30 = (sign > 0) ? 20000 * 32768 : -20000 * 32768;
         (void)step();
-        TEST_ASSERT_INT_WITHIN(3, sign * (20000 - 17791 / 14), state.s_d >> 16);
+        TEST_ASSERT_INT_WITHIN(3, sign * (20000 - 17791 / 14), state.s_d_q30 >> 15);
         for (int n = 0; n < 200; n++) { /* (13/14)^200 */
             (void)step();
         }
-        TEST_ASSERT_INT_WITHIN(15, sign * 2209, state.s_d >> 16);
+        TEST_ASSERT_INT_WITHIN(15, sign * 2209, state.s_d_q30 >> 15);
     }
 }
 
@@ -351,22 +365,22 @@ void test_an_integrator_far_beyond_the_limit_is_led_back_in_both_signs(void)
 void test_one_axis_at_the_limit_does_not_hold_the_other(void)
 {
     in.v_dc = 4000;
-    state.s_d = 1000 * 65536;
-    state.s_q = 20000 * 65536;
+    state.s_d_q30 = 1000 * 32768;
+    state.s_q_q30 = 20000 * 32768;
     target.psi.d = (q15_t)(target.psi.d - 10);
     (void)step();
-    TEST_ASSERT_EQUAL_INT32(1000 * 65536 - 2 * 10 * f.current_control.integral_gain, state.s_d);
-    TEST_ASSERT_LESS_THAN_INT32(20000 * 65536, state.s_q);
+    TEST_ASSERT_EQUAL_INT32(1000 * 32768 - 10 * f.current_control.integral_gain, state.s_d_q30);
+    TEST_ASSERT_LESS_THAN_INT32(20000 * 32768, state.s_q_q30);
 }
 
 void test_without_dc_voltage_nothing_is_put_out(void)
 {
     in.v_dc = 0;
-    target.weighted = (dq_t){-20000, 20000};
+    target.weighted_q30 = q30((dq_t){-20000, 20000});
     const dq_t u = step();
     TEST_ASSERT_EQUAL_INT(0, u.d);
     TEST_ASSERT_EQUAL_INT(0, u.q);
-    TEST_ASSERT_TRUE(state.limited);
+    TEST_ASSERT_TRUE(limited);
 }
 
 void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(void)
@@ -376,10 +390,10 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         flux.psi_d = end[n & 1];
         flux.psi_q = end[(n >> 1) & 1];
         target.psi = (dq_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
-        target.weighted = (dq_t){end[(n >> 4) & 1], end[(n >> 5) & 1]};
-        in.omega = end[(n >> 6) & 1];
+        target.weighted_q30 = q30((dq_t){end[(n >> 4) & 1], end[(n >> 5) & 1]});
+        in.omega = ((n >> 6) & 1) ? INT32_MIN : INT32_MAX;
         in.psi_delta = end[(n >> 7) & 1];
-        state.s_d = state.s_q = (n & 256) ? INT32_MIN : INT32_MAX;
+        state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
         in.v_dc = 32767;
         const dq_t u = step();
         TEST_ASSERT_TRUE(hypot(u.d, u.q) <= f.si.v_ratio * 32767 + 1.5);
@@ -388,9 +402,8 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
 
 void test_reset_forgets_everything(void)
 {
-    state = (current_control_state_t){1, 2, true};
+    state = (current_control_state_t){1, 2};
     current_control_reset(&state);
-    TEST_ASSERT_EQUAL_INT32(0, state.s_d);
-    TEST_ASSERT_EQUAL_INT32(0, state.s_q);
-    TEST_ASSERT_FALSE(state.limited);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
+    TEST_ASSERT_EQUAL_INT32(0, state.s_q_q30);
 }

@@ -64,10 +64,12 @@ void test_the_whole_current_plane_follows_the_twin(void)
 
 void test_a_node_gives_exactly_what_is_tabulated(void)
 {
-    for (int ix = 0; ix < f.flux_table.grid.nx; ix++) {
-        for (int iy = 0; iy < f.flux_table.grid.ny; iy++) {
-            const int n = ix * f.flux_table.grid.ny + iy;
-            const dq_t i = {(q15_t)(f.flux_table.grid.x0 + ix * 2048), (q15_t)(iy * 2048)};
+    const int nx = (int)(f.flux_table.mesh.x_last >> 14) + 2;
+    const int ny = (int)f.flux_table.mesh.ny;
+    for (int ix = 0; ix < nx; ix++) {
+        for (int iy = 0; iy < ny; iy++) {
+            const int n = ix * ny + iy;
+            const dq_t i = {(q15_t)(f.flux_table.mesh.x0 + ix * 2048), (q15_t)(iy * 2048)};
             const flux_point_t y = flux_table_step(&f.flux_table, i);
             TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], y.l_d);
             TEST_ASSERT_EQUAL_INT(f.flux_table.l_q[n], y.l_q);
@@ -96,7 +98,7 @@ void test_the_half_planes_mirror_each_other(void)
 
 void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(void)
 {
-    const int edge_d = f.flux_table.grid.x0;
+    const int edge_d = f.flux_table.mesh.x0;
     const int edge_q = 14 * 2048;
     const dq_t inside[4] = {{(q15_t)edge_d, 0}, {0, 0}, {-1000, (q15_t)edge_q}, {-1000, (q15_t)-edge_q}};
     const dq_t outside[4] = {
@@ -155,19 +157,23 @@ void test_a_table_that_would_break_a_later_stage_is_rejected(void)
 void test_a_grid_without_a_cell_or_with_an_impossible_shift_is_rejected(void)
 {
     flux_table_config_t c = f.flux_table;
-    c.grid.nx = 1;
+    c.mesh.x_last = UINT32_MAX; /* one column: (1 << 14) - 0x4001 */
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
-    c.grid.ny = 1;
+    c.mesh.ny = 1;
+    c.mesh.y_last = UINT32_MAX;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
-    c.grid.y0 = 1;
+    c.mesh.x_last++;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
-    c.grid.x_shift = c.grid.y_shift = 15;
+    c.mesh.y_last--;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
-    c.grid.x_shift++;
+    c.mesh.up = 15;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.mesh.up = UINT32_MAX; /* a spacing of 2^15 */
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
     c.l_shift = 15;

@@ -32,6 +32,24 @@ void test_sine_and_cosine_of_every_angle_are_within_four_in_a_hundred_thousand(v
     worst_expect(&cosine, "cos", 3.2e-5L);
 }
 
+/* The bound above for angles of 32 bits: every rest between two of 16 bits, by a stride that is a large prime. */
+void test_the_rotation_by_any_angle_of_32_bits_is_as_exact(void)
+{
+    worst_t sine = {0};
+    worst_t cosine = {0};
+    uint32_t angle = 0;
+    for (int32_t n = 0; n < 400000; n++) {
+        angle += 1999999973U;
+        const uint32_t got = fx_rotation(angle);
+        const long double radians = angle * TURN / 4294967296.0L;
+        worst_note(&sine, ((int16_t)(got >> 16) / 32768.0L) - sinl(radians), (int32_t)angle, (int16_t)(got >> 16));
+        worst_note(&cosine, ((int16_t)(got & 0xFFFFU) / 32768.0L) - cosl(radians), (int32_t)angle,
+                   (int16_t)(got & 0xFFFFU));
+    }
+    worst_expect(&sine, "sin", 3.2e-5L);
+    worst_expect(&cosine, "cos", 3.2e-5L);
+}
+
 void test_sine_and_cosine_at_the_axes_are_exact_or_saturated(void)
 {
     const fx_sincos_t east = fx_sincos(0x0000U);

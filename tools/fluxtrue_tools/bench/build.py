@@ -15,7 +15,8 @@ ROOT = Path(__file__).resolve().parents[3]
 FIRMWARE = ROOT / "firmware"
 FX_SOURCES = (Path(__file__).with_name("fx_kernels.c"), *sorted((FIRMWARE / "fx").glob("*.c")))
 ARM_CC = "arm-none-eabi-gcc"
-ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+# As tools/cmake/arm-none-eabi.cmake compiles the firmware.
+ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns")
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
 
 

@@ -70,8 +70,8 @@ class Host:
 def sources(folder: Path) -> list[Path]:
     """All of the firmware with the tables of hsm1, which are generated into the folder."""
     build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
-    layers = ("fx", "signal", "control", "safety", "app")
-    firmware = [path for layer in layers for path in (FIRMWARE / layer).glob("*.c")]
+    firmware = [path for layer in ("fx", "signal", "control", "safety") for path in (FIRMWARE / layer).glob("*.c")]
+    firmware += [FIRMWARE / "app" / f"{name}.c" for name in ("drive", "fast_isr", "mrai_isr", "task_1khz")]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
 
 

@@ -35,6 +35,7 @@ static struct {
     uint32_t theta_m;
     duty_t duty;
     bool gates;
+    bool limited;
 } port;
 static drive_t drive;
 static drive_t copy;
@@ -90,7 +91,7 @@ CALLED void drive_copy(void)
 
 CALLED uint32_t drive_limited(void)
 {
-    return (drive.fast.current_control.limited || drive.fast.modulated.limited) ? 1U : 0U;
+    return sample_box_look(&drive.samples)->voltage_limited ? 1U : 0U;
 }
 
 /* Duties and gates first, then everything that lives on from one period to the next. */
@@ -102,7 +103,7 @@ CALLED const int32_t *drive_outputs(void)
     const int32_t all[OUTPUTS] = {
         port.duty.a, port.duty.b, port.duty.c, port.gates,
         sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
-        fast->modulated.acted.d, fast->modulated.acted.q, fast->current_control.s_d, fast->current_control.s_q,
+        fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q30, mrai->e_q_q30, mrai->psi_delta, mrai->r_delta,
         drive.slow.torque.sum, drive.slow.torque.mean,
     };
@@ -156,20 +157,20 @@ STAGE void bench_current_tick(void)
     const motor_t *m = &copy.motor;
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_step(&m->angle_tracker, &copy.fast.angle_tracker, port.theta_m);
-    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
-    const fx_sincos_t at = fx_sincos((uint16_t)((angle.theta_e + 0x8000U) >> 16));
     const current_control_in_t control = {
         .target = &command_box_read(&copy.commands)->target,
         .flux = &flux,
-        .omega = fx_q15_from_q31(angle.omega_q31),
+        .omega = angle.omega_q31,
         .psi_delta = copy.slow.psi_delta_q15,
         .v_dc = measured.v_dc,
     };
-    const modulate_in_t modulation = {
-        .u = current_control_step(&m->current_control, &copy.fast.current_control, &control),
-        .i = park(clarke(measured.i), at),
-        .advanced = fx_sincos((uint16_t)((ahead + 0x8000U) >> 16)),
-        .v_dc = measured.v_dc,
-    };
-    modulate_step(&m->modulate, &modulation, &copy.fast.modulated);
+    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
+    const current_control_out_t wanted =
+        current_control_step(&m->current_control, &copy.fast.current_control, &control);
+    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
+    const modulate_in_t modulation = {wanted.u, i, ahead, measured.v_dc, wanted.clear};
+    const modulate_out_t made = modulate_step(&m->modulate, &modulation);
+    port.duty = made.duty;
+    copy.fast.coming = made.acted;
+    port.limited = wanted.limited || made.limited;
 }

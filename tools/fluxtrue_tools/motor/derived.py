@@ -13,6 +13,7 @@ TASK_PERIODS = 10  # the slow task runs every tenth PWM period: 1 kHz at 10 kHz
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
 V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
+V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
 
 TRACKER_BANDWIDTH_RAD_S = 300.0
@@ -49,6 +50,7 @@ class Derived:
     setpoint_weight: float
     integral_ratio: float
     v_ratio: float
+    v_clear: float
     dead_time_duty: float
     knee_A: float
     min_pulse_duty: float
@@ -90,9 +92,13 @@ def _modulation(config: MotorConfig) -> dict[str, float]:
     # A device drop acts like dead time: a leg voltage against its current.
     duty = inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V / inverter.vdc_V
     lsb_A = 2.0 * inverter.current_full_scale_A / (1 << inverter.adc_bits)
+    min_pulse = config.min_pulse_s * inverter.pwm_hz
+    # Inside this circle no pulse can be too short, with the whole dead time on top: (MO-11).
+    clear = (1.0 - 2.0 * (min_pulse + duty * max(1.0, config.control.dead_time_compensation))) / math.sqrt(3.0)
     return {"dead_time_duty": duty * config.control.dead_time_compensation,
             "knee_A": KNEE_LSB * lsb_A,
-            "min_pulse_duty": config.min_pulse_s * inverter.pwm_hz,
+            "min_pulse_duty": min_pulse,
+            "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0),
             "v_dc_min_V": V_FLOOR_PER_VDC * inverter.vdc_V}
 
 

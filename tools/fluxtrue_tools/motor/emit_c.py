@@ -70,13 +70,13 @@ def _bases(bases: Bases) -> list[Row]:
 
 
 def _measure(motor: Motor) -> list[Row]:
-    gain = u16(motor.config.v_dc_full_scale_V / motor.bases.voltage_V, Q15_ONE, "v_dc_full_scale_V/V_b")
     shift = 16 - motor.config.inverter.adc_bits
-    unity, middle = 1 << 14, 1 << 15
-    return [("scale", "{" + ", ".join([str(unity << shift)] * 3) + "}", f"gain 1.0 in Q14, times 2^{shift}"),
-            ("bias", "{" + ", ".join([str((1 << 13) - middle * unity)] * 3) + "}", "2^13 - 32768 counts * gain"),
-            ("v_dc_scale", f"{gain << shift}u",
-             f"{motor.config.v_dc_full_scale_V:g} V full scale in Q15, times 2^{shift}")]
+    ratio = motor.config.v_dc_full_scale_V / motor.bases.voltage_V
+    u16(ratio, Q15_ONE, "v_dc_full_scale_V/V_b")  # below 2
+    gain = round(math.ldexp(ratio, 14 + shift))
+    phase = "{" + f"{1 << 12 + shift}, {-(1 << 15 + 12)}" + "}"
+    return [("phase", "{" + ", ".join([phase] * 3) + "}", f"gain 1.0 in Q12, times 2^{shift}; -32768 counts * gain"),
+            ("v_dc_scale", f"{gain}u", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}")]
 
 
 def _tracker(motor: Motor) -> list[Row]:
@@ -85,7 +85,8 @@ def _tracker(motor: Motor) -> list[Row]:
     to_pu = math.pi / (b.omega_rad_s * b.period_s)
     return [("pole_pairs", f"{motor.config.machine.pole_pairs}u", ""), ("offset", "0u", ""),
             ("kp", q31(2 * w_ts, "tracker kp"), f"2 w_n T_s, w_n = {d.tracker_bandwidth_rad_s:g} rad/s"),
-            ("ki", q31(w_ts**2, "tracker ki"), "(w_n T_s)^2"),
+            ("ki_q29", q31(w_ts**2 * 2 * to_pu / 4, "tracker ki"), "(w_n T_s)^2 2 pi/(omega_b T_s)"),
+            ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
             ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
             ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn")]
 
@@ -98,7 +99,8 @@ def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
 def _flux_table(motor: Motor) -> list[Row]:
     tables = motor.tables
     names = ("l_d", "l_q", "l_qq", "g_d", "g_q", "psi_f0")
-    return [("grid", _grid(tables.x0, 0, tables.shift, tables.l_d_H.shape), ""),
+    nx, ny = tables.l_d_H.shape
+    return [("mesh", f"FX_MESH({tables.x0}, {tables.shift}u, {nx}u, {ny}u)", ""),
             ("l_shift", f"{tables.l_shift}u", ""), *((name, f"table_{name}", "") for name in names)]
 
 
@@ -106,18 +108,20 @@ def _current_control(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     sigma = d.sigma_rad_s / b.omega_rad_s
     r_pu = motor.config.machine.r_ohm / b.resistance_ohm
-    return [("sigma_gain", q16(sigma, "sigma_gain"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
+    return [("sigma_q24", q31(sigma / 128, "sigma"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
             ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
             ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
             ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
             ("tracking_gain", q15(d.integral_ratio / d.setpoint_weight, "tracking_gain"), "integral ratio over weight"),
-            ("v_ratio", q15(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}")]
+            ("v_ratio", q15(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
+            ("clear_q32", q31(2 * d.v_clear**2, "v_clear"), f"{d.v_clear:.6g} squared")]
 
 
 def _modulate(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     return [("dead_time", q15(d.dead_time_duty, "dead_time"), f"{d.dead_time_duty:.6g} duty"),
-            ("knee_gain", q16(b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
+            ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
+            ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_gain"), "times sqrt(3)/2"),
             ("min_pulse", q15(d.min_pulse_duty, "min_pulse"), f"{d.min_pulse_duty:.6g} duty"),
             ("v_dc_min", q15(d.v_dc_min_V / b.voltage_V, "v_dc_min"), f"{d.v_dc_min_V:g} V")]
 

@@ -74,7 +74,7 @@ class Channel:
 
     def ramp(self, name: str, value: float, seconds: float) -> None:
         """Linearly, during the runs to come."""
-        self.ask(f"ramp {name} {value!r} {seconds!r} s")
+        self.ask(f"ramp {name} {float(value)!r} {float(seconds)!r} s")
 
     def record(self, names: Sequence[str], periods: int = 10) -> None:
         """Rows that the following runs answer; no names: none."""

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One suite for the virtual ECU and for a bench: which bus, which plant, and what is looked at after every test."""
+
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import can
+import cantools.database
+import pytest
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.mdf import BusLog
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+
+import health
+from clients import client_port, connect
+from report import Figures, Report
+from rig import Rig
+
+ROOT = Path(__file__).resolve().parents[2]
+DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
+MARKERS = {
+    "plant": "needs a plant that can be told what to do (--bench, or the virtual ECU)",
+    "program": "needs the virtual ECU's program itself (--vecu)",
+}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """What tools/hil passes on."""
+    group = parser.getgroup("hil")
+    group.addoption("--vecu", help="program of the virtual ECU; used when no interface is given")
+    group.addoption("--can-interface", help="python-can interface: socketcand, socketcan, pcan, kvaser ...")
+    group.addoption("--can-channel", default="can0", help="its channel")
+    group.addoption("--can-option", action="append", default=[], metavar="NAME=VALUE",
+                    help="further argument of can.Bus, for example host=127.0.0.1, bitrate=500000")  # fmt: skip
+    group.addoption("--bench", metavar="HOST:PORT", help="bench channel of the plant behind that interface")
+    group.addoption("--report", default=str(ROOT / "build" / "hil"), help="folder for report.html and bus.mf4")
+    group.addoption("--soak-minutes", type=float, default=30.0, help="simulated length of the soak test")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Markers, and the report that hooks and fixtures share."""
+    # It warns of every frame that a read has cut in two, and then puts it together.
+    logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
+    for name, text in MARKERS.items():
+        config.addinivalue_line("markers", f"{name}: {text}")
+    config.stash[REPORT] = Report(Path(config.getoption("--report")))
+
+
+REPORT = pytest.StashKey[Report]()
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without a plant that obeys, say which tests cannot run and why."""
+    has_program = config.getoption("--can-interface") is None
+    has_plant = has_program or config.getoption("--bench") is not None
+    for item in items:
+        if "plant" in item.keywords and not has_plant:
+            item.add_marker(pytest.mark.skip(reason="needs plant control, and this bench has none (--bench)"))
+        if "program" in item.keywords and not has_program:
+            item.add_marker(pytest.mark.skip(reason="tests the virtual ECU itself"))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
+    """Every outcome goes into the report."""
+    outcome = yield
+    item.config.stash[REPORT].outcome(item.nodeid, outcome)
+    return outcome
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """The report is written even after failures."""
+    session.config.stash[REPORT].write()
+
+
+@pytest.fixture(scope="session")
+def program(request: pytest.FixtureRequest) -> Path:
+    """The virtual ECU's program."""
+    given = request.config.getoption("--vecu")
+    if given is None:
+        pytest.exit("no target: give --vecu=PATH, or --can-interface and --can-channel", returncode=2)
+    return Path(given)
+
+
+@pytest.fixture(scope="session")
+def database() -> cantools.database.Database:
+    """The one DBC."""
+    return cantools.database.load_file(DBC)
+
+
+@dataclass
+class Target:
+    """What the suite talks to."""
+
+    bus: can.BusABC
+    stand: Channel | None
+    can_port: int = 0  # of our virtual ECU: where further clients connect
+
+
+def _bench_target(config: pytest.Config) -> Target:
+    options: dict[str, Any] = {}
+    for option in config.getoption("--can-option"):
+        name, _, value = option.partition("=")
+        options[name] = int(value) if value.isdigit() else value
+    bus = can.Bus(interface=config.getoption("--can-interface"), channel=config.getoption("--can-channel"), **options)
+    bench = config.getoption("--bench")
+    host, _, port = (bench or "").rpartition(":")
+    return Target(bus, Channel(host, int(port)) if bench else None, int(options.get("port", 0)))
+
+
+@pytest.fixture(scope="session")
+def target(request: pytest.FixtureRequest) -> Iterator[Target]:
+    """The bench that was asked for, else a virtual ECU."""
+    if request.config.getoption("--can-interface") is not None:
+        found = _bench_target(request.config)
+        yield found
+        found.bus.shutdown()
+        return
+    with VirtualEcu(request.getfixturevalue("program")) as ecu:
+        bus = connect(ecu.can_port)
+        yield Target(bus, Channel(HOST, ecu.bench_port), ecu.can_port)
+        bus.shutdown()
+
+
+@pytest.fixture(scope="session")
+def bus_log(request: pytest.FixtureRequest) -> Iterator[BusLog]:
+    """Everything that was said, for bus.mf4."""
+    log = BusLog()
+    yield log
+    folder = Path(request.config.getoption("--report"))
+    folder.mkdir(parents=True, exist_ok=True)
+    log.write(folder / "bus.mf4", DBC)
+
+
+@pytest.fixture(scope="session")
+def connected(target: Target, database: cantools.database.Database, bus_log: BusLog) -> Rig:
+    """The one connection of the session."""
+    rig = Rig(target.bus, database, target.stand, client_port(target.bus))
+    rig.listeners.append(bus_log)
+    return rig
+
+
+@pytest.fixture
+def rig(connected: Rig) -> Iterator[Rig]:
+    """An ECU just started (virtual) or brought to standby (bench); after the test its health is checked."""
+    if connected.has_stand:
+        connected.power_cycle()
+    else:
+        connected.forget()
+        connected.ask(reset=True)
+        connected.advance(0.1)
+        connected.ask(reset=False)
+    connected.wait_for("standby")
+    before = health.note(connected)
+    yield connected
+    problems = health.problems(connected, before)
+    assert not problems, "after the test: " + "; ".join(problems)
+
+
+@pytest.fixture
+def second_client(target: Target, connected: Rig) -> Iterator[can.BusABC]:
+    """Another node on the virtual bus."""
+    bus = connect(target.can_port)
+    yield bus
+    bus.shutdown()
+    assert connected.has_stand
+
+
+@pytest.fixture
+def figures(request: pytest.FixtureRequest) -> Figures:
+    """Plots and figures of merit for the report."""
+    return request.config.stash[REPORT].figures(request.node.nodeid)
+
+
+@pytest.fixture
+def make_vecu(program: Path) -> Callable[[], VirtualEcu]:
+    """Further virtual ECUs, for tests that end or torment them."""
+    return lambda: VirtualEcu(program)

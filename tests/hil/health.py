@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What must be true after every test: no fault, no error counted, no cyclic frame missing, stack and time in reserve.
+
+A test that provokes errors says which: rig.expected.faults, .counters, .load, .frames.
+"""
+
+from typing import Any
+
+from rig import MS, Rig
+
+FAULTS = (("INV_Faults", "DriveFaults"), ("INV_Faults", "EcuFaults"))
+COUNTERS = {
+    "INV_DiagProtection": ("CrcErrors", "Repeated", "Jumps", "LengthErrors"),
+    "INV_DiagReceive": ("RangeErrors", "IdErrors", "TimeOuts"),
+    "INV_DiagBus": ("LostFrames", "NotSent", "Ignored", "BusOff", "SkippedCommands"),
+    "INV_DiagTask": ("IsrOverruns", "TaskOverruns", "WatchdogHeld"),
+}
+# Two frames of ours and one of another's may stand before it, and the period's own millisecond: 3 x 0.27 ms + 1 ms.
+JITTER_S = 2 * MS
+JITTER_BENCH_S = 20 * MS  # time stamps of an adapter and of an operating system
+STACK_RESERVE_BYTES = 256
+DIAGNOSTICS_S = 0.12  # their cycle, and some
+
+
+def note(rig: Rig) -> dict[str, Any]:
+    """The counters before a test: a bench keeps them from test to test."""
+    rig.advance(DIAGNOSTICS_S)
+    return {
+        "counters": {(m, s): rig.signal(m, s) for m, signals in COUNTERS.items() for s in signals},
+        "hub": rig.stand.counters() if rig.has_stand else {},
+    }
+
+
+def _counters(rig: Rig, before: dict[str, Any]) -> list[str]:
+    found = []
+    for (message, signal), was in before["counters"].items():
+        now = rig.signal(message, signal)
+        if now != was and signal not in rig.expected.counters:
+            found.append(f"{message}.{signal} counted {now - was:g}")
+    return found
+
+
+def _faults(rig: Rig) -> list[str]:
+    words = {signal: int(rig.signal(message, signal)) for message, signal in FAULTS}
+    if rig.expected.faults:
+        return []
+    return [f"{signal} is {word:#x}" for signal, word in words.items() if word]
+
+
+def missed(rig: Rig, name: str, jitter_s: float) -> list[str]:
+    """Gaps in a cyclic message."""
+    times = [frame.time_s for frame in rig.frames[name]]
+    cycle_s = rig.cycle_s(name)
+    gaps = [b - a for a, b in zip(times, times[1:], strict=False)]
+    bad = [gap for gap in gaps if abs(gap - cycle_s) > jitter_s]
+    if not bad:
+        return []
+    return [f"{name}: {len(bad)} of {len(gaps)} periods are not {1e3 * cycle_s:g} ms, e.g. {1e3 * bad[0]:.2f} ms"]
+
+
+def _frames(rig: Rig) -> list[str]:
+    found = []
+    jitter_s = JITTER_S if rig.has_stand else JITTER_BENCH_S
+    for name, message in rig.by_name.items():
+        if "INV" in message.senders and message.cycle_time:
+            found += missed(rig, name, jitter_s)
+    if rig.status_protection.wrong:
+        found.append(f"{rig.status_protection.wrong} status frames with a wrong CRC or counter")
+    return found
+
+
+def _bus(rig: Rig, before: dict[str, Any]) -> list[str]:
+    if not rig.has_stand:
+        return []
+    now = rig.stand.counters()
+    found = [
+        f"hub: {name} counted {now[name] - before['hub'][name]:g}"
+        for name in ("malformed", "dropped", "ecu_lost", "bus_lost", "slow_clients", "bench_refused")
+        if now[name] != before["hub"][name]
+    ]
+    if now["windows_over"] != before["hub"]["windows_over"]:
+        found.append(f"bus load up to {100 * now['load_peak']:.0f} %, allowed 70 %")
+    return found
+
+
+def problems(rig: Rig, before: dict[str, Any]) -> list[str]:
+    """Everything that is not as it must be, in words."""
+    rig.is_sending = True
+    rig.advance(DIAGNOSTICS_S)
+    found = _faults(rig) + _counters(rig, before)
+    stack = rig.signal("INV_DiagTask", "StackUnused")
+    if 0 < stack < STACK_RESERVE_BYTES:  # 0: this port cannot tell
+        found.append(f"{stack:g} bytes of stack were never used, wanted {STACK_RESERVE_BYTES}")
+    if not rig.expected.frames:
+        found += _frames(rig)
+    if not rig.expected.load:
+        found += _bus(rig, before)
+    return found

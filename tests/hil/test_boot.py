@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start-up: who talks, how often, and what an ECU that nobody commands does."""
+
+import pytest
+
+from rig import COMMAND, MS, STATUS, Rig
+
+VERSION = "INV_Version"
+FNV_START, FNV_PRIME = 2166136261, 16777619
+
+
+def test_after_start_the_ecu_reaches_standby_and_tells_its_version(rig: Rig) -> None:
+    rig.advance(1.1)
+    assert rig.state == "standby"
+    assert rig.signal(VERSION, "Interface") == 1
+
+
+@pytest.mark.plant
+def test_it_says_which_motor_it_was_built_for(rig: Rig) -> None:
+    rig.advance(1.1)
+    expected = FNV_START
+    for byte in b"hsm1":
+        expected = (expected ^ byte) * FNV_PRIME % 2**32
+    assert int(rig.signal(VERSION, "MotorId")) == expected
+
+
+def test_every_message_of_the_inverter_comes_in_its_cycle(rig: Rig) -> None:
+    rig.advance(3.0)
+    for name, message in rig.by_name.items():
+        if "INV" in message.senders:
+            # From 3 s at least so many; the check after the test looks at every period.
+            assert len(rig.frames[name]) >= 2.9 / rig.cycle_s(name), name
+
+
+@pytest.mark.plant
+def test_status_stays_within_100_microseconds_of_its_period_on_a_bus_of_its_own(rig: Rig) -> None:
+    rig.advance(1.0)
+    times = [frame.time_s for frame in rig.frames[STATUS]][2:]
+    periods = [b - a for a, b in zip(times, times[1:], strict=False)]
+    # At the same place in the task each time; only the command on the wire may stand before it.
+    assert max(abs(period - 10 * MS) for period in periods) <= 0.3 * MS
+
+
+def test_without_commands_it_stays_in_standby(rig: Rig) -> None:
+    rig.is_sending = False
+    rig.expected.counters |= {"TimeOuts", "Jumps", "Repeated"}
+    rig.advance(2.0)
+    assert rig.state == "standby"
+    assert rig.signal("INV_Currents", "IdRef") == rig.signal("INV_Currents", "IqRef") == 0.0
+
+
+@pytest.mark.plant
+def test_the_bus_carries_its_cyclic_traffic_below_a_third_of_its_capacity(rig: Rig) -> None:
+    rig.advance(2.0)
+    counters = rig.stand.counters()
+    # Commands, 5 messages each 10 ms, 7 each 100 ms: (6 x 100 + 7 x 10) x 135 bit / 500 kbit = 18 %.
+    assert 0.10 < counters["load_peak"] < 0.33
+    assert rig.counted[STATUS] > 0 and rig.by_name[COMMAND].cycle_time == 10

@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "comm/can_rx.h"
+#include "unity.h"
+
+/* From firmware/comm/fluxtrue.dbc, by hand. */
+#define COMMAND_ID 0x110U
+#define COMMAND_DATA_ID 0x1101U
+#define LIMITS_ID 0x111U
+#define LIMITS_DATA_ID 0x1111U
+
+static can_rx_t rx;
+static uint8_t counter;
+
+void setUp(void)
+{
+    rx = (can_rx_t){0};
+    counter = 0;
+}
+
+void tearDown(void)
+{
+}
+
+/* enable, mode torque, request in 0.1 Nm, limits 100.0 and 50.0 Nm */
+static can_frame_t command(int tenths_Nm)
+{
+    const unsigned raw = (unsigned)tenths_Nm & 0xFFFFU;
+    can_frame_t frame = {.id = COMMAND_ID, .length = 8,
+                         .data = {0, 0x50, (uint8_t)(raw & 0xFFU), (uint8_t)(raw >> 8), 0xE8, 0x03, 0xF4, 0x01}};
+    e2e_protect(COMMAND_DATA_ID, &counter, &frame);
+    return frame;
+}
+
+static rx_result_t send(int tenths_Nm)
+{
+    const can_frame_t frame = command(tenths_Nm);
+    return can_rx_frame(&rx, &frame);
+}
+
+static void milliseconds(int count)
+{
+    for (int n = 0; n < count; n++) {
+        can_rx_tick(&rx);
+    }
+}
+
+void test_a_good_command_is_taken_in_physical_units(void)
+{
+    TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(400));
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(-425));
+    TEST_ASSERT_TRUE(rx.command_channel.alive);
+    TEST_ASSERT_TRUE(rx.command.enable);
+    TEST_ASSERT_FALSE(rx.command.fault_reset);
+    TEST_ASSERT_EQUAL_INT(COMMAND_MODE_TORQUE, rx.command.mode);
+    TEST_ASSERT_EQUAL_FLOAT(-42.5F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(100.0F, rx.command.limit_drive_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(50.0F, rx.command.limit_regen_Nm);
+    TEST_ASSERT_EQUAL_UINT16(1, rx.accepted);
+}
+
+static void refused(rx_result_t why, const can_frame_t *frame)
+{
+    const bus_command_t before = rx.command;
+    const uint16_t counted = rx.count[why];
+    TEST_ASSERT_EQUAL_INT(why, can_rx_frame(&rx, frame));
+    TEST_ASSERT_EQUAL_UINT16(counted + 1, rx.count[why]);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &rx.command, sizeof before);
+}
+
+void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
+{
+    (void)send(0);
+    (void)send(100);
+    can_frame_t frame = command(200);
+    frame.data[0] ^= 0x01U;
+    refused(RX_CRC, &frame);
+    counter = (uint8_t)(counter + 14U) % 15U; /* the bad one did not count */
+    frame = command(200);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &frame));
+    refused(RX_REPEATED, &frame);
+    counter = (uint8_t)(counter + 3U) % 15U;
+    frame = command(300);
+    refused(RX_JUMP, &frame);
+    frame = command(400);
+    frame.length = 7;
+    refused(RX_LENGTH, &frame);
+    counter = (uint8_t)(counter + 14U) % 15U;
+    frame = command(10001); /* 1000.1 Nm: beyond the DBC's range, with a good CRC */
+    refused(RX_RANGE, &frame);
+    frame = command(100);
+    frame.extended = true;
+    refused(RX_ID, &frame);
+    frame.extended = false;
+    frame.data[0] = e2e_crc(LIMITS_DATA_ID, &frame); /* meant for another message */
+    refused(RX_ID, &frame);
+    frame.id = 0x112;
+    refused(RX_IGNORED, &frame);
+}
+
+/* 1000.0 Nm is raw 10000; both ends of each signal. */
+void test_the_ends_of_the_ranges_are_accepted_and_one_count_beyond_is_not(void)
+{
+    (void)send(0);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(10000));
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(-10000));
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, send(-10001));
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, send(32767));
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(1));
+    can_frame_t frame = command(1);
+    frame.data[1] |= 0xC0U; /* mode 3 */
+    frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
+    frame = command(1);
+    frame.data[5] = 0x28; /* limit 0x28E8 = 1047.2 Nm */
+    frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
+}
+
+void test_one_lost_frame_is_forgiven_and_counted_two_are_a_jump(void)
+{
+    (void)send(0);
+    (void)command(0);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(10));
+    TEST_ASSERT_EQUAL_UINT16(1, rx.skipped);
+    (void)command(0);
+    (void)command(0);
+    TEST_ASSERT_EQUAL_INT(RX_JUMP, send(20));
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(20));
+}
+
+/* 30 ms after the last good frame, not a millisecond earlier: no torque, not enabled; the mode stays. */
+void test_a_command_dies_after_30_ms_and_takes_torque_and_enable_along(void)
+{
+    (void)send(0);
+    (void)send(500);
+    milliseconds(29);
+    TEST_ASSERT_TRUE(rx.command_channel.alive);
+    TEST_ASSERT_EQUAL_FLOAT(50.0F, rx.command.torque_Nm);
+    milliseconds(1);
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_Nm);
+    TEST_ASSERT_FALSE(rx.command.enable);
+    TEST_ASSERT_EQUAL_INT(COMMAND_MODE_TORQUE, rx.command.mode);
+    milliseconds(1000);
+    TEST_ASSERT_EQUAL_UINT16(1, rx.time_outs);
+    TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(500)); /* then it begins anew */
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(500));
+}
+
+/* Bad frames do not keep a command alive. */
+void test_frames_with_a_wrong_crc_do_not_stop_the_clock(void)
+{
+    (void)send(0);
+    (void)send(500);
+    for (int n = 0; n < 30; n++) {
+        can_frame_t frame = command(500);
+        frame.data[0] ^= 0xFFU;
+        (void)can_rx_frame(&rx, &frame);
+        can_rx_tick(&rx);
+    }
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
+}
+
+void test_three_bad_frames_of_the_last_ten_fail_the_channel_until_they_have_passed(void)
+{
+    (void)send(0);
+    can_frame_t bad = command(0);
+    bad.data[0] ^= 0xFFU;
+    counter = (uint8_t)(counter + 14U) % 15U;
+    for (int pattern = 0; pattern < 1024; pattern++) {
+        rx.command_channel.bad = 0;
+        int count = 0;
+        for (int n = 0; n < 10; n++) {
+            const bool is_bad = (pattern >> n & 1) != 0;
+            count += is_bad ? 1 : 0;
+            (void)(is_bad ? can_rx_frame(&rx, &bad) : send(0));
+        }
+        TEST_ASSERT_EQUAL(count >= 3, rx.command_channel.failed);
+    }
+    for (int n = 0; n < 8; n++) {
+        (void)send(0);
+    }
+    TEST_ASSERT_FALSE(rx.command_channel.failed);
+}
+
+static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
+{
+    can_frame_t frame = {.id = LIMITS_ID, .length = 8,
+                         .data = {0, 0, (uint8_t)(drive & 0xFFU), (uint8_t)(drive >> 8), (uint8_t)(regen & 0xFFU),
+                                  (uint8_t)(regen >> 8), 0, 0}};
+    e2e_protect(LIMITS_DATA_ID, count, &frame);
+    return can_rx_frame(&rx, &frame);
+}
+
+/* 45.00 kW is raw 4500, 600.01 kW raw 60001; time-out 300 ms. */
+void test_battery_limits_are_a_channel_of_their_own_and_become_zero_when_lost(void)
+{
+    uint8_t count = 0;
+    TEST_ASSERT_FALSE(rx.limits_channel.seen);
+    TEST_ASSERT_EQUAL_INT(RX_SYNCED, send_limits(&count, 4500, 2000));
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send_limits(&count, 4500, 2000));
+    TEST_ASSERT_EQUAL_FLOAT(45.0F, rx.limits.drive_kW);
+    TEST_ASSERT_EQUAL_FLOAT(20.0F, rx.limits.regen_kW);
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, send_limits(&count, 60001, 2000));
+    milliseconds(299);
+    TEST_ASSERT_TRUE(rx.limits_channel.alive);
+    milliseconds(1);
+    TEST_ASSERT_FALSE(rx.limits_channel.alive);
+    TEST_ASSERT_TRUE(rx.limits_channel.seen);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.limits.drive_kW);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.limits.regen_kW);
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
+}
+
+void test_counters_saturate(void)
+{
+    rx.count[RX_IGNORED] = UINT16_MAX - 1U;
+    const can_frame_t frame = {.id = 0x7FF};
+    for (int n = 0; n < 3; n++) {
+        (void)can_rx_frame(&rx, &frame);
+    }
+    TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, rx.count[RX_IGNORED]);
+}

@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "comm/can_tx.h"
+
+#include <math.h>
+
+#include "comm/e2e.h"
+#include "unity.h"
+
+#define RUN_MS 10000
+
+/* Identifier and cycle time, by hand from the DBC. */
+static const struct {
+    uint32_t id;
+    int cycle_ms;
+} wanted[] = {
+    {0x210, 10},  {0x211, 10},  {0x212, 10},  {0x213, 10},  {0x214, 100},  {0x220, 100},
+    {0x230, 100}, {0x231, 100}, {0x232, 100}, {0x233, 100}, {0x240, 1000},
+};
+#define MESSAGES (int)(sizeof wanted / sizeof wanted[0])
+
+static can_tx_t tx;
+static telemetry_t telemetry;
+static can_frame_t frame;
+
+void setUp(void)
+{
+    tx = (can_tx_t){0};
+    telemetry = (telemetry_t){0};
+}
+
+void tearDown(void)
+{
+}
+
+static int place(uint32_t id)
+{
+    for (int n = 0; n < MESSAGES; n++) {
+        if (wanted[n].id == id) {
+            return n;
+        }
+    }
+    TEST_FAIL_MESSAGE("a message that is not in the DBC");
+    return 0;
+}
+
+void test_every_message_comes_exactly_in_its_cycle_time(void)
+{
+    int last[MESSAGES];
+    int count[MESSAGES] = {0};
+    for (int ms = 1; ms <= RUN_MS; ms++) {
+        can_tx_begin(&tx);
+        while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
+            const int n = place(frame.id);
+            TEST_ASSERT_EQUAL_UINT8(8, frame.length);
+            TEST_ASSERT_FALSE(frame.extended);
+            if (count[n] > 0) {
+                TEST_ASSERT_EQUAL_INT(wanted[n].cycle_ms, ms - last[n]);
+            }
+            last[n] = ms;
+            count[n]++;
+        }
+    }
+    for (int n = 0; n < MESSAGES; n++) {
+        TEST_ASSERT_EQUAL_INT(RUN_MS / wanted[n].cycle_ms, count[n]);
+    }
+}
+
+void test_no_millisecond_has_more_than_two_frames(void)
+{
+    for (int ms = 0; ms < RUN_MS; ms++) {
+        int frames = 0;
+        can_tx_begin(&tx);
+        while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
+            frames++;
+        }
+        TEST_ASSERT_LESS_OR_EQUAL_INT(2, frames);
+    }
+}
+
+/* A receiver of ours would accept each of them. */
+void test_the_status_frame_is_protected(void)
+{
+    e2e_state_t state = {0};
+    int good = 0;
+    for (int ms = 0; ms < 1000; ms++) {
+        can_tx_begin(&tx);
+        while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
+            good += (frame.id == 0x210 && e2e_check(0x2101, &state, &frame) == E2E_OK) ? 1 : 0;
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(99, good);
+}
+
+void test_a_frame_with_a_value_that_is_no_number_is_left_out_and_the_others_go(void)
+{
+    telemetry.v_dc_V = NAN;
+    telemetry.iq_ref_A = INFINITY;
+    int frames = 0;
+    int refused = 0;
+    for (int ms = 0; ms < 10; ms++) {
+        can_tx_begin(&tx);
+        for (tx_result_t r = can_tx_next(&tx, &telemetry, &frame); r != TX_NONE;
+             r = can_tx_next(&tx, &telemetry, &frame)) {
+            TEST_ASSERT_TRUE(r != TX_FRAME || (frame.id != 0x211 && frame.id != 0x212));
+            frames += (r == TX_FRAME) ? 1 : 0;
+            refused += (r == TX_NOT_A_NUMBER) ? 1 : 0;
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(2, refused);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(2, frames);
+}

@@ -1,0 +1,179 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/arbitrate.h"
+
+#include <stdlib.h>
+
+#include "unity.h"
+
+/* Full torque 16000 counts in 40 ms, full slew in 10 ms, from full to none in 15 ms; dead band 28 counts. */
+#define COUNT 65536
+#define SLEW (400 * COUNT)
+#define JERK (40 * COUNT)
+#define RAMP_OUT (1067 * COUNT)
+
+static const arbitrate_config_t config = {SLEW, JERK, RAMP_OUT, 28, 1000000};
+static arbitrate_state_t state;
+static arbitrate_in_t in;
+
+void setUp(void)
+{
+    state = (arbitrate_state_t){0};
+    in = (arbitrate_in_t){.limit_drive = 20000, .limit_regen = 20000, .run = true};
+}
+
+void tearDown(void)
+{
+}
+
+static q15_t step(void)
+{
+    return arbitrate_step(&config, &state, &in);
+}
+
+static q15_t steps(int count)
+{
+    q15_t last = 0;
+    for (int n = 0; n < count; n++) {
+        last = step();
+    }
+    return last;
+}
+
+/* 16000/400 = 40 steps at full slew and half of 10 more at either end. */
+void test_full_torque_takes_slew_and_jerk_time_and_is_reached_exactly(void)
+{
+    in.request = 16000;
+    TEST_ASSERT_LESS_THAN_INT(16000, steps(48));
+    TEST_ASSERT_EQUAL_INT(16000, steps(4));
+    TEST_ASSERT_EQUAL_INT(16000, steps(100));
+    TEST_ASSERT_EQUAL_INT32(0, state.rate);
+}
+
+/* From any torque to any other, with the target changed on the way. */
+void test_rate_and_its_growth_stay_within_slew_and_jerk_and_nothing_overshoots(void)
+{
+    srand(1);
+    q31_t rate_before = 0;
+    for (int n = 0; n < 200000; n++) {
+        if (n % 37 == 0) {
+            in.request = (q15_t)(rand() % 32001 - 16000);
+        }
+        const q31_t before = state.torque;
+        (void)step();
+        const q31_t wanted = (abs(in.request) <= 28) ? 0 : in.request * COUNT;
+        const int64_t moved = (int64_t)state.torque - before;
+        TEST_ASSERT_TRUE(llabs(moved) <= SLEW);
+        /* towards the target, never past it */
+        TEST_ASSERT_TRUE((moved >= 0) == (wanted >= before) || moved == 0);
+        TEST_ASSERT_TRUE(llabs((int64_t)wanted - state.torque) <= llabs((int64_t)wanted - before));
+        /* faster by one jerk at most, unless the direction changed: then it began at zero */
+        TEST_ASSERT_TRUE(llabs(moved) <= labs(rate_before) + JERK);
+        rate_before = (q31_t)moved;
+    }
+}
+
+/* The last step ends a braking that jerk allows: the rate before it is at most two jerks. */
+void test_it_arrives_gently(void)
+{
+    for (int target = 100; target <= 16000; target += 173) {
+        setUp();
+        in.request = (q15_t)target;
+        q31_t last = 0;
+        while (state.torque != target * COUNT) {
+            last = state.torque;
+            (void)step();
+        }
+        TEST_ASSERT_TRUE(state.torque - last <= 2 * JERK);
+    }
+}
+
+void test_a_request_taken_back_stops_the_rise_at_once(void)
+{
+    in.request = 16000;
+    const q15_t before = steps(20);
+    in.request = 0;
+    TEST_ASSERT_LESS_THAN_INT(before, step());
+}
+
+/* 28 counts are the dead band: neither sign of a smaller request makes the vehicle creep. */
+void test_requests_within_the_dead_band_are_exactly_zero(void)
+{
+    for (int request = -28; request <= 28; request++) {
+        in.request = (q15_t)request;
+        TEST_ASSERT_EQUAL_INT(0, steps(3));
+        TEST_ASSERT_EQUAL_INT32(0, state.torque);
+    }
+    in.request = 29;
+    TEST_ASSERT_EQUAL_INT(29, steps(3));
+    in.request = -29;
+    TEST_ASSERT_EQUAL_INT(-29, steps(5));
+}
+
+void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
+{
+    in.limit_drive = 9000;
+    in.limit_regen = 3000;
+    const struct {
+        q15_t request;
+        q31_t omega;
+        int wanted;
+    } quadrants[] = {
+        {16000, 1 << 28, 9000},    {-16000, 1 << 28, -3000}, {16000, -(1 << 28), 3000},
+        {-16000, -(1 << 28), -9000}, {16000, 0, 9000},       {-16000, 0, -9000},
+        {-16000, 900000, -9000}, /* rolling slower than standstill: to start backwards is driving */
+    };
+    for (unsigned n = 0; n < sizeof quadrants / sizeof quadrants[0]; n++) {
+        state = (arbitrate_state_t){0};
+        in.request = quadrants[n].request;
+        in.omega = quadrants[n].omega;
+        TEST_ASSERT_EQUAL_INT(quadrants[n].wanted, steps(100));
+    }
+}
+
+void test_a_limit_that_falls_takes_the_torque_down_with_slew(void)
+{
+    in.request = 16000;
+    (void)steps(100);
+    in.limit_drive = 1000;
+    const q15_t first = step();
+    TEST_ASSERT_GREATER_THAN_INT(15000, first);
+    TEST_ASSERT_EQUAL_INT(1000, steps(100));
+}
+
+/* Full torque, wherever it came from, is gone after 15 steps: no jerk limit may delay it. */
+void test_drop_ends_full_torque_within_15_steps(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        setUp();
+        in.request = (q15_t)(16000 * sign);
+        (void)steps(100);
+        in.drop = true;
+        TEST_ASSERT_NOT_EQUAL_INT(0, steps(14));
+        TEST_ASSERT_EQUAL_INT(0, step());
+    }
+}
+
+void test_stop_ends_torque_with_slew_and_off_at_once(void)
+{
+    in.request = 16000;
+    (void)steps(100);
+    in.stop = true;
+    TEST_ASSERT_GREATER_THAN_INT(0, steps(40));
+    TEST_ASSERT_EQUAL_INT(0, steps(12));
+    in.stop = false;
+    (void)steps(100);
+    in.run = false;
+    TEST_ASSERT_EQUAL_INT(0, step());
+    in.run = true;
+    TEST_ASSERT_LESS_OR_EQUAL_INT(40, step()); /* and begins anew */
+}
+
+/* The most negative count has no positive counterpart. */
+void test_the_ends_of_the_format_do_no_harm(void)
+{
+    in = (arbitrate_in_t){.request = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN,
+                          .run = true};
+    TEST_ASSERT_EQUAL_INT(-Q15_MAX, steps(1000));
+    in.request = Q15_MAX;
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, steps(1000));
+}

@@ -1,0 +1,497 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/supervisor.h"
+#include "unity.h"
+
+static supervisor_t s;
+static supervisor_in_t in;
+
+/* Healthy, on the bus, mode off, no voltage, at rest. */
+void setUp(void)
+{
+    s = (supervisor_t){0};
+    in = (supervisor_in_t){.alive = true,
+                           .request_is_zero = true,
+                           .torque_is_zero = true,
+                           .dc_safe = true,
+                           .dc_settled = true,
+                           .sensors_plausible = true,
+                           .slow = true};
+}
+
+void tearDown(void)
+{
+}
+
+static ecu_state_t step(void)
+{
+    supervisor_step(&s, &in);
+    return s.state;
+}
+
+static ecu_state_t steps(int count)
+{
+    for (int n = 0; n < count; n++) {
+        supervisor_step(&s, &in);
+    }
+    return s.state;
+}
+
+static void to_standby(void)
+{
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, steps(60));
+}
+
+static void to_precharge(void)
+{
+    to_standby();
+    in.torque_mode = true;
+    TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, step());
+}
+
+static void voltage(bool there)
+{
+    in.dc_in_range = there;
+    in.dc_safe = !there;
+}
+
+static void to_ready(void)
+{
+    to_precharge();
+    voltage(true);
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+}
+
+static void to_run(void)
+{
+    to_ready();
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
+static void to_derate(void)
+{
+    to_run();
+    in.derated = true;
+    TEST_ASSERT_EQUAL_INT(STATE_DERATE, step());
+}
+
+static void to_safe(void)
+{
+    to_run();
+    in.slow = false;
+    in.drive_faults = 1;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+}
+
+static void to_fault(void)
+{
+    to_safe();
+    in.slow = true;
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+}
+
+static void to_discharge(void)
+{
+    to_ready();
+    in.torque_mode = false;
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
+}
+
+void test_start_up_ends_in_standby_once_the_measurement_was_plausible_for_50_ms(void)
+{
+    in.sensors_plausible = false;
+    TEST_ASSERT_EQUAL_INT(STATE_INIT, steps(200));
+    in.sensors_plausible = true;
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
+}
+
+void test_start_up_without_a_plausible_measurement_is_a_fault_after_500_ms(void)
+{
+    in.sensors_plausible = false;
+    TEST_ASSERT_EQUAL_INT(STATE_INIT, steps(500));
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_SELF_TEST, s.faults);
+    TEST_ASSERT_EQUAL_UINT8(33 + 6, s.first_fault);
+}
+
+void test_bad_motor_data_end_in_fault(void)
+{
+    in.drive_faults = 1U << 7;
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_UINT8(8, s.first_fault);
+}
+
+void test_precharge_closes_the_main_contactor_when_the_voltage_has_settled(void)
+{
+    to_precharge();
+    TEST_ASSERT_TRUE(supervisor_outputs[s.state].precharge);
+    TEST_ASSERT_FALSE(supervisor_outputs[s.state].contactor);
+    voltage(true);
+    in.dc_settled = false;
+    TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, steps(10));
+    in.dc_settled = true;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    TEST_ASSERT_TRUE(supervisor_outputs[s.state].contactor);
+    TEST_ASSERT_FALSE(supervisor_outputs[s.state].precharge);
+}
+
+void test_precharge_that_takes_longer_than_2_s_is_a_fault(void)
+{
+    to_precharge();
+    TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, steps(2000));
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PRECHARGE, s.faults);
+}
+
+void test_mode_off_ends_precharge_and_ready_in_discharge(void)
+{
+    to_precharge();
+    in.torque_mode = false;
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
+    TEST_ASSERT_TRUE(supervisor_outputs[s.state].discharge);
+    setUp();
+    to_discharge();
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(100));
+    voltage(false);
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
+}
+
+void test_a_discharge_that_takes_longer_than_5_s_is_a_fault_and_is_not_tried_again_until_reset(void)
+{
+    to_discharge();
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(5000));
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_DISCHARGE, s.faults);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(100));
+}
+
+void test_disable_leaves_run_and_derate_only_when_no_torque_is_left(void)
+{
+    for (int derate = 0; derate <= 1; derate++) {
+        setUp();
+        derate ? to_derate() : to_run();
+        in.enable = false;
+        in.torque_is_zero = false;
+        (void)steps(20);
+        TEST_ASSERT_TRUE(supervisor_outputs[s.state].run);
+        in.torque_is_zero = true;
+        TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    }
+}
+
+void test_derating_comes_and_goes(void)
+{
+    to_derate();
+    TEST_ASSERT_EQUAL_INT(STATE_DERATE, steps(5));
+    in.derated = false;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
+void test_a_drive_fault_trips_from_ready_run_and_derate_at_once(void)
+{
+    void (*const from[])(void) = {to_ready, to_run, to_derate};
+    for (int n = 0; n < 3; n++) {
+        setUp();
+        from[n]();
+        in.torque_is_zero = false;
+        in.drive_faults = 4;
+        TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+        TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
+        TEST_ASSERT_EQUAL_UINT8(3, s.first_fault);
+    }
+}
+
+void test_a_gate_driver_fault_and_a_stalled_interrupt_trip_too(void)
+{
+    to_run();
+    in.gate_fault = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault);
+    setUp();
+    to_run();
+    in.stalled = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+    TEST_ASSERT_EQUAL_UINT8(33 + 5, s.first_fault);
+}
+
+void test_bad_commands_and_a_late_task_end_the_torque_first_and_then_the_run(void)
+{
+    to_run();
+    in.torque_is_zero = false;
+    in.failed = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(10));
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PROTECTION, s.faults);
+    in.torque_is_zero = true;
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    setUp();
+    to_derate();
+    in.task_late = true;
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_TASK, s.faults);
+}
+
+void test_the_safe_state_is_left_only_when_the_machine_can_feed_nothing(void)
+{
+    to_safe();
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE, steps(1000));
+    TEST_ASSERT_TRUE(supervisor_outputs[s.state].contactor);
+    in.slow = true;
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_FALSE(supervisor_outputs[s.state].contactor);
+}
+
+void test_mode_off_in_fault_discharges_and_comes_back_to_fault(void)
+{
+    to_fault();
+    in.torque_mode = false;
+    in.enable = false;
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(100));
+    voltage(false);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(100));
+}
+
+void test_a_time_out_ends_run_in_ready_and_needs_enable_off_before_on(void)
+{
+    to_run();
+    in.alive = false;
+    in.enable = false;
+    in.torque_is_zero = false;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(15));
+    in.torque_is_zero = true;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    TEST_ASSERT_EQUAL_INT(REFUSED_TIMED_OUT, s.refused);
+    in.alive = true;
+    in.enable = true; /* it was never off */
+    TEST_ASSERT_EQUAL_INT(STATE_READY, steps(10));
+    in.enable = false;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
+static void refused(refused_t why)
+{
+    const uint8_t before = s.refused_count;
+    in.enable = true;
+    (void)step();
+    TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
+    TEST_ASSERT_EQUAL_INT(why, s.refused);
+    TEST_ASSERT_EQUAL_UINT8(before + 1, s.refused_count);
+    /* what made it forbidden goes: a held enable is still none */
+    in.request_is_zero = true;
+    in.dc_in_range = true;
+    in.sensors_plausible = true;
+    in.current_mode = false;
+    (void)steps(5);
+    TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
+    TEST_ASSERT_EQUAL_UINT8(before + 1, s.refused_count);
+}
+
+void test_enable_with_a_torque_request_is_refused(void)
+{
+    to_ready();
+    in.request_is_zero = false;
+    refused(REFUSED_TORQUE_NOT_ZERO);
+}
+
+void test_enable_with_the_dc_voltage_out_of_range_is_refused(void)
+{
+    to_ready();
+    in.dc_in_range = false;
+    refused(REFUSED_DC_VOLTAGE);
+}
+
+void test_enable_with_an_implausible_sensor_is_refused(void)
+{
+    to_ready();
+    in.sensors_plausible = false;
+    refused(REFUSED_SENSOR);
+}
+
+void test_enable_in_the_locked_current_mode_is_refused(void)
+{
+    to_ready();
+    in.torque_mode = false;
+    in.current_mode = true;
+    refused(REFUSED_MODE);
+}
+
+void test_enable_before_ready_is_refused(void)
+{
+    to_precharge();
+    refused(REFUSED_NOT_READY);
+    setUp();
+    to_standby();
+    refused(REFUSED_NOT_READY);
+    setUp();
+    to_discharge();
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
+    TEST_ASSERT_EQUAL_INT(REFUSED_NOT_READY, s.refused);
+}
+
+void test_enable_in_fault_is_refused(void)
+{
+    to_fault();
+    in.enable = false;
+    (void)step();
+    refused(REFUSED_FAULT);
+}
+
+static void reset(void)
+{
+    in.reset = true;
+    (void)step();
+    in.reset = false;
+}
+
+void test_a_reset_with_enable_off_forgets_what_is_gone(void)
+{
+    to_fault();
+    in.enable = false;
+    (void)step();
+    reset();
+    TEST_ASSERT_EQUAL_UINT32(1, s.resets);
+    in.drive_faults = 0; /* the drive has followed */
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
+    TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
+    TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, step());
+}
+
+void test_a_reset_does_not_forget_what_is_still_there(void)
+{
+    to_fault();
+    in.enable = false;
+    in.gate_fault = true;
+    (void)step();
+    reset();
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, s.faults);
+    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault); /* seen at once; the drive's needs its own reset first */
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
+    setUp();
+    to_fault();
+    in.enable = false;
+    (void)step();
+    reset();
+    TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
+    TEST_ASSERT_EQUAL_UINT8(1, s.first_fault); /* the drive's fault never went: it is told again */
+}
+
+void test_a_reset_while_enabled_or_outside_fault_is_refused(void)
+{
+    to_fault();
+    in.enable = true;
+    reset();
+    TEST_ASSERT_EQUAL_UINT32(0, s.resets);
+    TEST_ASSERT_EQUAL_INT(REFUSED_RESET, s.refused);
+    setUp();
+    to_ready();
+    reset();
+    TEST_ASSERT_EQUAL_UINT32(0, s.resets);
+    TEST_ASSERT_EQUAL_INT(REFUSED_RESET, s.refused);
+}
+
+void test_a_held_reset_counts_once(void)
+{
+    to_fault();
+    in.enable = false;
+    in.reset = true;
+    (void)steps(50);
+    TEST_ASSERT_EQUAL_UINT32(1, s.resets);
+}
+
+/* The moves a reader of docs/howto/can.md is told of: one row per state, one bit per state that may follow. */
+#define TO(state) (1U << STATE_##state)
+static const unsigned allowed[STATES] = {
+    [STATE_INIT] = TO(STANDBY) | TO(FAULT),
+    [STATE_STANDBY] = TO(PRECHARGE) | TO(FAULT),
+    [STATE_PRECHARGE] = TO(READY) | TO(DISCHARGE) | TO(FAULT),
+    [STATE_READY] = TO(RUN) | TO(DISCHARGE) | TO(SAFE) | TO(FAULT),
+    [STATE_RUN] = TO(READY) | TO(DERATE) | TO(SAFE) | TO(FAULT),
+    [STATE_DERATE] = TO(READY) | TO(RUN) | TO(SAFE) | TO(FAULT),
+    [STATE_SAFE] = TO(FAULT),
+    [STATE_FAULT] = TO(STANDBY) | TO(DISCHARGE),
+    [STATE_DISCHARGE] = TO(STANDBY) | TO(FAULT),
+};
+
+static supervisor_in_t inputs_of(unsigned bits)
+{
+    return (supervisor_in_t){
+        .drive_faults = bits & 1U,
+        .alive = (bits >> 1 & 1U) != 0U,
+        .failed = (bits >> 2 & 1U) != 0U,
+        .torque_mode = (bits >> 3 & 1U) != 0U,
+        .current_mode = (bits >> 3 & 3U) == 2U, /* the modes exclude each other */
+        .enable = (bits >> 5 & 1U) != 0U,
+        .reset = (bits >> 6 & 1U) != 0U,
+        .request_is_zero = (bits >> 7 & 1U) != 0U,
+        .torque_is_zero = (bits >> 8 & 1U) != 0U,
+        .dc_in_range = (bits >> 9 & 3U) == 1U,
+        .dc_safe = (bits >> 9 & 3U) == 2U, /* never both */
+        .dc_settled = (bits >> 11 & 1U) != 0U,
+        .sensors_plausible = (bits >> 12 & 1U) != 0U,
+        .slow = (bits >> 13 & 1U) != 0U,
+        .derated = (bits >> 14 & 1U) != 0U,
+        .gate_fault = (bits >> 15 & 1U) != 0U,
+        .task_late = (bits >> 16 & 1U) != 0U,
+        .stalled = (bits >> 17 & 1U) != 0U,
+    };
+}
+
+/* What must hold whatever the inputs were; the conditions are spelled out again, not taken from the table. */
+static void judge(const supervisor_t *before, const supervisor_in_t *now)
+{
+    const bool ran = before->state == STATE_RUN || before->state == STATE_DERATE;
+    const bool runs = s.state == STATE_RUN || s.state == STATE_DERATE;
+    TEST_ASSERT_TRUE(s.state == before->state || (allowed[before->state] >> s.state & 1U) != 0U);
+    if (runs && !ran) {
+        TEST_ASSERT_TRUE(before->state == STATE_READY && now->alive && now->torque_mode);
+        TEST_ASSERT_TRUE(before->enabled || (now->enable && !before->enable_seen && now->request_is_zero &&
+                                             now->dc_in_range && now->sensors_plausible));
+        TEST_ASSERT_TRUE(s.faults == 0U && now->drive_faults == 0U);
+    }
+    if (now->drive_faults != 0U || now->gate_fault || now->stalled) {
+        TEST_ASSERT_FALSE(runs);
+    }
+    if (ran && !runs && now->drive_faults == 0U && s.faults == 0U) {
+        TEST_ASSERT_TRUE(now->torque_is_zero); /* torque is never cut by a state that could have ramped it down */
+    }
+    if (s.resets != before->resets) {
+        TEST_ASSERT_TRUE(before->state == STATE_FAULT && now->alive && now->reset && !now->enable);
+    }
+}
+
+void test_no_combination_of_inputs_makes_a_forbidden_move(void)
+{
+    unsigned seen[STATES] = {0};
+    for (unsigned state = 0; state < STATES; state++) {
+        for (unsigned bits = 0; bits < 1U << 20; bits++) {
+            const supervisor_t before = {.state = (ecu_state_t)state,
+                                         .ms = 100,
+                                         .enabled = (bits >> 18 & 1U) != 0U && supervisor_outputs[state].run,
+                                         .enable_seen = (bits >> 19 & 1U) != 0U};
+            in = inputs_of(bits);
+            s = before;
+            supervisor_step(&s, &in);
+            judge(&before, &in);
+            seen[state] |= (s.state != before.state) ? 1U << s.state : 0U;
+        }
+    }
+    /* The long time-outs have their own tests; every other move must have been seen. */
+    for (unsigned state = 0; state < STATES; state++) {
+        TEST_ASSERT_EQUAL_HEX(allowed[state], seen[state]);
+    }
+}
+
+void test_no_two_outputs_fight(void)
+{
+    for (int state = 0; state < STATES; state++) {
+        const state_outputs_t *o = &supervisor_outputs[state];
+        TEST_ASSERT_FALSE(o->discharge && (o->precharge || o->contactor));
+        TEST_ASSERT_FALSE(o->precharge && o->contactor);
+        TEST_ASSERT_TRUE(!o->run || (o->contactor && o->gate_driver));
+    }
+}
