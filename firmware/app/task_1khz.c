@@ -79,10 +79,13 @@ void task_1khz(drive_t *drive)
     }
     command_box_write(&drive->commands, command);
 
+    /* Read once: the identification may interrupt, and its drift must be counted to the end. */
+    const mrai_state_t identified = drive->slow.mrai;
+    exchange_barrier();
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
         .next = &next,
-        .identifier = &drive->slow.mrai,
+        .identifier = &identified,
         .enabled = drive->request.identification && sample.acting,
     };
     schedule_box_write(&drive->schedules, mrai_schedule_step(&drive->motor.mrai, &task->quality, &schedule));
