@@ -4,9 +4,9 @@
     i_d = (a_d + b_d |psi_d|^4 + c/2 |psi_d| psi_q^2) psi_d - i_f
     i_q = (a_q + b_q |psi_q|^4 + c/3 |psi_d|^3) psi_q
 
-Both currents are slopes of one energy, so that the maps are reciprocal. The form is that of Hinkkanen et al., "Sensorless
-self-commissioning of synchronous reluctance motors at standstill without rotor locking", IEEE Trans. Ind. Appl. 53 (2017),
-with a magnet as the current i_f; all numbers are our assumption.
+Both currents are slopes of one energy, so that the maps are reciprocal. The form is that of Hinkkanen et al.,
+"Sensorless self-commissioning of synchronous reluctance motors at standstill without rotor locking", IEEE Trans. Ind.
+Appl. 53 (2017), with a magnet as the current i_f; all numbers are our assumption.
 
     build/venv/bin/python tests/motors/make_maps.py       writes both flux_map.csv
 """
