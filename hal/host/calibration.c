@@ -67,13 +67,13 @@ void calibration_set_flux_bandwidth(fluxtrue_t *drive, double value)
 double calibration_get_resistance_bandwidth(const fluxtrue_t *drive)
 {
     const motor_t *m = &drive->drive.motor;
-    return m->mrai.resistance_gain / Q31_SCALE / (2.0 * (double)m->bases.period_s);
+    return m->mrai.resistance_gain / Q31_SCALE * (double)m->bases.omega_rad_s / 2.0;
 }
 
 void calibration_set_resistance_bandwidth(fluxtrue_t *drive, double value)
 {
     motor_t *m = &drive->drive.motor;
-    m->mrai.resistance_gain = to_q31(2.0 * value * (double)m->bases.period_s);
+    m->mrai.resistance_gain = to_q31(2.0 * value / (double)m->bases.omega_rad_s);
     m->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * m->mrai.r0 / Q31_SCALE * value * task_s(m));
 }
 
