@@ -6,16 +6,18 @@ void mrai_isr(drive_t *drive)
     slow_state_t *slow = &drive->slow;
     const uint32_t asked = drive->fast.pended;
     const sample_t *sample = sample_box_look(&drive->samples);
+    const mrai_config_t *config = &drive->motor.mrai;
+    const mrai_schedule_t *schedule = schedule_box_read(&drive->schedules);
 
     if (drive->request.identification_resets != slow->identification_resets) {
         slow->identification_resets = drive->request.identification_resets;
         slow->mrai = (mrai_state_t){0};
-        mrai_reset(&slow->mrai, &sample->mrai); /* goes on from this sample, not from zero flux */
+        mrai_reset(config, schedule, &slow->mrai, &sample->mrai); /* goes on from this sample, not from zero flux */
     } else if (sample->acting) {
-        mrai_step(&drive->motor.mrai, schedule_box_read(&drive->schedules), &slow->mrai, &sample->mrai);
+        mrai_step(config, schedule, &slow->mrai, &sample->mrai);
     } else {
         /* The bridge was off: its voltage is not ours, only the currents are known. */
-        mrai_reset(&slow->mrai, &sample->mrai);
+        mrai_reset(config, schedule, &slow->mrai, &sample->mrai);
     }
     slow->psi_delta_q15 = fx_q15_from_q31(slow->mrai.psi_delta);
     (void)torque_estimate_step(&slow->torque, sample->mrai.i, &sample->mrai.flux, slow->mrai.psi_delta);

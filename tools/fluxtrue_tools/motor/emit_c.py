@@ -132,14 +132,14 @@ def _mrai_gains(motor: Motor) -> list[Row]:
     return [
         ("r0", q31(r0, "r0"), "R at 20 C"),
         ("pole_gain", q31(control.observer_m * r0 / 2, "pole_gain"), f"m R_0/2, m = {control.observer_m:g}"),
-        ("l_shift", f"{motor.tables.l_shift}u", ""),
-        ("rate_gain_q26", str(round(2**26 / (b.omega_rad_s * b.period_s))), "1/(omega_b T_s)"),
+        ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
         ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
          f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
-        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s * b.period_s, "resistance_gain"),
-         f"2 k_r T_s, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
-        ("flux_proportional", q16(d.flux_proportional, "flux_proportional"), f"{d.flux_proportional:.6g} periods"),
-        ("resistance_proportional", q16(d.resistance_proportional, "resistance_proportional"),
+        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s / b.omega_rad_s, "resistance_gain"),
+         f"2 k_r/omega_b, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
+        ("flux_proportional_q24", q31(d.flux_proportional / 128, "flux_proportional"),
+         f"{d.flux_proportional:.6g} periods"),
+        ("resistance_proportional_q24", q31(d.resistance_proportional / 128, "resistance_proportional"),
          f"{d.resistance_proportional:.6g} periods"),
     ]
 
