@@ -25,6 +25,7 @@ typedef struct {
     bool output[BOARD_OUTPUTS];
     bool gate_fault;
     bool winding_broken, inverter_broken; /* no reading */
+    double inverter_C;
     bool watchdog_started;
     uint32_t watchdog_services;
 } host_board_t;
