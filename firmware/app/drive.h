@@ -67,6 +67,12 @@ typedef struct {
     volatile q15_t psi_delta_q15;
 } slow_state_t;
 
+/** What is identified by now, whichever way. */
+typedef struct {
+    q31_t psi_delta, r_delta; /* minus the table's flux, minus the resistance at 20 C */
+    bool psi_clamped, r_clamped;
+} learnt_t;
+
 /** Written by the 1 kHz task alone. */
 typedef struct {
     torque_loop_state_t torque_loop;
@@ -75,6 +81,7 @@ typedef struct {
     identify_out_t identified;
     volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
     q15_t torque_estimate;
+    learnt_t learnt;
     current_reference_t reference;
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */

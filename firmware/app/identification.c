@@ -2,6 +2,34 @@
 #include "app/drive.h"
 #include "hal/temperature.h"
 
+static bool at_limit(const identify_state_t *state, identify_index_t index)
+{
+    return fx_abs_q31(state->filter.x[index]) >= 4 * IDENTIFY_ONE_Q27;
+}
+
+/* Share of the prior's variance that is gone. */
+static q15_t known(const identify_memory_t *memory, identify_index_t index)
+{
+    return (q15_t)(Q15_MAX - (memory->variance[index] >> 15));
+}
+
+static void report_robust(drive_t *drive)
+{
+    const identify_config_t *config = &drive->motor.identify;
+    task_state_t *task = &drive->task;
+    const identify_state_t *state = &task->identify;
+    const identify_memory_t memory = identify_memory_get(state);
+    task->torque_estimate = task->identified.torque;
+    task->learnt = (learnt_t){
+        .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
+        .r_delta = fx_add_q31(state->r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
+        .psi_clamped = at_limit(state, IDENTIFY_FLUX),
+        .r_clamped = at_limit(state, IDENTIFY_R),
+    };
+    task->quality.psi_quality = known(&memory, IDENTIFY_FLUX);
+    task->quality.r_quality = known(&memory, IDENTIFY_R);
+}
+
 /* Ten periods from the MRAI ISR, the tables at their magnetising current, and what follows from both. */
 static void robust(drive_t *drive, const sample_t *sample)
 {
@@ -20,7 +48,14 @@ static void robust(drive_t *drive, const sample_t *sample)
     };
     task->identified = identify_step(&m->identify, &task->identify, &in);
     task->identifications = task->identifications + 1U;
-    task->torque_estimate = task->identified.torque;
+    report_robust(drive);
+}
+
+static void report_paper(drive_t *drive)
+{
+    const mrai_state_t *mrai = &drive->slow.mrai;
+    drive->task.torque_estimate = drive->slow.torque.mean;
+    drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai->psi_clamped, mrai->r_clamped};
 }
 
 void drive_identify(drive_t *drive, const sample_t *sample)
@@ -28,7 +63,7 @@ void drive_identify(drive_t *drive, const sample_t *sample)
     if (drive->request.identification_mode == IDENTIFICATION_ROBUST) {
         robust(drive, sample);
     } else {
-        drive->task.torque_estimate = drive->slow.torque.mean;
+        report_paper(drive);
     }
 }
 

@@ -83,6 +83,9 @@ void task_1khz(drive_t *drive)
     }
     command_box_write(&drive->commands, command);
 
+    if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
+        return;
+    }
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
         .next = &next,

@@ -22,39 +22,16 @@ static double value(const fluxtrue_t *d, identify_index_t index, float base)
     return is_robust(d) ? pu(learnt, 2147483648.0, base) : 0.0;
 }
 
-/* 1: as well known as can be, 0: no better than the prior. */
-static double quality(const fluxtrue_t *d, identify_index_t index)
-{
-    const identify_memory_t memory = drive_learnt(&d->drive);
-    return 1.0 - sqrt((double)memory.variance[index] / (double)IDENTIFY_ONE_Q30);
-}
-
 double learnt_psi_f_Vs(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
-    const double delta = is_robust(d) ? value(d, IDENTIFY_FLUX, m->bases.flux_Vs)
-                                      : pu(d->drive.slow.mrai.psi_delta, 2147483648.0, m->bases.flux_Vs);
-    return (double)m->psi_f_Vs + delta;
+    return (double)m->psi_f_Vs + pu(d->drive.task.learnt.psi_delta, 2147483648.0, m->bases.flux_Vs);
 }
 
 double learnt_r_ohm(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
-    const float base = m->bases.resistance_ohm;
-    if (is_robust(d)) {
-        return pu(d->drive.task.identify.r_prior, 2147483648.0, base) + value(d, IDENTIFY_R, base);
-    }
-    return (double)m->r_ohm_20 + pu(d->drive.slow.mrai.r_delta, 2147483648.0, base);
-}
-
-double learnt_psi_quality(const fluxtrue_t *d)
-{
-    return is_robust(d) ? quality(d, IDENTIFY_FLUX) : (double)d->drive.task.quality.psi_quality / 32768.0;
-}
-
-double learnt_r_quality(const fluxtrue_t *d)
-{
-    return is_robust(d) ? quality(d, IDENTIFY_R) : (double)d->drive.task.quality.r_quality / 32768.0;
+    return (double)m->r_ohm_20 + pu(d->drive.task.learnt.r_delta, 2147483648.0, m->bases.resistance_ohm);
 }
 
 double learnt_drop_V(const fluxtrue_t *d)

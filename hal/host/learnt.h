@@ -10,8 +10,6 @@
 
 double learnt_psi_f_Vs(const fluxtrue_t *drive);
 double learnt_r_ohm(const fluxtrue_t *drive);
-double learnt_psi_quality(const fluxtrue_t *drive);
-double learnt_r_quality(const fluxtrue_t *drive);
 double learnt_drop_V(const fluxtrue_t *drive);
 double learnt_lq_scale(const fluxtrue_t *drive);
 double learnt_ld_scale(const fluxtrue_t *drive);

@@ -62,8 +62,10 @@ GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
 GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
-GETTER(psi_clamped, d->drive.slow.mrai.psi_clamped)
-GETTER(r_clamped, d->drive.slow.mrai.r_clamped)
+GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
+GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
+GETTER(psi_clamped, d->drive.task.learnt.psi_clamped)
+GETTER(r_clamped, d->drive.task.learnt.r_clamped)
 GETTER(id, pu15(sample(d)->mrai.i.d, bases(d)->current_A))
 GETTER(iq, pu15(sample(d)->mrai.i.q, bases(d)->current_A))
 GETTER(ud, pu15(d->drive.fast.coming.d, bases(d)->voltage_V))
@@ -161,8 +163,8 @@ static const parameter_t parameters[] = {
     {"torque_correction", get_torque_correction, NULL, 0, 0},
     {"psi_f_Vs", learnt_psi_f_Vs, NULL, 0, 0},
     {"r_ohm", learnt_r_ohm, NULL, 0, 0},
-    {"psi_quality", learnt_psi_quality, NULL, 0, 0},
-    {"r_quality", learnt_r_quality, NULL, 0, 0},
+    {"psi_quality", get_psi_quality, NULL, 0, 0},
+    {"r_quality", get_r_quality, NULL, 0, 0},
     {"drop_V", learnt_drop_V, NULL, 0, 0},
     {"lq_scale", learnt_lq_scale, NULL, 0, 0},
     {"ld_scale", learnt_ld_scale, NULL, 0, 0},
