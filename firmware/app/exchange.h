@@ -21,7 +21,7 @@
 typedef struct {
     mrai_in_t mrai;
     int32_t v_dc;
-    uint32_t theta;       /* electrical, as measured */
+    uint32_t theta_e; /* of the samples, 2^32 = one turn */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
     bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */

@@ -27,7 +27,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     sample->mrai.i = i;
     sample->mrai.omega = now.angle.omega_q31;
-    sample->theta = now.angle.theta_e;
+    sample->theta_e = now.angle.theta_e;
     sample->v_dc = measured.v_dc;
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
     return now;

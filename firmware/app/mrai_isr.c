@@ -28,7 +28,7 @@ static void collect(drive_t *drive, const sample_t *sample)
         .i = sample->mrai.i,
         .u = sample->mrai.u,
         .flux = &sample->mrai.flux,
-        .theta = sample->theta,
+        .theta = sample->theta_e,
         .acting = sample->acting,
         .limited = sample->snapped,
     };
