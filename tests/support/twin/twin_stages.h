@@ -164,7 +164,7 @@ typedef struct {
 } twin_torque_state_t;
 
 typedef struct {
-    double command, estimate;
+    double command, estimate, confidence;
     bool enabled, limited;
 } twin_torque_in_t;
 

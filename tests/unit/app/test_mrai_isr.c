@@ -9,6 +9,7 @@
 void setUp(void)
 {
     seam_start();
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
 }
 
 void tearDown(void)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
@@ -213,6 +214,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
         ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
+        ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
         ("monitor", _monitor(motor), ""),
     ]
@@ -279,6 +281,7 @@ def _si_rows(motor: Motor) -> list[Row]:
               "nq": len(tables.iq_A), "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
     pointers = ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs", "ref_id_A", "ref_iq_A", "ref_torque_max_Nm")
     return [*((k, v, "") for k, v in counts.items()), *((k, _double(v), "") for k, v in numbers.items()),
+            *identification.si_rows(motor.config, motor.derived.identify),
             *((name, f"table_{name}", "") for name in pointers)]
 
 
