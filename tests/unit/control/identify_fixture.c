@@ -73,7 +73,8 @@ window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t ex
         const double turn = theta / 6.283185307179586;
         const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turn - floor(turn)) * 4294967296.0), true,
                                      false};
-        const twin_end_t t = {{from_q15(i.d) * f->i, from_q15(i.q) * f->i}, {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
+        const twin_end_t t = {{from_q15(i.d) * f->i, from_q15(i.q) * f->i},
+                              {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
                               {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi}, theta};
         if (k == 0) {
             pair.fixed.last = (identify_end_t){s.i, s.u, {flux.psi_d, flux.psi_q}, s.theta};

@@ -8,6 +8,7 @@
 
 static fixture_t f;
 static identify_config_t c;
+static const double one_q60 = 1152921504606846976.0;
 
 void setUp(void)
 {
@@ -136,7 +137,7 @@ void test_one_measurement_of_one_state_by_hand(void)
     identify_filter_reset(&filter);
     const identify_row_t row = {{[IDENTIFY_FLUX] = (int32_t)(0.1 * IDENTIFY_ONE_Q30)}};
     const identify_verdict_t verdict =
-        identify_filter_update(&filter, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * 1152921504606846976.0));
+        identify_filter_update(&filter, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * one_q60));
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.1, filter.x[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q27);
     identify_state_t state = {.filter = filter};
     const identify_memory_t memory = identify_memory_get(&state);
@@ -144,8 +145,8 @@ void test_one_measurement_of_one_state_by_hand(void)
     TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, memory.variance[IDENTIFY_LQ]);
     TEST_ASSERT_FALSE(verdict.inconsistent || verdict.clamped);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, identify_filter_shift(&filter, &row) / (double)IDENTIFY_ONE_Q30);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.005, (double)identify_filter_variance(&filter, &row) / 1152921504606846976.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)identify_filter_prior(&row) / 1152921504606846976.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.005, (double)identify_filter_variance(&filter, &row) / one_q60);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)identify_filter_prior(&row) / one_q60);
 }
 
 void test_what_the_model_cannot_explain_is_reported_and_limited(void)
@@ -153,7 +154,7 @@ void test_what_the_model_cannot_explain_is_reported_and_limited(void)
     identify_filter_t filter;
     identify_filter_reset(&filter);
     const identify_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
-    const int64_t r = (int64_t)(1e-4 * 1152921504606846976.0); /* s = 2e-4: 2.83 sigma is 0.04 */
+    const int64_t r = (int64_t)(1e-4 * one_q60); /* s = 2e-4: 2.83 sigma is 0.04 */
     TEST_ASSERT_FALSE(identify_filter_update(&filter, &row, (int32_t)(0.0395 * IDENTIFY_ONE_Q30), r).inconsistent);
     identify_filter_reset(&filter);
     TEST_ASSERT_TRUE(identify_filter_update(&filter, &row, (int32_t)(0.0405 * IDENTIFY_ONE_Q30), r).inconsistent);
@@ -223,7 +224,7 @@ void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
         }
         const int32_t e = random_in(&seed, -(1 << 22), 1 << 22);
         const double noise_pu = (n % 2 == 0) ? 0.008 : 0.04;
-        const int64_t r = (int64_t)(noise_pu * noise_pu * 1152921504606846976.0);
+        const int64_t r = (int64_t)(noise_pu * noise_pu * one_q60);
         (void)identify_filter_update(&filter, &row, e, r);
         (void)twin_filter_update(&twin, h, e / (double)IDENTIFY_ONE_Q30, noise_pu * noise_pu);
         identify_filter_leak(&c, &filter, n % 3 == 0);
