@@ -14,9 +14,9 @@
 #define CALLED __attribute__((used, externally_visible, noinline))
 #define STAGE __attribute__((used, externally_visible, noinline, flatten))
 
-enum { OUTPUTS = 20 };
+enum { OUTPUTS = 24 };
 
-void drive_start(void);
+void drive_start(uint32_t mode);
 void drive_request(int32_t torque, uint32_t enable);
 void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m);
 void drive_copy(void);
@@ -84,9 +84,10 @@ int16_t hal_temperature_inverter_dC(void)
     return 200;
 }
 
-CALLED void drive_start(void)
+CALLED void drive_start(uint32_t mode)
 {
     drive_init(&drive, &motor);
+    drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
 }
 
 CALLED void drive_request(int32_t torque, uint32_t enable)
@@ -128,6 +129,8 @@ CALLED const int32_t *drive_outputs(void)
         fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
         drive.slow.torque.sum, drive.slow.torque.mean,
+        drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0],
+        drive.task.identify.local.q,
     };
     for (int k = 0; k < OUTPUTS; k++) {
         outputs[k] = all[k];
