@@ -34,7 +34,9 @@ def _run(processor: drive.Processor, mode: int) -> list[list[int]]:
 
 
 @pytest.fixture(scope="module", params=[drive.PAPER, drive.ROBUST], ids=["paper", "robust"])
-def recorder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Recorder, list[list[int]]]:
+def recorder(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Recorder, list[list[int]]]:
     if not build.have_arm_compiler():
         pytest.skip(f"{build.ARM_CC} is not installed: nothing is compiled for the target")
     target = Recorder(drive.build_drive(tmp_path_factory.mktemp("target")))
