@@ -10,6 +10,7 @@ from typing import Any
 import can
 import cantools.database
 import pytest
+from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.mdf import BusLog
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
@@ -36,6 +37,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--can-option", action="append", default=[], metavar="NAME=VALUE",
                     help="further argument of can.Bus, for example host=127.0.0.1, bitrate=500000")  # fmt: skip
     group.addoption("--bench", metavar="HOST:PORT", help="bench channel of the plant behind that interface")
+    group.addoption("--allow-power", action="store_true",
+                    help="on a bench: tests may charge the dc link, close the gates and ask for torque")  # fmt: skip
+    group.addoption("--elf", help="the ECU's ELF file: where its calibration values are; default: --vecu")
     group.addoption("--report", default=str(ROOT / "build" / "hil"), help="folder for report.html and bus.mf4")
     group.addoption("--soak-minutes", type=float, default=30.0, help="simulated length of the soak test")
 
@@ -136,9 +140,13 @@ def bus_log(request: pytest.FixtureRequest) -> Iterator[BusLog]:
 
 
 @pytest.fixture(scope="session")
-def connected(target: Target, database: cantools.database.Database, bus_log: BusLog) -> Rig:
+def connected(
+    request: pytest.FixtureRequest, target: Target, database: cantools.database.Database, bus_log: BusLog
+) -> Rig:
     """The one connection of the session."""
     rig = Rig(target.bus, database, target.stand, client_port(target.bus))
+    is_bench = request.config.getoption("--can-interface") is not None
+    rig.may_switch_on = not is_bench or request.config.getoption("--allow-power")
     rig.listeners.append(bus_log)
     return rig
 
@@ -158,6 +166,15 @@ def rig(connected: Rig) -> Iterator[Rig]:
     yield connected
     problems = health.problems(connected, before)
     assert not problems, "after the test: " + "; ".join(problems)
+
+
+@pytest.fixture(scope="session")
+def description(request: pytest.FixtureRequest) -> Description:
+    """Calibration values and measurements of the ECU, from its ELF file."""
+    path = request.config.getoption("--elf") or request.config.getoption("--vecu")
+    if path is None:
+        pytest.skip("needs the ECU's ELF file (--elf)")
+    return read(Path(path))
 
 
 @pytest.fixture

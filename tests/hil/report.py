@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import pytest
 from fluxtrue_tools.demo.experiment import Bound
-from fluxtrue_tools.sim.plot import STYLE
 from jinja2 import Environment
 from numpy.typing import ArrayLike
 
@@ -19,6 +17,9 @@ Line = tuple[str, ArrayLike, ArrayLike]
 
 
 def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -> str:
+    import matplotlib.pyplot as plt  # a second that a run without plots does not need
+    from fluxtrue_tools.sim.plot import STYLE
+
     with plt.rc_context(STYLE | {"svg.hashsalt": title}):
         figure, rows = plt.subplots(
             len(axes), 1, figsize=(9, 1.0 + 2.2 * len(axes)), layout="constrained", squeeze=False, sharex=True

@@ -27,7 +27,8 @@ BAD_COMMANDS = (
     "set plant.r_ohm_20 -1", "set plant.speed_rad_s 1e999", "set enable 1", "set torque_command_Nm 100", "get",
     "get nothing", "run", "run 1", "run -1 ms", "run nan s", "run 1 fortnight", "run 1e30 s", "run 1 ms 99999 0",
     "run 1 ms 1 0", "record", "record 0 truth.torque_Nm", "record 1 nothing", "record x truth.torque_Nm", "ramp",
-    "ramp plant.speed_rad_s 1 1", "ramp plant.nothing 1 1 s", "reset minus", "reset 1 2", "set " + "plant.load_Nm 0 " * 40, "x" * 1000,
+    "ramp plant.speed_rad_s 1 1", "ramp plant.nothing 1 1 s", "reset minus",
+    "reset 1 2", "set " + "plant.load_Nm 0 " * 40, "x" * 1000,
 )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ add_custom_command(
     VERBATIM)
 add_library(fluxtrue_bus STATIC "${generated}/bus/bus.c" "${generated}/bus/bus.h" "${generated}/bus/signals.h")
 target_include_directories(fluxtrue_bus SYSTEM PUBLIC "${generated}")
+target_link_libraries(fluxtrue_bus PUBLIC m) # rounding
 target_compile_options(fluxtrue_bus PRIVATE -w)
 
 if(NOT CMAKE_CROSSCOMPILING)

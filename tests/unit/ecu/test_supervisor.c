@@ -36,6 +36,14 @@ static ecu_state_t steps(int count)
     return s.state;
 }
 
+/* In every single step: two states that take turns would look like one to every second step. */
+static void stays(ecu_state_t state, int count)
+{
+    for (int n = 0; n < count; n++) {
+        TEST_ASSERT_EQUAL_INT(state, step());
+    }
+}
+
 static void to_standby(void)
 {
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, steps(60));
@@ -162,7 +170,7 @@ void test_a_discharge_that_takes_longer_than_5_s_is_a_fault_and_is_not_tried_aga
     TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(5000));
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_DISCHARGE, s.faults);
-    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(100));
+    stays(STATE_FAULT, 100);
 }
 
 void test_disable_leaves_run_and_derate_only_when_no_torque_is_left(void)
@@ -248,8 +256,7 @@ void test_mode_off_in_fault_discharges_and_comes_back_to_fault(void)
     TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
     TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(100));
     voltage(false);
-    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
-    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(100));
+    stays(STATE_FAULT, 100);
 }
 
 void test_a_time_out_ends_run_in_ready_and_needs_enable_off_before_on(void)

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The suite as it runs on a bench: an interface that is given, no plant to command, time that is the wall clock's."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+
+pytestmark = pytest.mark.program
+HERE = Path(__file__).parent
+
+
+def suite(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pytest", "-q", "-rs", "-c", str(HERE.parent / "pytest.ini"),
+               "-p", "no:cacheprovider", *arguments]  # fmt: skip
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, env=os.environ, check=False)
+
+
+def over(ecu: VirtualEcu, *more: str) -> list[str]:
+    return ["--can-interface=socketcand", "--can-channel=can0", f"--can-option=host={HOST}",
+            f"--can-option=port={ecu.can_port}", "--can-option=tcp_tune=1", *more]  # fmt: skip
+
+
+def test_without_a_plant_the_rest_of_the_suite_runs_and_says_what_it_left_out(program: Path, tmp_path: Path) -> None:
+    for _ in range(3):  # in real time a computer that stalls for 30 ms loses the command; not what is tested here
+        with VirtualEcu(program, fast=False) as ecu:
+            done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", f"--junitxml={tmp_path}/junit.xml",
+                         *over(ecu))  # fmt: skip
+        if done.returncode == 0:
+            break
+    assert done.returncode == 0, done.stdout
+    assert "needs plant control, and this bench has none (--bench)" in done.stdout
+    assert "3 passed, 3 skipped" in done.stdout
+    assert (tmp_path / "report.html").is_file() and (tmp_path / "bus.mf4").is_file()
+    assert (tmp_path / "junit.xml").is_file()
+
+
+def test_on_a_bench_nothing_is_switched_on_unless_that_was_allowed(program: Path, tmp_path: Path) -> None:
+    one = f"{HERE}/test_states.py::test_enable_with_a_torque_request_is_refused"
+    with VirtualEcu(program) as ecu:
+        bench = over(ecu, f"--bench={HOST}:{ecu.bench_port}", f"--report={tmp_path}")
+        careful, allowed = suite(one, *bench), suite(one, *bench, "--allow-power")
+    assert "only with --allow-power" in careful.stdout and "1 skipped" in careful.stdout
+    assert "1 passed" in allowed.stdout
+
+
+def test_with_a_bench_channel_the_same_tests_run_as_with_the_suites_own_target(program: Path, tmp_path: Path) -> None:
+    with VirtualEcu(program) as ecu:
+        bench = f"--bench={HOST}:{ecu.bench_port}"
+        done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", *over(ecu, bench))
+    assert done.returncode == 0, done.stdout
+    assert "skipped" not in done.stdout
+
+
+def test_without_any_target_it_says_what_it_wants(tmp_path: Path) -> None:
+    done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}")
+    assert done.returncode == 2
+    assert "no target: give --vecu=PATH, or --can-interface and --can-channel" in done.stdout + done.stderr

@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/ecu.h"
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_board.h"
+#include "hal/mock_can.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_system.h"
+#include "hal/mock_temperature.h"
+#include "hal/mock_watchdog.h"
+#include "unity.h"
+
+#define NOMINAL_PERIODS 10
+
+static ecu_t ecu;
+static bool outputs[BOARD_OUTPUTS];
+static bool gate_fault, mailboxes_full, mrai_hangs;
+static int watchdog_starts, watchdog_services, sent, pended, waiting;
+
+static void adc_read(adc_counts_t *counts, int calls)
+{
+    (void)calls;
+    *counts = (adc_counts_t){2048, 2048, 2048, 0};
+}
+
+static void pend(int calls)
+{
+    (void)calls;
+    pended++;
+}
+
+static void board_set(board_output_t output, bool on, int calls)
+{
+    (void)calls;
+    outputs[output] = on;
+}
+
+static bool board_gate_fault(int calls)
+{
+    (void)calls;
+    return gate_fault;
+}
+
+/* Noise on the bus: `waiting` frames of an identifier that nobody knows. */
+static bool can_receive(can_frame_t *frame, int calls)
+{
+    (void)calls;
+    *frame = (can_frame_t){.id = 0x7FF, .length = 8};
+    return waiting-- > 0;
+}
+
+static bool can_send(const can_frame_t *frame, int calls)
+{
+    (void)frame;
+    (void)calls;
+    sent += mailboxes_full ? 0 : 1;
+    return !mailboxes_full;
+}
+
+static void watchdog_start(int calls)
+{
+    (void)calls;
+    watchdog_starts++;
+}
+
+static void watchdog_service(int calls)
+{
+    (void)calls;
+    watchdog_services++;
+}
+
+void setUp(void)
+{
+    gate_fault = mailboxes_full = mrai_hangs = false;
+    watchdog_starts = watchdog_services = sent = pended = waiting = 0;
+    hal_adc_read_Stub(adc_read);
+    hal_angle_read_IgnoreAndReturn(0);
+    hal_irq_pend_mrai_Stub(pend);
+    hal_pwm_write_Ignore();
+    hal_pwm_enable_Ignore();
+    hal_board_set_Stub(board_set);
+    hal_board_gate_fault_Stub(board_gate_fault);
+    hal_can_receive_Stub(can_receive);
+    hal_can_send_Stub(can_send);
+    hal_can_lost_IgnoreAndReturn(0);
+    hal_can_bus_off_IgnoreAndReturn(0);
+    hal_system_stack_unused_IgnoreAndReturn(100);
+    hal_system_reset_cause_IgnoreAndReturn(RESET_PIN);
+    hal_temperature_winding_dC_IgnoreAndReturn(250);
+    hal_temperature_inverter_dC_IgnoreAndReturn(250);
+    hal_watchdog_start_Stub(watchdog_start);
+    hal_watchdog_service_Stub(watchdog_service);
+    ecu_init(&ecu, &motor);
+}
+
+void tearDown(void)
+{
+}
+
+/* So many periods, then the task. */
+static void task_after(int periods)
+{
+    for (int n = 0; n < periods; n++) {
+        fast_isr(&ecu.drive);
+        if (!mrai_hangs) {
+            mrai_isr(&ecu.drive);
+        }
+    }
+    ecu_task_1khz(&ecu);
+}
+
+static void tasks(int count)
+{
+    for (int n = 0; n < count; n++) {
+        task_after(NOMINAL_PERIODS);
+    }
+}
+
+void test_the_watchdog_is_started_once_and_then_served_by_every_task(void)
+{
+    tasks(100);
+    TEST_ASSERT_EQUAL_INT(1, watchdog_starts);
+    TEST_ASSERT_EQUAL_INT(99, watchdog_services);
+    TEST_ASSERT_EQUAL_UINT16(0, ecu.liveness.held);
+}
+
+void test_the_watchdog_is_not_served_while_the_fast_interrupt_stands_still(void)
+{
+    tasks(10);
+    const int before = watchdog_services;
+    for (int n = 0; n < 5; n++) {
+        task_after(0);
+    }
+    TEST_ASSERT_EQUAL_INT(before, watchdog_services);
+    TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.held);
+    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE((ecu.supervisor.faults & ECU_FAULT_STALL) != 0U);
+}
+
+void test_the_watchdog_is_not_served_while_the_identification_stands_still(void)
+{
+    tasks(10);
+    const int before = watchdog_services;
+    mrai_hangs = true;
+    tasks(5);
+    TEST_ASSERT_EQUAL_INT(before, watchdog_services);
+    TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.held);
+}
+
+void test_one_millisecond_without_interrupts_is_no_fault_yet(void)
+{
+    tasks(10);
+    task_after(0);
+    tasks(1);
+    task_after(0);
+    tasks(10);
+    TEST_ASSERT_EQUAL_HEX16(0, ecu.supervisor.faults);
+    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+}
+
+void test_a_late_task_is_counted_and_three_in_a_row_are_a_fault(void)
+{
+    tasks(10);
+    task_after(15);
+    task_after(15);
+    tasks(1);
+    TEST_ASSERT_EQUAL_UINT16(2, ecu.liveness.task_overruns);
+    TEST_ASSERT_EQUAL_HEX16(0, ecu.supervisor.faults);
+    task_after(20);
+    task_after(20);
+    task_after(20);
+    TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.task_overruns);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_TASK, ecu.supervisor.faults);
+}
+
+void test_a_task_with_some_jitter_is_in_time(void)
+{
+    tasks(10);
+    for (int n = 0; n < 100; n++) {
+        task_after((n % 2 == 0) ? 14 : 6);
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, ecu.liveness.task_overruns);
+}
+
+void test_a_gate_driver_fault_reaches_the_fault_word(void)
+{
+    tasks(100);
+    gate_fault = true;
+    tasks(1);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, ecu.supervisor.faults);
+}
+
+/* In 100 ms: four messages of 10 ms and six of 100 ms; the one of 1 s is due at anfirst 10 ms. */
+void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
+{
+    tasks(100);
+    const int before = sent;
+    TEST_ASSERT_EQUAL_INT(4 * 10 + 6 + 1, before);
+    mailboxes_full = true;
+    tasks(100);
+    TEST_ASSERT_EQUAL_UINT16(4 * 10 + 6, ecu.not_sent);
+    TEST_ASSERT_EQUAL_INT(before, sent);
+    mailboxes_full = false;
+    tasks(1);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(before + 2, sent);
+}
+
+/* 32 frames are more than a bus of 1 Mbit/s can bring in a millisecond: the task's time stays bounded. */
+void test_a_task_takes_a_bounded_number_of_frames(void)
+{
+    waiting = 100;
+    tasks(1);
+    TEST_ASSERT_EQUAL_UINT16(32, ecu.rx.count[RX_IGNORED]);
+}
+
+void test_without_a_bus_nothing_is_switched_on(void)
+{
+    tasks(1000);
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, ecu.supervisor.state);
+    for (int n = 0; n < BOARD_OUTPUTS; n++) {
+        TEST_ASSERT_FALSE(outputs[n]);
+    }
+    TEST_ASSERT_FALSE(ecu.drive.request.enable);
+}
