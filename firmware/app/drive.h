@@ -111,8 +111,8 @@ identify_memory_t drive_learnt(const drive_t *drive);
 /** After drive_init(), before the first task; false: the record is refused, nothing changed. */
 bool drive_recall(drive_t *drive, const identify_memory_t *memory);
 
-/** The identification's share of the 1 kHz task; sample is the latest. */
-void drive_identify(drive_t *drive, const sample_t *sample);
+/** The identification's share of the 1 kHz task; sample is the latest, mrai the task's one copy of what may change. */
+void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai);
 
 void fast_isr(drive_t *drive);
 void mrai_isr(drive_t *drive);

@@ -50,20 +50,19 @@ static void robust(drive_t *drive, const sample_t *sample)
     report_robust(drive);
 }
 
-static void report_paper(drive_t *drive)
+static void report_paper(drive_t *drive, const mrai_state_t *mrai)
 {
-    const mrai_state_t *mrai = &drive->slow.mrai;
     drive->task.torque_estimate = drive->slow.torque.mean;
     drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai_flux_clamped(&drive->motor.mrai, mrai),
                                     mrai_resistance_clamped(&drive->motor.mrai, mrai)};
 }
 
-void drive_identify(drive_t *drive, const sample_t *sample)
+void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai)
 {
     if (drive->request.identification_mode == IDENTIFICATION_ROBUST) {
         robust(drive, sample);
     } else {
-        report_paper(drive);
+        report_paper(drive, mrai);
     }
 }
 

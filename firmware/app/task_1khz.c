@@ -68,8 +68,11 @@ void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     const sample_t sample = sample_box_read(&drive->samples);
+    /* Read once: the identification may interrupt, and its drift must be counted to the end. */
+    const mrai_state_t identified = drive->slow.mrai;
+    exchange_barrier();
     task->run_state = supervise(drive);
-    drive_identify(drive, &sample);
+    drive_identify(drive, &sample, &identified);
 
     mrai_in_t next = sample.mrai;
 
@@ -86,9 +89,6 @@ void task_1khz(drive_t *drive)
     if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
         return;
     }
-    /* Read once: the identification may interrupt, and its drift must be counted to the end. */
-    const mrai_state_t identified = drive->slow.mrai;
-    exchange_barrier();
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
         .next = &next,

@@ -148,7 +148,7 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
         return;
     }
     emu->s.instructions += block.count;
-    emu->s.now += (uint64_t)block.count * emu->s.core_ticks * EMU_CYCLES_PER_INSTRUCTION;
+    emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
 /* There before every access to a peripheral, so that the program counter is exact when one is refused. */
