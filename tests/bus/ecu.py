@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An inverter on a bus, in this process: the firmware's library, fed with samples and frames."""
 
+import cmath
 import ctypes
 import os
 from pathlib import Path
@@ -14,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 PERIODS_PER_MS = 10
+POLE_PAIRS = 3  # of the machine the library is built for
 COMMAND = "VCU_TorqueCommand"
 LIMITS = "VCU_BatteryLimits"
 
@@ -47,6 +49,7 @@ class Ecu:
         # ia ib ic in A, dc voltage in V, angle in rad, winding in degrees Celsius
         self.samples = [0.0, 0.0, 0.0, 0.0, 0.0, 25.0]
         self.speed_rad_s = 0.0
+        self.phase_offset_A = 0.0  # of the first current sensor
         self.out = (ctypes.c_double * 4)()
         self.time_ms = 0
         self.counters = {COMMAND: 0, LIMITS: 0}
@@ -80,12 +83,21 @@ class Ecu:
         """Puts a protected message on the bus."""
         self.put(self.dbc.get_message_by_name(name).frame_id, self.encode(name, values))
 
+    def follow_references(self) -> None:
+        """Currents as an ideal machine would have them: what the control asked for a period ago."""
+        i_dq = complex(self.get("id_ref_A"), self.get("iq_ref_A"))
+        vector = i_dq * cmath.exp(1j * POLE_PAIRS * self.samples[4])
+        for phase in range(3):
+            self.samples[phase] = (vector * cmath.exp(-2j * cmath.pi / 3 * phase)).real
+        self.samples[0] += self.phase_offset_A
+
     def step_ms(self) -> None:
         """One millisecond of simulated time; the command goes out in every tenth."""
         if self.talking and self.time_ms % 10 == 0:
             self.send(COMMAND, self.command)
         for _ in range(PERIODS_PER_MS):
             self.samples[4] += self.speed_rad_s * 1e-4
+            self.follow_references()
             self.lib.fluxtrue_step(self.handle, (ctypes.c_double * 6)(*self.samples), self.out)
         self.time_ms += 1
         frame = Frame()

@@ -157,7 +157,7 @@ def test_a_request_beyond_the_machine_comes_down_as_fast_as_any(running: Ecu) ->
 
 def test_a_trip_reaches_the_bus_as_safe_state_with_its_first_fault(running: Ecu) -> None:
     at_40_Nm(running)
-    running.samples[0] = 390.0  # beyond the trip of 300 A
+    running.phase_offset_A = 390.0  # beyond the trip of 300 A
     running.run(200)
     assert running.state == "fault"  # the rotor is at rest: the safe state has nothing to hold
     assert running.last["INV_Faults"]["FirstFault"] == 1
@@ -169,9 +169,9 @@ def test_the_safe_state_is_held_while_the_machine_turns_fast(running: Ecu) -> No
     for _ in range(300):
         running.speed_rad_s += 2.0
         running.run(1)
-    running.samples[0] = 390.0
+    running.phase_offset_A = 390.0
     running.run(3)
-    running.samples[0] = 0.0
+    running.phase_offset_A = 0.0
     running.run(200)
     assert running.state == "safe_state"
     running.speed_rad_s = 0.0

@@ -104,6 +104,17 @@ static double dc_link_V(double v_V)
     return on[BOARD_DISCHARGE] ? 0.98 * v_V : v_V + 0.1 * (to_V - v_V);
 }
 
+/* An ideal machine at rest, its magnet along phase a: the currents are what was asked for. */
+static void follow_references(double samples[6])
+{
+    const double base_A = (double)ecu.drive.motor.bases.current_A / 32768.0;
+    const double d_A = ecu.drive.task.reference.i_ref.d * base_A;
+    const double q_A = ecu.drive.task.reference.i_ref.q * base_A;
+    samples[0] = d_A;
+    samples[1] = -0.5 * d_A + 0.8660254 * q_A;
+    samples[2] = -0.5 * d_A - 0.8660254 * q_A;
+}
+
 static void millisecond(uint32_t ms)
 {
     static double samples[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 25.0};
@@ -114,6 +125,7 @@ static void millisecond(uint32_t ms)
     traffic(ms);
     oracle_tick(&oracle);
     for (int n = 0; n < PERIODS_PER_MS; n++) {
+        follow_references(samples);
         fluxtrue_step(&ecu, samples, duties);
     }
     while (can_host_take(&ecu, &sent)) {
