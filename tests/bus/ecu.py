@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An inverter on a bus, in this process: the firmware's library, fed with samples and frames."""
+"""An inverter on a bus, in this process: the firmware with the simulated machine, fed with frames."""
 
-import cmath
 import ctypes
 import os
 from pathlib import Path
@@ -9,13 +8,14 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database
 
+from fluxtrue_tools.sim import motor as sim_motor
+from fluxtrue_tools.sim.build import MotorFolder
 from protection import protect
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 PERIODS_PER_MS = 10
-POLE_PAIRS = 3  # of the machine the library is built for
 COMMAND = "VCU_TorqueCommand"
 LIMITS = "VCU_BatteryLimits"
 
@@ -35,22 +35,27 @@ class Frame(ctypes.Structure):
 
 
 class Ecu:
-    """One instance, one millisecond at a time."""
+    """One instance with its machine at an imposed speed, one millisecond at a time."""
 
     def __init__(self) -> None:
         self.dbc = load_dbc()
-        self.lib = ctypes.CDLL(str(BUILD / "libfluxtrue_sil.so"))
+        self.motor = sim_motor.read(MotorFolder("hsm1", BUILD / "motors" / "hsm1"))
+        self.lib = self.motor.library
         self.lib.fluxtrue_create.restype = ctypes.c_void_p
         self.lib.fluxtrue_get.restype = ctypes.c_double
+        self.lib.sim_create_around.restype = ctypes.c_void_p
         self.lib.can_host_put.restype = ctypes.c_bool
         self.lib.can_host_take.restype = ctypes.c_bool
         self.handle = ctypes.c_void_p(self.lib.fluxtrue_create())
         self.lib.can_host_attach(self.handle)
-        # ia ib ic in A, dc voltage in V, angle in rad, winding in degrees Celsius
-        self.samples = [0.0, 0.0, 0.0, 0.0, 0.0, 25.0]
+        self.sim = ctypes.c_void_p(self.lib.sim_create_around(self.handle))
+        if self.motor.flux_map is not None:
+            self.motor.flux_map.hand_over(self.lib, self.sim)
+        for name, value in {**self.motor.plant, "imposed_speed": 1.0, "vdc_V": 1.0}.items():
+            self.set(name, value)
+        bad = self.lib.sim_start(self.sim)
+        assert bad is None, bad
         self.speed_rad_s = 0.0
-        self.phase_offset_A = 0.0  # of the first current sensor
-        self.out = (ctypes.c_double * 4)()
         self.time_ms = 0
         self.counters = {COMMAND: 0, LIMITS: 0}
         self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequest": 0.0,
@@ -61,7 +66,16 @@ class Ecu:
 
     def close(self) -> None:
         """Gives the memory back."""
+        self.lib.sim_destroy(self.sim)
         self.lib.fluxtrue_destroy(self.handle)
+
+    def set(self, name: str, value: float) -> None:
+        """A parameter of the plant."""
+        assert self.lib.sim_set(self.sim, f"plant.{name}".encode(), float(value)) == 0, name
+
+    def truth(self, name: str) -> float:
+        """What the plant knows."""
+        return float(self.lib.sim_get(self.sim, f"truth.{name}".encode()))
 
     def get(self, name: str) -> float:
         """A value of fluxtrue_get()."""
@@ -83,22 +97,12 @@ class Ecu:
         """Puts a protected message on the bus."""
         self.put(self.dbc.get_message_by_name(name).frame_id, self.encode(name, values))
 
-    def follow_references(self) -> None:
-        """Currents as an ideal machine would have them: what the control asked for a period ago."""
-        i_dq = complex(self.get("id_ref_A"), self.get("iq_ref_A"))
-        vector = i_dq * cmath.exp(1j * POLE_PAIRS * self.samples[4])
-        for phase in range(3):
-            self.samples[phase] = (vector * cmath.exp(-2j * cmath.pi / 3 * phase)).real
-        self.samples[0] += self.phase_offset_A
-
     def step_ms(self) -> None:
         """One millisecond of simulated time; the command goes out in every tenth."""
         if self.talking and self.time_ms % 10 == 0:
             self.send(COMMAND, self.command)
-        for _ in range(PERIODS_PER_MS):
-            self.samples[4] += self.speed_rad_s * 1e-4
-            self.follow_references()
-            self.lib.fluxtrue_step(self.handle, (ctypes.c_double * 6)(*self.samples), self.out)
+        self.set("speed_rad_s", self.speed_rad_s)
+        assert self.lib.sim_run(self.sim, PERIODS_PER_MS, None, 0) == 0
         self.time_ms += 1
         frame = Frame()
         while self.lib.can_host_take(self.handle, ctypes.byref(frame)):
@@ -122,6 +126,6 @@ class Ecu:
         """To the state run, without torque."""
         self.run(100)
         self.run(20, Mode="torque")
-        self.samples[3] = v_dc_V
+        self.set("vdc_V", v_dc_V)
         self.run(100)
         self.run(30, Enable=1)
