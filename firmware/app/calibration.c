@@ -50,7 +50,7 @@ float calibration_get(const motor_t *m, calibration_id_t id)
     case CALIBRATION_flux_bandwidth_rad_s:
         return (float)m->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        return (float)m->mrai.resistance_gain / Q31_SCALE / (2.0F * m->bases.period_s);
+        return (float)m->mrai.resistance_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         return (float)m->torque_loop.ki / Q15_SCALE / task_s(m);
     case CALIBRATION_dead_time_compensation:
@@ -75,7 +75,7 @@ void calibration_put(motor_t *m, calibration_id_t id, float value)
         m->mrai.psi_drift_full = to_q31(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * task_s(m));
         break;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        m->mrai.resistance_gain = to_q31(2.0F * value * m->bases.period_s);
+        m->mrai.resistance_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
         m->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * (float)m->mrai.r0 / Q31_SCALE * value * task_s(m));
         break;
     case CALIBRATION_torque_loop_bandwidth_rad_s:

@@ -15,8 +15,15 @@
 
 #include "app/exchange.h"
 #include "app/motor.h"
+#include "control/identify_memory.h"
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
+
+/** How resistance and flux are identified. */
+typedef enum {
+    IDENTIFICATION_PAPER = 0, /* model reference adaptive, each period: resistance and magnet flux */
+    IDENTIFICATION_ROBUST = 1 /* seven parameters with their uncertainty, each millisecond */
+} identification_mode_t;
 
 /** What the outside asks. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
  * the MRAI ISR; every field is aligned and read word by word. */
@@ -27,6 +34,7 @@ typedef struct {
     bool current_mode;   /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
     bool identification;
+    identification_mode_t identification_mode;
     uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
     uint32_t identification_resets; /* counted up: what was identified is forgotten once */
 } request_t;
@@ -52,15 +60,28 @@ typedef struct {
 typedef struct {
     mrai_state_t mrai;
     torque_estimate_state_t torque;
+    identify_window_t window;
+    bool mrai_asleep; /* another mode ran in the last period */
     uint32_t identification_resets; /* of the request, as far as done */
     volatile uint32_t finished;
     volatile q15_t psi_delta_q15;
 } slow_state_t;
 
+/** What is identified by now, whichever way. */
+typedef struct {
+    q31_t psi_delta, r_delta; /* minus the table's flux, minus the resistance at 20 C */
+    bool psi_clamped, r_clamped;
+} learnt_t;
+
 /** Written by the 1 kHz task alone. */
 typedef struct {
     torque_loop_state_t torque_loop;
     mrai_quality_t quality;
+    identify_state_t identify;
+    identify_out_t identified;
+    volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
+    q15_t torque_estimate;
+    learnt_t learnt;
     current_reference_t reference;
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
@@ -77,12 +98,21 @@ typedef struct {
     slow_state_t slow;
     task_state_t task;
     sample_box_t samples;
+    window_box_t windows;
     command_box_t commands;
     schedule_box_t schedules;
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
+
+/** What has been learnt, for a store that survives a power cycle. Called in the background. */
+identify_memory_t drive_learnt(const drive_t *drive);
+/** After drive_init(), before the first task; false: the record is refused, nothing changed. */
+bool drive_recall(drive_t *drive, const identify_memory_t *memory);
+
+/** The identification's share of the 1 kHz task; sample is the latest. */
+void drive_identify(drive_t *drive, const sample_t *sample);
 
 void fast_isr(drive_t *drive);
 void mrai_isr(drive_t *drive);

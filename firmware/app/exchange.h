@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "control/current_control.h"
+#include "control/identify_window.h"
 #include "control/mrai.h"
 #include "types/frames.h"
 
@@ -20,14 +21,22 @@
 typedef struct {
     mrai_in_t mrai;
     int32_t v_dc;
+    uint32_t theta_e; /* of the samples, 2^32 = one turn */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
+    bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */
 } sample_t;
 
 typedef struct {
     sample_t slot[2];
     volatile uint32_t generation;
 } sample_box_t;
+
+/** Ten periods of the robust identification. Writer: MRAI ISR. Reader: 1 kHz task. */
+typedef struct {
+    identify_window_t slot[2];
+    volatile uint32_t generation;
+} window_box_t;
 
 /** What the task asks of the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
 typedef struct {
@@ -81,6 +90,26 @@ static inline sample_t sample_box_read(const sample_box_t *box)
 static inline const sample_t *sample_box_look(const sample_box_t *box)
 {
     return &box->slot[box->generation & 1U];
+}
+
+static inline void window_box_write(window_box_t *box, const identify_window_t *window)
+{
+    box->slot[(box->generation + 1U) & 1U] = *window;
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline identify_window_t window_box_read(const window_box_t *box)
+{
+    identify_window_t copy;
+    uint32_t seen;
+    do {
+        seen = box->generation;
+        exchange_barrier();
+        copy = box->slot[seen & 1U];
+        exchange_barrier();
+    } while (box->generation - seen > 1U);
+    return copy;
 }
 
 static inline void command_box_write(command_box_t *box, command_t command)

@@ -27,6 +27,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     sample->mrai.i = i;
     sample->mrai.omega = now.angle.omega_q31;
+    sample->theta_e = now.angle.theta_e;
     sample->v_dc = measured.v_dc;
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
     return now;
@@ -68,6 +69,7 @@ static void bridge_off(drive_t *drive, sample_t *sample)
     current_control_reset(&drive->fast.current_control);
     sample->mrai.u = (dq_t){0, 0};
     sample->voltage_limited = false;
+    sample->snapped = false;
     drive->fast.coming = (dq_t){0, 0};
     drive->fast.periods_on = 0;
 }
@@ -92,6 +94,7 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
     hal_pwm_enable(true);
     sample->mrai.u = fast->coming; /* acts now: the duties before these */
     sample->voltage_limited = wanted.limited || made.limited;
+    sample->snapped = made.limited;
     fast->coming = made.acted;
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }

@@ -18,7 +18,7 @@
     X(v_dc_V, S16, VOLTAGE, MEASURED(d).v_dc, "Measured dc voltage") \
     X(torque_command_Nm, S16, TORQUE, (d)->task.torque_command, "Torque command behind limit and slew") \
     X(torque_request_Nm, S16, TORQUE, (d)->task.torque_request, "Torque asked of the current reference") \
-    X(torque_estimate_Nm, S16, TORQUE, (d)->slow.torque.mean, "Estimated air-gap torque") \
+    X(torque_estimate_Nm, S16, TORQUE, (d)->task.torque_estimate, "Estimated air-gap torque") \
     X(psi_quality, S16, ONE, (d)->task.quality.psi_quality, "Quality of the identified flux") \
     X(r_quality, S16, ONE, (d)->task.quality.r_quality, "Quality of the identified resistance") \
     X(speed_rpm, F32, NONE, measured_speed_rpm(d), "Speed of the rotor") \

@@ -16,13 +16,13 @@ static float measured_speed_rpm(const drive_t *drive)
 static float measured_psi_f_Vs(const drive_t *drive)
 {
     const motor_t *m = &drive->motor;
-    return m->psi_f_Vs + (float)drive->slow.mrai.psi_delta / Q31_SCALE * m->bases.flux_Vs;
+    return m->psi_f_Vs + (float)drive->task.learnt.psi_delta / Q31_SCALE * m->bases.flux_Vs;
 }
 
 static float measured_r_ohm(const drive_t *drive)
 {
     const motor_t *m = &drive->motor;
-    return m->r_ohm_20 + (float)drive->slow.mrai.r_delta / Q31_SCALE * m->bases.resistance_ohm;
+    return m->r_ohm_20 + (float)drive->task.learnt.r_delta / Q31_SCALE * m->bases.resistance_ohm;
 }
 
 #define FILL(name, type, base, expression, text) .name = (MEASUREMENT_TYPE_##type)(expression),

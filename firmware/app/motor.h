@@ -9,6 +9,7 @@
 #include "control/current_control.h"
 #include "control/current_reference.h"
 #include "control/flux_table.h"
+#include "control/identify_config.h"
 #include "control/measure.h"
 #include "control/modulate.h"
 #include "control/mrai.h"
@@ -34,6 +35,7 @@ typedef struct {
     current_control_config_t current_control;
     modulate_config_t modulate;
     mrai_config_t mrai;
+    identify_config_t identify;
     torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
     monitor_config_t monitor;

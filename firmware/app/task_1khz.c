@@ -14,6 +14,7 @@ static run_state_t supervise(drive_t *drive)
     if (request->identification_resets != task->identification_resets) {
         task->identification_resets = request->identification_resets;
         task->quality = (mrai_quality_t){0};
+        identify_reset(&drive->motor.identify, &task->identify);
     }
     if (drive->fast.faults != 0) {
         return RUN_STATE_FAULT;
@@ -32,7 +33,9 @@ static q15_t torque_path(drive_t *drive, const sample_t *sample)
     task->torque_command = rate_limit_step(task->torque_command, wanted, m->torque_slew);
     const torque_loop_in_t loop = {
         .command = task->torque_command,
-        .estimate = drive->slow.torque.mean,
+        .estimate = task->torque_estimate,
+        .confidence = (drive->request.identification_mode == IDENTIFICATION_ROBUST) ? task->identify.confidence
+                                                                                     : Q15_MAX,
         .enabled = drive->request.torque_loop && !drive->request.current_mode,
         .limited = task->reference.limited || sample->voltage_limited,
     };
@@ -66,6 +69,7 @@ void task_1khz(drive_t *drive)
     task_state_t *task = &drive->task;
     const sample_t sample = sample_box_read(&drive->samples);
     task->run_state = supervise(drive);
+    drive_identify(drive, &sample);
 
     mrai_in_t next = sample.mrai;
 
@@ -79,10 +83,16 @@ void task_1khz(drive_t *drive)
     }
     command_box_write(&drive->commands, command);
 
+    if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
+        return;
+    }
+    /* Read once: the identification may interrupt, and its drift must be counted to the end. */
+    const mrai_state_t identified = drive->slow.mrai;
+    exchange_barrier();
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
         .next = &next,
-        .identifier = &drive->slow.mrai,
+        .identifier = &identified,
         .enabled = drive->request.identification && sample.acting,
     };
     schedule_box_write(&drive->schedules, mrai_schedule_step(&drive->motor.mrai, &task->quality, &schedule));

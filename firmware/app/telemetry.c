@@ -37,7 +37,7 @@ static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t
 static void read_torque(const drive_t *drive, telemetry_t *t)
 {
     const float base = drive->motor.bases.torque_Nm;
-    t->torque_estimate_Nm = from_q15(drive->slow.torque.mean, base);
+    t->torque_estimate_Nm = from_q15(drive->task.torque_estimate, base);
     t->torque_command_Nm = from_q15(drive->task.torque_command, base);
     t->torque_max_Nm = from_q15(drive->task.reference.torque_max, base);
 }
@@ -45,15 +45,15 @@ static void read_torque(const drive_t *drive, telemetry_t *t)
 static void read_identification(const drive_t *drive, telemetry_t *t)
 {
     const motor_t *m = &drive->motor;
-    const float psi_Vs = m->psi_f_Vs + from_q31(drive->slow.mrai.psi_delta, m->bases.flux_Vs);
-    const float r_ohm = m->r_ohm_20 + from_q31(drive->slow.mrai.r_delta, m->bases.resistance_ohm);
+    const float psi_Vs = m->psi_f_Vs + from_q31(drive->task.learnt.psi_delta, m->bases.flux_Vs);
+    const float r_ohm = m->r_ohm_20 + from_q31(drive->task.learnt.r_delta, m->bases.resistance_ohm);
     t->psi_f_mVs = 1000.0F * psi_Vs;
     t->r_mohm = 1000.0F * r_ohm;
     t->table_scale_percent = 100.0F * psi_Vs / m->psi_f_Vs;
     t->psi_quality_percent = from_q15(drive->task.quality.psi_quality, 100.0F);
     t->r_quality_percent = from_q15(drive->task.quality.r_quality, 100.0F);
-    t->psi_clamped = drive->slow.mrai.psi_clamped;
-    t->r_clamped = drive->slow.mrai.r_clamped;
+    t->psi_clamped = drive->task.learnt.psi_clamped;
+    t->r_clamped = drive->task.learnt.r_clamped;
 }
 
 static void read_temperatures(telemetry_t *t)

@@ -3,158 +3,115 @@
 
 #include "fx/q.h"
 
-/* The slow observer poles make e = w dpsi/(S L_q) large: 0.8 pu for a magnet 15 % weak at full speed on hsm1. A
+/* 4 pu. The slow observer poles make e = T_s w dpsi/(2 s2) large: 1.5 pu for a magnet 15 % weak at full speed on hsm1. A
  * tighter bound winds up. */
-#define ERROR_BITS 31
-/* |s2 e| < 1/16 in the laws: 5 more bits fit, and the small steps of the adaptation keep theirs. */
-#define INNOVATION_BITS 26
-#define INNOVATION_SCALE 32
-#define PROPORTIONAL_MAX (128 * Q16_ONE - 1)
+#define ERROR_BITS 30
+/* |s2 e| < 1/16 in the laws: Q35 fits, and the small steps of the adaptation keep their digits. */
+#define INNOVATION_BITS 24
+#define INNOVATION_SCALE 256
+
 
 typedef struct {
     int32_t d, q;
 } pair_t;
 
-/* Over the period: half the sum of two q15 values in Q31, two q15 values in Q30. */
-typedef struct {
-    pair_t g;     /* Q31 */
-    pair_t i;     /* Q30, measured */
-    pair_t i_hat; /* Q30, i - e: of the observer */
-    pair_t s2e;   /* Q29, weighted error */
-} mean_t;
-
 typedef struct {
     q31_t lo, hi;
-    q16_t proportional;
+    int32_t proportional_q24;
 } law_t;
+
+static bool limits_valid(q31_t lo, q31_t hi)
+{
+    return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
+}
 
 bool mrai_valid(const mrai_config_t *config)
 {
     const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->pole_gain <= Q31(0.25) &&
-                       config->flux_gain >= 0 && config->resistance_gain >= 0 &&
-                       config->resistance_gain <= Q31(1.0 / 32.0) && config->flux_proportional >= 0 &&
-                       config->flux_proportional <= PROPORTIONAL_MAX && config->resistance_proportional >= 0 &&
-                       config->resistance_proportional <= PROPORTIONAL_MAX;
-    const bool limits = config->psi_delta_min < config->psi_delta_max && config->r_delta_min < config->r_delta_max &&
-                        config->psi_delta_min >= Q31(-0.5) && config->psi_delta_max <= Q31(0.5) &&
-                        config->r_delta_min >= Q31(-0.5) && config->r_delta_max <= Q31(0.5);
-    return gains && limits && config->rate_gain_q26 > 0 && config->omega_min > 0 && config->l_shift <= 14 &&
+                       config->period > 0 && config->period <= Q31(0.78) && config->flux_gain >= 0 &&
+                       config->resistance_gain >= 0 && config->flux_proportional_q24 >= 0 &&
+                       config->resistance_proportional_q24 >= 0;
+    return gains && limits_valid(config->psi_delta_min, config->psi_delta_max) &&
+           limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
            config->psi_drift_full > 0 && config->r_drift_full > 0;
 }
 
-static void remember(mrai_state_t *state, const mrai_in_t *in)
+/* Q27 to Q35, limited. */
+static int32_t innovation(int32_t s2e_q27)
 {
-    state->i = in->i;
-    state->u = in->u;
-    state->psi = (dq_t){in->flux.psi_d, in->flux.psi_q};
-    state->g = (dq_t){in->flux.g_d, in->flux.g_q};
+    return fx_sat_bits(s2e_q27, INNOVATION_BITS) * INNOVATION_SCALE;
 }
 
-void mrai_reset(mrai_state_t *state, const mrai_in_t *in)
+/* One law: I -= step, clamped; the proportional part acts on top of it for this step only (MR-9, MR-10). Returns what
+ * the observer runs on. */
+static q31_t adapt(const law_t *law, q31_t *integral, q31_t step)
 {
-    state->e_d_q30 = 0;
-    state->e_q_q30 = 0;
-    state->psi_used = state->psi_delta;
-    state->r_used = state->r_delta;
-    remember(state, in);
-}
-
-/* s2 e in Q29 (MR-7): the pole placement makes s2 = m R_0/2 (g_d + g_q) the only gain of the correction. */
-static pair_t weighted_error(const mrai_config_t *config, pair_t g, pair_t e)
-{
-    /* Q31 * Q31 = Q30, below 1/2 by mrai_valid(), so that one more bit fits. */
-    const q31_t s2 = fx_mulhi_add(fx_mulhi(config->pole_gain, g.d), config->pole_gain, g.q) * 2;
-    return (pair_t){fx_mulhi(s2, e.d), fx_mulhi(s2, e.q)};
-}
-
-/* One law: I -= step, clamped; the proportional part acts on top of it for this step only (MR-9, MR-10). */
-static bool adapt(const law_t *law, q31_t *integral, q31_t *used, q31_t step)
-{
-    const q31_t moved = fx_sub_q31(*integral, step);
-    const q31_t kept = fx_clamp_q31(moved, law->lo, law->hi);
+    q31_t moved = fx_sub_q31(*integral, step);
+    if (__builtin_expect((uint32_t)moved - (uint32_t)law->lo > (uint32_t)law->hi - (uint32_t)law->lo, 0)) {
+        moved = fx_clamp_q31(moved, law->lo, law->hi);
+    }
+    *integral = moved;
     /* Q31 * Q24 = Q23; limited to 1/2 pu so that the sum with the limited integral cannot overflow. */
-    const int32_t proportional = fx_sat_bits(fx_mulhi(step, law->proportional * 256), 23);
-    *integral = kept;
-    *used = kept - proportional * 256;
-    return moved != kept;
+    return moved - fx_sat_bits(fx_mulhi(step, law->proportional_q24), 23) * 256;
 }
 
-/* (8) normalised: dpsi -= 2 k_psi s2 (l_q/w) e_q. Q34 * Q31 = Q33, * Q28 = Q29; |step| < 2^28 leaves two bits. */
-static void adapt_flux(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, int32_t l_qq,
-                       int32_t innovation_q)
+/* (8) normalised: dpsi -= 2 k_psi s2 e_q/w. Q28 * Q35 = Q31. */
+static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_state_t *state, int32_t innovation_q)
 {
-    const law_t law = {config->psi_delta_min, config->psi_delta_max, config->flux_proportional};
-    const q31_t step = fx_mulhi(schedule->flux_step_q28, fx_mulhi(innovation_q, l_qq * 65536)) * 4;
-    state->psi_clamped = adapt(&law, &state->psi_delta, &state->psi_used, step);
+    const law_t law = {config->psi_delta_min, config->psi_delta_max, config->flux_proportional_q24};
+    return adapt(&law, &state->psi_delta, fx_mulhi(step_q28, innovation_q));
 }
 
-/* (7) normalised: dR -= k (i_d~ s2 e_d g_d + i_q~ s2 e_q g_q). Q34 * Q30 = Q32, * Q31 = Q31, * Q26 = Q25. */
-static void adapt_resistance(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                             pair_t g, pair_t i_hat, pair_t innovation)
+/* (7) normalised: dR -= k s2 (i_d e_d + i_q e_q), i in Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25, saturated. */
+static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mrai_state_t *state, pair_t i,
+                              pair_t innovation)
 {
-    const law_t law = {config->r_delta_min, config->r_delta_max, config->resistance_proportional};
-    const int32_t d = fx_mulhi(fx_mulhi(innovation.d, i_hat.d), g.d);
-    const int32_t q = fx_mulhi(fx_mulhi(innovation.q, i_hat.q), g.q);
-    const int32_t step_q25 = fx_mulhi(schedule->resistance_step_q26, d + q); /* |d|, |q| < 2^28 */
-    state->r_clamped = adapt(&law, &state->r_delta, &state->r_used, fx_sat_bits(step_q25, 25) * 64);
+    const law_t law = {config->r_delta_min, config->r_delta_max, config->resistance_proportional_q24};
+    const int32_t power_q31 = fx_mulhi_add(fx_mulhi(innovation.d, i.d), innovation.q, i.q);
+    return adapt(&law, &state->r_delta, fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64);
 }
 
-/* u/sinc + rotational - drop on one axis, mean over the period, Q30, saturating; the drop in Q29 is taken twice. */
-static int32_t driving_voltage(int32_t u, int32_t gain, int32_t drop, int32_t rotational)
+/* Half a period's rotational and resistive voltage at one of its ends, as flux: half of T_s (R^ i_d - w psi_q) and of
+ * T_s (R^ i_q + w (psi_d + dpsi)) (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
+static pair_t half_voltage(const mrai_config_t *config, const mrai_in_t *in, pair_t i_q28, q31_t psi_used, q31_t r_used)
 {
-    return fx_sub2_q31(fx_add_q31(u * (0x8000 + gain), rotational), drop);
+    const int32_t turn_q30 = fx_mulhi(in->omega, config->period);
+    const int32_t drop_q30 = fx_mulhi(fx_add_q31(config->r0, r_used), config->period);
+    const int32_t psi_d_q28 = in->flux.psi_d * 8192 + (psi_used >> 3);
+    return (pair_t){fx_mulhi_sub(fx_mulhi(drop_q30, i_q28.d), turn_q30, in->flux.psi_q * 8192),
+                    fx_mulhi_add(fx_mulhi(drop_q30, i_q28.q), turn_q30, psi_d_q28)};
 }
 
-/* dpsi/T_s of one axis: Q26 * Q31 = Q25, limited to 1 pu and brought to Q30. */
-static int32_t flux_rate(const mrai_config_t *config, int32_t now, int32_t last)
+/* This sample's share of the period that begins with it. The voltage's product is cut, not rounded: 1e-8 of V_b. */
+static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in, pair_t e, pair_t half)
 {
-    return fx_sat_bits(fx_mulhi(config->rate_gain_q26, fx_sat_q15_word(now - last) * 65536), 26) * 32;
+    const int32_t voltage = -schedule->voltage_q28;
+    state->e_d_q27 = e.d;
+    state->e_q_q27 = e.q;
+    state->begun_d_q27 = fx_mac_q31_word(e.d - in->flux.psi_d * 4096 + half.d, voltage, in->u.d);
+    state->begun_q_q27 = fx_mac_q31_word(e.q - in->flux.psi_q * 4096 + half.q, voltage, in->u.q);
 }
 
-/* e + g x + correction; x in Q30, both terms in Q29 and counted twice. */
-static int32_t advance(int32_t e, int32_t x, q31_t g, int32_t correction_q29)
+void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    return fx_sat_bits(fx_add2_q31(e, fx_mulhi_add(correction_q29, x, g)), ERROR_BITS);
+    const pair_t i = {in->i.d * 8192, in->i.q * 8192};
+    begin(schedule, state, in, (pair_t){0, 0}, half_voltage(config, in, i, state->psi_delta, state->r_delta));
 }
 
-/* R_0 i + dR i~ (MR-6): R_0 acts on the measured current, else it would add its own R_0/L to the placed poles. Q29. */
-static int32_t resistive_drop(const mrai_config_t *config, q31_t r_used, int32_t i, int32_t i_hat)
-{
-    return fx_mulhi_add(fx_mulhi(r_used, i_hat), config->r0, i);
-}
-
-/* The voltage equation over the period that ends with this sample (MR-6); trapezoidal means make it exact in steady
- * state. */
-static void observe(const mrai_config_t *config, int32_t voltage_gain, mrai_state_t *state, const mrai_in_t *in,
-                    const mean_t *mean)
-{
-    const flux_point_t *flux = &in->flux;
-    const q31_t psi_d = fx_add_q31((flux->psi_d + state->psi.d) * 32768, state->psi_used);
-    const int32_t v_d = fx_mulhi(in->omega, (flux->psi_q + state->psi.q) * 32768);
-    const int32_t v_q = -fx_mulhi(in->omega, psi_d);
-    const int32_t drop_d = resistive_drop(config, state->r_used, mean->i.d, mean->i_hat.d);
-    const int32_t drop_q = resistive_drop(config, state->r_used, mean->i.q, mean->i_hat.q);
-    const int32_t x_d = fx_sub_q31(flux_rate(config, flux->psi_d, state->psi.d),
-                                   driving_voltage(state->u.d, voltage_gain, drop_d, v_d));
-    const int32_t x_q = fx_sub_q31(flux_rate(config, flux->psi_q, state->psi.q),
-                                   driving_voltage(state->u.q, voltage_gain, drop_q, v_q));
-    state->e_d_q30 = advance(state->e_d_q30, x_d, mean->g.d, mean->s2e.q - mean->s2e.d);
-    state->e_q_q30 = advance(state->e_q_q30, x_q, mean->g.q, -mean->s2e.d - mean->s2e.q);
-}
-
+/* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
+ * steady state. All terms in Q27: 4 + 2 + 1 + 0.8 + 4 + 1 < 16. */
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    const pair_t e = {state->e_d_q30, state->e_q_q30};
-    mean_t mean;
-    mean.g = (pair_t){(in->flux.g_d + state->g.d) * 32768, (in->flux.g_q + state->g.q) * 32768};
-    mean.i = (pair_t){(in->i.d + state->i.d) * 16384, (in->i.q + state->i.q) * 16384};
-    mean.i_hat = (pair_t){mean.i.d - e.d, mean.i.q - e.q};
-    mean.s2e = weighted_error(config, mean.g, e);
-    const pair_t innovation = {fx_sat_bits(mean.s2e.d, INNOVATION_BITS) * INNOVATION_SCALE,
-                               fx_sat_bits(mean.s2e.q, INNOVATION_BITS) * INNOVATION_SCALE};
-
-    adapt_flux(config, schedule, state, in->flux.l_qq, innovation.q);
-    adapt_resistance(config, schedule, state, mean.g, mean.i_hat, innovation);
-    observe(config, schedule->voltage_gain, state, in, &mean);
-    remember(state, in);
+    const pair_t i = {in->i.d * 8192, in->i.q * 8192}; /* Q28 */
+    /* (MR-7): half of s2 in Q30 is s2 in Q29, below 1/2 by mrai_valid(): Q32 fits. */
+    const int32_t s2_q32 = fx_mac_q31_word(0, config->pole_gain, (in->flux.g_d + in->flux.g_q) >> 1) * 8;
+    const pair_t s2e = {fx_mulhi(s2_q32, state->e_d_q27), fx_mulhi(s2_q32, state->e_q_q27)};
+    const pair_t e = {state->begun_d_q27 - s2e.d + s2e.q, state->begun_q_q27 - s2e.d - s2e.q};
+    const pair_t fresh = {innovation(s2e.d), innovation(s2e.q)};
+    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh.q);
+    const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, fresh);
+    const pair_t half = half_voltage(config, in, i, psi_used, r_used);
+    const pair_t now = {fx_sat_bits(e.d + in->flux.psi_d * 4096 + half.d, ERROR_BITS),
+                        fx_sat_bits(e.q + in->flux.psi_q * 4096 + half.q, ERROR_BITS)};
+    begin(schedule, state, in, now, half);
 }

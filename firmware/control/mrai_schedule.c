@@ -8,26 +8,26 @@
 /* Of the drift that means quality 0, which is that of an error of 5 %: the flux is within 1 %. */
 #define PSI_SETTLED Q15(0.2)
 
-/* 2 k_psi 2^l_shift/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the
- * gate's edge. */
+/* 2 k_psi/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's edge. */
 static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 {
-    return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U + config->l_shift);
+    return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U);
 }
 
-/* 2 k_r T_s/((i_d g_d)^2 + (i_q g_q)^2) in Q26 (MR-10): (Q31 2^5)/(Q30 2^-9) = Q15, shifted up with saturation. */
+/* 2 k_r/(omega_b |i|^2) in Q26 (MR-10): a 64th in Q31 over Q30 is a 32nd in Q31. */
 static int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
 {
-    const q15_t d = fx_mul_q15((q15_t)sample->i.d, (q15_t)sample->flux.g_d);
-    const q15_t q = fx_mul_q15((q15_t)sample->i.q, (q15_t)sample->flux.g_q);
-    const int32_t norm = fx_shr_round(fx_mac_q30(fx_mul_q30(d, d), q, q), 9);
-    return fx_shl_q31(fx_div_s32(fx_shl_q31(config->resistance_gain, 5), fx_max_s32(norm, 1)), 11);
+    const q15_t d = (q15_t)sample->i.d;
+    const q15_t q = (q15_t)sample->i.q;
+    const int32_t norm_q30 = fx_add_q31(fx_mul_q30(d, d), fx_mul_q30(q, q));
+    return fx_div_q31(config->resistance_gain / 64, norm_q30);
 }
 
-/* 1/sinc(w T_s/2) - 1 to second order (MR-5): the sampled flux is u/(w sinc), not u/w. */
-static q15_t voltage_gain(const mrai_config_t *config, q31_t omega)
+/* omega_b T_s/sinc(w T_s/2) to second order (MR-5): the sampled flux is u/(w sinc), not u/w. */
+static int32_t voltage_q28(const mrai_config_t *config, q31_t omega)
 {
-    return fx_q15_from_q31(fx_mul_q31(config->sinc_gain, fx_mul_q31(omega, omega)));
+    const q31_t more = fx_mul_q31(config->sinc_gain, fx_mul_q31(omega, omega));
+    return fx_shr_round(config->period, 3) + fx_shr_round(fx_mul_q31(config->period, more), 3);
 }
 
 /* |drift|/full: what the adaptation still has to do, 1 and more is 1 (MR-18). */
@@ -56,10 +56,10 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
     const bool settled = psi_missing <= PSI_SETTLED;
     const bool resistance_open = flux_open && settled && speed <= config->omega_r_max;
 
-    quality->psi_quality = quality_step(quality->psi_quality, config->quality_rate, flux_open && !now->psi_clamped,
-                                        psi_missing);
-    quality->r_quality = quality_step(quality->r_quality, config->quality_rate, resistance_open && !now->r_clamped,
-                                      r_missing);
+    quality->psi_quality = quality_step(quality->psi_quality, config->quality_rate,
+                                        flux_open && !mrai_flux_clamped(config, now), psi_missing);
+    quality->r_quality = quality_step(quality->r_quality, config->quality_rate,
+                                      resistance_open && !mrai_resistance_clamped(config, now), r_missing);
     quality->psi_last = now->psi_delta;
     quality->r_last = now->r_delta;
 
@@ -67,6 +67,6 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
         .flux_step_q28 = flux_open ? flux_step(config, omega) : 0,
         .resistance_step_q26 =
             resistance_open ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
-        .voltage_gain = voltage_gain(config, in->sample->omega),
+        .voltage_q28 = voltage_q28(config, in->sample->omega),
     };
 }

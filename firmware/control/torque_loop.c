@@ -30,22 +30,24 @@ static q15_t relative_error(const torque_loop_config_t *config, q15_t command, q
 q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)
 {
     const q15_t error = model_error(config, state, in);
-    const q31_t bound = fx_q31_from_q15(config->authority);
+    const q15_t authority = fx_mul_q15(config->authority, in->confidence);
+    const q31_t bound = fx_q31_from_q15(authority);
 
     if (!in->enabled) {
         /* Leaks instead of dropping to zero: switching off is as bumpless as switching on (TL-8). */
         state->correction = fx_sub_q31(state->correction, fx_mul_q31(fx_q31_from_q15(config->ki), state->correction));
     } else if (in->command != 0) {
         const q15_t relative = relative_error(config, in->command, error);
-        if (!in->limited || relative < 0) {
-            state->correction = fx_add_q31(state->correction, product_q31(config->ki, relative));
-        }
+        /* At a limit a positive correction may not grow; a negative one goes back to the command (TL-7). */
+        const q31_t moved = fx_add_q31(state->correction, product_q31(config->ki, relative));
+        const q31_t most = (in->limited && relative >= 0) ? fx_max_s32(state->correction, 0) : Q31_MAX;
+        state->correction = fx_min_s32(moved, most);
     }
     state->saturated = state->correction >= bound || state->correction <= -bound;
     state->correction = fx_clamp_q31(state->correction, -bound, bound);
 
     const q15_t proportional = in->enabled ? fx_mul_q15(config->kp, error) : 0;
     const int32_t integral = fx_mul_q15(fx_q15_from_q31(state->correction), in->command);
-    const int32_t most = fx_mul_q15(config->authority, fx_abs_q15(in->command));
+    const int32_t most = fx_mul_q15(authority, fx_abs_q15(in->command));
     return fx_sat_q15(in->command + fx_clamp_q31(integral + proportional, -most, most));
 }

@@ -3,10 +3,10 @@
 #define CONTROL_TORQUE_LOOP_H
 /** Torque closed loop: a relative correction of the torque request, so that what was learnt at one torque
  * serves at another.
- *   r = T* (1 + x) + k_p e,  e = T_m - T^,  x += k_i e / max(|T*|, T_min) sign(T*),  |r - T*| <= authority |T*|
+ *   r = T* (1 + x) + k_p e,  e = T_m - T^,  x += k_i e / max(|T*|, T_min) sign(T*),  |r - T*| <= c A |T*|
  *   T_m = T* through the closed loop's own first-order response: a step excites no integrator.
- *   x is held while voltage or current limit is active and e asks for more; switched off it leaks to 0 at the
- *   loop's own rate.
+ *   While voltage or current limit is active x does not grow beyond 0; switched off it leaks to 0 at the loop's own
+ *   rate. The authority A is scaled by the confidence c in the estimate: at c = 0 the request is the command.
  * Source   docs/theory/torque-loop.md (TL-3) ... (TL-9)
  * Units    per unit of T_b; x is a ratio
  * Range    authority (0, 1); |T*| < 1; the relative error e / max(|T*|, T_min) is limited to 1
@@ -34,6 +34,7 @@ typedef struct {
 typedef struct {
     q15_t command;   /* T*, after slew and torque limit */
     q15_t estimate;  /* T^ */
+    q15_t confidence; /* share of the authority that the estimate deserves, Q15_MAX: all */
     bool enabled;
     bool limited;    /* current or voltage limit active */
 } torque_loop_in_t;

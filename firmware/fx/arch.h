@@ -113,6 +113,14 @@ static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
     return __smlawb(a, b, acc);
 }
 
+/* The lower half of a word, whatever its upper one. */
+static inline int32_t fx_arch_smlawb_word(int32_t a, int32_t b, int32_t acc)
+{
+    int32_t y;
+    __asm__("smlawb %0, %1, %2, %3" : "=r"(y) : "r"(a), "r"(b), "r"(acc));
+    return y;
+}
+
 static inline int32_t fx_arch_smmul_r(int32_t a, int32_t b)
 {
     int32_t y;

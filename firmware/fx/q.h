@@ -85,6 +85,12 @@ static inline q31_t fx_mul_gain_q31(q16_t gain, q31_t x)
     return fx_sat_q31(((int64_t)gain * x + 0x8000) >> 16);
 }
 
+/* The same with the q15 number in a word. */
+static inline int32_t fx_mac_q31_word(int32_t acc, q31_t a, int32_t b)
+{
+    return fx_arch_smlawb_word(a, b, acc);
+}
+
 static inline fx_pair_t fx_pair(q15_t lo, q15_t hi)
 {
     return fx_arch_pkhbt(lo, hi);

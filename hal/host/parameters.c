@@ -5,6 +5,7 @@
 
 #include "app/calibration.h"
 #include "hal/host/instance.h"
+#include "hal/host/learnt.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
 typedef void (*set_fn)(fluxtrue_t *, double);
@@ -51,21 +52,20 @@ GETTER(torque_command, d->torque_command_Nm)
 GETTER(enable, d->drive.request.enable)
 GETTER(torque_loop, d->drive.request.torque_loop)
 GETTER(identification, d->drive.request.identification)
+GETTER(identification_mode, d->drive.request.identification_mode)
 /* 1 until the task has taken it. */
 GETTER(fault_reset, d->drive.request.fault_resets != d->drive.task.fault_resets_asked)
 GETTER(identification_reset, d->drive.request.identification_resets != d->drive.slow.identification_resets)
 GETTER(current_mode, d->drive.request.current_mode)
-GETTER(torque_estimate, pu15(d->drive.slow.torque.mean, bases(d)->torque_Nm))
+GETTER(torque_estimate, pu15(d->drive.task.torque_estimate, bases(d)->torque_Nm))
 GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
 GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
-GETTER(psi_f, (double)d->drive.motor.psi_f_Vs + pu31(d->drive.slow.mrai.psi_delta, bases(d)->flux_Vs))
-GETTER(r, (double)d->drive.motor.r_ohm_20 + pu31(d->drive.slow.mrai.r_delta, bases(d)->resistance_ohm))
 GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
 GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
-GETTER(psi_clamped, d->drive.slow.mrai.psi_clamped)
-GETTER(r_clamped, d->drive.slow.mrai.r_clamped)
+GETTER(psi_clamped, d->drive.task.learnt.psi_clamped)
+GETTER(r_clamped, d->drive.task.learnt.r_clamped)
 GETTER(id, pu15(sample(d)->mrai.i.d, bases(d)->current_A))
 GETTER(iq, pu15(sample(d)->mrai.i.q, bases(d)->current_A))
 GETTER(ud, pu15(d->drive.fast.coming.d, bases(d)->voltage_V))
@@ -114,6 +114,11 @@ static void set_identification(fluxtrue_t *d, double x)
     d->drive.request.identification = x != 0.0;
 }
 
+static void set_identification_mode(fluxtrue_t *d, double x)
+{
+    d->drive.request.identification_mode = (x >= 0.5) ? IDENTIFICATION_ROBUST : IDENTIFICATION_PAPER;
+}
+
 static void set_fault_reset(fluxtrue_t *d, double x)
 {
     d->drive.request.fault_resets += (x != 0.0) ? 1U : 0U;
@@ -145,6 +150,7 @@ static const parameter_t parameters[] = {
     {"enable", get_enable, set_enable, 0.0, 1.0},
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
+    {"identification_mode", get_identification_mode, set_identification_mode, 0.0, 1.0},
     {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
     {"identification_reset", get_identification_reset, set_identification_reset, 0.0, 1.0},
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
@@ -155,10 +161,19 @@ static const parameter_t parameters[] = {
     {"torque_request_Nm", get_torque_request, NULL, 0, 0},
     {"torque_max_Nm", get_torque_max, NULL, 0, 0},
     {"torque_correction", get_torque_correction, NULL, 0, 0},
-    {"psi_f_Vs", get_psi_f, NULL, 0, 0},
-    {"r_ohm", get_r, NULL, 0, 0},
+    {"psi_f_Vs", learnt_psi_f_Vs, NULL, 0, 0},
+    {"r_ohm", learnt_r_ohm, NULL, 0, 0},
     {"psi_quality", get_psi_quality, NULL, 0, 0},
     {"r_quality", get_r_quality, NULL, 0, 0},
+    {"drop_V", learnt_drop_V, NULL, 0, 0},
+    {"lq_scale", learnt_lq_scale, NULL, 0, 0},
+    {"ld_scale", learnt_ld_scale, NULL, 0, 0},
+    {"angle_error_rad", learnt_angle_rad, NULL, 0, 0},
+    {"iron_scale", learnt_iron_scale, NULL, 0, 0},
+    {"parameter_clamped", learnt_clamped, NULL, 0, 0},
+    {"torque_confidence", learnt_confidence, NULL, 0, 0},
+    {"contradiction", learnt_contradiction, NULL, 0, 0},
+    {"local_flux_Vs", learnt_local_Vs, NULL, 0, 0},
     {"psi_clamped", get_psi_clamped, NULL, 0, 0},
     {"r_clamped", get_r_clamped, NULL, 0, 0},
     {"id_A", get_id, NULL, 0, 0},

@@ -9,6 +9,7 @@
 #include "hal/mps2/script.h"
 #include "hal/mps2/semihosting.h"
 #include "hal/pwm.h"
+#include "hal/temperature.h"
 
 #define TASK_PERIODS 10U
 
@@ -36,6 +37,11 @@ void hal_pwm_write(duty_t duty)
 void hal_pwm_enable(bool on)
 {
     gates = on;
+}
+
+int16_t hal_temperature_winding_dC(void)
+{
+    return HAL_TEMPERATURE_UNKNOWN;
 }
 
 void hal_irq_pend_mrai(void)
@@ -90,7 +96,7 @@ __attribute__((noinline)) int main(void)
     semihosting_print_word("differing", script.differing);
     semihosting_print_word("faults", the_drive.fast.faults);
     semihosting_print_word("overruns", the_drive.fast.overruns);
-    semihosting_print_word("psi_delta", (uint32_t)the_drive.slow.mrai.psi_delta);
-    semihosting_print_word("r_delta", (uint32_t)the_drive.slow.mrai.r_delta);
+    semihosting_print_word("psi_delta", (uint32_t)the_drive.task.learnt.psi_delta);
+    semihosting_print_word("r_delta", (uint32_t)the_drive.task.learnt.r_delta);
     return 0;
 }

@@ -3,11 +3,13 @@
 #define HAL_S32K144_ANGLE_H
 /** The angle sensor behind hal/angle.h; one of angle_quadrature.c and angle_resolver.c is linked.
  * Source   README.md, angle
+ * Units    period_ticks: one PWM period in ticks of FTM0
  * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an encoder
- * Context  angle_init(): start-up; the others: fast ISR, angle_begin() first thing, angle_end() last */
+ * Context  angle_init(): start-up, right before the PWM starts; the others: fast ISR, angle_begin() first thing, angle_end() last */
 #include <stdbool.h>
+#include <stdint.h>
 
-void angle_init(void);
+void angle_init(uint32_t period_ticks);
 void angle_begin(void);
 void angle_end(void);
 bool angle_fault(void);

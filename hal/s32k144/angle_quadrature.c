@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/angle.h"
 
+#include "fx/q.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/registers.h"
 
@@ -9,8 +10,13 @@
 #define INPUT_FILTER 0x44U     /* channels 0 and 1: 4 clocks of 4 */
 #define SYSTEM_CLOCK 1U
 
-void angle_init(void)
+static uint32_t at_last;      /* reading of the period before */
+static uint32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+
+void angle_init(uint32_t period_ticks)
 {
+    q32_per_tick = UINT32_MAX / period_ticks;
+    at_last = 0;
     FTM2->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
     FTM2->CNTIN = 0;
     FTM2->MOD = COUNTS_PER_TURN - 1U;
@@ -29,7 +35,13 @@ bool angle_fault(void)
     return false;
 }
 
+/* The counter has moved on since the currents were sampled, at the period's start: by as much of the last period's
+ * travel as FTM0 says has passed of this one. Less than half a period, or the share would be negative. */
 uint32_t hal_angle_read(void)
 {
-    return FTM2->CNT << TURN_SHIFT;
+    const uint32_t now = FTM2->CNT << TURN_SHIFT;
+    const int32_t passed = (int32_t)(FTM0->CNT * q32_per_tick);
+    const int32_t travel = (int32_t)(now - at_last);
+    at_last = now;
+    return now - (uint32_t)fx_mulhi(travel, passed);
 }

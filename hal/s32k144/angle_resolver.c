@@ -9,6 +9,7 @@
 
 #define CLOCK_DIVIDER 0U   /* 28 MHz / (0 + 2) = 14 MHz */
 #define FRAME_GAP 3U       /* of 28 MHz: between frames, and around the chip select */
+#define FIFO_WORDS 4U
 #define WAIT_LOOPS 200U    /* 12 us and more; a frame takes 2 us */
 
 /* Written and read by the fast ISR alone, but velocity, one aligned half word. */
@@ -16,8 +17,9 @@ static ad2s1210_frame_t position;
 static volatile int16_t velocity;
 static bool missing; /* a frame did not come: the last angle stays, and the fault is raised */
 
-void angle_init(void)
+void angle_init(uint32_t period_ticks)
 {
+    (void)period_ticks;
     PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
     LPSPI0->CR = 0;
     LPSPI0->CFGR1 = LPSPI_CFGR1_MASTER;
@@ -27,10 +29,11 @@ void angle_init(void)
     LPSPI0->TCR = LPSPI_TCR_FRAMESZ(AD2S1210_BITS - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0);
 }
 
-/* The velocity asked for a period ago is long there; now the position of this period's SAMPLE pulse. */
+/* The velocity asked for a period ago is long there; now the position of this period's SAMPLE pulse. Nothing may be
+ * left in front of it. */
 void angle_begin(void)
 {
-    if ((LPSPI0->RSR & LPSPI_RSR_RXEMPTY) == 0U) {
+    for (uint32_t k = 0; k < FIFO_WORDS && (LPSPI0->RSR & LPSPI_RSR_RXEMPTY) == 0U; k++) {
         velocity = (int16_t)ad2s1210_decode(LPSPI0->RDR).value;
     }
     PTC->PCOR = 1U << PIN_RESOLVER_A1;

@@ -24,6 +24,7 @@ void can_init(void)
 {
     CAN0->MCR = NORMAL | FROZEN; /* leaves disabled mode with the oscillator as clock (CLKSRC is 0) */
     await(&CAN0->MCR, CAN_MCR_FRZACK, CAN_MCR_FRZACK);
+    CAN0->MCR = NORMAL | FROZEN; /* some of its bits take a value only when frozen */
     CAN0->CTRL1 = TIMING | CAN_CTRL1_BOFFMSK;
     for (uint32_t k = 0; k < MEMORY_WORDS; k++) {
         CAN0->EmbeddedRAM[k] = 0;
@@ -93,6 +94,7 @@ bool hal_can_send(const can_frame_t *frame)
         volatile uint32_t *word = &CAN0->EmbeddedRAM[box * CAN_BOX_WORDS];
         if ((word[0] & CAN_CODE_MASK) == CAN_CODE_INACTIVE) {
             const can_box_t packed = can_box_pack(frame);
+            CAN0->IFLAG1 = 1U << box; /* of the frame before */
             word[1] = packed.word[1];
             word[2] = packed.word[2];
             word[3] = packed.word[3];

@@ -13,10 +13,13 @@ typedef struct {
     volatile uint32_t ICER[8]; /* 0xE000E180 */
     uint8_t reserved1[0x60];
     volatile uint32_t ISPR[8]; /* 0xE000E200 */
-    uint8_t reserved2[0x1E0];
+    uint8_t reserved2[0x60];
+    volatile uint32_t ICPR[8]; /* 0xE000E280 */
+    uint8_t reserved3[0x160];
     volatile uint8_t IPR[240]; /* 0xE000E400, one byte each */
 } nvic_t;
-_Static_assert(offsetof(nvic_t, ICER) == 0x80 && offsetof(nvic_t, ISPR) == 0x100 && offsetof(nvic_t, IPR) == 0x300,
+_Static_assert(offsetof(nvic_t, ICER) == 0x80 && offsetof(nvic_t, ISPR) == 0x100 &&
+                   offsetof(nvic_t, ICPR) == 0x180 && offsetof(nvic_t, IPR) == 0x300,
                "NVIC");
 
 #if defined(FAKE_REGISTERS)
@@ -48,6 +51,11 @@ static inline void core_irq_disable(uint32_t irq)
 static inline void core_irq_pend(uint32_t irq)
 {
     NVIC->ISPR[irq >> 5] = 1U << (irq & 31U);
+}
+
+static inline void core_irq_clear(uint32_t irq)
+{
+    NVIC->ICPR[irq >> 5] = 1U << (irq & 31U);
 }
 
 /* Four bits of priority, in the upper half of the byte. */

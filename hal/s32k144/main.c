@@ -97,27 +97,27 @@ static uint32_t ticks(float seconds)
     return (uint32_t)(seconds * (float)CLOCK_CORE_HZ + 0.5F);
 }
 
-static void init_hardware(void)
+static void init_hardware(const pwm_config_t *pwm)
 {
-    const pwm_config_t pwm = {ticks(motor.bases.period_s), ticks(motor.dead_time_s)};
     clock_init();
     pins_init();
     sampling_init();
-    pwm_init(&pwm);
-    angle_init();
-    tick_init(pwm.period_ticks / PERIPHERAL_PER_CORE);
+    pwm_init(pwm);
+    tick_init(pwm->period_ticks / PERIPHERAL_PER_CORE);
     can_init();
 }
 
 /* Damaged data must not be computed with: then the counter, and so the fast ISR, never starts. */
-static void start(void)
+static void start(uint32_t period_ticks)
 {
     __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
+    angle_init(period_ticks);
     tick_start();
     if (!data_damaged) {
         pwm_start();
         started = true;
     }
+    tick_continue();
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
@@ -129,12 +129,13 @@ __attribute__((noinline)) int main(void)
     if (data_damaged) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
-    init_hardware();
+    const pwm_config_t pwm = {ticks(motor.bases.period_s), ticks(motor.dead_time_s)};
+    init_hardware(&pwm);
     enable_interrupts();
 #if DIRECT
     hal_watchdog_start();
 #endif
-    start();
+    start(pwm.period_ticks);
     for (;;) {
         if (!image_step()) {
             data_damaged = true;

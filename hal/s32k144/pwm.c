@@ -7,6 +7,7 @@
 
 #define SYSTEM_CLOCK 1U
 #define ALL_CHANNELS_MANUAL 2U
+#define SAFE_IN_DEBUG 1U /* a halted core stops the counter and switches the outputs off */
 #define FAULT_FILTER 4U
 #define SIX_OUTPUTS 0x3FU
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
@@ -27,7 +28,7 @@ static volatile bool fault_for_drive, fault_for_board; /* set by the fault inter
 static void configure_outputs(const pwm_config_t *config)
 {
     FTM0->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
-    FTM0->CONF = FTM_CONF_BDMMODE(0);
+    FTM0->CONF = FTM_CONF_BDMMODE(SAFE_IN_DEBUG);
     FTM0->CNTIN = 0;
     FTM0->MOD = config->period_ticks - 1U;
     FTM0->C0SC = FTM_C0SC_ELSB;
@@ -62,6 +63,7 @@ static void close_gates(void)
     if ((FTM0->FMS & (FTM_FMS_FAULTF | FTM_FMS_FAULTIN)) == FTM_FMS_FAULTF) {
         FTM0->FMS = FTM_FMS_WPEN; /* clears FAULTF: the fault is over, and the drive has been told */
     }
+    core_irq_clear(IRQ_FTM0_FAULT); /* pended again while the line stayed up after its interrupt */
     core_irq_enable(IRQ_FTM0_FAULT);
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = 0;
@@ -78,8 +80,8 @@ void pwm_init(const pwm_config_t *config)
     FTM0->SWOCTRL = SIX_OUTPUTS;
     FTM0->SYNCONF = FTM_SYNCONF_SYNCMODE | FTM_SYNCONF_SWWRBUF | FTM_SYNCONF_HWOM;
     FTM0->SYNC = FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM;
-    FTM0->EXTTRIG = FTM_EXTTRIG_INITTRIGEN;
     FTM0->CNT = 0;
+    FTM0->EXTTRIG = FTM_EXTTRIG_INITTRIGEN; /* after CNT, whose write would be a trigger, too */
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
     gates = false;

@@ -7,7 +7,7 @@
 #include "hal/system.h"
 
 #define STACK_PATTERN 0xC5C5C5C5U
-#define AWAIT_LOOPS 200000U /* 10 ms and more at any clock */
+#define AWAIT_LOOPS 1000000U /* 50 ms at the least; at most the watchdog's first 100 ms */
 #define OUTPUTS_OFF 0x3FU
 #define VECTORS (16 + 123)
 
@@ -89,26 +89,28 @@ static void clear_and_copy(void)
     }
 }
 
-/* Everything below the current frame, and a little less. */
-static void paint_stack(void)
-{
-    uint32_t *here;
-    __asm__ volatile("mov %0, sp" : "=r"(here));
-    for (uint32_t *word = stack_bottom; word < here - 8; word++) {
-        *word = STACK_PATTERN;
-    }
-}
-
-__attribute__((used)) void reset_handler(void)
+__attribute__((used)) void start_up(void)
 {
     wdog_first();
     SCB_CPACR = SCB_CPACR | CPACR_FPU;
     __asm__ volatile("dsb\n isb" ::: "memory");
-    paint_stack();
     clear_and_copy();
     cause = RCM->SRS;
     (void)main();
     panic();
+}
+
+/* All RAM in use is written in whole words before any is read or written in part: until then its error correction
+ * knows nothing. What is written is the stack's pattern, so that its high-water mark can be found. */
+__attribute__((naked)) void reset_handler(void)
+{
+    __asm__ volatile("ldr r0, =stack_bottom\n"
+                     "ldr r1, =bss_end\n"
+                     "ldr r2, =%c0\n"
+                     "1: str r2, [r0], #4\n"
+                     "cmp r0, r1\n"
+                     "blo 1b\n"
+                     "b start_up\n" ::"i"(STACK_PATTERN));
 }
 
 #define EXTERNAL(irq) (16 + (irq))

@@ -4,7 +4,8 @@
 /** From reset to main(), and the way back when nothing can go on.
  * Source   README.md, memory and stack guard
  * Units    bytes
- * Errors   panic(): switches the outputs off and resets the processor; every fault of the core ends there
+ * Errors   panic(): switches the outputs off and resets the processor; every fault of the core ends there, and so does
+ *          await() for what does not come within 50 ms
  * Context  stack_measure(): background, looks at every word; panic(): any, needs no stack */
 #include <stdint.h>
 
@@ -12,11 +13,12 @@
 uint32_t stack_measure(void);
 _Noreturn void panic(void);
 
-/** Waits until (*word & mask) == value, at most a few milliseconds; panics then. */
+/** Waits until (*word & mask) == value. */
 void await(const volatile uint32_t *word, uint32_t mask, uint32_t value);
 
 /* Handlers named by the vector table. */
 void reset_handler(void);
+void start_up(void); /* where it goes on */
 void fault_handler(void);
 void gate_fault_handler(void);
 void adc_handler(void);

@@ -3,21 +3,36 @@
 
 #include "hal/s32k144/registers.h"
 
+#define FOUR_TICKS_LOOPS 32 /* at least 4 ticks of 28 MHz, which are 16 of the core */
+
 static uint32_t pwm_ticks;
+
+static void pass_four_ticks(void)
+{
+    for (int k = 0; k < FOUR_TICKS_LOOPS; k++) {
+        __asm__ volatile("nop");
+    }
+}
 
 void tick_init(uint32_t period_ticks)
 {
     pwm_ticks = period_ticks;
     LPIT0->MCR = LPIT_MCR_M_CEN;
+    pass_four_ticks(); /* until then it takes no other register */
     LPIT0->MIER = LPIT_MIER_TIE0;
     LPIT0->TVAL0 = 9U * period_ticks + period_ticks / 4U - 1U;
 }
 
-/* The second value waits in the timer until the first has expired. The read lets four timer clocks pass. */
 void tick_start(void)
 {
     LPIT0->TCTRL0 = LPIT_TCTRL0_T_EN;
-    (void)LPIT0->TCTRL0;
+}
+
+/* The second value waits in the timer until the first has expired; written before the first is loaded, it would
+ * replace it. */
+void tick_continue(void)
+{
+    pass_four_ticks();
     LPIT0->TVAL0 = 10U * pwm_ticks - 1U;
 }
 

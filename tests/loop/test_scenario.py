@@ -190,7 +190,8 @@ def test_the_defaults_are_a_drive_with_nothing_wrong() -> None:
     assert scenario.plant.values() == {}
     assert scenario.profile == Profile()
     assert scenario.averaged() == (0.0, 0.05)
-    assert scenario.controller.values() == {"torque_loop": 1.0, "identification": 1.0, "enable": 1.0}
+    flags = {"torque_loop": 1.0, "identification": 1.0, "identification_mode": 1.0, "enable": 1.0}
+    assert scenario.controller.values() == flags
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ class Firmware:
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self.drive = Drive(library)
-        for name, value in {"enable": 1, "dead_time_compensation": 0}.items():
+        for name, value in {"enable": 1, "identification_mode": 0, "dead_time_compensation": 0}.items():
             assert self.drive.set(name, value) == OK
 
     def __call__(self, mdl: Any) -> tuple[float, list[float]]:

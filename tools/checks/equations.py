@@ -20,6 +20,7 @@ PAGES = {
     "CR": THEORY / "current-reference.md",
     "FT": THEORY / "flux-tables.md",
     "FX": THEORY / "fixed-point.md",
+    "IB": THEORY / "information-bound.md",
     "MO": THEORY / "modulation.md",
     "MR": THEORY / "mrai.md",
     "PL": THEORY / "plant.md",

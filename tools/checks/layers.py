@@ -29,7 +29,7 @@ class Layer:
 
 # The direction of the signal. A feedback arrow is a field one sample old, never an include.
 PIPELINE = (
-    "measure", "angle_tracker", "transform", "flux_table", "mrai", "torque_estimate",
+    "measure", "angle_tracker", "transform", "flux_table", "mrai", "identify", "torque_estimate",
     "torque_loop", "current_reference", "current_control", "modulate",
 )  # fmt: skip
 
@@ -91,14 +91,13 @@ def stage_rank(stem: str, stages: tuple[str, ...]) -> int | None:
 def stage_problem(layer: Layer, path: Path, target: Path) -> str | None:
     """Why a file of one stage may not include a header of the same layer."""
     stages = layer.stages or ()
-    own = stage_rank(path.stem, stages)
+    own, other = stage_rank(path.stem, stages), stage_rank(target.stem, stages)
     if stages and own is None:
         return f"stage '{path.stem}' has no place in PIPELINE of tools/checks/layers.py"
-    if same_stage(path.stem, target.stem):
+    if same_stage(path.stem, target.stem) or (own is not None and own == other):
         return None
     if not target.stem.endswith("_types") and target.stem not in VALUE_HEADERS:
         return f"another stage may be included for its value types only (*_types.h): {target}"
-    other = stage_rank(target.stem, stages)
     if own is not None and other is not None and other > own:
         return f"include against the signal's direction: {target} is downstream"
     return None

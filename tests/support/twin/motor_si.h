@@ -28,6 +28,13 @@ typedef struct {
     double psi_delta_min_Vs, psi_delta_max_Vs, r_delta_min_ohm, r_delta_max_ohm;
     double omega_min_rad_s, omega_r_max_rad_s, i_min_A;
     double quality_rate;
+    /* robust identification: R, drop, flux, l_q, l_d, angle, iron; leak per update, rates per step */
+    double r_temp_coeff_per_K, iron_hysteresis, iron_eddy, iron_sign_rad_s;
+    double identify_sigma[7], identify_leak[7], identify_r_known;
+    double identify_noise_V, identify_noise_Vs, identify_noise_rate;
+    double identify_omega_min_rad_s, identify_i_min_A, identify_i_smooth_A;
+    double identify_local_corner_rad_s, identify_local_rate, identify_torque_min_Nm;
+    double identify_confidence_full, identify_confidence_none, identify_confidence_rate;
     /* torque loop, per 1 kHz step */
     double torque_ki, torque_kp, torque_model_rate, torque_authority, torque_min_Nm;
     double torque_max_Nm, torque_slew_Nm; /* slew per 1 kHz step, <= 0: open */

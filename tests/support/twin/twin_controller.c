@@ -13,6 +13,8 @@ twin_t *twin_create(void)
         twin->torque_loop = true;
         twin->identification = true;
         twin->schedule.voltage_scale = 1.0;
+        twin->robust = true;
+        twin_identify_reset(&twin->motor, &twin->identify);
     }
     return twin;
 }
@@ -77,7 +79,8 @@ static void torque_path(twin_t *twin)
                         twin->motor.torque_slew_Nm);
     const twin_torque_in_t torque = {
         .command = twin->slewed,
-        .estimate = twin->torque_mean.mean,
+        .estimate = twin->torque_estimate,
+        .confidence = twin->robust ? twin->identify.confidence : 1.0,
         .enabled = twin->torque_loop && !twin->current_mode,
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
@@ -90,10 +93,23 @@ static void torque_path(twin_t *twin)
     twin->reference = twin_current_reference(&twin->motor, &request);
 }
 
+static void robust(twin_t *twin)
+{
+    const twin_point_t point = twin_point(&twin->motor, &twin->complete, twin->sample.omega);
+    twin_identify(&twin->motor, &twin->identify, &point, twin->winding_C,
+                  twin->identification && (twin->periods_on >= 3));
+    twin->torque_estimate = twin->identify.torque;
+}
+
 static void task(twin_t *twin)
 {
     twin_mrai_in_t next = twin->sample;
     supervise(twin);
+    if (twin->robust) {
+        robust(twin);
+    } else {
+        twin->torque_estimate = twin->torque_mean.mean;
+    }
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
         twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command}
@@ -123,13 +139,23 @@ static void identify(twin_t *twin)
     }
     (void)twin_torque_estimate(&twin->torque_mean, twin_torque(&twin->motor, now->i, &now->flux,
                                                                twin->mrai.psi_delta));
+    twin->psi_delta = twin->mrai.psi_delta;
+}
+
+static void collect(twin_t *twin, bool snapped)
+{
+    const twin_mrai_in_t *now = &twin->sample;
+    const twin_end_t end = {now->i, now->u, {now->flux.psi_d, now->flux.psi_q}, twin->theta};
+    if (twin_window(&twin->window, &end, twin->periods_on >= 3, snapped)) {
+        twin->complete = twin->window;
+    }
+    twin->psi_delta = twin->identify.psi_delta;
 }
 
 static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
 {
     const twin_mrai_in_t *now = &twin->sample;
-    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->mrai.psi_delta,
-                                       twin->v_dc};
+    const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->psi_delta, twin->v_dc};
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
     twin->u = twin_current_control(&motor, &twin->current, &request);
@@ -167,6 +193,7 @@ static void sample(twin_t *twin, const double in[6])
     twin->last_i = (twin_abc_t){in[0], in[1], in[2]};
     twin->v_dc = in[3];
     twin->last_theta_m = in[4];
+    twin->winding_C = in[5];
 }
 
 void twin_step(twin_t *twin, const double in[6], double out[4])
@@ -176,6 +203,7 @@ void twin_step(twin_t *twin, const double in[6], double out[4])
     twin->sample.i = twin_park(twin_clarke(twin->last_i), angle.theta);
     twin->sample.u = twin->acted; /* computed in the last period, acts in this one */
     twin->sample.omega = angle.omega;
+    twin->theta = angle.theta;
     twin->sample.flux = twin_flux_table(&twin->motor, twin->sample.i);
     const unsigned found = faults(&twin->motor, &twin->monitor, twin->last_i, twin->v_dc);
     const bool run = twin->run_state == TWIN_RUN;
@@ -185,7 +213,11 @@ void twin_step(twin_t *twin, const double in[6], double out[4])
     } else {
         bridge_off(twin, out);
     }
-    identify(twin);
+    if (twin->robust) {
+        collect(twin, twin->modulation_limited);
+    } else {
+        identify(twin);
+    }
     twin->periods++;
     if (twin->periods % TWIN_TASK_PERIODS == 0) {
         task(twin);

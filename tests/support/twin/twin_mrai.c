@@ -3,66 +3,55 @@
 
 #include "twin/twin_stages.h"
 
-static void remember(twin_mrai_state_t *state, const twin_mrai_in_t *in)
-{
-    state->last = *in;
-}
-
 void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
 {
     state->e = (twin_dq_t){0.0, 0.0};
     state->psi_used = state->psi_delta;
     state->r_used = state->r_delta;
-    remember(state, in);
+    state->last = *in;
 }
 
 /* One adaptation law: proportional and integral part, the integral inside its limits. */
 static double adapt(double step, double proportional, double lo, double hi, double *integral,
                     bool *clamped)
 {
-    const double next = *integral + step;
-    *integral = twin_clamp(next, lo, hi);
-    *clamped = (next < lo) || (next > hi);
+    *integral = twin_clamp(*integral + step, lo, hi);
+    *clamped = (*integral <= lo) || (*integral >= hi);
     return *integral + proportional * step;
 }
 
-/* The voltage equation over the period that has just passed, in means and differences of its two
- * ends; the observer error takes the share of it that its poles leave. */
-static void observe(const motor_si_t *motor, double scale, twin_mrai_state_t *state,
-                    const twin_mrai_in_t *in, twin_dq_t g, twin_dq_t i_hat, double s2)
+/* What the voltage has to overcome besides the change of the flux, at one instant. */
+static twin_dq_t burden(const motor_si_t *motor, const twin_mrai_in_t *at, double psi_used, double r_used)
 {
-    const twin_flux_t *f = &in->flux, *f0 = &state->last.flux;
-    const double r0 = motor->r_ohm_20, dr = state->r_used, t = motor->period_s;
-    /* R_0 acts on the measured current: on the model's it would add R_0/L to the placed poles. */
-    const twin_dq_t i = {0.5 * (in->i.d + state->last.i.d), 0.5 * (in->i.q + state->last.i.q)};
-    const double psi_d = 0.5 * (f->psi_d + f0->psi_d) + state->psi_used;
-    const double psi_q = 0.5 * (f->psi_q + f0->psi_q);
-    const double ud = scale * state->last.u.d + in->omega * psi_q - r0 * i.d - dr * i_hat.d;
-    const double uq = scale * state->last.u.q - in->omega * psi_d - r0 * i.q - dr * i_hat.q;
-    const twin_dq_t e = state->e;
-    state->e.d = e.d + g.d * ((f->psi_d - f0->psi_d) / t - ud) + s2 * (e.q - e.d);
-    state->e.q = e.q + g.q * ((f->psi_q - f0->psi_q) / t - uq) - s2 * (e.d + e.q);
+    const double r = motor->r_ohm_20 + r_used;
+    return (twin_dq_t){r * at->i.d - at->omega * at->flux.psi_q,
+                       r * at->i.q + at->omega * (at->flux.psi_d + psi_used)};
 }
 
+/* The voltage equation over the period that has just passed, in means and differences of its two
+ * ends; the observer error, a flux, takes the share of it that its poles leave. */
 void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
                twin_mrai_state_t *state, const twin_mrai_in_t *in)
 {
     const twin_mrai_in_t *last = &state->last;
-    const twin_dq_t g = {0.5 * (in->flux.g_d + last->flux.g_d),
-                         0.5 * (in->flux.g_q + last->flux.g_q)};
-    /* S T_s/2 with S = m R (1/L_d + 1/L_q): independent of the speed. */
-    const double s2 = 0.5 * motor->observer_m * motor->r_ohm_20 * (g.d + g.q);
     const twin_dq_t e = state->e;
-    const twin_dq_t i_hat = {0.5 * (in->i.d + last->i.d) - e.d, 0.5 * (in->i.q + last->i.q) - e.q};
-    const double flux_step = -schedule->flux_gain * s2 * in->flux.l_qq * e.q;
-    const double resistance_step =
-        -schedule->resistance_gain * s2 * (i_hat.d * e.d * g.d + i_hat.q * e.q * g.q);
+    /* S T_s/2 with S = m R (1/L_d + 1/L_q): independent of the speed. */
+    const double s2 = 0.5 * motor->observer_m * motor->r_ohm_20 * (in->flux.g_d + in->flux.g_q);
+    const double flux_step = -schedule->flux_gain * s2 * e.q;
+    const double resistance_step = -schedule->resistance_gain * s2 * (in->i.d * e.d + in->i.q * e.q);
+    const twin_dq_t before = burden(motor, last, state->psi_used, state->r_used);
     state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs,
                             motor->psi_delta_max_Vs, &state->psi_delta, &state->psi_clamped);
     state->r_used = adapt(resistance_step, motor->resistance_proportional, motor->r_delta_min_ohm,
                           motor->r_delta_max_ohm, &state->r_delta, &state->r_clamped);
-    observe(motor, schedule->voltage_scale, state, in, g, i_hat, s2);
-    remember(state, in);
+    const twin_dq_t after = burden(motor, in, state->psi_used, state->r_used);
+    const double t = motor->period_s;
+    const twin_dq_t u = {last->u.d * schedule->voltage_scale, last->u.q * schedule->voltage_scale};
+    state->e.d = e.d + in->flux.psi_d - last->flux.psi_d - t * (u.d - 0.5 * (before.d + after.d)) +
+                 s2 * (e.q - e.d);
+    state->e.q = e.q + in->flux.psi_q - last->flux.psi_q - t * (u.q - 0.5 * (before.q + after.q)) -
+                 s2 * (e.d + e.q);
+    state->last = *in;
 }
 
 static double sinc(double x)
@@ -86,9 +75,7 @@ static double psi_full_drift(const motor_si_t *motor)
 /* What the resistance law divides by. */
 static double excitation(const twin_mrai_in_t *at)
 {
-    const double a = at->i.d * at->flux.g_d;
-    const double b = at->i.q * at->flux.g_q;
-    return a * a + b * b;
+    return at->i.d * at->i.d + at->i.q * at->i.q;
 }
 
 static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
@@ -122,9 +109,7 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
     judge(motor, quality_state, identifier, flux_open, r_open);
     return (twin_mrai_schedule_t){
         .flux_gain = flux_open ? 2.0 * motor->flux_bandwidth_rad_s / w : 0.0,
-        .resistance_gain = r_open ? 2.0 * motor->resistance_bandwidth_rad_s * motor->period_s /
-                                        norm
-                                  : 0.0,
+        .resistance_gain = r_open ? 2.0 * motor->resistance_bandwidth_rad_s / norm : 0.0,
         .voltage_scale = 1.0 / sinc(0.5 * w * motor->period_s),
     };
 }

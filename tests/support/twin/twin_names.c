@@ -34,6 +34,8 @@ READ(torque_loop, t->torque_loop)
 WRITE(torque_loop, t->torque_loop = x != 0.0)
 READ(identification, t->identification)
 WRITE(identification, t->identification = x != 0.0)
+READ(identification_mode, t->robust)
+WRITE(identification_mode, t->robust = x >= 0.5)
 READ(current_mode, t->current_mode)
 WRITE(current_mode, t->current_mode = x != 0.0)
 READ(id_ref, t->i_ref.d)
@@ -51,9 +53,12 @@ WRITE(resistance_bandwidth, t->motor.resistance_bandwidth_rad_s = x)
 READ(compensation, t->compensation)
 WRITE(compensation, t->compensation = x)
 READ(nothing, 0.0 * t->v_dc)
-READ(torque_estimate, t->torque_mean.mean)
-READ(psi_f, t->motor.psi_f_Vs + t->mrai.psi_delta)
-READ(r, t->motor.r_ohm_20 + t->mrai.r_delta)
+READ(torque_estimate, t->torque_estimate)
+READ(psi_f, t->motor.psi_f_Vs + (t->robust ? t->identify.filter.x[2] * t->motor.identify_sigma[2] : t->mrai.psi_delta))
+READ(r, t->robust ? t->identify.r_prior + t->identify.filter.x[0] * t->motor.identify_sigma[0]
+                  : t->motor.r_ohm_20 + t->mrai.r_delta)
+READ(confidence, t->robust ? t->identify.confidence : 1.0)
+READ(lq_scale, t->robust ? 1.0 + t->identify.filter.x[3] * t->motor.identify_sigma[3] : 1.0)
 READ(id, t->sample.i.d)
 READ(iq, t->sample.i.q)
 READ(ud, t->acted.d)
@@ -80,6 +85,7 @@ static void set_identification_reset(twin_t *t, double x)
         t->mrai.psi_delta = 0.0;
         t->mrai.r_delta = 0.0;
         t->quality = (twin_mrai_quality_t){0};
+        twin_identify_reset(&t->motor, &t->identify);
         twin_mrai_reset(&t->mrai, &t->sample);
     }
 }
@@ -89,6 +95,7 @@ static const entry_t entries[] = {
     {"enable", get_enable, set_enable, 0.0, 1.0},
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
+    {"identification_mode", get_identification_mode, set_identification_mode, 0.0, 1.0},
     {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
     {"id_ref_A", get_id_ref, set_id_ref, -1e4, 1e4},
@@ -104,6 +111,8 @@ static const entry_t entries[] = {
     {"torque_limited_Nm", get_torque_limited, NULL, 0.0, 0.0},
     {"psi_f_Vs", get_psi_f, NULL, 0.0, 0.0},
     {"r_ohm", get_r, NULL, 0.0, 0.0},
+    {"torque_confidence", get_confidence, NULL, 0.0, 0.0},
+    {"lq_scale", get_lq_scale, NULL, 0.0, 0.0},
     {"id_A", get_id, NULL, 0.0, 0.0},
     {"iq_A", get_iq, NULL, 0.0, 0.0},
     {"ud_V", get_ud, NULL, 0.0, 0.0},

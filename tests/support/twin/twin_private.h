@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "twin/twin.h"
+#include "twin/twin_identify.h"
 
 enum { TWIN_READY = 0, TWIN_RUN = 1, TWIN_FAULT = 2 };
 
@@ -24,7 +25,7 @@ struct twin {
     motor_si_t motor; /* a copy: twin_set() may change it */
     /* commands */
     double torque_command, id_command, iq_command, compensation;
-    bool enable, torque_loop, identification, current_mode;
+    bool enable, torque_loop, identification, current_mode, robust;
     /* state */
     int run_state; /* of the 1 kHz task */
     bool fault_reset;
@@ -37,6 +38,9 @@ struct twin {
     twin_mrai_schedule_t schedule;
     twin_mrai_quality_t quality;
     twin_torque_estimate_t torque_mean;
+    twin_window_t window, complete;
+    twin_identify_t identify;
+    double torque_estimate, psi_delta; /* of the identification that is selected */
     twin_torque_state_t torque_state;
     double slewed;
     bool modulation_limited;
@@ -47,8 +51,8 @@ struct twin {
     twin_target_t target;
     twin_reference_t reference;
     twin_abc_t last_i; /* good samples, kept when an implausible one comes */
-    double last_theta_m;
-    double v_dc;
+    double last_theta_m, theta;
+    double v_dc, winding_C;
 };
 
 #endif

@@ -117,7 +117,7 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
 /* --- identification -------------------------------------------------------------------------- */
 typedef struct {
     double flux_gain;       /* 2 k_psi/w, 0 while the gate is closed */
-    double resistance_gain; /* 2 k_r T_s/norm, 0 while the gate is closed */
+    double resistance_gain; /* 2 k_r/|i|^2, 0 while the gate is closed */
     double voltage_scale;   /* 1/sinc(w T_s/2) */
 } twin_mrai_schedule_t;
 
@@ -128,7 +128,7 @@ typedef struct {
 } twin_mrai_in_t;
 
 typedef struct {
-    twin_dq_t e;         /* observer error */
+    twin_dq_t e;         /* observer error, V s */
     twin_mrai_in_t last; /* the other end of the period that has just passed */
     double psi_delta, r_delta;
     double psi_used, r_used;
@@ -164,7 +164,7 @@ typedef struct {
 } twin_torque_state_t;
 
 typedef struct {
-    double command, estimate;
+    double command, estimate, confidence;
     bool enabled, limited;
 } twin_torque_in_t;
 

@@ -23,7 +23,8 @@ double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm)
 double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in)
 {
-    const double room = motor->torque_authority * fabs(in->command);
+    const double authority = motor->torque_authority * in->confidence;
+    const double room = authority * fabs(in->command);
     const double direction = (in->command > 0.0) - (in->command < 0.0);
     /* The estimate is the mean of the time that has passed: it meets the model of before this step. */
     const double e = state->model - in->estimate;
@@ -33,15 +34,15 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
         state->correction -= motor->torque_ki * state->correction;
     } else {
         p = motor->torque_kp * e;
-        if (!(in->limited && (e * direction > 0.0))) {
-            /* More than 100 % of error is no measurement: it may not move the ratio faster. */
-            const double relative = e * direction / fmax(fabs(in->command), motor->torque_min_Nm);
-            state->correction += motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
-        }
+        /* More than 100 % of error is no measurement: it may not move the ratio faster. */
+        const double relative = e * direction / fmax(fabs(in->command), motor->torque_min_Nm);
+        const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
+        /* In a limit the correction grows up to the command itself, not beyond. */
+        const double most = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
+        state->correction = fmin(moved, most);
     }
-    state->saturated = fabs(state->correction) >= motor->torque_authority;
-    state->correction =
-        twin_clamp(state->correction, -motor->torque_authority, motor->torque_authority);
+    state->saturated = fabs(state->correction) >= authority;
+    state->correction = twin_clamp(state->correction, -authority, authority);
     const double wanted = in->command * state->correction + p;
     return in->command + twin_clamp(wanted, -room, room);
 }

@@ -22,6 +22,11 @@ void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
     emu->s.pins.resolver_fault = resolver_fault;
 }
 
+bool emu_gate_driver(const emu_t *emu)
+{
+    return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;
+}
+
 /* The shaft turns on between two settings. */
 uint32_t emu_angle(const emu_t *emu)
 {
@@ -71,7 +76,8 @@ uint32_t emu_symbol_size(const emu_t *emu, const char *name)
     return size;
 }
 
-uint64_t emu_register(const emu_t *emu, const char *name)
+/* "FTM0.MOD" among all registers; NULL: no such. */
+static const uint32_t *register_named(const emu_t *emu, const char *name)
 {
     const char *dot = strchr(name, '.');
     for (int p = 0; dot != NULL && p < peripherals_count; p++) {
@@ -81,11 +87,26 @@ uint64_t emu_register(const emu_t *emu, const char *name)
         }
         for (int r = 0; r < emu->facts_of[p]->count; r++) {
             if (strcmp(emu->facts_of[p]->fact[r].name, dot + 1) == 0) {
-                return emu->s.value[p][r];
+                return &emu->s.value[p][r];
             }
         }
     }
-    return UINT64_MAX;
+    return NULL;
+}
+
+uint64_t emu_register(const emu_t *emu, const char *name)
+{
+    const uint32_t *value = register_named(emu, name);
+    return value != NULL ? *value : UINT64_MAX;
+}
+
+bool emu_register_set(emu_t *emu, const char *name, uint32_t value)
+{
+    const uint32_t *at = register_named(emu, name);
+    if (at != NULL) {
+        (&emu->s.value[0][0])[at - &emu->s.value[0][0]] = value;
+    }
+    return at != NULL;
 }
 
 void emu_on_exception(emu_t *emu, emu_exception_fn fn, void *user)

@@ -212,12 +212,13 @@ int emu_run(emu_t *emu, uint64_t ticks)
         if (emu->error[0] != '\0') {
             return EMU_FAILED;
         }
-        s->stop = s->centre = false;
+        s->stop = false;
         timers_fire(emu);
         if (s->reset_wanted) {
             emu_reset(emu, s->reset_cause);
         }
         if (s->centre) {
+            s->centre = false;
             return EMU_CENTRE;
         }
         if (s->now >= end) {

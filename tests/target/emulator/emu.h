@@ -55,6 +55,8 @@ EMU_API const emu_pins_t *emu_pins_look(const emu_t *emu);
 /** Lines that do not belong to an instant. */
 EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
+/** The line that supplies the gate driver. */
+EMU_API bool emu_gate_driver(const emu_t *emu);
 
 /** Runs for at most so many ticks; EMU_CENTRE: FTM0 has just begun a period, its buffered values are loaded, and the
  * triggers of this instant come with the next call. */
@@ -72,6 +74,7 @@ EMU_API uint32_t emu_symbol_size(const emu_t *emu, const char *name);
 
 /** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
 EMU_API uint64_t emu_register(const emu_t *emu, const char *name);
+EMU_API bool emu_register_set(emu_t *emu, const char *name, uint32_t value);
 
 /** Called when an exception's handler is entered and left (vector number, 16 = first interrupt). */
 typedef void (*emu_exception_fn)(void *user, int vector, bool entered);

@@ -54,7 +54,7 @@ static void samples_to_pins(emulated_t *e, const double in[6])
     pins->adc[0][1] = to_count(in[2] / span_A + 0.5, m->adc_bits);
     pins->adc[1][1] = to_count(in[3] / (double)m->v_dc_full_scale_V, m->adc_bits);
     pins->adc[0][2] = ntc_count(in[5]);
-    pins->adc[1][2] = ntc_count(40.0);
+    pins->adc[1][2] = ntc_count(e->inverter_C);
     angle_to_pins(e, pins, angle_of(in[4]));
     e->mirror.host->winding_C = in[5];
 }
@@ -68,11 +68,11 @@ static void step(void *self, const double in[6], double out[4])
     samples_to_pins(e, in);
     const int stopped = emu_run(e->emu, (uint64_t)(1.01 * e->period_ticks));
     emu_bridge(e->emu, &bridge);
-    const bool runs = stopped == EMU_CENTRE;
+    const bool runs = stopped == EMU_CENTRE, driven = !e->gate_driver || emu_gate_driver(e->emu);
     for (int x = 0; x < 3; x++) {
         out[x] = runs ? bridge.duty[x] : 0.5;
     }
-    out[3] = runs && bridge.gates ? 1.0 : 0.0;
+    out[3] = runs && bridge.gates && driven ? 1.0 : 0.0;
     e->steps++;
     if (e->shadow != NULL && runs) {
         shadow_compare(e);
@@ -93,6 +93,14 @@ static int pin_set(emulated_t *e, const char *name, double value)
                 : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault : NULL;
     if (strcmp(name, "emulator.shadow") == 0) {
         return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
+    if (strcmp(name, "emulator.inverter_C") == 0 && value >= -40.0 && value <= 150.0) {
+        e->inverter_C = value;
+        return SIM_OK;
+    }
+    if (strcmp(name, "emulator.gate_driver") == 0) {
+        e->gate_driver = value != 0.0;
+        return SIM_OK;
     }
     if (pin == NULL) {
         return isnan(emulated_get(e, name)) ? SIM_UNKNOWN_NAME : SIM_READ_ONLY;
@@ -134,6 +142,8 @@ double emulated_get(emulated_t *e, const char *name)
         {"emulator.time_s", (double)emu_now(e->emu) / (double)EMU_TICKS_PER_S},
         {"emulator.gate_fault", e->pins_of_board.gate_fault},
         {"emulator.resolver_fault", e->pins_of_board.resolver_fault},
+        {"emulator.inverter_C", e->inverter_C},
+        {"emulator.gate_driver", e->gate_driver},
         {"emulator.dead_time_s", bridge.dead_time_s},
         {"emulator.pwm_period_s", bridge.period_s},
     };
@@ -166,6 +176,7 @@ static void destroy(void *self)
 static const char *boot(emulated_t *e)
 {
     const double still[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
+    e->inverter_C = 40.0;
     e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
     samples_to_pins(e, still);
     const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));
@@ -209,4 +220,10 @@ const char *sim_shadow_difference(sim_t *sim)
 {
     const emulated_t *e = sim->controller.self;
     return e->differing > 0 ? e->difference : NULL;
+}
+
+void sim_shadow_disturb(sim_t *sim)
+{
+    const emulated_t *e = sim->controller.self;
+    e->shadow->drive.slow.mrai.psi_delta ^= 1;
 }

@@ -6,6 +6,8 @@
  *   emulator.shadow        set 1: the same firmware, compiled for the host, follows with the same counts and angles and
  *                          is compared after every period; the angle then stands still between two samples
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
+ *   emulator.inverter_C    of the second thermistor
+ *   emulator.gate_driver   set 1: the gates close only while the image supplies their driver (board line)
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md
  * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation
@@ -18,5 +20,7 @@ EMU_API sim_t *sim_create_emulated(const char *elf, const char *layout, int mode
 EMU_API emu_t *sim_emulator(sim_t *sim);
 /** Where the shadow differed first ("part, period"); NULL: nowhere. */
 EMU_API const char *sim_shadow_difference(sim_t *sim);
+/** Changes one bit of the shadow's state: a test that it would be noticed. */
+EMU_API void sim_shadow_disturb(sim_t *sim);
 
 #endif

@@ -12,12 +12,17 @@ typedef struct {
     emu_pins_t pins_of_board;  /* only the lines that scenarios set */
     double period_ticks;
     uint64_t steps;
+    double inverter_C;
+    bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;
 
 double emulated_get(emulated_t *e, const char *name);
+
+/** What the firmware makes of a shaft that stands still, from whichever sensor the image reads. */
+uint32_t pins_theta(const emulated_t *e);
 
 bool shadow_start(emulated_t *e);
 void shadow_inputs(emulated_t *e);

@@ -76,6 +76,17 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
 }
 
+/* The counter is at CNTIN and runs: emu_run() returns, so that the pins can be given this instant's values. */
+static void period_begins(emu_t *emu, const peripheral_t *self)
+{
+    if (self->instance == 0) {
+        emu->s.ftm[0].triggers_due = true;
+        emu->s.centre = true;
+        emu->s.stop = true;
+        (void)uc_emu_stop(emu->uc);
+    }
+}
+
 static void start_or_stop(emu_t *emu, const peripheral_t *self)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
@@ -83,6 +94,7 @@ static void start_or_stop(emu_t *emu, const peripheral_t *self)
     if (wanted && !f->running) {
         f->running = true;
         f->start = emu->s.now;
+        period_begins(emu, self);
         emu_timer(emu, self->instance == 0 ? TIMER_FTM0 : TIMER_FTM2, emu->s.now + period_ticks(emu, self));
     } else if (!wanted) {
         f->running = false;
@@ -189,7 +201,12 @@ static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t 
         if ((value & 0x20U) != 0 || (value & 0x140U) != 0) {
             emu_fail(emu, "write of %s.SC: up-down counting and its interrupts are not modelled", self->name);
         }
-    } else if (offset == CNT && decoding(emu, self)) {
+    } else if (offset == CNT && !decoding(emu, self)) {
+        bus_put(emu, self, CNT, bus_get(emu, self, CNTIN));
+        if (self->instance == 0 && (bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
+            trgmux_event(emu, INIT_TRIGGER); /* a write of the counter is an initialisation, too */
+        }
+    } else if (offset == CNT) {
         f->quad_offset = 0;
         f->quad_offset = bus_get(emu, self, CNTIN) + bus_get(emu, self, MOD) + 1U - decoded(emu, self);
     } else if (offset == OUTMASK && (bus_get(emu, self, SYNC) & 8U) == 0) {
@@ -230,32 +247,13 @@ void ftm_fault_input(emu_t *emu)
     }
 }
 
-/* The counter goes from MOD to CNTIN: the loading point (SYNC.CNTMAX), and the period's begin. */
-void ftm_fire(emu_t *emu, int instance)
-{
-    const peripheral_t *self = of(instance);
-    ftm_t *f = &emu->s.ftm[instance];
-    const uint32_t sync = bus_get(emu, self, SYNC);
-    f->start = emu->s.now;
-    f->tof = true;
-    buffers_load(emu, self, f->software_trigger && (sync & 2U) != 0);
-    if (f->software_trigger && (sync & 2U) != 0) {
-        f->software_trigger = false;
-        bus_put(emu, self, SYNC, sync & ~0x80U);
-    }
-    emu_timer(emu, instance == 0 ? TIMER_FTM0 : TIMER_FTM2, emu->s.now + period_ticks(emu, self));
-    if (instance == 0) {
-        f->triggers_due = true;
-        emu->s.centre = true;
-    }
-}
-
-/* The hardware trigger that TRGMUX gives to FTM0: with HWOM it takes over the output mask. */
+/* The hardware trigger that TRGMUX gives to FTM0, from its own start: with HWOM it takes over the output mask. */
 static void hardware_trigger(emu_t *emu)
 {
     const peripheral_t *self = ftm0();
     const uint32_t sync = bus_get(emu, self, SYNC), conf = bus_get(emu, self, SYNCONF);
-    if ((sync & 0x10U) == 0) {
+    const bool connected = (bus_get(emu, bus_find("TRGMUX"), 0x28) & 0x3FU) == INIT_TRIGGER;
+    if (!connected || (sync & 0x10U) == 0) {
         return;
     }
     if ((conf & 1U << 18) != 0 && (sync & 8U) != 0) {
@@ -276,10 +274,32 @@ static void closed_update(emu_t *emu)
     emu->s.ftm[0].closed = bridge.gates;
 }
 
-/* What the period's begin sets off, once the pins carry this instant's values. */
+/* The counter goes from MOD to CNTIN: the loading point (SYNC.CNTMAX), and the period's begin. */
+void ftm_fire(emu_t *emu, int instance)
+{
+    const peripheral_t *self = of(instance);
+    ftm_t *f = &emu->s.ftm[instance];
+    const uint32_t sync = bus_get(emu, self, SYNC);
+    f->start = emu->s.now;
+    f->tof = true;
+    buffers_load(emu, self, f->software_trigger && (sync & 2U) != 0);
+    if (f->software_trigger && (sync & 2U) != 0) {
+        f->software_trigger = false;
+        bus_put(emu, self, SYNC, sync & ~0x80U);
+    }
+    emu_timer(emu, instance == 0 ? TIMER_FTM0 : TIMER_FTM2, emu->s.now + period_ticks(emu, self));
+    if (instance == 0) {
+        if ((bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
+            hardware_trigger(emu);
+        }
+        closed_update(emu);
+        period_begins(emu, self);
+    }
+}
+
+/* What the period's begin sets off outside, once the pins carry this instant's values. */
 void ftm_triggers(emu_t *emu)
 {
-    const peripheral_t *trgmux = bus_find("TRGMUX");
     ftm_fault_input(emu);
     if (!emu->s.ftm[0].triggers_due) {
         return;
@@ -288,9 +308,6 @@ void ftm_triggers(emu_t *emu)
     emu->s.rdc.latched = emu_angle(emu); /* SAMPLE of the resolver converter is a channel of this timer */
     if ((bus_get(emu, ftm0(), EXTTRIG) & 0x40U) != 0) {
         trgmux_event(emu, INIT_TRIGGER);
-        if ((bus_get(emu, trgmux, 0x28) & 0x3FU) == INIT_TRIGGER) {
-            hardware_trigger(emu);
-        }
     }
     closed_update(emu);
 }

@@ -105,7 +105,7 @@ double mirror_get(mirror_t *mirror, const char *name)
 }
 
 /* Bytes between the fields have no value. */
-static drive_t without_padding(const drive_t *drive)
+drive_t drive_plain(const drive_t *drive)
 {
     drive_t copy;
     memcpy(&copy, drive, sizeof copy);
@@ -120,7 +120,7 @@ static drive_t without_padding(const drive_t *drive)
 const char *mirror_differs(mirror_t *mirror, const fluxtrue_t *other)
 {
     mirror_pull(mirror);
-    const drive_t there = without_padding(&mirror->host->drive), here_ = without_padding(&other->drive);
+    const drive_t there = drive_plain(&mirror->host->drive), here_ = drive_plain(&other->drive);
     for (int i = mirror->inputs; i < mirror->parts; i++) {
         const mirror_part_t *part = &mirror->part[i];
         if (memcmp((const uint8_t *)&there + part->here, (const uint8_t *)&here_ + part->here, part->size) != 0) {

@@ -30,6 +30,8 @@ const char *mirror_open(mirror_t *mirror, emu_t *emu, const char *layout_file);
 void mirror_close(mirror_t *mirror);
 /** True when the image's calibration is the one compiled in here: it was built for the same motor. */
 bool mirror_same_motor(mirror_t *mirror);
+/** A copy whose bytes between the fields are 0. */
+drive_t drive_plain(const drive_t *drive);
 void mirror_pull(mirror_t *mirror);
 int mirror_set(mirror_t *mirror, const char *name, double value);
 double mirror_get(mirror_t *mirror, const char *name);

@@ -8,6 +8,7 @@
 #include "hal/irq.h"
 #include "hal/mps2/script.h"
 #include "hal/pwm.h"
+#include "hal/temperature.h"
 
 static drive_t drive;
 static script_t script;
@@ -39,6 +40,11 @@ void hal_irq_pend_mrai(void)
     pending = true;
 }
 
+int16_t hal_temperature_winding_dC(void)
+{
+    return HAL_TEMPERATURE_UNKNOWN;
+}
+
 int main(void)
 {
     drive_init(&drive, &motor);
@@ -57,6 +63,7 @@ int main(void)
     }
     printf("low=%08x\nhigh=%08x\ndiffering=%08x\nfaults=%08x\noverruns=%08x\n", script.low, script.high,
            script.differing, drive.fast.faults, drive.fast.overruns);
-    printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)drive.slow.mrai.psi_delta, (unsigned)drive.slow.mrai.r_delta);
+    const learnt_t *learnt = &drive.task.learnt;
+    printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)learnt->psi_delta, (unsigned)learnt->r_delta);
     return 0;
 }

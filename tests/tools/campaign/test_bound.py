@@ -17,7 +17,8 @@ from fluxtrue_tools.sim.library import Loop
 
 def test_two_states_and_three_measurements_give_the_covariance_worked_out_by_hand() -> None:
     # Priors 4 and 1; y1 = x1 twice with variance 2, y2 = x1 + x2 with variance 1, and the window sees x2 with 0.5.
-    learnt = np.diag([0.25, 1.0]) + information(np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), np.array([2.0, 2.0, 1.0]))
+    rows = np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    learnt = np.diag([0.25, 1.0]) + information(rows, np.array([2.0, 2.0, 1.0]))
     assert learnt == pytest.approx(np.array([[2.25, 1.0], [1.0, 2.0]]))
     own = information(np.array([[0.0, 1.0]]), np.array([0.5]))
     # The sum [[2.25, 1], [1, 4]] has the determinant 8; its inverse is [[4, -1], [-1, 2.25]]/8.

@@ -8,10 +8,11 @@ from conftest import SMALL, campaign
 from fluxtrue_tools.campaign.spec import parse
 from fluxtrue_tools.errors import FluxtrueError
 
+LQ, CHECKED = "[spread]\nlq_scale", "[check]\ncontrollers"
 BAD = [
     ("unknown key", "cases = 4", "cases = 4\nplants = 3", "plants: unknown field, allowed: motor, cases, seed"),
     ("unknown nested key", "[drive]", "[drive]\nspeed = 3", "drive.speed: unknown field, allowed: duration_s, vehicle"),
-    ("unknown controller key", "warm_up = false", "warmup = false", "controller.0.warmup: unknown field, allowed: name"),
+    ("unknown controller key", "warm_up = false", "warmup = false", "controller.0.warmup: unknown field, allowed"),
     ("wrong type", "cases = 4", 'cases = "many"', "cases = 'many'"),
     ("a fraction of a case", "cases = 4", "cases = 4.5", "cases = 4.5"),
     ("no case", "cases = 4", "cases = 0", "cases = 0"),
@@ -20,14 +21,14 @@ BAD = [
     ("not TOML", "seed = 7", "seed = ", "not TOML"),
     ("not a number", "duration_s = 2", "duration_s = nan", "drive.duration_s"),
     ("an absurd drive", "duration_s = 2", "duration_s = 1e9", "drive.duration_s"),
-    ("a reversed range", "[drive]", "[spread]\nlq_scale = [1.1, 0.9]\n[drive]", "spread.lq_scale = [1.1, 0.9]: allowed: [low"),
-    ("a range in percent", "[drive]", "[spread]\nlq_scale = [90, 110]\n[drive]", "spread.lq_scale.0 = 90"),
-    ("a range of one number", "[drive]", "[spread]\nlq_scale = 1.0\n[drive]", "spread.lq_scale = 1.0: allowed: [low, high]"),
+    ("a reversed range", "[drive]", f"{LQ} = [1.1, 0.9]\n[drive]", "spread.lq_scale = [1.1, 0.9]: allowed: [low"),
+    ("a range in percent", "[drive]", f"{LQ} = [90, 110]\n[drive]", "spread.lq_scale.0 = 90"),
+    ("a range of one number", "[drive]", f"{LQ} = 1.0\n[drive]", "spread.lq_scale = 1.0: allowed: [low, high]"),
     ("a reversed band", "[[500, 6000, 1]]", "[[6000, 500, 1]]", "windows.speed_rpm: 6000 to 500"),
     ("a band without strata", "[[500, 6000, 1]]", "[[500, 6000]]", "windows.speed_rpm.0"),
     ("a controller twice", 'name = "paper"', 'name = "tables"', "controller: tables, tables, allowed: every name once"),
-    ("an unknown checked one", "[drive]", '[check]\ncontrollers = ["robust"]\n[drive]', "check.controllers: 'robust', allowed"),
-    ("no reference", "[drive]", '[check]\ncontrollers = ["paper"]\nreference = "x"\n[drive]', "check.reference: 'x', allowed"),
+    ("an unknown checked one", "[drive]", f'{CHECKED} = ["robust"]\n[drive]', "check.controllers: 'robust', allowed"),
+    ("no reference", "[drive]", f'{CHECKED} = ["paper"]\nreference = "x"\n[drive]', "check.reference: 'x', allowed"),
     ("a plant's typo", "angle_bits = 12", "angle_bit = 12", "plant.angle_bit: unknown field"),
 ]
 
@@ -45,8 +46,8 @@ CALLED = [
     ("a missing file", SMALL, ["nowhere.toml"], "nowhere.toml: cannot be read (No such file or directory)"),
     ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "motor 'hsm2'"),
     ("a drop below nothing", SMALL.replace("device_drop_V = 1.0", ""), ["c.toml"], "spread.device_drop_error_V = -0.5"),
-    ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"), ["c.toml"],
-     "controller 'paper': torque_lop = 1: no such name"),
+    ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"),
+     ["c.toml"], "controller 'paper': torque_lop = 1: no such name"),
     ("a value no firmware takes", SMALL.replace("{ torque_loop = true", "{ observer_m = 99, torque_loop = true"),
      ["c.toml"], "controller 'paper': observer_m = 99: out of range"),
     ("a flag that is not there", SMALL + '[check]\ncount_nonzero = ["psi_clamp"]', ["c.toml"], "psi_clamp"),

@@ -75,7 +75,8 @@ def test_the_command_of_a_case_reproduces_its_numbers_and_stores_nothing(folder:
     before = sorted(path.name for path in folder.iterdir())
     result = campaign("small.toml", "--case", 2, "--plot", "case.png", cwd=folder)
     assert result.returncode == 0, result.stderr
-    lines = re.findall(r"^(\d+) +-?[\d.]+ +-?[\d.]+ +(-?[\d.e-]+) +(-?[\d.e-]+) ", result.stdout, re.MULTILINE)
+    row = re.compile(r"^(\d+) +-?[\d.]+ +-?[\d.]+ +(-?[\d.e-]+) +(-?[\d.e-]+) ", re.MULTILINE)
+    lines = row.findall(result.stdout)
     assert len(lines) == 8
     rows = whole[whole["case"] == 2].set_index(["controller", "window"])["torque_Nm"]
     for window, tables, paper in lines:
@@ -86,8 +87,10 @@ def test_the_command_of_a_case_reproduces_its_numbers_and_stores_nothing(folder:
 
 
 def _kill_after_first_case(folder: Path, out: str) -> None:
-    process = subprocess.Popen(command("small.toml", "--out", out, "--workers", 1), cwd=folder, env=environment(),
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)  # fmt: skip
+    process = subprocess.Popen(
+        command("small.toml", "--out", out, "--workers", 1), cwd=folder, env=environment(), start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
     while process.poll() is None and not list(folder.glob(f"{out}/cases/case-*.parquet")):
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGKILL)
@@ -103,7 +106,8 @@ def test_a_killed_campaign_goes_on_where_it_was(folder: Path, whole: pd.DataFram
     result = campaign("small.toml", "--out", "killed", cwd=folder)
     assert result.returncode == 0, result.stderr
     assert {path: path.stat().st_mtime_ns for path in done} == done
-    assert sorted(p.name for p in (folder / "killed" / "cases").iterdir()) == [f"case-{k:05d}.parquet" for k in range(4)]
+    names = sorted(path.name for path in (folder / "killed" / "cases").iterdir())
+    assert names == [f"case-{k:05d}.parquet" for k in range(4)]
     pd.testing.assert_frame_equal(results(folder, "killed"), whole, check_exact=True)
 
 

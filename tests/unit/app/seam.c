@@ -8,6 +8,7 @@
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
 #include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
 #include "unity.h"
 
 seam_t seam;
@@ -57,6 +58,18 @@ static void pwm_enable(bool on, int calls)
     seam.gates = on;
 }
 
+static int16_t winding(int calls)
+{
+    (void)calls;
+    return seam.winding_dC;
+}
+
+static int16_t inverter(int calls)
+{
+    (void)calls;
+    return seam.inverter_dC;
+}
+
 void seam_start(void)
 {
     memset(&seam, 0, sizeof seam);
@@ -66,6 +79,8 @@ void seam_start(void)
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Stub(pwm_write);
     hal_pwm_enable_Stub(pwm_enable);
+    hal_temperature_winding_dC_Stub(winding);
+    hal_temperature_inverter_dC_Stub(inverter);
     drive_init(&drive, &motor);
     seam_current(0.0, 0.0, 0.0);
     seam_voltage(350.0);

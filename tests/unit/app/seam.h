@@ -8,6 +8,7 @@
 typedef struct {
     adc_counts_t counts;
     uint32_t theta_m;
+    int16_t winding_dC, inverter_dC;
     duty_t duty;
     bool gates;
     int pended;

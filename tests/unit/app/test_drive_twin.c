@@ -94,7 +94,7 @@ static void drive_at(double rpm, double torque_Nm)
     TEST_ASSERT_TRUE_MESSAGE(off <= 3, where);
     const double rated = (double)motor.torque_max_Nm;
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-3 * rated, twin_get(twin, "torque_estimate_Nm"),
-                                      drive.slow.torque.mean / 32768.0 * (double)motor.bases.torque_Nm, where);
+                                      drive.task.torque_estimate / 32768.0 * (double)motor.bases.torque_Nm, where);
 }
 
 void test_the_whole_drive_switches_as_its_twin_at_low_speed(void)

@@ -100,9 +100,9 @@ void test_the_identification_is_the_si_values(void)
     HELD(r0, q31(c->r0), q31(1));
     HELD(0.5 * motor_si.observer_m * r0, q31(c->pole_gain), q31(1));
     HELD(2.0 * motor_si.flux_bandwidth_rad_s / w_b, q31(c->flux_gain), q31(1));
-    HELD(2.0 * motor_si.resistance_bandwidth_rad_s * motor_si.period_s, q31(c->resistance_gain), q31(1));
-    HELD(motor_si.flux_proportional, c->flux_proportional / 65536.0, 1.0 / 65536.0);
-    HELD(motor_si.resistance_proportional, c->resistance_proportional / 65536.0, 1.0 / 65536.0);
+    HELD(2.0 * motor_si.resistance_bandwidth_rad_s / w_b, q31(c->resistance_gain), q31(1));
+    HELD(motor_si.flux_proportional, c->flux_proportional_q24 / 16777216.0, 1.0 / 16777216.0);
+    HELD(motor_si.resistance_proportional, c->resistance_proportional_q24 / 16777216.0, 1.0 / 16777216.0);
     HELD(motor_si.psi_delta_min_Vs / psi_b, q31(c->psi_delta_min), q31(1));
     HELD(motor_si.psi_delta_max_Vs / psi_b, q31(c->psi_delta_max), q31(1));
     HELD(motor_si.r_delta_min_ohm / z_b, q31(c->r_delta_min), q31(1));
@@ -110,12 +110,11 @@ void test_the_identification_is_the_si_values(void)
     HELD(motor_si.omega_min_rad_s / w_b, q15(c->omega_min), q15(1));
     HELD(motor_si.omega_r_max_rad_s / w_b, q15(c->omega_r_max), q15(1));
     HELD(motor_si.i_min_A / i_b, q15(c->i_min), q15(1));
-    HELD(1.0 / (w_b * motor_si.period_s), c->rate_gain_q26 / 67108864.0, 1.0 / 67108864.0);
+    HELD(w_b * motor_si.period_s, q31(c->period), q31(1));
     HELD(w_b * motor_si.period_s * w_b * motor_si.period_s / 24.0, q31(c->sinc_gain), q31(1));
     HELD(0.05 * motor_si.psi_f_Vs / psi_b * motor_si.flux_bandwidth_rad_s * 1e-3, q31(c->psi_drift_full), q31(1));
     HELD(0.2 * r0 * motor_si.resistance_bandwidth_rad_s * 1e-3, q31(c->r_drift_full), q31(1));
     HELD(motor_si.quality_rate, q15(c->quality_rate), q15(1));
-    TEST_ASSERT_EQUAL_INT(motor.flux_table.l_shift, c->l_shift);
 }
 
 void test_torque_loop_references_and_monitors_are_the_si_values(void)

@@ -9,6 +9,7 @@
 void setUp(void)
 {
     seam_start();
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
 }
 
 void tearDown(void)
@@ -50,7 +51,7 @@ void test_with_the_bridge_off_nothing_is_learnt(void)
         mrai_isr(&drive);
     }
     TEST_ASSERT_EQUAL_INT32(0, drive.slow.mrai.psi_delta);
-    TEST_ASSERT_EQUAL_INT32(0, drive.slow.mrai.e_q_q30);
+    TEST_ASSERT_EQUAL_INT32(0, drive.slow.mrai.e_q_q27);
 }
 
 void test_with_the_bridge_on_the_flux_is_learnt_and_handed_to_the_fast_isr_rounded(void)
@@ -73,8 +74,8 @@ void test_the_first_acting_sample_continues_the_last_resting_one(void)
     mrai_isr(&drive);
     publish(true);
     mrai_isr(&drive);
-    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_d_q30); /* 1/64 pu: one period of a weak magnet */
-    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_q_q30);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_d_q27); /* 1/64 pu: one period of a weak magnet */
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_q_q27);
 }
 
 void test_the_torque_estimate_runs_with_the_bridge_on_or_off(void)
@@ -103,6 +104,6 @@ void test_a_reset_forgets_what_was_learnt_without_a_kick(void)
     TEST_ASSERT_EQUAL_INT(0, drive.slow.psi_delta_q15);
     publish(true);
     mrai_isr(&drive);
-    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_d_q30);
-    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_q_q30);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_d_q27);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.slow.mrai.e_q_q27);
 }

@@ -222,6 +222,7 @@ static void sample_at(double omega_pu, bool acting, bool limited)
 
 void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)
 {
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
     seam_run();
     sample_at(0.3, false, false);
     task_1khz(&drive);

@@ -13,7 +13,7 @@ void setUp(void)
 {
     f = fixture();
     state = (torque_loop_state_t){0};
-    in = (torque_loop_in_t){.enabled = true};
+    in = (torque_loop_in_t){.enabled = true, .confidence = Q15_MAX};
 }
 
 void tearDown(void)
@@ -215,7 +215,8 @@ void test_random_commands_and_estimates_follow_the_twin(void)
             in.command = (random_in(&seed, 0, 9) == 0) ? 0 : in.command;
         }
         in.estimate = (q15_t)(0.93 * in.command + random_in(&seed, -200, 200));
-        const twin_torque_in_t t = {from_q15(in.command) * f.t, from_q15(in.estimate) * f.t, in.enabled, in.limited};
+        const twin_torque_in_t t = {from_q15(in.command) * f.t, from_q15(in.estimate) * f.t,
+                                    from_q15(in.confidence), in.enabled, in.limited};
         const q15_t r = step();
         const double expected = twin_torque_loop(&f.si, &twin, &t);
         worst_note(&request, r - expected / f.t * 32768.0, "step %d, command %d", n, in.command);
@@ -230,7 +231,7 @@ void test_no_corner_wraps_or_leaves_the_authority(void)
 {
     static const int16_t corner[5] = {INT16_MIN, -1, 0, 1, INT16_MAX};
     for (int n = 0; n < 5 * 5 * 4 * 3; n++) {
-        in = (torque_loop_in_t){corner[n % 5], corner[n / 5 % 5], (n / 25) & 1, (n / 50) & 1};
+        in = (torque_loop_in_t){corner[n % 5], corner[n / 5 % 5], Q15_MAX, (n / 25) & 1, (n / 50) & 1};
         state.correction = (n / 100 == 0) ? INT32_MIN : (n / 100 == 1) ? 0 : INT32_MAX;
         state.model = (n & 1) ? INT32_MIN : INT32_MAX;
         const int r = step();

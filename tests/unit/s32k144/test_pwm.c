@@ -141,5 +141,6 @@ void test_closing_the_gates_clears_a_fault_only_when_it_is_over(void)
     FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
     hal_pwm_enable(true);
     TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
+    TEST_ASSERT_EQUAL_HEX32(1U << (IRQ_FTM0_FAULT & 31U), NVIC->ICPR[IRQ_FTM0_FAULT >> 5]);
     TEST_ASSERT_EQUAL_HEX32(1U << (IRQ_FTM0_FAULT & 31U), NVIC->ISER[IRQ_FTM0_FAULT >> 5]);
 }

@@ -28,7 +28,7 @@ static void nothing_received(void)
 void setUp(void)
 {
     nothing_received();
-    angle_init();
+    angle_init(11200);
     received(0);
     (void)hal_angle_read();
 }

@@ -8,6 +8,7 @@
 #include "hal/angle.h"
 #include "hal/irq.h"
 #include "hal/pwm.h"
+#include "hal/temperature.h"
 
 /* Called by name only; a stage is compiled as one piece, as it is in the interrupt. */
 #define CALLED __attribute__((used, externally_visible, noinline))
@@ -40,6 +41,13 @@ static struct {
 static drive_t drive;
 static drive_t copy;
 static flux_point_t flux;
+/* What the exchange has found for the stages: it is counted with the interrupts. */
+static struct {
+    dq_t i;
+    const mrai_in_t *sample;
+    const mrai_schedule_t *schedule;
+    const current_target_t *target;
+} found;
 static int32_t outputs[OUTPUTS];
 
 void hal_adc_read(adc_counts_t *counts)
@@ -66,6 +74,16 @@ void hal_irq_pend_mrai(void)
 {
 }
 
+int16_t hal_temperature_winding_dC(void)
+{
+    return 200;
+}
+
+int16_t hal_temperature_inverter_dC(void)
+{
+    return 200;
+}
+
 CALLED void drive_start(void)
 {
     drive_init(&drive, &motor);
@@ -87,6 +105,10 @@ CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 CALLED void drive_copy(void)
 {
     copy = drive;
+    found.sample = &sample_box_look(&copy.samples)->mrai;
+    found.schedule = schedule_box_read(&copy.schedules);
+    found.target = &command_box_read(&copy.commands)->target;
+    found.i = found.sample->i;
 }
 
 CALLED uint32_t drive_limited(void)
@@ -104,7 +126,7 @@ CALLED const int32_t *drive_outputs(void)
         port.duty.a, port.duty.b, port.duty.c, port.gates,
         sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
         fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
-        (int32_t)fast->faults, mrai->e_d_q30, mrai->e_q_q30, mrai->psi_delta, mrai->r_delta,
+        (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
         drive.slow.torque.sum, drive.slow.torque.mean,
     };
     for (int k = 0; k < OUTPUTS; k++) {
@@ -136,18 +158,17 @@ CALLED void bench_task(void)
 /* From the measured currents to every table output, in memory. */
 STAGE void bench_flux_table(void)
 {
-    flux = flux_table_step(&copy.motor.flux_table, sample_box_look(&copy.samples)->mrai.i);
+    flux = flux_table_step(&copy.motor.flux_table, found.i);
 }
 
 STAGE void bench_mrai(void)
 {
-    const mrai_schedule_t *schedule = schedule_box_read(&copy.schedules);
-    mrai_step(&copy.motor.mrai, schedule, &copy.slow.mrai, &sample_box_look(&copy.samples)->mrai);
+    mrai_step(&copy.motor.mrai, found.schedule, &copy.slow.mrai, found.sample);
 }
 
 STAGE void bench_torque_estimate(void)
 {
-    const mrai_in_t *in = &sample_box_look(&copy.samples)->mrai;
+    const mrai_in_t *in = found.sample;
     (void)torque_estimate_step(&copy.slow.torque, in->i, &in->flux, copy.slow.mrai.psi_delta);
 }
 
@@ -158,7 +179,7 @@ STAGE void bench_current_tick(void)
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_step(&m->angle_tracker, &copy.fast.angle_tracker, port.theta_m);
     const current_control_in_t control = {
-        .target = &command_box_read(&copy.commands)->target,
+        .target = found.target,
         .flux = &flux,
         .omega = angle.omega_q31,
         .psi_delta = copy.slow.psi_delta_q15,

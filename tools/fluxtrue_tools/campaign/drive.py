@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The warm-up drive: synthesised from the published phase statistics of WLTC class 3b, docs/howto/campaign.md.
 
-Source   UN GTR No. 15, table of WLTC characteristics; no second of the original speed trace is copied
+Source   UN GTR No. 15, statistics of the class 3b cycle; no second of its speed trace is copied
 Units    SI, motor quantities: mechanical rad/s, N·m at the rotor
 """
 
@@ -32,10 +32,10 @@ class Phase:
 
 
 PHASES: Final = (
-    Phase(589.0, 56.5, 25.3, 1.47, 1.47),
-    Phase(433.0, 76.6, 44.5, 1.57, 1.49),
-    Phase(455.0, 97.4, 60.7, 1.58, 1.49),
-    Phase(323.0, 131.3, 94.0, 1.03, 1.21),
+    Phase(589.0, 56.5, 25.3, 1.611, 1.5),
+    Phase(433.0, 76.6, 44.5, 1.611, 1.5),
+    Phase(455.0, 97.4, 60.7, 1.666, 1.5),
+    Phase(323.0, 131.3, 94.0, 1.055, 1.44),
 )
 
 

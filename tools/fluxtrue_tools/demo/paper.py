@@ -36,7 +36,7 @@ def _scenario(torque_Nm: Any, magnet: Any, controller: dict[str, Any], **more: A
     profile = {"torque_Nm": torque_Nm, "speed_rpm": SPEED_RPM, "magnet_scale": magnet}
     return {
         "duration_s": 1.5,
-        "controller": controller | {"dead_time_compensation": 0.0},
+        "controller": controller | {"dead_time_compensation": 0.0, "identification_mode": "paper"},
         "profile": profile | more.pop("profile", {}),
         # The currents are the states of the paper's (1): they go on when the magnet changes.
         "plant": {"ideal_inverter": True, "magnet_step_keeps_current": True},

@@ -50,7 +50,8 @@ def prepare(
                 ["cmake", "--build", str(host), "-j2", "--target", target], log, "building the emulation"
             )
     if elf is None:
-        elf = image(PRESETS[angle], ROOT / "build" / PRESETS[angle])
+        with sim_build.build_lock():
+            elf = image(PRESETS[angle], ROOT / "build" / "emulated" / PRESETS[angle])
     elif not elf.is_file():
         raise FluxtrueError(f"--elf {elf}: no such file")
     return Parts(built, elf.resolve(), host / "emulator" / "layout.bin")

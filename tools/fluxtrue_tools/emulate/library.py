@@ -21,6 +21,7 @@ _SIGNATURES = {
     ),
     "sim_emulator": (ctypes.c_void_p, [ctypes.c_void_p]),
     "sim_shadow_difference": (ctypes.c_char_p, [ctypes.c_void_p]),
+    "sim_shadow_disturb": (None, [ctypes.c_void_p]),
     "emu_error": (ctypes.c_char_p, [ctypes.c_void_p]),
     "emu_register": (ctypes.c_uint64, [ctypes.c_void_p, ctypes.c_char_p]),
 }

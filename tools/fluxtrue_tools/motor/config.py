@@ -69,12 +69,30 @@ class Control(_Section):
     dead_time_compensation: Annotated[float, Field(ge=0, le=1)] = 1.0
 
 
+class Identification(_Section):
+    """[identification], all optional: what is not known before the first drive, as standard deviations"""
+
+    magnet_uncertainty: Annotated[float, Field(ge=0.001, le=0.5)] = 0.12  # of psi_f
+    lq_uncertainty: Annotated[float, Field(ge=0.001, le=0.3)] = 0.06
+    ld_uncertainty: Annotated[float, Field(ge=0.001, le=0.3)] = 0.06
+    resistance_uncertainty: Annotated[float, Field(ge=0.01, le=1.0)] = 0.25  # without a winding sensor
+    winding_uncertainty_K: Annotated[float, Field(ge=0.5, le=50)] = 10.0  # with one: it is not everywhere
+    dead_time_uncertainty: Annotated[float, Field(ge=0.01, le=1.0)] = 0.12
+    device_drop_uncertainty_V: Annotated[float, Field(ge=0.01, le=5)] = 0.3
+    angle_uncertainty_deg: Annotated[float, Field(ge=0.01, le=5)] = 0.3  # electrical
+    iron_loss_uncertainty: Annotated[float, Field(ge=0.01, le=0.9)] = 0.2
+    flux_uncertainty: Annotated[float, Field(ge=0.001, le=0.1)] = 0.01  # shape of the map, of psi_f
+    voltage_uncertainty: Annotated[float, Field(ge=0.0001, le=0.05)] = 0.0017  # of vdc
+    correlation_time_s: Annotated[float, Field(ge=0.01, le=2)] = 0.5  # of those two
+
+
 class MotorConfig(_Section):
     """The whole file."""
 
     machine: Machine
     inverter: Inverter
     control: Control = Control()
+    identification: Identification = Identification()
 
     @property
     def min_pulse_s(self) -> float:
@@ -138,7 +156,8 @@ def _allowed(section: type[BaseModel], key: str) -> str:
 
 
 def _section_of(name: str) -> type[BaseModel] | None:
-    return {"machine": Machine, "inverter": Inverter, "control": Control}.get(name)
+    sections = {"machine": Machine, "inverter": Inverter, "control": Control, "identification": Identification}
+    return sections.get(name)
 
 
 def _message(error: dict[str, Any]) -> str:

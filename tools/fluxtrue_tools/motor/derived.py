@@ -4,6 +4,7 @@
 import math
 from dataclasses import dataclass
 
+from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
@@ -78,6 +79,7 @@ class Derived:
     v_max_V: float
     v_min_V: float
     sum_max_A: float
+    identify: identification.Identify
 
 
 def _current_control(period_s: float) -> dict[str, float]:
@@ -153,6 +155,7 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_identification(config, model, bases.period_s, psi_f),
         **_torque_loop(config),
         **_monitors(config),
+        identify=identification.derive(config, bases.period_s, psi_f),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
@@ -132,14 +133,14 @@ def _mrai_gains(motor: Motor) -> list[Row]:
     return [
         ("r0", q31(r0, "r0"), "R at 20 C"),
         ("pole_gain", q31(control.observer_m * r0 / 2, "pole_gain"), f"m R_0/2, m = {control.observer_m:g}"),
-        ("l_shift", f"{motor.tables.l_shift}u", ""),
-        ("rate_gain_q26", str(round(2**26 / (b.omega_rad_s * b.period_s))), "1/(omega_b T_s)"),
+        ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
         ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
          f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
-        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s * b.period_s, "resistance_gain"),
-         f"2 k_r T_s, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
-        ("flux_proportional", q16(d.flux_proportional, "flux_proportional"), f"{d.flux_proportional:.6g} periods"),
-        ("resistance_proportional", q16(d.resistance_proportional, "resistance_proportional"),
+        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s / b.omega_rad_s, "resistance_gain"),
+         f"2 k_r/omega_b, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
+        ("flux_proportional_q24", q31(d.flux_proportional / 128, "flux_proportional"),
+         f"{d.flux_proportional:.6g} periods"),
+        ("resistance_proportional_q24", q31(d.resistance_proportional / 128, "resistance_proportional"),
          f"{d.resistance_proportional:.6g} periods"),
     ]
 
@@ -213,6 +214,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
         ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
+        ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
         ("monitor", _monitor(motor), ""),
     ]
@@ -279,6 +281,7 @@ def _si_rows(motor: Motor) -> list[Row]:
               "nq": len(tables.iq_A), "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
     pointers = ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs", "ref_id_A", "ref_iq_A", "ref_torque_max_Nm")
     return [*((k, v, "") for k, v in counts.items()), *((k, _double(v), "") for k, v in numbers.items()),
+            *identification.si_rows(motor.config, motor.derived.identify),
             *((name, f"table_{name}", "") for name in pointers)]
 
 

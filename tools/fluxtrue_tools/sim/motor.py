@@ -41,6 +41,8 @@ def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[
         "ld_H": machine["ld_H"],
         "lq_H": machine["lq_H"],
         "psi_f_Vs": machine["psi_f_Vs"],
+        "iron_k_h": machine["iron_loss_hysteresis"],
+        "iron_k_e": machine["iron_loss_eddy"],
         "vdc_V": inverter["vdc_V"],
         "pwm_hz": inverter["pwm_hz"],
         "dead_time_s": inverter["dead_time_s"],

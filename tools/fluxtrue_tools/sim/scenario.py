@@ -79,6 +79,7 @@ class Controller(BaseModel):
     enable: bool = True
     torque_loop: bool = True
     identification: bool = True
+    identification_mode: Literal["paper", "robust"] = "robust"
 
     @model_validator(mode="after")
     def _no_plant(self) -> "Controller":
@@ -92,6 +93,7 @@ class Controller(BaseModel):
     def values(self) -> dict[str, float]:
         """Names and numbers as the controller takes them."""
         flags = {name: float(getattr(self, name)) for name in ("torque_loop", "identification")}
+        flags["identification_mode"] = float(self.identification_mode == "robust")
         return flags | (self.__pydantic_extra__ or {}) | {"enable": float(self.enable)}
 
 

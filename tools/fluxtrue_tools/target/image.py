@@ -9,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 
 from elftools.common.exceptions import ELFError
+from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 from elftools.elf.segments import Segment
 
@@ -18,7 +19,7 @@ RAM_FROM = 0x1000_0000  # everything the linker puts below is flash
 
 
 class Image:
-    """Loadable segments and symbols of an ELF file, and its bytes."""
+    """Loadable segments, their sections and the symbols of an ELF file, and its bytes."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -26,6 +27,7 @@ class Image:
             self.content = bytearray(path.read_bytes())
             elf = ELFFile(BytesIO(bytes(self.content)))
             self.segments: list[Segment] = list(elf.iter_segments("PT_LOAD"))
+            self.sections = [s for s in elf.iter_sections() if s["sh_flags"] & SH_FLAGS.SHF_ALLOC]
             table = elf.get_section_by_name(".symtab")
             symbols = table.iter_symbols() if table is not None else ()
             self.symbols = {symbol.name: int(symbol["st_value"]) for symbol in symbols}
@@ -64,9 +66,9 @@ def seal(path: Path) -> str:
 
 def size(path: Path, flash_most: int, ram_most: int) -> str:
     """Flash and RAM, against bounds."""
-    segments = Image(path).segments
-    flash = sum(p["p_filesz"] for p in segments if p["p_paddr"] < RAM_FROM)
-    ram = sum(p["p_memsz"] for p in segments if p["p_vaddr"] >= RAM_FROM)
+    sections = Image(path).sections
+    flash = sum(s["sh_size"] for s in sections if s["sh_type"] == "SHT_PROGBITS")
+    ram = sum(s["sh_size"] for s in sections if s["sh_addr"] >= RAM_FROM)
     text = f"{path.name}: flash {flash} of {flash_most} bytes, RAM {ram} of {ram_most} bytes with the stack"
     if flash > flash_most or ram > ram_most:
         raise FluxtrueError(text)

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/drive.h"
+#include "hal/temperature.h"
+
+static bool at_limit(const identify_state_t *state, identify_index_t index)
+{
+    return fx_abs_q31(state->filter.x[index]) >= 4 * IDENTIFY_ONE_Q27;
+}
+
+/* Share of the prior's variance that is gone. */
+static q15_t known(const identify_memory_t *memory, identify_index_t index)
+{
+    return (q15_t)(Q15_MAX - (memory->variance[index] >> 15));
+}
+
+static void report_robust(drive_t *drive)
+{
+    const identify_config_t *config = &drive->motor.identify;
+    task_state_t *task = &drive->task;
+    const identify_state_t *state = &task->identify;
+    const identify_memory_t memory = identify_memory_get(state);
+    task->torque_estimate = task->identified.torque;
+    task->learnt = (learnt_t){
+        .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
+        .r_delta = fx_add_q31(state->r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
+        .psi_clamped = at_limit(state, IDENTIFY_FLUX),
+        .r_clamped = at_limit(state, IDENTIFY_R),
+    };
+    task->quality.psi_quality = known(&memory, IDENTIFY_FLUX);
+    task->quality.r_quality = known(&memory, IDENTIFY_R);
+}
+
+/* Ten periods from the MRAI ISR, the tables at their magnetising current, and what follows from both. */
+static void robust(drive_t *drive, const sample_t *sample)
+{
+    const motor_t *m = &drive->motor;
+    task_state_t *task = &drive->task;
+    const int16_t winding_dC = hal_temperature_winding_dC();
+    const identify_window_t window = window_box_read(&drive->windows);
+    const identify_point_t point = identify_point(&m->identify, &window, sample->mrai.omega);
+    const flux_point_t flux = flux_table_step(&m->flux_table, point.i_m);
+    const identify_in_t in = {
+        .point = &point,
+        .flux = &flux,
+        .temperature_known = winding_dC != HAL_TEMPERATURE_UNKNOWN,
+        .winding_dC = winding_dC,
+        .enabled = drive->request.identification && sample->acting,
+    };
+    task->identified = identify_step(&m->identify, &task->identify, &in);
+    task->identifications = task->identifications + 1U;
+    report_robust(drive);
+}
+
+static void report_paper(drive_t *drive)
+{
+    const mrai_state_t *mrai = &drive->slow.mrai;
+    drive->task.torque_estimate = drive->slow.torque.mean;
+    drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai_flux_clamped(&drive->motor.mrai, mrai),
+                                    mrai_resistance_clamped(&drive->motor.mrai, mrai)};
+}
+
+void drive_identify(drive_t *drive, const sample_t *sample)
+{
+    if (drive->request.identification_mode == IDENTIFICATION_ROBUST) {
+        robust(drive, sample);
+    } else {
+        report_paper(drive);
+    }
+}
+
+identify_memory_t drive_learnt(const drive_t *drive)
+{
+    identify_memory_t memory;
+    uint32_t seen;
+    do {
+        seen = drive->task.identifications;
+        exchange_barrier();
+        memory = identify_memory_get(&drive->task.identify);
+        exchange_barrier();
+    } while (drive->task.identifications != seen);
+    return memory;
+}
+
+bool drive_recall(drive_t *drive, const identify_memory_t *memory)
+{
+    return identify_memory_restore(&drive->task.identify, memory);
+}

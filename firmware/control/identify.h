@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_IDENTIFY_H
+#define CONTROL_IDENTIFY_H
+/** Robust identification: seven slow parameters and a local flux error from the two voltage equations, and the torque.
+ *   each step  residuals of the operating point, local flux error, torque
+ *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md
+ *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the voltage model, as far as speed makes it better
+ *   each tenth step  mean residual into the Kalman filter, leak, confidence
+ * Source   docs/theory/identification.md (ID-5) ... (ID-20)
+ * Units    per unit
+ * Range    as in its parts
+ * Rounding 1/2 LSB q15 in the torque
+ * Errors   a closed gate freezes what is learnt; clamps and contradictions close the confidence, not the estimate
+ * Context  1 kHz task; three divisions per step, one more per update and axis */
+#include "control/identify_filter.h"
+
+#define IDENTIFY_STEPS 10 /* per update */
+
+typedef struct {
+    identify_filter_t filter;
+    identify_row_t mean_d, mean_q; /* over the steps of one update */
+    dq_t mean_e;
+    int32_t mean_noise_q30;
+    uint8_t steps;
+    bool learn;          /* every step of this update was valid */
+    bool clamped;        /* a parameter reached its limit in the last update */
+    dq_t local;          /* flux error of this operating point, Q30 */
+    q31_t r_prior;
+    bool r_known;        /* the winding temperature is measured */
+    q15_t contradiction; /* share of recent updates that the model cannot explain */
+    q15_t confidence;
+    bool trusted;        /* where the confidence is going */
+} identify_state_t;
+
+typedef struct {
+    const identify_point_t *point;
+    const flux_point_t *flux; /* of the tables at point->i_m */
+    bool temperature_known;
+    int16_t winding_dC;
+    bool enabled;
+} identify_in_t;
+
+typedef struct {
+    q15_t torque;     /* air gap, mean over the window */
+    q15_t psi_delta;  /* identified minus table's flux in the d axis, here */
+} identify_out_t;
+
+void identify_reset(const identify_config_t *config, identify_state_t *state);
+identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in);
+/** Value of a parameter, per unit, q31: sigma x, limited to +-1. */
+q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index);
+
+#endif

@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/identify_filter.h"
+
+#define X_MAX (4 * IDENTIFY_ONE_Q27)
+#define E_MAX (1 << 26)
+#define S_MIN (INT64_C(1) << 38) /* the square of the smallest noise that identify_valid() accepts */
+#define INCONSISTENT_SHIFT 3 /* e^2 > 8 s: 2.8 standard deviations */
+#define SIGNIFICANT 16 /* bits of the divisor */
+
+/* s as mantissa and exponent: 1/s = inverse 2^-(32 + shift), rounded down. */
+typedef struct {
+    uint32_t inverse;
+    unsigned shift;
+} reciprocal_t;
+
+static int32_t round_shift(int64_t x, unsigned n)
+{
+    return fx_sat_q31((x + (INT64_C(1) << (n - 1U))) >> n);
+}
+
+static unsigned place(unsigned row, unsigned column)
+{
+    const unsigned lo = (row < column) ? row : column;
+    const unsigned hi = (row < column) ? column : row;
+    return lo * IDENTIFY_STATES - (lo * (lo - 1U)) / 2U + (hi - lo);
+}
+
+void identify_filter_reset(identify_filter_t *filter)
+{
+    *filter = (identify_filter_t){{0}, {0}};
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        filter->p[place(j, j)] = IDENTIFY_ONE_Q30;
+    }
+}
+
+/* P h', Q30; answers h P h' in Q60. */
+static int64_t project(const identify_filter_t *filter, const identify_row_t *row, int32_t *ph)
+{
+    int64_t variance = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        int64_t sum = 0;
+        for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
+            sum += (int64_t)filter->p[place(j, l)] * row->h[l];
+        }
+        ph[j] = round_shift(sum, 30);
+        variance += (int64_t)ph[j] * row->h[j];
+    }
+    return variance;
+}
+
+int64_t identify_filter_variance(const identify_filter_t *filter, const identify_row_t *row)
+{
+    int32_t ph[IDENTIFY_STATES];
+    return project(filter, row, ph);
+}
+
+int64_t identify_filter_prior(const identify_row_t *row)
+{
+    int64_t variance = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        variance += (int64_t)row->h[j] * row->h[j];
+    }
+    return variance;
+}
+
+int32_t identify_filter_shift(const identify_filter_t *filter, const identify_row_t *row)
+{
+    int64_t sum = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        sum += (int64_t)filter->x[j] * row->h[j];
+    }
+    return round_shift(sum, 27);
+}
+
+/* The divisor's first 16 bits, rounded up: the gain is never larger than the optimum (ID-11). */
+static reciprocal_t reciprocal(int64_t s)
+{
+    const uint64_t divisor = (uint64_t)s;
+    const unsigned shift = 64U - (unsigned)__builtin_clzll(divisor) - SIGNIFICANT;
+    const uint32_t mantissa = (uint32_t)(divisor >> shift) + 1U;
+    return (reciprocal_t){UINT32_MAX / mantissa, shift};
+}
+
+static void shrink(identify_filter_t *filter, const int32_t *ph, const int32_t *gain_q24)
+{
+    unsigned k = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        for (unsigned l = j; l < IDENTIFY_STATES; l++, k++) {
+            filter->p[k] = fx_sub_q31(filter->p[k], round_shift((int64_t)gain_q24[j] * ph[l], 24));
+        }
+    }
+}
+
+identify_verdict_t identify_filter_update(identify_filter_t *filter, const identify_row_t *row, int32_t e_q30,
+                                          int64_t r_q60)
+{
+    int32_t ph[IDENTIFY_STATES];
+    int32_t gain[IDENTIFY_STATES];
+    int64_t s = project(filter, row, ph) + r_q60;
+    s = (s < S_MIN) ? S_MIN : s;
+    const reciprocal_t by = reciprocal(s);
+    const int32_t e = fx_clamp_q31(e_q30, -E_MAX, E_MAX);
+    identify_verdict_t verdict = {false, ((int64_t)e_q30 * e_q30) >> INCONSISTENT_SHIFT > s};
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        /* Q30 2^30/s = Q24 after 54 - 32 - shift. */
+        gain[j] = round_shift((int64_t)ph[j] * by.inverse, by.shift - 22U);
+        const int32_t moved = fx_add_q31(filter->x[j], round_shift((int64_t)gain[j] * e, 27));
+        filter->x[j] = fx_clamp_q31(moved, -X_MAX, X_MAX);
+        verdict.clamped = verdict.clamped || filter->x[j] != moved;
+    }
+    shrink(filter, ph, gain);
+    return verdict;
+}
+
+void identify_filter_leak(const identify_config_t *config, identify_filter_t *filter, bool r_known)
+{
+    unsigned k = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        const int32_t prior = (j == IDENTIFY_R && r_known) ? config->r_known_q30 : IDENTIFY_ONE_Q30;
+        filter->x[j] -= fx_mul_q31(config->leak[j], filter->x[j]);
+        filter->p[k] = fx_add_q31(filter->p[k], fx_mul_q31(2 * config->leak[j], prior - filter->p[k]));
+        k++;
+        for (unsigned l = j + 1U; l < IDENTIFY_STATES; l++, k++) {
+            filter->p[k] -= fx_mul_q31(config->leak[j] + config->leak[l], filter->p[k]);
+        }
+    }
+}

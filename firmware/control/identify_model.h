@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_IDENTIFY_MODEL_H
+#define CONTROL_IDENTIFY_MODEL_H
+/** What the tables say of an operating point, and how each unknown would change it.
+ *   residual  y = u - R i - w J psi(i_m) - d psi/dt     h = d(voltage)/d(state), per sigma, both axes
+ *   torque    t = psi_d i_mq - psi_q i_md               h_t = dt/d(state), per sigma
+ * Source   docs/theory/identification.md (ID-5) ... (ID-8)
+ * Units    per unit, Q30
+ * Range    |h| is limited to 1/4
+ * Rounding half up, a few LSB of Q30
+ * Errors   saturates
+ * Context  1 kHz task; two divisions of bounded quantities */
+#include "control/flux_table_types.h"
+#include "control/identify_point.h"
+
+typedef struct {
+    int32_t h[IDENTIFY_STATES];
+} identify_row_t;
+
+typedef struct {
+    dq_t y;                  /* residual with every state at its prior */
+    identify_row_t d, q;
+    dq_t psi;                /* of the tables, at i_m */
+    dq_t i_m;
+    dq_t turn;               /* d psi/d(angle), in the measured frame */
+    dq_t iron_psi, iron_i;   /* change of psi and of i_m with the scale of the iron loss */
+    int32_t slope;           /* psi_d - psi_f0 */
+    bool current;            /* enough current for the drop to have a direction */
+} identify_model_t;
+
+identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
+                                const flux_point_t *flux, q31_t r_prior);
+identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
+
+#endif

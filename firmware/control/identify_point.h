@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_IDENTIFY_POINT_H
+#define CONTROL_IDENTIFY_POINT_H
+/** One operating point from ten periods: means, speed, change of flux, magnetising current.
+ *   i = trapezoidal mean, u = mean acting voltage/sinc, w = turn of the measured angle over the window
+ *   i_m = i + a (psi_q, -psi_d),  a = (k_h sgn w + k_e w)/1.5
+ * Source   docs/theory/identification.md (ID-1) ... (ID-4)
+ * Units    per unit: i q31; u, rate Q30; i_m q15
+ * Range    |w| < 1; the tracked speed says how many whole turns the angle made
+ * Rounding half up, 1/2 LSB of Q30
+ * Errors   saturates; valid is false where nothing may be learnt from the window's voltage
+ * Context  1 kHz task */
+#include "control/identify_config.h"
+#include "control/identify_window.h"
+
+typedef struct {
+    dq_t i, u, rate;
+    dq_t i_m;
+    q31_t omega;
+    q31_t iron; /* a */
+    uint8_t limited;
+    bool valid;
+} identify_point_t;
+
+identify_point_t identify_point(const identify_config_t *config, const identify_window_t *window, q31_t omega_tracked);
+
+#endif

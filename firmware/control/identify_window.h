@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_IDENTIFY_WINDOW_H
+#define CONTROL_IDENTIFY_WINDOW_H
+/** The identification's part of every period: sums over ten of them, nothing else.
+ *   sum_i over samples 1 ... 10, sum_u over the voltages stated with them, and both ends of the ten periods
+ * Source   docs/theory/identification.md (ID-1)
+ * Units    q15 counts in words; angles 2^32 = one turn
+ * Range    any: |sum| <= 10 * 2^15
+ * Rounding none: exact
+ * Errors   acting is false if the bridge was not ours in one of the periods
+ * Context  MRAI ISR; no multiplication, no division, no loop */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "control/flux_table_types.h"
+#include "types/frames.h"
+
+#define IDENTIFY_PERIODS 10
+
+typedef struct {
+    dq_t i, u, psi; /* u acts during the period that starts here */
+    uint32_t theta;
+} identify_end_t;
+
+typedef struct {
+    identify_end_t first, last;
+    dq_t sum_i, sum_u;
+    uint8_t count, limited; /* periods so far; of these, with pulses that the bridge cannot make */
+    bool acting;
+} identify_window_t;
+
+typedef struct {
+    dq_t i, u;
+    const flux_point_t *flux;
+    uint32_t theta;
+    bool acting, limited;
+} identify_sample_t;
+
+/** True: ten periods are complete in *window; the next call starts anew from its last end. */
+bool identify_window_step(identify_window_t *window, const identify_sample_t *in);
+
+#endif

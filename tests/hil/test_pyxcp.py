@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A calibration master that this project did not write, against an ECU that keeps pace with the wall clock."""
+
+import struct
+from collections.abc import Callable, Iterator
+
+import pytest
+from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+from pyxcp.config import create_application_from_config
+from pyxcp.master import Master
+from pyxcp.types import XcpResponseError
+
+from xcp_master import key_of
+
+pytestmark = pytest.mark.program
+COMMAND_ID, ANSWER_ID = 0x650, 0x651
+FLOAT = struct.Struct("<f")
+
+
+def _key(resource: int, seed: bytes) -> bytes:
+    return key_of(int.from_bytes(seed, "little")).to_bytes(4, "little")
+
+
+@pytest.fixture
+def ecu(program: object) -> Iterator[VirtualEcu]:
+    """pyxcp waits for its answers in wall-clock time: so must the ECU run."""
+    with VirtualEcu(program, fast=False) as running:  # type: ignore[arg-type]
+        yield running
+
+
+@pytest.fixture
+def master(ecu: VirtualEcu) -> Iterator[Master]:
+    """A connected master."""
+    application = create_application_from_config({})
+    bus = application.transport.can
+    bus.interface, bus.channel, bus.bitrate = "socketcand", "can0", 500000
+    bus.can_id_master, bus.can_id_slave = COMMAND_ID, ANSWER_ID
+    bus.socketcand.host, bus.socketcand.port = HOST, ecu.can_port
+    application.general.seed_n_key_function = _key
+    application.general.disable_error_handling = True
+    with Master("can", config=application) as connected:
+        connected.connect()
+        yield connected
+        connected.disconnect()
+
+
+@pytest.fixture
+def address(description: Description) -> Callable[[str], int]:
+    """Where the A2L file says a value lies."""
+    where = {value.name: value.address for value in (*description.values, *description.measurements)}
+    return lambda name: where[name]
+
+
+def _read(master: Master, address: int) -> float:
+    master.setMta(address)
+    return FLOAT.unpack(master.upload(FLOAT.size))[0]
+
+
+def _write(master: Master, address: int, value: float) -> None:
+    master.setMta(address)
+    master.download(FLOAT.pack(value))
+
+
+def test_a_value_is_locked_then_written_then_read_back(master: Master, address: Callable[[str], int]) -> None:
+    at = address("observer_m")
+    with pytest.raises(XcpResponseError):
+        _write(master, at, 3.5)
+    assert _read(master, at) == pytest.approx(3.0, abs=1e-5)
+    master.cond_unlock()
+    _write(master, at, 3.5)
+    assert _read(master, at) == 3.5
+
+
+def test_a_value_out_of_its_range_is_refused_and_the_old_one_stays(
+    master: Master, address: Callable[[str], int]
+) -> None:
+    master.cond_unlock()
+    at = address("dead_time_compensation")
+    before = _read(master, at)
+    for bad in (1.01, -0.01, float("nan"), float("inf")):
+        with pytest.raises(XcpResponseError, match="OUT_OF_RANGE"):
+            _write(master, at, bad)
+        assert _read(master, at) == before
+
+
+def test_the_checksum_tells_a_changed_page_from_the_built_in_one(
+    master: Master, address: Callable[[str], int], description: Description
+) -> None:
+    start, size = min(value.address for value in description.values), 4 * len(description.values)
+
+    def checksum() -> int:
+        master.setMta(start)
+        return int(master.buildChecksum(size).checksum)
+
+    built_in = checksum()
+    master.cond_unlock()
+    _write(master, address("observer_m"), 2.5)
+    assert checksum() != built_in
+    master.copyCalPage(0, 0, 0, 1)
+    assert checksum() == built_in
+
+
+def test_the_slave_describes_itself_as_the_a2l_file_does(master: Master) -> None:
+    processor = master.getDaqProcessorInfo()
+    assert (processor.maxDaq, processor.maxEventChannel) == (4, 2)
+    assert processor.daqProperties.daqConfigType == "DYNAMIC"
+    assert master.getDaqResolutionInfo().maxOdtEntrySizeDaq == 7

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The campaign on machines it was not written for: strong saturation, hardly any."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+MOTORS = ROOT / "tests" / "motors"
+CASES = 2
+
+
+def campaign(name: str, out: Path) -> pd.DataFrame:
+    file = Path(__file__).with_name(f"{name}.toml")
+    command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES), "--out", str(out),
+               "--no-check"]  # fmt: skip
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+    result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert result.returncode == 0, result.stderr
+    return pd.read_parquet(out / "results.parquet")
+
+
+@pytest.mark.parametrize("name", ["saturated", "linear"])
+def test_another_machine_needs_nothing_but_its_folder(tmp_path: Path, name: str) -> None:
+    table = campaign(name, tmp_path)
+    assert table["case"].nunique() == CASES
+    assert table["finite"].all()
+    tables = table[table["controller"] == "tables"]
+    assert (tables["run_fault_word"] == 0).all()
+    # Below the voltage limit nothing is wrong by more than magnet and inductances together: 25 and 10 %.
+    assert tables[tables["voltage_limited"] == 0.0]["error_percent"].abs().max() < 35.0
+
+
+@pytest.mark.parametrize("name", ["saturated", "linear"])
+def test_the_map_is_what_its_script_makes(name: str) -> None:
+    spec = importlib.util.spec_from_file_location("make_maps", MOTORS / "make_maps.py")
+    assert spec is not None
+    assert spec.loader is not None
+    make_maps = importlib.util.module_from_spec(spec)
+    sys.modules["make_maps"] = make_maps  # dataclasses look their module up
+    spec.loader.exec_module(make_maps)
+    shipped = pd.read_csv(MOTORS / name / "flux_map.csv", comment="#")
+    iron = make_maps.MACHINES[name]
+    made = pd.DataFrame(make_maps.rows(iron), columns=list(shipped.columns))
+    # Nine decimals are written.
+    assert (shipped - made).abs().max(axis=None) < 1e-9
+    i_d, i_q = iron.currents(*shipped.loc[300, ["psi_d_Vs", "psi_q_Vs"]])
+    assert (i_d, i_q) == pytest.approx((shipped.loc[300, "id_A"], shipped.loc[300, "iq_A"]), abs=1e-3)

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TWIN_IDENTIFY_H
+#define TWIN_IDENTIFY_H
+/** The robust identification in SI doubles, from docs/theory/identification.md; parameters in prior sigmas.
+ * Units    SI; x and P relative to the priors
+ * Context  tests and simulation on a host */
+#include "twin/twin_stages.h"
+
+enum { TWIN_STATES = 7 };
+
+typedef struct {
+    twin_dq_t i, u, psi;
+    double theta;
+} twin_end_t;
+
+/* Ten periods: sums over samples 1 ... 10 and both ends. */
+typedef struct {
+    twin_end_t first, last;
+    twin_dq_t sum_i, sum_u;
+    int count, limited;
+    bool acting;
+} twin_window_t;
+
+/* One period more; true when ten are complete. */
+bool twin_window(twin_window_t *window, const twin_end_t *sample, bool acting, bool limited);
+
+typedef struct {
+    twin_dq_t i, u, rate, i_m;
+    double omega, iron; /* iron: A/Vs */
+    int limited;
+    bool valid;
+} twin_point_t;
+
+twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, double omega_tracked);
+
+typedef struct {
+    twin_dq_t y, psi, turn, iron_psi, iron_i;
+    double d[TWIN_STATES], q[TWIN_STATES], torque[TWIN_STATES]; /* per sigma; torque in Vs A */
+    double slope;
+    bool current;
+} twin_model_t;
+
+twin_model_t twin_model(const motor_si_t *motor, const twin_point_t *point, double r_prior);
+
+typedef struct {
+    double x[TWIN_STATES], p[TWIN_STATES][TWIN_STATES];
+} twin_filter_t;
+
+void twin_filter_reset(twin_filter_t *filter);
+/* Scalar measurement; answers whether model and measurement contradict each other or a state is at its limit. */
+bool twin_filter_update(twin_filter_t *filter, const double h[TWIN_STATES], double e, double r);
+void twin_filter_leak(const motor_si_t *motor, twin_filter_t *filter, bool r_known);
+
+typedef struct {
+    twin_filter_t filter;
+    double mean_d[TWIN_STATES], mean_q[TWIN_STATES], noise;
+    twin_dq_t e, local;
+    double r_prior, contradiction, confidence;
+    double torque, psi_delta; /* N m, Vs */
+    int steps;
+    bool learn, r_known, trusted;
+} twin_identify_t;
+
+void twin_identify_reset(const motor_si_t *motor, twin_identify_t *state);
+/* winding_C: NaN without a sensor. */
+void twin_identify(const motor_si_t *motor, twin_identify_t *state, const twin_point_t *point, double winding_C,
+                   bool enabled);
+
+#endif

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No activity ever sees half of a value: it is interrupted at each of its instructions."""
+
+from collections.abc import Iterator
+
+import pytest
+from fluxtrue_tools.emulate import library, preempt
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.sim.library import Loop
+
+
+@pytest.fixture(scope="module")
+def loop(parts: Parts) -> Iterator[Loop]:
+    """Identifying a weak magnet at 3000 rpm, counted instruction by instruction."""
+    motor = parts.emulated(library.COUNTING)
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5,
+                           "magnet_scale": 0.9}  # fmt: skip
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        for name, value in (("torque_loop", 1), ("identification", 1), ("enable", 1), ("torque_command_Nm", 80)):
+            loop.set(name, value)
+        loop.run(2000)
+        assert loop.get("fault_word") == 0
+        yield loop
+
+
+def check(report: preempt.Report) -> None:
+    assert report.mixed == 0, report
+    # Every boundary was tried, and both the old and the new values were seen.
+    assert report.points == report.instructions > 100
+    assert report.outcomes >= 2
+
+
+@pytest.mark.parametrize("periods", [1, 7])
+def test_the_identification_uses_the_old_sample_or_the_new_one_wherever_it_is_interrupted(
+    loop: Loop, periods: int
+) -> None:
+    loop.run(periods)
+    check(preempt.interrupt_everywhere(loop, preempt.MRAI))
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_the_task_uses_old_or_new_values_wherever_both_interrupts_come(loop: Loop, rounds: int) -> None:
+    # Two rounds at one place overwrite the slot that the task may be copying from: it has to look again.
+    check(preempt.interrupt_everywhere(loop, preempt.TASK, rounds))
+
+
+def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop) -> None:
+    before = loop.get("truth.time_s")
+    loop.run(100)
+    assert loop.get("truth.time_s") == pytest.approx(before + 0.01)
+    assert loop.get("fault_word") == 0
+    assert loop.get("truth.torque_Nm") == pytest.approx(80, abs=3)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sealing and sizing a linked image."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zlib
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.target import image
+from fluxtrue_tools.target.build import ARM_CC
+
+SOURCE = """
+__attribute__((section(".guarded"), used)) const unsigned char data[6] = {1, 2, 3, 4, 5, 6};
+__attribute__((section(".crc"), used)) const unsigned protected_crc = 0xFFFFFFFF;
+char big[1000] = {1};
+void start(void) { big[1]++; }
+"""
+SCRIPT = """
+ENTRY(start)
+SECTIONS {
+  .text 0x100 : { *(.text*) }
+  .guarded 0x1000 : { protected_start = .; *(.guarded) protected_end = .; . = ALIGN(4); KEEP(*(.crc)) }
+  .data 0x20000000 : AT(0x2000) { *(.data*) }
+  /DISCARD/ : { *(.ARM*) *(.comment) }
+}
+"""
+
+
+@pytest.fixture
+def elf(tmp_path: Path) -> Path:
+    if shutil.which(ARM_CC) is None:
+        pytest.skip(f"{ARM_CC} is not installed")
+    (tmp_path / "a.c").write_text(SOURCE)
+    (tmp_path / "a.ld").write_text(SCRIPT)
+    command = [ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-T", "a.ld", "a.c", "-o", "a.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    return tmp_path / "a.elf"
+
+
+def test_the_seal_is_the_checksum_of_what_lies_between_the_marks(elf: Path) -> None:
+    assert "over 6 bytes at 0x1000" in image.seal(elf)
+    content = elf.read_bytes()
+    at = content.index(bytes([1, 2, 3, 4, 5, 6]))
+    assert content[at + 8 : at + 12] == zlib.crc32(bytes([1, 2, 3, 4, 5, 6])).to_bytes(4, "little")
+
+
+def test_sealing_twice_changes_nothing(elf: Path) -> None:
+    image.seal(elf)
+    once = elf.read_bytes()
+    image.seal(elf)
+    assert elf.read_bytes() == once
+
+
+def test_initialised_data_count_in_flash_and_in_ram(elf: Path) -> None:
+    text = image.size(elf, 4096, 4096)
+    flash, ram = (int(part.split()[1]) for part in text.split(": ")[1].split(", "))
+    assert ram == 1000
+    assert 1012 < flash < 1100  # data, guarded bytes with their checksum, and a few instructions
+
+
+def test_an_image_beyond_its_bounds_is_an_error(elf: Path) -> None:
+    with pytest.raises(FluxtrueError, match=r"RAM 1000 of 999 bytes"):
+        image.size(elf, 4096, 999)
+    with pytest.raises(FluxtrueError, match=r"of 1000 bytes, RAM"):
+        image.size(elf, 1000, 1000)
+
+
+def test_what_is_no_image_is_refused_and_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "x.elf"
+    path.write_bytes(b"something else")
+    with pytest.raises(FluxtrueError, match="no ELF file"):
+        image.seal(path)
+    assert path.read_bytes() == b"something else"
+    with pytest.raises(FluxtrueError, match="No such file"):
+        image.seal(tmp_path / "missing.elf")
+
+
+def test_an_elf_without_the_marks_is_refused(elf: Path, tmp_path: Path) -> None:
+    (tmp_path / "b.c").write_text("void start(void) {}\n")
+    command = [ARM_CC, "-mcpu=cortex-m4", "-nostdlib", "-e", "start", "b.c", "-o", "b.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    with pytest.raises(FluxtrueError, match="no symbol 'protected_start'"):
+        image.seal(tmp_path / "b.elf")

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The emulated processor by itself: any ELF file for the S32K144, run, read, snapshot."""
+
+import ctypes
+from pathlib import Path
+from typing import Final
+
+from fluxtrue_tools.emulate.library import COUNTING, ERROR_SIZE, FAST
+from fluxtrue_tools.errors import FluxtrueError
+
+TICKS_PER_S: Final = 3_360_000_000
+LIMIT, CENTRE, BREAK, FAILED = 0, 1, 2, -1
+NO_REGISTER: Final = 2**64 - 1
+
+_U64, _U32, _INT, _BOOL = ctypes.c_uint64, ctypes.c_uint32, ctypes.c_int, ctypes.c_bool
+_HERE, _TEXT = ctypes.c_void_p, ctypes.c_char_p
+ON_EXCEPTION = ctypes.CFUNCTYPE(None, _HERE, _INT, _BOOL)
+_SIGNATURES = {
+    "emu_create": (_HERE, [_TEXT, _INT, _TEXT, ctypes.c_size_t]),
+    "emu_destroy": (None, [_HERE]),
+    "emu_run": (_INT, [_HERE, _U64]),
+    "emu_error": (_TEXT, [_HERE]),
+    "emu_now": (_U64, [_HERE]),
+    "emu_instructions": (_U64, [_HERE]),
+    "emu_resets": (_U32, [_HERE]),
+    "emu_read": (_BOOL, [_HERE, _U32, _HERE, _U32]),
+    "emu_write": (_BOOL, [_HERE, _U32, _HERE, _U32]),
+    "emu_symbol": (_U32, [_HERE, _TEXT]),
+    "emu_register": (_U64, [_HERE, _TEXT]),
+    "emu_register_set": (_BOOL, [_HERE, _TEXT, _U32]),
+    "emu_on_exception": (None, [_HERE, ON_EXCEPTION, _HERE]),
+    "emu_active_vector": (_INT, [_HERE]),
+    "emu_pend": (None, [_HERE, _INT]),
+    "emu_save": (_HERE, [_HERE]),
+    "emu_restore": (None, [_HERE, _HERE]),
+    "emu_snapshot_free": (None, [_HERE]),
+    "emu_break_after": (None, [_HERE, _U64]),
+    "emu_board_pins": (None, [_HERE, _BOOL, _BOOL]),
+    "sim_emulator": (_HERE, [_HERE]),
+}
+
+
+def declare(library: ctypes.CDLL) -> ctypes.CDLL:
+    """Prototypes of the processor's functions."""
+    for name, (result, arguments) in _SIGNATURES.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
+
+
+class Core:
+    """One processor: its own, running an ELF file, or the one inside a simulation."""
+
+    def __init__(self, library: ctypes.CDLL, handle: int, owned: bool) -> None:
+        self._library, self._handle, self._owned = declare(library), handle, owned
+        self._callback: object = None
+
+    @classmethod
+    def of_program(cls, library: ctypes.CDLL, elf: Path, counting: bool = False) -> "Core":
+        """A processor out of reset with this program in its flash."""
+        error = ctypes.create_string_buffer(ERROR_SIZE)
+        mode = COUNTING if counting else FAST
+        handle = declare(library).emu_create(bytes(elf), mode, error, ERROR_SIZE)
+        if not handle:
+            raise FluxtrueError(error.value.decode(errors="replace"))
+        return cls(library, handle, owned=True)
+
+    @classmethod
+    def of_simulation(cls, library: ctypes.CDLL, sim: int) -> "Core":
+        """The processor of a running simulation."""
+        return cls(library, declare(library).sim_emulator(sim), owned=False)
+
+    def close(self) -> None:
+        """Give the memory back."""
+        if self._handle and self._owned:
+            self._library.emu_destroy(self._handle)
+        self._handle = 0
+
+    def __enter__(self) -> "Core":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def run(self, seconds: float) -> int:
+        """Run for at most this time; LIMIT, CENTRE, BREAK or FAILED."""
+        return int(self._library.emu_run(self._handle, round(seconds * TICKS_PER_S)))
+
+    @property
+    def error(self) -> str | None:
+        """What stopped the emulation."""
+        text = self._library.emu_error(self._handle)
+        return None if text is None else text.decode(errors="replace")
+
+    @property
+    def now_s(self) -> float:
+        """Emulated time since creation."""
+        return float(self._library.emu_now(self._handle)) / TICKS_PER_S
+
+    @property
+    def instructions(self) -> int:
+        """Executed so far."""
+        return int(self._library.emu_instructions(self._handle))
+
+    @property
+    def resets(self) -> int:
+        """Since creation."""
+        return int(self._library.emu_resets(self._handle))
+
+    @property
+    def active_vector(self) -> int:
+        """Exception being handled, 0: none."""
+        return int(self._library.emu_active_vector(self._handle))
+
+    def symbol(self, name: str) -> int:
+        """Its address."""
+        address = int(self._library.emu_symbol(self._handle, name.encode()))
+        if address == 0:
+            raise KeyError(name)
+        return address
+
+    def read(self, address: int, size: int) -> bytes:
+        """Memory as a debugger sees it."""
+        content = ctypes.create_string_buffer(size)
+        if not self._library.emu_read(self._handle, address, content, size):
+            raise ValueError(f"nothing is at {address:#x}")
+        return content.raw
+
+    def word(self, symbol: str, index: int = 0) -> int:
+        """A 32-bit variable, or an element of an array."""
+        return int.from_bytes(self.read(self.symbol(symbol) + 4 * index, 4), "little")
+
+    def register(self, name: str) -> int:
+        """"FTM0.MOD", without side effects."""
+        value = int(self._library.emu_register(self._handle, name.encode()))
+        if value == NO_REGISTER:
+            raise KeyError(name)
+        return value
+
+    def set_register(self, name: str, value: int) -> None:
+        """What the register holds from now on, without side effects."""
+        if not self._library.emu_register_set(self._handle, name.encode(), value):
+            raise KeyError(name)
+
+    def board(self, *, gate_fault: bool = False, resolver_fault: bool = False) -> None:
+        """Lines of the board."""
+        self._library.emu_board_pins(self._handle, gate_fault, resolver_fault)
+
+    def pend(self, vector: int) -> None:
+        """Make an exception pending."""
+        self._library.emu_pend(self._handle, vector)
+
+    def on_exception(self, call: object) -> None:
+        """Tell `call(vector, entered)` of every entry and return."""
+        self._callback = ON_EXCEPTION(lambda _user, vector, entered: call(vector, entered))  # type: ignore[operator]
+        self._library.emu_on_exception(self._handle, self._callback, None)
+
+    def break_after(self, instructions: int) -> None:
+        """run() answers BREAK before the instruction that many from now (counting mode)."""
+        self._library.emu_break_after(self._handle, instructions)
+
+    def save(self) -> int:
+        """A snapshot for restore(); free() it."""
+        return int(self._library.emu_save(self._handle))
+
+    def restore(self, snapshot: int) -> None:
+        """Everything but the program as it was."""
+        self._library.emu_restore(self._handle, snapshot)
+
+    def free(self, snapshot: int) -> None:
+        """Give a snapshot's memory back."""
+        self._library.emu_snapshot_free(snapshot)
