@@ -117,6 +117,13 @@ class Ecu:
         for _ in range(milliseconds):
             self.step_ms()
 
+    def run_until(self, name: str) -> dict:
+        """To the end of the millisecond in which the message is sent; its values."""
+        self.last.pop(name, None)
+        while name not in self.last:
+            self.run(1)
+        return self.last[name]
+
     @property
     def state(self) -> str:
         """As told on the bus."""

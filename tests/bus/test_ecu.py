@@ -275,9 +275,9 @@ def test_what_is_sent_is_what_the_drive_has(running: Ecu) -> None:
     assert dc_link["DcVoltage"] == pytest.approx(350.0, abs=0.3)  # a count of the converter is 0.13 V
     assert running.last["INV_Temperatures"]["Winding"] == pytest.approx(63.4, abs=0.05)
     assert running.last["INV_Temperatures"]["WindingValid"] == "yes"
-    currents = running.last["INV_Currents"]
-    assert currents["IqRef"] == pytest.approx(running.get("iq_ref_A"), abs=0.05)
-    assert running.last["INV_Identification"]["PsiF"] == pytest.approx(1e3 * running.get("psi_f_Vs"), abs=0.006)
+    assert running.run_until("INV_Currents")["IqRef"] == pytest.approx(running.get("iq_ref_A"), abs=0.051)
+    psi_mVs = running.run_until("INV_Identification")["PsiF"]
+    assert psi_mVs == pytest.approx(1e3 * running.get("psi_f_Vs"), abs=0.006)
     assert running.last["INV_Version"]["Minor"] == 1
 
 
