@@ -296,6 +296,18 @@ def test_torque_speed_and_dc_current_are_those_of_the_plant(running: Ecu) -> Non
         assert running.last["INV_DcLink"]["DcCurrent"] == pytest.approx(running.truth("idc_A"), abs=2.0)
 
 
+# The plant's inductance in q is 8 % above the tables': the identified scale goes there, on the bus as in the drive.
+def test_a_wrong_table_shows_in_the_table_scale(running: Ecu) -> None:
+    running.set("lq_scale", 1.08)
+    for _ in range(600):
+        running.speed_rad_s += 0.5
+        running.run(1)
+    for torque_Nm in (30.0, 60.0, -40.0, 80.0, 20.0, 50.0) * 3:
+        running.run(300, TorqueRequest=torque_Nm)
+    assert running.state == "run"
+    assert running.last["INV_Identification"]["TableScale"] == pytest.approx(108.0, abs=2.0)
+
+
 def test_speed_is_told_in_revolutions_per_minute_with_its_sign(ecu: Ecu) -> None:
     for speed_rad_s in (100.0, -100.0):
         ecu.speed_rad_s = speed_rad_s
