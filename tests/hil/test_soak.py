@@ -57,8 +57,9 @@ def _check_frames(rig: Rig, begun: dict[str, int], seconds: float, figures: Figu
 
 
 def _check_torque(rows: list[list[float]], figures: Figures) -> None:
-    error = [row[2] - row[1] for row in rows]
-    figures.plot("Torque at the end of each round", [("N·m", [("shaft less asked", [r[0] for r in rows], error)])])
-    worst = max(rows, key=lambda row: abs(row[2] - row[1]) / max(0.005 * abs(row[1]), 0.15))
-    figures.promise(f"error at {worst[1]:g} N·m, {worst[0]:.0f} s", worst[2] - worst[1],
-                    max(0.005 * abs(worst[1]), 0.15), "N·m")  # fmt: skip
+    """The first minute is for learning."""
+    learnt = [row for row in rows if row[0] > 60.0] or rows[-1:]
+    errors = [100.0 * (row[2] - row[1]) / max(abs(row[1]), 13.2) for row in learnt]
+    figures.plot("Torque at the end of each round", [("%", [("shaft less asked", [r[0] for r in learnt], errors)])])
+    figures.promise("root mean square of the torque errors", float(np.sqrt(np.mean(np.square(errors)))), 0.8, "%")
+    figures.promise("largest torque error", max(errors, key=abs), 2.5, "%")
