@@ -74,6 +74,7 @@ def test_zero_torque_gives_no_torque_at_any_speed(rig: Rig, figures: Figures) ->
         rig.advance(0.4)
         rows.append([speed_rpm, mean_truth(rig, 0.1)])
     figures.table("Request 0", ["rpm", "shaft N·m"], rows)
+    figures.plot("Request 0", [("N·m", [("shaft", [r[0] for r in rows], [r[1] for r in rows])])], "rpm")
     worst = max(rows, key=lambda row: abs(row[1]))
     figures.promise(f"shaft torque at {worst[0]:g} rpm", worst[1], 2.0, "N·m")
 
