@@ -45,7 +45,8 @@ def test_a_bad_value_is_named_with_what_is_allowed(old: str, new: str, message: 
 CALLED = [
     ("a missing file", SMALL, ["nowhere.toml"], "nowhere.toml: cannot be read (No such file or directory)"),
     ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "motor 'hsm2'"),
-    ("a drop below nothing", SMALL.replace("device_drop_V = 1.0", ""), ["c.toml"], "spread.device_drop_error_V = -0.5"),
+    ("a drop below nothing", SMALL + "[spread]\ndevice_drop_error_V = [-2, 2]\n", ["c.toml"],
+     "spread.device_drop_error_V = -2 about 1 V, allowed: no drop below 0"),
     ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"),
      ["c.toml"], "controller 'paper': torque_lop = 1: no such name"),
     ("a value no firmware takes", SMALL.replace("{ torque_loop = true", "{ observer_m = 99, torque_loop = true"),
