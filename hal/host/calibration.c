@@ -42,13 +42,13 @@ void calibration_set_torque_slew(fluxtrue_t *drive, double value)
 double calibration_get_observer_m(const fluxtrue_t *drive)
 {
     const mrai_config_t *c = &drive->drive.motor.mrai;
-    return 2.0 * c->pole_gain / c->r0;
+    return 0.25 * c->pole_gain / c->r0;
 }
 
 void calibration_set_observer_m(fluxtrue_t *drive, double value)
 {
     mrai_config_t *c = &drive->drive.motor.mrai;
-    c->pole_gain = to_q31(value / 2.0 * c->r0 / Q31_SCALE);
+    c->pole_gain = to_q31(4.0 * value * c->r0 / Q31_SCALE);
 }
 
 double calibration_get_flux_bandwidth(const fluxtrue_t *drive)
