@@ -25,11 +25,19 @@ static bool clear_valid(const motor_t *m)
            3 * clear_q30 <= (int64_t)span * span;
 }
 
+/* The quick look may miss nothing: sqrt(quiet) + sum_max/3 <= i_trip. */
+static bool quiet_valid(const monitor_config_t *c)
+{
+    const int32_t most = c->i_trip - (c->sum_max + 2) / 3;
+    return c->quiet_q30 >= 0 && most >= 0 && c->quiet_q30 <= most * most;
+}
+
 bool motor_valid(const motor_t *m)
 {
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
-           m->monitor.sum_max > 0 && mrai_valid(&m->mrai) && identify_valid(&m->identify) && control_valid(m) &&
+           m->monitor.sum_max > 0 && quiet_valid(&m->monitor) && mrai_valid(&m->mrai) &&
+           identify_valid(&m->identify) && control_valid(m) &&
            clear_valid(m);
 }
 

@@ -117,7 +117,7 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
 /* --- identification -------------------------------------------------------------------------- */
 typedef struct {
     double flux_gain;       /* 2 k_psi/w, 0 while the gate is closed */
-    double resistance_gain; /* 2 k_r/|i|^2, 0 while the gate is closed */
+    double resistance_gain; /* 2 k_r/n, 0 while the gate is closed */
     double voltage_scale;   /* 1/sinc(w T_s/2) */
 } twin_mrai_schedule_t;
 

@@ -13,7 +13,7 @@ enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
 static const double period = 1e-4;
 static const int cell = 2048; /* counts of q15 between table nodes: 1/16 of the current base */
 
-static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g_d[NX * NY], g_q[NX * NY];
+static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g[NX * NY];
 static int16_t psi_f0[NX * NY], ref_d[NT * NPSI], ref_q[NT * NPSI], ref_max[NPSI];
 static double si_l_d[NX * NY], si_l_q[NX * NY], si_l_dd[NX * NY], si_l_qq[NX * NY];
 static double si_psi_f0[NX * NY], si_ref_d[NT * NPSI], si_ref_q[NT * NPSI], si_ref_max[NPSI];
@@ -73,13 +73,13 @@ static void flux_tables(fixture_t *f)
         si_l_dd[n] = l[2] * f->l;
         si_l_qq[n] = from_q15(l_qq[n]) * scale;
         si_psi_f0[n] = from_q15(psi_f0[n]) * f->psi;
-        g_d[n] = q15_of(period * f->z / si_l_dd[n]);
-        g_q[n] = q15_of(period * f->z / si_l_qq[n]);
+        g[n] = q15_of(0.5 * period * f->z * (1.0 / si_l_dd[n] + 1.0 / si_l_qq[n]));
     }
     f->flux_table = (flux_table_config_t){
         .mesh = FX_MESH(-(NX - 1) * cell, 11U, (uint32_t)NX, (uint32_t)NY),
         .l_shift = L_SHIFT,
-        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g_d = g_d, .g_q = g_q,
+        .i_scale = 8 << L_SHIFT,
+        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g = g,
         .psi_f0 = psi_f0,
     };
     f->si.nd = NX;
@@ -189,7 +189,7 @@ static void identification(fixture_t *f)
     const double m = 3.0, k_psi = 60.0, k_r = 20.0;
     f->mrai = (mrai_config_t){
         .r0 = q31_of(r0),
-        .pole_gain = q31_of(0.5 * m * r0),
+        .pole_gain = q31_of(4.0 * m * r0),
         .period = q31_of(f->w * period),
         .flux_gain = q31_of(2.0 * k_psi / f->w),
         .resistance_gain = q31_of(2.0 * k_r / f->w),

@@ -99,10 +99,11 @@ def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
 
 def _flux_table(motor: Motor) -> list[Row]:
     tables = motor.tables
-    names = ("l_d", "l_q", "l_qq", "g_d", "g_q", "psi_f0")
+    names = ("l_d", "l_q", "l_qq", "g", "psi_f0")
     nx, ny = tables.l_d_H.shape
     return [("mesh", f"FX_MESH({tables.x0}, {tables.shift}u, {nx}u, {ny}u)", ""),
-            ("l_shift", f"{tables.l_shift}u", ""), *((name, f"table_{name}", "") for name in names)]
+            ("l_shift", f"{tables.l_shift}u", ""), ("i_scale", 8 << tables.l_shift, ""),
+            *((name, f"table_{name}", "") for name in names)]
 
 
 def _current_control(motor: Motor) -> list[Row]:
@@ -132,7 +133,7 @@ def _mrai_gains(motor: Motor) -> list[Row]:
     r0 = motor.config.machine.r_ohm / b.resistance_ohm
     return [
         ("r0", q31(r0, "r0"), "R at 20 C"),
-        ("pole_gain", q31(control.observer_m * r0 / 2, "pole_gain"), f"m R_0/2, m = {control.observer_m:g}"),
+        ("pole_gain", q31(4 * control.observer_m * r0, "pole_gain"), f"4 m R_0, m = {control.observer_m:g}"),
         ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
         ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
          f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
@@ -185,10 +186,12 @@ def _current_reference(motor: Motor) -> list[Row]:
 
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
+    quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
     return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
             ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
             ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
-            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A")]
+            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A"),
+            ("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2")]
 
 
 def _torque_slew(motor: Motor) -> tuple[str, str]:
@@ -229,7 +232,7 @@ def _q15_tables(motor: Motor) -> list[str]:
             f"every {tables.iq_A[1]:g} A")
     comments = {"l_d": f"apparent L_d, {l_unit}", "l_q": f"apparent L_q, {l_unit}",
                 "l_qq": f"incremental L_q, {l_unit}",
-                "g_d": "omega_b T_s/l_dd, 2^-15 per count", "g_q": "omega_b T_s/l_qq, 2^-15 per count",
+                "g": "omega_b T_s/2 (1/l_dd + 1/l_qq), 2^-15 per count",
                 "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
     out = [f"/* Flux tables: {grid}. */\n"]
     # psi_f0 depends on i_q alone: one row of it is enough.
