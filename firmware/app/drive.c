@@ -12,6 +12,7 @@ static bool control_valid(const motor_t *m)
     const current_control_config_t *c = &m->current_control;
     return c->sigma_q24 > 0 && c->setpoint_weight > 0 && c->integral_gain >= 0 && c->integral_gain < Q15(0.5) &&
            c->tracking_gain >= 0 && c->tracking_gain < Q15(0.5) && c->v_ratio > 0 && c->v_ratio < Q15(0.7) &&
+           m->voltage_reserve.v_ratio > 0 && m->voltage_reserve.trim_min <= 0 && m->voltage_reserve.trim_max >= 0 &&
            m->torque_loop.authority > 0 && m->torque_loop.torque_min > 0 && modulate_valid(&m->modulate);
 }
 

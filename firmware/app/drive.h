@@ -83,6 +83,8 @@ typedef struct {
     q15_t torque_estimate;
     learnt_t learnt;
     current_reference_t reference;
+    voltage_reserve_state_t voltage_reserve;
+    dq_t psi_ref; /* tables' flux at the last reference */
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
     run_state_t run_state;
@@ -102,6 +104,12 @@ typedef struct {
     command_box_t commands;
     schedule_box_t schedules;
 } drive_t;
+
+/** The one place that says what the magnet differs by: identified flux minus the tables'. */
+static inline q15_t drive_psi_delta(const drive_t *drive)
+{
+    return drive->slow.psi_delta_q15;
+}
 
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);

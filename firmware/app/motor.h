@@ -14,6 +14,7 @@
 #include "control/modulate.h"
 #include "control/mrai.h"
 #include "control/torque_loop.h"
+#include "control/voltage_reserve.h"
 #include "safety/monitor.h"
 #include "types/bases.h"
 
@@ -38,6 +39,7 @@ typedef struct {
     identify_config_t identify;
     torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
+    voltage_reserve_config_t voltage_reserve;
     monitor_config_t monitor;
 } motor_t;
 

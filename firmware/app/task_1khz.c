@@ -22,6 +22,21 @@ static run_state_t supervise(drive_t *drive)
     return request->enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
+/* What the voltage of this millisecond says about the plan of the last one. */
+static voltage_reserve_t reserve(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const voltage_reserve_in_t in = {
+        .u = sample->mrai.u,
+        .v_dc = (q15_t)sample->v_dc,
+        .psi = task->psi_ref,
+        .psi_plan = task->reference.psi_plan,
+        .psi_delta = drive_psi_delta(drive),
+        .acting = sample->acting && !drive->request.current_mode,
+    };
+    return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
+}
+
 /* Request -> limits -> slew -> torque loop -> what the current reference is asked for. */
 static q15_t torque_path(drive_t *drive, const sample_t *sample)
 {
@@ -46,20 +61,27 @@ static dq_t references(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     task->torque_request = torque_path(drive, sample);
+    const voltage_reserve_t trim = reserve(drive, sample);
     const current_reference_in_t in = {
         .torque = task->torque_request,
         .v_dc = (q15_t)sample->v_dc,
         .omega = fx_q15_from_q31(sample->mrai.omega),
         .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
+        .v_trim = trim.v_trim,
+        .shift = trim.shift,
+        .psi_delta = drive_psi_delta(drive),
+        .i_d_max = drive->motor.current_reference.i_max,
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
 }
 
-static void rest(task_state_t *task)
+static void rest(drive_t *drive)
 {
+    task_state_t *task = &drive->task;
     task->torque_loop = (torque_loop_state_t){0};
-    task->reference = (current_reference_t){0};
+    task->reference = (current_reference_t){.torque_max = drive->motor.torque_max, .psi_plan = Q15_MAX};
+    task->voltage_reserve = (voltage_reserve_state_t){0};
     task->torque_command = 0;
     task->torque_request = 0;
 }
@@ -77,9 +99,10 @@ void task_1khz(drive_t *drive)
     if (command.run) {
         next.i = references(drive, &sample);
         next.flux = flux_table_step(&drive->motor.flux_table, next.i);
+        task->psi_ref = (dq_t){next.flux.psi_d, next.flux.psi_q};
         command.target = current_control_target(&drive->motor.current_control, next.i, &next.flux);
     } else {
-        rest(task);
+        rest(drive);
     }
     command_box_write(&drive->commands, command);
 

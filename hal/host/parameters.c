@@ -61,6 +61,7 @@ GETTER(torque_estimate, pu15(d->drive.task.torque_estimate, bases(d)->torque_Nm)
 GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
 GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
+GETTER(voltage_trim, pu31(d->drive.task.voltage_reserve.trim, bases(d)->voltage_V))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
 GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
 GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
@@ -160,6 +161,7 @@ static const parameter_t parameters[] = {
     {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
     {"torque_request_Nm", get_torque_request, NULL, 0, 0},
     {"torque_max_Nm", get_torque_max, NULL, 0, 0},
+    {"voltage_trim_V", get_voltage_trim, NULL, 0, 0},
     {"torque_correction", get_torque_correction, NULL, 0, 0},
     {"psi_f_Vs", learnt_psi_f_Vs, NULL, 0, 0},
     {"r_ohm", learnt_r_ohm, NULL, 0, 0},

@@ -45,6 +45,8 @@ typedef struct {
     const double *ref_id_A, *ref_iq_A;
     const double *ref_torque_max_Nm; /* [ref_npsi] */
     double ref_v_ratio, i_max_A;
+    /* voltage reserve, gain per 1 kHz step */
+    double trim_gain, trim_min_V, trim_max_V;
     /* monitors */
     double i_trip_A, v_max_V, v_min_V, sum_max_A;
 } motor_si_t;

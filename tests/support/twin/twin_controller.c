@@ -84,11 +84,24 @@ static void torque_path(twin_t *twin)
         .enabled = twin->torque_loop && !twin->current_mode,
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
+    const twin_reserve_in_t reserve = {
+        .u = twin->sample.u,
+        .psi = twin->psi_ref,
+        .v_dc = twin->v_dc,
+        .psi_plan = twin->reference.psi_plan,
+        .psi_delta = twin->mrai.psi_delta,
+        .acting = twin->periods_on >= 3 && !twin->current_mode,
+    };
+    const double shift = twin_voltage_reserve(&twin->motor, &twin->trim, &reserve);
     const twin_reference_in_t request = {
         .torque = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
         .v_dc = twin->v_dc,
         .omega = twin->sample.omega,
         .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
+        .v_trim = twin->trim,
+        .shift = shift,
+        .psi_delta = twin->mrai.psi_delta,
+        .i_d_max = twin->motor.i_max_A,
     };
     twin->reference = twin_current_reference(&twin->motor, &request);
 }
@@ -117,10 +130,12 @@ static void task(twin_t *twin)
         twin->target = twin_current_target(&twin->motor, twin->i_ref);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
+        twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
     } else {
         twin->slewed = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
         twin->reference = (twin_reference_t){0};
+        twin->trim = 0.0;
         twin->i_ref = (twin_dq_t){0.0, 0.0};
     }
     twin->schedule = twin_mrai_schedule(&twin->motor, &twin->quality, &twin->sample, &next, &twin->mrai,

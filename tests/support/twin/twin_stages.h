@@ -172,14 +172,23 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in);
 
 typedef struct {
-    double torque, v_dc, omega, i_magnitude;
+    double torque, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max;
 } twin_reference_in_t;
 
 typedef struct {
     twin_dq_t i_ref;
-    double torque_max;
+    double torque_max, psi_plan;
     bool limited;
 } twin_reference_t;
+
+typedef struct {
+    twin_dq_t u, psi; /* acting; the tables' flux at the last reference */
+    double v_dc, psi_plan, psi_delta;
+    bool acting;
+} twin_reserve_in_t;
+
+/* trim: the state. Answers |psi + dpsi| - |psi|. */
+double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_reserve_in_t *in);
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in);
 

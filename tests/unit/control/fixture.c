@@ -127,6 +127,15 @@ static void reference_tables(fixture_t *f)
     f->si.ref_torque_max_Nm = si_ref_max;
     f->si.ref_v_ratio = from_q15(q15_of(0.55));
     f->si.i_max_A = from_q15(q15_of(0.95)) * f->i;
+    f->voltage_reserve = (voltage_reserve_config_t){
+        .v_ratio = q15_of(0.55),
+        .gain = q15_of(0.05),
+        .trim_min = q15_of(-0.09),
+        .trim_max = q15_of(0.05),
+    };
+    f->si.trim_gain = from_q15(q15_of(0.05));
+    f->si.trim_min_V = from_q15(q15_of(-0.09)) * f->v;
+    f->si.trim_max_V = from_q15(q15_of(0.05)) * f->v;
 }
 
 static void inputs(fixture_t *f)

@@ -14,6 +14,7 @@
 #include "control/modulate.h"
 #include "control/mrai.h"
 #include "control/torque_loop.h"
+#include "control/voltage_reserve.h"
 #include "twin/twin_stages.h"
 
 typedef struct {
@@ -26,6 +27,7 @@ typedef struct {
     mrai_config_t mrai;
     torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
+    voltage_reserve_config_t voltage_reserve;
 } fixture_t;
 
 /* A fresh copy each time: tests may change it. */

@@ -16,6 +16,8 @@ CLOSED_LOOP_SHARE = 0.8
 V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
 V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
+TRIM_RATE_RAD_S = 50.0
+TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 
 TRACKER_BANDWIDTH_RAD_S = 300.0
 TRACKER_JUMP_TURNS = 1 / 16
@@ -75,6 +77,9 @@ class Derived:
     torque_min_Nm: float
     torque_slew_Nm: float
     ref_v_ratio: float
+    trim_gain: float
+    trim_min_V: float
+    trim_max_V: float
     i_trip_A: float
     v_max_V: float
     v_min_V: float
@@ -135,6 +140,12 @@ def _torque_loop(config: MotorConfig) -> dict[str, float]:
             "torque_slew_Nm": config.torque_slew_Nm_per_s * task_s}
 
 
+def _voltage_reserve(config: MotorConfig) -> dict[str, float]:
+    planned = V_RATIO_REFERENCE * config.inverter.vdc_V
+    return {"ref_v_ratio": V_RATIO_REFERENCE, "trim_gain": TRIM_RATE_RAD_S * TASK_PERIODS / config.inverter.pwm_hz,
+            "trim_min_V": TRIM_MIN_SHARE * planned, "trim_max_V": TRIM_MAX_SHARE * planned}
+
+
 def _monitors(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
@@ -149,11 +160,11 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         psi_f_Vs=psi_f,
         tracker_bandwidth_rad_s=TRACKER_BANDWIDTH_RAD_S,
         tracker_jump_turns=TRACKER_JUMP_TURNS,
-        ref_v_ratio=V_RATIO_REFERENCE,
         **_current_control(bases.period_s),
         **_modulation(config),
         **_identification(config, model, bases.period_s, psi_f),
         **_torque_loop(config),
+        **_voltage_reserve(config),
         **_monitors(config),
         identify=identification.derive(config, bases.period_s, psi_f),
     )

@@ -183,6 +183,14 @@ def _current_reference(motor: Motor) -> list[Row]:
              f"{motor.config.machine.i_max_A:g} A")]
 
 
+def _voltage_reserve(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("v_ratio", q15(d.ref_v_ratio, "ref v_ratio"), f"{d.ref_v_ratio:.6g}"),
+            ("gain", q15(d.trim_gain, "trim gain"), f"{d.trim_gain:g} per task"),
+            ("trim_min", q15(d.trim_min_V / b.voltage_V, "trim_min"), f"{d.trim_min_V:.6g} V"),
+            ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V")]
+
+
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
@@ -216,7 +224,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
-        ("monitor", _monitor(motor), ""),
+        ("voltage_reserve", _voltage_reserve(motor), ""), ("monitor", _monitor(motor), ""),
     ]
 
 
@@ -258,7 +266,8 @@ _SI_DERIVED = (
     "knee_A", "min_pulse_duty", "v_dc_min_V", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
     "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
     "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
-    "torque_slew_Nm", "ref_v_ratio", "i_trip_A", "v_max_V", "v_min_V", "sum_max_A", "psi_f_Vs",
+    "torque_slew_Nm", "ref_v_ratio", "trim_gain", "trim_min_V", "trim_max_V", "i_trip_A", "v_max_V", "v_min_V",
+    "sum_max_A", "psi_f_Vs",
 )
 
 
