@@ -29,6 +29,7 @@ static bool clear_valid(const motor_t *m)
 bool motor_valid(const motor_t *m)
 {
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
+           torque_limit_valid(&m->torque_limit) &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
            m->monitor.sum_max > 0 && mrai_valid(&m->mrai) && identify_valid(&m->identify) && control_valid(m) &&
            clear_valid(m);
@@ -36,9 +37,12 @@ bool motor_valid(const motor_t *m)
 
 void drive_init(drive_t *drive, const motor_t *source)
 {
-    *drive = (drive_t){.motor = *source, .request = {.torque_loop = true,
+    *drive = (drive_t){.motor = *source,
+                       .request = {.torque_loop = true,
                                    .identification = true,
-                                   .identification_mode = IDENTIFICATION_ROBUST}};
+                                   .identification_mode = IDENTIFICATION_ROBUST,
+                                   .limits = TORQUE_LIMITS_NONE},
+                       .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};
     identify_reset(&drive->motor.identify, &drive->task.identify);
     if (!motor_valid(source)) {
         drive_raise_fault(drive, FAULT_CONFIG);

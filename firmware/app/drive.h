@@ -18,6 +18,7 @@
 #include "control/identify_memory.h"
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
+#include "types/torque_limits.h"
 
 /** How resistance and flux are identified. */
 typedef enum {
@@ -30,6 +31,7 @@ typedef enum {
 typedef struct {
     q15_t torque;
     dq_t i_ref;          /* current mode only */
+    torque_limits_t limits;
     bool enable;
     bool current_mode;   /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
@@ -75,6 +77,8 @@ typedef struct {
 
 /** Written by the 1 kHz task alone. */
 typedef struct {
+    torque_limit_state_t torque_limit;
+    torque_limit_t allowed;
     torque_loop_state_t torque_loop;
     mrai_quality_t quality;
     identify_state_t identify;
@@ -85,6 +89,7 @@ typedef struct {
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
     dq_t psi_ref; /* tables' flux at the last reference */
+    uint16_t derating;    /* DERATING_...: why less than the request is made */
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
     run_state_t run_state;

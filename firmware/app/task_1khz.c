@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
 #include "fx/vec.h"
+#include "hal/temperature.h"
 #include "signal/rate_limit.h"
 
 static run_state_t supervise(drive_t *drive)
@@ -37,15 +38,45 @@ static voltage_reserve_t reserve(drive_t *drive, const sample_t *sample)
     return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
 }
 
-/* Request -> limits -> slew -> torque loop -> what the current reference is asked for. */
+/* Wide open, a step is for a machine that has voltage to follow it: near the limit it would only throw the currents
+ * about. */
+static q15_t slew_of(const drive_t *drive)
+{
+    const motor_t *m = &drive->motor;
+    const bool weak = drive->task.reference.psi_plan < m->psi_weak;
+    return weak ? (q15_t)fx_min_s32(m->torque_slew, m->torque_slew_weak) : m->torque_slew;
+}
+
+static q15_t allowed(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const torque_limit_in_t in = {
+        .wanted = drive->request.torque,
+        .limits = &drive->request.limits,
+        .u = sample->mrai.u,
+        .i = sample->mrai.i,
+        .torque = drive->slow.torque.mean,
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .v_dc = (q15_t)sample->v_dc,
+        .reach = task->reference.torque_max,
+        .inverter_dC = hal_temperature_inverter_dC(),
+        .winding_dC = hal_temperature_winding_dC(),
+    };
+    task->allowed = torque_limit_step(&drive->motor.torque_limit, &task->torque_limit, &in);
+    const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
+    task->derating = (uint16_t)(task->allowed.derating | magnet);
+    return task->allowed.torque;
+}
+
+/* Request -> limits -> slew -> torque loop -> what the current reference is asked for. A limit that closes is not
+ * slewed: what is no longer allowed or possible is not asked for. */
 static q15_t torque_path(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     const motor_t *m = &drive->motor;
-    const q15_t most = m->torque_max;
-    const q15_t wanted = fx_clamp_q15(drive->request.torque, fx_neg_q15(most), most);
+    const q15_t wanted = allowed(drive, sample);
 
-    task->torque_command = rate_limit_step(task->torque_command, wanted, m->torque_slew);
+    task->torque_command = rate_limit_step(task->torque_command, wanted, slew_of(drive));
     const torque_loop_in_t loop = {
         .command = task->torque_command,
         .estimate = task->torque_estimate,
@@ -70,7 +101,7 @@ static dq_t references(drive_t *drive, const sample_t *sample)
         .v_trim = trim.v_trim,
         .shift = trim.shift,
         .psi_delta = drive_psi_delta(drive),
-        .i_d_max = drive->motor.current_reference.i_max,
+        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, drive_psi_delta(drive), hal_temperature_winding_dC()),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
@@ -80,6 +111,8 @@ static void rest(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     task->torque_loop = (torque_loop_state_t){0};
+    task->torque_limit.loss = 0;
+    task->derating = 0;
     task->reference = (current_reference_t){.torque_max = drive->motor.torque_max, .psi_plan = Q15_MAX};
     task->voltage_reserve = (voltage_reserve_state_t){0};
     task->torque_command = 0;

@@ -24,6 +24,7 @@ DIVISIONS = {
     "modulate.c": 3,  # reciprocal of the measured dc voltage
     "current_reference.c": 1,  # the rest runs at 1 kHz
     "mrai_schedule.c": 3,
+    "torque_limit.c": 2,
     "torque_loop.c": 1,
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.

@@ -6,6 +6,7 @@
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
 #include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
 #include "seam.h"
 #include "twin/twin_private.h"
 #include "unity.h"

@@ -41,6 +41,14 @@ TORQUE_MIN_SHARE = 0.1
 V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
 SUM_MAX_PER_FULL_SCALE = 0.05
 
+SLEW_WEAK_PER_TORQUE_MAX = 100.0  # 1/s: a full reversal at top speed keeps its currents below the trip
+PSI_WEAK_PER_PSI_F = 1.0 / 0.6  # the magnet alone takes 60 % of the planned voltage
+LOSS_TIME_S = 0.02
+MOVING_SHARES = (0.01, 0.02)  # of maximum speed: from here to there the direction of power becomes certain
+DC_LOW_PER_VDC, DC_HIGH_PER_VDC = (0.4, 0.6), (1.24, 1.21)  # no torque, all torque
+SPEED_RESERVE_MAX = 0.125
+SPEED_START, SPEED_END = 0.1, 0.6  # of the reserve of the speed base: all torque, no driving torque
+
 
 @dataclass(frozen=True)
 class Derived:
@@ -80,6 +88,26 @@ class Derived:
     trim_gain: float
     trim_min_V: float
     trim_max_V: float
+    torque_slew_weak_Nm: float
+    psi_weak_Vs: float
+    loss_rate: float
+    loss_drop_V: float
+    moving_end_rad_s: float
+    moving_start_rad_s: float
+    inverter_end_C: float
+    inverter_start_C: float
+    winding_end_C: float
+    winding_start_C: float
+    dc_low_end_V: float
+    dc_low_start_V: float
+    dc_high_end_V: float
+    dc_high_start_V: float
+    speed_end_rad_s: float
+    speed_start_rad_s: float
+    i_d_20_A: float
+    i_d_slope_A_per_K: float
+    psi_temp_coeff_per_K: float
+    magnet_assumed_C: float
     i_trip_A: float
     v_max_V: float
     v_min_V: float
@@ -146,6 +174,28 @@ def _voltage_reserve(config: MotorConfig) -> dict[str, float]:
             "trim_min_V": TRIM_MIN_SHARE * planned, "trim_max_V": TRIM_MAX_SHARE * planned}
 
 
+def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
+    vdc, omega, thermal, magnet = config.inverter.vdc_V, config.omega_max_rad_s, config.thermal, config.magnet
+    reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
+    task_s = TASK_PERIODS * bases.period_s
+    return {
+        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * task_s,
+        "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
+        "loss_rate": 1.0 - math.exp(-task_s / LOSS_TIME_S),
+        "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
+        "moving_end_rad_s": MOVING_SHARES[0] * omega, "moving_start_rad_s": MOVING_SHARES[1] * omega,
+        "inverter_end_C": thermal.inverter_trip_C, "inverter_start_C": thermal.inverter_derate_C,
+        "winding_end_C": thermal.winding_trip_C, "winding_start_C": thermal.winding_derate_C,
+        "dc_low_end_V": DC_LOW_PER_VDC[0] * vdc, "dc_low_start_V": DC_LOW_PER_VDC[1] * vdc,
+        "dc_high_end_V": DC_HIGH_PER_VDC[0] * vdc, "dc_high_start_V": DC_HIGH_PER_VDC[1] * vdc,
+        "speed_end_rad_s": (1.0 + SPEED_END * reserve) * omega,
+        "speed_start_rad_s": (1.0 + SPEED_START * reserve) * omega,
+        "i_d_20_A": magnet.i_d_demag_A or config.machine.i_max_A,
+        "i_d_slope_A_per_K": magnet.i_d_demag_A_per_K if magnet.i_d_demag_A else 0.0,
+        "psi_temp_coeff_per_K": magnet.psi_temp_coeff_per_K, "magnet_assumed_C": magnet.assumed_C,
+    }
+
+
 def _monitors(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
@@ -165,6 +215,7 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_identification(config, model, bases.period_s, psi_f),
         **_torque_loop(config),
         **_voltage_reserve(config),
+        **_torque_limit(config, bases, psi_f),
         **_monitors(config),
         identify=identification.derive(config, bases.period_s, psi_f),
     )

@@ -191,6 +191,39 @@ def _voltage_reserve(motor: Motor) -> list[Row]:
             ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V")]
 
 
+def _line(end: float, start: float, per_count: float, name: str) -> list[Row]:
+    """derating_line_t: 2^31 over the counts from no torque to all of it."""
+    zero, one = round(end / per_count), round(start / per_count)
+    return [("end", q15(zero / Q15_ONE, name), f"{end:.6g}, all from {start:.6g} on"),
+            ("gain", q16(Q15_ONE / (one - zero), name), "")]
+
+
+def _torque_limit(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    volt, speed, tenth = b.voltage_V / Q15_ONE, b.omega_rad_s / Q15_ONE, 0.1
+    return [("torque_max", q15(motor.config.machine.torque_max_Nm / b.torque_Nm, "torque_max"), ""),
+            ("drop", q15(d.loss_drop_V / b.voltage_V, "drop"), f"{d.loss_drop_V:g} V"),
+            ("loss_rate", q15(d.loss_rate, "loss_rate"), f"{d.loss_rate:.6g}"),
+            ("moving", _line(d.moving_end_rad_s, d.moving_start_rad_s, speed, "moving"), ""),
+            ("inverter", _line(d.inverter_end_C, d.inverter_start_C, tenth, "inverter_trip_C"), ""),
+            ("winding", _line(d.winding_end_C, d.winding_start_C, tenth, "winding_trip_C"), ""),
+            ("dc_low", _line(d.dc_low_end_V, d.dc_low_start_V, volt, "dc_low"), ""),
+            ("dc_high", _line(d.dc_high_end_V, d.dc_high_start_V, volt, "dc_high"), ""),
+            ("speed", _line(d.speed_end_rad_s, d.speed_start_rad_s, speed, "speed"), "")]
+
+
+def _i_d_limit(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    i_20 = min(d.i_d_20_A / b.current_A, 1.0 - 1.0 / Q15_ONE)
+    slope = d.i_d_slope_A_per_K / 10.0 / b.current_A * Q15_ONE
+    per_psi = 10.0 / (d.psi_f_Vs * d.psi_temp_coeff_per_K) * b.flux_Vs / Q15_ONE
+    return [("i_20", q15(i_20, "i_d_demag_A"), f"{d.i_d_20_A:g} A"),
+            ("slope", q16(slope, "i_d_demag_A_per_K"), f"{d.i_d_slope_A_per_K:g} A/K"),
+            ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), ""),
+            ("dC_per_psi", q16(per_psi, "psi_temp_coeff_per_K"), f"{d.psi_temp_coeff_per_K:g} of psi_f per K"),
+            ("assumed_dC", str(round(10 * d.magnet_assumed_C)), "without a winding temperature")]
+
+
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
@@ -219,12 +252,15 @@ def _motor(motor: Motor) -> list[Row]:
         ("dead_time_s", _float(inverter.dead_time_s), ""),
         ("torque_max", q15(machine.torque_max_Nm / b.torque_Nm, "torque_max"), f"{machine.torque_max_Nm:g} N·m"),
         ("torque_slew", *_torque_slew(motor)),
+        ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
+        ("psi_weak", q15(min(motor.derived.psi_weak_Vs / b.flux_Vs, 1.0 - 1.0 / Q15_ONE), "psi_weak"), ""),
         ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
         ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
-        ("voltage_reserve", _voltage_reserve(motor), ""), ("monitor", _monitor(motor), ""),
+        ("voltage_reserve", _voltage_reserve(motor), ""), ("torque_limit", _torque_limit(motor), ""),
+        ("i_d_limit", _i_d_limit(motor), ""), ("monitor", _monitor(motor), ""),
     ]
 
 
@@ -267,7 +303,10 @@ _SI_DERIVED = (
     "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
     "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
     "torque_slew_Nm", "ref_v_ratio", "trim_gain", "trim_min_V", "trim_max_V", "i_trip_A", "v_max_V", "v_min_V",
-    "sum_max_A", "psi_f_Vs",
+    "sum_max_A", "psi_f_Vs", "torque_slew_weak_Nm", "psi_weak_Vs", "loss_rate", "loss_drop_V", "moving_end_rad_s",
+    "moving_start_rad_s", "inverter_end_C", "inverter_start_C", "winding_end_C", "winding_start_C", "dc_low_end_V",
+    "dc_low_start_V", "dc_high_end_V", "dc_high_start_V", "speed_end_rad_s", "speed_start_rad_s", "i_d_20_A",
+    "i_d_slope_A_per_K", "psi_temp_coeff_per_K", "magnet_assumed_C",
 )
 
 
