@@ -31,8 +31,8 @@ bool motor_valid(const motor_t *m)
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
            torque_limit_valid(&m->torque_limit) &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
-           m->monitor.sum_max > 0 && mrai_valid(&m->mrai) && identify_valid(&m->identify) && control_valid(m) &&
-           clear_valid(m);
+           m->monitor.sum_max > 0 && m->safe_state.psi_f > 0 && m->safe_state.share_open < m->safe_state.share_short &&
+           mrai_valid(&m->mrai) && identify_valid(&m->identify) && control_valid(m) && clear_valid(m);
 }
 
 void drive_init(drive_t *drive, const motor_t *source)

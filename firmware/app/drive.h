@@ -88,11 +88,16 @@ typedef struct {
     learnt_t learnt;
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
+    plausibility_state_t plausibility;
+    torque_monitor_state_t torque_monitor;
+    dq_t i_ref;   /* acts until the next step */
     dq_t psi_ref; /* tables' flux at the last reference */
     uint16_t derating;    /* DERATING_...: why less than the request is made */
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
     run_state_t run_state;
+    safe_state_state_t safe_state;
+    bool armed;           /* has run since it last was safe with open gates: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as the quality is concerned */

@@ -12,7 +12,6 @@
 
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
-    adc_counts_t counts;
     int32_t sum_q27;
     angle_t angle;
 } instant_t;
@@ -20,8 +19,8 @@ typedef struct {
 static instant_t observe(drive_t *drive, sample_t *sample)
 {
     instant_t now;
-    hal_adc_read(&now.counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &now.counts);
+    hal_adc_read(&sample->counts);
+    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
@@ -29,6 +28,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     sample->mrai.omega = now.angle.omega_q31;
     sample->theta_e = now.angle.theta_e;
     sample->v_dc = measured.v_dc;
+    sample->theta_e = now.angle.theta_e;
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
     return now;
 }
@@ -62,10 +62,19 @@ static void publish(drive_t *drive, sample_t *sample)
     hal_irq_pend_mrai();
 }
 
-static void bridge_off(drive_t *drive, sample_t *sample)
+/* The safe state: low sides closed, or all gates open. */
+static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 {
-    hal_pwm_enable(false);
-    hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
+    const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
+    const bool closed = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
+    const uint16_t duty = closed ? 0U : DUTY_MIDDLE;
+    if (!closed) {
+        hal_pwm_enable(false);
+    }
+    hal_pwm_write((duty_t){duty, duty, duty});
+    if (closed) {
+        hal_pwm_enable(true); /* with the duties, not before them */
+    }
     current_control_reset(&drive->fast.current_control);
     sample->mrai.u = (dq_t){0, 0};
     sample->voltage_limited = false;
@@ -118,7 +127,7 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     const command_t *command = command_box_read(&drive->commands);
     forget_faults(drive, command->fault_resets);
     watch(drive, unfinished);
-    const monitor_in_t seen = {measure_phases(&drive->motor.measure, &now.counts), sample->v_dc, now.angle.jumped};
+    const monitor_in_t seen = {measure_phases(&drive->motor.measure, &sample->counts), sample->v_dc, now.angle.jumped};
 
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
@@ -128,7 +137,10 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {
-        bridge_off(drive, sample);
+        if (command->faults != 0U) {
+            drive_raise_fault(drive, command->faults);
+        }
+        bridge_off(drive, sample, command->safe);
     }
     publish(drive, sample);
 }

@@ -18,6 +18,9 @@
 #include "control/torque_loop.h"
 #include "control/voltage_reserve.h"
 #include "safety/monitor.h"
+#include "safety/plausibility.h"
+#include "safety/safe_state.h"
+#include "safety/torque_monitor.h"
 #include "types/bases.h"
 
 typedef struct {
@@ -47,6 +50,9 @@ typedef struct {
     torque_limit_config_t torque_limit;
     i_d_limit_config_t i_d_limit;
     monitor_config_t monitor;
+    safe_state_config_t safe_state;
+    plausibility_config_t plausibility;
+    torque_monitor_config_t torque_monitor;
 } motor_t;
 
 extern const motor_t motor;

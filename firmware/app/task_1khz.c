@@ -1,8 +1,32 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
+#include "app/slow_monitors.h"
 #include "fx/vec.h"
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
+
+/* Gates that never closed stay open: the bridge may not even be powered. */
+static safe_t safe_state(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const uint32_t faults = drive->fast.faults;
+    const safe_state_in_t in = {
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .psi_delta = drive_psi_delta(drive),
+        .v_dc = (q15_t)sample->v_dc,
+        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
+    };
+    const bool closed = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
+    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (closed || faults != 0U));
+    if (!task->armed) {
+        return SAFE_FREEWHEEL;
+    }
+    if (closed) {
+        return SAFE_SHORT_CIRCUIT;
+    }
+    return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
+}
 
 static run_state_t supervise(drive_t *drive)
 {
@@ -123,20 +147,27 @@ void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     const sample_t sample = sample_box_read(&drive->samples);
+    const uint32_t found = slow_monitors_step(drive, &sample);
     task->run_state = supervise(drive);
     drive_identify(drive, &sample);
 
     mrai_in_t next = sample.mrai;
 
-    command_t command = {.run = task->run_state == RUN_STATE_RUN, .fault_resets = task->fault_resets};
+    command_t command = {
+        .run = task->run_state == RUN_STATE_RUN && found == 0U,
+        .faults = found,
+        .fault_resets = task->fault_resets,
+    };
     if (command.run) {
         next.i = references(drive, &sample);
         next.flux = flux_table_step(&drive->motor.flux_table, next.i);
+        task->i_ref = next.i;
         task->psi_ref = (dq_t){next.flux.psi_d, next.flux.psi_q};
         command.target = current_control_target(&drive->motor.current_control, next.i, &next.flux);
     } else {
         rest(drive);
     }
+    command.safe = safe_state(drive, &sample);
     command_box_write(&drive->commands, command);
 
     if (drive->request.identification_mode != IDENTIFICATION_PAPER) {

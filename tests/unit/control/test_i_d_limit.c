@@ -38,6 +38,11 @@ void test_weak_magnets_count_as_hot_ones_where_the_winding_is_cooler(void)
     TEST_ASSERT_INT_WITHIN(4, lround(0.5 * 32768.0), limit(-0.053, 2200));
 }
 
+void test_magnets_are_not_taken_for_hotter_than_assumed(void)
+{
+    TEST_ASSERT_INT_WITHIN(8, lround(0.64 * 32768.0), limit(-0.15, 300));
+}
+
 void test_strong_magnets_do_not_make_a_hot_winding_cold(void)
 {
     TEST_ASSERT_INT_WITHIN(4, lround(0.7 * 32768.0), limit(0.1, 1200));
@@ -48,6 +53,14 @@ void test_without_a_temperature_the_assumed_one_counts_whatever_the_magnets_say(
 {
     TEST_ASSERT_INT_WITHIN(4, lround(0.64 * 32768.0), limit(0.0, INT16_MIN));
     TEST_ASSERT_INT_WITHIN(4, lround(0.64 * 32768.0), limit(0.1, INT16_MIN));
+}
+
+/* 1.5 of I_b at 20 C: 0.002 per K have to take 0.7 away, 350 K, before the circle's 0.8 is passed. */
+void test_magnets_that_bear_more_than_can_be_measured_leave_room_before_the_limit(void)
+{
+    f.i_d_limit.i_20 = 49152;
+    TEST_ASSERT_EQUAL_INT(f.i_d_limit.i_max, limit(0.0, 3600));
+    TEST_ASSERT_INT_WITHIN(4, lround(0.7 * 32768.0), limit(0.0, 4200));
 }
 
 void test_no_argument_makes_the_limit_negative_or_larger_than_the_circle(void)

@@ -40,6 +40,12 @@ TORQUE_MIN_SHARE = 0.1
 
 V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
 SUM_MAX_PER_FULL_SCALE = 0.05
+DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_max
+SPEED_TRIP = 0.8  # of the reserve of the speed base
+TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
+INVERTER_ERROR_PER_VDC = 0.02
+SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
+V_RELEASE_PER_VDC = 1.15
 
 SLEW_WEAK_PER_TORQUE_MAX = 100.0  # 1/s: a full reversal at top speed keeps its currents below the trip
 PSI_WEAK_PER_PSI_F = 1.0 / 0.6  # the magnet alone takes 60 % of the planned voltage
@@ -112,6 +118,15 @@ class Derived:
     v_max_V: float
     v_min_V: float
     sum_max_A: float
+    deviation_A: float
+    phase_dead_A: float
+    phase_alive_A: float
+    speed_trip_rad_s: float
+    monitor_torque_Nm: float
+    monitor_V: float
+    share_short: float
+    share_open: float
+    v_release_V: float
     identify: identification.Identify
 
 
@@ -196,10 +211,22 @@ def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[st
     }
 
 
+def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
+    machine, omega = config.machine, config.omega_max_rad_s
+    reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
+    return {"deviation_A": DEVIATION_SHARE * machine.i_max_A, "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
+            "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
+            "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
+            "monitor_torque_Nm": max(min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm),
+                                     TORQUE_MONITOR_SHARE * machine.torque_max_Nm),
+            "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V}
+
+
 def _monitors(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
             "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
+            "share_short": SHARE_SHORT, "share_open": SHARE_OPEN, "v_release_V": V_RELEASE_PER_VDC * inverter.vdc_V,
             "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A}
 
 
@@ -217,6 +244,7 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_voltage_reserve(config),
         **_torque_limit(config, bases, psi_f),
         **_monitors(config),
+        **_slow_monitors(config, bases),
         identify=identification.derive(config, bases.period_s, psi_f),
     )
 

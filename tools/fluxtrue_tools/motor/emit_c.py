@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.derived import TASK_PERIODS
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
 
@@ -214,10 +215,9 @@ def _torque_limit(motor: Motor) -> list[Row]:
 
 def _i_d_limit(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    i_20 = min(d.i_d_20_A / b.current_A, 1.0 - 1.0 / Q15_ONE)
     slope = d.i_d_slope_A_per_K / 10.0 / b.current_A * Q15_ONE
     per_psi = 10.0 / (d.psi_f_Vs * d.psi_temp_coeff_per_K) * b.flux_Vs / Q15_ONE
-    return [("i_20", q15(i_20, "i_d_demag_A"), f"{d.i_d_20_A:g} A"),
+    return [("i_20", str(round(d.i_d_20_A / b.current_A * Q15_ONE)), f"{d.i_d_20_A:g} A"),
             ("slope", q16(slope, "i_d_demag_A_per_K"), f"{d.i_d_slope_A_per_K:g} A/K"),
             ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), ""),
             ("dC_per_psi", q16(per_psi, "psi_temp_coeff_per_K"), f"{d.psi_temp_coeff_per_K:g} of psi_f per K"),
@@ -230,6 +230,34 @@ def _monitor(motor: Motor) -> list[Row]:
             ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
             ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
             ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A")]
+
+
+def _plausibility(motor: Motor) -> list[Row]:
+    d, b, thermal = motor.derived, motor.bases, motor.config.thermal
+    return [("e_0", q15(d.deviation_A / b.current_A, "deviation"), f"{d.deviation_A:g} A"),
+            ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
+            ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
+            ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
+            ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
+            ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), "")]
+
+
+def _torque_monitor(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    rate = 1.0 / (b.omega_rad_s * TASK_PERIODS * b.period_s)
+    return [("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
+            ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+            ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
+            ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
+            ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b 1 ms)")]
+
+
+def _safe_state(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+            ("share_short", q15(d.share_short, "share_short"), f"{d.share_short:g}"),
+            ("share_open", q15(d.share_open, "share_open"), f"{d.share_open:g}"),
+            ("v_release", q15(d.v_release_V / b.voltage_V, "v_release"), f"{d.v_release_V:g} V")]
 
 
 def _torque_slew(motor: Motor) -> tuple[str, str]:
@@ -261,6 +289,8 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
         ("voltage_reserve", _voltage_reserve(motor), ""), ("torque_limit", _torque_limit(motor), ""),
         ("i_d_limit", _i_d_limit(motor), ""), ("monitor", _monitor(motor), ""),
+        ("safe_state", _safe_state(motor), ""), ("plausibility", _plausibility(motor), ""),
+        ("torque_monitor", _torque_monitor(motor), ""),
     ]
 
 
