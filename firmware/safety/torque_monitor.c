@@ -50,7 +50,7 @@ static bool too_much(const torque_monitor_config_t *config, torque_monitor_state
 }
 
 /* (MN-9), (MN-10) */
-static bool turned(const torque_monitor_config_t *config, const torque_monitor_in_t *in, dq_t emf)
+static bool turned(const torque_monitor_config_t *config, const torque_monitor_in_t *in, dq_t emf, dq_t change)
 {
     const q15_t speed = fx_abs_q15(in->omega);
     const int32_t e_d = emf.d + fx_mul_q15(in->omega, (q15_t)in->psi.q);
@@ -62,7 +62,9 @@ static bool turned(const torque_monitor_config_t *config, const torque_monitor_i
         return false; /* so slow that the inverter's own error hides the back-EMF */
     }
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
-    const int32_t unsure = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current); /* a winding twice as hot */
+    /* A winding twice as hot; a change of flux that was not the same all through the millisecond. */
+    const int32_t unsure = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current) +
+                           (fx_abs_q31(change.d) + fx_abs_q31(change.q)) / 2;
     const int32_t aside = magnet + (fx_mul_q15(speed, fx_abs_q15((q15_t)in->psi.q)) >> 3) + unsure;
     return fx_abs_q31(e_d) > aside || along > fx_mul_q15(PSI_STRONG, (q15_t)psi_f) + unsure ||
            along < -fx_mul_q15(PSI_WEAK, (q15_t)psi_f) - unsure;
@@ -82,5 +84,5 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
     const q15_t drop_q = fx_mul_gain_q15(config->r, (q15_t)in->i.q);
     const dq_t emf = {fx_sat_q15(in->u.d - drop_d - change.d), fx_sat_q15(in->u.q - drop_q - change.q)};
     return confirm(&state->torque, too_much(config, state, in, emf), FAULT_TORQUE) |
-           confirm(&state->angle, turned(config, in, emf), FAULT_ANGLE_OFFSET);
+           confirm(&state->angle, turned(config, in, emf, change), FAULT_ANGLE_OFFSET);
 }

@@ -7,7 +7,7 @@
  *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + v_0 |i|, or against the request by as much
  *   angle   e = u - r i - j w psi(i): a magnet that is weak or strong shows in e_q, a wrong angle in e_d
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
- *           v = v_0/2 + r |i|; blind while |w| psi_f/5 < v_0/2
+ *           v = v_0/2 + r |i| + |d psi/dt|/2; blind while |w| psi_f/5 < v_0/2
  *   each confirmed by 5 ms in a row
  * Source   docs/theory/monitors.md (MN-6) ... (MN-10)
  * Units    per unit

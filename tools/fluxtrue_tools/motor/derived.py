@@ -13,7 +13,7 @@ TASK_PERIODS = 10  # the slow task runs every tenth PWM period: 1 kHz at 10 kHz
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
-V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
+V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
 V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
 TRIM_RATE_RAD_S = 50.0
