@@ -28,7 +28,6 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     sample->mrai.omega = now.angle.omega_q31;
     sample->theta_e = now.angle.theta_e;
     sample->v_dc = measured.v_dc;
-    sample->theta_e = now.angle.theta_e;
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
     return now;
 }

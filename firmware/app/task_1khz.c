@@ -79,7 +79,7 @@ static q15_t allowed(drive_t *drive, const sample_t *sample)
         .limits = &drive->request.limits,
         .u = sample->mrai.u,
         .i = sample->mrai.i,
-        .torque = drive->slow.torque.mean,
+        .torque = task->torque_estimate,
         .omega = fx_q15_from_q31(sample->mrai.omega),
         .v_dc = (q15_t)sample->v_dc,
         .reach = task->reference.torque_max,
@@ -143,6 +143,28 @@ static void rest(drive_t *drive)
     task->torque_request = 0;
 }
 
+/* What the fast ISR is to do until the next step; next becomes the operating point just commanded. */
+static void order(drive_t *drive, const sample_t *sample, uint32_t found, mrai_in_t *next)
+{
+    task_state_t *task = &drive->task;
+    command_t command = {
+        .run = task->run_state == RUN_STATE_RUN && found == 0U,
+        .faults = found,
+        .fault_resets = task->fault_resets,
+    };
+    if (command.run) {
+        next->i = references(drive, sample);
+        next->flux = flux_table_step(&drive->motor.flux_table, next->i);
+        task->i_ref = next->i;
+        task->psi_ref = (dq_t){next->flux.psi_d, next->flux.psi_q};
+        command.target = current_control_target(&drive->motor.current_control, next->i, &next->flux);
+    } else {
+        rest(drive);
+    }
+    command.safe = safe_state(drive, sample);
+    command_box_write(&drive->commands, command);
+}
+
 void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
@@ -152,24 +174,7 @@ void task_1khz(drive_t *drive)
     drive_identify(drive, &sample);
 
     mrai_in_t next = sample.mrai;
-
-    command_t command = {
-        .run = task->run_state == RUN_STATE_RUN && found == 0U,
-        .faults = found,
-        .fault_resets = task->fault_resets,
-    };
-    if (command.run) {
-        next.i = references(drive, &sample);
-        next.flux = flux_table_step(&drive->motor.flux_table, next.i);
-        task->i_ref = next.i;
-        task->psi_ref = (dq_t){next.flux.psi_d, next.flux.psi_q};
-        command.target = current_control_target(&drive->motor.current_control, next.i, &next.flux);
-    } else {
-        rest(drive);
-    }
-    command.safe = safe_state(drive, &sample);
-    command_box_write(&drive->commands, command);
-
+    order(drive, &sample, found, &next);
     if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
         return;
     }

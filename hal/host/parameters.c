@@ -5,6 +5,7 @@
 
 #include "app/calibration.h"
 #include "hal/host/instance.h"
+#include "hal/host/limits.h"
 #include "hal/host/learnt.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
@@ -61,6 +62,7 @@ GETTER(torque_estimate, pu15(d->drive.task.torque_estimate, bases(d)->torque_Nm)
 GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
 GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
+GETTER(derating, d->drive.task.derating)
 GETTER(voltage_trim, pu31(d->drive.task.voltage_reserve.trim, bases(d)->voltage_V))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
 GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
@@ -140,50 +142,6 @@ static void set_iq_ref(fluxtrue_t *d, double x)
     d->drive.request.i_ref.q = to_pu15(x, bases(d)->current_A);
 }
 
-/* On the dc side: P_b = 1.5 V_b I_b. */
-static float power_base(const fluxtrue_t *d)
-{
-    return 1.5F * bases(d)->voltage_V * bases(d)->current_A;
-}
-
-/* Beyond the format a limit is open. */
-static q15_t to_limit(double x, float base)
-{
-    return (x >= (double)base) ? Q15_MAX : to_pu15(x, base);
-}
-
-GETTER(derating, d->drive.task.derating)
-GETTER(inverter, d->board.inverter_C)
-GETTER(torque_drive, pu15(d->drive.request.limits.torque_drive, bases(d)->torque_Nm))
-GETTER(torque_regen, pu15(d->drive.request.limits.torque_regen, bases(d)->torque_Nm))
-GETTER(power_drive, pu15(d->drive.request.limits.power_drive, power_base(d)))
-GETTER(power_regen, pu15(d->drive.request.limits.power_regen, power_base(d)))
-
-static void set_inverter(fluxtrue_t *d, double x)
-{
-    d->board.inverter_C = x;
-}
-
-static void set_torque_drive(fluxtrue_t *d, double x)
-{
-    d->drive.request.limits.torque_drive = to_limit(x, bases(d)->torque_Nm);
-}
-
-static void set_torque_regen(fluxtrue_t *d, double x)
-{
-    d->drive.request.limits.torque_regen = to_limit(x, bases(d)->torque_Nm);
-}
-
-static void set_power_drive(fluxtrue_t *d, double x)
-{
-    d->drive.request.limits.power_drive = to_limit(x, power_base(d));
-}
-
-static void set_power_regen(fluxtrue_t *d, double x)
-{
-    d->drive.request.limits.power_regen = to_limit(x, power_base(d));
-}
-
 static void set_identification_reset(fluxtrue_t *d, double x)
 {
     d->drive.request.identification_resets += (x != 0.0) ? 1U : 0U;
@@ -201,11 +159,11 @@ static const parameter_t parameters[] = {
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
     {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
     {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},
-    {"inverter_C", get_inverter, set_inverter, -100.0, 500.0},
-    {"torque_limit_drive_Nm", get_torque_drive, set_torque_drive, 0.0, 1e9},
-    {"torque_limit_regen_Nm", get_torque_regen, set_torque_regen, 0.0, 1e9},
-    {"power_limit_drive_W", get_power_drive, set_power_drive, 0.0, 1e9},
-    {"power_limit_regen_W", get_power_regen, set_power_regen, 0.0, 1e9},
+    {"inverter_C", limits_get_inverter, limits_set_inverter, -100.0, 500.0},
+    {"torque_limit_drive_Nm", limits_get_torque_drive, limits_set_torque_drive, 0.0, 1e9},
+    {"torque_limit_regen_Nm", limits_get_torque_regen, limits_set_torque_regen, 0.0, 1e9},
+    {"power_limit_drive_W", limits_get_power_drive, limits_set_power_drive, 0.0, 1e9},
+    {"power_limit_regen_W", limits_get_power_regen, limits_set_power_regen, 0.0, 1e9},
     {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},
     {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
     {"torque_request_Nm", get_torque_request, NULL, 0, 0},

@@ -51,8 +51,8 @@ def test_throttle_release_at_high_speed_does_not_brake_the_car(hsm1: Motor, torq
 @pytest.mark.parametrize("rpm", [2000.0, 3000.0, 5000.0, 8000.0])
 @pytest.mark.parametrize("torque", [0.0, 20.0, 80.0, -80.0])
 def test_a_resolver_mounted_30_degrees_off_is_found(hsm1: Motor, torque: float, rpm: float, degrees: float) -> None:
-    """Enabled into the rotating machine. 5 ms of settling and 5 ms of confirmation, 30 ms in the worst case; at high speed
-    the over-current trip is faster."""
+    """Enabled into the rotating machine. 5 ms of settling and 5 ms of confirmation, 30 ms in the worst case; at high
+    speed the over-current trip is faster."""
     rig = Rig(hsm1, rpm, torque, enable=False, angle_offset_rad=math.radians(degrees))
     rig.run(0.02)
     trace = rig.set(enable=1.0).run(0.1)
@@ -115,7 +115,7 @@ def test_switched_off_at_top_speed_it_shorts_and_opens_when_the_speed_has_gone(h
     assert trace.settled("truth.i_d_A") <= -150.0
     down = rig.run(0.3, plant_speed_rad_s=(10000.0 * math.pi / 30.0, 5000.0 * math.pi / 30.0))
     assert abs(down["truth.i_d_A"][-1]) <= 1.0
-    assert abs(down.torque[-1]) <= 0.1
+    assert abs(down.torque[-1]) <= 1.0  # iron loss
 
 
 @pytest.mark.parametrize("phase", ["a", "b", "c"])

@@ -84,7 +84,7 @@ static double allowed(twin_t *twin)
         .power_regen = HUGE_VAL,
         .u = twin->sample.u,
         .i = twin->sample.i,
-        .torque = twin->torque_mean.mean,
+        .torque = twin->torque_estimate,
         .omega = twin->sample.omega,
         .v_dc = twin->v_dc,
         .reach = twin->reference.torque_max,
@@ -117,7 +117,7 @@ static void torque_path(twin_t *twin)
         .psi = twin->psi_ref,
         .v_dc = twin->v_dc,
         .psi_plan = twin->reference.psi_plan,
-        .psi_delta = twin->mrai.psi_delta,
+        .psi_delta = twin->psi_delta,
         .acting = twin->periods_on >= 3 && !twin->current_mode,
     };
     const double shift = twin_voltage_reserve(&twin->motor, &twin->trim, &reserve);
@@ -128,8 +128,8 @@ static void torque_path(twin_t *twin)
         .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
         .v_trim = twin->trim,
         .shift = shift,
-        .psi_delta = twin->mrai.psi_delta,
-        .i_d_max = twin_i_d_limit(&twin->motor, twin->mrai.psi_delta, twin->winding_C),
+        .psi_delta = twin->psi_delta,
+        .i_d_max = twin_i_d_limit(&twin->motor, twin->psi_delta, twin->winding_C),
     };
     twin->reference = twin_current_reference(&twin->motor, &request);
 }

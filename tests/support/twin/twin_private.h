@@ -52,7 +52,6 @@ struct twin {
     twin_reference_t reference;
     double trim;
     twin_limit_state_t limit;
-    double winding_C;
     twin_dq_t psi_ref; /* tables' flux at the last reference */
     twin_abc_t last_i; /* good samples, kept when an implausible one comes */
     double last_theta_m, theta;
