@@ -19,9 +19,8 @@ typedef struct {
 
 static instant_t observe(drive_t *drive, sample_t *sample)
 {
-    adc_counts_t counts;
-    hal_adc_read(&counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &counts);
+    hal_adc_read(&sample->counts);
+    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     instant_t now;
     now.i = measured.i;
     now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
@@ -64,10 +63,19 @@ static void publish(drive_t *drive, sample_t *sample)
     hal_irq_pend_mrai();
 }
 
-static void bridge_off(drive_t *drive, sample_t *sample)
+/* The safe state: low sides closed, or all gates open. */
+static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 {
-    hal_pwm_enable(false);
-    hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
+    const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
+    const bool closed = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
+    const uint16_t duty = closed ? 0U : DUTY_MIDDLE;
+    if (!closed) {
+        hal_pwm_enable(false);
+    }
+    hal_pwm_write((duty_t){duty, duty, duty});
+    if (closed) {
+        hal_pwm_enable(true); /* with the duties, not before them */
+    }
     current_control_reset(&drive->fast.current_control);
     sample->mrai.u = (dq_t){0, 0};
     sample->voltage_limited = false;
@@ -138,7 +146,10 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {
-        bridge_off(drive, sample);
+        if (command->faults != 0U) {
+            drive_raise_fault(drive, command->faults);
+        }
+        bridge_off(drive, sample, command->safe);
     }
     publish(drive, sample);
 }

@@ -38,9 +38,11 @@ static void robust(drive_t *drive, const sample_t *sample)
     const identify_window_t window = window_box_read(&drive->windows);
     const identify_point_t point = identify_point(&m->identify, &window, sample->mrai.omega);
     const flux_point_t flux = flux_table_step(&m->flux_table, point.i_m);
+    const flux_inductances_t inductances = flux_table_inductances(&m->flux_table, point.i_m);
     const identify_in_t in = {
         .point = &point,
         .flux = &flux,
+        .l = &inductances,
         .temperature_known = winding_dC != HAL_TEMPERATURE_UNKNOWN,
         .winding_dC = winding_dC,
         .enabled = drive->request.identification && sample->acting,

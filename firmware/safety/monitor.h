@@ -13,18 +13,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "types/faults.h"
 #include "types/frames.h"
-
-enum {
-    FAULT_OVER_CURRENT = 1u << 0,
-    FAULT_OVER_VOLTAGE = 1u << 1,
-    FAULT_UNDER_VOLTAGE = 1u << 2,
-    FAULT_CURRENT_SUM = 1u << 3,
-    FAULT_ANGLE = 1u << 4,
-    FAULT_INPUT = 1u << 5,     /* the HAL delivered something that is no number */
-    FAULT_OVERRUN = 1u << 6,   /* the identification did not finish within its period, 3 in a row */
-    FAULT_CONFIG = 1u << 7     /* start-up check of the motor data failed */
-};
 
 typedef struct {
     q15_t i_trip;

@@ -27,6 +27,7 @@ DIVISIONS = {
     "identify_model.c": 2,  # 1 kHz: the direction of the current
     "identify.c": 1,  # 1 kHz: weight of the local flux error
     "identify_filter.c": 1,  # 100 Hz and axis
+    "torque_limit.c": 2,
     "torque_loop.c": 1,
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
