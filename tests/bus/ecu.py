@@ -44,6 +44,8 @@ class Ecu:
         self.lib.can_host_take.restype = ctypes.c_bool
         self.handle = ctypes.c_void_p(self.lib.fluxtrue_create())
         self.lib.can_host_attach(self.handle)
+        self.lib.fluxtrue_set.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double]
+        self.lib.fluxtrue_set(self.handle, b"machine_monitors", 0.0)  # these samples are no machine's
         # ia ib ic in A, dc voltage in V, angle in rad, winding in degrees Celsius
         self.samples = [0.0, 0.0, 0.0, 0.0, 0.0, 25.0]
         self.speed_rad_s = 0.0

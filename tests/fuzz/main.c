@@ -134,6 +134,7 @@ int main(int argc, char **argv)
     const uint64_t frames = strtoull(argv[1], NULL, 10);
     fluxtrue_init(&ecu);
     can_host_attach(&ecu);
+    (void)fluxtrue_set(&ecu, "machine_monitors", 0.0); /* no machine answers here */
     oracle_start(&oracle);
     sender_start(&sender, strtoull(argv[2], NULL, 10));
     for (uint32_t ms = 0; tally.frames < frames; ms++) {
