@@ -54,16 +54,17 @@ static bool stuck(uint8_t *count, bool equal, bool others_move)
     return *count >= EQUAL_SAMPLES;
 }
 
-static uint32_t sensors(plausibility_state_t *state, const plausibility_in_t *in)
+static uint32_t sensors(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in)
 {
     const abc_t i = in->phases;
-    const bool a = i.a == state->last.a;
-    const bool b = i.b == state->last.b;
-    const bool c = i.c == state->last.c;
+    const int32_t moved = config->i_dead >> 2; /* several steps of the converter: no noise around its edge */
+    const int32_t a = fx_abs_q31(i.a - state->last.a);
+    const int32_t b = fx_abs_q31(i.b - state->last.b);
+    const int32_t c = fx_abs_q31(i.c - state->last.c);
     state->last = i;
-    const bool is_stuck_a = stuck(&state->equal[0], a, !b && !c);
-    const bool is_stuck_b = stuck(&state->equal[1], b, !a && !c);
-    const bool is_stuck_c = stuck(&state->equal[2], c, !a && !b);
+    const bool is_stuck_a = stuck(&state->equal[0], a == 0, b > moved && c > moved);
+    const bool is_stuck_b = stuck(&state->equal[1], b == 0, a > moved && c > moved);
+    const bool is_stuck_c = stuck(&state->equal[2], c == 0, a > moved && b > moved);
     return (is_stuck_a || is_stuck_b || is_stuck_c) ? FAULT_CURRENT_STUCK : 0;
 }
 
@@ -79,7 +80,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         state->equal[0] = state->equal[1] = state->equal[2] = 0;
         return faults;
     }
-    faults |= deviation(config, state, in) | sensors(state, in);
+    faults |= deviation(config, state, in) | sensors(config, state, in);
     const bool is_lost_a = lost(config, &state->lost[0], in->wanted.a, in->phases.a);
     const bool is_lost_b = lost(config, &state->lost[1], in->wanted.b, in->phases.b);
     const bool is_lost_c = lost(config, &state->lost[2], in->wanted.c, in->phases.c);

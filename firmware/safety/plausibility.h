@@ -4,7 +4,7 @@
 /** Slow monitors: does the machine do what it was told, as far as its sensors tell?
  *   control deviation  |i - i*| > e_0 + |i*|/8 for 20 ms, 100 ms while the voltage is cut
  *   phase lost         a phase without current that should carry some: 10 more such samples than samples with current
- *   sensor stuck       20 equal samples of a phase while another one moves
+ *   sensor stuck       20 equal samples of a phase, both others moved by i_dead/4 in each
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
  * Source   docs/theory/monitors.md (MN-1) ... (MN-5)

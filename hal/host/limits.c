@@ -70,3 +70,20 @@ void limits_set_power_regen(fluxtrue_t *drive, double value)
 {
     drive->drive.request.limits.power_regen = to_limit(value, power_base(drive));
 }
+
+double limits_get_machine_monitors(const fluxtrue_t *drive)
+{
+    return drive->drive.motor.plausibility.e_0 != Q15_MAX;
+}
+
+void limits_set_machine_monitors(fluxtrue_t *drive, double value)
+{
+    motor_t *m = &drive->drive.motor;
+    m->plausibility = motor.plausibility;
+    m->torque_monitor = motor.torque_monitor;
+    if (value == 0.0) {
+        m->plausibility.e_0 = Q15_MAX;
+        m->plausibility.i_alive = Q15_MAX;
+        m->torque_monitor.v_0 = Q15_MAX;
+    }
+}

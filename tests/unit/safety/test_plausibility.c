@@ -98,11 +98,21 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_move_is_stuck(v
         int found = 0;
         for (int n = 1; n <= 100 && !found; n++) {
             const int32_t held = 5000;
-            in.phases = (abc_t){x == 0 ? held : n, x == 1 ? held : 2 * n, x == 2 ? held : -3 * n};
+            const int32_t moves = (n & 1) ? 3000 : 3101; /* i_dead/4 = 100 */
+            in.phases = (abc_t){x == 0 ? held : moves, x == 1 ? held : -moves, x == 2 ? held : 2 * moves};
             in.wanted = in.phases;
             found = (plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK) ? n : 0;
         }
         TEST_ASSERT_EQUAL_INT(21, found); /* the first sample is equal to nothing */
+    }
+}
+
+/* A quantised current at the edge of a step flickers by one of them while another phase repeats: 16 counts. */
+void test_phases_that_only_flicker_are_no_evidence(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        in.phases = in.wanted = (abc_t){5000, -2500 + 16 * (n & 1), -2500 - 16 * (n & 1)};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
     }
 }
 
