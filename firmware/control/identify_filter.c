@@ -4,7 +4,7 @@
 #define X_MAX (4 * IDENTIFY_ONE_Q27)
 #define E_MAX (1 << 26)
 #define S_MIN (INT64_C(1) << 38) /* the square of the smallest noise that identify_valid() accepts */
-#define INCONSISTENT_SHIFT 3 /* e^2 > 8 s: 2.8 standard deviations */
+#define INCONSISTENT_SHIFT 3 /* e^2 > 8 h P h' + r: r counts one error many times over (ID-14) */
 #define SIGNIFICANT 16 /* bits of the divisor */
 
 /* s as mantissa and exponent: 1/s = inverse 2^-(32 + shift), rounded down. */
@@ -92,11 +92,12 @@ identify_verdict_t identify_filter_update(identify_filter_t *filter, const ident
 {
     int32_t ph[IDENTIFY_STATES];
     int32_t gain[IDENTIFY_STATES];
-    int64_t s = project(filter, row, ph) + r_q60;
-    s = (s < S_MIN) ? S_MIN : s;
+    const int64_t own = project(filter, row, ph);
+    const int64_t s = (own + r_q60 < S_MIN) ? S_MIN : own + r_q60;
     const reciprocal_t by = reciprocal(s);
     const int32_t e = fx_clamp_q31(e_q30, -E_MAX, E_MAX);
-    identify_verdict_t verdict = {false, ((int64_t)e_q30 * e_q30) >> INCONSISTENT_SHIFT > s};
+    const int64_t credible = own + (r_q60 >> INCONSISTENT_SHIFT);
+    identify_verdict_t verdict = {false, ((int64_t)e_q30 * e_q30) >> INCONSISTENT_SHIFT > credible};
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         /* Q30 2^30/s = Q24 after 54 - 32 - shift. */
         gain[j] = round_shift((int64_t)ph[j] * by.inverse, by.shift - 22U);

@@ -24,7 +24,7 @@ typedef struct {
 
 typedef struct {
     bool clamped;      /* a state reached its limit */
-    bool inconsistent; /* the innovation is beyond 2.8 times what P and r expect */
+    bool inconsistent; /* the innovation is beyond what P and the errors behind r can be */
 } identify_verdict_t;
 
 void identify_filter_reset(identify_filter_t *filter);

@@ -155,10 +155,10 @@ void test_what_the_model_cannot_explain_is_reported_and_limited(void)
     identify_filter_t filter;
     identify_filter_reset(&filter);
     const identify_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
-    const int64_t r = (int64_t)(1e-4 * one_q60); /* s = 2e-4: 2.83 sigma is 0.04 */
-    TEST_ASSERT_FALSE(identify_filter_update(&filter, &row, (int32_t)(0.0395 * IDENTIFY_ONE_Q30), r).inconsistent);
+    const int64_t r = (int64_t)(1e-4 * one_q60); /* 8 * 1e-4 + 1e-4 is 0.03 squared */
+    TEST_ASSERT_FALSE(identify_filter_update(&filter, &row, (int32_t)(0.0296 * IDENTIFY_ONE_Q30), r).inconsistent);
     identify_filter_reset(&filter);
-    TEST_ASSERT_TRUE(identify_filter_update(&filter, &row, (int32_t)(0.0405 * IDENTIFY_ONE_Q30), r).inconsistent);
+    TEST_ASSERT_TRUE(identify_filter_update(&filter, &row, (int32_t)(0.0304 * IDENTIFY_ONE_Q30), r).inconsistent);
     bool clamped = false;
     for (int n = 0; n < 10; n++) {
         clamped = identify_filter_update(&filter, &row, IDENTIFY_ONE_Q30, r / 100).clamped || clamped;
