@@ -91,7 +91,6 @@ static void period_begins(emu_t *emu, const peripheral_t *self)
         emu->s.ftm[0].triggers_due = true;
         emu->s.centre = true;
         emu->s.stop = true;
-        (void)uc_emu_stop(emu->uc);
     }
 }
 
