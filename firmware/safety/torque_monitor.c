@@ -41,7 +41,7 @@ static bool too_much(const torque_monitor_config_t *config, torque_monitor_state
 
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
-    const int32_t power = fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(config->v_0, current);
+    const int32_t power = fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(config->v_0, fx_add_q15(current, config->i_0));
     const int32_t asked = fx_mul_q15(in->torque, in->omega);
     if (fx_abs_q31(asked) < fx_mul_q15(config->t_0, fx_abs_q15(in->omega))) {
         return fx_abs_q31(mean) > power; /* around no torque either sign is too much */

@@ -4,7 +4,7 @@
 /** Torque and angle judged from the voltages alone: a path that shares neither tables' torque nor identification with
  * the control, and works without a division.
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
- *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + v_0 |i|, or against the request by as much
+ *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + v_0 (|i| + i_0), or against the request by as much
  *   angle   e = u - r i - j w psi(i): a magnet that is weak or strong shows in e_q, a wrong angle in e_d
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
  *           v = v_0/2 + r |i| + |d psi/dt|/2; blind while |w| psi_f/5 < v_0/2
@@ -25,6 +25,7 @@ typedef struct {
     q15_t psi_f;
     q15_t t_0;         /* torque that never counts */
     q15_t v_0;         /* voltage that the inverter may be wrong by */
+    q15_t i_0;         /* current that noise and the bridge's zero crossing make of nothing */
     q16_t rate_gain;   /* 1/(omega_b task period): flux step to voltage */
 } torque_monitor_config_t;
 

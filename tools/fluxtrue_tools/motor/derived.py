@@ -44,6 +44,7 @@ DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_m
 SPEED_TRIP = 0.8  # of the reserve of the speed base
 TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
 INVERTER_ERROR_PER_VDC = 0.02
+MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
 
@@ -124,6 +125,7 @@ class Derived:
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
+    monitor_A: float
     share_short: float
     share_open: float
     v_release_V: float
@@ -219,7 +221,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
             "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
             "monitor_torque_Nm": max(min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm),
                                      TORQUE_MONITOR_SHARE * machine.torque_max_Nm),
-            "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V}
+            "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
+            "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A}
 
 
 def _monitors(config: MotorConfig) -> dict[str, float]:
