@@ -37,12 +37,11 @@ static void robust(drive_t *drive, const sample_t *sample)
     const int16_t winding_dC = hal_temperature_winding_dC();
     const identify_window_t window = window_box_read(&drive->windows);
     const identify_point_t point = identify_point(&m->identify, &window, sample->mrai.omega);
-    const flux_point_t flux = flux_table_step(&m->flux_table, point.i_m);
-    const flux_inductances_t inductances = flux_table_inductances(&m->flux_table, point.i_m);
+    const identify_tables_t tables = {flux_table_step(&m->flux_table, point.i_m),
+                                      flux_table_inductances(&m->flux_table, point.i_m)};
     const identify_in_t in = {
         .point = &point,
-        .flux = &flux,
-        .l = &inductances,
+        .tables = &tables,
         .temperature_known = winding_dC != HAL_TEMPERATURE_UNKNOWN,
         .winding_dC = winding_dC,
         .enabled = drive->request.identification && sample->acting,

@@ -17,9 +17,11 @@ static int32_t direction(int32_t i_q15, q15_t magnitude)
     return (int32_t)fx_div_q15((q15_t)i_q15, magnitude) * 32768;
 }
 
-static void derivatives(const identify_config_t *config, const flux_point_t *flux, const flux_inductances_t *l,
+static void derivatives(const identify_config_t *config, const identify_tables_t *tables,
                         const identify_point_t *point, identify_model_t *m)
 {
+    const flux_point_t *flux = &tables->flux;
+    const flux_inductances_t *l = &tables->inductances;
     const int32_t a = point->iron / 2; /* Q30 */
     m->psi = (dq_t){flux->psi_d * 32768, flux->psi_q * 32768};
     m->i_m = (dq_t){point->i_m.d * 32768, point->i_m.q * 32768};
@@ -56,10 +58,10 @@ static void rows(const identify_config_t *config, const identify_point_t *point,
 }
 
 identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const flux_point_t *flux, const flux_inductances_t *l, q31_t r_prior)
+                                const identify_tables_t *tables, q31_t r_prior)
 {
     identify_model_t m = {.current = false};
-    derivatives(config, flux, l, point, &m);
+    derivatives(config, tables, point, &m);
     rows(config, point, &m);
     const int32_t w = point->omega / 2;
     const int32_t d = fx_sub_q31(fx_add_q31(point->u.d, identify_mul(w, m.psi.q)), point->rate.d);

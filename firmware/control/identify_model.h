@@ -13,6 +13,12 @@
 #include "control/flux_table_types.h"
 #include "control/identify_point.h"
 
+/** The tables at point->i_m. */
+typedef struct {
+    flux_point_t flux;
+    flux_inductances_t inductances;
+} identify_tables_t;
+
 typedef struct {
     int32_t h[IDENTIFY_STATES];
 } identify_row_t;
@@ -29,7 +35,7 @@ typedef struct {
 } identify_model_t;
 
 identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const flux_point_t *flux, const flux_inductances_t *l, q31_t r_prior);
+                                const identify_tables_t *tables, q31_t r_prior);
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
 
 #endif

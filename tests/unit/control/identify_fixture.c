@@ -59,6 +59,11 @@ void identify_fixture(fixture_t *f, identify_config_t *c)
     si->identify_confidence_rate = from_q15(c->confidence_rate);
 }
 
+identify_tables_t tables_at(const fixture_t *f, dq_t i_m)
+{
+    return (identify_tables_t){flux_table_step(&f->flux_table, i_m), flux_table_inductances(&f->flux_table, i_m)};
+}
+
 /* Ten steady periods of the machine that the tables describe, and both forms of them. */
 window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t extra_u)
 {

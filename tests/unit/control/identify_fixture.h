@@ -14,6 +14,8 @@ typedef struct {
     twin_window_t twin;
 } window_pair_t;
 
+identify_tables_t tables_at(const fixture_t *f, dq_t i_m);
+
 /* i in q15, speed per unit; extra_u is added to the voltage that the tables would need. */
 window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t extra_u);
 

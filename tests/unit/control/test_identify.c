@@ -57,9 +57,8 @@ static void run(dq_t i, double omega, truth_t truth, int steps)
     const window_pair_t pair = steady_window(&f, i, omega, extra(i, omega, truth));
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
     const twin_point_t si = twin_point(&f.si, &pair.twin, omega * f.w);
-    const flux_point_t flux = flux_table_step(&f.flux_table, point.i_m);
-    const flux_inductances_t l = flux_table_inductances(&f.flux_table, point.i_m);
-    const identify_in_t in = {&point, &flux, &l, sensor, winding_dC, enabled};
+    const identify_tables_t tables = tables_at(&f, point.i_m);
+    const identify_in_t in = {&point, &tables, sensor, winding_dC, enabled};
     for (int n = 0; n < steps; n++) {
         out = identify_step(&c, &state, &in);
         twin_identify(&f.si, &twin, &si, sensor ? winding_dC / 10.0 : (double)NAN, enabled);
@@ -141,9 +140,8 @@ void test_a_period_without_the_bridge_is_not_learnt_from(void)
     window_pair_t pair = steady_window(&f, (dq_t){-4000, 8000}, 0.4, (dq_t){0, 900});
     pair.fixed.acting = false;
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.4 * 2147483647.0));
-    const flux_point_t flux = flux_table_step(&f.flux_table, point.i_m);
-    const flux_inductances_t l = flux_table_inductances(&f.flux_table, point.i_m);
-    const identify_in_t in = {&point, &flux, &l, false, 0, true};
+    const identify_tables_t tables = tables_at(&f, point.i_m);
+    const identify_in_t in = {&point, &tables, false, 0, true};
     for (int n = 0; n < 500; n++) {
         (void)identify_step(&c, &state, &in);
     }
@@ -156,9 +154,8 @@ void test_an_update_needs_all_of_its_steps(void)
     const dq_t i = {-4000, 8000};
     const window_pair_t pair = steady_window(&f, i, 0.4, (dq_t){0, 900});
     identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.4 * 2147483647.0));
-    const flux_point_t flux = flux_table_step(&f.flux_table, point.i_m);
-    const flux_inductances_t l = flux_table_inductances(&f.flux_table, point.i_m);
-    const identify_in_t in = {&point, &flux, &l, false, 0, true};
+    const identify_tables_t tables = tables_at(&f, point.i_m);
+    const identify_in_t in = {&point, &tables, false, 0, true};
     for (int n = 0; n < 100; n++) {
         point.valid = n % 10 != 4;
         (void)identify_step(&c, &state, &in);
@@ -219,9 +216,8 @@ void test_a_contradiction_takes_the_confidence_away(void)
     const dq_t turned = {(int32_t)(0.5 * 0.5 * flux.psi_d), (int32_t)(0.5 * 0.5 * flux.psi_q)};
     const window_pair_t pair = steady_window(&f, i, 0.5, turned);
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
-    const flux_point_t at = flux_table_step(&f.flux_table, point.i_m);
-    const flux_inductances_t l = flux_table_inductances(&f.flux_table, point.i_m);
-    const identify_in_t in = {&point, &at, &l, false, 0, true};
+    const identify_tables_t tables = tables_at(&f, point.i_m);
+    const identify_in_t in = {&point, &tables, false, 0, true};
     for (int n = 0; n < 1500; n++) {
         (void)identify_step(&c, &state, &in);
     }
