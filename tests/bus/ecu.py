@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An inverter on a bus, in this process: the firmware's library, fed with samples and frames."""
+"""An inverter on a bus, in this process: the firmware with the simulated machine, fed with frames."""
 
 import ctypes
 import os
@@ -8,6 +8,8 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database
 
+from fluxtrue_tools.sim import motor as sim_motor
+from fluxtrue_tools.sim.build import MotorFolder
 from protection import protect
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,21 +35,27 @@ class Frame(ctypes.Structure):
 
 
 class Ecu:
-    """One instance, one millisecond at a time."""
+    """One instance with its machine at an imposed speed, one millisecond at a time."""
 
     def __init__(self) -> None:
         self.dbc = load_dbc()
-        self.lib = ctypes.CDLL(str(BUILD / "libfluxtrue_sil.so"))
+        self.motor = sim_motor.read(MotorFolder("hsm1", BUILD / "motors" / "hsm1"))
+        self.lib = self.motor.library
         self.lib.fluxtrue_create.restype = ctypes.c_void_p
         self.lib.fluxtrue_get.restype = ctypes.c_double
+        self.lib.sim_create_around.restype = ctypes.c_void_p
         self.lib.can_host_put.restype = ctypes.c_bool
         self.lib.can_host_take.restype = ctypes.c_bool
         self.handle = ctypes.c_void_p(self.lib.fluxtrue_create())
         self.lib.can_host_attach(self.handle)
-        # ia ib ic in A, dc voltage in V, angle in rad, winding in degrees Celsius
-        self.samples = [0.0, 0.0, 0.0, 0.0, 0.0, 25.0]
+        self.sim = ctypes.c_void_p(self.lib.sim_create_around(self.handle))
+        if self.motor.flux_map is not None:
+            self.motor.flux_map.hand_over(self.lib, self.sim)
+        for name, value in {**self.motor.plant, "imposed_speed": 1.0, "vdc_V": 1.0}.items():
+            self.set(name, value)
+        bad = self.lib.sim_start(self.sim)
+        assert bad is None, bad
         self.speed_rad_s = 0.0
-        self.out = (ctypes.c_double * 4)()
         self.time_ms = 0
         self.counters = {COMMAND: 0, LIMITS: 0}
         self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequest": 0.0,
@@ -58,7 +66,16 @@ class Ecu:
 
     def close(self) -> None:
         """Gives the memory back."""
+        self.lib.sim_destroy(self.sim)
         self.lib.fluxtrue_destroy(self.handle)
+
+    def set(self, name: str, value: float) -> None:
+        """A parameter of the plant."""
+        assert self.lib.sim_set(self.sim, f"plant.{name}".encode(), float(value)) == 0, name
+
+    def truth(self, name: str) -> float:
+        """What the plant knows."""
+        return float(self.lib.sim_get(self.sim, f"truth.{name}".encode()))
 
     def get(self, name: str) -> float:
         """A value of fluxtrue_get()."""
@@ -84,9 +101,8 @@ class Ecu:
         """One millisecond of simulated time; the command goes out in every tenth."""
         if self.talking and self.time_ms % 10 == 0:
             self.send(COMMAND, self.command)
-        for _ in range(PERIODS_PER_MS):
-            self.samples[4] += self.speed_rad_s * 1e-4
-            self.lib.fluxtrue_step(self.handle, (ctypes.c_double * 6)(*self.samples), self.out)
+        self.set("speed_rad_s", self.speed_rad_s)
+        assert self.lib.sim_run(self.sim, PERIODS_PER_MS, None, 0) == 0
         self.time_ms += 1
         frame = Frame()
         while self.lib.can_host_take(self.handle, ctypes.byref(frame)):
@@ -101,6 +117,13 @@ class Ecu:
         for _ in range(milliseconds):
             self.step_ms()
 
+    def run_until(self, name: str) -> dict:
+        """To the end of the millisecond in which the message is sent; its values."""
+        self.last.pop(name, None)
+        while name not in self.last:
+            self.run(1)
+        return self.last[name]
+
     @property
     def state(self) -> str:
         """As told on the bus."""
@@ -110,6 +133,6 @@ class Ecu:
         """To the state run, without torque."""
         self.run(100)
         self.run(20, Mode="torque")
-        self.samples[3] = v_dc_V
+        self.set("vdc_V", v_dc_V)
         self.run(100)
         self.run(30, Enable=1)

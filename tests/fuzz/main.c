@@ -9,11 +9,15 @@
 
 #include "hal/host/can_host.h"
 #include "hal/host/instance.h"
+#include "loop/runner/sim.h"
 #include "oracle.h"
 #include "sender.h"
+#include "vecu/machine_data.h"
 
 #define BURST_MAX 30U /* frames per millisecond: what one task takes */
 #define PERIODS_PER_MS 10
+#define BATTERY_V 350.0
+#define EMPTY_V 1.0 /* the machine model wants a voltage */
 #define ROUNDING_NM 0.02 /* two counts of the torque */
 
 typedef struct {
@@ -21,6 +25,7 @@ typedef struct {
 } tally_t;
 
 static fluxtrue_t ecu;
+static sim_t *sim;
 static oracle_t oracle;
 static sender_t sender;
 static tally_t tally;
@@ -100,22 +105,39 @@ static void traffic(uint32_t ms)
 static double dc_link_V(double v_V)
 {
     const bool *on = ecu.board.output;
-    const double to_V = (on[BOARD_PRECHARGE] || on[BOARD_MAIN_CONTACTOR]) ? 350.0 : v_V;
-    return on[BOARD_DISCHARGE] ? 0.98 * v_V : v_V + 0.1 * (to_V - v_V);
+    const double to_V = (on[BOARD_PRECHARGE] || on[BOARD_MAIN_CONTACTOR]) ? BATTERY_V : v_V;
+    return fmax(on[BOARD_DISCHARGE] ? 0.98 * v_V : v_V + 0.1 * (to_V - v_V), EMPTY_V);
+}
+
+static void set(const char *name, double value)
+{
+    check(sim_set(sim, name, value) == SIM_OK, name);
+}
+
+/* The machine, turned slowly by someone else. */
+static void start_plant(void)
+{
+    const machine_data_t *m = &machine_data;
+    sim = sim_create_around(&ecu);
+    check(sim != NULL, "out of memory");
+    for (const machine_value_t *v = m->values; v->name != NULL; v++) {
+        set(v->name, v->value);
+    }
+    check(sim_map(sim, m->id_A, m->nd, m->iq_A, m->nq, m->psi_d_Vs, m->psi_q_Vs) == SIM_OK, "flux map");
+    set("plant.vdc_V", EMPTY_V);
+    set("plant.imposed_speed", 1.0);
+    set("plant.speed_rad_s", 30.0);
+    check(sim_start(sim) == NULL, "plant");
 }
 
 static void millisecond(uint32_t ms)
 {
-    static double samples[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 25.0};
-    double duties[4];
-    samples[3] = dc_link_V(samples[3]);
     can_frame_t sent;
     const double before_Nm = ecu.drive.request.torque / 32768.0 * (double)ecu.drive.motor.bases.torque_Nm;
+    set("plant.vdc_V", dc_link_V(sim_get(sim, "plant.vdc_V")));
     traffic(ms);
     oracle_tick(&oracle);
-    for (int n = 0; n < PERIODS_PER_MS; n++) {
-        fluxtrue_step(&ecu, samples, duties);
-    }
+    check(sim_run(sim, PERIODS_PER_MS, NULL, 0) == 0, "the simulation cannot go on");
     while (can_host_take(&ecu, &sent)) {
         check(sent.length == 8 && !sent.extended, "a frame was sent that the DBC does not know");
     }
@@ -134,6 +156,7 @@ int main(int argc, char **argv)
     const uint64_t frames = strtoull(argv[1], NULL, 10);
     fluxtrue_init(&ecu);
     can_host_attach(&ecu);
+    start_plant();
     oracle_start(&oracle);
     sender_start(&sender, strtoull(argv[2], NULL, 10));
     for (uint32_t ms = 0; tally.frames < frames; ms++) {
@@ -143,5 +166,6 @@ int main(int argc, char **argv)
     printf("%" PRIu64 " frames in %" PRIu64 " ms of simulated time: %" PRIu64 " accepted, as the oracle says; "
            "gates closed during %" PRIu64 " ms\n",
            tally.frames, tally.milliseconds, tally.accepted, tally.running_ms);
+    sim_destroy(sim);
     return 0;
 }

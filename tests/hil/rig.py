@@ -25,6 +25,9 @@ LIMITS = "VCU_BatteryLimits"
 STATUS = "INV_Status"
 MS = 1e-3
 RPM = 2.0 * np.pi / 60.0  # rad/s
+# In the first and third quadrant as often as in the others, at each speed with two torques.
+WARM_UP_RPM = (1500.0, 4000.0, 800.0, 2500.0, 6000.0, 3000.0, -1500.0, -4000.0, 2000.0, 7000.0, -700.0)
+WARM_UP_NM = (60.0, 20.0, -40.0, 100.0, -80.0, -20.0, 90.0, 40.0, -60.0)
 EXACT = 1e-9  # s: a step's end and a frame's due time are the same instant
 
 
@@ -274,6 +277,20 @@ class Rig:
         """The dynamometer brings the shaft to this speed; a jump would be an angle fault."""
         self.stand.ramp("plant.speed_rad_s", speed_rpm * RPM, seconds)
         self.advance(seconds + 0.1)
+
+    def warm_up(self, seconds: float) -> None:
+        """Drive about, so that the identification sees speeds and torques in all quadrants; afterwards slow, 20 N·m."""
+        assert self.state == "run"
+        end_s, k = self.now_s + seconds - 3.0, 0
+        while self.now_s < end_s:
+            self.stand.ramp("plant.speed_rad_s", WARM_UP_RPM[k % len(WARM_UP_RPM)] * RPM, 1.0)
+            for _ in range(2):
+                self.ask(torque_Nm=WARM_UP_NM[k % len(WARM_UP_NM)])
+                self.advance(1.0)
+                k += 1
+        self.ask(torque_Nm=20.0)
+        self.turn(1000.0, 1.0)
+        self.advance(end_s + 3.0 - self.now_s)
 
     def record(self, names: Sequence[str], periods: int = 10) -> Trace:
         """The plant's truth from now on: a row each so many PWM periods."""

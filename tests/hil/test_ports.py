@@ -5,6 +5,7 @@ import random
 import signal
 import socket
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -187,6 +188,17 @@ def test_a_bad_option_is_a_clear_error(program: Path, options: list[str]) -> Non
     done = subprocess.run([program, *options], capture_output=True, text=True, timeout=10, check=False)
     assert done.returncode == 2
     assert done.stderr.startswith("error: ") and "allowed" in done.stderr
+
+
+@pytest.mark.parametrize("motor", ["hsm1", "paper"])
+def test_the_command_line_serves_any_shipped_motor(motor: str) -> None:
+    command = [sys.executable, "-m", "fluxtrue_tools", "vecu", "--motor", motor, "--fast", "--port", "0",
+               "--bench-port", "0"]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith(f"fluxtrue-vecu motor={motor} mode=fast can=")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
 
 
 def test_in_real_time_a_second_takes_a_second_and_frames_keep_their_simulated_period(program: Path) -> None:

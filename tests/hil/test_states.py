@@ -92,6 +92,20 @@ def test_disable_under_torque_ramps_to_zero_and_then_opens_the_gates(rig: Rig) -
 
 
 @pytest.mark.plant
+@pytest.mark.parametrize("speed_rpm", [0.0, 3.0, 30.0, 300.0])
+@pytest.mark.parametrize("noise_A", [0.0, 0.05, 0.2, 0.5, 1.0])
+def test_a_healthy_drive_does_not_trip_however_slow_and_noisy(rig: Rig, noise_A: float, speed_rpm: float) -> None:
+    """Monitors that divide by speed, or wait for samples to move, are wrong here first."""
+    rig.stand.set(current_noise_A_rms=noise_A)
+    rig.turn(speed_rpm)
+    rig.start()
+    for torque_Nm in (0.0, 5.0, 50.0, -50.0, 0.0):
+        rig.ask(torque_Nm=torque_Nm)
+        rig.advance(0.5)
+        assert rig.state == "run", f"{torque_Nm:g} N·m: {rig.state}, faults {faults(rig)}"
+
+
+@pytest.mark.plant
 @pytest.mark.parametrize(
     ("cause", "drive", "ecu"),
     [

@@ -10,12 +10,14 @@ from fluxtrue_tools.demo.step import overshoot_percent, rise_ms
 from report import Figures
 from rig import Rig, Trace
 
-# Everything wrong at once, as in the demonstration: sensors, dead time, a winding at 118 C, a magnet 15 % weaker.
-WRONG: dict[str, Any] = {"r_ohm_20": 0.025, "dead_time_s": 2e-6, "current_noise_A_rms": 0.5, "magnet_scale": 0.85}
+# Everything wrong at once, as in the demonstration: noise, a winding at 118 C that reports 20 C, a magnet 15 % weaker.
+WRONG: dict[str, Any] = {"r_ohm_20": 0.025, "current_noise_A_rms": 0.5, "magnet_scale": 0.85}
 TRUTH = "truth.torque_shaft_mean_Nm"
-SHARE, LEAST_NM = 0.005, 0.15
-# The bus says torque in steps of 0.1 N m, and the estimate is one millisecond's mean with the sensors' noise in it.
-TOLD_NM = 1.0
+WARM_UP_S = 60.0
+# The campaign's bounds: of |torque|, or of a tenth of the machine's 132 N·m if that is more.
+LEAST_NM, RMS_PERCENT, WORST_PERCENT = 13.2, 0.8, 2.5
+# The bus says torque in steps of 0.1 N·m; the estimate is as wrong as the identification is.
+TOLD_PERCENT = 3.0
 
 
 def mean_truth(rig: Rig, seconds: float = 0.3) -> float:
@@ -24,36 +26,43 @@ def mean_truth(rig: Rig, seconds: float = 0.3) -> float:
     return float(trace[TRUTH].mean())
 
 
-def allowed_Nm(torque_Nm: float) -> float:
-    return max(SHARE * abs(torque_Nm), LEAST_NM)
+def percent(error_Nm: float, torque_Nm: float) -> float:
+    return 100.0 * error_Nm / max(abs(torque_Nm), LEAST_NM)
+
+
+def _row(rig: Rig, torque_Nm: float) -> list[float]:
+    """Asked, shaft, error in percent, told on CAN."""
+    rig.ask(torque_Nm=torque_Nm)
+    rig.advance(0.5)
+    since_s = rig.now_s
+    truth_Nm = mean_truth(rig)
+    told_Nm = float(rig.series("INV_Status", "TorqueEstimate", since_s)[1].mean())
+    return [torque_Nm, truth_Nm, percent(truth_Nm - torque_Nm, torque_Nm), told_Nm]
 
 
 @pytest.mark.plant
-@pytest.mark.parametrize("speed_rpm", [-3000.0, -1000.0, 1000.0, 3000.0])
-def test_shaft_torque_is_the_torque_asked_for_with_everything_wrong(
-    rig: Rig, figures: Figures, speed_rpm: float
-) -> None:
+def test_after_a_drive_shaft_torque_is_the_torque_asked_for_with_everything_wrong(rig: Rig, figures: Figures) -> None:
     rig.stand.set(**WRONG)
-    rig.turn(speed_rpm)
+    rig.turn(1000.0)
     rig.start()
-    rows, told = [], []
-    for torque_Nm in (-120.0, -80.0, -40.0, -20.0, 20.0, 40.0, 80.0, 120.0):
-        rig.ask(torque_Nm=torque_Nm)
-        rig.advance(1.5)
-        since_s = rig.now_s
-        truth_Nm = mean_truth(rig)
-        told_Nm = float(rig.series("INV_Status", "TorqueEstimate", since_s)[1].mean())
-        rows.append([torque_Nm, truth_Nm, truth_Nm - torque_Nm, allowed_Nm(torque_Nm), told_Nm])
-        told.append(told_Nm - truth_Nm)
-    figures.table(f"{speed_rpm:g} rpm", ["asked N·m", "shaft N·m", "error", "allowed", "told on CAN"], rows)
-    asked, truth = (np.asarray([row[k] for row in rows]) for k in (0, 1))
-    figures.plot(f"Torque error at {speed_rpm:g} rpm", [("N·m", [
-        ("shaft less asked", asked, truth - asked), ("told less shaft", asked, np.asarray(told)),
-        ("allowed", asked, [row[3] for row in rows]), ("allowed", asked, [-row[3] for row in rows]),
-    ])], "asked N·m")  # fmt: skip
-    worst = max(rows, key=lambda row: abs(row[2]) / row[3])
-    figures.promise(f"error at {worst[0]:g} N·m", worst[2], worst[3], "N·m")
-    figures.promise("told less shaft", max(told, key=abs), TOLD_NM, "N·m")
+    rig.warm_up(WARM_UP_S)
+    errors, told = [], []
+    for speed_rpm in (1000.0, 3000.0, 5000.0, -3000.0, -1000.0):
+        rig.turn(speed_rpm, 1.0)
+        # 5000 rpm and more than 80 N·m is beyond the voltage of a weak magnet's machine.
+        torques = [t for t in (-120.0, -80.0, -40.0, -20.0, 20.0, 40.0, 80.0, 120.0) if abs(t) * abs(speed_rpm) <= 4e5]
+        rows = [_row(rig, torque_Nm) for torque_Nm in torques]
+        errors += [row[2] for row in rows]
+        told += [percent(row[3] - row[1], row[0]) for row in rows]
+        figures.table(f"{speed_rpm:g} rpm", ["asked N·m", "shaft N·m", "error %", "told on CAN N·m"], rows)
+        asked = [row[0] for row in rows]
+        figures.plot(f"Torque error at {speed_rpm:g} rpm", [("%", [
+            ("shaft less asked", asked, [row[2] for row in rows]),
+            ("told less shaft", asked, told[-len(rows):]),
+        ])], "asked N·m")  # fmt: skip
+    figures.promise("root mean square of the errors", float(np.sqrt(np.mean(np.square(errors)))), RMS_PERCENT, "%")
+    figures.promise("largest error", max(errors, key=abs), WORST_PERCENT, "%")
+    figures.promise("told less shaft", max(told, key=abs), TOLD_PERCENT, "%")
 
 
 @pytest.mark.plant
@@ -65,33 +74,45 @@ def test_zero_torque_gives_no_torque_at_any_speed(rig: Rig, figures: Figures) ->
         rig.advance(0.4)
         rows.append([speed_rpm, mean_truth(rig, 0.1)])
     figures.table("Request 0", ["rpm", "shaft N·m"], rows)
+    figures.plot("Request 0", [("N·m", [("shaft", [r[0] for r in rows], [r[1] for r in rows])])], "rpm")
     worst = max(rows, key=lambda row: abs(row[1]))
     figures.promise(f"shaft torque at {worst[0]:g} rpm", worst[1], 2.0, "N·m")
 
 
 @pytest.mark.plant
 def test_a_weaker_magnet_costs_no_torque_as_in_figure_8_of_the_paper(rig: Rig, figures: Figures) -> None:
-    """40 N·m; the magnet loses 8.75 % of its flux in one step, and the identification is left to find it."""
+    """40 N·m; the magnet loses 8.75 % of its flux in one step, which no magnet does; identification has to find it.
+
+    The paper brings a loss of 8.75 % back to 1.25 %: so must this, at a standing point and without any further drive.
+    """
+    rig.turn(1000.0)
+    rig.start()
+    rig.warm_up(20.0)
     rig.turn(1500.0)
-    rig.start(40.0)
+    rig.ask(torque_Nm=40.0)
     rig.advance(1.0)
     start_s = rig.now_s
     trace = rig.record(["truth.time_s", TRUTH, "truth.psi_f_Vs"])
-    rig.advance(0.3)
+    rig.advance(1.0)
     weak_at = len(trace.rows)
     rig.stand.set(magnet_scale=0.9125)
-    rig.advance(1.0)
+    rig.advance(9.0)
     torque_Nm, psi_mVs = trace[TRUTH], 1e3 * trace["truth.psi_f_Vs"]
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
     told_s, told_Nm = rig.series("INV_Status", "TorqueEstimate", start_s)
     psi_s, told_mVs = rig.series("INV_Identification", "PsiF", start_s)
-    figures.plot("The magnet weakens at 0.3 s", [
+    figures.plot("The magnet weakens at 1 s", [
         ("N·m", [("shaft", time_s, torque_Nm), ("told on CAN", told_s - start_s, told_Nm)]),
         ("mV·s", [("magnet", time_s, psi_mVs), ("told on CAN", psi_s - start_s, told_mVs)]),
     ])  # fmt: skip
-    figures.promise("deepest loss", 100.0 * (torque_Nm[weak_at:].min() / 40.0 - 1.0), 10.0, "%")
-    figures.promise("torque after 0.7 s", 100.0 * (torque_Nm[-300:].mean() / 40.0 - 1.0), 0.3, "%")
-    figures.promise("flux told", 100.0 * (told_mVs[-20:].mean() / psi_mVs[-1] - 1.0), 1.0, "%")
+    figures.promise("deepest loss", 100.0 * (torque_Nm[weak_at:].min() / 40.0 - 1.0), 8.75, "%")
+    figures.promise("torque 9 s later", 100.0 * (torque_Nm[-300:].mean() / 40.0 - 1.0), 1.25, "%")
+    rig.record([])
+    rig.warm_up(20.0)
+    rig.turn(1500.0)
+    rig.ask(torque_Nm=40.0)
+    rig.advance(1.0)
+    figures.promise("torque after a drive of 20 s", 100.0 * (mean_truth(rig) / 40.0 - 1.0), 0.5, "%")
 
 
 def _step(rig: Rig, figures: Figures, first_Nm: float, second_Nm: float) -> tuple[Trace, int]:

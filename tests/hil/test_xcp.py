@@ -12,6 +12,17 @@ from xcp_master import DENIED, LOCKED, OUT_OF_RANGE, Master, XcpError
 TRUTH = "truth.torque_shaft_mean_Nm"
 
 
+def settled(rig: Rig) -> float:
+    """Shaft torque at 40 N·m."""
+    rig.turn(1500.0)
+    rig.ask(torque_Nm=40.0)
+    rig.advance(1.0)
+    trace = rig.record([TRUTH])
+    rig.advance(0.2)
+    rig.record([])
+    return float(trace[TRUTH].mean())
+
+
 @pytest.mark.plant
 def test_a_measurement_read_over_xcp_is_what_the_plant_does(rig: Rig, description: Description) -> None:
     rig.turn(2000.0)
@@ -101,25 +112,20 @@ def test_a_value_that_is_written_acts_and_the_built_in_one_comes_back(
     rig: Rig, figures: Figures, description: Description
 ) -> None:
     """With the bandwidth of the torque loop at zero a weaker magnet costs torque; with the built-in one it does not."""
-    rig.turn(1500.0)
-    rig.start(40.0)
-    rig.advance(0.5)
+    rig.turn(1000.0)
+    rig.start(0.0)
+    rig.advance(0.3)
     master = Master(rig, description)
     master.unlock()
     built_in = master.checksum()
     master.write("torque_loop_bandwidth_rad_s", 0.0)
     assert master.checksum() != built_in
     rig.stand.set(magnet_scale=0.9)
-    rig.advance(1.0)
-    trace = rig.record([TRUTH])
-    rig.advance(0.2)
-    open_Nm = trace[TRUTH].mean()
+    rig.warm_up(30.0)
+    open_Nm = settled(rig)
     master.set_page(0)
     assert master.calibration("torque_loop_bandwidth_rad_s") > 0.0
-    rig.advance(1.0)
-    trace = rig.record([TRUTH])
-    rig.advance(0.2)
-    closed_Nm = trace[TRUTH].mean()
+    closed_Nm = settled(rig)
     figures.table("40 N·m, magnet at 90 %", ["torque loop", "shaft N·m"], [["off", open_Nm], ["built in", closed_Nm]])
     assert open_Nm < 39.0
-    figures.promise("error with the built-in value", closed_Nm - 40.0, 0.2, "N·m")
+    figures.promise("error with the built-in value", closed_Nm - 40.0, 0.4, "N·m")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
-SCRIPTS = ("setup", "test", "demo", "fluxtrue", "common.sh")
+SCRIPTS = ("setup", "test", "demo", "hil", "fluxtrue", "common.sh")
 # What the scripts use besides the programs they look for.
 BASICS = (
     "bash", "sh", "env", "dirname", "readlink", "mkdir", "cat", "sha256sum", "flock", "sed", "grep",
@@ -141,6 +141,14 @@ def test_the_launcher_works_through_a_link(checkout: Path, tmp_path: Path) -> No
     link.symlink_to(checkout / "tools" / "fluxtrue")
     done = subprocess.run([str(link), "motor"], capture_output=True, text=True, check=False)
     assert done.stdout == "python|-m|fluxtrue_tools|motor|"
+
+
+def test_the_suite_on_a_bench_builds_nothing_and_passes_its_options_on(checkout: Path) -> None:
+    done = run(checkout, "hil", "--can-interface", "pcan", "--junit", "a b.xml", "-k", "boot or states")
+    assert (done.returncode, done.stderr) == (0, "")
+    words = done.stdout.split("|")
+    assert words[-6:] == ["--can-interface", "pcan", "--junitxml=a b.xml", "-k", "boot or states", ""]
+    assert str(checkout / "tests" / "hil") in words
 
 
 def test_a_build_that_fails_is_reported_with_its_log(checkout: Path) -> None:

@@ -14,23 +14,16 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { SERVERS_MAX = 4 };
+#include "line_client.h"
 
-typedef struct {
-    int fd; /* -1: free */
-    bool greeted, ended; /* ended: nothing more comes, but what has come is still served and answered */
-    uint16_t peer;
-    line_buffer_t in;
-    char *out;
-    size_t out_begin, out_end, out_size;
-} client_t;
+enum { SERVERS_MAX = 4 };
 
 struct line_server {
     int listener;
     uint16_t port;
     line_framing_t framing;
     line_counts_t counts;
-    client_t client[LINE_CLIENTS];
+    line_client_t client[LINE_CLIENTS];
     int turn; /* whose texts come next: no client can starve the others */
 };
 
@@ -83,23 +76,13 @@ line_server_t *line_server_create(uint16_t port, line_framing_t framing, char *w
     return server;
 }
 
-static void client_close(client_t *c)
-{
-    if (c->fd >= 0) {
-        (void)close(c->fd);
-    }
-    free(c->out);
-    memset(c, 0, sizeof *c);
-    c->fd = -1;
-}
-
 void line_server_destroy(line_server_t *server)
 {
     if (server == NULL) {
         return;
     }
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        client_close(&server->client[i]);
+        line_client_close(&server->client[i]);
     }
     (void)close(server->listener);
     free(server);
@@ -130,7 +113,7 @@ static void client_accept(line_server_t *server)
         return;
     }
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        client_t *c = &server->client[i];
+        line_client_t *c = &server->client[i];
         if (c->fd < 0 && set_nonblocking(fd)) {
             (void)setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
             (void)setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &send_size, sizeof send_size);
@@ -145,50 +128,13 @@ static void client_accept(line_server_t *server)
     (void)close(fd);
 }
 
-static void client_read(client_t *c)
-{
-    for (size_t room = line_buffer_room(&c->in); room > 0U; room = line_buffer_room(&c->in)) {
-        const ssize_t got = recv(c->fd, c->in.bytes + c->in.end, room, 0);
-        if (got > 0) {
-            c->in.end += (size_t)got;
-        } else if (got == 0 || (errno != EINTR && errno != EAGAIN && errno != EWOULDBLOCK)) {
-            c->ended = true;
-            return;
-        } else if (errno != EINTR) {
-            return;
-        }
-    }
-}
-
-static void client_write(client_t *c)
-{
-    while (c->out_begin < c->out_end) {
-        const ssize_t put = send(c->fd, c->out + c->out_begin, c->out_end - c->out_begin, MSG_NOSIGNAL);
-        if (put >= 0) {
-            c->out_begin += (size_t)put;
-        } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-            return;
-        } else if (errno != EINTR) {
-            c->ended = true;
-            break; /* nobody will read the rest */
-        }
-    }
-    c->out_begin = c->out_end = 0;
-}
-
-static short wanted(const client_t *c)
-{
-    const bool room = !c->ended && c->in.end - c->in.begin < LINE_BUFFER_SIZE;
-    return (short)((room ? POLLIN : 0) | (c->out_end > c->out_begin ? POLLOUT : 0));
-}
-
 static nfds_t collect(line_server_t *server, struct pollfd *fds)
 {
     nfds_t n = 0;
     fds[n++] = (struct pollfd){.fd = server->listener, .events = POLLIN};
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        const client_t *c = &server->client[i];
-        const short events = c->fd >= 0 ? wanted(c) : 0;
+        const line_client_t *c = &server->client[i];
+        const short events = c->fd >= 0 ? line_client_wants(c) : 0;
         fds[n++] = (struct pollfd){.fd = events != 0 ? c->fd : -1, .events = events};
     }
     return n;
@@ -197,13 +143,13 @@ static nfds_t collect(line_server_t *server, struct pollfd *fds)
 static void serve(line_server_t *server, const struct pollfd *fds)
 {
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        client_t *c = &server->client[i];
+        line_client_t *c = &server->client[i];
         const short seen = fds[1 + i].fd >= 0 ? fds[1 + i].revents : 0;
         if ((seen & (POLLIN | POLLHUP | POLLERR)) != 0 && !c->ended) {
-            client_read(c);
+            line_client_read(c);
         }
         if (seen != 0 && c->out_end > c->out_begin) {
-            client_write(c);
+            line_client_write(c);
         }
     }
     if ((fds[0].revents & POLLIN) != 0) {
@@ -226,7 +172,7 @@ void line_server_wait(line_server_t *const *servers, int count, int timeout_ms)
     }
 }
 
-static line_event_t client_next(line_server_t *server, client_t *c, char *text)
+static line_event_t client_next(line_server_t *server, line_client_t *c, char *text)
 {
     if (c->fd < 0) {
         return LINE_NONE;
@@ -243,8 +189,8 @@ static line_event_t client_next(line_server_t *server, client_t *c, char *text)
         return LINE_NONE;
     }
     server->counts.dropped += c->in.dropped + (line_buffer_empty(&c->in) ? 0U : 1U); /* half a text counts, too */
-    client_write(c);
-    client_close(c);
+    line_client_write(c);
+    line_client_close(c);
     return LINE_CLOSED;
 }
 
@@ -262,45 +208,16 @@ line_event_t line_server_next(line_server_t *server, int *client, char text[LINE
     return LINE_NONE;
 }
 
-static bool make_room(client_t *c, size_t length)
-{
-    if (c->out_end + length <= c->out_size) {
-        return true;
-    }
-    const size_t size = 2U * (c->out_end + length);
-    char *out = realloc(c->out, size);
-    if (out == NULL) {
-        return false;
-    }
-    c->out = out;
-    c->out_size = size;
-    return true;
-}
-
 void line_server_send(line_server_t *server, int client, const char *text, size_t length)
 {
-    client_t *c = &server->client[client];
-    if (c->fd < 0) {
-        return;
-    }
-    if (c->out_begin > 0U) {
-        memmove(c->out, c->out + c->out_begin, c->out_end - c->out_begin);
-        c->out_end -= c->out_begin;
-        c->out_begin = 0;
-    }
-    if (!make_room(c, length)) {
-        c->ended = true;
-        return;
-    }
-    memcpy(c->out + c->out_end, text, length);
-    c->out_end += length;
+    line_client_send(&server->client[client], text, length);
 }
 
 size_t line_server_backlog(const line_server_t *server)
 {
     size_t most = 0;
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        const client_t *c = &server->client[i];
+        const line_client_t *c = &server->client[i];
         const size_t waits = c->fd >= 0 ? c->out_end - c->out_begin : 0U;
         most = waits > most ? waits : most;
     }
@@ -310,7 +227,7 @@ size_t line_server_backlog(const line_server_t *server)
 void line_server_drop_slow(line_server_t *server, size_t bytes)
 {
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        client_t *c = &server->client[i];
+        line_client_t *c = &server->client[i];
         if (c->fd >= 0 && !c->ended && c->out_end - c->out_begin > bytes) {
             server->counts.slow_clients++;
             c->out_begin = c->out_end = 0;

@@ -164,6 +164,17 @@ void test_mode_off_ends_precharge_and_ready_in_discharge(void)
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
 }
 
+/* Without the battery a machine that turns fast would charge the capacitor as fast as it is discharged. */
+void test_the_contactor_stays_closed_until_the_machine_is_slow(void)
+{
+    to_ready();
+    in.slow = false;
+    in.torque_mode = false;
+    stays(STATE_READY, 100);
+    in.slow = true;
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
+}
+
 void test_a_discharge_that_takes_longer_than_5_s_is_a_fault_and_is_not_tried_again_until_reset(void)
 {
     to_discharge();

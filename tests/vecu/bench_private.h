@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef VECU_BENCH_PRIVATE_H
+#define VECU_BENCH_PRIVATE_H
+/** What the bench channel's commands and its runs share.
+ * Context  tests/vecu/bench*.c only */
+#include "bench.h"
+
+enum { ARGUMENTS_MAX = 68, RAMPS_MAX = 8, NAME_SIZE = 48, ANSWER_SIZE = 8192 };
+
+typedef struct {
+    char name[NAME_SIZE];
+    double from, to;
+    uint64_t begin_ns, end_ns;
+} bench_ramp_t;
+
+struct bench {
+    line_server_t *server;
+    vecu_t *vecu;
+    bool realtime;
+    uint64_t refused;
+    int columns;
+    /* the run under way */
+    int runner; /* the client that has asked; -1: no run */
+    bool begun;
+    uint64_t periods;
+    uint16_t peer; /* 0: waits for nobody */
+    uint64_t wanted;
+    bench_ramp_t ramp[RAMPS_MAX];
+    int ramps;
+};
+
+/** One line of answer. */
+__attribute__((format(printf, 3, 4))) void bench_say(bench_t *bench, int client, const char *format, ...);
+/** Does what a line asks for; a run is only noted. */
+void bench_obey(bench_t *bench, int client, char *text);
+
+#define REFUSE(...) \
+    do { \
+        bench->refused++; \
+        bench_say(bench, client, "error " __VA_ARGS__); \
+    } while (0)
+
+#endif
