@@ -140,6 +140,16 @@ void emu_pend(emu_t *emu, int vector)
     nvic_pend(emu, vector);
 }
 
+emu_counts_t emu_counts(const emu_t *emu, int vector)
+{
+    return vector >= 0 && vector < VECTORS ? emu->counts[vector] : (emu_counts_t){0};
+}
+
+void emu_counts_clear(emu_t *emu)
+{
+    memset(emu->counts, 0, sizeof emu->counts);
+}
+
 void emu_break_after(emu_t *emu, uint64_t instructions)
 {
     emu->s.break_at = emu->s.instructions + instructions;

@@ -133,8 +133,8 @@ static bool masks_opened(emu_t *emu)
     return emu->s.reschedule;
 }
 
-/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. Nothing else stops the
- * core: from within an access it would repeat the instruction. */
+/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. Nothing else stops
+ * the core: from within an access it would repeat the instruction. */
 static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
     emu_t *emu = user;

@@ -89,6 +89,15 @@ EMU_API int emu_active_vector(const emu_t *emu);
 /** Makes an interrupt pending, as its peripheral would. */
 EMU_API void emu_pend(emu_t *emu, int vector);
 
+/** Instructions of one handler, what interrupted it left out, since creation or emu_counts_clear(). EMU_FAST counts
+ * issued ones, by blocks; EMU_COUNTING leaves out the slots of IT instructions that are skipped. */
+typedef struct {
+    uint64_t runs, sum;
+    uint32_t least, most;
+} emu_counts_t;
+EMU_API emu_counts_t emu_counts(const emu_t *emu, int vector);
+EMU_API void emu_counts_clear(emu_t *emu);
+
 /** Everything but the program, in one piece. */
 typedef struct emu_snapshot emu_snapshot_t;
 EMU_API emu_snapshot_t *emu_save(emu_t *emu);

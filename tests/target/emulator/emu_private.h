@@ -36,6 +36,8 @@ typedef struct {
     uint32_t pending[VECTOR_WORDS], enabled[VECTOR_WORDS], line[VECTOR_WORDS];
     uint8_t priority[VECTORS];
     uint8_t active[NEST_MAX];
+    uint64_t spent[NEST_MAX]; /* instructions of each active handler so far */
+    uint64_t resumed;         /* count of instructions when the innermost last began or went on */
     int nest;
     uint32_t vtor, aircr, scr, ccr, cpacr, fpccr, fpcar, shcsr, demcr, dwt_ctrl, cyccnt_offset;
     uint32_t systick_csr, systick_rvr;
@@ -141,6 +143,7 @@ struct emu {
     emu_exception_fn on_exception;
     void *on_exception_user;
     can_port_t *can_port;
+    emu_counts_t counts[VECTORS];
     char error[ERROR_SIZE];
     state_t s;
 };

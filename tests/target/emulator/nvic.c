@@ -182,6 +182,25 @@ static bool unsupported(emu_t *emu)
     return false;
 }
 
+/* The innermost handler is left, for good or for one that interrupts it. */
+static void account(emu_t *emu)
+{
+    nvic_t *n = &emu->s.nvic;
+    if (n->nest > 0) {
+        n->spent[n->nest - 1] += emu->s.instructions - n->resumed;
+    }
+    n->resumed = emu->s.instructions;
+}
+
+static void count_run(emu_t *emu, int vector, uint64_t spent)
+{
+    emu_counts_t *c = &emu->counts[vector];
+    c->least = c->runs == 0 || spent < c->least ? (uint32_t)spent : c->least;
+    c->most = spent > c->most ? (uint32_t)spent : c->most;
+    c->sum += spent;
+    c->runs++;
+}
+
 static void enter(emu_t *emu, int vector)
 {
     nvic_t *n = &emu->s.nvic;
@@ -197,6 +216,8 @@ static void enter(emu_t *emu, int vector)
     put(emu, UC_ARM_REG_LR, n->nest == 0 ? code | 8U : code);
     put(emu, UC_ARM_REG_CONTROL, 0);
     bit_set(n->pending, vector, false);
+    account(emu);
+    n->spent[n->nest] = 0;
     n->active[n->nest++] = (uint8_t)vector;
     put(emu, UC_ARM_REG_XPSR, 1U << 24 | (uint32_t)vector);
     put(emu, UC_ARM_REG_IPSR, (uint32_t)vector);
@@ -257,7 +278,9 @@ void nvic_return(emu_t *emu)
         emu_fail(emu, "0x%08x is no valid exception return with %d exceptions active", code, n->nest);
         return;
     }
+    account(emu);
     const int vector = n->active[--n->nest];
+    count_run(emu, vector, n->spent[n->nest]);
     if (!pop_frame(emu, (code & 0x10U) == 0)) {
         return;
     }

@@ -8,7 +8,8 @@
 #include "hal/host/port.h"
 #include "loop/runner/sim_private.h"
 
-enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 1), POINTS_MAX = 4000 };
+enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69 };
+enum { WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 1), POINTS_MAX = 8000 };
 enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 
 typedef struct {
@@ -22,7 +23,7 @@ typedef struct {
     drive_t outcome[OUTCOMES_MAX];
     bool seen[OUTCOMES_MAX];
     int outcomes;
-    fast_state_t fast[4];                 /* what the interrupting fast ISR may make of the identification's two words */
+    fast_state_t fast[4];                 /* what the fast ISR may make of the identification's two words */
 } preempt_t;
 
 /* Too large for a stack; a test runs one at a time. */
@@ -35,7 +36,8 @@ static void on_exception(void *user, int vector, bool entered)
     preempt_t *p = user;
     const bool hit = (p->catch_entry && entered && vector == p->victim) ||
                      (p->catch_exit && !entered && vector == p->victim) ||
-                     (p->catch_return && !entered && vector == MRAI_VECTOR && emu_active_vector(p->e->emu) == p->victim);
+                     (p->catch_return && !entered && vector == MRAI_VECTOR &&
+                      emu_active_vector(p->e->emu) == p->victim);
     if (hit) {
         emu_break_after(p->e->emu, 0);
     }
@@ -143,7 +145,7 @@ static bool matters(preempt_t *p, size_t offset)
     return !same_outputs(p, &old, &old_toggled) || !same_outputs(p, &new, &new_toggled);
 }
 
-/* The words of fast and slow state that changed and that the victim reads. The identification's own state is not shared. */
+/* The words of fast and slow state that changed and that the victim reads; its own are not shared. */
 static bool words_find(preempt_t *p)
 {
     const size_t first = offsetof(drive_t, fast), last = offsetof(drive_t, task);

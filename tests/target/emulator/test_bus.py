@@ -12,8 +12,8 @@ from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
 
 SLICE = ("test_boot.py", "test_states.py")
-# The image also latches the drive's over-current fault for what the gate driver reports; the virtual ECU's port, which has
-# no timer with a fault input, does not, and the suite expects its word.
+# The image also latches the drive's over-current fault for what the gate driver reports; the virtual ECU's port, which
+# has no timer with a fault input, does not, and the suite expects its word.
 DIFFERENT = "not (test_a_fault_under_torque and gate_driver)"
 
 
@@ -26,8 +26,9 @@ def flashed() -> Parts:
 
 def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_path: Path) -> None:
     files = [str(ROOT / "tests" / "hil" / name) for name in SLICE]
-    command = [sys.executable, "-m", "pytest", "-q", "-c", str(ROOT / "tests" / "pytest.ini"), "-p",
-               "no:cacheprovider", "-k", DIFFERENT, f"--vecu={flashed.program}", f"--report={tmp_path}", *files]  # fmt: skip
+    settings = ["-c", str(ROOT / "tests" / "pytest.ini"), "-p", "no:cacheprovider", "-k", DIFFERENT]
+    target = [f"--vecu={flashed.program}", f"--report={tmp_path}"]
+    command = [sys.executable, "-m", "pytest", "-q", *settings, *target, *files]
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | flashed.environment, capture_output=True, text=True, check=False
     )

@@ -98,6 +98,32 @@ def test_exceptions_nest_by_priority_and_leave_every_register_as_it_was(
         assert value == 2.0 ** order.count(6)
 
 
+LOW, MIDDLE, HIGH, LPIT = (16 + irq for irq in (10, 11, 12, 48))
+
+
+def test_handlers_are_counted_without_what_interrupts_them(
+    library: ctypes.CDLL, exceptions: Path, tmp_path: Path
+) -> None:
+    counts = []
+    for counting in (False, True):
+        with Core.of_program(library, exceptions, counting) as core:
+            core.run(5.5e-3)
+            counts.append([[getattr(core.counts(v), n) for n, _ in core.counts(v)._fields_]
+                           for v in (LOW, MIDDLE, HIGH, LPIT)])  # fmt: skip
+    low, middle, high, _ = counts[0]
+    # Only blocks count the slot of an IT instruction that is skipped: one for each comparison, two of them in LOW.
+    assert [one[0] for one in counts[0]] == [one[0] for one in counts[1]]
+    assert all(0 <= block[1] - one[1] <= 2 * one[0] for block, one in zip(*counts, strict=True))
+    assert (low[0], middle[0], high[0]) == (2, 2, 4)
+    # HIGH has no branch: the same each time, and as many as the listing has from its symbol to its return.
+    listing = subprocess.run(["arm-none-eabi-objdump", "-d", "--disassemble=high", str(exceptions)], check=True,
+                             capture_output=True, text=True).stdout  # fmt: skip
+    instructions = [line for line in listing.splitlines() if "\t" in line and ".word" not in line]
+    returns = next(k for k, line in enumerate(instructions) if "bx\tlr" in line or "{pc}" in line or ", pc}" in line)
+    assert high[2] == high[3] == returns + 1
+    assert middle[2] < middle[3]  # it pends LOW in its first run only
+
+
 def test_a_sleeping_core_is_woken_by_each_tick_and_costs_nothing_in_between(
     library: ctypes.CDLL, exceptions: Path
 ) -> None:

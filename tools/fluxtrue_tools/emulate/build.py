@@ -50,7 +50,10 @@ def prepare(
     base: Path | None = None,
     flashed: bool = False,
 ) -> Parts:
-    """Build what is missing; `flashed`: the image that the bus commands. Without `elf` the image is built for the default motor (FLUXTRUE_MOTOR's default)."""
+    """Build what is missing. Without `elf` the image is built, for FLUXTRUE_MOTOR's default.
+
+    `flashed` chooses the image that the bus commands.
+    """
     built = motors.load(motor, build_dir, base)
     host = built.folder.folder.parents[1]
     shared = built.folder.folder / "libfluxtrue_emu.so"

@@ -14,6 +14,14 @@ NO_REGISTER: Final = 2**64 - 1
 
 _U64, _U32, _INT, _BOOL = ctypes.c_uint64, ctypes.c_uint32, ctypes.c_int, ctypes.c_bool
 _HERE, _TEXT = ctypes.c_void_p, ctypes.c_char_p
+
+
+class Counts(ctypes.Structure):
+    """Instructions of one handler; what interrupted it is left out."""
+
+    _fields_ = (("runs", _U64), ("sum", _U64), ("least", _U32), ("most", _U32))
+
+
 ON_EXCEPTION = ctypes.CFUNCTYPE(None, _HERE, _INT, _BOOL)
 _SIGNATURES = {
     "emu_create": (_HERE, [_TEXT, _INT, _TEXT, ctypes.c_size_t]),
@@ -34,6 +42,8 @@ _SIGNATURES = {
     "emu_save": (_HERE, [_HERE]),
     "emu_restore": (None, [_HERE, _HERE]),
     "emu_snapshot_free": (None, [_HERE]),
+    "emu_counts": (Counts, [_HERE, _INT]),
+    "emu_counts_clear": (None, [_HERE]),
     "emu_break_after": (None, [_HERE, _U64]),
     "emu_board_pins": (None, [_HERE, _BOOL, _BOOL]),
     "sim_emulator": (_HERE, [_HERE]),
@@ -158,6 +168,15 @@ class Core:
     def break_after(self, instructions: int) -> None:
         """run() answers BREAK before the instruction that many from now (counting mode)."""
         self._library.emu_break_after(self._handle, instructions)
+
+    def counts(self, vector: int) -> Counts:
+        """Of the handler's runs so far; the same in both modes."""
+        counts: Counts = self._library.emu_counts(self._handle, vector)
+        return counts
+
+    def clear_counts(self) -> None:
+        """Count from here on."""
+        self._library.emu_counts_clear(self._handle)
 
     def save(self) -> int:
         """A snapshot for restore(); free() it."""

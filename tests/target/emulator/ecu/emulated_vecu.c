@@ -60,7 +60,8 @@ static const char *processor_start(vecu_t *vecu)
     }
     port = (can_port_t){on_sent, vecu};
     emu_can_port(sim_emulator(vecu->sim), &port);
-    return sim_set(vecu->sim, "emulator.gate_driver", 1.0) == SIM_OK ? plant_set_up(vecu->sim, vecu->seed) : "gate driver";
+    (void)sim_set(vecu->sim, "emulator.gate_driver", 1.0);
+    return plant_set_up(vecu->sim, vecu->seed);
 }
 
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fluxtrue emulate as a user calls it: files, messages, exit codes."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.emulate.build import ROOT, Parts
+from fluxtrue_tools.sim.library import Loop
+
+RUN = 'motor = "hsm1"\nduration_s = 0.3\n[profile]\ntorque_Nm = 40\nspeed_rpm = 1000\n'
+
+
+def emulate(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fluxtrue_tools", "emulate", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=600, env=environment, check=False)
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "run.toml"
+    path.write_text(RUN)
+    return path
+
+
+def test_a_run_tells_torque_and_which_image_it_ran(parts: Parts, scenario: Path, tmp_path: Path) -> None:
+    summary = tmp_path / "run.json"
+    done = emulate("--scenario", scenario, "--elf", parts.image, "--json", summary)
+    assert done.returncode == 0, done.stderr
+    data = json.loads(summary.read_text())
+    assert data["controller"] == "emulated fluxtrue.elf"
+    assert data["fault_word"] == 0
+    assert data["mean"]["true_torque_Nm"] == pytest.approx(40, abs=1)
+    assert "times real time" in done.stdout
+
+
+def test_the_same_run_gives_the_same_bits_and_instructions(parts: Parts) -> None:
+    motor = parts.emulated()
+    seen = []
+    for _ in range(2):
+        with Loop(motor.library, motor.plant | {"current_noise_A_rms": 0.5, "seed": 3.0}, motor.flux_map) as loop:
+            loop.set("enable", 1)
+            loop.set("torque_command_Nm", 30)
+            loop.record(["truth.torque_Nm", "psi_f_Vs", "emulator.instructions"])
+            seen.append(loop.run(1000).tobytes())
+    assert seen[0] == seen[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "message"),
+    [
+        (RUN + '[controller]\nkind = "twin"\n', (), "controller.kind = 'twin', allowed: 'firmware'"),
+        (RUN.replace("hsm1", "paper"), ("--elf", "IMAGE"), "the image was built for another motor"),
+        (RUN, ("--elf", "/nowhere/x.elf"), "--elf /nowhere/x.elf: no such file"),
+        (RUN, ("--elf", "SCENARIO"), "is not a 32-bit little-endian ELF file for Arm"),
+    ],
+)
+def test_bad_input_is_one_clear_message(
+    parts: Parts, scenario: Path, text: str, options: tuple[str, ...], message: str
+) -> None:
+    scenario.write_text(text)
+    named = {"IMAGE": str(parts.image), "SCENARIO": str(scenario)}
+    done = emulate("--scenario", scenario, *(named.get(option, option) for option in options))
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.skipif("FLUXTRUE_REALTIME" not in os.environ, reason="measures this machine: FLUXTRUE_REALTIME=1")
+def test_a_core_of_this_machine_emulates_at_least_half_of_real_time(parts: Parts) -> None:
+    motor = parts.emulated()
+    with Loop(motor.library, motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.0}, motor.flux_map) as loop:
+        loop.set("enable", 1)
+        loop.set("torque_command_Nm", 80)
+        loop.run(1000)
+        begin = time.process_time()
+        loop.run(20000)
+        assert 2.0 / (time.process_time() - begin) >= 0.5
