@@ -46,7 +46,7 @@ float calibration_get(const motor_t *m, calibration_id_t id)
     case CALIBRATION_torque_slew_Nm_per_s:
         return (m->torque_slew == Q15_MAX) ? 0.0F : (float)m->torque_slew / Q15_SCALE * m->bases.torque_Nm / task_s(m);
     case CALIBRATION_observer_m:
-        return 2.0F * (float)m->mrai.pole_gain / (float)m->mrai.r0;
+        return 0.25F * (float)m->mrai.pole_gain / (float)m->mrai.r0;
     case CALIBRATION_flux_bandwidth_rad_s:
         return (float)m->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
     case CALIBRATION_resistance_bandwidth_rad_s:
@@ -68,7 +68,7 @@ void calibration_put(motor_t *m, calibration_id_t id, float value)
         m->torque_slew = (value > 0.0F) ? to_q15(value * task_s(m) / m->bases.torque_Nm) : Q15_MAX;
         break;
     case CALIBRATION_observer_m:
-        m->mrai.pole_gain = to_q31(value / 2.0F * (float)m->mrai.r0 / Q31_SCALE);
+        m->mrai.pole_gain = to_q31(4.0F * value * (float)m->mrai.r0 / Q31_SCALE);
         break;
     case CALIBRATION_flux_bandwidth_rad_s:
         m->mrai.flux_gain = to_q31(2.0F * value / m->bases.omega_rad_s);

@@ -18,6 +18,7 @@
 #include "control/identify_memory.h"
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
+#include "types/torque_limits.h"
 
 /** How resistance and flux are identified. */
 typedef enum {
@@ -30,6 +31,7 @@ typedef enum {
 typedef struct {
     q15_t torque;
     dq_t i_ref;          /* current mode only */
+    torque_limits_t limits;
     bool enable;
     bool current_mode;   /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
@@ -75,6 +77,8 @@ typedef struct {
 
 /** Written by the 1 kHz task alone. */
 typedef struct {
+    torque_limit_state_t torque_limit;
+    torque_limit_t allowed;
     torque_loop_state_t torque_loop;
     mrai_quality_t quality;
     identify_state_t identify;
@@ -83,9 +87,17 @@ typedef struct {
     q15_t torque_estimate;
     learnt_t learnt;
     current_reference_t reference;
+    voltage_reserve_state_t voltage_reserve;
+    plausibility_state_t plausibility;
+    torque_monitor_state_t torque_monitor;
+    dq_t i_ref;   /* acts until the next step */
+    dq_t psi_ref; /* tables' flux at the last reference */
+    uint16_t derating;    /* DERATING_...: why less than the request is made */
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */
     run_state_t run_state;
+    safe_state_state_t safe_state;
+    bool armed;           /* has run since it last was safe with open gates: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as the quality is concerned */
@@ -103,6 +115,12 @@ typedef struct {
     schedule_box_t schedules;
 } drive_t;
 
+/** The one place that says what the magnet differs by: identified flux minus the tables'. */
+static inline q15_t drive_psi_delta(const drive_t *drive)
+{
+    return drive->slow.psi_delta_q15;
+}
+
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
 
@@ -111,8 +129,8 @@ identify_memory_t drive_learnt(const drive_t *drive);
 /** After drive_init(), before the first task; false: the record is refused, nothing changed. */
 bool drive_recall(drive_t *drive, const identify_memory_t *memory);
 
-/** The identification's share of the 1 kHz task; sample is the latest. */
-void drive_identify(drive_t *drive, const sample_t *sample);
+/** The identification's share of the 1 kHz task; sample is the latest, mrai the task's one copy of what may change. */
+void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai);
 
 void fast_isr(drive_t *drive);
 void mrai_isr(drive_t *drive);

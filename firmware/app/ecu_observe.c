@@ -9,7 +9,17 @@
 #define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with the gates off, is an offset or a broken sensor */
 #define SQRT3 1.7320508F
 
-enum { DERATING_NONE = 0, DERATING_LIMITS_LOST = 7 };
+/* DeratingReason of the DBC. */
+enum { REASON_NONE = 0, REASON_LIMITS_LOST = 7 };
+
+/* The first that applies is told. Rated torque and the reach of voltage and current are no derating. */
+static const struct {
+    uint16_t derating;
+    uint8_t reason;
+} reasons[] = {
+    {DERATING_INVERTER, 1}, {DERATING_WINDING, 2}, {DERATING_DC_LOW | DERATING_DC_HIGH, 3},
+    {DERATING_POWER, 4},    {DERATING_MAGNET, 5},  {DERATING_SPEED, 8},
+};
 
 static void count(uint16_t *counter)
 {
@@ -75,6 +85,37 @@ static bool limits_lost(const ecu_t *ecu)
     return ecu->rx.limits_channel.seen && !ecu->rx.limits_channel.alive;
 }
 
+static uint32_t derating_reason(const ecu_t *ecu)
+{
+    if (limits_lost(ecu)) {
+        return REASON_LIMITS_LOST;
+    }
+    for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
+        if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
+            return reasons[n].reason;
+        }
+    }
+    return REASON_NONE;
+}
+
+static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
+{
+    const bases_t *b = &ecu->drive.motor.bases;
+    const float share = 1000.0F * power_kW / (1.5F * b->voltage_V * b->current_A);
+    return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
+}
+
+/* The torque limits are arbitrated: they move with slew. Lost battery limits too: the ramp ends them. */
+torque_limits_t ecu_limits(const ecu_t *ecu)
+{
+    torque_limits_t limits = TORQUE_LIMITS_NONE;
+    if (ecu->rx.limits_channel.alive) {
+        limits.power_drive = power_per_unit(ecu, ecu->rx.limits.drive_kW);
+        limits.power_regen = power_per_unit(ecu, ecu->rx.limits.regen_kW);
+    }
+    return limits;
+}
+
 supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
 {
     const drive_t *drive = &ecu->drive;
@@ -96,7 +137,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .sensors_plausible = plausible(drive, &sample),
         .slow = is_slow(drive, sample.mrai.omega),
-        .derated = limits_lost(ecu),
+        .derated = derating_reason(ecu) != REASON_NONE,
         .gate_fault = gate_fault,
         .task_late = ecu->liveness.late_in_a_row >= IN_A_ROW,
         .stalled = ecu->liveness.stalled_in_a_row >= IN_A_ROW,
@@ -131,7 +172,7 @@ void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
     telemetry->fault_count = s->fault_count;
     telemetry->refused_reason = s->refused;
     telemetry->refused_count = s->refused_count;
-    telemetry->derating_reason = limits_lost(ecu) ? DERATING_LIMITS_LOST : DERATING_NONE;
+    telemetry->derating_reason = derating_reason(ecu);
     d->crc_errors = rx->count[RX_CRC];
     d->repeated = rx->count[RX_REPEATED];
     d->jumps = rx->count[RX_JUMP];

@@ -16,10 +16,12 @@
 #include "control/identify_window.h"
 #include "control/mrai.h"
 #include "types/frames.h"
+#include "types/samples.h"
 
 /** One period as the fast ISR saw it. Writer: fast ISR. Readers: MRAI ISR, 1 kHz task. */
 typedef struct {
     mrai_in_t mrai;
+    adc_counts_t counts;
     int32_t v_dc;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
     bool acting;          /* the bridge was on throughout the last period and is on now */
@@ -38,10 +40,19 @@ typedef struct {
     volatile uint32_t generation;
 } window_box_t;
 
+/** What the bridge does while it does not run: decided before the fault comes, acted on in the same period. */
+typedef enum {
+    SAFE_FREEWHEEL = 0,             /* all gates open */
+    SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* low sides closed if the fault is an over-voltage, else all gates open */
+    SAFE_SHORT_CIRCUIT = 2          /* low sides closed */
+} safe_t;
+
 /** What the task asks of the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
 typedef struct {
     current_target_t target;
     bool run;
+    safe_t safe;
+    uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
 } command_t;
 

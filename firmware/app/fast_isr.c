@@ -12,16 +12,17 @@
 
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
-    adc_counts_t counts;
+    ab_t i;
     int32_t sum_q27;
     angle_t angle;
 } instant_t;
 
 static instant_t observe(drive_t *drive, sample_t *sample)
 {
+    hal_adc_read(&sample->counts);
+    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     instant_t now;
-    hal_adc_read(&now.counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &now.counts);
+    now.i = measured.i;
     now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
@@ -62,10 +63,19 @@ static void publish(drive_t *drive, sample_t *sample)
     hal_irq_pend_mrai();
 }
 
-static void bridge_off(drive_t *drive, sample_t *sample)
+/* The safe state: low sides closed, or all gates open. */
+static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 {
-    hal_pwm_enable(false);
-    hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
+    const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
+    const bool closed = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
+    const uint16_t duty = closed ? 0U : DUTY_MIDDLE;
+    if (!closed) {
+        hal_pwm_enable(false);
+    }
+    hal_pwm_write((duty_t){duty, duty, duty});
+    if (closed) {
+        hal_pwm_enable(true); /* with the duties, not before them */
+    }
     current_control_reset(&drive->fast.current_control);
     sample->mrai.u = (dq_t){0, 0};
     sample->voltage_limited = false;
@@ -109,6 +119,16 @@ static void forget_faults(drive_t *drive, uint32_t asked)
     }
 }
 
+/* Something is not as it should be, or was a moment ago. */
+static __attribute__((noinline)) void look(drive_t *drive, const monitor_in_t *seen, bool run)
+{
+    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, seen);
+    /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
+    if (faults != 0) {
+        drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
+    }
+}
+
 /* Everything the period needs is compiled into the one interrupt, with a compiler that sees all files. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
@@ -118,17 +138,18 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     const command_t *command = command_box_read(&drive->commands);
     forget_faults(drive, command->fault_resets);
     watch(drive, unfinished);
-    const monitor_in_t seen = {measure_phases(&drive->motor.measure, &now.counts), sample->v_dc, now.angle.jumped};
-
-    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
-    /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
-    if (faults != 0) {
-        drive_raise_fault(drive, command->run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
+    if (now.angle.jumped || !monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, sample->mrai.i, now.sum_q27,
+                                           sample->v_dc)) {
+        const monitor_in_t seen = {measure_phases(now.i, now.sum_q27), sample->v_dc, now.angle.jumped};
+        look(drive, &seen, command->run);
     }
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {
-        bridge_off(drive, sample);
+        if (command->faults != 0U) {
+            drive_raise_fault(drive, command->faults);
+        }
+        bridge_off(drive, sample, command->safe);
     }
     publish(drive, sample);
 }

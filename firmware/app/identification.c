@@ -8,9 +8,9 @@ static bool at_limit(const identify_state_t *state, identify_index_t index)
 }
 
 /* Share of the prior's variance that is gone. */
-static q15_t known(const identify_memory_t *memory, identify_index_t index)
+static q15_t known(const identify_state_t *state, identify_index_t index)
 {
-    return (q15_t)(Q15_MAX - (memory->variance[index] >> 15));
+    return (q15_t)fx_max_s32(Q15_MAX - (state->filter.p[index][index] >> 15), 0);
 }
 
 static void report_robust(drive_t *drive)
@@ -18,7 +18,6 @@ static void report_robust(drive_t *drive)
     const identify_config_t *config = &drive->motor.identify;
     task_state_t *task = &drive->task;
     const identify_state_t *state = &task->identify;
-    const identify_memory_t memory = identify_memory_get(state);
     task->torque_estimate = task->identified.torque;
     task->learnt = (learnt_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
@@ -26,8 +25,8 @@ static void report_robust(drive_t *drive)
         .psi_clamped = at_limit(state, IDENTIFY_FLUX),
         .r_clamped = at_limit(state, IDENTIFY_R),
     };
-    task->quality.psi_quality = known(&memory, IDENTIFY_FLUX);
-    task->quality.r_quality = known(&memory, IDENTIFY_R);
+    task->quality.psi_quality = known(state, IDENTIFY_FLUX);
+    task->quality.r_quality = known(state, IDENTIFY_R);
 }
 
 /* Ten periods from the MRAI ISR, the tables at their magnetising current, and what follows from both. */
@@ -39,9 +38,11 @@ static void robust(drive_t *drive, const sample_t *sample)
     const identify_window_t window = window_box_read(&drive->windows);
     const identify_point_t point = identify_point(&m->identify, &window, sample->mrai.omega);
     const flux_point_t flux = flux_table_step(&m->flux_table, point.i_m);
+    const flux_inductances_t inductances = flux_table_inductances(&m->flux_table, point.i_m);
     const identify_in_t in = {
         .point = &point,
         .flux = &flux,
+        .l = &inductances,
         .temperature_known = winding_dC != HAL_TEMPERATURE_UNKNOWN,
         .winding_dC = winding_dC,
         .enabled = drive->request.identification && sample->acting,
@@ -51,20 +52,19 @@ static void robust(drive_t *drive, const sample_t *sample)
     report_robust(drive);
 }
 
-static void report_paper(drive_t *drive)
+static void report_paper(drive_t *drive, const mrai_state_t *mrai)
 {
-    const mrai_state_t *mrai = &drive->slow.mrai;
     drive->task.torque_estimate = drive->slow.torque.mean;
     drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai_flux_clamped(&drive->motor.mrai, mrai),
                                     mrai_resistance_clamped(&drive->motor.mrai, mrai)};
 }
 
-void drive_identify(drive_t *drive, const sample_t *sample)
+void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai)
 {
     if (drive->request.identification_mode == IDENTIFICATION_ROBUST) {
         robust(drive, sample);
     } else {
-        report_paper(drive);
+        report_paper(drive, mrai);
     }
 }
 

@@ -9,12 +9,18 @@
 #include "control/current_control.h"
 #include "control/current_reference.h"
 #include "control/flux_table.h"
+#include "control/i_d_limit.h"
 #include "control/identify_config.h"
 #include "control/measure.h"
 #include "control/modulate.h"
 #include "control/mrai.h"
+#include "control/torque_limit.h"
 #include "control/torque_loop.h"
+#include "control/voltage_reserve.h"
 #include "safety/monitor.h"
+#include "safety/plausibility.h"
+#include "safety/safe_state.h"
+#include "safety/torque_monitor.h"
 #include "types/bases.h"
 
 typedef struct {
@@ -29,6 +35,8 @@ typedef struct {
     float dead_time_s;         /* of the bridge: modulate.dead_time compensates a fraction of it */
     q15_t torque_max;
     q15_t torque_slew;         /* per 1 kHz step; Q15_MAX = open */
+    q15_t torque_slew_weak;    /* the most while the planned flux is below psi_weak: little voltage is left for it */
+    q15_t psi_weak;
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;
     flux_table_config_t flux_table;
@@ -38,7 +46,13 @@ typedef struct {
     identify_config_t identify;
     torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
+    voltage_reserve_config_t voltage_reserve;
+    torque_limit_config_t torque_limit;
+    i_d_limit_config_t i_d_limit;
     monitor_config_t monitor;
+    safe_state_config_t safe_state;
+    plausibility_config_t plausibility;
+    torque_monitor_config_t torque_monitor;
 } motor_t;
 
 extern const motor_t motor;

@@ -1,7 +1,32 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
+#include "app/slow_monitors.h"
 #include "fx/vec.h"
+#include "hal/temperature.h"
 #include "signal/rate_limit.h"
+
+/* Gates that never closed stay open: the bridge may not even be powered. */
+static safe_t safe_state(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const uint32_t faults = drive->fast.faults;
+    const safe_state_in_t in = {
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .psi_delta = drive_psi_delta(drive),
+        .v_dc = (q15_t)sample->v_dc,
+        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
+    };
+    const bool closed = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
+    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (closed || faults != 0U));
+    if (!task->armed) {
+        return SAFE_FREEWHEEL;
+    }
+    if (closed) {
+        return SAFE_SHORT_CIRCUIT;
+    }
+    return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
+}
 
 static run_state_t supervise(drive_t *drive)
 {
@@ -22,15 +47,60 @@ static run_state_t supervise(drive_t *drive)
     return request->enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
-/* Request -> limits -> slew -> torque loop -> what the current reference is asked for. */
+/* What the voltage of this millisecond says about the plan of the last one. */
+static voltage_reserve_t reserve(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const voltage_reserve_in_t in = {
+        .u = sample->mrai.u,
+        .v_dc = (q15_t)sample->v_dc,
+        .psi = task->psi_ref,
+        .psi_plan = task->reference.psi_plan,
+        .psi_delta = drive_psi_delta(drive),
+        .acting = sample->acting && !drive->request.current_mode,
+    };
+    return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
+}
+
+/* Wide open, a step is for a machine that has voltage to follow it: near the limit it would only throw the currents
+ * about. */
+static q15_t slew_of(const drive_t *drive)
+{
+    const motor_t *m = &drive->motor;
+    const bool weak = drive->task.reference.psi_plan < m->psi_weak;
+    return weak ? (q15_t)fx_min_s32(m->torque_slew, m->torque_slew_weak) : m->torque_slew;
+}
+
+static q15_t allowed(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const torque_limit_in_t in = {
+        .wanted = drive->request.torque,
+        .limits = &drive->request.limits,
+        .u = sample->mrai.u,
+        .i = sample->mrai.i,
+        .torque = task->torque_estimate,
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .v_dc = (q15_t)sample->v_dc,
+        .reach = task->reference.torque_max,
+        .inverter_dC = hal_temperature_inverter_dC(),
+        .winding_dC = hal_temperature_winding_dC(),
+    };
+    task->allowed = torque_limit_step(&drive->motor.torque_limit, &task->torque_limit, &in);
+    const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
+    task->derating = (uint16_t)(task->allowed.derating | magnet);
+    return task->allowed.torque;
+}
+
+/* Request -> limits -> slew -> torque loop -> what the current reference is asked for. A limit that closes is not
+ * slewed: what is no longer allowed or possible is not asked for. */
 static q15_t torque_path(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     const motor_t *m = &drive->motor;
-    const q15_t most = m->torque_max;
-    const q15_t wanted = fx_clamp_q15(drive->request.torque, fx_neg_q15(most), most);
+    const q15_t wanted = allowed(drive, sample);
 
-    task->torque_command = rate_limit_step(task->torque_command, wanted, m->torque_slew);
+    task->torque_command = rate_limit_step(task->torque_command, wanted, slew_of(drive));
     const torque_loop_in_t loop = {
         .command = task->torque_command,
         .estimate = task->torque_estimate,
@@ -46,49 +116,71 @@ static dq_t references(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     task->torque_request = torque_path(drive, sample);
+    const voltage_reserve_t trim = reserve(drive, sample);
     const current_reference_in_t in = {
         .torque = task->torque_request,
         .v_dc = (q15_t)sample->v_dc,
         .omega = fx_q15_from_q31(sample->mrai.omega),
         .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
+        .v_trim = trim.v_trim,
+        .shift = trim.shift,
+        .psi_delta = drive_psi_delta(drive),
+        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, drive_psi_delta(drive), hal_temperature_winding_dC()),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
 }
 
-static void rest(task_state_t *task)
+static void rest(drive_t *drive)
 {
+    task_state_t *task = &drive->task;
     task->torque_loop = (torque_loop_state_t){0};
-    task->reference = (current_reference_t){0};
+    task->torque_limit.loss = 0;
+    task->derating = 0;
+    task->reference = (current_reference_t){.torque_max = drive->motor.torque_max, .psi_plan = Q15_MAX};
+    task->voltage_reserve = (voltage_reserve_state_t){0};
     task->torque_command = 0;
     task->torque_request = 0;
+}
+
+/* What the fast ISR is to do until the next step; next becomes the operating point just commanded. */
+static void order(drive_t *drive, const sample_t *sample, uint32_t found, mrai_in_t *next)
+{
+    task_state_t *task = &drive->task;
+    command_t command = {
+        .run = task->run_state == RUN_STATE_RUN && found == 0U,
+        .faults = found,
+        .fault_resets = task->fault_resets,
+    };
+    if (command.run) {
+        next->i = references(drive, sample);
+        next->flux = flux_table_step(&drive->motor.flux_table, next->i);
+        task->i_ref = next->i;
+        task->psi_ref = (dq_t){next->flux.psi_d, next->flux.psi_q};
+        command.target = current_control_target(&drive->motor.current_control, next->i, &next->flux);
+    } else {
+        rest(drive);
+    }
+    command.safe = safe_state(drive, sample);
+    command_box_write(&drive->commands, command);
 }
 
 void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     const sample_t sample = sample_box_read(&drive->samples);
-    task->run_state = supervise(drive);
-    drive_identify(drive, &sample);
-
-    mrai_in_t next = sample.mrai;
-
-    command_t command = {.run = task->run_state == RUN_STATE_RUN, .fault_resets = task->fault_resets};
-    if (command.run) {
-        next.i = references(drive, &sample);
-        next.flux = flux_table_step(&drive->motor.flux_table, next.i);
-        command.target = current_control_target(&drive->motor.current_control, next.i, &next.flux);
-    } else {
-        rest(task);
-    }
-    command_box_write(&drive->commands, command);
-
-    if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
-        return;
-    }
     /* Read once: the identification may interrupt, and its drift must be counted to the end. */
     const mrai_state_t identified = drive->slow.mrai;
     exchange_barrier();
+    const uint32_t found = slow_monitors_step(drive, &sample);
+    task->run_state = supervise(drive);
+    drive_identify(drive, &sample, &identified);
+
+    mrai_in_t next = sample.mrai;
+    order(drive, &sample, found, &next);
+    if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
+        return;
+    }
     const mrai_schedule_in_t schedule = {
         .sample = &sample.mrai,
         .next = &next,

@@ -23,39 +23,58 @@ bool current_reference_valid(const current_reference_config_t *config)
     return true;
 }
 
-/* (v_ratio v_dc - r |i|)/|w|: at low speed everything is available (CR-2). */
-static q15_t available_flux(const current_reference_config_t *config, const current_reference_in_t *in)
+/* (v_ratio v_dc - r |i| + v_trim)/|w| - shift: at low speed everything is available (CR-2), (CR-9).
+ * A quotient of up to 2^30 keeps the shift from mattering where the flux is no limit at all. */
+static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     const q15_t drop = fx_mul_gain_q15(config->r_pu, in->i_magnitude);
-    const q15_t voltage = fx_sub_q15(fx_mul_q15(config->v_ratio, in->v_dc), drop);
-    return fx_div_q15((q15_t)fx_max_s32(voltage, 0), (q15_t)fx_max_s32(fx_abs_q15(in->omega), 1));
+    const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
+    const int32_t over = fx_div_s32(fx_clamp_q31(voltage, 0, Q15_MAX) * 32768, fx_max_s32(fx_abs_q15(in->omega), 1));
+    return fx_max_s32(over - in->shift, 0);
 }
 
 /* Interpolation between table nodes may leave the circle by a little: the d axis keeps its share (CR-7). */
-static dq_t inside_circle(q15_t i_d, q15_t i_q, q15_t i_max)
+static dq_t inside_circle(dq_t i, q15_t i_max)
 {
-    const int32_t room = fx_mul_q30(i_max, i_max) - fx_mul_q30(i_d, i_d);
-    if (fx_mul_q30(i_q, i_q) <= room) {
-        return (dq_t){i_d, i_q};
+    const int32_t room = fx_mul_q30(i_max, i_max) - fx_mul_q30((q15_t)i.d, (q15_t)i.d);
+    if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= room) {
+        return i;
     }
-    return (dq_t){(q15_t)fx_max_s32(i_d, -i_max), fx_sqrt_q30((uint32_t)fx_max_s32(room, 0))};
+    return (dq_t){fx_max_s32(i.d, -i_max), fx_sqrt_q30((uint32_t)fx_max_s32(room, 0))};
+}
+
+/* t_max + dpsi i_q(t_max): the tables' torque plus what the magnet differs by (CR-10). What a weak magnet leaves at
+ * the present point it need not leave at the largest torque, where psi_d is small: not counted. */
+static q15_t reachable(const current_reference_config_t *config, const current_reference_in_t *in, int32_t planned)
+{
+    bool clamped = false;
+    const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
+    const q15_t torque_max = fx_lookup1(&config->torque_max, psi, &clamped);
+    const fx_cell_t edge = fx_cell(&config->grid, torque_max, psi);
+    const q15_t i_q = (q15_t)fx_cell_interp(config->i_q, config->grid.ny, edge);
+    return fx_sat_q15(fx_max_s32(torque_max + fx_mul_q15(in->psi_delta, i_q), 0));
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     bool flux_clamped = false;
-    const q15_t psi = available_flux(config, in);
+    const int32_t planned = planned_flux(config, in);
+    const q15_t psi = fx_sat_q15(planned);
     const q15_t torque_max = fx_lookup1(&config->torque_max, psi, &flux_clamped);
     const q15_t torque = (q15_t)fx_min_s32(fx_abs_q15(in->torque), torque_max);
 
     const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
-    const q15_t i_d = (q15_t)fx_cell_interp(config->i_d, config->grid.ny, cell);
-    const q15_t i_q = (q15_t)fx_cell_interp(config->i_q, config->grid.ny, cell);
-    dq_t i_ref = inside_circle(i_d, i_q, config->i_max);
+    const dq_t wanted = {fx_cell_interp(config->i_d, config->grid.ny, cell),
+                         fx_cell_interp(config->i_q, config->grid.ny, cell)};
+    dq_t i_ref = inside_circle(wanted, config->i_max);
+    const bool i_d_limited = i_ref.d < -in->i_d_max;
+    i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
-        .torque_max = torque_max,
+        .torque_max = reachable(config, in, planned),
+        .psi_plan = psi,
         .limited = fx_abs_q15(in->torque) > torque_max || psi < config->grid.y0,
+        .i_d_limited = i_d_limited,
     };
 }

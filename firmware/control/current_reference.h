@@ -2,13 +2,18 @@
 #ifndef CONTROL_CURRENT_REFERENCE_H
 #define CONTROL_CURRENT_REFERENCE_H
 /** Current references: maximum torque per ampere, field weakening and maximum torque per volt from one table.
- *   (i_d, i_q) = table(|T|, psi_avail), i_q takes the sign of T;  psi_avail = (v_ratio v_dc - r |i|)/|w|
- *   |T| is first limited to t_max(psi_avail), the largest torque inside voltage and current circle.
- * Source   docs/theory/current-reference.md (CR-1) ... (CR-8)
+ *   (i_d, i_q) = table(|T|, psi_plan), i_q takes the sign of T
+ *   psi_plan = (v_ratio v_dc - r |i| + v_trim)/|w| - shift: shift is what the identified magnet adds to |psi|, v_trim
+ *     what voltage_reserve.h found the plan to be wrong by
+ *   |T| is first limited to t_max(psi_plan), the largest torque inside voltage and current circle, and i_d to -i_d_max.
+ *   torque_max = t_max + dpsi i_q(t_max), t_max without the flux that a weak magnet leaves at the present point: what
+ *     the machine as identified can make, never too high
+ * Source   docs/theory/current-reference.md (CR-1) ... (CR-11)
  * Units    per unit
- * Range    psi_avail outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged
+ * Range    psi_plan outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged;
+ *          |v_trim|, |shift| < 1/2
  * Rounding 1 LSB q15 of interpolation
- * Errors   limited: the torque was cut, by voltage or by current
+ * Errors   limited: the torque was cut, by voltage or by current; i_d_limited: i_d was
  * Context  1 kHz task; one bounded division */
 #include <stdbool.h>
 
@@ -30,12 +35,18 @@ typedef struct {
     q15_t v_dc;
     q15_t omega;
     q15_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
+    q15_t v_trim;
+    q15_t shift;
+    q15_t psi_delta;   /* identified flux minus the table's */
+    q15_t i_d_max;     /* magnitude of the most negative i_d that the magnets bear now */
 } current_reference_in_t;
 
 typedef struct {
     dq_t i_ref;
-    q15_t torque_max;  /* at this available flux */
+    q15_t torque_max;  /* reachable with the flux that is there */
+    q15_t psi_plan;    /* flux that the table was asked for */
     bool limited;
+    bool i_d_limited;
 } current_reference_t;
 
 bool current_reference_valid(const current_reference_config_t *config);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CONTROL_FLUX_TABLE_H
 #define CONTROL_FLUX_TABLE_H
-/** The L_d/L_q look-up service: everything a saturating machine's other stages need to know at (i_d, i_q).
+/** The L_d/L_q look-up service: what a saturating machine's other stages need to know at (i_d, i_q).
  *   psi_d = l_d(i_d,|i_q|) i_d + psi_f0(|i_q|),  psi_q = l_q(i_d,|i_q|) i_q, bilinear in the tabulated quantities
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6); the 2014 paper's look-up of L_d, L_q (section 1)
  * Units    currents per unit of I_b; results as in flux_table_types.h
  * Range    i_d, i_q anywhere in q15; outside the grid the edge is used and flagged
- * Rounding 1 LSB q15 per interpolated quantity, plus 1/2 LSB in each product
+ * Rounding 1 LSB q15 per interpolated quantity; psi: 1/2 LSB of psi_f0 and 1/2 of the product with an l of 29 bits
  * Errors   clamped; flux_table_valid() rejects a bad table at start-up
- * Context  fast ISR, once per period; no division, no loop */
+ * Context  step: fast ISR, once per period; inductances: tasks; no division, no loop */
 #include <stdint.h>
 
 #include "control/flux_table_types.h"
@@ -18,11 +18,13 @@
 typedef struct {
     fx_mesh_t mesh;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
     uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
-    const int16_t *l_d, *l_q, *l_qq, *g_d, *g_q; /* [ix * ny + iy] */
+    int32_t i_scale;       /* 8 2^l_shift: l in Q29 times i is then flux in q15 */
+    const int16_t *l_d, *l_q, *l_qq, *g; /* [ix * ny + iy] */
     const int16_t *psi_f0; /* [iy]: depends on i_q alone */
 } flux_table_config_t;
 
 bool flux_table_valid(const flux_table_config_t *config);
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i);
+flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i);
 
 #endif

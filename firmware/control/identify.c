@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify.h"
 
+#include "control/identify_q30.h"
 #include "fx/div.h"
 
 #define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
@@ -14,11 +15,6 @@ typedef struct {
     dq_t psi, i; /* identified, Q30 */
     int32_t magnet; /* psi_d minus the tables', what the current control uses */
 } operating_t;
-
-static int32_t mul_q30(int32_t a, int32_t b)
-{
-    return fx_sat_q31(((int64_t)a * b + (1 << 29)) >> 30);
-}
 
 bool identify_valid(const identify_config_t *c)
 {
@@ -59,8 +55,8 @@ static int32_t noise(const identify_config_t *config, const identify_point_t *po
 {
     const int32_t change = fx_add_q31(fx_abs_q31(point->rate.d), fx_abs_q31(point->rate.q));
     const int32_t level = fx_add_q31(config->noise_voltage_q30,
-                                     fx_add_q31(mul_q30(fx_abs_q31(point->omega / 2), config->noise_flux_q30),
-                                                mul_q30(change, config->noise_rate_q30)));
+                                     fx_add_q31(identify_mul(fx_abs_q31(point->omega / 2), config->noise_flux_q30),
+                                                identify_mul(change, config->noise_rate_q30)));
     return fx_sat_q31(level + (((int64_t)level * point->limited) >> LIMITED_SHIFT));
 }
 
@@ -158,13 +154,14 @@ static operating_t correct(const identify_config_t *config, const identify_state
     }
     const int32_t angle = value[IDENTIFY_ANGLE];
     const int32_t iron = value[IDENTIFY_IRON];
-    const int32_t magnet = fx_add_q31(value[IDENTIFY_FLUX], mul_q30(value[IDENTIFY_LD], m->slope));
-    const int32_t d = mul_q30(angle, m->turn.d) + mul_q30(iron, m->iron_psi.d);
-    const int32_t q = mul_q30(value[IDENTIFY_LQ], m->psi.q) + mul_q30(angle, m->turn.q) + mul_q30(iron, m->iron_psi.q);
+    const int32_t magnet = fx_add_q31(value[IDENTIFY_FLUX], identify_mul(value[IDENTIFY_LD], m->slope));
+    const int32_t d = identify_mul(angle, m->turn.d) + identify_mul(iron, m->iron_psi.d);
+    const int32_t q = identify_mul(value[IDENTIFY_LQ], m->psi.q) + identify_mul(angle, m->turn.q) +
+                      identify_mul(iron, m->iron_psi.q);
     return (operating_t){
         .psi = {fx_add_q31(m->psi.d, fx_add_q31(magnet, fx_add_q31(d, state->local.d))),
                 fx_add_q31(m->psi.q, fx_add_q31(q, state->local.q))},
-        .i = {m->i_m.d + mul_q30(iron, m->iron_i.d), m->i_m.q + mul_q30(iron, m->iron_i.q)},
+        .i = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
         .magnet = magnet,
     };
 }
@@ -172,13 +169,13 @@ static operating_t correct(const identify_config_t *config, const identify_state
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
     resistance_prior(config, state, in);
-    const identify_model_t model = identify_model(config, in->point, in->flux, state->r_prior);
+    const identify_model_t model = identify_model(config, in->point, in->flux, in->l, state->r_prior);
     const dq_t e = {fx_sub_q31(model.y.d, identify_filter_shift(&state->filter, &model.d)),
                     fx_sub_q31(model.y.q, identify_filter_shift(&state->filter, &model.q))};
     localise(config, state, in, e);
     collect(config, state, in, &model, e);
     const operating_t now = correct(config, state, &model);
-    const int32_t torque = fx_sub_q31(mul_q30(now.psi.d, now.i.q), mul_q30(now.psi.q, now.i.d));
+    const int32_t torque = fx_sub_q31(identify_mul(now.psi.d, now.i.q), identify_mul(now.psi.q, now.i.d));
     const identify_out_t out = {fx_round_q15(torque), fx_round_q15(now.magnet)};
     if (state->steps >= IDENTIFY_STEPS) {
         update(config, state, &model, out.torque);

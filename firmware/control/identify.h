@@ -35,6 +35,7 @@ typedef struct {
 typedef struct {
     const identify_point_t *point;
     const flux_point_t *flux; /* of the tables at point->i_m */
+    const flux_inductances_t *l;
     bool temperature_known;
     int16_t winding_dC;
     bool enabled;

@@ -4,7 +4,7 @@
 #define X_MAX (4 * IDENTIFY_ONE_Q27)
 #define E_MAX (1 << 26)
 #define S_MIN (INT64_C(1) << 38) /* the square of the smallest noise that identify_valid() accepts */
-#define INCONSISTENT_SHIFT 3 /* e^2 > 8 s: 2.8 standard deviations */
+#define INCONSISTENT_SHIFT 3 /* e^2 > 8 h P h' + r: r counts one error many times over (ID-14) */
 #define SIGNIFICANT 16 /* bits of the divisor */
 
 /* s as mantissa and exponent: 1/s = inverse 2^-(32 + shift), rounded down. */
@@ -18,18 +18,11 @@ static int32_t round_shift(int64_t x, unsigned n)
     return fx_sat_q31((x + (INT64_C(1) << (n - 1U))) >> n);
 }
 
-static unsigned place(unsigned row, unsigned column)
-{
-    const unsigned lo = (row < column) ? row : column;
-    const unsigned hi = (row < column) ? column : row;
-    return lo * IDENTIFY_STATES - (lo * (lo - 1U)) / 2U + (hi - lo);
-}
-
 void identify_filter_reset(identify_filter_t *filter)
 {
-    *filter = (identify_filter_t){{0}, {0}};
+    *filter = (identify_filter_t){{0}, {{0}}};
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        filter->p[place(j, j)] = IDENTIFY_ONE_Q30;
+        filter->p[j][j] = IDENTIFY_ONE_Q30;
     }
 }
 
@@ -40,7 +33,7 @@ static int64_t project(const identify_filter_t *filter, const identify_row_t *ro
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         int64_t sum = 0;
         for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
-            sum += (int64_t)filter->p[place(j, l)] * row->h[l];
+            sum += (int64_t)filter->p[j][l] * row->h[l];
         }
         ph[j] = round_shift(sum, 30);
         variance += (int64_t)ph[j] * row->h[j];
@@ -81,12 +74,15 @@ static reciprocal_t reciprocal(int64_t s)
     return (reciprocal_t){UINT32_MAX / mantissa, shift};
 }
 
+/* Q24 * Q30, cut to Q30. */
 static void shrink(identify_filter_t *filter, const int32_t *ph, const int32_t *gain_q24)
 {
-    unsigned k = 0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        for (unsigned l = j; l < IDENTIFY_STATES; l++, k++) {
-            filter->p[k] = fx_sub_q31(filter->p[k], round_shift((int64_t)gain_q24[j] * ph[l], 24));
+        for (unsigned l = j; l < IDENTIFY_STATES; l++) {
+            const int64_t drop = (int64_t)gain_q24[j] * ph[l] + (1 << 23);
+            const int32_t left = filter->p[j][l] - (int32_t)(drop >> 24); /* |k_j Ph_l| <= 1: no more than there is */
+            filter->p[j][l] = left;
+            filter->p[l][j] = left;
         }
     }
 }
@@ -96,11 +92,12 @@ identify_verdict_t identify_filter_update(identify_filter_t *filter, const ident
 {
     int32_t ph[IDENTIFY_STATES];
     int32_t gain[IDENTIFY_STATES];
-    int64_t s = project(filter, row, ph) + r_q60;
-    s = (s < S_MIN) ? S_MIN : s;
+    const int64_t own = project(filter, row, ph);
+    const int64_t s = (own + r_q60 < S_MIN) ? S_MIN : own + r_q60;
     const reciprocal_t by = reciprocal(s);
     const int32_t e = fx_clamp_q31(e_q30, -E_MAX, E_MAX);
-    identify_verdict_t verdict = {false, ((int64_t)e_q30 * e_q30) >> INCONSISTENT_SHIFT > s};
+    const int64_t credible = own + (r_q60 >> INCONSISTENT_SHIFT);
+    identify_verdict_t verdict = {false, ((int64_t)e_q30 * e_q30) >> INCONSISTENT_SHIFT > credible};
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         /* Q30 2^30/s = Q24 after 54 - 32 - shift. */
         gain[j] = round_shift((int64_t)ph[j] * by.inverse, by.shift - 22U);
@@ -114,14 +111,14 @@ identify_verdict_t identify_filter_update(identify_filter_t *filter, const ident
 
 void identify_filter_leak(const identify_config_t *config, identify_filter_t *filter, bool r_known)
 {
-    unsigned k = 0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         const int32_t prior = (j == IDENTIFY_R && r_known) ? config->r_known_q30 : IDENTIFY_ONE_Q30;
+        int32_t *row = filter->p[j];
         filter->x[j] -= fx_mul_q31(config->leak[j], filter->x[j]);
-        filter->p[k] = fx_add_q31(filter->p[k], fx_mul_q31(2 * config->leak[j], prior - filter->p[k]));
-        k++;
-        for (unsigned l = j + 1U; l < IDENTIFY_STATES; l++, k++) {
-            filter->p[k] -= fx_mul_q31(config->leak[j] + config->leak[l], filter->p[k]);
+        row[j] += fx_mul_q31(2 * config->leak[j], prior - row[j]);
+        for (unsigned l = j + 1U; l < IDENTIFY_STATES; l++) {
+            row[l] -= fx_mul_q31(config->leak[j] + config->leak[l], row[l]);
+            filter->p[l][j] = row[l];
         }
     }
 }

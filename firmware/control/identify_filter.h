@@ -16,16 +16,15 @@
 
 #define IDENTIFY_ONE_Q27 (1 << 27)
 #define IDENTIFY_ONE_Q30 (1 << 30)
-#define IDENTIFY_PAIRS (IDENTIFY_STATES * (IDENTIFY_STATES + 1) / 2)
 
 typedef struct {
     int32_t x[IDENTIFY_STATES];
-    int32_t p[IDENTIFY_PAIRS]; /* upper triangle by rows */
+    int32_t p[IDENTIFY_STATES][IDENTIFY_STATES]; /* symmetric */
 } identify_filter_t;
 
 typedef struct {
     bool clamped;      /* a state reached its limit */
-    bool inconsistent; /* the innovation is beyond 2.8 times what P and r expect */
+    bool inconsistent; /* the innovation is beyond what P and the errors behind r can be */
 } identify_verdict_t;
 
 void identify_filter_reset(identify_filter_t *filter);

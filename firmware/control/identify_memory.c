@@ -12,17 +12,12 @@ static const int32_t since[IDENTIFY_STATES] = {
     [IDENTIFY_IRON] = IDENTIFY_ONE_Q30 / 64,
 };
 
-static unsigned diagonal(unsigned j)
-{
-    return j * IDENTIFY_STATES - (j * (j - 1U)) / 2U;
-}
-
 identify_memory_t identify_memory_get(const identify_state_t *state)
 {
     identify_memory_t memory = {.version = IDENTIFY_MEMORY_VERSION};
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         memory.x[j] = state->filter.x[j];
-        memory.variance[j] = state->filter.p[diagonal(j)];
+        memory.variance[j] = state->filter.p[j][j];
     }
     return memory;
 }
@@ -45,7 +40,7 @@ bool identify_memory_restore(identify_state_t *state, const identify_memory_t *m
     identify_filter_reset(&state->filter);
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         state->filter.x[j] = memory->x[j];
-        state->filter.p[diagonal(j)] = fx_min_s32(fx_add_q31(memory->variance[j], since[j]), IDENTIFY_ONE_Q30);
+        state->filter.p[j][j] = fx_min_s32(fx_add_q31(memory->variance[j], since[j]), IDENTIFY_ONE_Q30);
     }
     return true;
 }

@@ -29,7 +29,7 @@ typedef struct {
 } identify_model_t;
 
 identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const flux_point_t *flux, q31_t r_prior);
+                                const flux_point_t *flux, const flux_inductances_t *l, q31_t r_prior);
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
 
 #endif

@@ -30,9 +30,11 @@ measure_t measure_step(const measure_config_t *config, const adc_counts_t *count
     };
 }
 
-abc_t measure_phases(const measure_config_t *config, const adc_counts_t *counts)
+abc_t measure_phases(ab_t i, int32_t sum_q27)
 {
-    return (abc_t){fx_sat_q15_word(phase_q27(config, counts->i_a, 0) >> 12),
-                   fx_sat_q15_word(phase_q27(config, counts->i_b, 1) >> 12),
-                   fx_sat_q15_word(phase_q27(config, counts->i_c, 2) >> 12)};
+    const int32_t zero = fx_mulhi(sum_q27, PER_THREE);
+    const int32_t side = fx_mulhi(i.beta * 65536, Q16(0.86602540378443865)); /* Q31 * Q16 = Q15 */
+    const int32_t half = i.alpha >> 1;
+    return (abc_t){fx_sat_q15_word(i.alpha + zero), fx_sat_q15_word(zero - half + side),
+                   fx_sat_q15_word(zero - half - side)};
 }

@@ -3,13 +3,16 @@
 
 #include "fx/q.h"
 
-/* 4 pu. The slow observer poles make e = T_s w dpsi/(2 s2) large: 1.5 pu for a magnet 15 % weak at full speed on hsm1. A
+/* 4 pu. The slow poles make e = T_s w dpsi/(2 s2) large: 1.5 pu for a magnet 15 % weak at full speed on hsm1. A
  * tighter bound winds up. */
 #define ERROR_BITS 30
 /* |s2 e| < 1/16 in the laws: Q35 fits, and the small steps of the adaptation keep their digits. */
 #define INNOVATION_BITS 24
 #define INNOVATION_SCALE 256
 
+
+/* Of the d equation (MR-7). */
+#define WEIGHT_D 2
 
 typedef struct {
     int32_t d, q;
@@ -27,9 +30,9 @@ static bool limits_valid(q31_t lo, q31_t hi)
 
 bool mrai_valid(const mrai_config_t *config)
 {
-    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->pole_gain <= Q31(0.25) &&
-                       config->period > 0 && config->period <= Q31(0.78) && config->flux_gain >= 0 &&
-                       config->resistance_gain >= 0 && config->flux_proportional_q24 >= 0 &&
+    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 &&
+                       config->period <= Q31(0.78) && config->flux_gain >= 0 && config->resistance_gain >= 0 &&
+                       config->flux_proportional_q24 >= 0 &&
                        config->resistance_proportional_q24 >= 0;
     return gains && limits_valid(config->psi_delta_min, config->psi_delta_max) &&
            limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
@@ -62,7 +65,8 @@ static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_stat
     return adapt(&law, &state->psi_delta, fx_mulhi(step_q28, innovation_q));
 }
 
-/* (7) normalised: dR -= k s2 (i_d e_d + i_q e_q), i in Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25, saturated. */
+/* (7) normalised: dR -= k s2 (2 i_d e_d + i_q e_q), i weighted, Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25,
+ * saturated. */
 static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mrai_state_t *state, pair_t i,
                               pair_t innovation)
 {
@@ -72,46 +76,47 @@ static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mra
 }
 
 /* Half a period's rotational and resistive voltage at one of its ends, as flux: half of T_s (R^ i_d - w psi_q) and of
- * T_s (R^ i_q + w (psi_d + dpsi)) (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
+ * T_s (R^ i_q + w (psi_d + dpsi)), weighted (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
 static pair_t half_voltage(const mrai_config_t *config, const mrai_in_t *in, pair_t i_q28, q31_t psi_used, q31_t r_used)
 {
     const int32_t turn_q30 = fx_mulhi(in->omega, config->period);
     const int32_t drop_q30 = fx_mulhi(fx_add_q31(config->r0, r_used), config->period);
     const int32_t psi_d_q28 = in->flux.psi_d * 8192 + (psi_used >> 3);
-    return (pair_t){fx_mulhi_sub(fx_mulhi(drop_q30, i_q28.d), turn_q30, in->flux.psi_q * 8192),
+    return (pair_t){fx_mulhi_sub(fx_mulhi(drop_q30, i_q28.d), turn_q30, in->flux.psi_q * (8192 * WEIGHT_D)),
                     fx_mulhi_add(fx_mulhi(drop_q30, i_q28.q), turn_q30, psi_d_q28)};
 }
 
-/* This sample's share of the period that begins with it. The voltage's product is cut, not rounded: 1e-8 of V_b. */
+/* This sample's share of the period that begins with it. */
 static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in, pair_t e, pair_t half)
 {
-    const int32_t voltage = -schedule->voltage_q28;
     state->e_d_q27 = e.d;
     state->e_q_q27 = e.q;
-    state->begun_d_q27 = fx_mac_q31_word(e.d - in->flux.psi_d * 4096 + half.d, voltage, in->u.d);
-    state->begun_q_q27 = fx_mac_q31_word(e.q - in->flux.psi_q * 4096 + half.q, voltage, in->u.q);
+    state->begun_d_q27 = fx_mulhi_add(e.d - in->flux.psi_d * (4096 * WEIGHT_D) + half.d,
+                                      schedule->minus_voltage_q28 * WEIGHT_D, in->u.d * 65536);
+    state->begun_q_q27 = fx_mulhi_add(e.q - in->flux.psi_q * 4096 + half.q,
+                                      schedule->minus_voltage_q28, in->u.q * 65536);
 }
 
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    const pair_t i = {in->i.d * 8192, in->i.q * 8192};
+    const pair_t i = {in->i.d * (8192 * WEIGHT_D), in->i.q * 8192};
     begin(schedule, state, in, (pair_t){0, 0}, half_voltage(config, in, i, state->psi_delta, state->r_delta));
 }
 
 /* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
- * steady state. All terms in Q27: 4 + 2 + 1 + 0.8 + 4 + 1 < 16. */
+ * steady state. In Q27 the d axis is the larger one: 4 + 2 (1 + 1 + 0.8) + 2 + 2 (1 + 1) < 16. */
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    const pair_t i = {in->i.d * 8192, in->i.q * 8192}; /* Q28 */
-    /* (MR-7): half of s2 in Q30 is s2 in Q29, below 1/2 by mrai_valid(): Q32 fits. */
-    const int32_t s2_q32 = fx_mac_q31_word(0, config->pole_gain, (in->flux.g_d + in->flux.g_q) >> 1) * 8;
+    const pair_t i = {in->i.d * (8192 * WEIGHT_D), in->i.q * 8192}; /* weighted, Q28 */
+    /* (MR-7): 4 s2 in Q30, which is s2 in Q32, below 1/4. */
+    const int32_t s2_q32 = fx_mul_q31_word(config->pole_gain, in->flux.g);
     const pair_t s2e = {fx_mulhi(s2_q32, state->e_d_q27), fx_mulhi(s2_q32, state->e_q_q27)};
     const pair_t e = {state->begun_d_q27 - s2e.d + s2e.q, state->begun_q_q27 - s2e.d - s2e.q};
     const pair_t fresh = {innovation(s2e.d), innovation(s2e.q)};
     const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh.q);
     const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, fresh);
     const pair_t half = half_voltage(config, in, i, psi_used, r_used);
-    const pair_t now = {fx_sat_bits(e.d + in->flux.psi_d * 4096 + half.d, ERROR_BITS),
+    const pair_t now = {fx_sat_bits(e.d + in->flux.psi_d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
                         fx_sat_bits(e.q + in->flux.psi_q * 4096 + half.q, ERROR_BITS)};
     begin(schedule, state, in, now, half);
 }

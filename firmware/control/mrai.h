@@ -3,13 +3,13 @@
 #define CONTROL_MRAI_H
 /** Model reference adaptive identification of stator resistance and magnet flux.
  *   Full-order observer in flux linkage, poles at -S/2 +- jS/2, S = m R_0 (1/L_d + 1/L_q), carried as its error
- *   e = psi(i) - psi~: the derivative enters as the change of the table's flux, exact through saturation, cross
- *   coupling included, and no inductance is left in the equations but that of S.
- *     e_d += dpsi_d - T_s (u_d + w psi_q - R^ i_d) + s2 (e_q - e_d)
+ *   e = (2 (psi_d(i) - psi_d~), psi_q(i) - psi_q~): the derivative enters as the change of the table's flux, exact
+ *   through saturation, cross coupling included, and no inductance is left in the equations but that of S.
+ *     e_d += 2 (dpsi_d - T_s (u_d + w psi_q - R^ i_d)) + s2 (e_q - e_d)
  *     e_q += dpsi_q - T_s (u_q - w (psi_d + dpsi) - R^ i_q) - s2 (e_d + e_q),   s2 = S T_s/2
  *   with means of the period's two ends in the bracket.
  *   Adaptation, proportional and integral, normalised so that k_psi, k_r are bandwidths at every speed and current:
- *     dpsi -= 2 k_psi s2 e_q/w,   dR -= 2 k_r s2 (i_d e_d + i_q e_q)/|i|^2
+ *     dpsi -= 2 k_psi s2 e_q/w,   dR -= 2 k_r s2 (2 i_d e_d + i_q e_q)/n,  n = 4 i_d^2 + i_q^2
  * Source   docs/theory/mrai.md (MR-1) ... (MR-24); the 2014 paper's (3), (6), (7), (8), (11), in flux linkage
  * Units    per unit; dpsi is the deviation from the table's psi_f0, dR from R_0 (20 C)
  * Range    |w| < 1, |i| < 1, errors clamped to 4 pu of flux, s2 e to 1/16 in the laws; results clamped to
@@ -26,7 +26,7 @@
 
 typedef struct {
     q31_t r0;              /* nominal resistance in the observer and its poles */
-    q31_t pole_gain;       /* m R_0/2 <= 0.25: s2 = pole_gain (g_d + g_q) */
+    q31_t pole_gain;       /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
     q31_t period;          /* omega_b T_s: volts per unit to flux per unit and period */
     q31_t flux_gain;       /* 2 k_psi/omega_b */
     q31_t resistance_gain; /* 2 k_r/omega_b */
@@ -46,8 +46,8 @@ typedef struct {
 /** Slowly varying factors: written by the 1 kHz task, read by the MRAI ISR through a double buffer. */
 typedef struct {
     int32_t flux_step_q28;       /* 2 k_psi/(omega_b w), signed like w; 0 while the flux gate is closed */
-    int32_t resistance_step_q26; /* 2 k_r/(omega_b |i|^2); 0 while the resistance gate is closed */
-    int32_t voltage_q28;         /* omega_b T_s/sinc(w T_s/2) */
+    int32_t resistance_step_q26; /* 2 k_r/(omega_b n); 0 while the resistance gate is closed */
+    int32_t minus_voltage_q28;   /* -omega_b T_s/sinc(w T_s/2) */
 } mrai_schedule_t;
 
 typedef struct {

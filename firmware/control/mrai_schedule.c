@@ -14,20 +14,20 @@ static int32_t flux_step(const mrai_config_t *config, q15_t omega)
     return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U);
 }
 
-/* 2 k_r/(omega_b |i|^2) in Q26 (MR-10): a 64th in Q31 over Q30 is a 32nd in Q31. */
+/* 2 k_r/(omega_b n), n = 4 i_d^2 + i_q^2, in Q26 (MR-10): a 256th in Q31 over Q28 is a 32nd in Q31. */
 static int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
 {
     const q15_t d = (q15_t)sample->i.d;
     const q15_t q = (q15_t)sample->i.q;
-    const int32_t norm_q30 = fx_add_q31(fx_mul_q30(d, d), fx_mul_q30(q, q));
-    return fx_div_q31(config->resistance_gain / 64, norm_q30);
+    const int32_t norm_q28 = fx_mul_q30(d, d) + (fx_mul_q30(q, q) >> 2);
+    return fx_div_q31(config->resistance_gain / 256, norm_q28);
 }
 
-/* omega_b T_s/sinc(w T_s/2) to second order (MR-5): the sampled flux is u/(w sinc), not u/w. */
-static int32_t voltage_q28(const mrai_config_t *config, q31_t omega)
+/* -omega_b T_s/sinc(w T_s/2) to second order (MR-5): the sampled flux is u/(w sinc), not u/w. */
+static int32_t minus_voltage_q28(const mrai_config_t *config, q31_t omega)
 {
     const q31_t more = fx_mul_q31(config->sinc_gain, fx_mul_q31(omega, omega));
-    return fx_shr_round(config->period, 3) + fx_shr_round(fx_mul_q31(config->period, more), 3);
+    return -fx_shr_round(config->period, 3) - fx_shr_round(fx_mul_q31(config->period, more), 3);
 }
 
 /* |drift|/full: what the adaptation still has to do, 1 and more is 1 (MR-18). */
@@ -67,6 +67,6 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
         .flux_step_q28 = flux_open ? flux_step(config, omega) : 0,
         .resistance_step_q26 =
             resistance_open ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
-        .voltage_q28 = voltage_q28(config, in->sample->omega),
+        .minus_voltage_q28 = minus_voltage_q28(config, in->sample->omega),
     };
 }

@@ -114,6 +114,13 @@ static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
 }
 
 /* The lower half of a word, whatever its upper one. */
+static inline int32_t fx_arch_smulwb_word(int32_t a, int32_t b)
+{
+    int32_t y;
+    __asm__("smulwb %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
+    return y;
+}
+
 static inline int32_t fx_arch_smlawb_word(int32_t a, int32_t b, int32_t acc)
 {
     int32_t y;

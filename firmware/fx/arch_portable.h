@@ -75,6 +75,11 @@ static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
     return fx_arch_add_wrap(acc, fx_arch_smulwb(a, b));
 }
 
+static inline int32_t fx_arch_smulwb_word(int32_t a, int32_t b)
+{
+    return fx_arch_smulwb(a, (int16_t)(uint16_t)((uint32_t)b & 0xFFFFU));
+}
+
 static inline int32_t fx_arch_smlawb_word(int32_t a, int32_t b, int32_t acc)
 {
     return fx_arch_smlawb(a, (int16_t)(uint16_t)((uint32_t)b & 0xFFFFU), acc);

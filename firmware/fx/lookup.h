@@ -111,23 +111,26 @@ static inline q15_t fx_lookup1(const fx_lut1_t *lut, int32_t x, bool *clamped)
     return (q15_t)(fx_dot2_acc(0x2000, fx_load_pair(&lut->y[a.position >> 14]), weights) >> 14);
 }
 
-static inline fx_cell_t fx_cell_at(fx_axis_t ax, fx_axis_t ay, uint32_t ny)
+/* From two positions in cells, Q14, each below its last. */
+static inline fx_cell_t fx_cell_at(uint32_t x, uint32_t y, uint32_t ny)
 {
-    const uint32_t wx = ax.position & 0x3FFFU;
-    const uint32_t wy = ay.position & 0x3FFFU;
+    const uint32_t wx = x & 0x3FFFU;
+    const uint32_t wy = y & 0x3FFFU;
     /* One product, the other three by subtraction: the four always sum to 2^14 (FX-29). */
     const uint32_t w11 = ((wx * wy) + 0x2000U) >> 14;
     const fx_pair_t w1 = wx + (w11 << 16) - w11; /* (wx - w11, w11) */
     const fx_pair_t w = fx_weights(wy);
-    const uint32_t column = ay.position >> 14;
-    return (fx_cell_t){((ax.position >> 14) * ny) + column, column, w - w1, w1, w,
-                       (ax.outside | ay.outside) != 0U};
+    const uint32_t column = y >> 14;
+    return (fx_cell_t){((x >> 14) * ny) + column, column, w - w1, w1, w, false};
 }
 
 static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
 {
-    return fx_cell_at(fx_axis(x, grid->x0, grid->x_shift, grid->nx),
-                      fx_axis(y, grid->y0, grid->y_shift, grid->ny), grid->ny);
+    const fx_axis_t ax = fx_axis(x, grid->x0, grid->x_shift, grid->nx);
+    const fx_axis_t ay = fx_axis(y, grid->y0, grid->y_shift, grid->ny);
+    fx_cell_t cell = fx_cell_at(ax.position, ay.position, grid->ny);
+    cell.clamped = (ax.outside | ay.outside) != 0U;
+    return cell;
 }
 
 static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
@@ -140,16 +143,27 @@ static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
 /* fx_cell() of a q15 x and |y|; inside the grid nothing needs to be limited. */
 static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t y)
 {
-    fx_axis_t ax = {(uint32_t)(x - mesh->x0) << mesh->up, 0U};
-    fx_axis_t ay = {y << mesh->up, 0U};
-    if (__builtin_expect(ax.position > mesh->x_last, 0)) { /* a negative one is very large */
+    uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
+    uint32_t py = y << mesh->up;
+    bool clamped = false;
+    if (__builtin_expect(px > mesh->x_last, 0)) { /* a negative one is very large */
         const uint32_t nearest = (x < mesh->x0) ? 0U : mesh->x_last;
-        ax = (fx_axis_t){nearest, (ax.position - nearest) >> 1};
+        clamped = px - nearest > 1U; /* the last point itself, one count above, is inside */
+        px = nearest;
     }
-    if (__builtin_expect(ay.position > mesh->y_last, 0)) {
-        ay = (fx_axis_t){mesh->y_last, (ay.position - mesh->y_last) >> 1};
+    if (__builtin_expect(py > mesh->y_last, 0)) {
+        clamped = clamped || py - mesh->y_last > 1U;
+        py = mesh->y_last;
     }
-    return fx_cell_at(ax, ay, mesh->ny);
+    fx_cell_t cell = fx_cell_at(px, py, mesh->ny);
+    cell.clamped = clamped;
+    return cell;
+}
+
+/* Not rounded: the table's format with 14 bits more. */
+static inline int32_t fx_cell_sum(const int16_t *z, uint32_t ny, fx_cell_t cell)
+{
+    return fx_dot2_acc(fx_dot2(fx_load_pair(&z[cell.index]), cell.w0), fx_load_pair(&z[cell.index + ny]), cell.w1);
 }
 
 static inline int32_t fx_cell_interp(const int16_t *z, uint32_t ny, fx_cell_t cell)

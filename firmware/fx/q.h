@@ -85,7 +85,12 @@ static inline q31_t fx_mul_gain_q31(q16_t gain, q31_t x)
     return fx_sat_q31(((int64_t)gain * x + 0x8000) >> 16);
 }
 
-/* The same with the q15 number in a word. */
+/* The same two with the q15 number in a word. */
+static inline int32_t fx_mul_q31_word(q31_t a, int32_t b)
+{
+    return fx_arch_smulwb_word(a, b);
+}
+
 static inline int32_t fx_mac_q31_word(int32_t acc, q31_t a, int32_t b)
 {
     return fx_arch_smlawb_word(a, b, acc);

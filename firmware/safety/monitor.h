@@ -13,23 +13,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "types/faults.h"
 #include "types/frames.h"
-
-enum {
-    FAULT_OVER_CURRENT = 1u << 0,
-    FAULT_OVER_VOLTAGE = 1u << 1,
-    FAULT_UNDER_VOLTAGE = 1u << 2,
-    FAULT_CURRENT_SUM = 1u << 3,
-    FAULT_ANGLE = 1u << 4,
-    FAULT_INPUT = 1u << 5,     /* the HAL delivered something that is no number */
-    FAULT_OVERRUN = 1u << 6,   /* the identification did not finish within its period, 3 in a row */
-    FAULT_CONFIG = 1u << 7     /* start-up check of the motor data failed */
-};
 
 typedef struct {
     q15_t i_trip;
     q15_t v_max, v_min;
     q15_t sum_max;
+    int32_t quiet_q30; /* (i_trip - sum_max/3)^2: a vector that short has no phase beyond i_trip */
 } monitor_config_t;
 
 typedef struct {
@@ -42,6 +33,17 @@ typedef struct {
     int32_t v_dc;
     bool angle_jumped;
 } monitor_in_t;
+
+/** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to count.
+ * |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
+static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, dq_t i, int32_t sum_q27,
+                                 int32_t v_dc)
+{
+    const uint32_t sum_max = (uint32_t)config->sum_max;
+    return (uint32_t)(i.d * i.d) + (uint32_t)(i.q * i.q) < (uint32_t)config->quiet_q30 &&
+           (uint32_t)(sum_q27 >> 12) + sum_max < 2U * sum_max && v_dc >= config->v_min && v_dc <= config->v_max &&
+           !state->counting;
+}
 
 uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in);
 

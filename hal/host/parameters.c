@@ -5,6 +5,7 @@
 
 #include "app/calibration.h"
 #include "hal/host/instance.h"
+#include "hal/host/limits.h"
 #include "hal/host/learnt.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
@@ -61,6 +62,8 @@ GETTER(torque_estimate, pu15(d->drive.task.torque_estimate, bases(d)->torque_Nm)
 GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
 GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
+GETTER(derating, d->drive.task.derating)
+GETTER(voltage_trim, pu31(d->drive.task.voltage_reserve.trim, bases(d)->voltage_V))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
 GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
 GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
@@ -156,10 +159,18 @@ static const parameter_t parameters[] = {
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},
     {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
     {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},
+    {"inverter_C", limits_get_inverter, limits_set_inverter, -100.0, 500.0},
+    {"machine_monitors", limits_get_machine_monitors, limits_set_machine_monitors, 0.0, 1.0},
+    {"torque_limit_drive_Nm", limits_get_torque_drive, limits_set_torque_drive, 0.0, 1e9},
+    {"torque_limit_regen_Nm", limits_get_torque_regen, limits_set_torque_regen, 0.0, 1e9},
+    {"power_limit_drive_W", limits_get_power_drive, limits_set_power_drive, 0.0, 1e9},
+    {"power_limit_regen_W", limits_get_power_regen, limits_set_power_regen, 0.0, 1e9},
     {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},
     {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
     {"torque_request_Nm", get_torque_request, NULL, 0, 0},
     {"torque_max_Nm", get_torque_max, NULL, 0, 0},
+    {"voltage_trim_V", get_voltage_trim, NULL, 0, 0},
+    {"derating", get_derating, NULL, 0, 0},
     {"torque_correction", get_torque_correction, NULL, 0, 0},
     {"psi_f_Vs", learnt_psi_f_Vs, NULL, 0, 0},
     {"r_ohm", learnt_r_ohm, NULL, 0, 0},

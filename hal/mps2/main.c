@@ -44,6 +44,11 @@ int16_t hal_temperature_winding_dC(void)
     return HAL_TEMPERATURE_UNKNOWN;
 }
 
+int16_t hal_temperature_inverter_dC(void)
+{
+    return HAL_TEMPERATURE_UNKNOWN;
+}
+
 void hal_irq_pend_mrai(void)
 {
     SCB_ICSR = ICSR_PENDSV;

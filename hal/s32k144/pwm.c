@@ -139,18 +139,22 @@ void pwm_gate_fault_isr(void)
     core_irq_disable(IRQ_FTM0_FAULT);
 }
 
+/* Cleared only where it was seen set: what the interrupt sets in between is never lost. */
+static bool take(volatile bool *flag)
+{
+    if (!*flag) {
+        return false;
+    }
+    *flag = false;
+    return true;
+}
+
 bool pwm_fault_reported(void)
 {
-    const bool was = fault_for_board;
-    fault_for_board = false;
-    return was || (FTM0->FMS & FTM_FMS_FAULTIN) != 0U;
+    return take(&fault_for_board) || (FTM0->FMS & FTM_FMS_FAULTIN) != 0U;
 }
 
 bool pwm_fault_taken(void)
 {
-    if (!fault_for_drive) {
-        return false;
-    }
-    fault_for_drive = false;
-    return true;
+    return take(&fault_for_drive);
 }

@@ -251,6 +251,22 @@ def test_lost_battery_limits_take_the_torque_away_and_tell_why(running: Ecu) -> 
     assert running.get(TORQUE) == pytest.approx(40.0, abs=0.02)
 
 
+# 210 rad/s: 5 kW are less than 24 Nm at the shaft, by the losses. Sent every 100 ms.
+def test_battery_power_limits_hold_in_both_directions_and_tell_why(running: Ecu) -> None:
+    for _ in range(360):
+        running.speed_rad_s += 0.5
+        running.run(1)
+    for torque_Nm, power_kW in ((60.0, 5.0), (-60.0, -3.0)):
+        for _ in range(10):
+            running.send(LIMITS, {"PowerLimitDrive": 5.0, "PowerLimitRegen": 3.0})
+            running.run(100, TorqueRequest=torque_Nm)
+        electrical_kW = running.truth("idc_A") * running.truth("vdc_V") / 1000.0
+        assert electrical_kW == pytest.approx(power_kW, abs=0.25)
+        assert abs(electrical_kW) <= abs(power_kW) + 0.1
+        assert running.state == "derate"
+        assert running.last["INV_DcLink"]["DeratingReason"] == "battery_power"
+
+
 def test_mode_off_opens_the_contactor_and_discharges(running: Ecu) -> None:
     running.run(30, Enable=0)
     running.run(20, Mode="off")

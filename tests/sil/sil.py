@@ -17,8 +17,13 @@ def library_path(motor: str) -> Path:
 
 
 def load(motor: str) -> ctypes.CDLL:
+    """A shipped motor's library."""
+    return load_library(library_path(motor))
+
+
+def load_library(path: Path) -> ctypes.CDLL:
     """The library with the header's prototypes."""
-    library = ctypes.CDLL(str(library_path(motor)))
+    library = ctypes.CDLL(str(path))
     pointer, text, number = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double
     library.fluxtrue_create.restype = pointer
     library.fluxtrue_create.argtypes = []

@@ -24,6 +24,10 @@ DIVISIONS = {
     "modulate.c": 3,  # reciprocal of the measured dc voltage
     "current_reference.c": 1,  # the rest runs at 1 kHz
     "mrai_schedule.c": 3,
+    "identify_model.c": 2,  # 1 kHz: the direction of the current
+    "identify.c": 1,  # 1 kHz: weight of the local flux error
+    "identify_filter.c": 1,  # 100 Hz and axis
+    "torque_limit.c": 2,
     "torque_loop.c": 1,
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.

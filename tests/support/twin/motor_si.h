@@ -45,6 +45,14 @@ typedef struct {
     const double *ref_id_A, *ref_iq_A;
     const double *ref_torque_max_Nm; /* [ref_npsi] */
     double ref_v_ratio, i_max_A;
+    /* voltage reserve, gain per 1 kHz step */
+    double trim_gain, trim_min_V, trim_max_V;
+    /* torque limits, rates per 1 kHz step; lines: no torque at end, all of it from start on */
+    double torque_slew_weak_Nm, psi_weak_Vs, loss_rate, loss_drop_V;
+    double moving_end_rad_s, moving_start_rad_s, speed_end_rad_s, speed_start_rad_s;
+    double inverter_end_C, inverter_start_C, winding_end_C, winding_start_C;
+    double dc_low_end_V, dc_low_start_V, dc_high_end_V, dc_high_start_V;
+    double i_d_20_A, i_d_slope_A_per_K, psi_temp_coeff_per_K, magnet_assumed_C;
     /* monitors */
     double i_trip_A, v_max_V, v_min_V, sum_max_A;
 } motor_si_t;

@@ -10,6 +10,7 @@ twin_t *twin_create(void)
     if (twin != NULL) {
         twin->motor = motor_si;
         twin->compensation = 1.0;
+        twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
         twin->torque_loop = true;
         twin->identification = true;
         twin->schedule.voltage_scale = 1.0;
@@ -64,7 +65,7 @@ static void supervise(twin_t *twin)
 
 static double slew(double from, double to, double step)
 {
-    return (step > 0.0) ? from + twin_clamp(to - from, -step, step) : to;
+    return from + twin_clamp(to - from, -step, step);
 }
 
 static bool voltage_limited(const twin_t *twin)
@@ -72,11 +73,38 @@ static bool voltage_limited(const twin_t *twin)
     return twin->current.limited || twin->modulation_limited;
 }
 
+/* With every limit of the vehicle open and a cold inverter. */
+static double allowed(twin_t *twin)
+{
+    const twin_limit_in_t in = {
+        .wanted = twin->torque_command,
+        .torque_drive = HUGE_VAL,
+        .torque_regen = HUGE_VAL,
+        .power_drive = HUGE_VAL,
+        .power_regen = HUGE_VAL,
+        .u = twin->sample.u,
+        .i = twin->sample.i,
+        .torque = twin->torque_estimate,
+        .omega = twin->sample.omega,
+        .v_dc = twin->v_dc,
+        .reach = twin->reference.torque_max,
+        .inverter_C = 20.0,
+        .winding_C = twin->winding_C,
+    };
+    return twin_torque_limit(&twin->motor, &twin->limit, &in);
+}
+
+static double slew_now(const twin_t *twin)
+{
+    const motor_si_t *m = &twin->motor;
+    const bool weak = twin->reference.psi_plan < m->psi_weak_Vs;
+    const double open = (m->torque_slew_Nm > 0.0) ? m->torque_slew_Nm : HUGE_VAL;
+    return weak ? fmin(open, m->torque_slew_weak_Nm) : open;
+}
+
 static void torque_path(twin_t *twin)
 {
-    const double most = twin->motor.torque_max_Nm;
-    twin->slewed = slew(twin->slewed, twin_clamp(twin->torque_command, -most, most),
-                        twin->motor.torque_slew_Nm);
+    twin->slewed = slew(twin->slewed, allowed(twin), slew_now(twin));
     const twin_torque_in_t torque = {
         .command = twin->slewed,
         .estimate = twin->torque_estimate,
@@ -84,11 +112,24 @@ static void torque_path(twin_t *twin)
         .enabled = twin->torque_loop && !twin->current_mode,
         .limited = voltage_limited(twin) || twin->reference.limited,
     };
+    const twin_reserve_in_t reserve = {
+        .u = twin->sample.u,
+        .psi = twin->psi_ref,
+        .v_dc = twin->v_dc,
+        .psi_plan = twin->reference.psi_plan,
+        .psi_delta = twin->psi_delta,
+        .acting = twin->periods_on >= 3 && !twin->current_mode,
+    };
+    const double shift = twin_voltage_reserve(&twin->motor, &twin->trim, &reserve);
     const twin_reference_in_t request = {
         .torque = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
         .v_dc = twin->v_dc,
         .omega = twin->sample.omega,
         .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
+        .v_trim = twin->trim,
+        .shift = shift,
+        .psi_delta = twin->psi_delta,
+        .i_d_max = twin_i_d_limit(&twin->motor, twin->psi_delta, twin->winding_C),
     };
     twin->reference = twin_current_reference(&twin->motor, &request);
 }
@@ -117,10 +158,13 @@ static void task(twin_t *twin)
         twin->target = twin_current_target(&twin->motor, twin->i_ref);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
+        twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
     } else {
         twin->slewed = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
-        twin->reference = (twin_reference_t){0};
+        twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
+        twin->limit.loss_W = 0.0;
+        twin->trim = 0.0;
         twin->i_ref = (twin_dq_t){0.0, 0.0};
     }
     twin->schedule = twin_mrai_schedule(&twin->motor, &twin->quality, &twin->sample, &next, &twin->mrai,

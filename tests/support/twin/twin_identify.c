@@ -36,9 +36,10 @@ static double variance(const twin_filter_t *filter, const double h[TWIN_STATES])
 /* h, e in units in which e is limited to 1/16. */
 bool twin_filter_update(twin_filter_t *filter, const double h[TWIN_STATES], double e, double r)
 {
-    const double s = variance(filter, h) + r;
+    const double own = variance(filter, h);
+    const double s = own + r;
     double ph[TWIN_STATES];
-    bool doubt = e * e > 8.0 * s;
+    bool doubt = e * e > 8.0 * own + r;
     for (int j = 0; j < TWIN_STATES; j++) {
         ph[j] = dot(filter->p[j], h);
     }

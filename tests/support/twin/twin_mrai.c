@@ -3,6 +3,9 @@
 
 #include "twin/twin_stages.h"
 
+/* Of the d equation (MR-7). */
+static const double weight_d = 2.0;
+
 void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
 {
     state->e = (twin_dq_t){0.0, 0.0};
@@ -38,7 +41,7 @@ void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
     /* S T_s/2 with S = m R (1/L_d + 1/L_q): independent of the speed. */
     const double s2 = 0.5 * motor->observer_m * motor->r_ohm_20 * (in->flux.g_d + in->flux.g_q);
     const double flux_step = -schedule->flux_gain * s2 * e.q;
-    const double resistance_step = -schedule->resistance_gain * s2 * (in->i.d * e.d + in->i.q * e.q);
+    const double resistance_step = -schedule->resistance_gain * s2 * (weight_d * in->i.d * e.d + in->i.q * e.q);
     const twin_dq_t before = burden(motor, last, state->psi_used, state->r_used);
     state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs,
                             motor->psi_delta_max_Vs, &state->psi_delta, &state->psi_clamped);
@@ -47,7 +50,7 @@ void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
     const twin_dq_t after = burden(motor, in, state->psi_used, state->r_used);
     const double t = motor->period_s;
     const twin_dq_t u = {last->u.d * schedule->voltage_scale, last->u.q * schedule->voltage_scale};
-    state->e.d = e.d + in->flux.psi_d - last->flux.psi_d - t * (u.d - 0.5 * (before.d + after.d)) +
+    state->e.d = e.d + weight_d * (in->flux.psi_d - last->flux.psi_d - t * (u.d - 0.5 * (before.d + after.d))) +
                  s2 * (e.q - e.d);
     state->e.q = e.q + in->flux.psi_q - last->flux.psi_q - t * (u.q - 0.5 * (before.q + after.q)) -
                  s2 * (e.d + e.q);
@@ -75,7 +78,7 @@ static double psi_full_drift(const motor_si_t *motor)
 /* What the resistance law divides by. */
 static double excitation(const twin_mrai_in_t *at)
 {
-    return at->i.d * at->i.d + at->i.q * at->i.q;
+    return weight_d * at->i.d * weight_d * at->i.d + at->i.q * at->i.q;
 }
 
 static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,

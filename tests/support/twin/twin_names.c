@@ -69,6 +69,7 @@ READ(r_quality, t->quality.r_quality)
 READ(fault_word, t->fault_word)
 READ(voltage_limited, t->current.limited || t->modulation_limited)
 READ(v_dc, t->v_dc)
+READ(voltage_trim, t->trim)
 READ(torque_correction, t->torque_state.correction)
 READ(torque_max, t->reference.torque_max)
 READ(torque_limited, t->slewed)
@@ -123,6 +124,7 @@ static const entry_t entries[] = {
     {"fault_word", get_fault_word, NULL, 0.0, 0.0},
     {"voltage_limited", get_voltage_limited, NULL, 0.0, 0.0},
     {"vdc_V", get_v_dc, NULL, 0.0, 0.0},
+    {"voltage_trim_V", get_voltage_trim, NULL, 0.0, 0.0},
     {"torque_correction", get_torque_correction, NULL, 0.0, 0.0},
     {"torque_max_Nm", get_torque_max, NULL, 0.0, 0.0},
     {"run_state", get_run_state, NULL, 0.0, 0.0},

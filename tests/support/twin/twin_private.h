@@ -50,6 +50,9 @@ struct twin {
     twin_dq_t i_ref, u, acted;
     twin_target_t target;
     twin_reference_t reference;
+    double trim;
+    twin_limit_state_t limit;
+    twin_dq_t psi_ref; /* tables' flux at the last reference */
     twin_abc_t last_i; /* good samples, kept when an implausible one comes */
     double last_theta_m, theta;
     double v_dc, winding_C;

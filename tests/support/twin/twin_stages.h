@@ -117,7 +117,7 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
 /* --- identification -------------------------------------------------------------------------- */
 typedef struct {
     double flux_gain;       /* 2 k_psi/w, 0 while the gate is closed */
-    double resistance_gain; /* 2 k_r/|i|^2, 0 while the gate is closed */
+    double resistance_gain; /* 2 k_r/n, 0 while the gate is closed */
     double voltage_scale;   /* 1/sinc(w T_s/2) */
 } twin_mrai_schedule_t;
 
@@ -158,6 +158,21 @@ typedef struct {
 double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux, double psi_delta);
 double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm);
 
+/* Temperatures NaN: unknown. Limits infinite: open. */
+typedef struct {
+    double wanted, torque_drive, torque_regen, power_drive, power_regen;
+    twin_dq_t u, i;
+    double torque, omega, v_dc, reach, inverter_C, winding_C;
+} twin_limit_in_t;
+
+typedef struct {
+    double loss_W;
+    bool inverter_seen, winding_seen;
+} twin_limit_state_t;
+
+double twin_torque_limit(const motor_si_t *motor, twin_limit_state_t *state, const twin_limit_in_t *in);
+double twin_i_d_limit(const motor_si_t *motor, double psi_delta, double winding_C);
+
 typedef struct {
     double correction, model;
     bool saturated;
@@ -172,14 +187,23 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in);
 
 typedef struct {
-    double torque, v_dc, omega, i_magnitude;
+    double torque, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max;
 } twin_reference_in_t;
 
 typedef struct {
     twin_dq_t i_ref;
-    double torque_max;
+    double torque_max, psi_plan;
     bool limited;
 } twin_reference_t;
+
+typedef struct {
+    twin_dq_t u, psi; /* acting; the tables' flux at the last reference */
+    double v_dc, psi_plan, psi_delta;
+    bool acting;
+} twin_reserve_in_t;
+
+/* trim: the state. Answers |psi + dpsi| - |psi|. */
+double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_reserve_in_t *in);
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in);
 

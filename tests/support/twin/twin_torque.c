@@ -53,15 +53,35 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
                               motor->ref_nt, motor->ref_npsi};
     const twin_grid_t row = {0.0, 1.0, motor->psi0_Vs, motor->psi_step_Vs, 1, motor->ref_npsi};
     const double psi_top = motor->psi0_Vs + motor->psi_step_Vs * (motor->ref_npsi - 1);
-    const double u = motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude;
+    const double u =
+        fmax(motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude + in->v_trim, 0.0);
     const double w = fabs(in->omega);
-    const double psi = (u >= w * psi_top) ? psi_top : fmax(u, 0.0) / w;
+    const double psi_far_top = psi_top + fabs(in->shift);
+    const double raw =
+        (u >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(u / w - in->shift, 0.0);
+    const double psi = fmin(raw, psi_top);
     const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi);
     const double t = fmin(fabs(in->torque), t_max);
     const double iq = twin_lookup(&grid, motor->ref_iq_A, t, psi);
+    const double psi_far = raw + fmin(in->shift, 0.0);
+    const double t_far = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi_far);
+    const double iq_far = twin_lookup(&grid, motor->ref_iq_A, t_far, psi_far);
+    const double k = 1.5 * motor->pole_pairs;
     return (twin_reference_t){
-        .i_ref = {twin_lookup(&grid, motor->ref_id_A, t, psi), (in->torque < 0.0) ? -iq : iq},
-        .torque_max = t_max,
+        .i_ref = {fmax(twin_lookup(&grid, motor->ref_id_A, t, psi), -in->i_d_max),
+                  (in->torque < 0.0) ? -iq : iq},
+        .torque_max = fmax(t_far + k * in->psi_delta * iq_far, 0.0),
+        .psi_plan = psi,
         .limited = fabs(in->torque) > t_max,
     };
+}
+
+double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_reserve_in_t *in)
+{
+    const double psi = hypot(in->psi.d, in->psi.q);
+    const double e = motor->ref_v_ratio * in->v_dc - hypot(in->u.d, in->u.q);
+    const bool on_limit = psi > in->psi_plan * 31.0 / 32.0;
+    *trim += motor->trim_gain * ((in->acting && (e < 0.0 || on_limit)) ? e : -*trim);
+    *trim = twin_clamp(*trim, motor->trim_min_V, motor->trim_max_V);
+    return hypot(in->psi.d + in->psi_delta, in->psi.q) - psi;
 }

@@ -22,6 +22,16 @@ void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
     emu->s.pins.resolver_fault = resolver_fault;
 }
 
+uint32_t emu_counter_read(const emu_t *emu, int timer, bool before)
+{
+    return emu->s.ftm[timer].read[before ? 1 : 0];
+}
+
+uint32_t emu_resolver_angle(const emu_t *emu)
+{
+    return emu->s.rdc.latched;
+}
+
 bool emu_gate_driver(const emu_t *emu)
 {
     return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;

@@ -133,7 +133,8 @@ static bool masks_opened(emu_t *emu)
     return emu->s.reschedule;
 }
 
-/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. */
+/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. Nothing else stops the
+ * core: from within an access it would repeat the instruction. */
 static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
     emu_t *emu = user;
@@ -148,7 +149,7 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
         return;
     }
     emu->s.instructions += block.count;
-    emu->s.now += (uint64_t)block.count * emu->s.core_ticks * EMU_CYCLES_PER_INSTRUCTION;
+    emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
 /* There before every access to a peripheral, so that the program counter is exact when one is refused. */

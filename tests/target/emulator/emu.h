@@ -2,8 +2,8 @@
 #ifndef EMULATOR_EMU_H
 #define EMULATOR_EMU_H
 /** An emulated S32K144 that runs an unmodified ELF file: a Cortex-M4F (unicorn) with register-level models of the
- * peripherals the firmware uses. Time advances by executed instructions (each EMU_CYCLES_PER_INSTRUCTION core cycles:
- * a convention of the emulation, not a measurement) and by the peripherals' events; a sleeping core jumps to the next.
+ * peripherals the firmware uses. Time advances by executed instructions (3/2 core cycles each: a
+ * convention of the emulation, not a measurement) and by the peripherals' events; a sleeping core jumps to the next.
  * Source   docs/howto/emulate.md
  * Units    time in ticks of 1/3.36 GHz: every clock of the chip is a whole number of them
  * Errors   an access to a register that is not modelled or not clocked, a reserved bit, a fault of the core: the
@@ -14,7 +14,8 @@
 #include <stdint.h>
 
 #define EMU_TICKS_PER_S 3360000000ULL
-#define EMU_CYCLES_PER_INSTRUCTION 2U
+/* The clocks are even numbers of ticks. */
+#define EMU_HALF_CYCLES_PER_INSTRUCTION 3U
 #define EMU_PWM_CHANNELS 6
 
 #if defined(__GNUC__)
@@ -71,6 +72,11 @@ EMU_API bool emu_read(const emu_t *emu, uint32_t address, void *to, uint32_t siz
 EMU_API bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size);
 EMU_API uint32_t emu_symbol(const emu_t *emu, const char *name);
 EMU_API uint32_t emu_symbol_size(const emu_t *emu, const char *name);
+
+/** What the program has last read from FTM0's (0) or FTM2's (1) counter, and the time before that. */
+EMU_API uint32_t emu_counter_read(const emu_t *emu, int timer, bool before);
+/** The angle that the resolver converter holds. */
+EMU_API uint32_t emu_resolver_angle(const emu_t *emu);
 
 /** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
 EMU_API uint64_t emu_register(const emu_t *emu, const char *name);

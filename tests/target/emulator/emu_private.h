@@ -53,6 +53,7 @@ typedef struct {
     bool fault_latched, tof;
     bool closed;                /* the bridge, when last looked at */
     uint32_t quad_offset;
+    uint32_t read[2];           /* the counter as the program has read it last, and before that */
 } ftm_t;
 
 typedef struct {

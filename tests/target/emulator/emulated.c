@@ -40,7 +40,7 @@ static void angle_to_pins(emulated_t *e, emu_pins_t *pins, uint32_t angle)
 {
     const int32_t moved = (int32_t)(angle - pins->angle);
     const double rate = (double)moved * 65536.0 / e->period_ticks;
-    pins->angle_rate = e->shadow != NULL || fabs(rate) > 2e9 || e->steps == 0 ? 0 : (int32_t)rate;
+    pins->angle_rate = fabs(rate) > 2e9 || e->steps == 0 ? 0 : (int32_t)rate;
     pins->angle = angle;
 }
 
@@ -66,6 +66,9 @@ static void step(void *self, const double in[6], double out[4])
     emulated_t *e = self;
     emu_bridge_t bridge;
     samples_to_pins(e, in);
+    if (mirror_push(&e->mirror) && e->shadow != NULL) {
+        shadow_inputs(e);
+    }
     const int stopped = emu_run(e->emu, (uint64_t)(1.01 * e->period_ticks));
     emu_bridge(e->emu, &bridge);
     const bool runs = stopped == EMU_CENTRE, driven = !e->gate_driver || emu_gate_driver(e->emu);
@@ -119,11 +122,7 @@ static int set(void *self, const char *name, double value)
     if (strncmp(name, "emulator.", 9) == 0) {
         return pin_set(e, name, value);
     }
-    const int code = mirror_set(&e->mirror, name, value);
-    if (code == SIM_OK && e->shadow != NULL) {
-        shadow_inputs(e);
-    }
-    return code;
+    return mirror_set(&e->mirror, name, value);
 }
 
 double emulated_get(emulated_t *e, const char *name)

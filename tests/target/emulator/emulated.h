@@ -4,7 +4,7 @@
 /** The emulated processor as a controller of the closed-loop runner: sensors to pins, compare values to the bridge,
  * one PWM period per step. Besides the names of the software-in-the-loop library:
  *   emulator.shadow        set 1: the same firmware, compiled for the host, follows with the same counts and angles and
- *                          is compared after every period; the angle then stands still between two samples
+ *                          is compared after every period
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
  *   emulator.inverter_C    of the second thermistor
  *   emulator.gate_driver   set 1: the gates close only while the image supplies their driver (board line)

@@ -15,14 +15,13 @@ typedef struct {
     double inverter_C;
     bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
+    drive_t task_result;       /* of the shadow's task, while the image is still at it */
+    bool task_runs;
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;
 
 double emulated_get(emulated_t *e, const char *name);
-
-/** What the firmware makes of a shaft that stands still, from whichever sensor the image reads. */
-uint32_t pins_theta(const emulated_t *e);
 
 bool shadow_start(emulated_t *e);
 void shadow_inputs(emulated_t *e);

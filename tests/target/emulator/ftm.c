@@ -61,15 +61,23 @@ static uint32_t fault_status(const emu_t *emu, const peripheral_t *self)
     return kept | (emu->s.pins.gate_fault ? 0x20U : 0U) | (latched ? 0x81U : 0U);
 }
 
-uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+static uint32_t counter(const emu_t *emu, const peripheral_t *self, uint32_t stored)
 {
     const ftm_t *f = &emu->s.ftm[self->instance];
+    if (decoding(emu, self)) {
+        return decoded(emu, self);
+    }
+    return f->running ? f->cntin + (uint32_t)((emu->s.now - f->start) / clock_ticks(emu, self)) : stored;
+}
+
+uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    ftm_t *f = &emu->s.ftm[self->instance];
     switch (offset) {
     case CNT:
-        if (decoding(emu, self)) {
-            return decoded(emu, self);
-        }
-        return f->running ? f->cntin + (uint32_t)((emu->s.now - f->start) / clock_ticks(emu, self)) : stored;
+        f->read[1] = f->read[0];
+        f->read[0] = counter(emu, self, stored);
+        return f->read[0];
     case SC: return (stored & ~0x280U) | (f->tof ? 0x200U : 0U);
     case FMS: return fault_status(emu, self);
     default: return stored;
@@ -83,7 +91,6 @@ static void period_begins(emu_t *emu, const peripheral_t *self)
         emu->s.ftm[0].triggers_due = true;
         emu->s.centre = true;
         emu->s.stop = true;
-        (void)uc_emu_stop(emu->uc);
     }
 }
 

@@ -12,7 +12,8 @@
     X(motor.torque_slew) \
     X(motor.modulate)    \
     X(motor.mrai)        \
-    X(motor.torque_loop)
+    X(motor.torque_loop) \
+    X(motor.identify)
 
 /* What the activities write. */
 #define LAYOUT_STATE(X) \
@@ -20,6 +21,7 @@
     X(slow)             \
     X(task)             \
     X(samples)          \
+    X(windows)          \
     X(commands)         \
     X(schedules)
 

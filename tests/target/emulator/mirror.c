@@ -89,13 +89,25 @@ void mirror_pull(mirror_t *mirror)
 
 int mirror_set(mirror_t *mirror, const char *name, double value)
 {
-    copy_from_image(mirror, 0, 1); /* the request; nobody but us changes the calibration */
+    if (!mirror->waiting) {
+        copy_from_image(mirror, 0, 1); /* the request; nobody but us changes the calibration */
+    }
     const int code = fluxtrue_set(mirror->host, name, value);
-    for (int i = 0; code == FLUXTRUE_OK && i < mirror->inputs; i++) {
+    mirror->waiting = mirror->waiting || code == FLUXTRUE_OK;
+    return code;
+}
+
+bool mirror_push(mirror_t *mirror)
+{
+    if (!mirror->waiting || emu_active_vector(mirror->emu) != 0) {
+        return false;
+    }
+    for (int i = 0; i < mirror->inputs; i++) {
         const mirror_part_t *part = &mirror->part[i];
         (void)emu_write(mirror->emu, mirror->base + part->there, here(mirror, mirror->host, i), part->size);
     }
-    return code;
+    mirror->waiting = false;
+    return true;
 }
 
 double mirror_get(mirror_t *mirror, const char *name)

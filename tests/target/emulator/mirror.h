@@ -24,6 +24,7 @@ typedef struct {
     mirror_part_t part[MIRROR_PARTS_MAX];
     int inputs, parts;
     uint64_t pulled_at;
+    bool waiting; /* something was set and is not in the image yet */
 } mirror_t;
 
 const char *mirror_open(mirror_t *mirror, emu_t *emu, const char *layout_file);
@@ -33,7 +34,10 @@ bool mirror_same_motor(mirror_t *mirror);
 /** A copy whose bytes between the fields are 0. */
 drive_t drive_plain(const drive_t *drive);
 void mirror_pull(mirror_t *mirror);
+/** Takes effect with the next mirror_push(), which waits until no activity is under way: it reads some inputs late. */
 int mirror_set(mirror_t *mirror, const char *name, double value);
+/** True when something has been written into the image's memory. */
+bool mirror_push(mirror_t *mirror);
 double mirror_get(mirror_t *mirror, const char *name);
 /** Name of the first part that differs from another drive; NULL: none. */
 const char *mirror_differs(mirror_t *mirror, const fluxtrue_t *other);

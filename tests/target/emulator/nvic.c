@@ -118,7 +118,6 @@ static void reconsider(emu_t *emu)
     const int vector = first_pending(&emu->s.nvic);
     if (vector >= 0 && priority_of(&emu->s.nvic, vector) < active_priority(&emu->s.nvic)) {
         emu->s.reschedule = true;
-        (void)uc_emu_stop(emu->uc);
     }
 }
 
@@ -201,7 +200,8 @@ static void enter(emu_t *emu, int vector)
     n->active[n->nest++] = (uint8_t)vector;
     put(emu, UC_ARM_REG_XPSR, 1U << 24 | (uint32_t)vector);
     put(emu, UC_ARM_REG_IPSR, (uint32_t)vector);
-    if (uc_mem_read(emu->uc, n->vtor + 4U * (uint32_t)vector, &handler, 4) != UC_ERR_OK || (handler & 1U) == 0) {
+    const bool found = uc_mem_read(emu->uc, n->vtor + 4U * (uint32_t)vector, &handler, 4) == UC_ERR_OK;
+    if (!found || (handler & 1U) == 0 || handler >= RAM_BASE + RAM_SIZE) {
         emu_fail(emu, "vector %d (IRQ %d) has no handler", vector, vector - 16);
         return;
     }

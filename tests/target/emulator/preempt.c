@@ -9,7 +9,7 @@
 #include "loop/runner/sim_private.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 1), POINTS_MAX = 4000 };
-enum { PERIODS_TO_FIND = 25 };
+enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 
 typedef struct {
     emulated_t *e;
@@ -62,7 +62,8 @@ static drive_t drive_there(preempt_t *p)
     return p->e->mirror.host->drive;
 }
 
-/* Another sample than the last: both ADC results and shaft have moved. */
+/* Another sample than the last: the currents have moved. The shaft stands where the encoder was read last, because
+ * what the image takes away for the time since the sample would depend on when it is interrupted. */
 static void next_sample(preempt_t *p, int round)
 {
     static const char *const results[4] = {"ADC0.R0", "ADC1.R0", "ADC0.R1", "ADC1.R1"};
@@ -72,7 +73,7 @@ static void next_sample(preempt_t *p, int round)
         (void)emu_register_set(p->e->emu, results[i], old + (uint32_t)(change[i] * (round + 1)));
     }
     emu_pins_t *pins = emu_pins(p->e->emu);
-    pins->angle += 0x00900000U;
+    pins->angle = emu_counter_read(p->e->emu, 1, false) << ENCODER_SHIFT;
     pins->angle_rate = 0;
 }
 
@@ -92,7 +93,7 @@ static void fast_here(preempt_t *p, drive_t *drive)
                                      .i_b = (uint16_t)emu_register(p->e->emu, "ADC1.R0"),
                                      .i_c = (uint16_t)emu_register(p->e->emu, "ADC0.R1"),
                                      .v_dc = (uint16_t)emu_register(p->e->emu, "ADC1.R1")};
-    p->host->theta_m = pins_theta(p->e);
+    p->host->theta_m = emu_pins_look(p->e->emu)->angle;
     host_port_select(p->host);
     fast_isr(&p->host->drive);
     host_port_select(NULL);
@@ -123,7 +124,7 @@ static bool same_outputs(const preempt_t *p, const drive_t *a, const drive_t *b)
     }
     slow_state_t x = a->slow, y = b->slow;
     x.finished = y.finished = 0;
-    return memcmp(&x, &y, sizeof x) == 0;
+    return memcmp(&x, &y, sizeof x) == 0 && memcmp(&a->windows, &b->windows, sizeof a->windows) == 0;
 }
 
 /* Takes a word from the new state. */

@@ -206,7 +206,6 @@ static void control_store(emu_t *emu, uint32_t value)
         emu->s.reset_wanted = true;
         emu->s.reset_cause = 0x400;
         emu->s.stop = true;
-        (void)uc_emu_stop(emu->uc);
     }
 }
 
@@ -271,6 +270,5 @@ void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, vo
     }
     if (nvic_best(emu) >= 0) {
         emu->s.reschedule = true;
-        (void)uc_emu_stop(emu->uc);
     }
 }

@@ -1,23 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The same firmware compiled for the host follows the emulated one: each activity runs when the emulated core enters
- * its handler, with the counts and the angle that the pins carry. */
+/* The same firmware compiled for the host follows the emulated one: each activity runs when the emulated core runs
+ * its handler, with the counts and the angle that this has read. */
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "emulated_private.h"
+#include "fx/q.h"
 #include "hal/host/port.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48 };
 #define PWM_TICK_S (1.0 / 112e6)
-enum { ENCODER_COUNTS = 16384, ENCODER_SHIFT = 18 };
+enum { ENCODER_SHIFT = 18 };
 
-uint32_t pins_theta(const emulated_t *e)
+/* hal/s32k144/angle_quadrature.c and angle_resolver.c, from what they have read. */
+static uint32_t angle_read(const emulated_t *e)
 {
-    const uint32_t angle = emu_pins_look(e->emu)->angle;
-    const bool encoder = (emu_register(e->emu, "FTM2.QDCTRL") & 1U) != 0;
-    const uint64_t count = ((uint64_t)angle * ENCODER_COUNTS) >> 32;
-    return encoder ? (uint32_t)count << ENCODER_SHIFT : angle & 0xFFFF0000U;
+    if ((emu_register(e->emu, "FTM2.QDCTRL") & 1U) == 0) {
+        return emu_resolver_angle(e->emu) & 0xFFFF0000U;
+    }
+    const uint32_t q32_per_tick = UINT32_MAX / (uint32_t)(emu_register(e->emu, "FTM0.MOD") + 1U);
+    const uint32_t now = emu_counter_read(e->emu, 1, false) << ENCODER_SHIFT;
+    const uint32_t last = emu_counter_read(e->emu, 1, true) << ENCODER_SHIFT;
+    const int32_t passed = (int32_t)(emu_counter_read(e->emu, 0, false) * q32_per_tick);
+    return now - (uint32_t)fx_mulhi((int32_t)(now - last), passed);
 }
 
 static void samples_take(emulated_t *e)
@@ -25,23 +32,62 @@ static void samples_take(emulated_t *e)
     const emu_pins_t *pins = emu_pins_look(e->emu);
     e->shadow->counts = (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1],
                                        .v_dc = pins->adc[1][1]};
-    e->shadow->theta_m = pins_theta(e);
+    e->shadow->theta_m = angle_read(e);
 }
 
+/* The task is computed as a whole when it begins; what it writes reaches the shadow as the image writes it: at its end,
+ * or, when it is interrupted, byte by byte as far as the image's memory already has the new values. */
+static void task_begins(emulated_t *e)
+{
+    const drive_t before = e->shadow->drive;
+    task_1khz(&e->shadow->drive);
+    e->task_result = e->shadow->drive;
+    e->shadow->drive = before;
+    e->task_runs = true;
+}
+
+static void task_ends(emulated_t *e)
+{
+    e->shadow->drive.task = e->task_result.task;
+    e->shadow->drive.commands = e->task_result.commands;
+    e->shadow->drive.schedules = e->task_result.schedules;
+    e->task_runs = false;
+}
+
+static void part_take(emulated_t *e, size_t offset, size_t size)
+{
+    const uint8_t *there = (const uint8_t *)&e->mirror.host->drive + offset;
+    const uint8_t *result = (const uint8_t *)&e->task_result + offset;
+    uint8_t *here = (uint8_t *)&e->shadow->drive + offset;
+    for (size_t i = 0; i < size; i++) {
+        here[i] = there[i] == result[i] ? result[i] : here[i];
+    }
+}
+
+static void task_interrupted(emulated_t *e)
+{
+    mirror_pull(&e->mirror);
+    part_take(e, offsetof(drive_t, task), sizeof e->task_result.task);
+    part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
+    part_take(e, offsetof(drive_t, schedules), sizeof e->task_result.schedules);
+}
+
+/* The fast ISR, which nothing interrupts, is followed when it has read its inputs: at its end. */
 static void follow(void *user, int vector, bool entered)
 {
     emulated_t *e = user;
-    if (!entered) {
-        return;
-    }
     host_port_select(e->shadow);
-    if (vector == FAST_VECTOR) {
+    if (vector == FAST_VECTOR && entered && e->task_runs) {
+        task_interrupted(e);
+    } else if (vector == FAST_VECTOR && !entered) {
         samples_take(e);
         fast_isr(&e->shadow->drive);
-    } else if (vector == MRAI_VECTOR) {
+    } else if (vector == MRAI_VECTOR && entered) {
         mrai_isr(&e->shadow->drive);
+    } else if (vector == TASK_VECTOR && entered) {
+        task_begins(e);
     } else if (vector == TASK_VECTOR) {
-        task_1khz(&e->shadow->drive);
+        task_ends(e);
     }
     host_port_select(NULL);
 }

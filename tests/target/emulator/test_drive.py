@@ -41,17 +41,21 @@ def follow(loop: Loop, seconds: float) -> None:
     for k in range(parts_):
         loop.set("torque_command_Nm", torques[k % len(torques)])
         start, stop = (speeds[(k + j) // 4 % len(speeds)] * RPM for j in (0, 1))
-        loop.run(2500, {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": (1 - 0.15 * k / parts_, 1 - 0.15 * (k + 1) / parts_)})
+        weaker = 1 - 0.15 * k / parts_, 1 - 0.15 * (k + 1) / parts_
+        loop.run(2500, {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": weaker})
 
 
 def check_followed(parts: Parts, loop: Loop, periods: int) -> None:
     difference = loop._library.sim_shadow_difference(loop._sim)
     assert difference is None, difference
-    assert loop.get("emulator.compared") >= 0.99 * periods
+    # At 1 % of the period's ends the task is still at work, and nothing can be compared.
+    assert loop.get("emulator.compared") >= 0.98 * periods
     assert loop.get("fault_word") == 0
 
 
-def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(parts: Parts, drive: Loop) -> None:
+@pytest.mark.parametrize("mode", [0, 1], ids=["paper", "robust"])
+def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(parts: Parts, drive: Loop, mode: int) -> None:
+    drive.set("identification_mode", mode)
     follow(drive, 10.0)
     check_followed(parts, drive, 100_000)
 

@@ -9,13 +9,17 @@ from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.sim.library import Loop
 
 
-@pytest.fixture(scope="module")
-def loop(parts: Parts) -> Iterator[Loop]:
-    """Identifying a weak magnet at 3000 rpm, counted instruction by instruction."""
+PAPER, ROBUST = 0, 1
+
+
+@pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
+def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
+    """Identifying a weak magnet at 3000 rpm in either way, counted instruction by instruction."""
     motor = parts.emulated(library.COUNTING)
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5,
                            "magnet_scale": 0.9}  # fmt: skip
     with Loop(motor.library, plant, motor.flux_map) as loop:
+        loop.set("identification_mode", request.param)
         for name, value in (("torque_loop", 1), ("identification", 1), ("enable", 1), ("torque_command_Nm", 80)):
             loop.set(name, value)
         loop.run(2000)
@@ -25,9 +29,8 @@ def loop(parts: Parts) -> Iterator[Loop]:
 
 def check(report: preempt.Report) -> None:
     assert report.mixed == 0, report
-    # Every boundary was tried, and both the old and the new values were seen.
-    assert report.points == report.instructions > 100
-    assert report.outcomes >= 2
+    # Every boundary was tried.
+    assert report.points == report.instructions > 50
 
 
 @pytest.mark.parametrize("periods", [1, 7])
@@ -35,13 +38,19 @@ def test_the_identification_uses_the_old_sample_or_the_new_one_wherever_it_is_in
     loop: Loop, periods: int
 ) -> None:
     loop.run(periods)
-    check(preempt.interrupt_everywhere(loop, preempt.MRAI))
+    report = preempt.interrupt_everywhere(loop, preempt.MRAI)
+    check(report)
+    assert report.outcomes == 2  # both the old and the new sample were seen
 
 
 @pytest.mark.parametrize("rounds", [1, 2])
 def test_the_task_uses_old_or_new_values_wherever_both_interrupts_come(loop: Loop, rounds: int) -> None:
     # Two rounds at one place overwrite the slot that the task may be copying from: it has to look again.
-    check(preempt.interrupt_everywhere(loop, preempt.TASK, rounds))
+    report = preempt.interrupt_everywhere(loop, preempt.TASK, rounds)
+    check(report)
+    if loop.get("identification_mode") == PAPER:
+        assert report.words == 2  # the two corrections, which the task reads beside the sample
+        assert report.outcomes >= 3
 
 
 def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop) -> None:

@@ -55,7 +55,6 @@ void wdog_fire(emu_t *emu)
     emu->s.reset_wanted = true;
     emu->s.reset_cause = RCM_WDOG;
     emu->s.stop = true;
-    (void)uc_emu_stop(emu->uc);
 }
 
 static void refresh(emu_t *emu, const peripheral_t *self)

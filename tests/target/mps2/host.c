@@ -45,6 +45,11 @@ int16_t hal_temperature_winding_dC(void)
     return HAL_TEMPERATURE_UNKNOWN;
 }
 
+int16_t hal_temperature_inverter_dC(void)
+{
+    return HAL_TEMPERATURE_UNKNOWN;
+}
+
 int main(void)
 {
     drive_init(&drive, &motor);

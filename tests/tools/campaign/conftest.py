@@ -16,10 +16,6 @@ SMALL = """
 motor = "hsm1"
 cases = 4
 seed = 7
-[nominal]
-device_drop_V = 1.0
-iron_k_h = 12.2
-iron_k_e = 0.0088
 [plant]
 current_quantise = true
 angle_bits = 12
@@ -36,7 +32,7 @@ set = { torque_loop = false, identification = false }
 warm_up = false
 [[controller]]
 name = "paper"
-set = { torque_loop = true, identification = true }
+set = { torque_loop = true, identification = true, identification_mode = 0 }
 """
 
 

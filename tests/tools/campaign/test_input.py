@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL, campaign
-from fluxtrue_tools.campaign.spec import parse
+from fluxtrue_tools.campaign.spec import parse, read
 from fluxtrue_tools.errors import FluxtrueError
 
 LQ, CHECKED = "[spread]\nlq_scale", "[check]\ncontrollers"
@@ -45,7 +45,8 @@ def test_a_bad_value_is_named_with_what_is_allowed(old: str, new: str, message: 
 CALLED = [
     ("a missing file", SMALL, ["nowhere.toml"], "nowhere.toml: cannot be read (No such file or directory)"),
     ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "motor 'hsm2'"),
-    ("a drop below nothing", SMALL.replace("device_drop_V = 1.0", ""), ["c.toml"], "spread.device_drop_error_V = -0.5"),
+    ("a drop below nothing", SMALL + "[spread]\ndevice_drop_error_V = [-2, 2]\n", ["c.toml"],
+     "spread.device_drop_error_V = -2 about 1 V, allowed: no drop below 0"),
     ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"),
      ["c.toml"], "controller 'paper': torque_lop = 1: no such name"),
     ("a value no firmware takes", SMALL.replace("{ torque_loop = true", "{ observer_m = 99, torque_loop = true"),
@@ -71,10 +72,16 @@ def test_bad_input_ends_in_one_line_exit_2_and_no_results(
     assert not list(tmp_path.glob("out/**/*.parquet"))
 
 
-@pytest.mark.parametrize("name", ["ci", "hsm1-500", "development"])
-def test_the_shipped_campaigns_differ_in_seed_and_size_only(name: str) -> None:
-    folder = Path(__file__).resolve().parents[2] / "loop" / "campaign"
-    read = {n: parse((folder / f"{n}.toml").read_text(), n) for n in ("ci", "hsm1-500", "development")}
-    assert len({campaign.seed for campaign in read.values()}) == 3
-    alike = read[name].model_copy(update={"seed": 0, "cases": 1})
-    assert alike == read["hsm1-500"].model_copy(update={"seed": 0, "cases": 1})
+SHIPPED = Path(__file__).resolve().parents[2] / "loop" / "campaign"
+
+
+def test_no_two_shipped_campaigns_share_a_seed() -> None:
+    seeds = [read(path).seed for path in SHIPPED.glob("*.toml")]
+    assert len(seeds) == 5
+    assert len(set(seeds)) == 5
+
+
+@pytest.mark.parametrize("name", ["ci", "development"])
+def test_the_campaigns_of_the_measured_machine_differ_in_seed_and_size_only(name: str) -> None:
+    alike = [read(SHIPPED / f"{n}.toml").model_copy(update={"seed": 0, "cases": 1}) for n in (name, "hsm1-500")]
+    assert alike[0] == alike[1]

@@ -8,9 +8,9 @@ import pytest
 from fluxtrue_tools.campaign.case import make_plan
 from fluxtrue_tools.campaign.drive import PHASES, STEP_S, make_profile
 from fluxtrue_tools.campaign.envelope import NOTHING_WRONG, make_envelope
-from fluxtrue_tools.campaign.machine import Machine
+from fluxtrue_tools.campaign.machine import Machine, make_machine
 from fluxtrue_tools.campaign.sample import draws, sample
-from fluxtrue_tools.campaign.spec import Campaign, Windows
+from fluxtrue_tools.campaign.spec import Campaign, Nominal, Windows
 from fluxtrue_tools.campaign.windows import plan
 
 CASES = 300
@@ -82,7 +82,14 @@ def test_what_the_plant_gets_is_the_nominal_value_times_its_factor(small: Campai
     assert plant["current_noise_A_rms"] == pytest.approx(0.8)
     assert plant["iron_k_e"] == pytest.approx(machine.nominal.iron_k_e * factors["iron_loss_scale"])
     assert plant["angle_h2_rad"] == pytest.approx(math.radians(factors["angle_h2_deg"]))
-    assert plant["viscous_Nms"] == 0.0 if "viscous_Nms" in plant else True
+    assert plant.get("viscous_Nms", 0.0) == 0.0  # friction is not in the truth
+
+
+def test_the_motors_own_nominal_values_go_before_those_of_the_campaign(small: Campaign, machine: Machine) -> None:
+    # hsm1's motor.toml has all three; the campaign's are for motors that have none.
+    assert (machine.nominal.device_drop_V, machine.nominal.iron_k_h, machine.nominal.iron_k_e) == (1.0, 13.0, 0.0103)
+    other = small.model_copy(update={"nominal": Nominal(device_drop_V=3.0, iron_k_h=1.0)})
+    assert make_machine(machine.motor.folder, other, "c.toml").nominal == machine.nominal
 
 
 def test_the_windows_cover_four_quadrants_within_what_the_plant_can_give(machine: Machine) -> None:

@@ -101,9 +101,9 @@ def test_identification_gains_in_the_c_file_mean_what_motor_toml_says(motor):
     c, b, control = members(motor_tables_c(motor)), motor.bases, motor.config.control
     one = 2.0**31
     assert c["r0"] / one * b.resistance_ohm == pytest.approx(motor.config.machine.r_ohm, rel=1e-7)
-    assert c["pole_gain"] / c["r0"] == pytest.approx(control.observer_m / 2, rel=1e-7)
+    assert c["pole_gain"] / c["r0"] == pytest.approx(control.observer_m * 4, rel=1e-7)
     assert c["flux_gain"] / one * b.omega_rad_s / 2 == pytest.approx(control.flux_bandwidth_rad_s, rel=1e-6)
-    assert c["resistance_gain"] / one / b.period_s / 2 == pytest.approx(control.resistance_bandwidth_rad_s, rel=1e-6)
+    assert c["resistance_gain"] / one * b.omega_rad_s / 2 == pytest.approx(control.resistance_bandwidth_rad_s, rel=1e-6)
     assert c["turn_to_pu"] / 65536 * (b.omega_rad_s * b.period_s / (2 * math.pi)) == pytest.approx(0.5, rel=1e-5)
 
 

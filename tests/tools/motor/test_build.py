@@ -161,7 +161,7 @@ void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *ps
 void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2]);
 void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2])
 {
-    const current_reference_in_t in = {.torque = torque, .v_dc = v_dc, .omega = omega};
+    const current_reference_in_t in = {.torque = torque, .v_dc = v_dc, .omega = omega, .i_d_max = INT16_MAX};
     const current_reference_t r = current_reference_step(&motor.current_reference, &in);
     out[0] = r.i_ref.d;
     out[1] = r.i_ref.q;

@@ -3,6 +3,7 @@
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
 #include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
 #include "seam.h"
 #include "unity.h"
 
@@ -54,6 +55,72 @@ void test_an_over_current_opens_the_gates_in_the_same_period_and_stays_latched(v
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+}
+
+static void told(safe_t safe, uint32_t faults)
+{
+    command_t command = *command_box_read(&drive.commands);
+    command.safe = safe;
+    command.run = command.run && faults == 0U;
+    command.faults = faults;
+    command_box_write(&drive.commands, command);
+}
+
+static void shorted(bool is)
+{
+    TEST_ASSERT_EQUAL(is, seam.gates);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.c);
+}
+
+/* The duties of the short circuit come before the gates that would make them. */
+void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_so(void)
+{
+    seam_run();
+    seam_periods(3);
+    told(SAFE_SHORT_CIRCUIT, 0);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+p", seam.log);
+    shorted(true);
+}
+
+void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
+{
+    seam_run();
+    seam_periods(3);
+    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_OVER_VOLTAGE, command_box_read(&drive.commands)->safe);
+    seam_voltage(450.0);
+    seam_periods(2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+    shorted(true);
+    seam_periods(30); /* the task keeps it while the voltage is there */
+    shorted(true);
+    seam_voltage(350.0);
+    seam_periods(30);
+    shorted(false);
+}
+
+void test_an_over_voltage_never_closes_the_gates_of_a_bridge_that_has_not_run(void)
+{
+    seam_voltage(450.0);
+    seam_periods(30);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+    shorted(false);
+}
+
+void test_what_the_tasks_monitors_find_is_latched_and_stops_the_bridge(void)
+{
+    seam_run();
+    seam_periods(3);
+    told(SAFE_FREEWHEEL, FAULT_TORQUE | FAULT_PHASE_LOST);
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
+    TEST_ASSERT_FALSE(seam.gates);
+    told(SAFE_FREEWHEEL, 0);
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
 }
 
 void test_a_fault_raised_elsewhere_opens_the_gates_with_the_next_period(void)

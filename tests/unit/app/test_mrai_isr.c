@@ -3,6 +3,7 @@
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
 #include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
 #include "seam.h"
 #include "unity.h"
 

@@ -13,7 +13,7 @@ enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
 static const double period = 1e-4;
 static const int cell = 2048; /* counts of q15 between table nodes: 1/16 of the current base */
 
-static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g_d[NX * NY], g_q[NX * NY];
+static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g[NX * NY];
 static int16_t psi_f0[NX * NY], ref_d[NT * NPSI], ref_q[NT * NPSI], ref_max[NPSI];
 static double si_l_d[NX * NY], si_l_q[NX * NY], si_l_dd[NX * NY], si_l_qq[NX * NY];
 static double si_psi_f0[NX * NY], si_ref_d[NT * NPSI], si_ref_q[NT * NPSI], si_ref_max[NPSI];
@@ -73,13 +73,13 @@ static void flux_tables(fixture_t *f)
         si_l_dd[n] = l[2] * f->l;
         si_l_qq[n] = from_q15(l_qq[n]) * scale;
         si_psi_f0[n] = from_q15(psi_f0[n]) * f->psi;
-        g_d[n] = q15_of(period * f->z / si_l_dd[n]);
-        g_q[n] = q15_of(period * f->z / si_l_qq[n]);
+        g[n] = q15_of(0.5 * period * f->z * (1.0 / si_l_dd[n] + 1.0 / si_l_qq[n]));
     }
     f->flux_table = (flux_table_config_t){
         .mesh = FX_MESH(-(NX - 1) * cell, 11U, (uint32_t)NX, (uint32_t)NY),
         .l_shift = L_SHIFT,
-        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g_d = g_d, .g_q = g_q,
+        .i_scale = 8 << L_SHIFT,
+        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g = g,
         .psi_f0 = psi_f0,
     };
     f->si.nd = NX;
@@ -127,6 +127,15 @@ static void reference_tables(fixture_t *f)
     f->si.ref_torque_max_Nm = si_ref_max;
     f->si.ref_v_ratio = from_q15(q15_of(0.55));
     f->si.i_max_A = from_q15(q15_of(0.95)) * f->i;
+    f->voltage_reserve = (voltage_reserve_config_t){
+        .v_ratio = q15_of(0.55),
+        .gain = q15_of(0.05),
+        .trim_min = q15_of(-0.09),
+        .trim_max = q15_of(0.05),
+    };
+    f->si.trim_gain = from_q15(q15_of(0.05));
+    f->si.trim_min_V = from_q15(q15_of(-0.09)) * f->v;
+    f->si.trim_max_V = from_q15(q15_of(0.05)) * f->v;
 }
 
 static void inputs(fixture_t *f)
@@ -189,7 +198,7 @@ static void identification(fixture_t *f)
     const double m = 3.0, k_psi = 60.0, k_r = 20.0;
     f->mrai = (mrai_config_t){
         .r0 = q31_of(r0),
-        .pole_gain = q31_of(0.5 * m * r0),
+        .pole_gain = q31_of(4.0 * m * r0),
         .period = q31_of(f->w * period),
         .flux_gain = q31_of(2.0 * k_psi / f->w),
         .resistance_gain = q31_of(2.0 * k_r / f->w),
@@ -239,6 +248,46 @@ static void torque(fixture_t *f)
     f->si.torque_max_Nm = 0.6 * f->t;
 }
 
+/* From no torque at `end` to all of it at `start`, in counts. */
+static derating_line_t line_of(int end, int start)
+{
+    return (derating_line_t){(q15_t)end, (q16_t)floor(2147483648.0 / (start - end) + 0.5)};
+}
+
+static void limits(fixture_t *f)
+{
+    const double volt = f->v / 32768.0;
+    const double speed = f->w / 32768.0;
+    f->torque_limit = (torque_limit_config_t){
+        .torque_max = q15_of(0.6), .drop = q15_of(0.004), .loss_rate = q15_of(0.05), .moving = line_of(300, 600),
+        .inverter = line_of(1050, 850), .winding = line_of(1800, 1550), .dc_low = line_of(8192, 12288),
+        .dc_high = line_of(27000, 26000), .speed = line_of(30000, 28000),
+    };
+    f->si.loss_drop_V = from_q15(q15_of(0.004)) * f->v;
+    f->si.loss_rate = from_q15(q15_of(0.05));
+    f->si.moving_end_rad_s = 300 * speed;
+    f->si.moving_start_rad_s = 600 * speed;
+    f->si.speed_end_rad_s = 30000 * speed;
+    f->si.speed_start_rad_s = 28000 * speed;
+    f->si.inverter_end_C = 105.0;
+    f->si.inverter_start_C = 85.0;
+    f->si.winding_end_C = 180.0;
+    f->si.winding_start_C = 155.0;
+    f->si.dc_low_end_V = 8192 * volt;
+    f->si.dc_low_start_V = 12288 * volt;
+    f->si.dc_high_end_V = 27000 * volt;
+    f->si.dc_high_start_V = 26000 * volt;
+    /* 0.9 of I_b at 20 C, 0.002 I_b less per K; psi_f (0.53 psi_b) falls by 0.1 % per K. */
+    f->i_d_limit = (i_d_limit_config_t){
+        .i_20 = q15_of(0.9), .slope = q16_of(0.0002 * 32768.0), .i_max = q15_of(0.8),
+        .dC_per_psi = q16_of(-10.0 / (0.53 * 0.001 * 32768.0)), .assumed_dC = 1500,
+    };
+    f->si.i_d_20_A = from_q15(q15_of(0.9)) * f->i;
+    f->si.i_d_slope_A_per_K = 0.002 * f->i;
+    f->si.psi_temp_coeff_per_K = -0.001;
+    f->si.magnet_assumed_C = 150.0;
+}
+
 fixture_t fixture(void)
 {
     fixture_t f = {0};
@@ -249,6 +298,7 @@ fixture_t fixture(void)
     voltage(&f);
     identification(&f);
     torque(&f);
+    limits(&f);
     return f;
 }
 

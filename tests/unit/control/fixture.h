@@ -11,9 +11,12 @@
 #include "control/current_control.h"
 #include "control/current_reference.h"
 #include "control/flux_table.h"
+#include "control/i_d_limit.h"
 #include "control/modulate.h"
 #include "control/mrai.h"
+#include "control/torque_limit.h"
 #include "control/torque_loop.h"
+#include "control/voltage_reserve.h"
 #include "twin/twin_stages.h"
 
 typedef struct {
@@ -26,6 +29,9 @@ typedef struct {
     mrai_config_t mrai;
     torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
+    voltage_reserve_config_t voltage_reserve;
+    torque_limit_config_t torque_limit;
+    i_d_limit_config_t i_d_limit;
 } fixture_t;
 
 /* A fresh copy each time: tests may change it. */

@@ -11,7 +11,7 @@ static current_reference_in_t in;
 void setUp(void)
 {
     f = fixture();
-    in = (current_reference_in_t){.torque = 4096, .v_dc = 21845, .omega = 1000};
+    in = (current_reference_in_t){.torque = 4096, .v_dc = 21845, .omega = 1000, .i_d_max = INT16_MAX};
 }
 
 void tearDown(void)
@@ -101,6 +101,54 @@ void test_flux_below_the_table_is_flagged_and_uses_its_edge(void)
     TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
 }
 
+/* By hand, at w = 0.8: 0.02 of voltage is worth 0.025 of flux, and the magnet's share is taken off one to one. */
+void test_the_trim_adds_voltage_and_the_magnets_share_takes_flux_away(void)
+{
+    in.omega = 26214;
+    const double psi = 0.55 * 21845.0 / 32768.0 / 0.8;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, psi * 32768.0, step().psi_plan);
+    in.v_trim = 655;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (psi + 0.025) * 32768.0, step().psi_plan);
+    in.v_trim = -655;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (psi - 0.025) * 32768.0, step().psi_plan);
+    in.shift = 1000;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (psi - 0.025) * 32768.0 - 1000.0, step().psi_plan);
+    in.shift = -1000;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (psi - 0.025) * 32768.0 + 1000.0, step().psi_plan);
+}
+
+void test_where_voltage_is_no_limit_a_stronger_magnet_takes_no_flux_away(void)
+{
+    in.shift = 3000;
+    TEST_ASSERT_EQUAL_INT(INT16_MAX, step().psi_plan);
+    in.shift = INT16_MAX;
+    in.omega = INT16_MAX;
+    TEST_ASSERT_EQUAL_INT(0, step().psi_plan);
+}
+
+/* The fixture at t_max = 0.3833: i_q = 1.1 t - 0.2 t^2, linear between nodes 1/16 apart (below 2e-4 off). */
+void test_the_reachable_torque_counts_what_the_magnet_differs_by(void)
+{
+    in.omega = 26214;
+    const q15_t nominal = step().torque_max;
+    const double t = nominal / 32768.0;
+    in.psi_delta = -3277; /* -0.1 */
+    TEST_ASSERT_DOUBLE_WITHIN(8.0, nominal - 3276.8 * (1.1 * t - 0.2 * t * t), step().torque_max);
+    in.psi_delta = INT16_MIN;
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(0, step().torque_max);
+}
+
+void test_i_d_goes_no_further_than_the_magnets_bear_and_says_so(void)
+{
+    const current_reference_t free = step();
+    TEST_ASSERT_FALSE(free.i_d_limited);
+    in.i_d_max = (q15_t)(-free.i_ref.d - 10);
+    const current_reference_t cut = step();
+    TEST_ASSERT_EQUAL_INT(free.i_ref.d + 10, cut.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(free.i_ref.q, cut.i_ref.q);
+    TEST_ASSERT_TRUE(cut.i_d_limited);
+}
+
 void test_standstill_divides_by_nothing(void)
 {
     in.omega = 0;
@@ -122,10 +170,14 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
     uint64_t seed = 111;
     for (int n = 0; n < 300000; n++) {
         in = (current_reference_in_t){(q15_t)random_in(&seed, -16000, 16000), (q15_t)random_in(&seed, 8000, 32767),
-                                      (q15_t)random_in(&seed, 3000, 32767), (q15_t)random_in(&seed, 0, 30000)};
+                                      (q15_t)random_in(&seed, 3000, 32767), (q15_t)random_in(&seed, 0, 30000),
+                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, -4000, 2000),
+                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, 1000, 32767)};
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
-        const twin_reference_in_t t = {from_q15(in.torque) * f.t, from_q15(in.v_dc) * f.v, from_q15(in.omega) * f.w,
-                                       from_q15(in.i_magnitude) * f.i};
+        const twin_reference_in_t t = {from_q15(in.torque) * f.t,       from_q15(in.v_dc) * f.v,
+                                       from_q15(in.omega) * f.w,        from_q15(in.i_magnitude) * f.i,
+                                       from_q15(in.v_trim) * f.v,       from_q15(in.shift) * f.psi,
+                                       from_q15(in.psi_delta) * f.psi,  from_q15(in.i_d_max) * f.i};
         const current_reference_t y = step();
         const twin_reference_t s = twin_current_reference(&f.si, &t);
         worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque, in.v_dc, in.omega);

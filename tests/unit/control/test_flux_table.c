@@ -22,21 +22,21 @@ static twin_dq_t amperes(dq_t i)
 }
 
 /* Table values: one rounding (0.5) and the weights' 2^-15 of the twist, below 0.1 here.
- * psi = psi_f0 + l i: half an LSB of l times |i| < 1 and the shift 2^l_shift = 4: 4 (0.6) + 0.6 + 0.5. */
+ * psi = psi_f0 + l i with nothing rounded off l: 0.6 + 0.5, the twist times |i| < 1 and the shift 2^l_shift = 4. */
 static void hold_to_twin(worst_t *value, worst_t *flux, dq_t i)
 {
     const flux_point_t y = flux_table_step(&f.flux_table, i);
+    const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
     const twin_flux_t t = twin_flux_table(&f.si, amperes(i));
     const double l = 32768.0 / f.l / (1 << f.flux_table.l_shift);
     const double g = 32768.0 * f.z;
     const double psi = 32768.0 / f.psi;
-    worst_note(value, y.l_d - t.l_d * l, "l_d of %d %d", i.d, i.q);
-    worst_note(value, y.l_q - t.l_q * l, "l_q of %d %d", i.d, i.q);
-    worst_note(value, y.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
+    worst_note(value, x.l_d - t.l_d * l, "l_d of %d %d", i.d, i.q);
+    worst_note(value, x.l_q - t.l_q * l, "l_q of %d %d", i.d, i.q);
+    worst_note(value, x.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
     worst_note(value, y.psi_f0 - t.psi_f0 * psi, "psi_f0 of %d %d", i.d, i.q);
     /* The node of g is itself rounded. */
-    worst_note(value, fmax(fabs(y.g_d - t.g_d * g) - 0.5, 0.0), "g_d of %d %d", i.d, i.q);
-    worst_note(value, fmax(fabs(y.g_q - t.g_q * g) - 0.5, 0.0), "g_q of %d %d", i.d, i.q);
+    worst_note(value, fmax(fabs(y.g - 0.5 * (t.g_d + t.g_q) * g) - 0.5, 0.0), "g of %d %d", i.d, i.q);
     worst_note(flux, y.psi_d - twin_clamp(t.psi_d * psi, -32768, 32767), "psi_d of %d %d", i.d, i.q);
     worst_note(flux, y.psi_q - twin_clamp(t.psi_q * psi, -32768, 32767), "psi_q of %d %d", i.d, i.q);
     TEST_ASSERT_EQUAL(t.clamped, y.clamped);
@@ -71,11 +71,11 @@ void test_a_node_gives_exactly_what_is_tabulated(void)
             const int n = ix * ny + iy;
             const dq_t i = {(q15_t)(f.flux_table.mesh.x0 + ix * 2048), (q15_t)(iy * 2048)};
             const flux_point_t y = flux_table_step(&f.flux_table, i);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], y.l_d);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.l_q[n], y.l_q);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.l_qq[n], y.l_qq);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.g_d[n], y.g_d);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.g_q[n], y.g_q);
+            const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], x.l_d);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_q[n], x.l_q);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.l_qq[n], x.l_qq);
+            TEST_ASSERT_EQUAL_INT(f.flux_table.g[n], y.g);
             TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[n], y.psi_f0);
             TEST_ASSERT_FALSE(y.clamped);
         }
@@ -91,7 +91,7 @@ void test_the_half_planes_mirror_each_other(void)
         const flux_point_t a = flux_table_step(&f.flux_table, i);
         const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){i.d, (q15_t)-i.q});
         TEST_ASSERT_EQUAL_INT(a.psi_d, b.psi_d);
-        TEST_ASSERT_EQUAL_INT(a.l_qq, b.l_qq);
+        TEST_ASSERT_EQUAL_INT(a.g, b.g);
         TEST_ASSERT_INT_WITHIN(1, -a.psi_q, b.psi_q);
     }
 }
@@ -108,8 +108,11 @@ void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(
         const flux_point_t b = flux_table_step(&f.flux_table, outside[n]);
         TEST_ASSERT_FALSE(a.clamped);
         TEST_ASSERT_TRUE(b.clamped);
-        TEST_ASSERT_EQUAL_INT(a.l_d, b.l_d);
-        TEST_ASSERT_EQUAL_INT(a.l_qq, b.l_qq);
+        TEST_ASSERT_EQUAL_INT(a.g, b.g);
+        const flux_inductances_t at = flux_table_inductances(&f.flux_table, inside[n]);
+        const flux_inductances_t beyond = flux_table_inductances(&f.flux_table, outside[n]);
+        TEST_ASSERT_EQUAL_INT(at.l_d, beyond.l_d);
+        TEST_ASSERT_EQUAL_INT(at.l_qq, beyond.l_qq);
     }
 }
 
@@ -119,7 +122,7 @@ void test_there_is_no_step_at_a_cell_boundary(void)
     for (int q = -20000; q < 20000; q++) {
         const flux_point_t a = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)q});
         const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)(q + 1)});
-        TEST_ASSERT_INT_WITHIN(2, a.l_q, b.l_q);
+        TEST_ASSERT_INT_WITHIN(2, a.g, b.g);
         TEST_ASSERT_INT_WITHIN(8, a.psi_q, b.psi_q); /* l_q below 4, doubled by the slope of l_q, roundings */
     }
 }
@@ -132,15 +135,15 @@ void test_a_table_that_is_complete_and_positive_is_accepted(void)
 void test_a_table_that_would_break_a_later_stage_is_rejected(void)
 {
     static int16_t bad[256];
-    const int16_t **const pointers[6] = {&f.flux_table.l_d, &f.flux_table.l_q, &f.flux_table.l_qq, &f.flux_table.g_d,
-                                         &f.flux_table.g_q, &f.flux_table.psi_f0};
-    for (int n = 0; n < 6; n++) {
+    const int16_t **const pointers[5] = {&f.flux_table.l_d, &f.flux_table.l_q, &f.flux_table.l_qq, &f.flux_table.g,
+                                         &f.flux_table.psi_f0};
+    for (int n = 0; n < 5; n++) {
         const int16_t *good = *pointers[n];
         *pointers[n] = 0;
         TEST_ASSERT_FALSE(flux_table_valid(&f.flux_table));
         *pointers[n] = good;
     }
-    for (int n = 1; n < 5; n++) { /* all inductances but l_d, which may change its sign near i_d = 0 */
+    for (int n = 1; n < 4; n++) { /* all inductances but l_d, which may change its sign near i_d = 0 */
         const int16_t *good = *pointers[n];
         for (int k = 0; k < 225; k++) {
             bad[k] = good[k];
@@ -177,6 +180,10 @@ void test_a_grid_without_a_cell_or_with_an_impossible_shift_is_rejected(void)
     TEST_ASSERT_FALSE(flux_table_valid(&c));
     c = f.flux_table;
     c.l_shift = 15;
+    c.i_scale = 8 << 15;
+    TEST_ASSERT_FALSE(flux_table_valid(&c));
+    c = f.flux_table;
+    c.i_scale++;
     TEST_ASSERT_FALSE(flux_table_valid(&c));
 }
 

@@ -227,6 +227,33 @@ void test_random_commands_and_estimates_follow_the_twin(void)
     ASSERT_WORST(request, 30.0); /* 1.5e-3 of 18000 */
 }
 
+/* Learnt -10 % elsewhere; at the limit 0.97 of the request arrives. The way back is open up to the command. */
+void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond(void)
+{
+    in.command = 10000;
+    in.limited = true;
+    state.correction = Q31(-0.1);
+    state.model = 10000 * 65536;
+    (void)run(0.97, 3000);
+    TEST_ASSERT_EQUAL_INT32(0, state.correction);
+    in.limited = false;
+    (void)run(0.97, 3000);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 1.0 / 0.97 - 1.0, from_q31(state.correction));
+}
+
+/* Authority 0.4: half of the confidence leaves 0.2, none leaves the command. */
+void test_without_confidence_the_request_is_the_command(void)
+{
+    in.command = 10000;
+    in.confidence = 16384;
+    TEST_ASSERT_INT_WITHIN(3, 12000, run(0.5, 3000));
+    in.confidence = 0;
+    TEST_ASSERT_EQUAL_INT(10000, step());
+    TEST_ASSERT_EQUAL_INT32(0, state.correction);
+    in.command = -10000;
+    TEST_ASSERT_EQUAL_INT(-10000, step());
+}
+
 void test_no_corner_wraps_or_leaves_the_authority(void)
 {
     static const int16_t corner[5] = {INT16_MIN, -1, 0, 1, INT16_MAX};

@@ -14,9 +14,9 @@
 #define CALLED __attribute__((used, externally_visible, noinline))
 #define STAGE __attribute__((used, externally_visible, noinline, flatten))
 
-enum { OUTPUTS = 20 };
+enum { OUTPUTS = 24 };
 
-void drive_start(void);
+void drive_start(uint32_t mode);
 void drive_request(int32_t torque, uint32_t enable);
 void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m);
 void drive_copy(void);
@@ -84,9 +84,10 @@ int16_t hal_temperature_inverter_dC(void)
     return 200;
 }
 
-CALLED void drive_start(void)
+CALLED void drive_start(uint32_t mode)
 {
     drive_init(&drive, &motor);
+    drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
 }
 
 CALLED void drive_request(int32_t torque, uint32_t enable)
@@ -128,6 +129,8 @@ CALLED const int32_t *drive_outputs(void)
         fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
         drive.slow.torque.sum, drive.slow.torque.mean,
+        drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0][0],
+        drive.task.identify.local.q,
     };
     for (int k = 0; k < OUTPUTS; k++) {
         outputs[k] = all[k];
@@ -155,43 +158,55 @@ CALLED void bench_task(void)
     task_1khz(&drive);
 }
 
+/* The drive by its address, as the interrupts have it: else the compiler reaches everything from one symbol. */
+static inline drive_t *the_copy(void)
+{
+    drive_t *address = &copy;
+    __asm__("" : "+r"(address));
+    return address;
+}
+
 /* From the measured currents to every table output, in memory. */
 STAGE void bench_flux_table(void)
 {
-    flux = flux_table_step(&copy.motor.flux_table, found.i);
+    const drive_t *d = the_copy();
+    flux = flux_table_step(&d->motor.flux_table, found.i);
 }
 
 STAGE void bench_mrai(void)
 {
-    mrai_step(&copy.motor.mrai, found.schedule, &copy.slow.mrai, found.sample);
+    drive_t *d = the_copy();
+    mrai_step(&d->motor.mrai, found.schedule, &d->slow.mrai, found.sample);
 }
 
 STAGE void bench_torque_estimate(void)
 {
+    drive_t *d = the_copy();
     const mrai_in_t *in = found.sample;
-    (void)torque_estimate_step(&copy.slow.torque, in->i, &in->flux, copy.slow.mrai.psi_delta);
+    (void)torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta);
 }
 
 /* From converter counts and angle to duties; what the tables answer was found before. */
 STAGE void bench_current_tick(void)
 {
-    const motor_t *m = &copy.motor;
+    drive_t *d = the_copy();
+    const motor_t *m = &d->motor;
     const measure_t measured = measure_step(&m->measure, &port.counts);
-    const angle_t angle = angle_tracker_step(&m->angle_tracker, &copy.fast.angle_tracker, port.theta_m);
+    const angle_t angle = angle_tracker_step(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
     const current_control_in_t control = {
         .target = found.target,
         .flux = &flux,
         .omega = angle.omega_q31,
-        .psi_delta = copy.slow.psi_delta_q15,
+        .psi_delta = d->slow.psi_delta_q15,
         .v_dc = measured.v_dc,
     };
     const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
     const current_control_out_t wanted =
-        current_control_step(&m->current_control, &copy.fast.current_control, &control);
+        current_control_step(&m->current_control, &d->fast.current_control, &control);
     const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
     const modulate_in_t modulation = {wanted.u, i, ahead, measured.v_dc, wanted.clear};
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     port.duty = made.duty;
-    copy.fast.coming = made.acted;
+    d->fast.coming = made.acted;
     port.limited = wanted.limited || made.limited;
 }

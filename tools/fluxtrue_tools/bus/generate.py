@@ -122,6 +122,23 @@ def exports(sent: list[Message], received: list[Message]) -> Iterator[str]:
         yield f"    return {struct}_in_range(&m);\n}}\n"
 
 
+# What cantools writes, and what is enough for signals of 32 bits: on a processor without double precision the first
+# alone brings two kilobytes of library with it.
+WIDE = "static uint64_t cantools_unsigned_from_double(double value)"
+NARROW = "static uint32_t cantools_unsigned_from_double(float value)"
+CASTS = ("    return (uint64_t)value;", "    return (uint32_t)value;")
+
+
+def narrow(source: Path, database: Database) -> None:
+    """Let the conversion of floats be single precision and 32 bits, which hold every signal exactly as before."""
+    longest = max(signal.length for message in database.messages for signal in message.signals)
+    text = source.read_text(encoding="utf-8")
+    if longest > 32:
+        raise FluxtrueError(f"the DBC has a signal of {longest} bits, at most 32 are allowed")
+    if WIDE in text:
+        source.write_text(text.replace(WIDE, NARROW).replace(*CASTS), encoding="utf-8")
+
+
 def generate(dbc: Path, out: Path, node: str) -> None:
     """Writes bus.[ch], signals.h and exports.c to out/bus."""
     database = cantools.database.load_file(dbc)
@@ -132,6 +149,7 @@ def generate(dbc: Path, out: Path, node: str) -> None:
     subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--use-float", "--use-round",
                     "--node", node, "--database-name", PREFIX, "--output-directory", str(folder), str(dbc)],
                    check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+    narrow(folder / "bus.c", database)
     sent = [message for message in database.messages if node in message.senders]
     received = [message for message in database.messages if node in message.receivers]
     (folder / "signals.h").write_text(signals_header(sent, received), encoding="utf-8")

@@ -98,10 +98,13 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
         if np.isfinite([b for _, b in found]).any():
             axes.plot(middle, [b for _, b in found], color=colour, ls=":", label=f"information bound, {name}'s data")
     axes.set_yscale("log")
+    axes.set_ylim(0.1, 50.0)
+    errors = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
+    axes.set_yticks(errors, [f"{e:g}" for e in errors])
     _plain_ticks(axes, edges)
     axes.set_xlabel("speed, rpm")
     axes.set_ylabel("rms torque error, %")
-    axes.legend()
+    axes.legend(loc="upper center", ncols=3)
     return figure
 
 

@@ -16,6 +16,7 @@ from fluxtrue_tools.target.build import image
 ROOT: Final = sim_build.ROOT
 # Scenarios write the request themselves: the image in which no bus does.
 PRESETS: Final = {"encoder": "s32k144-direct", "resolver": "s32k144-resolver-direct"}
+FLASHED: Final = {"encoder": "s32k144", "resolver": "s32k144-resolver"}
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,16 @@ class Parts:
     motor: Motor
     image: Path
     layout: Path
+
+    @property
+    def program(self) -> Path:
+        """The stand of the virtual ECU around the emulated processor."""
+        return self.motor.folder.folder / "fluxtrue_emulated_ecu"
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What that program is told its files by."""
+        return {"FLUXTRUE_IMAGE": str(self.image), "FLUXTRUE_LAYOUT": str(self.layout)}
 
     def emulated(self, mode: int = library.FAST) -> Motor:
         """The motor with the image as its controller."""
@@ -37,21 +48,24 @@ def prepare(
     angle: str = "encoder",
     build_dir: Path | None = None,
     base: Path | None = None,
+    flashed: bool = False,
 ) -> Parts:
-    """Build what is missing. Without `elf` the image is built for the default motor (FLUXTRUE_MOTOR's default)."""
+    """Build what is missing; `flashed`: the image that the bus commands. Without `elf` the image is built for the default motor (FLUXTRUE_MOTOR's default)."""
     built = motors.load(motor, build_dir, base)
     host = built.folder.folder.parents[1]
     shared = built.folder.folder / "libfluxtrue_emu.so"
     if not shared.is_file() or "FLUXTRUE_BUILD_DIR" not in os.environ:
         log = host / "emulation.log"
         with sim_build.build_lock():
-            target = f"fluxtrue_emu_{built.folder.folder.name}"
+            name = built.folder.folder.name
+            targets = [f"fluxtrue_emu_{name}", f"fluxtrue_emulated_ecu_{name}"]
             sim_build.run_logged(
-                ["cmake", "--build", str(host), "-j2", "--target", target], log, "building the emulation"
+                ["cmake", "--build", str(host), "-j2", "--target", *targets], log, "building the emulation"
             )
     if elf is None:
         with sim_build.build_lock():
-            elf = image(PRESETS[angle], ROOT / "build" / "emulated" / PRESETS[angle])
+            preset = (FLASHED if flashed else PRESETS)[angle]
+            elf = image(preset, ROOT / "build" / "emulated" / preset)
     elif not elf.is_file():
         raise FluxtrueError(f"--elf {elf}: no such file")
     return Parts(built, elf.resolve(), host / "emulator" / "layout.bin")

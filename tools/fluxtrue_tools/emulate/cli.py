@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """fluxtrue emulate: run a scenario on the emulated microcontroller."""
 
+import os
 from pathlib import Path
 
 import click
@@ -15,6 +16,10 @@ DEFAULT = Path(__file__).resolve().parents[3] / "docs" / "howto" / "scenarios" /
 @click.option("--scenario", type=_FILE, default=DEFAULT, help="What to run (TOML); left out: warm-up.toml.")
 @click.option("--elf", type=_FILE, help="The image; left out: it is built for the S32K144.")
 @click.option("--angle", type=click.Choice(["encoder", "resolver"]), default="encoder", help="Which image to build.")
+@click.option("--serve", is_flag=True, help="Instead: the flashed image on the bus, with a bench channel.")
+@click.option("--port", type=click.IntRange(0, 65535), default=29536, show_default=True, help="--serve: socketcand.")
+@click.option("--bench-port", type=click.IntRange(0, 65535), default=29537, show_default=True, help="--serve: bench.")
+@click.option("--realtime/--fast", default=True, show_default=True, help="--serve: as of tools/fluxtrue vecu.")
 @click.option("--out", type=_FILE, help="Every recorded quantity over time, CSV.")
 @click.option("--json", "json_path", type=_FILE, help="Means over the window and errors, JSON.")
 @click.option("--plot", type=_FILE, help="Torque, currents, flux, resistance: PNG, SVG or PDF.")
@@ -27,6 +32,10 @@ def emulate(
     scenario: Path,
     elf: Path | None,
     angle: str,
+    serve: bool,
+    port: int,
+    bench_port: int,
+    realtime: bool,
     out: Path | None,
     json_path: Path | None,
     plot: Path | None,
@@ -37,6 +46,10 @@ def emulate(
     from fluxtrue_tools.sim import scenario as scenarios
     from fluxtrue_tools.sim.cli import check_outputs, run_and_report
 
+    if serve:
+        parts = build.prepare("hsm1", elf, angle, build_dir, flashed=True)
+        options = ["--realtime" if realtime else "--fast", "--port", str(port), "--bench-port", str(bench_port)]
+        os.execve(parts.program, [str(parts.program), *options], os.environ | parts.environment)
     check_outputs(out, json_path, plot)
     read = scenarios.read(scenario)
     if read.controller.kind != "firmware":

@@ -18,6 +18,7 @@ TRIP_PER_I_MAX = 1.2
 TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
+THERMAL_SPAN_MIN_K = 5.0
 ANGLE_PER_PERIOD_MAX = 0.6  # rad: beyond it the observer and the sampled controller lose their margins
 
 
@@ -86,6 +87,24 @@ class Identification(_Section):
     correlation_time_s: Annotated[float, Field(ge=0.01, le=2)] = 0.5  # of those two
 
 
+class Thermal(_Section):
+    """[thermal], all optional: from derate_C on torque falls in a straight line, at trip_C it is zero"""
+
+    inverter_derate_C: Annotated[float, Field(ge=20, le=300)] = 85.0
+    inverter_trip_C: Annotated[float, Field(ge=20, le=300)] = 105.0
+    winding_derate_C: Annotated[float, Field(ge=20, le=300)] = 155.0
+    winding_trip_C: Annotated[float, Field(ge=20, le=300)] = 180.0
+
+
+class Magnet(_Section):
+    """[magnet], all optional: what weakening the magnets bear"""
+
+    i_d_demag_A: Annotated[float, Field(gt=0, le=10000)] | None = None
+    i_d_demag_A_per_K: Annotated[float, Field(ge=0, le=100)] = 0.0
+    psi_temp_coeff_per_K: Annotated[float, Field(ge=-0.01, le=-0.0001)] = -0.001
+    assumed_C: Annotated[float, Field(ge=20, le=300)] = 150.0
+
+
 class MotorConfig(_Section):
     """The whole file."""
 
@@ -93,6 +112,8 @@ class MotorConfig(_Section):
     inverter: Inverter
     control: Control = Control()
     identification: Identification = Identification()
+    thermal: Thermal = Thermal()
+    magnet: Magnet = Magnet()
 
     @property
     def min_pulse_s(self) -> float:
@@ -156,7 +177,8 @@ def _allowed(section: type[BaseModel], key: str) -> str:
 
 
 def _section_of(name: str) -> type[BaseModel] | None:
-    sections = {"machine": Machine, "inverter": Inverter, "control": Control, "identification": Identification}
+    sections = {"machine": Machine, "inverter": Inverter, "control": Control, "identification": Identification,
+                "thermal": Thermal, "magnet": Magnet}
     return sections.get(name)
 
 
@@ -229,6 +251,14 @@ def _check_inverter(path: Path, config: MotorConfig) -> None:
                     f"{0.05 * inverter.vdc_V:g} (5 % of vdc_V)")
 
 
+def _check_thermal(path: Path, config: MotorConfig) -> None:
+    for what in ("inverter", "winding"):
+        derate, trip = (getattr(config.thermal, f"{what}_{key}_C") for key in ("derate", "trip"))
+        if trip < derate + THERMAL_SPAN_MIN_K:
+            _fail(path, f"thermal.{what}_trip_C = {trip:g}, allowed: from {derate + THERMAL_SPAN_MIN_K:g} "
+                        f"({what}_derate_C + {THERMAL_SPAN_MIN_K:g}: torque falls along a line, not at once)")
+
+
 def _check_bandwidth(path: Path, config: MotorConfig) -> None:
     bandwidth, limit = config.control.resistance_bandwidth_rad_s, config.inverter.pwm_hz / 64
     if bandwidth > limit:
@@ -272,4 +302,5 @@ def load_config(folder: Path) -> MotorConfig:
     _check_inverter(path, config)
     _check_drop(path, config)
     _check_bandwidth(path, config)
+    _check_thermal(path, config)
     return config

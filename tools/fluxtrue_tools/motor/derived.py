@@ -13,9 +13,11 @@ TASK_PERIODS = 10  # the slow task runs every tenth PWM period: 1 kHz at 10 kHz
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
-V_RATIO_CONTROL = 0.98 / math.sqrt(3.0)
+V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
 V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
+TRIM_RATE_RAD_S = 50.0
+TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 
 TRACKER_BANDWIDTH_RAD_S = 300.0
 TRACKER_JUMP_TURNS = 1 / 16
@@ -38,6 +40,21 @@ TORQUE_MIN_SHARE = 0.1
 
 V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
 SUM_MAX_PER_FULL_SCALE = 0.05
+DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_max
+SPEED_TRIP = 0.8  # of the reserve of the speed base
+TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
+INVERTER_ERROR_PER_VDC = 0.02
+MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
+SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
+V_RELEASE_PER_VDC = 1.15
+
+SLEW_WEAK_PER_TORQUE_MAX = 100.0  # 1/s: a full reversal at top speed keeps its currents below the trip
+PSI_WEAK_PER_PSI_F = 1.0 / 0.6  # the magnet alone takes 60 % of the planned voltage
+LOSS_TIME_S = 0.02
+MOVING_SHARES = (0.01, 0.02)  # of maximum speed: from here to there the direction of power becomes certain
+DC_LOW_PER_VDC, DC_HIGH_PER_VDC = (0.4, 0.6), (1.24, 1.21)  # no torque, all torque
+SPEED_RESERVE_MAX = 0.125
+SPEED_START, SPEED_END = 0.1, 0.6  # of the reserve of the speed base: all torque, no driving torque
 
 
 @dataclass(frozen=True)
@@ -75,10 +92,43 @@ class Derived:
     torque_min_Nm: float
     torque_slew_Nm: float
     ref_v_ratio: float
+    trim_gain: float
+    trim_min_V: float
+    trim_max_V: float
+    torque_slew_weak_Nm: float
+    psi_weak_Vs: float
+    loss_rate: float
+    loss_drop_V: float
+    moving_end_rad_s: float
+    moving_start_rad_s: float
+    inverter_end_C: float
+    inverter_start_C: float
+    winding_end_C: float
+    winding_start_C: float
+    dc_low_end_V: float
+    dc_low_start_V: float
+    dc_high_end_V: float
+    dc_high_start_V: float
+    speed_end_rad_s: float
+    speed_start_rad_s: float
+    i_d_20_A: float
+    i_d_slope_A_per_K: float
+    psi_temp_coeff_per_K: float
+    magnet_assumed_C: float
     i_trip_A: float
     v_max_V: float
     v_min_V: float
     sum_max_A: float
+    deviation_A: float
+    phase_dead_A: float
+    phase_alive_A: float
+    speed_trip_rad_s: float
+    monitor_torque_Nm: float
+    monitor_V: float
+    monitor_A: float
+    share_short: float
+    share_open: float
+    v_release_V: float
     identify: identification.Identify
 
 
@@ -135,10 +185,51 @@ def _torque_loop(config: MotorConfig) -> dict[str, float]:
             "torque_slew_Nm": config.torque_slew_Nm_per_s * task_s}
 
 
+def _voltage_reserve(config: MotorConfig) -> dict[str, float]:
+    planned = V_RATIO_REFERENCE * config.inverter.vdc_V
+    return {"ref_v_ratio": V_RATIO_REFERENCE, "trim_gain": TRIM_RATE_RAD_S * TASK_PERIODS / config.inverter.pwm_hz,
+            "trim_min_V": TRIM_MIN_SHARE * planned, "trim_max_V": TRIM_MAX_SHARE * planned}
+
+
+def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
+    vdc, omega, thermal, magnet = config.inverter.vdc_V, config.omega_max_rad_s, config.thermal, config.magnet
+    reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
+    task_s = TASK_PERIODS * bases.period_s
+    return {
+        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * task_s,
+        "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
+        "loss_rate": 1.0 - math.exp(-task_s / LOSS_TIME_S),
+        "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
+        "moving_end_rad_s": MOVING_SHARES[0] * omega, "moving_start_rad_s": MOVING_SHARES[1] * omega,
+        "inverter_end_C": thermal.inverter_trip_C, "inverter_start_C": thermal.inverter_derate_C,
+        "winding_end_C": thermal.winding_trip_C, "winding_start_C": thermal.winding_derate_C,
+        "dc_low_end_V": DC_LOW_PER_VDC[0] * vdc, "dc_low_start_V": DC_LOW_PER_VDC[1] * vdc,
+        "dc_high_end_V": DC_HIGH_PER_VDC[0] * vdc, "dc_high_start_V": DC_HIGH_PER_VDC[1] * vdc,
+        "speed_end_rad_s": (1.0 + SPEED_END * reserve) * omega,
+        "speed_start_rad_s": (1.0 + SPEED_START * reserve) * omega,
+        "i_d_20_A": magnet.i_d_demag_A or config.machine.i_max_A,
+        "i_d_slope_A_per_K": magnet.i_d_demag_A_per_K if magnet.i_d_demag_A else 0.0,
+        "psi_temp_coeff_per_K": magnet.psi_temp_coeff_per_K, "magnet_assumed_C": magnet.assumed_C,
+    }
+
+
+def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
+    machine, omega = config.machine, config.omega_max_rad_s
+    reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
+    return {"deviation_A": DEVIATION_SHARE * machine.i_max_A, "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
+            "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
+            "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
+            "monitor_torque_Nm": max(min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm),
+                                     TORQUE_MONITOR_SHARE * machine.torque_max_Nm),
+            "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
+            "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A}
+
+
 def _monitors(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
             "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
+            "share_short": SHARE_SHORT, "share_open": SHARE_OPEN, "v_release_V": V_RELEASE_PER_VDC * inverter.vdc_V,
             "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A}
 
 
@@ -149,12 +240,14 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         psi_f_Vs=psi_f,
         tracker_bandwidth_rad_s=TRACKER_BANDWIDTH_RAD_S,
         tracker_jump_turns=TRACKER_JUMP_TURNS,
-        ref_v_ratio=V_RATIO_REFERENCE,
         **_current_control(bases.period_s),
         **_modulation(config),
         **_identification(config, model, bases.period_s, psi_f),
         **_torque_loop(config),
+        **_voltage_reserve(config),
+        **_torque_limit(config, bases, psi_f),
         **_monitors(config),
+        **_slow_monitors(config, bases),
         identify=identification.derive(config, bases.period_s, psi_f),
     )
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.derived import TASK_PERIODS
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
 
@@ -99,10 +100,11 @@ def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
 
 def _flux_table(motor: Motor) -> list[Row]:
     tables = motor.tables
-    names = ("l_d", "l_q", "l_qq", "g_d", "g_q", "psi_f0")
+    names = ("l_d", "l_q", "l_qq", "g", "psi_f0")
     nx, ny = tables.l_d_H.shape
     return [("mesh", f"FX_MESH({tables.x0}, {tables.shift}u, {nx}u, {ny}u)", ""),
-            ("l_shift", f"{tables.l_shift}u", ""), *((name, f"table_{name}", "") for name in names)]
+            ("l_shift", f"{tables.l_shift}u", ""), ("i_scale", 8 << tables.l_shift, ""),
+            *((name, f"table_{name}", "") for name in names)]
 
 
 def _current_control(motor: Motor) -> list[Row]:
@@ -132,7 +134,7 @@ def _mrai_gains(motor: Motor) -> list[Row]:
     r0 = motor.config.machine.r_ohm / b.resistance_ohm
     return [
         ("r0", q31(r0, "r0"), "R at 20 C"),
-        ("pole_gain", q31(control.observer_m * r0 / 2, "pole_gain"), f"m R_0/2, m = {control.observer_m:g}"),
+        ("pole_gain", q31(4 * control.observer_m * r0, "pole_gain"), f"4 m R_0, m = {control.observer_m:g}"),
         ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
         ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
          f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
@@ -183,12 +185,83 @@ def _current_reference(motor: Motor) -> list[Row]:
              f"{motor.config.machine.i_max_A:g} A")]
 
 
+def _voltage_reserve(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("v_ratio", q15(d.ref_v_ratio, "ref v_ratio"), f"{d.ref_v_ratio:.6g}"),
+            ("gain", q15(d.trim_gain, "trim gain"), f"{d.trim_gain:g} per task"),
+            ("trim_min", q15(d.trim_min_V / b.voltage_V, "trim_min"), f"{d.trim_min_V:.6g} V"),
+            ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V")]
+
+
+def _line(end: float, start: float, per_count: float, name: str) -> list[Row]:
+    """derating_line_t: 2^31 over the counts from no torque to all of it."""
+    zero, one = round(end / per_count), round(start / per_count)
+    return [("end", q15(zero / Q15_ONE, name), f"{end:.6g}, all from {start:.6g} on"),
+            ("gain", q16(Q15_ONE / (one - zero), name), "")]
+
+
+def _torque_limit(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    volt, speed, tenth = b.voltage_V / Q15_ONE, b.omega_rad_s / Q15_ONE, 0.1
+    return [("torque_max", q15(motor.config.machine.torque_max_Nm / b.torque_Nm, "torque_max"), ""),
+            ("drop", q15(d.loss_drop_V / b.voltage_V, "drop"), f"{d.loss_drop_V:g} V"),
+            ("loss_rate", q15(d.loss_rate, "loss_rate"), f"{d.loss_rate:.6g}"),
+            ("moving", _line(d.moving_end_rad_s, d.moving_start_rad_s, speed, "moving"), ""),
+            ("inverter", _line(d.inverter_end_C, d.inverter_start_C, tenth, "inverter_trip_C"), ""),
+            ("winding", _line(d.winding_end_C, d.winding_start_C, tenth, "winding_trip_C"), ""),
+            ("dc_low", _line(d.dc_low_end_V, d.dc_low_start_V, volt, "dc_low"), ""),
+            ("dc_high", _line(d.dc_high_end_V, d.dc_high_start_V, volt, "dc_high"), ""),
+            ("speed", _line(d.speed_end_rad_s, d.speed_start_rad_s, speed, "speed"), "")]
+
+
+def _i_d_limit(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    slope = d.i_d_slope_A_per_K / 10.0 / b.current_A * Q15_ONE
+    per_psi = 10.0 / (d.psi_f_Vs * d.psi_temp_coeff_per_K) * b.flux_Vs / Q15_ONE
+    return [("i_20", str(round(d.i_d_20_A / b.current_A * Q15_ONE)), f"{d.i_d_20_A:g} A"),
+            ("slope", q16(slope, "i_d_demag_A_per_K"), f"{d.i_d_slope_A_per_K:g} A/K"),
+            ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), ""),
+            ("dC_per_psi", q16(per_psi, "psi_temp_coeff_per_K"), f"{d.psi_temp_coeff_per_K:g} of psi_f per K"),
+            ("assumed_dC", str(round(10 * d.magnet_assumed_C)), "without a winding temperature")]
+
+
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
+    quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
     return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
             ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
             ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
-            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A")]
+            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A"),
+            ("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2")]
+
+
+def _plausibility(motor: Motor) -> list[Row]:
+    d, b, thermal = motor.derived, motor.bases, motor.config.thermal
+    return [("e_0", q15(d.deviation_A / b.current_A, "deviation"), f"{d.deviation_A:g} A"),
+            ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
+            ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
+            ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
+            ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
+            ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), "")]
+
+
+def _torque_monitor(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    rate = 1.0 / (b.omega_rad_s * TASK_PERIODS * b.period_s)
+    return [("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
+            ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+            ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
+            ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
+            ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
+            ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b 1 ms)")]
+
+
+def _safe_state(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    return [("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+            ("share_short", q15(d.share_short, "share_short"), f"{d.share_short:g}"),
+            ("share_open", q15(d.share_open, "share_open"), f"{d.share_open:g}"),
+            ("v_release", q15(d.v_release_V / b.voltage_V, "v_release"), f"{d.v_release_V:g} V")]
 
 
 def _torque_slew(motor: Motor) -> tuple[str, str]:
@@ -211,12 +284,17 @@ def _motor(motor: Motor) -> list[Row]:
         ("dead_time_s", _float(inverter.dead_time_s), ""),
         ("torque_max", q15(machine.torque_max_Nm / b.torque_Nm, "torque_max"), f"{machine.torque_max_Nm:g} N·m"),
         ("torque_slew", *_torque_slew(motor)),
+        ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
+        ("psi_weak", q15(min(motor.derived.psi_weak_Vs / b.flux_Vs, 1.0 - 1.0 / Q15_ONE), "psi_weak"), ""),
         ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
         ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
         ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
-        ("monitor", _monitor(motor), ""),
+        ("voltage_reserve", _voltage_reserve(motor), ""), ("torque_limit", _torque_limit(motor), ""),
+        ("i_d_limit", _i_d_limit(motor), ""), ("monitor", _monitor(motor), ""),
+        ("safe_state", _safe_state(motor), ""), ("plausibility", _plausibility(motor), ""),
+        ("torque_monitor", _torque_monitor(motor), ""),
     ]
 
 
@@ -229,7 +307,7 @@ def _q15_tables(motor: Motor) -> list[str]:
             f"every {tables.iq_A[1]:g} A")
     comments = {"l_d": f"apparent L_d, {l_unit}", "l_q": f"apparent L_q, {l_unit}",
                 "l_qq": f"incremental L_q, {l_unit}",
-                "g_d": "omega_b T_s/l_dd, 2^-15 per count", "g_q": "omega_b T_s/l_qq, 2^-15 per count",
+                "g": "omega_b T_s/2 (1/l_dd + 1/l_qq), 2^-15 per count",
                 "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
     out = [f"/* Flux tables: {grid}. */\n"]
     # psi_f0 depends on i_q alone: one row of it is enough.
@@ -258,7 +336,11 @@ _SI_DERIVED = (
     "knee_A", "min_pulse_duty", "v_dc_min_V", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
     "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
     "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
-    "torque_slew_Nm", "ref_v_ratio", "i_trip_A", "v_max_V", "v_min_V", "sum_max_A", "psi_f_Vs",
+    "torque_slew_Nm", "ref_v_ratio", "trim_gain", "trim_min_V", "trim_max_V", "i_trip_A", "v_max_V", "v_min_V",
+    "sum_max_A", "psi_f_Vs", "torque_slew_weak_Nm", "psi_weak_Vs", "loss_rate", "loss_drop_V", "moving_end_rad_s",
+    "moving_start_rad_s", "inverter_end_C", "inverter_start_C", "winding_end_C", "winding_start_C", "dc_low_end_V",
+    "dc_low_start_V", "dc_high_end_V", "dc_high_start_V", "speed_end_rad_s", "speed_start_rad_s", "i_d_20_A",
+    "i_d_slope_A_per_K", "psi_temp_coeff_per_K", "magnet_assumed_C",
 )
 
 

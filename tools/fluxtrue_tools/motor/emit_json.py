@@ -55,6 +55,8 @@ def motor_json(motor: Motor) -> str:
         "machine": _machine(motor),
         "inverter": _inverter(motor),
         "control": motor.config.control.model_dump(),
+        "thermal": motor.config.thermal.model_dump(),
+        "magnet": motor.config.magnet.model_dump(),
         "bases": asdict(motor.bases),
         "derived": asdict(motor.derived),
         "map": _map(motor),

@@ -88,16 +88,16 @@ def _build(model: FluxModel, bases: Bases, i_max_A: float, shift: int) -> FluxTa
                             "wanted: positive incremental inductances everywhere")
     per_unit = {name: si[name] / bases.inductance_H for name in ("l_d", "l_q", "l_dd", "l_qq")}
     omega_ts = bases.omega_rad_s * bases.period_s
-    inverse = {"g_d": omega_ts / per_unit["l_dd"], "g_q": omega_ts / per_unit["l_qq"]}
+    inverse = omega_ts / 2 * (1 / per_unit["l_dd"] + 1 / per_unit["l_qq"])
     l_shift = shift_for(max(float(np.abs(table).max()) for table in per_unit.values()))
     if l_shift > SHIFT_MAX:
         raise FluxtrueError(f"flux tables: inductances span more than 2^{SHIFT_MAX} around L_b = "
                             f"{bases.inductance_H:.3g} H; check ld/lq, current_full_scale_A and speed_max_rpm")
     stored = {name: q15_table(per_unit[name] / (1 << l_shift), name) for name in ("l_d", "l_q", "l_qq")}
     # Nodes in the corners beyond the current circle may exceed the format: limited, never used. (FT-5)
-    stored |= {name: q15_table(np.minimum(table, 1 - 1 / Q15_ONE), name) for name, table in inverse.items()}
+    stored["g"] = q15_table(np.minimum(inverse, 1 - 1 / Q15_ONE), "g")
     stored["psi_f0"] = q15_table(si["psi_f0"] / bases.flux_Vs, "psi_f0")
-    for name in ("l_q", "l_qq", "g_d", "g_q"):
+    for name in ("l_q", "l_qq", "g"):
         if stored[name].min() <= 0:
             raise FluxtrueError(f"flux tables: {name} is too small for its format; inductances span too wide a range")
     x0 = -(len(id_A) - 2) << shift
@@ -112,28 +112,30 @@ def _axis(x: IntTable, x0: int, shift: int, n: int) -> tuple[IntTable, IntTable]
     return position >> 14, position & 0x3FFF
 
 
-def bilinear(table: IntTable, x: IntTable, y: IntTable, origin: tuple[int, int], shift: int) -> IntTable:
-    """fx_cell() and fx_cell_interp(): Q14 weights that sum to one, one rounding."""
+def _sum(table: IntTable, x: IntTable, y: IntTable, origin: tuple[int, int], shift: int) -> IntTable:
+    """fx_cell() and fx_cell_sum(): Q14 weights that sum to one, nothing rounded."""
     nx, ny = table.shape
     ix, wx = _axis(x, origin[0], shift, nx)
     iy, wy = _axis(y, origin[1], shift, ny)
     w11 = (wx * wy + 0x2000) >> 14
     w10, w01 = wx - w11, wy - w11
     w00 = 0x4000 - wx - w01
-    acc = w00 * table[ix, iy] + w01 * table[ix, iy + 1] + w10 * table[ix + 1, iy] + w11 * table[ix + 1, iy + 1]
-    return (acc + 0x2000) >> 14
+    return w00 * table[ix, iy] + w01 * table[ix, iy + 1] + w10 * table[ix + 1, iy] + w11 * table[ix + 1, iy + 1]
+
+
+def bilinear(table: IntTable, x: IntTable, y: IntTable, origin: tuple[int, int], shift: int) -> IntTable:
+    """fx_cell_interp(): one rounding."""
+    return (_sum(table, x, y, origin, shift) + 0x2000) >> 14
 
 
 def lookup_flux(tables: FluxTables, i_d: IntTable, i_q: IntTable) -> tuple[IntTable, IntTable]:
     """flux_table_step(): psi_d, psi_q in q15 from currents in q15."""
     y = np.abs(i_q)
-    read = {name: bilinear(tables.stored[name], i_d, y, (tables.x0, 0), tables.shift)
-            for name in ("l_d", "l_q", "psi_f0")}
-    cut = 15 - tables.l_shift
-    half = 1 << (cut - 1)
-    psi_d = read["psi_f0"] + ((read["l_d"] * i_d + half) >> cut)
-    psi_q = (read["l_q"] * i_q + half) >> cut
-    return psi_d, psi_q
+    where = (i_d, y, (tables.x0, 0), tables.shift)
+    l_d, l_q = (_sum(tables.stored[name], *where) for name in ("l_d", "l_q"))
+    scale, half = 8 << tables.l_shift, 1 << 31
+    psi_d = bilinear(tables.stored["psi_f0"], *where) + ((l_d * i_d * scale + half) >> 32)
+    return psi_d, (l_q * i_q * scale + half) >> 32
 
 
 def error_plane(tables: FluxTables, model: FluxModel, bases: Bases, i_max_A: float,

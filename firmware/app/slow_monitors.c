@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "app/slow_monitors.h"
+
+#include "control/transform.h"
+#include "hal/temperature.h"
+
+static abc_t in_phases(dq_t i, uint32_t theta_e)
+{
+    const ab_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
+    const int32_t alpha = transform_round(q30.alpha);
+    const int32_t side = fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865));
+    return (abc_t){alpha, side - alpha / 2, -side - alpha / 2};
+}
+
+static uint32_t currents(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
+    const plausibility_in_t in = {
+        .acting = sample->acting,
+        .voltage_limited = sample->voltage_limited,
+        .i = sample->mrai.i,
+        .i_ref = task->i_ref,
+        .phases = measure_phases(measured.i, measured.sum_q27),
+        .wanted = in_phases(task->i_ref, sample->theta_e),
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .inverter_dC = hal_temperature_inverter_dC(),
+        .winding_dC = hal_temperature_winding_dC(),
+    };
+    return plausibility_step(&drive->motor.plausibility, &task->plausibility, &in);
+}
+
+static uint32_t torque(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const torque_monitor_in_t in = {
+        .acting = sample->acting && !drive->request.current_mode,
+        .u = sample->mrai.u,
+        .i = sample->mrai.i,
+        .psi = {sample->mrai.flux.psi_d, sample->mrai.flux.psi_q},
+        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .torque = fx_q15_from_q31(task->torque_loop.model),
+    };
+    return torque_monitor_step(&drive->motor.torque_monitor, &task->torque_monitor, &in);
+}
+
+uint32_t slow_monitors_step(drive_t *drive, const sample_t *sample)
+{
+    return currents(drive, sample) | torque(drive, sample);
+}

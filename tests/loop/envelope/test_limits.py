@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Torque, power and temperature limits, judged by the plant's torque and its dc power."""
+
+import numpy as np
+import pytest
+from fluxtrue_tools.sim.motor import Motor
+from rig import TEMPERATURE, Rig
+
+RATED_NM = 132.0
+
+
+@pytest.mark.parametrize(("rpm", "torque"), [(4000.0, 100.0), (-4000.0, -100.0), (9000.0, 60.0)])
+def test_driving_stays_at_the_batterys_power(hsm1: Motor, rpm: float, torque: float) -> None:
+    rig = Rig(hsm1, rpm, torque).set(power_limit_drive_W=20e3)
+    trace = rig.run(0.6)
+    assert trace.faults == 0
+    power = trace.settled("truth.idc_A") * 350.0
+    # 12-bit converter, dead time and identification: 2 % of the limit; never more than 1 % beyond it.
+    assert 0.98 * 20e3 <= power <= 1.01 * 20e3
+    assert int(trace["derating"][-1]) & 2
+
+
+@pytest.mark.parametrize(("rpm", "torque"), [(4000.0, -100.0), (-4000.0, 100.0), (9000.0, -60.0)])
+def test_generating_stays_at_the_batterys_power(hsm1: Motor, rpm: float, torque: float) -> None:
+    trace = Rig(hsm1, rpm, torque).set(power_limit_regen_W=15e3).run(0.6)
+    assert trace.faults == 0
+    power = -trace.settled("truth.idc_A") * 350.0
+    assert 0.97 * 15e3 <= power <= 1.015 * 15e3
+
+
+def test_a_power_limit_that_closes_while_driving_is_obeyed_at_once(hsm1: Motor) -> None:
+    rig = Rig(hsm1, 6000.0, 90.0)
+    rig.run(0.3)
+    trace = rig.set(power_limit_drive_W=10e3).run(0.1)
+    power = trace["truth.electrical_W"]
+    assert power[300:].max() <= 11e3  # 30 ms: 90 N·m at 13 N·m/ms, then the filter of the losses
+
+
+def test_vehicle_torque_limits_hold_for_each_direction(hsm1: Motor) -> None:
+    for rpm, command, expected in ((3000, 100, 30), (3000, -100, -20), (-3000, -100, -30), (-3000, 100, 20)):
+        rig = Rig(hsm1, float(rpm), float(command)).set(torque_limit_drive_Nm=30.0, torque_limit_regen_Nm=20.0)
+        assert rig.run(0.4).settled() == pytest.approx(expected, abs=0.2)
+
+
+def test_a_command_in_amperes_instead_of_newton_metres_cannot_multiply_the_torque(hsm1: Motor) -> None:
+    """The request's format ends at the torque base, the limit at the machine's rating."""
+    rig = Rig(hsm1, 2000.0)
+    with pytest.raises(Exception, match="out of range"):
+        rig.set(torque_command_Nm=250.0)
+    rig.set(torque_command_Nm=RATED_NM)
+    assert np.abs(rig.run(0.3).torque).max() <= 1.03 * RATED_NM
+
+
+@pytest.mark.parametrize(("name", "start", "trip"), [("inverter_C", 85.0, 105.0), ("plant_winding_C", 210.0, 230.0)])
+def test_heat_takes_torque_along_a_line_and_then_trips(hsm1: Motor, name: str, start: float, trip: float) -> None:
+    rig = Rig(hsm1, 2000.0, RATED_NM)
+    rig.run(0.2)
+    half = rig.set(**{name: 0.5 * (start + trip)}).run(0.3)
+    assert half.faults == 0
+    assert half.settled() == pytest.approx(0.5 * RATED_NM, abs=1.0)
+    over = rig.set(**{name: trip}).run(0.2)
+    assert over.faults == TEMPERATURE
+    assert over.fault_ms(TEMPERATURE) == pytest.approx(110.0, abs=2.0)
+    assert abs(over.torque[1000]) <= 1.0  # nothing was left when it tripped
+
+
+def test_low_dc_voltage_takes_driving_and_high_dc_voltage_generating_torque(hsm1: Motor) -> None:
+    low = Rig(hsm1, 1000.0, 60.0, vdc_V=154.0).run(0.3)  # a fifth of the way from 140 to 210 V
+    assert low.faults == 0
+    assert low.settled() == pytest.approx(0.2 * RATED_NM, abs=1.0)
+    assert Rig(hsm1, 1000.0, -60.0, vdc_V=154.0).run(0.3).settled() == pytest.approx(-60.0, abs=1.2)
+    high = Rig(hsm1, 1000.0, -60.0, vdc_V=433.0).run(0.3)  # 434 V is the end of the line
+    assert high.faults == 0
+    assert abs(high.settled()) <= 15.0
+    assert Rig(hsm1, 1000.0, 60.0, vdc_V=433.0).run(0.3).settled() == pytest.approx(60.0, abs=0.5)

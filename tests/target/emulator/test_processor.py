@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The emulated processor by itself: small programs that do one wrong thing, and exceptions of every kind."""
+
+import ctypes
+import struct
+import subprocess
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import FAILED, Core
+from fluxtrue_tools.sim import library as lib
+
+WATCHDOG = 0x20
+LINK = ("-nostartfiles", "-nostdlib", "-Wl,-e,0,-Ttext=0x410,-Tbss=0x1FFF8000,-Tdata=0x1FFF8800",
+        "-Wl,--section-start=.vectors=0")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def library(parts: Parts) -> ctypes.CDLL:
+    return lib.load(parts.motor.folder.folder / "libfluxtrue_emu.so")
+
+
+def program(here: Path, folder: Path, name: str, *flags: str) -> Path:
+    elf = folder / f"{name}.elf"
+    source = here / "programs" / f"{name}.c"
+    command = [ARM_CC, *ARM_FLAGS, "-std=gnu11", "-O2", "-Wall", "-Werror", *flags, str(source), *LINK, "-o", str(elf)]
+    subprocess.run(command, check=True, capture_output=True)
+    return elf
+
+
+REFUSED = {
+    1: "write of SIM.PLATCGC offset 0x40: the register is not modelled",
+    2: "read of SCG offset 0x44: there is no register",
+    3: "write of FTM0.MOD offset 0x8: the peripheral's clock is off (PCC)",
+    4: "write of FTM0.MOD offset 0x8: 0x00010000 changes the reserved bits 0x00010000",
+    5: "read of 0x40025000: no peripheral is modelled there",
+    6: "write of FTM0.MOD offset 0x8: 1 bytes, the register has 4",
+    7: "write of 4 bytes at 0x00008000, where nothing is or may be changed",
+    8: "write of 4 bytes at 0x1fff7ffc, where nothing is or may be changed",
+    9: "write of 0x00000001 to the core's register 0xe000ed94 (4 bytes): not modelled",
+    10: "the bits 0x8 are write protected (FMS.WPEN)",
+    11: "HSRUN is not allowed by PMPROT.AHSRUN",
+    12: "0x12345678 is neither unlock nor refresh",
+    13: "vector 21 (IRQ 5) has no handler",
+    14: "has not the key 0x05FA",
+    15: "a floating-point instruction ran although CPACR does not allow it",
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_the_model_does_not_know_is_an_error_that_names_it(
+    library: ctypes.CDLL, here: Path, tmp_path: Path, case: int
+) -> None:
+    with Core.of_program(library, program(here, tmp_path, "poke", f"-DCASE={case}")) as core:
+        assert core.run(1e-3) == FAILED
+        assert core.error is not None
+        assert REFUSED[case] in core.error
+        assert "(reset+0x" in core.error, core.error  # and where in the program
+        assert core.run(1e-3) == FAILED  # it stays stopped
+
+
+def test_the_program_counter_of_a_refused_access_is_exact(
+    library: ctypes.CDLL, here: Path, tmp_path: Path
+) -> None:
+    elf = program(here, tmp_path, "poke", "-DCASE=4")
+    with Core.of_program(library, elf) as core:
+        core.run(1e-3)
+        assert core.error is not None
+        pc = int(core.error.split("pc ")[1].split()[0], 16)
+        (opcode,) = struct.unpack("<H", core.read(pc, 2))
+    is_store_word = opcode >> 11 == 0b01100 or opcode >> 4 == 0xF8C  # STR (immediate), T1 or T3
+    assert is_store_word
+
+
+@pytest.fixture(scope="module")
+def exceptions(here: Path, tmp_path_factory: pytest.TempPathFactory, parts: Parts) -> Path:
+    return program(here, tmp_path_factory.mktemp("programs"), "exceptions")
+
+
+@pytest.mark.parametrize("counting", [False, True])
+def test_exceptions_nest_by_priority_and_leave_every_register_as_it_was(
+    library: ctypes.CDLL, exceptions: Path, counting: bool
+) -> None:
+    with Core.of_program(library, exceptions, counting) as core:
+        core.run(5.5e-3)
+        assert core.error is None
+        # Masked first; then LOW interrupted by HIGH and MIDDLE, which pends LOW again; the whole once more; HIGH.
+        first = [6]
+        once = [1, 6, 2, 4, 5, 3]
+        order = [core.word("order", k) for k in range(core.word("at"))]
+        assert core.word("masked") == 0
+        assert order == first + once + once + first
+        assert core.word("wrong") == 0
+        # HIGH doubles: it has run as often as the order says.
+        (value,) = struct.unpack("<f", core.read(core.symbol("value"), 4))
+        assert value == 2.0 ** order.count(6)
+
+
+def test_a_sleeping_core_is_woken_by_each_tick_and_costs_nothing_in_between(
+    library: ctypes.CDLL, exceptions: Path
+) -> None:
+    with Core.of_program(library, exceptions) as core:
+        core.run(5.5e-3)
+        ticks, executed = core.word("ticks"), core.instructions
+        core.run(2e-3)
+        assert core.word("ticks") == ticks + 2
+        assert core.instructions - executed < 100
+
+
+def test_an_unserviced_watchdog_resets_and_tells_why(library: ctypes.CDLL, exceptions: Path) -> None:
+    with Core.of_program(library, exceptions) as core:
+        core.run(9.9e-3)
+        assert core.resets == 0
+        core.run(0.3e-3)
+        assert core.resets == 1  # 10 ms after it was set up
+        core.run(3e-3)
+        assert core.word("cause") == WATCHDOG
+        core.run(20e-3)
+        assert core.resets == 3
+
+
+def test_a_snapshot_takes_everything_back(library: ctypes.CDLL, exceptions: Path) -> None:
+    with Core.of_program(library, exceptions) as core:
+        core.run(3.2e-3)
+        snapshot = core.save()
+        seen = core.word("ticks"), core.now_s, core.instructions
+        core.run(3e-3)
+        assert core.word("ticks") == seen[0] + 3
+        core.restore(snapshot)
+        core.free(snapshot)
+        assert (core.word("ticks"), core.now_s, core.instructions) == seen
+        core.run(3e-3)
+        assert core.word("ticks") == seen[0] + 3
+
+
+def test_a_file_that_is_no_program_is_refused_by_name(library: ctypes.CDLL, tmp_path: Path) -> None:
+    path = tmp_path / "not.elf"
+    path.write_bytes(b"\x7fELF\x02 a 64-bit one" + bytes(64))
+    with pytest.raises(Exception, match="not.elf: is not a 32-bit little-endian ELF file for Arm"):
+        Core.of_program(library, path)

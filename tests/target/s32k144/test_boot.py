@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The S32K144's image boots on the emulated processor, and does not drive with data it was not built with."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core
+from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.target import image
+from fluxtrue_tools.target.build import image as build_image
+
+BUILD = Path(os.environ["FLUXTRUE_BUILD_DIR"]).parent
+CLOCK_SELECTED = 0x18  # FTM0_SC.CLKS
+FAULT_CONFIG = 1 << 7
+FOREVER = 0.1  # eight times the 12 ms of the watchdog
+
+
+@pytest.fixture(scope="module")
+def parts() -> build.Parts:
+    if not have_arm_compiler():
+        pytest.skip("the Arm compiler is not installed: no image is built")
+    return build.prepare("hsm1")
+
+
+@pytest.fixture(scope="module", params=["s32k144", "s32k144-resolver"])
+def elf(request: pytest.FixtureRequest, parts: build.Parts) -> Path:
+    return build_image(request.param, BUILD / request.param)
+
+
+def _core(parts: build.Parts, elf: Path) -> Core:
+    return Core.of_program(parts.emulated().library, elf)
+
+
+def _periods(core: Core, seconds: float) -> Iterator[int]:
+    end = core.now_s + seconds
+    while core.now_s < end:
+        yield core.run(end - core.now_s)
+
+
+def test_the_pwm_runs_soon_after_reset_and_nothing_resets_again(parts: build.Parts, elf: Path) -> None:
+    with _core(parts, elf) as core:
+        assert core.run(FOREVER) == CENTRE, core.error
+        assert core.now_s < 0.05
+        stops = list(_periods(core, FOREVER))
+        assert core.error is None
+        assert stops.count(CENTRE) == pytest.approx(FOREVER * 10_000, abs=2)
+        assert core.resets == 0
+
+
+def test_a_damaged_table_keeps_the_pwm_from_starting_and_the_bus_alive(
+    parts: build.Parts, elf: Path, tmp_path: Path
+) -> None:
+    sealed = image.Image(elf)
+    sealed.content[sealed.place(sealed.symbol("table_g_d") + 100, 1)] ^= 0x04
+    damaged = tmp_path / "damaged.elf"
+    damaged.write_bytes(sealed.content)
+    with _core(parts, damaged) as core:
+        assert core.run(FOREVER) == LIMIT, core.error
+        assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
+        assert core.register("CAN0.MCR") & 0x8000_0000 == 0  # the module is enabled
+        assert core.resets == 0
+
+
+def test_an_image_that_was_never_sealed_does_not_drive(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
+    content = image.Image(elf)
+    at = content.place(content.symbol("protected_crc"), 4)
+    content.content[at : at + 4] = b"\xff\xff\xff\xff"
+    unsealed = tmp_path / "unsealed.elf"
+    unsealed.write_bytes(content.content)
+    with _core(parts, unsealed) as core:
+        assert core.run(FOREVER) == LIMIT, core.error
+
+
+def test_most_of_the_stack_is_never_touched(parts: build.Parts, elf: Path) -> None:
+    """Half of it is what the worst case may need; an idle drive with a quiet bus needs far less."""
+    with _core(parts, elf) as core:
+        list(_periods(core, FOREVER))
+        bottom, top = core.symbol("stack_bottom"), core.symbol("stack_top")
+        stack = core.read(bottom, top - bottom)
+        untouched = len(stack) - len(stack.lstrip(b"\xc5"))
+        assert untouched > (top - bottom) // 2
+
+
+def test_a_table_that_is_damaged_later_opens_the_gates(parts: build.Parts) -> None:
+    motor = parts.emulated()
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        loop.set("enable", 1)
+        loop.set("torque_command_Nm", 20.0)
+        loop.run(1000)
+        assert loop.get("fault_word") == 0
+        core = Core.of_simulation(motor.library, loop._sim)
+        address = core.symbol("table_ref_i_d")
+        byte = core.read(address, 1)[0] ^ 0x01
+        assert core._library.emu_write(core._handle, address, bytes([byte]), 1)
+        loop.run(1000)
+        assert int(loop.get("fault_word")) == FAULT_CONFIG
+        assert abs(loop.get("truth.torque_Nm")) < 0.5

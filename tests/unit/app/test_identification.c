@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "hal/temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+/* The robust identification between the priorities: window, step, answer, memory. */
+
+void setUp(void)
+{
+    seam_start();
+    seam.winding_dC = 200;
+}
+
+void tearDown(void)
+{
+}
+
+/* A sample as the fast ISR publishes it: 60 A, 0.3 omega_b, a magnet that is 10 % weak. */
+static void period(uint32_t k)
+{
+    sample_t *s = sample_box_begin(&drive.samples);
+    const dq_t i = {-3000, 5000};
+    const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
+    *s = (sample_t){.mrai = in, .acting = true, .v_dc = 21238};
+    s->mrai.u.d = (int32_t)(-0.3 * s->mrai.flux.psi_q - 0.0133 * 3000);
+    s->mrai.u.q = (int32_t)(0.3 * (s->mrai.flux.psi_d - 1434) + 0.0133 * 5000);
+    s->theta_e = (uint32_t)(k * 0.3 * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
+    sample_box_publish(&drive.samples);
+    drive.fast.pended++;
+    mrai_isr(&drive);
+}
+
+static void milliseconds(int n)
+{
+    for (int k = 0; k < 10 * n; k++) {
+        period((uint32_t)k);
+        if (k % 10 == 9) {
+            task_1khz(&drive);
+        }
+    }
+}
+
+void test_robust_is_the_default_and_ten_periods_make_a_window(void)
+{
+    TEST_ASSERT_EQUAL_INT(IDENTIFICATION_ROBUST, drive.request.identification_mode);
+    for (uint32_t k = 0; k < 20; k++) {
+        TEST_ASSERT_EQUAL_UINT32(k / 10U, drive.windows.generation);
+        period(k);
+    }
+    const identify_window_t window = window_box_read(&drive.windows);
+    TEST_ASSERT_EQUAL_INT(-30000, window.sum_i.d);
+    TEST_ASSERT_EQUAL_INT(50000, window.sum_i.q);
+    TEST_ASSERT_TRUE(window.acting);
+    TEST_ASSERT_EQUAL_UINT32(drive.fast.pended, drive.slow.finished);
+}
+
+void test_a_weak_magnet_is_learnt_and_its_flux_handed_to_the_current_control(void)
+{
+    milliseconds(3000);
+    /* 10 % of psi_f, 1434 counts; magnet and inductances share what a single point shows. */
+    TEST_ASSERT_LESS_THAN_INT(-700, drive.slow.psi_delta_q15);
+    TEST_ASSERT_EQUAL_INT(drive.task.identified.psi_delta, drive.slow.psi_delta_q15);
+    TEST_ASSERT_LESS_THAN_INT32(0, drive.task.learnt.psi_delta);
+    TEST_ASSERT_GREATER_THAN_INT(20000, drive.task.quality.psi_quality);
+    TEST_ASSERT_FALSE(drive.task.learnt.psi_clamped);
+    TEST_ASSERT_EQUAL_INT(drive.task.identified.torque, drive.task.torque_estimate);
+}
+
+void test_a_reset_forgets_what_was_learnt(void)
+{
+    milliseconds(500);
+    TEST_ASSERT_NOT_EQUAL(0, drive.task.learnt.psi_delta);
+    drive.request.identification_resets++;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.learnt.psi_delta);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.quality.psi_quality);
+}
+
+void test_the_winding_temperature_reaches_the_resistance_and_a_broken_sensor_does_not(void)
+{
+    seam.winding_dC = 1200;
+    milliseconds(1);
+    /* 0.018 ohm, 0.393 % per kelvin, 100 K: 39.3 % more, 0.00707 ohm of 1.35. */
+    TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.learnt.r_delta);
+    seam.winding_dC = HAL_TEMPERATURE_UNKNOWN;
+    milliseconds(1);
+    TEST_ASSERT_FALSE(drive.task.identify.r_known);
+    TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.learnt.r_delta);
+}
+
+void test_what_was_learnt_can_be_kept_and_recalled(void)
+{
+    milliseconds(1000);
+    const identify_memory_t kept = drive_learnt(&drive);
+    const q31_t before = drive.task.learnt.psi_delta;
+    drive_init(&drive, &motor);
+    TEST_ASSERT_TRUE(drive_recall(&drive, &kept));
+    task_1khz(&drive);
+    TEST_ASSERT_INT32_WITHIN(2000, before, drive.task.learnt.psi_delta);
+    identify_memory_t foreign = kept;
+    foreign.version = 0;
+    TEST_ASSERT_FALSE(drive_recall(&drive, &foreign));
+}
+
+void test_the_papers_identification_starts_from_its_sample_when_it_is_selected(void)
+{
+    milliseconds(2);
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    period(0);
+    TEST_ASSERT_EQUAL_INT32(0, drive.slow.mrai.e_d_q27);
+    TEST_ASSERT_EQUAL_INT32(0, drive.slow.mrai.e_q_q27);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(drive.slow.torque.mean, drive.task.torque_estimate);
+}
+
+void test_the_window_box_survives_the_wrap_of_its_generation(void)
+{
+    drive.windows.generation = UINT32_MAX;
+    for (int n = 0; n < 4; n++) {
+        const identify_window_t window = {.count = (uint8_t)n};
+        window_box_write(&drive.windows, &window);
+        TEST_ASSERT_EQUAL_INT(n, window_box_read(&drive.windows).count);
+    }
+}

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef UNIT_CONTROL_IDENTIFY_FIXTURE_H
+#define UNIT_CONTROL_IDENTIFY_FIXTURE_H
+/** The invented machine of fixture.h with priors, and windows of ten steady periods of it. */
+#include "control/identify_memory.h"
+#include "fixture.h"
+#include "twin/twin_identify.h"
+
+/* Fills the configuration and the twin's data in f->si. */
+void identify_fixture(fixture_t *f, identify_config_t *config);
+
+typedef struct {
+    identify_window_t fixed;
+    twin_window_t twin;
+} window_pair_t;
+
+/* i in q15, speed per unit; extra_u is added to the voltage that the tables would need. */
+window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t extra_u);
+
+#endif

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "identify_fixture.h"
+#include "unity.h"
+
+/* Window, operating point, model and filter one by one. */
+
+static fixture_t f;
+static identify_config_t c;
+static const double one_q60 = 1152921504606846976.0;
+
+void setUp(void)
+{
+    f = fixture();
+    identify_fixture(&f, &c);
+}
+
+void tearDown(void)
+{
+}
+
+void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(void)
+{
+    identify_window_t window = {.count = IDENTIFY_PERIODS, .last = {.u = {7, -7}, .i = {100, 0}}};
+    const flux_point_t flux = {.psi_d = 11, .psi_q = 22};
+    for (int k = 1; k <= 10; k++) {
+        const identify_sample_t s = {{100 + k, -k}, {10 * k, k}, &flux, 1000U * (uint32_t)k, true, k == 3};
+        TEST_ASSERT_EQUAL(k == 10, identify_window_step(&window, &s));
+    }
+    TEST_ASSERT_EQUAL_INT(1055, window.sum_i.d); /* 10 * 100 + 55 */
+    TEST_ASSERT_EQUAL_INT(-55, window.sum_i.q);
+    TEST_ASSERT_EQUAL_INT(550, window.sum_u.d);
+    TEST_ASSERT_EQUAL_INT(7, window.first.u.d); /* sample 0 is the last of the window before */
+    TEST_ASSERT_EQUAL_INT(100, window.last.u.d);
+    TEST_ASSERT_EQUAL_INT(22, window.last.psi.q);
+    TEST_ASSERT_EQUAL_UINT32(10000U, window.last.theta);
+    TEST_ASSERT_EQUAL_INT(1, window.limited);
+    TEST_ASSERT_TRUE(window.acting);
+}
+
+void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
+{
+    identify_window_t window = {.count = IDENTIFY_PERIODS};
+    const flux_point_t flux = {0};
+    for (int k = 1; k <= 20; k++) {
+        const identify_sample_t s = {{0, 0}, {0, 0}, &flux, 0, k != 10, false};
+        if (identify_window_step(&window, &s)) {
+            TEST_ASSERT_EQUAL(k == 20, window.acting);
+        }
+    }
+}
+
+/* A ramp of current: the mean is that of both ends. A ramp of voltage by 20 per sample from 0: the ten periods have 0,
+ * 20, ... 180: 90 in the mean, divided by sinc. */
+void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
+{
+    identify_window_t window = {.count = IDENTIFY_PERIODS};
+    const flux_point_t flux = {0};
+    for (int k = 1; k <= 10; k++) {
+        const identify_sample_t s = {{-200 * k, 100 * k}, {20 * k, -2000 * k}, &flux, 0, true, false};
+        (void)identify_window_step(&window, &s);
+    }
+    const identify_point_t point = identify_point(&c, &window, 0);
+    TEST_ASSERT_INT32_WITHIN(40, -1000 * 65536, point.i.d); /* PER_TWENTY's own rounding: 4e-10 */
+    TEST_ASSERT_INT32_WITHIN(40, 500 * 65536, point.i.q);
+    TEST_ASSERT_INT32_WITHIN(40, 90 * 32768, point.u.d);
+    TEST_ASSERT_INT32_WITHIN(40, -9000 * 32768, point.u.q);
+    TEST_ASSERT_FALSE(point.valid); /* standstill */
+}
+
+/* At 0.9 pu the angle of the fixture turns 0.563 times in a window: more than a half. */
+void test_speed_counts_whole_turns_by_the_tracked_one_and_the_rest_by_the_measured_angle(void)
+{
+    const double true_pu = 0.9, tracked_pu = 0.87;
+    const window_pair_t pair = steady_window(&f, (dq_t){-2000, 4000}, true_pu, (dq_t){0, 0});
+    const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(tracked_pu * 2147483648.0));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(point.omega)); /* turn_to_pu has 17 bits of 0.03 */
+    const identify_point_t back = identify_point(&c, &pair.fixed, (q31_t)(0.93 * 2147483648.0));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(back.omega));
+}
+
+void test_points_agree_with_the_twin_over_the_range(void)
+{
+    worst_t u = {0}, i_m = {0}, w = {0};
+    uint64_t seed = 7;
+    for (int n = 0; n < 3000; n++) {
+        const dq_t i = {random_in(&seed, -26000, 2000), random_in(&seed, -18000, 18000)};
+        const double omega = random_in(&seed, -95, 95) / 100.0;
+        const window_pair_t pair = steady_window(&f, i, omega, (dq_t){random_in(&seed, -300, 300), 0});
+        const identify_point_t a = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
+        const twin_point_t b = twin_point(&f.si, &pair.twin, omega * f.w);
+        worst_note(&u, from_q31(a.u.q) * 2.0 - b.u.q / f.v, "%d: %d %d", n, i.d, i.q);
+        worst_note(&i_m, from_q15(a.i_m.q) - b.i_m.q / f.i, "%d: %d %d at %g", n, i.d, i.q, omega);
+        worst_note(&w, from_q31(a.omega) - b.omega / f.w, "%g", omega);
+        TEST_ASSERT_EQUAL(b.valid, a.valid);
+    }
+    ASSERT_WORST(u, 2e-6);
+    ASSERT_WORST(i_m, 1.0 / 32768.0); /* rounded to q15 */
+    ASSERT_WORST(w, 1e-6);
+}
+
+void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
+{
+    worst_t y = {0}, h = {0}, t = {0};
+    uint64_t seed = 9;
+    for (int n = 0; n < 3000; n++) {
+        const dq_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)}; /* flux and voltage below 1 */
+        const double omega = random_in(&seed, -95, 95) / 100.0;
+        const window_pair_t pair = steady_window(&f, i, omega, (dq_t){random_in(&seed, -300, 300), 100});
+        const identify_point_t a = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
+        const flux_point_t flux = flux_table_step(&f.flux_table, a.i_m);
+        const flux_inductances_t l = flux_table_inductances(&f.flux_table, a.i_m);
+        const identify_model_t m = identify_model(&c, &a, &flux, &l, c.r0);
+        const identify_row_t row = identify_torque_row(&c, &m);
+        const twin_model_t b = twin_model(&f.si, &(twin_point_t){
+            {from_q31(a.i.d) * f.i, from_q31(a.i.q) * f.i}, {from_q31(a.u.d) * 2.0 * f.v, from_q31(a.u.q) * 2.0 * f.v},
+            {from_q31(a.rate.d) * 2.0 * f.v, from_q31(a.rate.q) * 2.0 * f.v},
+            {from_q15(a.i_m.d) * f.i, from_q15(a.i_m.q) * f.i}, from_q31(a.omega) * f.w,
+            from_q31(a.iron) * f.i / f.psi, 0, true}, from_q31(c.r0) * f.z);
+        worst_note(&y, from_q31(m.y.d) * 2.0 - b.y.d / f.v, "%d: d %d %d at %g", n, i.d, i.q, omega);
+        worst_note(&y, from_q31(m.y.q) * 2.0 - b.y.q / f.v, "%d: q %d %d at %g", n, i.d, i.q, omega);
+        for (int j = 0; j < IDENTIFY_STATES; j++) {
+            worst_note(&h, from_q31(m.d.h[j]) * 2.0 - b.d[j] / f.v, "%d: d, state %d", n, j);
+            worst_note(&h, from_q31(m.q.h[j]) * 2.0 - b.q[j] / f.v, "%d: q, state %d", n, j);
+            worst_note(&t, from_q31(row.h[j]) * 2.0 - b.torque[j] / (f.psi * f.i), "%d: torque, state %d", n, j);
+        }
+    }
+    ASSERT_WORST(y, 1.5e-4); /* the table's q15 flux, 2 LSB, twice: quotient and products of q15 */
+    ASSERT_WORST(h, 1e-5);
+    ASSERT_WORST(t, 1e-5);
+}
+
+/* One state: h = 0.1, P = 1, r = 0.01 gives s = 0.02, k = 5; e = 0.02 moves x by 0.1 and leaves P = 1 - 5 * 0.1. */
+void test_one_measurement_of_one_state_by_hand(void)
+{
+    identify_filter_t filter;
+    identify_filter_reset(&filter);
+    const identify_row_t row = {{[IDENTIFY_FLUX] = (int32_t)(0.1 * IDENTIFY_ONE_Q30)}};
+    const identify_verdict_t verdict =
+        identify_filter_update(&filter, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * one_q60));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.1, filter.x[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q27);
+    identify_state_t state = {.filter = filter};
+    const identify_memory_t memory = identify_memory_get(&state);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.5, memory.variance[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, memory.variance[IDENTIFY_LQ]);
+    TEST_ASSERT_FALSE(verdict.inconsistent || verdict.clamped);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, identify_filter_shift(&filter, &row) / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.005, (double)identify_filter_variance(&filter, &row) / one_q60);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)identify_filter_prior(&row) / one_q60);
+}
+
+void test_what_the_model_cannot_explain_is_reported_and_limited(void)
+{
+    identify_filter_t filter;
+    identify_filter_reset(&filter);
+    const identify_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
+    const int64_t r = (int64_t)(1e-4 * one_q60); /* 8 * 1e-4 + 1e-4 is 0.03 squared */
+    TEST_ASSERT_FALSE(identify_filter_update(&filter, &row, (int32_t)(0.0296 * IDENTIFY_ONE_Q30), r).inconsistent);
+    identify_filter_reset(&filter);
+    TEST_ASSERT_TRUE(identify_filter_update(&filter, &row, (int32_t)(0.0304 * IDENTIFY_ONE_Q30), r).inconsistent);
+    bool clamped = false;
+    for (int n = 0; n < 10; n++) {
+        clamped = identify_filter_update(&filter, &row, IDENTIFY_ONE_Q30, r / 100).clamped || clamped;
+    }
+    TEST_ASSERT_TRUE(clamped);
+    TEST_ASSERT_EQUAL_INT32(4 * IDENTIFY_ONE_Q27, filter.x[IDENTIFY_DROP]);
+}
+
+/* x falls by a factor e in 1/lambda updates, P returns to the prior twice as fast. */
+void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
+{
+    identify_filter_t filter;
+    identify_filter_reset(&filter);
+    filter.x[IDENTIFY_DROP] = IDENTIFY_ONE_Q27;
+    filter.p[IDENTIFY_R][IDENTIFY_R] = 0;
+    filter.p[IDENTIFY_R][IDENTIFY_DROP] = IDENTIFY_ONE_Q30 / 2;
+    filter.p[IDENTIFY_DROP][IDENTIFY_R] = IDENTIFY_ONE_Q30 / 2;
+    for (int n = 0; n < 5000; n++) { /* 5000 * 2e-4 = 1 */
+        identify_filter_leak(&c, &filter, false);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, exp(-1.0), filter.x[IDENTIFY_DROP] / (double)IDENTIFY_ONE_Q27);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), filter.p[0][0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0), filter.p[1][0] / (double)IDENTIFY_ONE_Q30);
+    for (int n = 0; n < 60000; n++) {
+        identify_filter_leak(&c, &filter, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, filter.p[0][0] / (double)IDENTIFY_ONE_Q30);
+}
+
+static double smallest_pivot(const identify_filter_t *filter)
+{
+    double a[IDENTIFY_STATES][IDENTIFY_STATES], least = 1.0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
+            a[j][l] = filter->p[j][l] / (double)IDENTIFY_ONE_Q30;
+        }
+    }
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        least = fmin(least, a[j][j]);
+        for (unsigned l = j + 1U; l < IDENTIFY_STATES; l++) {
+            for (unsigned m = j + 1U; m < IDENTIFY_STATES; m++) {
+                a[l][m] -= a[l][j] * a[j][m] / a[j][j];
+            }
+        }
+    }
+    return least;
+}
+
+/* Rows as strong as they come, with the smallest noise, for an hour of updates: Cholesky's pivots stay positive. */
+void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
+{
+    identify_filter_t filter;
+    twin_filter_t twin;
+    worst_t p = {0}, x = {0};
+    uint64_t seed = 11;
+    identify_filter_reset(&filter);
+    twin_filter_reset(&twin);
+    for (int n = 0; n < 360000; n++) {
+        identify_row_t row = {{0}};
+        double h[TWIN_STATES] = {0.0};
+        for (int j = 0; j < IDENTIFY_STATES; j++) {
+            row.h[j] = random_in(&seed, -(1 << 26), 1 << 26);
+            h[j] = row.h[j] / (double)IDENTIFY_ONE_Q30;
+        }
+        const int32_t e = random_in(&seed, -(1 << 22), 1 << 22);
+        const double noise_pu = (n % 2 == 0) ? 0.008 : 0.04;
+        const int64_t r = (int64_t)(noise_pu * noise_pu * one_q60);
+        (void)identify_filter_update(&filter, &row, e, r);
+        (void)twin_filter_update(&twin, h, e / (double)IDENTIFY_ONE_Q30, noise_pu * noise_pu);
+        identify_filter_leak(&c, &filter, n % 3 == 0);
+        twin_filter_leak(&f.si, &twin, n % 3 == 0);
+        if (n % 1000 == 0) {
+            TEST_ASSERT_TRUE(smallest_pivot(&filter) > 1e-5);
+            worst_note(&p, filter.p[0][0] / (double)IDENTIFY_ONE_Q30 - twin.p[0][0], "update %d", n);
+            for (int j = 0; j < IDENTIFY_STATES; j++) {
+                worst_note(&x, filter.x[j] / (double)IDENTIFY_ONE_Q27 - twin.x[j], "update %d, state %d", n, j);
+            }
+        }
+    }
+    ASSERT_WORST(p, 1e-5);
+    ASSERT_WORST(x, 1e-3); /* of a prior's standard deviation */
+}

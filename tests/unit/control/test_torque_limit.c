@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/torque_limit.h"
+
+#include <math.h>
+
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static torque_limit_state_t state;
+static torque_limits_t limits;
+static torque_limit_in_t in;
+
+enum { RATED = 19661, ROOM_C = 200 };
+
+static q15_t counts(double x)
+{
+    return (q15_t)lround(x * 32768.0);
+}
+
+/* Half speed, 350 V, cold, everything open; the machine makes 0.25 without loss. */
+void setUp(void)
+{
+    f = fixture();
+    state = (torque_limit_state_t){0};
+    limits = TORQUE_LIMITS_NONE;
+    in = (torque_limit_in_t){.wanted = counts(0.25), .limits = &limits, .omega = counts(0.5), .v_dc = 21845,
+                             .reach = INT16_MAX, .inverter_dC = ROOM_C, .winding_dC = ROOM_C};
+}
+
+void tearDown(void)
+{
+}
+
+static torque_limit_t step(void)
+{
+    return torque_limit_step(&f.torque_limit, &state, &in);
+}
+
+void test_with_everything_open_the_request_passes_untouched(void)
+{
+    for (int sign = -1; sign <= 1; sign++) {
+        in.wanted = (q15_t)(sign * 8000);
+        const torque_limit_t y = step();
+        TEST_ASSERT_EQUAL_INT(sign * 8000, y.torque);
+        TEST_ASSERT_EQUAL_HEX16(0, y.derating);
+        TEST_ASSERT_EQUAL_INT(RATED, y.drive);
+        TEST_ASSERT_EQUAL_INT(RATED, y.regen);
+    }
+}
+
+/* Whatever unit a wrong command comes in, the machine's rating is the most it can do. */
+void test_no_request_exceeds_the_rated_torque(void)
+{
+    in.wanted = INT16_MAX;
+    TEST_ASSERT_EQUAL_INT(RATED, step().torque);
+    in.wanted = INT16_MIN;
+    TEST_ASSERT_EQUAL_INT(-RATED, step().torque);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, step().derating);
+}
+
+/* Driving is torque with the rotation, generating against it: four quadrants. */
+void test_driving_and_generating_are_limited_apart_in_both_directions_of_rotation(void)
+{
+    limits.torque_drive = 5000;
+    limits.torque_regen = 3000;
+    static const int expected[4][3] = {{1, 8000, 5000}, {1, -8000, -3000}, {-1, -8000, -5000}, {-1, 8000, 3000}};
+    for (int n = 0; n < 4; n++) {
+        in.omega = (q15_t)(expected[n][0] * 16384);
+        in.wanted = (q15_t)expected[n][1];
+        const torque_limit_t y = step();
+        TEST_ASSERT_EQUAL_INT(expected[n][2], y.torque);
+        TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, y.derating);
+    }
+}
+
+/* p = t w: 0.1 at half speed is 0.2 of torque; no loss is known yet. */
+void test_power_limits_become_torque_by_the_speed(void)
+{
+    limits.power_drive = counts(0.1);
+    limits.power_regen = counts(0.05);
+    TEST_ASSERT_INT_WITHIN(2, counts(0.2), step().torque);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_POWER, step().derating);
+    in.wanted = counts(-0.25);
+    TEST_ASSERT_INT_WITHIN(2, counts(-0.1), step().torque);
+    in.omega = 1000; /* slow: the same power is no limit */
+    TEST_ASSERT_EQUAL_INT(counts(-0.25), step().torque);
+}
+
+/* u.i - t w = 0.2 * 0.5 - 0 = 0.1, plus drop 0.004 * 0.5, is the loss: the battery pays for it when driving, and it
+ * relieves it when generating. 100 steps of 0.05: settled to 0.6 %. */
+void test_losses_count_on_the_dc_side(void)
+{
+    in.u = (dq_t){0, counts(0.2)};
+    in.i = (dq_t){0, counts(0.5)};
+    for (int n = 0; n < 100; n++) {
+        (void)step();
+    }
+    limits.power_drive = counts(0.15);
+    limits.power_regen = counts(0.01);
+    TEST_ASSERT_INT_WITHIN(60, counts((0.15 - 0.102) / 0.5), step().torque);
+    in.wanted = counts(-0.25);
+    TEST_ASSERT_INT_WITHIN(60, counts(-(0.01 + 0.102) / 0.5), step().torque);
+}
+
+void test_a_power_below_the_losses_allows_no_driving_torque(void)
+{
+    state.loss = 300000000; /* 0.14 */
+    limits.power_drive = counts(0.1);
+    TEST_ASSERT_EQUAL_INT(0, step().torque);
+    limits.power_drive = -1000;
+    TEST_ASSERT_EQUAL_INT(0, step().torque);
+}
+
+/* Halfway down each line half the rated torque is left: 9830. */
+static void halved(uint16_t reason, int driving, int generating)
+{
+    in.wanted = 15000;
+    const torque_limit_t up = step();
+    in.wanted = -15000;
+    const torque_limit_t down = step();
+    TEST_ASSERT_INT_WITHIN(20, driving ? RATED / 2 : 15000, up.torque);
+    TEST_ASSERT_INT_WITHIN(20, generating ? -RATED / 2 : -15000, down.torque);
+    TEST_ASSERT_EQUAL_HEX16(driving ? reason : 0, up.derating);
+    TEST_ASSERT_EQUAL_HEX16(generating ? reason : 0, down.derating);
+}
+
+void test_a_hot_inverter_halves_both_directions_halfway_down_its_line(void)
+{
+    in.inverter_dC = 950;
+    halved(DERATING_INVERTER, 1, 1);
+}
+
+void test_a_hot_winding_halves_both_directions_halfway_down_its_line(void)
+{
+    in.winding_dC = 1675;
+    halved(DERATING_WINDING, 1, 1);
+}
+
+void test_low_dc_voltage_takes_driving_torque_only(void)
+{
+    in.v_dc = 10240;
+    halved(DERATING_DC_LOW, 1, 0);
+}
+
+void test_high_dc_voltage_takes_generating_torque_only(void)
+{
+    in.v_dc = 26500;
+    halved(DERATING_DC_HIGH, 0, 1);
+}
+
+void test_beyond_maximum_speed_only_driving_torque_goes(void)
+{
+    in.omega = 29000;
+    halved(DERATING_SPEED, 1, 0);
+    in.omega = -29000;
+    in.wanted = 15000; /* brakes */
+    TEST_ASSERT_EQUAL_INT(15000, step().torque);
+}
+
+void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(void)
+{
+    static const int16_t hot[] = {1050, 2000, INT16_MAX};
+    for (int n = 0; n < 3; n++) {
+        in.inverter_dC = hot[n];
+        TEST_ASSERT_EQUAL_INT(0, step().torque);
+    }
+    in.inverter_dC = INT16_MIN + 1;
+    TEST_ASSERT_EQUAL_INT(counts(0.25), step().torque);
+}
+
+void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves(void)
+{
+    in.wanted = 15000;
+    in.inverter_dC = TEMPERATURE_UNKNOWN;
+    in.winding_dC = TEMPERATURE_UNKNOWN;
+    TEST_ASSERT_EQUAL_INT(15000, step().torque);
+    in.winding_dC = ROOM_C;
+    (void)step();
+    in.winding_dC = TEMPERATURE_UNKNOWN;
+    TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_WINDING, step().derating);
+}
+
+void test_what_the_machine_cannot_reach_is_not_asked_for(void)
+{
+    in.reach = 4000;
+    TEST_ASSERT_EQUAL_INT(4000, step().torque);
+    in.wanted = -8000;
+    TEST_ASSERT_EQUAL_INT(-4000, step().torque);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_REACH, step().derating);
+    in.wanted = 100;
+    TEST_ASSERT_EQUAL_HEX16(0, step().derating);
+}
+
+/* Holding a car on a slope must not depend on which way it rolls: the driving limit holds for both. */
+void test_near_standstill_the_driving_limit_holds_for_both_signs_and_nothing_jumps(void)
+{
+    limits.torque_drive = 8000;
+    limits.torque_regen = 2000;
+    in.wanted = -15000;
+    int last = 8000;
+    for (int w = 0; w <= 700; w++) {
+        in.omega = (q15_t)w;
+        const int now = -step().torque;
+        TEST_ASSERT_TRUE(now <= last && last - now <= 25); /* 6000 over 300 counts */
+        last = now;
+    }
+    TEST_ASSERT_EQUAL_INT(2000, last);
+    in.omega = 0;
+    TEST_ASSERT_EQUAL_INT(-8000, step().torque);
+    in.wanted = 15000;
+    TEST_ASSERT_EQUAL_INT(8000, step().torque);
+}
+
+/* The quotient of power and speed: 1/2 LSB of power over |w| >= 0.02; the loss carries 2 LSB. */
+void test_the_limit_follows_the_twin(void)
+{
+    worst_t worst = {0};
+    uint64_t seed = 99;
+    twin_limit_state_t t_state = {0};
+    const double power = 1.5 * f.v * f.i;
+    f.si.torque_max_Nm = RATED / 32768.0 * f.t;
+    for (int n = 0; n < 100000; n++) {
+        limits = (torque_limits_t){(q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000),
+                                   (q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000)};
+        in = (torque_limit_in_t){
+            .wanted = (q15_t)random_in(&seed, -32767, 32767), .limits = &limits,
+            .u = {random_in(&seed, -9000, 9000), random_in(&seed, -9000, 9000)},
+            .i = {random_in(&seed, -20000, 0), random_in(&seed, -20000, 20000)},
+            .torque = (q15_t)random_in(&seed, -3000, 3000), .omega = (q15_t)random_in(&seed, 650, 32767),
+            .v_dc = (q15_t)random_in(&seed, 7000, 28000), .reach = (q15_t)random_in(&seed, 0, 25000),
+            .inverter_dC = (int16_t)random_in(&seed, 0, 1200), .winding_dC = (int16_t)random_in(&seed, 0, 2000),
+        };
+        in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
+        const twin_limit_in_t t = {
+            from_q15(in.wanted) * f.t, from_q15(limits.torque_drive) * f.t, from_q15(limits.torque_regen) * f.t,
+            from_q15(limits.power_drive) * power, from_q15(limits.power_regen) * power,
+            {from_q15(in.u.d) * f.v, from_q15(in.u.q) * f.v}, {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i},
+            from_q15(in.torque) * f.t, from_q15(in.omega) * f.w, from_q15(in.v_dc) * f.v, from_q15(in.reach) * f.t,
+            in.inverter_dC / 10.0, in.winding_dC / 10.0};
+        const double s = twin_torque_limit(&f.si, &t_state, &t);
+        worst_note(&worst, step().torque - s / f.t * 32768.0, "step %d, wanted %d, w %d", n, in.wanted, in.omega);
+    }
+    ASSERT_WORST(worst, 60.0);
+}
+
+void test_lines_that_lead_the_wrong_way_are_rejected(void)
+{
+    TEST_ASSERT_TRUE(torque_limit_valid(&f.torque_limit));
+    torque_limit_config_t c = f.torque_limit;
+    c.winding.gain = 1;
+    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    c = f.torque_limit;
+    c.dc_low.gain = -1;
+    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    c = f.torque_limit;
+    c.torque_max = 0;
+    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    c = f.torque_limit;
+    c.loss_rate = 0;
+    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+}

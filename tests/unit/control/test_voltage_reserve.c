@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/voltage_reserve.h"
+
+#include <math.h>
+
+#include "fixture.h"
+#include "unity.h"
+
+static fixture_t f;
+static voltage_reserve_state_t state;
+static voltage_reserve_in_t in;
+
+/* v_ratio v_dc = 0.55 * 0.6667 = 0.36667, 12015 counts: the voltage is 0.3, the references sit on their flux. */
+void setUp(void)
+{
+    f = fixture();
+    state = (voltage_reserve_state_t){0};
+    in = (voltage_reserve_in_t){.u = {0, 9830}, .v_dc = 21845, .psi = {8000, 6000}, .psi_plan = 10000, .acting = true};
+}
+
+void tearDown(void)
+{
+}
+
+static voltage_reserve_t step(void)
+{
+    return voltage_reserve_step(&f.voltage_reserve, &state, &in);
+}
+
+static int32_t trim(void)
+{
+    return state.trim / 65536;
+}
+
+void test_on_the_limit_a_twentieth_of_the_missing_voltage_is_added_each_step(void)
+{
+    (void)step();
+    TEST_ASSERT_INT32_WITHIN(1, (12015 - 9830) / 20, trim());
+    in.u.q = 13000; /* too much */
+    state.trim = 0;
+    (void)step();
+    TEST_ASSERT_INT32_WITHIN(1, (12015 - 13000) / 20, trim());
+}
+
+void test_voltage_left_away_from_the_limit_is_no_reason_to_ask_for_more(void)
+{
+    in.psi = (dq_t){4800, 3600};
+    for (int n = 0; n < 100; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(0, state.trim);
+}
+
+void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
+{
+    in.psi = (dq_t){4800, 3600};
+    in.u.q = -13000;
+    (void)step();
+    TEST_ASSERT_INT32_WITHIN(1, (12015 - 13000) / 20, trim());
+}
+
+/* 0.95^100 = 0.0059 */
+void test_away_from_the_limit_and_with_the_bridge_off_the_trim_is_forgotten(void)
+{
+    for (int off = 0; off < 2; off++) {
+        in.psi = off ? (dq_t){8000, 6000} : (dq_t){4800, 3600};
+        in.acting = !off;
+        state.trim = -1000 * 65536;
+        for (int n = 0; n < 100; n++) {
+            (void)step();
+        }
+        TEST_ASSERT_INT32_WITHIN(10, -6, trim());
+    }
+}
+
+void test_the_trim_stays_within_its_authority(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(f.voltage_reserve.trim_max, trim());
+    in.u = (dq_t){INT16_MIN, INT16_MIN};
+    for (int n = 0; n < 1000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(f.voltage_reserve.trim_min, trim());
+}
+
+/* |(0.8, 0.6) + (0.1, 0)| = 1.0817 in units of 10000. */
+void test_the_magnets_share_is_what_it_adds_to_the_flux(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, step().shift);
+    in.psi_delta = 1000;
+    TEST_ASSERT_INT_WITHIN(2, 817, step().shift);
+    in.psi_delta = -1000;
+    TEST_ASSERT_INT_WITHIN(2, (int)(sqrt(49e6 + 36e6) - 10000), step().shift);
+}
+
+/* Three lengths of 0.7 LSB each; the gain makes the trim's part of that small. */
+void test_the_reserve_follows_the_twin(void)
+{
+    worst_t worst = {0};
+    uint64_t seed = 7;
+    double si_trim = 0.0;
+    for (int n = 0; n < 100000; n++) {
+        in.u = (dq_t){random_in(&seed, -12000, 12000), random_in(&seed, -12000, 12000)};
+        in.v_dc = (q15_t)random_in(&seed, 15000, 30000);
+        in.psi = (dq_t){random_in(&seed, 0, 20000), random_in(&seed, -20000, 20000)};
+        in.psi_delta = (q15_t)random_in(&seed, -4000, 2000);
+        in.psi_plan = (q15_t)((n & 1) ? hypot(in.psi.d, in.psi.q) : 32767);
+        in.acting = (n % 7) != 0;
+        if (fabs(0.55 * in.v_dc - hypot(in.u.d, in.u.q)) < 4.0) {
+            continue; /* either side of the limit */
+        }
+        const twin_reserve_in_t t = {
+            .u = {in.u.d / 32768.0 * f.v, in.u.q / 32768.0 * f.v},
+            .psi = {in.psi.d / 32768.0 * f.psi, in.psi.q / 32768.0 * f.psi},
+            .v_dc = in.v_dc / 32768.0 * f.v,
+            .psi_plan = in.psi_plan / 32768.0 * f.psi,
+            .psi_delta = in.psi_delta / 32768.0 * f.psi,
+            .acting = in.acting,
+        };
+        const voltage_reserve_t y = step();
+        const double shift = twin_voltage_reserve(&f.si, &si_trim, &t);
+        worst_note(&worst, y.shift - shift / f.psi * 32768.0, "shift of step %d", n);
+        worst_note(&worst, y.v_trim - si_trim / f.v * 32768.0, "trim of step %d", n);
+    }
+    ASSERT_WORST(worst, 3.0);
+}

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/plausibility.h"
+
+#include <math.h>
+
+#include "types/faults.h"
+#include "unity.h"
+
+static const plausibility_config_t config = {.e_0 = 2000, .i_dead = 400, .i_alive = 2400, .omega_trip = 32000,
+                                             .inverter_trip_dC = 1050, .winding_trip_dC = 1800};
+static plausibility_state_t state;
+static plausibility_in_t in;
+static int now;
+
+void setUp(void)
+{
+    state = (plausibility_state_t){0};
+    now = 0;
+    in = (plausibility_in_t){.acting = true, .i = {-8000, 8000}, .i_ref = {-8000, 8000}, .omega = 10000};
+}
+
+void tearDown(void)
+{
+}
+
+/* One millisecond of a machine that turns 0.7 rad in it; `broken`: that phase carries nothing. */
+static uint32_t turn(int broken)
+{
+    const double a = 0.7 * now++;
+    const int32_t want[3] = {(int32_t)(11314 * cos(a)), (int32_t)(11314 * cos(a - 2.0944)),
+                             (int32_t)(11314 * cos(a + 2.0944))};
+    in.wanted = (abc_t){want[0], want[1], want[2]};
+    in.phases = (abc_t){broken == 0 ? now % 3 : want[0], broken == 1 ? now % 3 : want[1],
+                        broken == 2 ? now % 3 : want[2]};
+    return plausibility_step(&config, &state, &in);
+}
+
+static int steps_until(uint32_t fault, int broken)
+{
+    for (int n = 1; n <= 1000; n++) {
+        if (turn(broken) & fault) {
+            return n;
+        }
+    }
+    return -1;
+}
+
+void test_a_machine_that_follows_raises_nothing(void)
+{
+    TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, -1));
+}
+
+/* e_0 + |i_ref|/8 = 2000 + 1414. */
+void test_a_current_that_does_not_follow_is_found_in_20_ms_and_in_100_while_the_voltage_is_cut(void)
+{
+    in.i.q = in.i_ref.q - 3500;
+    TEST_ASSERT_EQUAL_INT(20, steps_until(FAULT_CONTROL, -1));
+    setUp();
+    in.i.q = in.i_ref.q - 3500;
+    in.voltage_limited = true;
+    TEST_ASSERT_EQUAL_INT(100, steps_until(FAULT_CONTROL, -1));
+    setUp();
+    in.i.q = in.i_ref.q - 3300;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_CONTROL, -1));
+}
+
+void test_a_deviation_every_other_sample_is_noise(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        in.i.q = in.i_ref.q + ((n & 1) ? 5000 : 0);
+        TEST_ASSERT_EQUAL_HEX32(0, turn(-1));
+    }
+}
+
+void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
+{
+    for (int x = 0; x < 3; x++) {
+        setUp();
+        const int found = steps_until(FAULT_PHASE_LOST, x);
+        TEST_ASSERT_TRUE(found > 0 && found <= 20);
+    }
+}
+
+/* A phase that should carry nothing at this angle, and does not, is no evidence. */
+void test_a_phase_at_its_zero_crossing_is_not_missed(void)
+{
+    in.wanted = (abc_t){0, 9800, -9800};
+    for (int n = 0; n < 1000; n++) {
+        in.phases = (abc_t){n % 5, 9800 + n % 3, -9800 - n % 7};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
+    }
+}
+
+void test_a_sensor_that_repeats_itself_20_times_while_the_others_move_is_stuck(void)
+{
+    for (int x = 0; x < 3; x++) {
+        setUp();
+        int found = 0;
+        for (int n = 1; n <= 100 && !found; n++) {
+            const int32_t held = 5000;
+            const int32_t moves = (n & 1) ? 3000 : 3101; /* i_dead/4 = 100 */
+            in.phases = (abc_t){x == 0 ? held : moves, x == 1 ? held : -moves, x == 2 ? held : 2 * moves};
+            in.wanted = in.phases;
+            found = (plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK) ? n : 0;
+        }
+        TEST_ASSERT_EQUAL_INT(21, found); /* the first sample is equal to nothing */
+    }
+}
+
+/* A quantised current at the edge of a step flickers by one of them while another phase repeats: 16 counts. */
+void test_phases_that_only_flicker_are_no_evidence(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        in.phases = in.wanted = (abc_t){5000, -2500 + 16 * (n & 1), -2500 - 16 * (n & 1)};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
+    }
+}
+
+void test_a_machine_at_rest_repeats_all_its_currents(void)
+{
+    in.phases = in.wanted = (abc_t){5000, -2500, -2500};
+    for (int n = 0; n < 1000; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
+    }
+}
+
+void test_over_speed_needs_five_samples_in_a_row_in_either_direction(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        setUp();
+        in.omega = (q15_t)(sign * 32001);
+        TEST_ASSERT_EQUAL_INT(5, steps_until(FAULT_OVER_SPEED, -1));
+        in.omega = (q15_t)(sign * 32000);
+        TEST_ASSERT_EQUAL_HEX32(0, turn(-1));
+    }
+}
+
+void test_over_temperature_is_confirmed_after_110_ms_also_at_rest(void)
+{
+    in.acting = false;
+    in.inverter_dC = 1050;
+    TEST_ASSERT_EQUAL_INT(110, steps_until(FAULT_TEMPERATURE, -1));
+    setUp();
+    in.winding_dC = 1800;
+    TEST_ASSERT_EQUAL_INT(110, steps_until(FAULT_TEMPERATURE, -1));
+    setUp();
+    in.inverter_dC = INT16_MIN; /* unknown */
+    in.winding_dC = 1799;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_TEMPERATURE, -1));
+}
+
+void test_a_bridge_that_is_off_follows_nothing(void)
+{
+    in.acting = false;
+    in.i = (dq_t){0, 0};
+    TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, 0));
+}
