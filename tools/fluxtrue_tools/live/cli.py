@@ -78,12 +78,12 @@ def _listen(port: int) -> socket.socket:
 
 def _serve(session: Session, port: int) -> None:
     listener = _listen(port)
-    click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")
 
     async def _run() -> None:
         runner = web.AppRunner(make_app(session), access_log=None)
         await runner.setup()
         await web.SockSite(runner, listener).start()
+        click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")
         try:
             await asyncio.Event().wait()
         finally:

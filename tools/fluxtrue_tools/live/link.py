@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus side of the page: listens, sends the protected command every 10 ms, records."""
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -73,6 +74,10 @@ class Recorder:
         path = self._folder / f"live-{datetime.now():%Y%m%d-%H%M%S}.mf4"
         log.write(path, self._dbc)
         return path
+
+
+# It warns of every frame that a read has cut in two, and then puts it together.
+logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
 
 
 class Link:
