@@ -51,6 +51,7 @@ def _enable(browser: webdriver.Chrome, url: str) -> None:
     _until(browser, lambda: _state(browser) == "run", "run")
     _until(browser, lambda: _find(browser, "torque").is_enabled(), "the slider")
     _slide(browser, "speed_rpm", 2000.0)
+    _until(browser, lambda: _newest(browser, "INV_Status", "Speed") > 1990.0, "2000 rpm")
 
 
 @pytest.fixture

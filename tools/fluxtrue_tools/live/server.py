@@ -74,7 +74,7 @@ async def _page(request: web.Request) -> web.FileResponse:
 
 
 def _hello(session: Session) -> dict[str, Any]:
-    stand = {name: [lo, hi] for name, (_, _, lo, hi) in KNOBS.items()} if session.stand else {}
+    stand = {name: [knob.lo, knob.hi, knob.start] for name, knob in KNOBS.items()} if session.stand else {}
     return {"type": "hello", "title": session.title, "torque_max_Nm": session.commander.torque_max_Nm,
             "replay": session.link is None, "tuning": session.tuning is not None, "stand": stand,
             "faults": session.faults}  # fmt: skip
@@ -119,11 +119,11 @@ async def _tune(session: Session, message: dict[str, Any]) -> dict[str, Any]:
     return {"type": "tuned", "name": name, "value": held}
 
 
-async def _knob(session: Session, message: dict[str, Any]) -> None:
+def _knob(session: Session, message: dict[str, Any]) -> None:
     if session.stand is None or message.get("name") not in KNOBS:
         raise FluxtrueError(f"no knob '{message.get('name')}'")
     value = _number(message.get("value"), str(message["name"]))
-    await asyncio.to_thread(session.stand.turn, message["name"], value)
+    session.stand.turn(message["name"], value)
 
 
 async def _record(session: Session, message: dict[str, Any]) -> dict[str, Any]:
@@ -146,7 +146,7 @@ async def _answer(session: Session, socket: web.WebSocketResponse, text: str) ->
         case "tune_list" | "tune":
             return await _tune(session, message)
         case "knob":
-            await _knob(session, message)
+            _knob(session, message)
         case "record":
             return await _record(session, message)
         case other:

@@ -4,6 +4,7 @@
 import logging
 import struct
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from typing import Any, Final
 
 from pyxcp.config import create_application_from_config
@@ -47,13 +48,15 @@ class Tuning:
         self._address = address
         self._values = {value.name: value for value in description.values}
         self._master: Master | None = None
+        self._stack = ExitStack()  # closes the connection
         self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="xcp")
 
     def _session(self) -> Master:
         if self._master is None:
-            self._master = _connect(self._address)
-            self._master.connect()
-            self._master.cond_unlock()
+            master = self._stack.enter_context(_connect(self._address))
+            master.connect()
+            master.cond_unlock()
+            self._master = master
         return self._master
 
     def _read(self, name: str) -> float:
@@ -90,6 +93,5 @@ class Tuning:
 
     def close(self) -> None:
         """End the session."""
-        if self._master is not None:
-            self.thread.submit(self._master.close).result(5.0)
+        self.thread.submit(self._stack.close).result(5.0)
         self.thread.shutdown()

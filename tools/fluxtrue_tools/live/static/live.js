@@ -203,10 +203,10 @@ function onHello(message) {
   $("record").disabled = message.replay;
   $("tune-read").disabled = !message.tuning;
   if (message.replay) $("hand").textContent = "A recorded drive: nothing is commanded.";
-  const knobs = { speed_rpm: ["speed-value", "rpm", 0], magnet_percent: ["magnet-value", "%", 100],
-    winding_C: ["winding-value", "°C", 20] };
-  for (const [name, [lo, hi]] of Object.entries(message.stand)) {
-    const [label, unit, start] = knobs[name];
+  const knobs = { speed_rpm: ["speed-value", "rpm"], magnet_percent: ["magnet-value", "%"],
+    winding_C: ["winding-value", "°C"] };
+  for (const [name, [lo, hi, start]] of Object.entries(message.stand)) {
+    const [label, unit] = knobs[name];
     const show = () => { $(label).textContent = `${$(name).value} ${unit}`; };
     Object.assign($(name), { min: lo, max: hi, value: start });
     $(name).oninput = () => { show(); send({ type: "knob", name, value: Number($(name).value) }); };
