@@ -23,6 +23,9 @@ typedef struct {
 
 double emulated_get(emulated_t *e, const char *name);
 
+/** What the image makes of the thermistors, for a drive on the host. */
+void temperatures_take(const emulated_t *e, fluxtrue_t *host);
+
 bool shadow_start(emulated_t *e);
 void shadow_inputs(emulated_t *e);
 void shadow_compare(emulated_t *e);

@@ -106,6 +106,7 @@ static drive_t victim_here(preempt_t *p, const drive_t *inputs)
 {
     p->host->drive = *inputs;
     p->host->drive.motor = p->e->mirror.host->drive.motor;
+    temperatures_take(p->e, p->host);
     host_port_select(p->host);
     if (p->victim == PREEMPT_MRAI) {
         mrai_isr(&p->host->drive);

@@ -9,6 +9,8 @@
 #include "emulated_private.h"
 #include "fx/q.h"
 #include "hal/host/port.h"
+#include "hal/s32k144/ntc.h"
+#include "hal/temperature.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48 };
 #define PWM_TICK_S (1.0 / 112e6)
@@ -35,11 +37,25 @@ static void samples_take(emulated_t *e)
     e->shadow->theta_m = angle_read(e);
 }
 
+static double temperature(uint32_t count, bool *broken)
+{
+    const int16_t dC = ntc_dC((uint16_t)count);
+    *broken = dC == HAL_TEMPERATURE_UNKNOWN;
+    return *broken ? 0.0 : dC / 10.0;
+}
+
+void temperatures_take(const emulated_t *e, fluxtrue_t *host)
+{
+    host->winding_C = temperature((uint32_t)emu_register(e->emu, "ADC0.R2"), &host->board.winding_broken);
+    host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
+}
+
 /* The task is computed as a whole when it begins; what it writes reaches the shadow as the image writes it: at its end,
  * or, when it is interrupted, byte by byte as far as the image's memory already has the new values. */
 static void task_begins(emulated_t *e)
 {
     const drive_t before = e->shadow->drive;
+    temperatures_take(e, e->shadow);
     task_1khz(&e->shadow->drive);
     e->task_result = e->shadow->drive;
     e->shadow->drive = before;
