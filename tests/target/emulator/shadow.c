@@ -54,16 +54,38 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
  * or, when it is interrupted, byte by byte as far as the image's memory already has the new values. */
 static void task_begins(emulated_t *e)
 {
-    const drive_t before = e->shadow->drive;
+    e->task_before = e->shadow->drive;
     temperatures_take(e, e->shadow);
     task_1khz(&e->shadow->drive);
     e->task_result = e->shadow->drive;
-    e->shadow->drive = before;
+    e->shadow->drive = e->task_before;
     e->task_runs = true;
+    e->task_late = false;
+}
+
+/* What came while the task was interrupted may have been read late: each box as a whole, the old or the new one. */
+static void task_again(emulated_t *e)
+{
+    const drive_t now = e->shadow->drive;
+    for (int choice = 1; choice < 4; choice++) {
+        e->shadow->drive = e->task_before;
+        e->shadow->drive.samples = (choice & 1) != 0 ? now.samples : e->task_before.samples;
+        e->shadow->drive.windows = (choice & 2) != 0 ? now.windows : e->task_before.windows;
+        task_1khz(&e->shadow->drive);
+        if (memcmp(&e->shadow->drive.commands, &e->mirror.host->drive.commands, sizeof now.commands) == 0 &&
+            e->shadow->drive.task.identified.psi_delta == e->mirror.host->drive.task.identified.psi_delta) {
+            e->task_result = e->shadow->drive;
+        }
+    }
+    e->shadow->drive = now;
 }
 
 static void task_ends(emulated_t *e)
 {
+    mirror_pull(&e->mirror);
+    if (e->task_late && e->task_result.task.identified.psi_delta != e->mirror.host->drive.task.identified.psi_delta) {
+        task_again(e);
+    }
     e->shadow->drive.task = e->task_result.task;
     e->shadow->drive.commands = e->task_result.commands;
     e->shadow->drive.schedules = e->task_result.schedules;
@@ -82,6 +104,7 @@ static void part_take(emulated_t *e, size_t offset, size_t size)
 
 static void task_interrupted(emulated_t *e)
 {
+    e->task_late = true;
     mirror_pull(&e->mirror);
     part_take(e, offsetof(drive_t, task), sizeof e->task_result.task);
     part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
