@@ -10,7 +10,7 @@ from fluxtrue_tools.sim.library import Loop
 
 RPM = 2 * np.pi / 60
 # Held for 10 s in both modes before limits, derating and slow monitors joined the task; since then the task's state
-# differs from the shadow's after 0.15 to 0.4 s. Not explained yet: an input that the shadow is not given, or a difference.
+# differs from the shadow's after 0.15 to 0.4 s. Not explained yet: an input the shadow is not given, or a difference.
 UNEXPLAINED = pytest.mark.xfail(strict=False, reason="the task with limits and monitors: not explained yet")
 POINTS = [(speed, torque) for speed in grid.SPEEDS_RPM for torque in grid.TORQUES_NM]
 
