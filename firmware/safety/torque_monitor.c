@@ -5,17 +5,17 @@
 #include "fx/vec.h"
 #include "types/faults.h"
 
-enum { CONFIRM_SAMPLES = 5, SETTLE_SAMPLES = 5 };
+enum { TORQUE_SAMPLES = 20, ANGLE_SAMPLES = 5, SETTLE_SAMPLES = 5 };
 
 #define MEAN Q15(0.25)
 #define PSI_WEAK Q15(0.5)    /* of psi_f: a magnet has never lost that much */
 #define PSI_STRONG Q15(0.35)
 #define PSI_ASIDE Q15(0.2)
 
-static uint32_t confirm(uint8_t *count, bool bad, uint32_t fault)
+static uint32_t confirm(uint8_t *count, bool bad, uint8_t limit, uint32_t fault)
 {
-    *count = bad ? (uint8_t)fx_min_s32(*count + 1, CONFIRM_SAMPLES) : 0;
-    return (*count >= CONFIRM_SAMPLES) ? fault : 0;
+    *count = bad ? (uint8_t)fx_min_s32(*count + 1, limit) : 0;
+    return (*count >= limit) ? fault : 0;
 }
 
 static q15_t dot(dq_t a, dq_t b)
@@ -32,7 +32,7 @@ static dq_t changing(const torque_monitor_config_t *config, const torque_monitor
 
 /* Too much, or against the request; too little is no hazard (MN-7), (MN-8). */
 static bool too_much(const torque_monitor_config_t *config, torque_monitor_state_t *state,
-                     const torque_monitor_in_t *in, dq_t emf)
+                     const torque_monitor_in_t *in, dq_t emf, dq_t change)
 {
     const int32_t error = dot(emf, in->i) - fx_mul_q15(in->torque, in->omega);
     const q15_t step = fx_sat_q15(error - fx_q15_from_q31(state->deviation));
@@ -41,7 +41,9 @@ static bool too_much(const torque_monitor_config_t *config, torque_monitor_state
 
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
-    const int32_t power = fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(config->v_0, fx_add_q15(current, config->i_0));
+    /* The tables' slope is not exact, nor was the change the same all through the millisecond. */
+    const q15_t unsure = fx_sat_q15(config->v_0 + (fx_abs_q31(change.d) + fx_abs_q31(change.q)) / 2);
+    const int32_t power = fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(unsure, fx_add_q15(current, config->i_0));
     const int32_t asked = fx_mul_q15(in->torque, in->omega);
     if (fx_abs_q31(asked) < fx_mul_q15(config->t_0, fx_abs_q15(in->omega))) {
         return fx_abs_q31(mean) > power; /* around no torque either sign is too much */
@@ -83,6 +85,6 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
     const q15_t drop_d = fx_mul_gain_q15(config->r, (q15_t)in->i.d);
     const q15_t drop_q = fx_mul_gain_q15(config->r, (q15_t)in->i.q);
     const dq_t emf = {fx_sat_q15(in->u.d - drop_d - change.d), fx_sat_q15(in->u.q - drop_q - change.q)};
-    return confirm(&state->torque, too_much(config, state, in, emf), FAULT_TORQUE) |
-           confirm(&state->angle, turned(config, in, emf, change), FAULT_ANGLE_OFFSET);
+    return confirm(&state->torque, too_much(config, state, in, emf, change), TORQUE_SAMPLES, FAULT_TORQUE) |
+           confirm(&state->angle, turned(config, in, emf, change), ANGLE_SAMPLES, FAULT_ANGLE_OFFSET);
 }

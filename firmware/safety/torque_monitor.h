@@ -4,11 +4,12 @@
 /** Torque and angle judged from the voltages alone: a path that shares neither tables' torque nor identification with
  * the control, and works without a division.
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
- *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + v_0 (|i| + i_0), or against the request by as much
+ *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2) (|i| + i_0), or against the request
+ *           by as much
  *   angle   e = u - r i - j w psi(i): a magnet that is weak or strong shows in e_q, a wrong angle in e_d
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
  *           v = v_0/2 + r |i| + |d psi/dt|/2; blind while |w| psi_f/5 < v_0/2
- *   each confirmed by 5 ms in a row
+ *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
  * Source   docs/theory/monitors.md (MN-6) ... (MN-10)
  * Units    per unit
  * Range    every argument; saturates

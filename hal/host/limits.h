@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_HOST_LIMITS_H
 #define HAL_HOST_LIMITS_H
-/** The vehicle's limits, the inverter's temperature and the monitors that need a machine, in SI, for the names of fluxtrue_set() and fluxtrue_get().
+/** The vehicle's limits, the inverter's temperature and the monitors that need a machine, in SI,
+ * for the names of fluxtrue_set() and fluxtrue_get().
  * Units    N·m, W on the dc side, degrees C
  * Range    not negative; from the format's end on a limit is open
  * Errors   none: fluxtrue_set() has checked the range

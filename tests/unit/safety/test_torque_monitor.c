@@ -84,7 +84,7 @@ void test_magnets_from_20_percent_weak_to_10_percent_strong_are_no_fault(void)
 }
 
 /* The machine makes 0.126; allowed beyond the command are 0.034 and an eighth of it, and 0.013 |i|/|w| = 0.007. */
-void test_more_torque_than_asked_for_is_found_within_ten_milliseconds_of_settling(void)
+void test_more_torque_than_asked_for_is_found_within_30_milliseconds_of_settling(void)
 {
     static const int signs[2] = {1, -1};
     for (int n = 0; n < 2; n++) {
@@ -92,7 +92,7 @@ void test_more_torque_than_asked_for_is_found_within_ten_milliseconds_of_settlin
         machine(0.5, -0.2, signs[n] * 0.2, 1.0, 0.0);
         in.torque = (q15_t)(signs[n] * q15(0.06));
         const int found = steps_until(FAULT_TORQUE);
-        TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 10);
+        TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 30);
         fresh();
         in.torque = (q15_t)(signs[n] * q15(0.09));
         TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_TORQUE));
@@ -103,7 +103,7 @@ void test_torque_against_the_request_is_found(void)
 {
     in.torque = (q15_t)q15(-0.1);
     const int found = steps_until(FAULT_TORQUE);
-    TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 10);
+    TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 30);
 }
 
 void test_torque_of_either_sign_around_a_zero_request_is_found(void)

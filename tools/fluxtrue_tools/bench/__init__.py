@@ -94,8 +94,8 @@ def drive_table(stages: Iterable[Stage], counted: int, limited: int) -> str:
     """The drive's stages as text, other projects' ticks below."""
     lines = [
         "",
-        f"The drive, hsm1, {counted} periods in closed loop with a linear machine (torque steps at 3000 rpm, then",
-        f"a run-up into the voltage limit: {limited} periods limited); -O2, optimised across files; hardware access",
+        f"The drive, hsm1, {counted} periods in closed loop with its own map (torque steps at 3000 rpm, then",
+        f"a run-up into the voltage limit: {limited} periods limited); -O2 -fno-schedule-insns -flto; hardware access",
         "is a few variables. Stages as calls, the interrupts as they are; a period's own stages are inlined.",
         "",
         f"{'stage':<42}{'min':>5}{'avg':>8}{'max':>5}",

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drive's own cost: fast ISR, MRAI ISR and their stages on the emulated Cortex-M4.
 
-The firmware runs in closed loop with a small linear machine of this file's own, sampled once per
+The firmware runs in closed loop with the machine of hsm1's map, sampled once per
 period: torque steps in both directions at constant speed, then a run-up into the voltage limit.
-Nothing of the machine is meant to be accurate; it only keeps currents and duties where a drive's are.
+The inverter is an average one; what is measured keeps currents and duties where a drive's are.
 """
 
 from __future__ import annotations
@@ -20,10 +20,12 @@ import numpy as np
 from fluxtrue_tools.bench.build import FIRMWARE, ROOT, build_host, build_target
 from fluxtrue_tools.bench.machine import Machine
 from fluxtrue_tools.motor.build import build as build_motor
+from fluxtrue_tools.motor.flux_model import FluxModel
+from fluxtrue_tools.motor.motor import load_motor
 
 LTO = ("-flto",)
 OUTPUTS = 24
-SUB_STEPS = 10
+SUB_STEPS = 4
 TORQUE = 13653  # q15 of the base: about 100 N·m of hsm1
 TORQUES = (TORQUE, -TORQUE // 2, TORQUE // 3, TORQUE)
 PERIODS, RUN_UP_FROM, WARM_UP, STEP_PERIODS = 2400, 1600, 100, 200
@@ -72,7 +74,7 @@ def sources(folder: Path) -> list[Path]:
     """All of the firmware with the tables of hsm1, which are generated into the folder."""
     build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
     firmware = [path for layer in ("fx", "signal", "control", "safety") for path in (FIRMWARE / layer).glob("*.c")]
-    app = ("drive", "fast_isr", "identification", "mrai_isr", "task_1khz")
+    app = ("drive", "fast_isr", "identification", "mrai_isr", "slow_monitors", "task_1khz")
     firmware += [FIRMWARE / "app" / f"{name}.c" for name in app]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
 
@@ -89,20 +91,34 @@ def build_drive_host(folder: Path, flags: tuple[str, ...] = ()) -> Path:
 
 @dataclass
 class Load:
-    """A permanent-magnet machine with constant inductances on an average-value inverter."""
+    """The machine of the tables, hsm1's map, on an average-value inverter: what the monitors expect to see."""
 
-    l_d: float = 454e-6
-    l_q: float = 1.2e-3
-    psi_f: float = 0.0717
+    model: FluxModel
     r: float = 0.018
     pole_pairs: int = 3
     v_dc: float = 350.0
     period_s: float = 1e-4
     theta: float = 0.0
-    psi: list[float] = field(default_factory=lambda: [0.0717, 0.0])
+    i: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    psi: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.psi = [float(self.model.psi_d(0.0, 0.0)), 0.0]
 
     def currents(self) -> tuple[float, float]:
-        return (self.psi[0] - self.psi_f) / self.l_d, self.psi[1] / self.l_q
+        return self.i[0], self.i[1]
+
+    def _solve(self) -> None:
+        """The currents of psi, by Newton's steps from those of the step before."""
+        for _ in range(2):
+            d, q = self.i
+            sign, q = (1.0 if q >= 0 else -1.0), abs(q)
+            a, b = float(self.model.psi_d(d, q, nd=1)), sign * float(self.model.psi_d(d, q, nq=1))
+            c, e = sign * float(self.model.psi_q(d, q, nd=1)), float(self.model.psi_q(d, q, nq=1))
+            x = self.psi[0] - float(self.model.psi_d(d, q))
+            y = self.psi[1] - sign * float(self.model.psi_q(d, q))
+            det = a * e - b * c
+            self.i = [self.i[0] + (e * x - b * y) / det, self.i[1] + (a * y - c * x) / det]
 
     def phases(self) -> list[float]:
         i_d, i_q = self.currents()
@@ -125,6 +141,7 @@ class Load:
                 rate_d = u_d - self.r * i_d + omega * self.psi[1]
                 rate_q = u_q - self.r * i_q - omega * self.psi[0]
                 self.psi = [self.psi[0] + step * rate_d, self.psi[1] + step * rate_q]
+                self._solve()
             self.theta += step * omega
 
 
@@ -135,7 +152,7 @@ def _counts(amperes: float, noise: float) -> int:
 def periods(drive: Processor, mode: int = ROBUST, task: Callable[[], object] | None = None) -> Iterator[int]:
     """Run the drive against the machine: after each yield the ISRs of that period are wanted. task: the 1 kHz task."""
     rng = np.random.default_rng(1)
-    load = Load()
+    load = Load(load_motor(FIRMWARE / "motors" / "hsm1").model)
     duty, gates = [16384] * 3, False
     drive.call("drive_start", mode)
     for k in range(PERIODS):
