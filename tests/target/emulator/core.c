@@ -149,6 +149,9 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
         return;
     }
     emu->s.instructions += block.count;
+    if (emu->profile != NULL) {
+        profile_instruction(emu, (uint32_t)address, size);
+    }
     emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
@@ -344,6 +347,7 @@ void emu_destroy(emu_t *emu)
         bus_destroy(emu);
         elf_free(&emu->elf);
         free(emu->block);
+        profile_stop(emu);
         free(emu);
     }
 }

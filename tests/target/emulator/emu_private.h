@@ -132,6 +132,8 @@ typedef struct {
     bool idle; /* a branch to itself */
 } block_t;
 
+typedef struct profile profile_t;
+
 struct emu {
     uc_engine *uc;
     elf_t elf;
@@ -144,6 +146,7 @@ struct emu {
     void *on_exception_user;
     can_port_t *can_port;
     emu_counts_t counts[VECTORS];
+    profile_t *profile; /* NULL: nobody wants one */
     char error[ERROR_SIZE];
     state_t s;
 };
@@ -186,6 +189,12 @@ uint64_t scs_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
 void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
 void systick_fire(emu_t *emu);
 int nvic_best(const emu_t *emu);
+
+/* profile.c, while emu->profile is not NULL */
+void profile_stop(emu_t *emu);
+void profile_instruction(emu_t *emu, uint32_t address, uint32_t size);
+void profile_enter(emu_t *emu, int vector);
+void profile_leave(emu_t *emu);
 
 /* the peripherals' events */
 void ftm_fire(emu_t *emu, int instance);

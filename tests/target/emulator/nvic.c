@@ -228,6 +228,9 @@ static void enter(emu_t *emu, int vector)
     }
     emu->s.pc = handler & ~1U;
     emu->s.now += 12U * emu->s.core_ticks; /* TRM: twelve cycles, without wait states */
+    if (emu->profile != NULL) {
+        profile_enter(emu, vector);
+    }
     if (emu->on_exception != NULL) {
         emu->on_exception(emu->on_exception_user, vector, true);
     }
@@ -288,6 +291,9 @@ void nvic_return(emu_t *emu)
         bit_set(n->pending, vector, true); /* its cause still stands */
     }
     emu->s.now += 10U * emu->s.core_ticks;
+    if (emu->profile != NULL) {
+        profile_leave(emu);
+    }
     n->sleeping = n->nest == 0 && (n->scr & 2U) != 0; /* SLEEPONEXIT */
     if (emu->on_exception != NULL) {
         emu->on_exception(emu->on_exception_user, vector, false);

@@ -20,10 +20,39 @@ from fluxtrue_tools.errors import FluxtrueError
     "--json", "out", type=click.Path(path_type=Path, dir_okay=False),
     help="Also write the figures here.",
 )  # fmt: skip
-def bench(build_dir: Path, out: Path | None) -> None:
-    """Instructions and accuracy of the fixed-point functions on an emulated Cortex-M4."""
+@click.option("--check", is_flag=True, help="Instead: measure all of docs/performance.md again and compare exactly.")
+@click.option("--update", is_flag=True, help="Instead: measure, and rewrite docs/performance.{json,md}.")
+def bench(build_dir: Path, out: Path | None, check: bool, update: bool) -> None:
+    """Instructions, memory, stack of the firmware on an emulated Cortex-M4."""
     from fluxtrue_tools import bench as package  # the emulator takes a moment to load
 
     if out is not None and not out.absolute().parent.is_dir():
         raise FluxtrueError(f"--json {out}: the folder {out.parent} does not exist")
-    package.run(build_dir, out)
+    if check and update:
+        raise FluxtrueError("--check and --update: one of them")
+    if check or update:
+        _performance(build_dir, update)
+    else:
+        package.run(build_dir, out)
+
+
+def _performance(build_dir: Path, update: bool) -> None:
+    """docs/performance.md and what it is made of."""
+    from fluxtrue_tools.bench import baseline, figures, page, sizes
+
+    if not update:
+        committed = baseline.load()
+        reason = baseline.other_compiler(committed, sizes.compiler())
+        if reason is not None:
+            click.echo(reason)
+            return
+    measured = figures.measure(build_dir)
+    text = page.page(measured)
+    if update:
+        baseline.write(measured, text)
+        click.echo(f"{baseline.BASELINE.name} and {baseline.PAGE.name} written")
+        return
+    found = baseline.compare(committed, measured, text, baseline.PAGE.read_text(encoding="utf-8"))
+    if found:
+        raise FluxtrueError("\n  ".join(["the figures have changed:", *found, baseline.HOW]))
+    click.echo("every figure is as committed")

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "profile.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "emu_private.h"
+
+enum { SPANS_MAX = 1 << 16, NOWHERE = -1 };
+
+typedef struct {
+    emu_span_t span;
+    int64_t next; /* where the last instruction's neighbour is */
+} level_t;
+
+struct profile {
+    level_t level[NEST_MAX + 1]; /* the first is the background */
+    int depth;
+    emu_span_t done[SPANS_MAX];
+    uint32_t count;
+    uint32_t taken;
+    uint8_t cost[FLASH_SIZE / 2];
+};
+
+bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
+{
+    if (emu->mode != EMU_COUNTING || half_words > FLASH_SIZE / 2) {
+        return false;
+    }
+    profile_stop(emu);
+    emu->profile = calloc(1, sizeof *emu->profile);
+    if (emu->profile == NULL) {
+        return false;
+    }
+    memcpy(emu->profile->cost, cost, half_words);
+    emu->profile->taken = taken;
+    emu->profile->depth = emu->s.nvic.nest;
+    return true;
+}
+
+uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t most)
+{
+    profile_t *p = emu->profile;
+    const uint32_t count = p == NULL ? 0 : p->count < most ? p->count : most;
+    if (count > 0) {
+        memcpy(to, p->done, count * sizeof *to);
+        memmove(p->done, p->done + count, (p->count - count) * sizeof *to);
+        p->count -= count;
+    }
+    return count;
+}
+
+void profile_stop(emu_t *emu)
+{
+    free(emu->profile);
+    emu->profile = NULL;
+}
+
+void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
+{
+    profile_t *p = emu->profile;
+    level_t *level = &p->level[p->depth];
+    if (level->next != NOWHERE && level->next != address) {
+        level->span.cost += p->taken; /* of the instruction before */
+    }
+    level->next = (int64_t)address + size;
+    level->span.instructions++;
+    level->span.cost += address < FLASH_SIZE ? p->cost[address / 2U] : 1U;
+}
+
+void profile_enter(emu_t *emu, int vector)
+{
+    profile_t *p = emu->profile;
+    if (p->depth < NEST_MAX) {
+        p->depth++;
+    }
+    p->level[p->depth] = (level_t){.span = {.vector = (uint32_t)vector}, .next = NOWHERE};
+}
+
+void profile_leave(emu_t *emu)
+{
+    profile_t *p = emu->profile;
+    if (p->count < SPANS_MAX && p->depth > 0) {
+        p->done[p->count++] = p->level[p->depth].span;
+    }
+    p->depth = p->depth > 0 ? p->depth - 1 : 0;
+}

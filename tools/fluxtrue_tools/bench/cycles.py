@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An estimate of cycles: what the Arm Cortex-M4 Technical Reference Manual (DDI 0439) says of each instruction.
+
+Facts of its tables 3-1 (instruction set) and 7-1 (floating point), nothing measured. Where the manual gives a span the
+larger end is taken: a refilled pipeline P = 3, a division 12, neighbouring loads and stores never overlapped, an
+instruction skipped in an IT block as if it had run. Wait states of flash and peripheral bridges are not included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fluxtrue_tools.bench.disassembly import CONDITIONS, Function, Instruction, words
+from fluxtrue_tools.errors import FluxtrueError
+
+PIPELINE = 3  # P: 1 to 3
+DIVIDE = 12  # 2 to 12
+ENTRY, RETURN = 12, 10  # exception entry and return without wait states
+
+# Cycles by mnemonic; None: one and a word each of the register list.
+COSTS: dict[str, int | None] = {}
+
+
+def _same(cycles: int | None, names: str) -> None:
+    COSTS.update(dict.fromkeys(names.split(), cycles))
+
+
+_same(1, "mov movw movt mvn add addw adc sub subw sbc rsb neg cmp cmn tst teq and orr orn eor bic lsl lsr asr ror rrx adr")
+_same(1, "sxtb sxth uxtb uxth sxtb16 uxtb16 sxtab sxtah uxtab uxtah ubfx sbfx bfi bfc clz rbit rev rev16 revsh pkhbt pkhtb sel")
+_same(1, "mul mla mls smull umull smlal umlal umaal smmul smmulr smmla smmlar smmls smmlsr")
+_same(1, "smulbb smulbt smultb smultt smulwb smulwt smlabb smlabt smlatb smlatt smlawb smlawt smlalbb smlalbt smlaltb smlaltt")
+_same(1, "smuad smuadx smusd smusdx smlad smladx smlsd smlsdx smlald smlaldx smlsld smlsldx")
+_same(1, "ssat usat ssat16 usat16 qadd qsub qdadd qdsub qadd16 qsub16 qasx qsax sadd16 ssub16 shadd16 shsub16 sasx ssax uadd16 usub16 uadd8 usub8")
+_same(DIVIDE, "sdiv udiv")
+_same(2, "ldr ldrb ldrh ldrsb ldrsh ldrex ldrexb ldrexh str strb strh strex strexb strexh")
+_same(3, "ldrd strd")
+_same(None, "ldm ldmia ldmdb stm stmia stmdb push pop vpush vpop vldmia vstmia vldmdb vstmdb")
+# Branches: P is added when they are taken; a table branch reads first.
+_same(1, "b bl bx blx cbz cbnz")
+_same(2, "tbb tbh")
+_same(1, "nop it dsb isb dmb sev bkpt udf")
+_same(2, "mrs msr cps cpsid cpsie")
+_same(1, "wfi wfe")
+_same(1, "vadd vsub vmul vnmul vneg vabs vcmp vcmpe vcvt vcvtr vmov vmrs vmsr")
+_same(3, "vmla vmls vnmla vnmls vfma vfms vfnma vfnms")
+_same(14, "vdiv vsqrt")
+_same(2, "vldr vstr")
+
+DOUBLE = 1  # more for a double register
+
+
+def base(mnemonic: str) -> tuple[str, bool]:
+    """The instruction's name without condition and flag suffix, and whether it is conditional."""
+    bare = mnemonic.partition(".")[0]
+    if bare[:2] == "it" and set(bare[2:]) <= {"t", "e"}:
+        return "it", False
+    conditional = bare[-2:] in CONDITIONS
+    for name, under in ((bare, False), (bare[:-2] if conditional else bare, conditional)):
+        if name in COSTS:
+            return name, under
+    for name, under in ((bare, False), (bare[:-2] if conditional else bare, conditional)):
+        if name.endswith("s") and name[:-1] in COSTS:
+            return name[:-1], under
+    raise FluxtrueError(f"no cycles are known for the instruction '{mnemonic}'")
+
+
+def cycles(instruction: Instruction) -> int:
+    """When its neighbour follows; PIPELINE more when something else does."""
+    name, _ = base(instruction.mnemonic)
+    cost = COSTS[name]
+    if cost is None:
+        return 1 + words(instruction.operands)
+    if name in ("vldr", "vstr") and instruction.operands.startswith("d"):
+        return cost + DOUBLE
+    return cost
+
+
+def image_costs(functions: Iterable[Function], size: int) -> bytes:
+    """A byte for each half word of the flash, for the emulator's profile."""
+    costs = bytearray(size // 2)
+    for function in functions:
+        for instruction in function.instructions:
+            costs[instruction.address // 2] = cycles(instruction)
+    return bytes(costs)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The instructions of a linked image, as the binary utilities of its compiler print them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fluxtrue_tools.errors import FluxtrueError
+
+OBJDUMP = "arm-none-eabi-objdump"
+CONDITIONS = ("eq", "ne", "cs", "hs", "cc", "lo", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le")
+_FUNCTION = re.compile(r"^([0-9a-f]{8}) <(.+)>:$")
+_LINE = re.compile(r"^\s*([0-9a-f]+):\t([0-9a-f ]+?)\s*\t(\S+)(?:\t(.*))?$")
+_TARGET = re.compile(r"(?:^|, )([0-9a-f]+) <")
+_REGISTER_RANGE = re.compile(r"([rsd])(\d+)-[rsd](\d+)")
+_COPY = re.compile(r"\.(lto_priv|constprop|isra|part|cold)(\.\d+)?")
+
+
+@dataclass(frozen=True)
+class Instruction:
+    """One instruction; `target`: where a direct branch goes."""
+
+    address: int
+    size: int
+    mnemonic: str
+    operands: str = ""
+
+    @property
+    def target(self) -> int | None:
+        found = _TARGET.search(self.operands)
+        return int(found.group(1), 16) if found else None
+
+    @property
+    def bare(self) -> str:
+        """Without width and type: movge.w is movge."""
+        return self.mnemonic.partition(".")[0]
+
+
+@dataclass
+class Function:
+    """The instructions between two symbols; constants between them are left out."""
+
+    name: str
+    address: int
+    instructions: list[Instruction] = field(default_factory=list)
+
+
+def plain(name: str) -> str:
+    """The name in the source of a copy that the optimiser has made."""
+    return _COPY.sub("", name)
+
+
+def words(operands: str) -> int:
+    """Words in a register list; a double register has two."""
+    listed = operands[operands.index("{") + 1 : operands.index("}")]
+    number = 0
+    for part in listed.split(","):
+        part = part.strip()
+        span = _REGISTER_RANGE.fullmatch(part)
+        count = int(span.group(3)) - int(span.group(2)) + 1 if span else 1
+        number += 2 * count if part.startswith("d") else count
+    return number
+
+
+def parse(text: str) -> list[Function]:
+    """Functions of the listing in order of their addresses."""
+    functions: list[Function] = []
+    for line in text.splitlines():
+        if head := _FUNCTION.match(line):
+            functions.append(Function(head.group(2), int(head.group(1), 16)))
+        elif (found := _LINE.match(line)) and functions and not found.group(3).startswith("."):
+            address, code, mnemonic, operands = found.groups()
+            operands = re.split(r"\s*[@;]", operands or "")[0].strip()
+            size = len(code.replace(" ", "")) // 2
+            functions[-1].instructions.append(Instruction(int(address, 16), size, mnemonic, operands))
+    return functions
+
+
+def read(elf: Path) -> list[Function]:
+    """All code of the file."""
+    if shutil.which(OBJDUMP) is None:
+        raise FluxtrueError(f"{OBJDUMP} not found: install binutils-arm-none-eabi or run tools/setup")
+    done = subprocess.run([OBJDUMP, "-d", str(elf)], capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise FluxtrueError(f"{elf}: {done.stderr.strip()[:300]}")
+    functions = parse(done.stdout)
+    if not functions:
+        raise FluxtrueError(f"{elf}: contains no code")
+    return functions

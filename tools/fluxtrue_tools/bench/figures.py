@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every figure of docs/performance.md, measured anew: plain numbers that can be compared exactly."""
+
+from __future__ import annotations
+
+import fnmatch
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.bench import cycles, disassembly, image, sizes, stack
+from fluxtrue_tools.bench.build import ROOT
+from fluxtrue_tools.bench.drive import build_drive, measure_drive
+from fluxtrue_tools.emulate import build as emulation
+from fluxtrue_tools.errors import FluxtrueError
+
+BUDGET = ROOT / "hal" / "s32k144" / "budget.toml"
+MODES = {"paper": 0, "robust": 1}
+INTERRUPTS = {"fast ISR": image.FAST, "MRAI ISR": image.MRAI, "CAN ISR": image.CAN, "1 kHz task": image.TASK}
+PWM_HZ = 10_000
+TASK_HZ = 1_000
+COMMAND_HZ = 100
+FIGURES = dict[str, Any]
+
+
+def budget() -> dict[str, Any]:
+    """What the port says of itself."""
+    with BUDGET.open("rb") as file:
+        return tomllib.load(file)
+
+
+def _spread(values: NDArray[np.int64]) -> list[float]:
+    """Least, mean to a tenth, most."""
+    return [int(values.min()), round(float(values.mean()), 1), int(values.max())]
+
+
+def _work(recording: image.Recording) -> NDArray[np.int64]:
+    """Instructions and cycles of both interrupts of each period, exception entry and return in the latter."""
+    fast, mrai = recording.of(image.FAST), recording.of(image.MRAI)
+    periods = min(len(fast), len(mrai))
+    both: NDArray[np.int64] = fast[:periods] + mrai[:periods]
+    both[:, 1] += 2 * (cycles.ENTRY + cycles.RETURN)
+    return both
+
+
+def _mode(parts: emulation.Parts, functions: list[disassembly.Function], mode: int) -> tuple[FIGURES, int]:
+    recording = image.record(parts, functions, mode)
+    rows: FIGURES = {}
+    for name, vector in INTERRUPTS.items():
+        spans = recording.of(vector)
+        if len(spans) == 0:
+            raise FluxtrueError(f"the {name} never ran")
+        cost = spans[:, 1] + cycles.ENTRY + cycles.RETURN
+        rows[name] = {"runs": len(spans), "instructions": _spread(spans[:, 0]), "cycles": _spread(cost)}
+    both = _work(recording)
+    rows["10 kHz work"] = {
+        "runs": len(both), "instructions": _spread(both[:, 0]), "cycles": _spread(both[:, 1]),
+    }  # fmt: skip
+    met = {"periods": recording.periods, "voltage limited": recording.limited, "beyond the tables": recording.clamped,
+           "field weakening": recording.weakened}  # fmt: skip
+    return {"met": met, "runs": rows}, recording.stack_bytes
+
+
+def _pointers(listed: list[dict[str, Any]], names: list[str]) -> dict[str, list[str]]:
+    """Patterns of the port's list against the image's names."""
+    plain = sorted({disassembly.plain(name) for name in names})
+    found: dict[str, list[str]] = {}
+    for entry in listed:
+        for pattern in entry["calls"]:
+            # A target that was compiled into its caller, which is then no call any more, is not among the names.
+            found.setdefault(entry["in"], []).extend(fnmatch.filter(plain, pattern))
+    return found
+
+
+def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tuple[list[stack.Use], list[str]]:
+    """Worst case of each priority, and what speaks against relying on it."""
+    nodes = stack.graph(functions)
+    depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
+    uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])
+    return uses, sorted(set(depths.problems)) + stack.heap(nodes)
+
+
+def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
+    """Shares of the processor, estimated, and the PWM frequency at which all of it takes half."""
+    work = runs["10 kHz work"]["cycles"]
+    task, can = runs["1 kHz task"]["cycles"][1] * TASK_HZ, runs["CAN ISR"]["cycles"][1] * COMMAND_HZ
+    return {
+        "10 kHz work, average": round(100 * work[1] * PWM_HZ / core_hz, 2),
+        "10 kHz work, most": round(100 * work[2] * PWM_HZ / core_hz, 2),
+        "with task and CAN, average": round(100 * (work[1] * PWM_HZ + task + can) / core_hz, 2),
+        "highest PWM frequency at 50 %": int((0.5 * core_hz - task - can) / work[1] // 100 * 100),
+    }
+
+
+def measure(folder: Path) -> FIGURES:
+    """Builds what is missing below `folder` and measures; takes a minute or two."""
+    port = budget()
+    parts = emulation.prepare("hsm1", flashed=True)
+    functions = disassembly.read(parts.image)
+    uses, problems = stack_use(functions, port)
+    if problems:
+        raise FluxtrueError("the image's stack is not bounded:\n  " + "\n  ".join(problems))
+    drives: FIGURES = {}
+    deepest = 0
+    for name, mode in MODES.items():
+        drives[name], used = _mode(parts, functions, mode)
+        deepest = max(deepest, used)
+    whole = sizes.whole(parts.image)
+    stages, counted, limited = measure_drive(build_drive(folder / "bench"))
+    return {
+        "compiler": sizes.compiler(),
+        "drives": drives,
+        "utilisation": {name: _utilisation(drive["runs"], port["core_Hz"]) for name, drive in drives.items()},
+        "kernels": {
+            "periods": counted, "limited": limited,
+            "stages": {s.name: [s.minimum, round(s.average, 1), s.maximum] for s in stages},
+        },
+        "image": {"flash": whole.flash, "RAM": whole.ram, "stack reserved": whole.stack},
+        "modules": {name: list(both) for name, both in sizes.modules(parts.image).items()},
+        "control library": sizes.library(parts.image.parent),
+        "state": sizes.state(parts.image),
+        "stack": {
+            "levels": [{"level": u.name, "frame": u.frame, "stack": u.stack,
+                        "path": [disassembly.plain(f) for f in u.path]} for u in uses],
+            "total": sum(u.frame + u.stack for u in uses), "seen in emulation": deepest,
+        },
+    }  # fmt: skip

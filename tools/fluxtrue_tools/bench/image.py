@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The flashed image in closed loop on the emulated processor: what each run of each interrupt executes.
+
+The virtual vehicle powers the inverter up over CAN, asks for torque of both signs at 3000 rpm, for more than the
+machine's tables and its current limit give, drives into field weakening, and lets the dc voltage drop. The plant is
+that of the simulation: measured map, dead time, noise, quantised sensors.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.bench import cycles
+from fluxtrue_tools.bench.can_command import Command, Frame
+from fluxtrue_tools.bench.disassembly import Function
+from fluxtrue_tools.emulate import library as emulation
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import Core
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.library import Loop
+
+FAST, MRAI, CAN, TASK = 16 + 39, 16 + 69, 16 + 81, 16 + 48
+FLASH_SIZE: Final = 0x80000
+STACK_PATTERN: Final = b"\xc5" * 4
+SPANS_MOST: Final = 4096
+V_DC: Final = 350.0
+RPM: Final = 2 * math.pi / 60
+PERIODS_PER_MS: Final = 10
+WARM_UP_MS: Final = 20
+# Milliseconds, torque wanted, speed in rpm at its end, dc voltage.
+DRIVE: Final = (
+    (50, 80.0, 3000.0, V_DC), (50, -60.0, 3000.0, V_DC), (30, 5.0, 3000.0, V_DC),
+    (60, 400.0, 3000.0, V_DC), (80, -400.0, 3000.0, V_DC), (40, 0.0, 3000.0, V_DC),
+    (80, 60.0, 8000.0, V_DC), (20, 60.0, 8000.0, 300.0), (40, -40.0, 8000.0, 300.0), (10, 0.0, 8000.0, 200.0),
+    (15, 0.0, 8000.0, 150.0),
+)  # fmt: skip
+
+
+class _Span(ctypes.Structure):
+    _fields_ = (("vector", ctypes.c_uint32), ("instructions", ctypes.c_uint32), ("cost", ctypes.c_uint32))
+
+
+@dataclass
+class Recording:
+    """Rows of vector, instructions, cycles; and what the run met."""
+
+    spans: NDArray[np.int64]
+    periods: int
+    limited: int
+    clamped: int
+    weakened: int
+    stack_bytes: int
+
+    def of(self, vector: int) -> NDArray[np.int64]:
+        return self.spans[self.spans[:, 0] == vector, 1:]
+
+
+@dataclass
+class Stand:
+    """The image, its plant and the vehicle."""
+
+    loop: Loop
+    command: Command = field(default_factory=Command)
+
+    def __post_init__(self) -> None:
+        library = self.library = self.loop._library
+        self.core = Core.of_simulation(library, self.loop._sim)  # type: ignore[arg-type]
+        self.handle = self.core._handle
+        library.can_frame_arrives.argtypes = [ctypes.c_void_p, ctypes.POINTER(Frame)]
+        library.emu_profile_start.restype = ctypes.c_bool
+        library.emu_profile_start.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32]
+        library.emu_profile_take.restype = ctypes.c_uint32
+        library.emu_profile_take.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Span), ctypes.c_uint32]
+        self.time_ms = 0
+
+    def run_ms(self, ramps: dict[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
+        """One millisecond; in every tenth a command."""
+        if self.time_ms % 10 == 0:
+            self.library.can_frame_arrives(self.handle, ctypes.byref(self.command.frame()))
+        self.time_ms += 1
+        return self.loop.run(PERIODS_PER_MS, ramps)
+
+    def run(self, milliseconds: int, **values: float | str) -> None:
+        self.command.values.update(values)
+        for _ in range(milliseconds):
+            self.run_ms()
+
+    def power_up(self) -> None:
+        """To the state run, as the vehicle does it."""
+        self.run(100)
+        self.run(20, Mode="torque")
+        self.loop.set("plant.vdc_V", V_DC)
+        self.run(100)
+        self.run(30, Enable=1)
+
+    def profile(self, functions: list[Function]) -> None:
+        costs = cycles.image_costs(functions, FLASH_SIZE)
+        if not self.library.emu_profile_start(self.handle, costs, len(costs), cycles.PIPELINE):
+            raise FluxtrueError("the emulation is not in counting mode")
+
+    def take(self) -> Iterator[tuple[int, int, int]]:
+        """Finished runs since the last time."""
+        spans = (_Span * SPANS_MOST)()
+        while count := self.library.emu_profile_take(self.handle, spans, SPANS_MOST):
+            yield from ((s.vector, s.instructions, s.cost) for s in spans[:count])
+
+    def stack_used(self) -> int:
+        bottom, top = self.core.symbol("stack_bottom"), self.core.symbol("stack_top")
+        content = self.core.read(bottom, top - bottom)
+        unused = 0
+        while content[unused : unused + 4] == STACK_PATTERN:
+            unused += 4
+        return top - bottom - unused
+
+
+def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
+    """The whole drive; `mode`: identification_mode."""
+    motor = parts.emulated(emulation.COUNTING)
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0, "current_noise_A_rms": 0.5,
+                           "seed": 1.0}  # fmt: skip
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        stand = Stand(loop)
+        loop.set("identification_mode", mode)
+        stand.power_up()
+        loop.record(["voltage_limited", "table_clamped", "id_A"])
+        stand.profile(functions)
+        rows: list[NDArray[np.float64]] = []
+        spans: list[tuple[int, int, int]] = []
+        speed = 0.0
+        for milliseconds, torque, rpm, v_dc in DRIVE:
+            stand.command.values["TorqueRequest"] = torque
+            loop.set("plant.vdc_V", v_dc)
+            for k in range(milliseconds):
+                start, stop = (speed + (rpm - speed) * (k + j) / milliseconds for j in (0, 1))
+                rows.append(stand.run_ms({"plant.speed_rad_s": (start * RPM, stop * RPM)}))
+                spans += stand.take()
+            speed = rpm
+        fault = int(loop.get("fault_word"))
+        if fault != 0 or int(loop.get("identification_mode")) != mode:
+            raise FluxtrueError(f"the measured drive ended with fault word {fault:#x}")
+        seen = np.concatenate(rows)
+        return Recording(
+            np.array(spans, dtype=np.int64), len(seen), int(seen[:, 0].sum()), int(seen[:, 1].sum()),
+            int((seen[:, 2] < -100).sum()), stand.stack_used(),
+        )  # fmt: skip

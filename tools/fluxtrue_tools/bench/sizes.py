@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flash and RAM of an image by module, and of the control library by itself."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections import Counter
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+from elftools.dwarf.die import DIE
+from elftools.elf.elffile import ELFFile
+
+from fluxtrue_tools.bench.disassembly import plain
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.target.image import RAM_FROM, Image
+
+NM, SIZE = "arm-none-eabi-nm", "arm-none-eabi-size"
+LIBRARIES = ("fx", "signal", "control")
+TABLES = re.compile(r"\.rodata\.(fx_)?\w*_?table$")
+# The drive's state: what the stages keep, and what they hand to each other; not the copy of the motor's data.
+STATE = ("fast", "slow", "task", "samples", "windows", "commands", "schedules")
+_SECTION = re.compile(r"^\.(text|rodata|data|bss)(\S*)\s+(\d+)\s")
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Of the image: bytes of flash and RAM, the stack included in the latter."""
+
+    flash: int
+    ram: int
+    stack: int
+
+
+def _lines(*command: str) -> list[str]:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise FluxtrueError(f"{' '.join(command[:1])}: {done.stderr.strip()[:300]}")
+    return done.stdout.splitlines()
+
+
+def whole(elf: Path) -> Whole:
+    """As the linker counts."""
+    image = Image(elf)
+    flash = sum(s["sh_size"] for s in image.sections if s["sh_type"] == "SHT_PROGBITS")
+    ram = sum(s["sh_size"] for s in image.sections if s["sh_addr"] >= RAM_FROM)
+    return Whole(int(flash), int(ram), image.symbol("stack_top") - image.symbol("stack_bottom"))
+
+
+def _module(source: str, name: str) -> str:
+    """The layer of a source file; what the compiler's own library brought is named so."""
+    path = source.rpartition(":")[0]
+    if "motor_tables.c" in path:
+        return "motor data and tables"
+    for layer in ("fx", "signal", "control", "safety", "comm", "app"):
+        if f"/firmware/{layer}/" in path or (layer == "fx" and name.startswith("fx_")):
+            return f"firmware/{layer}"
+    if "/bus/" in path:
+        return "firmware/comm"
+    if "/hal/" in path:
+        return "hal"
+    return "C library" if path else "constants without a source line"
+
+
+NAMED = 64  # bytes: variables from here on are listed by name
+
+
+def modules(elf: Path) -> dict[str, tuple[int, int]]:
+    """Bytes of flash and RAM by module; a function that was compiled into another counts with that."""
+    flash: Counter[str] = Counter()
+    ram: Counter[str] = Counter()
+    seen: set[int] = set()
+    for line in _lines(NM, "-S", "-l", "--size-sort", str(elf)):
+        symbol, _, source = line.partition("\t")
+        address, size, kind, name = symbol.split()[:4]
+        if kind in "Nn" or int(address, 16) in seen:
+            continue
+        seen.add(int(address, 16))
+        if int(address, 16) >= RAM_FROM:
+            ram[f"variable {plain(name)}" if int(size, 16) >= NAMED else "small variables"] += int(size, 16)
+        else:
+            flash[_module(source, name)] += int(size, 16)
+    image = whole(elf)
+    flash["literals, padding, vectors"] = image.flash - flash.total()
+    ram["stack"] = image.stack
+    ram["padding"] = image.ram - ram.total()
+    return {name: (flash[name], ram[name]) for name in sorted(flash | ram)}
+
+
+def library(build: Path) -> dict[str, int]:
+    """The control library compiled by itself, not across files: bytes of code, of constants, and of their tables."""
+    bytes_of: Counter[str] = Counter(code=0, tables=0, constants=0, variables=0)
+    for layer in LIBRARIES:
+        archive = build / "firmware" / f"libfluxtrue_{layer}.a"
+        if not archive.is_file():
+            raise FluxtrueError(f"{archive}: not built")
+        for line in _lines(SIZE, "-A", str(archive)):
+            if found := _SECTION.match(line):
+                kind, rest, size = found.groups()
+                table = TABLES.match(f".{kind}{rest}")
+                key = "tables" if table else {"text": "code", "rodata": "constants"}.get(kind, "variables")
+                bytes_of[key] += int(size)
+    return dict(bytes_of)
+
+
+def _struct(typed: DIE) -> DIE:
+    while typed.tag != "DW_TAG_structure_type":
+        typed = typed.get_DIE_from_attribute("DW_AT_type")
+    return typed
+
+
+def _size(die: DIE) -> int:
+    while "DW_AT_byte_size" not in die.attributes:
+        die = die.get_DIE_from_attribute("DW_AT_type")
+    return int(die.attributes["DW_AT_byte_size"].value)
+
+
+def _members(elf: ELFFile, type_name: str) -> dict[str, int]:
+    for unit in elf.get_dwarf_info().iter_CUs():
+        for die in unit.iter_DIEs():
+            name = die.attributes.get("DW_AT_name")
+            if die.tag == "DW_TAG_typedef" and name is not None and name.value.decode() == type_name:
+                members = [m for m in _struct(die).iter_children() if m.tag == "DW_TAG_member"]
+                return {m.attributes["DW_AT_name"].value.decode(): _size(m.get_DIE_from_attribute("DW_AT_type"))
+                        for m in members}  # fmt: skip
+    raise FluxtrueError(f"no debug information for the type '{type_name}'")
+
+
+def state(elf: Path) -> dict[str, int]:
+    """Bytes of RAM of each part of drive_t."""
+    return _members(ELFFile(BytesIO(elf.read_bytes())), "drive_t")
+
+
+def compiler() -> str:
+    """What the figures depend on."""
+    return _lines("arm-none-eabi-gcc", "--version")[0].strip()
+
+
