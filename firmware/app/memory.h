@@ -2,10 +2,10 @@
 #ifndef APP_MEMORY_H
 #define APP_MEMORY_H
 /** Keeps what the drive has learnt over a power cycle, in the store's two slots.
- *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that the values are counted in: a
- *     record of other firmware, another motor or other priors is not found
+ *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that the values are counted in:
+ *     a record of other firmware, another motor or other priors is not found
  *   a save needs a run since the last one, MEMORY_REST_MS of rest (gates off, nothing latched), parameters that the
- *     model does not contradict, and MEMORY_INTERVAL_MS since the last save; the first one after a start may come at once
+ *     model does not contradict, and MEMORY_INTERVAL_MS since the last save; the first one after a start comes at once
  * Source   docs/decisions/007-store.md
  * Units    ms are steps of the robust identification, which alone learns what is kept
  * Errors   a memory that is empty, damaged or foreign leaves the priors; a save that fails is counted and tried again

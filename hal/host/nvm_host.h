@@ -2,7 +2,7 @@
 #ifndef HAL_HOST_NVM_HOST_H
 #define HAL_HOST_NVM_HOST_H
 /** The flash of a software-in-the-loop drive: erased when the instance is created, kept by whoever wants it kept.
- *   As in flash a programmed bit can only be cleared; the bytes handed out and taken are all slots, one after the other.
+ *   As in flash a programmed bit can only be cleared. Handed out and taken are all slots, one after the other.
  * Source   hal/nvm.h; docs/howto/software-in-the-loop.md
  * Errors   as fluxtrue_memory_read() and fluxtrue_memory_write()
  * Context  between two periods; the same thread as fluxtrue_step() */
