@@ -77,7 +77,7 @@ static uint32_t realisable(int32_t duty, int32_t min_pulse)
 }
 
 /* Near the hexagon or beyond it: the vector is shortened, pulses snap. */
-static __attribute__((noinline)) modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t sign)
+static modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t sign)
 {
     phases_t x = phases_q30(v.alpha, v.beta);
     const int32_t hi = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
@@ -123,6 +123,17 @@ static phases_t centred_q31(ab_t v)
                       (int32_t)((uint32_t)x.c + shift)};
 }
 
+static uint32_t duty_of(int32_t y, int32_t dead_time_q16, int32_t sign)
+{
+    return ((uint32_t)y + (uint32_t)(dead_time_q16 * sign)) >> 16;
+}
+
+static duty_t plain(const modulate_config_t *config, phases_t y, phases_t sign)
+{
+    const int32_t dead_time = 2 * config->dead_time;
+    return (duty_t){duty_of(y.a, dead_time, sign.a), duty_of(y.b, dead_time, sign.b), duty_of(y.c, dead_time, sign.c)};
+}
+
 /* Whatever the dead time adds, no pulse is too short. */
 static bool within(const modulate_config_t *config, phases_t y)
 {
@@ -131,26 +142,28 @@ static bool within(const modulate_config_t *config, phases_t y)
     return (uint32_t)y.a - margin <= width && (uint32_t)y.b - margin <= width && (uint32_t)y.c - margin <= width;
 }
 
-static uint32_t duty(int32_t y, int32_t dead_time_q16, int32_t sign)
+static __attribute__((noinline)) modulate_out_t near(const modulate_config_t *config, const modulate_in_t *in)
 {
-    return ((uint32_t)y + (uint32_t)(dead_time_q16 * sign)) >> 16;
-}
-
-modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
-{
-    if (!in->clear && !fits_q31(config, in)) {
-        const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
-        return far(config, &given);
+    if (!fits_q31(config, in)) {
+        return far(config, in);
     }
     const ab_t v = normalise(in->u, in->advanced, in->v_dc);
     const phases_t sign = polarity(config, in->i, in->advanced);
     const phases_t y = centred_q31(v);
-    if (!in->clear && !within(config, y)) {
+    if (!within(config, y)) {
         return careful(config, v, sign);
     }
-    const int32_t dead_time = 2 * config->dead_time;
-    return (modulate_out_t){
-        {duty(y.a, dead_time, sign.a), duty(y.b, dead_time, sign.b), duty(y.c, dead_time, sign.c)}, false};
+    return (modulate_out_t){plain(config, y, sign), false};
+}
+
+modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
+{
+    if (!in->clear) {
+        const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
+        return near(config, &given);
+    }
+    const phases_t y = centred_q31(normalise(in->u, in->advanced, in->v_dc));
+    return (modulate_out_t){plain(config, y, polarity(config, in->i, in->advanced)), false};
 }
 
 /* A phase that does not switch has no dead time: its compensation is not taken away again (MO-9). */
