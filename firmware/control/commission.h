@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CONTROL_COMMISSION_H
 #define CONTROL_COMMISSION_H
-/** Measures the inverter's voltage error at standstill: currents along the magnet, which make no torque, at ten levels in
- *   both polarities; each settles, then voltage and current are summed.
+/** Measures the inverter's voltage error at standstill: currents along the magnet, which make no torque, at ten levels
+ *   in both polarities; each settles, then voltage and current are summed.
  *   40 ms settle, 64 ms measure, 2 x 10 currents: 2.1 s; level k is 2^(-6 + k/2) of i_max
  * Source   docs/theory/commissioning.md (CM-1), (CM-6)
  * Units    per unit

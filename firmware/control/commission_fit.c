@@ -68,6 +68,21 @@ static void unfold(const commission_data_t *data, commission_curve_t *curve, uns
     }
 }
 
+/* Where v(I) and v(I/2) stand together an error of the one is minus that of the other, for ever: means over neighbours
+ * of neighbours are free of it (CM-7). */
+static void calm(commission_curve_t *curve)
+{
+    int32_t v[COMMISSION_LEVELS];
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        v[k] = curve->v[k];
+    }
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        const int32_t lower = (k >= 2U) ? v[k - 2U] : v[k + 2U];
+        const int32_t upper = (k + 2U < COMMISSION_LEVELS) ? v[k + 2U] : v[k - 2U];
+        curve->v[k] = v[k] / 2 + lower / 4 + upper / 4;
+    }
+}
+
 bool commission_fit(const commission_data_t *data, commission_curve_t *curve)
 {
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
@@ -80,6 +95,7 @@ bool commission_fit(const commission_data_t *data, commission_curve_t *curve)
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
         unfold(data, curve, k, fx_sub_q31(data->u[k], mul_q30(curve->r, data->i[k])));
     }
+    calm(curve);
     curve->level = mean_upper(curve->v);
     return curve->r > 0;
 }

@@ -3,9 +3,10 @@
 #define CONTROL_COMMISSION_FIT_H
 /** Resistance and the inverter's voltage error against current, from a few direct currents at standstill.
  *   r = slope of u over i in the upper half of the levels; y_k = u_k - r i_k
- *   v_k: 3/2 y_k = sum over the phases of |c_x| v(|c_x| i_k), c the phases' cosines, v a straight line between the knots
+ *   v_k: 3/2 y_k = sum over the phases of |c_x| v(|c_x| i_k), c the phases' cosines, v straight lines between the knots
+ *   then each knot is averaged with those at half and twice its current
  *   level = mean of v_k in the upper half; knee = twice the area that v leaves below the level
- * Source   docs/theory/commissioning.md (CM-1) ... (CM-5)
+ * Source   docs/theory/commissioning.md (CM-1) ... (CM-7)
  * Units    per unit, Q30; knots in Q15
  * Range    i rising, below 1/2; |u| below 1/8
  * Rounding below 2^-20 in the curve, 2^-16 relative in r
