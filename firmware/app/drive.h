@@ -97,6 +97,8 @@ typedef struct {
     learnt_t learnt;
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
+    angle_harmonics_state_t angle_harmonics;
+    volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
     commission_state_t commission;

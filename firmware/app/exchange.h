@@ -24,6 +24,7 @@ typedef struct {
     adc_counts_t counts;
     int32_t v_dc;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
+    uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
     bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */

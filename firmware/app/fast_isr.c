@@ -24,7 +24,9 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     instant_t now;
     now.i = measured.i;
-    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
+    const uint32_t read = hal_angle_read();
+    sample->theta_m = read + (uint32_t)drive->task.angle_correction[read >> ANGLE_HARMONICS_SHIFT];
+    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, sample->theta_m);
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     now.i_dq = fx_arch_pkhbt(i.d, i.q);

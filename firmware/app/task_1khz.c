@@ -175,6 +175,8 @@ void task_1khz(drive_t *drive)
     /* Read once: the identification may interrupt, and its drift must be counted to the end. */
     const mrai_state_t identified = drive->slow.mrai;
     exchange_barrier();
+    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, sample.theta_m,
+                         task->angle_correction);
     const uint32_t found = slow_monitors_step(drive, &sample);
     task->run_state = supervise(drive);
     drive_identify(drive, &sample, &identified);

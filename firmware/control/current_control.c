@@ -60,13 +60,15 @@ static dq_t shortened(int32_t d, int32_t q, int32_t v_max)
     return (dq_t){(u_d * share + 0x4000) >> 15, (u_q * share + 0x4000) >> 15};
 }
 
-/* d first, at most 31/32 of the circle; q what is left (CC-11). */
-static dq_t d_first(int32_t d, int32_t q, int32_t v_max)
+/* d first, at most 31/32 of the circle; q what is left (CC-11), less what d is short of: so the flux -w psi_q that binds
+ * d goes (CC-14). */
+static dq_t d_first(int32_t d, int32_t q, int32_t v_max, bool backwards)
 {
     const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
     const int32_t u_d = fx_clamp_q31(d, -d_max, d_max);
     const int32_t q_max = fx_sqrt_q30((uint32_t)(v_max * v_max - u_d * u_d));
-    return (dq_t){u_d, fx_clamp_q31(q, -q_max, q_max)};
+    const int32_t missing = d - u_d;
+    return (dq_t){u_d, fx_clamp_q31(q + (backwards ? -missing : missing), -q_max, q_max)};
 }
 
 /* s += a T_s (u_limited - u): what the circle cut away is no error to be integrated (CC-10). Q15 * Q15 = Q30, a gain
@@ -86,7 +88,8 @@ static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
  * first while it takes flux away (CC-11). While it asks for flux back, the q axis may be what holds that flux: a cut
  * that served d first would leave both where they are, at any torque. What was cut goes to the integrators as well. */
 static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *config, current_control_state_t *state,
-                                               int32_t d_q22, int32_t q_q22, int32_t v_dc, bool more_flux)
+                                               int32_t d_q22, int32_t q_q22, int32_t v_dc, bool more_flux,
+                                               bool backwards)
 {
     const int32_t d = d_q22 >> 7;
     const int32_t q = q_q22 >> 7;
@@ -98,7 +101,7 @@ static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *c
     if (s_q * s_q <= room && room >= room_min) {
         return fx_arch_pkhbt(s_d, s_q);
     }
-    const dq_t u = more_flux ? shortened(d, q, v_max) : d_first(d, q, v_max);
+    const dq_t u = more_flux ? shortened(d, q, v_max) : d_first(d, q, v_max, backwards);
     state->s_d_q30 = track(state->s_d_q30, config->tracking_gain, u.d - d);
     state->s_q_q30 = track(state->s_q_q30, config->tracking_gain, u.q - q);
     return fx_arch_pkhbt(u.d, u.q);
@@ -125,7 +128,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     if ((uint32_t)fx_dot2(both, both) < (uint32_t)fx_mulhi(config->clear_q32, in->v_dc * in->v_dc)) {
         return (current_control_out_t){.u = u, .clear = true};
     }
-    const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error > 0);
+    const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error > 0, omega < 0);
     const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
     return (current_control_out_t){.u = is, .limited = is.d != u.d || is.q != u.q};
 }
