@@ -82,7 +82,15 @@ static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
     return fx_sat_bits(s_q30 + gain * error, 31);
 }
 
-/* Beyond the circle that is surely clear: perhaps to be cut. Inside the circle as wanted. Beyond it the d axis comes
+/* Nothing to be cut: on the circle or inside, and d leaves q its quarter, 1 - (31/32)^2 < 1/16 (CC-11). */
+static bool inside(const current_control_config_t *config, fx_pair_t u, int32_t d, int32_t v_dc)
+{
+    const int32_t v_max = (config->v_ratio * v_dc + 0x4000) >> 15;
+    const int32_t most = v_max * v_max;
+    return fx_dot2(u, u) <= most && d * d <= most - (most >> 4);
+}
+
+/* Beyond the circle, or nearly, the d axis comes
  * first while it takes flux away (CC-11). While it asks for flux back, the q axis may be what holds that flux: a cut
  * that served d first would leave both where they are, at any torque. What was cut goes to the integrators as well. */
 static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *config, current_control_state_t *state,
@@ -124,6 +132,9 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const fx_pair_t both = fx_arch_pkhbt(u.d, u.q);
     if ((uint32_t)fx_dot2(both, both) < (uint32_t)fx_mulhi(config->clear_q32, in->v_dc * in->v_dc)) {
         return (current_control_out_t){.u = u, .clear = true};
+    }
+    if (inside(config, both, u.d, in->v_dc)) {
+        return (current_control_out_t){.u = u};
     }
     const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error > 0);
     const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
