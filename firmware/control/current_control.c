@@ -94,8 +94,9 @@ static bool inside(const current_control_config_t *config, fx_pair_t u, int32_t 
  * first while it takes flux away (CC-11). While it asks for flux back, the q axis may be what holds that flux: a cut
  * that served d first would leave both where they are, at any torque. What was cut goes to the integrators as well. */
 static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *config, current_control_state_t *state,
-                                               int32_t d_q22, int32_t q_q22, int32_t v_dc, bool more_flux)
+                                               int32_t d_q22, int32_t q_q22, int32_t v_dc, int32_t error_d)
 {
+    const bool more_flux = error_d > 0;
     const int32_t d = d_q22 >> 7;
     const int32_t q = q_q22 >> 7;
     const int32_t v_max = (config->v_ratio * v_dc + 0x4000) >> 15;
@@ -115,15 +116,18 @@ static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *c
 current_control_out_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
                                            const current_control_in_t *in)
 {
-    const flux_point_t *flux = in->flux;
-    const current_target_t *to = in->target;
-    const current_control_state_t s = *state;
+    const dq_t psi = {in->flux->psi_d, in->flux->psi_q};
+    current_target_t to = *in->target;
+    fx_arch_together(&to.psi.d, &to.psi.q);
+    fx_arch_together(&to.weighted_q30.d, &to.weighted_q30.q);
+    current_control_state_t s = *state;
+    fx_arch_together(&s.s_d_q30, &s.s_q_q30);
     const int32_t omega = in->omega >> 16;
-    const int32_t psi_d = fx_sat_q15_word(flux->psi_d + in->psi_delta);
+    const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_delta);
     /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
-    const axis_t d = axis(config->sigma_q24, to->psi.d, to->weighted_q30.d, flux->psi_d,
-                          s.s_d_q30 - omega * flux->psi_q);
-    const axis_t q = axis(config->sigma_q24, to->psi.q, to->weighted_q30.q, flux->psi_q,
+    const axis_t d = axis(config->sigma_q24, to.psi.d, to.weighted_q30.d, psi.d,
+                          s.s_d_q30 - omega * psi.q);
+    const axis_t q = axis(config->sigma_q24, to.psi.q, to.weighted_q30.q, psi.q,
                           s.s_q_q30 + omega * psi_d);
     const dq_t u = {fx_sat_q15_word(d.u >> 7), fx_sat_q15_word(q.u >> 7)};
     *state = (current_control_state_t){integrate(s.s_d_q30, config->integral_gain, d.error),
@@ -136,7 +140,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     if (inside(config, both, u.d, in->v_dc)) {
         return (current_control_out_t){.u = u};
     }
-    const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error > 0);
+    const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error);
     const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
     return (current_control_out_t){.u = is, .limited = is.d != u.d || is.q != u.q};
 }

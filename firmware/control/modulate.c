@@ -44,8 +44,11 @@ static int32_t middle(phases_t x)
 static phases_t polarity(const modulate_config_t *config, fx_pair_t i, fx_pair_t at)
 {
     const ab_t x = {fx_difference2(i, at), fx_dot2_cross(i, at)};
-    const int32_t a = fx_mulhi(config->knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
-    const int32_t side = fx_mulhi(config->knee_side_q17, x.beta);
+    int32_t knee_q17 = config->knee_q17;
+    int32_t knee_side_q17 = config->knee_side_q17;
+    fx_arch_together(&knee_q17, &knee_side_q17);
+    const int32_t a = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
+    const int32_t side = fx_mulhi(knee_side_q17, x.beta);
     const int32_t b = side - (a >> 1);
     return (phases_t){fx_sat_q15_word(a), fx_sat_q15_word(b), fx_sat_q15_word(b - 2 * side)};
 }
@@ -129,7 +132,7 @@ static uint32_t duty_of(int32_t y, int32_t dead_time_q16, int32_t sign)
     return ((uint32_t)y + (uint32_t)(dead_time_q16 * sign)) >> 16;
 }
 
-/* Below zero as well: Q31 holds 0 ... 2, and no duty comes near the middle of what it does not mean, 1.5. */
+/* The same below zero and above one: about the middle it fits. */
 static int32_t signed_duty(int32_t y, int32_t dead_time_q16, int32_t sign)
 {
     const uint32_t duty = (uint32_t)y + (uint32_t)(dead_time_q16 * sign);
