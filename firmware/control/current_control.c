@@ -1,16 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current_control.h"
 
-#include "fx/div.h"
 #include "fx/q.h"
 #include "fx/sqrt.h"
-#include "fx/vec.h"
 
 /* The d axis comes first, but never takes all: with no room at all the q axis could not shed the flux that
  * binds the d axis, and both would stay where they are. 31/32 leave it a quarter of the circle (CC-11). */
 #define D_RESERVE_SHIFT 5
 #define HALF_LSB_Q22 64
-#define LONGEST 45874 /* 1.4 pu: its half, squared twice, keeps a length below 1 */
 
 typedef struct {
     int32_t error; /* psi* - psi, Q15 */
@@ -49,15 +46,20 @@ static axis_t axis(int32_t sigma_q24, int32_t target, int32_t weighted_q30, int3
     };
 }
 
-/* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length
- * below 1. */
-static dq_t shortened(int32_t d, int32_t q, int32_t v_max)
+/* The whole vector shortened, its direction kept up to 2 pu per axis. */
+static dq_t shortened(int32_t d_q22, int32_t q_q22, int32_t v_max)
 {
-    const int32_t u_d = fx_clamp_q31(d, -LONGEST, LONGEST);
-    const int32_t u_q = fx_clamp_q31(q, -LONGEST, LONGEST);
-    const int32_t half = fx_magnitude((q15_t)(u_d / 2), (q15_t)(u_q / 2));
-    const int32_t share = fx_div_s32(v_max * 16384, half); /* Q15 * Q14 / Q15 of half = Q15, <= 1 */
-    return (dq_t){(u_d * share + 0x4000) >> 15, (u_q * share + 0x4000) >> 15};
+    const int32_t d = fx_sat_bits(d_q22, 24) * 128; /* Q29 */
+    const int32_t q = fx_sat_bits(q_q22, 24) * 128;
+    const uint32_t square = (uint32_t)fx_mulhi_add(fx_mulhi(d, d), q, q); /* Q26, below 2^29 */
+    if (square == 0U) {
+        return (dq_t){0, 0};
+    }
+    const unsigned shift = (unsigned)__builtin_clz(square) & 30U;
+    const int32_t inverse = fx_rsqrt_normalised(square << shift);
+    /* v_max/|u| <= 1: as |u| 2^(shift/2) is below 2^16 in Q13, v_max with as many bits is below 2^18 in Q15. */
+    const int32_t share = fx_mulhi((v_max << (shift >> 1)) << 12, inverse); /* Q27 */
+    return (dq_t){fx_shr_round(fx_mulhi(d, share), 9), fx_shr_round(fx_mulhi(q, share), 9)};
 }
 
 /* d first, at most 31/32 of the circle; q what is left (CC-11). */
@@ -107,7 +109,7 @@ static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *c
     if (s_q * s_q <= room && room >= room_min) {
         return fx_arch_pkhbt(s_d, s_q);
     }
-    const dq_t u = more_flux ? shortened(d, q, v_max) : d_first(d, q, v_max);
+    const dq_t u = more_flux ? shortened(d_q22, q_q22, v_max) : d_first(d, q, v_max);
     state->s_d_q30 = track(state->s_d_q30, config->tracking_gain, u.d - d);
     state->s_q_q30 = track(state->s_q_q30, config->tracking_gain, u.q - q);
     return fx_arch_pkhbt(u.d, u.q);

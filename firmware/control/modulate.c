@@ -132,13 +132,6 @@ static uint32_t duty_of(int32_t y, int32_t dead_time_q16, int32_t sign)
     return ((uint32_t)y + (uint32_t)(dead_time_q16 * sign)) >> 16;
 }
 
-/* The same below zero and above one: about the middle it fits. */
-static int32_t signed_duty(int32_t y, int32_t dead_time_q16, int32_t sign)
-{
-    const uint32_t duty = (uint32_t)y + (uint32_t)(dead_time_q16 * sign);
-    return ((int32_t)(duty - 0x40000000U) >> 16) + DUTY_HALF;
-}
-
 static duty_t plain(const modulate_config_t *config, phases_t y, phases_t sign)
 {
     const int32_t dead_time = 2 * config->dead_time;
@@ -153,19 +146,14 @@ static bool within(const modulate_config_t *config, phases_t y)
     return (uint32_t)y.a - margin <= width && (uint32_t)y.b - margin <= width && (uint32_t)y.c - margin <= width;
 }
 
-/* Between the middle and a duty, Q31. */
+/* From the middle to a duty, Q31, half an LSB of rounding included. */
 static int32_t off_middle(int32_t y)
 {
-    return (int32_t)((uint32_t)y - MIDDLE_Q31);
+    return (int32_t)((uint32_t)y - 0x40000000U);
 }
 
-/* Beyond the hexagon everything is shortened about the middle, from which both ends are equally far (MO-3). */
-static int32_t shortened(int32_t off, int32_t by_q31)
-{
-    return (int32_t)(MIDDLE_Q31 + 2U * (uint32_t)fx_mulhi(off, by_q31));
-}
-
-/* Some pulse may be too short, or the hexagon too small: duties as the bridge can make them, and bit 16 of the upper
+/* Some pulse may be too short, or the hexagon too small: then everything is shortened about the middle, from which both
+ * ends are equally far (MO-3). Duties as the bridge can make them, and bit 16 of the upper
  * word says that they are not as wanted. */
 static uint64_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
 {
@@ -174,13 +162,13 @@ static uint64_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
     uint32_t limited = 0;
     if (half > HALF_MAX_Q31) {
         const int32_t by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 32768;
-        y = (phases_t){shortened(x.a, by), shortened(x.b, by), shortened(x.c, by)};
+        x = (phases_t){2 * fx_mulhi(x.a, by), 2 * fx_mulhi(x.b, by), 2 * fx_mulhi(x.c, by)};
         limited = 0x10000U;
     }
     const int32_t dead_time = 2 * config->dead_time;
-    const int32_t a = signed_duty(y.a, dead_time, sign.a);
-    const int32_t b = signed_duty(y.b, dead_time, sign.b);
-    const int32_t c = signed_duty(y.c, dead_time, sign.c);
+    const int32_t a = DUTY_HALF + ((x.a + dead_time * sign.a) >> 16);
+    const int32_t b = DUTY_HALF + ((x.b + dead_time * sign.b) >> 16);
+    const int32_t c = DUTY_HALF + ((x.c + dead_time * sign.c) >> 16);
     const duty_t made = {realisable(a, config->min_pulse), realisable(b, config->min_pulse),
                          realisable(c, config->min_pulse)};
     if (made.a != (uint32_t)a || made.b != (uint32_t)b || made.c != (uint32_t)c) {
