@@ -119,11 +119,8 @@ current_control_out_t current_control_step(const current_control_config_t *confi
                                            const current_control_in_t *in)
 {
     const dq_t psi = {in->flux->psi_d, in->flux->psi_q};
-    current_target_t to = *in->target;
-    fx_arch_together(&to.psi.d, &to.psi.q);
-    fx_arch_together(&to.weighted_q30.d, &to.weighted_q30.q);
-    current_control_state_t s = *state;
-    fx_arch_together(&s.s_d_q30, &s.s_q_q30);
+    const current_target_t to = *in->target;
+    const current_control_state_t s = *state;
     const int32_t omega = in->omega >> 16;
     const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_delta);
     /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
