@@ -80,6 +80,9 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
     nodes = stack.graph(functions)
     depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
     uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])
+    sites = {entry["in"]: entry["sites"] for entry in port["pointer"]}
+    depths.problems += [f"{n.name}: {len(n.indirect)} calls through pointers, {sites[disassembly.plain(n.name)]} are listed"
+                        for n in nodes.values() if len(n.indirect) > sites.get(disassembly.plain(n.name), len(n.indirect))]  # fmt: skip
     return uses, sorted(set(depths.problems)) + stack.heap(nodes)
 
 
