@@ -13,6 +13,7 @@
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
     ab_t i;
+    fx_pair_t i_dq, advanced;
     int32_t sum_q27;
     angle_t angle;
 } instant_t;
@@ -26,6 +27,9 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
+    now.i_dq = fx_arch_pkhbt(i.d, i.q);
+    /* The middle of the period in which the duties will act: 1.5 periods ahead. */
+    now.advanced = fx_rotation(now.angle.theta_e + (uint32_t)now.angle.step + (uint32_t)(now.angle.step >> 1));
     sample->mrai.i = i;
     sample->mrai.omega = now.angle.omega_q31;
     sample->theta_e = now.angle.theta_e;
@@ -96,16 +100,14 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
         .v_dc = sample->v_dc,
     };
     const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
-    /* The middle of the period in which the duties will act: 1.5 periods ahead. */
-    const uint32_t ahead = now->angle.theta_e + (uint32_t)now->angle.step + (uint32_t)(now->angle.step >> 1);
-    const modulate_in_t modulation = {wanted.u, sample->mrai.i, ahead, sample->v_dc, wanted.clear};
+    const modulate_in_t modulation = {wanted.u, now->i_dq, now->advanced, sample->v_dc, wanted.clear};
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     hal_pwm_write(made.duty);
     hal_pwm_enable(true);
     sample->mrai.u = fast->coming; /* acts now: the duties before these */
     sample->voltage_limited = wanted.limited || made.limited;
     sample->snapped = made.limited;
-    fast->coming = made.acted;
+    fast->coming = made.limited ? modulate_acted(&m->modulate, &modulation, made.duty) : wanted.u;
     fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
 }
 

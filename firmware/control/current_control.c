@@ -51,36 +51,22 @@ static axis_t axis(int32_t sigma_q24, int32_t target, int32_t weighted_q30, int3
 
 /* The whole vector shortened, its direction kept up to 1.4 pu per axis: so long, half of it still has a length
  * below 1. */
-static dq_t shortened(axis_t d, axis_t q, int32_t v_max)
+static dq_t shortened(int32_t d, int32_t q, int32_t v_max)
 {
-    const int32_t u_d = fx_clamp_q31(d.u, -LONGEST, LONGEST);
-    const int32_t u_q = fx_clamp_q31(q.u, -LONGEST, LONGEST);
+    const int32_t u_d = fx_clamp_q31(d, -LONGEST, LONGEST);
+    const int32_t u_q = fx_clamp_q31(q, -LONGEST, LONGEST);
     const int32_t half = fx_magnitude((q15_t)(u_d / 2), (q15_t)(u_q / 2));
     const int32_t share = fx_div_s32(v_max * 16384, half); /* Q15 * Q14 / Q15 of half = Q15, <= 1 */
     return (dq_t){(u_d * share + 0x4000) >> 15, (u_q * share + 0x4000) >> 15};
 }
 
-/* Inside the circle as wanted. Beyond it the d axis comes first while it takes flux away (CC-11). While it asks for
- * flux back, the q axis may be what holds that flux: a cut that served d first would leave both where they are, at
- * any torque. */
-static dq_t limit(axis_t d, axis_t q, int32_t v_max)
+/* d first, at most 31/32 of the circle; q what is left (CC-11). */
+static dq_t d_first(int32_t d, int32_t q, int32_t v_max)
 {
-    const bool more_flux = d.error > 0;
-    const int32_t d_max = more_flux ? v_max : v_max - (v_max >> D_RESERVE_SHIFT);
-    const int32_t u_d = fx_clamp_q31(d.u, -d_max, d_max);
-    int32_t u_q = fx_clamp_q31(q.u, -v_max, v_max);
-    const int32_t room = v_max * v_max - u_d * u_d; /* Q30 */
-    if (u_d == d.u && u_q * u_q <= room && u_q == q.u) {
-        return (dq_t){u_d, u_q};
-    }
-    if (more_flux) {
-        return shortened(d, q, v_max);
-    }
-    if (u_q * u_q > room) {
-        const int32_t q_max = fx_sqrt_q30((uint32_t)room);
-        u_q = fx_clamp_q31(u_q, -q_max, q_max);
-    }
-    return (dq_t){u_d, u_q};
+    const int32_t d_max = v_max - (v_max >> D_RESERVE_SHIFT);
+    const int32_t u_d = fx_clamp_q31(d, -d_max, d_max);
+    const int32_t q_max = fx_sqrt_q30((uint32_t)(v_max * v_max - u_d * u_d));
+    return (dq_t){u_d, fx_clamp_q31(q, -q_max, q_max)};
 }
 
 /* s += a T_s (u_limited - u): what the circle cut away is no error to be integrated (CC-10). Q15 * Q15 = Q30, a gain
@@ -96,16 +82,25 @@ static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
     return fx_sat_bits(s_q30 + gain * error, 31);
 }
 
-/* Beyond the circle that is surely clear: perhaps to be cut. What was cut goes to the integrators as well. */
+/* Beyond the circle that is surely clear: perhaps to be cut. Inside the circle as wanted. Beyond it the d axis comes
+ * first while it takes flux away (CC-11). While it asks for flux back, the q axis may be what holds that flux: a cut
+ * that served d first would leave both where they are, at any torque. What was cut goes to the integrators as well. */
 static __attribute__((noinline)) fx_pair_t cut(const current_control_config_t *config, current_control_state_t *state,
-                                               axis_t d, axis_t q, int32_t v_dc)
+                                               int32_t d_q22, int32_t q_q22, int32_t v_dc, bool more_flux)
 {
+    const int32_t d = d_q22 >> 7;
+    const int32_t q = q_q22 >> 7;
     const int32_t v_max = (config->v_ratio * v_dc + 0x4000) >> 15;
-    d.u = d.u >> 7;
-    q.u = q.u >> 7;
-    const dq_t u = limit(d, q, v_max);
-    state->s_d_q30 = track(state->s_d_q30, config->tracking_gain, u.d - d.u);
-    state->s_q_q30 = track(state->s_q_q30, config->tracking_gain, u.q - q.u);
+    const int32_t s_d = fx_sat_q15_word(d);
+    const int32_t s_q = fx_sat_q15_word(q);
+    const int32_t room = v_max * v_max - s_d * s_d; /* Q30 */
+    const int32_t room_min = more_flux ? 0 : (v_max * v_max) >> 4;
+    if (s_q * s_q <= room && room >= room_min) {
+        return fx_arch_pkhbt(s_d, s_q);
+    }
+    const dq_t u = more_flux ? shortened(d, q, v_max) : d_first(d, q, v_max);
+    state->s_d_q30 = track(state->s_d_q30, config->tracking_gain, u.d - d);
+    state->s_q_q30 = track(state->s_q_q30, config->tracking_gain, u.q - q);
     return fx_arch_pkhbt(u.d, u.q);
 }
 
@@ -130,7 +125,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     if ((uint32_t)fx_dot2(both, both) < (uint32_t)fx_mulhi(config->clear_q32, in->v_dc * in->v_dc)) {
         return (current_control_out_t){.u = u, .clear = true};
     }
-    const fx_pair_t left = cut(config, state, d, q, in->v_dc);
+    const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error > 0);
     const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
     return (current_control_out_t){.u = is, .limited = is.d != u.d || is.q != u.q};
 }

@@ -13,13 +13,6 @@ typedef struct {
     int32_t a, b, c;
 } phases_t;
 
-/* What a period that cannot be as commanded is made from. */
-typedef struct {
-    phases_t want, sign;
-    fx_pair_t advanced;
-    int32_t v_dc;
-} cut_t;
-
 /* Q15 vector to Q30 phases; they sum to zero exactly, and |x| < 1.4, so that two differ by less than 2^32. */
 static phases_t phases_q30(int32_t alpha, int32_t beta)
 {
@@ -46,9 +39,9 @@ static int32_t middle(phases_t x)
 }
 
 /* Currents of the phases at the middle of the acting period, as polarity: Q15, 1.0 beyond the knee (MO-6). */
-static phases_t polarity(const modulate_config_t *config, dq_t i, fx_pair_t at)
+static phases_t polarity(const modulate_config_t *config, fx_pair_t i, fx_pair_t at)
 {
-    const ab_t x = inverse_park_q30(i, at);
+    const ab_t x = {fx_difference2(i, at), fx_dot2_cross(i, at)};
     const int32_t a = fx_mulhi(config->knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
     const int32_t side = fx_mulhi(config->knee_side_q17, x.beta);
     const int32_t b = side - (a >> 1);
@@ -83,47 +76,9 @@ static uint32_t realisable(int32_t duty, int32_t min_pulse)
     return (uint32_t)duty;
 }
 
-/* A phase that does not switch has no dead time: its compensation is not taken away again (MO-9). */
-static int32_t effective(uint32_t duty, int32_t compensation)
+/* Near the hexagon or beyond it: the vector is shortened, pulses snap. */
+static modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t sign)
 {
-    return (duty == 0 || duty == DUTY_ONE) ? (int32_t)duty : (int32_t)duty - compensation;
-}
-
-static dq_t acting_voltage(duty_t duty, phases_t c, const cut_t *cut)
-{
-    const int32_t a = effective(duty.a, c.a);
-    const int32_t b = effective(duty.b, c.b);
-    const int32_t g = effective(duty.c, c.c);
-    /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
-    const ab_t v = {transform_round((2 * a - b - g) * 10923), transform_round((b - g) * 18919)};
-    return park((ab_t){transform_round(v.alpha * cut->v_dc), transform_round(v.beta * cut->v_dc)}, cut->advanced);
-}
-
-/* Pulses snap, and acted says what they make. */
-static void limit(const modulate_config_t *config, const cut_t *cut, modulate_out_t *out)
-{
-    const phases_t c = {fx_mul_q15(config->dead_time, (q15_t)cut->sign.a),
-                        fx_mul_q15(config->dead_time, (q15_t)cut->sign.b),
-                        fx_mul_q15(config->dead_time, (q15_t)cut->sign.c)};
-    out->duty = (duty_t){realisable(cut->want.a, config->min_pulse), realisable(cut->want.b, config->min_pulse),
-                         realisable(cut->want.c, config->min_pulse)};
-    out->acted = acting_voltage(out->duty, c, cut);
-    out->limited = true;
-}
-
-static bool within(int32_t duty, int32_t min_pulse)
-{
-    return (uint32_t)(duty - min_pulse) <= (uint32_t)(DUTY_ONE - 2 * min_pulse);
-}
-
-/* Near the hexagon, or a dc voltage too low to divide by. */
-static __attribute__((noinline)) void careful(const modulate_config_t *config, const modulate_in_t *in,
-                                              modulate_out_t *out)
-{
-    const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
-    const fx_pair_t advanced = fx_rotation(in->theta);
-    ab_t v = normalise(in->u, advanced, v_dc);
-    v = (ab_t){fx_sat_q15_word(v.alpha), fx_sat_q15_word(v.beta)};
     phases_t x = phases_q30(v.alpha, v.beta);
     const int32_t hi = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
     const int32_t lo = fx_min_s32(x.a, fx_min_s32(x.b, x.c));
@@ -131,43 +86,100 @@ static __attribute__((noinline)) void careful(const modulate_config_t *config, c
     if (span > SPAN_MAX_Q30) {
         x = shorten(v, span);
     }
-    const phases_t sign = polarity(config, in->i, advanced);
-    const cut_t cut = {centred(x, sign, config->dead_time), sign, advanced, in->v_dc};
-    const int32_t pulse = config->min_pulse;
-    if (span <= SPAN_MAX_Q30 && v_dc == in->v_dc && within(cut.want.a, pulse) && within(cut.want.b, pulse) &&
-        within(cut.want.c, pulse)) {
-        out->duty = (duty_t){(uint32_t)cut.want.a, (uint32_t)cut.want.b, (uint32_t)cut.want.c};
-        out->acted = in->u;
-        out->limited = false;
-    } else {
-        limit(config, &cut, out);
-    }
+    const phases_t want = centred(x, sign, config->dead_time);
+    const duty_t duty = {realisable(want.a, config->min_pulse), realisable(want.b, config->min_pulse),
+                         realisable(want.c, config->min_pulse)};
+    const bool snapped = duty.a != (uint32_t)want.a || duty.b != (uint32_t)want.b || duty.c != (uint32_t)want.c;
+    return (modulate_out_t){duty, snapped || span > SPAN_MAX_Q30};
 }
 
-/* Where nothing limits: |v| < 0.58, the phases fit Q31, and their upper halves are the duties; unsigned, as only they
- * need to be in range. */
-static duty_t plain(const modulate_config_t *config, ab_t v, phases_t sign)
+/* Far beyond the hexagon, or a dc voltage too low to divide by. */
+static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_t *config, const modulate_in_t *in)
+{
+    const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
+    const ab_t v = normalise(in->u, in->advanced, v_dc);
+    modulate_out_t out = careful(config, (ab_t){fx_sat_q15_word(v.alpha), fx_sat_q15_word(v.beta)},
+                                 polarity(config, in->i, in->advanced));
+    out.limited = out.limited || v_dc != in->v_dc;
+    return out;
+}
+
+/* |u|^2 < v_dc^2/2, so that the phases fit Q31, and a dc voltage to divide by. */
+static bool fits_q31(const modulate_config_t *config, const modulate_in_t *in)
+{
+    const fx_pair_t u = fx_arch_pkhbt(in->u.d, in->u.q);
+    return in->v_dc >= config->v_dc_min && (uint32_t)fx_dot2(u, u) < (uint32_t)(in->v_dc * in->v_dc) >> 1;
+}
+
+/* Duties without dead time, Q31 and half an LSB to round them (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only
+ * the sums need to be in range. */
+static phases_t centred_q31(ab_t v)
 {
     const int32_t side = fx_arch_opaque(v.beta * Q16(0.86602540378443865)); /* Q15 * Q16 = Q31 */
     const int32_t b = side - v.alpha * DUTY_ONE;
-    const phases_t x = {v.alpha * (2 * DUTY_ONE), b, b - 2 * side};
+    const phases_t x = {v.alpha * (2 * DUTY_ONE), b, (int32_t)((uint32_t)b - 2U * (uint32_t)side)};
     const uint32_t shift = (uint32_t)fx_arch_opaque(0x40008000) + (uint32_t)(middle(x) >> 1);
+    return (phases_t){(int32_t)((uint32_t)x.a + shift), (int32_t)((uint32_t)x.b + shift),
+                      (int32_t)((uint32_t)x.c + shift)};
+}
+
+static uint32_t duty_of(int32_t y, int32_t dead_time_q16, int32_t sign)
+{
+    return ((uint32_t)y + (uint32_t)(dead_time_q16 * sign)) >> 16;
+}
+
+static duty_t plain(const modulate_config_t *config, phases_t y, phases_t sign)
+{
     const int32_t dead_time = 2 * config->dead_time;
-    const uint32_t a_q31 = (uint32_t)x.a + shift + (uint32_t)(dead_time * sign.a);
-    const uint32_t b_q31 = (uint32_t)x.b + shift + (uint32_t)(dead_time * sign.b);
-    const uint32_t c_q31 = (uint32_t)x.c + shift + (uint32_t)(dead_time * sign.c);
-    return (duty_t){a_q31 >> 16, b_q31 >> 16, c_q31 >> 16};
+    return (duty_t){duty_of(y.a, dead_time, sign.a), duty_of(y.b, dead_time, sign.b), duty_of(y.c, dead_time, sign.c)};
+}
+
+/* Whatever the dead time adds, no pulse is too short. */
+static bool within(const modulate_config_t *config, phases_t y)
+{
+    const uint32_t margin = (uint32_t)(config->min_pulse + config->dead_time) << 16;
+    const uint32_t width = 0x80000000U - 2U * margin;
+    return (uint32_t)y.a - margin <= width && (uint32_t)y.b - margin <= width && (uint32_t)y.c - margin <= width;
+}
+
+static __attribute__((noinline)) modulate_out_t near(const modulate_config_t *config, const modulate_in_t *in)
+{
+    if (!fits_q31(config, in)) {
+        return far(config, in);
+    }
+    const ab_t v = normalise(in->u, in->advanced, in->v_dc);
+    const phases_t sign = polarity(config, in->i, in->advanced);
+    const phases_t y = centred_q31(v);
+    if (!within(config, y)) {
+        return careful(config, v, sign);
+    }
+    return (modulate_out_t){plain(config, y, sign), false};
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
 {
-    modulate_out_t out;
     if (!in->clear) {
-        const modulate_in_t near = *in; /* a copy: the usual case keeps its values in registers */
-        careful(config, &near, &out);
-        return out;
+        const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
+        return near(config, &given);
     }
-    const fx_pair_t advanced = fx_rotation(in->theta);
-    const ab_t v = normalise(in->u, advanced, in->v_dc);
-    return (modulate_out_t){plain(config, v, polarity(config, in->i, advanced)), in->u, false};
+    const phases_t y = centred_q31(normalise(in->u, in->advanced, in->v_dc));
+    return (modulate_out_t){plain(config, y, polarity(config, in->i, in->advanced)), false};
+}
+
+/* A phase that does not switch has no dead time: its compensation is not taken away again (MO-9). */
+static int32_t effective(const modulate_config_t *config, uint32_t duty, int32_t sign)
+{
+    const bool switches = duty != 0U && duty != DUTY_ONE;
+    return (int32_t)duty - (switches ? fx_mul_q15(config->dead_time, (q15_t)sign) : 0);
+}
+
+__attribute__((noinline)) dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
+{
+    const phases_t sign = polarity(config, in->i, in->advanced);
+    const int32_t a = effective(config, duty.a, sign.a);
+    const int32_t b = effective(config, duty.b, sign.b);
+    const int32_t c = effective(config, duty.c, sign.c);
+    /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
+    const ab_t v = {transform_round((2 * a - b - c) * 10923), transform_round((b - c) * 18919)};
+    return park((ab_t){transform_round(v.alpha * in->v_dc), transform_round(v.beta * in->v_dc)}, in->advanced);
 }

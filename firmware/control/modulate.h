@@ -30,19 +30,21 @@ typedef struct {
 } modulate_config_t;
 
 typedef struct {
-    dq_t u;        /* commanded voltage */
-    dq_t i;        /* currents for the polarity */
-    uint32_t theta;     /* electrical angle at the middle of the acting period, 2^32 = one turn */
+    dq_t u;             /* commanded voltage */
+    fx_pair_t i;        /* currents for the polarity, (d, q) */
+    fx_pair_t advanced; /* fx_rotation() of the electrical angle at the middle of the acting period */
     int32_t v_dc;
     bool clear;         /* u is so small that no duty can be out of reach (MO-11); v_dc is then at least 2 */
 } modulate_in_t;
 
 typedef struct {
     duty_t duty;
-    dq_t acted;
     bool limited;
 } modulate_out_t;
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in);
+
+/** What limited duties make; duties that are not limited make in->u. */
+dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty);
 
 #endif

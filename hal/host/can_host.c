@@ -2,6 +2,7 @@
 #include "hal/host/can_host.h"
 
 #include "hal/host/instance.h"
+#include "hal/host/port.h"
 
 static bool put(can_queue_t *queue, const can_frame_t *frame)
 {
@@ -26,6 +27,7 @@ static bool take(can_queue_t *queue, can_frame_t *frame)
 void can_host_attach(fluxtrue_t *drive)
 {
     ecu_init(&drive->ecu, &motor);
+    host_port_recall(drive);
     drive->on_bus = true;
 }
 

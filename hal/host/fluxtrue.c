@@ -22,6 +22,7 @@
 void fluxtrue_init(fluxtrue_t *instance)
 {
     *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
+    nvm_host_erase(&instance->nvm);
     drive_init(&instance->drive, &motor);
 }
 
@@ -88,6 +89,7 @@ static void run_period(fluxtrue_t *d)
         } else {
             task_1khz(&d->drive);
         }
+        (void)memory_background(&d->memory, &d->drive);
     }
     host_port_select(NULL);
 }

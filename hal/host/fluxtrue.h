@@ -20,6 +20,8 @@ extern "C" {
 
 enum { FLUXTRUE_OK = 0, FLUXTRUE_UNKNOWN_NAME = -1, FLUXTRUE_OUT_OF_RANGE = -2, FLUXTRUE_READ_ONLY = -3 };
 
+enum { FLUXTRUE_MEMORY_SIZE = 4096 };
+
 typedef struct fluxtrue fluxtrue_t;
 
 /** A new drive with the motor compiled in; NULL when out of memory. */
@@ -31,6 +33,12 @@ FLUXTRUE_API int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
 FLUXTRUE_API double fluxtrue_get(const fluxtrue_t *drive, const char *name);
 /** The names one by one, NULL after the last and for a negative index. */
 FLUXTRUE_API const char *fluxtrue_name(int index);
+/** The drive's flash, FLUXTRUE_MEMORY_SIZE bytes: what was learnt is saved there a moment after `enable` has gone to 0,
+ *  and not more often than every five minutes. Carry it over to a new drive and it starts with that knowledge.
+ *  FLUXTRUE_OUT_OF_RANGE: another size. */
+FLUXTRUE_API int fluxtrue_memory_read(const fluxtrue_t *drive, unsigned char *data, int size);
+/** Before the first step, as at power-on: FLUXTRUE_READ_ONLY afterwards. Damaged or foreign ones leave the priors. */
+FLUXTRUE_API int fluxtrue_memory_write(fluxtrue_t *drive, const unsigned char *data, int size);
 /** in: ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start.
  *  out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1. */
 FLUXTRUE_API void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4]);

@@ -8,8 +8,10 @@
 #include <stddef.h>
 
 #include "app/ecu.h"
+#include "app/memory.h"
 #include "hal/board.h"
 #include "hal/host/fluxtrue.h"
+#include "hal/host/nvm_host.h"
 #include "types/samples.h"
 
 #define CAN_HOST_QUEUE 64U
@@ -37,6 +39,8 @@ struct fluxtrue {
     };
     bool on_bus; /* ecu_task_1khz() runs instead of task_1khz() */
     host_board_t board;
+    nvm_host_t nvm;
+    memory_t memory;
     adc_counts_t counts;
     uint32_t theta_m;
     double winding_C;

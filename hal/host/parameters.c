@@ -80,6 +80,8 @@ GETTER(table_clamped, sample(d)->mrai.flux.clamped)
 GETTER(overruns, d->drive.fast.overruns)
 GETTER(run_state, d->drive.task.run_state)
 GETTER(winding, d->winding_C)
+GETTER(memory_recalled, d->memory.recalled)
+GETTER(memory_saves, d->memory.saves)
 
 static double get_speed(const fluxtrue_t *d)
 {
@@ -199,6 +201,8 @@ static const parameter_t parameters[] = {
     {"mrai_overruns", get_overruns, NULL, 0, 0},
     {"run_state", get_run_state, NULL, 0, 0},
     {"winding_C", get_winding, NULL, 0, 0},
+    {"memory_recalled", get_memory_recalled, NULL, 0, 0},
+    {"memory_saves", get_memory_saves, NULL, 0, 0},
 };
 
 #define PARAMETERS ((int)(sizeof parameters / sizeof parameters[0]))

@@ -9,6 +9,7 @@
 #include "hal/can.h"
 #include "hal/host/can_host.h"
 #include "hal/irq.h"
+#include "hal/nvm.h"
 #include "hal/pwm.h"
 #include "hal/system.h"
 #include "hal/temperature.h"
@@ -20,6 +21,13 @@ static _Thread_local fluxtrue_t *active;
 void host_port_select(fluxtrue_t *instance)
 {
     active = instance;
+}
+
+void host_port_recall(fluxtrue_t *instance)
+{
+    host_port_select(instance);
+    memory_recall(&instance->memory, &instance->drive);
+    host_port_select(NULL);
 }
 
 void hal_adc_read(adc_counts_t *counts)
@@ -106,4 +114,19 @@ uint32_t hal_system_stack_unused(void)
 reset_cause_t hal_system_reset_cause(void)
 {
     return RESET_POWER_ON;
+}
+
+bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
+{
+    return nvm_host_read(&active->nvm, slot, offset, data, size);
+}
+
+bool hal_nvm_erase(uint32_t slot)
+{
+    return nvm_host_erase_slot(&active->nvm, slot);
+}
+
+bool hal_nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size)
+{
+    return nvm_host_program(&active->nvm, slot, offset, data, size);
 }

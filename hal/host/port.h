@@ -2,9 +2,11 @@
 #ifndef HAL_HOST_PORT_H
 #define HAL_HOST_PORT_H
 /** Chooses the instance whose registers the HAL functions see in this thread.
- * Context  fluxtrue_step() only */
+ * Context  fluxtrue_step() and start-up only */
 #include "hal/host/instance.h"
 
 void host_port_select(fluxtrue_t *instance);
+/** The start-up's look into the flash. */
+void host_port_recall(fluxtrue_t *instance);
 
 #endif

@@ -193,6 +193,6 @@ def figures(request: pytest.FixtureRequest) -> Figures:
 
 
 @pytest.fixture
-def make_vecu(program: Path) -> Callable[[], VirtualEcu]:
+def make_vecu(program: Path) -> Callable[..., VirtualEcu]:
     """Further virtual ECUs, for tests that end or torment them."""
-    return lambda: VirtualEcu(program)
+    return lambda **options: VirtualEcu(program, **options)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The virtual ECU: fluxtrue_vecu [--fast] [--port N] [--bench-port N] [--bit-rate N] [--seed N]
+/* The virtual ECU: fluxtrue_vecu [--fast] [--port N] [--bench-port N] [--bit-rate N] [--seed N] [--nvm FILE]
  * Says on standard output where it listens, in one line, as soon as it does. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
@@ -12,6 +12,7 @@
 #include "bench.h"
 #include "hub.h"
 #include "machine_data.h"
+#include "nvm_file.h"
 #include "vecu.h"
 
 enum { EXIT_USAGE = 2, PERIODS_PER_LOOP = 100 };
@@ -24,6 +25,7 @@ static volatile sig_atomic_t stop;
 typedef struct {
     bool realtime;
     uint64_t port, bench_port, bit_rate, seed;
+    const char *nvm;
 } options_t;
 
 static void on_signal(int number)
@@ -71,9 +73,11 @@ static bool parse(int count, char **words, options_t *o)
             good = parse_number(word, value, 10000, 1000000, &o->bit_rate);
         } else if (strcmp(word, "--seed") == 0) {
             good = parse_number(word, value, 0, 1ULL << 52, &o->seed);
+        } else if (strcmp(word, "--nvm") == 0 && value != NULL) {
+            o->nvm = value;
         } else {
             (void)fprintf(stderr, "error: unknown option '%s', allowed: --fast --realtime --port --bench-port "
-                                  "--bit-rate --seed\n", word);
+                                  "--bit-rate --seed --nvm\n", word);
             good = false;
         }
         if (!good) {
@@ -175,7 +179,13 @@ int main(int count, char **words)
     (void)sigaction(SIGTERM, &act, NULL);
     act.sa_handler = SIG_IGN;
     (void)sigaction(SIGPIPE, &act, NULL);
+    vecu.nvm_path = options.nvm;
     const char *bad = vecu_reset(&vecu, options.seed);
+    if (bad != NULL && bad == options.nvm) {
+        (void)fprintf(stderr, "error: --nvm %s: no flash contents, allowed: a file of %u bytes, or none yet\n", bad,
+                      NVM_HOST_SIZE);
+        return EXIT_USAGE;
+    }
     if (bad != NULL) {
         (void)fprintf(stderr, "error: motor %s: %s\n", machine_data.motor, bad);
         return EXIT_USAGE;

@@ -7,6 +7,7 @@
 #include "hal/host/can_host.h"
 #include "hal/host/instance.h"
 #include "machine_data.h"
+#include "nvm_file.h"
 
 #define DC_LINK_EMPTY_V 1.0 /* the machine model wants a voltage */
 #define FNV_START 14695981039346656037ULL
@@ -39,6 +40,10 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
         hub_forget_ecu(vecu->hub);
     }
     fluxtrue_init(&ecu);
+    if (vecu->nvm_path != NULL && !nvm_file_load(vecu->nvm_path, &ecu.nvm)) {
+        return vecu->nvm_path;
+    }
+    vecu->nvm_changes = ecu.nvm.changes;
     can_host_attach(&ecu);
     vecu->sim = sim_create_around(&ecu);
     if (vecu->sim == NULL) {
@@ -104,6 +109,10 @@ bool vecu_step(vecu_t *vecu, double *row)
     stand_step(vecu);
     const bool written = sim_run(vecu->sim, 1, row, 1) > 0;
     vecu->now_ns += vecu->period_ns;
+    if (vecu->nvm_path != NULL && ecu.nvm.changes != vecu->nvm_changes &&
+        nvm_file_save(vecu->nvm_path, &ecu.nvm)) {
+        vecu->nvm_changes = ecu.nvm.changes;
+    }
     hash_word(vecu, ecu.duty.a | (uint32_t)ecu.duty.b << 16);
     hash_word(vecu, ecu.duty.c | (ecu.gates ? 1U << 16 : 0U));
     exchange_out(vecu);

@@ -5,7 +5,7 @@
  *   each period: frames that have passed by are received, the firmware computes, the plant advances, frames are sent
  * Source   docs/howto/bench.md
  * Units    ns of simulated time since the program's start; a reset does not turn it back
- * Errors   vecu_reset() answers the name of what is wrong with the machine data, else NULL
+ * Errors   vecu_reset() answers the name of what is wrong with the machine data, nvm_path for its file, else NULL
  * Context  simulation only; one instance, because the calibration tools want its state at a fixed address */
 #include <stdbool.h>
 #include <stdint.h>
@@ -22,6 +22,8 @@ typedef struct {
     uint64_t seed;
     uint64_t duty_hash;    /* FNV-1a of every duty and gate state since the hash was last asked for */
     uint64_t resets;
+    const char *nvm_path;  /* file that holds the flash over power cycles; NULL: a power cycle erases it */
+    uint32_t nvm_changes;  /* as far as the file has them */
 } vecu_t;
 
 /** A power cycle of ECU and plant: everything as at the start, with the plant's random numbers from `seed`. */

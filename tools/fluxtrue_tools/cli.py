@@ -18,6 +18,8 @@ COMMANDS = {
     "vecu": ("fluxtrue_tools.vecu.cli", "vecu", "The virtual ECU: a CAN bus to talk to."),
     "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
+    "live": ("fluxtrue_tools.live.cli", "live", "Draw the drive live in a browser; command, tune, record."),
+    "log": ("fluxtrue_tools.log.cli", "log", "Decode, plot and export a recorded drive."),
     "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
     "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),

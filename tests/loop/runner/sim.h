@@ -33,6 +33,8 @@ SIM_API sim_t *sim_create(int controller);
 /** The same with firmware that belongs to the caller and outlives the simulation. */
 SIM_API sim_t *sim_create_around(struct fluxtrue *firmware);
 SIM_API void sim_destroy(sim_t *sim);
+/** The firmware in it, for fluxtrue_memory_read() and _write(); NULL: another controller. */
+SIM_API struct fluxtrue *sim_firmware(sim_t *sim);
 /** The machine's flux map, full plane, row-major [i_d][i_q]; copied. Without one the machine has
  * constant inductances. */
 SIM_API int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The two controllers that come with the runner: the firmware, and its twin. */
 #include "hal/host/fluxtrue.h"
-#include "sim_controller.h"
+#include "sim_private.h"
 #include "twin/twin.h"
 
 #include <stddef.h>
@@ -69,4 +69,9 @@ sim_t *sim_create_around(fluxtrue_t *firmware)
 {
     return sim_create_with(
         (sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep});
+}
+
+fluxtrue_t *sim_firmware(sim_t *sim)
+{
+    return sim->controller.step == firmware_step ? (fluxtrue_t *)sim->controller.self : NULL;
 }

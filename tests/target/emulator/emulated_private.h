@@ -16,12 +16,16 @@ typedef struct {
     bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
     drive_t task_result;       /* of the shadow's task, while the image is still at it */
-    bool task_runs;
+    drive_t task_before;       /* what it started from */
+    bool task_runs, task_late;
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;
 
 double emulated_get(emulated_t *e, const char *name);
+
+/** What the image makes of the thermistors, for a drive on the host. */
+void temperatures_take(const emulated_t *e, fluxtrue_t *host);
 
 bool shadow_start(emulated_t *e);
 void shadow_inputs(emulated_t *e);

@@ -9,7 +9,7 @@
 #include "loop/runner/sim_private.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69 };
-enum { WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 1), POINTS_MAX = 8000 };
+enum { WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 2), POINTS_MAX = 8000 };
 enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 
 typedef struct {
@@ -106,6 +106,7 @@ static drive_t victim_here(preempt_t *p, const drive_t *inputs)
 {
     p->host->drive = *inputs;
     p->host->drive.motor = p->e->mirror.host->drive.motor;
+    temperatures_take(p->e, p->host);
     host_port_select(p->host);
     if (p->victim == PREEMPT_MRAI) {
         mrai_isr(&p->host->drive);
@@ -164,13 +165,16 @@ static bool words_find(preempt_t *p)
 
 static void outcomes_compute(preempt_t *p)
 {
-    for (int choice = 0; choice < 1 << (p->words + 1); choice++) {
+    for (int choice = 0; choice < 1 << (p->words + 2); choice++) {
         drive_t inputs = p->before;
         if ((choice & 1) != 0) {
             inputs.samples = p->after.samples;
         }
+        if ((choice & 2) != 0 && p->victim == PREEMPT_TASK) {
+            inputs.windows = p->after.windows;
+        }
         for (int i = 0; i < p->words; i++) {
-            if ((choice >> (i + 1) & 1) != 0) {
+            if ((choice >> (i + 2) & 1) != 0) {
                 word_new(p, &inputs, p->word[i]);
             }
         }

@@ -2,9 +2,9 @@
 #ifndef EMULATOR_PREEMPT_H
 #define EMULATOR_PREEMPT_H
 /** Interrupts one activity at every instruction by the fast ISR (and the identification that it pends), and asks
- * whether the activity saw each shared value either as it was or as it became. Allowed outcomes are computed by the
- * same firmware on the host: every combination of old and new among the words that make a difference, and the sample box as
- * a whole. Needs counting mode and the image in which nothing but the drive runs in the 1 kHz task.
+ * whether the activity saw each shared value either as it was or as it became. The same firmware on the host computes
+ * what is allowed: every combination of old and new among the words that make a difference, and among the boxes of
+ * samples and windows. Needs counting mode and the image in which nothing but the drive runs in the 1 kHz task.
  * Source   docs/architecture.md, shared data
  * Errors   preempt_run(): a negative number, and why in the report
  * Context  a test; the simulation is left as it was */

@@ -40,7 +40,9 @@ def test_another_compiler_is_told_and_compares_nothing() -> None:
     assert reason is not None and "'gcc 1'" in reason and "'gcc 2'" in reason
 
 
-@pytest.mark.parametrize(("content", "message"), [(None, "bench --update"), ("{", "no JSON"), ("[]", "compiler is missing")])
+@pytest.mark.parametrize(
+    ("content", "message"), [(None, "bench --update"), ("{", "no JSON"), ("[]", "compiler is missing")]
+)
 def test_a_baseline_that_cannot_be_read_is_an_error(tmp_path: Path, content: str | None, message: str) -> None:
     path = tmp_path / "performance.json"
     if content is not None:

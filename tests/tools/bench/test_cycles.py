@@ -17,15 +17,18 @@ MANUAL = [
     ("sdiv", "r0, r1, r2", 12), ("udivne", "r0, r1, r2", 12),
     ("ssat", "r0, #16, r1, asr #2", 1), ("qadd", "r0, r1, r2", 1), ("uxth", "r0, r1", 1), ("sbfx", "r0, r1, #2, #3", 1),
     ("clz", "r0, r1", 1), ("pkhbt", "r0, r1, r2, lsl #16", 1),
-    ("ldr.w", "r0, [r1, #4]", 2), ("ldrsh.w", "r0, [r1, r2, lsl #1]", 2), ("ldrbeq", "r0, [r1]", 2), ("strh", "r0, [r1]", 2),
+    ("ldr.w", "r0, [r1, #4]", 2), ("ldrsh.w", "r0, [r1, r2, lsl #1]", 2), ("ldrbeq", "r0, [r1]", 2),
+    ("strh", "r0, [r1]", 2),
     ("strd", "r0, r1, [sp, #8]", 3), ("ldrd", "r0, r1, [sp]", 3),
     ("push", "{r4, r5, lr}", 4), ("pop", "{r4, pc}", 3), ("ldmia.w", "sp!, {r4, r5, r6, r7, r8, r9, sl, fp, pc}", 10),
     ("stmdb", "sp!, {r4, lr}", 3), ("vpush", "{d8-d9}", 5), ("vldmia", "r0!, {s0-s2}", 4),
     ("b.n", "41c <f>", 1), ("bls.n", "41c <f>", 1), ("bleq", "41c <f>", 1), ("bl", "41c <f>", 1), ("bx", "lr", 1),
     ("blx", "r3", 1), ("cbnz", "r0, 41c <f>", 1), ("tbh", "[pc, r3, lsl #1]", 2),
     ("it", "mi", 1), ("itte", "ne", 1), ("nop", "", 1), ("dsb", "sy", 1), ("cpsid", "i", 2), ("mrs", "r0, PRIMASK", 2),
-    ("vadd.f32", "s0, s1, s2", 1), ("vmulgt.f32", "s0, s1, s2", 1), ("vmov", "s0, r0", 1), ("vcvt.s32.f32", "s0, s1", 1),
-    ("vmla.f32", "s0, s1, s2", 3), ("vfma.f32", "s0, s1, s2", 3), ("vdiv.f32", "s0, s1, s2", 14), ("vsqrt.f32", "s0, s1", 14),
+    ("vadd.f32", "s0, s1, s2", 1), ("vmulgt.f32", "s0, s1, s2", 1), ("vmov", "s0, r0", 1),
+    ("vcvt.s32.f32", "s0, s1", 1),
+    ("vmla.f32", "s0, s1, s2", 3), ("vfma.f32", "s0, s1, s2", 3), ("vdiv.f32", "s0, s1, s2", 14),
+    ("vsqrt.f32", "s0, s1", 14),
     ("vldr", "s0, [r0]", 2), ("vldr", "d8, [r0]", 3), ("vstr", "s0, [sp, #4]", 2), ("vmrs", "APSR_nzcv, fpscr", 1),
 ]  # fmt: skip
 
@@ -40,8 +43,11 @@ def test_an_unknown_instruction_is_an_error_that_names_it() -> None:
         cycles.cycles(Instruction(0, 4, "vsel.f32", "s0, s1, s2"))
 
 
-@pytest.mark.parametrize(("name", "expected"), [("bls.n", ("b", True)), ("bl", ("bl", False)), ("mls", ("mls", False)),
-                                                ("muls", ("mul", False)), ("movls", ("mov", True)), ("addsne", ("add", True))])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("bls.n", ("b", True)), ("bl", ("bl", False)), ("mls", ("mls", False)), ("muls", ("mul", False)),
+     ("movls", ("mov", True)), ("addsne", ("add", True))],
+)  # fmt: skip
 def test_conditions_and_flag_suffixes_are_told_from_names(name: str, expected: tuple[str, bool]) -> None:
     assert cycles.base(name) == expected
 
@@ -53,7 +59,8 @@ def test_a_register_list_is_counted_in_words() -> None:
 
 
 def test_every_instruction_of_a_listing_gets_its_cost_and_constants_none() -> None:
-    listing = "00000410 <f>:\n 410:\tb510      \tpush\t{r4, lr}\n 412:\tf000 f801 \tbl\t418 <g>\n 416:\tbd10      \tpop\t{r4, pc}\n"
-    listing += "\n00000418 <g>:\n 418:\t4770      \tbx\tlr\n 41a:\tbf00      \tnop\n 41c:\t00001234 \t.word\t0x00001234\n"
+    listing = "00000410 <f>:\n 410:\tb510      \tpush\t{r4, lr}\n 412:\tf000 f801 \tbl\t418 <g>\n"
+    listing += " 416:\tbd10      \tpop\t{r4, pc}\n\n00000418 <g>:\n 418:\t4770      \tbx\tlr\n"
+    listing += " 41a:\tbf00      \tnop\n 41c:\t00001234 \t.word\t0x00001234\n"
     costs = cycles.image_costs(parse(listing), 0x420)
     assert list(costs[0x410 // 2 :]) == [3, 1, 0, 3, 1, 1, 0, 0]

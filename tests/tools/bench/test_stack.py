@@ -20,7 +20,8 @@ def nodes(folder: Path, source: str, suffix: str = ".s") -> dict[str, stack.Node
     code = folder / f"a{suffix}"
     code.write_text((HEAD if suffix == ".s" else "") + source)
     link = ("-nostdlib", "-nostartfiles", "-Wl,-e,start,-Ttext=0x400,--unresolved-symbols=ignore-all")
-    command = [ARM_CC, *ARM_FLAGS, "-O1", "-fno-inline", "-ffreestanding", *link, str(code), "-o", str(folder / "a.elf")]
+    flags = (*ARM_FLAGS, "-O1", "-fno-inline", "-ffreestanding", *link)
+    command = [ARM_CC, *flags, str(code), "-o", str(folder / "a.elf")]
     subprocess.run(command, check=True, capture_output=True)
     return stack.graph(disassembly.read(folder / "a.elf"))
 
@@ -39,7 +40,8 @@ def worst(found: dict[str, stack.Node], name: str, **pointers: list[str]) -> tup
 def test_frames_add_up_along_the_deepest_path(tmp_path: Path) -> None:
     source = function("start", "push {r4, lr}; sub sp, #24; bl shallow; bl deep; add sp, #24; pop {r4, pc}")
     source += function("shallow", "push {r4, r5, r6, lr}; pop {r4, r5, r6, pc}")
-    source += function("deep", "stmdb sp!, {r4, r5, r6, r7, r8, lr}; vpush {d8-d9}; vpop {d8-d9}; ldmia sp!, {r4, r5, r6, r7, r8, pc}")
+    saved = "sp!, {r4, r5, r6, r7, r8"
+    source += function("deep", f"stmdb {saved}, lr}}; vpush {{d8-d9}}; vpop {{d8-d9}}; ldmia {saved}, pc}}")
     # 8 + 24, then 24 + 16 below.
     assert worst(nodes(tmp_path, source), "start") == (72, ("start", "deep"), [])
 
@@ -87,7 +89,8 @@ def test_what_makes_the_stack_unbounded_is_found(tmp_path: Path, source: str, me
 
 
 def test_a_listed_pointer_is_followed_and_a_wrong_list_is_an_error(tmp_path: Path) -> None:
-    source = function("start", "push {r4, lr}; blx r3; pop {r4, pc}") + function("by_pointer", "sub sp, #16; add sp, #16; bx lr")
+    source = function("start", "push {r4, lr}; blx r3; pop {r4, pc}")
+    source += function("by_pointer", "sub sp, #16; add sp, #16; bx lr")
     found = nodes(tmp_path, source)
     assert worst(found, "start", start=["by_pointer"]) == (24, ("start", "by_pointer"), [])
     assert "'nobody'" in worst(found, "start", start=["nobody"])[2][0]
@@ -98,8 +101,8 @@ def test_functions_of_a_heap_are_found() -> None:
 
 
 def test_levels_add_the_frame_of_what_they_interrupt(tmp_path: Path) -> None:
-    source = function("start", "push {r4, lr}; vadd.f32 s0, s0, s1; pop {r4, pc}") + function("middle", "push {lr}; pop {pc}")
-    source += function("top", "sub sp, #8; add sp, #8; bx lr")
+    source = function("start", "push {r4, lr}; vadd.f32 s0, s0, s1; pop {r4, pc}")
+    source += function("middle", "push {lr}; pop {pc}") + function("top", "sub sp, #8; add sp, #8; bx lr")
     depths = stack.Depths(nodes(tmp_path, source), {})
     wanted = [stack.Level(name, (name,)) for name in ("start", "middle", "top")]
     uses = stack.levels(depths, wanted)

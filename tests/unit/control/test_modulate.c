@@ -7,6 +7,14 @@
 
 static fixture_t f;
 static modulate_in_t in;
+static dq_t i;
+
+typedef struct {
+    duty_t duty;
+    dq_t acted;
+    bool limited;
+} made_t;
+
 static const double pi = 3.14159265358979323846;
 static double theta;
 
@@ -17,7 +25,8 @@ void setUp(void)
     f.modulate.min_pulse = 0;
     f.si.dead_time_duty = 0.0;
     f.si.min_pulse_duty = 0.0;
-    in = (modulate_in_t){.v_dc = 20000};
+    in = (modulate_in_t){.v_dc = 20000, .advanced = fx_rotation(0)};
+    i = (dq_t){0, 0};
     theta = 0.0;
 }
 
@@ -27,22 +36,25 @@ void tearDown(void)
 
 static void at_angle(int32_t fraction)
 {
-    in.theta = (uint32_t)fraction << 16;
+    in.advanced = fx_rotation((uint32_t)fraction << 16);
     theta = fraction * (2.0 * pi / 65536.0);
 }
 
-static modulate_out_t step(void)
+static made_t step(void)
 {
     /* Current control's promise: within half of v_dc here, with the pulse and the dead time that a test sets. */
     const double reach = (1.0 - 2.0 * (f.modulate.min_pulse + f.modulate.dead_time) / 32768.0) / sqrt(3.0) * in.v_dc;
     in.clear = in.v_dc >= 2 && hypot(in.u.d, in.u.q) < 0.999 * reach;
-    return modulate_step(&f.modulate, &in);
+    in.i = fx_pair((q15_t)i.d, (q15_t)i.q);
+    const modulate_out_t made = modulate_step(&f.modulate, &in);
+    const dq_t acted = made.limited ? modulate_acted(&f.modulate, &in, made.duty) : in.u;
+    return (made_t){made.duty, acted, made.limited};
 }
 
 static twin_modulate_t twin_step(void)
 {
     const twin_modulate_in_t t = {{from_q15(in.u.d) * f.v, from_q15(in.u.q) * f.v},
-                                  {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i}, theta, from_q15(in.v_dc) * f.v};
+                                  {from_q15(i.d) * f.i, from_q15(i.q) * f.i}, theta, from_q15(in.v_dc) * f.v};
     return twin_modulate(&f.si, &t);
 }
 
@@ -60,7 +72,7 @@ static void min_pulse(double duty)
 
 void test_no_voltage_is_half_duty_on_every_phase(void)
 {
-    const modulate_out_t y = step();
+    const made_t y = step();
     TEST_ASSERT_EQUAL_INT(16384, y.duty.a);
     TEST_ASSERT_EQUAL_INT(16384, y.duty.b);
     TEST_ASSERT_EQUAL_INT(16384, y.duty.c);
@@ -74,7 +86,7 @@ void test_the_corners_of_the_hexagon_put_every_leg_on_its_rail(void)
     for (int n = 0; n < 6; n++) {
         at_angle((n * 65536 + 3) / 6);
         in.u.d = 13333;
-        const modulate_out_t y = step();
+        const made_t y = step();
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][0], y.duty.a);
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][1], y.duty.b);
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][2], y.duty.c);
@@ -86,7 +98,7 @@ void test_the_middle_of_a_side_has_one_leg_at_each_rail_and_one_in_the_middle(vo
 {
     at_angle(65536 / 12);
     in.u.d = (q15_t)lround(20000.0 / sqrt(3.0)) - 3;
-    const modulate_out_t y = step();
+    const made_t y = step();
     TEST_ASSERT_INT_WITHIN(12, 32768, y.duty.a);
     TEST_ASSERT_INT_WITHIN(6, 16384, y.duty.b);
     TEST_ASSERT_INT_WITHIN(12, 0, y.duty.c);
@@ -100,7 +112,7 @@ void test_the_zero_sequence_centres_the_outer_legs(void)
     for (int n = 0; n < 200000; n++) {
         at_angle(random_in(&seed, 0, 65535));
         in.u = (dq_t){(q15_t)random_in(&seed, -8000, 8000), (q15_t)random_in(&seed, -8000, 8000)};
-        const modulate_out_t y = step();
+        const made_t y = step();
         const int a = (int)y.duty.a, b = (int)y.duty.b, c = (int)y.duty.c;
         const int hi = fx_max_s32(a, fx_max_s32(b, c));
         const int lo = fx_min_s32(a, fx_min_s32(b, c));
@@ -122,20 +134,20 @@ void test_inside_the_hexagon_every_duty_follows_the_twin(void)
         const double phi = random_in(&seed, 0, 65535) * (2.0 * pi / 65536.0);
         const double length = random_in(&seed, 0, 1000) * 1e-3 * (in.v_dc * 0.95 / sqrt(3.0) - 1.0);
         in.u = (dq_t){(q15_t)lround(length * cos(phi)), (q15_t)lround(length * sin(phi))};
-        in.i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
-        const modulate_out_t y = step();
+        i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
+        const made_t y = step();
         const twin_modulate_t t = twin_step();
         /* The straight line of the compensation is steep: 1 LSB of current is 0.07 LSB of duty. */
         worst_note(&worst, (double)y.duty.a - t.duty[0] * 32768, "a, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                   in.v_dc, in.i.d, in.i.q, theta);
+                   in.v_dc, i.d, i.q, theta);
         worst_note(&worst, (double)y.duty.b - t.duty[1] * 32768, "b, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                   in.v_dc, in.i.d, in.i.q, theta);
+                   in.v_dc, i.d, i.q, theta);
         worst_note(&worst, (double)y.duty.c - t.duty[2] * 32768, "c, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                   in.v_dc, in.i.d, in.i.q, theta);
+                   in.v_dc, i.d, i.q, theta);
         worst_note(&acted, y.acted.d - t.acted.d / f.v * 32768, "acted d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                   in.v_dc, in.i.d, in.i.q, theta);
+                   in.v_dc, i.d, i.q, theta);
         worst_note(&acted, y.acted.q - t.acted.q / f.v * 32768, "acted q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                   in.v_dc, in.i.d, in.i.q, theta);
+                   in.v_dc, i.d, i.q, theta);
     }
     ASSERT_WORST(worst, 7.0);
     ASSERT_WORST(acted, 4.0);
@@ -153,7 +165,7 @@ void test_beyond_the_hexagon_the_vector_is_shortened_and_keeps_its_direction(voi
         const double phi = random_in(&seed, 0, 65535) * (2.0 * pi / 65536.0);
         const double ratio = random_in(&seed, 500, 999) * 1e-3;
         in.u = (dq_t){(q15_t)lround(in.v_dc * ratio * cos(phi)), (q15_t)lround(in.v_dc * ratio * sin(phi))};
-        const modulate_out_t y = step();
+        const made_t y = step();
         const twin_modulate_t t = twin_step();
         const double want = hypot(t.acted.d, t.acted.q) / f.v * 32768;
         const double is = hypot(y.acted.d, y.acted.q);
@@ -186,8 +198,8 @@ void test_the_acted_voltage_is_the_command_while_nothing_limits(void)
     for (int n = 0; n < 50000; n++) {
         at_angle(random_in(&seed, 0, 65535));
         in.u = (dq_t){(q15_t)random_in(&seed, -7000, 7000), (q15_t)random_in(&seed, -7000, 7000)};
-        in.i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
-        const modulate_out_t y = step();
+        i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
+        const made_t y = step();
         TEST_ASSERT_FALSE(y.limited);
         TEST_ASSERT_EQUAL_INT(in.u.d, y.acted.d);
         TEST_ASSERT_EQUAL_INT(in.u.q, y.acted.q);
@@ -198,8 +210,8 @@ void test_the_acted_voltage_is_the_command_while_nothing_limits(void)
 void test_the_compensation_adds_the_dead_time_to_legs_that_deliver_current(void)
 {
     dead_time(0.02);
-    in.i.d = 10000;
-    const modulate_out_t y = step();
+    i.d = 10000;
+    const made_t y = step();
     TEST_ASSERT_INT_WITHIN(1, 16384 + 655, y.duty.a);
     TEST_ASSERT_INT_WITHIN(1, 16384 - 655, y.duty.b);
     TEST_ASSERT_INT_WITHIN(1, 16384 - 655, y.duty.c);
@@ -209,21 +221,21 @@ void test_the_compensation_is_odd_in_the_current_and_smooth_through_zero(void)
 {
     dead_time(0.02);
     int last = -1;
-    for (int i = -2000; i <= 2000; i++) {
-        in.i.d = (q15_t)i;
+    for (int count = -2000; count <= 2000; count++) {
+        i.d = (q15_t)count;
         const int up = (int)step().duty.a - 16384;
-        in.i.d = (q15_t)-i;
+        i.d = (q15_t)-count;
         const int down = (int)step().duty.a - 16384;
         TEST_ASSERT_INT_WITHIN(1, -up, down);
-        if (i > -2000) { /* 655 LSB over 2 * 328 counts of current: at most 2, rounded up to 3 */
+        if (count > -2000) { /* 655 LSB over 2 * 328 counts of current: at most 2, rounded up to 3 */
             TEST_ASSERT_INT_WITHIN(3, last, up);
             TEST_ASSERT_TRUE(up >= last);
         }
         last = up;
     }
-    in.i.d = 0;
+    i.d = 0;
     TEST_ASSERT_EQUAL_INT(16384, step().duty.a);
-    in.i.d = 164; /* half of the knee: half of the dead time */
+    i.d = 164; /* half of the knee: half of the dead time */
     TEST_ASSERT_INT_WITHIN(3, 16384 + 328, step().duty.a);
 }
 
@@ -233,7 +245,7 @@ void test_short_pulses_snap_to_the_nearer_of_nothing_and_the_shortest(void)
     min_pulse(0.1);
     for (int u = 0; u <= 13333; u += 3) {
         in.u.d = (q15_t)u;
-        const modulate_out_t y = step();
+        const made_t y = step();
         const int ideal = 16384 + (int)lround(0.75 * u * 32768.0 / 20000.0); /* v (1 - 1/4) on leg a */
         TEST_ASSERT_TRUE(y.duty.a == 32768 || y.duty.a <= 32768 - 3277);
         TEST_ASSERT_TRUE(y.duty.b == 0 || y.duty.b >= 3277);
@@ -255,8 +267,8 @@ void test_a_leg_on_its_rail_loses_nothing_to_the_dead_time(void)
     dead_time(0.02);
     min_pulse(0.05);
     in.u.d = 13333;
-    in.i.d = 10000;
-    const modulate_out_t y = step();
+    i.d = 10000;
+    const made_t y = step();
     TEST_ASSERT_EQUAL_INT(32768, y.duty.a);
     TEST_ASSERT_EQUAL_INT(0, y.duty.b);
     TEST_ASSERT_INT_WITHIN(3, 13333, y.acted.d);
@@ -273,8 +285,8 @@ void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
         at_angle(random_in(&seed, 0, 65535));
         in.v_dc = (q15_t)random_in(&seed, 15000, 32767);
         in.u = (dq_t){(q15_t)random_in(&seed, -10600, 10600), (q15_t)random_in(&seed, -10600, 10600)};
-        in.i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
-        const modulate_out_t y = step();
+        i = (dq_t){(q15_t)random_in(&seed, -20000, 20000), (q15_t)random_in(&seed, -20000, 20000)};
+        const made_t y = step();
         const twin_modulate_t t = twin_step();
         const double jump = fmax(fabs((double)y.duty.a - t.duty[0] * 32768),
                                  fmax(fabs((double)y.duty.b - t.duty[1] * 32768),
@@ -284,9 +296,9 @@ void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
         }
         if (jump < 12.0) { /* else the two stand on different sides of a snap, the shortest pulse of 983 LSB apart */
             worst_note(&worst, y.acted.d - t.acted.d / f.v * 32768, "d, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                       in.v_dc, in.i.d, in.i.q, theta);
+                       in.v_dc, i.d, i.q, theta);
             worst_note(&worst, y.acted.q - t.acted.q / f.v * 32768, "q, u %d %d v %d i %d %d at %.4f", in.u.d, in.u.q,
-                       in.v_dc, in.i.d, in.i.q, theta);
+                       in.v_dc, i.d, i.q, theta);
         } else {
             TEST_ASSERT_DOUBLE_WITHIN(12.0, 983.0, jump);
         }
@@ -300,7 +312,7 @@ void test_below_the_voltage_floor_the_floor_normalises_and_acted_uses_the_real_v
 {
     in.v_dc = f.modulate.v_dc_min / 2;
     in.u.d = 500;
-    modulate_out_t y = step();
+    made_t y = step();
     TEST_ASSERT_FALSE(y.limited);
     TEST_ASSERT_INT_WITHIN(12, 16384 + lround(0.75 * 500.0 / in.v_dc * 32768.0), y.duty.a);
     in.u.d = 1500;
@@ -322,8 +334,8 @@ void test_every_duty_is_realisable_for_every_input(void)
         at_angle(random_in(&seed, 0, 65535));
         in.v_dc = (q15_t)random_in(&seed, -32768, 32767);
         in.u = (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)};
-        in.i = (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)};
-        const modulate_out_t y = step();
+        i = (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)};
+        const made_t y = step();
         const int duty[3] = {(int)y.duty.a, (int)y.duty.b, (int)y.duty.c};
         for (int x = 0; x < 3; x++) {
             TEST_ASSERT_TRUE(duty[x] == 0 || duty[x] == 32768 || (duty[x] >= 655 && duty[x] <= 32768 - 655));

@@ -193,6 +193,9 @@ STAGE void bench_current_tick(void)
     const motor_t *m = &d->motor;
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_step(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
+    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
+    const fx_pair_t i_dq = fx_arch_pkhbt(i.d, i.q);
+    const fx_pair_t advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1));
     const current_control_in_t control = {
         .target = found.target,
         .flux = &flux,
@@ -200,13 +203,10 @@ STAGE void bench_current_tick(void)
         .psi_delta = d->slow.psi_delta_q15,
         .v_dc = measured.v_dc,
     };
-    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
     const current_control_out_t wanted =
         current_control_step(&m->current_control, &d->fast.current_control, &control);
-    const uint32_t ahead = angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1);
-    const modulate_in_t modulation = {wanted.u, i, ahead, measured.v_dc, wanted.clear};
+    const modulate_in_t modulation = {wanted.u, i_dq, advanced, measured.v_dc, wanted.clear};
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     port.duty = made.duty;
-    d->fast.coming = made.acted;
     port.limited = wanted.limited || made.limited;
 }

@@ -81,8 +81,10 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
     depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
     uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])
     sites = {entry["in"]: entry["sites"] for entry in port["pointer"]}
-    depths.problems += [f"{n.name}: {len(n.indirect)} calls through pointers, {sites[disassembly.plain(n.name)]} are listed"
-                        for n in nodes.values() if len(n.indirect) > sites.get(disassembly.plain(n.name), len(n.indirect))]  # fmt: skip
+    for node in nodes.values():
+        found, listed = len(node.indirect), sites.get(disassembly.plain(node.name))
+        if listed is not None and found > listed:
+            depths.problems.append(f"{node.name}: {found} calls through pointers, {listed} are listed")
     return uses, sorted(set(depths.problems)) + stack.heap(nodes)
 
 

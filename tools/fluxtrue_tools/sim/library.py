@@ -16,6 +16,7 @@ UNKNOWN_NAME: Final = -1
 OUT_OF_RANGE: Final = -2
 READ_ONLY: Final = -3
 FAILED: Final = -6
+MEMORY_SIZE: Final = 4096
 REASONS: Final = {
     UNKNOWN_NAME: "no such name",
     OUT_OF_RANGE: "out of range",
@@ -46,6 +47,9 @@ _SIGNATURES = {
     ),
     "sim_failure": (ctypes.c_char_p, [ctypes.c_void_p]),
     "sim_run": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_int, _DOUBLES, ctypes.c_int]),
+    "sim_firmware": (ctypes.c_void_p, [ctypes.c_void_p]),
+    "fluxtrue_memory_read": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]),
+    "fluxtrue_memory_write": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]),
     "fluxtrue_name": (ctypes.c_char_p, [ctypes.c_int]),
 }
 
@@ -143,6 +147,20 @@ class Loop:
     def get(self, name: str) -> float:
         """The value now; NaN for an unknown name."""
         return float(self._library.sim_get(self._sim, name.encode()))
+
+    def memory(self) -> bytes:
+        """The firmware's flash as it would survive a power cycle now."""
+        data = ctypes.create_string_buffer(MEMORY_SIZE)
+        code = self._library.fluxtrue_memory_read(self._library.sim_firmware(self._sim), data, MEMORY_SIZE)
+        if code != 0:
+            raise LoopError("memory", None, code)
+        return data.raw
+
+    def remember(self, memory: bytes) -> None:
+        """Start with the flash of another power cycle; before the first period only."""
+        code = self._library.fluxtrue_memory_write(self._library.sim_firmware(self._sim), memory, len(memory))
+        if code != 0:
+            raise LoopError("memory", None, code)
 
     def record(self, names: Sequence[str], every: int = 1) -> None:
         """Columns of the rows that run() answers: one row each `every` periods."""

@@ -20,10 +20,13 @@ _PORT = click.IntRange(0, 65535)
 @click.option("--bench-port", type=_PORT, default=29537, show_default=True, help="Bench channel; 0: any.")
 @click.option("--bit-rate", type=click.IntRange(10000, 1000000), default=500000, show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the plant's random numbers.")
+@click.option("--nvm", type=click.Path(dir_okay=False, path_type=Path),
+              help="Keep what is learnt in this file; without it a power cycle forgets.")  # fmt: skip
 @click.option("--build-dir", type=click.Path(file_okay=False, path_type=Path),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def vecu(
-    motor: str, realtime: bool, port: int, bench_port: int, bit_rate: int, seed: int, build_dir: Path | None
+    motor: str, realtime: bool, port: int, bench_port: int, bit_rate: int, seed: int, nvm: Path | None,
+    build_dir: Path | None,
 ) -> None:
     """Serve application and plant in one process: CAN by the socketcand protocol, and a bench channel.
 
@@ -34,4 +37,5 @@ def vecu(
         raise FluxtrueError(f"{program} is missing: build it first")
     options = ["--realtime" if realtime else "--fast", "--port", port, "--bench-port", bench_port,
                "--bit-rate", bit_rate, "--seed", seed]  # fmt: skip
+    options += ["--nvm", nvm] if nvm is not None else []
     os.execv(program, [str(program), *map(str, options)])

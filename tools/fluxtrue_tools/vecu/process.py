@@ -16,9 +16,10 @@ STOP_S = 10.0
 class VirtualEcu:
     """Starts it on free ports, tells them, and stops it."""
 
-    def __init__(self, program: Path, fast: bool = True, seed: int = 1) -> None:
+    def __init__(self, program: Path, fast: bool = True, seed: int = 1, nvm: Path | None = None) -> None:
         command = [str(program), "--fast" if fast else "--realtime", "--port", "0", "--bench-port", "0",
                    "--seed", str(seed)]  # fmt: skip
+        command += ["--nvm", str(nvm)] if nvm is not None else []
         try:
             self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         except OSError as error:

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recorded drive comes back as it was: signals, table, picture."""
+
+from pathlib import Path
+
+import can
+import cantools.database
+import pandas as pd
+import pytest
+from click.testing import CliRunner, Result
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.log.cli import log
+from fluxtrue_tools.log.decode import DBC, signals_of
+from fluxtrue_tools.vecu.mdf import BusLog
+
+STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimate": 0.0, "TorqueCommand": 40.0, "Speed": 2000.0}
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Half a second: the estimate rises to 40 N·m, one frame is of a stranger, one too short."""
+    message = cantools.database.load_file(DBC).get_message_by_name("INV_Status")
+    recorder = BusLog()
+    for k in range(50):
+        data = message.encode(STATUS | {"TorqueEstimate": min(k, 40)})
+        recorder(can.Message(timestamp=7.0 + 0.01 * k, arbitration_id=0x210, data=data, is_extended_id=False))
+    recorder(can.Message(timestamp=7.5, arbitration_id=0x7FF, data=b"12345678", is_extended_id=False))
+    recorder(can.Message(timestamp=7.5, arbitration_id=0x210, data=b"123", is_extended_id=False))
+    path = tmp_path_factory.mktemp("log") / "drive.mf4"
+    recorder.write(path, DBC)
+    return path
+
+
+def _run(*arguments: object) -> Result:
+    return CliRunner().invoke(log, [str(argument) for argument in arguments], catch_exceptions=True)
+
+
+def test_every_signal_comes_back_with_its_time(drive: Path) -> None:
+    estimate = signals_of(drive)["INV_Status.TorqueEstimate"]
+    assert list(estimate) == [float(min(k, 40)) for k in range(50)]
+    assert list(estimate.index) == pytest.approx([0.01 * k for k in range(50)])
+
+
+def test_the_command_tells_plots_and_exports(drive: Path, tmp_path: Path) -> None:
+    done = _run(drive, "--plot", tmp_path / "p.png", "--export", tmp_path / "t.csv")
+    assert done.exit_code == 0, done.output
+    row = next(line for line in done.output.splitlines() if line.startswith("INV_Status.TorqueEstimate"))
+    assert row.split()[1:] == ["50", "0", "40", "40"]
+    assert (tmp_path / "p.png").stat().st_size > 10000
+    table = pd.read_csv(tmp_path / "t.csv")
+    assert len(table) == 50 and table["INV_Status.Speed"].iloc[-1] == 2000.0
+
+
+def test_one_signal_can_be_chosen_and_written_as_parquet(drive: Path, tmp_path: Path) -> None:
+    assert _run(drive, "--signal", "INV_Status.Speed", "--export", tmp_path / "t.parquet").exit_code == 0
+    assert list(pd.read_parquet(tmp_path / "t.parquet").columns) == ["INV_Status.Speed"]
+
+
+@pytest.mark.parametrize(("options", "wanted"), [
+    (("--signal", "INV_Status.Power"), "INV_Status.Power: not in this file"),
+    (("--plot", "p.bmp"), "allowed: a name ending in .png"),
+    (("--export", "t.xlsx"), "allowed: a name ending in .csv"),
+    (("--export", "no/such/folder/t.csv"), "is not a folder"),
+])  # fmt: skip
+def test_bad_options_are_refused_by_name(drive: Path, options: tuple[str, ...], wanted: str) -> None:
+    done = _run(drive, *options)
+    assert done.exit_code != 0 and wanted in str(done.exception)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"not a log", b"MDF     4.10    "])
+def test_a_file_that_is_no_log_is_refused(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "bad.mf4"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(FluxtrueError, match="bad.mf4"):
+        signals_of(path)

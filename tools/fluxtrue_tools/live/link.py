@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bus side of the page: listens, sends the protected command every 10 ms, records."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final
+
+import can
+import cantools.database
+
+from fluxtrue_tools.bus.protect import Protector
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.commander import Commander, Order, Wish
+from fluxtrue_tools.live.samples import Samples
+from fluxtrue_tools.vecu.mdf import BusLog
+
+COMMAND: Final = "VCU_TorqueCommand"
+PERIOD_S: Final = 0.010
+LIMIT_Nm: Final = 1000.0  # the message's own largest: the slider is the limit here
+
+
+@dataclass(frozen=True)
+class BusAddress:
+    """Arguments of can.Bus."""
+
+    interface: str
+    channel: str
+    options: dict[str, Any]
+
+    def connect(self) -> can.BusABC:
+        """A new connection."""
+        try:
+            return can.Bus(interface=self.interface, channel=self.channel, receive_own_messages=False,
+                           **self.options)  # fmt: skip
+        except (OSError, can.CanError, ValueError, NotImplementedError) as error:
+            raise FluxtrueError(f"--can-interface {self.interface}, --can-channel {self.channel}: {error}") from error
+
+
+class Recorder:
+    """Keeps frames from start() to stop(), then writes one MDF4 file."""
+
+    def __init__(self, folder: Path, dbc: Path) -> None:
+        self._folder, self._dbc = folder, dbc
+        self._log: BusLog | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def running(self) -> bool:
+        """Whether frames are kept."""
+        return self._log is not None
+
+    def __call__(self, frame: can.Message) -> None:
+        with self._lock:
+            if self._log is not None:
+                self._log(frame)
+
+    def start(self) -> None:
+        """Begin anew."""
+        with self._lock:
+            self._log = BusLog()
+
+    def stop(self) -> Path | None:
+        """The file written; None when nothing was recorded."""
+        with self._lock:
+            log, self._log = self._log, None
+        if log is None or len(log) == 0:
+            return None
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = self._folder / f"live-{datetime.now():%Y%m%d-%H%M%S}.mf4"
+        log.write(path, self._dbc)
+        return path
+
+
+# It warns of every frame that a read has cut in two, and then puts it together.
+logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
+
+
+class Link:
+    """One bus connection with its listeners and the thread that sends."""
+
+    def __init__(self, bus: can.BusABC, database: cantools.database.Database, commander: Commander,
+                 samples: Samples, recorder: Recorder) -> None:  # fmt: skip
+        self._bus, self._commander, self._samples = bus, commander, samples
+        self._message = database.get_message_by_name(COMMAND)
+        data_id = int(self._message.dbc.attributes["E2EDataId"].value)  # type: ignore[union-attr]
+        self._protector = Protector(data_id)
+        self._recorder = recorder
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self.send_errors = 0
+        self._notifier = can.Notifier(bus, [samples, recorder], timeout=0.1)
+        self._thread = threading.Thread(target=self._send_cyclic, name="command", daemon=True)
+        self._thread.start()
+
+    def act(self, action: Callable[[Commander, float], None]) -> None:
+        """Something a user did."""
+        with self._lock:
+            action(self._commander, time.monotonic())
+
+    def close(self) -> None:
+        """Torque to zero first; then leave the bus."""
+        self.act(lambda commander, now: commander.ask(Wish.OFF, now))
+        deadline = time.monotonic() + 3.0
+        while self._commander.torque_Nm != 0.0 and time.monotonic() < deadline:
+            time.sleep(PERIOD_S)
+        self._stop.set()
+        self._thread.join(1.0)
+        self._notifier.stop()
+        self._bus.shutdown()
+
+    def _frame(self, order: Order) -> can.Message:
+        data = self._message.encode({
+            "Crc": 0, "Counter": 0, "Enable": int(order.enable), "FaultReset": int(order.fault_reset),
+            "Mode": order.mode, "TorqueRequest": round(order.torque_Nm, 1),
+            "TorqueLimitDrive": LIMIT_Nm, "TorqueLimitRegen": LIMIT_Nm,
+        })  # fmt: skip
+        return can.Message(arbitration_id=self._message.frame_id, is_extended_id=False, is_rx=False,
+                           data=self._protector.protect(data), timestamp=self._samples.newest_s)  # fmt: skip
+
+    def _send_cyclic(self) -> None:
+        due = time.monotonic()
+        while not self._stop.is_set():
+            with self._lock:
+                frame = self._frame(self._commander.step(time.monotonic(), self._samples.state()))
+            try:
+                self._bus.send(frame, timeout=PERIOD_S)
+                self._recorder(frame)
+            except (can.CanError, OSError):
+                self.send_errors += 1
+            due = max(due + PERIOD_S, time.monotonic() - PERIOD_S)
+            self._stop.wait(max(due - time.monotonic(), 0.0))

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames into columns: what the page draws, collected between two sendings."""
+
+import threading
+from typing import Any, Final
+
+import can
+import cantools.database
+
+# What is drawn; everything else is only shown as its last value.
+DRAWN: Final = {
+    "INV_Status": ("TorqueEstimate", "TorqueCommand", "Speed"),
+    "INV_Currents": ("Id", "Iq", "IdRef", "IqRef"),
+    "INV_Identification": ("PsiF", "Resistance", "PsiQuality", "ResistanceQuality"),
+    "INV_DcLink": ("DcVoltage", "DcCurrent"),
+}  # fmt: skip
+
+
+class Samples:
+    """A python-can listener that decodes; take() empties it. Any thread."""
+
+    def __init__(self, database: cantools.database.Database) -> None:
+        self._messages = {message.frame_id: message for message in database.messages}
+        self._lock = threading.Lock()
+        self._columns: dict[str, dict[str, list[float]]] = {}
+        self._last: dict[str, Any] = {}
+        self.undecoded = 0
+        self.newest_s = 0.0  # the bus's clock: simulated time on a virtual ECU
+
+    def __call__(self, frame: can.Message) -> None:
+        message = self._messages.get(frame.arbitration_id)
+        if message is None or frame.is_extended_id or frame.is_error_frame:
+            return
+        try:
+            signals = message.decode(bytes(frame.data), decode_choices=False)
+        except (ValueError, cantools.database.DecodeError):
+            self.undecoded += 1
+            return
+        assert isinstance(signals, dict)
+        self.newest_s = frame.timestamp
+        with self._lock:
+            for name in DRAWN.get(message.name, ()):
+                columns = self._columns.setdefault(message.name, {})
+                columns.setdefault(name, []).append(float(signals[name]))
+            if message.name in DRAWN:
+                self._columns[message.name].setdefault("t", []).append(frame.timestamp)
+            self._last[message.name] = signals
+
+    def state(self) -> str:
+        """The inverter's state by name; empty before it has said anything."""
+        with self._lock:
+            status = self._last.get("INV_Status")
+        if status is None:
+            return ""
+        choices = self._messages[0x210].get_signal_by_name("State").choices or {}
+        return str(choices.get(int(status["State"]), ""))
+
+    def take(self) -> dict[str, dict[str, list[float]]]:
+        """Columns since the last time."""
+        with self._lock:
+            columns, self._columns = self._columns, {}
+        return columns
+
+    def last(self) -> dict[str, Any]:
+        """The last value of every signal, message by message."""
+        with self._lock:
+            return {name: {key: float(value) for key, value in signals.items()}
+                    for name, signals in self._last.items()}  # fmt: skip

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibration values over XCP, by pyxcp, on a bus connection of its own."""
+
+import logging
+import struct
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from typing import Any, Final
+
+from pyxcp.config import create_application_from_config
+from pyxcp.master import Master
+from pyxcp.types import XcpResponseError, XcpTimeoutError
+
+from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
+from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.link import BusAddress
+
+FLOAT: Final = struct.Struct("<f")
+
+
+def _key(resource: int, seed: bytes) -> bytes:
+    """The published function of firmware/app/xcp_access.c."""
+    value = int.from_bytes(seed, "little")
+    return (((value << 7 | value >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C).to_bytes(4, "little")
+
+
+def _connect(address: BusAddress) -> Master:
+    application = create_application_from_config({}, log_level=logging.CRITICAL)
+    can = application.transport.can
+    can.interface, can.channel = address.interface, address.channel
+    can.can_id_master, can.can_id_slave = COMMAND_ID, ANSWER_ID
+    section = getattr(can, address.interface, None)
+    for name, value in address.options.items():
+        if name == "bitrate":
+            can.bitrate = value
+        elif section is not None and hasattr(section, name):
+            setattr(section, name, value)
+    application.general.seed_n_key_function = _key
+    application.general.disable_error_handling = True
+    return Master("can", config=application)
+
+
+class Tuning:
+    """One session; every call runs in its one thread, since the master is not made for more."""
+
+    def __init__(self, address: BusAddress, description: Description) -> None:
+        self._address = address
+        self._values = {value.name: value for value in description.values}
+        self._master: Master | None = None
+        self._stack = ExitStack()  # closes the connection
+        self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="xcp")
+
+    def _session(self) -> Master:
+        if self._master is None:
+            master = self._stack.enter_context(_connect(self._address))
+            master.connect()
+            master.cond_unlock()
+            self._master = master
+        return self._master
+
+    def _read(self, name: str) -> float:
+        master = self._session()
+        master.setMta(self._values[name].address)
+        (value,) = FLOAT.unpack(master.upload(FLOAT.size))
+        return float(value)
+
+    def _tried(self, call: Any) -> Any:
+        try:
+            return call()
+        except (XcpResponseError, XcpTimeoutError, OSError, RuntimeError) as error:
+            raise FluxtrueError(f"XCP: {error}") from error
+
+    def table(self) -> list[dict[str, Any]]:
+        """Every value with its range."""
+        return [{"name": value.name, "text": value.text, "unit": value.unit, "lo": value.lo, "hi": value.hi,
+                 "value": self._tried(lambda name=value.name: self._read(name))}
+                for value in self._values.values()]  # fmt: skip
+
+    def write(self, name: str, value: float) -> float:
+        """Ask the ECU to take it; what it holds then. It is the ECU that refuses."""
+        if name not in self._values:
+            raise FluxtrueError(f"no calibration value '{name}', allowed: {', '.join(self._values)}")
+        info = self._values[name]
+        master = self._tried(self._session)
+        try:
+            master.setMta(info.address)
+            master.download(FLOAT.pack(value))
+        except XcpResponseError as error:
+            raise FluxtrueError(f"{name} = {value:g}: refused by the ECU ({error}), "
+                                f"allowed: {info.lo:g} … {info.hi:g} {info.unit}") from error  # fmt: skip
+        return float(self._tried(lambda: self._read(name)))
+
+    def close(self) -> None:
+        """End the session."""
+        self.thread.submit(self._stack.close).result(5.0)
+        self.thread.shutdown()

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bus frames of an MDF4 file into signals, by the project's DBC."""
+
+from pathlib import Path
+from typing import Final
+
+import cantools.database
+import numpy as np
+import pandas as pd
+from asammdf import MDF
+
+from fluxtrue_tools.errors import FluxtrueError
+
+DBC: Final = Path(__file__).resolve().parents[3] / "firmware" / "comm" / "fluxtrue.dbc"
+FRAMES: Final = "CAN_DataFrame"
+
+
+def signals_of(path: Path) -> dict[str, pd.Series]:
+    """Every signal by its name Message.Signal, over seconds since the first frame."""
+    if not path.is_file():
+        raise FluxtrueError(f"{path}: no such file")
+    try:
+        with MDF(path) as recorded:
+            frames = recorded.get(FRAMES)
+    except Exception as error:  # the reader stumbles over a bad file in many ways
+        raise FluxtrueError(f"{path}: not an MDF4 bus log ({error})") from error
+    found = _decode(frames.samples, frames.timestamps)
+    if not found:
+        raise FluxtrueError(f"{path}: holds no frame that {DBC.name} describes")
+    return found
+
+
+def _decode(frames: np.ndarray, times: np.ndarray) -> dict[str, pd.Series]:
+    ids, lengths = frames[f"{FRAMES}.ID"], frames[f"{FRAMES}.DataLength"]
+    data = np.ascontiguousarray(frames[f"{FRAMES}.DataBytes"][:, :8])
+    standard = frames[f"{FRAMES}.IDE"] == 0
+    found: dict[str, pd.Series] = {}
+    for message in cantools.database.load_file(DBC).messages:
+        rows = np.flatnonzero((ids == message.frame_id) & standard & (lengths == message.length))
+        if not len(rows):
+            continue
+        decoded = [message.decode(data[row].tobytes(), decode_choices=False) for row in rows]
+        table = pd.DataFrame(decoded, index=times[rows] - times[0])
+        found |= {f"{message.name}.{name}": table[name] for name in table}
+    return found
