@@ -34,8 +34,8 @@ typedef struct {
     bool angle_jumped;
 } monitor_in_t;
 
-/** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to count.
- * |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
+/** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to
+ * count. |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
 static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, dq_t i, int32_t sum_q27,
                                  int32_t v_dc)
 {

@@ -43,7 +43,8 @@ static bool too_much(const torque_monitor_config_t *config, torque_monitor_state
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, nor was the change the same all through the millisecond. */
     const q15_t unsure = fx_sat_q15(config->v_0 + (fx_abs_q31(change.d) + fx_abs_q31(change.q)) / 2);
-    const int32_t power = fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(unsure, fx_add_q15(current, config->i_0));
+    const int32_t power =
+        fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(unsure, fx_add_q15(current, config->i_0));
     const int32_t asked = fx_mul_q15(in->torque, in->omega);
     if (fx_abs_q31(asked) < fx_mul_q15(config->t_0, fx_abs_q15(in->omega))) {
         return fx_abs_q31(mean) > power; /* around no torque either sign is too much */

@@ -29,7 +29,7 @@ def _until(browser: webdriver.Chrome, true: Callable[[], bool], what: str) -> No
 
 
 def _newest(browser: webdriver.Chrome, ring: str, name: str) -> float:
-    script = "const r = rings[arguments[0]]; const c = r.data[r.names.indexOf(arguments[1]) + 1]; return c[c.length - 1];"
+    script = "const r = rings[arguments[0]]; return r.data[r.names.indexOf(arguments[1]) + 1].at(-1);"
     return float(browser.execute_script(script, ring, name) or 0.0)
 
 
