@@ -52,6 +52,13 @@ def test_a_call_counts_at_the_depth_it_is_made_at(tmp_path: Path) -> None:
     assert worst(nodes(tmp_path, source), "start")[0] == 104
 
 
+def test_stores_to_where_the_stack_is_do_not_move_it(tmp_path: Path) -> None:
+    body = "push {r4, lr}; sub sp, #16; stmia.w sp, {r0, r1}; str r0, [sp, #8]; "
+    body += "strd r0, r1, [sp, #-8]!; ldrd r0, r1, [sp], #8"
+    source = function("start", f"{body}; add sp, #16; pop {{r4, pc}}")
+    assert worst(nodes(tmp_path, source), "start") == (32, ("start",), [])
+
+
 def test_a_tail_call_has_the_callers_frame_no_more(tmp_path: Path) -> None:
     source = function("start", "push {r4, r5, r6, lr}; pop {r4, r5, r6, lr}; b.w last")
     source += function("last", "sub sp, #12; add sp, #12; bx lr")

@@ -26,11 +26,16 @@ CONTAINS = {
     "current_tick": "converter counts and angle → compare values: offset and gain, Clarke, sum of the phases, angle "
     "tracker, sincos, Park, 2 PI, decoupling from the flux tables, voltage limiter, dead-time compensation, dc-voltage "
     "normalisation, angle advance, SVPWM, all saturations",
-    "current_core": "what the leanest peer's tick has: sincos, Clarke, Park, 2 PI, inverse Park, clamp, SVPWM",
+    "current_core": "what the leanest peer's tick has: sincos, Clarke, Park, 2 PI, inverse Park, clamp, SVPWM; "
+    "the firmware's stages with the rest switched off when compiled",
+    "measure": "offset and gain of 4 converter counts, Clarke, sum of the phases",
+    "angle_tracker": "angle → angle, speed, step",
+    "current_control": "2 PI, decoupling from the flux tables, voltage limiter",
+    "modulate": "sincos, inverse Park, dc-voltage normalisation, dead-time compensation, SVPWM",
     "flux_table": "i_d, i_q → both flux linkages, their slopes and cross terms",
     "mrai": "the paper's identification, one period",
     "torque_estimate": "torque from currents, tables and identified flux, and its mean",
-    "torque_path": "torque estimate and one step of the torque loop (which runs at 1 kHz)",
+    "torque_path": "torque estimate and one step of the torque loop; in the drive only every tenth period has one",
     "fast_isr": "the interrupt on a hardware interface of variables",
     "mrai_isr_paper": "MRAI, torque estimate, exchange",
     "mrai_isr": "sums for the 1 kHz identification, exchange",

@@ -44,7 +44,7 @@ def movement(instruction: Instruction) -> int | None:
         return 4 * words(text) * (1 if name.endswith("db") and name[-4] != "l" and "st" in name else -1)
     if "[sp" in text and (text.endswith("]!") or re.search(r"\[sp\], #", text)):
         return -int(_IMMEDIATE.findall(text)[-1])
-    if not _INTO_SP.match(text) or name in ("cmp", "cmn", "tst"):
+    if not _INTO_SP.match(text) or name in ("cmp", "cmn", "tst") or name[:3] in ("stm", "ldm"):
         return 0
     number = _IMMEDIATE.search(text)
     operands = [part.strip() for part in text.split(",")]
