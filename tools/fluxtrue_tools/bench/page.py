@@ -58,14 +58,12 @@ def table(head: str, rows: Iterable[Iterable[object]]) -> list[str]:
     return [*lines, ""]
 
 
-def _bound(name: str, spread: list[float]) -> tuple[str, str]:
+def _bound(name: str, spread: list[float]) -> str:
+    """Each bound with its own verdict."""
     average, most = BOUNDS.get(name, (None, None))
-    parts = [f"avg ≤ {average}"] if average else []
-    parts += [f"max ≤ {most}"] if most else []
-    if not parts:
-        return "", ""
-    met = (average is None or spread[1] <= average) and (most is None or spread[2] <= most)
-    return ", ".join(parts), verdict(met)
+    parts = [f"avg ≤ {average} {verdict(spread[1] <= average)}"] if average is not None else []
+    parts += [f"max ≤ {most} {verdict(spread[2] <= most)}"] if most is not None else []
+    return ", ".join(parts)
 
 
 def _interrupts(figures: Figures) -> list[str]:
@@ -73,11 +71,10 @@ def _interrupts(figures: Figures) -> list[str]:
     for mode, drive in figures["drives"].items():
         for name, run in drive["runs"].items():
             whole = name == "10 kHz work"
-            bound = f"avg ≤ {WHOLE_MOST}" if whole else ""
-            met = verdict(run["instructions"][1] <= WHOLE_MOST) if whole else ""
+            bound = f"avg ≤ {WHOLE_MOST} {verdict(run['instructions'][1] <= WHOLE_MOST)}" if whole else ""
             title = f"**{name}: fast + MRAI ISR, HAL included**" if whole else name
-            rows.append((mode, title, run["runs"], *run["instructions"], *run["cycles"], bound, met))
-    return table("identification|interrupt|  runs |  min |  avg |  max |  cycles min |  avg |  max |bound|", rows)
+            rows.append((mode, title, run["runs"], *run["instructions"], *run["cycles"], bound))
+    return table("identification|interrupt|  runs |  min |  avg |  max |  cycles min |  avg |  max |bound", rows)
 
 
 def _kernels(figures: Figures) -> list[str]:
@@ -85,8 +82,8 @@ def _kernels(figures: Figures) -> list[str]:
     for name, spread in figures["kernels"]["stages"].items():
         if name in ("both", "tick"):
             continue
-        rows.append((TITLES.get(name, name), CONTAINS.get(name, ""), *spread, *_bound(name, spread)))
-    return table("kernel|contains|  min |  avg |  max |bound|", rows)
+        rows.append((TITLES.get(name, name), CONTAINS.get(name, ""), *spread, _bound(name, spread)))
+    return table("kernel|contains|  min |  avg |  max |bound", rows)
 
 
 def _peers(figures: Figures) -> list[str]:
@@ -137,11 +134,18 @@ def _utilisation(figures: Figures) -> list[str]:
     rows = []
     for mode, share in figures["utilisation"].items():
         average = share["10 kHz work, average"]
-        rows.append((mode, f"{average} %", f"{share['10 kHz work, most']} %", f"≤ {UTILISATION_MOST:g} %",
-                     verdict(average <= UTILISATION_MOST), f"{share['with task and CAN, average']} %",
+        rows.append((mode, f"{average} %", f"{share['10 kHz work, most']} %",
+                     f"≤ {UTILISATION_MOST:g} % {verdict(average <= UTILISATION_MOST)}",
+                     f"{share['with task and CAN, average']} %",
                      f"{share['highest PWM frequency at 50 %'] / 1000:.1f} kHz"))  # fmt: skip
-    head = "identification|  ISRs, average |  ISRs, most |bound of the average||  with task and CAN |"
+    head = "identification|  ISRs, average |  ISRs, most |bound of the average|  with task and CAN |"
     return table(head + "  highest PWM frequency at 50 % ", rows)
+
+
+def _torque_share(stages: dict[str, list[float]]) -> float:
+    """Instructions of a period: each has an estimate, every tenth a step of the loop."""
+    estimate, path = stages["torque_estimate"][1], stages["torque_path"][1]
+    return round(estimate + (path - estimate) / 10, 1)
 
 
 def page(figures: Figures) -> str:
@@ -157,6 +161,6 @@ def page(figures: Figures) -> str:
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
         tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
-        stack_sum=_stack_sum(figures),
+        stack_sum=_stack_sum(figures), torque_share=_torque_share(kernels["stages"]),
         **{"return": cycles.RETURN},
     )  # fmt: skip
