@@ -14,7 +14,7 @@
 #define CALLED __attribute__((used, externally_visible, noinline))
 #define STAGE __attribute__((used, externally_visible, noinline, flatten))
 
-enum { OUTPUTS = 24 };
+enum { OUTPUTS = 24, CORE_V_DC = 21845 };
 
 void drive_start(uint32_t mode);
 void drive_request(int32_t torque, uint32_t enable);
@@ -30,6 +30,12 @@ void bench_flux_table(void);
 void bench_mrai(void);
 void bench_torque_estimate(void);
 void bench_current_tick(void);
+void bench_current_core(void);
+void bench_measure(void);
+void bench_angle_tracker(void);
+void bench_current_control(void);
+void bench_modulate(void);
+void bench_torque_path(void);
 
 static struct {
     adc_counts_t counts;
@@ -47,6 +53,10 @@ static struct {
     const mrai_in_t *sample;
     const mrai_schedule_t *schedule;
     const current_target_t *target;
+    abc_t phases;
+    uint32_t theta_e;
+    current_target_t core; /* where the currents are already, as the core's machine has an inductance of one */
+    current_control_out_t wanted;
 } found;
 static int32_t outputs[OUTPUTS];
 
@@ -110,6 +120,10 @@ CALLED void drive_copy(void)
     found.schedule = schedule_box_read(&copy.schedules);
     found.target = &command_box_read(&copy.commands)->target;
     found.i = found.sample->i;
+    found.phases = (abc_t){((int32_t)port.counts.i_a - 2048) * 16, ((int32_t)port.counts.i_b - 2048) * 16,
+                           ((int32_t)port.counts.i_c - 2048) * 16};
+    found.theta_e = sample_box_look(&copy.samples)->theta_e;
+    found.core = (current_target_t){found.i, {found.i.d * 32768, found.i.q * 32768}};
 }
 
 CALLED uint32_t drive_limited(void)
@@ -209,4 +223,68 @@ STAGE void bench_current_tick(void)
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     port.duty = made.duty;
     port.limited = wanted.limited || made.limited;
+}
+
+/* What the leanest peer's tick has, of the same stages; all else is constant and so compiled away: inductance 1, no
+ * feed-forward of speed, no dead time, a known dc voltage. */
+STAGE void bench_current_core(void)
+{
+    static const modulate_config_t bare = {.v_dc_min = 2};
+    drive_t *d = the_copy();
+    const fx_pair_t at = fx_rotation(found.theta_e);
+    const dq_t i = park(clarke(found.phases), at);
+    const flux_point_t as_flux = {.psi_d = (q15_t)i.d, .psi_q = (q15_t)i.q};
+    const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
+    const current_control_out_t wanted =
+        current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
+    const modulate_in_t modulation = {wanted.u, 0, at, CORE_V_DC, wanted.clear};
+    port.duty = modulate_step(&bare, &modulation).duty;
+}
+
+STAGE void bench_measure(void)
+{
+    const drive_t *d = the_copy();
+    const measure_t measured = measure_step(&d->motor.measure, &port.counts);
+    found.phases = (abc_t){measured.i.alpha, measured.i.beta, measured.v_dc};
+}
+
+STAGE void bench_angle_tracker(void)
+{
+    drive_t *d = the_copy();
+    found.theta_e = angle_tracker_step(&d->motor.angle_tracker, &d->fast.angle_tracker, port.theta_m).theta_e;
+}
+
+STAGE void bench_current_control(void)
+{
+    drive_t *d = the_copy();
+    const current_control_in_t control = {
+        .target = found.target,
+        .flux = &flux,
+        .omega = found.sample->omega,
+        .psi_delta = d->slow.psi_delta_q15,
+        .v_dc = sample_box_look(&d->samples)->v_dc,
+    };
+    found.wanted = current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
+}
+
+/* The voltage of bench_current_control(). */
+STAGE void bench_modulate(void)
+{
+    const drive_t *d = the_copy();
+    const modulate_in_t modulation = {found.wanted.u, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e),
+                                      sample_box_look(&d->samples)->v_dc, found.wanted.clear};
+    port.duty = modulate_step(&d->motor.modulate, &modulation).duty;
+}
+
+STAGE void bench_torque_path(void)
+{
+    drive_t *d = the_copy();
+    const mrai_in_t *in = found.sample;
+    const torque_loop_in_t loop = {
+        .command = d->task.torque_command,
+        .estimate = torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta),
+        .confidence = Q15_MAX,
+        .enabled = true,
+    };
+    d->task.torque_request = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &loop);
 }

@@ -80,6 +80,11 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
     nodes = stack.graph(functions)
     depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
     uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])
+    sites = {entry["in"]: entry["sites"] for entry in port["pointer"]}
+    for node in nodes.values():
+        found, listed = len(node.indirect), sites.get(disassembly.plain(node.name))
+        if listed is not None and found > listed:
+            depths.problems.append(f"{node.name}: {found} calls through pointers, {listed} are listed")
     return uses, sorted(set(depths.problems)) + stack.heap(nodes)
 
 
@@ -108,6 +113,9 @@ def measure(folder: Path) -> FIGURES:
     for name, mode in MODES.items():
         drives[name], used = _mode(parts, functions, mode)
         deepest = max(deepest, used)
+    total = sum(u.frame + u.stack for u in uses)
+    if deepest > total:
+        raise FluxtrueError(f"the emulated drive used {deepest} bytes of stack, more than the worst case of {total}")
     whole = sizes.whole(parts.image)
     stages, counted, limited = measure_drive(build_drive(folder / "bench"))
     return {
@@ -125,6 +133,6 @@ def measure(folder: Path) -> FIGURES:
         "stack": {
             "levels": [{"level": u.name, "frame": u.frame, "stack": u.stack,
                         "path": [disassembly.plain(f) for f in u.path]} for u in uses],
-            "total": sum(u.frame + u.stack for u in uses), "seen in emulation": deepest,
+            "total": total, "seen in emulation": deepest,
         },
     }  # fmt: skip

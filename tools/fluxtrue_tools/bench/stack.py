@@ -44,7 +44,7 @@ def movement(instruction: Instruction) -> int | None:
         return 4 * words(text) * (1 if name.endswith("db") and name[-4] != "l" and "st" in name else -1)
     if "[sp" in text and (text.endswith("]!") or re.search(r"\[sp\], #", text)):
         return -int(_IMMEDIATE.findall(text)[-1])
-    if not _INTO_SP.match(text) or name in ("cmp", "cmn", "tst"):
+    if not _INTO_SP.match(text) or name in ("cmp", "cmn", "tst") or name[:3] in ("stm", "ldm"):
         return 0
     number = _IMMEDIATE.search(text)
     operands = [part.strip() for part in text.split(",")]
@@ -112,25 +112,30 @@ class _Walk:
             moved = 0
         after = depth + moved
         node.deepest = max(node.deepest, depth, after)
-        target, following = instruction.target, instruction.address + instruction.size
         if name == "msr" and "MSP" in instruction.operands.upper():
             node.unknown.append(f"{instruction.address:#x}: sets the stack pointer")
-        if name in ("tbb", "tbh"):
-            self.tables.append(after)
+        if self._goes_away(instruction, name, conditional, after):
             return
-        if name == "blx" or (name == "bx" and instruction.operands != "lr"):
-            node.indirect[instruction.address] = after
-        elif name == "ldr" and instruction.operands.startswith("pc") and "[sp]" not in instruction.operands:
-            node.indirect[instruction.address] = after
-        elif name == "bl" and target is not None:
-            self._call(target, after)
-        elif name in ("b", "cbz", "cbnz") and target is not None:
-            self._jump(target, after)
-            if name == "b" and not conditional:
-                return
-        if not (_leaves(instruction, name) and not conditional):
+        leaves = _leaves(instruction, name)
+        if not leaves or conditional:
             # A conditional return that is not taken leaves the stack as it was.
-            self.work.append((following, depth if conditional and _leaves(instruction, name) else after))
+            self.work.append((instruction.address + instruction.size, depth if leaves else after))
+
+    def _goes_away(self, instruction: Instruction, name: str, conditional: bool, depth: int) -> bool:
+        """Notes where the instruction leads; true if its neighbour never follows."""
+        target = instruction.target
+        into_pc = name == "ldr" and instruction.operands.startswith("pc") and "[sp]" not in instruction.operands
+        if name in ("tbb", "tbh"):
+            self.tables.append(depth)
+            return True
+        if name == "blx" or (name == "bx" and instruction.operands != "lr") or into_pc:
+            self.node.indirect[instruction.address] = depth
+        elif name == "bl" and target is not None:
+            self._call(target, depth)
+        elif name in ("b", "cbz", "cbnz") and target is not None:
+            self._jump(target, depth)
+            return name == "b" and not conditional
+        return False
 
 
 def graph(functions: Iterable[Function]) -> dict[str, Node]:

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The profile of each handler's runs, against the emulator's own counters and against programs counted by hand."""
+
+import ctypes
+from collections.abc import Iterator
+
+import pytest
+from fluxtrue_tools.bench import image
+from fluxtrue_tools.emulate import library as emulation
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.sim.library import Loop
+
+VECTORS = (image.FAST, image.MRAI, image.TASK)
+
+
+@pytest.fixture
+def stand(parts: Parts) -> Iterator[image.Stand]:
+    motor = parts.emulated(emulation.COUNTING)
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 100.0, "vdc_V": 350.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        loop.set("enable", 1)
+        loop.run(300)
+        yield image.Stand(loop)
+
+
+def start(stand: image.Stand, cost: int, taken: int) -> None:
+    costs = bytes([cost]) * (image.FLASH_SIZE // 2)
+    assert stand.library.emu_profile_start(stand.handle, costs, len(costs), taken)
+
+
+def test_the_runs_add_up_to_what_the_emulators_counters_say(stand: image.Stand) -> None:
+    start(stand, 1, 0)
+    stand.library.emu_counts_clear(stand.handle)
+    stand.loop.run(200)
+    spans = list(stand.take())
+    for vector in VECTORS:
+        issued = [instructions for v, instructions, _ in spans if v == vector]
+        counts = stand.core.counts(vector)
+        assert (len(issued), min(issued), max(issued), sum(issued)) == (
+            counts.runs, counts.least, counts.most, counts.sum)  # fmt: skip
+
+
+def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_come_on_top(stand: image.Stand) -> None:
+    start(stand, 1, 0)
+    stand.loop.run(50)
+    assert all(cost == instructions for _, instructions, cost in stand.take())
+    start(stand, 3, 0)
+    stand.loop.run(50)
+    assert all(cost == 3 * instructions for _, instructions, cost in stand.take())
+    start(stand, 1, 1)
+    stand.loop.run(50)
+    # A handler calls and returns: some instructions, and never all, are not followed by their neighbour.
+    assert all(instructions + 2 <= cost < 1.5 * instructions for _, instructions, cost in stand.take())
+
+
+def test_what_is_taken_is_not_given_again(stand: image.Stand) -> None:
+    start(stand, 1, 0)
+    stand.loop.run(20)
+    assert len(list(stand.take())) >= 40
+    assert list(stand.take()) == []
+
+
+def test_nothing_is_profiled_where_instructions_are_not_counted_one_by_one(parts: Parts) -> None:
+    motor = parts.emulated(emulation.FAST)
+    with Loop(motor.library, motor.plant, motor.flux_map) as loop:
+        stand = image.Stand(loop)
+        assert not stand.library.emu_profile_start(stand.handle, b"\1" * 2, 2, 0)
+        assert ctypes.sizeof(image._Span) == 12

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The comparison with the committed figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from fluxtrue_tools.bench import baseline, page
+from fluxtrue_tools.errors import FluxtrueError
+
+COMMITTED = {"compiler": "gcc 1", "drives": {"robust": {"fast": [1, 2.5, 3]}}, "image": {"flash": 10}}
+
+
+def test_equal_figures_have_no_difference() -> None:
+    assert baseline.compare(COMMITTED, json.loads(json.dumps(COMMITTED)), "page", "page") == []
+
+
+def test_one_instruction_more_is_named_with_old_and_new() -> None:
+    new = json.loads(json.dumps(COMMITTED))
+    new["drives"]["robust"]["fast"][2] = 4
+    assert baseline.compare(COMMITTED, new, "a", "b") == ["drives / robust / fast: [1, 2.5, 3] → [1, 2.5, 4]"]
+
+
+def test_figures_that_come_and_go_are_differences() -> None:
+    new = {"compiler": "gcc 1", "drives": {"robust": {}}, "image": {"flash": 10, "RAM": 3}}
+    assert baseline.compare(COMMITTED, new, "", "") == [
+        "drives / robust / fast: [1, 2.5, 3], now gone", "image / RAM: new, 3",
+    ]  # fmt: skip
+
+
+def test_a_page_changed_by_hand_is_a_difference() -> None:
+    assert "performance.md" in baseline.compare(COMMITTED, COMMITTED, "page", "page, nicer")[0]
+
+
+def test_another_compiler_is_told_and_compares_nothing() -> None:
+    assert baseline.other_compiler(COMMITTED, "gcc 1") is None
+    reason = baseline.other_compiler(COMMITTED, "gcc 2")
+    assert reason is not None and "'gcc 1'" in reason and "'gcc 2'" in reason
+
+
+@pytest.mark.parametrize(
+    ("content", "message"), [(None, "bench --update"), ("{", "no JSON"), ("[]", "compiler is missing")]
+)
+def test_a_baseline_that_cannot_be_read_is_an_error(tmp_path: Path, content: str | None, message: str) -> None:
+    path = tmp_path / "performance.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(FluxtrueError, match=message):
+        baseline.load(path)
+
+
+def test_what_is_written_reads_back(tmp_path: Path) -> None:
+    baseline.write(COMMITTED, "text\n", tmp_path / "a.json", tmp_path / "a.md")
+    assert baseline.load(tmp_path / "a.json") == COMMITTED
+    assert (tmp_path / "a.md").read_text() == "text\n"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_the_committed_page_is_what_the_committed_figures_give() -> None:
+    assert page.page(baseline.load()) == baseline.PAGE.read_text(encoding="utf-8")
+
+
+def test_a_bound_that_is_missed_is_called_missed() -> None:
+    figures = baseline.load()
+    figures["image"]["flash"] = page.FLASH_MOST + 1
+    assert f"| image, flash | {page.FLASH_MOST + 1} | {page.FLASH_MOST} | **missed** |" in page.page(figures)
+    figures["image"]["flash"] = page.FLASH_MOST
+    assert f"| image, flash | {page.FLASH_MOST} | {page.FLASH_MOST} | met |" in page.page(figures)
