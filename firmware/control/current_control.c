@@ -60,7 +60,7 @@ static dq_t shortened(int32_t d, int32_t q, int32_t v_max)
     return (dq_t){(u_d * share + 0x4000) >> 15, (u_q * share + 0x4000) >> 15};
 }
 
-/* d first, at most 31/32 of the circle; q what is left (CC-11), less what d is short of: so the flux -w psi_q that binds
+/* d first, at most 31/32 of the circle; q what is left (CC-11), less what d is short of: so the flux psi_q that binds
  * d goes (CC-14). */
 static dq_t d_first(int32_t d, int32_t q, int32_t v_max, bool backwards)
 {
