@@ -62,7 +62,7 @@ static dq_t shortened(int32_t d_q22, int32_t q_q22, int32_t v_max)
     return (dq_t){fx_shr_round(fx_mulhi(d, share), 9), fx_shr_round(fx_mulhi(q, share), 9)};
 }
 
-/* d first, at most 31/32 of the circle; q what is left (CC-11), less what d is short of: so the flux -w psi_q that binds
+/* d first, at most 31/32 of the circle; q what is left (CC-11), less what d is short of: so the flux psi_q that binds
  * d goes (CC-14). */
 static dq_t d_first(int32_t d, int32_t q, int32_t v_max, bool backwards)
 {

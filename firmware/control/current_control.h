@@ -10,11 +10,12 @@
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s
  * While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if the reference had been one
  * that the voltage can follow, and no slow tail remains.
- *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2)
+ *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2) and gives up
+ *   what u_d is short of, with the sign of w
  * While d asks for more flux (psi_d* > psi_d) the vector is shortened instead, else u_q could never shed the flux
  * that binds u_d.
  * clear: |u| < v_clear v_dc, a circle inside of everything that may limit here or in the modulation (MO-11)
- * Source   docs/theory/current-control.md (CC-4) ... (CC-12)
+ * Source   docs/theory/current-control.md (CC-4) ... (CC-14)
  * Units    per unit
  * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; v_ratio < 0.7; |s| <= 1
  * Rounding half up: 1/2 LSB q15 in u; s takes its step exactly

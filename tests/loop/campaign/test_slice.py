@@ -65,6 +65,5 @@ def test_who_is_held_to_the_bounds_meets_them(out: Path) -> None:
     assert missed(out, above=False) == []
 
 
-@pytest.mark.xfail(strict=True, reason="at the voltage limit the current reference still trusts its tables")
 def test_who_is_held_to_the_bounds_meets_them_in_field_weakening(out: Path) -> None:
     assert missed(out, above=True) == []

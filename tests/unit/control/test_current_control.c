@@ -251,6 +251,20 @@ void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the
     }
 }
 
+/* By hand: u_d is 200 LSB beyond its 31/32; with u_q at nothing, q gets just these, to shed the flux -w psi_q. */
+void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_of_rotation(void)
+{
+    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
+    const int d_max = v_max - v_max / 32;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        in.omega = sign; /* nothing but its sign */
+        state = (current_control_state_t){.s_d_q30 = -(d_max + 200) * 32768};
+        const dq_t u = step();
+        TEST_ASSERT_INT_WITHIN(1, -d_max, u.d);
+        TEST_ASSERT_INT_WITHIN(2, -sign * 200, u.q);
+    }
+}
+
 /* By hand: (-3, 4) is five long and may be 2.5 here; psi_d* one LSB above psi_d decides. */
 void test_while_the_d_axis_asks_for_flux_back_the_vector_is_shortened_and_keeps_its_direction(void)
 {

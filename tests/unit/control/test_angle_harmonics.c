@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+#include <string.h>
+
+#include "control/angle_harmonics.h"
+#include "unity.h"
+
+static const double turn = 4294967296.0;
+static const double two_pi = 6.283185307179586476925;
+static const double degree = 4294967296.0 / 360.0; /* mechanical */
+
+static angle_harmonics_config_t config;
+static angle_harmonics_state_t state;
+static int32_t table[ANGLE_HARMONICS_PARTS];
+static double theta; /* true, in turns */
+
+void setUp(void)
+{
+    config = (angle_harmonics_config_t){(int32_t)(2.0 / 3.0 * degree)};
+    state = (angle_harmonics_state_t){0};
+    memset(table, 0, sizeof table);
+    theta = 0.123;
+}
+
+void tearDown(void)
+{
+}
+
+static uint32_t counts(double turns)
+{
+    return (uint32_t)(int64_t)llround((turns - floor(turns)) * turn);
+}
+
+/* What a sensor with 0.3 degrees once and 0.25 degrees twice per turn adds: with three pole pairs nearly a degree
+ * electrical each. */
+static double wrong(double at)
+{
+    return (0.3 * cos(two_pi * at - 1.0) + 0.25 * sin(2.0 * two_pi * at + 0.4)) / 360.0;
+}
+
+/* Steps of a millisecond as the drive makes them: corrected, learnt from. The worst remaining error of the last turn or
+ * more, in degrees. */
+static double drive(double rpm, double rpm_per_s, int steps)
+{
+    double worst = 0.0;
+    for (int k = 0; k < steps; k++) {
+        theta += (rpm + rpm_per_s * k * 1e-3) / 60e3;
+        const uint32_t read = counts(theta + wrong(theta));
+        const uint32_t corrected = read + (uint32_t)table[read >> ANGLE_HARMONICS_SHIFT];
+        if (k >= steps - 100) {
+            worst = fmax(worst, fabs((double)(int32_t)(corrected - counts(theta)) / degree));
+        }
+        angle_harmonics_step(&config, &state, corrected, table);
+    }
+    return worst;
+}
+
+/* Five of the slower time constants (AT-13) leave 0.7 % of 0.3 degrees; the table without interpolation half a part:
+ * (0.3 + 2 * 0.25) pi/64 = 0.04 degrees. */
+void test_a_sensors_first_two_harmonics_are_learnt_away_in_both_directions(void)
+{
+    TEST_ASSERT_TRUE(drive(8400.0, 0.0, 200) > 0.05);
+    TEST_ASSERT_TRUE(drive(8400.0, 0.0, 900) < 0.05);
+    setUp();
+    TEST_ASSERT_TRUE(drive(-5000.0, 0.0, 2500) < 0.05);
+}
+
+void test_acceleration_is_no_harmonic(void)
+{
+    TEST_ASSERT_TRUE(drive(3000.0, 6000.0, 1000) < 0.06);
+}
+
+/* By (AT-13) 10 s at 900 rpm would take away nine tenths of the second harmonic. */
+void test_below_940_rpm_nothing_is_learnt_and_nothing_forgotten(void)
+{
+    (void)drive(900.0, 0.0, 10000);
+    TEST_ASSERT_EQUAL_INT32(0, state.c_1 | state.s_1 | state.c_2 | state.s_2);
+    (void)drive(8000.0, 0.0, 1000);
+    const angle_harmonics_state_t before = state;
+    (void)drive(500.0, 0.0, 1000);
+    (void)drive(0.0, 0.0, 1000);
+    TEST_ASSERT_EQUAL_INT32(before.c_1, state.c_1);
+    TEST_ASSERT_EQUAL_INT32(before.s_2, state.s_2);
+    TEST_ASSERT_TRUE(drive(500.0, 0.0, 200) < 0.05);
+}
+
+/* Every seventh sample is one period late, a tenth of the step. */
+void test_late_samples_teach_nothing(void)
+{
+    for (int k = 0; k < 4000; k++) {
+        theta += 6000.0 / 60e3;
+        angle_harmonics_step(&config, &state, counts(theta + ((k % 7 == 0) ? 600.0 / 60e3 : 0.0)), table);
+    }
+    TEST_ASSERT_INT32_WITHIN(64, 0, state.c_1);
+    TEST_ASSERT_INT32_WITHIN(64, 0, state.s_2);
+}
+
+void test_what_is_learnt_stays_within_its_bound(void)
+{
+    for (int k = 0; k < 5000; k++) {
+        theta += 7000.0 / 60e3;
+        angle_harmonics_step(&config, &state, counts(theta - 0.002 * cos(two_pi * theta)), table); /* uncorrected */
+    }
+    TEST_ASSERT_EQUAL_INT32(config.most, state.c_1);
+}
+
+/* The same sequence, not corrected, through (AT-11) and (AT-12) in double. The fixed point rounds each step to
+ * 1/2 LSB, and its waves to 2^-15: 100 steps of up to 1.3e5 LSB of d/64, 4 LSB each. */
+void test_coefficients_and_table_are_the_twins(void)
+{
+    double c[4] = {0}, last = 0.0, before = 0.0;
+    for (int k = 0; k < 100; k++) {
+        theta += 6500.0 / 60e3;
+        const double at = theta + wrong(theta);
+        const double d = (at - 2.0 * last + before) * turn;
+        if (k > 1) {
+            const double w = two_pi * last;
+            const double wave[4] = {cos(w), sin(w), cos(2.0 * w), sin(2.0 * w)};
+            for (int n = 0; n < 4; n++) {
+                c[n] += d * wave[n] / 64.0;
+            }
+        }
+        before = last;
+        last = at;
+        angle_harmonics_step(&config, &state, counts(at), table);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[0], state.c_1);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[1], state.s_1);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[2], state.c_2);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[3], state.s_2);
+    config.most = 0x00FFFFFF;
+    state.c_1 = 3000000;
+    state.s_2 = -2000000;
+    state.s_1 = state.c_2 = 0;
+    for (int k = 0; k < 16; k++) { /* standing still: renewed only */
+        angle_harmonics_step(&config, &state, state.last, table);
+    }
+    for (int j = 0; j < ANGLE_HARMONICS_PARTS; j++) {
+        const double w = two_pi * (j + 0.5) / 64.0;
+        TEST_ASSERT_DOUBLE_WITHIN(200.0, 3e6 * cos(w) - 2e6 * sin(2.0 * w), table[j]);
+    }
+}
