@@ -73,17 +73,18 @@ static inline void exchange_barrier(void)
     __asm__ volatile("" ::: "memory");
 }
 
-static inline sample_t *sample_box_begin(sample_box_t *box)
+/* next: the generation that publishing will make it. */
+static inline sample_t *sample_box_begin(sample_box_t *box, uint32_t next)
 {
-    sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    sample_t *slot = &box->slot[next & 1U];
     __asm__("" : "+r"(slot)); /* the address once: not found anew at every use */
     return slot;
 }
 
-static inline void sample_box_publish(sample_box_t *box)
+static inline void sample_box_publish(sample_box_t *box, uint32_t next)
 {
     exchange_barrier();
-    box->generation = box->generation + 1U;
+    box->generation = next;
 }
 
 static inline sample_t sample_box_read(const sample_box_t *box)

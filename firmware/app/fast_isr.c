@@ -51,15 +51,11 @@ static void watch(drive_t *drive, uint32_t unfinished)
     }
 }
 
-/* Hands this period to the identification. One that is two periods late still reads the slot whose turn it is:
- * that period is lost. */
-static void publish(drive_t *drive, sample_t *sample)
+/* Hands this period to the identification. */
+static void publish(drive_t *drive, uint32_t next)
 {
-    fast_state_t *fast = &drive->fast;
-    if (sample != &fast->lost) {
-        sample_box_publish(&drive->samples);
-    }
-    fast->pended++;
+    sample_box_publish(&drive->samples, next);
+    drive->fast.pended++;
     hal_irq_pend_mrai();
 }
 
@@ -158,7 +154,12 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     forget_faults(drive, command->fault_resets);
     const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
     watch(drive, unfinished);
-    sample_t *sample = __builtin_expect(unfinished > 1U, 0) ? &drive->fast.lost : sample_box_begin(&drive->samples);
+    uint32_t next = drive->samples.generation + 1U;
+    sample_t *sample = sample_box_begin(&drive->samples, next);
+    if (__builtin_expect(unfinished > 1U, 0)) {
+        sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
+        next--;
+    }
     const instant_t now = observe(drive, sample);
     const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, sample->v_dc);
     if (__builtin_expect(now.angle.jumped || !quiet, 0)) {
@@ -173,5 +174,5 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
         }
         bridge_off(drive, sample, command->safe);
     }
-    publish(drive, sample);
+    publish(drive, next);
 }
