@@ -74,17 +74,18 @@ static inline void exchange_barrier(void)
     __asm__ volatile("" ::: "memory");
 }
 
-static inline sample_t *sample_box_begin(sample_box_t *box)
+/* next: the generation that publishing will make it. */
+static inline sample_t *sample_box_begin(sample_box_t *box, uint32_t next)
 {
-    sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    sample_t *slot = &box->slot[next & 1U];
     __asm__("" : "+r"(slot)); /* the address once: not found anew at every use */
     return slot;
 }
 
-static inline void sample_box_publish(sample_box_t *box)
+static inline void sample_box_publish(sample_box_t *box, uint32_t next)
 {
     exchange_barrier();
-    box->generation = box->generation + 1U;
+    box->generation = next;
 }
 
 static inline sample_t sample_box_read(const sample_box_t *box)
@@ -110,7 +111,14 @@ static inline const sample_t *sample_box_look(const sample_box_t *box)
 
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)
 {
-    box->slot[(box->generation + 1U) & 1U] = *window;
+    identify_window_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    slot->first = window->first; /* part by part: the compiler calls the library for more than 64 bytes */
+    slot->last = window->last;
+    slot->sum_i = window->sum_i;
+    slot->sum_u = window->sum_u;
+    slot->count = window->count;
+    slot->limited = window->limited;
+    slot->acting = window->acting;
     exchange_barrier();
     box->generation = box->generation + 1U;
 }

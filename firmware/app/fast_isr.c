@@ -12,7 +12,6 @@
 
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
-    ab_t i;
     fx_pair_t i_dq, advanced;
     int32_t sum_q27;
     angle_t angle;
@@ -23,19 +22,18 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     hal_adc_read(&sample->counts);
     const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     instant_t now;
-    now.i = measured.i;
     const uint32_t read = hal_angle_read();
     sample->theta_m = read + (uint32_t)drive->task.angle_correction[read >> ANGLE_HARMONICS_SHIFT];
+    sample->v_dc = measured.v_dc;
     now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, sample->theta_m);
+    sample->mrai.omega = now.angle.omega_q31;
+    sample->theta_e = now.angle.theta_e;
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     now.i_dq = fx_arch_pkhbt(i.d, i.q);
     /* The middle of the period in which the duties will act: 1.5 periods ahead. */
     now.advanced = fx_rotation(now.angle.theta_e + (uint32_t)now.angle.step + (uint32_t)(now.angle.step >> 1));
     sample->mrai.i = i;
-    sample->mrai.omega = now.angle.omega_q31;
-    sample->theta_e = now.angle.theta_e;
-    sample->v_dc = measured.v_dc;
     return now;
 }
 
@@ -55,15 +53,11 @@ static void watch(drive_t *drive, uint32_t unfinished)
     }
 }
 
-/* Hands this period to the identification. One that is two periods late still reads the slot whose turn it is:
- * that period is lost. */
-static void publish(drive_t *drive, sample_t *sample)
+/* Hands this period to the identification. */
+static void publish(drive_t *drive, uint32_t next)
 {
-    fast_state_t *fast = &drive->fast;
-    if (sample != &fast->lost) {
-        sample_box_publish(&drive->samples);
-    }
-    fast->pended++;
+    sample_box_publish(&drive->samples, next);
+    drive->fast.pended++;
     hal_irq_pend_mrai();
 }
 
@@ -143,10 +137,12 @@ static void forget_faults(drive_t *drive, uint32_t asked)
     }
 }
 
-/* Something is not as it should be, or was a moment ago. */
-static __attribute__((noinline)) void look(drive_t *drive, const monitor_in_t *seen, bool run)
+/* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the counts again. */
+static __attribute__((noinline)) void look(drive_t *drive, const sample_t *sample, bool jumped, bool run)
 {
-    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, seen);
+    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
+    const monitor_in_t seen = {measure_phases(measured.i, measured.sum_q27), sample->v_dc, jumped};
+    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
     if (faults != 0) {
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
@@ -160,12 +156,16 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     forget_faults(drive, command->fault_resets);
     const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
     watch(drive, unfinished);
-    sample_t *sample = __builtin_expect(unfinished > 1U, 0) ? &drive->fast.lost : sample_box_begin(&drive->samples);
+    uint32_t next = drive->samples.generation + 1U;
+    sample_t *sample = sample_box_begin(&drive->samples, next);
+    if (__builtin_expect(unfinished > 1U, 0)) {
+        sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
+        next--;
+    }
     const instant_t now = observe(drive, sample);
     const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, sample->v_dc);
     if (__builtin_expect(now.angle.jumped || !quiet, 0)) {
-        const monitor_in_t seen = {measure_phases(now.i, now.sum_q27), sample->v_dc, now.angle.jumped};
-        look(drive, &seen, command->run);
+        look(drive, sample, now.angle.jumped, command->run);
     }
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, sample->mrai.i);
     if (command->run && drive->fast.faults == 0) {
@@ -176,5 +176,5 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
         }
         bridge_off(drive, sample, command->safe);
     }
-    publish(drive, sample);
+    publish(drive, next);
 }

@@ -23,14 +23,14 @@ void tearDown(void)
 /* A sample as the fast ISR publishes it: 60 A, 0.3 omega_b, a magnet that is 10 % weak. */
 static void period(uint32_t k)
 {
-    sample_t *s = sample_box_begin(&drive.samples);
+    sample_t *s = sample_box_begin(&drive.samples, drive.samples.generation + 1U);
     const dq_t i = {-3000, 5000};
     const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
     *s = (sample_t){.mrai = in, .acting = true, .v_dc = 21238};
     s->mrai.u.d = (int32_t)(-0.3 * s->mrai.flux.psi_q - 0.0133 * 3000);
     s->mrai.u.q = (int32_t)(0.3 * (s->mrai.flux.psi_d - 1434) + 0.0133 * 5000);
     s->theta_e = (uint32_t)(k * 0.3 * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
-    sample_box_publish(&drive.samples);
+    sample_box_publish(&drive.samples, drive.samples.generation + 1U);
     drive.fast.pended++;
     mrai_isr(&drive);
 }

@@ -20,13 +20,13 @@ void tearDown(void)
 /* A sample as the fast ISR publishes it: 60 A, 0.3 omega_b, the voltage that belongs to it. */
 static void publish(bool acting)
 {
-    sample_t *s = sample_box_begin(&drive.samples);
+    sample_t *s = sample_box_begin(&drive.samples, drive.samples.generation + 1U);
     const dq_t i = {-3000, 5000};
     const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
     *s = (sample_t){.mrai = in, .acting = acting};
     s->mrai.u.d = (q15_t)(-0.3 * s->mrai.flux.psi_q - 0.0133 * 3000);
     s->mrai.u.q = (q15_t)(0.3 * (s->mrai.flux.psi_d - 1500) + 0.0133 * 5000); /* a weak magnet */
-    sample_box_publish(&drive.samples);
+    sample_box_publish(&drive.samples, drive.samples.generation + 1U);
     drive.fast.pended++;
 }
 

@@ -218,11 +218,11 @@ void test_the_torque_loop_can_be_switched_off(void)
 
 static void sample_at(double omega_pu, bool acting, bool limited)
 {
-    sample_t *s = sample_box_begin(&drive.samples);
+    sample_t *s = sample_box_begin(&drive.samples, drive.samples.generation + 1U);
     *s = (sample_t){.mrai = {.i = {-3000, 5000}, .omega = (q31_t)(omega_pu * 2147483647.0)}, .v_dc = 21238,
                     .acting = acting, .voltage_limited = limited};
     s->mrai.flux = flux_table_step(&motor.flux_table, s->mrai.i);
-    sample_box_publish(&drive.samples);
+    sample_box_publish(&drive.samples, drive.samples.generation + 1U);
 }
 
 void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)
@@ -260,10 +260,10 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
 void test_what_is_being_written_is_not_seen_before_it_is_published(void)
 {
     sample_at(0.1, true, false);
-    sample_t *next = sample_box_begin(&drive.samples);
+    sample_t *next = sample_box_begin(&drive.samples, drive.samples.generation + 1U);
     next->v_dc = 77;
     TEST_ASSERT_EQUAL_INT(21238, sample_box_read(&drive.samples).v_dc);
-    sample_box_publish(&drive.samples);
+    sample_box_publish(&drive.samples, drive.samples.generation + 1U);
     TEST_ASSERT_EQUAL_INT(77, sample_box_read(&drive.samples).v_dc);
 }
 
