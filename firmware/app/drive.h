@@ -15,6 +15,7 @@
 
 #include "app/exchange.h"
 #include "app/motor.h"
+#include "control/commission.h"
 #include "control/identify_memory.h"
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
@@ -39,6 +40,7 @@ typedef struct {
     identification_mode_t identification_mode;
     uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
     uint32_t identification_resets; /* counted up: what was identified is forgotten once */
+    uint32_t commissionings;        /* counted up: the inverter's voltage error is measured once, at standstill */
 } request_t;
 
 typedef enum { RUN_STATE_OFF = 0, RUN_STATE_RUN = 1, RUN_STATE_FAULT = 2 } run_state_t;
@@ -75,6 +77,13 @@ typedef struct {
     bool psi_clamped, r_clamped;
 } learnt_t;
 
+/** What the modulation adds against dead time and device drop, if it has been measured. */
+typedef struct {
+    int32_t dead_time; /* q15 */
+    int32_t knee_q17;
+    int32_t measured;  /* not zero: this is not motor.toml's */
+} compensation_t;
+
 /** Written by the 1 kHz task alone. */
 typedef struct {
     torque_limit_state_t torque_limit;
@@ -88,8 +97,14 @@ typedef struct {
     learnt_t learnt;
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
+    angle_harmonics_state_t angle_harmonics;
+    volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
+    commission_state_t commission;
+    commission_curve_t inverter;    /* voltage error against current, as last measured */
+    compensation_t compensation;
+    uint32_t commissionings;        /* of the request, as far as seen */
     dq_t i_ref;   /* acts until the next step */
     dq_t psi_ref; /* tables' flux at the last reference */
     uint16_t derating;    /* DERATING_...: why less than the request is made */
@@ -131,6 +146,16 @@ bool drive_recall(drive_t *drive, const identify_memory_t *memory);
 
 /** The identification's share of the 1 kHz task; sample is the latest, mrai the task's one copy of what may change. */
 void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai);
+
+/** The commissioning's share of the 1 kHz task. */
+void drive_commission(drive_t *drive, const sample_t *sample);
+/** Takes a compensation over; false: out of range, nothing changed. From the task, or before it starts. */
+bool drive_compensate(drive_t *drive, const compensation_t *compensation);
+/** Current references come from outside the torque path. */
+static inline bool drive_is_direct(const drive_t *drive)
+{
+    return drive->request.current_mode || commission_runs(&drive->task.commission);
+}
 
 void fast_isr(drive_t *drive);
 void mrai_isr(drive_t *drive);

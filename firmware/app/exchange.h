@@ -24,6 +24,7 @@ typedef struct {
     adc_counts_t counts;
     int32_t v_dc;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
+    uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
     bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */
@@ -75,7 +76,9 @@ static inline void exchange_barrier(void)
 
 static inline sample_t *sample_box_begin(sample_box_t *box)
 {
-    return &box->slot[(box->generation + 1U) & 1U];
+    sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    __asm__("" : "+r"(slot)); /* the address once: not found anew at every use */
+    return slot;
 }
 
 static inline void sample_box_publish(sample_box_t *box)
@@ -100,7 +103,9 @@ static inline sample_t sample_box_read(const sample_box_t *box)
 /* In place, for the MRAI ISR: the fast ISR leaves a slot alone until it has finished with it. */
 static inline const sample_t *sample_box_look(const sample_box_t *box)
 {
-    return &box->slot[box->generation & 1U];
+    const sample_t *slot = &box->slot[box->generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
 }
 
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)
@@ -132,7 +137,9 @@ static inline void command_box_write(command_box_t *box, command_t command)
 
 static inline const command_t *command_box_read(const command_box_t *box)
 {
-    return &box->slot[box->generation & 1U];
+    const command_t *slot = &box->slot[box->generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
 }
 
 static inline void schedule_box_write(schedule_box_t *box, mrai_schedule_t schedule)

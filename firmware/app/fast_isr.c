@@ -24,7 +24,9 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     instant_t now;
     now.i = measured.i;
-    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, hal_angle_read());
+    const uint32_t read = hal_angle_read();
+    sample->theta_m = read + (uint32_t)drive->task.angle_correction[read >> ANGLE_HARMONICS_SHIFT];
+    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, sample->theta_m);
     now.sum_q27 = measured.sum_q27;
     const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
     now.i_dq = fx_arch_pkhbt(i.d, i.q);
@@ -34,7 +36,6 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     sample->mrai.omega = now.angle.omega_q31;
     sample->theta_e = now.angle.theta_e;
     sample->v_dc = measured.v_dc;
-    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, i);
     return now;
 }
 
@@ -42,7 +43,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
 static void watch(drive_t *drive, uint32_t unfinished)
 {
     fast_state_t *fast = &drive->fast;
-    if (unfinished == 0U) {
+    if (__builtin_expect(unfinished == 0U, 1)) {
         fast->overruns_in_a_row = 0;
         return;
     }
@@ -59,7 +60,6 @@ static void watch(drive_t *drive, uint32_t unfinished)
 static void publish(drive_t *drive, sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
-    sample->acting = fast->periods_on >= PERIODS_TO_ACT;
     if (sample != &fast->lost) {
         sample_box_publish(&drive->samples);
     }
@@ -84,8 +84,21 @@ static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t 
     sample->mrai.u = (dq_t){0, 0};
     sample->voltage_limited = false;
     sample->snapped = false;
+    sample->acting = false;
     drive->fast.coming = (dq_t){0, 0};
     drive->fast.periods_on = 0;
+}
+
+/* Circle or hexagon: the voltage to come may not be the one wanted. */
+static void note_limits(drive_t *drive, sample_t *sample, const modulate_in_t *modulation,
+                        const current_control_out_t *wanted, const modulate_out_t *made)
+{
+    sample->voltage_limited = wanted->limited || made->limited;
+    if (made->limited) {
+        const modulate_in_t again = *modulation; /* a copy: the usual case keeps its values in registers */
+        sample->snapped = true;
+        drive->fast.coming = modulate_acted(&drive->motor.modulate, &again, made->duty);
+    }
 }
 
 static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, const current_target_t *target)
@@ -104,11 +117,20 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     hal_pwm_write(made.duty);
     hal_pwm_enable(true);
-    sample->mrai.u = fast->coming; /* acts now: the duties before these */
-    sample->voltage_limited = wanted.limited || made.limited;
-    sample->snapped = made.limited;
-    fast->coming = made.limited ? modulate_acted(&m->modulate, &modulation, made.duty) : wanted.u;
-    fast->periods_on = (uint8_t)fx_min_s32(fast->periods_on + 1, PERIODS_TO_ACT);
+    sample->mrai.u.d = fast->coming.d; /* acts now: the duties before these */
+    sample->mrai.u.q = fast->coming.q;
+    sample->voltage_limited = false;
+    sample->snapped = false;
+    fast->coming.d = wanted.u.d;
+    fast->coming.q = wanted.u.q;
+    if (!wanted.clear) {
+        note_limits(drive, sample, &modulation, &wanted, &made);
+    }
+    sample->acting = true;
+    if (fast->periods_on < PERIODS_TO_ACT) {
+        fast->periods_on++;
+        sample->acting = fast->periods_on >= PERIODS_TO_ACT;
+    }
 }
 
 /* A reset comes before this period's monitors: what is still wrong is latched again at once.
@@ -134,17 +156,18 @@ static __attribute__((noinline)) void look(drive_t *drive, const monitor_in_t *s
 /* Everything the period needs is compiled into the one interrupt, with a compiler that sees all files. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
-    const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
-    sample_t *sample = (unfinished > 1U) ? &drive->fast.lost : sample_box_begin(&drive->samples);
-    const instant_t now = observe(drive, sample);
     const command_t *command = command_box_read(&drive->commands);
     forget_faults(drive, command->fault_resets);
+    const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
     watch(drive, unfinished);
-    if (now.angle.jumped || !monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, sample->mrai.i, now.sum_q27,
-                                           sample->v_dc)) {
+    sample_t *sample = __builtin_expect(unfinished > 1U, 0) ? &drive->fast.lost : sample_box_begin(&drive->samples);
+    const instant_t now = observe(drive, sample);
+    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, sample->v_dc);
+    if (__builtin_expect(now.angle.jumped || !quiet, 0)) {
         const monitor_in_t seen = {measure_phases(now.i, now.sum_q27), sample->v_dc, now.angle.jumped};
         look(drive, &seen, command->run);
     }
+    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, sample->mrai.i);
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {

@@ -5,6 +5,7 @@
  * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
  * Errors   motor_valid() checks tables and limits at start-up
  * Context  const data in flash */
+#include "control/angle_harmonics.h"
 #include "control/angle_tracker.h"
 #include "control/current_control.h"
 #include "control/current_reference.h"
@@ -39,6 +40,7 @@ typedef struct {
     q15_t psi_weak;
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;
+    angle_harmonics_config_t angle_harmonics;
     flux_table_config_t flux_table;
     current_control_config_t current_control;
     modulate_config_t modulate;

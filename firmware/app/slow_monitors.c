@@ -34,7 +34,7 @@ static uint32_t torque(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     const torque_monitor_in_t in = {
-        .acting = sample->acting && !drive->request.current_mode,
+        .acting = sample->acting && !drive_is_direct(drive),
         .u = sample->mrai.u,
         .i = sample->mrai.i,
         .psi = {sample->mrai.flux.psi_d, sample->mrai.flux.psi_q},

@@ -57,7 +57,7 @@ static voltage_reserve_t reserve(drive_t *drive, const sample_t *sample)
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
         .psi_delta = drive_psi_delta(drive),
-        .acting = sample->acting && !drive->request.current_mode,
+        .acting = sample->acting && !drive_is_direct(drive),
     };
     return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
 }
@@ -106,7 +106,7 @@ static q15_t torque_path(drive_t *drive, const sample_t *sample)
         .estimate = task->torque_estimate,
         .confidence = (drive->request.identification_mode == IDENTIFICATION_ROBUST) ? task->identify.confidence
                                                                                      : Q15_MAX,
-        .enabled = drive->request.torque_loop && !drive->request.current_mode,
+        .enabled = drive->request.torque_loop && !drive_is_direct(drive),
         .limited = task->reference.limited || sample->voltage_limited,
     };
     return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
@@ -128,6 +128,9 @@ static dq_t references(drive_t *drive, const sample_t *sample)
         .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, drive_psi_delta(drive), hal_temperature_winding_dC()),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
+    if (commission_runs(&task->commission)) {
+        return task->commission.i_ref;
+    }
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
 }
 
@@ -172,9 +175,12 @@ void task_1khz(drive_t *drive)
     /* Read once: the identification may interrupt, and its drift must be counted to the end. */
     const mrai_state_t identified = drive->slow.mrai;
     exchange_barrier();
+    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, sample.theta_m,
+                         task->angle_correction);
     const uint32_t found = slow_monitors_step(drive, &sample);
     task->run_state = supervise(drive);
     drive_identify(drive, &sample, &identified);
+    drive_commission(drive, &sample);
 
     mrai_in_t next = sample.mrai;
     order(drive, &sample, found, &next);

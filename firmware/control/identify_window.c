@@ -11,17 +11,27 @@ static void restart(identify_window_t *window)
     window->acting = true;
 }
 
+static void add(dq_t *sum, dq_t x)
+{
+    dq_t s = *sum;
+    fx_arch_together(&s.d, &s.q);
+    sum->d = s.d + x.d;
+    sum->q = s.q + x.q;
+}
+
 bool identify_window_step(identify_window_t *window, const identify_sample_t *in)
 {
     if (window->count >= IDENTIFY_PERIODS) {
         restart(window);
     }
-    window->sum_i.d += in->i.d;
-    window->sum_i.q += in->i.q;
-    window->sum_u.d += in->u.d;
-    window->sum_u.q += in->u.q;
-    window->acting = window->acting && in->acting;
-    window->limited = (uint8_t)(window->limited + (in->limited ? 1U : 0U));
+    add(&window->sum_i, in->i);
+    add(&window->sum_u, in->u);
+    if (__builtin_expect(!in->acting, 0)) {
+        window->acting = false;
+    }
+    if (__builtin_expect(in->limited, 0)) {
+        window->limited++;
+    }
     window->count++;
     if (window->count < IDENTIFY_PERIODS) {
         return false;

@@ -8,6 +8,9 @@
 #define DUTY_HALF 16384
 /* One count below the full range, in Q30: the largest distance between two phases. */
 #define SPAN_MAX_Q30 (32766U << 15)
+#define HALF_MAX_Q31 (32766 << 15)
+/* Half a duty, and half an LSB to round it. */
+#define MIDDLE_Q31 0x40008000U
 
 typedef struct {
     int32_t a, b, c;
@@ -22,11 +25,10 @@ static phases_t phases_q30(int32_t alpha, int32_t beta)
 }
 
 /* Stator voltage in units of v_dc. Q17 * Q30 = Q15. */
-static ab_t normalise(dq_t u, fx_pair_t at, int32_t v_dc)
+static ab_t normalise(fx_pair_t u, fx_pair_t at, int32_t v_dc)
 {
     const int32_t per_v_dc = (int32_t)(UINT32_MAX / (uint32_t)v_dc);
-    const ab_t v = inverse_park_q30(u, at);
-    return (ab_t){fx_mulhi(per_v_dc, v.alpha), fx_mulhi(per_v_dc, v.beta)};
+    return (ab_t){fx_mulhi(per_v_dc, fx_difference2(u, at)), fx_mulhi(per_v_dc, fx_dot2_cross(u, at))};
 }
 
 /* The middle one of three phases: as they sum to zero, minus the sum of the outer two. */
@@ -42,8 +44,11 @@ static int32_t middle(phases_t x)
 static phases_t polarity(const modulate_config_t *config, fx_pair_t i, fx_pair_t at)
 {
     const ab_t x = {fx_difference2(i, at), fx_dot2_cross(i, at)};
-    const int32_t a = fx_mulhi(config->knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
-    const int32_t side = fx_mulhi(config->knee_side_q17, x.beta);
+    int32_t knee_q17 = config->knee_q17;
+    int32_t knee_side_q17 = config->knee_side_q17;
+    fx_arch_together(&knee_q17, &knee_side_q17);
+    const int32_t a = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
+    const int32_t side = fx_mulhi(knee_side_q17, x.beta);
     const int32_t b = side - (a >> 1);
     return (phases_t){fx_sat_q15_word(a), fx_sat_q15_word(b), fx_sat_q15_word(b - 2 * side)};
 }
@@ -97,7 +102,7 @@ static modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t 
 static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_t *config, const modulate_in_t *in)
 {
     const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
-    const ab_t v = normalise(in->u, in->advanced, v_dc);
+    const ab_t v = normalise(fx_arch_pkhbt(in->u.d, in->u.q), in->advanced, v_dc);
     modulate_out_t out = careful(config, (ab_t){fx_sat_q15_word(v.alpha), fx_sat_q15_word(v.beta)},
                                  polarity(config, in->i, in->advanced));
     out.limited = out.limited || v_dc != in->v_dc;
@@ -105,10 +110,9 @@ static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_
 }
 
 /* |u|^2 < v_dc^2/2, so that the phases fit Q31, and a dc voltage to divide by. */
-static bool fits_q31(const modulate_config_t *config, const modulate_in_t *in)
+static bool fits_q31(const modulate_config_t *config, fx_pair_t u, int32_t v_dc)
 {
-    const fx_pair_t u = fx_arch_pkhbt(in->u.d, in->u.q);
-    return in->v_dc >= config->v_dc_min && (uint32_t)fx_dot2(u, u) < (uint32_t)(in->v_dc * in->v_dc) >> 1;
+    return v_dc >= config->v_dc_min && (uint32_t)fx_dot2(u, u) < (uint32_t)(v_dc * v_dc) >> 1;
 }
 
 /* Duties without dead time, Q31 and half an LSB to round them (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only
@@ -118,7 +122,7 @@ static phases_t centred_q31(ab_t v)
     const int32_t side = fx_arch_opaque(v.beta * Q16(0.86602540378443865)); /* Q15 * Q16 = Q31 */
     const int32_t b = side - v.alpha * DUTY_ONE;
     const phases_t x = {v.alpha * (2 * DUTY_ONE), b, (int32_t)((uint32_t)b - 2U * (uint32_t)side)};
-    const uint32_t shift = (uint32_t)fx_arch_opaque(0x40008000) + (uint32_t)(middle(x) >> 1);
+    const uint32_t shift = (uint32_t)fx_arch_opaque((int32_t)MIDDLE_Q31) + (uint32_t)(middle(x) >> 1);
     return (phases_t){(int32_t)((uint32_t)x.a + shift), (int32_t)((uint32_t)x.b + shift),
                       (int32_t)((uint32_t)x.c + shift)};
 }
@@ -142,27 +146,65 @@ static bool within(const modulate_config_t *config, phases_t y)
     return (uint32_t)y.a - margin <= width && (uint32_t)y.b - margin <= width && (uint32_t)y.c - margin <= width;
 }
 
-static __attribute__((noinline)) modulate_out_t near(const modulate_config_t *config, const modulate_in_t *in)
+/* From the middle to a duty, Q31, half an LSB of rounding included. */
+static int32_t off_middle(int32_t y)
 {
-    if (!fits_q31(config, in)) {
-        return far(config, in);
+    return (int32_t)((uint32_t)y - 0x40000000U);
+}
+
+/* Some pulse may be too short, or the hexagon too small: then everything is shortened about the middle, from which both
+ * ends are equally far (MO-3). Duties as the bridge can make them, and bit 16 of the upper
+ * word says that they are not as wanted. */
+static uint64_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
+{
+    phases_t x = {off_middle(y.a), off_middle(y.b), off_middle(y.c)};
+    const int32_t half = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
+    uint32_t limited = 0;
+    if (half > HALF_MAX_Q31) {
+        const int32_t by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 32768;
+        x = (phases_t){2 * fx_mulhi(x.a, by), 2 * fx_mulhi(x.b, by), 2 * fx_mulhi(x.c, by)};
+        limited = 0x10000U;
     }
-    const ab_t v = normalise(in->u, in->advanced, in->v_dc);
-    const phases_t sign = polarity(config, in->i, in->advanced);
+    const int32_t dead_time = 2 * config->dead_time;
+    const int32_t a = DUTY_HALF + ((x.a + dead_time * sign.a) >> 16);
+    const int32_t b = DUTY_HALF + ((x.b + dead_time * sign.b) >> 16);
+    const int32_t c = DUTY_HALF + ((x.c + dead_time * sign.c) >> 16);
+    const duty_t made = {realisable(a, config->min_pulse), realisable(b, config->min_pulse),
+                         realisable(c, config->min_pulse)};
+    if (made.a != (uint32_t)a || made.b != (uint32_t)b || made.c != (uint32_t)c) {
+        limited = 0x10000U;
+    }
+    return (uint64_t)(made.c | limited) << 32 | made.b << 16 | made.a;
+}
+
+/* In and out by registers: what goes through memory would be kept there in every period. */
+static __attribute__((noinline)) uint64_t near(const modulate_config_t *config, fx_pair_t u, fx_pair_t i,
+                                               fx_pair_t advanced, int32_t v_dc)
+{
+    const ab_t v = normalise(u, advanced, v_dc);
+    const phases_t sign = polarity(config, i, advanced);
     const phases_t y = centred_q31(v);
     if (!within(config, y)) {
-        return careful(config, v, sign);
+        return snap(config, y, sign);
     }
-    return (modulate_out_t){plain(config, y, sign), false};
+    const duty_t made = plain(config, y, sign);
+    return (uint64_t)made.c << 32 | made.b << 16 | made.a;
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
 {
+    const fx_pair_t u = fx_arch_pkhbt(in->u.d, in->u.q);
     if (!in->clear) {
-        const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
-        return near(config, &given);
+        if (!fits_q31(config, u, in->v_dc)) {
+            const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
+            return far(config, &given);
+        }
+        const uint64_t made = near(config, u, in->i, in->advanced, in->v_dc);
+        const uint32_t lower = (uint32_t)made;
+        const uint32_t upper = (uint32_t)(made >> 32);
+        return (modulate_out_t){{lower & 0xFFFFU, lower >> 16, upper & 0xFFFFU}, (upper & 0x10000U) != 0U};
     }
-    const phases_t y = centred_q31(normalise(in->u, in->advanced, in->v_dc));
+    const phases_t y = centred_q31(normalise(u, in->advanced, in->v_dc));
     return (modulate_out_t){plain(config, y, polarity(config, in->i, in->advanced)), false};
 }
 

@@ -36,11 +36,11 @@ typedef struct {
 
 /** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to
  * count. |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
-static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, dq_t i, int32_t sum_q27,
-                                 int32_t v_dc)
+static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, fx_pair_t i,
+                                 int32_t sum_q27, int32_t v_dc)
 {
     const uint32_t sum_max = (uint32_t)config->sum_max;
-    return (uint32_t)(i.d * i.d) + (uint32_t)(i.q * i.q) < (uint32_t)config->quiet_q30 &&
+    return (uint32_t)fx_dot2(i, i) < (uint32_t)config->quiet_q30 &&
            (uint32_t)(sum_q27 >> 12) + sum_max < 2U * sum_max && v_dc >= config->v_min && v_dc <= config->v_max &&
            !state->counting;
 }

@@ -65,9 +65,11 @@ static bool turned(const torque_monitor_config_t *config, const torque_monitor_i
         return false; /* so slow that the inverter's own error hides the back-EMF */
     }
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
-    /* A winding twice as hot; a change of flux that was not the same all through the millisecond. */
-    const int32_t unsure = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current) +
-                           (fx_abs_q31(change.d) + fx_abs_q31(change.q)) / 2;
+    /* A winding twice as hot; noise in the change of flux, and all of a change that is no noise: it may have been over
+     * before the sample. */
+    const int32_t moved = fx_abs_q31(change.d) + fx_abs_q31(change.q);
+    const int32_t unsure = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current) + moved / 2 +
+                           fx_max_s32(moved - config->v_0, 0);
     const int32_t aside = magnet + (fx_mul_q15(speed, fx_abs_q15((q15_t)in->psi.q)) >> 3) + unsure;
     return fx_abs_q31(e_d) > aside || along > fx_mul_q15(PSI_STRONG, (q15_t)psi_f) + unsure ||
            along < -fx_mul_q15(PSI_WEAK, (q15_t)psi_f) - unsure;

@@ -8,7 +8,7 @@
  *           by as much
  *   angle   e = u - r i - j w psi(i): a magnet that is weak or strong shows in e_q, a wrong angle in e_d
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
- *           v = v_0/2 + r |i| + |d psi/dt|/2; blind while |w| psi_f/5 < v_0/2
+ *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; blind while |w| psi_f/5 < v_0/2
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
  * Source   docs/theory/monitors.md (MN-6) ... (MN-10)
  * Units    per unit

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/calibration.h"
+#include "hal/host/commissioned.h"
 #include "hal/host/instance.h"
 #include "hal/host/limits.h"
 #include "hal/host/learnt.h"
@@ -149,6 +150,9 @@ static void set_identification_reset(fluxtrue_t *d, double x)
     d->drive.request.identification_resets += (x != 0.0) ? 1U : 0U;
 }
 
+#define POINT_NAME(k) \
+    {"inverter_" #k "_A", commissioned_##k##_A, NULL, 0, 0}, {"inverter_" #k "_V", commissioned_##k##_V, NULL, 0, 0},
+
 /* The range of torque and current is the motor's own: see limits_of(). */
 static const parameter_t parameters[] = {
     {"torque_command_Nm", get_torque_command, set_torque, -INFINITY, INFINITY},
@@ -201,6 +205,12 @@ static const parameter_t parameters[] = {
     {"mrai_overruns", get_overruns, NULL, 0, 0},
     {"run_state", get_run_state, NULL, 0, 0},
     {"winding_C", get_winding, NULL, 0, 0},
+    {"commission", commissioned_phase, commissioned_start, 0.0, 1.0},
+    {"commission_failure", commissioned_failure, NULL, 0, 0},
+    {"commission_r_ohm", commissioned_r_ohm, NULL, 0, 0},
+    {"compensation_V", commissioned_level_V, NULL, 0, 0},
+    {"compensation_knee_A", commissioned_knee_A, NULL, 0, 0},
+    COMMISSIONED_POINTS(POINT_NAME)
     {"memory_recalled", get_memory_recalled, NULL, 0, 0},
     {"memory_saves", get_memory_saves, NULL, 0, 0},
 };

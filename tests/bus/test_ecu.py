@@ -135,7 +135,7 @@ def test_three_bad_of_ten_end_the_torque_and_are_a_latched_fault(running: Ecu) -
     assert running.get(TORQUE) == 0.0
     running.run(100)
     faults = running.last["INV_Faults"]
-    assert (faults["EcuFaults"], faults["FirstFault"], faults["DriveFaults"]) == (1, 33, 0)
+    assert (faults["EcuFaults"], faults["FirstFault"], faults["DriveFaults"]) == (1, "ecu_protection", 0)
     assert running.last["INV_DiagProtection"]["CrcErrors"] == 3
 
 
@@ -163,7 +163,7 @@ def test_a_trip_reaches_the_bus_as_safe_state_with_its_first_fault(running: Ecu)
     running.set("current_offset_A_a", 390.0)  # beyond the trip of 300 A
     running.run(200)
     assert running.state == "fault"  # so slow that the safe state has nothing to hold
-    assert running.last["INV_Faults"]["FirstFault"] == 1
+    assert running.last["INV_Faults"]["FirstFault"] == "over_current"
     assert int(running.last["INV_Faults"]["DriveFaults"]) & 1
     assert running.get("run_state") != 1.0
 

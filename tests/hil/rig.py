@@ -95,7 +95,7 @@ class Rig:
         self.listeners: list[Callable[[can.Message], None]] = []
         self.sent = 0
         self._heard = 0
-        self._now_s = 0.0
+        self._now_s = 1e-9 * stand.run(0.0, port, 0).now_ns if stand is not None else 0.0
         self.forget()
 
     def forget(self) -> None:

@@ -17,6 +17,7 @@ THEORY = Path("docs/theory")
 PAGES = {
     "AT": THEORY / "angle-tracker.md",
     "CC": THEORY / "current-control.md",
+    "CM": THEORY / "commissioning.md",
     "CR": THEORY / "current-reference.md",
     "FT": THEORY / "flux-tables.md",
     "FX": THEORY / "fixed-point.md",

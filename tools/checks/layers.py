@@ -29,7 +29,8 @@ class Layer:
 
 # The direction of the signal. A feedback arrow is a field one sample old, never an include.
 PIPELINE = (
-    "measure", "angle_tracker", "transform", "flux_table", "mrai", "identify", "torque_estimate",
+    "measure", "angle_harmonics", "angle_tracker", "transform", "flux_table", "mrai", "identify", "torque_estimate",
+    "commission",
     "torque_limit", "torque_loop", "voltage_reserve", "i_d_limit", "current_reference", "current_control", "modulate",
 )  # fmt: skip
 

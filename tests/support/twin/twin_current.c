@@ -10,8 +10,9 @@ static double integral(const motor_si_t *motor, double e, double cut)
     return motor->sigma_rad_s * motor->integral_ratio * realisable;
 }
 
-/* The circle: d first while it takes flux away, the direction of the whole while it asks for flux back. */
-static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux)
+/* The circle: d first while it takes flux away, the direction of the whole while it asks for flux back. What d is
+ * short of is taken off the q flux that binds it. */
+static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const double length = hypot(u.d, u.q);
     if (more_flux) {
@@ -20,7 +21,8 @@ static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux)
     }
     const double d = twin_clamp(u.d, -31.0 / 32.0 * u_max, 31.0 / 32.0 * u_max);
     const double room = sqrt(u_max * u_max - d * d);
-    return (twin_dq_t){d, twin_clamp(u.q, -room, room)};
+    const double shed = (omega < 0.0) ? d - u.d : u.d - d;
+    return (twin_dq_t){d, twin_clamp(u.q + shed, -room, room)};
 }
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
@@ -45,7 +47,7 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q +
                       in->omega * (f->psi_d + in->psi_delta);
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
-    const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0);
+    const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
     state->limited = (u.d != ud) || (u.q != uq);
     state->s.d += integral(motor, e.d, u.d - ud);
     state->s.q += integral(motor, e.q, u.q - uq);

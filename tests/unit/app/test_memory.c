@@ -194,3 +194,27 @@ void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(vo
     broken = false;
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_INTERVAL_MS));
 }
+
+void test_a_measured_compensation_is_kept_with_the_room_it_needs(void)
+{
+    const compensation_t measured = {drive.motor.modulate.dead_time + 1000, drive.motor.modulate.knee_q17 / 2, 1};
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_TRUE(memory.recalled);
+    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time + 1000, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT32(motor.modulate.knee_q17 / 2, drive.motor.modulate.knee_q17);
+    TEST_ASSERT_INT32_WITHIN(1, motor.modulate.knee_side_q17 / 2, drive.motor.modulate.knee_side_q17);
+    TEST_ASSERT_LESS_THAN_INT32(motor.current_control.clear_q32, drive.motor.current_control.clear_q32);
+    TEST_ASSERT_TRUE(motor_valid(&drive.motor)); /* (MO-11) among others */
+}
+
+void test_a_compensation_that_no_inverter_needs_is_refused(void)
+{
+    const motor_t before = drive.motor;
+    const compensation_t wrong[] = {{-1, 1000, 1}, {4097, 1000, 1}, {300, 0, 1}, {300, 1 << 30, 1}};
+    for (unsigned k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        TEST_ASSERT_FALSE(drive_compensate(&drive, &wrong[k]));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.motor, sizeof before);
+}

@@ -21,6 +21,7 @@ TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 
 TRACKER_BANDWIDTH_RAD_S = 300.0
 TRACKER_JUMP_TURNS = 1 / 16
+ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
 KNEE_LSB = 4
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
-from fluxtrue_tools.motor.derived import TASK_PERIODS
+from fluxtrue_tools.motor.derived import ANGLE_HARMONIC_MAX_TURNS, TASK_PERIODS
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
 
@@ -91,6 +91,11 @@ def _tracker(motor: Motor) -> list[Row]:
             ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
             ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
             ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn")]
+
+
+def _harmonics(motor: Motor) -> list[Row]:
+    turns = ANGLE_HARMONIC_MAX_TURNS / motor.config.machine.pole_pairs
+    return [("most", int(turns * 2**32), f"{360 * ANGLE_HARMONIC_MAX_TURNS:g} degrees electrical")]
 
 
 def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
@@ -287,6 +292,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
         ("psi_weak", q15(min(motor.derived.psi_weak_Vs / b.flux_Vs, 1.0 - 1.0 / Q15_ONE), "psi_weak"), ""),
         ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
+        ("angle_harmonics", _harmonics(motor), ""),
         ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),

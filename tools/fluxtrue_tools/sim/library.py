@@ -148,17 +148,23 @@ class Loop:
         """The value now; NaN for an unknown name."""
         return float(self._library.sim_get(self._sim, name.encode()))
 
+    def _firmware(self) -> int:
+        firmware = self._library.sim_firmware(self._sim)
+        if not firmware:
+            raise FluxtrueError("memory: this controller has none, only the firmware on this computer")
+        return int(firmware)
+
     def memory(self) -> bytes:
         """The firmware's flash as it would survive a power cycle now."""
         data = ctypes.create_string_buffer(MEMORY_SIZE)
-        code = self._library.fluxtrue_memory_read(self._library.sim_firmware(self._sim), data, MEMORY_SIZE)
+        code = self._library.fluxtrue_memory_read(self._firmware(), data, MEMORY_SIZE)
         if code != 0:
             raise LoopError("memory", None, code)
         return data.raw
 
     def remember(self, memory: bytes) -> None:
         """Start with the flash of another power cycle; before the first period only."""
-        code = self._library.fluxtrue_memory_write(self._library.sim_firmware(self._sim), memory, len(memory))
+        code = self._library.fluxtrue_memory_write(self._firmware(), memory, len(memory))
         if code != 0:
             raise LoopError("memory", None, code)
 

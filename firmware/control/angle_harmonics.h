@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CONTROL_ANGLE_HARMONICS_H
+#define CONTROL_ANGLE_HARMONICS_H
+/** What the angle sensor is wrong by once and twice per turn, learnt while the rotor turns by itself at speed.
+ *   d = theta[k] - 2 theta[k-1] + theta[k-2], theta corrected already: a rotor cannot change its speed like that
+ *   c_n += mu d cos(n theta[k-1]),  s_n += mu d sin(n theta[k-1]),  n = 1, 2;  mu = 1/64, |c|, |s| <= most
+ *   table[j] = sum of c_n cos(n t_j) + s_n sin(n t_j), t_j the middle of 64 equal parts of the turn
+ * The fast ISR adds table[theta >> 26] to what it reads.
+ * Source   docs/theory/angle-tracker.md (AT-10) ... (AT-13)
+ * Units    mechanical angles as fractions of a turn times 2^32
+ * Range    every angle; learns between 1/64 and 1/4 turn per step: 940 and 15 000 rpm
+ * Rounding 1 LSB in 2^-16 turn of the step, half up
+ * Errors   |d| beyond 1/16 of the step is a late sample or a broken sensor: not learnt from
+ * Context  1 kHz task; no division. table is read by the fast ISR word by word */
+#include <stdint.h>
+
+#define ANGLE_HARMONICS_PARTS 64
+#define ANGLE_HARMONICS_SHIFT 26
+
+typedef struct {
+    int32_t most; /* of each coefficient, below 2^24 */
+} angle_harmonics_config_t;
+
+typedef struct {
+    uint32_t last, before;
+    int32_t c_1, s_1, c_2, s_2;
+    uint8_t part; /* of the table, next to be renewed */
+} angle_harmonics_state_t;
+
+void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,
+                          volatile int32_t table[ANGLE_HARMONICS_PARTS]);
+
+#endif

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/commission.h"
+
+#include "control/transform.h"
+#include "fx/trig.h"
+
+#define SETTLE_MS 40U
+#define MEASURE_MS 64U
+#define PER_COUNT_Q16 3355443 /* 2^15/640 in Q16: a sum of 640 q15 counts to the mean in Q30 */
+#define CURRENT_TOLERANCE 256 /* q15, besides an eighth of the level */
+
+/* 2^(-6 + k/2) of the largest current. */
+static const q15_t level[COMMISSION_LEVELS] = {512, 724, 1024, 1448, 2048, 2896, 4096, 5793, 8192, 11585};
+
+static void stop(commission_state_t *state, commission_phase_t phase, commission_failure_t why)
+{
+    state->phase = phase;
+    state->failure = why;
+    state->i_ref = (dq_t){0, 0};
+}
+
+static void next_current(const commission_config_t *config, commission_state_t *state)
+{
+    const int32_t i = fx_mul_q15(config->i_max, level[state->index / 2U]);
+    state->i_ref = (dq_t){(state->index % 2U == 0U) ? i : -i, 0};
+    state->phase = COMMISSION_SETTLE;
+    state->ms = 0;
+    state->sum_i = 0;
+    state->sum_u = 0;
+}
+
+void commission_start(const commission_config_t *config, commission_state_t *state)
+{
+    *state = (commission_state_t){.phase = COMMISSION_SETTLE};
+    next_current(config, state);
+}
+
+/* Magnitudes of the phases' cosines, falling. */
+static void note_angle(commission_data_t *data, uint32_t theta)
+{
+    const ab_t x = inverse_park_q30((dq_t){Q15_MAX, 0}, fx_rotation(theta));
+    const int32_t a = x.alpha >> 15;
+    const int32_t side = fx_mulhi(x.beta, Q31(0.86602540378443865)) >> 14;
+    int32_t c[3] = {fx_abs_q31(a), fx_abs_q31(side - a / 2), fx_abs_q31(-side - a / 2)};
+    for (unsigned pass = 0; pass < 3U; pass++) {
+        const unsigned k = pass % 2U;
+        const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
+        c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);
+        c[k] = larger;
+    }
+    for (unsigned x_ = 0; x_ < 3U; x_++) {
+        data->cosine[x_] = fx_sat_q15(c[x_]);
+    }
+}
+
+static commission_failure_t judge(const commission_config_t *config, const commission_state_t *state,
+                                  const commission_in_t *in)
+{
+    const int32_t error_d = fx_abs_q31(in->sum_i.d / 10 - state->i_ref.d);
+    const int32_t error_q = fx_abs_q31(in->sum_i.q / 10);
+    const int32_t allowed = fx_abs_q31(state->i_ref.d) / 8 + CURRENT_TOLERANCE;
+    if (!in->acting) {
+        return COMMISSION_STOPPED;
+    }
+    if (fx_abs_q31(in->omega) > config->omega_max) {
+        return COMMISSION_MOVED;
+    }
+    if (state->phase != COMMISSION_MEASURE) {
+        return COMMISSION_GOOD; /* a step of current may take all the voltage for a moment */
+    }
+    if (in->limited) {
+        return COMMISSION_LIMITED;
+    }
+    return (error_d > allowed || error_q > allowed) ? COMMISSION_CURRENT : COMMISSION_GOOD;
+}
+
+static int32_t mean_q30(int32_t sum)
+{
+    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16);
+}
+
+/* Half of the first polarity, then minus half of the other: offsets of the sensors cancel (CM-1). */
+static void take(commission_state_t *state)
+{
+    const unsigned k = state->index / 2U;
+    const bool other = state->index % 2U != 0U;
+    const int32_t i = mean_q30(state->sum_i) / 2;
+    const int32_t u = mean_q30(state->sum_u) / 2;
+    state->data.i[k] = other ? fx_sub_q31(state->data.i[k], i) : i;
+    state->data.u[k] = other ? fx_sub_q31(state->data.u[k], u) : u;
+}
+
+static void measure(const commission_config_t *config, commission_state_t *state, const commission_in_t *in)
+{
+    state->sum_i += in->sum_i.d;
+    state->sum_u += in->sum_u.d;
+    if (state->ms < MEASURE_MS) {
+        return;
+    }
+    take(state);
+    state->index++;
+    if (state->index >= 2U * COMMISSION_LEVELS) {
+        note_angle(&state->data, in->theta);
+        stop(state, COMMISSION_DONE, COMMISSION_GOOD);
+    } else {
+        next_current(config, state);
+    }
+}
+
+void commission_step(const commission_config_t *config, commission_state_t *state, const commission_in_t *in)
+{
+    if (!commission_runs(state)) {
+        return;
+    }
+    const commission_failure_t failure = judge(config, state, in);
+    state->ms++;
+    if (failure != COMMISSION_GOOD) {
+        stop(state, COMMISSION_FAILED, failure);
+    } else if (state->phase == COMMISSION_MEASURE) {
+        measure(config, state, in);
+    } else if (state->ms >= SETTLE_MS) {
+        state->phase = COMMISSION_MEASURE;
+        state->ms = 0;
+    }
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "hal/host/commissioned.h"
+
+#include "hal/host/instance.h"
+
+#define ONE_Q30 1073741824.0
+
+double commissioned_phase(const fluxtrue_t *d)
+{
+    return (double)d->drive.task.commission.phase;
+}
+
+void commissioned_start(fluxtrue_t *d, double value)
+{
+    d->drive.request.commissionings += (value != 0.0) ? 1U : 0U;
+}
+
+double commissioned_failure(const fluxtrue_t *d)
+{
+    return (double)d->drive.task.commission.failure;
+}
+
+double commissioned_r_ohm(const fluxtrue_t *d)
+{
+    return (double)d->drive.task.inverter.r / ONE_Q30 * (double)d->drive.motor.bases.resistance_ohm;
+}
+
+/* In effect, at the dc voltage of now. */
+double commissioned_level_V(const fluxtrue_t *d)
+{
+    const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation & 1U].v_dc / 32768.0 *
+                          (double)d->drive.motor.bases.voltage_V;
+    return (double)d->drive.motor.modulate.dead_time / 32768.0 * v_dc_V;
+}
+
+double commissioned_knee_A(const fluxtrue_t *d)
+{
+    return 131072.0 / (double)d->drive.motor.modulate.knee_q17 * (double)d->drive.motor.bases.current_A;
+}
+
+#define DEFINITION(k) \
+    double commissioned_##k##_A(const fluxtrue_t *d) \
+    { \
+        return (double)d->drive.task.inverter.knot[k] / ONE_Q30 * (double)d->drive.motor.bases.current_A; \
+    } \
+    double commissioned_##k##_V(const fluxtrue_t *d) \
+    { \
+        return (double)d->drive.task.inverter.v[k] / ONE_Q30 * (double)d->drive.motor.bases.voltage_V; \
+    }
+
+COMMISSIONED_POINTS(DEFINITION)

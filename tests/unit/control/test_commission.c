@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/commission.h"
+
+#include <math.h>
+
+#include "twin/twin_commission.h"
+#include "unity.h"
+
+#define ONE 1073741824.0
+#define R 0.0133
+#define LEVEL 0.022
+#define OMEGA_MAX Q31(0.002)
+
+static const commission_config_t config = {Q15(0.6), OMEGA_MAX};
+static commission_state_t state;
+
+void setUp(void)
+{
+    commission_start(&config, &state);
+}
+
+void tearDown(void)
+{
+}
+
+static int32_t q30(double x)
+{
+    return (int32_t)lround(x * ONE);
+}
+
+/* A leg's error: an arc through zero that ends at the level. */
+static double smooth(double i, double zone)
+{
+    return LEVEL * tanh(i / zone);
+}
+
+/* What ten levels at an angle measure, by the definition of the dq voltage (2/3 of the phases' projections). */
+static commission_data_t measured(double theta, double zone, twin_curve_t *twin)
+{
+    commission_data_t data;
+    double c[3], i[COMMISSION_LEVELS], u[COMMISSION_LEVELS];
+    twin_cosines(theta, c);
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        i[k] = 0.6 * pow(2.0, -6.0 + 0.5 * k);
+        u[k] = R * i[k];
+        for (int x = 0; x < 3; x++) {
+            u[k] += c[x] * smooth(c[x] * i[k], zone) / 1.5;
+        }
+        data.i[k] = q30(i[k]);
+        data.u[k] = q30(u[k]);
+    }
+    for (int x = 0; x < 3; x++) {
+        data.cosine[x] = fx_sat_q15((int32_t)lround(c[x] * 32768.0));
+    }
+    *twin = twin_commission(i, u, c);
+    return data;
+}
+
+void test_resistance_and_a_constant_error_are_found_at_every_angle_of_the_rotor(void)
+{
+    for (double theta = 0.0; theta < 6.3; theta += 0.05) {
+        twin_curve_t twin;
+        commission_curve_t curve;
+        const commission_data_t data = measured(theta, 1e-6, &twin);
+        TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, R, curve.r / ONE);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, LEVEL, curve.level / ONE);
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-5, LEVEL, curve.v[k] / ONE);
+        }
+    }
+}
+
+/* A few 2^-15 of the cosines, times the level, and the division's 2^-31. */
+void test_a_smooth_curve_is_what_the_twin_finds(void)
+{
+    for (double theta = 0.0; theta < 6.3; theta += 0.05) {
+        twin_curve_t twin;
+        commission_curve_t curve;
+        const commission_data_t data = measured(theta, 0.02, &twin);
+        TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+        TEST_ASSERT_DOUBLE_WITHIN(2e-6, twin.r, curve.r / ONE);
+        TEST_ASSERT_DOUBLE_WITHIN(3e-6, twin.level, curve.level / ONE);
+        TEST_ASSERT_DOUBLE_WITHIN(2e-4, twin_knee(&twin), commission_knee(&curve) / ONE);
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(6e-6, twin.v[k], curve.v[k] / ONE);
+        }
+    }
+}
+
+/* The zone is half of the first knot. What lies below it counts as constant, which the first knots feel most. */
+void test_the_curve_is_the_legs_own_within_a_few_percent(void)
+{
+    for (double theta = 0.0; theta < 6.3; theta += 0.05) {
+        twin_curve_t twin;
+        commission_curve_t curve;
+        const commission_data_t data = measured(theta, 0.005, &twin);
+        TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(((k < 5) ? 0.06 : 0.02) * LEVEL, smooth(curve.knot[k] / ONE, 0.005),
+                                      curve.v[k] / ONE);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * LEVEL, LEVEL, curve.level / ONE);
+    }
+}
+
+/* By hand: a line to 0.0625 that passes 0.0125, 0.025, 0.05 and the constant after it. */
+void test_the_knee_of_a_straight_line_is_its_end(void)
+{
+    commission_curve_t curve = {.level = q30(LEVEL)};
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        const double i = 0.0125 * (k + 1.0);
+        curve.knot[k] = q30(i);
+        curve.v[k] = q30(LEVEL * fmin(i / 0.0625, 1.0));
+    }
+    /* Half a knot's step is missing, the constant up to the first one: 0.0125^2/0.0625 of area, twice half of it. */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0625 - 0.0125 * 0.0125 / 0.0625, commission_knee(&curve) / ONE);
+    curve.level = 0;
+    TEST_ASSERT_EQUAL_INT32(0, commission_knee(&curve));
+}
+
+void test_currents_that_do_not_rise_and_a_falling_voltage_do_not_fit(void)
+{
+    twin_curve_t twin;
+    commission_curve_t curve;
+    commission_data_t data = measured(0.3, 0.02, &twin);
+    data.i[4] = data.i[3];
+    TEST_ASSERT_FALSE(commission_fit(&data, &curve));
+    data = measured(0.3, 0.02, &twin);
+    data.i[0] = 0;
+    TEST_ASSERT_FALSE(commission_fit(&data, &curve));
+    data = measured(0.3, 0.02, &twin);
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        data.u[k] = -data.u[k];
+    }
+    TEST_ASSERT_FALSE(commission_fit(&data, &curve));
+}
+
+/* A machine at rest with offsets in both sensors; ten periods. */
+static commission_in_t answer(void)
+{
+    const double i = state.i_ref.d, sign = (state.i_ref.d > 0) ? 1.0 : -1.0;
+    const double u = R * (i - 40.0) + sign * 4.0 / 3.0 * LEVEL * 32768.0 + 25.0;
+    return (commission_in_t){.sum_i = {10 * state.i_ref.d, 0}, .sum_u = {(int32_t)lround(10.0 * u), 0}, .acting = true};
+}
+
+static int run(void)
+{
+    int ms = 0;
+    while (commission_runs(&state) && ms < 5000) {
+        const commission_in_t in = answer();
+        TEST_ASSERT_EQUAL_INT32(0, state.i_ref.q);
+        commission_step(&config, &state, &in);
+        ms++;
+    }
+    return ms;
+}
+
+void test_it_ends_after_two_seconds_with_no_current_and_offsets_cancelled(void)
+{
+    commission_curve_t curve;
+    TEST_ASSERT_EQUAL_INT(20 * (40 + 64), run());
+    TEST_ASSERT_EQUAL_INT(COMMISSION_DONE, state.phase);
+    TEST_ASSERT_EQUAL_INT32(0, state.i_ref.d);
+    TEST_ASSERT_TRUE(commission_fit(&state.data, &curve));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-4, R, curve.r / ONE); /* a tenth of a count of voltage in each level */
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, LEVEL, curve.level / ONE);
+}
+
+void test_the_levels_double_every_second_time_and_both_polarities_are_used(void)
+{
+    TEST_ASSERT_INT_WITHIN(1, lround(0.6 * 512.0), state.i_ref.d);
+    for (int k = 0; k < 104; k++) {
+        const commission_in_t in = answer();
+        commission_step(&config, &state, &in);
+    }
+    TEST_ASSERT_INT_WITHIN(1, -lround(0.6 * 512.0), state.i_ref.d);
+    for (int k = 0; k < 3 * 104; k++) {
+        const commission_in_t in = answer();
+        commission_step(&config, &state, &in);
+    }
+    TEST_ASSERT_INT_WITHIN(1, lround(0.6 * 1024.0), state.i_ref.d);
+}
+
+static commission_failure_t after(int ms, commission_in_t wrong)
+{
+    commission_start(&config, &state);
+    for (int k = 0; k < ms; k++) {
+        const commission_in_t in = answer();
+        commission_step(&config, &state, &in);
+    }
+    commission_step(&config, &state, &wrong);
+    TEST_ASSERT_EQUAL_INT32(0, state.i_ref.d);
+    TEST_ASSERT_FALSE(commission_runs(&state));
+    return state.failure;
+}
+
+void test_it_gives_up_when_the_rotor_moves_the_gates_open_the_voltage_is_cut_or_the_current_is_wrong(void)
+{
+    const commission_in_t good = answer();
+    commission_in_t in = good;
+    in.omega = -OMEGA_MAX - 1;
+    TEST_ASSERT_EQUAL_INT(COMMISSION_MOVED, after(10, in));
+    in = good;
+    in.acting = false;
+    TEST_ASSERT_EQUAL_INT(COMMISSION_STOPPED, after(10, in));
+    in = good;
+    in.limited = true;
+    TEST_ASSERT_EQUAL_INT(COMMISSION_LIMITED, after(50, in));
+    in = good;
+    in.sum_i.d = good.sum_i.d + 6000;
+    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, after(50, in));
+    in = good;
+    in.sum_i.q = -6000;
+    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, after(50, in));
+}
+
+void test_while_a_current_settles_the_voltage_may_be_cut(void)
+{
+    commission_in_t in = answer();
+    in.limited = true;
+    commission_step(&config, &state, &in);
+    TEST_ASSERT_TRUE(commission_runs(&state));
+}
