@@ -34,7 +34,7 @@ typedef struct {
     bool angle_jumped;
 } monitor_in_t;
 
-/** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to count.
+/** What most periods look like, for a fraction of the price: monitor_step() would find and count nothing.
  * |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
 static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, fx_pair_t i,
                                  int32_t sum_q27, int32_t v_dc)

@@ -30,6 +30,7 @@ void bench_flux_table(void);
 void bench_mrai(void);
 void bench_torque_estimate(void);
 void bench_current_tick(void);
+void bench_subset(void);
 
 static struct {
     adc_counts_t counts;
@@ -49,6 +50,13 @@ static struct {
     const current_target_t *target;
 } found;
 static int32_t outputs[OUTPUTS];
+/* A tick of the leanest peer's content: see bench_subset(). */
+typedef struct {
+    int32_t kp_q24, ki_q15, target_d, target_q;
+    int32_t s_d_q30, s_q_q30;
+    int32_t i_a, i_b;
+} subset_t;
+static subset_t subset = {.kp_q24 = 1 << 23, .ki_q15 = 800, .target_d = -1000, .target_q = 4000};
 
 void hal_adc_read(adc_counts_t *counts)
 {
@@ -98,6 +106,8 @@ CALLED void drive_request(int32_t torque, uint32_t enable)
 
 CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 {
+    subset.i_a = ((int32_t)(i_ab & 0xFFFFU) - 2048) * 16;
+    subset.i_b = ((int32_t)(i_ab >> 16) - 2048) * 16;
     port.counts =
         (adc_counts_t){(uint16_t)i_ab, (uint16_t)(i_ab >> 16), (uint16_t)i_c_v_dc, (uint16_t)(i_c_v_dc >> 16)};
     port.theta_m = theta_m;
@@ -209,4 +219,40 @@ STAGE void bench_current_tick(void)
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     port.duty = made.duty;
     port.limited = wanted.limited || made.limited;
+}
+
+/* What the leanest peer's tick runs, from currents in two phases and an angle to duties: sine and cosine, Clarke, Park,
+ * two PI with limited integrators and output, inverse Park, SVPWM. No scaling of counts, no tables, no decoupling, no
+ * circle, no dc voltage, no dead time. Voltages are in units of v_dc. */
+static inline int32_t pi(int32_t kp_q24, int32_t ki_q15, int32_t error, int32_t *s_q30)
+{
+    const int32_t u_q22 = fx_mulhi_add(64, kp_q24, error * 32768) + (*s_q30 >> 8);
+    *s_q30 = fx_sat_bits(*s_q30 + ki_q15 * error, 30);
+    return fx_sat_bits(u_q22 >> 7, 15); /* 1/2: inside the hexagon */
+}
+
+/* As modulate.c does it, without dead time. */
+static inline duty_t svpwm(int32_t alpha, int32_t beta)
+{
+    const int32_t side = fx_arch_opaque(beta * Q16(0.86602540378443865));
+    const int32_t a = alpha * 65536;
+    const int32_t b = side - alpha * 32768;
+    const int32_t c = b - 2 * side;
+    const int32_t hi = fx_max_s32(a, fx_max_s32(b, c));
+    const int32_t lo = fx_min_s32(a, fx_min_s32(b, c));
+    const uint32_t shift = 0x40008000U - (uint32_t)((hi >> 1) + (lo >> 1));
+    return (duty_t){((uint32_t)a + shift) >> 16, ((uint32_t)b + shift) >> 16, ((uint32_t)c + shift) >> 16};
+}
+
+STAGE void bench_subset(void)
+{
+    subset_t *c = &subset;
+    __asm__("" : "+r"(c));
+    const int32_t beta = ((c->i_a + 2 * c->i_b) * Q15(0.57735026918962576) + 0x4000) >> 15;
+    const fx_pair_t at = fx_rotation(port.theta_m);
+    const dq_t i = park((ab_t){c->i_a, beta}, at);
+    const int32_t u_d = pi(c->kp_q24, c->ki_q15, c->target_d - i.d, &c->s_d_q30);
+    const int32_t u_q = pi(c->kp_q24, c->ki_q15, c->target_q - i.q, &c->s_q_q30);
+    const ab_t v = inverse_park_q30((dq_t){u_d, u_q}, at);
+    port.duty = svpwm(v.alpha >> 15, v.beta >> 15);
 }
