@@ -38,7 +38,8 @@ angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_s
     const int32_t error = (int32_t)(theta_e - predicted);
     /* Turns in Q32 * Q29 = Q29, counted twice. */
     const int32_t omega_q30 = fx_add2_q31(omega_before, fx_mulhi(config->ki_q29, error));
-    const angle_t angle = result(config, theta_e, omega_q30, (uint32_t)error + config->max_step > 2U * config->max_step);
+    const bool jumped = (uint32_t)error + config->max_step > 2U * config->max_step;
+    const angle_t angle = result(config, theta_e, omega_q30, jumped);
     /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
     state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(config->kp, error);
     state->omega_q30 = omega_q30;

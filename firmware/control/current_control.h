@@ -20,7 +20,7 @@
  * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; v_ratio < 0.7; |s| <= 1
  * Rounding half up: 1/2 LSB q15 in u; s takes its step exactly
  * Errors   saturates and says so in limited; no fault of its own
- * Context  step: fast ISR, one square root and at most one division only while limited; target: 1 kHz task */
+ * Context  step: fast ISR, one root, or its inverse, only while limited; no division; target: 1 kHz task */
 #include <stdbool.h>
 
 #include "control/flux_table_types.h"

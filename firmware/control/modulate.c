@@ -1,20 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/modulate.h"
-
+#include "control/modulate_phases.h"
 #include "control/transform.h"
 #include "fx/q.h"
 
-#define DUTY_ONE 32768
 #define DUTY_HALF 16384
 /* One count below the full range, in Q30: the largest distance between two phases. */
 #define SPAN_MAX_Q30 (32766U << 15)
 #define HALF_MAX_Q31 (32766 << 15)
 /* Half a duty, and half an LSB to round it. */
 #define MIDDLE_Q31 0x40008000U
-
-typedef struct {
-    int32_t a, b, c;
-} phases_t;
 
 /* Q15 vector to Q30 phases; they sum to zero exactly, and |x| < 1.4, so that two differ by less than 2^32. */
 static phases_t phases_q30(int32_t alpha, int32_t beta)
@@ -38,19 +32,6 @@ static int32_t middle(phases_t x)
         return (x.b < x.c) ? x.b : fx_max_s32(x.a, x.c);
     }
     return (x.a < x.c) ? x.a : fx_max_s32(x.b, x.c);
-}
-
-/* Currents of the phases at the middle of the acting period, as polarity: Q15, 1.0 beyond the knee (MO-6). */
-static phases_t polarity(const modulate_config_t *config, fx_pair_t i, fx_pair_t at)
-{
-    const ab_t x = {fx_difference2(i, at), fx_dot2_cross(i, at)};
-    int32_t knee_q17 = config->knee_q17;
-    int32_t knee_side_q17 = config->knee_side_q17;
-    fx_arch_together(&knee_q17, &knee_side_q17);
-    const int32_t a = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
-    const int32_t side = fx_mulhi(knee_side_q17, x.beta);
-    const int32_t b = side - (a >> 1);
-    return (phases_t){fx_sat_q15_word(a), fx_sat_q15_word(b), fx_sat_q15_word(b - 2 * side)};
 }
 
 /* Min-max zero sequence: both ends equally far from the rails (MO-4). One rounding for the whole duty. */
@@ -206,22 +187,4 @@ modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_
     }
     const phases_t y = centred_q31(normalise(u, in->advanced, in->v_dc));
     return (modulate_out_t){plain(config, y, polarity(config, in->i, in->advanced)), false};
-}
-
-/* A phase that does not switch has no dead time: its compensation is not taken away again (MO-9). */
-static int32_t effective(const modulate_config_t *config, uint32_t duty, int32_t sign)
-{
-    const bool switches = duty != 0U && duty != DUTY_ONE;
-    return (int32_t)duty - (switches ? fx_mul_q15(config->dead_time, (q15_t)sign) : 0);
-}
-
-__attribute__((noinline)) dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
-{
-    const phases_t sign = polarity(config, in->i, in->advanced);
-    const int32_t a = effective(config, duty.a, sign.a);
-    const int32_t b = effective(config, duty.b, sign.b);
-    const int32_t c = effective(config, duty.c, sign.c);
-    /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
-    const ab_t v = {transform_round((2 * a - b - c) * 10923), transform_round((b - c) * 18919)};
-    return park((ab_t){transform_round(v.alpha * in->v_dc), transform_round(v.beta * in->v_dc)}, in->advanced);
 }

@@ -6,13 +6,13 @@
  *   c_x: dead-time compensation of phase x by its predicted current, a straight line inside +-i_knee, constant outside
  *   beyond the hexagon the vector is shortened, its direction kept; pulses shorter than min_pulse snap to the nearer
  *     of {0, min_pulse}.
- *   acted: the voltage that the limited duties make once the inverter has taken c_x away, in the frame it acts in.
+ *   modulate_acted(): what limited duties make once the inverter has taken c_x away, in the frame it acts in.
  * Source   docs/theory/modulation.md (MO-1) ... (MO-9)
  * Units    u per unit of V_b; duties with 2^15 = 1.0; dead_time = t_dead f_pwm in duty units times the compensated
  *          fraction
  * Range    v_dc >= v_dc_min (below it the minimum is used)
  * Rounding 1 LSB of duty (2^-15)
- * Errors   limited says that acted differs from the command by more than rounding
+ * Errors   limited says that what acts differs from the command by more than rounding
  * Context  fast ISR; one bounded hardware division, a second one beyond the hexagon only */
 #include <stdbool.h>
 #include <stdint.h>

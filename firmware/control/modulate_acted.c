@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/modulate_phases.h"
+#include "control/transform.h"
+
+/* A phase that does not switch has no dead time: its compensation is not taken away again (MO-9). */
+static int32_t effective(const modulate_config_t *config, uint32_t duty, int32_t sign)
+{
+    const bool switches = duty != 0U && duty != DUTY_ONE;
+    return (int32_t)duty - (switches ? fx_mul_q15(config->dead_time, (q15_t)sign) : 0);
+}
+
+__attribute__((noinline)) dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
+{
+    const phases_t sign = polarity(config, in->i, in->advanced);
+    const int32_t a = effective(config, duty.a, sign.a);
+    const int32_t b = effective(config, duty.b, sign.b);
+    const int32_t c = effective(config, duty.c, sign.c);
+    /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
+    const ab_t v = {transform_round((2 * a - b - c) * 10923), transform_round((b - c) * 18919)};
+    return park((ab_t){transform_round(v.alpha * in->v_dc), transform_round(v.beta * in->v_dc)}, in->advanced);
+}
