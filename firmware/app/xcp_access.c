@@ -27,6 +27,7 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, uint32_t seed)
 {
     for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(&drive->motor, (calibration_id_t)k);
+        access->put[k] = access->reference[k];
     }
     access->area = (xcp_area_t){&access->measurements, sizeof access->measurements};
     access->answer_waits = false;
@@ -48,8 +49,9 @@ static void apply(xcp_access_t *access, drive_t *drive)
     const float *page = xcp_active_page(&access->xcp, &config);
     for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
         const calibration_id_t id = (calibration_id_t)k;
-        if (page[k] != calibration_get(&drive->motor, id)) { /* the others keep every bit */
+        if (page[k] != access->put[k]) { /* the others keep every bit, and what the drive has measured itself */
             calibration_put(&drive->motor, id, page[k]);
+            access->put[k] = page[k];
         }
     }
     access->applied = access->xcp.generation;

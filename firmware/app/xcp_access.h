@@ -20,6 +20,7 @@ typedef struct {
     xcp_t xcp;
     float working[CALIBRATION_COUNT];
     float reference[CALIBRATION_COUNT]; /* the built-in values; written once at start-up */
+    float put[CALIBRATION_COUNT];       /* what the drive was given last */
     measurements_t measurements;
     xcp_area_t area;
     uint32_t applied; /* generation of the values that the drive runs on */
