@@ -17,8 +17,8 @@ static waves_t waves(uint32_t theta)
 {
     const fx_pair_t at = fx_rotation(theta);
     const fx_pair_t twice = fx_rotation(2U * theta);
-    return (waves_t){(int32_t)(at & 0xFFFFU) * 65536, (int32_t)(at >> 16) * 65536, (int32_t)(twice & 0xFFFFU) * 65536,
-                     (int32_t)(twice >> 16) * 65536};
+    return (waves_t){(int32_t)(at << 16), (int32_t)(at & 0xFFFF0000U), (int32_t)(twice << 16),
+                     (int32_t)(twice & 0xFFFF0000U)};
 }
 
 /* c + d wave/64: Q32 * Q31 = half of Q32 above 2^32. */
