@@ -51,7 +51,7 @@ def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[.
     yield start
     for process in running:
         process.terminate()
-        process.wait(20)
+        assert process.wait(20) == 0
 
 
 @pytest.fixture(scope="session")

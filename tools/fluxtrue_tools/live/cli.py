@@ -3,6 +3,7 @@
 
 import asyncio
 import contextlib
+import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -84,10 +85,11 @@ def _serve(session: Session, port: int) -> None:
         await runner.setup()
         await web.SockSite(runner, listener).start()
         click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await runner.cleanup()
+        stop = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):  # the torque is ramped out, the virtual ECU ended
+            asyncio.get_running_loop().add_signal_handler(number, stop.set)
+        await stop.wait()
+        await runner.cleanup()
 
     asyncio.run(_run())
 
@@ -112,7 +114,7 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
         raise FluxtrueError("--replay and --can-interface exclude each other")
     torque_max = load_config(locate(motor, Path.cwd())[1]).machine.torque_max_Nm
     machine = prepare(motor, build_dir)
-    with contextlib.ExitStack() as stack, contextlib.suppress(KeyboardInterrupt):
+    with contextlib.ExitStack() as stack:
         stand, frames, address = None, None, None
         if replay is not None:
             frames, title = load(replay), f"{replay.name} (replay)"

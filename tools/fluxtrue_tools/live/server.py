@@ -27,7 +27,8 @@ HOST: Final = "127.0.0.1"
 BATCH_S: Final = 0.04  # 25 per second
 SLOW_EVERY: Final = 5  # last values, with every fifth batch
 PAGE: Final = Path(__file__).parent / "static"
-POLICY: Final = "default-src 'self'; connect-src 'self'; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'"
+POLICY: Final = ("default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
+                 "frame-ancestors 'none'")  # fmt: skip
 
 
 @dataclass

@@ -96,9 +96,10 @@ function draw() {
     dirty = false;
     const times = rings.INV_Status.data[0];
     const newest = times.length ? times[times.length - 1] : 0;
+    const oldest = Math.max(newest - WINDOW_S, Math.min(times[0] ?? 0, newest - 1));
     charts.forEach(({ plot, data }) => plot.batch(() => {
       plot.setData(data(), false);
-      plot.setScale("x", { min: newest - WINDOW_S, max: newest });
+      plot.setScale("x", { min: oldest, max: newest });
     }));
     stats.draws++;
   }
