@@ -92,6 +92,7 @@ static void start(void)
 __attribute__((noinline)) int main(void)
 {
     drive_init(&the_drive, &motor);
+    script_no_machine(&the_drive.motor);
     start();
     while (done < SCRIPT_PERIODS) {
         __asm__ volatile("wfi" ::: "memory");

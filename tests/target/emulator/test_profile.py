@@ -49,8 +49,9 @@ def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_c
     assert all(cost == 3 * instructions for _, instructions, cost in stand.take())
     start(stand, 1, 1)
     stand.loop.run(50)
-    # A handler calls and returns: some instructions, and never all, are not followed by their neighbour.
-    assert all(instructions + 2 <= cost < 1.5 * instructions for _, instructions, cost in stand.take())
+    # A handler returns, and most call: some instructions, and never all, are not followed by their neighbour.
+    outside = [(name, count, cost) for name, count, cost in stand.take() if not count + 1 <= cost < 1.5 * count]
+    assert outside == []
 
 
 def test_what_is_taken_is_not_given_again(stand: image.Stand) -> None:

@@ -53,6 +53,7 @@ int16_t hal_temperature_inverter_dC(void)
 int main(void)
 {
     drive_init(&drive, &motor);
+    script_no_machine(&drive.motor);
     for (uint32_t k = 1; k <= SCRIPT_PERIODS; k++) {
         script_next(&script);
         fast_isr(&drive);

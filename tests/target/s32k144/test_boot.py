@@ -57,7 +57,7 @@ def test_a_damaged_table_keeps_the_pwm_from_starting_and_the_bus_alive(
     parts: build.Parts, elf: Path, tmp_path: Path
 ) -> None:
     sealed = image.Image(elf)
-    sealed.content[sealed.place(sealed.symbol("table_g_d") + 100, 1)] ^= 0x04
+    sealed.content[sealed.place(sealed.symbol("table_g") + 100, 1)] ^= 0x04
     damaged = tmp_path / "damaged.elf"
     damaged.write_bytes(sealed.content)
     with _core(parts, damaged) as core:

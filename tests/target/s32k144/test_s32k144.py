@@ -65,7 +65,7 @@ def test_configuration_and_tables_are_sealed(elf: Path) -> None:
     symbols = image.Image(elf).symbols
     start, end = symbols["protected_start"], symbols["protected_end"]
     assert start <= symbols["motor"] < symbols["cal_end"] <= end
-    assert symbols["cal_end"] <= symbols["table_g_d"] < end
+    assert symbols["cal_end"] <= symbols["table_g"] < end
     stored = struct.unpack("<I", _read(elf, symbols["protected_crc"], 4))[0]
     assert stored == zlib.crc32(_read(elf, start, end - start))
 
