@@ -21,7 +21,8 @@ LAYERS = ("fx", "signal", "control", "safety")
 DIVISIONS = {
     "div.c": 2,
     "current_control.c": 1,  # only beyond the voltage circle, while d asks for more flux
-    "modulate.c": 3,  # reciprocal of the measured dc voltage
+    "modulate.c": 5,  # reciprocal of the measured dc voltage, and what must be shortened
+    "e2e.c": 2,  # 1 kHz: the counter's turn
     "current_reference.c": 1,  # the rest runs at 1 kHz
     "mrai_schedule.c": 3,
     "identify_model.c": 2,  # 1 kHz: the direction of the current
