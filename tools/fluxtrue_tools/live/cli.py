@@ -14,6 +14,7 @@ import click
 from aiohttp import web
 
 from fluxtrue_tools.a2l.elf import read
+from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander
 from fluxtrue_tools.live.link import BusAddress, Link, Recorder
@@ -27,8 +28,6 @@ from fluxtrue_tools.sim.build import locate, prepare
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import VirtualEcu
 
-ROOT: Final = Path(__file__).resolve().parents[3]
-DBC: Final = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 DRIVE_FAULTS: Final = 1  # FirstFault of bit 0
 ECU_FAULTS: Final = 33
 

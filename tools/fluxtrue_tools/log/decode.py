@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from asammdf import MDF
 
+from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.errors import FluxtrueError
 
-DBC: Final = Path(__file__).resolve().parents[3] / "firmware" / "comm" / "fluxtrue.dbc"
 FRAMES: Final = "CAN_DataFrame"
 
 
