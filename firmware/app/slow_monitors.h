@@ -9,4 +9,12 @@
 
 uint32_t slow_monitors_step(drive_t *drive, const sample_t *sample);
 
+/** For rigs whose currents answer to no voltage: the monitors that ask for a machine stay blind. */
+static inline void slow_monitors_without_machine(motor_t *m)
+{
+    m->plausibility.e_0 = Q15_MAX;
+    m->plausibility.i_alive = Q15_MAX;
+    m->torque_monitor.v_0 = Q15_MAX;
+}
+
 #endif

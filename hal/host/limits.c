@@ -3,6 +3,7 @@
 
 #include <math.h>
 
+#include "app/slow_monitors.h"
 #include "hal/host/instance.h"
 
 static double torque_base(const fluxtrue_t *d)
@@ -82,8 +83,6 @@ void limits_set_machine_monitors(fluxtrue_t *drive, double value)
     m->plausibility = motor.plausibility;
     m->torque_monitor = motor.torque_monitor;
     if (value == 0.0) {
-        m->plausibility.e_0 = Q15_MAX;
-        m->plausibility.i_alive = Q15_MAX;
-        m->torque_monitor.v_0 = Q15_MAX;
+        slow_monitors_without_machine(m);
     }
 }

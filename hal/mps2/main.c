@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the
  * task. */
-#include "app/drive.h"
+#include "app/slow_monitors.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -92,7 +92,7 @@ static void start(void)
 __attribute__((noinline)) int main(void)
 {
     drive_init(&the_drive, &motor);
-    script_no_machine(&the_drive.motor);
+    slow_monitors_without_machine(&the_drive.motor);
     start();
     while (done < SCRIPT_PERIODS) {
         __asm__ volatile("wfi" ::: "memory");

@@ -39,13 +39,6 @@ adc_counts_t script_adc(const script_t *script)
     };
 }
 
-void script_no_machine(motor_t *m)
-{
-    m->plausibility.e_0 = Q15_MAX;
-    m->plausibility.i_alive = Q15_MAX;
-    m->torque_monitor.v_0 = Q15_MAX;
-}
-
 void script_request(const script_t *script, request_t *request)
 {
     static const int16_t level[4] = {4000, -9000, 13000, -2500};

@@ -26,8 +26,6 @@ typedef struct {
 
 void script_next(script_t *script);
 adc_counts_t script_adc(const script_t *script);
-/** The script's currents answer to no voltage: the monitors that ask for a machine stay blind. */
-void script_no_machine(motor_t *motor);
 void script_request(const script_t *script, request_t *request);
 void script_note(script_t *script, duty_t duty, bool gates);
 

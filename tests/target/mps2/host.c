@@ -2,7 +2,7 @@
 /* The script of hal/mps2 on this computer: the activities called in the order of their priorities. */
 #include <stdio.h>
 
-#include "app/drive.h"
+#include "app/slow_monitors.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -53,7 +53,7 @@ int16_t hal_temperature_inverter_dC(void)
 int main(void)
 {
     drive_init(&drive, &motor);
-    script_no_machine(&drive.motor);
+    slow_monitors_without_machine(&drive.motor);
     for (uint32_t k = 1; k <= SCRIPT_PERIODS; k++) {
         script_next(&script);
         fast_isr(&drive);
