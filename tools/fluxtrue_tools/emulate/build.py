@@ -66,9 +66,8 @@ def prepare(
                 ["cmake", "--build", str(host), "-j2", "--target", *targets], log, "building the emulation"
             )
     if elf is None:
-        with sim_build.build_lock():
-            preset = (FLASHED if flashed else PRESETS)[angle]
-            elf = image(preset, ROOT / "build" / "emulated" / preset)
+        preset = (FLASHED if flashed else PRESETS)[angle]
+        elf = image(preset, ROOT / "build" / "emulated" / preset)
     elif not elf.is_file():
         raise FluxtrueError(f"--elf {elf}: no such file")
     return Parts(built, elf.resolve(), host / "emulator" / "layout.bin")

@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.build import build_lock
 
 ROOT = Path(__file__).resolve().parents[3]
 ARM_CC = "arm-none-eabi-gcc"
@@ -17,8 +18,9 @@ def image(preset: str, folder: Path) -> Path:
     """Configure and build the preset in the folder (quick when nothing changed); its ELF file."""
     if shutil.which(ARM_CC) is None:
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
-    _run(["cmake", "--preset", preset, "-B", str(folder)], preset)
-    _run(["cmake", "--build", str(folder), "-j", "2"], preset)
+    with build_lock():
+        _run(["cmake", "--preset", preset, "-B", str(folder)], preset)
+        _run(["cmake", "--build", str(folder), "-j", "2"], preset)
     return folder / "fluxtrue.elf"
 
 
