@@ -81,18 +81,19 @@ static void begin(drive_t *drive, const commission_config_t *config)
     }
 }
 
-void drive_commission(drive_t *drive, const sample_t *sample)
+void drive_commission(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
+    const sample_t *sample = &view->sample;
+    const identify_window_t *window = &view->window;
     const commission_config_t config = {drive->motor.current_reference.i_max, STANDSTILL};
-    const identify_window_t window = window_box_read(&drive->windows);
     const commission_in_t in = {
-        .sum_i = window.sum_i,
-        .sum_u = window.sum_u,
+        .sum_i = window->sum_i,
+        .sum_u = window->sum_u,
         .theta = sample->theta_e,
         .omega = sample->mrai.omega,
-        .acting = window.acting && sample->acting && task->run_state == RUN_STATE_RUN,
-        .limited = window.limited != 0U,
+        .acting = window->acting && sample->acting && task->run_state == RUN_STATE_RUN,
+        .limited = window->limited != 0U,
     };
     if (drive->request.commissionings != task->commissionings) {
         begin(drive, &config);

@@ -118,6 +118,17 @@ typedef struct {
     uint32_t identification_resets; /* of the request, as far as the quality is concerned */
 } task_state_t;
 
+/** What the 1 kHz task has seen of the priorities above it and of the port: one moment, for all of its step. */
+typedef struct {
+    sample_t sample;
+    identify_window_t window;
+    mrai_state_t mrai;
+    q15_t psi_delta;
+    q15_t torque; /* the paper's estimate, mean */
+    uint32_t faults;
+    int16_t inverter_dC, winding_dC;
+} view_t;
+
 typedef struct {
     motor_t motor; /* a copy in RAM: calibration changes it, the flash original never */
     request_t request;
@@ -144,11 +155,11 @@ identify_memory_t drive_learnt(const drive_t *drive);
 /** After drive_init(), before the first task; false: the record is refused, nothing changed. */
 bool drive_recall(drive_t *drive, const identify_memory_t *memory);
 
-/** The identification's share of the 1 kHz task; sample is the latest, mrai the task's one copy of what may change. */
-void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai);
+/** The identification's share of the 1 kHz task. */
+void drive_identify(drive_t *drive, const view_t *view);
 
 /** The commissioning's share of the 1 kHz task. */
-void drive_commission(drive_t *drive, const sample_t *sample);
+void drive_commission(drive_t *drive, const view_t *view);
 /** Takes a compensation over; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 /** Current references come from outside the torque path. */

@@ -4,8 +4,8 @@
 /** The boxes through which priorities exchange data; each has one writer.
  *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
  *   Upwards (task to the ISRs) the reader cannot be interrupted by its writer: one read is enough.
- *   Downwards (fast ISR to MRAI ISR and task) the reader may be: the task reads again if two writes came in between;
- *   the MRAI ISR says when it has finished, and until then only the other slot is written.
+ *   Downwards (fast ISR to MRAI ISR and task) the reader may be: the task copies all it needs at once, and again if a
+ *   period came in between; the MRAI ISR says when it has finished, and until then only the other slot is written.
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Errors   none
  * Context  stated per box */
@@ -123,17 +123,10 @@ static inline void window_box_write(window_box_t *box, const identify_window_t *
     box->generation = box->generation + 1U;
 }
 
-static inline identify_window_t window_box_read(const window_box_t *box)
+/* In place: the 1 kHz task copies it together with the sample, and again if a period has come in between. */
+static inline const identify_window_t *window_box_look(const window_box_t *box)
 {
-    identify_window_t copy;
-    uint32_t seen;
-    do {
-        seen = box->generation;
-        exchange_barrier();
-        copy = box->slot[seen & 1U];
-        exchange_barrier();
-    } while (box->generation - seen > 1U);
-    return copy;
+    return &box->slot[box->generation & 1U];
 }
 
 static inline void command_box_write(command_box_t *box, command_t command)

@@ -30,40 +30,39 @@ static void report_robust(drive_t *drive)
 }
 
 /* Ten periods from the MRAI ISR, the tables at their magnetising current, and what follows from both. */
-static void robust(drive_t *drive, const sample_t *sample)
+static void robust(drive_t *drive, const view_t *view)
 {
     const motor_t *m = &drive->motor;
     task_state_t *task = &drive->task;
-    const int16_t winding_dC = hal_temperature_winding_dC();
-    const identify_window_t window = window_box_read(&drive->windows);
-    const identify_point_t point = identify_point(&m->identify, &window, sample->mrai.omega);
+    const identify_point_t point = identify_point(&m->identify, &view->window, view->sample.mrai.omega);
     const identify_tables_t tables = {flux_table_step(&m->flux_table, point.i_m),
                                       flux_table_inductances(&m->flux_table, point.i_m)};
     const identify_in_t in = {
         .point = &point,
         .tables = &tables,
-        .temperature_known = winding_dC != HAL_TEMPERATURE_UNKNOWN,
-        .winding_dC = winding_dC,
-        .enabled = drive->request.identification && sample->acting,
+        .temperature_known = view->winding_dC != HAL_TEMPERATURE_UNKNOWN,
+        .winding_dC = view->winding_dC,
+        .enabled = drive->request.identification && view->sample.acting,
     };
     task->identified = identify_step(&m->identify, &task->identify, &in);
     task->identifications = task->identifications + 1U;
     report_robust(drive);
 }
 
-static void report_paper(drive_t *drive, const mrai_state_t *mrai)
+static void report_paper(drive_t *drive, const view_t *view)
 {
-    drive->task.torque_estimate = drive->slow.torque.mean;
+    const mrai_state_t *mrai = &view->mrai;
+    drive->task.torque_estimate = view->torque;
     drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai_flux_clamped(&drive->motor.mrai, mrai),
                                     mrai_resistance_clamped(&drive->motor.mrai, mrai)};
 }
 
-void drive_identify(drive_t *drive, const sample_t *sample, const mrai_state_t *mrai)
+void drive_identify(drive_t *drive, const view_t *view)
 {
     if (drive->request.identification_mode == IDENTIFICATION_ROBUST) {
-        robust(drive, sample);
+        robust(drive, view);
     } else {
-        report_paper(drive, mrai);
+        report_paper(drive, view);
     }
 }
 

@@ -2,7 +2,6 @@
 #include "app/slow_monitors.h"
 
 #include "control/transform.h"
-#include "hal/temperature.h"
 
 static abc_t in_phases(dq_t i, uint32_t theta_e)
 {
@@ -12,8 +11,9 @@ static abc_t in_phases(dq_t i, uint32_t theta_e)
     return (abc_t){alpha, side - alpha / 2, -side - alpha / 2};
 }
 
-static uint32_t currents(drive_t *drive, const sample_t *sample)
+static uint32_t currents(drive_t *drive, const view_t *view)
 {
+    const sample_t *sample = &view->sample;
     task_state_t *task = &drive->task;
     const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     const plausibility_in_t in = {
@@ -24,8 +24,8 @@ static uint32_t currents(drive_t *drive, const sample_t *sample)
         .phases = measure_phases(measured.i, measured.sum_q27),
         .wanted = in_phases(task->i_ref, sample->theta_e),
         .omega = fx_q15_from_q31(sample->mrai.omega),
-        .inverter_dC = hal_temperature_inverter_dC(),
-        .winding_dC = hal_temperature_winding_dC(),
+        .inverter_dC = view->inverter_dC,
+        .winding_dC = view->winding_dC,
     };
     return plausibility_step(&drive->motor.plausibility, &task->plausibility, &in);
 }
@@ -44,7 +44,7 @@ static uint32_t torque(drive_t *drive, const sample_t *sample)
     return torque_monitor_step(&drive->motor.torque_monitor, &task->torque_monitor, &in);
 }
 
-uint32_t slow_monitors_step(drive_t *drive, const sample_t *sample)
+uint32_t slow_monitors_step(drive_t *drive, const view_t *view)
 {
-    return currents(drive, sample) | torque(drive, sample);
+    return currents(drive, view) | torque(drive, &view->sample);
 }

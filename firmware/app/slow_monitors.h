@@ -7,7 +7,7 @@
  * Context  1 kHz task, before this step's references */
 #include "app/drive.h"
 
-uint32_t slow_monitors_step(drive_t *drive, const sample_t *sample);
+uint32_t slow_monitors_step(drive_t *drive, const view_t *view);
 
 /** For rigs whose currents answer to no voltage: the monitors that ask for a machine stay blind. */
 static inline void slow_monitors_without_machine(motor_t *m)

@@ -6,14 +6,14 @@
 #include "signal/rate_limit.h"
 
 /* Gates that never closed stay open: the bridge may not even be powered. */
-static safe_t safe_state(drive_t *drive, const sample_t *sample)
+static safe_t safe_state(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
-    const uint32_t faults = drive->fast.faults;
+    const uint32_t faults = view->faults;
     const safe_state_in_t in = {
-        .omega = fx_q15_from_q31(sample->mrai.omega),
-        .psi_delta = drive_psi_delta(drive),
-        .v_dc = (q15_t)sample->v_dc,
+        .omega = fx_q15_from_q31(view->sample.mrai.omega),
+        .psi_delta = view->psi_delta,
+        .v_dc = (q15_t)view->sample.v_dc,
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
@@ -28,7 +28,7 @@ static safe_t safe_state(drive_t *drive, const sample_t *sample)
     return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
 }
 
-static run_state_t supervise(drive_t *drive)
+static run_state_t supervise(drive_t *drive, uint32_t faults)
 {
     const request_t *request = &drive->request;
     task_state_t *task = &drive->task;
@@ -41,23 +41,23 @@ static run_state_t supervise(drive_t *drive)
         task->quality = (mrai_quality_t){0};
         identify_reset(&drive->motor.identify, &task->identify);
     }
-    if (drive->fast.faults != 0) {
+    if (faults != 0U) {
         return RUN_STATE_FAULT;
     }
     return request->enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* What the voltage of this millisecond says about the plan of the last one. */
-static voltage_reserve_t reserve(drive_t *drive, const sample_t *sample)
+static voltage_reserve_t reserve(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
     const voltage_reserve_in_t in = {
-        .u = sample->mrai.u,
-        .v_dc = (q15_t)sample->v_dc,
+        .u = view->sample.mrai.u,
+        .v_dc = (q15_t)view->sample.v_dc,
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
-        .psi_delta = drive_psi_delta(drive),
-        .acting = sample->acting && !drive_is_direct(drive),
+        .psi_delta = view->psi_delta,
+        .acting = view->sample.acting && !drive_is_direct(drive),
     };
     return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
 }
@@ -71,20 +71,20 @@ static q15_t slew_of(const drive_t *drive)
     return weak ? (q15_t)fx_min_s32(m->torque_slew, m->torque_slew_weak) : m->torque_slew;
 }
 
-static q15_t allowed(drive_t *drive, const sample_t *sample)
+static q15_t allowed(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
     const torque_limit_in_t in = {
         .wanted = drive->request.torque,
         .limits = &drive->request.limits,
-        .u = sample->mrai.u,
-        .i = sample->mrai.i,
+        .u = view->sample.mrai.u,
+        .i = view->sample.mrai.i,
         .torque = task->torque_estimate,
-        .omega = fx_q15_from_q31(sample->mrai.omega),
-        .v_dc = (q15_t)sample->v_dc,
+        .omega = fx_q15_from_q31(view->sample.mrai.omega),
+        .v_dc = (q15_t)view->sample.v_dc,
         .reach = task->reference.torque_max,
-        .inverter_dC = hal_temperature_inverter_dC(),
-        .winding_dC = hal_temperature_winding_dC(),
+        .inverter_dC = view->inverter_dC,
+        .winding_dC = view->winding_dC,
     };
     task->allowed = torque_limit_step(&drive->motor.torque_limit, &task->torque_limit, &in);
     const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
@@ -94,11 +94,11 @@ static q15_t allowed(drive_t *drive, const sample_t *sample)
 
 /* Request -> limits -> slew -> torque loop -> what the current reference is asked for. A limit that closes is not
  * slewed: what is no longer allowed or possible is not asked for. */
-static q15_t torque_path(drive_t *drive, const sample_t *sample)
+static q15_t torque_path(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
     const motor_t *m = &drive->motor;
-    const q15_t wanted = allowed(drive, sample);
+    const q15_t wanted = allowed(drive, view);
 
     task->torque_command = rate_limit_step(task->torque_command, wanted, slew_of(drive));
     const torque_loop_in_t loop = {
@@ -107,25 +107,25 @@ static q15_t torque_path(drive_t *drive, const sample_t *sample)
         .confidence = (drive->request.identification_mode == IDENTIFICATION_ROBUST) ? task->identify.confidence
                                                                                      : Q15_MAX,
         .enabled = drive->request.torque_loop && !drive_is_direct(drive),
-        .limited = task->reference.limited || sample->voltage_limited,
+        .limited = task->reference.limited || view->sample.voltage_limited,
     };
     return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
 }
 
-static dq_t references(drive_t *drive, const sample_t *sample)
+static dq_t references(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
-    task->torque_request = torque_path(drive, sample);
-    const voltage_reserve_t trim = reserve(drive, sample);
+    task->torque_request = torque_path(drive, view);
+    const voltage_reserve_t trim = reserve(drive, view);
     const current_reference_in_t in = {
         .torque = task->torque_request,
-        .v_dc = (q15_t)sample->v_dc,
-        .omega = fx_q15_from_q31(sample->mrai.omega),
+        .v_dc = (q15_t)view->sample.v_dc,
+        .omega = fx_q15_from_q31(view->sample.mrai.omega),
         .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
         .v_trim = trim.v_trim,
         .shift = trim.shift,
-        .psi_delta = drive_psi_delta(drive),
-        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, drive_psi_delta(drive), hal_temperature_winding_dC()),
+        .psi_delta = view->psi_delta,
+        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, view->psi_delta, view->winding_dC),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     if (commission_runs(&task->commission)) {
@@ -147,7 +147,7 @@ static void rest(drive_t *drive)
 }
 
 /* What the fast ISR is to do until the next step; next becomes the operating point just commanded. */
-static void order(drive_t *drive, const sample_t *sample, uint32_t found, mrai_in_t *next)
+static void order(drive_t *drive, const view_t *view, uint32_t found, mrai_in_t *next)
 {
     task_state_t *task = &drive->task;
     command_t command = {
@@ -156,7 +156,7 @@ static void order(drive_t *drive, const sample_t *sample, uint32_t found, mrai_i
         .fault_resets = task->fault_resets,
     };
     if (command.run) {
-        next->i = references(drive, sample);
+        next->i = references(drive, view);
         next->flux = flux_table_step(&drive->motor.flux_table, next->i);
         task->i_ref = next->i;
         task->psi_ref = (dq_t){next->flux.psi_d, next->flux.psi_q};
@@ -164,34 +164,53 @@ static void order(drive_t *drive, const sample_t *sample, uint32_t found, mrai_i
     } else {
         rest(drive);
     }
-    command.safe = safe_state(drive, sample);
+    command.safe = safe_state(drive, view);
     command_box_write(&drive->commands, command);
+}
+
+/* All from between the same two periods: taken again if one has come in between, which the copying is too short for to
+ * happen twice. What the identification writes later in the step, its answer to this one included, waits for the
+ * next. */
+static void look(const drive_t *drive, view_t *view)
+{
+    uint32_t seen;
+    do {
+        seen = drive->fast.pended;
+        exchange_barrier();
+        view->sample = *sample_box_look(&drive->samples);
+        view->window = *window_box_look(&drive->windows);
+        view->mrai = drive->slow.mrai;
+        view->psi_delta = drive_psi_delta(drive);
+        view->torque = drive->slow.torque.mean;
+        view->faults = drive->fast.faults;
+        exchange_barrier();
+    } while (drive->fast.pended != seen);
+    view->inverter_dC = hal_temperature_inverter_dC();
+    view->winding_dC = hal_temperature_winding_dC();
 }
 
 void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
-    const sample_t sample = sample_box_read(&drive->samples);
-    /* Read once: the identification may interrupt, and its drift must be counted to the end. */
-    const mrai_state_t identified = drive->slow.mrai;
-    exchange_barrier();
-    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, sample.theta_m,
+    view_t view;
+    look(drive, &view);
+    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, view.sample.theta_m,
                          task->angle_correction);
-    const uint32_t found = slow_monitors_step(drive, &sample);
-    task->run_state = supervise(drive);
-    drive_identify(drive, &sample, &identified);
-    drive_commission(drive, &sample);
+    const uint32_t found = slow_monitors_step(drive, &view);
+    task->run_state = supervise(drive, view.faults);
+    drive_identify(drive, &view);
+    drive_commission(drive, &view);
 
-    mrai_in_t next = sample.mrai;
-    order(drive, &sample, found, &next);
+    mrai_in_t next = view.sample.mrai;
+    order(drive, &view, found, &next);
     if (drive->request.identification_mode != IDENTIFICATION_PAPER) {
         return;
     }
     const mrai_schedule_in_t schedule = {
-        .sample = &sample.mrai,
+        .sample = &view.sample.mrai,
         .next = &next,
-        .identifier = &identified,
-        .enabled = drive->request.identification && sample.acting,
+        .identifier = &view.mrai,
+        .enabled = drive->request.identification && view.sample.acting,
     };
     schedule_box_write(&drive->schedules, mrai_schedule_step(&drive->motor.mrai, &task->quality, &schedule));
 }

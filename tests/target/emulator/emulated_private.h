@@ -16,8 +16,7 @@ typedef struct {
     bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
     drive_t task_result;       /* of the shadow's task, while the image is still at it */
-    drive_t task_before;       /* what it started from */
-    bool task_runs, task_late;
+    bool task_runs;
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;

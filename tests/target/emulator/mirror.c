@@ -129,15 +129,19 @@ drive_t drive_plain(const drive_t *drive)
     return copy;
 }
 
-const char *mirror_differs(mirror_t *mirror, const fluxtrue_t *other)
+bool mirror_differs(mirror_t *mirror, const fluxtrue_t *other, char *where, size_t size)
 {
     mirror_pull(mirror);
     const drive_t there = drive_plain(&mirror->host->drive), here_ = drive_plain(&other->drive);
     for (int i = mirror->inputs; i < mirror->parts; i++) {
         const mirror_part_t *part = &mirror->part[i];
-        if (memcmp((const uint8_t *)&there + part->here, (const uint8_t *)&here_ + part->here, part->size) != 0) {
-            return part->name;
+        const uint8_t *a = (const uint8_t *)&there + part->here, *b = (const uint8_t *)&here_ + part->here;
+        for (size_t at = 0; at < part->size; at++) {
+            if (a[at] != b[at]) {
+                (void)snprintf(where, size, "%s + %zu (0x%02x instead of 0x%02x)", part->name, at, a[at], b[at]);
+                return true;
+            }
         }
     }
-    return NULL;
+    return false;
 }

@@ -39,7 +39,7 @@ int mirror_set(mirror_t *mirror, const char *name, double value);
 /** True when something has been written into the image's memory. */
 bool mirror_push(mirror_t *mirror);
 double mirror_get(mirror_t *mirror, const char *name);
-/** Name of the first part that differs from another drive; NULL: none. */
-const char *mirror_differs(mirror_t *mirror, const fluxtrue_t *other);
+/** True when the image's state differs from another drive's; where: the first byte, as part, offset and both values. */
+bool mirror_differs(mirror_t *mirror, const fluxtrue_t *other, char *where, size_t size);
 
 #endif

@@ -50,42 +50,21 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
 }
 
-/* The task is computed as a whole when it begins; what it writes reaches the shadow as the image writes it: at its end,
- * or, when it is interrupted, byte by byte as far as the image's memory already has the new values. */
+/* The task looks at everything as it begins, a quarter period away from the next interrupt, and so is computed as a whole
+ * then; what it writes reaches the shadow as the image writes it: at its end, or, when it is interrupted, byte by byte
+ * as far as the image's memory already has the new values. */
 static void task_begins(emulated_t *e)
 {
-    e->task_before = e->shadow->drive;
+    const drive_t before = e->shadow->drive;
     temperatures_take(e, e->shadow);
     task_1khz(&e->shadow->drive);
     e->task_result = e->shadow->drive;
-    e->shadow->drive = e->task_before;
+    e->shadow->drive = before;
     e->task_runs = true;
-    e->task_late = false;
-}
-
-/* What came while the task was interrupted may have been read late: each box as a whole, the old or the new one. */
-static void task_again(emulated_t *e)
-{
-    const drive_t now = e->shadow->drive;
-    for (int choice = 1; choice < 4; choice++) {
-        e->shadow->drive = e->task_before;
-        e->shadow->drive.samples = (choice & 1) != 0 ? now.samples : e->task_before.samples;
-        e->shadow->drive.windows = (choice & 2) != 0 ? now.windows : e->task_before.windows;
-        task_1khz(&e->shadow->drive);
-        if (memcmp(&e->shadow->drive.commands, &e->mirror.host->drive.commands, sizeof now.commands) == 0 &&
-            e->shadow->drive.task.identified.psi_delta == e->mirror.host->drive.task.identified.psi_delta) {
-            e->task_result = e->shadow->drive;
-        }
-    }
-    e->shadow->drive = now;
 }
 
 static void task_ends(emulated_t *e)
 {
-    mirror_pull(&e->mirror);
-    if (e->task_late && e->task_result.task.identified.psi_delta != e->mirror.host->drive.task.identified.psi_delta) {
-        task_again(e);
-    }
     e->shadow->drive.task = e->task_result.task;
     e->shadow->drive.commands = e->task_result.commands;
     e->shadow->drive.schedules = e->task_result.schedules;
@@ -104,7 +83,6 @@ static void part_take(emulated_t *e, size_t offset, size_t size)
 
 static void task_interrupted(emulated_t *e)
 {
-    e->task_late = true;
     mirror_pull(&e->mirror);
     part_take(e, offsetof(drive_t, task), sizeof e->task_result.task);
     part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
@@ -179,10 +157,15 @@ void shadow_compare(emulated_t *e)
     if (emu_active_vector(e->emu) != 0) {
         return; /* in the middle of something: the next period will do */
     }
-    const char *part = mirror_differs(&e->mirror, e->shadow);
-    part = part != NULL ? part : bridge_differs(e);
+    char where[64];
+    bool differs = mirror_differs(&e->mirror, e->shadow, where, sizeof where);
+    const char *outputs = bridge_differs(e);
+    if (!differs && outputs != NULL) {
+        (void)snprintf(where, sizeof where, "%s", outputs);
+        differs = true;
+    }
     e->compared++;
-    if (part != NULL && e->differing++ == 0) {
-        (void)snprintf(e->difference, sizeof e->difference, "%s, period %llu", part, (unsigned long long)e->steps);
+    if (differs && e->differing++ == 0) {
+        (void)snprintf(e->difference, sizeof e->difference, "%s, period %llu", where, (unsigned long long)e->steps);
     }
 }

@@ -52,7 +52,7 @@ void test_robust_is_the_default_and_ten_periods_make_a_window(void)
         TEST_ASSERT_EQUAL_UINT32(k / 10U, drive.windows.generation);
         period(k);
     }
-    const identify_window_t window = window_box_read(&drive.windows);
+    const identify_window_t window = *window_box_look(&drive.windows);
     TEST_ASSERT_EQUAL_INT(-30000, window.sum_i.d);
     TEST_ASSERT_EQUAL_INT(50000, window.sum_i.q);
     TEST_ASSERT_TRUE(window.acting);
@@ -124,6 +124,6 @@ void test_the_window_box_survives_the_wrap_of_its_generation(void)
     for (int n = 0; n < 4; n++) {
         const identify_window_t window = {.count = (uint8_t)n};
         window_box_write(&drive.windows, &window);
-        TEST_ASSERT_EQUAL_INT(n, window_box_read(&drive.windows).count);
+        TEST_ASSERT_EQUAL_INT(n, window_box_look(&drive.windows)->count);
     }
 }
