@@ -7,7 +7,7 @@
 
 emu_pins_t *emu_pins(emu_t *emu)
 {
-    emu->s.pins_set_at = emu->s.now;
+    emu->s.pins_set_at = emu->s.ftm[0].triggers_due ? emu->s.ftm[0].start : emu->s.now; /* the period's begin */
     return &emu->s.pins;
 }
 
@@ -40,7 +40,7 @@ bool emu_gate_driver(const emu_t *emu)
 /* The shaft turns on between two settings. */
 uint32_t emu_angle(const emu_t *emu)
 {
-    const int64_t passed = (int64_t)(emu->s.now - emu->s.pins_set_at);
+    const int64_t passed = (int64_t)(emu_instant(emu) - emu->s.pins_set_at);
     return emu->s.pins.angle + (uint32_t)((passed * emu->s.pins.angle_rate) / 65536);
 }
 

@@ -62,7 +62,7 @@ static void start(emu_t *emu, const peripheral_t *self, int channel)
         return;
     }
     a->current = channel + 1;
-    a->done = emu->s.now + conversion_ticks(emu, self);
+    a->done = emu_instant(emu) + conversion_ticks(emu, self);
     emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
 }
 

@@ -177,7 +177,7 @@ static void send_next(emu_t *emu)
     const can_port_frame_t frame = frame_in(emu, box);
     const uint32_t overhead = frame.extended ? EXTENDED_OVERHEAD_BITS : FRAME_OVERHEAD_BITS;
     c->sending = box + 1;
-    emu_timer(emu, TIMER_CAN, emu->s.now + bit_ticks(emu) * (overhead + 8U * frame.length));
+    emu_timer(emu, TIMER_CAN, emu_instant(emu) + bit_ticks(emu) * (overhead + 8U * frame.length));
 }
 
 void can_fire(emu_t *emu)

@@ -66,7 +66,21 @@ void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle)
     emu->s.core_ticks = ticks_per_cycle;
 }
 
-static void timers_fire(emu_t *emu)
+uint64_t emu_instant(const emu_t *emu)
+{
+    return emu->s.event != NEVER ? emu->s.event : emu->s.now;
+}
+
+static int timer_next(const emu_t *emu)
+{
+    int next = 0;
+    for (int i = 1; i < TIMERS; i++) {
+        next = emu->s.due[i] < emu->s.due[next] ? i : next;
+    }
+    return next;
+}
+
+static void timer_fire(emu_t *emu)
 {
     static void (*const fire[TIMERS])(emu_t *, int) = {
         [TIMER_FTM0] = ftm_fire, [TIMER_FTM2] = ftm_fire, [TIMER_PDB0] = pdb_fire,   [TIMER_PDB1] = pdb_fire,
@@ -75,19 +89,26 @@ static void timers_fire(emu_t *emu)
     };
     static const uint8_t instance[TIMERS] = {[TIMER_FTM2] = 1, [TIMER_PDB1] = 1, [TIMER_ADC1] = 1,
                                              [TIMER_LPIT1] = 1, [TIMER_LPIT2] = 2, [TIMER_LPIT3] = 3};
-    for (int i = 0; i < TIMERS; i++) {
-        if (emu->s.due[i] <= emu->s.now) {
-            emu->s.due[i] = NEVER;
-            if (fire[i] != NULL) {
-                fire[i](emu, instance[i]);
-            } else if (i == TIMER_WDOG) {
-                wdog_fire(emu);
-            } else if (i == TIMER_CAN) {
-                can_fire(emu);
-            } else {
-                systick_fire(emu);
-            }
-        }
+    const int i = timer_next(emu);
+    emu->s.event = emu->s.due[i];
+    emu->s.due[i] = NEVER;
+    if (fire[i] != NULL) {
+        fire[i](emu, instance[i]);
+    } else if (i == TIMER_WDOG) {
+        wdog_fire(emu);
+    } else if (i == TIMER_CAN) {
+        can_fire(emu);
+    } else {
+        systick_fire(emu);
+    }
+    emu->s.event = NEVER;
+}
+
+/* In the order in which they are due; what a period's begin is followed by waits for the pins. */
+static void timers_fire(emu_t *emu)
+{
+    while (!emu->s.centre && emu->s.due[timer_next(emu)] <= emu->s.now) {
+        timer_fire(emu);
     }
 }
 
@@ -252,7 +273,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
     memset(s, 0, sizeof *s);
     s->now = old.now;
     s->instructions = old.instructions;
-    s->break_at = NEVER;
+    s->break_at = s->event = NEVER;
     s->resets = old.resets + (cause != 0 ? 1U : 0U);
     s->pins = old.pins;
     s->pins_set_at = old.pins_set_at;

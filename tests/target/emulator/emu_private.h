@@ -95,6 +95,7 @@ typedef struct {
 
 typedef struct {
     uint64_t now, limit, due[TIMERS];
+    uint64_t event; /* when the event under way was due, NEVER: none is */
     uint64_t instructions, break_at;
     uint32_t value[PERIPHERALS_MAX][REGISTERS_MAX];
     nvic_t nvic;
@@ -161,6 +162,8 @@ struct emu_snapshot {
 void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));
 uint32_t emu_pc(const emu_t *emu);
 void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);
+/** What an event sets going begins when it was due, not when the core's instruction was over: no timer drifts. */
+uint64_t emu_instant(const emu_t *emu);
 void emu_reset(emu_t *emu, uint32_t cause);
 void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle);
 

@@ -287,14 +287,14 @@ void ftm_fire(emu_t *emu, int instance)
     const peripheral_t *self = of(instance);
     ftm_t *f = &emu->s.ftm[instance];
     const uint32_t sync = bus_get(emu, self, SYNC);
-    f->start = emu->s.now;
+    f->start = emu_instant(emu);
     f->tof = true;
     buffers_load(emu, self, f->software_trigger && (sync & 2U) != 0);
     if (f->software_trigger && (sync & 2U) != 0) {
         f->software_trigger = false;
         bus_put(emu, self, SYNC, sync & ~0x80U);
     }
-    emu_timer(emu, instance == 0 ? TIMER_FTM0 : TIMER_FTM2, emu->s.now + period_ticks(emu, self));
+    emu_timer(emu, instance == 0 ? TIMER_FTM0 : TIMER_FTM2, f->start + period_ticks(emu, self));
     if (instance == 0) {
         if ((bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
             hardware_trigger(emu);
@@ -312,10 +312,12 @@ void ftm_triggers(emu_t *emu)
         return;
     }
     emu->s.ftm[0].triggers_due = false;
+    emu->s.event = emu->s.ftm[0].start;
     emu->s.rdc.latched = emu_angle(emu); /* SAMPLE of the resolver converter is a channel of this timer */
     if ((bus_get(emu, ftm0(), EXTTRIG) & 0x40U) != 0) {
         trgmux_event(emu, INIT_TRIGGER);
     }
+    emu->s.event = NEVER;
     closed_update(emu);
 }
 

@@ -25,7 +25,8 @@ uint32_t lpit_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
 {
     if (offset >= CVAL0 && (offset - CVAL0) % STEP == 0) {
         const uint64_t due = emu->s.due[TIMER_LPIT0 + (offset - CVAL0) / STEP];
-        return due == NEVER ? 0xFFFFFFFFU : (uint32_t)((due - emu->s.now) / clock_ticks(emu, self));
+        const uint64_t left = due > emu->s.now ? due - emu->s.now : 0U;
+        return due == NEVER ? 0xFFFFFFFFU : (uint32_t)(left / clock_ticks(emu, self));
     }
     return stored;
 }
@@ -41,7 +42,7 @@ static void lines_update(emu_t *emu, const peripheral_t *self)
 static void start(emu_t *emu, const peripheral_t *self, uint32_t channel)
 {
     const uint32_t value = bus_get(emu, self, TVAL0 + STEP * channel);
-    emu_timer(emu, (timer_t_)(TIMER_LPIT0 + channel), emu->s.now + ((uint64_t)value + 1U) * clock_ticks(emu, self));
+    emu_timer(emu, (timer_t_)(TIMER_LPIT0 + channel), emu_instant(emu) + ((uint64_t)value + 1U) * clock_ticks(emu, self));
 }
 
 static void control_written(emu_t *emu, const peripheral_t *self, uint32_t channel, uint32_t old, uint32_t value)

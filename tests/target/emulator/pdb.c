@@ -104,7 +104,7 @@ void pdb_trigger(emu_t *emu, int instance)
         return;
     }
     p->running = true;
-    p->start = emu->s.now;
+    p->start = emu_instant(emu);
     p->fired = 0;
     arm(emu, self);
 }
@@ -114,7 +114,7 @@ void pdb_fire(emu_t *emu, int instance)
     const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
     uint32_t which = 0;
-    while (next_due(emu, self, &which) <= emu->s.now) {
+    while (next_due(emu, self, &which) <= emu_instant(emu)) {
         p->fired |= 1U << which;
         bus_put(emu, self, S, bus_get(emu, self, S) | 1U << (16U + which));
         adc_pretrigger(emu, instance, (int)which);

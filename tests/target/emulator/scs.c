@@ -69,9 +69,9 @@ static uint64_t systick_period(const emu_t *emu)
 
 void systick_fire(emu_t *emu)
 {
-    emu->s.nvic.systick_start = emu->s.now;
+    emu->s.nvic.systick_start = emu_instant(emu);
     emu->s.nvic.systick_csr |= 1U << 16;
-    emu_timer(emu, TIMER_SYSTICK, emu->s.now + systick_period(emu));
+    emu_timer(emu, TIMER_SYSTICK, emu_instant(emu) + systick_period(emu));
     if ((emu->s.nvic.systick_csr & 2U) != 0) {
         nvic_pend(emu, SYSTICK);
     }
