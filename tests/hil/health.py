@@ -19,6 +19,7 @@ COUNTERS = {
 JITTER_S = 2 * MS
 JITTER_BENCH_S = 20 * MS  # time stamps of an adapter and of an operating system
 STACK_RESERVE_BYTES = 256
+LATE_S = 25 * MS  # between two commands: then a time-out of 30 ms is this computer's doing
 DIAGNOSTICS_S = 0.12  # their cycle, and some
 
 
@@ -37,6 +38,8 @@ def _counters(rig: Rig, before: dict[str, Any]) -> list[str]:
         now = rig.signal(message, signal)
         if now != was and signal not in rig.expected.counters:
             found.append(f"{message}.{signal} counted {now - was:g}")
+    if found and rig.longest_gap_s > LATE_S:
+        found.append(f"(this computer let {1e3 * rig.longest_gap_s:.0f} ms pass between two commands)")
     return found
 
 

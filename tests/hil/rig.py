@@ -110,6 +110,8 @@ class Rig:
         self.last: dict[str, Frame] = {}
         self.others: dict[int, list[Frame]] = defaultdict(list)  # by identifier: what the DBC does not describe
         self.keep_frames = True
+        self._commanded_s: float | None = None  # when the last cyclic command went out
+        self.longest_gap_s = 0.0  # between two of them: on the wall clock this computer may be late
         self.counted: dict[str, int] = defaultdict(int)
         self.trace = Trace([])
         self.expected = Expected()
@@ -198,9 +200,13 @@ class Rig:
 
     def _send_due(self) -> None:
         if not self.is_sending:
+            self._commanded_s = None
             return
         if self._is_due(COMMAND):
             self.send(self._command_id, self.next_command())
+            if self._commanded_s is not None:
+                self.longest_gap_s = max(self.longest_gap_s, self.now_s - self._commanded_s)
+            self._commanded_s = self.now_s
         if self._is_due(LIMITS) and self.power_limits_kW is not None:
             drive, regen = self.power_limits_kW
             signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}

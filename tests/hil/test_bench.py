@@ -11,6 +11,8 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 pytestmark = pytest.mark.program
 HERE = Path(__file__).parent
+TRIES = 12
+STALL = "(this computer let"
 
 
 def suite(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -25,12 +27,12 @@ def over(ecu: VirtualEcu, *more: str) -> list[str]:
 
 
 def test_without_a_plant_the_rest_of_the_suite_runs_and_says_what_it_left_out(program: Path, tmp_path: Path) -> None:
-    for _ in range(3):  # in real time a computer that stalls for 30 ms loses the command; not what is tested here
+    for _ in range(TRIES):
         with VirtualEcu(program, fast=False) as ecu:
             done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", f"--junitxml={tmp_path}/junit.xml",
                          *over(ecu))  # fmt: skip
-        if done.returncode == 0:
-            break
+        if done.returncode == 0 or STALL not in done.stdout:
+            break  # a computer that stalls for 30 ms loses the command, and the suite says so; not what is tested here
     assert done.returncode == 0, done.stdout
     assert "needs plant control, and this bench has none (--bench)" in done.stdout
     assert "3 passed, 3 skipped" in done.stdout

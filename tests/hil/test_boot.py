@@ -26,10 +26,13 @@ def test_it_says_which_motor_it_was_built_for(rig: Rig) -> None:
 
 def test_every_message_of_the_inverter_comes_in_its_cycle(rig: Rig) -> None:
     rig.advance(3.0)
+    times = [frame.time_s for frames in rig.frames.values() for frame in frames]
+    heard_s = max(times) - min(times)  # by the frames' own stamps: a simulation in real time may fall behind
+    assert heard_s > 1.0
     for name, message in rig.by_name.items():
         if "INV" in message.senders:
-            # From 3 s at least so many; the check after the test looks at every period.
-            assert len(rig.frames[name]) >= 2.9 / rig.cycle_s(name), name
+            # The span may begin right after a frame and end right before one; the check after the test sees each period.
+            assert len(rig.frames[name]) >= heard_s / rig.cycle_s(name) - 1.5, name
 
 
 @pytest.mark.plant
