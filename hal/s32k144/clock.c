@@ -29,13 +29,19 @@ static void start_pll(void)
     await(&SCG->SPLLCSR, SCG_SPLLCSR_SPLLVLD, SCG_SPLLCSR_SPLLVLD);
 }
 
+/* Within high-speed run no clock may more than double, and before it 80 MHz is the most: half of it comes first. */
+static void select_pll(void)
+{
+    SCG->RCCR = SCG_RCCR_SCS(SOURCE_SPLL) | SCG_RCCR_DIVCORE(1) | SCG_RCCR_DIVBUS(1) | SCG_RCCR_DIVSLOW(3);
+    await(&SCG->CSR, SCG_CSR_SCS_MASK, SCG_CSR_SCS(SOURCE_SPLL));
+}
+
 static void enter_high_speed(void)
 {
     SCG->HCCR = SCG_HCCR_SCS(SOURCE_SPLL) | SCG_HCCR_DIVCORE(0) | SCG_HCCR_DIVBUS(1) | SCG_HCCR_DIVSLOW(3);
     SMC->PMPROT = SMC_PMPROT_AHSRUN;
     SMC->PMCTRL = SMC_PMCTRL_RUNM(HSRUN);
     await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_HSRUN);
-    await(&SCG->CSR, SCG_CSR_SCS_MASK, SCG_CSR_SCS(SOURCE_SPLL));
 }
 
 /* A lost clock resets: the outputs are then inputs, and the gate resistors hold the bridge open. */
@@ -84,8 +90,9 @@ void clock_init(void)
 {
     start_oscillator();
     start_pll();
+    select_pll();
+    open_gates(); /* in high-speed run they must not be touched any more */
     enter_high_speed();
     guard_clocks();
     start_cache();
-    open_gates();
 }

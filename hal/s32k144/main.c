@@ -108,12 +108,12 @@ static void init_hardware(const pwm_config_t *pwm)
 }
 
 /* Damaged data must not be computed with: then the counter, and so the fast ISR, never starts. */
-static void start(uint32_t period_ticks)
+static void start(const pwm_config_t *pwm)
 {
     __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
-    angle_init(period_ticks);
+    angle_init(pwm->period_ticks);
     tick_start();
-    if (!data_damaged) {
+    if (!data_damaged && pwm_possible(pwm)) {
         pwm_start();
         started = true;
     }
@@ -126,16 +126,16 @@ __attribute__((noinline)) int main(void)
 {
     data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
-    if (data_damaged) {
+    const pwm_config_t pwm = {4U * ticks(motor.bases.period_s / 4.0F), ticks(motor.dead_time_s)};
+    if (data_damaged || !pwm_possible(&pwm)) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
-    const pwm_config_t pwm = {ticks(motor.bases.period_s), ticks(motor.dead_time_s)};
     init_hardware(&pwm);
     enable_interrupts();
 #if DIRECT
     hal_watchdog_start();
 #endif
-    start(pwm.period_ticks);
+    start(&pwm);
     for (;;) {
         if (!image_step()) {
             data_damaged = true;

@@ -12,6 +12,9 @@
 #define SIX_OUTPUTS 0x3FU
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
 #define FTM0_INIT_TRIGGER 22U
+#define PERIOD_MAX 65532U   /* 16 bits; a multiple of 4, for the tick's timer */
+#define DEAD_TIME_MAX 1023U
+#define DEAD_TIME_BY_4 2U
 
 #define PAIR(n)                                                                                         \
     (FTM_COMBINE_COMBINE##n | FTM_COMBINE_COMP##n | FTM_COMBINE_DTEN##n | FTM_COMBINE_SYNCEN##n | \
@@ -25,19 +28,30 @@ static uint32_t period;
 static bool gates;                        /* as last commanded */
 static volatile bool fault_for_drive, fault_for_board; /* set by the fault interrupt, each taken by its reader */
 
+/* Ten bits; beyond them in steps of four, rounded up: never less than asked for. */
+static uint32_t dead_time(uint32_t ticks)
+{
+    const bool coarse = ticks > DEAD_TIME_MAX;
+    const uint32_t value = coarse ? (ticks + 3U) / 4U : ticks;
+    return FTM_DEADTIME_DTVAL(value) | FTM_DEADTIME_DTVALEX(value >> 6) | FTM_DEADTIME_DTPS(coarse ? DEAD_TIME_BY_4 : 0U);
+}
+
 static void configure_outputs(const pwm_config_t *config)
 {
     FTM0->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
     FTM0->CONF = FTM_CONF_BDMMODE(SAFE_IN_DEBUG);
     FTM0->CNTIN = 0;
     FTM0->MOD = config->period_ticks - 1U;
-    FTM0->C0SC = FTM_C0SC_ELSB;
+    FTM0->C0SC = FTM_C0SC_ELSB; /* the lower switch's channel too: without an edge it does not drive its pin */
+    FTM0->C1SC = FTM_C0SC_ELSB;
     FTM0->C2SC = FTM_C0SC_ELSB;
+    FTM0->C3SC = FTM_C0SC_ELSB;
     FTM0->C4SC = FTM_C0SC_ELSB;
+    FTM0->C5SC = FTM_C0SC_ELSB;
     FTM0->C6SC = FTM_C0SC_ELSB;
     FTM0->COMBINE = PAIR(0) | PAIR(1) | PAIR(2) | FTM_COMBINE_COMBINE3;
     FTM0->POL = 0; /* safe: both switches of a pair off */
-    FTM0->DEADTIME = FTM_DEADTIME_DTVAL(config->dead_time_ticks) | FTM_DEADTIME_DTVALEX(config->dead_time_ticks >> 6);
+    FTM0->DEADTIME = dead_time(config->dead_time_ticks);
     FTM0->C6V = SAMPLE_PULSE_TICKS;
     FTM0->C7V = config->period_ticks;
 }
@@ -68,6 +82,12 @@ static void close_gates(void)
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = 0;
     FTM0->SYNC = LOAD;
+}
+
+bool pwm_possible(const pwm_config_t *config)
+{
+    return config->period_ticks <= PERIOD_MAX && config->period_ticks % 4U == 0U && config->dead_time_ticks > 0U &&
+           config->dead_time_ticks <= config->period_ticks / 8U && config->dead_time_ticks <= 4U * DEAD_TIME_MAX;
 }
 
 void pwm_init(const pwm_config_t *config)

@@ -4,7 +4,7 @@
 /** FTM0: three complementary pairs with dead time, and the pulse that makes the resolver converter sample.
  * Source   README.md, PWM
  * Units    ticks of 112 MHz
- * Range    period_ticks up to 65535
+ * Range    pwm_possible(): period_ticks a multiple of 4 up to 65532, dead_time_ticks from 1 to 4092 and an eighth of it
  * Context  pwm_init(), pwm_start(): start-up; pwm_fault_reported(): 1 kHz task;
  *          pwm_gate_fault_isr(): fault interrupt, the timer has already opened the gates */
 #include <stdbool.h>
@@ -12,9 +12,11 @@
 
 typedef struct {
     uint32_t period_ticks;
-    uint32_t dead_time_ticks; /* at most 1023 */
+    uint32_t dead_time_ticks;
 } pwm_config_t;
 
+/** What the timer cannot do must not be tried: bits beyond its registers would be a dead time too short. */
+bool pwm_possible(const pwm_config_t *config);
 void pwm_init(const pwm_config_t *config);
 /** The counter runs from here on; its first period starts now. */
 void pwm_start(void);

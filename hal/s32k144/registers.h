@@ -11,7 +11,8 @@
 typedef struct {
     uint8_t reserved0[0x10];
     const volatile uint32_t CSR;
-    uint8_t reserved1[0x8];
+    volatile uint32_t RCCR;
+    uint8_t reserved1[0x4];
     volatile uint32_t HCCR;
     uint8_t reserved2[0xe0];
     volatile uint32_t SOSCCSR;
@@ -23,6 +24,7 @@ typedef struct {
     volatile uint32_t SPLLCFG;
 } scg_t;
 _Static_assert(offsetof(scg_t, CSR) == 0x10, "CSR");
+_Static_assert(offsetof(scg_t, RCCR) == 0x14, "RCCR");
 _Static_assert(offsetof(scg_t, HCCR) == 0x1c, "HCCR");
 _Static_assert(offsetof(scg_t, SOSCCSR) == 0x100, "SOSCCSR");
 _Static_assert(offsetof(scg_t, SOSCDIV) == 0x104, "SOSCDIV");
@@ -32,6 +34,14 @@ _Static_assert(offsetof(scg_t, SPLLDIV) == 0x604, "SPLLDIV");
 _Static_assert(offsetof(scg_t, SPLLCFG) == 0x608, "SPLLCFG");
 #define SCG_CSR_SCS_MASK 0xf000000U
 #define SCG_CSR_SCS(x) (((uint32_t)(x) << 24) & 0xf000000U)
+#define SCG_RCCR_DIVSLOW_MASK 0xfU
+#define SCG_RCCR_DIVSLOW(x) (((uint32_t)(x) << 0) & 0xfU)
+#define SCG_RCCR_DIVBUS_MASK 0xf0U
+#define SCG_RCCR_DIVBUS(x) (((uint32_t)(x) << 4) & 0xf0U)
+#define SCG_RCCR_DIVCORE_MASK 0xf0000U
+#define SCG_RCCR_DIVCORE(x) (((uint32_t)(x) << 16) & 0xf0000U)
+#define SCG_RCCR_SCS_MASK 0xf000000U
+#define SCG_RCCR_SCS(x) (((uint32_t)(x) << 24) & 0xf000000U)
 #define SCG_HCCR_DIVSLOW_MASK 0xfU
 #define SCG_HCCR_DIVSLOW(x) (((uint32_t)(x) << 0) & 0xfU)
 #define SCG_HCCR_DIVBUS_MASK 0xf0U
@@ -312,6 +322,8 @@ _Static_assert(offsetof(ftm_t, SWOCTRL) == 0x94, "SWOCTRL");
 #define FTM_COMBINE_COMBINE3 0x1000000U
 #define FTM_DEADTIME_DTVAL_MASK 0x3fU
 #define FTM_DEADTIME_DTVAL(x) (((uint32_t)(x) << 0) & 0x3fU)
+#define FTM_DEADTIME_DTPS_MASK 0xc0U
+#define FTM_DEADTIME_DTPS(x) (((uint32_t)(x) << 6) & 0xc0U)
 #define FTM_DEADTIME_DTVALEX_MASK 0xf0000U
 #define FTM_DEADTIME_DTVALEX(x) (((uint32_t)(x) << 16) & 0xf0000U)
 #define FTM_EXTTRIG_INITTRIGEN 0x40U
@@ -362,6 +374,14 @@ typedef struct {
     uint8_t reserved0[0x8];
     volatile uint32_t SC2;
     volatile uint32_t SC3;
+    uint8_t reserved1[0x1c];
+    volatile uint32_t CLPS;
+    volatile uint32_t CLP3;
+    volatile uint32_t CLP2;
+    volatile uint32_t CLP1;
+    volatile uint32_t CLP0;
+    volatile uint32_t CLPX;
+    volatile uint32_t CLP9;
 } adc_t;
 _Static_assert(offsetof(adc_t, SC1) == 0x0, "SC1");
 _Static_assert(offsetof(adc_t, CFG1) == 0x40, "CFG1");
@@ -369,6 +389,13 @@ _Static_assert(offsetof(adc_t, CFG2) == 0x44, "CFG2");
 _Static_assert(offsetof(adc_t, R) == 0x48, "R");
 _Static_assert(offsetof(adc_t, SC2) == 0x90, "SC2");
 _Static_assert(offsetof(adc_t, SC3) == 0x94, "SC3");
+_Static_assert(offsetof(adc_t, CLPS) == 0xb4, "CLPS");
+_Static_assert(offsetof(adc_t, CLP3) == 0xb8, "CLP3");
+_Static_assert(offsetof(adc_t, CLP2) == 0xbc, "CLP2");
+_Static_assert(offsetof(adc_t, CLP1) == 0xc0, "CLP1");
+_Static_assert(offsetof(adc_t, CLP0) == 0xc4, "CLP0");
+_Static_assert(offsetof(adc_t, CLPX) == 0xc8, "CLPX");
+_Static_assert(offsetof(adc_t, CLP9) == 0xcc, "CLP9");
 #define ADC_SC1_ADCH_MASK 0x1fU
 #define ADC_SC1_ADCH(x) (((uint32_t)(x) << 0) & 0x1fU)
 #define ADC_SC1_AIEN 0x40U

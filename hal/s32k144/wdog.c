@@ -21,12 +21,18 @@ static void configure(uint32_t window, uint32_t timeout, uint32_t control)
     WDOG->WIN = window;
     WDOG->TOVAL = timeout;
     WDOG->CS = control;
+}
+
+/* It acts some ticks of its own clock later, 20 us and more: too long to wait with interrupts masked. */
+static void await_configured(void)
+{
     await(&WDOG->CS, WDOG_CS_RCS, WDOG_CS_RCS);
 }
 
 void wdog_first(void)
 {
     configure(0, FIRST_TICKS, COMMON | WDOG_CS_UPDATE);
+    await_configured();
 }
 
 void hal_watchdog_start(void)
@@ -34,6 +40,7 @@ void hal_watchdog_start(void)
     __asm__ volatile("cpsid i" ::: "memory");
     configure(WINDOW_TICKS, TIMEOUT_TICKS, COMMON | WDOG_CS_WIN);
     __asm__ volatile("cpsie i" ::: "memory");
+    await_configured();
 }
 
 void hal_watchdog_service(void)

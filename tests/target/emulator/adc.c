@@ -5,6 +5,7 @@
 
 enum {
     SC1 = 0x00, SC1_LAST = 0x3C, CFG1 = 0x40, CFG2 = 0x44, R = 0x48, R_LAST = 0x84, SC2 = 0x90, SC3 = 0x94, TRIM = 0x98,
+    CLPS = 0xB4, CLP9 = 0xCC, SAMPLE_MIN = 924, /* 275 ns */
     COCO = 0x80, AIEN = 0x40, OFF = 31, CONVERSION = 30, ADC0_IRQ = 39, ADC1_IRQ = 40,
 };
 
@@ -51,6 +52,9 @@ static uint64_t conversion_ticks(emu_t *emu, const peripheral_t *self)
     if ((cfg1 >> 2 & 3U) != 1U) {
         emu_fail(emu, "%s: only 12-bit conversions are modelled (CFG1.MODE = 1)", self->name);
     }
+    if (((bus_get(emu, self, CFG2) & 0xFFU) + 1U) * clock < SAMPLE_MIN) {
+        emu_fail(emu, "%s: a sample takes less than 275 ns (CFG2.SMPLTS)", self->name);
+    }
     const uint32_t each = (bus_get(emu, self, CFG2) & 0xFFU) + 1U + CONVERSION;
     return (uint64_t)clock * each * ((sc3 & 4U) != 0 ? 4U << (sc3 & 3U) : 1U);
 }
@@ -61,14 +65,29 @@ static void start(emu_t *emu, const peripheral_t *self, int channel)
     if ((bus_get(emu, self, 4U * (uint32_t)channel) & 31U) == OFF) {
         return;
     }
+    if (!a->calibrated) {
+        emu_fail(emu, "%s converts without having been calibrated", self->name);
+    }
     a->current = channel + 1;
     a->done = emu_instant(emu) + conversion_ticks(emu, self);
     emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
 }
 
+/* The manual's conditions: started by software, average of 32, at most half the fastest clock, from nothing. */
 static void calibrate(emu_t *emu, const peripheral_t *self)
 {
     (void)conversion_ticks(emu, self); /* it needs a clock, too */
+    bool clear = true;
+    for (uint32_t at = CLPS; at <= CLP9; at += 4U) {
+        clear = clear && bus_get(emu, self, at) == 0U;
+    }
+    const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (bus_get(emu, self, CFG1) >> 5 & 3U);
+    if ((bus_get(emu, self, SC2) & 0x40U) != 0 || (bus_get(emu, self, SC3) & 7U) != 7U || clock < 2U * 67U) {
+        emu_fail(emu, "write of %s.SC3: calibration wants ADTRG = 0, an average of 32 and at most 25 MHz", self->name);
+    } else if (!clear) {
+        emu_fail(emu, "write of %s.SC3: calibration wants CLPS ... CLP9 to be 0", self->name);
+    }
+    emu->s.adc[self->instance].calibrated = true;
     bus_put(emu, self, SC3, bus_get(emu, self, SC3) & ~0x80U);
     bus_put(emu, self, SC1, bus_get(emu, self, SC1) | COCO);
 }
@@ -95,8 +114,8 @@ void adc_pretrigger(emu_t *emu, int instance, int channel)
     if ((bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0 || (bus_get(emu, self, SC2) & 0x40U) == 0) {
         return;
     }
-    if (emu->s.adc[instance].current != 0 || (bus_get(emu, self, 4U * (uint32_t)channel) & COCO) != 0) {
-        pdb_sequence_error(emu, instance, channel); /* busy, or the last result was never read */
+    if (emu->s.adc[instance].current != 0) {
+        pdb_sequence_error(emu, instance, channel);
     }
     if (emu->s.adc[instance].current == 0) {
         start(emu, self, channel);
@@ -110,11 +129,12 @@ void adc_fire(emu_t *emu, int instance)
     const int channel = a->current - 1;
     const uint32_t control = 4U * (uint32_t)channel;
     const uint32_t input = bus_get(emu, self, control) & 31U;
+    const bool read_before = (bus_get(emu, self, control) & COCO) == 0;
     a->current = 0;
     bus_put(emu, self, R + control, emu->s.pins.adc[instance][input] & 0xFFFU);
     bus_put(emu, self, control, bus_get(emu, self, control) | COCO);
     line_update(emu, self);
-    if ((bus_get(emu, self, SC2) & 0x40U) != 0) {
+    if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* the rise of COCO is taken for the acknowledgement */
         pdb_acknowledge(emu, instance, channel);
     }
 }

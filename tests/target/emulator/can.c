@@ -21,6 +21,7 @@ enum {
 #define SOFTRST (1U << 25)
 #define FRZACK (1U << 24)
 #define LPMACK (1U << 20)
+#define MCR_FROZEN_ONLY 0x20A3337FU /* RFEN, SUPV, WRNEN, SRXDIS, IRMQ, LPRIOEN, AEN, IDAM, MAXMB */
 
 static const peripheral_t *can0(void)
 {
@@ -199,8 +200,24 @@ void can_fire(emu_t *emu)
 
 /* ---- registers ---- */
 
-static void control_written(emu_t *emu, uint32_t value)
+static bool memory_filled(const emu_t *emu)
 {
+    const uint32_t *filled = emu->s.can.filled;
+    return (filled[0] & filled[1] & filled[2] & filled[3]) == 0xFFFFFFFFU;
+}
+
+/* Outside of freeze mode some bits keep their values. */
+static void control_written(emu_t *emu, uint32_t old, uint32_t value)
+{
+    const bool was_frozen = (old & (MDIS | FRZ | HALT)) == (FRZ | HALT);
+    const uint32_t kept = was_frozen ? 0U : (old ^ value) & MCR_FROZEN_ONLY;
+    bus_put(emu, can0(), MCR, bus_get(emu, can0(), MCR) ^ kept);
+    if (kept != 0 && (old & MDIS) == 0) {
+        emu_fail(emu, "write of CAN0.MCR: the bits 0x%x can be written in freeze mode only", kept);
+    }
+    if (running(emu) && !memory_filled(emu)) {
+        emu_fail(emu, "write of CAN0.MCR: its message memory has not been initialised");
+    }
     if ((value & SOFTRST) != 0 || (value & 0x00004800U) != 0) {
         emu_fail(emu, "write of CAN0.MCR: soft reset, pretended networking and flexible data rate are not modelled");
     }
@@ -210,6 +227,9 @@ static void control_written(emu_t *emu, uint32_t value)
 void can_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)self;
+    if (offset >= RAM && offset < RAM_END) {
+        emu->s.can.filled[(offset - RAM) / 128U] |= 1U << ((offset - RAM) / 4U % 32U);
+    }
     const bool only_frozen = offset == CTRL1 || offset == RXMGMASK || offset == RXFGMASK ||
                              (offset >= RXIMR && offset < RXIMR + 64U);
     if (only_frozen && running(emu) && old != value) {
@@ -225,7 +245,7 @@ void can_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
     } else if (offset == ESR1) {
         bus_put(emu, can0(), ESR1, old & ~value);
     } else if (offset == MCR) {
-        control_written(emu, value);
+        control_written(emu, old, value);
     } else if (offset >= RAM && offset < RAM_END && (offset - RAM) % BOX == 0) {
         send_next(emu);
     }

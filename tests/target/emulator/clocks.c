@@ -73,6 +73,12 @@ static uint32_t selected(const emu_t *emu)
     return bus_get(emu, bus_find("SCG"), high_speed(emu) ? HCCR : RCCR);
 }
 
+/* In high-speed run no clock may change by more than a factor of two at once. */
+static bool steps(uint32_t before, uint32_t after)
+{
+    return after > 2U * before || before > 2U * after;
+}
+
 /* Data sheet: core, bus, flash at most 112/56/28 MHz in HSRUN, 80/48/26.67 MHz in RUN. */
 static void core_update(emu_t *emu)
 {
@@ -86,6 +92,8 @@ static void core_update(emu_t *emu)
         const uint32_t ticks_per_ms = EMU_TICKS_PER_S / 1000U;
         emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core,
                  ticks_per_ms / bus, ticks_per_ms / flash, high ? "HSRUN" : "RUN");
+    } else if (high && steps(emu->s.core_ticks, core)) {
+        emu_fail(emu, "SCG: in HSRUN the core's clock changes by more than a factor of two");
     } else {
         emu_core_clock(emu, core);
     }
@@ -138,7 +146,12 @@ uint32_t smc_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 
 void smc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
-    (void)old;
+    if (offset == PMPROT) {
+        if (old != 0U && old != value) {
+            emu_fail(emu, "write of SMC.PMPROT: it can be written once after a reset");
+        }
+        return;
+    }
     if (offset != PMCTRL) {
         return;
     }
@@ -169,6 +182,9 @@ uint32_t pcc_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 void pcc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)self;
+    if (high_speed(emu) && ((old ^ value) & CGC) != 0) {
+        emu_fail(emu, "write of PCC offset 0x%x: clock gates must not be changed in HSRUN", offset);
+    }
     if ((old & value & CGC) != 0 && ((old ^ value) & 0x07000000U) != 0) {
         emu_fail(emu, "write of PCC offset 0x%x: the clock source changes while the gate is open", offset);
     }

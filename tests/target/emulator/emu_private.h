@@ -52,7 +52,7 @@ typedef struct {
     bool software_trigger;
     uint32_t outmask;           /* acting */
     bool triggers_due;          /* the instant's triggers wait for the pins */
-    bool fault_latched, tof;
+    bool fault_latched, fault_seen, tof; /* seen: FMS was read while FAULTF was set */
     bool closed;                /* the bridge, when last looked at */
     uint32_t quad_offset;
     uint32_t read[2];           /* the counter as the program has read it last, and before that */
@@ -67,6 +67,7 @@ typedef struct {
 
 typedef struct {
     int current; /* SC1 index in conversion + 1, 0: idle */
+    bool calibrated;
     uint64_t done;
 } adc_t;
 
@@ -74,6 +75,7 @@ typedef struct {
     can_port_frame_t fifo[EMU_CAN_FIFO];
     int fifo_count;
     int sending; /* mailbox + 1, 0: the bus is free */
+    uint32_t filled[4]; /* words of the message memory that have been written since the reset */
 } can_t;
 
 typedef struct {
@@ -91,6 +93,7 @@ typedef struct {
     bool unlocked, configured;
     uint64_t start;
     uint64_t unlock_end; /* of the time for writing after an unlock */
+    uint64_t acts_from;  /* the written configuration, then CS.RCS is set */
 } wdog_t;
 
 typedef struct {
@@ -106,6 +109,7 @@ typedef struct {
     spi_t spi[3];
     rdc_t rdc;
     wdog_t wdog;
+    uint64_t lpit_ready; /* the timer takes its registers from here on */
     uint32_t core_ticks;   /* per core cycle */
     uint32_t pc, resets, reset_cause;
     bool centre, reset_wanted, poll_masks, reschedule, stop;

@@ -79,7 +79,9 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
         f->read[0] = counter(emu, self, stored);
         return f->read[0];
     case SC: return (stored & ~0x280U) | (f->tof ? 0x200U : 0U);
-    case FMS: return fault_status(emu, self);
+    case FMS:
+        f->fault_seen = f->fault_latched;
+        return fault_status(emu, self);
     default: return stored;
     }
 }
@@ -148,11 +150,12 @@ static void mode_written(emu_t *emu, const peripheral_t *self, uint32_t value)
     }
 }
 
-/* FAULTF falls when it is written 0 while the input is quiet again. */
+/* FAULTF falls when it is read as 1 and then written 0 while the input is quiet again. */
 static void fms_written(emu_t *emu, const peripheral_t *self, uint32_t value)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
-    if ((value & 0x80U) == 0 && !emu->s.pins.gate_fault) {
+    if ((value & 0x80U) == 0 && !emu->s.pins.gate_fault && f->fault_seen) {
+        f->fault_seen = false;
         f->fault_latched = false;
         nvic_line(emu, FTM0_FAULT_IRQ, false);
     }
@@ -250,6 +253,7 @@ void ftm_fault_input(emu_t *emu)
     const bool listens = (bus_get(emu, self, FLTCTRL) & 1U) != 0 && (bus_get(emu, self, MODE) & 0x60U) != 0;
     if (listens && emu->s.pins.gate_fault && !f->fault_latched) {
         f->fault_latched = true;
+        f->fault_seen = false;
         nvic_line(emu, FTM0_FAULT_IRQ, (bus_get(emu, self, MODE) & 0x80U) != 0);
     }
 }
@@ -323,6 +327,13 @@ void ftm_triggers(emu_t *emu)
 
 /* ---- the bridge ---- */
 
+/* The odd channel of a pair drives its pin only when it, too, has an edge (ELSB:ELSA). */
+static bool both_drive(const emu_t *emu, int pair)
+{
+    const uint32_t upper = C0SC + 16U * (uint32_t)pair;
+    return (bus_get(emu, ftm0(), upper) & 12U) == 8U && (bus_get(emu, ftm0(), upper + 8U) & 12U) == 8U;
+}
+
 static bool pair_follows(const emu_t *emu, int pair)
 {
     const peripheral_t *self = ftm0();
@@ -333,7 +344,7 @@ static bool pair_follows(const emu_t *emu, int pair)
     const bool faulted = f->fault_latched && (combine & PAIR_FAULTEN) != 0;
     return f->running && (enabled & both) == both && (f->outmask & both) == 0 && (forced & both) == 0 && !faulted &&
            (combine & (PAIR_COMBINE | PAIR_COMP)) == (PAIR_COMBINE | PAIR_COMP) &&
-           (bus_get(emu, self, C0SC + 16U * (uint32_t)pair) & 12U) == 8U;
+           both_drive(emu, pair);
 }
 
 static double pair_duty(const ftm_t *f, int pair)

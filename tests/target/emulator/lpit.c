@@ -47,9 +47,7 @@ static void start(emu_t *emu, const peripheral_t *self, uint32_t channel)
 
 static void control_written(emu_t *emu, const peripheral_t *self, uint32_t channel, uint32_t old, uint32_t value)
 {
-    if ((bus_get(emu, self, MCR) & 1U) == 0) {
-        emu_fail(emu, "write of LPIT0.TCTRL%u: the module is not enabled (MCR.M_CEN)", channel);
-    } else if ((value & ~1U) != 0) {
+    if ((value & ~1U) != 0) {
         emu_fail(emu, "write of LPIT0.TCTRL%u: only periodic counting is modelled", channel);
     } else if ((value & ~old & 1U) != 0) {
         start(emu, self, channel);
@@ -60,6 +58,13 @@ static void control_written(emu_t *emu, const peripheral_t *self, uint32_t chann
 
 void lpit_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
+    if (offset == MCR) {
+        emu->s.lpit_ready = (value & 1U) != 0 ? emu->s.now + 4U * clock_ticks(emu, self) : NEVER;
+        return;
+    }
+    if ((bus_get(emu, self, MCR) & 1U) == 0 || emu->s.now < emu->s.lpit_ready) {
+        emu_fail(emu, "write of LPIT0 offset 0x%x: the module was not enabled four clocks before (MCR.M_CEN)", offset);
+    }
     if (offset == MSR) {
         bus_put(emu, self, MSR, old & ~value);
     } else if (offset == SETTEN || offset == CLRTEN) {

@@ -46,6 +46,15 @@ REFUSED = {
     13: "vector 21 (IRQ 5) has no handler",
     14: "has not the key 0x05FA",
     15: "a floating-point instruction ran although CPACR does not allow it",
+    16: "in HSRUN the core's clock changes by more than a factor of two",
+    17: "clock gates must not be changed in HSRUN",
+    18: "write of SMC.PMPROT: it can be written once after a reset",
+    19: "write of ADC0.SC3: calibration wants CLPS ... CLP9 to be 0",
+    20: "ADC0: a sample takes less than 275 ns",
+    21: "ADC0 converts without having been calibrated",
+    22: "write of LPIT0 offset 0x10: the module was not enabled four clocks before",
+    23: "write of CAN0.MCR: the bits 0x20000000 can be written in freeze mode only",
+    24: "write of CAN0.MCR: its message memory has not been initialised",
 }
 
 

@@ -3,7 +3,7 @@
  * serviced within its window. */
 #include "emu_private.h"
 
-enum { CS = 0x00, CNT = 0x04, TOVAL = 0x08, WIN = 0x0C, LPO_TICKS = 26250, OSCILLATOR_TICKS = 420, RCM_WDOG = 0x20 };
+enum { CS = 0x00, CNT = 0x04, TOVAL = 0x08, WIN = 0x0C, LPO_TICKS = 26250, ACTS_AFTER = 3 * 26250, OSCILLATOR_TICKS = 420, RCM_WDOG = 0x20 };
 #define UNLOCK 0xD928C520U
 #define REFRESH 0xB480A602U
 #define EN 0x80U
@@ -37,7 +37,7 @@ uint32_t wdog_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
     }
     if (offset == CS) {
         const uint32_t unlocked = open_for_writing(emu) && !w->configured ? 0x800U : 0U;
-        return (stored & ~0xC00U) | (w->configured ? 0x400U : 0U) | unlocked;
+        return (stored & ~0xC00U) | (w->configured && emu->s.now >= w->acts_from ? 0x400U : 0U) | unlocked;
     }
     return stored;
 }
@@ -100,6 +100,7 @@ void wdog_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
     if (offset == CS) {
         emu->s.wdog.configured = true;
+        emu->s.wdog.acts_from = emu->s.now + ACTS_AFTER; /* some ticks of its own clock */
     }
     wdog_restart(emu);
 }

@@ -94,6 +94,38 @@ void test_dead_time_beyond_six_bits_goes_to_the_extension(void)
     TEST_ASSERT_EQUAL_HEX32(3U << 16 | 32U, FTM0->DEADTIME);
 }
 
+/* 9 us at 112 MHz still fit (1008 ticks), 10 us do not: 1120 ticks = 280 steps of four; 1121 take one step more. */
+void test_a_dead_time_beyond_ten_bits_is_counted_in_fours_and_never_too_short(void)
+{
+    pwm_init(&(pwm_config_t){.period_ticks = PERIOD, .dead_time_ticks = 1023});
+    TEST_ASSERT_EQUAL_HEX32(15U << 16 | 63U, FTM0->DEADTIME);
+    pwm_init(&(pwm_config_t){.period_ticks = PERIOD, .dead_time_ticks = 1120});
+    TEST_ASSERT_EQUAL_HEX32(4U << 16 | 2U << 6 | 24U, FTM0->DEADTIME);
+    pwm_init(&(pwm_config_t){.period_ticks = PERIOD, .dead_time_ticks = 1121});
+    TEST_ASSERT_EQUAL_HEX32(4U << 16 | 2U << 6 | 25U, FTM0->DEADTIME);
+}
+
+void test_a_period_or_a_dead_time_that_the_timer_cannot_keep_is_impossible(void)
+{
+    TEST_ASSERT_TRUE(pwm_possible(&(pwm_config_t){11200, 224}));
+    TEST_ASSERT_TRUE(pwm_possible(&(pwm_config_t){65532, 4092}));
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){65536, 224}));
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11202, 224})); /* no whole number of the tick timer's clocks */
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11200, 0}));   /* both switches of a phase on together */
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11200, 1401}));
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){65532, 4093}));
+}
+
+/* All seven: an odd channel without an edge leaves its pin, the lower switch's gate, undriven. */
+void test_both_channels_of_every_pair_have_an_edge(void)
+{
+    const volatile uint32_t *const control[] = {&FTM0->C0SC, &FTM0->C1SC, &FTM0->C2SC, &FTM0->C3SC,
+                                                &FTM0->C4SC, &FTM0->C5SC, &FTM0->C6SC};
+    for (int k = 0; k < 7; k++) {
+        TEST_ASSERT_EQUAL_HEX32(FTM_C0SC_ELSB, *control[k]);
+    }
+}
+
 void test_closing_the_gates_waits_for_the_period_and_opening_does_not(void)
 {
     hal_pwm_enable(true);

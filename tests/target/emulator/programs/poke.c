@@ -7,6 +7,25 @@ volatile uint32_t seen;
 void reset(void);
 __attribute__((section(".vectors"), used)) const vector_t vectors[16] = {(vector_t)STACK_TOP, reset};
 
+#if CASE >= 16 && CASE <= 18
+/* 112 MHz, by way of half of it unless at once. */
+static void high_speed(uint32_t at_once)
+{
+    REG(0x40064104U) = 0x101U;
+    REG(0x40064108U) = 0x24U;
+    REG(0x40064100U) = 1;
+    REG(0x40064604U) = 0x302U;
+    REG(0x40064608U) = 12U << 16;
+    REG(0x40064600U) = 1;
+    REG(0x4006401CU) = 0x06000013U;
+    if (at_once == 0U) {
+        REG(0x40064014U) = 0x06010013U;
+    }
+    REG(0x4007E008U) = 0x80;
+    REG(0x4007E00CU) = 0x60;
+}
+#endif
+
 __attribute__((used)) void reset(void)
 {
     watchdog_off();
@@ -48,6 +67,44 @@ __attribute__((used)) void reset(void)
     volatile float x = 1.5F;
     x = x * x;
     ISPR(0) = 1U << 5;
+#elif CASE >= 16 && CASE <= 18
+    high_speed(CASE == 16 ? 1U : 0U);
+#if CASE == 17 /* a clock gate while in HSRUN */
+    PCC(0xE0U) = CLOCK_ON;
+#elif CASE == 18 /* PMPROT a second time */
+    REG(0x4007E008U) = 0xA0;
+#endif
+#elif CASE == 19 || CASE == 20 || CASE == 21 /* the converter: calibrated from what was there, sampled too briefly, or not */
+    REG(0x40064304U) = 0x300U; /* FIRCDIV2: 12 MHz */
+    PCC(0xECU) = 3U << 24;
+    PCC(0xECU) = 3U << 24 | CLOCK_ON;
+    REG(0x4003B040U) = 4; /* 12 bits */
+#if CASE != 19
+    for (uint32_t at = 0xB4U; at <= 0xCCU; at += 4U) {
+        REG(0x4003B000U + at) = 0;
+    }
+#endif
+#if CASE != 21
+    REG(0x4003B094U) = 0x87U;
+#endif
+    REG(0x4003B044U) = CASE == 20 ? 1U : 12U;
+    REG(0x4003B000U) = 0;
+#elif CASE == 22 /* a timer register right after the module was enabled */
+    REG(0x40064304U) = 0x700U; /* FIRCDIV2: 1/64 */
+    PCC(0xDCU) = 3U << 24;
+    PCC(0xDCU) = 3U << 24 | CLOCK_ON;
+    REG(0x40037008U) = 1;
+    REG(0x40037010U) = 1;
+#elif CASE == 23 || CASE == 24 /* FlexCAN: bits for freeze mode later, message memory as it comes */
+    REG(0x40064100U) = 1;
+    REG(0x40064104U) = 0x101U;
+    PCC(0x90U) = CLOCK_ON;
+    REG(0x40024000U) = 0x5080000FU; /* frozen */
+    for (uint32_t at = 0; CASE == 23 && at < 512U; at += 4U) {
+        REG(0x40024080U + at) = 0;
+    }
+    REG(0x40024000U) = 0x0080000FU; /* normal */
+    REG(0x40024000U) = 0x2080000FU; /* RFEN */
 #endif
     for (;;) {
     }
