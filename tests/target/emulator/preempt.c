@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "preempt.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -9,21 +10,20 @@
 #include "loop/runner/sim_private.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69 };
-enum { WORDS_MAX = 12, OUTCOMES_MAX = 1 << (WORDS_MAX + 2), POINTS_MAX = 8000 };
+enum { OLD, NEW, OUTCOMES, CHOICES_MAX = 16, POINTS_MAX = 12000 };
 enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 
 typedef struct {
     emulated_t *e;
-    int victim;
+    int victim, rounds;
     bool catch_entry, catch_exit, catch_return; /* what emu_run() is to stop at */
     fluxtrue_t *host;
-    drive_t before, after;                /* the victim's inputs, old and new */
-    size_t word[WORDS_MAX];               /* offsets in drive_t of the words that make a difference */
-    int words;
-    drive_t outcome[OUTCOMES_MAX];
-    bool seen[OUTCOMES_MAX];
-    int outcomes;
-    fast_state_t fast[4];                 /* what the fast ISR may make of the identification's two words */
+    adc_counts_t counts;                  /* of the last sample at the victim's entry */
+    drive_t before;                       /* at the victim's entry */
+    drive_t outcome[OUTCOMES];            /* of the victim */
+    drive_t interrupts[CHOICES_MAX];      /* what the interrupts make of what the victim has handed over by then */
+    int choices;
+    bool seen[OUTCOMES], chosen[CHOICES_MAX];
 } preempt_t;
 
 /* Too large for a stack; a test runs one at a time. */
@@ -66,59 +66,119 @@ static drive_t drive_there(preempt_t *p)
 
 /* Another sample than the last: the currents have moved. The shaft stands where the encoder was read last, because
  * what the image takes away for the time since the sample would depend on when it is interrupted. */
-static void next_sample(preempt_t *p, int round)
+static adc_counts_t sample_of(const preempt_t *p, int round)
 {
-    static const char *const results[4] = {"ADC0.R0", "ADC1.R0", "ADC0.R1", "ADC1.R1"};
-    static const int change[4] = {40, -25, -15, 7};
-    for (int i = 0; i < 4; i++) {
-        const uint32_t old = (uint32_t)emu_register(p->e->emu, results[i]);
-        (void)emu_register_set(p->e->emu, results[i], old + (uint32_t)(change[i] * (round + 1)));
-    }
-    emu_pins_t *pins = emu_pins(p->e->emu);
-    pins->angle = emu_counter_read(p->e->emu, 1, false) << ENCODER_SHIFT;
-    pins->angle_rate = 0;
+    const adc_counts_t *c = &p->counts;
+    return (adc_counts_t){.i_a = (uint16_t)(c->i_a + 40 * (round + 1)), .i_b = (uint16_t)(c->i_b - 25 * (round + 1)),
+                          .i_c = (uint16_t)(c->i_c - 15 * (round + 1)), .v_dc = (uint16_t)(c->v_dc + 7 * (round + 1))};
+}
+
+static uint32_t shaft(const preempt_t *p)
+{
+    return emu_counter_read(p->e->emu, 1, false) << ENCODER_SHIFT;
 }
 
 static void round_there(preempt_t *p, int round)
 {
-    next_sample(p, round);
+    const adc_counts_t counts = sample_of(p, round);
+    (void)emu_register_set(p->e->emu, "ADC0.R0", counts.i_a);
+    (void)emu_register_set(p->e->emu, "ADC1.R0", counts.i_b);
+    (void)emu_register_set(p->e->emu, "ADC0.R1", counts.i_c);
+    (void)emu_register_set(p->e->emu, "ADC1.R1", counts.v_dc);
+    emu_pins_t *pins = emu_pins(p->e->emu);
+    pins->angle = shaft(p);
+    pins->angle_rate = 0;
     emu_pend(p->e->emu, FAST_VECTOR);
 }
 
 /* ---- the same on the host ---- */
 
-static void fast_here(preempt_t *p, drive_t *drive)
+static void load(preempt_t *p, const drive_t *drive)
 {
     p->host->drive = *drive;
     p->host->drive.motor = p->e->mirror.host->drive.motor;
-    p->host->counts = (adc_counts_t){.i_a = (uint16_t)emu_register(p->e->emu, "ADC0.R0"),
-                                     .i_b = (uint16_t)emu_register(p->e->emu, "ADC1.R0"),
-                                     .i_c = (uint16_t)emu_register(p->e->emu, "ADC0.R1"),
-                                     .v_dc = (uint16_t)emu_register(p->e->emu, "ADC1.R1")};
-    p->host->theta_m = emu_pins_look(p->e->emu)->angle;
+    temperatures_take(p->e, p->host);
     host_port_select(p->host);
-    fast_isr(&p->host->drive);
+}
+
+static drive_t unload(preempt_t *p)
+{
     host_port_select(NULL);
-    *drive = p->host->drive;
+    return drive_plain(&p->host->drive);
+}
+
+/* The interrupts that come at one boundary; the identification's does not interrupt itself. */
+static drive_t interrupts_here(preempt_t *p, const drive_t *drive)
+{
+    load(p, drive);
+    p->host->theta_m = shaft(p);
+    for (int round = 0; round < p->rounds; round++) {
+        p->host->counts = sample_of(p, round);
+        fast_isr(&p->host->drive);
+        if (p->victim == PREEMPT_TASK) {
+            mrai_isr(&p->host->drive);
+        }
+    }
+    return unload(p);
 }
 
 static drive_t victim_here(preempt_t *p, const drive_t *inputs)
 {
-    p->host->drive = *inputs;
-    p->host->drive.motor = p->e->mirror.host->drive.motor;
-    temperatures_take(p->e, p->host);
-    host_port_select(p->host);
+    load(p, inputs);
     if (p->victim == PREEMPT_MRAI) {
         mrai_isr(&p->host->drive);
     } else {
         task_1khz(&p->host->drive);
     }
-    host_port_select(NULL);
-    return drive_plain(&p->host->drive);
+    return unload(p);
 }
 
-/* What the victim alone writes; for the identification without its count of finished periods, a word of its own. */
-static bool same_outputs(const preempt_t *p, const drive_t *a, const drive_t *b)
+#define PART(name) {offsetof(drive_t, name), sizeof(((drive_t *)0)->name)}
+
+typedef struct {
+    size_t offset, size;
+} part_t;
+
+/* What a victim hands over to the interrupts, each a word of its own or a box that one word opens. */
+static const part_t by_mrai[] = {PART(slow.psi_delta_q15), PART(slow.finished)};
+static const part_t by_task[] = {PART(commands), PART(schedules), PART(task.identified.psi_delta),
+                                 PART(task.angle_correction)};
+
+/* The victim interrupted after it has handed over some of its results. */
+static drive_t handed_over(const preempt_t *p, int choice)
+{
+    const part_t *part = p->victim == PREEMPT_MRAI ? by_mrai : by_task;
+    drive_t drive = p->before;
+    for (; choice != 0; choice >>= 1, part++) {
+        if ((choice & 1) != 0) {
+            memcpy((uint8_t *)&drive + part->offset, (const uint8_t *)&p->outcome[OLD] + part->offset, part->size);
+        }
+    }
+    return drive;
+}
+
+/* The victim finds everything as it was when it was entered, or everything as the interrupts have left it. */
+static void allowed_compute(preempt_t *p)
+{
+    p->outcome[OLD] = victim_here(p, &p->before);
+    drive_t after = interrupts_here(p, &p->before);
+    if (p->victim == PREEMPT_MRAI) {
+        after.slow = p->before.slow; /* and only the sample is the victim's input */
+        after.fast = p->before.fast;
+    }
+    p->outcome[NEW] = victim_here(p, &after);
+    p->choices = p->victim == PREEMPT_MRAI ? 4 : 16;
+    for (int choice = 0; choice < p->choices; choice++) {
+        const drive_t drive = handed_over(p, choice);
+        p->interrupts[choice] = interrupts_here(p, &drive);
+    }
+}
+
+/* ---- one boundary ---- */
+
+/* What the victim alone writes; for the identification without its count of finished periods: it counts the one that
+ * it was pended for, whichever sample it found. */
+static bool same_victim(const preempt_t *p, const drive_t *a, const drive_t *b)
 {
     if (p->victim == PREEMPT_TASK) {
         return memcmp(&a->task, &b->task, sizeof a->task) == 0 &&
@@ -130,110 +190,24 @@ static bool same_outputs(const preempt_t *p, const drive_t *a, const drive_t *b)
     return memcmp(&x, &y, sizeof x) == 0 && memcmp(&a->windows, &b->windows, sizeof a->windows) == 0;
 }
 
-/* Takes a word from the new state. */
-static void word_new(const preempt_t *p, drive_t *drive, size_t offset)
+static bool same_interrupts(const preempt_t *p, const drive_t *a, const drive_t *b)
 {
-    memcpy((uint8_t *)drive + offset, (const uint8_t *)&p->after + offset, 4);
+    const bool fast = memcmp(&a->fast, &b->fast, sizeof a->fast) == 0 &&
+                      memcmp(&a->samples, &b->samples, sizeof a->samples) == 0;
+    return fast && (p->victim == PREEMPT_MRAI || (memcmp(&a->slow, &b->slow, sizeof a->slow) == 0 &&
+                                                  memcmp(&a->windows, &b->windows, sizeof a->windows) == 0));
 }
-
-static bool matters(preempt_t *p, size_t offset)
-{
-    drive_t from_old = p->before, from_new = p->after;
-    word_new(p, &from_old, offset);
-    memcpy((uint8_t *)&from_new + offset, (const uint8_t *)&p->before + offset, 4);
-    const drive_t old = victim_here(p, &p->before), old_toggled = victim_here(p, &from_old);
-    const drive_t new = victim_here(p, &p->after), new_toggled = victim_here(p, &from_new);
-    return !same_outputs(p, &old, &old_toggled) || !same_outputs(p, &new, &new_toggled);
-}
-
-/* The words of fast and slow state that changed and that the victim reads; its own are not shared. */
-static bool words_find(preempt_t *p)
-{
-    const size_t first = offsetof(drive_t, fast), last = offsetof(drive_t, task);
-    for (size_t at = first; at < last; at += 4) {
-        const bool own = p->victim == PREEMPT_MRAI && at >= offsetof(drive_t, slow);
-        const bool changed = memcmp((uint8_t *)&p->before + at, (uint8_t *)&p->after + at, 4) != 0;
-        if (!own && changed && matters(p, at)) {
-            if (p->words == WORDS_MAX) {
-                return false;
-            }
-            p->word[p->words++] = at;
-        }
-    }
-    return true;
-}
-
-static void outcomes_compute(preempt_t *p)
-{
-    for (int choice = 0; choice < 1 << (p->words + 2); choice++) {
-        drive_t inputs = p->before;
-        if ((choice & 1) != 0) {
-            inputs.samples = p->after.samples;
-        }
-        if ((choice & 2) != 0 && p->victim == PREEMPT_TASK) {
-            inputs.windows = p->after.windows;
-        }
-        for (int i = 0; i < p->words; i++) {
-            if ((choice >> (i + 2) & 1) != 0) {
-                word_new(p, &inputs, p->word[i]);
-            }
-        }
-        p->outcome[p->outcomes++] = victim_here(p, &inputs);
-    }
-}
-
-/* The fast ISR reads two words of the identification: its correction, and how many periods it has finished. */
-static void fast_outcomes_compute(preempt_t *p)
-{
-    const drive_t done = victim_here(p, &p->before);
-    for (int choice = 0; choice < 4; choice++) {
-        drive_t drive = p->before;
-        if ((choice & 1) != 0) {
-            drive.slow.psi_delta_q15 = done.slow.psi_delta_q15;
-        }
-        if ((choice & 2) != 0) {
-            drive.slow.finished = done.slow.finished;
-        }
-        fast_here(p, &drive);
-        p->fast[choice] = drive_plain(&drive).fast;
-    }
-}
-
-static bool fast_explained(const preempt_t *p, const drive_t *there)
-{
-    bool explained = p->victim == PREEMPT_TASK;
-    for (int i = 0; i < 4; i++) {
-        explained = explained || memcmp(&there->fast, &p->fast[i], sizeof p->fast[i]) == 0;
-    }
-    return explained;
-}
-
-/* Old and new inputs, as the host computes them from the state at the victim's entry. */
-static void inputs_compute(preempt_t *p, int rounds)
-{
-    p->before = drive_there(p);
-    p->after = p->before;
-    for (int round = 0; round < rounds; round++) {
-        next_sample(p, round);
-        fast_here(p, &p->after);
-        if (p->victim == PREEMPT_TASK) {
-            mrai_isr(&p->after);
-        }
-    }
-}
-
-/* ---- one boundary ---- */
 
 /* False: the victim had finished before so many instructions. */
-static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_t n, int rounds)
+static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_t n)
 {
     emu_restore(p->e->emu, start);
     emu_break_after(p->e->emu, n);
     if (!run_to_break(p) || emu_active_vector(p->e->emu) != p->victim) {
         return false;
     }
-    for (int round = 0; round < rounds; round++) {
-        p->catch_return = round + 1 < rounds;
+    for (int round = 0; round < p->rounds; round++) {
+        p->catch_return = round + 1 < p->rounds;
         round_there(p, round);
         if (p->catch_return && !run_to_break(p)) {
             return false;
@@ -246,17 +220,27 @@ static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_
     return ended;
 }
 
+/* A victim that looks after the interrupts has handed nothing over before them. */
+static bool explained(preempt_t *p, const drive_t *there)
+{
+    for (int outcome = OLD; outcome < OUTCOMES; outcome++) {
+        const int choices = outcome == NEW ? 1 : p->choices;
+        for (int choice = 0; choice < choices; choice++) {
+            if (same_victim(p, there, &p->outcome[outcome]) && same_interrupts(p, there, &p->interrupts[choice])) {
+                p->seen[outcome] = true;
+                p->chosen[choice] = true;
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 static void judge(preempt_t *p, preempt_report_t *report, int n)
 {
     const drive_t there = drive_there(p), plain = drive_plain(&there);
     report->points++;
-    for (int i = 0; i < p->outcomes; i++) {
-        if (same_outputs(p, &plain, &p->outcome[i]) && fast_explained(p, &plain)) {
-            p->seen[i] = true;
-            return;
-        }
-    }
-    if (report->mixed++ == 0) {
+    if (!explained(p, &plain) && report->mixed++ == 0) {
         (void)snprintf(report->first, sizeof report->first, "interrupted after %d instructions", n);
     }
 }
@@ -271,7 +255,7 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
     return ended ? (int)(emu_instructions(p->e->emu) - from) : -1;
 }
 
-static int try_all(preempt_t *p, int rounds, preempt_report_t *report)
+static int try_all(preempt_t *p, preempt_report_t *report)
 {
     p->catch_entry = true;
     const bool found = run_to_break(p);
@@ -281,21 +265,20 @@ static int try_all(preempt_t *p, int rounds, preempt_report_t *report)
         return -1;
     }
     emu_snapshot_t *start = emu_save(p->e->emu);
-    inputs_compute(p, rounds);
-    const bool fits = words_find(p);
-    if (fits) {
-        outcomes_compute(p);
-        fast_outcomes_compute(p);
-        report->instructions = length_of(p, start);
-        for (int n = 0; n < report->instructions && n < POINTS_MAX; n++) {
-            if (interrupted_after(p, start, (uint64_t)n, rounds)) {
-                judge(p, report, n);
-            }
+    p->before = drive_there(p);
+    p->counts = (adc_counts_t){.i_a = (uint16_t)emu_register(p->e->emu, "ADC0.R0"),
+                               .i_b = (uint16_t)emu_register(p->e->emu, "ADC1.R0"),
+                               .i_c = (uint16_t)emu_register(p->e->emu, "ADC0.R1"),
+                               .v_dc = (uint16_t)emu_register(p->e->emu, "ADC1.R1")};
+    allowed_compute(p);
+    report->instructions = length_of(p, start);
+    for (int n = 0; n < report->instructions && n < POINTS_MAX; n++) {
+        if (interrupted_after(p, start, (uint64_t)n)) {
+            judge(p, report, n);
         }
     }
     emu_snapshot_free(start);
-    (void)(fits || snprintf(report->first, sizeof report->first, "more than %d shared words", WORDS_MAX));
-    return fits ? 0 : -1;
+    return 0;
 }
 
 int preempt_run(sim_t *sim, int victim, int rounds, preempt_report_t *report)
@@ -305,17 +288,18 @@ int preempt_run(sim_t *sim, int victim, int rounds, preempt_report_t *report)
     memset(report, 0, sizeof *report);
     p->e = sim->controller.self;
     p->victim = victim;
+    p->rounds = rounds;
     p->host = fluxtrue_create();
     emu_snapshot_t *as_it_was = emu_save(p->e->emu);
     emu_on_exception(p->e->emu, on_exception, p);
-    const int code = p->host != NULL ? try_all(p, rounds, report) : -1;
+    const int code = p->host != NULL ? try_all(p, report) : -1;
     emu_on_exception(p->e->emu, NULL, NULL);
     emu_restore(p->e->emu, as_it_was);
     emu_snapshot_free(as_it_was);
     fluxtrue_destroy(p->host);
-    report->words = p->words;
-    for (int i = 0; i < p->outcomes; i++) {
-        report->outcomes += p->seen[i];
+    report->outcomes = p->seen[OLD] + p->seen[NEW];
+    for (int i = 0; i < p->choices; i++) {
+        report->choices += p->chosen[i];
     }
     return code;
 }

@@ -18,20 +18,20 @@ class _Report(ctypes.Structure):
         ("points", ctypes.c_int),
         ("mixed", ctypes.c_int),
         ("outcomes", ctypes.c_int),
-        ("words", ctypes.c_int),
+        ("choices", ctypes.c_int),
         ("first", ctypes.c_char * 160),
     )
 
 
 @dataclass(frozen=True)
 class Report:
-    """Boundaries tried, and outcomes that no choice between old and new explains."""
+    """Boundaries tried, and outcomes that mix old with new."""
 
     instructions: int
     points: int
     mixed: int
     outcomes: int
-    words: int
+    choices: int
     first: str
 
 
@@ -44,4 +44,4 @@ def interrupt_everywhere(loop: Loop, victim: int, rounds: int = 1) -> Report:
     text = report.first.decode(errors="replace")
     if code != 0:
         raise FluxtrueError(f"interrupting vector {victim}: {text}")
-    return Report(report.instructions, report.points, report.mixed, report.outcomes, report.words, text)
+    return Report(report.instructions, report.points, report.mixed, report.outcomes, report.choices, text)
