@@ -35,7 +35,7 @@ typedef int32_t q16_t;
 #define Q31(x) ((q31_t)FX_CONST((double)(x), 2147483648.0, -2147483648.0, 2147483647.0))
 #define Q16(x) ((q16_t)FX_CONST((double)(x), 65536.0, -2147483648.0, 2147483647.0))
 
-static inline q15_t fx_sat_q15(int32_t x)
+__attribute__((always_inline)) static inline q15_t fx_sat_q15(int32_t x)
 {
     return fx_arch_ssat16(x);
 }
