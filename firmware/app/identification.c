@@ -10,7 +10,7 @@ static bool at_limit(const identify_state_t *state, identify_index_t index)
 /* Share of the prior's variance that is gone. */
 static q15_t known(const identify_state_t *state, identify_index_t index)
 {
-    return (q15_t)fx_max_s32(Q15_MAX - (state->filter.p[index][index] >> 15), 0);
+    return (q15_t)fx_max_s32(Q15_MAX - (state->filter.p[identify_pair(index, index)] >> 15), 0);
 }
 
 static void report_robust(drive_t *drive)

@@ -43,30 +43,37 @@ static dq_t inside_circle(dq_t i, q15_t i_max)
     return (dq_t){fx_max_s32(i.d, -i_max), fx_sqrt_q30((uint32_t)fx_max_s32(room, 0))};
 }
 
+static __attribute__((noinline)) dq_t tabulated(const current_reference_config_t *config, q15_t torque, q15_t psi)
+{
+    const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
+    return (dq_t){fx_cell_interp(config->i_d, config->grid.ny, cell),
+                  fx_cell_interp(config->i_q, config->grid.ny, cell)};
+}
+
+static __attribute__((noinline)) q15_t largest(const current_reference_config_t *config, q15_t psi)
+{
+    bool clamped = false;
+    return fx_lookup1(&config->torque_max, psi, &clamped);
+}
+
 /* t_max + dpsi i_q(t_max): the tables' torque plus what the magnet differs by (CR-10). What a weak magnet leaves at
  * the present point it need not leave at the largest torque, where psi_d is small: not counted. */
 static q15_t reachable(const current_reference_config_t *config, const current_reference_in_t *in, int32_t planned)
 {
-    bool clamped = false;
     const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
-    const q15_t torque_max = fx_lookup1(&config->torque_max, psi, &clamped);
-    const fx_cell_t edge = fx_cell(&config->grid, torque_max, psi);
-    const q15_t i_q = (q15_t)fx_cell_interp(config->i_q, config->grid.ny, edge);
+    const q15_t torque_max = largest(config, psi);
+    const q15_t i_q = (q15_t)tabulated(config, torque_max, psi).q;
     return fx_sat_q15(fx_max_s32(torque_max + fx_mul_q15(in->psi_delta, i_q), 0));
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
-    bool flux_clamped = false;
     const int32_t planned = planned_flux(config, in);
     const q15_t psi = fx_sat_q15(planned);
-    const q15_t torque_max = fx_lookup1(&config->torque_max, psi, &flux_clamped);
+    const q15_t torque_max = largest(config, psi);
     const q15_t torque = (q15_t)fx_min_s32(fx_abs_q15(in->torque), torque_max);
 
-    const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
-    const dq_t wanted = {fx_cell_interp(config->i_d, config->grid.ny, cell),
-                         fx_cell_interp(config->i_q, config->grid.ny, cell)};
-    dq_t i_ref = inside_circle(wanted, config->i_max);
+    dq_t i_ref = inside_circle(tabulated(config, torque, psi), config->i_max);
     const bool i_d_limited = i_ref.d < -in->i_d_max;
     i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;

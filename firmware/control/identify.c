@@ -88,8 +88,8 @@ static void learn(identify_state_t *state)
     const int32_t moved = fx_sub_q31(identify_filter_shift(&state->filter, &state->mean_q), before);
     const identify_verdict_t q =
         identify_filter_update(&state->filter, &state->mean_q, fx_sub_q31(state->mean_e.q, moved), r);
-    const int32_t target = (d.inconsistent || q.inconsistent || d.clamped || q.clamped) ? Q15_MAX : 0;
     state->clamped = d.clamped || q.clamped;
+    const int32_t target = (d.inconsistent || q.inconsistent || state->clamped) ? Q15_MAX : 0;
     state->contradiction = fx_add_q15(state->contradiction,
                                       fx_mul_q15(CONTRADICTION_RATE, fx_sat_q15(target - state->contradiction)));
 }
@@ -105,8 +105,8 @@ static void judge(const identify_config_t *config, identify_state_t *state, cons
     const q15_t scale = (q15_t)fx_max_s32(fx_abs_q15(torque), config->torque_min);
     const int64_t full = (int64_t)fx_mul_q30(scale, config->confidence_full); /* Q30 */
     const int64_t none = (int64_t)fx_mul_q30(scale, config->confidence_none);
-    const bool good = variance < prior / 2 || variance < full * full;
-    const bool bad = variance > prior - prior / 4 && variance > none * none;
+    const bool good = variance < prior >> 1 || variance < full * full;
+    const bool bad = variance > prior - (prior >> 2) && variance > none * none;
     if (bad || state->contradiction > CONTRADICTION_MAX) {
         state->trusted = false;
     } else if (good) {

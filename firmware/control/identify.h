@@ -17,7 +17,6 @@
 #define IDENTIFY_STEPS 10 /* per update */
 
 typedef struct {
-    identify_filter_t filter;
     identify_row_t mean_d, mean_q; /* over the steps of one update */
     dq_t mean_e;
     int32_t mean_noise_q30;
@@ -30,6 +29,7 @@ typedef struct {
     q15_t contradiction; /* share of recent updates that the model cannot explain */
     q15_t confidence;
     bool trusted;        /* where the confidence is going */
+    identify_filter_t filter; /* last: what lies near the start takes shorter instructions */
 } identify_state_t;
 
 typedef struct {

@@ -20,9 +20,9 @@ static int32_t round_shift(int64_t x, unsigned n)
 
 void identify_filter_reset(identify_filter_t *filter)
 {
-    *filter = (identify_filter_t){{0}, {{0}}};
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        filter->p[j][j] = IDENTIFY_ONE_Q30;
+    *filter = (identify_filter_t){{0}, {0}};
+    for (unsigned j = 0, p = 0; j < IDENTIFY_STATES; p += IDENTIFY_STATES - j, j++) {
+        filter->p[p] = IDENTIFY_ONE_Q30;
     }
 }
 
@@ -32,8 +32,10 @@ static int64_t project(const identify_filter_t *filter, const identify_row_t *ro
     int64_t variance = 0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         int64_t sum = 0;
+        const int32_t *p = &filter->p[j];
         for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
-            sum += (int64_t)filter->p[j][l] * row->h[l];
+            sum += (int64_t)*p * row->h[l];
+            p += (l < j) ? IDENTIFY_STATES - 1U - l : 1U; /* down the column, then along the row */
         }
         ph[j] = round_shift(sum, 30);
         variance += (int64_t)ph[j] * row->h[j];
@@ -77,12 +79,11 @@ static reciprocal_t reciprocal(int64_t s)
 /* Q24 * Q30, cut to Q30. */
 static void shrink(identify_filter_t *filter, const int32_t *ph, const int32_t *gain_q24)
 {
+    int32_t *p = filter->p;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         for (unsigned l = j; l < IDENTIFY_STATES; l++) {
             const int64_t drop = (int64_t)gain_q24[j] * ph[l] + (1 << 23);
-            const int32_t left = filter->p[j][l] - (int32_t)(drop >> 24); /* |k_j Ph_l| <= 1: no more than there is */
-            filter->p[j][l] = left;
-            filter->p[l][j] = left;
+            *p++ -= (int32_t)(drop >> 24); /* |k_j Ph_l| <= 1: no more than there is */
         }
     }
 }
@@ -111,14 +112,15 @@ identify_verdict_t identify_filter_update(identify_filter_t *filter, const ident
 
 void identify_filter_leak(const identify_config_t *config, identify_filter_t *filter, bool r_known)
 {
+    int32_t *p = filter->p;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         const int32_t prior = (j == IDENTIFY_R && r_known) ? config->r_known_q30 : IDENTIFY_ONE_Q30;
-        int32_t *row = filter->p[j];
         filter->x[j] -= fx_mul_q31(config->leak[j], filter->x[j]);
-        row[j] += fx_mul_q31(2 * config->leak[j], prior - row[j]);
+        *p += fx_mul_q31(2 * config->leak[j], prior - *p);
+        p++;
         for (unsigned l = j + 1U; l < IDENTIFY_STATES; l++) {
-            row[l] -= fx_mul_q31(config->leak[j] + config->leak[l], row[l]);
-            filter->p[l][j] = row[l];
+            *p -= fx_mul_q31(config->leak[j] + config->leak[l], *p);
+            p++;
         }
     }
 }

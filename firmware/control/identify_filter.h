@@ -16,11 +16,18 @@
 
 #define IDENTIFY_ONE_Q27 (1 << 27)
 #define IDENTIFY_ONE_Q30 (1 << 30)
+#define IDENTIFY_PAIRS (IDENTIFY_STATES * (IDENTIFY_STATES + 1) / 2)
 
 typedef struct {
     int32_t x[IDENTIFY_STATES];
-    int32_t p[IDENTIFY_STATES][IDENTIFY_STATES]; /* symmetric */
+    int32_t p[IDENTIFY_PAIRS]; /* symmetric: the upper triangle, row by row */
 } identify_filter_t;
+
+/** Where P_jl lies, j <= l. */
+static inline unsigned identify_pair(unsigned j, unsigned l)
+{
+    return j * (2U * IDENTIFY_STATES - 1U - j) / 2U + l;
+}
 
 typedef struct {
     bool clamped;      /* a state reached its limit */

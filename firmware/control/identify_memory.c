@@ -15,9 +15,9 @@ static const int32_t since[IDENTIFY_STATES] = {
 identify_memory_t identify_memory_get(const identify_state_t *state)
 {
     identify_memory_t memory = {.version = IDENTIFY_MEMORY_VERSION};
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = 0, p = 0; j < IDENTIFY_STATES; p += IDENTIFY_STATES - j, j++) {
         memory.x[j] = state->filter.x[j];
-        memory.variance[j] = state->filter.p[j][j];
+        memory.variance[j] = state->filter.p[p];
     }
     return memory;
 }
@@ -38,9 +38,9 @@ bool identify_memory_restore(identify_state_t *state, const identify_memory_t *m
         return false;
     }
     identify_filter_reset(&state->filter);
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+    for (unsigned j = 0, p = 0; j < IDENTIFY_STATES; p += IDENTIFY_STATES - j, j++) {
         state->filter.x[j] = memory->x[j];
-        state->filter.p[j][j] = fx_min_s32(fx_add_q31(memory->variance[j], since[j]), IDENTIFY_ONE_Q30);
+        state->filter.p[p] = fx_min_s32(fx_add_q31(memory->variance[j], since[j]), IDENTIFY_ONE_Q30);
     }
     return true;
 }

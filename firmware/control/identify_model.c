@@ -32,29 +32,43 @@ static void derivatives(const identify_config_t *config, const identify_tables_t
                      fx_sub_q31(induced(config, l->l_qq, m->i_m.d), m->psi.d)};
 }
 
-static void rows(const identify_config_t *config, const identify_point_t *point, identify_model_t *m)
+static __attribute__((noinline)) int32_t cross(const dq_t *a, const dq_t *b)
 {
-    const q31_t *sigma = config->sigma;
+    return identify_mul(a->d, b->q) - identify_mul(a->q, b->d);
+}
+
+/* Derivatives by the states to derivatives by their sigmas. */
+static void per_sigma(const identify_config_t *config, identify_row_t *row)
+{
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        row->h[j] = identify_sigma(config->sigma[j], row->h[j]);
+    }
+}
+
+static void rows(const identify_config_t *config, const identify_point_t *point, q31_t r_prior, identify_model_t *m)
+{
     const int32_t w = point->omega / 2; /* Q30 */
+    const int32_t w_psi_q = identify_mul(w, m->psi.q);
+    const int32_t d = fx_sub_q31(fx_add_q31(point->u.d, w_psi_q), point->rate.d);
+    const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m->psi.d)), point->rate.q);
+    m->y = (dq_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
     const dq_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
     const q15_t magnitude = fx_magnitude((q15_t)i.d, (q15_t)i.q);
     const q15_t length = (q15_t)fx_max_s32(magnitude, config->i_smooth);
     m->current = magnitude >= config->i_min;
-    m->d = (identify_row_t){{
-        [IDENTIFY_R] = identify_sigma(sigma[IDENTIFY_R], point->i.d / 2),
-        [IDENTIFY_DROP] = identify_sigma(sigma[IDENTIFY_DROP], direction(i.d, length)),
-        [IDENTIFY_LQ] = identify_sigma(sigma[IDENTIFY_LQ], -identify_mul(w, m->psi.q)),
-        [IDENTIFY_ANGLE] = identify_sigma(sigma[IDENTIFY_ANGLE], -identify_mul(w, m->turn.q)),
-        [IDENTIFY_IRON] = identify_sigma(sigma[IDENTIFY_IRON], -identify_mul(w, m->iron_psi.q)),
-    }};
-    m->q = (identify_row_t){{
-        [IDENTIFY_R] = identify_sigma(sigma[IDENTIFY_R], point->i.q / 2),
-        [IDENTIFY_DROP] = identify_sigma(sigma[IDENTIFY_DROP], direction(i.q, length)),
-        [IDENTIFY_FLUX] = identify_sigma(sigma[IDENTIFY_FLUX], w),
-        [IDENTIFY_LD] = identify_sigma(sigma[IDENTIFY_LD], identify_mul(w, m->slope)),
-        [IDENTIFY_ANGLE] = identify_sigma(sigma[IDENTIFY_ANGLE], identify_mul(w, m->turn.d)),
-        [IDENTIFY_IRON] = identify_sigma(sigma[IDENTIFY_IRON], identify_mul(w, m->iron_psi.d)),
-    }};
+    m->d.h[IDENTIFY_R] = point->i.d / 2;
+    m->d.h[IDENTIFY_DROP] = direction(i.d, length);
+    m->d.h[IDENTIFY_LQ] = -w_psi_q;
+    m->d.h[IDENTIFY_ANGLE] = -identify_mul(w, m->turn.q);
+    m->d.h[IDENTIFY_IRON] = -identify_mul(w, m->iron_psi.q);
+    per_sigma(config, &m->d);
+    m->q.h[IDENTIFY_R] = point->i.q / 2;
+    m->q.h[IDENTIFY_DROP] = direction(i.q, length);
+    m->q.h[IDENTIFY_FLUX] = w;
+    m->q.h[IDENTIFY_LD] = identify_mul(w, m->slope);
+    m->q.h[IDENTIFY_ANGLE] = identify_mul(w, m->turn.d);
+    m->q.h[IDENTIFY_IRON] = identify_mul(w, m->iron_psi.d);
+    per_sigma(config, &m->q);
 }
 
 identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
@@ -62,25 +76,19 @@ identify_model_t identify_model(const identify_config_t *config, const identify_
 {
     identify_model_t m = {.current = false};
     derivatives(config, tables, point, &m);
-    rows(config, point, &m);
-    const int32_t w = point->omega / 2;
-    const int32_t d = fx_sub_q31(fx_add_q31(point->u.d, identify_mul(w, m.psi.q)), point->rate.d);
-    const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m.psi.d)), point->rate.q);
-    m.y = (dq_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
+    rows(config, point, r_prior, &m);
     return m;
 }
 
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)
 {
-    const q31_t *sigma = config->sigma;
-    const int32_t iron = identify_mul(m->iron_psi.d, m->i_m.q) - identify_mul(m->iron_psi.q, m->i_m.d) +
-                         identify_mul(m->psi.d, m->iron_i.q) - identify_mul(m->psi.q, m->iron_i.d);
-    return (identify_row_t){{
-        [IDENTIFY_FLUX] = identify_sigma(sigma[IDENTIFY_FLUX], m->i_m.q),
-        [IDENTIFY_LQ] = identify_sigma(sigma[IDENTIFY_LQ], -identify_mul(m->psi.q, m->i_m.d)),
-        [IDENTIFY_LD] = identify_sigma(sigma[IDENTIFY_LD], identify_mul(m->slope, m->i_m.q)),
-        [IDENTIFY_ANGLE] = identify_sigma(sigma[IDENTIFY_ANGLE],
-                                          identify_mul(m->turn.d, m->i_m.q) - identify_mul(m->turn.q, m->i_m.d)),
-        [IDENTIFY_IRON] = identify_sigma(sigma[IDENTIFY_IRON], iron),
+    identify_row_t row = {{
+        [IDENTIFY_FLUX] = m->i_m.q,
+        [IDENTIFY_LQ] = -identify_mul(m->psi.q, m->i_m.d),
+        [IDENTIFY_LD] = identify_mul(m->slope, m->i_m.q),
+        [IDENTIFY_ANGLE] = cross(&m->turn, &m->i_m),
+        [IDENTIFY_IRON] = cross(&m->iron_psi, &m->i_m) + cross(&m->psi, &m->iron_i),
     }};
+    per_sigma(config, &row);
+    return row;
 }

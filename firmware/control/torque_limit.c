@@ -16,18 +16,9 @@ bool torque_limit_valid(const torque_limit_config_t *config)
 }
 
 /* (x - end)/(start - end), 0 ... 1 (LM-4). */
-static q15_t line(derating_line_t at, q15_t x)
+static q15_t line(const derating_line_t *at, q15_t x)
 {
-    return (q15_t)fx_max_s32(fx_mul_gain_q15(at.gain, fx_sub_q15(x, at.end)), 0);
-}
-
-static q15_t temperature_factor(derating_line_t at, int16_t dC, bool *seen)
-{
-    if (dC == TEMPERATURE_UNKNOWN) {
-        return *seen ? SENSOR_LOST : Q15_MAX;
-    }
-    *seen = true;
-    return line(at, dC);
+    return (q15_t)fx_max_s32(fx_mul_gain_q15(at->gain, fx_sub_q15(x, at->end)), 0);
 }
 
 /* (LM-2); half up in both products, so that the mean has no bias. */
@@ -42,20 +33,12 @@ static q15_t loss_step(const torque_limit_config_t *config, torque_limit_state_t
     return fx_q15_from_q31(state->loss);
 }
 
-/* p/|w|; an open limit stays open. */
-static q15_t torque_of(q15_t limit, int32_t power, q15_t speed)
-{
-    if (limit == Q15_MAX) {
-        return Q15_MAX;
-    }
-    return fx_div_q15(fx_sat_q15(fx_max_s32(power, 0)), (q15_t)fx_max_s32(speed, 1));
-}
-
 /* The smaller of both limits; the reason is noted when it cuts the request. */
 typedef struct {
     int32_t wanted; /* magnitude */
     int32_t most;
     uint32_t reasons;
+    q15_t rated; /* what a factor is taken of */
 } cut_t;
 
 static void cut(cut_t *by, int32_t limit, uint32_t reason)
@@ -65,23 +48,46 @@ static void cut(cut_t *by, int32_t limit, uint32_t reason)
     by->reasons |= (by->wanted > most) ? reason : 0U;
 }
 
-static void cut_by_factor(cut_t *by, q15_t torque_max, q15_t factor, uint32_t reason)
+/* p/|w|; an open limit stays open. */
+static __attribute__((noinline)) void cut_by_power(cut_t *by, q15_t limit, int32_t loss, q15_t speed)
+{
+    if (limit < Q15_MAX) {
+        const q15_t power = fx_sat_q15(fx_max_s32(limit - loss, 0));
+        cut(by, fx_div_q15(power, (q15_t)fx_max_s32(speed, 1)), DERATING_POWER);
+    }
+}
+
+static void cut_by_factor(cut_t *by, q15_t factor, uint32_t reason)
 {
     if (factor < Q15_MAX) {
-        cut(by, fx_mul_q15(torque_max, factor), reason);
+        cut(by, fx_mul_q15(by->rated, factor), reason);
+    }
+}
+
+static __attribute__((noinline)) void derate(cut_t *by, const derating_line_t *at, q15_t x, uint32_t reason)
+{
+    cut_by_factor(by, line(at, x), reason);
+}
+
+static __attribute__((noinline)) void derate_hot(cut_t *by, const derating_line_t *at, int16_t dC, bool *seen,
+                                                 uint32_t reason)
+{
+    if (dC != TEMPERATURE_UNKNOWN) {
+        *seen = true;
+        derate(by, at, dC, reason);
+    } else if (*seen) {
+        cut_by_factor(by, SENSOR_LOST, reason);
     }
 }
 
 /* What holds for both directions. */
 static cut_t common(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
 {
-    cut_t by = {.wanted = fx_abs_q15(in->wanted), .most = Q15_MAX};
+    cut_t by = {.wanted = fx_abs_q15(in->wanted), .most = Q15_MAX, .rated = config->torque_max};
     cut(&by, config->torque_max, DERATING_REQUEST);
     cut(&by, in->reach, DERATING_REACH);
-    cut_by_factor(&by, config->torque_max, temperature_factor(config->inverter, in->inverter_dC,
-                                                              &state->inverter_seen), DERATING_INVERTER);
-    cut_by_factor(&by, config->torque_max, temperature_factor(config->winding, in->winding_dC, &state->winding_seen),
-                  DERATING_WINDING);
+    derate_hot(&by, &config->inverter, in->inverter_dC, &state->inverter_seen, DERATING_INVERTER);
+    derate_hot(&by, &config->winding, in->winding_dC, &state->winding_seen, DERATING_WINDING);
     return by;
 }
 
@@ -95,15 +101,15 @@ torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_lim
     cut_t regen = drive;
 
     cut(&drive, limits->torque_drive, DERATING_REQUEST);
-    cut(&drive, torque_of(limits->power_drive, limits->power_drive - loss, speed), DERATING_POWER);
-    cut_by_factor(&drive, config->torque_max, line(config->dc_low, in->v_dc), DERATING_DC_LOW);
-    cut_by_factor(&drive, config->torque_max, line(config->speed, speed), DERATING_SPEED);
+    cut_by_power(&drive, limits->power_drive, loss, speed);
+    derate(&drive, &config->dc_low, in->v_dc, DERATING_DC_LOW);
+    derate(&drive, &config->speed, speed, DERATING_SPEED);
     cut(&regen, limits->torque_regen, DERATING_REQUEST);
-    cut(&regen, torque_of(limits->power_regen, limits->power_regen + loss, speed), DERATING_POWER);
-    cut_by_factor(&regen, config->torque_max, line(config->dc_high, in->v_dc), DERATING_DC_HIGH);
+    cut_by_power(&regen, limits->power_regen, -loss, speed);
+    derate(&regen, &config->dc_high, in->v_dc, DERATING_DC_HIGH);
 
     /* Which of the two holds for torque against the rotation (LM-6). */
-    const q15_t moving = line(config->moving, speed);
+    const q15_t moving = line(&config->moving, speed);
     const int32_t against = drive.most + fx_mul_q15(moving, fx_sat_q15(regen.most - drive.most));
     const bool backwards = in->omega < 0;
     const int32_t high = backwards ? against : drive.most;

@@ -57,7 +57,7 @@ static inline int32_t fx_arch_qsub(int32_t a, int32_t b)
 /* gcc's __ssat and __usat convert from unsigned inside the macro, out of our reach. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
-static inline int16_t fx_arch_ssat16(int32_t x)
+__attribute__((always_inline)) static inline int16_t fx_arch_ssat16(int32_t x)
 {
     const int32_t y = __ssat(x, 16);
     /* Tells the compiler the range, which saves the SXTH after every narrowing. */

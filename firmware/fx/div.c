@@ -1,6 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fx/div.h"
 
+int32_t fx_div_s32(int32_t num, int32_t den)
+{
+    if (den == 0) {
+        return (num == 0) ? 0 : ((num >> 31) ^ INT32_MAX);
+    }
+    return (den == -1) ? fx_neg_q31(num) : (num / den);
+}
+
+/* 2^30 and half a denominator leave room in 32 bits. */
+q15_t fx_div_q15(q15_t num, q15_t den)
+{
+    if (den == 0) {
+        return (q15_t)((num == 0) ? 0 : ((num >> 15) ^ INT16_MAX));
+    }
+    const int32_t half = ((den < 0) ? -(int32_t)den : den) >> 1;
+    return fx_sat_q15((((int32_t)num * 32768) + ((num < 0) ? -half : half)) / den);
+}
+
 /* One base-2^16 digit of rem * 2^16 / d, for d >= 2^31 and rem < d. The estimate from d's upper
  * half is at most 2 too large (FX-11). Leaves the next remainder in *rem. */
 static inline uint32_t next_digit(uint32_t *rem, uint32_t d)

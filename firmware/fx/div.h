@@ -14,23 +14,10 @@
 #include "fx/q.h"
 
 /* C's quotient; INT32_MIN / -1 saturates. */
-static inline int32_t fx_div_s32(int32_t num, int32_t den)
-{
-    if (den == 0) {
-        return (num == 0) ? 0 : ((num >> 31) ^ INT32_MAX);
-    }
-    return (den == -1) ? fx_neg_q31(num) : (num / den);
-}
+int32_t fx_div_s32(int32_t num, int32_t den);
 
-/* (num * 2^15) / den: 2^30 and half a denominator leave room in 32 bits. */
-static inline q15_t fx_div_q15(q15_t num, q15_t den)
-{
-    if (den == 0) {
-        return (q15_t)((num == 0) ? 0 : ((num >> 15) ^ INT16_MAX));
-    }
-    const int32_t half = ((den < 0) ? -(int32_t)den : den) >> 1;
-    return fx_sat_q15((((int32_t)num * 32768) + ((num < 0) ? -half : half)) / den);
-}
+/* (num * 2^15) / den. */
+q15_t fx_div_q15(q15_t num, q15_t den);
 
 /* 2^31 / x: the value 2^15 / x carried to 16 fractional bits. */
 static inline q16_t fx_reciprocal_q16(q15_t x)

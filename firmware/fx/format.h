@@ -35,7 +35,7 @@ typedef int32_t q16_t;
 #define Q31(x) ((q31_t)FX_CONST((double)(x), 2147483648.0, -2147483648.0, 2147483647.0))
 #define Q16(x) ((q16_t)FX_CONST((double)(x), 65536.0, -2147483648.0, 2147483647.0))
 
-static inline q15_t fx_sat_q15(int32_t x)
+__attribute__((always_inline)) static inline q15_t fx_sat_q15(int32_t x)
 {
     return fx_arch_ssat16(x);
 }
@@ -156,16 +156,8 @@ static inline q15_t fx_clamp_q15(q15_t x, q15_t lo, q15_t hi)
     return (q15_t)fx_clamp_q31(x, lo, hi);
 }
 
-/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). */
-static inline q31_t fx_shl_q31(q31_t x, unsigned n)
-{
-    const q31_t limit = (x >> 31) ^ INT32_MAX;
-    if (n > 31U) {
-        return (x == 0) ? 0 : limit;
-    }
-    const int32_t y = (int32_t)((uint32_t)x << n);
-    return ((y >> n) == x) ? y : limit;
-}
+/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). A call: no interrupt needs it. */
+q31_t fx_shl_q31(q31_t x, unsigned n);
 
 /* x / 2^n, half up; adds the bit below the cut instead of a half, so nothing can overflow. */
 static inline int32_t fx_shr_round(int32_t x, unsigned n)

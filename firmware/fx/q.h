@@ -54,12 +54,8 @@ static inline int32_t fx_mulhi_sub(int32_t acc, int32_t a, int32_t b)
     return fx_arch_smmls_r(a, b, acc);
 }
 
-/* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. */
-static inline q31_t fx_mul_q31(q31_t a, q31_t b)
-{
-    const int64_t q62 = (int64_t)a * b + INT64_C(0x40000000);
-    return ((int32_t)(q62 >> 32) == 0x40000000) ? Q31_MAX : (q31_t)(q62 >> 31);
-}
+/* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. A call, like fx_mul_gain_q31(): no interrupt needs it. */
+q31_t fx_mul_q31(q31_t a, q31_t b);
 
 /* Q31 * Q15 = Q46 -> Q30, truncated. */
 static inline int32_t fx_mul_q31_q15(q31_t a, q15_t b)
@@ -80,10 +76,7 @@ static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
 }
 
 /* Q16 * Q31 = Q47 -> Q31. */
-static inline q31_t fx_mul_gain_q31(q16_t gain, q31_t x)
-{
-    return fx_sat_q31(((int64_t)gain * x + 0x8000) >> 16);
-}
+q31_t fx_mul_gain_q31(q16_t gain, q31_t x);
 
 /* The same two with the q15 number in a word. */
 static inline int32_t fx_mul_q31_word(q31_t a, int32_t b)

@@ -10,12 +10,8 @@
  * Errors   none
  * Context  any; 23 instructions as a call */
 
-#include "fx/sqrt.h"
+#include "fx/q.h"
 
-static inline q15_t fx_magnitude(q15_t x, q15_t y)
-{
-    /* Each square is at most 2^30, so the sum, at most 2^31, fits the unsigned argument. */
-    return fx_sqrt_q30((uint32_t)fx_mul_q30(x, x) + (uint32_t)fx_mul_q30(y, y));
-}
+q15_t fx_magnitude(q15_t x, q15_t y);
 
 #endif

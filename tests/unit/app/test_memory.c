@@ -78,7 +78,7 @@ static void run(uint32_t ms)
 static void learn(void)
 {
     drive.task.identify.filter.x[IDENTIFY_FLUX] = -IDENTIFY_ONE_Q27 / 2;
-    drive.task.identify.filter.p[IDENTIFY_FLUX][IDENTIFY_FLUX] = IDENTIFY_ONE_Q30 / 64;
+    drive.task.identify.filter.p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)] = IDENTIFY_ONE_Q30 / 64;
     run(1000);
 }
 
@@ -96,14 +96,14 @@ void test_what_was_learnt_is_there_after_power_on_with_a_wider_uncertainty(void)
     TEST_ASSERT_EQUAL_INT32(-IDENTIFY_ONE_Q27 / 2, drive.task.identify.filter.x[IDENTIFY_FLUX]);
     /* (ID-19): a quarter of the prior's variance more. */
     TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30 / 64 + IDENTIFY_ONE_Q30 / 4,
-                            drive.task.identify.filter.p[IDENTIFY_FLUX][IDENTIFY_FLUX]);
+                            drive.task.identify.filter.p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
 }
 
 void test_an_empty_memory_leaves_the_priors(void)
 {
     TEST_ASSERT_FALSE(memory.recalled);
     TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.filter.x[IDENTIFY_FLUX]);
-    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, drive.task.identify.filter.p[IDENTIFY_FLUX][IDENTIFY_FLUX]);
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, drive.task.identify.filter.p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
 }
 
 void test_a_damaged_memory_leaves_the_priors(void)

@@ -261,7 +261,7 @@ void test_the_whole_agrees_with_the_twin_after_a_minute(void)
             const double sigmas = state.filter.x[j] / (double)IDENTIFY_ONE_Q27;
             worst_note(&x, sigmas - twin.filter.x[j], "second %d, state %d", n, j);
         }
-        worst_note(&p, state.filter.p[0][0] / (double)IDENTIFY_ONE_Q30 - twin.filter.p[0][0], "second %d", n);
+        worst_note(&p, state.filter.p[0] / (double)IDENTIFY_ONE_Q30 - twin.filter.p[0][0], "second %d", n);
         worst_note(&t, from_q15(out.torque) - twin.torque / f.t, "second %d", n);
         TEST_ASSERT_EQUAL(twin.trusted, state.trusted);
     }

@@ -172,19 +172,18 @@ void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
     identify_filter_t filter;
     identify_filter_reset(&filter);
     filter.x[IDENTIFY_DROP] = IDENTIFY_ONE_Q27;
-    filter.p[IDENTIFY_R][IDENTIFY_R] = 0;
-    filter.p[IDENTIFY_R][IDENTIFY_DROP] = IDENTIFY_ONE_Q30 / 2;
-    filter.p[IDENTIFY_DROP][IDENTIFY_R] = IDENTIFY_ONE_Q30 / 2;
+    filter.p[identify_pair(IDENTIFY_R, IDENTIFY_R)] = 0;
+    filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] = IDENTIFY_ONE_Q30 / 2;
     for (int n = 0; n < 5000; n++) { /* 5000 * 2e-4 = 1 */
         identify_filter_leak(&c, &filter, false);
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, exp(-1.0), filter.x[IDENTIFY_DROP] / (double)IDENTIFY_ONE_Q27);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), filter.p[0][0] / (double)IDENTIFY_ONE_Q30);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0), filter.p[1][0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), filter.p[0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0), filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
     for (int n = 0; n < 60000; n++) {
         identify_filter_leak(&c, &filter, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, filter.p[0][0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, filter.p[0] / (double)IDENTIFY_ONE_Q30);
 }
 
 static double smallest_pivot(const identify_filter_t *filter)
@@ -192,7 +191,7 @@ static double smallest_pivot(const identify_filter_t *filter)
     double a[IDENTIFY_STATES][IDENTIFY_STATES], least = 1.0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
-            a[j][l] = filter->p[j][l] / (double)IDENTIFY_ONE_Q30;
+            a[j][l] = filter->p[(j < l) ? identify_pair(j, l) : identify_pair(l, j)] / (double)IDENTIFY_ONE_Q30;
         }
     }
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
@@ -231,7 +230,7 @@ void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
         twin_filter_leak(&f.si, &twin, n % 3 == 0);
         if (n % 1000 == 0) {
             TEST_ASSERT_TRUE(smallest_pivot(&filter) > 1e-5);
-            worst_note(&p, filter.p[0][0] / (double)IDENTIFY_ONE_Q30 - twin.p[0][0], "update %d", n);
+            worst_note(&p, filter.p[0] / (double)IDENTIFY_ONE_Q30 - twin.p[0][0], "update %d", n);
             for (int j = 0; j < IDENTIFY_STATES; j++) {
                 worst_note(&x, filter.x[j] / (double)IDENTIFY_ONE_Q27 - twin.x[j], "update %d, state %d", n, j);
             }

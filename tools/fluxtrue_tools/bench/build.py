@@ -18,6 +18,7 @@ ARM_CC = "arm-none-eabi-gcc"
 # As tools/cmake/arm-none-eabi.cmake compiles the firmware.
 ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns")
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
+FAST = frozenset(FIRMWARE / name for name in (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").split())
 
 
 def have_arm_compiler() -> bool:
@@ -34,7 +35,7 @@ def _run(command: Sequence[str], output: Path) -> Path:
 
 
 def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:
-    """An ELF file without start-up code: its functions are called one by one."""
+    """An ELF file without start-up code: its functions are called one by one. Fast or small as in the image."""
     if not have_arm_compiler():
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
     link = (
@@ -42,8 +43,14 @@ def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = (
         "--specs=nano.specs",
         f"-Wl,-Ttext={CODE[0] + 0x1000:#x},-Tdata={DATA[0]:#x},-e,0",
     )
-    files = [str(path) for path in sources]
-    return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *files, *link, "-o", str(output)], output)
+    objects = output.parent / f"{output.stem}.objects"
+    objects.mkdir(parents=True, exist_ok=True)
+    compiled = []
+    for path in sources:
+        compiled.append(objects / f"{path.stem}.o")
+        small = ("-Os",) if FIRMWARE in path.parents and path not in FAST else ()
+        _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *small, "-c", str(path), "-o", str(compiled[-1])], compiled[-1])
+    return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *map(str, compiled), *link, "-o", str(output)], output)
 
 
 def build_host(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:

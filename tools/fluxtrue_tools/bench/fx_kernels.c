@@ -5,6 +5,7 @@
 #include "fx/div.h"
 #include "fx/lookup.h"
 #include "fx/q.h"
+#include "fx/sqrt.h"
 #include "fx/trig.h"
 #include "fx/vec.h"
 
