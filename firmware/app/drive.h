@@ -3,7 +3,7 @@
 #define APP_DRIVE_H
 /** One drive: configuration, the state of every stage, and the three activities that run it.
  *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), then pends mrai_isr
- *   mrai_isr  each PWM period, below the fast ISR: identification and torque estimate
+ *   mrai_isr  each PWM period, below the fast ISR: the paper's identification and torque estimate
  *   task_1khz every tenth period, below both: request, torque loop, current reference, identification schedule,
  *     supervision
  * Source   docs/architecture.md
@@ -51,6 +51,7 @@ typedef struct {
     current_control_state_t current_control;
     monitor_state_t monitor;
     dq_t coming;                 /* voltage of the next period, which the duties just written will make */
+    identify_window_t window;    /* of the robust identification, in the making */
     uint8_t periods_on; /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
     uint32_t overruns;
@@ -60,12 +61,12 @@ typedef struct {
     volatile uint32_t faults;    /* latched */
 } fast_state_t;
 
-/** Written by the MRAI ISR alone; psi_delta_q15 is one half word for the fast ISR. */
+/** Written by the MRAI ISR alone. psi_delta_q15 is one half word for the fast ISR, which keeps it itself while the MRAI
+ * ISR rests: then it comes from the task's robust identification. */
 typedef struct {
     mrai_state_t mrai;
     torque_estimate_state_t torque;
-    identify_window_t window;
-    bool mrai_asleep; /* another mode ran in the last period */
+    uint32_t generation;            /* of the last sample it took */
     uint32_t identification_resets; /* of the request, as far as done */
     volatile uint32_t finished;
     volatile q15_t psi_delta_q15;

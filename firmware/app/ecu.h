@@ -17,7 +17,7 @@
 #include "comm/can_tx.h"
 
 typedef struct {
-    uint32_t pended, finished;   /* of the interrupts, at the last task */
+    uint32_t periods, finished;  /* of the interrupts, at the last task */
     uint16_t task_overruns, held; /* the watchdog was not served */
     uint8_t late_in_a_row, stalled_in_a_row;
     bool started;

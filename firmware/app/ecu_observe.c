@@ -36,15 +36,16 @@ static uint8_t in_a_row(uint8_t before, bool again)
 void ecu_watch(ecu_t *ecu)
 {
     liveness_t *seen = &ecu->liveness;
-    const uint32_t pended = ecu->drive.fast.pended;
+    const uint32_t periods = ecu->drive.samples.generation;
     const uint32_t finished = ecu->drive.slow.finished;
-    const bool late = seen->started && pended - seen->pended >= LATE_PERIODS;
+    const bool late = seen->started && periods - seen->periods >= LATE_PERIODS;
+    const bool unfinished = ecu->drive.fast.pended != finished && finished == seen->finished;
     seen->late_in_a_row = in_a_row(seen->late_in_a_row, late);
-    seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, pended == seen->pended || finished == seen->finished);
+    seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, periods == seen->periods || unfinished);
     if (late) {
         count(&seen->task_overruns);
     }
-    seen->pended = pended;
+    seen->periods = periods;
     seen->finished = finished;
 }
 
@@ -64,7 +65,7 @@ static bool plausible(const drive_t *drive, const sample_t *sample)
 {
     const dq_t i = sample->mrai.i;
     const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
-    return drive->fast.pended != 0U && (idle || drive->request.enable);
+    return drive->samples.generation != 0U && (idle || drive->request.enable);
 }
 
 /* sqrt(3) w psi: the peak of the line voltage that the turning magnet makes. */

@@ -21,7 +21,8 @@
 /** One period as the fast ISR saw it. Writer: fast ISR. Readers: MRAI ISR, 1 kHz task. */
 typedef struct {
     mrai_in_t mrai;
-    adc_counts_t counts;
+    fx_pair_t i_ab;   /* alpha, beta */
+    int32_t sum_q27;  /* of the phases */
     int32_t v_dc;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
     uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
@@ -35,7 +36,7 @@ typedef struct {
     volatile uint32_t generation;
 } sample_box_t;
 
-/** Ten periods of the robust identification. Writer: MRAI ISR. Reader: 1 kHz task. */
+/** Ten periods of the robust identification. Writer: fast ISR. Reader: 1 kHz task. */
 typedef struct {
     identify_window_t slot[2];
     volatile uint32_t generation;
@@ -102,9 +103,9 @@ static inline sample_t sample_box_read(const sample_box_t *box)
 }
 
 /* In place, for the MRAI ISR: the fast ISR leaves a slot alone until it has finished with it. */
-static inline const sample_t *sample_box_look(const sample_box_t *box)
+static inline const sample_t *sample_box_look(const sample_box_t *box, uint32_t generation)
 {
-    const sample_t *slot = &box->slot[box->generation & 1U];
+    const sample_t *slot = &box->slot[generation & 1U];
     __asm__("" : "+r"(slot));
     return slot;
 }

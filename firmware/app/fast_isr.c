@@ -13,28 +13,45 @@
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
     fx_pair_t i_dq, advanced;
-    int32_t sum_q27;
-    angle_t angle;
+    int32_t sum_q27, v_dc;
+    q31_t omega;
 } instant_t;
+
+/* What the angle sensor is known to be wrong by, where it stands. */
+static uint32_t correction(const drive_t *drive, uint32_t theta_m)
+{
+    const volatile int32_t *parts = drive->task.angle_correction;
+    __asm__("" : "+r"(parts)); /* the address once: not part of every index */
+    return (uint32_t)parts[theta_m >> ANGLE_HARMONICS_SHIFT];
+}
 
 static instant_t observe(drive_t *drive, sample_t *sample)
 {
-    hal_adc_read(&sample->counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
-    instant_t now;
-    const uint32_t read = hal_angle_read();
-    sample->theta_m = read + (uint32_t)drive->task.angle_correction[read >> ANGLE_HARMONICS_SHIFT];
+    adc_counts_t counts;
+    hal_adc_read(&counts);
+    const measure_t measured = measure_step(&drive->motor.measure, &counts);
+    sample->i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
+    sample->sum_q27 = measured.sum_q27;
     sample->v_dc = measured.v_dc;
-    now.angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, sample->theta_m);
-    sample->mrai.omega = now.angle.omega_q31;
-    sample->theta_e = now.angle.theta_e;
-    now.sum_q27 = measured.sum_q27;
-    const dq_t i = park(measured.i, fx_rotation(now.angle.theta_e));
-    now.i_dq = fx_arch_pkhbt(i.d, i.q);
-    /* The middle of the period in which the duties will act: 1.5 periods ahead. */
-    now.advanced = fx_rotation(now.angle.theta_e + (uint32_t)now.angle.step + (uint32_t)(now.angle.step >> 1));
+    const uint32_t read = hal_angle_read();
+    const uint32_t theta_m = read + correction(drive, read);
+    sample->theta_m = theta_m;
+    const angle_t angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, theta_m);
+    if (__builtin_expect(angle.jumped, 0)) {
+        monitor_note_jump(&drive->fast.monitor);
+    }
+    sample->theta_e = angle.theta_e;
+    sample->mrai.omega = angle.omega_q31;
+    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
     sample->mrai.i = i;
-    return now;
+    return (instant_t){
+        .i_dq = fx_arch_pkhbt(i.d, i.q),
+        /* The middle of the period in which the duties will act: 1.5 periods ahead. */
+        .advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1)),
+        .sum_q27 = measured.sum_q27,
+        .v_dc = measured.v_dc,
+        .omega = angle.omega_q31,
+    };
 }
 
 /* Counts the periods that find the identification still busy. */
@@ -53,12 +70,28 @@ static void watch(drive_t *drive, uint32_t unfinished)
     }
 }
 
-/* Hands this period to the identification. */
-static void publish(drive_t *drive, uint32_t next)
+/* Hands this period to the identification: the robust one's sums are made here, the paper's law runs below. */
+static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
 {
+    fast_state_t *fast = &drive->fast;
     sample_box_publish(&drive->samples, next);
-    drive->fast.pended++;
-    hal_irq_pend_mrai();
+    if (drive->request.identification_mode != IDENTIFICATION_ROBUST) {
+        fast->pended++;
+        hal_irq_pend_mrai();
+        return;
+    }
+    drive->slow.psi_delta_q15 = drive->task.identified.psi_delta;
+    const identify_sample_t in = {
+        .i = sample->mrai.i,
+        .u = sample->mrai.u,
+        .flux = &sample->mrai.flux,
+        .theta = sample->theta_e,
+        .acting = sample->acting,
+        .limited = sample->snapped,
+    };
+    if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
+        window_box_write(&drive->windows, &fast->window);
+    }
 }
 
 /* The safe state: low sides closed, or all gates open. */
@@ -102,12 +135,12 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
     const current_control_in_t control = {
         .target = target,
         .flux = &sample->mrai.flux,
-        .omega = now->angle.omega_q31,
-        .psi_delta = drive->slow.psi_delta_q15,
-        .v_dc = sample->v_dc,
+        .omega = now->omega,
+        .psi_delta = drive_psi_delta(drive),
+        .v_dc = now->v_dc,
     };
     const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
-    const modulate_in_t modulation = {wanted.u, now->i_dq, now->advanced, sample->v_dc, wanted.clear};
+    const modulate_in_t modulation = {wanted.u, now->i_dq, now->advanced, now->v_dc, wanted.clear};
     const modulate_out_t made = modulate_step(&m->modulate, &modulation);
     hal_pwm_write(made.duty);
     hal_pwm_enable(true);
@@ -137,11 +170,10 @@ static void forget_faults(drive_t *drive, uint32_t asked)
     }
 }
 
-/* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the counts again. */
-static __attribute__((noinline)) void look(drive_t *drive, const sample_t *sample, bool jumped, bool run)
+/* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the vector again. */
+static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t *sample, bool run)
 {
-    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
-    const monitor_in_t seen = {measure_phases(measured.i, measured.sum_q27), sample->v_dc, jumped};
+    const monitor_in_t seen = {measure_phases(sample->i_ab, sample->sum_q27), sample->v_dc};
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
     if (faults != 0) {
@@ -163,9 +195,9 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
         next--;
     }
     const instant_t now = observe(drive, sample);
-    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, sample->v_dc);
-    if (__builtin_expect(now.angle.jumped || !quiet, 0)) {
-        look(drive, sample, now.angle.jumped, command->run);
+    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, now.v_dc);
+    if (__builtin_expect(!quiet, 0)) {
+        look(drive, sample, command->run);
     }
     sample->mrai.flux = flux_table_step(&drive->motor.flux_table, sample->mrai.i);
     if (command->run && drive->fast.faults == 0) {
@@ -176,5 +208,5 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
         }
         bridge_off(drive, sample, command->safe);
     }
-    publish(drive, next);
+    publish(drive, sample, next);
 }

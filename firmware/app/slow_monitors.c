@@ -15,13 +15,12 @@ static uint32_t currents(drive_t *drive, const view_t *view)
 {
     const sample_t *sample = &view->sample;
     task_state_t *task = &drive->task;
-    const measure_t measured = measure_step(&drive->motor.measure, &sample->counts);
     const plausibility_in_t in = {
         .acting = sample->acting,
         .voltage_limited = sample->voltage_limited,
         .i = sample->mrai.i,
         .i_ref = task->i_ref,
-        .phases = measure_phases(measured.i, measured.sum_q27),
+        .phases = measure_phases(sample->i_ab, sample->sum_q27),
         .wanted = in_phases(task->i_ref, sample->theta_e),
         .omega = fx_q15_from_q31(sample->mrai.omega),
         .inverter_dC = view->inverter_dC,

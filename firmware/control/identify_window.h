@@ -8,7 +8,7 @@
  * Range    any: |sum| <= 10 * 2^15
  * Rounding none: exact
  * Errors   acting is false if the bridge was not ours in one of the periods
- * Context  MRAI ISR; no multiplication, no division, no loop */
+ * Context  fast ISR; no multiplication, no division, no loop */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -23,9 +23,10 @@ typedef struct {
 } identify_end_t;
 
 typedef struct {
-    identify_end_t first, last;
     dq_t sum_i, sum_u;
-    uint8_t count, limited; /* periods so far; of these, with pulses that the bridge cannot make */
+    identify_end_t first, last;
+    uint32_t count;  /* periods so far */
+    uint8_t limited; /* of these, with pulses that the bridge cannot make */
     bool acting;
 } identify_window_t;
 

@@ -30,8 +30,9 @@ measure_t measure_step(const measure_config_t *config, const adc_counts_t *count
     };
 }
 
-abc_t measure_phases(ab_t i, int32_t sum_q27)
+abc_t measure_phases(fx_pair_t i_ab, int32_t sum_q27)
 {
+    const ab_t i = {(int16_t)(i_ab & 0xFFFFU), (int16_t)(i_ab >> 16)};
     const int32_t zero = fx_mulhi(sum_q27, PER_THREE);
     const int32_t side = fx_mulhi(i.beta * 65536, Q16(0.86602540378443865)); /* Q31 * Q16 = Q15 */
     const int32_t half = i.alpha >> 1;

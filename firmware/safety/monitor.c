@@ -26,14 +26,15 @@ uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, co
     const bool over_voltage = in->v_dc > config->v_max;
     const bool under_voltage = in->v_dc < config->v_min;
     const bool unbalanced = beyond(i.a + i.b + i.c, config->sum_max);
-    if (!(over_current || over_voltage || under_voltage || unbalanced || in->angle_jumped || state->counting)) {
+    if (!(over_current || over_voltage || under_voltage || unbalanced || state->attention != 0U)) {
         return 0;
     }
     uint32_t faults = over_current ? FAULT_OVER_CURRENT : 0;
     faults |= confirm(&state->over_voltage, over_voltage, OVER_VOLTAGE_SAMPLES, FAULT_OVER_VOLTAGE);
     faults |= confirm(&state->under_voltage, under_voltage, UNDER_VOLTAGE_SAMPLES, FAULT_UNDER_VOLTAGE);
     faults |= confirm(&state->current_sum, unbalanced, CURRENT_SUM_SAMPLES, FAULT_CURRENT_SUM);
-    faults |= confirm(&state->angle, in->angle_jumped, ANGLE_SAMPLES, FAULT_ANGLE);
-    state->counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
+    faults |= confirm(&state->angle, (state->attention & MONITOR_JUMPED) != 0U, ANGLE_SAMPLES, FAULT_ANGLE);
+    const bool counts = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
+    state->attention = counts ? MONITOR_COUNTS : 0;
     return faults;
 }

@@ -16,22 +16,25 @@
 #include "types/faults.h"
 #include "types/frames.h"
 
+/* A reason to look closer than monitor_quiet(). */
+enum { MONITOR_COUNTS = 1, MONITOR_JUMPED = 2 };
+
+/** q15 in a word each, in the order in which every period reads them. */
 typedef struct {
-    q15_t i_trip;
-    q15_t v_max, v_min;
-    q15_t sum_max;
     int32_t quiet_q30; /* (i_trip - sum_max/3)^2: a vector that short has no phase beyond i_trip */
+    int32_t sum_max;
+    int32_t v_min, v_max;
+    int32_t i_trip;
 } monitor_config_t;
 
 typedef struct {
     uint8_t over_voltage, under_voltage, current_sum, angle;
-    bool counting; /* one of them is not zero: else a good sample has nothing to do */
+    uint8_t attention; /* MONITOR_..., else a good sample has nothing to do */
 } monitor_state_t;
 
 typedef struct {
     abc_t i;
     int32_t v_dc;
-    bool angle_jumped;
 } monitor_in_t;
 
 /** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to
@@ -39,10 +42,18 @@ typedef struct {
 static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, fx_pair_t i,
                                  int32_t sum_q27, int32_t v_dc)
 {
-    const uint32_t sum_max = (uint32_t)config->sum_max;
-    return (uint32_t)fx_dot2(i, i) < (uint32_t)config->quiet_q30 &&
-           (uint32_t)(sum_q27 >> 12) + sum_max < 2U * sum_max && v_dc >= config->v_min && v_dc <= config->v_max &&
-           !state->counting;
+    int32_t quiet_q30 = config->quiet_q30, most = config->sum_max, v_min = config->v_min, v_max = config->v_max;
+    fx_arch_together(&quiet_q30, &most);
+    fx_arch_together(&v_min, &v_max);
+    const uint32_t sum_max = (uint32_t)most;
+    return (uint32_t)fx_dot2(i, i) < (uint32_t)quiet_q30 && (uint32_t)(sum_q27 >> 12) + sum_max < 2U * sum_max &&
+           v_dc >= v_min && v_dc <= v_max && state->attention == 0U;
+}
+
+/** The angle has jumped: not a quiet period. */
+static inline void monitor_note_jump(monitor_state_t *state)
+{
+    state->attention |= MONITOR_JUMPED;
 }
 
 uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in);

@@ -4,13 +4,13 @@
 /** What crosses the hardware seam every period: converter counts in, duties out.
  * Source   docs/architecture.md, the HAL seam
  * Units    counts of an adc_bits converter, right-aligned; duties with 2^15 = 1.0
- * Range    duties 0 ... 32768, in a word each: a halfword would cost an extension at every use
+ * Range    duties 0 ... 32768; everything in a word each: a halfword would cost an extension at every use
  * Context  values only */
 #include <stdint.h>
 
 typedef struct {
-    uint16_t i_a, i_b, i_c; /* mid scale is zero current, positive into the motor */
-    uint16_t v_dc;
+    uint32_t i_a, i_b, i_c; /* mid scale is zero current, positive into the motor */
+    uint32_t v_dc;
 } adc_counts_t;
 
 typedef struct {

@@ -70,10 +70,10 @@ void sampling_init(void)
 
 void hal_adc_read(adc_counts_t *counts)
 {
-    counts->i_a = (uint16_t)ADC0->R[I_A];
-    counts->i_b = (uint16_t)ADC1->R[I_B];
-    counts->i_c = (uint16_t)ADC0->R[I_C]; /* ends the interrupt's request */
-    counts->v_dc = (uint16_t)ADC1->R[V_DC];
+    counts->i_a = ADC0->R[I_A];
+    counts->i_b = ADC1->R[I_B];
+    counts->i_c = ADC0->R[I_C]; /* ends the interrupt's request */
+    counts->v_dc = ADC1->R[V_DC];
 }
 
 uint16_t sampling_winding(void)

@@ -42,7 +42,7 @@ static measure_t measured(const adc_counts_t *counts)
 static abc_t phases(const adc_counts_t *counts)
 {
     const measure_t m = measured(counts);
-    return measure_phases(m.i, m.sum_q27);
+    return measure_phases(fx_pair((q15_t)m.i.alpha, (q15_t)m.i.beta), m.sum_q27);
 }
 
 void tearDown(void)

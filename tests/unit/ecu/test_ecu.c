@@ -143,6 +143,7 @@ void test_the_watchdog_is_not_served_while_the_identification_stands_still(void)
 {
     tasks(10);
     const int before = watchdog_services;
+    ecu.drive.request.identification_mode = IDENTIFICATION_PAPER;
     mrai_hangs = true;
     tasks(5);
     TEST_ASSERT_EQUAL_INT(before, watchdog_services);

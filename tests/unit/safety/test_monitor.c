@@ -5,10 +5,12 @@
 static const monitor_config_t config = {.i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900};
 static monitor_state_t state;
 static monitor_in_t in;
+static bool jumped;
 
 void setUp(void)
 {
     state = (monitor_state_t){0};
+    jumped = false;
     in = (monitor_in_t){.v_dc = 20000};
 }
 
@@ -18,6 +20,9 @@ void tearDown(void)
 
 static uint32_t step(void)
 {
+    if (jumped) {
+        monitor_note_jump(&state);
+    }
     return monitor_step(&config, &state, &in);
 }
 
@@ -106,16 +111,39 @@ void test_a_current_sum_needs_five_samples_in_a_row_with_either_sign(void)
 
 void test_three_angle_jumps_in_a_row_are_an_angle_fault(void)
 {
-    monitor_in_t bad = in;
-    bad.angle_jumped = true;
-    confirmed_after(3, FAULT_ANGLE, bad);
+    for (int round = 0; round < 2; round++) {
+        jumped = true;
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+        TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
+        TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
+        jumped = false;
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+    for (int n = 0; n < 100; n++) { /* never three in a row */
+        jumped = n % 3 != 0;
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+}
+
+/* A jump is noted for one period: the next one is quiet again if it is good. */
+void test_a_jump_is_looked_at_once_and_then_forgotten(void)
+{
+    const monitor_config_t quick = {.i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .quiet_q30 = 1 << 29};
+    TEST_ASSERT_TRUE(monitor_quiet(&quick, &state, 0, 0, 20000));
+    monitor_note_jump(&state);
+    TEST_ASSERT_FALSE(monitor_quiet(&quick, &state, 0, 0, 20000));
+    (void)step(); /* counts one */
+    TEST_ASSERT_FALSE(monitor_quiet(&quick, &state, 0, 0, 20000));
+    (void)step(); /* a good one: counts no longer */
+    TEST_ASSERT_TRUE(monitor_quiet(&quick, &state, 0, 0, 20000));
 }
 
 void test_several_faults_are_reported_together(void)
 {
     in.i = (abc_t){32767, 32767, 32767};
     in.v_dc = 32767;
-    in.angle_jumped = true;
+    jumped = true;
     uint32_t faults = 0;
     for (int n = 0; n < 5; n++) {
         faults = step();

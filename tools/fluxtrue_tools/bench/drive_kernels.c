@@ -109,26 +109,26 @@ CALLED void drive_request(int32_t torque, uint32_t enable)
 CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 {
     port.counts =
-        (adc_counts_t){(uint16_t)i_ab, (uint16_t)(i_ab >> 16), (uint16_t)i_c_v_dc, (uint16_t)(i_c_v_dc >> 16)};
+        (adc_counts_t){i_ab & 0xFFFFU, i_ab >> 16, i_c_v_dc & 0xFFFFU, i_c_v_dc >> 16};
     port.theta_m = theta_m;
 }
 
 CALLED void drive_copy(void)
 {
     copy = drive;
-    found.sample = &sample_box_look(&copy.samples)->mrai;
+    found.sample = &sample_box_look(&copy.samples, copy.samples.generation)->mrai;
     found.schedule = schedule_box_read(&copy.schedules);
     found.target = &command_box_read(&copy.commands)->target;
     found.i = found.sample->i;
     found.phases = (abc_t){((int32_t)port.counts.i_a - 2048) * 16, ((int32_t)port.counts.i_b - 2048) * 16,
                            ((int32_t)port.counts.i_c - 2048) * 16};
-    found.theta_e = sample_box_look(&copy.samples)->theta_e;
+    found.theta_e = sample_box_look(&copy.samples, copy.samples.generation)->theta_e;
     found.core = (current_target_t){found.i, {found.i.d * 32768, found.i.q * 32768}};
 }
 
 CALLED uint32_t drive_limited(void)
 {
-    return sample_box_look(&drive.samples)->voltage_limited ? 1U : 0U;
+    return sample_box_look(&drive.samples, drive.samples.generation)->voltage_limited ? 1U : 0U;
 }
 
 /* Duties and gates first, then everything that lives on from one period to the next. */
@@ -136,7 +136,7 @@ CALLED const int32_t *drive_outputs(void)
 {
     const fast_state_t *fast = &drive.fast;
     const mrai_state_t *mrai = &drive.slow.mrai;
-    const sample_t *sample = sample_box_look(&drive.samples);
+    const sample_t *sample = sample_box_look(&drive.samples, drive.samples.generation);
     const int32_t all[OUTPUTS] = {
         port.duty.a, port.duty.b, port.duty.c, port.gates,
         sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
@@ -214,7 +214,7 @@ STAGE void bench_current_tick(void)
         .target = found.target,
         .flux = &flux,
         .omega = angle.omega_q31,
-        .psi_delta = d->slow.psi_delta_q15,
+        .psi_delta = drive_psi_delta(d),
         .v_dc = measured.v_dc,
     };
     const current_control_out_t wanted =
@@ -261,8 +261,8 @@ STAGE void bench_current_control(void)
         .target = found.target,
         .flux = &flux,
         .omega = found.sample->omega,
-        .psi_delta = d->slow.psi_delta_q15,
-        .v_dc = sample_box_look(&d->samples)->v_dc,
+        .psi_delta = drive_psi_delta(d),
+        .v_dc = sample_box_look(&d->samples, d->samples.generation)->v_dc,
     };
     found.wanted = current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
 }
@@ -272,7 +272,7 @@ STAGE void bench_modulate(void)
 {
     const drive_t *d = the_copy();
     const modulate_in_t modulation = {found.wanted.u, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e),
-                                      sample_box_look(&d->samples)->v_dc, found.wanted.clear};
+                                      sample_box_look(&d->samples, d->samples.generation)->v_dc, found.wanted.clear};
     port.duty = modulate_step(&d->motor.modulate, &modulation).duty;
 }
 

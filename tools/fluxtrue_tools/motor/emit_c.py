@@ -233,11 +233,11 @@ def _i_d_limit(motor: Motor) -> list[Row]:
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
-    return [("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
-            ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
-            ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
+    return [("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2"),
             ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A"),
-            ("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2")]
+            ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
+            ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
+            ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A")]
 
 
 def _plausibility(motor: Motor) -> list[Row]:
