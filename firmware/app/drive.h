@@ -148,6 +148,13 @@ static inline q15_t drive_psi_delta(const drive_t *drive)
     return drive->slow.psi_delta_q15;
 }
 
+/** Scale of psi_q less one: only the robust identification tells the tables' error from the magnet's. */
+static inline q31_t drive_lq_error(const drive_t *drive)
+{
+    const bool robust = drive->request.identification_mode == IDENTIFICATION_ROBUST;
+    return robust ? identify_value(&drive->motor.identify, &drive->task.identify, IDENTIFY_LQ) : 0;
+}
+
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
 

@@ -112,6 +112,12 @@ static q15_t torque_path(drive_t *drive, const view_t *view)
     return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
 }
 
+/* What the identified |psi_q| is more than the tables'. */
+static q15_t psi_q_delta(const drive_t *drive)
+{
+    return fx_mul_q15(fx_q15_from_q31(drive_lq_error(drive)), fx_abs_q15((q15_t)drive->task.psi_ref.q));
+}
+
 static dq_t references(drive_t *drive, const view_t *view)
 {
     task_state_t *task = &drive->task;
@@ -126,6 +132,7 @@ static dq_t references(drive_t *drive, const view_t *view)
         .shift = trim.shift,
         .psi_delta = view->psi_delta,
         .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, view->psi_delta, view->winding_dC),
+        .psi_q_delta = psi_q_delta(drive),
     };
     task->reference = current_reference_step(&drive->motor.current_reference, &in);
     if (commission_runs(&task->commission)) {

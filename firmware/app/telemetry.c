@@ -42,13 +42,6 @@ static void read_torque(const drive_t *drive, telemetry_t *t)
     t->torque_max_Nm = from_q15(drive->task.reference.torque_max, base);
 }
 
-/* Only the robust identification tells the tables' error from the magnet's. */
-static q31_t lq_error(const drive_t *drive)
-{
-    const bool robust = drive->request.identification_mode == IDENTIFICATION_ROBUST;
-    return robust ? identify_value(&drive->motor.identify, &drive->task.identify, IDENTIFY_LQ) : 0;
-}
-
 static void read_identification(const drive_t *drive, telemetry_t *t)
 {
     const motor_t *m = &drive->motor;
@@ -56,7 +49,7 @@ static void read_identification(const drive_t *drive, telemetry_t *t)
     const float r_ohm = m->r_ohm_20 + from_q31(drive->task.learnt.r_delta, m->bases.resistance_ohm);
     t->psi_f_mVs = 1000.0F * psi_Vs;
     t->r_mohm = 1000.0F * r_ohm;
-    t->table_scale_percent = 100.0F + from_q31(lq_error(drive), 100.0F);
+    t->table_scale_percent = 100.0F + from_q31(drive_lq_error(drive), 100.0F);
     t->psi_quality_percent = from_q15(drive->task.quality.psi_quality, 100.0F);
     t->r_quality_percent = from_q15(drive->task.quality.r_quality, 100.0F);
     t->psi_clamped = drive->task.learnt.psi_clamped;

@@ -56,14 +56,15 @@ static __attribute__((noinline)) q15_t largest(const current_reference_config_t 
     return fx_lookup1(&config->torque_max, psi, &clamped);
 }
 
-/* t_max + dpsi i_q(t_max): the tables' torque plus what the magnet differs by (CR-10). What a weak magnet leaves at
- * the present point it need not leave at the largest torque, where psi_d is small: not counted. */
+/* t_max + dpsi_d i_q - dpsi_q i_d there: the tables' torque plus what magnet and q axis differ by (CR-10). What a weak
+ * magnet leaves at the present point it need not leave at the largest torque, where psi_d is small: not counted. */
 static q15_t reachable(const current_reference_config_t *config, const current_reference_in_t *in, int32_t planned)
 {
     const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
     const q15_t torque_max = largest(config, psi);
-    const q15_t i_q = (q15_t)tabulated(config, torque_max, psi).q;
-    return fx_sat_q15(fx_max_s32(torque_max + fx_mul_q15(in->psi_delta, i_q), 0));
+    const dq_t i = tabulated(config, torque_max, psi);
+    const int32_t learnt = fx_mul_q15(in->psi_delta, (q15_t)i.q) - fx_mul_q15(in->psi_q_delta, (q15_t)i.d);
+    return fx_sat_q15(fx_max_s32(torque_max + learnt, 0));
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)

@@ -6,8 +6,8 @@
  *   psi_plan = (v_ratio v_dc - r |i| + v_trim)/|w| - shift: shift is what the identified magnet adds to |psi|, v_trim
  *     what voltage_reserve.h found the plan to be wrong by
  *   |T| is first limited to t_max(psi_plan), the largest torque inside voltage and current circle, and i_d to -i_d_max.
- *   torque_max = t_max + dpsi i_q(t_max), t_max without the flux that a weak magnet leaves at the present point: what
- *     the machine as identified can make, never too high
+ *   torque_max = t_max + dpsi_d i_q(t_max) - dpsi_q i_d(t_max), t_max without the flux that a weak magnet leaves at the
+ *     present point: what the machine as identified can make
  * Source   docs/theory/current-reference.md (CR-1) ... (CR-11)
  * Units    per unit
  * Range    psi_plan outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged;
@@ -37,8 +37,9 @@ typedef struct {
     q15_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
     q15_t v_trim;
     q15_t shift;
-    q15_t psi_delta;   /* identified flux minus the table's */
+    q15_t psi_delta;   /* identified flux minus the table's, d axis */
     q15_t i_d_max;     /* magnitude of the most negative i_d that the magnets bear now */
+    q15_t psi_q_delta; /* what the identified |psi_q| is more than the tables' at the last reference */
 } current_reference_in_t;
 
 typedef struct {

@@ -121,6 +121,7 @@ static void torque_path(twin_t *twin)
         .acting = twin->periods_on >= 3 && !twin->current_mode,
     };
     const double shift = twin_voltage_reserve(&twin->motor, &twin->trim, &reserve);
+    const double lq_error = twin->robust ? twin->identify.filter.x[3] * twin->motor.identify_sigma[3] : 0.0;
     const twin_reference_in_t request = {
         .torque = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
         .v_dc = twin->v_dc,
@@ -130,6 +131,7 @@ static void torque_path(twin_t *twin)
         .shift = shift,
         .psi_delta = twin->psi_delta,
         .i_d_max = twin_i_d_limit(&twin->motor, twin->psi_delta, twin->winding_C),
+        .psi_q_delta = lq_error * fabs(twin->psi_ref.q),
     };
     twin->reference = twin_current_reference(&twin->motor, &request);
 }

@@ -187,7 +187,7 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in);
 
 typedef struct {
-    double torque, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max;
+    double torque, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max, psi_q_delta;
 } twin_reference_in_t;
 
 typedef struct {

@@ -138,6 +138,20 @@ void test_the_reachable_torque_counts_what_the_magnet_differs_by(void)
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, step().torque_max);
 }
 
+/* Reluctance torque is -psi_q i_d: at a table node, one tenth more q flux gives a tenth of its i_d. */
+void test_the_reachable_torque_counts_what_the_q_axis_differs_by(void)
+{
+    in.omega = 26214;
+    const q15_t nominal = step().torque_max;
+    in.torque = nominal;
+    const int32_t i_d = step().i_ref.d;
+    TEST_ASSERT_LESS_THAN_INT(-1000, i_d);
+    in.psi_q_delta = 3277; /* 0.1 */
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, nominal - 0.1 * i_d, step().torque_max);
+    in.psi_q_delta = -3277;
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, nominal + 0.1 * i_d, step().torque_max);
+}
+
 void test_i_d_goes_no_further_than_the_magnets_bear_and_says_so(void)
 {
     const current_reference_t free = step();
@@ -172,12 +186,14 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
         in = (current_reference_in_t){(q15_t)random_in(&seed, -16000, 16000), (q15_t)random_in(&seed, 8000, 32767),
                                       (q15_t)random_in(&seed, 3000, 32767), (q15_t)random_in(&seed, 0, 30000),
                                       (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, -4000, 2000),
-                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, 1000, 32767)};
+                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, 1000, 32767),
+                                      (q15_t)random_in(&seed, -3000, 3000)};
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
         const twin_reference_in_t t = {from_q15(in.torque) * f.t,       from_q15(in.v_dc) * f.v,
                                        from_q15(in.omega) * f.w,        from_q15(in.i_magnitude) * f.i,
                                        from_q15(in.v_trim) * f.v,       from_q15(in.shift) * f.psi,
-                                       from_q15(in.psi_delta) * f.psi,  from_q15(in.i_d_max) * f.i};
+                                       from_q15(in.psi_delta) * f.psi,  from_q15(in.i_d_max) * f.i,
+                                       from_q15(in.psi_q_delta) * f.psi};
         const current_reference_t y = step();
         const twin_reference_t s = twin_current_reference(&f.si, &t);
         worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque, in.v_dc, in.omega);

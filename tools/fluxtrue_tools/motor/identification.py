@@ -11,7 +11,7 @@ from fluxtrue_tools.motor.quantise import q15, q16, q31
 Row = tuple[str, object, str]
 
 WINDOW_PERIODS, UPDATE_STEPS = 10, 10
-IRON_SIGN_RAD_S = 30.0
+IRON_SIGN_RAD_S = 8.0  # electrical; the hysteresis term is whole from 25 rpm on three pole pairs
 OMEGA_MIN_SHARE = 0.02  # of maximum speed
 I_MIN_SHARE = 0.03  # of i_max
 LOCAL_TIME_S = 0.02
