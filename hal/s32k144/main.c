@@ -21,6 +21,7 @@
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
 
 ecu_t ecu; /* calibration tools find it by this name */
+static const pwm_config_t stopped = {11200, 1120}; /* for a counter that never runs, and the 1 kHz of the task */
 static volatile bool data_damaged; /* set by the background, for the fast ISR: it alone raises faults */
 static bool started;               /* the PWM, and with it the fast ISR */
 
@@ -97,6 +98,17 @@ static uint32_t ticks(float seconds)
     return (uint32_t)(seconds * (float)CLOCK_CORE_HZ + 0.5F);
 }
 
+/* False: the motor's data ask for what the timer cannot do. */
+static bool timing(pwm_config_t *pwm)
+{
+    const pwm_config_t wanted = {4U * ticks(motor.bases.period_s / 4.0F), ticks(motor.dead_time_s)};
+    if (!pwm_possible(&wanted)) {
+        return false;
+    }
+    *pwm = wanted;
+    return true;
+}
+
 static void init_hardware(const pwm_config_t *pwm)
 {
     clock_init();
@@ -107,13 +119,14 @@ static void init_hardware(const pwm_config_t *pwm)
     can_init();
 }
 
-/* Damaged data must not be computed with: then the counter, and so the fast ISR, never starts. */
-static void start(const pwm_config_t *pwm)
+/* Damaged data must not be computed with, nor a period or a dead time tried that the timer cannot keep: then the
+ * counter, and so the fast ISR, never starts. */
+static void start(const pwm_config_t *pwm, bool drivable)
 {
     __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
     angle_init(pwm->period_ticks);
     tick_start();
-    if (!data_damaged && pwm_possible(pwm)) {
+    if (drivable) {
         pwm_start();
         started = true;
     }
@@ -126,8 +139,9 @@ __attribute__((noinline)) int main(void)
 {
     data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
-    const pwm_config_t pwm = {4U * ticks(motor.bases.period_s / 4.0F), ticks(motor.dead_time_s)};
-    if (data_damaged || !pwm_possible(&pwm)) {
+    pwm_config_t pwm = stopped;
+    const bool drivable = !data_damaged && timing(&pwm);
+    if (!drivable) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
     init_hardware(&pwm);
@@ -135,7 +149,7 @@ __attribute__((noinline)) int main(void)
 #if DIRECT
     hal_watchdog_start();
 #endif
-    start(&pwm);
+    start(&pwm, drivable);
     for (;;) {
         if (!image_step()) {
             data_damaged = true;

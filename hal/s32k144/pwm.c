@@ -33,7 +33,8 @@ static uint32_t dead_time(uint32_t ticks)
 {
     const bool coarse = ticks > DEAD_TIME_MAX;
     const uint32_t value = coarse ? (ticks + 3U) / 4U : ticks;
-    return FTM_DEADTIME_DTVAL(value) | FTM_DEADTIME_DTVALEX(value >> 6) | FTM_DEADTIME_DTPS(coarse ? DEAD_TIME_BY_4 : 0U);
+    return FTM_DEADTIME_DTVAL(value) | FTM_DEADTIME_DTVALEX(value >> 6) |
+           FTM_DEADTIME_DTPS(coarse ? DEAD_TIME_BY_4 : 0U);
 }
 
 static void configure_outputs(const pwm_config_t *config)

@@ -215,6 +215,9 @@ static void control_written(emu_t *emu, uint32_t old, uint32_t value)
     if (kept != 0 && (old & MDIS) == 0) {
         emu_fail(emu, "write of CAN0.MCR: the bits 0x%x can be written in freeze mode only", kept);
     }
+    if (running(emu)) {
+        pins_check(emu, "CAN0");
+    }
     if (running(emu) && !memory_filled(emu)) {
         emu_fail(emu, "write of CAN0.MCR: its message memory has not been initialised");
     }

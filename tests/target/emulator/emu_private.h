@@ -218,6 +218,8 @@ void lpit_fire(emu_t *emu, int channel);
 void wdog_fire(emu_t *emu);
 void can_fire(emu_t *emu);
 void trgmux_event(emu_t *emu, uint32_t source);
+/** An error unless every pin of the peripheral is multiplexed to it. */
+void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);

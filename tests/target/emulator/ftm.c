@@ -100,6 +100,9 @@ static void start_or_stop(emu_t *emu, const peripheral_t *self)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
     const bool wanted = clock_ticks(emu, self) != 0 && !decoding(emu, self);
+    if (clock_ticks(emu, self) != 0 && !f->running) {
+        pins_check(emu, self->name);
+    }
     if (wanted && !f->running) {
         f->running = true;
         f->start = emu->s.now;

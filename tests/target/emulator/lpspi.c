@@ -88,6 +88,9 @@ void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
     } else if (offset == CR) {
         spi->rx_count = (value & (RESET | RRF)) != 0 ? 0 : spi->rx_count;
         bus_put(emu, self, CR, value & ~(uint32_t)(RTF | RRF));
+        if ((value & MEN) != 0) {
+            pins_check(emu, self->name);
+        }
     } else if (offset == CFGR1 && (old ^ value) != 0 && (bus_get(emu, self, CR) & MEN) != 0) {
         emu_fail(emu, "write of %s.CFGR1: the module is enabled", self->name);
     } else if ((offset == IER || offset == DER) && value != 0) {

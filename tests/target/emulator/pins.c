@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* PORT, GPIO and the trigger multiplexer. */
+#include <string.h>
+
 #include "emu_private.h"
 
 enum {
@@ -8,6 +10,48 @@ enum {
     TO_PDB0 = 0x38, TO_PDB1 = 0x3C,
     FLAG = 1 << 24,
 };
+
+/* Which function of which pin a peripheral needs: the maker's signal multiplexing table. */
+static const struct {
+    const char *peripheral, *port;
+    uint8_t pin, function;
+} wiring[] = {
+    {"FTM0", "PORTD", 15, 2}, {"FTM0", "PORTD", 16, 2}, {"FTM0", "PORTD", 0, 2}, {"FTM0", "PORTD", 1, 2},
+    {"FTM0", "PORTB", 4, 2},  {"FTM0", "PORTB", 5, 2},  {"FTM0", "PORTE", 8, 2}, {"FTM0", "PORTA", 14, 2},
+    {"FTM2", "PORTD", 10, 3}, {"FTM2", "PORTD", 11, 3}, {"CAN0", "PORTE", 4, 5}, {"CAN0", "PORTE", 5, 5},
+    {"LPSPI0", "PORTB", 0, 3}, {"LPSPI0", "PORTB", 1, 3}, {"LPSPI0", "PORTB", 2, 3}, {"LPSPI0", "PORTB", 3, 3},
+};
+
+static void check_pin(emu_t *emu, const char *peripheral, const char *port, uint32_t pin, uint32_t function)
+{
+    if ((bus_get(emu, bus_find(port), 4U * pin) >> 8 & 7U) != function) {
+        emu_fail(emu, "%s is used, but %s.PCR%u does not give it its pin (MUX %u)", peripheral, port, pin, function);
+    }
+}
+
+void pins_check(emu_t *emu, const char *peripheral)
+{
+    for (size_t k = 0; k < sizeof wiring / sizeof wiring[0]; k++) {
+        if (strcmp(wiring[k].peripheral, peripheral) == 0) {
+            check_pin(emu, peripheral, wiring[k].port, wiring[k].pin, wiring[k].function);
+        }
+    }
+}
+
+/* A line is driven by a pin that is an output and belongs to the GPIO. */
+static void check_lines(emu_t *emu, const peripheral_t *self, uint32_t lines)
+{
+    const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
+    for (uint32_t pin = 0; pin < 32U; pin++) {
+        if ((lines >> pin & 1U) == 0) {
+            continue;
+        }
+        check_pin(emu, self->name, port, pin, 1);
+        if ((bus_get(emu, self, PDDR) >> pin & 1U) == 0) {
+            emu_fail(emu, "%s: line %u is switched on, but it is an input (PDDR)", self->name, pin);
+        }
+    }
+}
 
 bool port_models(uint32_t offset)
 {
@@ -63,6 +107,7 @@ void gpio_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     (void)old;
     const uint32_t out = bus_get(emu, self, PDOR);
     if (offset == PSOR) {
+        check_lines(emu, self, value);
         bus_put(emu, self, PDOR, out | value);
     } else if (offset == PCOR) {
         bus_put(emu, self, PDOR, out & ~value);

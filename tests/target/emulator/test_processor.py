@@ -55,6 +55,8 @@ REFUSED = {
     22: "write of LPIT0 offset 0x10: the module was not enabled four clocks before",
     23: "write of CAN0.MCR: the bits 0x20000000 can be written in freeze mode only",
     24: "write of CAN0.MCR: its message memory has not been initialised",
+    25: "FTM0 is used, but PORTD.PCR15 does not give it its pin (MUX 2)",
+    26: "PTC: line 0 is switched on, but it is an input (PDDR)",
 }
 
 

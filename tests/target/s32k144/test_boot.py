@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -102,3 +103,81 @@ def test_a_table_that_is_damaged_later_opens_the_gates(parts: build.Parts) -> No
         loop.run(1000)
         assert int(loop.get("fault_word")) == FAULT_CONFIG
         assert abs(loop.get("truth.torque_Nm")) < 0.5
+
+
+def test_interrupts_rank_fault_fast_identification_bus_task(parts: build.Parts, elf: Path) -> None:
+    with _core(parts, elf) as core:
+        core.run(FOREVER)
+        by_irq = {irq: core.read(0xE000_E400 + irq, 1)[0] >> 4 for irq in (103, 39, 69, 81, 78, 48)}
+    assert list(by_irq.values()) == [0, 1, 2, 3, 3, 4]
+
+
+def test_the_processor_runs_at_112_mhz_from_the_crystal_and_guards_it(parts: build.Parts, elf: Path) -> None:
+    """8 MHz * 28 / 2; bus and flash at a half and a quarter; lost oscillator or lost lock resets."""
+    with _core(parts, elf) as core:
+        core.run(FOREVER)
+        assert core.register("SMC.PMCTRL") >> 5 & 3 == 3  # HSRUN
+        assert core.register("SCG.HCCR") == 6 << 24 | 0 << 16 | 1 << 4 | 3
+        assert core.register("SCG.SPLLCFG") == 12 << 16
+        assert core.register("SCG.SOSCCSR") & 0x3_0000 == 0x3_0000
+        assert core.register("SCG.SPLLCSR") & 0x3_0000 == 0x3_0000
+
+
+def test_the_bus_runs_at_500_kbit_per_second_and_samples_at_87_5_percent(parts: build.Parts, elf: Path) -> None:
+    with _core(parts, elf) as core:
+        core.run(FOREVER)
+        control = core.register("CAN0.CTRL1")
+    assert control >> 13 & 1 == 0  # clocked by the oscillator of 8 MHz
+    before = 1 + (control & 7) + 1 + (control >> 19 & 7) + 1  # synchronisation, propagation, segment 1
+    after = (control >> 16 & 7) + 1
+    assert 8_000_000 / ((control >> 24) + 1) / (before + after) == 500_000
+    assert before / (before + after) == 0.875
+
+
+def test_the_watchdog_has_a_window_and_can_no_longer_be_changed(parts: build.Parts, elf: Path) -> None:
+    """12 ms at the slowest of its oscillator, 113 kHz, are 1356 ticks; the task comes every 113 or more."""
+    with _core(parts, elf) as core:
+        core.run(FOREVER)
+        list(_periods(core, 0.01))
+        control = core.register("WDOG.CS")
+        assert control & 0x8080 == 0x8080  # WIN, EN
+        assert control & 0x20 == 0  # UPDATE
+        assert core.register("WDOG.TOVAL") / 113e3 == pytest.approx(12e-3, abs=1e-5)
+        assert 0 < core.register("WDOG.WIN") < 113
+
+
+def test_all_lines_to_the_board_are_outputs_and_off_until_asked_for(parts: build.Parts, elf: Path) -> None:
+    with _core(parts, elf) as core:
+        core.run(FOREVER)
+        assert core.register("PTC.PDDR") == 0b11_0100_1111  # precharge ... driver supply, safe state, A0, A1
+        assert core.register("PTC.PDOR") & 0b100_1111 == 0
+        assert core.register("FTM0.OUTMASK") & 0x3F == 0x3F
+
+
+def test_no_conversion_is_asked_for_while_another_runs(parts: build.Parts, elf: Path) -> None:
+    with _core(parts, elf) as core:
+        list(_periods(core, FOREVER))
+        assert core.error is None
+        assert core.register("PDB0.CH0S") & 0xFF == 0
+        assert core.register("PDB1.CH0S") & 0xFF == 0
+
+
+@pytest.mark.parametrize(("built", "wanted"), [(2e-6, 0.0), (2e-6, 1.3e-5), (1e-4, 1e-3)])
+def test_a_period_or_dead_time_the_timer_cannot_keep_never_starts_the_pwm(
+    parts: build.Parts, elf: Path, tmp_path: Path, built: float, wanted: float
+) -> None:
+    """dead_time_s (none; more than an eighth of the period) and period_s (beyond 16 bits), properly sealed."""
+    changed = image.Image(elf)
+    start = changed.place(changed.symbol("motor"), 4)
+    end = changed.place(changed.symbol("cal_end") - 4, 4)
+    word = struct.pack("<f", built)
+    assert changed.content.count(word, start, end) == 1
+    at = changed.content.index(word, start, end)
+    changed.content[at : at + 4] = struct.pack("<f", wanted)
+    path = tmp_path / "changed.elf"
+    path.write_bytes(changed.content)
+    image.seal(path)
+    with _core(parts, path) as core:
+        assert core.run(FOREVER) == LIMIT, core.error
+        assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
+        assert core.resets == 0

@@ -90,3 +90,8 @@ def test_reserved_memory_keeps_its_sectors(elf: Path) -> None:
     symbols = image.Image(elf).symbols
     assert symbols["nvm_start"] % 2048 == 0
     assert symbols["nvm_end"] - symbols["nvm_start"] == 2 * 2048
+
+
+def test_nothing_of_a_heap_is_linked(elf: Path) -> None:
+    heap = re.compile(r"_*(malloc|calloc|realloc|free|sbrk|morecore)(_r)?")
+    assert not [name for name in image.Image(elf).symbols if heap.fullmatch(name)]

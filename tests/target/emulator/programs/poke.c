@@ -74,7 +74,7 @@ __attribute__((used)) void reset(void)
 #elif CASE == 18 /* PMPROT a second time */
     REG(0x4007E008U) = 0xA0;
 #endif
-#elif CASE == 19 || CASE == 20 || CASE == 21 /* the converter: calibrated from what was there, sampled too briefly, or not */
+#elif CASE == 19 || CASE == 20 || CASE == 21 /* converter: calibration not cleared, short samples, not calibrated */
     REG(0x40064304U) = 0x300U; /* FIRCDIV2: 12 MHz */
     PCC(0xECU) = 3U << 24;
     PCC(0xECU) = 3U << 24 | CLOCK_ON;
@@ -99,12 +99,22 @@ __attribute__((used)) void reset(void)
     REG(0x40064100U) = 1;
     REG(0x40064104U) = 0x101U;
     PCC(0x90U) = CLOCK_ON;
+    PCC(0x134U) = CLOCK_ON;
+    REG(0x4004D010U) = 0x500U;
+    REG(0x4004D014U) = 0x500U;
     REG(0x40024000U) = 0x5080000FU; /* frozen */
     for (uint32_t at = 0; CASE == 23 && at < 512U; at += 4U) {
         REG(0x40024080U + at) = 0;
     }
     REG(0x40024000U) = 0x0080000FU; /* normal */
     REG(0x40024000U) = 0x2080000FU; /* RFEN */
+#elif CASE == 25 /* a timer without its pins */
+    PCC(0xE0U) = CLOCK_ON;
+    REG(0x40038000U) = 8;
+#elif CASE == 26 /* a line that is no output */
+    PCC(0x12CU) = CLOCK_ON;
+    REG(0x4004B000U) = 0x100U;
+    REG(0x400FF084U) = 1;
 #endif
     for (;;) {
     }
