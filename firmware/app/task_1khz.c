@@ -182,16 +182,16 @@ static void look(const drive_t *drive, view_t *view)
 {
     uint32_t seen;
     do {
-        seen = drive->fast.pended;
+        seen = drive->samples.generation;
         exchange_barrier();
-        view->sample = *sample_box_look(&drive->samples);
+        view->sample = *sample_box_look(&drive->samples, seen);
         view->window = *window_box_look(&drive->windows);
         view->mrai = drive->slow.mrai;
         view->psi_delta = drive_psi_delta(drive);
         view->torque = drive->slow.torque.mean;
         view->faults = drive->fast.faults;
         exchange_barrier();
-    } while (drive->fast.pended != seen);
+    } while (drive->samples.generation != seen);
     view->inverter_dC = hal_temperature_inverter_dC();
     view->winding_dC = hal_temperature_winding_dC();
 }

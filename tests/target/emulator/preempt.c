@@ -69,8 +69,9 @@ static drive_t drive_there(preempt_t *p)
 static adc_counts_t sample_of(const preempt_t *p, int round)
 {
     const adc_counts_t *c = &p->counts;
-    return (adc_counts_t){.i_a = (uint16_t)(c->i_a + 40 * (round + 1)), .i_b = (uint16_t)(c->i_b - 25 * (round + 1)),
-                          .i_c = (uint16_t)(c->i_c - 15 * (round + 1)), .v_dc = (uint16_t)(c->v_dc + 7 * (round + 1))};
+    const uint32_t more = (uint32_t)round + 1U;
+    return (adc_counts_t){.i_a = c->i_a + 40U * more, .i_b = c->i_b - 25U * more, .i_c = c->i_c - 15U * more,
+                          .v_dc = c->v_dc + 7U * more};
 }
 
 static uint32_t shaft(const preempt_t *p)

@@ -47,7 +47,7 @@ void test_ten_periods_make_a_window_of_sums(void)
     seam_run();
     seam_periods(10); /* the first two of them do not act yet */
     TEST_ASSERT_EQUAL_UINT32(1, drive.windows.generation);
-    TEST_ASSERT_FALSE(window_box_read(&drive.windows).acting);
+    TEST_ASSERT_FALSE(window_box_look(&drive.windows)->acting);
     dq_t sum_i = {0, 0}, sum_u = {0, 0};
     for (int n = 0; n < 10; n++) {
         TEST_ASSERT_EQUAL_UINT32(1, drive.windows.generation);
@@ -56,7 +56,7 @@ void test_ten_periods_make_a_window_of_sums(void)
         sum_u = (dq_t){sum_u.d + published()->mrai.u.d, sum_u.q + published()->mrai.u.q};
     }
     TEST_ASSERT_EQUAL_UINT32(2, drive.windows.generation);
-    const identify_window_t window = window_box_read(&drive.windows);
+    const identify_window_t window = *window_box_look(&drive.windows);
     TEST_ASSERT_INT_WITHIN(200, 81920, window.sum_i.d); /* 100 of 400 A, ten times */
     TEST_ASSERT_EQUAL_INT(sum_i.d, window.sum_i.d);
     TEST_ASSERT_EQUAL_INT(sum_i.q, window.sum_i.q);
