@@ -10,37 +10,42 @@
 #define LATE_SHIFT 4          /* a sample one period late moves the angle by 1/10 of the step */
 
 typedef struct {
-    int32_t cos_1, sin_1, cos_2, sin_2; /* Q31 */
+    int32_t q31[ANGLE_HARMONICS];
 } waves_t;
+
+static __attribute__((noinline)) void wave(int32_t *q31, uint32_t theta)
+{
+    const fx_pair_t at = fx_rotation(theta);
+    q31[0] = (int32_t)(at << 16);
+    q31[1] = (int32_t)(at & 0xFFFF0000U);
+}
 
 static waves_t waves(uint32_t theta)
 {
-    const fx_pair_t at = fx_rotation(theta);
-    const fx_pair_t twice = fx_rotation(2U * theta);
-    return (waves_t){(int32_t)(at << 16), (int32_t)(at & 0xFFFF0000U), (int32_t)(twice << 16),
-                     (int32_t)(twice & 0xFFFF0000U)};
+    waves_t at;
+    wave(&at.q31[0], theta);
+    wave(&at.q31[2], 2U * theta);
+    return at;
 }
 
 /* c + d wave/64: Q32 * Q31 = half of Q32 above 2^32. */
-static int32_t learnt(int32_t c, int32_t d, int32_t wave, int32_t most)
-{
-    return fx_clamp_q31(c + ((fx_mulhi(d, wave) + 16) >> 5), -most, most);
-}
-
 static void learn(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
 {
     const waves_t at = waves(state->last);
-    state->c_1 = learnt(state->c_1, d, at.cos_1, config->most);
-    state->s_1 = learnt(state->s_1, d, at.sin_1, config->most);
-    state->c_2 = learnt(state->c_2, d, at.cos_2, config->most);
-    state->s_2 = learnt(state->s_2, d, at.sin_2, config->most);
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
+        const int32_t moved = state->c[n] + ((fx_mulhi(d, at.q31[n]) + 16) >> 5);
+        state->c[n] = fx_clamp_q31(moved, -config->most, config->most);
+    }
 }
 
 static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
 {
     const waves_t at = waves((2U * part + 1U) << (ANGLE_HARMONICS_SHIFT - 1));
-    return 2 * (fx_mulhi(state->c_1, at.cos_1) + fx_mulhi(state->s_1, at.sin_1) + fx_mulhi(state->c_2, at.cos_2) +
-                fx_mulhi(state->s_2, at.sin_2));
+    int32_t half = 0;
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
+        half += fx_mulhi(state->c[n], at.q31[n]);
+    }
+    return 2 * half;
 }
 
 void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,

@@ -16,6 +16,7 @@
 
 #define ANGLE_HARMONICS_PARTS 64
 #define ANGLE_HARMONICS_SHIFT 26
+#define ANGLE_HARMONICS 4 /* coefficients: c_1, s_1, c_2, s_2 */
 
 typedef struct {
     int32_t most; /* of each coefficient, below 2^24 */
@@ -23,7 +24,7 @@ typedef struct {
 
 typedef struct {
     uint32_t last, before;
-    int32_t c_1, s_1, c_2, s_2;
+    int32_t c[ANGLE_HARMONICS];
     uint8_t part; /* of the table, next to be renewed */
 } angle_harmonics_state_t;
 

@@ -24,7 +24,8 @@ static int32_t acting_voltage(int32_t sum, int32_t first, int32_t last, q31_t si
 }
 
 /* d psi/dt over the window, Q30; (ID-3) takes it with w T_s/2 cot(w T_s/2). */
-static __attribute__((noinline)) int32_t flux_rate(const identify_config_t *config, int32_t first, int32_t last, q31_t sinc)
+static __attribute__((noinline)) int32_t flux_rate(const identify_config_t *config, int32_t first, int32_t last,
+                                                   q31_t sinc)
 {
     /* Q15 * Q28 = Q43, limited to 1 pu. */
     const q31_t rate = fx_sat_q31(((int64_t)(last - first) * config->rate_gain_q28) >> 12);

@@ -103,7 +103,8 @@ void test_an_empty_memory_leaves_the_priors(void)
 {
     TEST_ASSERT_FALSE(memory.recalled);
     TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.filter.x[IDENTIFY_FLUX]);
-    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, drive.task.identify.filter.p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30,
+                            drive.task.identify.filter.p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
 }
 
 void test_a_damaged_memory_leaves_the_priors(void)

@@ -74,13 +74,13 @@ void test_acceleration_is_no_harmonic(void)
 void test_below_940_rpm_nothing_is_learnt_and_nothing_forgotten(void)
 {
     (void)drive(900.0, 0.0, 10000);
-    TEST_ASSERT_EQUAL_INT32(0, state.c_1 | state.s_1 | state.c_2 | state.s_2);
+    TEST_ASSERT_EQUAL_INT32(0, state.c[0] | state.c[1] | state.c[2] | state.c[3]);
     (void)drive(8000.0, 0.0, 1000);
     const angle_harmonics_state_t before = state;
     (void)drive(500.0, 0.0, 1000);
     (void)drive(0.0, 0.0, 1000);
-    TEST_ASSERT_EQUAL_INT32(before.c_1, state.c_1);
-    TEST_ASSERT_EQUAL_INT32(before.s_2, state.s_2);
+    TEST_ASSERT_EQUAL_INT32(before.c[0], state.c[0]);
+    TEST_ASSERT_EQUAL_INT32(before.c[3], state.c[3]);
     TEST_ASSERT_TRUE(drive(500.0, 0.0, 200) < 0.05);
 }
 
@@ -91,8 +91,8 @@ void test_late_samples_teach_nothing(void)
         theta += 6000.0 / 60e3;
         angle_harmonics_step(&config, &state, counts(theta + ((k % 7 == 0) ? 600.0 / 60e3 : 0.0)), table);
     }
-    TEST_ASSERT_INT32_WITHIN(64, 0, state.c_1);
-    TEST_ASSERT_INT32_WITHIN(64, 0, state.s_2);
+    TEST_ASSERT_INT32_WITHIN(64, 0, state.c[0]);
+    TEST_ASSERT_INT32_WITHIN(64, 0, state.c[3]);
 }
 
 void test_what_is_learnt_stays_within_its_bound(void)
@@ -101,7 +101,7 @@ void test_what_is_learnt_stays_within_its_bound(void)
         theta += 7000.0 / 60e3;
         angle_harmonics_step(&config, &state, counts(theta - 0.002 * cos(two_pi * theta)), table); /* uncorrected */
     }
-    TEST_ASSERT_EQUAL_INT32(config.most, state.c_1);
+    TEST_ASSERT_EQUAL_INT32(config.most, state.c[0]);
 }
 
 /* The same sequence, not corrected, through (AT-11) and (AT-12) in double. The fixed point rounds each step to
@@ -124,14 +124,14 @@ void test_coefficients_and_table_are_the_twins(void)
         last = at;
         angle_harmonics_step(&config, &state, counts(at), table);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[0], state.c_1);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[1], state.s_1);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[2], state.c_2);
-    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[3], state.s_2);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[0], state.c[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[1], state.c[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[2], state.c[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(400.0, c[3], state.c[3]);
     config.most = 0x00FFFFFF;
-    state.c_1 = 3000000;
-    state.s_2 = -2000000;
-    state.s_1 = state.c_2 = 0;
+    state.c[0] = 3000000;
+    state.c[3] = -2000000;
+    state.c[1] = state.c[2] = 0;
     for (int k = 0; k < 16; k++) { /* standing still: renewed only */
         angle_harmonics_step(&config, &state, state.last, table);
     }

@@ -179,7 +179,8 @@ void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, exp(-1.0), filter.x[IDENTIFY_DROP] / (double)IDENTIFY_ONE_Q27);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), filter.p[0] / (double)IDENTIFY_ONE_Q30);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0), filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0),
+                              filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
     for (int n = 0; n < 60000; n++) {
         identify_filter_leak(&c, &filter, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
     }

@@ -18,7 +18,8 @@ ARM_CC = "arm-none-eabi-gcc"
 # As tools/cmake/arm-none-eabi.cmake compiles the firmware.
 ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns")
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
-FAST = frozenset(FIRMWARE / name for name in (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").split())
+_LIST = (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").splitlines()
+FAST = frozenset(FIRMWARE / line for line in _LIST if not line.startswith("#"))
 
 
 def have_arm_compiler() -> bool:
