@@ -4,6 +4,7 @@
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from rig import Rig
 
 ROOT = Path(__file__).resolve().parents[2]
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
+VERSION = "INV_Version"
 MARKERS = {
     "plant": "needs a plant that can be told what to do (--bench, or the virtual ECU)",
     "program": "needs the virtual ECU's program itself (--vecu)",
@@ -50,7 +52,12 @@ def pytest_configure(config: pytest.Config) -> None:
     logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
     for name, text in MARKERS.items():
         config.addinivalue_line("markers", f"{name}: {text}")
-    config.stash[REPORT] = Report(Path(config.getoption("--report")))
+    config.stash[REPORT] = report = Report(Path(config.getoption("--report")))
+    interface = config.getoption("--can-interface")
+    options = " ".join([config.getoption("--can-channel"), *config.getoption("--can-option")])
+    report.about["when"] = f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}"
+    report.about["target"] = f"{interface} {options}" if interface else f"virtual ECU {config.getoption('--vecu')}"
+    report.about["plant"] = config.getoption("--bench") or ("none to command" if interface else "simulated")
 
 
 REPORT = pytest.StashKey[Report]()
@@ -144,10 +151,18 @@ def connected(
     request: pytest.FixtureRequest, target: Target, database: cantools.database.Database, bus_log: BusLog
 ) -> Rig:
     """The one connection of the session."""
+    about = request.config.stash[REPORT].about
+
+    def note_version(message: can.Message) -> None:
+        if message.arbitration_id == rig.by_name[VERSION].frame_id and not message.is_extended_id:
+            told = rig.decode(VERSION, message.data)
+            about["firmware"] = (f"{told['Major']}.{told['Minor']}.{told['Patch']}, interface {told['Interface']}, "
+                                 f"motor {told['MotorId']:#010x}")  # fmt: skip
+
     rig = Rig(target.bus, database, target.stand, client_port(target.bus))
     is_bench = request.config.getoption("--can-interface") is not None
     rig.may_switch_on = not is_bench or request.config.getoption("--allow-power")
-    rig.listeners.append(bus_log)
+    rig.listeners += [bus_log, note_version]
     return rig
 
 

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fluxtrue_tools.demo.experiment import Bound
 from jinja2 import Environment
 from numpy.typing import ArrayLike
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
+POINTS = 50  # measured one by one: shown as such
 Line = tuple[str, ArrayLike, ArrayLike]
 
 
@@ -26,9 +28,12 @@ def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -
         )
         for row, (y_label, lines) in zip(rows[:, 0], axes, strict=True):
             for label, x, y in lines:
-                row.plot(x, y, label=label, lw=1.1)
+                few = {"marker": "o", "markersize": 3.5} if len(np.asarray(x)) <= POINTS else {}
+                row.plot(x, y, label=label, lw=1.1, **few)
             row.set_ylabel(y_label)
+            row.ticklabel_format(axis="y", useOffset=False)
             row.legend(loc="best", fontsize=8)
+        rows[0, 0].set_title(title, loc="left")
         rows[-1, 0].set_xlabel(x_label)
         stream = io.StringIO()
         figure.savefig(stream, format="svg")
@@ -45,12 +50,12 @@ class Figures:
     seconds: float = 0.0
     reason: str = ""
     bounds: list[Bound] = field(default_factory=list)
-    plots: list[tuple[str, str]] = field(default_factory=list)
+    plots: list[str] = field(default_factory=list)
     tables: list[tuple[str, list[str], list[list[str]]]] = field(default_factory=list)
 
-    def plot(self, title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str = "s") -> None:
+    def plot(self, title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str = "time, s") -> None:
         """One axis per (label, lines); a line is (label, x, y)."""
-        self.plots.append((title, "<svg" + _svg(title, axes, x_label)))
+        self.plots.append("<svg" + _svg(title, axes, x_label))
 
     def table(self, title: str, head: list[str], rows: list[list[Any]]) -> None:
         """Numbers with four digits."""
@@ -69,6 +74,7 @@ class Report:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self.about: dict[str, str] = {}  # when, what and by which way was tested
         self._tests: dict[str, Figures] = {}
 
     def figures(self, node: str) -> Figures:
@@ -97,4 +103,4 @@ class Report:
         page = Environment(autoescape=True).from_string(TEMPLATE.read_text(encoding="utf-8"))
         self._folder.mkdir(parents=True, exist_ok=True)
         target = self._folder / "report.html"
-        target.write_text(page.render(tests=tests, counts=counts), encoding="utf-8")
+        target.write_text(page.render(tests=tests, counts=counts, about=self.about), encoding="utf-8")

@@ -31,7 +31,7 @@ def test_every_message_of_the_inverter_comes_in_its_cycle(rig: Rig) -> None:
     assert heard_s > 1.0
     for name, message in rig.by_name.items():
         if "INV" in message.senders:
-            # The span may begin right after a frame and end right before one; the check after the test sees each period.
+            # The span may begin right after a frame and end right before one; the check afterwards sees each period.
             assert len(rig.frames[name]) >= heard_s / rig.cycle_s(name) - 1.5, name
 
 

@@ -36,7 +36,7 @@ def test_torque_limits_hold_in_all_four_quadrants(rig: Rig, figures: Figures, sp
     figures.table(f"{speed_rpm:g} rpm", ["asked N·m", "allowed", "shaft"], rows)
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
     figures.plot(f"Asked for +90 and then -90 N·m at {speed_rpm:g} rpm",
-                 [("N·m", [("shaft", time_s, trace[TRUTH])])])  # fmt: skip
+                 [("torque, N·m", [("shaft", time_s, trace[TRUTH])])])  # fmt: skip
     for asked_Nm, wanted_Nm, truth_Nm in rows:
         figures.promise(f"shaft less limit, asked {asked_Nm:g} N·m", truth_Nm - wanted_Nm, 0.3, "N·m")
 
@@ -73,7 +73,8 @@ def test_the_battery_is_not_asked_for_more_power_than_it_allows(
     rig.advance(1.5)
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
     power_kW = 1e-3 * trace["truth.idc_A"] * trace["truth.vdc_V"]
-    figures.plot("12 kW allowed", [("kW", [("dc link", time_s, power_kW)]), ("N·m", [("shaft", time_s, trace[TRUTH])])])
+    power, torque = [("dc link", time_s, power_kW)], [("shaft", time_s, trace[TRUTH])]
+    figures.plot("Battery allows 12 kW", [("power, kW", power), ("torque, N·m", torque)])
     last = time_s > 1.0
     figures.promise("largest power", np.abs(power_kW).max() / 12.0, 1.1, "of what is allowed")
     figures.promise("power at the end less 12 kW", np.abs(power_kW[last].mean()) - 12.0, 1.2, "kW")
@@ -96,8 +97,8 @@ def test_a_hot_inverter_derates_says_why_and_trips_only_without_torque(rig: Rig,
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
     torque_Nm = trace[TRUTH]
     figures.plot("The inverter warms by 10 K/s", [
-        ("N·m", [("shaft", time_s, torque_Nm)]),
-        ("C", [("inverter", 0.1 * np.arange(1, len(temperatures) + 1), temperatures)]),
+        ("torque, N·m", [("shaft", time_s, torque_Nm)]),
+        ("temperature, °C", [("inverter", 0.1 * np.arange(1, len(temperatures) + 1), temperatures)]),
     ])  # fmt: skip
     derated = [reason for state, reason in reasons if state == "derate"]
     assert len(derated) >= 5 and set(derated) == {1.0}, "half a second or more, and because of the temperature"

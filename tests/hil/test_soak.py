@@ -81,7 +81,8 @@ def _check_frames(rig: Rig, metronome: Metronome, figures: Figures) -> None:
 def _check_torque(rows: list[list[float]], figures: Figures) -> None:
     """The campaign's bounds, for a machine that warms up and cools down meanwhile."""
     errors = [100.0 * (row[2] - row[1]) / max(abs(row[1]), 13.2) for row in rows]
-    figures.plot("Torque at the end of each round", [("%", [("shaft less asked", [r[0] for r in rows], errors)])])
+    line = ("shaft less asked", [row[0] for row in rows], errors)
+    figures.plot("Torque at the end of each round", [("error, %", [line])])
     if len(errors) >= ROUNDS_FOR_RMS:
         figures.promise("root mean square of the torque errors", float(np.sqrt(np.mean(np.square(errors)))), 0.8, "%")
     figures.promise("99th percentile of the torque errors", float(np.percentile(np.abs(errors), 99)), 2.5, "%")

@@ -26,8 +26,8 @@ def test_50_ms_after_the_last_command_there_is_no_torque(
     # The last command went out one cycle before now.
     rig.advance(90 * MS)
     after_s = trace["truth.time_s"] - trace["truth.time_s"][0] + 10 * MS
-    figures.plot(f"{torque_Nm:g} N·m at {speed_rpm:g} rpm; s after the last command",
-                 [("N·m", [("shaft", after_s, trace[TRUTH])])])  # fmt: skip
+    figures.plot(f"{torque_Nm:g} N·m at {speed_rpm:g} rpm; the last command at 0 s",
+                 [("torque, N·m", [("shaft", after_s, trace[TRUTH])])])  # fmt: skip
     left_Nm = np.abs(trace[TRUTH][after_s >= 50 * MS]).max()
     figures.promise("torque left after 50 ms", left_Nm, NO_TORQUE_NM, "N·m")
     held = trace[TRUTH][after_s <= 29 * MS]
@@ -75,6 +75,6 @@ def test_power_limits_that_stop_coming_take_the_torque_back(rig: Rig, figures: F
     rig.power_limits_kW = None
     rig.advance(0.6)
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
-    figures.plot("The battery's limits stop coming at 0 s", [("N·m", [("shaft", time_s, trace[TRUTH])])])
+    figures.plot("The battery's limits stop coming at 0 s", [("torque, N·m", [("shaft", time_s, trace[TRUTH])])])
     figures.promise("torque left after 0.45 s", np.abs(trace[TRUTH][time_s > 0.45]).max(), NO_TORQUE_NM, "N·m")
     assert rig.signal("INV_DcLink", "DeratingReason") == 7.0

@@ -14,10 +14,12 @@ from rig import Rig, Trace
 WRONG: dict[str, Any] = {"r_ohm_20": 0.025, "current_noise_A_rms": 0.5, "magnet_scale": 0.85}
 TRUTH = "truth.torque_shaft_mean_Nm"
 WARM_UP_S = 60.0
-# The campaign's bounds: of |torque|, or of a tenth of the machine's 132 N·m if that is more.
-LEAST_NM, RMS_PERCENT, WORST_PERCENT = 13.2, 0.8, 2.5
-# The bus says torque in steps of 0.1 N·m; the estimate is as wrong as the identification is.
-TOLD_PERCENT = 3.0
+COLD_PERCENT = 4.0
+LEAST_NM = 13.2  # errors are of |torque|, or of a tenth of the machine's 132 N·m if that is more
+# After a drive. Tighter than the campaign's 0.8 % and 2.5 %: one plant, the same in every run, sensors without gain error.
+RMS_PERCENT, WORST_PERCENT = 0.6, 1.5
+# The bus says torque in steps of 0.1 N·m, 0.25 % of 20 N·m either way; the rest is the identification's.
+TOLD_PERCENT = 1.5
 
 
 def mean_truth(rig: Rig, seconds: float = 0.3) -> float:
@@ -56,13 +58,34 @@ def test_after_a_drive_shaft_torque_is_the_torque_asked_for_with_everything_wron
         told += [percent(row[3] - row[1], row[0]) for row in rows]
         figures.table(f"{speed_rpm:g} rpm", ["asked N·m", "shaft N·m", "error %", "told on CAN N·m"], rows)
         asked = [row[0] for row in rows]
-        figures.plot(f"Torque error at {speed_rpm:g} rpm", [("%", [
+        figures.plot(f"Torque error at {speed_rpm:g} rpm", [("error, %", [
             ("shaft less asked", asked, [row[2] for row in rows]),
             ("told less shaft", asked, told[-len(rows):]),
-        ])], "asked N·m")  # fmt: skip
+        ])], "torque asked for, N·m")  # fmt: skip
     figures.promise("root mean square of the errors", float(np.sqrt(np.mean(np.square(errors)))), RMS_PERCENT, "%")
     figures.promise("largest error", max(errors, key=abs), WORST_PERCENT, "%")
     figures.promise("told less shaft", max(told, key=abs), TOLD_PERCENT, "%")
+
+
+@pytest.mark.plant
+def test_from_a_cold_start_torque_is_close_at_the_first_requests_and_true_when_they_come_back(
+    rig: Rig, figures: Figures
+) -> None:
+    """The same machine, nothing learnt: the tables alone would be wrong by 5 to 10 % (as the demonstration shows)."""
+    rig.stand.set(**WRONG)
+    rig.turn(2000.0)
+    rig.start()
+    torques = (40.0, 80.0, 120.0, -120.0, -80.0, -40.0)
+    rounds = [[_row(rig, torque_Nm) for torque_Nm in torques] for _ in range(3)]
+    worst = [max((row[2] for row in rows), key=abs) for rows in rounds]
+    for number, rows in enumerate(rounds, 1):
+        figures.table(f"Round {number}", ["asked N·m", "shaft N·m", "error %", "told on CAN N·m"], rows)
+    figures.plot("Torque error from a cold start, 0.8 s at each point", [("error, %", [
+        (f"round {number}", range(1, len(rows) + 1), [row[2] for row in rows])
+        for number, rows in enumerate(rounds, 1)
+    ])], "point")  # fmt: skip
+    figures.promise("largest error in the first round", worst[0], COLD_PERCENT, "%")
+    figures.promise("largest error in the third round", worst[2], WORST_PERCENT, "%")
 
 
 @pytest.mark.plant
@@ -74,7 +97,8 @@ def test_zero_torque_gives_no_torque_at_any_speed(rig: Rig, figures: Figures) ->
         rig.advance(0.4)
         rows.append([speed_rpm, mean_truth(rig, 0.1)])
     figures.table("Request 0", ["rpm", "shaft N·m"], rows)
-    figures.plot("Request 0", [("N·m", [("shaft", [r[0] for r in rows], [r[1] for r in rows])])], "rpm")
+    shaft = [("shaft", [r[0] for r in rows], [r[1] for r in rows])]
+    figures.plot("Torque with a request of zero", [("torque, N·m", shaft)], "speed, rpm")
     worst = max(rows, key=lambda row: abs(row[1]))
     figures.promise(f"shaft torque at {worst[0]:g} rpm", worst[1], 2.0, "N·m")
 
@@ -102,8 +126,8 @@ def test_a_weaker_magnet_costs_no_torque_as_in_figure_8_of_the_paper(rig: Rig, f
     told_s, told_Nm = rig.series("INV_Status", "TorqueEstimate", start_s)
     psi_s, told_mVs = rig.series("INV_Identification", "PsiF", start_s)
     figures.plot("The magnet weakens at 1 s", [
-        ("N·m", [("shaft", time_s, torque_Nm), ("told on CAN", told_s - start_s, told_Nm)]),
-        ("mV·s", [("magnet", time_s, psi_mVs), ("told on CAN", psi_s - start_s, told_mVs)]),
+        ("torque, N·m", [("shaft", time_s, torque_Nm), ("told on CAN", told_s - start_s, told_Nm)]),
+        ("flux, mV·s", [("magnet", time_s, psi_mVs), ("told on CAN", psi_s - start_s, told_mVs)]),
     ])  # fmt: skip
     figures.promise("deepest loss", 100.0 * (torque_Nm[weak_at:].min() / 40.0 - 1.0), 8.75, "%")
     figures.promise("torque 9 s later", 100.0 * (torque_Nm[-300:].mean() / 40.0 - 1.0), 1.25, "%")
@@ -128,7 +152,7 @@ def _step(rig: Rig, figures: Figures, first_Nm: float, second_Nm: float) -> tupl
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
     told_s, told_Nm = rig.series("INV_Status", "TorqueEstimate", start_s)
     asked_s, asked_Nm = rig.series("INV_Status", "TorqueCommand", start_s)
-    figures.plot(f"From {first_Nm:g} to {second_Nm:g} N·m", [("N·m", [
+    figures.plot(f"From {first_Nm:g} to {second_Nm:g} N·m", [("torque, N·m", [
         ("shaft", time_s, trace[TRUTH]), ("told on CAN", told_s - start_s, told_Nm),
         ("asked of the control", asked_s - start_s, asked_Nm),
     ])])  # fmt: skip

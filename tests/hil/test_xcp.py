@@ -51,7 +51,7 @@ def test_a_measurement_list_loses_no_millisecond_of_a_torque_step(
     assert len(periods) >= 299 and set(periods) == {1.0}
     told = sampled.columns["torque_estimate_Nm"]
     truth = trace[TRUTH][begun:]
-    figures.plot("1 ms raster", [("N·m", [
+    figures.plot("Recorded over XCP in the 1 ms raster", [("torque, N·m", [
         ("told over XCP", 1e-3 * (sampled.time_ms - sampled.time_ms[0]), told),
         ("shaft", trace["truth.time_s"] - trace["truth.time_s"][0], truth),
     ])])  # fmt: skip

@@ -45,7 +45,7 @@ def test_the_command_tells_plots_and_exports(drive: Path, tmp_path: Path) -> Non
     done = _run(drive, "--plot", tmp_path / "p.png", "--export", tmp_path / "t.csv")
     assert done.exit_code == 0, done.output
     row = next(line for line in done.output.splitlines() if line.startswith("INV_Status.TorqueEstimate"))
-    assert row.split()[1:] == ["50", "0", "40", "40"]
+    assert row.split()[1:] == ["50", "0", "40", "40", "Nm"]
     assert (tmp_path / "p.png").stat().st_size > 10000
     table = pd.read_csv(tmp_path / "t.csv")
     assert len(table) == 50 and table["INV_Status.Speed"].iloc[-1] == 2000.0

@@ -7,20 +7,28 @@ from typing import Final
 
 import click
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.decode import signals_of
+from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
 
 Signals = dict[str, pd.Series]
-# Title, unit, and what is drawn under which name.
-PANELS: Final = (
-    ("Torque", "N·m", {"INV_Status.TorqueCommand": "command", "INV_Status.TorqueEstimate": "estimate"}),
-    ("Currents", "A", {"INV_Currents.Id": "i_d", "INV_Currents.Iq": "i_q"}),
-    ("Identified magnet flux", "mVs", {"INV_Identification.PsiF": "ψ̂"}),
-    ("Identified resistance", "mΩ", {"INV_Identification.Resistance": "R̂"}),
-    ("Speed", "rpm", {"INV_Status.Speed": "speed"}),
-)
+# Title, and what is drawn under which name, how.
+BACK: Final = {"color": COMMAND, "linestyle": "--"}
+PANELS: Final[tuple[tuple[str, dict[str, tuple[str, dict[str, str]]]], ...]] = (
+    ("Torque", {"INV_Status.TorqueCommand": ("command", BACK), "INV_Status.TorqueEstimate": ("estimate", {})}),
+    ("Currents", {"INV_Currents.IdRef": ("i_d*", BACK), "INV_Currents.IqRef": ("i_q*", BACK | {"linestyle": ":"}),
+                  "INV_Currents.Id": ("i_d", {"color": TRUTH}), "INV_Currents.Iq": ("i_q", {"color": SECOND})}),
+    ("Identified magnet flux", {"INV_Identification.PsiF": ("ψ̂", {})}),
+    ("Identified resistance", {"INV_Identification.Resistance": ("R̂", {})}),
+    ("Speed", {"INV_Status.Speed": ("speed", {"color": TRUTH})}),
+)  # fmt: skip
+UNITS: Final = {"Nm": "N·m", "mOhm": "mΩ"}  # the DBC is ASCII
+STATE: Final = "INV_Status.State"
+GAP_S: Final = 1.0  # nothing for so long was not recorded: no line is drawn across
 EXPORTS: Final[dict[str, Callable[[pd.DataFrame, Path], None]]] = {
     ".csv": lambda table, path: table.to_csv(path, index_label="time_s"),
     ".parquet": lambda table, path: table.to_parquet(path),
@@ -41,30 +49,55 @@ def _table(signals: Signals) -> pd.DataFrame:
     return pd.concat(series, axis=1).sort_index().ffill()
 
 
+def _line(values: pd.Series) -> tuple[np.ndarray, np.ndarray]:
+    """Times and values, broken where nothing was recorded."""
+    times, numbers = values.index.to_numpy(dtype=float), values.to_numpy(dtype=float)
+    gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
+    return np.insert(times, gaps, times[gaps - 1]), np.insert(numbers, gaps, np.nan)
+
+
+def _draw_panel(axis: Axes, signals: Signals, title: str, lines: dict[str, tuple[str, dict[str, str]]]) -> None:
+    axis.set_title(title, loc="left")
+    axis.ticklabel_format(axis="y", useOffset=False)
+    for name, (label, look) in lines.items():
+        if name in signals:
+            axis.plot(*_line(signals[name]), label=label, **{"color": ESTIMATE, "linewidth": "1.0", **look})
+            axis.set_ylabel(f"{title.split()[-1].lower()}, {UNITS.get(unit := signals[name].attrs['unit'], unit)}")
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    else:
+        axis.text(0.5, 0.5, "not in this file", transform=axis.transAxes, ha="center", color=COMMAND)
+
+
+def _draw_state(axis: Axes, signals: Signals) -> None:
+    axis.set_title("State", loc="left")
+    axis.set_ylabel("state")
+    if STATE in signals:
+        axis.plot(*_line(signals[STATE]), color=TRUTH, drawstyle="steps-post", linewidth=1.0)
+        choices = signals[STATE].attrs["choices"]
+        seen = sorted({int(value) for value in signals[STATE].unique()})
+        axis.set_yticks(seen, [str(choices.get(value, value)).replace("_", " ") for value in seen])
+
+
 def _draw(signals: Signals, path: Path, title: str) -> None:
-    figure, axes = plt.subplots(len(PANELS), 1, sharex=True, figsize=(10.0, 11.0), layout="constrained")
-    for axis, (name, unit, lines) in zip(axes, PANELS, strict=True):
-        for signal, label in lines.items():
-            if signal in signals:
-                axis.plot(signals[signal].index, signals[signal].to_numpy(), label=label, linewidth=1.0)
-        axis.set_title(name, loc="left", fontsize=10)
-        axis.set_ylabel(unit)
-        axis.grid(alpha=0.3)
-        if axis.get_legend_handles_labels()[0]:
-            axis.legend(loc="upper right", fontsize=8)
-    axes[-1].set_xlabel("time, s")
-    figure.suptitle(title)
-    figure.savefig(path)
-    plt.close(figure)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(len(PANELS) + 1, 1, sharex=True, figsize=(11.0, 13.0), layout="constrained")
+        for axis, (name, lines) in zip(axes[:-1], PANELS, strict=True):
+            _draw_panel(axis, signals, name, lines)
+        _draw_state(axes[-1], signals)
+        axes[-1].set_xlabel("time, s")
+        figure.suptitle(title)
+        figure.savefig(path, dpi=120)
+        plt.close(figure)
 
 
 def _tell(signals: Signals) -> None:
     width = max(len(name) for name in signals)
-    click.echo(f"{'signal':<{width}}  {'samples':>8}  {'lowest':>11}  {'highest':>11}  {'last':>11}")
+    click.echo(f"{'signal':<{width}}  {'samples':>8}  {'lowest':>11}  {'highest':>11}  {'last':>11}  unit")
     for name, values in signals.items():
         numbers = pd.to_numeric(values, errors="coerce")
         click.echo(f"{name:<{width}}  {len(values):>8}  {numbers.min():>11.5g}  {numbers.max():>11.5g}  "
-                   f"{numbers.iloc[-1]:>11.5g}")  # fmt: skip
+                   f"{numbers.iloc[-1]:>11.5g}  {values.attrs['unit']}".rstrip())  # fmt: skip
 
 
 def _suffix(option: str, path: Path | None, allowed: tuple[str, ...]) -> None:
@@ -86,8 +119,8 @@ def log(file: Path, plot: Path | None, export: Path | None, names: tuple[str, ..
     _suffix("--export", export, tuple(EXPORTS))
     every = signals_of(file)
     chosen = _wanted(every, names)
-    _tell(chosen)
     if plot is not None:
         _draw(every, plot, file.name)
     if export is not None:
         EXPORTS[export.suffix](_table(chosen), export)
+    _tell(chosen)

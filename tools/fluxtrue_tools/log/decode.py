@@ -16,7 +16,10 @@ FRAMES: Final = "CAN_DataFrame"
 
 
 def signals_of(path: Path) -> dict[str, pd.Series]:
-    """Every signal by its name Message.Signal, over seconds since the first frame."""
+    """Every signal by its name Message.Signal, over seconds since the first frame.
+
+    attrs["unit"] and attrs["choices"] of a series are the DBC's.
+    """
     if not path.is_file():
         raise FluxtrueError(f"{path}: no such file")
     try:
@@ -41,5 +44,7 @@ def _decode(frames: np.ndarray, times: np.ndarray) -> dict[str, pd.Series]:
             continue
         decoded = [message.decode(data[row].tobytes(), decode_choices=False) for row in rows]
         table = pd.DataFrame(decoded, index=times[rows] - times[0])
-        found |= {f"{message.name}.{name}": table[name] for name in table}
+        for signal in message.signals:
+            found[f"{message.name}.{signal.name}"] = values = table[signal.name]
+            values.attrs = {"unit": signal.unit or "", "choices": signal.choices or {}}
     return found

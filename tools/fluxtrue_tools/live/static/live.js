@@ -7,6 +7,8 @@ const RECONNECT_MS = 1000;
 const COLORS = { blue: "#4ea1ff", orange: "#ffab40", green: "#4cd19a", violet: "#b79cff", quiet: "#8d9bab" };
 const AXIS = { stroke: COLORS.quiet, grid: { stroke: "#222c38", width: 1 }, ticks: { stroke: "#222c38" } };
 
+const TIME_AXIS = { ...AXIS, values: (_, seconds) => seconds.map((s) => `${s} s`) };
+
 // One ring per message: columns that share their times.
 class Ring {
   constructor(names) {
@@ -49,7 +51,7 @@ function chart(id, height, series, data, range) {
   const figure = $(id);
   const plot = new uPlot({
     width: figure.clientWidth, height, series: [{ label: "s" }, ...series], legend: { live: false },
-    cursor: { show: false }, axes: [AXIS, { ...AXIS, size: 56 }],
+    cursor: { show: false }, axes: [TIME_AXIS, { ...AXIS, size: 56, space: 24 }],
     scales: { x: { time: false }, y: { range } },
   }, [[], ...series.map(() => [])], figure);
   new ResizeObserver(() => plot.setSize({ width: figure.clientWidth, height })).observe(figure);
