@@ -9,9 +9,8 @@ from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.sim.library import Loop
 
 RPM = 2 * np.pi / 60
-# Held for 10 s in both modes before limits, derating and slow monitors joined the task; since then the task's state
-# differs from the shadow's after 0.15 to 0.4 s. Not explained yet: an input the shadow is not given, or a difference.
-UNEXPLAINED = pytest.mark.xfail(strict=False, reason="the task with limits and monitors: not explained yet")
+PART_S = 0.25
+OVER_VOLTAGE, GATE = 1 << 1, 1 << 15
 POINTS = [(speed, torque) for speed in grid.SPEEDS_RPM for torque in grid.TORQUES_NM]
 
 
@@ -34,46 +33,77 @@ def test_a_torque_step_is_as_fast_as_promised(parts: Parts) -> None:
         assert bound.met, bound.text()
 
 
-def follow(loop: Loop, seconds: float) -> None:
-    """Torques of both signs, speeds into field weakening and back, a weakening magnet; with a shadow on the host."""
+# What the envelope is tried by, from which part of the drive on. The two faults come at the ends of parts.
+HIGH_DC, NO_DC_FAULT = {"plant.vdc_V": 450.0}, {"plant.vdc_V": 350.0}
+EVENTS: dict[int, dict[str, float]] = {
+    4: {"power_limit_drive_W": 8e3},
+    6: {"power_limit_drive_W": 1e6, "torque_limit_regen_Nm": 30.0},
+    8: {"torque_limit_regen_Nm": 1e4, "plant.vdc_V": 245.0},
+    10: {"plant.vdc_V": 350.0, "emulator.inverter_C": 90.0},
+    12: {"emulator.inverter_C": 40.0, "plant.winding_C": 150.0},
+    14: {"plant.winding_C": 90.0, "torque_loop": 1.0},
+    16: HIGH_DC,
+    17: NO_DC_FAULT | {"enable": 0.0},
+    18: {"fault_reset": 1.0},
+    19: {"enable": 1.0},
+    22: {"identification_reset": 1.0},
+    24: {"identification": 0.0},
+    26: {"identification": 1.0, "plant.lq_scale": 0.9},
+    28: {"emulator.gate_fault": 1.0},
+    29: {"emulator.gate_fault": 0.0, "enable": 0.0},
+    30: {"fault_reset": 1.0},
+    31: {"enable": 1.0},
+}
+
+
+def follow(loop: Loop, seconds: float) -> tuple[int, int]:
+    """Torques of both signs, speeds into field weakening and back, a weakening magnet, limits of every kind, two
+    faults; with a shadow on the host. Answers which deratings and which faults there have been."""
     torques = (80.0, -60.0, 120.0, -20.0, 5.0)
     speeds = (3000.0, 800.0, 6500.0, -2500.0)
-    loop.set("emulator.shadow", 1)
-    loop.set("enable", 1)
-    parts_ = round(seconds / 0.25)
+    derating = faults = 0
+    for name in ("emulator.shadow", "enable", "identification", "torque_loop"):
+        loop.set(name, 1)
+    parts_ = round(seconds / PART_S)
     for k in range(parts_):
+        for name, value in EVENTS.get(k, {}).items():
+            loop.set(name, value)
         loop.set("torque_command_Nm", torques[k % len(torques)])
         start, stop = (speeds[(k + j) // 4 % len(speeds)] * RPM for j in (0, 1))
         weaker = 1 - 0.15 * k / parts_, 1 - 0.15 * (k + 1) / parts_
         loop.run(2500, {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": weaker})
+        derating |= int(loop.get("derating"))
+        faults |= int(loop.get("fault_word"))
+    return derating, faults
 
 
-def check_followed(parts: Parts, loop: Loop, periods: int) -> None:
+def check_followed(loop: Loop, periods: int) -> None:
     difference = loop._library.sim_shadow_difference(loop._sim)
     assert difference is None, difference
-    # At 1 % of the period's ends the task is still at work, and nothing can be compared.
+    # At a few of the periods' ends the task is still at work, and nothing can be compared.
     assert loop.get("emulator.compared") >= 0.98 * periods
-    assert loop.get("fault_word") == 0
 
 
-@UNEXPLAINED
 @pytest.mark.parametrize("mode", [0, 1], ids=["paper", "robust"])
-def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(parts: Parts, drive: Loop, mode: int) -> None:
+def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(drive: Loop, mode: int) -> None:
     drive.set("identification_mode", mode)
-    follow(drive, 10.0)
-    check_followed(parts, drive, 100_000)
+    derating, faults = follow(drive, 10.0)
+    check_followed(drive, 100_000)
+    print(hex(derating), hex(faults), drive.get("psi_f_Vs"), drive.get("truth.psi_f_Vs"), drive.get("truth.torque_Nm"))
+    assert derating & 0x3F == 0x3F
+    assert faults == OVER_VOLTAGE | GATE
+    assert drive.get("fault_word") == 0
 
 
-@UNEXPLAINED
 def test_the_image_with_a_resolver_computes_the_same_bits_too(resolver_parts: Parts) -> None:
     motor = resolver_parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
         follow(loop, 1.0)
-        check_followed(resolver_parts, loop, 10_000)
+        check_followed(loop, 10_000)
+        assert loop.get("fault_word") == 0
 
 
-@UNEXPLAINED
 def test_a_shadow_that_is_given_another_calibration_is_caught(drive: Loop) -> None:
     follow(drive, 0.25)
     before = drive.get("emulator.differing")
@@ -97,8 +127,7 @@ def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Lo
     drive.run(50)
     drive.set("emulator.gate_fault", 0)
     drive.run(500)
-    over_current = 1
-    assert int(drive.get("fault_word")) & over_current
+    assert int(drive.get("fault_word")) == GATE
     # 3000 rpm: the back-EMF stays below the dc link, open diodes carry nothing.
     assert abs(drive.get("truth.torque_Nm")) < 0.5
     drive.set("enable", 0)
