@@ -77,6 +77,10 @@ static void take_samples(fluxtrue_t *d, const double in[6])
 static void run_period(fluxtrue_t *d)
 {
     host_port_select(d);
+    if (d->board.gate_fault && !d->board.gate_fault_told) {
+        d->board.gate_fault_told = true;
+        drive_raise_fault(&d->drive, FAULT_GATE);
+    }
     fast_isr(&d->drive);
     if (d->mrai_pending) {
         d->mrai_pending = false;

@@ -25,7 +25,7 @@ typedef struct {
     can_queue_t received, sent;
     uint32_t lost, bus_off;
     bool output[BOARD_OUTPUTS];
-    bool gate_fault;
+    bool gate_fault, gate_fault_told; /* the line; told to the drive, once until the gates are closed again */
     bool winding_broken, inverter_broken; /* no reading */
     double inverter_C;
     bool watchdog_started;

@@ -47,6 +47,7 @@ void hal_pwm_write(duty_t duty)
 
 void hal_pwm_enable(bool on)
 {
+    active->board.gate_fault_told = active->board.gate_fault_told && (!on || active->gates);
     active->gates = on;
 }
 

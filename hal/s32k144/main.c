@@ -29,7 +29,7 @@ void adc_handler(void)
 {
     angle_begin();
     if (pwm_fault_taken()) {
-        drive_raise_fault(&ecu.drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
+        drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
     }
     if (data_damaged) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);

@@ -17,6 +17,7 @@ typedef struct {
     fluxtrue_t *shadow;        /* NULL: not followed */
     drive_t task_result;       /* of the shadow's task, while the image is still at it */
     bool task_runs;
+    bool gate_fault;           /* its interrupt has come, the next fast ISR tells the shadow */
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;

@@ -265,6 +265,8 @@ static int try_all(preempt_t *p, preempt_report_t *report)
         (void)snprintf(report->first, sizeof report->first, "vector %d was never entered", p->victim);
         return -1;
     }
+    (void)emu_register_set(p->e->emu, "PDB0.SC", 0); /* no conversions: the only fast ISRs are ours */
+    (void)emu_register_set(p->e->emu, "PDB1.SC", 0);
     emu_snapshot_t *start = emu_save(p->e->emu);
     p->before = drive_there(p);
     p->counts = (adc_counts_t){.i_a = (uint16_t)emu_register(p->e->emu, "ADC0.R0"),

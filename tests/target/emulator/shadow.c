@@ -12,7 +12,7 @@
 #include "hal/s32k144/ntc.h"
 #include "hal/temperature.h"
 
-enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48 };
+enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE_VECTOR = 16 + 103 };
 #define PWM_TICK_S (1.0 / 112e6)
 enum { ENCODER_SHIFT = 18 };
 
@@ -35,6 +35,15 @@ static void samples_take(emulated_t *e)
     e->shadow->counts = (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1],
                                        .v_dc = pins->adc[1][1]};
     e->shadow->theta_m = angle_read(e);
+}
+
+/* Before the period's ISR, as hal/s32k144/main.c has it. */
+static void faults_take(emulated_t *e)
+{
+    if (e->gate_fault) {
+        drive_raise_fault(&e->shadow->drive, FAULT_GATE);
+    }
+    e->gate_fault = false;
 }
 
 static double temperature(uint32_t count, bool *broken)
@@ -96,8 +105,11 @@ static void follow(void *user, int vector, bool entered)
     host_port_select(e->shadow);
     if (vector == FAST_VECTOR && entered && e->task_runs) {
         task_interrupted(e);
+    } else if (vector == GATE_VECTOR && entered) {
+        e->gate_fault = true;
     } else if (vector == FAST_VECTOR && !entered) {
         samples_take(e);
+        faults_take(e);
         fast_isr(&e->shadow->drive);
     } else if (vector == MRAI_VECTOR && entered) {
         mrai_isr(&e->shadow->drive);

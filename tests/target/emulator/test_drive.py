@@ -9,9 +9,9 @@ from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.sim.library import Loop
 
 RPM = 2 * np.pi / 60
-# Held for 10 s in both modes before limits, derating and slow monitors joined the task; since then the task's state
-# differs from the shadow's after 0.15 to 0.4 s. Not explained yet: an input the shadow is not given, or a difference.
-UNEXPLAINED = pytest.mark.xfail(strict=False, reason="the task with limits and monitors: not explained yet")
+PART_S = 0.25
+OVER_CURRENT, OVER_VOLTAGE, GATE = 1 << 0, 1 << 1, 1 << 15
+EVERY_LIMIT = 0x3F  # of torque, power, voltage and current, inverter, winding, low dc voltage
 POINTS = [(speed, torque) for speed in grid.SPEEDS_RPM for torque in grid.TORQUES_NM]
 
 
@@ -34,46 +34,75 @@ def test_a_torque_step_is_as_fast_as_promised(parts: Parts) -> None:
         assert bound.met, bound.text()
 
 
-def follow(loop: Loop, seconds: float) -> None:
-    """Torques of both signs, speeds into field weakening and back, a weakening magnet; with a shadow on the host."""
+# Every limit, both ways a fault comes about, resets, the other identification: from which part of the drive on, and
+# within a part from one value to another.
+EVENTS: dict[int, dict[str, float]] = {
+    2: {"torque_limit_drive_Nm": 60.0}, 3: {"torque_limit_drive_Nm": 1e4},
+    10: {"power_limit_drive_W": 20e3}, 11: {"power_limit_drive_W": 1e6},
+    12: {"emulator.inverter_C": 99.0}, 13: {"emulator.inverter_C": 40.0},
+    17: {"plant.winding_C": 222.0}, 18: {"plant.winding_C": 90.0},
+    21: {"enable": 0.0}, 22: {"fault_reset": 1.0}, 23: {"enable": 1.0},
+    25: {"identification_reset": 1.0}, 26: {"identification": 0.0}, 27: {"identification": 1.0, "torque_loop": 0.0},
+    28: {"torque_loop": 1.0},
+    29: {"emulator.gate_fault": 1.0}, 30: {"emulator.gate_fault": 0.0, "enable": 0.0},
+    31: {"fault_reset": 1.0}, 32: {"enable": 1.0},
+}  # fmt: skip
+RAMPS: dict[int, tuple[float, float]] = {5: (350.0, 170.0), 6: (170.0, 350.0), 20: (350.0, 450.0), 21: (450.0, 350.0)}
+OTHER_MODE = range(36, 38)
+
+
+def follow(loop: Loop, seconds: float) -> tuple[int, int]:
+    """Torques of both signs, speeds into field weakening and back, a weakening magnet, and all the events; with a
+    shadow on the host. Answers which deratings and which faults there have been."""
     torques = (80.0, -60.0, 120.0, -20.0, 5.0)
     speeds = (3000.0, 800.0, 6500.0, -2500.0)
-    loop.set("emulator.shadow", 1)
-    loop.set("enable", 1)
-    parts_ = round(seconds / 0.25)
+    derating = faults = 0
+    mode = loop.get("identification_mode")
+    for name in ("emulator.shadow", "enable", "identification", "torque_loop"):
+        loop.set(name, 1)
+    parts_ = round(seconds / PART_S)
     for k in range(parts_):
+        for name, value in EVENTS.get(k, {}).items():
+            loop.set(name, value)
+        loop.set("identification_mode", 1 - mode if k in OTHER_MODE else mode)
         loop.set("torque_command_Nm", torques[k % len(torques)])
         start, stop = (speeds[(k + j) // 4 % len(speeds)] * RPM for j in (0, 1))
         weaker = 1 - 0.15 * k / parts_, 1 - 0.15 * (k + 1) / parts_
-        loop.run(2500, {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": weaker})
+        ramps = {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": weaker}
+        loop.run(2500, ramps | ({"plant.vdc_V": RAMPS[k]} if k in RAMPS else {}))
+        derating |= int(loop.get("derating"))
+        faults |= int(loop.get("fault_word"))
+    return derating, faults
 
 
-def check_followed(parts: Parts, loop: Loop, periods: int) -> None:
+def check_followed(loop: Loop, periods: int) -> None:
     difference = loop._library.sim_shadow_difference(loop._sim)
     assert difference is None, difference
-    # At 1 % of the period's ends the task is still at work, and nothing can be compared.
+    # At a few of the periods' ends the task is still at work, and nothing can be compared.
     assert loop.get("emulator.compared") >= 0.98 * periods
-    assert loop.get("fault_word") == 0
 
 
-@UNEXPLAINED
 @pytest.mark.parametrize("mode", [0, 1], ids=["paper", "robust"])
-def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(parts: Parts, drive: Loop, mode: int) -> None:
+def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(drive: Loop, mode: int) -> None:
     drive.set("identification_mode", mode)
-    follow(drive, 10.0)
-    check_followed(parts, drive, 100_000)
+    derating, faults = follow(drive, 10.0)
+    check_followed(drive, 100_000)
+    assert derating & EVERY_LIMIT == EVERY_LIMIT
+    # Closing the low sides against the over-voltage starts with a current beyond the trip.
+    assert faults == OVER_VOLTAGE | OVER_CURRENT | GATE
+    assert drive.get("fault_word") == 0
+    assert drive.get("truth.torque_Nm") == pytest.approx(5.0, abs=1.0)  # it drives
 
 
-@UNEXPLAINED
 def test_the_image_with_a_resolver_computes_the_same_bits_too(resolver_parts: Parts) -> None:
     motor = resolver_parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
         follow(loop, 1.0)
-        check_followed(resolver_parts, loop, 10_000)
+        check_followed(loop, 10_000)
+        assert loop.get("fault_word") == 0
 
 
-@UNEXPLAINED
 def test_a_shadow_that_is_given_another_calibration_is_caught(drive: Loop) -> None:
     follow(drive, 0.25)
     before = drive.get("emulator.differing")
@@ -97,8 +126,7 @@ def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Lo
     drive.run(50)
     drive.set("emulator.gate_fault", 0)
     drive.run(500)
-    over_current = 1
-    assert int(drive.get("fault_word")) & over_current
+    assert int(drive.get("fault_word")) == GATE
     # 3000 rpm: the back-EMF stays below the dc link, open diodes carry nothing.
     assert abs(drive.get("truth.torque_Nm")) < 0.5
     drive.set("enable", 0)

@@ -4,12 +4,14 @@
 from collections.abc import Iterator
 
 import pytest
+from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import library, preempt
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.sim.library import Loop
 
 
 PAPER, ROBUST = 0, 1
+STEPS, PERIODS = 10, 10
 
 
 @pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
@@ -27,32 +29,41 @@ def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
         yield loop
 
 
+def longest_step_next(loop: Loop) -> None:
+    """To just before the longest of the ten kinds of steps: the robust identification learns in every tenth."""
+    core = Stand(loop).core
+    lengths = []
+    for _ in range(STEPS):
+        core.clear_counts()
+        loop.run(PERIODS)
+        lengths.append(core.counts(preempt.TASK).most)
+    loop.run(PERIODS * lengths.index(max(lengths)))
+
+
 def check(report: preempt.Report) -> None:
     assert report.mixed == 0, report
-    # Every boundary was tried.
+    # Every boundary was tried, and both the old inputs and the new ones were seen.
     assert report.points == report.instructions > 50
+    assert report.outcomes == 2
 
 
-@pytest.mark.parametrize("periods", [1, 7])
-def test_the_identification_uses_the_old_sample_or_the_new_one_wherever_it_is_interrupted(
+@pytest.mark.parametrize("periods", [1, 7, 9])
+def test_the_identification_sees_the_old_sample_or_the_new_one_wherever_it_is_interrupted(
     loop: Loop, periods: int
 ) -> None:
     loop.run(periods)
-    report = preempt.interrupt_everywhere(loop, preempt.MRAI)
-    check(report)
-    assert report.outcomes == 2  # both the old and the new sample were seen
+    check(preempt.interrupt_everywhere(loop, preempt.MRAI))
 
 
+# Two rounds at one place overwrite the slot that the task may be copying from.
 @pytest.mark.parametrize("rounds", [1, 2])
-def test_the_task_uses_old_or_new_values_wherever_both_interrupts_come(loop: Loop, rounds: int) -> None:
-    # Two rounds at one place overwrite the slot that the task may be copying from: it has to look again.
+@pytest.mark.parametrize("longest", [False, True], ids=["next", "longest"])
+def test_the_task_sees_one_moment_wherever_both_interrupts_come(loop: Loop, longest: bool, rounds: int) -> None:
+    if longest:
+        longest_step_next(loop)
     report = preempt.interrupt_everywhere(loop, preempt.TASK, rounds)
-    if loop.get("identification_mode") == ROBUST and report.mixed:
-        pytest.xfail(f"not explained since limits and monitors joined the task: {report}")
     check(report)
-    if loop.get("identification_mode") == PAPER:
-        assert report.words >= 2  # the two corrections, which the task reads beside the sample
-        assert report.outcomes >= 3
+    assert report.choices >= 2  # interrupts before and after something was handed over to them
 
 
 def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop) -> None:
