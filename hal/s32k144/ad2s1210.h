@@ -22,6 +22,8 @@ enum {
 };
 
 #define AD2S1210_BITS 24U
+#define AD2S1210_REGISTER_BITS 8U /* of an address or a register, in configuration mode */
+#define AD2S1210_FAULT_REGISTER 0xFFU
 
 typedef struct {
     uint16_t value;

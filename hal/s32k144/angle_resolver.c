@@ -4,6 +4,7 @@
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/pins.h"
+#include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/resolver.h"
 
@@ -17,15 +18,34 @@ static ad2s1210_frame_t position;
 static volatile int16_t velocity;
 static bool missing; /* a frame did not come: the last angle stays, and the fault is raised */
 
+/* The converter keeps every fault it has ever seen, those of its own power-up first, until its register has been read
+ * in configuration mode between two falling edges of SAMPLE; the second comes with the first PWM period. What is
+ * still wrong then is seen by the first frames. */
+static void forget_faults(void)
+{
+    pwm_sample_by_hand();
+    PTC->PSOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1);
+    LPSPI0->TCR = LPSPI_TCR_FRAMESZ(AD2S1210_REGISTER_BITS - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0);
+    LPSPI0->TDR = AD2S1210_FAULT_REGISTER; /* its address, then its content */
+    LPSPI0->TDR = AD2S1210_FAULT_REGISTER;
+    for (uint32_t k = 0, frames = 0; k < WAIT_LOOPS && frames < 2U; k++) {
+        if ((LPSPI0->RSR & LPSPI_RSR_RXEMPTY) == 0U) {
+            (void)LPSPI0->RDR;
+            frames++;
+        }
+    }
+}
+
 void angle_init(uint32_t period_ticks)
 {
     (void)period_ticks;
-    PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
     LPSPI0->CR = 0;
     LPSPI0->CFGR1 = LPSPI_CFGR1_MASTER;
     LPSPI0->CCR = LPSPI_CCR_SCKDIV(CLOCK_DIVIDER) | LPSPI_CCR_DBT(FRAME_GAP) | LPSPI_CCR_PCSSCK(FRAME_GAP) |
                   LPSPI_CCR_SCKPCS(FRAME_GAP);
     LPSPI0->CR = LPSPI_CR_MEN | LPSPI_CR_RTF | LPSPI_CR_RRF;
+    forget_faults();
+    PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
     LPSPI0->TCR = LPSPI_TCR_FRAMESZ(AD2S1210_BITS - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0);
 }
 

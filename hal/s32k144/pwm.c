@@ -11,6 +11,9 @@
 #define FAULT_FILTER 4U
 #define SIX_OUTPUTS 0x3FU
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
+#define SAMPLE_HELD 0x40U   /* SWOCTRL: channel 6 by software, */
+#define SAMPLE_HIGH 0x4000U /* at this level */
+#define MICROSECOND_LOOPS 112
 #define FTM0_INIT_TRIGGER 22U
 #define PERIOD_MAX 65532U   /* 16 bits; a multiple of 4, for the tick's timer */
 #define DEAD_TIME_MAX 1023U
@@ -106,6 +109,22 @@ void pwm_init(const pwm_config_t *config)
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
     gates = false;
+}
+
+static void pass_a_microsecond(void)
+{
+    for (int k = 0; k < MICROSECOND_LOOPS; k++) {
+        __asm__ volatile("nop");
+    }
+}
+
+void pwm_sample_by_hand(void)
+{
+    FTM0->SWOCTRL = SIX_OUTPUTS | SAMPLE_HELD | SAMPLE_HIGH;
+    pass_a_microsecond();
+    FTM0->SWOCTRL = SIX_OUTPUTS | SAMPLE_HELD;
+    pass_a_microsecond();
+    FTM0->SWOCTRL = SIX_OUTPUTS;
 }
 
 void pwm_start(void)

@@ -20,6 +20,8 @@ bool pwm_possible(const pwm_config_t *config);
 void pwm_init(const pwm_config_t *config);
 /** The counter runs from here on; its first period starts now. */
 void pwm_start(void);
+/** A falling edge of SAMPLE, and a low microsecond after it; only before pwm_start(). */
+void pwm_sample_by_hand(void);
 void pwm_gate_fault_isr(void);
 /** True while the fault input is active, and once after it was. */
 bool pwm_fault_reported(void);

@@ -282,6 +282,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
         s->due[i] = NEVER;
     }
     s->core_ticks = FIRC_TICKS;
+    rdc_power_on(emu);
     bus_reset(emu);
     nvic_reset(emu);
     wdog_restart(emu);

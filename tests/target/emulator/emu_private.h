@@ -87,6 +87,9 @@ typedef struct {
 
 typedef struct {
     uint32_t latched; /* angle at the last SAMPLE */
+    uint8_t fault, sampled_fault; /* kept until it has been read in configuration mode and SAMPLE falls again */
+    bool read, high;              /* the fault register so; SAMPLE while software holds it */
+    uint8_t address;
 } rdc_t;
 
 typedef struct {
@@ -223,7 +226,9 @@ void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);
-uint32_t rdc_transfer(emu_t *emu, uint32_t bits);
+uint32_t rdc_transfer(emu_t *emu, uint32_t sent, uint32_t bits);
+void rdc_power_on(emu_t *emu);
+void rdc_sample(emu_t *emu);
 
 /* One line per kind of peripheral. */
 #define MODEL(kind) \

@@ -205,6 +205,26 @@ static void check_bridge(emu_t *emu, const peripheral_t *self, uint32_t offset, 
     emu->s.ftm[0].closed = now.gates;
 }
 
+/* SAMPLE of the resolver converter is channel 6: low from the period's start to C6V, high from there on. */
+static bool sample_falls(const emu_t *emu)
+{
+    const peripheral_t *self = ftm0();
+    const ftm_t *f = &emu->s.ftm[0];
+    return (bus_get(emu, self, SC) >> 22 & 1U) != 0 && (bus_get(emu, self, SWOCTRL) >> 6 & 1U) == 0 &&
+           (bus_get(emu, self, COMBINE) >> 24 & PAIR_COMBINE) != 0 && (bus_get(emu, self, C0SC + 48U) & 12U) == 8U &&
+           f->cv[6] > f->cntin && f->cv[7] > f->mod;
+}
+
+/* While software holds the line: what it is held at. */
+static void sample_held(emu_t *emu, uint32_t forced)
+{
+    const bool high = (forced >> 6 & 1U) != 0 && (forced >> 14 & 1U) != 0;
+    if (emu->s.rdc.high && !high) {
+        rdc_sample(emu);
+    }
+    emu->s.rdc.high = high;
+}
+
 static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t value)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
@@ -226,6 +246,8 @@ static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t 
         f->outmask = value;
     } else if (offset == SYNC) {
         sync_written(emu, self, value);
+    } else if (offset == SWOCTRL && self->instance == 0) {
+        sample_held(emu, value);
     } else if (offset == MODE) {
         mode_written(emu, self, value);
     } else if (offset == FMS) {
@@ -320,7 +342,9 @@ void ftm_triggers(emu_t *emu)
     }
     emu->s.ftm[0].triggers_due = false;
     emu->s.event = emu->s.ftm[0].start;
-    emu->s.rdc.latched = emu_angle(emu); /* SAMPLE of the resolver converter is a channel of this timer */
+    if (sample_falls(emu)) {
+        rdc_sample(emu);
+    }
     if ((bus_get(emu, ftm0(), EXTTRIG) & 0x40U) != 0) {
         trgmux_event(emu, INIT_TRIGGER);
     }

@@ -75,7 +75,8 @@ static void transfer(emu_t *emu, const peripheral_t *self)
     } else {
         const uint64_t begin = spi->busy_until > emu->s.now ? spi->busy_until : emu->s.now;
         spi->busy_until = begin + frame_ticks(emu, self, bits);
-        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, bits) : 0xFFFFFFFFU >> (32U - bits);
+        const uint32_t nobody = 0xFFFFFFFFU >> (32U - bits), sent = bus_get(emu, self, TDR);
+        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, sent, bits) : nobody;
         spi->ready[spi->rx_count++] = spi->busy_until;
     }
 }
@@ -100,17 +101,52 @@ void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
     }
 }
 
+/* ---- the converter at LPSPI0 ---- */
+
+/* Its fault register starts with what was missing while it was powered up: signals and tracking. */
+void rdc_power_on(emu_t *emu)
+{
+    emu->s.rdc.fault = 0x48;
+}
+
+/* SAMPLE falls: position and faults are taken over; faults that have been read are forgotten, unless they last. */
+void rdc_sample(emu_t *emu)
+{
+    rdc_t *rdc = &emu->s.rdc;
+    rdc->latched = emu_angle(emu);
+    rdc->fault = rdc->read ? 0U : rdc->fault;
+    rdc->read = false;
+    rdc->fault |= emu->s.pins.resolver_fault ? 0x40U : 0U;
+    rdc->sampled_fault = rdc->fault;
+}
+
+/* Configuration mode, eight bits each: first an address, then what is there. Only the fault register is modelled. */
+static uint32_t rdc_configure(emu_t *emu, uint32_t sent, uint32_t bits)
+{
+    rdc_t *rdc = &emu->s.rdc;
+    if (bits != 8U || (sent & 0xFFU) != 0xFFU) {
+        emu_fail(emu, "the AD2S1210 is in its configuration mode: only its fault register is modelled");
+        return 0;
+    }
+    rdc->read = rdc->address == 0xFFU;
+    const uint32_t answer = rdc->read ? rdc->sampled_fault : 0U;
+    rdc->address = rdc->read ? 0U : (uint8_t)sent;
+    return answer;
+}
+
 /* Normal mode: A1 = 0 position, A1 = 1 velocity; then the fault register. Latched by SAMPLE. */
-uint32_t rdc_transfer(emu_t *emu, uint32_t bits)
+uint32_t rdc_transfer(emu_t *emu, uint32_t sent, uint32_t bits)
 {
     const uint32_t lines = bus_get(emu, bus_find("PTC"), 0);
     const bool a0 = (lines >> EMU_RDC_A0 & 1U) != 0, a1 = (lines >> EMU_RDC_A1 & 1U) != 0;
-    if (a0) {
-        emu_fail(emu, "the AD2S1210 is in its configuration mode: not modelled");
+    if (a0 && a1) {
+        return rdc_configure(emu, sent, bits);
+    } else if (a0) {
+        emu_fail(emu, "the AD2S1210 has no mode A0 = 1, A1 = 0");
         return 0;
     }
     const double turns_per_s = (double)emu->s.pins.angle_rate / 65536.0 / 4294967296.0 * (double)EMU_TICKS_PER_S;
     const uint32_t value = a1 ? (uint32_t)(int32_t)(turns_per_s / 500.0 * 32768.0) & 0xFFFFU : emu->s.rdc.latched >> 16;
-    const uint32_t frame = value << 8 | (emu->s.pins.resolver_fault ? 0x40U : 0U);
+    const uint32_t frame = value << 8 | emu->s.rdc.sampled_fault;
     return bits >= 24U ? frame << (bits - 24U) : frame >> (24U - bits);
 }

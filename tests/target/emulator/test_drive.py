@@ -148,3 +148,7 @@ def test_a_fault_of_the_resolver_raises_the_angle_fault(resolver_parts: Parts) -
         loop.set("emulator.resolver_fault", 1)
         loop.run(10)
         assert int(loop.get("fault_word")) & 1 << 4
+        loop.set("emulator.resolver_fault", 0)  # the converter remembers it until its register is read
+        loop.set("fault_reset", 1)
+        loop.run(100)
+        assert int(loop.get("fault_word")) & 1 << 4

@@ -126,6 +126,12 @@ void test_both_channels_of_every_pair_have_an_edge(void)
     }
 }
 
+void test_sampling_by_hand_leaves_the_gates_held_and_the_line_to_the_timer(void)
+{
+    pwm_sample_by_hand();
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
+}
+
 void test_closing_the_gates_waits_for_the_period_and_opening_does_not(void)
 {
     hal_pwm_enable(true);

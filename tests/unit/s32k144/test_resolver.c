@@ -3,14 +3,23 @@
 #include <string.h>
 
 #include "hal/angle.h"
+#include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/pins.h"
+#include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/resolver.h"
 #include "unity.h"
 
 lpspi_t fake_LPSPI0;
 gpio_t fake_PTC;
+
+static int samples;
+
+void pwm_sample_by_hand(void)
+{
+    samples++;
+}
 
 static void received(uint32_t frame)
 {
@@ -34,6 +43,20 @@ void setUp(void)
 }
 
 void tearDown(void) {}
+
+void test_start_up_reads_the_fault_register_after_a_sample_and_leaves_the_converter_in_position_mode(void)
+{
+    const uint32_t both = 1U << PIN_RESOLVER_A0 | 1U << PIN_RESOLVER_A1;
+    samples = 0;
+    received(0);
+    fake_PTC = (gpio_t){0};
+    angle_init(11200);
+    TEST_ASSERT_EQUAL_INT(1, samples);
+    TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PSOR);
+    TEST_ASSERT_EQUAL_HEX32(AD2S1210_FAULT_REGISTER, fake_LPSPI0.TDR);
+    TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PCOR);
+    TEST_ASSERT_EQUAL_HEX32(23, fake_LPSPI0.TCR & 0xFFFU); /* 24 bits from here on */
+}
 
 void test_the_position_is_the_upper_half_of_the_angle(void)
 {
