@@ -21,17 +21,32 @@
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
 
 ecu_t ecu; /* calibration tools find it by this name */
-static volatile bool data_damaged; /* set by the background, for the fast ISR: it alone raises faults */
+/* For the fast ISR, which alone raises faults, as one word: what the gate driver and the background have seen. */
+static volatile union {
+    struct {
+        bool gates, data_damaged;
+    };
+    uint32_t any;
+} alarms;
 static bool started;               /* the PWM, and with it the fast ISR */
+
+/* The gate driver's is forgotten before it is asked for: one that comes in between is seen in the next period. */
+static __attribute__((noinline, cold)) void alarms_take(void)
+{
+    alarms.gates = false;
+    if (pwm_fault_taken()) {
+        drive_raise_fault(&ecu.drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
+    }
+    if (alarms.data_damaged) {
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    }
+}
 
 void adc_handler(void)
 {
     angle_begin();
-    if (pwm_fault_taken()) {
-        drive_raise_fault(&ecu.drive, FAULT_OVER_CURRENT); /* what a gate driver reports is a desaturated switch */
-    }
-    if (data_damaged) {
-        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    if (__builtin_expect(alarms.any != 0U, 0)) {
+        alarms_take();
     }
     fast_isr(&ecu.drive);
     if (angle_fault()) {
@@ -74,6 +89,7 @@ void can_bus_off_handler(void)
 void gate_fault_handler(void)
 {
     pwm_gate_fault_isr();
+    alarms.gates = true;
 }
 
 static void enable(uint32_t irq, uint32_t priority)
@@ -113,7 +129,7 @@ static void start(uint32_t period_ticks)
     __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
     angle_init(period_ticks);
     tick_start();
-    if (!data_damaged) {
+    if (!alarms.data_damaged) {
         pwm_start();
         started = true;
     }
@@ -124,9 +140,9 @@ static void start(uint32_t period_ticks)
 /* Not part of the reset handler: its floating-point instructions must not move before the FPU is on. */
 __attribute__((noinline)) int main(void)
 {
-    data_damaged = !image_valid();
+    alarms.data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
-    if (data_damaged) {
+    if (alarms.data_damaged) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
     const pwm_config_t pwm = {ticks(motor.bases.period_s), ticks(motor.dead_time_s)};
@@ -138,7 +154,7 @@ __attribute__((noinline)) int main(void)
     start(pwm.period_ticks);
     for (;;) {
         if (!image_step()) {
-            data_damaged = true;
+            alarms.data_damaged = true;
         }
         if (stack_measure() < STACK_RESERVE) {
             panic();
