@@ -76,6 +76,7 @@ static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
     fast_state_t *fast = &drive->fast;
     sample_box_publish(&drive->samples, next);
     if (drive->request.identification_mode != IDENTIFICATION_ROBUST) {
+        identify_window_spoil(&fast->window); /* it would have a gap */
         fast->pended++;
         hal_irq_pend_mrai();
         return;
@@ -86,16 +87,15 @@ static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
         .u = sample->mrai.u,
         .flux = &sample->mrai.flux,
         .theta = sample->theta_e,
-        .acting = sample->acting,
-        .limited = sample->snapped,
     };
     if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
         window_box_write(&drive->windows, &fast->window);
+        identify_window_restart(&fast->window);
     }
 }
 
 /* The safe state: low sides closed, or all gates open. */
-static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
+static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 {
     const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
     const bool closed = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
@@ -112,19 +112,41 @@ static __attribute__((noinline, cold)) void bridge_off(drive_t *drive, sample_t 
     sample->voltage_limited = false;
     sample->snapped = false;
     sample->acting = false;
+    identify_window_spoil(&drive->fast.window);
     drive->fast.coming = (dq_t){0, 0};
     drive->fast.periods_on = 0;
 }
 
-/* Circle or hexagon: the voltage to come may not be the one wanted. */
-static void note_limits(drive_t *drive, sample_t *sample, const modulate_in_t *modulation,
-                        const current_control_out_t *wanted, const modulate_out_t *made)
+/* Circle or hexagon: what the bridge makes, and the voltage to come, may not be what is wanted. By registers, two of
+ * the duties in one: what goes through memory would be kept there in every period. */
+static __attribute__((noinline)) uint64_t bridge_limited(drive_t *drive, sample_t *sample, fx_pair_t u, fx_pair_t i,
+                                                         fx_pair_t advanced, bool limited)
 {
-    sample->voltage_limited = wanted->limited || made->limited;
-    if (made->limited) {
-        const modulate_in_t again = *modulation; /* a copy: the usual case keeps its values in registers */
+    const dq_t wanted = {(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)};
+    const modulate_in_t in = {wanted, i, advanced, sample->v_dc};
+    const modulate_out_t made = modulate_step(&drive->motor.modulate, &in);
+    sample->voltage_limited = limited || made.limited;
+    if (made.limited) {
         sample->snapped = true;
-        drive->fast.coming = modulate_acted(&drive->motor.modulate, &again, made->duty);
+        identify_window_snapped(&drive->fast.window);
+        drive->fast.coming = modulate_acted(&drive->motor.modulate, &in, made.duty);
+    }
+    return (uint64_t)made.duty.c << 32 | made.duty.b << 16 | made.duty.a;
+}
+
+static duty_t unpacked(uint64_t duty)
+{
+    const uint32_t lower = (uint32_t)duty;
+    return (duty_t){lower & 0xFFFFU, lower >> 16, (uint32_t)(duty >> 32)};
+}
+
+/* The duties of the first period act in the second; the third sample ends a period of which they are known. */
+static __attribute__((noinline, cold)) void starting(fast_state_t *fast, sample_t *sample)
+{
+    fast->periods_on++;
+    sample->acting = fast->periods_on >= PERIODS_TO_ACT;
+    if (!sample->acting) {
+        identify_window_spoil(&fast->window);
     }
 }
 
@@ -140,34 +162,43 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
         .v_dc = now->v_dc,
     };
     const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
-    const modulate_in_t modulation = {wanted.u, now->i_dq, now->advanced, now->v_dc, wanted.clear};
-    const modulate_out_t made = modulate_step(&m->modulate, &modulation);
-    hal_pwm_write(made.duty);
-    hal_pwm_enable(true);
     sample->mrai.u.d = fast->coming.d; /* acts now: the duties before these */
     sample->mrai.u.q = fast->coming.q;
+    sample->acting = true;
     sample->voltage_limited = false;
     sample->snapped = false;
     fast->coming.d = wanted.u.d;
     fast->coming.q = wanted.u.q;
-    if (!wanted.clear) {
-        note_limits(drive, sample, &modulation, &wanted, &made);
+    const fx_pair_t u = fx_arch_pkhbt(wanted.u.d, wanted.u.q);
+    duty_t duty;
+    if (__builtin_expect(wanted.clear, 1)) {
+        duty = modulate_clear(&m->modulate, u, now->i_dq, now->advanced, now->v_dc);
+    } else {
+        duty = unpacked(bridge_limited(drive, sample, u, now->i_dq, now->advanced, wanted.limited));
     }
-    sample->acting = true;
-    if (fast->periods_on < PERIODS_TO_ACT) {
-        fast->periods_on++;
-        sample->acting = fast->periods_on >= PERIODS_TO_ACT;
+    hal_pwm_write(duty);
+    hal_pwm_enable(true);
+    if (__builtin_expect(fast->periods_on < PERIODS_TO_ACT, 0)) {
+        starting(fast, sample);
     }
 }
 
-/* A reset comes before this period's monitors: what is still wrong is latched again at once.
- * Bad motor data stay bad. */
-static void forget_faults(drive_t *drive, uint32_t asked)
+/* A reset comes before this period's monitors: what is still wrong is latched again at once. It never comes with the
+ * command to run. Bad motor data stay bad. */
+static __attribute__((noinline, cold)) void forget_faults(drive_t *drive, uint32_t asked)
 {
     if (drive->fast.fault_resets != asked) {
         drive->fast.fault_resets = asked;
         drive->fast.faults = drive->fast.faults & FAULT_CONFIG;
     }
+}
+
+static __attribute__((noinline, cold)) void rest(drive_t *drive, sample_t *sample, const command_t *command)
+{
+    if (command->faults != 0U) {
+        drive_raise_fault(drive, command->faults);
+    }
+    bridge_off(drive, sample, command->safe);
 }
 
 /* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the vector again. */
@@ -185,7 +216,9 @@ static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t 
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
-    forget_faults(drive, command->fault_resets);
+    if (__builtin_expect(!command->run, 0)) {
+        forget_faults(drive, command->fault_resets);
+    }
     const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
     watch(drive, unfinished);
     uint32_t next = drive->samples.generation + 1U;
@@ -203,10 +236,7 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     if (command->run && drive->fast.faults == 0) {
         bridge_on(drive, sample, &now, &command->target);
     } else {
-        if (command->faults != 0U) {
-            drive_raise_fault(drive, command->faults);
-        }
-        bridge_off(drive, sample, command->safe);
+        rest(drive, sample, command);
     }
     publish(drive, sample, next);
 }

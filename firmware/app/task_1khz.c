@@ -32,9 +32,10 @@ static run_state_t supervise(drive_t *drive, uint32_t faults)
 {
     const request_t *request = &drive->request;
     task_state_t *task = &drive->task;
+    const bool enable = request->enable; /* read once: a reset never goes down with the command to run */
     if (request->fault_resets != task->fault_resets_asked) {
         task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not kept for later */
-        task->fault_resets += request->enable ? 0U : 1U;
+        task->fault_resets += enable ? 0U : 1U;
     }
     if (request->identification_resets != task->identification_resets) {
         task->identification_resets = request->identification_resets;
@@ -44,7 +45,7 @@ static run_state_t supervise(drive_t *drive, uint32_t faults)
     if (faults != 0U) {
         return RUN_STATE_FAULT;
     }
-    return request->enable ? RUN_STATE_RUN : RUN_STATE_OFF;
+    return enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* What the voltage of this millisecond says about the plan of the last one. */

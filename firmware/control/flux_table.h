@@ -7,7 +7,7 @@
  * Units    currents per unit of I_b; results as in flux_table_types.h
  * Range    i_d, i_q anywhere in q15; outside the grid the edge is used and flagged
  * Rounding 1 LSB q15 per interpolated quantity; psi: 1/2 LSB of psi_f0 and 1/2 of the product with an l of 29 bits
- * Errors   clamped; flux_table_valid() rejects a bad table at start-up
+ * Errors   outside is not zero; flux_table_valid() rejects a bad table at start-up
  * Context  step: fast ISR, once per period; inductances: tasks; no division, no loop */
 #include <stdint.h>
 
@@ -17,10 +17,11 @@
 
 typedef struct {
     fx_mesh_t mesh;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
-    uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
     int32_t i_scale;       /* 8 2^l_shift: l in Q29 times i is then flux in q15 */
-    const int16_t *l_d, *l_q, *l_qq, *g; /* [ix * ny + iy] */
+    const int16_t *l_d, *l_q; /* [ix * ny + iy], as all but psi_f0; in the order in which every period reads them */
     const int16_t *psi_f0; /* [iy]: depends on i_q alone */
+    const int16_t *g, *l_qq;
+    uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
 } flux_table_config_t;
 
 bool flux_table_valid(const flux_table_config_t *config);

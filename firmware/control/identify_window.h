@@ -34,10 +34,23 @@ typedef struct {
     dq_t i, u;
     const flux_point_t *flux;
     uint32_t theta;
-    bool acting, limited;
 } identify_sample_t;
 
-/** True: ten periods are complete in *window; the next call starts anew from its last end. */
+/** Before the step of a period whose voltage was not ours. */
+static inline void identify_window_spoil(identify_window_t *window)
+{
+    window->acting = false;
+}
+
+/** Before the step of a period with pulses that the bridge cannot make. */
+static inline void identify_window_snapped(identify_window_t *window)
+{
+    window->limited++;
+}
+
+/** True: ten periods are complete in *window, to be taken and then restarted. */
 bool identify_window_step(identify_window_t *window, const identify_sample_t *in);
+/** Anew from its last end. */
+void identify_window_restart(identify_window_t *window);
 
 #endif

@@ -33,7 +33,8 @@ typedef struct {
 
 measure_t measure_step(const measure_config_t *config, const adc_counts_t *counts);
 
-/** Back to the phases, q15, from (alpha, beta) and the sum, for those who look closer: within 2.2 LSB while |alpha|, |beta| < 1. */
+/** Back to the phases, q15, from (alpha, beta) and the sum, for those who look closer: within 2.2 LSB while |alpha|,
+ * |beta| < 1. */
 abc_t measure_phases(fx_pair_t i, int32_t sum_q27);
 
 #endif

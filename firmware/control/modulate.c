@@ -134,17 +134,15 @@ static int32_t off_middle(int32_t y)
 }
 
 /* Some pulse may be too short, or the hexagon too small: then everything is shortened about the middle, from which both
- * ends are equally far (MO-3). Duties as the bridge can make them, and bit 16 of the upper
- * word says that they are not as wanted. */
-static uint64_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
+ * ends are equally far (MO-3). */
+static modulate_out_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
 {
     phases_t x = {off_middle(y.a), off_middle(y.b), off_middle(y.c)};
     const int32_t half = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
-    uint32_t limited = 0;
-    if (half > HALF_MAX_Q31) {
+    const bool shortened = half > HALF_MAX_Q31;
+    if (shortened) {
         const int32_t by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 32768;
         x = (phases_t){2 * fx_mulhi(x.a, by), 2 * fx_mulhi(x.b, by), 2 * fx_mulhi(x.c, by)};
-        limited = 0x10000U;
     }
     const int32_t dead_time = 2 * config->dead_time;
     const int32_t a = DUTY_HALF + ((x.a + dead_time * sign.a) >> 16);
@@ -152,39 +150,22 @@ static uint64_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
     const int32_t c = DUTY_HALF + ((x.c + dead_time * sign.c) >> 16);
     const duty_t made = {realisable(a, config->min_pulse), realisable(b, config->min_pulse),
                          realisable(c, config->min_pulse)};
-    if (made.a != (uint32_t)a || made.b != (uint32_t)b || made.c != (uint32_t)c) {
-        limited = 0x10000U;
-    }
-    return (uint64_t)(made.c | limited) << 32 | made.b << 16 | made.a;
-}
-
-/* In and out by registers: what goes through memory would be kept there in every period. */
-static __attribute__((noinline)) uint64_t near(const modulate_config_t *config, fx_pair_t u, fx_pair_t i,
-                                               fx_pair_t advanced, int32_t v_dc)
-{
-    const ab_t v = normalise(u, advanced, v_dc);
-    const phases_t sign = polarity(config, i, advanced);
-    const phases_t y = centred_q31(v);
-    if (!within(config, y)) {
-        return snap(config, y, sign);
-    }
-    const duty_t made = plain(config, y, sign);
-    return (uint64_t)made.c << 32 | made.b << 16 | made.a;
+    const bool snapped = made.a != (uint32_t)a || made.b != (uint32_t)b || made.c != (uint32_t)c;
+    return (modulate_out_t){made, shortened || snapped};
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
 {
     const fx_pair_t u = fx_arch_pkhbt(in->u.d, in->u.q);
-    if (!in->clear) {
-        if (!fits_q31(config, u, in->v_dc)) {
-            const modulate_in_t given = *in; /* a copy: the usual case keeps its values in registers */
-            return far(config, &given);
-        }
-        const uint64_t made = near(config, u, in->i, in->advanced, in->v_dc);
-        const uint32_t lower = (uint32_t)made;
-        const uint32_t upper = (uint32_t)(made >> 32);
-        return (modulate_out_t){{lower & 0xFFFFU, lower >> 16, upper & 0xFFFFU}, (upper & 0x10000U) != 0U};
+    if (!fits_q31(config, u, in->v_dc)) {
+        return far(config, in);
     }
     const phases_t y = centred_q31(normalise(u, in->advanced, in->v_dc));
-    return (modulate_out_t){plain(config, y, polarity(config, in->i, in->advanced)), false};
+    const phases_t sign = polarity(config, in->i, in->advanced);
+    return within(config, y) ? (modulate_out_t){plain(config, y, sign), false} : snap(config, y, sign);
+}
+
+duty_t modulate_clear(const modulate_config_t *config, fx_pair_t u, fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
+{
+    return plain(config, centred_q31(normalise(u, advanced, v_dc)), polarity(config, i, advanced));
 }

@@ -6,6 +6,7 @@
  *   c_x: dead-time compensation of phase x by its predicted current, a straight line inside +-i_knee, constant outside
  *   beyond the hexagon the vector is shortened, its direction kept; pulses shorter than min_pulse snap to the nearer
  *     of {0, min_pulse}.
+ *   modulate_clear(): the usual period, in which nothing of the last two lines can happen
  *   modulate_acted(): what limited duties make once the inverter has taken c_x away, in the frame it acts in.
  * Source   docs/theory/modulation.md (MO-1) ... (MO-9)
  * Units    u per unit of V_b; duties with 2^15 = 1.0; dead_time = t_dead f_pwm in duty units times the compensated
@@ -34,7 +35,6 @@ typedef struct {
     fx_pair_t i;        /* currents for the polarity, (d, q) */
     fx_pair_t advanced; /* fx_rotation() of the electrical angle at the middle of the acting period */
     int32_t v_dc;
-    bool clear;         /* u is so small that no duty can be out of reach (MO-11); v_dc is then at least 2 */
 } modulate_in_t;
 
 typedef struct {
@@ -43,6 +43,9 @@ typedef struct {
 } modulate_out_t;
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in);
+
+/** The same where u is so small that no duty can be out of reach (MO-11); v_dc is then at least 2. */
+duty_t modulate_clear(const modulate_config_t *config, fx_pair_t u, fx_pair_t i, fx_pair_t advanced, int32_t v_dc);
 
 /** What limited duties make; duties that are not limited make in->u. */
 dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty);

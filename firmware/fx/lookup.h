@@ -11,7 +11,7 @@
  *          Any x: outside the grid, the edge's value and a flag
  * Rounding half up, 1/2 LSB, plus 2^-15 of the cell's twist |z00 - z01 - z10 + z11|; on the
  *          last grid point 2^-14 of the step across the cell before it
- * Errors   outside the grid: *clamped (or .clamped) is true, else false
+ * Errors   outside the grid: *clamped is true (.outside not zero), else false
  * Context  any; fx_cell about 49 instructions, each fx_cell_interp 7, all branch-free */
 
 #include <stdbool.h>
@@ -57,7 +57,7 @@ typedef struct {
     fx_pair_t w0;    /* weights of z00 and z01 = z[index + 1] */
     fx_pair_t w1;    /* weights of z10 = z[index + ny] and z11 */
     fx_pair_t wy;    /* w0 + w1: of z[column] and z[column + 1] */
-    bool clamped;
+    uint32_t outside; /* not zero: the edge was used */
 } fx_cell_t;
 
 typedef struct {
@@ -121,7 +121,7 @@ static inline fx_cell_t fx_cell_at(uint32_t x, uint32_t y, uint32_t ny)
     const fx_pair_t w1 = wx + (w11 << 16) - w11; /* (wx - w11, w11) */
     const fx_pair_t w = fx_weights(wy);
     const uint32_t column = y >> 14;
-    return (fx_cell_t){((x >> 14) * ny) + column, column, w - w1, w1, w, false};
+    return (fx_cell_t){((x >> 14) * ny) + column, column, w - w1, w1, w, 0U};
 }
 
 static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
@@ -129,7 +129,7 @@ static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
     const fx_axis_t ax = fx_axis(x, grid->x0, grid->x_shift, grid->nx);
     const fx_axis_t ay = fx_axis(y, grid->y0, grid->y_shift, grid->ny);
     fx_cell_t cell = fx_cell_at(ax.position, ay.position, grid->ny);
-    cell.clamped = (ax.outside | ay.outside) != 0U;
+    cell.outside = ax.outside | ay.outside;
     return cell;
 }
 
@@ -143,20 +143,25 @@ static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
 /* fx_cell() of a q15 x and |y|; inside the grid nothing needs to be limited. */
 static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t y)
 {
+    int32_t x_most = (int32_t)mesh->x_last;
+    int32_t y_most = (int32_t)mesh->y_last;
+    fx_arch_together(&x_most, &y_most);
+    const uint32_t x_last = (uint32_t)x_most;
+    const uint32_t y_last = (uint32_t)y_most;
     uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
     uint32_t py = y << mesh->up;
-    bool clamped = false;
-    if (__builtin_expect(px > mesh->x_last, 0)) { /* a negative one is very large */
-        const uint32_t nearest = (x < mesh->x0) ? 0U : mesh->x_last;
-        clamped = px - nearest > 1U; /* the last point itself, one count above, is inside */
+    uint32_t outside = 0;
+    if (__builtin_expect(px > x_last, 0)) { /* a negative one is very large */
+        const uint32_t nearest = (x < mesh->x0) ? 0U : x_last;
+        outside = (px - nearest) >> 1; /* the last point itself, one count above, is inside */
         px = nearest;
     }
-    if (__builtin_expect(py > mesh->y_last, 0)) {
-        clamped = clamped || py - mesh->y_last > 1U;
-        py = mesh->y_last;
+    if (__builtin_expect(py > y_last, 0)) {
+        outside |= (py - y_last) >> 1;
+        py = y_last;
     }
     fx_cell_t cell = fx_cell_at(px, py, mesh->ny);
-    cell.clamped = clamped;
+    cell.outside = outside;
     return cell;
 }
 
@@ -181,7 +186,7 @@ static inline int32_t fx_cell_interp_y(const int16_t *z, fx_cell_t cell)
 static inline q15_t fx_lookup2(const fx_lut2_t *lut, int32_t x, int32_t y, bool *clamped)
 {
     const fx_cell_t cell = fx_cell(&lut->grid, x, y);
-    *clamped = cell.clamped;
+    *clamped = cell.outside != 0U;
     return (q15_t)fx_cell_interp(lut->z, lut->grid.ny, cell);
 }
 

@@ -10,13 +10,15 @@
 #define INPUT_FILTER 0x44U     /* channels 0 and 1: 4 clocks of 4 */
 #define SYSTEM_CLOCK 1U
 
-static uint32_t at_last;      /* reading of the period before */
-static uint32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+static struct {
+    uint32_t at_last;      /* reading of the period before */
+    uint32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+} encoder;                 /* together: every period reaches both from one address */
 
 void angle_init(uint32_t period_ticks)
 {
-    q32_per_tick = UINT32_MAX / period_ticks;
-    at_last = 0;
+    encoder.q32_per_tick = UINT32_MAX / period_ticks;
+    encoder.at_last = 0;
     FTM2->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
     FTM2->CNTIN = 0;
     FTM2->MOD = COUNTS_PER_TURN - 1U;
@@ -40,8 +42,8 @@ bool angle_fault(void)
 uint32_t hal_angle_read(void)
 {
     const uint32_t now = FTM2->CNT << TURN_SHIFT;
-    const int32_t passed = (int32_t)(FTM0->CNT * q32_per_tick);
-    const int32_t travel = (int32_t)(now - at_last);
-    at_last = now;
+    const int32_t passed = (int32_t)(FTM0->CNT * encoder.q32_per_tick);
+    const int32_t travel = (int32_t)(now - encoder.at_last);
+    encoder.at_last = now;
     return now - (uint32_t)fx_mulhi(travel, passed);
 }

@@ -22,17 +22,32 @@
 
 ecu_t ecu; /* calibration tools find it by this name */
 static const pwm_config_t stopped = {11200, 1120}; /* for a counter that never runs, and the 1 kHz of the task */
-static volatile bool data_damaged; /* set by the background, for the fast ISR: it alone raises faults */
-static bool started;               /* the PWM, and with it the fast ISR */
+/* For the fast ISR, which alone raises faults, as one word: what the gate driver and the background have seen. */
+static volatile union {
+    struct {
+        bool gates, data_damaged;
+    };
+    uint32_t any;
+} alarms;
+static bool started; /* the PWM, and with it the fast ISR */
+
+/* The gate driver's is forgotten before it is asked for: one that comes in between is seen in the next period. */
+static __attribute__((noinline, cold)) void alarms_take(void)
+{
+    alarms.gates = false;
+    if (pwm_fault_taken()) {
+        drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
+    }
+    if (alarms.data_damaged) {
+        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    }
+}
 
 void adc_handler(void)
 {
     angle_begin();
-    if (pwm_fault_taken()) {
-        drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
-    }
-    if (data_damaged) {
-        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+    if (__builtin_expect(alarms.any != 0U, 0)) {
+        alarms_take();
     }
     fast_isr(&ecu.drive);
     if (angle_fault()) {
@@ -75,6 +90,7 @@ void can_bus_off_handler(void)
 void gate_fault_handler(void)
 {
     pwm_gate_fault_isr();
+    alarms.gates = true;
 }
 
 static void enable(uint32_t irq, uint32_t priority)
@@ -137,10 +153,10 @@ static void start(const pwm_config_t *pwm, bool drivable)
 /* Not part of the reset handler: its floating-point instructions must not move before the FPU is on. */
 __attribute__((noinline)) int main(void)
 {
-    data_damaged = !image_valid();
+    alarms.data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
     pwm_config_t pwm = stopped;
-    const bool drivable = !data_damaged && timing(&pwm);
+    const bool drivable = !alarms.data_damaged && timing(&pwm);
     if (!drivable) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
@@ -152,7 +168,7 @@ __attribute__((noinline)) int main(void)
     start(&pwm, drivable);
     for (;;) {
         if (!image_step()) {
-            data_damaged = true;
+            alarms.data_damaged = true;
         }
         if (stack_measure() < STACK_RESERVE) {
             panic();

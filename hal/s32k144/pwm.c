@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/pwm.h"
 
+#include "fx/arch.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
@@ -27,8 +28,10 @@
 #define ENABLED                                                                                                    \
     (FTM_SC_PWMEN0 | FTM_SC_PWMEN1 | FTM_SC_PWMEN2 | FTM_SC_PWMEN3 | FTM_SC_PWMEN4 | FTM_SC_PWMEN5 | FTM_SC_PWMEN6)
 
-static uint32_t period;
-static bool gates;                        /* as last commanded */
+static struct {
+    uint32_t period;
+    bool gates; /* as last commanded */
+} bridge;       /* together: every period reaches both from one address */
 static volatile bool fault_for_drive, fault_for_board; /* set by the fault interrupt, each taken by its reader */
 
 /* Ten bits; beyond them in steps of four, rounded up: never less than asked for. */
@@ -96,7 +99,7 @@ bool pwm_possible(const pwm_config_t *config)
 
 void pwm_init(const pwm_config_t *config)
 {
-    period = config->period_ticks;
+    bridge.period = config->period_ticks;
     TRGMUX->TRGMUX_FTM0 = TRGMUX_FTM0_SEL0(FTM0_INIT_TRIGGER);
     configure_outputs(config);
     configure_faults();
@@ -108,7 +111,7 @@ void pwm_init(const pwm_config_t *config)
     FTM0->EXTTRIG = FTM_EXTTRIG_INITTRIGEN; /* after CNT, whose write would be a trigger, too */
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
-    gates = false;
+    bridge.gates = false;
 }
 
 static void pass_a_microsecond(void)
@@ -134,36 +137,33 @@ void pwm_start(void)
 }
 
 /* First and last tick of the upper switch's pulse, in the middle of the period; beyond MOD there is no match. */
-static inline uint32_t width(uint32_t duty)
+static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_t duty, uint32_t period, uint32_t half)
 {
-    return (duty * period + 16384U) >> 15;
-}
-
-static inline uint32_t rise(uint32_t ticks)
-{
-    return (ticks == 0U) ? period : (period - ticks) >> 1;
+    const uint32_t ticks = (duty * period + half) >> 15;
+    uint32_t rise = (period - ticks) >> 1;
+    if (__builtin_expect(ticks == 0U, 0)) {
+        rise = (uint32_t)fx_arch_opaque((int32_t)period); /* a branch: nothing in every other period */
+    }
+    *from = rise;
+    *to = rise + ticks;
 }
 
 void hal_pwm_write(duty_t duty)
 {
-    const uint32_t a = width(duty.a);
-    const uint32_t b = width(duty.b);
-    const uint32_t c = width(duty.c);
-    FTM0->C0V = rise(a);
-    FTM0->C1V = rise(a) + a;
-    FTM0->C2V = rise(b);
-    FTM0->C3V = rise(b) + b;
-    FTM0->C4V = rise(c);
-    FTM0->C5V = rise(c) + c;
+    const uint32_t period = bridge.period;
+    const uint32_t half = (uint32_t)fx_arch_opaque(16384); /* in a register: part of the multiplication */
+    pulse(&FTM0->C0V, &FTM0->C1V, duty.a, period, half);
+    pulse(&FTM0->C2V, &FTM0->C3V, duty.b, period, half);
+    pulse(&FTM0->C4V, &FTM0->C5V, duty.c, period, half);
     FTM0->SYNC = LOAD;
 }
 
 void hal_pwm_enable(bool on)
 {
-    if (on == gates) {
+    if (__builtin_expect(on == bridge.gates, 1)) {
         return;
     }
-    gates = on;
+    bridge.gates = on;
     if (on) {
         close_gates();
     } else {

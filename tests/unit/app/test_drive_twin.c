@@ -41,7 +41,7 @@ void tearDown(void)
     twin_destroy(twin);
 }
 
-static double ampere(uint16_t count)
+static double ampere(uint32_t count)
 {
     return (count - 2048.0) / 2048.0 * (double)motor.current_full_scale_A;
 }
@@ -58,7 +58,7 @@ static double period(machine_t *m, double rpm)
     seam_current(i.a, i.b, i.c);
     const double turns = m->theta_m / two_pi;
     seam.theta_m = (uint32_t)((turns - floor(turns)) * 4294967295.0);
-    const double in[6] = {ampere((uint16_t)seam.counts.i_a), ampere((uint16_t)seam.counts.i_b), ampere((uint16_t)seam.counts.i_c),
+    const double in[6] = {ampere(seam.counts.i_a), ampere(seam.counts.i_b), ampere(seam.counts.i_c),
                           seam.counts.v_dc / 4096.0 * (double)motor.v_dc_full_scale_V, m->theta_m, 20.0};
     twin_step(twin, in, out);
     seam_period();

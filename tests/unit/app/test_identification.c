@@ -36,9 +36,10 @@ static void period(uint32_t k)
         mrai_isr(&drive);
         return;
     }
-    const identify_sample_t sums = {s->mrai.i, s->mrai.u, &s->mrai.flux, s->theta_e, true, false};
+    const identify_sample_t sums = {s->mrai.i, s->mrai.u, &s->mrai.flux, s->theta_e};
     if (identify_window_step(&drive.fast.window, &sums)) {
         window_box_write(&drive.windows, &drive.fast.window);
+        identify_window_restart(&drive.fast.window);
     }
 }
 

@@ -72,17 +72,17 @@ window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t ex
     const double sinc = 1.0 / (1.0 + theta_step * theta_step / 24.0); /* what the held voltage has to be (MR-5) */
     const dq_t u = {(int32_t)lround(sinc * (r * i.d - omega_pu * flux.psi_q + extra_u.d)),
                     (int32_t)lround(sinc * (r * i.q + omega_pu * flux.psi_d + extra_u.q))};
-    window_pair_t pair = {.fixed = {.count = IDENTIFY_PERIODS}, .twin = {.count = 10}};
+    window_pair_t pair = {.twin = {.count = 10}};
     for (int k = 0; k <= IDENTIFY_PERIODS; k++) {
         const double theta = k * theta_step;
         const double turn = theta / 6.283185307179586;
-        const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turn - floor(turn)) * 4294967296.0), true,
-                                     false};
+        const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turn - floor(turn)) * 4294967296.0)};
         const twin_end_t t = {{from_q15(i.d) * f->i, from_q15(i.q) * f->i},
                               {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
                               {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi}, theta};
         if (k == 0) {
             pair.fixed.last = (identify_end_t){s.i, s.u, {flux.psi_d, flux.psi_q}, s.theta};
+            identify_window_restart(&pair.fixed);
             pair.twin.last = t;
         } else {
             (void)identify_window_step(&pair.fixed, &s);

@@ -23,9 +23,13 @@ void tearDown(void)
 void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(void)
 {
     identify_window_t window = {.count = IDENTIFY_PERIODS, .last = {.u = {7, -7}, .i = {100, 0}}};
+    identify_window_restart(&window);
     const flux_point_t flux = {.psi_d = 11, .psi_q = 22};
     for (int k = 1; k <= 10; k++) {
-        const identify_sample_t s = {{100 + k, -k}, {10 * k, k}, &flux, 1000U * (uint32_t)k, true, k == 3};
+        const identify_sample_t s = {{100 + k, -k}, {10 * k, k}, &flux, 1000U * (uint32_t)k};
+        if (k == 3) {
+            identify_window_snapped(&window);
+        }
         TEST_ASSERT_EQUAL(k == 10, identify_window_step(&window, &s));
     }
     TEST_ASSERT_EQUAL_INT(1055, window.sum_i.d); /* 10 * 100 + 55 */
@@ -41,12 +45,17 @@ void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(v
 
 void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
 {
-    identify_window_t window = {.count = IDENTIFY_PERIODS};
+    identify_window_t window = {0};
+    identify_window_restart(&window);
     const flux_point_t flux = {0};
     for (int k = 1; k <= 20; k++) {
-        const identify_sample_t s = {{0, 0}, {0, 0}, &flux, 0, k != 10, false};
+        const identify_sample_t s = {{0, 0}, {0, 0}, &flux, 0};
+        if (k == 10) {
+            identify_window_spoil(&window);
+        }
         if (identify_window_step(&window, &s)) {
             TEST_ASSERT_EQUAL(k == 20, window.acting);
+            identify_window_restart(&window);
         }
     }
 }
@@ -55,10 +64,11 @@ void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
  * 20, ... 180: 90 in the mean, divided by sinc. */
 void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
 {
-    identify_window_t window = {.count = IDENTIFY_PERIODS};
+    identify_window_t window = {0};
+    identify_window_restart(&window);
     const flux_point_t flux = {0};
     for (int k = 1; k <= 10; k++) {
-        const identify_sample_t s = {{-200 * k, 100 * k}, {20 * k, -2000 * k}, &flux, 0, true, false};
+        const identify_sample_t s = {{-200 * k, 100 * k}, {20 * k, -2000 * k}, &flux, 0};
         (void)identify_window_step(&window, &s);
     }
     const identify_point_t point = identify_point(&c, &window, 0);

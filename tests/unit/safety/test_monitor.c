@@ -129,7 +129,8 @@ void test_three_angle_jumps_in_a_row_are_an_angle_fault(void)
 /* A jump is noted for one period: the next one is quiet again if it is good. */
 void test_a_jump_is_looked_at_once_and_then_forgotten(void)
 {
-    const monitor_config_t quick = {.i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .quiet_q30 = 1 << 29};
+    monitor_config_t quick = config;
+    quick.quiet_q30 = 1 << 29;
     TEST_ASSERT_TRUE(monitor_quiet(&quick, &state, 0, 0, 20000));
     monitor_note_jump(&state);
     TEST_ASSERT_FALSE(monitor_quiet(&quick, &state, 0, 0, 20000));

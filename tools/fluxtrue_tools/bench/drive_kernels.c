@@ -200,6 +200,27 @@ STAGE void bench_torque_estimate(void)
     (void)torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta);
 }
 
+/* Apart from the usual case, as in the fast ISR. */
+static __attribute__((noinline)) void modulate_limited(const modulate_config_t *config, fx_pair_t u, fx_pair_t i,
+                                                       fx_pair_t advanced, int32_t v_dc)
+{
+    const modulate_in_t in = {{(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)}, i, advanced, v_dc};
+    const modulate_out_t made = modulate_step(config, &in);
+    port.duty = made.duty;
+    port.limited = made.limited;
+}
+
+static void modulate(const modulate_config_t *config, const current_control_out_t *wanted, fx_pair_t i,
+                     fx_pair_t advanced, int32_t v_dc)
+{
+    const fx_pair_t u = fx_arch_pkhbt(wanted->u.d, wanted->u.q);
+    if (__builtin_expect(wanted->clear, 1)) {
+        port.duty = modulate_clear(config, u, i, advanced, v_dc);
+    } else {
+        modulate_limited(config, u, i, advanced, v_dc);
+    }
+}
+
 /* From converter counts and angle to duties; what the tables answer was found before. */
 STAGE void bench_current_tick(void)
 {
@@ -219,10 +240,7 @@ STAGE void bench_current_tick(void)
     };
     const current_control_out_t wanted =
         current_control_step(&m->current_control, &d->fast.current_control, &control);
-    const modulate_in_t modulation = {wanted.u, i_dq, advanced, measured.v_dc, wanted.clear};
-    const modulate_out_t made = modulate_step(&m->modulate, &modulation);
-    port.duty = made.duty;
-    port.limited = wanted.limited || made.limited;
+    modulate(&m->modulate, &wanted, i_dq, advanced, measured.v_dc);
 }
 
 /* What the leanest peer's tick has, of the same stages; all else is constant and so compiled away: inductance 1, no
@@ -237,8 +255,7 @@ STAGE void bench_current_core(void)
     const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
     const current_control_out_t wanted =
         current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
-    const modulate_in_t modulation = {wanted.u, 0, at, CORE_V_DC, wanted.clear};
-    port.duty = modulate_step(&bare, &modulation).duty;
+    modulate(&bare, &wanted, 0, at, CORE_V_DC);
 }
 
 STAGE void bench_measure(void)
@@ -271,9 +288,8 @@ STAGE void bench_current_control(void)
 STAGE void bench_modulate(void)
 {
     const drive_t *d = the_copy();
-    const modulate_in_t modulation = {found.wanted.u, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e),
-                                      sample_box_look(&d->samples, d->samples.generation)->v_dc, found.wanted.clear};
-    port.duty = modulate_step(&d->motor.modulate, &modulation).duty;
+    modulate(&d->motor.modulate, &found.wanted, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e),
+             sample_box_look(&d->samples, d->samples.generation)->v_dc);
 }
 
 STAGE void bench_torque_path(void)
