@@ -74,9 +74,9 @@ static commission_failure_t judge(const commission_config_t *config, const commi
     return (error_d > allowed || error_q > allowed) ? COMMISSION_CURRENT : COMMISSION_GOOD;
 }
 
-static int32_t mean_q30(int32_t sum)
+static __attribute__((noinline)) int32_t half_mean_q30(int32_t sum)
 {
-    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16);
+    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) / 2;
 }
 
 /* Half of the first polarity, then minus half of the other: offsets of the sensors cancel (CM-1). */
@@ -84,8 +84,8 @@ static void take(commission_state_t *state)
 {
     const unsigned k = state->index / 2U;
     const bool other = state->index % 2U != 0U;
-    const int32_t i = mean_q30(state->sum_i) / 2;
-    const int32_t u = mean_q30(state->sum_u) / 2;
+    const int32_t i = half_mean_q30(state->sum_i);
+    const int32_t u = half_mean_q30(state->sum_u);
     state->data.i[k] = other ? fx_sub_q31(state->data.i[k], i) : i;
     state->data.u[k] = other ? fx_sub_q31(state->data.u[k], u) : u;
 }
