@@ -35,15 +35,14 @@ void commission_start(const commission_config_t *config, commission_state_t *sta
     next_current(config, state);
 }
 
-/* Magnitudes of the phases' cosines, falling. */
+/* Magnitudes of the phases' cosines, the largest first. */
 static void note_angle(commission_data_t *data, uint32_t theta)
 {
     const ab_t x = inverse_park_q30((dq_t){Q15_MAX, 0}, fx_rotation(theta));
     const int32_t a = x.alpha >> 15;
     const int32_t side = fx_mulhi(x.beta, Q31(0.86602540378443865)) >> 14;
     int32_t c[3] = {fx_abs_q31(a), fx_abs_q31(side - a / 2), fx_abs_q31(-side - a / 2)};
-    for (unsigned pass = 0; pass < 3U; pass++) {
-        const unsigned k = pass % 2U;
+    for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
         c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);
         c[k] = larger;

@@ -12,7 +12,8 @@ static const uint8_t halvings[IDENTIFY_STATES] = {
 
 identify_memory_t identify_memory_get(const identify_state_t *state)
 {
-    identify_memory_t memory = {.version = IDENTIFY_MEMORY_VERSION};
+    identify_memory_t memory; /* every field is written below */
+    memory.version = IDENTIFY_MEMORY_VERSION;
     for (unsigned j = 0, p = 0; j < IDENTIFY_STATES; p += IDENTIFY_STATES - j, j++) {
         memory.x[j] = state->filter.x[j];
         memory.variance[j] = state->filter.p[p];
