@@ -35,15 +35,14 @@ void commission_start(const commission_config_t *config, commission_state_t *sta
     next_current(config, state);
 }
 
-/* Magnitudes of the phases' cosines, falling. */
+/* Magnitudes of the phases' cosines, the largest first. */
 static void note_angle(commission_data_t *data, uint32_t theta)
 {
     const ab_t x = inverse_park_q30((dq_t){Q15_MAX, 0}, fx_rotation(theta));
     const int32_t a = x.alpha >> 15;
     const int32_t side = fx_mulhi(x.beta, Q31(0.86602540378443865)) >> 14;
     int32_t c[3] = {fx_abs_q31(a), fx_abs_q31(side - a / 2), fx_abs_q31(-side - a / 2)};
-    for (unsigned pass = 0; pass < 3U; pass++) {
-        const unsigned k = pass % 2U;
+    for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
         c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);
         c[k] = larger;
@@ -74,9 +73,9 @@ static commission_failure_t judge(const commission_config_t *config, const commi
     return (error_d > allowed || error_q > allowed) ? COMMISSION_CURRENT : COMMISSION_GOOD;
 }
 
-static int32_t mean_q30(int32_t sum)
+static __attribute__((noinline)) int32_t half_mean_q30(int32_t sum)
 {
-    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16);
+    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) / 2;
 }
 
 /* Half of the first polarity, then minus half of the other: offsets of the sensors cancel (CM-1). */
@@ -84,8 +83,8 @@ static void take(commission_state_t *state)
 {
     const unsigned k = state->index / 2U;
     const bool other = state->index % 2U != 0U;
-    const int32_t i = mean_q30(state->sum_i) / 2;
-    const int32_t u = mean_q30(state->sum_u) / 2;
+    const int32_t i = half_mean_q30(state->sum_i);
+    const int32_t u = half_mean_q30(state->sum_u);
     state->data.i[k] = other ? fx_sub_q31(state->data.i[k], i) : i;
     state->data.u[k] = other ? fx_sub_q31(state->data.u[k], u) : u;
 }

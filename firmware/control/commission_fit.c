@@ -7,7 +7,7 @@
 #define PER_UPPER Q31(0.2) /* one over so many */
 #define SWEEPS 20          /* each halves the error at least */
 
-static int32_t mul_q30(int32_t a, int32_t b)
+static __attribute__((noinline)) int32_t mul_q30(int32_t a, int32_t b)
 {
     return (int32_t)(((int64_t)a * b + (1 << 29)) >> 30);
 }

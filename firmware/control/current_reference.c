@@ -5,7 +5,7 @@
 
 #include "fx/div.h"
 #include "fx/q.h"
-#include "fx/sqrt.h"
+#include "fx/vec.h"
 
 bool current_reference_valid(const current_reference_config_t *config)
 {
@@ -40,7 +40,7 @@ static dq_t inside_circle(dq_t i, q15_t i_max)
     if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= room) {
         return i;
     }
-    return (dq_t){fx_max_s32(i.d, -i_max), fx_sqrt_q30((uint32_t)fx_max_s32(room, 0))};
+    return (dq_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, (q15_t)i.d)};
 }
 
 static __attribute__((noinline)) dq_t tabulated(const current_reference_config_t *config, q15_t torque, q15_t psi)

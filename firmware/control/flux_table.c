@@ -5,7 +5,7 @@
 
 #include "fx/q.h"
 
-bool flux_table_valid(const flux_table_config_t *config)
+__attribute__((cold)) bool flux_table_valid(const flux_table_config_t *config)
 {
     const bool tables = config->l_d && config->l_q && config->l_qq && config->g && config->psi_f0;
     if (!tables || !fx_mesh_valid(&config->mesh) || config->l_shift > 13 || config->i_scale != 8 << config->l_shift) {
@@ -44,10 +44,9 @@ flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i)
     };
 }
 
-flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i)
+__attribute__((cold)) flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i)
 {
     const fx_cell_t cell = cell_of(config, i);
     const uint32_t ny = config->mesh.ny;
-    return (flux_inductances_t){fx_cell_interp(config->l_d, ny, cell), fx_cell_interp(config->l_q, ny, cell),
-                                fx_cell_interp(config->l_qq, ny, cell)};
+    return (flux_inductances_t){fx_cell_interp(config->l_d, ny, cell), fx_cell_interp(config->l_qq, ny, cell)};
 }

@@ -20,8 +20,8 @@ typedef struct {
 
 /** For tasks. */
 typedef struct {
-    int32_t l_d, l_q; /* apparent: psi_d - psi_f0 = l_d i_d, psi_q = l_q i_q */
-    int32_t l_qq;     /* incremental: d psi_q/d i_q */
+    int32_t l_d;  /* apparent: psi_d - psi_f0 = l_d i_d */
+    int32_t l_qq; /* incremental: d psi_q/d i_q */
 } flux_inductances_t;
 
 #endif

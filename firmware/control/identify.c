@@ -148,19 +148,17 @@ static void localise(const identify_config_t *config, identify_state_t *state, c
 /* The tables' flux and magnetising current with everything that is known by now (ID-15). */
 static operating_t correct(const identify_config_t *config, const identify_state_t *state, const identify_model_t *m)
 {
+    dq_t shift = state->local;
     int32_t value[IDENTIFY_STATES];
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         value[j] = identify_value(config, state, (identify_index_t)j) / 2;
+        shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h[j]));
+        shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h[j]));
     }
-    const int32_t angle = value[IDENTIFY_ANGLE];
     const int32_t iron = value[IDENTIFY_IRON];
-    const int32_t magnet = fx_add_q31(value[IDENTIFY_FLUX], identify_mul(value[IDENTIFY_LD], m->slope));
-    const int32_t d = identify_mul(angle, m->turn.d) + identify_mul(iron, m->iron_psi.d);
-    const int32_t q = identify_mul(value[IDENTIFY_LQ], m->psi.q) + identify_mul(angle, m->turn.q) +
-                      identify_mul(iron, m->iron_psi.q);
+    const int32_t magnet = fx_add_q31(value[IDENTIFY_FLUX], identify_mul(value[IDENTIFY_LD], m->psi_d.h[IDENTIFY_LD]));
     return (operating_t){
-        .psi = {fx_add_q31(m->psi.d, fx_add_q31(magnet, fx_add_q31(d, state->local.d))),
-                fx_add_q31(m->psi.q, fx_add_q31(q, state->local.q))},
+        .psi = {fx_add_q31(m->psi.d, fx_add_q31(shift.d, value[IDENTIFY_FLUX])), fx_add_q31(m->psi.q, shift.q)},
         .i = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
         .magnet = magnet,
     };

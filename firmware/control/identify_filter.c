@@ -15,7 +15,7 @@ typedef struct {
 
 static int32_t round_shift(int64_t x, unsigned n)
 {
-    return fx_sat_q31((x + (INT64_C(1) << (n - 1U))) >> n);
+    return fx_sat_q31(((x >> (n - 1U)) + 1) >> 1);
 }
 
 void identify_filter_reset(identify_filter_t *filter)
@@ -104,7 +104,7 @@ identify_verdict_t identify_filter_update(identify_filter_t *filter, const ident
         gain[j] = round_shift((int64_t)ph[j] * by.inverse, by.shift - 22U);
         const int32_t moved = fx_add_q31(filter->x[j], round_shift((int64_t)gain[j] * e, 27));
         filter->x[j] = fx_clamp_q31(moved, -X_MAX, X_MAX);
-        verdict.clamped = verdict.clamped || filter->x[j] != moved;
+        verdict.clamped |= filter->x[j] != moved;
     }
     shrink(filter, ph, gain);
     return verdict;

@@ -25,16 +25,13 @@ static void derivatives(const identify_config_t *config, const identify_tables_t
     const int32_t a = point->iron / 2; /* Q30 */
     m->psi = (dq_t){flux->psi_d * 32768, flux->psi_q * 32768};
     m->i_m = (dq_t){point->i_m.d * 32768, point->i_m.q * 32768};
-    m->slope = (flux->psi_d - flux->psi_f0) * 32768;
     m->iron_i = (dq_t){identify_mul(a, m->psi.q), -identify_mul(a, m->psi.d)};
-    m->iron_psi = (dq_t){induced(config, l->l_d, m->iron_i.d), induced(config, l->l_qq, m->iron_i.q)};
-    m->turn = (dq_t){fx_sub_q31(m->psi.q, induced(config, l->l_d, m->i_m.q)),
-                     fx_sub_q31(induced(config, l->l_qq, m->i_m.d), m->psi.d)};
-}
-
-static __attribute__((noinline)) int32_t cross(const dq_t *a, const dq_t *b)
-{
-    return identify_mul(a->d, b->q) - identify_mul(a->q, b->d);
+    m->psi_q.h[IDENTIFY_LQ] = m->psi.q;
+    m->psi_d.h[IDENTIFY_LD] = (flux->psi_d - flux->psi_f0) * 32768;
+    m->psi_d.h[IDENTIFY_ANGLE] = fx_sub_q31(m->psi.q, induced(config, l->l_d, m->i_m.q));
+    m->psi_q.h[IDENTIFY_ANGLE] = fx_sub_q31(induced(config, l->l_qq, m->i_m.d), m->psi.d);
+    m->psi_d.h[IDENTIFY_IRON] = induced(config, l->l_d, m->iron_i.d);
+    m->psi_q.h[IDENTIFY_IRON] = induced(config, l->l_qq, m->iron_i.q);
 }
 
 /* Derivatives by the states to derivatives by their sigmas. */
@@ -48,26 +45,23 @@ static void per_sigma(const identify_config_t *config, identify_row_t *row)
 static void rows(const identify_config_t *config, const identify_point_t *point, q31_t r_prior, identify_model_t *m)
 {
     const int32_t w = point->omega / 2; /* Q30 */
-    const int32_t w_psi_q = identify_mul(w, m->psi.q);
-    const int32_t d = fx_sub_q31(fx_add_q31(point->u.d, w_psi_q), point->rate.d);
-    const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m->psi.d)), point->rate.q);
-    m->y = (dq_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
     const dq_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
     const q15_t magnitude = fx_magnitude((q15_t)i.d, (q15_t)i.q);
     const q15_t length = (q15_t)fx_max_s32(magnitude, config->i_smooth);
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        m->d.h[j] = -identify_mul(w, m->psi_q.h[j]);
+        m->q.h[j] = identify_mul(w, m->psi_d.h[j]);
+    }
+    const int32_t d = fx_sub_q31(fx_sub_q31(point->u.d, m->d.h[IDENTIFY_LQ]), point->rate.d);
+    const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m->psi.d)), point->rate.q);
+    m->y = (dq_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
     m->current = magnitude >= config->i_min;
     m->d.h[IDENTIFY_R] = point->i.d / 2;
     m->d.h[IDENTIFY_DROP] = direction(i.d, length);
-    m->d.h[IDENTIFY_LQ] = -w_psi_q;
-    m->d.h[IDENTIFY_ANGLE] = -identify_mul(w, m->turn.q);
-    m->d.h[IDENTIFY_IRON] = -identify_mul(w, m->iron_psi.q);
-    per_sigma(config, &m->d);
     m->q.h[IDENTIFY_R] = point->i.q / 2;
     m->q.h[IDENTIFY_DROP] = direction(i.q, length);
     m->q.h[IDENTIFY_FLUX] = w;
-    m->q.h[IDENTIFY_LD] = identify_mul(w, m->slope);
-    m->q.h[IDENTIFY_ANGLE] = identify_mul(w, m->turn.d);
-    m->q.h[IDENTIFY_IRON] = identify_mul(w, m->iron_psi.d);
+    per_sigma(config, &m->d);
     per_sigma(config, &m->q);
 }
 
@@ -82,13 +76,12 @@ identify_model_t identify_model(const identify_config_t *config, const identify_
 
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)
 {
-    identify_row_t row = {{
-        [IDENTIFY_FLUX] = m->i_m.q,
-        [IDENTIFY_LQ] = -identify_mul(m->psi.q, m->i_m.d),
-        [IDENTIFY_LD] = identify_mul(m->slope, m->i_m.q),
-        [IDENTIFY_ANGLE] = cross(&m->turn, &m->i_m),
-        [IDENTIFY_IRON] = cross(&m->iron_psi, &m->i_m) + cross(&m->psi, &m->iron_i),
-    }};
+    identify_row_t row;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        row.h[j] = identify_mul(m->psi_d.h[j], m->i_m.q) - identify_mul(m->psi_q.h[j], m->i_m.d);
+    }
+    row.h[IDENTIFY_FLUX] = m->i_m.q;
+    row.h[IDENTIFY_IRON] += identify_mul(m->psi.d, m->iron_i.q) - identify_mul(m->psi.q, m->iron_i.d);
     per_sigma(config, &row);
     return row;
 }

@@ -25,13 +25,12 @@ typedef struct {
 
 typedef struct {
     dq_t y;                  /* residual with every state at its prior */
-    identify_row_t d, q;
     dq_t psi;                /* of the tables, at i_m */
     dq_t i_m;
-    dq_t turn;               /* d psi/d(angle), in the measured frame */
-    dq_t iron_psi, iron_i;   /* change of psi and of i_m with the scale of the iron loss */
-    int32_t slope;           /* psi_d - psi_f0 */
+    dq_t iron_i;             /* change of i_m with the scale of the iron loss */
     bool current;            /* enough current for the drop to have a direction */
+    identify_row_t d, q;
+    identify_row_t psi_d, psi_q; /* change of psi with each state, but for the magnet's flux, with which it is one */
 } identify_model_t;
 
 identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,

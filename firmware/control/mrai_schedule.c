@@ -15,7 +15,7 @@ static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 }
 
 /* 2 k_r/(omega_b n), n = 4 i_d^2 + i_q^2, in Q26 (MR-10): a 256th in Q31 over Q28 is a 32nd in Q31. */
-static int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
+static __attribute__((noinline)) int32_t resistance_step(const mrai_config_t *config, const mrai_in_t *sample)
 {
     const q15_t d = (q15_t)sample->i.d;
     const q15_t q = (q15_t)sample->i.q;
@@ -31,7 +31,7 @@ static int32_t minus_voltage_q28(const mrai_config_t *config, q31_t omega)
 }
 
 /* |drift|/full: what the adaptation still has to do, 1 and more is 1 (MR-18). */
-static q15_t missing(q31_t drift, q31_t full)
+static __attribute__((noinline)) q15_t missing(q31_t drift, q31_t full)
 {
     return fx_q15_from_q31(fx_div_q31(fx_abs_q31(drift), full));
 }

