@@ -6,6 +6,7 @@
 #define DEAD_TIME_MAX Q15(0.125) /* more voltage error than an eighth of the dc voltage is no inverter's */
 #define KNEE_CHANGED Q31(0.8)    /* a knee that is a quarter wider is measured, not noise */
 #define KNEE_RANGE 16
+#define CONTRADICTION_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
 
 static int32_t product_q30(int32_t a_q30, q15_t b)
 {
@@ -51,6 +52,16 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
     return fits && credible(drive, curve) && drive_compensate(drive, &found);
 }
 
+/* One half word for the fast ISR; (MO-11) must hold before it adds more. */
+static void apply(motor_t *m, q15_t dead_time)
+{
+    const int32_t span = 32768 - 2 * (m->modulate.min_pulse + dead_time);
+    const int32_t clear_q30 = fx_max_s32((span > 0) ? fx_mul_q30((q15_t)span, (q15_t)span) / 3 - 1 : 0, 0);
+    m->current_control.clear_q32 = fx_min_s32(m->current_control.clear_q32, 4 * clear_q30);
+    exchange_barrier();
+    m->modulate.dead_time = dead_time;
+}
+
 bool drive_compensate(drive_t *drive, const compensation_t *compensation)
 {
     motor_t *m = &drive->motor;
@@ -59,16 +70,38 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
         compensation->knee_q17 >= 1 << 30) {
         return false;
     }
-    /* (MO-11) must hold before the fast ISR adds more. */
-    const int32_t span = 32768 - 2 * (m->modulate.min_pulse + dead_time);
-    const int32_t clear_q30 = fx_max_s32((span > 0) ? fx_mul_q30((q15_t)span, (q15_t)span) / 3 - 1 : 0, 0);
-    m->current_control.clear_q32 = fx_min_s32(m->current_control.clear_q32, 4 * clear_q30);
-    exchange_barrier();
-    m->modulate.dead_time = (q15_t)dead_time;
+    apply(m, (q15_t)dead_time);
     m->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
     m->modulate.knee_q17 = compensation->knee_q17;
     drive->task.compensation = *compensation;
+    drive->task.trim = (dead_time_trim_state_t){.base = dead_time};
     return true;
+}
+
+void drive_trim(drive_t *drive, q15_t v_dc)
+{
+    task_state_t *task = &drive->task;
+    identify_filter_t *filter = &task->identify.filter;
+    const dead_time_trim_in_t in = {
+        .sigma = drive->motor.identify.sigma[IDENTIFY_DROP],
+        .x = filter->x[IDENTIFY_DROP],
+        .variance = filter->p[identify_pair(IDENTIFY_DROP, IDENTIFY_DROP)],
+        .v_dc = v_dc,
+        .dead_time = drive->motor.modulate.dead_time,
+        .learning = drive->request.trim && task->identify.learn &&
+                    task->identify.contradiction <= CONTRADICTION_MAX,
+    };
+    const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
+    if (out.dead_time != in.dead_time) {
+        apply(&drive->motor, out.dead_time);
+        filter->x[IDENTIFY_DROP] = fx_add_q31(filter->x[IDENTIFY_DROP], out.x_shift);
+    }
+}
+
+void drive_retrim(drive_t *drive, int32_t trim)
+{
+    motor_t *m = &drive->motor;
+    apply(m, dead_time_trim_restore(&drive->task.trim, m->modulate.dead_time, trim));
 }
 
 static void begin(drive_t *drive, const commission_config_t *config)

@@ -48,6 +48,7 @@ void drive_init(drive_t *drive, const motor_t *source)
     *drive = (drive_t){.motor = *source,
                        .request = {.torque_loop = true,
                                    .identification = true,
+                                   .trim = true,
                                    .identification_mode = IDENTIFICATION_ROBUST,
                                    .limits = TORQUE_LIMITS_NONE},
                        .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};

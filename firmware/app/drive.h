@@ -16,6 +16,7 @@
 #include "app/exchange.h"
 #include "app/motor.h"
 #include "control/commission.h"
+#include "control/dead_time_trim.h"
 #include "control/identify_memory.h"
 #include "control/mrai_schedule.h"
 #include "control/torque_estimate.h"
@@ -37,6 +38,7 @@ typedef struct {
     bool current_mode;   /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
     bool identification;
+    bool trim;           /* the dead-time compensation follows what is identified */
     identification_mode_t identification_mode;
     uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
     uint32_t identification_resets; /* counted up: what was identified is forgotten once */
@@ -105,6 +107,7 @@ typedef struct {
     commission_state_t commission;
     commission_curve_t inverter;    /* voltage error against current, as last measured */
     compensation_t compensation;
+    dead_time_trim_state_t trim;    /* what driving has added to it */
     uint32_t commissionings;        /* of the request, as far as seen */
     dq_t i_ref;   /* acts until the next step */
     dq_t psi_ref; /* tables' flux at the last reference */
@@ -170,6 +173,10 @@ void drive_identify(drive_t *drive, const view_t *view);
 void drive_commission(drive_t *drive, const view_t *view);
 /** Takes a compensation over; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
+/** Moves what has been learnt of the voltage error into the compensation. From the task. */
+void drive_trim(drive_t *drive, q15_t v_dc);
+/** Puts a trim that was kept on the compensation in effect; 0 takes it away. */
+void drive_retrim(drive_t *drive, int32_t trim);
 /** Current references come from outside the torque path. */
 static inline bool drive_is_direct(const drive_t *drive)
 {

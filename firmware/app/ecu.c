@@ -20,7 +20,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
     const q31_t full = source->torque_max * 65536;
     *ecu = (ecu_t){0};
     drive_init(&ecu->drive, source);
-    xcp_access_init(&ecu->xcp, &ecu->drive, (uint32_t)hal_system_reset_cause());
+    xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, (uint32_t)hal_system_reset_cause());
     ecu->arbitration = (arbitrate_config_t){
         .slew = full / SLEW_STEPS,
         .jerk = full / SLEW_STEPS / JERK_STEPS,
@@ -121,6 +121,7 @@ void ecu_task_1khz(ecu_t *ecu)
     task_1khz(&ecu->drive);
     guard(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive);
+    freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state);
     send(ecu);
     send_xcp(ecu);
 }

@@ -39,6 +39,7 @@ typedef struct {
     settling_t settling;
     uint16_t not_sent;
     xcp_access_t xcp;
+    freeze_frame_t freeze;
 } ecu_t;
 
 void ecu_init(ecu_t *ecu, const motor_t *source);

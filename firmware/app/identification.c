@@ -45,6 +45,7 @@ static void robust(drive_t *drive, const view_t *view)
         .enabled = drive->request.identification && view->sample.acting,
     };
     task->identified = identify_step(&m->identify, &task->identify, &in);
+    drive_trim(drive, (q15_t)view->sample.v_dc);
     task->identifications = task->identifications + 1U;
     report_robust(drive);
 }

@@ -5,13 +5,14 @@
 
 #include "signal/crc32.h"
 
-#define VERSION 2U /* of record_t */
+#define VERSION 3U /* of record_t */
 #define CONTRADICTION_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
 
 /* No padding: the store's checksum runs over its bytes. */
 typedef struct {
     identify_memory_t identified;
     compensation_t compensation;
+    int32_t trim;
 } record_t;
 
 uint32_t memory_layout(const motor_t *m)
@@ -30,6 +31,9 @@ void memory_recall(memory_t *memory, drive_t *drive)
     if (store_load(memory_layout(&drive->motor), &record, sizeof record) == STORE_OK) {
         memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
                            drive_recall(drive, &record.identified);
+        if (memory->recalled) {
+            drive_retrim(drive, record.trim);
+        }
     }
 }
 
@@ -58,7 +62,7 @@ bool memory_background(memory_t *memory, const drive_t *drive)
     if (!is_due(memory, drive, now)) {
         return false;
     }
-    const record_t record = {drive_learnt(drive), drive->task.compensation};
+    const record_t record = {drive_learnt(drive), drive->task.compensation, drive->task.trim.trim};
     const bool saved = store_save(memory_layout(&drive->motor), &record, sizeof record);
     memory->has_tried = true;
     memory->tried_at = now;

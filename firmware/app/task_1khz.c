@@ -41,6 +41,7 @@ static run_state_t supervise(drive_t *drive, uint32_t faults)
         task->identification_resets = request->identification_resets;
         task->quality = (mrai_quality_t){0};
         identify_reset(&drive->motor.identify, &task->identify);
+        drive_retrim(drive, 0);
     }
     if (faults != 0U) {
         return RUN_STATE_FAULT;

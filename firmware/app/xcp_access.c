@@ -14,7 +14,7 @@ static uint32_t key_of(uint32_t seed)
 static xcp_config_t config_of(xcp_access_t *access)
 {
     return (xcp_config_t){
-        .memory = {&access->area, 1},
+        .memory = {access->area, XCP_ACCESS_AREAS},
         .working = access->working,
         .reference = access->reference,
         .limits = limits,
@@ -23,13 +23,14 @@ static xcp_config_t config_of(xcp_access_t *access)
     };
 }
 
-void xcp_access_init(xcp_access_t *access, const drive_t *drive, uint32_t seed)
+void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed)
 {
     for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(&drive->motor, (calibration_id_t)k);
         access->put[k] = access->reference[k];
     }
-    access->area = (xcp_area_t){&access->measurements, sizeof access->measurements};
+    access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
+    access->area[1] = (xcp_area_t){frame, sizeof *frame};
     access->answer_waits = false;
     const xcp_config_t config = config_of(access);
     xcp_reset(&access->xcp, &config, seed);

@@ -7,12 +7,15 @@
  * Errors   the protocol's own; seed and key keep out mistakes, not attackers: the key is a published function
  * Context  1 kHz task, after the drive's step */
 #include "app/calibration.h"
+#include "app/freeze_frame.h"
 #include "app/measurements.h"
 #include "comm/xcp.h"
 
 /** Identifiers on the bus, standard frames. */
 #define XCP_ID_COMMAND 0x650U /* master to slave */
 #define XCP_ID_ANSWER 0x651U  /* slave to master */
+
+#define XCP_ACCESS_AREAS 2
 
 _Static_assert(CALIBRATION_COUNT <= XCP_PARAMETERS_MAX, "the protocol's page holds every value");
 
@@ -22,13 +25,14 @@ typedef struct {
     float reference[CALIBRATION_COUNT]; /* the built-in values; written once at start-up */
     float put[CALIBRATION_COUNT];       /* what the drive was given last */
     measurements_t measurements;
-    xcp_area_t area;
+    xcp_area_t area[XCP_ACCESS_AREAS];
     uint32_t applied; /* generation of the values that the drive runs on */
     can_frame_t answer;
     bool answer_waits;
 } xcp_access_t;
 
-void xcp_access_init(xcp_access_t *access, const drive_t *drive, uint32_t seed);
+/** frame: readable besides the measurements. */
+void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed);
 /** A frame with id XCP_ID_COMMAND. */
 void xcp_access_receive(xcp_access_t *access, const can_frame_t *frame);
 /** Once per millisecond: takes over changed values, samples the measurement lists. */

@@ -25,6 +25,16 @@ double commissioned_r_ohm(const fluxtrue_t *d)
     return (double)d->drive.task.inverter.r / ONE_Q30 * (double)d->drive.motor.bases.resistance_ohm;
 }
 
+double commissioned_trims(const fluxtrue_t *d)
+{
+    return (double)d->drive.request.trim;
+}
+
+void commissioned_set_trim(fluxtrue_t *d, double value)
+{
+    d->drive.request.trim = value != 0.0;
+}
+
 /* In effect, at the dc voltage of now. */
 double commissioned_level_V(const fluxtrue_t *d)
 {

@@ -16,6 +16,9 @@ double commissioned_phase(const fluxtrue_t *drive);
 void commissioned_start(fluxtrue_t *drive, double value);
 double commissioned_failure(const fluxtrue_t *drive);
 double commissioned_r_ohm(const fluxtrue_t *drive);
+/** Whether driving moves the compensation. */
+double commissioned_trims(const fluxtrue_t *drive);
+void commissioned_set_trim(fluxtrue_t *drive, double value);
 double commissioned_level_V(const fluxtrue_t *drive);
 double commissioned_knee_A(const fluxtrue_t *drive);
 COMMISSIONED_POINTS(COMMISSIONED_POINT)

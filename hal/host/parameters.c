@@ -160,6 +160,7 @@ static const parameter_t parameters[] = {
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
     {"identification_mode", get_identification_mode, set_identification_mode, 0.0, 1.0},
+    {"trim", commissioned_trims, commissioned_set_trim, 0.0, 1.0},
     {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
     {"identification_reset", get_identification_reset, set_identification_reset, 0.0, 1.0},
     {"current_mode", get_current_mode, set_current_mode, 0.0, 1.0},

@@ -37,6 +37,15 @@ def test_every_declared_value_and_measurement_is_described_in_the_order_of_the_s
     assert [value.name for value in description.measurements] == _listed("measurement_list.h")
 
 
+def test_the_freeze_frame_is_described_with_its_samples() -> None:
+    frozen = {value.name: value for value in read(PROGRAM).frozen}
+    samples = [name for name, value in frozen.items() if value.count]
+    assert samples == [f"freeze_{name}" for name in _listed("freeze_frame.h")]
+    assert all(frozen[name].count == 32 for name in samples)
+    assert (frozen["freeze_i_q_A"].base, frozen["freeze_i_q_A"].unit) == ("CURRENT", "A")
+    assert frozen["freeze_time_ms"].count == 0
+
+
 def test_limits_and_units_are_those_of_the_declaration() -> None:
     by_name = {value.name: value for value in read(PROGRAM).values}
     assert (by_name["observer_m"].lo, by_name["observer_m"].hi) == (2.0, 4.0)
@@ -72,7 +81,7 @@ def test_pya2l_reads_addresses_limits_and_types(written: Path) -> None:
         found = session.query(pya2l.model.Characteristic).filter_by(name=value.name).one()
         assert (found.address, found.type) == (value.address, "VALUE")
         assert (found.lowerLimit, found.upperLimit) == pytest.approx((value.lo, value.hi))
-    for value in description.measurements:
+    for value in description.measurements + description.frozen:
         found = session.query(pya2l.model.Measurement).filter_by(name=value.name).one()
         assert found.ecu_address.address == value.address
     session.close()

@@ -30,7 +30,7 @@ class Layer:
 # The direction of the signal. A feedback arrow is a field one sample old, never an include.
 PIPELINE = (
     "measure", "angle_harmonics", "angle_tracker", "transform", "flux_table", "mrai", "identify", "torque_estimate",
-    "commission",
+    "commission", "dead_time_trim",
     "torque_limit", "torque_loop", "voltage_reserve", "i_d_limit", "current_reference", "current_control", "modulate",
 )  # fmt: skip
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -10,8 +12,19 @@
 
 /* The robust identification between the priorities: window, step, answer, memory. */
 
+static double omega;  /* of omega_b */
+static int32_t unit;  /* of the current: (-3, 5) of them */
+static int weak;      /* counts of magnet flux that are missing */
+static uint32_t now;  /* periods */
+static double lost;   /* counts of voltage along the current that nominal compensation leaves over */
+
 void setUp(void)
 {
+    omega = 0.3;
+    unit = 1000;
+    weak = 1434;
+    now = 0;
+    lost = 0.0;
     seam_start();
     seam.winding_dC = 200;
 }
@@ -20,16 +33,22 @@ void tearDown(void)
 {
 }
 
-/* A sample as the fast ISR publishes it: 60 A, 0.3 omega_b, a magnet that is 10 % weak. */
+/* A sample as the fast ISR publishes it: 60 A unless said otherwise, a magnet that is 10 % weak. */
 static void period(uint32_t k)
 {
     sample_t *s = sample_box_begin(&drive.samples, drive.samples.generation + 1U);
-    const dq_t i = {-3000, 5000};
-    const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
+    const dq_t i = {-3 * unit, 5 * unit};
+    const q31_t speed = (q31_t)(omega * 2147483648.0);
+    const mrai_in_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = speed};
     *s = (sample_t){.mrai = in, .acting = true, .v_dc = 21238};
-    s->mrai.u.d = (int32_t)(-0.3 * s->mrai.flux.psi_q - 0.0133 * 3000);
-    s->mrai.u.q = (int32_t)(0.3 * (s->mrai.flux.psi_d - 1434) + 0.0133 * 5000);
-    s->theta_e = (uint32_t)(k * 0.3 * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
+    s->mrai.u.d = (int32_t)(-omega * s->mrai.flux.psi_q + 0.0133 * i.d);
+    s->mrai.u.q = (int32_t)(omega * (s->mrai.flux.psi_d - weak) + 0.0133 * i.q);
+    /* What is compensated in addition need not be commanded any more. */
+    const double left = lost - 4.0 / 3.14159265 * 21238.0 *
+                                   (drive.motor.modulate.dead_time - motor.modulate.dead_time) / 32768.0;
+    s->mrai.u.d += (int32_t)lround(left * -3.0 / 5.831);
+    s->mrai.u.q += (int32_t)lround(left * 5.0 / 5.831);
+    s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
     sample_box_publish(&drive.samples, drive.samples.generation + 1U);
     if (drive.request.identification_mode == IDENTIFICATION_PAPER) {
         drive.fast.pended++;
@@ -46,7 +65,7 @@ static void period(uint32_t k)
 static void milliseconds(int n)
 {
     for (int k = 0; k < 10 * n; k++) {
-        period((uint32_t)k);
+        period(now++);
         if (k % 10 == 9) {
             task_1khz(&drive);
         }
@@ -134,4 +153,40 @@ void test_the_window_box_survives_the_wrap_of_its_generation(void)
         window_box_write(&drive.windows, &window);
         TEST_ASSERT_EQUAL_INT(n, window_box_look(&drive.windows)->count);
     }
+}
+
+/* Slow enough to be told from the magnet. */
+static void at_town_speed(void)
+{
+    omega = 0.04;
+    weak = 0;
+    lost = 100.0;
+}
+
+/* 100 counts are 1.65 V: pi/4 of them, over 21238 of dc voltage, are 121 LSB of duty. */
+void test_the_compensation_takes_over_what_is_learnt_of_the_voltage_error(void)
+{
+    at_town_speed();
+    for (int n = 0; n < 30; n++) {
+        unit = (n % 2 == 0) ? 1500 : 300;
+        milliseconds(4000);
+    }
+    const int last = drive.task.torque_estimate;
+    milliseconds(1000);
+    TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_max / 1000U, last, drive.task.torque_estimate);
+    TEST_ASSERT_INT_WITHIN(30, motor.modulate.dead_time + 121, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT32(drive.motor.modulate.dead_time - motor.modulate.dead_time, drive.task.trim.trim);
+    TEST_ASSERT_LESS_OR_EQUAL_INT32(motor.current_control.clear_q32, drive.motor.current_control.clear_q32);
+    drive.request.identification_resets++;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time, drive.motor.modulate.dead_time);
+}
+
+void test_who_does_not_want_the_compensation_moved_keeps_it(void)
+{
+    at_town_speed();
+    drive.request.trim = false;
+    milliseconds(20000);
+    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time, drive.motor.modulate.dead_time);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.filter.x[IDENTIFY_DROP]);
 }

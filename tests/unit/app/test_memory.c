@@ -210,6 +210,29 @@ void test_a_measured_compensation_is_kept_with_the_room_it_needs(void)
     TEST_ASSERT_TRUE(motor_valid(&drive.motor)); /* (MO-11) among others */
 }
 
+void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)
+{
+    const int32_t measured = motor.modulate.dead_time + 40;
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    drive_retrim(&drive, -60);
+    TEST_ASSERT_EQUAL_INT(measured - 60, drive.motor.modulate.dead_time);
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_EQUAL_INT(measured - 60, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT32(-60, drive.task.trim.trim);
+    /* A new measurement replaces both. */
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.trim.trim);
+}
+
+void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
+{
+    drive_retrim(&drive, 60);
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time + 60, drive.motor.modulate.dead_time);
+}
+
 void test_a_compensation_that_no_inverter_needs_is_refused(void)
 {
     const motor_t before = drive.motor;

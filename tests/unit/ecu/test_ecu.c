@@ -242,3 +242,39 @@ void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F,
                              calibration_get(&ecu.drive.motor, CALIBRATION_dead_time_compensation));
 }
+
+/* 32 ms of current before the fault, the newest last; a second fault and what the machine does then change nothing. */
+void test_the_first_fault_freezes_what_was_before_it(void)
+{
+    freeze_frame_t frame = {0};
+    measurements_t now = {.psi_f_Vs = 0.07F, .r_ohm = 0.02F};
+    for (int ms = 1; ms <= 100; ms++) {
+        now.i_q_A = (int16_t)(10 * ms);
+        now.speed_rpm = (ms == 99) ? 1e9F : -50.5F;
+        now.fault_word = (ms >= 100) ? 4U : 0U;
+        freeze_frame_step(&frame, &now, 0, (ms < 100) ? STATE_RUN : STATE_FAULT);
+    }
+    now.i_q_A = 7;
+    now.fault_word = 6U;
+    freeze_frame_step(&frame, &now, 1, STATE_FAULT);
+    TEST_ASSERT_EQUAL_INT(1, frame.frozen);
+    TEST_ASSERT_EQUAL_UINT32(100, frame.time_ms);
+    TEST_ASSERT_EQUAL_UINT32(4, frame.fault_word);
+    TEST_ASSERT_EQUAL_INT(0, frame.ecu_faults);
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, frame.state);
+    TEST_ASSERT_EQUAL_FLOAT(0.07F, frame.psi_f_Vs);
+    for (int n = 0; n < 32; n++) {
+        TEST_ASSERT_EQUAL_INT(10 * (69 + n), frame.i_q_A[(frame.oldest + (unsigned)n) % FREEZE_FRAME_SAMPLES]);
+    }
+    TEST_ASSERT_EQUAL_INT(-50, frame.speed_rpm[frame.oldest]);
+    TEST_ASSERT_EQUAL_INT(32767, frame.speed_rpm[(frame.oldest + 30U) % FREEZE_FRAME_SAMPLES]);
+    /* Forgotten: it records again, and the next fault is kept. */
+    now.fault_word = 0;
+    freeze_frame_step(&frame, &now, 0, STATE_STANDBY);
+    TEST_ASSERT_EQUAL_INT(0, frame.frozen);
+    freeze_frame_step(&frame, &now, 0, STATE_STANDBY);
+    freeze_frame_step(&frame, &now, 8, STATE_FAULT);
+    TEST_ASSERT_EQUAL_INT(1, frame.frozen);
+    TEST_ASSERT_EQUAL_INT(8, frame.ecu_faults);
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);
+}

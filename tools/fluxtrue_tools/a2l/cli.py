@@ -12,7 +12,7 @@ from fluxtrue_tools.a2l.elf import Description, read
 # firmware/app/xcp_access.h; a test holds the two together.
 COMMAND_ID = 0x650
 ANSWER_ID = 0x651
-ASAP2_TYPES = {"S16": "SWORD", "U32": "ULONG", "F32": "FLOAT32_IEEE", "U8": "UBYTE"}
+ASAP2_TYPES = {"S16": "SWORD", "U32": "ULONG", "F32": "FLOAT32_IEEE", "U8": "UBYTE", "U16": "UWORD"}
 FLOAT_SIZE = 4
 
 
@@ -27,7 +27,7 @@ def render(description: Description, source: str) -> str:
     return environment.get_template("fluxtrue.a2l.j2").render(
         name=description.machine, source=source, segment=segment, types=ASAP2_TYPES,
         command_id=COMMAND_ID, answer_id=ANSWER_ID, bases=description.bases,
-        values=description.values, measurements=description.measurements)  # fmt: skip
+        values=description.values, measurements=description.measurements, frozen=description.frozen)  # fmt: skip
 
 
 def write(text: str, path: Path) -> None:

@@ -19,8 +19,9 @@ from fluxtrue_tools.errors import FluxtrueError
 SECTION = ".a2l"
 OBJECT = "ecu"
 MOTOR = "motor"
-# kind, name, text, unit, type, base, lo, hi, offset: a2l_record_t.
-RECORD = struct.Struct("<8s40s80s12s8s12sffI")
+# kind, name, text, unit, type, base, lo, hi, count, offset: a2l_record_t.
+RECORD = struct.Struct("<8s40s80s12s8s12sffII")
+RANGES = {"U32": (0.0, 4294967295.0), "U16": (0.0, 65535.0), "U8": (0.0, 255.0), "S16": (-32768.0, 32767.0)}
 ADDRESS_MAX = 0xFFFFFFFF
 Q15_ONE = 32768.0
 
@@ -37,6 +38,7 @@ class Value:
     lo: float
     hi: float
     address: int
+    count: int = 0  # of an array
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,7 @@ class Description:
     machine: str
     values: tuple[Value, ...]
     measurements: tuple[Value, ...]
+    frozen: tuple[Value, ...]  # before the first fault; not recorded, read once
     bases: tuple[Base, ...]
 
 
@@ -94,8 +97,8 @@ def _records(elf: ELFFile, path: Path) -> list[tuple[str, Value, int]]:
         raise FluxtrueError(f"{path}: section '{SECTION}' has {len(data)} bytes, "
                             f"allowed: a multiple of {RECORD.size}")  # fmt: skip
     records = []
-    for kind, name, text, unit, type_, base, lo, hi, offset in RECORD.iter_unpack(data):
-        value = Value(_text(name), _text(text), _text(unit), _text(type_), _text(base), lo, hi, 0)
+    for kind, name, text, unit, type_, base, lo, hi, count, offset in RECORD.iter_unpack(data):
+        value = Value(_text(name), _text(text), _text(unit), _text(type_), _text(base), lo, hi, 0, count)
         records.append((_text(kind), value, offset))
     return records
 
@@ -114,9 +117,9 @@ def _placed(value: Value, path: Path, address: int, base: Base | None) -> Value:
     if base is not None:
         lo, hi = -base.full, base.full * (1.0 - 1.0 / Q15_ONE)
     elif lo == hi == 0.0:
-        lo, hi = {"U32": (0.0, 4294967295.0), "U8": (0.0, 255.0)}.get(value.type, (-3.4e38, 3.4e38))
+        lo, hi = RANGES.get(value.type, (-3.4e38, 3.4e38))
     unit = _unit_of(value.name, value.unit)
-    return Value(value.name, value.text, unit, value.type, value.base, lo, hi, address)
+    return Value(value.name, value.text, unit, value.type, value.base, lo, hi, address, value.count)
 
 
 def read(path: Path) -> Description:
@@ -143,6 +146,6 @@ def _describe(elf: ELFFile, path: Path) -> Description:
             _placed(value, path, ecu + offset, bases.get(value.base))
             for kind, value, offset in records if kind == wanted
         )
-        for wanted in ("value", "measure")
+        for wanted in ("value", "measure", "frozen")
     }  # fmt: skip
-    return Description("fluxtrue", placed["value"], placed["measure"], tuple(bases.values()))
+    return Description("fluxtrue", placed["value"], placed["measure"], placed["frozen"], tuple(bases.values()))
