@@ -24,6 +24,7 @@ from rig import Rig
 ROOT = Path(__file__).resolve().parents[2]
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 VERSION = "INV_Version"
+STACK = "unused stack"
 MARKERS = {
     "plant": "needs a plant that can be told what to do (--bench, or the virtual ECU)",
     "program": "needs the virtual ECU's program itself (--vecu)",
@@ -166,8 +167,17 @@ def connected(
     return rig
 
 
+def _note_stack(about: dict[str, str], unused_bytes: int) -> None:
+    """The high-water mark: the least after any test."""
+    was = about.get(STACK, "").partition(" ")[0]
+    if unused_bytes == 0:
+        about.setdefault(STACK, "not told by this target: not checked")
+    elif not was.isdigit() or unused_bytes < int(was):
+        about[STACK] = f"{unused_bytes} bytes, at least {health.STACK_RESERVE_BYTES} wanted after every test"
+
+
 @pytest.fixture
-def rig(connected: Rig) -> Iterator[Rig]:
+def rig(connected: Rig, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """An ECU just started (virtual) or brought to standby (bench); after the test its health is checked."""
     if connected.has_stand:
         connected.power_cycle()
@@ -180,6 +190,7 @@ def rig(connected: Rig) -> Iterator[Rig]:
     before = health.note(connected)
     yield connected
     problems = health.problems(connected, before)
+    _note_stack(request.config.stash[REPORT].about, health.stack_unused(connected))
     assert not problems, "after the test: " + "; ".join(problems)
 
 
