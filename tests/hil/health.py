@@ -87,7 +87,7 @@ def _bus(rig: Rig, before: dict[str, Any]) -> list[str]:
 
 
 def stack_unused(rig: Rig) -> int:
-    """Bytes that nothing has touched since start-up; 0: this target cannot tell (the virtual ECU, a process on a PC)."""
+    """Bytes that nothing has touched since start-up; 0: this target cannot tell (the virtual ECU is a process)."""
     return int(rig.signal("INV_DiagTask", "StackUnused"))
 
 
