@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import can
 import cantools.database
 import pytest
 from fluxtrue_tools.a2l.elf import Description, read
+from fluxtrue_tools.bus.address import BusAddress, parse_option
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.mdf import BusLog
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
@@ -24,6 +25,7 @@ from rig import Rig
 ROOT = Path(__file__).resolve().parents[2]
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 VERSION = "INV_Version"
+STACK = "unused stack"
 MARKERS = {
     "plant": "needs a plant that can be told what to do (--bench, or the virtual ECU)",
     "program": "needs the virtual ECU's program itself (--vecu)",
@@ -111,26 +113,38 @@ class Target:
     can_port: int = 0  # of our virtual ECU: where further clients connect
 
 
+def _bench_channel(address: str) -> Channel:
+    host, colon, port = address.rpartition(":")
+    if not colon or not host or not port.isdigit():
+        raise FluxtrueError(f"--bench {address}: allowed: HOST:PORT")
+    return Channel(host, int(port))
+
+
 def _bench_target(config: pytest.Config) -> Target:
-    options: dict[str, Any] = {}
-    for option in config.getoption("--can-option"):
-        name, _, value = option.partition("=")
-        options[name] = int(value) if value.isdigit() else value
-    bus = can.Bus(interface=config.getoption("--can-interface"), channel=config.getoption("--can-channel"), **options)
-    bench = config.getoption("--bench")
-    host, _, port = (bench or "").rpartition(":")
-    return Target(bus, Channel(host, int(port)) if bench else None, int(options.get("port", 0)))
+    options = dict(map(parse_option, config.getoption("--can-option")))
+    bus = BusAddress(config.getoption("--can-interface"), config.getoption("--can-channel"), options).connect()
+    try:
+        stand = _bench_channel(config.getoption("--bench")) if config.getoption("--bench") else None
+    except FluxtrueError:
+        bus.shutdown()
+        raise
+    port = options.get("port", 0)
+    return Target(bus, stand, port if isinstance(port, int) else 0)
 
 
 @pytest.fixture(scope="session")
 def target(request: pytest.FixtureRequest) -> Iterator[Target]:
-    """The bench that was asked for, else a virtual ECU."""
-    if request.config.getoption("--can-interface") is not None:
-        found = _bench_target(request.config)
+    """The bench that was asked for, else a virtual ECU; without either there is nothing to test."""
+    try:
+        is_bench = request.config.getoption("--can-interface") is not None
+        found = _bench_target(request.config) if is_bench else VirtualEcu(request.getfixturevalue("program"))
+    except FluxtrueError as error:
+        pytest.exit(f"error: {error}", returncode=2)
+    if isinstance(found, Target):
         yield found
         found.bus.shutdown()
         return
-    with VirtualEcu(request.getfixturevalue("program")) as ecu:
+    with found as ecu:
         bus = connect(ecu.can_port)
         yield Target(bus, Channel(HOST, ecu.bench_port), ecu.can_port)
         bus.shutdown()
@@ -166,8 +180,17 @@ def connected(
     return rig
 
 
+def _note_stack(about: dict[str, str], unused_bytes: int) -> None:
+    """The high-water mark: the least after any test."""
+    was = about.get(STACK, "").partition(" ")[0]
+    if unused_bytes == 0:
+        about.setdefault(STACK, "not told by this target: not checked")
+    elif not was.isdigit() or unused_bytes < int(was):
+        about[STACK] = f"{unused_bytes} bytes, at least {health.STACK_RESERVE_BYTES} wanted after every test"
+
+
 @pytest.fixture
-def rig(connected: Rig) -> Iterator[Rig]:
+def rig(connected: Rig, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """An ECU just started (virtual) or brought to standby (bench); after the test its health is checked."""
     if connected.has_stand:
         connected.power_cycle()
@@ -180,6 +203,7 @@ def rig(connected: Rig) -> Iterator[Rig]:
     before = health.note(connected)
     yield connected
     problems = health.problems(connected, before)
+    _note_stack(request.config.stash[REPORT].about, health.stack_unused(connected))
     assert not problems, "after the test: " + "; ".join(problems)
 
 

@@ -86,13 +86,18 @@ def _bus(rig: Rig, before: dict[str, Any]) -> list[str]:
     return found
 
 
+def stack_unused(rig: Rig) -> int:
+    """Bytes that nothing has touched since start-up; 0: this target cannot tell (the virtual ECU is a process)."""
+    return int(rig.signal("INV_DiagTask", "StackUnused"))
+
+
 def problems(rig: Rig, before: dict[str, Any]) -> list[str]:
     """Everything that is not as it must be, in words."""
     rig.is_sending = True
     rig.advance(DIAGNOSTICS_S)
     found = _faults(rig) + _counters(rig, before)
-    stack = rig.signal("INV_DiagTask", "StackUnused")
-    if 0 < stack < STACK_RESERVE_BYTES:  # 0: this port cannot tell
+    stack = stack_unused(rig)
+    if 0 < stack < STACK_RESERVE_BYTES:
         found.append(f"{stack:g} bytes of stack were never used, wanted {STACK_RESERVE_BYTES}")
     if not rig.expected.frames:
         found += _frames(rig)

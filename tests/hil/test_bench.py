@@ -61,3 +61,21 @@ def test_without_any_target_it_says_what_it_wants(tmp_path: Path) -> None:
     done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}")
     assert done.returncode == 2
     assert "no target: give --vecu=PATH, or --can-interface and --can-channel" in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(("arguments", "wanted"), [
+    (("--can-interface=nonsense",), 'error: --can-interface nonsense, --can-channel can0: Unknown interface type'),
+    (("--can-interface=socketcand",), "error: --can-interface socketcand, --can-channel can0: "),
+    (("--can-interface=kvaser", "--can-channel=0"), "error: --can-interface kvaser, --can-channel 0: "),
+    (("--can-interface=virtual", "--can-option=bitrate"), "error: --can-option bitrate: allowed: NAME=VALUE"),
+    (("--can-interface=virtual", "--bench=here"), "error: --bench here: allowed: HOST:PORT"),
+    (("--can-interface=virtual", "--bench=127.0.0.1:1"), "error: bench channel 127.0.0.1:1: "),
+    (("--vecu=/nowhere",), "error: virtual ECU /nowhere: No such file or directory"),
+])  # fmt: skip
+def test_a_target_that_is_not_there_is_one_clear_message(
+    tmp_path: Path, arguments: tuple[str, ...], wanted: str
+) -> None:
+    done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", *arguments)
+    assert done.returncode == 2
+    said = done.stdout + done.stderr
+    assert wanted in said and "Traceback" not in said and len(said.splitlines()) < 10, said

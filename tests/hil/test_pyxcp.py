@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """A calibration master that this project did not write, against an ECU that keeps pace with the wall clock."""
 
+import re
 import struct
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
-from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.a2l.cli import render
+from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from pyxcp.config import create_application_from_config
 from pyxcp.master import Master
@@ -14,6 +19,7 @@ from pyxcp.types import XcpResponseError
 from xcp_master import key_of
 
 pytestmark = pytest.mark.program
+ROOT = Path(__file__).resolve().parents[2]
 COMMAND_ID, ANSWER_ID = 0x650, 0x651
 FLOAT = struct.Struct("<f")
 
@@ -106,3 +112,15 @@ def test_the_slave_describes_itself_as_the_a2l_file_does(master: Master) -> None
     assert (processor.maxDaq, processor.maxEventChannel) == (4, 2)
     assert processor.daqProperties.daqConfigType == "DYNAMIC"
     assert master.getDaqResolutionInfo().maxOdtEntrySizeDaq == 7
+
+
+def test_the_session_of_the_howto_runs_as_it_is_printed(program: Path, ecu: VirtualEcu, tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "howto" / "xcp.md").read_text(encoding="utf-8")
+    (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    (tmp_path / "vecu.a2l").write_text(render(read(program), program.name), encoding="utf-8")
+    assert code.count("29536") == 1
+    code = code.replace("29536", str(ecu.can_port))
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300,
+                          check=False)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "observer_m 3.5 allowed 2.0 to 4.0"

@@ -16,7 +16,7 @@ TRUTH = "truth.torque_shaft_mean_Nm"
 WARM_UP_S = 60.0
 COLD_PERCENT = 4.0
 LEAST_NM = 13.2  # errors are of |torque|, or of a tenth of the machine's 132 N·m if that is more
-# After a drive. Tighter than the campaign's 0.8 % and 2.5 %: one plant, the same in every run, sensors without gain error.
+# After a drive. Tighter than the campaign, 0.8 % and 2.5 %: one plant, the same in every run, no gain error of sensors.
 RMS_PERCENT, WORST_PERCENT = 0.6, 1.5
 # The bus says torque in steps of 0.1 N·m, 0.25 % of 20 N·m either way; the rest is the identification's.
 TOLD_PERCENT = 1.5

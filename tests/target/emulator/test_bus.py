@@ -2,6 +2,7 @@
 """The image that would be flashed, on the bus: a slice of the suite for bench and virtual ECU."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -33,6 +34,8 @@ def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_p
         command, cwd=ROOT, env=os.environ | flashed.environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.search(r"<th>unused stack</th><td>[1-9]\d+ bytes", page), "the check of the stack was idle"
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-300:]
 
 

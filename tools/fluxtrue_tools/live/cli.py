@@ -15,9 +15,10 @@ from aiohttp import web
 
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.address import BusAddress, parse_option
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander
-from fluxtrue_tools.live.link import BusAddress, Link, Recorder
+from fluxtrue_tools.live.link import Link, Recorder
 from fluxtrue_tools.live.replay import Replay, load
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.server import HOST, Session, make_app
@@ -30,13 +31,6 @@ from fluxtrue_tools.vecu.process import VirtualEcu
 
 DRIVE_FAULTS: Final = 1  # FirstFault of bit 0
 ECU_FAULTS: Final = 33
-
-
-def _option(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise FluxtrueError(f"--can-option {text}: allowed: NAME=VALUE")
-    return name, int(value) if value.isdigit() else value
 
 
 def _fault_names(database: cantools.database.Database) -> dict[str, list[str]]:
@@ -118,7 +112,7 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
         if replay is not None:
             frames, title = load(replay), f"{replay.name} (replay)"
         elif can_interface is not None:
-            options = dict(map(_option, can_option))
+            options = dict(map(parse_option, can_option))
             address, title = BusAddress(can_interface, can_channel, options), f"{can_interface} {can_channel}"
         else:
             ecu = stack.enter_context(VirtualEcu(machine.vecu, fast=False))

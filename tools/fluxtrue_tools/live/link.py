@@ -5,16 +5,14 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import can
 import cantools.database
 
 from fluxtrue_tools.bus.protect import Protector
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander, Order, Wish
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.vecu.mdf import BusLog
@@ -22,23 +20,6 @@ from fluxtrue_tools.vecu.mdf import BusLog
 COMMAND: Final = "VCU_TorqueCommand"
 PERIOD_S: Final = 0.010
 LIMIT_Nm: Final = 1000.0  # the message's own largest: the slider is the limit here
-
-
-@dataclass(frozen=True)
-class BusAddress:
-    """Arguments of can.Bus."""
-
-    interface: str
-    channel: str
-    options: dict[str, Any]
-
-    def connect(self) -> can.BusABC:
-        """A new connection."""
-        try:
-            return can.Bus(interface=self.interface, channel=self.channel, receive_own_messages=False,
-                           **self.options)  # fmt: skip
-        except (OSError, can.CanError, ValueError, NotImplementedError) as error:
-            raise FluxtrueError(f"--can-interface {self.interface}, --can-channel {self.channel}: {error}") from error
 
 
 class Recorder:

@@ -13,8 +13,8 @@ from pyxcp.types import XcpResponseError, XcpTimeoutError
 
 from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
 from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.live.link import BusAddress
 
 FLOAT: Final = struct.Struct("<f")
 

@@ -109,7 +109,8 @@ def run_logged(command: list[str], log: Path, label: str) -> None:
         raise FluxtrueError(f"{label}: '{' '.join(command)}' failed, see {log}")
 
 
-def _configure(build_dir: Path, folder: Path | None, log: Path) -> None:
+def configure_build(build_dir: Path, folder: Path | None, log: Path) -> None:
+    """A build folder that is not there yet; a folder with motor data: for that machine alone, without tests."""
     if (build_dir / "build.ninja").is_file():
         return
     command = ["cmake", "--preset", "host", "-B", str(build_dir)]
@@ -124,7 +125,7 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
     log = build_dir / "simulation.log"
     with build_lock():
         log.unlink(missing_ok=True)
-        _configure(build_dir, folder, log)
+        configure_build(build_dir, folder, log)
         targets = [f"fluxtrue_sim_{target}", f"fluxtrue_sil_{target}", f"fluxtrue_vecu_{target}"]
         command = ["cmake", "--build", str(build_dir), "-j2", "--target", *targets]
         run_logged(command, log, f"building the simulation of motor {name}")

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which bus: the arguments of python-can as they come from a command line."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import can
+
+from fluxtrue_tools.errors import FluxtrueError
+
+
+def parse_option(text: str) -> tuple[str, Any]:
+    """NAME=VALUE of --can-option; digits are a number."""
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise FluxtrueError(f"--can-option {text}: allowed: NAME=VALUE")
+    return name, int(value) if value.isdigit() else value
+
+
+@dataclass(frozen=True)
+class BusAddress:
+    """Arguments of can.Bus."""
+
+    interface: str
+    channel: str
+    options: dict[str, Any]
+
+    def connect(self) -> can.BusABC:
+        """A new connection."""
+        try:
+            return can.Bus(interface=self.interface, channel=self.channel, receive_own_messages=False,
+                           **self.options)  # fmt: skip
+        except Exception as error:  # drivers and their Python fail in many ways, NameError and TypeError among them
+            raise FluxtrueError(f"--can-interface {self.interface}, --can-channel {self.channel}: {error}") from error
