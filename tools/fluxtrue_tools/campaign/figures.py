@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from fluxtrue_tools.campaign.case import Trace
-from fluxtrue_tools.campaign.score import BANDS, CRAWL, rms
+from fluxtrue_tools.campaign.score import BANDS, CRAWL, band_of, rms
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.campaign.terminal import band_name
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
@@ -83,10 +83,7 @@ def maps(campaign: Campaign, table: pd.DataFrame) -> Figure:
     return figure
 
 
-@_styled
-def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """rms error and information bound over speed."""
-    figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+def _over_speed(axes: Any, campaign: Campaign, table: pd.DataFrame) -> None:
     edges = _speed_edges(table)
     middle = np.sqrt(edges[1:] * edges[:-1])
     for name, colour in _colours(campaign).items():
@@ -104,7 +101,40 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
     _plain_ticks(axes, edges)
     axes.set_xlabel("speed, rpm")
     axes.set_ylabel("rms torque error, %")
+
+
+@_styled
+def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """rms error and information bound over speed."""
+    figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+    _over_speed(axes, campaign, table)
     axes.legend(loc="upper center", ncols=3)
+    return figure
+
+
+def headline(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """The campaign at a glance, from 300 rpm: how many windows are how wrong, and where."""
+    table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
+    table = table[table["band"] != CRAWL]
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+        for name, colour in _colours(campaign).items():
+            error = np.sort(table.loc[table["controller"] == name, "error_percent"].abs())
+            share = 100.0 * np.arange(1, len(error) + 1) / max(1, len(error))
+            axes[0].plot(error, share, color=colour, label=name)
+        axes[0].set_xlim(0.0, SCALE_PERCENT)
+        axes[0].set_ylim(0.0, 101.0)
+        axes[0].set_xlabel("magnitude of the torque error, %")
+        axes[0].set_ylabel("share of windows within it, %")
+        axes[0].set_title(f"{table['case'].nunique()} random plants, simulated", loc="left")
+        axes[0].legend(loc="lower right")
+        _over_speed(axes[1], campaign, table)
+        limits, split, edges = campaign.check.limits, campaign.check.band_rpm, _speed_edges(table)
+        bounds = {"color": COMMAND, "ls": "--", "lw": 1.0}
+        axes[1].plot([edges[0], split], [limits.rms_low] * 2, label="promised", **bounds)
+        axes[1].plot([split, edges[-1]], [limits.rms_high] * 2, **bounds)
+        axes[1].set_title("over speed", loc="left")
+        axes[1].legend(loc="upper center", ncols=2)
     return figure
 
 
