@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robust identification on machine models of other projects: motulator's with saturation, gym-electric-motor's."""
+"""The campaign's bounds on machine models of other projects: motulator's with saturation, gym-electric-motor's.
+
+FLUXTRUE_PLANTS=20 draws twenty plants of each instead of three."""
 
 import importlib.util
 import math
+import os
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +20,85 @@ from motulator.drive.utils import SynchronousMachinePars
 from sil import OK, Drive, load_library
 
 MOTORS = Path(__file__).resolve().parents[1] / "motors"
-PERIOD_S, SUBSTEPS, VDC_V = 1e-4, 10, 350.0
-MAGNET, LQ, RESISTANCE = 0.88, 1.08, 1.3
-WINDING_C = 20.0 + (RESISTANCE - 1.0) / 0.00393 - 3.0  # the thermometer reads 3 K too low
+PLANTS = int(os.environ.get("FLUXTRUE_PLANTS", "3"))
+SEED = 77003
+PERIOD_S, SUBSTEPS, VDC_V = 1e-4, 4, 350.0
+FULL_SCALE_A = 400.0
 
 Point = tuple[float, float, float]
-# time, speed, torque: learning first, then the windows.
-LEARN: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 120), (1.1, 3200, 50),
+# time, speed, torque: two seconds of learning.
+LEARN: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 100), (1.1, 3200, 50),
                       (1.5, 3200, -80), (1.9, 1500, 30)]  # fmt: skip
-WINDOWS: list[Point] = [(2.2, 1000, 100), (2.6, 3000, 40), (3.0, 3000, -70), (3.4, 1500, 20)]
-MOVE_S, SETTLE_S, MEASURE_S, WINDOW_S = 0.1, 0.25, 0.14, 0.4
-LATE_S = WINDOWS[0][0] - 0.1
-ALONE: list[Point] = [(0.0, 0, 0), *((t - LATE_S, n, torque) for t, n, torque in WINDOWS)]
+LEARNT_S = 2.2
+LOW_RPM, HIGH_RPM, LOW_WINDOWS, HIGH_WINDOWS = (300.0, 5000.0), (5000.0, 7500.0), 4, 2
+LOW_NM, HIGH_NM = (12.0, 100.0), (12.0, 45.0)
+MOVE_S, SETTLE_S, MEASURE_S, WINDOW_S = 0.12, 0.28, 0.12, 0.4
 TABLES = {"torque_loop": 0.0, "identification": 0.0, "enable": 1.0}
 ROBUST = {"identification_mode": 1.0, "enable": 1.0}
 
 Wave = Callable[[Any], Any]
-Plant = Callable[[Drive, Wave, Wave, float], tuple[Any, Any]]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What differs from the firmware's data: the campaign's ranges, uniform. The models know no dead time, no iron."""
+
+    magnet: float
+    lq: float
+    ld: float
+    resistance: float
+    winding_C: float
+    vdc_gain: float
+    angle_rad: float
+    gains: Any
+    offsets_A: Any
+    direction: int
+
+
+def draw(rng: np.random.Generator, k: int) -> Spread:
+    """Plant k; every other one runs backwards."""
+    resistance = rng.uniform(0.9, 1.7)
+    return Spread(
+        magnet=rng.uniform(0.8, 1.05), lq=rng.uniform(0.9, 1.1), ld=rng.uniform(0.9, 1.1), resistance=resistance,
+        winding_C=20.0 + (resistance - 1.0) / 0.00393 + rng.uniform(-5.0, 5.0), vdc_gain=rng.uniform(0.995, 1.005),
+        angle_rad=math.radians(rng.uniform(-0.5, 0.5)), gains=rng.uniform(0.995, 1.005, 3),
+        offsets_A=rng.uniform(-0.002, 0.002, 3) * FULL_SCALE_A, direction=1 - 2 * (k % 2),
+    )  # fmt: skip
+
+
+def windows(rng: np.random.Generator) -> list[Point]:
+    """Stratified in speed, up the even and down the odd strata; the sign of the torque alternates."""
+    points = []
+    for (low, high), (least, most), count in ((LOW_RPM, LOW_NM, LOW_WINDOWS), (HIGH_RPM, HIGH_NM, HIGH_WINDOWS)):
+        edges = np.geomspace(low, high, count + 1)
+        points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(least), np.log(most)))))
+                   for a, b in zip(edges, edges[1:], strict=False)]  # fmt: skip
+    tour = points[::2] + points[1::2][::-1]
+    return [(LEARNT_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
+
+
+class Firmware:
+    """The library behind sensors that are a little wrong: duties for the next period."""
+
+    def __init__(self, motor: str, spread: Spread, settings: dict[str, float], points: list[Point]) -> None:
+        self.drive = Drive(load_library(prepare(str(MOTORS / motor)).sil))
+        for name, value in settings.items():
+            assert self.drive.set(name, value) == OK
+        self.spread, self.rng = spread, np.random.default_rng(SEED)
+        self.end_s = points[-1][0] + WINDOW_S
+        self.speed, self.torque = profile(1, points), profile(2, points)
+
+    def step(self, now: float, currents: Any, angle: float) -> list[float]:
+        """Sample, step; noise is 0.2 % of full scale rms."""
+        s = self.spread
+        assert self.drive.set("torque_command_Nm", float(self.torque(now)) * s.direction) == OK
+        seen = np.asarray(currents) * s.gains + s.offsets_A + self.rng.normal(0.0, 0.002 * FULL_SCALE_A, 3)
+        sample = (*map(float, seen), VDC_V * s.vdc_gain, (angle + s.angle_rad) % math.tau, s.winding_C)
+        return list(self.drive.step(sample)[:3])
+
+    def omega(self, now: Any) -> Any:
+        """Mechanical, rad/s."""
+        return self.speed(now) * self.spread.direction * math.tau / 60.0
 
 
 def profile(column: int, points: list[Point]) -> Wave:
@@ -45,38 +111,46 @@ def profile(column: int, points: list[Point]) -> Wave:
     return lambda t: np.interp(t, times, values)
 
 
-def step(drive: Drive, torque_Nm: float, currents: Any, angle: float) -> list[float]:
-    """One period of the firmware: the duties of the next one."""
-    assert drive.set("torque_command_Nm", float(torque_Nm)) == OK
-    return list(drive.step((*map(float, currents), VDC_V, angle, WINDING_C))[:3])
+Plant = Callable[[Firmware], tuple[Any, Any]]
 
 
-def errors(plant: Plant, motor: str, settings: dict[str, float], points: list[Point]) -> list[float]:
-    """Percent of the command (of 18 N·m at least) in every window."""
-    drive = Drive(load_library(prepare(str(MOTORS / motor)).sil))
-    for name, value in settings.items():
-        assert drive.set(name, value) == OK
-    now, true = plant(drive, profile(1, points), profile(2, points), points[-1][0] + WINDOW_S)
-    assert drive.get("fault_word") == 0.0
-    drive.close()
+def errors(plant: Plant, motor: str, rated_Nm: float, spread: Spread, settings: dict[str, float],
+           points: list[Point], count: int) -> list[float]:  # fmt: skip
+    """Percent of the command, but of a tenth of rated torque at least, in the last windows."""
+    firmware = Firmware(motor, spread, settings, points)
+    now, true = plant(firmware)
+    assert firmware.drive.get("fault_word") == 0.0
+    firmware.drive.close()
     found = []
-    for start, _, command in points[-len(WINDOWS):]:
+    for start, _, command in points[-count:]:
         some = (now > start + SETTLE_S) & (now <= start + SETTLE_S + MEASURE_S)
         mean = float(np.trapezoid(true[some], now[some]) / (now[some][-1] - now[some][0]))
-        found.append(100.0 * (mean - command) / max(abs(command), 18.0))
+        found.append(100.0 * (mean * spread.direction - command) / max(abs(command), 0.1 * rated_Nm))
     return found
 
 
-def judge(plant: Plant, motor: str) -> None:
-    """What was learnt corrects the torque, and harms nowhere."""
-    tables = errors(plant, motor, TABLES, ALONE)
-    robust = errors(plant, motor, ROBUST, LEARN + WINDOWS)
-    print("tables", np.round(tables, 2), "robust", np.round(robust, 2))
-    # A magnet 12 % weaker costs some of it everywhere, L_q gives a little of it back.
-    assert max(abs(error) for error in tables) > 3.0
-    # The campaign's bound on the 99th percentile, after 2 s of learning.
-    assert max(abs(error) for error in robust) <= 2.5
-    assert all(abs(a) <= max(abs(b) + 0.5, 2.0) for a, b in zip(robust, tables, strict=True))
+def judge(plant: Plant, motor: str, rated_Nm: float) -> None:
+    """The campaign's bounds over all plants' windows; the tables are asked where only they can tell harm."""
+    speeds, found, harmless = [], [], 0
+    for k in range(PLANTS):
+        rng = np.random.default_rng((SEED, k))
+        spread, tour = draw(rng, k), windows(rng)
+        robust = errors(plant, motor, rated_Nm, spread, ROBUST, LEARN + tour, len(tour))
+        tables = robust
+        if max(map(abs, robust)) > 2.0:
+            alone: list[Point] = [(0.0, 0, 0), *((t - LEARNT_S + 0.1, n, torque) for t, n, torque in tour)]
+            tables = errors(plant, motor, rated_Nm, spread, TABLES, alone, len(tour))
+        harmless += sum(abs(a) <= max(abs(b) + 0.5, 2.0) for a, b in zip(robust, tables, strict=True))
+        speeds += [n for _, n, _ in tour]
+        found += robust
+        print(motor, k, f"magnet {spread.magnet:.2f} lq {spread.lq:.2f}", np.round(robust, 2))
+    error, low = np.abs(found), np.array(speeds) <= LOW_RPM[1]
+    for some, rms, p99 in ((low, 0.8, 2.5), (~low, 1.2, 3.0)):
+        reached = float(np.sqrt(np.mean(error[some] ** 2))), float(np.percentile(error[some], 99.0))
+        print(motor, f"rms {reached[0]:.2f} of {rms}, 99th percentile {reached[1]:.2f} of {p99}")
+        assert reached[0] <= rms
+        assert reached[1] <= p99
+    assert harmless >= 0.99 * len(found)
 
 
 def iron() -> Any:
@@ -93,49 +167,57 @@ def iron() -> Any:
 IRON = iron()
 
 
-def saturation(psi: Any) -> Any:
-    """What motulator asks for, current over flux, with a weaker magnet and a larger L_q."""
-    psi_d = psi.real + (1.0 - MAGNET) * IRON.psi_f_Vs
-    i_d, i_q = IRON.currents(psi_d, psi.imag / LQ)
-    return i_d + 1j * i_q
+def saturation(spread: Spread) -> Wave:
+    """What motulator asks for, current over flux, with another magnet and other inductances."""
+
+    def current(psi: Any) -> Any:
+        psi_d = IRON.psi_f_Vs + (psi.real - spread.magnet * IRON.psi_f_Vs) / spread.ld
+        i_d, i_q = IRON.currents(psi_d, psi.imag / spread.lq)
+        return i_d + 1j * i_q
+
+    return current
 
 
-class Firmware:
-    """The library in the place of motulator's control system; motulator delays the duties by a period."""
+class Control:
+    """In the place of motulator's control system; motulator itself delays the duties by a period."""
 
-    def __init__(self, drive: Drive, torque: Wave) -> None:
-        self.drive, self.torque = drive, torque
+    def __init__(self, firmware: Firmware) -> None:
+        self.firmware = firmware
 
     def __call__(self, mdl: Any) -> tuple[float, list[float]]:
         currents, angle = mdl.machine.meas_currents(), float(mdl.mechanics.meas_position())
-        return PERIOD_S, step(self.drive, self.torque(mdl.t0), currents, angle)
+        return PERIOD_S, self.firmware.step(mdl.t0, currents, angle)
 
     def post_process(self) -> None:
         """Nothing to tidy up."""
 
 
-def motulator(drive: Drive, speed: Wave, torque: Wave, end_s: float) -> tuple[Any, Any]:
+def motulator(firmware: Firmware) -> tuple[Any, Any]:
     """Time and torque of motulator's synchronous machine, its solver and transforms."""
-    machine = SynchronousMachinePars(n_p=4, R_s=0.012 * RESISTANCE, L_d=1e-4, L_q=1e-4, psi_f=MAGNET * IRON.psi_f_Vs)
+    spread = firmware.spread
+    psi_f = spread.magnet * IRON.psi_f_Vs
+    machine = SynchronousMachinePars(n_p=4, R_s=0.012 * spread.resistance, L_d=1e-4, L_q=1e-4, psi_f=psi_f)
     plant = model.Drive(
         model.VoltageSourceConverter(u_dc=VDC_V),
-        model.SynchronousMachine(machine, i_s=saturation, psi_s0=MAGNET * IRON.psi_f_Vs),
-        model.ExternalRotorSpeed(w_M=lambda t: speed(t) * math.tau / 60.0),
+        model.SynchronousMachine(machine, i_s=saturation(spread), psi_s0=psi_f),
+        model.ExternalRotorSpeed(w_M=firmware.omega),
     )
-    model.Simulation(plant, Firmware(drive, torque)).simulate(end_s)
+    model.Simulation(plant, Control(firmware)).simulate(firmware.end_s)
     return np.asarray(plant.machine.data.t), np.asarray(plant.machine.data.tau_M)
 
 
-def gym(drive: Drive, speed: Wave, torque: Wave, end_s: float) -> tuple[Any, Any]:
+def gym(firmware: Firmware) -> tuple[Any, Any]:
     """Time and torque of gym-electric-motor's PMSM: its differential equation, torque and transforms; RK4 is ours."""
-    given = {"p": 3, "r_s": 0.018 * RESISTANCE, "l_d": 0.37e-3, "l_q": 1.2e-3 * LQ, "psi_p": MAGNET * 0.066}
+    spread = firmware.spread
+    given = {"p": 3, "r_s": 0.018 * spread.resistance, "l_d": 0.37e-3 * spread.ld, "l_q": 1.2e-3 * spread.lq,
+             "psi_p": spread.magnet * 0.066}  # fmt: skip
     motor = PermanentMagnetSynchronousMotor(motor_parameter=given)
     state, duty, h = np.zeros(3), [0.5] * 3, PERIOD_S / SUBSTEPS
-    now, true = np.arange(round(end_s / PERIOD_S)) * PERIOD_S, []
+    now, true = np.arange(round(firmware.end_s / PERIOD_S)) * PERIOD_S, []
     for t in now:
-        omega = float(speed(t)) * math.tau / 60.0
+        omega = float(firmware.omega(t))
         currents = motor.t_32(motor.q(state[:2], state[2]))
-        coming = step(drive, torque(t), currents, (state[2] / 3.0) % math.tau)
+        coming = firmware.step(t, currents, (state[2] / 3.0) % math.tau)
         u_ab = motor.t_23((np.array(duty) - np.mean(duty)) * VDC_V)
 
         def slope(x: Any, u: Any = u_ab, w: float = omega) -> Any:
@@ -151,9 +233,9 @@ def gym(drive: Drive, speed: Wave, torque: Wave, end_s: float) -> tuple[Any, Any
     return now, np.array(true)
 
 
-def test_what_was_learnt_on_motulators_saturating_machine_corrects_its_torque() -> None:
-    judge(motulator, "lossless")
+def test_the_campaigns_bounds_hold_on_motulators_saturating_machine() -> None:
+    judge(motulator, "lossless", 180.0)
 
 
-def test_what_was_learnt_on_gym_electric_motors_machine_corrects_its_torque() -> None:
-    judge(gym, "gem")
+def test_the_campaigns_bounds_hold_on_gym_electric_motors_machine() -> None:
+    judge(gym, "gem", 140.0)

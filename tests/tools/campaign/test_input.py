@@ -54,7 +54,6 @@ CALLED = [
     ("a flag that is not there", SMALL + '[check]\ncount_nonzero = ["psi_clamp"]', ["c.toml"], "psi_clamp"),
     ("a case beyond the last", SMALL, ["c.toml", "--case", "4"], "--case 4, allowed: 0 to 3"),
     ("more cases than there are", SMALL, ["c.toml", "--cases", "5"], "--cases 5, allowed: up to the campaign's 4"),
-    ("a plot of nothing", SMALL, ["c.toml", "--plot", "a.png"], "--plot a.png: allowed together with --case"),
     ("a plot of no format", SMALL, ["c.toml", "--case", "1", "--plot", "a.gif"], "allowed: a file ending in .png"),
     ("no scheduler", SMALL, ["c.toml", "--scheduler", "nonsense://x"], "--scheduler nonsense://x"),
 ]  # fmt: skip

@@ -114,7 +114,8 @@ def test_a_killed_campaign_goes_on_where_it_was(folder: Path, whole: pd.DataFram
 def test_the_first_cases_alone_can_be_run_and_the_rest_later(folder: Path, whole: pd.DataFrame) -> None:
     assert campaign("small.toml", "--out", "parts", "--cases", 1, cwd=folder).returncode == 0
     assert set(results(folder, "parts")["case"]) == {0}
-    assert campaign("small.toml", "--out", "parts", cwd=folder).returncode == 0
+    assert campaign("small.toml", "--out", "parts", "--plot", "parts.png", cwd=folder).returncode == 0
+    assert (folder / "parts.png").read_bytes().startswith(b"\x89PNG")
     pd.testing.assert_frame_equal(results(folder, "parts"), whole, check_exact=True)
 
 

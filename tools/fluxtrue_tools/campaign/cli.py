@@ -23,7 +23,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: a core each]")
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead.")
 @click.option("--case", type=click.IntRange(min=0), help="Run one case and show its windows; nothing is stored.")
-@click.option("--plot", type=_FILE, help="With --case: its time series, PNG, SVG or PDF.")
+@click.option("--plot", type=_FILE, help="The errors at a glance, or with --case its time series: PNG, SVG or PDF.")
 @click.option("--build-dir", type=_FOLDER, help="Take the libraries from this build folder as they are.")
 def campaign(campaign: Path, out: Path | None, cases: int | None, fresh: bool, check: bool, workers: int | None,
              scheduler: str | None, case: int | None, plot: Path | None, build_dir: Path | None) -> int:  # fmt: skip
@@ -44,6 +44,7 @@ def campaign(campaign: Path, out: Path | None, cases: int | None, fresh: bool, c
         range(cases or read.cases),
         where=str(campaign),
         command=f"tools/fluxtrue campaign {shlex.quote(str(campaign))} --case {{case}}",
+        plot=plot,
     )
     text, met = run.whole(job, fresh=fresh, scheduler=scheduler, workers=workers)
     click.echo(text)
@@ -57,8 +58,6 @@ def _check_options(available: int, cases: int | None, case: int | None, plot: Pa
         raise FluxtrueError(f"--case {case}, allowed: 0 to {available - 1}")
     if plot is None:
         return
-    if case is None:
-        raise FluxtrueError(f"--plot {plot}: allowed together with --case")
     if plot.suffix.lower() not in PLOTS:
         raise FluxtrueError(f"--plot {plot}: allowed: a file ending in {', '.join(PLOTS)}")
     from fluxtrue_tools.sim.output import check_writable

@@ -14,7 +14,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from fluxtrue_tools.campaign.case import Trace
-from fluxtrue_tools.campaign.score import BANDS, CRAWL, rms
+from fluxtrue_tools.campaign.score import BANDS, CRAWL, band_of, rms
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.campaign.terminal import band_name
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
@@ -23,6 +23,7 @@ COLOURS: Final = (SECOND, ESTIMATE, TRUTH, "#6a994e", "#7b2d8b", "#4f4f4f", "#00
 SPEED_BINS: Final = 13
 TORQUE_BINS: Final = 12
 SCALE_PERCENT: Final = 10.0  # where colours and histograms end
+FINE_PERCENT: Final = 2.0
 
 
 def _styled(draw: Callable[..., Figure]) -> Callable[..., str]:
@@ -48,45 +49,51 @@ def _speed_edges(table: pd.DataFrame) -> np.ndarray:
 
 def _plain_ticks(axes: Any, edges: np.ndarray) -> None:
     """A logarithmic axis with the numbers that people use."""
-    wanted = [n for n in (300, 500, 1000, 2000, 3000, 5000, 10000) if edges[0] <= n <= edges[-1] * 1.01]
+    wanted = [n for n in (300, 500, 1000, 2000, 5000, 10000) if edges[0] <= n <= edges[-1] * 1.01]
     axes.set_xscale("log")
     axes.set_xlim(edges[0], edges[-1])
     axes.set_xticks(wanted, [str(n) for n in wanted])
     axes.minorticks_off()
 
 
+def _map(axis: Any, rows: pd.DataFrame, speeds: np.ndarray, torques: np.ndarray, top_percent: float) -> Any:
+    driving = rows["torque_command_Nm"] * np.sign(rows["speed_rpm"])
+    place = [rows["speed_rpm"].abs(), driving]
+    count, _, _ = np.histogram2d(*place, bins=[speeds, torques])
+    total, _, _ = np.histogram2d(*place, bins=[speeds, torques], weights=rows["error_percent"] ** 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.sqrt(total / count).T
+    mesh = axis.pcolormesh(speeds, torques, error, cmap="viridis_r", vmin=0.0, vmax=top_percent)
+    _plain_ticks(axis, speeds)
+    axis.set_xlabel("speed, rpm")
+    axis.grid(visible=False)
+    return mesh
+
+
 @_styled
 def maps(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """rms error over speed and torque: torque counted positive when it drives, whatever the direction."""
-    names = [controller.name for controller in campaign.controller]
-    figure, axes = plt.subplots(1, len(names), figsize=(4.0 * len(names) + 1.0, 4.2), layout="constrained",
+    """rms error over speed and torque: torque counted positive when it drives, whatever the direction. All on one
+    scale, and those held to bounds once more on a finer one."""
+    names, fine = [controller.name for controller in campaign.controller], campaign.check.controllers
+    count = len(names) + len(fine)
+    figure, axes = plt.subplots(1, count, figsize=(3.2 * count + 1.6, 3.8), layout="constrained",
                                 sharey=True, squeeze=False)  # fmt: skip
     speeds = _speed_edges(table)
     top = table["torque_command_Nm"].abs().max() * 1.001
     torques = np.linspace(-top, top, TORQUE_BINS + 1)
-    mesh = None
-    for axis, name in zip(axes[0], names, strict=True):
-        rows = table[table["controller"] == name]
-        driving = rows["torque_command_Nm"] * np.sign(rows["speed_rpm"])
-        place = [rows["speed_rpm"].abs(), driving]
-        count, _, _ = np.histogram2d(*place, bins=[speeds, torques])
-        total, _, _ = np.histogram2d(*place, bins=[speeds, torques], weights=rows["error_percent"] ** 2)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            error = np.sqrt(total / count).T
-        mesh = axis.pcolormesh(speeds, torques, error, cmap="viridis_r", vmin=0.0, vmax=SCALE_PERCENT)
-        _plain_ticks(axis, speeds)
-        axis.set_title(name, loc="left")
-        axis.set_xlabel("speed, rpm")
-        axis.grid(visible=False)
+    coarse, finer = list(axes[0][: len(names)]), list(axes[0][len(names) :])
+    for group, shown, scale, mark in ((coarse, names, SCALE_PERCENT, ""), (finer, fine, FINE_PERCENT, ", finer scale")):
+        mesh = None
+        for axis, name in zip(group, shown, strict=True):
+            mesh = _map(axis, table[table["controller"] == name], speeds, torques, scale)
+            axis.set_title(name + mark, loc="left")
+        if mesh is not None:
+            figure.colorbar(mesh, ax=group, label="rms torque error, %", extend="max")
     axes[0][0].set_ylabel("torque, N·m (positive drives, negative brakes)")
-    figure.colorbar(mesh, ax=axes[0], label="rms torque error, %", extend="max")
     return figure
 
 
-@_styled
-def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """rms error and information bound over speed."""
-    figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+def _over_speed(axes: Any, campaign: Campaign, table: pd.DataFrame) -> None:
     edges = _speed_edges(table)
     middle = np.sqrt(edges[1:] * edges[:-1])
     for name, colour in _colours(campaign).items():
@@ -104,7 +111,40 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
     _plain_ticks(axes, edges)
     axes.set_xlabel("speed, rpm")
     axes.set_ylabel("rms torque error, %")
+
+
+@_styled
+def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """rms error and information bound over speed."""
+    figure, axes = plt.subplots(figsize=(9, 4), layout="constrained")
+    _over_speed(axes, campaign, table)
     axes.legend(loc="upper center", ncols=3)
+    return figure
+
+
+def headline(campaign: Campaign, table: pd.DataFrame) -> Figure:
+    """The campaign at a glance, from 300 rpm: how many windows are how wrong, and where."""
+    table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
+    table = table[table["band"] != CRAWL]
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
+        for name, colour in _colours(campaign).items():
+            error = np.sort(table.loc[table["controller"] == name, "error_percent"].abs())
+            share = 100.0 * np.arange(1, len(error) + 1) / max(1, len(error))
+            axes[0].plot(error, share, color=colour, label=name)
+        axes[0].set_xlim(0.0, SCALE_PERCENT)
+        axes[0].set_ylim(0.0, 101.0)
+        axes[0].set_xlabel("magnitude of the torque error, %")
+        axes[0].set_ylabel("share of windows within it, %")
+        axes[0].set_title(f"{table['case'].nunique()} random plants, simulated", loc="left")
+        axes[0].legend(loc="lower right")
+        _over_speed(axes[1], campaign, table)
+        limits, split, edges = campaign.check.limits, campaign.check.band_rpm, _speed_edges(table)
+        bounds = {"color": COMMAND, "ls": "--", "lw": 1.0}
+        axes[1].plot([edges[0], split], [limits.rms_low] * 2, label="promised", **bounds)
+        axes[1].plot([split, edges[-1]], [limits.rms_high] * 2, **bounds)
+        axes[1].set_title("over speed", loc="left")
+        axes[1].legend(loc="upper center", ncols=2)
     return figure
 
 

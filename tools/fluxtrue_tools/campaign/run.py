@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 from tqdm import tqdm
 
-from fluxtrue_tools.campaign import report, schedule, terminal
+from fluxtrue_tools.campaign import figures, report, schedule, terminal
 from fluxtrue_tools.campaign.case import Trace, check_names, run_case
 from fluxtrue_tools.campaign.machine import machine_of, make_machine
 from fluxtrue_tools.campaign.score import score
@@ -31,6 +31,7 @@ class Job:
     cases: range
     where: str  # for messages
     command: str  # that reproduces {case}
+    plot: Path | None = None  # the whole at a glance
 
 
 def task(name: str, folder: str, text: str, case: int) -> list[dict[str, Any]]:
@@ -55,6 +56,14 @@ def _simulate(job: Job, store: Store, scheduler: str | None, workers: int | None
             bar.update()
 
 
+def _draw(sheet: Any, plot: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    with atomic(plot) as scratch:
+        sheet.savefig(scratch, dpi=120)
+    plt.close(sheet)
+
+
 def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
     """The text for the terminal, and whether every bound is met."""
     machine = make_machine(job.folder, job.campaign, job.where)
@@ -69,6 +78,8 @@ def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) 
     write_text(job.out / "summary.json", json_text(data))
     page = report.html(job.campaign, table, scores, promised, machine.nominal, job.command)
     write_text(job.out / "report.html", page)
+    if job.plot is not None:
+        _draw(figures.headline(job.campaign, table), job.plot)
     parts = [terminal.figures_table(job.campaign, scores), terminal.trouble_table(job.campaign, scores)]
     parts += [terminal.bounds_table(promised)] if promised else []
     parts.append(str(job.out / "report.html"))
@@ -82,12 +93,5 @@ def one_case(campaign: Campaign, folder: MotorFolder, case: int, plot: Path | No
     traces: dict[str, Trace] = {}
     table = pd.DataFrame(run_case(campaign, machine, case, traces.__setitem__))
     if plot is not None:
-        import matplotlib.pyplot as plt
-
-        from fluxtrue_tools.campaign.figures import case_figure
-
-        sheet = case_figure(campaign, traces, f"{Path(where).stem}, case {case}")
-        with atomic(plot) as scratch:
-            sheet.savefig(scratch, dpi=120)
-        plt.close(sheet)
+        _draw(figures.case_figure(campaign, traces, f"{Path(where).stem}, case {case}"), plot)
     return terminal.case_table(campaign, table)

@@ -8,6 +8,7 @@ from typing import Any
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -78,7 +79,7 @@ def _speed(axes: Axes, run: Recording) -> None:
     axes.plot(run["time_s"], run["true_speed_rpm"], color=TRUTH, label="plant")
     axes.plot(run["time_s"], run["speed_rpm"], color=ESTIMATE, lw=0.9, label="measured")
     _room(axes, 10.0)
-    finish(axes, "Speed", "rpm", "time, s")
+    finish(axes, "Speed", "rpm")
 
 
 def _voltage(axes: Axes, run: Recording) -> None:
@@ -86,7 +87,39 @@ def _voltage(axes: Axes, run: Recording) -> None:
     axes.plot(now, run["ud_V"], color=SECOND, label="u_d")
     axes.plot(now, run["uq_V"], color=TRUTH, label="u_q")
     axes.plot(now, run["vdc_V"] / 3**0.5, color=COMMAND, ls="--", lw=0.8, label="V_dc/√3")
-    finish(axes, "Voltages acting, as the controller has them", "V (peak)", "time, s")
+    finish(axes, "Voltages acting, as the controller has them", "V (peak)")
+
+
+def _scales(axes: Axes, run: Recording) -> None:
+    """What the tables and the iron loss are multiplied with."""
+    now = run["time_s"]
+    for name, label, colour in (("lq_scale", "ψ_q", TRUTH), ("ld_scale", "ψ_d − ψ_f", ESTIMATE),
+                                ("iron_scale", "iron loss", SECOND)):  # fmt: skip
+        axes.plot(now, run[name], color=colour, label=label)
+    _room(axes, 0.02)
+    finish(axes, "Identified scales of the motor data", "1")
+
+
+def _trust(axes: Axes, run: Recording) -> None:
+    now = run["time_s"]
+    axes.plot(now, run["torque_confidence"], color=TRUTH, label="confidence: the torque loop's share of its authority")
+    axes.plot(now, run["contradiction"], color=ESTIMATE, label="contradiction: what no parameter explains")
+    axes.set_ylim(-0.05, 1.05)
+    finish(axes, "Trust", "1")
+
+
+def _residues(axes: Axes, run: Recording) -> None:
+    now = run["time_s"]
+    axes.plot(now, run["drop_V"], color=TRUTH, label="dead time and device drop left over, V")
+    axes.plot(now, np.degrees(run["angle_error_rad"]), color=ESTIMATE, label="angle, measured less true, ° electrical")
+    _room(axes, 0.5)
+    finish(axes, "Identified errors of inverter and angle", "V, °")
+
+
+def _local(axes: Axes, run: Recording) -> None:
+    axes.plot(run["time_s"], 1e3 * run["local_flux_Vs"], color=TRUTH, label="what parameters leave unexplained here")
+    _room(axes, 0.5)
+    finish(axes, "Local flux error", "mV·s")
 
 
 def _room(axes: Axes, span: float) -> None:
@@ -98,13 +131,16 @@ def _room(axes: Axes, span: float) -> None:
 
 
 def figure(run: Recording, title: str) -> Figure:
-    """Torque, currents, flux, resistance, speed, voltages."""
+    """Torque, currents, flux, resistance, speed, voltages; of the firmware what else it learnt."""
+    panels = [torque, _currents, flux, resistance, _speed, _voltage]
+    panels += [_scales, _residues, _local, _trust] if "lq_scale" in run.columns else []
+    rows = len(panels) // 2
     with plt.rc_context(STYLE):
-        sheet, axes = plt.subplots(3, 2, figsize=(11, 8), sharex=True, layout="constrained")
-        for axis, draw in zip(
-            axes.flat, (torque, _currents, flux, resistance, _speed, _voltage), strict=True
-        ):
+        sheet, axes = plt.subplots(rows, 2, figsize=(11, 2.7 * rows), sharex=True, layout="constrained")
+        for axis, draw in zip(axes.flat, panels, strict=True):
             draw(axis, run)
+        for axis in axes[-1]:
+            axis.set_xlabel("time, s")
         sheet.suptitle(title, fontsize=11)
     return sheet
 

@@ -51,6 +51,10 @@ CHANNELS: Final = (
 )
 """What is recorded; a truth column is a mean over its row, the rest the value at its end."""
 
+LEARNT: Final = ("drop_V", "lq_scale", "ld_scale", "angle_error_rad", "iron_scale", "local_flux_Vs",
+                 "torque_confidence", "contradiction", "parameter_clamped")  # fmt: skip
+"""What the firmware's robust identification knows besides; the twin and another mode have no more than defaults."""
+
 
 def column_name(channel: str) -> str:
     """Name of a column: the plant's truth is marked as such."""
@@ -221,11 +225,13 @@ def simulate(
     motor: Motor,
     *,
     where: str = "scenario",
-    channels: Sequence[str] = CHANNELS,
+    channels: Sequence[str] | None = None,
     progress: Callable[[float], Any] | None = None,
 ) -> Recording:
     """Run a scenario. `progress` is told the simulated seconds of every chunk."""
     loop = _start(scenario, motor, where)
+    if channels is None:
+        channels = (*CHANNELS, *LEARNT) if scenario.controller.kind == "firmware" else CHANNELS
     begin = time.perf_counter()
     with loop:
         _check_speed(scenario, motor, loop.period_s, where)
