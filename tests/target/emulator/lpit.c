@@ -42,7 +42,8 @@ static void lines_update(emu_t *emu, const peripheral_t *self)
 static void start(emu_t *emu, const peripheral_t *self, uint32_t channel)
 {
     const uint32_t value = bus_get(emu, self, TVAL0 + STEP * channel);
-    emu_timer(emu, (timer_t_)(TIMER_LPIT0 + channel), emu_instant(emu) + ((uint64_t)value + 1U) * clock_ticks(emu, self));
+    const uint64_t due = emu_instant(emu) + ((uint64_t)value + 1U) * clock_ticks(emu, self);
+    emu_timer(emu, (timer_t_)(TIMER_LPIT0 + channel), due);
 }
 
 static void control_written(emu_t *emu, const peripheral_t *self, uint32_t channel, uint32_t old, uint32_t value)

@@ -181,3 +181,24 @@ def test_a_period_or_dead_time_the_timer_cannot_keep_never_starts_the_pwm(
         assert core.run(FOREVER) == LIMIT, core.error
         assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
         assert core.resets == 0
+
+
+@pytest.mark.parametrize(("register", "value"), [("LPIT0.MIER", 0), ("ADC0.SC11", 1)])
+def test_a_task_or_a_fast_interrupt_that_no_longer_comes_resets_within_20_ms(
+    parts: build.Parts, elf: Path, register: str, value: int
+) -> None:
+    """Without its timer's interrupt the task serves nothing; without the fast ISR it finds nothing that advanced and
+    holds the service back. 12 ms at the slowest oscillator, and up to three tasks until the stall is noticed."""
+    with _core(parts, elf) as core:
+        list(_periods(core, FOREVER))
+        assert core.resets == 0
+        core.set_register(register, value)
+        stopped_s = core.now_s
+        for _ in range(500):
+            if core.run(1e-3) not in (CENTRE, LIMIT) or core.resets == 1:
+                break
+        assert core.error is None
+        assert core.resets == 1
+        assert core.now_s - stopped_s < 0.02
+        assert core.run(FOREVER) == CENTRE, core.error  # it starts again
+        assert core.word("cause") & 0x20  # RCM_SRS.WDOG, what the bus is told
