@@ -57,7 +57,7 @@ static commission_failure_t judge(const commission_config_t *config, const commi
 {
     const int32_t error_d = fx_abs_q31(in->sum_i.d / 10 - state->i_ref.d);
     const int32_t error_q = fx_abs_q31(in->sum_i.q / 10);
-    const int32_t allowed = fx_abs_q31(state->i_ref.d) / 8 + CURRENT_TOLERANCE;
+    const int32_t allowed = (fx_abs_q31(state->i_ref.d) >> 3) + CURRENT_TOLERANCE;
     if (!in->acting) {
         return COMMISSION_STOPPED;
     }
@@ -75,7 +75,7 @@ static commission_failure_t judge(const commission_config_t *config, const commi
 
 static __attribute__((noinline)) int32_t half_mean_q30(int32_t sum)
 {
-    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) / 2;
+    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) >> 1;
 }
 
 /* Half of the first polarity, then minus half of the other: offsets of the sensors cancel (CM-1). */

@@ -151,7 +151,7 @@ static operating_t correct(const identify_config_t *config, const identify_state
     dq_t shift = state->local;
     int32_t value[IDENTIFY_STATES];
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        value[j] = identify_value(config, state, (identify_index_t)j) / 2;
+        value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
         shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h[j]));
         shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h[j]));
     }
