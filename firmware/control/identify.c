@@ -167,7 +167,8 @@ static operating_t correct(const identify_config_t *config, const identify_state
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
     resistance_prior(config, state, in);
-    const identify_model_t model = identify_model(config, in->point, in->tables, state->r_prior);
+    identify_model_t model;
+    identify_model(config, in->point, in->tables, state->r_prior, &model);
     const dq_t e = {fx_sub_q31(model.y.d, identify_filter_shift(&state->filter, &model.d)),
                     fx_sub_q31(model.y.q, identify_filter_shift(&state->filter, &model.q))};
     localise(config, state, in, e);

@@ -65,13 +65,12 @@ static void rows(const identify_config_t *config, const identify_point_t *point,
     per_sigma(config, &m->q);
 }
 
-identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const identify_tables_t *tables, q31_t r_prior)
+void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
+                    q31_t r_prior, identify_model_t *model)
 {
-    identify_model_t m = {.current = false};
-    derivatives(config, tables, point, &m);
-    rows(config, point, r_prior, &m);
-    return m;
+    *model = (identify_model_t){.current = false};
+    derivatives(config, tables, point, model);
+    rows(config, point, r_prior, model);
 }
 
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)
