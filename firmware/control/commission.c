@@ -12,6 +12,12 @@
 /* 2^(-6 + k/2) of the largest current. */
 static const q15_t level[COMMISSION_LEVELS] = {512, 724, 1024, 1448, 2048, 2896, 4096, 5793, 8192, 11585};
 
+/* A call: seven copies would take more room than they save time. */
+static __attribute__((noinline)) int32_t size_of(int32_t x)
+{
+    return fx_abs_q31(x);
+}
+
 static void stop(commission_state_t *state, commission_phase_t phase, commission_failure_t why)
 {
     state->phase = phase;
@@ -41,7 +47,7 @@ static void note_angle(commission_data_t *data, uint32_t theta)
     const ab_t x = inverse_park_q30((dq_t){Q15_MAX, 0}, fx_rotation(theta));
     const int32_t a = x.alpha >> 15;
     const int32_t side = fx_mulhi(x.beta, Q31(0.86602540378443865)) >> 14;
-    int32_t c[3] = {fx_abs_q31(a), fx_abs_q31(side - a / 2), fx_abs_q31(-side - a / 2)};
+    int32_t c[3] = {size_of(a), size_of(side - a / 2), size_of(-side - a / 2)};
     for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
         c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);
@@ -55,13 +61,13 @@ static void note_angle(commission_data_t *data, uint32_t theta)
 static commission_failure_t judge(const commission_config_t *config, const commission_state_t *state,
                                   const commission_in_t *in)
 {
-    const int32_t error_d = fx_abs_q31(in->sum_i.d / 10 - state->i_ref.d);
-    const int32_t error_q = fx_abs_q31(in->sum_i.q / 10);
-    const int32_t allowed = fx_abs_q31(state->i_ref.d) / 8 + CURRENT_TOLERANCE;
+    const int32_t error_d = size_of(in->sum_i.d / 10 - state->i_ref.d);
+    const int32_t error_q = size_of(in->sum_i.q / 10);
+    const int32_t allowed = (size_of(state->i_ref.d) >> 3) + CURRENT_TOLERANCE;
     if (!in->acting) {
         return COMMISSION_STOPPED;
     }
-    if (fx_abs_q31(in->omega) > config->omega_max) {
+    if (size_of(in->omega) > config->omega_max) {
         return COMMISSION_MOVED;
     }
     if (state->phase != COMMISSION_MEASURE) {
@@ -75,7 +81,7 @@ static commission_failure_t judge(const commission_config_t *config, const commi
 
 static __attribute__((noinline)) int32_t half_mean_q30(int32_t sum)
 {
-    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) / 2;
+    return fx_sat_q31(((int64_t)sum * PER_COUNT_Q16) >> 16) >> 1;
 }
 
 /* Half of the first polarity, then minus half of the other: offsets of the sensors cancel (CM-1). */

@@ -37,7 +37,7 @@ static int32_t slope(const commission_data_t *data)
         ii >>= 1;
         iu >>= 1;
     }
-    return (iu > 0 && iu < ii) ? fx_div_q31((int32_t)iu, (int32_t)ii) / 2 : 0;
+    return (iu > 0 && iu < ii) ? fx_div_q31((int32_t)iu, (int32_t)ii) >> 1 : 0;
 }
 
 /* Between the knots a straight line, constant beyond the first and the last of those known. */
@@ -59,12 +59,12 @@ static void unfold(const commission_data_t *data, commission_curve_t *curve, uns
 {
     curve->v[k] = (k > 0U) ? curve->v[k - 1U] : 0;
     for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        int32_t missing = y + y / 2;
+        int32_t missing = y + (y >> 1);
         for (unsigned x = 0; x < 3U; x++) {
             const int32_t share = data->cosine[x] * 32768;
             missing -= mul_q30(share, at(curve, k, mul_q30(share, data->i[k])));
         }
-        curve->v[k] += missing / 2;
+        curve->v[k] += missing >> 1;
     }
 }
 
@@ -79,7 +79,7 @@ static void calm(commission_curve_t *curve)
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
         const int32_t lower = (k >= 2U) ? v[k - 2U] : v[k + 2U];
         const int32_t upper = (k + 2U < COMMISSION_LEVELS) ? v[k + 2U] : v[k - 2U];
-        curve->v[k] = v[k] / 2 + lower / 4 + upper / 4;
+        curve->v[k] = (v[k] >> 1) + (lower >> 2) + (upper >> 2);
     }
 }
 
@@ -108,9 +108,9 @@ int32_t commission_knee(const commission_curve_t *curve)
     /* Level times current; up to the first knot the curve counts as constant. */
     int64_t area = (int64_t)curve->knot[0] * fx_sub_q31(curve->level, curve->v[0]);
     for (unsigned k = 1; k < UPPER; k++) {
-        const int32_t below = fx_sub_q31(curve->level, curve->v[k - 1U] / 2 + curve->v[k] / 2);
+        const int32_t below = fx_sub_q31(curve->level, (curve->v[k - 1U] >> 1) + (curve->v[k] >> 1));
         area += (int64_t)(curve->knot[k] - curve->knot[k - 1U]) * below;
     }
     const int32_t twice = fx_sat_q31(area >> 29); /* Q60 -> Q30, times two */
-    return (twice <= 0) ? 0 : (twice >= curve->level) ? INT32_MAX / 2 : fx_div_q31(twice, curve->level) / 2;
+    return (twice <= 0) ? 0 : (twice >= curve->level) ? INT32_MAX / 2 : fx_div_q31(twice, curve->level) >> 1;
 }

@@ -20,7 +20,8 @@ void current_control_reset(current_control_state_t *state)
 }
 
 /* f = psi* - (1 - b)(l i*) + (r/sigma) i*; lift is psi* less the magnet's share, from (CC-5). */
-static __attribute__((cold)) q15_t weighted(const current_control_config_t *config, int32_t psi, int32_t from, int32_t i_ref)
+static __attribute__((cold)) q15_t weighted(const current_control_config_t *config, int32_t psi, int32_t from,
+                                            int32_t i_ref)
 {
     const q15_t lift = fx_sat_q15(psi - from);
     const int32_t less = lift - fx_mul_q15(config->setpoint_weight, lift);

@@ -151,7 +151,7 @@ static operating_t correct(const identify_config_t *config, const identify_state
     dq_t shift = state->local;
     int32_t value[IDENTIFY_STATES];
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        value[j] = identify_value(config, state, (identify_index_t)j) / 2;
+        value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
         shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h[j]));
         shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h[j]));
     }
@@ -167,7 +167,8 @@ static operating_t correct(const identify_config_t *config, const identify_state
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
     resistance_prior(config, state, in);
-    const identify_model_t model = identify_model(config, in->point, in->tables, state->r_prior);
+    identify_model_t model;
+    identify_model(config, in->point, in->tables, state->r_prior, &model);
     const dq_t e = {fx_sub_q31(model.y.d, identify_filter_shift(&state->filter, &model.d)),
                     fx_sub_q31(model.y.q, identify_filter_shift(&state->filter, &model.q))};
     localise(config, state, in, e);

@@ -22,7 +22,7 @@ static void derivatives(const identify_config_t *config, const identify_tables_t
 {
     const flux_point_t *flux = &tables->flux;
     const flux_inductances_t *l = &tables->inductances;
-    const int32_t a = point->iron / 2; /* Q30 */
+    const int32_t a = point->iron >> 1; /* Q30 */
     m->psi = (dq_t){flux->psi_d * 32768, flux->psi_q * 32768};
     m->i_m = (dq_t){point->i_m.d * 32768, point->i_m.q * 32768};
     m->iron_i = (dq_t){identify_mul(a, m->psi.q), -identify_mul(a, m->psi.d)};
@@ -44,7 +44,7 @@ static void per_sigma(const identify_config_t *config, identify_row_t *row)
 
 static void rows(const identify_config_t *config, const identify_point_t *point, q31_t r_prior, identify_model_t *m)
 {
-    const int32_t w = point->omega / 2; /* Q30 */
+    const int32_t w = point->omega >> 1; /* Q30 */
     const dq_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
     const q15_t magnitude = fx_magnitude((q15_t)i.d, (q15_t)i.q);
     const q15_t length = (q15_t)fx_max_s32(magnitude, config->i_smooth);
@@ -56,22 +56,21 @@ static void rows(const identify_config_t *config, const identify_point_t *point,
     const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m->psi.d)), point->rate.q);
     m->y = (dq_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
     m->current = magnitude >= config->i_min;
-    m->d.h[IDENTIFY_R] = point->i.d / 2;
+    m->d.h[IDENTIFY_R] = point->i.d >> 1;
     m->d.h[IDENTIFY_DROP] = direction(i.d, length);
-    m->q.h[IDENTIFY_R] = point->i.q / 2;
+    m->q.h[IDENTIFY_R] = point->i.q >> 1;
     m->q.h[IDENTIFY_DROP] = direction(i.q, length);
     m->q.h[IDENTIFY_FLUX] = w;
     per_sigma(config, &m->d);
     per_sigma(config, &m->q);
 }
 
-identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const identify_tables_t *tables, q31_t r_prior)
+void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
+                    q31_t r_prior, identify_model_t *model)
 {
-    identify_model_t m = {.current = false};
-    derivatives(config, tables, point, &m);
-    rows(config, point, r_prior, &m);
-    return m;
+    *model = (identify_model_t){.current = false};
+    derivatives(config, tables, point, model);
+    rows(config, point, r_prior, model);
 }
 
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)

@@ -33,8 +33,8 @@ typedef struct {
     identify_row_t psi_d, psi_q; /* change of psi with each state, but for the magnet's flux, with which it is one */
 } identify_model_t;
 
-identify_model_t identify_model(const identify_config_t *config, const identify_point_t *point,
-                                const identify_tables_t *tables, q31_t r_prior);
+void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
+                    q31_t r_prior, identify_model_t *model);
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
 
 #endif

@@ -20,7 +20,7 @@ static q31_t trapezoid(int32_t sum, int32_t first, int32_t last)
 static int32_t acting_voltage(int32_t sum, int32_t first, int32_t last, q31_t sinc)
 {
     const q31_t u = mean(2 * (sum - last + first));
-    return fx_mulhi_add(u / 2, u, sinc);
+    return fx_mulhi_add(u >> 1, u, sinc);
 }
 
 /* d psi/dt over the window, Q30; (ID-3) takes it with w T_s/2 cot(w T_s/2). */
@@ -29,7 +29,7 @@ static __attribute__((noinline)) int32_t flux_rate(const identify_config_t *conf
 {
     /* Q15 * Q28 = Q43, limited to 1 pu. */
     const q31_t rate = fx_sat_q31(((int64_t)(last - first) * config->rate_gain_q28) >> 12);
-    return fx_mulhi_sub(rate / 2, rate, 2 * sinc);
+    return fx_mulhi_sub(rate >> 1, rate, 2 * sinc);
 }
 
 /* The tracked speed lags in acceleration: only the whole turns are taken from it (ID-2). */

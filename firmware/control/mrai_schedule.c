@@ -8,10 +8,11 @@
 /* Of the drift that means quality 0, which is that of an error of 5 %: the flux is within 1 %. */
 #define PSI_SETTLED Q15(0.2)
 
-/* 2 k_psi/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's edge. */
+/* 2 k_psi/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's
+ * edge. The gate keeps w from zero, and k_psi is not negative. */
 static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 {
-    return fx_shl_q31(fx_div_s32(config->flux_gain, omega), 12U);
+    return fx_shl_q31(config->flux_gain / omega, 12U);
 }
 
 /* 2 k_r/(omega_b n), n = 4 i_d^2 + i_q^2, in Q26 (MR-10): a 256th in Q31 over Q28 is a 32nd in Q31. */

@@ -7,7 +7,7 @@
 /* Q15 * Q15 = Q30 -> Q31: the integrator keeps every bit of its step. */
 static q31_t product_q31(q15_t a, q15_t b)
 {
-    return fx_shl_q31(fx_mul_q30(a, b), 1);
+    return fx_add2_q31(0, fx_mul_q30(a, b));
 }
 
 /* T_m follows T* as the closed current loop will: only what is left is the tables' error (TL-4). The estimate is the

@@ -1,14 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fx/div.h"
 
-int32_t fx_div_s32(int32_t num, int32_t den)
-{
-    if (den == 0) {
-        return (num == 0) ? 0 : ((num >> 31) ^ INT32_MAX);
-    }
-    return (den == -1) ? fx_neg_q31(num) : (num / den);
-}
-
 /* 2^30 and half a denominator leave room in 32 bits. */
 q15_t fx_div_q15(q15_t num, q15_t den)
 {

@@ -14,7 +14,13 @@
 #include "fx/q.h"
 
 /* C's quotient; INT32_MIN / -1 saturates. */
-int32_t fx_div_s32(int32_t num, int32_t den);
+static inline int32_t fx_div_s32(int32_t num, int32_t den)
+{
+    if (den == 0) {
+        return (num == 0) ? 0 : ((num >> 31) ^ INT32_MAX);
+    }
+    return (den == -1) ? fx_neg_q31(num) : (num / den);
+}
 
 /* (num * 2^15) / den. */
 q15_t fx_div_q15(q15_t num, q15_t den);

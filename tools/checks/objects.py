@@ -19,7 +19,10 @@ from tree import Violation, report
 LAYERS = ("fx", "signal", "control", "safety")
 # Divide instructions a file may contain: bounded, tested and counted, so that none creeps in.
 DIVISIONS = {
-    "div.c": 3,  # all at 1 kHz
+    "div.c": 2,  # all at 1 kHz
+    "current_reference.c": 1,
+    "identify.c": 1,
+    "mrai_schedule.c": 1,
     "modulate.c": 5,  # reciprocal of the measured dc voltage, and what must be shortened
     "current_control.c": 1,  # only beyond the voltage circle, while d asks for more flux
     "commission.c": 2,  # 1 kHz: means over ten periods

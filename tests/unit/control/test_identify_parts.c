@@ -120,7 +120,8 @@ void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
         const window_pair_t pair = steady_window(&f, i, omega, (dq_t){random_in(&seed, -300, 300), 100});
         const identify_point_t a = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
         const identify_tables_t tables = tables_at(&f, a.i_m);
-        const identify_model_t m = identify_model(&c, &a, &tables, c.r0);
+        identify_model_t m;
+        identify_model(&c, &a, &tables, c.r0, &m);
         const identify_row_t row = identify_torque_row(&c, &m);
         const twin_model_t b = twin_model(&f.si, &(twin_point_t){
             {from_q31(a.i.d) * f.i, from_q31(a.i.q) * f.i}, {from_q31(a.u.d) * 2.0 * f.v, from_q31(a.u.q) * 2.0 * f.v},

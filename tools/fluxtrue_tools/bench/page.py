@@ -9,6 +9,7 @@ from string import Template
 from typing import Any
 
 from fluxtrue_tools.bench import cycles
+from fluxtrue_tools.bench.build import SMALL
 from fluxtrue_tools.bench.drive import TITLES
 from fluxtrue_tools.bench.peers import LOOPS
 from fluxtrue_tools.bench.sizes import STATE
@@ -160,7 +161,7 @@ def page(figures: Figures) -> str:
         compiler=figures["compiler"], pipeline=cycles.PIPELINE, divide=cycles.DIVIDE, entry=cycles.ENTRY,
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
-        tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
+        small=" ".join(SMALL), tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
         stack_sum=_stack_sum(figures), torque_share=_torque_share(kernels["stages"]),
         **{"return": cycles.RETURN},
     )  # fmt: skip
