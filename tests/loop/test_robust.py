@@ -100,6 +100,26 @@ def test_cold_the_answer_is_the_tables(hsm1: Motor) -> None:
         assert rows[:, CORRECTION].max() == 0.0
 
 
+@pytest.mark.parametrize("plant", [SOFT, STIFF], ids=["soft", "stiff"])
+@pytest.mark.parametrize("rpm", [1500, 2500, 4000])
+def test_even_a_first_start_at_one_point_is_no_worse_than_the_tables_from_1500_rpm_on(
+    hsm1: Motor, plant: dict[str, float], rpm: float
+) -> None:
+    # Below, the two equations of one point do not tell inverter and magnet apart: docs/howto/tuning.md.
+    errors = []
+    for on in (0.0, 1.0):
+        drive = Drive(hsm1, plant)
+        with drive.loop:
+            drive.loop.set("identification", on)
+            drive.loop.set("torque_loop", on)
+            drive.to(rpm, 20, 1.0)
+            drive.to(rpm, 20, 20.0 * on + 0.5)
+            errors.append(100.0 * (drive.to(rpm, 20, 0.5)[:, TORQUE].mean() / 20.0 - 1.0))
+    tables, learnt = errors
+    print(f"{tables:+.1f} % tables, {learnt:+.1f} % learnt")
+    assert abs(learnt) <= abs(tables) + 0.5
+
+
 def test_a_resolver_that_slips_takes_the_confidence_away(driven: Drive) -> None:
     rows = driven.to(2000, 30, 1.0)
     assert rows[-1, CONFIDENCE] == 1.0
