@@ -12,28 +12,25 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
-CASES = 2
-
-
-def campaign(name: str, out: Path) -> pd.DataFrame:
-    file = Path(__file__).with_name(f"{name}.toml")
-    command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES), "--out", str(out),
-               "--no-check"]  # fmt: skip
-    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
-    result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-    assert result.returncode == 0, result.stderr
-    return pd.read_parquet(out / "results.parquet")
+CASES = 4
 
 
 @pytest.mark.parametrize("name", ["saturated", "linear"])
-def test_another_machine_needs_nothing_but_its_folder(tmp_path: Path, name: str) -> None:
-    table = campaign(name, tmp_path)
+def test_another_machine_needs_nothing_but_its_folder_to_meet_the_bounds(tmp_path: Path, name: str) -> None:
+    """The file's own 100 cases with: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
+    file = Path(__file__).with_name(f"{name}.toml")
+    command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES), "--out",
+               str(tmp_path)]  # fmt: skip
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+    result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert result.returncode in (0, 1), result.stderr
+    assert result.returncode == 0, result.stdout
+    table = pd.read_parquet(tmp_path / "results.parquet")
     assert table["case"].nunique() == CASES
-    assert table["finite"].all()
     tables = table[table["controller"] == "tables"]
     assert (tables["run_fault_word"] == 0).all()
-    # Below the voltage limit nothing is wrong by more than magnet and inductances together: 25 and 10 %.
-    assert tables[tables["voltage_limited"] == 0.0]["error_percent"].abs().max() < 35.0
+    # What there was to repair: a magnet up to 20 % weak, inductances 10 % off.
+    assert (tables["error_percent"] ** 2).mean() ** 0.5 > 3.0
 
 
 @pytest.mark.parametrize("name", ["saturated", "linear"])
