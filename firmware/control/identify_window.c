@@ -9,6 +9,11 @@ static void add(dq_t *sum, dq_t x)
     sum->q = s.q + x.q;
 }
 
+static identify_pair_t half(int32_t d, int32_t q)
+{
+    return (identify_pair_t){fx_sat_q15(d), fx_sat_q15(q)};
+}
+
 bool identify_window_step(identify_window_t *window, const identify_sample_t *in)
 {
     add(&window->sum_i, in->i);
@@ -18,7 +23,12 @@ bool identify_window_step(identify_window_t *window, const identify_sample_t *in
     if (__builtin_expect(count < IDENTIFY_PERIODS, 1)) {
         return false;
     }
-    window->last = (identify_end_t){in->i, in->u, {in->flux->psi_d, in->flux->psi_q}, in->theta};
+    window->last = (identify_end_t){
+        .i = half(in->i.d, in->i.q),
+        .u = half(in->u.d, in->u.q),
+        .psi = half(in->flux->psi_d, in->flux->psi_q),
+        .theta = in->theta,
+    };
     return true;
 }
 

@@ -5,7 +5,7 @@
  *   sum_i over samples 1 ... 10, sum_u over the voltages stated with them, and both ends of the ten periods
  * Source   docs/theory/identification.md (ID-1)
  * Units    q15 counts in words; angles 2^32 = one turn
- * Range    any: |sum| <= 10 * 2^15
+ * Range    any: |sum| <= 10 * 2^15; the ends saturate
  * Rounding none: exact
  * Errors   acting is false if the bridge was not ours in one of the periods
  * Context  fast ISR; no multiplication, no division, no loop */
@@ -17,8 +17,13 @@
 
 #define IDENTIFY_PERIODS 10
 
+/* Halfwords: kept for ten periods, in three windows. */
 typedef struct {
-    dq_t i, u, psi; /* u acts during the period that starts here */
+    q15_t d, q;
+} identify_pair_t;
+
+typedef struct {
+    identify_pair_t i, u, psi; /* u acts during the period that starts here */
     uint32_t theta;
 } identify_end_t;
 

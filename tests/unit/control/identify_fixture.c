@@ -81,7 +81,8 @@ window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t ex
                               {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
                               {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi}, theta};
         if (k == 0) {
-            pair.fixed.last = (identify_end_t){s.i, s.u, {flux.psi_d, flux.psi_q}, s.theta};
+            pair.fixed.last = (identify_end_t){{(q15_t)s.i.d, (q15_t)s.i.q}, {(q15_t)s.u.d, (q15_t)s.u.q},
+                                               {(q15_t)flux.psi_d, (q15_t)flux.psi_q}, s.theta};
             identify_window_restart(&pair.fixed);
             pair.twin.last = t;
         } else {
