@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LOADABLE = 1, SYMBOLS = 2, NO_BITS = 8, FUNCTION = 2, ARM = 40, PROGRAM_SIZE = 32, SECTION_SIZE = 40, SYMBOL_SIZE = 16 };
+enum { LOADABLE = 1, SYMBOLS = 2, NO_BITS = 8, FUNCTION = 2, ARM = 40 };
+enum { PROGRAM_SIZE = 32, SECTION_SIZE = 40, SYMBOL_SIZE = 16 };
 
 static uint32_t word(const elf_t *elf, size_t at)
 {

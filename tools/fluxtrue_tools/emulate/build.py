@@ -50,10 +50,11 @@ def _check_who_commands(elf: Path, flashed: bool) -> None:
     try:
         with elf.open("rb") as file:
             symbols = ELFFile(file).get_section_by_name(".symtab")
-            direct = symbols is not None and bool(symbols.get_symbol_by_name("commanded_directly"))
+            ours = symbols is not None and bool(symbols.get_symbol_by_name("ecu"))
+            direct = ours and bool(symbols.get_symbol_by_name("commanded_directly"))
     except (ELFError, OSError):
         return  # what is wrong with it is said when it is loaded
-    if symbols is not None and direct == flashed:
+    if ours and direct == flashed:
         raise FluxtrueError(
             f"--elf {elf}: takes no commands from the bus, allowed with --serve: the image that is flashed (s32k144)"
             if direct
