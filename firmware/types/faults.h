@@ -21,7 +21,7 @@ enum {
     FAULT_ANGLE_OFFSET = 1u << 12,  /* the back-EMF does not point where the angle says */
     FAULT_TORQUE = 1u << 13,        /* the independent torque is not the commanded one */
     FAULT_TEMPERATURE = 1u << 14,
-    FAULT_GATE = 1u << 15           /* told by the port: the gate driver has reported one, the hardware opened the gates */
+    FAULT_GATE = 1u << 15           /* told by the port: of the gate driver; the hardware has opened the gates */
 };
 
 #endif

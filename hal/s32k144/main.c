@@ -20,6 +20,10 @@
 #define STACK_RESERVE 256U /* bytes that must never have been touched */
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
 
+#if DIRECT
+__asm__(".global commanded_directly\n.set commanded_directly, 1"); /* for tools; takes no memory */
+#endif
+
 ecu_t ecu; /* calibration tools find it by this name */
 static const pwm_config_t stopped = {11200, 1120}; /* for a counter that never runs, and the 1 kHz of the task */
 /* For the fast ISR, which alone raises faults, as one word: what the gate driver and the background have seen. */

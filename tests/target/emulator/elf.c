@@ -6,7 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LOADABLE = 1, SYMBOLS = 2, FUNCTION = 2, ARM = 40, PROGRAM_SIZE = 32, SECTION_SIZE = 40, SYMBOL_SIZE = 16 };
+enum { LOADABLE = 1, SYMBOLS = 2, NO_BITS = 8, FUNCTION = 2, ARM = 40 };
+enum { PROGRAM_SIZE = 32, SECTION_SIZE = 40, SYMBOL_SIZE = 16 };
 
 static uint32_t word(const elf_t *elf, size_t at)
 {
@@ -22,6 +23,28 @@ static uint32_t half(const elf_t *elf, size_t at)
     return word(elf, at) & 0xFFFFU;
 }
 
+static bool inside(const elf_t *elf, size_t at, size_t size)
+{
+    return at <= elf->size && size <= elf->size - at;
+}
+
+/* Everything that the tables speak of lies in the file. */
+static bool complete(const elf_t *elf)
+{
+    const uint32_t programs = half(elf, 44), sections = half(elf, 48);
+    bool good = inside(elf, word(elf, 28), (size_t)programs * PROGRAM_SIZE) &&
+                inside(elf, word(elf, 32), (size_t)sections * SECTION_SIZE);
+    for (uint32_t i = 0; good && i < programs; i++) {
+        const size_t at = word(elf, 28) + (size_t)i * PROGRAM_SIZE;
+        good = inside(elf, word(elf, at + 4), word(elf, at + 16));
+    }
+    for (uint32_t i = 0; good && i < sections; i++) {
+        const size_t at = word(elf, 32) + (size_t)i * SECTION_SIZE;
+        good = word(elf, at + 4) == NO_BITS || inside(elf, word(elf, at + 16), word(elf, at + 20));
+    }
+    return good;
+}
+
 const char *elf_read(elf_t *elf, const char *path)
 {
     FILE *file = fopen(path, "rb");
@@ -32,7 +55,7 @@ const char *elf_read(elf_t *elf, const char *path)
     const long size = ftell(file);
     rewind(file);
     elf->size = size > 0 ? (size_t)size : 0U;
-    elf->image = malloc(elf->size + 4U);
+    elf->image = calloc(1, elf->size + 4U); /* text at the end is ended */
     const bool whole = elf->image != NULL && fread(elf->image, 1, elf->size, file) == elf->size;
     (void)fclose(file);
     if (!whole) {
@@ -41,7 +64,7 @@ const char *elf_read(elf_t *elf, const char *path)
     if (elf->size < 52 || memcmp(elf->image, "\177ELF\001\001", 6) != 0 || half(elf, 18) != ARM) {
         return "is not a 32-bit little-endian ELF file for Arm";
     }
-    return NULL;
+    return complete(elf) ? NULL : "is cut short or damaged: parts of it lie beyond the end of the file";
 }
 
 void elf_free(elf_t *elf)

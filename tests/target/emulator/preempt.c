@@ -188,15 +188,15 @@ static bool same_victim(const preempt_t *p, const drive_t *a, const drive_t *b)
     }
     slow_state_t x = a->slow, y = b->slow;
     x.finished = y.finished = 0;
-    return memcmp(&x, &y, sizeof x) == 0 && memcmp(&a->windows, &b->windows, sizeof a->windows) == 0;
+    return memcmp(&x, &y, sizeof x) == 0;
 }
 
 static bool same_interrupts(const preempt_t *p, const drive_t *a, const drive_t *b)
 {
     const bool fast = memcmp(&a->fast, &b->fast, sizeof a->fast) == 0 &&
-                      memcmp(&a->samples, &b->samples, sizeof a->samples) == 0;
-    return fast && (p->victim == PREEMPT_MRAI || (memcmp(&a->slow, &b->slow, sizeof a->slow) == 0 &&
-                                                  memcmp(&a->windows, &b->windows, sizeof a->windows) == 0));
+                      memcmp(&a->samples, &b->samples, sizeof a->samples) == 0 &&
+                      memcmp(&a->windows, &b->windows, sizeof a->windows) == 0;
+    return fast && (p->victim == PREEMPT_MRAI || memcmp(&a->slow, &b->slow, sizeof a->slow) == 0);
 }
 
 /* False: the victim had finished before so many instructions. */

@@ -11,8 +11,8 @@
  * All else is mixed: a value of which a part is old and a part is new, or two values that belong together and do not.
  * Source   docs/architecture.md, shared data
  * Errors   preempt_run(): a negative number, and why in the report
- * Context  a test, in counting mode, with the image in which nothing but the drive runs in the 1 kHz task; the simulation
- *          is left as it was */
+ * Context  a test, in counting mode, with the image in which nothing but the drive runs in the 1 kHz task; the
+ *          simulation is left as it was */
 #include "emu.h"
 #include "loop/runner/sim.h"
 

@@ -59,9 +59,9 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
 }
 
-/* The task looks at everything as it begins, a quarter period away from the next interrupt, and so is computed as a whole
- * then; what it writes reaches the shadow as the image writes it: at its end, or, when it is interrupted, byte by byte
- * as far as the image's memory already has the new values. */
+/* The task looks at everything as it begins, far from the next interrupt, and so is computed as a whole then; what it
+ * writes reaches the shadow as the image writes it: at its end, or, when it is interrupted, byte by byte as far as the
+ * image's memory already has the new values. */
 static void task_begins(emulated_t *e)
 {
     const drive_t before = e->shadow->drive;

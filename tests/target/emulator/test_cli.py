@@ -3,12 +3,14 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
 from fluxtrue_tools.sim.library import Loop
 
@@ -58,17 +60,37 @@ def test_the_same_run_gives_the_same_bits_and_instructions(parts: Parts) -> None
         (RUN.replace("hsm1", "paper"), ("--elf", "IMAGE"), "the image was built for another motor"),
         (RUN, ("--elf", "/nowhere/x.elf"), "--elf /nowhere/x.elf: no such file"),
         (RUN, ("--elf", "SCENARIO"), "is not a 32-bit little-endian ELF file for Arm"),
+        (RUN, ("--elf", sys.executable), "is not a 32-bit little-endian ELF file for Arm"),
+        (RUN, ("--elf", "CUT"), "is cut short or damaged"),
+        (RUN, ("--elf", "FLASHED"), "takes its commands from the bus, allowed without --serve"),
+        (RUN, ("--serve", "--elf", "IMAGE"), "takes no commands from the bus, allowed with --serve"),
+        ("motor = [", (), "not TOML"),
     ],
 )
 def test_bad_input_is_one_clear_message(
     parts: Parts, scenario: Path, text: str, options: tuple[str, ...], message: str
 ) -> None:
     scenario.write_text(text)
-    named = {"IMAGE": str(parts.image), "SCENARIO": str(scenario)}
+    cut = scenario.with_name("cut.elf")
+    cut.write_bytes(parts.image.read_bytes()[:60000])
+    flashed = build.prepare("hsm1", flashed=True) if "FLASHED" in options else parts
+    named = {"IMAGE": str(parts.image), "SCENARIO": str(scenario), "CUT": str(cut), "FLASHED": str(flashed.image)}
     done = emulate("--scenario", scenario, *(named.get(option, option) for option in options))
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("taken", ["--port", "--bench-port"])
+def test_a_port_that_is_taken_is_named(parts: Parts, taken: str) -> None:
+    free = {"--port": "--bench-port", "--bench-port": "--port"}[taken]
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        done = emulate("--serve", taken, port, free, 0)
+    assert done.returncode == 2
+    assert done.stderr == f"error: port {port} on 127.0.0.1: Address already in use\n"
 
 
 @pytest.mark.skipif("FLUXTRUE_REALTIME" not in os.environ, reason="measures this machine: FLUXTRUE_REALTIME=1")

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from elftools.common.exceptions import ELFError
+from elftools.elf.elffile import ELFFile
+
 from fluxtrue_tools.emulate import library
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import build as sim_build
@@ -42,6 +45,23 @@ class Parts:
         return library.emulated(self.motor, self.image, self.layout, mode)
 
 
+def _check_who_commands(elf: Path, flashed: bool) -> None:
+    """Without the bus the flashed image would stand still, and the other one never answers on it."""
+    try:
+        with elf.open("rb") as file:
+            symbols = ELFFile(file).get_section_by_name(".symtab")
+            ours = symbols is not None and bool(symbols.get_symbol_by_name("ecu"))
+            direct = ours and bool(symbols.get_symbol_by_name("commanded_directly"))
+    except (ELFError, OSError):
+        return  # what is wrong with it is said when it is loaded
+    if ours and direct == flashed:
+        raise FluxtrueError(
+            f"--elf {elf}: takes no commands from the bus, allowed with --serve: the image that is flashed (s32k144)"
+            if direct
+            else f"--elf {elf}: takes its commands from the bus, allowed without --serve: an image s32k144-direct"
+        )
+
+
 def prepare(
     motor: str,
     elf: Path | None = None,
@@ -70,4 +90,6 @@ def prepare(
         elf = image(preset, ROOT / "build" / "emulated" / preset)
     elif not elf.is_file():
         raise FluxtrueError(f"--elf {elf}: no such file")
+    else:
+        _check_who_commands(elf, flashed)
     return Parts(built, elf.resolve(), host / "emulator" / "layout.bin")
