@@ -56,6 +56,7 @@ typedef struct {
     safe_t safe;
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
+    uint32_t to_32_bytes;  /* a power of two is quicker to find */
 } command_t;
 
 typedef struct {

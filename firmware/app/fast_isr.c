@@ -75,7 +75,7 @@ static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
 {
     fast_state_t *fast = &drive->fast;
     sample_box_publish(&drive->samples, next);
-    if (drive->request.identification_mode != IDENTIFICATION_ROBUST) {
+    if (__builtin_expect(drive->request.identification_mode != IDENTIFICATION_ROBUST, 0)) {
         identify_window_spoil(&fast->window); /* it would have a gap */
         fast->pended++;
         hal_irq_pend_mrai();
@@ -119,8 +119,8 @@ static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 
 /* Circle or hexagon: what the bridge makes, and the voltage to come, may not be what is wanted. By registers, two of
  * the duties in one: what goes through memory would be kept there in every period. */
-static __attribute__((noinline)) uint64_t bridge_limited(drive_t *drive, sample_t *sample, fx_pair_t u, fx_pair_t i,
-                                                         fx_pair_t advanced, bool limited)
+static __attribute__((noinline, flatten)) uint64_t bridge_limited(drive_t *drive, sample_t *sample, fx_pair_t u,
+                                                                  fx_pair_t i, fx_pair_t advanced, bool limited)
 {
     const dq_t wanted = {(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)};
     const modulate_in_t in = {wanted, i, advanced, sample->v_dc};

@@ -145,5 +145,5 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     }
     const fx_pair_t left = cut(config, state, d.u, q.u, in->v_dc, d.error, omega < 0);
     const dq_t is = {(int16_t)(left & 0xFFFFU), (int16_t)(left >> 16)};
-    return (current_control_out_t){.u = is, .limited = is.d != u.d || is.q != u.q};
+    return (current_control_out_t){.u = is, .limited = left != both};
 }

@@ -50,16 +50,30 @@ static phases_t shorten(ab_t v, uint32_t span)
 }
 
 /* Pulses and gaps shorter than the bridge can make snap to the nearer of nothing and the shortest (MO-8). */
-static uint32_t realisable(int32_t duty, int32_t min_pulse)
+static uint32_t snapped(int32_t duty, int32_t min_pulse)
 {
-    if (duty < min_pulse) {
-        return (2 * duty < min_pulse) ? 0U : (uint32_t)min_pulse;
+    const bool upper = duty > DUTY_HALF;
+    const int32_t pulse = upper ? DUTY_ONE - duty : duty;
+    const int32_t made = (2 * pulse < min_pulse) ? 0 : min_pulse;
+    return (uint32_t)(upper ? DUTY_ONE - made : made);
+}
+
+/* One comparison for a duty that stays; one that does not leaves a bit in *changed. */
+static uint32_t realisable(int32_t duty, int32_t min_pulse, uint32_t *changed)
+{
+    if (__builtin_expect((uint32_t)(duty - min_pulse) <= (uint32_t)(DUTY_ONE - 2 * min_pulse), 1)) {
+        return (uint32_t)duty;
     }
-    if (duty > DUTY_ONE - min_pulse) {
-        const int32_t gap = DUTY_ONE - duty;
-        return (uint32_t)((2 * gap < min_pulse) ? DUTY_ONE : DUTY_ONE - min_pulse);
-    }
-    return (uint32_t)duty;
+    const uint32_t made = snapped(duty, min_pulse);
+    *changed |= made ^ (uint32_t)duty;
+    return made;
+}
+
+static duty_t all_realisable(const modulate_config_t *config, phases_t want, uint32_t *changed)
+{
+    const int32_t min_pulse = config->min_pulse;
+    return (duty_t){realisable(want.a, min_pulse, changed), realisable(want.b, min_pulse, changed),
+                    realisable(want.c, min_pulse, changed)};
 }
 
 /* Near the hexagon or beyond it: the vector is shortened, pulses snap. */
@@ -72,11 +86,9 @@ static modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t 
     if (span > SPAN_MAX_Q30) {
         x = shorten(v, span);
     }
-    const phases_t want = centred(x, sign, config->dead_time);
-    const duty_t duty = {realisable(want.a, config->min_pulse), realisable(want.b, config->min_pulse),
-                         realisable(want.c, config->min_pulse)};
-    const bool snapped = duty.a != (uint32_t)want.a || duty.b != (uint32_t)want.b || duty.c != (uint32_t)want.c;
-    return (modulate_out_t){duty, snapped || span > SPAN_MAX_Q30};
+    uint32_t changed = (span > SPAN_MAX_Q30) ? 1U : 0U;
+    const duty_t duty = all_realisable(config, centred(x, sign, config->dead_time), &changed);
+    return (modulate_out_t){duty, changed != 0U};
 }
 
 /* Far beyond the hexagon, or a dc voltage too low to divide by. */
@@ -119,14 +131,6 @@ static duty_t plain(const modulate_config_t *config, phases_t y, phases_t sign)
     return (duty_t){duty_of(y.a, dead_time, sign.a), duty_of(y.b, dead_time, sign.b), duty_of(y.c, dead_time, sign.c)};
 }
 
-/* Whatever the dead time adds, no pulse is too short. */
-static bool within(const modulate_config_t *config, phases_t y)
-{
-    const uint32_t margin = (uint32_t)(config->min_pulse + config->dead_time) << 16;
-    const uint32_t width = 0x80000000U - 2U * margin;
-    return (uint32_t)y.a - margin <= width && (uint32_t)y.b - margin <= width && (uint32_t)y.c - margin <= width;
-}
-
 /* From the middle to a duty, Q31, half an LSB of rounding included. */
 static int32_t off_middle(int32_t y)
 {
@@ -135,23 +139,26 @@ static int32_t off_middle(int32_t y)
 
 /* Some pulse may be too short, or the hexagon too small: then everything is shortened about the middle, from which both
  * ends are equally far (MO-3). */
-static modulate_out_t snap(const modulate_config_t *config, phases_t y, phases_t sign)
+static modulate_out_t cut(const modulate_config_t *config, phases_t y, phases_t sign)
 {
     phases_t x = {off_middle(y.a), off_middle(y.b), off_middle(y.c)};
     const int32_t half = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
-    const bool shortened = half > HALF_MAX_Q31;
-    if (shortened) {
+    const int32_t margin = (config->min_pulse + config->dead_time) * 0x10000;
+    if (half < 0x40000000 - margin) { /* whatever the dead time adds, no pulse is too short */
+        return (modulate_out_t){plain(config, y, sign), false};
+    }
+    uint32_t changed = 0;
+    if (half > HALF_MAX_Q31) {
         const int32_t by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 32768;
         x = (phases_t){2 * fx_mulhi(x.a, by), 2 * fx_mulhi(x.b, by), 2 * fx_mulhi(x.c, by)};
+        changed = 1;
     }
     const int32_t dead_time = 2 * config->dead_time;
-    const int32_t a = DUTY_HALF + ((x.a + dead_time * sign.a) >> 16);
-    const int32_t b = DUTY_HALF + ((x.b + dead_time * sign.b) >> 16);
-    const int32_t c = DUTY_HALF + ((x.c + dead_time * sign.c) >> 16);
-    const duty_t made = {realisable(a, config->min_pulse), realisable(b, config->min_pulse),
-                         realisable(c, config->min_pulse)};
-    const bool snapped = made.a != (uint32_t)a || made.b != (uint32_t)b || made.c != (uint32_t)c;
-    return (modulate_out_t){made, shortened || snapped};
+    const phases_t want = {DUTY_HALF + ((x.a + dead_time * sign.a) >> 16),
+                           DUTY_HALF + ((x.b + dead_time * sign.b) >> 16),
+                           DUTY_HALF + ((x.c + dead_time * sign.c) >> 16)};
+    const duty_t duty = all_realisable(config, want, &changed);
+    return (modulate_out_t){duty, changed != 0U};
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
@@ -161,8 +168,7 @@ modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_
         return far(config, in);
     }
     const phases_t y = centred_q31(normalise(u, in->advanced, in->v_dc));
-    const phases_t sign = polarity(config, in->i, in->advanced);
-    return within(config, y) ? (modulate_out_t){plain(config, y, sign), false} : snap(config, y, sign);
+    return cut(config, y, polarity(config, in->i, in->advanced));
 }
 
 duty_t modulate_clear(const modulate_config_t *config, fx_pair_t u, fx_pair_t i, fx_pair_t advanced, int32_t v_dc)

@@ -9,7 +9,7 @@ static int32_t effective(const modulate_config_t *config, uint32_t duty, int32_t
     return (int32_t)duty - (switches ? fx_mul_q15(config->dead_time, (q15_t)sign) : 0);
 }
 
-__attribute__((noinline)) dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
+dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
 {
     const phases_t sign = polarity(config, in->i, in->advanced);
     const int32_t a = effective(config, duty.a, sign.a);

@@ -201,8 +201,8 @@ STAGE void bench_torque_estimate(void)
 }
 
 /* Apart from the usual case, as in the fast ISR. */
-static __attribute__((noinline)) void modulate_limited(const modulate_config_t *config, fx_pair_t u, fx_pair_t i,
-                                                       fx_pair_t advanced, int32_t v_dc)
+static __attribute__((noinline, flatten)) void modulate_limited(const modulate_config_t *config, fx_pair_t u,
+                                                                fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
 {
     const modulate_in_t in = {{(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)}, i, advanced, v_dc};
     const modulate_out_t made = modulate_step(config, &in);
