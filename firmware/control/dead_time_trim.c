@@ -8,7 +8,7 @@
 #define KNOWN_Q30 (1 << 28) /* a quarter of the prior's variance: half of its deviation */
 #define RANGE 4             /* base +- base/4 */
 
-static int32_t limited(int32_t base, int32_t trim)
+static __attribute__((noinline)) int32_t limited(int32_t base, int32_t trim)
 {
     return fx_clamp_q31(trim, -(base / RANGE), base / RANGE);
 }
@@ -16,15 +16,14 @@ static int32_t limited(int32_t base, int32_t trim)
 /* (DT-1) in LSB of delta. */
 static int32_t missing(const dead_time_trim_in_t *in)
 {
-    const q31_t drop = fx_shl_q31(fx_mulhi(in->sigma, in->x), 5); /* Q31 * Q27 = Q26 */
-    const int32_t q16 = fx_div_s32(fx_mul_q31(drop, Q31(0.78539816339744831)), in->v_dc);
-    return fx_div_s32(q16, 2);
+    const int32_t drop = fx_mulhi(in->sigma, in->x); /* Q31 * Q27 = Q26 */
+    return fx_shl_q31(fx_mulhi(drop, Q31(0.78539816339744831)), 5) / in->v_dc; /* Q30/Q15, v_dc > 0 */
 }
 
 /* (DT-3): delta v_dc = Q30; 4/pi = 2 * 2/pi and Q30 to Q31 are the factor of four. */
 static int32_t shift_of(const dead_time_trim_in_t *in, int32_t moved)
 {
-    const q31_t drop = fx_mul_q31(4 * moved * in->v_dc, Q31(0.63661977236758134));
+    const q31_t drop = 2 * fx_mulhi(4 * moved * in->v_dc, Q31(0.63661977236758134));
     return -(fx_div_q31(drop, in->sigma) / 16); /* Q31 to Q27 */
 }
 
@@ -44,7 +43,7 @@ dead_time_trim_t dead_time_trim_step(dead_time_trim_state_t *state, const dead_t
     const int32_t w = missing(in);
     const int32_t away = (w > 0) ? SLOWNESS - 1 : 1 - SLOWNESS; /* towards w, and never to a halt before it */
     const int32_t before = state->trim;
-    state->trim = limited(state->base, before + fx_div_s32(w + away, SLOWNESS));
+    state->trim = limited(state->base, before + (w + away) / SLOWNESS);
     return (dead_time_trim_t){(q15_t)(state->base + state->trim), shift_of(in, state->trim - before)};
 }
 
