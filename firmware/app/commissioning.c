@@ -74,7 +74,7 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
     m->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
     m->modulate.knee_q17 = compensation->knee_q17;
     drive->task.compensation = *compensation;
-    drive->task.trim = (dead_time_trim_state_t){.base = dead_time};
+    drive->task.trim = (dead_time_trim_state_t){.base = (q15_t)dead_time};
     return true;
 }
 

@@ -17,9 +17,9 @@
 #include "fx/q.h"
 
 typedef struct {
-    int32_t base; /* delta as it was given: motor data, commissioning or calibration */
-    int32_t trim; /* what this stage has added */
-    uint16_t ms;  /* of learning since the last move */
+    q15_t base;  /* delta as it was given: motor data, commissioning or calibration */
+    q15_t trim;  /* what this stage has added */
+    uint16_t ms; /* of learning since the last move */
 } dead_time_trim_state_t;
 
 typedef struct {
