@@ -107,10 +107,10 @@ typedef struct {
     commission_state_t commission;
     commission_curve_t inverter;    /* voltage error against current, as last measured */
     compensation_t compensation;
-    dead_time_trim_state_t trim;    /* what driving has added to it */
     uint32_t commissionings;        /* of the request, as far as seen */
     dq_t i_ref;   /* acts until the next step */
     dq_t psi_ref; /* tables' flux at the last reference */
+    dead_time_trim_state_t trim; /* of the compensation: what driving has added */
     uint16_t derating;    /* DERATING_...: why less than the request is made */
     q15_t torque_command; /* after limit and slew */
     q15_t torque_request; /* after the torque loop */

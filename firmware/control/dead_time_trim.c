@@ -8,9 +8,9 @@
 #define KNOWN_Q30 (1 << 28) /* a quarter of the prior's variance: half of its deviation */
 #define RANGE 4             /* base +- base/4 */
 
-static __attribute__((noinline)) q15_t limited(int32_t base, int32_t trim)
+static __attribute__((noinline)) int32_t limited(int32_t base, int32_t trim)
 {
-    return (q15_t)fx_clamp_q31(trim, -(base / RANGE), base / RANGE);
+    return fx_clamp_q31(trim, -(base / RANGE), base / RANGE);
 }
 
 /* (DT-1) in LSB of delta. */
@@ -43,13 +43,13 @@ dead_time_trim_t dead_time_trim_step(dead_time_trim_state_t *state, const dead_t
     const int32_t w = missing(in);
     const int32_t away = (w > 0) ? SLOWNESS - 1 : 1 - SLOWNESS; /* towards w, and never to a halt before it */
     const int32_t before = state->trim;
-    state->trim = limited(state->base, before + (w + away) / SLOWNESS);
+    state->trim = (q15_t)limited(state->base, before + (w + away) / SLOWNESS);
     return (dead_time_trim_t){(q15_t)(state->base + state->trim), shift_of(in, state->trim - before)};
 }
 
 q15_t dead_time_trim_restore(dead_time_trim_state_t *state, q15_t dead_time, int32_t trim)
 {
     const q15_t base = (dead_time == state->base + state->trim) ? state->base : dead_time;
-    *state = (dead_time_trim_state_t){.base = base, .trim = limited(base, trim)};
+    *state = (dead_time_trim_state_t){.base = base, .trim = (q15_t)limited(base, trim)};
     return (q15_t)(base + state->trim);
 }

@@ -19,7 +19,7 @@
 typedef struct {
     q15_t base;  /* delta as it was given: motor data, commissioning or calibration */
     q15_t trim;  /* what this stage has added */
-    uint16_t ms;  /* of learning since the last move */
+    uint16_t ms; /* of learning since the last move */
 } dead_time_trim_state_t;
 
 typedef struct {
