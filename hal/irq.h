@@ -4,7 +4,7 @@
 /** Pends the identification interrupt, which runs below the fast ISR and above the 1 kHz task.
  * Source   docs/architecture.md, priorities
  * Errors   none; pending an interrupt that is already pending is one interrupt
- * Context  fast ISR, once per period */
+ * Context  fast ISR, once per period while the paper's identification is chosen */
 
 void hal_irq_pend_mrai(void);
 

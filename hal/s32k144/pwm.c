@@ -152,10 +152,12 @@ void hal_pwm_write(duty_t duty)
 {
     const uint32_t period = bridge.period;
     const uint32_t half = (uint32_t)fx_arch_opaque(16384); /* in a register: part of the multiplication */
-    pulse(&FTM0->C0V, &FTM0->C1V, duty.a, period, half);
-    pulse(&FTM0->C2V, &FTM0->C3V, duty.b, period, half);
-    pulse(&FTM0->C4V, &FTM0->C5V, duty.c, period, half);
-    FTM0->SYNC = LOAD;
+    ftm_t *timer = FTM0;
+    __asm__("" : "+r"(timer)); /* the address once: not loaded anew for every pulse */
+    pulse(&timer->C0V, &timer->C1V, duty.a, period, half);
+    pulse(&timer->C2V, &timer->C3V, duty.b, period, half);
+    pulse(&timer->C4V, &timer->C5V, duty.c, period, half);
+    timer->SYNC = LOAD;
 }
 
 void hal_pwm_enable(bool on)

@@ -39,7 +39,6 @@ CONTAINS = {
     "torque_path": "torque estimate and one step of the torque loop; in the drive only every tenth period has one",
     "fast_isr": "the interrupt on a hardware interface of variables",
     "mrai_isr_paper": "MRAI, torque estimate, exchange",
-    "mrai_isr": "sums for the 1 kHz identification, exchange",
     "task": "the drive's 1 kHz task without the bus",
 }
 WHOLE_MOST = 400
