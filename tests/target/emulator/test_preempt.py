@@ -51,6 +51,8 @@ def check(report: preempt.Report) -> None:
 def test_the_identification_sees_the_old_sample_or_the_new_one_wherever_it_is_interrupted(
     loop: Loop, periods: int
 ) -> None:
+    if loop.get("identification_mode") == ROBUST:
+        pytest.skip("the robust identification has no interrupt of its own: the fast ISR sums its windows")
     loop.run(periods)
     check(preempt.interrupt_everywhere(loop, preempt.MRAI))
 
