@@ -16,6 +16,7 @@ enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 typedef struct {
     emulated_t *e;
     int victim, rounds;
+    int last_vector;                      /* of a round: the identification's, if the fast ISR pends it */
     bool catch_entry, catch_exit, catch_return; /* what emu_run() is to stop at */
     fluxtrue_t *host;
     adc_counts_t counts;                  /* of the last sample at the victim's entry */
@@ -36,7 +37,7 @@ static void on_exception(void *user, int vector, bool entered)
     preempt_t *p = user;
     const bool hit = (p->catch_entry && entered && vector == p->victim) ||
                      (p->catch_exit && !entered && vector == p->victim) ||
-                     (p->catch_return && !entered && vector == MRAI_VECTOR &&
+                     (p->catch_return && !entered && vector == p->last_vector &&
                       emu_active_vector(p->e->emu) == p->victim);
     if (hit) {
         emu_break_after(p->e->emu, 0);
@@ -116,9 +117,11 @@ static drive_t interrupts_here(preempt_t *p, const drive_t *drive)
     for (int round = 0; round < p->rounds; round++) {
         p->host->counts = sample_of(p, round);
         fast_isr(&p->host->drive);
-        if (p->victim == PREEMPT_TASK) {
+        if (p->victim == PREEMPT_TASK && p->host->mrai_pending) {
             mrai_isr(&p->host->drive);
         }
+        p->last_vector = p->host->mrai_pending ? MRAI_VECTOR : FAST_VECTOR;
+        p->host->mrai_pending = false;
     }
     return unload(p);
 }

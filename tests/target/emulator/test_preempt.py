@@ -52,7 +52,7 @@ def test_the_identification_sees_the_old_sample_or_the_new_one_wherever_it_is_in
     loop: Loop, periods: int
 ) -> None:
     if loop.get("identification_mode") == ROBUST:
-        pytest.skip("has no interrupt of its own")
+        pytest.skip("the robust identification has no interrupt of its own: the fast ISR sums its windows")
     loop.run(periods)
     check(preempt.interrupt_everywhere(loop, preempt.MRAI))
 
