@@ -6,11 +6,13 @@
  * Source   app/drive.h
  * Context  emulator only */
 
-/* What the outside writes, and what calibration changes. */
+/* What the outside writes, and what calibration changes; the first ones the image writes, too: the request, and the
+ * dead-time compensation that its task trims. */
+#define LAYOUT_TRIMMED 2
 #define LAYOUT_INPUTS(X) \
     X(request)           \
-    X(motor.torque_slew) \
     X(motor.modulate)    \
+    X(motor.torque_slew) \
     X(motor.mrai)        \
     X(motor.torque_loop) \
     X(motor.identify)

@@ -82,6 +82,9 @@ bool mirror_same_motor(mirror_t *mirror)
 void mirror_pull(mirror_t *mirror)
 {
     if (mirror->pulled_at != emu_now(mirror->emu)) {
+        if (!mirror->waiting) {
+            copy_from_image(mirror, 0, LAYOUT_TRIMMED);
+        }
         copy_from_image(mirror, mirror->inputs, mirror->parts);
         mirror->pulled_at = emu_now(mirror->emu);
     }
@@ -90,7 +93,7 @@ void mirror_pull(mirror_t *mirror)
 int mirror_set(mirror_t *mirror, const char *name, double value)
 {
     if (!mirror->waiting) {
-        copy_from_image(mirror, 0, 1); /* the request; nobody but us changes the calibration */
+        copy_from_image(mirror, 0, LAYOUT_TRIMMED); /* nobody but us changes the rest of the calibration */
     }
     const int code = fluxtrue_set(mirror->host, name, value);
     mirror->waiting = mirror->waiting || code == FLUXTRUE_OK;

@@ -77,6 +77,8 @@ static void task_ends(emulated_t *e)
     e->shadow->drive.task = e->task_result.task;
     e->shadow->drive.commands = e->task_result.commands;
     e->shadow->drive.schedules = e->task_result.schedules;
+    e->shadow->drive.motor.modulate = e->task_result.motor.modulate;
+    e->shadow->drive.motor.current_control = e->task_result.motor.current_control;
     e->task_runs = false;
 }
 
@@ -96,6 +98,7 @@ static void task_interrupted(emulated_t *e)
     part_take(e, offsetof(drive_t, task), sizeof e->task_result.task);
     part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
     part_take(e, offsetof(drive_t, schedules), sizeof e->task_result.schedules);
+    part_take(e, offsetof(drive_t, motor.modulate), sizeof e->task_result.motor.modulate);
 }
 
 /* The fast ISR, which nothing interrupts, is followed when it has read its inputs: at its end. */
