@@ -4,19 +4,10 @@
 #include "fx/q.h"
 
 #define DUTY_HALF 16384
-/* One count below the full range, in Q30: the largest distance between two phases. */
-#define SPAN_MAX_Q30 (32766U << 15)
+/* The largest distance of a phase from the middle, one count below the full range in all. */
 #define HALF_MAX_Q31 (32766 << 15)
 /* Half a duty, and half an LSB to round it. */
 #define MIDDLE_Q31 0x40008000U
-
-/* Q15 vector to Q30 phases; they sum to zero exactly, and |x| < 1.4, so that two differ by less than 2^32. */
-static phases_t phases_q30(int32_t alpha, int32_t beta)
-{
-    const int32_t half = alpha * 16384;
-    const int32_t side = beta * Q15(0.86602540378443865);
-    return (phases_t){alpha * DUTY_ONE, side - half, side - half - 2 * side};
-}
 
 /* Stator voltage in units of v_dc. Q17 * Q30 = Q15. */
 static ab_t normalise(fx_pair_t u, fx_pair_t at, int32_t v_dc)
@@ -32,21 +23,6 @@ static int32_t middle(phases_t x)
         return (x.b < x.c) ? x.b : fx_max_s32(x.a, x.c);
     }
     return (x.a < x.c) ? x.a : fx_max_s32(x.b, x.c);
-}
-
-/* Min-max zero sequence: both ends equally far from the rails (MO-4). One rounding for the whole duty. */
-static phases_t centred(phases_t x, phases_t sign, int32_t dead_time)
-{
-    const int32_t shift = DUTY_HALF * DUTY_ONE + 0x4000 + (middle(x) >> 1);
-    return (phases_t){(x.a + shift + dead_time * sign.a) >> 15, (x.b + shift + dead_time * sign.b) >> 15,
-                      (x.c + shift + dead_time * sign.c) >> 15};
-}
-
-/* A vector beyond the hexagon is shortened along its own direction (MO-3). */
-static phases_t shorten(ab_t v, uint32_t span)
-{
-    const q15_t by = fx_sat_q15((int32_t)((SPAN_MAX_Q30 - 1U) / ((span + 0x7FFFU) >> 15)));
-    return phases_q30((v.alpha * by + 0x4000) >> 15, (v.beta * by + 0x4000) >> 15);
 }
 
 /* Pulses and gaps shorter than the bridge can make snap to the nearer of nothing and the shortest (MO-8). */
@@ -76,40 +52,14 @@ static duty_t all_realisable(const modulate_config_t *config, phases_t want, uin
                     realisable(want.c, min_pulse, changed)};
 }
 
-/* Near the hexagon or beyond it: the vector is shortened, pulses snap. */
-static modulate_out_t careful(const modulate_config_t *config, ab_t v, phases_t sign)
-{
-    phases_t x = phases_q30(v.alpha, v.beta);
-    const int32_t hi = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
-    const int32_t lo = fx_min_s32(x.a, fx_min_s32(x.b, x.c));
-    const uint32_t span = (uint32_t)hi - (uint32_t)lo; /* up to 2.8 in Q30: unsigned */
-    if (span > SPAN_MAX_Q30) {
-        x = shorten(v, span);
-    }
-    uint32_t changed = (span > SPAN_MAX_Q30) ? 1U : 0U;
-    const duty_t duty = all_realisable(config, centred(x, sign, config->dead_time), &changed);
-    return (modulate_out_t){duty, changed != 0U};
-}
-
-/* Far beyond the hexagon, or a dc voltage too low to divide by. */
-static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_t *config, const modulate_in_t *in)
-{
-    const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
-    const ab_t v = normalise(fx_arch_pkhbt(in->u.d, in->u.q), in->advanced, v_dc);
-    modulate_out_t out = careful(config, (ab_t){fx_sat_q15_word(v.alpha), fx_sat_q15_word(v.beta)},
-                                 polarity(config, in->i, in->advanced));
-    out.limited = out.limited || v_dc != in->v_dc;
-    return out;
-}
-
 /* |u|^2 < v_dc^2/2, so that the phases fit Q31, and a dc voltage to divide by. */
 static bool fits_q31(const modulate_config_t *config, fx_pair_t u, int32_t v_dc)
 {
     return v_dc >= config->v_dc_min && (uint32_t)fx_dot2(u, u) < (uint32_t)(v_dc * v_dc) >> 1;
 }
 
-/* Duties without dead time, Q31 and half an LSB to round them (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only
- * the sums need to be in range. */
+/* Min-max zero sequence: both ends equally far from the rails. Duties without dead time, Q31 and half an LSB to round them
+ * (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only the sums need to be in range. */
 static phases_t centred_q31(ab_t v)
 {
     const int32_t side = fx_arch_opaque(v.beta * Q16(0.86602540378443865)); /* Q15 * Q16 = Q31 */
@@ -132,33 +82,62 @@ static duty_t plain(const modulate_config_t *config, phases_t y, phases_t sign)
 }
 
 /* From the middle to a duty, Q31, half an LSB of rounding included. */
-static int32_t off_middle(int32_t y)
+static phases_t off_middle(phases_t y)
 {
-    return (int32_t)((uint32_t)y - 0x40000000U);
+    return (phases_t){(int32_t)((uint32_t)y.a - 0x40000000U), (int32_t)((uint32_t)y.b - 0x40000000U),
+                      (int32_t)((uint32_t)y.c - 0x40000000U)};
 }
 
-/* Some pulse may be too short, or the hexagon too small: then everything is shortened about the middle, from which both
- * ends are equally far (MO-3). */
-static modulate_out_t cut(const modulate_config_t *config, phases_t y, phases_t sign)
+static int32_t farthest(phases_t x)
 {
-    phases_t x = {off_middle(y.a), off_middle(y.b), off_middle(y.c)};
-    const int32_t half = fx_max_s32(x.a, fx_max_s32(x.b, x.c));
-    const int32_t margin = (config->min_pulse + config->dead_time) * 0x10000;
-    if (half < 0x40000000 - margin) { /* whatever the dead time adds, no pulse is too short */
-        return (modulate_out_t){plain(config, y, sign), false};
-    }
-    uint32_t changed = 0;
-    if (half > HALF_MAX_Q31) {
-        const int32_t by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 32768;
-        x = (phases_t){2 * fx_mulhi(x.a, by), 2 * fx_mulhi(x.b, by), 2 * fx_mulhi(x.c, by)};
-        changed = 1;
+    return fx_max_s32(x.a, fx_max_s32(x.b, x.c));
+}
+
+static int32_t scaled(int32_t x, int32_t by_q30)
+{
+    return 4 * fx_mulhi(x, by_q30);
+}
+
+/* x times 2^halvings (0 or 1), shortened about the middle if the hexagon is smaller (MO-3), with pulses that the bridge can make. */
+static __attribute__((noinline)) modulate_out_t near_the_hexagon(const modulate_config_t *config, phases_t x,
+                                                                 int32_t halvings, phases_t sign)
+{
+    const int32_t half = farthest(x);
+    const bool beyond = half > (HALF_MAX_Q31 >> halvings);
+    int32_t by = (halvings == 0) ? 1 << 30 : INT32_MAX; /* Q30 */
+    if (beyond) { /* at most 2^halvings */
+        by = (int32_t)((4U * (uint32_t)HALF_MAX_Q31) / (((uint32_t)half + 0x3FFFU) >> 14)) * 16384;
     }
     const int32_t dead_time = 2 * config->dead_time;
-    const phases_t want = {DUTY_HALF + ((x.a + dead_time * sign.a) >> 16),
-                           DUTY_HALF + ((x.b + dead_time * sign.b) >> 16),
-                           DUTY_HALF + ((x.c + dead_time * sign.c) >> 16)};
+    const phases_t want = {DUTY_HALF + ((scaled(x.a, by) + dead_time * sign.a) >> 16),
+                           DUTY_HALF + ((scaled(x.b, by) + dead_time * sign.b) >> 16),
+                           DUTY_HALF + ((scaled(x.c, by) + dead_time * sign.c) >> 16)};
+    uint32_t changed = beyond ? 1U : 0U;
     const duty_t duty = all_realisable(config, want, &changed);
     return (modulate_out_t){duty, changed != 0U};
+}
+
+/* Some pulse may be too short, or the hexagon too small. */
+static modulate_out_t cut(const modulate_config_t *config, phases_t y, phases_t sign)
+{
+    const phases_t x = off_middle(y);
+    const int32_t margin = (config->min_pulse + config->dead_time) * 0x10000;
+    if (farthest(x) < 0x40000000 - margin) { /* whatever the dead time adds, no pulse is too short */
+        return (modulate_out_t){plain(config, y, sign), false};
+    }
+    return near_the_hexagon(config, x, 0, sign);
+}
+
+/* Far beyond the hexagon, or a dc voltage too low to divide by: at half the size the phases fit. */
+static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_t *config, const modulate_in_t *in)
+{
+    const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
+    const ab_t v = normalise(fx_arch_pkhbt(in->u.d, in->u.q), in->advanced, v_dc);
+    const ab_t half = {fx_sat_q15_word(v.alpha) >> 1, fx_sat_q15_word(v.beta) >> 1};
+    modulate_out_t out = near_the_hexagon(config, off_middle(centred_q31(half)), 1,
+                                          polarity(config, in->i, in->advanced));
+    out.limited = out.limited || v_dc != in->v_dc;
+    return out;
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
