@@ -30,7 +30,8 @@ static uint32_t room(const xcp_daq_t *daq)
     return XCP_DAQ_QUEUE - (daq->queued - daq->sent);
 }
 
-/* The areas do not change: what WRITE_DAQ accepted is still readable. */
+/* The areas do not change: what WRITE_DAQ accepted is still readable. A list that runs was complete when it started
+ * and cannot be changed: its bytes fit into the frame. */
 static void sample_frame(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_list_t *list, uint8_t odt)
 {
     const xcp_odt_t *o = &daq->odt[list->first_odt + odt];

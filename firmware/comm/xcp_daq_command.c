@@ -86,6 +86,11 @@ static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
     if (mode > 2) {
         return XCP_ERR_MODE_NOT_VALID;
     }
+    for (uint8_t k = 0; k < daq->lists; k++) { /* one may have changed since it was selected: all start or none */
+        if (mode == 1 && daq->list[k].selected && !list_complete(daq, &daq->list[k])) {
+            return XCP_ERR_DAQ_CONFIG;
+        }
+    }
     for (uint8_t k = 0; k < daq->lists; k++) {
         if (mode == 0 || daq->list[k].selected) {
             run(&daq->list[k], mode == 1);

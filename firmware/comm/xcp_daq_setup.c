@@ -84,6 +84,9 @@ static xcp_result_t write_entry(xcp_daq_t *daq, const xcp_memory_t *memory, cons
     if (!daq->pointer_valid) {
         return XCP_ERR_SEQUENCE;
     }
+    if (daq->list[daq->at_list].running) { /* it may have been started since the pointer was set */
+        return XCP_ERR_DAQ_ACTIVE;
+    }
     if (command[1] != 0xFF || size == 0 || size > XCP_DAQ_PAYLOAD || command[3] != 0) {
         return XCP_ERR_OUT_OF_RANGE;
     }

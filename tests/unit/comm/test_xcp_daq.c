@@ -225,6 +225,50 @@ void test_a_running_list_cannot_be_changed(void)
     EXPECT_ERROR(0x11);
 }
 
+/* A frame that is full, and a pointer from before the start: what WRITE_DAQ added would lie behind the frame. */
+void test_an_entry_cannot_be_written_into_a_list_that_was_started_meanwhile(void)
+{
+    one_list(0, 1, 0);
+    SEND(0xE2, 0, 0, 0, 0, 0);
+    start();
+    SEND(0xE1, 0xFF, 7, 0, AT(measured));
+    EXPECT_ERROR(0x11);
+    event();
+    TEST_ASSERT_TRUE(next());
+    TEST_ASSERT_EQUAL_UINT8(4, dto.length);
+}
+
+/* Two lists are selected; the second is made too long afterwards, by an entry or by the time stamp. */
+void test_lists_that_changed_after_they_were_selected_start_together_or_not_at_all(void)
+{
+    for (unsigned by_entry = 0; by_entry < 2; by_entry++) {
+        SEND(0xD6);
+        SEND(0xD5, 0, 2, 0);
+        for (uint8_t list = 0; list < 2; list++) {
+            SEND(0xD4, 0, list, 0, 1);
+        }
+        for (uint8_t list = 0; list < 2; list++) {
+            SEND(0xD3, 0, list, 0, 0, 2);
+            SEND(0xE2, 0, list, 0, 0, 0);
+            SEND(0xE1, 0xFF, 3, 0, AT(measured));
+            SEND(0xE1, 0xFF, 3, 0, AT(measured));
+            SEND(0xDE, 2, list, 0);
+            EXPECT(0xFF);
+        }
+        if (by_entry) {
+            SEND(0xE2, 0, 1, 0, 0, 0);
+            SEND(0xE1, 0xFF, 7, 0, AT(measured));
+        } else {
+            SEND(0xE0, 0x10, 1, 0, 0, 0, 1, 0);
+        }
+        EXPECT(0xFF);
+        SEND(0xDD, 1);
+        EXPECT_ERROR(0x2A);
+        event();
+        TEST_ASSERT_FALSE(next());
+    }
+}
+
 void test_numbers_that_do_not_exist_are_refused(void)
 {
     one_list(0, 1, 0);
