@@ -12,7 +12,6 @@ enum {
     MMIO_SIZE = 0x100000,
     PPB_SIZE = 0x100000,
     NO_ADDRESS = 0xFFFFFFF0U - 0x20000000U,
-    THUMB_32BIT = 0xE8,
     BRANCH_TO_ITSELF = 0xE7FE,
 };
 #define PPB_BASE 0xE0000000U
@@ -123,6 +122,16 @@ static uint16_t count_instructions(const uint8_t *code, uint32_t size)
     return count;
 }
 
+/* An IT's mask: the lowest set bit ends it. */
+static uint8_t conditional(const uint8_t it[2])
+{
+    uint8_t slots = 0;
+    for (uint32_t mask = it[1] == 0xBF ? it[0] & 0xFU : 0U; mask != 0; mask = mask << 1 & 0xFU) {
+        slots++;
+    }
+    return slots;
+}
+
 static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
 {
     block_t *known = address < FLASH_SIZE ? &emu->block[address / 2U] : NULL;
@@ -133,6 +142,7 @@ static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
     block_t block = {.size = (uint16_t)size, .count = 1};
     if (size <= sizeof code && uc_mem_read(emu->uc, address, code, size) == UC_ERR_OK) {
         block.count = count_instructions(code, size);
+        block.conditional = size == 2U ? conditional(code) : (uint8_t)0;
         block.idle = size == 2U && (code[0] | code[1] << 8) == BRANCH_TO_ITSELF;
     }
     if (known != NULL) {

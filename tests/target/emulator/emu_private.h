@@ -137,8 +137,11 @@ struct peripheral {
 
 typedef struct {
     uint16_t size, count;
-    bool idle; /* a branch to itself */
+    bool idle;            /* a branch to itself */
+    uint8_t conditional;  /* instructions behind one IT */
 } block_t;
+
+enum { THUMB_32BIT = 0xE8 }; /* the second byte of a longer instruction is at least this */
 
 typedef struct profile profile_t;
 

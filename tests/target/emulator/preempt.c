@@ -259,6 +259,20 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
     return ended ? (int)(emu_instructions(p->e->emu) - from) : -1;
 }
 
+/* When the task is entered a window has just been handed over, the next one would be ten periods later: it lacks one
+ * period now, so that the first interrupt hands it over wherever the task is. */
+static void window_next(preempt_t *p)
+{
+    const mirror_t *m = &p->e->mirror;
+    const uint32_t count = IDENTIFY_PERIODS - 1;
+    for (int i = m->inputs; i < m->parts; i++) {
+        if (m->part[i].here == offsetof(drive_t, fast)) {
+            const size_t inside = offsetof(drive_t, fast.window.count) - offsetof(drive_t, fast);
+            (void)emu_write(p->e->emu, m->base + m->part[i].there + (uint32_t)inside, &count, sizeof count);
+        }
+    }
+}
+
 static int try_all(preempt_t *p, preempt_report_t *report)
 {
     p->catch_entry = true;
@@ -270,6 +284,7 @@ static int try_all(preempt_t *p, preempt_report_t *report)
     }
     (void)emu_register_set(p->e->emu, "PDB0.SC", 0); /* no conversions: the only fast ISRs are ours */
     (void)emu_register_set(p->e->emu, "PDB1.SC", 0);
+    window_next(p);
     emu_snapshot_t *start = emu_save(p->e->emu);
     p->before = drive_there(p);
     p->counts = (adc_counts_t){.i_a = (uint16_t)emu_register(p->e->emu, "ADC0.R0"),

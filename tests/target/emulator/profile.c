@@ -20,6 +20,7 @@ struct profile {
     uint32_t count;
     uint32_t taken;
     uint8_t cost[FLASH_SIZE / 2];
+    bool conditional[FLASH_SIZE / 2]; /* stands behind an IT that has run: counted with it */
 };
 
 bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
@@ -56,16 +57,45 @@ void profile_stop(emu_t *emu)
     emu->profile = NULL;
 }
 
+static uint32_t cost_of(const profile_t *p, uint32_t address)
+{
+    return address < FLASH_SIZE ? p->cost[address / 2U] : 1U;
+}
+
+static bool is_conditional(const profile_t *p, int64_t address)
+{
+    return address < FLASH_SIZE && p->conditional[address / 2];
+}
+
+/* The emulated core never shows an instruction that is skipped: all that an IT makes conditional counts with it. */
+static void count_conditional(emu_t *emu, emu_span_t *span, uint32_t address, uint32_t slots)
+{
+    for (uint32_t at = address; slots > 0 && at < FLASH_SIZE; slots--) {
+        uint8_t code[2] = {0, 0};
+        (void)uc_mem_read(emu->uc, at, code, sizeof code);
+        emu->profile->conditional[at / 2U] = true;
+        span->instructions++;
+        span->cost += cost_of(emu->profile, at);
+        at += code[1] >= THUMB_32BIT ? 4U : 2U;
+    }
+}
+
 void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
 {
     profile_t *p = emu->profile;
     level_t *level = &p->level[p->depth];
-    if (level->next != NOWHERE && level->next != address) {
+    if (level->next != NOWHERE && level->next != address && !is_conditional(p, level->next)) {
         level->span.cost += p->taken; /* of the instruction before */
     }
     level->next = (int64_t)address + size;
+    if (is_conditional(p, address)) {
+        return;
+    }
     level->span.instructions++;
-    level->span.cost += address < FLASH_SIZE ? p->cost[address / 2U] : 1U;
+    level->span.cost += cost_of(p, address);
+    if (address < FLASH_SIZE) {
+        count_conditional(emu, &level->span, address + size, emu->block[address / 2U].conditional);
+    }
 }
 
 void profile_enter(emu_t *emu, int vector)

@@ -7,6 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from fluxtrue_tools.bench import image
 from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import FAILED, Core
@@ -133,6 +134,28 @@ def test_handlers_are_counted_without_what_interrupts_them(
     returns = next(k for k, line in enumerate(instructions) if "bx\tlr" in line or "{pc}" in line or ", pc}" in line)
     assert high[2] == high[3] == returns + 1
     assert middle[2] < middle[3]  # it pends LOW in its first run only
+
+
+def test_a_profile_counts_what_is_skipped_behind_an_it_and_takes_it_for_no_branch(
+    library: ctypes.CDLL, exceptions: Path
+) -> None:
+    with Core.of_program(library, exceptions) as core:
+        core.run(5.5e-3)
+        blocks = [core.counts(v) for v in (LOW, MIDDLE, HIGH)]
+    image.declare(library)
+    with Core.of_program(library, exceptions, counting=True) as core:
+        size = image.FLASH_SIZE // 2
+        assert library.emu_profile_start(core._handle, b"\1" * size, size, 1000)
+        core.run(5.5e-3)
+        executed = [core.counts(v).sum for v in (LOW, MIDDLE, HIGH)]
+        spans = list(image.take(library, core._handle))
+    for vector, block in zip((LOW, MIDDLE, HIGH), blocks, strict=True):
+        issued = [count for v, count, _ in spans if v == vector]
+        assert (len(issued), min(issued), max(issued), sum(issued)) == (
+            block.runs, block.least, block.most, block.sum)  # fmt: skip
+    assert sum(executed) < sum(block.sum for block in blocks)  # something was skipped
+    # LOW and HIGH compare, but have no branch: nothing but one for each instruction.
+    assert all(cost == count for v, count, cost in spans if v in (LOW, HIGH))
 
 
 def test_a_sleeping_core_is_woken_by_each_tick_and_costs_nothing_in_between(

@@ -47,6 +47,21 @@ class _Span(ctypes.Structure):
     _fields_ = (("vector", ctypes.c_uint32), ("instructions", ctypes.c_uint32), ("cost", ctypes.c_uint32))
 
 
+def declare(library: ctypes.CDLL) -> None:
+    """Prototypes of the profile's functions."""
+    library.emu_profile_start.restype = ctypes.c_bool
+    library.emu_profile_start.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32]
+    library.emu_profile_take.restype = ctypes.c_uint32
+    library.emu_profile_take.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Span), ctypes.c_uint32]
+
+
+def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
+    """Vector, instructions, cost of each run that has finished since the last time."""
+    spans = (_Span * SPANS_MOST)()
+    while count := library.emu_profile_take(handle, spans, SPANS_MOST):
+        yield from ((s.vector, s.instructions, s.cost) for s in spans[:count])
+
+
 @dataclass
 class Recording:
     """Rows of vector, instructions, cycles; and what the run met."""
@@ -74,10 +89,7 @@ class Stand:
         self.core = Core.of_simulation(library, self.loop._sim)  # type: ignore[arg-type]
         self.handle = self.core._handle
         library.can_frame_arrives.argtypes = [ctypes.c_void_p, ctypes.POINTER(Frame)]
-        library.emu_profile_start.restype = ctypes.c_bool
-        library.emu_profile_start.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32]
-        library.emu_profile_take.restype = ctypes.c_uint32
-        library.emu_profile_take.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Span), ctypes.c_uint32]
+        declare(library)
         self.time_ms = 0
 
     def run_ms(self, ramps: dict[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
@@ -107,9 +119,7 @@ class Stand:
 
     def take(self) -> Iterator[tuple[int, int, int]]:
         """Finished runs since the last time."""
-        spans = (_Span * SPANS_MOST)()
-        while count := self.library.emu_profile_take(self.handle, spans, SPANS_MOST):
-            yield from ((s.vector, s.instructions, s.cost) for s in spans[:count])
+        return take(self.library, self.handle)
 
     def stack_used(self) -> int:
         bottom, top = self.core.symbol("stack_bottom"), self.core.symbol("stack_top")

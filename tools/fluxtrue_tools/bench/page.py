@@ -24,7 +24,7 @@ BOUNDS: dict[str, tuple[float | None, float | None]] = {
     "torque_path": (40, None),
 }  # fmt: skip
 CONTAINS = {
-    "current_tick": "converter counts and angle → compare values: offset and gain, Clarke, sum of the phases, angle "
+    "current_tick": "converter counts and angle → duties: offset and gain, Clarke, sum of the phases, angle "
     "tracker, sincos, Park, 2 PI, decoupling from the flux tables, voltage limiter, dead-time compensation, dc-voltage "
     "normalisation, angle advance, SVPWM, all saturations",
     "current_core": "what the leanest peer's tick has: sincos, Clarke, Park, 2 PI, inverse Park, clamp, SVPWM; "
@@ -42,6 +42,7 @@ CONTAINS = {
     "task": "the drive's 1 kHz task without the bus",
 }
 WHOLE_MOST = 400
+SHARE_MOST = 40
 TEMPLATE = Path(__file__).with_name("performance.md.in")
 
 
@@ -151,6 +152,7 @@ def _torque_share(stages: dict[str, list[float]]) -> float:
 def page(figures: Figures) -> str:
     """The whole document."""
     met, kernels = figures["drives"]["robust"]["met"], figures["kernels"]
+    share = _torque_share(kernels["stages"])
     tables: dict[str, list[str]] = {
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
@@ -161,6 +163,6 @@ def page(figures: Figures) -> str:
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
         small=" ".join(SMALL), tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
-        stack_sum=_stack_sum(figures), torque_share=_torque_share(kernels["stages"]),
+        stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MOST),
         **{"return": cycles.RETURN},
     )  # fmt: skip

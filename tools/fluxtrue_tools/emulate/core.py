@@ -170,7 +170,7 @@ class Core:
         self._library.emu_break_after(self._handle, instructions)
 
     def counts(self, vector: int) -> Counts:
-        """Of the handler's runs so far; the same in both modes."""
+        """Of the handler's runs so far; when counting without what is skipped behind an IT."""
         counts: Counts = self._library.emu_counts(self._handle, vector)
         return counts
 
