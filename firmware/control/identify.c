@@ -174,7 +174,8 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     localise(config, state, in, e);
     collect(config, state, in, &model, e);
     const operating_t now = correct(config, state, &model);
-    const int32_t torque = fx_sub_q31(identify_mul(now.psi.d, now.i.q), identify_mul(now.psi.q, now.i.d));
+    const int32_t torque =
+        identify_mean_torque(config, &in->tables->inductances, in->point->chord, now.psi, now.i);
     const identify_out_t out = {fx_round_q15(torque), fx_round_q15(now.magnet)};
     if (state->steps >= IDENTIFY_STEPS) {
         update(config, state, &model, out.torque);

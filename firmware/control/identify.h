@@ -3,7 +3,7 @@
 #define CONTROL_IDENTIFY_H
 /** Robust identification: seven slow parameters and a local flux error from the two voltage equations, and the torque.
  *   each step  residuals of the operating point, local flux error, torque
- *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md
+ *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md, over the period
  *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the voltage model, as far as speed makes it better
  *   each tenth step  mean residual into the Kalman filter, leak, confidence
  * Source   docs/theory/identification.md (ID-5) ... (ID-20)
@@ -11,7 +11,7 @@
  * Range    as in its parts
  * Rounding 1/2 LSB q15 in the torque
  * Errors   a closed gate freezes what is learnt; clamps and contradictions close the confidence, not the estimate
- * Context  1 kHz task; three divisions per step, one more per update and axis */
+ * Context  1 kHz task; five divisions per step, one more per update and axis */
 #include "control/identify_filter.h"
 
 #define IDENTIFY_STEPS 10 /* per update */

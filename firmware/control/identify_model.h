@@ -4,12 +4,13 @@
 /** What the tables say of an operating point, and how each unknown would change it.
  *   residual  y = u - R i - w J psi(i_m) - d psi/dt     h = d(voltage)/d(state), per sigma, both axes
  *   torque    t = psi_d i_mq - psi_q i_md               h_t = dt/d(state), per sigma
- * Source   docs/theory/identification.md (ID-5) ... (ID-8)
+ *   mean of a period, in which flux moves along a chord:   t - theta^2/12 (t + psi_d psi_q (1/l_qq - 1/l_d))
+ * Source   docs/theory/identification.md (ID-5) ... (ID-8), (ID-20)
  * Units    per unit, Q30
  * Range    |h| is limited to 1/4
  * Rounding half up, a few LSB of Q30
  * Errors   saturates
- * Context  1 kHz task; two divisions of bounded quantities */
+ * Context  1 kHz task; two divisions each, guarded (fx/div.h) */
 #include "control/flux_table_types.h"
 #include "control/identify_point.h"
 
@@ -36,5 +37,9 @@ typedef struct {
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
                     q31_t r_prior, identify_model_t *model);
 identify_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
+
+/** Torque over the period, from flux and magnetising current at its ends, Q30. */
+int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_t psi,
+                             dq_t i_m);
 
 #endif

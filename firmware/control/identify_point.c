@@ -64,6 +64,7 @@ identify_point_t identify_point(const identify_config_t *config, const identify_
                 fx_q15_from_q31(fx_sub_q31(i.q, fx_mul_q31(iron, (a->psi.d + b->psi.d) * 32768)))},
         .omega = omega,
         .iron = iron,
+        .chord = sinc, /* theta^2/24 in Q31 */
         .limited = window->limited,
         .valid = window->acting && speed >= config->omega_min,
     };

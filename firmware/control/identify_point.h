@@ -18,6 +18,7 @@ typedef struct {
     dq_t i_m;
     q31_t omega;
     q31_t iron; /* a */
+    int32_t chord; /* theta^2/12, Q30: what the mean flux of a period lacks of the sampled one (ID-20) */
     uint8_t limited;
     bool valid;
 } identify_point_t;

@@ -14,22 +14,20 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
 CASES = 4
-# Not reached: 1.35 % instead of 1.2 % on the nearly linear machine (docs/howto/campaign.md). Another miss fails.
-MISSED = {"saturated": set(), "linear": {"rms, above 5000 rpm"}}
 
 
 @pytest.mark.parametrize("name", ["saturated", "linear"])
-def test_another_machine_needs_nothing_but_its_folder_to_meet_its_stated_bounds(tmp_path: Path, name: str) -> None:
+def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_path: Path, name: str) -> None:
     """The file's own 100 cases with: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
     file = Path(__file__).with_name(f"{name}.toml")
     command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES), "--out",
                str(tmp_path)]  # fmt: skip
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
     result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-    assert result.returncode in (0, 1), result.stderr
+    assert result.returncode == 0, result.stdout + result.stderr
     bounds = json.loads((tmp_path / "summary.json").read_text())["bounds"]
-    assert {b["what"] for b in bounds if not b["met"]} <= MISSED[name], result.stdout
-    assert all(b["value"] <= 1.5 for b in bounds if b["what"] in MISSED[name])
+    assert bounds
+    assert all(b["met"] for b in bounds)
     table = pd.read_parquet(tmp_path / "results.parquet")
     assert table["case"].nunique() == CASES
     tables = table[table["controller"] == "tables"]

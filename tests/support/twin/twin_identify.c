@@ -140,7 +140,10 @@ static void answer(const motor_si_t *motor, twin_identify_t *s, const twin_point
     const double psi_d = m->psi.d + magnet + v[ANGLE] * m->turn.d + v[IRON] * m->iron_psi.d + s->local.d;
     const double psi_q = m->psi.q * (1.0 + v[LQ]) + v[ANGLE] * m->turn.q + v[IRON] * m->iron_psi.q + s->local.q;
     const twin_dq_t i = {point->i_m.d + v[IRON] * m->iron_i.d, point->i_m.q + v[IRON] * m->iron_i.q};
-    s->torque = 1.5 * motor->pole_pairs * (psi_d * i.q - psi_q * i.d);
+    const double sampled = psi_d * i.q - psi_q * i.d;
+    const double chord = pow(point->omega * motor->period_s, 2.0) / 12.0;
+    const double mean = sampled - chord * (sampled + psi_d * psi_q * (1.0 / m->l_qq - 1.0 / m->l_d));
+    s->torque = 1.5 * motor->pole_pairs * mean;
     s->psi_delta = magnet;
 }
 

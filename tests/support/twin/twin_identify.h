@@ -36,7 +36,7 @@ twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, do
 typedef struct {
     twin_dq_t y, psi, turn, iron_psi, iron_i;
     double d[TWIN_STATES], q[TWIN_STATES], torque[TWIN_STATES]; /* per sigma; torque in Vs A */
-    double slope;
+    double slope, l_d, l_qq;
     bool current;
 } twin_model_t;
 

@@ -66,7 +66,7 @@ twin_model_t twin_model(const motor_si_t *motor, const twin_point_t *p, double r
     const double w = p->omega;
     const double length = hypot(p->i.d, p->i.q);
     const double n = 1.0 / fmax(length, motor->identify_i_smooth_A);
-    twin_model_t m = {.psi = {f.psi_d, f.psi_q}, .slope = f.psi_d - f.psi_f0};
+    twin_model_t m = {.psi = {f.psi_d, f.psi_q}, .slope = f.psi_d - f.psi_f0, .l_d = f.l_d, .l_qq = f.l_qq};
     m.iron_i = (twin_dq_t){p->iron * f.psi_q, -p->iron * f.psi_d};
     m.iron_psi = (twin_dq_t){f.l_d * m.iron_i.d, f.l_qq * m.iron_i.q};
     m.turn = (twin_dq_t){f.psi_q - f.l_d * p->i_m.q, f.l_qq * p->i_m.d - f.psi_d};

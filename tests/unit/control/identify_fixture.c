@@ -92,3 +92,23 @@ window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t ex
     }
     return pair;
 }
+
+double mean_on_the_chord(const fixture_t *f, dq_t i_m, double psi_d, double psi_q, double omega_pu)
+{
+    enum { PIECES = 1000 };
+    const flux_inductances_t l = flux_table_inductances(&f->flux_table, i_m);
+    const double scale = ldexp(1.0, f->flux_table.l_shift), theta = omega_pu * f->w * f->si.period_s;
+    double sum = 0.0;
+    for (int k = 0; k < PIECES; k++) {
+        const double s = (k + 0.5) / PIECES - 0.5; /* of the period, from its middle */
+        /* The ends are psi e^(-j theta/2) and psi e^(j theta/2) as seen from the rotor's place in the middle. */
+        const double along = cos(0.5 * theta), across = 2.0 * s * sin(0.5 * theta);
+        const double x = psi_d * along - psi_q * across, y = psi_q * along + psi_d * across;
+        const double turn = s * theta;
+        const double d = x * cos(turn) + y * sin(turn), q_axis = y * cos(turn) - x * sin(turn);
+        const double i_d = from_q15(i_m.d) + (d - psi_d) / (from_q15(l.l_d) * scale);
+        const double i_q = from_q15(i_m.q) + (q_axis - psi_q) / (from_q15(l.l_qq) * scale);
+        sum += d * i_q - q_axis * i_d;
+    }
+    return sum / PIECES;
+}

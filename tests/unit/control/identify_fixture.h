@@ -19,4 +19,8 @@ identify_tables_t tables_at(const fixture_t *f, dq_t i_m);
 /* i in q15, speed per unit; extra_u is added to the voltage that the tables would need. */
 window_pair_t steady_window(const fixture_t *f, dq_t i, double omega_pu, dq_t extra_u);
 
+/* Per unit: the mean of psi x i over a period at whose ends the machine has psi and i_m, summed along the straight way
+ * that the held voltage drives its flux; currents follow with the tables' inductances. */
+double mean_on_the_chord(const fixture_t *f, dq_t i_m, double psi_d, double psi_q, double omega_pu);
+
 #endif

@@ -109,7 +109,7 @@ void test_after_a_drive_the_torque_is_that_of_the_true_flux_everywhere(void)
         run(i, 0.05 + 0.2 * n, wrong, 300);
         const flux_point_t flux = flux_table_step(&f.flux_table, i);
         const double psi_d = from_q15(flux.psi_d) - 0.06, psi_q = 1.05 * from_q15(flux.psi_q);
-        const double expected = psi_d * from_q15(i.q) - psi_q * from_q15(i.d);
+        const double expected = mean_on_the_chord(&f, i, psi_d, psi_q, 0.05 + 0.2 * n);
         TEST_ASSERT_DOUBLE_WITHIN(0.003, expected, from_q15(out.torque));
     }
 }
@@ -189,7 +189,7 @@ void test_with_nothing_learnt_the_torque_is_the_tables_less_the_iron_loss(void)
     const double a = (13.0 + 0.01 * 0.5 * f.w) / 1.5 * f.psi / f.i;
     const dq_t i_m = {(int32_t)lround(i.d + a * at_i.psi_q), (int32_t)lround(i.q - a * at_i.psi_d)};
     const flux_point_t flux = flux_table_step(&f.flux_table, i_m);
-    const double expected = from_q15(flux.psi_d) * from_q15(i_m.q) - from_q15(flux.psi_q) * from_q15(i_m.d);
+    const double expected = mean_on_the_chord(&f, i_m, from_q15(flux.psi_d), from_q15(flux.psi_q), 0.5);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, expected, from_q15(out.torque)); /* q15 of current, flux and torque */
 }
 
