@@ -29,7 +29,7 @@ static int32_t planned_flux(const current_reference_config_t *config, const curr
 {
     const q15_t drop = fx_mul_gain_q15(config->r_pu, in->i_magnitude);
     const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
-    const int32_t over = fx_div_s32(fx_clamp_q31(voltage, 0, Q15_MAX) * 32768, fx_max_s32(fx_abs_q15(in->omega), 1));
+    const int32_t over = fx_clamp_q31(voltage, 0, Q15_MAX) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
     return fx_max_s32(over - in->shift, 0);
 }
 

@@ -138,7 +138,7 @@ static void localise(const identify_config_t *config, identify_state_t *state, c
     if (in->point->valid && in->enabled) {
         const q15_t w = fx_q15_from_q31(in->point->omega);
         const int32_t square = fx_mul_q30(w, w) + fx_mul_q30(config->local_corner, config->local_corner);
-        const q16_t gain = fx_div_s32(in->point->omega, fx_max_s32(square >> 15, 1)); /* Q31/Q15 */
+        const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
         target = (dq_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
     }
     state->local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->local.d));
