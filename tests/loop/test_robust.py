@@ -75,20 +75,24 @@ def test_after_a_drive_torque_is_right_at_every_speed_in_every_quadrant(driven: 
 
 
 def test_a_torque_step_moves_the_flux_by_less_than_a_percent(driven: Drive) -> None:
-    driven.to(3000, 0, 1.0)
-    before = driven.to(3000, 0, 0.2)[:, PSI].mean()
-    driven.torque = 0.8 * RATED_NM
-    rows = driven.to(3000, 0.8 * RATED_NM, 0.5)
-    assert np.abs(rows[:, PSI] - before).max() <= 0.01 * 0.0717
+    # At 8000 rpm the voltage does not allow 80 %: the step then ends at the limit.
+    for rpm in (500, 1500, 3000, 5000, 8000):
+        for torque in (0.8 * RATED_NM, -0.8 * RATED_NM):
+            driven.to(rpm, 0, max(0.5, abs(rpm * RPM - driven.speed) / 1000.0))
+            before = driven.to(rpm, 0, 0.2)[:, PSI].mean()
+            driven.torque = torque
+            rows = driven.to(rpm, torque, 0.5)
+            assert np.abs(rows[:, PSI] - before).max() <= 0.01 * 0.0717, (rpm, torque)
 
 
 def test_a_speed_ramp_through_the_gates_makes_no_step_of_torque(driven: Drive) -> None:
-    driven.to(0, 40, 1.0)
-    rows = driven.to(2000, 40, 2.0)
-    rows = np.concatenate([rows, driven.to(-500, 40, 2.0)])
-    # Means of 20 ms, so that ripple of the sensors does not count; 1 % of rated torque.
-    smooth = rows[:, TORQUE].reshape(-1, 20).mean(axis=1)
-    assert np.abs(np.diff(smooth)).max() <= 0.01 * RATED_NM
+    for torque in (40, -40):
+        driven.to(0, torque, 1.0)
+        rows = driven.to(2000, torque, 2.0)
+        rows = np.concatenate([rows, driven.to(-500, torque, 2.0)])
+        # Means of 20 ms, so that ripple of the sensors does not count; 1 % of rated torque.
+        smooth = rows[:, TORQUE].reshape(-1, 20).mean(axis=1)
+        assert np.abs(np.diff(smooth)).max() <= 0.01 * RATED_NM, torque
 
 
 def test_cold_the_answer_is_the_tables(hsm1: Motor) -> None:
