@@ -58,8 +58,8 @@ static bool fits_q31(const modulate_config_t *config, fx_pair_t u, int32_t v_dc)
     return v_dc >= config->v_dc_min && (uint32_t)fx_dot2(u, u) < (uint32_t)(v_dc * v_dc) >> 1;
 }
 
-/* Min-max zero sequence: both ends equally far from the rails. Duties without dead time, Q31 and half an LSB to round them
- * (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only the sums need to be in range. */
+/* Min-max zero sequence: both ends equally far from the rails. Duties without dead time, Q31 and half an LSB to round
+ * them (MO-4): |v| < 0.71, the phases fit Q31; unsigned, as only the sums need to be in range. */
 static phases_t centred_q31(ab_t v)
 {
     const int32_t side = fx_arch_opaque(v.beta * Q16(0.86602540378443865)); /* Q15 * Q16 = Q31 */
@@ -98,9 +98,9 @@ static int32_t scaled(int32_t x, int32_t by_q30)
     return 4 * fx_mulhi(x, by_q30);
 }
 
-/* x times 2^halvings (0 or 1), shortened about the middle if the hexagon is smaller (MO-3), with pulses that the bridge can make. */
-static __attribute__((noinline)) modulate_out_t near_the_hexagon(const modulate_config_t *config, phases_t x,
-                                                                 int32_t halvings, phases_t sign)
+/* x times 2^halvings (0 or 1), shortened about the middle if the hexagon is smaller (MO-3), with pulses that the bridge
+ * can make. */
+static modulate_out_t near_the_hexagon(const modulate_config_t *config, phases_t x, int32_t halvings, phases_t sign)
 {
     const int32_t half = farthest(x);
     const bool beyond = half > (HALF_MAX_Q31 >> halvings);
@@ -117,37 +117,35 @@ static __attribute__((noinline)) modulate_out_t near_the_hexagon(const modulate_
     return (modulate_out_t){duty, changed != 0U};
 }
 
-/* Some pulse may be too short, or the hexagon too small. */
-static modulate_out_t cut(const modulate_config_t *config, phases_t y, phases_t sign)
+/* Far beyond the hexagon, or with a dc voltage too low to divide by: at half the size the phases fit. */
+static __attribute__((noinline, cold)) fx_pair_t halved(fx_pair_t u, fx_pair_t at, int32_t v_dc)
 {
-    const phases_t x = off_middle(y);
-    const int32_t margin = (config->min_pulse + config->dead_time) * 0x10000;
-    if (farthest(x) < 0x40000000 - margin) { /* whatever the dead time adds, no pulse is too short */
-        return (modulate_out_t){plain(config, y, sign), false};
-    }
-    return near_the_hexagon(config, x, 0, sign);
-}
-
-/* Far beyond the hexagon, or a dc voltage too low to divide by: at half the size the phases fit. */
-static __attribute__((noinline, cold)) modulate_out_t far(const modulate_config_t *config, const modulate_in_t *in)
-{
-    const int32_t v_dc = fx_max_s32(in->v_dc, config->v_dc_min);
-    const ab_t v = normalise(fx_arch_pkhbt(in->u.d, in->u.q), in->advanced, v_dc);
-    const ab_t half = {fx_sat_q15_word(v.alpha) >> 1, fx_sat_q15_word(v.beta) >> 1};
-    modulate_out_t out = near_the_hexagon(config, off_middle(centred_q31(half)), 1,
-                                          polarity(config, in->i, in->advanced));
-    out.limited = out.limited || v_dc != in->v_dc;
-    return out;
+    const ab_t v = normalise(u, at, v_dc);
+    return fx_arch_pkhbt(fx_sat_q15_word(v.alpha) >> 1, fx_sat_q15_word(v.beta) >> 1);
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, const modulate_in_t *in)
 {
     const fx_pair_t u = fx_arch_pkhbt(in->u.d, in->u.q);
-    if (!fits_q31(config, u, in->v_dc)) {
-        return far(config, in);
+    const phases_t sign = polarity(config, in->i, in->advanced);
+    const bool fits = fits_q31(config, u, in->v_dc);
+    const int32_t v_dc = fits ? in->v_dc : fx_max_s32(in->v_dc, config->v_dc_min);
+    ab_t v;
+    if (fits) {
+        v = normalise(u, in->advanced, v_dc);
+    } else {
+        const fx_pair_t half = halved(u, in->advanced, v_dc);
+        v = (ab_t){(int16_t)(half & 0xFFFFU), (int16_t)(half >> 16)};
     }
-    const phases_t y = centred_q31(normalise(u, in->advanced, in->v_dc));
-    return cut(config, y, polarity(config, in->i, in->advanced));
+    const phases_t y = centred_q31(v);
+    const phases_t x = off_middle(y);
+    const int32_t margin = (config->min_pulse + config->dead_time) * 0x10000;
+    if (fits && farthest(x) < 0x40000000 - margin) { /* whatever the dead time adds, no pulse is too short */
+        return (modulate_out_t){plain(config, y, sign), false};
+    }
+    modulate_out_t out = near_the_hexagon(config, x, fits ? 0 : 1, sign);
+    out.limited = out.limited || v_dc != in->v_dc;
+    return out;
 }
 
 duty_t modulate_clear(const modulate_config_t *config, fx_pair_t u, fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
