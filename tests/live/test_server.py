@@ -86,7 +86,8 @@ def serve(drive: Drive, folder: Path, talk: Talk) -> None:
 
     async def conversation() -> None:
         samples = Samples(cantools.database.load_file(DBC))
-        session = Session("test", drive.commander, samples, Recorder(folder, DBC), {}, link=drive)  # type: ignore[arg-type]
+        session = Session("test", drive.commander, samples, Recorder(folder, DBC), {})
+        session.link = drive  # type: ignore[assignment]
         async with TestClient(TestServer(make_app(session))) as client:
             await talk(client, session)
 
