@@ -4,8 +4,9 @@
 /** From what the bus asks to what the control may be asked: limits, dead band, slew and jerk.
  *   wanted = clamp(request, -limit, +limit), limit = drive or regen by the sign of request x speed;
  *            0 if |request| <= dead_band: a vehicle at rest must not creep
- *   torque follows wanted with |dT/dt| <= slew and |d2T/dt2| <= jerk while the rate grows or is braked towards the
- *   target; a rate that leads away from the target is dropped at once: torque never rises after it was taken back.
+ *   torque follows wanted with |dT/dt| <= slew and |d2T/dt2| <= jerk while the rate grows or is braked towards a target
+ *   that stays (the last step may take two jerks); a rate that leads away from the target, or would pass one that has
+ *   come nearer, is dropped at once: torque never rises after it was taken back, and never overshoots.
  *   drop     torque goes to zero with ramp_out alone: no jerk limit may delay it
  * Source   docs/howto/can.md, torque path
  * Units    per unit of T_b, q15; slew, jerk and ramp_out in q31 per step (and per step squared)

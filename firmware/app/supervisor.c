@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/supervisor.h"
 
-#define SELF_TEST_MS 50U         /* plausible for so long */
+#define SELF_TEST_MS 50U         /* the least time in init */
 #define SELF_TEST_TIME_OUT_MS 500U
 #define PRECHARGE_TIME_OUT_MS 2000U
 #define DISCHARGE_TIME_OUT_MS 5000U

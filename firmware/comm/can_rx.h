@@ -56,7 +56,7 @@ typedef struct {
     bus_power_limits_t limits; /* after a time-out: zero */
     uint16_t count[RX_RESULTS];
     uint16_t accepted; /* torque commands, wraps */
-    uint16_t skipped;
+    uint16_t skipped;  /* of either message, one frame before it was lost */
     uint16_t time_outs;
 } can_rx_t;
 

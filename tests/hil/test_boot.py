@@ -36,7 +36,7 @@ def test_every_message_of_the_inverter_comes_in_its_cycle(rig: Rig) -> None:
 
 
 @pytest.mark.plant
-def test_status_stays_within_100_microseconds_of_its_period_on_a_bus_of_its_own(rig: Rig) -> None:
+def test_status_stays_within_300_microseconds_of_its_period_on_a_bus_of_its_own(rig: Rig) -> None:
     rig.advance(1.0)
     times = [frame.time_s for frame in rig.frames[STATUS]][2:]
     periods = [b - a for a, b in zip(times, times[1:], strict=False)]
@@ -56,6 +56,6 @@ def test_without_commands_it_stays_in_standby(rig: Rig) -> None:
 def test_the_bus_carries_its_cyclic_traffic_below_a_third_of_its_capacity(rig: Rig) -> None:
     rig.advance(2.0)
     counters = rig.stand.counters()
-    # Commands, 5 messages each 10 ms, 7 each 100 ms: (6 x 100 + 7 x 10) x 135 bit / 500 kbit = 18 %.
+    # The command and 4 messages each 10 ms, 6 each 100 ms, 1 each second: 561 frames of 135 bits, of 500 kbit: 15 %.
     assert 0.10 < counters["load_peak"] < 0.33
     assert rig.counted[STATUS] > 0 and rig.by_name[COMMAND].cycle_time == 10

@@ -105,10 +105,13 @@ static void to_discharge(void)
     TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
 }
 
-void test_start_up_ends_in_standby_once_the_measurement_was_plausible_for_50_ms(void)
+void test_start_up_ends_in_standby_when_the_measurement_is_plausible_but_not_before_50_ms(void)
 {
+    stays(STATE_INIT, 50);
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
+    setUp();
     in.sensors_plausible = false;
-    TEST_ASSERT_EQUAL_INT(STATE_INIT, steps(200));
+    stays(STATE_INIT, 200);
     in.sensors_plausible = true;
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
 }

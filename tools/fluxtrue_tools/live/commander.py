@@ -64,14 +64,20 @@ class Commander:
         self.ask(Wish.READY, now_s)
         self._reset = True
 
+    def let_go(self) -> None:
+        """The page with control has gone: no need to wait whether it says something again."""
+        self._seen_s = float("-inf")
+        if self.wish is Wish.DRIVE:
+            self.wish, self.target_Nm = Wish.READY, 0.0  # it must be pressed again
+
     def alive(self, now_s: float) -> bool:
         """Whether the page with control has been heard of lately."""
         return now_s - self._seen_s <= HAND_TIMEOUT_S
 
     def step(self, now_s: float, state: str) -> Order:
         """The next command frame, given the inverter's state."""
-        if not self.alive(now_s) and self.wish is Wish.DRIVE:
-            self.wish, self.target_Nm = Wish.READY, 0.0  # it must be pressed again
+        if not self.alive(now_s):
+            self.let_go()
         step_s = 0.0 if self._stepped_s is None else max(now_s - self._stepped_s, 0.0)
         self._stepped_s = now_s
         wanted = self.target_Nm if self.wish is Wish.DRIVE and state in RUNNING else 0.0

@@ -82,9 +82,13 @@ def _hello(session: Session) -> dict[str, Any]:
 
 
 def _number(value: Any, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise FluxtrueError(f"{what} = {value!r}: not a number")
-    return float(value)
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:  # a whole number of three hundred digits
+        number = math.inf
+    if not math.isfinite(number):
+        raise FluxtrueError(f"{what}: not a number")
+    return number
 
 
 def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
@@ -121,10 +125,10 @@ async def _tune(session: Session, message: dict[str, Any]) -> dict[str, Any]:
 
 
 def _knob(session: Session, message: dict[str, Any]) -> None:
-    if session.stand is None or message.get("name") not in KNOBS:
-        raise FluxtrueError(f"no knob '{message.get('name')}'")
-    value = _number(message.get("value"), str(message["name"]))
-    session.stand.turn(message["name"], value)
+    name = str(message.get("name"))
+    if session.stand is None or name not in KNOBS:
+        raise FluxtrueError(f"no knob '{name}'")
+    session.stand.turn(name, _number(message.get("value"), name))
 
 
 async def _record(session: Session, message: dict[str, Any]) -> dict[str, Any]:
@@ -167,14 +171,16 @@ async def _viewer(request: web.Request) -> web.WebSocketResponse:
                 continue
             try:
                 answer = await _answer(session, socket, message.data)
-            except (FluxtrueError, ValueError) as error:
+            except (FluxtrueError, ValueError, RecursionError, OSError) as error:  # bad JSON, a full disk
                 answer = {"type": "refused", "text": str(error)}
             if answer is not None:
                 await socket.send_json(answer)
     finally:
         session.viewers.remove(socket)
         if session.hand is socket:
-            session.hand = None  # no sign of life any more: the commander ramps to zero
+            session.hand = None
+            if session.link is not None:
+                session.link.act(lambda commander, _: commander.let_go())
     return socket
 
 
@@ -199,7 +205,7 @@ async def _broadcast(app: web.Application) -> None:
         number += 1
         text = json.dumps(batch)
         for viewer in list(session.viewers):
-            with contextlib.suppress(ConnectionError, RuntimeError):
+            with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the others still read
                 await asyncio.wait_for(viewer.send_str(text), 1.0)
 
 
