@@ -28,6 +28,7 @@ DIVISIONS = {
     "commission.c": 2,  # 1 kHz: means over ten periods
     "e2e.c": 2,  # 1 kHz: the counter's turn
     "identify_filter.c": 1,  # 100 Hz and axis
+    "identify_model.c": 2,  # 1 kHz: torque of the period
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
 TASK_LAYERS = {"comm": re.compile(r"^e2e\.c"), "app": re.compile(r"_isr\.c")}
