@@ -85,22 +85,12 @@ identify_row_t identify_torque_row(const identify_config_t *config, const identi
     return row;
 }
 
-static int32_t cross(dq_t psi, dq_t i)
-{
-    return fx_sub_q31(identify_mul(psi.d, i.q), identify_mul(psi.q, i.d));
-}
-
-/* Q30/Q15 = Q15, with l in q15 of 2^l_shift: Q30. */
-static int32_t current_of(const identify_config_t *config, int32_t psi, int32_t l)
-{
-    return fx_shl_q31(fx_div_s32(psi, l), 15U - config->l_shift);
-}
-
 int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_t psi,
                              dq_t i_m)
 {
-    const dq_t less_psi = {identify_mul(chord, psi.d), identify_mul(chord, psi.q)};
-    const dq_t less_i = {current_of(config, less_psi.d, l->l_d), current_of(config, less_psi.q, l->l_qq)};
-    const int32_t less = fx_add_q31(cross(less_psi, i_m), cross(psi, less_i));
-    return fx_sub_q31(cross(psi, i_m), less);
+    const int32_t ends = fx_sub_q31(identify_mul(psi.d, i_m.q), identify_mul(psi.q, i_m.d));
+    /* Q30/Q15 = Q15, with l in q15 of 2^l_shift; no table has an l below 1. */
+    const int32_t product = identify_mul(identify_mul(chord, psi.d), psi.q);
+    const int32_t salient = fx_sub_q31(product / fx_max_s32(l->l_qq, 1), product / fx_max_s32(l->l_d, 1));
+    return fx_sub_q31(ends, fx_add_q31(identify_mul(chord, ends), fx_shl_q31(salient, 15U - config->l_shift)));
 }

@@ -10,7 +10,7 @@
  * Range    |h| is limited to 1/4
  * Rounding half up, a few LSB of Q30
  * Errors   saturates
- * Context  1 kHz task; two divisions each, guarded (fx/div.h) */
+ * Context  1 kHz task; two divisions each, of bounded quantities */
 #include "control/flux_table_types.h"
 #include "control/identify_point.h"
 
