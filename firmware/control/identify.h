@@ -6,7 +6,7 @@
  *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md, over the period
  *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the voltage model, as far as speed makes it better
  *   each tenth step  mean residual into the Kalman filter, leak, confidence
- * Source   docs/theory/identification.md (ID-5) ... (ID-20)
+ * Source   docs/theory/identification.md (ID-5) ... (ID-21)
  * Units    per unit
  * Range    as in its parts
  * Rounding 1/2 LSB q15 in the torque
