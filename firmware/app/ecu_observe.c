@@ -106,10 +106,11 @@ static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
     return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
 }
 
-/* The torque limits are arbitrated: they move with slew. Lost battery limits too: the ramp ends them. */
+/* The torque limits are arbitrated: they move with slew. Lost battery limits take the torque away by the same ramp;
+ * until it has ended the last ones hold, else the torque would first rise to what the ramp begins with. */
 torque_limits_t ecu_limits(const ecu_t *ecu)
 {
-    torque_limits_t limits = TORQUE_LIMITS_NONE;
+    torque_limits_t limits = limits_lost(ecu) ? ecu->drive.request.limits : TORQUE_LIMITS_NONE;
     if (ecu->rx.limits_channel.alive) {
         limits.power_drive = power_per_unit(ecu, ecu->rx.limits.drive_kW);
         limits.power_regen = power_per_unit(ecu, ecu->rx.limits.regen_kW);

@@ -78,3 +78,24 @@ def test_power_limits_that_stop_coming_take_the_torque_back(rig: Rig, figures: F
     figures.plot("The battery's limits stop coming at 0 s", [("torque, N·m", [("shaft", time_s, trace[TRUTH])])])
     figures.promise("torque left after 0.45 s", np.abs(trace[TRUTH][time_s > 0.45]).max(), NO_TORQUE_NM, "N·m")
     assert rig.signal("INV_DcLink", "DeratingReason") == 7.0
+
+
+@pytest.mark.plant
+def test_power_limits_that_stop_coming_while_they_limit_let_no_more_power_through_on_the_way(
+    rig: Rig, figures: Figures
+) -> None:
+    """100 N·m asked for, 12 kW allowed: about 36 N·m; the ramp that ends the torque begins beyond."""
+    rig.turn(3000.0)
+    rig.power_limits_kW = (12.0, 60.0)
+    rig.start(100.0)
+    rig.advance(1.5)
+    trace = rig.record(["truth.time_s", TRUTH, "truth.idc_A", "truth.vdc_V"])
+    rig.power_limits_kW = None
+    rig.advance(0.6)
+    time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
+    power_kW = 1e-3 * trace["truth.idc_A"] * trace["truth.vdc_V"]
+    figures.plot("The battery's limits stop coming at 0 s", [
+        ("torque, N·m", [("shaft", time_s, trace[TRUTH])]), ("power, kW", [("dc link", time_s, power_kW)]),
+    ])  # fmt: skip
+    figures.promise("largest power", power_kW.max() / 12.0, 1.1, "of what was allowed")
+    figures.promise("torque left after 0.45 s", np.abs(trace[TRUTH][time_s > 0.45]).max(), NO_TORQUE_NM, "N·m")

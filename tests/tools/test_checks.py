@@ -78,6 +78,7 @@ def test_a_clean_tree_passes(tree: Path, name: str) -> None:
         ("firmware/control/novel.c", '"control/mrai.h"', "has no place in PIPELINE"),
         ("firmware/safety/bad.c", '"control/mrai.h"', "not firmware/control/mrai.h"),
         ("firmware/app/bad.c", "<stdio.h>", "<stdio.h> in firmware/app"),
+        ("firmware/app/bad_isr.c", '"comm/messages.h"', "an interrupt packs nothing for the bus"),
         ("firmware/app/bad.c", '"plant/plant.h"', "not tests/plant/plant.h"),
         ("hal/bad.h", '"control/mrai.h"', "not firmware/control/mrai.h"),
         ("hal/mps2/bad.c", '"hal/host/port.h"', "not hal/host/port.h"),
@@ -90,6 +91,7 @@ def test_a_planted_include_against_the_layers_is_found(
     tree: Path, path: str, include: str, word: str
 ) -> None:
     write(tree, "hal/host/port.h", "")
+    write(tree, "firmware/comm/messages.h", "")
     write(tree, path, f"#  include {include}\n")
     code, messages = check("layers", tree)
     assert code == 1

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import can
 import cantools.database
+import numpy as np
 import pandas as pd
 import pytest
+from asammdf import MDF, Signal
 from click.testing import CliRunner, Result
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.cli import log
@@ -73,4 +75,13 @@ def test_a_file_that_is_no_log_is_refused(tmp_path: Path, content: bytes | None)
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(FluxtrueError, match="bad.mf4"):
+        signals_of(path)
+
+
+def test_a_recording_of_something_else_under_that_name_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.mf4"
+    with MDF(version="4.10") as recorded:
+        recorded.append(Signal(name="CAN_DataFrame", samples=np.arange(5.0), timestamps=np.arange(5.0)))
+        recorded.save(path)
+    with pytest.raises(FluxtrueError, match=r"other.mf4: not an MDF4 bus log \(no CAN_DataFrame.DataBytes\)"):
         signals_of(path)

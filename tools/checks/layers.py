@@ -121,6 +121,8 @@ def project_problem(root: Path, layer: Layer, path: Path, name: str) -> str | No
     if target is None:
         return f'"{name}" is not a file of the project'
     target_layer = layer_of(target)
+    if path.stem.endswith("_isr") and target.parts[:2] == ("firmware", "comm"):
+        return f"an interrupt packs nothing for the bus: {target}"
     if target_layer is layer:
         if layer.folder == "hal/*" and target.parts[:2] != path.parts[:2]:
             return f"one port may not include another: {target}"

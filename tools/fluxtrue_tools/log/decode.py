@@ -13,6 +13,7 @@ from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.errors import FluxtrueError
 
 FRAMES: Final = "CAN_DataFrame"
+FIELDS: Final = frozenset(f"{FRAMES}.{field}" for field in ("ID", "IDE", "DataLength", "DataBytes"))
 
 
 def signals_of(path: Path) -> dict[str, pd.Series]:
@@ -27,6 +28,9 @@ def signals_of(path: Path) -> dict[str, pd.Series]:
             frames = recorded.get(FRAMES)
     except Exception as error:  # the reader stumbles over a bad file in many ways
         raise FluxtrueError(f"{path}: not an MDF4 bus log ({error})") from error
+    missing = FIELDS - set(frames.samples.dtype.names or ())
+    if missing:
+        raise FluxtrueError(f"{path}: not an MDF4 bus log (no {min(missing)})")
     found = _decode(frames.samples, frames.timestamps)
     if not found:
         raise FluxtrueError(f"{path}: holds no frame that {DBC.name} describes")
