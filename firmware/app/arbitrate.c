@@ -52,6 +52,14 @@ static void drop(const arbitrate_config_t *config, arbitrate_state_t *state)
     state->rate = 0;
 }
 
+void arbitrate_hold(const arbitrate_config_t *config, arbitrate_state_t *state, q15_t allowed)
+{
+    const q31_t most = fx_add_q31(fx_abs_q15(allowed) * Q31_PER_Q15, config->jerk);
+    if (fx_abs_q31(state->torque) > most) {
+        *state = (arbitrate_state_t){.torque = fx_clamp_q31(state->torque, -most, most)};
+    }
+}
+
 q15_t arbitrate_step(const arbitrate_config_t *config, arbitrate_state_t *state, const arbitrate_in_t *in)
 {
     if (!in->run) {

@@ -8,6 +8,8 @@
  *   that stays (the last step may take two jerks); a rate that leads away from the target, or would pass one that has
  *   come nearer, is dropped at once: torque never rises after it was taken back, and never overshoots.
  *   drop     torque goes to zero with ramp_out alone: no jerk limit may delay it
+ * arbitrate_hold(): what the drive's own limits did not allow is not remembered, but for one jerk, by which they still
+ *   tell that they limit: when they open, the torque rises from where it is, with slew and jerk.
  * Source   docs/howto/can.md, torque path
  * Units    per unit of T_b, q15; slew, jerk and ramp_out in q31 per step (and per step squared)
  * Range    slew, jerk, ramp_out > 0 and below 2^29
@@ -38,6 +40,8 @@ typedef struct {
     bool drop; /* wanted is zero, reached with ramp_out */
 } arbitrate_in_t;
 
+/** Before the step; allowed is what the drive has made of the last step's answer. */
+void arbitrate_hold(const arbitrate_config_t *config, arbitrate_state_t *state, q15_t allowed);
 q15_t arbitrate_step(const arbitrate_config_t *config, arbitrate_state_t *state, const arbitrate_in_t *in);
 
 #endif

@@ -57,6 +57,7 @@ static void ask_drive(ecu_t *ecu)
 {
     request_t *request = &ecu->drive.request;
     const arbitrate_in_t in = ecu_arbitration(ecu);
+    arbitrate_hold(&ecu->arbitration, &ecu->torque, ecu->drive.task.allowed.torque);
     request->torque = arbitrate_step(&ecu->arbitration, &ecu->torque, &in);
     request->limits = ecu_limits(ecu);
     request->enable = in.run;
