@@ -251,6 +251,25 @@ void test_confidence_comes_when_a_point_has_told_five_eighths_and_not_before(voi
     TEST_ASSERT_TRUE(below && above);
 }
 
+/* A long stop: the leak forgets. Half a second after the upper level nothing is left, before it all. */
+void test_confidence_goes_when_three_quarters_are_forgotten_and_not_before(void)
+{
+    const dq_t i = {-4000, 8000};
+    const double slow = 0.01; /* nothing is learnt */
+    drive(nothing, 3);
+    double left = left_of_variance(i, slow);
+    TEST_ASSERT_TRUE(left < 0.375);
+    for (int n = 0; n < 1000 && left < 0.745; n++) {
+        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+        run(i, slow, nothing, 100);
+        left = left_of_variance(i, slow);
+    }
+    TEST_ASSERT_TRUE(left < 0.75);
+    run(i, slow, nothing, 3000);
+    TEST_ASSERT_TRUE(left_of_variance(i, slow) < 0.78);
+    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+}
+
 /* A resolver that is 30 degrees off: no parameter explains it. */
 void test_a_contradiction_takes_the_confidence_away(void)
 {
