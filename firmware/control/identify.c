@@ -94,18 +94,19 @@ static void learn(identify_state_t *state)
                                       fx_mul_q15(CONTRADICTION_RATE, fx_sat_q15(target - state->contradiction)));
 }
 
-/* Torque uncertainty against two levels: well below what the tables alone have, or small anyway; between the levels the
- * last decision holds (ID-18). */
+/* Torque uncertainty against two levels: well below what the tables alone have, or small against the torque; between
+ * the levels the last decision holds (ID-18). That no torque is certain to be no torque is no reason to trust. */
 static void judge(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
                   q15_t torque)
 {
     const identify_row_t row = identify_torque_row(config, model);
     const int64_t variance = identify_filter_variance(&state->filter, &row); /* Q60 */
     const int64_t prior = identify_filter_prior(&row);
-    const q15_t scale = (q15_t)fx_max_s32(fx_abs_q15(torque), config->torque_min);
-    const int64_t full = (int64_t)fx_mul_q30(scale, config->confidence_full); /* Q30 */
+    const q15_t size = fx_abs_q15(torque);
+    const q15_t scale = (q15_t)fx_max_s32(size, config->torque_min);
+    const int64_t full = (int64_t)fx_mul_q30(size, config->confidence_full); /* Q30 */
     const int64_t none = (int64_t)fx_mul_q30(scale, config->confidence_none);
-    const bool good = variance < prior >> 1 || variance < full * full;
+    const bool good = variance < (prior >> 2) + (prior >> 3) || variance < full * full;
     const bool bad = variance > prior - (prior >> 2) && variance > none * none;
     if (bad || state->contradiction > CONTRADICTION_MAX) {
         state->trusted = false;

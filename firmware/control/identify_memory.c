@@ -10,6 +10,14 @@ static const uint8_t halvings[IDENTIFY_STATES] = {
     [IDENTIFY_LD] = 8, [IDENTIFY_ANGLE] = 8, [IDENTIFY_IRON] = 6,
 };
 
+/* Magnet and q axis make the torque: known as (ID-18) wants it, there is nothing to wait for. */
+static bool known(const identify_filter_t *filter)
+{
+    const int32_t level = IDENTIFY_ONE_Q30 / 8 * 3;
+    return filter->p[identify_pair(IDENTIFY_FLUX, IDENTIFY_FLUX)] < level &&
+           filter->p[identify_pair(IDENTIFY_LQ, IDENTIFY_LQ)] < level;
+}
+
 identify_memory_t identify_memory_get(const identify_state_t *state)
 {
     identify_memory_t memory; /* every field is written below */
@@ -42,5 +50,7 @@ bool identify_memory_restore(identify_state_t *state, const identify_memory_t *m
         const int32_t variance = fx_add_q31(memory->variance[j], IDENTIFY_ONE_Q30 >> halvings[j]);
         state->filter.p[p] = fx_min_s32(variance, IDENTIFY_ONE_Q30);
     }
+    state->trusted = known(&state->filter);
+    state->confidence = state->trusted ? Q15_MAX : 0;
     return true;
 }

@@ -2,7 +2,8 @@
 #ifndef CONTROL_IDENTIFY_MEMORY_H
 #define CONTROL_IDENTIFY_MEMORY_H
 /** What the identification takes over a power cycle: its parameters and how sure it was of each.
- *   restore  P_jj = min(1, stored + what may have happened since), correlations forgotten
+ *   restore  P_jj = min(1, stored + what may have happened since), correlations forgotten; trusted at once if
+ *            magnet and q axis are then known to 3/8 of their prior's variance
  * Source   docs/theory/identification.md (ID-19)
  * Units    as in control/identify_filter.h; the record holds no padding, so that a checksum over its bytes is sound
  * Range    a record of another version or with a value out of range is refused and changes nothing

@@ -36,7 +36,7 @@ q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *
     if (!in->enabled) {
         /* Leaks instead of dropping to zero: switching off is as bumpless as switching on (TL-8). */
         state->correction = fx_sub_q31(state->correction, fx_mul_q31(fx_q31_from_q15(config->ki), state->correction));
-    } else if (in->command != 0) {
+    } else if (fx_abs_q15(in->command) >= config->torque_min / 2) { /* (TL-5): an offset is not a ratio */
         const q15_t relative = relative_error(config, in->command, error);
         /* At a limit a positive correction may not grow; a negative one goes back to the command (TL-7). */
         const q31_t moved = fx_add_q31(state->correction, product_q31(config->ki, relative));

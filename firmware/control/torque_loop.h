@@ -4,6 +4,7 @@
 /** Torque closed loop: a relative correction of the torque request, so that what was learnt at one torque
  * serves at another.
  *   r = T* (1 + x) + k_p e,  e = T_m - T^,  x += k_i e / max(|T*|, T_min) sign(T*),  |r - T*| <= c A |T*|
+ *   x is kept while |T*| < T_min/2: there an offset of T^ would become a ratio.
  *   T_m = T* through the closed loop's own first-order response: a step excites no integrator.
  *   While voltage or current limit is active x does not grow beyond 0; switched off it leaks to 0 at the loop's own
  *   rate. The authority A is scaled by the confidence c in the estimate: at c = 0 the request is the command.

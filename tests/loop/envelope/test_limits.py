@@ -72,4 +72,5 @@ def test_low_dc_voltage_takes_driving_and_high_dc_voltage_generating_torque(hsm1
     high = Rig(hsm1, 1000.0, -60.0, vdc_V=433.0).run(0.3)  # 434 V is the end of the line
     assert high.faults == 0
     assert abs(high.settled()) <= 15.0
-    assert Rig(hsm1, 1000.0, 60.0, vdc_V=433.0).run(0.3).settled() == pytest.approx(60.0, abs=0.5)
+    # The tables alone are 0.7 N·m short: a second and a half until the loop is trusted and has closed.
+    assert Rig(hsm1, 1000.0, 60.0, vdc_V=433.0).run(1.5).settled() == pytest.approx(60.0, abs=0.5)

@@ -111,7 +111,8 @@ static void judge(const motor_si_t *motor, twin_identify_t *s, const twin_model_
     const double uncertain = k * sqrt(variance(&s->filter, m->torque));
     const double prior = k * sqrt(dot(m->torque, m->torque));
     const double scale = fmax(fabs(s->torque), motor->identify_torque_min_Nm);
-    const bool good = (uncertain < sqrt(0.5) * prior) || (uncertain < motor->identify_confidence_full * scale);
+    const bool good = (uncertain < sqrt(0.375) * prior) ||
+                      (uncertain < motor->identify_confidence_full * fabs(s->torque));
     const bool bad = (uncertain > sqrt(0.75) * prior) && (uncertain > motor->identify_confidence_none * scale);
     if (bad || (s->contradiction > contradiction_max)) {
         s->trusted = false;

@@ -34,6 +34,8 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
         state->correction -= motor->torque_ki * state->correction;
     } else {
         p = motor->torque_kp * e;
+    }
+    if (in->enabled && (fabs(in->command) >= 0.5 * motor->torque_min_Nm)) {
         /* More than 100 % of error is no measurement: it may not move the ratio faster. */
         const double relative = e * direction / fmax(fabs(in->command), motor->torque_min_Nm);
         const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);

@@ -206,6 +206,70 @@ void test_confidence_starts_at_nothing_and_comes_with_knowledge_in_half_a_second
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
 }
 
+/* Share of the tables' torque variance that is left here, from the twin's covariance. */
+static double left_of_variance(dq_t i, double omega)
+{
+    const window_pair_t pair = steady_window(&f, i, omega, (dq_t){0, 0});
+    const twin_point_t point = twin_point(&f.si, &pair.twin, omega * f.w);
+    const twin_model_t m = twin_model(&f.si, &point, f.si.r_ohm_20);
+    double posterior = 0.0, prior = 0.0;
+    for (int j = 0; j < TWIN_STATES; j++) {
+        prior += m.torque[j] * m.torque[j];
+        for (int l = 0; l < TWIN_STATES; l++) {
+            posterior += m.torque[j] * twin.filter.p[j][l] * m.torque[l];
+        }
+    }
+    return posterior / prior;
+}
+
+/* No torque is certain to be no torque, whatever is known; it must not open the loop for the torque that follows. */
+void test_without_torque_no_confidence_comes_at_any_speed(void)
+{
+    static const double speed[4] = {0.0, 0.015, 0.3, -0.8};
+    for (int n = 0; n < 4; n++) {
+        run((dq_t){0, 0}, speed[n], nothing, 2000);
+        run((dq_t){-100, 300}, speed[n], nothing, 2000); /* too little to learn from */
+        TEST_ASSERT_FALSE(state.trusted);
+        TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    }
+}
+
+/* Three eighths of the tables' variance must be left at most, approached from above at one point and speed by speed. */
+void test_confidence_comes_when_a_point_has_told_five_eighths_and_not_before(void)
+{
+    const dq_t i = {-4000, 8000};
+    bool below = false, above = false;
+    for (double omega = 0.022; omega < 0.3; omega *= 1.1) {
+        identify_reset(&c, &state);
+        twin_identify_reset(&f.si, &twin);
+        run(i, omega, nothing, 20000);
+        const double left = left_of_variance(i, omega);
+        TEST_ASSERT_EQUAL_INT((left < 0.375) ? Q15_MAX : 0, state.confidence);
+        below = below || (left < 0.375 && left > 0.3);
+        above = above || (left > 0.375 && left < 0.45);
+    }
+    TEST_ASSERT_TRUE(below && above);
+}
+
+/* A long stop: the leak forgets. Half a second after the upper level nothing is left, before it all. */
+void test_confidence_goes_when_three_quarters_are_forgotten_and_not_before(void)
+{
+    const dq_t i = {-4000, 8000};
+    const double slow = 0.01; /* nothing is learnt */
+    drive(nothing, 3);
+    double left = left_of_variance(i, slow);
+    TEST_ASSERT_TRUE(left < 0.375);
+    for (int n = 0; n < 1000 && left < 0.745; n++) {
+        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+        run(i, slow, nothing, 100);
+        left = left_of_variance(i, slow);
+    }
+    TEST_ASSERT_TRUE(left < 0.75);
+    run(i, slow, nothing, 3000);
+    TEST_ASSERT_TRUE(left_of_variance(i, slow) < 0.78);
+    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+}
+
 /* A resolver that is 30 degrees off: no parameter explains it. */
 void test_a_contradiction_takes_the_confidence_away(void)
 {
@@ -322,6 +386,19 @@ void test_what_was_learnt_survives_a_power_cycle_with_less_certainty(void)
     TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, again.variance[IDENTIFY_R]); /* the winding has cooled */
     TEST_ASSERT_EQUAL_INT32(memory.variance[IDENTIFY_FLUX] + IDENTIFY_ONE_Q30 / 4, again.variance[IDENTIFY_FLUX]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, magnet, from_q31(identify_value(&c, &restored, IDENTIFY_FLUX)));
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, restored.confidence);
+}
+
+/* The magnet's quarter on top of an eighth is the level; the q axis has hardly changed. */
+void test_a_record_that_knows_too_little_of_magnet_or_q_axis_is_not_trusted_at_once(void)
+{
+    identify_memory_t memory = identify_memory_get(&state);
+    for (int n = 0; n < 4; n++) {
+        memory.variance[IDENTIFY_FLUX] = IDENTIFY_ONE_Q30 / 8 - (n & 1);
+        memory.variance[IDENTIFY_LQ] = (n & 2) ? IDENTIFY_ONE_Q30 / 3 : IDENTIFY_ONE_Q30 / 2;
+        TEST_ASSERT_TRUE(identify_memory_restore(&state, &memory));
+        TEST_ASSERT_EQUAL_INT((n == 3) ? Q15_MAX : 0, state.confidence);
+    }
 }
 
 void test_a_foreign_record_is_refused_and_changes_nothing(void)

@@ -182,11 +182,28 @@ void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
 void test_small_commands_learn_slower_instead_of_louder(void)
 {
     f.torque_loop.kp = 0;
-    in.command = 65; /* a tenth of T_min = 655 */
+    in.command = 400; /* T_min = 655 */
     in.estimate = 0;
-    state.model = 65 * 65536;
+    state.model = 400 * 65536;
     (void)step();
-    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 65.0 / 655.0, from_q31(state.correction));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 400.0 / 655.0, from_q31(state.correction));
+}
+
+/* Coasting at a 100th of T_min with an estimate that is a little off: as a ratio it would be all of the authority, and
+ * the next request would be wrong by it. What was learnt is kept. */
+void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state = (torque_loop_state_t){.correction = Q31(0.1), .model = sign * 6 * 65536};
+        in.command = (q15_t)(sign * 6);
+        in.estimate = (q15_t)(-20 * sign);
+        for (int n = 0; n < 10000; n++) {
+            (void)step();
+        }
+        in.command = in.estimate = (q15_t)(sign * 10000);
+        state.model = sign * 10000 * 65536;
+        TEST_ASSERT_INT_WITHIN(2, sign * 11000, step());
+    }
 }
 
 void test_one_lsb_of_alternating_error_does_not_walk_in_a_million_steps(void)
