@@ -177,3 +177,39 @@ void test_the_ends_of_the_format_do_no_harm(void)
     in.request = Q15_MAX;
     TEST_ASSERT_EQUAL_INT(Q15_MAX, steps(1000));
 }
+
+/* The drive allows 5000 of 16000; opened after a while, it rises from there: 40 more each millisecond. */
+void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_it_opens(void)
+{
+    in.request = 16000;
+    q15_t asked = 0;
+    for (int n = 0; n < 200; n++) {
+        arbitrate_hold(&config, &state, (q15_t)(asked < 5000 ? asked : 5000));
+        asked = step();
+        TEST_ASSERT_LESS_OR_EQUAL_INT(5000 + 400, asked); /* at most the last step before it was held */
+    }
+    TEST_ASSERT_EQUAL_INT(5080, asked); /* beyond the limit, which so is seen to limit */
+    q15_t before = 5000;
+    q15_t rate = 0;
+    while (asked < 16000) {
+        TEST_ASSERT_LESS_OR_EQUAL_INT(rate + 81, asked - before);
+        rate = (q15_t)(asked - before);
+        TEST_ASSERT_LESS_OR_EQUAL_INT(400, rate);
+        before = asked;
+        arbitrate_hold(&config, &state, asked);
+        asked = step();
+    }
+    TEST_ASSERT_EQUAL_INT(16000, asked);
+}
+
+void test_a_limit_that_does_not_limit_changes_nothing(void)
+{
+    in.request = -12000;
+    arbitrate_state_t alone = state;
+    for (int n = 0; n < 100; n++) {
+        arbitrate_hold(&config, &state, n == 0 ? 0 : fx_q15_from_q31(state.torque));
+        (void)step();
+        (void)arbitrate_step(&config, &alone, &in);
+        TEST_ASSERT_EQUAL_INT32(alone.torque, state.torque);
+    }
+}
