@@ -2,8 +2,9 @@
 #ifndef APP_DRIVE_H
 #define APP_DRIVE_H
 /** One drive: configuration, the state of every stage, and the three activities that run it.
- *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), then pends mrai_isr
- *   mrai_isr  each PWM period, below the fast ISR: the paper's identification and torque estimate
+ *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), windows of the
+ *     robust identification; for the paper's it pends mrai_isr
+ *   mrai_isr  below the fast ISR: the paper's identification and torque estimate
  *   task_1khz every tenth period, below both: request, torque loop, current reference, identification schedule,
  *     supervision
  * Source   docs/architecture.md
@@ -29,7 +30,7 @@ typedef enum {
 } identification_mode_t;
 
 /** What the outside asks. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
- * the MRAI ISR; every field is aligned and read word by word. */
+ * the MRAI ISR, identification_mode by the fast ISR; every field is aligned and read word by word. */
 typedef struct {
     q15_t torque;
     dq_t i_ref;          /* current mode only */

@@ -29,7 +29,7 @@ static void report_robust(drive_t *drive)
     task->quality.r_quality = known(state, IDENTIFY_R);
 }
 
-/* Ten periods from the MRAI ISR, the tables at their magnetising current, and what follows from both. */
+/* Ten periods summed by the fast ISR, the tables at their magnetising current, and what follows from both. */
 static void robust(drive_t *drive, const view_t *view)
 {
     const motor_t *m = &drive->motor;

@@ -53,6 +53,7 @@ static inline bool monitor_quiet(const monitor_config_t *config, const monitor_s
 /** The angle has jumped: not a quiet period. */
 static inline void monitor_note_jump(monitor_state_t *state)
 {
+    __asm__ volatile(""); /* behind a branch: no instructions that all other periods skip */
     state->attention |= MONITOR_JUMPED;
 }
 
