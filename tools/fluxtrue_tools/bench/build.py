@@ -16,9 +16,11 @@ FIRMWARE = ROOT / "firmware"
 FX_SOURCES = (Path(__file__).with_name("fx_kernels.c"), *sorted((FIRMWARE / "fx").glob("*.c")))
 ARM_CC = "arm-none-eabi-gcc"
 # As tools/cmake/arm-none-eabi.cmake compiles the firmware.
-ARM_FLAGS = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns")
+ARM_FLAGS = (
+    "-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16", "-fno-schedule-insns", "-fno-caller-saves",
+)  # fmt: skip
 COMMON = ("-std=c11", "-O2", "-ffp-contract=off", f"-I{FIRMWARE}")
-SMALL = ("-Os", "-fno-schedule-insns2", "-fno-move-loop-invariants")
+SMALL = ("-Os", "-fcaller-saves", "-fno-schedule-insns2", "-fno-move-loop-invariants")
 _LIST = (FIRMWARE / "fast_sources.txt").read_text(encoding="utf-8").splitlines()
 FAST = frozenset(FIRMWARE / line for line in _LIST if not line.startswith("#"))
 
