@@ -144,7 +144,7 @@ static inline int32_t one_table(const fx_grid_t *g, int32_t x, int32_t y)
 {
     const fx_cell_t cell = fx_cell(g, x, y);
     const int32_t z = fx_cell_interp(values, g->ny, cell);
-    return cell.clamped ? ~z : z;
+    return (cell.outside != 0U) ? ~z : z;
 }
 
 static inline int32_t five_tables(const fx_grid_t *g, int32_t x, int32_t y)
@@ -155,7 +155,7 @@ static inline int32_t five_tables(const fx_grid_t *g, int32_t x, int32_t y)
     z += fx_cell_interp(&values[2], g->ny, cell);
     z += fx_cell_interp(&values[3], g->ny, cell);
     z += fx_cell_interp(&values[4], g->ny, cell);
-    return cell.clamped ? ~z : z;
+    return (cell.outside != 0U) ? ~z : z;
 }
 
 KERNEL1(lookup1, int32_t, int32_t, lookup1(a))
