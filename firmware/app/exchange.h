@@ -113,14 +113,7 @@ static inline const sample_t *sample_box_look(const sample_box_t *box, uint32_t 
 
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)
 {
-    identify_window_t *slot = &box->slot[(box->generation + 1U) & 1U];
-    slot->first = window->first; /* part by part: the compiler calls the library for more than 64 bytes */
-    slot->last = window->last;
-    slot->sum_i = window->sum_i;
-    slot->sum_u = window->sum_u;
-    slot->count = window->count;
-    slot->limited = window->limited;
-    slot->acting = window->acting;
+    box->slot[(box->generation + 1U) & 1U] = *window;
     exchange_barrier();
     box->generation = box->generation + 1U;
 }
