@@ -16,7 +16,7 @@ static int32_t product_q30(int32_t a_q30, q15_t b)
 /* What has been compensated while it was measured, on top of what is left: the inverter's own (CM-2). */
 static void add_compensated(const modulate_config_t *config, q15_t v_dc, commission_curve_t *curve)
 {
-    const int32_t full = fx_mul_q30(config->dead_time, v_dc);
+    const int32_t full = config->dead_time_q16 / 2 * v_dc;
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
         const q15_t share = fx_sat_q15(fx_mulhi(config->knee_q17, curve->knot[k])); /* Q17 * Q30 = Q15 */
         curve->v[k] = fx_add_q31(curve->v[k], product_q30(full, share));
@@ -52,14 +52,15 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
     return fits && credible(drive, curve) && drive_compensate(drive, &found);
 }
 
-/* One half word for the fast ISR; (MO-11) must hold before it adds more. */
+/* One word for the fast ISR; (MO-11) must hold before it adds more. */
 static void apply(motor_t *m, q15_t dead_time)
 {
-    const int32_t span = 32768 - 2 * (m->modulate.min_pulse + dead_time);
-    const int32_t clear_q30 = fx_max_s32((span > 0) ? fx_mul_q30((q15_t)span, (q15_t)span) / 3 - 1 : 0, 0);
-    m->current_control.clear_q32 = fx_min_s32(m->current_control.clear_q32, 4 * clear_q30);
+    const uint32_t clear_q30 = motor_clear_q30(m, dead_time);
+    if (clear_q30 < m->current_control.clear_q30) {
+        m->current_control.clear_q30 = clear_q30;
+    }
     exchange_barrier();
-    m->modulate.dead_time = dead_time;
+    m->modulate.dead_time_q16 = 2 * dead_time;
 }
 
 bool drive_compensate(drive_t *drive, const compensation_t *compensation)
@@ -87,7 +88,7 @@ void drive_trim(drive_t *drive, q15_t v_dc)
         .x = filter->x[IDENTIFY_DROP],
         .variance = filter->p[identify_pair(IDENTIFY_DROP, IDENTIFY_DROP)],
         .v_dc = v_dc,
-        .dead_time = drive->motor.modulate.dead_time,
+        .dead_time = (q15_t)(drive->motor.modulate.dead_time_q16 / 2),
         .learning = drive->request.trim && task->identify.learn &&
                     task->identify.contradiction <= CONTRADICTION_MAX,
     };
@@ -101,7 +102,7 @@ void drive_trim(drive_t *drive, q15_t v_dc)
 void drive_retrim(drive_t *drive, int32_t trim)
 {
     motor_t *m = &drive->motor;
-    apply(m, dead_time_trim_restore(&drive->task.trim, m->modulate.dead_time, trim));
+    apply(m, dead_time_trim_restore(&drive->task.trim, (q15_t)(m->modulate.dead_time_q16 / 2), trim));
 }
 
 static void begin(drive_t *drive, const commission_config_t *config)

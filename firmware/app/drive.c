@@ -1,29 +1,46 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
 
+#define CIRCLE_CLEAR_Q30 1007681536 /* (31/32)^2 */
+
 static bool modulate_valid(const modulate_config_t *c)
 {
-    return c->v_dc_min > 1 && c->knee_q17 > 0 && c->knee_q17 < (1 << 30) && c->knee_side_q17 > 0 &&
-           c->knee_side_q17 < (1 << 30);
+    return c->longest_q31 > Q31(0.25) && c->longest_q31 <= c->nearer_rail_q31 && c->nearer_rail_q31 <= Q31(0.5) &&
+           c->dead_time_q16 >= 0 && c->knee_q17 > 0 &&
+           c->knee_q17 < (1 << 30) && c->knee_side_q17 > 0 && c->knee_side_q17 < (1 << 30);
+}
+
+/* Three users of one number, 1/2 < v_ratio < 0.7: as it is, its inverse (Q15 * Q16 = Q31), sqrt(3)/2 of it. */
+static bool ratio_valid(const motor_t *m)
+{
+    const int32_t ratio_q31 = m->modulate.alpha_q31;
+    const uint32_t one_q31 = (uint32_t)(ratio_q31 >> 16) * (m->current_control.per_ratio_q31 >> 15);
+    const int32_t off = m->modulate.side_q31 - fx_mul_q31(ratio_q31, Q31(0.86602540378443865));
+    return ratio_q31 > Q31(0.5) && ratio_q31 < Q31(0.7) && one_q31 - 0x7FF80000U < 0x100000U && off > -16 && off < 16;
 }
 
 static bool control_valid(const motor_t *m)
 {
     const current_control_config_t *c = &m->current_control;
     return c->sigma_q24 > 0 && c->setpoint_weight > 0 && c->integral_gain >= 0 && c->integral_gain < Q15(0.5) &&
-           c->tracking_gain >= 0 && c->tracking_gain < Q15(0.5) && c->v_ratio > 0 && c->v_ratio < Q15(0.7) &&
+           c->tracking_gain_q16 >= 0 && c->tracking_gain_q16 < Q16(0.5) && ratio_valid(m) &&
            m->voltage_reserve.v_ratio > 0 && m->voltage_reserve.trim_min <= 0 && m->voltage_reserve.trim_max >= 0 &&
            m->torque_loop.authority > 0 && m->torque_loop.torque_min > 0 && modulate_valid(&m->modulate);
 }
 
-/* (MO-11): the largest distance of two phases is sqrt(3) |u|/v_dc; the d axis alone may take 31/32 of the circle. */
+/* (MO-11): the largest distance of two phases is sqrt(3) v_ratio |v|; current control cuts from 31/32 on. 1/v_ratio is
+ * Q15 in two factors, below 2 each. */
+uint32_t motor_clear_q30(const motor_t *m, int32_t dead_time)
+{
+    const int32_t span = 2 * ((m->modulate.longest_q31 >> 16) - dead_time);
+    const int64_t per_ratio = m->current_control.per_ratio_q31 >> 16;
+    const int64_t most_q30 = (((span > 0) ? span * span / 3 : 0) * per_ratio >> 15) * per_ratio >> 15;
+    return (uint32_t)((most_q30 < CIRCLE_CLEAR_Q30) ? most_q30 : CIRCLE_CLEAR_Q30);
+}
+
 static bool clear_valid(const motor_t *m)
 {
-    const int32_t ratio = m->current_control.v_ratio - m->current_control.v_ratio / 32;
-    const int32_t span = 32768 - 2 * (m->modulate.min_pulse + m->modulate.dead_time);
-    const int64_t clear_q30 = m->current_control.clear_q32 / 4;
-    return m->current_control.clear_q32 >= 0 && span > 0 && clear_q30 <= ratio * ratio &&
-           3 * clear_q30 <= (int64_t)span * span;
+    return m->current_control.clear_q30 <= motor_clear_q30(m, m->modulate.dead_time_q16 / 2);
 }
 
 /* The quick look may miss nothing: sqrt(quiet) + sum_max/3 <= i_trip. */

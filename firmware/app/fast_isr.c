@@ -117,27 +117,12 @@ static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
     drive->fast.periods_on = 0;
 }
 
-/* Circle or hexagon: what the bridge makes, and the voltage to come, may not be what is wanted. By registers, two of
- * the duties in one: what goes through memory would be kept there in every period. */
-static __attribute__((noinline, flatten)) uint64_t bridge_limited(drive_t *drive, sample_t *sample, fx_pair_t u,
-                                                                  fx_pair_t i, fx_pair_t advanced, bool limited)
+/* Circle or hexagon: what the bridge makes, and the voltage to come, may not be what is wanted. */
+static __attribute__((noinline, flatten)) void bridge_limited(drive_t *drive, sample_t *sample, duty_t duty, const instant_t *now)
 {
-    const dq_t wanted = {(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)};
-    const modulate_in_t in = {wanted, i, advanced, sample->v_dc};
-    const modulate_out_t made = modulate_step(&drive->motor.modulate, &in);
-    sample->voltage_limited = limited || made.limited;
-    if (made.limited) {
-        sample->snapped = true;
-        identify_window_snapped(&drive->fast.window);
-        drive->fast.coming = modulate_acted(&drive->motor.modulate, &in, made.duty);
-    }
-    return (uint64_t)made.duty.c << 32 | made.duty.b << 16 | made.duty.a;
-}
-
-static duty_t unpacked(uint64_t duty)
-{
-    const uint32_t lower = (uint32_t)duty;
-    return (duty_t){lower & 0xFFFFU, lower >> 16, (uint32_t)(duty >> 32)};
+    sample->snapped = true;
+    identify_window_snapped(&drive->fast.window);
+    drive->fast.coming = modulate_acted(&drive->motor.modulate, duty, now->i_dq, now->advanced, now->v_dc);
 }
 
 /* The duties of the first period act in the second; the third sample ends a period of which they are known. */
@@ -169,12 +154,15 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
     sample->snapped = false;
     fast->coming.d = wanted.u.d;
     fast->coming.q = wanted.u.q;
-    const fx_pair_t u = fx_arch_pkhbt(wanted.u.d, wanted.u.q);
     duty_t duty;
     if (__builtin_expect(wanted.clear, 1)) {
-        duty = modulate_clear(&m->modulate, u, now->i_dq, now->advanced, now->v_dc);
+        duty = modulate_clear(&m->modulate, wanted.v, now->i_dq, now->advanced);
     } else {
-        duty = unpacked(bridge_limited(drive, sample, u, now->i_dq, now->advanced, wanted.limited));
+        const modulate_out_t made = modulate_step(&m->modulate, wanted.v, now->i_dq, now->advanced);
+        duty = made.duty;
+        if ((made.limited | wanted.limited) != 0U) {
+            bridge_limited(drive, sample, duty, now);
+        }
     }
     hal_pwm_write(duty);
     hal_pwm_enable(true);

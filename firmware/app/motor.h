@@ -61,4 +61,7 @@ extern const motor_t motor;
 
 bool motor_valid(const motor_t *motor);
 
+/** The largest current_control.clear_q30 with such a dead time. */
+uint32_t motor_clear_q30(const motor_t *motor, int32_t dead_time);
+
 #endif

@@ -10,17 +10,17 @@
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s
  * While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if the reference had been one
  * that the voltage can follow, and no slow tail remains.
- *   |u| <= v_max = v_ratio v_dc: u_d comes first with up to 31/32 v_max, u_q gets sqrt(v_max^2 - u_d^2) and gives up
- *   what u_d is short of, with the sign of w
- * While d asks for more flux (psi_d* > psi_d) the vector is shortened instead, else u_q could never shed the flux
- * that binds u_d.
- * clear: |u| < v_clear v_dc, a circle inside of everything that may limit here or in the modulation (MO-11)
- * Source   docs/theory/current-control.md (CC-4) ... (CC-14)
+ *   v = u/v_max, v_max = v_ratio v_dc, |v| <= 1: v_d comes first, v_q gets what the circle leaves, at least a quarter,
+ *   and gives up what v_d is short of, with the sign of w
+ * While d asks for more flux (psi_d* > psi_d) q comes first instead, else it could never shed the flux that binds d.
+ * clear: |v| < v_clear/v_ratio, a circle inside of everything that may limit here or in the modulation (MO-11)
+ * Source   docs/theory/current-control.md (CC-4) ... (CC-15)
  * Units    per unit
- * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; v_ratio < 0.7; |s| <= 1
- * Rounding half up: 1/2 LSB q15 in u; s takes its step exactly
+ * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; 0.5 < v_ratio < 0.7; |s| <= 1; v_dc from 0; below
+ *          1/(64 v_ratio) it is taken for that, below 2 LSB the voltage is none
+ * Rounding half up: 1/2 LSB q15 in u and in v; s takes its step exactly; the circle in 256 steps from inside
  * Errors   saturates and says so in limited; no fault of its own
- * Context  step: fast ISR, one root, or its inverse, only while limited; no division; target: 1 kHz task */
+ * Context  step: fast ISR, one bounded hardware division; target: 1 kHz task */
 #include <stdbool.h>
 
 #include "control/flux_table_types.h"
@@ -31,9 +31,9 @@ typedef struct {
     q16_t drop_gain;       /* r/sigma: flux that asks for the resistive drop */
     q15_t setpoint_weight; /* b = w_c/(w_c + a) */
     q15_t integral_gain;   /* sigma a_i < 1/2 */
-    q15_t tracking_gain;   /* a T_s = a_i/b < 1/2 */
-    q15_t v_ratio;         /* usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
-    int32_t clear_q32;     /* v_clear^2: below this part of v_dc nothing limits; v_clear <= 31/32 v_ratio */
+    int32_t tracking_gain_q16; /* a T_s v_ratio = a_i v_ratio/b < 1/2 */
+    uint32_t per_ratio_q31; /* 1/v_ratio: usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
+    uint32_t clear_q30;    /* (v_clear/v_ratio)^2 < 1: inside, nothing limits */
 } current_control_config_t;
 
 /** Where the current shall go, in flux linkage. */
@@ -55,8 +55,9 @@ typedef struct {
 } current_control_in_t;
 
 typedef struct {
-    dq_t u;
-    bool limited; /* the circle cut it */
+    dq_t u;       /* wanted, per unit of V_b */
+    fx_pair_t v;  /* (d, q) of what the circle leaves of it, per unit of v_max */
+    uint32_t limited; /* not zero: the circle cut it */
     bool clear;
 } current_control_out_t;
 

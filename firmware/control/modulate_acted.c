@@ -6,16 +6,16 @@
 static int32_t effective(const modulate_config_t *config, uint32_t duty, int32_t sign)
 {
     const bool switches = duty != 0U && duty != DUTY_ONE;
-    return (int32_t)duty - (switches ? fx_mul_q15(config->dead_time, (q15_t)sign) : 0);
+    return (int32_t)duty - (switches ? ((config->dead_time_q16 * sign + 0x8000) >> 16) : 0);
 }
 
-dq_t modulate_acted(const modulate_config_t *config, const modulate_in_t *in, duty_t duty)
+dq_t modulate_acted(const modulate_config_t *config, duty_t duty, fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
 {
-    const phases_t sign = polarity(config, in->i, in->advanced);
+    const phases_t sign = polarity(config, i, advanced);
     const int32_t a = effective(config, duty.a, sign.a);
     const int32_t b = effective(config, duty.b, sign.b);
     const int32_t c = effective(config, duty.c, sign.c);
     /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
     const ab_t v = {transform_round((2 * a - b - c) * 10923), transform_round((b - c) * 18919)};
-    return park((ab_t){transform_round(v.alpha * in->v_dc), transform_round(v.beta * in->v_dc)}, in->advanced);
+    return park((ab_t){transform_round(v.alpha * v_dc), transform_round(v.beta * v_dc)}, advanced);
 }

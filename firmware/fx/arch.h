@@ -92,6 +92,21 @@ __attribute__((always_inline)) static inline int32_t fx_arch_ssat(int32_t x, uns
     return y;
 }
 
+__attribute__((always_inline)) static inline int32_t fx_arch_usat(int32_t x, unsigned bits)
+{
+    int32_t y;
+    __asm__("usat %0, %1, %2" : "=r"(y) : "n"(bits), "r"(x));
+    return y;
+}
+
+/* Without the trap that a port could ask for, a division by zero gives zero. */
+static inline int32_t fx_arch_udiv(uint32_t a, uint32_t b)
+{
+    int32_t y;
+    __asm__("udiv %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
+    return y;
+}
+
 /* The compiler makes two instructions of the builtins. */
 static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
 {

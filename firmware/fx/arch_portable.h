@@ -38,6 +38,18 @@ static inline int32_t fx_arch_ssat(int32_t x, unsigned bits)
     return (low > high) ? high : low;
 }
 
+static inline int32_t fx_arch_usat(int32_t x, unsigned bits)
+{
+    const int32_t high = (int32_t)((UINT32_C(1) << bits) - 1U);
+    const int32_t low = (x < 0) ? 0 : x;
+    return (low > high) ? high : low;
+}
+
+static inline int32_t fx_arch_udiv(uint32_t a, uint32_t b)
+{
+    return (int32_t)((b == 0U) ? 0U : a / b);
+}
+
 static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
 {
     return fx_arch_qadd(a, fx_arch_qadd(b, b));

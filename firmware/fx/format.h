@@ -58,6 +58,18 @@ __attribute__((always_inline)) static inline int32_t fx_sat_bits(int32_t x, unsi
     return fx_arch_ssat(x, bits);
 }
 
+/* Into [0, 2^bits - 1]; bits is a constant of 0 to 31. */
+__attribute__((always_inline)) static inline int32_t fx_usat_bits(int32_t x, unsigned bits)
+{
+    return fx_arch_usat(x, bits);
+}
+
+/* a/b as the instruction has it, 0 for b = 0. The bits of a quotient of 2^31 and more are those of a negative number. */
+static inline int32_t fx_quotient(uint32_t a, uint32_t b)
+{
+    return fx_arch_udiv(a, b);
+}
+
 static inline q31_t fx_sat_q31(int64_t x)
 {
     const int32_t high = (int32_t)(x >> 32);

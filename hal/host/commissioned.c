@@ -40,7 +40,7 @@ double commissioned_level_V(const fluxtrue_t *d)
 {
     const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation & 1U].v_dc / 32768.0 *
                           (double)d->drive.motor.bases.voltage_V;
-    return (double)d->drive.motor.modulate.dead_time / 32768.0 * v_dc_V;
+    return (double)d->drive.motor.modulate.dead_time_q16 / 65536.0 * v_dc_V;
 }
 
 double commissioned_knee_A(const fluxtrue_t *d)

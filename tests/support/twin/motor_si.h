@@ -21,7 +21,7 @@ typedef struct {
     /* current control */
     double sigma_rad_s, setpoint_weight, integral_ratio, v_ratio;
     /* modulation */
-    double dead_time_duty, knee_A, min_pulse_duty, v_dc_min_V;
+    double dead_time_duty, knee_A, min_pulse_duty;
     /* identification */
     double observer_m, flux_bandwidth_rad_s, resistance_bandwidth_rad_s;
     double flux_proportional, resistance_proportional; /* k_P/k_I in periods */

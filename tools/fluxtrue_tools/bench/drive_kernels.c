@@ -42,7 +42,7 @@ static struct {
     uint32_t theta_m;
     duty_t duty;
     bool gates;
-    bool limited;
+    uint32_t limited;
 } port;
 static drive_t drive;
 static drive_t copy;
@@ -200,24 +200,15 @@ STAGE void bench_torque_estimate(void)
     (void)torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta);
 }
 
-/* Apart from the usual case, as in the fast ISR. */
-static __attribute__((noinline, flatten)) void modulate_limited(const modulate_config_t *config, fx_pair_t u,
-                                                                fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
-{
-    const modulate_in_t in = {{(int16_t)(u & 0xFFFFU), (int16_t)(u >> 16)}, i, advanced, v_dc};
-    const modulate_out_t made = modulate_step(config, &in);
-    port.duty = made.duty;
-    port.limited = made.limited;
-}
-
 static void modulate(const modulate_config_t *config, const current_control_out_t *wanted, fx_pair_t i,
-                     fx_pair_t advanced, int32_t v_dc)
+                     fx_pair_t advanced)
 {
-    const fx_pair_t u = fx_arch_pkhbt(wanted->u.d, wanted->u.q);
     if (__builtin_expect(wanted->clear, 1)) {
-        port.duty = modulate_clear(config, u, i, advanced, v_dc);
+        port.duty = modulate_clear(config, wanted->v, i, advanced);
     } else {
-        modulate_limited(config, u, i, advanced, v_dc);
+        const modulate_out_t made = modulate_step(config, wanted->v, i, advanced);
+        port.duty = made.duty;
+        port.limited = made.limited | wanted->limited;
     }
 }
 
@@ -240,14 +231,15 @@ STAGE void bench_current_tick(void)
     };
     const current_control_out_t wanted =
         current_control_step(&m->current_control, &d->fast.current_control, &control);
-    modulate(&m->modulate, &wanted, i_dq, advanced, measured.v_dc);
+    modulate(&m->modulate, &wanted, i_dq, advanced);
 }
 
 /* What the leanest peer's tick has, of the same stages; all else is constant and so compiled away: inductance 1, no
  * feed-forward of speed, no dead time, a known dc voltage. */
 STAGE void bench_current_core(void)
 {
-    static const modulate_config_t bare = {.v_dc_min = 2};
+    static const modulate_config_t bare = {.alpha_q31 = Q31(0.6), .side_q31 = Q31(0.51961524227066314),
+                                           .longest_q31 = 1 << 30, .nearer_rail_q31 = 1 << 30};
     drive_t *d = the_copy();
     const fx_pair_t at = fx_rotation(found.theta_e);
     const dq_t i = park(clarke(found.phases), at);
@@ -255,7 +247,7 @@ STAGE void bench_current_core(void)
     const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
     const current_control_out_t wanted =
         current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
-    modulate(&bare, &wanted, 0, at, CORE_V_DC);
+    modulate(&bare, &wanted, 0, at);
 }
 
 STAGE void bench_measure(void)
@@ -288,8 +280,7 @@ STAGE void bench_current_control(void)
 STAGE void bench_modulate(void)
 {
     const drive_t *d = the_copy();
-    modulate(&d->motor.modulate, &found.wanted, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e),
-             sample_box_look(&d->samples, d->samples.generation)->v_dc);
+    modulate(&d->motor.modulate, &found.wanted, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e));
 }
 
 STAGE void bench_torque_path(void)

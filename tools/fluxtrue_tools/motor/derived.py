@@ -39,7 +39,7 @@ QUALITY_TIME_S = 0.05
 TORQUE_MODEL_RATE = 0.6
 TORQUE_MIN_SHARE = 0.1
 
-V_MAX_PER_VDC, V_MIN_PER_VDC, V_FLOOR_PER_VDC = 1.25, 0.4, 0.1
+V_MAX_PER_VDC, V_MIN_PER_VDC = 1.25, 0.4
 SUM_MAX_PER_FULL_SCALE = 0.05
 DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_max
 SPEED_TRIP = 0.8  # of the reserve of the speed base
@@ -73,7 +73,6 @@ class Derived:
     dead_time_duty: float
     knee_A: float
     min_pulse_duty: float
-    v_dc_min_V: float
     observer_s_rad_s: float
     flux_proportional: float
     resistance_proportional: float
@@ -151,8 +150,7 @@ def _modulation(config: MotorConfig) -> dict[str, float]:
     return {"dead_time_duty": duty * config.control.dead_time_compensation,
             "knee_A": KNEE_LSB * lsb_A,
             "min_pulse_duty": min_pulse,
-            "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0),
-            "v_dc_min_V": V_FLOOR_PER_VDC * inverter.vdc_V}
+            "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0)}
 
 
 def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_f_Vs: float) -> dict[str, float]:

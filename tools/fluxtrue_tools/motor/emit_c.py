@@ -120,18 +120,24 @@ def _current_control(motor: Motor) -> list[Row]:
             ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
             ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
             ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
-            ("tracking_gain", q15(d.integral_ratio / d.setpoint_weight, "tracking_gain"), "integral ratio over weight"),
-            ("v_ratio", q15(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
-            ("clear_q32", q31(2 * d.v_clear**2, "v_clear"), f"{d.v_clear:.6g} squared")]
+            ("tracking_gain_q16", q16(d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
+             "integral ratio over weight, times v_ratio"),
+            ("per_ratio_q31", f"{round(2**31 / d.v_ratio)}u", f"1/{d.v_ratio:.6g}"),
+            ("clear_q30", f"{round(2**30 * (d.v_clear / d.v_ratio) ** 2)}u", f"({d.v_clear:.6g} over v_ratio) squared")]
 
 
 def _modulate(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    return [("dead_time", q15(d.dead_time_duty, "dead_time"), f"{d.dead_time_duty:.6g} duty"),
+    min_pulse = q15(d.min_pulse_duty, "min_pulse")
+    # Twice the q15 number that commissioning moves.
+    dead_time = 2 * q15(d.dead_time_duty, "dead_time")
+    return [("alpha_q31", q31(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
+            ("side_q31", q31(math.sqrt(0.75) * d.v_ratio, "v_ratio"), "times sqrt(3)/2"),
             ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
             ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_gain"), "times sqrt(3)/2"),
-            ("min_pulse", q15(d.min_pulse_duty, "min_pulse"), f"{d.min_pulse_duty:.6g} duty"),
-            ("v_dc_min", q15(d.v_dc_min_V / b.voltage_V, "v_dc_min"), f"{d.v_dc_min_V:g} V")]
+            ("dead_time_q16", dead_time, f"{d.dead_time_duty:.6g} duty"),
+            ("longest_q31", (1 << 30) - 65536 * min_pulse, f"half a duty less {d.min_pulse_duty:.6g}"),
+            ("nearer_rail_q31", (1 << 30) - 32768 * min_pulse, "less half of that")]
 
 
 def _mrai_gains(motor: Motor) -> list[Row]:
@@ -339,7 +345,7 @@ def motor_tables_c(motor: Motor) -> str:
 
 _SI_DERIVED = (
     "tracker_bandwidth_rad_s", "sigma_rad_s", "setpoint_weight", "integral_ratio", "v_ratio", "dead_time_duty",
-    "knee_A", "min_pulse_duty", "v_dc_min_V", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
+    "knee_A", "min_pulse_duty", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
     "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
     "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
     "torque_slew_Nm", "ref_v_ratio", "trim_gain", "trim_min_V", "trim_max_V", "i_trip_A", "v_max_V", "v_min_V",
