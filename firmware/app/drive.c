@@ -46,7 +46,7 @@ static bool clear_valid(const motor_t *m)
 /* The quick look may miss nothing: sqrt(quiet) + sum_max/3 <= i_trip. */
 static bool quiet_valid(const monitor_config_t *c)
 {
-    const int32_t most = c->i_trip - (c->sum_max + 2) / 3;
+    const int32_t most = c->i_trip - c->zero_max - 1;
     return c->quiet_q30 >= 0 && most >= 0 && c->quiet_q30 <= most * most;
 }
 
@@ -55,7 +55,7 @@ bool motor_valid(const motor_t *m)
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
            torque_limit_valid(&m->torque_limit) &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
-           m->monitor.sum_max > 0 && quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
+           m->monitor.zero_max > 0 && 3 * m->monitor.zero_max <= m->monitor.sum_max && quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
            m->safe_state.share_open < m->safe_state.share_short && mrai_valid(&m->mrai) &&
            identify_valid(&m->identify) && control_valid(m) && clear_valid(m);
 }

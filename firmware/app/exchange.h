@@ -22,7 +22,7 @@
 typedef struct {
     mrai_in_t mrai;
     fx_pair_t i_ab;   /* alpha, beta */
-    int32_t sum_q27;  /* of the phases */
+    int32_t zero_q28; /* mean of the phases */
     int32_t v_dc;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
     uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */

@@ -13,7 +13,7 @@
 /* What the period's own decisions need besides the sample that goes to the identification. */
 typedef struct {
     fx_pair_t i_dq, advanced;
-    int32_t sum_q27, v_dc;
+    int32_t zero_q28, v_dc;
     q31_t omega;
 } instant_t;
 
@@ -31,7 +31,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
     hal_adc_read(&counts);
     const measure_t measured = measure_step(&drive->motor.measure, &counts);
     sample->i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
-    sample->sum_q27 = measured.sum_q27;
+    sample->zero_q28 = measured.zero_q28;
     sample->v_dc = measured.v_dc;
     const uint32_t read = hal_angle_read();
     const uint32_t theta_m = read + correction(drive, read);
@@ -48,7 +48,7 @@ static instant_t observe(drive_t *drive, sample_t *sample)
         .i_dq = fx_arch_pkhbt(i.d, i.q),
         /* The middle of the period in which the duties will act: 1.5 periods ahead. */
         .advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1)),
-        .sum_q27 = measured.sum_q27,
+        .zero_q28 = measured.zero_q28,
         .v_dc = measured.v_dc,
         .omega = angle.omega_q31,
     };
@@ -192,7 +192,7 @@ static __attribute__((noinline, cold)) void rest(drive_t *drive, sample_t *sampl
 /* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the vector again. */
 static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t *sample, bool run)
 {
-    const monitor_in_t seen = {measure_phases(sample->i_ab, sample->sum_q27), sample->v_dc};
+    const monitor_in_t seen = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
     if (faults != 0) {
@@ -216,7 +216,7 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
         next--;
     }
     const instant_t now = observe(drive, sample);
-    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.sum_q27, now.v_dc);
+    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.zero_q28, now.v_dc);
     if (__builtin_expect(!quiet, 0)) {
         look(drive, sample, command->run);
     }

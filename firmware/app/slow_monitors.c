@@ -20,7 +20,7 @@ static uint32_t currents(drive_t *drive, const view_t *view)
         .voltage_limited = sample->voltage_limited,
         .i = sample->mrai.i,
         .i_ref = task->i_ref,
-        .phases = measure_phases(sample->i_ab, sample->sum_q27),
+        .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .wanted = in_phases(task->i_ref, sample->theta_e),
         .omega = fx_q15_from_q31(sample->mrai.omega),
         .inverter_dC = view->inverter_dC,

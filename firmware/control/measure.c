@@ -3,37 +3,33 @@
 
 #include "fx/q.h"
 
-/* Q27 to q15 in one product: 2^20 times the factor of the transform. */
-#define PER_THREE 349525      /* 2^20/3 */
-#define PER_ROOT_THREE 605396 /* 2^20/sqrt(3) */
+#define ROOT_THREE_Q19 908094
+#define QUARTER_LSB_Q28 2048 /* of q15 */
 
-static int32_t phase_q27(const measure_config_t *config, uint32_t count, int phase)
+/* Unsigned, so that a count beyond the converter's width wraps. */
+static int32_t line(const measure_line_t *line, uint32_t count)
 {
-    /* 16 bits * gain below 2 in Q12, twice for both signs: 30 bits. Unsigned, so that a count beyond the converter's
-     * width wraps. */
-    return (int32_t)(count * (uint32_t)config->phase[phase].scale + (uint32_t)config->phase[phase].bias);
+    return (int32_t)(count * (uint32_t)line->scale + (uint32_t)line->bias);
 }
 
 measure_t measure_step(const measure_config_t *config, const adc_counts_t *counts)
 {
-    const int32_t a = phase_q27(config, counts->i_a, 0);
-    const int32_t b = phase_q27(config, counts->i_b, 1);
-    const int32_t c = phase_q27(config, counts->i_c, 2);
-    const int32_t others = fx_add_q31(b, c);
-    /* 16-bit count * gain in Q14 = 31 bits; a full count is one full scale, hence the extra bit. */
-    const uint32_t v_dc = counts->v_dc * config->v_dc_scale + 0x4000U;
+    const int32_t a = line(&config->phase[0], counts->i_a); /* Q28 of a third, below 4/3: 2a + b + c fits */
+    const int32_t minus_b = line(&config->phase[1], counts->i_b);
+    const int32_t minus_c = line(&config->phase[2], counts->i_c);
+    const int32_t minus_others = minus_b + minus_c;
     return (measure_t){
-        .i = {fx_sat_q15_word(fx_mulhi(fx_sub2_q31(others, a), -PER_THREE)),
-              fx_sat_q15_word(fx_mulhi(fx_sub_q31(b, c), PER_ROOT_THREE))},
-        .sum_q27 = fx_add_q31(others, a),
-        .v_dc = fx_usat_q15_word((int32_t)v_dc >> 15),
+        .i = {fx_sat_q15_word((minus_others + 2 * a) >> 13),
+              fx_sat_q15_word(fx_mulhi(minus_c - minus_b, ROOT_THREE_Q19))}, /* Q28 * Q19 = Q15 */
+        .zero_q28 = a - minus_others,
+        .v_dc = fx_usat_q15_word(line(&config->v_dc, counts->v_dc) >> 15),
     };
 }
 
-abc_t measure_phases(fx_pair_t i_ab, int32_t sum_q27)
+abc_t measure_phases(fx_pair_t i_ab, int32_t zero_q28)
 {
     const ab_t i = {(int16_t)(i_ab & 0xFFFFU), (int16_t)(i_ab >> 16)};
-    const int32_t zero = fx_mulhi(sum_q27, PER_THREE);
+    const int32_t zero = (zero_q28 + QUARTER_LSB_Q28) >> 13; /* phase a's bias has the other quarter */
     const int32_t side = fx_mulhi(i.beta * 65536, Q16(0.86602540378443865)); /* Q31 * Q16 = Q15 */
     const int32_t half = i.alpha >> 1;
     return (abc_t){fx_sat_q15_word(i.alpha + zero), fx_sat_q15_word(zero - half + side),

@@ -27,16 +27,21 @@ typedef struct {
     uint32_t slope; /* per 2^-16 of the ratio */
 } fx_atan_cell_t;
 
-/* sin(2 pi i / 512), Q31, plus half an LSB of q15; a quarter turn longer: it serves cos too. */
-extern const int32_t fx_sin_table[640];
+/* Of 2 pi i / 512, Q31, plus half an LSB of q15; side by side, so that one instruction loads both. */
+typedef struct {
+    int32_t sin, cos;
+} fx_point_t;
+
+extern const fx_point_t fx_sin_table[512];
 extern const fx_atan_cell_t fx_atan_table[257];
 
 static inline fx_sincos_t fx_sincos(uint16_t angle)
 {
     const uint32_t a = angle;
-    const int32_t *point = &fx_sin_table[((a + 64U) >> 7) & 511U];
-    const int32_t sin0 = point[0];
-    const int32_t cos0 = point[128];
+    const fx_point_t *point = &fx_sin_table[((a + 64U) >> 7) & 511U];
+    __asm__("" : "+r"(point));
+    const int32_t sin0 = point->sin;
+    const int32_t cos0 = point->cos;
     /* The signed low 7 bits, -64..63, times 2 pi / 2^16 in Q32. */
     const int32_t rest = (int32_t)(a << 25) >> 25;
     const int32_t delta = rest * 411775;
@@ -48,9 +53,10 @@ static inline fx_sincos_t fx_sincos(uint16_t angle)
 /* (cos, sin) in one word, low half first, for dual products: fx_sincos() of an angle that is not rounded to 16 bits. */
 static inline fx_pair_t fx_rotation(uint32_t turn)
 {
-    const int32_t *point = &fx_sin_table[(turn + (1U << 22)) >> 23];
-    const int32_t sin0 = point[0];
-    const int32_t cos0 = point[128];
+    const fx_point_t *point = &fx_sin_table[(turn + (1U << 22)) >> 23];
+    __asm__("" : "+r"(point)); /* the address once, not as an index for each */
+    const int32_t sin0 = point->sin;
+    const int32_t cos0 = point->cos;
     /* The signed low 23 bits, as a fraction of 2^32, times 2 pi / 2^9 in Q32. */
     const int32_t delta = fx_mulhi((int32_t)(turn << 9), 52707179);
     return fx_arch_pkhtb(fx_mulhi_add(sin0, cos0, delta), fx_mulhi_sub(cos0, sin0, delta));

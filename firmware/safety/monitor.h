@@ -22,9 +22,10 @@ enum { MONITOR_COUNTS = 1, MONITOR_JUMPED = 2 };
 /** q15 in a word each, in the order in which every period reads them. */
 typedef struct {
     int32_t quiet_q30; /* (i_trip - sum_max/3)^2: a vector that short has no phase beyond i_trip */
-    int32_t sum_max;
+    int32_t zero_max;  /* a third of sum_max */
     int32_t v_min, v_max;
     int32_t i_trip;
+    int32_t sum_max;
 } monitor_config_t;
 
 typedef struct {
@@ -40,13 +41,13 @@ typedef struct {
 /** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to
  * count. |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
 static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, fx_pair_t i,
-                                 int32_t sum_q27, int32_t v_dc)
+                                 int32_t zero_q28, int32_t v_dc)
 {
-    int32_t quiet_q30 = config->quiet_q30, most = config->sum_max, v_min = config->v_min, v_max = config->v_max;
+    int32_t quiet_q30 = config->quiet_q30, most = config->zero_max, v_min = config->v_min, v_max = config->v_max;
     fx_arch_together(&quiet_q30, &most);
     fx_arch_together(&v_min, &v_max);
-    const uint32_t sum_max = (uint32_t)most;
-    return (uint32_t)fx_dot2(i, i) < (uint32_t)quiet_q30 && (uint32_t)(sum_q27 >> 12) + sum_max < 2U * sum_max &&
+    const uint32_t zero_max = (uint32_t)most;
+    return (uint32_t)fx_dot2(i, i) < (uint32_t)quiet_q30 && (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max &&
            v_dc >= v_min && v_dc <= v_max && state->attention == 0U;
 }
 

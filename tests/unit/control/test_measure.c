@@ -42,7 +42,7 @@ static measure_t measured(const adc_counts_t *counts)
 static abc_t phases(const adc_counts_t *counts)
 {
     const measure_t m = measured(counts);
-    return measure_phases(fx_pair((q15_t)m.i.alpha, (q15_t)m.i.beta), m.sum_q27);
+    return measure_phases(fx_pair((q15_t)m.i.alpha, (q15_t)m.i.beta), m.zero_q28);
 }
 
 void tearDown(void)
@@ -67,12 +67,12 @@ void test_the_vector_and_the_sum_of_the_phases_are_those_of_their_definition(voi
     measure_t m = measured(&balanced);
     TEST_ASSERT_EQUAL_INT(1600, m.i.alpha);
     TEST_ASSERT_EQUAL_INT(0, m.i.beta);
-    TEST_ASSERT_EQUAL_INT(0, m.sum_q27);
+    TEST_ASSERT_EQUAL_INT(0, m.zero_q28);
     const adc_counts_t alone = {2048, 2048 + 50, 2048, 0};
     m = measured(&alone);
     TEST_ASSERT_EQUAL_INT(-267, m.i.alpha);
     TEST_ASSERT_EQUAL_INT(462, m.i.beta);
-    TEST_ASSERT_EQUAL_INT(800 * 4096, m.sum_q27);
+    TEST_ASSERT_EQUAL_INT(800 * 4096, m.zero_q28);
 }
 
 /* Half scale is half of the full-scale voltage, which is one V_b with a gain of 1.0. */
@@ -113,7 +113,7 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     const abc_t i = phases(c);
     worst_note(worst, m.i.alpha - twin_clamp(vector.alpha, -32768, 32767), "alpha of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.i.beta - twin_clamp(vector.beta, -32768, 32767), "beta of %d %d %d", c->i_a, c->i_b, c->i_c);
-    worst_note(worst, m.sum_q27 / 4096.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b, c->i_c);
+    worst_note(worst, m.zero_q28 / 4096.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.v_dc - twin_clamp(t.v_dc, 0, 32767), "v_dc of %d", c->v_dc);
     if (fabs(vector.alpha) < 32767.0 && fabs(vector.beta) < 32767.0) { /* five roundings, 2.2 LSB at most */
         worst_note(worst, 0.25 * (i.a - twin_clamp(t.i.a, -32768, 32767)), "i_a of %d %d %d", c->i_a, c->i_b, c->i_c);

@@ -22,8 +22,8 @@ def rotate(start: int, other: int, delta: int) -> int:
     return ((start << 32) + other * delta + (1 << 31)) >> 32
 
 
-def sine_table() -> list[int]:
-    """512 points of a turn and a quarter more, Q31 plus half an LSB of q15 (FX-20)."""
+def sine_table() -> list[tuple[int, int]]:
+    """(sin, cos) of 512 points of a turn, Q31 plus half an LSB of q15 (FX-20)."""
     half_cell = 64 * 2.0 * math.pi / 65536.0
     amplitude = (1.0 - half_cell**2 / 4.0) * 2.0**31
     exact = [round(amplitude * math.sin(2.0 * math.pi * i / 512.0)) for i in range(512)]
@@ -33,7 +33,7 @@ def sine_table() -> list[int]:
         # Near +1 the raised entry would leave int32 on the way to its cell's edge.
         bump = rotate(0, other, 64 * TURN_STEP)
         table.append(min(exact[i % 512] + HALF_Q15, INT32_MAX - bump))
-    return table
+    return [(table[i], table[i + 128]) for i in range(512)]
 
 
 def rsqrt_table() -> list[tuple[int, int]]:
@@ -80,13 +80,13 @@ def _source(header: str, declaration: str, body: str) -> str:
 
 def sources() -> dict[str, str]:
     """The generated files by name."""
-    sine = _rows((str(v) for v in sine_table()), 7)
+    sine = _rows((f"{{{s}, {c}}}" for s, c in sine_table()), 4)
     arc = _rows((f"{{{b}U, {s}U}}" for b, s in atan_table()), 4)
     root = _rows((f"{{{b}, {s}}}" for b, s in rsqrt_table()), 3)
     circle = _rows((str(v) for v in circle_table()), 12)
     return {
         "circle_table.c": _source("fx/circle.h", "const uint16_t fx_circle_table[256]", circle),
-        "sin_table.c": _source("fx/trig.h", "const int32_t fx_sin_table[640]", sine),
+        "sin_table.c": _source("fx/trig.h", "const fx_point_t fx_sin_table[512]", sine),
         "atan_table.c": _source("fx/trig.h", "const fx_atan_cell_t fx_atan_table[257]", arc),
         "sqrt_table.c": _source("fx/sqrt.h", "const fx_rsqrt_cell_t fx_rsqrt_table[192]", root),
     }

@@ -76,9 +76,13 @@ def _measure(motor: Motor) -> list[Row]:
     ratio = motor.config.v_dc_full_scale_V / motor.bases.voltage_V
     u16(ratio, Q15_ONE, "v_dc_full_scale_V/V_b")  # below 2
     gain = round(math.ldexp(ratio, 14 + shift))
-    phase = "{" + f"{1 << 12 + shift}, {-(1 << 15 + 12)}" + "}"
-    return [("phase", "{" + ", ".join([phase] * 3) + "}", f"gain 1.0 in Q12, times 2^{shift}; -32768 counts * gain"),
-            ("v_dc_scale", f"{gain}u", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}")]
+    scale = round(2 ** (13 + shift) / 3)
+    # Mid scale stays exactly no current; half an LSB of alpha, which takes twice phase a.
+    bias = -scale << 15 - shift
+    phases = [(scale, bias + 2048), (-scale, -bias), (-scale, -bias)]
+    return [("phase", "{" + ", ".join(f"{{{s}, {b}}}" for s, b in phases) + "}",
+             f"a third of gain 1.0 in Q13, times 2^{shift}; -32768 counts of it"),
+            ("v_dc", f"{{{gain}, 16384}}", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}")]
 
 
 def _tracker(motor: Motor) -> list[Row]:
@@ -239,11 +243,13 @@ def _i_d_limit(motor: Motor) -> list[Row]:
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
+    sum_max = q15(d.sum_max_A / b.current_A, "sum_max")
     return [("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2"),
-            ("sum_max", q15(d.sum_max_A / b.current_A, "sum_max"), f"{d.sum_max_A:g} A"),
+            ("zero_max", sum_max // 3, "a third of sum_max"),
             ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
             ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
-            ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A")]
+            ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
+            ("sum_max", sum_max, f"{d.sum_max_A:g} A")]
 
 
 def _plausibility(motor: Motor) -> list[Row]:
