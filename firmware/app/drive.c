@@ -23,7 +23,7 @@ static bool control_valid(const motor_t *m)
 {
     const current_control_config_t *c = &m->current_control;
     return c->sigma_q24 > 0 && c->setpoint_weight > 0 && c->integral_gain >= 0 && c->integral_gain < Q15(0.5) &&
-           c->tracking_gain_q16 >= 0 && c->tracking_gain_q16 < Q16(0.5) && ratio_valid(m) &&
+           c->tracking_gain_q34 >= 0 && ratio_valid(m) &&
            m->voltage_reserve.v_ratio > 0 && m->voltage_reserve.trim_min <= 0 && m->voltage_reserve.trim_max >= 0 &&
            m->torque_loop.authority > 0 && m->torque_loop.torque_min > 0 && modulate_valid(&m->modulate);
 }
@@ -55,6 +55,7 @@ bool motor_valid(const motor_t *m)
     return flux_table_valid(&m->flux_table) && current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
            torque_limit_valid(&m->torque_limit) &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
+           (uint32_t)m->monitor.v_min > m->current_control.per_ratio_q31 >> 22 &&
            m->monitor.zero_max > 0 && 3 * m->monitor.zero_max <= m->monitor.sum_max && quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
            m->safe_state.share_open < m->safe_state.share_short && mrai_valid(&m->mrai) &&
            identify_valid(&m->identify) && control_valid(m) && clear_valid(m);

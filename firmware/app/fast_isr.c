@@ -118,11 +118,15 @@ static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 }
 
 /* Circle or hexagon: what the bridge makes, and the voltage to come, may not be what is wanted. */
-static __attribute__((noinline, flatten)) void bridge_limited(drive_t *drive, sample_t *sample, duty_t duty, const instant_t *now)
+static __attribute__((noinline, flatten)) void bridge_limited(drive_t *drive, sample_t *sample, modulate_out_t made,
+                                                              fx_pair_t i, fx_pair_t advanced)
 {
-    sample->snapped = true;
-    identify_window_snapped(&drive->fast.window);
-    drive->fast.coming = modulate_acted(&drive->motor.modulate, duty, now->i_dq, now->advanced, now->v_dc);
+    sample->voltage_limited = true;
+    if (made.limited != 0U) {
+        sample->snapped = true;
+        identify_window_snapped(&drive->fast.window);
+    }
+    drive->fast.coming = modulate_acted(&drive->motor.modulate, made.duty, i, advanced, sample->v_dc);
 }
 
 /* The duties of the first period act in the second; the third sample ends a period of which they are known. */
@@ -161,7 +165,7 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
         const modulate_out_t made = modulate_step(&m->modulate, wanted.v, now->i_dq, now->advanced);
         duty = made.duty;
         if ((made.limited | wanted.limited) != 0U) {
-            bridge_limited(drive, sample, duty, now);
+            bridge_limited(drive, sample, made, now->i_dq, now->advanced);
         }
     }
     hal_pwm_write(duty);
@@ -194,6 +198,9 @@ static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t 
 {
     const monitor_in_t seen = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
+    if (seen.v_dc < drive->motor.monitor.v_min) {
+        drive->fast.periods_on = 0; /* down there nobody knows what acts: as after switching on */
+    }
     /* An unpowered bridge may see no dc voltage; what opens the gates while they are closed is a fault at any time. */
     if (faults != 0) {
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);

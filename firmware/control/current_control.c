@@ -73,10 +73,11 @@ static dq_t cut(dq_t v, int32_t error_d, int32_t omega)
     return (dq_t){most.d, within(v.q + (missing ^ (omega >> 31)), room(most.d))};
 }
 
-/* s += a T_s (u_limited - u): what was cut away is no error to be integrated (CC-10). */
-static int32_t track(int32_t s_q30, int32_t gain, int32_t missing)
+/* s += a T_s (u_limited - u): what was cut away, at most four times the circle, is no error to
+ * be integrated (CC-10). Q33 * Q13 = Q30. */
+static int32_t track(int32_t s_q30, int32_t gain_q33, int32_t missing)
 {
-    return fx_sat_bits(s_q30 + gain * fx_sat_q15_word(missing), 31);
+    return fx_sat_bits(fx_mac_q31_word(s_q30, gain_q33, fx_sat_q15_word(missing >> 2)), 31);
 }
 
 current_control_out_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
@@ -104,8 +105,8 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     }
     const dq_t left = cut(v, error_d, omega);
     const dq_t missing = {left.d - v.d, left.q - v.q};
-    const int32_t gain = fx_mul_q31_word(config->tracking_gain_q16, in->v_dc);
-    *state = (current_control_state_t){track(next.s_d_q30, gain, missing.d), track(next.s_q_q30, gain, missing.q)};
+    const int32_t gain_q33 = fx_mul_q31_word(config->tracking_gain_q34, in->v_dc); /* per unit of v: Q34 * Q15 */
+    *state = (current_control_state_t){track(next.s_d_q30, gain_q33, missing.d), track(next.s_q_q30, gain_q33, missing.q)};
     return (current_control_out_t){
         .u = u,
         .v = fx_arch_pkhbt(left.d, left.q),

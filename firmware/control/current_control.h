@@ -31,7 +31,7 @@ typedef struct {
     q16_t drop_gain;       /* r/sigma: flux that asks for the resistive drop */
     q15_t setpoint_weight; /* b = w_c/(w_c + a) */
     q15_t integral_gain;   /* sigma a_i < 1/2 */
-    int32_t tracking_gain_q16; /* a T_s v_ratio = a_i v_ratio/b < 1/2 */
+    int32_t tracking_gain_q34; /* a T_s v_ratio = a_i v_ratio/b < 1/8 */
     uint32_t per_ratio_q31; /* 1/v_ratio: usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
     uint32_t clear_q30;    /* (v_clear/v_ratio)^2 < 1: inside, nothing limits */
 } current_control_config_t;

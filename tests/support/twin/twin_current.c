@@ -10,19 +10,27 @@ static double integral(const motor_si_t *motor, double e, double cut)
     return motor->sigma_rad_s * motor->integral_ratio * realisable;
 }
 
-/* The circle: d first while it takes flux away, the direction of the whole while it asks for flux back. What d is
- * short of is taken off the q flux that binds it. */
+/* What the unit circle leaves beside x, in the stage's 256 steps; never less than a quarter. */
+static double room(double x)
+{
+    const double end = (fmin(floor(fabs(x) * 256.0), 255.0) + 1.0) / 256.0;
+    return fmax(sqrt(1.0 - end * end), 0.25);
+}
+
+/* The circle: d first while it takes flux away, what it is short of taken off the q flux that binds it; q first while d
+ * asks for flux back. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
-    const double length = hypot(u.d, u.q);
+    const twin_dq_t v = {u.d / u_max, u.q / u_max};
+    const twin_dq_t most = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
     if (more_flux) {
-        const double share = (length > u_max) ? u_max / length : 1.0;
-        return (twin_dq_t){share * u.d, share * u.q};
+        const double left = room(most.q);
+        return (twin_dq_t){u_max * twin_clamp(most.d, -left, left), u_max * most.q};
     }
-    const double d = twin_clamp(u.d, -31.0 / 32.0 * u_max, 31.0 / 32.0 * u_max);
-    const double room = sqrt(u_max * u_max - d * d);
-    const double shed = (omega < 0.0) ? d - u.d : u.d - d;
-    return (twin_dq_t){d, twin_clamp(u.q + shed, -room, room)};
+    const double left = room(most.d);
+    const double missing = twin_clamp(v.d - most.d, -1.0, 1.0);
+    const double q = v.q + ((omega < 0.0) ? -missing : missing);
+    return (twin_dq_t){u_max * most.d, u_max * twin_clamp(q, -left, left)};
 }
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
@@ -48,9 +56,11 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
                       in->omega * (f->psi_d + in->psi_delta);
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
     const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
-    state->limited = (u.d != ud) || (u.q != uq);
-    state->s.d += integral(motor, e.d, u.d - ud);
-    state->s.q += integral(motor, e.q, u.q - uq);
+    const double rounding = 1e-9 * motor->v_base_V;
+    state->limited = fabs(u.d - ud) > rounding || fabs(u.q - uq) > rounding;
+    const double most = 4.0 * motor->v_ratio * in->v_dc;
+    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -most, most));
+    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -most, most));
     return u;
 }
 
@@ -68,19 +78,18 @@ static double snap(double duty, double min_pulse)
 
 twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t *in)
 {
-    const double v_dc = fmax(in->v_dc, motor->v_dc_min_V);
+    const double v_dc = in->v_dc;
     const twin_abc_t u = twin_clarke_inverse(twin_park_inverse(in->u, in->theta));
     const twin_abc_t i = twin_clarke_inverse(twin_park_inverse(in->i, in->theta));
     const double v[3] = {u.a / v_dc, u.b / v_dc, u.c / v_dc};
     const double current[3] = {i.a, i.b, i.c};
     const double top = fmax(v[0], fmax(v[1], v[2]));
     const double bottom = fmin(v[0], fmin(v[1], v[2]));
-    const double shorten = 1.0 / fmax(1.0, top - bottom);
     double made[3];
     twin_modulate_t out;
     for (int x = 0; x < 3; x++) {
         const double c = motor->dead_time_duty * twin_clamp(current[x] / motor->knee_A, -1.0, 1.0);
-        const double d = 0.5 + shorten * (v[x] - 0.5 * (top + bottom)) + c;
+        const double d = 0.5 + v[x] - 0.5 * (top + bottom) + c;
         out.duty[x] = snap(d, motor->min_pulse_duty);
         /* A phase that does not switch loses nothing to the dead time. */
         const bool switches = (out.duty[x] > 0.0) && (out.duty[x] < 1.0);

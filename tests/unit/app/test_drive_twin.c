@@ -25,7 +25,7 @@ void setUp(void)
     twin = twin_create();
     twin->motor.integral_ratio = 0.0;
     drive.motor.current_control.integral_gain = 0;
-    drive.motor.current_control.tracking_gain = 0;
+    drive.motor.current_control.tracking_gain_q34 = 0;
     twin->motor.torque_ki = 0.0;
     drive.motor.torque_loop.ki = 0;
     twin_set(twin, "identification", 0.0);

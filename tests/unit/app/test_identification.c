@@ -18,6 +18,12 @@ static int weak;      /* counts of magnet flux that are missing */
 static uint32_t now;  /* periods */
 static double lost;   /* counts of voltage along the current that nominal compensation leaves over */
 
+/* q15 */
+static int32_t dead_time(const motor_t *m)
+{
+    return m->modulate.dead_time_q16 / 2;
+}
+
 void setUp(void)
 {
     omega = 0.3;
@@ -45,7 +51,7 @@ static void period(uint32_t k)
     s->mrai.u.q = (int32_t)(omega * (s->mrai.flux.psi_d - weak) + 0.0133 * i.q);
     /* What is compensated in addition need not be commanded any more. */
     const double left = lost - 4.0 / 3.14159265 * 21238.0 *
-                                   (drive.motor.modulate.dead_time - motor.modulate.dead_time) / 32768.0;
+                                   (dead_time(&drive.motor) - dead_time(&motor)) / 32768.0;
     s->mrai.u.d += (int32_t)lround(left * -3.0 / 5.831);
     s->mrai.u.q += (int32_t)lround(left * 5.0 / 5.831);
     s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
@@ -174,12 +180,12 @@ void test_the_compensation_takes_over_what_is_learnt_of_the_voltage_error(void)
     const int last = drive.task.torque_estimate;
     milliseconds(1000);
     TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_max / 1000U, last, drive.task.torque_estimate);
-    TEST_ASSERT_INT_WITHIN(30, motor.modulate.dead_time + 121, drive.motor.modulate.dead_time);
-    TEST_ASSERT_EQUAL_INT32(drive.motor.modulate.dead_time - motor.modulate.dead_time, drive.task.trim.trim);
-    TEST_ASSERT_LESS_OR_EQUAL_INT32(motor.current_control.clear_q32, drive.motor.current_control.clear_q32);
+    TEST_ASSERT_INT_WITHIN(30, dead_time(&motor) + 121, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT32(dead_time(&drive.motor) - dead_time(&motor), drive.task.trim.trim);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
     drive.request.identification_resets++;
     task_1khz(&drive);
-    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
 }
 
 void test_who_does_not_want_the_compensation_moved_keeps_it(void)
@@ -187,6 +193,6 @@ void test_who_does_not_want_the_compensation_moved_keeps_it(void)
     at_town_speed();
     drive.request.trim = false;
     milliseconds(20000);
-    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.filter.x[IDENTIFY_DROP]);
 }

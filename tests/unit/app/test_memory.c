@@ -41,6 +41,12 @@ static void power_on(const motor_t *source)
     memory_recall(&memory, &drive);
 }
 
+/* q15 */
+static int32_t dead_time(const motor_t *m)
+{
+    return m->modulate.dead_time_q16 / 2;
+}
+
 void setUp(void)
 {
     hal_nvm_read_Stub(nvm_read);
@@ -198,27 +204,27 @@ void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(vo
 
 void test_a_measured_compensation_is_kept_with_the_room_it_needs(void)
 {
-    const compensation_t measured = {drive.motor.modulate.dead_time + 1000, drive.motor.modulate.knee_q17 / 2, 1};
+    const compensation_t measured = {dead_time(&drive.motor) + 1000, drive.motor.modulate.knee_q17 / 2, 1};
     TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
     learn_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
-    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time + 1000, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 1000, dead_time(&drive.motor));
     TEST_ASSERT_EQUAL_INT32(motor.modulate.knee_q17 / 2, drive.motor.modulate.knee_q17);
     TEST_ASSERT_INT32_WITHIN(1, motor.modulate.knee_side_q17 / 2, drive.motor.modulate.knee_side_q17);
-    TEST_ASSERT_LESS_THAN_INT32(motor.current_control.clear_q32, drive.motor.current_control.clear_q32);
+    TEST_ASSERT_LESS_THAN_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
     TEST_ASSERT_TRUE(motor_valid(&drive.motor)); /* (MO-11) among others */
 }
 
 void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)
 {
-    const int32_t measured = motor.modulate.dead_time + 40;
+    const int32_t measured = dead_time(&motor) + 40;
     TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
     drive_retrim(&drive, -60);
-    TEST_ASSERT_EQUAL_INT(measured - 60, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
     learn_and_save();
     power_on(&motor);
-    TEST_ASSERT_EQUAL_INT(measured - 60, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
     TEST_ASSERT_EQUAL_INT32(-60, drive.task.trim.trim);
     /* A new measurement replaces both. */
     TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
@@ -230,7 +236,7 @@ void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
     drive_retrim(&drive, 60);
     learn_and_save();
     power_on(&motor);
-    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time + 60, drive.motor.modulate.dead_time);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 60, dead_time(&drive.motor));
 }
 
 void test_a_compensation_that_no_inverter_needs_is_refused(void)

@@ -59,10 +59,12 @@ void test_measurement_and_angle_are_the_si_values(void)
     const double turns_at_base = w_b * motor_si.period_s / (2.0 * 3.14159265358979323846);
     const double wn = motor_si.tracker_bandwidth_rad_s * motor_si.period_s;
     const double lsb = 65536.0 / (1 << motor_si.adc_bits); /* of the converter, in 16-bit counts */
-    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc_scale / lsb / 16384.0, 1.0 / lsb / 16384.0);
+    HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc.scale / lsb / 16384.0, 1.0 / lsb / 16384.0);
     for (int phase = 0; phase < 3; phase++) {
-        TEST_ASSERT_EQUAL_INT((int)(lsb * 4096.0), motor.measure.phase[phase].scale);
-        TEST_ASSERT_EQUAL_INT(-32768 * 4096, motor.measure.phase[phase].bias);
+        const int sign = (phase == 0) ? 1 : -1; /* half an LSB of alpha, which takes twice phase a */
+        HELD(sign * lsb * 8192.0 / 3.0, motor.measure.phase[phase].scale, 1.0);
+        TEST_ASSERT_EQUAL_INT((phase == 0) ? 2048 : 0,
+                              (int)(32768.0 / lsb) * motor.measure.phase[phase].scale + motor.measure.phase[phase].bias);
     }
     TEST_ASSERT_EQUAL_INT(motor_si.pole_pairs, motor.angle_tracker.pole_pairs);
     HELD(2.0 * wn, q31(motor.angle_tracker.kp), q31(1));
@@ -79,15 +81,19 @@ void test_current_control_and_modulation_are_the_si_values(void)
     HELD(motor_si.r_ohm_20 / z_b / sigma, motor.current_control.drop_gain / 65536.0, 1.0 / 65536.0);
     HELD(motor_si.setpoint_weight, q15(motor.current_control.setpoint_weight), q15(1));
     HELD(sigma * motor_si.integral_ratio, q15(motor.current_control.integral_gain), q15(1));
-    HELD(motor_si.v_ratio, q15(motor.current_control.v_ratio), q15(1));
-    HELD(motor_si.dead_time_duty, q15(motor.modulate.dead_time), q15(1));
+    HELD(motor_si.integral_ratio / motor_si.setpoint_weight * motor_si.v_ratio,
+         q31(motor.current_control.tracking_gain_q34) / 8.0, q31(1) / 8.0);
+    HELD(1.0 / motor_si.v_ratio, motor.current_control.per_ratio_q31 / 2147483648.0, q31(1));
+    HELD(motor_si.v_ratio, q31(motor.modulate.alpha_q31), q31(1));
+    HELD(motor_si.v_ratio * sqrt(0.75), q31(motor.modulate.side_q31), q31(1));
+    HELD(motor_si.dead_time_duty, motor.modulate.dead_time_q16 / 65536.0, q15(1));
     HELD(i_b / motor_si.knee_A, motor.modulate.knee_q17 / 131072.0, 1.0 / 131072.0);
     HELD(0.5 * sqrt(3.0) * i_b / motor_si.knee_A, motor.modulate.knee_side_q17 / 131072.0, 1.0 / 131072.0);
-    HELD(motor_si.min_pulse_duty, q15(motor.modulate.min_pulse), q15(1));
-    HELD(motor_si.v_dc_min_V / v_b, q15(motor.modulate.v_dc_min), q15(1));
+    HELD(0.5 - motor_si.min_pulse_duty, q31(motor.modulate.longest_q31), q15(1));
+    HELD(0.5 - 0.5 * motor_si.min_pulse_duty, q31(motor.modulate.nearer_rail_q31), q15(1));
     TEST_ASSERT_TRUE(motor_si.v_ratio <= 1.05 / sqrt(3.0)); /* all that the hexagon's boundary carries */
     /* (MO-11), and 31/32 of the voltage circle: inside, neither stage limits. */
-    const double clear = sqrt(motor.current_control.clear_q32 / 4294967296.0);
+    const double clear = sqrt(motor.current_control.clear_q30 / 1073741824.0) * motor_si.v_ratio;
     const double pulse = motor_si.min_pulse_duty + motor_si.dead_time_duty;
     TEST_ASSERT_TRUE(clear < 31.0 / 32.0 * motor_si.v_ratio && sqrt(3.0) * clear + 2.0 * pulse < 1.0);
     TEST_ASSERT_TRUE(clear > 0.9 / sqrt(3.0)); /* and that is most of the range */
@@ -135,6 +141,7 @@ void test_torque_loop_references_and_monitors_are_the_si_values(void)
     HELD(motor_si.v_max_V / v_b, q15(motor.monitor.v_max), q15(1));
     HELD(motor_si.v_min_V / v_b, q15(motor.monitor.v_min), q15(1));
     HELD(motor_si.sum_max_A / i_b, q15(motor.monitor.sum_max), q15(1));
+    TEST_ASSERT_EQUAL_INT(motor.monitor.sum_max / 3, motor.monitor.zero_max);
     TEST_ASSERT_TRUE(motor_si.i_trip_A < 0.8 * motor_si.current_full_scale_A);
     TEST_ASSERT_TRUE(motor_si.i_max_A < motor_si.i_trip_A);
 }

@@ -10,6 +10,8 @@
 /* Assumed data of an invented machine in a 350 V, 300 A, 10 kHz inverter. */
 enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
 
+#define V_RATIO 0.57
+
 static const double period = 1e-4;
 static const int cell = 2048; /* counts of q15 between table nodes: 1/16 of the current base */
 
@@ -162,6 +164,19 @@ static void inputs(fixture_t *f)
     f->si.adc_bits = 12;
 }
 
+void fixture_dead_time(fixture_t *f, double duty)
+{
+    f->modulate.dead_time_q16 = 2 * q15_of(duty);
+    f->si.dead_time_duty = from_q15(q15_of(duty));
+}
+
+void fixture_min_pulse(fixture_t *f, double duty)
+{
+    f->modulate.longest_q31 = (1 << 30) - 65536 * q15_of(duty);
+    f->modulate.nearer_rail_q31 = (1 << 30) - 32768 * q15_of(duty);
+    f->si.min_pulse_duty = from_q15(q15_of(duty));
+}
+
 static void voltage(fixture_t *f)
 {
     const double sigma = 1.0 / (3.0 * period) / f->w;
@@ -170,26 +185,24 @@ static void voltage(fixture_t *f)
         .drop_gain = q16_of(674.0 / 65536.0 / sigma),
         .setpoint_weight = q15_of(0.7),
         .integral_gain = q15_of(0.05 * sigma),
-        .tracking_gain = q15_of(0.05 / 0.7),
-        .v_ratio = q15_of(0.57),
-        .clear_q32 = q31_of(2.0 * 0.5 * 0.5),
+        .per_ratio_q31 = (uint32_t)lround(2147483648.0 / V_RATIO),
+        .clear_q30 = (uint32_t)lround(1073741824.0 * 0.5 * 0.5 / V_RATIO / V_RATIO),
     };
     f->si.sigma_rad_s = f->current_control.sigma_q24 / 16777216.0 * f->w;
     f->si.setpoint_weight = from_q15(f->current_control.setpoint_weight);
     f->si.integral_ratio = from_q15(f->current_control.integral_gain) /
                            (f->current_control.sigma_q24 / 16777216.0);
-    f->si.v_ratio = from_q15(f->current_control.v_ratio);
+    f->si.v_ratio = V_RATIO;
+    f->current_control.tracking_gain_q34 = q31_of(8.0 * f->si.integral_ratio / f->si.setpoint_weight * V_RATIO);
     f->modulate = (modulate_config_t){
-        .dead_time = q15_of(0.02),
+        .alpha_q31 = q31_of(V_RATIO),
+        .side_q31 = q31_of(V_RATIO * 0.86602540378443865),
         .knee_q17 = q16_of(200.0),
         .knee_side_q17 = q16_of(200.0 * 0.86602540378443865),
-        .min_pulse = q15_of(0.01),
-        .v_dc_min = q15_of(0.1),
     };
-    f->si.dead_time_duty = from_q15(f->modulate.dead_time);
+    fixture_dead_time(f, 0.02);
+    fixture_min_pulse(f, 0.01);
     f->si.knee_A = f->i / 100.0;
-    f->si.min_pulse_duty = from_q15(f->modulate.min_pulse);
-    f->si.v_dc_min_V = from_q15(f->modulate.v_dc_min) * f->v;
 }
 
 static void identification(fixture_t *f)

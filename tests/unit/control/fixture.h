@@ -37,6 +37,10 @@ typedef struct {
 /* A fresh copy each time: tests may change it. */
 fixture_t fixture(void);
 
+/* The modulation's, and the twin's. */
+void fixture_dead_time(fixture_t *f, double duty);
+void fixture_min_pulse(fixture_t *f, double duty);
+
 /* The largest deviation of a sweep and where it was: one readable failure instead of thousands. */
 typedef struct {
     double error;

@@ -10,7 +10,8 @@ static current_control_state_t state;
 static current_target_t target;
 static flux_point_t flux;
 static current_control_in_t in;
-static bool limited; /* in the last step() */
+static current_control_out_t out; /* of the last step() */
+static bool limited;
 
 static dq_t q30(dq_t x)
 {
@@ -30,10 +31,28 @@ void tearDown(void)
 {
 }
 
+/* In LSB of q15: a whole v. */
+static double v_max(void)
+{
+    return f.si.v_ratio * in.v_dc;
+}
+
+static double of_v(int half)
+{
+    return (int16_t)(out.v >> (16 * half)) / 32768.0 * v_max();
+}
+
+/* What is left of the voltage, in LSB of q15. */
 static dq_t step(void)
 {
-    const current_control_out_t out = current_control_step(&f.current_control, &state, &in);
-    limited = out.limited;
+    out = current_control_step(&f.current_control, &state, &in);
+    limited = out.limited != 0U;
+    TEST_ASSERT_FALSE(limited && out.clear);
+    if (limited) {
+        return (dq_t){(int32_t)lround(of_v(0)), (int32_t)lround(of_v(1))};
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(0), out.u.d); /* half an LSB of each, where v's is the smaller one */
+    TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(1), out.u.q);
     return out.u;
 }
 
@@ -109,16 +128,21 @@ void test_the_set_point_weight_takes_of_the_currents_share_only(void)
 
 /* --- the step -------------------------------------------------------------------------------- */
 
+/* Near the edge of one of the 256 steps the two may stand on different sides. */
+static bool between_steps(double v)
+{
+    const double cells = fabs(v) * 256.0;
+    return fabs(v) < 1.0 && fabs(cells - round(cells)) < 0.05;
+}
+
 /* |psi* - psi| and psi_d + dpsi stay below 1 here: beyond, the stage saturates them.
- * u: 0.5 LSB of the product, 0.5 of the sum, 0.5 of v_max. On the arc u_q = sqrt(v^2 - u_d^2) magnifies 1 LSB
- * of u_d by u_d/u_q, hence the corner that is checked by |u| instead. The shortened vector (psi_d* > psi_d) is
- * u v_max/|u|: 2 LSB of |u|, 1 of the quotient and 0.5 each, all of them times v_max/|u| < 1. */
+ * v: 0.5 LSB of the product, 1e-5 of it of the quotient, 0.5 of the saturation's end; q takes two of them. */
 void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
 {
     worst_t worst = {0};
-    worst_t circle = {0};
     worst_t integrator = {0};
     uint64_t seed = 51;
+    int seen = 0;
     for (int n = 0; n < 400000; n++) {
         const int largest = (n % 2) ? 11000 : 4000;
         const dq_t psi = random_dq(&seed, largest);
@@ -127,25 +151,25 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         target = (current_target_t){random_dq(&seed, largest), q30(random_dq(&seed, largest))};
         in.omega = random_in(&seed, -32767, 32767) * 65536;
         in.psi_delta = (q15_t)random_in(&seed, -3000, 3000);
-        in.v_dc = (q15_t)random_in(&seed, 0, 32767);
+        in.v_dc = (q15_t)random_in(&seed, 900, 32767);
         state = (current_control_state_t){random_in(&seed, -450000000, 450000000),
                                           random_in(&seed, -450000000, 450000000)};
         twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
         const dq_t u = step();
         const twin_dq_t t = twin_step(&twin);
-        worst_note(&circle, fmax(hypot(u.d, u.q) - f.si.v_ratio * in.v_dc, 0.0), "|u| %d %d v %d", u.d, u.q, in.v_dc);
+        if ((limited || twin.limited) && between_steps(((target.psi.d > psi.d) ? t.q : t.d) / v_max())) {
+            continue;
+        }
+        seen += twin.limited ? 1 : 0;
         worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, in.omega, in.v_dc);
-        if (fabs(t.d) < fabs(t.q) || target.psi.d > psi.d) {
-            worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
-                       in.omega, in.v_dc);
-        }
-        if (limited == twin.limited && fabs(t.d) < fabs(t.q)) {
-            worst_note(&integrator, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
-        }
+        worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
+                   in.omega, in.v_dc);
+        worst_note(&integrator, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
+        worst_note(&integrator, 2.0 * from_q31(state.s_q_q30) - twin.s.q / f.v, "s_q, psi %d %d", psi.d, psi.q);
     }
+    TEST_ASSERT_GREATER_THAN_INT(200000, seen);
     ASSERT_WORST(worst, 3.0);
-    ASSERT_WORST(circle, 3.5); /* 0.5 of v_max, 1 of the root, or 2 of |u| and 0.7 of the roundings */
-    ASSERT_WORST(integrator, 6e-6); /* the step is exact in q31; the cut is known to 1.5 LSB of u, 1/14 of it counts */
+    ASSERT_WORST(integrator, 8e-6); /* the step is exact in q31; the cut is known to 4 + 2 LSB of v, 1/14 of it counts */
 }
 
 /* Without limit the two integrators do the same sums; the stage's are exact. */
@@ -232,60 +256,57 @@ void test_the_proportional_part_follows_the_weighted_target_and_the_integral_par
                               2.0 * from_q31(state.s_d_q30));
 }
 
-/* 3 : 4 : 5 by hand. 1 LSB of u_d is 4 of u_q at the end. */
+/* 3 : 4 : 5 by hand; the step of 0.6 ends at 154/256, which leaves 0.7988. */
 void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the_circle(void)
 {
-    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
     for (int sign = -1; sign <= 1; sign += 2) {
-        state.s_d_q30 = (v_max * 3 / 5) * 32768;
+        state.s_d_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
         state.s_q_q30 = (sign > 0) ? (1 << 30) - 1 : -(1 << 30);
         dq_t u = step();
-        TEST_ASSERT_INT_WITHIN(1, v_max * 3 / 5, u.d);
-        TEST_ASSERT_INT_WITHIN(2, sign * v_max * 4 / 5, u.q);
+        TEST_ASSERT_INT_WITHIN(1, v_max() * 3 / 5, u.d);
+        TEST_ASSERT_INT_WITHIN(2, sign * 0.7988 * v_max(), u.q);
         TEST_ASSERT_TRUE(limited);
         state.s_d_q30 = -32767 * 32768;
-        u = step();
-        /* 31/32 of the circle at most: the q axis keeps sqrt(1 - (31/32)^2) = 0.248 of it to get out of there. */
-        TEST_ASSERT_INT_WITHIN(1, -v_max * 31 / 32, u.d);
-        TEST_ASSERT_INT_WITHIN(8, sign * (int)(0.24804 * v_max), u.q);
+        u = step(); /* the q axis always keeps a quarter, to get out of there */
+        TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
+        TEST_ASSERT_INT_WITHIN(1, sign * 0.25 * v_max(), u.q);
     }
 }
 
-/* By hand: u_d is 200 LSB beyond its 31/32; with u_q at nothing, q gets just these, to shed the flux -w psi_q. */
+/* By hand: u_d is 200 LSB beyond the circle; with u_q at nothing, q gets just these, to shed the flux -w psi_q. */
 void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_of_rotation(void)
 {
-    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    const int d_max = v_max - v_max / 32;
     for (int sign = -1; sign <= 1; sign += 2) {
         in.omega = sign; /* nothing but its sign */
-        state = (current_control_state_t){.s_d_q30 = -(d_max + 200) * 32768};
+        state = (current_control_state_t){.s_d_q30 = -(int32_t)(v_max() + 200.0) * 32768};
         const dq_t u = step();
-        TEST_ASSERT_INT_WITHIN(1, -d_max, u.d);
+        TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
         TEST_ASSERT_INT_WITHIN(2, -sign * 200, u.q);
     }
 }
 
-/* By hand: (-3, 4) is five long and may be 2.5 here; psi_d* one LSB above psi_d decides. */
-void test_while_the_d_axis_asks_for_flux_back_the_vector_is_shortened_and_keeps_its_direction(void)
+/* By hand: 4/5 for q, its step ends at 205/256 and leaves 0.5990; psi_d* one LSB above psi_d decides. */
+void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
 {
-    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_d_q30 = -(v_max * 6 / 5) * 32768;
-    state.s_q_q30 = (v_max * 8 / 5) * 32768;
+    state.s_d_q30 = -(int32_t)(v_max() * 6 / 5) * 32768;
+    state.s_q_q30 = (int32_t)(v_max() * 4 / 5) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
     const dq_t u = step();
-    TEST_ASSERT_INT_WITHIN(2, -v_max * 3 / 5, u.d);
-    TEST_ASSERT_INT_WITHIN(2, v_max * 4 / 5, u.q);
+    TEST_ASSERT_INT_WITHIN(2, -0.5990 * v_max(), u.d);
+    TEST_ASSERT_INT_WITHIN(1, v_max() * 4 / 5, u.q);
     TEST_ASSERT_TRUE(limited);
+    state.s_q_q30 = -(1 << 30);
+    TEST_ASSERT_INT_WITHIN(1, -0.25 * v_max(), step().d);
 }
 
 /* All of u_d may go to the axis that asks for flux back, and that is not yet a limit. */
 void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
 {
-    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_d_q30 = (v_max - 1) * 32768;
+    state.s_d_q30 = (int32_t)(0.99 * v_max()) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
-    TEST_ASSERT_EQUAL_INT(v_max - 1, step().d);
+    (void)step();
     TEST_ASSERT_FALSE(limited);
+    TEST_ASSERT_FALSE(out.clear);
 }
 
 /* A machine that brakes at high speed with the flux that the voltage just holds, and is then asked for none: flux in
@@ -324,22 +345,35 @@ void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
     }
 }
 
-void test_a_voltage_on_the_circle_is_not_called_limited(void)
+/* Beside no u_d the first of the 256 steps leaves sqrt(1 - 1/256^2). */
+void test_a_voltage_inside_the_circle_is_not_called_limited(void)
 {
-    const int v_max = (f.current_control.v_ratio * in.v_dc + 16384) >> 15;
-    state.s_q_q30 = v_max * 32768;
-    TEST_ASSERT_EQUAL_INT(v_max, step().q);
+    state.s_q_q30 = (int32_t)(0.9999 * v_max()) * 32768;
+    TEST_ASSERT_INT_WITHIN(1, 0.9999 * v_max(), step().q);
     TEST_ASSERT_FALSE(limited);
-    state.s_q_q30 = (v_max + 1) * 32768;
-    TEST_ASSERT_EQUAL_INT(v_max, step().q);
+    state.s_q_q30 = (int32_t)(v_max() + 1.0) * 32768;
+    TEST_ASSERT_INT_WITHIN(1, v_max(), step().q);
     TEST_ASSERT_TRUE(limited);
+}
+
+/* The promise to the modulation: clear says that |v| is below its bound, and never that something was cut. */
+void test_clear_is_said_inside_its_circle_only(void)
+{
+    uint64_t seed = 54;
+    const double bound = f.current_control.clear_q30 / 1073741824.0;
+    for (int n = 0; n < 100000; n++) {
+        state = (current_control_state_t){random_in(&seed, -500000000, 500000000),
+                                          random_in(&seed, -500000000, 500000000)};
+        (void)step();
+        const double square = (of_v(0) * of_v(0) + of_v(1) * of_v(1)) / v_max() / v_max();
+        TEST_ASSERT_TRUE(out.clear ? square < bound + 1e-9 : square > bound - 1e-9);
+    }
 }
 
 /* Ten seconds against the limit: the integrator stops where what is cut away balances the error, u = v_max + sigma b e,
  * and a reversed error of the same size leads off the limit in the same period. */
 void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
 {
-    const int v_max = (f.current_control.v_ratio * 4000 + 16384) >> 15;
     in.v_dc = 4000;
     const int32_t rest = target.psi.q;
     target.psi.q = rest + 200;
@@ -353,25 +387,29 @@ void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
     }
     TEST_ASSERT_TRUE(limited);
     TEST_ASSERT_INT_WITHIN(32768, held, state.s_q_q30);
-    TEST_ASSERT_INT_WITHIN(2, v_max + lround(0.8488 * 200 * (0.7 - 1.0)), held >> 15);
+    TEST_ASSERT_INT_WITHIN(2, v_max() + 0.8488 * 200 * (0.7 - 1.0), held >> 15);
     target.psi.q = rest - 200;
     target.weighted_q30 = q30(target.psi);
-    TEST_ASSERT_LESS_THAN_INT(v_max, step().q);
+    TEST_ASSERT_LESS_THAN_INT((int)v_max(), step().q);
     TEST_ASSERT_LESS_THAN_INT32(held, state.s_q_q30);
 }
 
-/* By hand: v_max = 2280, 31/32 of it 2209; s = 20000 leaves a cut of 17791, a_i/b = 1/14 of it comes off per period. */
+/* By hand: v_max = 2280; s = 8000 leaves a cut of 5720, a_i/b = 1/14 of it comes off per period; of 20000 no more than
+ * four times the circle counts. */
 void test_an_integrator_far_beyond_the_limit_is_led_back_in_both_signs(void)
 {
     in.v_dc = 4000;
     for (int sign = -1; sign <= 1; sign += 2) {
-        state.s_d_q30 = (sign > 0) ? 20000 * 32768 : -20000 * 32768;
+        state.s_d_q30 = sign * 20000 * 32768;
         (void)step();
-        TEST_ASSERT_INT_WITHIN(3, sign * (20000 - 17791 / 14), state.s_d_q30 >> 15);
+        TEST_ASSERT_INT_WITHIN(3, sign * (20000 - 4 * 2280 / 14), state.s_d_q30 >> 15);
+        state.s_d_q30 = sign * 8000 * 32768;
+        (void)step();
+        TEST_ASSERT_INT_WITHIN(3, sign * (8000 - 5720 / 14), state.s_d_q30 >> 15);
         for (int n = 0; n < 200; n++) { /* (13/14)^200 */
             (void)step();
         }
-        TEST_ASSERT_INT_WITHIN(15, sign * 2209, state.s_d_q30 >> 15);
+        TEST_ASSERT_INT_WITHIN(15, sign * 2280, state.s_d_q30 >> 15);
     }
 }
 
@@ -387,14 +425,21 @@ void test_one_axis_at_the_limit_does_not_hold_the_other(void)
     TEST_ASSERT_LESS_THAN_INT32(20000 * 32768, state.s_q_q30);
 }
 
+/* Below 1/(64 v_ratio), 898 LSB, the voltage is normalised as if it were that; at 0 and 1 LSB nothing is put out. */
 void test_without_dc_voltage_nothing_is_put_out(void)
 {
-    in.v_dc = 0;
-    target.weighted_q30 = q30((dq_t){-20000, 20000});
-    const dq_t u = step();
-    TEST_ASSERT_EQUAL_INT(0, u.d);
-    TEST_ASSERT_EQUAL_INT(0, u.q);
-    TEST_ASSERT_TRUE(limited);
+    state.s_d_q30 = -100 * 32768;
+    in.v_dc = 898;
+    TEST_ASSERT_INT_WITHIN(1, -100, step().d);
+    const fx_pair_t there = out.v;
+    in.v_dc = 200;
+    out = current_control_step(&f.current_control, &state, &in);
+    TEST_ASSERT_INT_WITHIN(64, (int16_t)there, (int16_t)out.v);
+    for (in.v_dc = 0; in.v_dc < 2; in.v_dc++) {
+        target.weighted_q30 = q30((dq_t){-20000, 20000});
+        out = current_control_step(&f.current_control, &state, &in);
+        TEST_ASSERT_EQUAL_UINT32(0, out.v);
+    }
 }
 
 void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(void)
@@ -408,9 +453,9 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         in.omega = ((n >> 6) & 1) ? INT32_MIN : INT32_MAX;
         in.psi_delta = end[(n >> 7) & 1];
         state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
-        in.v_dc = 32767;
-        const dq_t u = step();
-        TEST_ASSERT_TRUE(hypot(u.d, u.q) <= f.si.v_ratio * 32767 + 1.5);
+        in.v_dc = (n & 1) ? 32767 : 900;
+        const dq_t u = step(); /* d whole, and the quarter that q always has */
+        TEST_ASSERT_TRUE(hypot(u.d, u.q) <= v_max() * sqrt(17.0 / 16.0) + 1.5);
     }
 }
 

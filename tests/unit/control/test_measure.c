@@ -19,16 +19,17 @@ void setUp(void)
     config.v_dc_gain_q15 = 32768;
     for (int x = 0; x < 3; x++) {
         config.offset[x] = 32768;
-        config.gain_q14[x] = 16384;
+        config.gain_q14[x] = 16386; /* 1.0001, of which Q13 holds a third */
     }
 }
 
 static measure_config_t configured(void)
 {
-    measure_config_t c = {.v_dc_scale = (config.v_dc_gain_q15 << config.shift) / 2U};
+    measure_config_t c = {.v_dc = {(int32_t)(config.v_dc_gain_q15 << config.shift) / 2, 0x4000}};
     for (int x = 0; x < 3; x++) {
-        c.phase[x].scale = config.gain_q14[x] * (1 << config.shift) / 4;
-        c.phase[x].bias = -config.offset[x] * (config.gain_q14[x] / 4);
+        const int32_t third = (x == 0) ? config.gain_q14[x] / 6 : -config.gain_q14[x] / 6; /* Q13 */
+        c.phase[x].scale = third * (1 << config.shift);
+        c.phase[x].bias = -config.offset[x] * third + ((x == 0) ? 2048 : 0);
     }
     return c;
 }
@@ -60,19 +61,20 @@ void test_mid_scale_is_no_current_and_the_ends_are_full_scale(void)
     TEST_ASSERT_EQUAL_INT(0, measured(&ends).i.beta);
 }
 
-/* By hand: (2 * 1600 + 800 + 800)/3, no beta; then phase b alone: -800/3 and 800/sqrt(3). The sum is in Q27. */
+/* By hand: (2 * 1600 + 800 + 800)/3, no beta; then phase b alone: -800/3 and 800/sqrt(3). The mean is in Q28, and a
+ * quarter LSB more. */
 void test_the_vector_and_the_sum_of_the_phases_are_those_of_their_definition(void)
 {
     const adc_counts_t balanced = {2048 + 100, 2048 - 50, 2048 - 50, 0};
     measure_t m = measured(&balanced);
     TEST_ASSERT_EQUAL_INT(1600, m.i.alpha);
     TEST_ASSERT_EQUAL_INT(0, m.i.beta);
-    TEST_ASSERT_EQUAL_INT(0, m.zero_q28);
+    TEST_ASSERT_EQUAL_INT(2048, m.zero_q28);
     const adc_counts_t alone = {2048, 2048 + 50, 2048, 0};
     m = measured(&alone);
     TEST_ASSERT_EQUAL_INT(-267, m.i.alpha);
     TEST_ASSERT_EQUAL_INT(462, m.i.beta);
-    TEST_ASSERT_EQUAL_INT(800 * 4096, m.zero_q28);
+    TEST_ASSERT_INT_WITHIN(300, 800 * 8192 / 3 + 2048, m.zero_q28);
 }
 
 /* Half scale is half of the full-scale voltage, which is one V_b with a gain of 1.0. */
@@ -90,7 +92,7 @@ void test_the_dc_voltage_scales_with_its_gain(void)
 void test_an_offset_and_a_gain_belong_to_their_own_phase(void)
 {
     config.offset[1] = 32768 + 160;
-    config.gain_q14[2] = 8192;
+    config.gain_q14[2] = 8190;
     const adc_counts_t counts = {2058, 2058, 2058, 0};
     const abc_t i = phases(&counts);
     TEST_ASSERT_INT_WITHIN(1, 160, i.a);
@@ -113,7 +115,7 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     const abc_t i = phases(c);
     worst_note(worst, m.i.alpha - twin_clamp(vector.alpha, -32768, 32767), "alpha of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.i.beta - twin_clamp(vector.beta, -32768, 32767), "beta of %d %d %d", c->i_a, c->i_b, c->i_c);
-    worst_note(worst, m.zero_q28 / 4096.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b, c->i_c);
+    worst_note(worst, (m.zero_q28 - 2048) * 3.0 / 8192.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.v_dc - twin_clamp(t.v_dc, 0, 32767), "v_dc of %d", c->v_dc);
     if (fabs(vector.alpha) < 32767.0 && fabs(vector.beta) < 32767.0) { /* five roundings, 2.2 LSB at most */
         worst_note(worst, 0.25 * (i.a - twin_clamp(t.i.a, -32768, 32767)), "i_a of %d %d %d", c->i_a, c->i_b, c->i_c);
@@ -122,8 +124,8 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     }
 }
 
-/* One rounding to q15, half an LSB; 1/3 and 1/sqrt(3) in Q20 are 1e-6 off, 0.1 LSB of up to 4 per unit. Gains that Q12
- * holds. */
+/* One rounding to q15, half an LSB; sqrt(3) in Q19 is 1e-7 off. Gains of
+ * which Q13 holds a third. */
 void test_every_count_with_random_offsets_and_gains_follows_the_twin(void)
 {
     worst_t worst = {0};
@@ -133,7 +135,7 @@ void test_every_count_with_random_offsets_and_gains_follows_the_twin(void)
         for (int count = 0; count < (1 << bits); count += 1 + (1 << bits) / 4096) {
             for (int x = 0; x < 3; x++) {
                 config.offset[x] = random_in(&seed, 0, 65535);
-                config.gain_q14[x] = 4 * random_in(&seed, 1, 8191);
+                config.gain_q14[x] = 6 * random_in(&seed, 1, 5461);
             }
             config.v_dc_gain_q15 = 2U * (uint32_t)random_in(&seed, 1, 32767);
             const uint16_t c = (uint16_t)count;
@@ -150,7 +152,7 @@ void test_the_widest_product_neither_wraps_nor_changes_sign(void)
     worst_t worst = {0};
     config.shift = 0;
     for (int x = 0; x < 3; x++) {
-        config.gain_q14[x] = 32764;
+        config.gain_q14[x] = 32766;
     }
     config.v_dc_gain_q15 = 65534;
     config.offset[0] = 0;

@@ -124,7 +124,7 @@ def _current_control(motor: Motor) -> list[Row]:
             ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
             ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
             ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
-            ("tracking_gain_q16", q16(d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
+            ("tracking_gain_q34", q31(8 * d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
              "integral ratio over weight, times v_ratio"),
             ("per_ratio_q31", f"{round(2**31 / d.v_ratio)}u", f"1/{d.v_ratio:.6g}"),
             ("clear_q30", f"{round(2**30 * (d.v_clear / d.v_ratio) ** 2)}u", f"({d.v_clear:.6g} over v_ratio) squared")]
