@@ -54,7 +54,8 @@ float calibration_get(const motor_t *m, calibration_id_t id)
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         return (float)m->torque_loop.ki / Q15_SCALE / task_s(m);
     case CALIBRATION_dead_time_compensation:
-        return (m->dead_time_s > 0.0F) ? (float)m->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m) : 0.0F;
+        return (m->dead_time_s > 0.0F) ? (float)m->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m)
+                                       : 0.0F;
     case CALIBRATION_COUNT:
     default:
         return 0.0F;

@@ -47,7 +47,8 @@ static bool clear_valid(const motor_t *m)
 static bool quiet_valid(const monitor_config_t *c)
 {
     const int32_t most = c->i_trip - c->zero_max - 1;
-    return c->quiet_q30 >= 0 && most >= 0 && c->quiet_q30 <= most * most;
+    return c->zero_max > 0 && 3 * c->zero_max <= c->sum_max && most >= 0 &&
+           c->quiet_q30 >= 0 && c->quiet_q30 <= most * most;
 }
 
 bool motor_valid(const motor_t *m)
@@ -56,7 +57,7 @@ bool motor_valid(const motor_t *m)
            torque_limit_valid(&m->torque_limit) &&
            m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
            (uint32_t)m->monitor.v_min > m->current_control.per_ratio_q31 >> 22 &&
-           m->monitor.zero_max > 0 && 3 * m->monitor.zero_max <= m->monitor.sum_max && quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
+           quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
            m->safe_state.share_open < m->safe_state.share_short && mrai_valid(&m->mrai) &&
            identify_valid(&m->identify) && control_valid(m) && clear_valid(m);
 }

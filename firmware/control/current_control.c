@@ -106,7 +106,8 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const dq_t left = cut(v, error_d, omega);
     const dq_t missing = {left.d - v.d, left.q - v.q};
     const int32_t gain_q33 = fx_mul_q31_word(config->tracking_gain_q34, in->v_dc); /* per unit of v: Q34 * Q15 */
-    *state = (current_control_state_t){track(next.s_d_q30, gain_q33, missing.d), track(next.s_q_q30, gain_q33, missing.q)};
+    *state = (current_control_state_t){track(next.s_d_q30, gain_q33, missing.d),
+                                       track(next.s_q_q30, gain_q33, missing.q)};
     return (current_control_out_t){
         .u = u,
         .v = fx_arch_pkhbt(left.d, left.q),

@@ -16,8 +16,8 @@
  * clear: |v| < v_clear/v_ratio, a circle inside of everything that may limit here or in the modulation (MO-11)
  * Source   docs/theory/current-control.md (CC-4) ... (CC-15)
  * Units    per unit
- * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; 0.5 < v_ratio < 0.7; |s| <= 1; v_dc from 0; below
- *          1/(64 v_ratio) it is taken for that, below 2 LSB the voltage is none
+ * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; 0.5 < v_ratio < 0.7; |s| <= 1; v_dc from 0;
+ *          below 1/(64 v_ratio) it is taken for that, below 2 LSB the voltage is none
  * Rounding half up: 1/2 LSB q15 in u and in v; s takes its step exactly; the circle in 256 steps from inside
  * Errors   saturates and says so in limited; no fault of its own
  * Context  step: fast ISR, one bounded hardware division; target: 1 kHz task */

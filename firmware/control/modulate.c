@@ -39,8 +39,8 @@ typedef struct {
     int32_t longest, nearer_rail, middle; /* Q31; the latter with half an LSB to round a duty */
 } reach_t;
 
-/* A pulse or a gap shorter than the bridge can make becomes the nearer of nothing and the shortest (MO-8). Of a negative
- * number the ones' complement is one short of the magnitude: rounding the duty makes up for it. */
+/* A pulse or a gap shorter than the bridge can make becomes the nearer of nothing and the shortest (MO-8). Of a
+ * negative number the ones' complement is one short of the magnitude: rounding the duty makes up for it. */
 static uint32_t realisable(reach_t reach, int32_t x_q31, uint32_t *limited)
 {
     const int32_t far = x_q31 ^ (x_q31 >> 31);

@@ -64,7 +64,7 @@ __attribute__((always_inline)) static inline int32_t fx_usat_bits(int32_t x, uns
     return fx_arch_usat(x, bits);
 }
 
-/* a/b as the instruction has it, 0 for b = 0. The bits of a quotient of 2^31 and more are those of a negative number. */
+/* a/b as the instruction has it, 0 for b = 0. A quotient of 2^31 and more has the bits of a negative number. */
 static inline int32_t fx_quotient(uint32_t a, uint32_t b)
 {
     return fx_arch_udiv(a, b);

@@ -23,8 +23,7 @@ DIVISIONS = {
     "current_reference.c": 1,
     "identify.c": 1,
     "mrai_schedule.c": 1,
-    "modulate.c": 5,  # reciprocal of the measured dc voltage, and what must be shortened
-    "current_control.c": 1,  # only beyond the voltage circle, while d asks for more flux
+    "current_control.c": 1,  # reciprocal of the measured dc voltage
     "commission.c": 2,  # 1 kHz: means over ten periods
     "e2e.c": 2,  # 1 kHz: the counter's turn
     "identify_filter.c": 1,  # 100 Hz and axis

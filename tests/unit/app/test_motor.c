@@ -63,8 +63,8 @@ void test_measurement_and_angle_are_the_si_values(void)
     for (int phase = 0; phase < 3; phase++) {
         const int sign = (phase == 0) ? 1 : -1; /* half an LSB of alpha, which takes twice phase a */
         HELD(sign * lsb * 8192.0 / 3.0, motor.measure.phase[phase].scale, 1.0);
-        TEST_ASSERT_EQUAL_INT((phase == 0) ? 2048 : 0,
-                              (int)(32768.0 / lsb) * motor.measure.phase[phase].scale + motor.measure.phase[phase].bias);
+        const int32_t at_middle = (int)(32768.0 / lsb) * motor.measure.phase[phase].scale;
+        TEST_ASSERT_EQUAL_INT((phase == 0) ? 2048 : 0, at_middle + motor.measure.phase[phase].bias);
     }
     TEST_ASSERT_EQUAL_INT(motor_si.pole_pairs, motor.angle_tracker.pole_pairs);
     HELD(2.0 * wn, q31(motor.angle_tracker.kp), q31(1));

@@ -169,7 +169,7 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
     }
     TEST_ASSERT_GREATER_THAN_INT(200000, seen);
     ASSERT_WORST(worst, 3.0);
-    ASSERT_WORST(integrator, 8e-6); /* the step is exact in q31; the cut is known to 4 + 2 LSB of v, 1/14 of it counts */
+    ASSERT_WORST(integrator, 8e-6); /* the step is exact; the cut is known to 4 + 2 LSB of v, 1/14 of it counts */
 }
 
 /* Without limit the two integrators do the same sums; the stage's are exact. */

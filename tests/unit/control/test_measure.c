@@ -115,7 +115,8 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     const abc_t i = phases(c);
     worst_note(worst, m.i.alpha - twin_clamp(vector.alpha, -32768, 32767), "alpha of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.i.beta - twin_clamp(vector.beta, -32768, 32767), "beta of %d %d %d", c->i_a, c->i_b, c->i_c);
-    worst_note(worst, (m.zero_q28 - 2048) * 3.0 / 8192.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b, c->i_c);
+    worst_note(worst, (m.zero_q28 - 2048) * 3.0 / 8192.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b,
+               c->i_c);
     worst_note(worst, m.v_dc - twin_clamp(t.v_dc, 0, 32767), "v_dc of %d", c->v_dc);
     if (fabs(vector.alpha) < 32767.0 && fabs(vector.beta) < 32767.0) { /* five roundings, 2.2 LSB at most */
         worst_note(worst, 0.25 * (i.a - twin_clamp(t.i.a, -32768, 32767)), "i_a of %d %d %d", c->i_a, c->i_b, c->i_c);

@@ -150,8 +150,8 @@ void test_the_zero_sequence_centres_the_outer_legs(void)
     }
 }
 
-/* Duty per LSB of v: 0.57 times up to sqrt(3). Sine and cosine are 1 LSB off at a length of 1: 0.57 * 1.73 * sqrt(2); 0.5
- * of the duty, 1 of the compensation. acted: a duty's errors in volts, and 1.5 of the way back. */
+/* Duty per LSB of v: 0.57 times up to sqrt(3). Sine and cosine are 1 LSB off at a length of 1: 0.57 * 1.73 * sqrt(2);
+ * 0.5 of the duty, 1 of the compensation. acted: a duty's errors in volts, and 1.5 of the way back. */
 void test_inside_the_hexagon_every_duty_follows_the_twin(void)
 {
     worst_t worst = {0};

@@ -2,7 +2,8 @@
 #include "safety/monitor.h"
 #include "unity.h"
 
-static const monitor_config_t config = {.i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_max = 300};
+static const monitor_config_t config = {
+    .i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_max = 300};
 static monitor_state_t state;
 static monitor_in_t in;
 static bool jumped;
