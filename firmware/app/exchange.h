@@ -147,7 +147,9 @@ static inline void schedule_box_write(schedule_box_t *box, mrai_schedule_t sched
 
 static inline const mrai_schedule_t *schedule_box_read(const schedule_box_t *box)
 {
-    return &box->slot[box->generation & 1U];
+    const mrai_schedule_t *slot = &box->slot[box->generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
 }
 
 #endif
