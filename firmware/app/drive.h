@@ -58,20 +58,18 @@ typedef struct {
     uint8_t periods_on; /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
     uint32_t overruns;
-    uint32_t pended;             /* identifications asked for */
     sample_t lost;               /* takes the sample of a period that finds both slots in use */
     uint32_t fault_resets;       /* of the command, as far as done */
     volatile uint32_t faults;    /* latched */
 } fast_state_t;
 
-/** Written by the MRAI ISR alone. psi_delta_q15 is one half word for the fast ISR, which keeps it itself while the MRAI
- * ISR rests: then it comes from the task's robust identification. */
+/** Written by the MRAI ISR alone. psi_delta_q15 is one half word for the fast ISR, which keeps it and `finished` itself
+ * while the MRAI ISR rests: then the task's robust identification knows the flux, and no sample waits. */
 typedef struct {
     mrai_state_t mrai;
-    torque_estimate_state_t torque;
-    uint32_t generation;            /* of the last sample it took */
+    torque_sum_t torque;
     uint32_t identification_resets; /* of the request, as far as done */
-    volatile uint32_t finished;
+    volatile uint32_t finished;     /* generation of the last sample it took */
     volatile q15_t psi_delta_q15;
 } slow_state_t;
 
@@ -97,6 +95,7 @@ typedef struct {
     identify_state_t identify;
     identify_out_t identified;
     volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
+    torque_mean_t torque_mean; /* of the paper's estimate */
     q15_t torque_estimate;
     learnt_t learnt;
     current_reference_t reference;
@@ -129,7 +128,7 @@ typedef struct {
     identify_window_t window;
     mrai_state_t mrai;
     q15_t psi_delta;
-    q15_t torque; /* the paper's estimate, mean */
+    torque_sum_t torque; /* the paper's estimate */
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
 } view_t;

@@ -39,7 +39,7 @@ void ecu_watch(ecu_t *ecu)
     const uint32_t periods = ecu->drive.samples.generation;
     const uint32_t finished = ecu->drive.slow.finished;
     const bool late = seen->started && periods - seen->periods >= LATE_PERIODS;
-    const bool unfinished = ecu->drive.fast.pended != finished && finished == seen->finished;
+    const bool unfinished = periods != finished && finished == seen->finished;
     seen->late_in_a_row = in_a_row(seen->late_in_a_row, late);
     seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, periods == seen->periods || unfinished);
     if (late) {

@@ -21,14 +21,15 @@
 /** One period as the fast ISR saw it. Writer: fast ISR. Readers: MRAI ISR, 1 kHz task. */
 typedef struct {
     mrai_in_t mrai;
+    uint32_t theta_e; /* of the samples, 2^32 = one turn */
     fx_pair_t i_ab;   /* alpha, beta */
     int32_t zero_q28; /* mean of the phases */
     int32_t v_dc;
-    uint32_t theta_e; /* of the samples, 2^32 = one turn */
     uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* circle or hexagon cut the voltage */
     bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */
+    uint32_t to_64_bytes; /* a power of two is quicker to find */
 } sample_t;
 
 typedef struct {
@@ -56,7 +57,7 @@ typedef struct {
     safe_t safe;
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
-    uint32_t to_32_bytes;  /* a power of two is quicker to find */
+    uint32_t to_32_bytes;  /* as above */
 } command_t;
 
 typedef struct {
@@ -147,7 +148,9 @@ static inline void schedule_box_write(schedule_box_t *box, mrai_schedule_t sched
 
 static inline const mrai_schedule_t *schedule_box_read(const schedule_box_t *box)
 {
-    return &box->slot[box->generation & 1U];
+    const mrai_schedule_t *slot = &box->slot[box->generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
 }
 
 #endif

@@ -77,11 +77,11 @@ static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
     sample_box_publish(&drive->samples, next);
     if (__builtin_expect(drive->request.identification_mode != IDENTIFICATION_ROBUST, 0)) {
         identify_window_spoil(&fast->window); /* it would have a gap */
-        fast->pended++;
         hal_irq_pend_mrai();
         return;
     }
     drive->slow.psi_delta_q15 = drive->task.identified.psi_delta;
+    drive->slow.finished = next;
     const identify_sample_t in = {
         .i = sample->mrai.i,
         .u = sample->mrai.u,
@@ -214,9 +214,10 @@ __attribute__((flatten)) void fast_isr(drive_t *drive)
     if (__builtin_expect(!command->run, 0)) {
         forget_faults(drive, command->fault_resets);
     }
-    const uint32_t unfinished = drive->fast.pended - drive->slow.finished;
+    const uint32_t published = drive->samples.generation;
+    const uint32_t unfinished = published - drive->slow.finished;
     watch(drive, unfinished);
-    uint32_t next = drive->samples.generation + 1U;
+    uint32_t next = published + 1U;
     sample_t *sample = sample_box_begin(&drive->samples, next);
     if (__builtin_expect(unfinished > 1U, 0)) {
         sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */

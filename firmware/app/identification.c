@@ -53,7 +53,7 @@ static void robust(drive_t *drive, const view_t *view)
 static void report_paper(drive_t *drive, const view_t *view)
 {
     const mrai_state_t *mrai = &view->mrai;
-    drive->task.torque_estimate = view->torque;
+    drive->task.torque_estimate = torque_estimate_mean(&drive->task.torque_mean, &view->torque);
     drive->task.learnt = (learnt_t){mrai->psi_delta, mrai->r_delta, mrai_flux_clamped(&drive->motor.mrai, mrai),
                                     mrai_resistance_clamped(&drive->motor.mrai, mrai)};
 }

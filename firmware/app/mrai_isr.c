@@ -5,7 +5,6 @@
  * rest the 1 kHz task's. */
 void mrai_isr(drive_t *drive)
 {
-    const uint32_t asked = drive->fast.pended;
     const uint32_t generation = drive->samples.generation;
     const sample_t *sample = sample_box_look(&drive->samples, generation);
     slow_state_t *slow = &drive->slow;
@@ -16,15 +15,15 @@ void mrai_isr(drive_t *drive)
         slow->identification_resets = drive->request.identification_resets;
         slow->mrai = (mrai_state_t){0};
         mrai_reset(config, schedule, &slow->mrai, &sample->mrai); /* goes on from this sample, not from zero flux */
-    } else if (sample->acting && generation - slow->generation == 1U) {
+    } else if (sample->acting && generation - slow->finished == 1U) {
         mrai_step(config, schedule, &slow->mrai, &sample->mrai);
     } else {
         /* The bridge was off, so that its voltage is not ours, or the sample before was not seen: only the currents
          * are known. */
         mrai_reset(config, schedule, &slow->mrai, &sample->mrai);
     }
-    slow->generation = generation;
-    slow->psi_delta_q15 = fx_q15_from_q31(slow->mrai.psi_delta);
-    (void)torque_estimate_step(&slow->torque, sample->mrai.i, &sample->mrai.flux, slow->mrai.psi_delta);
-    slow->finished = asked;
+    const int32_t psi_delta = mrai_psi_delta_q15(&slow->mrai);
+    slow->psi_delta_q15 = (q15_t)psi_delta;
+    torque_estimate_add(&slow->torque, &sample->mrai.i, &sample->mrai.flux, psi_delta);
+    slow->finished = generation;
 }

@@ -190,7 +190,7 @@ static void look(const drive_t *drive, view_t *view)
         view->window = *window_box_look(&drive->windows);
         view->mrai = drive->slow.mrai;
         view->psi_delta = drive_psi_delta(drive);
-        view->torque = drive->slow.torque.mean;
+        view->torque = drive->slow.torque;
         view->faults = drive->fast.faults;
         exchange_barrier();
     } while (drive->samples.generation != seen);

@@ -40,8 +40,12 @@ flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i)
         .psi_q = fx_sat_q15_word(psi_q),
         .psi_f0 = psi_f0,
         .g = g,
-        .outside = cell.outside,
     };
+}
+
+__attribute__((cold)) bool flux_table_outside(const flux_table_config_t *config, dq_t i)
+{
+    return fx_mesh_outside(&config->mesh, i.d, (uint32_t)((i.q < 0) ? -i.q : i.q));
 }
 
 __attribute__((cold)) flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i)

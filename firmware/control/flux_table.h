@@ -5,10 +5,10 @@
  *   psi_d = l_d(i_d,|i_q|) i_d + psi_f0(|i_q|),  psi_q = l_q(i_d,|i_q|) i_q, bilinear in the tabulated quantities
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6); the 2014 paper's look-up of L_d, L_q (section 1)
  * Units    currents per unit of I_b; results as in flux_table_types.h
- * Range    i_d, i_q anywhere in q15; outside the grid the edge is used and flagged
+ * Range    i_d, i_q anywhere in q15; outside the grid the edge is used, flux_table_outside() tells
  * Rounding 1 LSB q15 per interpolated quantity; psi: 1/2 LSB of psi_f0 and 1/2 of the product with an l of 29 bits
- * Errors   outside is not zero; flux_table_valid() rejects a bad table at start-up
- * Context  step: fast ISR, once per period; inductances: tasks; no division, no loop */
+ * Errors   none; flux_table_valid() rejects a bad table at start-up
+ * Context  step: fast ISR, once per period; the others: tasks; no division, no loop */
 #include <stdint.h>
 
 #include "control/flux_table_types.h"
@@ -26,6 +26,7 @@ typedef struct {
 
 bool flux_table_valid(const flux_table_config_t *config);
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i);
+bool flux_table_outside(const flux_table_config_t *config, dq_t i);
 flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i);
 
 #endif

@@ -15,7 +15,6 @@ typedef struct {
     int32_t psi_q;    /* l_q i_q */
     int32_t psi_f0;   /* psi_d at i_d = 0 for this i_q, nominal magnet */
     int32_t g;        /* (1/l_dd + 1/l_qq) omega_b T_s/2, as the observer's poles want it */
-    uint32_t outside; /* not zero: the point lay outside the table; the edge was used */
 } flux_point_t;
 
 /** For tasks. */

@@ -10,18 +10,12 @@
 #define INNOVATION_BITS 24
 #define INNOVATION_SCALE 256
 
-
 /* Of the d equation (MR-7). */
 #define WEIGHT_D 2
 
 typedef struct {
     int32_t d, q;
 } pair_t;
-
-typedef struct {
-    q31_t lo, hi;
-    int32_t proportional_q24;
-} law_t;
 
 static bool limits_valid(q31_t lo, q31_t hi)
 {
@@ -45,24 +39,36 @@ static int32_t innovation(int32_t s2e_q27)
     return fx_sat_bits(s2e_q27, INNOVATION_BITS) * INNOVATION_SCALE;
 }
 
-/* One law: I -= step, clamped; the proportional part acts on top of it for this step only (MR-9, MR-10). Returns what
- * the observer runs on. */
-static q31_t adapt(const law_t *law, q31_t *integral, q31_t step)
+static pair_t two(const int32_t *from)
 {
-    q31_t moved = fx_sub_q31(*integral, step);
-    if (__builtin_expect((uint32_t)moved - (uint32_t)law->lo > (uint32_t)law->hi - (uint32_t)law->lo, 0)) {
-        moved = fx_clamp_q31(moved, law->lo, law->hi);
+    const fx_arch_two_t read = fx_arch_load_two(from);
+    return (pair_t){read.first, read.second};
+}
+
+/* One law: I -= step, clamped (MR-9, MR-10). limits: the lower and the upper one. */
+static q31_t adapt(q31_t integral, q31_t step, pair_t limits)
+{
+    const q31_t moved = fx_sub_q31(integral, step);
+    if (__builtin_expect(moved < limits.d || moved > limits.q, 0)) {
+        return fx_arch_opaque(fx_clamp_q31(moved, limits.d, limits.q)); /* a branch: nothing in every other period */
     }
-    *integral = moved;
-    /* Q31 * Q24 = Q23; limited to 1/2 pu so that the sum with the limited integral cannot overflow. */
-    return moved - fx_sat_bits(fx_mulhi(step, law->proportional_q24), 23) * 256;
+    return moved;
+}
+
+/* The proportional part acts on top of the integral for this step only. Q31 * Q24 = Q23; limited to 1/2 pu so that the
+ * sum with the limited integral cannot overflow. */
+static q31_t used(q31_t integral, q31_t step, int32_t proportional_q24)
+{
+    return integral - fx_sat_bits(fx_mulhi(step, proportional_q24), 23) * 256;
 }
 
 /* (8) normalised: dpsi -= 2 k_psi s2 e_q/w. Q28 * Q35 = Q31. */
 static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_state_t *state, int32_t innovation_q)
 {
-    const law_t law = {config->psi_delta_min, config->psi_delta_max, config->flux_proportional_q24};
-    return adapt(&law, &state->psi_delta, fx_mulhi(step_q28, innovation_q));
+    const q31_t step = fx_mulhi(step_q28, innovation_q);
+    const q31_t moved = adapt(state->psi_delta, step, two(&config->psi_delta_min));
+    state->psi_delta = moved;
+    return used(moved, step, config->flux_proportional_q24);
 }
 
 /* (7) normalised: dR -= k s2 (2 i_d e_d + i_q e_q), i weighted, Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25,
@@ -70,53 +76,74 @@ static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_stat
 static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mrai_state_t *state, pair_t i,
                               pair_t innovation)
 {
-    const law_t law = {config->r_delta_min, config->r_delta_max, config->resistance_proportional_q24};
     const int32_t power_q31 = fx_mulhi_add(fx_mulhi(innovation.d, i.d), innovation.q, i.q);
-    return adapt(&law, &state->r_delta, fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64);
+    const q31_t step = fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64;
+    const q31_t moved = adapt(state->r_delta, step, two(&config->r_delta_min));
+    state->r_delta = moved;
+    return used(moved, step, config->resistance_proportional_q24);
+}
+
+/* Weighted, Q28. */
+static pair_t weighted(const dq_t *i)
+{
+    const pair_t read = two(&i->d);
+    return (pair_t){read.d * (8192 * WEIGHT_D), read.q * 8192};
 }
 
 /* Half a period's rotational and resistive voltage at one of its ends, as flux: half of T_s (R^ i_d - w psi_q) and of
  * T_s (R^ i_q + w (psi_d + dpsi)), weighted (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
-static pair_t half_voltage(const mrai_config_t *config, const mrai_in_t *in, pair_t i_q28, q31_t psi_used, q31_t r_used)
+static pair_t half_voltage(const mrai_config_t *config, const mrai_in_t *in, pair_t i_q28, q31_t psi_used, q31_t r_used,
+                           pair_t *psi)
 {
-    const int32_t turn_q30 = fx_mulhi(in->omega, config->period);
-    const int32_t drop_q30 = fx_mulhi(fx_add_q31(config->r0, r_used), config->period);
-    const int32_t psi_d_q28 = in->flux.psi_d * 8192 + (psi_used >> 3);
-    return (pair_t){fx_mulhi_sub(fx_mulhi(drop_q30, i_q28.d), turn_q30, in->flux.psi_q * (8192 * WEIGHT_D)),
-                    fx_mulhi_add(fx_mulhi(drop_q30, i_q28.q), turn_q30, psi_d_q28)};
+    const pair_t r0_period = two(&config->r0);
+    const int32_t drop_q30 = fx_mulhi(fx_add_q31(r0_period.d, r_used), r0_period.q);
+    const pair_t drop = {fx_mulhi(drop_q30, i_q28.d), fx_mulhi(drop_q30, i_q28.q)};
+    const int32_t turn_q30 = fx_mulhi(in->omega, r0_period.q);
+    *psi = two(&in->flux.psi_d);
+    const int32_t psi_d_q28 = psi->d * 8192 + (psi_used >> 3);
+    return (pair_t){fx_mulhi_sub(drop.d, turn_q30, psi->q * (8192 * WEIGHT_D)),
+                    fx_mulhi_add(drop.q, turn_q30, psi_d_q28)};
 }
 
 /* This sample's share of the period that begins with it. */
-static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in, pair_t e, pair_t half)
+static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const dq_t *u, pair_t psi, pair_t e,
+                  pair_t half)
 {
     state->e_d_q27 = e.d;
     state->e_q_q27 = e.q;
-    state->begun_d_q27 = fx_mulhi_add(e.d - in->flux.psi_d * (4096 * WEIGHT_D) + half.d,
-                                      schedule->minus_voltage_q28 * WEIGHT_D, in->u.d * 65536);
-    state->begun_q_q27 = fx_mulhi_add(e.q - in->flux.psi_q * 4096 + half.q,
-                                      schedule->minus_voltage_q28, in->u.q * 65536);
+    const pair_t volt = two(&schedule->minus_voltage_d_q28);
+    const pair_t acts = two(&u->d);
+    const int32_t begun_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, volt.d, acts.d * 65536);
+    const int32_t begun_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, volt.q, acts.q * 65536);
+    state->begun_d_q27 = begun_d;
+    state->begun_q_q27 = begun_q;
 }
 
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    const pair_t i = {in->i.d * (8192 * WEIGHT_D), in->i.q * 8192};
-    begin(schedule, state, in, (pair_t){0, 0}, half_voltage(config, in, i, state->psi_delta, state->r_delta));
+    pair_t psi;
+    const pair_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);
+    begin(schedule, state, &in->u, psi, (pair_t){0, 0}, half);
 }
 
 /* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
  * steady state. In Q27 the d axis is the larger one: 4 + 2 (1 + 1 + 0.8) + 2 + 2 (1 + 1) < 16. */
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in)
 {
-    const pair_t i = {in->i.d * (8192 * WEIGHT_D), in->i.q * 8192}; /* weighted, Q28 */
     /* (MR-7): 4 s2 in Q30, which is s2 in Q32, below 1/4. */
     const int32_t s2_q32 = fx_mul_q31_word(config->pole_gain, in->flux.g);
-    const pair_t s2e = {fx_mulhi(s2_q32, state->e_d_q27), fx_mulhi(s2_q32, state->e_q_q27)};
-    const pair_t e = {state->begun_d_q27 - s2e.d + s2e.q, state->begun_q_q27 - s2e.d - s2e.q};
-    const pair_t fresh = {innovation(s2e.d), innovation(s2e.q)};
-    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh.q);
+    const pair_t last = two(&state->e_d_q27);
+    const pair_t s2e = {fx_mulhi(s2_q32, last.d), fx_mulhi(s2_q32, last.q)};
+    const int32_t fresh_q = innovation(s2e.q);
+    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh_q);
+    const pair_t fresh = {innovation(s2e.d), fresh_q};
+    const pair_t i = weighted(&in->i);
     const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, fresh);
-    const pair_t half = half_voltage(config, in, i, psi_used, r_used);
-    const pair_t now = {fx_sat_bits(e.d + in->flux.psi_d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
-                        fx_sat_bits(e.q + in->flux.psi_q * 4096 + half.q, ERROR_BITS)};
-    begin(schedule, state, in, now, half);
+    pair_t psi;
+    const pair_t half = half_voltage(config, in, i, psi_used, r_used, &psi);
+    const pair_t begun = two(&state->begun_d_q27);
+    const pair_t e = {begun.d - s2e.d + s2e.q, begun.q - s2e.d - s2e.q};
+    const pair_t now = {fx_sat_bits(e.d + psi.d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
+                        fx_sat_bits(e.q + psi.q * 4096 + half.q, ERROR_BITS)};
+    begin(schedule, state, &in->u, psi, now, half);
 }

@@ -24,16 +24,17 @@
 #include "control/flux_table_types.h"
 #include "types/frames.h"
 
+/** First what every period reads, in its order. */
 typedef struct {
-    q31_t r0;              /* nominal resistance in the observer and its poles */
     q31_t pole_gain;       /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
+    int32_t flux_proportional_q24;       /* k_P/k_I of the flux law, in periods, < 128 */
+    q31_t psi_delta_min, psi_delta_max;
+    q31_t r_delta_min, r_delta_max;
+    int32_t resistance_proportional_q24; /* k_P/k_I of the resistance law, in periods, < 128 */
+    q31_t r0;              /* nominal resistance in the observer and its poles */
     q31_t period;          /* omega_b T_s: volts per unit to flux per unit and period */
     q31_t flux_gain;       /* 2 k_psi/omega_b */
     q31_t resistance_gain; /* 2 k_r/omega_b */
-    int32_t flux_proportional_q24;       /* k_P/k_I of the flux law, in periods, < 128 */
-    int32_t resistance_proportional_q24; /* k_P/k_I of the resistance law, in periods, < 128 */
-    q31_t psi_delta_min, psi_delta_max;
-    q31_t r_delta_min, r_delta_max;
     q15_t omega_min;       /* both gates: frozen below this speed */
     q15_t omega_r_max;     /* resistance gate: frozen above this speed */
     q15_t i_min;           /* both gates: frozen below this current magnitude */
@@ -47,6 +48,7 @@ typedef struct {
 typedef struct {
     int32_t flux_step_q28;       /* 2 k_psi/(omega_b w), signed like w; 0 while the flux gate is closed */
     int32_t resistance_step_q26; /* 2 k_r/(omega_b n); 0 while the resistance gate is closed */
+    int32_t minus_voltage_d_q28; /* of the d equation: twice the other one */
     int32_t minus_voltage_q28;   /* -omega_b T_s/sinc(w T_s/2) */
 } mrai_schedule_t;
 
@@ -68,6 +70,12 @@ bool mrai_valid(const mrai_config_t *config);
 /** Without error from this sample on, what was identified is kept. */
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in);
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state, const mrai_in_t *in);
+
+/** The identified flux, rounded; its limits leave room for that. */
+static inline int32_t mrai_psi_delta_q15(const mrai_state_t *state)
+{
+    return (state->psi_delta + 0x8000) >> 16;
+}
 
 /** A parameter rests on its limit. */
 static inline bool mrai_flux_clamped(const mrai_config_t *config, const mrai_state_t *state)

@@ -64,10 +64,12 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
     quality->psi_last = now->psi_delta;
     quality->r_last = now->r_delta;
 
+    const int32_t voltage = minus_voltage_q28(config, in->sample->omega);
     return (mrai_schedule_t){
         .flux_step_q28 = flux_open ? flux_step(config, omega) : 0,
         .resistance_step_q26 =
             resistance_open ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
-        .minus_voltage_q28 = minus_voltage_q28(config, in->sample->omega),
+        .minus_voltage_d_q28 = 2 * voltage,
+        .minus_voltage_q28 = voltage,
     };
 }

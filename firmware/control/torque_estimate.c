@@ -3,20 +3,33 @@
 
 #include "fx/q.h"
 
-/* 2^32/N: the mean without a division, exact to its rounding for |sum| <= 10 2^15. */
-#define PER_COUNT ((int32_t)(4294967296LL / TORQUE_ESTIMATE_PERIODS))
+#define Q24_PER_Q15 512
+/* Of that many periods the sum still fits: |t| < 2 in Q24. */
+#define PERIODS_MAX 63U
 
-q15_t torque_estimate_step(torque_estimate_state_t *state, dq_t i, const flux_point_t *flux, q31_t psi_delta)
+void torque_estimate_add(torque_sum_t *sum, const dq_t *i, const flux_point_t *flux, int32_t psi_delta)
 {
-    const int32_t psi_d = fx_sat_q15_word(flux->psi_d + fx_q15_from_q31(psi_delta));
-    const q15_t t = fx_round_q15(fx_sub_q31(psi_d * i.q, flux->psi_q * i.d));
+    const fx_arch_two_t current = fx_arch_load_two(&i->d);
+    const fx_arch_two_t psi = fx_arch_load_two(&flux->psi_d);
+    const fx_arch_two_t before = fx_arch_load_two(&sum->sum_q24);
+    const int32_t psi_d = fx_sat_q15_word(psi.first + psi_delta);
+    /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, but nothing below -2^30 + 2^15 is subtracted from it. */
+    const int32_t t_q30 = psi_d * current.second - psi.second * current.first;
+    const torque_sum_t now = {fx_arch_add_wrap(before.first, t_q30 >> 6), before.second + 1};
+    *sum = now;
+}
 
-    state->sum += t;
-    state->count++;
-    if (state->count >= TORQUE_ESTIMATE_PERIODS) {
-        state->mean = fx_sat_q15(fx_mulhi(state->sum, PER_COUNT));
-        state->sum = 0;
-        state->count = 0;
+/* Rounded half up, of either sign; half an LSB of Q24 per period is what the sum has cut off in the mean. */
+q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
+{
+    const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;
+    const int32_t total_q24 = fx_arch_sub_wrap(sum->sum_q24, state->last.sum_q24);
+    state->last = *sum;
+    if (count - 1U < PERIODS_MAX) {
+        const int32_t unit = (int32_t)count * Q24_PER_Q15;
+        const int32_t above = total_q24 + unit / 2 + (int32_t)count / 2;
+        const int32_t quotient = above / unit;
+        state->mean = fx_sat_q15((above % unit < 0) ? quotient - 1 : quotient);
     }
-    return t;
+    return state->mean;
 }

@@ -21,6 +21,11 @@ static inline int32_t fx_arch_add_wrap(int32_t a, int32_t b)
     return (int32_t)((uint32_t)a + (uint32_t)b);
 }
 
+static inline int32_t fx_arch_sub_wrap(int32_t a, int32_t b)
+{
+    return (int32_t)((uint32_t)a - (uint32_t)b);
+}
+
 /* Written in plain C on both sides: gcc picks MLA or SMLABB, whichever needs no sign extension. */
 static inline int32_t fx_arch_smlabb(int16_t a, int16_t b, int32_t acc)
 {
@@ -40,9 +45,24 @@ static inline void fx_arch_together(int32_t *a, int32_t *b)
     __asm__("" : "+r"(*a), "+r"(*b));
 }
 
+/* Two neighbours of memory, whatever they are there. */
+typedef struct {
+    int32_t first, second;
+} __attribute__((may_alias)) fx_arch_two_t;
+
 #if defined(__ARM_FEATURE_DSP)
 
 #include <arm_acle.h>
+
+typedef int64_t fx_arch_double_word_t __attribute__((may_alias, aligned(4)));
+
+/* The compiler would load the two one by one, as each is needed. Uv: it may add a constant that LDRD has room for. */
+static inline fx_arch_two_t fx_arch_load_two(const int32_t *from)
+{
+    fx_arch_two_t y;
+    __asm__("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const fx_arch_double_word_t *)from));
+    return y;
+}
 
 static inline int32_t fx_arch_qadd(int32_t a, int32_t b)
 {

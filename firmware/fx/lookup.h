@@ -11,7 +11,7 @@
  *          Any x: outside the grid, the edge's value and a flag
  * Rounding half up, 1/2 LSB, plus 2^-15 of the cell's twist |z00 - z01 - z10 + z11|; on the
  *          last grid point 2^-14 of the step across the cell before it
- * Errors   outside the grid: *clamped is true (.outside not zero), else false
+ * Errors   outside the grid: *clamped is true (.outside not zero, fx_mesh_outside()), else false
  * Context  any; fx_cell about 49 instructions, each fx_cell_interp 7, all branch-free */
 
 #include <stdbool.h>
@@ -140,7 +140,7 @@ static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
            mesh->y_last == (mesh->ny << 14) - 0x4001U;
 }
 
-/* fx_cell() of a q15 x and |y|; inside the grid nothing needs to be limited. */
+/* fx_cell() of a q15 x and |y|, without its flag; inside the grid nothing needs to be limited. */
 static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t y)
 {
     int32_t x_most = (int32_t)mesh->x_last;
@@ -150,19 +150,19 @@ static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t 
     const uint32_t y_last = (uint32_t)y_most;
     uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
     uint32_t py = y << mesh->up;
-    uint32_t outside = 0;
     if (__builtin_expect(px > x_last, 0)) { /* a negative one is very large */
-        const uint32_t nearest = (x < mesh->x0) ? 0U : x_last;
-        outside = (px - nearest) >> 1; /* the last point itself, one count above, is inside */
-        px = nearest;
+        px = (x < mesh->x0) ? 0U : x_last;
     }
     if (__builtin_expect(py > y_last, 0)) {
-        outside |= (py - y_last) >> 1;
         py = y_last;
     }
-    fx_cell_t cell = fx_cell_at(px, py, mesh->ny);
-    cell.outside = outside;
-    return cell;
+    return fx_cell_at(px, py, mesh->ny);
+}
+
+/* What fx_cell() would flag. The last point itself, one count above, is inside. */
+static inline bool fx_mesh_outside(const fx_mesh_t *mesh, int32_t x, uint32_t y)
+{
+    return (uint32_t)(x - mesh->x0) << mesh->up > mesh->x_last + 1U || y << mesh->up > mesh->y_last + 1U;
 }
 
 /* Not rounded: the table's format with 14 bits more. */

@@ -14,12 +14,18 @@ static twin_mrai_schedule_t twin_schedule;
 
 static const double q27 = 134217728.0;
 
+/* Both gates closed. */
+static mrai_schedule_t voltage(int32_t minus_q28)
+{
+    return (mrai_schedule_t){.minus_voltage_d_q28 = 2 * minus_q28, .minus_voltage_q28 = minus_q28};
+}
+
 void setUp(void)
 {
     f = fixture();
     state = (mrai_state_t){0};
     twin = (twin_mrai_state_t){0};
-    schedule = (mrai_schedule_t){.minus_voltage_q28 = -(f.mrai.period / 8)};
+    schedule = voltage(-(f.mrai.period / 8));
     twin_schedule = (twin_mrai_schedule_t){.voltage_scale = 1.0};
 }
 
@@ -235,7 +241,9 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
         if (abs(in.i.d) + abs(in.i.q) > 1700) {
             open_resistance_gate(&in);
         }
-        schedule.minus_voltage_q28 = -(f.mrai.period / 8 + random_in(&seed, 0, f.mrai.period / 512));
+        const int32_t minus_q28 = -(f.mrai.period / 8 + random_in(&seed, 0, f.mrai.period / 512));
+        schedule.minus_voltage_d_q28 = 2 * minus_q28;
+        schedule.minus_voltage_q28 = minus_q28;
         twin_schedule.voltage_scale = -schedule.minus_voltage_q28 / 268435456.0 / (f.w * f.si.period_s);
         state = (mrai_state_t){.psi_delta = random_in(&seed, f.mrai.psi_delta_min / 2, f.mrai.psi_delta_max / 2),
                                .r_delta = random_in(&seed, f.mrai.r_delta_min / 2, f.mrai.r_delta_max / 2)};
@@ -567,7 +575,9 @@ void test_no_corner_of_the_input_wraps_a_state(void)
         in.flux = (flux_point_t){.g = 32767,
                                  .psi_d = corner[random_in(&seed, 0, 3)], .psi_q = corner[random_in(&seed, 0, 3)]};
         schedule = (mrai_schedule_t){random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX,
-                                     random_in(&seed, 0, 1) ? 0 : INT32_MAX, random_in(&seed, 0, 1) ? 0 : -209000000};
+                                     random_in(&seed, 0, 1) ? 0 : INT32_MAX, 0,
+                                     random_in(&seed, 0, 1) ? 0 : -209000000};
+        schedule.minus_voltage_d_q28 = 2 * schedule.minus_voltage_q28;
         f.mrai.pole_gain = INT32_MAX;
         f.mrai.flux_proportional_q24 = f.mrai.resistance_proportional_q24 = INT32_MAX;
         f.mrai.period = Q31(0.78);

@@ -85,6 +85,7 @@ void test_disabled_identification_closes_both_gates_but_not_the_voltage_correcti
     TEST_ASSERT_EQUAL_INT32(0, off.resistance_step_q26);
     TEST_ASSERT_EQUAL_INT32(on.minus_voltage_q28, off.minus_voltage_q28);
     TEST_ASSERT_LESS_THAN_INT32(-(f.mrai.period / 8), on.minus_voltage_q28);
+    TEST_ASSERT_EQUAL_INT32(2 * on.minus_voltage_q28, on.minus_voltage_d_q28);
 }
 
 void test_the_flux_gate_opens_at_its_speed_in_both_directions(void)

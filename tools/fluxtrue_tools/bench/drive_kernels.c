@@ -142,7 +142,7 @@ CALLED const int32_t *drive_outputs(void)
         sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
         fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
-        drive.slow.torque.sum, drive.slow.torque.mean,
+        drive.slow.torque.sum_q24, drive.task.torque_mean.mean,
         drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0],
         drive.task.identify.local.q,
     };
@@ -197,7 +197,7 @@ STAGE void bench_torque_estimate(void)
 {
     drive_t *d = the_copy();
     const mrai_in_t *in = found.sample;
-    (void)torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta);
+    torque_estimate_add(&d->slow.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->slow.mrai));
 }
 
 static void modulate(const modulate_config_t *config, const current_control_out_t *wanted, fx_pair_t i,
@@ -287,9 +287,10 @@ STAGE void bench_torque_path(void)
 {
     drive_t *d = the_copy();
     const mrai_in_t *in = found.sample;
+    torque_estimate_add(&d->slow.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->slow.mrai));
     const torque_loop_in_t loop = {
         .command = d->task.torque_command,
-        .estimate = torque_estimate_step(&d->slow.torque, in->i, &in->flux, d->slow.mrai.psi_delta),
+        .estimate = torque_estimate_mean(&d->task.torque_mean, &d->slow.torque),
         .confidence = Q15_MAX,
         .enabled = true,
     };
