@@ -2,8 +2,8 @@
 """The estimate of cycles, opcode by opcode: each is assembled, executed, and compared with the manual's number.
 
 The numbers are written by hand from the instruction timings of the Cortex-M4 Technical Reference Manual (Arm DDI 0439,
-table 3-1 and, for floating point, 7-1), the larger end of every span: P = 3, divisions 12, MRS, MSR and CPS 2, ISB 1 + P.
-A case lists one number for each executed instruction.
+table 3-1 and, for floating point, 7-1), the larger end of every span: P = 3, divisions 12, MRS, MSR and CPS 2,
+ISB 1 + P. A case lists one number for each executed instruction.
 """
 
 import ctypes
@@ -28,7 +28,8 @@ ONE_CYCLE = """
 mov r4, r1|movw r4, #40000|movt r4, #1|mvn r4, r1|add r4, r1, r2|addw r4, r1, #4000|adc r4, r1, r2|sub r4, r1, r2
 subw r4, r1, #4000|sbc r4, r1, r2|rsb r4, r1, #5|negs r4, r1|cmp r1, r2|cmn r1, r2|tst r1, r2|teq r1, r2
 and r4, r1, r2|orr r4, r1, r2|orn r4, r1, r2|eor r4, r1, r2|bic r4, r1, r2|lsl r4, r1, r2|lsr r4, r1, r2
-asr r4, r1, r2|asrs r4, r1, #2|mov r4, r1, asr #2|ror r4, r1, r2|rrx r4, r1|add r4, r1, r2, lsl #3|movs r4, #9|adds r4, r1, r2
+asr r4, r1, r2
+asrs r4, r1, #2|mov r4, r1, asr #2|ror r4, r1, r2|rrx r4, r1|add r4, r1, r2, lsl #3|movs r4, #9|adds r4, r1, r2
 sxtb r4, r1|sxth r4, r1|uxtb r4, r1|uxth r4, r1|sxtb16 r4, r1|uxtb16 r4, r1|sxtab r4, r1, r2|sxtah r4, r1, r2
 uxtab r4, r1, r2|uxtah r4, r1, r2|ubfx r4, r1, #1, #5|sbfx r4, r1, #1, #5|bfi r4, r1, #1, #5|bfc r4, #1, #5
 clz r4, r1|rbit r4, r1|rev r4, r1|rev16 r4, r1|revsh r4, r1|pkhbt r4, r1, r2, lsl #4|pkhtb r4, r1, r2, asr #4

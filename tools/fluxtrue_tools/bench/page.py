@@ -45,8 +45,8 @@ CONTAINS = {
     "task": "the drive's 1 kHz task without the bus",
 }
 TASK_CONTAINS = {
-    "identify": "window → operating point, tables and their slopes there, torque, rows of the robust identification; in "
-    "every tenth step the filter's update",
+    "identify": "window → operating point, tables and their slopes there, torque, rows of the robust identification; "
+    "in every tenth step the filter's update",
     "trim": "identified voltage error → dead-time compensation",
     "angle_harmonics": "what the encoder repeats once and twice a turn; one part of its table",
     "slow_monitors": "phases, sensors, current control, speed, angle offset, temperatures, torque",
