@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """An activity interrupted at each of its instructions.
 
-By the fast ISR, with the host's answer for comparison: tests/target/emulator/preempt.h. By any other interrupt, with the
-image's own: everything in its memory must be as if the interrupt had come just before the activity, or just after it.
+By the fast ISR, with the host's answer for comparison: tests/target/emulator/preempt.h. By any other interrupt, with
+the image's own: everything in its memory must be as if the interrupt had come just before the activity, or just after.
 """
 
 import ctypes
