@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_TEMPERATURE_H
 #define HAL_TEMPERATURE_H
-/** Slow sensors: winding (NTC) and inverter.
+/** Slow sensors: winding (NTC), inverter, and the processor's own, which limits nothing.
  * Source   docs/howto/port.md
  * Units    tenths of a degree Celsius
  * Errors   HAL_TEMPERATURE_UNKNOWN: no sensor, or one that is broken or shorted
@@ -12,5 +12,6 @@
 
 int16_t hal_temperature_winding_dC(void);
 int16_t hal_temperature_inverter_dC(void);
+int16_t hal_temperature_processor_dC(void);
 
 #endif

@@ -25,6 +25,7 @@
     X(psi_f_Vs, F32, NONE, measured_psi_f_Vs(d), "Identified magnet flux") \
     X(r_ohm, F32, NONE, measured_r_ohm(d), "Identified resistance") \
     X(fault_word, U32, NONE, (d)->fast.faults, "Latched faults, one bit each") \
+    X(processor_dC, S16, NONE, hal_temperature_processor_dC(), "Processor, tenths of a degree; -32768: unknown") \
     X(mrai_overruns, U32, NONE, (d)->fast.overruns, "Periods in which the identification was late")
 
 #endif

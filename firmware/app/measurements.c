@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/measurements.h"
 
+#include "hal/temperature.h"
+
 #define Q31_SCALE 2147483648.0F
 #define RPM_PER_RAD_S 9.5492966F
 

@@ -96,6 +96,11 @@ int16_t hal_temperature_inverter_dC(void)
     return active->board.inverter_broken ? HAL_TEMPERATURE_UNKNOWN : (int16_t)lrint(active->board.inverter_C * 10.0);
 }
 
+int16_t hal_temperature_processor_dC(void)
+{
+    return HAL_TEMPERATURE_UNKNOWN; /* of a PC */
+}
+
 void hal_watchdog_start(void)
 {
     active->board.watchdog_started = true;

@@ -35,11 +35,12 @@ static volatile union {
 } alarms;
 static bool started; /* the PWM, and with it the fast ISR */
 
-/* The gate driver's is forgotten before it is asked for: one that comes in between is seen in the next period. */
+/* The gate driver's is cleared only where it was seen set, and raised after that: one that comes in between is told by
+ * this raise. */
 static __attribute__((noinline, cold)) void alarms_take(void)
 {
-    alarms.gates = false;
-    if (pwm_fault_taken()) {
+    if (alarms.gates) {
+        alarms.gates = false;
         drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
     }
     if (alarms.data_damaged) {

@@ -32,7 +32,7 @@ static struct {
     uint32_t period;
     bool gates; /* as last commanded */
 } bridge;       /* together: every period reaches both from one address */
-static volatile bool fault_for_drive, fault_for_board; /* set by the fault interrupt, each taken by its reader */
+static volatile bool fault_for_board; /* set by the fault interrupt, taken by its reader */
 
 /* Ten bits; beyond them in steps of four, rounded up: never less than asked for. */
 static uint32_t dead_time(uint32_t ticks)
@@ -176,27 +176,16 @@ void hal_pwm_enable(bool on)
 /* The request stays up until FAULTF is cleared, which waits for the gates: so it is masked here. */
 void pwm_gate_fault_isr(void)
 {
-    fault_for_drive = true;
     fault_for_board = true;
     core_irq_disable(IRQ_FTM0_FAULT);
 }
 
 /* Cleared only where it was seen set: what the interrupt sets in between is never lost. */
-static bool take(volatile bool *flag)
-{
-    if (!*flag) {
-        return false;
-    }
-    *flag = false;
-    return true;
-}
-
 bool pwm_fault_reported(void)
 {
-    return take(&fault_for_board) || (FTM0->FMS & FTM_FMS_FAULTIN) != 0U;
-}
-
-bool pwm_fault_taken(void)
-{
-    return take(&fault_for_drive);
+    if (fault_for_board) {
+        fault_for_board = false;
+        return true;
+    }
+    return (FTM0->FMS & FTM_FMS_FAULTIN) != 0U;
 }

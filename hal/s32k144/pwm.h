@@ -6,7 +6,8 @@
  * Units    ticks of 112 MHz
  * Range    pwm_possible(): period_ticks a multiple of 4 up to 65532, dead_time_ticks from 1 to 4092 and an eighth of it
  * Context  pwm_init(), pwm_start(): start-up; pwm_fault_reported(): 1 kHz task;
- *          pwm_gate_fault_isr(): fault interrupt, the timer has already opened the gates */
+ *          pwm_gate_fault_isr(): fault interrupt, the timer has already opened the gates; who is above the 1 kHz task
+ *          and must know of it is told by the interrupt's handler */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -25,7 +26,5 @@ void pwm_sample_by_hand(void);
 void pwm_gate_fault_isr(void);
 /** True while the fault input is active, and once after it was. */
 bool pwm_fault_reported(void);
-/** A gate fault that the fast ISR has not yet handed to the drive; taken by the call. */
-bool pwm_fault_taken(void);
 
 #endif

@@ -90,6 +90,23 @@ def test_a_planted_second_definition_is_found(tree: Path, again: str) -> None:
     assert messages == ["docs/theory/mrai.md:7: (MR-1) is defined again, first in docs/theory/mrai.md:3"]
 
 
+@pytest.mark.parametrize("prefix", ["ID", "LM", "MN", "SS"])
+def test_a_second_definition_is_found_whatever_page_it_is_on(tree: Path, prefix: str) -> None:
+    page = {"ID": "identification", "LM": "limits", "MN": "monitors", "SS": "safe-state"}[prefix]
+    write(tree, f"docs/theory/{page}.md", f"$$ x \\tag{{{prefix}-1}} $$\n$$ y \\tag{{{prefix}-1}} $$\n")
+    code, messages = check(tree)
+    assert code == 1
+    assert f"docs/theory/{page}.md:2: ({prefix}-1) is defined again" in messages[0]
+
+
+@pytest.mark.parametrize("tag", ["ZZ-1", "ZZ-1a", "MR-1a", "17"])
+def test_a_tag_that_no_page_owns_is_found(tree: Path, tag: str) -> None:
+    write(tree, "docs/theory/zeppelin.md", f"$$ x \\tag{{{tag}}} $$\n")
+    code, messages = check(tree)
+    assert code == 1
+    assert messages[0].startswith(f"docs/theory/zeppelin.md:1: ({tag}) is defined here, allowed are numbers of AT, CC")
+
+
 def test_a_definition_on_the_page_of_another_prefix_is_found(tree: Path) -> None:
     write(tree, "docs/theory/flux-tables.md", "$$ x \\tag{MR-4} $$\n")
     code, messages = check(tree)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-r"""Every equation number that is cited is defined exactly once, on the page that owns its prefix.
+r"""Every equation number that is cited is defined exactly once, on the page that owns its prefix; every prefix has one.
 
 A definition is \tag{MR-7}; in an indented block a number at the left margin, two blanks before the
 equation, or at the right one, two blanks after it; or a bold **(MR-7)** where the text itself is it.
@@ -23,10 +23,14 @@ PAGES = {
     "FT": THEORY / "flux-tables.md",
     "FX": THEORY / "fixed-point.md",
     "IB": THEORY / "information-bound.md",
+    "ID": THEORY / "identification.md",
+    "LM": THEORY / "limits.md",
+    "MN": THEORY / "monitors.md",
     "MO": THEORY / "modulation.md",
     "MR": THEORY / "mrai.md",
     "PL": THEORY / "plant.md",
     "SC": Path("docs/scaling.md"),
+    "SS": THEORY / "safe-state.md",
     "TL": THEORY / "torque-loop.md",
 }
 SEARCHED = {"firmware", "hal", "tests", "tools", "docs"}
@@ -38,6 +42,7 @@ NUMBER = rf"({'|'.join(PAGES)})-(\d+)"
 DEFINITION = re.compile(
     rf"\\tag\{{{NUMBER}\}}|\*\*\({NUMBER}\)\*\*|^ {{4,}}\({NUMBER}\) {{2,}}\S|\S {{2,}}\({NUMBER}\)\s*$"
 )
+TAG = re.compile(r"\\tag\{([^}]*)\}")
 CITED = re.compile(rf"\b{NUMBER}\b")
 RANGE = re.compile(rf"\({NUMBER}\)\s*(?:\.\.\.|…|–|-|to|bis)\s*\({NUMBER}\)")
 
@@ -100,11 +105,21 @@ def is_page(path: Path) -> bool:
     return path.parent == THEORY or path == PAGES["SC"]
 
 
+def unknown_in(line: str) -> Iterator[str]:
+    """Tags that nobody would look at: no page owns their prefix, or they are no number at all."""
+    for match in TAG.finditer(line):
+        if not re.fullmatch(NUMBER, match.group(1)):
+            yield match.group(1)
+
+
 def check(root: Path) -> Iterator[Violation]:
     """Definitions first: a citation may come before the page in the order of the files."""
     text = list(searched(root))
     first: dict[Equation, Place] = {}
     for place, line in text:
+        for tag in unknown_in(line) if is_page(place.path) else ():
+            allowed = f"allowed are numbers of {', '.join(PAGES)}; a new page is entered in tools/checks/equations.py"
+            yield Violation(place.path, place.line, f"({tag}) is defined here, {allowed}")
         for found in defined_in(line) if is_page(place.path) else ():
             page = PAGES[found.prefix]
             if place.path != page:

@@ -29,6 +29,12 @@ static uint16_t ntc_count(double celsius)
     return to_count(r / (1.0 + r), 12);
 }
 
+/* The sensor on the die: 740.5 mV at 25 degrees, 1.564 mV less for each kelvin, of 5 V, hal/s32k144/die.h. */
+static uint16_t die_count(double celsius)
+{
+    return to_count((0.7405 - 0.001564 * (celsius - 25.0)) / 5.0, 12);
+}
+
 static uint32_t angle_of(double rad)
 {
     const double turns = rad / TURN_RAD;
@@ -55,6 +61,7 @@ static void samples_to_pins(emulated_t *e, const double in[6])
     pins->adc[1][1] = to_count(in[3] / (double)m->v_dc_full_scale_V, m->adc_bits);
     pins->adc[0][2] = ntc_count(in[5]);
     pins->adc[1][2] = ntc_count(e->inverter_C);
+    pins->adc[0][26] = die_count(e->processor_C);
     angle_to_pins(e, pins, angle_of(in[4]));
     e->mirror.host->winding_C = in[5];
 }
@@ -97,9 +104,12 @@ static int pin_set(emulated_t *e, const char *name, double value)
     if (strcmp(name, "emulator.shadow") == 0) {
         return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
     }
-    if (strcmp(name, "emulator.inverter_C") == 0 && value >= -40.0 && value <= 150.0) {
-        e->inverter_C = value;
-        return SIM_OK;
+    double *temperature = strcmp(name, "emulator.inverter_C") == 0    ? &e->inverter_C
+                          : strcmp(name, "emulator.processor_C") == 0 ? &e->processor_C : NULL;
+    if (temperature != NULL) {
+        const bool possible = value >= -40.0 && value <= 150.0;
+        *temperature = possible ? value : *temperature;
+        return possible ? SIM_OK : SIM_OUT_OF_RANGE;
     }
     if (strcmp(name, "emulator.gate_driver") == 0) {
         e->gate_driver = value != 0.0;
@@ -142,6 +152,7 @@ double emulated_get(emulated_t *e, const char *name)
         {"emulator.gate_fault", e->pins_of_board.gate_fault},
         {"emulator.resolver_fault", e->pins_of_board.resolver_fault},
         {"emulator.inverter_C", e->inverter_C},
+        {"emulator.processor_C", e->processor_C},
         {"emulator.gate_driver", e->gate_driver},
         {"emulator.dead_time_s", bridge.dead_time_s},
         {"emulator.pwm_period_s", bridge.period_s},
@@ -176,6 +187,7 @@ static const char *boot(emulated_t *e)
 {
     const double still[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
     e->inverter_C = 40.0;
+    e->processor_C = 60.0;
     e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
     samples_to_pins(e, still);
     const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));

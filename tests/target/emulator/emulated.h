@@ -6,7 +6,7 @@
  *   emulator.shadow        set 1: the same firmware, compiled for the host, follows with the same counts and angles and
  *                          is compared after every period
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
- *   emulator.inverter_C    of the second thermistor
+ *   emulator.inverter_C, emulator.processor_C    of the second thermistor; of the sensor on the die
  *   emulator.gate_driver   set 1: the gates close only while the image supplies their driver (board line)
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md

@@ -12,7 +12,7 @@ typedef struct {
     emu_pins_t pins_of_board;  /* only the lines that scenarios set */
     double period_ticks;
     uint64_t steps;
-    double inverter_C;
+    double inverter_C, processor_C;
     bool gate_driver;          /* the gates need the line that supplies their driver */
     fluxtrue_t *shadow;        /* NULL: not followed */
     drive_t task_result;       /* of the shadow's task, while the image is still at it */

@@ -9,6 +9,7 @@ enum {
     NMI = 2, HARD_FAULT = 3, SYSTICK = 15,
     FRAME_WORDS = 8, EXTENDED_WORDS = 26,
     FPCA = 4, SPSEL = 2,
+    SFPA = 8, /* unicorn's core has it, and without it takes the context for a new one: FPSCR would be lost */
     LOWEST = 256,
     XPSR_ALIGNED = 1 << 9, XPSR_VECTOR = 0x1FF,
 };
@@ -260,7 +261,7 @@ static bool pop_frame(emu_t *emu, bool extended)
     for (int i = 0; i < 6; i++) {
         put(emu, frame_registers[i], frame[i]);
     }
-    put(emu, UC_ARM_REG_CONTROL, extended ? FPCA : 0U);
+    put(emu, UC_ARM_REG_CONTROL, extended ? FPCA | SFPA : 0U);
     for (int i = 0; extended && i < 16; i++) {
         put(emu, UC_ARM_REG_S0 + i, frame[FRAME_WORDS + i]);
     }

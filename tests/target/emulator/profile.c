@@ -57,9 +57,13 @@ void profile_stop(emu_t *emu)
     emu->profile = NULL;
 }
 
-static uint32_t cost_of(const profile_t *p, uint32_t address)
+static uint32_t cost_of(emu_t *emu, uint32_t address)
 {
-    return address < FLASH_SIZE ? p->cost[address / 2U] : 1U;
+    const uint32_t cost = address < FLASH_SIZE ? emu->profile->cost[address / 2U] : 0U;
+    if (cost == 0U) {
+        emu_fail(emu, "the instruction at 0x%08x ran, but no cost was given for it", address);
+    }
+    return cost;
 }
 
 static bool is_conditional(const profile_t *p, int64_t address)
@@ -75,7 +79,7 @@ static void count_conditional(emu_t *emu, emu_span_t *span, uint32_t address, ui
         (void)uc_mem_read(emu->uc, at, code, sizeof code);
         emu->profile->conditional[at / 2U] = true;
         span->instructions++;
-        span->cost += cost_of(emu->profile, at);
+        span->cost += cost_of(emu, at);
         at += code[1] >= THUMB_32BIT ? 4U : 2U;
     }
 }
@@ -92,7 +96,7 @@ void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
         return;
     }
     level->span.instructions++;
-    level->span.cost += cost_of(p, address);
+    level->span.cost += cost_of(emu, address);
     if (address < FLASH_SIZE) {
         count_conditional(emu, &level->span, address + size, emu->block[address / 2U].conditional);
     }

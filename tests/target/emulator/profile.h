@@ -4,7 +4,7 @@
 /** What each run of an exception's handler executes: instructions, and a sum of costs that the caller gives each
  * instruction. A handler that is interrupted is not charged with what interrupts it.
  * Source   docs/performance.md
- * Errors   only in counting mode; else nothing is ever recorded
+ * Errors   only in counting mode; else nothing is ever recorded. An instruction without a cost stops the emulation
  * Context  host */
 #include <stdbool.h>
 #include <stdint.h>

@@ -3,14 +3,18 @@
 
 import os
 import re
+import struct
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
+from fluxtrue_tools.sim.library import Loop
 
 SLICE = ("test_boot.py", "test_states.py")
 
@@ -34,6 +38,19 @@ def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_p
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert re.search(r"<th>unused stack</th><td>[1-9]\d+ bytes", page), "the check of the stack was idle"
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-300:]
+
+
+@pytest.mark.parametrize("celsius", [-20.0, 60.0, 125.0])
+def test_the_processor_s_own_temperature_is_among_the_measurements(flashed: Parts, celsius: float) -> None:
+    motor = flashed.emulated()
+    with Loop(motor.library, motor.plant, motor.flux_map) as loop:
+        core = Stand(loop).core
+        loop.set("emulator.processor_C", celsius)
+        loop.run(30)
+        address = next(m.address for m in read(flashed.image).measurements if m.name == "processor_dC")
+        (measured_dC,) = struct.unpack("<h", core.read(address, 2))
+    # A count is 0.78 K, and its offset is rounded by 0.3 K.
+    assert measured_dC / 10 == pytest.approx(celsius, abs=1.1)
 
 
 def test_without_an_image_the_program_says_what_it_needs(flashed: Parts) -> None:

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """No activity ever sees half of a value: it is interrupted at each of its instructions."""
 
-from collections.abc import Iterator
+import ctypes
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
+from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import Stand
-from fluxtrue_tools.emulate import library, preempt
+from fluxtrue_tools.emulate import build, library, preempt
 from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.sim.library import Loop
 
 
@@ -74,3 +78,96 @@ def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop
     assert loop.get("truth.time_s") == pytest.approx(before + 0.01)
     assert loop.get("fault_word") == 0
     assert loop.get("truth.torque_Nm") == pytest.approx(80, abs=3)
+
+
+# ---- interrupts that share nothing with the control but a flag or a queue, on the image that would be flashed ----
+
+
+@pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
+def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
+    """Torque at standstill, commanded over the bus."""
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    motor = build.prepare("hsm1", flashed=True).emulated(library.COUNTING)
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        stand = Stand(loop)
+        loop.set("identification_mode", request.param)
+        stand.power_up()
+        stand.run(60, TorqueRequest=60.0)
+        assert loop.get("fault_word") == 0
+        assert loop.get("truth.torque_Nm") == pytest.approx(60, abs=3)
+        yield stand
+
+
+@contextmanager
+def undone(core: Core) -> Iterator[None]:
+    snapshot = core.save()
+    yield
+    core.restore(snapshot)
+    core.free(snapshot)
+
+
+GATE_FAULT = 1 << 15
+
+
+def arrival(stand: Stand, by: int) -> Callable[[], None]:
+    """How the interrupt comes about; a frame finds one before it in the queue."""
+    if by == preempt.GATE:
+        return lambda: stand.core.pend(preempt.GATE)
+    first, frame = stand.command.frame(), stand.command.frame()
+    stand.library.can_frame_arrives(stand.handle, ctypes.byref(first))
+    return lambda: stand.library.can_frame_arrives(stand.handle, ctypes.byref(frame))
+
+
+# Who looks at what the interrupt leaves, and so may be on either side of it; all others are not touched by it.
+LOOKS = ((preempt.FAST, preempt.GATE), (preempt.TASK, preempt.GATE), (preempt.TASK, preempt.CAN))
+VICTIMS = {preempt.FAST: "fast", preempt.MRAI: "mrai", preempt.TASK: "task"}
+PAIRS = [(victim, by) for by in (preempt.GATE, preempt.CAN) for victim in VICTIMS]
+
+
+@pytest.mark.parametrize(("victim", "by"), PAIRS, ids=[f"{VICTIMS[v]}-{'gate' if b == preempt.GATE else 'can'}"
+                                                       for v, b in PAIRS])  # fmt: skip
+def test_an_interrupt_within_an_activity_leaves_what_it_would_have_left_just_before_or_just_after_it(
+    stand: Stand, victim: int, by: int
+) -> None:
+    if victim == preempt.MRAI and stand.loop.get("identification_mode") == ROBUST:
+        pytest.skip("the robust identification has no interrupt of its own")
+    with (
+        undone(stand.core),
+        preempt.interrupt_from_both_sides(stand.core, victim, by, arrival(stand, by)) as sides,
+    ):
+        assert sides.mixed == ()
+        assert sides.before + sides.after == sides.instructions > 50
+        if (victim, by) in LOOKS:
+            assert not sides.same and sides.before > 0 and sides.after > 0
+        else:
+            assert sides.same
+
+
+def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand) -> None:
+    core, loop = stand.core, stand.loop
+    with preempt.interrupt_from_both_sides(core, preempt.FAST, preempt.GATE, arrival(stand, preempt.GATE)) as sides:
+        core.restore(sides.snapshot_before)
+        assert loop.get("fault_word") == GATE_FAULT
+        core.restore(sides.snapshot_after)
+        assert loop.get("fault_word") == 0
+        core.pend(preempt.FAST)
+        preempt.Stepper(core).run((preempt.FAST, False))
+        assert loop.get("fault_word") == GATE_FAULT
+        assert core.register("FTM0.SWOCTRL") == 0x3F  # all six outputs forced low
+
+
+def test_a_frame_that_comes_within_the_task_is_taken_by_it_or_waits_for_the_next(stand: Stand) -> None:
+    core = stand.core
+    with (
+        undone(core),
+        preempt.interrupt_from_both_sides(core, preempt.TASK, preempt.CAN, arrival(stand, preempt.CAN)) as sides,
+    ):
+        core.restore(sides.snapshot_before)
+        taken, put = core.word("taken"), core.word("put")
+        assert taken == put
+        core.restore(sides.snapshot_after)
+        assert (core.word("taken"), core.word("put")) == (taken - 1, put)
+        preempt.Stepper(core).run((preempt.TASK, True), (preempt.TASK, False))
+        assert core.word("taken") == put

@@ -8,6 +8,7 @@ import pytest
 from fluxtrue_tools.bench import image
 from fluxtrue_tools.emulate import library as emulation
 from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
 VECTORS = (image.FAST, image.MRAI, image.TASK)
@@ -55,6 +56,12 @@ def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_c
     # A handler returns, and most call: some instructions, and never all, are not followed by their neighbour.
     outside = [(name, count, cost) for name, count, cost in stand.take() if not count + 1 <= cost < 1.5 * count]
     assert outside == []
+
+
+def test_an_instruction_without_a_cost_is_an_error_that_tells_where_it_is(stand: image.Stand) -> None:
+    start(stand, 0, 0)
+    with pytest.raises(FluxtrueError, match="the instruction at 0x0000.* ran, but no cost was given for it"):
+        stand.loop.run(1)
 
 
 def test_what_is_taken_is_not_given_again(stand: image.Stand) -> None:

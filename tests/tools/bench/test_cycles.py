@@ -24,8 +24,10 @@ MANUAL = [
     ("stmdb", "sp!, {r4, lr}", 3), ("vpush", "{d8-d9}", 5), ("vldmia", "r0!, {s0-s2}", 4),
     ("b.n", "41c <f>", 1), ("bls.n", "41c <f>", 1), ("bleq", "41c <f>", 1), ("bl", "41c <f>", 1), ("bx", "lr", 1),
     ("blx", "r3", 1), ("cbnz", "r0, 41c <f>", 1), ("tbh", "[pc, r3, lsl #1]", 2),
-    ("it", "mi", 1), ("itte", "ne", 1), ("nop", "", 1), ("dsb", "sy", 1), ("cpsid", "i", 2), ("mrs", "r0, PRIMASK", 2),
+    ("it", "mi", 1), ("itte", "ne", 1), ("nop", "", 1), ("dsb", "sy", 1), ("isb", "sy", 4),
+    ("cpsid", "i", 2), ("mrs", "r0, PRIMASK", 2),
     ("vadd.f32", "s0, s1, s2", 1), ("vmulgt.f32", "s0, s1, s2", 1), ("vmov", "s0, r0", 1),
+    ("vmov", "r0, r1, s0, s1", 2),
     ("vcvt.s32.f32", "s0, s1", 1),
     ("vmla.f32", "s0, s1, s2", 3), ("vfma.f32", "s0, s1, s2", 3), ("vdiv.f32", "s0, s1, s2", 14),
     ("vsqrt.f32", "s0, s1", 14),
@@ -33,6 +35,7 @@ MANUAL = [
 ]  # fmt: skip
 
 
+# Each opcode is executed by tests/target/emulator/test_opcodes.py, which needs the cross compiler.
 @pytest.mark.parametrize(("mnemonic", "operands", "expected"), MANUAL, ids=lambda value: str(value))
 def test_an_opcode_costs_what_the_manual_says(mnemonic: str, operands: str, expected: int) -> None:
     assert cycles.cycles(Instruction(0, 2, mnemonic, operands)) == expected
@@ -41,6 +44,8 @@ def test_an_opcode_costs_what_the_manual_says(mnemonic: str, operands: str, expe
 def test_an_unknown_instruction_is_an_error_that_names_it() -> None:
     with pytest.raises(FluxtrueError, match="'vsel.f32'"):
         cycles.cycles(Instruction(0, 4, "vsel.f32", "s0, s1, s2"))
+    with pytest.raises(FluxtrueError, match="'wfi'"):  # as one in an image would be: it waits, however long
+        cycles.image_costs(parse("00000410 <f>:\n 410:\tbf30      \twfi\n"), 0x420)
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,7 @@ void setUp(void)
     hal_system_reset_cause_IgnoreAndReturn(RESET_PIN);
     hal_temperature_winding_dC_IgnoreAndReturn(250);
     hal_temperature_inverter_dC_IgnoreAndReturn(250);
+    hal_temperature_processor_dC_IgnoreAndReturn(250);
     hal_watchdog_start_Stub(watchdog_start);
     hal_watchdog_service_Stub(watchdog_service);
     ecu_init(&ecu, &motor);

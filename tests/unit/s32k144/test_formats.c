@@ -6,6 +6,7 @@
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/can_mailbox.h"
 #include "hal/s32k144/ntc.h"
+#include "hal/s32k144/die.h"
 #include "hal/temperature.h"
 #include "unity.h"
 
@@ -80,4 +81,18 @@ void test_an_open_or_shorted_ntc_is_unknown(void)
     TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(3938));
     TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(131));
     TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, ntc_dC(0));
+}
+
+/* 740.5 mV at 25 degrees, 1.564 mV less for each kelvin, of 5 V and 4096 counts: 606.6 counts, 0.7805 K each. */
+void test_the_sensor_on_the_die_follows_its_line_and_is_unknown_where_no_processor_lives(void)
+{
+    for (uint16_t count = 383; count <= 703; count++) {
+        const double exact_dC = 250.0 - 10.0 * (count * 5000.0 / 4096.0 - 740.5) / 1.564;
+        TEST_ASSERT_DOUBLE_WITHIN(5.0, exact_dC, die_dC(count));
+    }
+    TEST_ASSERT_EQUAL_INT16(250, die_dC(607));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, die_dC(382));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, die_dC(704));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, die_dC(0));
+    TEST_ASSERT_EQUAL_INT16(HAL_TEMPERATURE_UNKNOWN, die_dC(4095));
 }

@@ -38,7 +38,9 @@ def _run(command: Sequence[str], output: Path) -> Path:
     return output
 
 
-def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:
+def build_target(
+    output: Path, sources: Sequence[Path], flags: Sequence[str] = (), also_small: Sequence[Path] = ()
+) -> Path:
     """An ELF file without start-up code: its functions are called one by one. Fast or small as in the image."""
     if not have_arm_compiler():
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
@@ -52,7 +54,7 @@ def build_target(output: Path, sources: Sequence[Path], flags: Sequence[str] = (
     compiled = []
     for path in sources:
         compiled.append(objects / f"{path.stem}.o")
-        small = SMALL if FIRMWARE in path.parents and path not in FAST else ()
+        small = SMALL if path in also_small or (FIRMWARE in path.parents and path not in FAST) else ()
         _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *small, "-c", str(path), "-o", str(compiled[-1])], compiled[-1])
     return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *map(str, compiled), *link, "-o", str(output)], output)
 

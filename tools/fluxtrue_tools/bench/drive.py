@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -82,6 +82,13 @@ def sources(folder: Path) -> list[Path]:
 def build_drive(folder: Path) -> Path:
     """The program for the target, optimised across files as the m4f preset does."""
     return build_target(folder / "drive.elf", sources(folder), (*LTO, f"-I{ROOT}"))
+
+
+def build_task(folder: Path) -> Path:
+    """The stages of the 1 kHz task, in a program of their own: called from two places they would be compiled apart."""
+    stages = Path(__file__).with_name("task_kernels.c")
+    app = [FIRMWARE / "app" / f"{name}.c" for name in ("arbitrate", "supervisor", "supervisor_table")]
+    return build_target(folder / "task.elf", [*sources(folder), stages, *app], (*LTO, f"-I{ROOT}"), [stages])
 
 
 def build_drive_host(folder: Path, flags: tuple[str, ...] = ()) -> Path:
@@ -188,6 +195,7 @@ TITLES = {
     "current_control": "current control, both axes and limiter",
     "modulate": "modulation, with the rotation ahead",
     "flux_table": "flux tables, all outputs",
+    "window": "identification, a period's sums",
     "mrai": "MRAI",
     "torque_estimate": "torque estimate",
     "torque_path": "torque estimate and loop",
@@ -200,7 +208,52 @@ TITLES = {
 
 
 # In this order: the tables' answer and the controller's voltage are used by those after them.
-STAGES = ("flux_table", "current_tick", "current_core", "measure", "angle_tracker", "current_control", "modulate")
+STAGES = (
+    "flux_table", "current_tick", "current_core", "measure", "angle_tracker", "current_control", "modulate", "window",
+)  # fmt: skip
+
+TASK_TITLES = {
+    "identify": "identification filter",
+    "trim": "dead-time trim",
+    "angle_harmonics": "angle correction",
+    "slow_monitors": "monitors",
+    "torque_limit": "torque limit",
+    "torque_loop": "slew and torque loop",
+    "reference": "current reference",
+    "target": "tables at the reference",
+    "safe_state": "safe state",
+    "schedule": "the paper's schedule",
+    "supervisor": "state machine of the bus",
+    "arbitrate": "torque arbitration",
+}
+PAPERS = ("schedule",)
+
+
+def measure_task(path: Path) -> list[Stage]:
+    """The stages of the 1 kHz task, each on a copy of the drive just before the task runs."""
+    target = Target(path)
+    machine = target.machine
+    overhead = machine.count("task_nothing")[1]
+    seen: dict[str, list[int]] = {name: [] for name in TASK_TITLES}
+
+    def task(names: Iterable[str], warm: list[int]) -> None:
+        for name in names:
+            machine.call("task_copy")
+            issued = machine.count(f"task_{name}")[1] - overhead
+            if warm:
+                seen[name].append(issued)
+        machine.call("bench_task")
+
+    for mode, names in ((ROBUST, [n for n in TASK_TITLES if n not in PAPERS]), (PAPER, PAPERS)):
+        warm: list[int] = []
+        for k in periods(target, mode, task=lambda names=names, warm=warm: task(names, warm)):  # type: ignore[misc]
+            if k == WARM_UP:
+                warm.append(k)
+            machine.call("bench_fast_isr")
+            if mode == PAPER:
+                machine.call("bench_mrai_isr")
+    return [Stage(name, title, min(seen[name]), float(np.mean(seen[name])), max(seen[name]))
+            for name, title in TASK_TITLES.items()]  # fmt: skip
 
 
 def measure_drive(path: Path) -> tuple[list[Stage], int, int]:

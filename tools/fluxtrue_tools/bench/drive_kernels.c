@@ -36,6 +36,8 @@ void bench_angle_tracker(void);
 void bench_current_control(void);
 void bench_modulate(void);
 void bench_torque_path(void);
+void bench_window(void);
+const drive_t *drive_now(void);
 
 static struct {
     adc_counts_t counts;
@@ -150,6 +152,12 @@ CALLED const int32_t *drive_outputs(void)
         outputs[k] = all[k];
     }
     return outputs;
+}
+
+/* For task_kernels.c, which copies it. */
+CALLED const drive_t *drive_now(void)
+{
+    return &drive;
 }
 
 CALLED void bench_nothing(void)
@@ -295,4 +303,21 @@ STAGE void bench_torque_path(void)
         .enabled = true,
     };
     d->task.torque_request = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &loop);
+}
+
+/* The fast ISR's share of the robust identification: one period summed, every tenth hands the sums over. */
+STAGE void bench_window(void)
+{
+    drive_t *d = the_copy();
+    const sample_t *sample = sample_box_look(&d->samples, d->samples.generation);
+    const identify_sample_t in = {
+        .i = sample->mrai.i,
+        .u = sample->mrai.u,
+        .flux = &sample->mrai.flux,
+        .theta = sample->theta_e,
+    };
+    if (__builtin_expect(identify_window_step(&d->fast.window, &in), 0)) {
+        window_box_write(&d->windows, &d->fast.window);
+        identify_window_restart(&d->fast.window);
+    }
 }

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.bench import cycles, disassembly, image, sizes, stack
 from fluxtrue_tools.bench.build import ROOT
-from fluxtrue_tools.bench.drive import build_drive, measure_drive
+from fluxtrue_tools.bench.drive import Stage, build_drive, build_task, measure_drive, measure_task
 from fluxtrue_tools.emulate import build as emulation
 from fluxtrue_tools.errors import FluxtrueError
 
@@ -106,6 +106,10 @@ def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
     }
 
 
+def _spreads(stages: list[Stage]) -> dict[str, list[float]]:
+    return {s.name: [s.minimum, round(s.average, 1), s.maximum] for s in stages}
+
+
 def measure(folder: Path) -> FIGURES:
     """Builds what is missing below `folder` and measures; takes a minute or two."""
     port = budget()
@@ -130,7 +134,8 @@ def measure(folder: Path) -> FIGURES:
         "utilisation": {name: _utilisation(drive["runs"], port["core_Hz"]) for name, drive in drives.items()},
         "kernels": {
             "periods": counted, "limited": limited,
-            "stages": {s.name: [s.minimum, round(s.average, 1), s.maximum] for s in stages},
+            "stages": _spreads(stages),
+            "task stages": _spreads(measure_task(build_task(folder / "bench"))),
         },
         "image": {"flash": whole.flash, "RAM": whole.ram, "stack reserved": whole.stack},
         "modules": {name: list(both) for name, both in sizes.modules(parts.image).items()},

@@ -10,11 +10,12 @@ from typing import Any
 
 from fluxtrue_tools.bench import cycles
 from fluxtrue_tools.bench.build import SMALL
-from fluxtrue_tools.bench.drive import TITLES
+from fluxtrue_tools.bench.drive import PERIODS, TASK_TITLES, TITLES, WARM_UP
 from fluxtrue_tools.bench.peers import LOOPS
 from fluxtrue_tools.bench.sizes import STATE
 
 Figures = dict[str, Any]
+TASK_PERIODS = 10
 CODE_MOST, STATE_MOST, FLASH_MOST, RAM_MOST = 12288, 1536, 65536, 12288
 UTILISATION_MOST = 10.0
 STACK_MOST = 0.5
@@ -34,12 +35,30 @@ CONTAINS = {
     "current_control": "2 PI, decoupling from the flux tables, voltage limiter",
     "modulate": "sincos, inverse Park, dc-voltage normalisation, dead-time compensation, SVPWM",
     "flux_table": "i_d, i_q → both flux linkages, their slopes and cross terms",
+    "window": "currents, voltages, fluxes and angle added to the window of the robust identification; in every tenth "
+    "period the window is handed over",
     "mrai": "the paper's identification, one period",
     "torque_estimate": "torque from currents, tables and identified flux, and its mean",
     "torque_path": "torque estimate and one step of the torque loop; in the drive only every tenth period has one",
     "fast_isr": "the interrupt on a hardware interface of variables",
     "mrai_isr_paper": "MRAI, torque estimate, exchange",
     "task": "the drive's 1 kHz task without the bus",
+}
+TASK_CONTAINS = {
+    "identify": "window → operating point, tables and their slopes there, torque, rows of the robust identification; "
+    "in every tenth step the filter's update",
+    "trim": "identified voltage error → dead-time compensation",
+    "angle_harmonics": "what the encoder repeats once and twice a turn; one part of its table",
+    "slow_monitors": "phases, sensors, current control, speed, angle offset, temperatures, torque",
+    "torque_limit": "request → torque allowed by reach, battery power, dc voltage, speed, temperatures",
+    "torque_loop": "slew, one step of the torque loop",
+    "reference": "torque, speed, dc voltage → i_d, i_q (MTPA, field weakening), with what the voltage limiter has left "
+    "and what the magnets bear",
+    "target": "flux tables at the reference, set point of the current control, hand-over",
+    "safe_state": "which safe state a fault would need now",
+    "schedule": "gains and gates of the paper's identification, hand-over; with the paper's identification only",
+    "supervisor": "state machine while torque is made",
+    "arbitrate": "limits, dead band, slew and jerk of what the bus asks",
 }
 WHOLE_MOST = 400
 SHARE_MOST = 40
@@ -85,6 +104,12 @@ def _kernels(figures: Figures) -> list[str]:
             continue
         rows.append((TITLES.get(name, name), CONTAINS.get(name, ""), *spread, _bound(name, spread)))
     return table("kernel|contains|  min |  avg |  max |bound", rows)
+
+
+def _task_stages(figures: Figures) -> list[str]:
+    stages = figures["kernels"]["task stages"]
+    rows = ((TASK_TITLES[name], TASK_CONTAINS[name], *spread) for name, spread in stages.items())
+    return table("stage|contains|  min |  avg |  max ", rows)
 
 
 def _peers(figures: Figures) -> list[str]:
@@ -155,6 +180,7 @@ def page(figures: Figures) -> str:
     share = _torque_share(kernels["stages"])
     tables: dict[str, list[str]] = {
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
+        "task_stages": _task_stages(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
     }  # fmt: skip
     return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
@@ -162,6 +188,7 @@ def page(figures: Figures) -> str:
         compiler=figures["compiler"], pipeline=cycles.PIPELINE, divide=cycles.DIVIDE, entry=cycles.ENTRY,
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
+        task_steps=(PERIODS - WARM_UP) // TASK_PERIODS,
         small=" ".join(SMALL), tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
         stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MOST),
         **{"return": cycles.RETURN},

@@ -1,15 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An activity interrupted by the fast ISR at each of its instructions: tests/target/emulator/preempt.h."""
+"""An activity interrupted at each of its instructions.
+
+By the fast ISR, with the host's answer for comparison: tests/target/emulator/preempt.h. By any other interrupt, with
+the image's own: everything in its memory must be as if the interrupt had come just before the activity, or just after.
+"""
 
 import ctypes
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
+from fluxtrue_tools.emulate.core import BREAK, FAILED, Core
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
-MRAI: Final = 16 + 69
+FAST: Final = 16 + 39
 TASK: Final = 16 + 48
+MRAI: Final = 16 + 69
+CAN: Final = 16 + 81
+GATE: Final = 16 + 103
+RAM_END: Final = 0x20007000
+SLICE_S: Final = 1e-4
+SLICES: Final = 25
+# What the bridge does, as far as the software says it.
+BRIDGE: Final = (*(f"FTM0.C{n}V" for n in range(6)), "FTM0.SWOCTRL", "FTM0.OUTMASK", "FTM0.SYNC")
 
 
 class _Report(ctypes.Structure):
@@ -45,3 +60,103 @@ def interrupt_everywhere(loop: Loop, victim: int, rounds: int = 1) -> Report:
     if code != 0:
         raise FluxtrueError(f"interrupting vector {victim}: {text}")
     return Report(report.instructions, report.points, report.mixed, report.outcomes, report.choices, text)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Boundaries tried, and on which side of the activity the interrupt seemed to have been."""
+
+    instructions: int
+    before: int
+    after: int
+    mixed: tuple[int, ...]  # after so many instructions: neither
+    same: bool  # before and after make no difference
+    snapshot_before: int  # the two outcomes, to be restored and to go on from
+    snapshot_after: int
+
+
+class Stepper:
+    """Runs a core from one exception's entry or return to another's."""
+
+    def __init__(self, core: Core) -> None:
+        self.core = core
+        self._until: set[tuple[int, bool]] = set()
+        core.on_exception(self._on_exception)
+
+    def _on_exception(self, vector: int, entered: bool) -> None:
+        if (vector, entered) in self._until:
+            self._until.discard((vector, entered))
+            if not self._until:
+                self.core.break_after(0)
+
+    def run(self, *until: tuple[int, bool]) -> None:
+        """Until each of them has happened."""
+        self._until = set(until)
+        self.stop()
+        if self._until:
+            raise FluxtrueError(f"(vector, entered) {sorted(self._until)} never happened")
+
+    def stop(self) -> None:
+        for _ in range(SLICES):
+            if (stopped := self.core.run(SLICE_S)) == BREAK:
+                return
+            if stopped == FAILED:
+                raise FluxtrueError(f"the emulation stopped: {self.core.error}")
+
+
+@contextmanager
+def interrupt_from_both_sides(core: Core, victim: int, by: int, raise_it: Callable[[], None]) -> Iterator[Sides]:
+    """From the victim's next run on. `raise_it` makes the interrupt `by` pending. The core is left as it was.
+
+    The rotor must stand: what the image takes away for the time since its angle was sampled depends on the delay.
+    """
+    snapshots = [core.save()]
+    try:
+        sides = _both_sides(core, victim, by, raise_it)
+        snapshots += [sides.snapshot_before, sides.snapshot_after]
+        yield sides
+    finally:
+        core.on_exception(lambda _vector, _entered: None)
+        core.restore(snapshots[0])
+        for snapshot in snapshots:
+            core.free(snapshot)
+
+
+def _both_sides(core: Core, victim: int, by: int, raise_it: Callable[[], None]) -> Sides:
+    stepper = Stepper(core)
+    stepper.run((victim, True))
+    for pdb in ("PDB0.SC", "PDB1.SC"):
+        core.set_register(pdb, 0)  # no conversions: no other period begins
+    start = core.save()
+    bottom = core.symbol("stack_top")
+
+    def found() -> tuple[bytes, tuple[int, ...]]:
+        return core.read(bottom, RAM_END - bottom), tuple(core.register(name) for name in BRIDGE)
+
+    begun = core.instructions
+    stepper.run((victim, False))
+    length = core.instructions - begun
+    raise_it()
+    stepper.run((by, False))
+    late, after = found(), core.save()
+    core.restore(start)
+    raise_it()
+    stepper.run((by, False), (victim, False))
+    early, before = found(), core.save()
+    sides: list[int] = []
+    mixed: list[int] = []
+    for n in range(length):
+        core.restore(start)
+        core.break_after(n)
+        stepper.stop()
+        if core.active_vector != victim:
+            raise FluxtrueError(f"vector {victim} was over before {n} instructions")
+        raise_it()
+        stepper.run((by, False), (victim, False))
+        outcome = found()
+        if outcome in (early, late):
+            sides.append(0 if outcome == early else 1)
+        else:
+            mixed.append(n)
+    core.free(start)
+    return Sides(length, sides.count(0), sides.count(1), tuple(mixed), early == late, before, after)
