@@ -48,9 +48,10 @@ static int32_t per_v_max(const current_control_config_t *config, int32_t v_dc)
     return fx_usat_bits(fx_quotient(config->per_ratio_q31, (uint32_t)v_dc), 22) * 512;
 }
 
+/* Into [-most - 1, most]: as a magnitude in ones' complement, which needs one comparison. */
 static int32_t within(int32_t x, int32_t most)
 {
-    return fx_clamp_q31(x, -most, most);
+    return fx_min_s32(x ^ (x >> 31), most) ^ (fx_arch_opaque(x) >> 31);
 }
 
 /* What the circle leaves one axis beside the other one's share, and never less than a quarter (CC-11). */
