@@ -25,15 +25,15 @@ BOUNDS: dict[str, tuple[float | None, float | None]] = {
     "torque_path": (40, None),
 }  # fmt: skip
 CONTAINS = {
-    "current_tick": "converter counts and angle → duties: offset and gain, Clarke, sum of the phases, angle "
+    "current_tick": "converter counts and angle → duties: offset and gain, Clarke, angle "
     "tracker, sincos, Park, 2 PI, decoupling from the flux tables, voltage limiter, dead-time compensation, dc-voltage "
     "normalisation, angle advance, SVPWM, all saturations",
     "current_core": "what the leanest peer's tick has: sincos, Clarke, Park, 2 PI, inverse Park, clamp, SVPWM; "
     "the firmware's stages with the rest switched off when compiled",
     "measure": "offset and gain of 4 converter counts, Clarke, sum of the phases",
     "angle_tracker": "angle → angle, speed, step",
-    "current_control": "2 PI, decoupling from the flux tables, voltage limiter",
-    "modulate": "sincos, inverse Park, dc-voltage normalisation, dead-time compensation, SVPWM",
+    "current_control": "2 PI, decoupling from the flux tables, dc-voltage normalisation, voltage limiter",
+    "modulate": "sincos, inverse Park, dead-time compensation, SVPWM, shortest pulses",
     "flux_table": "i_d, i_q → both flux linkages, their slopes and cross terms",
     "window": "currents, voltages, fluxes and angle added to the window of the robust identification; in every tenth "
     "period the window is handed over",
