@@ -6,6 +6,7 @@
 #include "app/drive.h"
 #include "app/slow_monitors.h"
 #include "app/supervisor.h"
+#include "fx/vec.h"
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
 
@@ -49,7 +50,7 @@ CALLED void task_copy(void)
     view.window = *window_box_look(&copy.windows);
     view.mrai = copy.slow.mrai;
     view.psi_delta = drive_psi_delta(&copy);
-    view.torque = copy.slow.torque.mean;
+    view.torque = copy.slow.torque;
     view.faults = copy.fast.faults;
     view.inverter_dC = hal_temperature_inverter_dC();
     view.winding_dC = hal_temperature_winding_dC();
