@@ -300,6 +300,23 @@ void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
     TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* only what the noise-free zero current asks for */
 }
 
+/* Below the bound nobody normalises for: neither identification may take the command for what acts. */
+void test_a_dc_voltage_below_its_bound_makes_the_acting_voltage_unknown(void)
+{
+    seam_run();
+    seam_periods(4);
+    TEST_ASSERT_TRUE(published()->acting);
+    seam_voltage(100.0); /* 140 V is the bound */
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    seam_voltage(350.0);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_TRUE(published()->acting);
+}
+
 void test_a_voltage_at_its_limit_is_told_to_the_task(void)
 {
     seam_run();
