@@ -22,7 +22,7 @@ void torque_estimate_add(torque_sum_t *sum, const dq_t *i, const flux_point_t *f
 }
 
 /* Rounded half up, of either sign; half an LSB of Q24 per period is what the sum has cut off in the mean. */
-q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
+__attribute__((cold)) q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
 {
     const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;
     const int32_t total_q24 = fx_arch_sub_wrap(sum->sum_q24, state->last.sum_q24);
