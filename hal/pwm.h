@@ -5,8 +5,8 @@
  * Source   docs/howto/port.md
  * Units    duty with 2^15 = 1.0 (0 ... 32768); the port turns it into timer ticks and takes it over synchronously
  * Errors   none; duties are always in range
- * Context  fast ISR, once per period; enable(true) takes effect together with the duties written in the same period,
- *          enable(false) at once */
+ * Context  fast ISR; write() once per period; enable() when the gates are to change, and again at will: true takes
+ *          effect together with the duties written in the same period, false at once */
 #include <stdbool.h>
 
 #include "types/samples.h"

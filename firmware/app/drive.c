@@ -80,4 +80,5 @@ void drive_init(drive_t *drive, const motor_t *source)
 void drive_raise_fault(drive_t *drive, uint32_t fault)
 {
     drive->fast.faults = drive->fast.faults | fault;
+    drive->fast.settled = false;
 }

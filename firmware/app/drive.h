@@ -57,6 +57,7 @@ typedef struct {
     identify_window_t window;    /* of the robust identification, in the making */
     uint8_t periods_on; /* since the gates closed, saturates at 3: then the voltage of the period before is ours too */
     uint8_t overruns_in_a_row;
+    bool settled;       /* the bridge runs, no fault, nothing to count: the next period need not look at all that */
     uint32_t overruns;
     sample_t lost;               /* takes the sample of a period that finds both slots in use */
     uint32_t fault_resets;       /* of the command, as far as done */
@@ -133,13 +134,14 @@ typedef struct {
     int16_t inverter_dC, winding_dC;
 } view_t;
 
+/** The samples first: whoever has the drive's address has theirs. */
 typedef struct {
+    sample_box_t samples;
     motor_t motor; /* a copy in RAM: calibration changes it, the flash original never */
     request_t request;
     fast_state_t fast;
     slow_state_t slow;
     task_state_t task;
-    sample_box_t samples;
     window_box_t windows;
     command_box_t commands;
     schedule_box_t schedules;

@@ -1,21 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
+#include "app/hand_over.h"
 #include "control/transform.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
-#include "hal/irq.h"
 #include "hal/pwm.h"
 
 #define DUTY_MIDDLE 16384
-#define OVERRUNS_TO_FAULT 3
 #define PERIODS_TO_ACT 3
 
-/* What the period's own decisions need besides the sample that goes to the identification. */
+/* What current control and modulation need besides the sample. */
 typedef struct {
     fx_pair_t i_dq, advanced;
-    int32_t zero_q28, v_dc;
+    int32_t v_dc;
     q31_t omega;
 } instant_t;
+
+/* What the first half of a period hands to the second besides the sample. */
+typedef struct {
+    int32_t step; /* electrical advance per period */
+    int32_t v_dc;
+    bool calm;    /* nothing to look at closely */
+} seen_t;
 
 /* What the angle sensor is known to be wrong by, where it stands. */
 static uint32_t correction(const drive_t *drive, uint32_t theta_m)
@@ -25,73 +31,27 @@ static uint32_t correction(const drive_t *drive, uint32_t theta_m)
     return (uint32_t)parts[theta_m >> ANGLE_HARMONICS_SHIFT];
 }
 
-static instant_t observe(drive_t *drive, sample_t *sample)
+static seen_t observe(drive_t *drive, sample_t *sample)
 {
     adc_counts_t counts;
     hal_adc_read(&counts);
     const measure_t measured = measure_step(&drive->motor.measure, &counts);
-    sample->i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
+    const fx_pair_t i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
+    sample->i_ab = i_ab;
     sample->zero_q28 = measured.zero_q28;
-    sample->v_dc = measured.v_dc;
     const uint32_t read = hal_angle_read();
     const uint32_t theta_m = read + correction(drive, read);
+    sample->v_dc = measured.v_dc;
     sample->theta_m = theta_m;
     const angle_t angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, theta_m);
+    sample->mrai.omega = angle.omega_q31;
+    sample->theta_e = angle.theta_e;
     if (__builtin_expect(angle.jumped, 0)) {
         monitor_note_jump(&drive->fast.monitor);
+        return (seen_t){angle.step, measured.v_dc, false};
     }
-    sample->theta_e = angle.theta_e;
-    sample->mrai.omega = angle.omega_q31;
-    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
-    sample->mrai.i = i;
-    return (instant_t){
-        .i_dq = fx_arch_pkhbt(i.d, i.q),
-        /* The middle of the period in which the duties will act: 1.5 periods ahead. */
-        .advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1)),
-        .zero_q28 = measured.zero_q28,
-        .v_dc = measured.v_dc,
-        .omega = angle.omega_q31,
-    };
-}
-
-/* Counts the periods that find the identification still busy. */
-static void watch(drive_t *drive, uint32_t unfinished)
-{
-    fast_state_t *fast = &drive->fast;
-    if (__builtin_expect(unfinished == 0U, 1)) {
-        fast->overruns_in_a_row = 0;
-        return;
-    }
-    fast->overruns++;
-    fast->overruns_in_a_row++;
-    if (fast->overruns_in_a_row >= OVERRUNS_TO_FAULT) {
-        fast->overruns_in_a_row = OVERRUNS_TO_FAULT;
-        drive_raise_fault(drive, FAULT_OVERRUN);
-    }
-}
-
-/* Hands this period to the identification: the robust one's sums are made here, the paper's law runs below. */
-static void publish(drive_t *drive, const sample_t *sample, uint32_t next)
-{
-    fast_state_t *fast = &drive->fast;
-    sample_box_publish(&drive->samples, next);
-    if (__builtin_expect(drive->request.identification_mode != IDENTIFICATION_ROBUST, 0)) {
-        identify_window_spoil(&fast->window); /* it would have a gap */
-        hal_irq_pend_mrai();
-        return;
-    }
-    drive->slow.psi_delta_q15 = drive->task.identified.psi_delta;
-    drive->slow.finished = next;
-    const identify_sample_t in = {
-        .i = sample->mrai.i,
-        .u = sample->mrai.u,
-        .flux = &sample->mrai.flux,
-        .theta = sample->theta_e,
-    };
-    if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
-        window_box_write(&drive->windows, &fast->window);
-        identify_window_restart(&fast->window);
-    }
+    return (seen_t){angle.step, measured.v_dc,
+                    monitor_quiet(&drive->motor.monitor, i_ab, measured.zero_q28, measured.v_dc)};
 }
 
 /* The safe state: low sides closed, or all gates open. */
@@ -130,9 +90,11 @@ static __attribute__((noinline, flatten)) void bridge_limited(drive_t *drive, sa
 }
 
 /* The duties of the first period act in the second; the third sample ends a period of which they are known. */
-static __attribute__((noinline, cold)) void starting(fast_state_t *fast, sample_t *sample)
+static void starting(fast_state_t *fast, sample_t *sample)
 {
-    fast->periods_on++;
+    if (fast->periods_on < PERIODS_TO_ACT) {
+        fast->periods_on++;
+    }
     sample->acting = fast->periods_on >= PERIODS_TO_ACT;
     if (!sample->acting) {
         identify_window_spoil(&fast->window);
@@ -169,15 +131,11 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
         }
     }
     hal_pwm_write(duty);
-    hal_pwm_enable(true);
-    if (__builtin_expect(fast->periods_on < PERIODS_TO_ACT, 0)) {
-        starting(fast, sample);
-    }
 }
 
 /* A reset comes before this period's monitors: what is still wrong is latched again at once. It never comes with the
  * command to run. Bad motor data stay bad. */
-static __attribute__((noinline, cold)) void forget_faults(drive_t *drive, uint32_t asked)
+static void forget_faults(drive_t *drive, uint32_t asked)
 {
     if (drive->fast.fault_resets != asked) {
         drive->fast.fault_resets = asked;
@@ -185,16 +143,8 @@ static __attribute__((noinline, cold)) void forget_faults(drive_t *drive, uint32
     }
 }
 
-static __attribute__((noinline, cold)) void rest(drive_t *drive, sample_t *sample, const command_t *command)
-{
-    if (command->faults != 0U) {
-        drive_raise_fault(drive, command->faults);
-    }
-    bridge_off(drive, sample, command->safe);
-}
-
-/* Something is not as it should be, or was a moment ago: seldom, so the phases are found from the vector again. */
-static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t *sample, bool run)
+/* The phases are found from the vector again: seldom. */
+static void look(drive_t *drive, const sample_t *sample, bool run)
 {
     const monitor_in_t seen = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
     const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &seen);
@@ -207,32 +157,69 @@ static __attribute__((noinline, cold)) void look(drive_t *drive, const sample_t 
     }
 }
 
-/* Everything the period needs is compiled into the one interrupt, with a compiler that sees all files. */
+/* From the sample each time: held in registers it would be put aside on the stack, too. */
+static dq_t current(const sample_t *sample)
+{
+    const fx_arch_two_t i = fx_arch_load_two(&sample->mrai.i.d);
+    return (dq_t){i.first, i.second};
+}
+
+/* The frame of the rotor, the tables, and what current control works with. */
+static instant_t turn(drive_t *drive, sample_t *sample, const seen_t *seen)
+{
+    sample->mrai.i = park_pair(sample->i_ab, fx_rotation(sample->theta_e));
+    /* The middle of the period in which the duties will act: 1.5 periods ahead. */
+    const uint32_t ahead = (uint32_t)seen->step + (uint32_t)(seen->step >> 1);
+    const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
+    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, current(sample));
+    const dq_t i = current(sample);
+    return (instant_t){fx_arch_pkhbt(i.d, i.q), advanced, seen->v_dc, sample->mrai.omega};
+}
+
+/* A period in which something is not as it should be, was not a moment ago, or in which the bridge does not run. */
+static __attribute__((noinline, cold)) void carefully(drive_t *drive, sample_t *sample, int32_t step)
+{
+    const command_t *command = command_box_read(&drive->commands);
+    fast_state_t *fast = &drive->fast;
+    const seen_t seen = {step, sample->v_dc, false};
+    if (drive->samples.generation == drive->slow.finished) {
+        fast->overruns_in_a_row = 0;
+    }
+    if (!command->run) {
+        forget_faults(drive, command->fault_resets);
+    }
+    look(drive, sample, command->run);
+    const instant_t now = turn(drive, sample, &seen);
+    if (command->run && fast->faults == 0) {
+        bridge_on(drive, sample, &now, &command->target);
+        hal_pwm_enable(true);
+        starting(fast, sample);
+    } else {
+        if (command->faults != 0U) {
+            drive_raise_fault(drive, command->faults);
+        }
+        bridge_off(drive, sample, command->safe);
+    }
+    fast->settled = fast->periods_on >= PERIODS_TO_ACT && fast->overruns_in_a_row == 0 && fast->monitor.attention == 0;
+    hand_over(drive, sample, drive->samples.generation + (sample == &fast->lost ? 0U : 1U));
+}
+
+/* Everything the usual period needs is compiled into the one interrupt, with a compiler that sees all files. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
-    if (__builtin_expect(!command->run, 0)) {
-        forget_faults(drive, command->fault_resets);
-    }
     const uint32_t published = drive->samples.generation;
     const uint32_t unfinished = published - drive->slow.finished;
-    watch(drive, unfinished);
-    uint32_t next = published + 1U;
-    sample_t *sample = sample_box_begin(&drive->samples, next);
-    if (__builtin_expect(unfinished > 1U, 0)) {
+    sample_t *sample = sample_box_begin(&drive->samples, published + 1U);
+    if (__builtin_expect(unfinished != 0U, 0) && hand_over_late(drive, unfinished)) {
         sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
-        next--;
     }
-    const instant_t now = observe(drive, sample);
-    const bool quiet = monitor_quiet(&drive->motor.monitor, &drive->fast.monitor, now.i_dq, now.zero_q28, now.v_dc);
-    if (__builtin_expect(!quiet, 0)) {
-        look(drive, sample, command->run);
+    const seen_t seen = observe(drive, sample);
+    if (__builtin_expect(!seen.calm || !(drive->fast.settled & command->run), 0)) {
+        carefully(drive, sample, seen.step);
+        return;
     }
-    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, sample->mrai.i);
-    if (command->run && drive->fast.faults == 0) {
-        bridge_on(drive, sample, &now, &command->target);
-    } else {
-        rest(drive, sample, command);
-    }
-    publish(drive, sample, next);
+    const instant_t now = turn(drive, sample, &seen);
+    bridge_on(drive, sample, &now, &command->target);
+    hand_over(drive, sample, drive->samples.generation + 1U);
 }

@@ -1,6 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
 
+/* The bridge was off, so that its voltage is not ours, or the sample before was not seen: only the currents are known.
+ * Or what was identified is to be forgotten: then it goes on from this sample, too, not from zero flux. */
+static __attribute__((noinline, cold)) void begin_anew(drive_t *drive, const mrai_schedule_t *schedule,
+                                                       const mrai_in_t *in)
+{
+    slow_state_t *slow = &drive->slow;
+    if (drive->request.identification_resets != slow->identification_resets) {
+        slow->identification_resets = drive->request.identification_resets;
+        slow->mrai = (mrai_state_t){0};
+    }
+    mrai_reset(&drive->motor.mrai, schedule, &slow->mrai, in);
+}
+
 /* The 2014 paper's law, each period. The robust identification needs nothing of this: its sums are the fast ISR's, the
  * rest the 1 kHz task's. */
 void mrai_isr(drive_t *drive)
@@ -11,16 +24,11 @@ void mrai_isr(drive_t *drive)
     const mrai_config_t *config = &drive->motor.mrai;
     const mrai_schedule_t *schedule = schedule_box_read(&drive->schedules);
 
-    if (drive->request.identification_resets != slow->identification_resets) {
-        slow->identification_resets = drive->request.identification_resets;
-        slow->mrai = (mrai_state_t){0};
-        mrai_reset(config, schedule, &slow->mrai, &sample->mrai); /* goes on from this sample, not from zero flux */
-    } else if (sample->acting && generation - slow->finished == 1U) {
-        mrai_step(config, schedule, &slow->mrai, &sample->mrai);
+    if (__builtin_expect(!sample->acting || generation - slow->finished != 1U ||
+                             drive->request.identification_resets != slow->identification_resets, 0)) {
+        begin_anew(drive, schedule, &sample->mrai);
     } else {
-        /* The bridge was off, so that its voltage is not ours, or the sample before was not seen: only the currents
-         * are known. */
-        mrai_reset(config, schedule, &slow->mrai, &sample->mrai);
+        mrai_step(config, schedule, &slow->mrai, &sample->mrai);
     }
     const int32_t psi_delta = mrai_psi_delta_q15(&slow->mrai);
     slow->psi_delta_q15 = (q15_t)psi_delta;

@@ -43,11 +43,6 @@ flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i)
     };
 }
 
-__attribute__((cold)) bool flux_table_outside(const flux_table_config_t *config, dq_t i)
-{
-    return fx_mesh_outside(&config->mesh, i.d, (uint32_t)((i.q < 0) ? -i.q : i.q));
-}
-
 __attribute__((cold)) flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i)
 {
     const fx_cell_t cell = cell_of(config, i);

@@ -26,7 +26,11 @@ typedef struct {
 
 bool flux_table_valid(const flux_table_config_t *config);
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_t i);
-bool flux_table_outside(const flux_table_config_t *config, dq_t i);
 flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_t i);
+
+static inline bool flux_table_outside(const flux_table_config_t *config, dq_t i)
+{
+    return fx_mesh_outside(&config->mesh, i.d, (uint32_t)((i.q < 0) ? -i.q : i.q));
+}
 
 #endif

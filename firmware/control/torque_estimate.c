@@ -15,12 +15,14 @@ void torque_estimate_add(torque_sum_t *sum, const dq_t *i, const flux_point_t *f
     const int32_t psi_d = fx_sat_q15_word(psi.first + psi_delta);
     /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, but nothing below -2^30 + 2^15 is subtracted from it. */
     const int32_t t_q30 = psi_d * current.second - psi.second * current.first;
-    const torque_sum_t now = {fx_arch_add_wrap(before.first, t_q30 >> 6), before.second + 1};
-    *sum = now;
+    int32_t sum_q24 = fx_arch_add_wrap(before.first, t_q30 >> 6);
+    int32_t count = before.second + 1;
+    fx_arch_together(&sum_q24, &count);
+    *sum = (torque_sum_t){sum_q24, count};
 }
 
 /* Rounded half up, of either sign; half an LSB of Q24 per period is what the sum has cut off in the mean. */
-q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
+__attribute__((cold)) q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
 {
     const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;
     const int32_t total_q24 = fx_arch_sub_wrap(sum->sum_q24, state->last.sum_q24);

@@ -29,11 +29,16 @@ static inline ab_t clarke(abc_t x)
     return (ab_t){transform_round(alpha), transform_round(beta)};
 }
 
-static inline dq_t park(ab_t x, fx_pair_t at)
+/* Of (alpha, beta) in one word. */
+static inline dq_t park_pair(fx_pair_t v, fx_pair_t at)
 {
-    const fx_pair_t v = fx_arch_pkhbt(x.alpha, x.beta);
     return (dq_t){fx_sat_q15_word(fx_dot2_acc(0x4000, at, v) >> 15),
                   fx_sat_q15_word(fx_difference2_cross_acc(0x4000, at, v) >> 15)};
+}
+
+static inline dq_t park(ab_t x, fx_pair_t at)
+{
+    return park_pair(fx_arch_pkhbt(x.alpha, x.beta), at);
 }
 
 static inline ab_t inverse_park_q30(dq_t x, fx_pair_t at)

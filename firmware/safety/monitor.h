@@ -38,17 +38,16 @@ typedef struct {
     int32_t v_dc;
 } monitor_in_t;
 
-/** What most periods look like, for a fraction of the price: monitor_step() would find nothing and has nothing to
- * count. |i_x| <= |i| + |sum|/3, since a phase is its share of the vector plus a third of the sum. */
-static inline bool monitor_quiet(const monitor_config_t *config, const monitor_state_t *state, fx_pair_t i,
-                                 int32_t zero_q28, int32_t v_dc)
+/** What most periods look like, for a fraction of the price: monitor_step() would find nothing, and needs to be called
+ * only while it counts (attention). |i_x| <= |i| + |sum|/3: a phase is its share of the vector plus a third of the
+ * sum. */
+static inline bool monitor_quiet(const monitor_config_t *config, fx_pair_t i, int32_t zero_q28, int32_t v_dc)
 {
-    int32_t quiet_q30 = config->quiet_q30, most = config->zero_max, v_min = config->v_min, v_max = config->v_max;
-    fx_arch_together(&quiet_q30, &most);
-    fx_arch_together(&v_min, &v_max);
-    const uint32_t zero_max = (uint32_t)most;
-    return (uint32_t)fx_dot2(i, i) < (uint32_t)quiet_q30 && (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max &&
-           v_dc >= v_min && v_dc <= v_max && state->attention == 0U;
+    const fx_arch_two_t most = fx_arch_load_two(&config->quiet_q30);
+    const uint32_t zero_max = (uint32_t)most.second;
+    const fx_arch_two_t v = fx_arch_load_two(&config->v_min);
+    return (uint32_t)fx_dot2(i, i) < (uint32_t)most.first && (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max &&
+           v_dc >= v.first && v_dc <= v.second;
 }
 
 /** The angle has jumped: not a quiet period. */

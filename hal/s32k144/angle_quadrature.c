@@ -11,13 +11,13 @@
 #define SYSTEM_CLOCK 1U
 
 static struct {
-    uint32_t at_last;      /* reading of the period before */
-    uint32_t q32_per_tick; /* share of a period, 2^32 = 1 */
-} encoder;                 /* together: every period reaches both from one address */
+    int32_t at_last;      /* reading of the period before */
+    int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+} encoder;                /* together: every period reads both at once */
 
 void angle_init(uint32_t period_ticks)
 {
-    encoder.q32_per_tick = UINT32_MAX / period_ticks;
+    encoder.q32_per_tick = (int32_t)(UINT32_MAX / period_ticks);
     encoder.at_last = 0;
     FTM2->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
     FTM2->CNTIN = 0;
@@ -41,9 +41,10 @@ bool angle_fault(void)
  * travel as FTM0 says has passed of this one. Less than half a period, or the share would be negative. */
 uint32_t hal_angle_read(void)
 {
+    const fx_arch_two_t last = fx_arch_load_two(&encoder.at_last);
     const uint32_t now = FTM2->CNT << TURN_SHIFT;
-    const int32_t passed = (int32_t)(FTM0->CNT * encoder.q32_per_tick);
-    const int32_t travel = (int32_t)(now - encoder.at_last);
-    encoder.at_last = now;
+    const int32_t passed = (int32_t)(FTM0->CNT * (uint32_t)last.second);
+    const int32_t travel = (int32_t)(now - (uint32_t)last.first);
+    encoder.at_last = (int32_t)now;
     return now - (uint32_t)fx_mulhi(travel, passed);
 }
