@@ -6,6 +6,11 @@
 #   <build>/<name>.elf and .bin; SEAL writes the checksum; FLASH and RAM are bounds
 function(fluxtrue_image name)
     cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;FLASH;RAM" "SOURCES;DEFINITIONS;LINK")
+    if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES OR NOT arg_SCRIPT OR
+       (DEFINED arg_FLASH AND NOT DEFINED arg_RAM) OR (DEFINED arg_RAM AND NOT DEFINED arg_FLASH))
+        message(FATAL_ERROR "fluxtrue_image(${name}): wants SOURCES and SCRIPT, FLASH and RAM together or neither; "
+            "unknown: '${arg_UNPARSED_ARGUMENTS}'")
+    endif()
     cmake_path(ABSOLUTE_PATH arg_SCRIPT)
     get_property(layers GLOBAL PROPERTY FLUXTRUE_LAYERS)
     list(TRANSFORM layers REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)

@@ -63,8 +63,10 @@ def test_the_same_run_gives_the_same_bits_and_instructions(parts: Parts) -> None
         (RUN, ("--elf", sys.executable), "is not a 32-bit little-endian ELF file for Arm"),
         (RUN, ("--elf", "CUT"), "is cut short or damaged"),
         (RUN, ("--elf", "FLASHED"), "takes its commands from the bus, allowed without --serve"),
-        (RUN, ("--serve", "--elf", "IMAGE"), "takes no commands from the bus, allowed with --serve"),
         ("motor = [", (), "not TOML"),
+        (RUN, ("--serve", "--port", "0"), "--scenario: allowed without --serve only"),
+        (RUN, ("--port", "29536"), "--port: allowed with --serve only"),
+        (RUN, ("--fast",), "--realtime/--fast: allowed with --serve only"),
     ],
 )
 def test_bad_input_is_one_clear_message(
@@ -79,6 +81,12 @@ def test_bad_input_is_one_clear_message(
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_an_image_that_does_not_listen_is_refused_on_the_bus(parts: Parts) -> None:
+    done = emulate("--serve", "--elf", parts.image)
+    assert done.returncode == 2
+    assert "takes no commands from the bus, allowed with --serve" in done.stderr
 
 
 @pytest.mark.parametrize("taken", ["--port", "--bench-port"])

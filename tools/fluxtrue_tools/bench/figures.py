@@ -19,7 +19,8 @@ from fluxtrue_tools.errors import FluxtrueError
 
 BUDGET = ROOT / "hal" / "s32k144" / "budget.toml"
 MODES = {"paper": 0, "robust": 1}
-INTERRUPTS = {"fast ISR": image.FAST, "MRAI ISR": image.MRAI, "CAN ISR": image.CAN, "1 kHz task": image.TASK}
+INTERRUPTS = {"fast ISR": image.FAST, "MRAI ISR": image.MRAI, "CAN ISR": image.CAN, "1 kHz task": image.TASK,
+              "gate fault ISR": image.GATE}  # fmt: skip
 PWM_HZ = 10_000
 TASK_PERIODS = 10
 COMMAND_HZ = 100

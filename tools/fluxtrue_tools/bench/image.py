@@ -26,7 +26,7 @@ from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
-FAST, MRAI, CAN, TASK = 16 + 39, 16 + 69, 16 + 81, 16 + 48
+FAST, MRAI, CAN, TASK, GATE = 16 + 39, 16 + 69, 16 + 81, 16 + 48, 16 + 103
 FLASH_SIZE: Final = 0x80000
 STACK_PATTERN: Final = b"\xc5" * 4
 SPANS_MOST: Final = 4096
@@ -155,6 +155,9 @@ def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
         fault = int(loop.get("fault_word"))
         if fault != 0 or int(loop.get("identification_mode")) != mode:
             raise FluxtrueError(f"the measured drive ended with fault word {fault:#x}")
+        stand.core.pend(GATE)  # last of all: it ends the drive
+        stand.run_ms()
+        spans += (span for span in stand.take() if span[0] == GATE)
         seen = np.concatenate(rows)
         return Recording(
             np.array(spans, dtype=np.int64), len(seen), int(seen[:, 0].sum()), int(seen[:, 1].sum()),

@@ -5,11 +5,26 @@ import os
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from fluxtrue_tools.errors import FluxtrueError
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 DEFAULT = Path(__file__).resolve().parents[3] / "docs" / "howto" / "scenarios" / "warm-up.toml"
+
+
+RUN_ONLY = ("scenario", "out", "json_path", "plot")
+SERVE_ONLY = ("port", "bench_port", "realtime")
+
+
+def _check_options(serve: bool) -> None:
+    """What would be left aside is refused."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        given = context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+        if given and option.name in (RUN_ONLY if serve else SERVE_ONLY):
+            name = "/".join([*option.opts, *option.secondary_opts])
+            raise FluxtrueError(f"{name}: allowed {'without' if serve else 'with'} --serve only")
 
 
 @click.command()
@@ -42,6 +57,7 @@ def emulate(
     build_dir: Path | None,
 ) -> None:
     """Run a scenario with the unmodified S32K144 image on an emulated processor, coupled at its registers."""
+    _check_options(serve)
     from fluxtrue_tools.emulate import build
     from fluxtrue_tools.sim import scenario as scenarios
     from fluxtrue_tools.sim.cli import check_outputs, run_and_report
