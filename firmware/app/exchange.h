@@ -27,7 +27,7 @@ typedef struct {
     int32_t v_dc;
     uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
     bool acting;          /* the bridge was on throughout the last period and is on now */
-    bool voltage_limited; /* circle or hexagon cut the voltage */
+    bool voltage_limited; /* the circle cut the voltage; a pulse that the bridge cannot make is no lack of it */
     bool snapped;         /* the bridge cannot make these pulses: the acting voltage is less well known */
     uint32_t to_64_bytes; /* a power of two is quicker to find */
 } sample_t;

@@ -81,7 +81,6 @@ static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
 static __attribute__((noinline, flatten)) void bridge_limited(drive_t *drive, sample_t *sample, modulate_out_t made,
                                                               fx_pair_t i, fx_pair_t advanced)
 {
-    sample->voltage_limited = true;
     if (made.limited != 0U) {
         sample->snapped = true;
         identify_window_snapped(&drive->fast.window);
@@ -127,6 +126,7 @@ static void bridge_on(drive_t *drive, sample_t *sample, const instant_t *now, co
         const modulate_out_t made = modulate_step(&m->modulate, wanted.v, now->i_dq, now->advanced);
         duty = made.duty;
         if ((made.limited | wanted.limited) != 0U) {
+            sample->voltage_limited = wanted.limited != 0U;
             bridge_limited(drive, sample, made, now->i_dq, now->advanced);
         }
     }
