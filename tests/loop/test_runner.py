@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.library import Loop, LoopError
 from fluxtrue_tools.sim.motor import Motor
@@ -157,6 +158,14 @@ def test_the_duties_of_a_period_act_in_the_next_one(hsm1: Motor) -> None:
     computed = int(np.argmax(np.abs(rows[:, 0]) > 1.0))
     acted = int(np.argmax(np.abs(rows[:, 1]) > 1.0))
     assert acted == computed + 1
+
+
+def test_a_plant_that_finds_no_current_ends_the_run_with_an_error(hsm1: Motor) -> None:
+    """Cross saturation a hundred times the measured: psi_d no longer follows i_d alone."""
+    with loop(hsm1, imposed_speed=1.0, speed_rad_s=500.0, cross_saturation_scale=100.0) as sim:
+        sim.set("enable", 1.0)
+        with pytest.raises(FluxtrueError, match="the plant: no current was found"):
+            sim.run_s(1.0)
 
 
 def test_unknown_channels_are_named(hsm1: Motor) -> None:
