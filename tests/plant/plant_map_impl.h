@@ -24,7 +24,7 @@ struct plant_map {
     double (*zero)[4]; /* psi_d(0, i_q) per i_q cell, powers of u */
 };
 
-/* A node's value, slopes and twist (PL-1); slope a and slope b make the twist's index. */
+/* A node's value, slopes and twist (PL-1). */
 enum { MAP_F = 0, MAP_BY_D = 1, MAP_BY_Q = 2, MAP_TWIST = 3 };
 typedef struct {
     double v[4];
