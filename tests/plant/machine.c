@@ -49,21 +49,40 @@ static void model_flux(const void *context, const double i[2], double psi[2], do
     }
 }
 
-/* im_dq holds a start that is a Newton step old at most: one evaluation and a correction do,
- * unless the residual says that quadratic convergence is not yet below the tolerance. */
-static void find_current(machine_t *m)
+/* The currents of psi_dq, searched from i. None found, or where many currents have this flux:
+ * counted, and currents and slopes stay those of before, which are numbers. */
+static void search_current(machine_t *m, double i[2])
 {
-    double psi[2], r[2], step[2];
-    model_flux(&m->flux, m->im_dq, psi, m->jac);
+    double jac[4];
+    if (flux_solve(model_flux, &m->flux, m->psi_dq, i, jac) != 0 ||
+        jac[0] * jac[3] == jac[1] * jac[2]) {
+        m->failures++;
+        return;
+    }
+    memcpy(m->im_dq, i, sizeof m->im_dq);
+    memcpy(m->jac, jac, sizeof jac);
+}
+
+/* start is a Newton step old at most: one evaluation and a correction do, unless the residual says
+ * that quadratic convergence is not yet below the tolerance. */
+static void find_current(machine_t *m, const double start[2])
+{
+    double i[2] = {start[0], start[1]}, psi[2], r[2], step[2], jac[4];
+    model_flux(&m->flux, i, psi, jac);
     r[0] = m->psi_dq[0] - psi[0];
     r[1] = m->psi_dq[1] - psi[1];
-    flux_divide(m->jac, r, step);
-    m->im_dq[0] += step[0];
-    m->im_dq[1] += step[1];
-    if (!(fabs(step[0]) + fabs(step[1]) < 1e-3) &&
-        flux_solve(model_flux, &m->flux, m->psi_dq, m->im_dq, m->jac) != 0) {
-        m->failures++;
+    flux_divide(jac, r, step);
+    i[0] += step[0];
+    i[1] += step[1];
+    if (fabs(step[0]) + fabs(step[1]) < 1e-3) {
+        memcpy(m->im_dq, i, sizeof i);
+        memcpy(m->jac, jac, sizeof jac);
+        return;
     }
+    if (!isfinite(i[0]) || !isfinite(i[1])) {
+        memcpy(i, m->im_dq, sizeof i);
+    }
+    search_current(m, i);
 }
 
 static void set_flux_from_current(machine_t *m, turn_t turn)
@@ -103,8 +122,8 @@ void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double o
     m->flux = now;
     if (p->magnet_step_keeps_current) {
         set_flux_from_current(m, turn);
-    } else if (flux_solve(model_flux, &m->flux, m->psi_dq, m->im_dq, m->jac) != 0) {
-        m->failures++;
+    } else {
+        search_current(m, (double[2]){m->im_dq[0], m->im_dq[1]});
     }
 }
 
@@ -140,17 +159,17 @@ void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t s
 
 void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end)
 {
-    double r[2], step[2], before[2] = {m->psi_dq[0], m->psi_dq[1]};
+    double r[2], start[2], before[2] = {m->psi_dq[0], m->psi_dq[1]};
     for (int k = 0; k < 2; k++) {
         m->psi_s[k] += h * (u_s[k] - m->r_ohm * i_mid_s[k]);
     }
     to_rotor(end, m->psi_s, m->psi_dq);
     r[0] = m->psi_dq[0] - before[0];
     r[1] = m->psi_dq[1] - before[1];
-    flux_divide(m->jac, r, step);
-    m->im_dq[0] += step[0];
-    m->im_dq[1] += step[1];
-    find_current(m);
+    flux_divide(m->jac, r, start);
+    start[0] += m->im_dq[0];
+    start[1] += m->im_dq[1];
+    find_current(m, start);
 }
 
 double machine_torque(const machine_t *m)

@@ -5,14 +5,9 @@
 
 #include "plant_map_impl.h"
 
-/* A node's value, slopes and twist (PL-1). */
-typedef struct {
-    double f, fd, fq, fdq;
-} node_t;
-
 /* Slope at node k of the parabola through it and its neighbours; at the ends the parabola of the
  * three end nodes, or the chord of the only two. */
-static double slope_at(const double *x, const double *f, int stride, int n, int k)
+double plant_map_slope(const double *x, const double *f, int stride, int n, int k)
 {
     if (n == 2) {
         return (f[stride] - f[0]) / (x[1] - x[0]);
@@ -25,20 +20,26 @@ static double slope_at(const double *x, const double *f, int stride, int n, int 
     return k == 0 ? 2.0 * s0 - mid : (k == n - 1 ? 2.0 * s1 - mid : mid);
 }
 
-static void fill_slopes(const map_axis_t *d, const map_axis_t *q, node_t *node)
+/* Values, slopes and twists at the given nodes, which begin behind the nodes beyond the edge. */
+static void fill_inside(const plant_map_t *map, map_node_t *node, const double *psi)
 {
+    const int edge = MAP_BEYOND, row = map->q.n, nd = map->d.n - 2 * edge, nq = row - 2 * edge;
+    const double *d = &map->d.node[edge], *q = &map->q.node[edge];
     const int stride = (int)(sizeof *node / sizeof(double));
-    for (int i = 0; i < d->n; i++) {
-        for (int j = 0; j < q->n; j++) {
-            node_t *p = &node[i * q->n + j];
-            p->fd = slope_at(d->node, &node[j].f, stride * q->n, d->n, i);
-            p->fq = slope_at(q->node, &node[i * q->n].f, stride, q->n, j);
-        }
+    map_node_t *first = &node[edge * row + edge];
+    for (int k = 0; k < nd * nq; k++) {
+        first[k / nq * row + k % nq].v[MAP_F] = psi[k];
     }
-    for (int i = 0; i < d->n; i++) {
-        for (int j = 0; j < q->n; j++) {
-            node[i * q->n + j].fdq = slope_at(q->node, &node[i * q->n].fd, stride, q->n, j);
-        }
+    for (int k = 0; k < nd * nq; k++) {
+        const int i = k / nq, j = k % nq;
+        double *v = first[i * row + j].v;
+        v[MAP_BY_D] = plant_map_slope(d, &first[j].v[MAP_F], stride * row, nd, i);
+        v[MAP_BY_Q] = plant_map_slope(q, &first[i * row].v[MAP_F], stride, nq, j);
+    }
+    for (int k = 0; k < nd * nq; k++) {
+        const int i = k / nq, j = k % nq;
+        first[i * row + j].v[MAP_TWIST] =
+            plant_map_slope(q, &first[i * row].v[MAP_BY_D], stride, nq, j);
     }
 }
 
@@ -51,15 +52,17 @@ static void hermite(double a, double b, double sa, double sb, double p[4])
     p[3] = 2.0 * (a - b) + sa + sb;
 }
 
-static void fill_cell(const node_t *n00, const node_t *n10, double hd, double hq, int axis,
+static void fill_cell(const map_node_t *n00, const map_node_t *n10, double hd, double hq, int axis,
                       map_cell_t *cell)
 {
-    const node_t *n01 = n00 + 1, *n11 = n10 + 1;
+    const double *v00 = n00->v, *v01 = n00[1].v, *v10 = n10->v, *v11 = n10[1].v;
     double row[4][4]; /* value at t = 0, value at t = 1, slope at 0, slope at 1, over u */
-    hermite(n00->f, n01->f, n00->fq * hq, n01->fq * hq, row[0]);
-    hermite(n10->f, n11->f, n10->fq * hq, n11->fq * hq, row[1]);
-    hermite(n00->fd * hd, n01->fd * hd, n00->fdq * hd * hq, n01->fdq * hd * hq, row[2]);
-    hermite(n10->fd * hd, n11->fd * hd, n10->fdq * hd * hq, n11->fdq * hd * hq, row[3]);
+    hermite(v00[MAP_F], v01[MAP_F], v00[MAP_BY_Q] * hq, v01[MAP_BY_Q] * hq, row[0]);
+    hermite(v10[MAP_F], v11[MAP_F], v10[MAP_BY_Q] * hq, v11[MAP_BY_Q] * hq, row[1]);
+    hermite(v00[MAP_BY_D] * hd, v01[MAP_BY_D] * hd, v00[MAP_TWIST] * hd * hq,
+            v01[MAP_TWIST] * hd * hq, row[2]);
+    hermite(v10[MAP_BY_D] * hd, v11[MAP_BY_D] * hd, v10[MAP_TWIST] * hd * hq,
+            v11[MAP_TWIST] * hd * hq, row[3]);
     for (int j = 0; j < 4; j++) {
         double p[4];
         hermite(row[0][j], row[1][j], row[2][j], row[3][j], p);
@@ -69,18 +72,17 @@ static void fill_cell(const node_t *n00, const node_t *n10, double hd, double hq
     }
 }
 
-static void fill_cells(plant_map_t *map, node_t *node, const double *psi, int axis)
+void plant_map_fill_cells(plant_map_t *map, map_nodes_t *nodes, map_block_t block)
 {
-    const int nd = map->d.n, nq = map->q.n;
-    for (int k = 0; k < nd * nq; k++) {
-        node[k].f = psi[k];
-    }
-    fill_slopes(&map->d, &map->q, node);
-    for (int i = 0; i + 1 < nd; i++) {
-        for (int j = 0; j + 1 < nq; j++) {
-            fill_cell(&node[i * nq + j], &node[(i + 1) * nq + j],
-                      map->d.node[i + 1] - map->d.node[i], map->q.node[j + 1] - map->q.node[j],
-                      axis, &map->cell[i * (nq - 1) + j]);
+    const double *d = map->d.node, *q = map->q.node;
+    const int row = map->q.n;
+    for (int i = block.d0; i < block.d1; i++) {
+        for (int j = block.q0; j < block.q1; j++) {
+            for (int axis = 0; axis < 2; axis++) {
+                const map_node_t *node = &nodes->psi[axis][i * row + j];
+                fill_cell(node, node + row, d[i + 1] - d[i], q[j + 1] - q[j], axis,
+                          &map->cell[i * (row - 1) + j]);
+            }
         }
     }
 }
@@ -96,24 +98,23 @@ static void fill_zero(plant_map_t *map)
     }
 }
 
-/* Nodes and four points between: a cubic that dips between good nodes is found. */
-static int invertible(const plant_map_t *map)
+map_margin_t plant_map_margin(const plant_map_t *map, map_block_t block)
 {
-    const int nd = map->d.n, nq = map->q.n;
-    for (int i = 0; i < 4 * (nd - 1) + 1; i++) {
-        for (int j = 0; j < 4 * (nq - 1) + 1; j++) {
-            int ci = i / 4 < nd - 1 ? i / 4 : nd - 2, cj = j / 4 < nq - 1 ? j / 4 : nq - 2;
-            double t = (i - 4 * ci) / 4.0, u = (j - 4 * cj) / 4.0, psi_d, psi_q, jac[4];
-            double id = map->d.node[ci] + t * (map->d.node[ci + 1] - map->d.node[ci]);
-            double iq = map->q.node[cj] + u * (map->q.node[cj + 1] - map->q.node[cj]);
-            plant_map_flux(map, id, iq, &psi_d, &psi_q, jac);
-            double product = jac[0] * jac[3];
-            if (!(jac[0] > 0.0 && jac[3] > 0.0 && product - jac[1] * jac[2] > 1e-6 * product)) {
-                return 0;
-            }
+    map_margin_t least = {INFINITY, INFINITY, INFINITY};
+    for (int i = 4 * block.d0; i <= 4 * block.d1; i++) {
+        for (int j = 4 * block.q0; j <= 4 * block.q1; j++) {
+            const int ci = i / 4 < block.d1 ? i / 4 : block.d1 - 1;
+            const int cj = j / 4 < block.q1 ? j / 4 : block.q1 - 1;
+            double psi[2], jac[4];
+            plant_map_cell_flux(map, ci, cj, (i - 4 * ci) / 4.0, (j - 4 * cj) / 4.0, psi, jac);
+            const double product = jac[0] * jac[3];
+            least.d = jac[0] > least.d ? least.d : jac[0]; /* NaN stays */
+            least.q = jac[3] > least.q ? least.q : jac[3];
+            const double det = (product - jac[1] * jac[2]) / product;
+            least.det = det > least.det ? least.det : det;
         }
     }
-    return 1;
+    return least;
 }
 
 static int axis_ok(const double *x, int n)
@@ -136,15 +137,47 @@ static int all_finite(const double *x, int n)
     return 1;
 }
 
+/* The given nodes, with room for those beyond the edge on either side. */
 static int axis_copy(map_axis_t *axis, const double *x, int n)
 {
-    axis->n = n;
+    axis->n = n + 2 * MAP_BEYOND;
+    axis->first = x[0];
+    axis->last = x[n - 1];
     axis->per_step = (n - 1) / (x[n - 1] - x[0]);
-    axis->node = malloc((size_t)n * sizeof *axis->node);
+    axis->node = calloc((size_t)axis->n, sizeof *axis->node);
     if (axis->node == NULL) {
         return 0;
     }
-    memcpy(axis->node, x, (size_t)n * sizeof *x);
+    memcpy(&axis->node[MAP_BEYOND], x, (size_t)n * sizeof *x);
+    return 1;
+}
+
+/* Everything that is allocated; 0 when something was not. */
+static int allocate(plant_map_t *map, map_nodes_t *nodes, int nd, int nq)
+{
+    const size_t ed = (size_t)nd + 2 * MAP_BEYOND, eq = (size_t)nq + 2 * MAP_BEYOND;
+    map->cell = calloc((ed - 1) * (eq - 1), sizeof *map->cell);
+    map->zero = calloc(eq - 1, sizeof *map->zero);
+    nodes->psi[0] = calloc(ed * eq, sizeof *nodes->psi[0]);
+    nodes->psi[1] = calloc(ed * eq, sizeof *nodes->psi[1]);
+    return map->cell != NULL && map->zero != NULL && nodes->psi[0] != NULL && nodes->psi[1] != NULL;
+}
+
+/* 0: the map cannot be inverted. */
+static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs,
+                const double *psi_q_Vs)
+{
+    const int edge = MAP_BEYOND;
+    const map_block_t inside = {edge, map->d.n - 1 - edge, edge, map->q.n - 1 - edge};
+    fill_inside(map, nodes->psi[0], psi_d_Vs);
+    fill_inside(map, nodes->psi[1], psi_q_Vs);
+    plant_map_fill_cells(map, nodes, inside);
+    const map_margin_t least = plant_map_margin(map, inside);
+    if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) ||
+        !plant_map_go_beyond(map, nodes, least)) {
+        return 0;
+    }
+    fill_zero(map);
     return 1;
 }
 
@@ -155,22 +188,12 @@ plant_map_t *plant_map_create(const double *id_A, int nd, const double *iq_A, in
         !all_finite(psi_d_Vs, nd * nq) || !all_finite(psi_q_Vs, nd * nq)) {
         return NULL;
     }
+    map_nodes_t nodes = {{NULL, NULL}};
     plant_map_t *map = calloc(1, sizeof *map);
-    node_t *node = calloc((size_t)(nd * nq), sizeof *node);
-    int ok =
-        map != NULL && node != NULL && axis_copy(&map->d, id_A, nd) && axis_copy(&map->q, iq_A, nq);
-    if (ok) {
-        map->cell = calloc((size_t)((nd - 1) * (nq - 1)), sizeof *map->cell);
-        map->zero = calloc((size_t)(nq - 1), sizeof *map->zero);
-        ok = map->cell != NULL && map->zero != NULL;
-    }
-    if (ok) {
-        fill_cells(map, node, psi_d_Vs, 0);
-        fill_cells(map, node, psi_q_Vs, 1);
-        fill_zero(map);
-        ok = invertible(map);
-    }
-    free(node);
+    int ok = map != NULL && axis_copy(&map->d, id_A, nd) && axis_copy(&map->q, iq_A, nq) &&
+             allocate(map, &nodes, nd, nq) && fill(map, &nodes, psi_d_Vs, psi_q_Vs);
+    free(nodes.psi[0]);
+    free(nodes.psi[1]);
     if (!ok) {
         plant_map_destroy(map);
         return NULL;

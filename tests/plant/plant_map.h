@@ -2,11 +2,11 @@
 #ifndef PLANT_PLANT_MAP_H
 #define PLANT_PLANT_MAP_H
 /** Flux map of a saturated machine: bicubic Hermite interpolation of psi_d, psi_q over (i_d, i_q).
- *   C1 everywhere; outside the grid every section continues with its edge slope.
+ *   C1 everywhere; outside the grid the edge slopes fade into constant, uncoupled ones.
  * Source   docs/theory/plant.md (PL-1) ... (PL-3)
  * Units    A, Vs, H; amplitude-invariant dq frame
- * Range    the inversion is unique where both incremental inductances and the determinant of
- *          the incremental inductance matrix are positive; that is checked over the grid
+ * Range    every current; the inversion is unique where both incremental inductances and the
+ *          determinant of their matrix are positive: checked over the grid, so made outside it
  * Errors   create returns NULL, invert returns non-zero when the residual stays above 1e-10 Vs
  * Context  simulation only; a map is constant after creation and may be shared by many plants */
 

@@ -12,12 +12,13 @@ typedef struct {
 static inline spot_t locate(const map_axis_t *axis, double x)
 {
     const double *node = axis->node;
-    double guess = (x - node[0]) * axis->per_step;
-    int k = guess > 0.0 ? (guess < axis->n - 2 ? (int)guess : axis->n - 2) : 0; /* NaN: 0 */
+    double guess = (x - axis->first) * axis->per_step + MAP_BEYOND;
+    const int top = axis->n - 2 - (x > axis->last ? 0 : MAP_BEYOND); /* the edge itself is inside */
+    int k = guess > 0.0 ? (guess < top ? (int)guess : top) : 0;      /* NaN: 0 */
     while (k > 0 && x < node[k]) {
         k--;
     }
-    while (k < axis->n - 2 && x >= node[k + 1]) {
+    while (k < top && x >= node[k + 1]) {
         k++;
     }
     double per_h = 1.0 / (node[k + 1] - node[k]);
@@ -26,13 +27,10 @@ static inline spot_t locate(const map_axis_t *axis, double x)
     return (spot_t){.k = k, .t = held, .beyond = t - held, .per_h = per_h};
 }
 
-void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs,
-                    double *psi_q_Vs, double jac[4])
+static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[2], double jac[4])
 {
-    const spot_t d = locate(&map->d, id_A), q = locate(&map->q, iq_A);
     const map_cell_t *cell = &map->cell[d.k * (map->q.n - 1) + q.k];
     const double t = d.t, u = q.t;
-    double psi[2], by_d[2], by_q[2];
     for (int a = 0; a < 2; a++) {
         double p[4], pu[4];
         for (int i = 0; i < 4; i++) {
@@ -43,20 +41,28 @@ void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *ps
         double f = p[0] + t * (p[1] + t * (p[2] + t * p[3]));
         double ft = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]);
         double fu = pu[0] + t * (pu[1] + t * (pu[2] + t * pu[3]));
-        double ftu = pu[1] + t * (2.0 * pu[2] + t * 3.0 * pu[3]);
-        /* the tangent of every section beyond the edge (PL-2) */
-        psi[a] = f + d.beyond * ft + q.beyond * (fu + d.beyond * ftu);
-        by_d[a] = (ft + q.beyond * ftu) * d.per_h;
-        by_q[a] = (fu + d.beyond * ftu) * q.per_h;
+        /* beyond the last grid line the tangent of the section, whose twist is zero (PL-2) */
+        psi[a] = f + d.beyond * ft + q.beyond * fu;
+        jac[2 * a] = ft * d.per_h;
+        jac[2 * a + 1] = fu * q.per_h;
     }
+}
+
+void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs,
+                    double *psi_q_Vs, double jac[4])
+{
+    double psi[2], unused[4];
+    patch(map, locate(&map->d, id_A), locate(&map->q, iq_A), psi, jac != NULL ? jac : unused);
     *psi_d_Vs = psi[0];
     *psi_q_Vs = psi[1];
-    if (jac != NULL) {
-        jac[0] = by_d[0];
-        jac[1] = by_q[0];
-        jac[2] = by_d[1];
-        jac[3] = by_q[1];
-    }
+}
+
+void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2],
+                         double jac[4])
+{
+    const double *d = &map->d.node[i], *q = &map->q.node[j];
+    patch(map, (spot_t){.k = i, .t = t, .per_h = 1.0 / (d[1] - d[0])},
+          (spot_t){.k = j, .t = u, .per_h = 1.0 / (q[1] - q[0])}, psi, jac);
 }
 
 double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H)

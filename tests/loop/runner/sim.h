@@ -58,7 +58,8 @@ SIM_API int sim_record(sim_t *sim, const char *const *names, int count, int ever
  * period, the controller's once per millisecond. */
 SIM_API int sim_ramp(sim_t *sim, const char *name, double from, double to);
 /** Runs; answers the rows written, or a negative code: SIM_FULL when they would not fit (then
- * nothing runs), SIM_FAILED when the controller cannot go on. */
+ * nothing runs), SIM_FAILED when the controller cannot go on or the plant
+ * found no current for its flux linkage. */
 SIM_API int sim_run(sim_t *sim, int periods, double *rows, int capacity_rows);
 /** Why, after SIM_FAILED; else NULL. */
 SIM_API const char *sim_failure(const sim_t *sim);

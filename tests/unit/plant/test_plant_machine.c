@@ -343,7 +343,7 @@ void test_currents_belong_to_the_flux_however_fast_they_move(void)
     TEST_ASSERT_EQUAL(0, t->inversion_failures);
 }
 
-/* A flux that no current can give must not pass silently. */
+/* A flux that no current can give must not pass silently, nor as something that is no number. */
 void test_an_impossible_flux_is_counted(void)
 {
     map = poly_map();
@@ -353,4 +353,5 @@ void test_an_impossible_flux_is_counted(void)
     plant_params(plant)->lq_scale = 0.0;
     bench_drive(plant, 10.0 * I);
     TEST_ASSERT_TRUE(t->inversion_failures > 0);
+    TEST_ASSERT_TRUE(isfinite(t->i_d_A) && isfinite(t->i_q_A) && isfinite(t->torque_Nm));
 }

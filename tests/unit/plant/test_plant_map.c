@@ -37,24 +37,37 @@ void test_quadratic_fluxes_are_reproduced_between_the_nodes(void)
     }
 }
 
-/* The edge value and the edge slope of the polynomial, straight on: beyond i_d = 50 A by x and
- * beyond i_q = 250 A by y, the corner term x y included. */
-void test_outside_the_grid_every_section_runs_on_with_its_edge_slope(void)
+/* 1 A beyond, the own slopes have moved by (1 - s)(1 - 3 s) - 1 = -3.96 %, s = 1/(0.4 x 250), of
+ * their distance from the far ones, here less than the edge's own, and the cross slopes by
+ * 1 - 2/250^2: the tangent of the edge holds within 5 % x 0.2 mH x 1 A / 2 = 5 uVs. */
+void test_just_outside_the_grid_the_flux_runs_on_with_its_edge_slope(void)
 {
-    const double x = 70.0, y = 40.0;
     double d, q, psi[2];
     poly_flux(50.0, -120.0, psi);
-    plant_map_flux(map, 50.0 + x, -120.0, &d, &q, NULL);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-14, psi[0] + x * (POLY_A - 2.0 * POLY_C * 50.0), d);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-14, psi[1] + x * (-2.0 * POLY_X * -120.0), q);
-    poly_flux(50.0, 250.0, psi);
-    plant_map_flux(map, 50.0 + x, 250.0 + y, &d, &q, NULL);
-    TEST_ASSERT_DOUBLE_WITHIN(
-        1e-14, psi[0] + x * (POLY_A - 2.0 * POLY_C * 50.0) + y * (-2.0 * POLY_X * 250.0), d);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-14,
-                              psi[1] + x * (-2.0 * POLY_X * 250.0) +
-                                  y * (POLY_B - 2.0 * POLY_X * 50.0) - x * y * 2.0 * POLY_X,
-                              q);
+    plant_map_flux(map, 51.0, -120.0, &d, &q, NULL);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-6, psi[0] + POLY_A - 2.0 * POLY_C * 50.0, d);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-6, psi[1] - 2.0 * POLY_X * -120.0, q);
+    poly_flux(-100.0, -250.0, psi);
+    plant_map_flux(map, -100.0, -251.0, &d, &q, NULL);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-6, psi[0] + 2.0 * POLY_X * -250.0, d);
+    TEST_ASSERT_DOUBLE_WITHIN(5e-6, psi[1] - (POLY_B - 2.0 * POLY_X * -100.0), q);
+}
+
+/* The polynomial is symmetric, so all of its cross slope fades, within 250 A. The upper d edge ends
+ * at the mean of its own slopes, A - 2 C x 50 A everywhere on it; psi_q has gained
+ * integral (1 - 2 w^2 | 2 (1 - w)^2) = 125 A times the cross slope. */
+void test_far_outside_the_axes_are_decoupled_and_the_slopes_constant(void)
+{
+    for (double iq = -250.0; iq <= 250.0; iq += 50.0) {
+        double d, q, psi[2], jac[4];
+        poly_flux(50.0, iq, psi);
+        plant_map_flux(map, 1000.0, iq, &d, &q, jac);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, POLY_A - 2.0 * POLY_C * 50.0, jac[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, jac[1]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, jac[2]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, POLY_B - 2.0 * POLY_X * (50.0 + 125.0), jac[3]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, psi[1] - 2.0 * POLY_X * 125.0 * iq, q);
+    }
 }
 
 /* An uneven, non-polynomial map: values and slopes either side of every grid line agree, the edges
@@ -170,6 +183,113 @@ void test_inversion_returns_every_current_of_the_measured_machine(void)
     plant_map_t *hsm1 = hsm1_map();
     TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
     round_trip(hsm1, 60.0);
+    plant_map_destroy(hsm1);
+}
+
+/* x . J x > 0 for every x: between two points of a plane the flux difference then has a component
+ * along the current difference, so no two currents share a flux. The smallest eigenvalue of the
+ * symmetric part is at least half of that inside. */
+static void check_rises(const plant_map_t *m, double id_lo, double id_hi)
+{
+    double inside = INFINITY, outside = INFINITY;
+    for (double id = -750.0; id <= 750.0; id += 3.1) {
+        for (double iq = -750.0; iq <= 750.0; iq += 2.9) {
+            double d, q, jac[4];
+            plant_map_flux(m, id, iq, &d, &q, jac);
+            const double least = 0.5 * (jac[0] + jac[3] - hypot(jac[0] - jac[3], jac[1] + jac[2]));
+            if (id >= id_lo && id <= id_hi && fabs(iq) <= 250.0) {
+                inside = fmin(inside, least);
+            } else {
+                outside = fmin(outside, least);
+            }
+        }
+    }
+    TEST_ASSERT_TRUE(inside > 0.0);
+    TEST_ASSERT_TRUE(outside > 0.5 * inside);
+}
+
+void test_the_flux_rises_along_every_direction_three_maps_out(void)
+{
+    check_rises(map, -250.0, 50.0);
+    plant_map_t *hsm1 = hsm1_map();
+    TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
+    check_rises(hsm1, -250.0, 0.0);
+    plant_map_destroy(hsm1);
+}
+
+/* From the origin and from the far corner opposite; tolerance as above. */
+void test_inversion_returns_every_current_three_maps_out(void)
+{
+    plant_map_t *hsm1 = hsm1_map();
+    TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
+    for (int k = 0; k < 2; k++) {
+        const plant_map_t *m = k ? hsm1 : map;
+        for (double id = -750.0; id <= 750.0; id += 13.7) {
+            for (double iq = -750.0; iq <= 750.0; iq += 12.3) {
+                double d, q, found[2][2] = {{0.0, 0.0}, {copysign(750.0, -id), copysign(750.0, -iq)}};
+                plant_map_flux(m, id, iq, &d, &q, NULL);
+                for (int n = 0; n < 2; n++) {
+                    TEST_ASSERT_EQUAL(0, plant_map_invert(m, d, q, &found[n][0], &found[n][1]));
+                    TEST_ASSERT_DOUBLE_WITHIN(2e-6, id, found[n][0]);
+                    TEST_ASSERT_DOUBLE_WITHIN(2e-6, iq, found[n][1]);
+                }
+            }
+        }
+    }
+    plant_map_destroy(hsm1);
+}
+
+/* The gradient of a convex co-energy that saturates steeply along both diagonals: the tangents of
+ * its edges, straight on, fold within 100 A. The smallest slope is some uH: 1e-10 Vs over it. */
+void test_a_map_that_bends_at_its_edge_does_not_fold_beyond_it(void)
+{
+    double x[9], d[9][9], q[9][9];
+    for (int i = 0; i < 9; i++) {
+        x[i] = 50.0 * i - 200.0;
+    }
+    for (int i = 0; i < 9; i++) {
+        for (int j = 0; j < 9; j++) {
+            const double sum = x[i] + x[j], less = x[i] - x[j];
+            d[i][j] = 0.08 * tanh(sum / 160.0) + 0.03 * tanh(less / 130.0) + 1e-5 * x[i];
+            q[i][j] = 0.08 * tanh(sum / 160.0) - 0.03 * tanh(less / 130.0) + 1e-5 * x[j];
+        }
+    }
+    plant_map_t *bent = plant_map_create(x, 9, x, 9, &d[0][0], &q[0][0]);
+    TEST_ASSERT_NOT_NULL(bent);
+    for (double id = -800.0; id <= 800.0; id += 11.3) {
+        for (double iq = -800.0; iq <= 800.0; iq += 11.9) {
+            double psi_d, psi_q, jac[4], found_d = 0.0, found_q = 0.0;
+            plant_map_flux(bent, id, iq, &psi_d, &psi_q, jac);
+            TEST_ASSERT_TRUE(jac[0] > 0.0 && jac[3] > 0.0);
+            TEST_ASSERT_TRUE(jac[0] * jac[3] - jac[1] * jac[2] > 0.0);
+            TEST_ASSERT_EQUAL(0, plant_map_invert(bent, psi_d, psi_q, &found_d, &found_q));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-4, id, found_d);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-4, iq, found_q);
+        }
+    }
+    plant_map_destroy(bent);
+}
+
+/* Found, or said not to be; never something that is not a number. Above 1e5 Vs an ulp of the flux
+ * is more than the tolerance. */
+void test_no_finite_flux_or_current_makes_a_not_a_number(void)
+{
+    plant_map_t *hsm1 = hsm1_map();
+    TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
+    for (int k = 0; k < 2 * 616 * 8; k++) {
+        const double size = ldexp(1.0, k / 16 - 308), turn = TWO_PI * (k % 16) / 16.0;
+        double id = size * cos(turn), iq = size * sin(turn), psi_d, psi_q, jac[4];
+        if (size < 1e300) {
+            plant_map_flux(hsm1, id, iq, &psi_d, &psi_q, jac);
+            TEST_ASSERT_TRUE(isfinite(psi_d) && isfinite(psi_q) && isfinite(jac[0] + jac[1]) &&
+                             isfinite(jac[2] + jac[3]));
+        }
+        psi_d = id, psi_q = iq;
+        id = iq = 0.0;
+        const int failed = plant_map_invert(hsm1, psi_d, psi_q, &id, &iq);
+        TEST_ASSERT_TRUE(isfinite(id) && isfinite(iq));
+        TEST_ASSERT_TRUE(failed == 0 || size > 1e5);
+    }
     plant_map_destroy(hsm1);
 }
 

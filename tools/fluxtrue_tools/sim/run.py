@@ -240,6 +240,8 @@ def simulate(
             rows = _run(scenario, loop, progress)
         except lib.LoopError as error:
             raise _refused(error, motor, where) from error
+        except FluxtrueError as error:
+            raise FluxtrueError(f"{where}: {error}") from error
     wall = time.perf_counter() - begin
     columns = [column_name(c) for c in channels]
     _check_finite(columns, rows, where)
