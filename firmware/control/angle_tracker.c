@@ -40,12 +40,13 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
     const fx_arch_two_t before = fx_arch_load_two((const int32_t *)&state->predicted);
     const uint32_t predicted = (uint32_t)before.first;
     const int32_t error = (int32_t)(theta_e - predicted);
+    const fx_arch_two_t gains = fx_arch_load_two(&config->kp); /* and ki_q29 */
     /* Turns in Q32 * Q29 = Q29, counted twice. */
-    const int32_t omega_q30 = fx_add2_q31(before.second, fx_mulhi(config->ki_q29, error));
+    const int32_t omega_q30 = fx_add2_q31(before.second, fx_mulhi(gains.second, error));
     const bool jumped = (uint32_t)error + config->max_step > 2U * config->max_step;
     const angle_t angle = result(config, theta_e, omega_q30, jumped);
     /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
-    state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(config->kp, error);
+    state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(gains.first, error);
     state->omega_q30 = omega_q30;
     return angle;
 }
