@@ -121,8 +121,10 @@ def test_options_reach_the_tables(write):
         inverter={"device_drop_V": 1.75, "min_pulse_s": 4e-6}))  # fmt: skip
     c = members(motor_tables_c(motor))
     # Dead time: (0.02 + 1.75/350) half compensated.
-    assert c["dead_time"] / 32768 == pytest.approx(0.0125, abs=2**-15)
-    assert c["min_pulse"] / 32768 == pytest.approx(0.04, abs=2**-15)
+    assert c["dead_time_q16"] / 65536 == pytest.approx(0.0125, abs=2**-15)
+    # A pulse of 4 us in 100 us: half a duty less all of it, and less half of it.
+    assert c["longest_q31"] / 2**31 == pytest.approx(0.46, abs=2**-15)
+    assert c["nearer_rail_q31"] / 2**31 == pytest.approx(0.48, abs=2**-15)
     assert c["torque_slew"] / 32768 * motor.bases.torque_Nm == pytest.approx(1.0, rel=0.01)
     assert c["authority"] / 32768 == pytest.approx(0.2, abs=2**-15)
     assert "Q15_MAX, /* open */" in motor_tables_c(load_motor(write(control={"torque_slew_Nm_per_s": 0.0})))
