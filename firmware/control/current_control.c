@@ -87,13 +87,14 @@ current_control_out_t current_control_step(const current_control_config_t *confi
 {
     const dq_t psi = {in->flux->psi_d, in->flux->psi_q};
     const current_target_t to = *in->target;
-    const current_control_state_t s = *state;
+    const fx_arch_two_t slow = fx_arch_load_two(&state->s_d_q30);
+    const current_control_state_t s = {slow.first, slow.second};
+    const int32_t error_d = to.psi.d - psi.d;
     const int32_t omega = fx_arch_opaque(in->omega >> 16);
     const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_delta);
     /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
     const dq_t u_q22 = {axis(config->sigma_q24, to.weighted_q30.d, psi.d, s.s_d_q30 - omega * psi.q),
                         axis(config->sigma_q24, to.weighted_q30.q, psi.q, s.s_q_q30 + omega * psi_d)};
-    const int32_t error_d = to.psi.d - psi.d;
     const current_control_state_t next = {integrate(s.s_d_q30, config->integral_gain, error_d),
                                           integrate(s.s_q_q30, config->integral_gain, to.psi.q - psi.q)};
     const dq_t u = {fx_sat_q15_word((u_q22.d + HALF_LSB_Q22) >> 7), fx_sat_q15_word((u_q22.q + HALF_LSB_Q22) >> 7)};
