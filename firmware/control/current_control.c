@@ -71,7 +71,8 @@ static dq_t cut(dq_t v, int32_t error_d, int32_t omega)
         return (dq_t){within(most.d, room(most.q)), most.q};
     }
     const int32_t missing = fx_sat_q15_word(v.d - most.d);
-    return (dq_t){most.d, within(v.q + (missing ^ (omega >> 31)), room(most.d))};
+    const int32_t sign = omega >> 31; /* the exact negative: nothing missing must take nothing off */
+    return (dq_t){most.d, within(v.q + (missing ^ sign) - sign, room(most.d))};
 }
 
 /* s += a T_s (u_limited - u): what was cut away, at most four times the circle, is no error to

@@ -354,6 +354,13 @@ void test_a_voltage_inside_the_circle_is_not_called_limited(void)
     state.s_q_q30 = (int32_t)(v_max() + 1.0) * 32768;
     TEST_ASSERT_INT_WITHIN(1, v_max(), step().q);
     TEST_ASSERT_TRUE(limited);
+    for (int sign = -1; sign <= 1; sign++) { /* d is short of nothing: nothing to take off q, whichever way it turns */
+        in.omega = sign;
+        state = (current_control_state_t){.s_d_q30 = (int32_t)(0.98 * v_max()) * 32768};
+        TEST_ASSERT_INT_WITHIN(1, 0, step().q);
+        TEST_ASSERT_FALSE(limited);
+        TEST_ASSERT_FALSE(out.clear);
+    }
 }
 
 /* The promise to the modulation: clear says that |v| is below its bound, and never that something was cut. */
