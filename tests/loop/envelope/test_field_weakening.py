@@ -78,16 +78,24 @@ def test_dc_sag_and_rise_neither_trip_nor_disturb_what_can_be_reached(
             assert abs(trace.settled() - wanted) <= 1.5, (rpm, stop)
 
 
-@pytest.mark.parametrize("rpm", [2000.0, 6000.0, 8200.0, 9000.0, TOP_RPM])
+# From 4000 to 5000 rpm the machine comes with all its current and the voltage is the limit as well: a reversal tripped
+# here while d got no more than a quarter of the circle beside q.
+@pytest.mark.parametrize(
+    ("rpm", "most_A"),
+    [(2000.0, 285.0), (4000.0, 292.0), (4500.0, 292.0), (5000.0, 292.0), (-5000.0, 292.0), (6000.0, 285.0),
+     (8200.0, 285.0), (9000.0, 285.0), (TOP_RPM, 285.0)],
+)  # fmt: skip
 @pytest.mark.parametrize("slew", [0.0, 13200.0])
-def test_full_reversals_with_the_slew_open_stay_below_the_trip(hsm1: Motor, rpm: float, slew: float) -> None:
+def test_full_reversals_with_the_slew_open_stay_below_the_trip(
+    hsm1: Motor, rpm: float, most_A: float, slew: float
+) -> None:
     for magnet in (0.85, 1.05):
         rig = Rig(hsm1, rpm, magnet_scale=magnet).set(torque_slew_Nm_per_s=slew)
         rig.run(0.2)
         for torque in (132.0, -132.0, 132.0, 0.0, -132.0, 0.0):
             trace = rig.set(torque_command_Nm=torque).run(0.1)
             assert trace.faults == 0
-            assert np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"]).max() < 285.0  # 300 A is the trip
+            assert np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"]).max() < most_A  # 300 A is the trip
 
 
 def test_a_run_up_through_base_speed_at_full_request_follows_the_reported_reach(hsm1: Motor) -> None:

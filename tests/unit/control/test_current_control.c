@@ -157,7 +157,9 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
         const dq_t u = step();
         const twin_dq_t t = twin_step(&twin);
-        if ((limited || twin.limited) && between_steps(((target.psi.d > psi.d) ? t.q : t.d) / v_max())) {
+        const bool q_first = target.psi.d > psi.d;
+        if ((limited || twin.limited) &&
+            (between_steps((q_first ? out.u.d : t.d) / v_max()) || (q_first && between_steps(t.q / v_max())))) {
             continue;
         }
         seen += twin.limited ? 1 : 0;
@@ -285,7 +287,9 @@ void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_o
     }
 }
 
-/* By hand: 4/5 for q, its step ends at 205/256 and leaves 0.5990; psi_d* one LSB above psi_d decides. */
+/* By hand: 4/5 for q, its step ends at 205/256 and leaves 0.5990; psi_d* one LSB above psi_d decides. Of both
+ * at their most q gets 0.87, whose step ends at 223/256 and leaves 0.4911; beside d's tenth, which ends at 26/256,
+ * 0.9948. */
 void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
 {
     state.s_d_q30 = -(int32_t)(v_max() * 6 / 5) * 32768;
@@ -296,7 +300,11 @@ void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
     TEST_ASSERT_INT_WITHIN(1, v_max() * 4 / 5, u.q);
     TEST_ASSERT_TRUE(limited);
     state.s_q_q30 = -(1 << 30);
-    TEST_ASSERT_INT_WITHIN(1, -0.25 * v_max(), step().d);
+    TEST_ASSERT_INT_WITHIN(2, -0.4911 * v_max(), step().d);
+    TEST_ASSERT_INT_WITHIN(2, -0.87 * v_max(), of_v(1));
+    state = (current_control_state_t){.s_d_q30 = (int32_t)(v_max() / 10.0) * 32768, .s_q_q30 = -(1 << 30)};
+    TEST_ASSERT_INT_WITHIN(2, -0.9948 * v_max(), step().q);
+    TEST_ASSERT_INT_WITHIN(2, 0.1 * v_max(), of_v(0));
 }
 
 /* Between the circle that is clear and the whole one, in all directions: nothing is cut, and nothing is said to be. */
@@ -374,6 +382,13 @@ void test_a_voltage_inside_the_circle_is_not_called_limited(void)
     state.s_q_q30 = (int32_t)(v_max() + 1.0) * 32768;
     TEST_ASSERT_INT_WITHIN(1, v_max(), step().q);
     TEST_ASSERT_TRUE(limited);
+    for (int sign = -1; sign <= 1; sign++) { /* d is short of nothing: nothing to take off q, whichever way it turns */
+        in.omega = sign;
+        state = (current_control_state_t){.s_d_q30 = (int32_t)(0.98 * v_max()) * 32768};
+        TEST_ASSERT_INT_WITHIN(1, 0, step().q);
+        TEST_ASSERT_FALSE(limited);
+        TEST_ASSERT_FALSE(out.clear);
+    }
 }
 
 /* The promise to the modulation: clear says that |v| is below its bound, and never that something was cut. */
