@@ -58,8 +58,8 @@ modulate_out_t modulate_step(const modulate_config_t *config, fx_pair_t v, fx_pa
     const phases_t sign = polarity(config, i, advanced);
     const int32_t shift = 2 * middle(x);
     const int32_t dead_time = config->dead_time_q16;
-    reach_t reach = {config->longest_q31, config->nearer_rail_q31, fx_arch_opaque(HALF_Q31 + ROUND_Q31)};
-    fx_arch_together(&reach.longest, &reach.nearer_rail);
+    const fx_arch_two_t limits = fx_arch_load_two(&config->longest_q31); /* and nearer_rail_q31 */
+    const reach_t reach = {limits.first, limits.second, fx_arch_opaque(HALF_Q31 + ROUND_Q31)};
     uint32_t limited = 0;
     const uint32_t a = realisable(reach, phase_q31(shift, x.a, dead_time, sign.a), &limited);
     const uint32_t b = realisable(reach, phase_q31(shift, x.b, dead_time, sign.b), &limited);
