@@ -5,7 +5,7 @@
 #include "fx/q.h"
 
 #define HALF_LSB_Q22 64
-#define Q_SHARE Q15(0.87) /* while both axes take all they can, of which d gets 0.49 (CC-11) */
+#define D_SHARE Q15(0.7) /* what is left to d beside q in any case (CC-11) */
 
 void current_control_reset(current_control_state_t *state)
 {
@@ -64,13 +64,12 @@ static int32_t room(int32_t other)
 }
 
 /* d first while it takes flux away; what it is short of is taken off q (CC-14). While it asks for flux back, q is what
- * may hold that flux and comes first, but leaves d half of the circle: with less the flux would fall on (CC-11). */
+ * may hold that flux, and comes first; d keeps 0.7 of the circle, else the flux would fall on, and i_d grow (CC-11). */
 static dq_t cut(dq_t v, int32_t error_d, int32_t omega)
 {
     const dq_t most = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
     if (error_d > 0) {
-        const int32_t q = within(most.q, fx_max_s32(room(most.d), Q_SHARE));
-        return (dq_t){within(most.d, room(q)), q};
+        return (dq_t){within(most.d, fx_max_s32(room(most.q), D_SHARE)), most.q};
     }
     const int32_t missing = fx_sat_q15_word(v.d - most.d);
     const int32_t sign = omega >> 31; /* the exact negative: nothing missing must take nothing off */

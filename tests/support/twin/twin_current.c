@@ -18,16 +18,14 @@ static double room(double x)
 }
 
 /* The circle: d first while it takes flux away, what it is short of taken off the q flux that binds it; q first while d
- * asks for flux back, at the cost of d up to 0.87. */
+ * asks for flux back, which keeps 0.7. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
     const twin_dq_t most = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
     if (more_flux) {
-        const double most_q = fmax(room(most.d), 0.87);
-        const double q = twin_clamp(most.q, -most_q, most_q);
-        const double left = room(q);
-        return (twin_dq_t){u_max * twin_clamp(most.d, -left, left), u_max * q};
+        const double left = fmax(room(most.q), 0.7);
+        return (twin_dq_t){u_max * twin_clamp(most.d, -left, left), u_max * most.q};
     }
     const double left = room(most.d);
     const double missing = twin_clamp(v.d - most.d, -1.0, 1.0);
