@@ -5,6 +5,7 @@
 #include "fx/q.h"
 
 #define HALF_LSB_Q22 64
+#define D_SHARE Q15(0.7) /* what is left to d beside q in any case (CC-11) */
 
 void current_control_reset(current_control_state_t *state)
 {
@@ -54,27 +55,25 @@ static int32_t within(int32_t x, int32_t most)
     return fx_min_s32(x ^ (x >> 31), most) ^ (fx_arch_opaque(x) >> 31);
 }
 
-/* What the circle leaves one axis beside the other one's share, but never less than the table's least (CC-11). */
-static int32_t room(const uint16_t table[256], int32_t other)
+/* What the circle leaves one axis beside the other one's share, and never less than a quarter (CC-11). */
+static int32_t room(int32_t other)
 {
-    __asm__("" : "+r"(table)); /* else found from the address of another one */
+    const uint16_t *table = fx_circle_table;
+    __asm__("" : "+r"(table)); /* else found from the address of another table */
     return table[(other ^ (other >> 31)) >> 7];
 }
 
 /* d first while it takes flux away; what it is short of is taken off q (CC-14). While it asks for flux back, q is what
- * may hold that flux and comes first, but leaves d half of the circle: with less the flux would fall on (CC-11). */
+ * may hold that flux, and comes first; d keeps 0.7 of the circle, else the flux would fall on, and i_d grow (CC-11). */
 static dq_t cut(dq_t v, int32_t error_d, int32_t omega)
 {
-    dq_t left = {fx_sat_q15_word(v.d), v.q};
+    const dq_t most = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
     if (error_d > 0) {
-        left.d = within(left.d, room(fx_circle_half_table, fx_sat_q15_word(v.q)));
-    } else {
-        const int32_t missing = fx_sat_q15_word(v.d - left.d);
-        const int32_t sign = omega >> 31; /* the exact negative: nothing missing must take nothing off */
-        left.q = v.q + (missing ^ sign) - sign;
+        return (dq_t){within(most.d, fx_max_s32(room(most.q), D_SHARE)), most.q};
     }
-    left.q = within(left.q, room(fx_circle_table, left.d));
-    return left;
+    const int32_t missing = fx_sat_q15_word(v.d - most.d);
+    const int32_t sign = omega >> 31; /* the exact negative: nothing missing must take nothing off */
+    return (dq_t){most.d, within(v.q + (missing ^ sign) - sign, room(most.d))};
 }
 
 /* s += a T_s (u_limited - u): what was cut away, at most four times the circle, is no error to

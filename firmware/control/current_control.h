@@ -10,10 +10,10 @@
  *   sigma = 1/(2 T_d), T_d = 1.5 T_s
  * While the circle cuts, s also takes a T_s (u_limited - u): the response goes on as if the reference had been one
  * that the voltage can follow, and no slow tail remains.
- *   v = u/v_max, v_max = v_ratio v_dc, |v| <= 1: v_d comes first, v_q gets what the circle leaves, at least a quarter,
+ *   v = u/v_max, v_max = v_ratio v_dc: v_d comes first, v_q gets what the circle leaves, at least a quarter,
  *   and gives up what v_d is short of, with the sign of w
- * While d asks for more flux (psi_d* > psi_d) q comes first instead, else it could never shed the flux that binds d;
- *   of both at their most q gets 0.87, d 0.49
+ * While d asks for more flux (psi_d* > psi_d) q comes first instead, else it could never shed the flux that binds d,
+ *   and d keeps 0.7
  * clear: |v| < v_clear/v_ratio, a circle inside of everything that may limit here or in the modulation (MO-11)
  * Source   docs/theory/current-control.md (CC-4) ... (CC-15)
  * Units    per unit

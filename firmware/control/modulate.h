@@ -11,7 +11,7 @@
  * Source   docs/theory/modulation.md (MO-1) ... (MO-11)
  * Units    v per unit of v_ratio v_dc; u per unit of V_b; duties with 2^15 = 1.0; dead_time = t_dead f_pwm times the
  *          compensated fraction, longest = 1/2 - min_pulse, nearer_rail = 1/2 - min_pulse/2
- * Range    |v| up to 17/16, what current control leaves
+ * Range    |v| up to 1.23, what current control leaves
  * Rounding 1 LSB of duty (2^-15)
  * Errors   limited says that a pulse was changed
  * Context  fast ISR; no division */

@@ -16,7 +16,7 @@ void torque_estimate_add(torque_sum_t *sum, const dq_t *i, const flux_point_t *f
     /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, but nothing below -2^30 + 2^15 is subtracted from it. */
     const int32_t t_q30 = psi_d * current.second - psi.second * current.first;
     int32_t sum_q24 = fx_arch_add_wrap(before.first, t_q30 >> 6);
-    int32_t count = before.second + 1;
+    int32_t count = fx_arch_add_wrap(before.second, 1);
     fx_arch_together(&sum_q24, &count);
     *sum = (torque_sum_t){sum_q24, count};
 }

@@ -2,8 +2,8 @@
 #ifndef FX_CIRCLE_H
 #define FX_CIRCLE_H
 
-/** The other leg of a right triangle with the hypotenuse 1, never below a quarter, or a half.
- *   y[n] = max(sqrt(1 - ((n + 1)/256)^2), least): what is left in the whole cell n/256 <= |x| < (n + 1)/256
+/** The other leg of a right triangle with the hypotenuse 1, never below a quarter.
+ *   y[n] = max(sqrt(1 - ((n + 1)/256)^2), 1/4): what is left in the whole cell n/256 <= |x| < (n + 1)/256
  * Source   docs/theory/fixed-point.md (FX-32)
  * Units    q15
  * Range    n = 0 ... 255
@@ -13,7 +13,6 @@
 
 #include <stdint.h>
 
-extern const uint16_t fx_circle_table[256];      /* at least 1/4 */
-extern const uint16_t fx_circle_half_table[256]; /* at least 1/2 */
+extern const uint16_t fx_circle_table[256];
 
 #endif

@@ -10,30 +10,27 @@ static double integral(const motor_si_t *motor, double e, double cut)
     return motor->sigma_rad_s * motor->integral_ratio * realisable;
 }
 
-/* What the unit circle leaves beside x, in the stage's 256 steps. */
-static double room(double x, double least)
+/* What the unit circle leaves beside x, in the stage's 256 steps; never less than a quarter. */
+static double room(double x)
 {
     const double end = (fmin(floor(fabs(x) * 256.0), 255.0) + 1.0) / 256.0;
-    return fmax(sqrt(1.0 - end * end), least);
+    return fmax(sqrt(1.0 - end * end), 0.25);
 }
 
 /* The circle: d first while it takes flux away, what it is short of taken off the q flux that binds it; q first while d
- * asks for flux back, which keeps half of the circle. */
+ * asks for flux back, which keeps 0.7. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
     const twin_dq_t most = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
-    double d = most.d;
-    double q = v.q;
     if (more_flux) {
-        const double share = room(most.q, 0.5);
-        d = twin_clamp(d, -share, share);
-    } else {
-        const double missing = twin_clamp(v.d - most.d, -1.0, 1.0);
-        q += (omega < 0.0) ? -missing : missing;
+        const double left = fmax(room(most.q), 0.7);
+        return (twin_dq_t){u_max * twin_clamp(most.d, -left, left), u_max * most.q};
     }
-    const double left = room(d, 0.25);
-    return (twin_dq_t){u_max * d, u_max * twin_clamp(q, -left, left)};
+    const double left = room(most.d);
+    const double missing = twin_clamp(v.d - most.d, -1.0, 1.0);
+    const double q = v.q + ((omega < 0.0) ? -missing : missing);
+    return (twin_dq_t){u_max * most.d, u_max * twin_clamp(q, -left, left)};
 }
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)

@@ -58,9 +58,9 @@ def atan_table() -> list[tuple[int, int]]:
     return [(angle[i] % 2**32, round((angle[i + 1] - angle[i]) / 512.0)) for i in range(257)]
 
 
-def circle_table(least: int) -> list[int]:
-    """What the unit circle leaves beside a leg of up to (i + 1)/256, q15 (FX-32)."""
-    return [max(math.floor(math.sqrt(1.0 - ((i + 1) / 256.0) ** 2) * 2.0**15), least) for i in range(256)]
+def circle_table() -> list[int]:
+    """What the unit circle leaves beside a leg of up to (i + 1)/256, q15, at least a quarter (FX-32)."""
+    return [max(math.floor(math.sqrt(1.0 - ((i + 1) / 256.0) ** 2) * 2.0**15), 2**13) for i in range(256)]
 
 
 def _rows(items: Iterable[str], per_line: int) -> str:
@@ -83,10 +83,9 @@ def sources() -> dict[str, str]:
     sine = _rows((f"{{{s}, {c}}}" for s, c in sine_table()), 4)
     arc = _rows((f"{{{b}U, {s}U}}" for b, s in atan_table()), 4)
     root = _rows((f"{{{b}, {s}}}" for b, s in rsqrt_table()), 3)
-    circle = [_rows((str(v) for v in circle_table(least)), 12) for least in (1 << 13, 1 << 14)]
+    circle = _rows((str(v) for v in circle_table()), 12)
     return {
-        "circle_table.c": _source("fx/circle.h", "const uint16_t fx_circle_table[256]", circle[0]),
-        "circle_half_table.c": _source("fx/circle.h", "const uint16_t fx_circle_half_table[256]", circle[1]),
+        "circle_table.c": _source("fx/circle.h", "const uint16_t fx_circle_table[256]", circle),
         "sin_table.c": _source("fx/trig.h", "const fx_point_t fx_sin_table[512]", sine),
         "atan_table.c": _source("fx/trig.h", "const fx_atan_cell_t fx_atan_table[257]", arc),
         "sqrt_table.c": _source("fx/sqrt.h", "const fx_rsqrt_cell_t fx_rsqrt_table[192]", root),
