@@ -301,6 +301,26 @@ void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
     TEST_ASSERT_INT_WITHIN(1, -v_max(), of_v(1));
 }
 
+/* Between the circle that is clear and the whole one, in all directions: nothing is cut, and nothing is said to be. */
+void test_inside_the_circle_nothing_is_cut_whatever_the_direction_of_rotation(void)
+{
+    uint64_t seed = 55;
+    int seen = 0;
+    for (int n = 0; n < 100000; n++) {
+        const double phi = random_in(&seed, 0, 65535) * (2.0 * 3.14159265358979323846 / 65536.0);
+        const double length = random_in(&seed, 880, 985) * 1e-3 * v_max();
+        state = (current_control_state_t){(int32_t)(length * cos(phi)) * 32768, (int32_t)(length * sin(phi)) * 32768};
+        const current_control_state_t before = state;
+        in.omega = (n & 1) ? -1 : 1;
+        (void)step();
+        TEST_ASSERT_FALSE(limited);
+        TEST_ASSERT_EQUAL_INT32(before.s_d_q30, state.s_d_q30);
+        TEST_ASSERT_EQUAL_INT32(before.s_q_q30, state.s_q_q30);
+        seen += out.clear ? 0 : 1;
+    }
+    TEST_ASSERT_GREATER_THAN_INT(80000, seen);
+}
+
 /* All of u_d may go to the axis that asks for flux back, and that is not yet a limit. */
 void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
 {
