@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "app/drive.h"
 #include "app/hand_over.h"
+#include "app/take_sample.h"
 #include "control/transform.h"
-#include "hal/adc.h"
-#include "hal/angle.h"
 #include "hal/pwm.h"
 
 #define DUTY_MIDDLE 16384
@@ -15,44 +14,6 @@ typedef struct {
     int32_t v_dc;
     q31_t omega;
 } instant_t;
-
-/* What the first half of a period hands to the second besides the sample. */
-typedef struct {
-    int32_t step; /* electrical advance per period */
-    int32_t v_dc;
-    bool calm;    /* nothing to look at closely */
-} seen_t;
-
-/* What the angle sensor is known to be wrong by, where it stands. */
-static uint32_t correction(const drive_t *drive, uint32_t theta_m)
-{
-    const volatile int32_t *parts = drive->task.angle_correction;
-    __asm__("" : "+r"(parts)); /* the address once: not part of every index */
-    return (uint32_t)parts[theta_m >> ANGLE_HARMONICS_SHIFT];
-}
-
-static seen_t observe(drive_t *drive, sample_t *sample)
-{
-    adc_counts_t counts;
-    hal_adc_read(&counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &counts);
-    const fx_pair_t i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
-    sample->i_ab = i_ab;
-    sample->zero_q28 = measured.zero_q28;
-    const uint32_t read = hal_angle_read();
-    const uint32_t theta_m = read + correction(drive, read);
-    sample->v_dc = measured.v_dc;
-    sample->theta_m = theta_m;
-    const angle_t angle = angle_tracker_step(&drive->motor.angle_tracker, &drive->fast.angle_tracker, theta_m);
-    sample->mrai.omega = angle.omega_q31;
-    sample->theta_e = angle.theta_e;
-    if (__builtin_expect(angle.jumped, 0)) {
-        monitor_note_jump(&drive->fast.monitor);
-        return (seen_t){angle.step, measured.v_dc, false};
-    }
-    return (seen_t){angle.step, measured.v_dc,
-                    monitor_quiet(&drive->motor.monitor, i_ab, measured.zero_q28, measured.v_dc)};
-}
 
 /* The safe state: low sides closed, or all gates open. */
 static void bridge_off(drive_t *drive, sample_t *sample, safe_t safe)
@@ -204,18 +165,32 @@ static __attribute__((noinline, cold)) void carefully(drive_t *drive, sample_t *
     hand_over(drive, sample, drive->samples.generation + (sample == &fast->lost ? 0U : 1U));
 }
 
+/* The bridge does not run or has just begun to, a fault is latched, something is being counted, or the identification
+ * is late. */
+static __attribute__((noinline, cold)) void unsettled(drive_t *drive)
+{
+    const uint32_t published = drive->samples.generation;
+    const uint32_t unfinished = published - drive->slow.finished;
+    sample_t *sample = sample_box_begin(&drive->samples, published + 1U);
+    if (unfinished != 0U && hand_over_late(drive, unfinished)) {
+        sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
+    }
+    const seen_t seen = take_sample(drive, sample, false);
+    carefully(drive, sample, seen.step);
+}
+
 /* Everything the usual period needs is compiled into the one interrupt, with a compiler that sees all files. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
     const uint32_t published = drive->samples.generation;
-    const uint32_t unfinished = published - drive->slow.finished;
-    sample_t *sample = sample_box_begin(&drive->samples, published + 1U);
-    if (__builtin_expect(unfinished != 0U, 0) && hand_over_late(drive, unfinished)) {
-        sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
+    if (__builtin_expect(published != drive->slow.finished || !(drive->fast.settled & command->run), 0)) {
+        unsettled(drive);
+        return;
     }
-    const seen_t seen = observe(drive, sample);
-    if (__builtin_expect(!seen.calm || !(drive->fast.settled & command->run), 0)) {
+    sample_t *sample = sample_box_begin(&drive->samples, published + 1U);
+    const seen_t seen = take_sample(drive, sample, true);
+    if (__builtin_expect(!seen.calm, 0)) {
         carefully(drive, sample, seen.step);
         return;
     }

@@ -15,8 +15,7 @@ static angle_t result(int32_t pu_to_turn, uint32_t theta_e, int32_t omega_q30, b
 
 /* The first two samples set angle and speed directly, so that start-up at speed slips no cycle: the second one's
  * error from the prediction, which is the first one, is the advance. */
-static __attribute__((noinline, cold)) void start(const angle_tracker_config_t *config, angle_tracker_state_t *state,
-                                                  uint32_t theta_e)
+static void start(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e)
 {
     const int32_t advance = (state->samples == 1) ? (int32_t)(theta_e - state->predicted) : 0;
     state->omega_q30 = fx_mul_gain_q31(config->turn_to_pu, advance) >> 1;
@@ -24,13 +23,20 @@ static __attribute__((noinline, cold)) void start(const angle_tracker_config_t *
     state->samples++;
 }
 
-angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
+__attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                                 uint32_t theta_m)
+{
+    if (state->samples >= 2) {
+        return angle_tracker_follow(config, state, theta_m);
+    }
+    const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
+    start(config, state, theta_e);
+    return result(config->pu_to_turn, theta_e, state->omega_q30, false);
+}
+
+angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
-    if (state->samples < 2) {
-        start(config, state, theta_e);
-        return result(config->pu_to_turn, theta_e, state->omega_q30, false);
-    }
     int32_t before = (int32_t)state->predicted;
     int32_t omega_before = state->omega_q30;
     fx_arch_together(&before, &omega_before);

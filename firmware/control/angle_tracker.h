@@ -38,6 +38,8 @@ typedef struct {
     bool jumped;
 } angle_t;
 
+/** Any sample; once it has had two, angle_tracker_follow() does the same. */
 angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
+angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
 
 #endif

@@ -75,7 +75,7 @@ def sources(folder: Path) -> list[Path]:
     build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
     firmware = [path for layer in ("fx", "signal", "control", "safety") for path in (FIRMWARE / layer).glob("*.c")]
     app = ("commissioning", "drive", "fast_isr", "hand_over", "identification", "mrai_isr", "slow_monitors",
-           "task_1khz")  # fmt: skip
+           "take_sample", "task_1khz")  # fmt: skip
     firmware += [FIRMWARE / "app" / f"{name}.c" for name in app]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
 

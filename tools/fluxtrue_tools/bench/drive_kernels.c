@@ -226,7 +226,7 @@ STAGE void bench_current_tick(void)
     drive_t *d = the_copy();
     const motor_t *m = &d->motor;
     const measure_t measured = measure_step(&m->measure, &port.counts);
-    const angle_t angle = angle_tracker_step(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
+    const angle_t angle = angle_tracker_follow(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
     const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
     const fx_pair_t i_dq = fx_arch_pkhbt(i.d, i.q);
     const fx_pair_t advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1));
@@ -268,7 +268,7 @@ STAGE void bench_measure(void)
 STAGE void bench_angle_tracker(void)
 {
     drive_t *d = the_copy();
-    found.theta_e = angle_tracker_step(&d->motor.angle_tracker, &d->fast.angle_tracker, port.theta_m).theta_e;
+    found.theta_e = angle_tracker_follow(&d->motor.angle_tracker, &d->fast.angle_tracker, port.theta_m).theta_e;
 }
 
 STAGE void bench_current_control(void)
