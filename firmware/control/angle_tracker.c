@@ -37,20 +37,16 @@ __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *c
 angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
-    int32_t before = (int32_t)state->predicted;
-    int32_t omega_before = state->omega_q30;
-    fx_arch_together(&before, &omega_before);
-    const uint32_t predicted = (uint32_t)before;
+    const fx_arch_two_t before = fx_arch_load_two((const int32_t *)&state->predicted);
+    const uint32_t predicted = (uint32_t)before.first;
     const int32_t error = (int32_t)(theta_e - predicted);
-    int32_t ki_q29 = config->ki_q29;
-    int32_t pu_to_turn = config->pu_to_turn;
-    fx_arch_together(&ki_q29, &pu_to_turn);
+    const fx_arch_two_t gains = fx_arch_load_two(&config->kp); /* and ki_q29 */
     /* Turns in Q32 * Q29 = Q29, counted twice. */
-    const int32_t omega_q30 = fx_add2_q31(omega_before, fx_mulhi(ki_q29, error));
+    const int32_t omega_q30 = fx_add2_q31(before.second, fx_mulhi(gains.second, error));
     const bool jumped = (uint32_t)error + config->max_step > 2U * config->max_step;
-    const angle_t angle = result(pu_to_turn, theta_e, omega_q30, jumped);
+    const angle_t angle = result(config->pu_to_turn, theta_e, omega_q30, jumped);
     /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
-    state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(config->kp, error);
+    state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(gains.first, error);
     state->omega_q30 = omega_q30;
     return angle;
 }

@@ -3,10 +3,11 @@
 
 static void add(dq_t *sum, dq_t x)
 {
-    dq_t s = *sum;
-    fx_arch_together(&s.d, &s.q);
-    sum->d = s.d + x.d;
-    sum->q = s.q + x.q;
+    const fx_arch_two_t s = fx_arch_load_two(&sum->d);
+    int32_t d = s.first + x.d;
+    int32_t q = s.second + x.q;
+    fx_arch_together(&d, &q);
+    *sum = (dq_t){d, q};
 }
 
 static identify_pair_t half(int32_t d, int32_t q)

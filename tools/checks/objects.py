@@ -31,7 +31,7 @@ DIVISIONS = {
     "dead_time_trim.c": 1,  # 1 kHz: by the measured dc voltage
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
-TASK_LAYERS = {"comm": re.compile(r"^e2e\.c"), "app": re.compile(r"_isr\.c")}
+TASK_LAYERS = {"comm": re.compile(r"^e2e\.c"), "app": re.compile(r"(_isr|hand_over|take_sample)\.c")}
 
 MUTABLE = re.compile(r"^(\.data(?!\.rel\.ro)|\.bss|\.tdata|\.tbss|\*COM\*)")
 SYMBOL = re.compile(r"^[0-9a-f]+ .{7} (\S+)\t([0-9a-f]+)\s+(\S+)$")
