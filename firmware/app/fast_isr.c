@@ -118,23 +118,18 @@ static void look(drive_t *drive, const sample_t *sample, bool run)
     }
 }
 
-/* From the sample each time: held in registers it would be put aside on the stack, too. */
-static dq_t current(const sample_t *sample)
-{
-    const fx_arch_two_t i = fx_arch_load_two(&sample->mrai.i.d);
-    return (dq_t){i.first, i.second};
-}
-
 /* The frame of the rotor, the tables, and what current control works with. */
 static instant_t turn(drive_t *drive, sample_t *sample, const seen_t *seen)
 {
-    sample->mrai.i = park_pair(sample->i_ab, fx_rotation(sample->theta_e));
+    const dq_t measured = park_pair(sample->i_ab, fx_rotation(sample->theta_e));
+    sample->mrai.i = measured;
     /* The middle of the period in which the duties will act: 1.5 periods ahead. */
     const uint32_t ahead = (uint32_t)seen->step + (uint32_t)(seen->step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
-    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, current(sample));
-    const dq_t i = current(sample);
-    return (instant_t){fx_arch_pkhbt(i.d, i.q), advanced, seen->v_dc, sample->mrai.omega};
+    sample->mrai.flux = flux_table_step(&drive->motor.flux_table, measured);
+    /* From the sample again: held in registers it would be put aside on the stack, too. */
+    const fx_arch_two_t i = fx_arch_load_two(&sample->mrai.i.d);
+    return (instant_t){fx_arch_pkhbt(i.first, i.second), advanced, seen->v_dc, sample->mrai.omega};
 }
 
 /* A period in which something is not as it should be, was not a moment ago, or in which the bridge does not run. */

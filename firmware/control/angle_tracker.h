@@ -21,8 +21,8 @@ typedef struct {
     q31_t kp;
     int32_t ki_q29;        /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
     int32_t pu_to_turn;    /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
-    q16_t turn_to_pu;      /* the way back, pi/(omega_b T_s): for the first samples only */
     uint32_t max_step;     /* largest credible |e| in one period, 2^32 = one turn */
+    q16_t turn_to_pu;      /* the way back to pu_to_turn, pi/(omega_b T_s): for the first samples only */
 } angle_tracker_config_t;
 
 typedef struct {
