@@ -53,8 +53,11 @@ def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_c
     assert all(cost == 3 * instructions for _, instructions, cost in stand.take())
     start(stand, 1, 1)
     stand.loop.run(50)
-    # A handler returns, and most call: some instructions, and never all, are not followed by their neighbour.
-    outside = [(name, count, cost) for name, count, cost in stand.take() if not count + 1 <= cost < 1.5 * count]
+    # Most handlers jump or call: some instructions, and never all, are not followed by their neighbour. The paper's law
+    # runs straight through as a rule.
+    spans = list(stand.take())
+    least = {name: 0 if name == image.MRAI else 1 for name in VECTORS}
+    outside = [(name, count, cost) for name, count, cost in spans if not count + least[name] <= cost < 1.5 * count]
     assert outside == []
 
 
