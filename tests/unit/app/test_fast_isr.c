@@ -129,6 +129,21 @@ void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_s
     shorted(true);
 }
 
+/* Two samples in a row: the good one between them, which alone would be the usual period, must count as well. */
+void test_single_samples_of_over_voltage_with_good_ones_between_are_no_fault(void)
+{
+    seam_run();
+    seam_periods(5);
+    for (int n = 0; n < 4; n++) {
+        seam_voltage(450.0);
+        seam_period();
+        TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+        seam_voltage(350.0);
+        seam_period();
+    }
+    TEST_ASSERT_TRUE(published()->acting);
+}
+
 void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
 {
     seam_run();

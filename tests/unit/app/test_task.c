@@ -128,6 +128,8 @@ void test_every_part_of_the_motor_data_is_checked(void)
     BAD(m.modulate.knee_q17 = 0);
     BAD(m.modulate.knee_side_q17 = 1 << 30);
     BAD(m.monitor.zero_max = 0);
+    BAD(m.monitor.quiet_q30 = m.monitor.i_trip * m.monitor.i_trip); /* nothing left for the zero sequence */
+    BAD(m.monitor.quiet_q30 = -1);
     BAD(m.monitor.sum_max = 3 * m.monitor.zero_max - 1);
     BAD(m.current_control.sigma_q24 = 0);
     BAD(m.current_control.clear_q30 = UINT32_MAX);
