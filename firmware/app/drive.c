@@ -6,7 +6,7 @@
 static bool modulate_valid(const modulate_config_t *c)
 {
     return c->longest_q31 > Q31(0.25) && c->longest_q31 <= c->nearer_rail_q31 && c->nearer_rail_q31 <= Q31(0.5) &&
-           c->dead_time_q16 >= 0 && c->knee_q17 > 0 &&
+           c->dead_time_q16 >= 0 && c->dead_time_q16 < Q16(0.2) && c->knee_q17 > 0 &&
            c->knee_q17 < (1 << 30) && c->knee_side_q17 > 0 && c->knee_side_q17 < (1 << 30);
 }
 

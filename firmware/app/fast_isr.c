@@ -141,9 +141,6 @@ static __attribute__((noinline, cold)) void carefully(drive_t *drive, sample_t *
     if (drive->samples.generation == drive->slow.finished) {
         fast->overruns_in_a_row = 0;
     }
-    if (!command->run) {
-        forget_faults(drive, command->fault_resets);
-    }
     look(drive, sample, command->run);
     const instant_t now = turn(drive, sample, &seen);
     if (command->run && fast->faults == 0) {
@@ -164,9 +161,13 @@ static __attribute__((noinline, cold)) void carefully(drive_t *drive, sample_t *
  * is late. */
 static __attribute__((noinline, cold)) void unsettled(drive_t *drive)
 {
+    const command_t *command = command_box_read(&drive->commands);
     const uint32_t published = drive->samples.generation;
     const uint32_t unfinished = published - drive->slow.finished;
     sample_t *sample = sample_box_begin(&drive->samples, published + 1U);
+    if (!command->run) {
+        forget_faults(drive, command->fault_resets);
+    }
     if (unfinished != 0U && hand_over_late(drive, unfinished)) {
         sample = &drive->fast.lost; /* the identification still reads the slot whose turn it is */
     }
