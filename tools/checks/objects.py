@@ -28,6 +28,7 @@ DIVISIONS = {
     "e2e.c": 2,  # 1 kHz: the counter's turn
     "identify_filter.c": 1,  # 100 Hz and axis
     "identify_model.c": 2,  # 1 kHz: torque of the period
+    "torque_estimate.c": 1,  # 1 kHz: the mean over the periods since
     "dead_time_trim.c": 1,  # 1 kHz: by the measured dc voltage
 }
 # Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
