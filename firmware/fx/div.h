@@ -9,7 +9,7 @@
  * Range    every argument; quotients outside the format saturate
  * Rounding to nearest, 1/2 LSB: no quotient lies halfway (FX-12); fx_div_s32 truncates as C does
  * Errors   none: saturation is the defined result
- * Context  any; one hardware divide (2 to 12 cycles): 9 to 12 instructions; fx_div_q31: two, 51 */
+ * Context  any; one hardware divide (2 to 12 cycles): 9 to 13 instructions; fx_div_q31: two, 72 */
 
 #include "fx/q.h"
 

@@ -11,7 +11,7 @@
  * Rounding half up, 1/2 LSB of the result; fx_mul_q31_q15 and fx_mac_q31_q15 truncate towards minus
  *          infinity (bias 1/2 LSB of Q30): never feed an integrator with them
  * Errors   none
- * Context  any; 1 to 3 instructions, fx_mul_q31 8, fx_mul_gain_q31 10 */
+ * Context  any; 1 to 3 instructions, fx_mul_q31 9, fx_mul_gain_q31 11 */
 
 #include "fx/format.h"
 

@@ -8,7 +8,7 @@
  * Range    every argument; negative q31 gives 0, q30 of 1 and more gives Q15_MAX
  * Rounding below 1 LSB of the result: 0.69 (q30), 0.87 (q31)
  * Errors   none
- * Context  any; 21 (q30) and 29 (q31) instructions as a call, no division, no loop */
+ * Context  any; 21 (q30) and 30 (q31) instructions as a call, no division, no loop */
 
 #include "fx/q.h"
 

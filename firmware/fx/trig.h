@@ -11,7 +11,7 @@
  * Rounding sin, cos: 3.2e-5 of full scale (32768), peaks at +1 saturate to 32767
  *          atan2: 2.1e-5 rad, of the angle of the integer pair, for every pair but (0, 0)
  * Errors   none
- * Context  any; 15 (sincos), 18 (atan2) instructions as a call; atan2 has one divide */
+ * Context  any; 12 (sincos), 20 (atan2) instructions as a call; atan2 has one divide */
 
 #include <stdbool.h>
 

@@ -8,7 +8,7 @@
  * Range    every argument; lengths of 1 and more saturate to Q15_MAX
  * Rounding 0.69 LSB
  * Errors   none
- * Context  any; 23 instructions as a call */
+ * Context  any; 24 instructions as a call */
 
 #include "fx/q.h"
 
