@@ -52,17 +52,17 @@ static rx_result_t check(uint16_t data_id, rx_channel_t *channel, const can_fram
 
 static bool take_command(can_rx_t *rx, const can_frame_t *frame)
 {
-    struct bus_vcu_torque_command_t m;
-    if (bus_vcu_torque_command_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_command_in_range(&m)) {
+    struct bus_vcu_torque_request_t m;
+    if (bus_vcu_torque_request_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_request_in_range(&m)) {
         return false;
     }
     rx->command = (bus_command_t){
         .enable = m.enable != 0U,
         .fault_reset = m.fault_reset != 0U,
         .mode = (command_mode_t)m.mode,
-        .torque_Nm = bus_vcu_torque_command_torque_request_decode(m.torque_request),
-        .limit_drive_Nm = bus_vcu_torque_command_torque_limit_drive_decode(m.torque_limit_drive),
-        .limit_regen_Nm = bus_vcu_torque_command_torque_limit_regen_decode(m.torque_limit_regen),
+        .torque_requested_Nm = bus_vcu_torque_request_torque_requested_decode(m.torque_requested),
+        .limit_drive_Nm = bus_vcu_torque_request_torque_limit_drive_decode(m.torque_limit_drive),
+        .limit_regen_Nm = bus_vcu_torque_request_torque_limit_regen_decode(m.torque_limit_regen),
     };
     rx->accepted++;
     return true;
@@ -94,7 +94,7 @@ static unsigned ones(unsigned bits)
 static void record(rx_channel_t *channel, rx_result_t result)
 {
     if (result == RX_ACCEPTED) {
-        channel->age_ms = 0;
+        channel->age_us = 0;
         channel->alive = true;
         channel->seen = true;
     }
@@ -107,7 +107,7 @@ static void record(rx_channel_t *channel, rx_result_t result)
 
 static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
 {
-    const bool is_command = frame->id == BUS_VCU_TORQUE_COMMAND_FRAME_ID;
+    const bool is_command = frame->id == BUS_VCU_TORQUE_REQUEST_FRAME_ID;
     if (!is_command && frame->id != BUS_VCU_BATTERY_LIMITS_FRAME_ID) {
         return RX_IGNORED;
     }
@@ -117,7 +117,7 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
     rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
     const uint8_t before = channel->e2e.counter;
     rx_result_t result =
-        check(is_command ? BUS_VCU_TORQUE_COMMAND_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel, frame);
+        check(is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel, frame);
     if (result == RX_ACCEPTED) {
         const bool taken = is_command ? take_command(rx, frame) : take_limits(rx, frame);
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;
@@ -137,14 +137,14 @@ rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame)
     return result;
 }
 
-/* True in the millisecond in which the message times out. */
-static bool grow_old(rx_channel_t *channel, uint16_t time_out_ms)
+/* True in the step in which the message times out. */
+static bool grow_old(rx_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_ms)
 {
     if (!channel->alive) {
         return false;
     }
-    channel->age_ms++;
-    if (channel->age_ms < time_out_ms) {
+    channel->age_us += elapsed_us;
+    if (channel->age_us < time_out_ms * 1000U) {
         return false;
     }
     channel->alive = false;
@@ -152,13 +152,13 @@ static bool grow_old(rx_channel_t *channel, uint16_t time_out_ms)
     return true;
 }
 
-void can_rx_tick(can_rx_t *rx)
+void can_rx_tick(can_rx_t *rx, uint32_t elapsed_us)
 {
-    if (grow_old(&rx->command_channel, BUS_VCU_TORQUE_COMMAND_TIME_OUT_MS)) {
+    if (grow_old(&rx->command_channel, elapsed_us, BUS_VCU_TORQUE_REQUEST_TIME_OUT_MS)) {
         rx->command = (bus_command_t){.mode = rx->command.mode};
         count(&rx->time_outs);
     }
-    if (grow_old(&rx->limits_channel, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
+    if (grow_old(&rx->limits_channel, elapsed_us, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
         rx->limits = (bus_power_limits_t){0};
     }
 }

@@ -10,7 +10,7 @@
  * Units    SI, as the DBC says
  * Range    accepted values lie within the DBC's ranges
  * Errors   one counter per kind of violation, saturating; a refused frame changes nothing else
- * Context  1 kHz task: can_rx_frame() for each frame, then can_rx_tick() once */
+ * Context  1 kHz task: can_rx_frame() for each frame, then can_rx_tick() once with the time since the last one */
 #include "comm/e2e.h"
 
 typedef enum { COMMAND_MODE_OFF = 0, COMMAND_MODE_TORQUE = 1, COMMAND_MODE_CURRENT = 2 } command_mode_t;
@@ -19,7 +19,7 @@ typedef struct {
     bool enable;
     bool fault_reset;
     command_mode_t mode;
-    float torque_Nm;
+    float torque_requested_Nm;
     float limit_drive_Nm, limit_regen_Nm; /* magnitudes */
 } bus_command_t;
 
@@ -43,7 +43,7 @@ typedef enum {
 /** One protected message. */
 typedef struct {
     e2e_state_t e2e;
-    uint16_t age_ms;
+    uint32_t age_us;
     uint16_t bad; /* the last ten frames, one bit each */
     bool alive;
     bool failed;
@@ -61,6 +61,6 @@ typedef struct {
 } can_rx_t;
 
 rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame);
-void can_rx_tick(can_rx_t *rx);
+void can_rx_tick(can_rx_t *rx, uint32_t elapsed_us);
 
 #endif

@@ -19,9 +19,10 @@ static const tx_message_t messages[] = {
 
 #define MESSAGES (sizeof messages / sizeof messages[0])
 
-void can_tx_begin(can_tx_t *tx)
+void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
 {
-    tx->time_ms++;
+    tx->time_ms += passed_ms;
+    tx->passed_ms = (uint8_t)passed_ms;
     tx->next = 0;
 }
 
@@ -29,7 +30,8 @@ void can_tx_begin(can_tx_t *tx)
  * meet at most. */
 static bool is_due(const can_tx_t *tx, unsigned index)
 {
-    return tx->time_ms % messages[index].cycle_ms == index % messages[index].cycle_ms;
+    const uint32_t cycle_ms = messages[index].cycle_ms;
+    return (tx->time_ms + cycle_ms - index % cycle_ms) % cycle_ms < tx->passed_ms; /* so long ago */
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)

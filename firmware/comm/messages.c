@@ -2,14 +2,14 @@
 #include "comm/messages.h"
 
 #include "bus/signals.h"
-#include "comm/version.h"
+#include "types/version.h"
 
 bool message_inv_status(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_status_t m = {0};
     bus_inv_status_put_state(&m, t->state);
-    const bool finite = bus_inv_status_put_torque_estimate(&m, t->torque_estimate_Nm) &&
-        bus_inv_status_put_torque_command(&m, t->torque_command_Nm) &&
+    const bool finite = bus_inv_status_put_torque_estimated(&m, t->torque_estimated_Nm) &&
+        bus_inv_status_put_torque_commanded(&m, t->torque_commanded_Nm) &&
         bus_inv_status_put_speed(&m, t->speed_rpm);
     return finite && bus_inv_status_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
@@ -114,9 +114,9 @@ bool message_inv_diag_task(const telemetry_t *t, uint8_t *data)
 bool message_inv_version(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_version_t m = {0};
-    bus_inv_version_put_major(&m, FLUXTRUE_MAJOR);
-    bus_inv_version_put_minor(&m, FLUXTRUE_MINOR);
-    bus_inv_version_put_patch(&m, FLUXTRUE_PATCH);
+    bus_inv_version_put_major(&m, FLUXTRUE_VERSION_MAJOR);
+    bus_inv_version_put_minor(&m, FLUXTRUE_VERSION_MINOR);
+    bus_inv_version_put_patch(&m, FLUXTRUE_VERSION_PATCH);
     bus_inv_version_put_interface(&m, INTERFACE_VERSION);
     bus_inv_version_put_motor_id(&m, t->motor_id);
     return bus_inv_version_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;

@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #define MESSAGE_LENGTH 8U
+#define INTERFACE_VERSION 2U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
 
 typedef struct {
     uint32_t crc_errors, repeated, jumps, length_errors, range_errors, id_errors, time_outs, accepted, skipped;
@@ -21,7 +22,7 @@ typedef struct {
 
 typedef struct {
     uint32_t state;
-    float torque_estimate_Nm, torque_command_Nm, torque_max_Nm, speed_rpm;
+    float torque_estimated_Nm, torque_commanded_Nm, torque_max_Nm, speed_rpm;
     float v_dc_V, i_dc_A;
     uint32_t derating_reason, refused_reason, refused_count;
     float id_A, iq_A, id_ref_A, iq_ref_A;

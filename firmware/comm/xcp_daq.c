@@ -5,8 +5,7 @@
 
 void xcp_daq_reset(xcp_daq_t *daq)
 {
-    const uint16_t now = daq->now_ms;
-    *daq = (xcp_daq_t){.now_ms = now};
+    *daq = (xcp_daq_t){.now_ms = daq->now_ms, .step_10us = daq->step_10us};
 }
 
 bool xcp_daq_running(const xcp_daq_t *daq)
@@ -64,9 +63,9 @@ static void sample_list(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_li
     }
 }
 
-static bool due(xcp_list_t *list, uint16_t now_ms)
+static bool due(xcp_list_t *list, bool tenth)
 {
-    if (!list->running || (list->event == 1 && now_ms % XCP_DAQ_TENTH != 0)) {
+    if (!list->running || (list->event == 1 && !tenth)) {
         return false;
     }
     if (list->countdown > 0) {
@@ -77,11 +76,12 @@ static bool due(xcp_list_t *list, uint16_t now_ms)
     return true;
 }
 
-void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory)
+void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory, uint32_t passed_ms)
 {
-    daq->now_ms++;
+    daq->now_ms = (uint16_t)(daq->now_ms + passed_ms);
+    const bool tenth = daq->now_ms % XCP_DAQ_TENTH < passed_ms;
     for (uint8_t k = 0; k < daq->lists; k++) {
-        if (due(&daq->list[k], daq->now_ms)) {
+        if (due(&daq->list[k], tenth)) {
             sample_list(daq, memory, &daq->list[k]);
         }
     }

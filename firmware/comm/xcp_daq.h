@@ -5,7 +5,8 @@
  *   An event samples every running list that is due, all of it or none: a list that does not fit into the send queue is
  *   dropped whole, counted, and announced by the protocol's overload event.
  * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
- * Units    time stamps of 1 ms, 16 bits, in the first frame of a list
+ *   Event 0 comes in each step of the 1 kHz task, event 1 in the step in which a multiple of 10 ms has passed.
+ * Units    time stamps of 1 ms of true time, 16 bits, in the first frame of a list
  * Range    sizes below; absolute ODT numbers as packet identifiers
  * Errors   the protocol's codes
  * Context  1 kHz task: commands between, xcp_daq_event() after the drive's step, so that one raster is one instant */
@@ -23,7 +24,7 @@
 #define XCP_DAQ_ODTS 24
 #define XCP_DAQ_ENTRIES 72
 #define XCP_DAQ_QUEUE 32 /* frames; a power of two */
-#define XCP_DAQ_EVENTS 2 /* 0: each millisecond, 1: each tenth */
+#define XCP_DAQ_EVENTS 2 /* 0: each step, 1: each tenth millisecond */
 
 typedef struct {
     uint32_t address;
@@ -49,6 +50,7 @@ typedef struct {
     uint8_t at_list, at_odt, at_entry;       /* where WRITE_DAQ goes */
     bool pointer_valid;
     uint16_t now_ms;
+    uint8_t step_10us; /* length of a step, rounded: only for the tool */
     can_frame_t queue[XCP_DAQ_QUEUE];
     uint32_t queued, sent;                   /* count up; the difference waits */
     uint32_t overloads;
@@ -60,8 +62,8 @@ bool xcp_daq_running(const xcp_daq_t *daq);
 /** Answers a DAQ command; *length is the answer's, at least 1. */
 xcp_result_t xcp_daq_command(xcp_daq_t *daq, const xcp_memory_t *memory, const uint8_t *command, uint8_t *answer,
                              uint8_t *length);
-/** Once per millisecond. */
-void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory);
+/** Once per step of the task, in which so many milliseconds have passed. */
+void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory, uint32_t passed_ms);
 /** The oldest frame that waits; false: none. */
 bool xcp_daq_next(const xcp_daq_t *daq, can_frame_t *frame);
 /** It has been sent. */

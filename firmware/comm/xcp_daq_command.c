@@ -3,6 +3,8 @@
 
 #define TIMESTAMP_MODE 0x62 /* 2 bytes, unit 1 ms */
 #define EVENT_CYCLE_UNIT_1MS 6
+#define EVENT_CYCLE_UNIT_10US 4
+#define STEP_1MS 100
 
 enum { MODE_TIMESTAMP = 0x10, MODE_SELECTED = 0x01, MODE_RUNNING = 0x40 };
 enum { STOP = 0, START = 1, SELECT = 2 };
@@ -99,6 +101,16 @@ static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
     return XCP_OK;
 }
 
+/* A step of 1 ms is told as such, another one in steps of 10 us. */
+static void describe_event(const xcp_daq_t *daq, uint16_t event, uint8_t *answer)
+{
+    const bool whole = event != 0 || daq->step_10us == STEP_1MS;
+    answer[1] = 0x04; /* measurement */
+    answer[2] = XCP_DAQ_LISTS;
+    answer[4] = (event != 0) ? XCP_DAQ_TENTH : whole ? 1 : daq->step_10us;
+    answer[5] = whole ? EVENT_CYCLE_UNIT_1MS : EVENT_CYCLE_UNIT_10US;
+}
+
 static xcp_result_t describe(const xcp_daq_t *daq, const uint8_t *command, uint8_t *answer, uint8_t *length)
 {
     *length = 8;
@@ -122,10 +134,7 @@ static xcp_result_t describe(const xcp_daq_t *daq, const uint8_t *command, uint8
         if (xcp_get_u16(&command[2]) >= XCP_DAQ_EVENTS) {
             return XCP_ERR_OUT_OF_RANGE;
         }
-        answer[1] = 0x04; /* measurement */
-        answer[2] = XCP_DAQ_LISTS;
-        answer[4] = (xcp_get_u16(&command[2]) == 0) ? 1 : XCP_DAQ_TENTH;
-        answer[5] = EVENT_CYCLE_UNIT_1MS;
+        describe_event(daq, xcp_get_u16(&command[2]), answer);
         *length = 7;
         break;
     }

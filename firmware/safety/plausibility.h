@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_PLAUSIBILITY_H
 #define SAFETY_PLAUSIBILITY_H
-/** Slow monitors: does the machine do what it was told, as far as its sensors tell?
- *   control deviation  |i - i*| > e_0 + |i*|/8 for 20 ms, 100 ms while the voltage is cut
- *   phase lost         a phase without current that should carry some: 10 more such samples than samples with current
- *   sensor stuck       20 equal samples of a phase, both others moved by i_dead/4 in each
+/** Slow monitors: currents, speed and temperatures are compared with the references and with their limits.
+ *   control deviation  |i - i*| > e_0 + |i*|/8 for 20 ms, for 100 ms while the voltage is limited
+ *   phase lost         |i_x| <= i_dead although |i_x*| > i_alive: 10 more such samples than samples with current
+ *   sensor stuck       20 equal samples of a phase while both others change by more than i_dead/4 in each
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
  * Source   docs/theory/monitors.md (MN-1) ... (MN-5)
+ *   Counted are steps of the task, as many as cover these times.
  * Units    per unit; temperatures in tenths of a degree C, INT16_MIN: unknown
  * Range    every argument
- * Errors   returns the set of faults that are confirmed now; latching is app's business
+ * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
  * Context  1 kHz task; one square root per vector length, no division */
 #include <stdbool.h>
 #include <stdint.h>
@@ -19,26 +20,28 @@
 
 typedef struct {
     q15_t e_0;                       /* deviation allowed at no current */
-    q15_t i_dead;                    /* a phase below it carries nothing */
-    q15_t i_alive;                   /* a phase that should carry this much is missed */
+    q15_t i_dead;                    /* a phase current up to this counts as none */
+    q15_t i_alive;                   /* a phase whose reference exceeds this must carry current */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
+    int16_t deviation_steps;         /* 100 ms: a step counts once while the voltage is cut, else five times */
+    uint8_t lost_steps, equal_steps, fast_steps, hot_steps; /* 10, 20, 5, 110 ms */
 } plausibility_config_t;
 
 typedef struct {
     int16_t deviation;
     int8_t lost[3];
     uint8_t equal[3];
-    abc_t last;
+    abc_q15_t last;
     uint8_t fast, hot;
 } plausibility_state_t;
 
 typedef struct {
     bool acting;          /* the bridge follows its references */
     bool voltage_limited;
-    dq_t i, i_ref;        /* the reference that acted until now */
-    abc_t phases;         /* measured */
-    abc_t wanted;         /* i_ref in the phases, at the instant of the samples */
+    dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
+    abc_q15_t phases;     /* measured */
+    abc_q15_t phases_ref; /* i_ref as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;
 } plausibility_in_t;

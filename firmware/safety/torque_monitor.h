@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_TORQUE_MONITOR_H
 #define SAFETY_TORQUE_MONITOR_H
-/** Torque and angle judged from the voltages alone: a path that shares neither tables' torque nor identification with
- * the control, and works without a division.
+/** Monitors torque and angle from the voltages: independent of the tables' torque and of the identification, which the
+ * control uses.
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
  *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2) (|i| + i_0), or against the request
  *           by as much
- *   angle   e = u - r i - j w psi(i): a magnet that is weak or strong shows in e_q, a wrong angle in e_d
+ *   angle   e = u - r i - j w psi(i): e_q shows a magnet that is too weak or too strong, e_d a wrong angle
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
- *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; blind while |w| psi_f/5 < v_0/2
+ *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
  * Source   docs/theory/monitors.md (MN-6) ... (MN-10)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 1 LSB q15, against thresholds of hundreds
- * Errors   returns the set of faults that are confirmed now; latching is app's business
+ * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
  * Context  1 kHz task; no division */
 #include <stdbool.h>
 #include <stdint.h>
@@ -24,21 +24,23 @@
 typedef struct {
     q16_t r;           /* at 20 C */
     q15_t psi_f;
-    q15_t t_0;         /* torque that never counts */
-    q15_t v_0;         /* voltage that the inverter may be wrong by */
-    q15_t i_0;         /* current that noise and the bridge's zero crossing make of nothing */
+    q15_t t_0;         /* torque error allowed at no torque */
+    q15_t v_0;         /* voltage error of the inverter */
+    q15_t i_0;         /* current error of noise and of the current's zero crossings */
     q16_t rate_gain;   /* 1/(omega_b task period): flux step to voltage */
+    q15_t mean_rate;   /* of the first-order mean, per step */
+    uint8_t torque_steps, angle_steps, settle_steps; /* 20, 5, 5 ms */
 } torque_monitor_config_t;
 
 typedef struct {
     q31_t deviation;
-    dq_t psi;          /* of the last step */
+    dq_q15_t psi;          /* of the last step */
     uint8_t torque, angle, settling;
 } torque_monitor_state_t;
 
 typedef struct {
     bool acting;
-    dq_t u, i, psi;    /* acting voltage, current and the tables' flux there */
+    dq_q15_t u, i, psi;    /* acting voltage, current and the tables' flux there */
     q15_t omega;
     q15_t torque;      /* commanded, as the closed loop follows it */
 } torque_monitor_in_t;

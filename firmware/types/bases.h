@@ -4,10 +4,11 @@
 /** The bases that turn SI into per unit; the only place where the drive's scale is written down.
  *   psi_b = V_b/omega_b   Z_b = V_b/I_b   L_b = Z_b/omega_b   T_b = 1.5 p psi_b I_b,
  *   so that torque is psi_d i_q - psi_q i_d with no constant.
- * Source   docs/scaling.md (SC-1) ... (SC-5)
+ * Source   docs/scaling.md (SC-1) ... (SC-5), (SC-10)
  * Units    SI, peak phase quantities, electrical angular frequency
  * Errors   the generator refuses bases that are not finite and positive; a test recomputes the derived ones
  * Context  start-up, configuration and telemetry only: no interrupt converts to SI */
+#include <stdint.h>
 
 typedef struct {
     float voltage_V;    /* V_b, phase peak */
@@ -18,6 +19,8 @@ typedef struct {
     float inductance_H; /* L_b */
     float torque_Nm;    /* T_b */
     float period_s;     /* T_s: one PWM period, one control period */
+    float step_s;       /* T: one step of the 1 kHz task, periods_per_step T_s */
+    uint32_t periods_per_step; /* N: the whole number of periods nearest to 1 ms, 4 ... 40 */
 } bases_t;
 
 #endif

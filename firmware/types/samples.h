@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_SAMPLES_H
 #define TYPES_SAMPLES_H
-/** What crosses the hardware seam every period: converter counts in, duties out.
+/** Values exchanged with the hardware in every period: converter counts in, duties out.
  * Source   docs/architecture.md, the HAL seam
  * Units    counts of an adc_bits converter, right-aligned; duties with 2^15 = 1.0
- * Range    duties 0 ... 32768; everything in a word each: a halfword would cost an extension at every use
+ * Range    duties 0 ... 32768. Each value is a word, because halfwords would have to be zero-extended at every use
  * Context  values only */
 #include <stdint.h>
 

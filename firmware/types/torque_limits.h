@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_TORQUE_LIMITS_H
 #define TYPES_TORQUE_LIMITS_H
-/** What the vehicle allows: magnitudes, driving (torque with the rotation) and generating (against it).
+/** Limits set by the vehicle: magnitudes for driving (torque in the direction of rotation) and generating (against it).
  * Source   docs/theory/limits.md (LM-1)
  * Units    torque per unit of T_b; power, on the dc side, per unit of P_b = 1.5 V_b I_b
- * Range    0 ... Q15_MAX; Q15_MAX does not limit, below 0 counts as 0
+ * Range    0 ... Q15_MAX; Q15_MAX does not limit, negative values count as 0
  * Context  values only */
 #include "fx/q.h"
 

@@ -6,6 +6,7 @@
 
 #include "hal/host/instance.h"
 #include "hal/host/port.h"
+#include "types/version.h"
 
 #define TURN_RAD 6.283185307179586
 #define DUTY_ONE 32768.0
@@ -24,6 +25,11 @@ void fluxtrue_init(fluxtrue_t *instance)
     *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
     nvm_host_erase(&instance->nvm);
     drive_init(&instance->drive, &motor);
+}
+
+const char *fluxtrue_version(void)
+{
+    return firmware_version.text;
 }
 
 fluxtrue_t *fluxtrue_create(void)
@@ -87,7 +93,7 @@ static void run_period(fluxtrue_t *d)
         mrai_isr(&d->drive);
     }
     d->periods++;
-    if (d->periods % TORQUE_ESTIMATE_PERIODS == 0) {
+    if (d->periods % d->drive.motor.bases.periods_per_step == 0U) {
         if (d->on_bus) {
             ecu_task_1khz(&d->ecu);
         } else {
@@ -103,7 +109,8 @@ void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4])
     if (credible(&drive->drive.motor, in)) {
         take_samples(drive, in);
     } else {
-        /* The last good samples stay: filters and observers keep their sense, only the gates open. */
+        /* The last credible samples are used again, so that filters and observers continue; the fault brings the safe
+         * state. */
         drive_raise_fault(&drive->drive, FAULT_INPUT);
     }
     run_period(drive);

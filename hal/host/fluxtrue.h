@@ -24,6 +24,8 @@ enum { FLUXTRUE_MEMORY_SIZE = 4096 };
 
 typedef struct fluxtrue fluxtrue_t;
 
+/** The version of the firmware in this library, "major.minor.patch"; valid as long as the library is loaded. */
+FLUXTRUE_API const char *fluxtrue_version(void);
 /** A new drive with the motor compiled in; NULL when out of memory. */
 FLUXTRUE_API fluxtrue_t *fluxtrue_create(void);
 FLUXTRUE_API void fluxtrue_destroy(fluxtrue_t *drive);

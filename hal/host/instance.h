@@ -7,8 +7,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "app/ecu.h"
-#include "app/memory.h"
+#include "ecu/ecu.h"
+#include "storage/memory.h"
 #include "hal/board.h"
 #include "hal/host/fluxtrue.h"
 #include "hal/host/nvm_host.h"
@@ -47,8 +47,8 @@ struct fluxtrue {
     duty_t duty;
     bool gates;
     bool mrai_pending;
-    uint32_t periods; /* since creation: every tenth runs the 1 kHz task */
-    double torque_command_Nm; /* as set: what get answers before the task has taken it over */
+    uint32_t periods; /* since creation: every periods_per_step-th runs the 1 kHz task */
+    double torque_requested_Nm; /* as set, without a bus */
 };
 
 _Static_assert(offsetof(ecu_t, drive) == 0, "the drive must be where a port without a bus looks for it");

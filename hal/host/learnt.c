@@ -25,13 +25,13 @@ static double value(const fluxtrue_t *d, identify_index_t index, float base)
 double learnt_psi_f_Vs(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
-    return (double)m->psi_f_Vs + pu(d->drive.task.learnt.psi_delta, 2147483648.0, m->bases.flux_Vs);
+    return (double)m->psi_f_Vs + pu(d->drive.task.identification.psi_delta, 2147483648.0, m->bases.flux_Vs);
 }
 
 double learnt_r_ohm(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
-    return (double)m->r_ohm_20 + pu(d->drive.task.learnt.r_delta, 2147483648.0, m->bases.resistance_ohm);
+    return (double)m->r_ohm_20 + pu(d->drive.task.identification.r_delta, 2147483648.0, m->bases.resistance_ohm);
 }
 
 double learnt_drop_V(const fluxtrue_t *d)
@@ -71,12 +71,12 @@ double learnt_confidence(const fluxtrue_t *d)
 
 double learnt_contradiction(const fluxtrue_t *d)
 {
-    return is_robust(d) ? (double)d->drive.task.identify.contradiction / 32768.0 : 0.0;
+    return is_robust(d) ? (double)d->drive.task.identify.mismatch_share / 32768.0 : 0.0;
 }
 
 double learnt_local_Vs(const fluxtrue_t *d)
 {
-    const dq_t local = d->drive.task.identify.local;
+    const dq_q30_t local = d->drive.task.identify.local;
     const double length = hypot((double)local.d, (double)local.q);
     return is_robust(d) ? length / 1073741824.0 * (double)d->drive.motor.bases.flux_Vs : 0.0;
 }

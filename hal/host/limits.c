@@ -3,7 +3,7 @@
 
 #include <math.h>
 
-#include "app/slow_monitors.h"
+#include "drive/slow_monitors.h"
 #include "hal/host/instance.h"
 
 static double torque_base(const fluxtrue_t *d)

@@ -3,11 +3,13 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "app/calibration.h"
+#include "calibration/calibration.h"
+#include "drive/mrai/mrai_seam.h"
 #include "hal/host/commissioned.h"
 #include "hal/host/instance.h"
 #include "hal/host/limits.h"
 #include "hal/host/learnt.h"
+#include "hal/host/stations.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
 typedef void (*set_fn)(fluxtrue_t *, double);
@@ -50,35 +52,31 @@ static const sample_t *sample(const fluxtrue_t *d)
         return (double)(expression); \
     }
 
-GETTER(torque_command, d->torque_command_Nm)
 GETTER(enable, d->drive.request.enable)
 GETTER(torque_loop, d->drive.request.torque_loop)
 GETTER(identification, d->drive.request.identification)
 GETTER(identification_mode, d->drive.request.identification_mode)
 /* 1 until the task has taken it. */
 GETTER(fault_reset, d->drive.request.fault_resets != d->drive.task.fault_resets_asked)
-GETTER(identification_reset, d->drive.request.identification_resets != d->drive.slow.identification_resets)
+GETTER(identification_reset, d->drive.request.identification_resets != d->drive.task.identification_resets)
 GETTER(current_mode, d->drive.request.current_mode)
-GETTER(torque_estimate, pu15(d->drive.task.torque_estimate, bases(d)->torque_Nm))
-GETTER(torque_limited, pu15(d->drive.task.torque_command, bases(d)->torque_Nm))
-GETTER(torque_request, pu15(d->drive.task.torque_request, bases(d)->torque_Nm))
 GETTER(torque_max, pu15(d->drive.task.reference.torque_max, bases(d)->torque_Nm))
 GETTER(derating, d->drive.task.derating)
 GETTER(voltage_trim, pu31(d->drive.task.voltage_reserve.trim, bases(d)->voltage_V))
 GETTER(torque_correction, pu31(d->drive.task.torque_loop.correction, 1.0F))
-GETTER(psi_quality, pu15(d->drive.task.quality.psi_quality, 1.0F))
-GETTER(r_quality, pu15(d->drive.task.quality.r_quality, 1.0F))
-GETTER(psi_clamped, d->drive.task.learnt.psi_clamped)
-GETTER(r_clamped, d->drive.task.learnt.r_clamped)
-GETTER(id, pu15(sample(d)->mrai.i.d, bases(d)->current_A))
-GETTER(iq, pu15(sample(d)->mrai.i.q, bases(d)->current_A))
-GETTER(ud, pu15(d->drive.fast.coming.d, bases(d)->voltage_V))
-GETTER(uq, pu15(d->drive.fast.coming.q, bases(d)->voltage_V))
+GETTER(psi_quality, pu15(d->drive.task.identification.psi_quality, 1.0F))
+GETTER(r_quality, pu15(d->drive.task.identification.r_quality, 1.0F))
+GETTER(psi_clamped, d->drive.task.identification.psi_clamped)
+GETTER(r_clamped, d->drive.task.identification.r_clamped)
+GETTER(id, pu15(sample(d)->point.i.d, bases(d)->current_A))
+GETTER(iq, pu15(sample(d)->point.i.q, bases(d)->current_A))
+GETTER(ud, pu15(d->drive.fast.u_next.d, bases(d)->voltage_V))
+GETTER(uq, pu15(d->drive.fast.u_next.q, bases(d)->voltage_V))
 GETTER(v_dc, pu15(sample(d)->v_dc, bases(d)->voltage_V))
 GETTER(fault_word, d->drive.fast.faults)
 GETTER(voltage_limited, sample(d)->voltage_limited)
-GETTER(table_clamped, flux_table_outside(&d->drive.motor.flux_table, sample(d)->mrai.i))
-GETTER(overruns, d->drive.fast.overruns)
+GETTER(table_clamped, flux_table_outside(&d->drive.motor.flux_table, sample(d)->point.i))
+GETTER(overruns, mrai_overruns(&d->drive))
 GETTER(run_state, d->drive.task.run_state)
 GETTER(winding, d->winding_C)
 GETTER(memory_recalled, d->memory.recalled)
@@ -86,24 +84,18 @@ GETTER(memory_saves, d->memory.saves)
 
 static double get_speed(const fluxtrue_t *d)
 {
-    const double omega_m = pu31(sample(d)->mrai.omega, bases(d)->omega_rad_s) / d->drive.motor.angle_tracker.pole_pairs;
-    return omega_m * 60.0 / 6.283185307179586;
+    const double omega_rad_s = pu31(sample(d)->point.omega, bases(d)->omega_rad_s);
+    return omega_rad_s / d->drive.motor.angle_tracker.pole_pairs * 60.0 / 6.283185307179586;
 }
 
 /* In current mode the command is the request; else it is what the reference stage answered. */
-static dq_t reference_of(const fluxtrue_t *d)
+static dq_q15_t reference_of(const fluxtrue_t *d)
 {
     return d->drive.request.current_mode ? d->drive.request.i_ref : d->drive.task.reference.i_ref;
 }
 
 GETTER(id_ref, pu15(reference_of(d).d, bases(d)->current_A))
 GETTER(iq_ref, pu15(reference_of(d).q, bases(d)->current_A))
-
-static void set_torque(fluxtrue_t *d, double x)
-{
-    d->torque_command_Nm = x;
-    d->drive.request.torque = to_pu15(x, bases(d)->torque_Nm);
-}
 
 static void set_enable(fluxtrue_t *d, double x)
 {
@@ -155,11 +147,11 @@ static void set_identification_reset(fluxtrue_t *d, double x)
 
 /* The range of torque and current is the motor's own: see limits_of(). */
 static const parameter_t parameters[] = {
-    {"torque_command_Nm", get_torque_command, set_torque, -INFINITY, INFINITY},
+    {"torque_requested_Nm", stations_requested_Nm, stations_set_requested_Nm, -INFINITY, INFINITY},
     {"enable", get_enable, set_enable, 0.0, 1.0},
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
-    {"identification_mode", get_identification_mode, set_identification_mode, 0.0, 1.0},
+    {"identification_mode", get_identification_mode, set_identification_mode, FLUXTRUE_MRAI ? 0.0 : 1.0, 1.0},
     {"trim", commissioned_trims, commissioned_set_trim, 0.0, 1.0},
     {"fault_reset", get_fault_reset, set_fault_reset, 0.0, 1.0},
     {"identification_reset", get_identification_reset, set_identification_reset, 0.0, 1.0},
@@ -172,9 +164,11 @@ static const parameter_t parameters[] = {
     {"torque_limit_regen_Nm", limits_get_torque_regen, limits_set_torque_regen, 0.0, 1e9},
     {"power_limit_drive_W", limits_get_power_drive, limits_set_power_drive, 0.0, 1e9},
     {"power_limit_regen_W", limits_get_power_regen, limits_set_power_regen, 0.0, 1e9},
-    {"torque_estimate_Nm", get_torque_estimate, NULL, 0, 0},
-    {"torque_limited_Nm", get_torque_limited, NULL, 0, 0},
-    {"torque_request_Nm", get_torque_request, NULL, 0, 0},
+    {"torque_arbitrated_Nm", stations_arbitrated_Nm, NULL, 0, 0},
+    {"torque_limited_Nm", stations_limited_Nm, NULL, 0, 0},
+    {"torque_commanded_Nm", stations_commanded_Nm, NULL, 0, 0},
+    {"torque_corrected_Nm", stations_corrected_Nm, NULL, 0, 0},
+    {"torque_estimated_Nm", stations_estimated_Nm, NULL, 0, 0},
     {"torque_max_Nm", get_torque_max, NULL, 0, 0},
     {"voltage_trim_V", get_voltage_trim, NULL, 0, 0},
     {"derating", get_derating, NULL, 0, 0},
@@ -218,8 +212,9 @@ static const parameter_t parameters[] = {
 
 #define PARAMETERS ((int)(sizeof parameters / sizeof parameters[0]))
 
-static const parameter_t *find(const char *name)
+static const parameter_t *find(const char *called)
 {
+    const char *name = stations_name(called);
     for (int k = 0; name && k < PARAMETERS; k++) {
         if (strcmp(name, parameters[k].name) == 0) {
             return &parameters[k];
@@ -231,7 +226,7 @@ static const parameter_t *find(const char *name)
 /* Torque and current requests are bounded by what the motor data allow. */
 static double bound_of(const fluxtrue_t *d, const parameter_t *p)
 {
-    if (p->set == set_torque) {
+    if (p->set == stations_set_requested_Nm) {
         return (double)d->drive.motor.torque_max_Nm;
     }
     return pu15(d->drive.motor.current_reference.i_max, bases(d)->current_A);

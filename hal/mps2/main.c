@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the
  * task. */
-#include "app/slow_monitors.h"
+#include "drive/mrai/mrai_seam.h"
+#include "drive/slow_monitors.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -10,8 +11,6 @@
 #include "hal/mps2/semihosting.h"
 #include "hal/pwm.h"
 #include "hal/temperature.h"
-
-#define TASK_PERIODS 10U
 
 static drive_t the_drive;
 static script_t script;
@@ -63,7 +62,7 @@ void systick_handler(void)
     fast_isr(&the_drive);
     script_note(&script, duties, gates);
     done = done + 1U;
-    if (done % TASK_PERIODS == 0U) {
+    if (done % the_drive.motor.bases.periods_per_step == 0U) {
         NVIC_ISPR0 = 1U << IRQ_TASK;
     }
 }
@@ -101,8 +100,8 @@ __attribute__((noinline)) int main(void)
     semihosting_print_word("high", script.high);
     semihosting_print_word("differing", script.differing);
     semihosting_print_word("faults", the_drive.fast.faults);
-    semihosting_print_word("overruns", the_drive.fast.overruns);
-    semihosting_print_word("psi_delta", (uint32_t)the_drive.task.learnt.psi_delta);
-    semihosting_print_word("r_delta", (uint32_t)the_drive.task.learnt.r_delta);
+    semihosting_print_word("overruns", mrai_overruns(&the_drive));
+    semihosting_print_word("psi_delta", (uint32_t)the_drive.task.identification.psi_delta);
+    semihosting_print_word("r_delta", (uint32_t)the_drive.task.identification.r_delta);
     return 0;
 }

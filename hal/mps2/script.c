@@ -43,7 +43,7 @@ void script_request(const script_t *script, request_t *request)
 {
     static const int16_t level[4] = {4000, -9000, 13000, -2500};
     request->enable = script->period >= ENABLE_AT;
-    request->torque = level[(script->period / LEVEL_PERIODS) % 4U];
+    request->torque_arbitrated = level[(script->period / LEVEL_PERIODS) % 4U];
 }
 
 static void add(script_t *script, uint32_t value)

@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drive.h"
+#include "drive/drive.h"
 #include "types/samples.h"
 
 #define SCRIPT_PERIODS 4000U

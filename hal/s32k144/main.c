@@ -3,7 +3,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/ecu.h"
+#include "ecu/ecu.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/can.h"
 #include "hal/s32k144/clock.h"
@@ -25,11 +25,14 @@ __asm__(".global commanded_directly\n.set commanded_directly, 1"); /* for tools;
 #endif
 
 ecu_t ecu; /* calibration tools find it by this name */
-static const pwm_config_t stopped = {11200, 1120}; /* for a counter that never runs, and the 1 kHz of the task */
-/* For the fast ISR, which alone raises faults, as one word: what the gate driver and the background have seen. */
+/* For a counter that never runs, and the 1 kHz of the task. */
+#define STOPPED_PERIODS 10U
+static const pwm_config_t stopped = {11200, 1120};
+/* For the fast ISR, which alone raises faults, as one word: what the gate driver, the converters' interrupt and the
+ * background have seen. */
 static volatile union {
     struct {
-        bool gates, data_damaged;
+        bool gates, sampling, data_damaged;
     };
     uint32_t any;
 } alarms;
@@ -42,6 +45,10 @@ static __attribute__((noinline, cold)) void alarms_take(void)
     if (alarms.gates) {
         alarms.gates = false;
         drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
+    }
+    if (alarms.sampling) {
+        alarms.sampling = false;
+        drive_raise_fault(&ecu.drive, FAULT_INPUT);
     }
     if (alarms.data_damaged) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
@@ -61,6 +68,16 @@ void adc_handler(void)
     angle_end();
 }
 
+/* Samples that keep failing end no conversion, and no conversion's end would run the fast ISR: it is pended here, to
+ * bring the drive into its safe state. */
+void sampling_error_handler(void)
+{
+    if (sampling_error_isr()) {
+        alarms.sampling = true;
+        core_irq_pend(IRQ_ADC0);
+    }
+}
+
 void mrai_handler(void)
 {
     mrai_isr(&ecu.drive);
@@ -71,6 +88,7 @@ void mrai_handler(void)
 void tick_handler(void)
 {
     tick_cleared();
+    sampling_tick();
 #if DIRECT
     hal_watchdog_service();
     task_1khz(&ecu.drive);
@@ -108,6 +126,8 @@ static void enable_interrupts(void)
 {
     enable(IRQ_FTM0_FAULT, PRIORITY_FAULT);
     enable(IRQ_ADC0, PRIORITY_FAST);
+    enable(IRQ_PDB0, PRIORITY_FAST);
+    enable(IRQ_PDB1, PRIORITY_FAST);
     enable(IRQ_MRAI, PRIORITY_MRAI);
     enable(IRQ_CAN0_ORED_0_15_MB, PRIORITY_CAN);
     enable(IRQ_CAN0_ORED, PRIORITY_CAN);
@@ -130,13 +150,13 @@ static bool timing(pwm_config_t *pwm)
     return true;
 }
 
-static void init_hardware(const pwm_config_t *pwm)
+static void init_hardware(const pwm_config_t *pwm, uint32_t periods_per_step)
 {
     clock_init();
     pins_init();
-    sampling_init();
+    sampling_init(pwm->period_ticks);
     pwm_init(pwm);
-    tick_init(pwm->period_ticks / PERIPHERAL_PER_CORE);
+    tick_init(pwm->period_ticks / PERIPHERAL_PER_CORE, periods_per_step);
     can_init();
 }
 
@@ -165,7 +185,7 @@ __attribute__((noinline)) int main(void)
     if (!drivable) {
         drive_raise_fault(&ecu.drive, FAULT_CONFIG);
     }
-    init_hardware(&pwm);
+    init_hardware(&pwm, drivable ? motor.bases.periods_per_step : STOPPED_PERIODS);
     enable_interrupts();
 #if DIRECT
     hal_watchdog_start();

@@ -63,11 +63,13 @@ static void configure_outputs(const pwm_config_t *config)
     FTM0->C7V = config->period_ticks;
 }
 
+/* The input last: a fault is latched by its edge, and a line that is active already must be an edge to a fault control
+ * that is on. */
 static void configure_faults(void)
 {
     FTM0->FLTPOL = FTM_FLTPOL_FLT0POL;
-    FTM0->FLTCTRL = FTM_FLTCTRL_FAULT0EN | FTM_FLTCTRL_FFLTR0EN | FTM_FLTCTRL_FFVAL(FAULT_FILTER);
     FTM0->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS | FTM_MODE_FAULTM(ALL_CHANNELS_MANUAL) | FTM_MODE_FAULTIE;
+    FTM0->FLTCTRL = FTM_FLTCTRL_FAULT0EN | FTM_FLTCTRL_FFLTR0EN | FTM_FLTCTRL_FFVAL(FAULT_FILTER);
 }
 
 /* Off: forced low now, masked from the next start on. */

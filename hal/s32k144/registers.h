@@ -350,21 +350,30 @@ typedef struct {
     volatile uint32_t MOD;
     uint8_t reserved0[0x8];
     volatile uint32_t CH0C1;
-    uint8_t reserved1[0x4];
+    volatile uint32_t CH0S;
     volatile uint32_t CH0DLY0;
+    uint8_t reserved1[0x4];
+    volatile uint32_t CH0DLY2;
 } pdb_t;
 _Static_assert(offsetof(pdb_t, SC) == 0x0, "SC");
 _Static_assert(offsetof(pdb_t, MOD) == 0x4, "MOD");
 _Static_assert(offsetof(pdb_t, CH0C1) == 0x10, "CH0C1");
+_Static_assert(offsetof(pdb_t, CH0S) == 0x14, "CH0S");
 _Static_assert(offsetof(pdb_t, CH0DLY0) == 0x18, "CH0DLY0");
+_Static_assert(offsetof(pdb_t, CH0DLY2) == 0x20, "CH0DLY2");
 #define PDB_SC_LDOK 0x1U
 #define PDB_SC_PDBEN 0x80U
+#define PDB_SC_PDBEIE 0x20000U
 #define PDB_CH0C1_EN_MASK 0xffU
 #define PDB_CH0C1_EN(x) (((uint32_t)(x) << 0) & 0xffU)
 #define PDB_CH0C1_TOS_MASK 0xff00U
 #define PDB_CH0C1_TOS(x) (((uint32_t)(x) << 8) & 0xff00U)
 #define PDB_CH0C1_BB_MASK 0xff0000U
 #define PDB_CH0C1_BB(x) (((uint32_t)(x) << 16) & 0xff0000U)
+#define PDB_CH0S_ERR_MASK 0xffU
+#define PDB_CH0S_ERR(x) (((uint32_t)(x) << 0) & 0xffU)
+#define IRQ_PDB0 52U
+#define IRQ_PDB1 68U
 
 typedef struct {
     volatile uint32_t SC1[16];

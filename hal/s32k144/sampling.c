@@ -11,10 +11,24 @@
 #define AVERAGE_32 3U
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
+#define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
+#define APART_MS 10U  /* an error later than this after the last one begins a new row */
 
 /* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). */
-enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3 };
-enum { I_B = 0, V_DC = 1, INVERTER = 2 };
+enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3, ADC0_CONVERSIONS = 4 };
+enum { I_B = 0, V_DC = 1, INVERTER = 2, ADC1_CONVERSIONS = 3 };
+enum { FIRST = 0, SLOW = 2 }; /* of either: the conversions that a delay starts, not the end of the one before */
+
+typedef uint64_t double_word_t __attribute__((may_alias, aligned(4)));
+typedef struct {
+    uint32_t first, second;
+} results_t;
+
+static struct {
+    uint32_t in_a_row;
+    uint32_t last; /* in milliseconds */
+} errors;                              /* written by the sequence errors' interrupt */
+static volatile uint32_t milliseconds; /* written by the 1 kHz task */
 
 /* From nothing: what an earlier run left in the converter's correction would be carried on. */
 static void forget_calibration(adc_t *adc)
@@ -40,18 +54,22 @@ static void calibrate(adc_t *adc)
     adc->SC2 = ADC_SC2_ADTRG;
 }
 
-/* The first conversion by the trigger, each further one by the end of the one before it. */
-static void chain(pdb_t *pdb, uint32_t conversions)
+/* The first conversion by the trigger, the second by the end of the first; the slow ones in the middle of the period,
+ * when the fast ISR has read all results of the period before: a result that is still unread when its next conversion
+ * ends leaves the pre-trigger locked, and a lock stops the whole sequence. */
+static void chain(pdb_t *pdb, uint32_t conversions, uint32_t period_ticks)
 {
     const uint32_t all = (1U << conversions) - 1U;
-    pdb->MOD = 1000; /* counts on a little after the trigger, then waits for the next */
+    const uint32_t delayed = 1U << FIRST | 1U << SLOW;
+    pdb->MOD = period_ticks / 2U;
     pdb->CH0DLY0 = 0;
-    pdb->CH0C1 = PDB_CH0C1_EN(all) | PDB_CH0C1_TOS(1) | PDB_CH0C1_BB(all & ~1U);
-    pdb->SC = PDB_SC_PDBEN;
-    pdb->SC = PDB_SC_PDBEN | PDB_SC_LDOK;
+    pdb->CH0DLY2 = period_ticks / 2U;
+    pdb->CH0C1 = PDB_CH0C1_EN(all) | PDB_CH0C1_TOS(delayed) | PDB_CH0C1_BB(all & ~delayed);
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE;
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
 }
 
-void sampling_init(void)
+void sampling_init(uint32_t period_ticks)
 {
     calibrate(ADC0);
     calibrate(ADC1);
@@ -64,16 +82,66 @@ void sampling_init(void)
     ADC1->SC1[INVERTER] = ADC_SC1_ADCH(2);
     TRGMUX->TRGMUX_PDB0 = TRGMUX_PDB0_SEL0(FTM0_INIT_TRIGGER);
     TRGMUX->TRGMUX_PDB1 = TRGMUX_PDB1_SEL0(FTM0_INIT_TRIGGER);
-    chain(PDB0, 4);
-    chain(PDB1, 3);
+    chain(PDB0, ADC0_CONVERSIONS, period_ticks);
+    chain(PDB1, ADC1_CONVERSIONS, period_ticks);
 }
 
+/* Two results that lie side by side, by one instruction where there is one. */
+static inline results_t read_two(const volatile uint32_t *from)
+{
+    results_t y;
+#if defined(__arm__)
+    __asm__ volatile("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const volatile double_word_t *)from));
+#else
+    y.first = from[0];
+    y.second = from[1];
+#endif
+    return y;
+}
+
+/* All results of the sequence are read, those of the slow channels too: what is read here no longer locks the delay
+ * blocks. The slow ones stay in their registers for the 1 kHz task. */
 void hal_adc_read(adc_counts_t *counts)
 {
-    counts->i_a = ADC0->R[I_A];
-    counts->i_b = ADC1->R[I_B];
-    counts->i_c = ADC0->R[I_C]; /* ends the interrupt's request */
-    counts->v_dc = ADC1->R[V_DC];
+    const results_t from_adc0 = read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
+    const results_t from_adc1 = read_two(&ADC1->R[I_B]);
+    (void)read_two(&ADC0->R[WINDING]);
+    (void)ADC1->R[INVERTER];
+    counts->i_a = from_adc0.first;
+    counts->i_c = from_adc0.second;
+    counts->i_b = from_adc1.first;
+    counts->v_dc = from_adc1.second;
+}
+
+/* Disabled, the block drops its locks; read, every result can complete again. The block waits for the next period. */
+static void restart(pdb_t *pdb, const adc_t *adc, uint32_t conversions)
+{
+    pdb->SC = 0;
+    pdb->CH0S = 0;
+    for (uint32_t k = 0; k < conversions; k++) {
+        (void)adc->R[k];
+    }
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE;
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
+}
+
+bool sampling_error_isr(void)
+{
+    if ((PDB0->CH0S & PDB_CH0S_ERR_MASK) != 0U) {
+        restart(PDB0, ADC0, ADC0_CONVERSIONS);
+    }
+    if ((PDB1->CH0S & PDB_CH0S_ERR_MASK) != 0U) {
+        restart(PDB1, ADC1, ADC1_CONVERSIONS);
+    }
+    const uint32_t now = milliseconds;
+    errors.in_a_row = now - errors.last <= APART_MS ? errors.in_a_row + 1U : 1U;
+    errors.last = now;
+    return errors.in_a_row >= ERRORS_MAX;
+}
+
+void sampling_tick(void)
+{
+    milliseconds = milliseconds + 1U;
 }
 
 uint16_t sampling_winding(void)

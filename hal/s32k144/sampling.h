@@ -1,13 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_SAMPLING_H
 #define HAL_S32K144_SAMPLING_H
-/** Both converters, started by the PWM's period through the delay blocks.
+/** Both converters, started by the PWM's period through the delay blocks: phase currents and dc voltage at the start of
+ * the period, temperatures in its middle.
  * Source   README.md, sampling
- * Units    12-bit counts
- * Context  sampling_init(): start-up, before the PWM starts; the slow channels: 1 kHz task, as converted last */
+ * Units    12-bit counts; period_ticks: ticks of 112 MHz
+ * Range    period_ticks up to 65535
+ * Errors   a sequence error (a conversion was asked for while a lock was held) loses the samples of up to
+ *          three periods; its interrupt restarts the delay block
+ * Context  sampling_init(): start-up, before the PWM starts; sampling_error_isr(): both delay blocks' interrupts, at
+ *          the fast ISR's priority; sampling_tick() and the slow channels, as converted last: 1 kHz task */
+#include <stdbool.h>
 #include <stdint.h>
 
-void sampling_init(void);
+void sampling_init(uint32_t period_ticks);
+/** True: the errors persist (five, less than 10 ms apart). Who calls it brings the drive into its safe state. */
+bool sampling_error_isr(void);
+void sampling_tick(void);
 
 uint16_t sampling_winding(void);
 uint16_t sampling_inverter(void);

@@ -22,6 +22,7 @@ void start_up(void); /* where it goes on */
 void fault_handler(void);
 void gate_fault_handler(void);
 void adc_handler(void);
+void sampling_error_handler(void);
 void mrai_handler(void);
 void can_message_handler(void);
 void can_bus_off_handler(void);

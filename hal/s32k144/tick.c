@@ -5,7 +5,7 @@
 
 #define FOUR_TICKS_LOOPS 32 /* at least 4 ticks of 28 MHz, which are 16 of the core */
 
-static uint32_t pwm_ticks;
+static uint32_t step_ticks;
 
 static void pass_four_ticks(void)
 {
@@ -14,13 +14,13 @@ static void pass_four_ticks(void)
     }
 }
 
-void tick_init(uint32_t period_ticks)
+void tick_init(uint32_t period_ticks, uint32_t periods)
 {
-    pwm_ticks = period_ticks;
+    step_ticks = periods * period_ticks;
     LPIT0->MCR = LPIT_MCR_M_CEN;
     pass_four_ticks(); /* until then it takes no other register */
     LPIT0->MIER = LPIT_MIER_TIE0;
-    LPIT0->TVAL0 = 9U * period_ticks + period_ticks / 4U - 1U;
+    LPIT0->TVAL0 = step_ticks - period_ticks + period_ticks / 4U - 1U;
 }
 
 void tick_start(void)
@@ -33,7 +33,7 @@ void tick_start(void)
 void tick_continue(void)
 {
     pass_four_ticks();
-    LPIT0->TVAL0 = 10U * pwm_ticks - 1U;
+    LPIT0->TVAL0 = step_ticks - 1U;
 }
 
 void tick_cleared(void)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 PERIODS_PER_MS = 10
-COMMAND = "VCU_TorqueCommand"
+COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"
 
 
@@ -37,9 +37,9 @@ class Frame(ctypes.Structure):
 class Ecu:
     """One instance with its machine at an imposed speed, one millisecond at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, motor: sim_motor.Motor | None = None) -> None:
         self.dbc = load_dbc()
-        self.motor = sim_motor.read(MotorFolder("hsm1", BUILD / "motors" / "hsm1"))
+        self.motor = motor or sim_motor.read(MotorFolder("hsm1", BUILD / "motors" / "hsm1"))
         self.lib = self.motor.library
         self.lib.fluxtrue_create.restype = ctypes.c_void_p
         self.lib.fluxtrue_get.restype = ctypes.c_double
@@ -58,7 +58,7 @@ class Ecu:
         self.speed_rad_s = 0.0
         self.time_ms = 0
         self.counters = {COMMAND: 0, LIMITS: 0}
-        self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequest": 0.0,
+        self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequested": 0.0,
                         "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0}  # fmt: skip
         self.talking = True
         self.sent: list[tuple[int, int, bytes]] = []
@@ -99,10 +99,14 @@ class Ecu:
 
     def step_ms(self) -> None:
         """One millisecond of simulated time; the command goes out in every tenth."""
-        if self.talking and self.time_ms % 10 == 0:
+        self.step_once(PERIODS_PER_MS, self.time_ms % 10 == 0)
+
+    def step_once(self, periods: int, command_is_due: bool) -> None:
+        """One step of the task, of so many periods."""
+        if self.talking and command_is_due:
             self.send(COMMAND, self.command)
         self.set("speed_rad_s", self.speed_rad_s)
-        assert self.lib.sim_run(self.sim, PERIODS_PER_MS, None, 0) == 0
+        assert self.lib.sim_run(self.sim, periods, None, 0) == 0
         self.time_ms += 1
         frame = Frame()
         while self.lib.can_host_take(self.handle, ctypes.byref(frame)):

@@ -8,7 +8,7 @@ import pytest
 from ecu import COMMAND, LIMITS, Ecu
 from protection import protect
 
-TORQUE = "torque_limited_Nm"
+TORQUE = "torque_commanded_Nm"
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def running(ecu: Ecu) -> Ecu:
 
 def at_40_Nm(ecu: Ecu) -> None:
     """A steady torque."""
-    ecu.run(100, TorqueRequest=40.0)
+    ecu.run(100, TorqueRequested=40.0)
     assert ecu.get(TORQUE) == pytest.approx(40.0, abs=0.02)
 
 
@@ -55,12 +55,12 @@ def test_power_up_passes_through_all_states_in_order(ecu: Ecu) -> None:
 # 0.1 Nm on the wire; one count of the control is 9 mNm on this machine.
 @pytest.mark.parametrize("torque_Nm", [40.0, -40.0, 0.3, 132.0])
 def test_a_command_reaches_the_torque_path_with_its_sign(running: Ecu, torque_Nm: float) -> None:
-    running.run(200, TorqueRequest=torque_Nm)
+    running.run(200, TorqueRequested=torque_Nm)
     assert running.get(TORQUE) == pytest.approx(torque_Nm, abs=0.02)
 
 
 def test_no_torque_exceeds_what_the_machine_may_give(running: Ecu) -> None:
-    running.run(300, TorqueRequest=1000.0)
+    running.run(300, TorqueRequested=1000.0)
     assert running.get(TORQUE) == pytest.approx(132.0, abs=0.02)
 
 
@@ -73,14 +73,14 @@ def test_drive_and_regen_limits_hold_in_four_quadrants(running: Ecu, speed: floa
         running.speed_rad_s += speed / 100.0
         running.run(1)
     running.run(100, TorqueLimitDrive=30.0, TorqueLimitRegen=20.0)
-    running.run(60, TorqueRequest=torque_Nm)
+    running.run(60, TorqueRequested=torque_Nm)
     assert running.state == "run"
     assert running.get(TORQUE) == pytest.approx(wanted, abs=0.02)
 
 
 # The last good frame is at t = 0; 30 ms later the command is dead, and 15 ms of ramp end full torque.
 def test_a_lost_command_ends_full_torque_within_50_ms_of_the_last_good_frame(running: Ecu) -> None:
-    running.run(300, TorqueRequest=1000.0)
+    running.run(300, TorqueRequested=1000.0)
     while running.time_ms % 10 != 1:
         running.run(1)
     running.talking = False  # the frame before this millisecond was the last
@@ -108,7 +108,7 @@ def test_after_a_time_out_torque_returns_only_after_enable_was_off_and_the_reque
     running.run(30, Enable=0)
     running.run(30, Enable=1)
     assert running.last["INV_DcLink"]["RefusedReason"] == "torque_request_not_zero"
-    running.run(30, Enable=0, TorqueRequest=0.0)
+    running.run(30, Enable=0, TorqueRequested=0.0)
     running.run(30, Enable=1)
     assert running.state == "run"
 
@@ -144,7 +144,7 @@ def test_a_fault_is_left_by_a_reset_with_enable_off_and_a_new_power_up(running: 
     running.run(30, FaultReset=1)
     assert running.state == "fault"
     assert running.last["INV_DcLink"]["RefusedReason"] == "reset_while_enabled"
-    running.run(30, FaultReset=0, Enable=0, TorqueRequest=0.0)
+    running.run(30, FaultReset=0, Enable=0, TorqueRequested=0.0)
     running.run(100, FaultReset=1)
     assert running.state == "ready"  # by standby and precharge, as the dc voltage is still there
     assert running.last["INV_Faults"]["EcuFaults"] == 0
@@ -153,8 +153,8 @@ def test_a_fault_is_left_by_a_reset_with_enable_off_and_a_new_power_up(running: 
 
 
 def test_a_request_beyond_the_machine_comes_down_as_fast_as_any(running: Ecu) -> None:
-    running.run(300, TorqueRequest=1000.0)
-    running.run(100, TorqueRequest=0.0)
+    running.run(300, TorqueRequested=1000.0)
+    running.run(100, TorqueRequested=0.0)
     assert running.get(TORQUE) == 0.0
 
 
@@ -193,9 +193,9 @@ def test_one_violation_is_counted_by_its_kind_and_not_obeyed(running: Ecu, kind:
         running.run(1)
     message = running.dbc.get_message_by_name(COMMAND)
     following = running.counters[COMMAND]
-    values = {**running.command, "TorqueRequest": 60.1, "Crc": 0, "Counter": following}
+    values = {**running.command, "TorqueRequested": 60.1, "Crc": 0, "Counter": following}
     if kind == "RangeErrors":
-        values["TorqueRequest"] = 1000.1
+        values["TorqueRequested"] = 1000.1
     if kind == "Repeated":
         values["Counter"] = (following - 1) % 15
     if kind == "Jumps":
@@ -237,7 +237,7 @@ def test_lost_battery_limits_take_the_torque_away_and_tell_why(running: Ecu) -> 
     limits = {"PowerLimitDrive": 100.0, "PowerLimitRegen": 50.0}
     for _ in range(5):
         running.send(LIMITS, limits)
-        running.run(100, TorqueRequest=40.0)
+        running.run(100, TorqueRequested=40.0)
     assert running.get(TORQUE) == pytest.approx(40.0, abs=0.02)
     assert running.last["INV_DcLink"]["DeratingReason"] == "none"
     running.run(300)
@@ -259,7 +259,7 @@ def test_battery_power_limits_hold_in_both_directions_and_tell_why(running: Ecu)
     for torque_Nm, power_kW in ((60.0, 5.0), (-60.0, -3.0)):
         for _ in range(10):
             running.send(LIMITS, {"PowerLimitDrive": 5.0, "PowerLimitRegen": 3.0})
-            running.run(100, TorqueRequest=torque_Nm)
+            running.run(100, TorqueRequested=torque_Nm)
         electrical_kW = running.truth("idc_A") * running.truth("vdc_V") / 1000.0
         assert electrical_kW == pytest.approx(power_kW, abs=0.25)
         assert abs(electrical_kW) <= abs(power_kW) + 0.1
@@ -285,9 +285,9 @@ def test_the_locked_commissioning_mode_is_refused(running: Ecu) -> None:
 
 def test_what_is_sent_is_what_the_drive_has(running: Ecu) -> None:
     running.set("winding_C", 63.4)
-    running.run(300, TorqueRequest=25.0)
+    running.run(300, TorqueRequested=25.0)
     status, dc_link = running.last["INV_Status"], running.last["INV_DcLink"]
-    assert status["TorqueCommand"] == pytest.approx(25.0, abs=0.05)
+    assert status["TorqueCommanded"] == pytest.approx(25.0, abs=0.05)
     assert dc_link["DcVoltage"] == pytest.approx(350.0, abs=0.3)  # a count of the converter is 0.13 V
     assert running.last["INV_Temperatures"]["Winding"] == pytest.approx(63.4, abs=0.05)
     assert running.last["INV_Temperatures"]["WindingValid"] == "yes"
@@ -304,10 +304,10 @@ def test_torque_speed_and_dc_current_are_those_of_the_plant(running: Ecu) -> Non
         running.speed_rad_s += 0.5
         running.run(1)
     for torque_Nm in (40.0, -40.0):
-        running.run(1000, TorqueRequest=torque_Nm)
+        running.run(1000, TorqueRequested=torque_Nm)
         assert running.state == "run"
         status = running.last["INV_Status"]
-        assert status["TorqueEstimate"] == pytest.approx(running.truth("torque_mean_Nm"), abs=0.4)
+        assert status["TorqueEstimated"] == pytest.approx(running.truth("torque_mean_Nm"), abs=0.4)
         assert status["Speed"] == pytest.approx(running.truth("speed_rpm"), abs=3.0)
         assert running.last["INV_DcLink"]["DcCurrent"] == pytest.approx(running.truth("idc_A"), abs=2.0)
 
@@ -319,7 +319,7 @@ def test_a_wrong_table_shows_in_the_table_scale(running: Ecu) -> None:
         running.speed_rad_s += 0.5
         running.run(1)
     for torque_Nm in (30.0, 60.0, -40.0, 80.0, 20.0, 50.0) * 3:
-        running.run(300, TorqueRequest=torque_Nm)
+        running.run(300, TorqueRequested=torque_Nm)
     assert running.state == "run"
     assert running.last["INV_Identification"]["TableScale"] == pytest.approx(108.0, abs=2.0)
 

@@ -83,7 +83,7 @@ def test_the_firmware_accepts_no_command_with_one_or_two_bits_wrong_at_any_count
     message = ecu.dbc.get_message_by_name(COMMAND)
     patterns = [(1 << k) for k in range(FRAME_BITS)]
     patterns += [1 << i | 1 << j for i, j in itertools.combinations(range(FRAME_BITS), 2)]
-    values = {"Crc": 0, "Enable": 1, "FaultReset": 0, "Mode": "torque", "TorqueRequest": 120.0,
+    values = {"Crc": 0, "Enable": 1, "FaultReset": 0, "Mode": "torque", "TorqueRequested": 120.0,
               "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0}  # fmt: skip
     ecu.talking = False
     frames = 0
@@ -99,7 +99,7 @@ def test_the_firmware_accepts_no_command_with_one_or_two_bits_wrong_at_any_count
     ecu.run(100)
     assert frames == 15 * (64 + 2016)
     assert ecu.last["INV_DiagReceive"]["Accepted"] == accepted
-    assert ecu.get("torque_limited_Nm") == 0.0
+    assert ecu.get("torque_commanded_Nm") == 0.0
     diagnostics = ecu.last["INV_DiagProtection"]
     refused = diagnostics["CrcErrors"] + ecu.last["INV_DiagReceive"]["IdErrors"]
     assert refused == frames

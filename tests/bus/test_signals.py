@@ -3,7 +3,6 @@
 
 import ctypes
 import math
-import re
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from cantools.database.can import Message
 from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
 
-from ecu import BUILD, ROOT, load_dbc
+from ecu import BUILD, load_dbc
 
 DBC = load_dbc()
 LIB = ctypes.CDLL(str(BUILD / "libfluxtrue_bus_exports.so"))
@@ -167,11 +166,3 @@ def test_whatever_can_move_the_car_is_protected() -> None:
 def test_all_messages_together_load_a_bus_of_500_kbit_by_at_most_16_percent() -> None:
     bits_per_s = sum(135 * 1000 / message.cycle_time for message in DBC.messages)
     assert bits_per_s <= 0.16 * 500e3
-
-
-def test_the_version_frame_tells_the_version_of_the_build() -> None:
-    project = re.search(r"project\(fluxtrue VERSION (\d+)\.(\d+)\.(\d+)", (ROOT / "CMakeLists.txt").read_text())
-    header = (ROOT / "firmware" / "comm" / "version.h").read_text()
-    assert project
-    for name, number in zip(("MAJOR", "MINOR", "PATCH"), project.groups(), strict=True):
-        assert f"#define FLUXTRUE_{name} {number}U" in header

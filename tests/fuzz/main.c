@@ -54,7 +54,7 @@ static void compare_command(void)
     check(rx->accepted == (oracle.accepted & 0xFFFFU), "a command was accepted that the oracle refuses, or refused");
     check(rx->command.enable == oracle.enable && rx->command.fault_reset == oracle.reset, "enable or reset differ");
     check((int)rx->command.mode == oracle.mode, "mode differs");
-    check(near(rx->command.torque_Nm, oracle.torque_dNm), "torque request differs");
+    check(near(rx->command.torque_requested_Nm, oracle.torque_dNm), "torque request differs");
     check(near(rx->command.limit_drive_Nm, oracle.drive_dNm), "drive limit differs");
     check(near(rx->command.limit_regen_Nm, oracle.regen_dNm), "regen limit differs");
     check(fabs((double)rx->limits.drive_kW - oracle.power_drive_10W / 100.0) < 1e-3, "power limit differs");
@@ -67,7 +67,7 @@ static void compare_command(void)
 static void compare_torque(double before_Nm)
 {
     const double base_Nm = (double)ecu.drive.motor.bases.torque_Nm;
-    const double now_Nm = ecu.drive.request.torque / 32768.0 * base_Nm;
+    const double now_Nm = ecu.drive.request.torque_arbitrated / 32768.0 * base_Nm;
     const double most_Nm = (double)ecu.drive.motor.torque_max_Nm;
     const double asked_Nm = oracle.command.alive ? oracle.torque_dNm / 10.0 : 0.0;
     check(fabs(now_Nm) <= most_Nm + ROUNDING_NM, "more torque than the machine may give");
@@ -133,7 +133,7 @@ static void start_plant(void)
 static void millisecond(uint32_t ms)
 {
     can_frame_t sent;
-    const double before_Nm = ecu.drive.request.torque / 32768.0 * (double)ecu.drive.motor.bases.torque_Nm;
+    const double before_Nm = ecu.drive.request.torque_arbitrated / 32768.0 * (double)ecu.drive.motor.bases.torque_Nm;
     set("plant.vdc_V", dc_link_V(sim_get(sim, "plant.vdc_V")));
     traffic(ms);
     oracle_tick(&oracle);

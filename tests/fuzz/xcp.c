@@ -150,7 +150,7 @@ static void calibrate(void)
 static void millisecond(void)
 {
     can_frame_t frame;
-    xcp_daq_event(&slave.daq, &config.memory);
+    xcp_daq_event(&slave.daq, &config.memory, below(3));
     check(slave.daq.queued - slave.daq.sent <= XCP_DAQ_QUEUE, "the queue holds more than it can");
     for (uint32_t n = below(6); n > 0U && xcp_daq_next(&slave.daq, &frame); n--) {
         check(frame.length >= 1U && frame.length <= FRAME_MAX, "a measurement frame of impossible length");

@@ -16,9 +16,9 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.mdf import BusLog
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+from fluxtrue_tools.vecu.stepped import connect
 
 import health
-from clients import client_port, connect
 from report import Figures, Report
 from rig import Rig
 
@@ -41,6 +41,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--can-option", action="append", default=[], metavar="NAME=VALUE",
                     help="further argument of can.Bus, for example host=127.0.0.1, bitrate=500000")  # fmt: skip
     group.addoption("--bench", metavar="HOST:PORT", help="bench channel of the plant behind that interface")
+    group.addoption("--clock", metavar="HOST:PORT",
+                    help="bench channel that only lets time pass: a virtual ECU with --fast as a bench")
     group.addoption("--allow-power", action="store_true",
                     help="on a bench: tests may charge the dc link, close the gates and ask for torque")  # fmt: skip
     group.addoption("--elf", help="the ECU's ELF file: where its calibration values are; default: --vecu")
@@ -111,25 +113,24 @@ class Target:
     bus: can.BusABC
     stand: Channel | None
     can_port: int = 0  # of our virtual ECU: where further clients connect
+    clock: Channel | None = None  # lets time pass, for a plant that cannot be commanded
 
 
-def _bench_channel(address: str) -> Channel:
-    host, colon, port = address.rpartition(":")
-    if not colon or not host or not port.isdigit():
-        raise FluxtrueError(f"--bench {address}: allowed: HOST:PORT")
-    return Channel(host, int(port))
+def _channel(config: pytest.Config, option: str) -> Channel | None:
+    address = config.getoption(option)
+    return None if address is None else Channel.at(address, option)
 
 
 def _bench_target(config: pytest.Config) -> Target:
     options = dict(map(parse_option, config.getoption("--can-option")))
     bus = BusAddress(config.getoption("--can-interface"), config.getoption("--can-channel"), options).connect()
     try:
-        stand = _bench_channel(config.getoption("--bench")) if config.getoption("--bench") else None
+        stand, clock = _channel(config, "--bench"), _channel(config, "--clock")
     except FluxtrueError:
         bus.shutdown()
         raise
     port = options.get("port", 0)
-    return Target(bus, stand, port if isinstance(port, int) else 0)
+    return Target(bus, stand, port if isinstance(port, int) else 0, clock)
 
 
 @pytest.fixture(scope="session")
@@ -173,7 +174,7 @@ def connected(
             about["firmware"] = (f"{told['Major']}.{told['Minor']}.{told['Patch']}, interface {told['Interface']}, "
                                  f"motor {told['MotorId']:#010x}")  # fmt: skip
 
-    rig = Rig(target.bus, database, target.stand, client_port(target.bus))
+    rig = Rig(target.bus, database, target.stand, target.clock)
     is_bench = request.config.getoption("--can-interface") is not None
     rig.may_switch_on = not is_bench or request.config.getoption("--allow-power")
     rig.listeners += [bus_log, note_version]

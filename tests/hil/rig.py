@@ -5,7 +5,6 @@ With a bench channel time is simulated: advance() sends the cyclic commands, let
 has sent, and nothing depends on how fast the computer is. Without one time is the wall clock's.
 """
 
-import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,11 +15,13 @@ import cantools.database
 import numpy as np
 import pytest
 from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.stepped import SteppedBus
 from numpy.typing import NDArray
 
 import e2e
+from progress import BenchTime
 
-COMMAND = "VCU_TorqueCommand"
+COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"
 STATUS = "INV_Status"
 MS = 1e-3
@@ -46,7 +47,7 @@ class Command:
         """For cantools; CRC and counter are put in afterwards."""
         return {
             "Crc": 0, "Counter": 0, "Enable": int(self.enable), "FaultReset": int(self.reset), "Mode": self.mode,
-            "TorqueRequest": self.torque_Nm, "TorqueLimitDrive": self.limit_drive_Nm,
+            "TorqueRequested": self.torque_Nm, "TorqueLimitDrive": self.limit_drive_Nm,
             "TorqueLimitRegen": self.limit_regen_Nm,
         }  # fmt: skip
 
@@ -81,21 +82,25 @@ class Frame:
 
 
 class Rig:
-    """Bus, DBC, the cyclic commands, and what has been received."""
+    """Bus, DBC, the cyclic commands, and what has been received.
+
+    A `clock` is a bench channel that lets time pass and does nothing else, for a plant that cannot be commanded.
+    """
 
     def __init__(
-        self, bus: can.BusABC, database: cantools.database.Database, stand: Channel | None, port: int = 0
-    ) -> None:
-        self.bus, self.database, self._stand, self._port = bus, database, stand, port
+        self, bus: can.BusABC, database: cantools.database.Database, stand: Channel | None,
+        clock: Channel | None = None,
+    ) -> None:  # fmt: skip
+        self.bus, self.database, self._stand = bus, database, stand
+        channel = stand if stand is not None else clock
+        self._stepped = SteppedBus(bus, channel) if channel is not None else None
+        self._bench_time = BenchTime()
         self.may_switch_on = True
         self.by_name = {message.name: message for message in database.messages}
         self._command_id, self._limits_id = self.by_name[COMMAND].frame_id, self.by_name[LIMITS].frame_id
         self._encoded: dict[Command, bytes] = {}
         self._inverters = {m.frame_id: m.name for m in database.messages if "INV" in m.senders}
         self.listeners: list[Callable[[can.Message], None]] = []
-        self.sent = 0
-        self._heard = 0
-        self._now_s = 1e-9 * stand.run(0.0, port, 0).now_ns if stand is not None else 0.0
         self.forget()
 
     def forget(self) -> None:
@@ -142,7 +147,7 @@ class Rig:
     @property
     def now_s(self) -> float:
         """Of the frames' time stamps, as far as this side knows."""
-        return self._now_s if self._stand is not None else time.monotonic()
+        return (self._stepped or self._bench_time).now_s
 
     def advance(self, seconds: float) -> None:
         """Let time pass; the commands go out in their cycle."""
@@ -153,17 +158,12 @@ class Rig:
             self._pass(step_to_s)
 
     def _pass(self, until_s: float) -> None:
-        if self._stand is None:
-            while (left_s := until_s - time.monotonic()) > 0.0:
-                self._take(self.bus.recv(left_s))
+        if self._stepped is None:
+            self._bench_time.receive(self.bus, until_s, self._take)
             return
-        ran = self._stand.run(round(1e3 * (until_s - self._now_s), 6), self._port, self.sent)
-        self._now_s = 1e-9 * ran.now_ns
-        self.trace.rows += ran.rows
-        while self._heard < ran.frames:
-            self._heard += 1
-            message = self.bus.recv(5.0)
-            assert message is not None, "the virtual ECU says it has sent more frames than arrived"
+        messages, rows = self._stepped.run(round(1e3 * (until_s - self.now_s), 6))
+        self.trace.rows += rows
+        for message in messages:
             self._take(message)
 
     # Sending.
@@ -171,8 +171,7 @@ class Rig:
     def send(self, frame_id: int, data: bytes, extended: bool = False) -> None:
         """One frame, as it is."""
         message = can.Message(arbitration_id=frame_id, data=data, is_extended_id=extended, timestamp=self.now_s)
-        self.bus.send(message)
-        self.sent += 1
+        (self._stepped or self.bus).send(message)
         for listener in self.listeners:
             listener(message)
 

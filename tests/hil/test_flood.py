@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import can
 import numpy as np
 import pytest
+from fluxtrue_tools.vecu.stepped import client_port
 
 import e2e
-from clients import client_port
 from rig import COMMAND, MS, Command, Rig
 
 FULL = 38  # frames of 8 bytes in 10 ms: more than 500 kbit/s carry

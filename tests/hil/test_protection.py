@@ -80,7 +80,7 @@ def test_no_corruption_of_one_or_two_bits_is_accepted_with_any_counter(rig: Rig)
                 rig.send(command_id, flipped(frame, todo[counter].pop()))
                 sent += 1
         rig.advance(10 * MS)
-        assert rig.signal("INV_Status", "TorqueCommand") == 0.0
+        assert rig.signal("INV_Status", "TorqueCommanded") == 0.0
     rig.advance(0.11)
     assert sent == 31200
     now = rig.signal("INV_DiagProtection", "CrcErrors") + rig.signal("INV_DiagReceive", "IdErrors")
@@ -163,5 +163,5 @@ def test_a_request_out_of_range_never_reaches_the_torque_path(rig: Rig, signal: 
     since_s = rig.now_s
     rig.advance(0.2)
     assert rig.signal("INV_DiagReceive", "RangeErrors") == 1.0
-    asked = rig.series("INV_Status", "TorqueCommand", since_s)[1]
+    asked = rig.series("INV_Status", "TorqueCommanded", since_s)[1]
     assert np.abs(asked - 10.0).max() <= 0.1

@@ -1,21 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A calibration master that this project did not write, against an ECU that keeps pace with the wall clock."""
+"""A calibration master that this project did not write, and that waits for its answers by the wall clock."""
 
 import re
 import struct
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 from fluxtrue_tools.a2l.cli import render
 from fluxtrue_tools.a2l.elf import Description, read
+from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from pyxcp.config import create_application_from_config
 from pyxcp.master import Master
 from pyxcp.types import XcpResponseError
 
+from progress import HANG_S, polled
 from xcp_master import key_of
 
 pytestmark = pytest.mark.program
@@ -28,11 +32,23 @@ def _key(resource: int, seed: bytes) -> bytes:
     return key_of(int.from_bytes(seed, "little")).to_bytes(4, "little")
 
 
+def _let_time_pass(stand: Channel, ended: threading.Event) -> None:
+    """From the first frame on: the master has read its greeting then, with no frame glued to it."""
+    polled(lambda: ended.is_set() or stand.counters()["from_clients"] > 0)
+    while not ended.is_set():
+        stand.run(10.0)
+
+
 @pytest.fixture
-def ecu(program: object) -> Iterator[VirtualEcu]:
-    """pyxcp waits for its answers in wall-clock time: so must the ECU run."""
-    with VirtualEcu(program, fast=False) as running:  # type: ignore[arg-type]
+def ecu(program: Path) -> Iterator[VirtualEcu]:
+    """Its time passes by itself as soon as somebody has said something."""
+    with VirtualEcu(program) as running, ThreadPoolExecutor(1) as pool:
+        stand, ended = Channel(HOST, running.bench_port), threading.Event()
+        passing = pool.submit(_let_time_pass, stand, ended)
         yield running
+        ended.set()
+        passing.result()
+        stand.close()
 
 
 @pytest.fixture
@@ -43,6 +59,7 @@ def master(ecu: VirtualEcu) -> Iterator[Master]:
     bus.interface, bus.channel, bus.bitrate = "socketcand", "can0", 500000
     bus.can_id_master, bus.can_id_slave = COMMAND_ID, ANSWER_ID
     bus.socketcand.host, bus.socketcand.port = HOST, ecu.can_port
+    application.transport.timeout = HANG_S
     application.general.seed_n_key_function = _key
     application.general.disable_error_handling = True
     with Master("can", config=application) as connected:
@@ -118,9 +135,11 @@ def test_the_session_of_the_howto_runs_as_it_is_printed(program: Path, ecu: Virt
     page = (ROOT / "docs" / "howto" / "xcp.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     (tmp_path / "vecu.a2l").write_text(render(read(program), program.name), encoding="utf-8")
-    assert code.count("29536") == 1
-    code = code.replace("29536", str(ecu.can_port))
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300,
+    patient = f"application.transport.timeout = {HANG_S}\nwith Master("
+    for printed, here in (("29536", str(ecu.can_port)), ("with Master(", patient)):
+        assert code.count(printed) == 1
+        code = code.replace(printed, here)
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=HANG_S,
                           check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines()[-1] == "observer_m 3.5 allowed 2.0 to 4.0"

@@ -9,8 +9,8 @@ import cantools.database
 import pytest
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+from fluxtrue_tools.vecu.stepped import connect
 
-from clients import client_port, connect
 from rig import Rig
 
 FLASH_BYTES = 4096
@@ -25,7 +25,7 @@ def test_a_second_process_starts_with_what_the_first_has_learnt(
     flash = tmp_path / "flash.bin"
     with make_vecu(nvm=flash) as ecu:
         bus = connect(ecu.can_port)
-        rig = Rig(bus, database, Channel(HOST, ecu.bench_port), client_port(bus))
+        rig = Rig(bus, database, Channel(HOST, ecu.bench_port))
         rig.wait_for("standby")
         rig.stand.set(magnet_scale=0.88)
         rig.start()
@@ -51,7 +51,7 @@ def test_a_file_that_is_no_flash_is_refused_with_its_name(program: Path, tmp_pat
     wrong = tmp_path / "wrong.bin"
     wrong.write_bytes(bytes(FLASH_BYTES - 1))
     command = [program, "--port", "0", "--bench-port", "0", "--nvm", wrong]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=20)
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert result.stderr == f"error: --nvm {wrong}: no flash contents, allowed: a file of 4096 bytes, or none yet\n"
     assert wrong.stat().st_size == FLASH_BYTES - 1

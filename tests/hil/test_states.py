@@ -51,7 +51,7 @@ def test_enable_with_a_torque_request_is_refused(rig: Rig) -> None:
     rig.ask(enable=True, torque_Nm=10.0)
     rig.advance(0.1)
     assert (rig.state, refusal(rig)) == ("ready", "torque_request_not_zero")
-    assert rig.signal("INV_Status", "TorqueCommand") == 0.0
+    assert rig.signal("INV_Status", "TorqueCommanded") == 0.0
 
 
 def test_an_enable_that_was_refused_needs_a_new_edge(rig: Rig) -> None:
@@ -85,10 +85,10 @@ def test_the_commissioning_mode_is_locked_on_the_bus(rig: Rig) -> None:
 def test_disable_under_torque_ramps_to_zero_and_then_opens_the_gates(rig: Rig) -> None:
     rig.start(50.0)
     rig.advance(0.3)
-    assert rig.signal("INV_Status", "TorqueCommand") == pytest.approx(50.0, abs=0.1)
+    assert rig.signal("INV_Status", "TorqueCommanded") == pytest.approx(50.0, abs=0.1)
     rig.ask(enable=False)
     rig.wait_for("ready", 0.5)
-    commands = rig.series("INV_Status", "TorqueCommand", rig.now_s - 0.2)[1]
+    commands = rig.series("INV_Status", "TorqueCommanded", rig.now_s - 0.2)[1]
     assert 0.0 <= commands.min() and commands[-1] == 0.0
 
 

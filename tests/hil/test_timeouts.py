@@ -46,7 +46,7 @@ def test_two_lost_commands_in_a_row_change_nothing(rig: Rig) -> None:
         rig.skip_counters(1)
         rig.advance(40 * MS)
     assert rig.state == "run"
-    assert rig.signal("INV_Status", "TorqueCommand") == pytest.approx(20.0, abs=0.1)
+    assert rig.signal("INV_Status", "TorqueCommanded") == pytest.approx(20.0, abs=0.1)
 
 
 def test_after_a_time_out_enable_must_be_given_anew(rig: Rig) -> None:
@@ -58,7 +58,7 @@ def test_after_a_time_out_enable_must_be_given_anew(rig: Rig) -> None:
     rig.is_sending = True  # with enable and torque, as if nothing had happened
     rig.advance(0.3)
     assert rig.state == "ready"
-    assert rig.signal("INV_Status", "TorqueCommand") == 0.0
+    assert rig.signal("INV_Status", "TorqueCommanded") == 0.0
     rig.ask(enable=False, torque_Nm=0.0)
     rig.advance(0.05)
     rig.ask(enable=True)

@@ -38,7 +38,7 @@ def _row(rig: Rig, torque_Nm: float) -> list[float]:
     rig.advance(0.5)
     since_s = rig.now_s
     truth_Nm = mean_truth(rig)
-    told_Nm = float(rig.series("INV_Status", "TorqueEstimate", since_s)[1].mean())
+    told_Nm = float(rig.series("INV_Status", "TorqueEstimated", since_s)[1].mean())
     return [torque_Nm, truth_Nm, percent(truth_Nm - torque_Nm, torque_Nm), told_Nm]
 
 
@@ -123,7 +123,7 @@ def test_a_weaker_magnet_costs_no_torque_as_in_figure_8_of_the_paper(rig: Rig, f
     rig.advance(9.0)
     torque_Nm, psi_mVs = trace[TRUTH], 1e3 * trace["truth.psi_f_Vs"]
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
-    told_s, told_Nm = rig.series("INV_Status", "TorqueEstimate", start_s)
+    told_s, told_Nm = rig.series("INV_Status", "TorqueEstimated", start_s)
     psi_s, told_mVs = rig.series("INV_Identification", "PsiF", start_s)
     figures.plot("The magnet weakens at 1 s", [
         ("torque, N·m", [("shaft", time_s, torque_Nm), ("told on CAN", told_s - start_s, told_Nm)]),
@@ -150,8 +150,8 @@ def _step(rig: Rig, figures: Figures, first_Nm: float, second_Nm: float) -> tupl
     rig.ask(torque_Nm=second_Nm)
     rig.advance(0.4)
     time_s = trace["truth.time_s"] - trace["truth.time_s"][0]
-    told_s, told_Nm = rig.series("INV_Status", "TorqueEstimate", start_s)
-    asked_s, asked_Nm = rig.series("INV_Status", "TorqueCommand", start_s)
+    told_s, told_Nm = rig.series("INV_Status", "TorqueEstimated", start_s)
+    asked_s, asked_Nm = rig.series("INV_Status", "TorqueCommanded", start_s)
     figures.plot(f"From {first_Nm:g} to {second_Nm:g} N·m", [("torque, N·m", [
         ("shaft", time_s, trace[TRUTH]), ("told on CAN", told_s - start_s, told_Nm),
         ("asked of the control", asked_s - start_s, asked_Nm),

@@ -31,7 +31,7 @@ def test_a_measurement_read_over_xcp_is_what_the_plant_does(rig: Rig, descriptio
     master = Master(rig, description)
     assert master.measurement("speed_rpm") == pytest.approx(2000.0, abs=2.0)
     # The estimate against the shaft, not against the request it is controlled to.
-    assert master.measurement("torque_estimate_Nm") == pytest.approx(rig.stand.get(TRUTH)[0], abs=0.5)
+    assert master.measurement("torque_estimated_Nm") == pytest.approx(rig.stand.get(TRUTH)[0], abs=0.5)
     assert master.measurement("v_dc_V") == pytest.approx(350.0, abs=1.0)
     assert master.measurement("fault_word") == 0.0
 
@@ -47,10 +47,10 @@ def test_a_measurement_list_loses_no_millisecond_of_a_torque_step(
     rig.ask(torque_Nm=60.0)
     trace = rig.record(["truth.time_s", TRUTH])
     begun = len(trace.rows)
-    sampled = master.sample(["torque_estimate_Nm", "i_q_A"], 0, 0.3)
+    sampled = master.sample(["torque_estimated_Nm", "i_q_A"], 0, 0.3)
     periods = np.diff(sampled.time_ms) % 65536
     assert len(periods) >= 299 and set(periods) == {1.0}
-    told = sampled.columns["torque_estimate_Nm"]
+    told = sampled.columns["torque_estimated_Nm"]
     truth = trace[TRUTH][begun:]
     figures.plot("Recorded over XCP in the 1 ms raster", [("torque, N·m", [
         ("told over XCP", 1e-3 * (sampled.time_ms - sampled.time_ms[0]), told),

@@ -21,7 +21,7 @@ ANSWER_MS = 10
 
 
 def key_of(seed: int) -> int:
-    """The published function of firmware/app/xcp_access.c."""
+    """The published function of firmware/calibration/xcp_access.c."""
     return ((seed << 7 | seed >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C
 
 

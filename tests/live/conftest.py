@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page's server as a child process, and a browser before it."""
+"""The page's server as a child process, a browser before it, and simulated time that waits for both.
 
+The virtual ECU is the test's own: its time passes when the server asks for it, and the server waits until every page
+has drawn what there was (--in-step). However long a browser takes, no command is late and no page is silent.
+"""
+
+import contextlib
 import os
 import re
 import subprocess
@@ -10,8 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
+
+from progress import HANG_S
 
 ROOT = Path(__file__).resolve().parents[2]
 CHROMIUM, DRIVER = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
@@ -25,33 +34,68 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @dataclass
 class Server:
-    """A running page."""
+    """A running page, and the bench channel of the virtual ECU behind it; a replay has none."""
 
     url: str
     records: Path
     process: subprocess.Popen[str]
+    stand: Channel | None = None
+
+    def now_s(self) -> float:
+        """Simulated time; fails when the server has ended, because then it would stand still for ever."""
+        assert self.process.poll() is None, "the server has ended"
+        assert self.stand is not None
+        return 1e-9 * self.stand.run(0.0).now_ns
+
+
+def launch(records: Path, *arguments: str) -> Server:
+    """`tools/fluxtrue live` with further arguments."""
+    build = Path(os.environ["FLUXTRUE_BUILD_DIR"])
+    command = [sys.executable, "-m", "fluxtrue_tools", "live", "--port", "0", "--build-dir", str(build), *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    if not re.fullmatch(r"http://127\.0\.0\.1:\d+/\n", line):
+        process.kill()
+        pytest.fail(f"the server said '{line}'")
+    return Server(line.strip(), records, process)
+
+
+def end(server: Server) -> None:
+    """As a user ends it."""
+    server.process.terminate()
+    assert server.process.wait(HANG_S) == 0
 
 
 @pytest.fixture
-def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[..., Server]]:
-    """Starts `tools/fluxtrue live` with further arguments."""
-    running: list[subprocess.Popen[str]] = []
-    build = Path(os.environ["FLUXTRUE_BUILD_DIR"])
+def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
+    """Before a virtual ECU that has just been started."""
+    program = Path(request.config.getoption("--vecu"))
+    with VirtualEcu(program) as ecu:
+        options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
+        records = tmp_path / "records"
+        running = launch(
+            records, "--record-dir", str(records), "--can-interface", "socketcand",
+            *(f"--can-option={one}" for one in options),
+            "--bench", f"{HOST}:{ecu.bench_port}", "--elf", str(program), "--in-step",
+        )  # fmt: skip
+        running.stand = Channel(HOST, ecu.bench_port)
+        yield running
+        end(running)
+        running.stand.close()
 
-    def start(*arguments: str) -> Server:
-        command = [sys.executable, "-m", "fluxtrue_tools", "live", "--port", "0", "--build-dir", str(build),
-                   "--record-dir", str(tmp_path / "records"), *arguments]  # fmt: skip
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
-        running.append(process)
-        assert process.stdout is not None
-        line = process.stdout.readline()
-        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\n", line), line
-        return Server(line.strip(), tmp_path / "records", process)
 
-    yield start
-    for process in running:
-        process.terminate()
-        assert process.wait(20) == 0
+@pytest.fixture
+def replay(tmp_path: Path) -> Iterator[Callable[[Path], Server]]:
+    """Plays a recorded drive."""
+    with contextlib.ExitStack() as stack:
+
+        def start(path: Path) -> Server:
+            running = launch(tmp_path / "unused", "--replay", str(path))
+            stack.callback(end, running)
+            return running
+
+        yield start
 
 
 @pytest.fixture(scope="session")
@@ -65,5 +109,7 @@ def browser() -> Iterator[webdriver.Chrome]:
                      "--window-size=1440,960", "--force-device-scale-factor=1"):  # fmt: skip
         options.add_argument(argument)
     driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
+    driver.set_page_load_timeout(HANG_S)
+    driver.set_script_timeout(HANG_S)
     yield driver
     driver.quit()

@@ -2,7 +2,6 @@
 """What a person sees and does on the page, done by a browser."""
 
 import json
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -13,170 +12,222 @@ from asammdf import MDF
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.ui import WebDriverWait
 
 from conftest import Server
+from progress import HANG_S, until
 
-PATIENCE_S = 60.0
-
-
-def _find(browser: webdriver.Chrome, name: str) -> WebElement:
-    return browser.find_element(By.ID, name)
-
-
-def _until(browser: webdriver.Chrome, true: Callable[[], bool], what: str) -> None:
-    WebDriverWait(browser, PATIENCE_S, poll_frequency=0.05).until(lambda _: true(), f"waited for: {what}")
+PATIENCE_S = 60.0  # of simulated time
+HAND_TIMEOUT_S = 0.3  # docs/howto/live.md
+RAMP_Nm_per_s = 150.0
+BATCH_S = 0.04
 
 
-def _newest(browser: webdriver.Chrome, ring: str, name: str) -> float:
-    script = "const r = rings[arguments[0]]; return r.data[r.names.indexOf(arguments[1]) + 1].at(-1);"
-    return float(browser.execute_script(script, ring, name) or 0.0)
+class Page:
+    """The page as a person sees it, and the server behind it."""
 
+    def __init__(self, browser: webdriver.Chrome, server: Server) -> None:
+        self.browser, self.server = browser, server
 
-def _slide(browser: webdriver.Chrome, name: str, value: float) -> None:
-    script = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'));"
-    browser.execute_script(script, _find(browser, name), value)
+    def find(self, name: str) -> WebElement:
+        return self.browser.find_element(By.ID, name)
 
+    def text(self, name: str) -> str:
+        return self.find(name).text
 
-def _state(browser: webdriver.Chrome) -> str:
-    return _find(browser, "state").text
+    def until(self, true: Callable[[], bool], what: str) -> None:
+        """Wait in simulated time."""
+        until(true, self.server.now_s, PATIENCE_S, what)
 
+    def run(self, script: str, *arguments: object) -> object:
+        return self.browser.execute_script(script, *arguments)
 
-def _drive(browser: webdriver.Chrome, torque_Nm: float, true: Callable[[], bool], what: str) -> None:
-    """Ask for torque until something holds; like a person, press Enable again when the drive has let go.
+    def drawn(self, ring: str, name: str) -> list[tuple[float, float]]:
+        """Times and values, oldest first."""
+        script = "const r = rings[arguments[0]]; return [r.data[0], r.data[r.names.indexOf(arguments[1]) + 1]];"
+        columns = self.run(script, ring, name)
+        assert isinstance(columns, list)
+        return list(zip(*columns, strict=True))
 
-    A browser that stalls for 0.3 s on a busy computer is a dead man, a server that stalls for 30 ms a lost command.
-    """
+    def newest(self, ring: str, name: str) -> float:
+        drawn = self.drawn(ring, name)
+        return drawn[-1][1] if drawn else 0.0
 
-    def step() -> bool:
-        if _state(browser) == "ready" and _find(browser, "enable").is_enabled():
-            _find(browser, "enable").click()
-        elif _find(browser, "torque").is_enabled():
-            _slide(browser, "torque", torque_Nm)
-        return true()
+    def newest_s(self) -> float:
+        """The time up to which there is a picture."""
+        drawn = self.drawn("INV_Status", "Speed")
+        return drawn[-1][0] if drawn else 0.0
 
-    _until(browser, step, what)
+    def slide(self, name: str, value: float) -> None:
+        script = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'));"
+        self.run(script, self.find(name), value)
 
+    def drive(self, torque_Nm: float) -> None:
+        """The slider, once; then wait for the torque."""
+        assert self.find("torque").is_enabled()
+        self.slide("torque", torque_Nm)
+        for signal, within_Nm in (("TorqueCommanded", 0.1), ("TorqueEstimated", 1.0)):
+            self.until(lambda signal=signal, within_Nm=within_Nm:
+                       abs(self.newest("INV_Status", signal) - torque_Nm) < within_Nm, f"{torque_Nm} N·m")  # fmt: skip
 
-def _enable(browser: webdriver.Chrome, url: str) -> None:
-    browser.get(url)
-    _until(browser, lambda: _state(browser) == "standby", "standby")
-    _find(browser, "ready").click()
-    _until(browser, lambda: _state(browser) == "ready", "ready")
-    _drive(browser, 0.0, lambda: _state(browser) == "run" and _find(browser, "torque").is_enabled(), "run, the slider")
-    _slide(browser, "speed_rpm", 2000.0)
-    _until(browser, lambda: _newest(browser, "INV_Status", "Speed") > 1990.0, "2000 rpm")
+    def enable(self) -> None:
+        """Pressed once."""
+        self.find("enable").click()
+        self.until(lambda: self.text("state") == "run" and self.find("torque").is_enabled(), "run, the slider")
+
+    def hide(self, hidden: bool) -> float:
+        """As if the page lay in the background, or came back; the time up to which there was a picture."""
+        newest_s = self.run("Object.defineProperty(document, 'hidden', {value: arguments[0], configurable: true});"
+                            "document.dispatchEvent(new Event('visibilitychange'));"
+                            "return rings.INV_Status.data[0].at(-1);", hidden)  # fmt: skip
+        assert isinstance(newest_s, float)
+        return newest_s
 
 
 @pytest.fixture
-def page(browser: webdriver.Chrome, serve: Callable[..., Server]) -> Server:
-    """A page whose drive runs."""
-    server = serve()
-    _enable(browser, server.url)
-    return server
+def page(browser: webdriver.Chrome, server: Server) -> Page:
+    """A page whose drive runs at 2000 rpm."""
+    opened = Page(browser, server)
+    browser.get(server.url)
+    opened.until(lambda: opened.text("state") == "standby", "standby")
+    opened.find("ready").click()
+    opened.until(lambda: opened.text("state") == "ready", "ready")
+    opened.enable()
+    opened.slide("speed_rpm", 2000.0)
+    opened.until(lambda: opened.newest("INV_Status", "Speed") > 1990.0, "2000 rpm")
+    return opened
 
 
-def test_the_slider_moves_the_torque_and_the_magnet_does_not(
-    browser: webdriver.Chrome, page: Server, request: pytest.FixtureRequest
-) -> None:
-    _drive(browser, 60.0, lambda: abs(_newest(browser, "INV_Status", "TorqueEstimate") - 60.0) < 1.0, "60 N·m")
-    _slide(browser, "magnet_percent", 88.0)
-    time.sleep(8.0)  # for the picture: the flux has been found, the torque is back
-    _drive(browser, 60.0, lambda: abs(_newest(browser, "truth", "Torque") - 60.0) < 1.5, "60 N·m at the shaft")
+def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request: pytest.FixtureRequest) -> None:
+    page.drive(60.0)
+    page.slide("magnet_percent", 88.0)
+    weakened_s = page.server.now_s()
+    # For the picture: the flux has been found, the torque is back.
+    page.until(lambda: page.server.now_s() > weakened_s + 8.0, "8 s")
+    page.until(lambda: abs(page.newest("truth", "Torque") - 60.0) < 1.5, "60 N·m at the shaft")
     pictures = Path(request.config.getoption("--pictures"))
     pictures.mkdir(parents=True, exist_ok=True)
-    assert browser.save_screenshot(str(pictures / "live.png"))
-    assert not [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert page.browser.save_screenshot(str(pictures / "live.png"))
+    assert not [entry for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
-def test_every_batch_that_arrives_is_drawn(browser: webdriver.Chrome, page: Server) -> None:
-    """25 batches a second; two that arrive within one refresh of the screen share a drawing.
-
-    On a busy computer they come in heaps; some stretch of 50 within a minute must be drawn as it comes.
-    """
+def test_every_batch_that_arrives_is_drawn(page: Page) -> None:
+    """25 batches a second of simulated time; the next one comes when this one has been drawn."""
     read = "return {...fluxtrueStats}"
-    first = browser.execute_script(read)
+    first = last = page.run(read)
+    assert isinstance(first, dict) and isinstance(last, dict)
 
-    def drawn() -> bool:
-        nonlocal first
-        last = browser.execute_script(read)
-        batches, draws = last["batches"] - first["batches"], last["draws"] - first["draws"]
-        if batches < 50:
-            return False
-        assert last["rows"] - first["rows"] >= 4 * batches
-        first = last
-        return bool(draws >= 0.8 * batches)
+    def seen() -> bool:
+        nonlocal last
+        last = page.run(read)
+        return bool(last["batches"] - first["batches"] >= 50)
 
-    _until(browser, drawn, "50 batches, 40 drawings")
-
-
-def test_closing_the_page_ramps_the_torque_to_zero_and_opens_the_gates(
-    browser: webdriver.Chrome, page: Server
-) -> None:
-    _drive(browser, 40.0, lambda: _newest(browser, "INV_Status", "TorqueEstimate") > 38.0, "40 N·m")
-    browser.get("about:blank")
-    browser.get(page.url)
-    _until(browser, lambda: _state(browser) == "ready", "ready again")
-    assert abs(_newest(browser, "INV_Status", "TorqueCommand")) < 0.1
-    assert not _find(browser, "torque").is_enabled()
+    begin_s = page.server.now_s()
+    page.until(seen, "50 batches")
+    batches = last["batches"] - first["batches"]
+    assert last["draws"] - first["draws"] >= batches - 1  # one may be under way
+    assert last["rows"] - first["rows"] >= 4 * (batches - 1)
+    assert page.server.now_s() - begin_s >= (batches - 1) * BATCH_S - 1e-6
 
 
-def test_a_second_page_looks_but_does_not_touch(browser: webdriver.Chrome, page: Server) -> None:
-    first = browser.current_window_handle
-    _slide(browser, "torque", 20.0)
-    browser.switch_to.new_window("tab")
-    browser.get(page.url)
-    # The first page may be asleep in the background: the second says so before that matters.
-    _until(browser, lambda: _state(browser) in ("run", "ready"), "a state")
-    browser.execute_script("send({type: 'torque', torque_Nm: 90})")
-    _until(browser, lambda: "hand on the slider" in _find(browser, "message").text, "a refusal")
-    browser.close()
-    browser.switch_to.window(first)
+def test_closing_the_page_ramps_the_torque_to_zero_and_ends_the_switching(page: Page) -> None:
+    page.drive(40.0)
+    page.browser.get("about:blank")
+    page.browser.get(page.server.url)
+    page.until(lambda: page.text("state") == "ready", "ready again")
+    assert abs(page.newest("INV_Status", "TorqueCommanded")) < 0.1
+    assert not page.find("torque").is_enabled()
+    assert "closed or silent" in page.text("stopped")
 
 
-def test_calibration_values_are_read_written_and_refused(browser: webdriver.Chrome, page: Server) -> None:
-    _find(browser, "tune-read").click()
-    _until(browser, lambda: len(browser.find_elements(By.CSS_SELECTOR, "#tuning tr")) >= 6, "the values")
+def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_goes_on(page: Page) -> None:
+    page.drive(60.0)
+    silent_s = page.hide(True)
+    latest_s = HAND_TIMEOUT_S + 60.0 / RAMP_Nm_per_s + 3 * BATCH_S
+    page.until(lambda: page.text("state") == "ready" and page.newest_s() > silent_s + latest_s, "ready")
+    after = [(t - silent_s, torque) for t, torque in page.drawn("INV_Status", "TorqueCommanded") if t > silent_s]
+    # It gave its last sign of life with this batch or the one before.
+    assert all(abs(torque - 60.0) < 0.1 for t, torque in after if t < HAND_TIMEOUT_S - 2 * BATCH_S)
+    assert all(abs(torque) < 0.2 for t, torque in after if t > latest_s)
+    assert "closed or silent for 0.3 s" in page.text("stopped")
+    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0 N·m"
+    page.hide(False)
+    page.enable()
+    assert page.text("stopped") == ""
+    page.drive(20.0)
+
+
+def test_after_a_gap_in_the_commands_the_page_says_why_and_one_press_on_enable_goes_on(page: Page) -> None:
+    page.drive(60.0)
+    assert page.server.stand is not None
+    page.server.stand.run(60.0)  # time passes, and nobody sends a command
+    page.until(lambda: page.text("stopped") != "", "the reason")
+    assert "command timed out" in page.text("stopped") and "No command for 70 ms" in page.text("stopped")
+    page.until(lambda: page.text("state") == "ready", "ready")
+    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0 N·m"
+    page.enable()
+    assert page.text("stopped") == ""
+    page.drive(20.0)
+
+
+def test_a_second_page_looks_but_does_not_touch(page: Page) -> None:
+    first = page.browser.current_window_handle
+    page.slide("torque", 20.0)
+    page.browser.switch_to.new_window("tab")
+    page.browser.get(page.server.url)
+    page.until(lambda: page.text("state") in ("run", "ready"), "a state")
+    page.run("send({type: 'torque', torque_requested_Nm: 90})")
+    page.until(lambda: "hand on the slider" in page.text("message"), "a refusal")
+    page.browser.close()
+    page.browser.switch_to.window(first)
+
+
+def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
+    page.find("tune-read").click()
+    page.until(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#tuning tr")) >= 6, "the values")
     script = "const i = document.querySelector('#tuning input[name=observer_m]'); i.value = arguments[0];" \
              "i.dispatchEvent(new Event('change'));"  # fmt: skip
-    browser.execute_script(script, 3.5)
-    _until(browser, lambda: _find(browser, "message").text == "observer_m = 3.5000", "the new value")
-    browser.execute_script(script, 9)
-    _until(browser, lambda: "refused by the ECU" in _find(browser, "message").text, "a refusal")
-    assert "allowed: 2 … 4" in _find(browser, "message").text
+    page.run(script, 3.5)
+    page.until(lambda: page.text("message") == "observer_m = 3.5000", "the new value")
+    page.run(script, 9)
+    page.until(lambda: "refused by the ECU" in page.text("message"), "a refusal")
+    assert "allowed: 2 … 4" in page.text("message")
 
 
-def test_a_recording_is_an_mdf4_file_and_can_be_played_back(
-    browser: webdriver.Chrome, page: Server, serve: Callable[..., Server]
-) -> None:
-    _find(browser, "record").click()
-    _until(browser, lambda: _find(browser, "record").text == "Stop", "recording")
-    _drive(browser, 30.0, lambda: _newest(browser, "INV_Status", "TorqueEstimate") > 28.0, "30 N·m")
-    time.sleep(2.0)
-    _find(browser, "record").click()
-    _until(browser, lambda: "written" in _find(browser, "file").text, "the file")
-    (path,) = page.records.glob("*.mf4")
+def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: Callable[[Path], Server]) -> None:
+    page.find("record").click()
+    page.until(lambda: page.text("record") == "Stop", "recording")
+    page.drive(30.0)
+    driven_s = page.server.now_s()
+    page.until(lambda: page.server.now_s() > driven_s + 2.0, "2 s")
+    page.find("record").click()
+    page.until(lambda: "written" in page.text("file"), "the file")
+    (path,) = page.server.records.glob("*.mf4")
     with MDF(path) as log:
         assert log.get("CAN_DataFrame").samples.size > 500
-    replay = serve("--replay", str(path))
-    browser.get(replay.url)
-    _until(browser, lambda: _newest(browser, "INV_Status", "TorqueEstimate") > 20.0, "the drive")
-    assert not _find(browser, "enable").is_enabled()
-    browser.execute_script("send({type: 'drive'})")
-    _until(browser, lambda: "obeys nobody" in _find(browser, "message").text, "a refusal")
+    played = Page(page.browser, replay(path))
+    played.browser.get(played.server.url)
+
+    def wait(true: Callable[[], bool], what: str) -> None:
+        """In the recording's time, as far as it has been drawn."""
+        until(true, played.newest_s, PATIENCE_S, what)
+
+    wait(lambda: played.newest("INV_Status", "TorqueEstimated") > 20.0, "the drive")
+    assert not played.find("enable").is_enabled()
+    played.run("send({type: 'drive'})")
+    wait(lambda: "obeys nobody" in played.text("message"), "a refusal")
 
 
 def _status(url: str, **headers: str) -> int:
     request = urllib.request.Request(url, headers=headers)
     try:
-        with urllib.request.urlopen(request, timeout=10) as answer:
+        with urllib.request.urlopen(request, timeout=HANG_S) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         return error.code
 
 
-def test_other_hosts_and_other_pages_are_refused(serve: Callable[..., Server]) -> None:
-    url = serve().url
+def test_other_hosts_and_other_pages_are_refused(server: Server) -> None:
+    url = server.url
     assert _status(url) == 200
     assert _status(url, Host="drive.example") == 403
     assert _status(url, Origin="http://drive.example") == 403
@@ -185,14 +236,14 @@ def test_other_hosts_and_other_pages_are_refused(serve: Callable[..., Server]) -
     assert _status(url + "static/../cli.py") == 404
 
 
-def test_garbage_from_a_page_is_answered_and_moves_nothing(browser: webdriver.Chrome, page: Server) -> None:
-    for message in ([], {"type": "torque"}, {"type": "torque", "torque_Nm": "40"}, {"type": "launch"},
-                    {"type": "knob", "name": "speed_rpm", "value": None}):  # fmt: skip
-        browser.execute_script("say('')")
-        browser.execute_script("socket.send(arguments[0])", json.dumps(message))
-        _until(browser, lambda: _find(browser, "message").text != "", f"an answer to {message}")
-    browser.execute_script("say(''); socket.send('{')")
-    _until(browser, lambda: _find(browser, "message").text != "", "an answer to half an object")
-    assert _state(browser) in ("run", "ready")  # the latter after a stall of this computer
-    assert abs(_newest(browser, "INV_Status", "TorqueCommand")) < 0.1
-    _drive(browser, 10.0, lambda: _newest(browser, "INV_Status", "TorqueEstimate") > 9.0, "10 N·m: it still obeys")
+def test_garbage_from_a_page_is_answered_and_moves_nothing(page: Page) -> None:
+    for message in ([], {"type": "torque"}, {"type": "torque", "torque_requested_Nm": "40"}, {"type": "launch"},
+                    {"type": "knob", "name": "speed_rpm", "value": None}, {"type": "drawn", "batch": "9"}):  # fmt: skip
+        page.run("say('')")
+        page.run("socket.send(arguments[0])", json.dumps(message))
+        page.until(lambda: page.text("message") != "", f"an answer to {message}")
+    page.run("say(''); socket.send('{')")
+    page.until(lambda: page.text("message") != "", "an answer to half an object")
+    assert page.text("state") == "run"
+    assert abs(page.newest("INV_Status", "TorqueCommanded")) < 0.1
+    page.drive(10.0)

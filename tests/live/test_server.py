@@ -3,7 +3,9 @@
 
 import asyncio
 import json
+import threading
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +17,30 @@ from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.live.cli import _listen
 from fluxtrue_tools.live.commander import Commander, Order, Wish
 from fluxtrue_tools.live.link import Recorder
+from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.server import Session, make_app
+
+from progress import HANG_S, polled_async
 
 TICK_S = 0.01
 RAMP_S = 0.4  # 60 N·m at 150 N·m/s
 
 
 class Drive:
-    """The bus side, in place of a Link: the commander is stepped by the test, the inverter does what it is told."""
+    """The bus side, in place of a Link: the commander is stepped by the test, the inverter does what it is told.
+
+    As the state machine of docs/howto/can.md: enable is an edge, and a command that is missing for 30 ms takes it back.
+    """
+
+    lost = ""
 
     def __init__(self) -> None:
         self.commander = Commander(132.0)
-        self.now_s, self.state = 100.0, "standby"
+        self.now_s, self.state, self.refused = 100.0, "standby", "none"
         self.order = Order()
+        self.obeys = True
+        self._enable_seen = self._enabled = False
 
     def act(self, action: Callable[[Commander, float], None]) -> None:
         """As Link.act(), with the test's clock."""
@@ -41,10 +53,23 @@ class Drive:
             self.now_s += TICK_S
             if alive:
                 self.commander.hand(self.now_s)
-            self.order = self.commander.step(self.now_s, self.state)
-            self.state = "run" if self.order.enable else "ready" if self.order.mode == "torque" else "standby"
-            torques.append(self.order.torque_Nm)
+            self.order = self.commander.step(self.now_s, self.state, self.refused)
+            self._follow()
+            torques.append(self.order.torque_requested_Nm)
         return torques
+
+    def _follow(self) -> None:
+        edge = self.order.enable and not self._enable_seen
+        self._enabled = self.order.enable and (self._enabled or (edge and self.obeys))
+        self._enable_seen = self.order.enable
+        self.state = "run" if self._enabled else "ready" if self.order.mode == "torque" else "standby"
+
+    def gap(self, seconds: float) -> None:
+        """Nobody sends a command."""
+        self.now_s += seconds
+        self.commander.hand(self.now_s)
+        if seconds > 0.03 and self._enabled:
+            self._enabled, self._enable_seen, self.state, self.refused = False, True, "ready", "command_timed_out"
 
 
 @pytest.fixture
@@ -76,18 +101,77 @@ def test_a_page_that_says_nothing_for_300_ms_loses_the_torque_by_a_ramp_and_must
     assert torques[-1] == 0.0 and not driving.order.enable and driving.state == "ready"
     driving.act(lambda commander, now: commander.slide(60.0, now))  # it wakes up, its slider still there
     assert set(driving.run(1.0, alive=True)) == {0.0} and not driving.order.enable
+    assert "closed or silent for 0.3 s. Press Enable" in driving.commander.stopped
+    press(driving, Wish.DRIVE)
+    assert driving.state == "run"
+
+
+def press(drive: Drive, wish: Wish) -> None:
+    """A button, once; and the hand stays."""
+    drive.act(lambda commander, now: commander.ask(wish, now))
+    drive.run(0.1, alive=True)
+
+
+def test_a_gap_in_the_commands_takes_the_wish_back_says_why_and_one_press_goes_on(driving: Drive) -> None:
+    driving.gap(0.05)
+    driving.run(0.05, alive=True)
+    commander = driving.commander
+    assert driving.state == "ready" and not driving.order.enable
+    assert (commander.wish, commander.target_Nm, driving.order.torque_requested_Nm) == (Wish.READY, 0.0, 0.0)
+    assert commander.stopped == ("The inverter stopped: command timed out. No command for 60 ms; it waits 30 ms. "
+                                 "Press Enable to go on.")  # fmt: skip
+    driving.run(2.0, alive=True)
+    assert driving.state == "ready" and commander.stopped
+    press(driving, Wish.DRIVE)
+    assert driving.state == "run" and commander.stopped == "" and driving.order.torque_requested_Nm == 0.0
+
+
+def test_a_gap_that_the_inverter_bears_changes_nothing(driving: Drive) -> None:
+    driving.gap(0.015)
+    assert set(driving.run(0.2, alive=True)) == {60.0}
+    assert driving.commander.stopped == "" and driving.state == "run"
+
+
+@pytest.mark.parametrize(("state", "why"), [
+    ("fault", "The inverter reports fault. Reset its faults first. Press Enable to go on."),
+    ("safe_state", "The inverter reports safe state. Reset its faults first. Press Enable to go on."),
+    ("ready", "The inverter stopped. Its state is ready. Press Enable to go on."),
+    ("discharge", "The inverter stopped. Its state is discharge. Press Enable to go on."),
+])  # fmt: skip
+def test_an_inverter_that_stops_by_itself_takes_the_wish_back_and_the_reason_names_its_state(
+    driving: Drive, state: str, why: str
+) -> None:
+    driving.state = state
+    driving.run(TICK_S, alive=True)
+    assert (driving.commander.wish, driving.commander.stopped) == (Wish.READY, why)
+
+
+def test_an_enable_that_is_not_obeyed_is_taken_back_after_half_a_second_with_the_inverter_s_reason() -> None:
+    drive = Drive()
+    press(drive, Wish.READY)
+    drive.obeys, drive.refused = False, "dc_voltage_out_of_range"
+    press(drive, Wish.DRIVE)
+    assert drive.commander.wish is Wish.DRIVE
+    drive.run(0.5, alive=True)
+    assert drive.commander.wish is Wish.READY
+    assert drive.commander.stopped == ("The inverter did not start: dc voltage out of range. Its state is ready. "
+                                       "Press Enable to go on.")  # fmt: skip
+    drive.obeys = True
+    press(drive, Wish.DRIVE)
+    assert drive.state == "run"
 
 
 Talk = Callable[[TestClient[Any, Any], Session], Awaitable[None]]
 
 
-def serve(drive: Drive, folder: Path, talk: Talk) -> None:
+def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None) -> None:
     """A server for the length of one conversation."""
 
     async def conversation() -> None:
         samples = Samples(cantools.database.load_file(DBC))
         session = Session("test", drive.commander, samples, Recorder(folder, DBC), {})
         session.link = drive  # type: ignore[assignment]
+        session.in_step = in_step
         async with TestClient(TestServer(make_app(session))) as client:
             await talk(client, session)
 
@@ -97,14 +181,14 @@ def serve(drive: Drive, folder: Path, talk: Talk) -> None:
 async def page(client: TestClient[Any, Any]) -> ClientWebSocketResponse:
     """A page that has just been opened."""
     socket = await client.ws_connect("/ws", headers={"Origin": f"http://127.0.0.1:{client.port}"})
-    assert (await socket.receive_json(timeout=10.0))["type"] == "hello"
+    assert (await socket.receive_json(timeout=HANG_S))["type"] == "hello"
     return socket
 
 
 async def refusal(socket: ClientWebSocketResponse, text: str) -> str:
     """What the page is told about one message."""
     await socket.send_str(text)
-    while (answer := await socket.receive_json(timeout=10.0))["type"] != "refused":
+    while (answer := await socket.receive_json(timeout=HANG_S))["type"] != "refused":
         assert answer["type"] == "rows", answer
     return str(answer["text"])
 
@@ -116,9 +200,7 @@ async def obeyed(socket: ClientWebSocketResponse) -> None:
 
 async def until_gone(session: Session, viewers: int) -> None:
     """The server has noticed that a page has gone."""
-    async with asyncio.timeout(10.0):
-        while len(session.viewers) > viewers:
-            await asyncio.sleep(0.01)
+    await polled_async(lambda: len(session.viewers) <= viewers)
 
 
 @pytest.mark.parametrize("cut", [False, True], ids=["closed", "cut off"])
@@ -133,17 +215,17 @@ def test_a_lost_page_lets_go_at_once_and_no_other_page_inherits_its_torque(tmp_p
         await first.send_json({"type": "drive"})
         await obeyed(first)
         drive.run(0.1)
-        await first.send_json({"type": "torque", "torque_Nm": 60.0})
+        await first.send_json({"type": "torque", "torque_requested_Nm": 60.0})
         await obeyed(first)
         assert drive.run(0.2)[-1] == pytest.approx(30.0)
-        assert "hand on the slider" in await refusal(second, '{"type": "torque", "torque_Nm": 90}')
+        assert "hand on the slider" in await refusal(second, '{"type": "torque", "torque_requested_Nm": 90}')
         if cut:
             assert first._response.connection is not None and first._response.connection.transport is not None
             first._response.connection.transport.abort()
         else:
             await first.close()
         await until_gone(session, 1)
-        await second.send_json({"type": "torque", "torque_Nm": 90.0})
+        await second.send_json({"type": "torque", "torque_requested_Nm": 90.0})
         await obeyed(second)
         torques = [30.0, *drive.run(0.3)]
         assert torques == sorted(torques, reverse=True) and torques[-1] == 0.0
@@ -154,8 +236,8 @@ def test_a_lost_page_lets_go_at_once_and_no_other_page_inherits_its_torque(tmp_p
 
 @pytest.mark.parametrize("text", [
     "{", "[]", "[" * 4000, '{"type": ["torque"]}', '{"type": "launch"}', '{"type": "torque"}',
-    '{"type": "torque", "torque_Nm": "40"}', '{"type": "torque", "torque_Nm": NaN}',
-    '{"type": "torque", "torque_Nm": true}', '{"type": "torque", "torque_Nm": 1' + "0" * 400 + "}",
+    '{"type": "torque", "torque_requested_Nm": "40"}', '{"type": "torque", "torque_requested_Nm": NaN}',
+    '{"type": "torque", "torque_requested_Nm": true}', '{"type": "torque", "torque_requested_Nm": 1' + "0" * 400 + "}",
     '{"type": "knob", "name": ["speed_rpm"], "value": 1}', '{"type": "tune", "name": "observer_m", "value": 3}',
 ], ids=range(12))  # fmt: skip
 def test_a_bad_message_is_answered_and_moves_nothing(driving: Drive, tmp_path: Path, text: str) -> None:
@@ -179,14 +261,92 @@ def test_a_page_that_does_not_read_leaves_the_others_their_pictures(tmp_path: Pa
             assert json.loads(text)["type"] == "rows"
             raise TimeoutError
 
+        async def close(self, **_: Any) -> None:
+            """There is no connection."""
+
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         session.viewers.append(Stuck())  # type: ignore[arg-type]
         socket = await page(client)
         for _ in range(5):
-            assert (await socket.receive_json(timeout=10.0))["type"] == "rows"
+            assert (await socket.receive_json(timeout=HANG_S))["type"] == "rows"
         assert Stuck.sent >= 4
 
     serve(Drive(), tmp_path, talk)
+
+
+def test_a_long_answer_does_not_keep_the_signs_of_life_from_being_heard(driving: Drive, tmp_path: Path) -> None:
+    """Reading all calibration values takes longer than a page may be silent."""
+    read = threading.Event()
+
+    class Slow:
+        """An ECU that answers when the test says so."""
+
+        thread = ThreadPoolExecutor(1)
+
+        def table(self) -> list[dict[str, Any]]:
+            read.wait()
+            return []
+
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        session.tuning = Slow()  # type: ignore[assignment]
+        socket = await page(client)
+        await socket.send_json({"type": "torque", "torque_requested_Nm": 60.0})
+        await socket.send_json({"type": "tune_list"})
+        await socket.send_json({"type": "drawn", "batch": 0, "visible": True})
+        await obeyed(socket)
+        assert driving.commander.alive(driving.now_s)
+        read.set()
+        while (answer := await socket.receive_json(timeout=HANG_S))["type"] == "rows":
+            pass
+        assert answer == {"type": "tune_list", "values": []}
+
+    driving.run(0.2)
+    serve(driving, tmp_path, talk)
+
+
+@pytest.mark.parametrize("visible", [True, False])
+def test_only_a_page_that_can_be_seen_gives_a_sign_of_life(driving: Drive, tmp_path: Path, visible: bool) -> None:
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        socket = await page(client)
+        await socket.send_json({"type": "torque", "torque_requested_Nm": 60.0})
+        await obeyed(socket)
+        driving.run(0.25)
+        await socket.send_json({"type": "drawn", "batch": 0, "visible": visible})
+        await obeyed(socket)
+        assert (driving.run(0.2)[-1] == 60.0) == visible
+
+    serve(driving, tmp_path, talk)
+
+
+def test_in_step_time_waits_until_each_page_has_drawn_and_for_a_page_to_draw(tmp_path: Path) -> None:
+    in_step, turns = InStep(), []
+
+    async def batch(socket: ClientWebSocketResponse) -> int:
+        while (message := await socket.receive_json(timeout=HANG_S))["type"] != "rows":
+            pass
+        return int(message["batch"])
+
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        def time_passes() -> None:
+            while len(turns) < 2:
+                in_step.turn()
+                turns.append(1)
+
+        first, second = await page(client), await page(client)
+        passing = asyncio.get_running_loop().run_in_executor(None, time_passes)
+        assert (await batch(first), await batch(second)) == (0, 0)
+        await first.send_json({"type": "drawn", "batch": 0, "visible": True})
+        await obeyed(first)
+        assert not turns  # the second has not drawn yet
+        await second.send_json({"type": "drawn", "batch": 0, "visible": False})
+        assert (await batch(first), await batch(second)) == (1, 1)
+        assert len(turns) == 1
+        await second.close()  # nobody waits for a page that has gone
+        await first.send_json({"type": "drawn", "batch": 1, "visible": True})
+        await passing
+        assert len(turns) == 2
+
+    serve(Drive(), tmp_path, talk, in_step)
 
 
 def test_it_listens_on_the_loopback_address_only() -> None:

@@ -4,6 +4,7 @@
 import csv
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ def sim(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess[str
     command = [sys.executable, "-m", "fluxtrue_tools", "sim", *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
     return subprocess.run(
-        command, capture_output=True, text=True, cwd=cwd, timeout=300, env=environment
+        command, capture_output=True, text=True, cwd=cwd, env=environment
     )
 
 
@@ -65,12 +66,12 @@ def test_a_plot_takes_its_format_from_its_name(tmp_path: Path, scenario: Path, s
         (GOOD, ["--plot", "run.gif"], "allowed: a file ending in .png, .svg, .pdf"),
         (GOOD, ["--json", "/dev/null"], "/dev/null: is a device or a pipe, allowed: a file name"),
         (GOOD, ["--json", "./out.csv"], "out.csv: given twice"),
-        (GOOD, ["--motor", "a;b"], "motor 'a;b': allowed: a path without"),
+        (GOOD, ["--motor", "a;b"], "--motor = 'a;b', allowed: hsm1, paper, or a folder whose path has none of ;"),
         (GOOD, ["--out", "missing/run.csv"], "missing/run.csv: cannot be written"),
-        (GOOD, ["--motor", "hsm2"], "motor 'hsm2': neither a folder with a motor.toml nor one of hsm1, paper"),
+        (GOOD, ["--motor", "hsm2"], "--motor = 'hsm2': neither a folder with a motor.toml nor one of hsm1, paper"),
         (GOOD, ["--build-dir", "empty"], "libfluxtrue_sim.so is missing: cmake --build"),
         (GOOD, ["--speed", "3"], "No such option"),
-        (GOOD + "[plant]\nvdc = 3", [], "plant.vdc: unknown field"),
+        (GOOD + "[plant]\nvdc = 3", [], "plant.vdc: unknown key"),
         (GOOD + "[controller]\nenabel = true", [], "enabel = 1: no such name, allowed: enable"),
         (GOOD.replace("0.4", "-1"), [], "duration_s = -1"),
     ],
@@ -86,6 +87,50 @@ def test_bad_input_ends_in_one_line_exit_2_and_no_file(
     assert len(result.stderr.strip().splitlines()) == 1, result.stderr
     assert result.stdout == ""
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bad.toml", "empty"]
+
+
+@pytest.mark.parametrize("option", ["--out", "--json", "--plot"])
+@pytest.mark.parametrize("link", [None, "symlink_to", "hardlink_to"])
+def test_no_output_overwrites_the_scenario(tmp_path: Path, scenario: Path, option: str, link: str | None) -> None:
+    name = "run.toml" if option != "--plot" else "run.png"
+    output = scenario
+    if link is not None or option == "--plot":
+        output = tmp_path / f"link-{name}"
+        getattr(output, link or "symlink_to")(scenario)
+    result = sim(scenario, option, output)
+    assert result.returncode == 2
+    assert result.stderr == f"error: {option} {output}: would overwrite input {scenario}, allowed: another name\n"
+    assert scenario.read_text() == GOOD
+
+
+def test_no_output_overwrites_the_data_of_the_motor(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    shutil.copytree(ROOT / "firmware" / "motors" / "hsm1", folder)
+    (tmp_path / "run.toml").write_text(GOOD.replace("hsm1", "mine"))
+    for name in ("motor.toml", "flux_map.csv"):
+        before = (folder / name).read_bytes()
+        result = sim("run.toml", "--out", f"mine/{name}", cwd=tmp_path)
+        assert result.returncode == 2
+        assert "would overwrite input" in result.stderr
+        assert (folder / name).read_bytes() == before
+
+
+def test_a_motor_that_is_refused_leaves_no_build_folder(tmp_path: Path) -> None:
+    folder = tmp_path / f"refused-{tmp_path.name}"
+    folder.mkdir()
+    (folder / "motor.toml").write_text("[machine]\nname = 'refused'\n")
+    (tmp_path / "run.toml").write_text(GOOD)
+    result = sim("run.toml", "--motor", folder, cwd=tmp_path)
+    assert result.returncode == 2
+    assert str(folder / "motor.toml") in result.stderr
+    assert not list((ROOT / "build" / "sim").glob(f"{folder.name}-*"))
+
+
+def test_a_motor_that_is_not_there_is_named_with_file_and_key(tmp_path: Path) -> None:
+    (tmp_path / "run.toml").write_text(GOOD.replace("hsm1", "hsm2"))
+    result = sim("run.toml", cwd=tmp_path)
+    assert result.returncode == 2
+    assert result.stderr.startswith("error: run.toml: motor = 'hsm2': neither a folder with a motor.toml nor one of ")
 
 
 def test_a_missing_scenario_is_named() -> None:
@@ -115,6 +160,7 @@ SHIPPED = sorted(SCENARIOS.glob("*.toml"))
 def test_a_shipped_scenario_runs_as_its_comment_says(path: Path, paper: Motor, hsm1: Motor) -> None:
     scenario = read(path)
     run = simulate(scenario, {"paper": paper, "hsm1": hsm1}[scenario.motor], where=path.name)
+    assert run.unexpected() is None
     if path.stem == "sensor-fault":
         assert run.fault_word != 0
         assert run["run_state"][-1] == 2.0

@@ -112,7 +112,7 @@ def test_it_survives_a_power_cycle(hsm1: Motor) -> None:
 def test_afterwards_the_drive_runs_as_before(hsm1: Motor) -> None:
     with standing(hsm1, {"dead_time_s": 2.4e-6, "device_drop_V": 1.5}) as loop:
         commission(loop)
-        loop.run(5000, {"plant.speed_rad_s": (0.0, 100.0), "torque_command_Nm": (0.0, 40.0)})
+        loop.run(5000, {"plant.speed_rad_s": (0.0, 100.0), "torque_requested_Nm": (0.0, 40.0)})
         rows = loop.run_s(0.5)
         assert rows[:, 1].max() == 0.0
         assert rows[-100:, 0].mean() == pytest.approx(40.0, rel=0.01)

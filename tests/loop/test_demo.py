@@ -80,7 +80,7 @@ def test_the_summary_has_every_experiment_with_its_fields(whole: Demonstration) 
     for experiment in summary["experiments"]:
         assert wanted[experiment["id"]] <= set(experiment)
     for point in next(e for e in summary["experiments"] if e["id"] == "hsm1-grid")["points"]:
-        assert {"speed_rpm", "torque_command_Nm", "torque_error_open_percent",
+        assert {"speed_rpm", "torque_requested_Nm", "torque_error_open_percent",
                 "torque_error_closed_percent", "psi_error_percent", "r_error_percent"} <= set(point)  # fmt: skip
 
 

@@ -41,9 +41,9 @@ def on_grid(machines: Bench) -> list[Result]:
 
 def test_the_measured_machine_keeps_its_torque_in_four_quadrants(on_grid: list[Result]) -> None:
     points = on_grid[0].summary["points"]
-    assert {(p["speed_rpm"], p["torque_command_Nm"]) for p in points} == QUADRANTS
+    assert {(p["speed_rpm"], p["torque_requested_Nm"]) for p in points} == QUADRANTS
     for p in points:
-        allowed = max(0.5, 15.0 / abs(p["torque_command_Nm"]))  # 0.15 N·m in percent
+        allowed = max(0.5, 15.0 / abs(p["torque_requested_Nm"]))  # 0.15 N·m in percent
         assert abs(p["torque_error_closed_percent"]) <= allowed, p
         # Without the loop the weaker magnets cost what the reference runs of the theory say.
         assert -11.0 <= p["torque_error_open_percent"] <= -5.0, p

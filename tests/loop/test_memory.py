@@ -23,7 +23,7 @@ def power_on(motor: Motor, memory: bytes | None = None) -> Loop:
 
 def to(loop: Loop, before: tuple[float, float], after: tuple[float, float], seconds: float) -> float:
     """From one speed and torque to another; the mean torque of the last 10 ms."""
-    ramps = {"plant.speed_rad_s": (before[0] * RPM, after[0] * RPM), "torque_command_Nm": (before[1], after[1])}
+    ramps = {"plant.speed_rad_s": (before[0] * RPM, after[0] * RPM), "torque_requested_Nm": (before[1], after[1])}
     rows = loop.run(round(seconds * 1e4), ramps)
     assert rows[:, 1].max() == 0.0
     return float(rows[-10:, 0].mean())

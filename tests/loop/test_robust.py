@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 RPM = 2.0 * math.pi / 60.0
 PER_S = 10000
 RATED_NM = 132.0
-COLUMNS = ("truth.torque_mean_Nm", "torque_estimate_Nm", "psi_f_Vs", "torque_confidence", "torque_correction",
+COLUMNS = ("truth.torque_mean_Nm", "torque_estimated_Nm", "psi_f_Vs", "torque_confidence", "torque_correction",
            "voltage_limited", "fault_word")  # fmt: skip
 TORQUE, ESTIMATE, PSI, CONFIDENCE, CORRECTION, LIMITED, FAULT = range(len(COLUMNS))
 
@@ -39,7 +39,7 @@ class Drive:
 
     def to(self, rpm: float, torque_Nm: float, seconds: float) -> NDArray[np.float64]:
         """On straight lines; a row each millisecond."""
-        ramps = {"plant.speed_rad_s": (self.speed, rpm * RPM), "torque_command_Nm": (self.torque, torque_Nm)}
+        ramps = {"plant.speed_rad_s": (self.speed, rpm * RPM), "torque_requested_Nm": (self.torque, torque_Nm)}
         rows = self.loop.run(round(seconds * PER_S), ramps)
         self.speed, self.torque = rpm * RPM, torque_Nm
         assert rows[:, FAULT].max() == 0.0

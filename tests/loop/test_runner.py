@@ -46,10 +46,10 @@ def test_every_plant_field_holds_the_value_it_is_given_and_only_that_field(hsm1:
     [
         ("plant.nothing", 1.0, lib.UNKNOWN_NAME),
         ("truth.torque_Nm", 1.0, lib.READ_ONLY),
-        ("torque_estimate_Nm", 1.0, lib.READ_ONLY),
+        ("torque_estimated_Nm", 1.0, lib.READ_ONLY),
         ("plant.vdc_V", math.nan, lib.OUT_OF_RANGE),
         ("plant.vdc_V", -1.0, lib.OUT_OF_RANGE),
-        ("torque_command_Nm", 1e9, lib.OUT_OF_RANGE),
+        ("torque_requested_Nm", 1e9, lib.OUT_OF_RANGE),
         ("x" * 200, 1.0, lib.UNKNOWN_NAME),
     ],
 )
@@ -72,7 +72,7 @@ def test_the_same_seed_gives_the_same_run_to_the_last_bit(hsm1: Motor, controlle
     def rows(seed: float) -> Any:
         with loop(hsm1, controller, seed=seed, current_noise_A_rms=0.5, speed_rad_s=100.0) as sim:
             sim.set("enable", 1.0)
-            sim.set("torque_command_Nm", 30.0)
+            sim.set("torque_requested_Nm", 30.0)
             sim.record(["truth.torque_mean_Nm", "id_A", "psi_f_Vs"])
             return sim.run(500)
 
@@ -85,7 +85,7 @@ def test_two_loops_side_by_side_do_not_see_each_other(hsm1: Motor) -> None:
     def one(torque: float) -> Loop:
         sim = loop(hsm1, speed_rad_s=100.0)
         sim.set("enable", 1.0)
-        sim.set("torque_command_Nm", torque)
+        sim.set("torque_requested_Nm", torque)
         sim.record(["truth.torque_mean_Nm"])
         return sim
 
@@ -115,8 +115,8 @@ def test_a_row_is_the_mean_of_its_periods_and_its_time_is_the_end(hsm1: Motor) -
     def rows(every: int) -> Any:
         with loop(hsm1, speed_rad_s=50.0) as sim:
             sim.set("enable", 1.0)
-            sim.set("torque_command_Nm", 40.0)
-            sim.record(["truth.time_s", "truth.torque_mean_Nm", "torque_estimate_Nm"], every)
+            sim.set("torque_requested_Nm", 40.0)
+            sim.record(["truth.time_s", "truth.torque_mean_Nm", "torque_estimated_Nm"], every)
             return sim.run(200)
 
     fine, coarse = rows(1), rows(10)
@@ -129,19 +129,19 @@ def test_a_ramp_is_linear_every_period_for_the_plant_and_every_millisecond_for_t
     hsm1: Motor,
 ) -> None:
     with loop(hsm1) as sim:
-        sim.record(["plant.vdc_V", "torque_command_Nm"])
-        rows = sim.run(100, {"plant.vdc_V": (300.0, 400.0), "torque_command_Nm": (0.0, 10.0)})
+        sim.record(["plant.vdc_V", "torque_requested_Nm"])
+        rows = sim.run(100, {"plant.vdc_V": (300.0, 400.0), "torque_requested_Nm": (0.0, 10.0)})
         assert np.allclose(rows[:, 0], 300.0 + np.arange(100))
         assert np.allclose(rows[:, 1], np.repeat(np.arange(10.0), 10))
         # It ends where it was told to, and stays there.
         assert sim.get("plant.vdc_V") == 400.0
-        assert sim.get("torque_command_Nm") == 10.0
+        assert sim.get("torque_requested_Nm") == 10.0
         assert set(sim.run(5)[:, 0]) == {400.0}
 
 
 def test_a_ramp_to_a_value_that_is_not_allowed_is_refused(hsm1: Motor) -> None:
     with loop(hsm1) as sim, pytest.raises(LoopError, match="out of range"):
-        sim.run(10, {"torque_command_Nm": (0.0, 1e9)})
+        sim.run(10, {"torque_requested_Nm": (0.0, 1e9)})
 
 
 def test_the_duties_of_a_period_act_in_the_next_one(hsm1: Motor) -> None:
@@ -175,7 +175,7 @@ def test_unknown_channels_are_named(hsm1: Motor) -> None:
 def test_an_open_sensor_trips_the_gates(hsm1: Motor) -> None:
     with loop(hsm1, speed_rad_s=100.0) as sim:
         sim.set("enable", 1.0)
-        sim.set("torque_command_Nm", 50.0)
+        sim.set("torque_requested_Nm", 50.0)
         sim.run(1000)
         assert sim.get("fault_word") == 0.0
         sim.set("plant.current_open_b", 1.0)

@@ -10,9 +10,9 @@ import pytest
 from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Drive, load, names
 
 IDLE = (0.0, 0.0, 0.0, 350.0, 0.0, 20.0)
-SETTABLE = ("torque_command_Nm", "enable", "torque_loop", "identification")
+SETTABLE = ("torque_requested_Nm", "enable", "torque_loop", "identification")
 READABLE = (
-    *SETTABLE, "torque_estimate_Nm", "psi_f_Vs", "r_ohm", "id_A", "iq_A", "id_ref_A", "iq_ref_A",
+    *SETTABLE, "torque_estimated_Nm", "psi_f_Vs", "r_ohm", "id_A", "iq_A", "id_ref_A", "iq_ref_A",
     "ud_V", "uq_V", "speed_rpm", "psi_quality", "r_quality", "fault_word",
 )  # fmt: skip
 INPUTS = ("ia_A", "ib_A", "ic_A", "vdc_V", "theta_m_rad", "t_winding_C")
@@ -59,6 +59,46 @@ def test_every_enumerated_name_can_be_read(library: ctypes.CDLL, make: Callable[
     assert [name for name in names(library) if not math.isfinite(drive.get(name))] == []
 
 
+OLD_NAMES = {
+    "torque_command_Nm": "torque_requested_Nm",
+    "torque_request_Nm": "torque_corrected_Nm",
+    "torque_estimate_Nm": "torque_estimated_Nm",
+}
+
+
+@pytest.mark.parametrize(("old", "present"), OLD_NAMES.items())
+def test_a_name_of_version_0_1_still_works_and_is_not_listed(
+    library: ctypes.CDLL, make: Callable[[], Drive], old: str, present: str
+) -> None:
+    drive = running(make())
+    assert drive.set("torque_requested_Nm", 8.0) == OK
+    for _ in range(100):
+        drive.step((0.0, 2.0, -2.0, 350.0, 0.0, 20.0))  # i_q, so that there is a torque to estimate
+    assert drive.get(old) == drive.get(present) != 0.0
+    assert drive.set(old, 5.0) == drive.set(present, 5.0)
+    assert drive.get(old) == drive.get(present)
+    assert old not in names(library) and present in names(library)
+
+
+def test_the_torque_passes_its_stations_in_order(make: Callable[[], Drive]) -> None:
+    drive = running(make())
+    assert drive.set("torque_slew_Nm_per_s", 1000.0) == OK
+    assert drive.set("torque_limit_drive_Nm", 30.0) == OK
+    assert drive.set("torque_requested_Nm", 50.0) == OK
+    for _ in range(20):
+        drive.step(IDLE)
+    assert drive.get("torque_requested_Nm") == 50.0
+    assert drive.get("torque_arbitrated_Nm") == pytest.approx(50.0, abs=0.01)
+    assert drive.get("torque_limited_Nm") == pytest.approx(30.0, abs=0.01)
+    assert 0.9 < drive.get("torque_commanded_Nm") < 2.1  # two steps of 1 N·m
+    assert drive.get("torque_corrected_Nm") >= drive.get("torque_commanded_Nm")
+    assert drive.set("enable", 0.0) == OK
+    for _ in range(20):
+        drive.step(IDLE)
+    later = [drive.get(f"torque_{station}_Nm") for station in ("limited", "commanded", "corrected")]
+    assert later == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize("name", ["", "torque", "torque_command_nm", "enable ", "x" * 10000])
 def test_an_unknown_name_is_refused_and_reads_as_nan(make: Callable[[], Drive], name: str) -> None:
     drive = make()
@@ -79,7 +119,7 @@ def test_an_absurd_value_is_refused_and_changes_nothing(
     library: ctypes.CDLL, make: Callable[[], Drive], value: float
 ) -> None:
     drive = make()
-    assert drive.set("torque_command_Nm", 17.0) == OK
+    assert drive.set("torque_requested_Nm", 17.0) == OK
     for name in names(library):
         before = drive.get(name)
         assert drive.set(name, value) in (OUT_OF_RANGE, READ_ONLY), name
@@ -88,7 +128,7 @@ def test_an_absurd_value_is_refused_and_changes_nothing(
 
 def test_what_is_set_is_what_is_read(make: Callable[[], Drive]) -> None:
     drive = make()
-    for name, value in [("torque_command_Nm", -33.25), ("torque_loop", 1.0), ("torque_loop", 0.0),
+    for name, value in [("torque_requested_Nm", -33.25), ("torque_loop", 1.0), ("torque_loop", 0.0),
                         ("identification", 1.0), ("identification", 0.0), ("enable", 1.0)]:  # fmt: skip
         assert drive.set(name, value) == OK
         assert drive.get(name) == value
@@ -156,7 +196,7 @@ def test_whatever_comes_in_the_outputs_stay_duties(make: Callable[[], Drive]) ->
             drive.set("fault_reset", 1.0)
         if rng.random() < 0.2:
             drive.set("enable", 1.0)
-            drive.set("torque_command_Nm", rng.uniform(-130.0, 130.0))
+            drive.set("torque_requested_Nm", rng.uniform(-130.0, 130.0))
         sample = [
             rng.choice(special) if rng.random() < 0.02 else rng.uniform(-300.0, 400.0)
             for _ in range(6)
@@ -170,7 +210,7 @@ def spin(drive: Drive, seed: int, periods: int) -> list[tuple[float, float, floa
     """The same made-up samples for the same seed."""
     rng = random.Random(seed)
     drive.set("enable", 1.0)
-    drive.set("torque_command_Nm", 10.0 * seed)
+    drive.set("torque_requested_Nm", 10.0 * seed)
     outs = []
     for k in range(periods):
         a, b = rng.uniform(-20.0, 20.0), rng.uniform(-20.0, 20.0)
@@ -185,7 +225,7 @@ def test_two_drives_in_one_process_do_not_see_each_other(make: Callable[[], Driv
     mixed: dict[int, list[tuple[float, float, float, float]]] = {1: [], 2: []}
     for seed, drive in ((1, first), (2, second)):
         drive.set("enable", 1.0)
-        drive.set("torque_command_Nm", 10.0 * seed)
+        drive.set("torque_requested_Nm", 10.0 * seed)
     for k in range(400):
         for seed, drive in ((1, first), (2, second)):
             a, b = (ran[seed].uniform(-20.0, 20.0) for _ in range(2))

@@ -49,7 +49,7 @@ def shaft(speed_rpm: float, torque_Nm: float) -> tuple[float, float]:
     )
     firmware = Firmware(load("paper"))
     simulation = model.Simulation(drive, firmware)
-    firmware.drive.set("torque_command_Nm", torque_Nm)
+    firmware.drive.set("torque_requested_Nm", torque_Nm)
     firmware.drive.set("torque_loop", 0)
     firmware.drive.set("identification", 0)
     simulation._simulation_loop(OPEN, np.inf)

@@ -92,7 +92,7 @@ class Firmware:
     def step(self, now: float, currents: Any, angle: float) -> list[float]:
         """Sample, step; noise is 0.2 % of full scale rms."""
         s = self.spread
-        assert self.drive.set("torque_command_Nm", float(self.torque(now)) * s.direction) == OK
+        assert self.drive.set("torque_requested_Nm", float(self.torque(now)) * s.direction) == OK
         seen = np.asarray(currents) * s.gains + s.offsets_A + self.rng.normal(0.0, 0.002 * FULL_SCALE_A, 3)
         sample = (*map(float, seen), VDC_V * s.vdc_gain, (angle + s.angle_rad) % math.tau, s.winding_C)
         return list(self.drive.step(sample)[:3])

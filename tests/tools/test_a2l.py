@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pya2l
@@ -16,7 +17,7 @@ from fluxtrue_tools.errors import FluxtrueError
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ["FLUXTRUE_BUILD_DIR"]) / "motors" / "hsm1" / "fluxtrue_vecu"
-LISTS = ROOT / "firmware" / "app"
+LISTS = ROOT / "firmware" / "calibration"
 
 
 def _listed(header: str) -> list[str]:
@@ -44,6 +45,15 @@ def test_the_freeze_frame_is_described_with_its_samples() -> None:
     assert all(frozen[name].count == 32 for name in samples)
     assert (frozen["freeze_i_q_A"].base, frozen["freeze_i_q_A"].unit) == ("CURRENT", "A")
     assert frozen["freeze_time_ms"].count == 0
+
+
+# 22 periods at 22.5 kHz; XCP's units: 6 is 1 ms, 4 is 10 us.
+@pytest.mark.parametrize(("step_s", "cycle"), [(1e-3, "1 6"), (22 / 22500, "98 4"), (5 / 4500, "111 4")])
+def test_the_raster_of_a_step_is_described_with_the_step_s_true_length(step_s: float, cycle: str) -> None:
+    description = read(PROGRAM)
+    assert description.step_s == pytest.approx(1e-3)  # 10 kHz
+    text = render(replace(description, step_s=step_s), PROGRAM.name)
+    assert f'EVENT "step" "step" 0 DAQ 4 {cycle} 0' in text
 
 
 def test_limits_and_units_are_those_of_the_declaration() -> None:

@@ -15,7 +15,7 @@ from fluxtrue_tools.log.cli import log
 from fluxtrue_tools.log.decode import DBC, signals_of
 from fluxtrue_tools.vecu.mdf import BusLog
 
-STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimate": 0.0, "TorqueCommand": 40.0, "Speed": 2000.0}
+STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCommanded": 40.0, "Speed": 2000.0}
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     message = cantools.database.load_file(DBC).get_message_by_name("INV_Status")
     recorder = BusLog()
     for k in range(50):
-        data = message.encode(STATUS | {"TorqueEstimate": min(k, 40)})
+        data = message.encode(STATUS | {"TorqueEstimated": min(k, 40)})
         recorder(can.Message(timestamp=7.0 + 0.01 * k, arbitration_id=0x210, data=data, is_extended_id=False))
     recorder(can.Message(timestamp=7.5, arbitration_id=0x7FF, data=b"12345678", is_extended_id=False))
     recorder(can.Message(timestamp=7.5, arbitration_id=0x210, data=b"123", is_extended_id=False))
@@ -38,7 +38,7 @@ def _run(*arguments: object) -> Result:
 
 
 def test_every_signal_comes_back_with_its_time(drive: Path) -> None:
-    estimate = signals_of(drive)["INV_Status.TorqueEstimate"]
+    estimate = signals_of(drive)["INV_Status.TorqueEstimated"]
     assert list(estimate) == [float(min(k, 40)) for k in range(50)]
     assert list(estimate.index) == pytest.approx([0.01 * k for k in range(50)])
 
@@ -46,7 +46,7 @@ def test_every_signal_comes_back_with_its_time(drive: Path) -> None:
 def test_the_command_tells_plots_and_exports(drive: Path, tmp_path: Path) -> None:
     done = _run(drive, "--plot", tmp_path / "p.png", "--export", tmp_path / "t.csv")
     assert done.exit_code == 0, done.output
-    row = next(line for line in done.output.splitlines() if line.startswith("INV_Status.TorqueEstimate"))
+    row = next(line for line in done.output.splitlines() if line.startswith("INV_Status.TorqueEstimated"))
     assert row.split()[1:] == ["50", "0", "40", "40", "Nm"]
     assert (tmp_path / "p.png").stat().st_size > 10000
     table = pd.read_csv(tmp_path / "t.csv")
@@ -60,9 +60,9 @@ def test_one_signal_can_be_chosen_and_written_as_parquet(drive: Path, tmp_path: 
 
 @pytest.mark.parametrize(("options", "wanted"), [
     (("--signal", "INV_Status.Power"), "INV_Status.Power: not in this file"),
-    (("--plot", "p.bmp"), "allowed: a name ending in .png"),
-    (("--export", "t.xlsx"), "allowed: a name ending in .csv"),
-    (("--export", "no/such/folder/t.csv"), "is not a folder"),
+    (("--plot", "p.bmp"), "allowed: a file ending in .png"),
+    (("--export", "t.xlsx"), "allowed: a file ending in .csv"),
+    (("--export", "no/such/folder/t.csv"), "t.csv: cannot be written (no folder "),
 ])  # fmt: skip
 def test_bad_options_are_refused_by_name(drive: Path, options: tuple[str, ...], wanted: str) -> None:
     done = _run(drive, *options)

@@ -50,8 +50,8 @@ def test_constants_are_no_variables_even_with_pointers(tmp_path: Path) -> None:
     assert check(tmp_path, source, ("gcc", "-fPIC")) == ""
 
 
-def test_app_may_own_state(tmp_path: Path) -> None:
-    assert check(tmp_path, "int counter;\n", ("gcc",), "app/tasks.c") == ""
+def test_the_drive_may_own_state(tmp_path: Path) -> None:
+    assert check(tmp_path, "int counter;\n", ("gcc",), "drive/tasks.c") == ""
 
 
 def test_a_folder_without_layers_is_an_error(tmp_path: Path) -> None:
@@ -81,12 +81,12 @@ def test_a_division_or_a_float_on_the_target_is_found(
 
 
 @needs_arm
-def test_an_interrupt_in_app_is_held_to_the_rule_and_a_task_is_not(tmp_path: Path) -> None:
+def test_an_interrupt_of_the_drive_is_held_to_the_rule_and_a_task_is_not(tmp_path: Path) -> None:
     source = "float f(float a) { return a * 3.0F; }\n"
     for folder in ("isr", "task"):
         (tmp_path / folder).mkdir()
-    assert "vmul" in check(tmp_path / "isr", source, ARM, "app/fast_isr.c")
-    assert check(tmp_path / "task", source, ARM, "app/task_1khz.c") == ""
+    assert "vmul" in check(tmp_path / "isr", source, ARM, "drive/fast_isr.c")
+    assert check(tmp_path / "task", source, ARM, "drive/task_1khz.c") == ""
 
 
 @needs_arm

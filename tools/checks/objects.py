@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the compiled layers contain: no mutable state; on the target no float and no division.
 
-Two drives can run in one process only if nothing below app/ and hal/ owns a variable; a float or a
+Two drives can run in one process only if no layer below drive/ owns a variable; a float or a
 division in an interrupt is a cost nobody decided on. The compiler's output shows both exactly.
 The library for the target must be complete, but for the port.
 """
@@ -22,17 +22,23 @@ DIVISIONS = {
     "div.c": 2,  # all at 1 kHz
     "current_reference.c": 1,
     "identify.c": 1,
-    "mrai_schedule.c": 1,
+    "schedule.c": 1,
     "current_control.c": 1,  # reciprocal of the measured dc voltage
-    "commission.c": 2,  # 1 kHz: means over ten periods
     "e2e.c": 2,  # 1 kHz: the counter's turn
-    "identify_filter.c": 1,  # 100 Hz and axis
-    "identify_model.c": 2,  # 1 kHz: torque of the period
+    "kalman.c": 1,  # 100 Hz and axis
+    "model.c": 2,  # 1 kHz: torque of the period
     "torque_estimate.c": 1,  # 1 kHz: the mean over the periods since
     "dead_time_trim.c": 1,  # 1 kHz: by the measured dc voltage
 }
-# Layers of the 1 kHz task: single precision is allowed but in these files. app/ may own state.
-TASK_LAYERS = {"comm": re.compile(r"^e2e\.c"), "app": re.compile(r"(_isr|hand_over|take_sample)\.c")}
+# Layers of the 1 kHz task: single precision is allowed but in these files.
+NO_FILE = re.compile(r"(?!)")
+TASK_LAYERS = {
+    "comm": re.compile(r"^e2e\.c"),
+    "drive": re.compile(r"(_isr|acquire|publish|mailbox)\.c"),
+    "storage": NO_FILE,
+    "calibration": NO_FILE,
+    "ecu": NO_FILE,
+}
 
 MUTABLE = re.compile(r"^(\.data(?!\.rel\.ro)|\.bss|\.tdata|\.tbss|\*COM\*)")
 SYMBOL = re.compile(r"^[0-9a-f]+ .{7} (\S+)\t([0-9a-f]+)\s+(\S+)$")
@@ -71,7 +77,7 @@ def mutable_state(archive: Path, prefix: str) -> Iterator[Violation]:
             is_marker = name.startswith("$") or name == section
             if MUTABLE.match(section) and int(size, 16) > 0 and not is_marker:
                 yield Violation(Path(archive.name, member), 0,
-                                f"'{name}' is a variable outside app/ and hal/")  # fmt: skip
+                                f"'{name}' is a variable; state belongs to the caller")  # fmt: skip
 
 
 def cost(line: str) -> tuple[bool, str]:
@@ -134,7 +140,7 @@ def check(build: Path, target: bool) -> Iterator[Violation]:
         if not archive.exists():
             continue
         found += 1
-        if layer != "app":
+        if layer in (*LAYERS, "comm"):
             yield from mutable_state(archive, prefix)
         if target:
             yield from costly_code(archive, prefix, TASK_LAYERS.get(layer, re.compile("")))

@@ -20,7 +20,7 @@ function(fluxtrue_image name)
         RUNTIME_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}")
     target_compile_definitions(${name}_image PRIVATE ${arg_DEFINITIONS})
     target_compile_options(${name}_image PRIVATE -ffreestanding)
-    target_link_libraries(${name}_image PRIVATE fluxtrue_app fluxtrue_strict)
+    target_link_libraries(${name}_image PRIVATE fluxtrue_firmware fluxtrue_strict)
     target_link_options(${name}_image PRIVATE -O2 -nostartfiles --specs=nano.specs ${arg_LINK} "-T${arg_SCRIPT}"
         -Wl,--gc-sections,--fatal-warnings "-Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map")
     set(tool ${CMAKE_COMMAND} -E env "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1

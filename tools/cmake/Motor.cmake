@@ -26,7 +26,7 @@ function(_fluxtrue_motor_tables name folder out)
         COMMENT "Generating the tables of motor ${name}"
         VERBATIM)
     add_library(motor_${name} OBJECT ${sources})
-    target_link_libraries(motor_${name} PRIVATE fluxtrue_strict fluxtrue_app)
+    target_link_libraries(motor_${name} PRIVATE fluxtrue_strict fluxtrue_firmware)
     if(CMAKE_CROSSCOMPILING)
         # Data, which an image places by the name of this file; no constant of it may melt into code.
         target_compile_options(motor_${name} PRIVATE -fno-lto)
@@ -46,14 +46,14 @@ function(fluxtrue_add_motor name folder)
     _fluxtrue_motor_tables(${name} "${folder}" "${out}")
     if(TARGET fluxtrue_hal_host)
         fluxtrue_shared(fluxtrue_sil_${name} fluxtrue_sil "${out}"
-            fluxtrue_hal_host motor_${name} fluxtrue_app)
+            fluxtrue_hal_host motor_${name} fluxtrue_firmware)
     endif()
     if(TARGET fluxtrue_hal_host AND TARGET fluxtrue_sim_runner)
         fluxtrue_shared(fluxtrue_sim_${name} fluxtrue_sim "${out}"
             fluxtrue_sim_runner fluxtrue_hal_host motor_${name}
-            fluxtrue_plant fluxtrue_twin fluxtrue_app)
+            fluxtrue_plant fluxtrue_twin fluxtrue_firmware)
         fluxtrue_vecu(${name} "${out}" fluxtrue_vecu_parts fluxtrue_sim_runner fluxtrue_hal_host
-            motor_${name} fluxtrue_plant fluxtrue_twin fluxtrue_app)
+            motor_${name} fluxtrue_plant fluxtrue_twin fluxtrue_firmware)
     endif()
 endfunction()
 
@@ -80,11 +80,11 @@ function(fluxtrue_build_for folder)
         get_property(layers GLOBAL PROPERTY FLUXTRUE_LAYERS)
         list(TRANSFORM layers REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
         add_library(fluxtrue STATIC ${objects} $<TARGET_OBJECTS:motor_${name}>)
-        target_link_libraries(fluxtrue INTERFACE fluxtrue_app)
+        target_link_libraries(fluxtrue INTERFACE fluxtrue_firmware)
         set_target_properties(fluxtrue PROPERTIES
             ARCHIVE_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}" LINKER_LANGUAGE C)
     elseif(TARGET fluxtrue_hal_host)
         fluxtrue_shared(fluxtrue_sil fluxtrue_sil "${CMAKE_BINARY_DIR}"
-            fluxtrue_hal_host motor_${name} fluxtrue_app)
+            fluxtrue_hal_host motor_${name} fluxtrue_firmware)
     endif()
 endfunction()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Tests written in Python, and the checkers of tools/checks, as ctest tests.
+include(TestTime)
 
 set(FLUXTRUE_TEST_ENVIRONMENT
     "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1 MPLBACKEND=Agg
@@ -15,18 +16,14 @@ if(FLUXTRUE_SANITIZE)
     set(FLUXTRUE_PRELOAD "LD_PRELOAD=${libasan}:${libstdcxx}" ASAN_OPTIONS=detect_leaks=0)
 endif()
 
-function(_fluxtrue_python_test name labels timeout)
-    if(NOT timeout)
-        set(timeout 600)
-    endif()
-    set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout}
-        ENVIRONMENT "${FLUXTRUE_TEST_ENVIRONMENT}")
+function(_fluxtrue_python_test name labels)
+    set_tests_properties(${name} PROPERTIES LABELS "${labels}" ENVIRONMENT "${FLUXTRUE_TEST_ENVIRONMENT}")
+    fluxtrue_test_time(${name})
 endfunction()
 
-# fluxtrue_pytest(NAME <n> PATH <file or folder> [ARGS <pytest argument> ...] [LABELS <label> ...]
-#                 [TIMEOUT <s>])
+# fluxtrue_pytest(NAME <n> PATH <file or folder> [ARGS <pytest argument> ...] [LABELS <label> ...])
 function(fluxtrue_pytest)
-    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;PATH;TIMEOUT" "ARGS;LABELS")
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;PATH" "ARGS;LABELS")
     if(arg_UNPARSED_ARGUMENTS OR NOT arg_NAME OR NOT arg_PATH)
         message(FATAL_ERROR "fluxtrue_pytest: NAME and PATH wanted; unknown: "
                             "${arg_UNPARSED_ARGUMENTS}")
@@ -34,13 +31,19 @@ function(fluxtrue_pytest)
     if(FLUXTRUE_TESTS STREQUAL OFF)
         return()
     endif()
+    # Hypothesis loads a module of its own at a session's very end, which CPython 3.11 refuses after a test has met the
+    # limit of recursion (a broken MDF file does that): only the tests that use Hypothesis get its plugin.
+    set(plugins -p no:hypothesispytest)
+    if(arg_NAME MATCHES "abuse")
+        set(plugins "")
+    endif()
     cmake_path(ABSOLUTE_PATH arg_PATH BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
     add_test(NAME ${arg_NAME}
         COMMAND "${CMAKE_COMMAND}" -E env ${FLUXTRUE_PRELOAD}
             "${FLUXTRUE_PYTHON}" -m pytest -q -c "${CMAKE_SOURCE_DIR}/tests/pytest.ini"
-            -p no:cacheprovider ${arg_ARGS} "${arg_PATH}"
+            -p no:cacheprovider ${plugins} ${arg_ARGS} "${arg_PATH}"
         WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
-    _fluxtrue_python_test(${arg_NAME} "${arg_LABELS}" "${arg_TIMEOUT}")
+    _fluxtrue_python_test(${arg_NAME} "${arg_LABELS}")
 endfunction()
 
 # fluxtrue_check(NAME <n> SCRIPT <file of tools/checks> [ARGS <argument> ...])
@@ -52,5 +55,5 @@ function(fluxtrue_check)
     add_test(NAME ${arg_NAME}
         COMMAND "${FLUXTRUE_PYTHON}" "${CMAKE_SOURCE_DIR}/tools/checks/${arg_SCRIPT}" ${arg_ARGS}
         WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
-    _fluxtrue_python_test(${arg_NAME} check 60)
+    _fluxtrue_python_test(${arg_NAME} check)
 endfunction()

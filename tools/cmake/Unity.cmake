@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Unit tests in C with Unity, mocks of the hardware interface with CMock.
 
+include(TestTime)
 find_program(FLUXTRUE_RUBY ruby)
 set(unity "${FLUXTRUE_CMOCK}/vendor/unity")
 set(FLUXTRUE_UNIT_TESTS ON)
@@ -58,10 +59,10 @@ endfunction()
 
 # fluxtrue_unity_test(NAME <n> SOURCES <test.c> [<more.c> ...] [LIBS <layer or library> ...]
 #                     [MOCKS hal/adc.h ...] [MOTOR <shipped motor>] [INCLUDES <folder> ...]
-#                     [DEFINITIONS <D> ...] [LABELS <label> ...] [TIMEOUT <s>])
+#                     [DEFINITIONS <D> ...] [LABELS <label> ...])
 # The first source holds the test functions. LIBS: fx, signal, ... or any target. Label: unit.
 function(fluxtrue_unity_test)
-    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;MOTOR;TIMEOUT"
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;MOTOR"
         "SOURCES;LIBS;MOCKS;INCLUDES;DEFINITIONS;LABELS")
     if(arg_UNPARSED_ARGUMENTS OR NOT arg_NAME OR NOT arg_SOURCES)
         message(FATAL_ERROR "fluxtrue_unity_test: NAME and SOURCES wanted; unknown: "
@@ -114,9 +115,7 @@ function(fluxtrue_unity_test)
     if(NOT arg_LABELS)
         set(arg_LABELS unit)
     endif()
-    if(NOT arg_TIMEOUT)
-        set(arg_TIMEOUT 120)
-    endif()
     add_test(NAME ${arg_NAME} COMMAND ${arg_NAME})
-    set_tests_properties(${arg_NAME} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
+    set_tests_properties(${arg_NAME} PROPERTIES LABELS "${arg_LABELS}")
+    fluxtrue_test_time(${arg_NAME})
 endfunction()

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import click
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.version import in_checkout, version
 
 # Name: (module, command in it, one line for --help). Importing them all would cost a second.
 COMMANDS = {
@@ -25,6 +26,8 @@ COMMANDS = {
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
     "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
 }
+# Commands that need no other file of the repository: an installed wheel has only these.
+STANDALONE = ("motor", "a2l", "target")
 # Done by tools/fluxtrue itself, before Python; listed here for --help.
 SHELL_COMMANDS = {"test": "Set up, build and test everything: tools/test."}
 
@@ -42,6 +45,11 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
+        if cmd_name not in STANDALONE and not in_checkout():
+            raise FluxtrueError(
+                f"command '{cmd_name}' needs the firmware's sources: run tools/fluxtrue in a checkout; "
+                f"allowed in the installed package: {', '.join(STANDALONE)}"
+            )
         module, name, _ = COMMANDS[cmd_name]
         command = getattr(importlib.import_module(module), name)
         assert isinstance(command, click.Command)
@@ -64,7 +72,15 @@ class LazyGroup(click.Group):
 HELP_OPTIONS = {"help_option_names": ["-h", "--help"]}
 
 
+def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted and not ctx.resilient_parsing:
+        click.echo(f"fluxtrue {version()}")
+        ctx.exit()
+
+
 @click.command(cls=LazyGroup, name="fluxtrue", context_settings=HELP_OPTIONS)
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
+              help="Print the version and exit.")  # fmt: skip
 def main() -> None:
     """Fluxtrue: torque control that stays true when the machine changes."""
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 NAMES = (
     "truth.torque_Nm", "truth.i_d_A", "truth.i_q_A", "truth.u_d_V", "truth.u_q_V", "truth.idc_A", "truth.vdc_V",
-    "truth.electrical_W", "torque_limited_Nm", "torque_max_Nm", "torque_estimate_Nm", "fault_word", "derating",
+    "truth.electrical_W", "torque_commanded_Nm", "torque_max_Nm", "torque_estimated_Nm", "fault_word", "derating",
     "voltage_limited", "run_state",
 )  # fmt: skip
 RUNNING, FAULTED = 1, 2
@@ -27,7 +27,7 @@ class Rig:
                                     "current_noise_A_rms": 0.5} | plant
         self.loop = Loop(motor.library, parameters, motor.flux_map)
         self.loop.record(NAMES)
-        self.loop.set("torque_command_Nm", torque_Nm)
+        self.loop.set("torque_requested_Nm", torque_Nm)
         self.loop.set("enable", float(enable))
 
     def set(self, **values: float) -> "Rig":

@@ -93,7 +93,7 @@ def test_full_reversals_with_the_slew_open_stay_below_the_trip(
         rig = Rig(hsm1, rpm, magnet_scale=magnet).set(torque_slew_Nm_per_s=slew)
         rig.run(0.2)
         for torque in (132.0, -132.0, 132.0, 0.0, -132.0, 0.0):
-            trace = rig.set(torque_command_Nm=torque).run(0.1)
+            trace = rig.set(torque_requested_Nm=torque).run(0.1)
             assert trace.faults == 0
             assert np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"]).max() < most_A  # 300 A is the trip
 
@@ -103,7 +103,7 @@ def test_a_run_up_through_base_speed_at_full_request_follows_the_reported_reach(
     rig.run(0.3)
     trace = rig.run(1.5, plant_speed_rad_s=(500.0 * math.pi / 30.0, TOP_RPM * math.pi / 30.0))
     assert trace.faults == 0
-    behind = trace.torque - trace["torque_limited_Nm"]
+    behind = trace.torque - trace["torque_commanded_Nm"]
     assert np.abs(behind).max() <= 5.0
     assert np.sqrt(np.mean(behind**2)) <= 1.5
 
@@ -120,7 +120,7 @@ def test_at_the_reach_a_sensor_a_degree_wrong_twice_per_turn_swings_no_current(h
     rig = Rig(hsm1, 2000.0, **AT_ITS_REACH).set(identification=0.0, torque_loop=0.0)
     rig.run(0.1)
     rig.run(1.0, plant_speed_rad_s=(2000.0 * math.pi / 30.0, 8396.0 * math.pi / 30.0))
-    trace = rig.set(torque_command_Nm=sign * 70.0).run(1.0)
+    trace = rig.set(torque_requested_Nm=sign * 70.0).run(1.0)
     assert trace.faults == 0
     half = len(trace.torque) // 2
     assert np.abs(trace["truth.i_d_A"]).max() <= 275.0  # 300 A is the trip
@@ -132,5 +132,5 @@ def test_a_sensor_that_nobody_has_learnt_yet_does_not_trip_at_the_reach(hsm1: Mo
     """Enabled at 8400 rpm and given two thirds of the reach at once: the q flux gives way until the sensor is known."""
     rig = Rig(hsm1, 8396.0, **AT_ITS_REACH).set(identification=0.0, torque_loop=0.0)
     rig.run(0.02)
-    trace = rig.set(torque_command_Nm=45.0).run(1.0)
+    trace = rig.set(torque_requested_Nm=45.0).run(1.0)
     assert trace.faults == 0

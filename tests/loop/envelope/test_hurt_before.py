@@ -24,7 +24,7 @@ def test_braking_out_of_field_weakening_surges_into_no_battery(hsm1: Motor, magn
     """Braking from top speed down through base speed: no bump of torque, no more power than asked for."""
     rig = Rig(hsm1, 9500.0, magnet_scale=magnet)
     rig.run(0.3)
-    rig.set(torque_command_Nm=-40.0).run(0.1)
+    rig.set(torque_requested_Nm=-40.0).run(0.1)
     trace = rig.run(1.0, plant_speed_rad_s=(9500.0 * math.pi / 30.0, 500.0 * math.pi / 30.0))
     assert trace.faults == 0
     assert np.abs(trace.torque + 40.0).max() <= 3.0  # at 9000 rpm/s
@@ -38,7 +38,7 @@ def test_throttle_release_at_high_speed_does_not_brake_the_car(hsm1: Motor, torq
     rig = Rig(hsm1, 9500.0, torque, magnet_scale=magnet)
     driving = rig.run(0.4)
     before = driving.settled()
-    trace = rig.set(torque_command_Nm=0.0).run(0.3)
+    trace = rig.set(torque_requested_Nm=0.0).run(0.3)
     assert trace.faults == 0
     assert trace.torque.min() >= -2.0
     assert trace.torque.max() <= before + 3.0

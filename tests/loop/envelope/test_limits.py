@@ -46,8 +46,8 @@ def test_a_command_in_amperes_instead_of_newton_metres_cannot_multiply_the_torqu
     """The request's format ends at the torque base, the limit at the machine's rating."""
     rig = Rig(hsm1, 2000.0)
     with pytest.raises(Exception, match="out of range"):
-        rig.set(torque_command_Nm=250.0)
-    rig.set(torque_command_Nm=RATED_NM)
+        rig.set(torque_requested_Nm=250.0)
+    rig.set(torque_requested_Nm=RATED_NM)
     assert np.abs(rig.run(0.3).torque).max() <= 1.03 * RATED_NM
 
 

@@ -53,7 +53,7 @@ def test_a_reversal_through_maximum_torque_per_volt_neither_trips_nor_overshoots
     rig = Rig(gem, TOP_RPM, vdc_V=LOW_V)
     rig.run(0.3)
     for torque in (132.0, -132.0, 132.0, 0.0):
-        trace = rig.set(torque_command_Nm=torque).run(0.2)
+        trace = rig.set(torque_requested_Nm=torque).run(0.2)
         assert trace.faults == 0
         assert np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"]).max() <= 1.1 * I_MAX_A
     assert abs(trace.settled()) <= 2.0
@@ -62,7 +62,7 @@ def test_a_reversal_through_maximum_torque_per_volt_neither_trips_nor_overshoots
 def test_a_step_at_speed_uses_the_hexagon_beyond_its_inner_circle_and_comes_back_to_the_reserve(hsm1: Motor) -> None:
     rig = Rig(hsm1, 4500.0)
     rig.run(0.3)
-    trace = rig.set(torque_command_Nm=120.0).run(0.3)
+    trace = rig.set(torque_requested_Nm=120.0).run(0.3)
     assert trace.faults == 0
     volts = np.hypot(trace["truth.u_d_V"], trace["truth.u_q_V"])
     circle, corner = 350.0 / math.sqrt(3.0), 2.0 / 3.0 * 350.0

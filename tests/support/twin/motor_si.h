@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_MOTOR_SI_H
 #define TWIN_MOTOR_SI_H
-/** The same machine data as app/motor.h, in SI doubles and before any quantisation: what the double-precision twin
+/** The same machine data as drive/motor.h, in SI doubles and before any quantisation: what the double-precision twin
  * runs on.
  *   Written beside the fixed-point tables by `tools/fluxtrue motor build`; shares no number format with the firmware.
  * Units    SI, electrical rad/s, per-second gains */
 
 typedef struct {
-    int pole_pairs;
-    double r_ohm_20, psi_f_Vs, period_s;
+    int pole_pairs, periods_per_step;
+    double r_ohm_20, psi_f_Vs, period_s, step_s; /* PWM period; step of the 1 kHz task */
     double i_base_A, v_base_V, omega_base_rad_s; /* only to state per-unit results */
     double current_full_scale_A, v_dc_full_scale_V;
     int adc_bits;
@@ -34,6 +34,7 @@ typedef struct {
     double identify_noise_V, identify_noise_Vs, identify_noise_rate;
     double identify_omega_min_rad_s, identify_i_min_A, identify_i_smooth_A;
     double identify_local_corner_rad_s, identify_local_rate, identify_torque_min_Nm;
+    double identify_limited_noise, identify_mismatch_rate;
     double identify_confidence_full, identify_confidence_none, identify_confidence_rate;
     /* torque loop, per 1 kHz step */
     double torque_ki, torque_kp, torque_model_rate, torque_authority, torque_min_Nm;

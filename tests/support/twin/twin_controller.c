@@ -74,17 +74,17 @@ static bool voltage_limited(const twin_t *twin)
 }
 
 /* With every limit of the vehicle open and a cold inverter. */
-static double allowed(twin_t *twin)
+static double limited_torque(twin_t *twin)
 {
     const twin_limit_in_t in = {
-        .wanted = twin->torque_command,
+        .torque_arbitrated = twin->torque_requested,
         .torque_drive = HUGE_VAL,
         .torque_regen = HUGE_VAL,
         .power_drive = HUGE_VAL,
         .power_regen = HUGE_VAL,
         .u = twin->sample.u,
         .i = twin->sample.i,
-        .torque = twin->torque_estimate,
+        .torque_estimated = twin->torque_estimated,
         .omega = twin->sample.omega,
         .v_dc = twin->v_dc,
         .reach = twin->reference.torque_max,
@@ -104,10 +104,10 @@ static double slew_now(const twin_t *twin)
 
 static void torque_path(twin_t *twin)
 {
-    twin->slewed = slew(twin->slewed, allowed(twin), slew_now(twin));
+    twin->torque_commanded = slew(twin->torque_commanded, limited_torque(twin), slew_now(twin));
     const twin_torque_in_t torque = {
-        .command = twin->slewed,
-        .estimate = twin->torque_estimate,
+        .torque_commanded = twin->torque_commanded,
+        .torque_estimated = twin->torque_estimated,
         .confidence = twin->robust ? twin->identify.confidence : 1.0,
         .enabled = twin->torque_loop && !twin->current_mode,
         .limited = voltage_limited(twin) || twin->reference.limited,
@@ -121,9 +121,9 @@ static void torque_path(twin_t *twin)
         .acting = twin->periods_on >= 3 && !twin->current_mode,
     };
     const double shift = twin_voltage_reserve(&twin->motor, &twin->trim, &reserve);
-    const double lq_error = twin->robust ? twin->identify.filter.x[3] * twin->motor.identify_sigma[3] : 0.0;
+    const double lq_error = twin->robust ? twin->identify.kalman.x[3] * twin->motor.identify_sigma[3] : 0.0;
     const twin_reference_in_t request = {
-        .torque = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
+        .torque_corrected = twin_torque_loop(&twin->motor, &twin->torque_state, &torque),
         .v_dc = twin->v_dc,
         .omega = twin->sample.omega,
         .i_magnitude = hypot(twin->reference.i_ref.d, twin->reference.i_ref.q),
@@ -141,7 +141,7 @@ static void robust(twin_t *twin)
     const twin_point_t point = twin_point(&twin->motor, &twin->complete, twin->sample.omega);
     twin_identify(&twin->motor, &twin->identify, &point, twin->winding_C,
                   twin->identification && (twin->periods_on >= 3));
-    twin->torque_estimate = twin->identify.torque;
+    twin->torque_estimated = twin->identify.torque;
 }
 
 static void task(twin_t *twin)
@@ -151,7 +151,7 @@ static void task(twin_t *twin)
     if (twin->robust) {
         robust(twin);
     } else {
-        twin->torque_estimate = twin->torque_mean.mean;
+        twin->torque_estimated = twin->torque_mean.mean;
     }
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
@@ -162,7 +162,7 @@ static void task(twin_t *twin)
         next.flux = twin_flux_table(&twin->motor, next.i);
         twin->psi_ref = (twin_dq_t){next.flux.psi_d, next.flux.psi_q};
     } else {
-        twin->slewed = 0.0;
+        twin->torque_commanded = 0.0;
         twin->torque_state = (twin_torque_state_t){0};
         twin->reference = (twin_reference_t){.torque_max = twin->motor.torque_max_Nm, .psi_plan = HUGE_VAL};
         twin->limit.loss_W = 0.0;
@@ -183,8 +183,8 @@ static void identify(twin_t *twin)
     } else {
         twin_mrai_reset(&twin->mrai, now);
     }
-    (void)twin_torque_estimate(&twin->torque_mean, twin_torque(&twin->motor, now->i, &now->flux,
-                                                               twin->mrai.psi_delta));
+    (void)twin_torque_estimate(&twin->motor, &twin->torque_mean,
+                               twin_torque(&twin->motor, now->i, &now->flux, twin->mrai.psi_delta));
     twin->psi_delta = twin->mrai.psi_delta;
 }
 
@@ -192,7 +192,7 @@ static void collect(twin_t *twin, bool snapped)
 {
     const twin_mrai_in_t *now = &twin->sample;
     const twin_end_t end = {now->i, now->u, {now->flux.psi_d, now->flux.psi_q}, twin->theta};
-    if (twin_window(&twin->window, &end, twin->periods_on >= 3, snapped)) {
+    if (twin_window(&twin->motor, &twin->window, &end, twin->periods_on >= 3, snapped)) {
         twin->complete = twin->window;
     }
     twin->psi_delta = twin->identify.psi_delta;
@@ -265,7 +265,7 @@ void twin_step(twin_t *twin, const double in[6], double out[4])
         identify(twin);
     }
     twin->periods++;
-    if (twin->periods % TWIN_TASK_PERIODS == 0) {
+    if (twin->periods % (unsigned long)twin->motor.periods_per_step == 0) {
         task(twin);
     }
 }

@@ -5,13 +5,13 @@
 
 enum { R, DROP, FLUX, LQ, LD, ANGLE, IRON, STEPS = 10 };
 
-static const double x_max = 4.0, e_max_pu = 0.0625, contradiction_rate = 0.1, contradiction_max = 0.5;
+static const double x_max = 4.0, e_max_pu = 0.0625, mismatch_max = 0.5;
 
-void twin_filter_reset(twin_filter_t *filter)
+void twin_kalman_reset(twin_kalman_t *kalman)
 {
-    *filter = (twin_filter_t){0};
+    *kalman = (twin_kalman_t){0};
     for (int j = 0; j < TWIN_STATES; j++) {
-        filter->p[j][j] = 1.0;
+        kalman->p[j][j] = 1.0;
     }
 }
 
@@ -24,62 +24,62 @@ static double dot(const double a[TWIN_STATES], const double b[TWIN_STATES])
     return sum;
 }
 
-static double variance(const twin_filter_t *filter, const double h[TWIN_STATES])
+static double variance(const twin_kalman_t *kalman, const double h[TWIN_STATES])
 {
     double sum = 0.0;
     for (int j = 0; j < TWIN_STATES; j++) {
-        sum += h[j] * dot(filter->p[j], h);
+        sum += h[j] * dot(kalman->p[j], h);
     }
     return sum;
 }
 
 /* h, e in units in which e is limited to 1/16. */
-bool twin_filter_update(twin_filter_t *filter, const double h[TWIN_STATES], double e, double r)
+bool twin_kalman_update(twin_kalman_t *kalman, const double h[TWIN_STATES], double e, double r)
 {
-    const double own = variance(filter, h);
-    const double s = own + r;
+    const double hph = variance(kalman, h);
+    const double s = hph + r;
     double ph[TWIN_STATES];
-    bool doubt = e * e > 8.0 * own + r;
+    bool mismatch = e * e > 8.0 * hph + r;
     for (int j = 0; j < TWIN_STATES; j++) {
-        ph[j] = dot(filter->p[j], h);
+        ph[j] = dot(kalman->p[j], h);
     }
     for (int j = 0; j < TWIN_STATES; j++) {
-        const double moved = filter->x[j] + ph[j] / s * twin_clamp(e, -e_max_pu, e_max_pu);
-        filter->x[j] = twin_clamp(moved, -x_max, x_max);
-        doubt = doubt || (filter->x[j] != moved);
+        const double updated = kalman->x[j] + ph[j] / s * twin_clamp(e, -e_max_pu, e_max_pu);
+        kalman->x[j] = twin_clamp(updated, -x_max, x_max);
+        mismatch = mismatch || (kalman->x[j] != updated);
         for (int l = 0; l < TWIN_STATES; l++) {
-            filter->p[j][l] -= ph[j] * ph[l] / s;
+            kalman->p[j][l] -= ph[j] * ph[l] / s;
         }
     }
-    return doubt;
+    return mismatch;
 }
 
-void twin_filter_leak(const motor_si_t *motor, twin_filter_t *filter, bool r_known)
+void twin_kalman_predict(const motor_si_t *motor, twin_kalman_t *kalman, bool r_known)
 {
     const double *leak = motor->identify_leak;
     for (int j = 0; j < TWIN_STATES; j++) {
         const double prior = ((j == R) && r_known) ? motor->identify_r_known : 1.0;
-        filter->x[j] -= leak[j] * filter->x[j];
+        kalman->x[j] -= leak[j] * kalman->x[j];
         for (int l = 0; l < TWIN_STATES; l++) {
-            filter->p[j][l] -= (leak[j] + leak[l]) * filter->p[j][l];
+            kalman->p[j][l] -= (leak[j] + leak[l]) * kalman->p[j][l];
         }
-        filter->p[j][j] += 2.0 * leak[j] * prior;
+        kalman->p[j][j] += 2.0 * leak[j] * prior;
     }
 }
 
 void twin_identify_reset(const motor_si_t *motor, twin_identify_t *state)
 {
     *state = (twin_identify_t){.r_prior = motor->r_ohm_20};
-    twin_filter_reset(&state->filter);
+    twin_kalman_reset(&state->kalman);
 }
 
-static void collect(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, const twin_model_t *m,
-                    twin_dq_t e, bool enabled)
+static void average_step(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, const twin_model_t *m,
+                         twin_dq_t e, bool enabled)
 {
     const double level = motor->identify_noise_V + fabs(point->omega) * motor->identify_noise_Vs +
                          motor->identify_noise_rate * (fabs(point->rate.d) + fabs(point->rate.q));
-    s->learn = (s->learn || (s->steps == 0)) && point->valid && m->current && enabled;
-    s->noise += level * (1.0 + 0.5 * point->limited) / STEPS;
+    s->update_valid = (s->update_valid || (s->steps == 0)) && point->valid && m->current && enabled;
+    s->noise += level * (1.0 + motor->identify_limited_noise * point->limited) / STEPS;
     s->e.d += e.d / STEPS;
     s->e.q += e.q / STEPS;
     for (int j = 0; j < TWIN_STATES; j++) {
@@ -89,7 +89,7 @@ static void collect(const motor_si_t *motor, twin_identify_t *s, const twin_poin
     s->steps++;
 }
 
-static void learn(const motor_si_t *motor, twin_identify_t *s)
+static void update_parameters(const motor_si_t *motor, twin_identify_t *s)
 {
     const double v = motor->v_base_V; /* the limit of e is per unit */
     double d[TWIN_STATES], q[TWIN_STATES];
@@ -98,44 +98,45 @@ static void learn(const motor_si_t *motor, twin_identify_t *s)
         q[j] = s->mean_q[j] / v;
     }
     const double r = pow(s->noise / v, 2.0);
-    const double before = dot(q, s->filter.x);
-    const bool doubt_d = twin_filter_update(&s->filter, d, s->e.d / v, r);
-    const double moved = dot(q, s->filter.x) - before;
-    const bool doubt_q = twin_filter_update(&s->filter, q, s->e.q / v - moved, r);
-    s->contradiction += contradiction_rate * ((doubt_d || doubt_q) - s->contradiction);
+    const double output_before = dot(q, s->kalman.x);
+    const bool mismatch_d = twin_kalman_update(&s->kalman, d, s->e.d / v, r);
+    const double change = dot(q, s->kalman.x) - output_before;
+    const bool mismatch_q = twin_kalman_update(&s->kalman, q, s->e.q / v - change, r);
+    s->mismatch_share += motor->identify_mismatch_rate * ((mismatch_d || mismatch_q) - s->mismatch_share);
 }
 
-static void judge(const motor_si_t *motor, twin_identify_t *s, const twin_model_t *m)
+static void update_confidence(const motor_si_t *motor, twin_identify_t *s, const twin_model_t *m)
 {
     const double k = 1.5 * motor->pole_pairs;
-    const double uncertain = k * sqrt(variance(&s->filter, m->torque));
+    const double uncertain = k * sqrt(variance(&s->kalman, m->torque));
     const double prior = k * sqrt(dot(m->torque, m->torque));
     const double scale = fmax(fabs(s->torque), motor->identify_torque_min_Nm);
     const bool good = (uncertain < sqrt(0.375) * prior) ||
                       (uncertain < motor->identify_confidence_full * fabs(s->torque));
     const bool bad = (uncertain > sqrt(0.75) * prior) && (uncertain > motor->identify_confidence_none * scale);
-    if (bad || (s->contradiction > contradiction_max)) {
-        s->trusted = false;
+    if (bad || (s->mismatch_share > mismatch_max)) {
+        s->torque_certain = false;
     } else if (good) {
-        s->trusted = true;
+        s->torque_certain = true;
     }
-    const double step = s->trusted ? motor->identify_confidence_rate : -motor->identify_confidence_rate;
+    const double step = s->torque_certain ? motor->identify_confidence_rate : -motor->identify_confidence_rate;
     s->confidence = twin_clamp(s->confidence + step, 0.0, 1.0);
 }
 
-static void localise(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, twin_dq_t e, bool open)
+static void update_local_flux_error(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, twin_dq_t e,
+                                    bool enabled)
 {
     const double w = point->omega;
-    const double gain = open ? w / (w * w + pow(motor->identify_local_corner_rad_s, 2.0)) : 0.0;
+    const double gain = enabled ? w / (w * w + pow(motor->identify_local_corner_rad_s, 2.0)) : 0.0;
     s->local.d += motor->identify_local_rate * (gain * e.q - s->local.d);
     s->local.q += motor->identify_local_rate * (-gain * e.d - s->local.q);
 }
 
-static void answer(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, const twin_model_t *m)
+static void correct(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, const twin_model_t *m)
 {
     double v[TWIN_STATES];
     for (int j = 0; j < TWIN_STATES; j++) {
-        v[j] = s->filter.x[j] * motor->identify_sigma[j];
+        v[j] = s->kalman.x[j] * motor->identify_sigma[j];
     }
     const double magnet = v[FLUX] + v[LD] * m->slope;
     const double psi_d = m->psi.d + magnet + v[ANGLE] * m->turn.d + v[IRON] * m->iron_psi.d + s->local.d;
@@ -156,18 +157,18 @@ void twin_identify(const motor_si_t *motor, twin_identify_t *s, const twin_point
         s->r_prior = motor->r_ohm_20 * (1.0 + motor->r_temp_coeff_per_K * (winding_C - 20.0));
     }
     const twin_model_t m = twin_model(motor, point, s->r_prior);
-    const twin_dq_t e = {m.y.d - dot(m.d, s->filter.x), m.y.q - dot(m.q, s->filter.x)};
-    localise(motor, s, point, e, point->valid && enabled);
-    collect(motor, s, point, &m, e, enabled);
-    answer(motor, s, point, &m);
+    const twin_dq_t e = {m.y.d - dot(m.d, s->kalman.x), m.y.q - dot(m.q, s->kalman.x)};
+    update_local_flux_error(motor, s, point, e, point->valid && enabled);
+    average_step(motor, s, point, &m, e, enabled);
+    correct(motor, s, point, &m);
     if (s->steps < STEPS) {
         return;
     }
-    if (s->learn) {
-        learn(motor, s);
+    if (s->update_valid) {
+        update_parameters(motor, s);
     }
-    twin_filter_leak(motor, &s->filter, s->r_known);
-    judge(motor, s, &m);
+    twin_kalman_predict(motor, &s->kalman, s->r_known);
+    update_confidence(motor, s, &m);
     for (int j = 0; j < TWIN_STATES; j++) {
         s->mean_d[j] = s->mean_q[j] = 0.0;
     }

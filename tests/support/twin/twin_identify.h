@@ -13,7 +13,7 @@ typedef struct {
     double theta;
 } twin_end_t;
 
-/* Ten periods: sums over samples 1 ... 10 and both ends. */
+/* N periods of one step: sums over samples 1 ... N and both ends. */
 typedef struct {
     twin_end_t first, last;
     twin_dq_t sum_i, sum_u;
@@ -21,8 +21,8 @@ typedef struct {
     bool acting;
 } twin_window_t;
 
-/* One period more; true when ten are complete. */
-bool twin_window(twin_window_t *window, const twin_end_t *sample, bool acting, bool limited);
+/* One period more; true when all are complete. */
+bool twin_window(const motor_si_t *motor, twin_window_t *window, const twin_end_t *sample, bool acting, bool limited);
 
 typedef struct {
     twin_dq_t i, u, rate, i_m;
@@ -44,21 +44,21 @@ twin_model_t twin_model(const motor_si_t *motor, const twin_point_t *point, doub
 
 typedef struct {
     double x[TWIN_STATES], p[TWIN_STATES][TWIN_STATES];
-} twin_filter_t;
+} twin_kalman_t;
 
-void twin_filter_reset(twin_filter_t *filter);
-/* Scalar measurement; answers whether model and measurement contradict each other or a state is at its limit. */
-bool twin_filter_update(twin_filter_t *filter, const double h[TWIN_STATES], double e, double r);
-void twin_filter_leak(const motor_si_t *motor, twin_filter_t *filter, bool r_known);
+void twin_kalman_reset(twin_kalman_t *kalman);
+/* Scalar measurement; true if the innovation exceeds its gate or a state reaches its limit. */
+bool twin_kalman_update(twin_kalman_t *kalman, const double h[TWIN_STATES], double e, double r);
+void twin_kalman_predict(const motor_si_t *motor, twin_kalman_t *kalman, bool r_known);
 
 typedef struct {
-    twin_filter_t filter;
+    twin_kalman_t kalman;
     double mean_d[TWIN_STATES], mean_q[TWIN_STATES], noise;
     twin_dq_t e, local;
-    double r_prior, contradiction, confidence;
+    double r_prior, mismatch_share, confidence;
     double torque, psi_delta; /* N m, Vs */
     int steps;
-    bool learn, r_known, trusted;
+    bool update_valid, r_known, torque_certain;
 } twin_identify_t;
 
 void twin_identify_reset(const motor_si_t *motor, twin_identify_t *state);

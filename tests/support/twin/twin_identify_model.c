@@ -3,13 +3,11 @@
 
 #include "twin/twin_identify.h"
 
-enum { WINDOW = 10 };
-
 static const double two_pi = 6.283185307179586476925;
 
-bool twin_window(twin_window_t *window, const twin_end_t *sample, bool acting, bool limited)
+bool twin_window(const motor_si_t *motor, twin_window_t *window, const twin_end_t *sample, bool acting, bool limited)
 {
-    if (window->count >= WINDOW) {
+    if (window->count >= motor->periods_per_step) {
         *window = (twin_window_t){.first = window->last, .acting = true};
     }
     window->sum_i.d += sample->i.d;
@@ -20,17 +18,18 @@ bool twin_window(twin_window_t *window, const twin_end_t *sample, bool acting, b
     window->limited += limited;
     window->count++;
     window->last = *sample;
-    return window->count == WINDOW;
+    return window->count == motor->periods_per_step;
 }
 
-static double trapezoid(double sum, double first, double last)
+static double trapezoid(double sum, double first, double last, int n)
 {
-    return (sum - 0.5 * last + 0.5 * first) / WINDOW;
+    return (sum - 0.5 * last + 0.5 * first) / n;
 }
 
 twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, double omega_tracked)
 {
-    const double time = WINDOW * motor->period_s;
+    const int n = motor->periods_per_step;
+    const double time = n * motor->period_s;
     const twin_end_t *a = &window->first;
     const twin_end_t *b = &window->last;
     const double turned = remainder(b->theta - a->theta - omega_tracked * time, two_pi);
@@ -38,8 +37,8 @@ twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, do
     const double sinc = pow(w * motor->period_s, 2.0) / 24.0;
     const double sign = twin_clamp(w / motor->iron_sign_rad_s, -1.0, 1.0);
     const double iron = (motor->iron_hysteresis * sign + motor->iron_eddy * w) / 1.5;
-    const twin_dq_t i = {trapezoid(window->sum_i.d, a->i.d, b->i.d), trapezoid(window->sum_i.q, a->i.q, b->i.q)};
-    const double u_gain = (1.0 + sinc) / WINDOW;
+    const twin_dq_t i = {trapezoid(window->sum_i.d, a->i.d, b->i.d, n), trapezoid(window->sum_i.q, a->i.q, b->i.q, n)};
+    const double u_gain = (1.0 + sinc) / n;
     const double rate_gain = (1.0 - 2.0 * sinc) / time;
     return (twin_point_t){
         .i = i,

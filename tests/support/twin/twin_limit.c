@@ -19,7 +19,7 @@ static double thermal(double end, double start, double celsius, bool *seen)
 
 static double loss(const motor_si_t *m, twin_limit_state_t *state, const twin_limit_in_t *in)
 {
-    const double mechanical = in->torque * in->omega / m->pole_pairs;
+    const double mechanical = in->torque_estimated * in->omega / m->pole_pairs;
     const double electrical = 1.5 * (in->u.d * in->i.d + in->u.q * in->i.q);
     const double now = electrical - mechanical + 1.5 * m->loss_drop_V * hypot(in->i.d, in->i.q);
     const double most = 0.25 * 1.5 * m->v_base_V * m->i_base_A;
@@ -44,7 +44,8 @@ double twin_torque_limit(const motor_si_t *m, twin_limit_state_t *state, const t
                               fmin(in->torque_regen, fmax(in->power_regen + lost, 0.0) / shaft));
     const double moving = line(m->moving_end_rad_s, m->moving_start_rad_s, speed);
     const double against = drive + moving * (regen - drive);
-    return (in->omega < 0.0) ? twin_clamp(in->wanted, -drive, against) : twin_clamp(in->wanted, -against, drive);
+    return (in->omega < 0.0) ? twin_clamp(in->torque_arbitrated, -drive, against)
+                             : twin_clamp(in->torque_arbitrated, -against, drive);
 }
 
 double twin_i_d_limit(const motor_si_t *m, double psi_delta, double winding_C)

@@ -71,8 +71,7 @@ static double quality(double now, double rate, bool known, double drift, double 
 
 static double psi_full_drift(const motor_si_t *motor)
 {
-    return 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * TWIN_TASK_PERIODS *
-           motor->period_s;
+    return 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * motor->step_s;
 }
 
 /* What the resistance law divides by. */
@@ -84,9 +83,8 @@ static double excitation(const twin_mrai_in_t *at)
 static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
                   bool flux_open, bool r_open)
 {
-    const double task_s = TWIN_TASK_PERIODS * motor->period_s;
     const double psi_full = psi_full_drift(motor);
-    const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * task_s;
+    const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * motor->step_s;
     q->psi_quality = quality(q->psi_quality, motor->quality_rate, flux_open && !now->psi_clamped,
                              now->psi_delta - q->psi_last, psi_full);
     q->r_quality = quality(q->r_quality, motor->quality_rate, r_open && !now->r_clamped,

@@ -26,8 +26,8 @@ typedef struct {
         statement; \
     }
 
-READ(torque_command, t->torque_command)
-WRITE(torque_command, t->torque_command = x)
+READ(torque_requested, t->torque_requested)
+WRITE(torque_requested, t->torque_requested = x)
 READ(enable, t->enable)
 WRITE(enable, t->enable = x != 0.0)
 READ(torque_loop, t->torque_loop)
@@ -42,8 +42,8 @@ READ(id_ref, t->i_ref.d)
 WRITE(id_ref, t->id_command = x)
 READ(iq_ref, t->i_ref.q)
 WRITE(iq_ref, t->iq_command = x)
-READ(slew, t->motor.torque_slew_Nm / (TWIN_TASK_PERIODS * t->motor.period_s))
-WRITE(slew, t->motor.torque_slew_Nm = x * TWIN_TASK_PERIODS * t->motor.period_s)
+READ(slew, t->motor.torque_slew_Nm / t->motor.step_s)
+WRITE(slew, t->motor.torque_slew_Nm = x * t->motor.step_s)
 READ(observer_m, t->motor.observer_m)
 WRITE(observer_m, t->motor.observer_m = x)
 READ(flux_bandwidth, t->motor.flux_bandwidth_rad_s)
@@ -53,12 +53,12 @@ WRITE(resistance_bandwidth, t->motor.resistance_bandwidth_rad_s = x)
 READ(compensation, t->compensation)
 WRITE(compensation, t->compensation = x)
 READ(nothing, 0.0 * t->v_dc)
-READ(torque_estimate, t->torque_estimate)
-READ(psi_f, t->motor.psi_f_Vs + (t->robust ? t->identify.filter.x[2] * t->motor.identify_sigma[2] : t->mrai.psi_delta))
-READ(r, t->robust ? t->identify.r_prior + t->identify.filter.x[0] * t->motor.identify_sigma[0]
+READ(torque_estimated, t->torque_estimated)
+READ(psi_f, t->motor.psi_f_Vs + (t->robust ? t->identify.kalman.x[2] * t->motor.identify_sigma[2] : t->mrai.psi_delta))
+READ(r, t->robust ? t->identify.r_prior + t->identify.kalman.x[0] * t->motor.identify_sigma[0]
                   : t->motor.r_ohm_20 + t->mrai.r_delta)
 READ(confidence, t->robust ? t->identify.confidence : 1.0)
-READ(lq_scale, t->robust ? 1.0 + t->identify.filter.x[3] * t->motor.identify_sigma[3] : 1.0)
+READ(lq_scale, t->robust ? 1.0 + t->identify.kalman.x[3] * t->motor.identify_sigma[3] : 1.0)
 READ(id, t->sample.i.d)
 READ(iq, t->sample.i.q)
 READ(ud, t->acted.d)
@@ -72,9 +72,9 @@ READ(v_dc, t->v_dc)
 READ(voltage_trim, t->trim)
 READ(torque_correction, t->torque_state.correction)
 READ(torque_max, t->reference.torque_max)
-READ(torque_limited, t->slewed)
-READ(loop_bandwidth, t->motor.torque_ki / (TWIN_TASK_PERIODS * t->motor.period_s))
-WRITE(loop_bandwidth, t->motor.torque_ki = x * TWIN_TASK_PERIODS * t->motor.period_s)
+READ(torque_commanded, t->torque_commanded)
+READ(loop_bandwidth, t->motor.torque_ki / t->motor.step_s)
+WRITE(loop_bandwidth, t->motor.torque_ki = x * t->motor.step_s)
 READ(run_state, t->run_state)
 
 READ(fault_reset, t->fault_reset)
@@ -92,7 +92,7 @@ static void set_identification_reset(twin_t *t, double x)
 }
 
 static const entry_t entries[] = {
-    {"torque_command_Nm", get_torque_command, set_torque_command, -1e4, 1e4},
+    {"torque_requested_Nm", get_torque_requested, set_torque_requested, -1e4, 1e4},
     {"enable", get_enable, set_enable, 0.0, 1.0},
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
     {"identification", get_identification, set_identification, 0.0, 1.0},
@@ -108,8 +108,8 @@ static const entry_t entries[] = {
     {"torque_loop_bandwidth_rad_s", get_loop_bandwidth, set_loop_bandwidth, 0.0, 500.0},
     {"dead_time_compensation", get_compensation, set_compensation, 0.0, 1.0},
     {"identification_reset", get_nothing, set_identification_reset, 0.0, 1.0},
-    {"torque_estimate_Nm", get_torque_estimate, NULL, 0.0, 0.0},
-    {"torque_limited_Nm", get_torque_limited, NULL, 0.0, 0.0},
+    {"torque_estimated_Nm", get_torque_estimated, NULL, 0.0, 0.0},
+    {"torque_commanded_Nm", get_torque_commanded, NULL, 0.0, 0.0},
     {"psi_f_Vs", get_psi_f, NULL, 0.0, 0.0},
     {"r_ohm", get_r, NULL, 0.0, 0.0},
     {"torque_confidence", get_confidence, NULL, 0.0, 0.0},

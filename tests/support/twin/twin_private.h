@@ -24,7 +24,7 @@ typedef struct {
 struct twin {
     motor_si_t motor; /* a copy: twin_set() may change it */
     /* commands */
-    double torque_command, id_command, iq_command, compensation;
+    double torque_requested, id_command, iq_command, compensation;
     bool enable, torque_loop, identification, current_mode, robust;
     /* state */
     int run_state; /* of the 1 kHz task */
@@ -40,9 +40,9 @@ struct twin {
     twin_torque_estimate_t torque_mean;
     twin_window_t window, complete;
     twin_identify_t identify;
-    double torque_estimate, psi_delta; /* of the identification that is selected */
+    double torque_estimated, psi_delta; /* of the identification that is selected */
     twin_torque_state_t torque_state;
-    double slewed;
+    double torque_commanded;
     bool modulation_limited;
     int periods_on; /* since the gates closed, saturates at 3 */
     /* latest signals */

@@ -148,21 +148,19 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
                                         const twin_mrai_state_t *identifier, bool enabled);
 
 /* --- torque ---------------------------------------------------------------------------------- */
-enum { TWIN_TASK_PERIODS = 10 };
-
 typedef struct {
     double sum, mean;
     int count;
 } twin_torque_estimate_t;
 
 double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux, double psi_delta);
-double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm);
+double twin_torque_estimate(const motor_si_t *motor, twin_torque_estimate_t *state, double torque_Nm);
 
 /* Temperatures NaN: unknown. Limits infinite: open. */
 typedef struct {
-    double wanted, torque_drive, torque_regen, power_drive, power_regen;
+    double torque_arbitrated, torque_drive, torque_regen, power_drive, power_regen;
     twin_dq_t u, i;
-    double torque, omega, v_dc, reach, inverter_C, winding_C;
+    double torque_estimated, omega, v_dc, reach, inverter_C, winding_C;
 } twin_limit_in_t;
 
 typedef struct {
@@ -179,7 +177,7 @@ typedef struct {
 } twin_torque_state_t;
 
 typedef struct {
-    double command, estimate, confidence;
+    double torque_commanded, torque_estimated, confidence;
     bool enabled, limited;
 } twin_torque_in_t;
 
@@ -187,7 +185,7 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in);
 
 typedef struct {
-    double torque, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max, psi_q_delta;
+    double torque_corrected, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max, psi_q_delta;
 } twin_reference_in_t;
 
 typedef struct {

@@ -8,12 +8,12 @@ double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux
     return 1.5 * motor->pole_pairs * ((flux->psi_d + psi_delta) * i.q - flux->psi_q * i.d);
 }
 
-double twin_torque_estimate(twin_torque_estimate_t *state, double torque_Nm)
+double twin_torque_estimate(const motor_si_t *motor, twin_torque_estimate_t *state, double torque_Nm)
 {
     state->sum += torque_Nm;
     state->count++;
-    if (state->count == TWIN_TASK_PERIODS) {
-        state->mean = state->sum / TWIN_TASK_PERIODS;
+    if (state->count == motor->periods_per_step) {
+        state->mean = state->sum / motor->periods_per_step;
         state->sum = 0.0;
         state->count = 0;
     }
@@ -24,20 +24,20 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
                         const twin_torque_in_t *in)
 {
     const double authority = motor->torque_authority * in->confidence;
-    const double room = authority * fabs(in->command);
-    const double direction = (in->command > 0.0) - (in->command < 0.0);
+    const double room = authority * fabs(in->torque_commanded);
+    const double direction = (in->torque_commanded > 0.0) - (in->torque_commanded < 0.0);
     /* The estimate is the mean of the time that has passed: it meets the model of before this step. */
-    const double e = state->model - in->estimate;
-    state->model += motor->torque_model_rate * (in->command - state->model);
+    const double e = state->model - in->torque_estimated;
+    state->model += motor->torque_model_rate * (in->torque_commanded - state->model);
     double p = 0.0;
     if (!in->enabled) {
         state->correction -= motor->torque_ki * state->correction;
     } else {
         p = motor->torque_kp * e;
     }
-    if (in->enabled && (fabs(in->command) >= 0.5 * motor->torque_min_Nm)) {
+    if (in->enabled && (fabs(in->torque_commanded) >= 0.5 * motor->torque_min_Nm)) {
         /* More than 100 % of error is no measurement: it may not move the ratio faster. */
-        const double relative = e * direction / fmax(fabs(in->command), motor->torque_min_Nm);
+        const double relative = e * direction / fmax(fabs(in->torque_commanded), motor->torque_min_Nm);
         const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
         /* In a limit the correction grows up to the command itself, not beyond. */
         const double most = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
@@ -45,8 +45,8 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
     }
     state->saturated = fabs(state->correction) >= authority;
     state->correction = twin_clamp(state->correction, -authority, authority);
-    const double wanted = in->command * state->correction + p;
-    return in->command + twin_clamp(wanted, -room, room);
+    const double wanted = in->torque_commanded * state->correction + p;
+    return in->torque_commanded + twin_clamp(wanted, -room, room);
 }
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in)
@@ -63,7 +63,7 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
         (u >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(u / w - in->shift, 0.0);
     const double psi = fmin(raw, psi_top);
     const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi);
-    const double t = fmin(fabs(in->torque), t_max);
+    const double t = fmin(fabs(in->torque_corrected), t_max);
     const double iq = twin_lookup(&grid, motor->ref_iq_A, t, psi);
     const double psi_far = raw + fmin(in->shift, 0.0);
     const double t_far = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi_far);
@@ -72,10 +72,10 @@ twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_refe
     const double k = 1.5 * motor->pole_pairs;
     return (twin_reference_t){
         .i_ref = {fmax(twin_lookup(&grid, motor->ref_id_A, t, psi), -in->i_d_max),
-                  (in->torque < 0.0) ? -iq : iq},
+                  (in->torque_corrected < 0.0) ? -iq : iq},
         .torque_max = fmax(t_far + k * (in->psi_delta * iq_far - in->psi_q_delta * id_far), 0.0),
         .psi_plan = psi,
-        .limited = fabs(in->torque) > t_max,
+        .limited = fabs(in->torque_corrected) > t_max,
     };
 }
 

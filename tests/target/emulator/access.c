@@ -5,6 +5,9 @@
 
 #include "emu_private.h"
 
+#define PERIPHERAL_BUS 0x40000000U
+#define PRIVATE_BUS 0xE0000000U
+
 emu_pins_t *emu_pins(emu_t *emu)
 {
     emu->s.pins_set_at = emu->s.ftm[0].triggers_due ? emu->s.ftm[0].start : emu->s.now; /* the period's begin */
@@ -20,6 +23,21 @@ void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
 {
     emu->s.pins.gate_fault = gate_fault;
     emu->s.pins.resolver_fault = resolver_fault;
+    ftm_fault_input(emu);
+}
+
+uint32_t emu_outputs(const emu_t *emu)
+{
+    emu_bridge_t bridge;
+    emu_bridge(emu, &bridge);
+    return bridge.driven;
+}
+
+void emu_core_state(emu_t *emu, emu_core_state_t state)
+{
+    emu->s.halted = state == EMU_HALTED;
+    emu->s.stuck = state == EMU_STUCK;
+    ftm_debug(emu, emu->s.halted);
 }
 
 uint32_t emu_counter_read(const emu_t *emu, int timer, bool before)
@@ -86,8 +104,8 @@ uint32_t emu_symbol_size(const emu_t *emu, const char *name)
     return size;
 }
 
-/* "FTM0.MOD" among all registers; NULL: no such. */
-static const uint32_t *register_named(const emu_t *emu, const char *name)
+/* "FTM0.MOD" among all registers; false: no such. */
+static bool find_named(const emu_t *emu, const char *name, int *peripheral, int *number)
 {
     const char *dot = strchr(name, '.');
     for (int p = 0; dot != NULL && p < peripherals_count; p++) {
@@ -97,26 +115,60 @@ static const uint32_t *register_named(const emu_t *emu, const char *name)
         }
         for (int r = 0; r < emu->facts_of[p]->count; r++) {
             if (strcmp(emu->facts_of[p]->fact[r].name, dot + 1) == 0) {
-                return &emu->s.value[p][r];
+                *peripheral = p;
+                *number = r;
+                return true;
             }
         }
     }
-    return NULL;
+    return false;
 }
 
 uint64_t emu_register(const emu_t *emu, const char *name)
 {
-    const uint32_t *value = register_named(emu, name);
-    return value != NULL ? *value : UINT64_MAX;
+    int p, r;
+    return find_named(emu, name, &p, &r) ? emu->s.value[p][r] : UINT64_MAX;
 }
 
 bool emu_register_set(emu_t *emu, const char *name, uint32_t value)
 {
-    const uint32_t *at = register_named(emu, name);
-    if (at != NULL) {
-        (&emu->s.value[0][0])[at - &emu->s.value[0][0]] = value;
+    int p, r;
+    if (!find_named(emu, name, &p, &r)) {
+        return false;
     }
-    return at != NULL;
+    emu->s.value[p][r] = value;
+    return true;
+}
+
+/* The cache's controller lies beside the core's own registers, everything else on the peripheral bus. */
+uint64_t emu_register_load(emu_t *emu, const char *name)
+{
+    int p, r;
+    uint64_t value = UINT64_MAX;
+    if (find_named(emu, name, &p, &r)) {
+        const fact_t *fact = &emu->facts_of[p]->fact[r];
+        const uint32_t address = emu->facts_of[p]->base + fact->offset;
+        if (address < PRIVATE_BUS) {
+            return bus_read(emu->uc, address - PERIPHERAL_BUS, fact->bytes, emu);
+        }
+        (void)bus_private_read(emu, address, fact->bytes, &value);
+    }
+    return value;
+}
+
+bool emu_register_store(emu_t *emu, const char *name, uint32_t value)
+{
+    int p, r;
+    if (!find_named(emu, name, &p, &r)) {
+        return false;
+    }
+    const fact_t *fact = &emu->facts_of[p]->fact[r];
+    const uint32_t address = emu->facts_of[p]->base + fact->offset;
+    if (address >= PRIVATE_BUS) {
+        return bus_private_write(emu, address, fact->bytes, value);
+    }
+    bus_write(emu->uc, address - PERIPHERAL_BUS, fact->bytes, value, emu);
+    return true;
 }
 
 void emu_on_exception(emu_t *emu, emu_exception_fn fn, void *user)

@@ -1,6 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Analogue-to-digital converters. Results are what the pins carry when the conversion ends; they change once per PWM
- * period, at its begin. A conversion takes SMPLTS + 1 + 30 converter clocks (of the order of the data sheet's). */
+ * period, at its begin. A conversion takes SMPLTS + 1 + 30 converter clocks (of the order of the data sheet's).
+ *
+ * documented behaviour                               | modelled | test
+ * -------------------------------------------------- | -------- | --------------------------------------------
+ * a trigger converts the input of SC1n into Rn       | yes      | test_back_to_back_conversions_follow_at_once
+ * software trigger by SC1A while ADTRG is 0          | yes      | test_a_written_sc1a_converts_at_once
+ * conversion takes SMPLTS + 31 clocks, averages more | yes      | test_averaging_takes_as_many_conversions
+ * COCO set at the end, cleared by Rn or SC1n         | yes      | test_complete_is_cleared_by_result_or_control
+ * AIEN: interrupt while COCO is set                  | yes      | test_a_complete_conversion_interrupts_if_asked_to
+ * ADCH 31: no conversion                             | yes      | test_the_disabled_input_is_not_converted
+ * a trigger during a conversion is ignored           | yes      | test_a_trigger_during_a_conversion_is_ignored
+ * calibration before use, and its conditions         | refused  | test_what_is_not_modelled_is_an_error
+ * least sample time, fastest clock                   | refused  | test_what_is_not_modelled_is_an_error
+ * 8 and 10 bits, comparison, DMA                     | refused  | test_other_converter_modes_are_refused
+ * noise, offset, gain and their calibration          | no       | -
+ */
 #include "emu_private.h"
 
 enum {
@@ -59,11 +74,11 @@ static uint64_t conversion_ticks(emu_t *emu, const peripheral_t *self)
     return (uint64_t)clock * each * ((sc3 & 4U) != 0 ? 4U << (sc3 & 3U) : 1U);
 }
 
-static void start(emu_t *emu, const peripheral_t *self, int channel)
+static bool start(emu_t *emu, const peripheral_t *self, int channel)
 {
     adc_t *a = &emu->s.adc[self->instance];
     if ((bus_get(emu, self, 4U * (uint32_t)channel) & 31U) == OFF) {
-        return;
+        return false;
     }
     if (!a->calibrated) {
         emu_fail(emu, "%s converts without having been calibrated", self->name);
@@ -71,6 +86,7 @@ static void start(emu_t *emu, const peripheral_t *self, int channel)
     a->current = channel + 1;
     a->done = emu_instant(emu) + conversion_ticks(emu, self);
     emu_timer(emu, self->instance == 0 ? TIMER_ADC0 : TIMER_ADC1, a->done);
+    return true;
 }
 
 /* The manual's conditions: started by software, average of 32, at most half the fastest clock, from nothing. */
@@ -103,23 +119,18 @@ void adc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
         bus_put(emu, self, offset, value & (AIEN | 31U)); /* clears COCO */
         line_update(emu, self);
         if (offset == SC1 && (bus_get(emu, self, SC2) & 0x40U) == 0) {
-            start(emu, self, 0);
+            (void)start(emu, self, 0);
         }
     }
 }
 
-void adc_pretrigger(emu_t *emu, int instance, int channel)
+/* A trigger that comes during a conversion is ignored. */
+bool adc_pretrigger(emu_t *emu, int instance, int channel)
 {
     const peripheral_t *self = of(instance);
-    if ((bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0 || (bus_get(emu, self, SC2) & 0x40U) == 0) {
-        return;
-    }
-    if (emu->s.adc[instance].current != 0) {
-        pdb_sequence_error(emu, instance, channel);
-    }
-    if (emu->s.adc[instance].current == 0) {
-        start(emu, self, channel);
-    }
+    const bool listens = (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) != 0 &&
+                         (bus_get(emu, self, SC2) & 0x40U) != 0;
+    return listens && emu->s.adc[instance].current == 0 && start(emu, self, channel);
 }
 
 void adc_fire(emu_t *emu, int instance)
@@ -134,7 +145,7 @@ void adc_fire(emu_t *emu, int instance)
     bus_put(emu, self, R + control, emu->s.pins.adc[instance][input] & 0xFFFU);
     bus_put(emu, self, control, bus_get(emu, self, control) | COCO);
     line_update(emu, self);
-    if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* the rise of COCO is taken for the acknowledgement */
+    if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* COCO rises: an unread result leaves it as it is */
         pdb_acknowledge(emu, instance, channel);
     }
 }

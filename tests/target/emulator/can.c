@@ -1,6 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* FlexCAN0: freeze handshake, legacy receive FIFO without filtering (all masks 0), transmit mailboxes, one frame on the
- * bus at a time. Bit errors, arbitration and bus off do not happen. */
+ * bus at a time. Bit errors, arbitration and bus off do not happen.
+ *
+ * documented behaviour                                | modelled | test
+ * --------------------------------------------------- | -------- | --------------------------------------------
+ * freeze handshake, bits only writable in it          | refused  | test_what_is_not_modelled_is_an_error
+ * message memory wants initialising                   | refused  | test_what_is_not_modelled_is_an_error
+ * legacy FIFO of six: shown in box 0, BUF5I           | yes      | test_received_frames_queue_for_the_program
+ * FIFO warning, overflow                              | yes      | test_received_frames_queue_for_the_program
+ * boxes sent lowest identifier first, CODE 12 to 8    | yes      | test_boxes_are_sent_lowest_identifier_first
+ * bit time from CTRL1 and its clock                   | yes      | test_boxes_are_sent_lowest_identifier_first
+ * interrupt of boxes 0 to 15                          | yes      | test_received_frames_queue_for_the_program
+ * filters of the FIFO, soft reset, flexible data rate | refused  | test_other_bus_modes_are_refused
+ * stuff bits, errors, arbitration, bus off            | no       | -
+ */
 #include <string.h>
 
 #include "can_port.h"

@@ -1,5 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: sources, dividers, run modes, gates. An enabled source is stable at once. */
+/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: sources, dividers, run modes, gates. An enabled source is stable at once.
+ *
+ * documented behaviour                           | modelled | test
+ * ---------------------------------------------- | -------- | --------------------------------------------
+ * sources, dividers, PLL multiplication          | yes      | test_the_processor_runs_guarded_at_112_mhz
+ * highest frequencies of RUN and HSRUN           | refused  | test_clocks_beyond_the_data_sheet_are_refused
+ * factor of two at most in HSRUN, PMPROT once    | refused  | test_what_is_not_modelled_is_an_error
+ * settings of a running oscillator or PLL        | refused  | test_a_running_source_keeps_its_settings
+ * PCC: gates, source only while closed, HSRUN    | refused  | test_what_is_not_modelled_is_an_error
+ * RCM: cause of the last reset                   | yes      | test_an_unserviced_watchdog_resets_and_tells_why
+ * LMEM: cache commands are done at once          | yes      | test_a_cache_command_is_done_at_once
+ * SIM: trigger sources of the converters but PDB | refused  | test_other_trigger_sources_are_refused
+ * VLPR, STOP                                     | refused  | test_other_run_modes_are_refused
+ * start-up times, monitors, jitter, cache hits   | no       | -
+ */
 #include "emu_private.h"
 
 enum {

@@ -1,14 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The emulated inverter, built once; without the cross compiler there is nothing to emulate."""
 
-from collections.abc import Iterator
+import ctypes
+import subprocess
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS, have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.library import Loop
+
+LINK = ("-nostartfiles", "-nostdlib", "-Wl,-e,0,-Ttext=0x410", "-Wl,--section-start=.vectors=0")
+Program = Callable[..., Path]
 
 
 @pytest.fixture(scope="session")
@@ -37,3 +43,25 @@ def drive(parts: Parts) -> Iterator[Loop]:
 @pytest.fixture(scope="session")
 def here() -> Path:
     return Path(__file__).parent
+
+
+@pytest.fixture(scope="session")
+def library(parts: Parts) -> ctypes.CDLL:
+    return lib.load(parts.motor.folder.folder / "libfluxtrue_emu.so")
+
+
+@pytest.fixture(scope="session")
+def program(here: Path, tmp_path_factory: pytest.TempPathFactory, parts: Parts) -> Program:
+    """Compiles programs/<name>.c with more flags, for memory at these addresses; answers the ELF file."""
+    folder = tmp_path_factory.mktemp("programs")
+
+    def compiled(name: str, *flags: str, data: int = 0x1FFF_8800, bss: int = 0x1FFF_8000) -> Path:
+        elf = folder / f"{name}{''.join(flags)}.elf"
+        source = here / "programs" / f"{name}.c"
+        options = ("-std=gnu11", "-O2", "-Wall", "-Werror", *flags)
+        places = f"-Wl,-Tbss={bss:#x},-Tdata={data:#x}"
+        command = [ARM_CC, *ARM_FLAGS, *options, str(source), *LINK, places, "-o", str(elf)]
+        subprocess.run(command, check=True, capture_output=True)
+        return elf
+
+    return compiled

@@ -93,6 +93,8 @@ static void timer_fire(emu_t *emu)
     emu->s.due[i] = NEVER;
     if (fire[i] != NULL) {
         fire[i](emu, instance[i]);
+    } else if (i == TIMER_FAULT) {
+        ftm_fault_fire(emu);
     } else if (i == TIMER_WDOG) {
         wdog_fire(emu);
     } else if (i == TIMER_CAN) {
@@ -261,14 +263,15 @@ int emu_run(emu_t *emu, uint64_t ticks)
         }
         limit_update(emu, end);
         s->reschedule = false;
-        if (nvic_take(emu)) {
+        const bool executes = !s->halted && !s->stuck;
+        if (executes && nvic_take(emu)) {
             s->nvic.sleeping = false;
         }
         if (s->instructions >= s->break_at) {
             s->break_at = NEVER;
             return EMU_BREAK;
         }
-        if (s->nvic.sleeping) {
+        if (s->nvic.sleeping || !executes) {
             s->now = s->now > s->limit ? s->now : s->limit;
         } else {
             run_core(emu);
@@ -293,6 +296,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
     }
     s->core_ticks = FIRC_TICKS;
     rdc_power_on(emu);
+    pdb_reset(emu);
     bus_reset(emu);
     nvic_reset(emu);
     wdog_restart(emu);

@@ -27,6 +27,8 @@
 typedef struct emu emu_t;
 
 typedef enum { EMU_FAST = 0, EMU_COUNTING = 1 } emu_mode_t;
+/** The core stuck: it executes nothing, as in a loop with all interrupts masked. Halted: by a debugger. */
+typedef enum { EMU_RUNS = 0, EMU_STUCK = 1, EMU_HALTED = 2 } emu_core_state_t;
 typedef enum { EMU_LIMIT = 0, EMU_CENTRE = 1, EMU_BREAK = 2, EMU_FAILED = -1 } emu_stop_t;
 
 /** What the pins carry into the chip. */
@@ -41,7 +43,8 @@ typedef struct {
 /** What the pins of the bridge do: compare values that act in this period, as a share of it. */
 typedef struct {
     double duty[3];
-    bool gates;              /* all six outputs follow the timer */
+    uint8_t driven;          /* outputs that may switch on, one bit each, even ones the upper switches */
+    bool gates;              /* all six follow the timer, complementary */
     double dead_time_s;
     double period_s;
 } emu_bridge_t;
@@ -56,6 +59,8 @@ EMU_API const emu_pins_t *emu_pins_look(const emu_t *emu);
 /** Lines that do not belong to an instant. */
 EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
+EMU_API uint32_t emu_outputs(const emu_t *emu);
+EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);
 /** The line that supplies the gate driver. */
 EMU_API bool emu_gate_driver(const emu_t *emu);
 
@@ -81,6 +86,9 @@ EMU_API uint32_t emu_resolver_angle(const emu_t *emu);
 /** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
 EMU_API uint64_t emu_register(const emu_t *emu, const char *name);
 EMU_API bool emu_register_set(emu_t *emu, const char *name, uint32_t value);
+/** The same as the core would access it, with every side effect and check; between two runs. */
+EMU_API uint64_t emu_register_load(emu_t *emu, const char *name);
+EMU_API bool emu_register_store(emu_t *emu, const char *name, uint32_t value);
 
 /** Called when an exception's handler is entered and left (vector number, 16 = first interrupt). */
 typedef void (*emu_exception_fn)(void *user, int vector, bool entered);

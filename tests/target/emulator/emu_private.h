@@ -28,7 +28,7 @@ enum {
 
 typedef enum {
     TIMER_FTM0, TIMER_FTM2, TIMER_PDB0, TIMER_PDB1, TIMER_ADC0, TIMER_ADC1, TIMER_LPIT0, TIMER_LPIT1, TIMER_LPIT2,
-    TIMER_LPIT3, TIMER_WDOG, TIMER_CAN, TIMER_SYSTICK, TIMERS
+    TIMER_LPIT3, TIMER_FAULT, TIMER_WDOG, TIMER_CAN, TIMER_SYSTICK, TIMERS
 } timer_t_;
 
 /* ---- what changes ---- */
@@ -52,7 +52,10 @@ typedef struct {
     bool software_trigger;
     uint32_t outmask;           /* acting */
     bool triggers_due;          /* the instant's triggers wait for the pins */
-    bool fault_latched, fault_seen, tof; /* seen: FMS was read while FAULTF was set */
+    bool tof;
+    bool fault_input;           /* behind the filter */
+    bool fault_latched, fault_seen, fault_holds; /* FAULTF; FMS was read while it was set; the outputs are off */
+    uint64_t stopped_at;        /* by a debugger, 0: not */
     bool closed;                /* the bridge, when last looked at */
     uint32_t quad_offset;
     uint32_t read[2];           /* the counter as the program has read it last, and before that */
@@ -62,7 +65,8 @@ typedef struct {
     bool running;
     uint64_t start;
     uint32_t mod, idly, dly[8]; /* that act: loaded by LDOK */
-    uint32_t fired;
+    uint64_t due[8];            /* trigger outputs to come */
+    uint32_t locked;            /* pre-triggers whose conversion has not risen COCO */
 } pdb_t;
 
 typedef struct {
@@ -116,6 +120,7 @@ typedef struct {
     uint32_t core_ticks;   /* per core cycle */
     uint32_t pc, resets, reset_cause;
     bool centre, reset_wanted, poll_masks, reschedule, stop;
+    bool halted, stuck; /* by a debugger; executing nothing while everything else goes on */
     uint32_t exc_return;
     emu_pins_t pins;
     uint64_t pins_set_at;
@@ -196,6 +201,7 @@ bool bus_private_write(emu_t *emu, uint32_t address, unsigned size, uint32_t val
 void nvic_reset(emu_t *emu);
 void nvic_line(emu_t *emu, int irq, bool level);
 void nvic_pend(emu_t *emu, int vector);
+void nvic_reconsider(emu_t *emu);
 bool nvic_take(emu_t *emu);
 void nvic_return(emu_t *emu);
 uint64_t scs_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
@@ -213,12 +219,15 @@ void profile_leave(emu_t *emu);
 void ftm_fire(emu_t *emu, int instance);
 void ftm_triggers(emu_t *emu);
 void ftm_fault_input(emu_t *emu);
+void ftm_fault_fire(emu_t *emu);
+void ftm_debug(emu_t *emu, bool halted);
 void pdb_trigger(emu_t *emu, int instance);
 void pdb_fire(emu_t *emu, int instance);
-void adc_pretrigger(emu_t *emu, int instance, int channel);
+/** False: no conversion was started. */
+bool adc_pretrigger(emu_t *emu, int instance, int channel);
 void adc_fire(emu_t *emu, int instance);
 void pdb_acknowledge(emu_t *emu, int instance, int channel);
-void pdb_sequence_error(emu_t *emu, int instance, int channel);
+void pdb_reset(emu_t *emu);
 void wdog_restart(emu_t *emu);
 void lpit_fire(emu_t *emu, int channel);
 void wdog_fire(emu_t *emu);

@@ -236,5 +236,5 @@ const char *sim_shadow_difference(sim_t *sim)
 void sim_shadow_disturb(sim_t *sim)
 {
     const emulated_t *e = sim->controller.self;
-    e->shadow->drive.slow.mrai.psi_delta ^= 1;
+    e->shadow->drive.mrai.isr.law.psi_delta ^= 1;
 }

@@ -1,21 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* FlexTimer: FTM0 as the bridge's modulator (up counting, combined complementary pairs with dead time, buffered and
- * synchronised compare values, output mask, software output control, fault input), FTM2 as quadrature decoder. */
-#include "emu_private.h"
+ * synchronised compare values, output mask, software output control, fault input), FTM2 as quadrature decoder.
+ *
+ * documented behaviour                               | modelled | test
+ * -------------------------------------------------- | -------- | --------------------------------------------
+ * counter from CNTIN to MOD, prescaler               | yes      | test_the_counter_wraps_at_its_modulus
+ * CnV buffered by SYNCEN, loaded by SWSYNC at CNTMAX | yes      | test_compare_values_wait_for_their_trigger
+ * OUTMASK by hardware trigger with HWOM              | yes      | test_the_mask_waits_for_the_hardware_trigger
+ * TRIGn cleared by the trigger (HWTRIGMODE 0)        | yes      | test_the_mask_waits_for_the_hardware_trigger
+ * initialisation trigger by overflow                 | yes      | test_the_mask_waits_for_the_hardware_trigger
+ * write protection                                   | refused  | test_the_fault_settings_are_write_protected
+ * channel 6: the edge that samples a resolver        | yes      | test_a_resolver_image_computes_the_same_bits
+ * FTM2: quadrature decoder                           | yes      | test_the_counter_follows_the_encoder
+ * BDMMODE: counter while the core is halted          | yes      | test_a_halted_core_leaves_outputs_as_bdmmode_says
+ * up-down counting, interrupts, legacy sync, INVCTRL | refused  | test_other_timer_modes_are_refused
+ * reload points, input capture                       | no       | -
+ */
+#include "ftm_private.h"
 
-enum {
-    SC = 0x00, CNT = 0x04, MOD = 0x08, C0SC = 0x0C, C0V = 0x10, C7V = 0x48, CNTIN = 0x4C, STATUS = 0x50, MODE = 0x54,
-    SYNC = 0x58, OUTINIT = 0x5C, OUTMASK = 0x60, COMBINE = 0x64, DEADTIME = 0x68, EXTTRIG = 0x6C, POL = 0x70,
-    FMS = 0x74, FILTER = 0x78, FLTCTRL = 0x7C, QDCTRL = 0x80, CONF = 0x84, FLTPOL = 0x88, SYNCONF = 0x8C,
-    SWOCTRL = 0x94, LAST = 0x98,
-    FTM0_FAULT_IRQ = 103, FTM0_OVERFLOW_IRQ = 104, INIT_TRIGGER = 22,
-    PAIR_COMBINE = 1, PAIR_COMP = 2, PAIR_DTEN = 16, PAIR_SYNCEN = 32, PAIR_FAULTEN = 64,
-};
-
-static const peripheral_t *ftm0(void)
-{
-    return bus_find("FTM0");
-}
+enum { INIT_TRIGGER = 22 };
 
 static const peripheral_t *of(int instance)
 {
@@ -54,20 +57,14 @@ static uint32_t decoded(const emu_t *emu, const peripheral_t *self)
 
 /* ---- registers ---- */
 
-static uint32_t fault_status(const emu_t *emu, const peripheral_t *self)
-{
-    const uint32_t kept = bus_get(emu, self, FMS) & 0x40U;
-    const bool latched = emu->s.ftm[self->instance].fault_latched;
-    return kept | (emu->s.pins.gate_fault ? 0x20U : 0U) | (latched ? 0x81U : 0U);
-}
-
 static uint32_t counter(const emu_t *emu, const peripheral_t *self, uint32_t stored)
 {
     const ftm_t *f = &emu->s.ftm[self->instance];
     if (decoding(emu, self)) {
         return decoded(emu, self);
     }
-    return f->running ? f->cntin + (uint32_t)((emu->s.now - f->start) / clock_ticks(emu, self)) : stored;
+    const uint64_t now = f->stopped_at != 0U ? f->stopped_at : emu->s.now;
+    return f->running ? f->cntin + (uint32_t)((now - f->start) / clock_ticks(emu, self)) : stored;
 }
 
 uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
@@ -81,7 +78,7 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     case SC: return (stored & ~0x280U) | (f->tof ? 0x200U : 0U);
     case FMS:
         f->fault_seen = f->fault_latched;
-        return fault_status(emu, self);
+        return self->instance == 0 ? ftm_fault_status(emu) : stored;
     default: return stored;
     }
 }
@@ -153,17 +150,11 @@ static void mode_written(emu_t *emu, const peripheral_t *self, uint32_t value)
     }
 }
 
-/* FAULTF falls when it is read as 1 and then written 0 while the input is quiet again. */
-static void fms_written(emu_t *emu, const peripheral_t *self, uint32_t value)
+/* WPDIS is its negation. */
+static void protection_written(emu_t *emu, const peripheral_t *self, uint32_t value)
 {
-    ftm_t *f = &emu->s.ftm[self->instance];
-    if ((value & 0x80U) == 0 && !emu->s.pins.gate_fault && f->fault_seen) {
-        f->fault_seen = false;
-        f->fault_latched = false;
-        nvic_line(emu, FTM0_FAULT_IRQ, false);
-    }
     if ((value & 0x40U) != 0) {
-        bus_put(emu, self, MODE, bus_get(emu, self, MODE) & ~4U); /* WPDIS is its negation */
+        bus_put(emu, self, MODE, bus_get(emu, self, MODE) & ~4U);
     }
 }
 
@@ -188,21 +179,6 @@ static void check_protection(emu_t *emu, const peripheral_t *self, uint32_t offs
         emu_fail(emu, "write of %s offset 0x%x: the bits 0x%x are write protected (FMS.WPEN) and keep their values",
                  self->name, offset, changed);
     }
-}
-
-/* The plant takes one state of the bridge per period: it may open within one, but not close. */
-static void check_bridge(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old)
-{
-    if (self->instance != 0 || (offset != SC && offset != OUTMASK && offset != SWOCTRL && offset != FMS)) {
-        return;
-    }
-    emu_bridge_t now;
-    emu_bridge(emu, &now);
-    if (now.gates && !emu->s.ftm[0].closed) {
-        emu_fail(emu, "write of FTM0 offset 0x%x (0x%x before): the bridge closes in the middle of a period", offset,
-                 old);
-    }
-    emu->s.ftm[0].closed = now.gates;
 }
 
 /* SAMPLE of the resolver converter is channel 6: low from the period's start to C6V, high from there on. */
@@ -251,37 +227,40 @@ static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t 
     } else if (offset == MODE) {
         mode_written(emu, self, value);
     } else if (offset == FMS) {
-        fms_written(emu, self, value);
+        protection_written(emu, self, value);
     } else if (offset == QDCTRL) {
         start_or_stop(emu, self);
-    } else if (offset == FLTCTRL || offset == FLTPOL) {
-        ftm_fault_input(emu);
     }
     if (!f->running) {
         buffers_load(emu, self, true);
     }
 }
 
+static bool sets_outputs(uint32_t offset)
+{
+    return offset == SC || offset == OUTMASK || offset == SWOCTRL || offset == FMS || offset == POL;
+}
+
+static bool sets_fault_control(uint32_t offset)
+{
+    return offset == FLTCTRL || offset == FLTPOL || offset == FMS || offset == MODE || offset == SC;
+}
+
 void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
+    const bool ran = emu->s.ftm[self->instance].running;
     check_protection(emu, self, offset, old, value);
     act(emu, self, offset, value);
-    check_bridge(emu, self, offset, old);
+    if (self->instance == 0 && sets_fault_control(offset)) {
+        ftm_fault_written(emu, offset, value);
+    }
+    if (self->instance == 0 && sets_outputs(offset)) {
+        ftm_outputs_written(emu, offset, value);
+        ftm_outputs_check(emu, emu->s.ftm[0].running && !ran);
+    }
 }
 
 /* ---- events ---- */
-
-void ftm_fault_input(emu_t *emu)
-{
-    const peripheral_t *self = ftm0();
-    ftm_t *f = &emu->s.ftm[0];
-    const bool listens = (bus_get(emu, self, FLTCTRL) & 1U) != 0 && (bus_get(emu, self, MODE) & 0x60U) != 0;
-    if (listens && emu->s.pins.gate_fault && !f->fault_latched) {
-        f->fault_latched = true;
-        f->fault_seen = false;
-        nvic_line(emu, FTM0_FAULT_IRQ, (bus_get(emu, self, MODE) & 0x80U) != 0);
-    }
-}
 
 /* The hardware trigger that TRGMUX gives to FTM0, from its own start: with HWOM it takes over the output mask. */
 static void hardware_trigger(emu_t *emu)
@@ -303,13 +282,6 @@ static void hardware_trigger(emu_t *emu)
     }
 }
 
-static void closed_update(emu_t *emu)
-{
-    emu_bridge_t bridge;
-    emu_bridge(emu, &bridge);
-    emu->s.ftm[0].closed = bridge.gates;
-}
-
 /* The counter goes from MOD to CNTIN: the loading point (SYNC.CNTMAX), and the period's begin. */
 void ftm_fire(emu_t *emu, int instance)
 {
@@ -328,7 +300,8 @@ void ftm_fire(emu_t *emu, int instance)
         if ((bus_get(emu, self, EXTTRIG) & 0x40U) != 0) {
             hardware_trigger(emu);
         }
-        closed_update(emu);
+        ftm_fault_period(emu);
+        ftm_outputs_check(emu, true);
         period_begins(emu, self);
     }
 }
@@ -349,52 +322,21 @@ void ftm_triggers(emu_t *emu)
         trgmux_event(emu, INIT_TRIGGER);
     }
     emu->s.event = NEVER;
-    closed_update(emu);
 }
 
-/* ---- the bridge ---- */
-
-/* The odd channel of a pair drives its pin only when it, too, has an edge (ELSB:ELSA). */
-static bool both_drive(const emu_t *emu, int pair)
+/* The core is halted by a debugger, or goes on: BDMMODE 3 lets the counter run. */
+void ftm_debug(emu_t *emu, bool halted)
 {
-    const uint32_t upper = C0SC + 16U * (uint32_t)pair;
-    return (bus_get(emu, ftm0(), upper) & 12U) == 8U && (bus_get(emu, ftm0(), upper + 8U) & 12U) == 8U;
-}
-
-static bool pair_follows(const emu_t *emu, int pair)
-{
-    const peripheral_t *self = ftm0();
-    const ftm_t *f = &emu->s.ftm[0];
-    const uint32_t both = 3U << (2 * pair);
-    const uint32_t combine = bus_get(emu, self, COMBINE) >> (8 * pair);
-    const uint32_t enabled = bus_get(emu, self, SC) >> 16, forced = bus_get(emu, self, SWOCTRL);
-    const bool faulted = f->fault_latched && (combine & PAIR_FAULTEN) != 0;
-    return f->running && (enabled & both) == both && (f->outmask & both) == 0 && (forced & both) == 0 && !faulted &&
-           (combine & (PAIR_COMBINE | PAIR_COMP)) == (PAIR_COMBINE | PAIR_COMP) &&
-           both_drive(emu, pair);
-}
-
-static double pair_duty(const ftm_t *f, int pair)
-{
-    const double from = f->cntin, to = (double)f->mod + 1.0;
-    const double rise = f->cv[2 * pair], fall = f->cv[2 * pair + 1];
-    const double high = (fall < to ? fall : to) - (rise > from ? rise : from);
-    return high > 0.0 ? high / (to - from) : 0.0;
-}
-
-void emu_bridge(const emu_t *emu, emu_bridge_t *bridge)
-{
-    const peripheral_t *self = ftm0();
-    const ftm_t *f = &emu->s.ftm[0];
-    const uint32_t dead = bus_get(emu, self, DEADTIME);
-    static const uint32_t prescaler[4] = {1, 1, 4, 16};
-    const double clock_s = (double)clock_ticks(emu, self) / (double)EMU_TICKS_PER_S;
-    bridge->gates = true;
-    for (int pair = 0; pair < 3; pair++) {
-        const bool dead_time = (bus_get(emu, self, COMBINE) >> (8 * pair) & PAIR_DTEN) != 0;
-        bridge->duty[pair] = pair_duty(f, pair);
-        bridge->gates = bridge->gates && pair_follows(emu, pair) && dead_time;
+    ftm_t *f = &emu->s.ftm[0];
+    if (!f->running || (bus_get(emu, ftm0(), CONF) >> 6 & 3U) == 3U || halted == (f->stopped_at != 0U)) {
+        return;
     }
-    bridge->dead_time_s = ((dead & 63U) | (dead >> 16 & 15U) << 6) * prescaler[dead >> 6 & 3U] * clock_s;
-    bridge->period_s = (double)(f->mod - f->cntin + 1U) * clock_s;
+    if (halted) {
+        f->stopped_at = emu->s.now;
+        emu_timer(emu, TIMER_FTM0, NEVER);
+    } else {
+        f->start += emu->s.now - f->stopped_at;
+        f->stopped_at = 0;
+        emu_timer(emu, TIMER_FTM0, f->start + period_ticks(emu, ftm0()));
+    }
 }

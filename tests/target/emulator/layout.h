@@ -3,7 +3,7 @@
 #define EMULATOR_LAYOUT_H
 /** Parts of drive_t that look the same on target and host (no pointers inside, short enumerations), for copying between
  * the image's memory and a drive_t on the host. Compiled twice: for the target to learn the offsets there.
- * Source   app/drive.h
+ * Source   drive/drive.h
  * Context  emulator only */
 
 /* What the outside writes, and what calibration changes; the first ones the image writes, too: the request, and the
@@ -20,12 +20,12 @@
 /* What the activities write. */
 #define LAYOUT_STATE(X) \
     X(fast)             \
-    X(slow)             \
+    X(psi_d_error)      \
     X(task)             \
     X(samples)          \
     X(windows)          \
     X(commands)         \
-    X(schedules)
+    X(mrai)
 
 #define LAYOUT_SYMBOL "ecu" /* its first member is the drive */
 

@@ -1,5 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Low-power interrupt timer: periodic channels. A value written while a channel runs acts after its next expiry. */
+/* Low-power interrupt timer: periodic channels. A value written while a channel runs acts after its next expiry.
+ *
+ * documented behaviour                            | modelled | test
+ * ----------------------------------------------- | -------- | --------------------------------------------
+ * a channel expires every TVAL + 1 clocks         | yes      | test_a_channel_expires_periodically
+ * a value written meanwhile acts after the expiry | yes      | test_a_new_value_acts_after_the_next_expiry
+ * TIF, cleared by a one; interrupt with TIE       | yes      | test_a_channel_expires_periodically
+ * four clocks between M_CEN and other writes      | refused  | test_what_is_not_modelled_is_an_error
+ * other modes, chains, triggers, SETTEN, CLRTEN   | refused  | test_other_channel_modes_are_refused
+ */
 #include "emu_private.h"
 
 enum {

@@ -1,6 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame arrives when its bits have been
- * clocked; what the converter answers is fixed when the frame begins. */
+ * clocked; what the converter answers is fixed when the frame begins.
+ *
+ * documented behaviour                               | modelled | test
+ * -------------------------------------------------- | -------- | --------------------------------------------
+ * master, single frames, FIFOs of four words         | yes      | test_a_frame_arrives_when_its_bits_have_been_clocked
+ * frame time from CCR, prescaler and clock           | yes      | test_a_frame_arrives_when_its_bits_have_been_clocked
+ * an empty receive FIFO, a full one                  | refused  | test_a_missing_word_and_one_too_many_are_refused
+ * interrupts, DMA, continuous and wide transfers     | refused  | test_other_transfer_modes_are_refused
+ * AD2S1210: position latched by SAMPLE               | yes      | test_a_resolver_image_computes_the_same_bits
+ * AD2S1210: faults kept until read and sampled again | yes      | test_a_fault_of_the_resolver_raises_the_angle_fault
+ * AD2S1210: tracking error, dynamics, settling       | no       | -
+ */
 #include "emu_private.h"
 
 enum {

@@ -1,6 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Exceptions: what is pending, what may interrupt what, entry and return. Every active exception has its frame on the
- * stack; registers of the floating-point unit are stacked at once, never lazily. */
+ * stack; registers of the floating-point unit are stacked at once, never lazily.
+ *
+ * documented behaviour                             | modelled | test
+ * ------------------------------------------------ | -------- | --------------------------------------------
+ * priorities, groups, nesting, PRIMASK, BASEPRI    | yes      | test_qemu_takes_the_same_exceptions
+ * what is pended under a mask comes when it opens  | yes      | test_qemu_takes_the_same_exceptions
+ * stacking, alignment, floating-point registers    | yes      | test_exceptions_nest_by_priority
+ * a level that stands pends again after the return | yes      | test_a_level_that_stands_interrupts_again
+ * sleep, wake-up                                   | yes      | test_a_sleeping_core_is_woken_by_each_tick
+ * a vector without a handler                       | refused  | test_what_is_not_modelled_is_an_error
+ * MPU, faults as exceptions                        | refused  | test_what_is_not_modelled_is_an_error
+ * lazy stacking, tail-chaining, late arrival       | no       | -
+ */
 #include <string.h>
 
 #include "emu_private.h"
@@ -63,6 +75,12 @@ static bool enabled(const nvic_t *n, int vector)
     return vector < 16 || bit(n->enabled, vector);
 }
 
+/* With its lower part, by which exceptions of one group are ordered. */
+static int whole_priority(const nvic_t *n, int vector)
+{
+    return vector == NMI || vector == HARD_FAULT ? priority_of(n, vector) : n->priority[vector];
+}
+
 /* The pending exception of the highest priority; -1: none. */
 static int first_pending(const nvic_t *n)
 {
@@ -72,9 +90,9 @@ static int first_pending(const nvic_t *n)
         while (left != 0) {
             const int vector = 32 * word + __builtin_ctz(left);
             left &= left - 1U;
-            if (enabled(n, vector) && (best < 0 || priority_of(n, vector) < best_priority)) {
+            if (enabled(n, vector) && (best < 0 || whole_priority(n, vector) < best_priority)) {
                 best = vector;
-                best_priority = priority_of(n, vector);
+                best_priority = whole_priority(n, vector);
             }
         }
     }
@@ -114,7 +132,9 @@ int nvic_best(const emu_t *emu)
     return priority < current && priority < masked_priority(emu, current) ? vector : -1;
 }
 
-static void reconsider(emu_t *emu)
+/* Something is pending that is more urgent than what runs: taken at once, or, while it is masked, as soon as the masks
+ * open, for which nvic_take() has them polled. */
+void nvic_reconsider(emu_t *emu)
 {
     const int vector = first_pending(&emu->s.nvic);
     if (vector >= 0 && priority_of(&emu->s.nvic, vector) < active_priority(&emu->s.nvic)) {
@@ -125,7 +145,7 @@ static void reconsider(emu_t *emu)
 void nvic_pend(emu_t *emu, int vector)
 {
     bit_set(emu->s.nvic.pending, vector, true);
-    reconsider(emu);
+    nvic_reconsider(emu);
 }
 
 void nvic_line(emu_t *emu, int irq, bool level)

@@ -1,9 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Programmable delay block: from one trigger to the converter's pretriggers; back-to-back pretriggers follow the
- * conversion before them. Channel 0 only. */
+/* Programmable delay block: from one trigger to the converter's pre-triggers. Channel 0 only.
+ *
+ * A pre-trigger that starts a conversion takes a lock; while any lock of the channel is held, a further pre-trigger
+ * starts nothing and sets its sequence error. A lock is released when the conversion's COCO rises, when the
+ * pre-trigger is disabled or when the PDB is disabled. COCO rises only if it was clear: a result that was not read
+ * before the next conversion into the same register leaves the lock held. Whether reading that result late would
+ * release it is not documented; here it does not.
+ *
+ * documented behaviour                               | modelled | test
+ * -------------------------------------------------- | -------- | ---------------------------------------------------
+ * counter, MULT, PRESCALER, delays up to MOD         | yes      | test_a_delay_counts_from_the_trigger
+ * a delay beyond MOD never comes                     | yes      | test_a_delay_beyond_the_modulus_never_comes
+ * registers act after LDOK (LDMOD 0)                 | yes      | test_a_delay_acts_only_after_it_was_loaded
+ * pre-trigger 2 cycles after its cause, trigger 3    | yes      | test_a_delay_counts_from_the_trigger
+ * back-to-back follows the rise of COCO before it    | yes      | test_back_to_back_conversions_follow_at_once
+ * lock until COCO rises; sequence error meanwhile    | yes      | test_an_unread_result_stops_the_sequence
+ * disabling PDB or pre-trigger releases locks        | yes      | test_disabling_releases_the_locks
+ * sequence error interrupt, flags cleared by zeros   | yes      | test_a_sequence_error_interrupts_until_it_is_cleared
+ * LDMOD 1 ... 3, CONT, PDBIE, DMAEN, other triggers  | refused  | test_other_modes_of_the_delay_block_are_refused
+ * channel 1, pulse outputs                           | refused  | test_channel_1_and_the_pulse_output_are_refused
+ */
 #include "emu_private.h"
 
-enum { SC = 0x00, MOD = 0x04, CNT = 0x08, IDLY = 0x0C, C1 = 0x10, S = 0x14, DLY0 = 0x18, DLY7 = 0x34 };
+enum {
+    SC = 0x00, MOD = 0x04, CNT = 0x08, IDLY = 0x0C, C1 = 0x10, S = 0x14, DLY0 = 0x18, DLY7 = 0x34,
+    PRETRIGGERS = 8, PRETRIGGER_CYCLES = 2, TRIGGER_CYCLES = 1, PDB0_IRQ = 52, PDB1_IRQ = 68,
+    LDOK = 1 << 0, PDBEN = 1 << 7, SWTRIG = 1 << 16, PDBEIE = 1 << 17, ERRORS = 0xFF, FLAG0 = 16,
+    NOT_MODELLED = 1 << 1 | 1 << 5 | 1 << 15 | 3 << 18, /* CONT, PDBIE, DMAEN, LDMOD */
+};
 
 static const peripheral_t *of(int instance)
 {
@@ -13,6 +37,15 @@ static const peripheral_t *of(int instance)
 bool pdb_models(uint32_t offset)
 {
     return offset <= DLY7;
+}
+
+void pdb_reset(emu_t *emu)
+{
+    for (int instance = 0; instance < 2; instance++) {
+        for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+            emu->s.pdb[instance].due[i] = NEVER;
+        }
+    }
 }
 
 static uint32_t clock_ticks(const emu_t *emu, const peripheral_t *self)
@@ -26,9 +59,16 @@ uint32_t pdb_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 {
     const pdb_t *p = &emu->s.pdb[self->instance];
     if (offset == CNT) {
-        return p->running ? (uint32_t)((emu->s.now - p->start) / clock_ticks(emu, self)) : 0U;
+        const uint64_t counted = p->running ? (emu->s.now - p->start) / clock_ticks(emu, self) : 0U;
+        return counted <= p->mod ? (uint32_t)counted : 0U; /* one shot: back to zero behind MOD */
     }
     return stored;
+}
+
+static void line_update(emu_t *emu, const peripheral_t *self)
+{
+    const bool error = (bus_get(emu, self, S) & ERRORS) != 0 && (bus_get(emu, self, SC) & PDBEIE) != 0;
+    nvic_line(emu, self->instance == 0 ? PDB0_IRQ : PDB1_IRQ, error);
 }
 
 static void load(emu_t *emu, const peripheral_t *self)
@@ -36,107 +76,135 @@ static void load(emu_t *emu, const peripheral_t *self)
     pdb_t *p = &emu->s.pdb[self->instance];
     p->mod = bus_get(emu, self, MOD);
     p->idly = bus_get(emu, self, IDLY);
-    for (uint32_t i = 0; i < 8U; i++) {
+    for (uint32_t i = 0; i < PRETRIGGERS; i++) {
         p->dly[i] = bus_get(emu, self, DLY0 + 4U * i);
     }
 }
 
-void pdb_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+/* The earliest trigger output that is due; NEVER: none is left. */
+static uint64_t next_due(const pdb_t *p, uint32_t *which)
 {
-    (void)old;
-    if (offset == S) {
-        bus_put(emu, self, S, old & value); /* flags fall when written 0 */
-    }
-    if (offset != SC) {
-        return;
-    }
-    const uint32_t source = value >> 8 & 15U;
-    if ((value & 0x20022U) != 0 || (value & 1U << 15) != 0) {
-        emu_fail(emu, "write of %s.SC: continuous mode, interrupts and DMA are not modelled", self->name);
-    }
-    if ((value & 0x80U) != 0 && source != 0U && source != 15U) {
-        emu_fail(emu, "write of %s.SC: trigger source %u is not connected", self->name, source);
-    }
-    if ((value & 0x81U) == 0x81U) {
-        load(emu, self);
-        bus_put(emu, self, SC, value & ~0x10001U);
-    }
-    if ((value & 0x10080U) == 0x10080U && source == 15U) {
-        pdb_trigger(emu, self->instance);
-    }
-}
-
-/* When the next pretrigger by delay is due; NEVER: none is left. */
-static uint64_t next_due(const emu_t *emu, const peripheral_t *self, uint32_t *which)
-{
-    const pdb_t *p = &emu->s.pdb[self->instance];
-    const uint32_t c1 = bus_get(emu, self, C1);
     uint64_t next = NEVER;
-    for (uint32_t i = 0; i < 8U; i++) {
-        const bool on = (c1 >> i & 1U) != 0, follows = (c1 >> (16U + i) & 1U) != 0;
-        const bool delayed = (c1 >> (8U + i) & 1U) != 0;
-        if (!on || follows || (p->fired >> i & 1U) != 0) {
-            continue;
-        }
-        const uint64_t due = p->start + (delayed ? (uint64_t)(p->dly[i] + 1U) : 1U) * clock_ticks(emu, self);
-        if (due < next) {
-            next = due;
+    for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+        if (p->due[i] < next) {
+            next = p->due[i];
             *which = i;
         }
     }
     return next;
 }
 
-static void arm(emu_t *emu, const peripheral_t *self)
+static void arm(emu_t *emu, int instance)
 {
     uint32_t which;
-    emu_timer(emu, self->instance == 0 ? TIMER_PDB0 : TIMER_PDB1, next_due(emu, self, &which));
+    emu_timer(emu, instance == 0 ? TIMER_PDB0 : TIMER_PDB1, next_due(&emu->s.pdb[instance], &which));
+}
+
+/* Disabled pre-triggers neither fire nor hold a lock; without PDBEN that is all of them. */
+static void disable(emu_t *emu, const peripheral_t *self, uint32_t pretriggers)
+{
+    pdb_t *p = &emu->s.pdb[self->instance];
+    p->locked &= ~pretriggers;
+    for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+        p->due[i] = (pretriggers >> i & 1U) != 0 ? NEVER : p->due[i];
+    }
+    arm(emu, self->instance);
+}
+
+static void control_written(emu_t *emu, const peripheral_t *self, uint32_t value)
+{
+    const uint32_t source = value >> 8 & 15U;
+    if ((value & NOT_MODELLED) != 0) {
+        emu_fail(emu, "write of %s.SC: CONT, PDBIE, DMAEN and LDMOD are not modelled", self->name);
+    }
+    if ((value & PDBEN) != 0 && source != 0U && source != 15U) {
+        emu_fail(emu, "write of %s.SC: trigger source %u is not connected", self->name, source);
+    }
+    if ((value & PDBEN) == 0) {
+        emu->s.pdb[self->instance].running = false;
+        disable(emu, self, ERRORS);
+    }
+    if ((value & (PDBEN | LDOK)) == (PDBEN | LDOK)) {
+        load(emu, self);
+    }
+    bus_put(emu, self, SC, value & ~(uint32_t)(LDOK | SWTRIG));
+    line_update(emu, self);
+    if ((value & (SWTRIG | PDBEN)) == (SWTRIG | PDBEN) && source == 15U) {
+        pdb_trigger(emu, self->instance);
+    }
+}
+
+void pdb_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    if (offset == S) {
+        bus_put(emu, self, S, old & value); /* flags fall when written 0 */
+        line_update(emu, self);
+    } else if (offset == C1) {
+        disable(emu, self, ~value & ERRORS);
+    } else if (offset == SC) {
+        control_written(emu, self, value);
+    }
+}
+
+static uint64_t output_delay(const emu_t *emu)
+{
+    return (uint64_t)(PRETRIGGER_CYCLES + TRIGGER_CYCLES) * emu->s.core_ticks;
 }
 
 void pdb_trigger(emu_t *emu, int instance)
 {
     const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
-    if ((bus_get(emu, self, SC) & 0x80U) == 0) {
-        return;
-    }
-    if ((bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0) {
+    const uint32_t c1 = bus_get(emu, self, C1);
+    if ((bus_get(emu, self, SC) & PDBEN) == 0 ||
+        (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0) {
         return;
     }
     p->running = true;
     p->start = emu_instant(emu);
-    p->fired = 0;
-    arm(emu, self);
+    for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+        const uint32_t delay = (c1 >> (8U + i) & 1U) != 0 ? p->dly[i] : 0U;
+        if ((c1 >> i & 1U) != 0 && (c1 >> (16U + i) & 1U) == 0 && delay <= p->mod) {
+            p->due[i] = p->start + (uint64_t)delay * clock_ticks(emu, self) + output_delay(emu);
+        }
+    }
+    arm(emu, instance);
+}
+
+static void pretrigger(emu_t *emu, const peripheral_t *self, uint32_t which)
+{
+    pdb_t *p = &emu->s.pdb[self->instance];
+    uint32_t flags = bus_get(emu, self, S) | 1U << (FLAG0 + which);
+    if (p->locked != 0) {
+        flags |= 1U << which;
+    } else if (adc_pretrigger(emu, self->instance, (int)which)) {
+        p->locked = 1U << which;
+    }
+    bus_put(emu, self, S, flags);
+    line_update(emu, self);
 }
 
 void pdb_fire(emu_t *emu, int instance)
 {
-    const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
     uint32_t which = 0;
-    while (next_due(emu, self, &which) <= emu_instant(emu)) {
-        p->fired |= 1U << which;
-        bus_put(emu, self, S, bus_get(emu, self, S) | 1U << (16U + which));
-        adc_pretrigger(emu, instance, (int)which);
+    while (next_due(p, &which) <= emu_instant(emu)) {
+        p->due[which] = NEVER;
+        pretrigger(emu, of(instance), which);
     }
-    arm(emu, self);
+    arm(emu, instance);
 }
 
-/* The converter has finished one: the pretrigger behind it, if it waits for that. */
+/* COCO has risen: the lock is released, and the pre-trigger behind it follows if it waits for that. */
 void pdb_acknowledge(emu_t *emu, int instance, int channel)
 {
     const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
     const uint32_t next = (uint32_t)channel + 1U, c1 = bus_get(emu, self, C1);
-    if (p->running && next < 8U && (c1 >> next & 1U) != 0 && (c1 >> (16U + next) & 1U) != 0) {
-        p->fired |= 1U << next;
-        bus_put(emu, self, S, bus_get(emu, self, S) | 1U << (16U + next));
-        adc_pretrigger(emu, instance, (int)next);
+    p->locked &= ~(1U << channel);
+    if ((bus_get(emu, self, SC) & PDBEN) != 0 && next < PRETRIGGERS && (c1 >> next & 1U) != 0 &&
+        (c1 >> (16U + next) & 1U) != 0) {
+        p->due[next] = emu_instant(emu) + output_delay(emu);
+        arm(emu, instance);
     }
-}
-
-void pdb_sequence_error(emu_t *emu, int instance, int channel)
-{
-    const peripheral_t *self = of(instance);
-    bus_put(emu, self, S, bus_get(emu, self, S) | 1U << channel);
 }

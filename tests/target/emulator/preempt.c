@@ -144,8 +144,8 @@ typedef struct {
 } part_t;
 
 /* What a victim hands over to the interrupts, each a word of its own or a box that one word opens. */
-static const part_t by_mrai[] = {PART(slow.psi_delta_q15), PART(slow.finished)};
-static const part_t by_task[] = {PART(commands), PART(schedules), PART(task.identified.psi_delta),
+static const part_t by_mrai[] = {PART(psi_d_error), PART(mrai.isr.finished)};
+static const part_t by_task[] = {PART(commands), PART(mrai.schedules), PART(task.psi_d_error),
                                  PART(task.angle_correction)};
 
 /* The victim interrupted after it has handed over some of its results. */
@@ -167,7 +167,8 @@ static void allowed_compute(preempt_t *p)
     p->outcome[OLD] = victim_here(p, &p->before);
     drive_t after = interrupts_here(p, &p->before);
     if (p->victim == PREEMPT_MRAI) {
-        after.slow = p->before.slow; /* and only the sample is the victim's input */
+        after.mrai.isr = p->before.mrai.isr; /* and only the mailbox is the victim's input */
+        after.psi_d_error = p->before.psi_d_error;
         after.fast = p->before.fast;
     }
     p->outcome[NEW] = victim_here(p, &after);
@@ -187,9 +188,10 @@ static bool same_victim(const preempt_t *p, const drive_t *a, const drive_t *b)
     if (p->victim == PREEMPT_TASK) {
         return memcmp(&a->task, &b->task, sizeof a->task) == 0 &&
                memcmp(&a->commands, &b->commands, sizeof a->commands) == 0 &&
-               memcmp(&a->schedules, &b->schedules, sizeof a->schedules) == 0;
+               memcmp(&a->mrai.schedules, &b->mrai.schedules, sizeof a->mrai.schedules) == 0 &&
+               memcmp(&a->mrai.task, &b->mrai.task, sizeof a->mrai.task) == 0;
     }
-    slow_state_t x = a->slow, y = b->slow;
+    mrai_isr_state_t x = a->mrai.isr, y = b->mrai.isr;
     x.finished = y.finished = 0;
     return memcmp(&x, &y, sizeof x) == 0;
 }
@@ -198,8 +200,10 @@ static bool same_interrupts(const preempt_t *p, const drive_t *a, const drive_t 
 {
     const bool fast = memcmp(&a->fast, &b->fast, sizeof a->fast) == 0 &&
                       memcmp(&a->samples, &b->samples, sizeof a->samples) == 0 &&
-                      memcmp(&a->windows, &b->windows, sizeof a->windows) == 0;
-    return fast && (p->victim == PREEMPT_MRAI || memcmp(&a->slow, &b->slow, sizeof a->slow) == 0);
+                      memcmp(&a->windows, &b->windows, sizeof a->windows) == 0 &&
+                      memcmp(&a->mrai.mailbox, &b->mrai.mailbox, sizeof a->mrai.mailbox) == 0;
+    const bool law = a->psi_d_error == b->psi_d_error && memcmp(&a->mrai.isr, &b->mrai.isr, sizeof a->mrai.isr) == 0;
+    return fast && (p->victim == PREEMPT_MRAI || law);
 }
 
 /* False: the victim had finished before so many instructions. */
@@ -259,16 +263,16 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
     return ended ? (int)(emu_instructions(p->e->emu) - from) : -1;
 }
 
-/* When the task is entered a window has just been handed over, the next one would be ten periods later: it lacks one
+/* When the task is entered a window has just been handed over, the next one would be N periods later: it lacks one
  * period now, so that the first interrupt hands it over wherever the task is. */
 static void window_next(preempt_t *p)
 {
     const mirror_t *m = &p->e->mirror;
-    const uint32_t count = IDENTIFY_PERIODS - 1;
+    const uint32_t left = 1;
     for (int i = m->inputs; i < m->parts; i++) {
         if (m->part[i].here == offsetof(drive_t, fast)) {
-            const size_t inside = offsetof(drive_t, fast.window.count) - offsetof(drive_t, fast);
-            (void)emu_write(p->e->emu, m->base + m->part[i].there + (uint32_t)inside, &count, sizeof count);
+            const size_t inside = offsetof(drive_t, fast.window.left) - offsetof(drive_t, fast);
+            (void)emu_write(p->e->emu, m->base + m->part[i].there + (uint32_t)inside, &left, sizeof left);
         }
     }
 }

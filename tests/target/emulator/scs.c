@@ -1,5 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The core's own registers: NVIC, SCB, SysTick, cycle counter; beside them LMEM. */
+/* The core's own registers: NVIC, SCB, SysTick, cycle counter; beside them LMEM.
+ *
+ * documented behaviour                       | modelled | test
+ * ------------------------------------------ | -------- | --------------------------------------------
+ * NVIC: enable, pend, priority, active; STIR | yes      | test_qemu_takes_the_same_exceptions
+ * ICSR, AIRCR.PRIGROUP, SHPR                 | yes      | test_qemu_takes_the_same_exceptions
+ * SysTick: count flag, reload, interrupt     | yes      | test_qemu_takes_the_same_exceptions
+ * AIRCR: reset request with its key          | refused  | test_what_is_not_modelled_is_an_error
+ * DWT: cycle counter                         | no       | -
+ * MPU, debug, every other register           | refused  | test_what_is_not_modelled_is_an_error
+ */
 #include "emu_private.h"
 
 enum {
@@ -268,7 +278,5 @@ void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, vo
                      0xE0000000U + at, size);
         }
     }
-    if (nvic_best(emu) >= 0) {
-        emu->s.reschedule = true;
-    }
+    nvic_reconsider(emu);
 }

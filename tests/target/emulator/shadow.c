@@ -76,7 +76,8 @@ static void task_ends(emulated_t *e)
 {
     e->shadow->drive.task = e->task_result.task;
     e->shadow->drive.commands = e->task_result.commands;
-    e->shadow->drive.schedules = e->task_result.schedules;
+    e->shadow->drive.mrai.schedules = e->task_result.mrai.schedules;
+    e->shadow->drive.mrai.task = e->task_result.mrai.task;
     e->shadow->drive.motor.modulate = e->task_result.motor.modulate;
     e->shadow->drive.motor.current_control = e->task_result.motor.current_control;
     e->task_runs = false;
@@ -97,7 +98,8 @@ static void task_interrupted(emulated_t *e)
     mirror_pull(&e->mirror);
     part_take(e, offsetof(drive_t, task), sizeof e->task_result.task);
     part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
-    part_take(e, offsetof(drive_t, schedules), sizeof e->task_result.schedules);
+    part_take(e, offsetof(drive_t, mrai.schedules), sizeof e->task_result.mrai.schedules);
+    part_take(e, offsetof(drive_t, mrai.task), sizeof e->task_result.mrai.task);
     part_take(e, offsetof(drive_t, motor.modulate), sizeof e->task_result.motor.modulate);
 }
 

@@ -6,7 +6,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -14,13 +13,15 @@ from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
 from fluxtrue_tools.sim.library import Loop
 
+from progress import cpu_seconds
+
 RUN = 'motor = "hsm1"\nduration_s = 0.3\n[profile]\ntorque_Nm = 40\nspeed_rpm = 1000\n'
 
 
 def emulate(*arguments: object) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "fluxtrue_tools", "emulate", *map(str, arguments)]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=600, env=environment, check=False)
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
 
 
 @pytest.fixture
@@ -47,7 +48,7 @@ def test_the_same_run_gives_the_same_bits_and_instructions(parts: Parts) -> None
     for _ in range(2):
         with Loop(motor.library, motor.plant | {"current_noise_A_rms": 0.5, "seed": 3.0}, motor.flux_map) as loop:
             loop.set("enable", 1)
-            loop.set("torque_command_Nm", 30)
+            loop.set("torque_requested_Nm", 30)
             loop.record(["truth.torque_Nm", "psi_f_Vs", "emulator.instructions"])
             seen.append(loop.run(1000).tobytes())
     assert seen[0] == seen[1]
@@ -106,8 +107,8 @@ def test_a_core_of_this_machine_emulates_at_least_half_of_real_time(parts: Parts
     motor = parts.emulated()
     with Loop(motor.library, motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.0}, motor.flux_map) as loop:
         loop.set("enable", 1)
-        loop.set("torque_command_Nm", 80)
+        loop.set("torque_requested_Nm", 80)
         loop.run(1000)
-        begin = time.process_time()
+        begin = cpu_seconds()
         loop.run(20000)
-        assert 2.0 / (time.process_time() - begin) >= 0.5
+        assert 2.0 / (cpu_seconds() - begin) >= 0.5

@@ -6,11 +6,13 @@ import pytest
 from fluxtrue_tools.demo import grid, step
 from fluxtrue_tools.demo.experiment import Bench, run
 from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.sim.library import Loop
 
 RPM = 2 * np.pi / 60
 PART_S = 0.25
-OVER_CURRENT, OVER_VOLTAGE, GATE = 1 << 0, 1 << 1, 1 << 15
+OVER_CURRENT, OVER_VOLTAGE, INPUT, GATE = 1 << 0, 1 << 1, 1 << 5, 1 << 15
+CONVERSION_COMPLETE, INTERRUPT_ENABLE = 0x80, 0x40
 EVERY_LIMIT = 0x3F  # of torque, power, voltage and current, inverter, winding, low dc voltage
 POINTS = [(speed, torque) for speed in grid.SPEEDS_RPM for torque in grid.TORQUES_NM]
 
@@ -65,7 +67,7 @@ def follow(loop: Loop, seconds: float) -> tuple[int, int]:
         for name, value in EVENTS.get(k, {}).items():
             loop.set(name, value)
         loop.set("identification_mode", 1 - mode if k in OTHER_MODE else mode)
-        loop.set("torque_command_Nm", torques[k % len(torques)])
+        loop.set("torque_requested_Nm", torques[k % len(torques)])
         start, stop = (speeds[(k + j) // 4 % len(speeds)] * RPM for j in (0, 1))
         weaker = 1 - 0.15 * k / parts_, 1 - 0.15 * (k + 1) / parts_
         ramps = {"plant.speed_rad_s": (start, stop), "plant.magnet_scale": weaker}
@@ -94,7 +96,7 @@ def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(drive: Loop, 
     assert drive.get("truth.torque_Nm") == pytest.approx(5.0, abs=1.0)  # it drives
 
 
-def test_the_image_with_a_resolver_computes_the_same_bits_too(resolver_parts: Parts) -> None:
+def test_a_resolver_image_computes_the_same_bits(resolver_parts: Parts) -> None:
     motor = resolver_parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
@@ -119,7 +121,7 @@ def test_the_timer_is_set_up_as_the_motor_file_says(parts: Parts, drive: Loop) -
 
 def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Loop) -> None:
     drive.set("enable", 1)
-    drive.set("torque_command_Nm", 80.0)
+    drive.set("torque_requested_Nm", 80.0)
     drive.run(3000)
     assert drive.get("truth.torque_Nm") > 50
     drive.set("emulator.gate_fault", 1)
@@ -137,6 +139,35 @@ def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Lo
     drive.run(3000)
     assert drive.get("fault_word") == 0
     assert drive.get("truth.torque_Nm") > 50
+
+
+@pytest.mark.parametrize("failure", ["no conversion", "no interrupt"])
+def test_samples_that_keep_failing_bring_the_safe_state(drive: Loop, failure: str) -> None:
+    """Each period's first conversion finds its last result unread, or no conversion's end interrupts any more: the
+    fast ISR no longer comes by itself. The fault stays while its cause does."""
+    drive.set("enable", 1)
+    drive.set("torque_requested_Nm", 80.0)
+    drive.run(3000)
+    assert drive.get("truth.torque_Nm") > 50
+    core = Core.of_simulation(drive._library, drive._sim)
+
+    def fail(periods: int) -> None:
+        if failure == "no interrupt":
+            core.set_register("ADC0.SC11", core.register("ADC0.SC11") & ~INTERRUPT_ENABLE)
+        for _ in range(periods):
+            drive.run(1)
+            if failure == "no conversion":
+                core.set_register("ADC0.SC10", core.register("ADC0.SC10") | CONVERSION_COMPLETE)
+
+    fail(40)
+    assert int(drive.get("fault_word")) & INPUT
+    fail(100)
+    drive.set("enable", 0)
+    drive.set("fault_reset", 1)
+    fail(100)
+    assert int(drive.get("fault_word")) & INPUT
+    assert core.resets == 0
+    assert abs(drive.get("truth.torque_Nm")) < 0.5  # 3000 rpm: open gates
 
 
 def test_a_fault_of_the_resolver_raises_the_angle_fault(resolver_parts: Parts) -> None:

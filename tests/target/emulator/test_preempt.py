@@ -26,7 +26,7 @@ def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
                            "magnet_scale": 0.9}  # fmt: skip
     with Loop(motor.library, plant, motor.flux_map) as loop:
         loop.set("identification_mode", request.param)
-        for name, value in (("torque_loop", 1), ("identification", 1), ("enable", 1), ("torque_command_Nm", 80)):
+        for name, value in (("torque_loop", 1), ("identification", 1), ("enable", 1), ("torque_requested_Nm", 80)):
             loop.set(name, value)
         loop.run(2000)
         assert loop.get("fault_word") == 0
@@ -44,11 +44,11 @@ def longest_step_next(loop: Loop) -> None:
     loop.run(PERIODS * lengths.index(max(lengths)))
 
 
-def check(report: preempt.Report) -> None:
+def check(report: preempt.Report, outcomes: int = 2) -> None:
     assert report.mixed == 0, report
     # Every boundary was tried, and both the old inputs and the new ones were seen.
     assert report.points == report.instructions > 50
-    assert report.outcomes == 2
+    assert report.outcomes == outcomes
 
 
 @pytest.mark.parametrize("periods", [1, 7, 9])
@@ -58,7 +58,8 @@ def test_the_identification_sees_the_old_sample_or_the_new_one_wherever_it_is_in
     if loop.get("identification_mode") == ROBUST:
         pytest.skip("the robust identification has no interrupt of its own: the fast ISR sums its windows")
     loop.run(periods)
-    check(preempt.interrupt_everywhere(loop, preempt.MRAI))
+    # Its mailbox is not written before it has finished: it always finds the point that it was pended for.
+    check(preempt.interrupt_everywhere(loop, preempt.MRAI), outcomes=1)
 
 
 # Two rounds at one place overwrite the slot that the task may be copying from.
@@ -94,7 +95,7 @@ def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
         stand = Stand(loop)
         loop.set("identification_mode", request.param)
         stand.power_up()
-        stand.run(60, TorqueRequest=60.0)
+        stand.run(60, TorqueRequested=60.0)
         assert loop.get("fault_word") == 0
         assert loop.get("truth.torque_Nm") == pytest.approx(60, abs=3)
         yield stand

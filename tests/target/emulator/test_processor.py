@@ -8,28 +8,10 @@ from pathlib import Path
 
 import pytest
 from fluxtrue_tools.bench import image
-from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS
-from fluxtrue_tools.emulate.build import Parts
-from fluxtrue_tools.emulate.core import FAILED, Core
-from fluxtrue_tools.sim import library as lib
+from conftest import Program
+from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
 
 WATCHDOG = 0x20
-LINK = ("-nostartfiles", "-nostdlib", "-Wl,-e,0,-Ttext=0x410,-Tbss=0x1FFF8000,-Tdata=0x1FFF8800",
-        "-Wl,--section-start=.vectors=0")  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def library(parts: Parts) -> ctypes.CDLL:
-    return lib.load(parts.motor.folder.folder / "libfluxtrue_emu.so")
-
-
-def program(here: Path, folder: Path, name: str, *flags: str) -> Path:
-    elf = folder / f"{name}.elf"
-    source = here / "programs" / f"{name}.c"
-    command = [ARM_CC, *ARM_FLAGS, "-std=gnu11", "-O2", "-Wall", "-Werror", *flags, str(source), *LINK, "-o", str(elf)]
-    subprocess.run(command, check=True, capture_output=True)
-    return elf
-
 
 REFUSED = {
     1: "write of SIM.PLATCGC offset 0x40: the register is not modelled",
@@ -62,23 +44,26 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_the_model_does_not_know_is_an_error_that_names_it(
-    library: ctypes.CDLL, here: Path, tmp_path: Path, case: int
+def test_what_is_not_modelled_is_an_error(
+    library: ctypes.CDLL, program: Program, case: int
 ) -> None:
-    with Core.of_program(library, program(here, tmp_path, "poke", f"-DCASE={case}")) as core:
-        assert core.run(1e-3) == FAILED
+    with Core.of_program(library, program("poke", f"-DCASE={case}")) as core:
+        with pytest.raises(EmulationStoppedError):
+            core.run(1e-3)
         assert core.error is not None
         assert REFUSED[case] in core.error
         assert "(reset+0x" in core.error, core.error  # and where in the program
-        assert core.run(1e-3) == FAILED  # it stays stopped
+        with pytest.raises(EmulationStoppedError, match="the emulation stopped"):
+            core.run(1e-3)  # it stays stopped
 
 
 def test_the_program_counter_of_a_refused_access_is_exact(
-    library: ctypes.CDLL, here: Path, tmp_path: Path
+    library: ctypes.CDLL, program: Program
 ) -> None:
-    elf = program(here, tmp_path, "poke", "-DCASE=4")
+    elf = program("poke", "-DCASE=4")
     with Core.of_program(library, elf) as core:
-        core.run(1e-3)
+        with pytest.raises(EmulationStoppedError):
+            core.run(1e-3)
         assert core.error is not None
         pc = int(core.error.split("pc ")[1].split()[0], 16)
         (opcode,) = struct.unpack("<H", core.read(pc, 2))
@@ -87,17 +72,16 @@ def test_the_program_counter_of_a_refused_access_is_exact(
 
 
 @pytest.fixture(scope="module")
-def exceptions(here: Path, tmp_path_factory: pytest.TempPathFactory, parts: Parts) -> Path:
-    return program(here, tmp_path_factory.mktemp("programs"), "exceptions")
+def exceptions(program: Program) -> Path:
+    return program("exceptions")
 
 
 @pytest.mark.parametrize("counting", [False, True])
-def test_exceptions_nest_by_priority_and_leave_every_register_as_it_was(
+def test_exceptions_nest_by_priority(
     library: ctypes.CDLL, exceptions: Path, counting: bool
 ) -> None:
     with Core.of_program(library, exceptions, counting) as core:
         core.run(5.5e-3)
-        assert core.error is None
         # Masked first; then LOW interrupted by HIGH and MIDDLE, which pends LOW again; the whole once more; HIGH.
         first = [6]
         once = [1, 6, 2, 4, 5, 3]
@@ -158,7 +142,7 @@ def test_a_profile_counts_what_is_skipped_behind_an_it_and_takes_it_for_no_branc
     assert all(cost == count for v, count, cost in spans if v in (LOW, HIGH))
 
 
-def test_a_sleeping_core_is_woken_by_each_tick_and_costs_nothing_in_between(
+def test_a_sleeping_core_is_woken_by_each_tick(
     library: ctypes.CDLL, exceptions: Path
 ) -> None:
     with Core.of_program(library, exceptions) as core:

@@ -1,6 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Watchdog: runs from reset on, is configured within 128 bus clocks of an unlock, resets when it is not serviced, or
- * serviced within its window. */
+ * serviced within its window.
+ *
+ * documented behaviour                             | modelled | test
+ * ------------------------------------------------ | -------- | --------------------------------------------
+ * runs from reset, resets after TOVAL              | yes      | test_an_unserviced_watchdog_resets_and_tells_why
+ * unlock for 128 bus clocks, then locked           | refused  | test_the_watchdog_locks_again
+ * refresh restarts; too early in the window resets | yes      | test_a_refresh_within_the_window_resets
+ * UPDATE 0: not configured again                   | refused  | test_the_watchdog_locks_again
+ * a word that is neither                           | refused  | test_what_is_not_modelled_is_an_error
+ * interrupt before the reset                       | refused  | test_a_watchdog_interrupt_is_refused
+ * tolerance of the LPO, debug and stop modes       | no       | -
+ */
 #include "emu_private.h"
 
 enum {

@@ -2,7 +2,8 @@
 /* The script of hal/mps2 on this computer: the activities called in the order of their priorities. */
 #include <stdio.h>
 
-#include "app/slow_monitors.h"
+#include "drive/mrai/mrai_seam.h"
+#include "drive/slow_monitors.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -62,14 +63,14 @@ int main(void)
             pending = false;
             mrai_isr(&drive);
         }
-        if (k % 10U == 0U) {
+        if (k % motor.bases.periods_per_step == 0U) {
             script_request(&script, &drive.request);
             task_1khz(&drive);
         }
     }
     printf("low=%08x\nhigh=%08x\ndiffering=%08x\nfaults=%08x\noverruns=%08x\n", script.low, script.high,
-           script.differing, drive.fast.faults, drive.fast.overruns);
-    const learnt_t *learnt = &drive.task.learnt;
+           script.differing, drive.fast.faults, mrai_overruns(&drive));
+    const identification_t *learnt = &drive.task.identification;
     printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)learnt->psi_delta, (unsigned)learnt->r_delta);
     return 0;
 }

@@ -37,7 +37,7 @@ def _boot(board: str) -> dict[str, int]:
     elf = image(board, BUILD.parent / board)
     command = [QEMU, "-M", board, "-nographic", "-monitor", "none", "-serial", "none", *CLOCK,
                "-semihosting-config", "enable=on,target=native", "-kernel", str(elf)]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     return _words(done.stdout + done.stderr)
 

@@ -21,6 +21,7 @@ FLASH, RAM = 64 * 1024, 12 * 1024
 # Slot of the vector table: handler. 16 + the interrupt's number of the maker's list.
 VECTORS = {1: "reset_handler", 3: "fault_handler", 15: "fault_handler", 16 + 39: "adc_handler", 16 + 48: "tick_handler",
            16 + 69: "mrai_handler", 16 + 78: "can_bus_off_handler", 16 + 81: "can_message_handler",
+           16 + 52: "sampling_error_handler", 16 + 68: "sampling_error_handler",
            16 + 103: "gate_fault_handler", 16 + 40: "fault_handler"}  # fmt: skip
 FLOAT = re.compile(r"^\s+[0-9a-f]+:\s+(?:[0-9a-f]{4} ?)+\s+(v[a-z0-9.]+)", re.MULTILINE)
 
@@ -70,7 +71,7 @@ def test_configuration_and_tables_are_sealed(elf: Path) -> None:
     assert stored == zlib.crc32(_read(elf, start, end - start))
 
 
-@pytest.mark.parametrize("handler", ["adc_handler", "mrai_handler", "gate_fault_handler"])
+@pytest.mark.parametrize("handler", ["adc_handler", "sampling_error_handler", "mrai_handler", "gate_fault_handler"])
 def test_no_interrupt_of_the_control_uses_floating_point(elf: Path, handler: str) -> None:
     """All it calls is in it or in the same ranges: what link-time optimisation left as calls is followed."""
     todo, seen = [handler], set()

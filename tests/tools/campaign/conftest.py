@@ -56,5 +56,5 @@ def environment() -> dict[str, str]:
 
 def campaign(*arguments: object, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
     """The command as a user calls it."""
-    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd, timeout=300,
+    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd,
                           env=environment(), check=False)  # fmt: skip

@@ -88,7 +88,7 @@ def test_the_model_says_what_the_simulated_drive_does(
     with Loop(machine.motor.library, drawn.plant | still | {"speed_rad_s": omega_m}, machine.motor.flux_map) as loop:
         for name, value in {"torque_loop": 0.0, "identification": 0.0, "enable": 1.0}.items():
             loop.set(name, value)
-        loop.set("torque_command_Nm", torque_Nm)
+        loop.set("torque_requested_Nm", torque_Nm)
         loop.run_s(0.3)
         names = ["truth.i_d_A", "truth.i_q_A", "truth.u_d_V", "truth.u_q_V", "truth.torque_mean_Nm"]
         loop.record(names, 1000)

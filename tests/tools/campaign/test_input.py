@@ -10,15 +10,15 @@ from fluxtrue_tools.errors import FluxtrueError
 
 LQ, CHECKED = "[spread]\nlq_scale", "[check]\ncontrollers"
 BAD = [
-    ("unknown key", "cases = 4", "cases = 4\nplants = 3", "plants: unknown field, allowed: motor, cases, seed"),
-    ("unknown nested key", "[drive]", "[drive]\nspeed = 3", "drive.speed: unknown field, allowed: duration_s, vehicle"),
-    ("unknown controller key", "warm_up = false", "warmup = false", "controller.0.warmup: unknown field, allowed"),
+    ("unknown key", "cases = 4", "cases = 4\nplants = 3", "plants: unknown key, allowed: motor, cases, seed"),
+    ("unknown nested key", "[drive]", "[drive]\nspeed = 3", "drive.speed: unknown key, allowed: duration_s, vehicle"),
+    ("unknown controller key", "warm_up = false", "warmup = false", "controller.0.warmup: unknown key, allowed"),
     ("wrong type", "cases = 4", 'cases = "many"', "cases = 'many'"),
     ("a fraction of a case", "cases = 4", "cases = 4.5", "cases = 4.5"),
     ("no case", "cases = 4", "cases = 0", "cases = 0"),
     ("a negative seed", "seed = 7", "seed = -7", "seed = -7"),
-    ("missing field", "seed = 7", "", "seed: this field is required"),
-    ("not TOML", "seed = 7", "seed = ", "not TOML"),
+    ("missing field", "seed = 7", "", "seed: missing, wanted"),
+    ("not valid TOML", "seed = 7", "seed = ", "not valid TOML"),
     ("not a number", "duration_s = 2", "duration_s = nan", "drive.duration_s"),
     ("an absurd drive", "duration_s = 2", "duration_s = 1e9", "drive.duration_s"),
     ("a reversed range", "[drive]", f"{LQ} = [1.1, 0.9]\n[drive]", "spread.lq_scale = [1.1, 0.9]: allowed: [low"),
@@ -29,7 +29,7 @@ BAD = [
     ("a controller twice", 'name = "paper"', 'name = "tables"', "controller: tables, tables, allowed: every name once"),
     ("an unknown checked one", "[drive]", f'{CHECKED} = ["robust"]\n[drive]', "check.controllers: 'robust', allowed"),
     ("no reference", "[drive]", f'{CHECKED} = ["paper"]\nreference = "x"\n[drive]', "check.reference: 'x', allowed"),
-    ("a plant's typo", "angle_bits = 12", "angle_bit = 12", "plant.angle_bit: unknown field"),
+    ("a plant's typo", "angle_bits = 12", "angle_bit = 12", "plant.angle_bit: unknown key"),
 ]
 
 
@@ -44,13 +44,13 @@ def test_a_bad_value_is_named_with_what_is_allowed(old: str, new: str, message: 
 
 CALLED = [
     ("a missing file", SMALL, ["nowhere.toml"], "nowhere.toml: cannot be read (No such file or directory)"),
-    ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "motor 'hsm2'"),
+    ("a motor that is not there", SMALL.replace("hsm1", "hsm2"), ["c.toml"], "c.toml: motor = 'hsm2': neither"),
     ("a drop below nothing", SMALL + "[spread]\ndevice_drop_error_V = [-2, 2]\n", ["c.toml"],
      "spread.device_drop_error_V = -2 about 1 V, allowed: no drop below 0"),
     ("a name no firmware has", SMALL.replace("{ torque_loop = true", "{ torque_lop = 1, torque_loop = true"),
-     ["c.toml"], "controller 'paper': torque_lop = 1: no such name"),
+     ["c.toml"], "c.toml: controller.1.set.torque_lop = 1: no such name, allowed: torque_loop"),
     ("a value no firmware takes", SMALL.replace("{ torque_loop = true", "{ observer_m = 99, torque_loop = true"),
-     ["c.toml"], "controller 'paper': observer_m = 99: out of range"),
+     ["c.toml"], "c.toml: controller.1.set.observer_m = 99, allowed: 2 to 4"),
     ("a flag that is not there", SMALL + '[check]\ncount_nonzero = ["psi_clamp"]', ["c.toml"], "psi_clamp"),
     ("a case beyond the last", SMALL, ["c.toml", "--case", "4"], "--case 4, allowed: 0 to 3"),
     ("more cases than there are", SMALL, ["c.toml", "--cases", "5"], "--cases 5, allowed: up to the campaign's 4"),

@@ -64,14 +64,30 @@ def test_a_failure_while_writing_leaves_the_old_files_and_no_debris(write, tmp_p
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("fluxtrue_tools.motor.html.write_report", fails)
-    with pytest.raises(FluxtrueError, match="cannot be written: No space left"):
+    with pytest.raises(FluxtrueError, match="cannot be written .No space left"):
         build(write(machine={"inertia_kgm2": 1.0}), out, report=True)
     assert contents(out) == before
 
 
+def test_an_empty_name_for_the_output_folder_writes_nothing_anywhere(cli, write, tmp_path, monkeypatch):
+    before = sorted((tmp_path / "bench").iterdir() if (tmp_path / "bench").exists() else [])
+    result = cli("build", write(), "--out", "")
+    assert result.returncode == 2
+    assert result.stderr == "error: --out '': empty, allowed: the name of a folder\n"
+    assert sorted((tmp_path / "bench").iterdir()) == [*before, tmp_path / "bench" / "motor.toml"]
+    assert not (ROOT / "motor.json").exists()
+
+
+def test_a_motor_is_not_built_into_its_own_folder(cli, write):
+    folder = write()
+    result = cli("build", folder, "--out", folder)
+    assert result.returncode == 2 and "would overwrite input" in result.stderr
+    assert [path.name for path in folder.iterdir()] == ["motor.toml"]
+
+
 def test_a_file_in_place_of_the_output_folder_is_said(write, tmp_path):
     (tmp_path / "out").write_text("mine")
-    with pytest.raises(FluxtrueError, match="out: cannot be written"):
+    with pytest.raises(FluxtrueError, match="out: is a file, allowed: a folder"):
         build(write(), tmp_path / "out", report=False)
     assert (tmp_path / "out").read_text() == "mine"
 
@@ -138,7 +154,7 @@ def test_generated_c_compiles_without_a_warning(tmp_path, compiler, name):
 
 
 SHIM = r"""
-#include "app/motor.h"
+#include "drive/motor.h"
 #include "twin/motor_si.h"
 
 int valid(void);
@@ -152,7 +168,7 @@ void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *ps
 void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *psi_q)
 {
     for (int k = 0; k < n; k++) {
-        const flux_point_t p = flux_table_step(&motor.flux_table, (dq_t){d[k], q[k]});
+        const flux_point_t p = flux_table_step(&motor.flux_table, (dq_q15_t){d[k], q[k]});
         psi_d[k] = p.psi_d;
         psi_q[k] = p.psi_q;
     }
@@ -161,7 +177,7 @@ void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *ps
 void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2]);
 void reference(int16_t torque, int16_t v_dc, int16_t omega, int16_t out[2])
 {
-    const current_reference_in_t in = {.torque = torque, .v_dc = v_dc, .omega = omega, .i_d_max = INT16_MAX};
+    const current_reference_in_t in = {.torque_corrected = torque, .v_dc = v_dc, .omega = omega, .i_d_max = INT16_MAX};
     const current_reference_t r = current_reference_step(&motor.current_reference, &in);
     out[0] = r.i_ref.d;
     out[1] = r.i_ref.q;
@@ -182,8 +198,9 @@ def firmware(request, tmp_path_factory):
     motor = build(MOTORS / request.param, folder, report=False)
     (folder / "shim.c").write_text(SHIM, encoding="utf-8")
     control = ROOT / "firmware" / "control"
-    sources = [folder / "shim.c", folder / "motor_tables.c", folder / "motor_si.c", control / "flux_table.c",
-               control / "current_reference.c", control / "mrai.c", *sorted((ROOT / "firmware/fx").glob("*.c"))]
+    stages = ("current/flux_table.c", "torque/current_reference.c", "mrai/mrai.c")
+    sources = [folder / "shim.c", folder / "motor_tables.c", folder / "motor_si.c", *(control / s for s in stages),
+               *sorted((ROOT / "firmware/fx").glob("*.c"))]
     library = folder / "motor.so"
     subprocess.run(["gcc", "-std=c11", "-O1", "-shared", "-fPIC", *INCLUDES, *map(str, sources), "-o", str(library)],
                    check=True)

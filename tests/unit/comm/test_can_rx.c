@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "comm/can_rx.h"
+#include "signal/step_clock.h"
 #include "unity.h"
 
 /* From firmware/comm/fluxtrue.dbc, by hand. */
@@ -40,7 +41,7 @@ static rx_result_t send(int tenths_Nm)
 static void milliseconds(int count)
 {
     for (int n = 0; n < count; n++) {
-        can_rx_tick(&rx);
+        can_rx_tick(&rx, 1000);
     }
 }
 
@@ -48,13 +49,13 @@ void test_a_good_command_is_taken_in_physical_units(void)
 {
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(400));
     TEST_ASSERT_FALSE(rx.command_channel.alive);
-    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_requested_Nm);
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(-425));
     TEST_ASSERT_TRUE(rx.command_channel.alive);
     TEST_ASSERT_TRUE(rx.command.enable);
     TEST_ASSERT_FALSE(rx.command.fault_reset);
     TEST_ASSERT_EQUAL_INT(COMMAND_MODE_TORQUE, rx.command.mode);
-    TEST_ASSERT_EQUAL_FLOAT(-42.5F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(-42.5F, rx.command.torque_requested_Nm);
     TEST_ASSERT_EQUAL_FLOAT(100.0F, rx.command.limit_drive_Nm);
     TEST_ASSERT_EQUAL_FLOAT(50.0F, rx.command.limit_regen_Nm);
     TEST_ASSERT_EQUAL_UINT16(1, rx.accepted);
@@ -137,16 +138,36 @@ void test_a_command_dies_after_30_ms_and_takes_torque_and_enable_along(void)
     (void)send(500);
     milliseconds(29);
     TEST_ASSERT_TRUE(rx.command_channel.alive);
-    TEST_ASSERT_EQUAL_FLOAT(50.0F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(50.0F, rx.command.torque_requested_Nm);
     milliseconds(1);
     TEST_ASSERT_FALSE(rx.command_channel.alive);
-    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.command.torque_requested_Nm);
     TEST_ASSERT_FALSE(rx.command.enable);
     TEST_ASSERT_EQUAL_INT(COMMAND_MODE_TORQUE, rx.command.mode);
     milliseconds(1000);
     TEST_ASSERT_EQUAL_UINT16(1, rx.time_outs);
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(500)); /* then it begins anew */
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(500));
+}
+
+/* 22 of 22.5 periods: 977.8 us a step. 30 steps are 29.33 ms, 31 are 30.31 ms: never early, less than a step late. */
+void test_a_time_out_ends_in_the_first_step_in_which_its_time_has_passed(void)
+{
+    static const uint32_t step_ns[] = {888889U, 977778U, 1000000U, 1111111U, 1125000U};
+    for (unsigned k = 0; k < sizeof step_ns / sizeof step_ns[0]; k++) {
+        setUp();
+        step_clock_t clock;
+        step_clock_start(&clock, step_ns[k]);
+        (void)send(0);
+        (void)send(100);
+        uint64_t passed_ns = 0;
+        while (rx.command_channel.alive) {
+            step_clock_step(&clock);
+            can_rx_tick(&rx, clock.elapsed_us);
+            passed_ns += step_ns[k];
+        }
+        TEST_ASSERT_TRUE(passed_ns + 1000U >= 30000000U && passed_ns < 30000000U + step_ns[k]);
+    }
 }
 
 /* Bad frames do not keep a command alive. */
@@ -158,7 +179,7 @@ void test_frames_with_a_wrong_crc_do_not_stop_the_clock(void)
         can_frame_t frame = command(500);
         frame.data[0] ^= 0xFFU;
         (void)can_rx_frame(&rx, &frame);
-        can_rx_tick(&rx);
+        can_rx_tick(&rx, 1000);
     }
     TEST_ASSERT_FALSE(rx.command_channel.alive);
 }

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "comm/e2e.h"
+#include "signal/step_clock.h"
 #include "unity.h"
 
 #define RUN_MS 10000
@@ -48,7 +49,7 @@ void test_every_message_comes_exactly_in_its_cycle_time(void)
     int last[MESSAGES];
     int count[MESSAGES] = {0};
     for (int ms = 1; ms <= RUN_MS; ms++) {
-        can_tx_begin(&tx);
+        can_tx_begin(&tx, 1);
         while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
             const int n = place(frame.id);
             TEST_ASSERT_EQUAL_UINT8(8, frame.length);
@@ -65,11 +66,44 @@ void test_every_message_comes_exactly_in_its_cycle_time(void)
     }
 }
 
+/* Each frame within a step of its millisecond, all of them in the long run, for steps of 4.5, 5.5 and 22.5 kHz. */
+void test_with_another_step_every_message_keeps_its_cycle_time_in_the_mean_and_each_frame_within_a_step(void)
+{
+    static const uint32_t step_ns[] = {888889U, 977778U, 1090909U, 1111111U};
+    for (unsigned k = 0; k < sizeof step_ns / sizeof step_ns[0]; k++) {
+        step_clock_t clock;
+        step_clock_start(&clock, step_ns[k]);
+        setUp();
+        int64_t due_ns[MESSAGES] = {0}, now_ns = 0;
+        int count[MESSAGES] = {0}, most = 0;
+        while (now_ns < RUN_MS * INT64_C(1000000)) {
+            int frames = 0;
+            step_clock_step(&clock);
+            now_ns += step_ns[k];
+            can_tx_begin(&tx, clock.passed_ms);
+            while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
+                const int n = place(frame.id);
+                const int64_t late_ns = (count[n] > 0) ? now_ns - due_ns[n] : 0;
+                TEST_ASSERT_TRUE(late_ns > -(int64_t)step_ns[k] && late_ns < (int64_t)step_ns[k]);
+                due_ns[n] = (count[n] > 0) ? due_ns[n] : now_ns;
+                due_ns[n] += wanted[n].cycle_ms * INT64_C(1000000);
+                count[n]++;
+                frames++;
+            }
+            most = (frames > most) ? frames : most;
+        }
+        for (int n = 0; n < MESSAGES; n++) {
+            TEST_ASSERT_INT_WITHIN(1, RUN_MS / wanted[n].cycle_ms, count[n]);
+        }
+        TEST_ASSERT_LESS_OR_EQUAL_INT((step_ns[k] > 1000000U) ? 3 : 2, most);
+    }
+}
+
 void test_no_millisecond_has_more_than_two_frames(void)
 {
     for (int ms = 0; ms < RUN_MS; ms++) {
         int frames = 0;
-        can_tx_begin(&tx);
+        can_tx_begin(&tx, 1);
         while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
             frames++;
         }
@@ -83,7 +117,7 @@ void test_the_status_frame_is_protected(void)
     e2e_state_t state = {0};
     int good = 0;
     for (int ms = 0; ms < 1000; ms++) {
-        can_tx_begin(&tx);
+        can_tx_begin(&tx, 1);
         while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
             good += (frame.id == 0x210 && e2e_check(0x2101, &state, &frame) == E2E_OK) ? 1 : 0;
         }
@@ -98,7 +132,7 @@ void test_a_frame_with_a_value_that_is_no_number_is_left_out_and_the_others_go(v
     int frames = 0;
     int refused = 0;
     for (int ms = 0; ms < 10; ms++) {
-        can_tx_begin(&tx);
+        can_tx_begin(&tx, 1);
         for (tx_result_t r = can_tx_next(&tx, &telemetry, &frame); r != TX_NONE;
              r = can_tx_next(&tx, &telemetry, &frame)) {
             TEST_ASSERT_TRUE(r != TX_FRAME || (frame.id != 0x211 && frame.id != 0x212));

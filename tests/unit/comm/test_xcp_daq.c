@@ -18,7 +18,7 @@ void tearDown(void)
 
 static void event(void)
 {
-    xcp_daq_event(&slave.daq, &slave_config.memory);
+    xcp_daq_event(&slave.daq, &slave_config.memory, 1);
 }
 
 static bool next(void)
@@ -319,6 +319,43 @@ void test_the_slave_describes_its_lists_clock_and_events(void)
     EXPECT(0xFF, 0, 0, 0, 1, 0, 0, 0);
     SEND(0xD7, 0, 1, 0);
     EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 10, 6, 0);
+    SEND(0xD7, 0, 0, 0);
+    EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 1, 6, 0);
+}
+
+/* 22 periods at 22.5 kHz: 0.978 ms, told as 98 times 10 us. */
+void test_a_step_that_is_not_a_millisecond_is_told_as_it_is_also_after_the_lists_were_cleared(void)
+{
+    slave.daq.step_10us = 98;
+    xcp_daq_reset(&slave.daq);
+    SEND(0xD7, 0, 0, 0);
+    EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 98, 4, 0);
+    SEND(0xD7, 0, 1, 0);
+    EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 10, 6, 0);
+}
+
+/* Steps in which none, one or two milliseconds pass: event 0 samples in each step, event 1 once in ten milliseconds. */
+void test_the_tenth_millisecond_is_sampled_once_whatever_the_steps_are(void)
+{
+    for (uint32_t passed = 0; passed <= 2; passed++) {
+        master_reset();
+        master_connect();
+        one_list(1, 1, 0x10);
+        start();
+        uint32_t ms = 0;
+        unsigned samples = 0;
+        for (int n = 0; n < 90; n++) {
+            const uint32_t now = (n % 2 == 0) ? passed : 1U;
+            ms += now;
+            xcp_daq_event(&slave.daq, &slave_config.memory, now);
+            while (next()) {
+                samples++;
+                TEST_ASSERT_EQUAL_UINT32(ms, dto.data[1] + 256U * dto.data[2]);
+                TEST_ASSERT_TRUE(ms % 10U < now);
+            }
+        }
+        TEST_ASSERT_EQUAL_UINT32(ms / 10U, samples);
+    }
 }
 
 void test_the_end_of_the_session_ends_measuring(void)

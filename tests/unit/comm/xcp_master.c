@@ -35,6 +35,7 @@ void master_reset(void)
         measured[k] = (uint8_t)(0xA0 + k);
     }
     xcp_reset(&slave, &slave_config, 7);
+    slave.daq.step_10us = 100;
 }
 
 void master_send(const uint8_t *data, unsigned length)

@@ -154,6 +154,8 @@ static void inputs(fixture_t *f)
     };
     f->si.pole_pairs = POLE_PAIRS;
     f->si.period_s = period;
+    f->si.periods_per_step = 10;
+    f->si.step_s = 10 * period;
     f->si.tracker_bandwidth_rad_s = 600.0;
     f->si.r_ohm_20 = 674.0 / 65536.0 * f->z;
     f->si.psi_f_Vs = from_q15(psi_f0[0]) * f->psi;

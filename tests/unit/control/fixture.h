@@ -7,16 +7,16 @@
  * Units    bases in SI; q15 helpers in counts */
 #include <stdint.h>
 
-#include "control/angle_tracker.h"
-#include "control/current_control.h"
-#include "control/current_reference.h"
-#include "control/flux_table.h"
-#include "control/i_d_limit.h"
-#include "control/modulate.h"
-#include "control/mrai.h"
-#include "control/torque_limit.h"
-#include "control/torque_loop.h"
-#include "control/voltage_reserve.h"
+#include "control/current/angle_tracker.h"
+#include "control/current/current_control.h"
+#include "control/torque/current_reference.h"
+#include "control/current/flux_table.h"
+#include "control/torque/i_d_limit.h"
+#include "control/current/modulate.h"
+#include "control/mrai/mrai.h"
+#include "control/torque/limit.h"
+#include "control/torque/loop.h"
+#include "control/torque/voltage_reserve.h"
 #include "twin/twin_stages.h"
 
 typedef struct {

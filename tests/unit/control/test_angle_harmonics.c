@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "control/angle_harmonics.h"
+#include "control/adapt/angle_harmonics.h"
 #include "unity.h"
 
 static const double turn = 4294967296.0;
@@ -101,7 +101,7 @@ void test_what_is_learnt_stays_within_its_bound(void)
         theta += 7000.0 / 60e3;
         angle_harmonics_step(&config, &state, counts(theta - 0.002 * cos(two_pi * theta)), table); /* uncorrected */
     }
-    TEST_ASSERT_EQUAL_INT32(config.most, state.c[0]);
+    TEST_ASSERT_EQUAL_INT32(config.max, state.c[0]);
 }
 
 /* The same sequence, not corrected, through (AT-11) and (AT-12) in double. The fixed point rounds each step to
@@ -128,7 +128,7 @@ void test_coefficients_and_table_are_the_twins(void)
     TEST_ASSERT_DOUBLE_WITHIN(400.0, c[1], state.c[1]);
     TEST_ASSERT_DOUBLE_WITHIN(400.0, c[2], state.c[2]);
     TEST_ASSERT_DOUBLE_WITHIN(400.0, c[3], state.c[3]);
-    config.most = 0x00FFFFFF;
+    config.max = 0x00FFFFFF;
     state.c[0] = 3000000;
     state.c[3] = -2000000;
     state.c[1] = state.c[2] = 0;

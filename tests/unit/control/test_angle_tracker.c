@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/angle_tracker.h"
+#include "control/current/angle_tracker.h"
 #include "fixture.h"
 #include "unity.h"
 

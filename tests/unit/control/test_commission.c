@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/commission.h"
+#include "control/commission/commission.h"
 
 #include <math.h>
 
@@ -11,7 +11,7 @@
 #define LEVEL 0.022
 #define OMEGA_MAX Q31(0.002)
 
-static const commission_config_t config = {Q15(0.6), OMEGA_MAX};
+static const commission_config_t config = {Q15(0.6), OMEGA_MAX, 40, 64, 10, 3355443};
 static commission_state_t state;
 
 void setUp(void)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/current_control.h"
+#include "control/current/current_control.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -13,17 +13,18 @@ static current_control_in_t in;
 static current_control_out_t out; /* of the last step() */
 static bool limited;
 
-static dq_t q30(dq_t x)
+static dq_q30_t q30(dq_q15_t x)
 {
-    return (dq_t){x.d * 32768, x.q * 32768};
+    return (dq_q30_t){x.d * 32768, x.q * 32768};
 }
 
 void setUp(void)
 {
     f = fixture();
     current_control_reset(&state);
-    flux = flux_table_step(&f.flux_table, (dq_t){-4000, 6000});
-    target = (current_target_t){{flux.psi_d, flux.psi_q}, q30((dq_t){flux.psi_d, flux.psi_q})}; /* no error at all */
+    flux = flux_table_step(&f.flux_table, (dq_q15_t){-4000, 6000});
+    const dq_q15_t psi = {flux.psi_d, flux.psi_q};
+    target = (current_target_t){psi, q30(psi)}; /* no error at all */
     in = (current_control_in_t){.target = &target, .flux = &flux, .v_dc = 21845 /* 350 V */};
 }
 
@@ -43,20 +44,20 @@ static double of_v(int half)
 }
 
 /* What is left of the voltage, in LSB of q15. */
-static dq_t step(void)
+static dq_q15_t step(void)
 {
     out = current_control_step(&f.current_control, &state, &in);
     limited = out.limited != 0U;
     TEST_ASSERT_FALSE(limited && out.clear);
     if (limited) {
-        return (dq_t){(int32_t)lround(of_v(0)), (int32_t)lround(of_v(1))};
+        return (dq_q15_t){(int32_t)lround(of_v(0)), (int32_t)lround(of_v(1))};
     }
     TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(0), out.u.d); /* half an LSB of each, where v's is the smaller one */
     TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(1), out.u.q);
     return out.u;
 }
 
-static twin_dq_t si_psi(dq_t psi)
+static twin_dq_t si_psi(dq_q15_t psi)
 {
     return (twin_dq_t){from_q15(psi.d) * f.psi, from_q15(psi.q) * f.psi};
 }
@@ -64,18 +65,18 @@ static twin_dq_t si_psi(dq_t psi)
 /* The twin on exactly what the stage was given: the rounded fluxes. Its answer in LSB of q15. */
 static twin_dq_t twin_step(twin_current_state_t *twin)
 {
-    const twin_dq_t psi = si_psi((dq_t){flux.psi_d, flux.psi_q});
+    const twin_dq_t psi = si_psi((dq_q15_t){flux.psi_d, flux.psi_q});
     const twin_flux_t si = {.psi_d = psi.d, .psi_q = psi.q};
-    const dq_t weighted = {target.weighted_q30.d / 32768, target.weighted_q30.q / 32768};
+    const dq_q15_t weighted = {target.weighted.d / 32768, target.weighted.q / 32768};
     const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)}, &si, from_q31(in.omega) * f.w,
                                  from_q15(in.psi_delta) * f.psi, from_q15(in.v_dc) * f.v};
     const twin_dq_t u = twin_current_control(&f.si, twin, &t);
     return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
 }
 
-static dq_t random_dq(uint64_t *seed, int largest)
+static dq_q15_t random_dq(uint64_t *seed, int largest)
 {
-    return (dq_t){(q15_t)random_in(seed, -largest, largest), (q15_t)random_in(seed, -largest, largest)};
+    return (dq_q15_t){(q15_t)random_in(seed, -largest, largest), (q15_t)random_in(seed, -largest, largest)};
 }
 
 /* --- the target ------------------------------------------------------------------------------ */
@@ -86,16 +87,16 @@ void test_the_target_of_every_reference_follows_the_twin(void)
     worst_t worst = {0};
     for (int d = -32768; d <= 0; d += 311) {
         for (int q = -32768; q <= 32767; q += 313) {
-            const dq_t i = {(q15_t)d, (q15_t)q};
+            const dq_q15_t i = {(q15_t)d, (q15_t)q};
             const flux_point_t at = flux_table_step(&f.flux_table, i);
             const current_target_t y = current_control_target(&f.current_control, i, &at);
             const twin_target_t t = twin_current_target(&f.si, (twin_dq_t){from_q15(d) * f.i, from_q15(q) * f.i});
             const double lsb = 32768.0 / f.psi;
             worst_note(&worst, y.psi.d - t.psi.d * lsb, "psi_d of %d %d", d, q);
             worst_note(&worst, y.psi.q - twin_clamp(t.psi.q * lsb, -32768, 32767), "psi_q of %d %d", d, q);
-            worst_note(&worst, y.weighted_q30.d / 32768.0 - t.weighted.d * lsb, "f_d of %d %d", d, q);
+            worst_note(&worst, y.weighted.d / 32768.0 - t.weighted.d * lsb, "f_d of %d %d", d, q);
             if (fabs(t.psi.q * lsb) < 32760.0) {
-                worst_note(&worst, y.weighted_q30.q / 32768.0 - t.weighted.q * lsb, "f_q of %d %d", d, q);
+                worst_note(&worst, y.weighted.q / 32768.0 - t.weighted.q * lsb, "f_q of %d %d", d, q);
             }
         }
     }
@@ -104,12 +105,12 @@ void test_the_target_of_every_reference_follows_the_twin(void)
 
 void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
 {
-    const flux_point_t at = flux_table_step(&f.flux_table, (dq_t){0, 0});
-    const current_target_t y = current_control_target(&f.current_control, (dq_t){0, 0}, &at);
+    const flux_point_t at = flux_table_step(&f.flux_table, (dq_q15_t){0, 0});
+    const current_target_t y = current_control_target(&f.current_control, (dq_q15_t){0, 0}, &at);
     TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0], y.psi.d);
-    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0] * 32768, y.weighted_q30.d);
+    TEST_ASSERT_EQUAL_INT(f.flux_table.psi_f0[0] * 32768, y.weighted.d);
     TEST_ASSERT_EQUAL_INT(0, y.psi.q);
-    TEST_ASSERT_EQUAL_INT(0, y.weighted_q30.q);
+    TEST_ASSERT_EQUAL_INT(0, y.weighted.q);
 }
 
 /* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of
@@ -119,9 +120,9 @@ void test_the_set_point_weight_takes_of_the_currents_share_only(void)
     const flux_point_t at = {.psi_d = 10000, .psi_q = 8000, .psi_f0 = 17000};
     f.current_control.setpoint_weight = 16384;
     f.current_control.drop_gain = 8192;
-    const current_target_t y = current_control_target(&f.current_control, (dq_t){-4000, 2000}, &at);
-    TEST_ASSERT_EQUAL_INT((10000 + 3500 - 500) * 32768, y.weighted_q30.d);
-    TEST_ASSERT_EQUAL_INT((8000 - 4000 + 250) * 32768, y.weighted_q30.q);
+    const current_target_t y = current_control_target(&f.current_control, (dq_q15_t){-4000, 2000}, &at);
+    TEST_ASSERT_EQUAL_INT((10000 + 3500 - 500) * 32768, y.weighted.d);
+    TEST_ASSERT_EQUAL_INT((8000 - 4000 + 250) * 32768, y.weighted.q);
     TEST_ASSERT_EQUAL_INT(10000, y.psi.d);
     TEST_ASSERT_EQUAL_INT(8000, y.psi.q);
 }
@@ -145,7 +146,7 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
     int seen = 0;
     for (int n = 0; n < 400000; n++) {
         const int largest = (n % 2) ? 11000 : 4000;
-        const dq_t psi = random_dq(&seed, largest);
+        const dq_q15_t psi = random_dq(&seed, largest);
         flux.psi_d = psi.d;
         flux.psi_q = psi.q;
         target = (current_target_t){random_dq(&seed, largest), q30(random_dq(&seed, largest))};
@@ -155,7 +156,7 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         state = (current_control_state_t){random_in(&seed, -450000000, 450000000),
                                           random_in(&seed, -450000000, 450000000)};
         twin_current_state_t twin = {{2.0 * from_q31(state.s_d_q30) * f.v, 2.0 * from_q31(state.s_q_q30) * f.v}, false};
-        const dq_t u = step();
+        const dq_q15_t u = step();
         const twin_dq_t t = twin_step(&twin);
         if ((limited || twin.limited) && between_steps(((target.psi.d > psi.d) ? t.q : t.d) / v_max())) {
             continue;
@@ -180,8 +181,8 @@ void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
     twin_current_state_t twin = {0};
     in.v_dc = 32767;
     for (int n = 0; n < 10000; n++) {
-        target.psi = (dq_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)),
-                            (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
+        target.psi = (dq_q15_t){(q15_t)(flux.psi_d + random_in(&seed, -300, 300)),
+                                (q15_t)(flux.psi_q + random_in(&seed, -300, 300))};
         (void)step();
         (void)twin_step(&twin);
         worst_note(&worst, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d of period %d", n);
@@ -194,10 +195,10 @@ void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
 /* Alternating +-1 LSB is no error: a truncating step would drift by 1e6/2 LSB of its own unit. */
 void test_a_million_periods_of_one_lsb_ripple_do_not_bias_the_integrators(void)
 {
-    const dq_t rest = target.psi;
+    const dq_q15_t rest = target.psi;
     for (int n = 0; n < 1000000; n++) {
         const int e = (n & 1) ? 1 : -1;
-        target.psi = (dq_t){(q15_t)(rest.d + e), (q15_t)(rest.q + e)};
+        target.psi = (dq_q15_t){(q15_t)(rest.d + e), (q15_t)(rest.q + e)};
         (void)step();
     }
     TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
@@ -219,7 +220,7 @@ void test_at_standstill_without_error_nothing_but_the_integrator_is_put_out(void
 {
     state.s_d_q30 = 1000 * 32768;
     state.s_q_q30 = -2000 * 32768;
-    const dq_t u = step();
+    const dq_q15_t u = step();
     TEST_ASSERT_EQUAL_INT(1000, u.d);
     TEST_ASSERT_EQUAL_INT(-2000, u.q);
     TEST_ASSERT_EQUAL_INT32(1000 * 32768, state.s_d_q30);
@@ -233,8 +234,8 @@ void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
     in.v_dc = 32767;
     flux.psi_d = target.psi.d = 10000;
     flux.psi_q = target.psi.q = 6000;
-    target.weighted_q30 = q30(target.psi);
-    dq_t u = step();
+    target.weighted = q30(target.psi);
+    dq_q15_t u = step();
     TEST_ASSERT_INT_WITHIN(1, -3000, u.d);
     TEST_ASSERT_INT_WITHIN(1, 5500, u.q);
     in.omega = -16384 * 65536;
@@ -246,10 +247,10 @@ void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
 /* sigma/omega_b = 1/(3 T_s omega_b) = 0.8488; the proportional part follows f, the integral part psi*. */
 void test_the_proportional_part_follows_the_weighted_target_and_the_integral_part_the_target(void)
 {
-    target.weighted_q30.d = (flux.psi_d + 1000) * 32768;
+    target.weighted.d = (flux.psi_d + 1000) * 32768;
     TEST_ASSERT_INT_WITHIN(1, 849, step().d);
     TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
-    target.weighted_q30.d = flux.psi_d * 32768;
+    target.weighted.d = flux.psi_d * 32768;
     target.psi.d = (q15_t)(flux.psi_d + 1000);
     TEST_ASSERT_EQUAL_INT(0, step().d);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1000.0 / 32768.0 * from_q15(f.current_control.integral_gain),
@@ -262,7 +263,7 @@ void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the
     for (int sign = -1; sign <= 1; sign += 2) {
         state.s_d_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
         state.s_q_q30 = (sign > 0) ? (1 << 30) - 1 : -(1 << 30);
-        dq_t u = step();
+        dq_q15_t u = step();
         TEST_ASSERT_INT_WITHIN(1, v_max() * 3 / 5, u.d);
         TEST_ASSERT_INT_WITHIN(2, sign * 0.7988 * v_max(), u.q);
         TEST_ASSERT_TRUE(limited);
@@ -279,7 +280,7 @@ void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_o
     for (int sign = -1; sign <= 1; sign += 2) {
         in.omega = sign; /* nothing but its sign */
         state = (current_control_state_t){.s_d_q30 = -(int32_t)(v_max() + 200.0) * 32768};
-        const dq_t u = step();
+        const dq_q15_t u = step();
         TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
         TEST_ASSERT_INT_WITHIN(2, -sign * 200, u.q);
     }
@@ -292,7 +293,7 @@ void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
     state.s_d_q30 = -(int32_t)(v_max() * 6 / 5) * 32768;
     state.s_q_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
-    const dq_t u = step();
+    const dq_q15_t u = step();
     TEST_ASSERT_INT_WITHIN(2, -0.7988 * v_max(), u.d);
     TEST_ASSERT_INT_WITHIN(1, v_max() * 3 / 5, u.q);
     TEST_ASSERT_TRUE(limited);
@@ -346,14 +347,14 @@ void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
         double psi_q = ring * sin(phi);
         twin_dq_t acting = {-w * psi_q, w * psi_d};
         current_control_reset(&state);
-        target.psi = (dq_t){(q15_t)lround(rest.psi_d / f.psi * 32768.0), 0};
-        target.weighted_q30 = q30(target.psi);
+        target.psi = (dq_q15_t){(q15_t)lround(rest.psi_d / f.psi * 32768.0), 0};
+        target.weighted = q30(target.psi);
         in.omega = (q31_t)lround(w / f.w * 2147483648.0);
         in.psi_delta = 0;
         for (int k = 0; k < 400; k++) { /* 40 ms, one period of delay */
             flux.psi_d = (q15_t)lround(psi_d / f.psi * 32768.0);
             flux.psi_q = (q15_t)lround(psi_q / f.psi * 32768.0);
-            const dq_t u = step();
+            const dq_q15_t u = step();
             for (int sub = 0; sub < 10; sub++) {
                 const double d = acting.d + w * psi_q;
                 const double q = acting.q - w * psi_d;
@@ -406,7 +407,7 @@ void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
     in.v_dc = 4000;
     const int32_t rest = target.psi.q;
     target.psi.q = rest + 200;
-    target.weighted_q30 = q30(target.psi);
+    target.weighted = q30(target.psi);
     for (int n = 0; n < 5000; n++) {
         (void)step();
     }
@@ -418,7 +419,7 @@ void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
     TEST_ASSERT_INT_WITHIN(32768, held, state.s_q_q30);
     TEST_ASSERT_INT_WITHIN(2, v_max() + 0.8488 * 200 * (0.7 - 1.0), held >> 15);
     target.psi.q = rest - 200;
-    target.weighted_q30 = q30(target.psi);
+    target.weighted = q30(target.psi);
     TEST_ASSERT_LESS_THAN_INT((int)v_max(), step().q);
     TEST_ASSERT_LESS_THAN_INT32(held, state.s_q_q30);
 }
@@ -465,7 +466,7 @@ void test_without_dc_voltage_nothing_is_put_out(void)
     out = current_control_step(&f.current_control, &state, &in);
     TEST_ASSERT_INT_WITHIN(64, (int16_t)there, (int16_t)out.v);
     for (in.v_dc = 0; in.v_dc < 2; in.v_dc++) {
-        target.weighted_q30 = q30((dq_t){-20000, 20000});
+        target.weighted = q30((dq_q15_t){-20000, 20000});
         out = current_control_step(&f.current_control, &state, &in);
         TEST_ASSERT_EQUAL_UINT32(0, out.v);
     }
@@ -477,13 +478,13 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         const q15_t end[2] = {INT16_MAX, INT16_MIN};
         flux.psi_d = end[n & 1];
         flux.psi_q = end[(n >> 1) & 1];
-        target.psi = (dq_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
-        target.weighted_q30 = q30((dq_t){end[(n >> 4) & 1], end[(n >> 5) & 1]});
+        target.psi = (dq_q15_t){end[(n >> 2) & 1], end[(n >> 3) & 1]};
+        target.weighted = q30((dq_q15_t){end[(n >> 4) & 1], end[(n >> 5) & 1]});
         in.omega = ((n >> 6) & 1) ? INT32_MIN : INT32_MAX;
         in.psi_delta = end[(n >> 7) & 1];
         state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
         in.v_dc = (n & 1) ? 32767 : 900;
-        const dq_t u = step(); /* q whole, and what d has beside it in any case */
+        const dq_q15_t u = step(); /* q whole, and what d has beside it in any case */
         TEST_ASSERT_TRUE(hypot(u.d, u.q) <= v_max() * hypot(1.0, 0.7) + 1.5);
     }
 }

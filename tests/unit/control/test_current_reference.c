@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/current_reference.h"
+#include "control/torque/current_reference.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -11,7 +11,7 @@ static current_reference_in_t in;
 void setUp(void)
 {
     f = fixture();
-    in = (current_reference_in_t){.torque = 4096, .v_dc = 21845, .omega = 1000, .i_d_max = INT16_MAX};
+    in = (current_reference_in_t){.torque_corrected = 4096, .v_dc = 21845, .omega = 1000, .i_d_max = INT16_MAX};
 }
 
 void tearDown(void)
@@ -27,7 +27,7 @@ static current_reference_t step(void)
 void test_at_low_speed_a_node_gives_the_tabulated_mtpa_currents(void)
 {
     for (int ix = 0; ix < 7; ix++) {
-        in.torque = (q15_t)(ix * 2048);
+        in.torque_corrected = (q15_t)(ix * 2048);
         const current_reference_t y = step();
         const int n = ix * f.current_reference.grid.ny + f.current_reference.grid.ny - 1;
         TEST_ASSERT_EQUAL_INT(f.current_reference.i_d[n], y.i_ref.d);
@@ -39,7 +39,7 @@ void test_at_low_speed_a_node_gives_the_tabulated_mtpa_currents(void)
 void test_i_q_takes_the_sign_of_the_torque_and_i_d_does_not(void)
 {
     const current_reference_t motor = step();
-    in.torque = -4096;
+    in.torque_corrected = -4096;
     const current_reference_t generator = step();
     TEST_ASSERT_EQUAL_INT(motor.i_ref.d, generator.i_ref.d);
     TEST_ASSERT_EQUAL_INT(-motor.i_ref.q, generator.i_ref.q);
@@ -61,7 +61,7 @@ void test_the_direction_of_rotation_does_not_matter(void)
 void test_the_available_flux_is_the_planned_voltage_over_the_speed(void)
 {
     in.omega = 26214;
-    in.torque = 0;
+    in.torque_corrected = 0;
     const double psi = 0.55 * 21845.0 / 32768.0 / 0.8;
     TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * psi) * 32768.0, step().torque_max); /* the fixture's own line */
     in.i_magnitude = 16384; /* takes r/2 = 0.00514 of the voltage */
@@ -71,17 +71,17 @@ void test_the_available_flux_is_the_planned_voltage_over_the_speed(void)
 void test_torque_beyond_the_limit_is_cut_to_it_and_flagged(void)
 {
     in.omega = 26214;
-    in.torque = 32767;
+    in.torque_corrected = 32767;
     const current_reference_t cut = step();
     TEST_ASSERT_TRUE(cut.limited);
-    in.torque = cut.torque_max;
+    in.torque_corrected = cut.torque_max;
     const current_reference_t full = step();
     TEST_ASSERT_FALSE(full.limited);
     TEST_ASSERT_EQUAL_INT(full.i_ref.d, cut.i_ref.d);
     TEST_ASSERT_EQUAL_INT(full.i_ref.q, cut.i_ref.q);
-    in.torque = (q15_t)(-cut.torque_max - 1);
+    in.torque_corrected = (q15_t)(-cut.torque_max - 1);
     TEST_ASSERT_TRUE(step().limited);
-    in.torque = INT16_MIN;
+    in.torque_corrected = INT16_MIN;
     TEST_ASSERT_EQUAL_INT(-full.i_ref.q, step().i_ref.q);
 }
 
@@ -89,7 +89,7 @@ void test_flux_below_the_table_is_flagged_and_uses_its_edge(void)
 {
     in.v_dc = 3000;
     in.omega = 32767;
-    in.torque = 100;
+    in.torque_corrected = 100;
     const current_reference_t y = step();
     TEST_ASSERT_TRUE(y.limited);
     in.v_dc = 0;
@@ -143,7 +143,7 @@ void test_the_reachable_torque_counts_what_the_q_axis_differs_by(void)
 {
     in.omega = 26214;
     const q15_t nominal = step().torque_max;
-    in.torque = nominal;
+    in.torque_corrected = nominal;
     const int32_t i_d = step().i_ref.d;
     TEST_ASSERT_LESS_THAN_INT(-1000, i_d);
     in.psi_q_delta = 3277; /* 0.1 */
@@ -189,17 +189,19 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
                                       (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, 1000, 32767),
                                       (q15_t)random_in(&seed, -3000, 3000)};
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
-        const twin_reference_in_t t = {from_q15(in.torque) * f.t,       from_q15(in.v_dc) * f.v,
+        const twin_reference_in_t t = {from_q15(in.torque_corrected) * f.t,       from_q15(in.v_dc) * f.v,
                                        from_q15(in.omega) * f.w,        from_q15(in.i_magnitude) * f.i,
                                        from_q15(in.v_trim) * f.v,       from_q15(in.shift) * f.psi,
                                        from_q15(in.psi_delta) * f.psi,  from_q15(in.i_d_max) * f.i,
                                        from_q15(in.psi_q_delta) * f.psi};
         const current_reference_t y = step();
         const twin_reference_t s = twin_current_reference(&f.si, &t);
-        worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque, in.v_dc, in.omega);
-        worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d", in.torque, in.v_dc, in.omega);
-        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque, in.v_dc,
-                   in.omega);
+        worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d",
+                   in.torque_corrected, in.v_dc, in.omega);
+        worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d",
+                   in.torque_corrected, in.v_dc, in.omega);
+        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d",
+                   in.torque_corrected, in.v_dc, in.omega);
     }
     ASSERT_WORST(worst, 8.0);
 }
@@ -207,7 +209,7 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
 void test_the_current_circle_cuts_i_q_and_keeps_i_d(void)
 {
     f.current_reference.i_max = 7000;
-    in.torque = 8192;
+    in.torque_corrected = 8192;
     const current_reference_t y = step();
     const current_reference_config_t open = fixture().current_reference;
     const current_reference_t free = current_reference_step(&open, &in);
@@ -217,7 +219,7 @@ void test_the_current_circle_cuts_i_q_and_keeps_i_d(void)
     const current_reference_t d_only = step();
     TEST_ASSERT_EQUAL_INT(-3000, d_only.i_ref.d);
     TEST_ASSERT_EQUAL_INT(0, d_only.i_ref.q);
-    in.torque = -8192;
+    in.torque_corrected = -8192;
     TEST_ASSERT_EQUAL_INT(0, step().i_ref.q);
 }
 

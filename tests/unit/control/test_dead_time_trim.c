@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/dead_time_trim.h"
+#include "control/adapt/dead_time_trim.h"
 
 #include <math.h>
 
@@ -33,11 +33,12 @@ static dead_time_trim_in_t input(double x)
 {
     return (dead_time_trim_in_t){
         .sigma = Q31(SIGMA),
-        .x = q27(x),
-        .variance = KNOWN,
+        .x_q27 = q27(x),
+        .variance_q30 = KNOWN,
         .v_dc = (q15_t)lround(V_DC * 32768.0),
         .dead_time = (q15_t)(state.base + state.trim),
-        .learning = true,
+        .identifying = true,
+        .period_steps = 1000,
     };
 }
 
@@ -47,7 +48,7 @@ static dead_time_trim_t second(const dead_time_trim_in_t *in)
     dead_time_trim_t out = {in->dead_time, 0};
     for (int ms = 0; ms < 1000; ms++) {
         TEST_ASSERT_EQUAL_INT(in->dead_time, out.dead_time);
-        TEST_ASSERT_EQUAL_INT32(0, out.x_shift);
+        TEST_ASSERT_EQUAL_INT32(0, out.x_shift_q27);
         out = dead_time_trim_step(&state, in);
     }
     return out;
@@ -73,7 +74,7 @@ void test_what_is_moved_is_taken_from_the_drop(void)
             in.v_dc = (q15_t)lround(v_dc * 32768.0);
             const dead_time_trim_t out = second(&in);
             const double added = 4.0 / PI * (in.v_dc / 32768.0) * (out.dead_time - BASE) / 32768.0;
-            TEST_ASSERT_DOUBLE_WITHIN(2e-9, -added, SIGMA * out.x_shift / 134217728.0);
+            TEST_ASSERT_DOUBLE_WITHIN(2e-9, -added, SIGMA * out.x_shift_q27 / 134217728.0);
         }
     }
 }
@@ -90,12 +91,12 @@ void test_over_minutes_it_follows_the_twin(void)
         for (int s = 0; s < 300; s++) {
             const dead_time_trim_t out = second(&in);
             in.dead_time = out.dead_time;
-            in.x += out.x_shift;
+            in.x_q27 += out.x_shift_q27;
             drop = twin_trim(&twin, drop, in.v_dc / 32768.0);
             TEST_ASSERT_DOUBLE_WITHIN(15.0, twin.trim * 32768.0, state.trim);
         }
         /* Less than one LSB of the duty is left. */
-        TEST_ASSERT_DOUBLE_WITHIN(4.0 / PI * V_DC / 32768.0, 0.0, SIGMA * in.x / 134217728.0);
+        TEST_ASSERT_DOUBLE_WITHIN(4.0 / PI * V_DC / 32768.0, 0.0, SIGMA * in.x_q27 / 134217728.0);
         TEST_ASSERT_DOUBLE_WITHIN(1.0, twin.trim * 32768.0, state.trim);
     }
 }
@@ -106,12 +107,12 @@ void test_no_more_than_a_quarter_is_added_or_taken_and_the_rest_stays_learnt(voi
     for (int s = 0; s < 100; s++) {
         const dead_time_trim_t out = second(&in);
         in.dead_time = out.dead_time;
-        in.x += out.x_shift;
+        in.x_q27 += out.x_shift_q27;
     }
     TEST_ASSERT_EQUAL_INT(BASE + BASE / 4, in.dead_time);
     /* 4 sigma are 429 LSB, of which 187 are moved. */
-    TEST_ASSERT_DOUBLE_WITHIN(0.01, 4.0 * (1.0 - 187.0 / 429.0), in.x / 134217728.0);
-    in.x = q27(-4.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 4.0 * (1.0 - 187.0 / 429.0), in.x_q27 / 134217728.0);
+    in.x_q27 = q27(-4.0);
     for (int s = 0; s < 100; s++) {
         in.dead_time = second(&in).dead_time;
     }
@@ -121,7 +122,7 @@ void test_no_more_than_a_quarter_is_added_or_taken_and_the_rest_stays_learnt(voi
 void test_what_is_not_known_or_cannot_be_compared_moves_nothing(void)
 {
     dead_time_trim_in_t in = input(2.0);
-    in.variance = ONE_Q30 / 4 + 1;
+    in.variance_q30 = ONE_Q30 / 4 + 1;
     TEST_ASSERT_EQUAL_INT(BASE, second(&in).dead_time);
     in = input(2.0);
     in.v_dc = 0;
@@ -134,9 +135,9 @@ void test_only_time_of_learning_counts(void)
     for (int ms = 0; ms < 999; ms++) {
         TEST_ASSERT_EQUAL_INT(BASE, dead_time_trim_step(&state, &in).dead_time);
     }
-    in.learning = false;
+    in.identifying = false;
     TEST_ASSERT_EQUAL_INT(BASE, second(&in).dead_time);
-    in.learning = true;
+    in.identifying = true;
     TEST_ASSERT_NOT_EQUAL(BASE, dead_time_trim_step(&state, &in).dead_time);
 }
 

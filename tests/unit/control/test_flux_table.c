@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/flux_table.h"
+#include "control/current/flux_table.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -16,14 +16,14 @@ void tearDown(void)
 {
 }
 
-static twin_dq_t amperes(dq_t i)
+static twin_dq_t amperes(dq_q15_t i)
 {
     return (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i};
 }
 
 /* Table values: one rounding (0.5) and the weights' 2^-15 of the twist, below 0.1 here.
  * psi = psi_f0 + l i with nothing rounded off l: 0.6 + 0.5, the twist times |i| < 1 and the shift 2^l_shift = 4. */
-static void hold_to_twin(worst_t *value, worst_t *flux, dq_t i)
+static void hold_to_twin(worst_t *value, worst_t *flux, dq_q15_t i)
 {
     const flux_point_t y = flux_table_step(&f.flux_table, i);
     const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
@@ -48,15 +48,15 @@ void test_the_whole_current_plane_follows_the_twin(void)
     uint64_t seed = 41;
     for (int d = -32768; d <= 32767; d += 257) {
         for (int q = -32768; q <= 32767; q += 255) {
-            hold_to_twin(&value, &flux, (dq_t){(q15_t)d, (q15_t)q});
+            hold_to_twin(&value, &flux, (dq_q15_t){(q15_t)d, (q15_t)q});
         }
     }
     for (int n = 0; n < 100000; n++) {
         hold_to_twin(&value, &flux,
-                     (dq_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
+                     (dq_q15_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
     }
-    hold_to_twin(&value, &flux, (dq_t){INT16_MIN, INT16_MIN});
-    hold_to_twin(&value, &flux, (dq_t){INT16_MAX, INT16_MIN});
+    hold_to_twin(&value, &flux, (dq_q15_t){INT16_MIN, INT16_MIN});
+    hold_to_twin(&value, &flux, (dq_q15_t){INT16_MAX, INT16_MIN});
     ASSERT_WORST(value, 0.6);
     ASSERT_WORST(flux, 3.6);
 }
@@ -68,7 +68,7 @@ void test_a_node_gives_exactly_what_is_tabulated(void)
     for (int ix = 0; ix < nx; ix++) {
         for (int iy = 0; iy < ny; iy++) {
             const int n = ix * ny + iy;
-            const dq_t i = {(q15_t)(f.flux_table.mesh.x0 + ix * 2048), (q15_t)(iy * 2048)};
+            const dq_q15_t i = {(q15_t)(f.flux_table.mesh.x0 + ix * 2048), (q15_t)(iy * 2048)};
             const flux_point_t y = flux_table_step(&f.flux_table, i);
             const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
             TEST_ASSERT_EQUAL_INT(f.flux_table.l_d[n], x.l_d);
@@ -85,9 +85,9 @@ void test_the_half_planes_mirror_each_other(void)
 {
     uint64_t seed = 42;
     for (int n = 0; n < 50000; n++) {
-        const dq_t i = {(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32767, 32767)};
+        const dq_q15_t i = {(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32767, 32767)};
         const flux_point_t a = flux_table_step(&f.flux_table, i);
-        const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){i.d, (q15_t)-i.q});
+        const flux_point_t b = flux_table_step(&f.flux_table, (dq_q15_t){i.d, (q15_t)-i.q});
         TEST_ASSERT_EQUAL_INT(a.psi_d, b.psi_d);
         TEST_ASSERT_EQUAL_INT(a.g, b.g);
         TEST_ASSERT_INT_WITHIN(1, -a.psi_q, b.psi_q);
@@ -98,8 +98,8 @@ void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(
 {
     const int edge_d = f.flux_table.mesh.x0;
     const int edge_q = 14 * 2048;
-    const dq_t inside[4] = {{(q15_t)edge_d, 0}, {0, 0}, {-1000, (q15_t)edge_q}, {-1000, (q15_t)-edge_q}};
-    const dq_t outside[4] = {
+    const dq_q15_t inside[4] = {{(q15_t)edge_d, 0}, {0, 0}, {-1000, (q15_t)edge_q}, {-1000, (q15_t)-edge_q}};
+    const dq_q15_t outside[4] = {
         {(q15_t)(edge_d - 1), 0}, {1, 0}, {-1000, (q15_t)(edge_q + 1)}, {-1000, (q15_t)(-edge_q - 1)}};
     for (int n = 0; n < 4; n++) {
         const flux_point_t a = flux_table_step(&f.flux_table, inside[n]);
@@ -118,8 +118,8 @@ void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(
 void test_there_is_no_step_at_a_cell_boundary(void)
 {
     for (int q = -20000; q < 20000; q++) {
-        const flux_point_t a = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)q});
-        const flux_point_t b = flux_table_step(&f.flux_table, (dq_t){-8192, (q15_t)(q + 1)});
+        const flux_point_t a = flux_table_step(&f.flux_table, (dq_q15_t){-8192, (q15_t)q});
+        const flux_point_t b = flux_table_step(&f.flux_table, (dq_q15_t){-8192, (q15_t)(q + 1)});
         TEST_ASSERT_INT_WITHIN(2, a.g, b.g);
         TEST_ASSERT_INT_WITHIN(8, a.psi_q, b.psi_q); /* l_q below 4, doubled by the slope of l_q, roundings */
     }
@@ -192,8 +192,8 @@ void test_flux_beyond_the_base_saturates(void)
         large[k] = 32767;
     }
     f.flux_table.l_q = f.flux_table.psi_f0 = f.flux_table.l_d = large;
-    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_t){0, 20000}).psi_q);
-    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_t){0, -20000}).psi_q);
-    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_t){1000, 0}).psi_d);
-    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_t){-28672, 0}).psi_d);
+    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_q15_t){0, 20000}).psi_q);
+    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_q15_t){0, -20000}).psi_q);
+    TEST_ASSERT_EQUAL_INT(32767, flux_table_step(&f.flux_table, (dq_q15_t){1000, 0}).psi_d);
+    TEST_ASSERT_EQUAL_INT(-32768, flux_table_step(&f.flux_table, (dq_q15_t){-28672, 0}).psi_d);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/i_d_limit.h"
+#include "control/torque/i_d_limit.h"
 
 #include <math.h>
 

@@ -22,13 +22,13 @@ void tearDown(void)
 
 void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(void)
 {
-    identify_window_t window = {.count = IDENTIFY_PERIODS, .last = {.u = {7, -7}, .i = {100, 0}}};
-    identify_window_restart(&window);
+    identify_window_t window = {.left = 7, .last = {.u = {7, -7}, .i = {100, 0}}};
+    identify_window_restart(&window, 10);
     const flux_point_t flux = {.psi_d = 11, .psi_q = 22};
     for (int k = 1; k <= 10; k++) {
         const identify_sample_t s = {{100 + k, -k}, {10 * k, k}, &flux, 1000U * (uint32_t)k};
         if (k == 3) {
-            identify_window_snapped(&window);
+            identify_window_count_limited(&window);
         }
         TEST_ASSERT_EQUAL(k == 10, identify_window_step(&window, &s));
     }
@@ -46,16 +46,16 @@ void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(v
 void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
 {
     identify_window_t window = {0};
-    identify_window_restart(&window);
+    identify_window_restart(&window, 10);
     const flux_point_t flux = {0};
     for (int k = 1; k <= 20; k++) {
         const identify_sample_t s = {{0, 0}, {0, 0}, &flux, 0};
         if (k == 10) {
-            identify_window_spoil(&window);
+            identify_window_invalidate(&window);
         }
         if (identify_window_step(&window, &s)) {
             TEST_ASSERT_EQUAL(k == 20, window.acting);
-            identify_window_restart(&window);
+            identify_window_restart(&window, 10);
         }
     }
 }
@@ -65,14 +65,14 @@ void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
 void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
 {
     identify_window_t window = {0};
-    identify_window_restart(&window);
+    identify_window_restart(&window, 10);
     const flux_point_t flux = {0};
     for (int k = 1; k <= 10; k++) {
         const identify_sample_t s = {{-200 * k, 100 * k}, {20 * k, -2000 * k}, &flux, 0};
         (void)identify_window_step(&window, &s);
     }
     const identify_point_t point = identify_point(&c, &window, 0);
-    TEST_ASSERT_INT32_WITHIN(40, -1000 * 65536, point.i.d); /* PER_TWENTY's own rounding: 4e-10 */
+    TEST_ASSERT_INT32_WITHIN(40, -1000 * 65536, point.i.d); /* the gain's own rounding: 4e-10 */
     TEST_ASSERT_INT32_WITHIN(40, 500 * 65536, point.i.q);
     TEST_ASSERT_INT32_WITHIN(40, 90 * 32768, point.u.d);
     TEST_ASSERT_INT32_WITHIN(40, -9000 * 32768, point.u.q);
@@ -83,21 +83,53 @@ void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
 void test_speed_counts_whole_turns_by_the_tracked_one_and_the_rest_by_the_measured_angle(void)
 {
     const double true_pu = 0.9, tracked_pu = 0.87;
-    const window_pair_t pair = steady_window(&f, (dq_t){-2000, 4000}, true_pu, (dq_t){0, 0});
+    const window_pair_t pair = steady_window(&f, (dq_q15_t){-2000, 4000}, true_pu, (dq_q15_t){0, 0});
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(tracked_pu * 2147483648.0));
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(point.omega)); /* turn_to_pu has 17 bits of 0.03 */
     const identify_point_t back = identify_point(&c, &pair.fixed, (q31_t)(0.93 * 2147483648.0));
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(back.omega));
 }
 
-void test_points_agree_with_the_twin_over_the_range(void)
+/* Any samples up to the formats' ends, as many as a step has from 4 to 40 kHz: sums are exact, means to the gain's own
+ * rounding, below 1e-8. */
+void test_the_mean_of_a_window_is_exact_for_any_number_of_periods(void)
+{
+    static const int counts[] = {4, 5, 8, 10, 22, 39, 40};
+    uint64_t seed = 5;
+    for (unsigned k = 0; k < sizeof counts / sizeof counts[0]; k++) {
+        identify_fixture_of(&f, &c, counts[k]);
+        for (int n = 0; n < 300; n++) {
+            identify_window_t window = {.left = 0};
+            identify_window_restart(&window, (uint32_t)counts[k]);
+            const flux_point_t flux = {0};
+            double sum_i = 0.0, sum_u = 0.0, u_before = 0.0;
+            int32_t i = 0, u = 0;
+            for (int p = 1; p <= counts[k]; p++) {
+                i = (n < 2) ? (n == 0 ? 32767 : -32768) : random_in(&seed, -32768, 32767);
+                u = (n < 2) ? i : random_in(&seed, -32768, 32767);
+                const identify_sample_t s = {{i, -i - 1}, {u, -u - 1}, &flux, 0};
+                TEST_ASSERT_EQUAL(p == counts[k], identify_window_step(&window, &s));
+                sum_i += i;
+                sum_u += u_before;
+                u_before = u;
+            }
+            const identify_point_t point = identify_point(&c, &window, 0);
+            const double mean_i = (sum_i - 0.5 * i) / counts[k], mean_u = sum_u / counts[k];
+            TEST_ASSERT_DOUBLE_WITHIN(1e-8 + 2.0 / 2147483648.0, mean_i / 32768.0, from_q31(point.i.d));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-8 + 4.0 / 2147483648.0, mean_u / 32768.0, 2.0 * from_q31(point.u.d));
+        }
+    }
+}
+
+static void points_agree(int periods)
 {
     worst_t u = {0}, i_m = {0}, w = {0};
     uint64_t seed = 7;
+    identify_fixture_of(&f, &c, periods);
     for (int n = 0; n < 3000; n++) {
-        const dq_t i = {random_in(&seed, -26000, 2000), random_in(&seed, -18000, 18000)};
+        const dq_q15_t i = {random_in(&seed, -26000, 2000), random_in(&seed, -18000, 18000)};
         const double omega = random_in(&seed, -95, 95) / 100.0;
-        const window_pair_t pair = steady_window(&f, i, omega, (dq_t){random_in(&seed, -300, 300), 0});
+        const window_pair_t pair = steady_window(&f, i, omega, (dq_q15_t){random_in(&seed, -300, 300), 0});
         const identify_point_t a = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
         const twin_point_t b = twin_point(&f.si, &pair.twin, omega * f.w);
         worst_note(&u, from_q31(a.u.q) * 2.0 - b.u.q / f.v, "%d: %d %d", n, i.d, i.q);
@@ -110,19 +142,28 @@ void test_points_agree_with_the_twin_over_the_range(void)
     ASSERT_WORST(w, 1e-6);
 }
 
+void test_points_agree_with_the_twin_over_the_range_and_for_any_number_of_periods(void)
+{
+    points_agree(4);
+    points_agree(10);
+    points_agree(17);
+    points_agree(40);
+}
+
 void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
 {
     worst_t y = {0}, h = {0}, t = {0};
     uint64_t seed = 9;
     for (int n = 0; n < 3000; n++) {
-        const dq_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)}; /* flux and voltage below 1 */
+        /* Flux and voltage below 1. */
+        const dq_q15_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)};
         const double omega = random_in(&seed, -95, 95) / 100.0;
-        const window_pair_t pair = steady_window(&f, i, omega, (dq_t){random_in(&seed, -300, 300), 100});
+        const window_pair_t pair = steady_window(&f, i, omega, (dq_q15_t){random_in(&seed, -300, 300), 100});
         const identify_point_t a = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
         const identify_tables_t tables = tables_at(&f, a.i_m);
         identify_model_t m;
         identify_model(&c, &a, &tables, c.r0, &m);
-        const identify_row_t row = identify_torque_row(&c, &m);
+        const jacobian_row_t row = identify_torque_row(&c, &m);
         const twin_model_t b = twin_model(&f.si, &(twin_point_t){
             {from_q31(a.i.d) * f.i, from_q31(a.i.q) * f.i}, {from_q31(a.u.d) * 2.0 * f.v, from_q31(a.u.q) * 2.0 * f.v},
             {from_q31(a.rate.d) * 2.0 * f.v, from_q31(a.rate.q) * 2.0 * f.v},
@@ -131,9 +172,9 @@ void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
         worst_note(&y, from_q31(m.y.d) * 2.0 - b.y.d / f.v, "%d: d %d %d at %g", n, i.d, i.q, omega);
         worst_note(&y, from_q31(m.y.q) * 2.0 - b.y.q / f.v, "%d: q %d %d at %g", n, i.d, i.q, omega);
         for (int j = 0; j < IDENTIFY_STATES; j++) {
-            worst_note(&h, from_q31(m.d.h[j]) * 2.0 - b.d[j] / f.v, "%d: d, state %d", n, j);
-            worst_note(&h, from_q31(m.q.h[j]) * 2.0 - b.q[j] / f.v, "%d: q, state %d", n, j);
-            worst_note(&t, from_q31(row.h[j]) * 2.0 - b.torque[j] / (f.psi * f.i), "%d: torque, state %d", n, j);
+            worst_note(&h, from_q31(m.d.h_q30[j]) * 2.0 - b.d[j] / f.v, "%d: d, state %d", n, j);
+            worst_note(&h, from_q31(m.q.h_q30[j]) * 2.0 - b.q[j] / f.v, "%d: q, state %d", n, j);
+            worst_note(&t, from_q31(row.h_q30[j]) * 2.0 - b.torque[j] / (f.psi * f.i), "%d: torque, state %d", n, j);
         }
     }
     ASSERT_WORST(y, 1.5e-4); /* the table's q15 flux, 2 LSB, twice: quotient and products of q15 */
@@ -146,7 +187,8 @@ void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
 void test_the_mean_torque_of_a_period_by_hand(void)
 {
     const double one = IDENTIFY_ONE_Q30;
-    const dq_t psi = {(int32_t)(0.4 * one), (int32_t)(0.2 * one)}, i = {(int32_t)(-0.1 * one), (int32_t)(0.3 * one)};
+    const dq_q30_t psi = {(int32_t)(0.4 * one), (int32_t)(0.2 * one)};
+    const dq_q30_t i = {(int32_t)(-0.1 * one), (int32_t)(0.3 * one)};
     const int32_t chord = (int32_t)(0.02 * one);
     const double scale = ldexp(32768.0, -c.l_shift);
     const flux_inductances_t salient = {(int32_t)(0.25 * scale), (int32_t)(0.5 * scale)};
@@ -166,13 +208,13 @@ void test_the_mean_torque_is_that_of_a_flux_that_moves_along_the_chord(void)
         worst_t t = {0};
         uint64_t seed = 11;
         for (int n = 0; n < 1000; n++) {
-            const dq_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)};
-            const window_pair_t pair = steady_window(&f, i, omega[k], (dq_t){0, 0});
+            const dq_q15_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)};
+            const window_pair_t pair = steady_window(&f, i, omega[k], (dq_q15_t){0, 0});
             const identify_point_t p = identify_point(&c, &pair.fixed, (q31_t)(omega[k] * 2147483647.0));
             const identify_tables_t tables = tables_at(&f, i);
-            const dq_t psi = {tables.flux.psi_d * 32768, tables.flux.psi_q * 32768};
-            const dq_t i_q30 = {i.d * 32768, i.q * 32768};
-            const int32_t mean = identify_mean_torque(&c, &tables.inductances, p.chord, psi, i_q30);
+            const dq_q30_t psi = {tables.flux.psi_d * 32768, tables.flux.psi_q * 32768};
+            const dq_q30_t i_q30 = {i.d * 32768, i.q * 32768};
+            const int32_t mean = identify_mean_torque(&c, &tables.inductances, p.chord_q30, psi, i_q30);
             const double expected = mean_on_the_chord(&f, i, from_q15(tables.flux.psi_d), from_q15(tables.flux.psi_q),
                                                       omega[k]);
             worst_note(&t, mean / (double)IDENTIFY_ONE_Q30 - expected, "%d %d at %g", i.d, i.q, omega[k]);
@@ -184,66 +226,66 @@ void test_the_mean_torque_is_that_of_a_flux_that_moves_along_the_chord(void)
 /* One state: h = 0.1, P = 1, r = 0.01 gives s = 0.02, k = 5; e = 0.02 moves x by 0.1 and leaves P = 1 - 5 * 0.1. */
 void test_one_measurement_of_one_state_by_hand(void)
 {
-    identify_filter_t filter;
-    identify_filter_reset(&filter);
-    const identify_row_t row = {{[IDENTIFY_FLUX] = (int32_t)(0.1 * IDENTIFY_ONE_Q30)}};
-    const identify_verdict_t verdict =
-        identify_filter_update(&filter, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * one_q60));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.1, filter.x[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q27);
-    identify_state_t state = {.filter = filter};
-    const identify_memory_t memory = identify_memory_get(&state);
-    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.5, memory.variance[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q30);
-    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, memory.variance[IDENTIFY_LQ]);
-    TEST_ASSERT_FALSE(verdict.inconsistent || verdict.clamped);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, identify_filter_shift(&filter, &row) / (double)IDENTIFY_ONE_Q30);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.005, (double)identify_filter_variance(&filter, &row) / one_q60);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)identify_filter_prior(&row) / one_q60);
+    kalman_t kalman;
+    kalman_reset(&kalman);
+    const jacobian_row_t row = {{[IDENTIFY_FLUX] = (int32_t)(0.1 * IDENTIFY_ONE_Q30)}};
+    const kalman_update_t update =
+        kalman_update(&kalman, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * one_q60));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.1, kalman.x_q27[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q27);
+    identify_state_t state = {.kalman = kalman};
+    const identify_record_t record = identify_record_get(&state);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.5, record.variance_q30[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, record.variance_q30[IDENTIFY_LQ]);
+    TEST_ASSERT_FALSE(update.innovation_gate_exceeded || update.clamped);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, kalman_output(&kalman, &row) / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.005, (double)kalman_output_variance(&kalman, &row) / one_q60);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)kalman_output_variance_prior(&row) / one_q60);
 }
 
 void test_what_the_model_cannot_explain_is_reported_and_limited(void)
 {
-    identify_filter_t filter;
-    identify_filter_reset(&filter);
-    const identify_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
+    kalman_t kalman;
+    kalman_reset(&kalman);
+    const jacobian_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
     const int64_t r = (int64_t)(1e-4 * one_q60); /* 8 * 1e-4 + 1e-4 is 0.03 squared */
-    TEST_ASSERT_FALSE(identify_filter_update(&filter, &row, (int32_t)(0.0296 * IDENTIFY_ONE_Q30), r).inconsistent);
-    identify_filter_reset(&filter);
-    TEST_ASSERT_TRUE(identify_filter_update(&filter, &row, (int32_t)(0.0304 * IDENTIFY_ONE_Q30), r).inconsistent);
+    TEST_ASSERT_FALSE(kalman_update(&kalman, &row, (int32_t)(0.0296 * IDENTIFY_ONE_Q30), r).innovation_gate_exceeded);
+    kalman_reset(&kalman);
+    TEST_ASSERT_TRUE(kalman_update(&kalman, &row, (int32_t)(0.0304 * IDENTIFY_ONE_Q30), r).innovation_gate_exceeded);
     bool clamped = false;
     for (int n = 0; n < 10; n++) {
-        clamped = identify_filter_update(&filter, &row, IDENTIFY_ONE_Q30, r / 100).clamped || clamped;
+        clamped = kalman_update(&kalman, &row, IDENTIFY_ONE_Q30, r / 100).clamped || clamped;
     }
     TEST_ASSERT_TRUE(clamped);
-    TEST_ASSERT_EQUAL_INT32(4 * IDENTIFY_ONE_Q27, filter.x[IDENTIFY_DROP]);
+    TEST_ASSERT_EQUAL_INT32(4 * IDENTIFY_ONE_Q27, kalman.x_q27[IDENTIFY_DROP]);
 }
 
 /* x falls by a factor e in 1/lambda updates, P returns to the prior twice as fast. */
 void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
 {
-    identify_filter_t filter;
-    identify_filter_reset(&filter);
-    filter.x[IDENTIFY_DROP] = IDENTIFY_ONE_Q27;
-    filter.p[identify_pair(IDENTIFY_R, IDENTIFY_R)] = 0;
-    filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] = IDENTIFY_ONE_Q30 / 2;
+    kalman_t kalman;
+    kalman_reset(&kalman);
+    kalman.x_q27[IDENTIFY_DROP] = IDENTIFY_ONE_Q27;
+    kalman.p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_R)] = 0;
+    kalman.p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_DROP)] = IDENTIFY_ONE_Q30 / 2;
     for (int n = 0; n < 5000; n++) { /* 5000 * 2e-4 = 1 */
-        identify_filter_leak(&c, &filter, false);
+        kalman_predict(&c, &kalman, false);
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, exp(-1.0), filter.x[IDENTIFY_DROP] / (double)IDENTIFY_ONE_Q27);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), filter.p[0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, exp(-1.0), kalman.x_q27[IDENTIFY_DROP] / (double)IDENTIFY_ONE_Q27);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 1.0 - exp(-2.0), kalman.p_q30[0] / (double)IDENTIFY_ONE_Q30);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0),
-                              filter.p[identify_pair(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
+                              kalman.p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
     for (int n = 0; n < 60000; n++) {
-        identify_filter_leak(&c, &filter, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
+        kalman_predict(&c, &kalman, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, filter.p[0] / (double)IDENTIFY_ONE_Q30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, kalman.p_q30[0] / (double)IDENTIFY_ONE_Q30);
 }
 
-static double smallest_pivot(const identify_filter_t *filter)
+static double smallest_pivot(const kalman_t *kalman)
 {
     double a[IDENTIFY_STATES][IDENTIFY_STATES], least = 1.0;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         for (unsigned l = 0; l < IDENTIFY_STATES; l++) {
-            a[j][l] = filter->p[(j < l) ? identify_pair(j, l) : identify_pair(l, j)] / (double)IDENTIFY_ONE_Q30;
+            a[j][l] = kalman->p_q30[(j < l) ? kalman_p_index(j, l) : kalman_p_index(l, j)] / (double)IDENTIFY_ONE_Q30;
         }
     }
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
@@ -260,31 +302,31 @@ static double smallest_pivot(const identify_filter_t *filter)
 /* Rows as strong as they come, with the smallest noise, for an hour of updates: Cholesky's pivots stay positive. */
 void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
 {
-    identify_filter_t filter;
-    twin_filter_t twin;
+    kalman_t kalman;
+    twin_kalman_t twin;
     worst_t p = {0}, x = {0};
     uint64_t seed = 11;
-    identify_filter_reset(&filter);
-    twin_filter_reset(&twin);
+    kalman_reset(&kalman);
+    twin_kalman_reset(&twin);
     for (int n = 0; n < 360000; n++) {
-        identify_row_t row = {{0}};
+        jacobian_row_t row = {{0}};
         double h[TWIN_STATES] = {0.0};
         for (int j = 0; j < IDENTIFY_STATES; j++) {
-            row.h[j] = random_in(&seed, -(1 << 26), 1 << 26);
-            h[j] = row.h[j] / (double)IDENTIFY_ONE_Q30;
+            row.h_q30[j] = random_in(&seed, -(1 << 26), 1 << 26);
+            h[j] = row.h_q30[j] / (double)IDENTIFY_ONE_Q30;
         }
         const int32_t e = random_in(&seed, -(1 << 22), 1 << 22);
         const double noise_pu = (n % 2 == 0) ? 0.008 : 0.04;
         const int64_t r = (int64_t)(noise_pu * noise_pu * one_q60);
-        (void)identify_filter_update(&filter, &row, e, r);
-        (void)twin_filter_update(&twin, h, e / (double)IDENTIFY_ONE_Q30, noise_pu * noise_pu);
-        identify_filter_leak(&c, &filter, n % 3 == 0);
-        twin_filter_leak(&f.si, &twin, n % 3 == 0);
+        (void)kalman_update(&kalman, &row, e, r);
+        (void)twin_kalman_update(&twin, h, e / (double)IDENTIFY_ONE_Q30, noise_pu * noise_pu);
+        kalman_predict(&c, &kalman, n % 3 == 0);
+        twin_kalman_predict(&f.si, &twin, n % 3 == 0);
         if (n % 1000 == 0) {
-            TEST_ASSERT_TRUE(smallest_pivot(&filter) > 1e-5);
-            worst_note(&p, filter.p[0] / (double)IDENTIFY_ONE_Q30 - twin.p[0][0], "update %d", n);
+            TEST_ASSERT_TRUE(smallest_pivot(&kalman) > 1e-5);
+            worst_note(&p, kalman.p_q30[0] / (double)IDENTIFY_ONE_Q30 - twin.p[0][0], "update %d", n);
             for (int j = 0; j < IDENTIFY_STATES; j++) {
-                worst_note(&x, filter.x[j] / (double)IDENTIFY_ONE_Q27 - twin.x[j], "update %d, state %d", n, j);
+                worst_note(&x, kalman.x_q27[j] / (double)IDENTIFY_ONE_Q27 - twin.x[j], "update %d, state %d", n, j);
             }
         }
     }

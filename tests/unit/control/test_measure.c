@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/measure.h"
+#include "control/current/measure.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -40,7 +40,7 @@ static measure_t measured(const adc_counts_t *counts)
     return measure_step(&c, counts);
 }
 
-static abc_t phases(const adc_counts_t *counts)
+static abc_q15_t phases(const adc_counts_t *counts)
 {
     const measure_t m = measured(counts);
     return measure_phases(fx_pair((q15_t)m.i.alpha, (q15_t)m.i.beta), m.zero_q28);
@@ -94,7 +94,7 @@ void test_an_offset_and_a_gain_belong_to_their_own_phase(void)
     config.offset[1] = 32768 + 160;
     config.gain_q14[2] = 8190;
     const adc_counts_t counts = {2058, 2058, 2058, 0};
-    const abc_t i = phases(&counts);
+    const abc_q15_t i = phases(&counts);
     TEST_ASSERT_INT_WITHIN(1, 160, i.a);
     TEST_ASSERT_INT_WITHIN(1, 0, i.b);
     TEST_ASSERT_INT_WITHIN(1, 80, i.c);
@@ -112,7 +112,7 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     const twin_measure_t t = twin_measure(&si, &twin_config, counts);
     const twin_ab_t vector = twin_clarke(t.i);
     const measure_t m = measured(c);
-    const abc_t i = phases(c);
+    const abc_q15_t i = phases(c);
     worst_note(worst, m.i.alpha - twin_clamp(vector.alpha, -32768, 32767), "alpha of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, m.i.beta - twin_clamp(vector.beta, -32768, 32767), "beta of %d %d %d", c->i_a, c->i_b, c->i_c);
     worst_note(worst, (m.zero_q28 - 2048) * 3.0 / 8192.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b,

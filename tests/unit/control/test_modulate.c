@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/modulate.h"
+#include "control/current/modulate.h"
 #include "fixture.h"
 #include "unity.h"
 
 static fixture_t f;
 static struct {
-    dq_t v, i; /* q15 of v_ratio v_dc, of I_b */
+    dq_q15_t v, i; /* q15 of v_ratio v_dc, of I_b */
     fx_pair_t advanced;
     int32_t v_dc;
 } in;
 
 typedef struct {
     duty_t duty;
-    dq_t acted; /* of duties that are limited */
+    dq_q15_t acted; /* of duties that are limited */
     bool limited;
 } made_t;
 
@@ -26,8 +26,8 @@ void setUp(void)
     f = fixture();
     fixture_dead_time(&f, 0.0);
     fixture_min_pulse(&f, 0.0);
-    in.v = (dq_t){0, 0};
-    in.i = (dq_t){0, 0};
+    in.v = (dq_q15_t){0, 0};
+    in.i = (dq_q15_t){0, 0};
     in.v_dc = 20000;
     in.advanced = fx_rotation(0);
     theta = 0.0;
@@ -50,7 +50,7 @@ static void at_angle(int32_t fraction)
     theta = fraction * (2.0 * pi / 65536.0);
 }
 
-static fx_pair_t pair(dq_t x)
+static fx_pair_t pair(dq_q15_t x)
 {
     return fx_pair((q15_t)x.d, (q15_t)x.q);
 }
@@ -67,7 +67,7 @@ static made_t step(void)
         TEST_ASSERT_EQUAL_UINT32(duty.c, made.duty.c);
         TEST_ASSERT_EQUAL_UINT32(0, made.limited);
     }
-    return (made_t){made.duty, modulate_acted(&f.modulate, made.duty, pair(in.i), in.advanced, in.v_dc),
+    return (made_t){made.duty, modulate_applied(&f.modulate, made.duty, pair(in.i), in.advanced, in.v_dc),
                     made.limited != 0U};
 }
 
@@ -94,9 +94,9 @@ static void against_twin(worst_t *duty, worst_t *acted)
                in.v_dc, in.i.d, in.i.q, theta);
 }
 
-static dq_t random_dq(uint64_t *seed, int largest)
+static dq_q15_t random_dq(uint64_t *seed, int largest)
 {
-    return (dq_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
+    return (dq_q15_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
 }
 
 void test_no_voltage_is_half_duty_on_every_phase(void)
@@ -163,7 +163,7 @@ void test_inside_the_hexagon_every_duty_follows_the_twin(void)
         in.v_dc = (q15_t)random_in(&seed, 12000, 32767);
         const double phi = random_in(&seed, 0, 65535) * (2.0 * pi / 65536.0);
         const double length = random_in(&seed, 0, 950) * 32.768;
-        in.v = (dq_t){(int32_t)lround(length * cos(phi)), (int32_t)lround(length * sin(phi))};
+        in.v = (dq_q15_t){(int32_t)lround(length * cos(phi)), (int32_t)lround(length * sin(phi))};
         in.i = random_dq(&seed, 20000);
         against_twin(&worst, &acted);
     }
@@ -200,9 +200,9 @@ void test_beyond_the_hexagon_every_duty_follows_the_twin(void)
     for (int n = 0; n < 200000; n++) {
         at_angle(random_in(&seed, 0, 65535));
         in.v_dc = (q15_t)random_in(&seed, 4000, 32767);
-        in.v = (dq_t){random_in(&seed, -32768, 32767), random_in(&seed, -22938, 22938)};
+        in.v = (dq_q15_t){random_in(&seed, -32768, 32767), random_in(&seed, -22938, 22938)};
         if (n & 1) {
-            in.v = (dq_t){in.v.q, in.v.d};
+            in.v = (dq_q15_t){in.v.q, in.v.d};
         }
         against_twin(&worst, &acted);
     }

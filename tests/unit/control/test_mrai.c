@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "control/mrai.h"
+#include "control/mrai/mrai.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -33,14 +33,15 @@ void tearDown(void)
 {
 }
 
-static mrai_in_t at(int id, int iq, double omega)
+static operating_point_t at(int id, int iq, double omega)
 {
-    const dq_t i = {(q15_t)id, (q15_t)iq};
-    return (mrai_in_t){.i = i, .flux = flux_table_step(&f.flux_table, i), .omega = (q31_t)(omega * 2147483647.0)};
+    const dq_q15_t i = {(q15_t)id, (q15_t)iq};
+    const q31_t speed = (q31_t)(omega * 2147483647.0);
+    return (operating_point_t){.i = i, .flux = flux_table_step(&f.flux_table, i), .omega = speed};
 }
 
 /* The SI view of the very numbers the stage gets. */
-static twin_mrai_in_t si(const mrai_in_t *in)
+static twin_mrai_in_t si(const operating_point_t *in)
 {
     twin_mrai_in_t t = {{from_q15(in->i.d) * f.i, from_q15(in->i.q) * f.i},
                         {from_q15(in->u.d) * f.v, from_q15(in->u.q) * f.v},
@@ -52,7 +53,7 @@ static twin_mrai_in_t si(const mrai_in_t *in)
 }
 
 /* Both observers at rest at `in`, parameters kept. */
-static void rest(const mrai_in_t *in)
+static void rest(const operating_point_t *in)
 {
     const twin_mrai_in_t t = si(in);
     mrai_reset(&f.mrai, &schedule, &state, in);
@@ -70,7 +71,7 @@ static void error(double e_d, double e_q)
     twin.e = (twin_dq_t){d / q27 * f.psi, q / q27 * f.psi};
 }
 
-static void both(const mrai_in_t *in)
+static void both(const operating_point_t *in)
 {
     const twin_mrai_in_t t = si(in);
     mrai_step(&f.mrai, &schedule, &state, in);
@@ -78,7 +79,7 @@ static void both(const mrai_in_t *in)
 }
 
 /* The voltage under which the nominal machine with dpsi, dR rests at in->i: u = R i + j w psi. */
-static void steady_voltage(mrai_in_t *in, double psi_delta, double r_delta)
+static void steady_voltage(operating_point_t *in, double psi_delta, double r_delta)
 {
     const double w = from_q31(in->omega);
     const double r = 674.0 / 65536.0 + r_delta;
@@ -86,7 +87,7 @@ static void steady_voltage(mrai_in_t *in, double psi_delta, double r_delta)
     in->u.q = (q15_t)lround(r * in->i.q + w * (in->flux.psi_d + psi_delta * 32768.0));
 }
 
-static void open_flux_gate(const mrai_in_t *in)
+static void open_flux_gate(const operating_point_t *in)
 {
     const double w = from_q31(in->omega);
     twin_schedule.flux_gain = 2.0 * f.si.flux_bandwidth_rad_s / (w * f.w);
@@ -94,7 +95,7 @@ static void open_flux_gate(const mrai_in_t *in)
         (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0);
 }
 
-static void open_resistance_gate(const mrai_in_t *in)
+static void open_resistance_gate(const operating_point_t *in)
 {
     const double a = 2.0 * from_q15(in->i.d);
     const double b = from_q15(in->i.q);
@@ -107,7 +108,7 @@ static void open_resistance_gate(const mrai_in_t *in)
 /* --- pole placement -------------------------------------------------------------------------- */
 
 /* d(e[k+1])/d(e[k]) by central differences of the step itself. */
-static void jacobian(bool fixed, const mrai_in_t *in, double j[2][2])
+static void jacobian(bool fixed, const operating_point_t *in, double j[2][2])
 {
     const double h = 0.0625; /* exact in q27 */
     for (int column = 0; column < 2; column++) {
@@ -134,9 +135,9 @@ static void check_pole_placement(bool fixed, double tolerance)
     for (int w = -10; w <= 10; w++) {
         for (int id = -28000; id <= 0; id += 4000) {
             for (int iq = -28000; iq <= 28000; iq += 4000) {
-                mrai_in_t in = at(id, iq, w / 10.0);
+                operating_point_t in = at(id, iq, w / 10.0);
                 double j[2][2];
-                in.u = (dq_t){5000, -3000};
+                in.u = (dq_q15_t){5000, -3000};
                 jacobian(fixed, &in, j);
                 const double inverse = 2.0 * from_q15(in.flux.g) / (f.si.period_s * f.z); /* 1/L_d + 1/L_q */
                 const double s = 3.0 * f.si.r_ohm_20 * inverse;
@@ -188,7 +189,7 @@ void test_the_printed_gains_miss_the_papers_own_pole_condition_and_the_corrected
 void test_the_explicit_step_is_stable_and_equally_fast_over_the_whole_speed_range(void)
 {
     for (int w = -20; w <= 20; w++) {
-        mrai_in_t in = at(-12000, 9000, w / 20.0 * 0.99);
+        operating_point_t in = at(-12000, 9000, w / 20.0 * 0.99);
         steady_voltage(&in, 0.0, 0.0);
         state = (mrai_state_t){0};
         rest(&in);
@@ -209,7 +210,7 @@ void test_the_explicit_step_is_stable_and_equally_fast_over_the_whole_speed_rang
 void test_the_fastest_poles_the_stage_accepts_are_still_stable(void)
 {
     f.mrai.pole_gain = INT32_MAX;
-    mrai_in_t in = at(-8000, 8000, 0.9);
+    operating_point_t in = at(-8000, 8000, 0.9);
     in.flux.g = 32767; /* s2 = 1/4: |3/4 + j/4| = 0.79 per period */
     steady_voltage(&in, 0.0, 0.0);
     rest(&in);
@@ -233,10 +234,10 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
     uint64_t seed = 71;
     for (int n = 0; n < 300000; n++) {
         const double w = (random_in(&seed, 0, 1) ? 1 : -1) * random_in(&seed, 50, 990) * 1e-3;
-        mrai_in_t last = at(random_in(&seed, -28000, 0), random_in(&seed, -28000, 28000), w);
-        mrai_in_t in = at(last.i.d + random_in(&seed, -500, 500), last.i.q + random_in(&seed, -500, 500), w);
-        last.u = (dq_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
-        in.u = (dq_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
+        operating_point_t last = at(random_in(&seed, -28000, 0), random_in(&seed, -28000, 28000), w);
+        operating_point_t in = at(last.i.d + random_in(&seed, -500, 500), last.i.q + random_in(&seed, -500, 500), w);
+        last.u = (dq_q15_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
+        in.u = (dq_q15_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
         open_flux_gate(&in);
         if (abs(in.i.d) + abs(in.i.q) > 1700) {
             open_resistance_gate(&in);
@@ -274,9 +275,9 @@ void test_a_current_ramp_through_saturation_leaves_no_error_when_the_voltage_exp
 {
     const double rate = 1.0 / (f.w * f.si.period_s);
     const double r = 674.0 / 65536.0;
-    mrai_in_t in = at(-2000, 1000, 0.3);
+    operating_point_t in = at(-2000, 1000, 0.3);
     for (int n = 0; n < 101; n++) {
-        const mrai_in_t next = at(in.i.d - 150, in.i.q + 200, 0.3);
+        const operating_point_t next = at(in.i.d - 150, in.i.q + 200, 0.3);
         in.u.d = (q15_t)lround((next.flux.psi_d - in.flux.psi_d) * rate + r * 0.5 * (next.i.d + in.i.d) -
                                0.3 * 0.5 * (next.flux.psi_q + in.flux.psi_q));
         in.u.q = (q15_t)lround((next.flux.psi_q - in.flux.psi_q) * rate + r * 0.5 * (next.i.q + in.i.q) +
@@ -299,12 +300,12 @@ void test_ten_thousand_noisy_periods_give_the_twins_parameters(void)
     uint64_t seed = 72;
     worst_t psi = {0};
     worst_t r = {0};
-    mrai_in_t base = at(-9000, 12000, 0.3);
+    operating_point_t base = at(-9000, 12000, 0.3);
     open_flux_gate(&base);
     open_resistance_gate(&base);
     rest(&base);
     for (int n = 0; n < 10000; n++) {
-        mrai_in_t in = at(-9000 + random_in(&seed, -60, 60), 12000 + random_in(&seed, -60, 60), 0.3);
+        operating_point_t in = at(-9000 + random_in(&seed, -60, 60), 12000 + random_in(&seed, -60, 60), 0.3);
         steady_voltage(&in, -0.08, 0.004);
         in.u.d = (q15_t)(in.u.d + random_in(&seed, -20, 20));
         in.u.q = (q15_t)(in.u.q + random_in(&seed, -20, 20));
@@ -331,7 +332,7 @@ void test_the_flux_bandwidth_is_the_same_at_every_speed(void)
         if (w == -1 || w == 1) {
             continue;
         }
-        mrai_in_t in = at(-6000, 8000, w / 10.0);
+        operating_point_t in = at(-6000, 8000, w / 10.0);
         steady_voltage(&in, -0.1, 0.0);
         open_flux_gate(&in);
         state = (mrai_state_t){0};
@@ -352,7 +353,7 @@ void test_the_resistance_bandwidth_is_the_same_at_every_current(void)
 {
     f.mrai.resistance_proportional_q24 = 0;
     for (int i = 6000; i <= 20000; i += 3500) {
-        mrai_in_t in = at(-i, i, 0.2);
+        operating_point_t in = at(-i, i, 0.2);
         steady_voltage(&in, 0.0, 0.005);
         open_resistance_gate(&in);
         state = (mrai_state_t){0};
@@ -376,7 +377,7 @@ void test_a_large_deviation_at_high_speed_is_learnt_without_overshoot(void)
         if (w == 0) {
             continue;
         }
-        mrai_in_t in = at(-6000, 8000, w / 10.0);
+        operating_point_t in = at(-6000, 8000, w / 10.0);
         steady_voltage(&in, -0.1, 0.0);
         open_flux_gate(&in);
         state = (mrai_state_t){0};
@@ -396,7 +397,7 @@ void test_the_flux_moves_towards_the_plant_for_both_signs_of_speed_and_of_deviat
 {
     for (int w = -1; w <= 1; w += 2) {
         for (int sign = -1; sign <= 1; sign += 2) {
-            mrai_in_t in = at(-6000, 8000, 0.4 * w);
+            operating_point_t in = at(-6000, 8000, 0.4 * w);
             steady_voltage(&in, 0.05 * sign, 0.0);
             open_flux_gate(&in);
             state = (mrai_state_t){0};
@@ -411,7 +412,7 @@ void test_the_flux_moves_towards_the_plant_for_both_signs_of_speed_and_of_deviat
 
 void test_a_closed_gate_freezes_the_parameter_to_the_bit_while_the_observer_goes_on(void)
 {
-    mrai_in_t in = at(-6000, 8000, 0.4);
+    operating_point_t in = at(-6000, 8000, 0.4);
     steady_voltage(&in, -0.1, 0.005);
     state.psi_delta = 12345;
     state.r_delta = -6789;
@@ -427,7 +428,7 @@ void test_a_closed_gate_freezes_the_parameter_to_the_bit_while_the_observer_goes
 
 void test_one_gate_does_not_open_the_other(void)
 {
-    mrai_in_t in = at(-6000, 8000, 0.4);
+    operating_point_t in = at(-6000, 8000, 0.4);
     steady_voltage(&in, -0.1, 0.005);
     rest(&in);
     open_flux_gate(&in);
@@ -441,7 +442,7 @@ void test_one_gate_does_not_open_the_other(void)
 /* A magnet outside of what is plausible: the parameter rests on its limit, says so, and leaves it when it may. */
 void test_the_limits_hold_are_flagged_and_let_go_again(void)
 {
-    mrai_in_t in = at(-6000, 8000, 0.5);
+    operating_point_t in = at(-6000, 8000, 0.5);
     open_flux_gate(&in);
     rest(&in);
     steady_voltage(&in, -0.3, 0.0);
@@ -465,7 +466,7 @@ void test_the_limits_hold_are_flagged_and_let_go_again(void)
 void test_the_resistance_limits_hold_and_are_flagged(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        mrai_in_t in = at(-12000, 12000, 0.2);
+        operating_point_t in = at(-12000, 12000, 0.2);
         open_resistance_gate(&in);
         state = (mrai_state_t){0};
         rest(&in);
@@ -482,7 +483,7 @@ void test_the_resistance_limits_hold_and_are_flagged(void)
  * rotational voltage of 20 steps, and the integral does not. By hand: w w_b T_s/2 * 20 dpsi. */
 void test_the_proportional_part_adds_its_multiple_of_the_step_for_this_period_only(void)
 {
-    mrai_in_t in = at(-6000, 8000, 0.5);
+    operating_point_t in = at(-6000, 8000, 0.5);
     open_flux_gate(&in);
     steady_voltage(&in, 0.0, 0.0);
     rest(&in);
@@ -506,7 +507,7 @@ void test_the_proportional_part_adds_its_multiple_of_the_step_for_this_period_on
  * per period against k_psi T_s: 2/(6e-3) LSB and more. */
 void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
 {
-    mrai_in_t base = at(-9000, 12000, 0.3);
+    operating_point_t base = at(-9000, 12000, 0.3);
     uint64_t seed = 73;
     open_flux_gate(&base);
     open_resistance_gate(&base);
@@ -516,7 +517,7 @@ void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
     double psi = 0.0;
     double r = 0.0;
     for (int n = 0; n < 1000000; n++) {
-        mrai_in_t in = base;
+        operating_point_t in = base;
         in.u.d = (q15_t)(in.u.d + random_in(&seed, -8, 8));
         in.u.q = (q15_t)(in.u.q + random_in(&seed, -8, 8));
         both(&in);
@@ -530,7 +531,7 @@ void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
 /* The observer held at an error of 1 LSB of q15: the ramp is N 2 k_psi s2 e/w exactly, with either sign. */
 void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
 {
-    const mrai_in_t in = at(-6000, 8000, 0.3);
+    const operating_point_t in = at(-6000, 8000, 0.3);
     open_flux_gate(&in);
     f.mrai.flux_proportional_q24 = 0;
     const double s2 = 3.0 * 674.0 / 65536.0 * from_q15(in.flux.g);
@@ -549,7 +550,7 @@ void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
 /* Errors that alternate exactly leave exactly nothing: rounding half up of +x and -x may differ in a tie only. */
 void test_an_alternating_error_does_not_walk(void)
 {
-    const mrai_in_t in = at(-6000, 8000, 0.3);
+    const operating_point_t in = at(-6000, 8000, 0.3);
     open_flux_gate(&in);
     open_resistance_gate(&in);
     rest(&in);
@@ -569,7 +570,7 @@ void test_no_corner_of_the_input_wraps_a_state(void)
     uint64_t seed = 74;
     for (int n = 0; n < 200000; n++) {
         static const int16_t corner[4] = {INT16_MIN, -1, 0, INT16_MAX};
-        mrai_in_t in = {.i = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
+        operating_point_t in = {.i = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
                         .u = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
                         .omega = random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX};
         in.flux = (flux_point_t){.g = 32767,
@@ -590,7 +591,7 @@ void test_no_corner_of_the_input_wraps_a_state(void)
 /* From a reset on nothing is wrong: a voltage that explains the sample leaves the error where the reset put it. */
 void test_reset_forgets_the_error_and_keeps_what_was_learnt(void)
 {
-    mrai_in_t in = at(-3000, 4000, 0.2);
+    operating_point_t in = at(-3000, 4000, 0.2);
     steady_voltage(&in, 300.0 / 32768.0, 0.001);
     state = (mrai_state_t){.e_d_q27 = 1, .e_q_q27 = 2, .psi_delta = 300 * 65536, .r_delta = Q31(0.001)};
     mrai_reset(&f.mrai, &schedule, &state, &in);

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/mrai_schedule.h"
+#include "control/mrai/schedule.h"
 #include "fixture.h"
 #include "unity.h"
 
 static fixture_t f;
 static mrai_quality_t quality;
 static mrai_state_t identifier;
-static mrai_in_t sample;
+static operating_point_t sample;
 
 void setUp(void)
 {
     f = fixture();
     quality = (mrai_quality_t){0};
     identifier = (mrai_state_t){0};
-    sample = (mrai_in_t){.i = {-9000, 12000}, .omega = 0x20000000};
+    sample = (operating_point_t){.i = {-9000, 12000}, .omega = 0x20000000};
     sample.flux = flux_table_step(&f.flux_table, sample.i);
 }
 
@@ -31,7 +31,7 @@ static mrai_schedule_t step(bool enabled)
 
 static void at(int id, int iq, int omega)
 {
-    sample.i = (dq_t){(q15_t)id, (q15_t)iq};
+    sample.i = (dq_q15_t){(q15_t)id, (q15_t)iq};
     sample.flux = flux_table_step(&f.flux_table, sample.i);
     sample.omega = omega * 65536;
 }
@@ -163,7 +163,7 @@ void test_the_resistance_gain_suits_the_current_now_and_the_one_just_commanded(v
 {
     f.mrai.i_min = 0;
     at(0, 1000, 16000);
-    const mrai_in_t small = sample;
+    const operating_point_t small = sample;
     const int32_t slow = step(true).resistance_step_q26;
     at(0, 12000, 16000);
     const int32_t fast = step(true).resistance_step_q26;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/torque_estimate.h"
+#include "control/mrai/torque_estimate.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -20,7 +20,7 @@ void tearDown(void)
 
 static void add(int32_t i_d, int32_t i_q, int32_t psi_d, int32_t psi_q, int32_t delta)
 {
-    const dq_t i = {i_d, i_q};
+    const dq_q15_t i = {i_d, i_q};
     const flux_point_t flux = {.psi_d = psi_d, .psi_q = psi_q};
     torque_estimate_add(&sum, &i, &flux, delta);
 }
@@ -51,8 +51,8 @@ void test_every_operating_point_follows_the_twin(void)
     worst_t worst = {0};
     uint64_t seed = 91;
     for (int n = 0; n < 200000; n++) {
-        const dq_t i = {random_in(&seed, -32768, 32767), random_in(&seed, -32768, 32767)};
-        const dq_t psi = {random_in(&seed, -20000, 20000), random_in(&seed, -32768, 32767)};
+        const dq_q15_t i = {random_in(&seed, -32768, 32767), random_in(&seed, -32768, 32767)};
+        const dq_q15_t psi = {random_in(&seed, -20000, 20000), random_in(&seed, -32768, 32767)};
         const int32_t delta = random_in(&seed, -7600, 7600);
         const twin_flux_t si = {.psi_d = from_q15(psi.d) * f.psi, .psi_q = from_q15(psi.q) * f.psi};
         const double t =

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/torque_limit.h"
+#include "control/torque/limit.h"
 
 #include <math.h>
 
@@ -24,7 +24,7 @@ void setUp(void)
     f = fixture();
     state = (torque_limit_state_t){0};
     limits = TORQUE_LIMITS_NONE;
-    in = (torque_limit_in_t){.wanted = counts(0.25), .limits = &limits, .omega = counts(0.5), .v_dc = 21845,
+    in = (torque_limit_in_t){.torque_arbitrated = counts(0.25), .limits = &limits, .omega = counts(0.5), .v_dc = 21845,
                              .reach = INT16_MAX, .inverter_dC = ROOM_C, .winding_dC = ROOM_C};
 }
 
@@ -40,9 +40,9 @@ static torque_limit_t step(void)
 void test_with_everything_open_the_request_passes_untouched(void)
 {
     for (int sign = -1; sign <= 1; sign++) {
-        in.wanted = (q15_t)(sign * 8000);
+        in.torque_arbitrated = (q15_t)(sign * 8000);
         const torque_limit_t y = step();
-        TEST_ASSERT_EQUAL_INT(sign * 8000, y.torque);
+        TEST_ASSERT_EQUAL_INT(sign * 8000, y.torque_limited);
         TEST_ASSERT_EQUAL_HEX16(0, y.derating);
         TEST_ASSERT_EQUAL_INT(RATED, y.drive);
         TEST_ASSERT_EQUAL_INT(RATED, y.regen);
@@ -52,10 +52,10 @@ void test_with_everything_open_the_request_passes_untouched(void)
 /* Whatever unit a wrong command comes in, the machine's rating is the most it can do. */
 void test_no_request_exceeds_the_rated_torque(void)
 {
-    in.wanted = INT16_MAX;
-    TEST_ASSERT_EQUAL_INT(RATED, step().torque);
-    in.wanted = INT16_MIN;
-    TEST_ASSERT_EQUAL_INT(-RATED, step().torque);
+    in.torque_arbitrated = INT16_MAX;
+    TEST_ASSERT_EQUAL_INT(RATED, step().torque_limited);
+    in.torque_arbitrated = INT16_MIN;
+    TEST_ASSERT_EQUAL_INT(-RATED, step().torque_limited);
     TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, step().derating);
 }
 
@@ -67,9 +67,9 @@ void test_driving_and_generating_are_limited_apart_in_both_directions_of_rotatio
     static const int expected[4][3] = {{1, 8000, 5000}, {1, -8000, -3000}, {-1, -8000, -5000}, {-1, 8000, 3000}};
     for (int n = 0; n < 4; n++) {
         in.omega = (q15_t)(expected[n][0] * 16384);
-        in.wanted = (q15_t)expected[n][1];
+        in.torque_arbitrated = (q15_t)expected[n][1];
         const torque_limit_t y = step();
-        TEST_ASSERT_EQUAL_INT(expected[n][2], y.torque);
+        TEST_ASSERT_EQUAL_INT(expected[n][2], y.torque_limited);
         TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, y.derating);
     }
 }
@@ -79,48 +79,48 @@ void test_power_limits_become_torque_by_the_speed(void)
 {
     limits.power_drive = counts(0.1);
     limits.power_regen = counts(0.05);
-    TEST_ASSERT_INT_WITHIN(2, counts(0.2), step().torque);
+    TEST_ASSERT_INT_WITHIN(2, counts(0.2), step().torque_limited);
     TEST_ASSERT_EQUAL_HEX16(DERATING_POWER, step().derating);
-    in.wanted = counts(-0.25);
-    TEST_ASSERT_INT_WITHIN(2, counts(-0.1), step().torque);
+    in.torque_arbitrated = counts(-0.25);
+    TEST_ASSERT_INT_WITHIN(2, counts(-0.1), step().torque_limited);
     in.omega = 1000; /* slow: the same power is no limit */
-    TEST_ASSERT_EQUAL_INT(counts(-0.25), step().torque);
+    TEST_ASSERT_EQUAL_INT(counts(-0.25), step().torque_limited);
 }
 
 /* u.i - t w = 0.2 * 0.5 - 0 = 0.1, plus drop 0.004 * 0.5, is the loss: the battery pays for it when driving, and it
  * relieves it when generating. 100 steps of 0.05: settled to 0.6 %. */
 void test_losses_count_on_the_dc_side(void)
 {
-    in.u = (dq_t){0, counts(0.2)};
-    in.i = (dq_t){0, counts(0.5)};
+    in.u = (dq_q15_t){0, counts(0.2)};
+    in.i = (dq_q15_t){0, counts(0.5)};
     for (int n = 0; n < 100; n++) {
         (void)step();
     }
     limits.power_drive = counts(0.15);
     limits.power_regen = counts(0.01);
-    TEST_ASSERT_INT_WITHIN(60, counts((0.15 - 0.102) / 0.5), step().torque);
-    in.wanted = counts(-0.25);
-    TEST_ASSERT_INT_WITHIN(60, counts(-(0.01 + 0.102) / 0.5), step().torque);
+    TEST_ASSERT_INT_WITHIN(60, counts((0.15 - 0.102) / 0.5), step().torque_limited);
+    in.torque_arbitrated = counts(-0.25);
+    TEST_ASSERT_INT_WITHIN(60, counts(-(0.01 + 0.102) / 0.5), step().torque_limited);
 }
 
 void test_a_power_below_the_losses_allows_no_driving_torque(void)
 {
     state.loss = 300000000; /* 0.14 */
     limits.power_drive = counts(0.1);
-    TEST_ASSERT_EQUAL_INT(0, step().torque);
+    TEST_ASSERT_EQUAL_INT(0, step().torque_limited);
     limits.power_drive = -1000;
-    TEST_ASSERT_EQUAL_INT(0, step().torque);
+    TEST_ASSERT_EQUAL_INT(0, step().torque_limited);
 }
 
 /* Halfway down each line half the rated torque is left: 9830. */
 static void halved(uint16_t reason, int driving, int generating)
 {
-    in.wanted = 15000;
+    in.torque_arbitrated = 15000;
     const torque_limit_t up = step();
-    in.wanted = -15000;
+    in.torque_arbitrated = -15000;
     const torque_limit_t down = step();
-    TEST_ASSERT_INT_WITHIN(20, driving ? RATED / 2 : 15000, up.torque);
-    TEST_ASSERT_INT_WITHIN(20, generating ? -RATED / 2 : -15000, down.torque);
+    TEST_ASSERT_INT_WITHIN(20, driving ? RATED / 2 : 15000, up.torque_limited);
+    TEST_ASSERT_INT_WITHIN(20, generating ? -RATED / 2 : -15000, down.torque_limited);
     TEST_ASSERT_EQUAL_HEX16(driving ? reason : 0, up.derating);
     TEST_ASSERT_EQUAL_HEX16(generating ? reason : 0, down.derating);
 }
@@ -154,8 +154,8 @@ void test_beyond_maximum_speed_only_driving_torque_goes(void)
     in.omega = 29000;
     halved(DERATING_SPEED, 1, 0);
     in.omega = -29000;
-    in.wanted = 15000; /* brakes */
-    TEST_ASSERT_EQUAL_INT(15000, step().torque);
+    in.torque_arbitrated = 15000; /* brakes */
+    TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
 }
 
 void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(void)
@@ -163,33 +163,33 @@ void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(voi
     static const int16_t hot[] = {1050, 2000, INT16_MAX};
     for (int n = 0; n < 3; n++) {
         in.inverter_dC = hot[n];
-        TEST_ASSERT_EQUAL_INT(0, step().torque);
+        TEST_ASSERT_EQUAL_INT(0, step().torque_limited);
     }
     in.inverter_dC = INT16_MIN + 1;
-    TEST_ASSERT_EQUAL_INT(counts(0.25), step().torque);
+    TEST_ASSERT_EQUAL_INT(counts(0.25), step().torque_limited);
 }
 
 void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves(void)
 {
-    in.wanted = 15000;
+    in.torque_arbitrated = 15000;
     in.inverter_dC = TEMPERATURE_UNKNOWN;
     in.winding_dC = TEMPERATURE_UNKNOWN;
-    TEST_ASSERT_EQUAL_INT(15000, step().torque);
+    TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
     in.winding_dC = ROOM_C;
     (void)step();
     in.winding_dC = TEMPERATURE_UNKNOWN;
-    TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque);
+    TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque_limited);
     TEST_ASSERT_EQUAL_HEX16(DERATING_WINDING, step().derating);
 }
 
 void test_what_the_machine_cannot_reach_is_not_asked_for(void)
 {
     in.reach = 4000;
-    TEST_ASSERT_EQUAL_INT(4000, step().torque);
-    in.wanted = -8000;
-    TEST_ASSERT_EQUAL_INT(-4000, step().torque);
+    TEST_ASSERT_EQUAL_INT(4000, step().torque_limited);
+    in.torque_arbitrated = -8000;
+    TEST_ASSERT_EQUAL_INT(-4000, step().torque_limited);
     TEST_ASSERT_EQUAL_HEX16(DERATING_REACH, step().derating);
-    in.wanted = 100;
+    in.torque_arbitrated = 100;
     TEST_ASSERT_EQUAL_HEX16(0, step().derating);
 }
 
@@ -198,19 +198,19 @@ void test_near_standstill_the_driving_limit_holds_for_both_signs_and_nothing_jum
 {
     limits.torque_drive = 8000;
     limits.torque_regen = 2000;
-    in.wanted = -15000;
+    in.torque_arbitrated = -15000;
     int last = 8000;
     for (int w = 0; w <= 700; w++) {
         in.omega = (q15_t)w;
-        const int now = -step().torque;
+        const int now = -step().torque_limited;
         TEST_ASSERT_TRUE(now <= last && last - now <= 25); /* 6000 over 300 counts */
         last = now;
     }
     TEST_ASSERT_EQUAL_INT(2000, last);
     in.omega = 0;
-    TEST_ASSERT_EQUAL_INT(-8000, step().torque);
-    in.wanted = 15000;
-    TEST_ASSERT_EQUAL_INT(8000, step().torque);
+    TEST_ASSERT_EQUAL_INT(-8000, step().torque_limited);
+    in.torque_arbitrated = 15000;
+    TEST_ASSERT_EQUAL_INT(8000, step().torque_limited);
 }
 
 /* The quotient of power and speed: 1/2 LSB of power over |w| >= 0.02; the loss carries 2 LSB. */
@@ -225,22 +225,24 @@ void test_the_limit_follows_the_twin(void)
         limits = (torque_limits_t){(q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000),
                                    (q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000)};
         in = (torque_limit_in_t){
-            .wanted = (q15_t)random_in(&seed, -32767, 32767), .limits = &limits,
+            .torque_arbitrated = (q15_t)random_in(&seed, -32767, 32767), .limits = &limits,
             .u = {random_in(&seed, -9000, 9000), random_in(&seed, -9000, 9000)},
             .i = {random_in(&seed, -20000, 0), random_in(&seed, -20000, 20000)},
-            .torque = (q15_t)random_in(&seed, -3000, 3000), .omega = (q15_t)random_in(&seed, 650, 32767),
+            .torque_estimated = (q15_t)random_in(&seed, -3000, 3000), .omega = (q15_t)random_in(&seed, 650, 32767),
             .v_dc = (q15_t)random_in(&seed, 7000, 28000), .reach = (q15_t)random_in(&seed, 0, 25000),
             .inverter_dC = (int16_t)random_in(&seed, 0, 1200), .winding_dC = (int16_t)random_in(&seed, 0, 2000),
         };
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
         const twin_limit_in_t t = {
-            from_q15(in.wanted) * f.t, from_q15(limits.torque_drive) * f.t, from_q15(limits.torque_regen) * f.t,
+            from_q15(in.torque_arbitrated) * f.t, from_q15(limits.torque_drive) * f.t,
+            from_q15(limits.torque_regen) * f.t,
             from_q15(limits.power_drive) * power, from_q15(limits.power_regen) * power,
             {from_q15(in.u.d) * f.v, from_q15(in.u.q) * f.v}, {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i},
-            from_q15(in.torque) * f.t, from_q15(in.omega) * f.w, from_q15(in.v_dc) * f.v, from_q15(in.reach) * f.t,
-            in.inverter_dC / 10.0, in.winding_dC / 10.0};
+            from_q15(in.torque_estimated) * f.t, from_q15(in.omega) * f.w, from_q15(in.v_dc) * f.v,
+            from_q15(in.reach) * f.t, in.inverter_dC / 10.0, in.winding_dC / 10.0};
         const double s = twin_torque_limit(&f.si, &t_state, &t);
-        worst_note(&worst, step().torque - s / f.t * 32768.0, "step %d, wanted %d, w %d", n, in.wanted, in.omega);
+        worst_note(&worst, step().torque_limited - s / f.t * 32768.0, "step %d, arbitrated %d, w %d", n,
+                   in.torque_arbitrated, in.omega);
     }
     ASSERT_WORST(worst, 60.0);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
-#include "control/torque_loop.h"
+#include "control/torque/loop.h"
 #include "fixture.h"
 #include "unity.h"
 
@@ -31,7 +31,7 @@ static q15_t run(double share, int steps)
     q15_t request = 0;
     for (int n = 0; n < steps; n++) {
         request = step();
-        in.estimate = (q15_t)lround(share * request);
+        in.torque_estimated = (q15_t)lround(share * request);
     }
     return request;
 }
@@ -40,8 +40,8 @@ void test_switched_off_the_command_passes_unchanged(void)
 {
     in.enabled = false;
     for (int c = -32768; c <= 32767; c += 111) {
-        in.command = (q15_t)c;
-        in.estimate = (q15_t)(c / 2);
+        in.torque_commanded = (q15_t)c;
+        in.torque_estimated = (q15_t)(c / 2);
         TEST_ASSERT_EQUAL_INT(c, step());
     }
 }
@@ -51,10 +51,10 @@ void test_the_correction_makes_the_estimate_equal_the_command(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){0};
-        in.estimate = 0;
-        in.command = (q15_t)(sign * 10000);
+        in.torque_estimated = 0;
+        in.torque_commanded = (q15_t)(sign * 10000);
         (void)run(0.9125, 2000);
-        TEST_ASSERT_INT_WITHIN(2, in.command, in.estimate);
+        TEST_ASSERT_INT_WITHIN(2, in.torque_commanded, in.torque_estimated);
         TEST_ASSERT_DOUBLE_WITHIN(3e-4, 1.0 / 0.9125 - 1.0, from_q31(state.correction));
         TEST_ASSERT_FALSE(state.saturated);
     }
@@ -63,10 +63,10 @@ void test_the_correction_makes_the_estimate_equal_the_command(void)
 /* x is a ratio: learnt at 100 it serves at 30 and in the other direction at once. */
 void test_what_was_learnt_at_one_torque_serves_at_another_and_in_the_other_direction(void)
 {
-    in.command = 10000;
+    in.torque_commanded = 10000;
     (void)run(0.9125, 2000);
     in.enabled = true;
-    in.command = in.estimate = -3000;
+    in.torque_commanded = in.torque_estimated = -3000;
     state.model = -3000 * 65536; /* settled: only x acts */
     TEST_ASSERT_INT_WITHIN(2, -3288, step());
 }
@@ -77,8 +77,8 @@ void test_the_loop_is_equally_fast_at_every_torque(void)
     f.torque_loop.kp = 0;
     for (int c = 1000; c <= 16000; c *= 2) {
         state = (torque_loop_state_t){.model = c * 65536};
-        in.command = (q15_t)c;
-        in.estimate = (q15_t)lround(0.8 * c);
+        in.torque_commanded = (q15_t)c;
+        in.torque_estimated = (q15_t)lround(0.8 * c);
         (void)run(0.8, 42); /* 1/(0.8 ki) */
         TEST_ASSERT_DOUBLE_WITHIN(0.012, 0.25 * 0.632, from_q31(state.correction));
     }
@@ -88,9 +88,9 @@ void test_a_step_of_a_perfect_machine_excites_no_integrator(void)
 {
     /* T^ follows as the model does, first order with model_rate, and tells of the time that has passed. */
     double torque = 0.0;
-    in.command = 12000;
+    in.torque_commanded = 12000;
     for (int n = 0; n < 200; n++) {
-        in.estimate = (q15_t)lround(torque);
+        in.torque_estimated = (q15_t)lround(torque);
         TEST_ASSERT_INT_WITHIN(1, 12000, step());
         torque += from_q15(f.torque_loop.model_rate) * (12000.0 - torque);
     }
@@ -99,7 +99,7 @@ void test_a_step_of_a_perfect_machine_excites_no_integrator(void)
 
 void test_switching_on_and_off_is_bumpless(void)
 {
-    in.command = 10000;
+    in.torque_commanded = 10000;
     in.enabled = false;
     (void)run(0.95, 100);
     in.enabled = true;
@@ -121,15 +121,15 @@ void test_the_authority_bounds_the_request_and_the_integrator(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){0};
-        in.command = (q15_t)(sign * 10000);
-        in.estimate = 0;
+        in.torque_commanded = (q15_t)(sign * 10000);
+        in.torque_estimated = 0;
         for (int n = 0; n < 3000; n++) {
-            TEST_ASSERT_INT_WITHIN(4001, in.command, step());
+            TEST_ASSERT_INT_WITHIN(4001, in.torque_commanded, step());
         }
         TEST_ASSERT_INT_WITHIN(1, sign * 14000, step());
         TEST_ASSERT_TRUE(state.saturated);
         TEST_ASSERT_INT_WITHIN(1, f.torque_loop.authority, state.correction >> 16);
-        in.estimate = (q15_t)(sign * 15000);
+        in.torque_estimated = (q15_t)(sign * 15000);
         (void)step();
         (void)step();
         TEST_ASSERT_FALSE(state.saturated);
@@ -139,8 +139,8 @@ void test_the_authority_bounds_the_request_and_the_integrator(void)
 
 void test_the_lower_bound_of_the_authority_holds_as_well(void)
 {
-    in.command = 10000;
-    in.estimate = 32767;
+    in.torque_commanded = 10000;
+    in.torque_estimated = 32767;
     for (int n = 0; n < 3000; n++) {
         TEST_ASSERT_TRUE(step() >= 5999);
     }
@@ -153,14 +153,14 @@ void test_the_correction_is_held_while_limited_and_asked_for_more(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){.correction = 100000000, .model = (sign > 0) ? 655360000 : -655360000};
-        in.command = (q15_t)(sign * 10000);
+        in.torque_commanded = (q15_t)(sign * 10000);
         in.limited = true;
-        in.estimate = (q15_t)(sign * 8000);
+        in.torque_estimated = (q15_t)(sign * 8000);
         for (int n = 0; n < 1000; n++) {
             (void)step();
         }
         TEST_ASSERT_EQUAL_INT32(100000000, state.correction);
-        in.estimate = (q15_t)(sign * 12000);
+        in.torque_estimated = (q15_t)(sign * 12000);
         (void)step();
         TEST_ASSERT_LESS_THAN_INT32(100000000, state.correction);
     }
@@ -170,8 +170,8 @@ void test_the_correction_is_held_while_limited_and_asked_for_more(void)
 void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
 {
     state.correction = 123456789;
-    in.command = 0;
-    in.estimate = 900;
+    in.torque_commanded = 0;
+    in.torque_estimated = 900;
     for (int n = 0; n < 1000; n++) {
         TEST_ASSERT_EQUAL_INT(0, step());
     }
@@ -182,8 +182,8 @@ void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
 void test_small_commands_learn_slower_instead_of_louder(void)
 {
     f.torque_loop.kp = 0;
-    in.command = 400; /* T_min = 655 */
-    in.estimate = 0;
+    in.torque_commanded = 400; /* T_min = 655 */
+    in.torque_estimated = 0;
     state.model = 400 * 65536;
     (void)step();
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 400.0 / 655.0, from_q31(state.correction));
@@ -195,12 +195,12 @@ void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){.correction = Q31(0.1), .model = sign * 6 * 65536};
-        in.command = (q15_t)(sign * 6);
-        in.estimate = (q15_t)(-20 * sign);
+        in.torque_commanded = (q15_t)(sign * 6);
+        in.torque_estimated = (q15_t)(-20 * sign);
         for (int n = 0; n < 10000; n++) {
             (void)step();
         }
-        in.command = in.estimate = (q15_t)(sign * 10000);
+        in.torque_commanded = in.torque_estimated = (q15_t)(sign * 10000);
         state.model = sign * 10000 * 65536;
         TEST_ASSERT_INT_WITHIN(2, sign * 11000, step());
     }
@@ -208,10 +208,10 @@ void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
 
 void test_one_lsb_of_alternating_error_does_not_walk_in_a_million_steps(void)
 {
-    in.command = 10000;
+    in.torque_commanded = 10000;
     state.model = 10000 * 65536;
     for (int n = 0; n < 1000000; n++) {
-        in.estimate = (q15_t)(10000 + ((n & 1) ? 1 : -1));
+        in.torque_estimated = (q15_t)(10000 + ((n & 1) ? 1 : -1));
         (void)step();
     }
     /* 1/10000 in q15 rounds to 3 either way */
@@ -226,18 +226,19 @@ void test_random_commands_and_estimates_follow_the_twin(void)
     uint64_t seed = 101;
     for (int n = 0; n < 50000; n++) {
         if (n % 100 == 0) {
-            in.command = (q15_t)random_in(&seed, -18000, 18000);
+            in.torque_commanded = (q15_t)random_in(&seed, -18000, 18000);
             in.enabled = random_in(&seed, 0, 5) != 0;
             in.limited = random_in(&seed, 0, 3) == 0;
-            in.command = (random_in(&seed, 0, 9) == 0) ? 0 : in.command;
+            in.torque_commanded = (random_in(&seed, 0, 9) == 0) ? 0 : in.torque_commanded;
         }
-        in.estimate = (q15_t)(0.93 * in.command + random_in(&seed, -200, 200));
-        const twin_torque_in_t t = {from_q15(in.command) * f.t, from_q15(in.estimate) * f.t,
+        in.torque_estimated = (q15_t)(0.93 * in.torque_commanded + random_in(&seed, -200, 200));
+        const twin_torque_in_t t = {from_q15(in.torque_commanded) * f.t, from_q15(in.torque_estimated) * f.t,
                                     from_q15(in.confidence), in.enabled, in.limited};
         const q15_t r = step();
         const double expected = twin_torque_loop(&f.si, &twin, &t);
-        worst_note(&request, r - expected / f.t * 32768.0, "step %d, command %d", n, in.command);
-        worst_note(&correction, from_q31(state.correction) - twin.correction, "step %d, command %d", n, in.command);
+        worst_note(&request, r - expected / f.t * 32768.0, "step %d, command %d", n, in.torque_commanded);
+        worst_note(&correction, from_q31(state.correction) - twin.correction, "step %d, command %d", n,
+                   in.torque_commanded);
     }
     /* T_m and the division round to q15: 1 LSB of 655 in e/T_min at worst, 1.5e-3 times ki, averaged over 1/ki. */
     ASSERT_WORST(correction, 1.5e-3);
@@ -247,7 +248,7 @@ void test_random_commands_and_estimates_follow_the_twin(void)
 /* Learnt -10 % elsewhere; at the limit 0.97 of the request arrives. The way back is open up to the command. */
 void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond(void)
 {
-    in.command = 10000;
+    in.torque_commanded = 10000;
     in.limited = true;
     state.correction = Q31(-0.1);
     state.model = 10000 * 65536;
@@ -261,13 +262,13 @@ void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond
 /* Authority 0.4: half of the confidence leaves 0.2, none leaves the command. */
 void test_without_confidence_the_request_is_the_command(void)
 {
-    in.command = 10000;
+    in.torque_commanded = 10000;
     in.confidence = 16384;
     TEST_ASSERT_INT_WITHIN(3, 12000, run(0.5, 3000));
     in.confidence = 0;
     TEST_ASSERT_EQUAL_INT(10000, step());
     TEST_ASSERT_EQUAL_INT32(0, state.correction);
-    in.command = -10000;
+    in.torque_commanded = -10000;
     TEST_ASSERT_EQUAL_INT(-10000, step());
 }
 
@@ -279,7 +280,7 @@ void test_no_corner_wraps_or_leaves_the_authority(void)
         state.correction = (n / 100 == 0) ? INT32_MIN : (n / 100 == 1) ? 0 : INT32_MAX;
         state.model = (n & 1) ? INT32_MIN : INT32_MAX;
         const int r = step();
-        const int room = (int)(0.4 * fabs((double)in.command)) + 2;
-        TEST_ASSERT_INT_WITHIN((unsigned)room, in.command, r);
+        const int room = (int)(0.4 * fabs((double)in.torque_commanded)) + 2;
+        TEST_ASSERT_INT_WITHIN((unsigned)room, in.torque_commanded, r);
     }
 }

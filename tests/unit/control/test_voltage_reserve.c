@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "control/voltage_reserve.h"
+#include "control/torque/voltage_reserve.h"
 
 #include <math.h>
 
@@ -44,7 +44,7 @@ void test_on_the_limit_a_twentieth_of_the_missing_voltage_is_added_each_step(voi
 
 void test_voltage_left_away_from_the_limit_is_no_reason_to_ask_for_more(void)
 {
-    in.psi = (dq_t){4800, 3600};
+    in.psi = (dq_q15_t){4800, 3600};
     for (int n = 0; n < 100; n++) {
         (void)step();
     }
@@ -53,7 +53,7 @@ void test_voltage_left_away_from_the_limit_is_no_reason_to_ask_for_more(void)
 
 void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
 {
-    in.psi = (dq_t){4800, 3600};
+    in.psi = (dq_q15_t){4800, 3600};
     in.u.q = -13000;
     (void)step();
     TEST_ASSERT_INT32_WITHIN(1, (12015 - 13000) / 20, trim());
@@ -63,7 +63,7 @@ void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
 void test_away_from_the_limit_and_with_the_bridge_off_the_trim_is_forgotten(void)
 {
     for (int off = 0; off < 2; off++) {
-        in.psi = off ? (dq_t){8000, 6000} : (dq_t){4800, 3600};
+        in.psi = off ? (dq_q15_t){8000, 6000} : (dq_q15_t){4800, 3600};
         in.acting = !off;
         state.trim = -1000 * 65536;
         for (int n = 0; n < 100; n++) {
@@ -79,7 +79,7 @@ void test_the_trim_stays_within_its_authority(void)
         (void)step();
     }
     TEST_ASSERT_EQUAL_INT32(f.voltage_reserve.trim_max, trim());
-    in.u = (dq_t){INT16_MIN, INT16_MIN};
+    in.u = (dq_q15_t){INT16_MIN, INT16_MIN};
     for (int n = 0; n < 1000; n++) {
         (void)step();
     }
@@ -103,9 +103,9 @@ void test_the_reserve_follows_the_twin(void)
     uint64_t seed = 7;
     double si_trim = 0.0;
     for (int n = 0; n < 100000; n++) {
-        in.u = (dq_t){random_in(&seed, -12000, 12000), random_in(&seed, -12000, 12000)};
+        in.u = (dq_q15_t){random_in(&seed, -12000, 12000), random_in(&seed, -12000, 12000)};
         in.v_dc = (q15_t)random_in(&seed, 15000, 30000);
-        in.psi = (dq_t){random_in(&seed, 0, 20000), random_in(&seed, -20000, 20000)};
+        in.psi = (dq_q15_t){random_in(&seed, 0, 20000), random_in(&seed, -20000, 20000)};
         in.psi_delta = (q15_t)random_in(&seed, -4000, 2000);
         in.psi_plan = (q15_t)((n & 1) ? hypot(in.psi.d, in.psi.q) : 32767);
         in.acting = (n % 7) != 0;

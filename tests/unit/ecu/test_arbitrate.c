@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "app/arbitrate.h"
+#include "ecu/arbitration.h"
 
 #include <stdlib.h>
 
@@ -42,7 +42,7 @@ static q15_t steps(int count)
 /* 16000/400 = 40 steps at full slew and half of 10 more at either end. */
 void test_full_torque_takes_slew_and_jerk_time_and_is_reached_exactly(void)
 {
-    in.request = 16000;
+    in.torque_requested = 16000;
     TEST_ASSERT_LESS_THAN_INT(16000, steps(48));
     TEST_ASSERT_EQUAL_INT(16000, steps(4));
     TEST_ASSERT_EQUAL_INT(16000, steps(100));
@@ -56,16 +56,16 @@ void test_rate_and_its_growth_stay_within_slew_and_jerk_and_nothing_overshoots(v
     q31_t rate_before = 0;
     for (int n = 0; n < 200000; n++) {
         if (n % 37 == 0) {
-            in.request = (q15_t)(rand() % 32001 - 16000);
+            in.torque_requested = (q15_t)(rand() % 32001 - 16000);
         }
-        const q31_t before = state.torque;
+        const q31_t before = state.torque_arbitrated;
         (void)step();
-        const q31_t wanted = (abs(in.request) <= 28) ? 0 : in.request * COUNT;
-        const int64_t moved = (int64_t)state.torque - before;
+        const q31_t wanted = (abs(in.torque_requested) <= 28) ? 0 : in.torque_requested * COUNT;
+        const int64_t moved = (int64_t)state.torque_arbitrated - before;
         TEST_ASSERT_TRUE(llabs(moved) <= SLEW);
         /* towards the target, never past it */
         TEST_ASSERT_TRUE((moved >= 0) == (wanted >= before) || moved == 0);
-        TEST_ASSERT_TRUE(llabs((int64_t)wanted - state.torque) <= llabs((int64_t)wanted - before));
+        TEST_ASSERT_TRUE(llabs((int64_t)wanted - state.torque_arbitrated) <= llabs((int64_t)wanted - before));
         /* faster by one jerk at most, unless the direction changed: then it began at zero */
         TEST_ASSERT_TRUE(llabs(moved) <= labs(rate_before) + JERK);
         rate_before = (q31_t)moved;
@@ -77,21 +77,21 @@ void test_it_arrives_gently(void)
 {
     for (int target = 100; target <= 16000; target += 173) {
         setUp();
-        in.request = (q15_t)target;
+        in.torque_requested = (q15_t)target;
         q31_t last = 0;
-        while (state.torque != target * COUNT) {
-            last = state.torque;
+        while (state.torque_arbitrated != target * COUNT) {
+            last = state.torque_arbitrated;
             (void)step();
         }
-        TEST_ASSERT_TRUE(state.torque - last <= 2 * JERK);
+        TEST_ASSERT_TRUE(state.torque_arbitrated - last <= 2 * JERK);
     }
 }
 
 void test_a_request_taken_back_stops_the_rise_at_once(void)
 {
-    in.request = 16000;
+    in.torque_requested = 16000;
     const q15_t before = steps(20);
-    in.request = 0;
+    in.torque_requested = 0;
     TEST_ASSERT_LESS_THAN_INT(before, step());
 }
 
@@ -99,13 +99,13 @@ void test_a_request_taken_back_stops_the_rise_at_once(void)
 void test_requests_within_the_dead_band_are_exactly_zero(void)
 {
     for (int request = -28; request <= 28; request++) {
-        in.request = (q15_t)request;
+        in.torque_requested = (q15_t)request;
         TEST_ASSERT_EQUAL_INT(0, steps(3));
-        TEST_ASSERT_EQUAL_INT32(0, state.torque);
+        TEST_ASSERT_EQUAL_INT32(0, state.torque_arbitrated);
     }
-    in.request = 29;
+    in.torque_requested = 29;
     TEST_ASSERT_EQUAL_INT(29, steps(3));
-    in.request = -29;
+    in.torque_requested = -29;
     TEST_ASSERT_EQUAL_INT(-29, steps(5));
 }
 
@@ -124,7 +124,7 @@ void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
     };
     for (unsigned n = 0; n < sizeof quadrants / sizeof quadrants[0]; n++) {
         state = (arbitrate_state_t){0};
-        in.request = quadrants[n].request;
+        in.torque_requested = quadrants[n].request;
         in.omega = quadrants[n].omega;
         TEST_ASSERT_EQUAL_INT(quadrants[n].wanted, steps(100));
     }
@@ -132,7 +132,7 @@ void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
 
 void test_a_limit_that_falls_takes_the_torque_down_with_slew(void)
 {
-    in.request = 16000;
+    in.torque_requested = 16000;
     (void)steps(100);
     in.limit_drive = 1000;
     const q15_t first = step();
@@ -145,7 +145,7 @@ void test_drop_ends_full_torque_within_15_steps(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         setUp();
-        in.request = (q15_t)(16000 * sign);
+        in.torque_requested = (q15_t)(16000 * sign);
         (void)steps(100);
         in.drop = true;
         TEST_ASSERT_NOT_EQUAL_INT(0, steps(14));
@@ -155,7 +155,7 @@ void test_drop_ends_full_torque_within_15_steps(void)
 
 void test_stop_ends_torque_with_slew_and_off_at_once(void)
 {
-    in.request = 16000;
+    in.torque_requested = 16000;
     (void)steps(100);
     in.stop = true;
     TEST_ASSERT_GREATER_THAN_INT(0, steps(40));
@@ -171,17 +171,17 @@ void test_stop_ends_torque_with_slew_and_off_at_once(void)
 /* The most negative count has no positive counterpart. */
 void test_the_ends_of_the_format_do_no_harm(void)
 {
-    in = (arbitrate_in_t){.request = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN,
+    in = (arbitrate_in_t){.torque_requested = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN,
                           .run = true};
     TEST_ASSERT_EQUAL_INT(-Q15_MAX, steps(1000));
-    in.request = Q15_MAX;
+    in.torque_requested = Q15_MAX;
     TEST_ASSERT_EQUAL_INT(Q15_MAX, steps(1000));
 }
 
 /* The drive allows 5000 of 16000; opened after a while, it rises from there: 40 more each millisecond. */
 void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_it_opens(void)
 {
-    in.request = 16000;
+    in.torque_requested = 16000;
     q15_t asked = 0;
     for (int n = 0; n < 200; n++) {
         arbitrate_hold(&config, &state, (q15_t)(asked < 5000 ? asked : 5000));
@@ -204,12 +204,12 @@ void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_it_opens(v
 
 void test_a_limit_that_does_not_limit_changes_nothing(void)
 {
-    in.request = -12000;
+    in.torque_requested = -12000;
     arbitrate_state_t alone = state;
     for (int n = 0; n < 100; n++) {
-        arbitrate_hold(&config, &state, n == 0 ? 0 : fx_q15_from_q31(state.torque));
+        arbitrate_hold(&config, &state, n == 0 ? 0 : fx_q15_from_q31(state.torque_arbitrated));
         (void)step();
         (void)arbitrate_step(&config, &alone, &in);
-        TEST_ASSERT_EQUAL_INT32(alone.torque, state.torque);
+        TEST_ASSERT_EQUAL_INT32(alone.torque_arbitrated, state.torque_arbitrated);
     }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "app/calibration.h"
-#include "app/ecu.h"
+#include "calibration/calibration.h"
+#include "ecu/ecu.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_board.h"
@@ -234,12 +234,12 @@ void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
     ecu.xcp.xcp.ecu_page = XCP_PAGE_WORKING;
     ecu.xcp.working[CALIBRATION_observer_m] = 2.5F;
     ecu.xcp.xcp.generation++;
-    xcp_access_step(&ecu.xcp, &ecu.drive);
+    xcp_access_step(&ecu.xcp, &ecu.drive, 1);
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 2.5F, calibration_get(&ecu.drive.motor, CALIBRATION_observer_m));
     TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time_q16 + 200, ecu.drive.motor.modulate.dead_time_q16);
     ecu.xcp.working[CALIBRATION_dead_time_compensation] = 0.5F;
     ecu.xcp.xcp.generation++;
-    xcp_access_step(&ecu.xcp, &ecu.drive);
+    xcp_access_step(&ecu.xcp, &ecu.drive, 1);
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F,
                              calibration_get(&ecu.drive.motor, CALIBRATION_dead_time_compensation));
 }
@@ -253,11 +253,11 @@ void test_the_first_fault_freezes_what_was_before_it(void)
         now.i_q_A = (int16_t)(10 * ms);
         now.speed_rpm = (ms == 99) ? 1e9F : -50.5F;
         now.fault_word = (ms >= 100) ? 4U : 0U;
-        freeze_frame_step(&frame, &now, 0, (ms < 100) ? STATE_RUN : STATE_FAULT);
+        freeze_frame_step(&frame, &now, 0, (ms < 100) ? STATE_RUN : STATE_FAULT, 1);
     }
     now.i_q_A = 7;
     now.fault_word = 6U;
-    freeze_frame_step(&frame, &now, 1, STATE_FAULT);
+    freeze_frame_step(&frame, &now, 1, STATE_FAULT, 1);
     TEST_ASSERT_EQUAL_INT(1, frame.frozen);
     TEST_ASSERT_EQUAL_UINT32(100, frame.time_ms);
     TEST_ASSERT_EQUAL_UINT32(4, frame.fault_word);
@@ -271,10 +271,10 @@ void test_the_first_fault_freezes_what_was_before_it(void)
     TEST_ASSERT_EQUAL_INT(32767, frame.speed_rpm[(frame.oldest + 30U) % FREEZE_FRAME_SAMPLES]);
     /* Forgotten: it records again, and the next fault is kept. */
     now.fault_word = 0;
-    freeze_frame_step(&frame, &now, 0, STATE_STANDBY);
+    freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
     TEST_ASSERT_EQUAL_INT(0, frame.frozen);
-    freeze_frame_step(&frame, &now, 0, STATE_STANDBY);
-    freeze_frame_step(&frame, &now, 8, STATE_FAULT);
+    freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
+    freeze_frame_step(&frame, &now, 8, STATE_FAULT, 1);
     TEST_ASSERT_EQUAL_INT(1, frame.frozen);
     TEST_ASSERT_EQUAL_INT(8, frame.ecu_faults);
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);

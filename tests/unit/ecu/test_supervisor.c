@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "app/supervisor.h"
+#include "ecu/supervisor.h"
 #include "unity.h"
 
 static supervisor_t s;
@@ -10,12 +10,13 @@ void setUp(void)
 {
     s = (supervisor_t){0};
     in = (supervisor_in_t){.alive = true,
-                           .request_is_zero = true,
-                           .torque_is_zero = true,
+                           .torque_requested_is_zero = true,
+                           .torque_arbitrated_is_zero = true,
                            .dc_safe = true,
                            .dc_settled = true,
                            .sensors_plausible = true,
-                           .slow = true};
+                           .slow = true,
+                           .elapsed_us = 1000};
 }
 
 void tearDown(void)
@@ -125,6 +126,39 @@ void test_start_up_without_a_plausible_measurement_is_a_fault_after_500_ms(void)
     TEST_ASSERT_EQUAL_UINT8(33 + 6, s.first_fault);
 }
 
+/* Steps of 4.5, 22.5 and 5.5 kHz: left in the first step in which more than the time has passed. */
+static void leaves_after(ecu_state_t state, uint32_t ms)
+{
+    uint32_t us = 0;
+    while (s.state == state && us < 6000000U) {
+        us += in.elapsed_us;
+        (void)step();
+    }
+    TEST_ASSERT_TRUE(us > ms * 1000U && us <= ms * 1000U + in.elapsed_us);
+}
+
+void test_the_times_of_the_states_hold_for_steps_that_are_not_a_millisecond(void)
+{
+    static const uint32_t step_us[] = {889U, 978U, 1000U, 1091U, 1111U};
+    for (unsigned k = 0; k < sizeof step_us / sizeof step_us[0]; k++) {
+        setUp();
+        in.elapsed_us = step_us[k];
+        leaves_after(STATE_INIT, 50);
+        setUp();
+        in.elapsed_us = step_us[k];
+        in.sensors_plausible = false;
+        leaves_after(STATE_INIT, 500);
+        setUp();
+        in.elapsed_us = step_us[k];
+        to_precharge();
+        leaves_after(STATE_PRECHARGE, 2000);
+        setUp();
+        in.elapsed_us = step_us[k];
+        to_discharge();
+        leaves_after(STATE_DISCHARGE, 5000);
+    }
+}
+
 void test_bad_motor_data_end_in_fault(void)
 {
     in.drive_faults = 1U << 7;
@@ -193,10 +227,10 @@ void test_disable_leaves_run_and_derate_only_when_no_torque_is_left(void)
         setUp();
         derate ? to_derate() : to_run();
         in.enable = false;
-        in.torque_is_zero = false;
+        in.torque_arbitrated_is_zero = false;
         (void)steps(20);
         TEST_ASSERT_TRUE(supervisor_outputs[s.state].run);
-        in.torque_is_zero = true;
+        in.torque_arbitrated_is_zero = true;
         TEST_ASSERT_EQUAL_INT(STATE_READY, step());
     }
 }
@@ -215,7 +249,7 @@ void test_a_drive_fault_trips_from_ready_run_and_derate_at_once(void)
     for (int n = 0; n < 3; n++) {
         setUp();
         from[n]();
-        in.torque_is_zero = false;
+        in.torque_arbitrated_is_zero = false;
         in.drive_faults = 4;
         TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
         TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
@@ -239,11 +273,11 @@ void test_a_gate_driver_fault_and_a_stalled_interrupt_trip_too(void)
 void test_bad_commands_and_a_late_task_end_the_torque_first_and_then_the_run(void)
 {
     to_run();
-    in.torque_is_zero = false;
+    in.torque_arbitrated_is_zero = false;
     in.failed = true;
     TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(10));
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PROTECTION, s.faults);
-    in.torque_is_zero = true;
+    in.torque_arbitrated_is_zero = true;
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     setUp();
     to_derate();
@@ -278,9 +312,9 @@ void test_a_time_out_ends_run_in_ready_and_needs_enable_off_before_on(void)
     to_run();
     in.alive = false;
     in.enable = false;
-    in.torque_is_zero = false;
+    in.torque_arbitrated_is_zero = false;
     TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(15));
-    in.torque_is_zero = true;
+    in.torque_arbitrated_is_zero = true;
     TEST_ASSERT_EQUAL_INT(STATE_READY, step());
     TEST_ASSERT_EQUAL_INT(REFUSED_TIMED_OUT, s.refused);
     in.alive = true;
@@ -301,7 +335,7 @@ static void refused(refused_t why)
     TEST_ASSERT_EQUAL_INT(why, s.refused);
     TEST_ASSERT_EQUAL_UINT8(before + 1, s.refused_count);
     /* what made it forbidden goes: a held enable is still none */
-    in.request_is_zero = true;
+    in.torque_requested_is_zero = true;
     in.dc_in_range = true;
     in.sensors_plausible = true;
     in.current_mode = false;
@@ -313,7 +347,7 @@ static void refused(refused_t why)
 void test_enable_with_a_torque_request_is_refused(void)
 {
     to_ready();
-    in.request_is_zero = false;
+    in.torque_requested_is_zero = false;
     refused(REFUSED_TORQUE_NOT_ZERO);
 }
 
@@ -448,8 +482,8 @@ static supervisor_in_t inputs_of(unsigned bits)
         .current_mode = (bits >> 3 & 3U) == 2U, /* the modes exclude each other */
         .enable = (bits >> 5 & 1U) != 0U,
         .reset = (bits >> 6 & 1U) != 0U,
-        .request_is_zero = (bits >> 7 & 1U) != 0U,
-        .torque_is_zero = (bits >> 8 & 1U) != 0U,
+        .torque_requested_is_zero = (bits >> 7 & 1U) != 0U,
+        .torque_arbitrated_is_zero = (bits >> 8 & 1U) != 0U,
         .dc_in_range = (bits >> 9 & 3U) == 1U,
         .dc_safe = (bits >> 9 & 3U) == 2U, /* never both */
         .dc_settled = (bits >> 11 & 1U) != 0U,
@@ -470,7 +504,7 @@ static void judge(const supervisor_t *before, const supervisor_in_t *now)
     TEST_ASSERT_TRUE(s.state == before->state || (allowed[before->state] >> s.state & 1U) != 0U);
     if (runs && !ran) {
         TEST_ASSERT_TRUE(before->state == STATE_READY && now->alive && now->torque_mode);
-        TEST_ASSERT_TRUE(before->enabled || (now->enable && !before->enable_seen && now->request_is_zero &&
+        TEST_ASSERT_TRUE(before->enabled || (now->enable && !before->enable_seen && now->torque_requested_is_zero &&
                                              now->dc_in_range && now->sensors_plausible));
         TEST_ASSERT_TRUE(s.faults == 0U && now->drive_faults == 0U);
     }
@@ -478,7 +512,8 @@ static void judge(const supervisor_t *before, const supervisor_in_t *now)
         TEST_ASSERT_FALSE(runs);
     }
     if (ran && !runs && now->drive_faults == 0U && s.faults == 0U) {
-        TEST_ASSERT_TRUE(now->torque_is_zero); /* torque is never cut by a state that could have ramped it down */
+        /* Torque is never cut by a state that could have ramped it down. */
+        TEST_ASSERT_TRUE(now->torque_arbitrated_is_zero);
     }
     if (s.resets != before->resets) {
         TEST_ASSERT_TRUE(before->state == STATE_FAULT && now->alive && now->reset && !now->enable);
@@ -491,7 +526,7 @@ void test_no_combination_of_inputs_makes_a_forbidden_move(void)
     for (unsigned state = 0; state < STATES; state++) {
         for (unsigned bits = 0; bits < 1U << 20; bits++) {
             const supervisor_t before = {.state = (ecu_state_t)state,
-                                         .ms = 100,
+                                         .us = 100000,
                                          .enabled = (bits >> 18 & 1U) != 0U && supervisor_outputs[state].run,
                                          .enable_seen = (bits >> 19 & 1U) != 0U};
             in = inputs_of(bits);

@@ -22,7 +22,7 @@ void tearDown(void)
 static uint32_t step(void)
 {
     if (jumped) {
-        monitor_note_jump(&state);
+        monitor_report_angle_jump(&state);
     }
     return monitor_step(&config, &state, &in);
 }
@@ -51,7 +51,7 @@ static void confirmed_after(int samples, uint32_t fault, monitor_in_t bad)
 
 void test_good_samples_raise_nothing(void)
 {
-    in.i = (abc_t){25000, -12500, -12500};
+    in.i = (abc_q15_t){25000, -12500, -12500};
     TEST_ASSERT_EQUAL_HEX32(0, step());
 }
 
@@ -61,18 +61,18 @@ void test_one_sample_above_the_trip_current_of_any_phase_and_sign_is_an_over_cur
         for (int sign = -1; sign <= 1; sign += 2) {
             const q15_t high = (q15_t)(sign * 25001);
             const q15_t half = (q15_t)(-high / 2);
-            in.i = (abc_t){(phase == 0) ? high : half, (phase == 1) ? high : half, (phase == 2) ? high : half};
+            in.i = (abc_q15_t){(phase == 0) ? high : half, (phase == 1) ? high : half, (phase == 2) ? high : half};
             TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, step());
         }
     }
-    in.i = (abc_t){-25000, 12500, 12500};
+    in.i = (abc_q15_t){-25000, 12500, 12500};
     TEST_ASSERT_EQUAL_HEX32(0, step());
 }
 
 /* -1 has no positive counterpart: a negation that wraps would hide the largest current there is. */
 void test_the_lower_end_stop_of_the_converter_is_an_over_current(void)
 {
-    in.i = (abc_t){INT16_MIN, 16384, 16384};
+    in.i = (abc_q15_t){INT16_MIN, 16384, 16384};
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, step());
 }
 
@@ -99,12 +99,12 @@ void test_under_voltage_needs_ten_samples_in_a_row(void)
 void test_a_current_sum_needs_five_samples_in_a_row_with_either_sign(void)
 {
     monitor_in_t bad = in;
-    bad.i = (abc_t){301, 300, 300};
+    bad.i = (abc_q15_t){301, 300, 300};
     confirmed_after(5, FAULT_CURRENT_SUM, bad);
     setUp();
-    bad.i = (abc_t){-301, -300, -300};
+    bad.i = (abc_q15_t){-301, -300, -300};
     confirmed_after(5, FAULT_CURRENT_SUM, bad);
-    in.i = (abc_t){300, 300, 300};
+    in.i = (abc_q15_t){300, 300, 300};
     for (int n = 0; n < 20; n++) {
         TEST_ASSERT_EQUAL_HEX32(0, step());
     }
@@ -130,18 +130,18 @@ void test_three_angle_jumps_in_a_row_are_an_angle_fault(void)
 /* A jump is noted for one period: after a good one nothing counts any more. */
 void test_a_jump_is_looked_at_once_and_then_forgotten(void)
 {
-    TEST_ASSERT_EQUAL(0, state.attention);
-    monitor_note_jump(&state);
-    TEST_ASSERT_EQUAL(MONITOR_JUMPED, state.attention);
+    TEST_ASSERT_EQUAL(0, state.pending);
+    monitor_report_angle_jump(&state);
+    TEST_ASSERT_EQUAL(MONITOR_ANGLE_JUMP, state.pending);
     (void)step(); /* counts one */
-    TEST_ASSERT_EQUAL(MONITOR_COUNTS, state.attention);
+    TEST_ASSERT_EQUAL(MONITOR_COUNTING, state.pending);
     (void)step(); /* a good one: counts no longer */
-    TEST_ASSERT_EQUAL(0, state.attention);
+    TEST_ASSERT_EQUAL(0, state.pending);
 }
 
 void test_several_faults_are_reported_together(void)
 {
-    in.i = (abc_t){32767, 32767, 32767};
+    in.i = (abc_q15_t){32767, 32767, 32767};
     in.v_dc = 32767;
     jumped = true;
     uint32_t faults = 0;

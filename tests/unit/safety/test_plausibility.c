@@ -7,7 +7,9 @@
 #include "unity.h"
 
 static const plausibility_config_t config = {.e_0 = 2000, .i_dead = 400, .i_alive = 2400, .omega_trip = 32000,
-                                             .inverter_trip_dC = 1050, .winding_trip_dC = 1800};
+                                             .inverter_trip_dC = 1050, .winding_trip_dC = 1800,
+                                             .deviation_steps = 100, .lost_steps = 10, .equal_steps = 20,
+                                             .fast_steps = 5, .hot_steps = 110};
 static plausibility_state_t state;
 static plausibility_in_t in;
 static int now;
@@ -29,9 +31,9 @@ static uint32_t turn(int broken)
     const double a = 0.7 * now++;
     const int32_t want[3] = {(int32_t)(11314 * cos(a)), (int32_t)(11314 * cos(a - 2.0944)),
                              (int32_t)(11314 * cos(a + 2.0944))};
-    in.wanted = (abc_t){want[0], want[1], want[2]};
-    in.phases = (abc_t){broken == 0 ? now % 3 : want[0], broken == 1 ? now % 3 : want[1],
-                        broken == 2 ? now % 3 : want[2]};
+    in.phases_ref = (abc_q15_t){want[0], want[1], want[2]};
+    in.phases = (abc_q15_t){broken == 0 ? now % 3 : want[0], broken == 1 ? now % 3 : want[1],
+                            broken == 2 ? now % 3 : want[2]};
     return plausibility_step(&config, &state, &in);
 }
 
@@ -84,9 +86,9 @@ void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
 /* A phase that should carry nothing at this angle, and does not, is no evidence. */
 void test_a_phase_at_its_zero_crossing_is_not_missed(void)
 {
-    in.wanted = (abc_t){0, 9800, -9800};
+    in.phases_ref = (abc_q15_t){0, 9800, -9800};
     for (int n = 0; n < 1000; n++) {
-        in.phases = (abc_t){n % 5, 9800 + n % 3, -9800 - n % 7};
+        in.phases = (abc_q15_t){n % 5, 9800 + n % 3, -9800 - n % 7};
         TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
     }
 }
@@ -99,8 +101,8 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_move_is_stuck(v
         for (int n = 1; n <= 100 && !found; n++) {
             const int32_t held = 5000;
             const int32_t moves = (n & 1) ? 3000 : 3101; /* i_dead/4 = 100 */
-            in.phases = (abc_t){x == 0 ? held : moves, x == 1 ? held : -moves, x == 2 ? held : 2 * moves};
-            in.wanted = in.phases;
+            in.phases = (abc_q15_t){x == 0 ? held : moves, x == 1 ? held : -moves, x == 2 ? held : 2 * moves};
+            in.phases_ref = in.phases;
             found = (plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK) ? n : 0;
         }
         TEST_ASSERT_EQUAL_INT(21, found); /* the first sample is equal to nothing */
@@ -111,14 +113,14 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_move_is_stuck(v
 void test_phases_that_only_flicker_are_no_evidence(void)
 {
     for (int n = 0; n < 1000; n++) {
-        in.phases = in.wanted = (abc_t){5000, -2500 + 16 * (n & 1), -2500 - 16 * (n & 1)};
+        in.phases = in.phases_ref = (abc_q15_t){5000, -2500 + 16 * (n & 1), -2500 - 16 * (n & 1)};
         TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
     }
 }
 
 void test_a_machine_at_rest_repeats_all_its_currents(void)
 {
-    in.phases = in.wanted = (abc_t){5000, -2500, -2500};
+    in.phases = in.phases_ref = (abc_q15_t){5000, -2500, -2500};
     for (int n = 0; n < 1000; n++) {
         TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
     }
@@ -152,6 +154,6 @@ void test_over_temperature_is_confirmed_after_110_ms_also_at_rest(void)
 void test_a_bridge_that_is_off_follows_nothing(void)
 {
     in.acting = false;
-    in.i = (dq_t){0, 0};
+    in.i = (dq_q15_t){0, 0};
     TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, 0));
 }

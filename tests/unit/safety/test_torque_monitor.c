@@ -8,7 +8,8 @@
 
 /* r = 0.0137, psi_f = 0.44, 10 N m = 0.034, 7 V = 0.013: about hsm1. */
 static const torque_monitor_config_t config = {
-    .r = 898, .psi_f = 14418, .t_0 = 1112, .v_0 = 425, .i_0 = 0, .rate_gain = 19867};
+    .r = 898, .psi_f = 14418, .t_0 = 1112, .v_0 = 425, .i_0 = 0, .rate_gain = 19867,
+    .mean_rate = 8192, .torque_steps = 20, .angle_steps = 5, .settle_steps = 5};
 static torque_monitor_state_t state;
 static torque_monitor_in_t in;
 

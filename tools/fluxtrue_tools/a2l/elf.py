@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an ELF file of the firmware says about its calibration values and measurements.
 
-The source lists them once (firmware/app/calibration_list.h, measurement_list.h); firmware/app/a2l.c
+The source lists them once (firmware/calibration/calibration_list.h, measurement_list.h); firmware/ecu/a2l_records.c
 puts the lists, with offsets, into a section that is never loaded.
 """
 
@@ -64,6 +64,7 @@ class Description:
     measurements: tuple[Value, ...]
     frozen: tuple[Value, ...]  # before the first fault; not recorded, read once
     bases: tuple[Base, ...]
+    step_s: float  # of the 1 kHz task: the faster raster
 
 
 def _text(raw: bytes) -> str:
@@ -136,11 +137,14 @@ def read(path: Path) -> Description:
 def _describe(elf: ELFFile, path: Path) -> Description:
     records = _records(elf, path)
     ecu, motor = _symbol(elf, path, OBJECT), _symbol(elf, path, MOTOR)
-    bases = {"ONE": Base("ONE", "", 1.0)}
+    bases, step_s = {"ONE": Base("ONE", "", 1.0)}, 1e-3
     for kind, value, offset in records:
-        if kind == "base":
-            (full,) = struct.unpack("<f", _bytes_at(elf, path, motor + offset, 4))
-            bases[value.name] = Base(value.name, value.unit, full)
+        if kind in ("base", "step"):
+            (number,) = struct.unpack("<f", _bytes_at(elf, path, motor + offset, 4))
+            if kind == "base":
+                bases[value.name] = Base(value.name, value.unit, number)
+            else:
+                step_s = number
     placed = {
         wanted: tuple(
             _placed(value, path, ecu + offset, bases.get(value.base))
@@ -148,4 +152,5 @@ def _describe(elf: ELFFile, path: Path) -> Description:
         )
         for wanted in ("value", "measure", "frozen")
     }  # fmt: skip
-    return Description("fluxtrue", placed["value"], placed["measure"], placed["frozen"], tuple(bases.values()))
+    return Description("fluxtrue", placed["value"], placed["measure"], placed["frozen"], tuple(bases.values()),
+                       step_s)  # fmt: skip

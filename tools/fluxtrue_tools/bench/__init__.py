@@ -111,8 +111,8 @@ def drive_table(stages: Iterable[Stage], counted: int, limited: int) -> str:
     return "\n".join(lines)
 
 
-def run(build_dir: Path, out: Path | None = None) -> list[Result]:
-    """Build for the target, measure, print the table and, if wanted, write it as JSON."""
+def run(build_dir: Path) -> str:
+    """Build for the target, measure, print the table; the same as JSON."""
     machine = Machine(build_target(build_dir / "bench" / "fx.elf", FX_SOURCES))
     overhead = call_overhead(machine)
     results = measure(machine, cases(), overhead)
@@ -120,8 +120,6 @@ def run(build_dir: Path, out: Path | None = None) -> list[Result]:
     stages, counted, limited = measure_drive(build_drive(build_dir / "bench"))
     stages += measure_task(build_task(build_dir / "bench"))
     print(drive_table(stages, counted, limited))
-    if out is not None:
-        data = {"call_overhead": overhead, "functions": [asdict(result) for result in results],
-                "drive": {"periods": counted, "limited": limited, "stages": [asdict(s) for s in stages]}}  # fmt: skip
-        out.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
-    return results
+    data = {"call_overhead": overhead, "functions": [asdict(result) for result in results],
+            "drive": {"periods": counted, "limited": limited, "stages": [asdict(s) for s in stages]}}  # fmt: skip
+    return json.dumps(data, indent=2) + "\n"

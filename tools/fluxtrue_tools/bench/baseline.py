@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from fluxtrue_tools.bench.build import ROOT
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import write_text
 
 BASELINE = ROOT / "docs" / "performance.json"
 PAGE = ROOT / "docs" / "performance.md"
@@ -63,6 +63,4 @@ def compare(committed: dict[str, Any], figures: dict[str, Any], page: str, commi
 def write(figures: dict[str, Any], page: str, baseline: Path = BASELINE, document: Path = PAGE) -> None:
     """Both files, each of them whole or not at all."""
     for path, text in ((baseline, json.dumps(figures, indent=1, ensure_ascii=False) + "\n"), (document, page)):
-        draft = path.with_suffix(path.suffix + ".new")
-        draft.write_text(text, encoding="utf-8")
-        os.replace(draft, path)
+        write_text(path, text)

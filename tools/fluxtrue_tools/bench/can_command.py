@@ -12,7 +12,7 @@ from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.errors import FluxtrueError
 
-COMMAND = "VCU_TorqueCommand"
+COMMAND = "VCU_TorqueRequest"
 
 
 class Frame(ctypes.Structure):
@@ -33,7 +33,7 @@ class Command:
         data_id = int(self._message.dbc.attributes["E2EDataId"].value)  # type: ignore[union-attr]
         self._protector = Protector(data_id)
         self.values: dict[str, float | str] = {
-            "Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequest": 0.0,
+            "Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequested": 0.0,
             "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0,
         }  # fmt: skip
 

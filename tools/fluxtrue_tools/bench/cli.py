@@ -7,33 +7,31 @@ from pathlib import Path
 
 import click
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.bench.build import ROOT
 from fluxtrue_tools.errors import FluxtrueError
 
 
-@click.command()
-@click.option(
-    "--build-dir", type=click.Path(path_type=Path, file_okay=False), default=ROOT / "build",
-    help="Where the measured program goes (default: build).",
-)  # fmt: skip
-@click.option(
-    "--json", "out", type=click.Path(path_type=Path, dir_okay=False),
-    help="Also write the figures here.",
-)  # fmt: skip
+@click.command(cls=paths.Command)
+@click.option("--build-dir", type=paths.BuildFolder(), default=ROOT / "build",
+              help="Where the measured program goes (default: build).")  # fmt: skip
+@click.option("--json", "out", type=paths.OutputFile(), help="Also write the figures here.")
 @click.option("--check", is_flag=True, help="Instead: measure all of docs/performance.md again and compare exactly.")
 @click.option("--update", is_flag=True, help="Instead: measure, and rewrite docs/performance.{json,md}.")
 def bench(build_dir: Path, out: Path | None, check: bool, update: bool) -> None:
     """Instructions, memory, stack of the firmware on an emulated Cortex-M4."""
     from fluxtrue_tools import bench as package  # the emulator takes a moment to load
 
-    if out is not None and not out.absolute().parent.is_dir():
-        raise FluxtrueError(f"--json {out}: the folder {out.parent} does not exist")
     if check and update:
         raise FluxtrueError("--check and --update: one of them")
     if check or update:
+        paths.refuse_given("with --check or --update", "out")
         _performance(build_dir, update)
-    else:
-        package.run(build_dir, out)
+        return
+    with paths.outputs() as outputs:
+        text = package.run(build_dir)
+        if out is not None:
+            outputs.text(out, text)
 
 
 def _performance(build_dir: Path, update: bool) -> None:

@@ -73,10 +73,8 @@ class Host:
 def sources(folder: Path) -> list[Path]:
     """All of the firmware with the tables of hsm1, which are generated into the folder."""
     build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
-    firmware = [path for layer in ("fx", "signal", "control", "safety") for path in (FIRMWARE / layer).glob("*.c")]
-    app = ("commissioning", "drive", "fast_isr", "hand_over", "identification", "mrai_isr", "slow_monitors",
-           "take_sample", "task_1khz")  # fmt: skip
-    firmware += [FIRMWARE / "app" / f"{name}.c" for name in app]
+    layers = ("fx", "signal", "control", "safety", "drive")
+    firmware = [path for layer in layers for path in (FIRMWARE / layer).rglob("*.c")]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
 
 
@@ -88,8 +86,8 @@ def build_drive(folder: Path) -> Path:
 def build_task(folder: Path) -> Path:
     """The stages of the 1 kHz task, in a program of their own: called from two places they would be compiled apart."""
     stages = Path(__file__).with_name("task_kernels.c")
-    app = [FIRMWARE / "app" / f"{name}.c" for name in ("arbitrate", "supervisor", "supervisor_table")]
-    return build_target(folder / "task.elf", [*sources(folder), stages, *app], (*LTO, f"-I{ROOT}"), [stages])
+    ecu = [FIRMWARE / "ecu" / f"{name}.c" for name in ("arbitration", "supervisor", "supervisor_table")]
+    return build_target(folder / "task.elf", [*sources(folder), stages, *ecu], (*LTO, f"-I{ROOT}"), [stages])
 
 
 def build_drive_host(folder: Path, flags: tuple[str, ...] = ()) -> Path:

@@ -2,8 +2,9 @@
 /* One drive on a hardware interface made of variables, and its stages as functions of their own.
  * The stages work on a copy of the drive: they see the state that the interrupt will see, and
  * leave none behind. Compiled for the target and, for comparison, for this computer. */
-#include "app/drive.h"
-#include "control/transform.h"
+#include "drive/mrai/mrai_seam.h"
+#include "drive/mrai/schedule_box.h"
+#include "control/current/transform.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -51,11 +52,11 @@ static drive_t copy;
 static flux_point_t flux;
 /* What the exchange has found for the stages: it is counted with the interrupts. */
 static struct {
-    dq_t i;
-    const mrai_in_t *sample;
+    dq_q15_t i;
+    const operating_point_t *sample;
     const mrai_schedule_t *schedule;
     const current_target_t *target;
-    abc_t phases;
+    abc_q15_t phases;
     uint32_t theta_e;
     current_target_t core; /* where the currents are already, as the core's machine has an inductance of one */
     current_control_out_t wanted;
@@ -104,7 +105,7 @@ CALLED void drive_start(uint32_t mode)
 
 CALLED void drive_request(int32_t torque, uint32_t enable)
 {
-    drive.request.torque = (q15_t)torque;
+    drive.request.torque_arbitrated = (q15_t)torque;
     drive.request.enable = enable != 0U;
 }
 
@@ -118,34 +119,35 @@ CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 CALLED void drive_copy(void)
 {
     copy = drive;
-    found.sample = &sample_box_look(&copy.samples, copy.samples.generation)->mrai;
-    found.schedule = schedule_box_read(&copy.schedules);
+    found.sample = &sample_box_at(&copy.samples, copy.samples.generation)->point;
+    found.schedule = schedule_box_read(&copy.mrai.schedules);
     found.target = &command_box_read(&copy.commands)->target;
     found.i = found.sample->i;
-    found.phases = (abc_t){((int32_t)port.counts.i_a - 2048) * 16, ((int32_t)port.counts.i_b - 2048) * 16,
-                           ((int32_t)port.counts.i_c - 2048) * 16};
-    found.theta_e = sample_box_look(&copy.samples, copy.samples.generation)->theta_e;
+    found.phases = (abc_q15_t){((int32_t)port.counts.i_a - 2048) * 16, ((int32_t)port.counts.i_b - 2048) * 16,
+                               ((int32_t)port.counts.i_c - 2048) * 16};
+    found.theta_e = sample_box_at(&copy.samples, copy.samples.generation)->theta_e;
     found.core = (current_target_t){found.i, {found.i.d * 32768, found.i.q * 32768}};
 }
 
 CALLED uint32_t drive_limited(void)
 {
-    return sample_box_look(&drive.samples, drive.samples.generation)->voltage_limited ? 1U : 0U;
+    return sample_box_at(&drive.samples, drive.samples.generation)->voltage_limited ? 1U : 0U;
 }
 
 /* Duties and gates first, then everything that lives on from one period to the next. */
 CALLED const int32_t *drive_outputs(void)
 {
     const fast_state_t *fast = &drive.fast;
-    const mrai_state_t *mrai = &drive.slow.mrai;
-    const sample_t *sample = sample_box_look(&drive.samples, drive.samples.generation);
+    const mrai_state_t *mrai = &drive.mrai.isr.law;
+    const sample_t *sample = sample_box_at(&drive.samples, drive.samples.generation);
     const int32_t all[OUTPUTS] = {
         port.duty.a, port.duty.b, port.duty.c, port.gates,
-        sample->mrai.i.d, sample->mrai.i.q, sample->mrai.flux.psi_d, sample->mrai.flux.psi_q, sample->mrai.omega,
-        fast->coming.d, fast->coming.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
+        sample->point.i.d, sample->point.i.q, sample->point.flux.psi_d, sample->point.flux.psi_q, sample->point.omega,
+        fast->u_next.d, fast->u_next.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
         (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
-        drive.slow.torque.sum_q24, drive.task.torque_mean.mean,
-        drive.task.torque_estimate, drive.task.learnt.psi_delta, drive.task.identify.filter.p[0],
+        drive.mrai.isr.torque.sum_q24, drive.mrai.task.torque_mean.mean,
+        drive.task.identification.torque_estimated, drive.task.identification.psi_delta,
+        drive.task.identify.kalman.p_q30[0],
         drive.task.identify.local.q,
     };
     for (int k = 0; k < OUTPUTS; k++) {
@@ -198,14 +200,14 @@ STAGE void bench_flux_table(void)
 STAGE void bench_mrai(void)
 {
     drive_t *d = the_copy();
-    mrai_step(&d->motor.mrai, found.schedule, &d->slow.mrai, found.sample);
+    mrai_step(&d->motor.mrai, found.schedule, &d->mrai.isr.law, found.sample);
 }
 
 STAGE void bench_torque_estimate(void)
 {
     drive_t *d = the_copy();
-    const mrai_in_t *in = found.sample;
-    torque_estimate_add(&d->slow.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->slow.mrai));
+    const operating_point_t *in = found.sample;
+    torque_estimate_add(&d->mrai.isr.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->mrai.isr.law));
 }
 
 static void modulate(const modulate_config_t *config, const current_control_out_t *wanted, fx_pair_t i,
@@ -227,14 +229,14 @@ STAGE void bench_current_tick(void)
     const motor_t *m = &d->motor;
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_follow(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
-    const dq_t i = park(measured.i, fx_rotation(angle.theta_e));
+    const dq_q15_t i = park(measured.i, fx_rotation(angle.theta_e));
     const fx_pair_t i_dq = fx_arch_pkhbt(i.d, i.q);
     const fx_pair_t advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1));
     const current_control_in_t control = {
         .target = found.target,
         .flux = &flux,
         .omega = angle.omega_q31,
-        .psi_delta = drive_psi_delta(d),
+        .psi_delta = d->psi_d_error,
         .v_dc = measured.v_dc,
     };
     const current_control_out_t wanted =
@@ -250,7 +252,7 @@ STAGE void bench_current_core(void)
                                            .longest_q31 = 1 << 30, .nearer_rail_q31 = 1 << 30};
     drive_t *d = the_copy();
     const fx_pair_t at = fx_rotation(found.theta_e);
-    const dq_t i = park(clarke(found.phases), at);
+    const dq_q15_t i = park(clarke(found.phases), at);
     const flux_point_t as_flux = {.psi_d = (q15_t)i.d, .psi_q = (q15_t)i.q};
     const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
     const current_control_out_t wanted =
@@ -262,7 +264,7 @@ STAGE void bench_measure(void)
 {
     const drive_t *d = the_copy();
     const measure_t measured = measure_step(&d->motor.measure, &port.counts);
-    found.phases = (abc_t){measured.i.alpha, measured.i.beta, measured.v_dc};
+    found.phases = (abc_q15_t){measured.i.alpha, measured.i.beta, measured.v_dc};
 }
 
 STAGE void bench_angle_tracker(void)
@@ -278,8 +280,8 @@ STAGE void bench_current_control(void)
         .target = found.target,
         .flux = &flux,
         .omega = found.sample->omega,
-        .psi_delta = drive_psi_delta(d),
-        .v_dc = sample_box_look(&d->samples, d->samples.generation)->v_dc,
+        .psi_delta = d->psi_d_error,
+        .v_dc = sample_box_at(&d->samples, d->samples.generation)->v_dc,
     };
     found.wanted = current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
 }
@@ -294,30 +296,30 @@ STAGE void bench_modulate(void)
 STAGE void bench_torque_path(void)
 {
     drive_t *d = the_copy();
-    const mrai_in_t *in = found.sample;
-    torque_estimate_add(&d->slow.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->slow.mrai));
+    const operating_point_t *in = found.sample;
+    torque_estimate_add(&d->mrai.isr.torque, &in->i, &in->flux, mrai_psi_delta_q15(&d->mrai.isr.law));
     const torque_loop_in_t loop = {
-        .command = d->task.torque_command,
-        .estimate = torque_estimate_mean(&d->task.torque_mean, &d->slow.torque),
+        .torque_commanded = d->task.torque_commanded,
+        .torque_estimated = torque_estimate_mean(&d->mrai.task.torque_mean, &d->mrai.isr.torque),
         .confidence = Q15_MAX,
         .enabled = true,
     };
-    d->task.torque_request = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &loop);
+    d->task.torque_corrected = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &loop);
 }
 
 /* The fast ISR's share of the robust identification: one period summed, every tenth hands the sums over. */
 STAGE void bench_window(void)
 {
     drive_t *d = the_copy();
-    const sample_t *sample = sample_box_look(&d->samples, d->samples.generation);
+    const sample_t *sample = sample_box_at(&d->samples, d->samples.generation);
     const identify_sample_t in = {
-        .i = sample->mrai.i,
-        .u = sample->mrai.u,
-        .flux = &sample->mrai.flux,
+        .i = sample->point.i,
+        .u = sample->point.u,
+        .flux = &sample->point.flux,
         .theta = sample->theta_e,
     };
     if (__builtin_expect(identify_window_step(&d->fast.window, &in), 0)) {
         window_box_write(&d->windows, &d->fast.window);
-        identify_window_restart(&d->fast.window);
+        identify_window_restart(&d->fast.window, d->motor.bases.periods_per_step);
     }
 }

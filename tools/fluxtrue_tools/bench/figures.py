@@ -95,7 +95,7 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
 def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
     """Shares of the processor, estimated, and the PWM frequency at which all of it takes half.
 
-    The task falls due in every tenth period, whatever their frequency.
+    The task falls due a thousand times a second, whatever that frequency.
     """
     work = runs["10 kHz work"]["cycles"]
     task, can = runs["1 kHz task"]["cycles"][1] / TASK_PERIODS, runs["CAN ISR"]["cycles"][1] * COMMAND_HZ
@@ -103,7 +103,7 @@ def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
         "10 kHz work, average": round(100 * work[1] * PWM_HZ / core_hz, 2),
         "10 kHz work, most": round(100 * work[2] * PWM_HZ / core_hz, 2),
         "with task and CAN, average": round(100 * ((work[1] + task) * PWM_HZ + can) / core_hz, 2),
-        "highest PWM frequency at 50 %": int((0.5 * core_hz - can) / (work[1] + task) // 100 * 100),
+        "highest PWM frequency at 50 %": int((0.5 * core_hz - can - task * PWM_HZ) / work[1] // 100 * 100),
     }
 
 

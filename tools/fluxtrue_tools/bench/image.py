@@ -145,7 +145,7 @@ def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
         spans: list[tuple[int, int, int]] = []
         speed = 0.0
         for milliseconds, torque, rpm, v_dc in DRIVE:
-            stand.command.values["TorqueRequest"] = torque
+            stand.command.values["TorqueRequested"] = torque
             loop.set("plant.vdc_V", v_dc)
             for k in range(milliseconds):
                 start, stop = (speed + (rpm - speed) * (k + j) / milliseconds for j in (0, 1))

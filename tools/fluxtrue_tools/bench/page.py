@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 from string import Template
@@ -16,6 +17,7 @@ from fluxtrue_tools.bench.sizes import STATE
 
 Figures = dict[str, Any]
 TASK_PERIODS = 10
+COLUMNS = 120
 CODE_MOST, STATE_MOST, FLASH_MOST, RAM_MOST = 12288, 1536, 65536, 12288
 UTILISATION_MOST = 10.0
 STACK_MOST = 0.5
@@ -25,40 +27,42 @@ BOUNDS: dict[str, tuple[float | None, float | None]] = {
     "torque_path": (40, None),
 }  # fmt: skip
 CONTAINS = {
-    "current_tick": "converter counts and angle → duties: offset and gain, Clarke, angle "
-    "tracker, sincos, Park, 2 PI, decoupling from the flux tables, voltage limiter, dead-time compensation, dc-voltage "
-    "normalisation, angle advance, SVPWM, all saturations",
-    "current_core": "what the leanest peer's tick has: sincos, Clarke, Park, 2 PI, inverse Park, clamp, SVPWM; "
-    "the firmware's stages with the rest switched off when compiled",
-    "measure": "offset and gain of 4 converter counts, Clarke, sum of the phases",
-    "angle_tracker": "angle → angle, speed, step",
-    "current_control": "2 PI, decoupling from the flux tables, dc-voltage normalisation, voltage limiter",
+    "current_tick": "from converter counts and angle to duties: offset and gain, Clarke, angle tracker, sincos, Park, "
+    "two PI controllers, decoupling with fluxes from the flux tables, voltage limiter, dead-time compensation, "
+    "dc-voltage normalisation, angle advance, SVPWM, all saturations. The look-up of the flux tables runs before the "
+    "counted region; it is the row *flux tables*",
+    "current_core": "what the tick of the leanest peer has: sincos, Clarke, Park, two PI controllers, inverse Park, "
+    "clamp, SVPWM. These are the firmware's stages with the rest switched off at compile time",
+    "measure": "offset and gain of four converter counts, Clarke, sum of the phases",
+    "angle_tracker": "from angle to angle, speed and step",
+    "current_control": "two PI controllers, decoupling, dc-voltage normalisation, voltage limiter",
     "modulate": "sincos, inverse Park, dead-time compensation, SVPWM, shortest pulses",
-    "flux_table": "i_d, i_q → both flux linkages, their slopes and cross terms",
-    "window": "currents, voltages, fluxes and angle added to the window of the robust identification; in every tenth "
-    "period the window is handed over",
+    "flux_table": "from i_d and i_q to both flux linkages, their slopes and cross terms",
+    "window": "currents, voltages, fluxes and angle are added to the window of the robust identification; in every "
+    "tenth period the window is handed over",
     "mrai": "the paper's identification, one period",
     "torque_estimate": "torque from currents, tables and identified flux, and its mean",
     "torque_path": "torque estimate and one step of the torque loop; in the drive only every tenth period has one",
-    "fast_isr": "the interrupt on a hardware interface of variables",
+    "fast_isr": "the interrupt on a hardware interface made of variables",
     "mrai_isr_paper": "MRAI, torque estimate, exchange",
     "task": "the drive's 1 kHz task without the bus",
 }
 TASK_CONTAINS = {
-    "identify": "window → operating point, tables and their slopes there, torque, rows of the robust identification; "
-    "in every tenth step the filter's update",
-    "trim": "identified voltage error → dead-time compensation",
-    "angle_harmonics": "what the encoder repeats once and twice a turn; one part of its table",
+    "identify": "from the window to the operating point, tables and slopes there, torque and the rows of the robust "
+    "identification; in every tenth step the update of the filter",
+    "trim": "from the identified voltage error to the dead-time compensation",
+    "angle_harmonics": "errors of the encoder once and twice per turn; one part of its table per step",
     "slow_monitors": "phases, sensors, current control, speed, angle offset, temperatures, torque",
-    "torque_limit": "request → torque allowed by reach, battery power, dc voltage, speed, temperatures",
+    "torque_limit": "from the requested torque to the torque that reach, battery power, dc voltage, speed and "
+    "temperatures allow",
     "torque_loop": "slew, one step of the torque loop",
-    "reference": "torque, speed, dc voltage → i_d, i_q (MTPA, field weakening), with what the voltage limiter has left "
-    "and what the magnets bear",
+    "reference": "from torque, speed and dc voltage to i_d and i_q (MTPA, field weakening), with the voltage that the "
+    "limiter has left and the demagnetisation limit",
     "target": "flux tables at the reference, set point of the current control, hand-over",
     "safe_state": "which safe state a fault would need now",
     "schedule": "gains and gates of the paper's identification, hand-over; with the paper's identification only",
     "supervisor": "state machine while torque is made",
-    "arbitrate": "limits, dead band, slew and jerk of what the bus asks",
+    "arbitrate": "limits, dead band, slew and jerk of the torque that the bus requests",
 }
 WHOLE_MOST = 400
 SHARE_MOST = 40
@@ -76,6 +80,14 @@ def table(head: str, rows: Iterable[Iterable[object]]) -> list[str]:
     lines.append("|" + "|".join("--:" if t.endswith(" ") and t.startswith("  ") else "---" for t in titles) + "|")
     lines += ["| " + " | ".join(str(c) for c in row) + " |" for row in rows]
     return [*lines, ""]
+
+
+def _wrapped(line: str) -> str:
+    """A line of prose at the width of the other pages; rows of tables and headings as they are."""
+    if line.startswith(("|", "#")) or not line:
+        return line
+    indent = "  " if line.startswith("- ") else ""
+    return textwrap.fill(line, COLUMNS, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def _bound(name: str, spread: list[float]) -> str:
@@ -102,22 +114,28 @@ def _kernels(figures: Figures) -> list[str]:
     for name, spread in figures["kernels"]["stages"].items():
         if name in ("both", "tick"):
             continue
-        rows.append((TITLES.get(name, name), CONTAINS.get(name, ""), *spread, _bound(name, spread)))
-    return table("kernel|contains|  min |  avg |  max |bound", rows)
+        rows.append((TITLES.get(name, name), *spread, _bound(name, spread)))
+    return table("kernel|  min |  avg |  max |bound", rows)
+
+
+def _contents(rows: Iterable[str], titles: dict[str, str], contains: dict[str, str]) -> list[str]:
+    """What the rows of a table stand for, as a list below it."""
+    return [*(f"- *{titles.get(name, name)}*: {contains[name]}." for name in rows if name in contains), ""]
 
 
 def _task_stages(figures: Figures) -> list[str]:
     stages = figures["kernels"]["task stages"]
-    rows = ((TASK_TITLES[name], TASK_CONTAINS[name], *spread) for name, spread in stages.items())
-    return table("stage|contains|  min |  avg |  max ", rows)
+    rows = ((TASK_TITLES[name], *spread) for name, spread in stages.items())
+    return table("stage|  min |  avg |  max ", rows)
 
 
 def _peers(figures: Figures) -> list[str]:
     tick = figures["kernels"]["stages"]["current_tick"]
-    ours = [("**Fluxtrue, current control**", f"fixed: {CONTAINS['current_tick']}", tick[1], tick[2])]
+    ours = [("**Fluxtrue, current control**", "fixed: *current control, counts to duties*", tick[1], tick[2])]
     both = figures["kernels"]["stages"].get("current_core")
     if both:
-        ours.append(("**Fluxtrue, the leanest peer's subset**", f"fixed: {CONTAINS['current_core']}", both[1], both[2]))
+        subset = "**Fluxtrue, the leanest peer's subset**"
+        ours.append((subset, "fixed: *of it what the leanest peer has*", both[1], both[2]))
     ours += [(p.source, p.content, p.average, p.maximum) for p in LOOPS]
     return table("control tick|contains|  avg |  max ", sorted(ours, key=lambda row: float(row[2])))
 
@@ -177,13 +195,16 @@ def _torque_share(stages: dict[str, list[float]]) -> float:
 def page(figures: Figures) -> str:
     """The whole document."""
     met, kernels = figures["drives"]["robust"]["met"], figures["kernels"]
-    share = _torque_share(kernels["stages"])
+    stages = kernels["stages"]
+    share = _torque_share(stages)
     tables: dict[str, list[str]] = {
+        "kernel_contents": _contents(stages, TITLES, CONTAINS),
+        "task_contents": _contents(kernels["task stages"], TASK_TITLES, TASK_CONTAINS),
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
         "task_stages": _task_stages(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
     }  # fmt: skip
-    return Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
+    text = Template(TEMPLATE.read_text(encoding="utf-8")).substitute(
         {name: "\n".join(lines) for name, lines in tables.items()},
         compiler=figures["compiler"], pipeline=cycles.PIPELINE, divide=cycles.DIVIDE, entry=cycles.ENTRY,
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
@@ -193,3 +214,4 @@ def page(figures: Figures) -> str:
         stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MOST),
         **{"return": cycles.RETURN},
     )  # fmt: skip
+    return "\n".join(_wrapped(line) for line in text.split("\n"))

@@ -21,7 +21,7 @@ NM, SIZE = "arm-none-eabi-nm", "arm-none-eabi-size"
 LIBRARIES = ("fx", "signal", "control")
 TABLES = re.compile(r"\.rodata\.(fx_)?\w*_?table$")
 # The drive's state: what the stages keep, and what they hand to each other; not the copy of the motor's data.
-STATE = ("fast", "slow", "task", "samples", "windows", "commands", "schedules")
+STATE = ("fast", "psi_d_error", "task", "samples", "windows", "commands", "mrai")
 _SECTION = re.compile(r"^\.(text|rodata|data|bss)(\S*)\s+(\d+)\s")
 
 
@@ -54,7 +54,7 @@ def _module(source: str, name: str) -> str:
     path = source.rpartition(":")[0]
     if "motor_tables.c" in path:
         return "motor data and tables"
-    for layer in ("fx", "signal", "control", "safety", "comm", "app"):
+    for layer in ("fx", "signal", "control", "safety", "comm", "drive", "storage", "calibration", "ecu"):
         if f"/firmware/{layer}/" in path or (layer == "fx" and name.startswith("fx_")):
             return f"firmware/{layer}"
     if "/bus/" in path:

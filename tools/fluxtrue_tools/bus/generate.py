@@ -18,7 +18,9 @@ from cantools.database.can import Database, Message
 from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import write_text
 
 PREFIX = "bus"
 
@@ -136,7 +138,7 @@ def narrow(source: Path, database: Database) -> None:
     if longest > 32:
         raise FluxtrueError(f"the DBC has a signal of {longest} bits, at most 32 are allowed")
     if WIDE in text:
-        source.write_text(text.replace(WIDE, NARROW).replace(*CASTS), encoding="utf-8")
+        write_text(source, text.replace(WIDE, NARROW).replace(*CASTS))
 
 
 def generate(dbc: Path, out: Path, node: str) -> None:
@@ -152,13 +154,13 @@ def generate(dbc: Path, out: Path, node: str) -> None:
     narrow(folder / "bus.c", database)
     sent = [message for message in database.messages if node in message.senders]
     received = [message for message in database.messages if node in message.receivers]
-    (folder / "signals.h").write_text(signals_header(sent, received), encoding="utf-8")
-    (folder / "exports.c").write_text("".join(exports(sent, received)), encoding="utf-8")
+    write_text(folder / "signals.h", signals_header(sent, received))
+    write_text(folder / "exports.c", "".join(exports(sent, received)))
 
 
-@click.command()
-@click.argument("dbc", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.argument("out", type=click.Path(file_okay=False, path_type=Path))
+@click.command(cls=paths.Command)
+@click.argument("dbc", type=paths.InputFile())
+@click.argument("out", type=paths.BuildFolder())
 @click.option("--node", default="INV", show_default=True, help="The node the code is for.")
 def main(dbc: Path, out: Path, node: str) -> None:
     """Write the C code of NODE for the messages of DBC to OUT."""

@@ -13,9 +13,10 @@ from pathlib import Path
 import click
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import write_text
 
 ROOT = Path(__file__).resolve().parents[3]
-TABLE = ROOT / "firmware" / "app" / "supervisor_table.c"
+TABLE = ROOT / "firmware" / "ecu" / "supervisor_table.c"
 PAGE = ROOT / "docs" / "howto" / "can.md"
 BEGIN, END = "<!-- states: begin -->\n", "<!-- states: end -->\n"
 
@@ -74,7 +75,7 @@ def main(check: bool) -> None:
     page = PAGE.read_text(encoding="utf-8")
     wanted = with_drawing(page, draw(read_table(TABLE)))
     if not check:
-        PAGE.write_text(wanted, encoding="utf-8")
+        write_text(PAGE, wanted)
     elif page != wanted:
         print(f"{PAGE} does not show the table of {TABLE.name}: run python -m fluxtrue_tools.bus.states")
         sys.exit(1)

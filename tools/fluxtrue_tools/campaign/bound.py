@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a perfect linear estimator could reach with the same data, docs/theory/information-bound.md.
 
-Units    torque error in percent of max(|command|, a tenth of rated), one standard deviation
+Units    torque error in percent of max(|requested torque|, a tenth of rated), one standard deviation
 """
 
 from typing import TYPE_CHECKING, Final
@@ -128,6 +128,6 @@ def _of_windows(campaign: Campaign, machine: Machine, physics: Physics, x: Array
     variance = noise_variance(campaign, machine, omega, 1.0) / periods
     own = [information(rows[[k, k + count]], np.full(2, variance[k])) for k in range(count)]
     deviation = torque_deviation(learnt, own, torque_jacobian(physics, x, seen, omega))
-    command = means[:, trace.columns.index("torque_command_Nm")]
-    base = np.maximum(np.abs(command), 0.1 * machine.rated_Nm)
+    requested = means[:, trace.columns.index("torque_requested_Nm")]
+    base = np.maximum(np.abs(requested), 0.1 * machine.rated_Nm)
     return [float(value) for value in 100.0 * deviation / base]

@@ -15,6 +15,8 @@ from fluxtrue_tools.campaign.machine import Machine
 from fluxtrue_tools.campaign.sample import Sample, draws, sample
 from fluxtrue_tools.campaign.spec import Campaign, Controller
 from fluxtrue_tools.campaign.windows import Window, plan
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.check import complaint
 from fluxtrue_tools.sim.library import Loop, LoopError
 
 Array = NDArray[np.float64]
@@ -24,8 +26,8 @@ WINDOW_ROW_S: Final = 0.001
 START_S: Final = 0.1  # gates on, no torque
 TRANSITION_S: Final = 0.05  # at least, from one window to the next
 
-CHANNELS: Final = ("truth.time_s", "torque_command_Nm", "truth.torque_mean_Nm", "truth.speed_rad_s", "truth.i_d_A",
-                   "truth.i_q_A", "torque_estimate_Nm", "voltage_limited", "fault_word")  # fmt: skip
+CHANNELS: Final = ("truth.time_s", "torque_requested_Nm", "truth.torque_mean_Nm", "truth.speed_rad_s", "truth.i_d_A",
+                   "truth.i_q_A", "torque_estimated_Nm", "voltage_limited", "fault_word")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class _Run:
 
     def _move(self, seconds: float, speed_rad_s: float, torque_Nm: float) -> Array:
         """Go to a speed and a torque on straight lines."""
-        ramps = {"torque_command_Nm": (self.torque, torque_Nm), "plant.speed_rad_s": (self.speed, speed_rad_s)}
+        ramps = {"torque_requested_Nm": (self.torque, torque_Nm), "plant.speed_rad_s": (self.speed, speed_rad_s)}
         rows = self.loop.run(round(seconds / self.loop.period_s), ramps)
         self.speed, self.torque = speed_rad_s, torque_Nm
         return rows
@@ -121,10 +123,10 @@ def _window_row(campaign: Campaign, machine: Machine, window: Window, columns: l
     base = max(abs(window.torque_Nm), 0.1 * machine.rated_Nm)
     return {
         "speed_rpm": window.speed_rpm,
-        "torque_command_Nm": window.torque_Nm,
+        "torque_requested_Nm": window.torque_Nm,
         "torque_Nm": mean["truth.torque_mean_Nm"],
         "torque_std_Nm": float(torque.std()),
-        "estimate_Nm": mean["torque_estimate_Nm"],
+        "estimate_Nm": mean["torque_estimated_Nm"],
         "id_A": mean["truth.i_d_A"],
         "iq_A": mean["truth.i_q_A"],
         "error_percent": 100.0 * (mean["truth.torque_mean_Nm"] - window.torque_Nm) / base,
@@ -162,6 +164,8 @@ def run_case(campaign: Campaign, machine: Machine, case: int,
              keep: Callable[[str, Trace], None] | None = None) -> list[dict[str, Any]]:  # fmt: skip
     """All controllers of a case, a row per window; the same numbers wherever and whenever it runs."""
     plan = make_plan(campaign, machine, case)
+    if not plan.windows:
+        return []  # this plant reaches the smallest torque nowhere
     truth = {f"plant_{name}": value for name, value in plan.sample.factors.items()}
     rows = []
     for controller in campaign.controller:
@@ -175,17 +179,12 @@ def run_case(campaign: Campaign, machine: Machine, case: int,
 def check_names(campaign: Campaign, machine: Machine, where: str) -> None:
     """Refuse what the plant or the firmware would refuse, before the first case."""
     plan = make_plan(campaign, machine, 0)
-    for controller in campaign.controller:
+    for index, controller in enumerate(campaign.controller):
         try:
             with _Run(campaign, machine, plan, controller).loop as loop:
-                loop.record([*CHANNELS, *campaign.check.count_nonzero])
+                recorded = [*CHANNELS, *campaign.check.count_nonzero]
+                loop.record(recorded)
         except LoopError as error:
-            raise LoopErrorAt(where, controller.name, error) from error
-
-
-class LoopErrorAt(LoopError):
-    """A refused name with the file and the controller it stands in."""
-
-    def __init__(self, where: str, controller: str, error: LoopError) -> None:
-        Exception.__init__(self, f"{where}: controller '{controller}': {error}")
-        self.name, self.code = error.name, error.code
+            key = error.name if error.name.startswith("plant.") else f"controller.{index}.set.{error.name}"
+            key = "check.count_nonzero" if error.name in campaign.check.count_nonzero else key
+            raise FluxtrueError(f"{where}: {complaint(error, key, machine.motor)}") from error

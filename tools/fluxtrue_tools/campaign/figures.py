@@ -57,7 +57,7 @@ def _plain_ticks(axes: Any, edges: np.ndarray) -> None:
 
 
 def _map(axis: Any, rows: pd.DataFrame, speeds: np.ndarray, torques: np.ndarray, top_percent: float) -> Any:
-    driving = rows["torque_command_Nm"] * np.sign(rows["speed_rpm"])
+    driving = rows["torque_requested_Nm"] * np.sign(rows["speed_rpm"])
     place = [rows["speed_rpm"].abs(), driving]
     count, _, _ = np.histogram2d(*place, bins=[speeds, torques])
     total, _, _ = np.histogram2d(*place, bins=[speeds, torques], weights=rows["error_percent"] ** 2)
@@ -79,7 +79,7 @@ def maps(campaign: Campaign, table: pd.DataFrame) -> Figure:
     figure, axes = plt.subplots(1, count, figsize=(3.2 * count + 1.6, 3.8), layout="constrained",
                                 sharey=True, squeeze=False)  # fmt: skip
     speeds = _speed_edges(table)
-    top = table["torque_command_Nm"].abs().max() * 1.001
+    top = table["torque_requested_Nm"].abs().max() * 1.001
     torques = np.linspace(-top, top, TORQUE_BINS + 1)
     coarse, finer = list(axes[0][: len(names)]), list(axes[0][len(names) :])
     for group, shown, scale, mark in ((coarse, names, SCALE_PERCENT, ""), (finer, fine, FINE_PERCENT, ", finer scale")):
@@ -158,7 +158,7 @@ def histograms(campaign: Campaign, table: pd.DataFrame) -> Figure:
         for name, colour in _colours(campaign).items():
             rows = table[(table["controller"] == name) & (table["band"] == band)]
             # An error helps or hurts along the torque, whichever sign that has.
-            error = np.clip(rows["error_percent"] * np.sign(rows["torque_command_Nm"]), bins[0], bins[-1])
+            error = np.clip(rows["error_percent"] * np.sign(rows["torque_requested_Nm"]), bins[0], bins[-1])
             weight = np.full(len(error), 100.0 / max(1, len(error)))
             axis.hist(error, bins=bins, weights=weight, histtype="step", color=colour, label=name, lw=1.4)
         axis.set_title(band_name(campaign, band), loc="left")
@@ -175,9 +175,9 @@ def _series(axes: Any, trace: Trace, colour: str, name: str) -> None:
     start = trace.drive[-1, column("truth.time_s")] if len(trace.drive) else 0.0
     now = every[:, column("truth.time_s")] - start
     axes[1].plot(now, every[:, column("truth.torque_mean_Nm")], color=colour, lw=0.7, label=f"{name}: air gap")
-    command, torque = (every[:, column(c)] for c in ("torque_command_Nm", "truth.torque_mean_Nm"))
-    axes[2].plot(now, torque - command, color=colour, lw=0.7, label=name)
-    axes[3].plot(now, every[:, column("torque_estimate_Nm")] - torque, color=colour, lw=0.7, label=name)
+    requested, torque = (every[:, column(c)] for c in ("torque_requested_Nm", "truth.torque_mean_Nm"))
+    axes[2].plot(now, torque - requested, color=colour, lw=0.7, label=name)
+    axes[3].plot(now, every[:, column("torque_estimated_Nm")] - torque, color=colour, lw=0.7, label=name)
     axes[0].plot(now, every[:, column("truth.speed_rad_s")] * 60.0 / (2.0 * np.pi), color=colour, lw=0.9, label=name)
 
 
@@ -188,7 +188,7 @@ def case_figure(campaign: Campaign, traces: dict[str, Trace], title: str) -> Fig
         for name, colour in _colours(campaign).items():
             if name in traces:
                 _series(axes, traces[name], colour, name)
-        labels = ("speed, rpm", "torque, N·m", "torque less command, N·m", "estimate less torque, N·m")
+        labels = ("speed, rpm", "torque, N·m", "torque less requested, N·m", "estimated less torque, N·m")
         for axis, label in zip(axes, labels, strict=True):
             axis.set_ylabel(label)
         for axis in axes[2:]:

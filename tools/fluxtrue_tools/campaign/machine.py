@@ -37,7 +37,7 @@ class Machine:
 
     @property
     def rated_Nm(self) -> float:
-        """Errors are relative to the command, but never to less than a tenth of this."""
+        """Errors are relative to the requested torque, but never to less than a tenth of this."""
         return self.motor.torque_max_Nm
 
 

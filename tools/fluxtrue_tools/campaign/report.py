@@ -9,6 +9,7 @@ from typing import Any, Final
 import jinja2
 import pandas as pd
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.campaign import figures
 from fluxtrue_tools.campaign.score import BANDS, CRAWL, Score, band_of
 from fluxtrue_tools.campaign.spec import Campaign, Nominal
@@ -28,8 +29,8 @@ def worst_cases(table: pd.DataFrame, controller: str, command: str) -> list[dict
             "case": int(row["case"]),
             "error_percent": float(row["error_percent"]),
             "speed_rpm": float(row["speed_rpm"]),
-            "torque_command_Nm": float(row["torque_command_Nm"]),
-            "fault_word": int(row["run_fault_word"]),
+            "torque_requested_Nm": float(row["torque_requested_Nm"]),
+            "faults": ", ".join(faults.named(int(row["run_fault_word"]))) or "none",
             "voltage_limited": float(row["voltage_limited"]),
             "command": command.format(case=int(row["case"])),
         }

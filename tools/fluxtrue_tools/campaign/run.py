@@ -13,12 +13,15 @@ from tqdm import tqdm
 
 from fluxtrue_tools.campaign import figures, report, schedule, terminal
 from fluxtrue_tools.campaign.case import Trace, check_names, run_case
+from fluxtrue_tools.campaign.check import check
 from fluxtrue_tools.campaign.machine import machine_of, make_machine
 from fluxtrue_tools.campaign.score import score
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.campaign.store import Store
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import Outputs, write_text
 from fluxtrue_tools.sim.build import MotorFolder
-from fluxtrue_tools.sim.output import atomic, json_text, write_text
+from fluxtrue_tools.sim.output import json_text
 
 
 @dataclass(frozen=True)
@@ -59,19 +62,21 @@ def _simulate(job: Job, store: Store, scheduler: str | None, workers: int | None
 def _draw(sheet: Any, plot: Path) -> None:
     import matplotlib.pyplot as plt
 
-    with atomic(plot) as scratch:
-        sheet.savefig(scratch, dpi=120)
-    plt.close(sheet)
+    try:
+        sheet.savefig(plot, dpi=120)
+    finally:
+        plt.close(sheet)
 
 
-def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
+def whole(job: Job, files: Outputs, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
     """The text for the terminal, and whether every bound is met."""
     machine = make_machine(job.folder, job.campaign, job.where)
+    check(job.campaign, machine, job.where)
     check_names(job.campaign, machine, job.where)
     store = Store(job.out)
-    store.open(_manifest(job), fresh)
-    _simulate(job, store, scheduler, workers)
-    table = store.load(job.cases)
+    with store.opened(_manifest(job), fresh):
+        _simulate(job, store, scheduler, workers)
+        table = store.load(job.cases)
     scores = score(job.campaign, table)
     promised = terminal.promises(job.campaign, scores)
     data = report.summary(job.campaign, table, scores, promised)
@@ -79,19 +84,25 @@ def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) 
     page = report.html(job.campaign, table, scores, promised, machine.nominal, job.command)
     write_text(job.out / "report.html", page)
     if job.plot is not None:
-        _draw(figures.headline(job.campaign, table), job.plot)
+        _draw(figures.headline(job.campaign, table), files.scratch(job.plot))
     parts = [terminal.figures_table(job.campaign, scores), terminal.trouble_table(job.campaign, scores)]
     parts += [terminal.bounds_table(promised)] if promised else []
     parts.append(str(job.out / "report.html"))
     return "\n\n".join(parts), all(bound.met for _, bound in promised)
 
 
-def one_case(campaign: Campaign, folder: MotorFolder, case: int, plot: Path | None, where: str) -> str:
+def one_case(
+    campaign: Campaign, folder: MotorFolder, case: int, files: Outputs, plot: Path | None, where: str
+) -> str:
     """Its plant and its windows as text, its time series as a picture."""
     machine = make_machine(folder, campaign, where)
+    check(campaign, machine, where)
     check_names(campaign, machine, where)
     traces: dict[str, Trace] = {}
     table = pd.DataFrame(run_case(campaign, machine, case, traces.__setitem__))
+    if table.empty:
+        raise FluxtrueError(f"{where}: case {case} has no window: its plant reaches windows.torque_min_Nm = "
+                            f"{campaign.windows.torque_min_Nm:g} N·m at none of its speeds")  # fmt: skip
     if plot is not None:
-        _draw(figures.case_figure(campaign, traces, f"{Path(where).stem}, case {case}"), plot)
+        _draw(figures.case_figure(campaign, traces, f"{Path(where).stem}, case {case}"), files.scratch(plot))
     return terminal.case_table(campaign, table)

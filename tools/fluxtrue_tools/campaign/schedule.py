@@ -13,11 +13,13 @@ from fluxtrue_tools.errors import FluxtrueError
 
 Task = Callable[[int], Any]
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
+SCHEDULER_S = 60  # a busy one answers, too
 
 
 def _worker() -> None:
     """The parent alone answers Ctrl-C; and nobody is left waiting when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
@@ -39,7 +41,7 @@ def dask(task: Task, cases: list[int], address: str) -> Iterator[tuple[int, Any]
     from distributed import as_completed as dask_completed
 
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=SCHEDULER_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise FluxtrueError(f"--scheduler {address}: no scheduler answers ({error})") from error
     with client:

@@ -123,17 +123,23 @@ def bounds(campaign: Campaign, scored: Score) -> list[Bound]:
     """What a checked controller has promised."""
     limits, split = campaign.check.limits, campaign.check.band_rpm
     low, high = scored.bands[LOW], scored.bands[HIGH]
-    promised = [
-        Bound(f"rms, 300 to {split:g} rpm", low.rms, limits.rms_low, "%"),
-        Bound(f"99th percentile, 300 to {split:g} rpm", low.p99, limits.p99_low, "%"),
-        Bound(f"rms, above {split:g} rpm", high.rms, limits.rms_high, "%"),
-        Bound(f"99th percentile, above {split:g} rpm", high.p99, limits.p99_high, "%"),
+    promised = []
+    if low.windows:
+        promised += [Bound(f"rms, 300 to {split:g} rpm", low.rms, limits.rms_low, "%"),
+                     Bound(f"99th percentile, 300 to {split:g} rpm", low.p99, limits.p99_low, "%")]  # fmt: skip
+    if high.windows:
+        promised += [Bound(f"rms, above {split:g} rpm", high.rms, limits.rms_high, "%"),
+                     Bound(f"99th percentile, above {split:g} rpm", high.p99, limits.p99_high, "%")]  # fmt: skip
+    promised += [
         Bound("trips", scored.trouble.trips, 0.0, "cases"),
         Bound("instabilities", scored.trouble.unstable, 0.0, "cases"),
     ]
-    if scored.harm is not None:
+    if scored.harm is not None and (low.windows or high.windows):
+        promised.append(
+            Bound("windows without harm", scored.harm.harmless_share, limits.no_harm_share, "%", at_least=True)
+        )
+    if scored.harm is not None and scored.bands[CRAWL].windows:
         promised += [
-            Bound("windows without harm", scored.harm.harmless_share, limits.no_harm_share, "%", at_least=True),
             Bound("below 300 rpm worse than the tables by", max(0.0, scored.harm.crawl_excess),
                   limits.low_speed_slack, "%"),
         ]  # fmt: skip

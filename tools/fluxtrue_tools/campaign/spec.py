@@ -2,18 +2,14 @@
 """campaign.toml: strict, every field with its unit in the name."""
 
 import hashlib
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.sim.scenario import NotNegative, Number, Plant, Positive
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+from fluxtrue_tools import strict
+from fluxtrue_tools.sim.scenario import NotNegative, Plant, Positive
+from fluxtrue_tools.strict import Flag, Number, Strict
 
 
 def _pair(value: Any) -> Any:
@@ -32,17 +28,13 @@ def _list(value: Any) -> Any:
     return tuple(value)
 
 
-def _flag(value: Any) -> Any:
-    return float(value) if isinstance(value, bool | int) else value
-
-
 def _within(low: float, high: float) -> Any:
     """A range inside given limits: what lies beyond them is a slip of the units."""
     number = Annotated[Number, Field(ge=low, le=high)]
     return Annotated[tuple[number, number], BeforeValidator(_pair)]  # type: ignore[valid-type]
 
 
-class Spread(_Strict):
+class Spread(Strict):
     """Uniform ranges. Factors of the motor's data, unless the name has a unit."""
 
     lq_scale: _within(0.5, 2.0) = (0.9, 1.1)
@@ -61,7 +53,7 @@ class Spread(_Strict):
     iron_loss_scale: _within(0.0, 3.0) = (0.7, 1.3)
 
 
-class Nominal(_Strict):
+class Nominal(Strict):
     """What the spread is about where the motor's data say nothing (or 0)."""
 
     device_drop_V: NotNegative = 0.0
@@ -69,7 +61,7 @@ class Nominal(_Strict):
     iron_k_e: NotNegative = 0.0
 
 
-class Vehicle(_Strict):
+class Vehicle(Strict):
     """Turns a car's speed into the motor's torque and speed."""
 
     mass_kg: Positive = 1600.0
@@ -79,14 +71,14 @@ class Vehicle(_Strict):
     drag_N_per_m2_s2: NotNegative = 0.40
 
 
-class Drive(_Strict):
+class Drive(Strict):
     """The warm-up drive that the controller learns from."""
 
     duration_s: Annotated[Number, Field(ge=1, le=600)] = 60.0
     vehicle: Vehicle = Vehicle()
 
 
-class Windows(_Strict):
+class Windows(Strict):
     """Where torque is measured."""
 
     speed_rpm: Annotated[
@@ -108,15 +100,15 @@ class Windows(_Strict):
         return self
 
 
-class Controller(_Strict):
+class Controller(Strict):
     """One way to run the firmware: names and numbers as fluxtrue_set() takes them."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,23}$")]
-    set: dict[str, Annotated[float, BeforeValidator(_flag)]]
+    set: dict[str, Flag]
     warm_up: bool = True
 
 
-class Limits(_Strict):
+class Limits(Strict):
     """The bounds that `check` holds its controllers to, percent."""
 
     rms_low: Positive = 0.8
@@ -129,7 +121,7 @@ class Limits(_Strict):
     low_speed_slack: Positive = 1.0
 
 
-class Check(_Strict):
+class Check(Strict):
     """Who is held to the bounds, and against whom harm is measured."""
 
     controllers: Annotated[tuple[str, ...], BeforeValidator(_list)] = ()
@@ -140,10 +132,10 @@ class Check(_Strict):
     limits: Limits = Limits()
 
 
-class Campaign(_Strict):
+class Campaign(Strict):
     """One campaign."""
 
-    motor: str = Field(min_length=1)
+    motor: Annotated[str, Field(min_length=1)]
     cases: Annotated[int, Field(ge=1, le=100000)]
     seed: Annotated[int, Field(ge=0, lt=2**63)]
     noise_share: Annotated[Number, Field(ge=0, le=0.1)] = 0.002
@@ -172,49 +164,11 @@ class Campaign(_Strict):
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
 
-_ALLOWED = {"missing": "this field is required", "extra_forbidden": "unknown field"}
-
-
-def _fields(location: tuple[int | str, ...]) -> str:
-    """The fields of the table that a bad key is in."""
-    model: Any = Campaign
-    for part in location[:-1]:
-        if isinstance(part, str):
-            model = {"controller": Controller}.get(part) or model.model_fields[part].annotation
-    fields = getattr(model, "model_fields", None)
-    return f", allowed: {', '.join(fields)}" if fields else ""
-
-
-def _explain(error: ValidationError) -> str:
-    """The first complaint as one line: field, value, what is allowed."""
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
-    text = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
-    if not where or (first["type"] == "value_error" and text.startswith(where)):
-        return text
-    if first["type"] in _ALLOWED:
-        return f"{where}: {text}{_fields(first['loc'])}"
-    shown = repr(first["input"])
-    shown = shown if len(shown) <= 60 else shown[:57] + "..."
-    return f"{where} = {shown}: {text[0].lower() + text[1:]}"
-
-
 def parse(text: str, name: str) -> Campaign:
     """A campaign from TOML text; `name` is for messages."""
-    try:
-        return Campaign.model_validate(tomllib.loads(text))
-    except ValidationError as error:
-        raise FluxtrueError(f"{name}: {_explain(error)}") from error
-    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
-        raise FluxtrueError(f"{name}: not TOML: {error}") from error
+    return strict.parse(Campaign, text, name)
 
 
 def read(path: Path) -> Campaign:
     """A campaign file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise FluxtrueError(f"{path}: not UTF-8 text") from error
-    return parse(text, str(path))
+    return parse(strict.read_text(path), str(path))

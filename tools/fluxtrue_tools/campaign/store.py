@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The campaign's folder: one Parquet file per finished case, so that a run can stop anywhere and go on."""
 
+import contextlib
 import json
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +12,7 @@ from typing import Any, Final
 import pandas as pd
 
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.sim.output import atomic, write_text
+from fluxtrue_tools.outputs import PREFIX, atomic, write_text
 
 MANIFEST: Final = "campaign.json"
 RESULTS: Final = "results.parquet"
@@ -26,6 +28,18 @@ class Store:
     def _cases(self) -> Path:
         return self.folder / "cases"
 
+    @contextlib.contextmanager
+    def opened(self, manifest: dict[str, Any], fresh: bool) -> Iterator[None]:
+        """The folder for one run; a run that finishes no case leaves no folder that was not there before."""
+        missing = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        try:
+            self.open(manifest, fresh)
+            yield
+        except BaseException:
+            if missing and not any(self._cases.glob("case-*")):
+                shutil.rmtree(missing[-1], ignore_errors=True)
+            raise
+
     def open(self, manifest: dict[str, Any], fresh: bool) -> None:
         """Make the folder or go on with it; results of another campaign or another firmware are not mixed in."""
         path = self.folder / MANIFEST
@@ -36,7 +50,7 @@ class Store:
             self._cases.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise FluxtrueError(f"--out {self.folder}: cannot be made ({error.strerror})") from error
-        for scratch in self._cases.glob(".case-*"):  # of a run that was killed
+        for scratch in self._cases.glob(f"{PREFIX}*"):  # of a run that was killed
             scratch.unlink(missing_ok=True)
         if not path.is_file():
             write_text(path, json.dumps(manifest, indent=1) + "\n")
@@ -66,13 +80,18 @@ class Store:
         return [case for case in cases if not self._path(case).is_file()]
 
     def save(self, case: int, rows: list[dict[str, Any]]) -> None:
-        """Whole or not at all."""
+        """Whole or not at all; a case without a window leaves nothing."""
+        if not rows:
+            return
         with atomic(self._path(case)) as scratch:
             pd.DataFrame(rows).to_parquet(scratch, index=False)
 
     def load(self, cases: range) -> pd.DataFrame:
         """Every finished case of the range, and the same as one file."""
         frames = [pd.read_parquet(self._path(case)) for case in cases if self._path(case).is_file()]
+        if not frames:
+            raise FluxtrueError(f"{self.folder}: no case has a window: no plant reaches windows.torque_min_Nm at any "
+                                "speed drawn, allowed: less torque, lower speeds or a smaller spread")  # fmt: skip
         table = pd.concat(frames, ignore_index=True)
         with atomic(self.folder / RESULTS) as scratch:
             table.to_parquet(scratch, index=False)

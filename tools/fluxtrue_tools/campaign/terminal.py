@@ -3,6 +3,7 @@
 
 import pandas as pd
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.campaign.score import BANDS, CRAWL, Score, bounds
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.demo.experiment import Bound
@@ -66,14 +67,15 @@ def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
     plant = "\n".join(f"{name.removeprefix('plant_')} = {first[name]:.10g}"
                       for name in table.columns if name.startswith("plant_"))  # fmt: skip
     names = [controller.name for controller in campaign.controller]
-    cells: list[tuple[str, ...]] = [("window", "rpm", "command N·m", *(f"{name} N·m" for name in names),
+    cells: list[tuple[str, ...]] = [("window", "rpm", "requested N·m", *(f"{name} N·m" for name in names),
                                      *(f"{name} %" for name in names), "bound %")]  # fmt: skip
     for window, rows in table.groupby("window"):
         rows = rows.set_index("controller")
         bound = rows["bound_percent"].max()
-        cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_command_Nm'].iloc[0]:.3f}",
+        cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_requested_Nm'].iloc[0]:.3f}",
                       *(f"{rows['torque_Nm'][name]:.10g}" for name in names),
                       *(f"{rows['error_percent'][name]:+.2f}" for name in names), f"{bound:.2f}"))  # fmt: skip
-    faults = table.groupby("controller", sort=False)["run_fault_word"].first()
-    tripped = ", ".join(f"{name}: fault word {word}" for name, word in faults.items() if word) or "no trip"
+    words = table.groupby("controller", sort=False)["run_fault_word"].first()
+    said = [f"{name}: {', '.join(faults.named(int(word)))}" for name, word in words.items() if word]
+    tripped = "; ".join(said) or "no trip"
     return f"{plant}\n\n{_columns(cells)}\n\n{tripped}"

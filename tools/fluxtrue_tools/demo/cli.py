@@ -8,15 +8,16 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools import paths
 
 EXIT_BOUND_MISSED = 1
+_FOLDER = paths.OutputFolder("report.html", "summary.json")
 
 
-@click.command()
+@click.command(cls=paths.Command)
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=_FOLDER,
     help="Folder for report.html and summary.json.  [default: build/demo]",
 )
 def demo(out: Path | None) -> int:
@@ -26,13 +27,12 @@ def demo(out: Path | None) -> int:
     from fluxtrue_tools.demo.experiment import bench
     from fluxtrue_tools.demo.grid import job_count
     from fluxtrue_tools.sim.build import ROOT
-    from fluxtrue_tools.sim.output import json_text, write_text
+    from fluxtrue_tools.sim.output import json_text
 
-    folder = out or ROOT / "build" / "demo"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FluxtrueError(f"--out {folder}: cannot be made ({error.strerror})") from error
+    folder, outputs = out, paths.outputs()
+    if folder is None:
+        folder = ROOT / "build" / "demo"
+        outputs.folder("--out", folder, _FOLDER.names)
     begin = time.monotonic()
 
     def say(text: str) -> None:
@@ -49,8 +49,10 @@ def demo(out: Path | None) -> int:
 
     demonstration = demonstrate(bench(), say, grid_done)
     say("report")
-    write_text(folder / "report.html", report.html(demonstration))
-    write_text(folder / "summary.json", json_text(demonstration.summary()))
+    with outputs:
+        made = outputs.scratch(folder)
+        (made / "report.html").write_text(report.html(demonstration), encoding="utf-8")
+        (made / "summary.json").write_text(json_text(demonstration.summary()), encoding="utf-8")
     click.echo(report.terminal(demonstration))
     click.echo(f"\n{folder / 'report.html'}\n{folder / 'summary.json'}")
     missed = demonstration.missed()

@@ -47,9 +47,9 @@ def _mark(axes: Axes, first: float, last: float, text: str, colour: str) -> None
     )  # fmt: skip
 
 
-def _zoom(axes: Axes, command: float) -> None:
+def _zoom(axes: Axes, requested: float) -> None:
     """Ten percent must look like ten percent."""
-    axes.set_ylim(0.84 * command, 1.06 * command)
+    axes.set_ylim(0.84 * requested, 1.06 * requested)
 
 
 @_styled
@@ -58,7 +58,7 @@ def story(run: Recording, parts: Sequence[tuple[float, float, str, str]]) -> Fig
     figure, axes = _sheet(2, 1, (9, 5.2), sharex=True, height_ratios=[2, 1])
     top, bottom = axes[:, 0]
     torque(top, run)
-    _zoom(top, float(run["torque_command_Nm"][-1]))
+    _zoom(top, float(run["torque_requested_Nm"][-1]))
     for part in parts:
         _mark(top, *part)
     finish(top, "Shaft torque", "N·m")
@@ -106,10 +106,10 @@ def fig7(run: Recording) -> Figure:
 
 def _point_axis(top: Axes, bottom: Axes, points: list[dict[str, float]]) -> None:
     """Torque under the lower axes, speed over the upper."""
-    labels = [f"{p['torque_command_Nm']:+.0f}" for p in points]
+    labels = [f"{p['torque_requested_Nm']:+.0f}" for p in points]
     bottom.set_xticks(range(len(points)), labels, rotation=90, fontsize=7)
     bottom.set_xlim(-0.5, len(points) - 0.5)
-    bottom.set_xlabel("torque command, N·m")
+    bottom.set_xlabel("requested torque, N·m")
     speeds = [p["speed_rpm"] for p in points]
     for speed in dict.fromkeys(speeds):
         at = [k for k, s in enumerate(speeds) if s == speed]
@@ -128,12 +128,12 @@ def grid(points: list[dict[str, float]]) -> Figure:
     top, bottom = axes[:, 0]
     at = np.arange(len(points))
     closed = [p["torque_error_closed_percent"] for p in points]
-    allowed = np.array([allowed_percent(p["torque_command_Nm"]) for p in points])
+    allowed = np.array([allowed_percent(p["torque_requested_Nm"]) for p in points])
     top.bar(at, [p["torque_error_open_percent"] for p in points], color=SECOND, label="tables alone")
     top.plot(at, closed, "o", ms=4, color=TRUTH, label="torque loop closed")
     bottom.bar(at, 2 * allowed, bottom=-allowed, color=COMMAND, alpha=0.2, label="allowed")
     bottom.plot(at, closed, "o", ms=4, color=TRUTH, label="torque loop closed")
-    finish(top, "", "torque error, % of command")
+    finish(top, "", "torque error, % of requested")
     finish(bottom, "", "the same, enlarged, %")
     for axis in (top, bottom):
         low, high = axis.get_ylim()
@@ -164,13 +164,13 @@ def steps(result: Result) -> Figure:
     figure, axes = _sheet(1, 2, (10, 3.6))
     left, right = axes[0]
     for axis, run, columns in (
-        (left, result.runs["torque"], ("torque_command_Nm", "true_torque_Nm", "torque_estimate_Nm")),
+        (left, result.runs["torque"], ("torque_requested_Nm", "true_torque_Nm", "torque_estimated_Nm")),
         (right, result.runs["current"], ("iq_ref_A", "true_i_q_A", "iq_A")),
     ):
         now = 1e3 * (run["time_s"] - STEP_S)
         shown = (now > -1) & (now < 12)
         for column, colour, label in zip(
-            columns, (COMMAND, TRUTH, ESTIMATE), ("command", "plant", "controller"), strict=True
+            columns, (COMMAND, TRUTH, ESTIMATE), ("requested", "plant", "estimated"), strict=True
         ):
             axis.plot(now[shown], run[column][shown], color=colour, label=label)
     right.plot(

@@ -95,7 +95,7 @@ def _point(speed_rpm: float, torque_Nm: float, row: Row) -> dict[str, float]:
     closed = row["firmware", True]
     return {
         "speed_rpm": speed_rpm,
-        "torque_command_Nm": torque_Nm,
+        "torque_requested_Nm": torque_Nm,
         "torque_error_open_percent": number(row["firmware", False].torque_error_percent, 4),
         "torque_error_closed_percent": number(closed.torque_error_percent, 4),
         "psi_error_percent": number(closed.error_percent("psi_f_Vs", "true_psi_f_Vs"), 4),
@@ -106,7 +106,7 @@ def _point(speed_rpm: float, torque_Nm: float, row: Row) -> dict[str, float]:
 
 
 def _difference(speed_rpm: float, torque_Nm: float, row: Row, rated: float) -> dict[str, float]:
-    point = {"speed_rpm": speed_rpm, "torque_command_Nm": torque_Nm}
+    point = {"speed_rpm": speed_rpm, "torque_requested_Nm": torque_Nm}
     for loop, closed in (("open", False), ("closed", True)):
         torque = {kind: row[kind, closed].mean("true_torque_Nm") for kind in ("firmware", "twin")}
         difference = 100.0 * (torque["firmware"] - torque["twin"]) / rated
@@ -115,16 +115,16 @@ def _difference(speed_rpm: float, torque_Nm: float, row: Row, rated: float) -> d
 
 
 def allowed_percent(torque_Nm: float) -> float:
-    """0.5 % of the command or 0.15 N·m, whichever is larger."""
+    """0.5 % of the requested torque or 0.15 N·m, whichever is larger."""
     return max(CLOSED_PERCENT, 100.0 * CLOSED_NM / abs(torque_Nm))
 
 
 def _grid_result(points: list[dict[str, float]]) -> Result:
     bounds = [
         Bound(
-            f"closed-loop torque error at {p['speed_rpm']:g} rpm, {p['torque_command_Nm']:g} N·m",
+            f"closed-loop torque error at {p['speed_rpm']:g} rpm, {p['torque_requested_Nm']:g} N·m",
             p["torque_error_closed_percent"],
-            allowed_percent(p["torque_command_Nm"]),
+            allowed_percent(p["torque_requested_Nm"]),
             "%",
         )
         for p in points
@@ -137,7 +137,7 @@ def _twin_result(points: list[dict[str, float]]) -> Result:
     worst = max((p[key] for p in points for key in keys), key=abs)
     bounds = [
         Bound(
-            f"firmware less twin at {p['speed_rpm']:g} rpm, {p['torque_command_Nm']:g} N·m, {key.split('_')[2]}",
+            f"firmware less twin at {p['speed_rpm']:g} rpm, {p['torque_requested_Nm']:g} N·m, {key.split('_')[2]}",
             p[key],
             TWIN_PERCENT,
             "% of rated",

@@ -115,13 +115,13 @@ def _figures(demonstration: Demonstration) -> dict[str, str]:
 def _headline(demonstration: Demonstration) -> str:
     run = demonstration.story
     assert run is not None
-    command = run.mean("torque_command_Nm", (0.9, 1.6))
+    requested = run.mean("torque_requested_Nm", (0.9, 1.6))
     lost = run.mean("true_torque_Nm", (0.65, 0.8))
     back = run.mean("true_torque_Nm", (1.3, 1.6))
     return (
-        f"A measured traction machine at 3000 rpm is asked for {command:.0f} N·m. Its magnets lose 15 % of their "
-        f"flux: the shaft gets {lost:.1f} N·m ({100 * (lost / command - 1):+.1f} %). At 0.8 s the firmware starts "
-        f"to identify the flux and closes its torque loop: {back:.2f} N·m ({100 * (back / command - 1):+.2f} %)."
+        f"A measured traction machine at 3000 rpm is asked for {requested:.0f} N·m. Its magnets lose 15 % of their "
+        f"flux: the shaft gets {lost:.1f} N·m ({100 * (lost / requested - 1):+.1f} %). At 0.8 s the firmware starts "
+        f"to identify the flux and closes its torque loop: {back:.2f} N·m ({100 * (back / requested - 1):+.2f} %)."
     )
 
 

@@ -69,12 +69,13 @@ def prepare(
     build_dir: Path | None = None,
     base: Path | None = None,
     flashed: bool = False,
+    where: str = "motor",
 ) -> Parts:
     """Build what is missing. Without `elf` the image is built, for FLUXTRUE_MOTOR's default.
 
     `flashed` chooses the image that the bus commands.
     """
-    built = motors.load(motor, build_dir, base)
+    built = motors.load(motor, build_dir, base, where)
     host = built.folder.folder.parents[1]
     shared = built.folder.folder / "libfluxtrue_emu.so"
     if not shared.is_file() or "FLUXTRUE_BUILD_DIR" not in os.environ:

@@ -2,6 +2,7 @@
 """The emulated processor by itself: any ELF file for the S32K144, run, read, snapshot."""
 
 import ctypes
+from enum import Enum
 from pathlib import Path
 from typing import Final
 
@@ -9,11 +10,37 @@ from fluxtrue_tools.emulate.library import COUNTING, ERROR_SIZE, FAST
 from fluxtrue_tools.errors import FluxtrueError
 
 TICKS_PER_S: Final = 3_360_000_000
-LIMIT, CENTRE, BREAK, FAILED = 0, 1, 2, -1
+LIMIT, CENTRE, BREAK = 0, 1, 2
 NO_REGISTER: Final = 2**64 - 1
 
 _U64, _U32, _INT, _BOOL = ctypes.c_uint64, ctypes.c_uint32, ctypes.c_int, ctypes.c_bool
 _HERE, _TEXT = ctypes.c_void_p, ctypes.c_char_p
+
+
+class Bridge(ctypes.Structure):
+    """emu_bridge_t."""
+
+    _fields_ = (("duty", ctypes.c_double * 3), ("driven", ctypes.c_uint8), ("gates", _BOOL),
+                ("dead_time_s", ctypes.c_double), ("period_s", ctypes.c_double))  # fmt: skip
+
+
+class Pins(ctypes.Structure):
+    """emu_pins_t."""
+
+    _fields_ = (("adc", ctypes.c_uint16 * 32 * 2), ("angle", _U32), ("angle_rate", ctypes.c_int32),
+                ("resolver_fault", _BOOL), ("gate_fault", _BOOL))  # fmt: skip
+
+
+class State(Enum):
+    """What the core does: it runs, is stuck with all interrupts masked, or is halted by a debugger."""
+
+    RUNS = 0
+    STUCK = 1
+    HALTED = 2
+
+
+class EmulationStoppedError(FluxtrueError):
+    """The program did what the emulator refuses; no further time will pass on this processor."""
 
 
 class Counts(ctypes.Structure):
@@ -36,6 +63,8 @@ _SIGNATURES = {
     "emu_symbol": (_U32, [_HERE, _TEXT]),
     "emu_register": (_U64, [_HERE, _TEXT]),
     "emu_register_set": (_BOOL, [_HERE, _TEXT, _U32]),
+    "emu_register_load": (_U64, [_HERE, _TEXT]),
+    "emu_register_store": (_BOOL, [_HERE, _TEXT, _U32]),
     "emu_on_exception": (None, [_HERE, ON_EXCEPTION, _HERE]),
     "emu_active_vector": (_INT, [_HERE]),
     "emu_pend": (None, [_HERE, _INT]),
@@ -45,6 +74,10 @@ _SIGNATURES = {
     "emu_counts": (Counts, [_HERE, _INT]),
     "emu_counts_clear": (None, [_HERE]),
     "emu_break_after": (None, [_HERE, _U64]),
+    "emu_bridge": (None, [_HERE, ctypes.POINTER(Bridge)]),
+    "emu_pins": (ctypes.POINTER(Pins), [_HERE]),
+    "emu_outputs": (_U32, [_HERE]),
+    "emu_core_state": (None, [_HERE, _INT]),
     "emu_board_pins": (None, [_HERE, _BOOL, _BOOL]),
     "sim_emulator": (_HERE, [_HERE]),
 }
@@ -93,8 +126,15 @@ class Core:
         self.close()
 
     def run(self, seconds: float) -> int:
-        """Run for at most this time; LIMIT, CENTRE, BREAK or FAILED."""
-        return int(self._library.emu_run(self._handle, round(seconds * TICKS_PER_S)))
+        """Run for at most this time; LIMIT, CENTRE or BREAK. A stopped emulation is an exception, never an answer:
+        a caller that waits for something else would wait for ever, because time no longer advances."""
+        stopped = int(self._library.emu_run(self._handle, round(seconds * TICKS_PER_S)))
+        self._raise_if_stopped()
+        return stopped
+
+    def _raise_if_stopped(self) -> None:
+        if self.error is not None:
+            raise EmulationStoppedError(f"the emulation stopped: {self.error}")
 
     @property
     def error(self) -> str | None:
@@ -136,6 +176,11 @@ class Core:
             raise ValueError(f"nothing is at {address:#x}")
         return content.raw
 
+    def write(self, address: int, content: bytes) -> None:
+        """Memory, as a debugger changes it."""
+        if not self._library.emu_write(self._handle, address, content, len(content)):
+            raise ValueError(f"nothing is at {address:#x}")
+
     def word(self, symbol: str, index: int = 0) -> int:
         """A 32-bit variable, or an element of an array."""
         return int.from_bytes(self.read(self.symbol(symbol) + 4 * index, 4), "little")
@@ -152,9 +197,43 @@ class Core:
         if not self._library.emu_register_set(self._handle, name.encode(), value):
             raise KeyError(name)
 
+    def load(self, name: str) -> int:
+        """The register as the core would read it."""
+        value = int(self._library.emu_register_load(self._handle, name.encode()))
+        if value == NO_REGISTER:
+            raise KeyError(name)
+        self._raise_if_stopped()
+        return value
+
+    def store(self, name: str, value: int) -> None:
+        """Write the register as the core would."""
+        if not self._library.emu_register_store(self._handle, name.encode(), value):
+            raise KeyError(name)
+        self._raise_if_stopped()
+
     def board(self, *, gate_fault: bool = False, resolver_fault: bool = False) -> None:
         """Lines of the board."""
         self._library.emu_board_pins(self._handle, gate_fault, resolver_fault)
+
+    @property
+    def outputs(self) -> int:
+        """Outputs of the bridge that may switch on in this period, one bit each, the even ones the upper switches."""
+        return int(self._library.emu_outputs(self._handle))
+
+    def duty(self, pair: int) -> float:
+        """Share of this period for which the upper switch's pulse lasts."""
+        bridge = Bridge()
+        self._library.emu_bridge(self._handle, ctypes.byref(bridge))
+        return float(bridge.duty[pair])
+
+    def turn(self, turns: float) -> None:
+        """The shaft stands at this angle from now on."""
+        pins = self._library.emu_pins(self._handle).contents
+        pins.angle, pins.angle_rate = round(turns % 1.0 * 2**32) % 2**32, 0
+
+    def core_state(self, state: State) -> None:
+        """From now on; everything but the core goes on."""
+        self._library.emu_core_state(self._handle, state.value)
 
     def pend(self, vector: int) -> None:
         """Make an exception pending."""

@@ -15,6 +15,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from fluxtrue_tools.outputs import write_text
+
 PERIPHERALS = (
     "MSCM", "FTFC", "DMAMUX", "CAN0", "FTM0", "FTM2", "ADC0", "ADC1", "LPSPI0", "LPSPI1", "LPSPI2", "PDB0", "PDB1",
     "LPIT0", "SIM", "PORTA", "PORTB", "PORTC", "PORTD", "PORTE", "WDOG", "TRGMUX", "SCG", "PCC", "PMC", "SMC", "RCM",
@@ -97,7 +99,7 @@ def table(device: ElementTree.Element) -> Iterator[str]:
 
 def main(svd: Path, output: Path) -> None:
     """Write the table."""
-    output.write_text("\n".join(table(ElementTree.parse(svd).getroot())) + "\n", encoding="utf-8")
+    write_text(output, "\n".join(table(ElementTree.parse(svd).getroot())) + "\n")
 
 
 if __name__ == "__main__":

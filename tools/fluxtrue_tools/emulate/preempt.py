@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
-from fluxtrue_tools.emulate.core import BREAK, FAILED, Core
+from fluxtrue_tools.emulate.core import BREAK, Core
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
@@ -98,10 +98,8 @@ class Stepper:
 
     def stop(self) -> None:
         for _ in range(SLICES):
-            if (stopped := self.core.run(SLICE_S)) == BREAK:
+            if self.core.run(SLICE_S) == BREAK:
                 return
-            if stopped == FAILED:
-                raise FluxtrueError(f"the emulation stopped: {self.core.error}")
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from typing import Final
 
 import click
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.build import ROOT, build_lock, configure_build, run_logged
 
@@ -32,11 +33,11 @@ def _program(build_dir: Path | None) -> Path:
     return program
 
 
-@click.command()
+@click.command(cls=paths.Command)
 @click.option("--frames", type=click.IntRange(100_000, 10**12), default=10_000_000, show_default=True,
               help="With fewer the drive may hardly ever run, which would prove little.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=2, show_default=True, help="Of the random numbers.")
-@click.option("--build-dir", type=click.Path(file_okay=False, path_type=Path),
+@click.option("--build-dir", type=paths.InputFolder(),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def fuzz(frames: int, seed: int, build_dir: Path | None) -> None:
     """Send random and mutated frames through the whole ECU, with sanitizers; a second opinion judges each millisecond.

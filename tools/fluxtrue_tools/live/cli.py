@@ -6,6 +6,7 @@ import contextlib
 import signal
 import socket
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,21 +14,24 @@ import cantools.database
 import click
 from aiohttp import web
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.address import BusAddress, parse_option
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander
 from fluxtrue_tools.live.link import Link, Recorder
+from fluxtrue_tools.live.pace import InStep, Pace, SimulatedTime, WallClock
 from fluxtrue_tools.live.replay import Replay, load
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.server import HOST, Session, make_app
 from fluxtrue_tools.live.stand import Stand
-from fluxtrue_tools.live.tuning import Tuning
+from fluxtrue_tools.live.tuning import BENCH_ANSWER_S, SIMULATED_ANSWER_S, Tuning
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.sim.build import locate, prepare
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import VirtualEcu
+from fluxtrue_tools.vecu.stepped import SteppedBus
 
 DRIVE_FAULTS: Final = 1  # FirstFault of bit 0
 ECU_FAULTS: Final = 33
@@ -41,21 +45,57 @@ def _fault_names(database: cantools.database.Database) -> dict[str, list[str]]:
             for word, (first, bits) in words.items()}  # fmt: skip
 
 
+@dataclass
+class Source:
+    """What the page shows: a bench, a virtual ECU with its bench channel, or a recorded drive."""
+
+    title: str
+    address: BusAddress | None = None
+    channel: Channel | None = None
+    frames: Any = None
+    elf: Path | None = None
+    in_step: bool = False
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether time passes only when it is asked to."""
+        return self.channel is not None and self.channel.is_fast()
+
+
+def _connect(source: Source, session: Session, stack: contextlib.ExitStack) -> None:
+    """Bus, time, stand and calibration of whatever can be commanded."""
+    assert source.address is not None
+    bus = source.address.connect()
+    listeners = [session.samples, session.recorder]
+    pace: Pace
+    if source.is_stepped:
+        assert source.channel is not None
+        session.in_step = InStep() if source.in_step else None
+        pace = SimulatedTime(SteppedBus(bus, source.channel.another()), listeners, session.in_step)
+    else:
+        pace = WallClock(bus, listeners)
+    if source.channel is not None:
+        session.stand = Stand(source.channel)
+        stack.callback(session.stand.close)
+    database = cantools.database.load_file(DBC)
+    session.link = Link(bus, pace, database, session.commander, session.samples, session.recorder, session.stand)
+    stack.callback(session.link.close)
+    if source.elf is not None:
+        answer_s = SIMULATED_ANSWER_S if source.is_stepped else BENCH_ANSWER_S
+        session.tuning = Tuning(source.address, read(source.elf), answer_s, pace.standing_still)
+        stack.callback(session.tuning.close)
+
+
 @contextlib.contextmanager
-def _session(title: str, torque_max_Nm: float, record_dir: Path, address: BusAddress | None, frames: Any,
-             elf: Path | None, stand: Stand | None) -> Iterator[Session]:  # fmt: skip
+def _session(source: Source, torque_max_Nm: float, record_dir: Path) -> Iterator[Session]:
     database = cantools.database.load_file(DBC)
     samples, recorder = Samples(database), Recorder(record_dir, DBC)
-    session = Session(title, Commander(torque_max_Nm), samples, recorder, _fault_names(database), stand=stand)
+    session = Session(source.title, Commander(torque_max_Nm), samples, recorder, _fault_names(database))
     with contextlib.ExitStack() as stack:
-        if address is None:
-            stack.callback(Replay(frames, [samples]).close)
+        if source.address is None:
+            stack.callback(Replay(source.frames, [samples]).close)
         else:
-            session.link = Link(address.connect(), database, session.commander, samples, recorder)
-            stack.callback(session.link.close)
-            if elf is not None:
-                session.tuning = Tuning(address, read(elf))
-                stack.callback(session.tuning.close)
+            _connect(source, session, stack)
         yield session
 
 
@@ -87,40 +127,47 @@ def _serve(session: Session, port: int) -> None:
     asyncio.run(_run())
 
 
-@click.command()
+@click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
 @click.option("--can-interface", help="python-can interface of a bench; without it a virtual ECU is started.")
 @click.option("--can-channel", default="can0", show_default=True)
 @click.option("--can-option", multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus.")
-@click.option("--elf", type=click.Path(exists=True, dir_okay=False, path_type=Path),
+@click.option("--bench", metavar="HOST:PORT",
+              help="Bench channel of the virtual ECU behind that interface: its plant, and with --fast its time.")
+@click.option("--in-step", is_flag=True, help="Simulated time waits until the pages have drawn it, for tests.")
+@click.option("--elf", type=paths.InputFile(),
               help="The bench's firmware image: its calibration values can then be tuned.")  # fmt: skip
-@click.option("--replay", type=click.Path(path_type=Path), help="Show a recorded drive (MF4, BLF, ASC ...).")
+@click.option("--replay", type=paths.InputFile(), help="Show a recorded drive (MF4, BLF, ASC ...).")
 @click.option("--port", type=click.IntRange(0, 65535), default=8137, show_default=True, help="Of the page; 0: any.")
-@click.option("--record-dir", type=click.Path(file_okay=False, path_type=Path), default=Path("build/live"),
+@click.option("--record-dir", type=paths.BuildFolder(), default=Path("build/live"),
               show_default=True, help="Where recordings go.")  # fmt: skip
-@click.option("--build-dir", type=click.Path(file_okay=False, path_type=Path),
+@click.option("--build-dir", type=paths.InputFolder(),
               help="Take the virtual ECU from this build folder as it is.")  # fmt: skip
-def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[str, ...], elf: Path | None,
-         replay: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
+def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[str, ...], bench: str | None,
+         in_step: bool, elf: Path | None, replay: Path | None, port: int, record_dir: Path,
+         build_dir: Path | None) -> None:  # fmt: skip
     """Serve a page that draws the drive live, commands torque, tunes and records. Loopback only."""
     if replay is not None and can_interface is not None:
         raise FluxtrueError("--replay and --can-interface exclude each other")
-    torque_max = load_config(locate(motor, Path.cwd())[1]).machine.torque_max_Nm
-    machine = prepare(motor, build_dir)
+    if replay is not None:
+        paths.refuse_given("with --replay", "elf", "record_dir")
+    if can_interface is None:
+        paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
+    torque_max = load_config(locate(motor, Path.cwd(), "--motor")[1]).machine.torque_max_Nm
+    machine = prepare(motor, build_dir, where="--motor")
     with contextlib.ExitStack() as stack:
-        stand, frames, address = None, None, None
         if replay is not None:
-            frames, title = load(replay), f"{replay.name} (replay)"
+            source = Source(f"{replay.name} (replay)", frames=load(replay))
         elif can_interface is not None:
-            options = dict(map(parse_option, can_option))
-            address, title = BusAddress(can_interface, can_channel, options), f"{can_interface} {can_channel}"
+            address = BusAddress(can_interface, can_channel, dict(map(parse_option, can_option)))
+            channel = None if bench is None else Channel.at(bench, "--bench")
+            source = Source(f"{can_interface} {can_channel}", address, channel, elf=elf)
         else:
-            ecu = stack.enter_context(VirtualEcu(machine.vecu, fast=False))
+            ecu = stack.enter_context(VirtualEcu(machine.vecu))
             options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
-            address, title = BusAddress("socketcand", "can0", options), f"{ecu.motor}, simulated"
-            elf, stand = machine.vecu, Stand(Channel(HOST, ecu.bench_port))
-            stack.callback(stand.close)
-        session = stack.enter_context(
-            _session(title, torque_max, record_dir, address, frames, elf, stand)
-        )
-        _serve(session, port)
+            address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
+            source = Source(f"{ecu.motor}, simulated", address, channel, elf=machine.vecu)
+        source.in_step = in_step
+        if in_step and not source.is_stepped:
+            raise FluxtrueError("--in-step: allowed before a virtual ECU with --fast only")
+        _serve(stack.enter_context(_session(source, torque_max, record_dir)), port)

@@ -9,8 +9,12 @@ from enum import StrEnum
 from typing import Final
 
 HAND_TIMEOUT_S: Final = 0.3  # a page that is closed, asleep or cut off
+START_S: Final = 0.5  # the inverter answers an enable within milliseconds
+GAP_S: Final = 0.03  # between two commands: the inverter's time-out, docs/howto/can.md
 RAMP_Nm_per_s: Final = 150.0
 RUNNING: Final = ("run", "derate")
+FAULTED: Final = ("fault", "safe_state")
+AGAIN: Final = "Press Enable to go on."
 
 
 class Wish(StrEnum):
@@ -28,20 +32,29 @@ class Order:
     mode: str = "off"
     enable: bool = False
     fault_reset: bool = False
-    torque_Nm: float = 0.0
+    torque_requested_Nm: float = 0.0
 
 
 @dataclass
 class Commander:
-    """Slider and buttons in, command frames out."""
+    """Slider and buttons in, command frames out.
+
+    The wish to drive ends when the user ends it, when the page with control is not heard of any more, and when the
+    inverter does not drive or no longer does. In the last two cases `stopped` says why, and one more press on Enable
+    goes on: the inverter wants to see enable off before it accepts it again, and it has been off since.
+    """
 
     torque_max_Nm: float
     wish: Wish = Wish.OFF
     target_Nm: float = 0.0
-    torque_Nm: float = 0.0
+    torque_requested_Nm: float = 0.0
+    stopped: str = ""  # why the wish to drive was taken back; empty since the last press on a button
     _seen_s: float = float("-inf")
     _stepped_s: float | None = None
     _reset: bool = False
+    _running: bool = False  # the inverter has followed the wish to drive
+    _enabled_s: float = 0.0  # how long enable has been sent without that
+    _gap_s: float = 0.0  # longest time between two commands since the last press on a button
 
     def hand(self, now_s: float) -> None:
         """A sign of life from the page that has control."""
@@ -52,12 +65,13 @@ class Commander:
         self.hand(now_s)
         if wish is not self.wish:
             self.target_Nm = 0.0
-        self.wish = wish
+            self._running, self._enabled_s, self._gap_s = False, 0.0, 0.0
+        self.wish, self.stopped = wish, ""
 
-    def slide(self, torque_Nm: float, now_s: float) -> None:
+    def slide(self, torque_requested_Nm: float, now_s: float) -> None:
         """The slider; a value beyond the machine is its limit."""
         self.hand(now_s)
-        self.target_Nm = min(max(torque_Nm, -self.torque_max_Nm), self.torque_max_Nm)
+        self.target_Nm = min(max(torque_requested_Nm, -self.torque_max_Nm), self.torque_max_Nm)
 
     def reset_faults(self, now_s: float) -> None:
         """One edge of the reset bit, with enable off."""
@@ -67,26 +81,51 @@ class Commander:
     def let_go(self) -> None:
         """The page with control has gone: no need to wait whether it says something again."""
         self._seen_s = float("-inf")
-        if self.wish is Wish.DRIVE:
-            self.wish, self.target_Nm = Wish.READY, 0.0  # it must be pressed again
+        self._take_back(f"The page with control was closed or silent for {HAND_TIMEOUT_S:g} s.")
 
     def alive(self, now_s: float) -> bool:
         """Whether the page with control has been heard of lately."""
         return now_s - self._seen_s <= HAND_TIMEOUT_S
 
-    def step(self, now_s: float, state: str) -> Order:
-        """The next command frame, given the inverter's state."""
-        if not self.alive(now_s):
-            self.let_go()
+    def step(self, now_s: float, state: str, refused: str = "") -> Order:
+        """The next command frame, given the inverter's state and why it last refused to drive."""
         step_s = 0.0 if self._stepped_s is None else max(now_s - self._stepped_s, 0.0)
         self._stepped_s = now_s
+        self._gap_s = max(self._gap_s, step_s)
+        if not self.alive(now_s):
+            self.let_go()
+        self._follow(state, refused, step_s)
         wanted = self.target_Nm if self.wish is Wish.DRIVE and state in RUNNING else 0.0
         most = RAMP_Nm_per_s * step_s
-        self.torque_Nm += min(max(wanted - self.torque_Nm, -most), most)
+        self.torque_requested_Nm += min(max(wanted - self.torque_requested_Nm, -most), most)
         if state not in RUNNING:
-            self.torque_Nm = 0.0
-        # The gates open only after the torque is gone.
-        enable = (self.wish is Wish.DRIVE and state in ("ready", *RUNNING)) or self.torque_Nm != 0.0
+            self.torque_requested_Nm = 0.0
+        # Switching ends only after the torque is gone.
+        enable = (self.wish is Wish.DRIVE and state in ("ready", *RUNNING)) or self.torque_requested_Nm != 0.0
         mode = "off" if self.wish is Wish.OFF and not enable else "torque"
         reset, self._reset = self._reset and not enable, self._reset and enable
-        return Order(mode, enable, reset, self.torque_Nm)
+        return Order(mode, enable, reset, self.torque_requested_Nm)
+
+    def _follow(self, state: str, refused: str, step_s: float) -> None:
+        """Take the wish to drive back when the inverter does not follow it."""
+        if self.wish is not Wish.DRIVE:
+            return
+        if state in RUNNING:
+            self._running = True
+            return
+        self._enabled_s += step_s if state == "ready" else 0.0
+        shown = state.replace("_", " ") or "not known"
+        why = f": {refused.replace('_', ' ')}" if refused not in ("", "none") else ""
+        if state in FAULTED:
+            self._take_back(f"The inverter reports {shown}. Reset its faults first.")
+        elif self._running and self._gap_s > GAP_S:
+            self._take_back(f"The inverter stopped{why}. No command for {1e3 * self._gap_s:.0f} ms; "
+                            f"it waits {1e3 * GAP_S:.0f} ms.")  # fmt: skip
+        elif self._running:
+            self._take_back(f"The inverter stopped{why}. Its state is {shown}.")
+        elif self._enabled_s > START_S:
+            self._take_back(f"The inverter did not start{why}. Its state is {shown}.")
+
+    def _take_back(self, why: str) -> None:
+        if self.wish is Wish.DRIVE:
+            self.wish, self.target_Nm, self.stopped = Wish.READY, 0.0, f"{why} {AGAIN}"

@@ -3,7 +3,6 @@
 
 import logging
 import threading
-import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -13,12 +12,16 @@ import can
 import cantools.database
 
 from fluxtrue_tools.bus.protect import Protector
+from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander, Order, Wish
+from fluxtrue_tools.live.pace import PERIOD_S, Pace
 from fluxtrue_tools.live.samples import Samples
+from fluxtrue_tools.live.stand import Stand
+from fluxtrue_tools.outputs import atomic
 from fluxtrue_tools.vecu.mdf import BusLog
 
-COMMAND: Final = "VCU_TorqueCommand"
-PERIOD_S: Final = 0.010
+COMMAND: Final = "VCU_TorqueRequest"
+CLOSING_S: Final = 3.0  # the largest torque is ramped out in less
 LIMIT_Nm: Final = 1000.0  # the message's own largest: the slider is the limit here
 
 
@@ -53,7 +56,8 @@ class Recorder:
             return None
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"live-{datetime.now():%Y%m%d-%H%M%S}.mf4"
-        log.write(path, self._dbc)
+        with atomic(path) as scratch:
+            log.write(scratch, self._dbc)
         return path
 
 
@@ -62,56 +66,63 @@ logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
 
 
 class Link:
-    """One bus connection with its listeners and the thread that sends."""
+    """One bus connection and the thread that commands, in the pace of whoever keeps the time."""
 
-    def __init__(self, bus: can.BusABC, database: cantools.database.Database, commander: Commander,
-                 samples: Samples, recorder: Recorder) -> None:  # fmt: skip
-        self._bus, self._commander, self._samples = bus, commander, samples
+    def __init__(self, bus: can.BusABC, pace: Pace, database: cantools.database.Database, commander: Commander,
+                 samples: Samples, recorder: Recorder, stand: Stand | None = None) -> None:  # fmt: skip
+        self._bus, self._pace, self._commander, self._samples = bus, pace, commander, samples
         self._message = database.get_message_by_name(COMMAND)
         data_id = int(self._message.dbc.attributes["E2EDataId"].value)  # type: ignore[union-attr]
         self._protector = Protector(data_id)
-        self._recorder = recorder
+        self._recorder, self._stand = recorder, stand
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self.send_errors = 0
-        self._notifier = can.Notifier(bus, [samples, recorder], timeout=0.1)
-        self._thread = threading.Thread(target=self._send_cyclic, name="command", daemon=True)
+        self.lost = ""  # why nothing is commanded any more
+        self._thread = threading.Thread(target=self._command, name="command", daemon=True)
         self._thread.start()
 
     def act(self, action: Callable[[Commander, float], None]) -> None:
         """Something a user did."""
         with self._lock:
-            action(self._commander, time.monotonic())
+            action(self._commander, self._pace.now_s)
 
     def close(self) -> None:
         """Torque to zero first; then leave the bus."""
         self.act(lambda commander, now: commander.ask(Wish.OFF, now))
-        deadline = time.monotonic() + 3.0
-        while self._commander.torque_Nm != 0.0 and time.monotonic() < deadline:
-            time.sleep(PERIOD_S)
+        end_s = self._pace.now_s + CLOSING_S
+        while self._commander.torque_requested_Nm != 0.0 and self._pace.now_s < end_s and self._thread.is_alive():
+            self._stop.wait(PERIOD_S)
         self._stop.set()
-        self._thread.join(1.0)
-        self._notifier.stop()
+        self._thread.join()
+        self._pace.close()
         self._bus.shutdown()
 
     def _frame(self, order: Order) -> can.Message:
         data = self._message.encode({
             "Crc": 0, "Counter": 0, "Enable": int(order.enable), "FaultReset": int(order.fault_reset),
-            "Mode": order.mode, "TorqueRequest": round(order.torque_Nm, 1),
+            "Mode": order.mode, "TorqueRequested": round(order.torque_requested_Nm, 1),
             "TorqueLimitDrive": LIMIT_Nm, "TorqueLimitRegen": LIMIT_Nm,
         })  # fmt: skip
         return can.Message(arbitration_id=self._message.frame_id, is_extended_id=False, is_rx=False,
                            data=self._protector.protect(data), timestamp=self._samples.newest_s)  # fmt: skip
 
-    def _send_cyclic(self) -> None:
-        due = time.monotonic()
-        while not self._stop.is_set():
-            with self._lock:
-                frame = self._frame(self._commander.step(time.monotonic(), self._samples.state()))
-            try:
-                self._bus.send(frame, timeout=PERIOD_S)
-                self._recorder(frame)
-            except (can.CanError, OSError):
-                self.send_errors += 1
-            due = max(due + PERIOD_S, time.monotonic() - PERIOD_S)
-            self._stop.wait(max(due - time.monotonic(), 0.0))
+    def _send(self) -> None:
+        state, refused = self._samples.state(), self._samples.choice("INV_DcLink", "RefusedReason")
+        with self._lock:
+            frame = self._frame(self._commander.step(self._pace.now_s, state, refused))
+        try:
+            self._pace.send(frame)
+            self._recorder(frame)
+        except (can.CanError, OSError):
+            self.send_errors += 1
+
+    def _command(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._send()
+                if self._stand is not None:
+                    self._stand.step(PERIOD_S)
+                self._pace.next_period(self._stop)
+        except (FluxtrueError, OSError) as error:
+            self.lost = str(error)  # the virtual ECU has ended

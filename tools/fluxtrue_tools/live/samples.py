@@ -9,7 +9,7 @@ import cantools.database
 
 # What is drawn; everything else is only shown as its last value.
 DRAWN: Final = {
-    "INV_Status": ("TorqueEstimate", "TorqueCommand", "Speed"),
+    "INV_Status": ("TorqueEstimated", "TorqueCommanded", "Speed"),
     "INV_Currents": ("Id", "Iq", "IdRef", "IqRef"),
     "INV_Identification": ("PsiF", "Resistance", "PsiQuality", "ResistanceQuality"),
     "INV_DcLink": ("DcVoltage", "DcCurrent"),
@@ -46,14 +46,18 @@ class Samples:
                 self._columns[message.name].setdefault("t", []).append(frame.timestamp)
             self._last[message.name] = signals
 
+    def choice(self, message: str, signal: str) -> str:
+        """The name of a signal's last value; empty before it has been heard."""
+        with self._lock:
+            signals = self._last.get(message)
+        if signals is None:
+            return ""
+        described = next(m for m in self._messages.values() if m.name == message).get_signal_by_name(signal)
+        return str((described.choices or {}).get(int(signals[signal]), ""))
+
     def state(self) -> str:
         """The inverter's state by name; empty before it has said anything."""
-        with self._lock:
-            status = self._last.get("INV_Status")
-        if status is None:
-            return ""
-        choices = self._messages[0x210].get_signal_by_name("State").choices or {}
-        return str(choices.get(int(status["State"]), ""))
+        return self.choice("INV_Status", "State")
 
     def take(self) -> dict[str, dict[str, list[float]]]:
         """Columns since the last time."""

@@ -8,25 +8,31 @@ site in the same browser must not move a motor.
 import asyncio
 import contextlib
 import importlib.resources
+import itertools
 import json
 import math
+from collections.abc import Awaitable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from aiohttp import WSMsgType, web
+from aiohttp import WSCloseCode, WSMsgType, web
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Recorder
+from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.stand import KNOBS, Stand
 from fluxtrue_tools.live.tuning import Tuning
 
 HOST: Final = "127.0.0.1"
 BATCH_S: Final = 0.04  # 25 per second
+SEND_S: Final = 1.0  # a page that does not take its batch for so long goes without it
+HEARTBEAT_S: Final = 5.0  # of a connection
 SLOW_EVERY: Final = 5  # last values, with every fifth batch
 PAGE: Final = Path(__file__).parent / "static"
+REFUSED: Final = (FluxtrueError, ValueError, RecursionError, OSError)  # bad JSON and a full disk among them
 POLICY: Final = ("default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
                  "frame-ancestors 'none'")  # fmt: skip
 
@@ -43,9 +49,20 @@ class Session:
     link: Link | None = None  # None: a replay, nothing can be commanded
     tuning: Tuning | None = None
     stand: Stand | None = None
+    in_step: InStep | None = None  # simulated time waits for the pages
     viewers: list[web.WebSocketResponse] = field(default_factory=list)
+    drawn: dict[web.WebSocketResponse, int] = field(default_factory=dict)  # number of the last batch, page by page
+    changed: asyncio.Event = field(default_factory=asyncio.Event)  # a page has come, drawn or gone
     hand: web.WebSocketResponse | None = None
     last_file: str = ""
+
+    def stopped(self) -> str:
+        """Why nothing drives although somebody has asked for it."""
+        return (self.link.lost if self.link is not None else "") or self.commander.stopped
+
+    def wall_s(self, seconds: float) -> float | None:
+        """A time-out by the wall clock: none where simulated time waits for the pages."""
+        return None if self.in_step is not None else seconds
 
 
 SESSION: Final = web.AppKey("session", Session)
@@ -92,25 +109,29 @@ def _number(value: Any, what: str) -> float:
 
 
 def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
-    """Buttons, slider and signs of life."""
+    """Buttons and slider."""
     link = session.link
     if link is None:
         raise FluxtrueError("a replay obeys nobody")
     kind = message["type"]
-    if kind == "alive":
-        if session.hand is socket:
-            link.act(lambda commander, now: commander.hand(now))
-        return
     if session.hand is not None and session.hand is not socket and not session.hand.closed and kind != "off":
         raise FluxtrueError("another page has its hand on the slider")
     session.hand = socket
     if kind == "torque":
-        torque = _number(message.get("torque_Nm"), "torque_Nm")
+        torque = _number(message.get("torque_requested_Nm"), "torque_requested_Nm")
         link.act(lambda commander, now: commander.slide(torque, now))
     elif kind == "reset":
         link.act(lambda commander, now: commander.reset_faults(now))
     else:
         link.act(lambda commander, now: commander.ask(Wish(kind), now))
+
+
+def _drawn(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+    """A page has drawn a batch. Somebody may be looking at it: its sign of life."""
+    session.drawn[socket] = int(_number(message.get("batch"), "batch"))
+    session.changed.set()
+    if message.get("visible") and session.hand is socket and session.link is not None:
+        session.link.act(lambda commander, now: commander.hand(now))
 
 
 async def _tune(session: Session, message: dict[str, Any]) -> dict[str, Any]:
@@ -140,81 +161,139 @@ async def _record(session: Session, message: dict[str, Any]) -> dict[str, Any]:
     return {"type": "recording", "on": session.recorder.running, "file": session.last_file}
 
 
-async def _answer(session: Session, socket: web.WebSocketResponse, text: str) -> dict[str, Any] | None:
-    """What one message of a page does; an answer for it alone."""
-    message = json.loads(text)
-    if not isinstance(message, dict):
-        raise FluxtrueError("not an object")
+def _obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[dict[str, Any]] | None:
+    """What one message of a page does. What takes its time, and has an answer, is left to be waited for."""
     match message.get("type"):
-        case "alive" | "torque" | "reset" | "off" | "ready" | "drive":
+        case "drawn":
+            _drawn(session, socket, message)
+        case "torque" | "reset" | "off" | "ready" | "drive":
             _drive(session, socket, message)
-        case "tune_list" | "tune":
-            return await _tune(session, message)
         case "knob":
             _knob(session, message)
+        case "tune_list" | "tune":
+            return _tune(session, message)
         case "record":
-            return await _record(session, message)
+            return _record(session, message)
         case other:
             raise FluxtrueError(f"unknown message {other!r}")
     return None
 
 
+def _refusal(error: Exception) -> dict[str, Any]:
+    return {"type": "refused", "text": str(error)}
+
+
+async def _answer_later(socket: web.WebSocketResponse, answer: Awaitable[dict[str, Any]]) -> None:
+    """While the page goes on to tell that it lives."""
+    with contextlib.suppress(ConnectionError, RuntimeError):  # it has gone meanwhile
+        try:
+            await socket.send_json(await answer)
+        except REFUSED as error:
+            await socket.send_json(_refusal(error))
+
+
+async def _converse(session: Session, socket: web.WebSocketResponse, tasks: asyncio.TaskGroup) -> None:
+    async for message in socket:
+        if message.type is not WSMsgType.TEXT:
+            continue
+        try:
+            asked = json.loads(message.data)
+            if not isinstance(asked, dict):
+                raise FluxtrueError("not an object")
+            later = _obey(session, socket, asked)
+        except REFUSED as error:
+            await socket.send_json(_refusal(error))
+            continue
+        if later is not None:
+            tasks.create_task(_answer_later(socket, later))
+
+
 async def _viewer(request: web.Request) -> web.WebSocketResponse:
     session = request.app[SESSION]
-    socket = web.WebSocketResponse(heartbeat=5.0, max_msg_size=4096)
+    socket = web.WebSocketResponse(heartbeat=session.wall_s(HEARTBEAT_S), max_msg_size=4096)
     await socket.prepare(request)
     await socket.send_json(_hello(session))
     session.viewers.append(socket)
-    try:
-        async for message in socket:
-            if message.type is not WSMsgType.TEXT:
-                continue
-            try:
-                answer = await _answer(session, socket, message.data)
-            except (FluxtrueError, ValueError, RecursionError, OSError) as error:  # bad JSON, a full disk
-                answer = {"type": "refused", "text": str(error)}
-            if answer is not None:
-                await socket.send_json(answer)
-    finally:
-        session.viewers.remove(socket)
-        if session.hand is socket:
-            session.hand = None
-            if session.link is not None:
-                session.link.act(lambda commander, _: commander.let_go())
+    session.changed.set()
+    async with asyncio.TaskGroup() as tasks:
+        try:
+            await _converse(session, socket, tasks)
+        finally:
+            session.viewers.remove(socket)
+            session.drawn.pop(socket, None)
+            session.changed.set()
+            if session.hand is socket:
+                session.hand = None
+                if session.link is not None:
+                    session.link.act(lambda commander, _: commander.let_go())
     return socket
 
 
 def _batch(session: Session, number: int) -> dict[str, Any]:
-    batch: dict[str, Any] = {"type": "rows", "groups": session.samples.take()}
+    batch: dict[str, Any] = {"type": "rows", "batch": number, "groups": session.samples.take()}
     if number % SLOW_EVERY == 0:
         batch["last"] = session.samples.last()
         batch["state"] = session.samples.state()
         batch["wish"] = session.commander.wish.value
         batch["target_Nm"] = session.commander.target_Nm
+        batch["stopped"] = session.stopped()
     return batch
 
 
-async def _broadcast(app: web.Application) -> None:
-    session, number = app[SESSION], 0
-    while True:
+async def _send_batch(session: Session, number: int) -> list[web.WebSocketResponse]:
+    """To every page; those that took it."""
+    batch = _batch(session, number)
+    if session.stand is not None and session.viewers:
+        with contextlib.suppress(FluxtrueError, OSError):
+            batch["truth_Nm"] = await asyncio.to_thread(session.stand.truth_Nm)
+    text, taken = json.dumps(batch), []
+    for viewer in list(session.viewers):
+        with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the others still read
+            await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
+            taken.append(viewer)
+    return taken
+
+
+async def _broadcast(session: Session) -> None:
+    for number in itertools.count():
         await asyncio.sleep(BATCH_S)
-        batch = _batch(session, number)
-        if session.stand is not None and session.viewers:
-            with contextlib.suppress(FluxtrueError, OSError):
-                batch["truth_Nm"] = await asyncio.to_thread(session.stand.truth_Nm)
+        await _send_batch(session, number)
+
+
+async def _broadcast_in_step(session: Session, in_step: InStep) -> None:
+    """Without a page nothing is drawn, and time stands still."""
+    number = 0
+    while await asyncio.to_thread(in_step.due):
+        while not session.viewers:
+            await _change(session)
+        taken = await _send_batch(session, number)
+        while any(viewer in session.viewers and session.drawn.get(viewer, -1) < number for viewer in taken):
+            await _change(session)
+        in_step.done()
         number += 1
-        text = json.dumps(batch)
-        for viewer in list(session.viewers):
-            with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the others still read
-                await asyncio.wait_for(viewer.send_str(text), 1.0)
+
+
+async def _change(session: Session) -> None:
+    await session.changed.wait()
+    session.changed.clear()
 
 
 async def _background(app: web.Application) -> Any:
-    task = asyncio.create_task(_broadcast(app))
+    session = app[SESSION]
+    in_step = session.in_step
+    task = asyncio.create_task(_broadcast_in_step(session, in_step) if in_step else _broadcast(session))
     yield
+    if in_step is not None:
+        in_step.release()
     task.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await task
+
+
+async def _farewell(app: web.Application) -> None:
+    """Close the pages' connections: the server waits for them."""
+    for viewer in list(app[SESSION].viewers):
+        await viewer.close(code=WSCloseCode.GOING_AWAY)
 
 
 def make_app(session: Session) -> web.Application:
@@ -227,4 +306,5 @@ def make_app(session: Session) -> web.Application:
     app.router.add_static("/uplot", Path(str(plotter)))
     app.router.add_static("/static", PAGE)
     app.cleanup_ctx.append(_background)
+    app.on_shutdown.append(_farewell)
     return app

@@ -7,12 +7,10 @@ import threading
 from dataclasses import dataclass
 from typing import Final
 
-from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.channel import BenchRefused, Channel
 
 RPM: Final = 2.0 * math.pi / 60.0
 TRUTH: Final = "truth.torque_mean_Nm"
-STEP_S: Final = 0.02
 
 
 @dataclass(frozen=True)
@@ -35,34 +33,31 @@ KNOBS: Final = {
 
 
 class Stand:
-    """The bench channel with a few knobs. Any thread."""
+    """The bench channel with a few knobs. Any thread; whoever lets time pass calls step()."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self._lock = threading.Lock()
         self._target = {name: knob.start for name, knob in KNOBS.items()}
         self._now = dict(self._target)
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._follow, name="stand", daemon=True)
-        self._thread.start()
 
     def turn(self, name: str, value: float) -> None:
         """One knob; beyond its range is its end."""
         knob = KNOBS[name]
         self._target[name] = min(max(value, knob.lo), knob.hi)
 
-    def _follow(self) -> None:
-        while not self._stop.wait(STEP_S):
-            values = {}
-            for name, knob in KNOBS.items():
-                most = knob.per_s * STEP_S
-                step = min(max(self._target[name] - self._now[name], -most), most)
-                if step:
-                    self._now[name] += step
-                    values[knob.parameter] = self._now[name] * knob.factor
-            if values:
-                with self._lock, contextlib.suppress(FluxtrueError, OSError):
-                    self._channel.set(**values)
+    def step(self, seconds: float) -> None:
+        """The plant follows its knobs."""
+        values = {}
+        for name, knob in KNOBS.items():
+            most = knob.per_s * seconds
+            change = min(max(self._target[name] - self._now[name], -most), most)
+            if change:
+                self._now[name] += change
+                values[knob.parameter] = self._now[name] * knob.factor
+        if values:
+            with self._lock, contextlib.suppress(BenchRefused):
+                self._channel.set(**values)
 
     def truth_Nm(self) -> float:
         """The machine's air-gap torque now."""
@@ -71,6 +66,4 @@ class Stand:
 
     def close(self) -> None:
         """Leave it as it is."""
-        self._stop.set()
-        self._thread.join(1.0)
         self._channel.close()

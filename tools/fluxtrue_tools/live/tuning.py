@@ -3,8 +3,9 @@
 
 import logging
 import struct
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from typing import Any, Final
 
 from pyxcp.config import create_application_from_config
@@ -17,15 +18,17 @@ from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.errors import FluxtrueError
 
 FLOAT: Final = struct.Struct("<f")
+BENCH_ANSWER_S: Final = 2.0
+SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, which says nothing about simulated time: only ends a hang
 
 
 def _key(resource: int, seed: bytes) -> bytes:
-    """The published function of firmware/app/xcp_access.c."""
+    """The published function of firmware/calibration/xcp_access.c."""
     value = int.from_bytes(seed, "little")
     return (((value << 7 | value >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C).to_bytes(4, "little")
 
 
-def _connect(address: BusAddress) -> Master:
+def _connect(address: BusAddress, answer_s: float) -> Master:
     application = create_application_from_config({}, log_level=logging.CRITICAL)
     can = application.transport.can
     can.interface, can.channel = address.interface, address.channel
@@ -36,6 +39,7 @@ def _connect(address: BusAddress) -> Master:
             can.bitrate = value
         elif section is not None and hasattr(section, name):
             setattr(section, name, value)
+    application.transport.timeout = answer_s
     application.general.seed_n_key_function = _key
     application.general.disable_error_handling = True
     return Master("can", config=application)
@@ -44,8 +48,9 @@ def _connect(address: BusAddress) -> Master:
 class Tuning:
     """One session; every call runs in its one thread, since the master is not made for more."""
 
-    def __init__(self, address: BusAddress, description: Description) -> None:
-        self._address = address
+    def __init__(self, address: BusAddress, description: Description, answer_s: float = BENCH_ANSWER_S,
+                 standing_still: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:  # fmt: skip
+        self._address, self._answer_s, self._standing_still = address, answer_s, standing_still
         self._values = {value.name: value for value in description.values}
         self._master: Master | None = None
         self._stack = ExitStack()  # closes the connection
@@ -53,7 +58,8 @@ class Tuning:
 
     def _session(self) -> Master:
         if self._master is None:
-            master = self._stack.enter_context(_connect(self._address))
+            with self._standing_still():
+                master = self._stack.enter_context(_connect(self._address, self._answer_s))
             master.connect()
             master.cond_unlock()
             self._master = master
@@ -93,5 +99,5 @@ class Tuning:
 
     def close(self) -> None:
         """End the session."""
-        self.thread.submit(self._stack.close).result(5.0)
+        self.thread.submit(self._stack.close).result()
         self.thread.shutdown()

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.decode import signals_of
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
@@ -19,7 +20,7 @@ Signals = dict[str, pd.Series]
 # Title, and what is drawn under which name, how.
 BACK: Final = {"color": COMMAND, "linestyle": "--"}
 PANELS: Final[tuple[tuple[str, dict[str, tuple[str, dict[str, str]]]], ...]] = (
-    ("Torque", {"INV_Status.TorqueCommand": ("command", BACK), "INV_Status.TorqueEstimate": ("estimate", {})}),
+    ("Torque", {"INV_Status.TorqueCommanded": ("commanded", BACK), "INV_Status.TorqueEstimated": ("estimated", {})}),
     ("Currents", {"INV_Currents.IdRef": ("i_d*", BACK), "INV_Currents.IqRef": ("i_q*", BACK | {"linestyle": ":"}),
                   "INV_Currents.Id": ("i_d", {"color": TRUTH}), "INV_Currents.Iq": ("i_q", {"color": SECOND})}),
     ("Identified magnet flux", {"INV_Identification.PsiF": ("ψ̂", {})}),
@@ -33,7 +34,6 @@ EXPORTS: Final[dict[str, Callable[[pd.DataFrame, Path], None]]] = {
     ".csv": lambda table, path: table.to_csv(path, index_label="time_s"),
     ".parquet": lambda table, path: table.to_parquet(path),
 }
-PICTURES: Final = (".png", ".svg", ".pdf")
 
 
 def _wanted(signals: Signals, names: tuple[str, ...]) -> Signals:
@@ -100,27 +100,19 @@ def _tell(signals: Signals) -> None:
                    f"{numbers.iloc[-1]:>11.5g}  {values.attrs['unit']}".rstrip())  # fmt: skip
 
 
-def _suffix(option: str, path: Path | None, allowed: tuple[str, ...]) -> None:
-    if path is not None and path.suffix not in allowed:
-        raise FluxtrueError(f"{option} {path}: allowed: a name ending in {', '.join(allowed)}")
-    if path is not None and not path.parent.is_dir():
-        raise FluxtrueError(f"{option} {path}: {path.parent} is not a folder")
-
-
-@click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--plot", type=click.Path(dir_okay=False, path_type=Path), help="Draw torque, currents, what was "
+@click.command(cls=paths.Command)
+@click.argument("file", type=paths.InputFile())
+@click.option("--plot", type=paths.OutputFile(*paths.PICTURES), help="Draw torque, currents, what was "
               "identified and speed: PNG, SVG or PDF.")  # fmt: skip
-@click.option("--export", type=click.Path(dir_okay=False, path_type=Path), help="Write the signals: CSV or Parquet.")
+@click.option("--export", type=paths.OutputFile(*EXPORTS), help="Write the signals: CSV or Parquet.")
 @click.option("--signal", "names", multiple=True, metavar="MESSAGE.SIGNAL", help="Tell and export only these.")
 def log(file: Path, plot: Path | None, export: Path | None, names: tuple[str, ...]) -> None:
     """Decode a recorded drive (MDF4): signals with their ranges; plot and export on request."""
-    _suffix("--plot", plot, PICTURES)
-    _suffix("--export", export, tuple(EXPORTS))
-    every = signals_of(file)
-    chosen = _wanted(every, names)
-    if plot is not None:
-        _draw(every, plot, file.name)
-    if export is not None:
-        EXPORTS[export.suffix](_table(chosen), export)
+    with paths.outputs() as outputs:
+        every = signals_of(file)
+        chosen = _wanted(every, names)
+        if plot is not None:
+            _draw(every, outputs.scratch(plot), file.name)
+        if export is not None:
+            EXPORTS[export.suffix.lower()](_table(chosen), outputs.scratch(export))
     _tell(chosen)

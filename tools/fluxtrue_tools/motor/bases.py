@@ -6,17 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel, flux
+from fluxtrue_tools.motor.quantise import Unfit
 
 VOLTAGE_PER_VDC = 1.5
 VOLTAGE_STEP_V = 10.0
 OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05, 1.02)  # the first that fits
 OMEGA_MIN_PER_PWM = 0.02  # rad/s per Hz: below it the current controller's integral gain leaves its format
+OMEGA_STEP_MIN = 1.0 / 7.9  # rad per step of the task: below it 1/(omega_b T) leaves its format
 FLUX_USE_MIN = 0.3  # of psi_b, by the largest flux: less leaves torque and tables without resolution
 FLUX_USE_MAX = 0.97  # of psi_b, by the largest flux on the i_max circle
 STEP_USE_MAX = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
+TASK_HZ = 1000.0  # what a whole number of PWM periods comes nearest to
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,13 @@ class Bases:
     inductance_H: float
     torque_Nm: float
     period_s: float
+    step_s: float
+    periods_per_step: int
+
+
+def periods_per_step(pwm_hz: float) -> int:
+    """PWM periods of one step of the 1 kHz task (SC-10); of two that are equally near the larger number."""
+    return math.floor(pwm_hz / TASK_HZ + 0.5)
 
 
 def flux_max(model: FluxModel, i_max_A: float) -> float:
@@ -60,7 +69,8 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
     psi_max = flux_max(model, config.machine.i_max_A)
     l_min = inductance_min(model, config.machine.i_max_A)
     voltage_max = STEP_USE_MAX * l_min * current / period
-    omega_min = max(OMEGA_MIN_PER_PWM * config.inverter.pwm_hz,
+    step_s = periods_per_step(config.inverter.pwm_hz) * period
+    omega_min = max(OMEGA_MIN_PER_PWM * config.inverter.pwm_hz, OMEGA_STEP_MIN / step_s,
                     FLUX_USE_MIN * VOLTAGE_PER_VDC * config.inverter.vdc_V / psi_max)
     for ratio in OMEGA_PER_OMEGA_MAX:
         omega = max(ratio * config.omega_max_rad_s, omega_min)
@@ -68,10 +78,10 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
         if voltage <= voltage_max:
             break
     else:
-        raise FluxtrueError(f"incremental inductance {l_min:.3g} H is too small: "
-                            f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
-                            f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
-                            f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)")
+        raise Unfit(f"incremental inductance {l_min:.3g} H is too small: "
+                    f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
+                    f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
+                    f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)")
     impedance = voltage / current
     return Bases(
         voltage_V=voltage,
@@ -82,4 +92,6 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
         inductance_H=impedance / omega,
         torque_Nm=1.5 * config.machine.pole_pairs * voltage / omega * current,
         period_s=period,
+        step_s=periods_per_step(config.inverter.pwm_hz) / config.inverter.pwm_hz,
+        periods_per_step=periods_per_step(config.inverter.pwm_hz),
     )

@@ -1,21 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """motor build: all files or none."""
 
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.emit_c import motor_si_c, motor_tables_c
 from fluxtrue_tools.motor.emit_json import motor_json
 from fluxtrue_tools.motor.motor import Motor, load_motor, naming
+from fluxtrue_tools.motor.names import BUILT, HTML, PLOTS, source_files
 from fluxtrue_tools.motor.report import report_text
-
-HTML_NAME = "report.html"
-PLOT_NAMES = tuple(f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci"))
+from fluxtrue_tools.outputs import Outputs
 
 
 def generate(motor: Motor) -> dict[str, str]:
@@ -24,38 +17,28 @@ def generate(motor: Motor) -> dict[str, str]:
             "motor.json": motor_json(motor), "report.txt": report_text(motor)}
 
 
-@contextmanager
-def _staging(out: Path) -> Iterator[Path]:
-    """A fresh folder on the same disk as out, gone afterwards whatever happens."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".motor-build-", dir=out))
-    except OSError as error:
-        raise FluxtrueError(f"{out}: cannot be written: {error.strerror}") from None
-    try:
-        yield folder
-    except OSError as error:
-        raise FluxtrueError(f"{out}: cannot be written: {error.strerror}") from None
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def build(folder: Path, out: Path, report: bool) -> Motor:
+    """What `motor build` does, for other tools."""
+    outputs = Outputs()
+    outputs.reads(folder, *source_files(folder))
+    outputs.folder("--out", out, BUILT)
+    with outputs:
+        return build_into(folder, outputs, out, report)
+
+
+def build_into(folder: Path, outputs: Outputs, out: Path, report: bool) -> Motor:
     """Generate everything for one motor. Old files stay until every new one is complete."""
     motor = load_motor(folder)
     with naming(folder):
         files = generate(motor)
-    with _staging(out) as staging:
-        for name, text in files.items():
-            (staging / name).write_text(text, encoding="utf-8")
-        if report:
-            from fluxtrue_tools.motor.html import write_report
+    staging = outputs.scratch(out)
+    for name, text in files.items():
+        (staging / name).write_text(text, encoding="utf-8")
+    if report:
+        from fluxtrue_tools.motor.html import write_report
 
-            write_report(motor, files["report.txt"], staging)
-        new = {path.name for path in staging.iterdir()}
-        for stale in (out / name for name in (HTML_NAME, *PLOT_NAMES)):
-            if stale.name not in new:
-                stale.unlink(missing_ok=True)  # plots of an older build would be taken for these tables'
-        for name in sorted(new):
-            os.replace(staging / name, out / name)
+        write_report(motor, files["report.txt"], staging)
+    else:
+        for name in (HTML, *PLOTS):  # of an older build would be taken for these tables'
+            outputs.remove(out, name)
     return motor

@@ -2,17 +2,15 @@
 """motor.toml: its keys, their ranges, and one clear line when something is wrong."""
 
 import math
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
+from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
-
-FILE_NAME = "motor.toml"
-
-SHOWN_MAX = 60  # characters of a bad value in a message
+from fluxtrue_tools.motor.names import FILE_NAME
+from fluxtrue_tools.strict import Strict
 
 TRIP_PER_I_MAX = 1.2
 TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
@@ -22,11 +20,7 @@ THERMAL_SPAN_MIN_K = 5.0
 ANGLE_PER_PERIOD_MAX = 0.6  # rad: beyond it the observer and the sampled controller lose their margins
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-
-class Machine(_Section):
+class Machine(Strict):
     """[machine]"""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.+-]{0,47}$")]
@@ -45,11 +39,11 @@ class Machine(_Section):
     psi_f_Vs: Annotated[float, Field(gt=0, le=100)] | None = None
 
 
-class Inverter(_Section):
+class Inverter(Strict):
     """[inverter]"""
 
     vdc_V: Annotated[float, Field(ge=5, le=2000)]
-    pwm_hz: Annotated[float, Field(ge=1000, le=100000)]
+    pwm_hz: Annotated[float, Field(ge=4000, le=40000)]
     dead_time_s: Annotated[float, Field(ge=0, le=2e-5)]
     current_full_scale_A: Annotated[float, Field(gt=0, le=10000)]
     adc_bits: Annotated[int, Field(ge=8, le=16)]
@@ -58,7 +52,7 @@ class Inverter(_Section):
     v_dc_full_scale_V: Annotated[float, Field(gt=0, le=4000)] | None = None
 
 
-class Control(_Section):
+class Control(Strict):
     """[control], all optional"""
 
     observer_m: Annotated[float, Field(ge=2, le=4)] = 3.0
@@ -70,7 +64,7 @@ class Control(_Section):
     dead_time_compensation: Annotated[float, Field(ge=0, le=1)] = 1.0
 
 
-class Identification(_Section):
+class Identification(Strict):
     """[identification], all optional: what is not known before the first drive, as standard deviations"""
 
     magnet_uncertainty: Annotated[float, Field(ge=0.001, le=0.5)] = 0.12  # of psi_f
@@ -87,7 +81,7 @@ class Identification(_Section):
     correlation_time_s: Annotated[float, Field(ge=0.01, le=2)] = 0.5  # of those two
 
 
-class Thermal(_Section):
+class Thermal(Strict):
     """[thermal], all optional: from derate_C on torque falls in a straight line, at trip_C it is zero"""
 
     inverter_derate_C: Annotated[float, Field(ge=20, le=300)] = 85.0
@@ -96,7 +90,7 @@ class Thermal(_Section):
     winding_trip_C: Annotated[float, Field(ge=20, le=300)] = 180.0
 
 
-class Magnet(_Section):
+class Magnet(Strict):
     """[magnet], all optional: what weakening the magnets bear"""
 
     i_d_demag_A: Annotated[float, Field(gt=0, le=10000)] | None = None
@@ -105,7 +99,7 @@ class Magnet(_Section):
     assumed_C: Annotated[float, Field(ge=20, le=300)] = 150.0
 
 
-class MotorConfig(_Section):
+class MotorConfig(Strict):
     """The whole file."""
 
     machine: Machine
@@ -142,165 +136,133 @@ class MotorConfig(_Section):
         return self.machine.pole_pairs * self.machine.speed_max_rpm * 2 * math.pi / 60
 
 
-def _number(value: float) -> str:
-    return f"{value:g}"
+NAME_ALLOWED = {"machine.name": "1 to 48 letters, digits, spaces or _ . + -", "machine.flux_map": "1 to 255 characters"}
 
 
-def _range_text(metadata: list[Any]) -> str:
-    """The limits of a field in words, from the annotations the validation itself uses."""
-    low = high = ""
-    for item in metadata:
-        for limit, text in (("ge", "from {}"), ("gt", "above {}")):
-            if getattr(item, limit, None) is not None:
-                low = text.format(_number(getattr(item, limit)))
-        if getattr(item, "le", None) is not None:
-            high = _number(item.le)
-    if low and high:
-        return f"{low} up to {high}" if low.startswith("above") else f"{low} to {high}"
-    return low
+def _complaint(error: ValidationError) -> str:
+    first = error.errors()[0]
+    where = ".".join(map(str, first["loc"]))
+    if len(first["loc"]) == 1 and where in MotorConfig.model_fields and first["type"] != "extra_forbidden":
+        if first["type"] == "missing":
+            return f"[{where}]: section missing"
+        return f"{strict.quantity(where, first['input'])}, allowed: a section [{where}]"
+    return strict.explain(error, MotorConfig, NAME_ALLOWED)
 
 
-def _allowed(section: type[BaseModel], key: str) -> str:
-    field = section.model_fields[key]
-    metadata, kind = list(field.metadata), field.annotation
-    for part in getattr(kind, "__args__", ()):  # X | None
-        if part is not type(None):
-            for item in getattr(part, "__metadata__", ()):
-                metadata += getattr(item, "metadata", [item])  # pydantic keeps the limits one level down
-            kind = getattr(part, "__origin__", part)
-    if kind is str:
-        if key == "name":
-            return "1 to 48 letters, digits, spaces or _ . + -"
-        return "1 to 255 characters"
-    noun = "a whole number" if kind is int else "a finite number"
-    return f"{noun} {_range_text(metadata)}".rstrip()
+def _fail(text: str) -> None:
+    raise FluxtrueError(text)
 
 
-def _section_of(name: str) -> type[BaseModel] | None:
-    sections = {"machine": Machine, "inverter": Inverter, "control": Control, "identification": Identification,
-                "thermal": Thermal, "magnet": Magnet}
-    return sections.get(name)
-
-
-def _message(error: dict[str, Any]) -> str:
-    location = [str(part) for part in error["loc"]]
-    section = _section_of(location[0]) if location else None
-    name = ".".join(location[:2])
-    kind = error["type"]
-    if kind == "extra_forbidden":
-        owner = section if len(location) > 1 and section else MotorConfig
-        allowed = ", ".join(owner.model_fields)
-        return f"{name}: unknown key, allowed: {allowed}"
-    if kind == "missing":
-        if len(location) > 1 and section:
-            return f"{name}: missing, wanted: {_allowed(section, location[1])}"
-        return f"[{name}]: section missing"
-    shown = repr(error["input"])
-    shown = shown if len(shown) <= SHOWN_MAX else f"{shown[:SHOWN_MAX - 3]}..."
-    if section and len(location) > 1:
-        return f"{name} = {shown}, allowed: {_allowed(section, location[1])}"
-    return f"{name} = {shown}, allowed: a section [{name}]"
-
-
-def _fail(path: Path, text: str) -> None:
-    raise FluxtrueError(f"{path}: {text}")
-
-
-def _check_flux_source(path: Path, machine: Machine) -> None:
+def _check_flux_source(machine: Machine) -> None:
     constants = {"ld_H": machine.ld_H, "lq_H": machine.lq_H, "psi_f_Vs": machine.psi_f_Vs}
     given = [key for key, value in constants.items() if value is not None]
     if machine.flux_map is not None and given:
-        _fail(path, f"machine.flux_map and machine.{given[0]}: give either flux_map or "
-                    "ld_H, lq_H and psi_f_Vs, not both")
+        _fail(f"machine.flux_map and machine.{given[0]}: give either flux_map or "
+              "ld_H, lq_H and psi_f_Vs, not both")
     if machine.flux_map is None and len(given) != len(constants):
         missing = next(key for key in constants if key not in given)
-        _fail(path, f"machine.{missing}: missing, give either flux_map or "
-                    "all of ld_H, lq_H and psi_f_Vs")
+        _fail(f"machine.{missing}: missing, give either flux_map or "
+              "all of ld_H, lq_H and psi_f_Vs")
 
 
-def _check_speed(path: Path, config: MotorConfig) -> None:
+def _check_speed(config: MotorConfig) -> None:
     step = config.omega_max_rad_s / config.inverter.pwm_hz
     if step > ANGLE_PER_PERIOD_MAX:
         limit = ANGLE_PER_PERIOD_MAX * config.inverter.pwm_hz * 60 / (2 * math.pi * config.machine.pole_pairs)
-        _fail(path, f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
-                    f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)")
+        _fail(f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
+              f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)")
 
 
-def _check_currents(path: Path, config: MotorConfig) -> None:
+def _check_currents(config: MotorConfig) -> None:
     full_scale, i_max = config.inverter.current_full_scale_A, config.machine.i_max_A
     if full_scale < FULL_SCALE_PER_I_MAX * i_max:
-        _fail(path, f"inverter.current_full_scale_A = {full_scale:g}, allowed: from {FULL_SCALE_PER_I_MAX * i_max:g} "
-                    f"({FULL_SCALE_PER_I_MAX} * i_max_A: the over-current trip lies above i_max_A "
-                    "and below 80 % of full scale)")
+        _fail(f"inverter.current_full_scale_A = {full_scale:g} A, allowed: from "
+              f"{FULL_SCALE_PER_I_MAX * i_max:g} A "
+              f"({FULL_SCALE_PER_I_MAX} * i_max_A: the over-current trip lies above i_max_A "
+              "and below 80 % of full scale)")
     if full_scale > 20 * i_max:
-        _fail(path, f"inverter.current_full_scale_A = {full_scale:g}, allowed: up to {20 * i_max:g} "
-                    "(20 * i_max_A: beyond it the measurement has no resolution left)")
+        _fail(f"inverter.current_full_scale_A = {full_scale:g} A, allowed: up to {20 * i_max:g} A "
+              "(20 * i_max_A: beyond it the measurement has no resolution left)")
 
 
-def _check_inverter(path: Path, config: MotorConfig) -> None:
+def _check_inverter(config: MotorConfig) -> None:
     inverter = config.inverter
     for key, value in (("dead_time_s", inverter.dead_time_s), ("min_pulse_s", config.min_pulse_s)):
         limit = 0.1 / inverter.pwm_hz
         if value > limit:
-            _fail(path, f"inverter.{key} = {value:g}, allowed: up to {limit:g} (10 % of the PWM period)")
+            _fail(f"inverter.{key} = {value:g} s, allowed: up to {limit:g} s (10 % of the PWM period)")
     if config.v_dc_full_scale_V < 1.3 * inverter.vdc_V:
-        _fail(path, f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g}, allowed: from "
-                    f"{1.3 * inverter.vdc_V:g} (1.3 * vdc_V: the over-voltage trip lies below it)")
+        _fail(f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g} V, allowed: from "
+              f"{1.3 * inverter.vdc_V:g} V (1.3 * vdc_V: the over-voltage trip lies below it)")
     if inverter.device_drop_V > 0.05 * inverter.vdc_V:
-        _fail(path, f"inverter.device_drop_V = {inverter.device_drop_V:g}, allowed: up to "
-                    f"{0.05 * inverter.vdc_V:g} (5 % of vdc_V)")
+        _fail(f"inverter.device_drop_V = {inverter.device_drop_V:g} V, allowed: up to "
+              f"{0.05 * inverter.vdc_V:g} V (5 % of vdc_V)")
 
 
-def _check_thermal(path: Path, config: MotorConfig) -> None:
+def _check_thermal(config: MotorConfig) -> None:
     for what in ("inverter", "winding"):
         derate, trip = (getattr(config.thermal, f"{what}_{key}_C") for key in ("derate", "trip"))
         if trip < derate + THERMAL_SPAN_MIN_K:
-            _fail(path, f"thermal.{what}_trip_C = {trip:g}, allowed: from {derate + THERMAL_SPAN_MIN_K:g} "
-                        f"({what}_derate_C + {THERMAL_SPAN_MIN_K:g}: torque falls along a line, not at once)")
+            _fail(f"thermal.{what}_trip_C = {trip:g} °C, allowed: from {derate + THERMAL_SPAN_MIN_K:g} °C "
+                  f"({what}_derate_C + {THERMAL_SPAN_MIN_K:g}: torque falls along a line, not at once)")
 
 
-def _check_bandwidth(path: Path, config: MotorConfig) -> None:
+def _check_bandwidth(config: MotorConfig) -> None:
     bandwidth, limit = config.control.resistance_bandwidth_rad_s, config.inverter.pwm_hz / 64
     if bandwidth > limit:
-        _fail(path, f"control.resistance_bandwidth_rad_s = {bandwidth:g}, allowed: up to {limit:g} (pwm_hz / 64)")
+        _fail(f"control.resistance_bandwidth_rad_s = {bandwidth:g} rad/s, allowed: up to {limit:g} (pwm_hz / 64)")
 
 
-def _check_drop(path: Path, config: MotorConfig) -> None:
+def _check_drop(config: MotorConfig) -> None:
     machine = config.machine
     drop, limit = machine.r_ohm * machine.i_max_A, 0.3 * config.inverter.vdc_V
     if drop > limit:
-        _fail(path, f"machine.r_ohm = {machine.r_ohm:g} drops {drop:.3g} V at i_max_A, allowed: up to "
-                    f"{limit:.3g} V (30 % of vdc_V)")
+        slip = f"; as mΩ it would be {machine.r_ohm / 1000:g} Ω" if drop / 1000 <= limit else ""
+        _fail(f"machine.r_ohm = {machine.r_ohm:g} Ω drops {drop:.3g} V at i_max_A, allowed: up to "
+              f"{limit:.3g} V (30 % of vdc_V), here {strict.down(limit / machine.i_max_A):g} Ω{slip}")
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def _check_magnet(config: MotorConfig) -> None:
+    given = config.magnet.given()
+    if "i_d_demag_A_per_K" in given and config.magnet.i_d_demag_A is None:
+        _fail("magnet.i_d_demag_A_per_K: has no effect without magnet.i_d_demag_A, the limit at 20 °C")
+    if config.magnet.i_d_demag_A_per_K == 0.0:
+        for key in ("psi_temp_coeff_per_K", "assumed_C"):
+            if key in given:
+                _fail(f"magnet.{key}: has no effect without magnet.i_d_demag_A_per_K: no limit depends on temperature")
+
+
+def check_config(config: MotorConfig) -> None:
+    """Refuse values that do not fit one another."""
+    _check_flux_source(config.machine)
+    _check_speed(config)
+    _check_currents(config)
+    _check_inverter(config)
+    _check_drop(config)
+    _check_bandwidth(config)
+    _check_thermal(config)
+    _check_magnet(config)
+
+
+def _read(path: Path) -> str:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise FluxtrueError(f"{path}: no such file; a motor is a folder with {FILE_NAME}") from None
-    except NotADirectoryError:
-        raise FluxtrueError(f"{path.parent}: not a folder; a motor is a folder with {FILE_NAME}") from None
-    except OSError as error:
-        raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise FluxtrueError(f"{path}: not UTF-8 text") from None
-    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
-        raise FluxtrueError(f"{path}: not valid TOML: {error}") from None
+        if not path.parent.is_dir() and path.parent.exists():
+            raise FluxtrueError(f"{path.parent}: not a folder; a motor is a folder with {FILE_NAME}")
+        if not path.exists():
+            raise FluxtrueError(f"{path}: no such file; a motor is a folder with {FILE_NAME}")
+        if not path.is_file():
+            raise FluxtrueError(f"{path}: cannot be read (not a file)")
+    except OSError as error:  # too long a name, a loop of links
+        raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from None
+    return strict.read_text(path)
 
 
 def load_config(folder: Path) -> MotorConfig:
     """Read and validate <folder>/motor.toml."""
     path = folder / FILE_NAME
-    data = _read_toml(path)
+    config = strict.parse(MotorConfig, _read(path), str(path), _complaint)
     try:
-        config = MotorConfig.model_validate(data)
-    except ValidationError as error:
-        raise FluxtrueError(f"{path}: {_message(dict(error.errors()[0]))}") from None
-    _check_flux_source(path, config.machine)
-    _check_speed(path, config)
-    _check_currents(path, config)
-    _check_inverter(path, config)
-    _check_drop(path, config)
-    _check_bandwidth(path, config)
-    _check_thermal(path, config)
+        check_config(config)
+    except FluxtrueError as error:
+        raise FluxtrueError(f"{path}: {error}") from None
     return config

@@ -9,8 +9,6 @@ from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
 
-TASK_PERIODS = 10  # the slow task runs every tenth PWM period: 1 kHz at 10 kHz
-
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
 V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
@@ -36,7 +34,8 @@ PROPORTIONAL_MAX_PERIODS = 127.0
 PSI_DRIFT_SHARE, R_DRIFT_SHARE = 0.05, 0.2
 QUALITY_TIME_S = 0.05
 
-TORQUE_MODEL_RATE = 0.6
+LOOP_MISSING_PERIODS = 3.75  # area between a small step of current and its answer (TL-11)
+STEP_MISSING_S = 2e-3 / 3 - LOOP_MISSING_PERIODS * 1e-4  # what the voltage circle adds in a large one
 TORQUE_MIN_SHARE = 0.1
 
 V_MAX_PER_VDC, V_MIN_PER_VDC = 1.25, 0.4
@@ -45,6 +44,12 @@ DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_m
 SPEED_TRIP = 0.8  # of the reserve of the speed base
 TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
 INVERTER_ERROR_PER_VDC = 0.02
+MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
+DEVIATION_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.01, 0.02, 0.005, 0.11
+TORQUE_S, ANGLE_S, SETTLE_S = 0.02, 0.005, 0.005
+TRIM_S = 1.0  # of learning between two moves of the dead-time compensation
+COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
+STANDSTILL_SHARE = 0.002  # of the speed base
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
@@ -126,6 +131,7 @@ class Derived:
     monitor_torque_Nm: float
     monitor_V: float
     monitor_A: float
+    monitor_mean_rate: float
     share_short: float
     share_open: float
     v_release_V: float
@@ -153,14 +159,14 @@ def _modulation(config: MotorConfig) -> dict[str, float]:
             "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0)}
 
 
-def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_f_Vs: float) -> dict[str, float]:
+def _identification(config: MotorConfig, model: FluxModel, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
     machine, control, inverter = config.machine, config.control, config.inverter
+    period_s, step_s = bases.period_s, bases.step_s
     l_d, l_q = float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1))
     s = control.observer_m * machine.r_ohm * (1.0 / l_d + 1.0 / l_q)
     # The zero of each law lies on the observer's poles, so that the proportional part damps them.
     periods = min(2.0 / (s * period_s), PROPORTIONAL_MAX_PERIODS)
     v_dead = 4.0 / math.pi * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz
-    task_s = TASK_PERIODS * period_s
     looks_like = DEAD_TIME_RESIDUAL * v_dead / (DEAD_TIME_CURRENT * machine.i_max_A)
     return {
         "observer_s_rad_s": s, "flux_proportional": periods, "resistance_proportional": periods,
@@ -170,34 +176,39 @@ def _identification(config: MotorConfig, model: FluxModel, period_s: float, psi_
         "omega_min_rad_s": min(OMEGA_MIN_RAD_S, OMEGA_MIN_SHARE * config.omega_max_rad_s),
         "omega_r_max_rad_s": OMEGA_R_MAX_SHARE * config.omega_max_rad_s,
         "i_min_A": I_MIN_SHARE * machine.i_max_A,
-        "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * task_s,
-        "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * task_s,
-        "quality_rate": 1.0 - math.exp(-task_s / QUALITY_TIME_S),
+        "psi_drift_full_Vs": PSI_DRIFT_SHARE * psi_f_Vs * control.flux_bandwidth_rad_s * step_s,
+        "r_drift_full_ohm": R_DRIFT_SHARE * machine.r_ohm * control.resistance_bandwidth_rad_s * step_s,
+        "quality_rate": 1.0 - math.exp(-step_s / QUALITY_TIME_S),
     }
 
 
-def _torque_loop(config: MotorConfig) -> dict[str, float]:
-    control, task_s = config.control, TASK_PERIODS / config.inverter.pwm_hz
-    return {"torque_ki": control.torque_loop_bandwidth_rad_s * task_s, "torque_kp": 0.0,
-            "torque_model_rate": TORQUE_MODEL_RATE,
+def steps(seconds: float, step_s: float) -> int:
+    """Steps of the task that cover a time."""
+    return math.ceil(seconds / step_s - 1e-6)
+
+
+def _torque_loop(config: MotorConfig, step_s: float) -> dict[str, float]:
+    control = config.control
+    missing_s = LOOP_MISSING_PERIODS / config.inverter.pwm_hz + STEP_MISSING_S
+    return {"torque_ki": control.torque_loop_bandwidth_rad_s * step_s, "torque_kp": 0.0,
+            "torque_model_rate": step_s / (step_s + missing_s),
             "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
-            "torque_slew_Nm": config.torque_slew_Nm_per_s * task_s}
+            "torque_slew_Nm": config.torque_slew_Nm_per_s * step_s}
 
 
-def _voltage_reserve(config: MotorConfig) -> dict[str, float]:
+def _voltage_reserve(config: MotorConfig, step_s: float) -> dict[str, float]:
     planned = V_RATIO_REFERENCE * config.inverter.vdc_V
-    return {"ref_v_ratio": V_RATIO_REFERENCE, "trim_gain": TRIM_RATE_RAD_S * TASK_PERIODS / config.inverter.pwm_hz,
+    return {"ref_v_ratio": V_RATIO_REFERENCE, "trim_gain": TRIM_RATE_RAD_S * step_s,
             "trim_min_V": TRIM_MIN_SHARE * planned, "trim_max_V": TRIM_MAX_SHARE * planned}
 
 
 def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
     vdc, omega, thermal, magnet = config.inverter.vdc_V, config.omega_max_rad_s, config.thermal, config.magnet
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
-    task_s = TASK_PERIODS * bases.period_s
     return {
-        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * task_s,
+        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * bases.step_s,
         "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
-        "loss_rate": 1.0 - math.exp(-task_s / LOSS_TIME_S),
+        "loss_rate": 1.0 - math.exp(-bases.step_s / LOSS_TIME_S),
         "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
         "moving_end_rad_s": MOVING_SHARES[0] * omega, "moving_start_rad_s": MOVING_SHARES[1] * omega,
         "inverter_end_C": thermal.inverter_trip_C, "inverter_start_C": thermal.inverter_derate_C,
@@ -221,7 +232,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
             "monitor_torque_Nm": max(min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm),
                                      TORQUE_MONITOR_SHARE * machine.torque_max_Nm),
             "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
-            "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A}
+            "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
+            "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S)}
 
 
 def _monitors(config: MotorConfig) -> dict[str, float]:
@@ -241,13 +253,13 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         tracker_jump_turns=TRACKER_JUMP_TURNS,
         **_current_control(bases.period_s),
         **_modulation(config),
-        **_identification(config, model, bases.period_s, psi_f),
-        **_torque_loop(config),
-        **_voltage_reserve(config),
+        **_identification(config, model, bases, psi_f),
+        **_torque_loop(config, bases.step_s),
+        **_voltage_reserve(config, bases.step_s),
         **_torque_limit(config, bases, psi_f),
         **_monitors(config),
         **_slow_monitors(config, bases),
-        identify=identification.derive(config, bases.period_s, psi_f),
+        identify=identification.derive(config, bases, psi_f),
     )
 
 

@@ -9,9 +9,24 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
-from fluxtrue_tools.motor.derived import ANGLE_HARMONIC_MAX_TURNS, TASK_PERIODS
+from fluxtrue_tools.motor.derived import (
+    ANGLE_HARMONIC_MAX_TURNS,
+    ANGLE_S,
+    COMMISSION_MEASURE_S,
+    COMMISSION_SETTLE_S,
+    DEVIATION_S,
+    EQUAL_S,
+    FAST_S,
+    HOT_S,
+    LOST_S,
+    SETTLE_S,
+    STANDSTILL_SHARE,
+    TORQUE_S,
+    TRIM_S,
+    steps,
+)
 from fluxtrue_tools.motor.motor import Motor
-from fluxtrue_tools.motor.quantise import Q15_ONE, q15, q16, q31, u16
+from fluxtrue_tools.motor.quantise import Q15_ONE, Unfit, q15, q16, q31, u16
 
 Row = tuple[str, object, str]  # member, literal, comment
 
@@ -68,7 +83,8 @@ def _head(motor: Motor, include: str) -> str:
 
 
 def _bases(bases: Bases) -> list[Row]:
-    return [(name, _float(getattr(bases, name)), "") for name in Bases.__dataclass_fields__]
+    values = {name: getattr(bases, name) for name in Bases.__dataclass_fields__}
+    return [(name, f"{v}u" if isinstance(v, int) else _float(v), "") for name, v in values.items()]
 
 
 def _measure(motor: Motor) -> list[Row]:
@@ -99,7 +115,7 @@ def _tracker(motor: Motor) -> list[Row]:
 
 def _harmonics(motor: Motor) -> list[Row]:
     turns = ANGLE_HARMONIC_MAX_TURNS / motor.config.machine.pole_pairs
-    return [("most", int(turns * 2**32), f"{360 * ANGLE_HARMONIC_MAX_TURNS:g} degrees electrical")]
+    return [("max", int(turns * 2**32), f"{360 * ANGLE_HARMONIC_MAX_TURNS:g} degrees electrical")]
 
 
 def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
@@ -211,6 +227,9 @@ def _voltage_reserve(motor: Motor) -> list[Row]:
 def _line(end: float, start: float, per_count: float, name: str) -> list[Row]:
     """derating_line_t: 2^31 over the counts from no torque to all of it."""
     zero, one = round(end / per_count), round(start / per_count)
+    if abs(one - zero) < 2:
+        raise Unfit(f"between {end:.3g} and {start:.3g} (SI units, {name}) the firmware has no two steps of "
+                    f"{per_count:.3g}")
     return [("end", q15(zero / Q15_ONE, name), f"{end:.6g}, all from {start:.6g} on"),
             ("gain", q16(Q15_ONE / (one - zero), name), "")]
 
@@ -244,12 +263,27 @@ def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
     sum_max = q15(d.sum_max_A / b.current_A, "sum_max")
-    return [("quiet_q30", q31(quiet**2 / 2, "quiet"), f"({quiet * b.current_A:.6g} A)^2"),
+    return [("i_normal_squared_q30", q31(quiet**2 / 2, "i_normal_squared"), f"({quiet * b.current_A:.6g} A)^2"),
             ("zero_max", sum_max // 3, "a third of sum_max"),
             ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
             ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
             ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
             ("sum_max", sum_max, f"{d.sum_max_A:g} A")]
+
+
+def _counts(bases: Bases, **seconds: float) -> list[Row]:
+    """Times as counts of steps."""
+    return [(f"{name}_steps", f"{steps(s, bases.step_s)}", f"{1e3 * s:g} ms") for name, s in seconds.items()]
+
+
+def _commission(motor: Motor) -> list[Row]:
+    b = motor.bases
+    periods = steps(COMMISSION_MEASURE_S, b.step_s) * b.periods_per_step
+    return [("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), f"{motor.config.machine.i_max_A:g} A"),
+            ("omega_max", q31(STANDSTILL_SHARE, "standstill"), "of omega_b"),
+            *_counts(b, settle=COMMISSION_SETTLE_S, measure=COMMISSION_MEASURE_S),
+            ("periods_per_step", f"{b.periods_per_step}", ""),
+            ("mean_gain_q31", str(round(2**31 / periods)), f"1/{periods}: a sum to its mean")]
 
 
 def _plausibility(motor: Motor) -> list[Row]:
@@ -259,18 +293,21 @@ def _plausibility(motor: Motor) -> list[Row]:
             ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
             ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
             ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
-            ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), "")]
+            ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
+            *_counts(b, deviation=DEVIATION_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S)]
 
 
 def _torque_monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    rate = 1.0 / (b.omega_rad_s * TASK_PERIODS * b.period_s)
+    rate = 1.0 / (b.omega_rad_s * b.step_s)
     return [("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
             ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
             ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
             ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
             ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
-            ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b 1 ms)")]
+            ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
+            ("mean_rate", q15(d.monitor_mean_rate, "mean_rate"), f"{d.monitor_mean_rate:.6g}"),
+            *_counts(b, torque=TORQUE_S, angle=ANGLE_S, settle=SETTLE_S)]
 
 
 def _safe_state(motor: Motor) -> list[Row]:
@@ -293,6 +330,7 @@ def _motor(motor: Motor) -> list[Row]:
     return [
         ("name", f'"{machine.name}"', ""), ("bases", _bases(b), ""),
         ("adc_bits", f"{inverter.adc_bits}u", ""),
+        ("trim_steps", f"{steps(TRIM_S, b.step_s)}u", f"{TRIM_S:g} s"),
         ("current_full_scale_A", _float(inverter.current_full_scale_A), ""),
         ("v_dc_full_scale_V", _float(motor.config.v_dc_full_scale_V), ""),
         ("torque_max_Nm", _float(machine.torque_max_Nm), ""),
@@ -313,6 +351,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("i_d_limit", _i_d_limit(motor), ""), ("monitor", _monitor(motor), ""),
         ("safe_state", _safe_state(motor), ""), ("plausibility", _plausibility(motor), ""),
         ("torque_monitor", _torque_monitor(motor), ""),
+        ("commission", _commission(motor), ""),
     ]
 
 
@@ -343,10 +382,15 @@ def _q15_tables(motor: Motor) -> list[str]:
     return out
 
 
+def check_numbers(motor: Motor) -> None:
+    """Refuse what does not fit the firmware's formats, without making the text."""
+    _motor(motor)
+
+
 def motor_tables_c(motor: Motor) -> str:
     """motor_tables.c."""
     body = "\n".join(_struct(_motor(motor), INDENT))
-    return "\n".join([_head(motor, "app/motor.h"), *_q15_tables(motor), f"const motor_t motor = {{\n{body}\n}};\n"])
+    return "\n".join([_head(motor, "drive/motor.h"), *_q15_tables(motor), f"const motor_t motor = {{\n{body}\n}};\n"])
 
 
 _SI_DERIVED = (
@@ -366,8 +410,9 @@ def _si_rows(motor: Motor) -> list[Row]:
     machine, inverter, control, b = (motor.config.machine, motor.config.inverter, motor.config.control, motor.bases)
     tables, refs = motor.tables, motor.references
     numbers: dict[str, float] = {
-        "r_ohm_20": machine.r_ohm, "period_s": b.period_s, "i_base_A": b.current_A, "v_base_V": b.voltage_V,
-        "omega_base_rad_s": b.omega_rad_s, "current_full_scale_A": inverter.current_full_scale_A,
+        "r_ohm_20": machine.r_ohm, "period_s": b.period_s, "step_s": b.step_s, "i_base_A": b.current_A,
+        "v_base_V": b.voltage_V, "omega_base_rad_s": b.omega_rad_s,
+        "current_full_scale_A": inverter.current_full_scale_A,
         "v_dc_full_scale_V": motor.config.v_dc_full_scale_V, "id0_A": tables.id_A[0],
         "did_A": tables.id_A[1] - tables.id_A[0], "diq_A": tables.iq_A[1], "observer_m": control.observer_m,
         "flux_bandwidth_rad_s": control.flux_bandwidth_rad_s,
@@ -377,8 +422,9 @@ def _si_rows(motor: Motor) -> list[Row]:
         "i_max_A": machine.i_max_A,
     }
     numbers |= {name: getattr(motor.derived, name) for name in _SI_DERIVED}
-    counts = {"pole_pairs": machine.pole_pairs, "adc_bits": inverter.adc_bits, "nd": len(tables.id_A),
-              "nq": len(tables.iq_A), "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
+    counts = {"pole_pairs": machine.pole_pairs, "periods_per_step": b.periods_per_step,
+              "adc_bits": inverter.adc_bits, "nd": len(tables.id_A), "nq": len(tables.iq_A),
+              "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
     pointers = ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs", "ref_id_A", "ref_iq_A", "ref_torque_max_Nm")
     return [*((k, v, "") for k, v in counts.items()), *((k, _double(v), "") for k, v in numbers.items()),
             *identification.si_rows(motor.config, motor.derived.identify),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array, SplineModel
 
@@ -16,6 +17,8 @@ COLUMNS = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
 NODES_MIN = 4
 ROWS_MAX = 1_000_000
 SIZE_MAX = 200_000_000  # bytes
+VALUE_MAX = 1e5  # A, V·s
+SEPARATORS = {";": "';'", "\t": "tabs"}
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,7 @@ class Symmetry:
     psi_d_rms_Vs: float
     psi_q_max_Vs: float
     psi_q_rms_Vs: float
+    psi_q_offset_Vs: float  # mean of what was taken from psi_q, with its sign
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,7 @@ class _Grid:
     iq_A: Array
     psi_d: Array
     psi_q: Array
+    line_of: dict[tuple[float, float], int]
 
 
 def _number(path: Path, line: int, column: str, text: str) -> float:
@@ -53,8 +58,10 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
         value = float(text.replace("_", "?"))  # Python would take 1_0 for 10
     except ValueError:
         raise FluxtrueError(f"{path}:{line}: {column} = '{text.strip()[:40]}', allowed: a number") from None
-    if not math.isfinite(value):
-        raise FluxtrueError(f"{path}:{line}: {column} = {text.strip()}, allowed: a finite number")
+    if not math.isfinite(value) or abs(value) > VALUE_MAX:
+        unit = strict.unit_of(column)
+        raise FluxtrueError(f"{path}:{line}: {column} = {text.strip()[:40]}, allowed: a finite number from "
+                            f"{-VALUE_MAX:g} to {VALUE_MAX:g} {unit}")
     return value
 
 
@@ -85,6 +92,10 @@ def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
     if len(lines) > ROWS_MAX:
         raise FluxtrueError(f"{path}: {len(lines)} rows, allowed: up to {ROWS_MAX}")
     header = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    for sign, words in SEPARATORS.items():
+        if len(header) == 1 and sign in lines[0][1]:
+            raise FluxtrueError(f"{path}:{lines[0][0]}: columns separated by {words}, allowed: by ',' (and a decimal "
+                                "point)")
     for column in COLUMNS:
         if header.count(column) != 1:
             raise FluxtrueError(f"{path}:{lines[0][0]}: column {column} found {header.count(column)} times, "
@@ -123,7 +134,7 @@ def _grid(path: Path) -> _Grid:
         raise FluxtrueError(f"{path}: no row with id_A = {id_A[k]:g}, iq_A = {iq_A[j]:g} ({len(holes)} missing; "
                             f"id_A = {id_A[k]:g} stands on lines {lines[0]} to {lines[-1]}); "
                             "wanted: a full rectangular grid")
-    return _Grid(id_A, iq_A, psi_d, psi_q)
+    return _Grid(id_A, iq_A, psi_d, psi_q, line_of)
 
 
 def _check_cover(path: Path, grid: _Grid, i_max_A: float) -> None:
@@ -172,7 +183,7 @@ def _both_halves(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
     # The removed parts over the whole plane: every node but i_q = 0 stands for two.
     both = np.concatenate((np.arange(len(iq)), np.arange(1, len(iq))))
     symmetry = Symmetry(source, float(np.abs(lost_d).max()), _rms(lost_d[:, both]),
-                        float(np.abs(lost_q).max()), _rms(lost_q[:, both]))
+                        float(np.abs(lost_q).max()), _rms(lost_q[:, both]), float(lost_q[:, both].mean()))
     return iq, (d_plus + d_minus) / 2, (q_plus - q_minus) / 2, symmetry
 
 
@@ -185,23 +196,42 @@ def _one_half(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
     psi_q = -grid.psi_q[:, ::-1] if negative else grid.psi_q
     offset = psi_q[:, :1]
     half = "i_q <= 0" if negative else "i_q >= 0"
-    symmetry = Symmetry(f"{half}, mirrored", 0.0, 0.0, float(np.abs(offset).max()), _rms(offset))
+    symmetry = Symmetry(f"{half}, mirrored", 0.0, 0.0, float(np.abs(offset).max()), _rms(offset),
+                        float(offset.mean()) * (-1.0 if negative else 1.0))
     return iq, psi_d, psi_q - offset, symmetry
 
 
-def _check_physics(path: Path, flux_map: FluxMap) -> None:
-    psi_f = float(np.interp(0.0, flux_map.id_A, flux_map.psi_d_Vs[:, len(flux_map.iq_A) // 2]))
+def _place(grid: _Grid, i_d: float, i_q: float) -> str:
+    """Where the file has a point of the symmetrised half plane; in the half that it has."""
+    for q in (i_q, -i_q):
+        line = grid.line_of.get((i_d, q + 0.0)) or grid.line_of.get((i_d, -0.0 if q == 0.0 else q))
+        if line is not None:
+            return f"id_A = {i_d:g}, iq_A = {q + 0.0:g} (line {line})"
+    return f"id_A = {i_d:g}, iq_A = +-{i_q:g}"
+
+
+def _check_rising(path: Path, grid: _Grid, iq: Array, name: str, psi: Array, axis: int) -> None:
+    """A flux that falls with its own current: where, in terms of the file."""
+    falls = np.diff(psi, axis=axis) <= 0
+    if not falls.any():
+        return
+    k, j = np.argwhere(falls)[0]
+    current = "id_A" if axis == 0 else "iq_A"
+    here, there = (grid.id_A[k], iq[j]), (grid.id_A[k + (axis == 0)], iq[j + (axis == 1)])
+    sign = f"; everywhere: its sign is the other way round, wanted: {name} rising with {current}"
+    turned = sign if falls.all() else ""
+    raise FluxtrueError(f"{path}: {name} does not rise with {current} from {_place(grid, *here)} to "
+                        f"{_place(grid, *there)}{turned}; wanted: positive incremental inductances everywhere")
+
+
+def _check_physics(path: Path, grid: _Grid, iq: Array, psi_d: Array, psi_q: Array) -> None:
+    """On the half plane i_q >= 0, after symmetrising."""
+    psi_f = float(np.interp(0.0, grid.id_A, psi_d[:, 0]))
     if psi_f <= 0:
-        raise FluxtrueError(f"{path}: psi_d_Vs = {psi_f:g} at id_A = 0, iq_A = 0, allowed: above 0 "
+        raise FluxtrueError(f"{path}: psi_d_Vs = {psi_f:g} V·s at id_A = 0, iq_A = 0, allowed: above 0 "
                             "(the d axis lies along the magnet)")
-    for name, psi, axis in (("psi_d_Vs", flux_map.psi_d_Vs, 0), ("psi_q_Vs", flux_map.psi_q_Vs, 1)):
-        falls = np.argwhere(np.diff(psi, axis=axis) <= 0)
-        if len(falls):
-            k, j = falls[0]
-            current = "id_A" if axis == 0 else "iq_A"
-            raise FluxtrueError(f"{path}: {name} does not rise with {current} above id_A = {flux_map.id_A[k]:g}, "
-                                f"iq_A = {flux_map.iq_A[j]:g} (after symmetrising); "
-                                "wanted: positive incremental inductances everywhere")
+    _check_rising(path, grid, iq, "psi_d_Vs", psi_d, 0)
+    _check_rising(path, grid, iq, "psi_q_Vs", psi_q, 1)
 
 
 def load_flux_map(path: Path, i_max_A: float) -> FluxMap:
@@ -211,7 +241,6 @@ def load_flux_map(path: Path, i_max_A: float) -> FluxMap:
     both = grid.iq_A[0] < 0 < grid.iq_A[-1]
     iq, psi_d, psi_q, symmetry = _both_halves(grid) if both else _one_half(grid)
     psi_q[:, 0] = 0.0
+    _check_physics(path, grid, iq, psi_d, psi_q)
     full_iq, full_d, full_q = _mirror(iq, psi_d, psi_q)
-    flux_map = FluxMap(grid.id_A, full_iq, full_d, full_q, symmetry)
-    _check_physics(path, flux_map)
-    return flux_map
+    return FluxMap(grid.id_A, full_iq, full_d, full_q, symmetry)

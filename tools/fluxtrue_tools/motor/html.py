@@ -4,7 +4,6 @@
 from html import escape
 from pathlib import Path
 
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.motor import Motor
 
 STYLE = ("body{font:15px/1.45 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
@@ -17,14 +16,10 @@ def write_plots(motor: Motor, folder: Path) -> None:
 
     from fluxtrue_tools.motor.plots import FIGURES
 
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, (_, draw) in FIGURES.items():
-            figure = draw(motor)
-            figure.savefig(folder / name, dpi=100, metadata={"Software": None})
-            plt.close(figure)
-    except OSError as error:
-        raise FluxtrueError(f"{folder}: cannot be written: {error.strerror}") from None
+    for name, (_, draw) in FIGURES.items():
+        figure = draw(motor)
+        figure.savefig(folder / name, dpi=100, metadata={"Software": None})
+        plt.close(figure)
 
 
 def write_report(motor: Motor, text: str, folder: Path) -> None:

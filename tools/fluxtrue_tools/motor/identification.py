@@ -10,7 +10,9 @@ from fluxtrue_tools.motor.quantise import q15, q16, q31
 
 Row = tuple[str, object, str]
 
-WINDOW_PERIODS, UPDATE_STEPS = 10, 10
+UPDATE_STEPS = 10  # windows per update of the filter
+LIMITED_NOISE = 5.0  # times the noise, in addition, if every period of a window has limited pulses
+MISMATCH_TIME_S = -0.01 / math.log(0.9)  # a tenth in 10 ms
 IRON_SIGN_RAD_S = 8.0  # electrical; the hysteresis term is whole from 25 rpm on three pole pairs
 OMEGA_MIN_SHARE = 0.02  # of maximum speed
 I_MIN_SHARE = 0.03  # of i_max
@@ -40,15 +42,16 @@ class Identify:
     i_smooth_A: float
     local_corner_rad_s: float
     local_rate: float
+    limited_noise: float
+    mismatch_rate: float
     torque_min_Nm: float
     confidence_rate: float
 
 
-def derive(config: MotorConfig, period_s: float, psi_f_Vs: float) -> Identify:
+def derive(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> Identify:
     """From the uncertainties in motor.toml."""
     machine, inverter, prior = config.machine, config.inverter, config.identification
-    step_s = WINDOW_PERIODS * period_s
-    update_s = UPDATE_STEPS * step_s
+    update_s = UPDATE_STEPS * bases.step_s
     dead_V = prior.dead_time_uncertainty * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz
     drop_V = 4.0 / math.pi * (dead_V + prior.device_drop_uncertainty_V)
     voltage_V, flux_Vs = prior.voltage_uncertainty * inverter.vdc_V, prior.flux_uncertainty * psi_f_Vs
@@ -64,7 +67,9 @@ def derive(config: MotorConfig, period_s: float, psi_f_Vs: float) -> Identify:
         noise_V=correlated * voltage_V, noise_Vs=correlated * flux_Vs, noise_rate=correlated * CHANGE_UNCERTAINTY,
         omega_min_rad_s=OMEGA_MIN_SHARE * config.omega_max_rad_s,
         i_min_A=I_MIN_SHARE * machine.i_max_A, i_smooth_A=0.5 * I_MIN_SHARE * machine.i_max_A,
-        local_corner_rad_s=voltage_V / flux_Vs, local_rate=1.0 - math.exp(-step_s / LOCAL_TIME_S),
+        local_corner_rad_s=voltage_V / flux_Vs, local_rate=1.0 - math.exp(-bases.step_s / LOCAL_TIME_S),
+        limited_noise=LIMITED_NOISE / bases.periods_per_step,
+        mismatch_rate=1.0 - math.exp(-update_s / MISMATCH_TIME_S),
         torque_min_Nm=TORQUE_MIN_SHARE * machine.torque_max_Nm,
         confidence_rate=update_s / CONFIDENCE_TIME_S,
     )  # fmt: skip
@@ -80,16 +85,16 @@ def _q30(value: float, name: str) -> str:
 
 def _machine_rows(config: MotorConfig, bases: Bases, l_shift: int) -> list[Row]:
     b, machine = bases, config.machine
-    window_s = WINDOW_PERIODS * b.period_s
-    turns = b.omega_rad_s * window_s / (2.0 * math.pi)
+    turns = b.omega_rad_s * b.step_s / (2.0 * math.pi)
     admittance = b.flux_Vs / (1.5 * b.current_A)
     r0 = machine.r_ohm / b.resistance_ohm
     return [
         ("l_shift", f"{l_shift}u", ""), ("r0", q31(r0, "r0"), "R at 20 C"),
         ("r_per_dC", q31(r0 * machine.r_temp_coeff_per_K / 10.0, "r_per_dC"), "per 0.1 K"),
         ("sinc_gain", q31((b.omega_rad_s * b.period_s) ** 2 / 24, "sinc_gain"), "(omega_b T_s)^2/24"),
-        ("rate_gain_q28", str(round(2**28 / (b.omega_rad_s * window_s))), "1/(omega_b T)"),
-        ("window_turns_q29", str(round(2**29 * turns)), f"{turns:.6g} turns"),
+        ("mean_gain_q32", str(round(2**32 / (2 * b.periods_per_step))), f"1/(2 N), N = {b.periods_per_step}"),
+        ("rate_gain_q28", str(round(2**28 / (b.omega_rad_s * b.step_s))), "1/(omega_b T)"),
+        ("window_turns_q29", f"{round(2**29 * turns)}u", f"{turns:.6g} turns"),
         ("turn_to_pu", q16(0.5 / turns, "turn_to_pu"), f"{0.5 / turns:.6g}"),
         ("iron_hysteresis", q31(machine.iron_loss_hysteresis * admittance, "iron_hysteresis"), "k_h/1.5"),
         ("iron_eddy", q31(machine.iron_loss_eddy * b.omega_rad_s * admittance, "iron_eddy"), "k_e omega_b/1.5"),
@@ -117,6 +122,8 @@ def rows(config: MotorConfig, bases: Bases, identify: Identify, l_shift: int) ->
         ("local_corner", q15(d.local_corner_rad_s / b.omega_rad_s, "local_corner"),
          f"{d.local_corner_rad_s:.4g} rad/s"),
         ("local_rate", q31(d.local_rate, "local_rate"), f"{LOCAL_TIME_S:g} s"),
+        ("limited_noise", q16(d.limited_noise, "limited_noise"), f"{d.limited_noise:g}"),
+        ("mismatch_rate", q15(d.mismatch_rate, "mismatch_rate"), f"{MISMATCH_TIME_S:.3g} s"),
         ("torque_min", q15(d.torque_min_Nm / b.torque_Nm, "torque_min"), f"{d.torque_min_Nm:.4g} N·m"),
         ("confidence_full", q15(CONFIDENCE_FULL, "confidence_full"), f"{CONFIDENCE_FULL:g}"),
         ("confidence_none", q15(CONFIDENCE_NONE, "confidence_none"), f"{CONFIDENCE_NONE:g}"),
@@ -133,7 +140,8 @@ def si_rows(config: MotorConfig, identify: Identify) -> list[Row]:
         "identify_noise_V": d.noise_V, "identify_noise_Vs": d.noise_Vs, "identify_noise_rate": d.noise_rate,
         "identify_omega_min_rad_s": d.omega_min_rad_s, "identify_i_min_A": d.i_min_A,
         "identify_i_smooth_A": d.i_smooth_A, "identify_local_corner_rad_s": d.local_corner_rad_s,
-        "identify_local_rate": d.local_rate, "identify_torque_min_Nm": d.torque_min_Nm,
+        "identify_local_rate": d.local_rate, "identify_limited_noise": d.limited_noise,
+        "identify_mismatch_rate": d.mismatch_rate, "identify_torque_min_Nm": d.torque_min_Nm,
         "identify_confidence_full": CONFIDENCE_FULL, "identify_confidence_none": CONFIDENCE_NONE,
         "identify_confidence_rate": d.confidence_rate,
     }  # fmt: skip

@@ -13,11 +13,21 @@ Q16_ONE = 1 << 16
 Q31_ONE = 1 << 31
 
 
+class Unfit(FluxtrueError):
+    """A number that follows from the user's values and that the firmware cannot hold."""
+
+
+def _words(low: int, high: int, one: int) -> str:
+    """The range of a format: its upper end is one step below a round number."""
+    upper = f"below {(high + 1) / one:g}"
+    return upper if low == 0 else f"from {low / one:g} and {upper}"
+
+
 def _fixed(value: float, one: int, low: int, high: int, name: str) -> int:
     scaled = math.floor(value * one + 0.5)
     if not low <= scaled <= high:
-        raise FluxtrueError(f"{name} = {value:.6g} does not fit the firmware's format, allowed: "
-                            f"{low / one:g} to {high / one:g} per unit")
+        raise Unfit(f"the number that the firmware derives from it ({name}) is {value:.6g} per unit, allowed: "
+                    f"{_words(low, high, one)}")
     return scaled
 
 
@@ -46,7 +56,7 @@ def q15_table(values: ArrayLike, name: str) -> NDArray[np.int64]:
     scaled = np.floor(np.asarray(values, float) * Q15_ONE + 0.5).astype(np.int64)
     if scaled.min() < -Q15_ONE or scaled.max() > Q15_ONE - 1:
         worst = float(np.asarray(values).flat[int(np.argmax(np.abs(np.asarray(values))))])
-        raise FluxtrueError(f"table {name}: {worst:.6g} does not fit the firmware's format, allowed: -1 to 1 per unit")
+        raise Unfit(f"a number in the firmware's table {name} is {worst:.6g} per unit, allowed: from -1 and below 1")
     return scaled
 
 

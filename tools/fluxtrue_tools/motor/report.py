@@ -3,6 +3,7 @@
 
 from dataclasses import asdict
 
+from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.motor import Motor
 
 Lines = list[str]
@@ -90,9 +91,13 @@ def _bases(motor: Motor) -> Lines:
     return [f"bases: {text}", f"  speed reserve      {_percent(ratio - 1)} above speed_max_rpm"]
 
 
+def _warnings(motor: Motor) -> Lines:
+    return [f"warning: {text}" for text in doubts.of_motor(motor)]
+
+
 def report_text(motor: Motor) -> str:
     """report.txt."""
-    parts = [_machine(motor), _map(motor), _tables(motor), _references(motor), _bases(motor),
+    parts = [_warnings(motor), _machine(motor), _map(motor), _tables(motor), _references(motor), _bases(motor),
              [f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
               "references "
               f"= {motor.flash_bytes} bytes"]]

@@ -6,6 +6,8 @@ import fcntl
 import hashlib
 import os
 import re
+import shutil
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -56,20 +58,31 @@ def shipped_names() -> list[str]:
     return sorted(path.parent.name for path in SHIPPED.glob("*/motor.toml"))
 
 
-def locate(motor: str, base: Path) -> tuple[str, Path]:
+def locate(motor: str, base: Path, where: str = "motor") -> tuple[str, Path]:
     """Name and folder of a shipped motor, or of a folder with a motor.toml, relative to `base`."""
     if motor in shipped_names():
         return motor, SHIPPED / motor
-    if set(motor) & set(UNUSABLE):
-        raise FluxtrueError(f"motor {motor!r}: allowed: a path without {' '.join(UNUSABLE)} (CMake's own signs)")
+    shipped = ", ".join(shipped_names())
+    if not motor or set(motor) & set(UNUSABLE) or not motor.isprintable():
+        raise FluxtrueError(f"{where} = {motor!r}, allowed: {shipped}, or a folder whose path has none of "
+                            f"{' '.join(UNUSABLE)} and no control characters")  # fmt: skip
     try:
         folder = (base / Path(motor).expanduser()).resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, a NUL
-        raise FluxtrueError(f"motor {motor!r}: {error}") from None
-    if not (folder / "motor.toml").is_file():
-        shipped = ", ".join(shipped_names())
-        raise FluxtrueError(f"motor '{motor}': neither a folder with a motor.toml nor one of {shipped}")
+        found = stat.S_ISREG((folder / "motor.toml").stat().st_mode)
+    except FileNotFoundError:
+        found = False
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, too long a name
+        raise FluxtrueError(f"{where} = {motor!r}: {getattr(error, 'strerror', None) or error}") from None
+    if not found:
+        raise FluxtrueError(f"{where} = {motor!r}: neither a folder with a motor.toml nor one of {shipped}")
     return folder.name, folder
+
+
+def sources(motor: str, base: Path, where: str = "motor") -> tuple[Path, ...]:
+    """The files a motor is made from: no command that uses the motor may write them."""
+    from fluxtrue_tools.motor.names import source_files
+
+    return source_files(locate(motor, base, where)[1])
 
 
 @contextlib.contextmanager
@@ -132,9 +145,11 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
     return MotorFolder(name, build_dir / "motors" / target)
 
 
-def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None) -> MotorFolder:
+def prepare(
+    motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor"
+) -> MotorFolder:
     """The built motor. A given build folder is used as it is; else build/ is brought up to date."""
-    name, folder = locate(motor, base or Path.cwd())
+    name, folder = locate(motor, base or Path.cwd(), where)
     is_shipped = folder == SHIPPED / name
     if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
         build_dir = Path(os.environ["FLUXTRUE_BUILD_DIR"])
@@ -149,13 +164,32 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None)
     if is_shipped:
         return _make(name, ROOT / "build" / "host", None)
     tag = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
-    try:
-        return _make(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
-    except FluxtrueError:
-        from fluxtrue_tools.motor.motor import load_motor
+    return _make_from(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
 
-        load_motor(folder)  # bad motor data explain themselves better than a build log
+
+def _make_from(name: str, build_dir: Path, folder: Path) -> MotorFolder:
+    """A build of its own for a folder anywhere; motor data that are refused leave none behind."""
+    is_new = not build_dir.exists()
+    if is_new:
+        _check_motor(folder)
+    try:
+        return _make(name, build_dir, folder)
+    except FluxtrueError:
+        _check_motor(folder)
         raise
+    finally:
+        if is_new and not (build_dir / "build.ninja").is_file():
+            shutil.rmtree(build_dir, ignore_errors=True)
+
+
+def _check_motor(folder: Path) -> None:
+    """Bad motor data explain themselves better than a build log."""
+    from fluxtrue_tools.motor.build import generate
+    from fluxtrue_tools.motor.motor import load_motor, naming
+
+    motor = load_motor(folder)
+    with naming(folder):
+        generate(motor)
 
 
 def _selected(build_dir: Path) -> Path | None:

@@ -7,27 +7,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools import paths
 
 if TYPE_CHECKING:
     from fluxtrue_tools.sim.motor import Motor
     from fluxtrue_tools.sim.scenario import Scenario
 
-_FILE = click.Path(dir_okay=False, path_type=Path)
-PLOTS = (".png", ".svg", ".pdf")
+EXIT_TRIPPED = 1
 
 
-@click.command()
-@click.argument("scenario", type=_FILE)
-@click.option("--out", type=_FILE, help="Every recorded quantity over time, CSV.")
-@click.option("--json", "json_path", type=_FILE, help="Means over the window and errors, JSON.")
-@click.option("--plot", type=_FILE, help="Torque, currents, flux, resistance: PNG, SVG or PDF.")
-@click.option("--motor", help="Instead of the scenario's: a shipped name or a folder.")
+@click.command(cls=paths.Command)
+@click.argument("scenario", type=paths.InputFile())
+@click.option("--out", type=paths.OutputFile(), help="Every recorded quantity over time, CSV.")
+@click.option("--json", "json_path", type=paths.OutputFile(), help="Means over the window and errors, JSON.")
 @click.option(
-    "--build-dir",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Take the libraries from this build folder as they are.",
+    "--plot", type=paths.OutputFile(*paths.PICTURES), help="Torque, currents, flux, resistance: PNG, SVG or PDF."
 )
+@click.option("--motor", help="Instead of the scenario's: a shipped name or a folder.")
+@click.option("--build-dir", type=paths.InputFolder(), help="Take the libraries from this build folder as they are.")
 def sim(
     scenario: Path,
     out: Path | None,
@@ -35,25 +32,18 @@ def sim(
     plot: Path | None,
     motor: str | None,
     build_dir: Path | None,
-) -> None:
+) -> int:
     """Run a SCENARIO (TOML): the simulated drive with the firmware, or with its twin."""
+    from fluxtrue_tools.sim import build
     from fluxtrue_tools.sim import motor as motors
     from fluxtrue_tools.sim import scenario as scenarios
 
-    check_outputs(out, json_path, plot)
     read = scenarios.read(scenario)
-    base = Path.cwd() if motor else scenario.parent
-    built = motors.load(motor or read.motor, build_dir, base)
-    run_and_report(read, built, scenario, out, json_path, plot, read.controller.kind)
-
-
-def check_outputs(out: Path | None, json_path: Path | None, plot: Path | None) -> None:
-    """Complain before a long run, not after it."""
-    from fluxtrue_tools.sim import output
-
-    if plot is not None and plot.suffix.lower() not in PLOTS:
-        raise FluxtrueError(f"--plot {plot}: allowed: a file ending in {', '.join(PLOTS)}")
-    output.check_writable(out, json_path, plot)
+    named, base = (motor, Path.cwd()) if motor is not None else (read.motor, scenario.parent)
+    where = "--motor" if motor is not None else f"{scenario}: motor"
+    paths.outputs().reads(*build.sources(named, base, where))
+    built = motors.load(named, build_dir, base, where)
+    return run_and_report(read, built, scenario, out, json_path, plot, read.controller.kind)
 
 
 def run_and_report(
@@ -64,30 +54,41 @@ def run_and_report(
     json_path: Path | None,
     plot: Path | None,
     controller: str,
-) -> None:
+) -> int:
     """Run it with a progress bar, write the files asked for, print the table."""
     from fluxtrue_tools.sim import output
     from fluxtrue_tools.sim.run import simulate
 
-    with click.progressbar(
-        length=max(1, round(1e3 * read.duration_s)),
-        label=scenario.stem,
-        file=sys.stderr,
-        hidden=not sys.stderr.isatty(),
-    ) as bar:
-        run = simulate(
-            read, built, where=str(scenario), progress=lambda s: bar.update(round(1e3 * s))
-        )
-    data = output.summary(run) | {"controller": controller}
-    if out is not None:
-        output.write_text(out, output.csv_text(run))
-    if json_path is not None:
-        output.write_text(json_path, output.json_text(data))
-    if plot is not None:
-        from fluxtrue_tools.sim import plot as plots
+    with paths.outputs() as files:
+        files.reads(built.folder.library, built.folder.data)
+        with click.progressbar(
+            length=max(1, round(1e3 * read.duration_s)),
+            label=scenario.stem,
+            file=sys.stderr,
+            hidden=not sys.stderr.isatty(),
+        ) as bar:
+            run = simulate(
+                read, built, where=str(scenario), progress=lambda s: bar.update(round(1e3 * s))
+            )
+        data = output.summary(run) | {"controller": controller}
+        if out is not None:
+            files.text(out, output.csv_text(run))
+        if json_path is not None:
+            files.text(json_path, output.json_text(data))
+        if plot is not None:
+            from fluxtrue_tools.sim import plot as plots
 
-        plots.write(run, f"{scenario.stem}: {built.name}, {controller}", plot)
+            plots.write(run, f"{scenario.stem}: {built.name}, {controller}", files.scratch(plot))
     click.echo(table(data))
+    complaint = run.unexpected()
+    if complaint is None:
+        return 0
+    click.echo(f"error: {scenario}: {complaint}", err=True)
+    return EXIT_TRIPPED
+
+
+def _faults(faults: list[dict[str, Any]]) -> str:
+    return ", then ".join(f"{', '.join(one['names'])} at {one['t']:g} s" for one in faults) or "none"
 
 
 def _line(label: str, values: list[tuple[Any, str]]) -> str:
@@ -103,14 +104,14 @@ def table(data: dict[str, Any]) -> str:
             f"{data['motor']}, {data['controller']}: {data['duration_s']:g} s simulated, "
             f"{data['realtime_factor']:.3g} times real time",
             f"means from {window['from_s']:g} to {window['to_s']:g} s",
-            _line("  torque command", [(mean["torque_command_Nm"], "N·m")]),
+            _line("  torque requested", [(mean["torque_requested_Nm"], "N·m")]),
             _line(
                 "  shaft torque",
-                [(mean["true_torque_Nm"], "N·m"), (data["torque_error_percent"], "% of command")],
+                [(mean["true_torque_Nm"], "N·m"), (data["torque_error_percent"], "% of requested")],
             ),
             _line(
-                "  torque estimate",
-                [(mean["torque_estimate_Nm"], "N·m"), (data["estimate_error_percent"], "% off")],
+                "  torque estimated",
+                [(mean["torque_estimated_Nm"], "N·m"), (data["estimate_error_percent"], "% off")],
             ),
             _line("  speed", [(mean["true_speed_rpm"], "rpm")]),
             _line(
@@ -121,6 +122,6 @@ def table(data: dict[str, Any]) -> str:
                 "  resistance",
                 [(1e3 * mean["r_ohm"], "mΩ"), (data["r_error_percent"], "% off")],
             ),
-            _line("  faults", [(data["fault_word"], "(bits)")]),
+            f"{'  faults':<22}{_faults(data['faults'])}",
         ]
     )

@@ -93,7 +93,7 @@ class LoopError(FluxtrueError):
     def __init__(self, name: str, value: float | None, code: int) -> None:
         shown = "" if value is None else f" = {value:g}"
         super().__init__(f"{name}{shown}: {REASONS.get(code, f'error {code}')}")
-        self.name, self.code = name, code
+        self.name, self.value, self.code = name, value, code
 
 
 class Loop:

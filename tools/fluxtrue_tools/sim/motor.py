@@ -23,6 +23,7 @@ class Motor:
     plant: dict[str, float]
     inertia_kgm2: float
     torque_max_Nm: float
+    speed_max_rpm: float
     psi_f_Vs: float
     r_ohm: float
 
@@ -67,14 +68,15 @@ def read(folder: MotorFolder) -> Motor:
         plant=plant_parameters(machine, data["inverter"]),
         inertia_kgm2=machine["inertia_kgm2"],
         torque_max_Nm=machine["torque_max_Nm"],
+        speed_max_rpm=machine["speed_max_rpm"],
         psi_f_Vs=machine["psi_f_Vs"],
         r_ohm=machine["r_ohm"],
     )
 
 
-def load(motor: str, build_dir: Path | None = None, base: Path | None = None) -> Motor:
-    """A shipped motor or a folder with a motor.toml, built if need be."""
-    folder = prepare(motor, build_dir, base)
+def load(motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor") -> Motor:
+    """A shipped motor or a folder with a motor.toml, built if need be; `where` says who named it."""
+    folder = prepare(motor, build_dir, base, where)
     try:
         return read(folder)
     except (OSError, KeyError, TypeError, ValueError) as error:

@@ -12,10 +12,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fluxtrue_tools.sim.output import atomic
 from fluxtrue_tools.sim.run import Recording
 
-COMMAND, TRUTH, ESTIMATE, SECOND = "#7f7f7f", "#1f4e79", "#d1495b", "#edae49"
+COMMAND, TRUTH, ESTIMATE, SECOND, FAULT = "#7f7f7f", "#1f4e79", "#d1495b", "#edae49", "#b00020"
 STYLE: dict[Any, Any] = {
     "axes.grid": True,
     "axes.spines.right": False,
@@ -42,11 +41,11 @@ def finish(axes: Axes, title: str, ylabel: str, xlabel: str | None = None) -> No
 
 
 def torque(axes: Axes, run: Recording) -> None:
-    """Command, truth, estimate."""
+    """Requested, true and estimated torque."""
     now = run["time_s"]
-    axes.plot(now, run["torque_command_Nm"], color=COMMAND, ls="--", label="command")
+    axes.plot(now, run["torque_requested_Nm"], color=COMMAND, ls="--", label="requested")
     axes.plot(now, run["true_torque_Nm"], color=TRUTH, label="shaft (plant)")
-    axes.plot(now, run["torque_estimate_Nm"], color=ESTIMATE, lw=0.9, label="estimate")
+    axes.plot(now, run["torque_estimated_Nm"], color=ESTIMATE, lw=0.9, label="estimated")
     finish(axes, "Torque", "N·m")
 
 
@@ -130,6 +129,16 @@ def _room(axes: Axes, span: float) -> None:
         axes.set_ylim(middle - span, middle + span)
 
 
+def _mark_faults(axes: Axes, run: Recording, named: bool) -> None:
+    """A line where the drive tripped, through every panel; its name in one."""
+    for time_s, names in run.faults():
+        axes.axvline(time_s, color=FAULT, ls=":", lw=1.1)
+        if named:
+            axes.annotate(", ".join(names), (time_s, 0.98), xycoords=("data", "axes fraction"), rotation=90,
+                          ha="right", va="top", color=FAULT, fontsize=8,
+                          bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0})  # fmt: skip
+
+
 def figure(run: Recording, title: str) -> Figure:
     """Torque, currents, flux, resistance, speed, voltages; of the firmware what else it learnt."""
     panels = [torque, _currents, flux, resistance, _speed, _voltage]
@@ -139,6 +148,7 @@ def figure(run: Recording, title: str) -> Figure:
         sheet, axes = plt.subplots(rows, 2, figsize=(11, 2.7 * rows), sharex=True, layout="constrained")
         for axis, draw in zip(axes.flat, panels, strict=True):
             draw(axis, run)
+            _mark_faults(axis, run, named=draw is torque)
         for axis in axes[-1]:
             axis.set_xlabel("time, s")
         sheet.suptitle(title, fontsize=11)
@@ -149,7 +159,6 @@ def write(run: Recording, title: str, path: Path) -> None:
     """Any format that matplotlib knows by its suffix."""
     sheet = figure(run, title)
     try:
-        with atomic(path) as scratch:
-            sheet.savefig(scratch, dpi=120)
+        sheet.savefig(path, dpi=120)
     finally:
         plt.close(sheet)

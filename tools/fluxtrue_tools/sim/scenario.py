@@ -2,57 +2,47 @@
 """The scenario file: strict, every field with its unit in the name."""
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools import faults, strict
+from fluxtrue_tools.sim import effects
+from fluxtrue_tools.strict import Flag, Number, Strict, number
 
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
-
-
-def _number(value: Any) -> Any:
-    """TOML tells 1 from 1.0; nobody who writes a speed of 1000 means anything by it."""
-    if not isinstance(value, int) or isinstance(value, bool):
-        return value
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-Number = Annotated[float, BeforeValidator(_number)]
+POINTS_MAX = 10_000
+POINTS_ALLOWED = "allowed: a number, or a list of [t, value]"
 
 
 def _points(value: Any) -> Any:
     """A plain number holds for ever; a list of [time, value] is piecewise linear."""
-    value = _number(value)
+    value = number(value)
     if isinstance(value, float):
         return ((0.0, value),)
     if not isinstance(value, list) or not value:
-        raise ValueError("allowed: a number, or a list of [t, value]")
+        raise ValueError(POINTS_ALLOWED)
     points = []
     for point in value:
         if not (
             isinstance(point, list)
             and len(point) == 2
             and all(isinstance(x, int | float) and not isinstance(x, bool) for x in point)
-            and all(math.isfinite(_number(x)) for x in point)
+            and all(math.isfinite(number(x)) for x in point)
         ):
-            raise ValueError("allowed: a number, or a list of [t, value]")
+            raise ValueError(POINTS_ALLOWED)
         points.append((float(point[0]), float(point[1])))
     times = [time for time, _ in points]
+    if len(times) > POINTS_MAX:
+        raise ValueError(f"{len(times)} points, allowed: up to {POINTS_MAX}")
     if times != sorted(times) or times[0] < 0.0:
         raise ValueError("times must not be negative nor go backwards")
-    if any(times.count(time) > 2 for time in times):
+    if any(first == third for first, third in zip(times, times[2:], strict=False)):
         raise ValueError("at most two points may share a time: before and after a step")
     return tuple(points)
 
 
+SHARES = {"torque_share": "torque_Nm", "speed_share": "speed_rpm"}
 Points = Annotated[tuple[tuple[float, float], ...], BeforeValidator(_points)]
 
 Positive = Annotated[Number, Field(gt=0)]
@@ -73,7 +63,7 @@ class Controller(BaseModel):
     """Which controller runs, and its calibration: every other key is a name of the controller."""
 
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
-    __pydantic_extra__: dict[str, Annotated[float, BeforeValidator(lambda v: _flag(v))]]
+    __pydantic_extra__: dict[str, Flag]
 
     kind: Literal["firmware", "twin"] = "firmware"
     enable: bool = True
@@ -97,22 +87,45 @@ class Controller(BaseModel):
         return flags | (self.__pydantic_extra__ or {}) | {"enable": float(self.enable)}
 
 
-def _flag(value: Any) -> Any:
-    return float(value) if isinstance(value, bool) else _number(value)
-
-
-class Profile(_Strict):
+class Profile(Strict):
     """What the drive is asked to do and what happens around it, over time."""
 
     torque_Nm: Points = ((0.0, 0.0),)
+    torque_share: Points | None = None  # of the motor's torque_max_Nm, instead
     speed_rpm: Points = ((0.0, 0.0),)
+    speed_share: Points | None = None  # of the motor's speed_max_rpm, instead
     vdc_V: Points | None = None
     winding_C: Points = ((0.0, 20.0),)
     magnet_scale: Points = ((0.0, 1.0),)
     load_Nm: Points = ((0.0, 0.0),)
 
+    @model_validator(mode="after")
+    def _once(self) -> "Profile":
+        for share, absolute in SHARES.items():
+            if {share, absolute} <= self.given():
+                raise ValueError(f"profile.{share} and profile.{absolute}: give one of the two")
+        for _, value in self.torque_share or ():
+            if abs(value) > 1.0:
+                raise ValueError(f"profile.torque_share = {value:g}, allowed: -1 to 1 (of the motor's torque_max_Nm)")
+        return self
 
-class Mechanics(_Strict):
+    def key(self, name: str) -> str:
+        """The key that a quantity was given by."""
+        other = next((share for share, absolute in SHARES.items() if absolute == name), name)
+        return f"profile.{other if other in self.given() else name}"
+
+    def resolved(self, torque_max_Nm: float, speed_max_rpm: float) -> "Profile":
+        """With the shares worked out for a motor."""
+        factors = {"torque_share": torque_max_Nm, "speed_share": speed_max_rpm}
+        worked_out = {
+            SHARES[share]: tuple((t, factor * value) for t, value in getattr(self, share))
+            for share, factor in factors.items()
+            if getattr(self, share) is not None
+        }
+        return self.model_copy(update=worked_out)
+
+
+class Mechanics(Strict):
     """The shaft: a speed imposed by [profile] speed_rpm, or an inertia that starts there."""
 
     mode: Literal["imposed", "inertia"] = "imposed"
@@ -120,7 +133,7 @@ class Mechanics(_Strict):
     viscous_Nms: NotNegative = 0.0
 
 
-class Plant(_Strict):
+class Plant(Strict):
     """What is wrong with the drive. Left out: the motor's own data, and nothing wrong."""
 
     r_ohm_20: Positive | None = None
@@ -176,11 +189,36 @@ class Plant(_Strict):
         return values
 
 
-class Event(_Strict):
+FLAGS = ("enable", "torque_loop", "identification", "identification_mode", "trim", "fault_reset",
+         "identification_reset", "current_mode", "machine_monitors", "commission")  # fmt: skip
+
+
+def _kind_of(name: str) -> type | None:
+    """Of a name in an event: bool and int where the simulation would cut a fraction off."""
+    if name in FLAGS:
+        return bool
+    base = name.removeprefix("plant.").removesuffix("_a").removesuffix("_b").removesuffix("_c")
+    field = Plant.model_fields.get(base) if name.startswith("plant.") else None
+    if field is None:
+        return None
+    words = str(field.annotation)
+    return bool if "bool" in words else int if "int" in words else None
+
+
+class Event(Strict):
     """At a time, set plant fields ("plant.…") or names of the controller."""
 
     t: NotNegative
-    set: dict[str, Annotated[float, BeforeValidator(_flag)]] = Field(min_length=1)
+    set: Annotated[dict[str, Flag], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _whole(self) -> "Event":
+        for name, value in self.set.items():
+            kind = _kind_of(name)
+            if (kind is bool and value not in (0.0, 1.0)) or (kind is int and not value.is_integer()):
+                what = "true or false" if kind is bool else "a whole number"
+                raise ValueError(f"set.{name} = {value:g}, allowed: {what}")
+        return self
 
 
 def _events(value: Any) -> Any:
@@ -189,17 +227,18 @@ def _events(value: Any) -> Any:
     return tuple(value)
 
 
-class Window(_Strict):
+class Window(Strict):
     """What the summary averages; left out: the last 0.3 s."""
 
     from_s: NotNegative | None = None
     to_s: Positive | None = None
 
 
-class Scenario(_Strict):
+class Scenario(Strict):
     """One run."""
 
-    motor: str = Field(min_length=1)
+    motor: Annotated[str, Field(min_length=1)]
+    expect_fault: str | None = None  # a run that trips is a failure unless its fault is named here
     duration_s: Annotated[Number, Field(gt=0, le=36000)]
     seed: Annotated[int, Field(ge=0, lt=2**53)] = 1
     record_every_s: Positive = 1e-3
@@ -213,17 +252,26 @@ class Scenario(_Strict):
     @model_validator(mode="after")
     def _consistent(self) -> "Scenario":
         for index, event in enumerate(self.event):
-            if event.t > self.duration_s:
-                raise ValueError(f"event.{index}.t = {event.t:g}: after the end, allowed: 0 to duration_s")
+            if event.t >= self.duration_s:
+                raise ValueError(f"event.{index}.t = {event.t:g} s: after the end, allowed: from 0 up to and without "
+                                 f"duration_s = {self.duration_s:g} s")  # fmt: skip
             for name in event.set:
                 if name in self.profiled():
                     raise ValueError(f"event.{index}.set.{name}: the profile drives it, take one of the two")
-        if self.mechanics.mode == "inertia" and len(self.profile.speed_rpm) > 1:
-            raise ValueError("profile.speed_rpm: with an inertia only the initial speed can be given")
+        speed = self.profile.key("speed_rpm")
+        if self.mechanics.mode == "inertia" and len(getattr(self.profile, speed.removeprefix("profile."))) > 1:
+            raise ValueError(f"{speed}: with an inertia only the initial speed can be given")
         first, last = self.averaged()
         if not first < last <= self.duration_s:
-            raise ValueError(f"window: {first:g} to {last:g} s, allowed: within 0 to duration_s")
+            end = f"duration_s = {self.duration_s:g} s"
+            raise ValueError(f"window: {first:g} to {last:g} s, allowed: within 0 to {end}")
+        if self.expect_fault is not None and self.expect_fault not in faults.names().values():
+            raise ValueError(f"expect_fault = {self.expect_fault!r}, allowed: {', '.join(faults.names().values())}")
         return self
+
+    def resolved(self, torque_max_Nm: float, speed_max_rpm: float) -> "Scenario":
+        """For a motor: torque and speed in their units."""
+        return self.model_copy(update={"profile": self.profile.resolved(torque_max_Nm, speed_max_rpm)})
 
     def averaged(self) -> tuple[float, float]:
         """Begin and end of the window."""
@@ -234,8 +282,8 @@ class Scenario(_Strict):
     def profiled(self) -> set[str]:
         """Names in the simulation that a profile with more than one point drives."""
         named = {
-            "torque_command_Nm": self.profile.torque_Nm,
-            "plant.speed_rad_s": self.profile.speed_rpm,
+            "torque_requested_Nm": self.profile.torque_share or self.profile.torque_Nm,
+            "plant.speed_rad_s": self.profile.speed_share or self.profile.speed_rpm,
             "plant.vdc_V": self.profile.vdc_V or (),
             "plant.winding_C": self.profile.winding_C,
             "plant.magnet_scale": self.profile.magnet_scale,
@@ -244,51 +292,13 @@ class Scenario(_Strict):
         return {name for name, points in named.items() if len(points) > 1}
 
 
-_ALLOWED = {
-    "missing": "this field is required",
-    "extra_forbidden": "unknown field",
-}
-
-
-def _explain(error: ValidationError) -> str:
-    """The first complaint as one line: field, value, what is allowed."""
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"]) or "scenario"
-    text = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
-    if not first["loc"] and first["type"] == "value_error":
-        return text
-    if first["type"] in _ALLOWED:
-        return f"{where}: {text}{_fields(first['loc'])}"
-    value = first["input"]
-    shown = repr(value) if len(repr(value)) <= 60 else repr(value)[:57] + "..."
-    return f"{where} = {shown}: {text[0].lower() + text[1:]}"
-
-
-def _fields(location: tuple[int | str, ...]) -> str:
-    """The fields of the table that a bad key is in."""
-    model: Any = Scenario
-    for part in location[:-1]:
-        if isinstance(part, str):
-            model = {"event": Event}.get(part) or model.model_fields[part].annotation
-    return f", allowed: {', '.join(model.model_fields)}"
-
-
 def parse(text: str, name: str) -> Scenario:
-    """A scenario from TOML text; `name` is for messages."""
-    try:
-        return Scenario.model_validate(tomllib.loads(text))
-    except ValidationError as error:
-        raise FluxtrueError(f"{name}: {_explain(error)}") from error
-    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
-        raise FluxtrueError(f"{name}: not TOML: {error}") from error
+    """A scenario from TOML text; `name` is for messages. In a file, a key without effect is an error too."""
+    scenario = strict.parse(Scenario, text, name)
+    effects.check(scenario, name)
+    return scenario
 
 
 def read(path: Path) -> Scenario:
     """A scenario file."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise FluxtrueError(f"{path}: not UTF-8 text") from error
-    return parse(text, str(path))
+    return parse(strict.read_text(path), str(path))

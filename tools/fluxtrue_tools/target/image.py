@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import zlib
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.segments import Segment
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import atomic
 
 RAM_FROM = 0x1000_0000  # everything the linker puts below is flash
 
@@ -50,6 +53,31 @@ class Image:
         raise FluxtrueError(f"{self.path}: {size} bytes at {address:#x} are not in the file")
 
 
+MARK = b"fluxtrue-ver".ljust(16, b"\0")  # FLUXTRUE_VERSION_MARK of firmware/types/version.h
+VERSION = struct.Struct("<16s3I12s")  # version_t there
+
+
+@dataclass(frozen=True)
+class Version:
+    """What an image says of itself: the three numbers, and the text."""
+
+    numbers: tuple[int, int, int]
+    text: str
+
+
+def version(path: Path) -> Version:
+    """The version in an ELF file, a .bin or a dump of the flash: found by its mark, which must be there once."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise FluxtrueError(f"{path}: {error.strerror}") from error
+    places = [match.start() for match in re.finditer(re.escape(MARK), content)]
+    if len(places) != 1 or places[0] + VERSION.size > len(content):
+        raise FluxtrueError(f"{path}: the mark of a version was found {len(places)} times, allowed: once")
+    _, major, minor, patch, text = VERSION.unpack_from(content, places[0])
+    return Version((major, minor, patch), text.rstrip(b"\0").decode("ascii", "replace"))
+
+
 def seal(path: Path) -> str:
     """Compute and store the CRC-32 (IEEE 802.3) of everything between the two marks."""
     image = Image(path)
@@ -60,7 +88,8 @@ def seal(path: Path) -> str:
     at = image.place(start, end - start)
     crc = zlib.crc32(image.content[at : at + end - start])
     struct.pack_into("<I", image.content, image.place(word, 4), crc)
-    path.write_bytes(image.content)
+    with atomic(path) as scratch:
+        scratch.write_bytes(image.content)
     return f"{path.name}: CRC-32 {crc:#010x} over {end - start} bytes at {start:#x}"
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fluxtrue_tools.errors import FluxtrueError
 
-TIMEOUT_S = 120.0
+TIMEOUT_S = 600.0  # only ends a hang: how long a run takes is its own affair
 
 
 class BenchRefused(FluxtrueError):
@@ -26,13 +26,30 @@ class Ran:
 class Channel:
     """One connection to the bench port."""
 
+    @classmethod
+    def at(cls, address: str, option: str) -> "Channel":
+        """A connection to HOST:PORT, the value of a command line's option."""
+        host, colon, port = address.rpartition(":")
+        if not colon or not host or not port.isdigit():
+            raise FluxtrueError(f"{option} {address}: allowed: HOST:PORT")
+        return cls(host, int(port))
+
     def __init__(self, host: str, port: int, timeout_s: float = TIMEOUT_S) -> None:
+        self._address = host, port
         try:
             self._socket = socket.create_connection((host, port), timeout_s)
         except OSError as error:
             raise FluxtrueError(f"bench channel {host}:{port}: {error}") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._file = self._socket.makefile("r", encoding="ascii", newline="\n")
+
+    def another(self) -> "Channel":
+        """A second connection: while one waits for its run the other one may ask."""
+        return Channel(*self._address)
+
+    def is_fast(self) -> bool:
+        """Whether time passes only in run()."""
+        return self.ask("hello").split()[2] == "fast"
 
     def close(self) -> None:
         """Leave; the bench goes on."""

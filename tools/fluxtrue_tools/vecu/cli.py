@@ -6,23 +6,25 @@ from pathlib import Path
 
 import click
 
+from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.sim.build import prepare
+from fluxtrue_tools.sim.build import prepare, sources
 
 _PORT = click.IntRange(0, 65535)
 
 
-@click.command()
+@click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
 @click.option("--realtime/--fast", default=True, show_default=True,
               help="Keep pace with the wall clock, or let time pass only when a bench client asks for it.")  # fmt: skip
 @click.option("--port", type=_PORT, default=29536, show_default=True, help="socketcand, on 127.0.0.1; 0: any.")
 @click.option("--bench-port", type=_PORT, default=29537, show_default=True, help="Bench channel; 0: any.")
 @click.option("--bit-rate", type=click.IntRange(10000, 1000000), default=500000, show_default=True)
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Of the plant's random numbers.")
-@click.option("--nvm", type=click.Path(dir_okay=False, path_type=Path),
+@click.option("--seed", type=click.IntRange(0, 2**53 - 1), default=1, show_default=True,
+              help="Of the plant's random numbers.")  # fmt: skip
+@click.option("--nvm", type=paths.StateFile(),
               help="Keep what is learnt in this file; without it a power cycle forgets.")  # fmt: skip
-@click.option("--build-dir", type=click.Path(file_okay=False, path_type=Path),
+@click.option("--build-dir", type=paths.InputFolder(),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def vecu(
     motor: str, realtime: bool, port: int, bench_port: int, bit_rate: int, seed: int, nvm: Path | None,
@@ -32,7 +34,10 @@ def vecu(
 
     Any python-can program reaches it with interface=socketcand, host=127.0.0.1, channel=can0.
     """
-    program = prepare(motor, build_dir).vecu
+    files = paths.outputs()
+    files.reads(*sources(motor, Path.cwd(), "--motor"))
+    program = prepare(motor, build_dir, where="--motor").vecu
+    files.reads(program)
     if not program.is_file():
         raise FluxtrueError(f"{program} is missing: build it first")
     options = ["--realtime" if realtime else "--fast", "--port", port, "--bench-port", bench_port,

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from fluxtrue_tools.outputs import write_text
 from fluxtrue_tools.sim.motor import plant_parameters
 
 AXES = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
@@ -43,7 +44,7 @@ def machine_data_c(data: dict[str, Any]) -> str:
 def main(source: str, target: str) -> None:
     """Command line."""
     data = json.loads(Path(source).read_text(encoding="utf-8"))
-    Path(target).write_text(machine_data_c(data), encoding="utf-8")
+    write_text(Path(target), machine_data_c(data))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "app/drive.h"
+#include "drive/drive.h"
 
 #define PLACE(part) {offsetof(drive_t, part), sizeof(((drive_t *)0)->part)},
 

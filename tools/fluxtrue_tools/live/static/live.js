@@ -2,7 +2,6 @@
 "use strict";
 
 const WINDOW_S = 20;
-const ALIVE_MS = 100;
 const RECONNECT_MS = 1000;
 const COLORS = { blue: "#4ea1ff", orange: "#ffab40", green: "#4cd19a", violet: "#b79cff", quiet: "#8d9bab" };
 const AXIS = { stroke: COLORS.quiet, grid: { stroke: "#222c38", width: 1 }, ticks: { stroke: "#222c38" } };
@@ -28,7 +27,7 @@ class Ring {
 }
 
 const rings = {
-  INV_Status: new Ring(["TorqueCommand", "TorqueEstimate", "Speed"]),
+  INV_Status: new Ring(["TorqueCommanded", "TorqueEstimated", "Speed"]),
   INV_Currents: new Ring(["IdRef", "IqRef", "Id", "Iq"]),
   INV_Identification: new Ring(["PsiF", "Resistance"]),
   truth: new Ring(["Torque"]),
@@ -40,6 +39,7 @@ const $ = (id) => document.getElementById(id);
 let socket = null;
 let hello = null;
 let dirty = false;
+let batch = -1; // number of the newest one
 let mine = false; // this page has asked for torque
 let charts = [];
 
@@ -74,13 +74,13 @@ function columns(ring, ...names) {
 
 // The plant's torque comes on its own times: joined for one picture.
 function torqueData() {
-  const drive = columns("INV_Status", "TorqueCommand", "TorqueEstimate");
+  const drive = columns("INV_Status", "TorqueCommanded", "TorqueEstimated");
   if (!hello.stand.speed_rpm) return drive;
   return uPlot.join([drive, rings.truth.data]);
 }
 
 function makeCharts() {
-  const torque = [line("command", COLORS.quiet, { dash: [6, 4] }), line("estimate", COLORS.blue)];
+  const torque = [line("commanded", COLORS.quiet, { dash: [6, 4] }), line("estimated", COLORS.blue)];
   if (hello.stand.speed_rpm) torque.push(line("shaft (simulated truth)", COLORS.orange, { spanGaps: true }));
   charts = [
     chart("chart-torque", 210, torque, torqueData, atLeast(20)),
@@ -104,8 +104,14 @@ function draw() {
       plot.setScale("x", { min: oldest, max: newest });
     }));
     stats.draws++;
+    tellDrawn();
   }
   requestAnimationFrame(draw);
+}
+
+// The page's sign of life: what has arrived has been drawn. A page in the background draws nothing and says so.
+function tellDrawn() {
+  if (batch >= 0) send({ type: "drawn", batch, visible: !document.hidden });
 }
 
 function send(message) {
@@ -134,7 +140,7 @@ function showFaults(faults) {
 }
 
 const NUMBERS = [
-  ["Torque estimate", "INV_Status", "TorqueEstimate", "N·m", 1], ["Speed", "INV_Status", "Speed", "rpm", 0],
+  ["Torque estimated", "INV_Status", "TorqueEstimated", "N·m", 1], ["Speed", "INV_Status", "Speed", "rpm", 0],
   ["dc voltage", "INV_DcLink", "DcVoltage", "V", 1], ["dc current (estimated)", "INV_DcLink", "DcCurrent", "A", 1],
   ["ψ̂", "INV_Identification", "PsiF", "mVs", 2], ["quality of ψ̂", "INV_Identification", "PsiQuality", "%", 0],
   ["R̂", "INV_Identification", "Resistance", "mΩ", 2], ["quality of R̂", "INV_Identification", "ResistanceQuality", "%", 0],
@@ -174,11 +180,14 @@ function onRows(message) {
     rings.truth.add({ t: [times[times.length - 1]], Torque: [message.truth_Nm] });
   }
   stats.batches++;
+  batch = message.batch;
   dirty = true;
+  if (document.hidden) tellDrawn();
   if (message.last) {
     showNumbers(message.last);
     showFaults(message.last.INV_Faults || {});
     showState(message.state, message.wish, message.target_Nm);
+    $("stopped").textContent = message.stopped;
   }
 }
 
@@ -249,6 +258,7 @@ function connect() {
   socket.onclose = () => {
     badge("connection", "disconnected", "bad");
     mine = false;
+    batch = -1;
     setTimeout(connect, RECONNECT_MS);
   };
 }
@@ -263,7 +273,7 @@ $("torque").oninput = () => {
   mine = true;
   const torque = Number($("torque").value);
   $("torque-value").textContent = `${torque.toFixed(1)} N·m`;
-  send({ type: "torque", torque_Nm: torque });
+  send({ type: "torque", torque_requested_Nm: torque });
 };
-setInterval(() => { if (!document.hidden) send({ type: "alive" }); }, ALIVE_MS);
+document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
 connect();

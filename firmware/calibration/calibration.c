@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "calibration/calibration.h"
+
+#define Q15_SCALE 32768.0F
+#define Q31_SCALE 2147483648.0F
+/* A parameter that drifts this fast relative to its own adaptation has no quality: 5 % of psi_f, 20 % of R_0. */
+#define PSI_DRIFT_SHARE 0.05F
+#define R_DRIFT_SHARE 0.20F
+
+#define INFO(name, lo, hi, unit, text) {#name, lo, hi},
+const calibration_info_t calibration_info[CALIBRATION_COUNT] = {CALIBRATION_LIST(INFO)};
+
+static int32_t nearest(float x)
+{
+    return (int32_t)((x < 0.0F) ? x - 0.5F : x + 0.5F);
+}
+
+/* The largest float below 2^31 is 2^31 - 128: the comparison keeps the conversion inside. */
+static q31_t to_q31(float x)
+{
+    return (x >= 1.0F) ? Q31_MAX : (x <= -1.0F) ? -Q31_MAX : nearest(x * Q31_SCALE);
+}
+
+static q15_t to_q15(float x)
+{
+    return fx_sat_q15(nearest(((x > 1.0F) ? 1.0F : (x < -1.0F) ? -1.0F : x) * Q15_SCALE));
+}
+
+/* Share of the period that the bridge loses in full. */
+static float dead_time_full(const motor_t *m)
+{
+    return m->dead_time_s / m->bases.period_s;
+}
+
+float calibration_get(const motor_t *m, calibration_id_t id)
+{
+    switch (id) {
+    case CALIBRATION_torque_slew_Nm_per_s:
+        return (m->torque_slew == Q15_MAX)
+                   ? 0.0F
+                   : (float)m->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
+    case CALIBRATION_observer_m:
+        return 0.25F * (float)m->mrai.pole_gain / (float)m->mrai.r0;
+    case CALIBRATION_flux_bandwidth_rad_s:
+        return (float)m->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+    case CALIBRATION_resistance_bandwidth_rad_s:
+        return (float)m->mrai.resistance_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+    case CALIBRATION_torque_loop_bandwidth_rad_s:
+        return (float)m->torque_loop.ki / Q15_SCALE / m->bases.step_s;
+    case CALIBRATION_dead_time_compensation:
+        return (m->dead_time_s > 0.0F) ? (float)m->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m)
+                                       : 0.0F;
+    case CALIBRATION_COUNT:
+    default:
+        return 0.0F;
+    }
+}
+
+void calibration_put(motor_t *m, calibration_id_t id, float value)
+{
+    switch (id) {
+    case CALIBRATION_torque_slew_Nm_per_s:
+        m->torque_slew = (value > 0.0F) ? to_q15(value * m->bases.step_s / m->bases.torque_Nm) : Q15_MAX;
+        break;
+    case CALIBRATION_observer_m:
+        m->mrai.pole_gain = to_q31(4.0F * value * (float)m->mrai.r0 / Q31_SCALE);
+        break;
+    case CALIBRATION_flux_bandwidth_rad_s:
+        m->mrai.flux_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
+        m->mrai.psi_drift_full = to_q31(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s);
+        break;
+    case CALIBRATION_resistance_bandwidth_rad_s:
+        m->mrai.resistance_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
+        m->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * (float)m->mrai.r0 / Q31_SCALE * value * m->bases.step_s);
+        break;
+    case CALIBRATION_torque_loop_bandwidth_rad_s:
+        m->torque_loop.ki = to_q15(value * m->bases.step_s);
+        break;
+    case CALIBRATION_dead_time_compensation:
+        m->modulate.dead_time_q16 = 2 * to_q15(value * dead_time_full(m));
+        break;
+    case CALIBRATION_COUNT:
+    default:
+        break;
+    }
+}

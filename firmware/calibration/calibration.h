@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CALIBRATION_CALIBRATION_H
+#define CALIBRATION_CALIBRATION_H
+/** Calibration values in SI against the drive's motor data in RAM.
+ *   Each value becomes one or two aligned words of the configuration, so that an interrupt sees the old or the new one.
+ * Source   docs/howto/xcp.md; the relations of tools/fluxtrue_tools/motor/derived.py
+ * Units    as named
+ * Range    calibration/calibration_list.h; calibration_put() expects a value inside
+ * Rounding to the nearest step of the configuration's format
+ * Context  1 kHz task or below; floating point, hence in no interrupt above it */
+#include "calibration/calibration_list.h"
+#include "drive/motor.h"
+
+#define CALIBRATION_ENUM(name, lo, hi, unit, text) CALIBRATION_##name,
+typedef enum { CALIBRATION_LIST(CALIBRATION_ENUM) CALIBRATION_COUNT } calibration_id_t;
+
+typedef struct {
+    const char *name;
+    float lo, hi;
+} calibration_info_t;
+
+extern const calibration_info_t calibration_info[CALIBRATION_COUNT];
+
+/** As the motor data hold it now. */
+float calibration_get(const motor_t *motor, calibration_id_t id);
+void calibration_put(motor_t *motor, calibration_id_t id, float value);
+
+#endif

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CALIBRATION_FREEZE_FRAME_H
+#define CALIBRATION_FREEZE_FRAME_H
+/** The last 32 steps before the first fault, and what was identified then. Frozen with the step that shows the fault,
+ *   until every fault has been forgotten; a second fault changes nothing.
+ *   X(name, base, text): name of calibration/measurement_list.h, taken as S16
+ * Source   docs/howto/xcp.md
+ * Units    those of the measurements; time since the start
+ * Range    signals beyond +-32767 are limited
+ * Errors   none
+ * Context  1 kHz task, after the measurements; read by tools through XCP, and by a debugger */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "calibration/measurements.h"
+
+#define FREEZE_FRAME_SAMPLES 32U
+
+#define FREEZE_FRAME_LIST(X) \
+    X(i_d_A, CURRENT, "Current along the magnet") \
+    X(i_q_A, CURRENT, "Current across the magnet") \
+    X(u_d_V, VOLTAGE, "Voltage of the next period, d") \
+    X(u_q_V, VOLTAGE, "Voltage of the next period, q") \
+    X(v_dc_V, VOLTAGE, "Measured dc voltage") \
+    X(speed_rpm, NONE, "Speed of the rotor") \
+    X(torque_commanded_Nm, TORQUE, "Limited torque after slew") \
+    X(torque_estimated_Nm, TORQUE, "Estimated air-gap torque")
+
+#define FREEZE_FRAME_SIGNAL(name, base, text) int16_t name[FREEZE_FRAME_SAMPLES];
+
+typedef struct {
+    uint32_t now_ms;
+    uint32_t time_ms;    /* of the fault; this and what follows is of no meaning unless frozen */
+    uint32_t fault_word; /* the drive's */
+    float psi_f_Vs, r_ohm;
+    uint16_t ecu_faults;
+    uint8_t state;       /* before the fault */
+    uint8_t oldest;      /* sample; the newest is the one before it */
+    uint8_t frozen;
+    FREEZE_FRAME_LIST(FREEZE_FRAME_SIGNAL)
+} freeze_frame_t;
+
+/** passed_ms: since the last step. */
+void freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_t ecu_faults, uint8_t state,
+                       uint32_t passed_ms);
+
+#endif

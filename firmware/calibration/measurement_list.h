@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CALIBRATION_MEASUREMENT_LIST_H
+#define CALIBRATION_MEASUREMENT_LIST_H
+/** What a calibration tool may record: one snapshot per millisecond.
+ *   X(name, type, base, expression, text); the physical value is raw * base / 2^15, or raw itself without a base
+ *   (NONE). d is the drive.
+ * Source   docs/howto/xcp.md
+ * Units    a name ends in its unit
+ * Context  calibration/measurements.c fills it, ecu/a2l_records.c describes it to tools */
+
+#define MEASUREMENT_LIST(X) \
+    X(i_d_A, S16, CURRENT, MEASURED(d).point.i.d, "Current along the magnet") \
+    X(i_q_A, S16, CURRENT, MEASURED(d).point.i.q, "Current across the magnet") \
+    X(i_d_ref_A, S16, CURRENT, (d)->task.reference.i_ref.d, "Reference of i_d") \
+    X(i_q_ref_A, S16, CURRENT, (d)->task.reference.i_ref.q, "Reference of i_q") \
+    X(u_d_V, S16, VOLTAGE, (d)->fast.u_next.d, "Voltage of the next period, d") \
+    X(u_q_V, S16, VOLTAGE, (d)->fast.u_next.q, "Voltage of the next period, q") \
+    X(v_dc_V, S16, VOLTAGE, MEASURED(d).v_dc, "Measured dc voltage") \
+    X(torque_arbitrated_Nm, S16, TORQUE, (d)->request.torque_arbitrated, "Torque asked of the drive") \
+    X(torque_limited_Nm, S16, TORQUE, (d)->task.allowed.torque_limited, "Arbitrated torque within its limits") \
+    X(torque_commanded_Nm, S16, TORQUE, (d)->task.torque_commanded, "Limited torque after slew") \
+    X(torque_corrected_Nm, S16, TORQUE, (d)->task.torque_corrected, "Commanded torque after the torque loop") \
+    X(torque_estimated_Nm, S16, TORQUE, (d)->task.identification.torque_estimated, "Estimated air-gap torque") \
+    X(psi_quality, S16, ONE, (d)->task.identification.psi_quality, "Quality of the identified flux") \
+    X(r_quality, S16, ONE, (d)->task.identification.r_quality, "Quality of the identified resistance") \
+    X(speed_rpm, F32, NONE, measured_speed_rpm(d), "Speed of the rotor") \
+    X(psi_f_Vs, F32, NONE, measured_psi_f_Vs(d), "Identified magnet flux") \
+    X(r_ohm, F32, NONE, measured_r_ohm(d), "Identified resistance") \
+    X(fault_word, U32, NONE, (d)->fast.faults, "Latched faults, one bit each") \
+    X(processor_dC, S16, NONE, hal_temperature_processor_dC(), "Processor, tenths of a degree; -32768: unknown") \
+    X(mrai_overruns, U32, NONE, mrai_overruns(d), "Periods in which the identification was late")
+
+#endif

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CALIBRATION_MEASUREMENTS_H
+#define CALIBRATION_MEASUREMENTS_H
+/** The snapshot that measurement tools read.
+ * Source   calibration/measurement_list.h
+ * Units    per unit of motor.bases or SI, as the list says
+ * Context  1 kHz task; floating point, hence in no interrupt above it */
+#include <stdint.h>
+
+#include "drive/drive.h"
+#include "calibration/measurement_list.h"
+
+#define MEASUREMENT_TYPE_S16 int16_t
+#define MEASUREMENT_TYPE_U32 uint32_t
+#define MEASUREMENT_TYPE_F32 float
+#define MEASUREMENT_FIELD(name, type, base, expression, text) MEASUREMENT_TYPE_##type name;
+
+typedef struct {
+    MEASUREMENT_LIST(MEASUREMENT_FIELD)
+} measurements_t;
+
+void measurements_step(measurements_t *measurements, const drive_t *d);
+
+#endif

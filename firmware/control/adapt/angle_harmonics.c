@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/adapt/angle_harmonics.h"
+
+#include "fx/q.h"
+#include "fx/trig.h"
+
+#define PARTS_PER_STEP 4        /* the whole table in 16 steps */
+#define ADVANCE_MIN (1 << 26)   /* 1/64 turn per step: below, the second difference of a harmonic is too small */
+#define ADVANCE_MAX (1 << 30)   /* 1/4 turn per step: above, the second harmonic aliases */
+#define DIFFERENCE_MAX_SHIFT 4  /* 1/16 of the step: a sample one period late deviates by 1/10 of ten periods */
+
+typedef struct {
+    int32_t q31[ANGLE_HARMONICS];
+} harmonics_t;
+
+static __attribute__((noinline)) void cos_sin(int32_t *q31, uint32_t theta)
+{
+    const fx_pair_t at = fx_rotation(theta);
+    q31[0] = (int32_t)(at << 16);
+    q31[1] = (int32_t)(at & 0xFFFF0000U);
+}
+
+static harmonics_t harmonics(uint32_t theta)
+{
+    harmonics_t at;
+    cos_sin(&at.q31[0], theta);
+    cos_sin(&at.q31[2], 2U * theta);
+    return at;
+}
+
+/* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. */
+static void update_coefficients(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
+{
+    const harmonics_t at = harmonics(state->last);
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
+        const int32_t updated = state->c[n] + ((fx_mulhi(d, at.q31[n]) + 16) >> 5);
+        state->c[n] = fx_clamp_q31(updated, -config->max, config->max);
+    }
+}
+
+static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
+{
+    const harmonics_t at = harmonics((2U * part + 1U) << (ANGLE_HARMONICS_SHIFT - 1));
+    int32_t half = 0;
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
+        half += fx_mulhi(state->c[n], at.q31[n]);
+    }
+    return 2 * half;
+}
+
+void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,
+                          volatile int32_t table[ANGLE_HARMONICS_PARTS])
+{
+    const int32_t advance = (int32_t)(theta - state->last);
+    const int32_t d = (int32_t)(theta - 2U * state->last + state->before);
+    const int32_t speed = fx_abs_q31(advance);
+    if (speed >= ADVANCE_MIN && speed <= ADVANCE_MAX && fx_abs_q31(d) <= speed >> DIFFERENCE_MAX_SHIFT) {
+        update_coefficients(config, state, d);
+    }
+    state->before = state->last;
+    state->last = theta;
+    for (uint32_t n = 0; n < PARTS_PER_STEP; n++) {
+        table[state->part] = correction(state, state->part);
+        state->part = (uint8_t)((state->part + 1U) % ANGLE_HARMONICS_PARTS);
+    }
+}

@@ -1,0 +1,74 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CURRENT_CURRENT_CONTROL_H
+#define CURRENT_CURRENT_CONTROL_H
+/** Current control in the rotor frame: one PI controller per axis in flux linkage, decoupled by the flux tables and the
+ * identified flux.
+ *   u_d = sigma (f_d - psi_d) + s_d - w psi_q,          s_d += sigma a_i (psi_d* - psi_d)
+ *   u_q = sigma (f_q - psi_q) + s_q + w (psi_d + dpsi), s_q += sigma a_i (psi_q* - psi_q)
+ *   psi* = tables at i*;  f = psi* - (1 - b) l i* + (r/sigma) i*  (set-point weight b, resistive drop fed forward)
+ * The error is a flux linkage: sigma (psi* - psi) equals sigma l (i* - i) with l the incremental inductance between
+ * both points, so that the gain is scheduled over the whole step and a step into saturation does not overshoot.
+ *   sigma = 1/(2 T_d), T_d = 1.5 T_s
+ * Voltage limit: v = u/v_max, v_max = v_ratio v_dc, is limited to the unit circle.
+ *   psi_d* <= psi_d: the d axis has priority. v_q gets the rest of the circle, at least a quarter, and is reduced, with
+ *     the sign of w, by what v_d exceeds the circle.
+ *   psi_d* > psi_d: the q axis has priority and the d axis keeps 0.7 of the circle. Otherwise the q current could never
+ *     fall, and its flux would keep the d axis at its limit.
+ * Anti-windup: while the circle limits, s also integrates a T_s (u_limited - u). The response then is that to a
+ *   reference which the voltage can follow, without a slow tail.
+ * clear: |v| < v_clear/v_ratio; neither this circle nor the modulation can limit such a voltage (MO-11).
+ * Source   docs/theory/current-control.md (CC-4) ... (CC-15)
+ * Units    per unit
+ * Range    sigma = 1/(2 T_d omega_b) < 128; b, a_i in q15; |omega| < 1; 0.5 < v_ratio < 0.7; |s| <= 1; v_dc >= 0. A
+ *          v_dc below 1/(64 v_ratio) is replaced by that value; below 2 LSB the voltage is 0
+ * Rounding half up: 1/2 LSB q15 in u and in v; s is integrated exactly; the circle is a table of 256 steps that never
+ *          exceeds it
+ * Errors   saturates and reports it in limited; raises no fault
+ * Context  step: fast ISR, one bounded hardware division; target: 1 kHz task */
+#include <stdbool.h>
+
+#include "control/current/flux_table_types.h"
+#include "types/frames.h"
+
+typedef struct {
+    int32_t sigma_q24;
+    q16_t drop_gain;       /* r/sigma: resistive voltage drop as a flux error */
+    q15_t setpoint_weight; /* b = w_c/(w_c + a) */
+    q15_t integral_gain;   /* sigma a_i < 1/2 */
+    int32_t tracking_gain_q34; /* a T_s v_ratio = a_i v_ratio/b < 1/8 */
+    uint32_t per_ratio_q31; /* 1/v_ratio: usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
+    uint32_t clear_q30;    /* (v_clear/v_ratio)^2 < 1: limit of |v|^2 for clear */
+} current_control_config_t;
+
+/** Current reference as flux linkage. */
+typedef struct {
+    dq_q15_t psi;      /* psi*: reference of the integral part */
+    dq_q30_t weighted; /* f: reference of the proportional part */
+} current_target_t;
+
+typedef struct {
+    int32_t s_d_q30, s_q_q30;
+} current_control_state_t;
+
+typedef struct {
+    const current_target_t *target;
+    const flux_point_t *flux; /* at the measured current */
+    q31_t omega;     /* its upper half is used; the integrators compensate the rest of the feed-forward */
+    q15_t psi_delta; /* identified flux minus the table's */
+    int32_t v_dc;    /* not negative */
+} current_control_in_t;
+
+typedef struct {
+    dq_q15_t u;       /* before the limit, per unit of V_b */
+    fx_pair_t v;      /* (d, q) after the limit, q15, per unit of v_max */
+    uint32_t limited; /* not zero: the circle limited u */
+    bool clear;
+} current_control_out_t;
+
+void current_control_reset(current_control_state_t *state);
+current_target_t current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
+                                        const flux_point_t *at_ref);
+current_control_out_t current_control_step(const current_control_config_t *config, current_control_state_t *state,
+                                           const current_control_in_t *in);
+
+#endif

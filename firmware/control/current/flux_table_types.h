@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef CURRENT_FLUX_TABLE_TYPES_H
+#define CURRENT_FLUX_TABLE_TYPES_H
+/** What the flux-table service answers for one operating point; the values other stages consume.
+ * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
+ * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full
+ *          voltage must not reach I_b
+ * Range    q15 in a word each: halfwords would cost an extension at every use
+ * Context  values only */
+#include "types/operating_point.h"
+
+/** For tasks. */
+typedef struct {
+    int32_t l_d;  /* apparent: psi_d - psi_f0 = l_d i_d */
+    int32_t l_qq; /* incremental: d psi_q/d i_q */
+} flux_inductances_t;
+
+#endif

@@ -1,0 +1,188 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/identify/identify.h"
+
+#include "control/identify/q30.h"
+#include "fx/div.h"
+
+#define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
+#define REFERENCE_dC 200   /* 20 C */
+#define MISMATCH_MAX Q15(0.5)
+#define NOISE_MIN_Q30 (1 << 19) /* its square is the smallest innovation variance of the Kalman filter */
+
+typedef struct {
+    dq_q30_t psi, i;    /* identified */
+    int32_t magnet_q30; /* psi_d minus the tables', without the local error: for the current control */
+} corrected_t;
+
+bool identify_valid(const identify_config_t *c)
+{
+    bool good = c->r0 > 0 && c->mean_gain_q32 > 0 && c->rate_gain_q28 > 0 && c->window_turns_q29 > 0 &&
+                c->turn_to_pu > 0 && c->noise_voltage_q30 >= NOISE_MIN_Q30 && c->noise_flux_q30 >= 0 &&
+                c->noise_rate_q30 >= 0 && c->r_known_q30 > 0 && c->r_known_q30 <= IDENTIFY_ONE_Q30 && c->l_shift <= 14;
+    good = good && c->omega_min > 0 && c->i_min > 0 && c->i_smooth > 0 && c->i_smooth <= c->i_min &&
+           c->local_corner > 0 && c->local_rate > 0 && c->torque_min > 0 && c->confidence_rate > 0 &&
+           c->limited_noise > 0 && c->mismatch_rate > 0 && c->confidence_full > 0 &&
+           c->confidence_full < c->confidence_none;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        good = good && c->sigma[j] > 0 && c->leak[j] > 0 && c->leak[j] <= Q31(0.25);
+    }
+    return good;
+}
+
+void identify_reset(const identify_config_t *config, identify_state_t *state)
+{
+    *state = (identify_state_t){.r_prior = config->r0, .torque_variance_q30 = Q31_MAX};
+    kalman_reset(&state->kalman);
+}
+
+q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index)
+{
+    return fx_shl_q31(fx_mulhi(config->sigma[index], state->kalman.x_q27[index]), 5); /* Q31 * Q27 = Q26 */
+}
+
+/* R = r0 (1 + alpha (theta - 20 C)); without a sensor the last one holds (ID-13). */
+static void resistance_prior(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
+{
+    state->r_known = in->temperature_known;
+    if (in->temperature_known) {
+        state->r_prior = fx_sat_q31(config->r0 + (int64_t)config->r_per_dC * (in->winding_dC - REFERENCE_dC));
+    }
+}
+
+/* Standard deviation of the measurement noise (ID-14): errors of voltage, of flux and of its change. */
+static int32_t measurement_noise(const identify_config_t *config, const identify_point_t *point)
+{
+    const int32_t change = fx_add_q31(fx_abs_q31(point->rate.d), fx_abs_q31(point->rate.q));
+    const int32_t level = fx_add_q31(config->noise_voltage_q30,
+                                     fx_add_q31(identify_mul(fx_abs_q31(point->omega / 2), config->noise_flux_q30),
+                                                identify_mul(change, config->noise_rate_q30)));
+    return fx_sat_q31(level + (((int64_t)level * point->limited * config->limited_noise) >> 16));
+}
+
+static void average_row(jacobian_row_t *mean, const jacobian_row_t *row)
+{
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        mean->h_q30[j] = fx_mulhi_add(mean->h_q30[j], row->h_q30[j], PER_STEP);
+    }
+}
+
+static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
+                         const identify_model_t *model, dq_q30_t e)
+{
+    const bool step_valid = in->point->valid && model->current && in->enabled;
+    state->update_valid = (state->update_valid || state->steps == 0U) && step_valid;
+    average_row(&state->mean_d, &model->d);
+    average_row(&state->mean_q, &model->q);
+    state->mean_e.d = fx_mulhi_add(state->mean_e.d, e.d, PER_STEP);
+    state->mean_e.q = fx_mulhi_add(state->mean_e.q, e.q, PER_STEP);
+    state->mean_noise_q30 = fx_mulhi_add(state->mean_noise_q30, measurement_noise(config, in->point), PER_STEP);
+    state->steps++;
+}
+
+/* The measurements of both axes, one after the other: the second innovation takes the first update into account. */
+static void update_parameters(const identify_config_t *config, identify_state_t *state)
+{
+    const int64_t r = (int64_t)state->mean_noise_q30 * state->mean_noise_q30;
+    const int32_t output_before = kalman_output(&state->kalman, &state->mean_q);
+    const kalman_update_t d = kalman_update(&state->kalman, &state->mean_d, state->mean_e.d, r);
+    const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean_q), output_before);
+    const kalman_update_t q =
+        kalman_update(&state->kalman, &state->mean_q, fx_sub_q31(state->mean_e.q, change), r);
+    state->clamped = d.clamped || q.clamped;
+    const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->clamped) ? Q15_MAX : 0;
+    const q15_t error = fx_sat_q15(target - state->mismatch_share);
+    state->mismatch_share = fx_add_q15(state->mismatch_share, fx_mul_q15(config->mismatch_rate, error));
+}
+
+/* The torque's variance is compared with two levels: well below the variance of the tables alone, or small against the
+ * torque; between the levels the last decision holds (ID-18). At no torque the relative test is not used to switch on:
+ * a torque of zero is certain whatever the parameters are. */
+static void update_confidence(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
+                              q15_t torque)
+{
+    const jacobian_row_t row = identify_torque_row(config, model);
+    const int64_t variance = kalman_output_variance(&state->kalman, &row); /* Q60 */
+    state->torque_variance_q30 = fx_sat_q31(variance >> 30);
+    const int64_t prior = kalman_output_variance_prior(&row);
+    const q15_t size = fx_abs_q15(torque);
+    const q15_t scale = (q15_t)fx_max_s32(size, config->torque_min);
+    const int64_t full = (int64_t)fx_mul_q30(size, config->confidence_full); /* Q30 */
+    const int64_t none = (int64_t)fx_mul_q30(scale, config->confidence_none);
+    const bool good = variance < (prior >> 2) + (prior >> 3) || variance < full * full;
+    const bool bad = variance > prior - (prior >> 2) && variance > none * none;
+    if (bad || state->mismatch_share > MISMATCH_MAX) {
+        state->torque_certain = false;
+    } else if (good) {
+        state->torque_certain = true;
+    }
+    const int32_t step = state->torque_certain ? config->confidence_rate : -config->confidence_rate;
+    state->confidence = (q15_t)fx_clamp_q31(state->confidence + step, 0, Q15_MAX);
+}
+
+static void kalman_step(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
+                        q15_t torque)
+{
+    if (state->update_valid) {
+        update_parameters(config, state);
+    }
+    kalman_predict(config, &state->kalman, state->r_known);
+    update_confidence(config, state, model, torque);
+    state->mean_d = (jacobian_row_t){{0}};
+    state->mean_q = (jacobian_row_t){{0}};
+    state->mean_e = (dq_q30_t){0, 0};
+    state->mean_noise_q30 = 0;
+    state->steps = 0;
+}
+
+/* w/(w^2 + w_x^2) times the residual, into a first-order filter (ID-16). */
+static void update_local_flux_error(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
+                                    dq_q30_t e)
+{
+    dq_q30_t target = {0, 0};
+    if (in->point->valid && in->enabled) {
+        const q15_t w = fx_q15_from_q31(in->point->omega);
+        const int32_t square = fx_mul_q30(w, w) + fx_mul_q30(config->local_corner, config->local_corner);
+        const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
+        target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
+    }
+    state->local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->local.d));
+    state->local.q += fx_mul_q31(config->local_rate, fx_sub_q31(target.q, state->local.q));
+}
+
+/* The tables' flux and magnetising current, corrected by all parameters and by the local flux error (ID-15). */
+static corrected_t correct(const identify_config_t *config, const identify_state_t *state, const identify_model_t *m)
+{
+    dq_q30_t shift = state->local;
+    int32_t value[IDENTIFY_STATES];
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
+        shift.d = fx_add_q31(shift.d, identify_mul(value[j], m->psi_d.h_q30[j]));
+        shift.q = fx_add_q31(shift.q, identify_mul(value[j], m->psi_q.h_q30[j]));
+    }
+    const int32_t iron = value[IDENTIFY_IRON];
+    const int32_t d_axis = identify_mul(value[IDENTIFY_LD], m->psi_d.h_q30[IDENTIFY_LD]);
+    return (corrected_t){
+        .psi = {fx_add_q31(m->psi.d, fx_add_q31(shift.d, value[IDENTIFY_FLUX])), fx_add_q31(m->psi.q, shift.q)},
+        .i = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
+        .magnet_q30 = fx_add_q31(value[IDENTIFY_FLUX], d_axis),
+    };
+}
+
+identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
+{
+    resistance_prior(config, state, in);
+    identify_model_t model;
+    identify_model(config, in->point, in->tables, state->r_prior, &model);
+    const dq_q30_t e = {fx_sub_q31(model.y.d, kalman_output(&state->kalman, &model.d)),
+                        fx_sub_q31(model.y.q, kalman_output(&state->kalman, &model.q))};
+    update_local_flux_error(config, state, in, e);
+    average_step(config, state, in, &model, e);
+    const corrected_t now = correct(config, state, &model);
+    const int32_t torque =
+        identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, now.psi, now.i);
+    const identify_out_t out = {fx_round_q15(torque), fx_round_q15(now.magnet_q30)};
+    if (state->steps >= IDENTIFY_STEPS) {
+        kalman_step(config, state, &model, out.torque);
+    }
+    return out;
+}

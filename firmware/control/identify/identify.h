@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IDENTIFY_IDENTIFY_H
+#define IDENTIFY_IDENTIFY_H
+/** Robust identification: seven slow parameters and a local flux error from the two voltage equations, and the torque.
+ *   each step  residuals of the operating point, local flux error, torque
+ *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md, over the period
+ *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the voltage model, as far as speed makes it better
+ *   each tenth step  Kalman update with the mean residuals, Kalman prediction, confidence
+ * Source   docs/theory/identification.md (ID-5) ... (ID-21)
+ * Units    per unit
+ * Range    as in its parts
+ * Rounding 1/2 LSB q15 in the torque
+ * Errors   without valid windows the parameters only return to their priors; clamped states and innovations beyond the
+ *          gate take the confidence to 0, the torque estimate goes on
+ * Context  1 kHz task; five divisions per step, one more per update and axis */
+#include "control/identify/kalman.h"
+
+#define IDENTIFY_STEPS 10 /* per update */
+
+typedef struct {
+    jacobian_row_t mean_d, mean_q; /* over the steps of one update */
+    dq_q30_t mean_e;
+    int32_t mean_noise_q30; /* standard deviation of the measurement noise */
+    uint8_t steps;
+    bool update_valid;    /* every step of this update so far was valid */
+    bool clamped;         /* a state reached its limit in the last update */
+    dq_q30_t local;       /* flux error of this operating point */
+    q31_t r_prior;
+    bool r_known;         /* the winding temperature is measured */
+    q15_t mismatch_share; /* of recent updates: those beyond the innovation gate or with a clamped state */
+    int32_t torque_variance_q30; /* at the last update */
+    q15_t confidence;
+    bool torque_certain;  /* the confidence rises, else it falls */
+    kalman_t kalman;      /* last: the fields before it are then in reach of 16-bit load instructions */
+} identify_state_t;
+
+typedef struct {
+    const identify_point_t *point;
+    const identify_tables_t *tables;
+    bool temperature_known;
+    int16_t winding_dC;
+    bool enabled;
+} identify_in_t;
+
+typedef struct {
+    q15_t torque;     /* air gap, mean over the window */
+    q15_t psi_delta;  /* identified minus table's flux in the d axis, here */
+} identify_out_t;
+
+void identify_reset(const identify_config_t *config, identify_state_t *state);
+identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in);
+/** Value of a parameter, per unit, q31: sigma x, limited to +-1. */
+q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index);
+
+#endif

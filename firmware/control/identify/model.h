@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IDENTIFY_MODEL_H
+#define IDENTIFY_MODEL_H
+/** What the tables say of an operating point, and how each unknown would change it.
+ *   residual  y = u - R i - w J psi(i_m) - d psi/dt     h = d(voltage)/d(state), per sigma, both axes
+ *   torque    t = psi_d i_mq - psi_q i_md               h_t = dt/d(state), per sigma
+ *   mean of a period, in which flux moves along a chord:   t - theta^2/12 (t + psi_d psi_q (1/l_qq - 1/l_d))
+ * Source   docs/theory/identification.md (ID-5) ... (ID-8), (ID-20)
+ * Units    per unit, Q30
+ * Range    |h| is limited to 1/4
+ * Rounding half up, a few LSB of Q30
+ * Errors   saturates
+ * Context  1 kHz task; two divisions each, of bounded quantities */
+#include "control/current/flux_table_types.h"
+#include "control/identify/point.h"
+
+/** The tables at point->i_m. */
+typedef struct {
+    flux_point_t flux;
+    flux_inductances_t inductances;
+} identify_tables_t;
+
+typedef struct {
+    int32_t h_q30[IDENTIFY_STATES];
+} jacobian_row_t;
+
+typedef struct {
+    dq_q30_t y;                  /* residual with every state at its prior */
+    dq_q30_t psi;                /* of the tables, at i_m */
+    dq_q30_t i_m;
+    dq_q30_t iron_i;             /* change of i_m with the scale of the iron loss */
+    bool current;            /* enough current for the drop to have a direction */
+    jacobian_row_t d, q;
+    jacobian_row_t psi_d, psi_q; /* change of psi with each state, but for the magnet's flux, with which it is one */
+} identify_model_t;
+
+void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
+                    q31_t r_prior, identify_model_t *model);
+jacobian_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
+
+/** Torque over the period, from flux and magnetising current at its ends, Q30. */
+int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_q30_t psi,
+                             dq_q30_t i_m);
+
+#endif

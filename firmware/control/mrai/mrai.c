@@ -1,0 +1,155 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/mrai/mrai.h"
+
+#include "fx/q.h"
+
+/* 4 pu. The slow poles make e = T_s w dpsi/(2 s2) large: 1.5 pu for a magnet 15 % weak at full speed on hsm1. A
+ * tighter bound winds up. */
+#define ERROR_BITS 30
+/* |s2 e| < 1/16 in the laws: Q35 fits, and the small steps of the adaptation keep their digits. */
+#define INNOVATION_BITS 24
+#define INNOVATION_SCALE 256
+
+/* Of the d equation (MR-7). */
+#define WEIGHT_D 2
+
+/* Formats that only this law uses. */
+typedef struct {
+    int32_t d, q;
+} dq_q27_t;
+
+typedef struct {
+    int32_t d, q;
+} dq_q28_t;
+
+typedef struct {
+    int32_t d, q;
+} dq_q35_t;
+
+static bool limits_valid(q31_t lo, q31_t hi)
+{
+    return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
+}
+
+bool mrai_valid(const mrai_config_t *config)
+{
+    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 &&
+                       config->period <= Q31(0.78) && config->flux_gain >= 0 && config->resistance_gain >= 0 &&
+                       config->flux_proportional_q24 >= 0 &&
+                       config->resistance_proportional_q24 >= 0;
+    return gains && limits_valid(config->psi_delta_min, config->psi_delta_max) &&
+           limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
+           config->psi_drift_full > 0 && config->r_drift_full > 0;
+}
+
+/* Q27 to Q35, limited. */
+static int32_t innovation(int32_t s2e_q27)
+{
+    return fx_sat_bits(s2e_q27, INNOVATION_BITS) * INNOVATION_SCALE;
+}
+
+/* One law: I -= step, clamped (MR-9, MR-10). limits: the lower and the upper one. */
+static q31_t adapt(q31_t integral, q31_t step, fx_arch_two_t limits)
+{
+    const q31_t moved = fx_sub_q31(integral, step);
+    if (__builtin_expect(moved < limits.first || moved > limits.second, 0)) {
+        return fx_arch_opaque(fx_clamp_q31(moved, limits.first, limits.second)); /* a branch: nothing else pays */
+    }
+    return moved;
+}
+
+/* The proportional part acts on top of the integral for this step only. Q31 * Q24 = Q23; limited to 1/2 pu so that the
+ * sum with the limited integral cannot overflow. */
+static q31_t used(q31_t integral, q31_t step, int32_t proportional_q24)
+{
+    return integral - fx_sat_bits(fx_mulhi(step, proportional_q24), 23) * 256;
+}
+
+/* (8) normalised: dpsi -= 2 k_psi s2 e_q/w. Q28 * Q35 = Q31. */
+static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_state_t *state, int32_t innovation_q)
+{
+    const q31_t step = fx_mulhi(step_q28, innovation_q);
+    const q31_t moved = adapt(state->psi_delta, step, fx_arch_load_two(&config->psi_delta_min));
+    state->psi_delta = moved;
+    return used(moved, step, config->flux_proportional_q24);
+}
+
+/* (7) normalised: dR -= k s2 (2 i_d e_d + i_q e_q), i weighted, Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25,
+ * saturated. */
+static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mrai_state_t *state, dq_q28_t i,
+                              dq_q35_t innovation)
+{
+    const int32_t power_q31 = fx_mulhi_add(fx_mulhi(innovation.d, i.d), innovation.q, i.q);
+    const q31_t step = fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64;
+    const q31_t moved = adapt(state->r_delta, step, fx_arch_load_two(&config->r_delta_min));
+    state->r_delta = moved;
+    return used(moved, step, config->resistance_proportional_q24);
+}
+
+/* With the weight of each equation. */
+static dq_q28_t weighted(const dq_q15_t *i)
+{
+    const fx_arch_two_t read = fx_arch_load_two(&i->d);
+    return (dq_q28_t){read.first * (8192 * WEIGHT_D), read.second * 8192};
+}
+
+/* Half a period's rotational and resistive voltage at one of its ends, as flux: half of T_s (R^ i_d - w psi_q) and of
+ * T_s (R^ i_q + w (psi_d + dpsi)), weighted (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
+static dq_q27_t half_voltage(const mrai_config_t *config, const operating_point_t *in, dq_q28_t i, q31_t psi_used,
+                             q31_t r_used, dq_q15_t *psi)
+{
+    const fx_arch_two_t r0_period = fx_arch_load_two(&config->r0);
+    const int32_t drop_q30 = fx_mulhi(fx_add_q31(r0_period.first, r_used), r0_period.second);
+    const dq_q27_t drop = {fx_mulhi(drop_q30, i.d), fx_mulhi(drop_q30, i.q)};
+    const int32_t turn_q30 = fx_mulhi(in->omega, r0_period.second);
+    const fx_arch_two_t table = fx_arch_load_two(&in->flux.psi_d);
+    *psi = (dq_q15_t){table.first, table.second};
+    const int32_t psi_d_q28 = psi->d * 8192 + (psi_used >> 3);
+    return (dq_q27_t){fx_mulhi_sub(drop.d, turn_q30, psi->q * (8192 * WEIGHT_D)),
+                      fx_mulhi_add(drop.q, turn_q30, psi_d_q28)};
+}
+
+/* This sample's share of the period that begins with it. */
+static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const dq_q15_t *u, dq_q15_t psi, dq_q27_t e,
+                  dq_q27_t half)
+{
+    state->e_d_q27 = e.d;
+    state->e_q_q27 = e.q;
+    const fx_arch_two_t volt_q28 = fx_arch_load_two(&schedule->minus_voltage_d_q28);
+    const fx_arch_two_t u_q15 = fx_arch_load_two(&u->d);
+    const int32_t begun_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, volt_q28.first, u_q15.first * 65536);
+    const int32_t begun_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, volt_q28.second, u_q15.second * 65536);
+    state->begun_d_q27 = begun_d;
+    state->begun_q_q27 = begun_q;
+}
+
+void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
+                const operating_point_t *in)
+{
+    dq_q15_t psi;
+    const dq_q27_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);
+    begin(schedule, state, &in->u, psi, (dq_q27_t){0, 0}, half);
+}
+
+/* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
+ * steady state. In Q27 the d axis is the larger one: 4 + 2 (1 + 1 + 0.8) + 2 + 2 (1 + 1) < 16. */
+void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
+               const operating_point_t *in)
+{
+    /* (MR-7): 4 s2 in Q30, which is s2 in Q32, below 1/4. */
+    const int32_t s2_q32 = fx_mul_q31_word(config->pole_gain, in->flux.g);
+    const fx_arch_two_t last = fx_arch_load_two(&state->e_d_q27);
+    const dq_q27_t s2e = {fx_mulhi(s2_q32, last.first), fx_mulhi(s2_q32, last.second)};
+    const int32_t fresh_q = innovation(s2e.q);
+    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh_q);
+    const dq_q35_t fresh = {innovation(s2e.d), fresh_q};
+    const dq_q28_t i = weighted(&in->i);
+    const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, fresh);
+    dq_q15_t psi;
+    const dq_q27_t half = half_voltage(config, in, i, psi_used, r_used, &psi);
+    const fx_arch_two_t begun = fx_arch_load_two(&state->begun_d_q27);
+    const dq_q27_t e = {begun.first - s2e.d + s2e.q, begun.second - s2e.d - s2e.q};
+    const dq_q27_t now = {fx_sat_bits(e.d + psi.d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
+                          fx_sat_bits(e.q + psi.q * 4096 + half.q, ERROR_BITS)};
+    begin(schedule, state, &in->u, psi, now, half);
+}

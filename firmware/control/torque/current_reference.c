@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "control/torque/current_reference.h"
+
+#include <stddef.h>
+
+#include "fx/div.h"
+#include "fx/q.h"
+#include "fx/vec.h"
+
+bool current_reference_valid(const current_reference_config_t *config)
+{
+    const fx_grid_t *grid = &config->grid;
+    const bool axes = fx_axis_valid(grid->x_shift, grid->nx) && fx_axis_valid(grid->y_shift, grid->ny) &&
+                      fx_axis_valid(config->torque_max.shift, config->torque_max.n);
+    if (!config->i_d || !config->i_q || !config->torque_max.y || !axes || config->i_max <= 0) {
+        return false;
+    }
+    for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {
+        if (config->i_d[k] > 0 || config->i_q[k] < 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* (v_ratio v_dc - r |i| + v_trim)/|w| - shift: at low speed everything is available (CR-2), (CR-9).
+ * A quotient of up to 2^30 keeps the shift from mattering where the flux is no limit at all. */
+static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
+{
+    const q15_t drop = fx_mul_gain_q15(config->r_pu, in->i_magnitude);
+    const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
+    const int32_t over = fx_clamp_q31(voltage, 0, Q15_MAX) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
+    return fx_max_s32(over - in->shift, 0);
+}
+
+/* Interpolation between table nodes may leave the circle by a little: the d axis keeps its share (CR-7). */
+static dq_q15_t inside_circle(dq_q15_t i, q15_t i_max)
+{
+    const int32_t room = fx_mul_q30(i_max, i_max) - fx_mul_q30((q15_t)i.d, (q15_t)i.d);
+    if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= room) {
+        return i;
+    }
+    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, (q15_t)i.d)};
+}
+
+static __attribute__((noinline)) dq_q15_t tabulated(const current_reference_config_t *config, q15_t torque, q15_t psi)
+{
+    const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
+    return (dq_q15_t){fx_cell_interp(config->i_d, config->grid.ny, cell),
+                      fx_cell_interp(config->i_q, config->grid.ny, cell)};
+}
+
+static __attribute__((noinline)) q15_t largest(const current_reference_config_t *config, q15_t psi)
+{
+    bool clamped = false;
+    return fx_lookup1(&config->torque_max, psi, &clamped);
+}
+
+/* t_max + dpsi_d i_q - dpsi_q i_d there: the tables' torque plus what magnet and q axis differ by (CR-10). What a weak
+ * magnet leaves at the present point it need not leave at the largest torque, where psi_d is small: not counted. */
+static q15_t reachable(const current_reference_config_t *config, const current_reference_in_t *in, int32_t planned)
+{
+    const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
+    const q15_t torque_max = largest(config, psi);
+    const dq_q15_t i = tabulated(config, torque_max, psi);
+    const int32_t learnt = fx_mul_q15(in->psi_delta, (q15_t)i.q) - fx_mul_q15(in->psi_q_delta, (q15_t)i.d);
+    return fx_sat_q15(fx_max_s32(torque_max + learnt, 0));
+}
+
+current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
+{
+    const int32_t planned = planned_flux(config, in);
+    const q15_t psi = fx_sat_q15(planned);
+    const q15_t torque_max = largest(config, psi);
+    const q15_t torque = (q15_t)fx_min_s32(fx_abs_q15(in->torque_corrected), torque_max);
+
+    dq_q15_t i_ref = inside_circle(tabulated(config, torque, psi), config->i_max);
+    const bool i_d_limited = i_ref.d < -in->i_d_max;
+    i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
+    i_ref.q = (in->torque_corrected < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;
+    return (current_reference_t){
+        .i_ref = i_ref,
+        .torque_max = reachable(config, in, planned),
+        .psi_plan = psi,
+        .limited = fx_abs_q15(in->torque_corrected) > torque_max || psi < config->grid.y0,
+        .i_d_limited = i_d_limited,
+    };
+}

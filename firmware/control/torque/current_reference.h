@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TORQUE_CURRENT_REFERENCE_H
+#define TORQUE_CURRENT_REFERENCE_H
+/** Current references: maximum torque per ampere, field weakening and maximum torque per volt from one table.
+ *   (i_d, i_q) = table(|T|, psi_plan), i_q takes the sign of T
+ *   psi_plan = (v_ratio v_dc - r |i| + v_trim)/|w| - shift: shift is what the identified magnet adds to |psi|, v_trim
+ *     what voltage_reserve.h found the plan to be wrong by
+ *   |T| is first limited to t_max(psi_plan), the largest torque inside voltage and current circle, and i_d to -i_d_max.
+ *   torque_max = t_max + dpsi_d i_q(t_max) - dpsi_q i_d(t_max), t_max without the flux that a weak magnet leaves at the
+ *     present point: what the machine as identified can make
+ * Source   docs/theory/current-reference.md (CR-1) ... (CR-11)
+ * Units    per unit
+ * Range    psi_plan outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged;
+ *          |v_trim|, |shift| < 1/2
+ * Rounding 1 LSB q15 of interpolation
+ * Errors   limited: the torque was cut, by voltage or by current; i_d_limited: i_d was
+ * Context  1 kHz task; one bounded division */
+#include <stdbool.h>
+
+#include "fx/lookup.h"
+#include "types/frames.h"
+
+typedef struct {
+    fx_grid_t grid;         /* x: |T| from 0, y: psi_avail from y0, both q15 */
+    const int16_t *i_d;     /* [ix * ny + iy], <= 0 */
+    const int16_t *i_q;     /* [ix * ny + iy], >= 0 */
+    fx_lut1_t torque_max;   /* over psi_avail */
+    q15_t v_ratio;          /* planned share of v_dc: a little below current control's, as its dynamic reserve */
+    q16_t r_pu;
+    q15_t i_max;            /* current circle */
+} current_reference_config_t;
+
+typedef struct {
+    q15_t torque_corrected;
+    q15_t v_dc;
+    q15_t omega;
+    q15_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
+    q15_t v_trim;
+    q15_t shift;
+    q15_t psi_delta;   /* identified flux minus the table's, d axis */
+    q15_t i_d_max;     /* magnitude of the most negative i_d that the magnets bear now */
+    q15_t psi_q_delta; /* what the identified |psi_q| is more than the tables' at the last reference */
+} current_reference_in_t;
+
+typedef struct {
+    dq_q15_t i_ref;
+    q15_t torque_max;  /* reachable with the flux that is there */
+    q15_t psi_plan;    /* flux that the table was asked for */
+    bool limited;
+    bool i_d_limited;
+} current_reference_t;
+
+bool current_reference_valid(const current_reference_config_t *config);
+current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in);
+
+#endif

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TORQUE_LIMIT_H
+#define TORQUE_LIMIT_H
+/** What may be asked for now: the arbitrated torque between what vehicle, battery, temperatures, dc voltage, speed
+ * and the machine's own reach allow, each direction of power by itself.
+ *   loss   = first-order mean of u.i - t^ w, plus drop |i|: what the dc side pays beyond the shaft
+ *   drive <= min(torque_max f, torque_drive, (power_drive - loss)/|w|, reach)    f = min of the derating factors
+ *   regen <= min(torque_max f, torque_regen, (power_regen + loss)/|w|, reach)
+ *   near standstill, where the direction of power is not known, the driving limit holds for both
+ * Source   docs/theory/limits.md (LM-1) ... (LM-7)
+ * Units    per unit; temperatures in tenths of a degree C, TEMPERATURE_UNKNOWN as in hal/temperature.h
+ * Range    every argument; loss is kept in 0 ... 1/4
+ * Rounding 1 LSB q15
+ * Errors   derating says every reason that the torque was cut for, whether or not it was the smallest; a temperature
+ *          that was known and no longer is counts as a factor of 1/2
+ * Context  1 kHz task; two bounded divisions */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "types/frames.h"
+#include "types/torque_limits.h"
+
+#define TEMPERATURE_UNKNOWN INT16_MIN
+
+enum {
+    DERATING_REQUEST = 1u << 0,  /* beyond the machine's rated torque or the vehicle's torque limit */
+    DERATING_POWER = 1u << 1,
+    DERATING_REACH = 1u << 2,    /* voltage or current circle */
+    DERATING_INVERTER = 1u << 3, /* temperature */
+    DERATING_WINDING = 1u << 4,  /* temperature */
+    DERATING_DC_LOW = 1u << 5,
+    DERATING_DC_HIGH = 1u << 6,
+    DERATING_SPEED = 1u << 7,
+    DERATING_MAGNET = 1u << 8,   /* i_d at the demagnetisation limit: set by the 1 kHz task */
+};
+
+/** A straight line: 0 at end, 1 where (x - end) gain is 1. gain = 2^31/(start - end), with its sign. */
+typedef struct {
+    q15_t end;
+    q16_t gain;
+} derating_line_t;
+
+typedef struct {
+    q15_t torque_max;
+    q15_t drop;             /* device drop as loss per current */
+    q15_t loss_rate;        /* first-order coefficient per task period */
+    derating_line_t moving; /* over |w|: 0 standstill, 1 the direction of power is certain */
+    derating_line_t inverter, winding, dc_low, dc_high, speed;
+} torque_limit_config_t;
+
+typedef struct {
+    q31_t loss;
+    bool inverter_seen, winding_seen;
+} torque_limit_state_t;
+
+typedef struct {
+    q15_t torque_arbitrated;
+    const torque_limits_t *limits;
+    dq_q15_t u, i;
+    q15_t torque_estimated;
+    q15_t omega;
+    q15_t v_dc;
+    q15_t reach;      /* the references' torque_max of the last step */
+    int16_t inverter_dC, winding_dC;
+} torque_limit_in_t;
+
+typedef struct {
+    q15_t torque_limited; /* the arbitrated torque inside its limits */
+    q15_t drive, regen;   /* magnitudes allowed now */
+    uint16_t derating;
+} torque_limit_t;
+
+bool torque_limit_valid(const torque_limit_config_t *config);
+torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_limit_state_t *state,
+                                 const torque_limit_in_t *in);
+
+#endif

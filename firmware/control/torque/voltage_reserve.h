@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TORQUE_VOLTAGE_RESERVE_H
+#define TORQUE_VOLTAGE_RESERVE_H
+/** Keeps the acting voltage at the planned share of the dc voltage while the flux is what limits the references: the
+ * trim on top of the tables.
+ *   shift  = |psi + dpsi| - |psi|, psi the tables' flux at the last reference: the identified magnet's part
+ *   e      = v_ratio v_dc - |u|
+ *   v_trim += k e        if e < 0, or while the references sit on the planned flux
+ *   v_trim -= k v_trim   else: no limit, nothing to be learnt
+ *   trim_min <= v_trim <= trim_max
+ * Source   docs/theory/current-reference.md (CR-9), (CR-12) ... (CR-14)
+ * Units    per unit
+ * Range    k < 1; trim_min <= 0 <= trim_max
+ * Rounding half up, 1/2 LSB q31 per step in v_trim, 1 LSB q15 in shift
+ * Errors   saturates at its bounds; they are the authority of the trim
+ * Context  1 kHz task; three square roots, no division */
+#include <stdbool.h>
+
+#include "types/frames.h"
+
+typedef struct {
+    q15_t v_ratio;  /* the references' planned share of v_dc */
+    q15_t gain;     /* k per task period */
+    q15_t trim_min;
+    q15_t trim_max;
+} voltage_reserve_config_t;
+
+typedef struct {
+    q31_t trim;
+} voltage_reserve_state_t;
+
+typedef struct {
+    dq_q15_t u;          /* that acts now */
+    q15_t v_dc;
+    dq_q15_t psi;        /* tables' flux at the last reference */
+    q15_t psi_plan;  /* of the last reference */
+    q15_t psi_delta; /* identified flux minus the table's */
+    bool acting;     /* u is ours */
+} voltage_reserve_in_t;
+
+typedef struct {
+    q15_t v_trim;
+    q15_t shift;
+} voltage_reserve_t;
+
+voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, voltage_reserve_state_t *state,
+                                       const voltage_reserve_in_t *in);
+
+#endif

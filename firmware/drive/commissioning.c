@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/mrai/mrai_seam.h"
+#include "fx/div.h"
+
+#define DEAD_TIME_MAX Q15(0.125) /* more voltage error than an eighth of the dc voltage is no inverter's */
+#define KNEE_CHANGED Q31(0.8)    /* a knee that is a quarter wider is measured, not noise */
+#define KNEE_RANGE 16
+#define MISMATCH_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
+
+static int32_t product_q30(int32_t a_q30, q15_t b)
+{
+    return (int32_t)(((int64_t)a_q30 * b) >> 15);
+}
+
+/* What has been compensated while it was measured, on top of what is left: the inverter's own (CM-2). */
+static void add_compensated(const modulate_config_t *config, q15_t v_dc, commission_curve_t *curve)
+{
+    const int32_t full = config->dead_time_q16 / 2 * v_dc;
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        const q15_t share = fx_sat_q15(fx_mulhi(config->knee_q17, curve->knot[k])); /* Q17 * Q30 = Q15 */
+        curve->v[k] = fx_add_q31(curve->v[k], product_q30(full, share));
+    }
+    curve->level = fx_add_q31(curve->level, full);
+}
+
+/* (CM-5): the straight line and the constant that come nearest to the curve. */
+static int32_t knee_gain(const modulate_config_t *config, const commission_curve_t *curve)
+{
+    const int32_t gain = fx_div_q31(2, commission_knee(curve) >> 15); /* 2^17 over q15: 2^32 over counts */
+    if (gain >= fx_mul_q31(config->knee_q17, KNEE_CHANGED)) {
+        return config->knee_q17;
+    }
+    return fx_max_s32(gain, config->knee_q17 / KNEE_RANGE);
+}
+
+static bool credible(const drive_t *drive, const commission_curve_t *curve)
+{
+    const q31_t r0 = drive->motor.identify.r0;
+    return curve->r > r0 / 4 && curve->r < r0 * INT64_C(3) / 2 && curve->level >= 0; /* Q30 against Q31 */
+}
+
+static bool evaluate(drive_t *drive, q15_t v_dc)
+{
+    task_state_t *task = &drive->task;
+    commission_curve_t *curve = &task->inverter;
+    const modulate_config_t *config = &drive->motor.modulate;
+    const bool fits = commission_fit(&task->commission.data, curve);
+    add_compensated(config, v_dc, curve);
+    const q31_t dead_time = fx_div_q31(curve->level, v_dc * 32768);
+    const compensation_t found = {fx_round_q15(dead_time / 2), knee_gain(config, curve), true};
+    return fits && credible(drive, curve) && drive_compensate(drive, &found);
+}
+
+/* One word for the fast ISR; (MO-11) must hold before it adds more. */
+static void apply(motor_t *m, q15_t dead_time)
+{
+    const uint32_t clear_q30 = motor_clear_q30(m, dead_time);
+    if (clear_q30 < m->current_control.clear_q30) {
+        m->current_control.clear_q30 = clear_q30;
+    }
+    exchange_barrier();
+    m->modulate.dead_time_q16 = 2 * dead_time;
+}
+
+bool drive_compensate(drive_t *drive, const compensation_t *compensation)
+{
+    motor_t *m = &drive->motor;
+    const int32_t dead_time = compensation->dead_time;
+    if (dead_time < 0 || dead_time > DEAD_TIME_MAX || compensation->knee_q17 <= 0 ||
+        compensation->knee_q17 >= 1 << 30) {
+        return false;
+    }
+    apply(m, (q15_t)dead_time);
+    m->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
+    m->modulate.knee_q17 = compensation->knee_q17;
+    drive->task.compensation = *compensation;
+    drive->task.trim = (dead_time_trim_state_t){.base = (q15_t)dead_time};
+    return true;
+}
+
+void drive_trim(drive_t *drive, q15_t v_dc)
+{
+    task_state_t *task = &drive->task;
+    kalman_t *kalman = &task->identify.kalman;
+    const dead_time_trim_in_t in = {
+        .sigma = drive->motor.identify.sigma[IDENTIFY_DROP],
+        .x_q27 = kalman->x_q27[IDENTIFY_DROP],
+        .variance_q30 = kalman->p_q30[kalman_p_index(IDENTIFY_DROP, IDENTIFY_DROP)],
+        .v_dc = v_dc,
+        .dead_time = (q15_t)(drive->motor.modulate.dead_time_q16 / 2),
+        .period_steps = drive->motor.trim_steps,
+        .identifying = drive->request.trim && task->identify.update_valid &&
+                    task->identify.mismatch_share <= MISMATCH_MAX,
+    };
+    const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
+    if (out.dead_time != in.dead_time) {
+        apply(&drive->motor, out.dead_time);
+        kalman->x_q27[IDENTIFY_DROP] = fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27);
+    }
+}
+
+void drive_retrim(drive_t *drive, int32_t trim)
+{
+    motor_t *m = &drive->motor;
+    apply(m, dead_time_trim_restore(&drive->task.trim, (q15_t)(m->modulate.dead_time_q16 / 2), trim));
+}
+
+static void begin(drive_t *drive, const commission_config_t *config)
+{
+    task_state_t *task = &drive->task;
+    task->commissionings = drive->request.commissionings;
+    task->commission = (commission_state_t){.phase = COMMISSION_FAILED, .failure = COMMISSION_STOPPED};
+    if (task->run_state == RUN_STATE_RUN && !mrai_is_chosen(drive)) {
+        commission_start(config, &task->commission);
+    }
+}
+
+void drive_commission(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const sample_t *sample = &snapshot->sample;
+    const identify_window_t *window = &snapshot->window;
+    const commission_config_t *config = &drive->motor.commission;
+    const commission_in_t in = {
+        .sum_i = window->sum_i,
+        .sum_u = window->sum_u,
+        .theta = sample->theta_e,
+        .omega = sample->point.omega,
+        .acting = window->acting && sample->acting && task->run_state == RUN_STATE_RUN,
+        .limited = window->limited != 0U,
+    };
+    if (drive->request.commissionings != task->commissionings) {
+        begin(drive, config);
+        return;
+    }
+    const bool ran = commission_runs(&task->commission);
+    commission_step(config, &task->commission, &in);
+    if (!ran || task->commission.phase != COMMISSION_DONE) {
+        return;
+    }
+    if (evaluate(drive, (q15_t)sample->v_dc)) {
+        task->identify.kalman.x_q27[IDENTIFY_DROP] = 0; /* what it stood for is compensated now */
+    } else {
+        task->commission.phase = COMMISSION_FAILED;
+        task->commission.failure = COMMISSION_FIT;
+    }
+}

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_DRIVE_H
+#define DRIVE_DRIVE_H
+/** One drive: configuration, the state of every stage, and the three activities that run it.
+ *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), windows of the
+ *     robust identification; for the paper's it pends mrai_isr
+ *   mrai_isr  below the fast ISR, while it is chosen: the paper's identification and torque estimate
+ *   task_1khz every bases.periods_per_step periods, below both: torque path, current reference, identification,
+ *     supervision
+ * Source   docs/architecture.md
+ * Units    per unit of motor.bases
+ * Errors   latched in faults; the safe state acts in the same period
+ * Context  all state lives here: several drives run in one process */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "drive/exchange.h"
+#include "drive/motor.h"
+#include "control/commission/commission.h"
+#include "control/adapt/dead_time_trim.h"
+#include "control/identify/record.h"
+#include "types/features.h"
+#include "types/identification.h"
+#include "types/torque_limits.h"
+
+#if FLUXTRUE_MRAI
+#include "drive/mrai/mrai_data.h"
+#endif
+
+/** How resistance and flux are identified. */
+typedef enum {
+    IDENTIFICATION_PAPER = 0, /* model reference adaptive, each period: resistance and magnet flux */
+    IDENTIFICATION_ROBUST = 1 /* seven parameters with their uncertainty, each millisecond */
+} identification_mode_t;
+
+/** What the outside asks. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
+ * the MRAI ISR, identification_mode by the fast ISR; every field is aligned and read word by word. */
+typedef struct {
+    q15_t torque_arbitrated; /* without a bus nothing arbitrates: the requested torque itself */
+    dq_q15_t i_ref;          /* current mode only */
+    torque_limits_t limits;
+    bool enable;
+    bool current_mode;   /* commissioning: i_ref directly, no torque path */
+    bool torque_loop;
+    bool identification;
+    bool trim;           /* the dead-time compensation follows what is identified */
+    identification_mode_t identification_mode;
+    uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
+    uint32_t identification_resets; /* counted up: what was identified is forgotten once */
+    uint32_t commissionings;        /* counted up: the inverter's voltage error is measured once, at standstill */
+} request_t;
+
+typedef enum { RUN_STATE_OFF = 0, RUN_STATE_RUN = 1, RUN_STATE_FAULT = 2 } run_state_t;
+
+/** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */
+typedef struct {
+    angle_tracker_state_t angle_tracker;
+    current_control_state_t current_control;
+    monitor_state_t monitor;
+    dq_q15_t u_next;              /* voltage of the next period, which the duties just written will make */
+    identify_window_t window;     /* of the robust identification, being summed up */
+    uint8_t periods_since_enable; /* saturates at 3: from then on the voltage of the whole last period is known */
+    bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
+    uint32_t fault_resets;        /* of the command, as far as done */
+    volatile uint32_t faults;     /* latched */
+} fast_state_t;
+
+/** What the modulation adds against dead time and device drop, if it has been measured. */
+typedef struct {
+    int32_t dead_time; /* q15 */
+    int32_t knee_q17;
+    int32_t measured;  /* not zero: this is not motor.toml's */
+} compensation_t;
+
+/** Written by the 1 kHz task alone. */
+typedef struct {
+    torque_limit_state_t torque_limit;
+    torque_limit_t allowed;
+    torque_loop_state_t torque_loop;
+    identify_state_t identify;
+    identification_t identification; /* of the law that is chosen */
+    volatile q15_t psi_d_error;      /* of the robust one: the fast ISR copies one half word */
+    volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
+    current_reference_t reference;
+    voltage_reserve_state_t voltage_reserve;
+    angle_harmonics_state_t angle_harmonics;
+    volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* the fast ISR reads one word */
+    plausibility_state_t plausibility;
+    torque_monitor_state_t torque_monitor;
+    commission_state_t commission;
+    commission_curve_t inverter;    /* voltage error against current, as last measured */
+    compensation_t compensation;
+    uint32_t commissionings;        /* of the request, as far as seen */
+    dq_q15_t i_ref;   /* acts until the next step */
+    dq_q15_t psi_ref; /* tables' flux at the last reference */
+    dead_time_trim_state_t trim; /* of the compensation: what driving has added */
+    uint16_t derating;    /* DERATING_...: why less than the request is made */
+    q15_t torque_commanded; /* the limited torque after slew */
+    q15_t torque_corrected; /* after the torque loop: what the current reference is asked for */
+    run_state_t run_state;
+    safe_state_state_t safe_state;
+    bool armed;           /* has run since freewheel was last the safe state: the bridge is powered */
+    uint32_t fault_resets_asked;    /* of the request, as far as seen */
+    uint32_t fault_resets;          /* passed on to the fast ISR */
+    uint32_t identification_resets; /* of the request, as far as the quality is concerned */
+} task_state_t;
+
+/** What the 1 kHz task knows of the priorities above it and of the port: one moment, for all of its step. */
+typedef struct {
+    sample_t sample;
+    identify_window_t window;
+#if FLUXTRUE_MRAI
+    mrai_snapshot_t mrai;
+#endif
+    q15_t psi_d_error;
+    uint32_t faults;
+    int16_t inverter_dC, winding_dC;
+} snapshot_t;
+
+/** The samples first: whoever has the drive's address has theirs. */
+typedef struct {
+    sample_box_t samples;
+    motor_t motor; /* a copy in RAM: calibration changes it, the flash original never */
+    request_t request;
+    fast_state_t fast;
+    volatile q15_t psi_d_error; /* fed forward: the fast ISR copies the robust identification's, else the MRAI ISR's */
+    task_state_t task;
+    window_box_t windows;
+    command_box_t commands;
+#if FLUXTRUE_MRAI
+    mrai_data_t mrai;
+#endif
+} drive_t;
+
+void drive_init(drive_t *drive, const motor_t *source);
+void drive_raise_fault(drive_t *drive, uint32_t fault);
+
+/** What has been identified, for a store that survives a power cycle. Called in the background. */
+identify_record_t drive_identified_record(const drive_t *drive);
+/** After drive_init(), before the first task; false: the record is refused, nothing changed. */
+bool drive_recall(drive_t *drive, const identify_record_t *record);
+
+/** The identification's share of the 1 kHz task. */
+void drive_identify(drive_t *drive, const snapshot_t *snapshot);
+
+/** The commissioning's share of the 1 kHz task. */
+void drive_commission(drive_t *drive, const snapshot_t *snapshot);
+/** Takes a compensation over; false: out of range, nothing changed. From the task, or before it starts. */
+bool drive_compensate(drive_t *drive, const compensation_t *compensation);
+/** Moves what has been learnt of the voltage error into the compensation. From the task. */
+void drive_trim(drive_t *drive, q15_t v_dc);
+/** Puts a trim that was kept on the compensation in effect; 0 takes it away. */
+void drive_retrim(drive_t *drive, int32_t trim);
+/** Current references come from outside the torque path. */
+static inline bool drive_is_direct(const drive_t *drive)
+{
+    return drive->request.current_mode || commission_runs(&drive->task.commission);
+}
+
+void fast_isr(drive_t *drive);
+void task_1khz(drive_t *drive);
+#if FLUXTRUE_MRAI
+void mrai_isr(drive_t *drive);
+#else
+/* So that a port needs no condition of its own. */
+static inline void mrai_isr(drive_t *drive)
+{
+    (void)drive;
+}
+#endif
+
+#endif

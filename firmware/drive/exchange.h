@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_EXCHANGE_H
+#define DRIVE_EXCHANGE_H
+/** The boxes through which priorities exchange data; each has one writer.
+ *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
+ *   Upwards (task to the ISRs) the reader cannot be interrupted by its writer: one read is enough.
+ *   Downwards (fast ISR to task) the reader may be: the task copies all it needs at once, and again if a period came in
+ *   between. What goes to the paper's identification has a box of its own (drive/mrai).
+ * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
+ * Errors   none
+ * Context  stated per box */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "control/current/current_control.h"
+#include "control/identify/window.h"
+#include "types/operating_point.h"
+#include "types/frames.h"
+#include "types/samples.h"
+
+/** One period as the fast ISR saw it. Writer: fast ISR. Reader: 1 kHz task. */
+typedef struct {
+    operating_point_t point;
+    uint32_t theta_e; /* of the samples, 2^32 = one turn */
+    fx_pair_t i_ab;   /* alpha, beta */
+    int32_t zero_q28; /* mean of the phases */
+    int32_t v_dc;
+    uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
+    bool acting;          /* the bridge was on throughout the last period and is on now */
+    bool voltage_limited; /* the circle cut the voltage; a pulse that the bridge cannot make is no lack of it */
+    bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
+    uint32_t to_64_bytes; /* a power of two is quicker to find */
+} sample_t;
+
+typedef struct {
+    sample_t slot[2];
+    volatile uint32_t generation;
+} sample_box_t;
+
+/** One window of the robust identification. Writer: fast ISR. Reader: 1 kHz task. */
+typedef struct {
+    identify_window_t slot[2];
+    volatile uint32_t generation;
+} window_box_t;
+
+/** What the bridge does while it does not run: decided before the fault comes, acted on in the same period. */
+typedef enum {
+    SAFE_FREEWHEEL = 0,             /* switching disabled */
+    SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* low sides on if the fault is an over-voltage, else disabled */
+    SAFE_SHORT_CIRCUIT = 2          /* low sides closed */
+} safe_t;
+
+/** What the task asks of the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
+typedef struct {
+    current_target_t target;
+    bool run;
+    safe_t safe;
+    uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
+    uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
+    uint32_t to_32_bytes;  /* as above */
+} command_t;
+
+typedef struct {
+    command_t slot[2];
+    volatile uint32_t generation;
+} command_box_t;
+
+/* The compiler must not move the slot's stores behind the generation's. */
+static inline void exchange_barrier(void)
+{
+    __asm__ volatile("" ::: "memory");
+}
+
+/* The slot that publishing will complete. */
+static inline sample_t *sample_box_begin(sample_box_t *box)
+{
+    sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    __asm__("" : "+r"(slot)); /* the address once: not found anew at every use */
+    return slot;
+}
+
+static inline void sample_box_publish(sample_box_t *box)
+{
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline sample_t sample_box_read(const sample_box_t *box)
+{
+    sample_t copy;
+    uint32_t seen;
+    do {
+        seen = box->generation;
+        exchange_barrier();
+        copy = box->slot[seen & 1U];
+        exchange_barrier();
+    } while (box->generation - seen > 1U);
+    return copy;
+}
+
+/* In place: whoever may be interrupted by the fast ISR copies it and looks at the generation again. */
+static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t generation)
+{
+    const sample_t *slot = &box->slot[generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
+}
+
+static inline void window_box_write(window_box_t *box, const identify_window_t *window)
+{
+    box->slot[(box->generation + 1U) & 1U] = *window;
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+/* In place: the 1 kHz task copies it together with the sample, and again if a period has come in between. */
+static inline const identify_window_t *window_box_at(const window_box_t *box)
+{
+    return &box->slot[box->generation & 1U];
+}
+
+static inline void command_box_write(command_box_t *box, command_t command)
+{
+    box->slot[(box->generation + 1U) & 1U] = command;
+    exchange_barrier();
+    box->generation = box->generation + 1U;
+}
+
+static inline const command_t *command_box_read(const command_box_t *box)
+{
+    const command_t *slot = &box->slot[box->generation & 1U];
+    __asm__("" : "+r"(slot));
+    return slot;
+}
+
+#endif

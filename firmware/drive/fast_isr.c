@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* One PWM period, from converter counts to duties:
+ *
+ *   counts, angle -> acquire_sample -> to_rotor_frame -> current control -> modulation -> duties
+ *                                                                        -> publish_sample -> identification
+ *
+ * Three routes lead through it. The usual one (the bridge runs, nothing is latched, counted or out of its limits) skips
+ * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions of 345.
+ *   usual      fast_isr(): the order of the block diagram, written here once
+ *   unsettled  run_period_unsettled(): the bridge rests or has just been enabled, or a fault or a counter is pending
+ *   checked    run_period_checked(): the sample of a usual period is out of its limits; also the end of the unsettled
+ * tests/unit/drive/test_fast_isr.c shows that the routes agree. */
+#include "drive/acquire.h"
+#include "drive/drive.h"
+#include "drive/publish.h"
+#include "control/current/transform.h"
+#include "hal/pwm.h"
+
+#define DUTY_MIDDLE 16384
+#define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
+
+/* Currents and the angle at which the duties will act, as current control and modulation want them. */
+typedef struct {
+    fx_pair_t i_dq, advanced;
+    int32_t v_dc;
+    q31_t omega;
+} rotor_frame_t;
+
+/* The safe state: all low sides on (short circuit), or switching disabled (freewheel). */
+static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
+{
+    const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
+    const bool short_circuit = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
+    const uint16_t duty = short_circuit ? 0U : DUTY_MIDDLE;
+    if (!short_circuit) {
+        hal_pwm_enable(false);
+    }
+    hal_pwm_write((duty_t){duty, duty, duty});
+    if (short_circuit) {
+        hal_pwm_enable(true); /* with the duties, not before them */
+    }
+    current_control_reset(&drive->fast.current_control);
+    sample->point.u = (dq_q15_t){0, 0};
+    sample->voltage_limited = false;
+    sample->pulses_clamped = false;
+    sample->acting = false;
+    identify_window_invalidate(&drive->fast.window);
+    drive->fast.u_next = (dq_q15_t){0, 0};
+    drive->fast.periods_since_enable = 0;
+}
+
+/* A limit of the voltage circle or of the pulses acts: the voltage of the next period follows from the duties. */
+static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
+                                                                   modulate_out_t made, fx_pair_t i,
+                                                                   fx_pair_t advanced)
+{
+    if (made.limited != 0U) {
+        sample->pulses_clamped = true;
+        identify_window_count_limited(&drive->fast.window);
+    }
+    drive->fast.u_next = modulate_applied(&drive->motor.modulate, made.duty, i, advanced, sample->v_dc);
+}
+
+/* The duties of the first period act in the second; the third sample ends a period of which they are known. */
+static void count_since_enable(fast_state_t *fast, sample_t *sample)
+{
+    if (fast->periods_since_enable < PERIODS_TO_ACT) {
+        fast->periods_since_enable++;
+    }
+    sample->acting = fast->periods_since_enable >= PERIODS_TO_ACT;
+    if (!sample->acting) {
+        identify_window_invalidate(&fast->window);
+    }
+}
+
+/* Current control -> modulation -> duties. The voltage that acts now is the one computed a period ago. */
+static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_target_t *target)
+{
+    fast_state_t *fast = &drive->fast;
+    const motor_t *m = &drive->motor;
+    const current_control_in_t control = {
+        .target = target,
+        .flux = &sample->point.flux,
+        .omega = now->omega,
+        .psi_delta = drive->psi_d_error,
+        .v_dc = now->v_dc,
+    };
+    const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
+    sample->point.u.d = fast->u_next.d;
+    sample->point.u.q = fast->u_next.q;
+    sample->acting = true;
+    sample->voltage_limited = false;
+    sample->pulses_clamped = false;
+    fast->u_next.d = wanted.u.d;
+    fast->u_next.q = wanted.u.q;
+    duty_t duty;
+    if (__builtin_expect(wanted.clear, 1)) {
+        duty = modulate_clear(&m->modulate, wanted.v, now->i_dq, now->advanced);
+    } else {
+        const modulate_out_t made = modulate_step(&m->modulate, wanted.v, now->i_dq, now->advanced);
+        duty = made.duty;
+        if ((made.limited | wanted.limited) != 0U) {
+            sample->voltage_limited = wanted.limited != 0U;
+            voltage_from_duties(drive, sample, made, now->i_dq, now->advanced);
+        }
+    }
+    hal_pwm_write(duty);
+}
+
+/* Before this period's monitors: what is still wrong is latched again at once. A reset never comes with the command to
+ * run. Invalid motor data stay invalid. */
+static void reset_faults(drive_t *drive, uint32_t requested)
+{
+    if (drive->fast.fault_resets != requested) {
+        drive->fast.fault_resets = requested;
+        drive->fast.faults = drive->fast.faults & FAULT_CONFIG;
+    }
+}
+
+/* All sample monitors, with their counters. */
+static void check_samples(drive_t *drive, const sample_t *sample, bool run)
+{
+    const monitor_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
+    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &in);
+    if (in.v_dc < drive->motor.monitor.v_min) {
+        /* Below v_min the applied voltage is unknown; the three-period count starts again. */
+        drive->fast.periods_since_enable = 0;
+    }
+    /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
+    if (faults != 0) {
+        drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
+    }
+}
+
+/* Park, the flux tables, and the angle in the middle of the period in which the duties will act: 1.5 periods ahead. */
+static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step)
+{
+    const dq_q15_t measured = park_pair(sample->i_ab, fx_rotation(sample->theta_e));
+    sample->point.i = measured;
+    const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
+    const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
+    sample->point.flux = flux_table_step(&drive->motor.flux_table, measured);
+    /* Read again from the sample: kept in registers over the look-up, both would be spilled to the stack. */
+    const fx_arch_two_t i = fx_arch_load_two(&sample->point.i.d);
+    return (rotor_frame_t){fx_arch_pkhbt(i.first, i.second), advanced, sample->v_dc, sample->point.omega};
+}
+
+static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)
+{
+    const command_t *command = command_box_read(&drive->commands);
+    fast_state_t *fast = &drive->fast;
+    check_samples(drive, sample, command->run);
+    const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
+    if (command->run && fast->faults == 0) {
+        control_currents(drive, sample, &now, &command->target);
+        hal_pwm_enable(true);
+        count_since_enable(fast, sample);
+    } else {
+        if (command->faults != 0U) {
+            drive_raise_fault(drive, command->faults);
+        }
+        apply_safe_state(drive, sample, command->safe);
+    }
+    fast->is_settled = fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0;
+    publish_sample(drive, sample);
+}
+
+static __attribute__((noinline, cold)) void run_period_unsettled(drive_t *drive)
+{
+    const command_t *command = command_box_read(&drive->commands);
+    if (!command->run) {
+        reset_faults(drive, command->fault_resets);
+    }
+    sample_t *sample = sample_box_begin(&drive->samples);
+    const acquired_t acquired = acquire_sample(drive, sample, false);
+    run_period_checked(drive, sample, acquired.angle_step);
+}
+
+/* The usual period. Everything it needs is compiled into the one interrupt, with a compiler that sees all files. */
+__attribute__((flatten)) void fast_isr(drive_t *drive)
+{
+    const command_t *command = command_box_read(&drive->commands);
+    if (__builtin_expect(!(drive->fast.is_settled & command->run), 0)) {
+        run_period_unsettled(drive);
+        return;
+    }
+    sample_t *sample = sample_box_begin(&drive->samples);
+    const acquired_t acquired = acquire_sample(drive, sample, true);
+    if (__builtin_expect(!acquired.within_limits, 0)) {
+        run_period_checked(drive, sample, acquired.angle_step);
+        return;
+    }
+    const rotor_frame_t now = to_rotor_frame(drive, sample, acquired.angle_step);
+    control_currents(drive, sample, &now, &command->target);
+    publish_sample(drive, sample);
+}

@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/drive.h"
+#include "drive/mrai/mrai_seam.h"
+#include "hal/temperature.h"
+
+static bool at_limit(const identify_state_t *state, identify_index_t index)
+{
+    return fx_abs_q31(state->kalman.x_q27[index]) >= 4 * IDENTIFY_ONE_Q27;
+}
+
+/* Share of the prior's variance that is gone. */
+static q15_t known(const identify_state_t *state, identify_index_t index)
+{
+    return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
+}
+
+static identification_t robust_identification(const drive_t *drive, const identify_out_t *out)
+{
+    const identify_config_t *config = &drive->motor.identify;
+    const identify_state_t *state = &drive->task.identify;
+    return (identification_t){
+        .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
+        .r_delta = fx_add_q31(state->r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
+        .lq_error = identify_value(config, state, IDENTIFY_LQ),
+        .torque_variance_q30 = state->torque_variance_q30,
+        .psi_d_error = out->psi_delta,
+        .torque_estimated = out->torque,
+        .confidence = state->confidence,
+        .psi_quality = known(state, IDENTIFY_FLUX),
+        .r_quality = known(state, IDENTIFY_R),
+        .psi_clamped = at_limit(state, IDENTIFY_FLUX),
+        .r_clamped = at_limit(state, IDENTIFY_R),
+    };
+}
+
+/* The window summed by the fast ISR, the tables at its magnetising current, and what follows from both. */
+static void robust_step(drive_t *drive, const snapshot_t *snapshot)
+{
+    const motor_t *m = &drive->motor;
+    task_state_t *task = &drive->task;
+    const identify_point_t point = identify_point(&m->identify, &snapshot->window, snapshot->sample.point.omega);
+    const identify_tables_t tables = {flux_table_step(&m->flux_table, point.i_m),
+                                      flux_table_inductances(&m->flux_table, point.i_m)};
+    const identify_in_t in = {
+        .point = &point,
+        .tables = &tables,
+        .temperature_known = snapshot->winding_dC != HAL_TEMPERATURE_UNKNOWN,
+        .winding_dC = snapshot->winding_dC,
+        .enabled = drive->request.identification && snapshot->sample.acting,
+    };
+    const identify_out_t out = identify_step(&m->identify, &task->identify, &in);
+    drive_trim(drive, (q15_t)snapshot->sample.v_dc);
+    task->identifications = task->identifications + 1U;
+    task->identification = robust_identification(drive, &out);
+    task->psi_d_error = out.psi_delta;
+}
+
+void drive_identify(drive_t *drive, const snapshot_t *snapshot)
+{
+    if (mrai_is_chosen(drive)) {
+        mrai_identify(drive, snapshot);
+    } else {
+        robust_step(drive, snapshot);
+    }
+}
+
+identify_record_t drive_identified_record(const drive_t *drive)
+{
+    identify_record_t record;
+    uint32_t seen;
+    do {
+        seen = drive->task.identifications;
+        exchange_barrier();
+        record = identify_record_get(&drive->task.identify);
+        exchange_barrier();
+    } while (drive->task.identifications != seen);
+    return record;
+}
+
+bool drive_recall(drive_t *drive, const identify_record_t *record)
+{
+    return identify_record_restore(&drive->task.identify, record);
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_MOTOR_H
+#define DRIVE_MOTOR_H
+/** Everything that depends on the machine and its inverter: one constant, generated from motor.toml and the flux map.
+ * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
+ * Errors   motor_valid() checks tables and limits at start-up
+ * Context  const data in flash */
+#include "control/adapt/angle_harmonics.h"
+#include "control/commission/commission.h"
+#include "control/current/angle_tracker.h"
+#include "control/current/current_control.h"
+#include "control/torque/current_reference.h"
+#include "control/current/flux_table.h"
+#include "control/torque/i_d_limit.h"
+#include "control/identify/config.h"
+#include "control/current/measure.h"
+#include "control/current/modulate.h"
+#include "control/mrai/mrai.h"
+#include "control/torque/limit.h"
+#include "control/torque/loop.h"
+#include "control/torque/voltage_reserve.h"
+#include "safety/monitor.h"
+#include "safety/plausibility.h"
+#include "safety/safe_state.h"
+#include "safety/torque_monitor.h"
+#include "types/bases.h"
+
+typedef struct {
+    const char *name;
+    bases_t bases;
+    uint8_t adc_bits;
+    uint16_t trim_steps;       /* of learning between two moves of the dead-time compensation */
+    float current_full_scale_A;
+    float v_dc_full_scale_V;
+    float torque_max_Nm;
+    float psi_f_Vs;            /* table value at no current: psi_f^ = psi_f_Vs + dpsi */
+    float r_ohm_20;
+    float dead_time_s;         /* of the bridge: modulate.dead_time compensates a fraction of it */
+    q15_t torque_max;
+    q15_t torque_slew;         /* per 1 kHz step; Q15_MAX = open */
+    q15_t torque_slew_weak;    /* the most while the planned flux is below psi_weak: little voltage is left for it */
+    q15_t psi_weak;
+    measure_config_t measure;
+    angle_tracker_config_t angle_tracker;
+    angle_harmonics_config_t angle_harmonics;
+    flux_table_config_t flux_table;
+    current_control_config_t current_control;
+    modulate_config_t modulate;
+    mrai_config_t mrai;
+    identify_config_t identify;
+    torque_loop_config_t torque_loop;
+    current_reference_config_t current_reference;
+    voltage_reserve_config_t voltage_reserve;
+    torque_limit_config_t torque_limit;
+    i_d_limit_config_t i_d_limit;
+    monitor_config_t monitor;
+    safe_state_config_t safe_state;
+    plausibility_config_t plausibility;
+    torque_monitor_config_t torque_monitor;
+    commission_config_t commission;
+} motor_t;
+
+extern const motor_t motor;
+
+bool motor_valid(const motor_t *motor);
+
+/** The largest current_control.clear_q30 with such a dead time. */
+uint32_t motor_clear_q30(const motor_t *motor, int32_t dead_time);
+
+#endif

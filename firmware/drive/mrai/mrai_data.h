@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef MRAI_MRAI_DATA_H
+#define MRAI_MRAI_DATA_H
+/** Everything that a drive holds for the 2014 paper's identification and for nothing else, by writer.
+ * Source   docs/architecture.md, shared data; docs/theory/mrai.md
+ * Units    as in control/mrai
+ * Context  part of drive_t; a build without FLUXTRUE_MRAI has none of it */
+#include "control/mrai/schedule.h"
+#include "control/mrai/torque_estimate.h"
+#include "types/operating_point.h"
+
+/** One operating point on its way to the MRAI interrupt. Writer: fast ISR, only while the interrupt has finished the
+ * point before (generation == finished); so the interrupt reads it in place. */
+typedef struct {
+    operating_point_t point;
+    bool acting;                  /* the bridge was on throughout the last period and is on now */
+    uint8_t overruns_in_a_row;
+    volatile uint32_t generation; /* of the sample it was taken from */
+    uint32_t overruns;            /* periods whose point was dropped, since the one before was not finished */
+} mrai_mailbox_t;
+
+/** Writer: MRAI interrupt. */
+typedef struct {
+    mrai_state_t law;
+    torque_sum_t torque;
+    uint32_t identification_resets; /* of the request, as far as done */
+    volatile uint32_t finished;     /* generation of the last point it took */
+} mrai_isr_state_t;
+
+/** Gains and gates. Writer: 1 kHz task. Reader: MRAI interrupt, which the task never interrupts. */
+typedef struct {
+    mrai_schedule_t slot[2];
+    volatile uint32_t generation;
+} schedule_box_t;
+
+/** Writer: 1 kHz task. */
+typedef struct {
+    mrai_quality_t quality;
+    torque_mean_t torque_mean;
+} mrai_task_state_t;
+
+typedef struct {
+    mrai_mailbox_t mailbox;
+    mrai_isr_state_t isr;
+    mrai_task_state_t task;
+    schedule_box_t schedules;
+} mrai_data_t;
+
+/** What the 1 kHz task has seen of it, in the same moment as the rest. */
+typedef struct {
+    mrai_state_t law;
+    torque_sum_t torque;
+} mrai_snapshot_t;
+
+#endif

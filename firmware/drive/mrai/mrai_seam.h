@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef MRAI_MRAI_SEAM_H
+#define MRAI_MRAI_SEAM_H
+/** The only way to the 2014 paper's identification: an optional consumer of the operating point.
+ *   The fast ISR calls mrai_offer() in a period in which the law is chosen; the 1 kHz task calls mrai_snapshot(),
+ *   mrai_identify() and mrai_reschedule(); the second interrupt is mrai_isr() (drive/drive.h). While the law is not
+ *   chosen, none of them runs.
+ * Source   docs/architecture.md, shared data; docs/decisions/012-seam-of-the-papers-law.md
+ * Errors   a point that comes before the last one is finished is dropped and counted; three in a row are FAULT_OVERRUN
+ * Context  stated per function. Without FLUXTRUE_MRAI the law cannot be chosen and the functions are empty */
+#include "drive/drive.h"
+
+#if FLUXTRUE_MRAI
+
+static inline bool mrai_data_valid(const motor_t *m)
+{
+    return mrai_valid(&m->mrai);
+}
+
+static inline bool mrai_is_chosen(const drive_t *drive)
+{
+    return drive->request.identification_mode == IDENTIFICATION_PAPER;
+}
+
+/** Fast ISR, after the sample has been published. */
+void mrai_offer(drive_t *drive, const sample_t *sample);
+/** 1 kHz task, among what it copies between the same two periods. */
+void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot);
+/** 1 kHz task: the law's answer as the drive's identification. */
+void mrai_identify(drive_t *drive, const snapshot_t *snapshot);
+/** 1 kHz task, after the references: gains for this operating point and for the one just commanded. */
+void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating_point_t *commanded);
+/** 1 kHz task: what was identified is discarded. */
+void mrai_discard(drive_t *drive);
+
+/** Generations offered and finished: equal unless the interrupt is at work or was starved. */
+static inline uint32_t mrai_offered(const drive_t *drive)
+{
+    return drive->mrai.mailbox.generation;
+}
+
+static inline uint32_t mrai_finished(const drive_t *drive)
+{
+    return drive->mrai.isr.finished;
+}
+
+static inline uint32_t mrai_overruns(const drive_t *drive)
+{
+    return drive->mrai.mailbox.overruns;
+}
+
+#else
+
+static inline bool mrai_data_valid(const motor_t *m)
+{
+    (void)m;
+    return true;
+}
+
+static inline bool mrai_is_chosen(const drive_t *drive)
+{
+    (void)drive;
+    return false;
+}
+
+static inline void mrai_offer(drive_t *drive, const sample_t *sample)
+{
+    (void)drive;
+    (void)sample;
+}
+
+static inline void mrai_identify(drive_t *drive, const snapshot_t *snapshot)
+{
+    (void)drive;
+    (void)snapshot;
+}
+
+static inline void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating_point_t *commanded)
+{
+    (void)drive;
+    (void)snapshot;
+    (void)commanded;
+}
+
+static inline void mrai_discard(drive_t *drive)
+{
+    (void)drive;
+}
+
+static inline uint32_t mrai_offered(const drive_t *drive)
+{
+    (void)drive;
+    return 0;
+}
+
+static inline uint32_t mrai_finished(const drive_t *drive)
+{
+    (void)drive;
+    return 0;
+}
+
+static inline uint32_t mrai_overruns(const drive_t *drive)
+{
+    (void)drive;
+    return 0;
+}
+
+#endif
+
+#endif

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/mrai/mrai_seam.h"
+#include "drive/mrai/schedule_box.h"
+
+void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot)
+{
+    snapshot->law = drive->mrai.isr.law;
+    snapshot->torque = drive->mrai.isr.torque;
+}
+
+void mrai_identify(drive_t *drive, const snapshot_t *snapshot)
+{
+    const mrai_config_t *config = &drive->motor.mrai;
+    const mrai_state_t *law = &snapshot->mrai.law;
+    mrai_task_state_t *task = &drive->mrai.task;
+    drive->task.identification = (identification_t){
+        .psi_delta = law->psi_delta,
+        .r_delta = law->r_delta,
+        .torque_variance_q30 = Q31_MAX,
+        .psi_d_error = snapshot->psi_d_error,
+        .torque_estimated = torque_estimate_mean(&task->torque_mean, &snapshot->mrai.torque),
+        .confidence = Q15_MAX, /* the law states no uncertainty */
+        .psi_quality = task->quality.psi_quality,
+        .r_quality = task->quality.r_quality,
+        .psi_clamped = mrai_flux_clamped(config, law),
+        .r_clamped = mrai_resistance_clamped(config, law),
+    };
+}
+
+void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating_point_t *commanded)
+{
+    const mrai_schedule_in_t in = {
+        .sample = &snapshot->sample.point,
+        .next = commanded,
+        .identifier = &snapshot->mrai.law,
+        .enabled = drive->request.identification && snapshot->sample.acting,
+    };
+    mrai_quality_t *quality = &drive->mrai.task.quality;
+    schedule_box_write(&drive->mrai.schedules, mrai_schedule_step(&drive->motor.mrai, quality, &in));
+    drive->task.identification.psi_quality = quality->psi_quality;
+    drive->task.identification.r_quality = quality->r_quality;
+}
+
+/* The interrupt discards its own part with its next point. */
+void mrai_discard(drive_t *drive)
+{
+    drive->mrai.task.quality = (mrai_quality_t){0};
+}

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/slow_monitors.h"
+
+#include "control/current/transform.h"
+
+static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
+{
+    const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
+    const int32_t alpha = transform_round(q30.alpha);
+    const int32_t side = fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865));
+    return (abc_q15_t){alpha, side - alpha / 2, -side - alpha / 2};
+}
+
+static uint32_t currents(drive_t *drive, const snapshot_t *snapshot)
+{
+    const sample_t *sample = &snapshot->sample;
+    task_state_t *task = &drive->task;
+    const plausibility_in_t in = {
+        .acting = sample->acting,
+        .voltage_limited = sample->voltage_limited,
+        .i = sample->point.i,
+        .i_ref = task->i_ref,
+        .phases = measure_phases(sample->i_ab, sample->zero_q28),
+        .phases_ref = in_phases(task->i_ref, sample->theta_e),
+        .omega = fx_q15_from_q31(sample->point.omega),
+        .inverter_dC = snapshot->inverter_dC,
+        .winding_dC = snapshot->winding_dC,
+    };
+    return plausibility_step(&drive->motor.plausibility, &task->plausibility, &in);
+}
+
+static uint32_t torque(drive_t *drive, const sample_t *sample)
+{
+    task_state_t *task = &drive->task;
+    const torque_monitor_in_t in = {
+        .acting = sample->acting && !drive_is_direct(drive),
+        .u = sample->point.u,
+        .i = sample->point.i,
+        .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
+        .omega = fx_q15_from_q31(sample->point.omega),
+        .torque = fx_q15_from_q31(task->torque_loop.model),
+    };
+    return torque_monitor_step(&drive->motor.torque_monitor, &task->torque_monitor, &in);
+}
+
+uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
+{
+    return currents(drive, snapshot) | torque(drive, &snapshot->sample);
+}

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_SLOW_MONITORS_H
+#define DRIVE_SLOW_MONITORS_H
+/** The monitors that have a millisecond's time, fed from the last sample and what was asked of it.
+ * Source   docs/theory/monitors.md, docs/architecture.md
+ * Errors   returns the confirmed faults; the fast ISR latches them, as it alone writes the fault word
+ * Context  1 kHz task, before this step's references */
+#include "drive/drive.h"
+
+uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot);
+
+/** For rigs whose currents answer to no voltage: the monitors that ask for a machine stay blind. */
+static inline void slow_monitors_without_machine(motor_t *m)
+{
+    m->plausibility.e_0 = Q15_MAX;
+    m->plausibility.i_alive = Q15_MAX;
+    m->torque_monitor.v_0 = Q15_MAX;
+}
+
+#endif

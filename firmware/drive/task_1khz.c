@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/drive.h"
+#include "drive/mrai/mrai_seam.h"
+#include "drive/slow_monitors.h"
+#include "fx/vec.h"
+#include "hal/temperature.h"
+#include "signal/rate_limit.h"
+
+/* Switching that was never enabled stays disabled: the bridge may not even be powered. */
+static safe_t safe_state(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const uint32_t faults = snapshot->faults;
+    const safe_state_in_t in = {
+        .omega = fx_q15_from_q31(snapshot->sample.point.omega),
+        .psi_delta = snapshot->psi_d_error,
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
+    };
+    const bool closed = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
+    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (closed || faults != 0U));
+    if (!task->armed) {
+        return SAFE_FREEWHEEL;
+    }
+    if (closed) {
+        return SAFE_SHORT_CIRCUIT;
+    }
+    return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
+}
+
+static run_state_t supervise(drive_t *drive, uint32_t faults)
+{
+    const request_t *request = &drive->request;
+    task_state_t *task = &drive->task;
+    const bool enable = request->enable; /* read once: a reset never goes down with the command to run */
+    if (request->fault_resets != task->fault_resets_asked) {
+        task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not kept for later */
+        task->fault_resets += enable ? 0U : 1U;
+    }
+    if (request->identification_resets != task->identification_resets) {
+        task->identification_resets = request->identification_resets;
+        mrai_discard(drive);
+        identify_reset(&drive->motor.identify, &task->identify);
+        drive_retrim(drive, 0);
+    }
+    if (faults != 0U) {
+        return RUN_STATE_FAULT;
+    }
+    return enable ? RUN_STATE_RUN : RUN_STATE_OFF;
+}
+
+/* What the voltage of this millisecond says about the plan of the last one. */
+static voltage_reserve_t reserve(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const voltage_reserve_in_t in = {
+        .u = snapshot->sample.point.u,
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .psi = task->psi_ref,
+        .psi_plan = task->reference.psi_plan,
+        .psi_delta = snapshot->psi_d_error,
+        .acting = snapshot->sample.acting && !drive_is_direct(drive),
+    };
+    return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
+}
+
+/* An unlimited step needs voltage to follow it; near the voltage limit it would only make the currents oscillate. */
+static q15_t slew_limit(const drive_t *drive)
+{
+    const motor_t *m = &drive->motor;
+    const bool weak = drive->task.reference.psi_plan < m->psi_weak;
+    return weak ? (q15_t)fx_min_s32(m->torque_slew, m->torque_slew_weak) : m->torque_slew;
+}
+
+static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const torque_limit_in_t in = {
+        .torque_arbitrated = drive->request.torque_arbitrated,
+        .limits = &drive->request.limits,
+        .u = snapshot->sample.point.u,
+        .i = snapshot->sample.point.i,
+        .torque_estimated = task->identification.torque_estimated,
+        .omega = fx_q15_from_q31(snapshot->sample.point.omega),
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .reach = task->reference.torque_max,
+        .inverter_dC = snapshot->inverter_dC,
+        .winding_dC = snapshot->winding_dC,
+    };
+    task->allowed = torque_limit_step(&drive->motor.torque_limit, &task->torque_limit, &in);
+    const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
+    task->derating = (uint16_t)(task->allowed.derating | magnet);
+    return task->allowed.torque_limited;
+}
+
+/* Arbitrated -> limited -> commanded (slew) -> corrected (torque loop): docs/glossary.md. A limit that closes is not
+ * slewed: what is no longer allowed or possible is not asked for. */
+static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const motor_t *m = &drive->motor;
+    const q15_t limited = limit_torque(drive, snapshot);
+
+    task->torque_commanded = rate_limit_step(task->torque_commanded, limited, slew_limit(drive));
+    const torque_loop_in_t loop = {
+        .torque_commanded = task->torque_commanded,
+        .torque_estimated = task->identification.torque_estimated,
+        .confidence = task->identification.confidence,
+        .enabled = drive->request.torque_loop && !drive_is_direct(drive),
+        .limited = task->reference.limited || snapshot->sample.voltage_limited,
+    };
+    return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
+}
+
+/* What the identified |psi_q| is more than the tables'. */
+static q15_t psi_q_delta(const drive_t *drive)
+{
+    return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15((q15_t)drive->task.psi_ref.q));
+}
+
+static dq_q15_t references(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    task->torque_corrected = torque_path(drive, snapshot);
+    const voltage_reserve_t trim = reserve(drive, snapshot);
+    const current_reference_in_t in = {
+        .torque_corrected = task->torque_corrected,
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .omega = fx_q15_from_q31(snapshot->sample.point.omega),
+        .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
+        .v_trim = trim.v_trim,
+        .shift = trim.shift,
+        .psi_delta = snapshot->psi_d_error,
+        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, snapshot->psi_d_error, snapshot->winding_dC),
+        .psi_q_delta = psi_q_delta(drive),
+    };
+    task->reference = current_reference_step(&drive->motor.current_reference, &in);
+    if (commission_runs(&task->commission)) {
+        return task->commission.i_ref;
+    }
+    return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
+}
+
+static void reset_torque_path(drive_t *drive)
+{
+    task_state_t *task = &drive->task;
+    task->torque_loop = (torque_loop_state_t){0};
+    task->torque_limit.loss = 0;
+    task->derating = 0;
+    task->reference = (current_reference_t){.torque_max = drive->motor.torque_max, .psi_plan = Q15_MAX};
+    task->voltage_reserve = (voltage_reserve_state_t){0};
+    task->allowed.torque_limited = 0;
+    task->torque_commanded = 0;
+    task->torque_corrected = 0;
+}
+
+/* What the fast ISR is to do until the next step; commanded: the operating point that follows from it. */
+static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
+{
+    task_state_t *task = &drive->task;
+    command_t command = {
+        .run = task->run_state == RUN_STATE_RUN && faults == 0U,
+        .faults = faults,
+        .fault_resets = task->fault_resets,
+    };
+    if (command.run) {
+        commanded->i = references(drive, snapshot);
+        commanded->flux = flux_table_step(&drive->motor.flux_table, commanded->i);
+        task->i_ref = commanded->i;
+        task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
+        command.target = current_control_target(&drive->motor.current_control, commanded->i, &commanded->flux);
+    } else {
+        reset_torque_path(drive);
+    }
+    command.safe = safe_state(drive, snapshot);
+    command_box_write(&drive->commands, command);
+}
+
+/* All from between the same two periods: copied again if one has come in between, for which the copying is too short to
+ * happen twice. What the paper's identification writes later in the step waits for the next one. */
+static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
+{
+    uint32_t generation;
+    do {
+        generation = drive->samples.generation;
+        exchange_barrier();
+        snapshot->sample = *sample_box_at(&drive->samples, generation);
+        snapshot->window = *window_box_at(&drive->windows);
+#if FLUXTRUE_MRAI
+        mrai_snapshot(drive, &snapshot->mrai);
+#endif
+        snapshot->psi_d_error = drive->psi_d_error;
+        snapshot->faults = drive->fast.faults;
+        exchange_barrier();
+    } while (drive->samples.generation != generation);
+    snapshot->inverter_dC = hal_temperature_inverter_dC();
+    snapshot->winding_dC = hal_temperature_winding_dC();
+}
+
+void task_1khz(drive_t *drive)
+{
+    task_state_t *task = &drive->task;
+    snapshot_t snapshot;
+    take_snapshot(drive, &snapshot);
+    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
+                         task->angle_correction);
+    const uint32_t faults = slow_monitors_step(drive, &snapshot);
+    task->run_state = supervise(drive, snapshot.faults);
+    drive_identify(drive, &snapshot);
+    drive_commission(drive, &snapshot);
+    operating_point_t commanded = snapshot.sample.point;
+    command_fast_isr(drive, &snapshot, faults, &commanded);
+    if (mrai_is_chosen(drive)) {
+        mrai_reschedule(drive, &snapshot, &commanded);
+    }
+}

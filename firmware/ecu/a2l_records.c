@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What tools must know about the values they read and write, made from the declarations themselves. The image carries
+ * no byte of it: the linker script keeps the section out of memory; tools read it from the ELF. */
+#include <stddef.h>
+
+#include "ecu/ecu.h"
+
+typedef struct {
+    char kind[8];    /* value, measure, frozen, base or step */
+    char name[40];
+    char text[80];
+    char unit[12];
+    char type[8];
+    char base[12];
+    float lo, hi;
+    uint32_t count;  /* of an array, else 0 */
+    uint32_t offset; /* from the symbol ecu; of a base and the step: from the symbol motor */
+} a2l_record_t;
+
+#define VALUE(id, low, high, si, comment) \
+    {.kind = "value", .name = #id, .text = comment, .unit = si, .type = "F32", .base = "NONE", .lo = (low), \
+     .hi = (high), .offset = offsetof(ecu_t, xcp.working) + sizeof(float) * CALIBRATION_##id},
+#define MEASURE(id, kind_of, base_of, expression, comment) \
+    {.kind = "measure", .name = #id, .text = comment, .type = #kind_of, .base = #base_of, \
+     .offset = offsetof(ecu_t, xcp.measurements.id)},
+#define FROZEN(id, kind_of, si, comment) \
+    {.kind = "frozen", .name = "freeze_" #id, .text = comment, .unit = si, .type = #kind_of, .base = "NONE", \
+     .offset = offsetof(ecu_t, freeze.id)},
+#define SAMPLES(id, base_of, comment) \
+    {.kind = "frozen", .name = "freeze_" #id, .text = comment, .type = "S16", .base = #base_of, \
+     .count = FREEZE_FRAME_SAMPLES, .offset = offsetof(ecu_t, freeze.id)},
+#define BASE(id, field, si) {.kind = "base", .name = #id, .unit = si, .offset = offsetof(motor_t, bases.field)},
+
+/* Not static: the link asks for it by name, since no code does. */
+extern const a2l_record_t a2l_records[];
+__attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
+    CALIBRATION_LIST(VALUE) MEASUREMENT_LIST(MEASURE)
+    FROZEN(frozen, U8, "", "1: a fault has frozen the frame")
+    FROZEN(time_ms, U32, "ms", "Time of the fault since the start")
+    FROZEN(fault_word, U32, "", "Faults of the drive, one bit each")
+    FROZEN(ecu_faults, U16, "", "Faults of the supervisor, one bit each")
+    FROZEN(state, U8, "", "State before the fault")
+    FROZEN(psi_f_Vs, F32, "Vs", "Identified magnet flux")
+    FROZEN(r_ohm, F32, "ohm", "Identified resistance")
+    FROZEN(oldest, U8, "", "Index of the oldest of 32 samples, a step apart")
+    FREEZE_FRAME_LIST(SAMPLES)
+    BASE(CURRENT, current_A, "A") BASE(VOLTAGE, voltage_V, "V") BASE(TORQUE, torque_Nm, "Nm")
+    {.kind = "step", .name = "step_s", .unit = "s", .offset = offsetof(motor_t, bases.step_s)},
+};

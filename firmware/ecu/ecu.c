@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ecu/ecu.h"
+
+#include "ecu/ecu_private.h"
+#include "ecu/telemetry.h"
+#include "hal/board.h"
+#include "hal/can.h"
+#include "hal/system.h"
+#include "hal/watchdog.h"
+
+#define FRAMES_PER_TASK 32 /* more than a bus of 1 Mbit/s delivers in a millisecond */
+#define SLEW_MS 40         /* full torque in so many milliseconds */
+#define JERK_MS 10         /* full slew in so many */
+#define RAMP_OUT_MS 15     /* from full torque to none, after the 30 ms of the time-out */
+#define ONE_Q30 1073741824.0F
+#define DEAD_BAND_NM 0.25F
+#define STANDSTILL Q31(0.002)
+
+/* What a millisecond changes, for a step. */
+static q31_t in_step(const step_clock_t *clock, q31_t per_ms)
+{
+    const float share = ((float)clock->step_us + (float)clock->step_ns * 1e-3F) * 1e-3F;
+    return (q31_t)(((int64_t)(int32_t)(share * ONE_Q30) * per_ms) >> 30);
+}
+
+void ecu_init(ecu_t *ecu, const motor_t *source)
+{
+    const q31_t full = source->torque_max * 65536;
+    *ecu = (ecu_t){0};
+    step_clock_start(&ecu->clock, (uint32_t)(source->bases.step_s * 1e9F + 0.5F));
+    drive_init(&ecu->drive, source);
+    xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, (uint32_t)hal_system_reset_cause());
+    const q31_t slew = in_step(&ecu->clock, full / SLEW_MS);
+    ecu->arbitration_config = (arbitrate_config_t){
+        .slew = slew,
+        .jerk = in_step(&ecu->clock, slew / JERK_MS),
+        .ramp_out = in_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
+        .dead_band = (q15_t)(DEAD_BAND_NM / source->bases.torque_Nm * 32768.0F),
+        .omega_standstill = STANDSTILL,
+    };
+}
+
+static void receive(ecu_t *ecu)
+{
+    can_frame_t frame;
+    for (int n = 0; n < FRAMES_PER_TASK && hal_can_receive(&frame); n++) {
+        if (frame.id == XCP_ID_COMMAND && !frame.extended) {
+            xcp_access_receive(&ecu->xcp, &frame);
+        } else {
+            (void)can_rx_frame(&ecu->rx, &frame);
+        }
+    }
+    can_rx_tick(&ecu->rx, ecu->clock.elapsed_us);
+}
+
+static void set_outputs(const ecu_t *ecu)
+{
+    const state_outputs_t *on = &supervisor_outputs[ecu->supervisor.state];
+    hal_board_set(BOARD_PRECHARGE, on->precharge);
+    hal_board_set(BOARD_MAIN_CONTACTOR, on->contactor);
+    hal_board_set(BOARD_DISCHARGE, on->discharge);
+    hal_board_set(BOARD_GATE_DRIVER, on->gate_driver);
+    hal_board_set(BOARD_SAFE_STATE, (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U);
+}
+
+static void ask_drive(ecu_t *ecu)
+{
+    request_t *request = &ecu->drive.request;
+    const arbitrate_in_t in = ecu_arbitration(ecu);
+    arbitrate_hold(&ecu->arbitration_config, &ecu->arbitration_state, ecu->drive.task.allowed.torque_limited);
+    request->torque_arbitrated = arbitrate_step(&ecu->arbitration_config, &ecu->arbitration_state, &in);
+    request->limits = ecu_limits(ecu);
+    request->enable = in.run;
+    request->fault_resets = ecu->supervisor.resets;
+}
+
+static void count(uint16_t *counter)
+{
+    if (*counter < UINT16_MAX) {
+        (*counter)++;
+    }
+}
+
+static void guard(ecu_t *ecu)
+{
+    if (!ecu->liveness.started) {
+        ecu->liveness.started = true;
+        hal_watchdog_start();
+    } else if (ecu->liveness.stalled_in_a_row == 0U) {
+        hal_watchdog_service();
+    } else {
+        count(&ecu->liveness.held);
+    }
+}
+
+static void send(ecu_t *ecu)
+{
+    telemetry_t telemetry;
+    can_frame_t frame;
+    telemetry_read(&ecu->drive, &telemetry);
+    ecu_telemetry(ecu, &telemetry);
+    telemetry.diagnostics.lost_frames = hal_can_lost();
+    telemetry.diagnostics.bus_off = hal_can_bus_off();
+    telemetry.diagnostics.stack_unused_bytes = hal_system_stack_unused();
+    telemetry.diagnostics.reset_cause = (uint32_t)hal_system_reset_cause();
+    can_tx_begin(&ecu->tx, ecu->clock.passed_ms);
+    for (tx_result_t r = can_tx_next(&ecu->tx, &telemetry, &frame); r != TX_NONE;
+         r = can_tx_next(&ecu->tx, &telemetry, &frame)) {
+        if (r == TX_NOT_A_NUMBER || !hal_can_send(&frame)) {
+            count(&ecu->not_sent);
+        }
+    }
+}
+
+/* Behind the cyclic frames, and only while mailboxes are free: what waits is sent a millisecond later. */
+static void send_xcp(ecu_t *ecu)
+{
+    can_frame_t frame;
+    while (xcp_access_next(&ecu->xcp, &frame) && hal_can_send(&frame)) {
+        xcp_access_sent(&ecu->xcp);
+    }
+}
+
+void ecu_task_1khz(ecu_t *ecu)
+{
+    step_clock_step(&ecu->clock);
+    receive(ecu);
+    ecu_watch(ecu);
+    const supervisor_in_t in = ecu_observe(ecu, hal_board_gate_fault());
+    supervisor_step(&ecu->supervisor, &in);
+    set_outputs(ecu);
+    ask_drive(ecu);
+    task_1khz(&ecu->drive);
+    guard(ecu);
+    xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
+    freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
+                      ecu->clock.passed_ms);
+    send(ecu);
+    send_xcp(ecu);
+}

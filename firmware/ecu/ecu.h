@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef ECU_ECU_H
+#define ECU_ECU_H
+/** The drive on a bus: receives what is asked, decides the state, arbitrates the torque, runs the drive's 1 kHz task,
+ * tells what is.
+ *   Ports call fast_isr(&ecu.drive), mrai_isr(&ecu.drive) and, instead of task_1khz(), ecu_task_1khz(&ecu).
+ *   The watchdog is served only while both interrupts advance.
+ * Source   docs/howto/can.md; docs/architecture.md
+ * Units    per unit inside, the DBC's units on the bus
+ * Errors   latched faults of drive and supervisor; told on the bus
+ * Context  ecu_init() once; ecu_task_1khz() every bases.periods_per_step periods */
+#include "ecu/arbitration.h"
+#include "drive/drive.h"
+#include "ecu/supervisor.h"
+#include "calibration/xcp_access.h"
+#include "comm/can_rx.h"
+#include "comm/can_tx.h"
+#include "signal/step_clock.h"
+
+typedef struct {
+    uint32_t periods, finished;  /* of the interrupts, at the last task */
+    uint16_t task_overruns, held; /* the watchdog was not served */
+    uint8_t late_in_a_row, stalled_in_a_row;
+    bool started;
+} liveness_t;
+
+typedef struct {
+    int32_t reference; /* voltage that the present is compared with */
+    uint32_t us;       /* for so long it has stayed near */
+} settling_t;
+
+typedef struct {
+    drive_t drive; /* first: a port that knows only the drive finds it here */
+    step_clock_t clock;
+    can_rx_t rx;
+    can_tx_t tx;
+    supervisor_t supervisor;
+    arbitrate_config_t arbitration_config;
+    arbitrate_state_t arbitration_state;
+    liveness_t liveness;
+    settling_t settling;
+    uint16_t not_sent;
+    xcp_access_t xcp;
+    freeze_frame_t freeze;
+} ecu_t;
+
+void ecu_init(ecu_t *ecu, const motor_t *source);
+void ecu_task_1khz(ecu_t *ecu);
+
+#endif

@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ecu/ecu_private.h"
+#include "drive/mrai/mrai_seam.h"
+
+#define IN_A_ROW 3U
+#define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
+#define SETTLED_BAND Q15(0.01)  /* of V_b */
+#define SETTLED_US 50000U
+#define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with switching disabled, is an offset or a broken sensor */
+#define SQRT3 1.7320508F
+
+/* DeratingReason of the DBC. */
+enum { REASON_NONE = 0, REASON_LIMITS_LOST = 7 };
+
+/* The first that applies is told. Rated torque and the reach of voltage and current are no derating. */
+static const struct {
+    uint16_t derating;
+    uint8_t reason;
+} reasons[] = {
+    {DERATING_INVERTER, 1}, {DERATING_WINDING, 2}, {DERATING_DC_LOW | DERATING_DC_HIGH, 3},
+    {DERATING_POWER, 4},    {DERATING_MAGNET, 5},  {DERATING_SPEED, 8},
+};
+
+static void count(uint16_t *counter)
+{
+    if (*counter < UINT16_MAX) {
+        (*counter)++;
+    }
+}
+
+static uint8_t in_a_row(uint8_t before, bool again)
+{
+    return again ? (uint8_t)((before < IN_A_ROW) ? before + 1U : IN_A_ROW) : 0U;
+}
+
+void ecu_watch(ecu_t *ecu)
+{
+    liveness_t *seen = &ecu->liveness;
+    const uint32_t periods = ecu->drive.samples.generation;
+    const uint32_t finished = mrai_finished(&ecu->drive);
+    const uint32_t in_step = ecu->drive.motor.bases.periods_per_step;
+    const bool late = seen->started && periods - seen->periods >= in_step + in_step / 2U;
+    const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == seen->finished;
+    seen->late_in_a_row = in_a_row(seen->late_in_a_row, late);
+    seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, periods == seen->periods || unfinished);
+    if (late) {
+        count(&seen->task_overruns);
+    }
+    seen->periods = periods;
+    seen->finished = finished;
+}
+
+static bool settled(settling_t *settling, int32_t v_dc, uint32_t elapsed_us)
+{
+    const int32_t away = v_dc - settling->reference;
+    if (away > SETTLED_BAND || away < -SETTLED_BAND) {
+        *settling = (settling_t){.reference = v_dc};
+    } else if (settling->us < SETTLED_US) {
+        settling->us += elapsed_us;
+    }
+    return settling->us >= SETTLED_US;
+}
+
+/* With switching disabled there is no current; while the bridge switches, the monitors check it. */
+static bool plausible(const drive_t *drive, const sample_t *sample)
+{
+    const dq_q15_t i = sample->point.i;
+    const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
+    return drive->samples.generation != 0U && (idle || drive->request.enable);
+}
+
+/* sqrt(3) w psi: the peak of the line voltage that the turning magnet makes. */
+static bool is_slow(const drive_t *drive, q31_t omega)
+{
+    const float v_V = SQRT3 * (float)omega / 2147483648.0F * drive->motor.bases.omega_rad_s * drive->motor.psi_f_Vs;
+    return v_V < TOUCH_SAFE_V && v_V > -TOUCH_SAFE_V;
+}
+
+static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
+{
+    const float share = torque_Nm / ecu->drive.motor.bases.torque_Nm;
+    return (share >= 1.0F) ? Q15_MAX : (share <= -1.0F) ? (q15_t)-Q15_MAX : (q15_t)(share * 32767.0F);
+}
+
+static bool limits_lost(const ecu_t *ecu)
+{
+    return ecu->rx.limits_channel.seen && !ecu->rx.limits_channel.alive;
+}
+
+static uint32_t derating_reason(const ecu_t *ecu)
+{
+    if (limits_lost(ecu)) {
+        return REASON_LIMITS_LOST;
+    }
+    for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
+        if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
+            return reasons[n].reason;
+        }
+    }
+    return REASON_NONE;
+}
+
+static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
+{
+    const bases_t *b = &ecu->drive.motor.bases;
+    const float share = 1000.0F * power_kW / (1.5F * b->voltage_V * b->current_A);
+    return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
+}
+
+/* The torque limits are arbitrated: they move with slew. Lost battery limits take the torque away by the same ramp;
+ * until it has ended the last ones hold, else the torque would first rise to what the ramp begins with. */
+torque_limits_t ecu_limits(const ecu_t *ecu)
+{
+    torque_limits_t limits = limits_lost(ecu) ? ecu->drive.request.limits : TORQUE_LIMITS_NONE;
+    if (ecu->rx.limits_channel.alive) {
+        limits.power_drive = power_per_unit(ecu, ecu->rx.limits.drive_kW);
+        limits.power_regen = power_per_unit(ecu, ecu->rx.limits.regen_kW);
+    }
+    return limits;
+}
+
+supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
+{
+    const drive_t *drive = &ecu->drive;
+    const bus_command_t *command = &ecu->rx.command;
+    const sample_t sample = sample_box_read(&drive->samples);
+    const float v_dc_V = (float)sample.v_dc / 32768.0F * drive->motor.bases.voltage_V;
+    const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
+    return (supervisor_in_t){
+        .drive_faults = drive->fast.faults,
+        .alive = ecu->rx.command_channel.alive,
+        .failed = ecu->rx.command_channel.failed,
+        .torque_mode = command->mode == COMMAND_MODE_TORQUE,
+        .current_mode = command->mode == COMMAND_MODE_CURRENT,
+        .enable = command->enable,
+        .reset = command->fault_reset,
+        .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
+        .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
+        .dc_in_range = sample.v_dc >= drive->motor.monitor.v_min && sample.v_dc <= drive->motor.monitor.v_max,
+        .dc_settled = settled(&ecu->settling, sample.v_dc, ecu->clock.elapsed_us),
+        .dc_safe = v_dc_V < TOUCH_SAFE_V,
+        .sensors_plausible = plausible(drive, &sample),
+        .slow = is_slow(drive, sample.point.omega),
+        .derated = derating_reason(ecu) != REASON_NONE,
+        .gate_fault = gate_fault,
+        .task_late = ecu->liveness.late_in_a_row >= IN_A_ROW,
+        .stalled = ecu->liveness.stalled_in_a_row >= IN_A_ROW,
+        .elapsed_us = ecu->clock.elapsed_us,
+    };
+}
+
+arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
+{
+    const bus_command_t *command = &ecu->rx.command;
+    const supervisor_t *supervisor = &ecu->supervisor;
+    /* Never more than the machine gives: a ramp to zero would first have to come down from beyond. */
+    const q15_t most = limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor.torque_max;
+    return (arbitrate_in_t){
+        .torque_requested = per_unit(ecu, command->torque_requested_Nm),
+        .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, most),
+        .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, most),
+        .omega = sample_box_read(&ecu->drive.samples).point.omega,
+        .run = supervisor_outputs[supervisor->state].run,
+        .stop = !supervisor->enabled,
+        .drop = !ecu->rx.command_channel.alive || supervisor->faults != 0U,
+    };
+}
+
+void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
+{
+    const can_rx_t *rx = &ecu->rx;
+    const supervisor_t *s = &ecu->supervisor;
+    diagnostics_t *d = &telemetry->diagnostics;
+    telemetry->state = s->state;
+    telemetry->ecu_faults = s->faults;
+    telemetry->first_fault = s->first_fault;
+    telemetry->fault_count = s->fault_count;
+    telemetry->refused_reason = s->refused;
+    telemetry->refused_count = s->refused_count;
+    telemetry->derating_reason = derating_reason(ecu);
+    d->crc_errors = rx->count[RX_CRC];
+    d->repeated = rx->count[RX_REPEATED];
+    d->jumps = rx->count[RX_JUMP];
+    d->length_errors = rx->count[RX_LENGTH];
+    d->range_errors = rx->count[RX_RANGE];
+    d->id_errors = rx->count[RX_ID];
+    d->ignored = rx->count[RX_IGNORED];
+    d->time_outs = rx->time_outs;
+    d->accepted = rx->accepted;
+    d->skipped = rx->skipped;
+    d->not_sent = ecu->not_sent;
+    d->task_overruns = ecu->liveness.task_overruns;
+    d->watchdog_held = ecu->liveness.held;
+}

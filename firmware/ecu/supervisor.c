@@ -1,0 +1,171 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ecu/supervisor.h"
+
+#define SELF_TEST_MS 50U         /* the least time in init */
+#define SELF_TEST_TIME_OUT_MS 500U
+#define PRECHARGE_TIME_OUT_MS 2000U
+#define DISCHARGE_TIME_OUT_MS 5000U
+#define FORGETTING_STEPS 3U /* until the drive has done a reset */
+#define STATE_TIME_MAX_US 60000000U /* far beyond every time-out */
+#define FIRST_ECU_FAULT 33U
+
+static bool refuse(supervisor_t *s, refused_t reason)
+{
+    s->refused = reason;
+    s->refused_count = (s->refused_count < UINT8_MAX) ? (uint8_t)(s->refused_count + 1U) : s->refused_count;
+    return false;
+}
+
+/* Whether an edge of enable may close the gates. */
+static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
+{
+    if (in->current_mode) {
+        return refuse(s, REFUSED_MODE);
+    }
+    if (s->faults != 0U || in->drive_faults != 0U) {
+        return refuse(s, REFUSED_FAULT);
+    }
+    if (s->state != STATE_READY || !in->torque_mode) {
+        return refuse(s, REFUSED_NOT_READY);
+    }
+    if (!in->dc_in_range) {
+        return refuse(s, REFUSED_DC_VOLTAGE);
+    }
+    if (!in->sensors_plausible) {
+        return refuse(s, REFUSED_SENSOR);
+    }
+    if (!in->torque_requested_is_zero) {
+        return refuse(s, REFUSED_TORQUE_NOT_ZERO);
+    }
+    s->refused = REFUSED_NOTHING;
+    return true;
+}
+
+static void follow_enable(supervisor_t *s, const supervisor_in_t *in)
+{
+    if (!in->alive) {
+        if (s->enabled) {
+            (void)refuse(s, REFUSED_TIMED_OUT);
+        }
+        s->enabled = false;
+        s->enable_seen = true; /* what comes back must show enable off first */
+        return;
+    }
+    if (in->enable && !s->enable_seen) {
+        s->enabled = grant_enable(s, in);
+    } else if (!in->enable || !in->torque_mode) {
+        s->enabled = false;
+    }
+    s->enable_seen = in->enable;
+}
+
+static uint32_t bit_if(bool condition, uint32_t bit)
+{
+    return condition ? bit : 0U;
+}
+
+static bool too_long(const supervisor_t *s, ecu_state_t state, uint32_t most_ms)
+{
+    return s->state == state && s->us > most_ms * 1000U;
+}
+
+static uint16_t causes(const supervisor_t *s, const supervisor_in_t *in)
+{
+    const uint32_t now = bit_if(in->failed, ECU_FAULT_PROTECTION) | bit_if(in->gate_fault, ECU_FAULT_GATE) |
+                         bit_if(in->task_late, ECU_FAULT_TASK) | bit_if(in->stalled, ECU_FAULT_STALL) |
+                         bit_if(too_long(s, STATE_INIT, SELF_TEST_TIME_OUT_MS), ECU_FAULT_SELF_TEST) |
+                         bit_if(too_long(s, STATE_PRECHARGE, PRECHARGE_TIME_OUT_MS), ECU_FAULT_PRECHARGE) |
+                         bit_if(too_long(s, STATE_DISCHARGE, DISCHARGE_TIME_OUT_MS), ECU_FAULT_DISCHARGE);
+    return (uint16_t)now;
+}
+
+static uint8_t lowest_bit(uint32_t bits)
+{
+    uint8_t bit = 0;
+    for (; (bits & 1U) == 0U; bits >>= 1) {
+        bit++;
+    }
+    return bit;
+}
+
+/* Notes what is new; of several in one step the drive's lowest bit is the first. */
+static void note(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
+{
+    if (new_drive == 0U && new_ecu == 0U) {
+        return;
+    }
+    s->fault_count = (s->fault_count < UINT8_MAX) ? (uint8_t)(s->fault_count + 1U) : s->fault_count;
+    if (s->first_fault == 0U) {
+        s->first_fault =
+            (uint8_t)((new_drive != 0U) ? 1U + lowest_bit(new_drive) : FIRST_ECU_FAULT + lowest_bit(new_ecu));
+    }
+}
+
+static void latch(supervisor_t *s, const supervisor_in_t *in)
+{
+    const uint16_t now = causes(s, in);
+    const bool forgetting = s->forgetting > 0U;
+    note(s, forgetting ? 0U : in->drive_faults & ~s->drive_faults_seen, now & ~(uint32_t)s->faults);
+    s->drive_faults_seen = forgetting ? 0U : in->drive_faults;
+    s->forgetting = forgetting ? (uint8_t)(s->forgetting - 1U) : (uint8_t)0;
+    s->faults = (uint16_t)(s->faults | now);
+}
+
+static void follow_reset(supervisor_t *s, const supervisor_in_t *in)
+{
+    const bool edge = in->alive && in->reset && !s->reset_seen;
+    s->reset_seen = in->alive && in->reset;
+    if (!edge) {
+        return;
+    }
+    if (in->enable || s->state != STATE_FAULT) {
+        (void)refuse(s, REFUSED_RESET);
+        return;
+    }
+    s->resets++;
+    s->faults = 0; /* what is still there is new again */
+    s->first_fault = 0;
+    s->forgetting = FORGETTING_STEPS;
+}
+
+static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
+{
+    const bool faulted = s->faults != 0U || in->drive_faults != 0U;
+    const bool tripped = in->drive_faults != 0U || (s->faults & (ECU_FAULT_GATE | ECU_FAULT_STALL)) != 0U;
+    const bool may_discharge = !in->dc_safe && (s->faults & ECU_FAULT_DISCHARGE) == 0U;
+    return bit_if(in->sensors_plausible && s->us > SELF_TEST_MS * 1000U, WHEN_SELF_TEST_PASSED) |
+           bit_if(tripped, WHEN_TRIPPED) | bit_if(faulted, WHEN_FAULTED) | bit_if(!faulted, WHEN_HEALTHY) |
+           bit_if(in->alive && in->torque_mode, WHEN_ON) |
+           bit_if(in->alive && !in->torque_mode && !in->current_mode, WHEN_OFF) |
+           bit_if(in->dc_in_range && in->dc_settled, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
+           bit_if(may_discharge, WHEN_DANGEROUS) | bit_if(s->enabled, WHEN_ENABLED) |
+           bit_if(!s->enabled && in->torque_arbitrated_is_zero, WHEN_STOPPED) |
+           bit_if(in->torque_arbitrated_is_zero, WHEN_NO_TORQUE) |
+           bit_if(in->derated, WHEN_DERATED) | bit_if(!in->derated, WHEN_FULL) |
+           bit_if(in->slow, WHEN_SLOW) |
+           bit_if((s->faults & ECU_FAULT_DISCHARGE) != 0U, WHEN_NOT_DISCHARGING);
+}
+
+static void move(supervisor_t *s, uint32_t now)
+{
+    for (uint32_t n = 0; n < supervisor_transitions; n++) {
+        const transition_t *row = &supervisor_table[n];
+        if (row->from == s->state && (row->when & now) == row->when) {
+            s->state = row->to;
+            s->us = 0;
+            return;
+        }
+    }
+}
+
+void supervisor_step(supervisor_t *supervisor, const supervisor_in_t *in)
+{
+    supervisor->us += (supervisor->us < STATE_TIME_MAX_US) ? in->elapsed_us : 0U;
+    follow_reset(supervisor, in);
+    latch(supervisor, in);
+    follow_enable(supervisor, in);
+    move(supervisor, conditions(supervisor, in));
+    if (!supervisor_outputs[supervisor->state].run && supervisor->state != STATE_READY) {
+        supervisor->enabled = false;
+    }
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ecu/supervisor.h"
+
+/* The first row that fits is taken: what is urgent comes first. docs/howto/can.md draws this table. */
+const transition_t supervisor_table[] = {
+    {STATE_INIT, WHEN_FAULTED, STATE_FAULT},
+    {STATE_INIT, WHEN_SELF_TEST_PASSED, STATE_STANDBY},
+    {STATE_STANDBY, WHEN_FAULTED, STATE_FAULT},
+    {STATE_STANDBY, WHEN_ON, STATE_PRECHARGE},
+    {STATE_PRECHARGE, WHEN_FAULTED, STATE_FAULT},
+    {STATE_PRECHARGE, WHEN_OFF, STATE_DISCHARGE},
+    {STATE_PRECHARGE, WHEN_CHARGED, STATE_READY},
+    {STATE_READY, WHEN_TRIPPED, STATE_SAFE},
+    {STATE_READY, WHEN_FAULTED, STATE_FAULT},
+    {STATE_READY, WHEN_OFF | WHEN_SLOW, STATE_DISCHARGE},
+    {STATE_READY, WHEN_ENABLED, STATE_RUN},
+    {STATE_RUN, WHEN_TRIPPED, STATE_SAFE},
+    {STATE_RUN, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_FAULT},
+    {STATE_RUN, WHEN_STOPPED, STATE_READY},
+    {STATE_RUN, WHEN_DERATED, STATE_DERATE},
+    {STATE_DERATE, WHEN_TRIPPED, STATE_SAFE},
+    {STATE_DERATE, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_FAULT},
+    {STATE_DERATE, WHEN_STOPPED, STATE_READY},
+    {STATE_DERATE, WHEN_FULL, STATE_RUN},
+    {STATE_SAFE, WHEN_SLOW, STATE_FAULT},
+    {STATE_FAULT, WHEN_HEALTHY, STATE_STANDBY},
+    {STATE_FAULT, WHEN_OFF | WHEN_DANGEROUS, STATE_DISCHARGE},
+    {STATE_DISCHARGE, WHEN_DISCHARGED | WHEN_FAULTED, STATE_FAULT},
+    {STATE_DISCHARGE, WHEN_DISCHARGED, STATE_STANDBY},
+    {STATE_DISCHARGE, WHEN_NOT_DISCHARGING, STATE_FAULT},
+};
+
+const uint32_t supervisor_transitions = sizeof supervisor_table / sizeof supervisor_table[0];
+
+const state_outputs_t supervisor_outputs[STATES] = {
+    [STATE_PRECHARGE] = {.precharge = true},
+    [STATE_READY] = {.contactor = true, .gate_driver = true},
+    [STATE_RUN] = {.contactor = true, .gate_driver = true, .run = true},
+    [STATE_DERATE] = {.contactor = true, .gate_driver = true, .run = true},
+    [STATE_SAFE] = {.contactor = true, .gate_driver = true},
+    [STATE_DISCHARGE] = {.discharge = true},
+};

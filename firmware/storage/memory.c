@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "storage/memory.h"
+
+#include <string.h>
+
+#include "signal/crc32.h"
+
+#define VERSION 3U /* of record_t */
+#define MISMATCH_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
+
+/* No padding: the store's checksum runs over its bytes. */
+typedef struct {
+    identify_record_t identified;
+    compensation_t compensation;
+    int32_t trim;
+} record_t;
+
+uint32_t memory_layout(const motor_t *m)
+{
+    const uint32_t version[2] = {VERSION, (uint32_t)sizeof(record_t)};
+    uint32_t crc = crc32_update(CRC32_START, version, sizeof version);
+    crc = crc32_update(crc, m->name, (uint32_t)strlen(m->name));
+    crc = crc32_update(crc, &m->bases, sizeof m->bases);
+    return ~crc32_update(crc, m->identify.sigma, sizeof m->identify.sigma);
+}
+
+void memory_recall(memory_t *memory, drive_t *drive)
+{
+    record_t record;
+    *memory = (memory_t){0};
+    if (store_load(memory_layout(&drive->motor), &record, sizeof record) == STORE_OK) {
+        memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
+                           drive_recall(drive, &record.identified);
+        if (memory->recalled) {
+            drive_retrim(drive, record.trim);
+        }
+    }
+}
+
+/* The robust identification counts steps of the task. */
+static uint32_t in_steps(const drive_t *drive, uint32_t ms)
+{
+    return (uint32_t)((float)ms * 1e-3F / drive->motor.bases.step_s + 0.5F);
+}
+
+static bool at_rest(const drive_t *drive)
+{
+    return drive->task.run_state == RUN_STATE_OFF && drive->fast.faults == 0U &&
+           command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT;
+}
+
+/* Counters wrap after 49 days: only their differences count. */
+static bool is_due(const memory_t *memory, const drive_t *drive, uint32_t now)
+{
+    return memory->has_run && now - memory->rest_since >= in_steps(drive, MEMORY_REST_MS) &&
+           (!memory->has_tried || now - memory->tried_at >= in_steps(drive, MEMORY_INTERVAL_MS)) &&
+           drive->task.identify.mismatch_share <= MISMATCH_MAX;
+}
+
+bool memory_background(memory_t *memory, const drive_t *drive)
+{
+    const uint32_t now = drive->task.identifications;
+    if (!at_rest(drive)) {
+        memory->has_run = memory->has_run || drive->task.run_state == RUN_STATE_RUN;
+        memory->rest_since = now;
+        return false;
+    }
+    if (!is_due(memory, drive, now)) {
+        return false;
+    }
+    const record_t record = {drive_identified_record(drive), drive->task.compensation, drive->task.trim.trim};
+    const bool saved = store_save(memory_layout(&drive->motor), &record, sizeof record);
+    memory->has_tried = true;
+    memory->tried_at = now;
+    memory->has_run = !saved;
+    memory->saves += saved ? 1U : 0U;
+    memory->failures += saved ? 0U : 1U;
+    return saved;
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef STORAGE_MEMORY_H
+#define STORAGE_MEMORY_H
+/** Keeps what the drive has learnt over a power cycle, in the store's two slots.
+ *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that the values are counted in:
+ *     a record of other firmware, another motor or other priors is not found
+ *   a save needs a run since the last one, MEMORY_REST_MS of rest (switching disabled, nothing latched), parameters
+ *     that agree with the model, and MEMORY_INTERVAL_MS since the last save; the first one after a start comes at once
+ * Source   docs/decisions/007-store.md
+ * Units    ms are counted in steps of the robust identification, which alone learns what is kept
+ * Errors   a memory that is empty, damaged or foreign leaves the priors; a save that fails is counted and tried again
+ *          after the interval, the record of before stays
+ * Context  memory_recall(): after drive_init(), before the interrupts. memory_background(): the port's idle loop, below
+ *          every interrupt. A port without a driver for hal/nvm.h calls neither */
+#include "drive/drive.h"
+#include "storage/store.h"
+
+#define MEMORY_REST_MS 100U
+#define MEMORY_INTERVAL_MS 300000U
+
+typedef struct {
+    uint32_t saves, failures;
+    uint32_t rest_since, tried_at; /* counts of the drive's identifications */
+    bool recalled;                 /* a record was found and taken */
+    bool has_run, has_tried;       /* since the last save; since the start */
+} memory_t;
+
+uint32_t memory_layout(const motor_t *m);
+void memory_recall(memory_t *memory, drive_t *drive);
+/** True: a record has been saved in this call. */
+bool memory_background(memory_t *memory, const drive_t *drive);
+
+#endif

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef STORAGE_STORE_H
+#define STORAGE_STORE_H
+/** One record that survives a power cycle: what the drive has learnt.
+ *   Each slot: header {layout, size, sequence, crc}, then the record. A save erases and writes the slot that does not
+ *   hold the newest record, the header last, so that a cut at any byte leaves the record of before or the new one.
+ * Source   docs/decisions/007-store.md
+ * Range    size <= STORE_RECORD_MAX; layout names the record's meaning: a record of another layout is not found
+ * Errors   store_load(): STORE_EMPTY, nothing was ever saved, or under another layout; STORE_DAMAGED, records are there
+ *          but none is intact; the caller's record is touched only by STORE_OK. store_save(): false, the memory refused
+ *          or did not keep what was written; the record of before is still the valid one
+ * Context  background, below every interrupt; the caller copies a consistent record first */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "hal/nvm.h"
+
+#define STORE_HEADER_SIZE 16U
+#define STORE_RECORD_MAX (HAL_NVM_SLOT_SIZE - STORE_HEADER_SIZE)
+
+typedef enum { STORE_OK = 0, STORE_EMPTY = 1, STORE_DAMAGED = 2 } store_result_t;
+
+store_result_t store_load(uint32_t layout, void *record, uint32_t size);
+bool store_save(uint32_t layout, const void *record, uint32_t size);
+
+#endif

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef TYPES_IDENTIFICATION_H
+#define TYPES_IDENTIFICATION_H
+/** What an identification knows about the machine, whichever law found it.
+ *   psi_delta  magnet flux minus the tables';  r_delta  resistance minus that at 20 C
+ *   psi_d_error  d-axis flux minus the tables' at the present current: what current control feeds forward
+ *   torque_estimated  air-gap torque, mean over the last step;  torque_variance_q30  of it
+ *   lq_error  scale of psi_q minus one
+ * Source   docs/theory/identification.md (ID-15) ... (ID-18); docs/theory/mrai.md
+ * Units    per unit of the bases in types/bases.h
+ * Range    confidence and qualities 0 ... 1; torque_variance_q30 Q30, Q31_MAX: the law does not state one
+ * Errors   clamped: the parameter rests on its limit, what stands here is the limit
+ * Context  written by the 1 kHz task once per step */
+#include <stdbool.h>
+
+#include "fx/q.h"
+
+typedef struct {
+    q31_t psi_delta, r_delta;
+    q31_t lq_error;
+    int32_t torque_variance_q30;
+    q15_t psi_d_error;
+    q15_t torque_estimated;
+    q15_t confidence;
+    q15_t psi_quality, r_quality;
+    bool psi_clamped, r_clamped;
+} identification_t;
+
+#endif

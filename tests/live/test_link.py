@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page's bus side before the virtual ECU, without a browser: the test lets time pass, 40 ms at a time."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cantools.database
+import numpy as np
+import pytest
+from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.live.commander import Commander, Wish
+from fluxtrue_tools.live.link import Link, Recorder
+from fluxtrue_tools.live.pace import InStep, SimulatedTime
+from fluxtrue_tools.live.samples import Samples
+from fluxtrue_tools.live.stand import Stand
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+from fluxtrue_tools.vecu.stepped import SteppedBus, connect
+
+BATCH_S = 0.04
+MOST_S = 5.0  # of simulated time: any change of state takes less
+
+
+class Drive:
+    """What the server has, with the test in the place of pages and server."""
+
+    def __init__(self, ecu: VirtualEcu, folder: Path) -> None:
+        database = cantools.database.load_file(DBC)
+        self.channel, bus = Channel(HOST, ecu.bench_port), connect(ecu.can_port)
+        self.commander, self.samples, self.in_step = Commander(132.0), Samples(database), InStep()
+        pace = SimulatedTime(SteppedBus(bus, self.channel.another()), [self.samples], self.in_step)
+        self.stand = Stand(self.channel.another())
+        recorder = Recorder(folder, DBC)
+        self.link = Link(bus, pace, database, self.commander, self.samples, recorder, self.stand)
+        assert self.in_step.due()
+
+    def pass_batch(self, alive: bool = True) -> None:
+        """40 ms; the hand is at the slider at their beginning."""
+        if alive:
+            self.link.act(lambda commander, now: commander.hand(now))
+        self.in_step.done()
+        assert self.in_step.due(), self.link.lost
+
+    def until(self, true: Callable[[], bool], alive: bool = True) -> None:
+        for _ in range(round(MOST_S / BATCH_S)):
+            if true():
+                return
+            self.pass_batch(alive)
+        pytest.fail(f"after {MOST_S} s: state {self.samples.state()}, {self.commander}")
+
+    def press(self, wish: Wish) -> None:
+        self.link.act(lambda commander, now: commander.ask(wish, now))
+
+    def torques(self) -> np.ndarray:
+        """Times and what the inverter says it has been asked for, since the last call."""
+        columns = self.samples.take()["INV_Status"]
+        return np.array([columns["t"], columns["TorqueCommanded"]])
+
+    def close(self) -> None:
+        self.in_step.release()
+        self.link.close()
+        self.stand.close()
+        self.channel.close()
+
+
+@pytest.fixture
+def driving(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Drive]:
+    """At 2000 rpm, 60 N·m."""
+    with VirtualEcu(Path(request.config.getoption("--vecu"))) as ecu:
+        drive = Drive(ecu, tmp_path)
+        for wish, state in ((Wish.READY, "ready"), (Wish.DRIVE, "run")):
+            drive.press(wish)
+            drive.until(lambda state=state: drive.samples.state() == state)
+        drive.stand.turn("speed_rpm", 2000.0)
+        drive.link.act(lambda commander, now: commander.slide(60.0, now))
+        drive.until(lambda: abs(drive.stand.truth_Nm() - 60.0) < 1.0)
+        yield drive
+        drive.close()
+
+
+def test_a_gap_in_the_commands_takes_the_wish_back_and_one_press_on_enable_goes_on(driving: Drive) -> None:
+    driving.channel.run(60.0)  # time passes, and nobody sends a command
+    driving.until(lambda: driving.samples.state() == "ready")
+    driving.pass_batch()
+    assert (driving.commander.wish, driving.commander.target_Nm) == (Wish.READY, 0.0)
+    assert "The inverter stopped: command timed out. No command for 70 ms" in driving.commander.stopped
+    for _ in range(25):
+        driving.pass_batch()
+    assert driving.samples.state() == "ready"
+    driving.press(Wish.DRIVE)
+    driving.until(lambda: driving.samples.state() == "run")
+    assert driving.commander.stopped == ""
+
+
+def test_a_hand_that_is_gone_keeps_its_torque_for_300_ms_and_loses_it_by_a_ramp(driving: Drive) -> None:
+    driving.pass_batch()
+    gone_s = driving.samples.newest_s
+    driving.link.act(lambda commander, now: commander.hand(now))
+    driving.torques()
+    driving.until(lambda: driving.samples.newest_s > gone_s + 1.0, alive=False)
+    times, torques = driving.torques()
+    # The status comes each 10 ms and tells the command that came up to 10 ms before it.
+    held = torques[times < gone_s + 0.3]
+    assert abs(held - 60.0).max() < 0.1
+    assert abs(torques[times > gone_s + 0.3 + 60.0 / 150.0 + 0.03]).max() < 0.1
+    ramp = torques[(times > gone_s + 0.33) & (times < gone_s + 0.68)]
+    assert np.diff(ramp) == pytest.approx(-1.5, abs=0.11)
+    assert driving.samples.state() == "ready"
+    assert "closed or silent for 0.3 s" in driving.commander.stopped
+
+
+def test_closing_the_link_while_it_drives_ramps_the_torque_out_first(driving: Drive) -> None:
+    driving.torques()
+    driving.in_step.release()
+    driving.link.close()
+    _, torques = driving.torques()
+    assert driving.commander.torque_requested_Nm == 0.0
+    assert torques[-1] < 1.6  # the answer to the last command may not have been heard
+    assert np.diff(torques).min() >= -1.61
+
+
+def test_a_virtual_ecu_that_ends_is_told_and_nothing_hangs(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    with VirtualEcu(Path(request.config.getoption("--vecu"))) as ecu:
+        drive = Drive(ecu, tmp_path)
+    drive.in_step.release()
+    drive.link._thread.join()
+    assert "bench" in drive.link.lost
+    drive.close()

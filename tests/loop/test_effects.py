@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keys without effect are refused, and only those: what is refused changes nothing, what is taken changes something."""
+
+import numpy as np
+import pytest
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim import check, effects
+from fluxtrue_tools.sim.library import Loop, LoopError
+from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.sim.run import simulate
+from fluxtrue_tools.sim.scenario import Scenario, parse
+
+HEAD = 'motor = "hsm1"\nduration_s = 0.06\n'
+PROFILE = "[profile]\ntorque_Nm = 60\nspeed_rpm = 2500\n"
+
+# What is added, the key that is named, what makes the same key effective.
+CASES = [
+    ("[plant]\nideal_inverter = true\ndead_time_s = 3e-6", "plant.dead_time_s",
+     "[plant]\nideal_inverter = false\ndead_time_s = 3e-6"),
+    ("[plant]\nideal_inverter = true\ndevice_drop_V = 2", "plant.device_drop_V", "[plant]\ndevice_drop_V = 2"),
+    ("[plant]\nvdc_ripple_hz = 300", "plant.vdc_ripple_hz", "[plant]\nvdc_ripple_hz = 300\nvdc_ripple_V = 5"),
+    ("[plant]\nvdc_ripple_V = 5", "plant.vdc_ripple_V", "[plant]\nvdc_ripple_hz = 100\nvdc_ripple_V = 5"),
+    ("[plant]\nangle_h1_phase = 1", "plant.angle_h1_phase", "[plant]\nangle_h1_phase = 1\nangle_h1_rad = 0.01"),
+    ("[plant]\nangle_h2_phase = 1", "plant.angle_h2_phase", "[plant]\nangle_h2_phase = 1\nangle_h2_rad = 0.01"),
+    ("[plant]\nresolver_pole_pairs = 3", "plant.resolver_pole_pairs",
+     "[plant]\nresolver_pole_pairs = 3\nangle_h2_rad = 0.01"),
+    ("[plant]\nrotor_C = 90", "plant.rotor_C", "[plant]\nrotor_C = 90\nmagnet_temp_coeff_per_K = -1e-3"),
+    ("[plant]\nmagnet_temp_coeff_per_K = -1e-3", "plant.magnet_temp_coeff_per_K",
+     "[plant]\nmagnet_temp_coeff_per_K = -1e-3\n[[event]]\nt = 0.03\nset = { 'plant.rotor_C' = 90 }"),
+    ("[plant]\nr_temp_coeff_per_K = 0.005", "plant.r_temp_coeff_per_K",
+     "winding_C = 90\n[plant]\nr_temp_coeff_per_K = 0.005"),
+    ("[plant]\nmagnet_step_keeps_current = true", "plant.magnet_step_keeps_current",
+     "magnet_scale = [[0, 1], [0.03, 1], [0.03, 0.9]]\n[plant]\nmagnet_step_keeps_current = true"),
+    ("[mechanics]\ninertia_kgm2 = 0.1", "mechanics.inertia_kgm2", "[mechanics]\nmode = 'inertia'\ninertia_kgm2 = 0.1"),
+    ("load_Nm = 5", "profile.load_Nm", "load_Nm = 5\n[mechanics]\nmode = 'inertia'"),
+    ("vdc_V = [[0, 350], [0.06, 350], [0.07, 300]]", "profile.vdc_V", "vdc_V = [[0, 350], [0.05, 350], [0.07, 300]]"),
+    ("[controller]\nflux_bandwidth_rad_s = 90", "controller.flux_bandwidth_rad_s",
+     "[controller]\nflux_bandwidth_rad_s = 90\nidentification_mode = 'paper'"),
+    ("[controller]\nresistance_bandwidth_rad_s = 90", "controller.resistance_bandwidth_rad_s", None),
+    ("[controller]\nobserver_m = 2.5", "controller.observer_m",
+     "[controller]\nobserver_m = 2.5\nidentification_mode = 'paper'"),
+    ("[[event]]\nt = 0.03\nset = { 'plant.theta_m_rad' = 1 }", "event.0.set.plant.theta_m_rad",
+     "[plant]\ntheta_m_rad = 1"),
+    ("[[event]]\nt = 0.03\nset = { 'plant.seed' = 9 }", "event.0.set.plant.seed", None),
+]  # fmt: skip
+IDS = [key for _, key, _ in CASES]
+
+
+def text_of(added: str) -> str:
+    return HEAD + PROFILE + added + "\n"
+
+
+def bits(scenario: Scenario, motor: Motor) -> np.ndarray:
+    return simulate(scenario, motor).rows
+
+
+@pytest.mark.parametrize(("added", "key", "_"), CASES, ids=IDS)
+def test_a_key_without_effect_is_refused_by_name(added: str, key: str, _: str | None) -> None:
+    with pytest.raises(FluxtrueError, match=rf"^s\.toml: {key}: (has no effect here|.* never approached)") as refusal:
+        parse(text_of(added), "s.toml")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("added", "key", "_"), CASES, ids=IDS)
+def test_what_is_refused_would_not_have_changed_a_bit(
+    added: str, key: str, _: str | None, hsm1: Motor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(effects, "check", lambda *_: None)
+    whole = text_of(added)
+    lines = [line for line in whole.splitlines() if not line.startswith(key.rsplit(".", 1)[1])]
+    without = parse("\n".join(lines).split("[[event]]")[0], "s.toml")
+    assert np.array_equal(bits(parse(whole, "s.toml"), hsm1), bits(without, hsm1))
+
+
+@pytest.mark.parametrize(("key", "effective"), [(k, e) for _, k, e in CASES if e], ids=[k for _, k, e in CASES if e])
+def test_where_it_has_an_effect_the_key_is_taken(key: str, effective: str, hsm1: Motor) -> None:
+    whole = text_of(effective)
+    name = key.rsplit(".", 1)[1]
+    lines = [line for line in whole.splitlines() if not line.startswith(name)]
+    with_key = bits(parse(whole, "s.toml"), hsm1)
+    assert not np.array_equal(with_key, bits(_parsed_without_check("\n".join(lines)), hsm1))
+
+
+def _parsed_without_check(text: str) -> Scenario:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(effects, "check", lambda *_: None)
+        return parse(text, "s.toml")
+
+
+@pytest.mark.parametrize("name", effects.MAP_INSTEAD)
+def test_constants_on_a_machine_with_a_map_are_refused(name: str, hsm1: Motor, paper: Motor) -> None:
+    event = f"[[event]]\nt = 0.01\nset = {{ 'plant.{name}' = 1e-3 }}"
+    for added, key in ((f"[plant]\n{name} = 1e-3", f"plant.{name}"), (event, f"event.0.set.plant.{name}")):
+        with pytest.raises(FluxtrueError, match=f"^s.toml: {key}: has no effect here: the motor has a flux map"):
+            simulate(parse(text_of(added), "s.toml"), hsm1, where="s.toml")
+    changed = parse(text_of(f"[plant]\n{name} = {1.2 * paper.plant[name]}"), "s.toml")
+    assert not np.array_equal(bits(changed, paper), bits(parse(text_of(""), "s.toml"), paper))
+
+
+def test_cross_saturation_of_a_machine_with_constants_is_refused(hsm1: Motor, paper: Motor) -> None:
+    scenario = parse(text_of("[plant]\ncross_saturation_scale = 1.5"), "s.toml")
+    with pytest.raises(FluxtrueError, match="cross_saturation_scale: has no effect here: the motor has no flux map"):
+        simulate(scenario, paper)
+    assert not np.array_equal(bits(scenario, hsm1), bits(parse(text_of(""), "s.toml"), hsm1))
+
+
+def test_every_value_is_checked_before_the_first_period(hsm1: Motor, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("a period was simulated")
+
+    monkeypatch.setattr(Loop, "run", never)
+    late = [
+        ("torque_Nm = [[0, 0], [100, 500]]",
+         "profile.torque_Nm reaches 500 N·m at t = 100 s, allowed: -132 to 132 N·m"),
+        ("vdc_V = [[0, 350], [99, -1]]", "profile.vdc_V reaches -1 V at t = 99 s, allowed: above 0 V"),
+        ("[[event]]\nt = 99\nset = { dead_time_compensation = 3 }",
+         "event.0.set.dead_time_compensation = 3, allowed: 0 to 1"),
+        ("[[event]]\nt = 99\nset = { 'plant.adc_bits' = 30 }",
+         "event.0.set.plant.adc_bits = 30, allowed: from 1 and below 25"),
+        ("[[event]]\nt = 99\nset = { enabel = 1 }", "event.0.set.enabel = 1: no such name, allowed: enable"),
+    ]  # fmt: skip
+    for added, message in late:
+        text = 'motor = "hsm1"\nduration_s = 100.5\nrecord_every_s = 0.1\n[profile]\n' + added
+        with pytest.raises(FluxtrueError) as refusal:
+            simulate(parse(text, "s.toml"), hsm1, where="s.toml")
+        assert str(refusal.value).startswith(f"s.toml: {message}"), refusal.value
+
+
+def test_the_range_that_a_message_gives_is_the_range_that_is_taken(hsm1: Motor) -> None:
+    with Loop(hsm1.library, hsm1.plant, hsm1.flux_map) as loop:
+        for name in ("observer_m", "torque_requested_Nm", "plant.dead_time_s", "plant.vdc_V", "inverter_C"):
+            found = check.limits(loop, name)
+            for edge, taken, outwards in ((found.low, found.takes_low, -1), (found.high, found.takes_high, 1)):
+                if not np.isfinite(edge):
+                    continue
+                assert _takes(loop, name, edge) == taken, (name, edge)
+                assert not _takes(loop, name, edge + outwards * 1e-4 * max(abs(edge), 1e-3)), (name, edge)
+
+
+def _takes(loop: Loop, name: str, value: float) -> bool:
+    try:
+        loop.set(name, value)
+    except LoopError:
+        return False
+    return True
+
+
+def test_a_recording_that_would_fill_the_memory_is_refused(hsm1: Motor) -> None:
+    text = 'motor = "hsm1"\nduration_s = 36000\nrecord_every_s = 1e-4'
+    with pytest.raises(FluxtrueError, match="record_every_s = 0.0001 s: 360000000 rows .*, allowed: from 0.01"):
+        simulate(parse(text, "s.toml"), hsm1, where="s.toml")

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an image of the S32K144 must do on the emulated processor. Each check raises when the image does not.
+
+test_faults.py holds the image to all of them, test_plants.py plants one error after the other that a check must find.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import CENTRE, Core, State
+from fluxtrue_tools.sim.library import Loop
+
+PERIOD_S = 1e-4
+FILTER_S = 8 / 112e6  # README.md, PWM: 4 + FFVAL cycles of the timer's clock
+SLACK_S = 1 / 112e6
+ALL_OUTPUTS, NO_OUTPUTS = 0x3F, 0
+FAULTF = 0x80
+ENCACHE = 1
+ADC0_IRQ, PDB0_IRQ, PDB1_IRQ = 39, 52, 68
+CONVERSION_COMPLETE = 0x80
+
+
+@contextmanager
+def driving(parts: Parts) -> Iterator[tuple[Loop, Core]]:
+    """80 N·m at 3000 rpm."""
+    motor = parts.emulated()
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        loop.set("enable", 1)
+        loop.set("torque_command_Nm", 80.0)
+        loop.run(500)
+        assert loop.get("fault_word") == 0
+        assert loop.get("truth.torque_Nm") > 50
+        core = Core.of_simulation(motor.library, loop._sim)
+        assert core.outputs == ALL_OUTPUTS
+        yield loop, core
+
+
+@contextmanager
+def alone(parts: Parts) -> Iterator[Core]:
+    """The processor without a drive around it, out of reset."""
+    with Core.of_program(parts.emulated().library, parts.image) as core:
+        yield core
+
+
+def started(core: Core) -> None:
+    assert core.run(0.1) == CENTRE
+
+
+def run(core: Core, seconds: float) -> int:
+    """However many periods begin meanwhile; how many."""
+    end, periods = core.now_s + seconds, 0
+    while end - core.now_s > SLACK_S:
+        periods += core.run(end - core.now_s) == CENTRE
+    return periods
+
+
+def a_gate_fault_opens_every_output_in_the_filter_time(parts: Parts) -> None:
+    """Whatever the core does meanwhile: it computes, or it is stuck with all interrupts masked."""
+    for state in (State.RUNS, State.STUCK):
+        with driving(parts) as (_, core):
+            core.run(0.4 * PERIOD_S)
+            core.core_state(state)
+            assert core.outputs == ALL_OUTPUTS
+            core.board(gate_fault=True)
+            core.run(FILTER_S)
+            assert core.outputs == NO_OUTPUTS, f"outputs 0x{core.outputs:02x} while the core {state.name.lower()}"
+
+
+def a_fault_line_that_is_up_at_power_on_keeps_the_outputs_off(parts: Parts) -> None:
+    """For each alignment of its filter with the program's writes: up from the start on, or from just before them."""
+    with alone(parts) as core:
+        core.board(gate_fault=True)
+        started(core)
+        run(core, 0.01)
+        assert core.load("FTM0.FMS") & FAULTF
+        assert core.outputs == NO_OUTPUTS
+
+
+def a_halted_core_opens_every_output(parts: Parts) -> None:
+    with driving(parts) as (_, core):
+        core.run(0.4 * PERIOD_S)
+        core.core_state(State.HALTED)
+        assert core.outputs == NO_OUTPUTS
+
+
+def every_period_is_sampled(parts: Parts) -> None:
+    with alone(parts) as core:
+        started(core)
+        entered = _entries(core)
+        periods = run(core, 0.02)
+        assert abs(entered.get(ADC0_IRQ, 0) - periods) <= 1
+        assert core.resets == 0
+
+
+def a_result_that_was_not_read_is_got_over(parts: Parts) -> None:
+    with alone(parts) as core:
+        started(core)
+        run(core, 0.02)
+        core.run(20e-6)
+        core.set_register("ADC0.SC12", core.register("ADC0.SC12") | CONVERSION_COMPLETE)
+        entered = _entries(core)
+        periods = run(core, 0.02)
+        assert periods - entered.get(ADC0_IRQ, 0) <= 3
+        assert entered.get(PDB0_IRQ, 0) + entered.get(PDB1_IRQ, 0) <= 2  # more: the fast ISR is only pended for it
+        assert core.resets == 0
+
+
+def a_stack_near_its_end_resets(parts: Parts) -> None:
+    """The reserve is never touched by a sound program."""
+    with alone(parts) as core:
+        started(core)
+        run(core, 0.02)
+        core.write(core.symbol("stack_bottom") + 128, bytes(4))
+        run(core, 0.05)
+        assert core.resets >= 1
+
+
+def the_code_cache_is_on(parts: Parts) -> None:
+    with alone(parts) as core:
+        started(core)
+        assert core.register("LMEM.LMEM_PCCCR") & ENCACHE
+
+
+CHECKS = (
+    a_gate_fault_opens_every_output_in_the_filter_time,
+    a_fault_line_that_is_up_at_power_on_keeps_the_outputs_off,
+    a_halted_core_opens_every_output,
+    every_period_is_sampled,
+    a_result_that_was_not_read_is_got_over,
+    a_stack_near_its_end_resets,
+    the_code_cache_is_on,
+)
+
+
+def _entries(core: Core) -> dict[int, int]:
+    """Entries of each handler from now on, by interrupt number."""
+    entered: dict[int, int] = {}
+
+    def note(vector: int, enters: bool) -> None:
+        if enters:
+            entered[vector - 16] = entered.get(vector - 16, 0) + 1
+
+    core.on_exception(note)
+    return entered

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""hal/template defines every function that the headers of hal/ declare, and says in each file what is to be written."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+HAL = Path(__file__).resolve().parents[3] / "hal"
+HEADERS = sorted(HAL.glob("*.h"))
+FUNCTION = re.compile(r"^[a-z]\w*(?: \w+)*[ *]+(hal_\w+)\([^;{]*\)\s*(;|\{)", re.MULTILINE)
+
+
+def functions(path: Path, end: str) -> set[str]:
+    """The functions a file declares (';') or defines ('{')."""
+    return {name for name, sign in FUNCTION.findall(path.read_text(encoding="utf-8")) if sign == end}
+
+
+def test_every_mention_of_a_function_is_found_in_the_headers() -> None:
+    # A prototype in a form that FUNCTION does not know would otherwise be left out silently.
+    for header in HEADERS:
+        code = re.sub(r"/\*.*?\*/", "", header.read_text(encoding="utf-8"), flags=re.DOTALL)
+        assert functions(header, ";") == set(re.findall(r"\b(hal_\w+)\(", code)), header.name
+    assert sum(len(functions(header, ";")) for header in HEADERS) >= 20
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=lambda path: path.stem)
+def test_the_template_defines_what_the_header_declares(header: Path) -> None:
+    source = HAL / "template" / f"{header.stem}.c"
+    assert source.is_file(), f"{source} is missing: hal/{header.name} declares {sorted(functions(header, ';'))}"
+    assert functions(source, "{") == functions(header, ";")
+    assert "/* Write" in source.read_text(encoding="utf-8")
+
+
+def test_the_howto_lists_every_header() -> None:
+    page = (HAL.parent / "docs" / "howto" / "port.md").read_text(encoding="utf-8")
+    assert [header.name for header in HEADERS if f"`hal/{header.name}`" not in page] == []

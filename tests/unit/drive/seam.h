@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef UNIT_DRIVE_SEAM_H
+#define UNIT_DRIVE_SEAM_H
+/** The mocked hardware of one drive: what it delivers, and a record of what was asked of it.
+ *   The log holds one letter per call: a adc, r angle (resolver), w duties, + gates on, - gates off, p pend. */
+#include "drive/drive.h"
+
+typedef struct {
+    adc_counts_t counts;
+    uint32_t theta_m;
+    int16_t winding_dC, inverter_dC;
+    duty_t duty;
+    bool gates;
+    int pended;
+    char log[64];
+} seam_t;
+
+extern seam_t seam;
+extern drive_t drive;
+
+/* Fresh drive for the compiled-in motor, no current, 350 V, rotor at rest; all mocks answer from `seam`. */
+void seam_start(void);
+/* Counts of a 12-bit converter for amperes and volts. */
+void seam_current(double a_A, double b_A, double c_A);
+void seam_voltage(double v_dc_V);
+/* One PWM period: fast ISR, then the MRAI ISR if it was pended, then every tenth the task. */
+void seam_period(void);
+void seam_periods(int count);
+/* Enabled, through the task: the next period switches. */
+void seam_run(void);
+
+#endif

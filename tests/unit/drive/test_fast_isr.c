@@ -1,0 +1,357 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/mrai/mrai_seam.h"
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    seam_start();
+}
+
+void tearDown(void)
+{
+}
+
+static const sample_t *published(void)
+{
+    return &drive.samples.slot[drive.samples.generation & 1U];
+}
+
+void test_a_period_samples_then_switches_then_pends_the_papers_identification_once(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+p", seam.log);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+p", seam.log);
+}
+
+void test_the_robust_identification_needs_no_interrupt_of_its_own(void)
+{
+    seam_run();
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_STRING("arw", seam.log); /* the gates have long been closed */
+    TEST_ASSERT_EQUAL_INT(0, seam.pended);
+    TEST_ASSERT_EQUAL_UINT32(0, mrai_overruns(&drive));
+}
+
+/* By hand: ten samples of the same current, ten of the voltages that acted, each published with its sample. */
+void test_ten_periods_make_a_window_of_sums(void)
+{
+    seam_current(100.0, -50.0, -50.0);
+    seam_run();
+    seam_periods(10); /* the first two of them do not act yet */
+    TEST_ASSERT_EQUAL_UINT32(1, drive.windows.generation);
+    TEST_ASSERT_FALSE(window_box_at(&drive.windows)->acting);
+    dq_q15_t sum_i = {0, 0}, sum_u = {0, 0};
+    for (int n = 0; n < 10; n++) {
+        TEST_ASSERT_EQUAL_UINT32(1, drive.windows.generation);
+        seam_period();
+        sum_i = (dq_q15_t){sum_i.d + published()->point.i.d, sum_i.q + published()->point.i.q};
+        sum_u = (dq_q15_t){sum_u.d + published()->point.u.d, sum_u.q + published()->point.u.q};
+    }
+    TEST_ASSERT_EQUAL_UINT32(2, drive.windows.generation);
+    const identify_window_t window = *window_box_at(&drive.windows);
+    TEST_ASSERT_INT_WITHIN(200, 81920, window.sum_i.d); /* 100 of 400 A, ten times */
+    TEST_ASSERT_EQUAL_INT(sum_i.d, window.sum_i.d);
+    TEST_ASSERT_EQUAL_INT(sum_i.q, window.sum_i.q);
+    TEST_ASSERT_EQUAL_INT(sum_u.d, window.sum_u.d);
+    TEST_ASSERT_EQUAL_INT(sum_u.q, window.sum_u.q);
+    TEST_ASSERT_EQUAL_UINT32(published()->theta_e, window.last.theta);
+    TEST_ASSERT_TRUE(window.acting);
+}
+
+void test_the_flux_of_the_robust_identification_is_fed_forward_from_the_next_period_on(void)
+{
+    drive.task.psi_d_error = -1234;
+    seam_period();
+    TEST_ASSERT_EQUAL_INT(-1234, drive.psi_d_error);
+}
+
+/* Off means off first: the gates open before anything else is written. */
+void test_while_off_the_gates_open_first_and_the_duties_rest_in_the_middle(void)
+{
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("ar-w", seam.log);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.c);
+}
+
+void test_an_over_current_opens_the_gates_in_the_same_period_and_stays_latched(void)
+{
+    seam_run();
+    seam_periods(3);
+    TEST_ASSERT_TRUE(seam.gates);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("ar-w", seam.log);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    seam_current(0.0, 0.0, 0.0);
+    seam_periods(100);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+}
+
+static void told(safe_t safe, uint32_t faults)
+{
+    command_t command = *command_box_read(&drive.commands);
+    command.safe = safe;
+    command.run = command.run && faults == 0U;
+    command.faults = faults;
+    command_box_write(&drive.commands, command);
+}
+
+static void shorted(bool is)
+{
+    TEST_ASSERT_EQUAL(is, seam.gates);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.c);
+}
+
+/* The duties of the short circuit come before the gates that would make them. */
+void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_so(void)
+{
+    seam_run();
+    seam_periods(3);
+    told(SAFE_SHORT_CIRCUIT, 0);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_EQUAL_STRING("arw+", seam.log);
+    shorted(true);
+}
+
+/* Two samples in a row: the good one between them, which alone would be the usual period, must count as well. */
+void test_single_samples_of_over_voltage_with_good_ones_between_are_no_fault(void)
+{
+    seam_run();
+    seam_periods(5);
+    for (int n = 0; n < 4; n++) {
+        seam_voltage(450.0);
+        seam_period();
+        TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+        seam_voltage(350.0);
+        seam_period();
+    }
+    TEST_ASSERT_TRUE(published()->acting);
+}
+
+void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
+{
+    seam_run();
+    seam_periods(3);
+    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_OVER_VOLTAGE, command_box_read(&drive.commands)->safe);
+    seam_voltage(450.0);
+    seam_periods(2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+    shorted(true);
+    seam_periods(30); /* the task keeps it while the voltage is there */
+    shorted(true);
+    seam_voltage(350.0);
+    seam_periods(30);
+    shorted(false);
+}
+
+void test_an_over_voltage_never_closes_the_gates_of_a_bridge_that_has_not_run(void)
+{
+    seam_voltage(450.0);
+    seam_periods(30);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+    shorted(false);
+}
+
+void test_what_the_tasks_monitors_find_is_latched_and_stops_the_bridge(void)
+{
+    seam_run();
+    seam_periods(3);
+    told(SAFE_FREEWHEEL, FAULT_TORQUE | FAULT_PHASE_LOST);
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
+    TEST_ASSERT_FALSE(seam.gates);
+    told(SAFE_FREEWHEEL, 0);
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
+}
+
+void test_a_fault_raised_elsewhere_opens_the_gates_with_the_next_period(void)
+{
+    seam_run();
+    seam_periods(3);
+    drive_raise_fault(&drive, FAULT_INPUT);
+    seam_period();
+    TEST_ASSERT_FALSE(seam.gates);
+}
+
+void test_an_unpowered_dc_link_is_a_fault_only_while_switching(void)
+{
+    seam_voltage(0.0);
+    seam_periods(50);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_UNDER_VOLTAGE, drive.fast.faults);
+    TEST_ASSERT_FALSE(seam.gates);
+}
+
+void test_an_over_voltage_while_off_is_a_fault_too(void)
+{
+    seam_voltage(500.0);
+    seam_periods(2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+}
+
+/* One jump is not a fault; the tracker needs some periods to agree with the new angle again. */
+void test_an_angle_that_jumps_three_times_in_a_row_is_a_fault(void)
+{
+    seam_periods(5);
+    seam.theta_m = 0x40000000u / 3U;
+    seam_period();
+    seam.theta_m = 0;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    for (int n = 0; n < 3; n++) {
+        seam.theta_m += 0x30000000u;
+        seam_period();
+    }
+    TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, drive.fast.faults);
+}
+
+/* The voltage of period k acts in period k + 1: what is published is the previous period's. */
+void test_the_published_voltage_is_the_one_that_acts_now(void)
+{
+    seam_run();
+    seam_period();
+    TEST_ASSERT_EQUAL_INT(0, published()->point.u.d);
+    drive.fast.u_next = (dq_q15_t){1234, -567};
+    seam_period();
+    TEST_ASSERT_EQUAL_INT(1234, published()->point.u.d);
+    TEST_ASSERT_EQUAL_INT(-567, published()->point.u.q);
+}
+
+/* The duties of period 1 act in 2; the first period whose voltage is known from end to end ends with sample 3. */
+void test_the_identification_gets_voltages_only_after_the_bridge_has_acted_for_a_whole_period(void)
+{
+    seam_run();
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_TRUE(published()->acting);
+    seam_current(310.0, -155.0, -155.0);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    TEST_ASSERT_EQUAL_INT(0, published()->point.u.d);
+}
+
+void test_the_samples_are_published_in_the_rotors_frame(void)
+{
+    seam.theta_m = 0x40000000u / 3U; /* 90 electrical degrees: the current of phase a is -i_q */
+    seam_current(100.0, -50.0, -50.0);
+    seam_periods(3);
+    const double lsb = 400.0 / 32768.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, 0.0, published()->point.i.d * lsb);
+    TEST_ASSERT_DOUBLE_WITHIN(0.3, -100.0, published()->point.i.q * lsb);
+    TEST_ASSERT_DOUBLE_WITHIN(0.2, 350.0, published()->v_dc * 540.0 / 32768.0);
+}
+
+/* An identification that does not finish: the sample is still published, the third in a row is a fault. */
+void test_three_unfinished_identifications_in_a_row_are_an_overrun(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    seam_run();
+    fast_isr(&drive);
+    mrai_isr(&drive);
+    for (int n = 0; n < 3; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+        seam.log[0] = '\0';
+        fast_isr(&drive);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    fast_isr(&drive);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVERRUN, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(3, mrai_overruns(&drive));
+    fast_isr(&drive);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(3, drive.mrai.mailbox.overruns_in_a_row);
+}
+
+void test_an_identification_that_is_late_now_and_then_is_counted_and_forgiven(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    seam_run();
+    for (int n = 0; n < 9; n++) {
+        seam.log[0] = '\0';
+        fast_isr(&drive);
+        if (n % 3 == 2) {
+            mrai_isr(&drive);
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(6, mrai_overruns(&drive));
+}
+
+void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
+{
+    seam_run();
+    seam_periods(3);
+    drive.fast.current_control.s_q_q30 = 250000000;
+    drive.request.enable = false;
+    task_1khz(&drive);
+    seam_period();
+    TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_q_q30);
+    TEST_ASSERT_FALSE(seam.gates);
+    seam_run();
+    seam_period();
+    TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* only what the noise-free zero current asks for */
+}
+
+/* Below the bound nobody normalises for: neither identification may take the command for what acts. */
+void test_a_dc_voltage_below_its_bound_makes_the_acting_voltage_unknown(void)
+{
+    seam_run();
+    seam_periods(4);
+    TEST_ASSERT_TRUE(published()->acting);
+    seam_voltage(100.0); /* 140 V is the bound */
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    seam_voltage(350.0);
+    seam_period();
+    TEST_ASSERT_FALSE(published()->acting);
+    seam_period();
+    TEST_ASSERT_TRUE(published()->acting);
+}
+
+void test_a_voltage_at_its_limit_is_told_to_the_task(void)
+{
+    seam_run();
+    seam_periods(2);
+    TEST_ASSERT_FALSE(published()->voltage_limited);
+    drive.fast.current_control.s_q_q30 = 1000000000;
+    seam_period();
+    TEST_ASSERT_TRUE(published()->voltage_limited);
+}
+
+void test_two_drives_in_one_process_do_not_share_a_thing(void)
+{
+    static drive_t other;
+    drive_init(&other, &motor);
+    seam_run();
+    seam_periods(3);
+    seam.log[0] = '\0';
+    fast_isr(&other);
+    TEST_ASSERT_FALSE(seam.gates); /* the other one is off */
+    TEST_ASSERT_EQUAL_INT(1, other.samples.generation);
+    TEST_ASSERT_EQUAL_INT(3, drive.samples.generation);
+}

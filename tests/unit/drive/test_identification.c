@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "hal/temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+/* The robust identification between the priorities: window, step, answer, memory. */
+
+static double omega;  /* of omega_b */
+static int32_t unit;  /* of the current: (-3, 5) of them */
+static int weak;      /* counts of magnet flux that are missing */
+static uint32_t now;  /* periods */
+static double lost;   /* counts of voltage along the current that nominal compensation leaves over */
+
+/* q15 */
+static int32_t dead_time(const motor_t *m)
+{
+    return m->modulate.dead_time_q16 / 2;
+}
+
+void setUp(void)
+{
+    omega = 0.3;
+    unit = 1000;
+    weak = 1434;
+    now = 0;
+    lost = 0.0;
+    seam_start();
+    seam.winding_dC = 200;
+}
+
+void tearDown(void)
+{
+}
+
+/* A sample as the fast ISR publishes it: 60 A unless said otherwise, a magnet that is 10 % weak. */
+static void period(uint32_t k)
+{
+    sample_t *s = sample_box_begin(&drive.samples);
+    const dq_q15_t i = {-3 * unit, 5 * unit};
+    const q31_t speed = (q31_t)(omega * 2147483648.0);
+    const operating_point_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = speed};
+    *s = (sample_t){.point = in, .acting = true, .v_dc = 21238};
+    s->point.u.d = (int32_t)(-omega * s->point.flux.psi_q + 0.0133 * i.d);
+    s->point.u.q = (int32_t)(omega * (s->point.flux.psi_d - weak) + 0.0133 * i.q);
+    /* What is compensated in addition need not be commanded any more. */
+    const double left = lost - 4.0 / 3.14159265 * 21238.0 *
+                                   (dead_time(&drive.motor) - dead_time(&motor)) / 32768.0;
+    s->point.u.d += (int32_t)lround(left * -3.0 / 5.831);
+    s->point.u.q += (int32_t)lround(left * 5.0 / 5.831);
+    s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
+    sample_box_publish(&drive.samples);
+    if (drive.request.identification_mode == IDENTIFICATION_PAPER) {
+        mrai_isr(&drive);
+        return;
+    }
+    const identify_sample_t sums = {s->point.i, s->point.u, &s->point.flux, s->theta_e};
+    if (identify_window_step(&drive.fast.window, &sums)) {
+        window_box_write(&drive.windows, &drive.fast.window);
+        identify_window_restart(&drive.fast.window, motor.bases.periods_per_step);
+    }
+}
+
+static void milliseconds(int n)
+{
+    for (int k = 0; k < 10 * n; k++) {
+        period(now++);
+        if (k % 10 == 9) {
+            task_1khz(&drive);
+        }
+    }
+}
+
+void test_robust_is_the_default_and_ten_periods_make_a_window(void)
+{
+    TEST_ASSERT_EQUAL_INT(IDENTIFICATION_ROBUST, drive.request.identification_mode);
+    for (uint32_t k = 0; k < 20; k++) {
+        TEST_ASSERT_EQUAL_UINT32(k / 10U, drive.windows.generation);
+        period(k);
+    }
+    const identify_window_t window = *window_box_at(&drive.windows);
+    TEST_ASSERT_EQUAL_INT(-30000, window.sum_i.d);
+    TEST_ASSERT_EQUAL_INT(50000, window.sum_i.q);
+    TEST_ASSERT_TRUE(window.acting);
+}
+
+void test_a_weak_magnet_is_learnt_and_its_flux_handed_to_the_current_control(void)
+{
+    milliseconds(3000);
+    /* 10 % of psi_f, 1434 counts; magnet and inductances share what a single point shows. */
+    TEST_ASSERT_LESS_THAN_INT(-700, drive.task.psi_d_error);
+    fast_isr(&drive);
+    TEST_ASSERT_EQUAL_INT(drive.task.psi_d_error, drive.psi_d_error);
+    TEST_ASSERT_LESS_THAN_INT32(0, drive.task.identification.psi_delta);
+    TEST_ASSERT_GREATER_THAN_INT(20000, drive.task.identification.psi_quality);
+    TEST_ASSERT_FALSE(drive.task.identification.psi_clamped);
+}
+
+void test_a_reset_forgets_what_was_learnt(void)
+{
+    milliseconds(500);
+    TEST_ASSERT_NOT_EQUAL(0, drive.task.identification.psi_delta);
+    drive.request.identification_resets++;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.identification.psi_delta);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.identification.psi_quality);
+}
+
+void test_the_winding_temperature_reaches_the_resistance_and_a_broken_sensor_does_not(void)
+{
+    seam.winding_dC = 1200;
+    milliseconds(1);
+    /* 0.018 ohm, 0.393 % per kelvin, 100 K: 39.3 % more, 0.00707 ohm of 1.35. */
+    TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.identification.r_delta);
+    seam.winding_dC = HAL_TEMPERATURE_UNKNOWN;
+    milliseconds(1);
+    TEST_ASSERT_FALSE(drive.task.identify.r_known);
+    TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.identification.r_delta);
+}
+
+void test_what_was_learnt_can_be_kept_and_recalled(void)
+{
+    milliseconds(1000);
+    const identify_record_t kept = drive_identified_record(&drive);
+    const q31_t before = drive.task.identification.psi_delta;
+    drive_init(&drive, &motor);
+    TEST_ASSERT_TRUE(drive_recall(&drive, &kept));
+    task_1khz(&drive);
+    TEST_ASSERT_INT32_WITHIN(2000, before, drive.task.identification.psi_delta);
+    identify_record_t foreign = kept;
+    foreign.version = 0;
+    TEST_ASSERT_FALSE(drive_recall(&drive, &foreign));
+}
+
+void test_the_papers_identification_starts_from_its_sample_when_it_is_selected(void)
+{
+    milliseconds(2);
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    period(0);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_d_q27);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_q_q27);
+    task_1khz(&drive);
+    TEST_ASSERT_NOT_EQUAL(0, drive.mrai.isr.torque.count);
+    TEST_ASSERT_EQUAL_INT(drive.mrai.task.torque_mean.mean, drive.task.identification.torque_estimated);
+}
+
+void test_the_window_box_survives_the_wrap_of_its_generation(void)
+{
+    drive.windows.generation = UINT32_MAX;
+    for (int n = 0; n < 4; n++) {
+        const identify_window_t window = {.left = (uint8_t)n};
+        window_box_write(&drive.windows, &window);
+        TEST_ASSERT_EQUAL_INT(n, window_box_at(&drive.windows)->left);
+    }
+}
+
+/* Slow enough to be told from the magnet. */
+static void at_town_speed(void)
+{
+    omega = 0.04;
+    weak = 0;
+    lost = 100.0;
+}
+
+/* 100 counts are 1.65 V: pi/4 of them, over 21238 of dc voltage, are 121 LSB of duty. */
+void test_the_compensation_takes_over_what_is_learnt_of_the_voltage_error(void)
+{
+    at_town_speed();
+    for (int n = 0; n < 30; n++) {
+        unit = (n % 2 == 0) ? 1500 : 300;
+        milliseconds(4000);
+    }
+    const int last = drive.task.identification.torque_estimated;
+    milliseconds(1000);
+    TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_max / 1000U, last, drive.task.identification.torque_estimated);
+    TEST_ASSERT_INT_WITHIN(30, dead_time(&motor) + 121, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT32(dead_time(&drive.motor) - dead_time(&motor), drive.task.trim.trim);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
+    drive.request.identification_resets++;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
+}
+
+void test_who_does_not_want_the_compensation_moved_keeps_it(void)
+{
+    at_town_speed();
+    drive.request.trim = false;
+    milliseconds(20000);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_DROP]);
+}

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/mrai/mrai_seam.h"
+#include "drive/mrai/schedule_box.h"
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    seam_start();
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+}
+
+void tearDown(void)
+{
+}
+
+/* A sample as the fast ISR offers it: 60 A, 0.3 omega_b, the voltage that belongs to it. */
+static void publish(bool acting)
+{
+    sample_t *s = sample_box_begin(&drive.samples);
+    const dq_q15_t i = {-3000, 5000};
+    const operating_point_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
+    *s = (sample_t){.point = in, .acting = acting};
+    s->point.u.d = (q15_t)(-0.3 * s->point.flux.psi_q - 0.0133 * 3000);
+    s->point.u.q = (q15_t)(0.3 * (s->point.flux.psi_d - 1500) + 0.0133 * 5000); /* a weak magnet */
+    sample_box_publish(&drive.samples);
+    seam.log[0] = '\0';
+    mrai_offer(&drive, s);
+}
+
+static void open_gates(void)
+{
+    drive.request.identification = true;
+    schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = 60000000});
+}
+
+void test_it_tells_that_it_has_finished(void)
+{
+    publish(false);
+    TEST_ASSERT_NOT_EQUAL(mrai_offered(&drive), mrai_finished(&drive));
+    mrai_isr(&drive);
+    TEST_ASSERT_EQUAL_INT(mrai_offered(&drive), mrai_finished(&drive));
+}
+
+void test_with_the_bridge_off_nothing_is_learnt(void)
+{
+    open_gates();
+    for (int n = 0; n < 100; n++) {
+        publish(false);
+        mrai_isr(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.psi_delta);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_q_q27);
+}
+
+void test_with_the_bridge_on_the_flux_is_learnt_and_handed_to_the_fast_isr_rounded(void)
+{
+    open_gates();
+    publish(false);
+    mrai_isr(&drive);
+    for (int n = 0; n < 500; n++) {
+        publish(true);
+        mrai_isr(&drive);
+    }
+    TEST_ASSERT_LESS_THAN_INT32(-1000000, drive.mrai.isr.law.psi_delta);
+    TEST_ASSERT_EQUAL_INT((drive.mrai.isr.law.psi_delta + 32768) >> 16, drive.psi_d_error);
+}
+
+/* The observer starts from the last sample with the bridge off: switching on is no event to it. */
+void test_the_first_acting_sample_continues_the_last_resting_one(void)
+{
+    publish(false);
+    mrai_isr(&drive);
+    publish(true);
+    mrai_isr(&drive);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_d_q27); /* 1/64 pu: one period of a weak magnet */
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_q_q27);
+}
+
+void test_the_torque_estimate_runs_with_the_bridge_on_or_off(void)
+{
+    for (int n = 0; n < 10; n++) {
+        publish(n % 2 == 0);
+        mrai_isr(&drive);
+    }
+    const flux_point_t f = flux_table_step(&motor.flux_table, (dq_q15_t){-3000, 5000});
+    TEST_ASSERT_INT_WITHIN(2, (f.psi_d * 5000 + f.psi_q * 3000) / 32768,
+                           torque_estimate_mean(&drive.mrai.task.torque_mean, &drive.mrai.isr.torque));
+}
+
+void test_a_reset_forgets_what_was_learnt_without_a_kick(void)
+{
+    open_gates();
+    publish(false);
+    mrai_isr(&drive);
+    for (int n = 0; n < 500; n++) {
+        publish(true);
+        mrai_isr(&drive);
+    }
+    drive.request.identification_resets++;
+    publish(true);
+    mrai_isr(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.psi_delta);
+    TEST_ASSERT_EQUAL_INT(0, drive.psi_d_error);
+    publish(true);
+    mrai_isr(&drive);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_d_q27);
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_q_q27);
+}
+
+/* Sums that were begun before a gap say nothing about the period that ends after it. */
+static void expect_restart(void)
+{
+    publish(true);
+    mrai_isr(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_d_q27);
+    TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_q_q27);
+}
+
+static void run_for(int periods)
+{
+    for (int n = 0; n < periods; n++) {
+        publish(true);
+        mrai_isr(&drive);
+    }
+    TEST_ASSERT_NOT_EQUAL(0, drive.mrai.isr.law.e_q_q27);
+}
+
+void test_the_law_restarts_after_periods_in_which_the_other_identification_was_chosen(void)
+{
+    run_for(20);
+    for (int n = 0; n < 5; n++) {
+        (void)sample_box_begin(&drive.samples);
+        sample_box_publish(&drive.samples);
+    }
+    expect_restart();
+}
+
+void test_a_point_that_comes_too_early_is_dropped_and_the_law_restarts_after_it(void)
+{
+    run_for(20);
+    publish(true);
+    const operating_point_t in_work = drive.mrai.mailbox.point;
+    publish(false);
+    TEST_ASSERT_EQUAL_UINT32(1, mrai_overruns(&drive));
+    TEST_ASSERT_TRUE_MESSAGE(drive.mrai.mailbox.acting, "the interrupt reads the mailbox in place");
+    TEST_ASSERT_EQUAL_MEMORY(&in_work, &drive.mrai.mailbox.point, sizeof in_work);
+    mrai_isr(&drive);
+    TEST_ASSERT_EQUAL_UINT32(mrai_offered(&drive), mrai_finished(&drive));
+    expect_restart();
+    TEST_ASSERT_EQUAL_UINT(0, drive.mrai.mailbox.overruns_in_a_row);
+}

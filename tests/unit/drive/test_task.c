@@ -1,0 +1,296 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/mrai/mrai_seam.h"
+#include "drive/mrai/schedule_box.h"
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+void setUp(void)
+{
+    seam_start();
+    seam_periods(3); /* a sample with 350 V is there */
+    /* The samples below are no machine's: the monitors would say so. */
+    drive.motor.plausibility.e_0 = INT16_MAX;
+    drive.motor.plausibility.i_alive = INT16_MAX;
+    drive.motor.torque_monitor.v_0 = INT16_MAX;
+}
+
+void tearDown(void)
+{
+}
+
+static const command_t *command(void)
+{
+    return &drive.commands.slot[drive.commands.generation & 1U];
+}
+
+static const mrai_schedule_t *schedule(void)
+{
+    return &drive.mrai.schedules.slot[drive.mrai.schedules.generation & 1U];
+}
+
+/* What the task asks is done by the fast ISR of the next period. */
+static void task_and_period(void)
+{
+    task_1khz(&drive);
+    seam_period();
+}
+
+void test_the_shipped_motor_is_valid_and_starts_off(void)
+{
+    TEST_ASSERT_TRUE(motor_valid(&motor));
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+void test_enable_runs_and_disable_stops(void)
+{
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, drive.task.run_state);
+    TEST_ASSERT_TRUE(command()->run);
+    drive.request.enable = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+void test_a_fault_is_reset_only_while_enable_is_off(void)
+{
+    seam_run();
+    drive_raise_fault(&drive, FAULT_OVER_CURRENT);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
+    drive.request.fault_resets++; /* taken, refused, not kept for later */
+    task_and_period();
+    drive.request.enable = false;
+    task_and_period();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults);
+    drive.request.fault_resets++;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    task_and_period();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+}
+
+void test_a_fault_that_is_still_there_is_latched_again_at_once(void)
+{
+    seam_run();
+    seam.counts.i_a = 4095;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults & FAULT_OVER_CURRENT);
+    drive.request.enable = false;
+    drive.request.fault_resets++;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults & FAULT_OVER_CURRENT);
+}
+
+void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
+{
+    static motor_t bad;
+    bad = motor;
+    bad.monitor.i_trip = 26215; /* 0.8: would trip after the converter's end stop */
+    drive_init(&drive, &bad);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    drive.request.fault_resets++;
+    task_and_period();
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+}
+
+#define BAD(statement) \
+    do { \
+        motor_t m = motor; \
+        statement; \
+        TEST_ASSERT_FALSE_MESSAGE(motor_valid(&m), #statement); \
+    } while (0)
+
+void test_every_part_of_the_motor_data_is_checked(void)
+{
+    BAD(m.flux_table.l_q = 0);
+    BAD(m.current_reference.i_d = 0);
+    BAD(m.torque_max = 0);
+    BAD(m.monitor.i_trip = 0);
+    BAD(m.monitor.v_min = m.monitor.v_max);
+    BAD(m.mrai.r0 = 0);
+    BAD(m.monitor.v_min = 800); /* 1/v_ratio in Q31 over 2^22 is 853 */
+    BAD(m.modulate.longest_q31 = 1 << 29);
+    BAD(m.modulate.longest_q31 = m.modulate.nearer_rail_q31 + 1);
+    BAD(m.modulate.nearer_rail_q31 = (1 << 30) + 1);
+    BAD(m.modulate.side_q31 = m.modulate.side_q31 + 20);
+    BAD(m.modulate.alpha_q31 = m.modulate.alpha_q31 / 1000 * 1001);
+    BAD(m.modulate.knee_q17 = 0);
+    BAD(m.modulate.knee_side_q17 = 1 << 30);
+    BAD(m.monitor.zero_max = 0);
+    BAD(m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip); /* nothing left for the zero sequence */
+    BAD(m.monitor.i_normal_squared_q30 = -1);
+    BAD(m.monitor.sum_max = 3 * m.monitor.zero_max - 1);
+    BAD(m.current_control.sigma_q24 = 0);
+    BAD(m.current_control.clear_q30 = UINT32_MAX);
+    BAD(m.current_control.clear_q30 = m.current_control.clear_q30 / 8 * 9);
+    BAD(m.modulate.dead_time_q16 = 32768);
+    BAD(m.modulate.dead_time_q16 = -2);
+    BAD(m.current_control.setpoint_weight = 0);
+    BAD(m.current_control.integral_gain = 16384);
+    BAD(m.current_control.tracking_gain_q34 = -1);
+    BAD(m.current_control.per_ratio_q31 = 0);
+    BAD(m.torque_loop.authority = 0);
+    BAD(m.torque_loop.torque_min = 0);
+}
+
+void test_the_torque_request_is_limited_and_slewed(void)
+{
+    drive.motor.torque_slew = 100;
+    drive.request.torque_arbitrated = INT16_MAX;
+    seam_run();
+    TEST_ASSERT_EQUAL_INT(100, drive.task.torque_commanded);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(200, drive.task.torque_commanded);
+    for (int n = 0; n < 500; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT(motor.torque_max, drive.task.torque_commanded);
+    drive.motor.torque_slew = Q15_MAX;
+    drive.request.torque_arbitrated = INT16_MIN;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
+}
+
+void test_stopping_forgets_the_slew_and_the_correction(void)
+{
+    drive.request.torque_arbitrated = 5000;
+    seam_run();
+    drive.task.torque_loop.correction = 300000000;
+    drive.request.enable = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.torque_commanded);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.reference.i_ref.q);
+}
+
+void test_the_target_handed_down_is_the_flux_of_the_current_reference(void)
+{
+    drive.request.torque_arbitrated = 5000;
+    seam_run();
+    const dq_q15_t i = drive.task.reference.i_ref;
+    TEST_ASSERT_GREATER_THAN_INT(0, i.q);
+    TEST_ASSERT_LESS_THAN_INT(0, i.d);
+    const flux_point_t at = flux_table_step(&motor.flux_table, i);
+    TEST_ASSERT_EQUAL_INT(at.psi_d, command()->target.psi.d);
+    TEST_ASSERT_EQUAL_INT(at.psi_q, command()->target.psi.q);
+}
+
+void test_in_current_mode_the_requested_currents_are_the_target(void)
+{
+    drive.request.torque_arbitrated = 5000;
+    drive.request.current_mode = true;
+    drive.request.i_ref = (dq_q15_t){-1000, -2000};
+    seam_run();
+    const flux_point_t at = flux_table_step(&motor.flux_table, (dq_q15_t){-1000, -2000});
+    TEST_ASSERT_EQUAL_INT(at.psi_d, command()->target.psi.d);
+    TEST_ASSERT_EQUAL_INT(at.psi_q, command()->target.psi.q);
+}
+
+/* The torque does not follow the request there: the torque loop must not take that for its own fault. */
+void test_in_current_mode_the_torque_loop_does_not_wind_up(void)
+{
+    drive.request.torque_arbitrated = 5000;
+    drive.request.current_mode = true;
+    seam_run();
+    for (int n = 0; n < 1000; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+}
+
+void test_the_torque_loop_can_be_switched_off(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER; /* trusts itself at once */
+    drive.request.torque_arbitrated = 5000;
+    drive.request.torque_loop = false;
+    seam_run();
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT(5000, drive.task.torque_corrected);
+    drive.request.torque_loop = true;
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(5000, drive.task.torque_corrected); /* the estimate is 0: more is wanted */
+}
+
+static void sample_at(double omega_pu, bool acting, bool limited)
+{
+    sample_t *s = sample_box_begin(&drive.samples);
+    *s = (sample_t){.point = {.i = {-3000, 5000}, .omega = (q31_t)(omega_pu * 2147483647.0)}, .v_dc = 21238,
+                    .acting = acting, .voltage_limited = limited};
+    s->point.flux = flux_table_step(&motor.flux_table, s->point.i);
+    sample_box_publish(&drive.samples);
+}
+
+void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    seam_run();
+    sample_at(0.3, false, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, schedule()->flux_step_q28);
+    sample_at(0.3, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_NOT_EQUAL(0, schedule()->flux_step_q28);
+    drive.request.identification = false;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT32(0, schedule()->flux_step_q28);
+}
+
+void test_the_voltage_limit_holds_the_torque_loop(void)
+{
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    drive.request.torque_arbitrated = 5000;
+    seam_run();
+    sample_at(0.3, true, true);
+    drive.task.torque_loop = (torque_loop_state_t){.model = 5000 * 65536};
+    for (int n = 0; n < 100; n++) {
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.torque_loop.correction);
+    sample_at(0.3, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
+}
+
+/* --- the boxes ------------------------------------------------------------------------------- */
+
+void test_what_is_being_written_is_not_seen_before_it_is_published(void)
+{
+    sample_at(0.1, true, false);
+    sample_t *next = sample_box_begin(&drive.samples);
+    next->v_dc = 77;
+    TEST_ASSERT_EQUAL_INT(21238, sample_box_read(&drive.samples).v_dc);
+    sample_box_publish(&drive.samples);
+    TEST_ASSERT_EQUAL_INT(77, sample_box_read(&drive.samples).v_dc);
+}
+
+void test_the_boxes_survive_the_wrap_of_their_generation(void)
+{
+    drive.samples.generation = UINT32_MAX - 2U;
+    drive.commands.generation = UINT32_MAX - 2U;
+    drive.mrai.schedules.generation = UINT32_MAX - 2U;
+    for (int n = 0; n < 6; n++) {
+        sample_at(0.01 * n, true, false);
+        TEST_ASSERT_EQUAL_INT32((q31_t)(0.01 * n * 2147483647.0), sample_box_read(&drive.samples).point.omega);
+        command_box_write(&drive.commands, (command_t){.run = n & 1});
+        TEST_ASSERT_EQUAL(n & 1, command_box_read(&drive.commands)->run);
+        schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = n});
+        TEST_ASSERT_EQUAL_INT(n, schedule_box_read(&drive.mrai.schedules)->flux_step_q28);
+    }
+}

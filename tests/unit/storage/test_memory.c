@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <string.h>
+
+#include "storage/memory.h"
+#include "hal/mock_nvm.h"
+#include "unity.h"
+
+/* The keeper above the store: what is taken at the start, when is saved. */
+
+static uint8_t flash[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
+static int erases;
+static bool broken;
+static drive_t drive;
+static memory_t memory;
+
+static bool nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size, int calls)
+{
+    (void)calls;
+    memcpy(data, &flash[slot][offset], size);
+    return true;
+}
+
+static bool nvm_erase(uint32_t slot, int calls)
+{
+    (void)calls;
+    erases++;
+    memset(flash[slot], 0xFF, sizeof flash[slot]);
+    return !broken;
+}
+
+static bool nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size, int calls)
+{
+    (void)calls;
+    memcpy(&flash[slot][offset], data, size);
+    return true;
+}
+
+static void power_on(const motor_t *source)
+{
+    drive_init(&drive, source);
+    memory_recall(&memory, &drive);
+}
+
+/* q15 */
+static int32_t dead_time(const motor_t *m)
+{
+    return m->modulate.dead_time_q16 / 2;
+}
+
+void setUp(void)
+{
+    hal_nvm_read_Stub(nvm_read);
+    hal_nvm_erase_Stub(nvm_erase);
+    hal_nvm_program_Stub(nvm_program);
+    memset(flash, 0xFF, sizeof flash);
+    erases = 0;
+    broken = false;
+    power_on(&motor);
+}
+
+void tearDown(void)
+{
+}
+
+/* The background looks once per millisecond; the number of saves. */
+static uint32_t milliseconds(uint32_t n)
+{
+    const uint32_t before = memory.saves;
+    for (uint32_t k = 0; k < n; k++) {
+        drive.task.identifications = drive.task.identifications + 1U;
+        (void)memory_background(&memory, &drive);
+    }
+    return memory.saves - before;
+}
+
+static void run(uint32_t ms)
+{
+    drive.task.run_state = RUN_STATE_RUN;
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(ms));
+    drive.task.run_state = RUN_STATE_OFF;
+}
+
+/* A magnet half a standard deviation weak, well known. */
+static void learn(void)
+{
+    drive.task.identify.kalman.x_q27[IDENTIFY_FLUX] = -IDENTIFY_ONE_Q27 / 2;
+    drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)] = IDENTIFY_ONE_Q30 / 64;
+    run(1000);
+}
+
+static void learn_and_save(void)
+{
+    learn();
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
+}
+
+void test_what_was_learnt_is_there_after_power_on_with_a_wider_uncertainty(void)
+{
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_TRUE(memory.recalled);
+    TEST_ASSERT_EQUAL_INT32(-IDENTIFY_ONE_Q27 / 2, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
+    /* (ID-19): a quarter of the prior's variance more. */
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30 / 64 + IDENTIFY_ONE_Q30 / 4,
+                            drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
+}
+
+void test_an_empty_memory_leaves_the_priors(void)
+{
+    TEST_ASSERT_FALSE(memory.recalled);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30,
+                            drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
+}
+
+void test_a_damaged_memory_leaves_the_priors(void)
+{
+    learn_and_save();
+    for (uint32_t byte = 0; byte < 32U; byte++) {
+        flash[0][byte] ^= 0x10;
+        power_on(&motor);
+        TEST_ASSERT_FALSE(memory.recalled);
+        TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
+        flash[0][byte] ^= 0x10;
+    }
+}
+
+/* A copy of the motor with one statement's difference does not take the record. */
+#define FOREIGN(statement) \
+    do { \
+        static motor_t m; \
+        m = motor; \
+        statement; \
+        power_on(&m); \
+        TEST_ASSERT_FALSE_MESSAGE(memory.recalled, #statement); \
+        TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]); \
+    } while (0)
+
+void test_a_record_of_another_motor_or_of_other_priors_is_not_used(void)
+{
+    learn_and_save();
+    FOREIGN(m.name = "another");
+    FOREIGN(m.bases.flux_Vs = m.bases.flux_Vs * 1.01F);
+    FOREIGN(m.identify.sigma[IDENTIFY_LQ]++);
+    power_on(&motor);
+    TEST_ASSERT_TRUE(memory.recalled);
+}
+
+void test_nothing_is_written_without_a_run(void)
+{
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(10000));
+    TEST_ASSERT_EQUAL_INT(0, erases);
+}
+
+void test_it_waits_until_the_drive_has_rested(void)
+{
+    learn();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
+    run(1);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1));
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(2U * MEMORY_INTERVAL_MS)); /* once is enough */
+}
+
+void test_the_second_save_waits_for_the_interval(void)
+{
+    learn_and_save();
+    run(1000);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_INTERVAL_MS - 1001U));
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1));
+    TEST_ASSERT_EQUAL_INT(2, erases);
+}
+
+void test_a_fault_or_a_short_circuit_is_no_rest(void)
+{
+    learn();
+    drive_raise_fault(&drive, FAULT_ANGLE_OFFSET);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    drive.fast.faults = 0;
+    command_box_write(&drive.commands, (command_t){.safe = SAFE_SHORT_CIRCUIT});
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    command_box_write(&drive.commands, (command_t){.safe = SAFE_FREEWHEEL});
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1000));
+}
+
+void test_parameters_that_the_model_contradicts_are_not_kept(void)
+{
+    learn();
+    drive.task.identify.mismatch_share = Q15(0.3);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    TEST_ASSERT_EQUAL_INT(0, erases);
+}
+
+void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(void)
+{
+    broken = true;
+    learn();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    TEST_ASSERT_EQUAL_UINT32(1, memory.failures);
+    TEST_ASSERT_EQUAL_INT(1, erases);
+    broken = false;
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_INTERVAL_MS));
+}
+
+void test_a_measured_compensation_is_kept_with_the_room_it_needs(void)
+{
+    const compensation_t measured = {dead_time(&drive.motor) + 1000, drive.motor.modulate.knee_q17 / 2, 1};
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_TRUE(memory.recalled);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 1000, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT32(motor.modulate.knee_q17 / 2, drive.motor.modulate.knee_q17);
+    TEST_ASSERT_INT32_WITHIN(1, motor.modulate.knee_side_q17 / 2, drive.motor.modulate.knee_side_q17);
+    TEST_ASSERT_LESS_THAN_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
+    TEST_ASSERT_TRUE(motor_valid(&drive.motor)); /* (MO-11) among others */
+}
+
+void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)
+{
+    const int32_t measured = dead_time(&motor) + 40;
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    drive_retrim(&drive, -60);
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT32(-60, drive.task.trim.trim);
+    /* A new measurement replaces both. */
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.trim.trim);
+}
+
+void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
+{
+    drive_retrim(&drive, 60);
+    learn_and_save();
+    power_on(&motor);
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 60, dead_time(&drive.motor));
+}
+
+void test_a_compensation_that_no_inverter_needs_is_refused(void)
+{
+    const motor_t before = drive.motor;
+    const compensation_t wrong[] = {{-1, 1000, 1}, {4097, 1000, 1}, {300, 0, 1}, {300, 1 << 30, 1}};
+    for (unsigned k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
+        TEST_ASSERT_FALSE(drive_compensate(&drive, &wrong[k]));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.motor, sizeof before);
+}

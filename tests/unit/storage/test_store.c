@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <string.h>
+
+#include "storage/store.h"
+#include "signal/crc32.h"
+#include "unity.h"
+
+#define LAYOUT 0x46540001U
+#define NEVER INT32_MAX
+
+/* A flash with named faults. Writing can only clear bits; power is cut when `energy` bytes have been written. */
+static uint8_t memory[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
+static int32_t energy;
+static bool erase_fails;
+static int stuck_offset; /* this byte of every slot keeps one bit; -1: none */
+
+typedef struct {
+    uint32_t number;
+    uint8_t body[173]; /* neither a whole unit nor a whole chunk */
+} record_t;
+
+static record_t record_of(uint32_t number)
+{
+    record_t r = {.number = number};
+    for (uint32_t k = 0; k < sizeof r.body; k++) {
+        r.body[k] = (uint8_t)(number * 31U + k * 7U);
+    }
+    return r;
+}
+
+bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
+{
+    TEST_ASSERT_TRUE(slot < HAL_NVM_SLOTS && offset + size <= HAL_NVM_SLOT_SIZE);
+    memcpy(data, &memory[slot][offset], size);
+    return true;
+}
+
+bool hal_nvm_erase(uint32_t slot)
+{
+    /* An interrupted erase leaves a part erased. */
+    for (uint32_t k = 0; k < HAL_NVM_SLOT_SIZE && !erase_fails; k++) {
+        if (energy <= 0) {
+            return false;
+        }
+        energy--;
+        memory[slot][k] = 0xFF;
+    }
+    return !erase_fails;
+}
+
+bool hal_nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size)
+{
+    const uint8_t *byte = data;
+    TEST_ASSERT_TRUE(offset % HAL_NVM_UNIT == 0 && size % HAL_NVM_UNIT == 0 && offset + size <= HAL_NVM_SLOT_SIZE);
+    for (uint32_t k = 0; k < size; k++) {
+        if (energy <= 0) {
+            return false;
+        }
+        energy--;
+        memory[slot][offset + k] &= byte[k];
+        if ((int)(offset + k) == stuck_offset) {
+            memory[slot][offset + k] ^= 0x10;
+        }
+    }
+    return true;
+}
+
+void setUp(void)
+{
+    memset(memory, 0xFF, sizeof memory);
+    energy = NEVER;
+    erase_fails = false;
+    stuck_offset = -1;
+}
+
+void tearDown(void)
+{
+}
+
+static bool save(uint32_t number)
+{
+    const record_t r = record_of(number);
+    return store_save(LAYOUT, &r, sizeof r);
+}
+
+/* The number of the record that loads; fails unless every byte belongs to it. */
+static uint32_t loaded(void)
+{
+    record_t r;
+    TEST_ASSERT_EQUAL(STORE_OK, store_load(LAYOUT, &r, sizeof r));
+    const record_t whole = record_of(r.number);
+    TEST_ASSERT_EQUAL_MEMORY(&whole, &r, sizeof r);
+    return r.number;
+}
+
+void test_the_check_value_of_the_crc_is_the_published_one(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926, crc32("123456789", 9));
+    TEST_ASSERT_EQUAL_HEX32(0xCBF43926, ~crc32_update(crc32_update(CRC32_START, "1234", 4), "56789", 5));
+}
+
+void test_a_blank_memory_is_empty_and_leaves_the_record_alone(void)
+{
+    record_t r = record_of(9);
+    const record_t before = r;
+    TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT, &r, sizeof r));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &r, sizeof r);
+}
+
+void test_the_newest_of_many_saves_is_loaded_and_both_slots_take_turns(void)
+{
+    for (uint32_t number = 1; number <= 10; number++) {
+        TEST_ASSERT_TRUE(save(number));
+        TEST_ASSERT_EQUAL_UINT32(number, loaded());
+    }
+    memset(memory[1], 0xFF, sizeof memory[1]); /* the tenth went here */
+    TEST_ASSERT_EQUAL_UINT32(9, loaded());
+}
+
+void test_the_sequence_may_wrap(void)
+{
+    TEST_ASSERT_TRUE(save(1));
+    uint32_t header[4];
+    memcpy(header, memory[0], sizeof header);
+    header[2] = UINT32_MAX;
+    const record_t r = record_of(1);
+    header[3] = ~crc32_update(crc32_update(CRC32_START, header, 12), &r, sizeof r);
+    memcpy(memory[0], header, sizeof header);
+    TEST_ASSERT_TRUE(save(2));
+    TEST_ASSERT_EQUAL_UINT32(2, loaded());
+}
+
+void test_a_cut_at_any_byte_of_a_save_leaves_the_old_or_the_new_record(void)
+{
+    const int32_t whole = (int32_t)(HAL_NVM_SLOT_SIZE + STORE_HEADER_SIZE + (sizeof(record_t) + 7U) / 8U * 8U);
+    for (int32_t cut = 0; cut <= whole; cut++) {
+        setUp();
+        TEST_ASSERT_TRUE(save(1) && save(2));
+        energy = cut;
+        const bool done = save(3);
+        TEST_ASSERT_EQUAL(cut == whole, done);
+        TEST_ASSERT_EQUAL_UINT32(done ? 3 : 2, loaded());
+        energy = NEVER; /* and the next save works on what the cut left */
+        TEST_ASSERT_TRUE(save(4));
+        TEST_ASSERT_EQUAL_UINT32(4, loaded());
+    }
+}
+
+void test_a_cut_during_the_very_first_save_loads_nothing(void)
+{
+    energy = (int32_t)HAL_NVM_SLOT_SIZE + 100;
+    record_t r;
+    TEST_ASSERT_FALSE(save(1));
+    TEST_ASSERT_NOT_EQUAL(STORE_OK, store_load(LAYOUT, &r, sizeof r));
+}
+
+void test_any_flipped_bit_of_the_newest_record_gives_the_one_before(void)
+{
+    TEST_ASSERT_TRUE(save(1) && save(2));
+    for (uint32_t bit = 0; bit < 8U * (STORE_HEADER_SIZE + (uint32_t)sizeof(record_t)); bit++) {
+        memory[1][bit / 8U] ^= (uint8_t)(1U << (bit % 8U));
+        TEST_ASSERT_EQUAL_UINT32(1, loaded());
+        memory[1][bit / 8U] ^= (uint8_t)(1U << (bit % 8U));
+    }
+}
+
+void test_two_damaged_slots_are_reported_and_not_used(void)
+{
+    TEST_ASSERT_TRUE(save(1) && save(2));
+    memory[0][40] ^= 1;
+    memory[1][40] ^= 1;
+    record_t r = record_of(9);
+    TEST_ASSERT_EQUAL(STORE_DAMAGED, store_load(LAYOUT, &r, sizeof r));
+    TEST_ASSERT_EQUAL_UINT32(9, r.number);
+}
+
+void test_another_layout_or_size_is_not_found(void)
+{
+    record_t r;
+    TEST_ASSERT_TRUE(save(1));
+    TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT + 1U, &r, sizeof r));
+    TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT, &r, sizeof r - 1U));
+}
+
+void test_a_memory_that_does_not_keep_what_was_written_is_noticed(void)
+{
+    TEST_ASSERT_TRUE(save(1));
+    stuck_offset = 60;
+    TEST_ASSERT_FALSE(save(2));
+    TEST_ASSERT_EQUAL_UINT32(1, loaded());
+    stuck_offset = -1;
+    erase_fails = true;
+    TEST_ASSERT_FALSE(save(3));
+    TEST_ASSERT_EQUAL_UINT32(1, loaded());
+}
+
+void test_a_record_larger_than_a_slot_is_refused_before_anything_is_erased(void)
+{
+    static uint8_t large[HAL_NVM_SLOT_SIZE];
+    TEST_ASSERT_TRUE(save(1) && save(2));
+    TEST_ASSERT_FALSE(store_save(LAYOUT, large, STORE_RECORD_MAX + 1U));
+    memory[1][40] ^= 1;
+    TEST_ASSERT_EQUAL_UINT32(1, loaded());
+}
+
+void test_the_largest_record_fits(void)
+{
+    static uint8_t large[STORE_RECORD_MAX], back[STORE_RECORD_MAX];
+    memset(large, 0x5A, sizeof large);
+    TEST_ASSERT_TRUE(store_save(LAYOUT, large, sizeof large));
+    TEST_ASSERT_EQUAL(STORE_OK, store_load(LAYOUT, back, sizeof back));
+    TEST_ASSERT_EQUAL_MEMORY(large, back, sizeof back);
+}

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prose of the Markdown pages: width of the lines. Code, equations, tables and the targets of links are exempt."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from tree import Violation
+
+MAX_COLUMNS = 120
+
+LINK_TARGET = re.compile(r"\]\([^()\s]*\)")
+IMAGE = re.compile(r"\s*!\[[^\]]*\]\([^)]*\)\s*")
+
+
+def visible(line: str) -> str:
+    """The line as a reader sees it: without the targets of its links."""
+    return LINK_TARGET.sub("]", line)
+
+
+def fences(text: list[str]) -> Iterator[tuple[int, str]]:
+    """Numbered lines outside of fenced code."""
+    fenced = False
+    for number, line in enumerate(text, start=1):
+        if line.lstrip().startswith("```"):
+            fenced = not fenced
+        elif not fenced:
+            yield number, line
+
+
+def prose(text: list[str]) -> Iterator[tuple[int, str]]:
+    """Numbered lines that are neither code, nor equations, nor rows of a table."""
+    equation = code = False
+    before = ""
+    last = 0
+    for number, line in fences(text):
+        starts_block = not before.strip() or code or number != last + 1
+        before, last = line, number
+        if line.strip() == "$$":
+            equation = not equation
+        elif not equation:
+            # An indented line is code only after a blank one; otherwise it continues a paragraph.
+            code = line.startswith("    ") and starts_block
+            if not code and not line.startswith("|"):
+                yield number, line
+
+
+def check_markdown(path: Path, text: list[str]) -> Iterator[Violation]:
+    """Everything about one page."""
+    for number, line in prose(text):
+        width = len(visible(line))
+        if width > MAX_COLUMNS and not IMAGE.fullmatch(line):
+            yield Violation(path, number, f"{width} columns of prose, at most {MAX_COLUMNS}")

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Time-outs of the tests: every one follows from tests/seconds.txt, by tools/cmake/TestTime.cmake.
+
+    times.py BUILD                       check what ctest was told
+    times.py BUILD --record TEST ...     run these tests one by one and write down how long they take
+
+What is written down are the processor's seconds of the test and its child processes. They say how long it takes on an
+idle computer, and can be measured on a busy one.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tree import PROJECT, Violation, report
+
+SECONDS = Path("tests/seconds.txt")
+FACTOR = 5  # the least that a time-out may be, in idle times; TestTime.cmake takes twice as much
+NOTEWORTHY_S = 10
+
+
+def recorded(root: Path) -> dict[str, int]:
+    """Seconds by test."""
+    lines = (root / SECONDS).read_text(encoding="utf-8").splitlines()
+    return {name: int(seconds) for name, seconds in (line.split() for line in lines if line and line[0] != "#")}
+
+
+def described(build: Path) -> dict[str, dict[str, Any]]:
+    """ctest's properties by test."""
+    told = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1"], capture_output=True, text=True,
+                          check=True)  # fmt: skip
+    tests = json.loads(told.stdout)["tests"]
+    return {test["name"]: {one["name"]: one["value"] for one in test.get("properties", [])} for test in tests}
+
+
+def check(root: Path, tests: dict[str, dict[str, Any]]) -> Iterator[Violation]:
+    """Every test's time-out and rank."""
+    seconds = recorded(root)
+    for name, properties in tests.items():
+        idle_s = seconds.get(name, 1)
+        timeout_s = float(properties.get("TIMEOUT", 0.0))
+        if timeout_s < FACTOR * max(idle_s, NOTEWORTHY_S):
+            yield Violation(SECONDS, 1, f"{name}: time-out {timeout_s:g} s, wanted fluxtrue_test_time({name})")
+        if float(properties.get("COST", 0.0)) != idle_s:
+            yield Violation(SECONDS, 1, f"{name}: COST is not the recorded {idle_s} s, wanted fluxtrue_test_time")
+        if properties.get("RUN_SERIAL"):
+            yield Violation(SECONDS, 1, f"{name}: RUN_SERIAL, but no test depends on what else the computer does")
+
+
+def spent(build: Path, name: str) -> float:
+    """Processor's seconds of one test."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = ["ctest", "--test-dir", str(build), "--output-on-failure", "-R", f"^{name}$"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def record(root: Path, build: Path, names: list[str]) -> None:
+    """Write the file anew, test by test."""
+    for name in names:
+        measured = round(spent(build, name))
+        seconds = recorded(root)
+        seconds[name] = measured
+        head = [line for line in (root / SECONDS).read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+        rows = [f"{test} {s}" for test, s in sorted(seconds.items(), key=lambda row: -row[1]) if s >= NOTEWORTHY_S]
+        (root / SECONDS).write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+        print(f"{name}: {measured} s", flush=True)
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("build", type=Path)
+    parser.add_argument("--root", type=Path, default=PROJECT)
+    parser.add_argument("--record", nargs="+", metavar="TEST")
+    given = parser.parse_args()
+    if given.record:
+        record(given.root, given.build, given.record)
+        return 0
+    return report(check(given.root, described(given.build)), "time-outs")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whose time the commands follow: the wall clock's on a bench, simulated time before a virtual ECU.
+
+Before a virtual ECU time passes only between two commands. A computer that stalls stalls the inverter and its machine
+with it: no command is late, whatever else runs. On a bench nothing waits, and a late command is late.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Final, Protocol
+
+import can
+
+from fluxtrue_tools.vecu.stepped import SteppedBus
+
+PERIOD_S: Final = 0.010
+BATCH_PERIODS: Final = 4  # what a page draws at once
+
+Listener = Callable[[can.Message], None]
+
+
+class Pace(Protocol):
+    """A bus with its own time."""
+
+    @property
+    def now_s(self) -> float: ...
+    def send(self, frame: can.Message) -> None: ...
+    def next_period(self, stop: threading.Event) -> None: ...
+    def standing_still(self) -> AbstractContextManager[None]: ...
+    def close(self) -> None: ...
+
+
+class WallClock:
+    """A bench."""
+
+    def __init__(self, bus: can.BusABC, listeners: list[Listener]) -> None:
+        self._bus = bus
+        self._notifier = can.Notifier(bus, listeners, timeout=0.1)
+        self._due_s = time.monotonic()
+
+    @property
+    def now_s(self) -> float:
+        """The time of commands and signs of life."""
+        return time.monotonic()
+
+    def send(self, frame: can.Message) -> None:
+        """One command."""
+        self._bus.send(frame, timeout=PERIOD_S)
+
+    def next_period(self, stop: threading.Event) -> None:
+        """Wait until the next command is due."""
+        self._due_s = max(self._due_s + PERIOD_S, time.monotonic() - PERIOD_S)
+        stop.wait(max(self._due_s - time.monotonic(), 0.0))
+
+    @contextmanager
+    def standing_still(self) -> Iterator[None]:
+        """A bench does not wait."""
+        yield
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._notifier.stop()
+
+
+class InStep:
+    """Holds simulated time until every page has drawn what there was, instead of until the wall clock has caught up.
+
+    The link's thread calls turn() each so many periods; the web server waits for due(), sends a batch, and answers with
+    done() when all pages have drawn it.
+    """
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._due = self._open = False
+
+    def turn(self) -> None:
+        """Time for a batch; goes on when it is done."""
+        with self._changed:
+            self._due = not self._open
+            self._changed.notify_all()
+            self._changed.wait_for(lambda: not self._due)
+
+    def due(self) -> bool:
+        """Waits for the next batch; False: there will be none."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._due or self._open)
+            return not self._open
+
+    def done(self) -> None:
+        """Time may go on."""
+        with self._changed:
+            self._due = False
+            self._changed.notify_all()
+
+    def release(self) -> None:
+        """Nobody will draw any more."""
+        with self._changed:
+            self._open, self._due = True, False
+            self._changed.notify_all()
+
+
+class SimulatedTime:
+    """A virtual ECU whose time passes only here: not faster than the wall clock, or in step with the pages."""
+
+    def __init__(self, bus: SteppedBus, listeners: list[Listener], in_step: InStep | None = None) -> None:
+        self._bus, self._listeners, self._in_step = bus, listeners, in_step
+        self._due_s = time.monotonic()
+        self._periods = 0
+
+    @property
+    def now_s(self) -> float:
+        """The time of commands and signs of life."""
+        return self._bus.now_s
+
+    def send(self, frame: can.Message) -> None:
+        """One command, heard before time goes on."""
+        self._bus.send(frame)
+
+    def next_period(self, stop: threading.Event) -> None:
+        """Let 10 ms pass and hear what was said meanwhile."""
+        for message in self._bus.run(1e3 * PERIOD_S)[0]:
+            for listener in self._listeners:
+                listener(message)
+        self._periods += 1
+        if self._in_step is None:
+            self._due_s = max(self._due_s + PERIOD_S, time.monotonic() - PERIOD_S)
+            stop.wait(max(self._due_s - time.monotonic(), 0.0))
+        elif self._periods % BATCH_PERIODS == 0:
+            self._in_step.turn()
+
+    def standing_still(self) -> AbstractContextManager[None]:
+        """Time does not pass while another connection is made."""
+        return self._bus.standing_still()
+
+    def close(self) -> None:
+        """Nothing runs by itself."""

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values that are possible but hardly meant: a unit that is off by 1000, a map that no machine has, tables too coarse.
+
+A doubt is a warning of motor check and build. Where a motor is refused for any reason, a doubt about its units goes
+first: what follows from a slip of the units says nothing about the slip.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fluxtrue_tools.motor.config import MotorConfig
+from fluxtrue_tools.motor.flux_map import FluxMap
+from fluxtrue_tools.motor.flux_model import FluxModel
+from fluxtrue_tools.motor.flux_tables import ERROR_WANTED as TABLE_WANTED
+from fluxtrue_tools.motor.references import ERROR_WANTED, ERROR_WANTED_WEAK
+
+if TYPE_CHECKING:
+    from fluxtrue_tools.motor.motor import Motor
+
+EMF_MOST = 60.0  # of what the dc link can balance, by the magnet alone at top speed: field weakening has its limits
+EMF_LEAST = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
+SALIENCE_MOST = 100.0  # flux of i_max in the q axis over the magnet's
+DROP_LEAST = 5e-5  # of vdc, by i_max on the resistance
+RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
+OFFSET_MOST = 0.05  # of the largest psi_q
+CURL_MOST = 0.05  # of the mean inductance
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """One warning; conclusive where nothing else that is refused needs to be said beside it."""
+
+    text: str
+    conclusive: bool = False
+
+
+def _reach_V(config: MotorConfig) -> float:
+    return config.inverter.vdc_V / math.sqrt(3.0)
+
+
+def _flux_key(config: MotorConfig, value: float) -> str:
+    name = config.machine.flux_map
+    return f"machine.psi_f_Vs = {value:g} V·s" if name is None else f"{name}: psi_d_Vs = {value:g} V·s at no current"
+
+
+def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+    machine = config.machine
+    psi_f = float(model.psi_d(0.0, 0.0))
+    emf = config.omega_max_rad_s * psi_f / _reach_V(config)
+    if emf > EMF_MOST:
+        yield Doubt(f"{_flux_key(config, psi_f)} looks like mV·s: at speed_max_rpm the magnet alone would induce "
+                    f"{emf:.0f} times what vdc_V can balance; wanted: V·s ({psi_f / 1000:g})", True)  # fmt: skip
+    psi_q = float(model.psi_q(0.0, machine.i_max_A))
+    if psi_q > SALIENCE_MOST * psi_f:
+        key = "machine.lq_H" if machine.flux_map is None else f"{machine.flux_map}: psi_q_Vs"
+        yield Doubt(f"{key}: i_max_A makes {psi_q / psi_f:.0f} times the magnet's flux in the q axis, as if an "
+                    "inductance were in mH; wanted: H, V·s and A", True)  # fmt: skip
+    whole = float(np.hypot(model.psi_d(0.0, machine.i_max_A), psi_q))
+    used = config.omega_max_rad_s * whole / _reach_V(config)
+    if used < EMF_LEAST:
+        rad_s = machine.speed_max_rpm * 60.0 / (2.0 * math.pi)
+        yield Doubt(f"machine.speed_max_rpm = {machine.speed_max_rpm:g} rpm: there all flux needs {100 * used:.1g} % "
+                    f"of vdc_V = {config.inverter.vdc_V:g} V; as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
+
+
+def _values(config: MotorConfig) -> Iterator[Doubt]:
+    machine = config.machine
+    if machine.r_ohm * machine.i_max_A < DROP_LEAST * config.inverter.vdc_V:
+        yield Doubt(f"machine.r_ohm = {machine.r_ohm:g} Ω drops {machine.r_ohm * machine.i_max_A:.2g} V at i_max_A: "
+                    f"is it {1000 * machine.r_ohm:g} Ω?")  # fmt: skip
+    run_up = machine.inertia_kgm2 * config.omega_max_rad_s / machine.pole_pairs / machine.torque_max_Nm
+    if not RUN_UP_LEAST_S <= run_up <= RUN_UP_MOST_S:
+        yield Doubt(f"machine.inertia_kgm2 = {machine.inertia_kgm2:g} kg·m²: torque_max_Nm brings it to speed_max_rpm "
+                    f"in {run_up:.2g} s; wanted: kg·m²")  # fmt: skip
+
+
+def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
+    """Keys whose value takes their effect away; keys whose combination does are refused (config.py)."""
+    machine, given = config.machine, config.identification.given()
+    if "iron_loss_uncertainty" in given and machine.iron_loss_hysteresis == machine.iron_loss_eddy == 0.0:
+        yield Doubt("identification.iron_loss_uncertainty has no effect: both iron_loss keys are 0")
+    if "dead_time_uncertainty" in given and config.inverter.dead_time_s == 0.0:
+        yield Doubt("identification.dead_time_uncertainty has no effect: inverter.dead_time_s is 0")
+    if "dead_time_compensation" in config.control.given() and config.inverter.dead_time_s == 0.0:
+        if config.inverter.device_drop_V == 0.0:
+            yield Doubt("control.dead_time_compensation has no effect: dead_time_s and device_drop_V are 0")
+
+
+def curl(model: FluxModel, i_max_A: float) -> float:
+    """Rms of d psi_d/d i_q - d psi_q/d i_d inside the current circle, over the mean inductance."""
+    d, q = np.meshgrid(np.linspace(-i_max_A, 0.0, 61), np.linspace(-i_max_A, i_max_A, 121), indexing="ij")
+    inside = np.hypot(d, q) <= i_max_A
+
+    def rms(values: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(np.square(values[inside]))))
+
+    difference = model.psi_d(d, q, nq=1) - model.psi_q(d, q, nd=1)
+    return rms(difference) / math.sqrt(rms(model.psi_d(d, q, nd=1)) * rms(model.psi_q(d, q, nq=1)))
+
+
+def _map(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> Iterator[Doubt]:
+    if flux_map is None:
+        return
+    name, offset = config.machine.flux_map, flux_map.symmetry.psi_q_offset_Vs
+    largest = float(np.abs(flux_map.psi_q_Vs).max())
+    if abs(offset) > OFFSET_MOST * largest:
+        yield Doubt(f"{name}: psi_q_Vs has an offset of {1e3 * offset:.3g} mV·s, {100 * abs(offset) / largest:.2g} % "
+                    "of its largest value; it is taken away (allowed without a warning: "
+                    f"{100 * OFFSET_MOST:g} %). An angle that is off turns psi_d into psi_q")  # fmt: skip
+    turned = curl(model, config.machine.i_max_A)
+    if turned > CURL_MOST:
+        yield Doubt(f"{name}: not reciprocal: d psi_d/d i_q and d psi_q/d i_d differ by {100 * turned:.3g} % of the "
+                    f"mean inductance (allowed without a warning: {100 * CURL_MOST:g} %); no lossless machine has "
+                    "such a map")  # fmt: skip
+
+
+def _accuracy(motor: "Motor") -> Iterator[Doubt]:
+    torque_max = motor.config.machine.torque_max_Nm
+    errors = (
+        ("flux tables: torque", motor.table_error.torque_max_Nm, TABLE_WANTED),
+        ("current references: torque along MTPA", motor.reference_errors.torque_mtpa_max_Nm, ERROR_WANTED),
+        ("current references: torque, weakening", motor.reference_errors.torque_weak_max_Nm, ERROR_WANTED_WEAK),
+    )
+    for what, error_Nm, wanted in errors:
+        if error_Nm > wanted * torque_max:
+            yield Doubt(f"{what} is up to {error_Nm:.3g} N·m off, {100 * error_Nm / torque_max:.2g} % of "
+                        f"torque_max_Nm = {torque_max:g} N·m (wanted: {100 * wanted:g} %): the machine has more "
+                        "detail than the finest table")  # fmt: skip
+
+
+def explaining(config: MotorConfig, model: FluxModel) -> Doubt | None:
+    """The doubt about units that may be behind a refusal."""
+    return next(_units(config, model), None)
+
+
+def of_motor(motor: "Motor") -> list[str]:
+    """Every warning about a motor that is accepted."""
+    config = motor.config
+    found = [*_units(config, motor.model), *_values(config), *_map(config, motor.flux_map, motor.model),
+             *_accuracy(motor), *_no_effect(config)]  # fmt: skip
+    return [doubt.text for doubt in found]

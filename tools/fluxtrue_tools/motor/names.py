@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that a motor is made from, and those that the motor commands write."""
+
+import tomllib
+from pathlib import Path
+
+FILE_NAME = "motor.toml"
+HTML = "report.html"
+PLOTS = tuple(f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci"))
+BUILT = ("motor_tables.c", "motor_si.c", "motor.json", "report.txt", HTML, *PLOTS)
+
+
+def source_files(folder: Path) -> tuple[Path, ...]:
+    """What a motor is made from: nothing that is written may take its place."""
+    path = folder / FILE_NAME
+    try:
+        return path, folder / tomllib.loads(path.read_text(encoding="utf-8-sig"))["machine"]["flux_map"]
+    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+        return (path,)  # no map, or nothing that can be read: said when it is loaded

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The kinds of path a command line takes, and the command that checks them all before it begins.
+
+No command uses click's own Path: an input declared here is protected from every output of the same command.
+"""
+
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.outputs import Outputs
+
+_KEY = "fluxtrue.outputs"
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def _label(param: click.Parameter | None) -> str:
+    if isinstance(param, click.Option):
+        return max(param.opts, key=len)
+    return param.human_readable_name if param is not None else "path"
+
+
+class GivenPath(click.ParamType):
+    """Any path: refuses what is no name at all."""
+
+    name = "path"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Text to a path."""
+        text = os.fspath(value)
+        if not text:
+            raise FluxtrueError(f"{_label(param)} '': empty, allowed: the name of a {self.name}")
+        if "\0" in text:
+            raise FluxtrueError(f"{_label(param)} {text!r}: allowed: a name without NUL")
+        return Path(text)
+
+
+class InputFile(GivenPath):
+    """A file that is there and is only read."""
+
+    name = "file"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """Text to a path that can be read."""
+        path = super().convert(value, param, ctx)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from None
+        if not stat.S_ISREG(status.st_mode):
+            raise FluxtrueError(f"{path}: cannot be read (not a file)")
+        if not os.access(path, os.R_OK):
+            raise FluxtrueError(f"{path}: cannot be read (Permission denied)")
+        return path
+
+
+class InputFolder(GivenPath):
+    """A folder that is only read; what must be in it is the command's business."""
+
+    name = "folder"
+
+
+class OutputFile(GivenPath):
+    """A file to write, with the endings it may have."""
+
+    name = "file"
+
+    def __init__(self, *suffixes: str) -> None:
+        self.suffixes = suffixes
+
+
+class OutputFolder(GivenPath):
+    """A folder to write files of these names to."""
+
+    name = "folder"
+
+    def __init__(self, *names: str) -> None:
+        self.names = names
+
+
+class BuildFolder(GivenPath):
+    """A folder for what is built on the way, kept for the next call."""
+
+    name = "folder"
+
+
+class StateFile(GivenPath):
+    """A file that is read when it is there and written when the command ends."""
+
+    name = "file"
+
+
+def refuse_given(why: str, *names: str) -> None:
+    """An option that would be left aside is an error; of the command that is running."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        given = context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
+        if given and option.name in names:
+            raise FluxtrueError(f"{'/'.join([*option.opts, *option.secondary_opts])}: has no effect {why}")
+
+
+class Command(click.Command):
+    """Declares every path among its parameters before its body runs."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Check, then run."""
+        ctx.meta[_KEY] = declared(ctx)
+        return super().invoke(ctx)
+
+
+def _values(ctx: click.Context) -> list[tuple[click.Parameter, Path]]:
+    pairs = [(param, ctx.params.get(str(param.name))) for param in ctx.command.params]
+    return [(param, value) for param, value in pairs if isinstance(value, Path)]
+
+
+def declared(ctx: click.Context) -> Outputs:
+    """The outputs among the parameters of a call, with its inputs protected."""
+    outputs = Outputs()
+    for param, path in _values(ctx):
+        if isinstance(param.type, InputFile | InputFolder):
+            outputs.reads(path)
+    for param, path in _values(ctx):
+        if isinstance(param.type, OutputFolder):
+            outputs.folder(_label(param), path, param.type.names)
+        elif isinstance(param.type, BuildFolder):
+            outputs.folder(_label(param), path)
+    for param, path in _values(ctx):
+        if isinstance(param.type, OutputFile):
+            outputs.file(_label(param), path, param.type.suffixes)
+        elif isinstance(param.type, StateFile):
+            outputs.file(_label(param), path)
+    return outputs
+
+
+def outputs() -> Outputs:
+    """Of the command that is running."""
+    found = click.get_current_context().meta[_KEY]
+    assert isinstance(found, Outputs)
+    return found

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keys of a scenario that have no effect in their combination: an error, because whoever wrote them meant something."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from fluxtrue_tools.errors import FluxtrueError
+
+if TYPE_CHECKING:
+    from fluxtrue_tools.sim.scenario import Event, Plant, Scenario
+
+Found = tuple[str, str]  # key, why
+
+PAPER_GAINS = ("observer_m", "flux_bandwidth_rad_s", "resistance_bandwidth_rad_s")
+MAP_INSTEAD = ("ld_H", "lq_H", "psi_f_Vs")
+ONLY_WITH_MAP = ("cross_saturation_scale",)
+AT_START = {"plant.seed": "seed", "plant.theta_m_rad": "plant.theta_m_rad"}
+
+
+class _Plant:
+    """What the plant's fields are during a run: as given, and as events change them."""
+
+    def __init__(self, table: "Plant", events: "tuple[Event, ...]" = ()) -> None:
+        self.table = table
+        self.given = self.table.given()
+        self.events = {name for event in events for name in event.set}
+
+    def always(self, name: str, default: Any) -> bool:
+        """Whether a field has this value during the whole run."""
+        value = getattr(self.table, name)
+        return (default if value is None else value) == default and f"plant.{name}" not in self.events
+
+    def is_on(self, name: str) -> bool:
+        """Whether a flag is given as true and no event changes it."""
+        return bool(getattr(self.table, name)) and f"plant.{name}" not in self.events
+
+
+def _points(scenario: "Scenario") -> Iterator[Found]:
+    for name in sorted(scenario.profile.given()):
+        points = getattr(scenario.profile, name) or ()
+        for before, point in zip(points, points[1:], strict=False):
+            if before[0] >= scenario.duration_s:
+                yield (f"profile.{name}", f"its point [{point[0]:g}, {point[1]:g}] is never approached: the run ends "
+                                          f"at duration_s = {scenario.duration_s:g} s")  # fmt: skip
+                break
+
+
+def _mechanics(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
+    if scenario.mechanics.mode == "imposed" and "plant.imposed_speed" not in plant.events:
+        why = "the speed is imposed; allowed with mechanics.mode = 'inertia'"
+        if "inertia_kgm2" in scenario.mechanics.given():
+            yield "mechanics.inertia_kgm2", why
+        if "load_Nm" in scenario.profile.given():
+            yield "profile.load_Nm", why
+
+
+def _inverter(plant: _Plant) -> Iterator[Found]:
+    if plant.is_on("ideal_inverter"):
+        for name in ("dead_time_s", "device_drop_V"):
+            yield f"plant.{name}", "plant.ideal_inverter = true has neither dead time nor device drop"
+    if plant.always("vdc_ripple_V", 0.0):
+        yield "plant.vdc_ripple_hz", "plant.vdc_ripple_V is 0"
+    if plant.always("vdc_ripple_hz", 0.0):
+        yield "plant.vdc_ripple_V", "plant.vdc_ripple_hz is 0"
+
+
+def _sensors(plant: _Plant) -> Iterator[Found]:
+    silent = [k for k in (1, 2) if plant.always(f"angle_h{k}_rad", 0.0)]
+    for k in silent:
+        yield f"plant.angle_h{k}_phase", f"plant.angle_h{k}_rad is 0"
+    if len(silent) == 2:
+        yield "plant.resolver_pole_pairs", "plant.angle_h1_rad and plant.angle_h2_rad are 0"
+
+
+def _magnet(plant: _Plant) -> Iterator[Found]:
+    if plant.always("magnet_temp_coeff_per_K", 0.0):
+        yield "plant.rotor_C", "plant.magnet_temp_coeff_per_K is 0"
+    if plant.always("rotor_C", 20.0):
+        yield "plant.magnet_temp_coeff_per_K", "plant.rotor_C is 20 °C, where the magnet has its nominal flux"
+
+
+def of_plant(table: "Plant") -> Iterator[Found]:
+    """Fields of a plant that nothing changes later."""
+    yield from _inverter(_Plant(table))
+    yield from _magnet(_Plant(table))
+
+
+def _machine(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
+    yield from _magnet(plant)
+    if {value for _, value in scenario.profile.winding_C} == {20.0} and "plant.winding_C" not in plant.events:
+        yield "plant.r_temp_coeff_per_K", "profile.winding_C is 20 °C, where the resistance is r_ohm_20"
+    moves = {"plant.magnet_scale", "plant.rotor_C", "plant.magnet_temp_coeff_per_K"} & plant.events
+    if len(scenario.profile.magnet_scale) == 1 and not moves:
+        yield "plant.magnet_step_keeps_current", "the magnet's flux does not change in this run"
+
+
+def _controller(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
+    if scenario.controller.identification_mode == "robust" and "identification_mode" not in plant.events:
+        for name in PAPER_GAINS:
+            if name in (scenario.controller.__pydantic_extra__ or {}):
+                yield f"controller.{name}", "it belongs to controller.identification_mode = 'paper'"
+
+
+def _events(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
+    for index, event in enumerate(scenario.event):
+        for name in event.set:
+            if name in AT_START:
+                yield f"event.{index}.set.{name}", f"it is taken at the start only; allowed: {AT_START[name]}"
+
+
+def _found(scenario: "Scenario") -> Iterator[Found]:
+    plant = _Plant(scenario.plant, scenario.event)
+    yield from _points(scenario)
+    yield from _mechanics(scenario, plant)
+    yield from _controller(scenario, plant)
+    yield from _events(scenario, plant)
+    for key, why in (*_inverter(plant), *_sensors(plant), *_machine(scenario, plant)):
+        if key.removeprefix("plant.") in plant.given:
+            yield key, why
+
+
+def check(scenario: "Scenario", name: str) -> None:
+    """Refuse the first key that has no effect whatever the motor; `name` is the file."""
+    for key, why in _found(scenario):
+        raise FluxtrueError(f"{name}: {key}: has no effect here: {why}")
+
+
+def for_motor(scenario: "Scenario", has_map: bool) -> str | None:
+    """The first key that has no effect with this motor, and why."""
+    plant = _Plant(scenario.plant, scenario.event)
+    names = MAP_INSTEAD if has_map else ONLY_WITH_MAP
+    why = "the motor has a flux map" if has_map else "the motor has no flux map"
+    for name in names:
+        if name in plant.given:
+            return f"plant.{name}: has no effect here: {why}"
+    for index, event in enumerate(scenario.event):
+        for name in event.set:
+            if name.removeprefix("plant.") in names and name.startswith("plant."):
+                return f"event.{index}.set.{name}: has no effect here: {why}"
+    return None

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Strict TOML files: every complaint is one line that names file, key, value, unit and what is allowed."""
+
+import math
+import re
+import tomllib
+import types
+import typing
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from fluxtrue_tools.errors import FluxtrueError
+
+SIZE_MAX = 10_000_000  # bytes; the largest that ships has two thousand
+SHOWN_MAX = 60  # characters of a bad value in a message
+UNITS = {
+    "Nm_per_s": "N·m/s", "rpm_per_s": "rpm/s", "A_per_K": "A/K", "N_per_m2_s2": "N/(m/s)²", "per_K": "1/K",
+    "rad_s": "rad/s", "kgm2": "kg·m²", "Nms": "N·m·s", "Nm": "N·m", "rpm": "rpm", "A_rms": "A rms", "Vs": "V·s",
+    "ohm_20": "Ω", "ohm": "Ω", "hz": "Hz", "deg": "°", "rad": "rad", "kg": "kg", "V": "V", "A": "A", "H": "H",
+    "s": "s", "C": "°C", "K": "K", "m": "m", "N": "N", "W": "W",
+}  # fmt: skip
+NOT_A_UNIT = {"observer_m"}
+_UNIT = re.compile(rf"_({'|'.join(UNITS)})(?:_[abc])?$")
+
+
+class Strict(BaseModel):
+    """A table in which an unknown key, another type, NaN and infinity are errors."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    def given(self) -> set[str]:
+        """Keys that the file has, as against those left at their default."""
+        return set(self.model_fields_set)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def number(value: Any) -> Any:
+    """TOML tells 1 from 1.0; nobody who writes a speed of 1000 means anything by it."""
+    if not isinstance(value, int) or isinstance(value, bool):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def flag(value: Any) -> Any:
+    """Names of the controller take numbers; true and false are 1 and 0."""
+    return float(value) if isinstance(value, bool) else number(value)
+
+
+Number = Annotated[float, BeforeValidator(number)]
+Flag = Annotated[float, BeforeValidator(flag)]
+
+
+def unit_of(key: str) -> str:
+    """The unit that a key ends in, as a reader writes it; empty without one."""
+    found = None if key.split(".")[-1] in NOT_A_UNIT else _UNIT.search(key)
+    return UNITS[found[1]] if found else ""
+
+
+def down(value: float) -> float:
+    """A largest allowed value to four digits: what a message offers is accepted."""
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - 3) if value else 1.0
+    return math.floor(value / step * (1.0 + 1e-12)) * step
+
+
+def quantity(key: str, value: Any) -> str:
+    """`key = value unit`, short."""
+    shown = repr(value)
+    shown = shown if len(shown) <= SHOWN_MAX else f"{shown[: SHOWN_MAX - 3]}..."
+    last = [part for part in key.split(".") if not part.isdigit()][-1]
+    unit = unit_of(last) if isinstance(value, int | float) and not isinstance(value, bool) else ""
+    return f"{key} = {shown} {unit}".rstrip()
+
+
+def _leaf(annotation: Any, location: Iterable[int | str]) -> tuple[Any, list[Any]]:
+    """The type at a location below an annotation, and the limits written beside it."""
+    metadata: list[Any] = []
+    while typing.get_origin(annotation) is Annotated:
+        annotation, *more = typing.get_args(annotation)
+        metadata += [item for one in more for item in getattr(one, "metadata", [one])]
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin in (types.UnionType, typing.Union):
+        kinds = [kind for kind in arguments if kind is not type(None)]
+        below, more = _leaf(kinds[0], location)
+        return below, metadata + more
+    rest = list(location)
+    if not rest:
+        return annotation, metadata
+    head, tail = rest[0], rest[1:]
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        info = annotation.model_fields.get(str(head))
+        if info is None:
+            return None, []
+        below, more = _leaf(info.annotation, tail)
+        return below, more + (list(info.metadata) if not tail else [])
+    if origin is tuple and arguments:
+        index = head if isinstance(head, int) and len(arguments) > head and arguments[-1] is not Ellipsis else 0
+        return _leaf(arguments[index], tail)
+    if origin is dict:
+        return _leaf(arguments[1], tail)
+    return None, []
+
+
+def _range(metadata: list[Any]) -> str:
+    """The limits of a field in words, from the annotations the validation itself uses."""
+    found = {name: getattr(item, name) for item in metadata for name in ("ge", "gt", "le", "lt", "min_length",
+             "max_length", "pattern") if getattr(item, name, None) is not None}  # fmt: skip
+    low = f"from {found['ge']:g}" if "ge" in found else f"above {found['gt']:g}" if "gt" in found else ""
+    high = f"{found['le']:g}" if "le" in found else f"below {found['lt']:g}" if "lt" in found else ""
+    if low and high and low.startswith("from") and "le" in found:
+        return f" {low} to {high}"
+    return " " + " up to ".join(part for part in (low, high) if part) if low or high else ""
+
+
+def _nouns(kind: Any) -> str:
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return "a table with the keys " + ", ".join(kind.model_fields)
+    if typing.get_origin(kind) is Literal:
+        return " or ".join(repr(value) for value in typing.get_args(kind))
+    if typing.get_origin(kind) in (tuple, list):
+        return "a list"
+    if typing.get_origin(kind) is dict:
+        return "a table of names and numbers"
+    return {int: "a whole number", float: "a finite number", bool: "true or false", str: "text"}.get(kind, "")
+
+
+def allowed(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    """What the field at a location takes, in words with its unit."""
+    kind, metadata = _leaf(model, location)
+    keys = [str(part) for part in location if isinstance(part, str)]
+    unit = unit_of(keys[-1]) if keys and kind in (int, float) else ""
+    if kind is str:
+        longest = next((item.max_length for item in metadata if getattr(item, "max_length", None)), None)
+        return f"text of 1 to {longest} characters" if longest else "text, not empty"
+    return f"{_nouns(kind)}{_range(metadata)} {unit}".strip()
+
+
+def _keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    """The keys of the table that a location is in."""
+    kind, _ = _leaf(model, location[:-1])
+    known = isinstance(kind, type) and issubclass(kind, BaseModel)
+    return ", ".join(kind.model_fields) if known else ""
+
+
+def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str] | None = None) -> str:
+    """The first complaint as one line. `words` says in its own way what a key takes."""
+    first = error.errors()[0]
+    location = tuple(part for part in first["loc"] if not str(part).startswith("function-"))
+    where = ".".join(map(str, location))
+    if first["type"] == "extra_forbidden":
+        return f"{where}: unknown key, allowed: {_keys(model, location)}"
+    what = (words or {}).get(where) or allowed(model, location)
+    if first["type"] == "missing":
+        return f"{where}: missing, wanted: {what}"
+    if first["type"] == "value_error":
+        text = first["msg"].removeprefix("Value error, ")
+        own_name = not where or text.startswith(where)
+        if own_name or isinstance(first["input"], dict):  # a table's complaint names a key below it
+            return text if own_name else f"{where}.{text}"
+        return f"{quantity(where, first['input'])}: {text}"
+    if not where:
+        return f"not a table of keys, wanted: {', '.join(model.model_fields)}"
+    return f"{quantity(where, first['input'])}, allowed: {what or first['msg'][0].lower() + first['msg'][1:]}"
+
+
+def read_text(path: Path) -> str:
+    """A text file, whole."""
+    try:
+        if path.stat().st_size > SIZE_MAX:
+            raise FluxtrueError(f"{path}: {path.stat().st_size} bytes, allowed: up to {SIZE_MAX}")
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise FluxtrueError(f"{path}: not UTF-8 text") from None
+    except ValueError as error:  # a NUL in the name
+        raise FluxtrueError(f"{str(path)!r}: cannot be read ({error})") from None
+
+
+def parse(model: type[Model], text: str, name: str, complain: Callable[[ValidationError], str] | None = None) -> Model:
+    """A file's text as its model; `name` is for messages."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # tomllib's own error is a ValueError
+        raise FluxtrueError(f"{name}: not valid TOML: {error}") from None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        said = complain(error) if complain is not None else explain(error, model)
+        raise FluxtrueError(f"{name}: {said}") from None
