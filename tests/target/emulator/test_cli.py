@@ -59,15 +59,15 @@ def test_the_same_run_gives_the_same_bits_and_instructions(parts: Parts) -> None
     [
         (RUN + '[controller]\nkind = "twin"\n', (), "controller.kind = 'twin', allowed: 'firmware'"),
         (RUN.replace("hsm1", "paper"), ("--elf", "IMAGE"), "the image was built for another motor"),
-        (RUN, ("--elf", "/nowhere/x.elf"), "--elf /nowhere/x.elf: no such file"),
+        (RUN, ("--elf", "/nowhere/x.elf"), "/nowhere/x.elf: cannot be read (No such file or directory)"),
         (RUN, ("--elf", "SCENARIO"), "is not a 32-bit little-endian ELF file for Arm"),
         (RUN, ("--elf", sys.executable), "is not a 32-bit little-endian ELF file for Arm"),
         (RUN, ("--elf", "CUT"), "is cut short or damaged"),
         (RUN, ("--elf", "FLASHED"), "takes its commands from the bus, allowed without --serve"),
-        ("motor = [", (), "not TOML"),
-        (RUN, ("--serve", "--port", "0"), "--scenario: allowed without --serve only"),
-        (RUN, ("--port", "29536"), "--port: allowed with --serve only"),
-        (RUN, ("--fast",), "--realtime/--fast: allowed with --serve only"),
+        ("motor = [", (), "not valid TOML"),
+        (RUN, ("--serve", "--port", "0"), "--scenario: has no effect with --serve"),
+        (RUN, ("--port", "29536"), "--port: has no effect without --serve"),
+        (RUN, ("--fast",), "--realtime/--fast: has no effect without --serve"),
     ],
 )
 def test_bad_input_is_one_clear_message(
