@@ -12,8 +12,8 @@ typedef enum {
     BOARD_PRECHARGE = 0,
     BOARD_MAIN_CONTACTOR = 1,
     BOARD_DISCHARGE = 2,
-    BOARD_GATE_DRIVER = 3,  /* supplies the gate driver; off, no gate can close */
-    BOARD_SAFE_STATE = 4,   /* asks the hardware for its safe state, whatever the processor does next */
+    BOARD_GATE_DRIVER = 3, /* supplies the gate driver; off, no gate can close */
+    BOARD_SAFE_STATE = 4,  /* asks the hardware for its safe state, whatever the processor does next */
     BOARD_OUTPUTS = 5
 } board_output_t;
 

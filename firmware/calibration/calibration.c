@@ -36,9 +36,8 @@ float calibration_get(const motor_t *m, calibration_id_t id)
 {
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        return (m->torque_slew == Q15_MAX)
-                   ? 0.0F
-                   : (float)m->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
+        return (m->torque_slew == Q15_MAX) ? 0.0F
+                                           : (float)m->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
     case CALIBRATION_observer_m:
         return 0.25F * (float)m->mrai.pole_gain / (float)m->mrai.r0;
     case CALIBRATION_flux_bandwidth_rad_s:

@@ -34,8 +34,8 @@ typedef struct {
     uint32_t fault_word; /* the drive's */
     float psi_f_Vs, r_ohm;
     uint16_t ecu_faults;
-    uint8_t state;       /* before the fault */
-    uint8_t oldest;      /* sample; the newest is the one before it */
+    uint8_t state;  /* before the fault */
+    uint8_t oldest; /* sample; the newest is the one before it */
     uint8_t frozen;
     FREEZE_FRAME_LIST(FREEZE_FRAME_SIGNAL)
 } freeze_frame_t;

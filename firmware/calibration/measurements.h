@@ -7,8 +7,8 @@
  * Context  1 kHz task; floating point, hence in no interrupt above it */
 #include <stdint.h>
 
-#include "drive/drive.h"
 #include "calibration/measurement_list.h"
+#include "drive/drive.h"
 
 #define MEASUREMENT_TYPE_S16 int16_t
 #define MEASUREMENT_TYPE_U32 uint32_t

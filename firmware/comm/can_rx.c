@@ -116,8 +116,8 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
     }
     rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
     const uint8_t before = channel->e2e.counter;
-    rx_result_t result =
-        check(is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel, frame);
+    rx_result_t result = check(is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel,
+                               frame);
     if (result == RX_ACCEPTED) {
         const bool taken = is_command ? take_command(rx, frame) : take_limits(rx, frame);
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;

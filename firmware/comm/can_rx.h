@@ -29,7 +29,7 @@ typedef struct {
 
 typedef enum {
     RX_ACCEPTED = 0,
-    RX_SYNCED,  /* the first frame: right, not used */
+    RX_SYNCED, /* the first frame: right, not used */
     RX_REPEATED,
     RX_JUMP,
     RX_CRC,

@@ -22,8 +22,8 @@
 
 typedef enum {
     E2E_OK = 0,
-    E2E_SKIPPED,  /* good, one frame before it was lost */
-    E2E_FIRST,    /* good CRC, nothing to compare the counter with: not to be used */
+    E2E_SKIPPED, /* good, one frame before it was lost */
+    E2E_FIRST,   /* good CRC, nothing to compare the counter with: not to be used */
     E2E_REPEATED,
     E2E_JUMP,
     E2E_CRC,

@@ -9,8 +9,8 @@ bool message_inv_status(const telemetry_t *t, uint8_t *data)
     struct bus_inv_status_t m = {0};
     bus_inv_status_put_state(&m, t->state);
     const bool finite = bus_inv_status_put_torque_estimated(&m, t->torque_estimated_Nm) &&
-        bus_inv_status_put_torque_commanded(&m, t->torque_commanded_Nm) &&
-        bus_inv_status_put_speed(&m, t->speed_rpm);
+                        bus_inv_status_put_torque_commanded(&m, t->torque_commanded_Nm) &&
+                        bus_inv_status_put_speed(&m, t->speed_rpm);
     return finite && bus_inv_status_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -21,18 +21,16 @@ bool message_inv_dc_link(const telemetry_t *t, uint8_t *data)
     bus_inv_dc_link_put_refused_reason(&m, t->refused_reason);
     bus_inv_dc_link_put_refused_count(&m, t->refused_count);
     const bool finite = bus_inv_dc_link_put_dc_voltage(&m, t->v_dc_V) &&
-        bus_inv_dc_link_put_dc_current(&m, t->i_dc_A) &&
-        bus_inv_dc_link_put_torque_max(&m, t->torque_max_Nm);
+                        bus_inv_dc_link_put_dc_current(&m, t->i_dc_A) &&
+                        bus_inv_dc_link_put_torque_max(&m, t->torque_max_Nm);
     return finite && bus_inv_dc_link_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
 bool message_inv_currents(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_currents_t m = {0};
-    const bool finite = bus_inv_currents_put_id(&m, t->id_A) &&
-        bus_inv_currents_put_iq(&m, t->iq_A) &&
-        bus_inv_currents_put_id_ref(&m, t->id_ref_A) &&
-        bus_inv_currents_put_iq_ref(&m, t->iq_ref_A);
+    const bool finite = bus_inv_currents_put_id(&m, t->id_A) && bus_inv_currents_put_iq(&m, t->iq_A) &&
+                        bus_inv_currents_put_id_ref(&m, t->id_ref_A) && bus_inv_currents_put_iq_ref(&m, t->iq_ref_A);
     return finite && bus_inv_currents_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -42,10 +40,10 @@ bool message_inv_identification(const telemetry_t *t, uint8_t *data)
     bus_inv_identification_put_psi_clamped(&m, t->psi_clamped);
     bus_inv_identification_put_resistance_clamped(&m, t->r_clamped);
     const bool finite = bus_inv_identification_put_psi_f(&m, t->psi_f_mVs) &&
-        bus_inv_identification_put_resistance(&m, t->r_mohm) &&
-        bus_inv_identification_put_psi_quality(&m, t->psi_quality_percent) &&
-        bus_inv_identification_put_resistance_quality(&m, t->r_quality_percent) &&
-        bus_inv_identification_put_table_scale(&m, t->table_scale_percent);
+                        bus_inv_identification_put_resistance(&m, t->r_mohm) &&
+                        bus_inv_identification_put_psi_quality(&m, t->psi_quality_percent) &&
+                        bus_inv_identification_put_resistance_quality(&m, t->r_quality_percent) &&
+                        bus_inv_identification_put_table_scale(&m, t->table_scale_percent);
     return finite && bus_inv_identification_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -55,7 +53,7 @@ bool message_inv_temperatures(const telemetry_t *t, uint8_t *data)
     bus_inv_temperatures_put_winding_valid(&m, t->winding_valid);
     bus_inv_temperatures_put_inverter_valid(&m, t->inverter_valid);
     const bool finite = bus_inv_temperatures_put_winding(&m, t->winding_C) &&
-        bus_inv_temperatures_put_inverter(&m, t->inverter_C);
+                        bus_inv_temperatures_put_inverter(&m, t->inverter_C);
     return finite && bus_inv_temperatures_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 

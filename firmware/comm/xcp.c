@@ -16,16 +16,37 @@
 static uint8_t needed(uint8_t command)
 {
     static const uint8_t count[] = {
-        BYTES(XCP_CONNECT, 2), BYTES(XCP_DISCONNECT, 1), BYTES(XCP_GET_STATUS, 1), BYTES(XCP_SYNCH, 1),
-        BYTES(XCP_GET_COMM_MODE_INFO, 1), BYTES(XCP_GET_SEED, 3), BYTES(XCP_UNLOCK, 6), BYTES(XCP_SET_MTA, 8),
-        BYTES(XCP_UPLOAD, 2), BYTES(XCP_SHORT_UPLOAD, 8), BYTES(XCP_BUILD_CHECKSUM, 8), BYTES(XCP_DOWNLOAD, 3),
-        BYTES(XCP_SET_CAL_PAGE, 4), BYTES(XCP_GET_CAL_PAGE, 3), BYTES(XCP_GET_PAG_PROCESSOR_INFO, 1),
-        BYTES(XCP_COPY_CAL_PAGE, 5), BYTES(XCP_CLEAR_DAQ_LIST, 4), BYTES(XCP_SET_DAQ_PTR, 6),
-        BYTES(XCP_WRITE_DAQ, 8), BYTES(XCP_SET_DAQ_LIST_MODE, 8), BYTES(XCP_GET_DAQ_LIST_MODE, 4),
-        BYTES(XCP_START_STOP_DAQ_LIST, 4), BYTES(XCP_START_STOP_SYNCH, 2), BYTES(XCP_GET_DAQ_CLOCK, 1),
-        BYTES(XCP_GET_DAQ_PROCESSOR_INFO, 1), BYTES(XCP_GET_DAQ_RESOLUTION_INFO, 1),
-        BYTES(XCP_GET_DAQ_EVENT_INFO, 4), BYTES(XCP_FREE_DAQ, 1), BYTES(XCP_ALLOC_DAQ, 4),
-        BYTES(XCP_ALLOC_ODT, 5), BYTES(XCP_ALLOC_ODT_ENTRY, 6),
+        BYTES(XCP_CONNECT, 2),
+        BYTES(XCP_DISCONNECT, 1),
+        BYTES(XCP_GET_STATUS, 1),
+        BYTES(XCP_SYNCH, 1),
+        BYTES(XCP_GET_COMM_MODE_INFO, 1),
+        BYTES(XCP_GET_SEED, 3),
+        BYTES(XCP_UNLOCK, 6),
+        BYTES(XCP_SET_MTA, 8),
+        BYTES(XCP_UPLOAD, 2),
+        BYTES(XCP_SHORT_UPLOAD, 8),
+        BYTES(XCP_BUILD_CHECKSUM, 8),
+        BYTES(XCP_DOWNLOAD, 3),
+        BYTES(XCP_SET_CAL_PAGE, 4),
+        BYTES(XCP_GET_CAL_PAGE, 3),
+        BYTES(XCP_GET_PAG_PROCESSOR_INFO, 1),
+        BYTES(XCP_COPY_CAL_PAGE, 5),
+        BYTES(XCP_CLEAR_DAQ_LIST, 4),
+        BYTES(XCP_SET_DAQ_PTR, 6),
+        BYTES(XCP_WRITE_DAQ, 8),
+        BYTES(XCP_SET_DAQ_LIST_MODE, 8),
+        BYTES(XCP_GET_DAQ_LIST_MODE, 4),
+        BYTES(XCP_START_STOP_DAQ_LIST, 4),
+        BYTES(XCP_START_STOP_SYNCH, 2),
+        BYTES(XCP_GET_DAQ_CLOCK, 1),
+        BYTES(XCP_GET_DAQ_PROCESSOR_INFO, 1),
+        BYTES(XCP_GET_DAQ_RESOLUTION_INFO, 1),
+        BYTES(XCP_GET_DAQ_EVENT_INFO, 4),
+        BYTES(XCP_FREE_DAQ, 1),
+        BYTES(XCP_ALLOC_DAQ, 4),
+        BYTES(XCP_ALLOC_ODT, 5),
+        BYTES(XCP_ALLOC_ODT_ENTRY, 6),
     };
     return (command < XCP_ALLOC_ODT_ENTRY) ? 0 : count[command - XCP_ALLOC_ODT_ENTRY];
 }
@@ -109,8 +130,8 @@ static xcp_result_t short_upload(xcp_t *xcp, const xcp_config_t *config, const u
     return (moved == XCP_OK) ? upload(xcp, config, command[1], answer, length) : moved;
 }
 
-static xcp_result_t memory_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command,
-                                   uint8_t *answer, uint8_t *length)
+static xcp_result_t memory_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, uint8_t *answer,
+                                   uint8_t *length)
 {
     const uint8_t *data = command->data;
     switch (data[0]) {

@@ -39,14 +39,14 @@ typedef struct {
 
 typedef struct {
     bool connected;
-    bool unlocked;                  /* calibration; measuring needs no key */
+    bool unlocked; /* calibration; measuring needs no key */
     uint8_t ecu_page, xcp_page;
-    uint8_t wrong_keys;             /* at 3 the slave answers no seed before it is reset */
+    uint8_t wrong_keys; /* at 3 the slave answers no seed before it is reset */
     uint32_t seed, seed_counter;
     uint32_t mta;
     uint8_t arrived[XCP_PARAMETERS_MAX]; /* bytes of a parameter that wait for the rest, one bit each */
     uint8_t waiting[4 * XCP_PARAMETERS_MAX];
-    uint32_t generation;            /* counted up when the active values change */
+    uint32_t generation; /* counted up when the active values change */
     xcp_daq_t daq;
     xcp_counts_t counts;
 } xcp_t;

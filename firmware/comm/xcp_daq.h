@@ -45,14 +45,14 @@ typedef struct {
     xcp_list_t list[XCP_DAQ_LISTS];
     xcp_odt_t odt[XCP_DAQ_ODTS];
     xcp_entry_t entry[XCP_DAQ_ENTRIES];
-    uint8_t lists, odts, entries;            /* in use */
-    uint8_t stage; /* of the allocation, which has its order */
-    uint8_t at_list, at_odt, at_entry;       /* where WRITE_DAQ goes */
+    uint8_t lists, odts, entries;      /* in use */
+    uint8_t stage;                     /* of the allocation, which has its order */
+    uint8_t at_list, at_odt, at_entry; /* where WRITE_DAQ goes */
     bool pointer_valid;
     uint16_t now_ms;
     uint8_t step_10us; /* length of a step, rounded: only for the tool */
     can_frame_t queue[XCP_DAQ_QUEUE];
-    uint32_t queued, sent;                   /* count up; the difference waits */
+    uint32_t queued, sent; /* count up; the difference waits */
     uint32_t overloads;
     bool overload_pending;
 } xcp_daq_t;

@@ -26,8 +26,8 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     sample->theta_m = theta_m;
     const angle_tracker_config_t *config = &drive->motor.angle_tracker;
     angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
-    const angle_t angle =
-        settled ? angle_tracker_follow(config, tracker, theta_m) : angle_tracker_step(config, tracker, theta_m);
+    const angle_t angle = settled ? angle_tracker_follow(config, tracker, theta_m)
+                                  : angle_tracker_step(config, tracker, theta_m);
     sample->point.omega = angle.omega_q31;
     sample->theta_e = angle.theta_e;
     if (__builtin_expect(angle.jumped, 0)) {

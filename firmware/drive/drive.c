@@ -6,8 +6,8 @@
 static bool modulate_valid(const modulate_config_t *c)
 {
     return c->longest_q31 > Q31(0.25) && c->longest_q31 <= c->nearer_rail_q31 && c->nearer_rail_q31 <= Q31(0.5) &&
-           c->dead_time_q16 >= 0 && c->dead_time_q16 < Q16(0.2) && c->knee_q17 > 0 &&
-           c->knee_q17 < (1 << 30) && c->knee_side_q17 > 0 && c->knee_side_q17 < (1 << 30);
+           c->dead_time_q16 >= 0 && c->dead_time_q16 < Q16(0.2) && c->knee_q17 > 0 && c->knee_q17 < (1 << 30) &&
+           c->knee_side_q17 > 0 && c->knee_side_q17 < (1 << 30);
 }
 
 /* Three users of one number, 1/2 < v_ratio < 0.7: as it is, its inverse (Q15 * Q16 = Q31), sqrt(3)/2 of it. */
@@ -23,9 +23,9 @@ static bool control_valid(const motor_t *m)
 {
     const current_control_config_t *c = &m->current_control;
     return c->sigma_q24 > 0 && c->setpoint_weight > 0 && c->integral_gain >= 0 && c->integral_gain < Q15(0.5) &&
-           c->tracking_gain_q34 >= 0 && ratio_valid(m) &&
-           m->voltage_reserve.v_ratio > 0 && m->voltage_reserve.trim_min <= 0 && m->voltage_reserve.trim_max >= 0 &&
-           m->torque_loop.authority > 0 && m->torque_loop.torque_min > 0 && modulate_valid(&m->modulate);
+           c->tracking_gain_q34 >= 0 && ratio_valid(m) && m->voltage_reserve.v_ratio > 0 &&
+           m->voltage_reserve.trim_min <= 0 && m->voltage_reserve.trim_max >= 0 && m->torque_loop.authority > 0 &&
+           m->torque_loop.torque_min > 0 && modulate_valid(&m->modulate);
 }
 
 /* (MO-11): the largest distance of two phases is sqrt(3) v_ratio |v|; current control cuts from 31/32 on. 1/v_ratio is
@@ -47,8 +47,8 @@ static bool clear_valid(const motor_t *m)
 static bool quiet_valid(const monitor_config_t *c)
 {
     const int32_t most = c->i_trip - c->zero_max - 1;
-    return c->zero_max > 0 && 3 * c->zero_max <= c->sum_max && most >= 0 &&
-           c->i_normal_squared_q30 >= 0 && c->i_normal_squared_q30 <= most * most;
+    return c->zero_max > 0 && 3 * c->zero_max <= c->sum_max && most >= 0 && c->i_normal_squared_q30 >= 0 &&
+           c->i_normal_squared_q30 <= most * most;
 }
 
 /* (SC-10); the sums of a window are proven for these. */
@@ -61,12 +61,11 @@ bool motor_valid(const motor_t *m)
 {
     return step_valid(&m->bases) && flux_table_valid(&m->flux_table) &&
            current_reference_valid(&m->current_reference) && m->torque_max > 0 &&
-           torque_limit_valid(&m->torque_limit) &&
-           m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) && m->monitor.v_min < m->monitor.v_max &&
-           (uint32_t)m->monitor.v_min > m->current_control.per_ratio_q31 >> 22 &&
+           torque_limit_valid(&m->torque_limit) && m->monitor.i_trip > 0 && m->monitor.i_trip < Q15(0.8) &&
+           m->monitor.v_min < m->monitor.v_max && (uint32_t)m->monitor.v_min > m->current_control.per_ratio_q31 >> 22 &&
            quiet_valid(&m->monitor) && m->safe_state.psi_f > 0 &&
-           m->safe_state.share_open < m->safe_state.share_short && mrai_data_valid(m) &&
-           identify_valid(&m->identify) && control_valid(m) && clear_valid(m);
+           m->safe_state.share_open < m->safe_state.share_short && mrai_data_valid(m) && identify_valid(&m->identify) &&
+           control_valid(m) && clear_valid(m);
 }
 
 void drive_init(drive_t *drive, const motor_t *source)

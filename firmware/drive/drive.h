@@ -14,11 +14,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "control/adapt/dead_time_trim.h"
+#include "control/commission/commission.h"
+#include "control/identify/record.h"
 #include "drive/exchange.h"
 #include "drive/motor.h"
-#include "control/commission/commission.h"
-#include "control/adapt/dead_time_trim.h"
-#include "control/identify/record.h"
 #include "types/features.h"
 #include "types/identification.h"
 #include "types/torque_limits.h"
@@ -40,10 +40,10 @@ typedef struct {
     dq_q15_t i_ref;          /* current mode only */
     torque_limits_t limits;
     bool enable;
-    bool current_mode;   /* commissioning: i_ref directly, no torque path */
+    bool current_mode; /* commissioning: i_ref directly, no torque path */
     bool torque_loop;
     bool identification;
-    bool trim;           /* the dead-time compensation follows what is identified */
+    bool trim; /* the dead-time compensation follows what is identified */
     identification_mode_t identification_mode;
     uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
     uint32_t identification_resets; /* counted up: what was identified is forgotten once */
@@ -69,7 +69,7 @@ typedef struct {
 typedef struct {
     int32_t dead_time; /* q15 */
     int32_t knee_q17;
-    int32_t measured;  /* not zero: this is not motor.toml's */
+    int32_t measured; /* not zero: this is not motor.toml's */
 } compensation_t;
 
 /** Written by the 1 kHz task alone. */
@@ -78,8 +78,8 @@ typedef struct {
     torque_limit_t allowed;
     torque_loop_state_t torque_loop;
     identify_state_t identify;
-    identification_t identification; /* of the law that is chosen */
-    volatile q15_t psi_d_error;      /* of the robust one: the fast ISR copies one half word */
+    identification_t identification;   /* of the law that is chosen */
+    volatile q15_t psi_d_error;        /* of the robust one: the fast ISR copies one half word */
     volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
@@ -88,18 +88,18 @@ typedef struct {
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
     commission_state_t commission;
-    commission_curve_t inverter;    /* voltage error against current, as last measured */
+    commission_curve_t inverter; /* voltage error against current, as last measured */
     compensation_t compensation;
-    uint32_t commissionings;        /* of the request, as far as seen */
-    dq_q15_t i_ref;   /* acts until the next step */
-    dq_q15_t psi_ref; /* tables' flux at the last reference */
+    uint32_t commissionings;     /* of the request, as far as seen */
+    dq_q15_t i_ref;              /* acts until the next step */
+    dq_q15_t psi_ref;            /* tables' flux at the last reference */
     dead_time_trim_state_t trim; /* of the compensation: what driving has added */
-    uint16_t derating;    /* DERATING_...: why less than the request is made */
-    q15_t torque_commanded; /* the limited torque after slew */
-    q15_t torque_corrected; /* after the torque loop: what the current reference is asked for */
+    uint16_t derating;           /* DERATING_...: why less than the request is made */
+    q15_t torque_commanded;      /* the limited torque after slew */
+    q15_t torque_corrected;      /* after the torque loop: what the current reference is asked for */
     run_state_t run_state;
     safe_state_state_t safe_state;
-    bool armed;           /* has run since freewheel was last the safe state: the bridge is powered */
+    bool armed;                     /* has run since freewheel was last the safe state: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as the quality is concerned */

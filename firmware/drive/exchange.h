@@ -14,8 +14,8 @@
 
 #include "control/current/current_control.h"
 #include "control/identify/window.h"
-#include "types/operating_point.h"
 #include "types/frames.h"
+#include "types/operating_point.h"
 #include "types/samples.h"
 
 /** One period as the fast ISR saw it. Writer: fast ISR. Reader: 1 kHz task. */
@@ -25,7 +25,7 @@ typedef struct {
     fx_pair_t i_ab;   /* alpha, beta */
     int32_t zero_q28; /* mean of the phases */
     int32_t v_dc;
-    uint32_t theta_m; /* mechanical, less what the sensor is known to be wrong by */
+    uint32_t theta_m;     /* mechanical, less what the sensor is known to be wrong by */
     bool acting;          /* the bridge was on throughout the last period and is on now */
     bool voltage_limited; /* the circle cut the voltage; a pulse that the bridge cannot make is no lack of it */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */

@@ -10,10 +10,10 @@
  *   unsettled  run_period_unsettled(): the bridge rests or has just been enabled, or a fault or a counter is pending
  *   checked    run_period_checked(): the sample of a usual period is out of its limits; also the end of the unsettled
  * tests/unit/drive/test_fast_isr.c shows that the routes agree. */
+#include "control/current/transform.h"
 #include "drive/acquire.h"
 #include "drive/drive.h"
 #include "drive/publish.h"
-#include "control/current/transform.h"
 #include "hal/pwm.h"
 
 #define DUTY_MIDDLE 16384
@@ -51,8 +51,7 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
 
 /* A limit of the voltage circle or of the pulses acts: the voltage of the next period follows from the duties. */
 static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
-                                                                   modulate_out_t made, fx_pair_t i,
-                                                                   fx_pair_t advanced)
+                                                                   modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
 {
     if (made.limited != 0U) {
         sample->pulses_clamped = true;

@@ -9,13 +9,13 @@
 #include "control/commission/commission.h"
 #include "control/current/angle_tracker.h"
 #include "control/current/current_control.h"
-#include "control/torque/current_reference.h"
 #include "control/current/flux_table.h"
-#include "control/torque/i_d_limit.h"
-#include "control/identify/config.h"
 #include "control/current/measure.h"
 #include "control/current/modulate.h"
+#include "control/identify/config.h"
 #include "control/mrai/mrai.h"
+#include "control/torque/current_reference.h"
+#include "control/torque/i_d_limit.h"
 #include "control/torque/limit.h"
 #include "control/torque/loop.h"
 #include "control/torque/voltage_reserve.h"
@@ -29,16 +29,16 @@ typedef struct {
     const char *name;
     bases_t bases;
     uint8_t adc_bits;
-    uint16_t trim_steps;       /* of learning between two moves of the dead-time compensation */
+    uint16_t trim_steps; /* of learning between two moves of the dead-time compensation */
     float current_full_scale_A;
     float v_dc_full_scale_V;
     float torque_max_Nm;
-    float psi_f_Vs;            /* table value at no current: psi_f^ = psi_f_Vs + dpsi */
+    float psi_f_Vs; /* table value at no current: psi_f^ = psi_f_Vs + dpsi */
     float r_ohm_20;
-    float dead_time_s;         /* of the bridge: modulate.dead_time compensates a fraction of it */
+    float dead_time_s; /* of the bridge: modulate.dead_time compensates a fraction of it */
     q15_t torque_max;
-    q15_t torque_slew;         /* per 1 kHz step; Q15_MAX = open */
-    q15_t torque_slew_weak;    /* the most while the planned flux is below psi_weak: little voltage is left for it */
+    q15_t torque_slew;      /* per 1 kHz step; Q15_MAX = open */
+    q15_t torque_slew_weak; /* the most while the planned flux is below psi_weak: little voltage is left for it */
     q15_t psi_weak;
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;

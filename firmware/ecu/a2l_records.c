@@ -6,7 +6,7 @@
 #include "ecu/ecu.h"
 
 typedef struct {
-    char kind[8];    /* value, measure, frozen, base or step */
+    char kind[8]; /* value, measure, frozen, base or step */
     char name[40];
     char text[80];
     char unit[12];
@@ -34,16 +34,13 @@ typedef struct {
 /* Not static: the link asks for it by name, since no code does. */
 extern const a2l_record_t a2l_records[];
 __attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
-    CALIBRATION_LIST(VALUE) MEASUREMENT_LIST(MEASURE)
-    FROZEN(frozen, U8, "", "1: a fault has frozen the frame")
-    FROZEN(time_ms, U32, "ms", "Time of the fault since the start")
-    FROZEN(fault_word, U32, "", "Faults of the drive, one bit each")
-    FROZEN(ecu_faults, U16, "", "Faults of the supervisor, one bit each")
-    FROZEN(state, U8, "", "State before the fault")
-    FROZEN(psi_f_Vs, F32, "Vs", "Identified magnet flux")
-    FROZEN(r_ohm, F32, "ohm", "Identified resistance")
-    FROZEN(oldest, U8, "", "Index of the oldest of 32 samples, a step apart")
-    FREEZE_FRAME_LIST(SAMPLES)
-    BASE(CURRENT, current_A, "A") BASE(VOLTAGE, voltage_V, "V") BASE(TORQUE, torque_Nm, "Nm")
-    {.kind = "step", .name = "step_s", .unit = "s", .offset = offsetof(motor_t, bases.step_s)},
+    CALIBRATION_LIST(VALUE) MEASUREMENT_LIST(MEASURE) FROZEN(frozen, U8, "", "1: a fault has frozen the frame")
+        FROZEN(time_ms, U32, "ms", "Time of the fault since the start") FROZEN(fault_word, U32, "",
+                                                                               "Faults of the drive, one bit each")
+            FROZEN(ecu_faults, U16, "", "Faults of the supervisor, one bit each") FROZEN(state, U8, "",
+                                                                                         "State before the fault")
+                FROZEN(psi_f_Vs, F32, "Vs", "Identified magnet flux") FROZEN(r_ohm, F32, "ohm", "Identified resistance")
+                    FROZEN(oldest, U8, "", "Index of the oldest of 32 samples, a step apart") FREEZE_FRAME_LIST(SAMPLES)
+                        BASE(CURRENT, current_A, "A") BASE(VOLTAGE, voltage_V, "V") BASE(TORQUE, torque_Nm, "Nm"){
+                            .kind = "step", .name = "step_s", .unit = "s", .offset = offsetof(motor_t, bases.step_s)},
 };

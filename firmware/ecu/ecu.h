@@ -9,16 +9,16 @@
  * Units    per unit inside, the DBC's units on the bus
  * Errors   latched faults of drive and supervisor; told on the bus
  * Context  ecu_init() once; ecu_task_1khz() every bases.periods_per_step periods */
-#include "ecu/arbitration.h"
-#include "drive/drive.h"
-#include "ecu/supervisor.h"
 #include "calibration/xcp_access.h"
 #include "comm/can_rx.h"
 #include "comm/can_tx.h"
+#include "drive/drive.h"
+#include "ecu/arbitration.h"
+#include "ecu/supervisor.h"
 #include "signal/step_clock.h"
 
 typedef struct {
-    uint32_t periods, finished;  /* of the interrupts, at the last task */
+    uint32_t periods, finished;   /* of the interrupts, at the last task */
     uint16_t task_overruns, held; /* the watchdog was not served */
     uint8_t late_in_a_row, stalled_in_a_row;
     bool started;

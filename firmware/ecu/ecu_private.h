@@ -5,8 +5,8 @@
  * and telemetry.
  * Source   docs/howto/can.md
  * Context  1 kHz task; ecu.c only */
-#include "ecu/ecu.h"
 #include "comm/messages.h"
+#include "ecu/ecu.h"
 #include "types/torque_limits.h"
 
 /* Whether the interrupts advance and the task is in time; once per task. */

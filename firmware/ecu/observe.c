@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "ecu/ecu_private.h"
 #include "drive/mrai/mrai_seam.h"
+#include "ecu/ecu_private.h"
 
 #define IN_A_ROW 3U
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */

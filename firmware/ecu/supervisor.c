@@ -96,8 +96,8 @@ static void note(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
     }
     s->fault_count = (s->fault_count < UINT8_MAX) ? (uint8_t)(s->fault_count + 1U) : s->fault_count;
     if (s->first_fault == 0U) {
-        s->first_fault =
-            (uint8_t)((new_drive != 0U) ? 1U + lowest_bit(new_drive) : FIRST_ECU_FAULT + lowest_bit(new_ecu));
+        s->first_fault = (uint8_t)((new_drive != 0U) ? 1U + lowest_bit(new_drive)
+                                                     : FIRST_ECU_FAULT + lowest_bit(new_ecu));
     }
 }
 
@@ -140,9 +140,8 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
            bit_if(in->dc_in_range && in->dc_settled, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
            bit_if(may_discharge, WHEN_DANGEROUS) | bit_if(s->enabled, WHEN_ENABLED) |
            bit_if(!s->enabled && in->torque_arbitrated_is_zero, WHEN_STOPPED) |
-           bit_if(in->torque_arbitrated_is_zero, WHEN_NO_TORQUE) |
-           bit_if(in->derated, WHEN_DERATED) | bit_if(!in->derated, WHEN_FULL) |
-           bit_if(in->slow, WHEN_SLOW) |
+           bit_if(in->torque_arbitrated_is_zero, WHEN_NO_TORQUE) | bit_if(in->derated, WHEN_DERATED) |
+           bit_if(!in->derated, WHEN_FULL) | bit_if(in->slow, WHEN_SLOW) |
            bit_if((s->faults & ECU_FAULT_DISCHARGE) != 0U, WHEN_NOT_DISCHARGING);
 }
 

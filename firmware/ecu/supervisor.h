@@ -53,20 +53,20 @@ typedef enum {
 /** Conditions of a transition, one bit each. */
 typedef enum {
     WHEN_SELF_TEST_PASSED = 1U << 0,
-    WHEN_TRIPPED = 1U << 1,    /* a fault that opened the gates or must do so at once */
-    WHEN_FAULTED = 1U << 2,    /* any latched fault */
-    WHEN_HEALTHY = 1U << 3,    /* none */
-    WHEN_ON = 1U << 4,         /* a live command asks for mode torque */
-    WHEN_OFF = 1U << 5,        /* a live command asks for mode off */
-    WHEN_CHARGED = 1U << 6,    /* dc voltage in range and settled */
+    WHEN_TRIPPED = 1U << 1, /* a fault that opened the gates or must do so at once */
+    WHEN_FAULTED = 1U << 2, /* any latched fault */
+    WHEN_HEALTHY = 1U << 3, /* none */
+    WHEN_ON = 1U << 4,      /* a live command asks for mode torque */
+    WHEN_OFF = 1U << 5,     /* a live command asks for mode off */
+    WHEN_CHARGED = 1U << 6, /* dc voltage in range and settled */
     WHEN_DISCHARGED = 1U << 7,
-    WHEN_DANGEROUS = 1U << 8,  /* not discharged, and discharging has not failed */
-    WHEN_ENABLED = 1U << 9,    /* enable was asked for and granted */
-    WHEN_STOPPED = 1U << 10,   /* not enabled and no torque left */
+    WHEN_DANGEROUS = 1U << 8, /* not discharged, and discharging has not failed */
+    WHEN_ENABLED = 1U << 9,   /* enable was asked for and granted */
+    WHEN_STOPPED = 1U << 10,  /* not enabled and no torque left */
     WHEN_NO_TORQUE = 1U << 11,
     WHEN_DERATED = 1U << 12,
-    WHEN_FULL = 1U << 13,      /* not derated */
-    WHEN_SLOW = 1U << 14,      /* the machine's voltage is below what may be touched: it can feed nothing */
+    WHEN_FULL = 1U << 13,           /* not derated */
+    WHEN_SLOW = 1U << 14,           /* the machine's voltage is below what may be touched: it can feed nothing */
     WHEN_NOT_DISCHARGING = 1U << 15 /* discharging took too long */
 } supervisor_when_t;
 
@@ -82,8 +82,8 @@ typedef struct {
 
 typedef struct {
     uint32_t drive_faults;
-    bool alive;   /* a command was accepted in time */
-    bool failed;  /* command protection: 3 of 10 bad */
+    bool alive;  /* a command was accepted in time */
+    bool failed; /* command protection: 3 of 10 bad */
     bool torque_mode, current_mode;
     bool enable, reset;
     bool torque_requested_is_zero, torque_arbitrated_is_zero;
@@ -101,7 +101,7 @@ typedef struct {
     uint16_t faults;
     uint8_t first_fault, fault_count; /* first: 1 ... 32 drive faults, 33 ... ecu faults */
     uint32_t drive_faults_seen;
-    uint8_t forgetting; /* steps: a reset is on its way to the drive */
+    uint8_t forgetting;           /* steps: a reset is on its way to the drive */
     bool enable_seen, reset_seen; /* as the last live command had them */
     bool enabled;
     refused_t refused;

@@ -7,8 +7,8 @@
  * Units    SI or as the names of telemetry_t say
  * Errors   i_dc is 0 below 1 V
  * Context  1 kHz task; single precision, never in an interrupt */
-#include "drive/drive.h"
 #include "comm/messages.h"
+#include "drive/drive.h"
 
 void telemetry_read(const drive_t *drive, telemetry_t *telemetry);
 

@@ -52,11 +52,11 @@ typedef struct {
     {(from), 14U - (shift), ((n_x) << 14) - 0x4001U, ((n_y) << 14) - 0x4001U, (n_y)}
 
 typedef struct {
-    uint32_t index;  /* of the corner z00 */
-    uint32_t column; /* of that corner: for tables that depend on y alone */
-    fx_pair_t w0;    /* weights of z00 and z01 = z[index + 1] */
-    fx_pair_t w1;    /* weights of z10 = z[index + ny] and z11 */
-    fx_pair_t wy;    /* w0 + w1: of z[column] and z[column + 1] */
+    uint32_t index;   /* of the corner z00 */
+    uint32_t column;  /* of that corner: for tables that depend on y alone */
+    fx_pair_t w0;     /* weights of z00 and z01 = z[index + 1] */
+    fx_pair_t w1;     /* weights of z10 = z[index + ny] and z11 */
+    fx_pair_t wy;     /* w0 + w1: of z[column] and z[column + 1] */
     uint32_t outside; /* not zero: the edge was used */
 } fx_cell_t;
 

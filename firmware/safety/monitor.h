@@ -22,7 +22,7 @@ enum { MONITOR_COUNTING = 1, MONITOR_ANGLE_JUMP = 2 };
 /** q15 in a word each unless the name says otherwise. monitor_is_sample_normal() loads the first four in pairs. */
 typedef struct {
     int32_t i_normal_squared_q30; /* (i_trip - sum_max/3)^2: no phase of a shorter vector exceeds i_trip */
-    int32_t zero_max;  /* a third of sum_max */
+    int32_t zero_max;             /* a third of sum_max */
     int32_t v_min, v_max;
     int32_t i_trip;
     int32_t sum_max;
@@ -30,7 +30,7 @@ typedef struct {
 
 typedef struct {
     uint8_t over_voltage, under_voltage, current_sum, angle;
-    uint8_t pending;   /* MONITOR_...; 0: a normal sample needs no monitor_step() */
+    uint8_t pending; /* MONITOR_...; 0: a normal sample needs no monitor_step() */
 } monitor_state_t;
 
 typedef struct {

@@ -19,12 +19,12 @@
 #include "types/frames.h"
 
 typedef struct {
-    q15_t e_0;                       /* deviation allowed at no current */
-    q15_t i_dead;                    /* a phase current up to this counts as none */
-    q15_t i_alive;                   /* a phase whose reference exceeds this must carry current */
+    q15_t e_0;     /* deviation allowed at no current */
+    q15_t i_dead;  /* a phase current up to this counts as none */
+    q15_t i_alive; /* a phase whose reference exceeds this must carry current */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
-    int16_t deviation_steps;         /* 100 ms: a step counts once while the voltage is cut, else five times */
+    int16_t deviation_steps; /* 100 ms: a step counts once while the voltage is cut, else five times */
     uint8_t lost_steps, equal_steps, fast_steps, hot_steps; /* 10, 20, 5, 110 ms */
 } plausibility_config_t;
 
@@ -37,7 +37,7 @@ typedef struct {
 } plausibility_state_t;
 
 typedef struct {
-    bool acting;          /* the bridge follows its references */
+    bool acting; /* the bridge follows its references */
     bool voltage_limited;
     dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
     abc_q15_t phases;     /* measured */

@@ -35,8 +35,8 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
     const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2);
-    const int32_t limit =
-        fx_mul_q15(allowed, fx_abs_q15(in->omega)) + fx_mul_q15(v_error, fx_add_q15(current, config->i_0));
+    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(in->omega)) +
+                          fx_mul_q15(v_error, fx_add_q15(current, config->i_0));
     const int32_t commanded = fx_mul_q15(in->torque, in->omega);
     if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(in->omega))) {
         return fx_abs_q31(mean) > limit; /* near zero torque both directions count */

@@ -22,27 +22,27 @@
 #include "types/frames.h"
 
 typedef struct {
-    q16_t r;           /* at 20 C */
+    q16_t r; /* at 20 C */
     q15_t psi_f;
-    q15_t t_0;         /* torque error allowed at no torque */
-    q15_t v_0;         /* voltage error of the inverter */
-    q15_t i_0;         /* current error of noise and of the current's zero crossings */
-    q16_t rate_gain;   /* 1/(omega_b task period): flux step to voltage */
-    q15_t mean_rate;   /* of the first-order mean, per step */
+    q15_t t_0;                                       /* torque error allowed at no torque */
+    q15_t v_0;                                       /* voltage error of the inverter */
+    q15_t i_0;                                       /* current error of noise and of the current's zero crossings */
+    q16_t rate_gain;                                 /* 1/(omega_b task period): flux step to voltage */
+    q15_t mean_rate;                                 /* of the first-order mean, per step */
     uint8_t torque_steps, angle_steps, settle_steps; /* 20, 5, 5 ms */
 } torque_monitor_config_t;
 
 typedef struct {
     q31_t deviation;
-    dq_q15_t psi;          /* of the last step */
+    dq_q15_t psi; /* of the last step */
     uint8_t torque, angle, settling;
 } torque_monitor_state_t;
 
 typedef struct {
     bool acting;
-    dq_q15_t u, i, psi;    /* acting voltage, current and the tables' flux there */
+    dq_q15_t u, i, psi; /* acting voltage, current and the tables' flux there */
     q15_t omega;
-    q15_t torque;      /* commanded, as the closed loop follows it */
+    q15_t torque; /* commanded, as the closed loop follows it */
 } torque_monitor_in_t;
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,

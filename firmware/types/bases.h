@@ -11,15 +11,15 @@
 #include <stdint.h>
 
 typedef struct {
-    float voltage_V;    /* V_b, phase peak */
-    float current_A;    /* I_b, phase peak: the full scale of the current measurement */
-    float omega_rad_s;  /* omega_b, electrical */
-    float flux_Vs;      /* psi_b */
-    float resistance_ohm; /* Z_b */
-    float inductance_H; /* L_b */
-    float torque_Nm;    /* T_b */
-    float period_s;     /* T_s: one PWM period, one control period */
-    float step_s;       /* T: one step of the 1 kHz task, periods_per_step T_s */
+    float voltage_V;           /* V_b, phase peak */
+    float current_A;           /* I_b, phase peak: the full scale of the current measurement */
+    float omega_rad_s;         /* omega_b, electrical */
+    float flux_Vs;             /* psi_b */
+    float resistance_ohm;      /* Z_b */
+    float inductance_H;        /* L_b */
+    float torque_Nm;           /* T_b */
+    float period_s;            /* T_s: one PWM period, one control period */
+    float step_s;              /* T: one step of the 1 kHz task, periods_per_step T_s */
     uint32_t periods_per_step; /* N: the whole number of periods nearest to 1 ms, 4 ... 40 */
 } bases_t;
 

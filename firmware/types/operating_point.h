@@ -10,17 +10,17 @@
 
 /** What the flux tables answer at one current. */
 typedef struct {
-    int32_t psi_d;    /* psi_f0 + l_d i_d, nominal magnet */
-    int32_t psi_q;    /* l_q i_q */
-    int32_t psi_f0;   /* psi_d at i_d = 0 for this i_q, nominal magnet */
-    int32_t g;        /* (1/l_dd + 1/l_qq) omega_b T_s/2, as the observer's poles want it */
+    int32_t psi_d;  /* psi_f0 + l_d i_d, nominal magnet */
+    int32_t psi_q;  /* l_q i_q */
+    int32_t psi_f0; /* psi_d at i_d = 0 for this i_q, nominal magnet */
+    int32_t g;      /* (1/l_dd + 1/l_qq) omega_b T_s/2, as the observer's poles want it */
 } flux_point_t;
 
 typedef struct {
-    dq_q15_t i;           /* sampled at the start of this period */
-    dq_q15_t u;           /* acts during this period, in the frame of its middle */
-    flux_point_t flux;  /* at i */
-    q31_t omega;        /* electrical speed */
+    dq_q15_t i;        /* sampled at the start of this period */
+    dq_q15_t u;        /* acts during this period, in the frame of its middle */
+    flux_point_t flux; /* at i */
+    q31_t omega;       /* electrical speed */
 } operating_point_t;
 
 #endif

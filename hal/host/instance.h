@@ -8,10 +8,10 @@
 #include <stddef.h>
 
 #include "ecu/ecu.h"
-#include "storage/memory.h"
 #include "hal/board.h"
 #include "hal/host/fluxtrue.h"
 #include "hal/host/nvm_host.h"
+#include "storage/memory.h"
 #include "types/samples.h"
 
 #define CAN_HOST_QUEUE 64U
@@ -25,7 +25,7 @@ typedef struct {
     can_queue_t received, sent;
     uint32_t lost, bus_off;
     bool output[BOARD_OUTPUTS];
-    bool gate_fault, gate_fault_told; /* the line; told to the drive, once until the gates are closed again */
+    bool gate_fault, gate_fault_told;     /* the line; told to the drive, once until the gates are closed again */
     bool winding_broken, inverter_broken; /* no reading */
     double inverter_C;
     bool watchdog_started;
@@ -47,7 +47,7 @@ struct fluxtrue {
     duty_t duty;
     bool gates;
     bool mrai_pending;
-    uint32_t periods; /* since creation: every periods_per_step-th runs the 1 kHz task */
+    uint32_t periods;           /* since creation: every periods_per_step-th runs the 1 kHz task */
     double torque_requested_Nm; /* as set, without a bus */
 };
 

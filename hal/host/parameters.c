@@ -7,8 +7,8 @@
 #include "drive/mrai/mrai_seam.h"
 #include "hal/host/commissioned.h"
 #include "hal/host/instance.h"
-#include "hal/host/limits.h"
 #include "hal/host/learnt.h"
+#include "hal/host/limits.h"
 #include "hal/host/stations.h"
 
 typedef double (*get_fn)(const fluxtrue_t *);
@@ -205,8 +205,7 @@ static const parameter_t parameters[] = {
     {"commission_r_ohm", commissioned_r_ohm, NULL, 0, 0},
     {"compensation_V", commissioned_level_V, NULL, 0, 0},
     {"compensation_knee_A", commissioned_knee_A, NULL, 0, 0},
-    COMMISSIONED_POINTS(POINT_NAME)
-    {"memory_recalled", get_memory_recalled, NULL, 0, 0},
+    COMMISSIONED_POINTS(POINT_NAME){"memory_recalled", get_memory_recalled, NULL, 0, 0},
     {"memory_saves", get_memory_saves, NULL, 0, 0},
 };
 

@@ -11,12 +11,12 @@
 #include <stdint.h>
 
 enum {
-    AD2S1210_PARITY = 1 << 0,     /* of the configuration */
-    AD2S1210_PHASE = 1 << 1,      /* lock range exceeded */
-    AD2S1210_SPEED = 1 << 2,      /* beyond the largest tracking rate */
-    AD2S1210_TRACKING = 1 << 3,   /* loss of tracking */
-    AD2S1210_MISMATCH = 1 << 4,   /* degradation: sine and cosine differ */
-    AD2S1210_OVERRANGE = 1 << 5,  /* degradation: too large */
+    AD2S1210_PARITY = 1 << 0,    /* of the configuration */
+    AD2S1210_PHASE = 1 << 1,     /* lock range exceeded */
+    AD2S1210_SPEED = 1 << 2,     /* beyond the largest tracking rate */
+    AD2S1210_TRACKING = 1 << 3,  /* loss of tracking */
+    AD2S1210_MISMATCH = 1 << 4,  /* degradation: sine and cosine differ */
+    AD2S1210_OVERRANGE = 1 << 5, /* degradation: too large */
     AD2S1210_SIGNAL_LOSS = 1 << 6,
     AD2S1210_CLIPPED = 1 << 7
 };

@@ -18,8 +18,8 @@ typedef struct {
     uint8_t reserved3[0x160];
     volatile uint8_t IPR[240]; /* 0xE000E400, one byte each */
 } nvic_t;
-_Static_assert(offsetof(nvic_t, ICER) == 0x80 && offsetof(nvic_t, ISPR) == 0x100 &&
-                   offsetof(nvic_t, ICPR) == 0x180 && offsetof(nvic_t, IPR) == 0x300,
+_Static_assert(offsetof(nvic_t, ICER) == 0x80 && offsetof(nvic_t, ISPR) == 0x100 && offsetof(nvic_t, ICPR) == 0x180 &&
+                   offsetof(nvic_t, IPR) == 0x300,
                "NVIC");
 
 #if defined(FAKE_REGISTERS)

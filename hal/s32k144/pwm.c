@@ -30,8 +30,8 @@
 
 static struct {
     uint32_t period;
-    bool gates; /* as last commanded */
-} bridge;       /* together: every period reaches both from one address */
+    bool gates;                       /* as last commanded */
+} bridge;                             /* together: every period reaches both from one address */
 static volatile bool fault_for_board; /* set by the fault interrupt, taken by its reader */
 
 /* Ten bits; beyond them in steps of four, rounded up: never less than asked for. */

@@ -26,7 +26,7 @@ typedef struct {
 
 static struct {
     uint32_t in_a_row;
-    uint32_t last; /* in milliseconds */
+    uint32_t last;                     /* in milliseconds */
 } errors;                              /* written by the sequence errors' interrupt */
 static volatile uint32_t milliseconds; /* written by the 1 kHz task */
 

@@ -27,9 +27,9 @@ reset_cause_t hal_system_reset_cause(void)
         uint32_t bit;
         reset_cause_t meaning;
     } known[] = {
-        {RCM_SRS_POR, RESET_POWER_ON},     {RCM_SRS_WDOG, RESET_WATCHDOG}, {RCM_SRS_LOCKUP, RESET_LOCKUP},
-        {RCM_SRS_LOC, RESET_CLOCK},        {RCM_SRS_LOL, RESET_CLOCK},     {RCM_SRS_SW, RESET_SOFTWARE},
-        {RCM_SRS_LVD, RESET_BROWN_OUT},    {RCM_SRS_PIN, RESET_PIN},
+        {RCM_SRS_POR, RESET_POWER_ON},  {RCM_SRS_WDOG, RESET_WATCHDOG}, {RCM_SRS_LOCKUP, RESET_LOCKUP},
+        {RCM_SRS_LOC, RESET_CLOCK},     {RCM_SRS_LOL, RESET_CLOCK},     {RCM_SRS_SW, RESET_SOFTWARE},
+        {RCM_SRS_LVD, RESET_BROWN_OUT}, {RCM_SRS_PIN, RESET_PIN},
     };
     for (uint32_t k = 0; k < sizeof known / sizeof known[0]; k++) {
         if ((cause & known[k].bit) != 0U) {
@@ -140,5 +140,5 @@ __attribute__((section(".vectors"), used)) static const vector_t vectors[VECTORS
 };
 
 /* Keys, protection off, FSEC: not secured, FOPT: as delivered. */
-__attribute__((section(".flash_config"), used)) static const uint32_t flash_config[4] = {
-    0xFFFFFFFFU, 0xFFFFFFFFU, 0xFFFFFFFFU, 0xFFFF7FFEU};
+__attribute__((section(".flash_config"), used)) static const uint32_t flash_config[4] = {0xFFFFFFFFU, 0xFFFFFFFFU,
+                                                                                         0xFFFFFFFFU, 0xFFFF7FFEU};

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import cantools
 from cantools.database.can import Database
+from protection import protect
 
 from fluxtrue_tools.sim import motor as sim_motor
 from fluxtrue_tools.sim.build import MotorFolder
-from protection import protect
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 from ecu import load_dbc
+
 from fluxtrue_tools.bus.states import PAGE, TABLE, draw, read_table, with_drawing
 
 

@@ -4,7 +4,6 @@
 import math
 
 import pytest
-
 from ecu import COMMAND, LIMITS, Ecu
 from protection import protect
 
@@ -67,8 +66,9 @@ def test_no_torque_exceeds_what_the_machine_may_give(running: Ecu) -> None:
 # Forwards: 100 rad/s of the rotor. Positive torque drives, negative brakes.
 @pytest.mark.parametrize(("speed", "torque_Nm", "wanted"), [
     (100.0, 80.0, 30.0), (100.0, -80.0, -20.0), (-100.0, 80.0, 20.0), (-100.0, -80.0, -30.0)])  # fmt: skip
-def test_drive_and_regen_limits_hold_in_four_quadrants(running: Ecu, speed: float, torque_Nm: float,
-                                                       wanted: float) -> None:
+def test_drive_and_regen_limits_hold_in_four_quadrants(
+    running: Ecu, speed: float, torque_Nm: float, wanted: float
+) -> None:
     for _ in range(100):
         running.speed_rad_s += speed / 100.0
         running.run(1)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ecu import ROOT, Ecu
+
 from fluxtrue_tools.motor.bases import periods_per_step
 from fluxtrue_tools.sim import motor as sim_motor
 

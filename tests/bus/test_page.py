@@ -6,6 +6,7 @@ import re
 import pytest
 from cantools.database import load_file
 from cantools.database.can import Database, Message
+
 from fluxtrue_tools.bus import DBC
 
 ROOT = DBC.parents[2]

@@ -5,7 +5,6 @@ import itertools
 
 import numpy as np
 import pytest
-
 from ecu import COMMAND, Ecu
 from protection import crc8, crc_of, protect
 

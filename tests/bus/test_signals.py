@@ -9,7 +9,6 @@ import pytest
 from cantools.database.can import Message
 from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
-
 from ecu import BUILD, load_dbc
 
 DBC = load_dbc()

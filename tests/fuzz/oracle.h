@@ -11,10 +11,10 @@
 #include "types/can_frame.h"
 
 typedef struct {
-    int last_counter;    /* -1: not synchronised */
+    int last_counter;     /* -1: not synchronised */
     uint32_t accepted_ms; /* time of the last accepted frame */
     bool alive;
-    char history[10];    /* 'g'ood or 'b'ad, newest first */
+    char history[10]; /* 'g'ood or 'b'ad, newest first */
 } oracle_channel_t;
 
 typedef struct {

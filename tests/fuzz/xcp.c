@@ -26,8 +26,12 @@ static uint32_t key(uint32_t seed)
     return ~seed;
 }
 
-static const xcp_config_t config = {.memory = {areas, 1}, .working = working, .reference = reference,
-                                    .limits = limits, .parameters = PARAMETERS, .key = key};
+static const xcp_config_t config = {.memory = {areas, 1},
+                                    .working = working,
+                                    .reference = reference,
+                                    .limits = limits,
+                                    .parameters = PARAMETERS,
+                                    .key = key};
 
 /* xorshift64* */
 static uint32_t below(uint32_t count)

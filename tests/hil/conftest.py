@@ -9,7 +9,11 @@ from pathlib import Path
 
 import can
 import cantools.database
+import health
 import pytest
+from report import Figures, Report
+from rig import Rig
+
 from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.bus.address import BusAddress, parse_option
 from fluxtrue_tools.errors import FluxtrueError
@@ -17,10 +21,6 @@ from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.mdf import BusLog
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
-
-import health
-from report import Figures, Report
-from rig import Rig
 
 ROOT = Path(__file__).resolve().parents[2]
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
@@ -41,8 +41,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--can-option", action="append", default=[], metavar="NAME=VALUE",
                     help="further argument of can.Bus, for example host=127.0.0.1, bitrate=500000")  # fmt: skip
     group.addoption("--bench", metavar="HOST:PORT", help="bench channel of the plant behind that interface")
-    group.addoption("--clock", metavar="HOST:PORT",
-                    help="bench channel that only lets time pass: a virtual ECU with --fast as a bench")
+    group.addoption(
+        "--clock",
+        metavar="HOST:PORT",
+        help="bench channel that only lets time pass: a virtual ECU with --fast as a bench",
+    )
     group.addoption("--allow-power", action="store_true",
                     help="on a bench: tests may charge the dc link, close the gates and ask for torque")  # fmt: skip
     group.addoption("--elf", help="the ECU's ELF file: where its calibration values are; default: --vecu")

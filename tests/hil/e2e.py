@@ -6,7 +6,7 @@ profile undoes the standard's start value and final inversion: both are 0 here.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 POLYNOMIAL = 0x11D  # x^8 + x^4 + x^3 + x^2 + 1
 COUNTERS = 15  # 0 ... 14
@@ -21,7 +21,7 @@ def remainder(bits: int, polynomial: int = POLYNOMIAL) -> int:
     return bits
 
 
-@lru_cache(maxsize=None)
+@cache
 def _share(byte: int, behind: int) -> int:
     """What a byte with so many bytes behind it adds to the remainder: division is linear."""
     return remainder(byte << 8 * (behind + 1))

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fluxtrue_tools.demo.experiment import Bound
 from jinja2 import Environment
 from numpy.typing import ArrayLike
+
+from fluxtrue_tools.demo.experiment import Bound
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
 POINTS = 50  # measured one by one: shown as such
@@ -20,6 +21,7 @@ Line = tuple[str, ArrayLike, ArrayLike]
 
 def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -> str:
     import matplotlib.pyplot as plt  # a second that a run without plots does not need
+
     from fluxtrue_tools.sim.plot import STYLE
 
     with plt.rc_context(STYLE | {"svg.hashsalt": title}):

@@ -12,14 +12,14 @@ from typing import Any
 
 import can
 import cantools.database
+import e2e
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from progress import BenchTime
+
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.stepped import SteppedBus
-from numpy.typing import NDArray
-
-import e2e
-from progress import BenchTime
 
 COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"

@@ -9,10 +9,10 @@ from pathlib import Path
 import can
 import cantools.database
 import pytest
-from fluxtrue_tools.vecu.process import HOST, VirtualEcu
-
 from progress import HANG_S
 from rig import COMMAND, STATUS, Rig
+
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 pytestmark = pytest.mark.program
 HERE = Path(__file__).parent

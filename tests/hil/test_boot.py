@@ -2,7 +2,6 @@
 """Start-up: who talks, how often, and what an ECU that nobody commands does."""
 
 import pytest
-
 from rig import COMMAND, MS, STATUS, Rig
 
 VERSION = "INV_Version"

@@ -4,12 +4,12 @@
 from collections.abc import Iterator
 
 import can
+import e2e
 import numpy as np
 import pytest
-from fluxtrue_tools.vecu.stepped import client_port
-
-import e2e
 from rig import COMMAND, MS, Command, Rig
+
+from fluxtrue_tools.vecu.stepped import client_port
 
 FULL = 38  # frames of 8 bytes in 10 ms: more than 500 kbit/s carry
 TRUTH = "truth.torque_shaft_mean_Nm"

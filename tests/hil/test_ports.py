@@ -11,11 +11,11 @@ from pathlib import Path
 
 import can
 import pytest
+from progress import HANG_S
+
 from fluxtrue_tools.vecu.channel import BenchRefused, Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import client_port, connect
-
-from progress import HANG_S
 
 pytestmark = pytest.mark.program
 STATUS_ID = 0x210

@@ -12,11 +12,10 @@ then counter and range checks stand behind the CRC.
 from collections.abc import Callable
 from itertools import combinations
 
+import e2e
 import numpy as np
 import pytest
 from crccheck.crc import Crc8Base
-
-import e2e
 from rig import COMMAND, MS, Rig
 
 BITS = 64

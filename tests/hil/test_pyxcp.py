@@ -11,16 +11,16 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from progress import HANG_S, polled
+from pyxcp.config import create_application_from_config
+from pyxcp.master import Master
+from pyxcp.types import XcpResponseError
+from xcp_master import key_of
+
 from fluxtrue_tools.a2l.cli import render
 from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
-from pyxcp.config import create_application_from_config
-from pyxcp.master import Master
-from pyxcp.types import XcpResponseError
-
-from progress import HANG_S, polled
-from xcp_master import key_of
 
 pytestmark = pytest.mark.program
 ROOT = Path(__file__).resolve().parents[2]

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import cantools.database
 import pytest
+from rig import Rig
+
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
-
-from rig import Rig
 
 FLASH_BYTES = 4096
 LEARNT = ("psi_f_Vs", "lq_scale", "ld_scale")

@@ -4,7 +4,6 @@
 import can
 import numpy as np
 import pytest
-
 from health import JITTER_S
 from report import Figures
 from rig import Rig

@@ -4,7 +4,6 @@
 from typing import Any
 
 import pytest
-
 from rig import Rig
 
 REFUSED = ("none", "torque_request_not_zero", "fault", "dc_voltage_out_of_range", "sensor_implausible", "not_ready",
@@ -89,7 +88,7 @@ def test_disable_under_torque_ramps_to_zero_and_then_opens_the_gates(rig: Rig) -
     rig.ask(enable=False)
     rig.wait_for("ready", 0.5)
     commands = rig.series("INV_Status", "TorqueCommanded", rig.now_s - 0.2)[1]
-    assert 0.0 <= commands.min() and commands[-1] == 0.0
+    assert commands.min() >= 0.0 and commands[-1] == 0.0
 
 
 @pytest.mark.plant

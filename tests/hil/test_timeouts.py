@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-
 from report import Figures
 from rig import MS, Rig
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fluxtrue_tools.demo.step import overshoot_percent, rise_ms
-
 from report import Figures
 from rig import Rig, Trace
+
+from fluxtrue_tools.demo.step import overshoot_percent, rise_ms
 
 # Everything wrong at once, as in the demonstration: noise, a winding at 118 C that reports 20 C, a magnet 15 % weaker.
 WRONG: dict[str, Any] = {"r_ohm_20": 0.025, "current_noise_A_rms": 0.5, "magnet_scale": 0.85}

@@ -3,11 +3,11 @@
 
 import numpy as np
 import pytest
-from fluxtrue_tools.a2l.elf import Description
-
 from report import Figures
 from rig import Rig
 from xcp_master import DENIED, LOCKED, OUT_OF_RANGE, Master, XcpError
+
+from fluxtrue_tools.a2l.elf import Description
 
 TRUTH = "truth.torque_shaft_mean_Nm"
 

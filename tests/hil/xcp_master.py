@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from rig import MS, Frame, Rig
+
 from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
 from fluxtrue_tools.a2l.elf import Description, Value
-from numpy.typing import NDArray
-
-from rig import MS, Frame, Rig
 
 FORMATS = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
 POSITIVE, NEGATIVE = 0xFF, 0xFE

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from fluxtrue_tools.vecu.channel import Channel
-from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+from progress import HANG_S
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
-from progress import HANG_S
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 ROOT = Path(__file__).resolve().parents[2]
 CHROMIUM, DRIVER = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")

@@ -7,6 +7,7 @@ from pathlib import Path
 import cantools.database
 import numpy as np
 import pytest
+
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Recorder

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 from asammdf import MDF
+from conftest import Server
+from progress import HANG_S, until
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
-
-from conftest import Server
-from progress import HANG_S, until
 
 PATIENCE_S = 60.0  # of simulated time
 HAND_TIMEOUT_S = 0.3  # docs/howto/live.md

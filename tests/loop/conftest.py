@@ -2,6 +2,7 @@
 """The machines, loaded once."""
 
 import pytest
+
 from fluxtrue_tools.demo.experiment import Bench, bench
 from fluxtrue_tools.sim.motor import Motor
 

@@ -4,6 +4,7 @@
 import math
 
 import pytest
+
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 

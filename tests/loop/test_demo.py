@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.demo import report, step
 from fluxtrue_tools.demo.all import Demonstration, demonstrate
 from fluxtrue_tools.demo.experiment import Bench, Bound, Result

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import check, effects
 from fluxtrue_tools.sim.library import Loop, LoopError

@@ -2,6 +2,7 @@
 """Every experiment of tools/demo within its bounds, written down here a second time."""
 
 import pytest
+
 from fluxtrue_tools.demo import grid, paper, step
 from fluxtrue_tools.demo.experiment import Bench, Result
 

@@ -4,6 +4,7 @@
 import math
 
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import MEMORY_SIZE, Loop
 from fluxtrue_tools.sim.motor import Motor

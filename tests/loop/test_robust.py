@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
-from numpy.typing import NDArray
 
 RPM = 2.0 * math.pi / 60.0
 PER_S = 10000

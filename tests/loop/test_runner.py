@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.library import Loop, LoopError

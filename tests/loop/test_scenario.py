@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.build import locate
@@ -62,8 +63,10 @@ def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
         (HEAD + "[profile]\ntorque_Nm = [[0, 1], [0, 2], [0, 3]]", "at most two points"),
         (HEAD + "[mechanics]\nmode = 'free'", "mechanics.mode = 'free'"),
         (HEAD + "[mechanics]\nmode = 'inertia'\n[profile]\nspeed_rpm = [[0, 0], [1, 1]]", "initial speed"),
-        (HEAD + "[[event]]\nt = 1\nset = { enable = false }",
-         "event.0.t = 1 s: after the end, allowed: from 0 up to and without duration_s = 0.05 s"),
+        (
+            HEAD + "[[event]]\nt = 1\nset = { enable = false }",
+            "event.0.t = 1 s: after the end, allowed: from 0 up to and without duration_s = 0.05 s",
+        ),
         (HEAD + "[[event]]\nt = 0", "event.0.set: missing, wanted"),
         (HEAD + "[[event]]\nt = 0\nset = {}", "event.0.set"),
         (HEAD + "[event]\nt = 0\nset = { enable = true }", "allowed: tables [[event]]"),
@@ -77,8 +80,7 @@ def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
         (HEAD + "[window]\nfrom_s = 0.04\nto_s = 0.03", "window: 0.04 to 0.03 s"),
         (HEAD + "[window]\nto_s = 1", "window"),
         (
-            HEAD + "[profile]\nmagnet_scale = [[0, 1], [1, 0.9]]\n"
-            "[[event]]\nt = 0\nset = { 'plant.magnet_scale' = 1 }",
+            HEAD + "[profile]\nmagnet_scale = [[0, 1], [1, 0.9]]\n[[event]]\nt = 0\nset = { 'plant.magnet_scale' = 1 }",
             "the profile drives it",
         ),
         ("motor = ", "not valid TOML"),
@@ -100,21 +102,22 @@ def test_a_bad_scenario_is_refused_in_one_line_that_names_file_and_field(text: s
     ("text", "message"),
     [
         ("[controller]\nobserver_n = 3", "controller.observer_n = 3: no such name, allowed: observer_m"),
-        ("[controller]\nidentification_mode = 'paper'\nobserver_m = 30",
-         "controller.observer_m = 30, allowed: 2 to 4"),
+        ("[controller]\nidentification_mode = 'paper'\nobserver_m = 30", "controller.observer_m = 30, allowed: 2 to 4"),
         ("[controller]\npsi_f_Vs = 0.07", "controller.psi_f_Vs = 0.07 V·s: read only"),
         ("[profile]\ntorque_Nm = 1e6", "profile.torque_Nm = 1000000.0 N·m, allowed: -132 to 132 N·m"),
-        ("[profile]\ntorque_Nm = [[0, 0], [0.04, 1e6]]",
-         "profile.torque_Nm reaches 1e+06 N·m at t = 0.04 s, allowed: -132 to 132 N·m"),
+        (
+            "[profile]\ntorque_Nm = [[0, 0], [0.04, 1e6]]",
+            "profile.torque_Nm reaches 1e+06 N·m at t = 0.04 s, allowed: -132 to 132 N·m",
+        ),
         ("[plant]\ndead_time_s = 1", "plant.dead_time_s = 1 s, allowed: from 0 and below 5e-05 s"),
-        ("[[event]]\nt = 0.01\nset = { 'plant.vdc' = 3 }",
-         "event.0.set.plant.vdc = 3: no such name, allowed: plant.vdc_V"),
+        (
+            "[[event]]\nt = 0.01\nset = { 'plant.vdc' = 3 }",
+            "event.0.set.plant.vdc = 3: no such name, allowed: plant.vdc_V",
+        ),
         ("[[event]]\nt = 0.01\nset = { 'plant.vdc_V' = -3 }", "event.0.set.plant.vdc_V = -3 V, allowed: above 0 V"),
     ],
 )
-def test_what_only_the_library_can_know_is_refused_in_one_line_too(
-    hsm1: Motor, text: str, message: str
-) -> None:
+def test_what_only_the_library_can_know_is_refused_in_one_line_too(hsm1: Motor, text: str, message: str) -> None:
     with pytest.raises(FluxtrueError) as refusal:
         simulate(parse(HEAD + text, "bad.toml"), hsm1, where="bad.toml")
     line = str(refusal.value)

@@ -11,6 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+
 from fluxtrue_tools import faults
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import plot

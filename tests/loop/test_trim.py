@@ -3,9 +3,10 @@
 
 import numpy as np
 import pytest
+from test_robust import CONFIDENCE, RATED_NM, SOFT, STIFF, TORQUE, Drive
+
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
-from test_robust import CONFIDENCE, RATED_NM, SOFT, STIFF, TORQUE, Drive
 
 VDC_V, PWM_HZ = 350.0, 1e4
 NOTHING: dict[str, float] = {}

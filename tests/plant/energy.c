@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "energy.h"
 
-void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to,
-                     const double u_s[2], const double i_s[2], double h)
+void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to, const double u_s[2],
+                     const double i_s[2], double h)
 {
     double swept = 0.0;
     for (int k = 0; k < 2; k++) {
@@ -15,8 +15,7 @@ void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, con
     e->iron += 0.75 * m->iron_A_per_Vs * swept;
 }
 
-void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms,
-                     double h)
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms, double h)
 {
     e->torque += h * torque_Nm;
     e->torque_shaft += h * (torque_Nm - viscous_Nms * speed_rad_s);

@@ -27,12 +27,11 @@ static inline instant_t energy_instant(const machine_t *m)
 }
 
 /** Adds a substep of length h from one instant to the other, with its mid-point current i_s. */
-void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to,
-                     const double u_s[2], const double i_s[2], double h);
+void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, const instant_t *to, const double u_s[2],
+                     const double i_s[2], double h);
 
 /** The mechanical part: mean torque of the substep, speed in its middle. */
-void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms,
-                     double h);
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms, double h);
 
 /** Mean of the constant u_s over the substep in the rotor frame that turns by 2 x half_rad. */
 void energy_voltage(energy_t *e, const double u_s[2], turn_t mid, double half_rad, double h);

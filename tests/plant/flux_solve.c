@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-static double miss(flux_fn_t *flux, const void *model, const double psi[2], const double i[2],
-                   double r[2], double jac[4])
+static double miss(flux_fn_t *flux, const void *model, const double psi[2], const double i[2], double r[2],
+                   double jac[4])
 {
     flux(model, i, r, jac);
     r[0] = psi[0] - r[0];

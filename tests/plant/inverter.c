@@ -33,8 +33,7 @@ static void leg_on(inverter_t *v, int x, double duty, double dead)
     v->zone_A[x] = SWITCHING_ZONE_A;
 }
 
-void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on,
-                  double vdc_V)
+void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V)
 {
     const double dead = p->ideal_inverter ? 0.0 : p->dead_time_s * p->pwm_hz;
     const double drop = p->ideal_inverter ? 0.0 : p->device_drop_V;
@@ -71,8 +70,7 @@ static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], 
 static int consistent(const inverter_t *v, const double error_V[3], const double i_abc[3])
 {
     for (int x = 0; x < 3; x++) {
-        if (v->hi_V[x] + v->lo_V[x] > 0.0 &&
-            !(error_V[x] > 0.0 ? i_abc[x] > v->zone_A[x] : i_abc[x] < -v->zone_A[x])) {
+        if (v->hi_V[x] + v->lo_V[x] > 0.0 && !(error_V[x] > 0.0 ? i_abc[x] > v->zone_A[x] : i_abc[x] < -v->zone_A[x])) {
             return 0;
         }
     }
@@ -107,8 +105,7 @@ static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, con
     }
     const double soft = v->zone_A[0] / bound; /* no bound at all: the legs were exact */
     const double per_det = h / (jac[0] * jac[3] - jac[1] * jac[2]);
-    const double a[4] = {jac[3] * per_det + soft, -jac[1] * per_det, -jac[2] * per_det,
-                         jac[0] * per_det + soft};
+    const double a[4] = {jac[3] * per_det + soft, -jac[1] * per_det, -jac[2] * per_det, jac[0] * per_det + soft};
     double ab[2], dq[2], error_dq[2], e[3];
     from_phases(free_A, ab);
     to_rotor(end, ab, dq);
@@ -134,8 +131,7 @@ static void solve_errors(inverter_t *v, double gain[3][3], const double free_A[3
         moved = 0.0;
         for (int x = 0; x < 3; x++) {
             const double *g = gain[x], *e = v->error_V;
-            const double drive =
-                free_A[x] - (g[0] * e[0] + g[1] * e[1] + g[2] * e[2]) + g[x] * e[x];
+            const double drive = free_A[x] - (g[0] * e[0] + g[1] * e[1] + g[2] * e[2]) + g[x] * e[x];
             const double bound = drive > 0.0 ? v->hi_V[x] : v->lo_V[x];
             if (bound > 0.0) {
                 const double now = clamp(drive / (g[x] + v->zone_A[x] / bound), -bound, bound);
@@ -148,8 +144,8 @@ static void solve_errors(inverter_t *v, double gain[3][3], const double free_A[3
     }
 }
 
-void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start,
-                      turn_t end, double u_s[2], double i_end_dq[2])
+void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start, turn_t end,
+                      double u_s[2], double i_end_dq[2])
 {
     double i[2], i_s[2], i_abc[3], error_V[3] = {0.0, 0.0, 0.0}, gain[3][3], free_A[3];
     if (!v->exact) {
@@ -168,8 +164,7 @@ void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h,
         if (!consistent(v, error_V, i_abc)) {
             current_gain(m, h, end, gain);
             for (int x = 0; x < 3; x++) {
-                free_A[x] = i_abc[x] + gain[x][0] * error_V[0] + gain[x][1] * error_V[1] +
-                            gain[x][2] * error_V[2];
+                free_A[x] = i_abc[x] + gain[x][0] * error_V[0] + gain[x][1] * error_V[1] + gain[x][2] * error_V[2];
             }
             if (!hold_all(v, m, h, end, free_A)) {
                 solve_errors(v, gain, free_A);

@@ -20,12 +20,11 @@ typedef struct {
 } inverter_t;
 
 /** The legs of one period. */
-void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on,
-                  double vdc_V);
+void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V);
 
 /** Voltage of one substep (stationary frame), terminal current at its end (rotor frame). */
-void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start,
-                      turn_t end, double u_s[2], double i_end_dq[2]);
+void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start, turn_t end,
+                      double u_s[2], double i_end_dq[2]);
 
 /** Mean dc current of the substep for the given phase currents. */
 double inverter_dc_current(const inverter_t *v, const double i_abc[3]);

@@ -10,8 +10,7 @@
 
 static flux_model_t model_of(const machine_t *m, const plant_params_t *p, const plant_map_t *map)
 {
-    const double magnet =
-        p->magnet_scale * (1.0 + p->magnet_temp_coeff_per_K * (p->rotor_C - 20.0));
+    const double magnet = p->magnet_scale * (1.0 + p->magnet_temp_coeff_per_K * (p->rotor_C - 20.0));
     const double nominal = map != NULL ? m->psi_nominal_Vs : p->psi_f_Vs;
     const double cross = map != NULL ? p->cross_saturation_scale : 0.0;
     return (flux_model_t){.map = map,
@@ -54,8 +53,7 @@ static void model_flux(const void *context, const double i[2], double psi[2], do
 static void search_current(machine_t *m, double i[2])
 {
     double jac[4];
-    if (flux_solve(model_flux, &m->flux, m->psi_dq, i, jac) != 0 ||
-        jac[0] * jac[3] == jac[1] * jac[2]) {
+    if (flux_solve(model_flux, &m->flux, m->psi_dq, i, jac) != 0 || jac[0] * jac[3] == jac[1] * jac[2]) {
         m->failures++;
         return;
     }
@@ -103,9 +101,8 @@ void machine_create(machine_t *m, const plant_params_t *p, const plant_map_t *ma
 
 static int same_model(const flux_model_t *a, const flux_model_t *b)
 {
-    return a->ld_H == b->ld_H && a->lq_H == b->lq_H && a->slope == b->slope &&
-           a->cross == b->cross && a->q == b->q && a->offset_Vs == b->offset_Vs &&
-           a->psi_f_Vs == b->psi_f_Vs;
+    return a->ld_H == b->ld_H && a->lq_H == b->lq_H && a->slope == b->slope && a->cross == b->cross && a->q == b->q &&
+           a->offset_Vs == b->offset_Vs && a->psi_f_Vs == b->psi_f_Vs;
 }
 
 void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double omega_e)
@@ -113,8 +110,7 @@ void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double o
     const double w = omega_e;
     m->pole_pairs = p->pole_pairs;
     m->r_ohm = p->r_ohm_20 * (1.0 + p->r_temp_coeff_per_K * (p->winding_C - 20.0));
-    m->iron_A_per_Vs =
-        (p->iron_k_h * w / sqrt(w * w + IRON_SIGN_RAD_S * IRON_SIGN_RAD_S) + p->iron_k_e * w) / 1.5;
+    m->iron_A_per_Vs = (p->iron_k_h * w / sqrt(w * w + IRON_SIGN_RAD_S * IRON_SIGN_RAD_S) + p->iron_k_e * w) / 1.5;
     const flux_model_t now = model_of(m, p, m->flux.map);
     if (same_model(&now, &m->flux)) {
         return;
@@ -140,8 +136,7 @@ void machine_current(const machine_t *m, double i_dq[2])
     i_dq[1] = m->im_dq[1] + m->iron_A_per_Vs * m->psi_dq[0];
 }
 
-void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end,
-                     double i_dq[2])
+void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end, double i_dq[2])
 {
     double i[2], i_s[2], psi[2], r[2], step[2];
     machine_current(m, i);

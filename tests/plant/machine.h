@@ -43,8 +43,7 @@ void machine_set_current(machine_t *m, const double im_dq[2], turn_t turn);
 void machine_current(const machine_t *m, double i_dq[2]);
 
 /** Terminal current at the end of a substep with voltage u_s, linearised. */
-void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end,
-                     double i_dq[2]);
+void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end, double i_dq[2]);
 
 /** One substep of length h; i_mid_s: the terminal current in its middle. */
 void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end);

@@ -22,8 +22,7 @@ void mechanics_set(mechanics_t *m, double theta_m_rad, double speed_rad_s)
     m->speed_rad_s = speed_rad_s;
 }
 
-double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm,
-                           double h)
+double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm, double h)
 {
     if (p->imposed_speed) {
         return m->speed_rad_s;
@@ -31,8 +30,7 @@ double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double
     return m->speed_rad_s + 0.5 * h * acceleration(p, torque_Nm, m->speed_rad_s);
 }
 
-void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm,
-                    double h)
+void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm, double h)
 {
     m->theta_m_rad = wrap_turn(m->theta_m_rad + h * mid_rad_s);
     if (!p->imposed_speed) {

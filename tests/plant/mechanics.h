@@ -16,12 +16,10 @@ typedef struct {
 void mechanics_set(mechanics_t *m, double theta_m_rad, double speed_rad_s);
 
 /** Speed in the middle of the coming substep. */
-double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm,
-                           double h);
+double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm, double h);
 
 /** Ends the substep that ran at mid_rad_s with the mean air-gap torque. */
-void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm,
-                    double h);
+void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm, double h);
 
 double wrap_turn(double angle_rad);
 

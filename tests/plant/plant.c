@@ -103,8 +103,7 @@ const plant_truth_t *plant_truth(const plant_t *plant)
     return &plant->truth;
 }
 
-void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad,
-                     double speed_rad_s)
+void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad, double speed_rad_s)
 {
     const double time_s = plant->truth.time_s, im_dq[2] = {id_A, iq_A};
     if (plant->params.imposed_speed) {

@@ -17,9 +17,8 @@
 typedef struct plant plant_t;
 
 typedef struct {
-    double ia_A, ib_A,
-        ic_A;           /* as the chain delivers them: gain, offset, noise, quantised, saturated */
-    int32_t i_count[3]; /* converter counts, mid-scale is zero current */
+    double ia_A, ib_A, ic_A; /* as the chain delivers them: gain, offset, noise, quantised, saturated */
+    int32_t i_count[3];      /* converter counts, mid-scale is zero current */
     double vdc_V;
     int32_t vdc_count;
     double theta_m_rad; /* [0, 2 pi) */
@@ -57,8 +56,7 @@ plant_params_t *plant_params(plant_t *plant);
 
 /** Puts the machine into a given state (magnetising currents; an imposed speed becomes this one)
  * and clears the energy integrals; time runs on. */
-void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad,
-                     double speed_rad_s);
+void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_rad, double speed_rad_s);
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 

@@ -38,8 +38,7 @@ static void fill_inside(const plant_map_t *map, map_node_t *node, const double *
     }
     for (int k = 0; k < nd * nq; k++) {
         const int i = k / nq, j = k % nq;
-        first[i * row + j].v[MAP_TWIST] =
-            plant_map_slope(q, &first[i * row].v[MAP_BY_D], stride, nq, j);
+        first[i * row + j].v[MAP_TWIST] = plant_map_slope(q, &first[i * row].v[MAP_BY_D], stride, nq, j);
     }
 }
 
@@ -52,17 +51,14 @@ static void hermite(double a, double b, double sa, double sb, double p[4])
     p[3] = 2.0 * (a - b) + sa + sb;
 }
 
-static void fill_cell(const map_node_t *n00, const map_node_t *n10, double hd, double hq, int axis,
-                      map_cell_t *cell)
+static void fill_cell(const map_node_t *n00, const map_node_t *n10, double hd, double hq, int axis, map_cell_t *cell)
 {
     const double *v00 = n00->v, *v01 = n00[1].v, *v10 = n10->v, *v11 = n10[1].v;
     double row[4][4]; /* value at t = 0, value at t = 1, slope at 0, slope at 1, over u */
     hermite(v00[MAP_F], v01[MAP_F], v00[MAP_BY_Q] * hq, v01[MAP_BY_Q] * hq, row[0]);
     hermite(v10[MAP_F], v11[MAP_F], v10[MAP_BY_Q] * hq, v11[MAP_BY_Q] * hq, row[1]);
-    hermite(v00[MAP_BY_D] * hd, v01[MAP_BY_D] * hd, v00[MAP_TWIST] * hd * hq,
-            v01[MAP_TWIST] * hd * hq, row[2]);
-    hermite(v10[MAP_BY_D] * hd, v11[MAP_BY_D] * hd, v10[MAP_TWIST] * hd * hq,
-            v11[MAP_TWIST] * hd * hq, row[3]);
+    hermite(v00[MAP_BY_D] * hd, v01[MAP_BY_D] * hd, v00[MAP_TWIST] * hd * hq, v01[MAP_TWIST] * hd * hq, row[2]);
+    hermite(v10[MAP_BY_D] * hd, v11[MAP_BY_D] * hd, v10[MAP_TWIST] * hd * hq, v11[MAP_TWIST] * hd * hq, row[3]);
     for (int j = 0; j < 4; j++) {
         double p[4];
         hermite(row[0][j], row[1][j], row[2][j], row[3][j], p);
@@ -80,8 +76,7 @@ void plant_map_fill_cells(plant_map_t *map, map_nodes_t *nodes, map_block_t bloc
         for (int j = block.q0; j < block.q1; j++) {
             for (int axis = 0; axis < 2; axis++) {
                 const map_node_t *node = &nodes->psi[axis][i * row + j];
-                fill_cell(node, node + row, d[i + 1] - d[i], q[j + 1] - q[j], axis,
-                          &map->cell[i * (row - 1) + j]);
+                fill_cell(node, node + row, d[i + 1] - d[i], q[j + 1] - q[j], axis, &map->cell[i * (row - 1) + j]);
             }
         }
     }
@@ -164,8 +159,7 @@ static int allocate(plant_map_t *map, map_nodes_t *nodes, int nd, int nq)
 }
 
 /* 0: the map cannot be inverted. */
-static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs,
-                const double *psi_q_Vs)
+static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs, const double *psi_q_Vs)
 {
     const int edge = MAP_BEYOND;
     const map_block_t inside = {edge, map->d.n - 1 - edge, edge, map->q.n - 1 - edge};
@@ -173,16 +167,15 @@ static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs,
     fill_inside(map, nodes->psi[1], psi_q_Vs);
     plant_map_fill_cells(map, nodes, inside);
     const map_margin_t least = plant_map_margin(map, inside);
-    if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) ||
-        !plant_map_go_beyond(map, nodes, least)) {
+    if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) || !plant_map_go_beyond(map, nodes, least)) {
         return 0;
     }
     fill_zero(map);
     return 1;
 }
 
-plant_map_t *plant_map_create(const double *id_A, int nd, const double *iq_A, int nq,
-                              const double *psi_d_Vs, const double *psi_q_Vs)
+plant_map_t *plant_map_create(const double *id_A, int nd, const double *iq_A, int nq, const double *psi_d_Vs,
+                              const double *psi_q_Vs)
 {
     if (nd < 2 || nq < 2 || nd > 10000 || nq > 10000 || !axis_ok(id_A, nd) || !axis_ok(iq_A, nq) ||
         !all_finite(psi_d_Vs, nd * nq) || !all_finite(psi_q_Vs, nd * nq)) {

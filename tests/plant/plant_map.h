@@ -14,19 +14,18 @@ typedef struct plant_map plant_map_t;
 
 /** Full plane, row-major [i_d][i_q], at least 2 x 2, axes strictly increasing. Copies the data.
  * NULL: bad size, a non-monotone axis, a non-finite number, a singular incremental inductance. */
-plant_map_t *plant_map_create(const double *id_A, int nd, const double *iq_A, int nq,
-                              const double *psi_d_Vs, const double *psi_q_Vs);
+plant_map_t *plant_map_create(const double *id_A, int nd, const double *iq_A, int nq, const double *psi_d_Vs,
+                              const double *psi_q_Vs);
 void plant_map_destroy(plant_map_t *map);
 
 /** jac = {dpsi_d/di_d, dpsi_d/di_q, dpsi_q/di_d, dpsi_q/di_q}; may be NULL. */
-void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs,
-                    double *psi_q_Vs, double jac[4]);
+void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs, double *psi_q_Vs,
+                    double jac[4]);
 
 /** psi_d(0, i_q) and its slope, cheaper than the whole map. */
 double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H);
 
 /** Damped Newton from the given currents (any start) to 1e-10 Vs. 0, or -1. */
-int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A,
-                     double *iq_A);
+int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A, double *iq_A);
 
 #endif

@@ -63,8 +63,7 @@ static far_t far_of(const edge_t *e)
     return (far_t){fmax(sum / e->count, 0.5 * most), 0.5 * (low + high)};
 }
 
-static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, shape_t k,
-                  int out_by)
+static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, shape_t k, int out_by)
 {
     const int at = j * e->along, to = at + out_by * e->out, by_n = e->by_n, by_t = e->by_t;
     const int stride = (int)(sizeof *e->n / sizeof(double)) * e->along;
@@ -74,8 +73,7 @@ static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, 
     const double level = fade->cross * (n[MAP_F] - far->level_Vs), more = n[by_n] - far->slope_H;
     double *to_n = e->n[to].v, *to_t = e->t[to].v;
 
-    to_n[MAP_F] = n[MAP_F] + (k.cross - 1.0) * level +
-                  sign * (k.own * more + k.x * far->slope_H);
+    to_n[MAP_F] = n[MAP_F] + (k.cross - 1.0) * level + sign * (k.own * more + k.x * far->slope_H);
     to_n[by_n] = sign * k.cross_x * level + k.own_x * more + far->slope_H;
     to_n[by_t] = n[by_t] + (k.cross - 1.0) * c + sign * k.own * n[MAP_TWIST];
     to_n[MAP_TWIST] = sign * k.cross_x * c + k.own_x * n[MAP_TWIST];
@@ -101,14 +99,11 @@ static void extend(const edge_t *e, const fade_t *fade)
 
 /* The longest fade and the largest cross part that leave the given margins. Without a cross part
  * and near 0 J tends to the edge's own with a growing share of the far slope: that one passes. */
-static int extend_within(plant_map_t *map, map_nodes_t *nodes, const edge_t *e, map_block_t block,
-                         map_margin_t least)
+static int extend_within(plant_map_t *map, map_nodes_t *nodes, const edge_t *e, map_block_t block, map_margin_t least)
 {
     for (int part = 4; part >= 0; part--) {
         for (int halve = 0; halve < (part > 0 ? 4 : 20); halve++) {
-            const fade_t fade = {.near_A = ldexp(0.4 * e->reach_A, -halve),
-                                 .far_A = e->reach_A,
-                                 .cross = 0.25 * part};
+            const fade_t fade = {.near_A = ldexp(0.4 * e->reach_A, -halve), .far_A = e->reach_A, .cross = 0.25 * part};
             extend(e, &fade);
             plant_map_fill_cells(map, nodes, block);
             const map_margin_t got = plant_map_margin(map, block);
@@ -125,28 +120,49 @@ static map_margin_t share(map_margin_t m, double part)
     return (map_margin_t){part * m.d, part * m.q, part * m.det};
 }
 
-int plant_map_go_beyond(plant_map_t *map, map_nodes_t *nodes, map_margin_t least)
+static int extend_d(plant_map_t *map, map_nodes_t *nodes, int up, map_margin_t least)
 {
     const int b = MAP_BEYOND, row = map->q.n, d_hi = map->d.n - 1 - b, q_hi = map->q.n - 1 - b;
-    double *d = map->d.node, *q = map->q.node;
-    for (int up = 0; up < 2; up++) {
-        const int i = up ? d_hi : b, from = i * row + b;
-        const edge_t e = {&nodes->psi[0][from], &nodes->psi[1][from], q_hi - b + 1, 1,
-                          up ? row : -row, MAP_BY_D, MAP_BY_Q, up ? 1.0 : -1.0, &q[b], &d[i],
-                          fmax(fabs(d[b]), fabs(d[d_hi]))};
-        const map_block_t strip = {up ? d_hi : 0, up ? d_hi + b : b, b, q_hi};
-        if (!extend_within(map, nodes, &e, strip, share(least, 0.5))) {
-            return 0;
-        }
-    }
-    for (int up = 0; up < 2; up++) { /* the corners with them */
-        const int j = up ? q_hi : b;
-        const edge_t e = {&nodes->psi[1][j], &nodes->psi[0][j], map->d.n, row, up ? 1 : -1,
-                          MAP_BY_Q, MAP_BY_D, up ? 1.0 : -1.0, d, &q[j], fmax(fabs(q[b]), fabs(q[q_hi]))};
-        const map_block_t strip = {0, d_hi + b, up ? q_hi : 0, up ? q_hi + b : b};
-        if (!extend_within(map, nodes, &e, strip, share(least, 0.25))) {
-            return 0;
-        }
-    }
-    return 1;
+    double *d = map->d.node;
+    const int i = up ? d_hi : b, from = i * row + b;
+    const edge_t e = {.n = &nodes->psi[0][from],
+                      .t = &nodes->psi[1][from],
+                      .count = q_hi - b + 1,
+                      .along = 1,
+                      .out = up ? row : -row,
+                      .by_n = MAP_BY_D,
+                      .by_t = MAP_BY_Q,
+                      .sign = up ? 1.0 : -1.0,
+                      .x = &map->q.node[b],
+                      .line = &d[i],
+                      .reach_A = fmax(fabs(d[b]), fabs(d[d_hi]))};
+    const map_block_t strip = {up ? d_hi : 0, up ? d_hi + b : b, b, q_hi};
+    return extend_within(map, nodes, &e, strip, share(least, 0.5));
+}
+
+/* With the corners, hence after the d axis. */
+static int extend_q(plant_map_t *map, map_nodes_t *nodes, int up, map_margin_t least)
+{
+    const int b = MAP_BEYOND, row = map->q.n, d_hi = map->d.n - 1 - b, q_hi = map->q.n - 1 - b;
+    double *q = map->q.node;
+    const int j = up ? q_hi : b;
+    const edge_t e = {.n = &nodes->psi[1][j],
+                      .t = &nodes->psi[0][j],
+                      .count = map->d.n,
+                      .along = row,
+                      .out = up ? 1 : -1,
+                      .by_n = MAP_BY_Q,
+                      .by_t = MAP_BY_D,
+                      .sign = up ? 1.0 : -1.0,
+                      .x = map->d.node,
+                      .line = &q[j],
+                      .reach_A = fmax(fabs(q[b]), fabs(q[q_hi]))};
+    const map_block_t strip = {0, d_hi + b, up ? q_hi : 0, up ? q_hi + b : b};
+    return extend_within(map, nodes, &e, strip, share(least, 0.25));
+}
+
+int plant_map_go_beyond(plant_map_t *map, map_nodes_t *nodes, map_margin_t least)
+{
+    return extend_d(map, nodes, 0, least) && extend_d(map, nodes, 1, least) && extend_q(map, nodes, 0, least) &&
+           extend_q(map, nodes, 1, least);
 }

@@ -48,8 +48,7 @@ static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[
     }
 }
 
-void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs,
-                    double *psi_q_Vs, double jac[4])
+void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs, double *psi_q_Vs, double jac[4])
 {
     double psi[2], unused[4];
     patch(map, locate(&map->d, id_A), locate(&map->q, iq_A), psi, jac != NULL ? jac : unused);
@@ -57,8 +56,7 @@ void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *ps
     *psi_q_Vs = psi[1];
 }
 
-void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2],
-                         double jac[4])
+void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2], double jac[4])
 {
     const double *d = &map->d.node[i], *q = &map->q.node[j];
     patch(map, (spot_t){.k = i, .t = t, .per_h = 1.0 / (d[1] - d[0])},
@@ -79,8 +77,7 @@ static void map_flux(const void *map, const double i[2], double psi[2], double j
     plant_map_flux(map, i[0], i[1], &psi[0], &psi[1], jac);
 }
 
-int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A,
-                     double *iq_A)
+int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A, double *iq_A)
 {
     const double psi[2] = {psi_d_Vs, psi_q_Vs};
     double i[2] = {*id_A, *iq_A}, jac[4];

@@ -55,8 +55,7 @@ void plant_map_fill_cells(plant_map_t *map, map_nodes_t *nodes, map_block_t bloc
 map_margin_t plant_map_margin(const plant_map_t *map, map_block_t block);
 
 /* Flux and its derivatives (as plant_map_flux()) at t, u of cell (i, j). */
-void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2],
-                         double jac[4]);
+void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2], double jac[4]);
 
 /* Nodes and cells beyond the four edges; least: of the inside. 0 when they cannot be inverted. */
 int plant_map_go_beyond(plant_map_t *map, map_nodes_t *nodes, map_margin_t least);

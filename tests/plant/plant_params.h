@@ -16,8 +16,8 @@ typedef struct {
     double magnet_scale;                                     /* of psi_f = psi_d(0, 0), (PL-4) */
     double magnet_temp_coeff_per_K, rotor_C;                 /* further factor on psi_f, (PL-4) */
     double lq_scale, ld_slope_scale, cross_saturation_scale; /* (PL-4) */
-    double iron_k_h, iron_k_e;     /* W/(rad/s Vs^2), W/(rad/s Vs)^2, (PL-8) */
-    int magnet_step_keeps_current; /* 0: flux linkage is continuous; 1: current is, (PL-6) */
+    double iron_k_h, iron_k_e;                               /* W/(rad/s Vs^2), W/(rad/s Vs)^2, (PL-8) */
+    int magnet_step_keeps_current;                           /* 0: flux linkage is continuous; 1: current is, (PL-6) */
     /* inverter */
     double vdc_V, vdc_ripple_V, vdc_ripple_hz;
     double pwm_hz, dead_time_s, device_drop_V;

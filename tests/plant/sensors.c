@@ -73,8 +73,7 @@ static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_trut
     }
 }
 
-void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth,
-                    plant_sensors_t *out)
+void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth, plant_sensors_t *out)
 {
     for (int x = 0; x < 3; x++) {
         sample_current(s, p, x, truth->i_abc_A[x]);

@@ -21,7 +21,6 @@ typedef struct {
 
 void sensors_create(sensors_t *s, const plant_params_t *p);
 
-void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth,
-                    plant_sensors_t *out);
+void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth, plant_sensors_t *out);
 
 #endif

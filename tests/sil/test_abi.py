@@ -197,10 +197,7 @@ def test_whatever_comes_in_the_outputs_stay_duties(make: Callable[[], Drive]) ->
         if rng.random() < 0.2:
             drive.set("enable", 1.0)
             drive.set("torque_requested_Nm", rng.uniform(-130.0, 130.0))
-        sample = [
-            rng.choice(special) if rng.random() < 0.02 else rng.uniform(-300.0, 400.0)
-            for _ in range(6)
-        ]
+        sample = [rng.choice(special) if rng.random() < 0.02 else rng.uniform(-300.0, 400.0) for _ in range(6)]
         out = drive.step(sample)
         assert all(0.0 <= duty <= 1.0 for duty in out[:3])
         assert out[3] in (0.0, 1.0)

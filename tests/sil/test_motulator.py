@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fluxtrue_tools.demo.grid import allowed_percent
 from motulator.drive import model
 from motulator.drive.utils import SynchronousMachinePars
 from sil import OK, Drive, load
+
+from fluxtrue_tools.demo.grid import allowed_percent
 
 PERIOD_S = 1e-4
 RAMP_S = 0.1
@@ -68,9 +69,7 @@ def mean(drive: Any, end: float) -> float:
     return float(np.trapezoid(torque[some], now[some]) / (now[some][-1] - now[some][0]))
 
 
-@pytest.mark.parametrize(
-    ("speed_rpm", "torque_Nm"), [(1500.0, 40.0), (3000.0, 80.0), (-1500.0, 40.0), (1000.0, -80.0)]
-)
+@pytest.mark.parametrize(("speed_rpm", "torque_Nm"), [(1500.0, 40.0), (3000.0, 80.0), (-1500.0, 40.0), (1000.0, -80.0)])
 def test_torque_of_a_foreign_machine_with_weak_magnets_comes_back(speed_rpm: float, torque_Nm: float) -> None:
     alone, closed = shaft(speed_rpm, torque_Nm)
     error = 100.0 * (alone / torque_Nm - 1.0)

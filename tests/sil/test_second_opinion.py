@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fluxtrue_tools.sim.build import prepare
 from gym_electric_motor.physical_systems.electric_motors import PermanentMagnetSynchronousMotor
 from motulator.drive import model
 from motulator.drive.utils import SynchronousMachinePars
 from sil import OK, Drive, load_library
+
+from fluxtrue_tools.sim.build import prepare
 
 MOTORS = Path(__file__).resolve().parents[1] / "motors"
 PLANTS = int(os.environ.get("FLUXTRUE_PLANTS", "3"))

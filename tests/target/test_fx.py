@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from unicorn import UC_HOOK_CODE
+
 from fluxtrue_tools import bench
 from fluxtrue_tools.bench import build, fx_cases, fx_tables
 from fluxtrue_tools.bench.machine import Elf, Machine, instructions
 from fluxtrue_tools.bench.peers import PEERS
-from unicorn import UC_HOOK_CODE
 
 ROWS = 30000
 NAMES = sorted(
@@ -56,17 +57,13 @@ def rows() -> np.ndarray:
     corners = np.array(sorted({*fx_cases.CORNERS_Q15, *fx_cases.CORNERS_Q31, 32768, 65535, 31, 32}))
     pairs = np.stack([axis.ravel() for axis in np.meshgrid(corners, corners)], axis=1)
     pairs = np.column_stack([pairs, rng.permutation(pairs[:, 0])])
-    every = np.column_stack(
-        [np.arange(-32768, 32768), rng.permutation(65536) - 32768, rng.permutation(65536) - 32768]
-    )
+    every = np.column_stack([np.arange(-32768, 32768), rng.permutation(65536) - 32768, rng.permutation(65536) - 32768])
     random = rng.integers(-(2**31), 2**31, (ROWS, 3)) >> rng.integers(0, 32, (ROWS, 3))
     return np.ascontiguousarray(np.concatenate([pairs, every, random]), dtype=np.int32)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_target_and_host_agree_bit_for_bit(
-    name: str, program: Path, host: ctypes.CDLL, rows: np.ndarray
-) -> None:
+def test_target_and_host_agree_bit_for_bit(name: str, program: Path, host: ctypes.CDLL, rows: np.ndarray) -> None:
     machine = Machine(program)
     here = np.empty(len(rows), dtype=np.int64)
     function = getattr(host, f"batch_{name}")
@@ -107,9 +104,7 @@ def test_cost_and_error_stay_inside_the_promise(
 
 
 @pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
-def test_no_peer_is_both_faster_and_more_accurate(
-    results: dict[str, bench.Result], peer: bench.peers.Peer
-) -> None:
+def test_no_peer_is_both_faster_and_more_accurate(results: dict[str, bench.Result], peer: bench.peers.Peer) -> None:
     rivals = [result for result in results.values() if result.group == peer.function]
     assert rivals
     for result in rivals:
@@ -123,9 +118,7 @@ def test_no_peer_is_both_faster_and_more_accurate(
     [("sincos", (12345,)), ("atan2", (-7, 9)), ("atan2", (0, 0)), ("sqrt_q31", (123456,)),
      ("div_q31", (-5, 7)), ("five_tables", (40000, -3)), ("nothing", (0,))],
 )  # fmt: skip
-def test_counting_by_block_equals_counting_one_by_one(
-    program: Path, name: str, arguments: tuple[int, ...]
-) -> None:
+def test_counting_by_block_equals_counting_one_by_one(program: Path, name: str, arguments: tuple[int, ...]) -> None:
     by_block = Machine(program).count(f"bench_{name}", *arguments)[1]
     single = Machine(program)
     seen: list[int] = []
@@ -140,7 +133,7 @@ def test_counting_by_block_equals_counting_one_by_one(
 
 def test_instructions_of_two_and_four_bytes_are_told_apart() -> None:
     # bx lr; nop; smmlar r2, r1, r0, r3 (4 bytes); b.n
-    code = bytes.fromhex("7047" "00bf" "51fb1032" "fee7")
+    code = bytes.fromhex("704700bf51fb1032fee7")
     assert instructions(code) == 4
 
 

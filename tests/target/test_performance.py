@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 from click.testing import CliRunner
+
 from fluxtrue_tools.bench import build
 from fluxtrue_tools.bench.cli import bench
 

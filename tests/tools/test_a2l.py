@@ -11,6 +11,7 @@ from pathlib import Path
 import pya2l
 import pytest
 from click.testing import CliRunner
+
 from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID, a2l, render
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.errors import FluxtrueError

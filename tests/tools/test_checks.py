@@ -4,8 +4,7 @@
 import importlib
 import subprocess
 import sys
-from collections.abc import Iterable
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -133,9 +132,7 @@ def test_a_clean_tree_passes(tree: Path, name: str) -> None:
         ("tests/support/twin/bad.c", '"control/mrai/mrai.h"', "not firmware/control/mrai/mrai.h"),
     ],
 )
-def test_a_planted_include_against_the_layers_is_found(
-    tree: Path, path: str, include: str, word: str
-) -> None:
+def test_a_planted_include_against_the_layers_is_found(tree: Path, path: str, include: str, word: str) -> None:
     write(tree, "hal/host/port.h", "")
     write(tree, "firmware/comm/messages.h", "")
     write(tree, path, f"#  include {include}\n")

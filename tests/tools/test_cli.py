@@ -26,7 +26,7 @@ def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[], object]],
         def probe(count: int | None) -> object:
             return body()
 
-        setattr(module, "probe", probe)
+        module.probe = probe
         monkeypatch.setitem(sys.modules, "probe_module", module)
         monkeypatch.setattr(cli, "COMMANDS", {"probe": ("probe_module", "probe", "A probe.")})
 

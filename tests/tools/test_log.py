@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from asammdf import MDF, Signal
 from click.testing import CliRunner, Result
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.cli import log
 from fluxtrue_tools.log.decode import DBC, signals_of

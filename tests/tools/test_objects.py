@@ -74,9 +74,7 @@ def test_a_folder_without_layers_is_an_error(tmp_path: Path) -> None:
         ("float sinf(float);\nfloat f(float a) { return sinf(a); }", "sinf"),
     ],
 )
-def test_a_division_or_a_float_on_the_target_is_found(
-    tmp_path: Path, source: str, word: str
-) -> None:
+def test_a_division_or_a_float_on_the_target_is_found(tmp_path: Path, source: str, word: str) -> None:
     assert word in check(tmp_path, source + "\n", ARM)
 
 
@@ -91,10 +89,7 @@ def test_an_interrupt_of_the_drive_is_held_to_the_rule_and_a_task_is_not(tmp_pat
 
 @needs_arm
 def test_fixed_point_code_and_names_like_instructions_pass(tmp_path: Path) -> None:
-    source = (
-        "int valid(int);\n"
-        "int f(int a, short b) { return valid((int)(((long long)a * b + 0x4000) >> 15)) / 8; }\n"
-    )
+    source = "int valid(int);\nint f(int a, short b) { return valid((int)(((long long)a * b + 0x4000) >> 15)) / 8; }\n"
     assert check(tmp_path, source, ARM) == ""
 
 

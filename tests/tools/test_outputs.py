@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 import pytest
+
 from fluxtrue_tools import cli, paths
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import Outputs, write_text
@@ -14,7 +15,7 @@ from fluxtrue_tools.outputs import Outputs, write_text
 
 def declare(path: object, **options: object) -> Outputs:
     outputs = Outputs()
-    outputs.file("--out", Path(str(path)) if path else Path(""), **options)  # type: ignore[arg-type]
+    outputs.file("--out", Path(str(path)) if path else Path(), **options)  # type: ignore[arg-type]
     return outputs
 
 

@@ -69,9 +69,7 @@ def test_bash_accepts_the_script(script: str) -> None:
     subprocess.run(["bash", "-n", str(TOOLS / script)], check=True)
 
 
-def test_a_finished_set_up_is_silent_and_uses_no_package_manager(
-    checkout: Path, bare_path: Path
-) -> None:
+def test_a_finished_set_up_is_silent_and_uses_no_package_manager(checkout: Path, bare_path: Path) -> None:
     stub(bare_path, "ninja", "exit 0")
     done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
@@ -97,9 +95,7 @@ def test_without_root_the_missing_package_is_named(checkout: Path, bare_path: Pa
     stub(bare_path, "id", "echo 1000")
     done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
     assert done.returncode == 2
-    assert done.stderr == (
-        "error: missing packages, and no root rights to install them: ninja-build\n"
-    )
+    assert done.stderr == ("error: missing packages, and no root rights to install them: ninja-build\n")
 
 
 def test_a_failed_python_set_up_leaves_nothing_behind(checkout: Path, bare_path: Path) -> None:

@@ -57,7 +57,7 @@ static void do_hello(bench_t *bench, int client, const arguments_t *a)
     (void)a;
     const vecu_t *v = bench->vecu;
     bench_say(bench, client, "ok fluxtrue-vecu 1 %s period_ns=%" PRIu64 " now_ns=%" PRIu64,
-        bench->realtime ? "realtime" : "fast", v->period_ns, v->now_ns);
+              bench->realtime ? "realtime" : "fast", v->period_ns, v->now_ns);
 }
 
 static void do_names(bench_t *bench, int client, const arguments_t *a)
@@ -200,13 +200,14 @@ static void do_counters(bench_t *bench, int client, const arguments_t *a)
     const line_counts_t own = line_server_counts(bench->server);
     (void)a;
     bench_say(bench, client,
-        "ok malformed=%" PRIu64 " dropped=%" PRIu64 " from_clients=%" PRIu64 " to_ecu=%" PRIu64 " from_ecu=%" PRIu64
-        " ecu_lost=%" PRIu64 " bus_frames=%" PRIu64 " bus_bits=%" PRIu64 " bus_lost=%" PRIu64 " load=%.6f"
-        " load_peak=%.6f own_load_peak=%.6f windows=%" PRIu64 " windows_over=%" PRIu64 " slow_clients=%" PRIu64
-        " bench_refused=%" PRIu64 " bench_dropped=%" PRIu64,
-        h.malformed, h.lines.dropped, h.from_clients, h.to_ecu, h.from_ecu, h.ecu_lost, h.bus.frames, h.bus.bits,
-        h.bus.lost, h.bus.load, h.bus.load_peak, h.bus.own_load_peak, h.bus.windows, h.bus.windows_over,
-        h.lines.slow_clients + own.slow_clients, bench->refused, own.dropped);
+              "ok malformed=%" PRIu64 " dropped=%" PRIu64 " from_clients=%" PRIu64 " to_ecu=%" PRIu64
+              " from_ecu=%" PRIu64 " ecu_lost=%" PRIu64 " bus_frames=%" PRIu64 " bus_bits=%" PRIu64 " bus_lost=%" PRIu64
+              " load=%.6f"
+              " load_peak=%.6f own_load_peak=%.6f windows=%" PRIu64 " windows_over=%" PRIu64 " slow_clients=%" PRIu64
+              " bench_refused=%" PRIu64 " bench_dropped=%" PRIu64,
+              h.malformed, h.lines.dropped, h.from_clients, h.to_ecu, h.from_ecu, h.ecu_lost, h.bus.frames, h.bus.bits,
+              h.bus.lost, h.bus.load, h.bus.load_peak, h.bus.own_load_peak, h.bus.windows, h.bus.windows_over,
+              h.lines.slow_clients + own.slow_clients, bench->refused, own.dropped);
 }
 
 static void do_reset(bench_t *bench, int client, const arguments_t *a)
@@ -231,8 +232,8 @@ void bench_obey(bench_t *bench, int client, char *text)
     static const struct {
         const char *name;
         void (*act)(bench_t *, int, const arguments_t *);
-    } commands[] = {{"hello", do_hello}, {"names", do_names},   {"set", do_set}, {"get", do_get},
-                    {"ramp", do_ramp},   {"record", do_record}, {"run", do_run}, {"hash", do_hash},
+    } commands[] = {{"hello", do_hello},       {"names", do_names},   {"set", do_set}, {"get", do_get},
+                    {"ramp", do_ramp},         {"record", do_record}, {"run", do_run}, {"hash", do_hash},
                     {"counters", do_counters}, {"reset", do_reset}};
     arguments_t a = {.count = 0};
     char *rest = text;
@@ -251,4 +252,3 @@ void bench_obey(bench_t *bench, int client, char *text)
     }
     REFUSE("unknown command, wanted: hello names set get ramp record run hash counters reset");
 }
-

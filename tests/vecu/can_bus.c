@@ -80,8 +80,8 @@ static int arbitrate(const can_bus_t *bus, uint64_t until_ns, uint64_t *start_ns
     for (int i = 0; i < CAN_BUS_NODES && *start_ns < until_ns; i++) {
         const can_bus_node_t *n = &bus->node[i];
         if (n->count > 0U && n->entry[n->first].arrival_ns <= *start_ns &&
-            (winner < 0 || rank(&n->entry[n->first].frame) <
-                               rank(&bus->node[winner].entry[bus->node[winner].first].frame))) {
+            (winner < 0 ||
+             rank(&n->entry[n->first].frame) < rank(&bus->node[winner].entry[bus->node[winner].first].frame))) {
             winner = i;
         }
     }

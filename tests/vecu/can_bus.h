@@ -30,8 +30,8 @@ typedef struct {
 
 typedef struct {
     uint64_t frames, bits, lost;
-    double load, load_peak;       /* of the last complete window; the largest so far; 1 = the wire was never idle */
-    double own_load_peak;         /* what the ECU's own frames came to */
+    double load, load_peak;         /* of the last complete window; the largest so far; 1 = the wire was never idle */
+    double own_load_peak;           /* what the ECU's own frames came to */
     uint64_t windows, windows_over; /* complete ones; those beyond CAN_BUS_LOAD_MAX */
 } can_bus_counts_t;
 

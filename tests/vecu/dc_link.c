@@ -8,8 +8,7 @@
 void dc_link_params_default(dc_link_params_t *p, double battery_V)
 {
     /* Assumed: 500 uF, charged to 95 % in 60 ms, discharged to 5 % in 0.3 s. */
-    *p = (dc_link_params_t){
-        .battery_V = battery_V, .capacitance_F = 500e-6, .precharge_s = 0.02, .discharge_s = 0.1};
+    *p = (dc_link_params_t){.battery_V = battery_V, .capacitance_F = 500e-6, .precharge_s = 0.02, .discharge_s = 0.1};
 }
 
 double dc_link_step(const dc_link_params_t *p, dc_link_switches_t s, double v_V, double i_bridge_A, double dt_s)

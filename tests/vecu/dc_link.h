@@ -11,7 +11,7 @@
 
 typedef struct {
     double battery_V;
-    double capacitance_F, precharge_s, discharge_s; /* time constants */
+    double capacitance_F, precharge_s, discharge_s;        /* time constants */
     double precharge_open, discharge_open, contactor_open; /* not 0: the switch does not close */
 } dc_link_params_t;
 

@@ -19,9 +19,9 @@
 typedef struct hub hub_t;
 
 typedef struct {
-    uint64_t malformed;  /* texts of the clients that were no protocol */
+    uint64_t malformed; /* texts of the clients that were no protocol */
     uint64_t from_clients, to_ecu, from_ecu;
-    uint64_t ecu_lost;   /* frames that found the ECU's receive queue full */
+    uint64_t ecu_lost; /* frames that found the ECU's receive queue full */
     can_bus_counts_t bus;
     line_counts_t lines;
 } hub_counts_t;

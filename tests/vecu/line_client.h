@@ -11,7 +11,7 @@
 #include "line_buffer.h"
 
 typedef struct {
-    int fd; /* -1: free */
+    int fd;              /* -1: free */
     bool greeted, ended; /* ended: nothing more comes, but what has come is still served and answered */
     uint16_t peer;
     line_buffer_t in;

@@ -78,8 +78,10 @@ static bool parse(int count, char **words, options_t *o)
         } else if (strcmp(word, "--nvm") == 0 && value != NULL) {
             o->nvm = value;
         } else {
-            (void)fprintf(stderr, "error: unknown option '%s', allowed: --fast --realtime --port --bench-port "
-                                  "--bit-rate --seed --nvm\n", word);
+            (void)fprintf(stderr,
+                          "error: unknown option '%s', allowed: --fast --realtime --port --bench-port "
+                          "--bit-rate --seed --nvm\n",
+                          word);
             good = false;
         }
         if (!good) {

@@ -109,8 +109,7 @@ bool vecu_step(vecu_t *vecu, double *row)
     stand_step(vecu);
     const bool written = sim_run(vecu->sim, 1, row, 1) > 0;
     vecu->now_ns += vecu->period_ns;
-    if (vecu->nvm_path != NULL && ecu.nvm.changes != vecu->nvm_changes &&
-        nvm_file_save(vecu->nvm_path, &ecu.nvm)) {
+    if (vecu->nvm_path != NULL && ecu.nvm.changes != vecu->nvm_changes && nvm_file_save(vecu->nvm_path, &ecu.nvm)) {
         vecu->nvm_changes = ecu.nvm.changes;
     }
     hash_word(vecu, ecu.duty.a | (uint32_t)ecu.duty.b << 16);

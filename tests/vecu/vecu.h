@@ -20,10 +20,10 @@ typedef struct {
     stand_t stand;
     uint64_t now_ns, period_ns;
     uint64_t seed;
-    uint64_t duty_hash;    /* FNV-1a of every duty and gate state since the hash was last asked for */
+    uint64_t duty_hash; /* FNV-1a of every duty and gate state since the hash was last asked for */
     uint64_t resets;
-    const char *nvm_path;  /* file that holds the flash over power cycles; NULL: a power cycle erases it */
-    uint32_t nvm_changes;  /* as far as the file has them */
+    const char *nvm_path; /* file that holds the flash over power cycles; NULL: a power cycle erases it */
+    uint32_t nvm_changes; /* as far as the file has them */
 } vecu_t;
 
 /** A power cycle of ECU and plant: everything as at the start, with the plant's random numbers from `seed`. */

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import lizard
+
 from tree import Violation, files, run
 
 

@@ -49,9 +49,7 @@ FUNCTION = re.compile(r"^[0-9a-f]+ <(\S+)>:")
 DIVIDES = re.compile(r"[su]div")
 DIVISION_CALL = re.compile(r"__aeabi_u?[il]div|__u?(div|mod)[ds]i")
 FLOATS = re.compile(r"v[a-z]")
-FLOAT_CALL = re.compile(
-    r"__aeabi_(f|d|i2|ui2|l2|ul2)|(sqrt|sin|cos|tan|atan2?|pow|exp|log|floor|ceil|fabs)f?$"
-)
+FLOAT_CALL = re.compile(r"__aeabi_(f|d|i2|ui2|l2|ul2)|(sqrt|sin|cos|tan|atan2?|pow|exp|log|floor|ceil|fabs)f?$")
 # The port's functions, what gcc emits calls to on its own, and the rounding of the bus's encoders (1 kHz task).
 FROM_OUTSIDE = re.compile(r"hal_\w+$|mem(cpy|set|move|cmp)$|__aeabi_\w+$|roundf$")
 

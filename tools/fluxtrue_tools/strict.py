@@ -60,7 +60,7 @@ Flag = Annotated[float, BeforeValidator(flag)]
 
 def unit_of(key: str) -> str:
     """The unit that a key ends in, as a reader writes it; empty without one."""
-    found = None if key.split(".")[-1] in NOT_A_UNIT else _UNIT.search(key)
+    found = None if key.rsplit(".", maxsplit=1)[-1] in NOT_A_UNIT else _UNIT.search(key)
     return UNITS[found[1]] if found else ""
 
 

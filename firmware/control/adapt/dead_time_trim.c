@@ -15,7 +15,7 @@ static __attribute__((noinline)) int32_t limited(int32_t base, int32_t trim)
 /* Voltage error that is not compensated yet (DT-1), in LSB of delta. */
 static int32_t uncompensated(const dead_time_trim_in_t *in)
 {
-    const int32_t drop = fx_mulhi(in->sigma, in->x_q27); /* Q31 * Q27 = Q26 */
+    const int32_t drop = fx_mulhi(in->sigma, in->x_q27);                       /* Q31 * Q27 = Q26 */
     return fx_shl_q31(fx_mulhi(drop, Q31(0.78539816339744831)), 5) / in->v_dc; /* Q30/Q15, v_dc > 0 */
 }
 

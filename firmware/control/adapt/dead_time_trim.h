@@ -32,7 +32,7 @@ typedef struct {
 } dead_time_trim_in_t;
 
 typedef struct {
-    q15_t dead_time;    /* for the modulation from now on */
+    q15_t dead_time;     /* for the modulation from now on */
     int32_t x_shift_q27; /* to be added to x at the same time */
 } dead_time_trim_t;
 

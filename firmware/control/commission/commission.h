@@ -49,7 +49,7 @@ typedef struct {
 
 typedef struct {
     dq_q15_t sum_i, sum_u; /* over the periods of a step: up to 40 */
-    uint32_t theta;    /* electrical */
+    uint32_t theta;        /* electrical */
     q31_t omega;
     bool acting, limited;
 } commission_in_t;

@@ -17,18 +17,18 @@
 
 typedef struct {
     uint32_t pole_pairs;
-    uint32_t offset;       /* electrical, 2^32 = one turn */
+    uint32_t offset; /* electrical, 2^32 = one turn */
     q31_t kp;
-    int32_t ki_q29;        /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
-    int32_t pu_to_turn;    /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
-    uint32_t max_step;     /* largest credible |e| in one period, 2^32 = one turn */
-    q16_t turn_to_pu;      /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
+    int32_t ki_q29;     /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
+    int32_t pu_to_turn; /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
+    uint32_t max_step;  /* largest credible |e| in one period, 2^32 = one turn */
+    q16_t turn_to_pu;   /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
 } angle_tracker_config_t;
 
 typedef struct {
     uint32_t predicted; /* tracked electrical angle of the coming sample */
     int32_t omega_q30;
-    uint8_t samples;    /* taken so far, up to 2: the first two set angle and speed directly */
+    uint8_t samples; /* taken so far, up to 2: the first two set angle and speed directly */
 } angle_tracker_state_t;
 
 typedef struct {

@@ -32,12 +32,12 @@
 
 typedef struct {
     int32_t sigma_q24;
-    q16_t drop_gain;       /* r/sigma: resistive voltage drop as a flux error */
-    q15_t setpoint_weight; /* b = w_c/(w_c + a) */
-    q15_t integral_gain;   /* sigma a_i < 1/2 */
+    q16_t drop_gain;           /* r/sigma: resistive voltage drop as a flux error */
+    q15_t setpoint_weight;     /* b = w_c/(w_c + a) */
+    q15_t integral_gain;       /* sigma a_i < 1/2 */
     int32_t tracking_gain_q34; /* a T_s v_ratio = a_i v_ratio/b < 1/8 */
-    uint32_t per_ratio_q31; /* 1/v_ratio: usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
-    uint32_t clear_q30;    /* (v_clear/v_ratio)^2 < 1: limit of |v|^2 for clear */
+    uint32_t per_ratio_q31;    /* 1/v_ratio: usable part of v_dc as phase peak; 1/sqrt(3) is the linear limit */
+    uint32_t clear_q30;        /* (v_clear/v_ratio)^2 < 1: limit of |v|^2 for clear */
 } current_control_config_t;
 
 /** Current reference as flux linkage. */
@@ -53,9 +53,9 @@ typedef struct {
 typedef struct {
     const current_target_t *target;
     const flux_point_t *flux; /* at the measured current */
-    q31_t omega;     /* its upper half is used; the integrators compensate the rest of the feed-forward */
-    q15_t psi_delta; /* identified flux minus the table's */
-    int32_t v_dc;    /* not negative */
+    q31_t omega;              /* its upper half is used; the integrators compensate the rest of the feed-forward */
+    q15_t psi_delta;          /* identified flux minus the table's */
+    int32_t v_dc;             /* not negative */
 } current_control_in_t;
 
 typedef struct {

@@ -16,12 +16,12 @@
 #include "types/frames.h"
 
 typedef struct {
-    fx_mesh_t mesh;        /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
-    int32_t i_scale;       /* 8 2^l_shift: l in Q29 times i is then flux in q15 */
+    fx_mesh_t mesh;           /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
+    int32_t i_scale;          /* 8 2^l_shift: l in Q29 times i is then flux in q15 */
     const int16_t *l_d, *l_q; /* [ix * ny + iy], as all but psi_f0; neighbours are read by one instruction */
-    const int16_t *psi_f0; /* [iy]: depends on i_q alone */
+    const int16_t *psi_f0;    /* [iy]: depends on i_q alone */
     const int16_t *g, *l_qq;
-    uint8_t l_shift;       /* inductances are stored as l / 2^l_shift */
+    uint8_t l_shift; /* inductances are stored as l / 2^l_shift */
 } flux_table_config_t;
 
 bool flux_table_valid(const flux_table_config_t *config);

@@ -24,7 +24,7 @@ static inline ab_q15_t clarke(abc_q15_t x)
 {
     /* The coefficients sum to -1 LSB: a zero sequence of full scale leaks 1 LSB into alpha. */
     const int32_t alpha = x.a * Q15(2.0 / 3.0) + (x.b + x.c) * Q15(-1.0 / 3.0); /* below 4/3 in Q30 */
-    const int32_t beta = (x.b - x.c) * Q15(0.57735026918962576);               /* |b - c| < 2 */
+    const int32_t beta = (x.b - x.c) * Q15(0.57735026918962576);                /* |b - c| < 2 */
     return (ab_q15_t){transform_round(alpha), transform_round(beta)};
 }
 

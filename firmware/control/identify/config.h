@@ -23,30 +23,30 @@ typedef enum {
 } identify_index_t;
 
 typedef struct {
-    uint8_t l_shift;          /* of the flux tables */
-    q31_t r0;                 /* at 20 C */
-    q31_t r_per_dC;           /* r0 alpha/10: change per tenth of a degree */
-    q31_t sinc_gain;          /* (omega_b T_s)^2/24 */
-    int32_t mean_gain_q32;    /* 1/(2 N), N periods in a window: twice a sum to its mean */
-    int32_t rate_gain_q28;    /* 1/(omega_b T), T = N periods, < 8 */
+    uint8_t l_shift;           /* of the flux tables */
+    q31_t r0;                  /* at 20 C */
+    q31_t r_per_dC;            /* r0 alpha/10: change per tenth of a degree */
+    q31_t sinc_gain;           /* (omega_b T_s)^2/24 */
+    int32_t mean_gain_q32;     /* 1/(2 N), N periods in a window: twice a sum to its mean */
+    int32_t rate_gain_q28;     /* 1/(omega_b T), T = N periods, < 8 */
     uint32_t window_turns_q29; /* turns in T at omega_b, < 8 */
-    q16_t turn_to_pu;         /* 1/(2 turns in T at omega_b): 2^-32 turn to q31 of omega_b */
-    q31_t iron_hysteresis;    /* k_h/1.5 */
-    q31_t iron_eddy;          /* k_e omega_b/1.5 */
-    q16_t iron_sign_gain;     /* slope of the hysteresis term's sign through zero speed */
+    q16_t turn_to_pu;          /* 1/(2 turns in T at omega_b): 2^-32 turn to q31 of omega_b */
+    q31_t iron_hysteresis;     /* k_h/1.5 */
+    q31_t iron_eddy;           /* k_e omega_b/1.5 */
+    q16_t iron_sign_gain;      /* slope of the hysteresis term's sign through zero speed */
     q31_t sigma[IDENTIFY_STATES];
-    q31_t leak[IDENTIFY_STATES];  /* per update: towards the prior, mean and variance alike */
-    int32_t r_known_q30;      /* prior variance of R, of sigma^2, while the winding temperature is measured */
+    q31_t leak[IDENTIFY_STATES]; /* per update: towards the prior, mean and variance alike */
+    int32_t r_known_q30;         /* prior variance of R, of sigma^2, while the winding temperature is measured */
     int32_t noise_voltage_q30, noise_flux_q30, noise_rate_q30; /* of the residuals' standard deviation */
-    q15_t omega_min, i_min;   /* below either nothing is learnt */
-    q15_t i_smooth;           /* below it the drop's direction fades */
-    q15_t local_corner;       /* speed at which voltage and flux errors weigh the same */
-    q31_t local_rate;         /* of the local flux error's filter, per step */
-    q16_t limited_noise;      /* share of the noise that each period with limited pulses adds: 5/N */
-    q15_t mismatch_rate;      /* first-order coefficient of the mismatch share, per update */
-    q15_t torque_min;         /* uncertainty is relative to the torque, but to this at least */
+    q15_t omega_min, i_min;                                    /* below either nothing is learnt */
+    q15_t i_smooth;                                            /* below it the drop's direction fades */
+    q15_t local_corner;                     /* speed at which voltage and flux errors weigh the same */
+    q31_t local_rate;                       /* of the local flux error's filter, per step */
+    q16_t limited_noise;                    /* share of the noise that each period with limited pulses adds: 5/N */
+    q15_t mismatch_rate;                    /* first-order coefficient of the mismatch share, per update */
+    q15_t torque_min;                       /* uncertainty is relative to the torque, but to this at least */
     q15_t confidence_full, confidence_none; /* relative torque uncertainty that opens and closes the torque loop */
-    q15_t confidence_rate;    /* of the confidence, per update */
+    q15_t confidence_rate;                  /* of the confidence, per update */
 } identify_config_t;
 
 bool identify_valid(const identify_config_t *config);

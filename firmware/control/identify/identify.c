@@ -86,8 +86,7 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
     const int32_t output_before = kalman_output(&state->kalman, &state->mean_q);
     const kalman_update_t d = kalman_update(&state->kalman, &state->mean_d, state->mean_e.d, r);
     const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean_q), output_before);
-    const kalman_update_t q =
-        kalman_update(&state->kalman, &state->mean_q, fx_sub_q31(state->mean_e.q, change), r);
+    const kalman_update_t q = kalman_update(&state->kalman, &state->mean_q, fx_sub_q31(state->mean_e.q, change), r);
     state->clamped = d.clamped || q.clamped;
     const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->clamped) ? Q15_MAX : 0;
     const q15_t error = fx_sat_q15(target - state->mismatch_share);
@@ -178,8 +177,7 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     update_local_flux_error(config, state, in, e);
     average_step(config, state, in, &model, e);
     const corrected_t now = correct(config, state, &model);
-    const int32_t torque =
-        identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, now.psi, now.i);
+    const int32_t torque = identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, now.psi, now.i);
     const identify_out_t out = {fx_round_q15(torque), fx_round_q15(now.magnet_q30)};
     if (state->steps >= IDENTIFY_STEPS) {
         kalman_step(config, state, &model, out.torque);

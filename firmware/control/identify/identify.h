@@ -22,16 +22,16 @@ typedef struct {
     dq_q30_t mean_e;
     int32_t mean_noise_q30; /* standard deviation of the measurement noise */
     uint8_t steps;
-    bool update_valid;    /* every step of this update so far was valid */
-    bool clamped;         /* a state reached its limit in the last update */
-    dq_q30_t local;       /* flux error of this operating point */
+    bool update_valid; /* every step of this update so far was valid */
+    bool clamped;      /* a state reached its limit in the last update */
+    dq_q30_t local;    /* flux error of this operating point */
     q31_t r_prior;
-    bool r_known;         /* the winding temperature is measured */
-    q15_t mismatch_share; /* of recent updates: those beyond the innovation gate or with a clamped state */
+    bool r_known;                /* the winding temperature is measured */
+    q15_t mismatch_share;        /* of recent updates: those beyond the innovation gate or with a clamped state */
     int32_t torque_variance_q30; /* at the last update */
     q15_t confidence;
-    bool torque_certain;  /* the confidence rises, else it falls */
-    kalman_t kalman;      /* last: the fields before it are then in reach of 16-bit load instructions */
+    bool torque_certain; /* the confidence rises, else it falls */
+    kalman_t kalman;     /* last: the fields before it are then in reach of 16-bit load instructions */
 } identify_state_t;
 
 typedef struct {
@@ -43,8 +43,8 @@ typedef struct {
 } identify_in_t;
 
 typedef struct {
-    q15_t torque;     /* air gap, mean over the window */
-    q15_t psi_delta;  /* identified minus table's flux in the d axis, here */
+    q15_t torque;    /* air gap, mean over the window */
+    q15_t psi_delta; /* identified minus table's flux in the d axis, here */
 } identify_out_t;
 
 void identify_reset(const identify_config_t *config, identify_state_t *state);

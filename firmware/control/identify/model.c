@@ -17,8 +17,8 @@ static int32_t direction(int32_t i_q15, q15_t magnitude)
     return (int32_t)fx_div_q15((q15_t)i_q15, magnitude) * 32768;
 }
 
-static void derivatives(const identify_config_t *config, const identify_tables_t *tables,
-                        const identify_point_t *point, identify_model_t *m)
+static void derivatives(const identify_config_t *config, const identify_tables_t *tables, const identify_point_t *point,
+                        identify_model_t *m)
 {
     const flux_point_t *flux = &tables->flux;
     const flux_inductances_t *l = &tables->inductances;

@@ -25,11 +25,11 @@ typedef struct {
 } jacobian_row_t;
 
 typedef struct {
-    dq_q30_t y;                  /* residual with every state at its prior */
-    dq_q30_t psi;                /* of the tables, at i_m */
+    dq_q30_t y;   /* residual with every state at its prior */
+    dq_q30_t psi; /* of the tables, at i_m */
     dq_q30_t i_m;
-    dq_q30_t iron_i;             /* change of i_m with the scale of the iron loss */
-    bool current;            /* enough current for the drop to have a direction */
+    dq_q30_t iron_i; /* change of i_m with the scale of the iron loss */
+    bool current;    /* enough current for the drop to have a direction */
     jacobian_row_t d, q;
     jacobian_row_t psi_d, psi_q; /* change of psi with each state, but for the magnet's flux, with which it is one */
 } identify_model_t;

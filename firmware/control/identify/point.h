@@ -18,7 +18,7 @@ typedef struct {
     dq_q30_t u, rate;
     dq_q15_t i_m;
     q31_t omega;
-    q31_t iron; /* a */
+    q31_t iron;        /* a */
     int32_t chord_q30; /* theta^2/12: what the mean flux of a period lacks of the sampled one (ID-20) */
     uint8_t limited;
     bool valid;

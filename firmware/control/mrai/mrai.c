@@ -33,9 +33,8 @@ static bool limits_valid(q31_t lo, q31_t hi)
 
 bool mrai_valid(const mrai_config_t *config)
 {
-    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 &&
-                       config->period <= Q31(0.78) && config->flux_gain >= 0 && config->resistance_gain >= 0 &&
-                       config->flux_proportional_q24 >= 0 &&
+    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 && config->period <= Q31(0.78) &&
+                       config->flux_gain >= 0 && config->resistance_gain >= 0 && config->flux_proportional_q24 >= 0 &&
                        config->resistance_proportional_q24 >= 0;
     return gains && limits_valid(config->psi_delta_min, config->psi_delta_max) &&
            limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&

@@ -25,22 +25,22 @@
 
 /** First what every period reads, in its order. */
 typedef struct {
-    q31_t pole_gain;       /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
-    int32_t flux_proportional_q24;       /* k_P/k_I of the flux law, in periods, < 128 */
+    q31_t pole_gain;               /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
+    int32_t flux_proportional_q24; /* k_P/k_I of the flux law, in periods, < 128 */
     q31_t psi_delta_min, psi_delta_max;
     q31_t r_delta_min, r_delta_max;
     int32_t resistance_proportional_q24; /* k_P/k_I of the resistance law, in periods, < 128 */
-    q31_t r0;              /* nominal resistance in the observer and its poles */
-    q31_t period;          /* omega_b T_s: volts per unit to flux per unit and period */
-    q31_t flux_gain;       /* 2 k_psi/omega_b */
-    q31_t resistance_gain; /* 2 k_r/omega_b */
-    q15_t omega_min;       /* both gates: frozen below this speed */
-    q15_t omega_r_max;     /* resistance gate: frozen above this speed */
-    q15_t i_min;           /* both gates: frozen below this current magnitude */
-    q31_t sinc_gain;       /* (omega_b T_s)^2/24: 1/sinc(w T_s/2) - 1 = sinc_gain w^2 */
-    q31_t psi_drift_full;  /* drift of dpsi per 1 kHz step that means quality 0: 5 % psi_f k_psi 1 ms */
-    q31_t r_drift_full;    /* drift of dR per 1 kHz step that means quality 0: 20 % R_0 k_r 1 ms */
-    q15_t quality_rate;    /* of the quality filters, per 1 kHz step */
+    q31_t r0;                            /* nominal resistance in the observer and its poles */
+    q31_t period;                        /* omega_b T_s: volts per unit to flux per unit and period */
+    q31_t flux_gain;                     /* 2 k_psi/omega_b */
+    q31_t resistance_gain;               /* 2 k_r/omega_b */
+    q15_t omega_min;                     /* both gates: frozen below this speed */
+    q15_t omega_r_max;                   /* resistance gate: frozen above this speed */
+    q15_t i_min;                         /* both gates: frozen below this current magnitude */
+    q31_t sinc_gain;                     /* (omega_b T_s)^2/24: 1/sinc(w T_s/2) - 1 = sinc_gain w^2 */
+    q31_t psi_drift_full;                /* drift of dpsi per 1 kHz step that means quality 0: 5 % psi_f k_psi 1 ms */
+    q31_t r_drift_full;                  /* drift of dR per 1 kHz step that means quality 0: 20 % R_0 k_r 1 ms */
+    q15_t quality_rate;                  /* of the quality filters, per 1 kHz step */
 } mrai_config_t;
 
 /** Slowly varying factors: written by the 1 kHz task, read by the MRAI ISR through a double buffer. */

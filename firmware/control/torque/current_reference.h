@@ -21,13 +21,13 @@
 #include "types/frames.h"
 
 typedef struct {
-    fx_grid_t grid;         /* x: |T| from 0, y: psi_avail from y0, both q15 */
-    const int16_t *i_d;     /* [ix * ny + iy], <= 0 */
-    const int16_t *i_q;     /* [ix * ny + iy], >= 0 */
-    fx_lut1_t torque_max;   /* over psi_avail */
-    q15_t v_ratio;          /* planned share of v_dc: a little below current control's, as its dynamic reserve */
+    fx_grid_t grid;       /* x: |T| from 0, y: psi_avail from y0, both q15 */
+    const int16_t *i_d;   /* [ix * ny + iy], <= 0 */
+    const int16_t *i_q;   /* [ix * ny + iy], >= 0 */
+    fx_lut1_t torque_max; /* over psi_avail */
+    q15_t v_ratio;        /* planned share of v_dc: a little below current control's, as its dynamic reserve */
     q16_t r_pu;
-    q15_t i_max;            /* current circle */
+    q15_t i_max; /* current circle */
 } current_reference_config_t;
 
 typedef struct {
@@ -44,8 +44,8 @@ typedef struct {
 
 typedef struct {
     dq_q15_t i_ref;
-    q15_t torque_max;  /* reachable with the flux that is there */
-    q15_t psi_plan;    /* flux that the table was asked for */
+    q15_t torque_max; /* reachable with the flux that is there */
+    q15_t psi_plan;   /* flux that the table was asked for */
     bool limited;
     bool i_d_limited;
 } current_reference_t;

@@ -16,10 +16,10 @@
 #include "fx/q.h"
 
 typedef struct {
-    int32_t i_20;         /* Q15, at 20 C; may exceed 1: then there is room before the limit acts */
-    q16_t slope;          /* per unit of current per tenth of a degree */
+    int32_t i_20; /* Q15, at 20 C; may exceed 1: then there is room before the limit acts */
+    q16_t slope;  /* per unit of current per tenth of a degree */
     q15_t i_max;
-    q16_t dC_per_psi;     /* 1/(psi_f alpha), <= 0 */
+    q16_t dC_per_psi; /* 1/(psi_f alpha), <= 0 */
     int16_t assumed_dC;
 } i_d_limit_config_t;
 

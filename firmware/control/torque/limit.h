@@ -23,7 +23,7 @@
 #define TEMPERATURE_UNKNOWN INT16_MIN
 
 enum {
-    DERATING_REQUEST = 1u << 0,  /* beyond the machine's rated torque or the vehicle's torque limit */
+    DERATING_REQUEST = 1u << 0, /* beyond the machine's rated torque or the vehicle's torque limit */
     DERATING_POWER = 1u << 1,
     DERATING_REACH = 1u << 2,    /* voltage or current circle */
     DERATING_INVERTER = 1u << 3, /* temperature */
@@ -31,7 +31,7 @@ enum {
     DERATING_DC_LOW = 1u << 5,
     DERATING_DC_HIGH = 1u << 6,
     DERATING_SPEED = 1u << 7,
-    DERATING_MAGNET = 1u << 8,   /* i_d at the demagnetisation limit: set by the 1 kHz task */
+    DERATING_MAGNET = 1u << 8, /* i_d at the demagnetisation limit: set by the 1 kHz task */
 };
 
 /** A straight line: 0 at end, 1 where (x - end) gain is 1. gain = 2^31/(start - end), with its sign. */
@@ -60,7 +60,7 @@ typedef struct {
     q15_t torque_estimated;
     q15_t omega;
     q15_t v_dc;
-    q15_t reach;      /* the references' torque_max of the last step */
+    q15_t reach; /* the references' torque_max of the last step */
     int16_t inverter_dC, winding_dC;
 } torque_limit_in_t;
 

@@ -19,25 +19,25 @@
 #include "fx/q.h"
 
 typedef struct {
-    q15_t ki;          /* integral gain per task period */
+    q15_t ki; /* integral gain per task period */
     q15_t kp;
-    q15_t model_rate;  /* first-order coefficient of T_m per task period */
+    q15_t model_rate; /* first-order coefficient of T_m per task period */
     q15_t authority;
-    q15_t torque_min;  /* T_min */
+    q15_t torque_min; /* T_min */
 } torque_loop_config_t;
 
 typedef struct {
-    q31_t correction;  /* x */
-    q31_t model;       /* T_m */
+    q31_t correction; /* x */
+    q31_t model;      /* T_m */
     bool saturated;
 } torque_loop_state_t;
 
 typedef struct {
     q15_t torque_commanded; /* T* */
     q15_t torque_estimated; /* T^ */
-    q15_t confidence; /* share of the authority that the estimate deserves, Q15_MAX: all */
+    q15_t confidence;       /* share of the authority that the estimate deserves, Q15_MAX: all */
     bool enabled;
-    bool limited;    /* current or voltage limit active */
+    bool limited; /* current or voltage limit active */
 } torque_loop_in_t;
 
 q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in);

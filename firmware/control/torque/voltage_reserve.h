@@ -19,8 +19,8 @@
 #include "types/frames.h"
 
 typedef struct {
-    q15_t v_ratio;  /* the references' planned share of v_dc */
-    q15_t gain;     /* k per task period */
+    q15_t v_ratio; /* the references' planned share of v_dc */
+    q15_t gain;    /* k per task period */
     q15_t trim_min;
     q15_t trim_max;
 } voltage_reserve_config_t;
@@ -30,9 +30,9 @@ typedef struct {
 } voltage_reserve_state_t;
 
 typedef struct {
-    dq_q15_t u;          /* that acts now */
+    dq_q15_t u; /* that acts now */
     q15_t v_dc;
-    dq_q15_t psi;        /* tables' flux at the last reference */
+    dq_q15_t psi;    /* tables' flux at the last reference */
     q15_t psi_plan;  /* of the last reference */
     q15_t psi_delta; /* identified flux minus the table's */
     bool acting;     /* u is ours */

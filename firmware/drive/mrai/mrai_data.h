@@ -13,7 +13,7 @@
  * point before (generation == finished); so the interrupt reads it in place. */
 typedef struct {
     operating_point_t point;
-    bool acting;                  /* the bridge was on throughout the last period and is on now */
+    bool acting; /* the bridge was on throughout the last period and is on now */
     uint8_t overruns_in_a_row;
     volatile uint32_t generation; /* of the sample it was taken from */
     uint32_t overruns;            /* periods whose point was dropped, since the one before was not finished */

@@ -25,7 +25,8 @@ void mrai_isr(drive_t *drive)
     const mrai_schedule_t *schedule = schedule_box_read(&drive->mrai.schedules);
 
     if (__builtin_expect(!mailbox->acting || generation - state->finished != 1U ||
-                             drive->request.identification_resets != state->identification_resets, 0)) {
+                             drive->request.identification_resets != state->identification_resets,
+                         0)) {
         restart(drive, schedule);
     } else {
         mrai_step(&drive->motor.mrai, schedule, &state->law, point);

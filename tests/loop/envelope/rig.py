@@ -2,12 +2,12 @@
 """One simulated drive at an imposed speed, recorded by name; torque is the plant's."""
 
 import math
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
-from numpy.typing import NDArray
 
 NAMES = (
     "truth.torque_Nm", "truth.i_d_A", "truth.i_q_A", "truth.u_d_V", "truth.u_q_V", "truth.idc_A", "truth.vdc_V",
@@ -23,8 +23,11 @@ class Rig:
     """A drive with the motor's own plant, half an ampere of noise, and whatever is wrong with it."""
 
     def __init__(self, motor: Motor, rpm: float, torque_Nm: float = 0.0, enable: bool = True, **plant: float) -> None:
-        parameters = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": rpm * math.pi / 30.0,
-                                    "current_noise_A_rms": 0.5} | plant
+        parameters = (
+            motor.plant
+            | {"imposed_speed": 1.0, "speed_rad_s": rpm * math.pi / 30.0, "current_noise_A_rms": 0.5}
+            | plant
+        )
         self.loop = Loop(motor.library, parameters, motor.flux_map)
         self.loop.record(NAMES)
         self.loop.set("torque_requested_Nm", torque_Nm)
@@ -79,5 +82,3 @@ class Trace:
         """Milliseconds from the start of the run to the fault; NaN: none."""
         found = self["fault_word"].astype(int) & fault > 0
         return float(np.argmax(found)) * 0.1 if found.any() else math.nan
-
-

@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from fluxtrue_tools.sim.motor import Motor
 from rig import RUNNING, Rig
+
+from fluxtrue_tools.sim.motor import Motor
 
 MAGNETS = (0.8, 0.9, 1.0, 1.05, 1.1)
 TOP_RPM = 10000.0

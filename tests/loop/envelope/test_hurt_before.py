@@ -5,7 +5,6 @@ import math
 
 import numpy as np
 import pytest
-from fluxtrue_tools.sim.motor import Motor
 from rig import (
     ANGLE,
     ANGLE_OFFSET,
@@ -17,6 +16,8 @@ from rig import (
     PHASE_LOST,
     Rig,
 )
+
+from fluxtrue_tools.sim.motor import Motor
 
 
 @pytest.mark.parametrize("magnet", [0.85, 1.0, 1.05])

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from fluxtrue_tools.sim.motor import Motor
 from rig import TEMPERATURE, Rig
+
+from fluxtrue_tools.sim.motor import Motor
 
 RATED_NM = 132.0
 

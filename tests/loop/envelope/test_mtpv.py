@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig import Rig
+
 from fluxtrue_tools.sim.build import prepare
 from fluxtrue_tools.sim.motor import Motor, read
-from rig import Rig
 
 GEM = Path(__file__).resolve().parents[2] / "motors" / "gem"
 TOP_RPM, LOW_V, I_MAX_A = 8000.0, 250.0, 240.0

@@ -13,7 +13,7 @@
 
 typedef struct {
     double psi_f_Vs, l_d_H, l_q_H, i_sat_A, r_ohm, pole_pairs;
-    double gain[3];      /* of the current sensors */
+    double gain[3]; /* of the current sensors */
     double offset_A[3];
     double angle_ripple; /* of the angle sensor, first harmonic, rad mechanical */
 } exact_machine_t;

@@ -16,12 +16,24 @@
 #define RPM (6.283185307179586 / 60.0)
 
 static const exact_machine_t nominal = {
-    .psi_f_Vs = 0.0717, .l_d_H = 0.00030, .l_q_H = 0.00205, .i_sat_A = 105.0, .r_ohm = 0.019, .pole_pairs = 3.0,
+    .psi_f_Vs = 0.0717,
+    .l_d_H = 0.00030,
+    .l_q_H = 0.00205,
+    .i_sat_A = 105.0,
+    .r_ohm = 0.019,
+    .pole_pairs = 3.0,
     .gain = {1.0, 1.0, 1.0},
 };
 static const exact_machine_t warm = {
-    .psi_f_Vs = 0.0650, .l_d_H = 0.00029, .l_q_H = 0.00198, .i_sat_A = 108.0, .r_ohm = 0.023, .pole_pairs = 3.0,
-    .gain = {1.004, 0.997, 1.0}, .offset_A = {0.4, -0.3, 0.2}, .angle_ripple = 0.004,
+    .psi_f_Vs = 0.0650,
+    .l_d_H = 0.00029,
+    .l_q_H = 0.00198,
+    .i_sat_A = 108.0,
+    .r_ohm = 0.023,
+    .pole_pairs = 3.0,
+    .gain = {1.004, 0.997, 1.0},
+    .offset_A = {0.4, -0.3, 0.2},
+    .angle_ripple = 0.004,
 };
 
 void setUp(void)
@@ -53,7 +65,10 @@ static void add(rig_t *rig, uint64_t value)
 
 static rig_t rig_start(const exact_machine_t *machine)
 {
-    rig_t rig = {.drive = fluxtrue_create(), .machine = *machine, .v_dc_V = 350.0, .winding_C = 60.0,
+    rig_t rig = {.drive = fluxtrue_create(),
+                 .machine = *machine,
+                 .v_dc_V = 350.0,
+                 .winding_C = 60.0,
                  .hash = 14695981039346656037ULL};
     TEST_ASSERT_NOT_NULL(rig.drive);
     rig.state.psi_d_Vs = machine->psi_f_Vs;
@@ -83,8 +98,8 @@ static void period(rig_t *rig)
 /* Slow values are taken once in 100 periods: identified parameters, torque, faults. */
 static void slow_values(rig_t *rig)
 {
-    static const char *const names[] = {"torque_estimated_Nm", "psi_f_Vs", "r_ohm", "torque_confidence", "fault_word",
-                                        "derating", "lq_scale", "drop_V"};
+    static const char *const names[] = {"torque_estimated_Nm", "psi_f_Vs", "r_ohm",    "torque_confidence",
+                                        "fault_word",          "derating", "lq_scale", "drop_V"};
     for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
         const double value = fluxtrue_get(rig->drive, names[k]);
         uint64_t bits;

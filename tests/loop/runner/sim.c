@@ -40,8 +40,8 @@ const char *sim_failure(const sim_t *sim)
     return sim->controller.failure != NULL ? sim->controller.failure(sim->controller.self) : NULL;
 }
 
-int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq,
-            const double *psi_d_Vs, const double *psi_q_Vs)
+int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq, const double *psi_d_Vs,
+            const double *psi_q_Vs)
 {
     if (sim->plant != NULL) {
         return SIM_READ_ONLY; /* the plant holds on to its map */

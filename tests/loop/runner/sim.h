@@ -37,8 +37,8 @@ SIM_API void sim_destroy(sim_t *sim);
 SIM_API struct fluxtrue *sim_firmware(sim_t *sim);
 /** The machine's flux map, full plane, row-major [i_d][i_q]; copied. Without one the machine has
  * constant inductances. */
-SIM_API int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq,
-                    const double *psi_d_Vs, const double *psi_q_Vs);
+SIM_API int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq, const double *psi_d_Vs,
+                    const double *psi_q_Vs);
 /** Builds the plant. NULL: done; else the name of the first bad field. */
 SIM_API const char *sim_start(sim_t *sim);
 

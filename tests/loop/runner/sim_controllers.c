@@ -55,8 +55,8 @@ static void twin_destroy_(void *self)
 sim_t *sim_create(int controller)
 {
     if (controller == SIM_FIRMWARE) {
-        return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
-                                                  firmware_destroy});
+        return sim_create_with(
+            (sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL, firmware_destroy});
     }
     if (controller == SIM_TWIN) {
         return sim_create_with(

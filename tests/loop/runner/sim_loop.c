@@ -107,8 +107,7 @@ static bool row_collect(sim_t *sim)
     for (int i = 0; i < sim->channels; i++) {
         channel_t *channel = &sim->channel[i];
         if (channel->source == FROM_TRUTH && sim_truth_averages(channel->index)) {
-            channel->sum =
-                (sim->in_row == 0 ? 0.0 : channel->sum) + sim_truth_read(truth, channel->index);
+            channel->sum = (sim->in_row == 0 ? 0.0 : channel->sum) + sim_truth_read(truth, channel->index);
         }
     }
     sim->in_row++;

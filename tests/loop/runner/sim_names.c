@@ -88,8 +88,7 @@ const char *sim_names_at(int index)
     if (index < 0 || index >= PLANT_FIELDS + TRUTH_FIELDS) {
         return NULL;
     }
-    return index < PLANT_FIELDS ? plant_fields[index].name
-                                : truth_fields[index - PLANT_FIELDS].name;
+    return index < PLANT_FIELDS ? plant_fields[index].name : truth_fields[index - PLANT_FIELDS].name;
 }
 
 void sim_plant_write(plant_params_t *params, int index, double value)

@@ -43,8 +43,8 @@ static double line(const twin_curve_t *curve, int last, double i)
     }
     for (int k = 0; k < last; k++) {
         if (i <= curve->knot[k + 1]) {
-            return curve->v[k] + (curve->v[k + 1] - curve->v[k]) * (i - curve->knot[k]) /
-                                     (curve->knot[k + 1] - curve->knot[k]);
+            return curve->v[k] +
+                   (curve->v[k + 1] - curve->v[k]) * (i - curve->knot[k]) / (curve->knot[k + 1] - curve->knot[k]);
         }
     }
     return curve->v[last];

@@ -155,8 +155,7 @@ static void task(twin_t *twin)
     }
     if (twin->run_state == TWIN_RUN) {
         torque_path(twin);
-        twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command}
-                                         : twin->reference.i_ref;
+        twin->i_ref = twin->current_mode ? (twin_dq_t){twin->id_command, twin->iq_command} : twin->reference.i_ref;
         twin->target = twin_current_target(&twin->motor, twin->i_ref);
         next.i = twin->i_ref;
         next.flux = twin_flux_table(&twin->motor, next.i);
@@ -205,8 +204,7 @@ static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
     twin->u = twin_current_control(&motor, &twin->current, &request);
-    const twin_modulate_in_t voltage = {twin->u, now->i, angle->theta + 1.5 * angle->step,
-                                        twin->v_dc};
+    const twin_modulate_in_t voltage = {twin->u, now->i, angle->theta + 1.5 * angle->step, twin->v_dc};
     const twin_modulate_t m = twin_modulate(&motor, &voltage);
     twin->acted = m.acted;
     twin->modulation_limited = m.limited;

@@ -45,15 +45,13 @@ twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
     };
 }
 
-twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state,
-                               const twin_current_in_t *in)
+twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state, const twin_current_in_t *in)
 {
     const twin_flux_t *f = in->flux;
     const twin_target_t *to = &in->target;
     const double sigma = motor->sigma_rad_s;
     const double ud = sigma * (to->weighted.d - f->psi_d) + state->s.d - in->omega * f->psi_q;
-    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q +
-                      in->omega * (f->psi_d + in->psi_delta);
+    const double uq = sigma * (to->weighted.q - f->psi_q) + state->s.q + in->omega * (f->psi_d + in->psi_delta);
     const twin_dq_t e = {to->psi.d - f->psi_d, to->psi.q - f->psi_q};
     const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
     const double rounding = 1e-9 * motor->v_base_V;

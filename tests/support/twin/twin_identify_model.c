@@ -74,10 +74,9 @@ twin_model_t twin_model(const motor_si_t *motor, const twin_point_t *p, double r
     m.y.q = p->u.q - r * p->i.q - w * f.psi_d - p->rate.q;
     const double d[TWIN_STATES] = {p->i.d, p->i.d * n, 0.0, -w * f.psi_q, 0.0, -w * m.turn.q, -w * m.iron_psi.q};
     const double q[TWIN_STATES] = {p->i.q, p->i.q * n, w, 0.0, w * m.slope, w * m.turn.d, w * m.iron_psi.d};
-    const double iron = m.iron_psi.d * p->i_m.q - m.iron_psi.q * p->i_m.d + f.psi_d * m.iron_i.q -
-                        f.psi_q * m.iron_i.d;
-    const double t[TWIN_STATES] = {0.0, 0.0, p->i_m.q, -f.psi_q * p->i_m.d, m.slope * p->i_m.q,
-                                   m.turn.d * p->i_m.q - m.turn.q * p->i_m.d, iron};
+    const double iron = m.iron_psi.d * p->i_m.q - m.iron_psi.q * p->i_m.d + f.psi_d * m.iron_i.q - f.psi_q * m.iron_i.d;
+    const double t[TWIN_STATES] = {
+        0.0, 0.0, p->i_m.q, -f.psi_q * p->i_m.d, m.slope * p->i_m.q, m.turn.d * p->i_m.q - m.turn.q * p->i_m.d, iron};
     for (int j = 0; j < TWIN_STATES; j++) {
         m.d[j] = d[j];
         m.q[j] = q[j];

@@ -3,21 +3,17 @@
 
 #include "twin/twin_stages.h"
 
-twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t *config,
-                            const double counts[4])
+twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t *config, const double counts[4])
 {
     const double full = ldexp(1.0, motor->adc_bits);
     double i[3];
     for (int x = 0; x < 3; x++) {
-        i[x] = (counts[x] - config->offset[x]) / (0.5 * full) * config->gain[x] *
-               motor->current_full_scale_A;
+        i[x] = (counts[x] - config->offset[x]) / (0.5 * full) * config->gain[x] * motor->current_full_scale_A;
     }
-    return (twin_measure_t){{i[0], i[1], i[2]},
-                            counts[3] / full * config->v_dc_gain * motor->v_dc_full_scale_V};
+    return (twin_measure_t){{i[0], i[1], i[2]}, counts[3] / full * config->v_dc_gain * motor->v_dc_full_scale_V};
 }
 
-twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state,
-                                double theta_m_rad)
+twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state, double theta_m_rad)
 {
     const double theta = twin_wrap(motor->pole_pairs * theta_m_rad);
     const double wn = motor->tracker_bandwidth_rad_s * motor->period_s;
@@ -33,8 +29,7 @@ twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *sta
     return (twin_angle_t){theta, state->step, state->step / motor->period_s};
 }
 
-static double inverse_lookup(const twin_grid_t *grid, const double *l, double period, double x,
-                             double y)
+static double inverse_lookup(const twin_grid_t *grid, const double *l, double period, double x, double y)
 {
     /* The service tabulates T_s/l itself, so it is what gets interpolated. */
     double corner[4];

@@ -50,8 +50,7 @@ double twin_torque_limit(const motor_si_t *m, twin_limit_state_t *state, const t
 
 double twin_i_d_limit(const motor_si_t *m, double psi_delta, double winding_C)
 {
-    const double magnet_C =
-        fmin(20.0 + psi_delta / (m->psi_f_Vs * m->psi_temp_coeff_per_K), m->magnet_assumed_C);
+    const double magnet_C = fmin(20.0 + psi_delta / (m->psi_f_Vs * m->psi_temp_coeff_per_K), m->magnet_assumed_C);
     const double celsius = isnan(winding_C) ? m->magnet_assumed_C : fmax(winding_C, magnet_C);
     return twin_clamp(m->i_d_20_A - m->i_d_slope_A_per_K * (celsius - 20.0), 0.0, m->i_max_A);
 }

@@ -15,8 +15,7 @@ void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
 }
 
 /* One adaptation law: proportional and integral part, the integral inside its limits. */
-static double adapt(double step, double proportional, double lo, double hi, double *integral,
-                    bool *clamped)
+static double adapt(double step, double proportional, double lo, double hi, double *integral, bool *clamped)
 {
     *integral = twin_clamp(*integral + step, lo, hi);
     *clamped = (*integral <= lo) || (*integral >= hi);
@@ -27,14 +26,13 @@ static double adapt(double step, double proportional, double lo, double hi, doub
 static twin_dq_t burden(const motor_si_t *motor, const twin_mrai_in_t *at, double psi_used, double r_used)
 {
     const double r = motor->r_ohm_20 + r_used;
-    return (twin_dq_t){r * at->i.d - at->omega * at->flux.psi_q,
-                       r * at->i.q + at->omega * (at->flux.psi_d + psi_used)};
+    return (twin_dq_t){r * at->i.d - at->omega * at->flux.psi_q, r * at->i.q + at->omega * (at->flux.psi_d + psi_used)};
 }
 
 /* The voltage equation over the period that has just passed, in means and differences of its two
  * ends; the observer error, a flux, takes the share of it that its poles leave. */
-void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
-               twin_mrai_state_t *state, const twin_mrai_in_t *in)
+void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule, twin_mrai_state_t *state,
+               const twin_mrai_in_t *in)
 {
     const twin_mrai_in_t *last = &state->last;
     const twin_dq_t e = state->e;
@@ -43,8 +41,8 @@ void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
     const double flux_step = -schedule->flux_gain * s2 * e.q;
     const double resistance_step = -schedule->resistance_gain * s2 * (weight_d * in->i.d * e.d + in->i.q * e.q);
     const twin_dq_t before = burden(motor, last, state->psi_used, state->r_used);
-    state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs,
-                            motor->psi_delta_max_Vs, &state->psi_delta, &state->psi_clamped);
+    state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs, motor->psi_delta_max_Vs,
+                            &state->psi_delta, &state->psi_clamped);
     state->r_used = adapt(resistance_step, motor->resistance_proportional, motor->r_delta_min_ohm,
                           motor->r_delta_max_ohm, &state->r_delta, &state->r_clamped);
     const twin_dq_t after = burden(motor, in, state->psi_used, state->r_used);
@@ -52,8 +50,7 @@ void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
     const twin_dq_t u = {last->u.d * schedule->voltage_scale, last->u.q * schedule->voltage_scale};
     state->e.d = e.d + weight_d * (in->flux.psi_d - last->flux.psi_d - t * (u.d - 0.5 * (before.d + after.d))) +
                  s2 * (e.q - e.d);
-    state->e.q = e.q + in->flux.psi_q - last->flux.psi_q - t * (u.q - 0.5 * (before.q + after.q)) -
-                 s2 * (e.d + e.q);
+    state->e.q = e.q + in->flux.psi_q - last->flux.psi_q - t * (u.q - 0.5 * (before.q + after.q)) - s2 * (e.d + e.q);
     state->last = *in;
 }
 
@@ -80,15 +77,15 @@ static double excitation(const twin_mrai_in_t *at)
     return weight_d * at->i.d * weight_d * at->i.d + at->i.q * at->i.q;
 }
 
-static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
-                  bool flux_open, bool r_open)
+static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now, bool flux_open,
+                  bool r_open)
 {
     const double psi_full = psi_full_drift(motor);
     const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * motor->step_s;
     q->psi_quality = quality(q->psi_quality, motor->quality_rate, flux_open && !now->psi_clamped,
                              now->psi_delta - q->psi_last, psi_full);
-    q->r_quality = quality(q->r_quality, motor->quality_rate, r_open && !now->r_clamped,
-                           now->r_delta - q->r_last, r_full);
+    q->r_quality = quality(q->r_quality, motor->quality_rate, r_open && !now->r_clamped, now->r_delta - q->r_last,
+                           r_full);
     q->psi_last = now->psi_delta;
     q->r_last = now->r_delta;
 }
@@ -99,12 +96,10 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
 {
     const double w = sample->omega;
     const double magnitude = hypot(sample->i.d, sample->i.q);
-    const bool flux_open =
-        enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
+    const bool flux_open = enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
     const double psi_drift = identifier->psi_delta - quality_state->psi_last;
     const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
-    const bool r_open = flux_open && settled &&
-                        (fabs(w) <= motor->omega_r_max_rad_s);
+    const bool r_open = flux_open && settled && (fabs(w) <= motor->omega_r_max_rad_s);
     /* A current step is over before the next task: the gain must suit both of its ends. */
     const double norm = fmax(excitation(sample), excitation(next));
     judge(motor, quality_state, identifier, flux_open, r_open);

@@ -53,8 +53,7 @@ typedef struct {
 } twin_measure_t;
 
 /* counts: i_a, i_b, i_c, v_dc of a converter of motor->adc_bits. */
-twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t *config,
-                            const double counts[4]);
+twin_measure_t twin_measure(const motor_si_t *motor, const twin_measure_config_t *config, const double counts[4]);
 
 typedef struct {
     double theta, step; /* rad, rad per period */
@@ -65,8 +64,7 @@ typedef struct {
     double theta, step, omega; /* measured angle; tracked advance per period and speed */
 } twin_angle_t;
 
-twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state,
-                                double theta_m_rad);
+twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *state, double theta_m_rad);
 
 /* --- flux tables ----------------------------------------------------------------------------- */
 typedef struct {
@@ -97,8 +95,7 @@ typedef struct {
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref);
 
-twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state,
-                               const twin_current_in_t *in);
+twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state, const twin_current_in_t *in);
 
 typedef struct {
     twin_dq_t u, i;
@@ -141,8 +138,8 @@ typedef struct {
 } twin_mrai_quality_t;
 
 void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in);
-void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule,
-               twin_mrai_state_t *state, const twin_mrai_in_t *in);
+void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule, twin_mrai_state_t *state,
+               const twin_mrai_in_t *in);
 twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quality_t *quality_state,
                                         const twin_mrai_in_t *sample, const twin_mrai_in_t *next,
                                         const twin_mrai_state_t *identifier, bool enabled);
@@ -181,8 +178,7 @@ typedef struct {
     bool enabled, limited;
 } twin_torque_in_t;
 
-double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
-                        const twin_torque_in_t *in);
+double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, const twin_torque_in_t *in);
 
 typedef struct {
     double torque_corrected, v_dc, omega, i_magnitude, v_trim, shift, psi_delta, i_d_max, psi_q_delta;

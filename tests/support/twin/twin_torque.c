@@ -20,8 +20,7 @@ double twin_torque_estimate(const motor_si_t *motor, twin_torque_estimate_t *sta
     return state->mean;
 }
 
-double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
-                        const twin_torque_in_t *in)
+double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, const twin_torque_in_t *in)
 {
     const double authority = motor->torque_authority * in->confidence;
     const double room = authority * fabs(in->torque_commanded);
@@ -51,16 +50,14 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state,
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in)
 {
-    const twin_grid_t grid = {0.0,          motor->torque_step_Nm, motor->psi0_Vs, motor->psi_step_Vs,
+    const twin_grid_t grid = {0.0,           motor->torque_step_Nm, motor->psi0_Vs, motor->psi_step_Vs,
                               motor->ref_nt, motor->ref_npsi};
     const twin_grid_t row = {0.0, 1.0, motor->psi0_Vs, motor->psi_step_Vs, 1, motor->ref_npsi};
     const double psi_top = motor->psi0_Vs + motor->psi_step_Vs * (motor->ref_npsi - 1);
-    const double u =
-        fmax(motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude + in->v_trim, 0.0);
+    const double u = fmax(motor->ref_v_ratio * in->v_dc - motor->r_ohm_20 * in->i_magnitude + in->v_trim, 0.0);
     const double w = fabs(in->omega);
     const double psi_far_top = psi_top + fabs(in->shift);
-    const double raw =
-        (u >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(u / w - in->shift, 0.0);
+    const double raw = (u >= w * (psi_far_top + fabs(in->shift))) ? psi_far_top : fmax(u / w - in->shift, 0.0);
     const double psi = fmin(raw, psi_top);
     const double t_max = twin_lookup(&row, motor->ref_torque_max_Nm, 0.0, psi);
     const double t = fmin(fabs(in->torque_corrected), t_max);

@@ -19,9 +19,24 @@
 #include "emu_private.h"
 
 enum {
-    SC1 = 0x00, SC1_LAST = 0x3C, CFG1 = 0x40, CFG2 = 0x44, R = 0x48, R_LAST = 0x84, SC2 = 0x90, SC3 = 0x94, TRIM = 0x98,
-    CLPS = 0xB4, CLP9 = 0xCC, SAMPLE_MIN = 924, /* 275 ns */
-    COCO = 0x80, AIEN = 0x40, OFF = 31, CONVERSION = 30, ADC0_IRQ = 39, ADC1_IRQ = 40,
+    SC1 = 0x00,
+    SC1_LAST = 0x3C,
+    CFG1 = 0x40,
+    CFG2 = 0x44,
+    R = 0x48,
+    R_LAST = 0x84,
+    SC2 = 0x90,
+    SC3 = 0x94,
+    TRIM = 0x98,
+    CLPS = 0xB4,
+    CLP9 = 0xCC,
+    SAMPLE_MIN = 924, /* 275 ns */
+    COCO = 0x80,
+    AIEN = 0x40,
+    OFF = 31,
+    CONVERSION = 30,
+    ADC0_IRQ = 39,
+    ADC1_IRQ = 40,
 };
 
 static const peripheral_t *of(int instance)

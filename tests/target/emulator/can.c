@@ -20,11 +20,30 @@
 #include "emu_private.h"
 
 enum {
-    MCR = 0x00, CTRL1 = 0x04, TIMER = 0x08, RXMGMASK = 0x10, ECR = 0x1C, ESR1 = 0x20, IMASK1 = 0x28, IFLAG1 = 0x30,
-    CTRL2 = 0x34, RXFGMASK = 0x48, RAM = 0x80, RAM_END = 0x280, BOX = 16, RXIMR = 0x880,
-    CODE_SEND = 12, CODE_DONE = 8, FIRST_SEND_BOX = 8, BOXES = 16,
-    MB_IRQ = 81, FRAME_OVERHEAD_BITS = 47, EXTENDED_OVERHEAD_BITS = 67,
-    FIFO_WARNING = 1 << 6, FIFO_OVERFLOW = 1 << 7, FIFO_FRAME = 1 << 5,
+    MCR = 0x00,
+    CTRL1 = 0x04,
+    TIMER = 0x08,
+    RXMGMASK = 0x10,
+    ECR = 0x1C,
+    ESR1 = 0x20,
+    IMASK1 = 0x28,
+    IFLAG1 = 0x30,
+    CTRL2 = 0x34,
+    RXFGMASK = 0x48,
+    RAM = 0x80,
+    RAM_END = 0x280,
+    BOX = 16,
+    RXIMR = 0x880,
+    CODE_SEND = 12,
+    CODE_DONE = 8,
+    FIRST_SEND_BOX = 8,
+    BOXES = 16,
+    MB_IRQ = 81,
+    FRAME_OVERHEAD_BITS = 47,
+    EXTENDED_OVERHEAD_BITS = 67,
+    FIFO_WARNING = 1 << 6,
+    FIFO_OVERFLOW = 1 << 7,
+    FIFO_FRAME = 1 << 5,
 };
 #define MDIS (1U << 31)
 #define FRZ (1U << 30)

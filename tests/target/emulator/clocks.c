@@ -17,13 +17,34 @@
 #include "emu_private.h"
 
 enum {
-    CSR = 0x10, RCCR = 0x14, VCCR = 0x18, HCCR = 0x1C, SOSCCSR = 0x100, SOSCDIV = 0x104, SOSCCFG = 0x108,
-    SIRCCSR = 0x200, SIRCDIV = 0x204, SIRCCFG = 0x208, FIRCCSR = 0x300, FIRCDIV = 0x304, FIRCCFG = 0x308,
-    SPLLCSR = 0x600, SPLLDIV = 0x604, SPLLCFG = 0x608,
-    PMPROT = 0x08, PMCTRL = 0x0C, PMSTAT = 0x14,
-    SOSC = 1, SIRC = 2, FIRC = 3, SPLL = 6,
-    CRYSTAL_TICKS = 420, SIRC_TICKS = 420, FIRC_TICKS = 70, /* 8, 8, 48 MHz */
-    RUN = 1, HSRUN = 0x80,
+    CSR = 0x10,
+    RCCR = 0x14,
+    VCCR = 0x18,
+    HCCR = 0x1C,
+    SOSCCSR = 0x100,
+    SOSCDIV = 0x104,
+    SOSCCFG = 0x108,
+    SIRCCSR = 0x200,
+    SIRCDIV = 0x204,
+    SIRCCFG = 0x208,
+    FIRCCSR = 0x300,
+    FIRCDIV = 0x304,
+    FIRCCFG = 0x308,
+    SPLLCSR = 0x600,
+    SPLLDIV = 0x604,
+    SPLLCFG = 0x608,
+    PMPROT = 0x08,
+    PMCTRL = 0x0C,
+    PMSTAT = 0x14,
+    SOSC = 1,
+    SIRC = 2,
+    FIRC = 3,
+    SPLL = 6,
+    CRYSTAL_TICKS = 420,
+    SIRC_TICKS = 420,
+    FIRC_TICKS = 70, /* 8, 8, 48 MHz */
+    RUN = 1,
+    HSRUN = 0x80,
 };
 #define ENABLED 1U
 #define VALID (1U << 24)
@@ -104,8 +125,8 @@ static void core_update(emu_t *emu)
         emu_fail(emu, "SCG selects clock source %u, which is off or no whole number of ticks", ccr >> 24 & 15U);
     } else if (core < (high ? 30U : 42U) || bus < (high ? 60U : 70U) || flash < (high ? 120U : 126U)) {
         const uint32_t ticks_per_ms = EMU_TICKS_PER_S / 1000U;
-        emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core,
-                 ticks_per_ms / bus, ticks_per_ms / flash, high ? "HSRUN" : "RUN");
+        emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core, ticks_per_ms / bus,
+                 ticks_per_ms / flash, high ? "HSRUN" : "RUN");
     } else if (high && steps(emu->s.core_ticks, core)) {
         emu_fail(emu, "SCG: in HSRUN the core's clock changes by more than a factor of two");
     } else {
@@ -123,11 +144,16 @@ uint32_t scg_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     (void)self;
     const int source = offset == SOSCCSR ? SOSC : offset == SIRCCSR ? SIRC : offset == FIRCCSR ? FIRC : SPLL;
     switch (offset) {
-    case CSR: return selected(emu);
-    case SOSCCSR: case SIRCCSR: case FIRCCSR: case SPLLCSR:
+    case CSR:
+        return selected(emu);
+    case SOSCCSR:
+    case SIRCCSR:
+    case FIRCCSR:
+    case SPLLCSR:
         return (stored & 0x00FFFFFFU) | (source_on(emu, source) ? VALID : 0U) |
                ((selected(emu) >> 24 & 15U) == (uint32_t)source ? 1U << 25 : 0U);
-    default: return stored;
+    default:
+        return stored;
     }
 }
 

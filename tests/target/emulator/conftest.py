@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS, have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts

@@ -82,11 +82,11 @@ static int timer_next(const emu_t *emu)
 static void timer_fire(emu_t *emu)
 {
     static void (*const fire[TIMERS])(emu_t *, int) = {
-        [TIMER_FTM0] = ftm_fire, [TIMER_FTM2] = ftm_fire, [TIMER_PDB0] = pdb_fire,   [TIMER_PDB1] = pdb_fire,
-        [TIMER_ADC0] = adc_fire, [TIMER_ADC1] = adc_fire, [TIMER_LPIT0] = lpit_fire, [TIMER_LPIT1] = lpit_fire,
+        [TIMER_FTM0] = ftm_fire,   [TIMER_FTM2] = ftm_fire,   [TIMER_PDB0] = pdb_fire,   [TIMER_PDB1] = pdb_fire,
+        [TIMER_ADC0] = adc_fire,   [TIMER_ADC1] = adc_fire,   [TIMER_LPIT0] = lpit_fire, [TIMER_LPIT1] = lpit_fire,
         [TIMER_LPIT2] = lpit_fire, [TIMER_LPIT3] = lpit_fire,
     };
-    static const uint8_t instance[TIMERS] = {[TIMER_FTM2] = 1, [TIMER_PDB1] = 1, [TIMER_ADC1] = 1,
+    static const uint8_t instance[TIMERS] = {[TIMER_FTM2] = 1,  [TIMER_PDB1] = 1,  [TIMER_ADC1] = 1,
                                              [TIMER_LPIT1] = 1, [TIMER_LPIT2] = 2, [TIMER_LPIT3] = 3};
     const int i = timer_next(emu);
     emu->s.event = emu->s.due[i];
@@ -353,8 +353,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
         emu->mode = (emu_mode_t)mode;
         emu->block = calloc(FLASH_SIZE / 2, sizeof *emu->block);
         if (emu->block == NULL || uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &emu->uc) != UC_ERR_OK ||
-            uc_ctl_set_cpu_model(emu->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !maps_create(emu) ||
-            !bus_create(emu)) {
+            uc_ctl_set_cpu_model(emu->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !maps_create(emu) || !bus_create(emu)) {
             bad = "the emulated core cannot be created";
         } else {
             uint8_t erased[4096];

@@ -33,18 +33,18 @@ typedef enum { EMU_LIMIT = 0, EMU_CENTRE = 1, EMU_BREAK = 2, EMU_FAILED = -1 } e
 
 /** What the pins carry into the chip. */
 typedef struct {
-    uint16_t adc[2][32];     /* 12-bit result of each converter's channel */
-    uint32_t angle;          /* of the shaft, 2^32 = one turn */
-    int32_t angle_rate;      /* 2^-32 turns per tick, 2^16 = 1: the shaft turns on between two settings */
+    uint16_t adc[2][32]; /* 12-bit result of each converter's channel */
+    uint32_t angle;      /* of the shaft, 2^32 = one turn */
+    int32_t angle_rate;  /* 2^-32 turns per tick, 2^16 = 1: the shaft turns on between two settings */
     bool resolver_fault;
-    bool gate_fault;         /* the gate driver pulls the fault input */
+    bool gate_fault; /* the gate driver pulls the fault input */
 } emu_pins_t;
 
 /** What the pins of the bridge do: compare values that act in this period, as a share of it. */
 typedef struct {
     double duty[3];
-    uint8_t driven;          /* outputs that may switch on, one bit each, even ones the upper switches */
-    bool gates;              /* all six follow the timer, complementary */
+    uint8_t driven; /* outputs that may switch on, one bit each, even ones the upper switches */
+    bool gates;     /* all six follow the timer, complementary */
     double dead_time_s;
     double period_s;
 } emu_bridge_t;

@@ -27,8 +27,21 @@ enum {
 #define NEVER UINT64_MAX
 
 typedef enum {
-    TIMER_FTM0, TIMER_FTM2, TIMER_PDB0, TIMER_PDB1, TIMER_ADC0, TIMER_ADC1, TIMER_LPIT0, TIMER_LPIT1, TIMER_LPIT2,
-    TIMER_LPIT3, TIMER_FAULT, TIMER_WDOG, TIMER_CAN, TIMER_SYSTICK, TIMERS
+    TIMER_FTM0,
+    TIMER_FTM2,
+    TIMER_PDB0,
+    TIMER_PDB1,
+    TIMER_ADC0,
+    TIMER_ADC1,
+    TIMER_LPIT0,
+    TIMER_LPIT1,
+    TIMER_LPIT2,
+    TIMER_LPIT3,
+    TIMER_FAULT,
+    TIMER_WDOG,
+    TIMER_CAN,
+    TIMER_SYSTICK,
+    TIMERS
 } timer_t_;
 
 /* ---- what changes ---- */
@@ -50,15 +63,15 @@ typedef struct {
     uint64_t start;             /* when the counter was last at CNTIN */
     uint32_t mod, cntin, cv[8]; /* that act; the registers are their buffers */
     bool software_trigger;
-    uint32_t outmask;           /* acting */
-    bool triggers_due;          /* the instant's triggers wait for the pins */
+    uint32_t outmask;  /* acting */
+    bool triggers_due; /* the instant's triggers wait for the pins */
     bool tof;
-    bool fault_input;           /* behind the filter */
+    bool fault_input;                            /* behind the filter */
     bool fault_latched, fault_seen, fault_holds; /* FAULTF; FMS was read while it was set; the outputs are off */
-    uint64_t stopped_at;        /* by a debugger, 0: not */
-    bool closed;                /* the bridge, when last looked at */
+    uint64_t stopped_at;                         /* by a debugger, 0: not */
+    bool closed;                                 /* the bridge, when last looked at */
     uint32_t quad_offset;
-    uint32_t read[2];           /* the counter as the program has read it last, and before that */
+    uint32_t read[2]; /* the counter as the program has read it last, and before that */
 } ftm_t;
 
 typedef struct {
@@ -78,7 +91,7 @@ typedef struct {
 typedef struct {
     can_port_frame_t fifo[EMU_CAN_FIFO];
     int fifo_count;
-    int sending; /* mailbox + 1, 0: the bus is free */
+    int sending;        /* mailbox + 1, 0: the bus is free */
     uint32_t filled[4]; /* words of the message memory that have been written since the reset */
 } can_t;
 
@@ -90,7 +103,7 @@ typedef struct {
 } spi_t;
 
 typedef struct {
-    uint32_t latched; /* angle at the last SAMPLE */
+    uint32_t latched;             /* angle at the last SAMPLE */
     uint8_t fault, sampled_fault; /* kept until it has been read in configuration mode and SAMPLE falls again */
     bool read, high;              /* the fault register so; SAMPLE while software holds it */
     uint8_t address;
@@ -117,7 +130,7 @@ typedef struct {
     rdc_t rdc;
     wdog_t wdog;
     uint64_t lpit_ready; /* the timer takes its registers from here on */
-    uint32_t core_ticks;   /* per core cycle */
+    uint32_t core_ticks; /* per core cycle */
     uint32_t pc, resets, reset_cause;
     bool centre, reset_wanted, poll_masks, reschedule, stop;
     bool halted, stuck; /* by a debugger; executing nothing while everything else goes on */
@@ -137,13 +150,13 @@ struct peripheral {
     void (*written)(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value);
     uint16_t gate; /* offset in PCC, 0: always clocked */
     uint8_t instance;
-    bool narrow;   /* bytes and half words of its registers may be written */
+    bool narrow; /* bytes and half words of its registers may be written */
 };
 
 typedef struct {
     uint16_t size, count;
-    bool idle;            /* a branch to itself */
-    uint8_t conditional;  /* instructions behind one IT */
+    bool idle;           /* a branch to itself */
+    uint8_t conditional; /* instructions behind one IT */
 } block_t;
 
 enum { THUMB_32BIT = 0xE8 }; /* the second byte of a longer instruction is at least this */
@@ -157,7 +170,7 @@ struct emu {
     const facts_t *facts_of[PERIPHERALS_MAX];
     int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
     int16_t page[256];
-    block_t *block;  /* by address / 2 in flash */
+    block_t *block; /* by address / 2 in flash */
     emu_exception_fn on_exception;
     void *on_exception_user;
     can_port_t *can_port;

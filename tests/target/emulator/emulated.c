@@ -100,12 +100,14 @@ static int pin_set(emulated_t *e, const char *name, double value)
 {
     emu_pins_t *pins = &e->pins_of_board;
     bool *pin = strcmp(name, "emulator.gate_fault") == 0       ? &pins->gate_fault
-                : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault : NULL;
+                : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault
+                                                               : NULL;
     if (strcmp(name, "emulator.shadow") == 0) {
         return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
     }
     double *temperature = strcmp(name, "emulator.inverter_C") == 0    ? &e->inverter_C
-                          : strcmp(name, "emulator.processor_C") == 0 ? &e->processor_C : NULL;
+                          : strcmp(name, "emulator.processor_C") == 0 ? &e->processor_C
+                                                                      : NULL;
     if (temperature != NULL) {
         const bool possible = value >= -40.0 && value <= 150.0;
         *temperature = possible ? value : *temperature;

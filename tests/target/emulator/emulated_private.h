@@ -9,15 +9,15 @@
 typedef struct {
     emu_t *emu;
     mirror_t mirror;
-    emu_pins_t pins_of_board;  /* only the lines that scenarios set */
+    emu_pins_t pins_of_board; /* only the lines that scenarios set */
     double period_ticks;
     uint64_t steps;
     double inverter_C, processor_C;
-    bool gate_driver;          /* the gates need the line that supplies their driver */
-    fluxtrue_t *shadow;        /* NULL: not followed */
-    drive_t task_result;       /* of the shadow's task, while the image is still at it */
+    bool gate_driver;    /* the gates need the line that supplies their driver */
+    fluxtrue_t *shadow;  /* NULL: not followed */
+    drive_t task_result; /* of the shadow's task, while the image is still at it */
     bool task_runs;
-    bool gate_fault;           /* its interrupt has come, the next fast ISR tells the shadow */
+    bool gate_fault; /* its interrupt has come, the next fast ISR tells the shadow */
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;

@@ -75,11 +75,13 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
         f->read[1] = f->read[0];
         f->read[0] = counter(emu, self, stored);
         return f->read[0];
-    case SC: return (stored & ~0x280U) | (f->tof ? 0x200U : 0U);
+    case SC:
+        return (stored & ~0x280U) | (f->tof ? 0x200U : 0U);
     case FMS:
         f->fault_seen = f->fault_latched;
         return self->instance == 0 ? ftm_fault_status(emu) : stored;
-    default: return stored;
+    default:
+        return stored;
     }
 }
 
@@ -162,13 +164,22 @@ static void protection_written(emu_t *emu, const peripheral_t *self, uint32_t va
 static uint32_t protected_bits(uint32_t offset)
 {
     switch (offset) {
-    case SC: return 0x3FU;                          /* CPWMS, CLKS, PS */
-    case MODE: return 0x79U;                        /* FTMEN, PWMSYNC, CAPTEST, FAULTM */
-    case COMBINE: return 0x57575757U;               /* all but DECAP, SYNCEN, MCOMBINE */
-    case FLTCTRL: return 0xFFU;
-    case QDCTRL: return 1U;
-    case DEADTIME: case POL: case FLTPOL: return 0xFFFFFFFFU;
-    default: return offset >= C0SC && offset < C7V && (offset - C0SC) % 8U == 0 ? 0x3CU : 0U;
+    case SC:
+        return 0x3FU; /* CPWMS, CLKS, PS */
+    case MODE:
+        return 0x79U; /* FTMEN, PWMSYNC, CAPTEST, FAULTM */
+    case COMBINE:
+        return 0x57575757U; /* all but DECAP, SYNCEN, MCOMBINE */
+    case FLTCTRL:
+        return 0xFFU;
+    case QDCTRL:
+        return 1U;
+    case DEADTIME:
+    case POL:
+    case FLTPOL:
+        return 0xFFFFFFFFU;
+    default:
+        return offset >= C0SC && offset < C7V && (offset - C0SC) % 8U == 0 ? 0x3CU : 0U;
     }
 }
 

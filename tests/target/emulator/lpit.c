@@ -12,8 +12,17 @@
 #include "emu_private.h"
 
 enum {
-    MCR = 0x08, MSR = 0x0C, MIER = 0x10, SETTEN = 0x14, CLRTEN = 0x18, TVAL0 = 0x20, CVAL0 = 0x24, TCTRL0 = 0x28,
-    STEP = 0x10, CHANNELS = 4, LPIT_IRQ = 48,
+    MCR = 0x08,
+    MSR = 0x0C,
+    MIER = 0x10,
+    SETTEN = 0x14,
+    CLRTEN = 0x18,
+    TVAL0 = 0x20,
+    CVAL0 = 0x24,
+    TCTRL0 = 0x28,
+    STEP = 0x10,
+    CHANNELS = 4,
+    LPIT_IRQ = 48,
 };
 
 bool lpit_models(uint32_t offset)

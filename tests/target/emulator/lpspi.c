@@ -15,9 +15,23 @@
 #include "emu_private.h"
 
 enum {
-    CR = 0x10, SR = 0x14, IER = 0x18, DER = 0x1C, CFGR1 = 0x24, CCR = 0x40, FCR = 0x58, FSR = 0x5C, TCR = 0x60,
-    TDR = 0x64, RSR = 0x70, RDR = 0x74, FIFO = 4,
-    MEN = 1, RESET = 2, RTF = 1 << 8, RRF = 1 << 9,
+    CR = 0x10,
+    SR = 0x14,
+    IER = 0x18,
+    DER = 0x1C,
+    CFGR1 = 0x24,
+    CCR = 0x40,
+    FCR = 0x58,
+    FSR = 0x5C,
+    TCR = 0x60,
+    TDR = 0x64,
+    RSR = 0x70,
+    RDR = 0x74,
+    FIFO = 4,
+    MEN = 1,
+    RESET = 2,
+    RTF = 1 << 8,
+    RRF = 1 << 9,
 };
 
 bool lpspi_models(uint32_t offset)
@@ -55,12 +69,17 @@ uint32_t lpspi_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint3
     spi_t *spi = &emu->s.spi[self->instance];
     const uint32_t count = arrived(emu, spi);
     switch (offset) {
-    case SR: return 1U | (count > (bus_get(emu, self, FCR) >> 16 & 3U) ? 2U : 0U) |
-                    (emu->s.now < spi->busy_until ? 1U << 24 : 0U);
-    case FSR: return count << 16;
-    case RSR: return count == 0 ? 2U : 0U;
-    case RDR: return receive(emu, self);
-    default: return stored;
+    case SR:
+        return 1U | (count > (bus_get(emu, self, FCR) >> 16 & 3U) ? 2U : 0U) |
+               (emu->s.now < spi->busy_until ? 1U << 24 : 0U);
+    case FSR:
+        return count << 16;
+    case RSR:
+        return count == 0 ? 2U : 0U;
+    case RDR:
+        return receive(emu, self);
+    default:
+        return stored;
     }
 }
 

@@ -18,12 +18,17 @@
 #include "emu_private.h"
 
 enum {
-    NMI = 2, HARD_FAULT = 3, SYSTICK = 15,
-    FRAME_WORDS = 8, EXTENDED_WORDS = 26,
-    FPCA = 4, SPSEL = 2,
+    NMI = 2,
+    HARD_FAULT = 3,
+    SYSTICK = 15,
+    FRAME_WORDS = 8,
+    EXTENDED_WORDS = 26,
+    FPCA = 4,
+    SPSEL = 2,
     SFPA = 8, /* unicorn's core has it, and without it takes the context for a new one: FPSCR would be lost */
     LOWEST = 256,
-    XPSR_ALIGNED = 1 << 9, XPSR_VECTOR = 0x1FF,
+    XPSR_ALIGNED = 1 << 9,
+    XPSR_VECTOR = 0x1FF,
 };
 
 static const int frame_registers[FRAME_WORDS] = {UC_ARM_REG_R0,  UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3,
@@ -45,8 +50,8 @@ void nvic_reset(emu_t *emu)
 {
     nvic_t *n = &emu->s.nvic;
     memset(n, 0, sizeof *n);
-    n->ccr = 1U << 9;      /* STKALIGN */
-    n->fpccr = 3U << 30;   /* ASPEN, LSPEN */
+    n->ccr = 1U << 9;    /* STKALIGN */
+    n->fpccr = 3U << 30; /* ASPEN, LSPEN */
     n->aircr = 0xFA050000U;
 }
 

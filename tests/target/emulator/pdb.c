@@ -23,9 +23,25 @@
 #include "emu_private.h"
 
 enum {
-    SC = 0x00, MOD = 0x04, CNT = 0x08, IDLY = 0x0C, C1 = 0x10, S = 0x14, DLY0 = 0x18, DLY7 = 0x34,
-    PRETRIGGERS = 8, PRETRIGGER_CYCLES = 2, TRIGGER_CYCLES = 1, PDB0_IRQ = 52, PDB1_IRQ = 68,
-    LDOK = 1 << 0, PDBEN = 1 << 7, SWTRIG = 1 << 16, PDBEIE = 1 << 17, ERRORS = 0xFF, FLAG0 = 16,
+    SC = 0x00,
+    MOD = 0x04,
+    CNT = 0x08,
+    IDLY = 0x0C,
+    C1 = 0x10,
+    S = 0x14,
+    DLY0 = 0x18,
+    DLY7 = 0x34,
+    PRETRIGGERS = 8,
+    PRETRIGGER_CYCLES = 2,
+    TRIGGER_CYCLES = 1,
+    PDB0_IRQ = 52,
+    PDB1_IRQ = 68,
+    LDOK = 1 << 0,
+    PDBEN = 1 << 7,
+    SWTRIG = 1 << 16,
+    PDBEIE = 1 << 17,
+    ERRORS = 0xFF,
+    FLAG0 = 16,
     NOT_MODELLED = 1 << 1 | 1 << 5 | 1 << 15 | 3 << 18, /* CONT, PDBIE, DMAEN, LDMOD */
 };
 
@@ -156,8 +172,7 @@ void pdb_trigger(emu_t *emu, int instance)
     const peripheral_t *self = of(instance);
     pdb_t *p = &emu->s.pdb[instance];
     const uint32_t c1 = bus_get(emu, self, C1);
-    if ((bus_get(emu, self, SC) & PDBEN) == 0 ||
-        (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0) {
+    if ((bus_get(emu, self, SC) & PDBEN) == 0 || (bus_get(emu, bus_find("PCC"), self->gate) & 1U << 30) == 0) {
         return;
     }
     p->running = true;

@@ -17,9 +17,18 @@
 #include "emu_private.h"
 
 enum {
-    PCR_LAST = 0x7C, GPCLR = 0x80, GPCHR = 0x84, ISFR = 0xA0,
-    PDOR = 0x00, PSOR = 0x04, PCOR = 0x08, PTOR = 0x0C, PDIR = 0x10, PDDR = 0x14,
-    TO_PDB0 = 0x38, TO_PDB1 = 0x3C,
+    PCR_LAST = 0x7C,
+    GPCLR = 0x80,
+    GPCHR = 0x84,
+    ISFR = 0xA0,
+    PDOR = 0x00,
+    PSOR = 0x04,
+    PCOR = 0x08,
+    PTOR = 0x0C,
+    PDIR = 0x10,
+    PDDR = 0x14,
+    TO_PDB0 = 0x38,
+    TO_PDB1 = 0x3C,
     FLAG = 1 << 24,
 };
 #define LOCK (1U << 31)
@@ -29,9 +38,9 @@ static const struct {
     const char *peripheral, *port;
     uint8_t pin, function;
 } wiring[] = {
-    {"FTM0", "PORTD", 15, 2}, {"FTM0", "PORTD", 16, 2}, {"FTM0", "PORTD", 0, 2}, {"FTM0", "PORTD", 1, 2},
-    {"FTM0", "PORTB", 4, 2},  {"FTM0", "PORTB", 5, 2},  {"FTM0", "PORTE", 8, 2}, {"FTM0", "PORTA", 14, 2},
-    {"FTM2", "PORTD", 10, 3}, {"FTM2", "PORTD", 11, 3}, {"CAN0", "PORTE", 4, 5}, {"CAN0", "PORTE", 5, 5},
+    {"FTM0", "PORTD", 15, 2},  {"FTM0", "PORTD", 16, 2},  {"FTM0", "PORTD", 0, 2},   {"FTM0", "PORTD", 1, 2},
+    {"FTM0", "PORTB", 4, 2},   {"FTM0", "PORTB", 5, 2},   {"FTM0", "PORTE", 8, 2},   {"FTM0", "PORTA", 14, 2},
+    {"FTM2", "PORTD", 10, 3},  {"FTM2", "PORTD", 11, 3},  {"CAN0", "PORTE", 4, 5},   {"CAN0", "PORTE", 5, 5},
     {"LPSPI0", "PORTB", 0, 3}, {"LPSPI0", "PORTB", 1, 3}, {"LPSPI0", "PORTB", 2, 3}, {"LPSPI0", "PORTB", 3, 3},
 };
 

@@ -16,13 +16,13 @@ enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 typedef struct {
     emulated_t *e;
     int victim, rounds;
-    int last_vector;                      /* of a round: the identification's, if the fast ISR pends it */
+    int last_vector;                            /* of a round: the identification's, if the fast ISR pends it */
     bool catch_entry, catch_exit, catch_return; /* what emu_run() is to stop at */
     fluxtrue_t *host;
-    adc_counts_t counts;                  /* of the last sample at the victim's entry */
-    drive_t before;                       /* at the victim's entry */
-    drive_t outcome[OUTCOMES];            /* of the victim */
-    drive_t interrupts[CHOICES_MAX];      /* what the interrupts make of what the victim has handed over by then */
+    adc_counts_t counts;             /* of the last sample at the victim's entry */
+    drive_t before;                  /* at the victim's entry */
+    drive_t outcome[OUTCOMES];       /* of the victim */
+    drive_t interrupts[CHOICES_MAX]; /* what the interrupts make of what the victim has handed over by then */
     int choices;
     bool seen[OUTCOMES], chosen[CHOICES_MAX];
 } preempt_t;
@@ -35,10 +35,9 @@ static preempt_t the_test;
 static void on_exception(void *user, int vector, bool entered)
 {
     preempt_t *p = user;
-    const bool hit = (p->catch_entry && entered && vector == p->victim) ||
-                     (p->catch_exit && !entered && vector == p->victim) ||
-                     (p->catch_return && !entered && vector == p->last_vector &&
-                      emu_active_vector(p->e->emu) == p->victim);
+    const bool hit =
+        (p->catch_entry && entered && vector == p->victim) || (p->catch_exit && !entered && vector == p->victim) ||
+        (p->catch_return && !entered && vector == p->last_vector && emu_active_vector(p->e->emu) == p->victim);
     if (hit) {
         emu_break_after(p->e->emu, 0);
     }
@@ -71,7 +70,9 @@ static adc_counts_t sample_of(const preempt_t *p, int round)
 {
     const adc_counts_t *c = &p->counts;
     const uint32_t more = (uint32_t)round + 1U;
-    return (adc_counts_t){.i_a = c->i_a + 40U * more, .i_b = c->i_b - 25U * more, .i_c = c->i_c - 15U * more,
+    return (adc_counts_t){.i_a = c->i_a + 40U * more,
+                          .i_b = c->i_b - 25U * more,
+                          .i_c = c->i_c - 15U * more,
                           .v_dc = c->v_dc + 7U * more};
 }
 

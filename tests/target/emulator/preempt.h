@@ -19,12 +19,12 @@
 typedef enum { PREEMPT_MRAI = 16 + 69, PREEMPT_TASK = 16 + 48 } preempt_victim_t;
 
 typedef struct {
-    int instructions;  /* of the victim, uninterrupted */
-    int points;        /* boundaries tried */
-    int mixed;         /* outcomes that are not allowed */
-    int outcomes;      /* of the victim's two, how many were seen */
-    int choices;       /* of what it hands over: combinations of old and new that the interrupts have found */
-    char first[160];   /* the first mixed outcome, or why nothing could be tried */
+    int instructions; /* of the victim, uninterrupted */
+    int points;       /* boundaries tried */
+    int mixed;        /* outcomes that are not allowed */
+    int outcomes;     /* of the victim's two, how many were seen */
+    int choices;      /* of what it hands over: combinations of old and new that the interrupts have found */
+    char first[160];  /* the first mixed outcome, or why nothing could be tried */
 } preempt_report_t;
 
 /** rounds: fast ISRs at the same boundary, 1 or 2 (the task only): two overwrite the slot that is being copied. */

@@ -13,15 +13,39 @@
 #include "emu_private.h"
 
 enum {
-    DWT_CTRL = 0xE0001000 - 0xE0000000, DWT_CYCCNT = DWT_CTRL + 4,
-    SCS = 0xE000, ICTR = SCS + 4, ACTLR = SCS + 8, SYST_CSR = SCS + 0x10, SYST_RVR = SCS + 0x14, SYST_CVR = SCS + 0x18,
-    ISER = SCS + 0x100, ICER = SCS + 0x180, ISPR = SCS + 0x200, ICPR = SCS + 0x280, IABR = SCS + 0x300,
-    IPR = SCS + 0x400, CPUID = SCS + 0xD00, ICSR = SCS + 0xD04, VTOR = SCS + 0xD08, AIRCR = SCS + 0xD0C,
-    SCR = SCS + 0xD10, CCR = SCS + 0xD14, SHPR = SCS + 0xD18, SHCSR = SCS + 0xD24, CFSR = SCS + 0xD28,
-    HFSR = SCS + 0xD2C, CPACR = SCS + 0xD88, STIR = SCS + 0xF00, FPCCR = SCS + 0xF34, FPCAR = SCS + 0xF38,
+    DWT_CTRL = 0xE0001000 - 0xE0000000,
+    DWT_CYCCNT = DWT_CTRL + 4,
+    SCS = 0xE000,
+    ICTR = SCS + 4,
+    ACTLR = SCS + 8,
+    SYST_CSR = SCS + 0x10,
+    SYST_RVR = SCS + 0x14,
+    SYST_CVR = SCS + 0x18,
+    ISER = SCS + 0x100,
+    ICER = SCS + 0x180,
+    ISPR = SCS + 0x200,
+    ICPR = SCS + 0x280,
+    IABR = SCS + 0x300,
+    IPR = SCS + 0x400,
+    CPUID = SCS + 0xD00,
+    ICSR = SCS + 0xD04,
+    VTOR = SCS + 0xD08,
+    AIRCR = SCS + 0xD0C,
+    SCR = SCS + 0xD10,
+    CCR = SCS + 0xD14,
+    SHPR = SCS + 0xD18,
+    SHCSR = SCS + 0xD24,
+    CFSR = SCS + 0xD28,
+    HFSR = SCS + 0xD2C,
+    CPACR = SCS + 0xD88,
+    STIR = SCS + 0xF00,
+    FPCCR = SCS + 0xF34,
+    FPCAR = SCS + 0xF38,
     DEMCR = SCS + 0xDFC,
-    INTERRUPTS = VECTORS - 16, SET_WORDS = 4,
-    PENDSV = 14, SYSTICK = 15,
+    INTERRUPTS = VECTORS - 16,
+    SET_WORDS = 4,
+    PENDSV = 14,
+    SYSTICK = 15,
 };
 
 static bool within(uint32_t at, uint32_t first, uint32_t words)
@@ -130,24 +154,62 @@ static bool system_word(emu_t *emu, uint32_t at, uint32_t *value)
 {
     const nvic_t *n = &emu->s.nvic;
     switch (at) {
-    case ICTR: *value = 3; break;
-    case ACTLR: *value = 0; break;
-    case SYST_CSR: case SYST_RVR: case SYST_CVR: *value = systick_read(emu, at); break;
-    case CPUID: *value = 0x410FC241U; break;
-    case ICSR: *value = icsr(emu); break;
-    case VTOR: *value = n->vtor; break;
-    case AIRCR: *value = n->aircr; break;
-    case SCR: *value = n->scr; break;
-    case CCR: *value = n->ccr; break;
-    case SHCSR: *value = n->shcsr; break;
-    case CFSR: case HFSR: *value = 0; break; /* a fault ends the emulation before anybody could ask */
-    case CPACR: *value = n->cpacr; break;
-    case FPCCR: *value = n->fpccr; break;
-    case FPCAR: *value = n->fpcar; break;
-    case DEMCR: *value = n->demcr; break;
-    case DWT_CTRL: *value = n->dwt_ctrl | 4U << 28; break;
-    case DWT_CYCCNT: *value = (uint32_t)(emu->s.now / emu->s.core_ticks) - n->cyccnt_offset; break;
-    default: return false;
+    case ICTR:
+        *value = 3;
+        break;
+    case ACTLR:
+        *value = 0;
+        break;
+    case SYST_CSR:
+    case SYST_RVR:
+    case SYST_CVR:
+        *value = systick_read(emu, at);
+        break;
+    case CPUID:
+        *value = 0x410FC241U;
+        break;
+    case ICSR:
+        *value = icsr(emu);
+        break;
+    case VTOR:
+        *value = n->vtor;
+        break;
+    case AIRCR:
+        *value = n->aircr;
+        break;
+    case SCR:
+        *value = n->scr;
+        break;
+    case CCR:
+        *value = n->ccr;
+        break;
+    case SHCSR:
+        *value = n->shcsr;
+        break;
+    case CFSR:
+    case HFSR:
+        *value = 0;
+        break; /* a fault ends the emulation before anybody could ask */
+    case CPACR:
+        *value = n->cpacr;
+        break;
+    case FPCCR:
+        *value = n->fpccr;
+        break;
+    case FPCAR:
+        *value = n->fpcar;
+        break;
+    case DEMCR:
+        *value = n->demcr;
+        break;
+    case DWT_CTRL:
+        *value = n->dwt_ctrl | 4U << 28;
+        break;
+    case DWT_CYCCNT:
+        *value = (uint32_t)(emu->s.now / emu->s.core_ticks) - n->cyccnt_offset;
+        break;
+    default:
+        return false;
     }
     return true;
 }
@@ -229,21 +291,51 @@ static bool system_store(emu_t *emu, uint32_t at, uint32_t value)
 {
     nvic_t *n = &emu->s.nvic;
     switch (at) {
-    case SYST_CSR: systick_write(emu, value); break;
-    case SYST_RVR: n->systick_rvr = value & 0xFFFFFFU; break;
-    case SYST_CVR: systick_write(emu, n->systick_csr); break;
-    case ICSR: pend_store(emu, value); break;
-    case VTOR: n->vtor = value & 0xFFFFFF80U; break;
-    case AIRCR: control_store(emu, value); break;
-    case SCR: n->scr = value & 0x16U; break;
-    case CCR: n->ccr = value; break;
-    case SHCSR: n->shcsr = value; break;
-    case CFSR: case HFSR: break;
-    case CPACR: n->cpacr = value; break;
-    case FPCCR: n->fpccr = value; break;
-    case DEMCR: n->demcr = value; break;
-    case DWT_CTRL: n->dwt_ctrl = value & 1U; break;
-    case DWT_CYCCNT: n->cyccnt_offset = (uint32_t)(emu->s.now / emu->s.core_ticks) - value; break;
+    case SYST_CSR:
+        systick_write(emu, value);
+        break;
+    case SYST_RVR:
+        n->systick_rvr = value & 0xFFFFFFU;
+        break;
+    case SYST_CVR:
+        systick_write(emu, n->systick_csr);
+        break;
+    case ICSR:
+        pend_store(emu, value);
+        break;
+    case VTOR:
+        n->vtor = value & 0xFFFFFF80U;
+        break;
+    case AIRCR:
+        control_store(emu, value);
+        break;
+    case SCR:
+        n->scr = value & 0x16U;
+        break;
+    case CCR:
+        n->ccr = value;
+        break;
+    case SHCSR:
+        n->shcsr = value;
+        break;
+    case CFSR:
+    case HFSR:
+        break;
+    case CPACR:
+        n->cpacr = value;
+        break;
+    case FPCCR:
+        n->fpccr = value;
+        break;
+    case DEMCR:
+        n->demcr = value;
+        break;
+    case DWT_CTRL:
+        n->dwt_ctrl = value & 1U;
+        break;
+    case DWT_CYCCNT:
+        n->cyccnt_offset = (uint32_t)(emu->s.now / emu->s.core_ticks) - value;
+        break;
     case STIR:
         if (value >= INTERRUPTS) {
             emu_fail(emu, "write of STIR: %u, interrupts end at %d", value, INTERRUPTS - 1);
@@ -251,7 +343,8 @@ static bool system_store(emu_t *emu, uint32_t at, uint32_t value)
         }
         change(n->pending, value / 32U, 1U << (value % 32U), true);
         break;
-    default: return false;
+    default:
+        return false;
     }
     return true;
 }

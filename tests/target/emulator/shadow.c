@@ -32,8 +32,8 @@ static uint32_t angle_read(const emulated_t *e)
 static void samples_take(emulated_t *e)
 {
     const emu_pins_t *pins = emu_pins_look(e->emu);
-    e->shadow->counts = (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1],
-                                       .v_dc = pins->adc[1][1]};
+    e->shadow->counts =
+        (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1], .v_dc = pins->adc[1][1]};
     e->shadow->theta_m = angle_read(e);
 }
 

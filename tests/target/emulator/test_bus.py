@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import Stand

@@ -9,11 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from progress import cpu_seconds
+
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
 from fluxtrue_tools.sim.library import Loop
-
-from progress import cpu_seconds
 
 RUN = 'motor = "hsm1"\nduration_s = 0.3\n[profile]\ntorque_Nm = 40\nspeed_rpm = 1000\n'
 

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.demo import grid, step
 from fluxtrue_tools.demo.experiment import Bench, run
 from fluxtrue_tools.emulate.build import Parts

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench import cycles, disassembly, image
 from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS
 from fluxtrue_tools.emulate import build

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
+
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import build, library, preempt
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.sim.library import Loop
-
 
 PAPER, ROBUST = 0, 1
 STEPS, PERIODS = 10, 10

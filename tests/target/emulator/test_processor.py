@@ -7,8 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from fluxtrue_tools.bench import image
 from conftest import Program
+
+from fluxtrue_tools.bench import image
 from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
 
 WATCHDOG = 0x20
@@ -44,9 +45,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_is_not_modelled_is_an_error(
-    library: ctypes.CDLL, program: Program, case: int
-) -> None:
+def test_what_is_not_modelled_is_an_error(library: ctypes.CDLL, program: Program, case: int) -> None:
     with Core.of_program(library, program("poke", f"-DCASE={case}")) as core:
         with pytest.raises(EmulationStoppedError):
             core.run(1e-3)
@@ -57,9 +56,7 @@ def test_what_is_not_modelled_is_an_error(
             core.run(1e-3)  # it stays stopped
 
 
-def test_the_program_counter_of_a_refused_access_is_exact(
-    library: ctypes.CDLL, program: Program
-) -> None:
+def test_the_program_counter_of_a_refused_access_is_exact(library: ctypes.CDLL, program: Program) -> None:
     elf = program("poke", "-DCASE=4")
     with Core.of_program(library, elf) as core:
         with pytest.raises(EmulationStoppedError):
@@ -77,9 +74,7 @@ def exceptions(program: Program) -> Path:
 
 
 @pytest.mark.parametrize("counting", [False, True])
-def test_exceptions_nest_by_priority(
-    library: ctypes.CDLL, exceptions: Path, counting: bool
-) -> None:
+def test_exceptions_nest_by_priority(library: ctypes.CDLL, exceptions: Path, counting: bool) -> None:
     with Core.of_program(library, exceptions, counting) as core:
         core.run(5.5e-3)
         # Masked first; then LOW interrupted by HIGH and MIDDLE, which pends LOW again; the whole once more; HIGH.
@@ -142,9 +137,7 @@ def test_a_profile_counts_what_is_skipped_behind_an_it_and_takes_it_for_no_branc
     assert all(cost == count for v, count, cost in spans if v in (LOW, HIGH))
 
 
-def test_a_sleeping_core_is_woken_by_each_tick(
-    library: ctypes.CDLL, exceptions: Path
-) -> None:
+def test_a_sleeping_core_is_woken_by_each_tick(library: ctypes.CDLL, exceptions: Path) -> None:
     with Core.of_program(library, exceptions) as core:
         core.run(5.5e-3)
         ticks, executed = core.word("ticks"), core.instructions

@@ -5,6 +5,7 @@ import ctypes
 from collections.abc import Iterator
 
 import pytest
+
 from fluxtrue_tools.bench import image
 from fluxtrue_tools.emulate import library as emulation
 from fluxtrue_tools.emulate.build import Parts

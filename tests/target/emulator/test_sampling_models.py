@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 from conftest import Program
+
 from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
 
 CORE_S = 1 / 48e6  # out of reset the fast internal clock runs everything

@@ -15,8 +15,14 @@
 #include "emu_private.h"
 
 enum {
-    CS = 0x00, CNT = 0x04, TOVAL = 0x08, WIN = 0x0C,
-    LPO_TICKS = 26250, ACTS_AFTER = 3 * LPO_TICKS, OSCILLATOR_TICKS = 420, RCM_WDOG = 0x20,
+    CS = 0x00,
+    CNT = 0x04,
+    TOVAL = 0x08,
+    WIN = 0x0C,
+    LPO_TICKS = 26250,
+    ACTS_AFTER = 3 * LPO_TICKS,
+    OSCILLATOR_TICKS = 420,
+    RCM_WDOG = 0x20,
 };
 #define UNLOCK 0xD928C520U
 #define REFRESH 0xB480A602U

@@ -9,6 +9,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.target.build import image
 

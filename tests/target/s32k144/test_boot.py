@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core, EmulationStoppedError

@@ -11,6 +11,7 @@ import zlib
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.target import image
 from fluxtrue_tools.target.build import image as build_image

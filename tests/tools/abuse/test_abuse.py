@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fluxtrue_tools import cli
-from fluxtrue_tools.errors import FluxtrueError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.configuration import set_hypothesis_home_dir
+
+from fluxtrue_tools import cli
+from fluxtrue_tools.errors import FluxtrueError
 
 COUNT = int(os.environ.get("FLUXTRUE_ABUSE", "12"))
 ROOT = Path(__file__).resolve().parents[3]
@@ -168,7 +169,7 @@ def abuse(files: dict[str, str | bytes], arguments: list[str], outputs: list[str
             warnings.simplefilter("always")
             try:
                 code = cli.run(arguments)
-            except BaseException:  # noqa: BLE001 - a traceback is what must not come
+            except BaseException:
                 pytest.fail(f"{told}\n{traceback.format_exc()}")
         after, text = snapshot(folder), err.getvalue()
         noisy = [str(one.message) for one in said if issubclass(one.category, RuntimeWarning)]

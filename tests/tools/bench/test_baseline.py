@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench import baseline, page
 from fluxtrue_tools.errors import FluxtrueError
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import pytest
+
 from fluxtrue_tools.bench import cycles
 from fluxtrue_tools.bench.disassembly import Instruction, parse, words
 from fluxtrue_tools.errors import FluxtrueError

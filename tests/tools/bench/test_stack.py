@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.bench import disassembly, stack
 from fluxtrue_tools.bench.build import ARM_CC, ARM_FLAGS
 

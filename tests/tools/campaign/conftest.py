@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.campaign.machine import Machine, make_machine
 from fluxtrue_tools.campaign.spec import Campaign, parse
 from fluxtrue_tools.sim.build import prepare

@@ -5,8 +5,14 @@ import math
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.campaign.bound import (
-    information, noise_variance, prior_variances, torque_deviation, torque_jacobian, voltage_jacobian,
+    information,
+    noise_variance,
+    prior_variances,
+    torque_deviation,
+    torque_jacobian,
+    voltage_jacobian,
 )  # fmt: skip
 from fluxtrue_tools.campaign.bound_model import STATES, physics_of, truth_of
 from fluxtrue_tools.campaign.machine import Machine
@@ -83,7 +89,7 @@ def test_the_model_says_what_the_simulated_drive_does(
 ) -> None:
     drawn = sample(small, machine, draws(small.seed, 2))
     # Means over turns leave nothing of these; without them a short run is enough.
-    still = {name: 0.0 for name in ("angle_h1_rad", "angle_h2_rad", "current_noise_A_rms")}
+    still = dict.fromkeys(("angle_h1_rad", "angle_h2_rad", "current_noise_A_rms"), 0.0)
     omega_m = speed_rpm * 2.0 * math.pi / 60.0
     with Loop(machine.motor.library, drawn.plant | still | {"speed_rad_s": omega_m}, machine.motor.flux_map) as loop:
         for name, value in {"torque_loop": 0.0, "identification": 0.0, "enable": 1.0}.items():

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL, campaign
+
 from fluxtrue_tools.campaign.case import run_case
 from fluxtrue_tools.campaign.check import check
 from fluxtrue_tools.campaign.machine import Machine, make_machine

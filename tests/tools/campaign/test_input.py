@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL, campaign
+
 from fluxtrue_tools.campaign.spec import parse, read
 from fluxtrue_tools.errors import FluxtrueError
 

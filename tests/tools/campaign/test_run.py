@@ -12,9 +12,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from conftest import SMALL, campaign, command, environment
-from fluxtrue_tools.outputs import PREFIX
-
 from progress import polled
+
+from fluxtrue_tools.outputs import PREFIX
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+
 from fluxtrue_tools.campaign.case import make_plan
 from fluxtrue_tools.campaign.drive import PHASES, STEP_S, make_profile
 from fluxtrue_tools.campaign.envelope import NOTHING_WRONG, make_envelope
@@ -61,9 +62,7 @@ def test_a_case_is_the_same_in_a_campaign_of_any_size_and_another_one_in_another
     assert make_plan(small, machine, 3).sample.factors != make_plan(other, machine, 3).sample.factors
 
 
-def test_the_true_resistance_follows_the_scale_and_the_thermometer_its_error(
-    small: Campaign, machine: Machine
-) -> None:
+def test_the_true_resistance_follows_the_scale_and_the_thermometer_its_error(small: Campaign, machine: Machine) -> None:
     for case in range(20):
         got = sample(small, machine, draws(small.seed, case))
         plant, factors = got.plant, got.factors

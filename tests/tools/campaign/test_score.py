@@ -5,10 +5,10 @@ import math
 
 import pandas as pd
 import pytest
+from conftest import SMALL
+
 from fluxtrue_tools.campaign.score import Score, bounds, score
 from fluxtrue_tools.campaign.spec import Campaign, parse
-
-from conftest import SMALL
 
 CHECKED = SMALL + '[check]\ncontrollers = ["paper"]\n'
 
@@ -62,8 +62,14 @@ def test_the_percentile_is_of_the_magnitude(campaign: Campaign) -> None:
 
 @pytest.mark.parametrize(
     ("tables", "error", "harmless"),
-    [(0.0, 2.0, True), (0.0, -2.01, False), (5.0, -5.5, True), (-5.0, 5.6, False), (1.6, 2.05, True),
-     (1.6, 2.2, False)],
+    [
+        (0.0, 2.0, True),
+        (0.0, -2.01, False),
+        (5.0, -5.5, True),
+        (-5.0, 5.6, False),
+        (1.6, 2.05, True),
+        (1.6, 2.2, False),
+    ],
 )
 def test_harm_is_what_exceeds_the_tables_by_half_a_percent_and_two_percent(
     campaign: Campaign, tables: float, error: float, harmless: bool

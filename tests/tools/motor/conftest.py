@@ -14,12 +14,24 @@ MOTORS = ROOT / "firmware" / "motors"
 
 GOOD: dict[str, dict[str, Any]] = {
     "machine": {
-        "name": '"bench"', "pole_pairs": 4, "r_ohm": 0.02, "r_temp_coeff_per_K": 0.00393, "i_max_A": 250.0,
-        "torque_max_Nm": 150.0, "speed_max_rpm": 6000.0, "inertia_kgm2": 0.05,
-        "ld_H": 0.2e-3, "lq_H": 0.5e-3, "psi_f_Vs": 0.084,
+        "name": '"bench"',
+        "pole_pairs": 4,
+        "r_ohm": 0.02,
+        "r_temp_coeff_per_K": 0.00393,
+        "i_max_A": 250.0,
+        "torque_max_Nm": 150.0,
+        "speed_max_rpm": 6000.0,
+        "inertia_kgm2": 0.05,
+        "ld_H": 0.2e-3,
+        "lq_H": 0.5e-3,
+        "psi_f_Vs": 0.084,
     },
     "inverter": {
-        "vdc_V": 350.0, "pwm_hz": 10000.0, "dead_time_s": 2e-6, "current_full_scale_A": 400.0, "adc_bits": 12,
+        "vdc_V": 350.0,
+        "pwm_hz": 10000.0,
+        "dead_time_s": 2e-6,
+        "current_full_scale_A": 400.0,
+        "adc_bits": 12,
     },
 }
 MAPPED: dict[str, Any] = {"flux_map": '"flux_map.csv"', "ld_H": None, "lq_H": None, "psi_f_Vs": None}

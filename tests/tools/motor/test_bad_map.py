@@ -78,8 +78,9 @@ def test_a_map_that_is_a_folder_or_no_text_is_refused(write, folder):
         load_motor(folder)
 
 
-@pytest.mark.parametrize(("name", "word"), [("/dev/zero", "not a file"), (".", "not a file"),
-                                            ("a\\u0000b", "machine.flux_map = ")])
+@pytest.mark.parametrize(
+    ("name", "word"), [("/dev/zero", "not a file"), (".", "not a file"), ("a\\u0000b", "machine.flux_map = ")]
+)
 def test_a_map_that_is_no_file_is_refused_and_not_read_for_ever(write, name, word):
     with pytest.raises(FluxtrueError, match=word):
         load_motor(write(machine={"flux_map": f'"{name}"', "ld_H": None, "lq_H": None, "psi_f_Vs": None}))

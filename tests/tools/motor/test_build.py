@@ -199,11 +199,17 @@ def firmware(request, tmp_path_factory):
     (folder / "shim.c").write_text(SHIM, encoding="utf-8")
     control = ROOT / "firmware" / "control"
     stages = ("current/flux_table.c", "torque/current_reference.c", "mrai/mrai.c")
-    sources = [folder / "shim.c", folder / "motor_tables.c", folder / "motor_si.c", *(control / s for s in stages),
-               *sorted((ROOT / "firmware/fx").glob("*.c"))]
+    sources = [
+        folder / "shim.c",
+        folder / "motor_tables.c",
+        folder / "motor_si.c",
+        *(control / s for s in stages),
+        *sorted((ROOT / "firmware/fx").glob("*.c")),
+    ]
     library = folder / "motor.so"
-    subprocess.run(["gcc", "-std=c11", "-O1", "-shared", "-fPIC", *INCLUDES, *map(str, sources), "-o", str(library)],
-                   check=True)
+    subprocess.run(
+        ["gcc", "-std=c11", "-O1", "-shared", "-fPIC", *INCLUDES, *map(str, sources), "-o", str(library)], check=True
+    )
     return ctypes.CDLL(str(library)), motor
 
 

@@ -9,6 +9,7 @@ import zlib
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import image
 from fluxtrue_tools.target.build import ARM_CC

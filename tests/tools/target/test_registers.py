@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import registers
 from fluxtrue_tools.target.svd import Device
@@ -56,9 +57,7 @@ def _header(device: Device, tmp_path: Path, text: str = LIST) -> str:
     return registers.header(wanted, device, registers.choose(wanted, device, path), path)
 
 
-def test_the_header_compiles_and_puts_bits_and_registers_where_the_file_says(
-    device: Device, tmp_path: Path
-) -> None:
+def test_the_header_compiles_and_puts_bits_and_registers_where_the_file_says(device: Device, tmp_path: Path) -> None:
     (tmp_path / "registers.h").write_text(_header(device, tmp_path))
     program = """#include "registers.h"
     _Static_assert(TIM_SC_CLK(3) == 0x18 && TIM_SC_CLK(4) == 0 && TIM_SC_CLK_MASK == 0x18, "CLK");

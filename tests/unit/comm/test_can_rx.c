@@ -26,7 +26,8 @@ void tearDown(void)
 static can_frame_t command(int tenths_Nm)
 {
     const unsigned raw = (unsigned)tenths_Nm & 0xFFFFU;
-    can_frame_t frame = {.id = COMMAND_ID, .length = 8,
+    can_frame_t frame = {.id = COMMAND_ID,
+                         .length = 8,
                          .data = {0, 0x50, (uint8_t)(raw & 0xFFU), (uint8_t)(raw >> 8), 0xE8, 0x03, 0xF4, 0x01}};
     e2e_protect(COMMAND_DATA_ID, &counter, &frame);
     return frame;
@@ -208,7 +209,8 @@ void test_three_bad_frames_of_the_last_ten_fail_the_channel_until_they_have_pass
 
 static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
 {
-    can_frame_t frame = {.id = LIMITS_ID, .length = 8,
+    can_frame_t frame = {.id = LIMITS_ID,
+                         .length = 8,
                          .data = {0, 0, (uint8_t)(drive & 0xFFU), (uint8_t)(drive >> 8), (uint8_t)(regen & 0xFFU),
                                   (uint8_t)(regen >> 8), 0, 0}};
     e2e_protect(LIMITS_DATA_ID, count, &frame);

@@ -81,7 +81,10 @@ static void flux_tables(fixture_t *f)
         .mesh = FX_MESH(-(NX - 1) * cell, 11U, (uint32_t)NX, (uint32_t)NY),
         .l_shift = L_SHIFT,
         .i_scale = 8 << L_SHIFT,
-        .l_d = l_d, .l_q = l_q, .l_qq = l_qq, .g = g,
+        .l_d = l_d,
+        .l_q = l_q,
+        .l_qq = l_qq,
+        .g = g,
         .psi_f0 = psi_f0,
     };
     f->si.nd = NX;
@@ -113,7 +116,8 @@ static void reference_tables(fixture_t *f)
     }
     f->current_reference = (current_reference_config_t){
         .grid = {0, 2 * cell, 11, 11, NT, NPSI},
-        .i_d = ref_d, .i_q = ref_q,
+        .i_d = ref_d,
+        .i_q = ref_q,
         .torque_max = {ref_max, 2 * cell, 11, NPSI},
         .v_ratio = q15_of(0.55),
         .r_pu = 674,
@@ -192,8 +196,7 @@ static void voltage(fixture_t *f)
     };
     f->si.sigma_rad_s = f->current_control.sigma_q24 / 16777216.0 * f->w;
     f->si.setpoint_weight = from_q15(f->current_control.setpoint_weight);
-    f->si.integral_ratio = from_q15(f->current_control.integral_gain) /
-                           (f->current_control.sigma_q24 / 16777216.0);
+    f->si.integral_ratio = from_q15(f->current_control.integral_gain) / (f->current_control.sigma_q24 / 16777216.0);
     f->si.v_ratio = V_RATIO;
     f->current_control.tracking_gain_q34 = q31_of(8.0 * f->si.integral_ratio / f->si.setpoint_weight * V_RATIO);
     f->modulate = (modulate_config_t){
@@ -274,9 +277,15 @@ static void limits(fixture_t *f)
     const double volt = f->v / 32768.0;
     const double speed = f->w / 32768.0;
     f->torque_limit = (torque_limit_config_t){
-        .torque_max = q15_of(0.6), .drop = q15_of(0.004), .loss_rate = q15_of(0.05), .moving = line_of(300, 600),
-        .inverter = line_of(1050, 850), .winding = line_of(1800, 1550), .dc_low = line_of(8192, 12288),
-        .dc_high = line_of(27000, 26000), .speed = line_of(30000, 28000),
+        .torque_max = q15_of(0.6),
+        .drop = q15_of(0.004),
+        .loss_rate = q15_of(0.05),
+        .moving = line_of(300, 600),
+        .inverter = line_of(1050, 850),
+        .winding = line_of(1800, 1550),
+        .dc_low = line_of(8192, 12288),
+        .dc_high = line_of(27000, 26000),
+        .speed = line_of(30000, 28000),
     };
     f->si.loss_drop_V = from_q15(q15_of(0.004)) * f->v;
     f->si.loss_rate = from_q15(q15_of(0.05));
@@ -294,8 +303,11 @@ static void limits(fixture_t *f)
     f->si.dc_high_start_V = 26000 * volt;
     /* 0.9 of I_b at 20 C, 0.002 I_b less per K; psi_f (0.53 psi_b) falls by 0.1 % per K. */
     f->i_d_limit = (i_d_limit_config_t){
-        .i_20 = q15_of(0.9), .slope = q16_of(0.0002 * 32768.0), .i_max = q15_of(0.8),
-        .dC_per_psi = q16_of(-10.0 / (0.53 * 0.001 * 32768.0)), .assumed_dC = 1500,
+        .i_20 = q15_of(0.9),
+        .slope = q16_of(0.0002 * 32768.0),
+        .i_max = q15_of(0.8),
+        .dC_per_psi = q16_of(-10.0 / (0.53 * 0.001 * 32768.0)),
+        .assumed_dC = 1500,
     };
     f->si.i_d_20_A = from_q15(q15_of(0.9)) * f->i;
     f->si.i_d_slope_A_per_K = 0.002 * f->i;
@@ -332,8 +344,7 @@ void worst_note(worst_t *worst, double error, const char *format, ...)
 void worst_assert(const worst_t *worst, double tolerance, int line)
 {
     char message[300];
-    (void)snprintf(message, sizeof message, "%.6g off, allowed %.6g, at %s", worst->error, tolerance,
-                   worst->where);
+    (void)snprintf(message, sizeof message, "%.6g off, allowed %.6g, at %s", worst->error, tolerance, worst->where);
     UNITY_TEST_ASSERT(worst->error <= tolerance, line, message);
 }
 

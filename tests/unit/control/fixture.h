@@ -9,11 +9,11 @@
 
 #include "control/current/angle_tracker.h"
 #include "control/current/current_control.h"
-#include "control/torque/current_reference.h"
 #include "control/current/flux_table.h"
-#include "control/torque/i_d_limit.h"
 #include "control/current/modulate.h"
 #include "control/mrai/mrai.h"
+#include "control/torque/current_reference.h"
+#include "control/torque/i_d_limit.h"
 #include "control/torque/limit.h"
 #include "control/torque/loop.h"
 #include "control/torque/voltage_reserve.h"
@@ -47,8 +47,7 @@ typedef struct {
     char where[200];
 } worst_t;
 
-void worst_note(worst_t *worst, double error, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
+void worst_note(worst_t *worst, double error, const char *format, ...) __attribute__((format(printf, 3, 4)));
 void worst_assert(const worst_t *worst, double tolerance, int line);
 #define ASSERT_WORST(worst, tolerance) worst_assert(&(worst), (tolerance), __LINE__)
 

@@ -24,16 +24,32 @@ void identify_fixture(fixture_t *f, identify_config_t *c)
     const double turns = f->w * window / (2.0 * 3.14159265358979323846);
     const double admittance = f->psi / (1.5 * f->i);
     *c = (identify_config_t){
-        .l_shift = f->flux_table.l_shift, .r0 = f->mrai.r0, .r_per_dC = q(from_q31(f->mrai.r0) * 0.00039, 2147483648.0),
-        .sinc_gain = f->mrai.sinc_gain, .mean_gain_q32 = q(0.5 / n, 4294967296.0),
+        .l_shift = f->flux_table.l_shift,
+        .r0 = f->mrai.r0,
+        .r_per_dC = q(from_q31(f->mrai.r0) * 0.00039, 2147483648.0),
+        .sinc_gain = f->mrai.sinc_gain,
+        .mean_gain_q32 = q(0.5 / n, 4294967296.0),
         .rate_gain_q28 = q(1.0 / (f->w * window), 268435456.0),
-        .window_turns_q29 = (uint32_t)q(turns, 536870912.0), .turn_to_pu = q(0.5 / turns, 65536.0),
-        .iron_hysteresis = q(13.0 * admittance, 2147483648.0), .iron_eddy = q(0.01 * f->w * admittance, 2147483648.0),
-        .iron_sign_gain = q(f->w / 30.0, 65536.0), .r_known_q30 = q(0.03, 1073741824.0),
-        .noise_voltage_q30 = q(0.008, 1073741824.0), .noise_flux_q30 = q(0.03, 1073741824.0),
-        .noise_rate_q30 = q(0.7, 1073741824.0), .omega_min = 655, .i_min = 983, .i_smooth = 491,
-        .local_corner = 8520, .local_rate = q(0.05, 2147483648.0), .torque_min = 1500, .confidence_full = 983,
-        .confidence_none = 1966, .confidence_rate = 655, .limited_noise = q(5.0 / n, 65536.0), .mismatch_rate = 3277,
+        .window_turns_q29 = (uint32_t)q(turns, 536870912.0),
+        .turn_to_pu = q(0.5 / turns, 65536.0),
+        .iron_hysteresis = q(13.0 * admittance, 2147483648.0),
+        .iron_eddy = q(0.01 * f->w * admittance, 2147483648.0),
+        .iron_sign_gain = q(f->w / 30.0, 65536.0),
+        .r_known_q30 = q(0.03, 1073741824.0),
+        .noise_voltage_q30 = q(0.008, 1073741824.0),
+        .noise_flux_q30 = q(0.03, 1073741824.0),
+        .noise_rate_q30 = q(0.7, 1073741824.0),
+        .omega_min = 655,
+        .i_min = 983,
+        .i_smooth = 491,
+        .local_corner = 8520,
+        .local_rate = q(0.05, 2147483648.0),
+        .torque_min = 1500,
+        .confidence_full = 983,
+        .confidence_none = 1966,
+        .confidence_rate = 655,
+        .limited_noise = q(5.0 / n, 65536.0),
+        .mismatch_rate = 3277,
     };
     motor_si_t *si = &f->si;
     for (int j = 0; j < IDENTIFY_STATES; j++) {
@@ -93,10 +109,13 @@ window_pair_t steady_window(const fixture_t *f, dq_q15_t i, double omega_pu, dq_
         const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turn - floor(turn)) * 4294967296.0)};
         const twin_end_t t = {{from_q15(i.d) * f->i, from_q15(i.q) * f->i},
                               {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
-                              {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi}, theta};
+                              {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi},
+                              theta};
         if (k == 0) {
-            pair.fixed.last = (identify_end_t){{(q15_t)s.i.d, (q15_t)s.i.q}, {(q15_t)s.u.d, (q15_t)s.u.q},
-                                               {(q15_t)flux.psi_d, (q15_t)flux.psi_q}, s.theta};
+            pair.fixed.last = (identify_end_t){{(q15_t)s.i.d, (q15_t)s.i.q},
+                                               {(q15_t)s.u.d, (q15_t)s.u.q},
+                                               {(q15_t)flux.psi_d, (q15_t)flux.psi_q},
+                                               s.theta};
             identify_window_restart(&pair.fixed, (uint32_t)f->si.periods_per_step);
             pair.twin.last = t;
         } else {

@@ -68,8 +68,11 @@ static twin_dq_t twin_step(twin_current_state_t *twin)
     const twin_dq_t psi = si_psi((dq_q15_t){flux.psi_d, flux.psi_q});
     const twin_flux_t si = {.psi_d = psi.d, .psi_q = psi.q};
     const dq_q15_t weighted = {target.weighted.d / 32768, target.weighted.q / 32768};
-    const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)}, &si, from_q31(in.omega) * f.w,
-                                 from_q15(in.psi_delta) * f.psi, from_q15(in.v_dc) * f.v};
+    const twin_current_in_t t = {{si_psi(target.psi), si_psi(weighted)},
+                                 &si,
+                                 from_q31(in.omega) * f.w,
+                                 from_q15(in.psi_delta) * f.psi,
+                                 from_q15(in.v_dc) * f.v};
     const twin_dq_t u = twin_current_control(&f.si, twin, &t);
     return (twin_dq_t){u.d / f.v * 32768.0, u.q / f.v * 32768.0};
 }

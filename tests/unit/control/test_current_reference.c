@@ -184,24 +184,23 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
     uint64_t seed = 111;
     for (int n = 0; n < 300000; n++) {
         in = (current_reference_in_t){(q15_t)random_in(&seed, -16000, 16000), (q15_t)random_in(&seed, 8000, 32767),
-                                      (q15_t)random_in(&seed, 3000, 32767), (q15_t)random_in(&seed, 0, 30000),
-                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, -4000, 2000),
-                                      (q15_t)random_in(&seed, -4000, 2000), (q15_t)random_in(&seed, 1000, 32767),
+                                      (q15_t)random_in(&seed, 3000, 32767),   (q15_t)random_in(&seed, 0, 30000),
+                                      (q15_t)random_in(&seed, -4000, 2000),   (q15_t)random_in(&seed, -4000, 2000),
+                                      (q15_t)random_in(&seed, -4000, 2000),   (q15_t)random_in(&seed, 1000, 32767),
                                       (q15_t)random_in(&seed, -3000, 3000)};
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
-        const twin_reference_in_t t = {from_q15(in.torque_corrected) * f.t,       from_q15(in.v_dc) * f.v,
-                                       from_q15(in.omega) * f.w,        from_q15(in.i_magnitude) * f.i,
-                                       from_q15(in.v_trim) * f.v,       from_q15(in.shift) * f.psi,
-                                       from_q15(in.psi_delta) * f.psi,  from_q15(in.i_d_max) * f.i,
-                                       from_q15(in.psi_q_delta) * f.psi};
+        const twin_reference_in_t t = {
+            from_q15(in.torque_corrected) * f.t, from_q15(in.v_dc) * f.v,    from_q15(in.omega) * f.w,
+            from_q15(in.i_magnitude) * f.i,      from_q15(in.v_trim) * f.v,  from_q15(in.shift) * f.psi,
+            from_q15(in.psi_delta) * f.psi,      from_q15(in.i_d_max) * f.i, from_q15(in.psi_q_delta) * f.psi};
         const current_reference_t y = step();
         const twin_reference_t s = twin_current_reference(&f.si, &t);
-        worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d",
-                   in.torque_corrected, in.v_dc, in.omega);
-        worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d",
-                   in.torque_corrected, in.v_dc, in.omega);
-        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d",
-                   in.torque_corrected, in.v_dc, in.omega);
+        worst_note(&worst, y.i_ref.d - s.i_ref.d / f.i * 32768, "i_d of T %d v %d w %d", in.torque_corrected, in.v_dc,
+                   in.omega);
+        worst_note(&worst, y.i_ref.q - s.i_ref.q / f.i * 32768, "i_q of T %d v %d w %d", in.torque_corrected, in.v_dc,
+                   in.omega);
+        worst_note(&worst, y.torque_max - s.torque_max / f.t * 32768, "limit of T %d v %d w %d", in.torque_corrected,
+                   in.v_dc, in.omega);
     }
     ASSERT_WORST(worst, 8.0);
 }

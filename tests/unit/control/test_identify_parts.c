@@ -164,11 +164,17 @@ void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
         identify_model_t m;
         identify_model(&c, &a, &tables, c.r0, &m);
         const jacobian_row_t row = identify_torque_row(&c, &m);
-        const twin_model_t b = twin_model(&f.si, &(twin_point_t){
-            {from_q31(a.i.d) * f.i, from_q31(a.i.q) * f.i}, {from_q31(a.u.d) * 2.0 * f.v, from_q31(a.u.q) * 2.0 * f.v},
-            {from_q31(a.rate.d) * 2.0 * f.v, from_q31(a.rate.q) * 2.0 * f.v},
-            {from_q15(a.i_m.d) * f.i, from_q15(a.i_m.q) * f.i}, from_q31(a.omega) * f.w,
-            from_q31(a.iron) * f.i / f.psi, 0, true}, from_q31(c.r0) * f.z);
+        const twin_model_t b =
+            twin_model(&f.si,
+                       &(twin_point_t){{from_q31(a.i.d) * f.i, from_q31(a.i.q) * f.i},
+                                       {from_q31(a.u.d) * 2.0 * f.v, from_q31(a.u.q) * 2.0 * f.v},
+                                       {from_q31(a.rate.d) * 2.0 * f.v, from_q31(a.rate.q) * 2.0 * f.v},
+                                       {from_q15(a.i_m.d) * f.i, from_q15(a.i_m.q) * f.i},
+                                       from_q31(a.omega) * f.w,
+                                       from_q31(a.iron) * f.i / f.psi,
+                                       0,
+                                       true},
+                       from_q31(c.r0) * f.z);
         worst_note(&y, from_q31(m.y.d) * 2.0 - b.y.d / f.v, "%d: d %d %d at %g", n, i.d, i.q, omega);
         worst_note(&y, from_q31(m.y.q) * 2.0 - b.y.q / f.v, "%d: q %d %d at %g", n, i.d, i.q, omega);
         for (int j = 0; j < IDENTIFY_STATES; j++) {
@@ -229,8 +235,8 @@ void test_one_measurement_of_one_state_by_hand(void)
     kalman_t kalman;
     kalman_reset(&kalman);
     const jacobian_row_t row = {{[IDENTIFY_FLUX] = (int32_t)(0.1 * IDENTIFY_ONE_Q30)}};
-    const kalman_update_t update =
-        kalman_update(&kalman, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30), (int64_t)(0.01 * one_q60));
+    const kalman_update_t update = kalman_update(&kalman, &row, (int32_t)(0.02 * IDENTIFY_ONE_Q30),
+                                                 (int64_t)(0.01 * one_q60));
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.1, kalman.x_q27[IDENTIFY_FLUX] / (double)IDENTIFY_ONE_Q27);
     identify_state_t state = {.kalman = kalman};
     const identify_record_t record = identify_record_get(&state);

@@ -75,7 +75,9 @@ static twin_modulate_t twin_step(void)
 {
     const double v_max = f.si.v_ratio * from_q15(in.v_dc) * f.v;
     const twin_modulate_in_t t = {{from_q15(in.v.d) * v_max, from_q15(in.v.q) * v_max},
-                                  {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i}, theta, from_q15(in.v_dc) * f.v};
+                                  {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i},
+                                  theta,
+                                  from_q15(in.v_dc) * f.v};
     return twin_modulate(&f.si, &t);
 }
 
@@ -326,9 +328,9 @@ void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
         in.i = random_dq(&seed, 20000);
         const made_t y = step();
         const twin_modulate_t t = twin_step();
-        const double jump = fmax(fabs((double)y.duty.a - t.duty[0] * 32768),
-                                 fmax(fabs((double)y.duty.b - t.duty[1] * 32768),
-                                      fabs((double)y.duty.c - t.duty[2] * 32768)));
+        const double jump =
+            fmax(fabs((double)y.duty.a - t.duty[0] * 32768),
+                 fmax(fabs((double)y.duty.b - t.duty[1] * 32768), fabs((double)y.duty.c - t.duty[2] * 32768)));
         if (jump < 4.0) { /* else the two stand on different sides of a snap, half a pulse of 983 LSB away */
             worst_note(&worst, y.acted.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
                        in.v.q, in.v_dc, in.i.d, in.i.q, theta);

@@ -45,7 +45,8 @@ static twin_mrai_in_t si(const operating_point_t *in)
 {
     twin_mrai_in_t t = {{from_q15(in->i.d) * f.i, from_q15(in->i.q) * f.i},
                         {from_q15(in->u.d) * f.v, from_q15(in->u.q) * f.v},
-                        {.clamped = false}, from_q31(in->omega) * f.w};
+                        {.clamped = false},
+                        from_q31(in->omega) * f.w};
     t.flux.g_d = t.flux.g_q = from_q15(in->flux.g) / f.z;
     t.flux.psi_d = from_q15(in->flux.psi_d) * f.psi;
     t.flux.psi_q = from_q15(in->flux.psi_q) * f.psi;
@@ -91,8 +92,7 @@ static void open_flux_gate(const operating_point_t *in)
 {
     const double w = from_q31(in->omega);
     twin_schedule.flux_gain = 2.0 * f.si.flux_bandwidth_rad_s / (w * f.w);
-    schedule.flux_step_q28 =
-        (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0);
+    schedule.flux_step_q28 = (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0);
 }
 
 static void open_resistance_gate(const operating_point_t *in)
@@ -571,10 +571,10 @@ void test_no_corner_of_the_input_wraps_a_state(void)
     for (int n = 0; n < 200000; n++) {
         static const int16_t corner[4] = {INT16_MIN, -1, 0, INT16_MAX};
         operating_point_t in = {.i = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
-                        .u = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
-                        .omega = random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX};
-        in.flux = (flux_point_t){.g = 32767,
-                                 .psi_d = corner[random_in(&seed, 0, 3)], .psi_q = corner[random_in(&seed, 0, 3)]};
+                                .u = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
+                                .omega = random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX};
+        in.flux = (flux_point_t){
+            .g = 32767, .psi_d = corner[random_in(&seed, 0, 3)], .psi_q = corner[random_in(&seed, 0, 3)]};
         schedule = (mrai_schedule_t){random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX,
                                      random_in(&seed, 0, 1) ? 0 : INT32_MAX, 0,
                                      random_in(&seed, 0, 1) ? 0 : -209000000};

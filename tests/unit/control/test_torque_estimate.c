@@ -55,8 +55,8 @@ void test_every_operating_point_follows_the_twin(void)
         const dq_q15_t psi = {random_in(&seed, -20000, 20000), random_in(&seed, -32768, 32767)};
         const int32_t delta = random_in(&seed, -7600, 7600);
         const twin_flux_t si = {.psi_d = from_q15(psi.d) * f.psi, .psi_q = from_q15(psi.q) * f.psi};
-        const double t =
-            twin_torque(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, &si, from_q15(delta) * f.psi);
+        const double t = twin_torque(&f.si, (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i}, &si,
+                                     from_q15(delta) * f.psi);
         const q15_t y = torque(i.d, i.q, psi.d, psi.q, delta);
         worst_note(&worst, y - twin_clamp(t / f.t * 32768.0, -32768, 32767), "i %d %d psi %d %d", i.d, i.q, psi.d,
                    psi.q);

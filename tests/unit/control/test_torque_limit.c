@@ -24,8 +24,13 @@ void setUp(void)
     f = fixture();
     state = (torque_limit_state_t){0};
     limits = TORQUE_LIMITS_NONE;
-    in = (torque_limit_in_t){.torque_arbitrated = counts(0.25), .limits = &limits, .omega = counts(0.5), .v_dc = 21845,
-                             .reach = INT16_MAX, .inverter_dC = ROOM_C, .winding_dC = ROOM_C};
+    in = (torque_limit_in_t){.torque_arbitrated = counts(0.25),
+                             .limits = &limits,
+                             .omega = counts(0.5),
+                             .v_dc = 21845,
+                             .reach = INT16_MAX,
+                             .inverter_dC = ROOM_C,
+                             .winding_dC = ROOM_C};
 }
 
 void tearDown(void)
@@ -225,21 +230,31 @@ void test_the_limit_follows_the_twin(void)
         limits = (torque_limits_t){(q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000),
                                    (q15_t)random_in(&seed, 0, 25000), (q15_t)random_in(&seed, 0, 25000)};
         in = (torque_limit_in_t){
-            .torque_arbitrated = (q15_t)random_in(&seed, -32767, 32767), .limits = &limits,
+            .torque_arbitrated = (q15_t)random_in(&seed, -32767, 32767),
+            .limits = &limits,
             .u = {random_in(&seed, -9000, 9000), random_in(&seed, -9000, 9000)},
             .i = {random_in(&seed, -20000, 0), random_in(&seed, -20000, 20000)},
-            .torque_estimated = (q15_t)random_in(&seed, -3000, 3000), .omega = (q15_t)random_in(&seed, 650, 32767),
-            .v_dc = (q15_t)random_in(&seed, 7000, 28000), .reach = (q15_t)random_in(&seed, 0, 25000),
-            .inverter_dC = (int16_t)random_in(&seed, 0, 1200), .winding_dC = (int16_t)random_in(&seed, 0, 2000),
+            .torque_estimated = (q15_t)random_in(&seed, -3000, 3000),
+            .omega = (q15_t)random_in(&seed, 650, 32767),
+            .v_dc = (q15_t)random_in(&seed, 7000, 28000),
+            .reach = (q15_t)random_in(&seed, 0, 25000),
+            .inverter_dC = (int16_t)random_in(&seed, 0, 1200),
+            .winding_dC = (int16_t)random_in(&seed, 0, 2000),
         };
         in.omega = (n & 1) ? in.omega : (q15_t)-in.omega;
-        const twin_limit_in_t t = {
-            from_q15(in.torque_arbitrated) * f.t, from_q15(limits.torque_drive) * f.t,
-            from_q15(limits.torque_regen) * f.t,
-            from_q15(limits.power_drive) * power, from_q15(limits.power_regen) * power,
-            {from_q15(in.u.d) * f.v, from_q15(in.u.q) * f.v}, {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i},
-            from_q15(in.torque_estimated) * f.t, from_q15(in.omega) * f.w, from_q15(in.v_dc) * f.v,
-            from_q15(in.reach) * f.t, in.inverter_dC / 10.0, in.winding_dC / 10.0};
+        const twin_limit_in_t t = {from_q15(in.torque_arbitrated) * f.t,
+                                   from_q15(limits.torque_drive) * f.t,
+                                   from_q15(limits.torque_regen) * f.t,
+                                   from_q15(limits.power_drive) * power,
+                                   from_q15(limits.power_regen) * power,
+                                   {from_q15(in.u.d) * f.v, from_q15(in.u.q) * f.v},
+                                   {from_q15(in.i.d) * f.i, from_q15(in.i.q) * f.i},
+                                   from_q15(in.torque_estimated) * f.t,
+                                   from_q15(in.omega) * f.w,
+                                   from_q15(in.v_dc) * f.v,
+                                   from_q15(in.reach) * f.t,
+                                   in.inverter_dC / 10.0,
+                                   in.winding_dC / 10.0};
         const double s = twin_torque_limit(&f.si, &t_state, &t);
         worst_note(&worst, step().torque_limited - s / f.t * 32768.0, "step %d, arbitrated %d, w %d", n,
                    in.torque_arbitrated, in.omega);

@@ -58,8 +58,12 @@ static double period(machine_t *m, double rpm)
     seam_current(i.a, i.b, i.c);
     const double turns = m->theta_m / two_pi;
     seam.theta_m = (uint32_t)((turns - floor(turns)) * 4294967295.0);
-    const double in[6] = {ampere(seam.counts.i_a), ampere(seam.counts.i_b), ampere(seam.counts.i_c),
-                          seam.counts.v_dc / 4096.0 * (double)motor.v_dc_full_scale_V, m->theta_m, 20.0};
+    const double in[6] = {ampere(seam.counts.i_a),
+                          ampere(seam.counts.i_b),
+                          ampere(seam.counts.i_c),
+                          seam.counts.v_dc / 4096.0 * (double)motor.v_dc_full_scale_V,
+                          m->theta_m,
+                          20.0};
     twin_step(twin, in, out);
     seam_period();
     m->theta_m += rpm / 60.0 * two_pi * 1e-4;
@@ -98,10 +102,9 @@ static void drive_at(double rpm, double torque_Nm)
     (void)snprintf(where, sizeof where, "%g rpm, %g N m: worst %.1f LSB, %d periods apart", rpm, torque_Nm, worst, off);
     TEST_ASSERT_TRUE_MESSAGE(off <= 3, where);
     const double rated = (double)motor.torque_max_Nm;
-    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-3 * rated, twin_get(twin, "torque_estimated_Nm"),
-                                      drive.task.identification.torque_estimated / 32768.0 *
-                                          (double)motor.bases.torque_Nm,
-                                      where);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(
+        1e-3 * rated, twin_get(twin, "torque_estimated_Nm"),
+        drive.task.identification.torque_estimated / 32768.0 * (double)motor.bases.torque_Nm, where);
 }
 
 void test_the_whole_drive_switches_as_its_twin_at_low_speed(void)
@@ -133,7 +136,7 @@ void test_both_open_the_gates_in_the_same_period(void)
         (void)period(&m, 1000.0);
     }
     TEST_ASSERT_TRUE(seam.gates);
-    m.i_d = -390.0; /* at least 338 A in some phase */
+    m.i_d = -390.0;           /* at least 338 A in some phase */
     (void)period(&m, 1000.0); /* compares the gates */
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_INT((int)drive.fast.faults, (int)twin_get(twin, "fault_word"));

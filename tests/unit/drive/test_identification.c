@@ -12,11 +12,11 @@
 
 /* The robust identification between the priorities: window, step, answer, memory. */
 
-static double omega;  /* of omega_b */
-static int32_t unit;  /* of the current: (-3, 5) of them */
-static int weak;      /* counts of magnet flux that are missing */
-static uint32_t now;  /* periods */
-static double lost;   /* counts of voltage along the current that nominal compensation leaves over */
+static double omega; /* of omega_b */
+static int32_t unit; /* of the current: (-3, 5) of them */
+static int weak;     /* counts of magnet flux that are missing */
+static uint32_t now; /* periods */
+static double lost;  /* counts of voltage along the current that nominal compensation leaves over */
 
 /* q15 */
 static int32_t dead_time(const motor_t *m)
@@ -50,8 +50,7 @@ static void period(uint32_t k)
     s->point.u.d = (int32_t)(-omega * s->point.flux.psi_q + 0.0133 * i.d);
     s->point.u.q = (int32_t)(omega * (s->point.flux.psi_d - weak) + 0.0133 * i.q);
     /* What is compensated in addition need not be commanded any more. */
-    const double left = lost - 4.0 / 3.14159265 * 21238.0 *
-                                   (dead_time(&drive.motor) - dead_time(&motor)) / 32768.0;
+    const double left = lost - 4.0 / 3.14159265 * 21238.0 * (dead_time(&drive.motor) - dead_time(&motor)) / 32768.0;
     s->point.u.d += (int32_t)lround(left * -3.0 / 5.831);
     s->point.u.q += (int32_t)lround(left * 5.0 / 5.831);
     s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);

@@ -231,8 +231,10 @@ void test_the_torque_loop_can_be_switched_off(void)
 static void sample_at(double omega_pu, bool acting, bool limited)
 {
     sample_t *s = sample_box_begin(&drive.samples);
-    *s = (sample_t){.point = {.i = {-3000, 5000}, .omega = (q31_t)(omega_pu * 2147483647.0)}, .v_dc = 21238,
-                    .acting = acting, .voltage_limited = limited};
+    *s = (sample_t){.point = {.i = {-3000, 5000}, .omega = (q31_t)(omega_pu * 2147483647.0)},
+                    .v_dc = 21238,
+                    .acting = acting,
+                    .voltage_limited = limited};
     s->point.flux = flux_table_step(&motor.flux_table, s->point.i);
     sample_box_publish(&drive.samples);
 }

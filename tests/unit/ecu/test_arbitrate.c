@@ -117,10 +117,12 @@ void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
         q15_t request;
         q31_t omega;
         int wanted;
-    } quadrants[] = {
-        {16000, 1 << 28, 9000},    {-16000, 1 << 28, -3000}, {16000, -(1 << 28), 3000},
-        {-16000, -(1 << 28), -9000}, {16000, 0, 9000},       {-16000, 0, -9000},
-        {-16000, 900000, -9000}, /* rolling slower than standstill: to start backwards is driving */
+    } quadrants
+        [] =
+            {
+                {16000, 1 << 28, 9000},      {-16000, 1 << 28, -3000}, {16000, -(1 << 28), 3000},
+                {-16000, -(1 << 28), -9000}, {16000, 0, 9000},         {-16000, 0, -9000},
+                {-16000, 900000, -9000}, /* rolling slower than standstill: to start backwards is driving */
     };
     for (unsigned n = 0; n < sizeof quadrants / sizeof quadrants[0]; n++) {
         state = (arbitrate_state_t){0};
@@ -171,8 +173,8 @@ void test_stop_ends_torque_with_slew_and_off_at_once(void)
 /* The most negative count has no positive counterpart. */
 void test_the_ends_of_the_format_do_no_harm(void)
 {
-    in = (arbitrate_in_t){.torque_requested = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN,
-                          .run = true};
+    in = (arbitrate_in_t){
+        .torque_requested = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN, .run = true};
     TEST_ASSERT_EQUAL_INT(-Q15_MAX, steps(1000));
     in.torque_requested = Q15_MAX;
     TEST_ASSERT_EQUAL_INT(Q15_MAX, steps(1000));

@@ -240,8 +240,7 @@ void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
     ecu.xcp.working[CALIBRATION_dead_time_compensation] = 0.5F;
     ecu.xcp.xcp.generation++;
     xcp_access_step(&ecu.xcp, &ecu.drive, 1);
-    TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F,
-                             calibration_get(&ecu.drive.motor, CALIBRATION_dead_time_compensation));
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive.motor, CALIBRATION_dead_time_compensation));
 }
 
 /* 32 ms of current before the fault, the newest last; a second fault and what the machine does then change nothing. */

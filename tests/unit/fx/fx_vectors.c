@@ -8,11 +8,24 @@
 #include "unity.h"
 
 const int32_t corner[CORNERS] = {
-    INT32_MIN,   INT32_MIN + 1, -0x7FFF8001, -0x7FFF8000, -0x40000001, -0x40000000, -0x3FFFFFFF,
-    -0x00020000, -65537,        -65536,      -65535,      -32769,      -32768,      -32767,
-    -16384,      -2,            -1,          0,           1,           2,           3,
-    16383,       16384,         32767,       32768,       65535,       65536,       65537,
-    0x0001FFFF,  0x3FFFFFFF,    0x40000000,  0x40000001,  0x7FFF7FFF,  0x7FFF8000,  INT32_MAX,
+    INT32_MIN,   INT32_MIN + 1,
+    -0x7FFF8001, -0x7FFF8000,
+    -0x40000001, -0x40000000,
+    -0x3FFFFFFF, -0x00020000,
+    -65537,      -65536,
+    -65535,      -32769,
+    -32768,      -32767,
+    -16384,      -2,
+    -1,          0,
+    1,           2,
+    3,           16383,
+    16384,       32767,
+    32768,       65535,
+    65536,       65537,
+    0x0001FFFF,  0x3FFFFFFF,
+    0x40000000,  0x40000001,
+    0x7FFF7FFF,  0x7FFF8000,
+    INT32_MAX,
 };
 
 uint32_t random_u32(void)
@@ -59,8 +72,7 @@ void expect_equal(const char *what, int64_t a, int64_t b, int64_t got, int64_t w
 {
     if (got != want) {
         char text[200];
-        (void)snprintf(text, sizeof text,
-                       "%s(%" PRId64 ", %" PRId64 ") is %" PRId64 ", expected %" PRId64, what, a, b,
+        (void)snprintf(text, sizeof text, "%s(%" PRId64 ", %" PRId64 ") is %" PRId64 ", expected %" PRId64, what, a, b,
                        got, want);
         TEST_FAIL_MESSAGE(text);
     }
@@ -76,8 +88,7 @@ void worst_note(worst_t *worst, long double error, int64_t a, int64_t b)
 void worst_expect(const worst_t *worst, const char *what, long double allowed)
 {
     char text[200];
-    (void)snprintf(text, sizeof text,
-                   "%s: largest error %.6Lg at (%" PRId64 ", %" PRId64 "), allowed %.6Lg", what,
+    (void)snprintf(text, sizeof text, "%s: largest error %.6Lg at (%" PRId64 ", %" PRId64 "), allowed %.6Lg", what,
                    worst->error, worst->a, worst->b, allowed);
     TEST_ASSERT_TRUE_MESSAGE(worst->error <= allowed, text);
 }

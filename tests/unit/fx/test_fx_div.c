@@ -13,8 +13,7 @@ void tearDown(void)
 
 /* q = num * scale / den to nearest, exactly: num * scale - q * den lies in [-den/2, den/2).
  * The clipped ends are checked by the inequality that sent the quotient there. */
-static void check(const char *what, int64_t num, int64_t den, int64_t scale, int64_t q,
-                  int64_t low, int64_t high)
+static void check(const char *what, int64_t num, int64_t den, int64_t scale, int64_t q, int64_t low, int64_t high)
 {
     const int64_t n = (den < 0) ? -(num * scale) : (num * scale);
     const int64_t d = (den < 0) ? -den : den;
@@ -27,8 +26,7 @@ static void check(const char *what, int64_t num, int64_t den, int64_t scale, int
 static void q31_pair(int32_t num, int32_t den)
 {
     if (den != 0) {
-        check("fx_div_q31", num, den, INT64_C(0x80000000), fx_div_q31(num, den), INT32_MIN,
-              INT32_MAX);
+        check("fx_div_q31", num, den, INT64_C(0x80000000), fx_div_q31(num, den), INT32_MIN, INT32_MAX);
         const int64_t q = (int64_t)num / den;
         expect_equal("fx_div_s32", num, den, fx_div_s32(num, den), (q > INT32_MAX) ? INT32_MAX : q);
     }
@@ -128,8 +126,7 @@ void test_the_reciprocal_of_every_q15_is_right_to_half_an_lsb_of_the_gain(void)
     TEST_ASSERT_EQUAL_INT32(-Q16_ONE, fx_reciprocal_q16(Q15_MIN));
     for (int32_t x = -32768; x <= 32767; x++) {
         if (x != 0) {
-            check("fx_reciprocal_q16", 1, x, INT64_C(0x80000000), fx_reciprocal_q16((q15_t)x),
-                  INT32_MIN, INT32_MAX);
+            check("fx_reciprocal_q16", 1, x, INT64_C(0x80000000), fx_reciprocal_q16((q15_t)x), INT32_MIN, INT32_MAX);
         }
     }
 }

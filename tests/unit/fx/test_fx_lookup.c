@@ -33,8 +33,7 @@ static long double place(int32_t x, int32_t x0, unsigned shift, int n, int *inde
 }
 
 /* Bilinear interpolation as the text-book has it; and the error the header allows for this cell. */
-static long double bilinear(const fx_lut2_t *lut, int32_t x, int32_t y, long double *allowed,
-                            bool *outside)
+static long double bilinear(const fx_lut2_t *lut, int32_t x, int32_t y, long double *allowed, bool *outside)
 {
     int ix;
     int iy;
@@ -70,13 +69,11 @@ void test_bilinear_look_up_agrees_with_long_double_inside_and_outside_any_grid(v
 {
     for (unsigned shift = 0U; shift <= 14U; shift++) {
         const uint8_t other = (uint8_t)(14U - shift);
-        const fx_lut2_t lut = {
-            table, {-3 * (1 << shift), 1 - (1 << other), (uint8_t)shift, other, NX, NY}};
+        const fx_lut2_t lut = {table, {-3 * (1 << shift), 1 - (1 << other), (uint8_t)shift, other, NX, NY}};
         for (int32_t i = 0; i < 20000; i++) {
             const int32_t wide = (NX + 2) << shift;
             const int32_t x = lut.grid.x0 - (1 << shift) + (int32_t)(random_u32() % (uint32_t)wide);
-            const int32_t y = lut.grid.y0 - (1 << other) +
-                              (int32_t)(random_u32() % ((NY + 2U) << other));
+            const int32_t y = lut.grid.y0 - (1 << other) + (int32_t)(random_u32() % ((NY + 2U) << other));
             check2(&lut, x, y);
         }
         for (int32_t i = 0; i < CORNERS; i++) {
@@ -119,7 +116,7 @@ void test_one_count_beyond_the_grid_is_flagged_on_every_side(void)
     bool clamped = false;
     const int32_t left = lut.grid.x0;
     const int32_t bottom = lut.grid.y0;
-    const int32_t point[6][3] = {{left, bottom, 0},   {right, top, 0},          {left - 1, top, 1},
+    const int32_t point[6][3] = {{left, bottom, 0},   {right, top, 0},        {left - 1, top, 1},
                                  {right + 1, top, 1}, {right, bottom - 1, 1}, {left, top + 1, 1}};
     for (int i = 0; i < 6; i++) {
         (void)fx_lookup2(&lut, point[i][0], point[i][1], &clamped);
@@ -157,8 +154,8 @@ void test_the_four_weights_are_never_negative_and_sum_to_one(void)
         const int32_t x = (i < 16384) ? i : (int32_t)(random_u32() & 0x3FFFU);
         const int32_t y = (i < 16384) ? 16383 - i : (int32_t)(random_u32() & 0x3FFFU);
         const fx_cell_t cell = fx_cell(&grid, x, y);
-        const int32_t w[4] = {half_word(cell.w0, 0U), half_word(cell.w0, 16U),
-                              half_word(cell.w1, 0U), half_word(cell.w1, 16U)};
+        const int32_t w[4] = {half_word(cell.w0, 0U), half_word(cell.w0, 16U), half_word(cell.w1, 0U),
+                              half_word(cell.w1, 16U)};
         expect_equal("sum", x, y, w[0] + w[1] + w[2] + w[3], 16384);
         /* w11 is u v rounded half up to Q14. */
         const int32_t excess = (w[3] * 16384) - (x * y);

@@ -34,8 +34,8 @@ double poly_field_energy(double id, double iq)
     double psi[2];
     poly_flux(id, iq, psi);
     return id * psi[0] + iq * psi[1] -
-           (POLY_F * id + POLY_A * id * id / 2.0 - POLY_C * id * id * id / 3.0 +
-            POLY_B * iq * iq / 2.0 - POLY_X * id * iq * iq);
+           (POLY_F * id + POLY_A * id * id / 2.0 - POLY_C * id * id * id / 3.0 + POLY_B * iq * iq / 2.0 -
+            POLY_X * id * iq * iq);
 }
 
 plant_map_t *poly_map(void)

@@ -64,8 +64,7 @@ void test_a_conservative_map_gives_back_the_field_energy_it_took(void)
     wild_run(3100);
     const double field = 1.5 * (poly_field_energy(t->i_dm_A, t->i_qm_A));
     TEST_ASSERT_TRUE(field > 3.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4 * t->e_copper_J, t->e_copper_J + t->e_mechanical_J + field,
-                              t->e_electrical_J);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4 * t->e_copper_J, t->e_copper_J + t->e_mechanical_J + field, t->e_electrical_J);
     TEST_ASSERT_DOUBLE_WITHIN(1e-3 * field, field, t->e_field_J);
 }
 
@@ -105,8 +104,7 @@ void test_a_free_rotor_takes_up_the_air_gap_work(void)
     }
     const double now = 0.5 * p.inertia_kgm2 * t->speed_rad_s * t->speed_rad_s;
     TEST_ASSERT_TRUE(fabs(now - at_start) > 100.0 && friction > 10.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4 * fabs(now - at_start), t->e_mechanical_J,
-                              now - at_start + load + friction);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4 * fabs(now - at_start), t->e_mechanical_J, now - at_start + load + friction);
 }
 
 /* No torque: J dw/dt = -T - B w, so w = (w0 + T/B) e^(-B t/J) - T/B, second order in 10 us. */
@@ -152,8 +150,7 @@ static double loop_energy(const plant_map_t *m, double d_A, double q_A)
         for (int k = 1; k <= 2000; k++) {
             const double f = k / 2000.0, g = (k - 0.5) / 2000.0;
             const double *a = corner[side], *b = corner[side + 1];
-            plant_map_flux(m, a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), &now[0], &now[1],
-                           NULL);
+            plant_map_flux(m, a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), &now[0], &now[1], NULL);
             sum += 1.5 * (a[0] + g * (b[0] - a[0])) * (now[0] - was[0]);
             sum += 1.5 * (a[1] + g * (b[1] - a[1])) * (now[1] - was[1]);
             was[0] = now[0], was[1] = now[1];

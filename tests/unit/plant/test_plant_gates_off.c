@@ -159,8 +159,7 @@ void test_a_rectifying_machine_turns_shaft_power_into_charge(void)
     TEST_ASSERT_TRUE(t->e_mechanical_J < -100.0);
     TEST_ASSERT_TRUE(t->e_dc_J < -0.5 * fabs(t->e_mechanical_J));
     const double lost = t->e_copper_J + t->e_field_J;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * fabs(t->e_mechanical_J), t->e_electrical_J,
-                              t->e_mechanical_J + lost);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3 * fabs(t->e_mechanical_J), t->e_electrical_J, t->e_mechanical_J + lost);
     TEST_ASSERT_TRUE(t->e_dc_J > t->e_electrical_J); /* the diodes take their part */
 }
 

@@ -195,8 +195,7 @@ void test_dc_ripple_is_seen_at_the_start_and_acts_in_the_middle_of_a_period(void
     for (int k = 0; k < 30; k++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, 400.0 + 20.0 * sin(TWO_PI * 0.03 * k), t->vdc_V);
         plant_advance(plant, duty, 1);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 / 3.0 * (400.0 + 20.0 * sin(TWO_PI * 0.03 * (k + 0.5))),
-                                  t->u_d_V);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 / 3.0 * (400.0 + 20.0 * sin(TWO_PI * 0.03 * (k + 0.5))), t->u_d_V);
     }
 }
 

@@ -42,10 +42,8 @@ void test_a_locked_rotor_answers_a_voltage_step_with_one_exponential_per_axis(vo
     for (int k = 1; k <= 500; k++) {
         plant_advance(plant, duty, 1);
         const double at = k * 1e-4;
-        TEST_ASSERT_DOUBLE_WITHIN(1e-6 * fabs(final_d), final_d * -expm1(-at * p.r_ohm_20 / p.ld_H),
-                                  t->i_d_A);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-6 * fabs(final_q), final_q * -expm1(-at * p.r_ohm_20 / p.lq_H),
-                                  t->i_q_A);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6 * fabs(final_d), final_d * -expm1(-at * p.r_ohm_20 / p.ld_H), t->i_d_A);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6 * fabs(final_q), final_q * -expm1(-at * p.r_ohm_20 / p.lq_H), t->i_q_A);
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.05, t->time_s);
 }
@@ -126,8 +124,7 @@ void test_the_rotor_turns_inside_the_period_against_a_resting_voltage(void)
     const double w = 6300.0, ts = 1e-4;
     const double complex u = 150.0 - 80.0 * I, z = p.r_ohm_20 + I * w * p.ld_H;
     const double complex ip = -I * w * p.psi_f_Vs / z, rest = u / p.r_ohm_20;
-    const double complex at_end =
-        ip * cexp(I * w * ts) + rest + (0.0 - ip - rest) * exp(-ts * p.r_ohm_20 / p.ld_H);
+    const double complex at_end = ip * cexp(I * w * ts) + rest + (0.0 - ip - rest) * exp(-ts * p.r_ohm_20 / p.ld_H);
     const double complex i_dq = at_end * cexp(-I * w * ts);
     /* mean of e^(-j w t) over the period: sinc(w Ts/2) e^(-j w Ts/2) */
     const double complex mean = u * sin(0.5 * w * ts) / (0.5 * w * ts) * cexp(-I * 0.5 * w * ts);
@@ -191,8 +188,7 @@ void test_a_saturating_machine_agrees_with_an_independent_integration_of_its_cur
         double psi[2], duty[3];
         poly_flux(i[0], i[1], psi);
         const double complex kick = 25.0 * cexp(I * 0.5 * k) + 0.05 * (-80.0 - i[0] - I * i[1]);
-        const double complex u =
-            (kick + I * w * (psi[0] + I * psi[1])) * cexp(I * (theta + 0.5 * w * 1e-4));
+        const double complex u = (kick + I * w * (psi[0] + I * psi[1])) * cexp(I * (theta + 0.5 * w * 1e-4));
         bench_duty(u, p.vdc_V, duty);
         plant_advance(plant, duty, 1);
         for (int n = 0; n < 50; n++) {

@@ -48,11 +48,9 @@ void test_each_perturbation_scales_its_own_part_of_the_flux(void)
     for (double id = -240.0; id <= 40.0; id += 35.0) {
         for (double iq = -240.0; iq <= 240.0; iq += 48.0) {
             plant_set_state(plant, id, iq, 0.0, 0.0);
-            const double d =
-                0.85 * POLY_F - 1.2 * POLY_X * iq * iq + 0.9 * (POLY_A * id - POLY_C * id * id);
+            const double d = 0.85 * POLY_F - 1.2 * POLY_X * iq * iq + 0.9 * (POLY_A * id - POLY_C * id * id);
             TEST_ASSERT_DOUBLE_WITHIN(1e-14, d, t->psi_d_Vs);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1.1 * (POLY_B * iq - 2.0 * POLY_X * id * iq),
-                                      t->psi_q_Vs);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, 1.1 * (POLY_B * iq - 2.0 * POLY_X * id * iq), t->psi_q_Vs);
         }
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.85 * POLY_F, t->psi_f_Vs);
@@ -72,8 +70,7 @@ void test_perturbed_currents_are_those_of_the_perturbed_flux(void)
     for (int k = 0; k < 20; k++) {
         bench_drive(plant, -10.0 + 100.0 * I * (k < 10 ? 1.0 : -1.0));
         const double id = t->i_d_A, iq = t->i_q_A;
-        const double d =
-            0.9 * POLY_F - 0.5 * POLY_X * iq * iq + 1.3 * (POLY_A * id - POLY_C * id * id);
+        const double d = 0.9 * POLY_F - 0.5 * POLY_X * iq * iq + 1.3 * (POLY_A * id - POLY_C * id * id);
         TEST_ASSERT_DOUBLE_WITHIN(2e-10, d, t->psi_d_Vs);
         TEST_ASSERT_DOUBLE_WITHIN(2e-10, 0.8 * (POLY_B * iq - 2.0 * POLY_X * id * iq), t->psi_q_Vs);
     }

@@ -74,8 +74,7 @@ void test_far_outside_the_axes_are_decoupled_and_the_slopes_constant(void)
  * included. 1e-9 A away the smooth functions move by < 1e-12 Vs and their slopes by < 1e-12 H. */
 void test_value_and_slope_are_continuous_across_grid_lines_and_edges(void)
 {
-    const double id[] = {-200.0, -120.0, -50.0, 0.0, 20.0},
-                 iq[] = {-200.0, -60.0, 0.0, 90.0, 200.0};
+    const double id[] = {-200.0, -120.0, -50.0, 0.0, 20.0}, iq[] = {-200.0, -60.0, 0.0, 90.0, 200.0};
     double psi_d[5][5], psi_q[5][5];
     for (int i = 0; i < 5; i++) {
         for (int j = 0; j < 5; j++) {
@@ -157,8 +156,7 @@ void test_the_flux_on_the_q_axis_is_that_of_the_map(void)
  * coupling. Starts: the origin and all four corners. */
 static void round_trip(const plant_map_t *m, double id_hi)
 {
-    const double start[5][2] = {
-        {0.0, 0.0}, {-250.0, -250.0}, {-250.0, 250.0}, {0.0, 250.0}, {0.0, -250.0}};
+    const double start[5][2] = {{0.0, 0.0}, {-250.0, -250.0}, {-250.0, 250.0}, {0.0, 250.0}, {0.0, -250.0}};
     for (double id = -270.0; id <= id_hi; id += 10.7) {
         for (double iq = -270.0; iq <= 270.0; iq += 9.9) {
             double d, q;

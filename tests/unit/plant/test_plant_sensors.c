@@ -45,8 +45,7 @@ void test_unquantised_sensors_show_the_phase_currents_themselves(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, t->i_abc_A[1], seen.ib_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, t->i_abc_A[2], seen.ic_A);
     /* phase b is the d axis seen from 120 degrees further on */
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -70.0 * cos(0.6 - TWO_PI / 3) - 110.0 * sin(0.6 - TWO_PI / 3),
-                              seen.ib_A);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -70.0 * cos(0.6 - TWO_PI / 3) - 110.0 * sin(0.6 - TWO_PI / 3), seen.ib_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 400.0, seen.vdc_V);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.2, seen.theta_m_rad);
     TEST_ASSERT_DOUBLE_WITHIN(0.0, 20.0, seen.t_winding_C);
@@ -208,8 +207,7 @@ void test_the_angle_carries_its_offset_and_both_harmonics_of_the_turn(void)
     plant_params(plant)->resolver_pole_pairs = 3.0;
     plant_set_state(plant, 0.0, 0.0, 1.0, 0.0);
     plant_sample(plant, &seen);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0 + (0.03 + 0.02 * sin(3.5) + 0.01 * sin(5.0)) / 3.0,
-                              seen.theta_m_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0 + (0.03 + 0.02 * sin(3.5) + 0.01 * sin(5.0)) / 3.0, seen.theta_m_rad);
 }
 
 void test_the_angle_stays_in_one_turn_at_its_ends(void)

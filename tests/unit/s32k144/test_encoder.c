@@ -18,7 +18,9 @@ void setUp(void)
     angle_init(PERIOD);
 }
 
-void tearDown(void) {}
+void tearDown(void)
+{
+}
 
 void test_a_shaft_at_rest_is_where_the_counter_says(void)
 {

@@ -5,13 +5,17 @@
 
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/can_mailbox.h"
-#include "hal/s32k144/ntc.h"
 #include "hal/s32k144/die.h"
+#include "hal/s32k144/ntc.h"
 #include "hal/temperature.h"
 #include "unity.h"
 
-void setUp(void) {}
-void tearDown(void) {}
+void setUp(void)
+{
+}
+void tearDown(void)
+{
+}
 
 /* Words by hand: identifier 0x123 << 18 = 0x048C0000, length 8, code 12. */
 void test_a_standard_frame_fills_the_buffer_from_the_top_byte_down(void)

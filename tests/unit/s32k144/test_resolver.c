@@ -42,7 +42,9 @@ void setUp(void)
     (void)hal_angle_read();
 }
 
-void tearDown(void) {}
+void tearDown(void)
+{
+}
 
 void test_start_up_reads_the_fault_register_after_a_sample_and_leaves_the_converter_in_position_mode(void)
 {

@@ -6,10 +6,17 @@
 #include "types/faults.h"
 #include "unity.h"
 
-static const plausibility_config_t config = {.e_0 = 2000, .i_dead = 400, .i_alive = 2400, .omega_trip = 32000,
-                                             .inverter_trip_dC = 1050, .winding_trip_dC = 1800,
-                                             .deviation_steps = 100, .lost_steps = 10, .equal_steps = 20,
-                                             .fast_steps = 5, .hot_steps = 110};
+static const plausibility_config_t config = {.e_0 = 2000,
+                                             .i_dead = 400,
+                                             .i_alive = 2400,
+                                             .omega_trip = 32000,
+                                             .inverter_trip_dC = 1050,
+                                             .winding_trip_dC = 1800,
+                                             .deviation_steps = 100,
+                                             .lost_steps = 10,
+                                             .equal_steps = 20,
+                                             .fast_steps = 5,
+                                             .hot_steps = 110};
 static plausibility_state_t state;
 static plausibility_in_t in;
 static int now;

@@ -7,9 +7,16 @@
 #include "unity.h"
 
 /* r = 0.0137, psi_f = 0.44, 10 N m = 0.034, 7 V = 0.013: about hsm1. */
-static const torque_monitor_config_t config = {
-    .r = 898, .psi_f = 14418, .t_0 = 1112, .v_0 = 425, .i_0 = 0, .rate_gain = 19867,
-    .mean_rate = 8192, .torque_steps = 20, .angle_steps = 5, .settle_steps = 5};
+static const torque_monitor_config_t config = {.r = 898,
+                                               .psi_f = 14418,
+                                               .t_0 = 1112,
+                                               .v_0 = 425,
+                                               .i_0 = 0,
+                                               .rate_gain = 19867,
+                                               .mean_rate = 8192,
+                                               .torque_steps = 20,
+                                               .angle_steps = 5,
+                                               .settle_steps = 5};
 static torque_monitor_state_t state;
 static torque_monitor_in_t in;
 
@@ -193,8 +200,12 @@ void test_no_argument_wraps(void)
 {
     static const int16_t ends[] = {INT16_MIN, INT16_MAX};
     for (int n = 0; n < 64; n++) {
-        in = (torque_monitor_in_t){true, {ends[n & 1], ends[(n >> 1) & 1]}, {ends[(n >> 2) & 1], ends[n & 1]},
-                                   {ends[(n >> 3) & 1], ends[(n >> 4) & 1]}, ends[(n >> 5) & 1], ends[n & 1]};
+        in = (torque_monitor_in_t){true,
+                                   {ends[n & 1], ends[(n >> 1) & 1]},
+                                   {ends[(n >> 2) & 1], ends[n & 1]},
+                                   {ends[(n >> 3) & 1], ends[(n >> 4) & 1]},
+                                   ends[(n >> 5) & 1],
+                                   ends[n & 1]};
         (void)torque_monitor_step(&config, &state, &in);
     }
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <string.h>
 
-#include "storage/memory.h"
 #include "hal/mock_nvm.h"
+#include "storage/memory.h"
 #include "unity.h"
 
 /* The keeper above the store: what is taken at the start, when is saved. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <string.h>
 
-#include "storage/store.h"
 #include "signal/crc32.h"
+#include "storage/store.h"
 #include "unity.h"
 
 #define LAYOUT 0x46540001U

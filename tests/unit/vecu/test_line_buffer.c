@@ -138,8 +138,10 @@ void test_random_bytes_never_block_it(void)
             const int rare = rand() % 200 + 3;
             for (size_t k = 0; k < count; k++) {
                 const int pick = rand() % rare;
-                buffer.bytes[buffer.end++] =
-                    (char)(pick == 0 ? '<' : pick == 1 ? '>' : pick == 2 ? '\n' : rand() % 256 - 128);
+                buffer.bytes[buffer.end++] = (char)(pick == 0   ? '<'
+                                                    : pick == 1 ? '>'
+                                                    : pick == 2 ? '\n'
+                                                                : rand() % 256 - 128);
             }
             while (line_buffer_next(&buffer, text)) {
                 TEST_ASSERT_LESS_OR_EQUAL_size_t(LINE_LENGTH, strlen(text));

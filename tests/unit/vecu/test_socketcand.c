@@ -39,11 +39,30 @@ void test_the_greetings_are_known(void)
 void test_everything_else_is_bad(void)
 {
     static const char *const bad[] = {
-        "", " ", "send", "send ", "send 123", "send 800 0", "send FFF 0", "send 20000000 0", "send 1234 0",
+        "",
+        " ",
+        "send",
+        "send ",
+        "send 123",
+        "send 800 0",
+        "send FFF 0",
+        "send 20000000 0",
+        "send 1234 0",
         "send 123 9",
-        "send 123 8 1 2 3", "send 123 1 1 2", "send 123 1 100", "send 123 1 1x", "send 123 1 -1", "send 12g 0",
+        "send 123 8 1 2 3",
+        "send 123 1 1 2",
+        "send 123 1 100",
+        "send 123 1 1x",
+        "send 123 1 -1",
+        "send 12g 0",
         "send 123456789 0",
-        "send 123 01", "rawmode now", "opencan0", "SEND 123 0", "send 123 1 +1", "send 123 2 1,2", "send 123 1 0x1",
+        "send 123 01",
+        "rawmode now",
+        "opencan0",
+        "SEND 123 0",
+        "send 123 1 +1",
+        "send 123 2 1,2",
+        "send 123 1 0x1",
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(SOCKETCAND_BAD, socketcand_parse(bad[i], &frame), bad[i]);

@@ -57,8 +57,17 @@ def measure(machine: Machine, what: Iterable[Case], overhead: int) -> list[Resul
             values = np.array([value for value, _ in calls], dtype=np.uint64).astype(np.int64)
             error = float(case.error(case.rows, values).max())
         results.append(
-            Result(case.name, case.title, case.group, len(calls), int(issued.min()),
-                   float(issued.mean()), int(issued.max()), error, case.unit)  # fmt: skip
+            Result(
+                case.name,
+                case.title,
+                case.group,
+                len(calls),
+                int(issued.min()),
+                float(issued.mean()),
+                int(issued.max()),
+                error,
+                case.unit,
+            )  # fmt: skip
         )
     return results
 
@@ -87,9 +96,7 @@ def table(results: Iterable[Result], overhead: int) -> str:
             continue
         for peer in (peer for peer in peers if peer.function == result.group):
             label = f"  {peer.name}, {peer.source}"
-            lines.append(
-                f"{label:<50}{peer.instructions:>5}       {_error(peer.error, peer.unit)}".rstrip()
-            )
+            lines.append(f"{label:<50}{peer.instructions:>5}       {_error(peer.error, peer.unit)}".rstrip())
     return "\n".join(lines)
 
 

@@ -26,16 +26,24 @@ def _same(cycles: int | None, names: str) -> None:
     COSTS.update(dict.fromkeys(names.split(), cycles))
 
 
-_same(1, "mov movw movt mvn add addw adc sub subw sbc rsb neg cmp cmn tst teq and orr orn eor bic lsl lsr asr "
-      "ror")
-_same(1, "sxtb sxth uxtb uxth sxtb16 uxtb16 sxtab sxtah uxtab uxtah ubfx sbfx bfi bfc clz rbit rev rev16 revsh "
-      "pkhbt pkhtb sel")
+_same(1, "mov movw movt mvn add addw adc sub subw sbc rsb neg cmp cmn tst teq and orr orn eor bic lsl lsr asr ror")
+_same(
+    1,
+    "sxtb sxth uxtb uxth sxtb16 uxtb16 sxtab sxtah uxtab uxtah ubfx sbfx bfi bfc clz rbit rev rev16 revsh "
+    "pkhbt pkhtb sel",
+)
 _same(1, "mul mla mls smull umull smlal umlal umaal smmul smmulr smmla smmlar smmls smmlsr")
-_same(1, "smulbb smulbt smultb smultt smulwb smulwt smlabb smlabt smlatb smlatt smlawb smlawt smlalbb smlalbt "
-      "smlaltb smlaltt")
+_same(
+    1,
+    "smulbb smulbt smultb smultt smulwb smulwt smlabb smlabt smlatb smlatt smlawb smlawt smlalbb smlalbt "
+    "smlaltb smlaltt",
+)
 _same(1, "smuad smuadx smusd smusdx smlad smladx smlsd smlsdx smlald smlaldx smlsld smlsldx")
-_same(1, "ssat usat ssat16 usat16 qadd qsub qdadd qdsub qadd16 qsub16 qasx qsax sadd16 ssub16 shadd16 shsub16 "
-      "sasx ssax uadd16 usub16 uadd8 usub8")
+_same(
+    1,
+    "ssat usat ssat16 usat16 qadd qsub qdadd qdsub qadd16 qsub16 qasx qsax sadd16 ssub16 shadd16 shsub16 "
+    "sasx ssax uadd16 usub16 uadd8 usub8",
+)
 _same(DIVIDE, "sdiv udiv")
 _same(2, "ldr ldrb ldrh ldrsb ldrsh ldrex ldrexb ldrexh str strb strh strex strexb strexh")
 _same(3, "ldrd strd")
@@ -76,7 +84,7 @@ def cycles(instruction: Instruction) -> int:
     if cost is None:
         return 1 + words(instruction.operands)
     registers = instruction.operands.split(", ")
-    if name in ("vldr", "vstr") and registers[0].startswith("d") or name == "vmov" and len(registers) > 2:
+    if (name in ("vldr", "vstr") and registers[0].startswith("d")) or (name == "vmov" and len(registers) > 2):
         return cost + DOUBLE
     return cost
 

@@ -2,9 +2,9 @@
 /* One drive on a hardware interface made of variables, and its stages as functions of their own.
  * The stages work on a copy of the drive: they see the state that the interrupt will see, and
  * leave none behind. Compiled for the target and, for comparison, for this computer. */
+#include "control/current/transform.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
-#include "control/current/transform.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/irq.h"
@@ -111,8 +111,7 @@ CALLED void drive_request(int32_t torque, uint32_t enable)
 
 CALLED void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m)
 {
-    port.counts =
-        (adc_counts_t){i_ab & 0xFFFFU, i_ab >> 16, i_c_v_dc & 0xFFFFU, i_c_v_dc >> 16};
+    port.counts = (adc_counts_t){i_ab & 0xFFFFU, i_ab >> 16, i_c_v_dc & 0xFFFFU, i_c_v_dc >> 16};
     port.theta_m = theta_m;
 }
 
@@ -141,12 +140,28 @@ CALLED const int32_t *drive_outputs(void)
     const mrai_state_t *mrai = &drive.mrai.isr.law;
     const sample_t *sample = sample_box_at(&drive.samples, drive.samples.generation);
     const int32_t all[OUTPUTS] = {
-        port.duty.a, port.duty.b, port.duty.c, port.gates,
-        sample->point.i.d, sample->point.i.q, sample->point.flux.psi_d, sample->point.flux.psi_q, sample->point.omega,
-        fast->u_next.d, fast->u_next.q, fast->current_control.s_d_q30, fast->current_control.s_q_q30,
-        (int32_t)fast->faults, mrai->e_d_q27, mrai->e_q_q27, mrai->psi_delta, mrai->r_delta,
-        drive.mrai.isr.torque.sum_q24, drive.mrai.task.torque_mean.mean,
-        drive.task.identification.torque_estimated, drive.task.identification.psi_delta,
+        port.duty.a,
+        port.duty.b,
+        port.duty.c,
+        port.gates,
+        sample->point.i.d,
+        sample->point.i.q,
+        sample->point.flux.psi_d,
+        sample->point.flux.psi_q,
+        sample->point.omega,
+        fast->u_next.d,
+        fast->u_next.q,
+        fast->current_control.s_d_q30,
+        fast->current_control.s_q_q30,
+        (int32_t)fast->faults,
+        mrai->e_d_q27,
+        mrai->e_q_q27,
+        mrai->psi_delta,
+        mrai->r_delta,
+        drive.mrai.isr.torque.sum_q24,
+        drive.mrai.task.torque_mean.mean,
+        drive.task.identification.torque_estimated,
+        drive.task.identification.psi_delta,
         drive.task.identify.kalman.p_q30[0],
         drive.task.identify.local.q,
     };
@@ -239,8 +254,7 @@ STAGE void bench_current_tick(void)
         .psi_delta = d->psi_d_error,
         .v_dc = measured.v_dc,
     };
-    const current_control_out_t wanted =
-        current_control_step(&m->current_control, &d->fast.current_control, &control);
+    const current_control_out_t wanted = current_control_step(&m->current_control, &d->fast.current_control, &control);
     modulate(&m->modulate, &wanted, i_dq, advanced);
 }
 
@@ -248,15 +262,17 @@ STAGE void bench_current_tick(void)
  * feed-forward of speed, no dead time, a known dc voltage. */
 STAGE void bench_current_core(void)
 {
-    static const modulate_config_t bare = {.alpha_q31 = Q31(0.6), .side_q31 = Q31(0.51961524227066314),
-                                           .longest_q31 = 1 << 30, .nearer_rail_q31 = 1 << 30};
+    static const modulate_config_t bare = {.alpha_q31 = Q31(0.6),
+                                           .side_q31 = Q31(0.51961524227066314),
+                                           .longest_q31 = 1 << 30,
+                                           .nearer_rail_q31 = 1 << 30};
     drive_t *d = the_copy();
     const fx_pair_t at = fx_rotation(found.theta_e);
     const dq_q15_t i = park(clarke(found.phases), at);
     const flux_point_t as_flux = {.psi_d = (q15_t)i.d, .psi_q = (q15_t)i.q};
     const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
-    const current_control_out_t wanted =
-        current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
+    const current_control_out_t wanted = current_control_step(&d->motor.current_control, &d->fast.current_control,
+                                                              &control);
     modulate(&bare, &wanted, 0, at);
 }
 

@@ -48,9 +48,7 @@ class Elf:
         ph_off, sh_off = struct.unpack_from("<II", image, 28)
         ph_size, ph_num, sh_size, sh_num = struct.unpack_from("<HHHH", image, 42)
         for i in range(ph_num):
-            kind, off, address, _, in_file, in_memory = struct.unpack_from(
-                "<6I", image, ph_off + i * ph_size
-            )
+            kind, off, address, _, in_file, in_memory = struct.unpack_from("<6I", image, ph_off + i * ph_size)
             if kind == PT_LOAD:
                 elf.segments.append((address, image[off : off + in_file], in_memory))
         sections = [struct.unpack_from("<10I", image, sh_off + i * sh_size) for i in range(sh_num)]

@@ -136,5 +136,3 @@ def state(elf: Path) -> dict[str, int]:
 def compiler() -> str:
     """What the figures depend on."""
     return _lines("arm-none-eabi-gcc", "--version")[0].strip()
-
-

@@ -2,10 +2,10 @@
 /* The stages of the 1 kHz task as functions of their own, and the supervisor's of the bus. Each works on a copy of the
  * drive as the task is about to find it, with the inputs that the task gives it; it leaves nothing behind. Compiled as
  * the task is: small, but for what is in fast_sources.txt, which is called, not compiled in. */
-#include "ecu/arbitration.h"
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
+#include "ecu/arbitration.h"
 #include "ecu/supervisor.h"
 #include "fx/vec.h"
 #include "hal/temperature.h"

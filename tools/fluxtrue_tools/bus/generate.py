@@ -70,7 +70,8 @@ def in_range(message: Message) -> str:
     """The function that checks every signal of a received message."""
     struct = f"{PREFIX}_{snake(message.name)}"
     tests = " &&\n           ".join(
-        f"{struct}_{snake(signal.name)}_is_in_range(m->{snake(signal.name)})" for signal in message.signals)
+        f"{struct}_{snake(signal.name)}_is_in_range(m->{snake(signal.name)})" for signal in message.signals
+    )
     return f"static inline bool {struct}_in_range(const struct {struct}_t *m)\n{{\n    return {tests};\n}}\n"
 
 

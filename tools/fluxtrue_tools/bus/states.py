@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the state machine of docs/howto/can.md from the table the firmware runs on.
 
-    python -m fluxtrue_tools.bus.states          write the drawing into the page
-    python -m fluxtrue_tools.bus.states --check  fail if the page shows another table
+python -m fluxtrue_tools.bus.states          write the drawing into the page
+python -m fluxtrue_tools.bus.states --check  fail if the page shows another table
 """
 
 import re

@@ -117,7 +117,7 @@ def run_controller(campaign: Campaign, machine: Machine, plan: Plan, controller:
 def _window_row(campaign: Campaign, machine: Machine, window: Window, columns: list[str],
                 rows: Array) -> dict[str, Any]:  # fmt: skip
     """Means of the measured part, and the error that is scored."""
-    kept = rows[-max(1, round(window.measure_s / WINDOW_ROW_S)):]
+    kept = rows[-max(1, round(window.measure_s / WINDOW_ROW_S)) :]
     mean = dict(zip(columns, kept.mean(axis=0), strict=True))
     torque = kept[:, columns.index("truth.torque_mean_Nm")]
     base = max(abs(window.torque_Nm), 0.1 * machine.rated_Nm)

@@ -91,9 +91,7 @@ def whole(job: Job, files: Outputs, *, fresh: bool, scheduler: str | None, worke
     return "\n\n".join(parts), all(bound.met for _, bound in promised)
 
 
-def one_case(
-    campaign: Campaign, folder: MotorFolder, case: int, files: Outputs, plot: Path | None, where: str
-) -> str:
+def one_case(campaign: Campaign, folder: MotorFolder, case: int, files: Outputs, plot: Path | None, where: str) -> str:
     """Its plant and its windows as text, its time series as a picture."""
     machine = make_machine(folder, campaign, where)
     check(campaign, machine, where)

@@ -25,9 +25,7 @@ class Demonstration:
     @property
     def realtime(self) -> Bound:
         """The promise about speed."""
-        return Bound(
-            "simulated over wall time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True
-        )
+        return Bound("simulated over wall time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True)
 
     def missed(self) -> list[str]:
         """One line for each promise that was not kept."""

@@ -82,9 +82,7 @@ def gain_sets(results: Sequence[Result]) -> Figure:
             left.plot(now, 1e3 * run["true_psi_f_Vs"][shown], color=TRUTH, label="plant")
             right.plot(now, 1e3 * run["true_r_ohm"][shown], color=TRUTH, label="plant")
             final = 1e3 * float(run["true_psi_f_Vs"][-1])
-            left.axhspan(
-                final * (1 - SETTLED), final * (1 + SETTLED), color=COMMAND, alpha=0.25, lw=0, label="±1 %"
-            )
+            left.axhspan(final * (1 - SETTLED), final * (1 + SETTLED), color=COMMAND, alpha=0.25, lw=0, label="±1 %")
         colour = GAIN_COLOURS[name]
         left.plot(now, 1e3 * run["psi_f_Vs"][shown], color=colour, label=name)
         right.plot(now, 1e3 * run["r_ohm"][shown], color=colour, label=name, lw=1.0)

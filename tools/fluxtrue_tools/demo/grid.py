@@ -71,9 +71,7 @@ def grid(bench: Bench, done: Callable[[], None] = lambda: None) -> list[Result]:
     points = [(speed, torque) for speed in SPEEDS_RPM for torque in TORQUES_NM]
     variants = [(kind, closed) for kind in ("firmware", "twin") for closed in (False, True)]
     jobs = [
-        _job(bench.hsm1, scenario(speed, torque, closed, kind))
-        for speed, torque in points
-        for kind, closed in variants
+        _job(bench.hsm1, scenario(speed, torque, closed, kind)) for speed, torque in points for kind, closed in variants
     ]
     recordings = iter(parallel(jobs, done))
     rows = [{variant: next(recordings) for variant in variants} for _ in points]

@@ -56,10 +56,7 @@ def rows(demonstration: Demonstration) -> list[Row]:
 def terminal(demonstration: Demonstration) -> str:
     """Plain text, as wide as it needs to be."""
     cells = [("experiment", "figure of merit", "simulated", "allowed", "")]
-    cells += [
-        (r.experiment, r.what, r.value, r.allowed, "met" if r.met else "MISSED")
-        for r in rows(demonstration)
-    ]
+    cells += [(r.experiment, r.what, r.value, r.allowed, "met" if r.met else "MISSED") for r in rows(demonstration)]
     widths = [max(len(line[k]) for line in cells) for k in range(5)]
     lines = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
     lines.insert(1, "  ".join("-" * width for width in widths[:4]))

@@ -44,8 +44,7 @@ def torque_step(bench: Bench) -> Result:
     step = [[0, 0], [STEP_S, 0], [STEP_S, TORQUE_NM]]
     torque = run(
         bench.hsm1,
-        base
-        | {"controller": {"torque_slew_Nm_per_s": 0}, "profile": profile | {"torque_Nm": step}},
+        base | {"controller": {"torque_slew_Nm_per_s": 0}, "profile": profile | {"torque_Nm": step}},
     )
     current = run(
         bench.hsm1,

@@ -49,8 +49,8 @@ def emulate(
     if elf is not None:
         paths.refuse_given("with --elf", "angle")
     from fluxtrue_tools.emulate import build
-    from fluxtrue_tools.sim.build import sources
     from fluxtrue_tools.sim import scenario as scenarios
+    from fluxtrue_tools.sim.build import sources
     from fluxtrue_tools.sim.cli import run_and_report
 
     if serve:

@@ -186,7 +186,7 @@ class Core:
         return int.from_bytes(self.read(self.symbol(symbol) + 4 * index, 4), "little")
 
     def register(self, name: str) -> int:
-        """"FTM0.MOD", without side effects."""
+        """ "FTM0.MOD", without side effects."""
         value = int(self._library.emu_register(self._handle, name.encode()))
         if value == NO_REGISTER:
             raise KeyError(name)

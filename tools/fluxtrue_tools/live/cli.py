@@ -132,8 +132,11 @@ def _serve(session: Session, port: int) -> None:
 @click.option("--can-interface", help="python-can interface of a bench; without it a virtual ECU is started.")
 @click.option("--can-channel", default="can0", show_default=True)
 @click.option("--can-option", multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus.")
-@click.option("--bench", metavar="HOST:PORT",
-              help="Bench channel of the virtual ECU behind that interface: its plant, and with --fast its time.")
+@click.option(
+    "--bench",
+    metavar="HOST:PORT",
+    help="Bench channel of the virtual ECU behind that interface: its plant, and with --fast its time.",
+)
 @click.option("--in-step", is_flag=True, help="Simulated time waits until the pages have drawn it, for tests.")
 @click.option("--elf", type=paths.InputFile(),
               help="The bench's firmware image: its calibration values can then be tuned.")  # fmt: skip

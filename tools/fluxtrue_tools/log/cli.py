@@ -62,7 +62,9 @@ def _draw_panel(axis: Axes, signals: Signals, title: str, lines: dict[str, tuple
     for name, (label, look) in lines.items():
         if name in signals:
             axis.plot(*_line(signals[name]), label=label, **{"color": ESTIMATE, "linewidth": "1.0", **look})
-            axis.set_ylabel(f"{title.split()[-1].lower()}, {UNITS.get(unit := signals[name].attrs['unit'], unit)}")
+            axis.set_ylabel(
+                f"{title.rsplit(maxsplit=1)[-1].lower()}, {UNITS.get(unit := signals[name].attrs['unit'], unit)}"
+            )
     if axis.get_legend_handles_labels()[0]:
         axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     else:

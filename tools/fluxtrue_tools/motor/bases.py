@@ -70,18 +70,23 @@ def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
     l_min = inductance_min(model, config.machine.i_max_A)
     voltage_max = STEP_USE_MAX * l_min * current / period
     step_s = periods_per_step(config.inverter.pwm_hz) * period
-    omega_min = max(OMEGA_MIN_PER_PWM * config.inverter.pwm_hz, OMEGA_STEP_MIN / step_s,
-                    FLUX_USE_MIN * VOLTAGE_PER_VDC * config.inverter.vdc_V / psi_max)
+    omega_min = max(
+        OMEGA_MIN_PER_PWM * config.inverter.pwm_hz,
+        OMEGA_STEP_MIN / step_s,
+        FLUX_USE_MIN * VOLTAGE_PER_VDC * config.inverter.vdc_V / psi_max,
+    )
     for ratio in OMEGA_PER_OMEGA_MAX:
         omega = max(ratio * config.omega_max_rad_s, omega_min)
         voltage = _voltage(config, psi_max, omega)
         if voltage <= voltage_max:
             break
     else:
-        raise Unfit(f"incremental inductance {l_min:.3g} H is too small: "
-                    f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
-                    f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
-                    f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)")
+        raise Unfit(
+            f"incremental inductance {l_min:.3g} H is too small: "
+            f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
+            f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
+            f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)"
+        )
     impedance = voltage / current
     return Bases(
         voltage_V=voltage,

@@ -13,8 +13,12 @@ from fluxtrue_tools.outputs import Outputs
 
 def generate(motor: Motor) -> dict[str, str]:
     """Every file as text; refuses numbers that do not fit the firmware's formats."""
-    return {"motor_tables.c": motor_tables_c(motor), "motor_si.c": motor_si_c(motor),
-            "motor.json": motor_json(motor), "report.txt": report_text(motor)}
+    return {
+        "motor_tables.c": motor_tables_c(motor),
+        "motor_si.c": motor_si_c(motor),
+        "motor.json": motor_json(motor),
+        "report.txt": report_text(motor),
+    }
 
 
 def build(folder: Path, out: Path, report: bool) -> Motor:

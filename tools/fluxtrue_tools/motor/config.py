@@ -157,32 +157,36 @@ def _check_flux_source(machine: Machine) -> None:
     constants = {"ld_H": machine.ld_H, "lq_H": machine.lq_H, "psi_f_Vs": machine.psi_f_Vs}
     given = [key for key, value in constants.items() if value is not None]
     if machine.flux_map is not None and given:
-        _fail(f"machine.flux_map and machine.{given[0]}: give either flux_map or "
-              "ld_H, lq_H and psi_f_Vs, not both")
+        _fail(f"machine.flux_map and machine.{given[0]}: give either flux_map or ld_H, lq_H and psi_f_Vs, not both")
     if machine.flux_map is None and len(given) != len(constants):
         missing = next(key for key in constants if key not in given)
-        _fail(f"machine.{missing}: missing, give either flux_map or "
-              "all of ld_H, lq_H and psi_f_Vs")
+        _fail(f"machine.{missing}: missing, give either flux_map or all of ld_H, lq_H and psi_f_Vs")
 
 
 def _check_speed(config: MotorConfig) -> None:
     step = config.omega_max_rad_s / config.inverter.pwm_hz
     if step > ANGLE_PER_PERIOD_MAX:
         limit = ANGLE_PER_PERIOD_MAX * config.inverter.pwm_hz * 60 / (2 * math.pi * config.machine.pole_pairs)
-        _fail(f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
-              f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)")
+        _fail(
+            f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
+            f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)"
+        )
 
 
 def _check_currents(config: MotorConfig) -> None:
     full_scale, i_max = config.inverter.current_full_scale_A, config.machine.i_max_A
     if full_scale < FULL_SCALE_PER_I_MAX * i_max:
-        _fail(f"inverter.current_full_scale_A = {full_scale:g} A, allowed: from "
-              f"{FULL_SCALE_PER_I_MAX * i_max:g} A "
-              f"({FULL_SCALE_PER_I_MAX} * i_max_A: the over-current trip lies above i_max_A "
-              "and below 80 % of full scale)")
+        _fail(
+            f"inverter.current_full_scale_A = {full_scale:g} A, allowed: from "
+            f"{FULL_SCALE_PER_I_MAX * i_max:g} A "
+            f"({FULL_SCALE_PER_I_MAX} * i_max_A: the over-current trip lies above i_max_A "
+            "and below 80 % of full scale)"
+        )
     if full_scale > 20 * i_max:
-        _fail(f"inverter.current_full_scale_A = {full_scale:g} A, allowed: up to {20 * i_max:g} A "
-              "(20 * i_max_A: beyond it the measurement has no resolution left)")
+        _fail(
+            f"inverter.current_full_scale_A = {full_scale:g} A, allowed: up to {20 * i_max:g} A "
+            "(20 * i_max_A: beyond it the measurement has no resolution left)"
+        )
 
 
 def _check_inverter(config: MotorConfig) -> None:
@@ -192,19 +196,25 @@ def _check_inverter(config: MotorConfig) -> None:
         if value > limit:
             _fail(f"inverter.{key} = {value:g} s, allowed: up to {limit:g} s (10 % of the PWM period)")
     if config.v_dc_full_scale_V < 1.3 * inverter.vdc_V:
-        _fail(f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g} V, allowed: from "
-              f"{1.3 * inverter.vdc_V:g} V (1.3 * vdc_V: the over-voltage trip lies below it)")
+        _fail(
+            f"inverter.v_dc_full_scale_V = {config.v_dc_full_scale_V:g} V, allowed: from "
+            f"{1.3 * inverter.vdc_V:g} V (1.3 * vdc_V: the over-voltage trip lies below it)"
+        )
     if inverter.device_drop_V > 0.05 * inverter.vdc_V:
-        _fail(f"inverter.device_drop_V = {inverter.device_drop_V:g} V, allowed: up to "
-              f"{0.05 * inverter.vdc_V:g} V (5 % of vdc_V)")
+        _fail(
+            f"inverter.device_drop_V = {inverter.device_drop_V:g} V, allowed: up to "
+            f"{0.05 * inverter.vdc_V:g} V (5 % of vdc_V)"
+        )
 
 
 def _check_thermal(config: MotorConfig) -> None:
     for what in ("inverter", "winding"):
         derate, trip = (getattr(config.thermal, f"{what}_{key}_C") for key in ("derate", "trip"))
         if trip < derate + THERMAL_SPAN_MIN_K:
-            _fail(f"thermal.{what}_trip_C = {trip:g} °C, allowed: from {derate + THERMAL_SPAN_MIN_K:g} °C "
-                  f"({what}_derate_C + {THERMAL_SPAN_MIN_K:g}: torque falls along a line, not at once)")
+            _fail(
+                f"thermal.{what}_trip_C = {trip:g} °C, allowed: from {derate + THERMAL_SPAN_MIN_K:g} °C "
+                f"({what}_derate_C + {THERMAL_SPAN_MIN_K:g}: torque falls along a line, not at once)"
+            )
 
 
 def _check_bandwidth(config: MotorConfig) -> None:
@@ -218,8 +228,10 @@ def _check_drop(config: MotorConfig) -> None:
     drop, limit = machine.r_ohm * machine.i_max_A, 0.3 * config.inverter.vdc_V
     if drop > limit:
         slip = f"; as mΩ it would be {machine.r_ohm / 1000:g} Ω" if drop / 1000 <= limit else ""
-        _fail(f"machine.r_ohm = {machine.r_ohm:g} Ω drops {drop:.3g} V at i_max_A, allowed: up to "
-              f"{limit:.3g} V (30 % of vdc_V), here {strict.down(limit / machine.i_max_A):g} Ω{slip}")
+        _fail(
+            f"machine.r_ohm = {machine.r_ohm:g} Ω drops {drop:.3g} V at i_max_A, allowed: up to "
+            f"{limit:.3g} V (30 % of vdc_V), here {strict.down(limit / machine.i_max_A):g} Ω{slip}"
+        )
 
 
 def _check_magnet(config: MotorConfig) -> None:

@@ -141,8 +141,12 @@ class Derived:
 def _current_control(period_s: float) -> dict[str, float]:
     sigma = 1.0 / (2.0 * DELAY_PERIODS * period_s)
     w_c, a = CLOSED_LOOP_SHARE * sigma, (1.0 - CLOSED_LOOP_SHARE) * sigma
-    return {"sigma_rad_s": sigma, "setpoint_weight": w_c / (w_c + a),
-            "integral_ratio": w_c * a * period_s / sigma, "v_ratio": V_RATIO_CONTROL}
+    return {
+        "sigma_rad_s": sigma,
+        "setpoint_weight": w_c / (w_c + a),
+        "integral_ratio": w_c * a * period_s / sigma,
+        "v_ratio": V_RATIO_CONTROL,
+    }
 
 
 def _modulation(config: MotorConfig) -> dict[str, float]:
@@ -153,10 +157,12 @@ def _modulation(config: MotorConfig) -> dict[str, float]:
     min_pulse = config.min_pulse_s * inverter.pwm_hz
     # Inside this circle no pulse can be too short, with the whole dead time on top: (MO-11).
     clear = (1.0 - 2.0 * (min_pulse + duty * max(1.0, config.control.dead_time_compensation))) / math.sqrt(3.0)
-    return {"dead_time_duty": duty * config.control.dead_time_compensation,
-            "knee_A": KNEE_LSB * lsb_A,
-            "min_pulse_duty": min_pulse,
-            "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0)}
+    return {
+        "dead_time_duty": duty * config.control.dead_time_compensation,
+        "knee_A": KNEE_LSB * lsb_A,
+        "min_pulse_duty": min_pulse,
+        "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0),
+    }
 
 
 def _identification(config: MotorConfig, model: FluxModel, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
@@ -169,8 +175,11 @@ def _identification(config: MotorConfig, model: FluxModel, bases: Bases, psi_f_V
     v_dead = 4.0 / math.pi * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz
     looks_like = DEAD_TIME_RESIDUAL * v_dead / (DEAD_TIME_CURRENT * machine.i_max_A)
     return {
-        "observer_s_rad_s": s, "flux_proportional": periods, "resistance_proportional": periods,
-        "psi_delta_min_Vs": PSI_DELTA_MIN * psi_f_Vs, "psi_delta_max_Vs": PSI_DELTA_MAX * psi_f_Vs,
+        "observer_s_rad_s": s,
+        "flux_proportional": periods,
+        "resistance_proportional": periods,
+        "psi_delta_min_Vs": PSI_DELTA_MIN * psi_f_Vs,
+        "psi_delta_max_Vs": PSI_DELTA_MAX * psi_f_Vs,
         "r_delta_min_ohm": R_DELTA_MIN * machine.r_ohm,
         "r_delta_max_ohm": R_DELTA_MAX * machine.r_ohm + looks_like,
         "omega_min_rad_s": min(OMEGA_MIN_RAD_S, OMEGA_MIN_SHARE * config.omega_max_rad_s),
@@ -190,16 +199,23 @@ def steps(seconds: float, step_s: float) -> int:
 def _torque_loop(config: MotorConfig, step_s: float) -> dict[str, float]:
     control = config.control
     missing_s = LOOP_MISSING_PERIODS / config.inverter.pwm_hz + STEP_MISSING_S
-    return {"torque_ki": control.torque_loop_bandwidth_rad_s * step_s, "torque_kp": 0.0,
-            "torque_model_rate": step_s / (step_s + missing_s),
-            "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
-            "torque_slew_Nm": config.torque_slew_Nm_per_s * step_s}
+    return {
+        "torque_ki": control.torque_loop_bandwidth_rad_s * step_s,
+        "torque_kp": 0.0,
+        "torque_model_rate": step_s / (step_s + missing_s),
+        "torque_min_Nm": TORQUE_MIN_SHARE * config.machine.torque_max_Nm,
+        "torque_slew_Nm": config.torque_slew_Nm_per_s * step_s,
+    }
 
 
 def _voltage_reserve(config: MotorConfig, step_s: float) -> dict[str, float]:
     planned = V_RATIO_REFERENCE * config.inverter.vdc_V
-    return {"ref_v_ratio": V_RATIO_REFERENCE, "trim_gain": TRIM_RATE_RAD_S * step_s,
-            "trim_min_V": TRIM_MIN_SHARE * planned, "trim_max_V": TRIM_MAX_SHARE * planned}
+    return {
+        "ref_v_ratio": V_RATIO_REFERENCE,
+        "trim_gain": TRIM_RATE_RAD_S * step_s,
+        "trim_min_V": TRIM_MIN_SHARE * planned,
+        "trim_max_V": TRIM_MAX_SHARE * planned,
+    }
 
 
 def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[str, float]:
@@ -210,38 +226,53 @@ def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[st
         "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
         "loss_rate": 1.0 - math.exp(-bases.step_s / LOSS_TIME_S),
         "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
-        "moving_end_rad_s": MOVING_SHARES[0] * omega, "moving_start_rad_s": MOVING_SHARES[1] * omega,
-        "inverter_end_C": thermal.inverter_trip_C, "inverter_start_C": thermal.inverter_derate_C,
-        "winding_end_C": thermal.winding_trip_C, "winding_start_C": thermal.winding_derate_C,
-        "dc_low_end_V": DC_LOW_PER_VDC[0] * vdc, "dc_low_start_V": DC_LOW_PER_VDC[1] * vdc,
-        "dc_high_end_V": DC_HIGH_PER_VDC[0] * vdc, "dc_high_start_V": DC_HIGH_PER_VDC[1] * vdc,
+        "moving_end_rad_s": MOVING_SHARES[0] * omega,
+        "moving_start_rad_s": MOVING_SHARES[1] * omega,
+        "inverter_end_C": thermal.inverter_trip_C,
+        "inverter_start_C": thermal.inverter_derate_C,
+        "winding_end_C": thermal.winding_trip_C,
+        "winding_start_C": thermal.winding_derate_C,
+        "dc_low_end_V": DC_LOW_PER_VDC[0] * vdc,
+        "dc_low_start_V": DC_LOW_PER_VDC[1] * vdc,
+        "dc_high_end_V": DC_HIGH_PER_VDC[0] * vdc,
+        "dc_high_start_V": DC_HIGH_PER_VDC[1] * vdc,
         "speed_end_rad_s": (1.0 + SPEED_END * reserve) * omega,
         "speed_start_rad_s": (1.0 + SPEED_START * reserve) * omega,
         "i_d_20_A": magnet.i_d_demag_A or config.machine.i_max_A,
         "i_d_slope_A_per_K": magnet.i_d_demag_A_per_K if magnet.i_d_demag_A else 0.0,
-        "psi_temp_coeff_per_K": magnet.psi_temp_coeff_per_K, "magnet_assumed_C": magnet.assumed_C,
+        "psi_temp_coeff_per_K": magnet.psi_temp_coeff_per_K,
+        "magnet_assumed_C": magnet.assumed_C,
     }
 
 
 def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
     machine, omega = config.machine, config.omega_max_rad_s
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
-    return {"deviation_A": DEVIATION_SHARE * machine.i_max_A, "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
-            "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
-            "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
-            "monitor_torque_Nm": max(min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm),
-                                     TORQUE_MONITOR_SHARE * machine.torque_max_Nm),
-            "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
-            "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
-            "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S)}
+    return {
+        "deviation_A": DEVIATION_SHARE * machine.i_max_A,
+        "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
+        "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
+        "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
+        "monitor_torque_Nm": max(
+            min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm), TORQUE_MONITOR_SHARE * machine.torque_max_Nm
+        ),
+        "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
+        "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
+        "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
+    }
 
 
 def _monitors(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
-    return {"i_trip_A": config.i_trip_A, "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
-            "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
-            "share_short": SHARE_SHORT, "share_open": SHARE_OPEN, "v_release_V": V_RELEASE_PER_VDC * inverter.vdc_V,
-            "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A}
+    return {
+        "i_trip_A": config.i_trip_A,
+        "v_max_V": V_MAX_PER_VDC * inverter.vdc_V,
+        "v_min_V": V_MIN_PER_VDC * inverter.vdc_V,
+        "share_short": SHARE_SHORT,
+        "share_open": SHARE_OPEN,
+        "v_release_V": V_RELEASE_PER_VDC * inverter.vdc_V,
+        "sum_max_A": SUM_MAX_PER_FULL_SCALE * inverter.current_full_scale_A,
+    }
 
 
 def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:

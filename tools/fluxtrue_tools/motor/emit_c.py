@@ -77,9 +77,11 @@ def _struct(rows: Sequence[Row], indent: str) -> list[str]:
 
 
 def _head(motor: Motor, include: str) -> str:
-    return (f"/* SPDX-License-Identifier: Apache-2.0 */\n"
-            f"/* Motor '{motor.config.machine.name}'. Generated from motor.toml by `tools/fluxtrue motor build`; "
-            f"do not edit. */\n#include \"{include}\"\n")
+    return (
+        f"/* SPDX-License-Identifier: Apache-2.0 */\n"
+        f"/* Motor '{motor.config.machine.name}'. Generated from motor.toml by `tools/fluxtrue motor build`; "
+        f'do not edit. */\n#include "{include}"\n'
+    )
 
 
 def _bases(bases: Bases) -> list[Row]:
@@ -96,21 +98,29 @@ def _measure(motor: Motor) -> list[Row]:
     # Mid scale stays exactly no current; half an LSB of alpha, which takes twice phase a.
     bias = -scale << 15 - shift
     phases = [(scale, bias + 2048), (-scale, -bias), (-scale, -bias)]
-    return [("phase", "{" + ", ".join(f"{{{s}, {b}}}" for s, b in phases) + "}",
-             f"a third of gain 1.0 in Q13, times 2^{shift}; -32768 counts of it"),
-            ("v_dc", f"{{{gain}, 16384}}", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}")]
+    return [
+        (
+            "phase",
+            "{" + ", ".join(f"{{{s}, {b}}}" for s, b in phases) + "}",
+            f"a third of gain 1.0 in Q13, times 2^{shift}; -32768 counts of it",
+        ),
+        ("v_dc", f"{{{gain}, 16384}}", f"{motor.config.v_dc_full_scale_V:g} V full scale in Q14, times 2^{shift}"),
+    ]
 
 
 def _tracker(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     w_ts = d.tracker_bandwidth_rad_s * b.period_s
     to_pu = math.pi / (b.omega_rad_s * b.period_s)
-    return [("pole_pairs", f"{motor.config.machine.pole_pairs}u", ""), ("offset", "0u", ""),
-            ("kp", q31(2 * w_ts, "tracker kp"), f"2 w_n T_s, w_n = {d.tracker_bandwidth_rad_s:g} rad/s"),
-            ("ki_q29", q31(w_ts**2 * 2 * to_pu / 4, "tracker ki"), "(w_n T_s)^2 2 pi/(omega_b T_s)"),
-            ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
-            ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
-            ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn")]
+    return [
+        ("pole_pairs", f"{motor.config.machine.pole_pairs}u", ""),
+        ("offset", "0u", ""),
+        ("kp", q31(2 * w_ts, "tracker kp"), f"2 w_n T_s, w_n = {d.tracker_bandwidth_rad_s:g} rad/s"),
+        ("ki_q29", q31(w_ts**2 * 2 * to_pu / 4, "tracker ki"), "(w_n T_s)^2 2 pi/(omega_b T_s)"),
+        ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
+        ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
+        ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn"),
+    ]
 
 
 def _harmonics(motor: Motor) -> list[Row]:
@@ -119,31 +129,45 @@ def _harmonics(motor: Motor) -> list[Row]:
 
 
 def _grid(x0: int, y0: int, shift: int, shape: tuple[int, ...]) -> list[Row]:
-    return [("x0", x0, ""), ("y0", y0, ""), ("x_shift", f"{shift}u", ""), ("y_shift", f"{shift}u", ""),
-            ("nx", f"{shape[0]}u", ""), ("ny", f"{shape[1]}u", "")]
+    return [
+        ("x0", x0, ""),
+        ("y0", y0, ""),
+        ("x_shift", f"{shift}u", ""),
+        ("y_shift", f"{shift}u", ""),
+        ("nx", f"{shape[0]}u", ""),
+        ("ny", f"{shape[1]}u", ""),
+    ]
 
 
 def _flux_table(motor: Motor) -> list[Row]:
     tables = motor.tables
     names = ("l_d", "l_q", "l_qq", "g", "psi_f0")
     nx, ny = tables.l_d_H.shape
-    return [("mesh", f"FX_MESH({tables.x0}, {tables.shift}u, {nx}u, {ny}u)", ""),
-            ("l_shift", f"{tables.l_shift}u", ""), ("i_scale", 8 << tables.l_shift, ""),
-            *((name, f"table_{name}", "") for name in names)]
+    return [
+        ("mesh", f"FX_MESH({tables.x0}, {tables.shift}u, {nx}u, {ny}u)", ""),
+        ("l_shift", f"{tables.l_shift}u", ""),
+        ("i_scale", 8 << tables.l_shift, ""),
+        *((name, f"table_{name}", "") for name in names),
+    ]
 
 
 def _current_control(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     sigma = d.sigma_rad_s / b.omega_rad_s
     r_pu = motor.config.machine.r_ohm / b.resistance_ohm
-    return [("sigma_q24", q31(sigma / 128, "sigma"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
-            ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
-            ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
-            ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
-            ("tracking_gain_q34", q31(8 * d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
-             "integral ratio over weight, times v_ratio"),
-            ("per_ratio_q31", f"{round(2**31 / d.v_ratio)}u", f"1/{d.v_ratio:.6g}"),
-            ("clear_q30", f"{round(2**30 * (d.v_clear / d.v_ratio) ** 2)}u", f"({d.v_clear:.6g} over v_ratio) squared")]
+    return [
+        ("sigma_q24", q31(sigma / 128, "sigma"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
+        ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
+        ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
+        ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
+        (
+            "tracking_gain_q34",
+            q31(8 * d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
+            "integral ratio over weight, times v_ratio",
+        ),
+        ("per_ratio_q31", f"{round(2**31 / d.v_ratio)}u", f"1/{d.v_ratio:.6g}"),
+        ("clear_q30", f"{round(2**30 * (d.v_clear / d.v_ratio) ** 2)}u", f"({d.v_clear:.6g} over v_ratio) squared"),
+    ]
 
 
 def _modulate(motor: Motor) -> list[Row]:
@@ -151,13 +175,15 @@ def _modulate(motor: Motor) -> list[Row]:
     min_pulse = q15(d.min_pulse_duty, "min_pulse")
     # Twice the q15 number that commissioning moves.
     dead_time = 2 * q15(d.dead_time_duty, "dead_time")
-    return [("alpha_q31", q31(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
-            ("side_q31", q31(math.sqrt(0.75) * d.v_ratio, "v_ratio"), "times sqrt(3)/2"),
-            ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
-            ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_gain"), "times sqrt(3)/2"),
-            ("dead_time_q16", dead_time, f"{d.dead_time_duty:.6g} duty"),
-            ("longest_q31", (1 << 30) - 65536 * min_pulse, f"half a duty less {d.min_pulse_duty:.6g}"),
-            ("nearer_rail_q31", (1 << 30) - 32768 * min_pulse, "less half of that")]
+    return [
+        ("alpha_q31", q31(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
+        ("side_q31", q31(math.sqrt(0.75) * d.v_ratio, "v_ratio"), "times sqrt(3)/2"),
+        ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
+        ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_gain"), "times sqrt(3)/2"),
+        ("dead_time_q16", dead_time, f"{d.dead_time_duty:.6g} duty"),
+        ("longest_q31", (1 << 30) - 65536 * min_pulse, f"half a duty less {d.min_pulse_duty:.6g}"),
+        ("nearer_rail_q31", (1 << 30) - 32768 * min_pulse, "less half of that"),
+    ]
 
 
 def _mrai_gains(motor: Motor) -> list[Row]:
@@ -167,14 +193,26 @@ def _mrai_gains(motor: Motor) -> list[Row]:
         ("r0", q31(r0, "r0"), "R at 20 C"),
         ("pole_gain", q31(4 * control.observer_m * r0, "pole_gain"), f"4 m R_0, m = {control.observer_m:g}"),
         ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
-        ("flux_gain", q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
-         f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s"),
-        ("resistance_gain", q31(2 * control.resistance_bandwidth_rad_s / b.omega_rad_s, "resistance_gain"),
-         f"2 k_r/omega_b, k_r = {control.resistance_bandwidth_rad_s:g} rad/s"),
-        ("flux_proportional_q24", q31(d.flux_proportional / 128, "flux_proportional"),
-         f"{d.flux_proportional:.6g} periods"),
-        ("resistance_proportional_q24", q31(d.resistance_proportional / 128, "resistance_proportional"),
-         f"{d.resistance_proportional:.6g} periods"),
+        (
+            "flux_gain",
+            q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
+            f"2 k_psi/omega_b, k_psi = {control.flux_bandwidth_rad_s:g} rad/s",
+        ),
+        (
+            "resistance_gain",
+            q31(2 * control.resistance_bandwidth_rad_s / b.omega_rad_s, "resistance_gain"),
+            f"2 k_r/omega_b, k_r = {control.resistance_bandwidth_rad_s:g} rad/s",
+        ),
+        (
+            "flux_proportional_q24",
+            q31(d.flux_proportional / 128, "flux_proportional"),
+            f"{d.flux_proportional:.6g} periods",
+        ),
+        (
+            "resistance_proportional_q24",
+            q31(d.resistance_proportional / 128, "resistance_proportional"),
+            f"{d.resistance_proportional:.6g} periods",
+        ),
     ]
 
 
@@ -197,78 +235,98 @@ def _mrai_limits(motor: Motor) -> list[Row]:
 
 def _torque_loop(motor: Motor) -> list[Row]:
     d, control = motor.derived, motor.config.control
-    return [("ki", q15(d.torque_ki, "torque ki"), f"{control.torque_loop_bandwidth_rad_s:g} rad/s"),
-            ("kp", q15(d.torque_kp, "torque kp"), ""),
-            ("model_rate", q15(d.torque_model_rate, "model_rate"), f"{d.torque_model_rate:g}"),
-            ("authority", q15(control.torque_authority, "authority"), f"{control.torque_authority:g}"),
-            ("torque_min", q15(d.torque_min_Nm / motor.bases.torque_Nm, "torque_min"), f"{d.torque_min_Nm:.6g} N·m")]
+    return [
+        ("ki", q15(d.torque_ki, "torque ki"), f"{control.torque_loop_bandwidth_rad_s:g} rad/s"),
+        ("kp", q15(d.torque_kp, "torque kp"), ""),
+        ("model_rate", q15(d.torque_model_rate, "model_rate"), f"{d.torque_model_rate:g}"),
+        ("authority", q15(control.torque_authority, "authority"), f"{control.torque_authority:g}"),
+        ("torque_min", q15(d.torque_min_Nm / motor.bases.torque_Nm, "torque_min"), f"{d.torque_min_Nm:.6g} N·m"),
+    ]
 
 
 def _current_reference(motor: Motor) -> list[Row]:
     refs, b = motor.references, motor.bases
-    lut: list[Row] = [("y", "table_ref_torque_max", ""), ("x0", refs.y0, ""), ("shift", f"{refs.shift}u", ""),
-                      ("n", f"{len(refs.psi_Vs)}u", "")]
-    return [("grid", _grid(0, refs.y0, refs.shift, refs.id_A.shape), ""),
-            ("i_d", "table_ref_i_d", ""), ("i_q", "table_ref_i_q", ""), ("torque_max", lut, ""),
-            ("v_ratio", q15(motor.derived.ref_v_ratio, "ref v_ratio"), f"{motor.derived.ref_v_ratio:.6g}"),
-            ("r_pu", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r_pu"), "R at 20 C"),
-            ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"),
-             f"{motor.config.machine.i_max_A:g} A")]
+    lut: list[Row] = [
+        ("y", "table_ref_torque_max", ""),
+        ("x0", refs.y0, ""),
+        ("shift", f"{refs.shift}u", ""),
+        ("n", f"{len(refs.psi_Vs)}u", ""),
+    ]
+    return [
+        ("grid", _grid(0, refs.y0, refs.shift, refs.id_A.shape), ""),
+        ("i_d", "table_ref_i_d", ""),
+        ("i_q", "table_ref_i_q", ""),
+        ("torque_max", lut, ""),
+        ("v_ratio", q15(motor.derived.ref_v_ratio, "ref v_ratio"), f"{motor.derived.ref_v_ratio:.6g}"),
+        ("r_pu", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r_pu"), "R at 20 C"),
+        ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), f"{motor.config.machine.i_max_A:g} A"),
+    ]
 
 
 def _voltage_reserve(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    return [("v_ratio", q15(d.ref_v_ratio, "ref v_ratio"), f"{d.ref_v_ratio:.6g}"),
-            ("gain", q15(d.trim_gain, "trim gain"), f"{d.trim_gain:g} per task"),
-            ("trim_min", q15(d.trim_min_V / b.voltage_V, "trim_min"), f"{d.trim_min_V:.6g} V"),
-            ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V")]
+    return [
+        ("v_ratio", q15(d.ref_v_ratio, "ref v_ratio"), f"{d.ref_v_ratio:.6g}"),
+        ("gain", q15(d.trim_gain, "trim gain"), f"{d.trim_gain:g} per task"),
+        ("trim_min", q15(d.trim_min_V / b.voltage_V, "trim_min"), f"{d.trim_min_V:.6g} V"),
+        ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V"),
+    ]
 
 
 def _line(end: float, start: float, per_count: float, name: str) -> list[Row]:
     """derating_line_t: 2^31 over the counts from no torque to all of it."""
     zero, one = round(end / per_count), round(start / per_count)
     if abs(one - zero) < 2:
-        raise Unfit(f"between {end:.3g} and {start:.3g} (SI units, {name}) the firmware has no two steps of "
-                    f"{per_count:.3g}")
-    return [("end", q15(zero / Q15_ONE, name), f"{end:.6g}, all from {start:.6g} on"),
-            ("gain", q16(Q15_ONE / (one - zero), name), "")]
+        raise Unfit(
+            f"between {end:.3g} and {start:.3g} (SI units, {name}) the firmware has no two steps of {per_count:.3g}"
+        )
+    return [
+        ("end", q15(zero / Q15_ONE, name), f"{end:.6g}, all from {start:.6g} on"),
+        ("gain", q16(Q15_ONE / (one - zero), name), ""),
+    ]
 
 
 def _torque_limit(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     volt, speed, tenth = b.voltage_V / Q15_ONE, b.omega_rad_s / Q15_ONE, 0.1
-    return [("torque_max", q15(motor.config.machine.torque_max_Nm / b.torque_Nm, "torque_max"), ""),
-            ("drop", q15(d.loss_drop_V / b.voltage_V, "drop"), f"{d.loss_drop_V:g} V"),
-            ("loss_rate", q15(d.loss_rate, "loss_rate"), f"{d.loss_rate:.6g}"),
-            ("moving", _line(d.moving_end_rad_s, d.moving_start_rad_s, speed, "moving"), ""),
-            ("inverter", _line(d.inverter_end_C, d.inverter_start_C, tenth, "inverter_trip_C"), ""),
-            ("winding", _line(d.winding_end_C, d.winding_start_C, tenth, "winding_trip_C"), ""),
-            ("dc_low", _line(d.dc_low_end_V, d.dc_low_start_V, volt, "dc_low"), ""),
-            ("dc_high", _line(d.dc_high_end_V, d.dc_high_start_V, volt, "dc_high"), ""),
-            ("speed", _line(d.speed_end_rad_s, d.speed_start_rad_s, speed, "speed"), "")]
+    return [
+        ("torque_max", q15(motor.config.machine.torque_max_Nm / b.torque_Nm, "torque_max"), ""),
+        ("drop", q15(d.loss_drop_V / b.voltage_V, "drop"), f"{d.loss_drop_V:g} V"),
+        ("loss_rate", q15(d.loss_rate, "loss_rate"), f"{d.loss_rate:.6g}"),
+        ("moving", _line(d.moving_end_rad_s, d.moving_start_rad_s, speed, "moving"), ""),
+        ("inverter", _line(d.inverter_end_C, d.inverter_start_C, tenth, "inverter_trip_C"), ""),
+        ("winding", _line(d.winding_end_C, d.winding_start_C, tenth, "winding_trip_C"), ""),
+        ("dc_low", _line(d.dc_low_end_V, d.dc_low_start_V, volt, "dc_low"), ""),
+        ("dc_high", _line(d.dc_high_end_V, d.dc_high_start_V, volt, "dc_high"), ""),
+        ("speed", _line(d.speed_end_rad_s, d.speed_start_rad_s, speed, "speed"), ""),
+    ]
 
 
 def _i_d_limit(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     slope = d.i_d_slope_A_per_K / 10.0 / b.current_A * Q15_ONE
     per_psi = 10.0 / (d.psi_f_Vs * d.psi_temp_coeff_per_K) * b.flux_Vs / Q15_ONE
-    return [("i_20", str(round(d.i_d_20_A / b.current_A * Q15_ONE)), f"{d.i_d_20_A:g} A"),
-            ("slope", q16(slope, "i_d_demag_A_per_K"), f"{d.i_d_slope_A_per_K:g} A/K"),
-            ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), ""),
-            ("dC_per_psi", q16(per_psi, "psi_temp_coeff_per_K"), f"{d.psi_temp_coeff_per_K:g} of psi_f per K"),
-            ("assumed_dC", str(round(10 * d.magnet_assumed_C)), "without a winding temperature")]
+    return [
+        ("i_20", str(round(d.i_d_20_A / b.current_A * Q15_ONE)), f"{d.i_d_20_A:g} A"),
+        ("slope", q16(slope, "i_d_demag_A_per_K"), f"{d.i_d_slope_A_per_K:g} A/K"),
+        ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), ""),
+        ("dC_per_psi", q16(per_psi, "psi_temp_coeff_per_K"), f"{d.psi_temp_coeff_per_K:g} of psi_f per K"),
+        ("assumed_dC", str(round(10 * d.magnet_assumed_C)), "without a winding temperature"),
+    ]
 
 
 def _monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     quiet = max(d.i_trip_A - d.sum_max_A / 3, 0.0) / b.current_A * 0.999  # less the roundings on the way
     sum_max = q15(d.sum_max_A / b.current_A, "sum_max")
-    return [("i_normal_squared_q30", q31(quiet**2 / 2, "i_normal_squared"), f"({quiet * b.current_A:.6g} A)^2"),
-            ("zero_max", sum_max // 3, "a third of sum_max"),
-            ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
-            ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
-            ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
-            ("sum_max", sum_max, f"{d.sum_max_A:g} A")]
+    return [
+        ("i_normal_squared_q30", q31(quiet**2 / 2, "i_normal_squared"), f"({quiet * b.current_A:.6g} A)^2"),
+        ("zero_max", sum_max // 3, "a third of sum_max"),
+        ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
+        ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
+        ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
+        ("sum_max", sum_max, f"{d.sum_max_A:g} A"),
+    ]
 
 
 def _counts(bases: Bases, **seconds: float) -> list[Row]:
@@ -279,43 +337,51 @@ def _counts(bases: Bases, **seconds: float) -> list[Row]:
 def _commission(motor: Motor) -> list[Row]:
     b = motor.bases
     periods = steps(COMMISSION_MEASURE_S, b.step_s) * b.periods_per_step
-    return [("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), f"{motor.config.machine.i_max_A:g} A"),
-            ("omega_max", q31(STANDSTILL_SHARE, "standstill"), "of omega_b"),
-            *_counts(b, settle=COMMISSION_SETTLE_S, measure=COMMISSION_MEASURE_S),
-            ("periods_per_step", f"{b.periods_per_step}", ""),
-            ("mean_gain_q31", str(round(2**31 / periods)), f"1/{periods}: a sum to its mean")]
+    return [
+        ("i_max", q15(motor.config.machine.i_max_A / b.current_A, "i_max"), f"{motor.config.machine.i_max_A:g} A"),
+        ("omega_max", q31(STANDSTILL_SHARE, "standstill"), "of omega_b"),
+        *_counts(b, settle=COMMISSION_SETTLE_S, measure=COMMISSION_MEASURE_S),
+        ("periods_per_step", f"{b.periods_per_step}", ""),
+        ("mean_gain_q31", str(round(2**31 / periods)), f"1/{periods}: a sum to its mean"),
+    ]
 
 
 def _plausibility(motor: Motor) -> list[Row]:
     d, b, thermal = motor.derived, motor.bases, motor.config.thermal
-    return [("e_0", q15(d.deviation_A / b.current_A, "deviation"), f"{d.deviation_A:g} A"),
-            ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
-            ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
-            ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
-            ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
-            ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
-            *_counts(b, deviation=DEVIATION_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S)]
+    return [
+        ("e_0", q15(d.deviation_A / b.current_A, "deviation"), f"{d.deviation_A:g} A"),
+        ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
+        ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
+        ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
+        ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
+        ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
+        *_counts(b, deviation=DEVIATION_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S),
+    ]
 
 
 def _torque_monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     rate = 1.0 / (b.omega_rad_s * b.step_s)
-    return [("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
-            ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
-            ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
-            ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
-            ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
-            ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
-            ("mean_rate", q15(d.monitor_mean_rate, "mean_rate"), f"{d.monitor_mean_rate:.6g}"),
-            *_counts(b, torque=TORQUE_S, angle=ANGLE_S, settle=SETTLE_S)]
+    return [
+        ("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
+        ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+        ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
+        ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
+        ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
+        ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
+        ("mean_rate", q15(d.monitor_mean_rate, "mean_rate"), f"{d.monitor_mean_rate:.6g}"),
+        *_counts(b, torque=TORQUE_S, angle=ANGLE_S, settle=SETTLE_S),
+    ]
 
 
 def _safe_state(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    return [("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
-            ("share_short", q15(d.share_short, "share_short"), f"{d.share_short:g}"),
-            ("share_open", q15(d.share_open, "share_open"), f"{d.share_open:g}"),
-            ("v_release", q15(d.v_release_V / b.voltage_V, "v_release"), f"{d.v_release_V:g} V")]
+    return [
+        ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
+        ("share_short", q15(d.share_short, "share_short"), f"{d.share_short:g}"),
+        ("share_open", q15(d.share_open, "share_open"), f"{d.share_open:g}"),
+        ("v_release", q15(d.v_release_V / b.voltage_V, "v_release"), f"{d.v_release_V:g} V"),
+    ]
 
 
 def _torque_slew(motor: Motor) -> tuple[str, str]:
@@ -328,7 +394,8 @@ def _torque_slew(motor: Motor) -> tuple[str, str]:
 def _motor(motor: Motor) -> list[Row]:
     machine, inverter, b = motor.config.machine, motor.config.inverter, motor.bases
     return [
-        ("name", f'"{machine.name}"', ""), ("bases", _bases(b), ""),
+        ("name", f'"{machine.name}"', ""),
+        ("bases", _bases(b), ""),
         ("adc_bits", f"{inverter.adc_bits}u", ""),
         ("trim_steps", f"{steps(TRIM_S, b.step_s)}u", f"{TRIM_S:g} s"),
         ("current_full_scale_A", _float(inverter.current_full_scale_A), ""),
@@ -341,15 +408,22 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_slew", *_torque_slew(motor)),
         ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
         ("psi_weak", q15(min(motor.derived.psi_weak_Vs / b.flux_Vs, 1.0 - 1.0 / Q15_ONE), "psi_weak"), ""),
-        ("measure", _measure(motor), ""), ("angle_tracker", _tracker(motor), ""),
+        ("measure", _measure(motor), ""),
+        ("angle_tracker", _tracker(motor), ""),
         ("angle_harmonics", _harmonics(motor), ""),
-        ("flux_table", _flux_table(motor), ""), ("current_control", _current_control(motor), ""),
-        ("modulate", _modulate(motor), ""), ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
+        ("flux_table", _flux_table(motor), ""),
+        ("current_control", _current_control(motor), ""),
+        ("modulate", _modulate(motor), ""),
+        ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
-        ("torque_loop", _torque_loop(motor), ""), ("current_reference", _current_reference(motor), ""),
-        ("voltage_reserve", _voltage_reserve(motor), ""), ("torque_limit", _torque_limit(motor), ""),
-        ("i_d_limit", _i_d_limit(motor), ""), ("monitor", _monitor(motor), ""),
-        ("safe_state", _safe_state(motor), ""), ("plausibility", _plausibility(motor), ""),
+        ("torque_loop", _torque_loop(motor), ""),
+        ("current_reference", _current_reference(motor), ""),
+        ("voltage_reserve", _voltage_reserve(motor), ""),
+        ("torque_limit", _torque_limit(motor), ""),
+        ("i_d_limit", _i_d_limit(motor), ""),
+        ("monitor", _monitor(motor), ""),
+        ("safe_state", _safe_state(motor), ""),
+        ("plausibility", _plausibility(motor), ""),
         ("torque_monitor", _torque_monitor(motor), ""),
         ("commission", _commission(motor), ""),
     ]
@@ -360,25 +434,34 @@ def _q15_tables(motor: Motor) -> list[str]:
     l_unit = f"{b.inductance_H * 2**tables.l_shift / Q15_ONE:.6g} H per count"
     psi_unit = f"{b.flux_Vs / Q15_ONE:.6g} Vs per count"
     i_unit = f"{b.current_A / Q15_ONE:.6g} A per count"
-    grid = (f"rows i_d = {tables.id_A[0]:g} ... {tables.id_A[-1]:g} A, columns |i_q| = 0 ... {tables.iq_A[-1]:g} A, "
-            f"every {tables.iq_A[1]:g} A")
-    comments = {"l_d": f"apparent L_d, {l_unit}", "l_q": f"apparent L_q, {l_unit}",
-                "l_qq": f"incremental L_q, {l_unit}",
-                "g": "omega_b T_s/2 (1/l_dd + 1/l_qq), 2^-15 per count",
-                "psi_f0": f"psi_d at i_d = 0, {psi_unit}"}
+    grid = (
+        f"rows i_d = {tables.id_A[0]:g} ... {tables.id_A[-1]:g} A, columns |i_q| = 0 ... {tables.iq_A[-1]:g} A, "
+        f"every {tables.iq_A[1]:g} A"
+    )
+    comments = {
+        "l_d": f"apparent L_d, {l_unit}",
+        "l_q": f"apparent L_q, {l_unit}",
+        "l_qq": f"incremental L_q, {l_unit}",
+        "g": "omega_b T_s/2 (1/l_dd + 1/l_qq), 2^-15 per count",
+        "psi_f0": f"psi_d at i_d = 0, {psi_unit}",
+    }
     out = [f"/* Flux tables: {grid}. */\n"]
     # psi_f0 depends on i_q alone: one row of it is enough.
     rows = {name: values[:1] if name == "psi_f0" else values for name, values in tables.stored.items()}
-    out += [_table("int16_t", f"table_{name}", rows[name], text)
-            for name, text in comments.items()]
-    out.append(f"/* Current references: rows |T| = 0 ... {refs.torque_Nm[-1]:.6g} N·m "
-               f"every {refs.torque_Nm[1]:.6g} N·m, columns\n"
-               f" * available flux {refs.psi_Vs[0]:.6g} ... {refs.psi_Vs[-1]:.6g} Vs every "
-               f"{refs.psi_Vs[1] - refs.psi_Vs[0]:.6g} Vs. */\n")
+    out += [_table("int16_t", f"table_{name}", rows[name], text) for name, text in comments.items()]
+    out.append(
+        f"/* Current references: rows |T| = 0 ... {refs.torque_Nm[-1]:.6g} N·m "
+        f"every {refs.torque_Nm[1]:.6g} N·m, columns\n"
+        f" * available flux {refs.psi_Vs[0]:.6g} ... {refs.psi_Vs[-1]:.6g} Vs every "
+        f"{refs.psi_Vs[1] - refs.psi_Vs[0]:.6g} Vs. */\n"
+    )
     out.append(_table("int16_t", "table_ref_i_d", refs.stored["i_d"], i_unit))
     out.append(_table("int16_t", "table_ref_i_q", refs.stored["i_q"], i_unit))
-    out.append(_table("int16_t", "table_ref_torque_max", refs.stored["torque_max"],
-                      f"{b.torque_Nm / Q15_ONE:.6g} N·m per count"))
+    out.append(
+        _table(
+            "int16_t", "table_ref_torque_max", refs.stored["torque_max"], f"{b.torque_Nm / Q15_ONE:.6g} N·m per count"
+        )
+    )
     return out
 
 
@@ -394,15 +477,58 @@ def motor_tables_c(motor: Motor) -> str:
 
 
 _SI_DERIVED = (
-    "tracker_bandwidth_rad_s", "sigma_rad_s", "setpoint_weight", "integral_ratio", "v_ratio", "dead_time_duty",
-    "knee_A", "min_pulse_duty", "flux_proportional", "resistance_proportional", "psi_delta_min_Vs",
-    "psi_delta_max_Vs", "r_delta_min_ohm", "r_delta_max_ohm", "omega_min_rad_s", "omega_r_max_rad_s", "i_min_A",
-    "quality_rate", "torque_ki", "torque_kp", "torque_model_rate", "torque_min_Nm",
-    "torque_slew_Nm", "ref_v_ratio", "trim_gain", "trim_min_V", "trim_max_V", "i_trip_A", "v_max_V", "v_min_V",
-    "sum_max_A", "psi_f_Vs", "torque_slew_weak_Nm", "psi_weak_Vs", "loss_rate", "loss_drop_V", "moving_end_rad_s",
-    "moving_start_rad_s", "inverter_end_C", "inverter_start_C", "winding_end_C", "winding_start_C", "dc_low_end_V",
-    "dc_low_start_V", "dc_high_end_V", "dc_high_start_V", "speed_end_rad_s", "speed_start_rad_s", "i_d_20_A",
-    "i_d_slope_A_per_K", "psi_temp_coeff_per_K", "magnet_assumed_C",
+    "tracker_bandwidth_rad_s",
+    "sigma_rad_s",
+    "setpoint_weight",
+    "integral_ratio",
+    "v_ratio",
+    "dead_time_duty",
+    "knee_A",
+    "min_pulse_duty",
+    "flux_proportional",
+    "resistance_proportional",
+    "psi_delta_min_Vs",
+    "psi_delta_max_Vs",
+    "r_delta_min_ohm",
+    "r_delta_max_ohm",
+    "omega_min_rad_s",
+    "omega_r_max_rad_s",
+    "i_min_A",
+    "quality_rate",
+    "torque_ki",
+    "torque_kp",
+    "torque_model_rate",
+    "torque_min_Nm",
+    "torque_slew_Nm",
+    "ref_v_ratio",
+    "trim_gain",
+    "trim_min_V",
+    "trim_max_V",
+    "i_trip_A",
+    "v_max_V",
+    "v_min_V",
+    "sum_max_A",
+    "psi_f_Vs",
+    "torque_slew_weak_Nm",
+    "psi_weak_Vs",
+    "loss_rate",
+    "loss_drop_V",
+    "moving_end_rad_s",
+    "moving_start_rad_s",
+    "inverter_end_C",
+    "inverter_start_C",
+    "winding_end_C",
+    "winding_start_C",
+    "dc_low_end_V",
+    "dc_low_start_V",
+    "dc_high_end_V",
+    "dc_high_start_V",
+    "speed_end_rad_s",
+    "speed_start_rad_s",
+    "i_d_20_A",
+    "i_d_slope_A_per_K",
+    "psi_temp_coeff_per_K",
+    "magnet_assumed_C",
 )
 
 
@@ -410,34 +536,62 @@ def _si_rows(motor: Motor) -> list[Row]:
     machine, inverter, control, b = (motor.config.machine, motor.config.inverter, motor.config.control, motor.bases)
     tables, refs = motor.tables, motor.references
     numbers: dict[str, float] = {
-        "r_ohm_20": machine.r_ohm, "period_s": b.period_s, "step_s": b.step_s, "i_base_A": b.current_A,
-        "v_base_V": b.voltage_V, "omega_base_rad_s": b.omega_rad_s,
+        "r_ohm_20": machine.r_ohm,
+        "period_s": b.period_s,
+        "step_s": b.step_s,
+        "i_base_A": b.current_A,
+        "v_base_V": b.voltage_V,
+        "omega_base_rad_s": b.omega_rad_s,
         "current_full_scale_A": inverter.current_full_scale_A,
-        "v_dc_full_scale_V": motor.config.v_dc_full_scale_V, "id0_A": tables.id_A[0],
-        "did_A": tables.id_A[1] - tables.id_A[0], "diq_A": tables.iq_A[1], "observer_m": control.observer_m,
+        "v_dc_full_scale_V": motor.config.v_dc_full_scale_V,
+        "id0_A": tables.id_A[0],
+        "did_A": tables.id_A[1] - tables.id_A[0],
+        "diq_A": tables.iq_A[1],
+        "observer_m": control.observer_m,
         "flux_bandwidth_rad_s": control.flux_bandwidth_rad_s,
         "resistance_bandwidth_rad_s": control.resistance_bandwidth_rad_s,
-        "torque_authority": control.torque_authority, "torque_max_Nm": machine.torque_max_Nm,
-        "torque_step_Nm": refs.torque_Nm[1], "psi0_Vs": refs.psi_Vs[0], "psi_step_Vs": refs.psi_Vs[1] - refs.psi_Vs[0],
+        "torque_authority": control.torque_authority,
+        "torque_max_Nm": machine.torque_max_Nm,
+        "torque_step_Nm": refs.torque_Nm[1],
+        "psi0_Vs": refs.psi_Vs[0],
+        "psi_step_Vs": refs.psi_Vs[1] - refs.psi_Vs[0],
         "i_max_A": machine.i_max_A,
     }
     numbers |= {name: getattr(motor.derived, name) for name in _SI_DERIVED}
-    counts = {"pole_pairs": machine.pole_pairs, "periods_per_step": b.periods_per_step,
-              "adc_bits": inverter.adc_bits, "nd": len(tables.id_A), "nq": len(tables.iq_A),
-              "ref_nt": len(refs.torque_Nm), "ref_npsi": len(refs.psi_Vs)}
+    counts = {
+        "pole_pairs": machine.pole_pairs,
+        "periods_per_step": b.periods_per_step,
+        "adc_bits": inverter.adc_bits,
+        "nd": len(tables.id_A),
+        "nq": len(tables.iq_A),
+        "ref_nt": len(refs.torque_Nm),
+        "ref_npsi": len(refs.psi_Vs),
+    }
     pointers = ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs", "ref_id_A", "ref_iq_A", "ref_torque_max_Nm")
-    return [*((k, v, "") for k, v in counts.items()), *((k, _double(v), "") for k, v in numbers.items()),
-            *identification.si_rows(motor.config, motor.derived.identify),
-            *((name, f"table_{name}", "") for name in pointers)]
+    return [
+        *((k, v, "") for k, v in counts.items()),
+        *((k, _double(v), "") for k, v in numbers.items()),
+        *identification.si_rows(motor.config, motor.derived.identify),
+        *((name, f"table_{name}", "") for name in pointers),
+    ]
 
 
 def motor_si_c(motor: Motor) -> str:
     """motor_si.c."""
     tables, refs = motor.tables, motor.references
-    arrays = {"l_d_H": tables.l_d_H, "l_q_H": tables.l_q_H, "l_dd_H": tables.l_dd_H, "l_qq_H": tables.l_qq_H,
-              "psi_f0_Vs": tables.psi_f0_Vs, "ref_id_A": refs.id_A, "ref_iq_A": refs.iq_A,
-              "ref_torque_max_Nm": refs.torque_max_Nm}
-    blocks = [_table("double", f"table_{name}", values, name.rsplit("_", 1)[1] + ", unquantised")
-              for name, values in arrays.items()]
+    arrays = {
+        "l_d_H": tables.l_d_H,
+        "l_q_H": tables.l_q_H,
+        "l_dd_H": tables.l_dd_H,
+        "l_qq_H": tables.l_qq_H,
+        "psi_f0_Vs": tables.psi_f0_Vs,
+        "ref_id_A": refs.id_A,
+        "ref_iq_A": refs.iq_A,
+        "ref_torque_max_Nm": refs.torque_max_Nm,
+    }
+    blocks = [
+        _table("double", f"table_{name}", values, name.rsplit("_", 1)[1] + ", unquantised")
+        for name, values in arrays.items()
+    ]
     body = "\n".join(_struct(_si_rows(motor), INDENT))
     return "\n".join([_head(motor, "twin/motor_si.h"), *blocks, f"const motor_si_t motor_si = {{\n{body}\n}};\n"])

@@ -44,8 +44,12 @@ def _map(motor: Motor) -> dict[str, Any] | None:
 
 def _references(motor: Motor) -> dict[str, Any]:
     limits = motor.limits
-    return {"torque_top_Nm": motor.solver.torque_top_Nm, "limit_torque_Nm": _plain(limits.torque_Nm),
-            "limit_psi_min_Vs": _plain(limits.psi_min_Vs), "limit_psi_mtpa_Vs": _plain(limits.psi_mtpa_Vs)}
+    return {
+        "torque_top_Nm": motor.solver.torque_top_Nm,
+        "limit_torque_Nm": _plain(limits.torque_Nm),
+        "limit_psi_min_Vs": _plain(limits.psi_min_Vs),
+        "limit_psi_mtpa_Vs": _plain(limits.psi_mtpa_Vs),
+    }
 
 
 def motor_json(motor: Motor) -> str:

@@ -60,8 +60,10 @@ def _number(path: Path, line: int, column: str, text: str) -> float:
         raise FluxtrueError(f"{path}:{line}: {column} = '{text.strip()[:40]}', allowed: a number") from None
     if not math.isfinite(value) or abs(value) > VALUE_MAX:
         unit = strict.unit_of(column)
-        raise FluxtrueError(f"{path}:{line}: {column} = {text.strip()[:40]}, allowed: a finite number from "
-                            f"{-VALUE_MAX:g} to {VALUE_MAX:g} {unit}")
+        raise FluxtrueError(
+            f"{path}:{line}: {column} = {text.strip()[:40]}, allowed: a finite number from "
+            f"{-VALUE_MAX:g} to {VALUE_MAX:g} {unit}"
+        )
     return value
 
 
@@ -94,12 +96,15 @@ def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
     header = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
     for sign, words in SEPARATORS.items():
         if len(header) == 1 and sign in lines[0][1]:
-            raise FluxtrueError(f"{path}:{lines[0][0]}: columns separated by {words}, allowed: by ',' (and a decimal "
-                                "point)")
+            raise FluxtrueError(
+                f"{path}:{lines[0][0]}: columns separated by {words}, allowed: by ',' (and a decimal point)"
+            )
     for column in COLUMNS:
         if header.count(column) != 1:
-            raise FluxtrueError(f"{path}:{lines[0][0]}: column {column} found {header.count(column)} times, "
-                                f"wanted once: {', '.join(COLUMNS)}")
+            raise FluxtrueError(
+                f"{path}:{lines[0][0]}: column {column} found {header.count(column)} times, "
+                f"wanted once: {', '.join(COLUMNS)}"
+            )
     places = [header.index(column) for column in COLUMNS]
     rows = []
     for (number, _), cells in zip(lines[1:], csv.reader(line for _, line in lines[1:]), strict=True):
@@ -116,14 +121,17 @@ def _grid(path: Path) -> _Grid:
     id_A = np.array(sorted({row[1] for row in rows}))
     iq_A = np.array(sorted({row[2] for row in rows}))
     if len(id_A) < NODES_MIN or len(iq_A) < NODES_MIN:
-        raise FluxtrueError(f"{path}: {len(id_A)} x {len(iq_A)} different (id_A, iq_A), "
-                            f"wanted: at least {NODES_MIN} x {NODES_MIN}")
+        raise FluxtrueError(
+            f"{path}: {len(id_A)} x {len(iq_A)} different (id_A, iq_A), wanted: at least {NODES_MIN} x {NODES_MIN}"
+        )
     line_of: dict[tuple[float, float], int] = {}
     psi_d, psi_q = np.full((len(id_A), len(iq_A)), np.nan), np.full((len(id_A), len(iq_A)), np.nan)
     for line, d, q, flux_d, flux_q in rows:
         if (d, q) in line_of:
-            raise FluxtrueError(f"{path}:{line}: id_A = {d:g}, iq_A = {q:g} again, first on line {line_of[d, q]}; "
-                                "wanted: every point once")
+            raise FluxtrueError(
+                f"{path}:{line}: id_A = {d:g}, iq_A = {q:g} again, first on line {line_of[d, q]}; "
+                "wanted: every point once"
+            )
         line_of[d, q] = line
         at = np.searchsorted(id_A, d), np.searchsorted(iq_A, q)
         psi_d[at], psi_q[at] = flux_d, flux_q
@@ -131,9 +139,11 @@ def _grid(path: Path) -> _Grid:
     if len(holes):
         k, j = holes[0]
         lines = sorted(line for (d, _), line in line_of.items() if d == id_A[k])
-        raise FluxtrueError(f"{path}: no row with id_A = {id_A[k]:g}, iq_A = {iq_A[j]:g} ({len(holes)} missing; "
-                            f"id_A = {id_A[k]:g} stands on lines {lines[0]} to {lines[-1]}); "
-                            "wanted: a full rectangular grid")
+        raise FluxtrueError(
+            f"{path}: no row with id_A = {id_A[k]:g}, iq_A = {iq_A[j]:g} ({len(holes)} missing; "
+            f"id_A = {id_A[k]:g} stands on lines {lines[0]} to {lines[-1]}); "
+            "wanted: a full rectangular grid"
+        )
     return _Grid(id_A, iq_A, psi_d, psi_q, line_of)
 
 
@@ -143,12 +153,16 @@ def _check_cover(path: Path, grid: _Grid, i_max_A: float) -> None:
         reach = min(-grid.iq_A[0], grid.iq_A[-1])
     slack = 1e-9 * i_max_A
     if grid.id_A[0] > -i_max_A + slack or grid.id_A[-1] < -slack or reach < i_max_A - slack:
-        raise FluxtrueError(f"{path}: map too small: id_A {grid.id_A[0]:g} to {grid.id_A[-1]:g}, "
-                            f"iq_A {grid.iq_A[0]:g} to {grid.iq_A[-1]:g}; wanted for machine.i_max_A = {i_max_A:g}: "
-                            f"id_A from {-i_max_A:g} to 0 and iq_A to {i_max_A:g} in at least one half")
+        raise FluxtrueError(
+            f"{path}: map too small: id_A {grid.id_A[0]:g} to {grid.id_A[-1]:g}, "
+            f"iq_A {grid.iq_A[0]:g} to {grid.iq_A[-1]:g}; wanted for machine.i_max_A = {i_max_A:g}: "
+            f"id_A from {-i_max_A:g} to 0 and iq_A to {i_max_A:g} in at least one half"
+        )
     if not (grid.iq_A[0] < 0 < grid.iq_A[-1]) and 0.0 not in grid.iq_A:
-        raise FluxtrueError(f"{path}: iq_A {grid.iq_A[0]:g} to {grid.iq_A[-1]:g} is one half of the plane "
-                            "without its edge; wanted: iq_A = 0 too")
+        raise FluxtrueError(
+            f"{path}: iq_A {grid.iq_A[0]:g} to {grid.iq_A[-1]:g} is one half of the plane "
+            "without its edge; wanted: iq_A = 0 too"
+        )
 
 
 def _mirror(iq: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array, Array]:
@@ -182,8 +196,14 @@ def _both_halves(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
     source = "both halves" if shared else "both halves, mirrored nodes interpolated"
     # The removed parts over the whole plane: every node but i_q = 0 stands for two.
     both = np.concatenate((np.arange(len(iq)), np.arange(1, len(iq))))
-    symmetry = Symmetry(source, float(np.abs(lost_d).max()), _rms(lost_d[:, both]),
-                        float(np.abs(lost_q).max()), _rms(lost_q[:, both]), float(lost_q[:, both].mean()))
+    symmetry = Symmetry(
+        source,
+        float(np.abs(lost_d).max()),
+        _rms(lost_d[:, both]),
+        float(np.abs(lost_q).max()),
+        _rms(lost_q[:, both]),
+        float(lost_q[:, both].mean()),
+    )
     return iq, (d_plus + d_minus) / 2, (q_plus - q_minus) / 2, symmetry
 
 
@@ -196,8 +216,14 @@ def _one_half(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
     psi_q = -grid.psi_q[:, ::-1] if negative else grid.psi_q
     offset = psi_q[:, :1]
     half = "i_q <= 0" if negative else "i_q >= 0"
-    symmetry = Symmetry(f"{half}, mirrored", 0.0, 0.0, float(np.abs(offset).max()), _rms(offset),
-                        float(offset.mean()) * (-1.0 if negative else 1.0))
+    symmetry = Symmetry(
+        f"{half}, mirrored",
+        0.0,
+        0.0,
+        float(np.abs(offset).max()),
+        _rms(offset),
+        float(offset.mean()) * (-1.0 if negative else 1.0),
+    )
     return iq, psi_d, psi_q - offset, symmetry
 
 
@@ -220,16 +246,20 @@ def _check_rising(path: Path, grid: _Grid, iq: Array, name: str, psi: Array, axi
     here, there = (grid.id_A[k], iq[j]), (grid.id_A[k + (axis == 0)], iq[j + (axis == 1)])
     sign = f"; everywhere: its sign is the other way round, wanted: {name} rising with {current}"
     turned = sign if falls.all() else ""
-    raise FluxtrueError(f"{path}: {name} does not rise with {current} from {_place(grid, *here)} to "
-                        f"{_place(grid, *there)}{turned}; wanted: positive incremental inductances everywhere")
+    raise FluxtrueError(
+        f"{path}: {name} does not rise with {current} from {_place(grid, *here)} to "
+        f"{_place(grid, *there)}{turned}; wanted: positive incremental inductances everywhere"
+    )
 
 
 def _check_physics(path: Path, grid: _Grid, iq: Array, psi_d: Array, psi_q: Array) -> None:
     """On the half plane i_q >= 0, after symmetrising."""
     psi_f = float(np.interp(0.0, grid.id_A, psi_d[:, 0]))
     if psi_f <= 0:
-        raise FluxtrueError(f"{path}: psi_d_Vs = {psi_f:g} V·s at id_A = 0, iq_A = 0, allowed: above 0 "
-                            "(the d axis lies along the magnet)")
+        raise FluxtrueError(
+            f"{path}: psi_d_Vs = {psi_f:g} V·s at id_A = 0, iq_A = 0, allowed: above 0 "
+            "(the d axis lies along the magnet)"
+        )
     _check_rising(path, grid, iq, "psi_d_Vs", psi_d, 0)
     _check_rising(path, grid, iq, "psi_q_Vs", psi_q, 1)
 

@@ -84,15 +84,19 @@ def _build(model: FluxModel, bases: Bases, i_max_A: float, shift: int) -> FluxTa
         raise FluxtrueError(f"flux tables: {len(id_A)} x {len(iq_A)} nodes, allowed: up to {NODES_MAX} per axis")
     si = _inductances(model, id_A, iq_A)
     if min(si["l_q"].min(), si["l_dd"].min(), si["l_qq"].min()) <= 0:
-        raise FluxtrueError("flux tables: an inductance is not positive within machine.i_max_A; "
-                            "wanted: positive incremental inductances everywhere")
+        raise FluxtrueError(
+            "flux tables: an inductance is not positive within machine.i_max_A; "
+            "wanted: positive incremental inductances everywhere"
+        )
     per_unit = {name: si[name] / bases.inductance_H for name in ("l_d", "l_q", "l_dd", "l_qq")}
     omega_ts = bases.omega_rad_s * bases.period_s
     inverse = omega_ts / 2 * (1 / per_unit["l_dd"] + 1 / per_unit["l_qq"])
     l_shift = shift_for(max(float(np.abs(table).max()) for table in per_unit.values()))
     if l_shift > SHIFT_MAX:
-        raise FluxtrueError(f"flux tables: inductances span more than 2^{SHIFT_MAX} around L_b = "
-                            f"{bases.inductance_H:.3g} H; check ld/lq, current_full_scale_A and speed_max_rpm")
+        raise FluxtrueError(
+            f"flux tables: inductances span more than 2^{SHIFT_MAX} around L_b = "
+            f"{bases.inductance_H:.3g} H; check ld/lq, current_full_scale_A and speed_max_rpm"
+        )
     stored = {name: q15_table(per_unit[name] / (1 << l_shift), name) for name in ("l_d", "l_q", "l_qq")}
     # Nodes in the corners beyond the current circle may exceed the format: limited, never used. (FT-5)
     stored["g"] = q15_table(np.minimum(inverse, 1 - 1 / Q15_ONE), "g")
@@ -101,8 +105,9 @@ def _build(model: FluxModel, bases: Bases, i_max_A: float, shift: int) -> FluxTa
         if stored[name].min() <= 0:
             raise FluxtrueError(f"flux tables: {name} is too small for its format; inductances span too wide a range")
     x0 = -(len(id_A) - 2) << shift
-    return FluxTables(shift, id_A, iq_A, si["l_d"], si["l_q"], si["l_dd"], si["l_qq"], si["psi_f0"],
-                      l_shift, x0, stored)
+    return FluxTables(
+        shift, id_A, iq_A, si["l_d"], si["l_q"], si["l_dd"], si["l_qq"], si["psi_f0"], l_shift, x0, stored
+    )
 
 
 def _axis(x: IntTable, x0: int, shift: int, n: int) -> tuple[IntTable, IntTable]:
@@ -138,12 +143,14 @@ def lookup_flux(tables: FluxTables, i_d: IntTable, i_q: IntTable) -> tuple[IntTa
     return psi_d, (l_q * i_q * scale + half) >> 32
 
 
-def error_plane(tables: FluxTables, model: FluxModel, bases: Bases, i_max_A: float,
-                pole_pairs: int) -> tuple[Array, Array, Array, Array, Array]:
+def error_plane(
+    tables: FluxTables, model: FluxModel, bases: Bases, i_max_A: float, pole_pairs: int
+) -> tuple[Array, Array, Array, Array, Array]:
     """i_d, i_q and the errors of psi_d, psi_q, torque there: stored tables, read as the firmware does, minus map."""
     reach = int(i_max_A / bases.current_A * Q15_ONE)
-    d, q = np.meshgrid(np.linspace(-reach, 0, 151).astype(np.int64), np.linspace(0, reach, 151).astype(np.int64),
-                       indexing="ij")
+    d, q = np.meshgrid(
+        np.linspace(-reach, 0, 151).astype(np.int64), np.linspace(0, reach, 151).astype(np.int64), indexing="ij"
+    )
     psi_d, psi_q = lookup_flux(tables, d, q)
     i_d, i_q = d / Q15_ONE * bases.current_A, q / Q15_ONE * bases.current_A
     read_d, read_q = psi_d / Q15_ONE * bases.flux_Vs, psi_q / Q15_ONE * bases.flux_Vs
@@ -156,12 +163,14 @@ def table_error(tables: FluxTables, model: FluxModel, bases: Bases, i_max_A: flo
     i_d, i_q, *errors = error_plane(tables, model, bases, i_max_A, pole_pairs)
     inside = np.hypot(i_d, i_q) <= i_max_A
     e_d, e_q, e_t = (error[inside] for error in errors)
-    return TableError(float(np.abs(e_d).max()), float(np.abs(e_q).max()), float(np.abs(e_t).max()),
-                      float(np.sqrt(np.mean(e_t**2))))
+    return TableError(
+        float(np.abs(e_d).max()), float(np.abs(e_q).max()), float(np.abs(e_t).max()), float(np.sqrt(np.mean(e_t**2)))
+    )
 
 
-def make_flux_tables(model: FluxModel, bases: Bases, i_max_A: float, pole_pairs: int,
-                     torque_max_Nm: float) -> tuple[FluxTables, TableError]:
+def make_flux_tables(
+    model: FluxModel, bases: Bases, i_max_A: float, pole_pairs: int, torque_max_Nm: float
+) -> tuple[FluxTables, TableError]:
     """The coarsest grid whose torque error is within 0.2 % of torque_max; else the finest."""
     for shift in range(SHIFT_COARSE, SHIFT_FINE - 1, -1):
         tables = _build(model, bases, i_max_A, shift)

@@ -6,8 +6,10 @@ from pathlib import Path
 
 from fluxtrue_tools.motor.motor import Motor
 
-STYLE = ("body{font:15px/1.45 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
-         "pre{overflow:auto;background:#f4f4f4;padding:1em}img{max-width:100%}")
+STYLE = (
+    "body{font:15px/1.45 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}"
+    "pre{overflow:auto;background:#f4f4f4;padding:1em}img{max-width:100%}"
+)
 
 
 def write_plots(motor: Motor, folder: Path) -> None:
@@ -28,8 +30,11 @@ def write_report(motor: Motor, text: str, folder: Path) -> None:
 
     write_plots(motor, folder)
     name = escape(motor.config.machine.name)
-    figures = "\n".join(f'<h2>{escape(title)}</h2>\n<img src="{file}" alt="{escape(title)}">'
-                        for file, (title, _) in FIGURES.items())
-    page = (f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>Motor {name}</title>'
-            f"<style>{STYLE}</style>\n<h1>Motor {name}</h1>\n<pre>{escape(text)}</pre>\n{figures}\n</html>\n")
+    figures = "\n".join(
+        f'<h2>{escape(title)}</h2>\n<img src="{file}" alt="{escape(title)}">' for file, (title, _) in FIGURES.items()
+    )
+    page = (
+        f'<!doctype html>\n<html lang="en"><meta charset="utf-8"><title>Motor {name}</title>'
+        f"<style>{STYLE}</style>\n<h1>Motor {name}</h1>\n<pre>{escape(text)}</pre>\n{figures}\n</html>\n"
+    )
     (folder / "report.html").write_text(page, encoding="utf-8")

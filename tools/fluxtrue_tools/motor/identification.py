@@ -146,5 +146,7 @@ def si_rows(config: MotorConfig, identify: Identify) -> list[Row]:
         "identify_confidence_rate": d.confidence_rate,
     }  # fmt: skip
     lists = {"identify_sigma": d.sigma, "identify_leak": d.leak}
-    return [*((k, repr(float(v)), "") for k, v in numbers.items()),
-            *((k, _array([repr(float(v)) for v in values]), "") for k, values in lists.items())]
+    return [
+        *((k, repr(float(v)), "") for k, v in numbers.items()),
+        *((k, _array([repr(float(v)) for v in values]), "") for k, values in lists.items()),
+    ]

@@ -22,7 +22,6 @@ from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.motor.quantise import Unfit
 from fluxtrue_tools.motor.references import Limits, ReferenceErrors, References, Solver, make_references
 
-
 TORQUE_SHARE_MIN = 0.01  # of the torque at i_max: less is a slip of the units, and below the formats' resolution
 
 
@@ -71,11 +70,15 @@ def _check_torque(config: MotorConfig, solver: Solver) -> None:
     machine = config.machine
     given = f"machine.torque_max_Nm = {machine.torque_max_Nm:g} N·m, allowed:"
     if machine.torque_max_Nm > solver.torque_top_Nm:
-        raise FluxtrueError(f"{given} up to {strict.down(solver.torque_top_Nm):g} N·m, all the torque there is at "
-                            f"i_max_A = {machine.i_max_A:g} A")
+        raise FluxtrueError(
+            f"{given} up to {strict.down(solver.torque_top_Nm):g} N·m, all the torque there is at "
+            f"i_max_A = {machine.i_max_A:g} A"
+        )
     if machine.torque_max_Nm < TORQUE_SHARE_MIN * solver.torque_top_Nm:
-        raise FluxtrueError(f"{given} from {TORQUE_SHARE_MIN * solver.torque_top_Nm:.4g} N·m, 1 % of the torque at "
-                            f"i_max_A = {machine.i_max_A:g} A")
+        raise FluxtrueError(
+            f"{given} from {TORQUE_SHARE_MIN * solver.torque_top_Nm:.4g} N·m, 1 % of the torque at "
+            f"i_max_A = {machine.i_max_A:g} A"
+        )
 
 
 def resolve(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> Motor:
@@ -86,8 +89,19 @@ def resolve(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> 
     _check_torque(config, solver)
     tables, table_error = make_flux_tables(model, bases, machine.i_max_A, machine.pole_pairs, machine.torque_max_Nm)
     references, limits, errors = make_references(solver, bases, reference_flux_low(config), machine.torque_max_Nm)
-    return Motor(config, flux_map, model, bases, derive(config, model, bases), tables, table_error, solver,
-                 references, limits, errors)
+    return Motor(
+        config,
+        flux_map,
+        model,
+        bases,
+        derive(config, model, bases),
+        tables,
+        table_error,
+        solver,
+        references,
+        limits,
+        errors,
+    )
 
 
 def _whole(flux_map: FluxMap | None, model: FluxModel) -> Test:

@@ -6,17 +6,17 @@ from collections.abc import Callable
 import matplotlib
 
 matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-import numpy as np  # noqa: E402
-from matplotlib.axes import Axes  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from fluxtrue_tools.motor.envelope import torque_envelope  # noqa: E402
-from fluxtrue_tools.motor.flux_model import Array, flux, torque  # noqa: E402
-from fluxtrue_tools.motor.flux_tables import error_plane  # noqa: E402
-from fluxtrue_tools.motor.motor import Motor  # noqa: E402
-from fluxtrue_tools.motor.references import lookup_references  # noqa: E402
-from fluxtrue_tools.motor.quantise import Q15_ONE  # noqa: E402
+from fluxtrue_tools.motor.envelope import torque_envelope
+from fluxtrue_tools.motor.flux_model import Array, flux, torque
+from fluxtrue_tools.motor.flux_tables import error_plane
+from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.quantise import Q15_ONE
+from fluxtrue_tools.motor.references import lookup_references
 
 POINTS = 121
 
@@ -52,8 +52,11 @@ def _grid(motor: Motor, panels: list[tuple[str, Callable[[Array, Array], Array]]
 def flux_figure(motor: Motor) -> Figure:
     """psi_d, psi_q over the current circle, symmetrised."""
     m = motor.model
-    return _grid(motor, [("psi_d, mVs", lambda d, q: 1e3 * m.psi_d(d, q)),
-                         ("psi_q, mVs", lambda d, q: 1e3 * m.psi_q(d, q))], True)
+    return _grid(
+        motor,
+        [("psi_d, mVs", lambda d, q: 1e3 * m.psi_d(d, q)), ("psi_q, mVs", lambda d, q: 1e3 * m.psi_q(d, q))],
+        True,
+    )
 
 
 def inductance_figure(motor: Motor) -> Figure:
@@ -68,9 +71,16 @@ def inductance_figure(motor: Motor) -> Figure:
         near = np.maximum(q, 1e-3 * motor.config.machine.i_max_A)
         return 1e6 * m.psi_q(d, near) / near
 
-    return _grid(motor, [("L_d apparent, uH", l_d), ("L_q apparent, uH", l_q),
-                         ("L_d incremental, uH", lambda d, q: 1e6 * m.psi_d(d, q, nd=1)),
-                         ("L_q incremental, uH", lambda d, q: 1e6 * m.psi_q(d, q, nq=1))], False)
+    return _grid(
+        motor,
+        [
+            ("L_d apparent, uH", l_d),
+            ("L_q apparent, uH", l_q),
+            ("L_d incremental, uH", lambda d, q: 1e6 * m.psi_d(d, q, nd=1)),
+            ("L_q incremental, uH", lambda d, q: 1e6 * m.psi_q(d, q, nq=1)),
+        ],
+        False,
+    )
 
 
 def _lines(axes: Axes, d: Array, q: Array, z: Array, colour: str, label: str) -> None:
@@ -133,19 +143,22 @@ def envelope_figure(motor: Motor) -> Figure:
     power = axes.twinx()
     power.plot(speed, limited * speed * 2 * np.pi / 60 / 1e3, "tab:blue", lw=1, label="shaft power, kW (no losses)")
     power.set(ylabel="kW", ylim=(0, None))
-    axes.set_title(f"{motor.config.inverter.vdc_V:g} V, of which the references plan "
-                   f"{motor.derived.ref_v_ratio:.3f} as phase peak")
+    axes.set_title(
+        f"{motor.config.inverter.vdc_V:g} V, of which the references plan {motor.derived.ref_v_ratio:.3f} as phase peak"
+    )
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     return figure
 
 
 def error_figure(motor: Motor) -> Figure:
     """What the quantised, bilinear look-up adds to the map."""
-    d, q, e_d, e_q, e_t = error_plane(motor.tables, motor.model, motor.bases, motor.config.machine.i_max_A,
-                                      motor.config.machine.pole_pairs)
+    d, q, e_d, e_q, e_t = error_plane(
+        motor.tables, motor.model, motor.bases, motor.config.machine.i_max_A, motor.config.machine.pole_pairs
+    )
     figure, axes = plt.subplots(1, 3, figsize=(14, 4.2), layout="constrained")
-    for ax, z, title in zip(axes, (1e6 * e_d, 1e6 * e_q, e_t),
-                            ("psi_d error, uVs", "psi_q error, uVs", "torque error, N·m"), strict=True):
+    for ax, z, title in zip(
+        axes, (1e6 * e_d, 1e6 * e_q, e_t), ("psi_d error, uVs", "psi_q error, uVs", "torque error, N·m"), strict=True
+    ):
         _filled(ax, motor, d, q, z, title)
     return figure
 

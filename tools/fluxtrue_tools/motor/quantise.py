@@ -26,8 +26,10 @@ def _words(low: int, high: int, one: int) -> str:
 def _fixed(value: float, one: int, low: int, high: int, name: str) -> int:
     scaled = math.floor(value * one + 0.5)
     if not low <= scaled <= high:
-        raise Unfit(f"the number that the firmware derives from it ({name}) is {value:.6g} per unit, allowed: "
-                    f"{_words(low, high, one)}")
+        raise Unfit(
+            f"the number that the firmware derives from it ({name}) is {value:.6g} per unit, allowed: "
+            f"{_words(low, high, one)}"
+        )
     return scaled
 
 

@@ -52,8 +52,10 @@ class Solver:
         inside = np.hypot(d, q) <= i_max_A
         if np.any((np.diff(self.plane, axis=1) <= 0) & inside[:, 1:]):
             k, j = np.argwhere((np.diff(self.plane, axis=1) <= 0) & inside[:, 1:])[0]
-            raise FluxtrueError(f"flux map: torque does not rise with i_q at i_d = {self.id_A[k]:.4g} A, i_q = "
-                                f"{self.iq_A[j]:.4g} A; wanted: a machine whose torque does, inside machine.i_max_A")
+            raise FluxtrueError(
+                f"flux map: torque does not rise with i_q at i_d = {self.id_A[k]:.4g} A, i_q = "
+                f"{self.iq_A[j]:.4g} A; wanted: a machine whose torque does, inside machine.i_max_A"
+            )
         self.torque_top_Nm, self.id_top_A, self.iq_top_A = self._top()
 
     def _top(self) -> tuple[float, float, float]:
@@ -241,8 +243,9 @@ def _psi_range(limits: Limits, unit: float, psi_low_Vs: float) -> tuple[int, int
     return first, last
 
 
-def _build(solver: Solver, limits: Limits, bases: Bases, psi_low_Vs: float,
-           shift: int) -> tuple[References, ReferenceErrors]:
+def _build(
+    solver: Solver, limits: Limits, bases: Bases, psi_low_Vs: float, shift: int
+) -> tuple[References, ReferenceErrors]:
     unit = (1 << shift) / Q15_ONE
     first, last = _psi_range(limits, unit * bases.flux_Vs, psi_low_Vs)
     rows = max(math.ceil(solver.torque_top_Nm / (unit * bases.torque_Nm)), 1) + 1
@@ -257,16 +260,20 @@ def _build(solver: Solver, limits: Limits, bases: Bases, psi_low_Vs: float,
     i_d, i_q = _tables(samples, len(torque_Nm), len(psi_Vs), edge)
     largest = bases.current_A * (1 - 1 / Q15_ONE)  # only extended nodes can come near it
     i_d, i_q = np.maximum(i_d, -largest), np.minimum(i_q, largest)
-    stored = {"i_d": q15_table(i_d / bases.current_A, "reference i_d"),
-              "i_q": q15_table(i_q / bases.current_A, "reference i_q"),
-              "torque_max": q15_table(torque_max / bases.torque_Nm, "torque_max")}
-    references = References(shift, torque_Nm, psi_Vs, i_d, i_q, torque_max, first << shift, stored,
-                            solver.torque_top_Nm)
+    stored = {
+        "i_d": q15_table(i_d / bases.current_A, "reference i_d"),
+        "i_q": q15_table(i_q / bases.current_A, "reference i_q"),
+        "torque_max": q15_table(torque_max / bases.torque_Nm, "torque_max"),
+    }
+    references = References(
+        shift, torque_Nm, psi_Vs, i_d, i_q, torque_max, first << shift, stored, solver.torque_top_Nm
+    )
     return references, _error(references, samples, solver, bases)
 
 
-def make_references(solver: Solver, bases: Bases, psi_low_Vs: float,
-                    torque_max_Nm: float) -> tuple[References, Limits, ReferenceErrors]:
+def make_references(
+    solver: Solver, bases: Bases, psi_low_Vs: float, torque_max_Nm: float
+) -> tuple[References, Limits, ReferenceErrors]:
     """Tables over torque 0 ... T_top and psi psi_low ... largest MTPA flux, as coarse as the error allows."""
     limits = limits_of(solver)
     for shift in range(SHIFT_COARSE, SHIFT_FINE - 1, -1):
@@ -286,16 +293,20 @@ def _tables(samples: _Samples, rows: int, columns: int, edge: tuple[Array, Array
     ok = np.isfinite(samples.id_A)
     x, y = np.nonzero(ok)
     place = (x / PARTS, y / PARTS)
-    filled = [_extend(np.nan_to_num(node), known, end, (*place, wanted[ok]))
-              for node, wanted, end in ((node_d, samples.id_A, edge[0]), (node_q, samples.iq_A, edge[1]))]
+    filled = [
+        _extend(np.nan_to_num(node), known, end, (*place, wanted[ok]))
+        for node, wanted, end in ((node_d, samples.id_A, edge[0]), (node_q, samples.iq_A, edge[1]))
+    ]
     return np.minimum(filled[0], 0.0), np.maximum(filled[1], 0.0)
 
 
 def lookup_references(references: References, t: IntTable, psi: IntTable) -> tuple[IntTable, IntTable]:
     """current_reference_step() between T_max and the circle: i_d, i_q in q15 from torque and flux in q15."""
     origin = (0, references.y0)
-    return (bilinear(references.stored["i_d"], t, psi, origin, references.shift),
-            bilinear(references.stored["i_q"], t, psi, origin, references.shift))
+    return (
+        bilinear(references.stored["i_d"], t, psi, origin, references.shift),
+        bilinear(references.stored["i_q"], t, psi, origin, references.shift),
+    )
 
 
 def _error(references: References, samples: _Samples, solver: Solver, bases: Bases) -> ReferenceErrors:
@@ -304,8 +315,11 @@ def _error(references: References, samples: _Samples, solver: Solver, bases: Bas
     limit = np.interp(psi, references.psi_Vs, references.stored["torque_max"] / Q15_ONE * bases.torque_Nm)
     asked = np.minimum(t, limit)
     ok = np.isfinite(samples.id_A)
-    read = lookup_references(references, np.round(asked / bases.torque_Nm * Q15_ONE).astype(np.int64),
-                             np.round(psi / bases.flux_Vs * Q15_ONE).astype(np.int64))
+    read = lookup_references(
+        references,
+        np.round(asked / bases.torque_Nm * Q15_ONE).astype(np.int64),
+        np.round(psi / bases.flux_Vs * Q15_ONE).astype(np.int64),
+    )
     i_d, i_q = (x / Q15_ONE * bases.current_A for x in read)
     error = np.where(ok, torque(solver.model, solver.pole_pairs, i_d, i_q) - asked, 0.0)
     weak = error[ok & ~mtpa] if np.any(ok & ~mtpa) else np.zeros(1)

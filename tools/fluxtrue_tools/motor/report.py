@@ -36,8 +36,11 @@ def _map(motor: Motor) -> Lines:
         return ["flux map: none, constant inductances"]
     s = flux_map.symmetry
     preserved = getattr(motor.model, "shape_preserving", False)
-    how = ("shape-preserving cubics (a plain cubic spline would overshoot this map)" if preserved
-           else "bicubic spline through every node, monotone between them too")
+    how = (
+        "shape-preserving cubics (a plain cubic spline would overshoot this map)"
+        if preserved
+        else "bicubic spline through every node, monotone between them too"
+    )
     lines = [
         f"flux map: {len(flux_map.id_A)} x {len(flux_map.iq_A)} nodes after symmetrising, id {flux_map.id_A[0]:g} ... "
         f"{flux_map.id_A[-1]:g} A, iq {flux_map.iq_A[0]:g} ... {flux_map.iq_A[-1]:g} A",
@@ -49,8 +52,9 @@ def _map(motor: Motor) -> Lines:
         f"  interpolation      {how}",
     ]
     if flux_map.id_A[-1] < motor.tables.id_A[-1]:
-        lines.append(f"  extended           to id = {motor.tables.id_A[-1]:g} A, one table node, "
-                     "along the edge's slope")
+        lines.append(
+            f"  extended           to id = {motor.tables.id_A[-1]:g} A, one table node, along the edge's slope"
+        )
     return lines
 
 
@@ -79,8 +83,10 @@ def _references(motor: Motor) -> Lines:
         f"  current            {_percent(max(e.current_excess, 0.0))} beyond i_max at worst",
     ]
     if reach > r.psi_Vs[0]:
-        lines.append(f"  note               this machine cannot go below {1e3 * reach:.3g} mVs within i_max: at top "
-                     "speed and a low dc voltage its back-EMF exceeds what the references can weaken")
+        lines.append(
+            f"  note               this machine cannot go below {1e3 * reach:.3g} mVs within i_max: at top "
+            "speed and a low dc voltage its back-EMF exceeds what the references can weaken"
+        )
     return lines
 
 
@@ -97,8 +103,17 @@ def _warnings(motor: Motor) -> Lines:
 
 def report_text(motor: Motor) -> str:
     """report.txt."""
-    parts = [_warnings(motor), _machine(motor), _map(motor), _tables(motor), _references(motor), _bases(motor),
-             [f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
-              "references "
-              f"= {motor.flash_bytes} bytes"]]
+    parts = [
+        _warnings(motor),
+        _machine(motor),
+        _map(motor),
+        _tables(motor),
+        _references(motor),
+        _bases(motor),
+        [
+            f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
+            "references "
+            f"= {motor.flash_bytes} bytes"
+        ],
+    ]
     return "\n".join(line for part in parts for line in part) + "\n"

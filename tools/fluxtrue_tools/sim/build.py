@@ -106,9 +106,7 @@ def run_logged(command: list[str], log: Path, label: str) -> None:
     shown = False
     with (
         log.open("a") as file,
-        subprocess.Popen(
-            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-        ) as process,
+        subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process,
     ):
         assert process.stdout is not None
         for line in process.stdout:
@@ -145,9 +143,7 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
     return MotorFolder(name, build_dir / "motors" / target)
 
 
-def prepare(
-    motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor"
-) -> MotorFolder:
+def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor") -> MotorFolder:
     """The built motor. A given build folder is used as it is; else build/ is brought up to date."""
     name, folder = locate(motor, base or Path.cwd(), where)
     is_shipped = folder == SHIPPED / name
@@ -157,9 +153,7 @@ def prepare(
         target = name if is_shipped else "selected"
         built = MotorFolder(name, build_dir / "motors" / target)
         if not built.library.is_file():
-            raise FluxtrueError(
-                f"{built.library} is missing: cmake --build {build_dir} --target fluxtrue_sim_{target}"
-            )
+            raise FluxtrueError(f"{built.library} is missing: cmake --build {build_dir} --target fluxtrue_sim_{target}")
         return built
     if is_shipped:
         return _make(name, ROOT / "build" / "host", None)

@@ -67,9 +67,7 @@ def run_and_report(
             file=sys.stderr,
             hidden=not sys.stderr.isatty(),
         ) as bar:
-            run = simulate(
-                read, built, where=str(scenario), progress=lambda s: bar.update(round(1e3 * s))
-            )
+            run = simulate(read, built, where=str(scenario), progress=lambda s: bar.update(round(1e3 * s)))
         data = output.summary(run) | {"controller": controller}
         if out is not None:
             files.text(out, output.csv_text(run))

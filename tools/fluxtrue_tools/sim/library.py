@@ -177,9 +177,7 @@ class Loop:
             raise LoopError(unknown[0] if unknown else "record", None, code)
         self._width, self._every = len(names), every
 
-    def run(
-        self, periods: int, ramps: Mapping[str, tuple[float, float]] | None = None
-    ) -> NDArray[np.float64]:
+    def run(self, periods: int, ramps: Mapping[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
         """Run PWM periods; each ramp goes linearly from its first value to its second."""
         for name, (start, stop) in (ramps or {}).items():
             code = self._library.sim_ramp(self._sim, name.encode(), start, stop)

@@ -37,9 +37,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "window": {"from_s": first, "to_s": last},
         "torque_error_Nm": _rounded(error),
         "torque_error_percent": _rounded(recording.torque_error_percent),
-        "estimate_error_percent": _rounded(
-            recording.error_percent("torque_estimated_Nm", "true_torque_Nm")
-        ),
+        "estimate_error_percent": _rounded(recording.error_percent("torque_estimated_Nm", "true_torque_Nm")),
         "psi_error_percent": _rounded(recording.error_percent("psi_f_Vs", "true_psi_f_Vs")),
         "r_error_percent": _rounded(recording.error_percent("r_ohm", "true_r_ohm")),
         "fault_word": recording.fault_word,

@@ -125,7 +125,7 @@ class Recording:
         told = ", then ".join(f"{', '.join(names)} at {time_s:g} s" for time_s, names in tripped)
         if wanted is not None:
             return f"expect_fault = {wanted!r}: the drive tripped with another fault first: {told}"
-        return f"the drive tripped: {told}; a scenario that means it says expect_fault = \"{tripped[0][1][0]}\""
+        return f'the drive tripped: {told}; a scenario that means it says expect_fault = "{tripped[0][1][0]}"'
 
 
 def _plant(scenario: Scenario, motor: Motor) -> dict[str, float]:

@@ -48,7 +48,7 @@ class Image:
         """Where in the file the bytes at a run-time address are."""
         for part in self.segments:
             inside = address - part["p_vaddr"]
-            if 0 <= inside and inside + size <= part["p_filesz"]:
+            if inside >= 0 and inside + size <= part["p_filesz"]:
                 return int(part["p_offset"] + inside)
         raise FluxtrueError(f"{self.path}: {size} bytes at {address:#x} are not in the file")
 

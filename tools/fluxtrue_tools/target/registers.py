@@ -143,4 +143,3 @@ def header(wanted: Wanted, device: Device, chosen: list[Chosen], path: Path) -> 
     for one in chosen:
         lines += _instances(one, device, fake=False)
     return "\n".join([*lines, "#endif", "", "#endif", ""])
-

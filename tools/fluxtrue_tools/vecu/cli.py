@@ -27,7 +27,13 @@ _PORT = click.IntRange(0, 65535)
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def vecu(
-    motor: str, realtime: bool, port: int, bench_port: int, bit_rate: int, seed: int, nvm: Path | None,
+    motor: str,
+    realtime: bool,
+    port: int,
+    bench_port: int,
+    bit_rate: int,
+    seed: int,
+    nvm: Path | None,
     build_dir: Path | None,
 ) -> None:
     """Serve application and plant in one process: CAN by the socketcand protocol, and a bench channel.

@@ -12,8 +12,8 @@ from pathlib import Path
 import can
 import numpy as np
 from asammdf import MDF, Signal
-from asammdf.blocks.v4_constants import BUS_TYPE_CAN, SOURCE_BUS
 from asammdf.blocks.v4_blocks import SourceInformation
+from asammdf.blocks.v4_constants import BUS_TYPE_CAN, SOURCE_BUS
 from can.io.mf4 import STD_DTYPE
 
 

@@ -86,15 +86,15 @@ static void prepare(void)
 
 static void start_timer(void)
 {
-    REG(0x40064304U) = 0x100U;                 /* FIRCDIV2 1/1: 48 MHz */
+    REG(0x40064304U) = 0x100U; /* FIRCDIV2 1/1: 48 MHz */
     PCC(0xDCU) = 3U << 24;
     PCC(0xDCU) = 3U << 24 | CLOCK_ON;
-    REG(0x40037008U) = 1;                      /* module on */
-    for (int k = 0; k < 8; k++) {              /* four clocks before it takes anything else */
+    REG(0x40037008U) = 1;         /* module on */
+    for (int k = 0; k < 8; k++) { /* four clocks before it takes anything else */
         __asm__ volatile("nop");
     }
-    REG(0x40037010U) = 1;                      /* channel 0 interrupts */
-    REG(0x40037020U) = 48000U - 1U;            /* 1 ms */
+    REG(0x40037010U) = 1;           /* channel 0 interrupts */
+    REG(0x40037020U) = 48000U - 1U; /* 1 ms */
     REG(0x40037028U) = 1;
 }
 

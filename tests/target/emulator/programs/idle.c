@@ -11,7 +11,9 @@ void reset(void);
 void count(void);
 
 __attribute__((section(".vectors"), used)) const vector_t vectors[16 + IRQS] = {
-    (vector_t)STACK_TOP, reset, [16 ... 16 + IRQS - 1] = count,
+    (vector_t)STACK_TOP,
+    reset,
+    [16 ... 16 + IRQS - 1] = count,
 };
 
 void count(void)

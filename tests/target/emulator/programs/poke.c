@@ -31,23 +31,23 @@ __attribute__((used)) void reset(void)
     watchdog_off();
 #if CASE == 1 /* SIM.PLATCGC is in the manual, but not in the model */
     REG(0x40048040U) = 0;
-#elif CASE == 2 /* nothing is at this offset */
+#elif CASE == 2  /* nothing is at this offset */
     seen = REG(0x40064044U);
-#elif CASE == 3 /* no clock for FTM0 */
+#elif CASE == 3  /* no clock for FTM0 */
     REG(0x40038008U) = 1000;
-#elif CASE == 4 /* FTM0.MOD has 16 bits */
+#elif CASE == 4  /* FTM0.MOD has 16 bits */
     PCC(0xE0U) = CLOCK_ON;
     REG(0x40038008U) = 0x10000;
-#elif CASE == 5 /* a peripheral that is not modelled: CAN1 */
+#elif CASE == 5  /* a peripheral that is not modelled: CAN1 */
     seen = REG(0x40025000U);
-#elif CASE == 6 /* a byte of a 32-bit register */
+#elif CASE == 6  /* a byte of a 32-bit register */
     PCC(0xE0U) = CLOCK_ON;
     *(volatile uint8_t *)0x40038008U = 1;
-#elif CASE == 7 /* flash cannot be written */
+#elif CASE == 7  /* flash cannot be written */
     REG(0x00008000U) = 1;
-#elif CASE == 8 /* below the RAM */
+#elif CASE == 8  /* below the RAM */
     REG(0x1FFF7FFCU) = 1;
-#elif CASE == 9 /* the core's own: MPU */
+#elif CASE == 9  /* the core's own: MPU */
     REG(0xE000ED94U) = 1;
 #elif CASE == 10 /* write protected after WPEN */
     PCC(0xE0U) = CLOCK_ON;
@@ -69,7 +69,7 @@ __attribute__((used)) void reset(void)
     ISPR(0) = 1U << 5;
 #elif CASE >= 16 && CASE <= 18
     high_speed(CASE == 16 ? 1U : 0U);
-#if CASE == 17 /* a clock gate while in HSRUN */
+#if CASE == 17   /* a clock gate while in HSRUN */
     PCC(0xE0U) = CLOCK_ON;
 #elif CASE == 18 /* PMPROT a second time */
     REG(0x4007E008U) = 0xA0;
@@ -89,7 +89,7 @@ __attribute__((used)) void reset(void)
 #endif
     REG(0x4003B044U) = CASE == 20 ? 1U : 12U;
     REG(0x4003B000U) = 0;
-#elif CASE == 22 /* a timer register right after the module was enabled */
+#elif CASE == 22               /* a timer register right after the module was enabled */
     REG(0x40064304U) = 0x700U; /* FIRCDIV2: 1/64 */
     PCC(0xDCU) = 3U << 24;
     PCC(0xDCU) = 3U << 24 | CLOCK_ON;
@@ -108,10 +108,10 @@ __attribute__((used)) void reset(void)
     }
     REG(0x40024000U) = 0x0080000FU; /* normal */
     REG(0x40024000U) = 0x2080000FU; /* RFEN */
-#elif CASE == 25 /* a timer without its pins */
+#elif CASE == 25               /* a timer without its pins */
     PCC(0xE0U) = CLOCK_ON;
     REG(0x40038000U) = 8;
-#elif CASE == 26 /* a line that is no output */
+#elif CASE == 26               /* a line that is no output */
     PCC(0x12CU) = CLOCK_ON;
     REG(0x4004B000U) = 0x100U;
     REG(0x400FF084U) = 1;
