@@ -4,6 +4,7 @@
 A test that provokes errors says which: rig.expected.faults, .counters, .load, .frames.
 """
 
+from itertools import pairwise
 from typing import Any
 
 from rig import MS, Rig
@@ -54,7 +55,7 @@ def missed(rig: Rig, name: str, jitter_s: float) -> list[str]:
     """Gaps in a cyclic message."""
     times = [frame.time_s for frame in rig.frames[name]]
     cycle_s = rig.cycle_s(name)
-    gaps = [b - a for a, b in zip(times, times[1:], strict=False)]
+    gaps = [b - a for a, b in pairwise(times)]
     bad = [gap for gap in gaps if abs(gap - cycle_s) > jitter_s]
     if not bad:
         return []

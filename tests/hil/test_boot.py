@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start-up: who talks, how often, and what an ECU that nobody commands does."""
 
+from itertools import pairwise
+
 import pytest
 from rig import COMMAND, MS, STATUS, Rig
 
@@ -38,7 +40,7 @@ def test_every_message_of_the_inverter_comes_in_its_cycle(rig: Rig) -> None:
 def test_status_stays_within_300_microseconds_of_its_period_on_a_bus_of_its_own(rig: Rig) -> None:
     rig.advance(1.0)
     times = [frame.time_s for frame in rig.frames[STATUS]][2:]
-    periods = [b - a for a, b in zip(times, times[1:], strict=False)]
+    periods = [b - a for a, b in pairwise(times)]
     # At the same place in the task each time; only the command on the wire may stand before it.
     assert max(abs(period - 10 * MS) for period in periods) <= 0.3 * MS
 

@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,7 @@ def test_a_page_that_says_nothing_for_300_ms_loses_the_torque_by_a_ramp_and_must
 ) -> None:
     assert set(driving.run(0.29)) == {60.0}
     torques = [60.0, *driving.run(0.05 + RAMP_S)]
-    steps = [before - after for before, after in zip(torques, torques[1:], strict=False)]
+    steps = [before - after for before, after in pairwise(torques)]
     assert min(steps) >= 0.0 and max(steps) <= 150.0 * TICK_S + 1e-9
     assert torques[-1] == 0.0 and not driving.order.enable and driving.state == "ready"
     driving.act(lambda commander, now: commander.slide(60.0, now))  # it wakes up, its slider still there

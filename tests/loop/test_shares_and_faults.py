@@ -107,7 +107,7 @@ def test_a_trip_is_marked_in_every_panel_and_named_in_one(hsm1: Motor) -> None:
     sheet = plot.figure(run, "trip")
     time_s = run.faults()[0][0]
     for axes in sheet.axes:
-        assert any(list(line.get_xdata())[0] == time_s for line in axes.lines if len(line.get_xdata()) == 2)
+        assert any(next(iter(line.get_xdata())) == time_s for line in axes.lines if len(line.get_xdata()) == 2)
     texts = [text.get_text() for axes in sheet.axes for text in axes.texts]
     assert sum("over_current" in text for text in texts) == 1
     plt.close(sheet)

@@ -26,7 +26,7 @@ def test_the_example_has_fewer_than_40_lines_of_code(example: str) -> None:
 def test_the_example_runs_and_the_torque_loop_repairs_the_torque(example: str) -> None:
     result = subprocess.run(
         [sys.executable, "-c", example],
-        capture_output=True, text=True, cwd=ROOT,
+        capture_output=True, text=True, cwd=ROOT, check=False,
         env=os.environ | {"FLUXTRUE_SIL": str(library_path("paper"))},
     )  # fmt: skip
     assert result.returncode == 0, result.stderr

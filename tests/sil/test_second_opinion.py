@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def windows(rng: np.random.Generator) -> list[Point]:
     for (low, high), (least, most), count in ((LOW_RPM, LOW_NM, LOW_WINDOWS), (HIGH_RPM, HIGH_NM, HIGH_WINDOWS)):
         edges = np.geomspace(low, high, count + 1)
         points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(least), np.log(most)))))
-                   for a, b in zip(edges, edges[1:], strict=False)]  # fmt: skip
+                   for a, b in pairwise(edges)]  # fmt: skip
     tour = points[::2] + points[1::2][::-1]
     return [(LEARNT_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
 

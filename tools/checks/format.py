@@ -55,15 +55,15 @@ def run(root: Path, command: Sequence[str], paths: Sequence[Path]) -> list[subpr
 
 def complaints(
     root: Path, command: Sequence[str], paths: Sequence[Path], form: re.Pattern[str]
-) -> Iterator[tuple[str, int]]:
-    """File and line of what the program reports."""
+) -> Iterator[tuple[str, ...]]:
+    """What the program reports: file, line, and what else the form takes from each message."""
     for done in run(root, command, paths):
         found = [match.groups() for line in (done.stdout + done.stderr).splitlines() if (match := form.match(line))]
         if bool(found) != bool(done.returncode):
             sys.exit(
                 f"error: {Path(command[0]).name} printed what is not understood: {(done.stderr or done.stdout).strip()}"
             )
-        yield from ((name, int(number)) for name, number in found)
+        yield from found
 
 
 def check(root: Path, c_files: Sequence[Path], python_files: Sequence[Path]) -> Iterator[Violation]:
@@ -75,7 +75,7 @@ def check(root: Path, c_files: Sequence[Path], python_files: Sequence[Path]) -> 
         *complaints(root, c_check, c_files, C_COMPLAINT),
         *complaints(root, python_check, python_files, PYTHON_COMPLAINT),
     ):
-        first[name] = min(number, first.get(name, number))
+        first[name] = min(int(number), first.get(name, int(number)))
     for name, number in sorted(first.items()):
         yield Violation(Path(name), number, "not laid out as tools/format does it")
 

@@ -27,9 +27,8 @@ def files(root: Path, *suffixes: str) -> Iterator[Path]:
     """All files under root, relative to it, sorted; with one of the suffixes if any are given."""
     for path in sorted(root.rglob("*")):
         relative = path.relative_to(root)
-        if SKIPPED.isdisjoint(relative.parts) and path.is_file():
-            if not suffixes or path.suffix in suffixes:
-                yield relative
+        if SKIPPED.isdisjoint(relative.parts) and path.is_file() and (not suffixes or path.suffix in suffixes):
+            yield relative
 
 
 def lines(root: Path, path: Path) -> list[str]:

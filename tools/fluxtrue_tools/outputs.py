@@ -57,7 +57,7 @@ def _probe(label: str, path: Path, folder: Path) -> None:
     try:
         handle, name = tempfile.mkstemp(prefix=PREFIX, dir=folder)
         os.close(handle)
-        os.unlink(name)
+        Path(name).unlink()
     except OSError as error:
         raise _refused(label, path, f"cannot be written ({_reason(error)} in {folder})") from None
 

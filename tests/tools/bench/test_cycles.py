@@ -37,7 +37,7 @@ MANUAL = [
 
 
 # Each opcode is executed by tests/target/emulator/test_opcodes.py, which needs the cross compiler.
-@pytest.mark.parametrize(("mnemonic", "operands", "expected"), MANUAL, ids=lambda value: str(value))
+@pytest.mark.parametrize(("mnemonic", "operands", "expected"), MANUAL, ids=str)
 def test_an_opcode_costs_what_the_manual_says(mnemonic: str, operands: str, expected: int) -> None:
     assert cycles.cycles(Instruction(0, 2, mnemonic, operands)) == expected
 

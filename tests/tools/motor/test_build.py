@@ -108,7 +108,7 @@ def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(wr
 
 def test_motor_json_is_complete_and_plain_json(tmp_path):
     build(MOTORS / "hsm1", tmp_path, report=False)
-    data = json.loads((tmp_path / "motor.json").read_text(), parse_constant=lambda text: pytest.fail(text))
+    data = json.loads((tmp_path / "motor.json").read_text(), parse_constant=pytest.fail)
     assert data["machine"]["name"] == "hsm1" and data["machine"]["pole_pairs"] == 3
     assert data["machine"]["psi_f_Vs"] == pytest.approx(0.071658)
     assert data["inverter"]["v_dc_full_scale_V"] == 525.0 and data["inverter"]["min_pulse_s"] == 2e-6

@@ -15,7 +15,7 @@ SLEW = {"control": {"torque_slew_Nm_per_s": 1000.0, "torque_loop_bandwidth_rad_s
 
 def literals(text):
     """{member: literal} of the generated struct; the first of equal names."""
-    return {name: value for name, value in reversed(re.findall(r"\.(\w+) = (-?[0-9][0-9.e+-]*)[fu]?,", text))}
+    return dict(reversed(re.findall(r"\.(\w+) = (-?[0-9][0-9.e+-]*)[fu]?,", text)))
 
 
 @pytest.fixture

@@ -67,7 +67,7 @@ def measure(machine: Machine, what: Iterable[Case], overhead: int) -> list[Resul
                 int(issued.max()),
                 error,
                 case.unit,
-            )  # fmt: skip
+            )
         )
     return results
 

@@ -58,8 +58,7 @@ def words(operands: str) -> int:
     """Words in a register list; a double register has two."""
     listed = operands[operands.index("{") + 1 : operands.index("}")]
     number = 0
-    for part in listed.split(","):
-        part = part.strip()
+    for part in map(str.strip, listed.split(",")):
         span = _REGISTER_RANGE.fullmatch(part)
         count = int(span.group(3)) - int(span.group(2)) + 1 if span else 1
         number += 2 * count if part.startswith("d") else count

@@ -69,8 +69,7 @@ def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
     names = [controller.name for controller in campaign.controller]
     cells: list[tuple[str, ...]] = [("window", "rpm", "requested N·m", *(f"{name} N·m" for name in names),
                                      *(f"{name} %" for name in names), "bound %")]  # fmt: skip
-    for window, rows in table.groupby("window"):
-        rows = rows.set_index("controller")
+    for window, rows in table.set_index("controller").groupby("window"):
         bound = rows["bound_percent"].max()
         cells.append((str(window), f"{rows['speed_rpm'].iloc[0]:.1f}", f"{rows['torque_requested_Nm'].iloc[0]:.3f}",
                       *(f"{rows['torque_Nm'][name]:.10g}" for name in names),

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def _speeds(windows: Windows, rng: np.random.Generator) -> list[tuple[float, int
     points = []
     for low, high, count in windows.speed_rpm:
         edges = np.geomspace(low, high, count + 1)
-        for first, last in zip(edges, edges[1:], strict=False):
+        for first, last in pairwise(edges):
             for direction, sign in QUADRANTS:
                 points.append((float(np.exp(rng.uniform(np.log(first), np.log(last)))), direction, sign))
     for speed in windows.low_speed_rpm:

@@ -85,9 +85,9 @@ def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
         yield Doubt("identification.iron_loss_uncertainty has no effect: both iron_loss keys are 0")
     if "dead_time_uncertainty" in given and config.inverter.dead_time_s == 0.0:
         yield Doubt("identification.dead_time_uncertainty has no effect: inverter.dead_time_s is 0")
-    if "dead_time_compensation" in config.control.given() and config.inverter.dead_time_s == 0.0:
-        if config.inverter.device_drop_V == 0.0:
-            yield Doubt("control.dead_time_compensation has no effect: dead_time_s and device_drop_V are 0")
+    compensates = "dead_time_compensation" in config.control.given()
+    if compensates and config.inverter.dead_time_s == config.inverter.device_drop_V == 0.0:
+        yield Doubt("control.dead_time_compensation has no effect: dead_time_s and device_drop_V are 0")
 
 
 def curl(model: FluxModel, i_max_A: float) -> float:

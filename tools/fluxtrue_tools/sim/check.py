@@ -5,6 +5,7 @@ import difflib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 from fluxtrue_tools import strict
@@ -151,7 +152,7 @@ def ranges(scenario: Scenario, motor: Motor, loop: lib.Loop, where: str) -> None
     moving = profiles.moving(scenario)
     events = sorted(enumerate(scenario.event), key=lambda item: item[1].t)
     times = profiles.breakpoints(scenario)
-    for start, stop in zip(times, times[1:], strict=False):
+    for start, stop in pairwise(times):
         while events and events[0][1].t <= start:
             index, event = events.pop(0)
             for name, value in event.set.items():

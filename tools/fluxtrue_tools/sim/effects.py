@@ -2,6 +2,7 @@
 """Keys of a scenario that have no effect in their combination: an error, because whoever wrote them meant something."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from fluxtrue_tools.errors import FluxtrueError
@@ -38,7 +39,7 @@ class _Plant:
 def _points(scenario: "Scenario") -> Iterator[Found]:
     for name in sorted(scenario.profile.given()):
         points = getattr(scenario.profile, name) or ()
-        for before, point in zip(points, points[1:], strict=False):
+        for before, point in pairwise(points):
             if before[0] >= scenario.duration_s:
                 yield (f"profile.{name}", f"its point [{point[0]:g}, {point[1]:g}] is never approached: the run ends "
                                           f"at duration_s = {scenario.duration_s:g} s")  # fmt: skip

@@ -4,6 +4,7 @@
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -206,7 +207,7 @@ def _run(
     events = sorted(scenario.event, key=lambda event: event.t)
     times = profiles.breakpoints(scenario, CHUNK_S)
     rows = []
-    for start, stop in zip(times, times[1:], strict=False):
+    for start, stop in pairwise(times):
         while events and events[0].t <= start:
             for name, value in events.pop(0).set.items():
                 loop.set(name, value)
