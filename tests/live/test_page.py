@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from asammdf import MDF
 from conftest import Server
-from progress import HANG_S, until
+from progress import HANG_S, polled, until
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
@@ -207,7 +207,8 @@ def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: 
     played.browser.get(played.server.url)
 
     def wait(true: Callable[[], bool], what: str) -> None:
-        """In the recording's time, as far as it has been drawn."""
+        """In the recording's time, as far as it has been drawn; it is a date, and 0 before the first sample."""
+        polled(lambda: played.newest_s() > 0.0)
         until(true, played.newest_s, PATIENCE_S, what)
 
     wait(lambda: played.newest("INV_Status", "TorqueEstimated") > 20.0, "the drive")
