@@ -3,7 +3,7 @@
 
 #define Q15_SCALE 32768.0F
 #define Q31_SCALE 2147483648.0F
-/* A parameter that drifts this fast relative to its own adaptation has no quality: 5 % of psi_f, 20 % of R_0. */
+/* Drift that means quality 0: an error of 5 % of psi_f, 20 % of R_0, at the law's own bandwidth. */
 #define PSI_DRIFT_SHARE 0.05F
 #define R_DRIFT_SHARE 0.20F
 
@@ -26,7 +26,7 @@ static q15_t to_q15(float x)
     return fx_sat_q15(nearest(((x > 1.0F) ? 1.0F : (x < -1.0F) ? -1.0F : x) * Q15_SCALE));
 }
 
-/* Share of the period that the bridge loses in full. */
+/* The bridge's dead time as a share of the period. */
 static float dead_time_full(const motor_t *m)
 {
     return m->dead_time_s / m->bases.period_s;
@@ -55,7 +55,7 @@ float calibration_get(const motor_t *m, calibration_id_t id)
     }
 }
 
-void calibration_put(motor_t *m, calibration_id_t id, float value)
+void calibration_set(motor_t *m, calibration_id_t id, float value)
 {
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:

@@ -5,7 +5,7 @@
  *   Each value becomes one or two aligned words of the configuration, so that an interrupt sees the old or the new one.
  * Source   docs/howto/xcp.md; the relations of tools/fluxtrue_tools/motor/derived.py
  * Units    as named
- * Range    calibration/calibration_list.h; calibration_put() expects a value inside
+ * Range    calibration/calibration_list.h; calibration_set() expects a value in range
  * Rounding to the nearest step of the configuration's format
  * Context  1 kHz task or below; floating point, hence in no interrupt above it */
 #include "calibration/calibration_list.h"
@@ -21,8 +21,8 @@ typedef struct {
 
 extern const calibration_info_t calibration_info[CALIBRATION_COUNT];
 
-/** As the motor data hold it now. */
+/** The present value in the motor data. */
 float calibration_get(const motor_t *motor, calibration_id_t id);
-void calibration_put(motor_t *motor, calibration_id_t id, float value);
+void calibration_set(motor_t *motor, calibration_id_t id, float value);
 
 #endif

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CALIBRATION_CALIBRATION_LIST_H
 #define CALIBRATION_CALIBRATION_LIST_H
-/** What may be calibrated while the drive runs: the one place that names a value, its range and its unit. Page, checks,
- *   software-in-the-loop names and the description file for calibration tools follow from it.
+/** The values that may be calibrated while the drive runs, each with its range and unit. The calibration page, the
+ *   range checks, the names in software in the loop and the A2L file are generated from this list.
  *   X(name, lowest, highest, unit, text)
  * Source   docs/howto/xcp.md
- * Range    a value outside is refused by whoever writes it
- * Context  calibration/calibration.c gives each its meaning */
+ * Range    a write access refuses a value outside its range
+ * Context  calibration/calibration.c connects each value with the motor data */
 
 #define CALIBRATION_LIST(X) \
     X(torque_slew_Nm_per_s, 0.0F, 1e6F, "Nm/s", "Slew limit of the commanded torque, 0: open") \

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CALIBRATION_FREEZE_FRAME_H
 #define CALIBRATION_FREEZE_FRAME_H
-/** The last 32 steps before the first fault, and what was identified then. Frozen with the step that shows the fault,
- *   until every fault has been forgotten; a second fault changes nothing.
+/** Freeze frame: the last 32 steps before the first fault, and the identified values at that time. It is frozen in the
+ *   step that reports the fault and released when all faults have been reset; a second fault does not change it.
  *   X(name, base, text): name of calibration/measurement_list.h, taken as S16
  * Source   docs/howto/xcp.md
  * Units    those of the measurements; time since the start
@@ -30,7 +30,7 @@
 
 typedef struct {
     uint32_t now_ms;
-    uint32_t time_ms;    /* of the fault; this and what follows is of no meaning unless frozen */
+    uint32_t time_ms;    /* of the fault; this and the following fields are valid only while frozen */
     uint32_t fault_word; /* the drive's */
     float psi_f_Vs, r_ohm;
     uint16_t ecu_faults;

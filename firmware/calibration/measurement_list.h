@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CALIBRATION_MEASUREMENT_LIST_H
 #define CALIBRATION_MEASUREMENT_LIST_H
-/** What a calibration tool may record: one snapshot per millisecond.
+/** The values that a calibration tool may record, one snapshot per step of the task.
  *   X(name, type, base, expression, text); the physical value is raw * base / 2^15, or raw itself without a base
  *   (NONE). d is the drive.
  * Source   docs/howto/xcp.md
@@ -16,7 +16,7 @@
     X(u_d_V, S16, VOLTAGE, (d)->fast.u_next.d, "Voltage of the next period, d") \
     X(u_q_V, S16, VOLTAGE, (d)->fast.u_next.q, "Voltage of the next period, q") \
     X(v_dc_V, S16, VOLTAGE, MEASURED(d).v_dc, "Measured dc voltage") \
-    X(torque_arbitrated_Nm, S16, TORQUE, (d)->request.torque_arbitrated, "Torque asked of the drive") \
+    X(torque_arbitrated_Nm, S16, TORQUE, (d)->request.torque_arbitrated, "Requested torque after limits and slew") \
     X(torque_limited_Nm, S16, TORQUE, (d)->task.allowed.torque_limited, "Arbitrated torque within its limits") \
     X(torque_commanded_Nm, S16, TORQUE, (d)->task.torque_commanded, "Limited torque after slew") \
     X(torque_corrected_Nm, S16, TORQUE, (d)->task.torque_corrected, "Commanded torque after the torque loop") \

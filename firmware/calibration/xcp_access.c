@@ -5,13 +5,13 @@
 
 static const xcp_limits_t limits[CALIBRATION_COUNT] = {CALIBRATION_LIST(LIMITS)};
 
-/* Keeps a mistyped address from changing a drive; whoever needs more replaces it. */
-static uint32_t key_of(uint32_t seed)
+/* Protects against accidental writes only. A product that needs protection against attacks must replace it. */
+static uint32_t compute_key(uint32_t seed)
 {
     return (seed << 7 | seed >> 25) ^ 0x5A17F10CU;
 }
 
-static xcp_config_t config_of(xcp_access_t *access)
+static xcp_config_t protocol_config(xcp_access_t *access)
 {
     return (xcp_config_t){
         .memory = {access->area, XCP_ACCESS_AREAS},
@@ -19,7 +19,7 @@ static xcp_config_t config_of(xcp_access_t *access)
         .reference = access->reference,
         .limits = limits,
         .parameters = CALIBRATION_COUNT,
-        .key = key_of,
+        .key = compute_key,
     };
 }
 
@@ -27,12 +27,12 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
 {
     for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(&drive->motor, (calibration_id_t)k);
-        access->put[k] = access->reference[k];
+        access->applied_value[k] = access->reference[k];
     }
     access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
     access->area[1] = (xcp_area_t){frame, sizeof *frame};
     access->answer_waits = false;
-    const xcp_config_t config = config_of(access);
+    const xcp_config_t config = protocol_config(access);
     xcp_reset(&access->xcp, &config, seed);
     access->xcp.daq.step_10us = (uint8_t)(drive->motor.bases.step_s * 1e5F + 0.5F);
     access->applied = access->xcp.generation;
@@ -40,20 +40,22 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
 
 void xcp_access_receive(xcp_access_t *access, const can_frame_t *frame)
 {
-    const xcp_config_t config = config_of(access);
+    const xcp_config_t config = protocol_config(access);
     access->answer_waits = xcp_command(&access->xcp, &config, frame, &access->answer);
     access->answer.id = XCP_ID_ANSWER;
 }
 
 static void apply(xcp_access_t *access, drive_t *drive)
 {
-    const xcp_config_t config = config_of(access);
+    const xcp_config_t config = protocol_config(access);
     const float *page = xcp_active_page(&access->xcp, &config);
     for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
         const calibration_id_t id = (calibration_id_t)k;
-        if (page[k] != access->put[k]) { /* the others keep every bit, and what the drive has measured itself */
-            calibration_put(&drive->motor, id, page[k]);
-            access->put[k] = page[k];
+        if (page[k] !=
+            access->applied_value
+                [k]) { /* unchanged values are not converted again, so what the drive has measured itself is kept */
+            calibration_set(&drive->motor, id, page[k]);
+            access->applied_value[k] = page[k];
         }
     }
     access->applied = access->xcp.generation;
@@ -65,7 +67,7 @@ void xcp_access_step(xcp_access_t *access, drive_t *drive, uint32_t passed_ms)
         apply(access, drive);
     }
     measurements_step(&access->measurements, drive);
-    const xcp_config_t config = config_of(access);
+    const xcp_config_t config = protocol_config(access);
     xcp_daq_event(&access->xcp.daq, &config.memory, passed_ms);
 }
 

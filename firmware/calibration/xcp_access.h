@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CALIBRATION_XCP_ACCESS_H
 #define CALIBRATION_XCP_ACCESS_H
-/** The drive behind the calibration protocol: which memory may be read, which values may be written, when they act.
+/** Connects the calibration protocol with the drive: readable memory, writable values, and when they take effect.
  * Source   docs/howto/xcp.md
  * Range    calibration/calibration_list.h, calibration/measurement_list.h
  * Errors   the protocol's own; seed and key keep out mistakes, not attackers: the key is a published function
@@ -22,8 +22,8 @@ _Static_assert(CALIBRATION_COUNT <= XCP_PARAMETERS_MAX, "the protocol's page hol
 typedef struct {
     xcp_t xcp;
     float working[CALIBRATION_COUNT];
-    float reference[CALIBRATION_COUNT]; /* the built-in values; written once at start-up */
-    float put[CALIBRATION_COUNT];       /* what the drive was given last */
+    float reference[CALIBRATION_COUNT];     /* the built-in values; written once at start-up */
+    float applied_value[CALIBRATION_COUNT]; /* value that the drive uses */
     measurements_t measurements;
     xcp_area_t area[XCP_ACCESS_AREAS];
     uint32_t applied; /* generation of the values that the drive runs on */
@@ -35,10 +35,10 @@ typedef struct {
 void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed);
 /** A frame with id XCP_ID_COMMAND. */
 void xcp_access_receive(xcp_access_t *access, const can_frame_t *frame);
-/** Once per step, in which so many milliseconds have passed: takes over changed values, samples the measurement
- * lists. */
+/** Once per step: takes over changed values and samples the measurement lists. passed_ms: milliseconds that passed in
+ * this step. */
 void xcp_access_step(xcp_access_t *access, drive_t *drive, uint32_t passed_ms);
-/** The next frame for the bus, answers first; false: none. Follow with xcp_access_sent() once it is out. */
+/** The next frame for the bus, answers first; false: none. Call xcp_access_sent() after it has been sent. */
 bool xcp_access_next(const xcp_access_t *access, can_frame_t *frame);
 void xcp_access_sent(xcp_access_t *access);
 

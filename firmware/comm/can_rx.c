@@ -12,15 +12,15 @@ static const uint16_t data_ids[] = {
 #undef DATA_ID
 };
 
-static void count(uint16_t *counter)
+static void count_up(uint16_t *counter)
 {
     if (*counter < UINT16_MAX) {
         (*counter)++;
     }
 }
 
-/* A CRC that is wrong here may be right for another message: then it is the identifier that is wrong. */
-static bool is_of_another(const can_frame_t *frame)
+/* A CRC that is wrong for this message but right for another one shows that the identifier is wrong. */
+static bool has_crc_of_another_message(const can_frame_t *frame)
 {
     for (unsigned n = 0; n < sizeof data_ids / sizeof data_ids[0]; n++) {
         if (frame->data[0] == e2e_crc(data_ids[n], frame)) {
@@ -43,7 +43,7 @@ static rx_result_t check(uint16_t data_id, rx_channel_t *channel, const can_fram
     case E2E_JUMP:
         return RX_JUMP;
     case E2E_CRC:
-        return is_of_another(frame) ? RX_ID : RX_CRC;
+        return has_crc_of_another_message(frame) ? RX_ID : RX_CRC;
     case E2E_WRONG_LENGTH:
     default:
         return RX_LENGTH;
@@ -81,7 +81,7 @@ static bool take_limits(can_rx_t *rx, const can_frame_t *frame)
     return true;
 }
 
-static unsigned ones(unsigned bits)
+static unsigned count_ones(unsigned bits)
 {
     unsigned sum = 0;
     for (; bits != 0U; bits &= bits - 1U) {
@@ -90,8 +90,8 @@ static unsigned ones(unsigned bits)
     return sum;
 }
 
-/* The first frame proves nothing: it is neither good nor bad. */
-static void record(rx_channel_t *channel, rx_result_t result)
+/* The first frame only synchronises the counter: it counts neither as good nor as bad. */
+static void record_result(rx_channel_t *channel, rx_result_t result)
 {
     if (result == RX_ACCEPTED) {
         channel->age_us = 0;
@@ -101,7 +101,7 @@ static void record(rx_channel_t *channel, rx_result_t result)
     if (result != RX_SYNCED) {
         const unsigned bad = (result != RX_ACCEPTED) ? 1U : 0U;
         channel->bad = (uint16_t)(((unsigned)channel->bad << 1 | bad) & WINDOW_MASK);
-        channel->failed = ones(channel->bad) >= BAD_TO_FAIL;
+        channel->failed = count_ones(channel->bad) >= BAD_TO_FAIL;
     }
 }
 
@@ -112,7 +112,7 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
         return RX_IGNORED;
     }
     if (frame->extended) {
-        return RX_ID; /* another sender's, not a bad frame of ours */
+        return RX_ID; /* a frame of another sender */
     }
     rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
     const uint8_t before = channel->e2e.counter;
@@ -123,22 +123,22 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;
         result = taken ? RX_ACCEPTED : RX_RANGE;
         if (!next) {
-            count(&rx->skipped);
+            count_up(&rx->skipped);
         }
     }
-    record(channel, result);
+    record_result(channel, result);
     return result;
 }
 
 rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame)
 {
     const rx_result_t result = receive(rx, frame);
-    count(&rx->count[result]);
+    count_up(&rx->count[result]);
     return result;
 }
 
 /* True in the step in which the message times out. */
-static bool grow_old(rx_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_ms)
+static bool advance_age(rx_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_ms)
 {
     if (!channel->alive) {
         return false;
@@ -154,11 +154,11 @@ static bool grow_old(rx_channel_t *channel, uint32_t elapsed_us, uint32_t time_o
 
 void can_rx_tick(can_rx_t *rx, uint32_t elapsed_us)
 {
-    if (grow_old(&rx->command_channel, elapsed_us, BUS_VCU_TORQUE_REQUEST_TIME_OUT_MS)) {
+    if (advance_age(&rx->command_channel, elapsed_us, BUS_VCU_TORQUE_REQUEST_TIME_OUT_MS)) {
         rx->command = (bus_command_t){.mode = rx->command.mode};
-        count(&rx->time_outs);
+        count_up(&rx->time_outs);
     }
-    if (grow_old(&rx->limits_channel, elapsed_us, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
+    if (advance_age(&rx->limits_channel, elapsed_us, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
         rx->limits = (bus_power_limits_t){0};
     }
 }

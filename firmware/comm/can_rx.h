@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef COMM_CAN_RX_H
 #define COMM_CAN_RX_H
-/** What the bus may ask: the protected messages, each with its checks, its age and its record of bad frames.
+/** Reception of the protected messages, each with its checks, its age and its record of bad frames.
  *   A frame counts only if length, CRC and data id, counter and the range of every signal are right.
  *   alive   a frame was accepted less than the message's time-out ago
  *   failed  three of the last ten frames with this identifier were bad
@@ -29,14 +29,14 @@ typedef struct {
 
 typedef enum {
     RX_ACCEPTED = 0,
-    RX_SYNCED, /* the first frame: right, not used */
+    RX_SYNCED, /* the first frame: valid, but not used */
     RX_REPEATED,
     RX_JUMP,
     RX_CRC,
     RX_LENGTH,
     RX_RANGE,
     RX_ID,      /* the CRC of another protected message, or an extended identifier */
-    RX_IGNORED, /* an identifier that means nothing here */
+    RX_IGNORED, /* another identifier */
     RX_RESULTS
 } rx_result_t;
 
@@ -56,7 +56,7 @@ typedef struct {
     bus_power_limits_t limits; /* after a time-out: zero */
     uint16_t count[RX_RESULTS];
     uint16_t accepted; /* torque commands, wraps */
-    uint16_t skipped;  /* of either message, one frame before it was lost */
+    uint16_t skipped;  /* accepted frames of either message before which one was lost */
     uint16_t time_outs;
 } can_rx_t;
 

@@ -26,12 +26,12 @@ void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
     tx->next = 0;
 }
 
-/* The place in the list is the phase: the list has more entries than the shortest cycle has milliseconds, so that two
- * meet at most. */
+/* A message's index in the list is its phase. The list is longer than the shortest cycle has milliseconds, so at most
+ * two messages are due in the same one. */
 static bool is_due(const can_tx_t *tx, unsigned index)
 {
     const uint32_t cycle_ms = messages[index].cycle_ms;
-    return (tx->time_ms + cycle_ms - index % cycle_ms) % cycle_ms < tx->passed_ms; /* so long ago */
+    return (tx->time_ms + cycle_ms - index % cycle_ms) % cycle_ms < tx->passed_ms; /* time since it was due */
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)

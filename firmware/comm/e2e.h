@@ -5,11 +5,11 @@
  *   byte 0           CRC-8 SAE J1850, x^8 + x^4 + x^3 + x^2 + 1 (0x1D), start 0x00, no final inversion, over the low
  *                    and the high byte of the data id (which is not sent), then over bytes 1 to the end
  *   byte 1, bits 0-3 counter 0 ... 14, then 0 again; bits 4-7 belong to the message
- *   A counter that advanced by 1 is right, by 2 tells that one frame was skipped; by more is a jump, by 0 a repetition.
- *   After a jump the next frame must follow the new counter. The first frame only tells where the sender counts.
+ *   The counter must advance by 1; an advance by 2 means one lost frame and is accepted, by more it is a jump, by 0 a
+ *   repetition. After a jump the next frame must follow the new counter. The first frame only synchronises the counter.
  * Source   AUTOSAR PRS_E2EProtocol, profile 11, data-id mode BOTH; docs/howto/can.md
- * Range    counter 15 is never right
- * Errors   one status per kind; nothing is repaired
+ * Range    counter 15 is never valid
+ * Errors   one status for each kind of error; no error is corrected
  * Context  1 kHz task */
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,13 +17,13 @@
 #include "types/can_frame.h"
 
 #define E2E_COUNTERS 15U /* values the counter takes */
-#define E2E_SKIP_MAX 2U  /* most it may advance */
+#define E2E_SKIP_MAX 2U  /* largest accepted advance */
 #define E2E_LENGTH 8U    /* every protected message has eight bytes */
 
 typedef enum {
     E2E_OK = 0,
-    E2E_SKIPPED, /* good, one frame before it was lost */
-    E2E_FIRST,   /* good CRC, nothing to compare the counter with: not to be used */
+    E2E_SKIPPED, /* valid; the frame before it was lost */
+    E2E_FIRST,   /* valid CRC, but no counter to compare with: must not be used */
     E2E_REPEATED,
     E2E_JUMP,
     E2E_CRC,
@@ -31,8 +31,8 @@ typedef enum {
 } e2e_status_t;
 
 typedef struct {
-    uint8_t counter; /* of the last frame that counted */
-    bool synced;     /* there was one */
+    uint8_t counter; /* of the last valid frame */
+    bool synced;     /* counter is known */
 } e2e_state_t;
 
 uint8_t e2e_crc(uint16_t data_id, const can_frame_t *frame);

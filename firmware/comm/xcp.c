@@ -8,12 +8,12 @@
 #include "signal/crc32.h"
 
 #define DATA_MAX (XCP_PACKET_MAX - 1)
-#define CHECKSUM_MAX 4096U /* bytes in one go: a fraction of the task's millisecond */
+#define CHECKSUM_MAX 4096U /* bytes per command: takes a fraction of the task's millisecond */
 
 #define BYTES(command, count) [(command)-XCP_ALLOC_ODT_ENTRY] = (count)
 
-/* Bytes a command needs at least; 0: not one of ours. */
-static uint8_t needed(uint8_t command)
+/* Smallest number of bytes of a command; 0: not supported. */
+static uint8_t min_length(uint8_t command)
 {
     static const uint8_t count[] = {
         BYTES(XCP_CONNECT, 2),
@@ -62,7 +62,7 @@ const float *xcp_active_page(const xcp_t *xcp, const xcp_config_t *config)
     return (xcp->ecu_page == XCP_PAGE_WORKING) ? config->working : config->reference;
 }
 
-static const uint8_t *readable(const xcp_t *xcp, const xcp_config_t *config, uint32_t size)
+static const uint8_t *readable_area(const xcp_t *xcp, const xcp_config_t *config, uint32_t size)
 {
     if (xcp_page_holds(config, xcp->mta, size)) {
         return xcp_page_read(xcp, config, xcp->mta);
@@ -75,7 +75,7 @@ static xcp_result_t upload(xcp_t *xcp, const xcp_config_t *config, uint8_t size,
     if (size == 0 || size > DATA_MAX) {
         return XCP_ERR_OUT_OF_RANGE;
     }
-    const uint8_t *from = readable(xcp, config, size);
+    const uint8_t *from = readable_area(xcp, config, size);
     if (!from) {
         return XCP_ERR_ACCESS_DENIED;
     }
@@ -103,7 +103,7 @@ static xcp_result_t checksum(xcp_t *xcp, const xcp_config_t *config, uint32_t si
         *length = 8;
         return XCP_ERR_OUT_OF_RANGE;
     }
-    const uint8_t *from = readable(xcp, config, size);
+    const uint8_t *from = readable_area(xcp, config, size);
     if (!from) {
         return XCP_ERR_ACCESS_DENIED;
     }
@@ -114,7 +114,7 @@ static xcp_result_t checksum(xcp_t *xcp, const xcp_config_t *config, uint32_t si
     return XCP_OK;
 }
 
-static xcp_result_t move_pointer(xcp_t *xcp, const uint8_t *command)
+static xcp_result_t set_pointer(xcp_t *xcp, const uint8_t *command)
 {
     if (command[3] != 0) {
         return XCP_ERR_OUT_OF_RANGE; /* one address space */
@@ -126,7 +126,7 @@ static xcp_result_t move_pointer(xcp_t *xcp, const uint8_t *command)
 static xcp_result_t short_upload(xcp_t *xcp, const xcp_config_t *config, const uint8_t *command, uint8_t *answer,
                                  uint8_t *length)
 {
-    const xcp_result_t moved = move_pointer(xcp, command);
+    const xcp_result_t moved = set_pointer(xcp, command);
     return (moved == XCP_OK) ? upload(xcp, config, command[1], answer, length) : moved;
 }
 
@@ -136,7 +136,7 @@ static xcp_result_t memory_command(xcp_t *xcp, const xcp_config_t *config, const
     const uint8_t *data = command->data;
     switch (data[0]) {
     case XCP_SET_MTA:
-        return move_pointer(xcp, data);
+        return set_pointer(xcp, data);
     case XCP_UPLOAD:
         return upload(xcp, config, data[1], answer, length);
     case XCP_SHORT_UPLOAD:
@@ -158,10 +158,10 @@ static xcp_result_t memory_command(xcp_t *xcp, const xcp_config_t *config, const
 static xcp_result_t execute(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, can_frame_t *answer)
 {
     const uint8_t code = command->data[0];
-    if (needed(code) == 0) {
+    if (min_length(code) == 0) {
         return XCP_ERR_CMD_UNKNOWN;
     }
-    if (needed(code) > command->length) {
+    if (min_length(code) > command->length) {
         return XCP_ERR_CMD_SYNTAX;
     }
     return xcp_is_session(code) ? xcp_session_command(xcp, config, command->data, answer->data, &answer->length)

@@ -3,7 +3,7 @@
 #define COMM_XCP_H
 /** XCP slave on CAN: reading memory, calibration pages, seed and key. Measurement lists are in comm/xcp_daq.h.
  *   One command, one answer. Writes reach the working page parameter by parameter: a value takes effect when all its
- *   bytes have arrived and it lies in its declared range, else the command is refused and nothing of it stays.
+ *   bytes have arrived and it lies in its declared range; otherwise the command is refused and has no effect.
  * Source   ASAM MCD-1 XCP 1.x, protocol and CAN transport layer; commands in docs/howto/xcp.md
  * Units    addresses as the processor's, 32 bits, little endian; MAX_CTO = MAX_DTO = 8 bytes
  * Range    only the areas named in the configuration can be read; only the calibration page can be written

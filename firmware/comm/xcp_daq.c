@@ -17,24 +17,24 @@ bool xcp_daq_running(const xcp_daq_t *daq)
     return running;
 }
 
-static can_frame_t *push(xcp_daq_t *daq)
+static can_frame_t *next_free_frame(xcp_daq_t *daq)
 {
     can_frame_t *frame = &daq->queue[daq->queued % XCP_DAQ_QUEUE];
     daq->queued++;
     return frame;
 }
 
-static uint32_t room(const xcp_daq_t *daq)
+static uint32_t free_frames(const xcp_daq_t *daq)
 {
     return XCP_DAQ_QUEUE - (daq->queued - daq->sent);
 }
 
-/* The areas do not change: what WRITE_DAQ accepted is still readable. A list that runs was complete when it started
- * and cannot be changed: its bytes fit into the frame. */
+/* The areas are constant, so the addresses that WRITE_DAQ accepted remain readable. A running list was complete when it
+ * started and cannot be changed, so its bytes fit into the frame. */
 static void sample_frame(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_list_t *list, uint8_t odt)
 {
     const xcp_odt_t *o = &daq->odt[list->first_odt + odt];
-    can_frame_t *frame = push(daq);
+    can_frame_t *frame = next_free_frame(daq);
     *frame = (can_frame_t){.length = 1};
     frame->data[0] = (uint8_t)(list->first_odt + odt);
     if (list->timestamp && odt == 0) {
@@ -53,7 +53,7 @@ static void sample_frame(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_l
 
 static void sample_list(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_list_t *list)
 {
-    if (room(daq) < list->odts + 1U) { /* one stays free for the overload event */
+    if (free_frames(daq) < list->odts + 1U) { /* one stays free for the overload event */
         daq->overloads++;
         daq->overload_pending = true;
         return;
@@ -63,7 +63,7 @@ static void sample_list(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_li
     }
 }
 
-static bool due(xcp_list_t *list, bool tenth)
+static bool is_due(xcp_list_t *list, bool tenth)
 {
     if (!list->running || (list->event == 1 && !tenth)) {
         return false;
@@ -81,13 +81,13 @@ void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory, uint32_t passed_m
     daq->now_ms = (uint16_t)(daq->now_ms + passed_ms);
     const bool tenth = daq->now_ms % XCP_DAQ_TENTH < passed_ms;
     for (uint8_t k = 0; k < daq->lists; k++) {
-        if (due(&daq->list[k], tenth)) {
+        if (is_due(&daq->list[k], tenth)) {
             sample_list(daq, memory, &daq->list[k]);
         }
     }
-    if (daq->overload_pending && room(daq) > 0) {
+    if (daq->overload_pending && free_frames(daq) > 0) {
         daq->overload_pending = false;
-        *push(daq) = (can_frame_t){.length = 2, .data = {XCP_PID_EVENT, XCP_EVENT_DAQ_OVERLOAD}};
+        *next_free_frame(daq) = (can_frame_t){.length = 2, .data = {XCP_PID_EVENT, XCP_EVENT_DAQ_OVERLOAD}};
     }
 }
 

@@ -2,14 +2,14 @@
 #ifndef COMM_XCP_DAQ_H
 #define COMM_XCP_DAQ_H
 /** Measurement lists of the XCP slave: dynamic lists, one frame (ODT) of up to 7 bytes each, two rasters.
- *   An event samples every running list that is due, all of it or none: a list that does not fit into the send queue is
- *   dropped whole, counted, and announced by the protocol's overload event.
+ *   An event samples every running list that is due. A list that does not fit into the send queue completely is not
+ *   sampled; this is counted and reported by the protocol's overload event.
  * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
  *   Event 0 comes in each step of the 1 kHz task, event 1 in the step in which a multiple of 10 ms has passed.
  * Units    time stamps of 1 ms of true time, 16 bits, in the first frame of a list
  * Range    sizes below; absolute ODT numbers as packet identifiers
  * Errors   the protocol's codes
- * Context  1 kHz task: commands between, xcp_daq_event() after the drive's step, so that one raster is one instant */
+ * Context  1 kHz task; xcp_daq_event() after the drive's step, so that all values of a raster are from one instant */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -46,13 +46,13 @@ typedef struct {
     xcp_odt_t odt[XCP_DAQ_ODTS];
     xcp_entry_t entry[XCP_DAQ_ENTRIES];
     uint8_t lists, odts, entries;      /* in use */
-    uint8_t stage;                     /* of the allocation, which has its order */
-    uint8_t at_list, at_odt, at_entry; /* where WRITE_DAQ goes */
+    uint8_t stage;                     /* of the allocation, whose commands have a fixed order */
+    uint8_t at_list, at_odt, at_entry; /* where WRITE_DAQ writes */
     bool pointer_valid;
     uint16_t now_ms;
-    uint8_t step_10us; /* length of a step, rounded: only for the tool */
+    uint8_t step_10us; /* length of a step, rounded; only reported to the tool */
     can_frame_t queue[XCP_DAQ_QUEUE];
-    uint32_t queued, sent; /* count up; the difference waits */
+    uint32_t queued, sent; /* count up; the difference is the number of waiting frames */
     uint32_t overloads;
     bool overload_pending;
 } xcp_daq_t;
@@ -62,11 +62,11 @@ bool xcp_daq_running(const xcp_daq_t *daq);
 /** Answers a DAQ command; *length is the answer's, at least 1. */
 xcp_result_t xcp_daq_command(xcp_daq_t *daq, const xcp_memory_t *memory, const uint8_t *command, uint8_t *answer,
                              uint8_t *length);
-/** Once per step of the task, in which so many milliseconds have passed. */
+/** Once per step of the task; passed_ms: milliseconds that passed in this step. */
 void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory, uint32_t passed_ms);
-/** The oldest frame that waits; false: none. */
+/** The oldest waiting frame; false: none. */
 bool xcp_daq_next(const xcp_daq_t *daq, can_frame_t *frame);
-/** It has been sent. */
+/** The oldest frame has been sent. */
 void xcp_daq_sent(xcp_daq_t *daq);
 
 #endif

@@ -9,7 +9,7 @@
 enum { MODE_TIMESTAMP = 0x10, MODE_SELECTED = 0x01, MODE_RUNNING = 0x40 };
 enum { STOP = 0, START = 1, SELECT = 2 };
 
-/* The list's bytes in one of its frames, entries not yet written included: they make it incomplete. */
+/* Whether every entry of this frame has been written and all of them fit into it. */
 static bool frame_complete(const xcp_daq_t *daq, const xcp_list_t *list, uint8_t odt)
 {
     const xcp_odt_t *o = &daq->odt[list->first_odt + odt];
@@ -88,7 +88,7 @@ static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
     if (mode > 2) {
         return XCP_ERR_MODE_NOT_VALID;
     }
-    for (uint8_t k = 0; k < daq->lists; k++) { /* one may have changed since it was selected: all start or none */
+    for (uint8_t k = 0; k < daq->lists; k++) { /* a list may have changed since it was selected; start all or none */
         if (mode == 1 && daq->list[k].selected && !list_complete(daq, &daq->list[k])) {
             return XCP_ERR_DAQ_CONFIG;
         }
@@ -101,7 +101,7 @@ static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
     return XCP_OK;
 }
 
-/* A step of 1 ms is told as such, another one in steps of 10 us. */
+/* A step of 1 ms is reported in the unit 1 ms, any other in the unit 10 us. */
 static void describe_event(const xcp_daq_t *daq, uint16_t event, uint8_t *answer)
 {
     const bool whole = event != 0 || daq->step_10us == STEP_1MS;

@@ -59,7 +59,7 @@ static xcp_result_t allocate_entries(xcp_daq_t *daq, uint16_t list, uint8_t odt,
     return XCP_OK;
 }
 
-static xcp_result_t point(xcp_daq_t *daq, uint16_t list, uint8_t odt, uint8_t entry)
+static xcp_result_t set_pointer(xcp_daq_t *daq, uint16_t list, uint8_t odt, uint8_t entry)
 {
     daq->pointer_valid = false;
     if (list >= daq->lists || odt >= daq->list[list].odts ||
@@ -76,7 +76,7 @@ static xcp_result_t point(xcp_daq_t *daq, uint16_t list, uint8_t odt, uint8_t en
     return XCP_OK;
 }
 
-/* Bit offset 0xFF: whole bytes, the only kind there is. */
+/* Bit offset 0xFF means whole bytes; single bits are not supported. */
 static xcp_result_t write_entry(xcp_daq_t *daq, const xcp_memory_t *memory, const uint8_t *command)
 {
     const uint32_t address = xcp_get_u32(&command[4]);
@@ -96,7 +96,7 @@ static xcp_result_t write_entry(xcp_daq_t *daq, const xcp_memory_t *memory, cons
     const xcp_odt_t *o = &daq->odt[daq->list[daq->at_list].first_odt + daq->at_odt];
     daq->entry[o->first_entry + daq->at_entry] = (xcp_entry_t){address, size};
     daq->at_entry++;
-    daq->pointer_valid = daq->at_entry < o->entries; /* the master must point anew behind the last one */
+    daq->pointer_valid = daq->at_entry < o->entries; /* after the last entry the master must set the pointer again */
     return XCP_OK;
 }
 
@@ -138,7 +138,7 @@ xcp_result_t xcp_daq_setup(xcp_daq_t *daq, const xcp_memory_t *memory, const uin
     case XCP_CLEAR_DAQ_LIST:
         return clear_list(daq, list);
     case XCP_SET_DAQ_PTR:
-        return point(daq, list, command[4], command[5]);
+        return set_pointer(daq, list, command[4], command[5]);
     case XCP_WRITE_DAQ:
         return write_entry(daq, memory, command);
     default:

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef COMM_XCP_MEMORY_H
 #define COMM_XCP_MEMORY_H
-/** What a master may read: a few areas, nothing else.
+/** The memory areas that a master may read.
  * Source   docs/howto/xcp.md
  * Units    32-bit addresses; on a host they fit because the program is linked at a fixed address
- * Errors   NULL: some byte lies outside every area
+ * Errors   NULL: the range does not lie inside one area
  * Context  1 kHz task */
 #include <stdint.h>
 

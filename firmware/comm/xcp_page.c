@@ -25,7 +25,7 @@ const uint8_t *xcp_page_read(const xcp_t *xcp, const xcp_config_t *config, uint3
     return (const uint8_t *)page + (address - xcp_address(config->working));
 }
 
-void xcp_page_forget(xcp_t *xcp)
+void xcp_page_discard(xcp_t *xcp)
 {
     memset(xcp->arrived, 0, sizeof xcp->arrived);
 }
@@ -42,7 +42,7 @@ static float waiting_value(const xcp_t *xcp, uint32_t parameter)
     return value;
 }
 
-/* All parameters a command completes must be good before the first is stored. */
+/* Every parameter that a command completes must be in range before the first one is stored. */
 static xcp_result_t check_whole(xcp_t *xcp, const xcp_config_t *config, uint32_t first, uint32_t last)
 {
     xcp_result_t result = XCP_OK;
@@ -130,7 +130,7 @@ static xcp_result_t get_page(const xcp_t *xcp, uint8_t mode, uint8_t segment, ui
     return XCP_OK;
 }
 
-/* Only from flash to RAM: the way back to the built-in values. */
+/* Only from flash to RAM: restores the built-in values. */
 static xcp_result_t copy_page(xcp_t *xcp, const xcp_config_t *config, const uint8_t *command)
 {
     if (command[1] != 0 || command[3] != 0) {
@@ -146,7 +146,7 @@ static xcp_result_t copy_page(xcp_t *xcp, const xcp_config_t *config, const uint
         return XCP_ERR_ACCESS_LOCKED;
     }
     memcpy(config->working, config->reference, segment_size(config));
-    xcp_page_forget(xcp);
+    xcp_page_discard(xcp);
     xcp->generation++;
     return XCP_OK;
 }

@@ -9,17 +9,17 @@
 #define SEED_SIZE 4
 #define SPREAD 2654435761U /* 2^32 divided by the golden ratio: neighbouring counts give distant seeds */
 
-static void leave(xcp_t *xcp)
+static void end_session(xcp_t *xcp)
 {
     xcp->connected = false;
     xcp->unlocked = false;
-    xcp_page_forget(xcp);
+    xcp_page_discard(xcp);
     xcp_daq_reset(&xcp->daq);
 }
 
 static xcp_result_t connect(xcp_t *xcp, uint8_t *answer, uint8_t *length)
 {
-    leave(xcp);
+    end_session(xcp);
     xcp->connected = true;
     answer[1] = XCP_RESOURCE_CALIBRATION | XCP_RESOURCE_DAQ;
     answer[2] = 0x80; /* Intel byte order, byte addresses; more from GET_COMM_MODE_INFO */
@@ -31,7 +31,7 @@ static xcp_result_t connect(xcp_t *xcp, uint8_t *answer, uint8_t *length)
     return XCP_OK;
 }
 
-static uint8_t protection(const xcp_t *xcp)
+static uint8_t protected_resources(const xcp_t *xcp)
 {
     return xcp->unlocked ? 0 : XCP_RESOURCE_CALIBRATION;
 }
@@ -39,7 +39,7 @@ static uint8_t protection(const xcp_t *xcp)
 static xcp_result_t status(const xcp_t *xcp, uint8_t *answer, uint8_t *length)
 {
     answer[1] = xcp_daq_running(&xcp->daq) ? 0x40 : 0;
-    answer[2] = protection(xcp);
+    answer[2] = protected_resources(xcp);
     *length = 6;
     return XCP_OK;
 }
@@ -63,7 +63,7 @@ static xcp_result_t get_seed(xcp_t *xcp, const uint8_t *command, uint8_t *answer
     return XCP_OK;
 }
 
-/* A wrong key ends the session, as the protocol wants it; the seed is good for one try. */
+/* A wrong key ends the session, as the protocol demands; each seed is valid for one attempt. */
 static xcp_result_t unlock(xcp_t *xcp, const xcp_config_t *config, const uint8_t *command, uint8_t *answer,
                            uint8_t *length)
 {
@@ -75,12 +75,12 @@ static xcp_result_t unlock(xcp_t *xcp, const xcp_config_t *config, const uint8_t
     if (!right) {
         xcp->wrong_keys++;
         xcp->counts.locked_out += (xcp->wrong_keys == WRONG_KEYS_MAX) ? 1U : 0U;
-        leave(xcp);
+        end_session(xcp);
         return XCP_ERR_ACCESS_LOCKED;
     }
     xcp->wrong_keys = 0;
     xcp->unlocked = true;
-    answer[1] = protection(xcp);
+    answer[1] = protected_resources(xcp);
     *length = 2;
     return XCP_OK;
 }
@@ -92,7 +92,7 @@ xcp_result_t xcp_session_command(xcp_t *xcp, const xcp_config_t *config, const u
     case XCP_CONNECT:
         return connect(xcp, answer, length);
     case XCP_DISCONNECT:
-        leave(xcp);
+        end_session(xcp);
         return XCP_OK;
     case XCP_GET_STATUS:
         return status(xcp, answer, length);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef COMM_XCP_SESSION_H
 #define COMM_XCP_SESSION_H
-/** Connection, status, seed and key of the XCP slave. A wrong key ends the session; after three the slave gives no seed
- *   before its next reset.
+/** Connection, status, seed and key of the XCP slave. A wrong key ends the session; after three wrong
+ *   keys the slave gives no seed before its next reset.
  * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
  * Errors   the protocol's codes
  * Context  comm/xcp.c only */

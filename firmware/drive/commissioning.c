@@ -2,17 +2,17 @@
 #include "drive/mrai/mrai_seam.h"
 #include "fx/div.h"
 
-#define DEAD_TIME_MAX Q15(0.125) /* more voltage error than an eighth of the dc voltage is no inverter's */
-#define KNEE_CHANGED Q31(0.8)    /* a knee that is a quarter wider is measured, not noise */
+#define DEAD_TIME_MAX Q15(0.125) /* a larger share of the dc voltage is not a plausible voltage error */
+#define KNEE_CHANGED Q31(0.8)    /* a measured knee counts from a quarter wider on; smaller differences are noise */
 #define KNEE_RANGE 16
-#define MISMATCH_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
+#define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
 
 static int32_t product_q30(int32_t a_q30, q15_t b)
 {
     return (int32_t)(((int64_t)a_q30 * b) >> 15);
 }
 
-/* What has been compensated while it was measured, on top of what is left: the inverter's own (CM-2). */
+/* The measurement contains what the compensation left over; with the compensation it is the inverter's error (CM-2). */
 static void add_compensated(const modulate_config_t *config, q15_t v_dc, commission_curve_t *curve)
 {
     const int32_t full = config->dead_time_q16 / 2 * v_dc;
@@ -23,7 +23,7 @@ static void add_compensated(const modulate_config_t *config, q15_t v_dc, commiss
     curve->level = fx_add_q31(curve->level, full);
 }
 
-/* (CM-5): the straight line and the constant that come nearest to the curve. */
+/* (CM-5): slope of the straight line that, followed by a constant, approximates the curve. */
 static int32_t knee_gain(const modulate_config_t *config, const commission_curve_t *curve)
 {
     const int32_t gain = fx_div_q31(2, commission_knee(curve) >> 15); /* 2^17 over q15: 2^32 over counts */
@@ -33,7 +33,7 @@ static int32_t knee_gain(const modulate_config_t *config, const commission_curve
     return fx_max_s32(gain, config->knee_q17 / KNEE_RANGE);
 }
 
-static bool credible(const drive_t *drive, const commission_curve_t *curve)
+static bool is_plausible(const drive_t *drive, const commission_curve_t *curve)
 {
     const q31_t r0 = drive->motor.identify.r0;
     return curve->r > r0 / 4 && curve->r < r0 * INT64_C(3) / 2 && curve->level >= 0; /* Q30 against Q31 */
@@ -48,11 +48,11 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
     add_compensated(config, v_dc, curve);
     const q31_t dead_time = fx_div_q31(curve->level, v_dc * 32768);
     const compensation_t found = {fx_round_q15(dead_time / 2), knee_gain(config, curve), true};
-    return fits && credible(drive, curve) && drive_compensate(drive, &found);
+    return fits && is_plausible(drive, curve) && drive_compensate(drive, &found);
 }
 
-/* One word for the fast ISR; (MO-11) must hold before it adds more. */
-static void apply(motor_t *m, q15_t dead_time)
+/* One word for the fast ISR. A smaller bound (MO-11) must be in effect before a larger compensation is. */
+static void set_dead_time(motor_t *m, q15_t dead_time)
 {
     const uint32_t clear_q30 = motor_clear_q30(m, dead_time);
     if (clear_q30 < m->current_control.clear_q30) {
@@ -70,7 +70,7 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
         compensation->knee_q17 >= 1 << 30) {
         return false;
     }
-    apply(m, (q15_t)dead_time);
+    set_dead_time(m, (q15_t)dead_time);
     m->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
     m->modulate.knee_q17 = compensation->knee_q17;
     drive->task.compensation = *compensation;
@@ -94,7 +94,7 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     };
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {
-        apply(&drive->motor, out.dead_time);
+        set_dead_time(&drive->motor, out.dead_time);
         kalman->x_q27[IDENTIFY_DROP] = fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27);
     }
 }
@@ -102,10 +102,10 @@ void drive_trim(drive_t *drive, q15_t v_dc)
 void drive_retrim(drive_t *drive, int32_t trim)
 {
     motor_t *m = &drive->motor;
-    apply(m, dead_time_trim_restore(&drive->task.trim, (q15_t)(m->modulate.dead_time_q16 / 2), trim));
+    set_dead_time(m, dead_time_trim_restore(&drive->task.trim, (q15_t)(m->modulate.dead_time_q16 / 2), trim));
 }
 
-static void begin(drive_t *drive, const commission_config_t *config)
+static void start_if_running(drive_t *drive, const commission_config_t *config)
 {
     task_state_t *task = &drive->task;
     task->commissionings = drive->request.commissionings;
@@ -130,7 +130,7 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
         .limited = window->limited != 0U,
     };
     if (drive->request.commissionings != task->commissionings) {
-        begin(drive, config);
+        start_if_running(drive, config);
         return;
     }
     const bool ran = commission_runs(&task->commission);
@@ -139,7 +139,7 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
         return;
     }
     if (evaluate(drive, (q15_t)sample->v_dc)) {
-        task->identify.kalman.x_q27[IDENTIFY_DROP] = 0; /* what it stood for is compensated now */
+        task->identify.kalman.x_q27[IDENTIFY_DROP] = 0; /* the compensation now contains this voltage drop */
     } else {
         task->commission.phase = COMMISSION_FAILED;
         task->commission.failure = COMMISSION_FIT;

@@ -3,9 +3,9 @@
 #define DRIVE_EXCHANGE_H
 /** The boxes through which priorities exchange data; each has one writer.
  *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
- *   Upwards (task to the ISRs) the reader cannot be interrupted by its writer: one read is enough.
- *   Downwards (fast ISR to task) the reader may be: the task copies all it needs at once, and again if a period came in
- *   between. What goes to the paper's identification has a box of its own (drive/mrai).
+ *   From task to ISR, the writer cannot interrupt the reader: one read is enough.
+ *   From fast ISR to task, it can: the task copies all it needs, and copies again if a period came in between.
+ *   The paper's identification has a box of its own (drive/mrai).
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Errors   none
  * Context  stated per box */
@@ -25,11 +25,11 @@ typedef struct {
     fx_pair_t i_ab;   /* alpha, beta */
     int32_t zero_q28; /* mean of the phases */
     int32_t v_dc;
-    uint32_t theta_m;     /* mechanical, less what the sensor is known to be wrong by */
-    bool acting;          /* the bridge was on throughout the last period and is on now */
-    bool voltage_limited; /* the circle cut the voltage; a pulse that the bridge cannot make is no lack of it */
+    uint32_t theta_m;     /* mechanical, after correction of the sensor's known error */
+    bool acting;          /* the bridge switched throughout the last period and is switching now */
+    bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
-    uint32_t to_64_bytes; /* a power of two is quicker to find */
+    uint32_t to_64_bytes; /* unused: a size that is a power of two makes the slot's address cheaper to compute */
 } sample_t;
 
 typedef struct {
@@ -43,21 +43,21 @@ typedef struct {
     volatile uint32_t generation;
 } window_box_t;
 
-/** What the bridge does while it does not run: decided before the fault comes, acted on in the same period. */
+/** Safe state: decided by the task before a fault occurs, applied by the fast ISR in the period of the fault. */
 typedef enum {
     SAFE_FREEWHEEL = 0,             /* switching disabled */
     SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* low sides on if the fault is an over-voltage, else disabled */
-    SAFE_SHORT_CIRCUIT = 2          /* low sides closed */
+    SAFE_SHORT_CIRCUIT = 2          /* low sides on */
 } safe_t;
 
-/** What the task asks of the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
+/** Command of the task to the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
 typedef struct {
     current_target_t target;
     bool run;
     safe_t safe;
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
-    uint32_t fault_resets; /* counts up: each step asks the fast ISR to forget its faults once */
-    uint32_t to_32_bytes;  /* as above */
+    uint32_t fault_resets; /* counts up: the fast ISR clears its faults once for each count */
+    uint32_t to_32_bytes;  /* unused, as to_64_bytes */
 } command_t;
 
 typedef struct {
@@ -65,7 +65,7 @@ typedef struct {
     volatile uint32_t generation;
 } command_box_t;
 
-/* The compiler must not move the slot's stores behind the generation's. */
+/* Prevents the compiler from moving the stores to the slot behind the store to the generation. */
 static inline void exchange_barrier(void)
 {
     __asm__ volatile("" ::: "memory");
@@ -75,7 +75,7 @@ static inline void exchange_barrier(void)
 static inline sample_t *sample_box_begin(sample_box_t *box)
 {
     sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
-    __asm__("" : "+r"(slot)); /* the address once: not found anew at every use */
+    __asm__("" : "+r"(slot)); /* the address is computed once, not at every use */
     return slot;
 }
 
@@ -98,7 +98,7 @@ static inline sample_t sample_box_read(const sample_box_t *box)
     return copy;
 }
 
-/* In place: whoever may be interrupted by the fast ISR copies it and looks at the generation again. */
+/* In place: a reader that the fast ISR may interrupt must copy it and then compare the generation again. */
 static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t generation)
 {
     const sample_t *slot = &box->slot[generation & 1U];
@@ -113,7 +113,7 @@ static inline void window_box_write(window_box_t *box, const identify_window_t *
     box->generation = box->generation + 1U;
 }
 
-/* In place: the 1 kHz task copies it together with the sample, and again if a period has come in between. */
+/* In place: the 1 kHz task copies it together with the sample and repeats both if a period came in between. */
 static inline const identify_window_t *window_box_at(const window_box_t *box)
 {
     return &box->slot[box->generation & 1U];

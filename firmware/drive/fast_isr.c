@@ -6,9 +6,10 @@
  *
  * Three routes lead through it. The usual one (the bridge runs, nothing is latched, counted or out of its limits) skips
  * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions of 345.
- *   usual      fast_isr(): the order of the block diagram, written here once
- *   unsettled  run_period_unsettled(): the bridge rests or has just been enabled, or a fault or a counter is pending
- *   checked    run_period_checked(): the sample of a usual period is out of its limits; also the end of the unsettled
+ *   usual        fast_isr(): the order of the block diagram, written here once
+ *   not settled  run_period_not_settled(): the bridge is disabled or has just been enabled, or a fault or a counter is
+ *                pending
+ *   checked      run_period_checked(): a sample is out of its limits; also the second part of the route above
  * tests/unit/drive/test_fast_isr.c shows that the routes agree. */
 #include "control/current/transform.h"
 #include "drive/acquire.h"
@@ -49,7 +50,7 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
     drive->fast.periods_since_enable = 0;
 }
 
-/* A limit of the voltage circle or of the pulses acts: the voltage of the next period follows from the duties. */
+/* The voltage circle or a pulse limit is active: the voltage of the next period follows from the duties. */
 static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
                                                                    modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
 {
@@ -106,8 +107,8 @@ static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame
     hal_pwm_write(duty);
 }
 
-/* Before this period's monitors: what is still wrong is latched again at once. A reset never comes with the command to
- * run. Invalid motor data stay invalid. */
+/* Called before the monitors of this period, which latch a fault again at once if its cause persists. The task never
+ * sends a reset together with the command to run. Invalid motor data cannot be reset. */
 static void reset_faults(drive_t *drive, uint32_t requested)
 {
     if (drive->fast.fault_resets != requested) {
@@ -164,7 +165,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
     publish_sample(drive, sample);
 }
 
-static __attribute__((noinline, cold)) void run_period_unsettled(drive_t *drive)
+static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
     if (!command->run) {
@@ -175,12 +176,12 @@ static __attribute__((noinline, cold)) void run_period_unsettled(drive_t *drive)
     run_period_checked(drive, sample, acquired.angle_step);
 }
 
-/* The usual period. Everything it needs is compiled into the one interrupt, with a compiler that sees all files. */
+/* The usual period. With link-time optimisation all of its stages are compiled into this function. */
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
     if (__builtin_expect(!(drive->fast.is_settled & command->run), 0)) {
-        run_period_unsettled(drive);
+        run_period_not_settled(drive);
         return;
     }
     sample_t *sample = sample_box_begin(&drive->samples);

@@ -3,13 +3,13 @@
 #include "drive/mrai/mrai_seam.h"
 #include "hal/temperature.h"
 
-static bool at_limit(const identify_state_t *state, identify_index_t index)
+static bool is_at_limit(const identify_state_t *state, identify_index_t index)
 {
     return fx_abs_q31(state->kalman.x_q27[index]) >= 4 * IDENTIFY_ONE_Q27;
 }
 
-/* Share of the prior's variance that is gone. */
-static q15_t known(const identify_state_t *state, identify_index_t index)
+/* 1 - variance/prior variance. */
+static q15_t variance_reduction(const identify_state_t *state, identify_index_t index)
 {
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
@@ -26,14 +26,14 @@ static identification_t robust_identification(const drive_t *drive, const identi
         .psi_d_error = out->psi_delta,
         .torque_estimated = out->torque,
         .confidence = state->confidence,
-        .psi_quality = known(state, IDENTIFY_FLUX),
-        .r_quality = known(state, IDENTIFY_R),
-        .psi_clamped = at_limit(state, IDENTIFY_FLUX),
-        .r_clamped = at_limit(state, IDENTIFY_R),
+        .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
+        .r_quality = variance_reduction(state, IDENTIFY_R),
+        .psi_clamped = is_at_limit(state, IDENTIFY_FLUX),
+        .r_clamped = is_at_limit(state, IDENTIFY_R),
     };
 }
 
-/* The window summed by the fast ISR, the tables at its magnetising current, and what follows from both. */
+/* One step from the window of the fast ISR and the tables at its magnetising current. */
 static void robust_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const motor_t *m = &drive->motor;

@@ -8,7 +8,7 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     fast_state_t *fast = &drive->fast;
     sample_box_publish(&drive->samples);
     if (__builtin_expect(mrai_is_chosen(drive), 0)) {
-        identify_window_invalidate(&fast->window); /* it would have a gap */
+        identify_window_invalidate(&fast->window); /* this period is missing in it */
         mrai_offer(drive, sample);
         return;
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_PUBLISH_H
 #define DRIVE_PUBLISH_H
-/** The end of a period: its sample goes to the 1 kHz task and to the identification that is chosen.
- *   robust  the sums of a window are formed here   the paper's  its law runs in the interrupt below (drive/mrai)
+/** The last part of a period: its sample is passed to the 1 kHz task and to the chosen identification.
+ *   robust  the sums of a window are updated here;   the paper's  its law runs in a lower interrupt (drive/mrai)
  * Source   docs/architecture.md, shared data
  * Context  fast ISR */
 #include "drive/drive.h"

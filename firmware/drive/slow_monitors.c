@@ -11,7 +11,7 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     return (abc_q15_t){alpha, side - alpha / 2, -side - alpha / 2};
 }
 
-static uint32_t currents(drive_t *drive, const snapshot_t *snapshot)
+static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -29,7 +29,7 @@ static uint32_t currents(drive_t *drive, const snapshot_t *snapshot)
     return plausibility_step(&drive->motor.plausibility, &task->plausibility, &in);
 }
 
-static uint32_t torque(drive_t *drive, const sample_t *sample)
+static uint32_t check_torque(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     const torque_monitor_in_t in = {
@@ -45,5 +45,5 @@ static uint32_t torque(drive_t *drive, const sample_t *sample)
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
-    return currents(drive, snapshot) | torque(drive, &snapshot->sample);
+    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample);
 }

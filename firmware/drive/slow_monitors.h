@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_SLOW_MONITORS_H
 #define DRIVE_SLOW_MONITORS_H
-/** The monitors that have a millisecond's time, fed from the last sample and what was asked of it.
+/** The monitors of the 1 kHz task, with the last sample and the references that were in effect.
  * Source   docs/theory/monitors.md, docs/architecture.md
  * Errors   returns the confirmed faults; the fast ISR latches them, as it alone writes the fault word
  * Context  1 kHz task, before this step's references */
@@ -9,7 +9,7 @@
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot);
 
-/** For rigs whose currents answer to no voltage: the monitors that ask for a machine stay blind. */
+/** For test rigs without a machine, whose currents do not follow the voltage: disables the monitors that need one. */
 static inline void slow_monitors_without_machine(motor_t *m)
 {
     m->plausibility.e_0 = Q15_MAX;

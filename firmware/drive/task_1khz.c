@@ -6,8 +6,8 @@
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
 
-/* Switching that was never enabled stays disabled: the bridge may not even be powered. */
-static safe_t safe_state(drive_t *drive, const snapshot_t *snapshot)
+/* The short circuit is commanded only if the bridge has been switching before; otherwise it may not be powered. */
+static safe_t decide_safe_state(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const uint32_t faults = snapshot->faults;
@@ -18,24 +18,24 @@ static safe_t safe_state(drive_t *drive, const snapshot_t *snapshot)
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
-    const bool closed = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
-    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (closed || faults != 0U));
+    const bool short_circuit = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
+    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));
     if (!task->armed) {
         return SAFE_FREEWHEEL;
     }
-    if (closed) {
+    if (short_circuit) {
         return SAFE_SHORT_CIRCUIT;
     }
     return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
 }
 
-static run_state_t supervise(drive_t *drive, uint32_t faults)
+static run_state_t next_run_state(drive_t *drive, uint32_t faults)
 {
     const request_t *request = &drive->request;
     task_state_t *task = &drive->task;
-    const bool enable = request->enable; /* read once: a reset never goes down with the command to run */
+    const bool enable = request->enable; /* read once, so that a reset is never sent together with the command to run */
     if (request->fault_resets != task->fault_resets_asked) {
-        task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not kept for later */
+        task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not carried out later */
         task->fault_resets += enable ? 0U : 1U;
     }
     if (request->identification_resets != task->identification_resets) {
@@ -50,8 +50,8 @@ static run_state_t supervise(drive_t *drive, uint32_t faults)
     return enable ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
-/* What the voltage of this millisecond says about the plan of the last one. */
-static voltage_reserve_t reserve(drive_t *drive, const snapshot_t *snapshot)
+/* Compares the acting voltage with the plan of the last step. */
+static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const voltage_reserve_in_t in = {
@@ -65,7 +65,7 @@ static voltage_reserve_t reserve(drive_t *drive, const snapshot_t *snapshot)
     return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
 }
 
-/* An unlimited step needs voltage to follow it; near the voltage limit it would only make the currents oscillate. */
+/* A fast change of torque needs voltage. Near the voltage limit it would make the currents oscillate. */
 static q15_t slew_limit(const drive_t *drive)
 {
     const motor_t *m = &drive->motor;
@@ -94,8 +94,8 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
     return task->allowed.torque_limited;
 }
 
-/* Arbitrated -> limited -> commanded (slew) -> corrected (torque loop): docs/glossary.md. A limit that closes is not
- * slewed: what is no longer allowed or possible is not asked for. */
+/* Arbitrated -> limited -> commanded (slew) -> corrected (torque loop): docs/glossary.md. A falling limit
+ * acts at once, without slew. */
 static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
@@ -113,17 +113,17 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
     return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
 }
 
-/* What the identified |psi_q| is more than the tables'. */
+/* Identified |psi_q| minus the tables'. */
 static q15_t psi_q_delta(const drive_t *drive)
 {
     return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15((q15_t)drive->task.psi_ref.q));
 }
 
-static dq_q15_t references(drive_t *drive, const snapshot_t *snapshot)
+static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     task->torque_corrected = torque_path(drive, snapshot);
-    const voltage_reserve_t trim = reserve(drive, snapshot);
+    const voltage_reserve_t trim = update_voltage_reserve(drive, snapshot);
     const current_reference_in_t in = {
         .torque_corrected = task->torque_corrected,
         .v_dc = (q15_t)snapshot->sample.v_dc,
@@ -155,7 +155,7 @@ static void reset_torque_path(drive_t *drive)
     task->torque_corrected = 0;
 }
 
-/* What the fast ISR is to do until the next step; commanded: the operating point that follows from it. */
+/* Writes the command for the fast ISR. commanded: the operating point that follows from it. */
 static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
 {
     task_state_t *task = &drive->task;
@@ -165,7 +165,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         .fault_resets = task->fault_resets,
     };
     if (command.run) {
-        commanded->i = references(drive, snapshot);
+        commanded->i = compute_references(drive, snapshot);
         commanded->flux = flux_table_step(&drive->motor.flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
@@ -173,12 +173,12 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
     } else {
         reset_torque_path(drive);
     }
-    command.safe = safe_state(drive, snapshot);
+    command.safe = decide_safe_state(drive, snapshot);
     command_box_write(&drive->commands, command);
 }
 
-/* All from between the same two periods: copied again if one has come in between, for which the copying is too short to
- * happen twice. What the paper's identification writes later in the step waits for the next one. */
+/* Copies everything from the same period: if a period came in between, the copy is repeated. Copying is much shorter
+ * than a period, so one repetition suffices. What the paper's identification writes later is used in the next step. */
 static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
 {
     uint32_t generation;
@@ -206,7 +206,7 @@ void task_1khz(drive_t *drive)
     angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
     const uint32_t faults = slow_monitors_step(drive, &snapshot);
-    task->run_state = supervise(drive, snapshot.faults);
+    task->run_state = next_run_state(drive, snapshot.faults);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);
     operating_point_t commanded = snapshot.sample.point;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What tools must know about the values they read and write, made from the declarations themselves. The image carries
- * no byte of it: the linker script keeps the section out of memory; tools read it from the ELF. */
+/* Description of calibration and measurement values for tools, generated from their declarations. It takes no memory in
+ * the image: the linker script places the section outside of memory, and tools read it from the ELF file. */
 #include <stddef.h>
 
 #include "ecu/ecu.h"
@@ -31,7 +31,7 @@ typedef struct {
      .count = FREEZE_FRAME_SAMPLES, .offset = offsetof(ecu_t, freeze.id)},
 #define BASE(id, field, si) {.kind = "base", .name = #id, .unit = si, .offset = offsetof(motor_t, bases.field)},
 
-/* Not static: the link asks for it by name, since no code does. */
+/* Not static: no code refers to it, so the linker keeps it by its name. */
 extern const a2l_record_t a2l_records[];
 __attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
     CALIBRATION_LIST(VALUE) MEASUREMENT_LIST(MEASURE) FROZEN(frozen, U8, "", "1: a fault has frozen the frame")

@@ -3,7 +3,7 @@
 
 #define Q31_PER_Q15 65536
 
-static q31_t wanted_torque(const arbitrate_config_t *config, const arbitrate_in_t *in)
+static q31_t torque_target(const arbitrate_config_t *config, const arbitrate_in_t *in)
 {
     const bool moving = fx_abs_q31(in->omega) > config->omega_standstill;
     const bool braking = moving && (in->omega < 0) != (in->torque_requested < 0);
@@ -24,41 +24,41 @@ static bool stops_in_time(q31_t rate, q31_t jerk, int64_t distance)
 /* The rate's magnitude for this step, from the one before. */
 static q31_t next_rate(const arbitrate_config_t *config, q31_t rate, int64_t distance)
 {
-    const q31_t faster = (config->slew - rate > config->jerk) ? rate + config->jerk : config->slew;
-    if (stops_in_time(faster, config->jerk, distance)) {
-        return faster;
+    const q31_t increased = (config->slew - rate > config->jerk) ? rate + config->jerk : config->slew;
+    if (stops_in_time(increased, config->jerk, distance)) {
+        return increased;
     }
     const q31_t kept = stops_in_time(rate, config->jerk, distance) ? rate : rate - config->jerk;
-    return (kept > config->jerk) ? kept : config->jerk; /* less would never arrive */
+    return (kept > config->jerk) ? kept : config->jerk; /* a smaller rate might never reach the target */
 }
 
-static void follow(const arbitrate_config_t *config, arbitrate_state_t *state, q31_t wanted)
+static void ramp_to(const arbitrate_config_t *config, arbitrate_state_t *state, q31_t target)
 {
-    const int64_t error = (int64_t)wanted - state->torque_arbitrated;
+    const int64_t error = (int64_t)target - state->torque_arbitrated;
     const int64_t distance = (error < 0) ? -error : error;
-    const bool away = (state->rate < 0) != (error < 0);
-    const q31_t rate = next_rate(config, away ? 0 : fx_abs_q31(state->rate), distance);
+    const bool wrong_direction = (state->rate < 0) != (error < 0);
+    const q31_t rate = next_rate(config, wrong_direction ? 0 : fx_abs_q31(state->rate), distance);
     if (rate >= distance) {
-        *state = (arbitrate_state_t){.torque_arbitrated = wanted};
+        *state = (arbitrate_state_t){.torque_arbitrated = target};
         return;
     }
     state->rate = (error < 0) ? -rate : rate;
     state->torque_arbitrated = fx_add_q31(state->torque_arbitrated, state->rate);
 }
 
-static void drop(const arbitrate_config_t *config, arbitrate_state_t *state)
+static void ramp_out(const arbitrate_config_t *config, arbitrate_state_t *state)
 {
-    const q31_t most = config->ramp_out;
+    const q31_t max = config->ramp_out;
     const q31_t now = state->torque_arbitrated;
-    state->torque_arbitrated = fx_sub_q31(now, fx_clamp_q31(now, -most, most));
+    state->torque_arbitrated = fx_sub_q31(now, fx_clamp_q31(now, -max, max));
     state->rate = 0;
 }
 
 void arbitrate_hold(const arbitrate_config_t *config, arbitrate_state_t *state, q15_t torque_limited)
 {
-    const q31_t most = fx_add_q31(fx_abs_q15(torque_limited) * Q31_PER_Q15, config->jerk);
-    if (fx_abs_q31(state->torque_arbitrated) > most) {
-        *state = (arbitrate_state_t){.torque_arbitrated = fx_clamp_q31(state->torque_arbitrated, -most, most)};
+    const q31_t max = fx_add_q31(fx_abs_q15(torque_limited) * Q31_PER_Q15, config->jerk);
+    if (fx_abs_q31(state->torque_arbitrated) > max) {
+        *state = (arbitrate_state_t){.torque_arbitrated = fx_clamp_q31(state->torque_arbitrated, -max, max)};
     }
 }
 
@@ -66,10 +66,10 @@ q15_t arbitrate_step(const arbitrate_config_t *config, arbitrate_state_t *state,
 {
     if (!in->run) {
         *state = (arbitrate_state_t){0};
-    } else if (in->drop) {
-        drop(config, state);
+    } else if (in->ramp_out) {
+        ramp_out(config, state);
     } else {
-        follow(config, state, wanted_torque(config, in));
+        ramp_to(config, state, torque_target(config, in));
     }
     return fx_q15_from_q31(state->torque_arbitrated);
 }

@@ -8,16 +8,16 @@
 #include "hal/system.h"
 #include "hal/watchdog.h"
 
-#define FRAMES_PER_TASK 32 /* more than a bus of 1 Mbit/s delivers in a millisecond */
-#define SLEW_MS 40         /* full torque in so many milliseconds */
-#define JERK_MS 10         /* full slew in so many */
-#define RAMP_OUT_MS 15     /* from full torque to none, after the 30 ms of the time-out */
+#define FRAMES_PER_TASK 32 /* a bus of 1 Mbit/s delivers fewer in a millisecond */
+#define SLEW_MS 40         /* from zero to full torque */
+#define JERK_MS 10         /* from zero to full slew */
+#define RAMP_OUT_MS 15     /* from full torque to zero, after the time-out of 30 ms */
 #define ONE_Q30 1073741824.0F
 #define DEAD_BAND_NM 0.25F
 #define STANDSTILL Q31(0.002)
 
-/* What a millisecond changes, for a step. */
-static q31_t in_step(const step_clock_t *clock, q31_t per_ms)
+/* A change per millisecond as a change per step. */
+static q31_t per_step(const step_clock_t *clock, q31_t per_ms)
 {
     const float share = ((float)clock->step_us + (float)clock->step_ns * 1e-3F) * 1e-3F;
     return (q31_t)(((int64_t)(int32_t)(share * ONE_Q30) * per_ms) >> 30);
@@ -30,11 +30,11 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
     step_clock_start(&ecu->clock, (uint32_t)(source->bases.step_s * 1e9F + 0.5F));
     drive_init(&ecu->drive, source);
     xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, (uint32_t)hal_system_reset_cause());
-    const q31_t slew = in_step(&ecu->clock, full / SLEW_MS);
+    const q31_t slew = per_step(&ecu->clock, full / SLEW_MS);
     ecu->arbitration_config = (arbitrate_config_t){
         .slew = slew,
-        .jerk = in_step(&ecu->clock, slew / JERK_MS),
-        .ramp_out = in_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
+        .jerk = per_step(&ecu->clock, slew / JERK_MS),
+        .ramp_out = per_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
         .dead_band = (q15_t)(DEAD_BAND_NM / source->bases.torque_Nm * 32768.0F),
         .omega_standstill = STANDSTILL,
     };
@@ -63,7 +63,7 @@ static void set_outputs(const ecu_t *ecu)
     hal_board_set(BOARD_SAFE_STATE, (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U);
 }
 
-static void ask_drive(ecu_t *ecu)
+static void command_drive(ecu_t *ecu)
 {
     request_t *request = &ecu->drive.request;
     const arbitrate_in_t in = ecu_arbitration(ecu);
@@ -74,14 +74,14 @@ static void ask_drive(ecu_t *ecu)
     request->fault_resets = ecu->supervisor.resets;
 }
 
-static void count(uint16_t *counter)
+static void count_up(uint16_t *counter)
 {
     if (*counter < UINT16_MAX) {
         (*counter)++;
     }
 }
 
-static void guard(ecu_t *ecu)
+static void service_watchdog(ecu_t *ecu)
 {
     if (!ecu->liveness.started) {
         ecu->liveness.started = true;
@@ -89,11 +89,11 @@ static void guard(ecu_t *ecu)
     } else if (ecu->liveness.stalled_in_a_row == 0U) {
         hal_watchdog_service();
     } else {
-        count(&ecu->liveness.held);
+        count_up(&ecu->liveness.held);
     }
 }
 
-static void send(ecu_t *ecu)
+static void send_frames(ecu_t *ecu)
 {
     telemetry_t telemetry;
     can_frame_t frame;
@@ -107,12 +107,12 @@ static void send(ecu_t *ecu)
     for (tx_result_t r = can_tx_next(&ecu->tx, &telemetry, &frame); r != TX_NONE;
          r = can_tx_next(&ecu->tx, &telemetry, &frame)) {
         if (r == TX_NOT_A_NUMBER || !hal_can_send(&frame)) {
-            count(&ecu->not_sent);
+            count_up(&ecu->not_sent);
         }
     }
 }
 
-/* Behind the cyclic frames, and only while mailboxes are free: what waits is sent a millisecond later. */
+/* After the cyclic frames, and only while mailboxes are free; the rest waits for the next step. */
 static void send_xcp(ecu_t *ecu)
 {
     can_frame_t frame;
@@ -129,12 +129,12 @@ void ecu_task_1khz(ecu_t *ecu)
     const supervisor_in_t in = ecu_observe(ecu, hal_board_gate_fault());
     supervisor_step(&ecu->supervisor, &in);
     set_outputs(ecu);
-    ask_drive(ecu);
+    command_drive(ecu);
     task_1khz(&ecu->drive);
-    guard(ecu);
+    service_watchdog(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
     freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
                       ecu->clock.passed_ms);
-    send(ecu);
+    send_frames(ecu);
     send_xcp(ecu);
 }

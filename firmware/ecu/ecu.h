@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef ECU_ECU_H
 #define ECU_ECU_H
-/** The drive on a bus: receives what is asked, decides the state, arbitrates the torque, runs the drive's 1 kHz task,
- * tells what is.
+/** The drive on a bus: receives commands, decides the state, arbitrates the torque, runs the drive's 1 kHz task and
+ * transmits status.
  *   Ports call fast_isr(&ecu.drive), mrai_isr(&ecu.drive) and, instead of task_1khz(), ecu_task_1khz(&ecu).
  *   The watchdog is served only while both interrupts advance.
  * Source   docs/howto/can.md; docs/architecture.md
  * Units    per unit inside, the DBC's units on the bus
- * Errors   latched faults of drive and supervisor; told on the bus
+ * Errors   latched faults of drive and supervisor, transmitted on the bus
  * Context  ecu_init() once; ecu_task_1khz() every bases.periods_per_step periods */
 #include "calibration/xcp_access.h"
 #include "comm/can_rx.h"
@@ -19,18 +19,18 @@
 
 typedef struct {
     uint32_t periods, finished;   /* of the interrupts, at the last task */
-    uint16_t task_overruns, held; /* the watchdog was not served */
+    uint16_t task_overruns, held; /* held: steps without service of the watchdog */
     uint8_t late_in_a_row, stalled_in_a_row;
     bool started;
 } liveness_t;
 
 typedef struct {
-    int32_t reference; /* voltage that the present is compared with */
-    uint32_t us;       /* for so long it has stayed near */
+    int32_t reference; /* voltage that the present one is compared with */
+    uint32_t us;       /* time for which the voltage has stayed near the reference */
 } settling_t;
 
 typedef struct {
-    drive_t drive; /* first: a port that knows only the drive finds it here */
+    drive_t drive; /* first, so that the address of the ECU is also that of the drive */
     step_clock_t clock;
     can_rx_t rx;
     can_tx_t tx;

@@ -2,7 +2,7 @@
 #include "drive/mrai/mrai_seam.h"
 #include "ecu/ecu_private.h"
 
-#define IN_A_ROW 3U
+#define CONSECUTIVE_MAX 3U
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
 #define SETTLED_BAND Q15(0.01)  /* of V_b */
 #define SETTLED_US 50000U
@@ -12,7 +12,7 @@
 /* DeratingReason of the DBC. */
 enum { REASON_NONE = 0, REASON_LIMITS_LOST = 7 };
 
-/* The first that applies is told. Rated torque and the reach of voltage and current are no derating. */
+/* The first reason that applies is transmitted. Rated torque and the reach of voltage and current are not derating. */
 static const struct {
     uint16_t derating;
     uint8_t reason;
@@ -21,36 +21,36 @@ static const struct {
     {DERATING_POWER, 4},    {DERATING_MAGNET, 5},  {DERATING_SPEED, 8},
 };
 
-static void count(uint16_t *counter)
+static void count_up(uint16_t *counter)
 {
     if (*counter < UINT16_MAX) {
         (*counter)++;
     }
 }
 
-static uint8_t in_a_row(uint8_t before, bool again)
+static uint8_t consecutive(uint8_t before, bool again)
 {
-    return again ? (uint8_t)((before < IN_A_ROW) ? before + 1U : IN_A_ROW) : 0U;
+    return again ? (uint8_t)((before < CONSECUTIVE_MAX) ? before + 1U : CONSECUTIVE_MAX) : 0U;
 }
 
 void ecu_watch(ecu_t *ecu)
 {
-    liveness_t *seen = &ecu->liveness;
+    liveness_t *liveness = &ecu->liveness;
     const uint32_t periods = ecu->drive.samples.generation;
     const uint32_t finished = mrai_finished(&ecu->drive);
     const uint32_t in_step = ecu->drive.motor.bases.periods_per_step;
-    const bool late = seen->started && periods - seen->periods >= in_step + in_step / 2U;
-    const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == seen->finished;
-    seen->late_in_a_row = in_a_row(seen->late_in_a_row, late);
-    seen->stalled_in_a_row = in_a_row(seen->stalled_in_a_row, periods == seen->periods || unfinished);
+    const bool late = liveness->started && periods - liveness->periods >= in_step + in_step / 2U;
+    const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == liveness->finished;
+    liveness->late_in_a_row = consecutive(liveness->late_in_a_row, late);
+    liveness->stalled_in_a_row = consecutive(liveness->stalled_in_a_row, periods == liveness->periods || unfinished);
     if (late) {
-        count(&seen->task_overruns);
+        count_up(&liveness->task_overruns);
     }
-    seen->periods = periods;
-    seen->finished = finished;
+    liveness->periods = periods;
+    liveness->finished = finished;
 }
 
-static bool settled(settling_t *settling, int32_t v_dc, uint32_t elapsed_us)
+static bool is_dc_settled(settling_t *settling, int32_t v_dc, uint32_t elapsed_us)
 {
     const int32_t away = v_dc - settling->reference;
     if (away > SETTLED_BAND || away < -SETTLED_BAND) {
@@ -62,14 +62,14 @@ static bool settled(settling_t *settling, int32_t v_dc, uint32_t elapsed_us)
 }
 
 /* With switching disabled there is no current; while the bridge switches, the monitors check it. */
-static bool plausible(const drive_t *drive, const sample_t *sample)
+static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
 {
     const dq_q15_t i = sample->point.i;
     const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
     return drive->samples.generation != 0U && (idle || drive->request.enable);
 }
 
-/* sqrt(3) w psi: the peak of the line voltage that the turning magnet makes. */
+/* sqrt(3) w psi: peak of the line back-EMF. */
 static bool is_slow(const drive_t *drive, q31_t omega)
 {
     const float v_V = SQRT3 * (float)omega / 2147483648.0F * drive->motor.bases.omega_rad_s * drive->motor.psi_f_Vs;
@@ -82,14 +82,14 @@ static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
     return (share >= 1.0F) ? Q15_MAX : (share <= -1.0F) ? (q15_t)-Q15_MAX : (q15_t)(share * 32767.0F);
 }
 
-static bool limits_lost(const ecu_t *ecu)
+static bool are_limits_lost(const ecu_t *ecu)
 {
     return ecu->rx.limits_channel.seen && !ecu->rx.limits_channel.alive;
 }
 
 static uint32_t derating_reason(const ecu_t *ecu)
 {
-    if (limits_lost(ecu)) {
+    if (are_limits_lost(ecu)) {
         return REASON_LIMITS_LOST;
     }
     for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
@@ -107,11 +107,12 @@ static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
     return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
 }
 
-/* The torque limits are arbitrated: they move with slew. Lost battery limits take the torque away by the same ramp;
- * until it has ended the last ones hold, else the torque would first rise to what the ramp begins with. */
+/* Power limits of the battery. The torque limits are not among them: arbitration applies those, with its slew. When the
+ * battery limits are lost, arbitration ramps the torque to zero; the last limits are kept meanwhile, because without
+ * them the torque would rise at the start of the ramp. */
 torque_limits_t ecu_limits(const ecu_t *ecu)
 {
-    torque_limits_t limits = limits_lost(ecu) ? ecu->drive.request.limits : TORQUE_LIMITS_NONE;
+    torque_limits_t limits = are_limits_lost(ecu) ? ecu->drive.request.limits : TORQUE_LIMITS_NONE;
     if (ecu->rx.limits_channel.alive) {
         limits.power_drive = power_per_unit(ecu, ecu->rx.limits.drive_kW);
         limits.power_regen = power_per_unit(ecu, ecu->rx.limits.regen_kW);
@@ -137,14 +138,14 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
         .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
         .dc_in_range = sample.v_dc >= drive->motor.monitor.v_min && sample.v_dc <= drive->motor.monitor.v_max,
-        .dc_settled = settled(&ecu->settling, sample.v_dc, ecu->clock.elapsed_us),
+        .dc_settled = is_dc_settled(&ecu->settling, sample.v_dc, ecu->clock.elapsed_us),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
-        .sensors_plausible = plausible(drive, &sample),
+        .sensors_plausible = are_sensors_plausible(drive, &sample),
         .slow = is_slow(drive, sample.point.omega),
         .derated = derating_reason(ecu) != REASON_NONE,
         .gate_fault = gate_fault,
-        .task_late = ecu->liveness.late_in_a_row >= IN_A_ROW,
-        .stalled = ecu->liveness.stalled_in_a_row >= IN_A_ROW,
+        .task_late = ecu->liveness.late_in_a_row >= CONSECUTIVE_MAX,
+        .stalled = ecu->liveness.stalled_in_a_row >= CONSECUTIVE_MAX,
         .elapsed_us = ecu->clock.elapsed_us,
     };
 }
@@ -153,16 +154,16 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
 {
     const bus_command_t *command = &ecu->rx.command;
     const supervisor_t *supervisor = &ecu->supervisor;
-    /* Never more than the machine gives: a ramp to zero would first have to come down from beyond. */
-    const q15_t most = limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor.torque_max;
+    /* At most the rated torque: a ramp to zero from a larger value would reach the machine late. */
+    const q15_t max = are_limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor.torque_max;
     return (arbitrate_in_t){
         .torque_requested = per_unit(ecu, command->torque_requested_Nm),
-        .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, most),
-        .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, most),
+        .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, max),
+        .limit_regen = fx_clamp_q15(per_unit(ecu, command->limit_regen_Nm), 0, max),
         .omega = sample_box_read(&ecu->drive.samples).point.omega,
         .run = supervisor_outputs[supervisor->state].run,
         .stop = !supervisor->enabled,
-        .drop = !ecu->rx.command_channel.alive || supervisor->faults != 0U,
+        .ramp_out = !ecu->rx.command_channel.alive || supervisor->faults != 0U,
     };
 }
 

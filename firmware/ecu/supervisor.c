@@ -5,7 +5,7 @@
 #define SELF_TEST_TIME_OUT_MS 500U
 #define PRECHARGE_TIME_OUT_MS 2000U
 #define DISCHARGE_TIME_OUT_MS 5000U
-#define FORGETTING_STEPS 3U /* until the drive has done a reset */
+#define RESET_STEPS 3U /* until the drive has carried out a reset */
 #define STATE_TIME_MAX_US 60000000U /* far beyond every time-out */
 #define FIRST_ECU_FAULT 33U
 
@@ -16,7 +16,7 @@ static bool refuse(supervisor_t *s, refused_t reason)
     return false;
 }
 
-/* Whether an edge of enable may close the gates. */
+/* Whether a rising edge of enable enables switching; if not, the reason is recorded. */
 static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
 {
     if (in->current_mode) {
@@ -48,7 +48,7 @@ static void follow_enable(supervisor_t *s, const supervisor_in_t *in)
             (void)refuse(s, REFUSED_TIMED_OUT);
         }
         s->enabled = false;
-        s->enable_seen = true; /* what comes back must show enable off first */
+        s->enable_seen = true; /* after a time-out a command with enable off must come first */
         return;
     }
     if (in->enable && !s->enable_seen) {
@@ -64,18 +64,18 @@ static uint32_t bit_if(bool condition, uint32_t bit)
     return condition ? bit : 0U;
 }
 
-static bool too_long(const supervisor_t *s, ecu_state_t state, uint32_t most_ms)
+static bool is_timed_out(const supervisor_t *s, ecu_state_t state, uint32_t max_ms)
 {
-    return s->state == state && s->us > most_ms * 1000U;
+    return s->state == state && s->us > max_ms * 1000U;
 }
 
-static uint16_t causes(const supervisor_t *s, const supervisor_in_t *in)
+static uint16_t present_faults(const supervisor_t *s, const supervisor_in_t *in)
 {
     const uint32_t now = bit_if(in->failed, ECU_FAULT_PROTECTION) | bit_if(in->gate_fault, ECU_FAULT_GATE) |
                          bit_if(in->task_late, ECU_FAULT_TASK) | bit_if(in->stalled, ECU_FAULT_STALL) |
-                         bit_if(too_long(s, STATE_INIT, SELF_TEST_TIME_OUT_MS), ECU_FAULT_SELF_TEST) |
-                         bit_if(too_long(s, STATE_PRECHARGE, PRECHARGE_TIME_OUT_MS), ECU_FAULT_PRECHARGE) |
-                         bit_if(too_long(s, STATE_DISCHARGE, DISCHARGE_TIME_OUT_MS), ECU_FAULT_DISCHARGE);
+                         bit_if(is_timed_out(s, STATE_INIT, SELF_TEST_TIME_OUT_MS), ECU_FAULT_SELF_TEST) |
+                         bit_if(is_timed_out(s, STATE_PRECHARGE, PRECHARGE_TIME_OUT_MS), ECU_FAULT_PRECHARGE) |
+                         bit_if(is_timed_out(s, STATE_DISCHARGE, DISCHARGE_TIME_OUT_MS), ECU_FAULT_DISCHARGE);
     return (uint16_t)now;
 }
 
@@ -88,8 +88,8 @@ static uint8_t lowest_bit(uint32_t bits)
     return bit;
 }
 
-/* Notes what is new; of several in one step the drive's lowest bit is the first. */
-static void note(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
+/* Records new faults. Of several in one step the lowest bit of the drive counts as the first. */
+static void record_new_faults(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
 {
     if (new_drive == 0U && new_ecu == 0U) {
         return;
@@ -101,13 +101,13 @@ static void note(supervisor_t *s, uint32_t new_drive, uint32_t new_ecu)
     }
 }
 
-static void latch(supervisor_t *s, const supervisor_in_t *in)
+static void latch_faults(supervisor_t *s, const supervisor_in_t *in)
 {
-    const uint16_t now = causes(s, in);
-    const bool forgetting = s->forgetting > 0U;
-    note(s, forgetting ? 0U : in->drive_faults & ~s->drive_faults_seen, now & ~(uint32_t)s->faults);
-    s->drive_faults_seen = forgetting ? 0U : in->drive_faults;
-    s->forgetting = forgetting ? (uint8_t)(s->forgetting - 1U) : (uint8_t)0;
+    const uint16_t now = present_faults(s, in);
+    const bool reset_pending = s->reset_pending > 0U;
+    record_new_faults(s, reset_pending ? 0U : in->drive_faults & ~s->drive_faults_seen, now & ~(uint32_t)s->faults);
+    s->drive_faults_seen = reset_pending ? 0U : in->drive_faults;
+    s->reset_pending = reset_pending ? (uint8_t)(s->reset_pending - 1U) : (uint8_t)0;
     s->faults = (uint16_t)(s->faults | now);
 }
 
@@ -123,9 +123,9 @@ static void follow_reset(supervisor_t *s, const supervisor_in_t *in)
         return;
     }
     s->resets++;
-    s->faults = 0; /* what is still there is new again */
+    s->faults = 0; /* a fault that is still present is latched again as a new one */
     s->first_fault = 0;
-    s->forgetting = FORGETTING_STEPS;
+    s->reset_pending = RESET_STEPS;
 }
 
 static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
@@ -145,7 +145,7 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
            bit_if((s->faults & ECU_FAULT_DISCHARGE) != 0U, WHEN_NOT_DISCHARGING);
 }
 
-static void move(supervisor_t *s, uint32_t now)
+static void take_transition(supervisor_t *s, uint32_t now)
 {
     for (uint32_t n = 0; n < supervisor_transitions; n++) {
         const transition_t *row = &supervisor_table[n];
@@ -161,9 +161,9 @@ void supervisor_step(supervisor_t *supervisor, const supervisor_in_t *in)
 {
     supervisor->us += (supervisor->us < STATE_TIME_MAX_US) ? in->elapsed_us : 0U;
     follow_reset(supervisor, in);
-    latch(supervisor, in);
+    latch_faults(supervisor, in);
     follow_enable(supervisor, in);
-    move(supervisor, conditions(supervisor, in));
+    take_transition(supervisor, conditions(supervisor, in));
     if (!supervisor_outputs[supervisor->state].run && supervisor->state != STATE_READY) {
         supervisor->enabled = false;
     }

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef ECU_SUPERVISOR_H
 #define ECU_SUPERVISOR_H
-/** The state machine of the inverter: which board outputs are on, and when the gates may close.
- *   In every step the conditions of the moment are collected in one word; the first row of supervisor_table whose
- *   state is the current one and whose conditions are all there is taken. Outputs depend on the state alone.
- *   Torque is left by a ramp: run and derate end, other than by a trip, when the torque has reached zero.
- *   Enable counts as an edge, seen in a frame of the bus, in state ready, with no torque requested, no fault, plausible
- *   sensors and the dc voltage in range; else it is refused and the reason is told.
- * Source   docs/howto/can.md, where the drawing is made from the same table
- * Units    us of true time; the longest that is waited for is 5 s
- * Errors   its own faults are latched in state.faults (ecu_fault_t) until a reset finds their cause gone
+/** The state machine of the inverter: which board outputs are on, and when switching may be enabled.
+ *   In every step the present conditions are collected in one word. The first row of supervisor_table that begins in
+ *   the present state and whose conditions all hold is taken. Outputs depend on the state alone.
+ *   Except for a trip, run and derate end only when a ramp has brought the torque to zero.
+ *   Enable is accepted at a rising edge in a frame of the bus, in state ready, with no torque requested, no fault,
+ *   plausible sensors and the dc voltage in range; otherwise it is refused and the reason is transmitted.
+ * Source   docs/howto/can.md, whose drawing is made from the same table
+ * Units    us of true time; the longest time-out is 5 s
+ * Errors   its own faults are latched in faults (ecu_fault_t) until a reset after their cause has gone
  * Context  1 kHz task; pure decisions */
 #include <stdbool.h>
 #include <stdint.h>
@@ -30,8 +30,8 @@ typedef enum {
 /** Latched by the supervisor, bits of EcuFaults on the bus. */
 typedef enum {
     ECU_FAULT_PROTECTION = 1U << 0, /* 3 of 10 commands bad */
-    ECU_FAULT_PRECHARGE = 1U << 1,  /* dc voltage not there in time */
-    ECU_FAULT_DISCHARGE = 1U << 2,  /* dc voltage not gone in time */
+    ECU_FAULT_PRECHARGE = 1U << 1,  /* dc voltage not reached in time */
+    ECU_FAULT_DISCHARGE = 1U << 2,  /* dc link not discharged in time */
     ECU_FAULT_GATE = 1U << 3,       /* gate driver */
     ECU_FAULT_TASK = 1U << 4,       /* the 1 kHz task came late 3 times in a row */
     ECU_FAULT_STALL = 1U << 5,      /* an interrupt stood still */
@@ -53,20 +53,20 @@ typedef enum {
 /** Conditions of a transition, one bit each. */
 typedef enum {
     WHEN_SELF_TEST_PASSED = 1U << 0,
-    WHEN_TRIPPED = 1U << 1, /* a fault that opened the gates or must do so at once */
+    WHEN_TRIPPED = 1U << 1, /* a fault that has disabled switching or must do so at once */
     WHEN_FAULTED = 1U << 2, /* any latched fault */
     WHEN_HEALTHY = 1U << 3, /* none */
     WHEN_ON = 1U << 4,      /* a live command asks for mode torque */
     WHEN_OFF = 1U << 5,     /* a live command asks for mode off */
     WHEN_CHARGED = 1U << 6, /* dc voltage in range and settled */
     WHEN_DISCHARGED = 1U << 7,
-    WHEN_DANGEROUS = 1U << 8, /* not discharged, and discharging has not failed */
+    WHEN_DANGEROUS = 1U << 8, /* dc link charged, and discharging has not failed */
     WHEN_ENABLED = 1U << 9,   /* enable was asked for and granted */
     WHEN_STOPPED = 1U << 10,  /* not enabled and no torque left */
     WHEN_NO_TORQUE = 1U << 11,
     WHEN_DERATED = 1U << 12,
     WHEN_FULL = 1U << 13,           /* not derated */
-    WHEN_SLOW = 1U << 14,           /* the machine's voltage is below what may be touched: it can feed nothing */
+    WHEN_SLOW = 1U << 14,           /* back-EMF below the voltage that is safe to touch: it cannot charge the dc link */
     WHEN_NOT_DISCHARGING = 1U << 15 /* discharging took too long */
 } supervisor_when_t;
 
@@ -87,7 +87,7 @@ typedef struct {
     bool torque_mode, current_mode;
     bool enable, reset;
     bool torque_requested_is_zero, torque_arbitrated_is_zero;
-    bool dc_in_range, dc_settled, dc_safe; /* safe: below the voltage that may be touched */
+    bool dc_in_range, dc_settled, dc_safe; /* safe: below the voltage that is safe to touch */
     bool sensors_plausible;
     bool slow;
     bool derated;
@@ -97,11 +97,11 @@ typedef struct {
 
 typedef struct {
     ecu_state_t state;
-    uint32_t us; /* in this state, the step that looks at it included; saturates */
+    uint32_t us; /* in this state, including the present step; saturates */
     uint16_t faults;
     uint8_t first_fault, fault_count; /* first: 1 ... 32 drive faults, 33 ... ecu faults */
     uint32_t drive_faults_seen;
-    uint8_t forgetting;           /* steps: a reset is on its way to the drive */
+    uint8_t reset_pending;        /* steps until the drive has carried out a reset */
     bool enable_seen, reset_seen; /* as the last live command had them */
     bool enabled;
     refused_t refused;

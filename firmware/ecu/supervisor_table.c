@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/supervisor.h"
 
-/* The first row that fits is taken: what is urgent comes first. docs/howto/can.md draws this table. */
+/* The first row that applies is taken, so urgent transitions come first. docs/howto/can.md contains a drawing of it. */
 const transition_t supervisor_table[] = {
     {STATE_INIT, WHEN_FAULTED, STATE_FAULT},
     {STATE_INIT, WHEN_SELF_TEST_PASSED, STATE_STANDBY},

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef ECU_TELEMETRY_H
 #define ECU_TELEMETRY_H
-/** The drive's state in physical units: everything the bus tells that the drive itself knows.
- *   i_dc = 1.5 (u_d i_d + u_q i_q)/v_dc: from power, as there is no sensor; without the losses of the bridge
+/** The drive's state in physical units, for transmission on the bus.
+ *   i_dc = 1.5 (u_d i_d + u_q i_q)/v_dc: computed from power, because there is no sensor; without the bridge's losses
  * Source   docs/scaling.md (SC-1) ... (SC-5)
  * Units    SI or as the names of telemetry_t say
  * Errors   i_dc is 0 below 1 V

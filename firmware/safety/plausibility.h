@@ -7,8 +7,8 @@
  *   sensor stuck       20 equal samples of a phase while both others change by more than i_dead/4 in each
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
+ *   These times are counted in steps of the task, rounded up.
  * Source   docs/theory/monitors.md (MN-1) ... (MN-5)
- *   Counted are steps of the task, as many as cover these times.
  * Units    per unit; temperatures in tenths of a degree C, INT16_MIN: unknown
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them

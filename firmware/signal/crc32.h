@@ -3,8 +3,8 @@
 #define SIGNAL_CRC32_H
 /** CRC-32 of stored records and of the tables in flash.
  *   polynomial 0x04C11DB7, bits reflected, start value and final inversion 0xFFFFFFFF; "123456789" gives 0xCBF43926
- * Source   IEEE 802.3; the same as zlib's crc32(), with which tools compute it
- * Range    any size; a long area can be checked in pieces: start with CRC32_START, invert the last answer
+ * Source   IEEE 802.3; the same as zlib's crc32(), which the tools use
+ * Range    any size; a long area can be checked in pieces: start with CRC32_START, invert the last result
  * Errors   none
  * Context  start-up and background; 16-word table, two look-ups per byte */
 #include <stdint.h>

@@ -2,7 +2,7 @@
 #ifndef SIGNAL_RATE_LIMIT_H
 #define SIGNAL_RATE_LIMIT_H
 /** Slew limit: the output follows the target by at most rate per step.
- *   y[k] = y[k-1] + clamp(x - y[k-1], -rate, +rate); rate = Q15_MAX is open: the target at once
+ *   y[k] = y[k-1] + clamp(x - y[k-1], -rate, +rate); with rate = Q15_MAX there is no limit and y = x
  * Source   docs/theory/torque-loop.md (TL-10)
  * Units    those of the signal
  * Range    rate [0, Q15_MAX]; every x, y

@@ -2,16 +2,16 @@
 #ifndef SIGNAL_STEP_CLOCK_H
 #define SIGNAL_STEP_CLOCK_H
 /** True time for a task whose step is not exactly one millisecond.
- *   Every step adds its length in nanoseconds. elapsed_us is what has been added to the whole microseconds, passed_ms
- *   what has been added to the whole milliseconds: they vary by one from step to step, and their sums never drift.
- *   An age adds elapsed_us in every step; it has reached a limit in the first step in which that time has passed.
- *   A cycle is due in the step in which its millisecond has passed.
+ *   Every step adds its length in nanoseconds. elapsed_us is the number of whole microseconds, passed_ms of whole
+ *   milliseconds, that became complete in this step: both vary by one from step to step, and their sums never drift.
+ *   An age adds elapsed_us in every step and reaches its limit in the first step in which that time has passed.
+ *   A cyclic message is due in the step in which its millisecond has passed.
  * Source   docs/decisions/010-true-time.md
  * Units    as named; ms wraps after 49 days
  * Range    steps of 0.8 ... 1.25 ms; anything else counts as 1 ms, so that time passes even with damaged data
  * Rounding none: exact in nanoseconds
  * Errors   none
- * Context  step_clock_start() once, step_clock_step() first thing in each step; no division but in the start */
+ * Context  step_clock_start() once, step_clock_step() at the start of each step; only step_clock_start() divides */
 #include <stdint.h>
 
 #define STEP_CLOCK_NOMINAL_NS 1000000U

@@ -6,7 +6,7 @@
 #include "signal/crc32.h"
 
 #define VERSION 3U /* of record_t */
-#define MISMATCH_MAX Q15(0.25) /* half of what takes the torque loop's confidence away */
+#define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
 
 /* No padding: the store's checksum runs over its bytes. */
 typedef struct {
@@ -49,7 +49,7 @@ static bool at_rest(const drive_t *drive)
            command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT;
 }
 
-/* Counters wrap after 49 days: only their differences count. */
+/* The counters wrap after 49 days; only differences are used. */
 static bool is_due(const memory_t *memory, const drive_t *drive, uint32_t now)
 {
     return memory->has_run && now - memory->rest_since >= in_steps(drive, MEMORY_REST_MS) &&

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef STORAGE_MEMORY_H
 #define STORAGE_MEMORY_H
-/** Keeps what the drive has learnt over a power cycle, in the store's two slots.
- *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that the values are counted in:
- *     a record of other firmware, another motor or other priors is not found
- *   a save needs a run since the last one, MEMORY_REST_MS of rest (switching disabled, nothing latched), parameters
- *     that agree with the model, and MEMORY_INTERVAL_MS since the last save; the first one after a start comes at once
+/** Keeps the identified values over a power cycle, in the store's two slots.
+ *   layout = CRC-32 of the record's version, the motor's name, its bases and the priors that scale the values: a record
+ *     of another firmware, another motor or other priors is not used
+ *   A save needs a run since the last save, MEMORY_REST_MS with switching disabled and no fault, a mismatch share below
+ *     1/4, and MEMORY_INTERVAL_MS since the last save; the interval does not apply to the first save after a start.
  * Source   docs/decisions/007-store.md
- * Units    ms are counted in steps of the robust identification, which alone learns what is kept
- * Errors   a memory that is empty, damaged or foreign leaves the priors; a save that fails is counted and tried again
- *          after the interval, the record of before stays
+ * Units    ms are counted in steps of the robust identification, whose values are stored
+ * Errors   if the memory is empty, damaged or of another layout, the priors are used; a save that fails is counted and
+ *          repeated after the interval, and the previous record stays valid
  * Context  memory_recall(): after drive_init(), before the interrupts. memory_background(): the port's idle loop, below
  *          every interrupt. A port without a driver for hal/nvm.h calls neither */
 #include "drive/drive.h"

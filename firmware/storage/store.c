@@ -30,30 +30,30 @@ static bool stored_crc(uint32_t slot, const header_t *header, uint32_t *crc)
     uint32_t sum = header_crc(header);
     for (uint32_t done = 0; done < header->size; done += CHUNK) {
         const uint32_t left = header->size - done;
-        const uint32_t now = (left < CHUNK) ? left : CHUNK;
-        if (!hal_nvm_read(slot, STORE_HEADER_SIZE + done, chunk, now)) {
+        const uint32_t size_now = (left < CHUNK) ? left : CHUNK;
+        if (!hal_nvm_read(slot, STORE_HEADER_SIZE + done, chunk, size_now)) {
             return false;
         }
-        sum = crc32_update(sum, chunk, now);
+        sum = crc32_update(sum, chunk, size_now);
     }
     *crc = ~sum;
     return true;
 }
 
-static slot_t inspect(uint32_t slot)
+static slot_t check_slot(uint32_t slot)
 {
-    slot_t seen = {.state = SLOT_DAMAGED};
+    slot_t result = {.state = SLOT_DAMAGED};
     uint32_t crc = 0;
-    if (!hal_nvm_read(slot, 0, &seen.header, STORE_HEADER_SIZE)) {
-        return seen;
+    if (!hal_nvm_read(slot, 0, &result.header, STORE_HEADER_SIZE)) {
+        return result;
     }
-    const header_t *h = &seen.header;
+    const header_t *h = &result.header;
     if (h->layout == UINT32_MAX && h->size == UINT32_MAX && h->sequence == UINT32_MAX && h->crc == UINT32_MAX) {
-        seen.state = SLOT_BLANK;
+        result.state = SLOT_BLANK;
     } else if (h->size <= STORE_RECORD_MAX && stored_crc(slot, h, &crc) && crc == h->crc) {
-        seen.state = SLOT_INTACT;
+        result.state = SLOT_INTACT;
     }
-    return seen;
+    return result;
 }
 
 /* The slot with the newest intact record; HAL_NVM_SLOTS if there is none. The sequence may wrap. */
@@ -70,16 +70,16 @@ static uint32_t newest(const slot_t slot[HAL_NVM_SLOTS])
 
 store_result_t store_load(uint32_t layout, void *record, uint32_t size)
 {
-    const slot_t slot[HAL_NVM_SLOTS] = {inspect(0), inspect(1)};
-    const uint32_t best = newest(slot);
-    if (best == HAL_NVM_SLOTS) {
+    const slot_t slot[HAL_NVM_SLOTS] = {check_slot(0), check_slot(1)};
+    const uint32_t newest_slot = newest(slot);
+    if (newest_slot == HAL_NVM_SLOTS) {
         const bool damaged = slot[0].state == SLOT_DAMAGED || slot[1].state == SLOT_DAMAGED;
         return damaged ? STORE_DAMAGED : STORE_EMPTY;
     }
-    if (slot[best].header.layout != layout || slot[best].header.size != size) {
+    if (slot[newest_slot].header.layout != layout || slot[newest_slot].header.size != size) {
         return STORE_EMPTY;
     }
-    return hal_nvm_read(best, STORE_HEADER_SIZE, record, size) ? STORE_OK : STORE_DAMAGED;
+    return hal_nvm_read(newest_slot, STORE_HEADER_SIZE, record, size) ? STORE_OK : STORE_DAMAGED;
 }
 
 static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
@@ -101,15 +101,15 @@ static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
 
 bool store_save(uint32_t layout, const void *record, uint32_t size)
 {
-    const slot_t slot[HAL_NVM_SLOTS] = {inspect(0), inspect(1)};
-    const uint32_t best = newest(slot);
-    const uint32_t target = (best == 0U) ? 1U : 0U;
+    const slot_t slot[HAL_NVM_SLOTS] = {check_slot(0), check_slot(1)};
+    const uint32_t newest_slot = newest(slot);
+    const uint32_t target = (newest_slot == 0U) ? 1U : 0U;
     header_t header = {.layout = layout, .size = size};
     if (size > STORE_RECORD_MAX) {
         return false;
     }
-    header.sequence = (best == HAL_NVM_SLOTS) ? 0U : slot[best].header.sequence + 1U;
+    header.sequence = (newest_slot == HAL_NVM_SLOTS) ? 0U : slot[newest_slot].header.sequence + 1U;
     header.crc = ~crc32_update(header_crc(&header), record, size);
     return hal_nvm_erase(target) && program_record(target, record, size) &&
-           hal_nvm_program(target, 0, &header, STORE_HEADER_SIZE) && inspect(target).state == SLOT_INTACT;
+           hal_nvm_program(target, 0, &header, STORE_HEADER_SIZE) && check_slot(target).state == SLOT_INTACT;
 }

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef STORAGE_STORE_H
 #define STORAGE_STORE_H
-/** One record that survives a power cycle: what the drive has learnt.
+/** One record that survives a power cycle.
  *   Each slot: header {layout, size, sequence, crc}, then the record. A save erases and writes the slot that does not
- *   hold the newest record, the header last, so that a cut at any byte leaves the record of before or the new one.
+ *   hold the newest record, the header last, so that a power cut at any byte leaves either the previous or the new
+ *   record intact.
  * Source   docs/decisions/007-store.md
  * Range    size <= STORE_RECORD_MAX; layout names the record's meaning: a record of another layout is not found
- * Errors   store_load(): STORE_EMPTY, nothing was ever saved, or under another layout; STORE_DAMAGED, records are there
- *          but none is intact; the caller's record is touched only by STORE_OK. store_save(): false, the memory refused
- *          or did not keep what was written; the record of before is still the valid one
+ * Errors   store_load(): STORE_EMPTY, no record was saved with this layout; STORE_DAMAGED, there are records but none
+ *          is intact; the caller's record changes only with STORE_OK. store_save(): false, the memory failed to erase,
+ *          program or verify; the previous record is still valid
  * Context  background, below every interrupt; the caller copies a consistent record first */
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_BASES_H
 #define TYPES_BASES_H
-/** The bases that turn SI into per unit; the only place where the drive's scale is written down.
+/** The bases that convert SI to per unit; the only place where the drive's scale is stored.
  *   psi_b = V_b/omega_b   Z_b = V_b/I_b   L_b = Z_b/omega_b   T_b = 1.5 p psi_b I_b,
  *   so that torque is psi_d i_q - psi_q i_d with no constant.
  * Source   docs/scaling.md (SC-1) ... (SC-5), (SC-10)

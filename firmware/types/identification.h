@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_IDENTIFICATION_H
 #define TYPES_IDENTIFICATION_H
-/** What an identification knows about the machine, whichever law found it.
+/** Result of the identification, in the same form for both laws.
  *   psi_delta  magnet flux minus the tables';  r_delta  resistance minus that at 20 C
  *   psi_d_error  d-axis flux minus the tables' at the present current: what current control feeds forward
  *   torque_estimated  air-gap torque, mean over the last step;  torque_variance_q30  of it
@@ -9,7 +9,7 @@
  * Source   docs/theory/identification.md (ID-15) ... (ID-18); docs/theory/mrai.md
  * Units    per unit of the bases in types/bases.h
  * Range    confidence and qualities 0 ... 1; torque_variance_q30 Q30, Q31_MAX: the law does not state one
- * Errors   clamped: the parameter rests on its limit, what stands here is the limit
+ * Errors   clamped: the parameter is at its limit, and the limit is what is reported
  * Context  written by the 1 kHz task once per step */
 #include <stdbool.h>
 

@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_OPERATING_POINT_H
 #define TYPES_OPERATING_POINT_H
-/** Where the machine is in one PWM period: what every identification and every monitor starts from.
+/** Operating point of the machine in one PWM period: input of both identifications and of the monitors.
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6) for the flux; docs/theory/current-control.md for the voltage
  * Units    per unit of the bases in types/bases.h; g = omega_b T_s/l < 1: one period of full voltage must not reach I_b
- * Range    q15 fields in a word each: halfwords would cost an extension at every use
+ * Range    each q15 field is a word, because a halfword would have to be sign-extended at every use
  * Context  values only */
 #include "types/frames.h"
 
-/** What the flux tables answer at one current. */
+/** Result of the flux tables at one current. */
 typedef struct {
     int32_t psi_d;  /* psi_f0 + l_d i_d, nominal magnet */
     int32_t psi_q;  /* l_q i_q */
     int32_t psi_f0; /* psi_d at i_d = 0 for this i_q, nominal magnet */
-    int32_t g;      /* (1/l_dd + 1/l_qq) omega_b T_s/2, as the observer's poles want it */
+    int32_t g;      /* (1/l_dd + 1/l_qq) omega_b T_s/2, from which the observer's poles follow */
 } flux_point_t;
 
 typedef struct {

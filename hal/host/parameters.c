@@ -251,7 +251,7 @@ static int set_calibration(fluxtrue_t *drive, const char *name, double value)
     if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi)) {
         return FLUXTRUE_OUT_OF_RANGE;
     }
-    calibration_put(&drive->drive.motor, id, (float)value);
+    calibration_set(&drive->drive.motor, id, (float)value);
     return FLUXTRUE_OK;
 }
 

@@ -21,7 +21,7 @@ typedef struct {
     q31_t kp;
     int32_t ki_q29;     /* k_i 2 pi/(omega_b T_s): turns per period to per unit */
     int32_t pu_to_turn; /* omega_b T_s/(2 pi) 2^34: speed in Q30 to advance per period */
-    uint32_t max_step;  /* largest credible |e| in one period, 2^32 = one turn */
+    uint32_t max_step;  /* largest plausible |e| in one period, 2^32 = one turn */
     q16_t turn_to_pu;   /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
 } angle_tracker_config_t;
 

@@ -61,7 +61,7 @@ static int32_t clamp_symmetric(int32_t x, int32_t limit)
 static int32_t remaining_voltage(int32_t other)
 {
     const uint16_t *table = fx_circle_table;
-    __asm__("" : "+r"(table)); /* else found from the address of another table */
+    __asm__("" : "+r"(table)); /* otherwise computed from the address of another table */
     return table[(other ^ (other >> 31)) >> 7];
 }
 

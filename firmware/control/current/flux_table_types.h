@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CURRENT_FLUX_TABLE_TYPES_H
 #define CURRENT_FLUX_TABLE_TYPES_H
-/** What the flux-table service answers for one operating point; the values other stages consume.
+/** Result of the flux tables for one operating point.
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
  * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full
  *          voltage must not reach I_b
- * Range    q15 in a word each: halfwords would cost an extension at every use
+ * Range    each q15 value is a word, because a halfword would have to be sign-extended at every use
  * Context  values only */
 #include "types/operating_point.h"
 

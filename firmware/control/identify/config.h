@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef IDENTIFY_CONFIG_H
 #define IDENTIFY_CONFIG_H
-/** Data of the robust identification: the machine's constants and what is not known about them before the first drive.
+/** Data of the robust identification: the machine's constants and their uncertainty before the first drive.
  * Source   docs/theory/identification.md; written by `tools/fluxtrue motor build` from [identification]
  * Units    per unit; sigma[k] is one standard deviation of the prior of state k
  * Range    identify_valid() checks it at start-up
@@ -35,18 +35,19 @@ typedef struct {
     q31_t iron_eddy;           /* k_e omega_b/1.5 */
     q16_t iron_sign_gain;      /* slope of the hysteresis term's sign through zero speed */
     q31_t sigma[IDENTIFY_STATES];
-    q31_t leak[IDENTIFY_STATES]; /* per update: towards the prior, mean and variance alike */
+    q31_t leak[IDENTIFY_STATES]; /* per update: return of state and variance to the prior */
     int32_t r_known_q30;         /* prior variance of R, of sigma^2, while the winding temperature is measured */
     int32_t noise_voltage_q30, noise_flux_q30, noise_rate_q30; /* of the residuals' standard deviation */
-    q15_t omega_min, i_min;                                    /* below either nothing is learnt */
-    q15_t i_smooth;                                            /* below it the drop's direction fades */
-    q15_t local_corner;                     /* speed at which voltage and flux errors weigh the same */
-    q31_t local_rate;                       /* of the local flux error's filter, per step */
-    q16_t limited_noise;                    /* share of the noise that each period with limited pulses adds: 5/N */
-    q15_t mismatch_rate;                    /* first-order coefficient of the mismatch share, per update */
-    q15_t torque_min;                       /* uncertainty is relative to the torque, but to this at least */
-    q15_t confidence_full, confidence_none; /* relative torque uncertainty that opens and closes the torque loop */
-    q15_t confidence_rate;                  /* of the confidence, per update */
+    q15_t omega_min, i_min;                                    /* no parameter update below either */
+    q15_t i_smooth;      /* below it the assumed voltage drop decreases with the current */
+    q15_t local_corner;  /* speed at which voltage and flux errors weigh the same */
+    q31_t local_rate;    /* of the local flux error's filter, per step */
+    q16_t limited_noise; /* share of the noise that each period with limited pulses adds: 5/N */
+    q15_t mismatch_rate; /* first-order coefficient of the mismatch share, per update */
+    q15_t torque_min;    /* the uncertainty is relative to the torque, and to this value at smaller torque */
+    q15_t confidence_full,
+        confidence_none;   /* relative torque uncertainty below which the confidence rises, above which it falls */
+    q15_t confidence_rate; /* of the confidence, per update */
 } identify_config_t;
 
 bool identify_valid(const identify_config_t *config);

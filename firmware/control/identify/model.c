@@ -6,7 +6,7 @@
 #include "fx/vec.h"
 
 /* l x with l in q15 of 2^l_shift and x in Q30: Q30. */
-static int32_t induced(const identify_config_t *config, int32_t l, int32_t x)
+static int32_t flux_of_current(const identify_config_t *config, int32_t l, int32_t x)
 {
     return fx_shl_q31(fx_mulhi(l * 65536, x), 1U + config->l_shift); /* Q31 * Q30 = Q29 */
 }
@@ -17,8 +17,8 @@ static int32_t direction(int32_t i_q15, q15_t magnitude)
     return (int32_t)fx_div_q15((q15_t)i_q15, magnitude) * 32768;
 }
 
-static void derivatives(const identify_config_t *config, const identify_tables_t *tables, const identify_point_t *point,
-                        identify_model_t *m)
+static void flux_derivatives(const identify_config_t *config, const identify_tables_t *tables,
+                             const identify_point_t *point, identify_model_t *m)
 {
     const flux_point_t *flux = &tables->flux;
     const flux_inductances_t *l = &tables->inductances;
@@ -28,13 +28,13 @@ static void derivatives(const identify_config_t *config, const identify_tables_t
     m->iron_i = (dq_q30_t){identify_mul(a, m->psi.q), -identify_mul(a, m->psi.d)};
     m->psi_q.h_q30[IDENTIFY_LQ] = m->psi.q;
     m->psi_d.h_q30[IDENTIFY_LD] = (flux->psi_d - flux->psi_f0) * 32768;
-    m->psi_d.h_q30[IDENTIFY_ANGLE] = fx_sub_q31(m->psi.q, induced(config, l->l_d, m->i_m.q));
-    m->psi_q.h_q30[IDENTIFY_ANGLE] = fx_sub_q31(induced(config, l->l_qq, m->i_m.d), m->psi.d);
-    m->psi_d.h_q30[IDENTIFY_IRON] = induced(config, l->l_d, m->iron_i.d);
-    m->psi_q.h_q30[IDENTIFY_IRON] = induced(config, l->l_qq, m->iron_i.q);
+    m->psi_d.h_q30[IDENTIFY_ANGLE] = fx_sub_q31(m->psi.q, flux_of_current(config, l->l_d, m->i_m.q));
+    m->psi_q.h_q30[IDENTIFY_ANGLE] = fx_sub_q31(flux_of_current(config, l->l_qq, m->i_m.d), m->psi.d);
+    m->psi_d.h_q30[IDENTIFY_IRON] = flux_of_current(config, l->l_d, m->iron_i.d);
+    m->psi_q.h_q30[IDENTIFY_IRON] = flux_of_current(config, l->l_qq, m->iron_i.q);
 }
 
-/* Derivatives by the states to derivatives by their sigmas. */
+/* Derivatives by the states to flux_derivatives by their sigmas. */
 static void per_sigma(const identify_config_t *config, jacobian_row_t *row)
 {
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
@@ -42,7 +42,8 @@ static void per_sigma(const identify_config_t *config, jacobian_row_t *row)
     }
 }
 
-static void rows(const identify_config_t *config, const identify_point_t *point, q31_t r_prior, identify_model_t *m)
+static void jacobian_rows(const identify_config_t *config, const identify_point_t *point, q31_t r_prior,
+                          identify_model_t *m)
 {
     const int32_t w = point->omega >> 1; /* Q30 */
     const dq_q15_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
@@ -69,8 +70,8 @@ void identify_model(const identify_config_t *config, const identify_point_t *poi
                     q31_t r_prior, identify_model_t *model)
 {
     *model = (identify_model_t){.current = false};
-    derivatives(config, tables, point, model);
-    rows(config, point, r_prior, model);
+    flux_derivatives(config, tables, point, model);
+    jacobian_rows(config, point, r_prior, model);
 }
 
 jacobian_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)
@@ -88,9 +89,10 @@ jacobian_row_t identify_torque_row(const identify_config_t *config, const identi
 int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_q30_t psi,
                              dq_q30_t i_m)
 {
-    const int32_t ends = fx_sub_q31(identify_mul(psi.d, i_m.q), identify_mul(psi.q, i_m.d));
+    const int32_t torque_at_ends = fx_sub_q31(identify_mul(psi.d, i_m.q), identify_mul(psi.q, i_m.d));
     /* Q30/Q15 = Q15, with l in q15 of 2^l_shift; no table has an l below 1. */
     const int32_t product = identify_mul(identify_mul(chord, psi.d), psi.q);
-    const int32_t salient = fx_sub_q31(product / fx_max_s32(l->l_qq, 1), product / fx_max_s32(l->l_d, 1));
-    return fx_sub_q31(ends, fx_add_q31(identify_mul(chord, ends), fx_shl_q31(salient, 15U - config->l_shift)));
+    const int32_t salient_part = fx_sub_q31(product / fx_max_s32(l->l_qq, 1), product / fx_max_s32(l->l_d, 1));
+    return fx_sub_q31(torque_at_ends,
+                      fx_add_q31(identify_mul(chord, torque_at_ends), fx_shl_q31(salient_part, 15U - config->l_shift)));
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef IDENTIFY_MODEL_H
 #define IDENTIFY_MODEL_H
-/** What the tables say of an operating point, and how each unknown would change it.
+/** Voltage and torque that the tables predict at an operating point, and their derivatives by the states.
  *   residual  y = u - R i - w J psi(i_m) - d psi/dt     h = d(voltage)/d(state), per sigma, both axes
  *   torque    t = psi_d i_mq - psi_q i_md               h_t = dt/d(state), per sigma
- *   mean of a period, in which flux moves along a chord:   t - theta^2/12 (t + psi_d psi_q (1/l_qq - 1/l_d))
+ *   mean over a period, in which the flux moves along a chord:   t - theta^2/12 (t + psi_d psi_q (1/l_qq - 1/l_d))
  * Source   docs/theory/identification.md (ID-5) ... (ID-8), (ID-20)
  * Units    per unit, Q30
  * Range    |h| is limited to 1/4
@@ -29,9 +29,9 @@ typedef struct {
     dq_q30_t psi; /* of the tables, at i_m */
     dq_q30_t i_m;
     dq_q30_t iron_i; /* change of i_m with the scale of the iron loss */
-    bool current;    /* enough current for the drop to have a direction */
+    bool current;    /* the current is large enough to define the direction of the voltage drop */
     jacobian_row_t d, q;
-    jacobian_row_t psi_d, psi_q; /* change of psi with each state, but for the magnet's flux, with which it is one */
+    jacobian_row_t psi_d, psi_q; /* change of psi with each state but the magnet's flux, for which it is 1 */
 } identify_model_t;
 
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify/point.h"
 
-/* Q15 * Q32 = Q47 -> Q31; |twice| < 2^22. A call from each axis takes less room than two copies, here and below. */
-static __attribute__((noinline)) q31_t mean(const identify_config_t *config, int32_t twice)
+/* Q15 * Q32 = Q47 -> Q31; |twice_sum| < 2^22. Not inlined, here and below: two calls take less memory than two
+ * copies. */
+static __attribute__((noinline)) q31_t mean(const identify_config_t *config, int32_t twice_sum)
 {
-    return fx_sat_q31(((int64_t)twice * config->mean_gain_q32) >> 16);
+    return fx_sat_q31(((int64_t)twice_sum * config->mean_gain_q32) >> 16);
 }
 
 /* 2 sum_{1..N} - last + first: the trapezoidal mean. */
@@ -13,7 +14,7 @@ static q31_t trapezoid(const identify_config_t *config, int32_t sum, int32_t fir
     return mean(config, 2 * sum - last + first);
 }
 
-/* The voltages of the N periods are those stated at samples 0 ... N - 1. Q30, divided by sinc (MR-5). */
+/* The N periods begin with samples 0 ... N - 1, which hold their voltages. Q30, divided by sinc (MR-5). */
 static int32_t acting_voltage(const identify_config_t *config, int32_t sum, int32_t first, int32_t last, q31_t sinc)
 {
     const q31_t u = mean(config, 2 * (sum - last + first));
@@ -29,14 +30,14 @@ static __attribute__((noinline)) int32_t flux_rate(const identify_config_t *conf
     return fx_mulhi_sub(rate >> 1, rate, 2 * sinc);
 }
 
-/* The tracked speed lags in acceleration: only the whole turns are taken from it (ID-2). */
-static q31_t mean_speed(const identify_config_t *config, uint32_t turned, q31_t tracked)
+/* The tracked speed lags during acceleration and serves only to count whole turns (ID-2). */
+static q31_t mean_speed(const identify_config_t *config, uint32_t angle_change, q31_t tracked)
 {
     const uint32_t expected = (uint32_t)(((int64_t)tracked * config->window_turns_q29) >> 28);
-    return fx_add_q31(tracked, fx_mul_gain_q31(config->turn_to_pu, (int32_t)(turned - expected)));
+    return fx_add_q31(tracked, fx_mul_gain_q31(config->turn_to_pu, (int32_t)(angle_change - expected)));
 }
 
-/* a in q31: hysteresis turns its sign gradually through standstill (ID-4). */
+/* a in q31. The hysteresis term changes its sign gradually through zero speed (ID-4). */
 static q31_t iron_admittance(const identify_config_t *config, q31_t omega)
 {
     const q31_t sign = fx_mul_gain_q31(config->iron_sign_gain, omega);

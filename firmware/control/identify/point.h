@@ -2,13 +2,13 @@
 #ifndef IDENTIFY_POINT_H
 #define IDENTIFY_POINT_H
 /** One operating point from the N periods of a window: means, speed, change of flux, magnetising current.
- *   i = trapezoidal mean, u = mean acting voltage/sinc, w = turn of the measured angle over the window
+ *   i = trapezoidal mean, u = mean acting voltage/sinc, w = change of the measured angle over the window
  *   i_m = i + a (psi_q, -psi_d),  a = (k_h sgn w + k_e w)/1.5
  * Source   docs/theory/identification.md (ID-1) ... (ID-4)
  * Units    per unit
- * Range    |w| < 1; the tracked speed says how many whole turns the angle made
+ * Range    |w| < 1; the number of whole turns follows from the tracked speed
  * Rounding half up, 1/2 LSB of Q30
- * Errors   saturates; valid is false where nothing may be learnt from the window's voltage
+ * Errors   saturates; valid is false if the window's voltage must not be used
  * Context  1 kHz task */
 #include "control/identify/config.h"
 #include "control/identify/window.h"
@@ -19,7 +19,7 @@ typedef struct {
     dq_q15_t i_m;
     q31_t omega;
     q31_t iron;        /* a */
-    int32_t chord_q30; /* theta^2/12: what the mean flux of a period lacks of the sampled one (ID-20) */
+    int32_t chord_q30; /* theta^2/12: relative difference of sampled and mean flux of a period (ID-20) */
     uint8_t limited;
     bool valid;
 } identify_point_t;

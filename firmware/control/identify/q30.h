@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef IDENTIFY_Q30_H
 #define IDENTIFY_Q30_H
-/** Products of the identification's 1 kHz part: Q30 with a range of +-2, for sums need no care.
+/** Products of the identification's 1 kHz part: Q30 has a range of +-2.
  *   identify_mul: Q30 * Q30 = Q28, brought back with saturation; identify_sigma: Q31 * Q30 = Q29, limited to 1/4
  * Source   docs/theory/identification.md, section 12
  * Units    per unit

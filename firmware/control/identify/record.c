@@ -3,14 +3,14 @@
 
 #define X_MAX_Q27 (4U * IDENTIFY_ONE_Q27)
 
-/* A stop of unknown length adds 2^-n of the prior's variance (ID-19): winding and magnet have cooled, the inverter's
- * temperature and the machine's geometry have hardly changed. */
+/* A stop of unknown length adds 2^-n of the prior's variance (ID-19): winding and magnet may have cooled; the voltage
+ * drop of the inverter and the machine's geometry hardly change. */
 static const uint8_t added_variance_shift[IDENTIFY_STATES] = {
     [IDENTIFY_R] = 0,  [IDENTIFY_DROP] = 3,  [IDENTIFY_FLUX] = 2, [IDENTIFY_LQ] = 8,
     [IDENTIFY_LD] = 8, [IDENTIFY_ANGLE] = 8, [IDENTIFY_IRON] = 6,
 };
 
-/* The torque depends on magnet and q axis: both are known as well as (ID-18) demands. */
+/* The torque depends mainly on magnet and q axis: both must be known as well as (ID-18) demands. */
 static bool is_torque_certain(const kalman_t *kalman)
 {
     const int32_t level = IDENTIFY_ONE_Q30 / 8 * 3;

@@ -5,7 +5,8 @@
  *   restore  P_jj = min(1, stored + growth during the stop), covariances between states 0; the confidence starts at 1
  *            if the variances of magnet and q axis are then below 3/8 of their priors'
  * Source   docs/theory/identification.md (ID-19)
- * Units    as in control/identify/kalman.h; the record holds no padding, so that a checksum over its bytes is sound
+ * Units    as in control/identify/kalman.h; the record has no padding, so that a checksum over its bytes is well
+ *          defined
  * Range    a record of another version or with a value out of range is refused and changes nothing
  * Errors   false: refused
  * Context  start-up (restore) and background (get); the caller computes and checks the checksum */

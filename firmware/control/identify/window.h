@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef IDENTIFY_WINDOW_H
 #define IDENTIFY_WINDOW_H
-/** The identification's part of every period: sums over one step of the 1 kHz task, N periods, nothing else.
- *   sum_i over samples 1 ... N, sum_u over the voltages stated with them, and both ends of the N periods
+/** The identification's part of every period: sums over the N periods of one step of the 1 kHz task.
+ *   sum_i over samples 1 ... N, sum_u over their voltages, and the samples at both ends of the N periods
  * Source   docs/theory/identification.md (ID-1)
  * Units    q15 counts in words; angles 2^32 = one turn
  * Range    N up to 40: |sum| <= 40 * 2^15; the ends saturate
  * Rounding none: exact
- * Errors   acting is false if the bridge was not ours in one of the periods
+ * Errors   acting is false if the bridge did not switch throughout one of the periods
  * Context  fast ISR; no multiplication, no division, no loop */
 #include <stdbool.h>
 #include <stdint.h>
@@ -15,7 +15,7 @@
 #include "control/current/flux_table_types.h"
 #include "types/frames.h"
 
-/* Halfwords: kept for one window, in three windows. */
+/* In halfwords, because three windows are stored. */
 typedef struct {
     dq_q15_halfword_t i, u, psi; /* u acts during the period that starts here */
     uint32_t theta;
@@ -24,8 +24,8 @@ typedef struct {
 typedef struct {
     dq_q15_t sum_i, sum_u;
     identify_end_t first, last;
-    uint32_t left;   /* periods to come */
-    uint8_t limited; /* of those so far, with pulses that the bridge cannot make */
+    uint32_t left;   /* periods still to come */
+    uint8_t limited; /* periods so far with clamped pulses */
     bool acting;
 } identify_window_t;
 
@@ -35,21 +35,21 @@ typedef struct {
     uint32_t theta;
 } identify_sample_t;
 
-/** Before the step of a period whose voltage was not ours. */
+/** Before the step of a period whose voltage is unknown. */
 static inline void identify_window_invalidate(identify_window_t *window)
 {
     window->acting = false;
 }
 
-/** Before the step of a period with pulses that the bridge cannot make. */
+/** Before the step of a period with clamped pulses. */
 static inline void identify_window_count_limited(identify_window_t *window)
 {
     window->limited++;
 }
 
-/** True: all periods are complete in *window, to be taken and then restarted. */
+/** True: the window is complete; the caller copies it and then restarts it. */
 bool identify_window_step(identify_window_t *window, const identify_sample_t *in);
-/** Anew from its last end, over so many periods. */
+/** The last sample becomes the first of the next window. */
 void identify_window_restart(identify_window_t *window, uint32_t periods);
 
 #endif

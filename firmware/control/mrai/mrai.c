@@ -3,14 +3,14 @@
 
 #include "fx/q.h"
 
-/* 4 pu. The slow poles make e = T_s w dpsi/(2 s2) large: 1.5 pu for a magnet 15 % weak at full speed on hsm1. A
- * tighter bound winds up. */
+/* Limit of the observer error: 4 pu. With slow poles e = T_s w dpsi/(2 s2) is large: 1.5 pu at full speed for a magnet
+ * that is 15 % weak (hsm1). A tighter limit would falsify the adaptation. */
 #define ERROR_BITS 30
-/* |s2 e| < 1/16 in the laws: Q35 fits, and the small steps of the adaptation keep their digits. */
+/* |s2 e| < 1/16 in the laws: it fits Q35, in which small steps of the adaptation are not rounded away. */
 #define INNOVATION_BITS 24
 #define INNOVATION_SCALE 256
 
-/* Of the d equation (MR-7). */
+/* Weight of the d equation (MR-7). */
 #define WEIGHT_D 2
 
 /* Formats that only this law uses. */
@@ -26,7 +26,7 @@ typedef struct {
     int32_t d, q;
 } dq_q35_t;
 
-static bool limits_valid(q31_t lo, q31_t hi)
+static bool are_limits_valid(q31_t lo, q31_t hi)
 {
     return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
 }
@@ -36,8 +36,8 @@ bool mrai_valid(const mrai_config_t *config)
     const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 && config->period <= Q31(0.78) &&
                        config->flux_gain >= 0 && config->resistance_gain >= 0 && config->flux_proportional_q24 >= 0 &&
                        config->resistance_proportional_q24 >= 0;
-    return gains && limits_valid(config->psi_delta_min, config->psi_delta_max) &&
-           limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
+    return gains && are_limits_valid(config->psi_delta_min, config->psi_delta_max) &&
+           are_limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
            config->psi_drift_full > 0 && config->r_drift_full > 0;
 }
 
@@ -52,14 +52,15 @@ static q31_t adapt(q31_t integral, q31_t step, fx_arch_two_t limits)
 {
     const q31_t moved = fx_sub_q31(integral, step);
     if (__builtin_expect(moved < limits.first || moved > limits.second, 0)) {
-        return fx_arch_opaque(fx_clamp_q31(moved, limits.first, limits.second)); /* a branch: nothing else pays */
+        return fx_arch_opaque(
+            fx_clamp_q31(moved, limits.first, limits.second)); /* a branch, free while no limit acts */
     }
     return moved;
 }
 
-/* The proportional part acts on top of the integral for this step only. Q31 * Q24 = Q23; limited to 1/2 pu so that the
- * sum with the limited integral cannot overflow. */
-static q31_t used(q31_t integral, q31_t step, int32_t proportional_q24)
+/* The parameter used in this step: integral part plus proportional part. Q31 * Q24 = Q23; limited to 1/2 pu, so that
+ * the sum with the limited integral part cannot overflow. */
+static q31_t with_proportional_part(q31_t integral, q31_t step, int32_t proportional_q24)
 {
     return integral - fx_sat_bits(fx_mulhi(step, proportional_q24), 23) * 256;
 }
@@ -70,7 +71,7 @@ static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_stat
     const q31_t step = fx_mulhi(step_q28, innovation_q);
     const q31_t moved = adapt(state->psi_delta, step, fx_arch_load_two(&config->psi_delta_min));
     state->psi_delta = moved;
-    return used(moved, step, config->flux_proportional_q24);
+    return with_proportional_part(moved, step, config->flux_proportional_q24);
 }
 
 /* (7) normalised: dR -= k s2 (2 i_d e_d + i_q e_q), i weighted, Q28. Q35 * Q28 = Q31, at most 1/8; * Q26 = Q25,
@@ -82,44 +83,47 @@ static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mra
     const q31_t step = fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64;
     const q31_t moved = adapt(state->r_delta, step, fx_arch_load_two(&config->r_delta_min));
     state->r_delta = moved;
-    return used(moved, step, config->resistance_proportional_q24);
+    return with_proportional_part(moved, step, config->resistance_proportional_q24);
 }
 
-/* With the weight of each equation. */
+/* Current with the weight of each equation. */
 static dq_q28_t weighted(const dq_q15_t *i)
 {
     const fx_arch_two_t read = fx_arch_load_two(&i->d);
     return (dq_q28_t){read.first * (8192 * WEIGHT_D), read.second * 8192};
 }
 
-/* Half a period's rotational and resistive voltage at one of its ends, as flux: half of T_s (R^ i_d - w psi_q) and of
- * T_s (R^ i_q + w (psi_d + dpsi)), weighted (MR-6). Q30 * Q28 = Q26, which is the half in Q27. */
+/* One of the two terms of the trapezoidal mean of rotational and resistive voltage, as flux: T_s/2 (R^ i_d - w psi_q)
+ * and T_s/2 (R^ i_q + w (psi_d + dpsi)) at one end of the period, weighted (MR-6). Q30 * Q28 = Q26, which is half in
+ * Q27. */
 static dq_q27_t half_voltage(const mrai_config_t *config, const operating_point_t *in, dq_q28_t i, q31_t psi_used,
                              q31_t r_used, dq_q15_t *psi)
 {
     const fx_arch_two_t r0_period = fx_arch_load_two(&config->r0);
     const int32_t drop_q30 = fx_mulhi(fx_add_q31(r0_period.first, r_used), r0_period.second);
     const dq_q27_t drop = {fx_mulhi(drop_q30, i.d), fx_mulhi(drop_q30, i.q)};
-    const int32_t turn_q30 = fx_mulhi(in->omega, r0_period.second);
+    const int32_t rotation_q30 = fx_mulhi(in->omega, r0_period.second);
     const fx_arch_two_t table = fx_arch_load_two(&in->flux.psi_d);
     *psi = (dq_q15_t){table.first, table.second};
     const int32_t psi_d_q28 = psi->d * 8192 + (psi_used >> 3);
-    return (dq_q27_t){fx_mulhi_sub(drop.d, turn_q30, psi->q * (8192 * WEIGHT_D)),
-                      fx_mulhi_add(drop.q, turn_q30, psi_d_q28)};
+    return (dq_q27_t){fx_mulhi_sub(drop.d, rotation_q30, psi->q * (8192 * WEIGHT_D)),
+                      fx_mulhi_add(drop.q, rotation_q30, psi_d_q28)};
 }
 
-/* This sample's share of the period that begins with it. */
-static void begin(const mrai_schedule_t *schedule, mrai_state_t *state, const dq_q15_t *u, dq_q15_t psi, dq_q27_t e,
-                  dq_q27_t half)
+/* The terms of the next error that this sample, the first of its period, already determines. */
+static void begin_period(const mrai_schedule_t *schedule, mrai_state_t *state, const dq_q15_t *u, dq_q15_t psi,
+                         dq_q27_t e, dq_q27_t half)
 {
     state->e_d_q27 = e.d;
     state->e_q_q27 = e.q;
-    const fx_arch_two_t volt_q28 = fx_arch_load_two(&schedule->minus_voltage_d_q28);
+    const fx_arch_two_t voltage_gain_q28 = fx_arch_load_two(&schedule->minus_voltage_d_q28);
     const fx_arch_two_t u_q15 = fx_arch_load_two(&u->d);
-    const int32_t begun_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, volt_q28.first, u_q15.first * 65536);
-    const int32_t begun_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, volt_q28.second, u_q15.second * 65536);
-    state->begun_d_q27 = begun_d;
-    state->begun_q_q27 = begun_q;
+    const int32_t predicted_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, voltage_gain_q28.first,
+                                             u_q15.first * 65536);
+    const int32_t predicted_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, voltage_gain_q28.second,
+                                             u_q15.second * 65536);
+    state->predicted_d_q27 = predicted_d;
+    state->predicted_q_q27 = predicted_q;
 }
 
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
@@ -127,7 +131,7 @@ void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mr
 {
     dq_q15_t psi;
     const dq_q27_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);
-    begin(schedule, state, &in->u, psi, (dq_q27_t){0, 0}, half);
+    begin_period(schedule, state, &in->u, psi, (dq_q27_t){0, 0}, half);
 }
 
 /* The voltage equation over the period that ends with this sample, in flux (MR-6); trapezoidal means make it exact in
@@ -139,16 +143,16 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
     const int32_t s2_q32 = fx_mul_q31_word(config->pole_gain, in->flux.g);
     const fx_arch_two_t last = fx_arch_load_two(&state->e_d_q27);
     const dq_q27_t s2e = {fx_mulhi(s2_q32, last.first), fx_mulhi(s2_q32, last.second)};
-    const int32_t fresh_q = innovation(s2e.q);
-    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, fresh_q);
-    const dq_q35_t fresh = {innovation(s2e.d), fresh_q};
+    const int32_t innovation_q = innovation(s2e.q);
+    const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, innovation_q);
+    const dq_q35_t innovations = {innovation(s2e.d), innovation_q};
     const dq_q28_t i = weighted(&in->i);
-    const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, fresh);
+    const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, innovations);
     dq_q15_t psi;
     const dq_q27_t half = half_voltage(config, in, i, psi_used, r_used, &psi);
-    const fx_arch_two_t begun = fx_arch_load_two(&state->begun_d_q27);
-    const dq_q27_t e = {begun.first - s2e.d + s2e.q, begun.second - s2e.d - s2e.q};
+    const fx_arch_two_t predicted = fx_arch_load_two(&state->predicted_d_q27);
+    const dq_q27_t e = {predicted.first - s2e.d + s2e.q, predicted.second - s2e.d - s2e.q};
     const dq_q27_t now = {fx_sat_bits(e.d + psi.d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
                           fx_sat_bits(e.q + psi.q * 4096 + half.q, ERROR_BITS)};
-    begin(schedule, state, &in->u, psi, now, half);
+    begin_period(schedule, state, &in->u, psi, now, half);
 }

@@ -7,7 +7,7 @@
  *   through saturation, cross coupling included, and no inductance is left in the equations but that of S.
  *     e_d += 2 (dpsi_d - T_s (u_d + w psi_q - R^ i_d)) + s2 (e_q - e_d)
  *     e_q += dpsi_q - T_s (u_q - w (psi_d + dpsi) - R^ i_q) - s2 (e_d + e_q),   s2 = S T_s/2
- *   with means of the period's two ends in the bracket.
+ *   with the means over the period's two ends in the bracket.
  *   Adaptation, proportional and integral, normalised so that k_psi, k_r are bandwidths at every speed and current:
  *     dpsi -= 2 k_psi s2 e_q/w,   dR -= 2 k_r s2 (2 i_d e_d + i_q e_q)/n,  n = 4 i_d^2 + i_q^2
  * Source   docs/theory/mrai.md (MR-1) ... (MR-24); the 2014 paper's (3), (6), (7), (8), (11), in flux linkage
@@ -15,7 +15,8 @@
  * Range    |w| < 1, |i| < 1, errors clamped to 4 pu of flux, s2 e to 1/16 in the laws; results clamped to
  *          [psi_min, psi_max], [r_min, r_max]
  * Rounding state LSB 2^-27 pu (errors), 2^-31 pu (parameters); steps rounded half up where they accumulate
- * Errors   clamps show, mrai_..._clamped(); a closed gate freezes the parameter, the observer goes on
+ * Errors   mrai_..._clamped() reports a limit; while a gate condition is not met, the parameter is held and the
+ *          observer continues
  * Context  MRAI ISR, each period, below the current ISR; mrai_schedule_step() in the 1 kHz task; no division in the
  *          step */
 #include <stdbool.h>
@@ -23,7 +24,7 @@
 
 #include "types/operating_point.h"
 
-/** First what every period reads, in its order. */
+/** In the order of use: what every period reads comes first. */
 typedef struct {
     q31_t pole_gain;               /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
     int32_t flux_proportional_q24; /* k_P/k_I of the flux law, in periods, < 128 */
@@ -34,9 +35,9 @@ typedef struct {
     q31_t period;                        /* omega_b T_s: volts per unit to flux per unit and period */
     q31_t flux_gain;                     /* 2 k_psi/omega_b */
     q31_t resistance_gain;               /* 2 k_r/omega_b */
-    q15_t omega_min;                     /* both gates: frozen below this speed */
-    q15_t omega_r_max;                   /* resistance gate: frozen above this speed */
-    q15_t i_min;                         /* both gates: frozen below this current magnitude */
+    q15_t omega_min;                     /* no adaptation below this speed */
+    q15_t omega_r_max;                   /* resistance held above this speed */
+    q15_t i_min;                         /* no adaptation below this magnitude of current */
     q31_t sinc_gain;                     /* (omega_b T_s)^2/24: 1/sinc(w T_s/2) - 1 = sinc_gain w^2 */
     q31_t psi_drift_full;                /* drift of dpsi per 1 kHz step that means quality 0: 5 % psi_f k_psi 1 ms */
     q31_t r_drift_full;                  /* drift of dR per 1 kHz step that means quality 0: 20 % R_0 k_r 1 ms */
@@ -45,33 +46,33 @@ typedef struct {
 
 /** Slowly varying factors: written by the 1 kHz task, read by the MRAI ISR through a double buffer. */
 typedef struct {
-    int32_t flux_step_q28;       /* 2 k_psi/(omega_b w), signed like w; 0 while the flux gate is closed */
-    int32_t resistance_step_q26; /* 2 k_r/(omega_b n); 0 while the resistance gate is closed */
-    int32_t minus_voltage_d_q28; /* of the d equation: twice the other one */
+    int32_t flux_step_q28;       /* 2 k_psi/(omega_b w), signed like w; 0 holds the flux */
+    int32_t resistance_step_q26; /* 2 k_r/(omega_b n); 0 holds the resistance */
+    int32_t minus_voltage_d_q28; /* of the d equation: twice that of the q equation */
     int32_t minus_voltage_q28;   /* -omega_b T_s/sinc(w T_s/2) */
 } mrai_schedule_t;
 
 typedef struct {
-    int32_t e_d_q27, e_q_q27;         /* observer error, flux */
-    int32_t begun_d_q27, begun_q_q27; /* what the last sample has put into the coming error: e - psi, half of the
+    int32_t e_d_q27, e_q_q27;                 /* observer error, flux */
+    int32_t predicted_d_q27, predicted_q_q27; /* terms of the next error that are known: e - psi, half of the
                                        * rotational and resistive voltage, the voltage of the period */
-    q31_t psi_delta, r_delta;         /* integral parts: the identified parameters */
+    q31_t psi_delta, r_delta;                 /* integral parts: the identified parameters */
 } mrai_state_t;
 
 bool mrai_valid(const mrai_config_t *config);
-/** Without error from this sample on, what was identified is kept. */
+/** Sets the observer error to 0 at this sample; the identified parameters are kept. */
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
                 const operating_point_t *in);
 void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
                const operating_point_t *in);
 
-/** The identified flux, rounded; its limits leave room for that. */
+/** The identified flux, rounded; its limits prevent an overflow. */
 static inline int32_t mrai_psi_delta_q15(const mrai_state_t *state)
 {
     return (state->psi_delta + 0x8000) >> 16;
 }
 
-/** A parameter rests on its limit. */
+/** The parameter is at its limit. */
 static inline bool mrai_flux_clamped(const mrai_config_t *config, const mrai_state_t *state)
 {
     return state->psi_delta <= config->psi_delta_min || state->psi_delta >= config->psi_delta_max;

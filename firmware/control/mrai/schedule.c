@@ -5,11 +5,11 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 
-/* Of the drift that means quality 0, which is that of an error of 5 %: the flux is within 1 %. */
+/* Share of psi_drift_full, which is the drift of an error of 5 %: below it the flux error is below 1 %. */
 #define PSI_SETTLED Q15(0.2)
 
-/* 2 k_psi/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates instead of wrapping at the gate's
- * edge. The gate keeps w from zero, and k_psi is not negative. */
+/* 2 k_psi/(omega_b w) in Q28 (MR-9): Q31 / Q15 = Q16, shifted up; saturates at the lowest speed. The
+ * condition |w| >= omega_min excludes zero, and k_psi is not negative. */
 static int32_t flux_step(const mrai_config_t *config, q15_t omega)
 {
     return fx_shl_q31(config->flux_gain / omega, 12U);
@@ -31,16 +31,16 @@ static int32_t minus_voltage_q28(const mrai_config_t *config, q31_t omega)
     return -fx_shr_round(config->period, 3) - fx_shr_round(fx_mul_q31(config->period, more), 3);
 }
 
-/* |drift|/full: what the adaptation still has to do, 1 and more is 1 (MR-18). */
-static __attribute__((noinline)) q15_t missing(q31_t drift, q31_t full)
+/* |drift|/full, at most 1: share of the adaptation that is still to come (MR-18). */
+static __attribute__((noinline)) q15_t drift_share(q31_t drift, q31_t full)
 {
     return fx_q15_from_q31(fx_div_q31(fx_abs_q31(drift), full));
 }
 
-/* First-order filter towards 1 - missing, or towards 0 where nothing can be known (MR-18). */
-static q15_t quality_step(q15_t quality, q15_t rate, bool known, q15_t missing_now)
+/* First-order filter towards 1 - drift while the parameter adapts, else towards 0 (MR-18). */
+static q15_t quality_step(q15_t quality, q15_t rate, bool adapting, q15_t drift_share_now)
 {
-    const int32_t target = known ? Q15_MAX - missing_now : 0;
+    const int32_t target = adapting ? Q15_MAX - drift_share_now : 0;
     return fx_add_q15(quality, fx_mul_q15(rate, fx_sat_q15(target - quality)));
 }
 
@@ -49,26 +49,26 @@ mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *
     const q15_t omega = fx_q15_from_q31(in->sample->omega);
     const q15_t speed = fx_abs_q15(omega);
     const q15_t current = fx_magnitude((q15_t)in->sample->i.d, (q15_t)in->sample->i.q);
-    const mrai_state_t *now = in->identifier;
-    const bool flux_open = in->enabled && speed >= config->omega_min && current >= config->i_min;
-    /* Seen through a wrong flux, the resistance law walks off to its limit: it waits until the flux has settled. */
-    const q15_t psi_missing = missing(fx_sub_q31(now->psi_delta, quality->psi_last), config->psi_drift_full);
-    const q15_t r_missing = missing(fx_sub_q31(now->r_delta, quality->r_last), config->r_drift_full);
-    const bool settled = psi_missing <= PSI_SETTLED;
-    const bool resistance_open = flux_open && settled && speed <= config->omega_r_max;
+    const mrai_state_t *identified = in->identifier;
+    const bool adapt_flux = in->enabled && speed >= config->omega_min && current >= config->i_min;
+    /* A flux error would drive the resistance to its limit, so it adapts only after the flux has settled. */
+    const q15_t psi_drift = drift_share(fx_sub_q31(identified->psi_delta, quality->psi_last), config->psi_drift_full);
+    const q15_t r_drift = drift_share(fx_sub_q31(identified->r_delta, quality->r_last), config->r_drift_full);
+    const bool flux_settled = psi_drift <= PSI_SETTLED;
+    const bool adapt_resistance = adapt_flux && flux_settled && speed <= config->omega_r_max;
 
     quality->psi_quality = quality_step(quality->psi_quality, config->quality_rate,
-                                        flux_open && !mrai_flux_clamped(config, now), psi_missing);
+                                        adapt_flux && !mrai_flux_clamped(config, identified), psi_drift);
     quality->r_quality = quality_step(quality->r_quality, config->quality_rate,
-                                      resistance_open && !mrai_resistance_clamped(config, now), r_missing);
-    quality->psi_last = now->psi_delta;
-    quality->r_last = now->r_delta;
+                                      adapt_resistance && !mrai_resistance_clamped(config, identified), r_drift);
+    quality->psi_last = identified->psi_delta;
+    quality->r_last = identified->r_delta;
 
     const int32_t voltage = minus_voltage_q28(config, in->sample->omega);
     return (mrai_schedule_t){
-        .flux_step_q28 = flux_open ? flux_step(config, omega) : 0,
+        .flux_step_q28 = adapt_flux ? flux_step(config, omega) : 0,
         .resistance_step_q26 =
-            resistance_open ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
+            adapt_resistance ? fx_min_s32(resistance_step(config, in->sample), resistance_step(config, in->next)) : 0,
         .minus_voltage_d_q28 = 2 * voltage,
         .minus_voltage_q28 = voltage,
     };

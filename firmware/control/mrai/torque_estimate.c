@@ -4,7 +4,7 @@
 #include "fx/q.h"
 
 #define Q24_PER_Q15 512
-/* Of that many periods the sum still fits: |t| < 2 in Q24. */
+/* The largest number of periods whose sum fits: |t| < 2 in Q24. */
 #define PERIODS_MAX 63U
 
 void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_t *flux, int32_t psi_delta)
@@ -21,7 +21,8 @@ void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_
     *sum = (torque_sum_t){sum_q24, count};
 }
 
-/* Rounded half up, of either sign; half an LSB of Q24 per period is what the sum has cut off in the mean. */
+/* Rounded half up for either sign. Each term of the sum was truncated, by half an LSB of Q24 on average, which count/2
+ * restores. */
 __attribute__((cold)) q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
 {
     const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;

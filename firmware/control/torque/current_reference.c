@@ -23,64 +23,67 @@ bool current_reference_valid(const current_reference_config_t *config)
     return true;
 }
 
-/* (v_ratio v_dc - r |i| + v_trim)/|w| - shift: at low speed everything is available (CR-2), (CR-9).
- * A quotient of up to 2^30 keeps the shift from mattering where the flux is no limit at all. */
+/* (v_ratio v_dc - r |i| + v_trim)/|w| - shift (CR-2), (CR-9). The quotient may reach 2^30, so that the shift has no
+ * effect at low speed, where the voltage does not limit the flux. */
 static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     const q15_t drop = fx_mul_gain_q15(config->r_pu, in->i_magnitude);
     const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
-    const int32_t over = fx_clamp_q31(voltage, 0, Q15_MAX) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
-    return fx_max_s32(over - in->shift, 0);
+    const int32_t flux = fx_clamp_q31(voltage, 0, Q15_MAX) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
+    return fx_max_s32(flux - in->shift, 0);
 }
 
-/* Interpolation between table nodes may leave the circle by a little: the d axis keeps its share (CR-7). */
-static dq_q15_t inside_circle(dq_q15_t i, q15_t i_max)
+/* Interpolation between table nodes may slightly exceed the current circle: i_d is kept and i_q reduced (CR-7). */
+static dq_q15_t limit_to_current_circle(dq_q15_t i, q15_t i_max)
 {
-    const int32_t room = fx_mul_q30(i_max, i_max) - fx_mul_q30((q15_t)i.d, (q15_t)i.d);
-    if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= room) {
+    const int32_t i_q_squared_max = fx_mul_q30(i_max, i_max) - fx_mul_q30((q15_t)i.d, (q15_t)i.d);
+    if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= i_q_squared_max) {
         return i;
     }
     return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, (q15_t)i.d)};
 }
 
-static __attribute__((noinline)) dq_q15_t tabulated(const current_reference_config_t *config, q15_t torque, q15_t psi)
+static __attribute__((noinline)) dq_q15_t currents_from_table(const current_reference_config_t *config, q15_t torque,
+                                                              q15_t psi)
 {
     const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
     return (dq_q15_t){fx_cell_interp(config->i_d, config->grid.ny, cell),
                       fx_cell_interp(config->i_q, config->grid.ny, cell)};
 }
 
-static __attribute__((noinline)) q15_t largest(const current_reference_config_t *config, q15_t psi)
+static __attribute__((noinline)) q15_t torque_max_from_table(const current_reference_config_t *config, q15_t psi)
 {
     bool clamped = false;
     return fx_lookup1(&config->torque_max, psi, &clamped);
 }
 
-/* t_max + dpsi_d i_q - dpsi_q i_d there: the tables' torque plus what magnet and q axis differ by (CR-10). What a weak
- * magnet leaves at the present point it need not leave at the largest torque, where psi_d is small: not counted. */
-static q15_t reachable(const current_reference_config_t *config, const current_reference_in_t *in, int32_t planned)
+/* t_max + dpsi_d i_q - dpsi_q i_d at the currents of t_max: the tables' torque corrected by the identified flux
+ * (CR-10). Only a negative shift is used. A positive one means that a weak magnet leaves additional flux at the present
+ * point; at the largest torque, where psi_d is small, it need not. */
+static q15_t torque_max_identified(const current_reference_config_t *config, const current_reference_in_t *in,
+                                   int32_t planned)
 {
     const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
-    const q15_t torque_max = largest(config, psi);
-    const dq_q15_t i = tabulated(config, torque_max, psi);
-    const int32_t learnt = fx_mul_q15(in->psi_delta, (q15_t)i.q) - fx_mul_q15(in->psi_q_delta, (q15_t)i.d);
-    return fx_sat_q15(fx_max_s32(torque_max + learnt, 0));
+    const q15_t torque_max = torque_max_from_table(config, psi);
+    const dq_q15_t i = currents_from_table(config, torque_max, psi);
+    const int32_t identified = fx_mul_q15(in->psi_delta, (q15_t)i.q) - fx_mul_q15(in->psi_q_delta, (q15_t)i.d);
+    return fx_sat_q15(fx_max_s32(torque_max + identified, 0));
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     const int32_t planned = planned_flux(config, in);
     const q15_t psi = fx_sat_q15(planned);
-    const q15_t torque_max = largest(config, psi);
+    const q15_t torque_max = torque_max_from_table(config, psi);
     const q15_t torque = (q15_t)fx_min_s32(fx_abs_q15(in->torque_corrected), torque_max);
 
-    dq_q15_t i_ref = inside_circle(tabulated(config, torque, psi), config->i_max);
+    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, torque, psi), config->i_max);
     const bool i_d_limited = i_ref.d < -in->i_d_max;
     i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
     i_ref.q = (in->torque_corrected < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
-        .torque_max = reachable(config, in, planned),
+        .torque_max = torque_max_identified(config, in, planned),
         .psi_plan = psi,
         .limited = fx_abs_q15(in->torque_corrected) > torque_max || psi < config->grid.y0,
         .i_d_limited = i_d_limited,

@@ -3,17 +3,18 @@
 #define TORQUE_CURRENT_REFERENCE_H
 /** Current references: maximum torque per ampere, field weakening and maximum torque per volt from one table.
  *   (i_d, i_q) = table(|T|, psi_plan), i_q takes the sign of T
- *   psi_plan = (v_ratio v_dc - r |i| + v_trim)/|w| - shift: shift is what the identified magnet adds to |psi|, v_trim
- *     what voltage_reserve.h found the plan to be wrong by
- *   |T| is first limited to t_max(psi_plan), the largest torque inside voltage and current circle, and i_d to -i_d_max.
- *   torque_max = t_max + dpsi_d i_q(t_max) - dpsi_q i_d(t_max), t_max without the flux that a weak magnet leaves at the
- *     present point: what the machine as identified can make
+ *   psi_plan = (v_ratio v_dc - r |i| + v_trim)/|w| - shift, with shift the contribution of the identified flux error to
+ *     |psi|, and v_trim the output of voltage_reserve.h
+ *   |T| is first limited to t_max(psi_plan), the largest torque inside voltage and current circle; i_d is limited to
+ *     -i_d_max.
+ *   torque_max = t_max + dpsi_d i_q(t_max) - dpsi_q i_d(t_max): the largest torque of the machine as identified; here
+ *     t_max does not count additional flux from a weak magnet
  * Source   docs/theory/current-reference.md (CR-1) ... (CR-11)
  * Units    per unit
  * Range    psi_plan outside the grid uses the edge: above it is maximum torque per ampere, below it is flagged;
  *          |v_trim|, |shift| < 1/2
  * Rounding 1 LSB q15 of interpolation
- * Errors   limited: the torque was cut, by voltage or by current; i_d_limited: i_d was
+ * Errors   limited: the torque was limited by voltage or current; i_d_limited: i_d was limited
  * Context  1 kHz task; one bounded division */
 #include <stdbool.h>
 
@@ -38,14 +39,14 @@ typedef struct {
     q15_t v_trim;
     q15_t shift;
     q15_t psi_delta;   /* identified flux minus the table's, d axis */
-    q15_t i_d_max;     /* magnitude of the most negative i_d that the magnets bear now */
-    q15_t psi_q_delta; /* what the identified |psi_q| is more than the tables' at the last reference */
+    q15_t i_d_max;     /* magnitude of the demagnetisation limit at the present temperature */
+    q15_t psi_q_delta; /* identified |psi_q| minus the tables', at the last reference */
 } current_reference_in_t;
 
 typedef struct {
     dq_q15_t i_ref;
-    q15_t torque_max; /* reachable with the flux that is there */
-    q15_t psi_plan;   /* flux that the table was asked for */
+    q15_t torque_max; /* largest torque of the machine as identified */
+    q15_t psi_plan;   /* planned flux: second input of the table */
     bool limited;
     bool i_d_limited;
 } current_reference_t;

@@ -6,7 +6,7 @@
 #include "fx/vec.h"
 
 #define LOSS_MAX Q31(0.25)
-#define SENSOR_LOST Q15(0.5)
+#define FACTOR_SENSOR_LOST Q15(0.5)
 
 bool torque_limit_valid(const torque_limit_config_t *config)
 {
@@ -16,12 +16,12 @@ bool torque_limit_valid(const torque_limit_config_t *config)
 }
 
 /* (x - end)/(start - end), 0 ... 1 (LM-4). */
-static q15_t line(const derating_line_t *at, q15_t x)
+static q15_t derating_factor(const derating_line_t *at, q15_t x)
 {
     return (q15_t)fx_max_s32(fx_mul_gain_q15(at->gain, fx_sub_q15(x, at->end)), 0);
 }
 
-/* (LM-2); half up in both products, so that the mean has no bias. */
+/* (LM-2). Both products are rounded half up, so that the mean has no bias. */
 static q15_t loss_step(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
 {
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
@@ -33,62 +33,63 @@ static q15_t loss_step(const torque_limit_config_t *config, torque_limit_state_t
     return fx_q15_from_q31(state->loss);
 }
 
-/* The smaller of both limits; the reason is noted when it cuts the request. */
+/* The smallest of the limits so far, and the reason of each limit that the torque exceeds. */
 typedef struct {
-    int32_t wanted; /* magnitude of the arbitrated torque */
-    int32_t most;
+    int32_t torque; /* magnitude of the arbitrated torque */
+    int32_t max;
     uint32_t reasons;
-    q15_t rated; /* what a factor is taken of */
-} cut_t;
+    q15_t rated; /* 1 for a derating factor */
+} bound_t;
 
-static void cut(cut_t *by, int32_t limit, uint32_t reason)
+static void limit_to(bound_t *bound, int32_t limit, uint32_t reason)
 {
-    const int32_t most = fx_max_s32(limit, 0);
-    by->most = fx_min_s32(by->most, most);
-    by->reasons |= (by->wanted > most) ? reason : 0U;
+    const int32_t max = fx_max_s32(limit, 0);
+    bound->max = fx_min_s32(bound->max, max);
+    bound->reasons |= (bound->torque > max) ? reason : 0U;
 }
 
-/* p/|w|; an open limit stays open. */
-static __attribute__((noinline)) void cut_by_power(cut_t *by, q15_t limit, int32_t loss, q15_t speed)
+/* (power -+ loss)/|w| (LM-3). Q15_MAX means that no limit is set. */
+static __attribute__((noinline)) void limit_by_power(bound_t *bound, q15_t limit, int32_t loss, q15_t speed)
 {
     if (limit < Q15_MAX) {
         const q15_t power = fx_sat_q15(fx_max_s32(limit - loss, 0));
-        cut(by, fx_div_q15(power, (q15_t)fx_max_s32(speed, 1)), DERATING_POWER);
+        limit_to(bound, fx_div_q15(power, (q15_t)fx_max_s32(speed, 1)), DERATING_POWER);
     }
 }
 
-static void cut_by_factor(cut_t *by, q15_t factor, uint32_t reason)
+static void limit_by_factor(bound_t *bound, q15_t factor, uint32_t reason)
 {
     if (factor < Q15_MAX) {
-        cut(by, fx_mul_q15(by->rated, factor), reason);
+        limit_to(bound, fx_mul_q15(bound->rated, factor), reason);
     }
 }
 
-static __attribute__((noinline)) void derate(cut_t *by, const derating_line_t *at, q15_t x, uint32_t reason)
+static __attribute__((noinline)) void limit_by_line(bound_t *bound, const derating_line_t *at, q15_t x, uint32_t reason)
 {
-    cut_by_factor(by, line(at, x), reason);
+    limit_by_factor(bound, derating_factor(at, x), reason);
 }
 
-static __attribute__((noinline)) void derate_hot(cut_t *by, const derating_line_t *at, int16_t dC, bool *seen,
-                                                 uint32_t reason)
+static __attribute__((noinline)) void limit_by_temperature(bound_t *bound, const derating_line_t *at, int16_t dC,
+                                                           bool *was_known, uint32_t reason)
 {
     if (dC != TEMPERATURE_UNKNOWN) {
-        *seen = true;
-        derate(by, at, dC, reason);
-    } else if (*seen) {
-        cut_by_factor(by, SENSOR_LOST, reason);
+        *was_known = true;
+        limit_by_line(bound, at, dC, reason);
+    } else if (*was_known) {
+        limit_by_factor(bound, FACTOR_SENSOR_LOST, reason);
     }
 }
 
-/* What holds for both directions. */
-static cut_t common(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
+/* The limits that do not depend on the direction of power. */
+static bound_t limits_of_both_directions(const torque_limit_config_t *config, torque_limit_state_t *state,
+                                         const torque_limit_in_t *in)
 {
-    cut_t by = {.wanted = fx_abs_q15(in->torque_arbitrated), .most = Q15_MAX, .rated = config->torque_max};
-    cut(&by, config->torque_max, DERATING_REQUEST);
-    cut(&by, in->reach, DERATING_REACH);
-    derate_hot(&by, &config->inverter, in->inverter_dC, &state->inverter_seen, DERATING_INVERTER);
-    derate_hot(&by, &config->winding, in->winding_dC, &state->winding_seen, DERATING_WINDING);
-    return by;
+    bound_t bound = {.torque = fx_abs_q15(in->torque_arbitrated), .max = Q15_MAX, .rated = config->torque_max};
+    limit_to(&bound, config->torque_max, DERATING_REQUEST);
+    limit_to(&bound, in->reach, DERATING_REACH);
+    limit_by_temperature(&bound, &config->inverter, in->inverter_dC, &state->inverter_seen, DERATING_INVERTER);
+    limit_by_temperature(&bound, &config->winding, in->winding_dC, &state->winding_seen, DERATING_WINDING);
+    return bound;
 }
 
 torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_limit_state_t *state,
@@ -97,28 +98,28 @@ torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_lim
     const torque_limits_t *limits = in->limits;
     const q15_t speed = fx_abs_q15(in->omega);
     const q15_t loss = loss_step(config, state, in);
-    cut_t drive = common(config, state, in);
-    cut_t regen = drive;
+    bound_t drive = limits_of_both_directions(config, state, in);
+    bound_t regen = drive;
 
-    cut(&drive, limits->torque_drive, DERATING_REQUEST);
-    cut_by_power(&drive, limits->power_drive, loss, speed);
-    derate(&drive, &config->dc_low, in->v_dc, DERATING_DC_LOW);
-    derate(&drive, &config->speed, speed, DERATING_SPEED);
-    cut(&regen, limits->torque_regen, DERATING_REQUEST);
-    cut_by_power(&regen, limits->power_regen, -loss, speed);
-    derate(&regen, &config->dc_high, in->v_dc, DERATING_DC_HIGH);
+    limit_to(&drive, limits->torque_drive, DERATING_REQUEST);
+    limit_by_power(&drive, limits->power_drive, loss, speed);
+    limit_by_line(&drive, &config->dc_low, in->v_dc, DERATING_DC_LOW);
+    limit_by_line(&drive, &config->speed, speed, DERATING_SPEED);
+    limit_to(&regen, limits->torque_regen, DERATING_REQUEST);
+    limit_by_power(&regen, limits->power_regen, -loss, speed);
+    limit_by_line(&regen, &config->dc_high, in->v_dc, DERATING_DC_HIGH);
 
-    /* Which of the two holds for torque against the rotation (LM-6). */
-    const q15_t moving = line(&config->moving, speed);
-    const int32_t against = drive.most + fx_mul_q15(moving, fx_sat_q15(regen.most - drive.most));
-    const bool backwards = in->omega < 0;
-    const int32_t high = backwards ? against : drive.most;
-    const int32_t low = backwards ? drive.most : against;
-    const bool with_rotation = (in->torque_arbitrated < 0) == backwards || moving == 0;
+    /* Torque against the rotation: from the driving limit at standstill to the regenerating one (LM-6). */
+    const q15_t direction_known = derating_factor(&config->moving, speed);
+    const int32_t against_rotation = drive.max + fx_mul_q15(direction_known, fx_sat_q15(regen.max - drive.max));
+    const bool negative_speed = in->omega < 0;
+    const int32_t high = negative_speed ? against_rotation : drive.max;
+    const int32_t low = negative_speed ? drive.max : against_rotation;
+    const bool with_rotation = (in->torque_arbitrated < 0) == negative_speed || direction_known == 0;
     return (torque_limit_t){
         .torque_limited = (q15_t)fx_clamp_q31(in->torque_arbitrated, -low, high),
-        .drive = (q15_t)drive.most,
-        .regen = (q15_t)against,
+        .drive = (q15_t)drive.max,
+        .regen = (q15_t)against_rotation,
         .derating = (uint16_t)(with_rotation ? drive.reasons : regen.reasons),
     };
 }

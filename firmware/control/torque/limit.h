@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TORQUE_LIMIT_H
 #define TORQUE_LIMIT_H
-/** What may be asked for now: the arbitrated torque between what vehicle, battery, temperatures, dc voltage, speed
- * and the machine's own reach allow, each direction of power by itself.
- *   loss   = first-order mean of u.i - t^ w, plus drop |i|: what the dc side pays beyond the shaft
+/** Torque limits: the arbitrated torque is limited to what vehicle, battery, temperatures, dc voltage, speed and the
+ * machine's reach allow, separately for driving and regenerating.
+ *   loss   = first-order mean of u.i - t^ w, plus drop |i|: dc power minus shaft power
  *   drive <= min(torque_max f, torque_drive, (power_drive - loss)/|w|, reach)    f = min of the derating factors
  *   regen <= min(torque_max f, torque_regen, (power_regen + loss)/|w|, reach)
- *   near standstill, where the direction of power is not known, the driving limit holds for both
+ *   Near standstill the direction of power is not known, and the driving limit holds for both directions.
  * Source   docs/theory/limits.md (LM-1) ... (LM-7)
  * Units    per unit; temperatures in tenths of a degree C, TEMPERATURE_UNKNOWN as in hal/temperature.h
  * Range    every argument; loss is kept in 0 ... 1/4
  * Rounding 1 LSB q15
- * Errors   derating says every reason that the torque was cut for, whether or not it was the smallest; a temperature
- *          that was known and no longer is counts as a factor of 1/2
+ * Errors   derating contains the reason of every limit that the torque exceeds, not only of the smallest one; a
+ *          temperature that was known and is lost counts as a factor of 1/2
  * Context  1 kHz task; two bounded divisions */
 #include <stdbool.h>
 #include <stdint.h>
@@ -44,7 +44,7 @@ typedef struct {
     q15_t torque_max;
     q15_t drop;             /* device drop as loss per current */
     q15_t loss_rate;        /* first-order coefficient per task period */
-    derating_line_t moving; /* over |w|: 0 standstill, 1 the direction of power is certain */
+    derating_line_t moving; /* over |w|: 0 at standstill, 1 where the direction of power is certain */
     derating_line_t inverter, winding, dc_low, dc_high, speed;
 } torque_limit_config_t;
 

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TORQUE_LOOP_H
 #define TORQUE_LOOP_H
-/** Torque closed loop: a relative correction of the commanded torque, so that what was learnt at one torque
- * serves at another.
+/** Closed torque loop: a relative correction of the commanded torque, so that a correction found at one torque is valid
+ * at another.
  *   r = T* (1 + x) + k_p e,  e = T_m - T^,  x += k_i e / max(|T*|, T_min) sign(T*),  |r - T*| <= c A |T*|
- *   x is kept while |T*| < T_min/2: there an offset of T^ would become a ratio.
- *   T_m = T* through the closed loop's own first-order response: a step excites no integrator.
- *   While voltage or current limit is active x does not grow beyond 0; switched off it leaks to 0 at the loop's own
- *   rate. The authority A is scaled by the confidence c in the estimate: at c = 0 nothing is corrected.
+ *   x is held while |T*| < T_min/2, because dividing by a small T* would turn an offset of T^ into a large ratio.
+ *   T_m is T* after the first-order response of the closed current loop, so that a step of T* does not charge the
+ *   integrator.
+ *   While the voltage or current limit is active, x does not rise above 0; while the loop is disabled, x decays to 0 at
+ *   the loop's own rate. The authority A is scaled by the confidence c in the estimate: at c = 0 nothing is corrected.
  * Source   docs/theory/torque-loop.md (TL-3) ... (TL-9)
  * Units    per unit of T_b; x is a ratio
  * Range    authority (0, 1); |T*| < 1; the relative error e / max(|T*|, T_min) is limited to 1
  * Rounding half up: 1/2 LSB q31 per step in x, 1/2 LSB q15 in r
- * Errors   saturates at the authority and says so
+ * Errors   saturates at the authority and reports it in saturated
  * Context  1 kHz task; one bounded division */
 #include <stdbool.h>
 
@@ -35,7 +36,7 @@ typedef struct {
 typedef struct {
     q15_t torque_commanded; /* T* */
     q15_t torque_estimated; /* T^ */
-    q15_t confidence;       /* share of the authority that the estimate deserves, Q15_MAX: all */
+    q15_t confidence;       /* share of the authority that may be used, Q15_MAX: all of it */
     bool enabled;
     bool limited; /* current or voltage limit active */
 } torque_loop_in_t;

@@ -4,8 +4,8 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 
-/* The references sit on the planned flux when they use all but 1/32 of it: rounding and interpolation of the tables
- * stay below that, any point of maximum torque per ampere away from the limit lies outside. */
+/* The references are at the flux limit when their flux exceeds 31/32 of the planned flux: errors of rounding and
+ * interpolation are smaller than 1/32, and a maximum-torque-per-ampere point away from the limit has less flux. */
 #define ON_LIMIT_SHIFT 5
 
 voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, voltage_reserve_state_t *state,

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TORQUE_VOLTAGE_RESERVE_H
 #define TORQUE_VOLTAGE_RESERVE_H
-/** Keeps the acting voltage at the planned share of the dc voltage while the flux is what limits the references: the
- * trim on top of the tables.
- *   shift  = |psi + dpsi| - |psi|, psi the tables' flux at the last reference: the identified magnet's part
+/** Voltage controller of field weakening: keeps the acting voltage at its planned share of the dc voltage while the
+ * flux limits the references, by a trim of the tables' input.
+ *   shift  = |psi + dpsi| - |psi|: contribution of the identified flux error; psi is the tables' flux at the last
+ *            reference
  *   e      = v_ratio v_dc - |u|
- *   v_trim += k e        if e < 0, or while the references sit on the planned flux
- *   v_trim -= k v_trim   else: no limit, nothing to be learnt
+ *   v_trim += k e        if e < 0, or while the references use the planned flux
+ *   v_trim -= k v_trim   otherwise, because away from the limit e says nothing about the trim
  *   trim_min <= v_trim <= trim_max
  * Source   docs/theory/current-reference.md (CR-9), (CR-12) ... (CR-14)
  * Units    per unit
  * Range    k < 1; trim_min <= 0 <= trim_max
  * Rounding half up, 1/2 LSB q31 per step in v_trim, 1 LSB q15 in shift
- * Errors   saturates at its bounds; they are the authority of the trim
+ * Errors   saturates at trim_min and trim_max, the authority of the trim
  * Context  1 kHz task; three square roots, no division */
 #include <stdbool.h>
 
@@ -30,12 +31,12 @@ typedef struct {
 } voltage_reserve_state_t;
 
 typedef struct {
-    dq_q15_t u; /* that acts now */
+    dq_q15_t u; /* acting voltage */
     q15_t v_dc;
     dq_q15_t psi;    /* tables' flux at the last reference */
     q15_t psi_plan;  /* of the last reference */
     q15_t psi_delta; /* identified flux minus the table's */
-    bool acting;     /* u is ours */
+    bool acting;     /* the bridge makes u */
 } voltage_reserve_in_t;
 
 typedef struct {

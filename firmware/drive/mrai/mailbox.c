@@ -4,8 +4,8 @@
 
 #define OVERRUNS_TO_FAULT 3
 
-/* The interrupt still reads the point before: this one is dropped, the law restarts from the next. */
-static __attribute__((noinline, cold)) void overrun(drive_t *drive)
+/* The interrupt still uses the previous point: this one is dropped, and the law restarts with the next. */
+static __attribute__((noinline, cold)) void count_overrun(drive_t *drive)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     mailbox->overruns++;
@@ -20,7 +20,7 @@ void mrai_offer(drive_t *drive, const sample_t *sample)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     if (__builtin_expect(mailbox->generation != drive->mrai.isr.finished, 0)) {
-        overrun(drive);
+        count_overrun(drive);
         return;
     }
     mailbox->overruns_in_a_row = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef MRAI_MRAI_DATA_H
 #define MRAI_MRAI_DATA_H
-/** Everything that a drive holds for the 2014 paper's identification and for nothing else, by writer.
+/** All data of a drive that only the 2014 paper's identification needs, by writer.
  * Source   docs/architecture.md, shared data; docs/theory/mrai.md
  * Units    as in control/mrai
  * Context  part of drive_t; a build without FLUXTRUE_MRAI has none of it */
@@ -9,25 +9,25 @@
 #include "control/mrai/torque_estimate.h"
 #include "types/operating_point.h"
 
-/** One operating point on its way to the MRAI interrupt. Writer: fast ISR, only while the interrupt has finished the
- * point before (generation == finished); so the interrupt reads it in place. */
+/** One operating point on its way to the MRAI interrupt. Writer: fast ISR, only after the interrupt has finished the
+ * previous point (generation == finished), so the interrupt reads it in place. */
 typedef struct {
     operating_point_t point;
     bool acting; /* the bridge was on throughout the last period and is on now */
     uint8_t overruns_in_a_row;
     volatile uint32_t generation; /* of the sample it was taken from */
-    uint32_t overruns;            /* periods whose point was dropped, since the one before was not finished */
+    uint32_t overruns;            /* periods whose point was dropped because the previous one was not finished */
 } mrai_mailbox_t;
 
 /** Writer: MRAI interrupt. */
 typedef struct {
     mrai_state_t law;
     torque_sum_t torque;
-    uint32_t identification_resets; /* of the request, as far as done */
-    volatile uint32_t finished;     /* generation of the last point it took */
+    uint32_t identification_resets; /* of the request, as far as carried out */
+    volatile uint32_t finished;     /* generation of the last point processed */
 } mrai_isr_state_t;
 
-/** Gains and gates. Writer: 1 kHz task. Reader: MRAI interrupt, which the task never interrupts. */
+/** Gains. Writer: 1 kHz task. Reader: MRAI interrupt, which the task never interrupts. */
 typedef struct {
     mrai_schedule_t slot[2];
     volatile uint32_t generation;
@@ -46,7 +46,7 @@ typedef struct {
     schedule_box_t schedules;
 } mrai_data_t;
 
-/** What the 1 kHz task has seen of it, in the same moment as the rest. */
+/** Copy for the 1 kHz task, from the same moment as the rest of its snapshot. */
 typedef struct {
     mrai_state_t law;
     torque_sum_t torque;

@@ -2,9 +2,9 @@
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
 
-/* The bridge was off, so that the acting voltage is unknown, or the sample before was not seen: the observer restarts
- * from the measured currents and keeps what it has identified. After a reset it restarts in the same way, from zero
- * deviation. */
+/* If the bridge was off, so that the acting voltage is unknown, or the previous point was dropped, the observer
+ * restarts from the measured currents and keeps the identified parameters. After a reset it restarts with parameters of
+ * zero. */
 static __attribute__((noinline, cold)) void restart(drive_t *drive, const mrai_schedule_t *schedule)
 {
     mrai_isr_state_t *state = &drive->mrai.isr;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef MRAI_MRAI_SEAM_H
 #define MRAI_MRAI_SEAM_H
-/** The only way to the 2014 paper's identification: an optional consumer of the operating point.
+/** The interface of the 2014 paper's identification, an optional consumer of the operating point.
  *   The fast ISR calls mrai_offer() in a period in which the law is chosen; the 1 kHz task calls mrai_snapshot(),
  *   mrai_identify() and mrai_reschedule(); the second interrupt is mrai_isr() (drive/drive.h). While the law is not
  *   chosen, none of them runs.
@@ -24,16 +24,16 @@ static inline bool mrai_is_chosen(const drive_t *drive)
 
 /** Fast ISR, after the sample has been published. */
 void mrai_offer(drive_t *drive, const sample_t *sample);
-/** 1 kHz task, among what it copies between the same two periods. */
+/** 1 kHz task, as part of its snapshot. */
 void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot);
-/** 1 kHz task: the law's answer as the drive's identification. */
+/** 1 kHz task: the result of the law as the drive's identification. */
 void mrai_identify(drive_t *drive, const snapshot_t *snapshot);
 /** 1 kHz task, after the references: gains for this operating point and for the one just commanded. */
 void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating_point_t *commanded);
-/** 1 kHz task: what was identified is discarded. */
+/** 1 kHz task: discards the identified parameters. */
 void mrai_discard(drive_t *drive);
 
-/** Generations offered and finished: equal unless the interrupt is at work or was starved. */
+/** Generations offered and finished: equal unless the interrupt is running or has not had time to run. */
 static inline uint32_t mrai_offered(const drive_t *drive)
 {
     return drive->mrai.mailbox.generation;

@@ -41,7 +41,7 @@ void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating
     drive->task.identification.r_quality = quality->r_quality;
 }
 
-/* The interrupt discards its own part with its next point. */
+/* The interrupt resets its own part at its next point. */
 void mrai_discard(drive_t *drive)
 {
     drive->mrai.task.quality = (mrai_quality_t){0};

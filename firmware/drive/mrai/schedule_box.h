@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef MRAI_SCHEDULE_BOX_H
 #define MRAI_SCHEDULE_BOX_H
-/** Gains and gates from the 1 kHz task to the MRAI interrupt: two slots, the generation tells the complete one.
+/** Gains from the 1 kHz task to the MRAI interrupt: two slots; the generation selects the complete one.
  * Source   docs/architecture.md, shared data
  * Context  written by the 1 kHz task, read by the MRAI interrupt, which the task never interrupts: one read suffices */
 #include "drive/exchange.h"

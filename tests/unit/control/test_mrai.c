@@ -65,8 +65,8 @@ static void error(double e_d, double e_q)
 {
     const int32_t d = (int32_t)lround(e_d * q27);
     const int32_t q = (int32_t)lround(e_q * q27);
-    state.begun_d_q27 += d - state.e_d_q27; /* weighted, as e is */
-    state.begun_q_q27 += q - state.e_q_q27;
+    state.predicted_d_q27 += d - state.e_d_q27; /* weighted, as e is */
+    state.predicted_q_q27 += q - state.e_q_q27;
     state.e_d_q27 = d;
     state.e_q_q27 = q;
     twin.e = (twin_dq_t){d / q27 * f.psi, q / q27 * f.psi};

@@ -149,7 +149,7 @@ void test_drop_ends_full_torque_within_15_steps(void)
         setUp();
         in.torque_requested = (q15_t)(16000 * sign);
         (void)steps(100);
-        in.drop = true;
+        in.ramp_out = true;
         TEST_ASSERT_NOT_EQUAL_INT(0, steps(14));
         TEST_ASSERT_EQUAL_INT(0, step());
     }
