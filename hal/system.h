@@ -10,16 +10,20 @@
  * Context  1 kHz task; stack_unused may look at a bounded number of words per call */
 #include <stdint.h>
 
-typedef enum {
-    RESET_UNKNOWN = 0,
-    RESET_POWER_ON = 1,
-    RESET_PIN = 2,
-    RESET_WATCHDOG = 3,
-    RESET_SOFTWARE = 4,
-    RESET_BROWN_OUT = 5,
-    RESET_LOCKUP = 6,
-    RESET_CLOCK = 7
-} reset_cause_t;
+/* X(NAME, value, explanation): named and explained here only. */
+#define RESET_CAUSE_LIST(X) \
+    X(UNKNOWN, 0, "The port cannot tell.") \
+    X(POWER_ON, 1, "The supply was switched on.") \
+    X(PIN, 2, "The reset pin.") \
+    X(WATCHDOG, 3, "The watchdog was not served, or too early.") \
+    X(SOFTWARE, 4, "The firmware itself.") \
+    X(BROWN_OUT, 5, "The supply voltage was too low.") \
+    X(LOCKUP, 6, "The core locked up.") \
+    X(CLOCK, 7, "The clock was lost.")
+
+#define RESET_VALUE(name, value, text) RESET_##name = (value),
+typedef enum { RESET_CAUSE_LIST(RESET_VALUE) } reset_cause_t;
+#undef RESET_VALUE
 
 uint32_t hal_system_stack_unused(void);
 reset_cause_t hal_system_reset_cause(void);

@@ -13,7 +13,15 @@
  * Context  1 kHz task: can_rx_frame() for each frame, then can_rx_tick() once with the time since the last one */
 #include "comm/e2e.h"
 
-typedef enum { COMMAND_MODE_OFF = 0, COMMAND_MODE_TORQUE = 1, COMMAND_MODE_CURRENT = 2 } command_mode_t;
+/* X(NAME, value, explanation): named and explained here only. */
+#define COMMAND_MODE_LIST(X) \
+    X(OFF, 0, "The dc link is discharged.") \
+    X(TORQUE, 1, "The dc link is charged, ready for torque.") \
+    X(CURRENT_LOCKED, 2, "Commissioning: refused on the bus.")
+
+#define COMMAND_MODE_VALUE(name, value, text) COMMAND_MODE_##name = (value),
+typedef enum { COMMAND_MODE_LIST(COMMAND_MODE_VALUE) } command_mode_t;
+#undef COMMAND_MODE_VALUE
 
 typedef struct {
     bool enable;

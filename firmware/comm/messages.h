@@ -14,6 +14,21 @@
 #define MESSAGE_LENGTH 8U
 #define INTERFACE_VERSION 2U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
 
+/* Why the torque is limited, as the bus tells it; X(NAME, value, explanation): named and explained here only. */
+#define DERATING_REASON_LIST(X) \
+    X(NONE, 0, "The torque is not limited.") \
+    X(INVERTER_TEMPERATURE, 1, "The inverter is too warm.") \
+    X(WINDING_TEMPERATURE, 2, "The winding is too warm.") \
+    X(DC_VOLTAGE, 3, "The dc voltage is near a limit.") \
+    X(BATTERY_POWER, 4, "The battery's power limit is reached.") \
+    X(MAGNET, 5, "i_d is at the limit that protects the magnets.") \
+    X(BATTERY_LIMITS_LOST, 7, "The battery's limits were received once and are lost.") \
+    X(SPEED, 8, "The speed is near its limit.")
+
+#define DERATING_REASON_VALUE(name, value, text) DERATING_REASON_##name = (value),
+typedef enum { DERATING_REASON_LIST(DERATING_REASON_VALUE) } derating_reason_t;
+#undef DERATING_REASON_VALUE
+
 typedef struct {
     uint32_t crc_errors, repeated, jumps, length_errors, range_errors, id_errors, time_outs, accepted, skipped;
     uint32_t lost_frames, not_sent, ignored, bus_off;

@@ -50,7 +50,15 @@ typedef struct {
     uint32_t commissionings;        /* counted up: the inverter's voltage error is measured once, at standstill */
 } request_t;
 
-typedef enum { RUN_STATE_OFF = 0, RUN_STATE_RUN = 1, RUN_STATE_FAULT = 2 } run_state_t;
+/* X(NAME, value, explanation): named and explained here only. */
+#define RUN_STATE_LIST(X) \
+    X(OFF, 0, "Switching is disabled.") \
+    X(RUN, 1, "Switching is enabled.") \
+    X(FAULT, 2, "A fault is latched.")
+
+#define RUN_STATE_VALUE(name, value, text) RUN_STATE_##name = (value),
+typedef enum { RUN_STATE_LIST(RUN_STATE_VALUE) } run_state_t;
+#undef RUN_STATE_VALUE
 
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */
 typedef struct {

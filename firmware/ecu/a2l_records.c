@@ -6,15 +6,15 @@
 #include "ecu/ecu.h"
 
 typedef struct {
-    char kind[8]; /* value, measure, frozen, base or step */
+    char kind[8]; /* value, measure, frozen, base, step, word or bit */
     char name[40];
-    char text[80];
+    char text[112];
     char unit[12];
     char type[8];
-    char base[12];
+    char base[12]; /* of a measurement also the list that its words or bits are from */
     float lo, hi;
     uint32_t count;  /* of an array, else 0 */
-    uint32_t offset; /* from the symbol ecu; of a base and the step: from the symbol motor */
+    uint32_t offset; /* from the symbol ecu; of a base and the step: from the symbol motor; of a word: its value */
 } a2l_record_t;
 
 #define VALUE(id, low, high, si, comment) \
@@ -23,24 +23,41 @@ typedef struct {
 #define MEASURE(id, kind_of, base_of, expression, comment) \
     {.kind = "measure", .name = #id, .text = comment, .type = #kind_of, .base = #base_of, \
      .offset = offsetof(ecu_t, xcp.measurements.id)},
-#define FROZEN(id, kind_of, si, comment) \
-    {.kind = "frozen", .name = "freeze_" #id, .text = comment, .unit = si, .type = #kind_of, .base = "NONE", \
+#define FROZEN(id, kind_of, si, base_of, comment) \
+    {.kind = "frozen", .name = "freeze_" #id, .text = comment, .unit = si, .type = #kind_of, .base = #base_of, \
      .offset = offsetof(ecu_t, freeze.id)},
 #define SAMPLES(id, base_of, comment) \
     {.kind = "frozen", .name = "freeze_" #id, .text = comment, .type = "S16", .base = #base_of, \
      .count = FREEZE_FRAME_SAMPLES, .offset = offsetof(ecu_t, freeze.id)},
 #define BASE(id, field, si) {.kind = "base", .name = #id, .unit = si, .offset = offsetof(motor_t, bases.field)},
+#define FAULT_WORD(id, number, comment) \
+    {.kind = "bit", .name = #id, .text = comment, .base = "FAULT", .offset = (number)},
+#define ECU_FAULT_WORD(id, number, comment) \
+    {.kind = "bit", .name = "ECU_" #id, .text = comment, .base = "ECU_FAULT", .offset = (number)},
+#define STATE_WORD(id, number, comment) \
+    {.kind = "word", .name = #id, .text = comment, .base = "ECU_STATE", .offset = (number)},
 
 /* Not static: no code refers to it, so the linker keeps it by its name. */
 extern const a2l_record_t a2l_records[];
+/* clang-format off */
 __attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
-    CALIBRATION_LIST(VALUE) MEASUREMENT_LIST(MEASURE) FROZEN(frozen, U8, "", "1: a fault has frozen the frame")
-        FROZEN(time_ms, U32, "ms", "Time of the fault since the start") FROZEN(fault_word, U32, "",
-                                                                               "Faults of the drive, one bit each")
-            FROZEN(ecu_faults, U16, "", "Faults of the supervisor, one bit each") FROZEN(state, U8, "",
-                                                                                         "State before the fault")
-                FROZEN(psi_f_Vs, F32, "Vs", "Identified magnet flux") FROZEN(r_ohm, F32, "ohm", "Identified resistance")
-                    FROZEN(oldest, U8, "", "Index of the oldest of 32 samples, a step apart") FREEZE_FRAME_LIST(SAMPLES)
-                        BASE(CURRENT, current_A, "A") BASE(VOLTAGE, voltage_V, "V") BASE(TORQUE, torque_Nm, "Nm"){
-                            .kind = "step", .name = "step_s", .unit = "s", .offset = offsetof(motor_t, bases.step_s)},
+    CALIBRATION_LIST(VALUE)
+    MEASUREMENT_LIST(MEASURE)
+    FROZEN(frozen, U8, "", NONE, "1: a fault has frozen the frame")
+    FROZEN(time_ms, U32, "ms", NONE, "Time of the fault since the start")
+    FROZEN(fault_word, U32, "", FAULT, "Faults of the drive, one bit each")
+    FROZEN(ecu_faults, U16, "", ECU_FAULT, "Faults of the supervisor, one bit each")
+    FROZEN(state, U8, "", ECU_STATE, "State before the fault")
+    FROZEN(psi_f_Vs, F32, "Vs", NONE, "Identified magnet flux")
+    FROZEN(r_ohm, F32, "ohm", NONE, "Identified resistance")
+    FROZEN(oldest, U8, "", NONE, "Index of the oldest of 32 samples, a step apart")
+    FREEZE_FRAME_LIST(SAMPLES)
+    BASE(CURRENT, current_A, "A")
+    BASE(VOLTAGE, voltage_V, "V")
+    BASE(TORQUE, torque_Nm, "Nm")
+    {.kind = "step", .name = "step_s", .unit = "s", .offset = offsetof(motor_t, bases.step_s)},
+    FAULT_LIST(FAULT_WORD)
+    ECU_FAULT_LIST(ECU_FAULT_WORD)
+    ECU_STATE_LIST(STATE_WORD)
 };
+/* clang-format on */

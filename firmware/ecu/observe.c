@@ -9,16 +9,17 @@
 #define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with switching disabled, is an offset or a broken sensor */
 #define SQRT3 1.7320508F
 
-/* DeratingReason of the DBC. */
-enum { REASON_NONE = 0, REASON_LIMITS_LOST = 7 };
-
 /* The first reason that applies is transmitted. Rated torque and the reach of voltage and current are not derating. */
 static const struct {
     uint16_t derating;
     uint8_t reason;
 } reasons[] = {
-    {DERATING_INVERTER, 1}, {DERATING_WINDING, 2}, {DERATING_DC_LOW | DERATING_DC_HIGH, 3},
-    {DERATING_POWER, 4},    {DERATING_MAGNET, 5},  {DERATING_SPEED, 8},
+    {DERATING_INVERTER, DERATING_REASON_INVERTER_TEMPERATURE},
+    {DERATING_WINDING, DERATING_REASON_WINDING_TEMPERATURE},
+    {DERATING_DC_LOW | DERATING_DC_HIGH, DERATING_REASON_DC_VOLTAGE},
+    {DERATING_POWER, DERATING_REASON_BATTERY_POWER},
+    {DERATING_MAGNET, DERATING_REASON_MAGNET},
+    {DERATING_SPEED, DERATING_REASON_SPEED},
 };
 
 static void count_up(uint16_t *counter)
@@ -90,14 +91,14 @@ static bool are_limits_lost(const ecu_t *ecu)
 static uint32_t derating_reason(const ecu_t *ecu)
 {
     if (are_limits_lost(ecu)) {
-        return REASON_LIMITS_LOST;
+        return DERATING_REASON_BATTERY_LIMITS_LOST;
     }
     for (unsigned n = 0; n < sizeof reasons / sizeof reasons[0]; n++) {
         if ((ecu->drive.task.derating & reasons[n].derating) != 0U) {
             return reasons[n].reason;
         }
     }
-    return REASON_NONE;
+    return DERATING_REASON_NONE;
 }
 
 static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
@@ -132,7 +133,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .alive = ecu->rx.command_channel.alive,
         .failed = ecu->rx.command_channel.failed,
         .torque_mode = command->mode == COMMAND_MODE_TORQUE,
-        .current_mode = command->mode == COMMAND_MODE_CURRENT,
+        .current_mode = command->mode == COMMAND_MODE_CURRENT_LOCKED,
         .enable = command->enable,
         .reset = command->fault_reset,
         .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
@@ -142,7 +143,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .sensors_plausible = are_sensors_plausible(drive, &sample),
         .slow = is_slow(drive, sample.point.omega),
-        .derated = derating_reason(ecu) != REASON_NONE,
+        .derated = derating_reason(ecu) != DERATING_REASON_NONE,
         .gate_fault = gate_fault,
         .task_late = ecu->liveness.late_in_a_row >= CONSECUTIVE_MAX,
         .stalled = ecu->liveness.stalled_in_a_row >= CONSECUTIVE_MAX,

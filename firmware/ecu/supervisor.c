@@ -20,7 +20,7 @@ static bool refuse(supervisor_t *s, refused_t reason)
 static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
 {
     if (in->current_mode) {
-        return refuse(s, REFUSED_MODE);
+        return refuse(s, REFUSED_MODE_LOCKED);
     }
     if (s->faults != 0U || in->drive_faults != 0U) {
         return refuse(s, REFUSED_FAULT);
@@ -29,15 +29,15 @@ static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
         return refuse(s, REFUSED_NOT_READY);
     }
     if (!in->dc_in_range) {
-        return refuse(s, REFUSED_DC_VOLTAGE);
+        return refuse(s, REFUSED_DC_VOLTAGE_OUT_OF_RANGE);
     }
     if (!in->sensors_plausible) {
-        return refuse(s, REFUSED_SENSOR);
+        return refuse(s, REFUSED_SENSOR_IMPLAUSIBLE);
     }
     if (!in->torque_requested_is_zero) {
-        return refuse(s, REFUSED_TORQUE_NOT_ZERO);
+        return refuse(s, REFUSED_TORQUE_REQUEST_NOT_ZERO);
     }
-    s->refused = REFUSED_NOTHING;
+    s->refused = REFUSED_NONE;
     return true;
 }
 
@@ -45,7 +45,7 @@ static void follow_enable(supervisor_t *s, const supervisor_in_t *in)
 {
     if (!in->alive) {
         if (s->enabled) {
-            (void)refuse(s, REFUSED_TIMED_OUT);
+            (void)refuse(s, REFUSED_COMMAND_TIMED_OUT);
         }
         s->enabled = false;
         s->enable_seen = true; /* after a time-out a command with enable off must come first */
@@ -119,7 +119,7 @@ static void follow_reset(supervisor_t *s, const supervisor_in_t *in)
         return;
     }
     if (in->enable || s->state != STATE_FAULT) {
-        (void)refuse(s, REFUSED_RESET);
+        (void)refuse(s, REFUSED_RESET_WHILE_ENABLED);
         return;
     }
     s->resets++;

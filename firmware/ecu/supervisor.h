@@ -14,41 +14,48 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef enum {
-    STATE_INIT = 0,
-    STATE_STANDBY = 1,
-    STATE_PRECHARGE = 2,
-    STATE_READY = 3,
-    STATE_RUN = 4,
-    STATE_DERATE = 5,
-    STATE_SAFE = 6,
-    STATE_FAULT = 7,
-    STATE_DISCHARGE = 8,
-    STATES = 9
-} ecu_state_t;
+/* X(NAME, value or bit, explanation): named and explained here only; the bus has the names in lower case. */
+#define ECU_STATE_LIST(X) \
+    X(INIT, 0, "After start-up, until the self-test has passed.") \
+    X(STANDBY, 1, "The dc link is off; mode torque charges it.") \
+    X(PRECHARGE, 2, "The dc link is being charged.") \
+    X(READY, 3, "The dc link is charged and switching is disabled; enable is accepted.") \
+    X(RUN, 4, "Switching is enabled and the torque follows the request.") \
+    X(DERATE, 5, "As run, with the torque limited for the reason that DeratingReason names.") \
+    X(SAFE_STATE, 6, "A fault tripped the drive, which applies its safe state; the machine turns fast.") \
+    X(FAULT, 7, "A fault is latched; a reset is accepted.") \
+    X(DISCHARGE, 8, "The dc link is being discharged.")
 
-/** Latched by the supervisor, bits of EcuFaults on the bus. */
-typedef enum {
-    ECU_FAULT_PROTECTION = 1U << 0, /* 3 of 10 commands bad */
-    ECU_FAULT_PRECHARGE = 1U << 1,  /* dc voltage not reached in time */
-    ECU_FAULT_DISCHARGE = 1U << 2,  /* dc link not discharged in time */
-    ECU_FAULT_GATE = 1U << 3,       /* gate driver */
-    ECU_FAULT_TASK = 1U << 4,       /* the 1 kHz task came late 3 times in a row */
-    ECU_FAULT_STALL = 1U << 5,      /* an interrupt stood still */
-    ECU_FAULT_SELF_TEST = 1U << 6   /* no plausible measurement in time after start-up */
-} ecu_fault_t;
+/* Latched by the supervisor: the bits of EcuFaults. */
+#define ECU_FAULT_LIST(X) \
+    X(PROTECTION, 0, "3 of the last 10 torque commands were bad.") \
+    X(PRECHARGE, 1, "Precharge took too long.") \
+    X(DISCHARGE, 2, "Discharge took too long.") \
+    X(GATE, 3, "The gate driver reports a fault.") \
+    X(TASK, 4, "The 1 kHz task came late 3 times in a row.") \
+    X(STALL, 5, "An interrupt stopped for 3 steps of the task.") \
+    X(SELF_TEST, 6, "The self-test did not pass in time after start-up.")
 
-typedef enum {
-    REFUSED_NOTHING = 0,
-    REFUSED_TORQUE_NOT_ZERO = 1,
-    REFUSED_FAULT = 2,
-    REFUSED_DC_VOLTAGE = 3,
-    REFUSED_SENSOR = 4,
-    REFUSED_NOT_READY = 5,
-    REFUSED_MODE = 6,
-    REFUSED_TIMED_OUT = 7,
-    REFUSED_RESET = 8
-} refused_t;
+#define REFUSED_LIST(X) \
+    X(NONE, 0, "Nothing was refused since the last enable that was granted.") \
+    X(TORQUE_REQUEST_NOT_ZERO, 1, "Enable with a requested torque that is not zero.") \
+    X(FAULT, 2, "Enable while a fault is latched.") \
+    X(DC_VOLTAGE_OUT_OF_RANGE, 3, "Enable with a dc voltage out of its range.") \
+    X(SENSOR_IMPLAUSIBLE, 4, "Enable while the measured currents are implausible.") \
+    X(NOT_READY, 5, "Enable in another state than ready, or in another mode than torque.") \
+    X(MODE_LOCKED, 6, "Enable in the current mode for commissioning, which is locked on the bus.") \
+    X(COMMAND_TIMED_OUT, 7, "The command was lost while the drive was enabled.") \
+    X(RESET_WHILE_ENABLED, 8, "Reset while enable was on, or in another state than fault.")
+
+#define STATE_VALUE(name, value, text) STATE_##name = (value),
+#define ECU_FAULT_BIT(name, bit, text) ECU_FAULT_##name = 1U << (bit),
+#define REFUSED_VALUE(name, value, text) REFUSED_##name = (value),
+typedef enum { ECU_STATE_LIST(STATE_VALUE) STATES } ecu_state_t;
+typedef enum { ECU_FAULT_LIST(ECU_FAULT_BIT) } ecu_fault_t;
+typedef enum { REFUSED_LIST(REFUSED_VALUE) } refused_t;
+#undef STATE_VALUE
+#undef ECU_FAULT_BIT
+#undef REFUSED_VALUE
 
 /** Conditions of a transition, one bit each. */
 typedef enum {

@@ -1,27 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_FAULTS_H
 #define TYPES_FAULTS_H
-/** The fault word's bits.
- * Source   docs/architecture.md, fault table
+/** The fault word's bits: the one place that names and explains them. The value tables and comments of the DBC, the
+ *   description file for calibration tools, the words of the library and the pages follow from it (bus.words of the
+ *   tools).
+ *   X(NAME, bit, explanation): FAULT_NAME in C, the name in lower case everywhere else
+ * Source   docs/theory/monitors.md, docs/architecture.md
  * Context  values only */
 
-enum {
-    FAULT_OVER_CURRENT = 1u << 0,
-    FAULT_OVER_VOLTAGE = 1u << 1,
-    FAULT_UNDER_VOLTAGE = 1u << 2,
-    FAULT_CURRENT_SUM = 1u << 3,
-    FAULT_ANGLE = 1u << 4,
-    FAULT_INPUT = 1u << 5,   /* the port delivered NaN, infinity or no samples */
-    FAULT_OVERRUN = 1u << 6, /* the identification did not finish within its period, 3 times in a row */
-    FAULT_CONFIG = 1u << 7,  /* start-up check of the motor data failed */
-    FAULT_CONTROL = 1u << 8, /* the current does not follow its reference */
-    FAULT_PHASE_LOST = 1u << 9,
-    FAULT_CURRENT_STUCK = 1u << 10, /* a current sensor repeats the same value */
-    FAULT_OVER_SPEED = 1u << 11,
-    FAULT_ANGLE_OFFSET = 1u << 12, /* the back-EMF does not fit the measured angle */
-    FAULT_TORQUE = 1u << 13,       /* the torque monitor's torque exceeds the commanded one */
-    FAULT_TEMPERATURE = 1u << 14,
-    FAULT_GATE = 1u << 15 /* reported by the gate driver, which has disabled switching */
-};
+#define FAULT_LIST(X) \
+    X(OVER_CURRENT, 0, "A phase current exceeds the trip level in one sample.") \
+    X(OVER_VOLTAGE, 1, "The dc voltage exceeds its upper limit in 2 samples.") \
+    X(UNDER_VOLTAGE, 2, "The dc voltage is below its lower limit in 10 samples while the drive runs.") \
+    X(CURRENT_SUM, 3, "The sum of the phase currents exceeds 5 % of full scale in 5 samples.") \
+    X(ANGLE, 4, "The angle changes implausibly 3 times in a row, or its sensor reports an error.") \
+    X(INPUT, 5, "The samples are invalid, or the converters repeatedly deliver none.") \
+    X(OVERRUN, 6, "The paper's identification missed its period 3 times in a row.") \
+    X(CONFIG, 7, "The motor data or the port's settings failed a check; a separate value names the check.") \
+    X(CONTROL, 8, "The current is off its reference for 20 ms, or for 100 ms while the voltage is limited.") \
+    X(PHASE_LOST, 9, "A phase carries no current although it should, in 10 ms of samples.") \
+    X(CURRENT_STUCK, 10, "A phase current has 20 equal samples at 1 kHz while the others change.") \
+    X(OVER_SPEED, 11, "The speed exceeds 80 % of the reserve of the speed base for 5 ms.") \
+    X(ANGLE_OFFSET, 12, "The direction of the back-EMF contradicts the measured angle for 5 ms.") \
+    X(TORQUE, 13, "The torque from electrical power exceeds the command by max(10 Nm, 5 %) and 1/8 for 25 ms.") \
+    X(TEMPERATURE, 14, "The inverter or the winding is at the end of its derating line for 110 ms.") \
+    X(GATE, 15, "The gate driver reports a fault; the hardware has disabled switching.")
+
+#define FAULT_BIT(name, bit, text) FAULT_##name = 1u << (bit),
+enum { FAULT_LIST(FAULT_BIT) };
+#undef FAULT_BIT
 
 #endif

@@ -35,6 +35,12 @@ FLUXTRUE_API int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
 FLUXTRUE_API double fluxtrue_get(const fluxtrue_t *drive, const char *name);
 /** The names one by one, NULL after the last and for a negative index. */
 FLUXTRUE_API const char *fluxtrue_name(int index);
+/** The word for a value of a name that stands for an enumeration, in lower case: "moved" for ("commission_failure", 2);
+ *  of a word of bits that for the bit: "over_current" for ("fault_word", 0). FLUXTRUE_UNKNOWN_NAME: no such name or
+ *  value; FLUXTRUE_OUT_OF_RANGE: the word with its end needs more than size characters. */
+FLUXTRUE_API int fluxtrue_word(const char *name, int value, char *word, int size);
+/** What it means, a sentence; NULL for no such name or value. */
+FLUXTRUE_API const char *fluxtrue_explanation(const char *name, int value);
 /** The drive's flash, FLUXTRUE_MEMORY_SIZE bytes: what was learnt is saved there a moment after `enable` has gone to 0,
  *  and not more often than every five minutes. Carry it over to a new drive and it starts with that knowledge.
  *  FLUXTRUE_OUT_OF_RANGE: another size. */

@@ -17,8 +17,8 @@ def test_the_page_shows_the_table_that_runs() -> None:
 
 def test_a_changed_table_changes_the_drawing(tmp_path) -> None:
     changed = tmp_path / "table.c"
-    changed.write_text(TABLE.read_text().replace("{STATE_SAFE, WHEN_SLOW, STATE_FAULT}",
-                                                 "{STATE_SAFE, WHEN_SLOW, STATE_READY}"))  # fmt: skip
+    changed.write_text(TABLE.read_text().replace("{STATE_SAFE_STATE, WHEN_SLOW, STATE_FAULT}",
+                                                 "{STATE_SAFE_STATE, WHEN_SLOW, STATE_READY}"))  # fmt: skip
     page = PAGE.read_text()
     assert with_drawing(page, draw(read_table(changed))) != page
 

@@ -12,22 +12,26 @@
 #include "control/commission/fit.h"
 #include "types/frames.h"
 
-typedef enum {
-    COMMISSION_IDLE = 0,
-    COMMISSION_SETTLE = 1,
-    COMMISSION_MEASURE = 2,
-    COMMISSION_DONE = 3,
-    COMMISSION_FAILED = 4
-} commission_phase_t;
+/* X(NAME, value, explanation): named and explained here only. */
+#define COMMISSION_PHASE_LIST(X) \
+    X(IDLE, 0, "No measurement has been asked for.") \
+    X(SETTLE, 1, "A current settles.") \
+    X(MEASURE, 2, "Voltage and current are averaged.") \
+    X(DONE, 3, "The measurement is complete and the compensation has changed.") \
+    X(FAILED, 4, "The measurement has failed and nothing has changed; the failure says why.")
 
-typedef enum {
-    COMMISSION_GOOD = 0,
-    COMMISSION_STOPPED = 1, /* switching was disabled, or the sums of the periods are missing */
-    COMMISSION_MOVED = 2,
-    COMMISSION_LIMITED = 3, /* the voltage was limited */
-    COMMISSION_CURRENT = 4, /* the current deviates from its reference */
-    COMMISSION_FIT = 5      /* no plausible resistance or voltage error results */
-} commission_failure_t;
+#define COMMISSION_FAILURE_LIST(X) \
+    X(GOOD, 0, "No failure.") \
+    X(STOPPED, 1, "Switching was disabled, or the paper's identification is selected.") \
+    X(MOVED, 2, "The rotor moved.") \
+    X(LIMITED, 3, "The voltage was not sufficient.") \
+    X(CURRENT, 4, "The current did not reach its reference.") \
+    X(FIT, 5, "No resistance or voltage error of an inverter fits the measurement.")
+
+#define COMMISSION_VALUE(name, value, text) COMMISSION_##name = (value),
+typedef enum { COMMISSION_PHASE_LIST(COMMISSION_VALUE) } commission_phase_t;
+typedef enum { COMMISSION_FAILURE_LIST(COMMISSION_VALUE) } commission_failure_t;
+#undef COMMISSION_VALUE
 
 typedef struct {
     q15_t i_max;

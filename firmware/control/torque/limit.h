@@ -22,17 +22,21 @@
 
 #define TEMPERATURE_UNKNOWN INT16_MIN
 
-enum {
-    DERATING_REQUEST = 1u << 0, /* beyond the machine's rated torque or the vehicle's torque limit */
-    DERATING_POWER = 1u << 1,
-    DERATING_REACH = 1u << 2,    /* voltage or current circle */
-    DERATING_INVERTER = 1u << 3, /* temperature */
-    DERATING_WINDING = 1u << 4,  /* temperature */
-    DERATING_DC_LOW = 1u << 5,
-    DERATING_DC_HIGH = 1u << 6,
-    DERATING_SPEED = 1u << 7,
-    DERATING_MAGNET = 1u << 8, /* i_d at the demagnetisation limit: set by the 1 kHz task */
-};
+/* X(NAME, bit, explanation): the bits of `derating`, named and explained here only. */
+#define DERATING_LIST(X) \
+    X(REQUEST, 0, "Rated torque of the machine, or the vehicle's torque limit.") \
+    X(POWER, 1, "Power limit of the battery.") \
+    X(REACH, 2, "Reach: voltage and current circle.") \
+    X(INVERTER, 3, "Inverter temperature.") \
+    X(WINDING, 4, "Winding temperature.") \
+    X(DC_LOW, 5, "The dc voltage is low.") \
+    X(DC_HIGH, 6, "The dc voltage is high.") \
+    X(SPEED, 7, "Speed.") \
+    X(MAGNET, 8, "i_d is at the demagnetisation limit.") /* set by the 1 kHz task */
+
+#define DERATING_BIT(name, bit, text) DERATING_##name = 1u << (bit),
+enum { DERATING_LIST(DERATING_BIT) };
+#undef DERATING_BIT
 
 /** A straight line: 0 at end, 1 where (x - end) gain is 1. gain = 2^31/(start - end), with its sign. */
 typedef struct {

@@ -89,7 +89,7 @@ static void to_safe(void)
     to_run();
     in.slow = false;
     in.drive_faults = 1;
-    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
 }
 
 static void to_fault(void)
@@ -251,7 +251,7 @@ void test_a_drive_fault_trips_from_ready_run_and_derate_at_once(void)
         from[n]();
         in.torque_arbitrated_is_zero = false;
         in.drive_faults = 4;
-        TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+        TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
         TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
         TEST_ASSERT_EQUAL_UINT8(3, s.first_fault);
     }
@@ -261,12 +261,12 @@ void test_a_gate_driver_fault_and_a_stalled_interrupt_trip_too(void)
 {
     to_run();
     in.gate_fault = true;
-    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
     TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault);
     setUp();
     to_run();
     in.stalled = true;
-    TEST_ASSERT_EQUAL_INT(STATE_SAFE, step());
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
     TEST_ASSERT_EQUAL_UINT8(33 + 5, s.first_fault);
 }
 
@@ -289,7 +289,7 @@ void test_bad_commands_and_a_late_task_end_the_torque_first_and_then_the_run(voi
 void test_the_safe_state_is_left_only_when_the_machine_can_feed_nothing(void)
 {
     to_safe();
-    TEST_ASSERT_EQUAL_INT(STATE_SAFE, steps(1000));
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, steps(1000));
     TEST_ASSERT_TRUE(supervisor_outputs[s.state].contactor);
     in.slow = true;
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
@@ -316,7 +316,7 @@ void test_a_time_out_ends_run_in_ready_and_needs_enable_off_before_on(void)
     TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(15));
     in.torque_arbitrated_is_zero = true;
     TEST_ASSERT_EQUAL_INT(STATE_READY, step());
-    TEST_ASSERT_EQUAL_INT(REFUSED_TIMED_OUT, s.refused);
+    TEST_ASSERT_EQUAL_INT(REFUSED_COMMAND_TIMED_OUT, s.refused);
     in.alive = true;
     in.enable = true; /* it was never off */
     TEST_ASSERT_EQUAL_INT(STATE_READY, steps(10));
@@ -348,21 +348,21 @@ void test_enable_with_a_torque_request_is_refused(void)
 {
     to_ready();
     in.torque_requested_is_zero = false;
-    refused(REFUSED_TORQUE_NOT_ZERO);
+    refused(REFUSED_TORQUE_REQUEST_NOT_ZERO);
 }
 
 void test_enable_with_the_dc_voltage_out_of_range_is_refused(void)
 {
     to_ready();
     in.dc_in_range = false;
-    refused(REFUSED_DC_VOLTAGE);
+    refused(REFUSED_DC_VOLTAGE_OUT_OF_RANGE);
 }
 
 void test_enable_with_an_implausible_sensor_is_refused(void)
 {
     to_ready();
     in.sensors_plausible = false;
-    refused(REFUSED_SENSOR);
+    refused(REFUSED_SENSOR_IMPLAUSIBLE);
 }
 
 void test_enable_in_the_locked_current_mode_is_refused(void)
@@ -370,7 +370,7 @@ void test_enable_in_the_locked_current_mode_is_refused(void)
     to_ready();
     in.torque_mode = false;
     in.current_mode = true;
-    refused(REFUSED_MODE);
+    refused(REFUSED_MODE_LOCKED);
 }
 
 void test_enable_before_ready_is_refused(void)
@@ -441,12 +441,12 @@ void test_a_reset_while_enabled_or_outside_fault_is_refused(void)
     in.enable = true;
     reset();
     TEST_ASSERT_EQUAL_UINT32(0, s.resets);
-    TEST_ASSERT_EQUAL_INT(REFUSED_RESET, s.refused);
+    TEST_ASSERT_EQUAL_INT(REFUSED_RESET_WHILE_ENABLED, s.refused);
     setUp();
     to_ready();
     reset();
     TEST_ASSERT_EQUAL_UINT32(0, s.resets);
-    TEST_ASSERT_EQUAL_INT(REFUSED_RESET, s.refused);
+    TEST_ASSERT_EQUAL_INT(REFUSED_RESET_WHILE_ENABLED, s.refused);
 }
 
 void test_a_held_reset_counts_once(void)
@@ -464,10 +464,10 @@ static const unsigned allowed[STATES] = {
     [STATE_INIT] = TO(STANDBY) | TO(FAULT),
     [STATE_STANDBY] = TO(PRECHARGE) | TO(FAULT),
     [STATE_PRECHARGE] = TO(READY) | TO(DISCHARGE) | TO(FAULT),
-    [STATE_READY] = TO(RUN) | TO(DISCHARGE) | TO(SAFE) | TO(FAULT),
-    [STATE_RUN] = TO(READY) | TO(DERATE) | TO(SAFE) | TO(FAULT),
-    [STATE_DERATE] = TO(READY) | TO(RUN) | TO(SAFE) | TO(FAULT),
-    [STATE_SAFE] = TO(FAULT),
+    [STATE_READY] = TO(RUN) | TO(DISCHARGE) | TO(SAFE_STATE) | TO(FAULT),
+    [STATE_RUN] = TO(READY) | TO(DERATE) | TO(SAFE_STATE) | TO(FAULT),
+    [STATE_DERATE] = TO(READY) | TO(RUN) | TO(SAFE_STATE) | TO(FAULT),
+    [STATE_SAFE_STATE] = TO(FAULT),
     [STATE_FAULT] = TO(STANDBY) | TO(DISCHARGE),
     [STATE_DISCHARGE] = TO(STANDBY) | TO(FAULT),
 };

@@ -7,7 +7,7 @@ import click
 import jinja2
 
 from fluxtrue_tools import paths
-from fluxtrue_tools.a2l.elf import Description, read
+from fluxtrue_tools.a2l.elf import Description, Word, read
 
 # firmware/calibration/xcp_access.h; a test holds the two together.
 COMMAND_ID = 0x650
@@ -31,10 +31,17 @@ def render(description: Description, source: str) -> str:
                                      undefined=jinja2.StrictUndefined)  # fmt: skip
     addresses = [value.address for value in description.values]
     segment = {"address": min(addresses), "size": FLOAT_SIZE * len(addresses)}
+    tables: dict[str, list[Word]] = {}
+    bits: dict[str, list[Word]] = {}
+    for word in description.words:
+        (bits if word.is_bit else tables).setdefault(word.base, []).append(word)
+    conversions = {base.name: f"per_unit_{base.name}" for base in description.bases}
+    conversions |= {name: f"words_{name}" for name in tables}
     return environment.get_template("fluxtrue.a2l.j2").render(
         name=description.machine, source=source, segment=segment, types=ASAP2_TYPES,
         cycle=_cycle(description.step_s), command_id=COMMAND_ID, answer_id=ANSWER_ID, bases=description.bases,
-        values=description.values, measurements=description.measurements, frozen=description.frozen)  # fmt: skip
+        values=description.values, measurements=description.measurements, frozen=description.frozen,
+        conversions=conversions, tables=tables, bits=bits)  # fmt: skip
 
 
 @click.command(cls=paths.Command)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an ELF file of the firmware says about its calibration values and measurements.
 
-The source lists them once (firmware/calibration/calibration_list.h, measurement_list.h); firmware/ecu/a2l_records.c
-puts the lists, with offsets, into a section that is never loaded.
+The source lists them once (firmware/calibration/calibration_list.h, measurement_list.h, and the lists of names such as
+FAULT_LIST); firmware/ecu/a2l_records.c puts the lists, with offsets, into a section that is never loaded.
 """
 
 import re
@@ -20,7 +20,7 @@ SECTION = ".a2l"
 OBJECT = "ecu"
 MOTOR = "motor"
 # kind, name, text, unit, type, base, lo, hi, count, offset: a2l_record_t.
-RECORD = struct.Struct("<8s40s80s12s8s12sffII")
+RECORD = struct.Struct("<8s40s112s12s8s12sffII")
 RANGES = {"U32": (0.0, 4294967295.0), "U16": (0.0, 65535.0), "U8": (0.0, 255.0), "S16": (-32768.0, 32767.0)}
 ADDRESS_MAX = 0xFFFFFFFF
 Q15_ONE = 32768.0
@@ -56,6 +56,17 @@ class Base:
 
 
 @dataclass(frozen=True)
+class Word:
+    """What a value, or a bit, of a measurement with this base means."""
+
+    base: str
+    is_bit: bool
+    value: int
+    name: str
+    text: str
+
+
+@dataclass(frozen=True)
 class Description:
     """Everything the description file is made from."""
 
@@ -65,6 +76,7 @@ class Description:
     frozen: tuple[Value, ...]  # before the first fault; not recorded, read once
     bases: tuple[Base, ...]
     step_s: float  # of the 1 kHz task: the faster raster
+    words: tuple[Word, ...] = ()
 
 
 def _text(raw: bytes) -> str:
@@ -152,5 +164,7 @@ def _describe(elf: ELFFile, path: Path) -> Description:
         )
         for wanted in ("value", "measure", "frozen")
     }  # fmt: skip
+    words = tuple(Word(value.base, kind == "bit", number, value.name.lower(), value.text)
+                  for kind, value, number in records if kind in ("word", "bit"))  # fmt: skip
     return Description("fluxtrue", placed["value"], placed["measure"], placed["frozen"], tuple(bases.values()),
-                       step_s)  # fmt: skip
+                       step_s, words)  # fmt: skip

@@ -21,8 +21,6 @@ PAGE = ROOT / "docs" / "howto" / "can.md"
 BEGIN, END = "<!-- states: begin -->\n", "<!-- states: end -->\n"
 
 ROW = re.compile(r"^\s*\{STATE_(\w+), ([^,{}]*), STATE_(\w+)\},$", re.MULTILINE)
-# The supervisor's short names, as the DBC spells them.
-NAMES = {"SAFE": "safe_state"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,7 @@ class Transition:
 
 def state_name(raw: str) -> str:
     """As on the bus."""
-    return NAMES.get(raw, raw.lower())
+    return raw.lower()
 
 
 def read_table(path: Path) -> list[Transition]:
