@@ -135,34 +135,15 @@ static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
     return y;
 }
 
-static inline int32_t fx_arch_qdsub(int32_t a, int32_t b)
-{
-    int32_t y;
-    __asm__("qdsub %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
-    return y;
-}
-
-static inline int32_t fx_arch_smulwb(int32_t a, int16_t b)
-{
-    int32_t y;
-    __asm__("smulwb %0, %1, %2" : "=r"(y) : "r"(a), "r"((int32_t)b));
-    return y;
-}
-
-static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
-{
-    return __smlawb(a, b, acc);
-}
-
-/* The lower half of a word, whatever its upper one. */
-static inline int32_t fx_arch_smulwb_word(int32_t a, int32_t b)
+/* b is the lower half of a word, whatever its upper half holds; the builtin would extend its sign first. */
+static inline int32_t fx_arch_smulwb(int32_t a, int32_t b)
 {
     int32_t y;
     __asm__("smulwb %0, %1, %2" : "=r"(y) : "r"(a), "r"(b));
     return y;
 }
 
-static inline int32_t fx_arch_smlawb_word(int32_t a, int32_t b, int32_t acc)
+static inline int32_t fx_arch_smlawb(int32_t a, int32_t b, int32_t acc)
 {
     int32_t y;
     __asm__("smlawb %0, %1, %2, %3" : "=r"(y) : "r"(a), "r"(b), "r"(acc));

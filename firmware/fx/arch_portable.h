@@ -60,11 +60,6 @@ static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
     return fx_arch_qadd(a, fx_arch_qadd(b, b));
 }
 
-static inline int32_t fx_arch_qdsub(int32_t a, int32_t b)
-{
-    return fx_arch_qsub(a, fx_arch_qadd(b, b));
-}
-
 static inline int32_t fx_arch_ssat16_word(int32_t x)
 {
     return fx_arch_ssat16(x);
@@ -82,24 +77,14 @@ static inline uint32_t fx_arch_usat17(int32_t x)
     return (uint32_t)((low > 0x1FFFF) ? 0x1FFFF : low);
 }
 
-static inline int32_t fx_arch_smulwb(int32_t a, int16_t b)
+static inline int32_t fx_arch_smulwb(int32_t a, int32_t b)
 {
-    return (int32_t)(((int64_t)a * b) >> 16);
+    return (int32_t)(((int64_t)a * (int16_t)((uint32_t)b & 0xFFFFU)) >> 16);
 }
 
-static inline int32_t fx_arch_smlawb(int32_t a, int16_t b, int32_t acc)
+static inline int32_t fx_arch_smlawb(int32_t a, int32_t b, int32_t acc)
 {
     return fx_arch_add_wrap(acc, fx_arch_smulwb(a, b));
-}
-
-static inline int32_t fx_arch_smulwb_word(int32_t a, int32_t b)
-{
-    return fx_arch_smulwb(a, (int16_t)(uint16_t)((uint32_t)b & 0xFFFFU));
-}
-
-static inline int32_t fx_arch_smlawb_word(int32_t a, int32_t b, int32_t acc)
-{
-    return fx_arch_smlawb(a, (int16_t)(uint16_t)((uint32_t)b & 0xFFFFU), acc);
 }
 
 static inline int32_t fx_arch_smmul_r(int32_t a, int32_t b)

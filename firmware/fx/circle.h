@@ -4,7 +4,7 @@
 
 /** The other leg of a right triangle with the hypotenuse 1, never below a quarter.
  *   y[n] = max(sqrt(1 - ((n + 1)/256)^2), 1/4): what is left in the whole cell n/256 <= |x| < (n + 1)/256
- * Source   docs/theory/fixed-point.md (FX-32)
+ * Source   docs/theory/fixed-point.md (FX-27)
  * Units    q15
  * Range    n = 0 ... 255
  * Rounding down, to the cell's far end: at most 0.0149 where the quarter begins, 0.004 at |x| = 0.7

@@ -64,12 +64,6 @@ __attribute__((always_inline)) static inline int32_t fx_usat_bits(int32_t x, uns
     return fx_arch_usat(x, bits);
 }
 
-/* a/b as the instruction has it, 0 for b = 0. A quotient of 2^31 and more has the bits of a negative number. */
-static inline int32_t fx_quotient(uint32_t a, uint32_t b)
-{
-    return fx_arch_udiv(a, b);
-}
-
 static inline q31_t fx_sat_q31(int64_t x)
 {
     const int32_t high = (int32_t)(x >> 32);
@@ -109,15 +103,10 @@ static inline q31_t fx_sub_q31(q31_t a, q31_t b)
     return fx_arch_qsub(a, b);
 }
 
-/* a + 2 b and a - 2 b, both steps saturating. */
+/* a + 2 b, both steps saturating. */
 static inline q31_t fx_add2_q31(q31_t a, q31_t b)
 {
     return fx_arch_qdadd(a, b);
-}
-
-static inline q31_t fx_sub2_q31(q31_t a, q31_t b)
-{
-    return fx_arch_qdsub(a, b);
 }
 
 static inline q31_t fx_neg_q31(q31_t a)

@@ -5,7 +5,7 @@
 /** Linear and bilinear look-up on a uniform grid whose spacing is a power of two.
  *   z = sum of w_k z_k over the cell's corners, weights Q14, non-negative, summing to exactly one.
  *   For several tables on one grid find the cell once, fx_cell(), then fx_cell_interp() per table.
- * Source   docs/theory/fixed-point.md (FX-27) to (FX-31)
+ * Source   docs/theory/fixed-point.md (FX-22) to (FX-26)
  * Units    x, y: integers, any unit; grid point i is at x0 + i * 2^shift. Values: 16-bit, any scale
  * Range    2 <= n <= 255, shift <= 14, (n - 1) * 2^shift < 2^17, any x0; see fx_axis_valid().
  *          Any x: outside the grid, the edge's value and a flag
@@ -34,11 +34,6 @@ typedef struct {
     uint8_t nx;
     uint8_t ny;
 } fx_grid_t;
-
-typedef struct {
-    const int16_t *z; /* row-major: z[ix * ny + iy] */
-    fx_grid_t grid;
-} fx_lut2_t;
 
 /* A grid with one spacing, y from 0, as a look-up in every period wants it. */
 typedef struct {
@@ -116,7 +111,7 @@ static inline fx_cell_t fx_cell_at(uint32_t x, uint32_t y, uint32_t ny)
 {
     const uint32_t wx = x & 0x3FFFU;
     const uint32_t wy = y & 0x3FFFU;
-    /* One product, the other three by subtraction: the four always sum to 2^14 (FX-29). */
+    /* One product, the other three by subtraction: the four always sum to 2^14 (FX-24). */
     const uint32_t w11 = ((wx * wy) + 0x2000U) >> 14;
     const fx_pair_t w1 = wx + (w11 << 16) - w11; /* (wx - w11, w11) */
     const fx_pair_t w = fx_weights(wy);
@@ -179,13 +174,6 @@ static inline int32_t fx_cell_interp(const int16_t *z, uint32_t ny, fx_cell_t ce
 static inline int32_t fx_cell_interp_y(const int16_t *z, fx_cell_t cell)
 {
     return fx_dot2_acc(0x2000, fx_load_pair(&z[cell.column]), cell.wy) >> 14;
-}
-
-static inline q15_t fx_lookup2(const fx_lut2_t *lut, int32_t x, int32_t y, bool *clamped)
-{
-    const fx_cell_t cell = fx_cell(&lut->grid, x, y);
-    *clamped = cell.outside != 0U;
-    return (q15_t)fx_cell_interp(lut->z, lut->grid.ny, cell);
 }
 
 #endif

@@ -8,7 +8,7 @@
  * Units    per unit; gains in q16
  * Range    every argument, except that the multiply-accumulates (mac, mulhi_add, mulhi_sub, dot2)
  *          wrap modulo 2^32: the caller proves that its sum stays inside int32_t
- * Rounding half up, 1/2 LSB of the result; fx_mul_q31_q15 and fx_mac_q31_q15 truncate towards minus
+ * Rounding half up, 1/2 LSB of the result; fx_mul_q31_word and fx_mac_q31_word truncate towards minus
  *          infinity (bias 1/2 LSB of Q30): never feed an integrator with them
  * Errors   none
  * Context  any; 1 to 3 instructions, fx_mul_q31 9, fx_mul_gain_q31 11 */
@@ -57,14 +57,14 @@ static inline int32_t fx_mulhi_sub(int32_t acc, int32_t a, int32_t b)
 /* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. A call, like fx_mul_gain_q31(): no interrupt needs it. */
 q31_t fx_mul_q31(q31_t a, q31_t b);
 
-/* Q31 * Q15 = Q46 -> Q30, truncated. */
-static inline int32_t fx_mul_q31_q15(q31_t a, q15_t b)
+/* Q31 * Q15 = Q46 -> Q30, truncated; b is the lower half of a word, whatever its upper half holds. */
+static inline int32_t fx_mul_q31_word(q31_t a, int32_t b)
 {
     return fx_arch_smulwb(a, b);
 }
 
-/* acc + Q31 * Q15, Q30, truncated. */
-static inline int32_t fx_mac_q31_q15(int32_t acc, q31_t a, q15_t b)
+/* acc + Q31 * Q15, Q30, truncated; b as in fx_mul_q31_word(). */
+static inline int32_t fx_mac_q31_word(int32_t acc, q31_t a, int32_t b)
 {
     return fx_arch_smlawb(a, b, acc);
 }
@@ -77,17 +77,6 @@ static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
 
 /* Q16 * Q31 = Q47 -> Q31. */
 q31_t fx_mul_gain_q31(q16_t gain, q31_t x);
-
-/* The same two with the q15 number in a word. */
-static inline int32_t fx_mul_q31_word(q31_t a, int32_t b)
-{
-    return fx_arch_smulwb_word(a, b);
-}
-
-static inline int32_t fx_mac_q31_word(int32_t acc, q31_t a, int32_t b)
-{
-    return fx_arch_smlawb_word(a, b, acc);
-}
 
 static inline fx_pair_t fx_pair(q15_t lo, q15_t hi)
 {

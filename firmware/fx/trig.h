@@ -2,18 +2,13 @@
 #ifndef FX_TRIG_H
 #define FX_TRIG_H
 
-/** Sine and cosine of an angle; angle of a vector.
- *   (sin, cos)(a) by rotating the nearest of 512 table points through the remaining angle.
- *   atan2: signed ratio of the smaller to the larger component, table of atan, nearest axis added.
- * Source   docs/theory/fixed-point.md (FX-18) to (FX-25)
- * Units    angles: turn / 2^16 (fx_sincos), turn / 2^32 (fx_rotation, fx_atan2); all wrap. sin, cos: q15
- * Range    every argument; atan2(0, 0) = 0
- * Rounding sin, cos: 3.2e-5 of full scale (32768), peaks at +1 saturate to 32767
- *          atan2: 2.1e-5 rad, of the angle of the integer pair, for every pair but (0, 0)
+/** Sine and cosine of an angle, by rotating the nearest of 512 table points through the remaining angle.
+ * Source   docs/theory/fixed-point.md (FX-16) to (FX-20)
+ * Units    angles: turn / 2^16 (fx_sincos), turn / 2^32 (fx_rotation); both wrap. sin, cos: q15
+ * Range    every argument
+ * Rounding 3.2e-5 of full scale (32768), peaks at +1 saturate to 32767
  * Errors   none
- * Context  any; 12 (sincos), 20 (atan2) instructions as a call; atan2 has one divide */
-
-#include <stdbool.h>
+ * Context  any; 12 instructions as a call, no division, no loop */
 
 #include "fx/q.h"
 
@@ -22,18 +17,12 @@ typedef struct {
     q15_t cos;
 } fx_sincos_t;
 
-typedef struct {
-    uint32_t base;  /* atan at the cell's start, turn / 2^32 */
-    uint32_t slope; /* per 2^-16 of the ratio */
-} fx_atan_cell_t;
-
 /* Of 2 pi i / 512, Q31, plus half an LSB of q15; side by side, so that one instruction loads both. */
 typedef struct {
     int32_t sin, cos;
 } fx_point_t;
 
 extern const fx_point_t fx_sin_table[512];
-extern const fx_atan_cell_t fx_atan_table[257];
 
 static inline fx_sincos_t fx_sincos(uint16_t angle)
 {
@@ -60,24 +49,6 @@ static inline fx_pair_t fx_rotation(uint32_t turn)
     /* The signed low 23 bits, as a fraction of 2^32, times 2 pi / 2^9 in Q32. */
     const int32_t delta = fx_mulhi((int32_t)(turn << 9), 52707179);
     return fx_arch_pkhtb(fx_mulhi_add(sin0, cos0, delta), fx_mulhi_sub(cos0, sin0, delta));
-}
-
-static inline uint32_t fx_atan2(q15_t y, q15_t x)
-{
-    const bool steep = fx_mul_q30(y, y) > fx_mul_q30(x, x);
-    const int32_t num = steep ? x : y;
-    const int32_t den = steep ? y : x;
-    if (den == 0) {
-        return 0U;
-    }
-    /* The axis nearest to the vector: 0, 1/4, 1/2 or 3/4 turn. */
-    const uint32_t half = (uint32_t)den & UINT32_C(0x80000000);
-    const uint32_t axis = steep ? (half | UINT32_C(0x40000000)) : half;
-    /* Q16, -1..1 inclusive; |num| <= |den|, so neither the shift nor the quotient overflows. */
-    const int32_t ratio = (num * 65536) / den;
-    const fx_atan_cell_t cell = fx_atan_table[(ratio >> 9) + 128];
-    const uint32_t angle = cell.base + (cell.slope * ((uint32_t)ratio & 511U));
-    return steep ? (axis - angle) : (axis + angle);
 }
 
 #endif

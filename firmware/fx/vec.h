@@ -3,7 +3,7 @@
 #define FX_VEC_H
 
 /** Length of a vector, |v| = sqrt(x^2 + y^2), and its other component, sqrt(length^2 - x^2).
- * Source   docs/theory/fixed-point.md (FX-26)
+ * Source   docs/theory/fixed-point.md (FX-21)
  * Units    per unit, q15
  * Range    every argument; lengths of 1 and more saturate to Q15_MAX
  * Rounding 0.69 LSB

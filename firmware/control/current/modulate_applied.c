@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include <stdbool.h>
+
 #include "control/current/modulate_phases.h"
 #include "control/current/transform.h"
 

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CURRENT_TRANSFORM_H
 #define CURRENT_TRANSFORM_H
-/** Changes of reference frame, amplitude-invariant.
+/** Park transform and its inverse, amplitude-invariant. The Clarke transform is part of measure_step().
  *   Park  d = alpha cos + beta sin, q = beta cos - alpha sin;  inverse  alpha = d cos - q sin, beta = d sin + q cos
- *   Clarke  alpha = (2a - b - c)/3, beta = (b - c)/sqrt(3)
  * Source   docs/theory/current-control.md (CC-1)
  * Units    per unit; the angle as its (cos, sin), fx_rotation()
  * Range    every q15 vector with a unit sine and cosine: the sum of two products stays below 2 in Q30
@@ -18,14 +17,6 @@
 static inline int32_t transform_round(int32_t q30)
 {
     return fx_sat_q15_word((q30 + 0x4000) >> 15);
-}
-
-static inline ab_q15_t clarke(abc_q15_t x)
-{
-    /* The coefficients sum to -1 LSB: a zero sequence of full scale leaks 1 LSB into alpha. */
-    const int32_t alpha = x.a * Q15(2.0 / 3.0) + (x.b + x.c) * Q15(-1.0 / 3.0); /* below 4/3 in Q30 */
-    const int32_t beta = (x.b - x.c) * Q15(0.57735026918962576);                /* |b - c| < 2 */
-    return (ab_q15_t){transform_round(alpha), transform_round(beta)};
 }
 
 /* v: (alpha, beta) in one word. */

@@ -18,35 +18,6 @@ static double clip(double x)
     return twin_clamp(x, -32768.0, 32767.0);
 }
 
-/* Half an LSB of the one rounding, and 1/3, 2/3, 1/sqrt(3) in q15: 0.5 + 3 * 0.33 (alpha), 2 * 0.5 (beta). */
-void test_clarke_follows_its_equation_for_every_corner_and_at_random(void)
-{
-    worst_t worst = {0};
-    uint64_t seed = 11;
-    for (int n = 0; n < 300000; n++) {
-        static const int16_t corner[3] = {INT16_MIN, 0, INT16_MAX};
-        abc_q15_t x = {corner[n % 3], corner[n / 3 % 3], corner[n / 9 % 3]};
-        if (n >= 27) {
-            x = (abc_q15_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767),
-                            (q15_t)random_in(&seed, -32768, 32767)};
-        }
-        const ab_q15_t y = clarke(x);
-        const twin_ab_t t = twin_clarke((twin_abc_t){x.a, x.b, x.c});
-        worst_note(&worst, y.alpha - clip(t.alpha), "alpha of %d %d %d", x.a, x.b, x.c);
-        worst_note(&worst, y.beta - clip(t.beta), "beta of %d %d %d", x.a, x.b, x.c);
-    }
-    ASSERT_WORST(worst, 1.5);
-}
-
-void test_clarke_ignores_a_common_current_to_one_lsb(void)
-{
-    for (int x = -32768; x <= 32767; x += 13) {
-        const ab_q15_t y = clarke((abc_q15_t){(q15_t)x, (q15_t)x, (q15_t)x});
-        TEST_ASSERT_INT_WITHIN(1, 0, y.alpha);
-        TEST_ASSERT_EQUAL_INT(0, y.beta);
-    }
-}
-
 /* The angle of a is exact in the twin; sine and cosine are each good to 1.05 LSB, so |v| 1.05 sqrt(2) at most, plus
  * 0.5. */
 void test_park_and_its_inverse_follow_the_twin_at_every_angle(void)

@@ -82,6 +82,50 @@ void test_saturation_to_q15_leaves_the_range_alone_and_stops_at_its_ends(void)
     for (int32_t i = 0; i < 1000000; i++) {
         const int32_t x = (i < CORNERS) ? corner[i] : random_s32();
         expect_equal("fx_sat_q15", x, 0, fx_sat_q15(x), (int64_t)clip(x, -32768.0L, 32767.0L));
+        expect_equal("fx_sat_q15_word", x, 0, fx_sat_q15_word(x), (int64_t)clip(x, -32768.0L, 32767.0L));
+        expect_equal("fx_usat_q15_word", x, 0, fx_usat_q15_word(x), (int64_t)clip(x, 0.0L, 32767.0L));
+    }
+}
+
+/* The width is part of an instruction, so each needs a line of its own: the ends and those that the firmware uses. */
+#define CHECK_SIGNED(x, bits) \
+    expect_equal("fx_sat_bits", x, bits, fx_sat_bits((x), (bits)), \
+                 (int64_t)clip((x), -ldexpl(1.0L, (bits)-1), ldexpl(1.0L, (bits)-1) - 1.0L))
+#define CHECK_UNSIGNED(x, bits) \
+    expect_equal("fx_usat_bits", x, bits, fx_usat_bits((x), (bits)), \
+                 (int64_t)clip((x), 0.0L, ldexpl(1.0L, (bits)) - 1.0L))
+
+static void saturate_to_bits(int32_t x)
+{
+    CHECK_SIGNED(x, 1);
+    CHECK_SIGNED(x, 2);
+    CHECK_SIGNED(x, 16);
+    CHECK_SIGNED(x, 23);
+    CHECK_SIGNED(x, 24);
+    CHECK_SIGNED(x, 26);
+    CHECK_SIGNED(x, 30);
+    CHECK_SIGNED(x, 31);
+    CHECK_SIGNED(x, 32);
+    CHECK_UNSIGNED(x, 0);
+    CHECK_UNSIGNED(x, 1);
+    CHECK_UNSIGNED(x, 17);
+    CHECK_UNSIGNED(x, 22);
+    CHECK_UNSIGNED(x, 31);
+}
+
+void test_saturation_to_a_number_of_bits_leaves_the_range_alone_and_stops_at_its_ends(void)
+{
+    for (int32_t i = 0; i < CORNERS; i++) {
+        saturate_to_bits(corner[i]);
+    }
+    for (int32_t n = 0; n < 31; n++) {
+        for (int32_t offset = -2; offset <= 2; offset++) {
+            saturate_to_bits((int32_t)((1U << n) + (uint32_t)offset));
+            saturate_to_bits(-(int32_t)((1U << n) + (uint32_t)offset));
+        }
+    }
+    for (int32_t i = 0; i < 200000; i++) {
+        saturate_to_bits(random_s32());
     }
 }
 
@@ -105,6 +149,8 @@ static void q31_pair(int32_t a, int32_t b)
     const long double difference = clip((long double)a - b, INT32_MIN, INT32_MAX);
     expect_equal("fx_add_q31", a, b, fx_add_q31(a, b), (int64_t)sum);
     expect_equal("fx_sub_q31", a, b, fx_sub_q31(a, b), (int64_t)difference);
+    const long double twice = clip((long double)b + b, INT32_MIN, INT32_MAX);
+    expect_equal("fx_add2_q31", a, b, fx_add2_q31(a, b), (int64_t)clip(a + twice, INT32_MIN, INT32_MAX));
     expect_equal("fx_min_s32", a, b, fx_min_s32(a, b), (int64_t)fminl(a, b));
     expect_equal("fx_max_s32", a, b, fx_max_s32(a, b), (int64_t)fmaxl(a, b));
 }

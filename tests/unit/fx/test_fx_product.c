@@ -108,26 +108,59 @@ void test_subtracting_a_tie_rounds_the_difference_up_and_not_the_product(void)
     TEST_ASSERT_EQUAL_INT32(10, fx_mulhi_sub(10, 0x40000000, 2));
 }
 
-static void mixed(int32_t a, int32_t b, int32_t acc)
+static void gain_q15(int32_t a, int32_t b)
 {
     const q15_t x = (q15_t)b;
     const long double product = (long double)a * x;
-    const long double cut = floorl(product / 65536.0L);
-    expect_equal("fx_mul_q31_q15", a, x, fx_mul_q31_q15(a, x), (int64_t)cut);
-    expect_equal("fx_mac_q31_q15", a, x, fx_mac_q31_q15(acc, a, x), wrapped(acc + cut));
     const int64_t gain = (int64_t)clip(half_up(product / 65536.0L), -32768.0L, 32767.0L);
     expect_equal("fx_mul_gain_q15", a, x, fx_mul_gain_q15(a, x), gain);
 }
 
-void test_products_of_unlike_formats_truncate_states_and_round_gains(void)
+void test_gains_of_q15_round_half_up_and_saturate(void)
 {
     for (int32_t i = 0; i < CORNERS; i++) {
         for (int32_t j = 0; j < CORNERS; j++) {
-            mixed(corner[i], corner[j] >> 16, corner[(i + j) % CORNERS]);
+            gain_q15(corner[i], corner[j] >> 16);
         }
     }
     for (int32_t i = 0; i < 1000000; i++) {
-        mixed(random_s32(), random_s16(), random_s32());
+        gain_q15(random_s32(), random_s16());
+    }
+}
+
+/* b's lower half as a number; the upper half is whatever a larger word left there. */
+static int32_t lower_half(int32_t b)
+{
+    const int32_t low = (int32_t)((uint32_t)b % 65536U);
+    return (low < 32768) ? low : low - 65536;
+}
+
+static void word(int32_t acc, int32_t a, int32_t b)
+{
+    const long double cut = floorl((long double)a * lower_half(b) / 65536.0L);
+    expect_equal("fx_mul_q31_word", a, b, fx_mul_q31_word(a, b), (int64_t)cut);
+    expect_equal("fx_mac_q31_word", a, b, fx_mac_q31_word(acc, a, b), wrapped(acc + cut));
+}
+
+void test_products_with_the_lower_half_of_a_word_truncate_and_ignore_the_upper_half(void)
+{
+    TEST_ASSERT_EQUAL_INT32(0x40000000, fx_mul_q31_word(Q31_MIN, Q15_MIN)); /* -1 * -1 = 1 in Q30 */
+    TEST_ASSERT_EQUAL_INT32(-1, fx_mul_q31_word(-1, 1));                    /* towards minus infinity */
+    TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_mac_q31_word(INT32_MAX, 65536, 1));
+    for (int32_t i = 0; i < CORNERS; i++) {
+        for (int32_t j = 0; j < CORNERS; j++) {
+            for (int32_t k = 0; k < CORNERS; k++) {
+                word(corner[k], corner[i], corner[j]);
+            }
+        }
+    }
+    for (int32_t b = -32768; b <= 32767; b++) {
+        word(random_s32(), Q31_MIN, b);
+        word(random_s32(), Q31_MAX, b);
+        word(random_s32(), random_s32(), b);
+    }
+    for (int32_t i = 0; i < 1000000; i++) {
+        word(random_s32(), random_s32(), (int32_t)random_u32());
     }
 }
 
@@ -141,6 +174,13 @@ static void dual(const q15_t v[4], int32_t acc)
                      (v[0] < 0 ? v[0] + INT64_C(65536) : v[0]));
     expect_equal("fx_dot2", v[0], v[1], fx_dot2(a, b), wrapped(dot));
     expect_equal("fx_dot2_acc", v[0], v[1], fx_dot2_acc(acc, a, b), wrapped(acc + dot));
+    const long double crossed = ((long double)v[0] * v[3]) + ((long double)v[1] * v[2]);
+    expect_equal("fx_dot2_cross", v[0], v[1], fx_dot2_cross(a, b), wrapped(crossed));
+    const long double difference = ((long double)v[0] * v[2]) - ((long double)v[1] * v[3]);
+    expect_equal("fx_difference2", v[0], v[1], fx_difference2(a, b), (int64_t)difference);
+    const long double crossed_difference = ((long double)v[0] * v[3]) - ((long double)v[1] * v[2]);
+    expect_equal("fx_difference2_cross_acc", v[0], v[1], fx_difference2_cross_acc(acc, a, b),
+                 wrapped(acc + crossed_difference));
     const int32_t one_by_one = fx_mac_q30(fx_mac_q30(acc, v[0], v[2]), v[1], v[3]);
     expect_equal("fx_mac_q30", v[0], v[1], one_by_one, wrapped(acc + dot));
 }
@@ -151,6 +191,11 @@ void test_dual_products_equal_two_single_ones_and_wrap_as_documented(void)
     TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_dot2(fx_pair(Q15_MIN, Q15_MIN), fx_pair(Q15_MIN, Q15_MIN)));
     dual(all_minus_one, INT32_MAX);
     dual(all_minus_one, INT32_MIN);
+    static const q15_t end[7] = {Q15_MIN, -32767, -1, 0, 1, 16384, Q15_MAX};
+    for (int32_t i = 0; i < 7 * 7 * 7 * 7; i++) {
+        const q15_t v[4] = {end[i % 7], end[i / 7 % 7], end[i / 49 % 7], end[i / 343]};
+        dual(v, corner[i % CORNERS]);
+    }
     for (int32_t i = 0; i < 1000000; i++) {
         const q15_t v[4] = {random_s16(), random_s16(), random_s16(), random_s16()};
         dual(v, random_s32());

@@ -58,54 +58,6 @@ void test_the_root_of_one_and_more_saturates(void)
     TEST_ASSERT_EQUAL_INT16(32767, fx_sqrt_q30(UINT32_MAX));
 }
 
-static void note_q31(worst_t *worst, int64_t x)
-{
-    if ((x >= 0) && (x <= INT32_MAX)) {
-        const long double exact = sqrtl((long double)x * 2147483648.0L);
-        worst_note(worst, fx_sqrt_q31((int32_t)x) - exact, x, 0);
-    }
-}
-
-/* Every cell of the table, its ends and its inside, at every power of four. (FX-17) bounds the error
- * by 0.87 LSB; its two roundings do not meet at their worst, and 0.77 leaves no room for a third. */
-void test_q31_roots_are_within_one_lsb_in_every_cell_of_the_table(void)
-{
-    worst_t worst = {0};
-    for (int64_t edge = 64; edge <= 256; edge++) {
-        for (int shift = -24; shift <= 23; shift++) {
-            const int64_t x = (shift < 0) ? (edge >> -shift) : (edge << shift);
-            const int64_t step = (shift < 8) ? 1 : (INT64_C(1) << (shift - 8));
-            for (int64_t i = -130; i <= 130; i++) {
-                note_q31(&worst, x + i);
-                note_q31(&worst, x + (i * step));
-            }
-        }
-    }
-    worst_expect(&worst, "fx_sqrt_q31", 0.77L);
-}
-
-void test_q31_roots_are_within_one_lsb_at_random_and_for_all_small_arguments(void)
-{
-    worst_t worst = {0};
-    for (int64_t x = 0; x <= 300000; x++) {
-        note_q31(&worst, x);
-        note_q31(&worst, INT32_MAX - x);
-    }
-    for (int32_t i = 0; i < 3000000; i++) {
-        note_q31(&worst, random_s32());
-    }
-    worst_expect(&worst, "fx_sqrt_q31", 0.77L);
-}
-
-void test_q31_roots_of_negative_arguments_are_zero_and_of_the_largest_saturate(void)
-{
-    TEST_ASSERT_EQUAL_INT32(0, fx_sqrt_q31(0));
-    TEST_ASSERT_EQUAL_INT32(0, fx_sqrt_q31(-1));
-    TEST_ASSERT_EQUAL_INT32(0, fx_sqrt_q31(INT32_MIN));
-    TEST_ASSERT_EQUAL_INT32(0x40000000, fx_sqrt_q31(0x20000000)); /* sqrt(1/4) */
-    TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_sqrt_q31(INT32_MAX));   /* 2^31 - 1/2 */
-}
-
 static void note_magnitude(worst_t *worst, int32_t x, int32_t y)
 {
     const long double exact = hypotl(x, y);

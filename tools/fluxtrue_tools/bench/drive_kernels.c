@@ -258,6 +258,14 @@ STAGE void bench_current_tick(void)
     modulate(&m->modulate, &wanted, i_dq, advanced);
 }
 
+/* As a step of its own, (CC-1): in the firmware it is part of measure_step(), which also scales the counts. */
+static ab_q15_t clarke(abc_q15_t x)
+{
+    const int32_t alpha = x.a * Q15(2.0 / 3.0) + (x.b + x.c) * Q15(-1.0 / 3.0);
+    const int32_t beta = (x.b - x.c) * Q15(0.57735026918962576);
+    return (ab_q15_t){transform_round(alpha), transform_round(beta)};
+}
+
 /* What the leanest peer's tick has, of the same stages; all else is constant and so compiled away: inductance 1, no
  * feed-forward of speed, no dead time, a known dc voltage. */
 STAGE void bench_current_core(void)

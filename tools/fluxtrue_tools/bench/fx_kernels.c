@@ -48,8 +48,14 @@ KERNEL1(sat_q15, q15_t, int32_t, fx_sat_q15(a))
 KERNEL1(sat_q15_word, int32_t, int32_t, fx_sat_q15_word(a))
 KERNEL1(sat_bits_23, int32_t, int32_t, fx_sat_bits(a, 23))
 KERNEL1(sat_bits_31, int32_t, int32_t, fx_sat_bits(a, 31))
+KERNEL1(sat_bits_1, int32_t, int32_t, fx_sat_bits(a, 1))
+KERNEL1(sat_bits_32, int32_t, int32_t, fx_sat_bits(a, 32))
+KERNEL1(usat_bits_0, int32_t, int32_t, fx_usat_bits(a, 0))
+KERNEL1(usat_bits_22, int32_t, int32_t, fx_usat_bits(a, 22))
+KERNEL1(usat_bits_31, int32_t, int32_t, fx_usat_bits(a, 31))
+KERNEL2(min_s32, int32_t, int32_t, int32_t, fx_min_s32(a, b))
+KERNEL2(max_s32, int32_t, int32_t, int32_t, fx_max_s32(a, b))
 KERNEL2(add2_q31, q31_t, q31_t, q31_t, fx_add2_q31(a, b))
-KERNEL2(sub2_q31, q31_t, q31_t, q31_t, fx_sub2_q31(a, b))
 KERNEL2(sat_q31, q31_t, int32_t, int32_t, fx_sat_q31((int64_t)a * 8 + (b & 7)))
 KERNEL2(add_q15, q15_t, q15_t, q15_t, fx_add_q15(a, b))
 KERNEL2(sub_q15, q15_t, q15_t, q15_t, fx_sub_q15(a, b))
@@ -69,8 +75,8 @@ KERNEL2(mulhi, int32_t, int32_t, int32_t, fx_mulhi(a, b))
 KERNEL3(mulhi_add, int32_t, int32_t, int32_t, int32_t, fx_mulhi_add(a, b, c))
 KERNEL3(mulhi_sub, int32_t, int32_t, int32_t, int32_t, fx_mulhi_sub(a, b, c))
 KERNEL2(mul_q31, q31_t, q31_t, q31_t, fx_mul_q31(a, b))
-KERNEL2(mul_q31_q15, int32_t, q31_t, q15_t, fx_mul_q31_q15(a, b))
-KERNEL3(mac_q31_q15, int32_t, int32_t, q31_t, q15_t, fx_mac_q31_q15(a, b, c))
+KERNEL2(mul_q31_word, int32_t, q31_t, int32_t, fx_mul_q31_word(a, b))
+KERNEL3(mac_q31_word, int32_t, int32_t, q31_t, int32_t, fx_mac_q31_word(a, b, c))
 KERNEL2(mul_gain_q15, q15_t, q16_t, q15_t, fx_mul_gain_q15(a, b))
 KERNEL2(mul_gain_q31, q31_t, q16_t, q31_t, fx_mul_gain_q31(a, b))
 KERNEL2(shl_q31, q31_t, q31_t, u32, fx_shl_q31(a, b & 63U))
@@ -87,14 +93,12 @@ KERNEL2(difference2, int32_t, fx_pair_t, fx_pair_t, fx_difference2(a, b))
 KERNEL3(difference2_cross_acc, int32_t, int32_t, fx_pair_t, fx_pair_t, fx_difference2_cross_acc(a, b, c))
 KERNEL1(usat_q15_word, int32_t, int32_t, fx_usat_q15_word(a))
 KERNEL1(rotation, fx_pair_t, u32, fx_rotation(a))
-KERNEL2(div_s32, int32_t, int32_t, int32_t, fx_div_s32(a, b))
+KERNEL2(quotient, int32_t, u32, u32, fx_quotient(a, b))
 KERNEL2(div_q15, q15_t, q15_t, q15_t, fx_div_q15(a, b))
 KERNEL2(div_q31, q31_t, int32_t, int32_t, fx_div_q31(a, b))
-KERNEL1(reciprocal_q16, q16_t, q15_t, fx_reciprocal_q16(a))
 KERNEL1(sqrt_q30, q15_t, u32, fx_sqrt_q30(a))
-KERNEL1(sqrt_q31, q31_t, q31_t, fx_sqrt_q31(a))
 KERNEL2(magnitude, q15_t, q15_t, q15_t, fx_magnitude(a, b))
-KERNEL2(atan2, u32, q15_t, q15_t, fx_atan2(a, b))
+KERNEL2(leg, q15_t, q15_t, q15_t, fx_leg(a, b))
 /* As an inlined caller has them: each in a register of its own (r0 and r1). */
 static inline int64_t sincos_in_registers(uint16_t angle)
 {
@@ -119,20 +123,12 @@ static const int16_t values[60] = {
     -2500,  111,    -222,   333,   -444,  555,    -666,  777,  -888,  999,   -1111, 2222,   -3333,  4444,  -5555,
 };
 static const fx_lut1_t line = {values, -32768, 11, 33};
-static const fx_lut2_t plane = {values, {-32768, 0, 12, 13, 9, 5}};
 static const fx_grid_t grid = {-32768, 0, 12, 13, 9, 5};
 
 static inline int32_t lookup1(int32_t x)
 {
     bool clamped;
     const int32_t z = fx_lookup1(&line, x, &clamped);
-    return clamped ? ~z : z;
-}
-
-static inline int32_t lookup2(int32_t x, int32_t y)
-{
-    bool clamped;
-    const int32_t z = fx_lookup2(&plane, x, y, &clamped);
     return clamped ? ~z : z;
 }
 
@@ -157,7 +153,51 @@ static inline int32_t five_tables(const fx_grid_t *g, int32_t x, int32_t y)
     return (cell.outside != 0U) ? ~z : z;
 }
 
+/* Inside q15, beyond its ends, and one count per cell; the arguments have the range that the mesh is for. */
+static const fx_mesh_t mesh = FX_MESH(-20000, 12U, 9U, 5U);
+static const fx_mesh_t finest = FX_MESH(-3, 0U, 6U, 6U);
+static const fx_mesh_t *volatile mesh_pointer = &mesh;
+static const fx_mesh_t *volatile finest_pointer = &finest;
+
+static inline int64_t words(u32 high, u32 low)
+{
+    return (int64_t)(((uint64_t)high << 32) | low);
+}
+
+static inline fx_cell_t cell_of(const fx_mesh_t *m, int32_t x, int32_t y)
+{
+    return fx_mesh_cell(m, (int16_t)(x & 0xFFFF), (u32)y % 32769U);
+}
+
+static inline int64_t mesh_index(const fx_mesh_t *m, int32_t x, int32_t y)
+{
+    const fx_cell_t cell = cell_of(m, x, y);
+    const bool outside = fx_mesh_outside(m, (int16_t)(x & 0xFFFF), (u32)y % 32769U);
+    return words((outside ? 0x10000U : 0U) + cell.column, cell.index);
+}
+
+static inline int64_t mesh_weights(const fx_mesh_t *m, int32_t x, int32_t y)
+{
+    const fx_cell_t cell = cell_of(m, x, y);
+    return words(cell.w0 ^ (cell.wy * 3U), cell.w1);
+}
+
+static inline bool mesh_valid(int32_t x, int32_t y)
+{
+    const fx_mesh_t m = {x, (u32)x & 15U, (u32)y, (u32)x, (u32)y & 255U};
+    const fx_mesh_t made = FX_MESH(x, (u32)y & 15U, (u32)x & 255U, ((u32)y >> 8) & 255U);
+    return fx_mesh_valid(&m) != fx_mesh_valid(&made);
+}
+
+KERNEL2(mesh_index, int64_t, int32_t, int32_t, mesh_index(mesh_pointer, a, b))
+KERNEL2(mesh_weights, int64_t, int32_t, int32_t, mesh_weights(mesh_pointer, a, b))
+KERNEL2(finest_mesh_index, int64_t, int32_t, int32_t, mesh_index(finest_pointer, a, b))
+KERNEL2(finest_mesh_weights, int64_t, int32_t, int32_t, mesh_weights(finest_pointer, a, b))
+KERNEL2(mesh_valid, bool, int32_t, int32_t, mesh_valid(a, b))
+KERNEL2(cell_sum, int32_t, int32_t, int32_t, fx_cell_sum(values, 5U, cell_of(mesh_pointer, a, b)))
+KERNEL2(cell_interp, int32_t, int32_t, int32_t, fx_cell_interp(values, 5U, cell_of(mesh_pointer, a, b)))
+KERNEL2(cell_interp_y, int32_t, int32_t, int32_t, fx_cell_interp_y(&values[7], cell_of(mesh_pointer, a, b)))
+KERNEL2(axis_valid, bool, u32, u32, fx_axis_valid(a, b))
 KERNEL1(lookup1, int32_t, int32_t, lookup1(a))
-KERNEL2(lookup2, int32_t, int32_t, int32_t, lookup2(a, b))
 KERNEL2(one_table, int32_t, int32_t, int32_t, one_table(grid_pointer, a, b))
 KERNEL2(five_tables, int32_t, int32_t, int32_t, five_tables(grid_pointer, a, b))

@@ -23,7 +23,7 @@ def rotate(start: int, other: int, delta: int) -> int:
 
 
 def sine_table() -> list[tuple[int, int]]:
-    """(sin, cos) of 512 points of a turn, Q31 plus half an LSB of q15 (FX-20)."""
+    """(sin, cos) of 512 points of a turn, Q31 plus half an LSB of q15 (FX-18)."""
     half_cell = 64 * 2.0 * math.pi / 65536.0
     amplitude = (1.0 - half_cell**2 / 4.0) * 2.0**31
     exact = [round(amplitude * math.sin(2.0 * math.pi * i / 512.0)) for i in range(512)]
@@ -49,17 +49,8 @@ def rsqrt_table() -> list[tuple[int, int]]:
     return rows
 
 
-def atan_table() -> list[tuple[int, int]]:
-    """(base, slope per 2^-16) of atan, in turns / 2^32, for 256 cells of [-1, 1] (FX-24).
-
-    The last entry serves the ratio 1 alone.
-    """
-    angle = [round(math.atan(i / 128.0) / (2.0 * math.pi) * 2.0**32) for i in range(-128, 130)]
-    return [(angle[i] % 2**32, round((angle[i + 1] - angle[i]) / 512.0)) for i in range(257)]
-
-
 def circle_table() -> list[int]:
-    """What the unit circle leaves beside a leg of up to (i + 1)/256, q15, at least a quarter (FX-32)."""
+    """What the unit circle leaves beside a leg of up to (i + 1)/256, q15, at least a quarter (FX-27)."""
     return [max(math.floor(math.sqrt(1.0 - ((i + 1) / 256.0) ** 2) * 2.0**15), 2**13) for i in range(256)]
 
 
@@ -81,13 +72,11 @@ def _source(header: str, declaration: str, body: str) -> str:
 def sources() -> dict[str, str]:
     """The generated files by name."""
     sine = _rows((f"{{{s}, {c}}}" for s, c in sine_table()), 4)
-    arc = _rows((f"{{{b}U, {s}U}}" for b, s in atan_table()), 4)
     root = _rows((f"{{{b}, {s}}}" for b, s in rsqrt_table()), 3)
     circle = _rows((str(v) for v in circle_table()), 12)
     return {
         "circle_table.c": _source("fx/circle.h", "const uint16_t fx_circle_table[256]", circle),
         "sin_table.c": _source("fx/trig.h", "const fx_point_t fx_sin_table[512]", sine),
-        "atan_table.c": _source("fx/trig.h", "const fx_atan_cell_t fx_atan_table[257]", arc),
         "sqrt_table.c": _source("fx/sqrt.h", "const fx_rsqrt_cell_t fx_rsqrt_table[192]", root),
     }
 

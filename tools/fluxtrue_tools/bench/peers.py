@@ -32,8 +32,6 @@ PEERS = (
     Peer("sincos", "arm_sin_cos_q31", CMSIS, 124, 3.6e-3, "of 1"),
     Peer("sincos", "sine and cosine", ST, 28, 6.1e-3, "of 1"),
     Peer("sincos", "sine only", OPENINVERTER, 5, 3.0e-3, "of 1"),
-    Peer("atan2", "atan2", OPENINVERTER, 40, 1.3e-4, "rad"),
-    Peer("atan2", "arm_atan2_q15", CMSIS, 161, 3e-4, "rad"),
     Peer("sqrt", "sqrt", OPENINVERTER, 49, 4.5e-4, "relative"),
     Peer("sqrt", "arm_sqrt_q31", CMSIS, 58, 2e-9, "of 1"),
     Peer("divide", "arm_divide_q15", CMSIS, 78),
