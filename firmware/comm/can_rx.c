@@ -2,6 +2,7 @@
 #include "comm/can_rx.h"
 
 #include "bus/signals.h"
+#include "signal/counter.h"
 
 #define WINDOW_MASK 0x3FFU /* ten frames */
 #define BAD_TO_FAIL 3U
@@ -11,13 +12,6 @@ static const uint16_t data_ids[] = {
     BUS_PROTECTED(DATA_ID)
 #undef DATA_ID
 };
-
-static void count_up(uint16_t *counter)
-{
-    if (*counter < UINT16_MAX) {
-        (*counter)++;
-    }
-}
 
 /* A CRC that is wrong for this message but right for another one shows that the identifier is wrong. */
 static bool has_crc_of_another_message(const can_frame_t *frame)

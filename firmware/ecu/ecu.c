@@ -7,6 +7,7 @@
 #include "hal/can.h"
 #include "hal/system.h"
 #include "hal/watchdog.h"
+#include "signal/counter.h"
 
 #define FRAMES_PER_TASK 32 /* a bus of 1 Mbit/s delivers fewer in a millisecond */
 #define SLEW_MS 40         /* from zero to full torque */
@@ -72,13 +73,6 @@ static void command_drive(ecu_t *ecu)
     request->limits = ecu_limits(ecu);
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
-}
-
-static void count_up(uint16_t *counter)
-{
-    if (*counter < UINT16_MAX) {
-        (*counter)++;
-    }
 }
 
 static void service_watchdog(ecu_t *ecu)

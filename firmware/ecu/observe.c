@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
 #include "ecu/ecu_private.h"
+#include "signal/counter.h"
+#include "signal/debounce.h"
 
 #define CONSECUTIVE_MAX 3U
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
@@ -22,18 +24,6 @@ static const struct {
     {DERATING_SPEED, DERATING_REASON_SPEED},
 };
 
-static void count_up(uint16_t *counter)
-{
-    if (*counter < UINT16_MAX) {
-        (*counter)++;
-    }
-}
-
-static uint8_t consecutive(uint8_t before, bool again)
-{
-    return again ? (uint8_t)((before < CONSECUTIVE_MAX) ? before + 1U : CONSECUTIVE_MAX) : 0U;
-}
-
 void ecu_watch(ecu_t *ecu)
 {
     liveness_t *liveness = &ecu->liveness;
@@ -42,8 +32,8 @@ void ecu_watch(ecu_t *ecu)
     const uint32_t in_step = ecu->drive.motor.bases.periods_per_step;
     const bool late = liveness->started && periods - liveness->periods >= in_step + in_step / 2U;
     const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == liveness->finished;
-    liveness->late_in_a_row = consecutive(liveness->late_in_a_row, late);
-    liveness->stalled_in_a_row = consecutive(liveness->stalled_in_a_row, periods == liveness->periods || unfinished);
+    (void)debounce_step(&liveness->late_in_a_row, late, CONSECUTIVE_MAX, 1U);
+    (void)debounce_step(&liveness->stalled_in_a_row, periods == liveness->periods || unfinished, CONSECUTIVE_MAX, 1U);
     if (late) {
         count_up(&liveness->task_overruns);
     }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/supervisor.h"
 
+#include "signal/counter.h"
+
 #define SELF_TEST_MS 50U         /* the least time in init */
 #define SELF_TEST_TIME_OUT_MS 500U
 #define PRECHARGE_TIME_OUT_MS 2000U
@@ -12,7 +14,7 @@
 static bool refuse(supervisor_t *s, refused_t reason)
 {
     s->refused = reason;
-    s->refused_count = (s->refused_count < UINT8_MAX) ? (uint8_t)(s->refused_count + 1U) : s->refused_count;
+    s->refused_count = (uint8_t)count_up_to(s->refused_count, UINT8_MAX);
     return false;
 }
 
@@ -94,7 +96,7 @@ static void record_new_faults(supervisor_t *s, uint32_t new_drive, uint32_t new_
     if (new_drive == 0U && new_ecu == 0U) {
         return;
     }
-    s->fault_count = (s->fault_count < UINT8_MAX) ? (uint8_t)(s->fault_count + 1U) : s->fault_count;
+    s->fault_count = (uint8_t)count_up_to(s->fault_count, UINT8_MAX);
     if (s->first_fault == 0U) {
         s->first_fault = (uint8_t)((new_drive != 0U) ? 1U + lowest_bit(new_drive)
                                                      : FIRST_ECU_FAULT + lowest_bit(new_ecu));

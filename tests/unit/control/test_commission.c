@@ -216,6 +216,38 @@ void test_the_knee_of_a_straight_line_is_its_end(void)
     TEST_ASSERT_EQUAL_INT32(0, commission_knee(&curve));
 }
 
+/* A curve that lies above its level has no area below it; one without voltage up to 0.9 would have its knee at 1.8. */
+void test_a_knee_is_neither_negative_nor_beyond_one(void)
+{
+    commission_curve_t curve = {.level = q30(LEVEL)};
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        curve.knot[k] = q30(0.18 * (k + 1.0));
+        curve.v[k] = q30(1.5 * LEVEL);
+    }
+    TEST_ASSERT_EQUAL_INT32(0, commission_knee(&curve));
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        curve.v[k] = 0;
+    }
+    TEST_ASSERT_EQUAL_INT32(q30(1.0) - 1, commission_knee(&curve));
+}
+
+/* The resistance is below Z_b in every machine; a larger one would not fit its format. */
+void test_a_slope_of_one_or_more_does_not_fit(void)
+{
+    commission_curve_t curve;
+    twin_curve_t twin;
+    commission_data_t data = measured(0.3, 1e-6, &twin);
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        data.u[k] = data.i[k] / 100 * 99;
+    }
+    TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.99, curve.r / ONE);
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        data.u[k] = data.i[k];
+    }
+    TEST_ASSERT_FALSE(commission_fit(&data, &curve));
+}
+
 void test_currents_that_do_not_rise_and_a_falling_voltage_do_not_fit(void)
 {
     twin_curve_t twin;

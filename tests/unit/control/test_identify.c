@@ -311,6 +311,53 @@ void test_a_contradiction_takes_the_confidence_away(void)
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
 }
 
+/* 0.15 of the base voltage in one axis alone, ten times the noise: the gate of that axis must see it. */
+void test_a_contradiction_in_either_axis_alone_takes_the_confidence_away(void)
+{
+    const dq_q15_t i = {-4000, 8000};
+    for (int axis = 0; axis < 2; axis++) {
+        setUp();
+        drive(nothing, 3);
+        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+        const dq_q15_t more = {(axis == 0) ? 5000 : 0, (axis == 1) ? 5000 : 0};
+        const window_pair_t pair = steady_window(&f, i, 0.5, more);
+        const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
+        const identify_tables_t tables = tables_at(&f, point.i_m);
+        const identify_in_t in = {&point, &tables, false, 0, true};
+        for (int n = 0; n < 300; n++) {
+            (void)identify_step(&c, &state, &in);
+        }
+        TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
+        TEST_ASSERT_FALSE(state.torque_certain);
+    }
+}
+
+/* A magnet 7 standard deviations weaker than assumed, which so large a noise does not contradict: the estimate creeps
+ * to its limit of 4 and what is left is in no parameter. */
+void test_a_parameter_at_its_limit_takes_the_confidence_away(void)
+{
+    c.noise_voltage_q30 = (int32_t)(0.2 * 1073741824.0);
+    run((dq_q15_t){-4000, 8000}, 0.5, (truth_t){-0.42, 1.0, 0.0}, 20000);
+    TEST_ASSERT_TRUE(state.clamped);
+    TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
+    TEST_ASSERT_FALSE(state.torque_certain);
+}
+
+/* With nothing learnt the torque is uncertain by about a tenth: enough where half of it may be wrong, but never at no
+ * torque. */
+void test_an_uncertainty_that_is_small_against_the_torque_is_confidence_enough(void)
+{
+    enabled = false;
+    run((dq_q15_t){-4000, 8000}, 0.5, nothing, 1000);
+    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    c.confidence_full = Q15(0.5);
+    c.confidence_none = Q15(0.6);
+    run((dq_q15_t){0, 0}, 0.5, nothing, 1000);
+    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    run((dq_q15_t){-4000, 8000}, 0.5, nothing, 1000);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+}
+
 /* At the corner speed half of an unexplained flux is taken, far above it all: with 20 steps the filter has 1 - 0.95^20
  * of it. Parameters are frozen by a huge noise. */
 void test_the_local_flux_error_takes_over_with_speed(void)

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+
 #include "calibration/calibration.h"
 #include "ecu/ecu.h"
 #include "hal/mock_adc.h"
@@ -18,6 +20,8 @@ static ecu_t ecu;
 static bool outputs[BOARD_OUTPUTS];
 static bool gate_fault, mailboxes_full, mrai_hangs;
 static int watchdog_starts, watchdog_services, sent, pended, waiting;
+static can_frame_t arriving, last_answer;
+static int answers;
 
 static void adc_read(adc_counts_t *counts, int calls)
 {
@@ -43,19 +47,23 @@ static bool board_gate_fault(int calls)
     return gate_fault;
 }
 
-/* Noise on the bus: `waiting` frames of an identifier that nobody knows. */
+/* `waiting` times the same frame. */
 static bool can_receive(can_frame_t *frame, int calls)
 {
     (void)calls;
-    *frame = (can_frame_t){.id = 0x7FF, .length = 8};
+    *frame = arriving;
     return waiting-- > 0;
 }
 
 static bool can_send(const can_frame_t *frame, int calls)
 {
-    (void)frame;
     (void)calls;
-    sent += mailboxes_full ? 0 : 1;
+    if (frame->id == XCP_ID_ANSWER && !mailboxes_full) {
+        last_answer = *frame;
+        answers++;
+    } else {
+        sent += mailboxes_full ? 0 : 1;
+    }
     return !mailboxes_full;
 }
 
@@ -74,7 +82,8 @@ static void watchdog_service(int calls)
 void setUp(void)
 {
     gate_fault = mailboxes_full = mrai_hangs = false;
-    watchdog_starts = watchdog_services = sent = pended = waiting = 0;
+    watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
+    arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an identifier that nobody knows */
     hal_adc_read_Stub(adc_read);
     hal_angle_read_IgnoreAndReturn(0);
     hal_irq_pend_mrai_Stub(pend);
@@ -194,7 +203,7 @@ void test_a_gate_driver_fault_reaches_the_fault_word(void)
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, ecu.supervisor.faults);
 }
 
-/* In 100 ms: four messages of 10 ms and six of 100 ms; the one of 1 s is due at anfirst 10 ms. */
+/* In 100 ms: four messages of 10 ms and six of 100 ms; the one of 1 s is due in the first 10 ms. */
 void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
 {
     tasks(100);
@@ -207,6 +216,53 @@ void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
     mailboxes_full = false;
     tasks(1);
     TEST_ASSERT_LESS_OR_EQUAL_INT(before + 2, sent);
+}
+
+/* R is told by INV_Identification alone, every 10 ms. */
+void test_a_frame_with_a_value_that_is_no_number_is_counted_and_not_sent(void)
+{
+    static motor_t broken;
+    broken = motor;
+    broken.r_ohm_20 = NAN;
+    ecu_init(&ecu, &broken);
+    tasks(100);
+    TEST_ASSERT_EQUAL_UINT16(10, ecu.not_sent);
+    TEST_ASSERT_EQUAL_INT(3 * 10 + 6 + 1, sent);
+}
+
+/* CONNECT with two bytes; the answer begins with 0xFF. */
+void test_a_command_of_the_calibration_tool_is_answered_in_the_same_task(void)
+{
+    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
+    waiting = 1;
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(1, answers);
+    TEST_ASSERT_EQUAL_HEX8(0xFF, last_answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT16(0, ecu.rx.count[RX_IGNORED]);
+    tasks(5);
+    TEST_ASSERT_EQUAL_INT(1, answers);
+}
+
+void test_an_answer_that_finds_no_mailbox_waits_for_one(void)
+{
+    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
+    waiting = 1;
+    mailboxes_full = true;
+    tasks(5);
+    TEST_ASSERT_EQUAL_INT(0, answers);
+    mailboxes_full = false;
+    tasks(2);
+    TEST_ASSERT_EQUAL_INT(1, answers);
+}
+
+/* 29 bits with the same number are another sender's. */
+void test_an_extended_identifier_is_no_command_of_the_calibration_tool(void)
+{
+    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .extended = true, .length = 2, .data = {0xFF, 0}};
+    waiting = 1;
+    tasks(2);
+    TEST_ASSERT_EQUAL_INT(0, answers);
+    TEST_ASSERT_EQUAL_UINT16(1, ecu.rx.count[RX_IGNORED]);
 }
 
 /* 32 frames are more than a bus of 1 Mbit/s can bring in a millisecond: the task's time stays bounded. */

@@ -159,6 +159,18 @@ void test_the_times_of_the_states_hold_for_steps_that_are_not_a_millisecond(void
     }
 }
 
+/* 32 bits of microseconds would wrap after 72 minutes; the time stops at one. */
+void test_the_time_in_a_state_does_not_wrap(void)
+{
+    to_standby();
+    in.elapsed_us = 1111;
+    stays(STATE_STANDBY, 54055); /* 60.06 s */
+    const uint32_t us = s.us;
+    TEST_ASSERT_UINT32_WITHIN(1111, 60000000U, us);
+    stays(STATE_STANDBY, 1000);
+    TEST_ASSERT_EQUAL_UINT32(us, s.us);
+}
+
 void test_bad_motor_data_end_in_fault(void)
 {
     in.drive_faults = 1U << 7;
@@ -456,6 +468,25 @@ void test_a_held_reset_counts_once(void)
     in.reset = true;
     (void)steps(50);
     TEST_ASSERT_EQUAL_UINT32(1, s.resets);
+}
+
+void test_the_numbers_of_faults_and_refusals_stop_at_255(void)
+{
+    to_standby();
+    for (int n = 0; n < 300; n++) {
+        in.reset = true;
+        (void)step();
+        in.reset = false;
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_UINT8(255, s.refused_count);
+    for (int n = 0; n < 300; n++) {
+        in.drive_faults = 1;
+        (void)step();
+        in.drive_faults = 0;
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_UINT8(255, s.fault_count);
 }
 
 /* The moves a reader of docs/howto/can.md is told of: one row per state, one bit per state that may follow. */

@@ -108,11 +108,16 @@ void test_more_torque_than_asked_for_is_found_within_30_milliseconds_of_settling
     }
 }
 
+/* Asked to drive and braking instead, and asked to brake and driving instead. */
 void test_torque_against_the_request_is_found(void)
 {
-    in.torque = (q15_t)q15(-0.1);
-    const int found = steps_until(FAULT_TORQUE);
-    TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 30);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        fresh();
+        machine(0.5, -0.2, sign * 0.2, 1.0, 0.0);
+        in.torque = (q15_t)(-sign * q15(0.1));
+        const int found = steps_until(FAULT_TORQUE);
+        TEST_ASSERT_TRUE(found > SETTLING && found <= SETTLING + 30);
+    }
 }
 
 void test_torque_of_either_sign_around_a_zero_request_is_found(void)

@@ -1,0 +1,337 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ecu/ecu_private.h"
+#include "hal/mock_system.h"
+#include "unity.h"
+
+/* hsm1: V_b = 540 V, I_b = 400 A, T_b = 294.664 N·m, omega_b = 3298.6724 rad/s, torque_max = 132 N·m, 3 pole pairs. */
+#define COUNT_PER_V (32768.0 / 540.0)
+#define OMEGA_PER_RPM (3.0 * 2.0 * 3.14159265358979 / 60.0 / 3298.6724 * 2147483648.0)
+#define TORQUE_MAX 14679
+#define US 1000U
+
+static ecu_t ecu;
+static sample_t sample;
+static supervisor_in_t seen;
+
+void setUp(void)
+{
+    hal_system_reset_cause_IgnoreAndReturn(RESET_PIN);
+    ecu_init(&ecu, &motor);
+    ecu.clock.elapsed_us = US;
+    sample = (sample_t){.v_dc = (int32_t)(350.0 * COUNT_PER_V)};
+}
+
+void tearDown(void)
+{
+}
+
+/* One period with this sample, then what the state machine is told. */
+static const supervisor_in_t *observe(void)
+{
+    *sample_box_begin(&ecu.drive.samples) = sample;
+    sample_box_publish(&ecu.drive.samples);
+    seen = ecu_observe(&ecu, false);
+    return &seen;
+}
+
+static const supervisor_in_t *observe_v(double v_dc_V)
+{
+    sample.v_dc = (int32_t)(v_dc_V * COUNT_PER_V);
+    return observe();
+}
+
+static uint32_t told_reason(void)
+{
+    telemetry_t telemetry = {0};
+    ecu_telemetry(&ecu, &telemetry);
+    return telemetry.derating_reason;
+}
+
+/* 140 V and 437.5 V, each with its count of 1/61 V. */
+void test_the_dc_voltage_is_in_range_between_the_monitors_limits(void)
+{
+    TEST_ASSERT_FALSE(observe_v(139.9)->dc_in_range);
+    TEST_ASSERT_TRUE(observe_v(140.1)->dc_in_range);
+    TEST_ASSERT_TRUE(observe_v(437.4)->dc_in_range);
+    TEST_ASSERT_FALSE(observe_v(437.6)->dc_in_range);
+}
+
+void test_the_dc_voltage_is_safe_to_touch_below_60_V(void)
+{
+    TEST_ASSERT_TRUE(observe_v(59.9)->dc_safe);
+    TEST_ASSERT_FALSE(observe_v(60.1)->dc_safe);
+}
+
+/* The band is 1 % of V_b, 5.4 V to either side of where the voltage was first seen. */
+static void settles_in_50_ms_at(double v_dc_V)
+{
+    for (int ms = 0; ms < 50; ms++) {
+        TEST_ASSERT_FALSE(observe_v(v_dc_V)->dc_settled);
+    }
+    TEST_ASSERT_TRUE(observe_v(v_dc_V)->dc_settled);
+}
+
+void test_the_dc_voltage_has_settled_after_50_ms_within_one_percent_of_the_base(void)
+{
+    settles_in_50_ms_at(350.0);
+    TEST_ASSERT_TRUE(observe_v(355.0)->dc_settled);
+    TEST_ASSERT_TRUE(observe_v(345.0)->dc_settled);
+    settles_in_50_ms_at(356.0);
+    settles_in_50_ms_at(350.0);
+}
+
+void test_a_voltage_that_moves_must_settle_again_however_long_it_has_stayed(void)
+{
+    settles_in_50_ms_at(350.0);
+    for (int ms = 0; ms < 10000; ms++) {
+        TEST_ASSERT_TRUE(observe_v(350.0)->dc_settled);
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(50000U + US, ecu.settling.us);
+    settles_in_50_ms_at(340.0);
+}
+
+/* 2 % of 400 A: 655 counts. */
+void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_direction(void)
+{
+    static const dq_q15_t allowed[] = {{655, 0}, {-655, 0}, {0, 655}, {0, -655}, {655, -655}};
+    static const dq_q15_t too_much[] = {{656, 0}, {-656, 0}, {0, 656}, {0, -656}};
+    for (unsigned n = 0; n < sizeof allowed / sizeof allowed[0]; n++) {
+        sample.point.i = allowed[n];
+        TEST_ASSERT_TRUE(observe()->sensors_plausible);
+    }
+    for (unsigned n = 0; n < sizeof too_much / sizeof too_much[0]; n++) {
+        sample.point.i = too_much[n];
+        ecu.drive.request.enable = false;
+        TEST_ASSERT_FALSE(observe()->sensors_plausible);
+        ecu.drive.request.enable = true;
+        TEST_ASSERT_TRUE(observe()->sensors_plausible);
+    }
+}
+
+void test_sensors_are_not_plausible_before_the_first_period(void)
+{
+    TEST_ASSERT_FALSE(ecu_observe(&ecu, false).sensors_plausible);
+    ecu.drive.request.enable = true;
+    TEST_ASSERT_FALSE(ecu_observe(&ecu, false).sensors_plausible);
+}
+
+/* sqrt(3) omega 0.071658 Vs = 60 V at 483.43 rad/s, 1538.8 rpm. */
+void test_the_machine_is_slow_while_its_line_voltage_stays_below_60_V_in_either_direction(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        sample.point.omega = (q31_t)(sign * 1537.0 * OMEGA_PER_RPM);
+        TEST_ASSERT_TRUE(observe()->slow);
+        sample.point.omega = (q31_t)(sign * 1541.0 * OMEGA_PER_RPM);
+        TEST_ASSERT_FALSE(observe()->slow);
+    }
+}
+
+void test_the_command_of_the_bus_is_passed_on(void)
+{
+    const supervisor_in_t *told = observe();
+    TEST_ASSERT_FALSE(told->alive || told->failed || told->torque_mode || told->current_mode || told->enable ||
+                      told->reset || told->gate_fault);
+    ecu.rx.command_channel = (rx_channel_t){.alive = true, .failed = true};
+    ecu.rx.command = (bus_command_t){.enable = true, .mode = COMMAND_MODE_TORQUE};
+    ecu.drive.fast.faults = 0x2005U;
+    told = observe();
+    TEST_ASSERT_TRUE(told->alive && told->failed && told->torque_mode && told->enable);
+    TEST_ASSERT_FALSE(told->current_mode || told->reset);
+    TEST_ASSERT_EQUAL_HEX32(0x2005U, told->drive_faults);
+    TEST_ASSERT_EQUAL_UINT32(US, told->elapsed_us);
+    ecu.rx.command = (bus_command_t){.fault_reset = true, .mode = COMMAND_MODE_CURRENT_LOCKED};
+    told = observe();
+    TEST_ASSERT_TRUE(told->current_mode && told->reset);
+    TEST_ASSERT_FALSE(told->torque_mode || told->enable);
+    TEST_ASSERT_TRUE(ecu_observe(&ecu, true).gate_fault);
+}
+
+/* The dead band is 0.25 N·m, rounded to 27 counts of 0.009 N·m. */
+void test_a_requested_torque_within_the_dead_band_is_zero(void)
+{
+    static const struct {
+        float torque_Nm;
+        bool is_zero;
+    } cases[] = {{0.0F, true}, {0.24F, true}, {-0.24F, true}, {0.26F, false}, {-0.26F, false}, {-1e6F, false}};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
+        TEST_ASSERT_EQUAL(cases[n].is_zero, observe()->torque_requested_is_zero);
+    }
+}
+
+void test_arbitrated_torque_is_zero_only_when_not_one_count_is_left(void)
+{
+    TEST_ASSERT_TRUE(observe()->torque_arbitrated_is_zero);
+    ecu.arbitration_state.torque_arbitrated = -1;
+    TEST_ASSERT_FALSE(observe()->torque_arbitrated_is_zero);
+}
+
+/* 29.4664 N·m is a tenth of the base, 3276.7 counts. */
+void test_the_requested_torque_is_converted_and_limited_to_the_range_of_the_format(void)
+{
+    ecu.rx.command.torque_requested_Nm = 29.4664F;
+    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).torque_requested);
+    ecu.rx.command.torque_requested_Nm = -29.4664F;
+    TEST_ASSERT_INT_WITHIN(1, -3276, ecu_arbitration(&ecu).torque_requested);
+    ecu.rx.command.torque_requested_Nm = 295.0F;
+    TEST_ASSERT_EQUAL_INT(32767, ecu_arbitration(&ecu).torque_requested);
+    ecu.rx.command.torque_requested_Nm = -295.0F;
+    TEST_ASSERT_EQUAL_INT(-32767, ecu_arbitration(&ecu).torque_requested);
+}
+
+void test_torque_limits_are_never_larger_than_the_machines_torque_nor_negative(void)
+{
+    ecu.rx.command.limit_drive_Nm = 500.0F;
+    ecu.rx.command.limit_regen_Nm = 29.4664F;
+    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).limit_regen);
+    ecu.rx.command.limit_drive_Nm = 29.4664F;
+    ecu.rx.command.limit_regen_Nm = 500.0F;
+    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_regen);
+    ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = -1.0F;
+    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
+}
+
+void test_the_torque_runs_stops_and_ramps_out_as_state_enable_command_and_faults_say(void)
+{
+    ecu.rx.command_channel.alive = true;
+    ecu.supervisor = (supervisor_t){.state = STATE_RUN, .enabled = true};
+    sample.point.omega = -12345;
+    (void)observe();
+    arbitrate_in_t in = ecu_arbitration(&ecu);
+    TEST_ASSERT_TRUE(in.run && !in.stop && !in.ramp_out);
+    TEST_ASSERT_EQUAL_INT32(-12345, in.omega);
+    ecu.supervisor.enabled = false;
+    in = ecu_arbitration(&ecu);
+    TEST_ASSERT_TRUE(in.run && in.stop && !in.ramp_out);
+    ecu.supervisor.faults = ECU_FAULT_PROTECTION;
+    TEST_ASSERT_TRUE(ecu_arbitration(&ecu).ramp_out);
+    ecu.supervisor.faults = 0;
+    ecu.rx.command_channel.alive = false;
+    TEST_ASSERT_TRUE(ecu_arbitration(&ecu).ramp_out);
+    ecu.supervisor.state = STATE_READY;
+    TEST_ASSERT_FALSE(ecu_arbitration(&ecu).run);
+}
+
+/* P_b = 1.5 * 540 V * 400 A = 324 kW: 32.4 kW are 3276.7 counts. */
+void test_the_batterys_power_limits_act_while_they_arrive(void)
+{
+    ecu.rx.limits = (bus_power_limits_t){.drive_kW = 32.4F, .regen_kW = 16.2F};
+    torque_limits_t limits = ecu_limits(&ecu);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_drive);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_regen);
+    ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
+    limits = ecu_limits(&ecu);
+    TEST_ASSERT_INT_WITHIN(1, 3276, limits.power_drive);
+    TEST_ASSERT_INT_WITHIN(1, 1638, limits.power_regen);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_drive);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_regen);
+    ecu.rx.limits.drive_kW = 325.0F;
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, ecu_limits(&ecu).power_drive);
+}
+
+void test_lost_battery_limits_keep_the_last_ones_take_the_torque_away_and_are_the_reason_told(void)
+{
+    const torque_limits_t last = {.torque_drive = 1, .torque_regen = 2, .power_drive = 3276, .power_regen = 4};
+    ecu.drive.request.limits = last;
+    ecu.drive.task.derating = DERATING_INVERTER;
+    ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = 100.0F;
+    ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
+    TEST_ASSERT_GREATER_THAN_INT(0, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_EQUAL_UINT32(1, told_reason());
+    ecu.rx.limits_channel.alive = false;
+    const torque_limits_t limits = ecu_limits(&ecu);
+    TEST_ASSERT_EQUAL_MEMORY(&last, &limits, sizeof last);
+    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_UINT32(7, told_reason());
+    TEST_ASSERT_TRUE(observe()->derated);
+}
+
+/* Numbers of DeratingReason in the DBC. */
+void test_the_first_reason_for_less_torque_is_told_by_the_number_of_the_dbc(void)
+{
+    static const struct {
+        uint32_t derating, reason;
+    } cases[] = {
+        {0, 0},
+        {DERATING_REQUEST | DERATING_REACH, 0},
+        {DERATING_INVERTER, 1},
+        {DERATING_WINDING, 2},
+        {DERATING_DC_LOW, 3},
+        {DERATING_DC_HIGH, 3},
+        {DERATING_POWER, 4},
+        {DERATING_MAGNET, 5},
+        {DERATING_SPEED, 8},
+        {DERATING_SPEED | DERATING_WINDING | DERATING_REACH, 2},
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        ecu.drive.task.derating = (uint16_t)cases[n].derating;
+        TEST_ASSERT_EQUAL_UINT32(cases[n].reason, told_reason());
+        TEST_ASSERT_EQUAL(cases[n].reason != 0U, observe()->derated);
+    }
+}
+
+/* The paper's identification may still be at work on the newest point, as long as it has finished one since. */
+void test_an_identification_that_works_is_not_stalled_and_one_that_stands_still_is(void)
+{
+    ecu.drive.mrai.mailbox.generation = 10;
+    ecu.drive.mrai.isr.finished = 9;
+    ecu.liveness = (liveness_t){.started = true, .finished = 8};
+    for (uint32_t n = 1; n <= 3U; n++) {
+        ecu.drive.samples.generation += 10U;
+        ecu_watch(&ecu);
+        TEST_ASSERT_EQUAL_UINT8(n - 1U, ecu.liveness.stalled_in_a_row);
+    }
+    TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
+    ecu.drive.samples.generation += 10U;
+    ecu_watch(&ecu);
+    TEST_ASSERT_TRUE(ecu_observe(&ecu, false).stalled);
+    ecu.drive.mrai.isr.finished = 10;
+    ecu.drive.samples.generation += 10U;
+    ecu_watch(&ecu);
+    TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
+}
+
+/* Every counter has a value of its own. */
+void test_every_counter_of_the_bus_reaches_its_place_in_the_telemetry(void)
+{
+    for (uint16_t n = 0; n < RX_RESULTS; n++) {
+        ecu.rx.count[n] = (uint16_t)(100 + n);
+    }
+    ecu.rx.time_outs = 201;
+    ecu.rx.accepted = 202;
+    ecu.rx.skipped = 203;
+    ecu.not_sent = 204;
+    ecu.liveness.task_overruns = 205;
+    ecu.liveness.held = 206;
+    ecu.supervisor = (supervisor_t){.state = STATE_FAULT,
+                                    .faults = 0x21,
+                                    .first_fault = 34,
+                                    .fault_count = 3,
+                                    .refused = REFUSED_SENSOR_IMPLAUSIBLE,
+                                    .refused_count = 7};
+    telemetry_t t = {0};
+    ecu_telemetry(&ecu, &t);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_CRC, t.diagnostics.crc_errors);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_REPEATED, t.diagnostics.repeated);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_JUMP, t.diagnostics.jumps);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_LENGTH, t.diagnostics.length_errors);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_RANGE, t.diagnostics.range_errors);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_ID, t.diagnostics.id_errors);
+    TEST_ASSERT_EQUAL_UINT32(100 + RX_IGNORED, t.diagnostics.ignored);
+    TEST_ASSERT_EQUAL_UINT32(201, t.diagnostics.time_outs);
+    TEST_ASSERT_EQUAL_UINT32(202, t.diagnostics.accepted);
+    TEST_ASSERT_EQUAL_UINT32(203, t.diagnostics.skipped);
+    TEST_ASSERT_EQUAL_UINT32(204, t.diagnostics.not_sent);
+    TEST_ASSERT_EQUAL_UINT32(205, t.diagnostics.task_overruns);
+    TEST_ASSERT_EQUAL_UINT32(206, t.diagnostics.watchdog_held);
+    TEST_ASSERT_EQUAL_UINT32(STATE_FAULT, t.state);
+    TEST_ASSERT_EQUAL_HEX32(0x21, t.ecu_faults);
+    TEST_ASSERT_EQUAL_UINT32(34, t.first_fault);
+    TEST_ASSERT_EQUAL_UINT32(3, t.fault_count);
+    TEST_ASSERT_EQUAL_UINT32(REFUSED_SENSOR_IMPLAUSIBLE, t.refused_reason);
+    TEST_ASSERT_EQUAL_UINT32(7, t.refused_count);
+}
