@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 PERIODS_PER_MS = 10
+DC_LINK = {"dc_link_F": 500e-6, "avalanche_V": 700.0}  # assumed; empty at the start
 COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"
 
@@ -51,7 +52,7 @@ class Ecu:
         self.sim = ctypes.c_void_p(self.lib.sim_create_around(self.handle))
         if self.motor.flux_map is not None:
             self.motor.flux_map.hand_over(self.lib, self.sim)
-        for name, value in {**self.motor.plant, "imposed_speed": 1.0, "vdc_V": 1.0}.items():
+        for name, value in {**self.motor.plant, "imposed_speed": 1.0, **DC_LINK}.items():
             self.set(name, value)
         bad = self.lib.sim_start(self.sim)
         assert bad is None, bad
@@ -135,8 +136,8 @@ class Ecu:
 
     def power_up(self, v_dc_V: float = 350.0) -> None:
         """To the state run, without torque."""
-        self.run(100)
-        self.run(20, Mode="torque")
         self.set("vdc_V", v_dc_V)
         self.run(100)
+        self.run(20, Mode="torque")
+        self.run(200)
         self.run(30, Enable=1)

@@ -77,8 +77,7 @@ def running(ecu: Clocked) -> Clocked:
     """In state run, without torque."""
     ecu.run_for(100)
     ecu.run_for(20, Mode="torque")
-    ecu.set("vdc_V", 350.0)
-    ecu.run_for(100)
+    ecu.run_for(200)
     ecu.run_for(40, Enable=1)
     assert ecu.state == "run"
     return ecu
@@ -136,6 +135,7 @@ def test_full_torque_takes_50_ms_from_zero(running: Clocked) -> None:
 
 def test_states_last_as_long_as_they_should(ecu: Clocked) -> None:
     """50 ms at least in init; 2 s without a charged dc link are a fault; a status comes each 10 ms."""
+    ecu.set("precharge_open", 1.0)
     took = ecu.wait_for("standby")
     assert 50.0 <= took <= 50.0 + 10.0 + 2.0 * ecu.step
     ecu.command["Mode"] = "torque"

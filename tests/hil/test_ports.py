@@ -28,7 +28,7 @@ MALFORMED = (
     b"< se\0nd 123 0 >", b"<" + b"x" * 5000, b"< send " + b"0" * 3000 + b" >",
 )  # fmt: skip
 BAD_COMMANDS = (
-    "nonsense", "set", "set plant.vdc_V 1", "set plant.speed_rad_s", "set plant.speed_rad_s nan",
+    "nonsense", "set", "set truth.vdc_V 1", "set plant.speed_rad_s", "set plant.speed_rad_s nan",
     "set plant.r_ohm_20 -1", "set plant.speed_rad_s 1e999", "set enable 1", "set torque_requested_Nm 100", "get",
     "get nothing", "run", "run 1", "run -1 ms", "run nan s", "run 1 fortnight", "run 1e30 s", "run 1 ms 99999 0",
     "run 1 ms 1 0", "record", "record 0 truth.torque_Nm", "record 1 nothing", "record x truth.torque_Nm", "ramp",

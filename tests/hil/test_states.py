@@ -110,7 +110,7 @@ def test_a_healthy_drive_does_not_trip_however_slow_and_noisy(rig: Rig, noise_A:
     ("cause", "drive", "ecu"),
     [
         ({"board_gate_fault": 1.0}, DRIVER, GATE),
-        ({"board_battery_V": 460.0}, OVER_VOLTAGE, 0),
+        ({"vdc_V": 460.0}, OVER_VOLTAGE, 0),
         ({"current_offset_A_b": 60.0}, CURRENT_SUM, 0),
     ],
     ids=["gate_driver", "over_voltage", "current_sum"],
@@ -128,7 +128,7 @@ def test_a_fault_under_torque_ends_in_fault_with_no_torque_and_is_told(
     assert int(rig.signal("INV_Faults", "FirstFault")) == (bit if drive else 32 + bit)
     assert abs(rig.stand.get("truth.torque_mean_Nm")[0]) < 0.5
     # With the cause gone and the dc link discharged, a reset helps.
-    rig.stand.set(**{name: {"board_battery_V": 350.0}.get(name, 0.0) for name in cause})
+    rig.stand.set(**{name: {"vdc_V": 350.0}.get(name, 0.0) for name in cause})
     rig.ask(enable=False, mode="off", torque_Nm=0.0)
     rig.advance(1.0)
     reset(rig)
@@ -149,7 +149,7 @@ def test_a_reset_does_not_hide_a_fault_whose_cause_is_still_there(rig: Rig) -> N
 @pytest.mark.plant
 def test_a_precharge_that_does_not_charge_ends_in_fault(rig: Rig) -> None:
     rig.expected.faults = True
-    rig.stand.set(board_precharge_open=1.0)
+    rig.stand.set(precharge_open=1.0)
     rig.ask(mode="torque")
     rig.wait_for("fault", 4.0)
     assert faults(rig) == (0, PRECHARGE)
@@ -160,7 +160,7 @@ def test_a_discharge_that_does_not_discharge_ends_in_fault(rig: Rig) -> None:
     rig.expected.faults = True
     rig.ask(mode="torque")
     rig.wait_for("ready")
-    rig.stand.set(board_discharge_open=1.0)
+    rig.stand.set(discharge_open=1.0)
     rig.ask(mode="off")
     rig.wait_for("fault", 8.0)
     assert faults(rig) == (0, DISCHARGE)
@@ -169,10 +169,10 @@ def test_a_discharge_that_does_not_discharge_ends_in_fault(rig: Rig) -> None:
 @pytest.mark.plant
 def test_a_battery_below_the_range_is_never_switched_on(rig: Rig) -> None:
     rig.expected.faults = True
-    rig.stand.set(board_battery_V=60.0)
+    rig.stand.set(vdc_V=60.0)
     rig.ask(mode="torque")
     rig.wait_for("fault", 4.0)
-    assert rig.stand.get("plant.vdc_V")[0] <= 60.0
+    assert rig.stand.get("truth.vdc_V")[0] <= 60.0
 
 
 def test_a_fault_reset_is_refused_while_enable_is_on(rig: Rig) -> None:

@@ -15,6 +15,7 @@ typedef struct {
 
 typedef struct {
     double u_dq[2], torque, torque_shaft; /* integrals over time */
+    double charge;                        /* out of the dc link */
     double dc, electrical, copper, iron, mechanical, field;
 } energy_t;
 

@@ -18,8 +18,17 @@ struct plant {
     inverter_t inverter;
     mechanics_t mechanics;
     sensors_t sensors;
+    plant_switches_t on;
+    double link_V; /* of the capacitor */
     plant_truth_t truth;
 };
+
+/* What does not change within a period. */
+typedef struct {
+    const double *duty;
+    int switching;
+    double battery_V;
+} bridge_t;
 
 static turn_t rotor_turn(const plant_t *plant)
 {
@@ -33,6 +42,14 @@ static double vdc_at(const plant_params_t *p, double time_s)
         return p->vdc_V;
     }
     return p->vdc_V + p->vdc_ripple_V * sin(TWO_PI * p->vdc_ripple_hz * time_s);
+}
+
+/* Without a capacitor the bridge is at the battery. */
+static double bridge_V(const plant_t *plant, double time_s)
+{
+    const plant_params_t *p = &plant->params;
+    const int at_battery = p->dc_link_F == 0.0 || (plant->on.contactor && !p->contactor_open);
+    return at_battery ? vdc_at(p, time_s) : plant->link_V;
 }
 
 /* Brings the model up to date with the live parameters; returns the rotor's orientation. */
@@ -68,7 +85,7 @@ static void instant_truth(plant_t *plant, turn_t turn)
     t->theta_e_rad = wrap_turn(t->theta_m_rad * plant->params.pole_pairs);
     t->r_ohm = m->r_ohm;
     t->psi_f_Vs = m->flux.psi_f_Vs;
-    t->vdc_V = vdc_at(&plant->params, t->time_s);
+    t->vdc_V = bridge_V(plant, t->time_s);
     t->inversion_failures = m->failures;
 }
 
@@ -82,6 +99,8 @@ plant_t *plant_create(const plant_params_t *params, const plant_map_t *map)
         return NULL;
     }
     plant->params = *params;
+    plant->on = (plant_switches_t){.contactor = 1, .gate_supply = 1};
+    plant->link_V = params->vdc_start_V;
     machine_create(&plant->machine, params, map);
     sensors_create(&plant->sensors, params);
     plant_set_state(plant, 0.0, 0.0, params->theta_m_rad, params->speed_rad_s);
@@ -147,17 +166,34 @@ static void substep(plant_t *plant, turn_t *turn, double vdc_V, double h, energy
     energy_voltage(sum, u_s, mid, half_rad, h);
     energy_electric(sum, m, &from, &to, u_s, i_s, h);
     energy_mechanic(sum, torque_Nm, mid_rad_s, p->viscous_Nms, h);
-    sum->dc += h * vdc_V * inverter_dc_current(&plant->inverter, i_abc);
+    const double charge_As = h * inverter_dc_current(&plant->inverter, i_abc);
+    sum->dc += vdc_V * charge_As;
+    sum->charge += charge_As;
     *turn = end;
 }
 
-static void mean_truth(plant_truth_t *t, const energy_t *sum, double vdc_V, double period_s)
+/* The capacitor after the substep, and the legs, whose errors are shares of its voltage. */
+static double link_substep(plant_t *plant, const bridge_t *bridge, double vdc_V, double charge_As, double h)
+{
+    const plant_params_t *p = &plant->params;
+    if (p->dc_link_F == 0.0) {
+        return vdc_V;
+    }
+    plant->link_V = dc_link_step(p, &plant->on, vdc_V, bridge->battery_V, charge_As / h, h,
+                                 &plant->truth.e_avalanche_J);
+    if (plant->link_V != vdc_V) {
+        inverter_set(&plant->inverter, p, bridge->duty, bridge->switching, plant->link_V);
+    }
+    return plant->link_V;
+}
+
+static void mean_truth(plant_truth_t *t, const energy_t *sum, double period_s)
 {
     t->u_d_V = sum->u_dq[0] / period_s;
     t->u_q_V = sum->u_dq[1] / period_s;
     t->torque_mean_Nm = sum->torque / period_s;
     t->torque_shaft_mean_Nm = sum->torque_shaft / period_s;
-    t->idc_A = sum->dc / vdc_V / period_s;
+    t->idc_A = sum->charge / period_s;
     t->copper_W = sum->copper / period_s;
     t->iron_W = sum->iron / period_s;
     t->mechanical_W = sum->mechanical / period_s;
@@ -171,19 +207,28 @@ static void mean_truth(plant_truth_t *t, const energy_t *sum, double vdc_V, doub
     t->e_field_J += sum->field;
 }
 
+void plant_switch(plant_t *plant, const plant_switches_t *on)
+{
+    plant->on = *on;
+}
+
 void plant_advance(plant_t *plant, const double duty[3], int gates_on)
 {
     const plant_params_t *p = &plant->params;
     const double period_s = 1.0 / p->pwm_hz;
     const int n = p->substeps < 10 ? 10 : p->substeps;
-    const double vdc_V = vdc_at(p, plant->truth.time_s + 0.5 * period_s);
+    const double middle_s = plant->truth.time_s + 0.5 * period_s;
+    const bridge_t bridge = {duty, gates_on && plant->on.gate_supply, vdc_at(p, middle_s)};
+    double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};
     turn_t turn = update(plant);
-    inverter_set(&plant->inverter, p, duty, gates_on, vdc_V);
+    inverter_set(&plant->inverter, p, duty, bridge.switching, vdc_V);
     for (int k = 0; k < n; k++) {
+        const double before_As = sum.charge;
         substep(plant, &turn, vdc_V, period_s / n, &sum);
+        vdc_V = link_substep(plant, &bridge, vdc_V, sum.charge - before_As, period_s / n);
     }
-    mean_truth(&plant->truth, &sum, vdc_V, period_s);
+    mean_truth(&plant->truth, &sum, period_s);
     plant->truth.time_s += period_s;
     instant_truth(plant, rotor_turn(plant));
 }

@@ -3,7 +3,7 @@
 #define PLANT_PLANT_H
 /** The simulated traction drive: inverter, machine, mechanics, sensors; the oracle of every test.
  *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
- * Source   docs/theory/plant.md (PL-1) ... (PL-20)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-22)
  * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
  * Errors   plant_create() returns NULL for bad parameters or no memory
  * Context  simulation only, double precision; one instance per drive, no global state.
@@ -11,6 +11,7 @@
  *          act in it. The computation delay belongs to the caller. */
 #include <stdint.h>
 
+#include "dc_link.h"
 #include "plant_map.h"
 #include "plant_params.h"
 
@@ -43,7 +44,8 @@ typedef struct {
     double copper_W, iron_W, mechanical_W, electrical_W, inverter_W;
     /* integrals since creation or plant_set_state() */
     double e_dc_J, e_electrical_J, e_copper_J, e_iron_J, e_mechanical_J;
-    double e_field_J; /* 1.5 integral of i . dpsi in the rotor frame */
+    double e_field_J;     /* 1.5 integral of i . dpsi in the rotor frame */
+    double e_avalanche_J; /* taken by the bridge above avalanche_V */
 } plant_truth_t;
 
 /** The map is borrowed and must outlive the plant; NULL: ld_H, lq_H, psi_f_Vs are used.
@@ -60,7 +62,10 @@ void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_ra
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 
-/** One PWM period; duty 0..1 (clamped, NaN counts as 0.5). Gates off: the diodes conduct. */
+/** The board's switches from now on; at creation the battery is connected and the gates have their supply. */
+void plant_switch(plant_t *plant, const plant_switches_t *on);
+
+/** One PWM period; duty 0..1 (clamped, NaN counts as 0.5). Gates off, or without their supply: the diodes conduct. */
 void plant_advance(plant_t *plant, const double duty[3], int gates_on);
 
 const plant_truth_t *plant_truth(const plant_t *plant);

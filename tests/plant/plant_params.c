@@ -14,6 +14,9 @@ void plant_params_default(plant_params_t *params)
     params->lq_scale = 1.0;
     params->ld_slope_scale = 1.0;
     params->cross_saturation_scale = 1.0;
+    params->precharge_s = 0.02; /* assumed: charged to 95 % in 60 ms, discharged to 5 % in 0.3 s */
+    params->discharge_s = 0.1;
+    params->avalanche_V = 1e6; /* none */
     params->substeps = 10;
     params->adc_bits = 12;
     for (int x = 0; x < 3; x++) {
@@ -93,6 +96,11 @@ static const char *bad_electronics(const plant_params_t *p)
         {"vdc_V", above_zero(p->vdc_V)},
         {"vdc_ripple_V", isfinite(p->vdc_ripple_V) && fabs(p->vdc_ripple_V) < p->vdc_V},
         {"vdc_ripple_hz", not_below_zero(p->vdc_ripple_hz)},
+        {"vdc_start_V", not_below_zero(p->vdc_start_V)},
+        {"dc_link_F", not_below_zero(p->dc_link_F)},
+        {"precharge_s", above_zero(p->precharge_s)},
+        {"discharge_s", above_zero(p->discharge_s)},
+        {"avalanche_V", above_zero(p->avalanche_V)},
         {"pwm_hz", above_zero(p->pwm_hz)},
         {"dead_time_s", not_below_zero(p->dead_time_s) && p->dead_time_s * p->pwm_hz < 0.5},
         {"device_drop_V", not_below_zero(p->device_drop_V)},

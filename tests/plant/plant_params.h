@@ -19,11 +19,16 @@ typedef struct {
     double iron_k_h, iron_k_e;                               /* W/(rad/s Vs^2), W/(rad/s Vs)^2, (PL-8) */
     int magnet_step_keeps_current;                           /* 0: flux linkage is continuous; 1: current is, (PL-6) */
     /* inverter */
-    double vdc_V, vdc_ripple_V, vdc_ripple_hz;
+    double vdc_V, vdc_ripple_V, vdc_ripple_hz; /* of the battery */
     double pwm_hz, dead_time_s, device_drop_V;
-    int substeps;       /* per PWM period, at least 10 */
-    int ideal_inverter; /* no dead time, no device drop */
-    int phase_open[3];  /* the motor lead is broken */
+    double vdc_start_V;              /* of the dc link's capacitor, taken at creation */
+    double dc_link_F;                /* 0: the bridge is always at the battery, whatever the switches do */
+    double precharge_s, discharge_s; /* time constants of the capacitor with its resistors */
+    double avalanche_V;              /* switches and diodes of the bridge conduct above it */
+    int precharge_open, discharge_open, contactor_open; /* the switch does not close */
+    int substeps;                                       /* per PWM period, at least 10 */
+    int ideal_inverter;                                 /* no dead time, no device drop */
+    int phase_open[3];                                  /* the motor lead is broken */
     /* sensors */
     double current_full_scale_A; /* the converter spans -full scale ... +full scale */
     int adc_bits;

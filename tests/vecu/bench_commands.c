@@ -75,11 +75,9 @@ static void do_names(bench_t *bench, int client, const arguments_t *a)
     bench_say(bench, client, "%s", text);
 }
 
-/* The dc voltage is the battery's and the switches'. */
 static bool settable(const vecu_t *vecu, const char *name)
 {
-    return strcmp(name, "plant.vdc_V") != 0 && !isnan(vecu_get(vecu, name)) &&
-           (strncmp(name, "plant.", 6) == 0 || strncmp(name, "board.", 6) == 0);
+    return !isnan(vecu_get(vecu, name)) && (strncmp(name, "plant.", 6) == 0 || strncmp(name, "board.", 6) == 0);
 }
 
 static void do_set(bench_t *bench, int client, const arguments_t *a)

@@ -5,6 +5,10 @@
 #include <stddef.h>
 #include <string.h>
 
+/* Assumed: 500 uF, and semiconductors that withstand twice the battery's voltage. */
+#define CAPACITANCE_F 500e-6
+#define AVALANCHE_PER_BATTERY 2.0
+
 typedef struct {
     const char *name;
     size_t offset;
@@ -12,22 +16,21 @@ typedef struct {
 } stand_field_t;
 
 static const stand_field_t fields[] = {
-    {"board.battery_V", offsetof(stand_t, dc.battery_V), 0.0, 2000.0},
-    {"board.capacitance_F", offsetof(stand_t, dc.capacitance_F), 1e-6, 1.0},
-    {"board.precharge_s", offsetof(stand_t, dc.precharge_s), 1e-3, 1e3},
-    {"board.discharge_s", offsetof(stand_t, dc.discharge_s), 1e-3, 1e3},
-    {"board.precharge_open", offsetof(stand_t, dc.precharge_open), 0.0, 1.0},
-    {"board.discharge_open", offsetof(stand_t, dc.discharge_open), 0.0, 1.0},
-    {"board.contactor_open", offsetof(stand_t, dc.contactor_open), 0.0, 1.0},
     {"board.inverter_C", offsetof(stand_t, inverter_C), -100.0, 300.0},
     {"board.gate_fault", offsetof(stand_t, gate_fault), 0.0, 1.0},
 };
 enum { FIELDS = (int)(sizeof fields / sizeof fields[0]) };
 
-void stand_default(stand_t *stand, double battery_V)
+void stand_default(stand_t *stand)
 {
     *stand = (stand_t){.inverter_C = 40.0};
-    dc_link_params_default(&stand->dc, battery_V);
+}
+
+bool stand_dc_link(sim_t *sim)
+{
+    const double avalanche_V = AVALANCHE_PER_BATTERY * sim_get(sim, "plant.vdc_V");
+    return sim_set(sim, "plant.dc_link_F", CAPACITANCE_F) == SIM_OK &&
+           sim_set(sim, "plant.vdc_start_V", 0.0) == SIM_OK && sim_set(sim, "plant.avalanche_V", avalanche_V) == SIM_OK;
 }
 
 static const stand_field_t *find(const char *name)

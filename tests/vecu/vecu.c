@@ -9,7 +9,6 @@
 #include "machine_data.h"
 #include "nvm_file.h"
 
-#define DC_LINK_EMPTY_V 1.0 /* the machine model wants a voltage */
 #define FNV_START 14695981039346656037ULL
 #define FNV_PRIME 1099511628211ULL
 
@@ -30,7 +29,7 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
     if (m->nd > 0 && sim_map(sim, m->id_A, m->nd, m->iq_A, m->nq, m->psi_d_Vs, m->psi_q_Vs) != SIM_OK) {
         return "flux map";
     }
-    return sim_start(sim);
+    return stand_dc_link(sim) ? sim_start(sim) : "dc link";
 }
 
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)
@@ -51,8 +50,7 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
     }
     const char *bad = plant_set_up(vecu->sim, seed);
     if (bad == NULL) {
-        stand_default(&vecu->stand, sim_get(vecu->sim, "plant.vdc_V"));
-        (void)sim_set(vecu->sim, "plant.vdc_V", DC_LINK_EMPTY_V);
+        stand_default(&vecu->stand);
         vecu->period_ns = (uint64_t)llround(1e9 / sim_get(vecu->sim, "plant.pwm_hz"));
         vecu->seed = seed;
         vecu->duty_hash = FNV_START;
@@ -74,14 +72,9 @@ static void hash_word(vecu_t *vecu, uint32_t word)
     }
 }
 
-/* The switches as the last task has set them, and the lines it will read. */
+/* The lines that the next task will read. */
 static void stand_step(vecu_t *vecu)
 {
-    const bool *on = ecu.board.output;
-    const dc_link_switches_t switches = {on[BOARD_PRECHARGE], on[BOARD_MAIN_CONTACTOR], on[BOARD_DISCHARGE]};
-    const double v_V = dc_link_step(&vecu->stand.dc, switches, sim_get(vecu->sim, "plant.vdc_V"),
-                                    sim_get(vecu->sim, "truth.idc_A"), 1e-9 * (double)vecu->period_ns);
-    (void)sim_set(vecu->sim, "plant.vdc_V", v_V);
     ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
     ecu.board.inverter_C = vecu->stand.inverter_C;
 }

@@ -4,9 +4,13 @@
 /** A controller as the runner sees it: the firmware, its twin, or an emulated processor.
  *   in:  ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start
  *   out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1
+ *   switches(): the board's switches; left out, or false: the controller has no board, the battery stays connected
  * Errors   set answers a SIM_ code; get of an unknown name is NaN; failure() is NULL, or why no further
  *          step can be run (it may be left out)
  * Context  host; owned by the runner, which destroys it */
+#include <stdbool.h>
+
+#include "plant/dc_link.h"
 #include "sim.h"
 
 typedef struct {
@@ -16,6 +20,7 @@ typedef struct {
     double (*get)(const void *self, const char *name);
     const char *(*failure)(const void *self);
     void (*destroy)(void *self);
+    bool (*switches)(const void *self, plant_switches_t *on);
 } sim_controller_t;
 
 /** Takes the controller over, also when it answers NULL (out of memory). */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The two controllers that come with the runner: the firmware, and its twin. */
-#include "hal/host/fluxtrue.h"
+#include "hal/host/instance.h"
 #include "sim_private.h"
 #include "twin/twin.h"
 
@@ -24,6 +24,18 @@ static double firmware_get(const void *self, const char *name)
 static void firmware_destroy(void *self)
 {
     fluxtrue_destroy(self);
+}
+
+/* On a bus the state machine controls the board. */
+static bool firmware_switches(const void *self, plant_switches_t *on)
+{
+    const fluxtrue_t *drive = self;
+    const bool *output = drive->board.output;
+    *on = (plant_switches_t){.precharge = output[BOARD_PRECHARGE],
+                             .contactor = output[BOARD_MAIN_CONTACTOR],
+                             .discharge = output[BOARD_DISCHARGE],
+                             .gate_supply = output[BOARD_GATE_DRIVER]};
+    return drive->on_bus;
 }
 
 /* Firmware of the caller. */
@@ -55,20 +67,20 @@ static void twin_destroy_(void *self)
 sim_t *sim_create(int controller)
 {
     if (controller == SIM_FIRMWARE) {
-        return sim_create_with(
-            (sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL, firmware_destroy});
+        return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
+                                                  firmware_destroy, firmware_switches});
     }
     if (controller == SIM_TWIN) {
         return sim_create_with(
-            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_});
+            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL});
     }
     return NULL;
 }
 
 sim_t *sim_create_around(fluxtrue_t *firmware)
 {
-    return sim_create_with(
-        (sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep});
+    return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep,
+                                              firmware_switches});
 }
 
 fluxtrue_t *sim_firmware(sim_t *sim)

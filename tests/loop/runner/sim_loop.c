@@ -96,6 +96,10 @@ static void period_run(sim_t *sim)
                           sensors.vdc_V, sensors.theta_m_rad, sensors.t_winding_C};
     double out[4] = {0.5, 0.5, 0.5, 0.0};
     sim->controller.step(sim->controller.self, in, out);
+    plant_switches_t on;
+    if (sim->controller.switches != NULL && sim->controller.switches(sim->controller.self, &on)) {
+        plant_switch(sim->plant, &on);
+    }
     plant_advance(sim->plant, sim->duty, sim->gates_on);
     memcpy(sim->duty, out, sizeof sim->duty);
     sim->gates_on = out[3] > 0.5;

@@ -29,7 +29,9 @@ static const field_t plant_fields[] = {
     REAL(lq_H), REAL(psi_f_Vs), REAL(magnet_scale), REAL(magnet_temp_coeff_per_K), REAL(rotor_C),
     REAL(lq_scale), REAL(ld_slope_scale), REAL(cross_saturation_scale), REAL(iron_k_h),
     REAL(iron_k_e), FLAG(magnet_step_keeps_current), REAL(vdc_V), REAL(vdc_ripple_V),
-    REAL(vdc_ripple_hz), REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), FLAG(substeps),
+    REAL(vdc_ripple_hz), REAL(vdc_start_V), REAL(dc_link_F), REAL(precharge_s), REAL(discharge_s), REAL(avalanche_V),
+    FLAG(precharge_open), FLAG(discharge_open), FLAG(contactor_open),
+    REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), FLAG(substeps),
     FLAG(ideal_inverter), FLAG3(phase_open), REAL(current_full_scale_A), FLAG(adc_bits),
     REAL3(current_gain), REAL3(current_offset_A), REAL(current_noise_A_rms),
     FLAG(current_quantise), FLAG3(current_stuck), FLAG3(current_open), REAL(vdc_full_scale_V),
@@ -58,7 +60,7 @@ static const truth_field_t truth_fields[] = {
     LAST(theta_e_rad), MEAN(r_ohm), MEAN(psi_f_Vs), MEAN(vdc_V), MEAN(u_d_V), MEAN(u_q_V),
     MEAN(torque_mean_Nm), MEAN(torque_shaft_mean_Nm), MEAN(idc_A), MEAN(copper_W), MEAN(iron_W),
     MEAN(mechanical_W), MEAN(electrical_W), MEAN(inverter_W), LAST(e_dc_J), LAST(e_electrical_J),
-    LAST(e_copper_J), LAST(e_iron_J), LAST(e_mechanical_J), LAST(e_field_J),
+    LAST(e_copper_J), LAST(e_iron_J), LAST(e_mechanical_J), LAST(e_field_J), LAST(e_avalanche_J),
 };
 /* clang-format on */
 enum { TRUTH_FIELDS = (int)(sizeof truth_fields / sizeof truth_fields[0]) };

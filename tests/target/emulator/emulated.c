@@ -78,15 +78,28 @@ static void step(void *self, const double in[6], double out[4])
     }
     const int stopped = emu_run(e->emu, (uint64_t)(1.01 * e->period_ticks));
     emu_bridge(e->emu, &bridge);
-    const bool runs = stopped == EMU_CENTRE, driven = !e->gate_driver || emu_gate_driver(e->emu);
+    const bool runs = stopped == EMU_CENTRE;
     for (int x = 0; x < 3; x++) {
         out[x] = runs ? bridge.duty[x] : 0.5;
     }
-    out[3] = runs && bridge.gates && driven ? 1.0 : 0.0;
+    out[3] = runs && bridge.gates ? 1.0 : 0.0;
     e->steps++;
     if (e->shadow != NULL && runs) {
         shadow_compare(e);
     }
+}
+
+/* Lines of port C, hal/s32k144/pins.h. */
+static bool switches(const void *self, plant_switches_t *on)
+{
+    enum { PRECHARGE = 0, MAIN_CONTACTOR = 1, DISCHARGE = 2 };
+    const emulated_t *e = self;
+    const uint64_t lines = emu_register(e->emu, "PTC.PDOR");
+    *on = (plant_switches_t){.precharge = (int)(lines >> PRECHARGE & 1U),
+                             .contactor = (int)(lines >> MAIN_CONTACTOR & 1U),
+                             .discharge = (int)(lines >> DISCHARGE & 1U),
+                             .gate_supply = emu_gate_driver(e->emu)};
+    return e->board;
 }
 
 static const char *failure(const void *self)
@@ -113,8 +126,8 @@ static int pin_set(emulated_t *e, const char *name, double value)
         *temperature = possible ? value : *temperature;
         return possible ? SIM_OK : SIM_OUT_OF_RANGE;
     }
-    if (strcmp(name, "emulator.gate_driver") == 0) {
-        e->gate_driver = value != 0.0;
+    if (strcmp(name, "emulator.board") == 0) {
+        e->board = value != 0.0;
         return SIM_OK;
     }
     if (pin == NULL) {
@@ -155,7 +168,7 @@ double emulated_get(emulated_t *e, const char *name)
         {"emulator.resolver_fault", e->pins_of_board.resolver_fault},
         {"emulator.inverter_C", e->inverter_C},
         {"emulator.processor_C", e->processor_C},
-        {"emulator.gate_driver", e->gate_driver},
+        {"emulator.board", e->board},
         {"emulator.dead_time_s", bridge.dead_time_s},
         {"emulator.pwm_period_s", bridge.period_s},
     };
@@ -221,7 +234,7 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         destroy(e);
         return NULL;
     }
-    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy});
+    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy, switches});
 }
 
 emu_t *sim_emulator(sim_t *sim)

@@ -7,7 +7,7 @@
  *                          is compared after every period
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
  *   emulator.inverter_C, emulator.processor_C    of the second thermistor; of the sensor on the die
- *   emulator.gate_driver   set 1: the gates close only while the image supplies their driver (board line)
+ *   emulator.board         set 1: the image's lines act: contactor, precharge, discharge, supply of the gates
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md
  * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation

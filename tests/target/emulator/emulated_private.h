@@ -13,7 +13,7 @@ typedef struct {
     double period_ticks;
     uint64_t steps;
     double inverter_C, processor_C;
-    bool gate_driver;    /* the gates need the line that supplies their driver */
+    bool board;          /* the image's lines act: contactor, precharge, discharge, supply of the gates */
     fluxtrue_t *shadow;  /* NULL: not followed */
     drive_t task_result; /* of the shadow's task, while the image is still at it */
     bool task_runs;

@@ -13,11 +13,8 @@
 #include "emulated.h"
 #include "machine_data.h"
 
-#define DC_LINK_EMPTY_V 1.0
 #define FNV_START 14695981039346656037ULL
 #define FNV_PRIME 1099511628211ULL
-
-enum { PIN_PRECHARGE = 0, PIN_MAIN_CONTACTOR = 1, PIN_DISCHARGE = 2 }; /* of port C, hal/s32k144/pins.h */
 
 static can_port_t port;
 
@@ -44,7 +41,7 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
     if (m->nd > 0 && sim_map(sim, m->id_A, m->nd, m->iq_A, m->nq, m->psi_d_Vs, m->psi_q_Vs) != SIM_OK) {
         return "flux map";
     }
-    return sim_start(sim);
+    return stand_dc_link(sim) ? sim_start(sim) : "dc link";
 }
 
 static const char *processor_start(vecu_t *vecu)
@@ -60,7 +57,7 @@ static const char *processor_start(vecu_t *vecu)
     }
     port = (can_port_t){on_sent, vecu};
     emu_can_port(sim_emulator(vecu->sim), &port);
-    (void)sim_set(vecu->sim, "emulator.gate_driver", 1.0);
+    (void)sim_set(vecu->sim, "emulator.board", 1.0);
     return plant_set_up(vecu->sim, vecu->seed);
 }
 
@@ -71,8 +68,7 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
     vecu->seed = seed;
     const char *bad = processor_start(vecu);
     if (bad == NULL) {
-        stand_default(&vecu->stand, sim_get(vecu->sim, "plant.vdc_V"));
-        (void)sim_set(vecu->sim, "plant.vdc_V", DC_LINK_EMPTY_V);
+        stand_default(&vecu->stand);
         vecu->period_ns = (uint64_t)llround(1e9 / sim_get(vecu->sim, "plant.pwm_hz"));
         vecu->duty_hash = FNV_START;
         vecu->resets++;
@@ -88,12 +84,6 @@ void vecu_destroy(vecu_t *vecu)
 
 static void stand_step(vecu_t *vecu)
 {
-    const uint64_t lines = emu_register(sim_emulator(vecu->sim), "PTC.PDOR");
-    const dc_link_switches_t switches = {(lines >> PIN_PRECHARGE & 1U) != 0, (lines >> PIN_MAIN_CONTACTOR & 1U) != 0,
-                                         (lines >> PIN_DISCHARGE & 1U) != 0};
-    const double v_V = dc_link_step(&vecu->stand.dc, switches, sim_get(vecu->sim, "plant.vdc_V"),
-                                    sim_get(vecu->sim, "truth.idc_A"), 1e-9 * (double)vecu->period_ns);
-    (void)sim_set(vecu->sim, "plant.vdc_V", v_V);
     (void)sim_set(vecu->sim, "emulator.gate_fault", vecu->stand.gate_fault != 0.0 ? 1.0 : 0.0);
     (void)sim_set(vecu->sim, "emulator.inverter_C", vecu->stand.inverter_C);
 }
