@@ -4,7 +4,7 @@
 /** Phase currents and dc voltage, all sampled at the same instant: the start of the PWM period.
  * Source   docs/howto/port.md
  * Units    right-aligned counts of the converter that motor.toml names (adc_bits)
- * Errors   none here; an end stop is a value like any other, the monitors judge it
+ * Errors   none here; a value at the end of the range is returned as it is, and the monitors evaluate it
  * Context  fast ISR, once per period, after the conversion has finished */
 #include "types/samples.h"
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_BOARD_H
 #define HAL_BOARD_H
-/** Lines of the inverter that are neither PWM nor measurement.
+/** Digital lines of the inverter board: contactors, supplies, safe state, gate fault.
  * Source   docs/howto/port.md
  * Errors   hal_board_gate_fault(): true while the gate driver reports a fault; the timer's fault input has already
- *          opened the gates by then
+ *          disabled switching
  * Context  1 kHz task */
 #include <stdbool.h>
 
@@ -12,8 +12,8 @@ typedef enum {
     BOARD_PRECHARGE = 0,
     BOARD_MAIN_CONTACTOR = 1,
     BOARD_DISCHARGE = 2,
-    BOARD_GATE_DRIVER = 3, /* supplies the gate driver; off, no gate can close */
-    BOARD_SAFE_STATE = 4,  /* asks the hardware for its safe state, whatever the processor does next */
+    BOARD_GATE_DRIVER = 3, /* supply of the gate driver; without it the bridge cannot switch */
+    BOARD_SAFE_STATE = 4,  /* requests the hardware's safe state, independent of the processor */
     BOARD_OUTPUTS = 5
 } board_output_t;
 

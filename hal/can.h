@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_CAN_H
 #define HAL_CAN_H
-/** One classic CAN channel. The port's receive interrupt only queues frames; nobody interprets them there.
+/** One classic CAN channel. The port's receive interrupt only queues frames; it does not interpret them.
  * Source   docs/howto/port.md
  * Errors   hal_can_receive(): false, nothing waits. hal_can_send(): false, all mailboxes are busy and the frame was
  *          not taken. hal_can_lost(): received frames that found the queue full, and hal_can_bus_off(): times the

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_NVM_H
 #define HAL_NVM_H
-/** Two flash slots that survive a power cycle. The store above keeps a record in each, so that a cut at any byte leaves
- * the old or the new one.
+/** Two flash slots that survive a power cycle. The store writes them alternately, so that a power cut at any byte
+ * leaves the previous or the new record intact.
  * Source   docs/howto/port.md
  * Units    bytes; program() writes whole multiples of HAL_NVM_UNIT at multiples of it, once after each erase
  * Errors   false: out of the slot's range, not erased, or the hardware reported a failure

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_PWM_H
 #define HAL_PWM_H
-/** Three-phase bridge: duties for the next period, and the gates.
+/** Three-phase bridge: duties for the next period; switching enabled or disabled.
  * Source   docs/howto/port.md
  * Units    duty with 2^15 = 1.0 (0 ... 32768); the port turns it into timer ticks and takes it over synchronously
  * Errors   none; duties are always in range
- * Context  fast ISR; write() once per period; enable() when the gates are to change, and again at will: true takes
- *          effect together with the duties written in the same period, false at once */
+ * Context  fast ISR; write() once per period; enable() at a change, and possibly repeatedly: true takes effect
+ *          together with the duties written in the same period, false at once */
 #include <stdbool.h>
 
 #include "types/samples.h"

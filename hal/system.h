@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_SYSTEM_H
 #define HAL_SYSTEM_H
-/** What the processor knows about itself.
+/** Stack use and reset cause of the processor.
  *   stack_unused  bytes at the stack's end that still hold the pattern written at start-up: the high-water mark
  *   reset_cause   why the processor started; noted by the port before it clears the register
  * Source   docs/howto/port.md
  * Units    bytes
- * Errors   a port that cannot tell answers 0 and RESET_UNKNOWN
- * Context  1 kHz task; stack_unused may look at a bounded number of words per call */
+ * Errors   a port without this information returns 0 and RESET_UNKNOWN
+ * Context  1 kHz task; stack_unused may check a bounded number of words per call */
 #include <stdint.h>
 
 /* X(NAME, value, explanation): named and explained here only. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_TEMPERATURE_H
 #define HAL_TEMPERATURE_H
-/** Slow sensors: winding (NTC), inverter, and the processor's own, which limits nothing.
+/** Temperatures: winding (NTC), inverter, and the processor, which is only measured and limits nothing.
  * Source   docs/howto/port.md
  * Units    tenths of a degree Celsius
  * Errors   HAL_TEMPERATURE_UNKNOWN: no sensor, or one that is broken or shorted

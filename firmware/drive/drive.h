@@ -33,7 +33,7 @@ typedef enum {
     IDENTIFICATION_ROBUST = 1 /* seven parameters with their uncertainty, each millisecond */
 } identification_mode_t;
 
-/** What the outside asks. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
+/** Requests from outside. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
  * the MRAI ISR, identification_mode by the fast ISR; every field is aligned and read word by word. */
 typedef struct {
     q15_t torque_arbitrated; /* without a bus nothing arbitrates: the requested torque itself */
@@ -45,9 +45,9 @@ typedef struct {
     bool identification;
     bool trim; /* the dead-time compensation follows what is identified */
     identification_mode_t identification_mode;
-    uint32_t fault_resets;          /* counted up: faults are forgotten once, if enable is off */
-    uint32_t identification_resets; /* counted up: what was identified is forgotten once */
-    uint32_t commissionings;        /* counted up: the inverter's voltage error is measured once, at standstill */
+    uint32_t fault_resets;          /* counts up: each count clears the faults once, if enable is off */
+    uint32_t identification_resets; /* counts up: each count resets the identification once */
+    uint32_t commissionings; /* counts up: each count measures the inverter's voltage error once, at standstill */
 } request_t;
 
 /* X(NAME, value, explanation): named and explained here only. */
@@ -69,7 +69,7 @@ typedef struct {
     identify_window_t window;     /* of the robust identification, being summed up */
     uint8_t periods_since_enable; /* saturates at 3: from then on the voltage of the whole last period is known */
     bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
-    uint32_t fault_resets;        /* of the command, as far as done */
+    uint32_t fault_resets;        /* of the command, as far as carried out */
     volatile uint32_t faults;     /* latched */
 } fast_state_t;
 
@@ -86,9 +86,10 @@ typedef struct {
     torque_limit_t allowed;
     torque_loop_state_t torque_loop;
     identify_state_t identify;
-    identification_t identification;   /* of the law that is chosen */
-    volatile q15_t psi_d_error;        /* of the robust one: the fast ISR copies one half word */
-    volatile uint32_t identifications; /* steps so far: who copies the state from below sees whether it moved */
+    identification_t identification; /* of the law that is chosen */
+    volatile q15_t psi_d_error;      /* of the robust one: the fast ISR copies one half word */
+    volatile uint32_t
+        identifications; /* number of steps: a lower priority detects by it that its copy is inconsistent */
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
     angle_harmonics_state_t angle_harmonics;
@@ -101,19 +102,19 @@ typedef struct {
     uint32_t commissionings;     /* of the request, as far as seen */
     dq_q15_t i_ref;              /* acts until the next step */
     dq_q15_t psi_ref;            /* tables' flux at the last reference */
-    dead_time_trim_state_t trim; /* of the compensation: what driving has added */
-    uint16_t derating;           /* DERATING_...: why less than the request is made */
+    dead_time_trim_state_t trim; /* of the compensation: added while driving */
+    uint16_t derating;           /* DERATING_...: reasons for less than the requested torque */
     q15_t torque_commanded;      /* the limited torque after slew */
-    q15_t torque_corrected;      /* after the torque loop: what the current reference is asked for */
+    q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     safe_state_state_t safe_state;
-    bool armed;                     /* has run since freewheel was last the safe state: the bridge is powered */
+    bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
-    uint32_t identification_resets; /* of the request, as far as the quality is concerned */
+    uint32_t identification_resets; /* of the request, as far as carried out by the task */
 } task_state_t;
 
-/** What the 1 kHz task knows of the priorities above it and of the port: one moment, for all of its step. */
+/** All inputs of one step of the 1 kHz task from higher priorities and from the port, from the same moment. */
 typedef struct {
     sample_t sample;
     identify_window_t window;
@@ -125,10 +126,10 @@ typedef struct {
     int16_t inverter_dC, winding_dC;
 } snapshot_t;
 
-/** The samples first: whoever has the drive's address has theirs. */
+/** The samples are first, because their address is then that of the drive. */
 typedef struct {
     sample_box_t samples;
-    motor_t motor; /* a copy in RAM: calibration changes it, the flash original never */
+    motor_t motor; /* a copy in RAM, which calibration may change; the original is in flash */
     request_t request;
     fast_state_t fast;
     volatile q15_t psi_d_error; /* fed forward: the fast ISR copies the robust identification's, else the MRAI ISR's */
@@ -143,7 +144,7 @@ typedef struct {
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
 
-/** What has been identified, for a store that survives a power cycle. Called in the background. */
+/** The identified values, for the store that survives a power cycle. Called in the background. */
 identify_record_t drive_identified_record(const drive_t *drive);
 /** After drive_init(), before the first task; false: the record is refused, nothing changed. */
 bool drive_recall(drive_t *drive, const identify_record_t *record);
@@ -153,11 +154,11 @@ void drive_identify(drive_t *drive, const snapshot_t *snapshot);
 
 /** The commissioning's share of the 1 kHz task. */
 void drive_commission(drive_t *drive, const snapshot_t *snapshot);
-/** Takes a compensation over; false: out of range, nothing changed. From the task, or before it starts. */
+/** Sets the compensation; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
-/** Moves what has been learnt of the voltage error into the compensation. From the task. */
+/** Moves the identified voltage error into the compensation. From the task. */
 void drive_trim(drive_t *drive, q15_t v_dc);
-/** Puts a trim that was kept on the compensation in effect; 0 takes it away. */
+/** Adds a stored trim to the compensation in effect; 0 removes the trim. */
 void drive_retrim(drive_t *drive, int32_t trim);
 /** Current references come from outside the torque path. */
 static inline bool drive_is_direct(const drive_t *drive)
@@ -170,7 +171,7 @@ void task_1khz(drive_t *drive);
 #if FLUXTRUE_MRAI
 void mrai_isr(drive_t *drive);
 #else
-/* So that a port needs no condition of its own. */
+/* Empty, so that a port needs no condition. */
 static inline void mrai_isr(drive_t *drive)
 {
     (void)drive;

@@ -29,7 +29,7 @@ typedef struct {
     const char *name;
     bases_t bases;
     uint8_t adc_bits;
-    uint16_t trim_steps; /* of learning between two moves of the dead-time compensation */
+    uint16_t trim_steps; /* steps of identification between two changes of the dead-time compensation */
     float current_full_scale_A;
     float v_dc_full_scale_V;
     float torque_max_Nm;
@@ -37,8 +37,8 @@ typedef struct {
     float r_ohm_20;
     float dead_time_s; /* of the bridge: modulate.dead_time compensates a fraction of it */
     q15_t torque_max;
-    q15_t torque_slew;      /* per 1 kHz step; Q15_MAX = open */
-    q15_t torque_slew_weak; /* the most while the planned flux is below psi_weak: little voltage is left for it */
+    q15_t torque_slew;      /* per 1 kHz step; Q15_MAX: no limit */
+    q15_t torque_slew_weak; /* largest slew while the planned flux is below psi_weak, where little voltage is left */
     q15_t psi_weak;
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;
@@ -64,7 +64,7 @@ extern const motor_t motor;
 
 bool motor_valid(const motor_t *motor);
 
-/** The largest current_control.clear_q30 with such a dead time. */
+/** The largest current_control.clear_q30 for this dead time. */
 uint32_t motor_clear_q30(const motor_t *motor, int32_t dead_time);
 
 #endif

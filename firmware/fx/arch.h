@@ -56,7 +56,7 @@ typedef struct {
 
 typedef int64_t fx_arch_double_word_t __attribute__((may_alias, aligned(4)));
 
-/* The compiler would load the two one by one, as each is needed. Uv: it may add a constant that LDRD has room for. */
+/* The compiler would load the two one by one, as each is needed. Uv: it may add a constant that fits LDRD. */
 static inline fx_arch_two_t fx_arch_load_two(const int32_t *from)
 {
     fx_arch_two_t y;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fx/div.h"
 
-/* 2^30 and half a denominator leave room in 32 bits. */
+/* 2^30 and half a denominator fit 32 bits. */
 q15_t fx_div_q15(q15_t num, q15_t den)
 {
     if (den == 0) {

@@ -35,7 +35,7 @@ void commissioned_set_trim(fluxtrue_t *d, double value)
     d->drive.request.trim = value != 0.0;
 }
 
-/* In effect, at the dc voltage of now. */
+/* The compensation in effect, at the present dc voltage. */
 double commissioned_level_V(const fluxtrue_t *d)
 {
     const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation & 1U].v_dc / 32768.0 *

@@ -11,7 +11,7 @@
 #define TURN_RAD 6.283185307179586
 #define DUTY_ONE 32768.0
 
-/* Beyond these no sensor of a traction drive delivers: a unit mix-up or garbage, not a measurement. */
+/* A value beyond these limits is not a measurement of a traction drive but an error, for example of units. */
 #define CURRENT_CREDIBLE_A 1e5
 #define VOLTAGE_CREDIBLE_V 1e5
 #define VOLTAGE_NEGATIVE_SHARE 0.05 /* of full scale: an offset of the sensor, not a reversed dc link */

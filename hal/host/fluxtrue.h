@@ -6,7 +6,7 @@
  * Source   docs/howto/software-in-the-loop.md
  * Units    SI; the names of fluxtrue_set() and fluxtrue_get() end in their unit
  * Errors   fluxtrue_set() answers a negative code; fluxtrue_get() of an unknown name is NaN;
- *          non-finite or impossible samples open the gates and set a fault bit
+ *          NaN, infinite or impossible samples disable switching and set a fault bit
  * Context  any number of instances in one process; one thread per instance at a time */
 #if defined(__GNUC__)
 #define FLUXTRUE_API __attribute__((visibility("default")))
@@ -29,11 +29,11 @@ FLUXTRUE_API const char *fluxtrue_version(void);
 /** A new drive with the motor compiled in; NULL when out of memory. */
 FLUXTRUE_API fluxtrue_t *fluxtrue_create(void);
 FLUXTRUE_API void fluxtrue_destroy(fluxtrue_t *drive);
-/** FLUXTRUE_OK, or why not; a refused value changes nothing. */
+/** FLUXTRUE_OK or the reason for the refusal; a refused value changes nothing. */
 FLUXTRUE_API int fluxtrue_set(fluxtrue_t *drive, const char *name, double value);
 /** The value now; NaN for an unknown name. */
 FLUXTRUE_API double fluxtrue_get(const fluxtrue_t *drive, const char *name);
-/** The names one by one, NULL after the last and for a negative index. */
+/** The index-th name; NULL after the last one and for a negative index. */
 FLUXTRUE_API const char *fluxtrue_name(int index);
 /** The word for a value of a name that stands for an enumeration, in lower case: "moved" for ("commission_failure", 2);
  *  of a word of bits that for the bit: "over_current" for ("fault_word", 0). FLUXTRUE_UNKNOWN_NAME: no such name or
@@ -45,10 +45,11 @@ FLUXTRUE_API const char *fluxtrue_explanation(const char *name, int value);
  *  and not more often than every five minutes. Carry it over to a new drive and it starts with that knowledge.
  *  FLUXTRUE_OUT_OF_RANGE: another size. */
 FLUXTRUE_API int fluxtrue_memory_read(const fluxtrue_t *drive, unsigned char *data, int size);
-/** Before the first step, as at power-on: FLUXTRUE_READ_ONLY afterwards. Damaged or foreign ones leave the priors. */
+/** Before the first step, as at power-on; FLUXTRUE_READ_ONLY afterwards. A record that is damaged or of another motor
+ *  is not used. */
 FLUXTRUE_API int fluxtrue_memory_write(fluxtrue_t *drive, const unsigned char *data, int size);
 /** in: ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start.
- *  out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1. */
+ *  out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 1 while switching is enabled, else 0. */
 FLUXTRUE_API void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4]);
 
 #ifdef __cplusplus

@@ -25,8 +25,8 @@ typedef struct {
     can_queue_t received, sent;
     uint32_t lost, bus_off;
     bool output[BOARD_OUTPUTS];
-    bool gate_fault, gate_fault_told;     /* the line; told to the drive, once until the gates are closed again */
-    bool winding_broken, inverter_broken; /* no reading */
+    bool gate_fault, gate_fault_told;     /* the line; reported to the drive once until switching is enabled again */
+    bool winding_broken, inverter_broken; /* sensor defective */
     double inverter_C;
     bool watchdog_started;
     uint32_t watchdog_services;
@@ -51,7 +51,7 @@ struct fluxtrue {
     double torque_requested_Nm; /* as set, without a bus */
 };
 
-_Static_assert(offsetof(ecu_t, drive) == 0, "the drive must be where a port without a bus looks for it");
+_Static_assert(offsetof(ecu_t, drive) == 0, "the drive must be where a port without a bus expects it");
 
 /** As fluxtrue_create() leaves it, in memory of the caller's. */
 void fluxtrue_init(fluxtrue_t *instance);

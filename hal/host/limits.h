@@ -4,7 +4,7 @@
 /** The vehicle's limits, the inverter's temperature and the monitors that need a machine, in SI,
  * for the names of fluxtrue_set() and fluxtrue_get().
  * Units    N·m, W on the dc side, degrees C
- * Range    not negative; from the format's end on a limit is open
+ * Range    not negative; a value from the end of the format on means no limit
  * Errors   none: fluxtrue_set() has checked the range
  * Context  between two steps */
 #include "hal/host/fluxtrue.h"
@@ -19,7 +19,7 @@ double limits_get_power_drive(const fluxtrue_t *drive);
 void limits_set_power_drive(fluxtrue_t *drive, double value);
 double limits_get_power_regen(const fluxtrue_t *drive);
 void limits_set_power_regen(fluxtrue_t *drive, double value);
-/* 0: a rig feeds samples that no machine answers; control deviation, lost phase, angle and torque are not judged. */
+/* 0: the samples do not come from a machine, so control deviation, lost phase, angle and torque are not monitored. */
 double limits_get_machine_monitors(const fluxtrue_t *drive);
 void limits_set_machine_monitors(fluxtrue_t *drive, double value);
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_HOST_NVM_HOST_H
 #define HAL_HOST_NVM_HOST_H
-/** The flash of a software-in-the-loop drive: erased when the instance is created, kept by whoever wants it kept.
- *   As in flash a programmed bit can only be cleared. Handed out and taken are all slots, one after the other.
+/** The flash of a software-in-the-loop drive. It is erased when the instance is created; a caller may copy it out and
+ * back.
+ *   As in flash, programming can only clear bits. The copy contains all slots, one after the other.
  * Source   hal/nvm.h; docs/howto/software-in-the-loop.md
  * Errors   as fluxtrue_memory_read() and fluxtrue_memory_write()
  * Context  between two periods; the same thread as fluxtrue_step() */
@@ -15,7 +16,7 @@
 
 typedef struct {
     uint8_t slot[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
-    uint32_t changes; /* counted up by every erase and every program */
+    uint32_t changes; /* number of erase and program operations */
 } nvm_host_t;
 
 void nvm_host_erase(nvm_host_t *nvm);

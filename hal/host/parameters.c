@@ -6,8 +6,8 @@
 #include "calibration/calibration.h"
 #include "drive/mrai/mrai_seam.h"
 #include "hal/host/commissioned.h"
+#include "hal/host/identified.h"
 #include "hal/host/instance.h"
-#include "hal/host/learnt.h"
 #include "hal/host/limits.h"
 #include "hal/host/stations.h"
 
@@ -56,7 +56,7 @@ GETTER(enable, d->drive.request.enable)
 GETTER(torque_loop, d->drive.request.torque_loop)
 GETTER(identification, d->drive.request.identification)
 GETTER(identification_mode, d->drive.request.identification_mode)
-/* 1 until the task has taken it. */
+/* 1 until the task has processed the reset. */
 GETTER(fault_reset, d->drive.request.fault_resets != d->drive.task.fault_resets_asked)
 GETTER(identification_reset, d->drive.request.identification_resets != d->drive.task.identification_resets)
 GETTER(current_mode, d->drive.request.current_mode)
@@ -88,7 +88,7 @@ static double get_speed(const fluxtrue_t *d)
     return omega_rad_s / d->drive.motor.angle_tracker.pole_pairs * 60.0 / 6.283185307179586;
 }
 
-/* In current mode the command is the request; else it is what the reference stage answered. */
+/* In current mode the requested reference, else the output of the current reference. */
 static dq_q15_t reference_of(const fluxtrue_t *d)
 {
     return d->drive.request.current_mode ? d->drive.request.i_ref : d->drive.task.reference.i_ref;
@@ -173,19 +173,19 @@ static const parameter_t parameters[] = {
     {"voltage_trim_V", get_voltage_trim, NULL, 0, 0},
     {"derating", get_derating, NULL, 0, 0},
     {"torque_correction", get_torque_correction, NULL, 0, 0},
-    {"psi_f_Vs", learnt_psi_f_Vs, NULL, 0, 0},
-    {"r_ohm", learnt_r_ohm, NULL, 0, 0},
+    {"psi_f_Vs", identified_psi_f_Vs, NULL, 0, 0},
+    {"r_ohm", identified_r_ohm, NULL, 0, 0},
     {"psi_quality", get_psi_quality, NULL, 0, 0},
     {"r_quality", get_r_quality, NULL, 0, 0},
-    {"drop_V", learnt_drop_V, NULL, 0, 0},
-    {"lq_scale", learnt_lq_scale, NULL, 0, 0},
-    {"ld_scale", learnt_ld_scale, NULL, 0, 0},
-    {"angle_error_rad", learnt_angle_rad, NULL, 0, 0},
-    {"iron_scale", learnt_iron_scale, NULL, 0, 0},
-    {"parameter_clamped", learnt_clamped, NULL, 0, 0},
-    {"torque_confidence", learnt_confidence, NULL, 0, 0},
-    {"contradiction", learnt_contradiction, NULL, 0, 0},
-    {"local_flux_Vs", learnt_local_Vs, NULL, 0, 0},
+    {"drop_V", identified_drop_V, NULL, 0, 0},
+    {"lq_scale", identified_lq_scale, NULL, 0, 0},
+    {"ld_scale", identified_ld_scale, NULL, 0, 0},
+    {"angle_error_rad", identified_angle_rad, NULL, 0, 0},
+    {"iron_scale", identified_iron_scale, NULL, 0, 0},
+    {"parameter_clamped", identified_clamped, NULL, 0, 0},
+    {"torque_confidence", identified_confidence, NULL, 0, 0},
+    {"mismatch_share", identified_mismatch_share, NULL, 0, 0},
+    {"local_flux_Vs", identified_local_Vs, NULL, 0, 0},
     {"psi_clamped", get_psi_clamped, NULL, 0, 0},
     {"r_clamped", get_r_clamped, NULL, 0, 0},
     {"id_A", get_id, NULL, 0, 0},

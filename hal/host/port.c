@@ -98,7 +98,7 @@ int16_t hal_temperature_inverter_dC(void)
 
 int16_t hal_temperature_processor_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN; /* of a PC */
+    return HAL_TEMPERATURE_UNKNOWN; /* a PC has no such sensor */
 }
 
 void hal_watchdog_start(void)
@@ -111,7 +111,7 @@ void hal_watchdog_service(void)
     active->board.watchdog_services++;
 }
 
-/* A process on a PC has no stack of its own to measure, and no reset. */
+/* Not available for a process on a PC: stack use and reset cause. */
 uint32_t hal_system_stack_unused(void)
 {
     return 0;

@@ -6,7 +6,7 @@
 #include "hal/host/instance.h"
 
 void host_port_select(fluxtrue_t *instance);
-/** The start-up's look into the flash. */
+/** Restores the identified values from the flash at start-up. */
 void host_port_recall(fluxtrue_t *instance);
 
 #endif

@@ -61,6 +61,7 @@ static const struct {
     {"torque_command_Nm", "torque_requested_Nm"},
     {"torque_request_Nm", "torque_corrected_Nm"},
     {"torque_estimate_Nm", "torque_estimated_Nm"},
+    {"contradiction", "mismatch_share"},
 };
 
 const char *stations_name(const char *name)

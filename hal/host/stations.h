@@ -5,13 +5,12 @@
  *   requested -> arbitrated -> limited -> commanded (after slew) -> corrected (after the torque loop); estimated
  * Source   docs/glossary.md
  * Units    N·m
- * Errors   stations_name() answers a name that is not an old one unchanged
  * Context  private to hal/host */
 #include "hal/host/fluxtrue.h"
 
-/** On a bus what the last accepted command frame asks for, else as set. */
+/** On a bus the request of the last accepted command frame, otherwise the value that was set. */
 double stations_requested_Nm(const fluxtrue_t *drive);
-/** Without a bus nothing arbitrates: the drive is asked for the requested torque. */
+/** Without a bus there is no arbitration: the requested torque becomes the arbitrated one. */
 void stations_set_requested_Nm(fluxtrue_t *drive, double value);
 double stations_arbitrated_Nm(const fluxtrue_t *drive);
 double stations_limited_Nm(const fluxtrue_t *drive);
@@ -19,7 +18,7 @@ double stations_commanded_Nm(const fluxtrue_t *drive);
 double stations_corrected_Nm(const fluxtrue_t *drive);
 double stations_estimated_Nm(const fluxtrue_t *drive);
 
-/** The present name of what version 0.1 called by the given one. NULL stays NULL. */
+/** The present name for a name of version 0.1; any other name, and NULL, is returned unchanged. */
 const char *stations_name(const char *name);
 
 #endif

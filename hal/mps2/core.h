@@ -21,7 +21,7 @@
 #define ICSR_PENDSV (1U << 28)
 #define CPACR_FPU 0x00F00000U
 
-#define IRQ_TASK 31U /* no peripheral of the board pends it here */
+#define IRQ_TASK 31U /* not used by the board's peripherals in this port */
 #define PRIORITY_FAST 0x20U /* uppermost three bits */
 #define PRIORITY_MRAI 0x40U
 #define PRIORITY_TASK 0x60U

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The firmware at a scripted machine: SysTick is the PWM period, PendSV the identification, a spare interrupt the
+/* The firmware with scripted sensor values. SysTick is the PWM period, PendSV the identification, a spare interrupt the
  * task. */
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_MPS2_SCRIPT_H
 #define HAL_MPS2_SCRIPT_H
-/** What the sensors say and what is asked for, period by period: the same integers on every machine, so that the
- * duties must be the same bits too.
+/** Scripted sensor values and requests, period by period: the same integers on every processor, so that the duties must
+ * be identical too.
  *   angle: 41 s^-1 rising to 150 s^-1; currents: a vector that turns with the rotor, its d and q parts triangles of the
- *   period's number; dc voltage: a triangle around 350 V; torque: four levels in turn, gates on from period 20
- * Source   none: a stimulus, no machine; the controller's integrators reach their limits with it
- * Units    as hal/adc.h and hal/angle.h; sum: Fletcher-like, over duties and gates of every period
+ *   period's number; dc voltage: a triangle around 350 V; torque: four levels one after the other, switching enabled
+ *   from period 20
+ * Source   none: a stimulus without a machine, with which the controller's integrators reach their limits
+ * Units    as hal/adc.h and hal/angle.h; sum: Fletcher-like, over duties and enable of every period
  * Context  fast ISR: script_adc(), script_angle(), script_note(); 1 kHz task: script_request() */
 #include <stdbool.h>
 #include <stdint.h>

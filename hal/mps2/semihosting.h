@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_MPS2_SEMIHOSTING_H
 #define HAL_MPS2_SEMIHOSTING_H
-/** Words to the emulator that runs the image, and the end of the run.
+/** Output to the emulator that runs the image, and the end of the run.
  * Source   Arm semihosting specification: SYS_WRITE0, SYS_EXIT_EXTENDED
  * Context  any; without a debugger or emulator each call is a fault */
 #include <stdint.h>

@@ -5,7 +5,7 @@
  * Source   README.md, angle
  * Units    period_ticks: one PWM period in ticks of FTM0
  * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an encoder
- * Context  angle_init(): start-up, right before the PWM starts; the others: fast ISR, angle_begin() first thing,
+ * Context  angle_init(): start-up, right before the PWM starts; the others: fast ISR, angle_begin() first,
  *          angle_end() last */
 #include <stdbool.h>
 #include <stdint.h>

@@ -13,7 +13,7 @@
 static struct {
     int32_t at_last;      /* reading of the period before */
     int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
-} encoder;                /* together: every period reads both at once */
+} encoder;                /* adjacent, so that one instruction reads both */
 
 void angle_init(uint32_t period_ticks)
 {
@@ -41,8 +41,9 @@ bool angle_fault(void)
     return false;
 }
 
-/* The counter has moved on since the currents were sampled, at the period's start: by as much of the last period's
- * travel as FTM0 says has passed of this one. Less than half a period, or the share would be negative. */
+/* Since the currents were sampled at the start of the period the rotor has moved on, by the travel of the last period
+ * times the share of this period that has passed (FTM0). The share must stay below one half, or it would be
+ * negative. */
 uint32_t hal_angle_read(void)
 {
     const fx_arch_two_t last = fx_arch_load_two(&encoder.at_last);

@@ -16,12 +16,12 @@
 /* Written and read by the fast ISR alone, but velocity, one aligned half word. */
 static ad2s1210_frame_t position;
 static volatile int16_t velocity;
-static bool missing; /* a frame did not come: the last angle stays, and the fault is raised */
+static bool missing; /* a frame was not received: the last angle is kept and the fault raised */
 
-/* The converter keeps every fault it has ever seen, those of its own power-up first, until its register has been read
- * in configuration mode between two falling edges of SAMPLE; the second comes with the first PWM period. What is
- * still wrong then is seen by the first frames. */
-static void forget_faults(void)
+/* The converter keeps every fault, including those of its own power-up, until its register has been read in
+ * configuration mode between two falling edges of SAMPLE; the second edge comes with the first PWM period. A fault that
+ * persists appears in the first frames. */
+static void clear_faults(void)
 {
     pwm_sample_by_hand();
     PTC->PSOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1);
@@ -44,13 +44,13 @@ void angle_init(uint32_t period_ticks)
     LPSPI0->CCR = LPSPI_CCR_SCKDIV(CLOCK_DIVIDER) | LPSPI_CCR_DBT(FRAME_GAP) | LPSPI_CCR_PCSSCK(FRAME_GAP) |
                   LPSPI_CCR_SCKPCS(FRAME_GAP);
     LPSPI0->CR = LPSPI_CR_MEN | LPSPI_CR_RTF | LPSPI_CR_RRF;
-    forget_faults();
+    clear_faults();
     PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
     LPSPI0->TCR = LPSPI_TCR_FRAMESZ(AD2S1210_BITS - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0);
 }
 
-/* The velocity asked for a period ago is long there; now the position of this period's SAMPLE pulse. Nothing may be
- * left in front of it. */
+/* The velocity requested a period ago has been received. Starts the transfer of the position that this period's SAMPLE
+ * pulse has latched; the receive FIFO must be empty before. */
 void angle_begin(void)
 {
     for (uint32_t k = 0; k < FIFO_WORDS && (LPSPI0->RSR & LPSPI_RSR_RXEMPTY) == 0U; k++) {

@@ -16,7 +16,7 @@
 #define TIMING                                                                                      \
     (CAN_CTRL1_PRESDIV(0) | CAN_CTRL1_RJW(1) | CAN_CTRL1_PSEG1(4) | CAN_CTRL1_PSEG2(1) | CAN_CTRL1_PROPSEG(7))
 
-/* One writer each: put by the interrupt, taken by the reader. */
+/* One writer each: the interrupt writes put, the reader writes taken. */
 static can_frame_t queue[QUEUE];
 static volatile uint32_t put, taken, lost, bus_off;
 

@@ -29,7 +29,8 @@ static void start_pll(void)
     await(&SCG->SPLLCSR, SCG_SPLLCSR_SPLLVLD, SCG_SPLLCSR_SPLLVLD);
 }
 
-/* Within high-speed run no clock may more than double, and before it 80 MHz is the most: half of it comes first. */
+/* In high-speed run no clock may change by more than a factor of two, and before it the limit is 80 MHz. Therefore half
+ * of the final frequency is selected first. */
 static void select_pll(void)
 {
     SCG->RCCR = SCG_RCCR_SCS(SOURCE_SPLL) | SCG_RCCR_DIVCORE(1) | SCG_RCCR_DIVBUS(1) | SCG_RCCR_DIVSLOW(3);
@@ -44,7 +45,8 @@ static void enter_high_speed(void)
     await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_HSRUN);
 }
 
-/* A lost clock resets: the outputs are then inputs, and the gate resistors hold the bridge open. */
+/* The loss of a clock resets the processor: the outputs become inputs, and pull-downs at the gate drivers keep the
+ * bridge off. */
 static void guard_clocks(void)
 {
     SCG->SOSCCSR = SCG_SOSCCSR_SOSCEN | SCG_SOSCCSR_SOSCCM | SCG_SOSCCSR_SOSCCMRE;
@@ -60,14 +62,14 @@ static void start_cache(void)
 
 #define GATE PCC_FLEXCAN0_CGC
 
-/* The source may only change while the gate is closed. */
-static void open_gate(volatile uint32_t *gate)
+/* The clock source may only be changed while the clock gate is disabled. */
+static void enable_clock_gate(volatile uint32_t *gate)
 {
     *gate = PCC_FTM0_PCS(PCS_SPLLDIV2);
     *gate = PCC_FTM0_PCS(PCS_SPLLDIV2) | GATE;
 }
 
-static void open_gates(void)
+static void enable_clock_gates(void)
 {
     open_gate(&PCC->PCC_ADC0);
     open_gate(&PCC->PCC_ADC1);
@@ -91,7 +93,7 @@ void clock_init(void)
     start_oscillator();
     start_pll();
     select_pll();
-    open_gates(); /* in high-speed run they must not be touched any more */
+    enable_clock_gates(); /* in high-speed run they must not be changed */
     enter_high_speed();
     guard_clocks();
     start_cache();

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_IMAGE_H
 #define HAL_S32K144_IMAGE_H
-/** The checksum that guards the motor's configuration and tables in flash.
+/** The checksum over the motor's configuration and tables in flash.
  *   CRC-32 of IEEE 802.3 from protected_start to protected_end; the word behind it is written after linking by
  *   `tools/fluxtrue target seal`, and an image that was never sealed does not match
  * Source   README.md, memory

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The image: one drive, the interrupts that run it, and what is done when none of them is due. */
+/* The image: one drive, the interrupts that run it, and the background loop. */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -17,7 +17,7 @@
 #include "hal/s32k144/tick.h"
 #include "hal/watchdog.h"
 
-#define STACK_RESERVE 256U /* bytes that must never have been touched */
+#define STACK_RESERVE 256U /* bytes at the end of the stack that must stay unused */
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
 
 #if DIRECT
@@ -28,22 +28,21 @@ ecu_t ecu; /* calibration tools find it by this name */
 /* For a counter that never runs, and the 1 kHz of the task. */
 #define STOPPED_PERIODS 10U
 static const pwm_config_t stopped = {11200, 1120};
-/* For the fast ISR, which alone raises faults, as one word: what the gate driver, the converters' interrupt and the
- * background have seen. */
+/* Faults found by the gate driver's interrupt, the converters' interrupt and the background loop. The fast ISR, which
+ * alone raises faults, reads them as one word. */
 static volatile union {
     struct {
-        bool gates, sampling, data_damaged;
+        bool gate_driver, sampling, data_damaged;
     };
     uint32_t any;
 } alarms;
 static bool started; /* the PWM, and with it the fast ISR */
 
-/* The gate driver's is cleared only where it was seen set, and raised after that: one that comes in between is told by
- * this raise. */
+/* The gate driver's flag is cleared first and the fault raised afterwards, so that a fault in between is not lost. */
 static __attribute__((noinline, cold)) void alarms_take(void)
 {
-    if (alarms.gates) {
-        alarms.gates = false;
+    if (alarms.gate_driver) {
+        alarms.gate_driver = false;
         drive_raise_fault(&ecu.drive, FAULT_GATE); /* the outputs are off already */
     }
     if (alarms.sampling) {
@@ -68,8 +67,8 @@ void adc_handler(void)
     angle_end();
 }
 
-/* Samples that keep failing end no conversion, and no conversion's end would run the fast ISR: it is pended here, to
- * bring the drive into its safe state. */
+/* If sampling keeps failing, no end of a conversion starts the fast ISR. It is pended here, so that it brings the drive
+ * into its safe state. */
 void sampling_error_handler(void)
 {
     if (sampling_error_isr()) {
@@ -83,8 +82,8 @@ void mrai_handler(void)
     mrai_isr(&ecu.drive);
 }
 
-/* The application serves the watchdog while the other interrupts advance. Without them, because the data are damaged,
- * the bus must still be able to say so. */
+/* The application services the watchdog only while the interrupts advance. With damaged data they never run; the
+ * watchdog is then serviced here, so that the bus can report the fault. */
 void tick_handler(void)
 {
     tick_cleared();
@@ -113,7 +112,7 @@ void can_bus_off_handler(void)
 void gate_fault_handler(void)
 {
     pwm_gate_fault_isr();
-    alarms.gates = true;
+    alarms.gate_driver = true;
 }
 
 static void enable(uint32_t irq, uint32_t priority)
@@ -139,7 +138,7 @@ static uint32_t ticks(float seconds)
     return (uint32_t)(seconds * (float)CLOCK_CORE_HZ + 0.5F);
 }
 
-/* False: the motor's data ask for what the timer cannot do. */
+/* False: the timer cannot make the period or dead time of the motor's data. */
 static bool timing(pwm_config_t *pwm)
 {
     const pwm_config_t wanted = {4U * ticks(motor.bases.period_s / 4.0F), ticks(motor.dead_time_s)};
@@ -160,8 +159,8 @@ static void init_hardware(const pwm_config_t *pwm, uint32_t periods_per_step)
     can_init();
 }
 
-/* Damaged data must not be computed with, nor a period or a dead time tried that the timer cannot keep: then the
- * counter, and so the fast ISR, never starts. */
+/* If the data are damaged, or the timer cannot make the period or the dead time, the counter and with it the fast ISR
+ * never start. */
 static void start(const pwm_config_t *pwm, bool drivable)
 {
     __asm__ volatile("cpsid i" ::: "memory"); /* tick and PWM start together */
@@ -175,7 +174,7 @@ static void start(const pwm_config_t *pwm, bool drivable)
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-/* Not part of the reset handler: its floating-point instructions must not move before the FPU is on. */
+/* Separate from the reset handler, so that no floating-point instruction is moved before the FPU is enabled. */
 __attribute__((noinline)) int main(void)
 {
     alarms.data_damaged = !image_valid();

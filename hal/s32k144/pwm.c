@@ -8,7 +8,7 @@
 
 #define SYSTEM_CLOCK 1U
 #define ALL_CHANNELS_MANUAL 2U
-#define SAFE_IN_DEBUG 1U /* a halted core stops the counter and switches the outputs off */
+#define SAFE_IN_DEBUG 1U /* a halted core stops the counter and disables the outputs */
 #define FAULT_FILTER 4U
 #define SIX_OUTPUTS 0x3FU
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
@@ -30,11 +30,11 @@
 
 static struct {
     uint32_t period;
-    bool gates;                       /* as last commanded */
-} bridge;                             /* together: every period reaches both from one address */
+    bool switching;                   /* as last commanded */
+} bridge;                             /* adjacent: one address serves both in every period */
 static volatile bool fault_for_board; /* set by the fault interrupt, taken by its reader */
 
-/* Ten bits; beyond them in steps of four, rounded up: never less than asked for. */
+/* Ten bits; larger values in steps of four, rounded up, so that the dead time is never shorter than requested. */
 static uint32_t dead_time(uint32_t ticks)
 {
     const bool coarse = ticks > DEAD_TIME_MAX;
@@ -63,8 +63,8 @@ static void configure_outputs(const pwm_config_t *config)
     FTM0->C7V = config->period_ticks;
 }
 
-/* The input last: a fault is latched by its edge, and a line that is active already must be an edge to a fault control
- * that is on. */
+/* The input is enabled last: a fault is latched at its edge, and a line that is already active must make an edge while
+ * the fault control is on. */
 static void configure_faults(void)
 {
     FTM0->FLTPOL = FTM_FLTPOL_FLT0POL;
@@ -72,21 +72,21 @@ static void configure_faults(void)
     FTM0->FLTCTRL = FTM_FLTCTRL_FAULT0EN | FTM_FLTCTRL_FFLTR0EN | FTM_FLTCTRL_FFVAL(FAULT_FILTER);
 }
 
-/* Off: forced low now, masked from the next start on. */
-static void open_gates(void)
+/* The outputs are forced low at once, and masked from the start of the next period. */
+static void disable_switching(void)
 {
     FTM0->SWOCTRL = SIX_OUTPUTS;
     FTM0->OUTMASK = SIX_OUTPUTS;
     FTM0->SYNC = LOAD;
 }
 
-/* On: still masked until the next start, which takes over mask and duties together. */
-static void close_gates(void)
+/* The outputs stay masked until the start of the next period, which takes over mask and duties together. */
+static void enable_switching(void)
 {
     if ((FTM0->FMS & (FTM_FMS_FAULTF | FTM_FMS_FAULTIN)) == FTM_FMS_FAULTF) {
-        FTM0->FMS = FTM_FMS_WPEN; /* clears FAULTF: the fault is over, and the drive has been told */
+        FTM0->FMS = FTM_FMS_WPEN; /* clears FAULTF: the fault has ended and was reported to the drive */
     }
-    core_irq_clear(IRQ_FTM0_FAULT); /* pended again while the line stayed up after its interrupt */
+    core_irq_clear(IRQ_FTM0_FAULT); /* still pending if the line stayed active after its interrupt */
     core_irq_enable(IRQ_FTM0_FAULT);
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = 0;
@@ -113,7 +113,7 @@ void pwm_init(const pwm_config_t *config)
     FTM0->EXTTRIG = FTM_EXTTRIG_INITTRIGEN; /* after CNT, whose write would be a trigger, too */
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
-    bridge.gates = false;
+    bridge.switching = false;
 }
 
 static void pass_a_microsecond(void)
@@ -144,7 +144,7 @@ static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_
     const uint32_t ticks = (duty * period + half) >> 15;
     uint32_t rise = (period - ticks) >> 1;
     if (__builtin_expect(ticks == 0U, 0)) {
-        rise = (uint32_t)fx_arch_opaque((int32_t)period); /* a branch: nothing in every other period */
+        rise = (uint32_t)fx_arch_opaque((int32_t)period); /* a branch, free in every other period */
     }
     *from = rise;
     *to = rise + ticks;
@@ -155,7 +155,7 @@ void hal_pwm_write(duty_t duty)
     const uint32_t period = bridge.period;
     const uint32_t half = (uint32_t)fx_arch_opaque(16384); /* in a register: part of the multiplication */
     ftm_t *timer = FTM0;
-    __asm__("" : "+r"(timer)); /* the address once: not loaded anew for every pulse */
+    __asm__("" : "+r"(timer)); /* the address is loaded once, not for every pulse */
     pulse(&timer->C0V, &timer->C1V, duty.a, period, half);
     pulse(&timer->C2V, &timer->C3V, duty.b, period, half);
     pulse(&timer->C4V, &timer->C5V, duty.c, period, half);
@@ -164,25 +164,26 @@ void hal_pwm_write(duty_t duty)
 
 void hal_pwm_enable(bool on)
 {
-    if (__builtin_expect(on == bridge.gates, 1)) {
+    if (__builtin_expect(on == bridge.switching, 1)) {
         return;
     }
-    bridge.gates = on;
+    bridge.switching = on;
     if (on) {
-        close_gates();
+        enable_switching();
     } else {
-        open_gates();
+        disable_switching();
     }
 }
 
-/* The request stays up until FAULTF is cleared, which waits for the gates: so it is masked here. */
+/* The interrupt request persists until FAULTF is cleared, which happens only when switching is enabled again; therefore
+ * the interrupt is masked here. */
 void pwm_gate_fault_isr(void)
 {
     fault_for_board = true;
     core_irq_disable(IRQ_FTM0_FAULT);
 }
 
-/* Cleared only where it was seen set: what the interrupt sets in between is never lost. */
+/* Cleared only after it was read as set, so that a fault that the interrupt sets in between is not lost. */
 bool pwm_fault_reported(void)
 {
     if (fault_for_board) {

@@ -6,8 +6,8 @@
  * Units    ticks of 112 MHz
  * Range    pwm_possible(): period_ticks a multiple of 4 up to 65532, dead_time_ticks from 1 to 4092 and an eighth of it
  * Context  pwm_init(), pwm_start(): start-up; pwm_fault_reported(): 1 kHz task;
- *          pwm_gate_fault_isr(): fault interrupt, the timer has already opened the gates; who is above the 1 kHz task
- *          and must know of it is told by the interrupt's handler */
+ *          pwm_gate_fault_isr(): fault interrupt; the timer has already disabled switching. The interrupt's handler
+ *          reports the fault to the fast ISR */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -16,7 +16,7 @@ typedef struct {
     uint32_t dead_time_ticks;
 } pwm_config_t;
 
-/** What the timer cannot do must not be tried: bits beyond its registers would be a dead time too short. */
+/** Whether the timer can make this period and dead time. Bits beyond its registers would shorten the dead time. */
 bool pwm_possible(const pwm_config_t *config);
 void pwm_init(const pwm_config_t *config);
 /** The counter runs from here on; its first period starts now. */
@@ -24,7 +24,7 @@ void pwm_start(void);
 /** A falling edge of SAMPLE, and a low microsecond after it; only before pwm_start(). */
 void pwm_sample_by_hand(void);
 void pwm_gate_fault_isr(void);
-/** True while the fault input is active, and once after it was. */
+/** True while the fault input is active, and once after it was active. */
 bool pwm_fault_reported(void);
 
 #endif

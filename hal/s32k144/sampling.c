@@ -12,12 +12,15 @@
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
 #define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
-#define APART_MS 10U  /* an error later than this after the last one begins a new row */
+#define APART_MS 10U  /* a longer interval between errors restarts the count */
 
 /* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). */
 enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3, ADC0_CONVERSIONS = 4 };
 enum { I_B = 0, V_DC = 1, INVERTER = 2, ADC1_CONVERSIONS = 3 };
-enum { FIRST = 0, SLOW = 2 }; /* of either: the conversions that a delay starts, not the end of the one before */
+enum {
+    FIRST = 0,
+    SLOW = 2
+}; /* conversions that are started by a delay; each other one follows the end of the one before */
 
 typedef uint64_t double_word_t __attribute__((may_alias, aligned(4)));
 typedef struct {
@@ -30,8 +33,8 @@ static struct {
 } errors;                              /* written by the sequence errors' interrupt */
 static volatile uint32_t milliseconds; /* written by the 1 kHz task */
 
-/* From nothing: what an earlier run left in the converter's correction would be carried on. */
-static void forget_calibration(adc_t *adc)
+/* Calibration starts from zero; results of an earlier run would falsify it. */
+static void clear_calibration(adc_t *adc)
 {
     adc->CLPS = 0;
     adc->CLP3 = 0;
@@ -44,7 +47,7 @@ static void forget_calibration(adc_t *adc)
 
 static void calibrate(adc_t *adc)
 {
-    forget_calibration(adc);
+    clear_calibration(adc);
     adc->CFG1 = ADC_CFG1_MODE(BITS_12) | ADC_CFG1_ADIV(HALF_CLOCK);
     adc->SC3 = ADC_SC3_CAL | ADC_SC3_AVGE | ADC_SC3_AVGS(AVERAGE_32);
     await(&adc->SC3, ADC_SC3_CAL, 0);
@@ -54,9 +57,9 @@ static void calibrate(adc_t *adc)
     adc->SC2 = ADC_SC2_ADTRG;
 }
 
-/* The first conversion by the trigger, the second by the end of the first; the slow ones in the middle of the period,
- * when the fast ISR has read all results of the period before: a result that is still unread when its next conversion
- * ends leaves the pre-trigger locked, and a lock stops the whole sequence. */
+/* The trigger starts the first conversion, the end of the first one the second. The slow channels are converted in the
+ * middle of the period, after the fast ISR has read all results of the previous one: a result that is still unread when
+ * its next conversion ends leaves the pre-trigger locked, and a lock stops the whole sequence. */
 static void chain(pdb_t *pdb, uint32_t conversions, uint32_t period_ticks)
 {
     const uint32_t all = (1U << conversions) - 1U;
@@ -86,7 +89,7 @@ void sampling_init(uint32_t period_ticks)
     chain(PDB1, ADC1_CONVERSIONS, period_ticks);
 }
 
-/* Two results that lie side by side, by one instruction where there is one. */
+/* Two adjacent results, read by one instruction where the core has one. */
 static inline results_t read_two(const volatile uint32_t *from)
 {
     results_t y;
@@ -99,8 +102,8 @@ static inline results_t read_two(const volatile uint32_t *from)
     return y;
 }
 
-/* All results of the sequence are read, those of the slow channels too: what is read here no longer locks the delay
- * blocks. The slow ones stay in their registers for the 1 kHz task. */
+/* Reads all results of the sequence, also those of the slow channels, so that no pre-trigger stays locked. The slow
+ * results stay in their registers for the 1 kHz task. */
 void hal_adc_read(adc_counts_t *counts)
 {
     const results_t from_adc0 = read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
@@ -113,7 +116,8 @@ void hal_adc_read(adc_counts_t *counts)
     counts->v_dc = from_adc1.second;
 }
 
-/* Disabled, the block drops its locks; read, every result can complete again. The block waits for the next period. */
+/* Disabling the block releases its locks; reading the results lets every conversion complete again. The block then
+ * waits for the next period. */
 static void restart(pdb_t *pdb, const adc_t *adc, uint32_t conversions)
 {
     pdb->SC = 0;

@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 void sampling_init(uint32_t period_ticks);
-/** True: the errors persist (five, less than 10 ms apart). Who calls it brings the drive into its safe state. */
+/** True: the errors persist (five, less than 10 ms apart), and the caller must bring the drive into its safe state. */
 bool sampling_error_isr(void);
 void sampling_tick(void);
 

@@ -20,7 +20,7 @@ int main(void);
 
 static uint32_t cause, unused;
 
-/* The bits of RCM_SRS, the most telling first: a power-on also counts as a low voltage. */
+/* The bits of RCM_SRS, the most specific first: a power-on also sets the bit for low voltage. */
 reset_cause_t hal_system_reset_cause(void)
 {
     static const struct {
@@ -72,7 +72,7 @@ void await(const volatile uint32_t *word, uint32_t mask, uint32_t value)
     panic();
 }
 
-/* A fault's cause may be the stack itself: start from a fresh one. */
+/* The stack itself may be the cause of a fault, so its pointer is reset first. */
 __attribute__((naked)) void fault_handler(void)
 {
     __asm__ volatile("ldr r0, =stack_top\n msr msp, r0\n b panic\n" ::"i"(panic));
@@ -100,8 +100,8 @@ __attribute__((used)) void start_up(void)
     panic();
 }
 
-/* All RAM in use is written in whole words before any is read or written in part: until then its error correction
- * knows nothing. What is written is the stack's pattern, so that its high-water mark can be found. */
+/* Writes all RAM in use in whole words before any of it is read or written in part, because until then its error
+ * correction codes are undefined. The value is the stack's pattern, from which the high-water mark is found. */
 __attribute__((naked)) void reset_handler(void)
 {
     __asm__ volatile("ldr r0, =stack_bottom\n"

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_STARTUP_H
 #define HAL_S32K144_STARTUP_H
-/** From reset to main(), and the way back when nothing can go on.
+/** From reset to main(), and the reset after a fatal error.
  * Source   README.md, memory and stack guard
  * Units    bytes
  * Errors   panic(): switches the outputs off and resets the processor; every fault of the core ends there, and so does
- *          await() for what does not come within 50 ms
- * Context  stack_measure(): background, looks at every word; panic(): any, needs no stack */
+ *          await() after 50 ms without the awaited value
+ * Context  stack_measure(): background, reads every word; panic(): any, needs no stack */
 #include <stdint.h>
 
-/** Bytes of the stack that nothing has ever touched; hal_system_stack_unused() repeats the last answer. */
+/** Bytes of the stack that were never used; hal_system_stack_unused() returns the last result. */
 uint32_t stack_measure(void);
 _Noreturn void panic(void);
 
@@ -18,7 +18,7 @@ void await(const volatile uint32_t *word, uint32_t mask, uint32_t value);
 
 /* Handlers named by the vector table. */
 void reset_handler(void);
-void start_up(void); /* where it goes on */
+void start_up(void); /* second part of the reset handler */
 void fault_handler(void);
 void gate_fault_handler(void);
 void adc_handler(void);

@@ -18,7 +18,7 @@ void tick_init(uint32_t period_ticks, uint32_t periods)
 {
     step_ticks = periods * period_ticks;
     LPIT0->MCR = LPIT_MCR_M_CEN;
-    pass_four_ticks(); /* until then it takes no other register */
+    pass_four_ticks(); /* the timer accepts no other access before that */
     LPIT0->MIER = LPIT_MIER_TIE0;
     LPIT0->TVAL0 = step_ticks - period_ticks + period_ticks / 4U - 1U;
 }
@@ -39,5 +39,5 @@ void tick_continue(void)
 void tick_cleared(void)
 {
     LPIT0->MSR = LPIT_MSR_TIF0;
-    (void)LPIT0->MSR; /* the write has arrived before the interrupt returns */
+    (void)LPIT0->MSR; /* a read back, so that the write has arrived before the interrupt returns */
 }

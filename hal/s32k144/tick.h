@@ -5,7 +5,7 @@
  * Source   README.md, time
  * Units    period_ticks: one PWM period in ticks of the 28 MHz timer; periods: N
  * Context  start-up; tick_start() right before pwm_start(), tick_continue() right after it;
- *          tick_cleared(): tick interrupt, first thing */
+ *          tick_cleared(): first in the tick interrupt */
 #include <stdint.h>
 
 void tick_init(uint32_t period_ticks, uint32_t periods);

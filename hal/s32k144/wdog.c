@@ -13,7 +13,7 @@
 #define WINDOW_TICKS 50U    /* a service within 0.35 ... 0.44 ms of the last one resets */
 #define COMMON (WDOG_CS_CMD32EN | WDOG_CS_CLK(LPO) | WDOG_CS_EN)
 
-/* The three writes must follow the unlocking within 128 bus clocks: no interrupt is on yet, or all are masked. */
+/* The three writes must follow the unlocking within 128 bus clocks: no interrupt is enabled yet, or all are masked. */
 static void configure(uint32_t window, uint32_t timeout, uint32_t control)
 {
     WDOG->CNT = UNLOCK;
@@ -23,7 +23,8 @@ static void configure(uint32_t window, uint32_t timeout, uint32_t control)
     WDOG->CS = control;
 }
 
-/* It acts some ticks of its own clock later, 20 us and more: too long to wait with interrupts masked. */
+/* The configuration takes effect some ticks of the watchdog's clock later, 20 us and more: too long to wait with
+ * interrupts masked. */
 static void await_configured(void)
 {
     await(&WDOG->CS, WDOG_CS_RCS, WDOG_CS_RCS);

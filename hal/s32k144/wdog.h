@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_WDOG_H
 #define HAL_S32K144_WDOG_H
-/** The watchdog's first configuration, which comes before anything else: reset leaves it 8 ms.
+/** The watchdog's first configuration, which must come first: after a reset it expires in 8 ms.
  * Source   README.md, watchdog
  * Context  start-up, before .data and .bss exist */
 

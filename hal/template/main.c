@@ -57,6 +57,6 @@ int main(void)
         start_timers();
     }
     for (;;) {
-        /* Write: what has time, such as the checksum again and memory_background(). */
+        /* Write: background work, such as repeating the checksum, and memory_background(). */
     }
 }

@@ -60,7 +60,7 @@ static void compare_command(void)
     check(fabs((double)rx->limits.regen_kW - oracle.power_regen_10W / 100.0) < 1e-3, "power limit differs");
     check(rx->command_channel.alive == oracle.command.alive, "the age of the command differs");
     check(rx->limits_channel.alive == oracle.limits.alive, "the age of the limits differs");
-    check(rx->command_channel.failed == oracle_failed(&oracle.command), "3 of 10 judged otherwise");
+    check(rx->command_channel.failed == oracle_failed(&oracle.command), "3 of 10 evaluated differently");
 }
 
 static void compare_torque(double before_Nm)
@@ -70,10 +70,10 @@ static void compare_torque(double before_Nm)
     const double most_Nm = (double)ecu.drive.motor.torque_max_Nm;
     const double asked_Nm = oracle.command.alive ? oracle.torque_dNm / 10.0 : 0.0;
     check(fabs(now_Nm) <= most_Nm + ROUNDING_NM, "more torque than the machine may give");
-    check(now_Nm <= fmax(fmax(before_Nm, asked_Nm), 0.0) + ROUNDING_NM, "torque that nobody asked for");
-    check(now_Nm >= fmin(fmin(before_Nm, asked_Nm), 0.0) - ROUNDING_NM, "torque that nobody asked for");
+    check(now_Nm <= fmax(fmax(before_Nm, asked_Nm), 0.0) + ROUNDING_NM, "torque that was not requested");
+    check(now_Nm >= fmin(fmin(before_Nm, asked_Nm), 0.0) - ROUNDING_NM, "torque that was not requested");
     check(!ecu.drive.request.enable || oracle.command.alive || now_Nm != 0.0 || before_Nm != 0.0,
-          "the gates stay closed without a command and without torque");
+          "switching stays enabled without a command and without torque");
 }
 
 static void put(can_frame_t frame)
@@ -93,8 +93,8 @@ static void traffic(uint32_t ms)
     if (ms % 100U == 5U && sender_random(&sender, 50) != 0U) {
         put(sender_sane(&sender, 1));
     }
-    const uint32_t most = (mood == 0U) ? 0U : (mood == 1U) ? 1U : BURST_MAX - 3U;
-    const uint32_t chance = (mood == 1U) ? sender_random(&sender, 40) / 39U : sender_random(&sender, most + 1U);
+    const uint32_t frames_max = (mood == 0U) ? 0U : (mood == 1U) ? 1U : BURST_MAX - 3U;
+    const uint32_t chance = (mood == 1U) ? sender_random(&sender, 40) / 39U : sender_random(&sender, frames_max + 1U);
     for (uint32_t n = 0; n < ((mood == 0U) ? 0U : chance); n++) {
         put(sender_insane(&sender));
     }
@@ -156,7 +156,7 @@ int main(int argc, char **argv)
     }
     check(tally.running_ms > tally.milliseconds / 20U, "the drive hardly ever ran: the campaign proves little");
     printf("%" PRIu64 " frames in %" PRIu64 " ms of simulated time: %" PRIu64 " accepted, as the oracle says; "
-           "gates closed during %" PRIu64 " ms\n",
+           "switching enabled during %" PRIu64 " ms\n",
            tally.frames, tally.milliseconds, tally.accepted, tally.running_ms);
     sim_destroy(sim);
     return 0;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One suite for the virtual ECU and for a bench: which bus, which plant, and what is looked at after every test."""
+"""One suite for the virtual ECU and for a bench: which bus, which plant, and what is checked after every test."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -47,7 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="bench channel that only lets time pass: a virtual ECU with --fast as a bench",
     )
     group.addoption("--allow-power", action="store_true",
-                    help="on a bench: tests may charge the dc link, close the gates and ask for torque")  # fmt: skip
+                    help="on a bench: tests may charge the dc link, enable switching and request torque")  # fmt: skip
     group.addoption("--elf", help="the ECU's ELF file: where its calibration values are; default: --vecu")
     group.addoption("--report", default=str(ROOT / "build" / "hil"), help="folder for report.html and bus.mf4")
     group.addoption("--soak-minutes", type=float, default=30.0, help="simulated length of the soak test")
@@ -199,7 +199,7 @@ def rig(connected: Rig, request: pytest.FixtureRequest) -> Iterator[Rig]:
     if connected.has_stand:
         connected.power_cycle()
     else:
-        connected.forget()
+        connected.clear_history()
         connected.ask(reset=True)
         connected.advance(0.1)
         connected.ask(reset=False)

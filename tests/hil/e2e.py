@@ -28,7 +28,7 @@ def _share(byte: int, behind: int) -> int:
 
 
 def crc(data_id: int, data: bytes) -> int:
-    """What byte 0 of the frame must be; byte 0 of `data` is not looked at."""
+    """What byte 0 of the frame must be; byte 0 of `data` is not checked."""
     message = bytes([data_id & 0xFF, data_id >> 8]) + data[1:]
     found = 0
     for behind, byte in enumerate(reversed(message)):

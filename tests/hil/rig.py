@@ -101,9 +101,9 @@ class Rig:
         self._encoded: dict[Command, bytes] = {}
         self._inverters = {m.frame_id: m.name for m in database.messages if "INV" in m.senders}
         self.listeners: list[Callable[[can.Message], None]] = []
-        self.forget()
+        self.clear_history()
 
-    def forget(self) -> None:
+    def clear_history(self) -> None:
         """As after connecting: nothing sent, nothing received."""
         self.command = Command()
         self.is_sending = True
@@ -259,7 +259,7 @@ class Rig:
         """Change the command that is sent from now on."""
         wanted = replace(self.command, **changes)
         if not self.may_switch_on and (wanted.enable or wanted.mode != "off"):
-            pytest.skip("switches dc link or gates on: on a bench only with --allow-power")
+            pytest.skip("charges the dc link or enables switching: on a bench only with --allow-power")
         self.command = wanted
 
     def wait_for(self, state: str, seconds: float = 2.0) -> float:
@@ -271,7 +271,7 @@ class Rig:
         return self.now_s - start_s
 
     def start(self, torque_Nm: float = 0.0) -> None:
-        """From standby to run, with a torque request that comes after the gates have closed."""
+        """From standby to run, with a torque request that comes after switching has been enabled."""
         self.ask(mode="torque", enable=False, torque_Nm=0.0)
         self.wait_for("ready")
         self.ask(enable=True)
@@ -306,4 +306,4 @@ class Rig:
     def power_cycle(self, seed: int = 1) -> None:
         """ECU and plant from the start; the commands stop being what they were."""
         self.stand.reset(seed)
-        self.forget()
+        self.clear_history()

@@ -59,8 +59,8 @@ def test_on_a_bench_nothing_is_switched_on_unless_that_was_allowed(program: Path
     one = f"{HERE}/test_states.py::test_enable_with_a_torque_request_is_refused"
     with VirtualEcu(program) as ecu:
         bench = over(ecu, f"--bench={HOST}:{ecu.bench_port}", f"--report={tmp_path}")
-        careful, allowed = suite(one, *bench), suite(one, *bench, "--allow-power")
-    assert "only with --allow-power" in careful.stdout and "1 skipped" in careful.stdout
+        without_power, allowed = suite(one, *bench), suite(one, *bench, "--allow-power")
+    assert "only with --allow-power" in without_power.stdout and "1 skipped" in without_power.stdout
     assert "1 passed" in allowed.stdout, "also for a client that comes when the ECU has been running for a while"
 
 

@@ -127,7 +127,7 @@ def test_a_run_that_waits_for_a_client_that_left_is_given_up(ecu: VirtualEcu, st
         stand.answer()
 
 
-def test_more_clients_than_it_has_room_for_are_turned_away_and_the_rest_served(ecu: VirtualEcu, stand: Channel) -> None:
+def test_more_clients_than_it_can_serve_are_refused_and_the_rest_served(ecu: VirtualEcu, stand: Channel) -> None:
     guests = [greeted(ecu.can_port) for _ in range(16)]
     with raw(ecu.can_port) as late:
         assert late.recv(16) == b""
@@ -218,7 +218,7 @@ def frames(connection: socket.socket, already: bytes = b"") -> Iterator[tuple[in
 
 
 def test_in_real_time_time_passes_by_itself_and_frames_keep_their_simulated_period(program: Path) -> None:
-    """Without a look at the clock. Read by hand: python-can takes a greeting with a frame glued to it for a broken one,
+    """Without reading the clock. Read by hand: python-can takes a greeting with a frame glued to it for a broken one,
     and how much time passes until it has read the greeting is this computer's business."""
     times: list[float] = []
     with VirtualEcu(program, fast=False) as ecu, raw(ecu.can_port) as connection:

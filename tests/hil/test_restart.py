@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The virtual ECU's flash in a file: what was learnt is there after the process has ended."""
+"""The virtual ECU's flash in a file: what was identified is there after the process has ended."""
 
 import subprocess
 from collections.abc import Callable
@@ -19,7 +19,7 @@ LEARNT = ("psi_f_Vs", "lq_scale", "ld_scale")
 pytestmark = pytest.mark.program
 
 
-def test_a_second_process_starts_with_what_the_first_has_learnt(
+def test_a_second_process_starts_with_what_the_first_has_identified(
     make_vecu: Callable[..., VirtualEcu], database: cantools.database.Database, tmp_path: Path
 ) -> None:
     flash = tmp_path / "flash.bin"
@@ -41,7 +41,7 @@ def test_a_second_process_starts_with_what_the_first_has_learnt(
         stand = Channel(HOST, ecu.bench_port)
         assert stand.get("memory_recalled") == [1.0]
         stand.run(5.0)
-        # The flux is told after the first millisecond; nothing is learnt with open gates, but the leak goes on.
+        # The flux is transmitted after the first millisecond. With switching disabled only the leak acts.
         assert stand.get(*LEARNT) == pytest.approx(before, rel=2e-3)
         assert before[0] < 0.94 * 0.0717
         stand.close()

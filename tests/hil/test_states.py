@@ -81,7 +81,7 @@ def test_the_commissioning_mode_is_locked_on_the_bus(rig: Rig) -> None:
     assert (rig.state, refusal(rig)) == ("standby", "mode_locked")
 
 
-def test_disable_under_torque_ramps_to_zero_and_then_opens_the_gates(rig: Rig) -> None:
+def test_disable_under_torque_ramps_to_zero_and_then_disables_switching(rig: Rig) -> None:
     rig.start(50.0)
     rig.advance(0.3)
     assert rig.signal("INV_Status", "TorqueCommanded") == pytest.approx(50.0, abs=0.1)

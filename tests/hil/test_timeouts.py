@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What happens when nobody commands any more."""
+"""Behaviour after the loss of commands."""
 
 import numpy as np
 import pytest

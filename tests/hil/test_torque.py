@@ -71,7 +71,7 @@ def test_after_a_drive_shaft_torque_is_the_torque_asked_for_with_everything_wron
 def test_from_a_cold_start_torque_is_close_at_the_first_requests_and_true_when_they_come_back(
     rig: Rig, figures: Figures
 ) -> None:
-    """The same machine, nothing learnt: the tables alone would be wrong by 5 to 10 % (as the demonstration shows)."""
+    """The same machine without identification: the tables alone are wrong by 5 to 10 %, as the demonstration shows."""
     rig.stand.set(**WRONG)
     rig.turn(2000.0)
     rig.start()

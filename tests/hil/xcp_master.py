@@ -61,11 +61,11 @@ class Master:
             for k, frame in enumerate(frames):
                 if frame.data[0] in (POSITIVE, NEGATIVE):
                     self._taken += k + 1
-                    return self._judge(frame.data)
+                    return self._check_answer(frame.data)
         raise AssertionError(f"no answer to command {data[0]:#04x} in {ANSWER_MS} ms")
 
     @staticmethod
-    def _judge(data: bytes) -> bytes:
+    def _check_answer(data: bytes) -> bytes:
         if data[0] == NEGATIVE:
             raise XcpError(data[1])
         return data[1:]
@@ -128,15 +128,15 @@ class Master:
 
     def _lay_out(self, names: Sequence[str]) -> list[list[Value]]:
         frames: list[list[Value]] = [[]]
-        room = PAYLOAD - STAMP
+        free = PAYLOAD - STAMP
         for name in names:
             value = self.measurements[name]
             size = struct.calcsize(FORMATS[value.type])
-            if size > room:
+            if size > free:
                 frames.append([])
-                room = PAYLOAD
+                free = PAYLOAD
             frames[-1].append(value)
-            room -= size
+            free -= size
         return frames
 
     def _unpack(self, frames: list[list[Value]], received: Sequence[Frame]) -> Sampled:

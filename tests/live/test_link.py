@@ -80,7 +80,7 @@ def driving(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Drive]:
 
 
 def test_a_gap_in_the_commands_takes_the_wish_back_and_one_press_on_enable_goes_on(driving: Drive) -> None:
-    driving.channel.run(60.0)  # time passes, and nobody sends a command
+    driving.channel.run(60.0)  # time passes without a command
     driving.until(lambda: driving.samples.state() == "ready")
     driving.pass_batch()
     assert (driving.commander.wish, driving.commander.target_Nm) == (Wish.READY, 0.0)

@@ -158,7 +158,7 @@ def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_goe
 def test_after_a_gap_in_the_commands_the_page_says_why_and_one_press_on_enable_goes_on(page: Page) -> None:
     page.drive(60.0)
     assert page.server.stand is not None
-    page.server.stand.run(60.0)  # time passes, and nobody sends a command
+    page.server.stand.run(60.0)  # time passes without a command
     page.until(lambda: page.text("stopped") != "", "the reason")
     assert "command timed out" in page.text("stopped") and "No command for 70 ms" in page.text("stopped")
     page.until(lambda: page.text("state") == "ready", "ready")
@@ -168,7 +168,7 @@ def test_after_a_gap_in_the_commands_the_page_says_why_and_one_press_on_enable_g
     page.drive(20.0)
 
 
-def test_a_second_page_looks_but_does_not_touch(page: Page) -> None:
+def test_a_second_page_shows_values_but_cannot_command(page: Page) -> None:
     first = page.browser.current_window_handle
     page.slide("torque", 20.0)
     page.browser.switch_to.new_window("tab")
@@ -214,7 +214,7 @@ def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: 
     wait(lambda: played.newest("INV_Status", "TorqueEstimated") > 20.0, "the drive")
     assert not played.find("enable").is_enabled()
     played.run("send({type: 'drive'})")
-    wait(lambda: "obeys nobody" in played.text("message"), "a refusal")
+    wait(lambda: "takes no commands" in played.text("message"), "a refusal")
 
 
 def _status(url: str, **headers: str) -> int:

@@ -342,7 +342,7 @@ def test_in_step_time_waits_until_each_page_has_drawn_and_for_a_page_to_draw(tmp
         await second.send_json({"type": "drawn", "batch": 0, "visible": False})
         assert (await batch(first), await batch(second)) == (1, 1)
         assert len(turns) == 1
-        await second.close()  # nobody waits for a page that has gone
+        await second.close()  # nothing waits for a closed page
         await first.send_json({"type": "drawn", "batch": 1, "visible": True})
         await passing
         assert len(turns) == 2

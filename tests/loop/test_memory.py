@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was learnt survives a power cycle; torque is the plant's."""
+"""What was identified survives a power cycle; torque is the plant's."""
 
 import math
 
@@ -31,7 +31,7 @@ def to(loop: Loop, before: tuple[float, float], after: tuple[float, float], seco
 
 
 def error_after_enabling(motor: Motor, memory: bytes | None) -> float:
-    """Percent, 0.1 s after the gates closed at speed and 50 ms after the torque was there."""
+    """Percent, 0.1 s after switching was enabled at speed and 50 ms after the torque was there."""
     with power_on(motor, memory) as loop:
         assert loop.get("memory_recalled") == float(memory is not None)
         to(loop, (0.0, 0.0), (SPEED_RPM, 0.0), 0.5)

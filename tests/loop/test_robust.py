@@ -63,7 +63,7 @@ def driven(request: pytest.FixtureRequest, hsm1: Motor) -> Iterator[Drive]:
 
 
 def test_after_a_drive_torque_is_right_at_every_speed_in_every_quadrant(driven: Drive) -> None:
-    # The campaign judges the distribution; here no point may miss its 99th percentile. Where the voltage limit makes
+    # The campaign evaluates the distribution; here no point may miss its 99th percentile. Where the voltage limit makes
     # the torque it is the estimate that must be right.
     for rpm, torque, most in ((150, 40, 2.5), (400, -30, 2.5), (800, 100, 2.5), (1500, -60, 2.5), (3000, 15, 2.5),
                               (4500, -70, 2.5), (6000, 40, 3.0), (8000, -25, 3.0), (-2500, 60, 2.5)):  # fmt: skip
@@ -143,9 +143,9 @@ def test_even_a_first_start_at_one_point_is_no_worse_than_the_tables_from_1500_r
             drive.to(rpm, 20, 1.0)
             drive.to(rpm, 20, 20.0 * on + 0.5)
             errors.append(100.0 * (drive.to(rpm, 20, 0.5)[:, TORQUE].mean() / 20.0 - 1.0))
-    tables, learnt = errors
-    print(f"{tables:+.1f} % tables, {learnt:+.1f} % learnt")
-    assert abs(learnt) <= abs(tables) + 0.5
+    tables, identified = errors
+    print(f"{tables:+.1f} % tables, {identified:+.1f} % identified")
+    assert abs(identified) <= abs(tables) + 0.5
 
 
 def test_a_resolver_that_slips_takes_the_confidence_away(driven: Drive) -> None:

@@ -173,7 +173,7 @@ def test_unknown_channels_are_named(hsm1: Motor) -> None:
         sim.record(["truth.time_s", "truth.nothing"])
 
 
-def test_an_open_sensor_trips_the_gates(hsm1: Motor) -> None:
+def test_an_open_sensor_disables_switching(hsm1: Motor) -> None:
     with loop(hsm1, speed_rad_s=100.0) as sim:
         sim.set("enable", 1.0)
         sim.set("torque_requested_Nm", 50.0)

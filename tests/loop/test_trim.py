@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dead-time compensation follows what is learnt while driving; the truth is the plant's inverter and torque."""
+"""The dead-time compensation follows what is identified while driving; the truth is the plant's inverter and torque."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def test_a_minutes_drive_leaves_a_quarter_and_torque_is_no_worse(
     print(f"{before_V:+.2f} V, {after_V:+.2f} V left; rms and largest error {rms[0]:.2f}, {without.max():.2f} % fixed, "
           f"{rms[1]:.2f}, {with_.max():.2f} % trimmed, most worse {worse:+.2f} %")  # fmt: skip
     assert abs(after_V) <= 0.25 * abs(before_V)
-    # The margin of "do no harm"; and on the whole as good, but for what two different drives' learning scatters.
+    # The margin of "do no harm"; and on the whole as good, but for the scatter of two different drives' identification.
     assert worse <= 0.5
     assert rms[1] <= rms[0] + 0.1
 

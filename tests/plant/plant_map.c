@@ -132,7 +132,7 @@ static int all_finite(const double *x, int n)
     return 1;
 }
 
-/* The given nodes, with room for those beyond the edge on either side. */
+/* The given nodes, with space for those beyond the edge on either side. */
 static int axis_copy(map_axis_t *axis, const double *x, int n)
 {
     axis->n = n + 2 * MAP_BEYOND;

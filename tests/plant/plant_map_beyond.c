@@ -52,15 +52,15 @@ typedef struct {
 
 static far_t far_of(const edge_t *e)
 {
-    double sum = 0.0, most = 0.0, low = INFINITY, high = -INFINITY;
+    double sum = 0.0, max = 0.0, low = INFINITY, high = -INFINITY;
     for (int j = 0; j < e->count; j++) {
         const double *v = e->n[j * e->along].v;
         sum += v[e->by_n];
-        most = fmax(most, v[e->by_n]);
+        max = fmax(max, v[e->by_n]);
         low = fmin(low, v[MAP_F]);
         high = fmax(high, v[MAP_F]);
     }
-    return (far_t){fmax(sum / e->count, 0.5 * most), 0.5 * (low + high)};
+    return (far_t){fmax(sum / e->count, 0.5 * max), 0.5 * (low + high)};
 }
 
 static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, shape_t k, int out_by)

@@ -15,7 +15,7 @@ typedef struct {
 typedef struct {
     double *node; /* n strictly increasing currents: MAP_BEYOND, those given, MAP_BEYOND */
     int n;
-    double first, last, per_step; /* of those given; (count - 1)/span: where to look first */
+    double first, last, per_step; /* of those given; (count - 1)/span: where the search begins */
 } map_axis_t;
 
 struct plant_map {

@@ -37,7 +37,7 @@ def make(library: ctypes.CDLL) -> Iterator[Callable[[], Drive]]:
 
 
 def running(drive: Drive) -> Drive:
-    """Gates on, at standstill, no torque asked for."""
+    """Switching enabled, at standstill, no torque requested."""
     assert drive.set("enable", 1.0) == OK
     for _ in range(50):
         out = drive.step(IDLE)
@@ -78,6 +78,15 @@ def test_a_name_of_version_0_1_still_works_and_is_not_listed(
     assert drive.set(old, 5.0) == drive.set(present, 5.0)
     assert drive.get(old) == drive.get(present)
     assert old not in names(library) and present in names(library)
+
+
+def test_the_former_name_of_the_mismatch_share_still_reads_it_and_is_not_listed(
+    library: ctypes.CDLL, make: Callable[[], Drive]
+) -> None:
+    drive = make()
+    assert drive.get("contradiction") == drive.get("mismatch_share") == 0.0
+    assert drive.set("contradiction", 0.0) == drive.set("mismatch_share", 0.0) == READ_ONLY
+    assert "contradiction" not in names(library) and "mismatch_share" in names(library)
 
 
 def test_the_torque_passes_its_stations_in_order(make: Callable[[], Drive]) -> None:

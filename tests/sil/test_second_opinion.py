@@ -29,7 +29,7 @@ SIMPSON = np.array([1, 4, 2, 4, 1]) / 12.0
 FULL_SCALE_A = 400.0
 
 Point = tuple[float, float, float]
-# time, speed, torque: two seconds of learning.
+# time, speed, torque: two seconds of identification.
 LEARN: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 100), (1.1, 3200, 50),
                       (1.5, 3200, -80), (1.9, 1500, 30)]  # fmt: skip
 LEARNT_S = 2.2
@@ -72,9 +72,9 @@ def draw(rng: np.random.Generator, k: int) -> Spread:
 def windows(rng: np.random.Generator) -> list[Point]:
     """Stratified in speed, up the even and down the odd strata; the sign of the torque alternates."""
     points = []
-    for (low, high), (least, most), count in ((LOW_RPM, LOW_NM, LOW_WINDOWS), (HIGH_RPM, HIGH_NM, HIGH_WINDOWS)):
+    for (low, high), (lowest, highest), count in ((LOW_RPM, LOW_NM, LOW_WINDOWS), (HIGH_RPM, HIGH_NM, HIGH_WINDOWS)):
         edges = np.geomspace(low, high, count + 1)
-        points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(least), np.log(most)))))
+        points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(lowest), np.log(highest)))))
                    for a, b in pairwise(edges)]  # fmt: skip
     tour = points[::2] + points[1::2][::-1]
     return [(LEARNT_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
@@ -132,7 +132,7 @@ def errors(plant: Plant, motor: str, rated_Nm: float, spread: Spread, settings: 
     return found
 
 
-def judge(plant: Plant, motor: str, rated_Nm: float) -> None:
+def assert_accurate(plant: Plant, motor: str, rated_Nm: float) -> None:
     """The campaign's bounds over all plants' windows; the tables are asked where only they can tell harm."""
     speeds, found, harmless = [], [], 0
     for k in range(PLANTS):
@@ -240,8 +240,8 @@ def gym(firmware: Firmware) -> tuple[Any, Any]:
 
 
 def test_the_campaigns_bounds_hold_on_motulators_saturating_machine() -> None:
-    judge(motulator, "lossless", 180.0)
+    assert_accurate(motulator, "lossless", 180.0)
 
 
 def test_the_campaigns_bounds_hold_on_gym_electric_motors_machine() -> None:
-    judge(gym, "gem", 140.0)
+    assert_accurate(gym, "gem", 140.0)

@@ -17,7 +17,7 @@ from typing import Final
 import can
 
 HANG_S: Final = 3600.0
-PAUSE_S: Final = 0.02  # between two looks
+PAUSE_S: Final = 0.02  # between two checks
 
 
 def until(true: Callable[[], bool], progress: Callable[[], float], most: float, what: str) -> None:
@@ -25,7 +25,7 @@ def until(true: Callable[[], bool], progress: Callable[[], float], most: float, 
     begin = progress()
     while not true():
         gone = progress() - begin
-        # Looked at again: this process may have been paused between the two looks.
+        # Checked again: this process may have been paused between the two checks.
         assert gone <= most or true(), f"waited for: {what}; {gone:g} later it was still not so"
         time.sleep(PAUSE_S)
 

@@ -280,7 +280,7 @@ def test_something_new_at_the_top_level_is_found(tree: Path) -> None:
     assert messages.startswith("src:1: does not belong at the top level")
 
 
-def test_the_build_folder_is_not_looked_at(tree: Path) -> None:
+def test_the_build_folder_is_not_checked(tree: Path) -> None:
     (tree / "build/host").mkdir(parents=True)
     (tree / "build/host/bad.c").write_text("/* TODO */\n")
     assert check("style", tree) == (0, "")

@@ -115,11 +115,11 @@ def test_a_definition_on_the_page_of_another_prefix_is_found(tree: Path) -> None
 
 
 @pytest.mark.parametrize("text", ["FT-ABC", "a UTF-8 text", "ISO-9001", "XMR-7", "AT-"])
-def test_what_only_looks_like_a_number_is_left_alone(tree: Path, text: str) -> None:
+def test_what_only_resembles_a_number_is_left_alone(tree: Path, text: str) -> None:
     write(tree, "docs/howto/x.md", text + "\n")
     assert check(tree) == (0, [])
 
 
-def test_the_build_folder_is_not_looked_at(tree: Path) -> None:
+def test_the_build_folder_is_not_checked(tree: Path) -> None:
     write(tree, "build/generated.c", "/* (MR-99) */\n")
     assert check(tree) == (0, [])

@@ -73,7 +73,7 @@ def test_imports_are_sorted_by_the_repair(tree: Path) -> None:
     assert path.read_text(encoding="utf-8").startswith("import os\nimport sys\n")
 
 
-def test_many_files_are_all_looked_at(tree: Path) -> None:
+def test_many_files_are_all_checked(tree: Path) -> None:
     for number in range(130):
         write(tree, f"tests/many/f{number:03}.c", GOOD_C if number % 10 else GOOD_C + "int  x;\n")
     code, messages = run(tree)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of Python finds planted errors, and is not silent when it could not look."""
+"""The checker of Python finds planted errors, and reports when it could not run."""
 
 import shutil
 import subprocess

@@ -101,4 +101,4 @@ def test_a_library_that_needs_more_than_the_port_is_found(tmp_path: Path) -> Non
     done = subprocess.run([sys.executable, str(CHECK), "--target", str(tmp_path)],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 1
-    assert done.stderr == "libfluxtrue.a/bad.c:0: nobody defines 'other'\n"
+    assert done.stderr == "libfluxtrue.a/bad.c:0: no definition of 'other'\n"

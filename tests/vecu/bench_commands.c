@@ -23,13 +23,13 @@ static bool number(const char *word, double *value)
     return end != word && *end == '\0' && isfinite(*value);
 }
 
-static bool whole(const char *word, uint64_t most, uint64_t *value)
+static bool whole(const char *word, uint64_t max, uint64_t *value)
 {
     char *end;
     errno = 0;
     const unsigned long long read = strtoull(word, &end, 10);
     *value = read;
-    return word[0] >= '0' && word[0] <= '9' && *end == '\0' && errno == 0 && read <= most;
+    return word[0] >= '0' && word[0] <= '9' && *end == '\0' && errno == 0 && read <= max;
 }
 
 /* A time in ns, rounded to whole periods. */

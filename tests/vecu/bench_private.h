@@ -23,7 +23,7 @@ struct bench {
     int runner; /* the client that has asked; -1: no run */
     bool begun;
     uint64_t periods;
-    uint16_t peer; /* 0: waits for nobody */
+    uint16_t peer; /* 0: does not wait */
     uint64_t wanted;
     bench_ramp_t ramp[RAMPS_MAX];
     int ramps;

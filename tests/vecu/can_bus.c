@@ -41,10 +41,10 @@ bool can_bus_post(can_bus_t *bus, int node, const can_frame_t *frame, uint64_t n
 
 static void window_close(can_bus_t *bus)
 {
-    const double most = (double)bus->bit_rate * (double)CAN_BUS_WINDOW_NS / (double)NS_PER_S;
+    const double max = (double)bus->bit_rate * (double)CAN_BUS_WINDOW_NS / (double)NS_PER_S;
     can_bus_counts_t *c = &bus->counts;
-    const double own = (double)bus->window_own_bits / most;
-    c->load = (double)bus->window_bits / most;
+    const double own = (double)bus->window_own_bits / max;
+    c->load = (double)bus->window_bits / max;
     c->load_peak = c->load > c->load_peak ? c->load : c->load_peak;
     c->own_load_peak = own > c->own_load_peak ? own : c->own_load_peak;
     c->windows++;
@@ -65,7 +65,7 @@ static void account(can_bus_t *bus, uint64_t until_ns, uint32_t bits)
     bus->counts.frames += bits > 0U ? 1U : 0U;
 }
 
-/* The wire is idle from free_ns on: who may begin, and when? -1: nobody before `until`. */
+/* The wire is idle from free_ns on: who may begin, and when? -1: none before `until`. */
 static int arbitrate(const can_bus_t *bus, uint64_t until_ns, uint64_t *start_ns)
 {
     uint64_t first_ns = until_ns;

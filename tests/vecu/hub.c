@@ -160,7 +160,7 @@ void hub_run(hub_t *hub, uint64_t now_ns)
     }
 }
 
-bool hub_has_room(const hub_t *hub)
+bool hub_can_queue(const hub_t *hub)
 {
     return hub->bus.node[CAN_BUS_ECU].count < (uint32_t)CAN_BUS_MAILBOXES;
 }
@@ -183,7 +183,7 @@ bool hub_receive(hub_t *hub, can_frame_t *frame)
     return true;
 }
 
-void hub_forget_ecu(hub_t *hub)
+void hub_detach_ecu(hub_t *hub)
 {
     can_bus_silence_ecu(&hub->bus);
     hub->count = 0;

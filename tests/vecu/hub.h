@@ -39,12 +39,12 @@ void hub_poll(hub_t *hub, uint64_t now_ns, int timeout_ms);
 void hub_run(hub_t *hub, uint64_t now_ns);
 
 /** Whether hub_send() would take a frame. */
-bool hub_has_room(const hub_t *hub);
+bool hub_can_queue(const hub_t *hub);
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns);
 bool hub_receive(hub_t *hub, can_frame_t *frame);
 
 /** The ECU is switched off: nothing of its own is on the bus any more, and it has heard nothing. */
-void hub_forget_ecu(hub_t *hub);
+void hub_detach_ecu(hub_t *hub);
 
 /** What passed between us and the client whose side of the connection has this port: frames it sent, good or bad, and
  * frames sent to it. False: no such client. A client that knows its own port has read the greetings: frames flow at

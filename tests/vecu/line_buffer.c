@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-size_t line_buffer_room(line_buffer_t *b)
+size_t line_buffer_free(line_buffer_t *b)
 {
     memmove(b->bytes, b->bytes + b->begin, b->end - b->begin);
     b->end -= b->begin;

@@ -5,7 +5,7 @@
  * Range    texts of up to LINE_LENGTH characters
  * Errors   a text that is too long, has a NUL in it, or is interrupted by another '<', and whatever stands between
  *          '>' and '<' but white space, is dropped and counted
- * Context  simulation only; pure: the caller reads line_buffer_room() bytes at most into bytes[end] and advances end */
+ * Context  simulation only; pure: the caller reads line_buffer_free() bytes at most into bytes[end] and advances end */
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -23,7 +23,7 @@ typedef struct {
 } line_buffer_t;
 
 /** Moves what is left to the front; bytes that fit behind it. */
-size_t line_buffer_room(line_buffer_t *b);
+size_t line_buffer_free(line_buffer_t *b);
 /** The next text, without its frame, NUL-terminated; false: none is complete. */
 bool line_buffer_next(line_buffer_t *b, char text[LINE_LENGTH + 1]);
 bool line_buffer_empty(const line_buffer_t *b);

@@ -21,8 +21,8 @@ void line_client_close(line_client_t *c)
 
 void line_client_read(line_client_t *c)
 {
-    for (size_t room = line_buffer_room(&c->in); room > 0U; room = line_buffer_room(&c->in)) {
-        const ssize_t got = recv(c->fd, c->in.bytes + c->in.end, room, 0);
+    for (size_t free_bytes = line_buffer_free(&c->in); free_bytes > 0U; free_bytes = line_buffer_free(&c->in)) {
+        const ssize_t got = recv(c->fd, c->in.bytes + c->in.end, free_bytes, 0);
         if (got > 0) {
             c->in.end += (size_t)got;
         } else if (got == 0 || (errno != EINTR && errno != EAGAIN && errno != EWOULDBLOCK)) {
@@ -44,7 +44,7 @@ void line_client_write(line_client_t *c)
             return;
         } else if (errno != EINTR) {
             c->ended = true;
-            break; /* nobody will read the rest */
+            break; /* the client does not read the rest */
         }
     }
     c->out_begin = c->out_end = 0;
@@ -52,11 +52,11 @@ void line_client_write(line_client_t *c)
 
 short line_client_wants(const line_client_t *c)
 {
-    const bool room = !c->ended && c->in.end - c->in.begin < LINE_BUFFER_SIZE;
-    return (short)((room ? POLLIN : 0) | (c->out_end > c->out_begin ? POLLOUT : 0));
+    const bool has_space = !c->ended && c->in.end - c->in.begin < LINE_BUFFER_SIZE;
+    return (short)((has_space ? POLLIN : 0) | (c->out_end > c->out_begin ? POLLOUT : 0));
 }
 
-static bool make_room(line_client_t *c, size_t length)
+static bool reserve_output(line_client_t *c, size_t length)
 {
     if (c->out_end + length <= c->out_size) {
         return true;
@@ -81,7 +81,7 @@ void line_client_send(line_client_t *c, const char *text, size_t length)
         c->out_end -= c->out_begin;
         c->out_begin = 0;
     }
-    if (!make_room(c, length)) {
+    if (!reserve_output(c, length)) {
         c->ended = true;
         return;
     }

@@ -24,7 +24,7 @@ struct line_server {
     line_framing_t framing;
     line_counts_t counts;
     line_client_t client[LINE_CLIENTS];
-    int turn; /* whose texts come next: no client can starve the others */
+    int next_client; /* whose texts come next, so that no client delays the others */
 };
 
 static bool set_nonblocking(int fd)
@@ -197,11 +197,11 @@ static line_event_t client_next(line_server_t *server, line_client_t *c, char *t
 line_event_t line_server_next(line_server_t *server, int *client, char text[LINE_LENGTH + 1])
 {
     for (int i = 0; i < LINE_CLIENTS; i++) {
-        const int which = (server->turn + i) % LINE_CLIENTS;
+        const int which = (server->next_client + i) % LINE_CLIENTS;
         const line_event_t event = client_next(server, &server->client[which], text);
         if (event != LINE_NONE) {
             *client = which;
-            server->turn = which + 1;
+            server->next_client = which + 1;
             return event;
         }
     }
@@ -215,13 +215,13 @@ void line_server_send(line_server_t *server, int client, const char *text, size_
 
 size_t line_server_backlog(const line_server_t *server)
 {
-    size_t most = 0;
+    size_t longest = 0;
     for (int i = 0; i < LINE_CLIENTS; i++) {
         const line_client_t *c = &server->client[i];
         const size_t waits = c->fd >= 0 ? c->out_end - c->out_begin : 0U;
-        most = waits > most ? waits : most;
+        longest = waits > longest ? waits : longest;
     }
-    return most;
+    return longest;
 }
 
 void line_server_drop_slow(line_server_t *server, size_t bytes)

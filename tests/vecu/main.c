@@ -43,14 +43,14 @@ static int64_t wall_ns(void)
     return (int64_t)now.tv_sec * 1000000000LL + now.tv_nsec;
 }
 
-static bool parse_number(const char *option, const char *text, uint64_t least, uint64_t most, uint64_t *value)
+static bool parse_number(const char *option, const char *text, uint64_t min, uint64_t max, uint64_t *value)
 {
     char *end = NULL;
     errno = 0;
     const unsigned long long read = text != NULL && text[0] >= '0' && text[0] <= '9' ? strtoull(text, &end, 10) : 0ULL;
-    if (end == NULL || *end != '\0' || errno != 0 || read < least || read > most) {
+    if (end == NULL || *end != '\0' || errno != 0 || read < min || read > max) {
         (void)fprintf(stderr, "error: %s %s: allowed: %llu ... %llu\n", option, text != NULL ? text : "(nothing)",
-                      (unsigned long long)least, (unsigned long long)most);
+                      (unsigned long long)min, (unsigned long long)max);
         return false;
     }
     *value = read;

@@ -36,7 +36,7 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
 {
     sim_destroy(vecu->sim);
     if (vecu->hub != NULL) {
-        hub_forget_ecu(vecu->hub);
+        hub_detach_ecu(vecu->hub);
     }
     fluxtrue_init(&ecu);
     if (vecu->nvm_path != NULL && !nvm_file_load(vecu->nvm_path, &ecu.nvm)) {
@@ -91,7 +91,7 @@ static void exchange_in(vecu_t *vecu)
 static void exchange_out(vecu_t *vecu)
 {
     can_frame_t frame;
-    while (hub_has_room(vecu->hub) && can_host_take(&ecu, &frame)) {
+    while (hub_can_queue(vecu->hub) && can_host_take(&ecu, &frame)) {
         (void)hub_send(vecu->hub, &frame, vecu->now_ns);
     }
 }

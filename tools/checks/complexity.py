@@ -52,11 +52,11 @@ def check(root: Path) -> Iterator[Violation]:
                 yield Violation(path, function.start_line,
                                 f"{function.name}: {function.length} lines, at most {limit.lines}")  # fmt: skip
             is_validator = function.name.endswith(VALIDATOR)
-            most = VALIDATOR_COMPLEXITY if is_validator else limit.complexity
-            if function.cyclomatic_complexity > most:
+            limit_here = VALIDATOR_COMPLEXITY if is_validator else limit.complexity
+            if function.cyclomatic_complexity > limit_here:
                 yield Violation(path, function.start_line,
                                 f"{function.name}: complexity {function.cyclomatic_complexity}, "
-                                f"at most {most}")  # fmt: skip
+                                f"at most {limit_here}")  # fmt: skip
 
 
 if __name__ == "__main__":

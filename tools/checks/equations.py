@@ -106,7 +106,7 @@ def is_page(path: Path) -> bool:
 
 
 def unknown_in(line: str) -> Iterator[str]:
-    """Tags that nobody would look at: no page owns their prefix, or they are no number at all."""
+    """Tags that no check covers: no page owns their prefix, or they are no number at all."""
     for match in TAG.finditer(line):
         if not re.fullmatch(NUMBER, match.group(1)):
             yield match.group(1)

@@ -2,7 +2,7 @@
 """What the compiled layers contain: no mutable state; on the target no float and no division.
 
 Two drives can run in one process only if no layer below drive/ owns a variable; a float or a
-division in an interrupt is a cost nobody decided on. The compiler's output shows both exactly.
+division in an interrupt is an unintended cost. The compiler's output shows both exactly.
 The library for the target must be complete, but for the port.
 """
 
@@ -126,7 +126,7 @@ def unresolved(archive: Path, prefix: str) -> Iterator[Violation]:
             defined.add(name)
     for name in sorted(needed.keys() - defined):
         if not FROM_OUTSIDE.match(name):
-            yield Violation(Path(archive.name, needed[name]), 0, f"nobody defines '{name}'")
+            yield Violation(Path(archive.name, needed[name]), 0, f"no definition of '{name}'")
 
 
 def check(build: Path, target: bool) -> Iterator[Violation]:

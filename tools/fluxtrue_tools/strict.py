@@ -40,7 +40,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def number(value: Any) -> Any:
-    """TOML tells 1 from 1.0; nobody who writes a speed of 1000 means anything by it."""
+    """TOML tells 1 from 1.0; which makes no difference in a scenario."""
     if not isinstance(value, int) or isinstance(value, bool):
         return value
     try:

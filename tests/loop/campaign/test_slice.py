@@ -47,9 +47,9 @@ def test_the_tables_alone_are_wrong_by_what_the_spread_makes_them(table: pd.Data
 
 def test_no_controller_beats_what_the_data_can_tell(out: Path) -> None:
     scores = json.loads((out / "summary.json").read_text())["controllers"]
-    learnt = [s for s in scores if s["bands"]["low"]["bound_rms"] is not None]
-    assert learnt
-    for score in learnt:
+    identified = [s for s in scores if s["bands"]["low"]["bound_rms"] is not None]
+    assert identified
+    for score in identified:
         for band in ("low", "high"):
             assert score["ratio"][band] > 1.0, score["controller"]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque, voltage and reach where the voltage is the limit, for magnets that nobody told the drive about."""
+"""Torque, voltage and reach where the voltage is the limit, for magnets that differ from the motor data."""
 
 import math
 
@@ -52,7 +52,7 @@ def test_beyond_its_reach_the_drive_makes_what_it_says_it_can(
 
 
 def test_the_voltage_keeps_its_reserve_although_the_plan_is_wrong(hsm1: Motor) -> None:
-    """Ten per cent of L_q, a strong magnet and a hot winding that nobody identified: the trim finds them."""
+    """Ten per cent of L_q, a strong magnet and a hot winding without identification: the trim compensates them."""
     wrong = {"lq_scale": 1.1, "magnet_scale": 1.05, "r_ohm_20": 0.028}
     trace = Rig(hsm1, 9000.0, 40.0, **wrong).set(identification=0.0, torque_loop=0.0).run(0.6)
     assert trace.faults == 0
@@ -129,7 +129,7 @@ def test_at_the_reach_a_sensor_a_degree_wrong_twice_per_turn_swings_no_current(h
     assert trace.torque[half:].std() <= 2.0
 
 
-def test_a_sensor_that_nobody_has_learnt_yet_does_not_trip_at_the_reach(hsm1: Motor) -> None:
+def test_a_sensor_without_identified_harmonics_does_not_trip_at_the_reach(hsm1: Motor) -> None:
     """Enabled at 8400 rpm and given two thirds of the reach at once: the q flux gives way until the sensor is known."""
     rig = Rig(hsm1, 8396.0, **AT_ITS_REACH).set(identification=0.0, torque_loop=0.0)
     rig.run(0.02)

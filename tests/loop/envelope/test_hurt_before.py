@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What hurt users of other drives, each as it happened to them."""
+"""Faults that users of other drives reported, each as it was reported."""
 
 import math
 
@@ -104,7 +104,7 @@ def test_a_fault_at_top_speed_does_not_brake_by_rectifying(hsm1: Motor, torque: 
     rig.run(0.2)
     trace = rig.set(plant_current_open_a=1.0).run(0.2)
     assert trace.faults & (OVER_CURRENT | CURRENT_SUM)
-    assert abs(trace.settled()) <= 5.0  # open gates: -53 N·m
+    assert abs(trace.settled()) <= 5.0  # switching disabled: -53 N·m
     assert abs(trace.settled("truth.idc_A")) <= 2.0
     assert trace["truth.i_d_A"].min() >= -560.0  # (SS-4)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque, power and temperature limits, judged by the plant's torque and its dc power."""
+"""Torque, power and temperature limits, measured by the plant's torque and its dc power."""
 
 import numpy as np
 import pytest

@@ -97,7 +97,7 @@ int sim_set(sim_t *sim, const char *name, double value)
         return SIM_OUT_OF_RANGE;
     }
     sim_plant_write(&trial, index, value);
-    /* Before the start the other fields may still be missing: sim_start() looks at all of them. */
+    /* Before the start the other fields may still be missing: sim_start() checks all of them. */
     if (sim->plant != NULL && plant_params_bad_field(&trial, sim->map != NULL) != NULL) {
         return SIM_OUT_OF_RANGE;
     }

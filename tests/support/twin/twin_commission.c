@@ -61,7 +61,7 @@ static double folded(twin_curve_t *curve, int k, double v, const double c[3], do
 }
 
 /* (CM-7) */
-static void calm(double *v)
+static void smooth(double *v)
 {
     double w[N];
     for (int k = 0; k < N; k++) {
@@ -83,7 +83,7 @@ twin_curve_t twin_commission(const double *i, const double *u, const double cosi
         const double per_volt = folded(&curve, k, 1.0, cosine, i[k]) - at_zero;
         curve.v[k] = (1.5 * (u[k] - curve.r * i[k]) - at_zero) / per_volt;
     }
-    calm(curve.v);
+    smooth(curve.v);
     curve.level = mean_upper(curve.v);
     return curve;
 }

@@ -11,7 +11,7 @@ static double integral(const motor_si_t *motor, double e, double cut)
 }
 
 /* What the unit circle leaves beside x, in the stage's 256 steps; never less than a quarter. */
-static double room(double x)
+static double remaining_voltage(double x)
 {
     const double end = (fmin(floor(fabs(x) * 256.0), 255.0) + 1.0) / 256.0;
     return fmax(sqrt(1.0 - end * end), 0.25);
@@ -22,15 +22,15 @@ static double room(double x)
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
-    const twin_dq_t most = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
+    const twin_dq_t limited = {twin_clamp(v.d, -1.0, 1.0), twin_clamp(v.q, -1.0, 1.0)};
     if (more_flux) {
-        const double left = fmax(room(most.q), 0.7);
-        return (twin_dq_t){u_max * twin_clamp(most.d, -left, left), u_max * most.q};
+        const double left = fmax(remaining_voltage(limited.q), 0.7);
+        return (twin_dq_t){u_max * twin_clamp(limited.d, -left, left), u_max * limited.q};
     }
-    const double left = room(most.d);
-    const double missing = twin_clamp(v.d - most.d, -1.0, 1.0);
+    const double left = remaining_voltage(limited.d);
+    const double missing = twin_clamp(v.d - limited.d, -1.0, 1.0);
     const double q = v.q + ((omega < 0.0) ? -missing : missing);
-    return (twin_dq_t){u_max * most.d, u_max * twin_clamp(q, -left, left)};
+    return (twin_dq_t){u_max * limited.d, u_max * twin_clamp(q, -left, left)};
 }
 
 twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref)
@@ -56,9 +56,9 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     const twin_dq_t u = circle((twin_dq_t){ud, uq}, motor->v_ratio * in->v_dc, e.d > 0.0, in->omega);
     const double rounding = 1e-9 * motor->v_base_V;
     state->limited = fabs(u.d - ud) > rounding || fabs(u.q - uq) > rounding;
-    const double most = 4.0 * motor->v_ratio * in->v_dc;
-    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -most, most));
-    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -most, most));
+    const double max = 4.0 * motor->v_ratio * in->v_dc;
+    state->s.d += integral(motor, e.d, twin_clamp(u.d - ud, -max, max));
+    state->s.q += integral(motor, e.q, twin_clamp(u.q - uq, -max, max));
     return u;
 }
 

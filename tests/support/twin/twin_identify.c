@@ -139,8 +139,8 @@ static void correct(const motor_si_t *motor, twin_identify_t *s, const twin_poin
         v[j] = s->kalman.x[j] * motor->identify_sigma[j];
     }
     const double magnet = v[FLUX] + v[LD] * m->slope;
-    const double psi_d = m->psi.d + magnet + v[ANGLE] * m->turn.d + v[IRON] * m->iron_psi.d + s->local.d;
-    const double psi_q = m->psi.q * (1.0 + v[LQ]) + v[ANGLE] * m->turn.q + v[IRON] * m->iron_psi.q + s->local.q;
+    const double psi_d = m->psi.d + magnet + v[ANGLE] * m->angle_flux.d + v[IRON] * m->iron_psi.d + s->local.d;
+    const double psi_q = m->psi.q * (1.0 + v[LQ]) + v[ANGLE] * m->angle_flux.q + v[IRON] * m->iron_psi.q + s->local.q;
     const twin_dq_t i = {point->i_m.d + v[IRON] * m->iron_i.d, point->i_m.q + v[IRON] * m->iron_i.q};
     const double sampled = psi_d * i.q - psi_q * i.d;
     const double chord = pow(point->omega * motor->period_s, 2.0) / 12.0;

@@ -34,7 +34,7 @@ typedef struct {
 twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, double omega_tracked);
 
 typedef struct {
-    twin_dq_t y, psi, turn, iron_psi, iron_i;
+    twin_dq_t y, psi, angle_flux, iron_psi, iron_i;
     double d[TWIN_STATES], q[TWIN_STATES], torque[TWIN_STATES]; /* per sigma; torque in Vs A */
     double slope, l_d, l_qq;
     bool current;

@@ -68,15 +68,20 @@ twin_model_t twin_model(const motor_si_t *motor, const twin_point_t *p, double r
     twin_model_t m = {.psi = {f.psi_d, f.psi_q}, .slope = f.psi_d - f.psi_f0, .l_d = f.l_d, .l_qq = f.l_qq};
     m.iron_i = (twin_dq_t){p->iron * f.psi_q, -p->iron * f.psi_d};
     m.iron_psi = (twin_dq_t){f.l_d * m.iron_i.d, f.l_qq * m.iron_i.q};
-    m.turn = (twin_dq_t){f.psi_q - f.l_d * p->i_m.q, f.l_qq * p->i_m.d - f.psi_d};
+    m.angle_flux = (twin_dq_t){f.psi_q - f.l_d * p->i_m.q, f.l_qq * p->i_m.d - f.psi_d};
     m.current = length >= motor->identify_i_min_A;
     m.y.d = p->u.d - r * p->i.d + w * f.psi_q - p->rate.d;
     m.y.q = p->u.q - r * p->i.q - w * f.psi_d - p->rate.q;
-    const double d[TWIN_STATES] = {p->i.d, p->i.d * n, 0.0, -w * f.psi_q, 0.0, -w * m.turn.q, -w * m.iron_psi.q};
-    const double q[TWIN_STATES] = {p->i.q, p->i.q * n, w, 0.0, w * m.slope, w * m.turn.d, w * m.iron_psi.d};
+    const double d[TWIN_STATES] = {p->i.d, p->i.d * n, 0.0, -w * f.psi_q, 0.0, -w * m.angle_flux.q, -w * m.iron_psi.q};
+    const double q[TWIN_STATES] = {p->i.q, p->i.q * n, w, 0.0, w * m.slope, w * m.angle_flux.d, w * m.iron_psi.d};
     const double iron = m.iron_psi.d * p->i_m.q - m.iron_psi.q * p->i_m.d + f.psi_d * m.iron_i.q - f.psi_q * m.iron_i.d;
-    const double t[TWIN_STATES] = {
-        0.0, 0.0, p->i_m.q, -f.psi_q * p->i_m.d, m.slope * p->i_m.q, m.turn.d * p->i_m.q - m.turn.q * p->i_m.d, iron};
+    const double t[TWIN_STATES] = {0.0,
+                                   0.0,
+                                   p->i_m.q,
+                                   -f.psi_q * p->i_m.d,
+                                   m.slope * p->i_m.q,
+                                   m.angle_flux.d * p->i_m.q - m.angle_flux.q * p->i_m.d,
+                                   iron};
     for (int j = 0; j < TWIN_STATES; j++) {
         m.d[j] = d[j];
         m.q[j] = q[j];

@@ -22,8 +22,8 @@ static double loss(const motor_si_t *m, twin_limit_state_t *state, const twin_li
     const double mechanical = in->torque_estimated * in->omega / m->pole_pairs;
     const double electrical = 1.5 * (in->u.d * in->i.d + in->u.q * in->i.q);
     const double now = electrical - mechanical + 1.5 * m->loss_drop_V * hypot(in->i.d, in->i.q);
-    const double most = 0.25 * 1.5 * m->v_base_V * m->i_base_A;
-    state->loss_W = twin_clamp(state->loss_W + m->loss_rate * (now - state->loss_W), 0.0, most);
+    const double loss_max_W = 0.25 * 1.5 * m->v_base_V * m->i_base_A;
+    state->loss_W = twin_clamp(state->loss_W + m->loss_rate * (now - state->loss_W), 0.0, loss_max_W);
     return state->loss_W;
 }
 

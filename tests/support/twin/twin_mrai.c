@@ -77,15 +77,15 @@ static double excitation(const twin_mrai_in_t *at)
     return weight_d * at->i.d * weight_d * at->i.d + at->i.q * at->i.q;
 }
 
-static void judge(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now, bool flux_open,
-                  bool r_open)
+static void update_quality(const motor_si_t *motor, twin_mrai_quality_t *q, const twin_mrai_state_t *now,
+                           bool adapt_flux, bool adapt_resistance)
 {
     const double psi_full = psi_full_drift(motor);
     const double r_full = 0.2 * motor->r_ohm_20 * motor->resistance_bandwidth_rad_s * motor->step_s;
-    q->psi_quality = quality(q->psi_quality, motor->quality_rate, flux_open && !now->psi_clamped,
+    q->psi_quality = quality(q->psi_quality, motor->quality_rate, adapt_flux && !now->psi_clamped,
                              now->psi_delta - q->psi_last, psi_full);
-    q->r_quality = quality(q->r_quality, motor->quality_rate, r_open && !now->r_clamped, now->r_delta - q->r_last,
-                           r_full);
+    q->r_quality = quality(q->r_quality, motor->quality_rate, adapt_resistance && !now->r_clamped,
+                           now->r_delta - q->r_last, r_full);
     q->psi_last = now->psi_delta;
     q->r_last = now->r_delta;
 }
@@ -96,16 +96,16 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
 {
     const double w = sample->omega;
     const double magnitude = hypot(sample->i.d, sample->i.q);
-    const bool flux_open = enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
+    const bool adapt_flux = enabled && (fabs(w) >= motor->omega_min_rad_s) && (magnitude >= motor->i_min_A);
     const double psi_drift = identifier->psi_delta - quality_state->psi_last;
     const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
-    const bool r_open = flux_open && settled && (fabs(w) <= motor->omega_r_max_rad_s);
+    const bool adapt_resistance = adapt_flux && settled && (fabs(w) <= motor->omega_r_max_rad_s);
     /* A current step is over before the next task: the gain must suit both of its ends. */
     const double norm = fmax(excitation(sample), excitation(next));
-    judge(motor, quality_state, identifier, flux_open, r_open);
+    update_quality(motor, quality_state, identifier, adapt_flux, adapt_resistance);
     return (twin_mrai_schedule_t){
-        .flux_gain = flux_open ? 2.0 * motor->flux_bandwidth_rad_s / w : 0.0,
-        .resistance_gain = r_open ? 2.0 * motor->resistance_bandwidth_rad_s / norm : 0.0,
+        .flux_gain = adapt_flux ? 2.0 * motor->flux_bandwidth_rad_s / w : 0.0,
+        .resistance_gain = adapt_resistance ? 2.0 * motor->resistance_bandwidth_rad_s / norm : 0.0,
         .voltage_scale = 1.0 / sinc(0.5 * w * motor->period_s),
     };
 }

@@ -44,7 +44,7 @@ struct twin {
     twin_torque_state_t torque_state;
     double torque_commanded;
     bool modulation_limited;
-    int periods_on; /* since the gates closed, saturates at 3 */
+    int periods_on; /* since switching was enabled, saturates at 3 */
     /* latest signals */
     twin_mrai_in_t sample; /* its u acts during the present period */
     twin_dq_t i_ref, u, acted;

@@ -23,7 +23,7 @@ double twin_torque_estimate(const motor_si_t *motor, twin_torque_estimate_t *sta
 double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, const twin_torque_in_t *in)
 {
     const double authority = motor->torque_authority * in->confidence;
-    const double room = authority * fabs(in->torque_commanded);
+    const double limit = authority * fabs(in->torque_commanded);
     const double direction = (in->torque_commanded > 0.0) - (in->torque_commanded < 0.0);
     /* The estimate is the mean of the time that has passed: it meets the model of before this step. */
     const double e = state->model - in->torque_estimated;
@@ -39,13 +39,13 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, con
         const double relative = e * direction / fmax(fabs(in->torque_commanded), motor->torque_min_Nm);
         const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
         /* In a limit the correction grows up to the command itself, not beyond. */
-        const double most = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
-        state->correction = fmin(moved, most);
+        const double max = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
+        state->correction = fmin(moved, max);
     }
     state->saturated = fabs(state->correction) >= authority;
     state->correction = twin_clamp(state->correction, -authority, authority);
     const double wanted = in->torque_commanded * state->correction + p;
-    return in->torque_commanded + twin_clamp(wanted, -room, room);
+    return in->torque_commanded + twin_clamp(wanted, -limit, limit);
 }
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in)

@@ -9,7 +9,7 @@ typedef struct {
     double base, trim;
 } twin_trim_t;
 
-/* A second of learning has passed; what is left of the drop. */
+/* After one second of identification; returns what is left of the drop. */
 double twin_trim(twin_trim_t *state, double drop, double v_dc);
 
 #endif

@@ -14,7 +14,7 @@ emu_pins_t *emu_pins(emu_t *emu)
     return &emu->s.pins;
 }
 
-const emu_pins_t *emu_pins_look(const emu_t *emu)
+const emu_pins_t *emu_pins_now(const emu_t *emu)
 {
     return &emu->s.pins;
 }

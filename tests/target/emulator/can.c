@@ -122,7 +122,7 @@ void can_frame_arrives(emu_t *emu, const can_port_frame_t *frame)
     const peripheral_t *self = can0();
     can_t *c = &emu->s.can;
     if (!running(emu) || (bus_get(emu, self, MCR) & RFEN) == 0) {
-        return; /* nobody listens */
+        return; /* no receiver */
     }
     if (c->fifo_count == EMU_CAN_FIFO) {
         bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | FIFO_OVERFLOW);

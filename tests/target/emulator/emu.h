@@ -55,7 +55,7 @@ EMU_API void emu_destroy(emu_t *emu);
 
 /** To be written now: the shaft turns on from this instant. */
 EMU_API emu_pins_t *emu_pins(emu_t *emu);
-EMU_API const emu_pins_t *emu_pins_look(const emu_t *emu);
+EMU_API const emu_pins_t *emu_pins_now(const emu_t *emu);
 /** Lines that do not belong to an instant. */
 EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);

@@ -69,7 +69,7 @@ typedef struct {
     bool fault_input;                            /* behind the filter */
     bool fault_latched, fault_seen, fault_holds; /* FAULTF; FMS was read while it was set; the outputs are off */
     uint64_t stopped_at;                         /* by a debugger, 0: not */
-    bool closed;                                 /* the bridge, when last looked at */
+    bool closed;                                 /* the bridge, at the last check */
     uint32_t quad_offset;
     uint32_t read[2]; /* the counter as the program has read it last, and before that */
 } ftm_t;
@@ -175,7 +175,7 @@ struct emu {
     void *on_exception_user;
     can_port_t *can_port;
     emu_counts_t counts[VECTORS];
-    profile_t *profile; /* NULL: nobody wants one */
+    profile_t *profile; /* NULL: not requested */
     char error[ERROR_SIZE];
     state_t s;
 };

@@ -7,7 +7,7 @@
  * documented behaviour                                 | modelled | test
  * ---------------------------------------------------- | -------- | --------------------------------------------
  * FLTPOL: which level of the pin is a fault            | yes      | test_the_level_of_fltpol_is_the_fault
- * FAULT0EN: the input is looked at                     | yes      | test_an_input_that_is_not_enabled_does_nothing
+ * FAULT0EN: the input is evaluated                     | yes      | test_an_input_that_is_not_enabled_does_nothing
  * FFLTR0EN, FFVAL, FLTPS: delay, pulses ignored        | yes      | test_the_filter_delays_and_ignores_pulses
  * FAULTM 0, 1, 2: no channels, even channels, all      | yes      | test_the_fault_mode_chooses_the_channels
  * FAULTEN of each pair                                 | yes      | test_only_pairs_with_faulten_are_switched_off

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_LAYOUT_H
 #define EMULATOR_LAYOUT_H
-/** Parts of drive_t that look the same on target and host (no pointers inside, short enumerations), for copying between
- * the image's memory and a drive_t on the host. Compiled twice: for the target to learn the offsets there.
+/** Parts of drive_t with the same layout on target and host (no pointers inside, short enumerations), for copying
+ * between the image's memory and a drive_t on the host. Compiled twice: for the target, to obtain its offsets.
  * Source   drive/drive.h
  * Context  emulator only */
 

@@ -139,7 +139,7 @@ void rdc_power_on(emu_t *emu)
     emu->s.rdc.fault = 0x48;
 }
 
-/* SAMPLE falls: position and faults are taken over; faults that have been read are forgotten, unless they last. */
+/* SAMPLE falls: position and faults are taken over; faults that have been read are cleared, unless they persist. */
 void rdc_sample(emu_t *emu)
 {
     rdc_t *rdc = &emu->s.rdc;

@@ -245,7 +245,7 @@ static bool explained(preempt_t *p, const drive_t *there)
     return false;
 }
 
-static void judge(preempt_t *p, preempt_report_t *report, int n)
+static void classify_outcome(preempt_t *p, preempt_report_t *report, int n)
 {
     const drive_t there = drive_there(p), plain = drive_plain(&there);
     report->points++;
@@ -300,7 +300,7 @@ static int try_all(preempt_t *p, preempt_report_t *report)
     report->instructions = length_of(p, start);
     for (int n = 0; n < report->instructions && n < POINTS_MAX; n++) {
         if (interrupted_after(p, start, (uint64_t)n)) {
-            judge(p, report, n);
+            classify_outcome(p, report, n);
         }
     }
     emu_snapshot_free(start);

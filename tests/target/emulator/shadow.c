@@ -31,7 +31,7 @@ static uint32_t angle_read(const emulated_t *e)
 
 static void samples_take(emulated_t *e)
 {
-    const emu_pins_t *pins = emu_pins_look(e->emu);
+    const emu_pins_t *pins = emu_pins_now(e->emu);
     e->shadow->counts =
         (adc_counts_t){.i_a = pins->adc[0][0], .i_b = pins->adc[1][0], .i_c = pins->adc[0][1], .v_dc = pins->adc[1][1]};
     e->shadow->theta_m = angle_read(e);
@@ -59,7 +59,7 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
 }
 
-/* The task looks at everything as it begins, far from the next interrupt, and so is computed as a whole then; what it
+/* The task reads all its inputs as it begins, far from the next interrupt, and so is computed as a whole then; what it
  * writes reaches the shadow as the image writes it: at its end, or, when it is interrupted, byte by byte as far as the
  * image's memory already has the new values. */
 static void task_begins(emulated_t *e)

@@ -168,7 +168,7 @@ def test_samples_that_keep_failing_bring_the_safe_state(drive: Loop, failure: st
     fail(100)
     assert int(drive.get("fault_word")) & INPUT
     assert core.resets == 0
-    assert abs(drive.get("truth.torque_Nm")) < 0.5  # 3000 rpm: open gates
+    assert abs(drive.get("truth.torque_Nm")) < 0.5  # 3000 rpm: switching disabled
 
 
 def test_a_fault_of_the_resolver_raises_the_angle_fault(resolver_parts: Parts) -> None:

@@ -34,7 +34,7 @@ def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
 
 
 def longest_step_next(loop: Loop) -> None:
-    """To just before the longest of the ten kinds of steps: the robust identification learns in every tenth."""
+    """To just before the longest of ten steps: the one in which the identification updates its parameters."""
     core = Stand(loop).core
     lengths = []
     for _ in range(STEPS):

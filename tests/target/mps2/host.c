@@ -70,7 +70,7 @@ int main(void)
     }
     printf("low=%08x\nhigh=%08x\ndiffering=%08x\nfaults=%08x\noverruns=%08x\n", script.low, script.high,
            script.differing, drive.fast.faults, mrai_overruns(&drive));
-    const identification_t *learnt = &drive.task.identification;
-    printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)learnt->psi_delta, (unsigned)learnt->r_delta);
+    const identification_t *identification = &drive.task.identification;
+    printf("psi_delta=%08x\nr_delta=%08x\n", (unsigned)identification->psi_delta, (unsigned)identification->r_delta);
     return 0;
 }

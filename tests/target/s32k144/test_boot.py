@@ -58,7 +58,7 @@ def test_the_pwm_runs_soon_after_reset_and_nothing_resets_again(parts: build.Par
 
 
 def test_a_stopped_emulation_ends_the_test_at_once(parts: build.Parts, elf: Path) -> None:
-    """Time no longer advances then: whoever waits for an end time would wait for ever."""
+    """Time no longer advances then: a wait for an end time would never end."""
     with _core(parts, elf) as core:
         core.run(FOREVER)
         core.set_register("PCC.PCC_ADC0", 0)  # the fast ISR reads from a converter without a clock
@@ -100,7 +100,7 @@ def test_most_of_the_stack_is_never_touched(parts: build.Parts, elf: Path) -> No
         assert untouched > (top - bottom) // 2
 
 
-def test_a_table_that_is_damaged_later_opens_the_gates(parts: build.Parts) -> None:
+def test_a_table_that_is_damaged_later_disables_switching(parts: build.Parts) -> None:
     motor = parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:

@@ -63,7 +63,7 @@ PLANTS: dict[str, tuple[Callable[[Parts], None], Plant]] = {
         checks.a_result_that_was_not_read_is_got_over,
         Plant("sampling.c", "    pdb->SC = 0;\n", ""),
     ),
-    "nobody watches the stack": (
+    "the stack is not watched": (
         checks.a_stack_near_its_end_resets,
         Plant("main.c", "if (stack_measure() < STACK_RESERVE)", "if (stack_measure() < 4U)"),
     ),

@@ -24,11 +24,11 @@ from fluxtrue_tools.sim.library import Loop
 def test_two_states_and_three_measurements_give_the_covariance_worked_out_by_hand() -> None:
     # Priors 4 and 1; y1 = x1 twice with variance 2, y2 = x1 + x2 with variance 1, and the window sees x2 with 0.5.
     rows = np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    learnt = np.diag([0.25, 1.0]) + information(rows, np.array([2.0, 2.0, 1.0]))
-    assert learnt == pytest.approx(np.array([[2.25, 1.0], [1.0, 2.0]]))
+    information_of_drive = np.diag([0.25, 1.0]) + information(rows, np.array([2.0, 2.0, 1.0]))
+    assert information_of_drive == pytest.approx(np.array([[2.25, 1.0], [1.0, 2.0]]))
     own = information(np.array([[0.0, 1.0]]), np.array([0.5]))
     # The sum [[2.25, 1], [1, 4]] has the determinant 8; its inverse is [[4, -1], [-1, 2.25]]/8.
-    got = torque_deviation(learnt, [own, 0.0 * own], np.array([[2.0, 1.0], [2.0, 1.0]]))
+    got = torque_deviation(information_of_drive, [own, 0.0 * own], np.array([[2.0, 1.0], [2.0, 1.0]]))
     assert got[0] == pytest.approx(math.sqrt((4.0 * 4.0 - 2.0 * 2.0 + 2.25) / 8.0))
     # Without the window: determinant 3.5, inverse [[2, -1], [-1, 2.25]]/3.5.
     assert got[1] == pytest.approx(math.sqrt((4.0 * 2.0 - 2.0 * 2.0 + 2.25) / 3.5))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a case draws: inside its ranges, all over them, and the same whoever asks."""
+"""What a case draws: inside its ranges, all over them, and independent of the caller."""
 
 import math
 
@@ -121,7 +121,7 @@ def test_a_weak_magnet_shrinks_the_envelope_and_a_strong_one_never_exceeds_what_
     nominal = make_envelope(machine, NOTHING_WRONG)
     weak = make_envelope(machine, NOTHING_WRONG | {"magnet_scale": 0.8})
     strong = make_envelope(machine, NOTHING_WRONG | {"magnet_scale": 1.05})
-    # All the torque there is at 250 A is 132.3 N·m; 3 % are kept as room.
+    # All the torque there is at 250 A is 132.3 N·m; 3 % are kept as a margin.
     assert nominal.at(0.0) == pytest.approx(0.97 * 132.3, rel=2e-3)
     assert (weak.torque_Nm < nominal.torque_Nm).all()
     assert (strong.torque_Nm <= nominal.torque_Nm).all()

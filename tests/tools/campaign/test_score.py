@@ -79,7 +79,7 @@ def test_harm_is_what_exceeds_the_tables_by_half_a_percent_and_two_percent(
     assert got.harmless_share == (100.0 if harmless else 0.0)
 
 
-def test_harm_is_judged_window_by_window_whatever_the_order_of_the_rows(campaign: Campaign) -> None:
+def test_harm_is_checked_window_by_window_whatever_the_order_of_the_rows(campaign: Campaign) -> None:
     data = table([(1000, 10), (2000, 0), (3000, 0)], [(1000, 9), (2000, 9), (3000, 1)]).iloc[::-1]
     got = scored(campaign, data).harm
     assert got is not None

@@ -75,7 +75,7 @@ void test_with_another_step_every_message_keeps_its_cycle_time_in_the_mean_and_e
         step_clock_start(&clock, step_ns[k]);
         setUp();
         int64_t due_ns[MESSAGES] = {0}, now_ns = 0;
-        int count[MESSAGES] = {0}, most = 0;
+        int count[MESSAGES] = {0}, frames_max = 0;
         while (now_ns < RUN_MS * INT64_C(1000000)) {
             int frames = 0;
             step_clock_step(&clock);
@@ -90,12 +90,12 @@ void test_with_another_step_every_message_keeps_its_cycle_time_in_the_mean_and_e
                 count[n]++;
                 frames++;
             }
-            most = (frames > most) ? frames : most;
+            frames_max = (frames > frames_max) ? frames : frames_max;
         }
         for (int n = 0; n < MESSAGES; n++) {
             TEST_ASSERT_INT_WITHIN(1, RUN_MS / wanted[n].cycle_ms, count[n]);
         }
-        TEST_ASSERT_LESS_OR_EQUAL_INT((step_ns[k] > 1000000U) ? 3 : 2, most);
+        TEST_ASSERT_LESS_OR_EQUAL_INT((step_ns[k] > 1000000U) ? 3 : 2, frames_max);
     }
 }
 

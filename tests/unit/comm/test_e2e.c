@@ -58,7 +58,7 @@ void test_the_first_frame_only_tells_where_the_sender_counts(void)
 }
 
 /* From every counter to every other: 1 ahead is right, 2 is one lost, 0 a repetition, the rest a jump. */
-void test_every_step_of_the_counter_is_judged_by_how_far_it_is_ahead(void)
+void test_every_step_of_the_counter_is_checked_by_how_far_it_is_ahead(void)
 {
     for (uint8_t from = 0; from < 15; from++) {
         for (uint8_t ahead = 0; ahead < 15; ahead++) {
@@ -104,7 +104,7 @@ void test_another_data_id_is_a_wrong_crc(void)
     TEST_ASSERT_EQUAL_INT(E2E_CRC, e2e_check(DATA_ID + 256U, &state, &frame));
 }
 
-void test_any_other_length_is_refused_before_the_data_are_looked_at(void)
+void test_any_other_length_is_refused_before_the_data_are_checked(void)
 {
     for (uint8_t length = 0; length < 8; length++) {
         can_frame_t frame = frame_with(3);

@@ -223,7 +223,7 @@ void test_the_reference_page_can_be_read_and_not_written(void)
     const float three = 3.0F;
     ready();
     write_float(0, 8.0F);
-    SEND(0xEB, 0x02, 0, 0); /* the master looks at the reference page */
+    SEND(0xEB, 0x02, 0, 0); /* the master reads the reference page */
     EXPECT(0xFF);
     SEND(0xF4, 4, 0, 0, AT(working));
     EXPECT(0xFF, 0x00, 0x00, 0x80, 0x3F); /* 1.0 */
@@ -296,7 +296,7 @@ void test_the_checksum_is_that_of_the_bytes(void)
     EXPECT_ERROR(0x24);
 }
 
-void test_bytes_that_wait_are_forgotten_with_the_session(void)
+void test_waiting_bytes_are_discarded_with_the_session(void)
 {
     const float value = 7.25F;
     ready();

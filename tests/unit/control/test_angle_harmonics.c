@@ -38,8 +38,8 @@ static double wrong(double at)
     return (0.3 * cos(two_pi * at - 1.0) + 0.25 * sin(2.0 * two_pi * at + 0.4)) / 360.0;
 }
 
-/* Steps of a millisecond as the drive makes them: corrected, learnt from. The worst remaining error of the last turn or
- * more, in degrees. */
+/* Steps of a millisecond as the drive makes them: corrected and used for adaptation. The worst remaining error of the
+ * last turn or more, in degrees. */
 static double drive(double rpm, double rpm_per_s, int steps)
 {
     double worst = 0.0;
@@ -57,7 +57,7 @@ static double drive(double rpm, double rpm_per_s, int steps)
 
 /* Five of the slower time constants (AT-13) leave 0.7 % of 0.3 degrees; the table without interpolation half a part:
  * (0.3 + 2 * 0.25) pi/64 = 0.04 degrees. */
-void test_a_sensors_first_two_harmonics_are_learnt_away_in_both_directions(void)
+void test_a_sensors_first_two_harmonics_are_removed_in_both_directions(void)
 {
     TEST_ASSERT_TRUE(drive(8400.0, 0.0, 200) > 0.05);
     TEST_ASSERT_TRUE(drive(8400.0, 0.0, 900) < 0.05);
@@ -71,7 +71,7 @@ void test_acceleration_is_no_harmonic(void)
 }
 
 /* By (AT-13) 10 s at 900 rpm would take away nine tenths of the second harmonic. */
-void test_below_940_rpm_nothing_is_learnt_and_nothing_forgotten(void)
+void test_below_940_rpm_the_coefficients_are_kept(void)
 {
     (void)drive(900.0, 0.0, 10000);
     TEST_ASSERT_EQUAL_INT32(0, state.c[0] | state.c[1] | state.c[2] | state.c[3]);
@@ -95,7 +95,7 @@ void test_late_samples_teach_nothing(void)
     TEST_ASSERT_INT32_WITHIN(64, 0, state.c[3]);
 }
 
-void test_what_is_learnt_stays_within_its_bound(void)
+void test_what_is_identified_stays_within_its_bound(void)
 {
     for (int k = 0; k < 5000; k++) {
         theta += 7000.0 / 60e3;

@@ -155,7 +155,7 @@ static commission_curve_t commissioned(const leg_t *leg, double theta, double *k
     return curve;
 }
 
-/* Largest share of the level by which the fundamental is missed, from the smallest current that anything is learnt at
+/* Largest share of the level by which the fundamental is missed, from the smallest current with identification
  * (3 %) to the largest; what the linear term holds is resistance to the drive. */
 static double missed(const leg_t *leg)
 {
@@ -192,12 +192,12 @@ static double missed_by_the_curve(const leg_t *leg)
 void test_level_and_knee_meet_the_fundamental_of_a_leg_with_capacitance_drop_and_slope(void)
 {
     const struct {
-        double zone, most, most_of_curve;
+        double zone, error_max, curve_error_max;
     } legs[] = {{0.001, 0.03, 0.02}, {0.002, 0.05, 0.03}, {0.005, 0.11, 0.06}};
     for (unsigned n = 0; n < sizeof legs / sizeof legs[0]; n++) {
         const leg_t leg = {0.875 * LEVEL, 0.125 * LEVEL, 0.3 * R, legs[n].zone};
-        TEST_ASSERT_DOUBLE_WITHIN(legs[n].most, 0.0, missed(&leg));
-        TEST_ASSERT_DOUBLE_WITHIN(legs[n].most_of_curve, 0.0, missed_by_the_curve(&leg));
+        TEST_ASSERT_DOUBLE_WITHIN(legs[n].error_max, 0.0, missed(&leg));
+        TEST_ASSERT_DOUBLE_WITHIN(legs[n].curve_error_max, 0.0, missed_by_the_curve(&leg));
     }
 }
 

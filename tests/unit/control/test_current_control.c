@@ -492,7 +492,7 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
     }
 }
 
-void test_reset_forgets_everything(void)
+void test_reset_clears_everything(void)
 {
     state = (current_control_state_t){1, 2};
     current_control_reset(&state);

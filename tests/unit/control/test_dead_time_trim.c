@@ -101,7 +101,7 @@ void test_over_minutes_it_follows_the_twin(void)
     }
 }
 
-void test_no_more_than_a_quarter_is_added_or_taken_and_the_rest_stays_learnt(void)
+void test_no_more_than_a_quarter_is_added_or_taken_and_the_rest_stays_identified(void)
 {
     dead_time_trim_in_t in = input(4.0);
     for (int s = 0; s < 100; s++) {
@@ -129,7 +129,7 @@ void test_what_is_not_known_or_cannot_be_compared_moves_nothing(void)
     TEST_ASSERT_EQUAL_INT(BASE, second(&in).dead_time);
 }
 
-void test_only_time_of_learning_counts(void)
+void test_only_time_of_identification_counts(void)
 {
     dead_time_trim_in_t in = input(2.0);
     for (int ms = 0; ms < 999; ms++) {

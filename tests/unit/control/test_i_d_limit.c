@@ -56,7 +56,7 @@ void test_without_a_temperature_the_assumed_one_counts_whatever_the_magnets_say(
 }
 
 /* 1.5 of I_b at 20 C: 0.002 per K have to take 0.7 away, 350 K, before the circle's 0.8 is passed. */
-void test_magnets_that_bear_more_than_can_be_measured_leave_room_before_the_limit(void)
+void test_magnets_that_bear_more_than_can_be_measured_are_not_limited_at_low_temperature(void)
 {
     f.i_d_limit.i_20 = 49152;
     TEST_ASSERT_EQUAL_INT(f.i_d_limit.i_max, limit(0.0, 3600));

@@ -4,7 +4,7 @@
 #include "identify_fixture.h"
 #include "unity.h"
 
-/* The whole identification on the invented machine: what it learns, when it does not, whom it trusts. */
+/* The whole identification on the invented machine: what it identifies, when it does not, and its confidence. */
 
 static fixture_t f;
 static identify_config_t c;
@@ -137,13 +137,13 @@ void test_after_a_drive_the_torque_is_that_of_the_true_flux_everywhere(void)
     }
 }
 
-void test_near_standstill_nothing_is_learnt(void)
+void test_near_standstill_nothing_is_identified(void)
 {
     run((dq_q15_t){-4000, 8000}, 0.019, wrong, 5000);
     assert_untouched();
 }
 
-void test_without_current_no_parameter_is_learnt(void)
+void test_without_current_no_parameter_is_identified(void)
 {
     run((dq_q15_t){-900, 300}, 0.3, (truth_t){-0.06, 1.0, 0.0}, 2000); /* 949 of 983 counts */
     for (int j = 0; j < IDENTIFY_STATES; j++) {
@@ -151,14 +151,14 @@ void test_without_current_no_parameter_is_learnt(void)
     }
 }
 
-void test_switched_off_nothing_is_learnt(void)
+void test_switched_off_nothing_is_identified(void)
 {
     enabled = false;
     drive(wrong, 2);
     assert_untouched();
 }
 
-void test_a_period_without_the_bridge_is_not_learnt_from(void)
+void test_a_period_without_the_bridge_is_not_used_for_identification(void)
 {
     window_pair_t pair = steady_window(&f, (dq_q15_t){-4000, 8000}, 0.4, (dq_q15_t){0, 900});
     pair.fixed.acting = false;
@@ -171,7 +171,7 @@ void test_a_period_without_the_bridge_is_not_learnt_from(void)
     assert_untouched();
 }
 
-/* One invalid step among ten keeps the ten from being learnt. */
+/* One invalid step among ten excludes the ten from identification. */
 void test_an_update_needs_all_of_its_steps(void)
 {
     const dq_q15_t i = {-4000, 8000};
@@ -200,8 +200,8 @@ void test_the_winding_temperature_is_the_priors_mean_and_a_lost_sensor_keeps_it(
     TEST_ASSERT_FALSE(state.r_known);
 }
 
-/* T^ with nothing learnt is the tables' torque at the magnetising current. */
-void test_with_nothing_learnt_the_torque_is_the_tables_less_the_iron_loss(void)
+/* T^ with nothing identified is the tables' torque at the magnetising current. */
+void test_with_nothing_identified_the_torque_is_the_tables_less_the_iron_loss(void)
 {
     const dq_q15_t i = {-4000, 8000};
     enabled = false;
@@ -251,7 +251,7 @@ void test_without_torque_no_confidence_comes_at_any_speed(void)
     static const double speed[4] = {0.0, 0.015, 0.3, -0.8};
     for (int n = 0; n < 4; n++) {
         run((dq_q15_t){0, 0}, speed[n], nothing, 2000);
-        run((dq_q15_t){-100, 300}, speed[n], nothing, 2000); /* too little to learn from */
+        run((dq_q15_t){-100, 300}, speed[n], nothing, 2000); /* too little to identify anything */
         TEST_ASSERT_FALSE(state.torque_certain);
         TEST_ASSERT_EQUAL_INT(0, state.confidence);
     }
@@ -274,11 +274,12 @@ void test_confidence_comes_when_a_point_has_told_five_eighths_and_not_before(voi
     TEST_ASSERT_TRUE(below && above);
 }
 
-/* A long stop: the leak forgets. Half a second after the upper level nothing is left, before it all. */
-void test_confidence_goes_when_three_quarters_are_forgotten_and_not_before(void)
+/* A long stop: the leak returns the parameters to their priors. Half a second after the upper level nothing is left,
+ * before it all. */
+void test_confidence_goes_when_three_quarters_of_the_information_are_lost_and_not_before(void)
 {
     const dq_q15_t i = {-4000, 8000};
-    const double slow = 0.01; /* nothing is learnt */
+    const double slow = 0.01; /* nothing is identified */
     drive(nothing, 3);
     double left = left_of_variance(i, slow);
     TEST_ASSERT_TRUE(left < 0.375);
@@ -294,7 +295,7 @@ void test_confidence_goes_when_three_quarters_are_forgotten_and_not_before(void)
 }
 
 /* A resolver that is 30 degrees off: no parameter explains it. */
-void test_a_contradiction_takes_the_confidence_away(void)
+void test_a_persistent_mismatch_takes_the_confidence_away(void)
 {
     drive(nothing, 3);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
@@ -439,7 +440,7 @@ void test_bad_configurations_are_rejected(void)
     BAD(leak[IDENTIFY_R] = Q31(0.3));
 }
 
-void test_what_was_learnt_survives_a_power_cycle_with_less_certainty(void)
+void test_what_was_identified_survives_a_power_cycle_with_less_certainty(void)
 {
     drive(wrong, 20);
     const identify_record_t record = identify_record_get(&state);

@@ -371,7 +371,7 @@ void test_the_resistance_bandwidth_is_the_same_at_every_current(void)
 
 /* A magnet 19 % weak met at full speed: the observer is 0.7 pu off before the flux has moved. A bound on the error
  * that cuts this winds the observer up, and the flux overshoots by half. */
-void test_a_large_deviation_at_high_speed_is_learnt_without_overshoot(void)
+void test_a_large_deviation_at_high_speed_is_identified_without_overshoot(void)
 {
     for (int w = -9; w <= 9; w += 3) {
         if (w == 0) {
@@ -589,7 +589,7 @@ void test_no_corner_of_the_input_wraps_a_state(void)
 }
 
 /* From a reset on nothing is wrong: a voltage that explains the sample leaves the error where the reset put it. */
-void test_reset_forgets_the_error_and_keeps_what_was_learnt(void)
+void test_reset_clears_the_error_and_keeps_what_was_identified(void)
 {
     operating_point_t in = at(-3000, 4000, 0.2);
     steady_voltage(&in, 300.0 / 32768.0, 0.001);

@@ -60,8 +60,8 @@ void test_the_correction_makes_the_estimate_equal_the_command(void)
     }
 }
 
-/* x is a ratio: learnt at 100 it serves at 30 and in the other direction at once. */
-void test_what_was_learnt_at_one_torque_serves_at_another_and_in_the_other_direction(void)
+/* x is a ratio: identified at 100 it serves at 30 and in the other direction at once. */
+void test_what_was_identified_at_one_torque_serves_at_another_and_in_the_other_direction(void)
 {
     in.torque_commanded = 10000;
     (void)run(0.9125, 2000);
@@ -167,7 +167,7 @@ void test_the_correction_is_held_while_limited_and_asked_for_more(void)
 }
 
 /* Nothing asked for, nothing corrected: a torque estimate's offset must not creep in at standstill. */
-void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
+void test_a_zero_command_asks_for_zero_and_keeps_what_was_identified(void)
 {
     state.correction = 123456789;
     in.torque_commanded = 0;
@@ -179,7 +179,7 @@ void test_a_zero_command_asks_for_zero_and_keeps_what_was_learnt(void)
 }
 
 /* Below T_min the relative error is that of T_min: no division by a vanishing command. */
-void test_small_commands_learn_slower_instead_of_louder(void)
+void test_small_commands_integrate_more_slowly_without_more_noise(void)
 {
     f.torque_loop.kp = 0;
     in.torque_commanded = 400; /* T_min = 655 */
@@ -190,7 +190,7 @@ void test_small_commands_learn_slower_instead_of_louder(void)
 }
 
 /* Coasting at a 100th of T_min with an estimate that is a little off: as a ratio it would be all of the authority, and
- * the next request would be wrong by it. What was learnt is kept. */
+ * the next request would be wrong by it. What was identified is kept. */
 void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
@@ -245,7 +245,7 @@ void test_random_commands_and_estimates_follow_the_twin(void)
     ASSERT_WORST(request, 30.0); /* 1.5e-3 of 18000 */
 }
 
-/* Learnt -10 % elsewhere; at the limit 0.97 of the request arrives. The way back is open up to the command. */
+/* Identified -10 % elsewhere; at the limit 0.97 of the request arrives. The way back is open up to the command. */
 void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond(void)
 {
     in.torque_commanded = 10000;
@@ -280,7 +280,7 @@ void test_no_corner_wraps_or_leaves_the_authority(void)
         state.correction = (n / 100 == 0) ? INT32_MIN : (n / 100 == 1) ? 0 : INT32_MAX;
         state.model = (n & 1) ? INT32_MIN : INT32_MAX;
         const int r = step();
-        const int room = (int)(0.4 * fabs((double)in.torque_commanded)) + 2;
-        TEST_ASSERT_INT_WITHIN((unsigned)room, in.torque_commanded, r);
+        const int tolerance = (int)(0.4 * fabs((double)in.torque_commanded)) + 2;
+        TEST_ASSERT_INT_WITHIN((unsigned)tolerance, in.torque_commanded, r);
     }
 }

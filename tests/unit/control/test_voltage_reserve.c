@@ -60,7 +60,7 @@ void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
 }
 
 /* 0.95^100 = 0.0059 */
-void test_away_from_the_limit_and_with_the_bridge_off_the_trim_is_forgotten(void)
+void test_away_from_the_limit_and_with_the_bridge_off_the_trim_returns_to_zero(void)
 {
     for (int off = 0; off < 2; off++) {
         in.psi = off ? (dq_q15_t){8000, 6000} : (dq_q15_t){4800, 3600};

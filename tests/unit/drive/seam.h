@@ -2,7 +2,7 @@
 #ifndef UNIT_DRIVE_SEAM_H
 #define UNIT_DRIVE_SEAM_H
 /** The mocked hardware of one drive: what it delivers, and a record of what was asked of it.
- *   The log holds one letter per call: a adc, r angle (resolver), w duties, + gates on, - gates off, p pend. */
+ *   The log holds one letter per call: a adc, r angle (resolver), w duties, + enable, - disable, p pend. */
 #include "drive/drive.h"
 
 typedef struct {

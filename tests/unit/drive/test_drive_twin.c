@@ -12,8 +12,8 @@
 #include "unity.h"
 
 /* The whole drive and its double-precision twin see the same quantised samples of a machine that follows the
- * twin's references with a first-order lag; every duty must agree. What learns is out, that is, the integrators of
- * currents and torque and the identification: it has no effect on this machine, so that it would add up a rounding
+ * twin's references with a first-order lag; every duty must agree. Identification is disabled, that is, the integrators
+ * of currents and torque and the identification: it has no effect on this machine, so that it would add up a rounding
  * for ever. The closed loop of both with a real machine model is compared elsewhere (tests/loop). */
 
 static twin_t *twin;
@@ -30,7 +30,7 @@ void setUp(void)
     drive.motor.torque_loop.ki = 0;
     twin_set(twin, "identification", 0.0);
     drive.request.identification = false;
-    /* This machine's currents lag and its voltages are nobody's: the monitors would say so. */
+    /* This machine's currents lag and its voltages are not physical: the monitors would report it. */
     drive.motor.plausibility.e_0 = INT16_MAX;
     drive.motor.plausibility.i_alive = INT16_MAX;
     drive.motor.torque_monitor.v_0 = INT16_MAX;
@@ -137,7 +137,7 @@ void test_both_open_the_gates_in_the_same_period(void)
     }
     TEST_ASSERT_TRUE(seam.gates);
     m.i_d = -390.0;           /* at least 338 A in some phase */
-    (void)period(&m, 1000.0); /* compares the gates */
+    (void)period(&m, 1000.0); /* compares the enable signal */
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_INT((int)drive.fast.faults, (int)twin_get(twin, "fault_word"));
 }

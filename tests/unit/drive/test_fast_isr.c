@@ -36,7 +36,7 @@ void test_the_robust_identification_needs_no_interrupt_of_its_own(void)
 {
     seam_run();
     seam_periods(20);
-    TEST_ASSERT_EQUAL_STRING("arw", seam.log); /* the gates have long been closed */
+    TEST_ASSERT_EQUAL_STRING("arw", seam.log); /* switching has long been enabled */
     TEST_ASSERT_EQUAL_INT(0, seam.pended);
     TEST_ASSERT_EQUAL_UINT32(0, mrai_overruns(&drive));
 }
@@ -74,7 +74,7 @@ void test_the_flux_of_the_robust_identification_is_fed_forward_from_the_next_per
     TEST_ASSERT_EQUAL_INT(-1234, drive.psi_d_error);
 }
 
-/* Off means off first: the gates open before anything else is written. */
+/* Switching is disabled before anything else is written. */
 void test_while_off_the_gates_open_first_and_the_duties_rest_in_the_middle(void)
 {
     seam_period();
@@ -118,7 +118,7 @@ static void shorted(bool is)
     TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.c);
 }
 
-/* The duties of the short circuit come before the gates that would make them. */
+/* The duties of the short circuit are written before switching is enabled. */
 void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_so(void)
 {
     seam_run();
@@ -316,7 +316,7 @@ void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
     TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* only what the noise-free zero current asks for */
 }
 
-/* Below the bound nobody normalises for: neither identification may take the command for what acts. */
+/* At a v_dc too small to normalise with: neither identification may take the command for what acts. */
 void test_a_dc_voltage_below_its_bound_makes_the_acting_voltage_unknown(void)
 {
     seam_run();

@@ -89,7 +89,7 @@ void test_robust_is_the_default_and_ten_periods_make_a_window(void)
     TEST_ASSERT_TRUE(window.acting);
 }
 
-void test_a_weak_magnet_is_learnt_and_its_flux_handed_to_the_current_control(void)
+void test_a_weak_magnet_is_identified_and_its_flux_handed_to_the_current_control(void)
 {
     milliseconds(3000);
     /* 10 % of psi_f, 1434 counts; magnet and inductances share what a single point shows. */
@@ -101,7 +101,7 @@ void test_a_weak_magnet_is_learnt_and_its_flux_handed_to_the_current_control(voi
     TEST_ASSERT_FALSE(drive.task.identification.psi_clamped);
 }
 
-void test_a_reset_forgets_what_was_learnt(void)
+void test_a_reset_discards_what_was_identified(void)
 {
     milliseconds(500);
     TEST_ASSERT_NOT_EQUAL(0, drive.task.identification.psi_delta);
@@ -123,7 +123,7 @@ void test_the_winding_temperature_reaches_the_resistance_and_a_broken_sensor_doe
     TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.identification.r_delta);
 }
 
-void test_what_was_learnt_can_be_kept_and_recalled(void)
+void test_what_was_identified_can_be_kept_and_recalled(void)
 {
     milliseconds(1000);
     const identify_record_t kept = drive_identified_record(&drive);
@@ -168,7 +168,7 @@ static void at_town_speed(void)
 }
 
 /* 100 counts are 1.65 V: pi/4 of them, over 21238 of dc voltage, are 121 LSB of duty. */
-void test_the_compensation_takes_over_what_is_learnt_of_the_voltage_error(void)
+void test_the_compensation_takes_over_what_is_identified_of_the_voltage_error(void)
 {
     at_town_speed();
     for (int n = 0; n < 30; n++) {

@@ -33,7 +33,7 @@ static void publish(bool acting)
     mrai_offer(&drive, s);
 }
 
-static void open_gates(void)
+static void disable_switching(void)
 {
     drive.request.identification = true;
     schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = 60000000});
@@ -47,9 +47,9 @@ void test_it_tells_that_it_has_finished(void)
     TEST_ASSERT_EQUAL_INT(mrai_offered(&drive), mrai_finished(&drive));
 }
 
-void test_with_the_bridge_off_nothing_is_learnt(void)
+void test_with_the_bridge_off_nothing_is_identified(void)
 {
-    open_gates();
+    disable_switching();
     for (int n = 0; n < 100; n++) {
         publish(false);
         mrai_isr(&drive);
@@ -58,9 +58,9 @@ void test_with_the_bridge_off_nothing_is_learnt(void)
     TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_q_q27);
 }
 
-void test_with_the_bridge_on_the_flux_is_learnt_and_handed_to_the_fast_isr_rounded(void)
+void test_with_the_bridge_on_the_flux_is_identified_and_handed_to_the_fast_isr_rounded(void)
 {
-    open_gates();
+    disable_switching();
     publish(false);
     mrai_isr(&drive);
     for (int n = 0; n < 500; n++) {
@@ -93,9 +93,9 @@ void test_the_torque_estimate_runs_with_the_bridge_on_or_off(void)
                            torque_estimate_mean(&drive.mrai.task.torque_mean, &drive.mrai.isr.torque));
 }
 
-void test_a_reset_forgets_what_was_learnt_without_a_kick(void)
+void test_a_reset_discards_what_was_identified_without_a_kick(void)
 {
-    open_gates();
+    disable_switching();
     publish(false);
     mrai_isr(&drive);
     for (int n = 0; n < 500; n++) {

@@ -164,7 +164,7 @@ void test_the_torque_request_is_limited_and_slewed(void)
     TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
 }
 
-void test_stopping_forgets_the_slew_and_the_correction(void)
+void test_stopping_resets_the_slew_and_the_correction(void)
 {
     drive.request.torque_arbitrated = 5000;
     seam_run();

@@ -414,7 +414,7 @@ static void reset(void)
     in.reset = false;
 }
 
-void test_a_reset_with_enable_off_forgets_what_is_gone(void)
+void test_a_reset_with_enable_off_clears_faults_that_have_ended(void)
 {
     to_fault();
     in.enable = false;
@@ -427,7 +427,7 @@ void test_a_reset_with_enable_off_forgets_what_is_gone(void)
     TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, step());
 }
 
-void test_a_reset_does_not_forget_what_is_still_there(void)
+void test_a_reset_does_not_clear_a_fault_that_persists(void)
 {
     to_fault();
     in.enable = false;
@@ -528,7 +528,7 @@ static supervisor_in_t inputs_of(unsigned bits)
 }
 
 /* What must hold whatever the inputs were; the conditions are spelled out again, not taken from the table. */
-static void judge(const supervisor_t *before, const supervisor_in_t *now)
+static void check_transition(const supervisor_t *before, const supervisor_in_t *now)
 {
     const bool ran = before->state == STATE_RUN || before->state == STATE_DERATE;
     const bool runs = s.state == STATE_RUN || s.state == STATE_DERATE;
@@ -563,7 +563,7 @@ void test_no_combination_of_inputs_makes_a_forbidden_move(void)
             in = inputs_of(bits);
             s = before;
             supervisor_step(&s, &in);
-            judge(&before, &in);
+            check_transition(&before, &in);
             seen[state] |= (s.state != before.state) ? 1U << s.state : 0U;
         }
     }

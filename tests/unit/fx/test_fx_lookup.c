@@ -137,7 +137,7 @@ void test_one_count_beyond_the_grid_is_flagged_on_every_side(void)
     }
 }
 
-/* Weights that did not sum to one would scale the value; and -32768 leaves no room for an excess. */
+/* Weights that did not sum to one would scale the value; and -32768 allows no excess. */
 void test_a_constant_table_gives_its_constant_everywhere(void)
 {
     static const int16_t value[3] = {INT16_MIN, INT16_MAX, 12345};

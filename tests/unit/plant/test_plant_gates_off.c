@@ -114,12 +114,12 @@ static void spin(double of_threshold, double *charge_A, double *torque_Nm, doubl
 
 void test_rectification_starts_where_the_line_voltage_passes_the_dc_link(void)
 {
-    double charge, torque, most;
-    spin(0.99, &charge, &torque, &most);
-    TEST_ASSERT_TRUE(most < 1e-4);
+    double charge, torque, i_max;
+    spin(0.99, &charge, &torque, &i_max);
+    TEST_ASSERT_TRUE(i_max < 1e-4);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, charge);
-    spin(1.01, &charge, &torque, &most);
-    TEST_ASSERT_TRUE(most > 0.1);
+    spin(1.01, &charge, &torque, &i_max);
+    TEST_ASSERT_TRUE(i_max > 0.1);
     TEST_ASSERT_TRUE(charge > 0.01);
     TEST_ASSERT_TRUE(torque < -0.01);
 }
@@ -169,13 +169,13 @@ void test_a_broken_lead_carries_no_current(void)
     p.phase_open[1] = 1;
     p.speed_rad_s = 100.0;
     const plant_truth_t *t = start();
-    double most = 0.0;
+    double i_max = 0.0;
     for (int k = 0; k < 300; k++) {
         bench_drive(plant, 30.0 + 60.0 * I);
         TEST_ASSERT_DOUBLE_WITHIN(5e-3, 0.0, t->i_abc_A[1]);
-        most = fmax(most, fabs(t->i_abc_A[0]));
+        i_max = fmax(i_max, fabs(t->i_abc_A[0]));
     }
-    TEST_ASSERT_TRUE(most > 10.0);
+    TEST_ASSERT_TRUE(i_max > 10.0);
 }
 
 void test_a_lead_that_breaks_under_current_is_dead_at_once(void)

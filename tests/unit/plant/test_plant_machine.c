@@ -182,7 +182,7 @@ void test_a_saturating_machine_agrees_with_an_independent_integration_of_its_cur
     p.speed_rad_s = 100.0 * PI;
     const plant_truth_t *t = start();
     const double w = 3.0 * p.speed_rad_s;
-    double i[2] = {-80.0, 60.0}, theta = 0.0, most = 0.0;
+    double i[2] = {-80.0, 60.0}, theta = 0.0, i_max = 0.0;
     plant_set_state(plant, i[0], i[1], 0.0, p.speed_rad_s);
     for (int k = 0; k < 200; k++) {
         double psi[2], duty[3];
@@ -195,11 +195,11 @@ void test_a_saturating_machine_agrees_with_an_independent_integration_of_its_cur
             runge_kutta(i, u, theta + 2e-6 * n * w, w, 2e-6);
         }
         theta += 1e-4 * w;
-        most = fmax(most, fabs(i[1]));
+        i_max = fmax(i_max, fabs(i[1]));
         TEST_ASSERT_DOUBLE_WITHIN(1e-3, i[0], t->i_d_A);
         TEST_ASSERT_DOUBLE_WITHIN(1e-3, i[1], t->i_q_A);
     }
-    TEST_ASSERT_TRUE(most > 30.0);
+    TEST_ASSERT_TRUE(i_max > 30.0);
     TEST_ASSERT_EQUAL(0, t->inversion_failures);
 }
 

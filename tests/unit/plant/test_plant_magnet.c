@@ -30,7 +30,7 @@ static const plant_truth_t *start(const plant_map_t *with)
 }
 
 /* What the truth shows after a change of parameters, with no time gone by. */
-static void look(void)
+static void sample(void)
 {
     plant_sensors_t unused;
     plant_sample(plant, &unused);
@@ -88,10 +88,10 @@ void test_each_scale_acts_when_it_alone_changes_at_run_time(void)
     for (int n = 0; n < 4; n++) {
         plant_set_state(plant, -80.0, 90.0, 0.0, 0.0);
         *scale[n] = 0.9;
-        look();
+        sample();
         TEST_ASSERT_TRUE(fabs(t->i_d_A + 80.0) + fabs(t->i_q_A - 90.0) > 0.5);
         *scale[n] = 1.0;
-        look();
+        sample();
         TEST_ASSERT_DOUBLE_WITHIN(1e-5, -80.0, t->i_d_A);
         TEST_ASSERT_DOUBLE_WITHIN(1e-5, 90.0, t->i_q_A);
     }
@@ -116,15 +116,15 @@ void test_each_constant_acts_when_it_alone_changes_at_run_time(void)
     plant_params_t *live = plant_params(plant);
     plant_set_state(plant, -50.0, 70.0, 0.0, 0.0);
     live->ld_H = 0.25e-3;
-    look();
+    sample();
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, -40.0, t->i_d_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 70.0, t->i_q_A);
     live->lq_H = 0.7e-3;
-    look();
+    sample();
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 50.0, t->i_q_A);
     live->ld_H = 0.2e-3;
     live->psi_f_Vs = 1.1 * 0.084;
-    look();
+    sample();
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, -92.0, t->i_d_A);
 }
 
@@ -144,7 +144,7 @@ void test_a_magnet_step_leaves_the_flux_linkage_and_moves_the_current(void)
     plant_set_state(plant, -30.0, 60.0, 0.5, 100.0);
     const double psi_d = t->psi_d_Vs, psi_q = t->psi_q_Vs;
     plant_params(plant)->magnet_scale = 0.99;
-    look();
+    sample();
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, psi_d, t->psi_d_Vs);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, psi_q, t->psi_q_Vs);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, -30.0 + 4.2, t->i_d_A);
@@ -158,7 +158,7 @@ void test_a_magnet_step_may_be_told_to_leave_the_current_instead(void)
     plant_set_state(plant, -30.0, 60.0, 0.5, 0.0);
     const double psi_d = t->psi_d_Vs;
     plant_params(plant)->magnet_scale = 0.8;
-    look();
+    sample();
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, -30.0, t->i_d_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 60.0, t->i_q_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, psi_d - 0.2 * POLY_F, t->psi_d_Vs);

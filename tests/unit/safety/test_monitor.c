@@ -128,7 +128,7 @@ void test_three_angle_jumps_in_a_row_are_an_angle_fault(void)
 }
 
 /* A jump is noted for one period: after a good one nothing counts any more. */
-void test_a_jump_is_looked_at_once_and_then_forgotten(void)
+void test_a_jump_is_evaluated_once_and_then_cleared(void)
 {
     TEST_ASSERT_EQUAL(0, state.pending);
     monitor_report_angle_jump(&state);

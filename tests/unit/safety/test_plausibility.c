@@ -33,7 +33,7 @@ void tearDown(void)
 }
 
 /* One millisecond of a machine that turns 0.7 rad in it; `broken`: that phase carries nothing. */
-static uint32_t turn(int broken)
+static uint32_t run_one_turn(int broken)
 {
     const double a = 0.7 * now++;
     const int32_t want[3] = {(int32_t)(11314 * cos(a)), (int32_t)(11314 * cos(a - 2.0944)),
@@ -47,7 +47,7 @@ static uint32_t turn(int broken)
 static int steps_until(uint32_t fault, int broken)
 {
     for (int n = 1; n <= 1000; n++) {
-        if (turn(broken) & fault) {
+        if (run_one_turn(broken) & fault) {
             return n;
         }
     }
@@ -77,7 +77,7 @@ void test_a_deviation_every_other_sample_is_noise(void)
 {
     for (int n = 0; n < 1000; n++) {
         in.i.q = in.i_ref.q + ((n & 1) ? 5000 : 0);
-        TEST_ASSERT_EQUAL_HEX32(0, turn(-1));
+        TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
     }
 }
 
@@ -140,7 +140,7 @@ void test_over_speed_needs_five_samples_in_a_row_in_either_direction(void)
         in.omega = (q15_t)(sign * 32001);
         TEST_ASSERT_EQUAL_INT(5, steps_until(FAULT_OVER_SPEED, -1));
         in.omega = (q15_t)(sign * 32000);
-        TEST_ASSERT_EQUAL_HEX32(0, turn(-1));
+        TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
     }
 }
 

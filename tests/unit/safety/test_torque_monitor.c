@@ -190,7 +190,7 @@ void test_a_reversal_that_is_over_before_the_sample_is_no_wrong_angle(void)
     }
 }
 
-void test_nothing_is_judged_while_the_bridge_is_off_or_has_just_been_switched_on(void)
+void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_on(void)
 {
     in.torque = INT16_MIN;
     in.acting = false;

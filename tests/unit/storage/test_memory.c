@@ -62,7 +62,7 @@ void tearDown(void)
 {
 }
 
-/* The background looks once per millisecond; the number of saves. */
+/* The background runs once per millisecond; the number of saves. */
 static uint32_t milliseconds(uint32_t n)
 {
     const uint32_t before = memory.saves;
@@ -81,22 +81,22 @@ static void run(uint32_t ms)
 }
 
 /* A magnet half a standard deviation weak, well known. */
-static void learn(void)
+static void identify(void)
 {
     drive.task.identify.kalman.x_q27[IDENTIFY_FLUX] = -IDENTIFY_ONE_Q27 / 2;
     drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)] = IDENTIFY_ONE_Q30 / 64;
     run(1000);
 }
 
-static void learn_and_save(void)
+static void identify_and_save(void)
 {
-    learn();
+    identify();
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
 }
 
-void test_what_was_learnt_is_there_after_power_on_with_a_wider_uncertainty(void)
+void test_what_was_identified_is_there_after_power_on_with_a_wider_uncertainty(void)
 {
-    learn_and_save();
+    identify_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
     TEST_ASSERT_EQUAL_INT32(-IDENTIFY_ONE_Q27 / 2, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
@@ -115,7 +115,7 @@ void test_an_empty_memory_leaves_the_priors(void)
 
 void test_a_damaged_memory_leaves_the_priors(void)
 {
-    learn_and_save();
+    identify_and_save();
     for (uint32_t byte = 0; byte < 32U; byte++) {
         flash[0][byte] ^= 0x10;
         power_on(&motor);
@@ -138,7 +138,7 @@ void test_a_damaged_memory_leaves_the_priors(void)
 
 void test_a_record_of_another_motor_or_of_other_priors_is_not_used(void)
 {
-    learn_and_save();
+    identify_and_save();
     FOREIGN(m.name = "another");
     FOREIGN(m.bases.flux_Vs = m.bases.flux_Vs * 1.01F);
     FOREIGN(m.identify.sigma[IDENTIFY_LQ]++);
@@ -154,7 +154,7 @@ void test_nothing_is_written_without_a_run(void)
 
 void test_it_waits_until_the_drive_has_rested(void)
 {
-    learn();
+    identify();
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
     run(1);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
@@ -164,7 +164,7 @@ void test_it_waits_until_the_drive_has_rested(void)
 
 void test_the_second_save_waits_for_the_interval(void)
 {
-    learn_and_save();
+    identify_and_save();
     run(1000);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_INTERVAL_MS - 1001U));
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1));
@@ -173,7 +173,7 @@ void test_the_second_save_waits_for_the_interval(void)
 
 void test_a_fault_or_a_short_circuit_is_no_rest(void)
 {
-    learn();
+    identify();
     drive_raise_fault(&drive, FAULT_ANGLE_OFFSET);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     drive.fast.faults = 0;
@@ -185,7 +185,7 @@ void test_a_fault_or_a_short_circuit_is_no_rest(void)
 
 void test_parameters_that_the_model_contradicts_are_not_kept(void)
 {
-    learn();
+    identify();
     drive.task.identify.mismatch_share = Q15(0.3);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     TEST_ASSERT_EQUAL_INT(0, erases);
@@ -194,7 +194,7 @@ void test_parameters_that_the_model_contradicts_are_not_kept(void)
 void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(void)
 {
     broken = true;
-    learn();
+    identify();
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     TEST_ASSERT_EQUAL_UINT32(1, memory.failures);
     TEST_ASSERT_EQUAL_INT(1, erases);
@@ -202,11 +202,11 @@ void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(vo
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_INTERVAL_MS));
 }
 
-void test_a_measured_compensation_is_kept_with_the_room_it_needs(void)
+void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
 {
     const compensation_t measured = {dead_time(&drive.motor) + 1000, drive.motor.modulate.knee_q17 / 2, 1};
     TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
-    learn_and_save();
+    identify_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
     TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 1000, dead_time(&drive.motor));
@@ -222,7 +222,7 @@ void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measu
     TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
     drive_retrim(&drive, -60);
     TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
-    learn_and_save();
+    identify_and_save();
     power_on(&motor);
     TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
     TEST_ASSERT_EQUAL_INT32(-60, drive.task.trim.trim);
@@ -234,7 +234,7 @@ void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measu
 void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
 {
     drive_retrim(&drive, 60);
-    learn_and_save();
+    identify_and_save();
     power_on(&motor);
     TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 60, dead_time(&drive.motor));
 }

@@ -19,7 +19,7 @@ void tearDown(void)
 
 static void feed_bytes(const char *bytes, size_t count)
 {
-    TEST_ASSERT_LESS_OR_EQUAL_size_t(line_buffer_room(&buffer), count);
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(line_buffer_free(&buffer), count);
     memcpy(buffer.bytes + buffer.end, bytes, count);
     buffer.end += count;
 }
@@ -124,7 +124,8 @@ void test_a_word_in_brackets_that_is_too_long_is_dropped(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(1, buffer.dropped);
 }
 
-/* Any bytes in any portions: there is always room again, and no text is longer than allowed (the sanitizers watch). */
+/* Any bytes in any portions: there is always free space again, and no text is longer than allowed (the sanitizers
+ * watch). */
 void test_random_bytes_never_block_it(void)
 {
     srand(2);
@@ -132,9 +133,9 @@ void test_random_bytes_never_block_it(void)
         setUp();
         buffer.framing = framing == 0 ? LINE_BY_NEWLINE : LINE_IN_BRACKETS;
         for (int i = 0; i < 2000; i++) {
-            const size_t room = line_buffer_room(&buffer);
-            TEST_ASSERT_GREATER_THAN_size_t(0, room);
-            const size_t count = (size_t)rand() % (room + 1U);
+            const size_t free_bytes = line_buffer_free(&buffer);
+            TEST_ASSERT_GREATER_THAN_size_t(0, free_bytes);
+            const size_t count = (size_t)rand() % (free_bytes + 1U);
             const int rare = rand() % 200 + 3;
             for (size_t k = 0; k < count; k++) {
                 const int pick = rand() % rare;

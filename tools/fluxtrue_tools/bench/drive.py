@@ -135,7 +135,7 @@ class Load:
         return int(self.theta / (2 * math.pi * self.pole_pairs) * 2**32) & 0xFFFF_FFFF
 
     def run(self, duty: list[int], gates: bool, omega: float) -> None:
-        """One period; with the gates closed the rotor turns and no current flows."""
+        """One period; with switching disabled the rotor turns and no current flows."""
         a, b, c = (d / 32768.0 * self.v_dc for d in duty)
         alpha, beta = (2 * a - b - c) / 3, (b - c) / math.sqrt(3)
         step = self.period_s / SUB_STEPS

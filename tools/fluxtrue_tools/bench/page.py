@@ -92,9 +92,9 @@ def _wrapped(line: str) -> str:
 
 def _bound(name: str, spread: list[float]) -> str:
     """Each bound with its own verdict."""
-    average, most = BOUNDS.get(name, (None, None))
+    average, maximum = BOUNDS.get(name, (None, None))
     parts = [f"avg ≤ {average} {verdict(spread[1] <= average)}"] if average is not None else []
-    parts += [f"max ≤ {most} {verdict(spread[2] <= most)}"] if most is not None else []
+    parts += [f"max ≤ {maximum} {verdict(spread[2] <= maximum)}"] if maximum is not None else []
     return ", ".join(parts)
 
 

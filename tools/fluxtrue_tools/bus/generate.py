@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """C from the DBC: cantools' pack and unpack, and on top what it leaves out.
 
-cantools writes bus.[ch]; its encoder neither saturates nor looks for NaN. signals.h adds for every
+cantools writes bus.[ch]; its encoder neither saturates nor checks for NaN. signals.h adds for every
 signal the node sends a function that clamps to the DBC's range and refuses what is no number, for
 every message it receives the check of all ranges, and the cycle times, time-outs and data ids that
 the DBC holds as attributes. exports.c makes all of it callable from the tests.

@@ -84,11 +84,11 @@ def information(jacobian: Array, variance: Array) -> Array:
     return np.asarray(jacobian.T @ (jacobian / variance[:, None]))
 
 
-def torque_deviation(learnt: Array, per_window: list[Array], slopes: Array) -> Array:
-    """(IB-8): torque's standard deviation in each window, from what was learnt and the window itself."""
+def torque_deviation(information_of_drive: Array, per_window: list[Array], slopes: Array) -> Array:
+    """(IB-8): torque's standard deviation in each window, from the information of the drive and the window itself."""
     deviation = []
     for own, slope in zip(per_window, slopes, strict=True):
-        total = learnt + own
+        total = information_of_drive + own
         scale = 1.0 / np.sqrt(np.diag(total))  # states of very different size: condition it
         covariance = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
         deviation.append(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
@@ -111,11 +111,11 @@ def of_case(campaign: Campaign, machine: Machine, drawn: Sample, trace: "Trace")
     rows = voltage_jacobian(physics, x, seen, omega)
     per_row = 0.01 / (1.0 / machine.motor.plant["pwm_hz"])
     variance = np.tile(noise_variance(campaign, machine, omega, per_row), 2)
-    learnt = np.diag(1.0 / prior_variances(campaign, machine)) + information(rows, variance)
-    return _of_windows(campaign, machine, physics, x, learnt, trace)
+    information_of_drive = np.diag(1.0 / prior_variances(campaign, machine)) + information(rows, variance)
+    return _of_windows(campaign, machine, physics, x, information_of_drive, trace)
 
 
-def _of_windows(campaign: Campaign, machine: Machine, physics: Physics, x: Array, learnt: Array,
+def _of_windows(campaign: Campaign, machine: Machine, physics: Physics, x: Array, information_of_drive: Array,
                 trace: "Trace") -> list[float]:  # fmt: skip
     means = np.array([rows.mean(axis=0) for rows in trace.windows])
     current, speed = _points(trace, means)
@@ -127,7 +127,7 @@ def _of_windows(campaign: Campaign, machine: Machine, physics: Physics, x: Array
     periods = np.array([rows.shape[0] for rows in trace.windows]) * 1e-3 * machine.motor.plant["pwm_hz"]
     variance = noise_variance(campaign, machine, omega, 1.0) / periods
     own = [information(rows[[k, k + count]], np.full(2, variance[k])) for k in range(count)]
-    deviation = torque_deviation(learnt, own, torque_jacobian(physics, x, seen, omega))
+    deviation = torque_deviation(information_of_drive, own, torque_jacobian(physics, x, seen, omega))
     requested = means[:, trace.columns.index("torque_requested_Nm")]
     base = np.maximum(np.abs(requested), 0.1 * machine.rated_Nm)
     return [float(value) for value in 100.0 * deviation / base]

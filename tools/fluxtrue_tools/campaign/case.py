@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 RPM: Final = 2.0 * np.pi / 60.0
 DRIVE_ROW_S: Final = 0.01
 WINDOW_ROW_S: Final = 0.001
-START_S: Final = 0.1  # gates on, no torque
+START_S: Final = 0.1  # switching enabled, no torque
 TRANSITION_S: Final = 0.05  # at least, from one window to the next
 
 CHANNELS: Final = ("truth.time_s", "torque_requested_Nm", "truth.torque_mean_Nm", "truth.speed_rad_s", "truth.i_d_A",
@@ -50,7 +50,7 @@ def make_plan(campaign: Campaign, machine: Machine, case: int) -> Plan:
 
 @dataclass
 class Trace:
-    """Rows of one controller's run, for who wants to look closely."""
+    """Rows of one controller's run, for a closer analysis."""
 
     columns: list[str]
     drive: Array

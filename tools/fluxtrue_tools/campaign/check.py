@@ -105,8 +105,8 @@ def _reach(campaign: Campaign, machine: Machine) -> Iterator[str]:
     starts += [(f"windows.low_speed_rpm.{k}", speed) for k, speed in enumerate(windows.low_speed_rpm)]
     for key, speed in starts:
         if envelope.at(speed) < windows.torque_min_Nm:
-            most = strict.down(envelope.at(speed))
-            yield (f"windows.torque_min_Nm = {windows.torque_min_Nm:g} N·m, allowed: up to {most:g} N·m "
+            torque_max = strict.down(envelope.at(speed))
+            yield (f"windows.torque_min_Nm = {windows.torque_min_Nm:g} N·m, allowed: up to {torque_max:g} N·m "
                    f"(what motor {name} can give at {speed:g} rpm, where {key} begins)")  # fmt: skip
 
 

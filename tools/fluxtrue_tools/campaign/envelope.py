@@ -16,7 +16,7 @@ from fluxtrue_tools.motor.derived import V_RATIO_REFERENCE
 Array = NDArray[np.float64]
 NODES: Final = 121
 SPEEDS: Final = 41
-MARGIN: Final = 0.97  # of what the plant can give: a controller needs room to correct
+MARGIN: Final = 0.97  # of what the plant can give: a controller needs a margin to correct
 NOTHING_WRONG: Final = {"magnet_scale": 1.0, "lq_scale": 1.0, "ld_slope_scale": 1.0, "cross_saturation_scale": 1.0,
                         "resistance_scale": 1.0}  # fmt: skip
 

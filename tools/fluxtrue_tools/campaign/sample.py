@@ -23,7 +23,7 @@ class Draws:
 
 
 def draws(seed: int, case: int) -> Draws:
-    """The streams of a case, whoever runs it and in whatever order."""
+    """The streams of a case, independent of process and order."""
     streams = np.random.SeedSequence(seed, spawn_key=(case,)).spawn(4)
     generators = [np.random.default_rng(stream) for stream in streams[:3]]
     # The plant takes its seed through a double.

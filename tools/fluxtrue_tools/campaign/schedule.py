@@ -17,7 +17,7 @@ SCHEDULER_S = 60  # a busy one answers, too
 
 
 def _worker() -> None:
-    """The parent alone answers Ctrl-C; and nobody is left waiting when it is killed."""
+    """The parent alone answers Ctrl-C; and no process keeps waiting when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform == "linux":

@@ -13,7 +13,7 @@ from fluxtrue_tools.demo.experiment import Bound
 
 LOW, HIGH, CRAWL = "low", "high", "crawl"
 BANDS: Final = (LOW, HIGH)
-CRAWL_RPM: Final = 299.999  # below it only harm is judged
+CRAWL_RPM: Final = 299.999  # below it only harm is evaluated
 
 
 def band_of(speed_rpm: pd.Series, split_rpm: float) -> pd.Series:

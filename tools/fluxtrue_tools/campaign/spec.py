@@ -72,7 +72,7 @@ class Vehicle(Strict):
 
 
 class Drive(Strict):
-    """The warm-up drive that the controller learns from."""
+    """The warm-up drive in which the controller identifies the machine."""
 
     duration_s: Annotated[Number, Field(ge=1, le=600)] = 60.0
     vehicle: Vehicle = Vehicle()

@@ -48,13 +48,13 @@ def _mark(axes: Axes, first: float, last: float, text: str, colour: str) -> None
 
 
 def _zoom(axes: Axes, requested: float) -> None:
-    """Ten percent must look like ten percent."""
+    """The axis shows at least ten percent."""
     axes.set_ylim(0.84 * requested, 1.06 * requested)
 
 
 @_styled
 def story(run: Recording, parts: Sequence[tuple[float, float, str, str]]) -> Figure:
-    """Torque lost and given back, and what the firmware learnt on the way."""
+    """Torque lost and given back, and what the firmware identified on the way."""
     figure, axes = _sheet(2, 1, (9, 5.2), sharex=True, height_ratios=[2, 1])
     top, bottom = axes[:, 0]
     torque(top, run)

@@ -37,7 +37,7 @@ def scenario(speed_rpm: float, torque_Nm: float, closed: bool, kind: str) -> dic
             "kind": kind,
             "torque_loop": closed,
             "identification": closed,
-            "identification_mode": "paper",  # learns a single point within a second
+            "identification_mode": "paper",  # identifies a single point within a second
             "dead_time_compensation": 0.95,
         },
         "profile": {

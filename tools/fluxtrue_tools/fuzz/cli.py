@@ -40,9 +40,9 @@ def _program(build_dir: Path | None) -> Path:
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def fuzz(frames: int, seed: int, build_dir: Path | None) -> None:
-    """Send random and mutated frames through the whole ECU, with sanitizers; a second opinion judges each millisecond.
+    """Send random and mutated frames through the whole ECU, with sanitizers; a model checks each millisecond.
 
-    Ends at the first frame that was accepted or refused wrongly, with 1; the seed makes it happen again.
+    Ends with exit code 1 at the first frame that was wrongly accepted or refused; the seed repeats it.
     """
     program = _program(build_dir)
     click.echo(f"{frames} frames, seed {seed}", err=True)

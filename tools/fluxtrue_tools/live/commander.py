@@ -96,8 +96,8 @@ class Commander:
             self.let_go()
         self._follow(state, refused, step_s)
         wanted = self.target_Nm if self.wish is Wish.DRIVE and state in RUNNING else 0.0
-        most = RAMP_Nm_per_s * step_s
-        self.torque_requested_Nm += min(max(wanted - self.torque_requested_Nm, -most), most)
+        step_max = RAMP_Nm_per_s * step_s
+        self.torque_requested_Nm += min(max(wanted - self.torque_requested_Nm, -step_max), step_max)
         if state not in RUNNING:
             self.torque_requested_Nm = 0.0
         # Switching ends only after the torque is gone.

@@ -66,7 +66,7 @@ logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
 
 
 class Link:
-    """One bus connection and the thread that commands, in the pace of whoever keeps the time."""
+    """One bus connection and the thread that commands, at the pace of the time base."""
 
     def __init__(self, bus: can.BusABC, pace: Pace, database: cantools.database.Database, commander: Commander,
                  samples: Samples, recorder: Recorder, stand: Stand | None = None) -> None:  # fmt: skip

@@ -112,7 +112,7 @@ def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, A
     """Buttons and slider."""
     link = session.link
     if link is None:
-        raise FluxtrueError("a replay obeys nobody")
+        raise FluxtrueError("a replay takes no commands")
     kind = message["type"]
     if session.hand is not None and session.hand is not socket and not session.hand.closed and kind != "off":
         raise FluxtrueError("another page has its hand on the slider")
@@ -127,7 +127,7 @@ def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, A
 
 
 def _drawn(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
-    """A page has drawn a batch. Somebody may be looking at it: its sign of life."""
+    """A page has drawn a batch. The page is alive."""
     session.drawn[socket] = int(_number(message.get("batch"), "batch"))
     session.changed.set()
     if message.get("visible") and session.hand is socket and session.link is not None:

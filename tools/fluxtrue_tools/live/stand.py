@@ -33,7 +33,7 @@ KNOBS: Final = {
 
 
 class Stand:
-    """The bench channel with a few knobs. Any thread; whoever lets time pass calls step()."""
+    """The bench channel with a few knobs. Any thread; the thread that advances the time calls step()."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -50,8 +50,8 @@ class Stand:
         """The plant follows its knobs."""
         values = {}
         for name, knob in KNOBS.items():
-            most = knob.per_s * seconds
-            change = min(max(self._target[name] - self._now[name], -most), most)
+            step_max = knob.per_s * seconds
+            change = min(max(self._target[name] - self._now[name], -step_max), step_max)
             if change:
                 self._now[name] += change
                 values[knob.parameter] = self._now[name] * knob.factor

@@ -23,7 +23,7 @@ TORQUE_MIN_SHARE = 0.1
 Q30 = 1 << 30
 
 STATES = ("R", "drop", "flux", "lq", "ld", "angle", "iron")
-# How fast what was learnt is forgotten: a winding and an inverter in a minute, a magnet in two, geometry in minutes.
+# Return to the prior: winding and inverter within a minute, magnet within two, geometry within minutes.
 LEAK_PER_S = (0.02, 0.02, 0.01, 0.003, 0.003, 0.003, 0.003)
 
 

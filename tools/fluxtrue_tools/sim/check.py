@@ -118,7 +118,7 @@ def refused(error: lib.LoopError, scenario: Scenario, motor: Motor, where: str) 
 
 
 def rows(scenario: Scenario, period_s: float, columns: int, where: str) -> int:
-    """PWM periods per row; the window must have a row to average, and the memory room for all of them."""
+    """PWM periods per row; the window must have a row to average, and all of them must fit the memory."""
     wanted, (first, last) = scenario.record_every_s, scenario.averaged()
     every = max(1, round(min(wanted, 2.0 * scenario.duration_s) / period_s))
     row_s = every * period_s

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of a scenario that have no effect in their combination: an error, because whoever wrote them meant something."""
+"""Keys of a scenario that have no effect in their combination: an error, because they were written for a purpose."""
 
 from collections.abc import Iterator
 from itertools import pairwise

@@ -53,7 +53,7 @@ def flux(axes: Axes, run: Recording) -> None:
     """Magnet flux, true and identified."""
     axes.plot(run["time_s"], 1e3 * run["true_psi_f_Vs"], color=TRUTH, label="plant")
     axes.plot(run["time_s"], 1e3 * run["psi_f_Vs"], color=ESTIMATE, lw=0.9, label="identified")
-    _room(axes, 1.0)
+    _widen(axes, 1.0)
     finish(axes, "Magnet flux ψ_f", "mV·s")
 
 
@@ -61,7 +61,7 @@ def resistance(axes: Axes, run: Recording) -> None:
     """Stator resistance, true and identified."""
     axes.plot(run["time_s"], 1e3 * run["true_r_ohm"], color=TRUTH, label="plant")
     axes.plot(run["time_s"], 1e3 * run["r_ohm"], color=ESTIMATE, lw=0.9, label="identified")
-    _room(axes, 0.5)
+    _widen(axes, 0.5)
     finish(axes, "Stator resistance R", "mΩ")
 
 
@@ -77,7 +77,7 @@ def _currents(axes: Axes, run: Recording) -> None:
 def _speed(axes: Axes, run: Recording) -> None:
     axes.plot(run["time_s"], run["true_speed_rpm"], color=TRUTH, label="plant")
     axes.plot(run["time_s"], run["speed_rpm"], color=ESTIMATE, lw=0.9, label="measured")
-    _room(axes, 10.0)
+    _widen(axes, 10.0)
     finish(axes, "Speed", "rpm")
 
 
@@ -95,33 +95,38 @@ def _scales(axes: Axes, run: Recording) -> None:
     for name, label, colour in (("lq_scale", "ψ_q", TRUTH), ("ld_scale", "ψ_d − ψ_f", ESTIMATE),
                                 ("iron_scale", "iron loss", SECOND)):  # fmt: skip
         axes.plot(now, run[name], color=colour, label=label)
-    _room(axes, 0.02)
+    _widen(axes, 0.02)
     finish(axes, "Identified scales of the motor data", "1")
 
 
-def _trust(axes: Axes, run: Recording) -> None:
+def _confidence(axes: Axes, run: Recording) -> None:
     now = run["time_s"]
-    axes.plot(now, run["torque_confidence"], color=TRUTH, label="confidence: the torque loop's share of its authority")
-    axes.plot(now, run["contradiction"], color=ESTIMATE, label="contradiction: what no parameter explains")
+    axes.plot(
+        now,
+        run["torque_confidence"],
+        color=TRUTH,
+        label="confidence: share of its authority that the torque loop may use",
+    )
+    axes.plot(now, run["mismatch_share"], color=ESTIMATE, label="mismatch: share of updates that no parameter explains")
     axes.set_ylim(-0.05, 1.05)
-    finish(axes, "Trust", "1")
+    finish(axes, "Confidence", "1")
 
 
 def _residues(axes: Axes, run: Recording) -> None:
     now = run["time_s"]
-    axes.plot(now, run["drop_V"], color=TRUTH, label="dead time and device drop left over, V")
-    axes.plot(now, np.degrees(run["angle_error_rad"]), color=ESTIMATE, label="angle, measured less true, ° electrical")
-    _room(axes, 0.5)
+    axes.plot(now, run["drop_V"], color=TRUTH, label="uncompensated dead time and device drop, V")
+    axes.plot(now, np.degrees(run["angle_error_rad"]), color=ESTIMATE, label="angle, measured minus true, ° electrical")
+    _widen(axes, 0.5)
     finish(axes, "Identified errors of inverter and angle", "V, °")
 
 
 def _local(axes: Axes, run: Recording) -> None:
-    axes.plot(run["time_s"], 1e3 * run["local_flux_Vs"], color=TRUTH, label="what parameters leave unexplained here")
-    _room(axes, 0.5)
+    axes.plot(run["time_s"], 1e3 * run["local_flux_Vs"], color=TRUTH, label="flux error that no parameter explains")
+    _widen(axes, 0.5)
     finish(axes, "Local flux error", "mV·s")
 
 
-def _room(axes: Axes, span: float) -> None:
+def _widen(axes: Axes, span: float) -> None:
     """A constant is drawn as a constant, not as the noise of its last digit."""
     low, high = axes.get_ylim()
     if high - low < span:
@@ -140,9 +145,9 @@ def _mark_faults(axes: Axes, run: Recording, named: bool) -> None:
 
 
 def figure(run: Recording, title: str) -> Figure:
-    """Torque, currents, flux, resistance, speed, voltages; of the firmware what else it learnt."""
+    """Torque, currents, flux, resistance, speed, voltages; of the firmware what else it identified."""
     panels = [torque, _currents, flux, resistance, _speed, _voltage]
-    panels += [_scales, _residues, _local, _trust] if "lq_scale" in run.columns else []
+    panels += [_scales, _residues, _local, _confidence] if "lq_scale" in run.columns else []
     rows = len(panels) // 2
     with plt.rc_context(STYLE):
         sheet, axes = plt.subplots(rows, 2, figsize=(11, 2.7 * rows), sharex=True, layout="constrained")

@@ -53,7 +53,7 @@ CHANNELS: Final = (
 """What is recorded; a truth column is a mean over its row, the rest the value at its end."""
 
 LEARNT: Final = ("drop_V", "lq_scale", "ld_scale", "angle_error_rad", "iron_scale", "local_flux_Vs",
-                 "torque_confidence", "contradiction", "parameter_clamped")  # fmt: skip
+                 "torque_confidence", "mismatch_share", "parameter_clamped")  # fmt: skip
 """What the firmware's robust identification knows besides; the twin and another mode have no more than defaults."""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds the image of a preset, for whoever wants to run it."""
+"""Builds the image of a preset."""
 
 from __future__ import annotations
 

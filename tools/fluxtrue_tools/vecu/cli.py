@@ -23,7 +23,7 @@ _PORT = click.IntRange(0, 65535)
 @click.option("--seed", type=click.IntRange(0, 2**53 - 1), default=1, show_default=True,
               help="Of the plant's random numbers.")  # fmt: skip
 @click.option("--nvm", type=paths.StateFile(),
-              help="Keep what is learnt in this file; without it a power cycle forgets.")  # fmt: skip
+              help="Keep what is identified in this file; without it nothing survives a power cycle.")  # fmt: skip
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the program from this build folder as it is.")  # fmt: skip
 def vecu(

@@ -62,8 +62,8 @@ function chart(id, height, series, data, range) {
 function atLeast(span) {
   return (_, lo, hi) => {
     if (lo == null) return [-span / 2, span / 2];
-    const room = Math.max(span - (hi - lo), 0.08 * (hi - lo)) / 2;
-    return [lo - room, hi + room];
+    const margin = Math.max(span - (hi - lo), 0.08 * (hi - lo)) / 2;
+    return [lo - margin, hi + margin];
   };
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "hal/host/learnt.h"
+#include "hal/host/identified.h"
 
 #include <math.h>
 
@@ -18,63 +18,63 @@ static double pu(int32_t x, double one, float base)
 static double value(const fluxtrue_t *d, identify_index_t index, float base)
 {
     const drive_t *drive = &d->drive;
-    const q31_t learnt = identify_value(&drive->motor.identify, &drive->task.identify, index);
-    return is_robust(d) ? pu(learnt, 2147483648.0, base) : 0.0;
+    const q31_t identified = identify_value(&drive->motor.identify, &drive->task.identify, index);
+    return is_robust(d) ? pu(identified, 2147483648.0, base) : 0.0;
 }
 
-double learnt_psi_f_Vs(const fluxtrue_t *d)
+double identified_psi_f_Vs(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
     return (double)m->psi_f_Vs + pu(d->drive.task.identification.psi_delta, 2147483648.0, m->bases.flux_Vs);
 }
 
-double learnt_r_ohm(const fluxtrue_t *d)
+double identified_r_ohm(const fluxtrue_t *d)
 {
     const motor_t *m = &d->drive.motor;
     return (double)m->r_ohm_20 + pu(d->drive.task.identification.r_delta, 2147483648.0, m->bases.resistance_ohm);
 }
 
-double learnt_drop_V(const fluxtrue_t *d)
+double identified_drop_V(const fluxtrue_t *d)
 {
     return value(d, IDENTIFY_DROP, d->drive.motor.bases.voltage_V);
 }
 
-double learnt_lq_scale(const fluxtrue_t *d)
+double identified_lq_scale(const fluxtrue_t *d)
 {
     return 1.0 + value(d, IDENTIFY_LQ, 1.0F);
 }
 
-double learnt_ld_scale(const fluxtrue_t *d)
+double identified_ld_scale(const fluxtrue_t *d)
 {
     return 1.0 + value(d, IDENTIFY_LD, 1.0F);
 }
 
-double learnt_angle_rad(const fluxtrue_t *d)
+double identified_angle_rad(const fluxtrue_t *d)
 {
     return value(d, IDENTIFY_ANGLE, 1.0F);
 }
 
-double learnt_iron_scale(const fluxtrue_t *d)
+double identified_iron_scale(const fluxtrue_t *d)
 {
     return 1.0 + value(d, IDENTIFY_IRON, 1.0F);
 }
 
-double learnt_clamped(const fluxtrue_t *d)
+double identified_clamped(const fluxtrue_t *d)
 {
     return (double)(is_robust(d) && d->drive.task.identify.clamped);
 }
 
-double learnt_confidence(const fluxtrue_t *d)
+double identified_confidence(const fluxtrue_t *d)
 {
     return is_robust(d) ? (double)d->drive.task.identify.confidence / 32767.0 : 1.0;
 }
 
-double learnt_contradiction(const fluxtrue_t *d)
+double identified_mismatch_share(const fluxtrue_t *d)
 {
     return is_robust(d) ? (double)d->drive.task.identify.mismatch_share / 32768.0 : 0.0;
 }
 
-double learnt_local_Vs(const fluxtrue_t *d)
+double identified_local_Vs(const fluxtrue_t *d)
 {
     const dq_q30_t local = d->drive.task.identify.local;
     const double length = hypot((double)local.d, (double)local.q);
