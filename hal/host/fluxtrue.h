@@ -41,8 +41,8 @@ FLUXTRUE_API const char *fluxtrue_name(int index);
 FLUXTRUE_API int fluxtrue_word(const char *name, int value, char *word, int size);
 /** What it means, a sentence; NULL for no such name or value. */
 FLUXTRUE_API const char *fluxtrue_explanation(const char *name, int value);
-/** The drive's flash, FLUXTRUE_MEMORY_SIZE bytes: what was learnt is saved there a moment after `enable` has gone to 0,
- *  and not more often than every five minutes. Carry it over to a new drive and it starts with that knowledge.
+/** The drive's flash, FLUXTRUE_MEMORY_SIZE bytes. The identified values are saved there 0.1 s after `enable` has gone
+ *  to 0, at most every five minutes. A new drive that is given this memory starts with them.
  *  FLUXTRUE_OUT_OF_RANGE: another size. */
 FLUXTRUE_API int fluxtrue_memory_read(const fluxtrue_t *drive, unsigned char *data, int size);
 /** Before the first step, as at power-on; FLUXTRUE_READ_ONLY afterwards. A record that is damaged or of another motor

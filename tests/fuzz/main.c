@@ -83,7 +83,7 @@ static void put(can_frame_t frame)
     tally.frames++;
 }
 
-/* Calm stretches, in which the drive comes to run, and attacks of every intensity. */
+/* Phases of normal traffic, in which the drive reaches the state run, and attacks of every intensity. */
 static void traffic(uint32_t ms)
 {
     const uint32_t mood = (ms / 2000U) % 4U;

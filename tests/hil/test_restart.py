@@ -14,7 +14,7 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
 
 FLASH_BYTES = 4096
-LEARNT = ("psi_f_Vs", "lq_scale", "ld_scale")
+IDENTIFIED = ("psi_f_Vs", "lq_scale", "ld_scale")
 
 pytestmark = pytest.mark.program
 
@@ -34,7 +34,7 @@ def test_a_second_process_starts_with_what_the_first_has_identified(
         rig.ask(enable=False, mode="off", torque_Nm=0.0)
         rig.turn(0.0, 1.0)
         rig.advance(0.5)
-        before = rig.stand.get(*LEARNT)
+        before = rig.stand.get(*IDENTIFIED)
         bus.shutdown()
     assert flash.stat().st_size == FLASH_BYTES
     with make_vecu(nvm=flash) as ecu:
@@ -42,7 +42,7 @@ def test_a_second_process_starts_with_what_the_first_has_identified(
         assert stand.get("memory_recalled") == [1.0]
         stand.run(5.0)
         # The flux is transmitted after the first millisecond. With switching disabled only the leak acts.
-        assert stand.get(*LEARNT) == pytest.approx(before, rel=2e-3)
+        assert stand.get(*IDENTIFIED) == pytest.approx(before, rel=2e-3)
         assert before[0] < 0.94 * 0.0717
         stand.close()
 

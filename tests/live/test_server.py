@@ -66,7 +66,7 @@ class Drive:
         self.state = "run" if self._enabled else "ready" if self.order.mode == "torque" else "standby"
 
     def gap(self, seconds: float) -> None:
-        """Nobody sends a command."""
+        """No command is sent."""
         self.now_s += seconds
         self.commander.hand(self.now_s)
         if seconds > 0.03 and self._enabled:

@@ -88,7 +88,7 @@ def test_a_rotor_that_is_turned_ends_it_and_nothing_has_changed(hsm1: Motor) -> 
         assert loop.get("compensation_V") == before_V
 
 
-def test_without_closed_gates_it_does_not_start(hsm1: Motor) -> None:
+def test_without_switching_it_does_not_start(hsm1: Motor) -> None:
     with Loop(hsm1.library, hsm1.plant | {"imposed_speed": 1.0}, hsm1.flux_map) as loop:
         loop.run_s(0.1)
         loop.set("commission", 1.0)

@@ -242,7 +242,7 @@ def test_a_window_of_one_row_has_a_mean(hsm1: Motor, text: str) -> None:
     assert math.isfinite(run.mean("true_torque_Nm"))
 
 
-@pytest.mark.parametrize("motor", ["a\x00b", "~nobody-of-that-name/x"])
+@pytest.mark.parametrize("motor", ["a\x00b", "~no-such-user/x"])
 def test_a_motor_that_is_no_path_is_refused(motor: str, tmp_path: Path) -> None:
     with pytest.raises(FluxtrueError, match="^motor "):
         locate(motor, tmp_path)

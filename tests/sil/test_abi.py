@@ -143,14 +143,14 @@ def test_what_is_set_is_what_is_read(make: Callable[[], Drive]) -> None:
         assert drive.get(name) == value
 
 
-def test_a_new_drive_keeps_its_gates_open_until_it_is_enabled(make: Callable[[], Drive]) -> None:
+def test_a_new_drive_does_not_switch_until_it_is_enabled(make: Callable[[], Drive]) -> None:
     drive = make()
     assert {drive.step(IDLE)[3] for _ in range(100)} == {0.0}
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
 @pytest.mark.parametrize("place", range(6), ids=INPUTS)
-def test_a_sample_that_is_no_number_opens_the_gates_at_once_and_leaves_a_fault_bit(
+def test_a_sample_that_is_nan_disables_switching_at_once_and_sets_a_fault_bit(
     make: Callable[[], Drive], place: int, bad: float
 ) -> None:
     drive = running(make())

@@ -30,9 +30,9 @@ FULL_SCALE_A = 400.0
 
 Point = tuple[float, float, float]
 # time, speed, torque: two seconds of identification.
-LEARN: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 100), (1.1, 3200, 50),
+IDENTIFY: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 100), (1.1, 3200, 50),
                       (1.5, 3200, -80), (1.9, 1500, 30)]  # fmt: skip
-LEARNT_S = 2.2
+IDENTIFIED_S = 2.2
 LOW_RPM, HIGH_RPM, LOW_WINDOWS, HIGH_WINDOWS = (300.0, 5000.0), (5000.0, 7500.0), 4, 2
 LOW_NM, HIGH_NM = (12.0, 100.0), (12.0, 45.0)
 MOVE_S, SETTLE_S, MEASURE_S, WINDOW_S = 0.12, 0.28, 0.12, 0.4
@@ -77,7 +77,7 @@ def windows(rng: np.random.Generator) -> list[Point]:
         points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(lowest), np.log(highest)))))
                    for a, b in pairwise(edges)]  # fmt: skip
     tour = points[::2] + points[1::2][::-1]
-    return [(LEARNT_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
+    return [(IDENTIFIED_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
 
 
 class Firmware:
@@ -138,10 +138,10 @@ def assert_accurate(plant: Plant, motor: str, rated_Nm: float) -> None:
     for k in range(PLANTS):
         rng = np.random.default_rng((SEED, k))
         spread, tour = draw(rng, k), windows(rng)
-        robust = errors(plant, motor, rated_Nm, spread, ROBUST, LEARN + tour, len(tour))
+        robust = errors(plant, motor, rated_Nm, spread, ROBUST, IDENTIFY + tour, len(tour))
         tables = robust
         if max(map(abs, robust)) > 2.0:
-            alone: list[Point] = [(0.0, 0, 0), *((t - LEARNT_S + 0.1, n, torque) for t, n, torque in tour)]
+            alone: list[Point] = [(0.0, 0, 0), *((t - IDENTIFIED_S + 0.1, n, torque) for t, n, torque in tour)]
             tables = errors(plant, motor, rated_Nm, spread, TABLES, alone, len(tour))
         harmless += sum(abs(a) <= max(abs(b) + 0.5, 2.0) for a, b in zip(robust, tables, strict=True))
         speeds += [n for _, n, _ in tour]

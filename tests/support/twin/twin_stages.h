@@ -113,8 +113,8 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
 
 /* --- identification -------------------------------------------------------------------------- */
 typedef struct {
-    double flux_gain;       /* 2 k_psi/w, 0 while the gate is closed */
-    double resistance_gain; /* 2 k_r/n, 0 while the gate is closed */
+    double flux_gain;       /* 2 k_psi/w, 0 holds the flux */
+    double resistance_gain; /* 2 k_r/n, 0 holds the resistance */
     double voltage_scale;   /* 1/sinc(w T_s/2) */
 } twin_mrai_schedule_t;
 

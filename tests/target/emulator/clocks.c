@@ -226,7 +226,7 @@ void pcc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
         emu_fail(emu, "write of PCC offset 0x%x: clock gates must not be changed in HSRUN", offset);
     }
     if ((old & value & CGC) != 0 && ((old ^ value) & 0x07000000U) != 0) {
-        emu_fail(emu, "write of PCC offset 0x%x: the clock source changes while the gate is open", offset);
+        emu_fail(emu, "write of PCC offset 0x%x: the clock source changes while the clock gate is enabled", offset);
     }
 }
 

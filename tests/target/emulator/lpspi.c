@@ -105,8 +105,8 @@ static void transfer(emu_t *emu, const peripheral_t *self)
     } else {
         const uint64_t begin = spi->busy_until > emu->s.now ? spi->busy_until : emu->s.now;
         spi->busy_until = begin + frame_ticks(emu, self, bits);
-        const uint32_t nobody = 0xFFFFFFFFU >> (32U - bits), sent = bus_get(emu, self, TDR);
-        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, sent, bits) : nobody;
+        const uint32_t no_answer = 0xFFFFFFFFU >> (32U - bits), sent = bus_get(emu, self, TDR);
+        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, sent, bits) : no_answer;
         spi->ready[spi->rx_count++] = spi->busy_until;
     }
 }

@@ -229,7 +229,7 @@ static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_
     return ended;
 }
 
-/* A victim that looks after the interrupts has handed nothing over before them. */
+/* A victim that reads its inputs after the interrupts has handed nothing over before them. */
 static bool explained(preempt_t *p, const drive_t *there)
 {
     for (int outcome = OLD; outcome < OUTCOMES; outcome++) {

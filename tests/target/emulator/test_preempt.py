@@ -121,7 +121,7 @@ def arrival(stand: Stand, by: int) -> Callable[[], None]:
     return lambda: stand.library.can_frame_arrives(stand.handle, ctypes.byref(frame))
 
 
-# Who looks at what the interrupt leaves, and so may be on either side of it; all others are not touched by it.
+# Activities that read what the interrupt writes may find either value; the interrupt does not affect the others.
 LOOKS = ((preempt.FAST, preempt.GATE), (preempt.TASK, preempt.GATE), (preempt.TASK, preempt.CAN))
 VICTIMS = {preempt.FAST: "fast", preempt.MRAI: "mrai", preempt.TASK: "task"}
 PAIRS = [(victim, by) for by in (preempt.GATE, preempt.CAN) for victim in VICTIMS]

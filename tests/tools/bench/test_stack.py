@@ -101,7 +101,7 @@ def test_a_listed_pointer_is_followed_and_a_wrong_list_is_an_error(tmp_path: Pat
     source += function("by_pointer", "sub sp, #16; add sp, #16; bx lr")
     found = nodes(tmp_path, source)
     assert worst(found, "start", start=["by_pointer"]) == (24, ("start", "by_pointer"), [])
-    assert "'nobody'" in worst(found, "start", start=["nobody"])[2][0]
+    assert "'missing'" in worst(found, "start", start=["missing"])[2][0]
 
 
 def test_functions_of_a_heap_are_found() -> None:

@@ -324,7 +324,7 @@ static commission_failure_t after(int ms, commission_in_t wrong)
     return state.failure;
 }
 
-void test_it_gives_up_when_the_rotor_moves_the_gates_open_the_voltage_is_cut_or_the_current_is_wrong(void)
+void test_it_fails_if_the_rotor_moves_switching_stops_the_voltage_is_limited_or_the_current_is_wrong(void)
 {
     const commission_in_t good = answer();
     commission_in_t in = good;

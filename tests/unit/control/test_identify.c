@@ -313,7 +313,7 @@ void test_a_persistent_mismatch_takes_the_confidence_away(void)
 }
 
 /* 0.15 of the base voltage in one axis alone, ten times the noise: the gate of that axis must see it. */
-void test_a_contradiction_in_either_axis_alone_takes_the_confidence_away(void)
+void test_a_mismatch_in_either_axis_alone_takes_the_confidence_away(void)
 {
     const dq_q15_t i = {-4000, 8000};
     for (int axis = 0; axis < 2; axis++) {
@@ -344,8 +344,8 @@ void test_a_parameter_at_its_limit_takes_the_confidence_away(void)
     TEST_ASSERT_FALSE(state.torque_certain);
 }
 
-/* With nothing learnt the torque is uncertain by about a tenth: enough where half of it may be wrong, but never at no
- * torque. */
+/* With nothing identified the torque is uncertain by about a tenth: enough where half of it may be wrong, but never at
+ * no torque. */
 void test_an_uncertainty_that_is_small_against_the_torque_is_confidence_enough(void)
 {
     enabled = false;

@@ -9,12 +9,12 @@
 static fixture_t f;
 static mrai_state_t state;
 static twin_mrai_state_t twin;
-static mrai_schedule_t schedule; /* all zero: gates closed, no voltage correction */
+static mrai_schedule_t schedule; /* all zero: no adaptation, no voltage correction */
 static twin_mrai_schedule_t twin_schedule;
 
 static const double q27 = 134217728.0;
 
-/* Both gates closed. */
+/* No adaptation. */
 static mrai_schedule_t voltage(int32_t minus_q28)
 {
     return (mrai_schedule_t){.minus_voltage_d_q28 = 2 * minus_q28, .minus_voltage_q28 = minus_q28};

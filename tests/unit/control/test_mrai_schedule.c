@@ -88,7 +88,7 @@ void test_disabled_identification_closes_both_gates_but_not_the_voltage_correcti
     TEST_ASSERT_EQUAL_INT32(2 * on.minus_voltage_q28, on.minus_voltage_d_q28);
 }
 
-void test_the_flux_gate_opens_at_its_speed_in_both_directions(void)
+void test_the_flux_adapts_from_its_speed_on_in_both_directions(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         at(-9000, 12000, sign * f.mrai.omega_min);
@@ -188,7 +188,7 @@ void test_the_resistance_law_waits_until_the_flux_has_settled(void)
     TEST_ASSERT_EQUAL_INT32(0, step(true).resistance_step_q26);
 }
 
-void test_closed_gates_and_clamped_parameters_lose_their_quality(void)
+void test_parameters_that_do_not_adapt_or_are_clamped_lose_their_quality(void)
 {
     at(-9000, 12000, 16000);
     quality.psi_quality = quality.r_quality = 32767;

@@ -11,7 +11,7 @@ static torque_limit_state_t state;
 static torque_limits_t limits;
 static torque_limit_in_t in;
 
-enum { RATED = 19661, ROOM_C = 200 };
+enum { RATED = 19661, AMBIENT_C = 200 };
 
 static q15_t counts(double x)
 {
@@ -29,8 +29,8 @@ void setUp(void)
                              .omega = counts(0.5),
                              .v_dc = 21845,
                              .reach = INT16_MAX,
-                             .inverter_dC = ROOM_C,
-                             .winding_dC = ROOM_C};
+                             .inverter_dC = AMBIENT_C,
+                             .winding_dC = AMBIENT_C};
 }
 
 void tearDown(void)
@@ -180,7 +180,7 @@ void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves
     in.inverter_dC = TEMPERATURE_UNKNOWN;
     in.winding_dC = TEMPERATURE_UNKNOWN;
     TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
-    in.winding_dC = ROOM_C;
+    in.winding_dC = AMBIENT_C;
     (void)step();
     in.winding_dC = TEMPERATURE_UNKNOWN;
     TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque_limited);

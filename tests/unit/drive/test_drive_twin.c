@@ -127,7 +127,7 @@ void test_the_whole_drive_switches_as_its_twin_in_field_weakening(void)
     drive_at(5000.0, 40.0);
 }
 
-void test_both_open_the_gates_in_the_same_period(void)
+void test_both_disable_switching_in_the_same_period(void)
 {
     machine_t m = {0};
     twin_set(twin, "enable", 1.0);

@@ -75,7 +75,7 @@ void test_the_flux_of_the_robust_identification_is_fed_forward_from_the_next_per
 }
 
 /* Switching is disabled before anything else is written. */
-void test_while_off_the_gates_open_first_and_the_duties_rest_in_the_middle(void)
+void test_while_off_switching_is_disabled_first_and_the_duties_are_one_half(void)
 {
     seam_period();
     TEST_ASSERT_EQUAL_STRING("ar-w", seam.log);
@@ -85,7 +85,7 @@ void test_while_off_the_gates_open_first_and_the_duties_rest_in_the_middle(void)
     TEST_ASSERT_EQUAL_INT(16384, seam.duty.c);
 }
 
-void test_an_over_current_opens_the_gates_in_the_same_period_and_stays_latched(void)
+void test_an_over_current_disables_switching_in_the_same_period_and_stays_latched(void)
 {
     seam_run();
     seam_periods(3);
@@ -161,7 +161,7 @@ void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
     shorted(false);
 }
 
-void test_an_over_voltage_never_closes_the_gates_of_a_bridge_that_has_not_run(void)
+void test_an_over_voltage_never_enables_a_bridge_that_has_not_run(void)
 {
     seam_voltage(450.0);
     seam_periods(30);
@@ -182,7 +182,7 @@ void test_what_the_tasks_monitors_find_is_latched_and_stops_the_bridge(void)
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
 }
 
-void test_a_fault_raised_elsewhere_opens_the_gates_with_the_next_period(void)
+void test_a_fault_raised_elsewhere_disables_switching_in_the_next_period(void)
 {
     seam_run();
     seam_periods(3);

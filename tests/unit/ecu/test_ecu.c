@@ -83,7 +83,7 @@ void setUp(void)
 {
     gate_fault = mailboxes_full = mrai_hangs = false;
     watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
-    arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an identifier that nobody knows */
+    arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an unknown identifier */
     hal_adc_read_Stub(adc_read);
     hal_angle_read_IgnoreAndReturn(0);
     hal_irq_pend_mrai_Stub(pend);
@@ -324,7 +324,7 @@ void test_the_first_fault_freezes_what_was_before_it(void)
     }
     TEST_ASSERT_EQUAL_INT(-50, frame.speed_rpm[frame.oldest]);
     TEST_ASSERT_EQUAL_INT(32767, frame.speed_rpm[(frame.oldest + 30U) % FREEZE_FRAME_SAMPLES]);
-    /* Forgotten: it records again, and the next fault is kept. */
+    /* After the reset it records again, and the next fault is kept. */
     now.fault_word = 0;
     freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
     TEST_ASSERT_EQUAL_INT(0, frame.frozen);

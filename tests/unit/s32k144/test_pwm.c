@@ -67,7 +67,7 @@ void test_compare_values_are_released_together_after_the_last(void)
     TEST_ASSERT_EQUAL_HEX32(FTM_SYNC_CNTMAX | FTM_SYNC_SYNCHOM | FTM_SYNC_SWSYNC | FTM_SYNC_TRIG0, FTM0->SYNC);
 }
 
-void test_start_up_leaves_the_gates_open_and_the_configuration_locked(void)
+void test_after_start_up_switching_is_disabled_and_the_configuration_locked(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
@@ -131,7 +131,7 @@ void test_sampling_by_hand_leaves_the_gates_held_and_the_line_to_the_timer(void)
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
 }
 
-void test_closing_the_gates_waits_for_the_period_and_opening_does_not(void)
+void test_enabling_waits_for_the_period_and_disabling_does_not(void)
 {
     hal_pwm_enable(true);
     TEST_ASSERT_EQUAL_HEX32(0, FTM0->OUTMASK);
@@ -167,7 +167,7 @@ void test_a_fault_that_lasts_keeps_being_reported(void)
     TEST_ASSERT_TRUE(pwm_fault_reported());
 }
 
-void test_closing_the_gates_clears_a_fault_only_when_it_is_over(void)
+void test_enabling_clears_a_fault_only_when_it_has_ended(void)
 {
     FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_FAULTIN | FTM_FMS_WPEN;
     hal_pwm_enable(true);

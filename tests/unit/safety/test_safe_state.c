@@ -25,7 +25,7 @@ static bool at(double omega)
     return safe_state_step(&config, &state, &in);
 }
 
-void test_at_low_speed_the_gates_open_and_at_high_speed_the_phases_are_shorted(void)
+void test_at_low_speed_switching_is_disabled_and_at_high_speed_the_phases_are_shorted(void)
 {
     TEST_ASSERT_FALSE(at(0.0));
     TEST_ASSERT_FALSE(at(0.5));

@@ -95,7 +95,7 @@ class InStep:
             self._changed.notify_all()
 
     def release(self) -> None:
-        """Nobody will draw any more."""
+        """No page will draw any more."""
         with self._changed:
             self._open, self._due = True, False
             self._changed.notify_all()

@@ -52,7 +52,7 @@ CHANNELS: Final = (
 )
 """What is recorded; a truth column is a mean over its row, the rest the value at its end."""
 
-LEARNT: Final = ("drop_V", "lq_scale", "ld_scale", "angle_error_rad", "iron_scale", "local_flux_Vs",
+IDENTIFIED: Final = ("drop_V", "lq_scale", "ld_scale", "angle_error_rad", "iron_scale", "local_flux_Vs",
                  "torque_confidence", "mismatch_share", "parameter_clamped")  # fmt: skip
 """What the firmware's robust identification knows besides; the twin and another mode have no more than defaults."""
 
@@ -182,7 +182,7 @@ def simulate(
     scenario = scenario.resolved(motor.torque_max_Nm, motor.speed_max_rpm)
     check.effective(scenario, motor, where)
     if channels is None:
-        channels = (*CHANNELS, *LEARNT) if scenario.controller.kind == "firmware" else CHANNELS
+        channels = (*CHANNELS, *IDENTIFIED) if scenario.controller.kind == "firmware" else CHANNELS
     columns = [column_name(c) for c in channels]
     with _start(scenario, motor, where) as probe:  # a whole run without its periods
         check.speed(scenario, motor, probe.period_s, where)
