@@ -21,6 +21,7 @@
 #include "drive/motor.h"
 #include "types/features.h"
 #include "types/identification.h"
+#include "types/motor_check.h"
 #include "types/torque_limits.h"
 
 #if FLUXTRUE_MRAI
@@ -68,6 +69,7 @@ typedef struct {
     dq_q15_t u_next;              /* voltage of the next period, which the duties just written will make */
     identify_window_t window;     /* of the robust identification, being summed up */
     uint8_t periods_since_enable; /* saturates at 3: from then on the voltage of the whole last period is known */
+    uint8_t motor_check;          /* motor_check_t: the first check of the motor data that failed */
     bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
     uint32_t fault_resets;        /* of the command, as far as carried out */
     volatile uint32_t faults;     /* latched */
@@ -143,6 +145,14 @@ typedef struct {
 
 void drive_init(drive_t *drive, const motor_t *source);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
+/** FAULT_CONFIG, and why: the first check that failed is kept until the next start. Nothing for MOTOR_CHECK_OK. From
+ * the fast ISR's priority, or before the interrupts start. */
+void drive_refuse(drive_t *drive, motor_check_t check);
+/** What FAULT_CONFIG stands for; MOTOR_CHECK_OK while there is none. From any priority. */
+static inline motor_check_t drive_motor_check(const drive_t *drive)
+{
+    return (motor_check_t)drive->fast.motor_check;
+}
 
 /** The identified values, for the store that survives a power cycle. Called in the background. */
 identify_record_t drive_identified_record(const drive_t *drive);

@@ -3,7 +3,7 @@
 #define DRIVE_MOTOR_H
 /** Everything that depends on the machine and its inverter: one constant, generated from motor.toml and the flux map.
  * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
- * Errors   motor_valid() checks tables and limits at start-up
+ * Errors   motor_check() names the first of tables, gains and limits that no drive may run with
  * Context  const data in flash */
 #include "control/adapt/angle_harmonics.h"
 #include "control/commission/commission.h"
@@ -24,6 +24,7 @@
 #include "safety/safe_state.h"
 #include "safety/torque_monitor.h"
 #include "types/bases.h"
+#include "types/motor_check.h"
 
 typedef struct {
     const char *name;
@@ -62,7 +63,8 @@ typedef struct {
 
 extern const motor_t motor;
 
-bool motor_valid(const motor_t *motor);
+/** The first check that fails, in the order of the signal; MOTOR_CHECK_OK if none does. */
+motor_check_t motor_check(const motor_t *motor);
 
 /** The largest current_control.clear_q30 for this dead time. */
 uint32_t motor_clear_q30(const motor_t *motor, int32_t dead_time);

@@ -50,7 +50,7 @@ static __attribute__((noinline, cold)) void alarms_take(void)
         drive_raise_fault(&ecu.drive, FAULT_INPUT);
     }
     if (alarms.data_damaged) {
-        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+        drive_refuse(&ecu.drive, MOTOR_CHECK_IMAGE_CHECKSUM);
     }
 }
 
@@ -182,7 +182,7 @@ __attribute__((noinline)) int main(void)
     pwm_config_t pwm = stopped;
     const bool drivable = !alarms.data_damaged && timing(&pwm);
     if (!drivable) {
-        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
+        drive_refuse(&ecu.drive, alarms.data_damaged ? MOTOR_CHECK_IMAGE_CHECKSUM : MOTOR_CHECK_PWM_TIMER);
     }
     init_hardware(&pwm, drivable ? motor.bases.periods_per_step : STOPPED_PERIODS);
     enable_interrupts();

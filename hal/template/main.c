@@ -49,9 +49,7 @@ int main(void)
 {
     const bool intact = data_are_intact();
     ecu_init(&ecu, &motor);
-    if (!intact) {
-        drive_raise_fault(&ecu.drive, FAULT_CONFIG);
-    }
+    drive_refuse(&ecu.drive, intact ? MOTOR_CHECK_OK : MOTOR_CHECK_IMAGE_CHECKSUM);
     init_hardware();
     if (intact) {
         start_timers();

@@ -30,7 +30,7 @@ LIMITS = (
     Limit("tests", ".py", 60, 20),
 )
 # A configuration's check is one chain of comparisons: many paths, nothing to lose one's way in.
-VALIDATOR, VALIDATOR_COMPLEXITY = "_valid", 30
+VALIDATOR, VALIDATOR_COMPLEXITY = "_check", 30
 
 
 def limit_for(path: Path) -> Limit | None:

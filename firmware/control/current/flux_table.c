@@ -5,19 +5,21 @@
 
 #include "fx/q.h"
 
-__attribute__((cold)) bool flux_table_valid(const flux_table_config_t *config)
+__attribute__((cold)) motor_check_t flux_table_check(const flux_table_config_t *config)
 {
-    const bool tables = config->l_d && config->l_q && config->l_qq && config->g && config->psi_f0;
-    if (!tables || !fx_mesh_valid(&config->mesh) || config->l_shift > 13 || config->i_scale != 8 << config->l_shift) {
-        return false;
+    if (!config->l_d || !config->l_q || !config->l_qq || !config->g || !config->psi_f0) {
+        return MOTOR_CHECK_FLUX_TABLE_MISSING;
+    }
+    if (!fx_mesh_valid(&config->mesh) || config->l_shift > 13 || config->i_scale != 8 << config->l_shift) {
+        return MOTOR_CHECK_FLUX_TABLE_GRID;
     }
     const size_t nodes = (size_t)((config->mesh.x_last >> 14) + 2U) * config->mesh.ny;
     for (size_t k = 0; k < nodes; k++) {
         if (config->l_q[k] <= 0 || config->l_qq[k] <= 0 || config->g[k] <= 0) {
-            return false;
+            return MOTOR_CHECK_FLUX_TABLE_VALUE;
         }
     }
-    return true;
+    return MOTOR_CHECK_OK;
 }
 
 static fx_cell_t cell_of(const flux_table_config_t *config, dq_q15_t i)

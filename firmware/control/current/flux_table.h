@@ -7,13 +7,14 @@
  * Units    currents per unit of I_b; results as in flux_table_types.h
  * Range    i_d, i_q anywhere in q15; outside the grid the value at its edge is used, which flux_table_outside() reports
  * Rounding 1 LSB q15 per interpolated quantity; psi: 1/2 LSB of psi_f0 and 1/2 of the product with an l of 29 bits
- * Errors   none; flux_table_valid() rejects a bad table at start-up
+ * Errors   none; flux_table_check() rejects a bad table at start-up
  * Context  step: fast ISR, once per period; the others: tasks; no division, no loop */
 #include <stdint.h>
 
 #include "control/current/flux_table_types.h"
 #include "fx/lookup.h"
 #include "types/frames.h"
+#include "types/motor_check.h"
 
 typedef struct {
     fx_mesh_t mesh;           /* x: i_d from x0 in q15 counts, y: |i_q| from 0 */
@@ -24,7 +25,7 @@ typedef struct {
     uint8_t l_shift; /* inductances are stored as l / 2^l_shift */
 } flux_table_config_t;
 
-bool flux_table_valid(const flux_table_config_t *config);
+motor_check_t flux_table_check(const flux_table_config_t *config);
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_q15_t i);
 flux_inductances_t flux_table_inductances(const flux_table_config_t *config, dq_q15_t i);
 

@@ -4,11 +4,14 @@
 /** Data of the robust identification: the machine's constants and their uncertainty before the first drive.
  * Source   docs/theory/identification.md; written by `tools/fluxtrue motor build` from [identification]
  * Units    per unit; sigma[k] is one standard deviation of the prior of state k
- * Range    identify_valid() checks it at start-up
+ * Range    identify_check() checks it at start-up
  * Context  const data */
 #include <stdbool.h>
 
 #include "fx/q.h"
+#include "types/motor_check.h"
+
+#define IDENTIFY_ONE_Q30 (1 << 30) /* the variance of a prior */
 
 /** What is identified; each state is carried as a multiple of its prior's standard deviation. */
 typedef enum {
@@ -50,6 +53,6 @@ typedef struct {
     q15_t confidence_rate; /* of the confidence, per update */
 } identify_config_t;
 
-bool identify_valid(const identify_config_t *config);
+motor_check_t identify_check(const identify_config_t *config);
 
 #endif

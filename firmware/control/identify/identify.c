@@ -7,27 +7,11 @@
 #define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
 #define REFERENCE_dC 200   /* 20 C */
 #define MISMATCH_MAX Q15(0.5)
-#define NOISE_MIN_Q30 (1 << 19) /* its square is the smallest innovation variance of the Kalman filter */
 
 typedef struct {
     dq_q30_t psi, i;    /* identified */
     int32_t magnet_q30; /* psi_d minus the tables', without the local error: for the current control */
 } corrected_t;
-
-bool identify_valid(const identify_config_t *c)
-{
-    bool good = c->r0 > 0 && c->mean_gain_q32 > 0 && c->rate_gain_q28 > 0 && c->window_turns_q29 > 0 &&
-                c->turn_to_pu > 0 && c->noise_voltage_q30 >= NOISE_MIN_Q30 && c->noise_flux_q30 >= 0 &&
-                c->noise_rate_q30 >= 0 && c->r_known_q30 > 0 && c->r_known_q30 <= IDENTIFY_ONE_Q30 && c->l_shift <= 14;
-    good = good && c->omega_min > 0 && c->i_min > 0 && c->i_smooth > 0 && c->i_smooth <= c->i_min &&
-           c->local_corner > 0 && c->local_rate > 0 && c->torque_min > 0 && c->confidence_rate > 0 &&
-           c->limited_noise > 0 && c->mismatch_rate > 0 && c->confidence_full > 0 &&
-           c->confidence_full < c->confidence_none;
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        good = good && c->sigma[j] > 0 && c->leak[j] > 0 && c->leak[j] <= Q31(0.25);
-    }
-    return good;
-}
 
 void identify_reset(const identify_config_t *config, identify_state_t *state)
 {

@@ -3,7 +3,7 @@
 
 #define X_MAX_Q27 (4 * IDENTIFY_ONE_Q27)
 #define INNOVATION_MAX_Q30 (1 << 26)
-#define S_MIN_Q60 (INT64_C(1) << 38) /* the square of the smallest noise that identify_valid() accepts */
+#define S_MIN_Q60 (INT64_C(1) << 38) /* the square of the smallest noise that identify_check() accepts */
 #define GATE_SHIFT 3                 /* e^2 > 8 h P h' + r; r counts one error many times over (ID-14) */
 #define DIVISOR_BITS 16
 

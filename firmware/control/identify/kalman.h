@@ -19,7 +19,6 @@
 #include "control/identify/model.h"
 
 #define IDENTIFY_ONE_Q27 (1 << 27)
-#define IDENTIFY_ONE_Q30 (1 << 30)
 #define KALMAN_P_SIZE (IDENTIFY_STATES * (IDENTIFY_STATES + 1) / 2)
 
 typedef struct {

@@ -31,14 +31,19 @@ static bool are_limits_valid(q31_t lo, q31_t hi)
     return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
 }
 
-bool mrai_valid(const mrai_config_t *config)
+motor_check_t mrai_check(const mrai_config_t *c)
 {
-    const bool gains = config->r0 > 0 && config->pole_gain > 0 && config->period > 0 && config->period <= Q31(0.78) &&
-                       config->flux_gain >= 0 && config->resistance_gain >= 0 && config->flux_proportional_q24 >= 0 &&
-                       config->resistance_proportional_q24 >= 0;
-    return gains && are_limits_valid(config->psi_delta_min, config->psi_delta_max) &&
-           are_limits_valid(config->r_delta_min, config->r_delta_max) && config->omega_min > 0 &&
-           config->psi_drift_full > 0 && config->r_drift_full > 0;
+    if (c->r0 <= 0 || c->pole_gain <= 0 || c->period <= 0 || c->period > Q31(0.78) || c->flux_gain < 0 ||
+        c->resistance_gain < 0 || c->flux_proportional_q24 < 0 || c->resistance_proportional_q24 < 0) {
+        return MOTOR_CHECK_MRAI_GAINS;
+    }
+    if (!are_limits_valid(c->psi_delta_min, c->psi_delta_max) || !are_limits_valid(c->r_delta_min, c->r_delta_max)) {
+        return MOTOR_CHECK_MRAI_LIMITS;
+    }
+    if (c->omega_min <= 0 || c->psi_drift_full <= 0 || c->r_drift_full <= 0) {
+        return MOTOR_CHECK_MRAI_GATES;
+    }
+    return MOTOR_CHECK_OK;
 }
 
 /* Q27 to Q35, limited. */

@@ -22,6 +22,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "types/motor_check.h"
 #include "types/operating_point.h"
 
 /** In the order of use: what every period reads comes first. */
@@ -59,7 +60,7 @@ typedef struct {
     q31_t psi_delta, r_delta;                 /* integral parts: the identified parameters */
 } mrai_state_t;
 
-bool mrai_valid(const mrai_config_t *config);
+motor_check_t mrai_check(const mrai_config_t *config);
 /** Sets the observer error to 0 at this sample; the identified parameters are kept. */
 void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
                 const operating_point_t *in);

@@ -7,20 +7,22 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 
-bool current_reference_valid(const current_reference_config_t *config)
+motor_check_t current_reference_check(const current_reference_config_t *config)
 {
     const fx_grid_t *grid = &config->grid;
-    const bool axes = fx_axis_valid(grid->x_shift, grid->nx) && fx_axis_valid(grid->y_shift, grid->ny) &&
-                      fx_axis_valid(config->torque_max.shift, config->torque_max.n);
-    if (!config->i_d || !config->i_q || !config->torque_max.y || !axes || config->i_max <= 0) {
-        return false;
+    if (!config->i_d || !config->i_q || !config->torque_max.y) {
+        return MOTOR_CHECK_REFERENCE_TABLE_MISSING;
+    }
+    if (!fx_axis_valid(grid->x_shift, grid->nx) || !fx_axis_valid(grid->y_shift, grid->ny) ||
+        !fx_axis_valid(config->torque_max.shift, config->torque_max.n)) {
+        return MOTOR_CHECK_REFERENCE_TABLE_GRID;
     }
     for (size_t k = 0; k < (size_t)grid->nx * grid->ny; k++) {
         if (config->i_d[k] > 0 || config->i_q[k] < 0) {
-            return false;
+            return MOTOR_CHECK_REFERENCE_TABLE_VALUE;
         }
     }
-    return true;
+    return (config->i_max > 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_CURRENT_MAX;
 }
 
 /* (v_ratio v_dc - r |i| + v_trim)/|w| - shift (CR-2), (CR-9). The quotient may reach 2^30, so that the shift has no

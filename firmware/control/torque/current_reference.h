@@ -20,6 +20,7 @@
 
 #include "fx/lookup.h"
 #include "types/frames.h"
+#include "types/motor_check.h"
 
 typedef struct {
     fx_grid_t grid;       /* x: |T| from 0, y: psi_avail from y0, both q15 */
@@ -51,7 +52,7 @@ typedef struct {
     bool i_d_limited;
 } current_reference_t;
 
-bool current_reference_valid(const current_reference_config_t *config);
+motor_check_t current_reference_check(const current_reference_config_t *config);
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in);
 
 #endif

@@ -8,11 +8,27 @@
 #define LOSS_MAX Q31(0.25)
 #define FACTOR_SENSOR_LOST Q15(0.5)
 
-bool torque_limit_valid(const torque_limit_config_t *config)
+motor_check_t torque_limit_check(const torque_limit_config_t *config)
 {
-    return config->torque_max > 0 && config->drop >= 0 && config->loss_rate > 0 && config->moving.gain > 0 &&
-           config->inverter.gain < 0 && config->winding.gain < 0 && config->dc_low.gain > 0 &&
-           config->dc_high.gain < 0 && config->speed.gain < 0;
+    if (config->torque_max <= 0 || config->drop < 0 || config->loss_rate <= 0) {
+        return MOTOR_CHECK_TORQUE_LIMIT;
+    }
+    if (config->moving.gain <= 0) {
+        return MOTOR_CHECK_DERATING_STANDSTILL;
+    }
+    if (config->inverter.gain >= 0) {
+        return MOTOR_CHECK_DERATING_INVERTER;
+    }
+    if (config->winding.gain >= 0) {
+        return MOTOR_CHECK_DERATING_WINDING;
+    }
+    if (config->dc_low.gain <= 0) {
+        return MOTOR_CHECK_DERATING_DC_LOW;
+    }
+    if (config->dc_high.gain >= 0) {
+        return MOTOR_CHECK_DERATING_DC_HIGH;
+    }
+    return (config->speed.gain < 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_DERATING_SPEED;
 }
 
 /* (x - end)/(start - end), 0 ... 1 (LM-4). */

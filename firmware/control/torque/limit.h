@@ -18,6 +18,7 @@
 #include <stdint.h>
 
 #include "types/frames.h"
+#include "types/motor_check.h"
 #include "types/torque_limits.h"
 
 #define TEMPERATURE_UNKNOWN INT16_MIN
@@ -74,7 +75,7 @@ typedef struct {
     uint16_t derating;
 } torque_limit_t;
 
-bool torque_limit_valid(const torque_limit_config_t *config);
+motor_check_t torque_limit_check(const torque_limit_config_t *config);
 torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_limit_state_t *state,
                                  const torque_limit_in_t *in);
 

@@ -12,9 +12,9 @@
 
 #if FLUXTRUE_MRAI
 
-static inline bool mrai_data_valid(const motor_t *m)
+static inline motor_check_t mrai_data_check(const motor_t *m)
 {
-    return mrai_valid(&m->mrai);
+    return mrai_check(&m->mrai);
 }
 
 static inline bool mrai_is_chosen(const drive_t *drive)
@@ -51,10 +51,10 @@ static inline uint32_t mrai_overruns(const drive_t *drive)
 
 #else
 
-static inline bool mrai_data_valid(const motor_t *m)
+static inline motor_check_t mrai_data_check(const motor_t *m)
 {
     (void)m;
-    return true;
+    return MOTOR_CHECK_OK;
 }
 
 static inline bool mrai_is_chosen(const drive_t *drive)

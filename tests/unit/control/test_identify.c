@@ -408,12 +408,12 @@ void test_the_whole_agrees_with_the_twin_after_a_minute(void)
 
 void test_bad_configurations_are_rejected(void)
 {
-    TEST_ASSERT_TRUE(identify_valid(&c));
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, identify_check(&c));
 #define BAD(change) \
     do { \
         identify_config_t bad = c; \
         bad.change; \
-        TEST_ASSERT_FALSE_MESSAGE(identify_valid(&bad), #change); \
+        TEST_ASSERT_NOT_EQUAL_INT_MESSAGE(MOTOR_CHECK_OK, identify_check(&bad), #change); \
     } while (0)
     BAD(r0 = 0);
     BAD(rate_gain_q28 = 0);

@@ -264,17 +264,17 @@ void test_the_limit_follows_the_twin(void)
 
 void test_lines_that_lead_the_wrong_way_are_rejected(void)
 {
-    TEST_ASSERT_TRUE(torque_limit_valid(&f.torque_limit));
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&f.torque_limit));
     torque_limit_config_t c = f.torque_limit;
     c.winding.gain = 1;
-    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c));
     c = f.torque_limit;
     c.dc_low.gain = -1;
-    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c));
     c = f.torque_limit;
     c.torque_max = 0;
-    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c));
     c = f.torque_limit;
     c.loss_rate = 0;
-    TEST_ASSERT_FALSE(torque_limit_valid(&c));
+    TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c));
 }

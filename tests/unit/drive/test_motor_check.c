@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Valid motor data with one thing broken at a time: the check that notices has that thing's name. */
+#include <string.h>
+
+#include "drive/drive.h"
+#include "unity.h"
+
+static int16_t table[4096]; /* a copy of one of the motor's, to be damaged */
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+/* The table's last value is the one that a check with a wrong size would miss. */
+static const int16_t *damaged(const int16_t *good, size_t n, int16_t last)
+{
+    TEST_ASSERT_LESS_OR_EQUAL(sizeof table / sizeof *table, n);
+    memcpy(table, good, n * sizeof *table);
+    table[n - 1U] = last;
+    return table;
+}
+
+static const int16_t *flux(const int16_t *good, int16_t last)
+{
+    const fx_mesh_t *mesh = &motor.flux_table.mesh;
+    return damaged(good, (size_t)((mesh->x_last >> 14) + 2U) * mesh->ny, last);
+}
+
+static const int16_t *reference(const int16_t *good, int16_t last)
+{
+    const fx_grid_t *grid = &motor.current_reference.grid;
+    return damaged(good, (size_t)grid->nx * grid->ny, last);
+}
+
+/* Every comparison of every check, from both sides of its bound where it has two. */
+#define TABLES(X) \
+    X(TASK_STEP, m.bases.periods_per_step = 3) \
+    X(TASK_STEP, m.bases.periods_per_step = 41) \
+    X(TASK_STEP, m.bases.step_s = 0.79e-3F) \
+    X(TASK_STEP, m.bases.step_s = 1.26e-3F) \
+    X(FLUX_TABLE_MISSING, m.flux_table.l_d = 0) \
+    X(FLUX_TABLE_MISSING, m.flux_table.l_q = 0) \
+    X(FLUX_TABLE_MISSING, m.flux_table.l_qq = 0) \
+    X(FLUX_TABLE_MISSING, m.flux_table.g = 0) \
+    X(FLUX_TABLE_MISSING, m.flux_table.psi_f0 = 0) \
+    X(FLUX_TABLE_GRID, m.flux_table.mesh.ny--) \
+    X(FLUX_TABLE_GRID, m.flux_table.mesh.up = 15) \
+    X(FLUX_TABLE_GRID, m.flux_table.l_shift++) \
+    X(FLUX_TABLE_GRID, m.flux_table.i_scale = 8 << (m.flux_table.l_shift = 14)) \
+    X(FLUX_TABLE_VALUE, m.flux_table.l_q = flux(motor.flux_table.l_q, 0)) \
+    X(FLUX_TABLE_VALUE, m.flux_table.l_qq = flux(motor.flux_table.l_qq, 0)) \
+    X(FLUX_TABLE_VALUE, m.flux_table.g = flux(motor.flux_table.g, -1)) \
+    X(REFERENCE_TABLE_MISSING, m.current_reference.i_d = 0) \
+    X(REFERENCE_TABLE_MISSING, m.current_reference.i_q = 0) \
+    X(REFERENCE_TABLE_MISSING, m.current_reference.torque_max.y = 0) \
+    X(REFERENCE_TABLE_GRID, m.current_reference.grid.nx = 1) \
+    X(REFERENCE_TABLE_GRID, m.current_reference.grid.ny = 1) \
+    X(REFERENCE_TABLE_GRID, m.current_reference.torque_max.n = 1) \
+    X(REFERENCE_TABLE_VALUE, m.current_reference.i_d = reference(motor.current_reference.i_d, 1)) \
+    X(REFERENCE_TABLE_VALUE, m.current_reference.i_q = reference(motor.current_reference.i_q, -1)) \
+    X(CURRENT_MAX, m.current_reference.i_max = 0)
+
+#define LIMITS(X) \
+    X(TORQUE_MAX, m.torque_max = 0) \
+    X(TORQUE_LIMIT, m.torque_limit.torque_max = 0) \
+    X(TORQUE_LIMIT, m.torque_limit.drop = -1) \
+    X(TORQUE_LIMIT, m.torque_limit.loss_rate = 0) \
+    X(DERATING_STANDSTILL, m.torque_limit.moving.gain = 0) \
+    X(DERATING_INVERTER, m.torque_limit.inverter.gain = 0) \
+    X(DERATING_WINDING, m.torque_limit.winding.gain = 0) \
+    X(DERATING_DC_LOW, m.torque_limit.dc_low.gain = 0) \
+    X(DERATING_DC_HIGH, m.torque_limit.dc_high.gain = 0) \
+    X(DERATING_SPEED, m.torque_limit.speed.gain = 0) \
+    X(OVER_CURRENT_LEVEL, m.monitor.i_trip = 0) \
+    X(OVER_CURRENT_LEVEL, m.monitor.i_trip = Q15(0.8)) \
+    X(DC_VOLTAGE_LEVELS, m.monitor.v_min = m.monitor.v_max) \
+    X(UNDER_VOLTAGE_LEVEL, m.monitor.v_min = 800) /* 1/v_ratio in Q31 over 2^22 is 853 */ \
+    X(CURRENT_SUM_LEVEL, m.monitor.zero_max = 0) \
+    X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * m.monitor.zero_max - 1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = -1) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.zero_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.zero_max) \
+    X(SAFE_STATE_FLUX, m.safe_state.psi_f = 0) \
+    X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)
+
+#define CONTROL(X) \
+    X(CURRENT_CONTROL_GAINS, m.current_control.sigma_q24 = 0) \
+    X(CURRENT_CONTROL_GAINS, m.current_control.setpoint_weight = 0) \
+    X(CURRENT_CONTROL_GAINS, m.current_control.integral_gain = -1) \
+    X(CURRENT_CONTROL_GAINS, m.current_control.integral_gain = Q15(0.5)) \
+    X(CURRENT_CONTROL_GAINS, m.current_control.tracking_gain_q34 = -1) \
+    X(VOLTAGE_RATIO, m.modulate.alpha_q31 = m.modulate.alpha_q31 / 1000 * 1001) \
+    X(VOLTAGE_RATIO, m.modulate.side_q31 += 20) \
+    X(VOLTAGE_RATIO, m.modulate.side_q31 -= 20) \
+    X(VOLTAGE_RATIO, m.current_control.per_ratio_q31 = 0) \
+    X(VOLTAGE_RATIO, scale_ratio(&m, 0.499)) \
+    X(VOLTAGE_RATIO, scale_ratio(&m, 0.701)) \
+    X(VOLTAGE_RESERVE, m.voltage_reserve.v_ratio = 0) \
+    X(VOLTAGE_RESERVE, m.voltage_reserve.trim_min = 1) \
+    X(VOLTAGE_RESERVE, m.voltage_reserve.trim_max = -1) \
+    X(TORQUE_LOOP, m.torque_loop.authority = 0) \
+    X(TORQUE_LOOP, m.torque_loop.torque_min = 0) \
+    X(SHORTEST_PULSE, m.modulate.longest_q31 = Q31(0.25)) \
+    X(SHORTEST_PULSE, m.modulate.longest_q31 = m.modulate.nearer_rail_q31 + 1) \
+    X(SHORTEST_PULSE, m.modulate.nearer_rail_q31 = Q31(0.5) + 1) \
+    X(DEAD_TIME, m.modulate.dead_time_q16 = Q16(0.2)) \
+    X(DEAD_TIME, m.modulate.dead_time_q16 = -2) \
+    X(CURRENT_KNEE, m.modulate.knee_q17 = 0) \
+    X(CURRENT_KNEE, m.modulate.knee_q17 = 1 << 30) \
+    X(CURRENT_KNEE, m.modulate.knee_side_q17 = 0) \
+    X(CURRENT_KNEE, m.modulate.knee_side_q17 = 1 << 30) \
+    X(CLEAR_VOLTAGE, m.current_control.clear_q30 = UINT32_MAX) \
+    X(CLEAR_VOLTAGE, m.current_control.clear_q30 = m.current_control.clear_q30 / 8 * 9)
+
+#define MRAI(X) \
+    X(MRAI_GAINS, m.mrai.r0 = 0) \
+    X(MRAI_GAINS, m.mrai.pole_gain = 0) \
+    X(MRAI_GAINS, m.mrai.period = 0) \
+    X(MRAI_GAINS, m.mrai.period = Q31(0.79)) \
+    X(MRAI_GAINS, m.mrai.flux_gain = -1) \
+    X(MRAI_GAINS, m.mrai.resistance_gain = -1) \
+    X(MRAI_GAINS, m.mrai.flux_proportional_q24 = -1) \
+    X(MRAI_GAINS, m.mrai.resistance_proportional_q24 = -1) \
+    X(MRAI_LIMITS, m.mrai.psi_delta_min = m.mrai.psi_delta_max) \
+    X(MRAI_LIMITS, m.mrai.psi_delta_min = Q31(-0.5) - 1) \
+    X(MRAI_LIMITS, m.mrai.r_delta_max = Q31(0.5) + 1) \
+    X(MRAI_GATES, m.mrai.omega_min = 0) \
+    X(MRAI_GATES, m.mrai.psi_drift_full = 0) \
+    X(MRAI_GATES, m.mrai.r_drift_full = 0)
+
+#define IDENTIFY(X) \
+    X(IDENTIFY_WINDOW, m.identify.l_shift = 15) \
+    X(IDENTIFY_WINDOW, m.identify.mean_gain_q32 = 0) \
+    X(IDENTIFY_WINDOW, m.identify.rate_gain_q28 = 0) \
+    X(IDENTIFY_WINDOW, m.identify.window_turns_q29 = 0) \
+    X(IDENTIFY_WINDOW, m.identify.turn_to_pu = 0) \
+    X(IDENTIFY_RESISTANCE, m.identify.r0 = 0) \
+    X(IDENTIFY_RESISTANCE, m.identify.r_known_q30 = 0) \
+    X(IDENTIFY_RESISTANCE, m.identify.r_known_q30 = (1 << 30) + 1) \
+    X(IDENTIFY_NOISE, m.identify.noise_voltage_q30 = (1 << 19) - 1) \
+    X(IDENTIFY_NOISE, m.identify.noise_flux_q30 = -1) \
+    X(IDENTIFY_NOISE, m.identify.noise_rate_q30 = -1) \
+    X(IDENTIFY_NOISE, m.identify.limited_noise = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.omega_min = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.i_min = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.i_smooth = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.i_smooth = (q15_t)(m.identify.i_min + 1)) \
+    X(IDENTIFY_THRESHOLDS, m.identify.local_corner = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.local_rate = 0) \
+    X(IDENTIFY_THRESHOLDS, m.identify.torque_min = 0) \
+    X(IDENTIFY_CONFIDENCE, m.identify.confidence_rate = 0) \
+    X(IDENTIFY_CONFIDENCE, m.identify.mismatch_rate = 0) \
+    X(IDENTIFY_CONFIDENCE, m.identify.confidence_full = 0) \
+    X(IDENTIFY_CONFIDENCE, m.identify.confidence_none = m.identify.confidence_full) \
+    X(IDENTIFY_PRIOR, m.identify.sigma[IDENTIFY_IRON] = 0) \
+    X(IDENTIFY_PRIOR, m.identify.leak[IDENTIFY_IRON] = 0) \
+    X(IDENTIFY_PRIOR, m.identify.leak[IDENTIFY_R] = Q31(0.25) + 1)
+
+/* All three copies of the ratio agree. */
+static void scale_ratio(motor_t *m, double ratio)
+{
+    m->modulate.alpha_q31 = (q31_t)(ratio * 2147483648.0);
+    m->modulate.side_q31 = (q31_t)(ratio * 2147483648.0 * 0.86602540378443865);
+    m->current_control.per_ratio_q31 = (uint32_t)(2147483648.0 / ratio > 4294967295.0 ? 4294967295.0
+                                                                                      : 2147483648.0 / ratio);
+}
+
+typedef struct {
+    motor_check_t value;
+    const char *name, *words;
+    bool seen;
+} named_t;
+
+#define NAMED(name, value, text) {value, #name, text, false},
+static named_t checks[] = {MOTOR_CHECK_LIST(NAMED)};
+#define CHECKS (sizeof checks / sizeof *checks)
+
+/* The check with this value, which the list must have. */
+static named_t *named(motor_check_t value)
+{
+    for (size_t n = 0; n < CHECKS; n++) {
+        if (checks[n].value == value) {
+            return &checks[n];
+        }
+    }
+    TEST_FAIL_MESSAGE("a check that the list does not name");
+    return checks;
+}
+
+#define BREAK(expected, ...) \
+    do { \
+        motor_t m = motor; \
+        __VA_ARGS__; \
+        TEST_ASSERT_EQUAL_STRING_MESSAGE(#expected, named(motor_check(&m))->name, #__VA_ARGS__); \
+        named(MOTOR_CHECK_##expected)->seen = true; \
+    } while (0);
+
+static void break_tables(void)
+{
+    TABLES(BREAK)
+}
+
+static void break_limits(void)
+{
+    LIMITS(BREAK)
+}
+
+static void break_control(void)
+{
+    CONTROL(BREAK)
+}
+
+static void break_identification(void)
+{
+    MRAI(BREAK)
+    IDENTIFY(BREAK)
+}
+
+void test_one_broken_thing_is_reported_by_its_name_and_every_name_can_be_reported(void)
+{
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&motor));
+    break_tables();
+    break_limits();
+    break_control();
+    break_identification();
+    named(MOTOR_CHECK_OK)->seen = true;
+    named(MOTOR_CHECK_IMAGE_CHECKSUM)->seen = true; /* the port's own */
+    named(MOTOR_CHECK_PWM_TIMER)->seen = true;
+    for (size_t n = 0; n < CHECKS; n++) {
+        TEST_ASSERT_TRUE_MESSAGE(checks[n].seen, checks[n].name);
+    }
+}
+
+void test_the_first_reason_is_kept_and_no_reason_is_no_fault(void)
+{
+    static drive_t drive;
+    drive_init(&drive, &motor);
+    drive_refuse(&drive, MOTOR_CHECK_OK);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, drive_motor_check(&drive));
+    drive_refuse(&drive, MOTOR_CHECK_PWM_TIMER);
+    drive_refuse(&drive, MOTOR_CHECK_IMAGE_CHECKSUM);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_PWM_TIMER, drive_motor_check(&drive));
+}
+
+void test_every_check_has_a_value_a_name_and_words_of_its_own(void)
+{
+    for (size_t a = 0; a < CHECKS; a++) {
+        TEST_ASSERT_LESS_OR_EQUAL(UINT8_MAX, checks[a].value); /* the drive keeps a byte */
+        for (size_t b = 0; b < a; b++) {
+            TEST_ASSERT_NOT_EQUAL_INT(checks[b].value, checks[a].value);
+            TEST_ASSERT_TRUE_MESSAGE(strcmp(checks[a].name, checks[b].name) != 0, checks[a].name);
+            TEST_ASSERT_TRUE_MESSAGE(strcmp(checks[a].words, checks[b].words) != 0, checks[a].name);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(0, MOTOR_CHECK_OK);
+}
