@@ -25,7 +25,7 @@ static xcp_config_t protocol_config(xcp_access_t *access)
 
 void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed)
 {
-    for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
+    for (int k = 0; k < CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(&drive->motor, (calibration_id_t)k);
         access->applied_value[k] = access->reference[k];
     }
@@ -49,7 +49,7 @@ static void apply(xcp_access_t *access, drive_t *drive)
 {
     const xcp_config_t config = protocol_config(access);
     const float *page = xcp_active_page(&access->xcp, &config);
-    for (int k = 0; k < (int)CALIBRATION_COUNT; k++) {
+    for (int k = 0; k < CALIBRATION_COUNT; k++) {
         const calibration_id_t id = (calibration_id_t)k;
         if (page[k] !=
             access->applied_value

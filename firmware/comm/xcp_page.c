@@ -38,7 +38,7 @@ static bool in_range(const xcp_limits_t *limits, float value)
 static float waiting_value(const xcp_t *xcp, uint32_t parameter)
 {
     float value;
-    memcpy(&value, &xcp->waiting[WORD * parameter], sizeof value);
+    memcpy(&value, &xcp->waiting[(size_t)WORD * parameter], sizeof value);
     return value;
 }
 

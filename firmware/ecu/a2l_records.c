@@ -17,6 +17,7 @@ typedef struct {
     uint32_t offset; /* from the symbol ecu; of a base and the step: from the symbol motor; of a word: its value */
 } a2l_record_t;
 
+/* NOLINTBEGIN(bugprone-macro-parentheses): the name of a member cannot stand in parentheses. */
 #define VALUE(id, low, high, si, comment) \
     {.kind = "value", .name = #id, .text = comment, .unit = si, .type = "F32", .base = "NONE", .lo = (low), \
      .hi = (high), .offset = offsetof(ecu_t, xcp.working) + sizeof(float) * CALIBRATION_##id},
@@ -36,6 +37,7 @@ typedef struct {
     {.kind = "bit", .name = "ECU_" #id, .text = comment, .base = "ECU_FAULT", .offset = (number)},
 #define STATE_WORD(id, number, comment) \
     {.kind = "word", .name = #id, .text = comment, .base = "ECU_STATE", .offset = (number)},
+/* NOLINTEND(bugprone-macro-parentheses) */
 
 /* Not static: no code refers to it, so the linker keeps it by its name. */
 extern const a2l_record_t a2l_records[];

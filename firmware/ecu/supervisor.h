@@ -50,6 +50,7 @@
 #define STATE_VALUE(name, value, text) STATE_##name = (value),
 #define ECU_FAULT_BIT(name, bit, text) ECU_FAULT_##name = 1U << (bit),
 #define REFUSED_VALUE(name, value, text) REFUSED_##name = (value),
+// NOLINTNEXTLINE(cert-int09-c,readability-enum-initial-value): STATES is their number
 typedef enum { ECU_STATE_LIST(STATE_VALUE) STATES } ecu_state_t;
 typedef enum { ECU_FAULT_LIST(ECU_FAULT_BIT) } ecu_fault_t;
 typedef enum { REFUSED_LIST(REFUSED_VALUE) } refused_t;

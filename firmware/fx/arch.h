@@ -40,6 +40,7 @@ static inline int32_t fx_arch_opaque(int32_t x)
 }
 
 /* Two neighbours of memory, wanted at the same time: the compiler loads both by one instruction. */
+// NOLINTNEXTLINE(readability-non-const-parameter): the operands are outputs, too
 static inline void fx_arch_together(int32_t *a, int32_t *b)
 {
     __asm__("" : "+r"(*a), "+r"(*b));
@@ -50,7 +51,7 @@ typedef struct {
     int32_t first, second;
 } __attribute__((may_alias)) fx_arch_two_t;
 
-#if defined(__ARM_FEATURE_DSP)
+#ifdef __ARM_FEATURE_DSP
 
 #include <arm_acle.h>
 

@@ -8,7 +8,7 @@
  * Errors   fluxtrue_set() answers a negative code; fluxtrue_get() of an unknown name is NaN;
  *          NaN, infinite or impossible samples disable switching and set a fault bit
  * Context  any number of instances in one process; one thread per instance at a time */
-#if defined(__GNUC__)
+#ifdef __GNUC__
 #define FLUXTRUE_API __attribute__((visibility("default")))
 #else
 #define FLUXTRUE_API

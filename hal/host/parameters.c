@@ -234,7 +234,7 @@ static double bound_of(const fluxtrue_t *d, const parameter_t *p)
 /* CALIBRATION_COUNT: no such name. */
 static calibration_id_t find_calibration(const char *name)
 {
-    for (int k = 0; name && k < (int)CALIBRATION_COUNT; k++) {
+    for (int k = 0; name && k < CALIBRATION_COUNT; k++) {
         if (strcmp(name, calibration_info[k].name) == 0) {
             return (calibration_id_t)k;
         }
@@ -285,7 +285,7 @@ double fluxtrue_get(const fluxtrue_t *drive, const char *name)
 
 const char *fluxtrue_name(int index)
 {
-    if (index < 0 || index >= PARAMETERS + (int)CALIBRATION_COUNT) {
+    if (index < 0 || index >= PARAMETERS + CALIBRATION_COUNT) {
         return NULL;
     }
     return (index < PARAMETERS) ? parameters[index].name : calibration_info[index - PARAMETERS].name;

@@ -13,9 +13,10 @@ double plant_map_slope(const double *x, const double *f, int stride, int n, int 
         return (f[stride] - f[0]) / (x[1] - x[0]);
     }
     int m = k == 0 ? 1 : (k == n - 1 ? n - 2 : k);
+    const ptrdiff_t at = (ptrdiff_t)m * stride;
     double h0 = x[m] - x[m - 1], h1 = x[m + 1] - x[m];
-    double s0 = (f[m * stride] - f[(m - 1) * stride]) / h0;
-    double s1 = (f[(m + 1) * stride] - f[m * stride]) / h1;
+    double s0 = (f[at] - f[at - stride]) / h0;
+    double s1 = (f[at + stride] - f[at]) / h1;
     double mid = (s0 * h1 + s1 * h0) / (h0 + h1);
     return k == 0 ? 2.0 * s0 - mid : (k == n - 1 ? 2.0 * s1 - mid : mid);
 }
@@ -34,11 +35,11 @@ static void fill_inside(const plant_map_t *map, map_node_t *node, const double *
         const int i = k / nq, j = k % nq;
         double *v = first[i * row + j].v;
         v[MAP_BY_D] = plant_map_slope(d, &first[j].v[MAP_F], stride * row, nd, i);
-        v[MAP_BY_Q] = plant_map_slope(q, &first[i * row].v[MAP_F], stride, nq, j);
+        v[MAP_BY_Q] = plant_map_slope(q, &first[(ptrdiff_t)i * row].v[MAP_F], stride, nq, j);
     }
     for (int k = 0; k < nd * nq; k++) {
         const int i = k / nq, j = k % nq;
-        first[i * row + j].v[MAP_TWIST] = plant_map_slope(q, &first[i * row].v[MAP_BY_D], stride, nq, j);
+        first[i * row + j].v[MAP_TWIST] = plant_map_slope(q, &first[(ptrdiff_t)i * row].v[MAP_BY_D], stride, nq, j);
     }
 }
 
@@ -150,7 +151,7 @@ static int axis_copy(map_axis_t *axis, const double *x, int n)
 /* Everything that is allocated; 0 when something was not. */
 static int allocate(plant_map_t *map, map_nodes_t *nodes, int nd, int nq)
 {
-    const size_t ed = (size_t)nd + 2 * MAP_BEYOND, eq = (size_t)nq + 2 * MAP_BEYOND;
+    const size_t ed = (size_t)nd + (size_t)2 * MAP_BEYOND, eq = (size_t)nq + (size_t)2 * MAP_BEYOND;
     map->cell = calloc((ed - 1) * (eq - 1), sizeof *map->cell);
     map->zero = calloc(eq - 1, sizeof *map->zero);
     nodes->psi[0] = calloc(ed * eq, sizeof *nodes->psi[0]);

@@ -54,7 +54,7 @@ static far_t far_of(const edge_t *e)
 {
     double sum = 0.0, max = 0.0, low = INFINITY, high = -INFINITY;
     for (int j = 0; j < e->count; j++) {
-        const double *v = e->n[j * e->along].v;
+        const double *v = e->n[(ptrdiff_t)j * e->along].v;
         sum += v[e->by_n];
         max = fmax(max, v[e->by_n]);
         low = fmin(low, v[MAP_F]);
@@ -90,7 +90,7 @@ static void extend(const edge_t *e, const fade_t *fade)
     const far_t far = far_of(e);
     for (int k = 0; k < MAP_BEYOND; k++) {
         const shape_t shape = shape_at(fade, out_A[k]);
-        e->line[(k + 1) * (int)e->sign] = *e->line + e->sign * out_A[k];
+        e->line[(ptrdiff_t)(k + 1) * (int)e->sign] = *e->line + e->sign * out_A[k];
         for (int j = 0; j < e->count; j++) {
             place(e, j, &far, fade, shape, k + 1);
         }

@@ -43,8 +43,8 @@ static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[
         double fu = pu[0] + t * (pu[1] + t * (pu[2] + t * pu[3]));
         /* beyond the last grid line the tangent of the section, whose twist is zero (PL-2) */
         psi[a] = f + d.beyond * ft + q.beyond * fu;
-        jac[2 * a] = ft * d.per_h;
-        jac[2 * a + 1] = fu * q.per_h;
+        jac[(ptrdiff_t)2 * a] = ft * d.per_h;
+        jac[(ptrdiff_t)2 * a + 1] = fu * q.per_h;
     }
 }
 

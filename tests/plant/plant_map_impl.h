@@ -2,6 +2,8 @@
 #ifndef PLANT_PLANT_MAP_IMPL_H
 #define PLANT_PLANT_MAP_IMPL_H
 /** What plant_map.c and plant_map_beyond.c build and plant_map_eval.c reads. */
+#include <stddef.h>
+
 #include "plant_map.h"
 
 /* Grid lines that are added beyond each edge (PL-2). */

@@ -8,7 +8,7 @@
  * unit Errors   the codes below; a refused call changes nothing Context  host; any number of
  * instances, one thread per instance at a time order of calls: sim_create, sim_map and sim_set of
  * the plant, sim_start, then everything else */
-#if defined(__GNUC__)
+#ifdef __GNUC__
 #define SIM_API __attribute__((visibility("default")))
 #else
 #define SIM_API

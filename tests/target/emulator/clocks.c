@@ -55,13 +55,17 @@ static uint32_t control_of(int source)
     return source == SOSC ? SOSCCSR : source == SIRC ? SIRCCSR : source == FIRC ? FIRCCSR : SPLLCSR;
 }
 
+static bool enabled(const emu_t *emu, int source)
+{
+    return (bus_get(emu, bus_find("SCG"), control_of(source)) & ENABLED) != 0;
+}
+
 static bool source_on(const emu_t *emu, int source)
 {
-    const peripheral_t *scg = bus_find("SCG");
     if (source != SOSC && source != SIRC && source != FIRC && source != SPLL) {
         return false;
     }
-    return (bus_get(emu, scg, control_of(source)) & ENABLED) != 0 && (source != SPLL || source_on(emu, SOSC));
+    return enabled(emu, source) && (source != SPLL || enabled(emu, SOSC));
 }
 
 /* (PREDIV, MULT) of 8 MHz: f = 8 MHz (MULT + 16) / (PREDIV + 1) / 2; 0 when ticks would not be whole. */

@@ -352,8 +352,10 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
     if (bad == NULL) {
         emu->mode = (emu_mode_t)mode;
         emu->block = calloc(FLASH_SIZE / 2, sizeof *emu->block);
+        // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
         if (emu->block == NULL || uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &emu->uc) != UC_ERR_OK ||
             uc_ctl_set_cpu_model(emu->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !maps_create(emu) || !bus_create(emu)) {
+            // NOLINTEND(clang-analyzer-optin.core.EnumCastOutOfRange)
             bad = "the emulated core cannot be created";
         } else {
             uint8_t erased[4096];

@@ -53,7 +53,7 @@ const char *elf_read(elf_t *elf, const char *path)
     }
     (void)fseek(file, 0, SEEK_END);
     const long size = ftell(file);
-    rewind(file);
+    (void)fseek(file, 0, SEEK_SET);
     elf->size = size > 0 ? (size_t)size : 0U;
     elf->image = calloc(1, elf->size + 4U); /* text at the end is ended */
     const bool whole = elf->image != NULL && fread(elf->image, 1, elf->size, file) == elf->size;

@@ -18,7 +18,7 @@
 #define EMU_HALF_CYCLES_PER_INSTRUCTION 3U
 #define EMU_PWM_CHANNELS 6
 
-#if defined(__GNUC__)
+#ifdef __GNUC__
 #define EMU_API __attribute__((visibility("default")))
 #else
 #define EMU_API

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "emulated.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -111,6 +112,7 @@ static const char *failure(const void *self)
 
 static int pin_set(emulated_t *e, const char *name, double value)
 {
+    assert(e != NULL);
     emu_pins_t *pins = &e->pins_of_board;
     bool *pin = strcmp(name, "emulator.gate_fault") == 0       ? &pins->gate_fault
                 : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault

@@ -64,7 +64,8 @@ static uint32_t counter(const emu_t *emu, const peripheral_t *self, uint32_t sto
         return decoded(emu, self);
     }
     const uint64_t now = f->stopped_at != 0U ? f->stopped_at : emu->s.now;
-    return f->running ? f->cntin + (uint32_t)((now - f->start) / clock_ticks(emu, self)) : stored;
+    const uint32_t ticks = clock_ticks(emu, self);
+    return f->running && ticks != 0U ? f->cntin + (uint32_t)((now - f->start) / ticks) : stored;
 }
 
 uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)

@@ -43,7 +43,7 @@ static bool pair_complementary(const emu_t *emu, int pair)
 static double pair_duty(const ftm_t *f, int pair)
 {
     const double from = f->cntin, to = (double)f->mod + 1.0;
-    const double rise = f->cv[2 * pair], fall = f->cv[2 * pair + 1];
+    const double rise = f->cv[(ptrdiff_t)2 * pair], fall = f->cv[(ptrdiff_t)2 * pair + 1];
     const double high = (fall < to ? fall : to) - (rise > from ? rise : from);
     return high > 0.0 ? high / (to - from) : 0.0;
 }

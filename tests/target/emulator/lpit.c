@@ -78,7 +78,7 @@ static void control_written(emu_t *emu, const peripheral_t *self, uint32_t chann
 void lpit_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     if (offset == MCR) {
-        emu->s.lpit_ready = (value & 1U) != 0 ? emu->s.now + 4U * clock_ticks(emu, self) : NEVER;
+        emu->s.lpit_ready = (value & 1U) != 0 ? emu->s.now + 4ULL * clock_ticks(emu, self) : NEVER;
         return;
     }
     if ((bus_get(emu, self, MCR) & 1U) == 0 || emu->s.now < emu->s.lpit_ready) {

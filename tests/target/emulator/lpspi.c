@@ -171,7 +171,8 @@ uint32_t rdc_transfer(emu_t *emu, uint32_t sent, uint32_t bits)
     const bool a0 = (lines >> EMU_RDC_A0 & 1U) != 0, a1 = (lines >> EMU_RDC_A1 & 1U) != 0;
     if (a0 && a1) {
         return rdc_configure(emu, sent, bits);
-    } else if (a0) {
+    }
+    if (a0) {
         emu_fail(emu, "the AD2S1210 has no mode A0 = 1, A1 = 0");
         return 0;
     }

@@ -7,6 +7,7 @@
 #include "layout.h"
 
 #define HERE(part) {#part, offsetof(drive_t, part), 0, sizeof(((drive_t *)0)->part)},
+// NOLINTNEXTLINE(bugprone-macro-parentheses): the terms of a sum
 #define ONE(part) +1
 
 static const mirror_part_t parts_here[] = {LAYOUT_INPUTS(HERE) LAYOUT_STATE(HERE)};
@@ -125,7 +126,7 @@ drive_t drive_plain(const drive_t *drive)
 {
     drive_t copy;
     memcpy(&copy, drive, sizeof copy);
-#if defined(__has_builtin)
+#ifdef __has_builtin
 #if __has_builtin(__builtin_clear_padding)
     LAYOUT_STATE(CLEAR)
 #endif

@@ -164,7 +164,7 @@ void nvic_line(emu_t *emu, int irq, bool level)
 
 static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uint32_t count)
 {
-    if (uc_mem_write(emu->uc, address, words, 4U * count) == UC_ERR_OK) {
+    if (uc_mem_write(emu->uc, address, words, (size_t)4U * count) == UC_ERR_OK) {
         return true;
     }
     emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", address);
@@ -253,7 +253,7 @@ static void enter(emu_t *emu, int vector)
         return;
     }
     emu->s.pc = handler & ~1U;
-    emu->s.now += 12U * emu->s.core_ticks; /* TRM: twelve cycles, without wait states */
+    emu->s.now += 12ULL * emu->s.core_ticks; /* TRM: twelve cycles, without wait states */
     if (emu->profile != NULL) {
         profile_enter(emu, vector);
     }
@@ -278,7 +278,7 @@ static bool pop_frame(emu_t *emu, bool extended)
 {
     uint32_t frame[EXTENDED_WORDS];
     const uint32_t words = extended ? EXTENDED_WORDS : FRAME_WORDS, sp = get(emu, UC_ARM_REG_SP);
-    if (uc_mem_read(emu->uc, sp, frame, 4U * words) != UC_ERR_OK) {
+    if (uc_mem_read(emu->uc, sp, frame, (size_t)4U * words) != UC_ERR_OK) {
         emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", sp);
         return false;
     }
@@ -303,7 +303,7 @@ void nvic_return(emu_t *emu)
 {
     nvic_t *n = &emu->s.nvic;
     const uint32_t code = emu->s.exc_return;
-    if (n->nest == 0 || (code & 0xFFFFFFE7U) != 0xFFFFFFE1U || ((code & 8U) != 0) != (n->nest == 1)) {
+    if (n->nest <= 0 || (code & 0xFFFFFFE7U) != 0xFFFFFFE1U || ((code & 8U) != 0) != (n->nest == 1)) {
         emu_fail(emu, "0x%08x is no valid exception return with %d exceptions active", code, n->nest);
         return;
     }
@@ -316,7 +316,7 @@ void nvic_return(emu_t *emu)
     if (bit(n->line, vector)) {
         bit_set(n->pending, vector, true); /* its cause still stands */
     }
-    emu->s.now += 10U * emu->s.core_ticks;
+    emu->s.now += 10ULL * emu->s.core_ticks;
     if (emu->profile != NULL) {
         profile_leave(emu);
     }

@@ -10,7 +10,8 @@
 #include "loop/runner/sim_private.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69 };
-enum { OLD, NEW, OUTCOMES, CHOICES_MAX = 16, POINTS_MAX = 12000 };
+enum { OLD, NEW, OUTCOMES };
+enum { CHOICES_MAX = 16, POINTS_MAX = 12000 };
 enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 
 typedef struct {
@@ -182,6 +183,8 @@ static void allowed_compute(preempt_t *p)
 
 /* ---- one boundary ---- */
 
+// NOLINTBEGIN(bugprone-suspicious-memory-comparison,cert-exp42-c,cert-flp37-c): mirror.c has cleared the padding
+
 /* What the victim alone writes; for the identification without its count of finished periods: it counts the one that
  * it was pended for, whichever sample it found. */
 static bool same_victim(const preempt_t *p, const drive_t *a, const drive_t *b)
@@ -206,6 +209,8 @@ static bool same_interrupts(const preempt_t *p, const drive_t *a, const drive_t 
     const bool law = a->psi_d_error == b->psi_d_error && memcmp(&a->mrai.isr, &b->mrai.isr, sizeof a->mrai.isr) == 0;
     return fast && (p->victim == PREEMPT_MRAI || law);
 }
+
+// NOLINTEND(bugprone-suspicious-memory-comparison,cert-exp42-c,cert-flp37-c)
 
 /* False: the victim had finished before so many instructions. */
 static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_t n)

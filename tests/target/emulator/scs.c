@@ -365,11 +365,10 @@ void scs_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, vo
     uint8_t *priority = priorities(emu, at, size);
     if (priority != NULL) {
         priorities_store(priority, size, (uint32_t)value);
-    } else if (size != 4U || (!nvic_store(emu, at, (uint32_t)value) && !system_store(emu, at, (uint32_t)value))) {
-        if (!bus_private_write(emu, 0xE0000000U + at, size, (uint32_t)value)) {
-            emu_fail(emu, "write of 0x%08x to the core's register 0x%08x (%u bytes): not modelled", (uint32_t)value,
-                     0xE0000000U + at, size);
-        }
+    } else if ((size != 4U || (!nvic_store(emu, at, (uint32_t)value) && !system_store(emu, at, (uint32_t)value))) &&
+               !bus_private_write(emu, 0xE0000000U + at, size, (uint32_t)value)) {
+        emu_fail(emu, "write of 0x%08x to the core's register 0x%08x (%u bytes): not modelled", (uint32_t)value,
+                 0xE0000000U + at, size);
     }
     nvic_reconsider(emu);
 }

@@ -97,7 +97,7 @@ static void count_written(emu_t *emu, const peripheral_t *self, uint32_t value)
         }
         emu->s.wdog.unlocked = true;
         emu->s.wdog.configured = false;
-        emu->s.wdog.unlock_end = emu->s.now + 128U * 2U * emu->s.core_ticks;
+        emu->s.wdog.unlock_end = emu->s.now + 256ULL * emu->s.core_ticks;
     } else {
         emu_fail(emu, "write of WDOG.CNT: 0x%08x is neither unlock nor refresh", value);
     }
