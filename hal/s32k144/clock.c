@@ -71,10 +71,10 @@ static void enable_clock_gate(volatile uint32_t *gate)
 
 static void enable_clock_gates(void)
 {
-    open_gate(&PCC->PCC_ADC0);
-    open_gate(&PCC->PCC_ADC1);
-    open_gate(&PCC->PCC_LPIT);
-    open_gate(&PCC->PCC_LPSPI0);
+    enable_clock_gate(&PCC->PCC_ADC0);
+    enable_clock_gate(&PCC->PCC_ADC1);
+    enable_clock_gate(&PCC->PCC_LPIT);
+    enable_clock_gate(&PCC->PCC_LPSPI0);
     /* These run on the system clock, or choose their own. */
     PCC->PCC_FTM0 = GATE;
     PCC->PCC_FTM2 = GATE;
