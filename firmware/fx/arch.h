@@ -52,6 +52,7 @@ typedef struct {
 } __attribute__((may_alias)) fx_arch_two_t;
 
 #ifdef __ARM_FEATURE_DSP
+/* GCOVR_EXCL_START: instructions of the Cortex-M4, which tests/target/test_fx.py compares with the other half. */
 
 #include <arm_acle.h>
 
@@ -211,6 +212,7 @@ static inline int32_t fx_arch_smlad(uint32_t a, uint32_t b, int32_t acc)
     return __smlad((int16x2_t)a, (int16x2_t)b, acc);
 }
 
+/* GCOVR_EXCL_STOP */
 #else
 #include "fx/arch_portable.h"
 #endif

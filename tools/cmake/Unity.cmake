@@ -15,6 +15,10 @@ elseif(NOT EXISTS "${unity}/src/unity.c" OR NOT FLUXTRUE_RUBY)
     set(FLUXTRUE_UNIT_TESTS OFF)
 endif()
 
+# The tests whose coverage counts: those of the firmware below tests/unit. They take seconds, and they assert what they
+# execute; a closed loop also executes much that it does not assert.
+add_custom_target(fluxtrue_coverage_tests)
+
 if(FLUXTRUE_UNIT_TESTS)
     add_library(fluxtrue_unity STATIC "${unity}/src/unity.c" "${FLUXTRUE_CMOCK}/src/cmock.c")
     target_include_directories(fluxtrue_unity SYSTEM PUBLIC "${unity}/src" "${FLUXTRUE_CMOCK}/src")
@@ -114,6 +118,12 @@ function(fluxtrue_unity_test)
 
     if(NOT arg_LABELS)
         set(arg_LABELS unit)
+    endif()
+    string(FIND "${CMAKE_CURRENT_SOURCE_DIR}/" "${CMAKE_SOURCE_DIR}/tests/unit/" place)
+    list(FILTER arg_LIBS INCLUDE REGEX "^(fx|signal|control|safety|firmware)$")
+    if(place EQUAL 0 AND arg_LIBS)
+        list(APPEND arg_LABELS coverage)
+        add_dependencies(fluxtrue_coverage_tests ${arg_NAME})
     endif()
     add_test(NAME ${arg_NAME} COMMAND ${arg_NAME})
     set_tests_properties(${arg_NAME} PROPERTIES LABELS "${arg_LABELS}")
