@@ -22,6 +22,7 @@ void freeze_frame_step(freeze_frame_t *frame, const measurements_t *now, uint16_
     frame->frozen = 1U;
     frame->time_ms = frame->now_ms;
     frame->fault_word = now->fault_word;
+    frame->motor_check = now->motor_check;
     frame->ecu_faults = ecu_faults;
     frame->psi_f_Vs = now->psi_f_Vs;
     frame->r_ohm = now->r_ohm;

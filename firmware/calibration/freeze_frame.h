@@ -37,6 +37,7 @@ typedef struct {
     uint8_t state;  /* before the fault */
     uint8_t oldest; /* sample; the newest is the one before it */
     uint8_t frozen;
+    uint8_t motor_check; /* motor_check_t */
     FREEZE_FRAME_LIST(FREEZE_FRAME_SIGNAL)
 } freeze_frame_t;
 

@@ -3,7 +3,7 @@
 #define CALIBRATION_MEASUREMENT_LIST_H
 /** The values that a calibration tool may record, one snapshot per step of the task.
  *   X(name, type, base, expression, text); the physical value is raw * base / 2^15, or raw itself without a base
- *   (NONE) and where the base is a list of words (FAULT). d is the drive.
+ *   (NONE) and where the base is a list of words (FAULT, MOTOR_CHECK). d is the drive.
  * Source   docs/howto/xcp.md
  * Units    a name ends in its unit
  * Context  calibration/measurements.c fills it, ecu/a2l_records.c describes it to tools */
@@ -27,6 +27,7 @@
     X(psi_f_Vs, F32, NONE, measured_psi_f_Vs(d), "Identified magnet flux") \
     X(r_ohm, F32, NONE, measured_r_ohm(d), "Identified resistance") \
     X(fault_word, U32, FAULT, (d)->fast.faults, "Latched faults, one bit each") \
+    X(motor_check, U8, MOTOR_CHECK, drive_motor_check(d), "What the fault config stands for") \
     X(processor_dC, S16, NONE, hal_temperature_processor_dC(), "Processor, tenths of a degree; -32768: unknown") \
     X(mrai_overruns, U32, NONE, mrai_overruns(d), "Periods in which the identification was late")
 

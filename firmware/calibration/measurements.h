@@ -11,6 +11,7 @@
 #include "drive/drive.h"
 
 #define MEASUREMENT_TYPE_S16 int16_t
+#define MEASUREMENT_TYPE_U8 uint8_t
 #define MEASUREMENT_TYPE_U32 uint32_t
 #define MEASUREMENT_TYPE_F32 float
 #define MEASUREMENT_FIELD(name, type, base, expression, text) MEASUREMENT_TYPE_##type name;

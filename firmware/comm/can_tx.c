@@ -7,12 +7,14 @@
 typedef struct {
     uint16_t id;
     uint16_t cycle_ms;
-    uint16_t data_id; /* 0: not protected */
+    uint16_t phase_ms; /* no two messages are due in the same millisecond */
+    uint16_t data_id;  /* 0: not protected */
     message_encoder_t encode;
 } tx_message_t;
 
 static const tx_message_t messages[] = {
-#define SENT(name, NAME) {BUS_##NAME##_FRAME_ID, BUS_##NAME##_CYCLE_MS, BUS_##NAME##_DATA_ID, message_##name},
+#define SENT(name, NAME) \
+    {BUS_##NAME##_FRAME_ID, BUS_##NAME##_CYCLE_MS, BUS_##NAME##_PHASE_MS, BUS_##NAME##_DATA_ID, message_##name},
     BUS_SENT(SENT)
 #undef SENT
 };
@@ -26,21 +28,18 @@ void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
     tx->next = 0;
 }
 
-/* A message's index in the list is its phase. The list is longer than the shortest cycle has milliseconds, so at most
- * two messages are due in the same one. */
-static bool is_due(const can_tx_t *tx, unsigned index)
+static bool is_due(const can_tx_t *tx, const tx_message_t *message)
 {
-    const uint32_t cycle_ms = messages[index].cycle_ms;
-    return (tx->time_ms + cycle_ms - index % cycle_ms) % cycle_ms < tx->passed_ms; /* time since it was due */
+    const uint32_t time_ms = tx->time_ms + message->cycle_ms - message->phase_ms; /* a cycle more: never negative */
+    return time_ms % message->cycle_ms < tx->passed_ms;
 }
 
 tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t *frame)
 {
     while (tx->next < MESSAGES) {
-        const unsigned index = tx->next;
-        const tx_message_t *message = &messages[index];
+        const tx_message_t *message = &messages[tx->next];
         tx->next++;
-        if (!is_due(tx, index)) {
+        if (!is_due(tx, message)) {
             continue;
         }
         *frame = (can_frame_t){.id = message->id, .length = MESSAGE_LENGTH};

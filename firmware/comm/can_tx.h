@@ -2,7 +2,7 @@
 #ifndef COMM_CAN_TX_H
 #define COMM_CAN_TX_H
 /** Schedule of the transmitted frames, with the cycle times of the DBC.
- *   Messages of one cycle time are spread over its milliseconds: at most two frames are due in any of them.
+ *   Messages are spread over the milliseconds of their cycles: at most one frame is due in any of them.
  *   Message n is due when (time - phase) mod cycle = 0; phases are fixed, so that periods are exact. In a step of the
  *   task zero, one or two milliseconds pass; it sends the messages that were due in them.
  * Source   firmware/comm/fluxtrue.dbc, GenMsgCycleTime; docs/howto/can.md

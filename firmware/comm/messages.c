@@ -67,6 +67,13 @@ bool message_inv_faults(const telemetry_t *t, uint8_t *data)
     return bus_inv_faults_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
+bool message_inv_configuration(const telemetry_t *t, uint8_t *data)
+{
+    struct bus_inv_configuration_t m = {0};
+    bus_inv_configuration_put_motor_check(&m, t->motor_check);
+    return bus_inv_configuration_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
+}
+
 bool message_inv_diag_protection(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_diag_protection_t m = {0};

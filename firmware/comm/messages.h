@@ -46,6 +46,7 @@ typedef struct {
     float winding_C, inverter_C;
     bool winding_valid, inverter_valid;
     uint32_t drive_faults, ecu_faults, first_fault, fault_count;
+    uint32_t motor_check; /* motor_check_t */
     uint32_t motor_id;
     diagnostics_t diagnostics;
 } telemetry_t;
@@ -58,6 +59,7 @@ bool message_inv_currents(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_identification(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_temperatures(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_faults(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_configuration(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_diag_protection(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_diag_receive(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_diag_bus(const telemetry_t *telemetry, uint8_t *data);

@@ -35,6 +35,8 @@ typedef struct {
     {.kind = "bit", .name = #id, .text = comment, .base = "FAULT", .offset = (number)},
 #define ECU_FAULT_WORD(id, number, comment) \
     {.kind = "bit", .name = "ECU_" #id, .text = comment, .base = "ECU_FAULT", .offset = (number)},
+#define MOTOR_CHECK_WORD(id, number, comment) \
+    {.kind = "word", .name = #id, .text = comment, .base = "MOTOR_CHECK", .offset = (number)},
 #define STATE_WORD(id, number, comment) \
     {.kind = "word", .name = #id, .text = comment, .base = "ECU_STATE", .offset = (number)},
 /* NOLINTEND(bugprone-macro-parentheses) */
@@ -48,6 +50,7 @@ __attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
     FROZEN(frozen, U8, "", NONE, "1: a fault has frozen the frame")
     FROZEN(time_ms, U32, "ms", NONE, "Time of the fault since the start")
     FROZEN(fault_word, U32, "", FAULT, "Faults of the drive, one bit each")
+    FROZEN(motor_check, U8, "", MOTOR_CHECK, "What the fault config stands for")
     FROZEN(ecu_faults, U16, "", ECU_FAULT, "Faults of the supervisor, one bit each")
     FROZEN(state, U8, "", ECU_STATE, "State before the fault")
     FROZEN(psi_f_Vs, F32, "Vs", NONE, "Identified magnet flux")
@@ -61,5 +64,6 @@ __attribute__((section(".a2l"), used)) const a2l_record_t a2l_records[] = {
     FAULT_LIST(FAULT_WORD)
     ECU_FAULT_LIST(ECU_FAULT_WORD)
     ECU_STATE_LIST(STATE_WORD)
+    MOTOR_CHECK_LIST(MOTOR_CHECK_WORD)
 };
 /* clang-format on */

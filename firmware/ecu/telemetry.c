@@ -84,6 +84,7 @@ void telemetry_read(const drive_t *drive, telemetry_t *telemetry)
     read_identification(drive, telemetry);
     read_temperatures(telemetry);
     telemetry->drive_faults = drive->fast.faults;
+    telemetry->motor_check = (uint32_t)drive_motor_check(drive);
     telemetry->diagnostics.isr_overruns = mrai_overruns(drive);
     telemetry->motor_id = hash(drive->motor.name);
 }

@@ -74,6 +74,7 @@ GETTER(ud, pu15(d->drive.fast.u_next.d, bases(d)->voltage_V))
 GETTER(uq, pu15(d->drive.fast.u_next.q, bases(d)->voltage_V))
 GETTER(v_dc, pu15(sample(d)->v_dc, bases(d)->voltage_V))
 GETTER(fault_word, d->drive.fast.faults)
+GETTER(motor_check, drive_motor_check(&d->drive))
 GETTER(voltage_limited, sample(d)->voltage_limited)
 GETTER(table_clamped, flux_table_outside(&d->drive.motor.flux_table, sample(d)->point.i))
 GETTER(overruns, mrai_overruns(&d->drive))
@@ -195,6 +196,7 @@ static const parameter_t parameters[] = {
     {"vdc_V", get_v_dc, NULL, 0, 0},
     {"speed_rpm", get_speed, NULL, 0, 0},
     {"fault_word", get_fault_word, NULL, 0, 0},
+    {"motor_check", get_motor_check, NULL, 0, 0},
     {"voltage_limited", get_voltage_limited, NULL, 0, 0},
     {"table_clamped", get_table_clamped, NULL, 0, 0},
     {"mrai_overruns", get_overruns, NULL, 0, 0},

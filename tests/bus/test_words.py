@@ -20,8 +20,14 @@ from fluxtrue_tools.errors import FluxtrueError
 LISTS = words.read()
 MOTOR = BUILD / "motors" / "hsm1"
 LIBRARY_LISTS = {"fault_word": "FAULT_LIST", "derating": "DERATING_LIST", "run_state": "RUN_STATE_LIST",
-                 "commission": "COMMISSION_PHASE_LIST", "commission_failure": "COMMISSION_FAILURE_LIST"}  # fmt: skip
-DESCRIBED = {"FAULT": "FAULT_LIST", "ECU_FAULT": "ECU_FAULT_LIST", "ECU_STATE": "ECU_STATE_LIST"}
+                 "commission": "COMMISSION_PHASE_LIST", "commission_failure": "COMMISSION_FAILURE_LIST",
+                 "motor_check": "MOTOR_CHECK_LIST"}  # fmt: skip
+DESCRIBED = {
+    "FAULT": "FAULT_LIST",
+    "ECU_FAULT": "ECU_FAULT_LIST",
+    "ECU_STATE": "ECU_STATE_LIST",
+    "MOTOR_CHECK": "MOTOR_CHECK_LIST",
+}
 
 
 @pytest.fixture
@@ -112,7 +118,7 @@ def test_the_library_has_the_compiler_s_view_of_the_same_lists() -> None:
     text = ctypes.create_string_buffer(64)
     for name, wanted in LIBRARY_LISTS.items():
         found = []
-        for value in range(33):
+        for value in range(256):
             if library.fluxtrue_word(name.encode(), value, text, len(text)) == 0:
                 explanation = library.fluxtrue_explanation(name.encode(), value).decode()
                 found.append(words.Word(text.value.decode(), value, explanation))

@@ -9,6 +9,8 @@ from typing import Any
 
 from rig import MS, Rig
 
+from fluxtrue_tools import faults
+
 FAULTS = (("INV_Faults", "DriveFaults"), ("INV_Faults", "EcuFaults"))
 COUNTERS = {
     "INV_DiagProtection": ("CrcErrors", "Repeated", "Jumps", "LengthErrors"),
@@ -48,7 +50,15 @@ def _faults(rig: Rig) -> list[str]:
     words = {signal: int(rig.signal(message, signal)) for message, signal in FAULTS}
     if rig.expected.faults:
         return []
-    return [f"{signal} is {word:#x}" for signal, word in words.items() if word]
+    found = [f"{signal}: {', '.join(_named(f'INV_Faults.{signal}', word))}" for signal, word in words.items() if word]
+    check = int(rig.signal("INV_Configuration", "MotorCheck")) if found else 0
+    return [*found, *([f"motor data refused: {faults.refused_data(check)}"] if check else [])]
+
+
+def _named(signal: str, word: int) -> list[str]:
+    """The bits of a fault word by name."""
+    known = faults.explained(signal)
+    return [known[bit][0] if bit in known else f"bit {bit}" for bit in range(word.bit_length()) if word >> bit & 1]
 
 
 def missed(rig: Rig, name: str, jitter_s: float) -> list[str]:

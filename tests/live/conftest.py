@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from damage import BAD_FLUX, damaged
 from progress import HANG_S
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -70,7 +71,17 @@ def end(server: Server) -> None:
 @pytest.fixture
 def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
     """Before a virtual ECU that has just been started."""
+    yield from _before(Path(request.config.getoption("--vecu")), tmp_path)
+
+
+@pytest.fixture
+def refused(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
+    """Before a virtual ECU whose motor data fail a check."""
     program = Path(request.config.getoption("--vecu"))
+    yield from _before(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
+
+
+def _before(program: Path, tmp_path: Path) -> Iterator[Server]:
     with VirtualEcu(program) as ecu:
         options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
         records = tmp_path / "records"

@@ -96,6 +96,17 @@ def page(browser: webdriver.Chrome, server: Server) -> Page:
     return opened
 
 
+def test_the_page_says_which_check_the_motor_data_failed(browser: webdriver.Chrome, refused: Server) -> None:
+    page = Page(browser, refused)
+    browser.get(refused.url)
+    page.until(lambda: page.text("state") == "fault" and "config" in page.text("faults"), "the fault")
+    page.until(lambda: "flux table value" in page.text("faults"), "the check that failed")
+    lines = page.text("faults").splitlines()
+    assert lines[0] == "config" and lines[1].startswith("The motor data or the port's settings failed a check")
+    assert lines[2] == "flux table value"
+    assert lines[3] == "A flux table contains an inductance or observer gain that is not positive."
+
+
 def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request: pytest.FixtureRequest) -> None:
     page.drive(60.0)
     page.slide("magnet_percent", 88.0)

@@ -2,6 +2,7 @@
 #include "vecu.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "hal/host/can_host.h"
@@ -32,6 +33,16 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
     return stand_dc_link(sim) ? sim_start(sim) : "dc link";
 }
 
+/* The ECU runs nevertheless, as one on a bus does: it reports its fault. */
+static void tell_refused_data(void)
+{
+    const motor_check_t check = drive_motor_check(&ecu.drive);
+    char word[64];
+    if (check != MOTOR_CHECK_OK && fluxtrue_word("motor_check", (int)check, word, sizeof word) == FLUXTRUE_OK) {
+        (void)fprintf(stderr, "motor data refused: %s: %s\n", word, fluxtrue_explanation("motor_check", (int)check));
+    }
+}
+
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)
 {
     sim_destroy(vecu->sim);
@@ -44,6 +55,7 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
     }
     vecu->nvm_changes = ecu.nvm.changes;
     can_host_attach(&ecu);
+    tell_refused_data();
     vecu->sim = sim_create_around(&ecu);
     if (vecu->sim == NULL) {
         return "out of memory";

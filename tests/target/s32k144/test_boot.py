@@ -3,14 +3,19 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 
+import cantools.database
 import pytest
+from damage import damaged
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core, EmulationStoppedError
 from fluxtrue_tools.sim.library import Loop
@@ -80,6 +85,57 @@ def test_a_damaged_table_keeps_the_pwm_from_starting_and_the_bus_alive(
         assert core.resets == 0
 
 
+class _Frame(ctypes.Structure):
+    """can_port_frame_t."""
+
+    _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
+                ("data", ctypes.c_uint8 * 8))  # fmt: skip
+
+
+_SENT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.POINTER(_Frame), ctypes.c_uint64)
+
+
+class _Port(ctypes.Structure):
+    """can_port_t."""
+
+    _fields_ = (("sent", _SENT), ("user", ctypes.c_void_p))
+
+
+def _told(parts: build.Parts, elf: Path) -> dict[str, dict[str, object]]:
+    """The newest frame of each message that an image sends in its first 0.3 s, decoded; its PWM does not start."""
+    database = cantools.database.load_file(DBC)
+    told: dict[str, dict[str, object]] = {}
+
+    def on_sent(_: int, frame: ctypes._Pointer[_Frame], _now: int) -> None:
+        message = database.get_message_by_frame_id(frame[0].id)
+        told[message.name] = message.decode(bytes(frame[0].data))
+
+    with _core(parts, elf) as core:
+        port = _Port(_SENT(on_sent), None)
+        core._library.emu_can_port(ctypes.c_void_p(core._handle), ctypes.byref(port))
+        assert core.run(0.3) == LIMIT
+        assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
+    return told
+
+
+def test_a_damaged_table_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
+    told = _told(parts, damaged(elf, tmp_path / "damaged.elf", "table_g", 100, b"\x01\x00"))
+    assert told["INV_Status"]["State"] == "fault"
+    assert told["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
+    assert told["INV_Configuration"]["MotorCheck"] == "image_checksum"
+
+
+def test_a_dead_time_beyond_the_timer_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
+    content = image.Image(elf)
+    at = content.place(content.symbol("motor"), 128)
+    dead_time = content.content[at : at + 128].index(struct.pack("<f", 2e-6))
+    impossible = damaged(elf, tmp_path / "impossible.elf", "motor", dead_time, struct.pack("<f", 1e-3))
+    image.seal(impossible)
+    told = _told(parts, impossible)
+    assert told["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
+    assert told["INV_Configuration"]["MotorCheck"] == "pwm_timer"
+
+
 def test_an_image_that_was_never_sealed_does_not_drive(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
     content = image.Image(elf)
     at = content.place(content.symbol("protected_crc"), 4)
@@ -114,6 +170,7 @@ def test_a_table_that_is_damaged_later_disables_switching(parts: build.Parts) ->
         assert core._library.emu_write(core._handle, address, bytes([byte]), 1)
         loop.run(1000)
         assert int(loop.get("fault_word")) == FAULT_CONFIG
+        assert faults.refused_data(int(loop.get("motor_check"))).startswith("image_checksum: ")
         assert abs(loop.get("truth.torque_Nm")) < 0.5
 
 

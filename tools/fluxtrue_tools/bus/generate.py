@@ -10,6 +10,7 @@ the DBC holds as attributes. exports.c makes all of it callable from the tests.
 import subprocess
 import sys
 from collections.abc import Iterator
+from math import gcd
 from pathlib import Path
 
 import cantools
@@ -82,6 +83,26 @@ def constants(message: Message) -> str:
         ("CYCLE_MS", "GenMsgCycleTime"), ("TIME_OUT_MS", "TimeOut"), ("DATA_ID", "E2EDataId")))  # fmt: skip
 
 
+def phases(messages: list[Message]) -> dict[str, int]:
+    """When in its cycle each message is due: the fastest first, each in the first millisecond that no other takes."""
+    found: dict[str, int] = {}
+    taken: list[tuple[int, int]] = []  # phase and cycle
+    for message in sorted(messages, key=lambda message: attribute(message, "GenMsgCycleTime")):
+        cycle = attribute(message, "GenMsgCycleTime")
+        free = (ms for ms in range(cycle) if all((ms - phase) % gcd(cycle, other) for phase, other in taken))
+        found[message.name] = next(free, -1)
+        if found[message.name] < 0:
+            raise FluxtrueError(f"message {message.name}: no millisecond of its cycle of {cycle} ms is left")
+        taken.append((found[message.name], cycle))
+    return found
+
+
+def phase_constants(messages: list[Message]) -> str:
+    """The phases for C."""
+    return "".join(f"#define {PREFIX.upper()}_{snake(name).upper()}_PHASE_MS {phase}U\n"
+                   for name, phase in phases(messages).items())  # fmt: skip
+
+
 def x_macro(name: str, messages: list[Message]) -> str:
     """A list of messages to expand: X(lower-case name, upper-case name)."""
     rows = "".join(f" \\\n    X({snake(message.name)}, {snake(message.name).upper()})" for message in messages)
@@ -93,6 +114,7 @@ def signals_header(sent: list[Message], received: list[Message]) -> str:
     parts = ["/* Generated from the DBC by fluxtrue_tools.bus.generate. */\n#ifndef BUS_SIGNALS_H\n"
              "#define BUS_SIGNALS_H\n#include <math.h>\n\n#include \"bus/bus.h\"\n"]  # fmt: skip
     parts += [constants(message) for message in (*sent, *received)]
+    parts.append(phase_constants(sent))
     protected = [message for message in (*sent, *received) if attribute(message, "E2EDataId")]
     parts += [x_macro("BUS_SENT", sent), x_macro("BUS_PROTECTED", protected)]
     parts += [put(message, signal) for message in sent for signal in message.signals]

@@ -27,6 +27,7 @@ PAGES: Final = ("docs/architecture.md", "docs/howto/can.md", "docs/howto/commiss
 
 SOURCES: Final = {
     "FAULT_LIST": "firmware/types/faults.h",
+    "MOTOR_CHECK_LIST": "firmware/types/motor_check.h",
     "DERATING_LIST": "firmware/control/torque/limit.h",
     "COMMISSION_PHASE_LIST": "firmware/control/commission/commission.h",
     "COMMISSION_FAILURE_LIST": "firmware/control/commission/commission.h",
@@ -52,6 +53,7 @@ CHOICES: Final = {
     "INV_DcLink.DeratingReason": (("DERATING_REASON_LIST", 0),),
     "INV_DcLink.RefusedReason": (("REFUSED_LIST", 0),),
     "INV_Faults.FirstFault": (("FAULT_LIST", 1), ("ECU_FAULT_LIST", 33)),
+    "INV_Configuration.MotorCheck": (("MOTOR_CHECK_LIST", 0),),
     "INV_DiagTask.ResetCause": (("RESET_CAUSE_LIST", 0),),
 }
 """Signals with a value table, and what is added to the values of each list."""
@@ -63,6 +65,7 @@ EXPLAINED: Final = {
     "INV_DcLink.RefusedReason": "REFUSED_LIST",
     "INV_Faults.DriveFaults": "FAULT_LIST",
     "INV_Faults.EcuFaults": "ECU_FAULT_LIST",
+    "INV_Configuration.MotorCheck": "MOTOR_CHECK_LIST",
     "INV_DiagTask.ResetCause": "RESET_CAUSE_LIST",
 }
 """Signals whose comment explains every value or bit, behind its first sentence."""

@@ -14,7 +14,7 @@ import cantools.database
 import click
 from aiohttp import web
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import faults, paths
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.address import BusAddress, parse_option
@@ -33,16 +33,14 @@ from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import VirtualEcu
 from fluxtrue_tools.vecu.stepped import SteppedBus
 
-DRIVE_FAULTS: Final = 1  # FirstFault of bit 0
-ECU_FAULTS: Final = 33
+EXPLAINED: Final = {"DriveFaults": "INV_Faults.DriveFaults", "EcuFaults": "INV_Faults.EcuFaults",
+                    "MotorCheck": "INV_Configuration.MotorCheck"}  # fmt: skip
 
 
-def _fault_names(database: cantools.database.Database) -> dict[str, list[str]]:
-    """Name of every bit of the two fault words: FirstFault's value table counts them through."""
-    choices = database.get_message_by_name("INV_Faults").get_signal_by_name("FirstFault").choices or {}
-    words = {"DriveFaults": (DRIVE_FAULTS, 32), "EcuFaults": (ECU_FAULTS, 16)}
-    return {word: [str(choices.get(first + bit, f"bit {bit}")).replace("_", " ") for bit in range(bits)]
-            for word, (first, bits) in words.items()}  # fmt: skip
+def _explanations() -> dict[str, dict[int, tuple[str, str]]]:
+    """Name and explanation of every bit of the fault words and of every check of the motor data."""
+    return {name: {value: (word.replace("_", " "), text) for value, (word, text) in faults.explained(path).items()}
+            for name, path in EXPLAINED.items()}  # fmt: skip
 
 
 @dataclass
@@ -90,7 +88,7 @@ def _connect(source: Source, session: Session, stack: contextlib.ExitStack) -> N
 def _session(source: Source, torque_max_Nm: float, record_dir: Path) -> Iterator[Session]:
     database = cantools.database.load_file(DBC)
     samples, recorder = Samples(database), Recorder(record_dir, DBC)
-    session = Session(source.title, Commander(torque_max_Nm), samples, recorder, _fault_names(database))
+    session = Session(source.title, Commander(torque_max_Nm), samples, recorder, _explanations())
     with contextlib.ExitStack() as stack:
         if source.address is None:
             stack.callback(Replay(source.frames, [samples]).close)

@@ -45,7 +45,7 @@ class Session:
     commander: Commander
     samples: Samples
     recorder: Recorder
-    faults: dict[str, list[str]]
+    explanations: dict[str, dict[int, tuple[str, str]]]  # of fault bits and checks: name, sentence
     link: Link | None = None  # None: a replay, nothing can be commanded
     tuning: Tuning | None = None
     stand: Stand | None = None
@@ -95,7 +95,7 @@ def _hello(session: Session) -> dict[str, Any]:
     stand = {name: [knob.lo, knob.hi, knob.start] for name, knob in KNOBS.items()} if session.stand else {}
     return {"type": "hello", "title": session.title, "torque_max_Nm": session.commander.torque_max_Nm,
             "replay": session.link is None, "tuning": session.tuning is not None, "stand": stand,
-            "faults": session.faults}  # fmt: skip
+            "explanations": session.explanations}  # fmt: skip
 
 
 def _number(value: Any, what: str) -> float:

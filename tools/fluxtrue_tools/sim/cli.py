@@ -85,8 +85,9 @@ def run_and_report(
     return EXIT_TRIPPED
 
 
-def _faults(faults: list[dict[str, Any]]) -> str:
-    return ", then ".join(f"{', '.join(one['names'])} at {one['t']:g} s" for one in faults) or "none"
+def _faults(data: dict[str, Any]) -> str:
+    told = ", then ".join(f"{', '.join(one['names'])} at {one['t']:g} s" for one in data["faults"]) or "none"
+    return f"{told} ({data['motor_check']})" if data["motor_check"] else told
 
 
 def _line(label: str, values: list[tuple[Any, str]]) -> str:
@@ -120,6 +121,6 @@ def table(data: dict[str, Any]) -> str:
                 "  resistance",
                 [(1e3 * mean["r_ohm"], "mΩ"), (data["r_error_percent"], "% off")],
             ),
-            f"{'  faults':<22}{_faults(data['faults'])}",
+            f"{'  faults':<22}{_faults(data)}",
         ]
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.sim.run import Recording
 
 
@@ -42,6 +43,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "r_error_percent": _rounded(recording.error_percent("r_ohm", "true_r_ohm")),
         "fault_word": recording.fault_word,
         "faults": [{"t": _rounded(time_s), "names": names} for time_s, names in recording.faults()],
+        "motor_check": faults.refused_data(recording.motor_check) or None,
         "expect_fault": scenario.expect_fault,
         "realtime_factor": _rounded(scenario.duration_s / recording.wall_s),
         "mean": means,

@@ -72,6 +72,7 @@ class Recording:
     columns: list[str]
     rows: NDArray[np.float64]
     wall_s: float = 0.0
+    motor_check: int = 0  # why the motor data were refused, as faults.refused_data() tells it
     _index: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -116,6 +117,11 @@ class Recording:
                 known |= new
         return found
 
+    def in_words(self, fault: str) -> str:
+        """A fault's name; that of refused motor data with what is wrong with them."""
+        why = faults.refused_data(self.motor_check) if fault == faults.CONFIG else ""
+        return f"{fault} ({why})" if why else fault
+
     def unexpected(self) -> str | None:
         """What is wrong with the run's faults: a trip that the scenario does not expect, or the other way round."""
         tripped, wanted = self.faults(), self.scenario.expect_fault
@@ -123,7 +129,7 @@ class Recording:
             return None if wanted is None else f"expect_fault = {wanted!r}: the drive did not trip"
         if wanted in tripped[0][1]:
             return None
-        told = ", then ".join(f"{', '.join(names)} at {time_s:g} s" for time_s, names in tripped)
+        told = ", then ".join(f"{', '.join(map(self.in_words, names))} at {time_s:g} s" for time_s, names in tripped)
         if wanted is not None:
             return f"expect_fault = {wanted!r}: the drive tripped with another fault first: {told}"
         return f'the drive tripped: {told}; a scenario that means it says expect_fault = "{tripped[0][1][0]}"'
@@ -193,11 +199,12 @@ def simulate(
         try:
             loop.record(channels, every)
             rows = _run(scenario, loop, columns, progress)
+            check_number = int(loop.get("motor_check")) if scenario.controller.kind == "firmware" else 0
         except lib.LoopError as error:
             raise check.refused(error, scenario, motor, where) from error
         except FluxtrueError as error:
             raise FluxtrueError(f"{where}: {error}") from error
-    return Recording(scenario, motor, columns, rows, time.perf_counter() - begin)
+    return Recording(scenario, motor, columns, rows, time.perf_counter() - begin, check_number)
 
 
 def _run(

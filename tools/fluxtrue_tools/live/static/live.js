@@ -127,14 +127,24 @@ function badge(id, text, kind) {
   $(id).className = `badge ${kind}`;
 }
 
-function showFaults(faults) {
+// Name and explanation of each fault; the configuration fault with the check of the motor data that failed.
+function showFaults(faults, configuration) {
   const active = [];
-  for (const [signal, names] of Object.entries(hello.faults)) {
-    names.forEach((text, bit) => {
-      if (Math.floor((faults[signal] || 0) / 2 ** bit) % 2) active.push(text);
-    });
+  const bits = (signal) => Object.entries(hello.explanations[signal])
+    .filter(([bit]) => Math.floor((faults[signal] || 0) / 2 ** bit) % 2).map(([, words]) => words);
+  for (const words of bits("DriveFaults")) {
+    active.push(words);
+    const check = configuration.MotorCheck;
+    if (words[0] === "config" && check) {
+      active.push(hello.explanations.MotorCheck[check] || [`check ${check}`, "Not known to this page."]);
+    }
   }
-  const rows = active.map((text) => Object.assign(document.createElement("li"), { textContent: text, className: "active" }));
+  active.push(...bits("EcuFaults"));
+  const rows = active.map(([name, text]) => {
+    const row = Object.assign(document.createElement("li"), { textContent: name, className: "active" });
+    row.append(Object.assign(document.createElement("small"), { textContent: text }));
+    return row;
+  });
   if (!rows.length) rows.push(Object.assign(document.createElement("li"), { textContent: "none", className: "quiet" }));
   $("faults").replaceChildren(...rows);
 }
@@ -185,7 +195,7 @@ function onRows(message) {
   if (document.hidden) tellDrawn();
   if (message.last) {
     showNumbers(message.last);
-    showFaults(message.last.INV_Faults || {});
+    showFaults(message.last.INV_Faults || {}, message.last.INV_Configuration || {});
     showState(message.state, message.wish, message.target_Nm);
     $("stopped").textContent = message.stopped;
   }

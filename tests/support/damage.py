@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs, libraries and images with a fault in the motor data that they carry."""
+
+import shutil
+from pathlib import Path
+
+from fluxtrue_tools.target.image import Image
+
+BAD_FLUX = ("table_l_q", 0, bytes(2))  # an inductance of zero
+BAD_REFERENCE = ("table_ref_i_d", 0, b"\x01\x00")  # a positive i_d
+
+
+def damaged(elf: Path, out: Path, symbol: str, at: int, data: bytes) -> Path:
+    """A copy of an ELF file in which the bytes behind a symbol are others."""
+    image = Image(elf)
+    place = image.place(image.symbol(symbol) + at, len(data))
+    assert image.content[place : place + len(data)] != data, "nothing would be damaged"
+    image.content[place : place + len(data)] = data
+    shutil.copy(elf, out)  # may be executed if the original may
+    out.write_bytes(image.content)
+    return out
