@@ -20,7 +20,9 @@ flash = { text = "61 KiB", path = ["image", "flash"], scale = 1024 }
 
 [code]
 precharge = { text = "2 s", define = ["firmware/ecu/supervisor.c", "PRECHARGE_MS"], scale = 1000 }
+time_out = { text = "30 ms", match = ["firmware/comm/bus.dbc", 'BO_ 272 (\\d+);'] }
 """
+DBC = 'BA_ "TimeOut" BO_ 272 30;\nBA_ "TimeOut" BO_ 273 300;\n'
 CODE = "#define PRECHARGE_MS 2000U /* least time */\n"
 PAGE = """# Page
 
@@ -28,6 +30,7 @@ An error of <!-- figure: rms -->0.41 %, that is <!-- figure: ratio -->1.5 times 
 
 | flash | <!-- figure: flash -->61 KiB |
 | precharge | <!-- figure: precharge -->2 s |
+| time-out | <!-- figure: time_out -->30 ms |
 """
 SUMMARY = {
     "controllers": [
@@ -43,6 +46,8 @@ def tree(tmp_path: Path) -> Path:
     (tmp_path / "docs").mkdir()
     (tmp_path / "firmware/ecu").mkdir(parents=True)
     (tmp_path / "firmware/ecu/supervisor.c").write_text(CODE)
+    (tmp_path / "firmware/comm").mkdir()
+    (tmp_path / "firmware/comm/bus.dbc").write_text(DBC)
     (tmp_path / "docs/figures.toml").write_text(DATA)
     (tmp_path / "docs/page.md").write_text(PAGE)
     (tmp_path / "README.md").write_text("The error is **<!-- figure: rms -->0.41 %**.\n")
@@ -103,6 +108,16 @@ def test_a_constant_that_has_changed_or_gone_is_found(tree: Path) -> None:
     code, messages = check(tree)
     assert code == 1
     assert "figure 'precharge': nothing at" in messages[0]
+
+
+def test_a_number_that_a_pattern_finds_changed_twice_or_not_at_all_is_found(tree: Path) -> None:
+    source = tree / "firmware/comm/bus.dbc"
+    line = "docs/figures.toml:11: figure 'time_out'"
+    source.write_text(DBC.replace("272 30", "272 20"))
+    assert check(tree) == (1, [f"{line} reads '30 ms', firmware/comm/bus.dbc gives 20"])
+    for text in (DBC.replace("272", "274"), DBC + DBC):
+        source.write_text(text)
+        assert check(tree) == (1, [f"{line}: nothing at ['firmware/comm/bus.dbc', 'BO_ 272 (\\\\d+);']"])
 
 
 def test_a_campaign_with_another_result_is_found(tree: Path) -> None:

@@ -81,8 +81,19 @@ def constant(root: Path, file: str, name: str) -> float:
     return float(match.group(1))
 
 
+def matched(root: Path, file: str, pattern: str) -> float:
+    """The number that the group of a pattern finds in the only line of a file that has it."""
+    found = [match.group(1) for line in lines(root, Path(file)) if (match := re.search(pattern, line))]
+    if len(found) != 1:
+        raise KeyError(pattern)
+    return float(found[0])
+
+
 def source_of(root: Path, figure: Figure, results: Path | None) -> tuple[str, float] | None:
     """What a figure is taken from, by name, and the number there; nothing if there is nothing to compare with."""
+    if "match" in figure:
+        file, pattern = figure["match"]
+        return file, matched(root, file, pattern)
     if "define" in figure:
         file, name = figure["define"]
         return file, constant(root, file, name)
@@ -99,7 +110,7 @@ def source_problem(root: Path, name: str, figure: Figure, results: Path | None) 
     try:
         source = source_of(root, figure, results)
     except (KeyError, TypeError, ValueError, OSError):
-        return f"figure '{name}': nothing at {figure.get('path') or figure.get('define')}"
+        return f"figure '{name}': nothing at {figure.get('path') or figure.get('define') or figure.get('match')}"
     if source is None:
         return None
     rounded = f"{source[1] / figure.get('scale', 1):.{len(match.group(1) or '')}f}"

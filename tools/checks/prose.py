@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prose of the Markdown pages: width of the lines. Code, equations, tables and the targets of links are exempt."""
+"""Prose of the Markdown pages: width of the lines. Code, equations, tables, the targets of
+links and comments are exempt."""
 
 import re
 from collections.abc import Iterator
@@ -10,12 +11,13 @@ from tree import Violation
 MAX_COLUMNS = 120
 
 LINK_TARGET = re.compile(r"\]\([^()\s]*\)")
+MARK = re.compile(r"<!--.*?-->")
 IMAGE = re.compile(r"\s*!\[[^\]]*\]\([^)]*\)\s*")
 
 
 def visible(line: str) -> str:
-    """The line as a reader sees it: without the targets of its links."""
-    return LINK_TARGET.sub("]", line)
+    """The line as a reader sees it: without the targets of its links and the marks of its figures."""
+    return MARK.sub("", LINK_TARGET.sub("]", line))
 
 
 def fences(text: list[str]) -> Iterator[tuple[int, str]]:
