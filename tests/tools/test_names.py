@@ -15,7 +15,8 @@ def tree(tmp_path: Path) -> Path:
     """A small project."""
     for name, text in {
         "firmware/control/measure.c": "void measure_step(int x)\n{\n}\n",
-        "firmware/control/measure.h": "void measure_step(int x);\n",
+        "firmware/control/measure.h": "typedef struct {\n    int gain; /* not: offset */\n} measure_t;\n"
+        "typedef int count_t;\nvoid measure_step(int x);\n",
         "docs/theory/plant.md": "# Plant\n",
         "CHANGELOG.md": "`firmware/app/gone.c` was split.\n",
         "docs/decisions/009.md": "`firmware/app/gone.c` held 41 files; see [plant](../theory/plant.md).\n",
@@ -42,6 +43,7 @@ def check(root: Path) -> tuple[int, list[str]]:
         "`hal/acme/main.c` is yours, `motor_si.c` is generated",
         "```\n`firmware/none.c`\n```",
         "`measure_step` without brackets, `x.toml`, `hal_*`",
+        "`measure_t`, `measure_t.gain`, `count_t`, `uint32_t`",
     ],
 )
 def test_what_exists_may_be_named(tree: Path, text: str) -> None:
@@ -58,6 +60,8 @@ def test_what_exists_may_be_named(tree: Path, text: str) -> None:
         ("see `measures.c`", "there is no file measures.c"),
         ("call `measure_steps()`", "there is no function measure_steps()"),
         ("| `measure_step()` | `none.h` |", "there is no file none.h"),
+        ("the type `measures_t`", "there is no measures_t"),
+        ("the field `measure_t.offset`", "there is no measure_t.offset"),
         ("see [plant](plant.md)", "the link leads nowhere: plant.md"),
         ("see [plant](theory/plants.md#tests)", "the link leads nowhere: theory/plants.md"),
     ],

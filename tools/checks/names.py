@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the pages name exists: targets of links, paths, source files and functions."""
+"""What the pages name exists: targets of links, paths, source files, functions, types and their fields."""
 
 import re
 import sys
@@ -15,8 +15,14 @@ REMOTE = re.compile(r"[a-z]+:")
 PATH = re.compile(r"(?:firmware|hal|tests|tools|docs)/[\w./*-]+")
 FILE = re.compile(r"[\w-]+\.(?:c|h|py)")
 FUNCTION = re.compile(r"(\w+)\(\)")
+FIELD = re.compile(r"(\w+_t)(?:\.(\w+))?")
+TYPE = re.compile(
+    r"typedef (?:struct|union|enum) ?\w*\s*\{((?:[^{}]|\{[^{}]*\})*)\}\s*(\w+_t);|typedef [^{};]*?\b(\w+_t);"
+)
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 WORD = re.compile(r"\b\w+(?=\s*\()")
 SOURCES = (".c", ".h", ".py", ".in", ".js")
+STANDARD = {"int16_t", "int32_t", "int64_t", "uint8_t", "uint16_t", "uint32_t", "uint64_t", "size_t"}
 # Written by the build, or an example of a reader's own.
 ELSEWHERE = ("motor_si.c", "hal/acme/")
 # Pages about names of the past.
@@ -31,8 +37,20 @@ class Tree:
         self.root = root
         self.files = {path.name for path in files(root)}
         self.functions: set[str] = set()
+        self.fields: dict[str, set[str]] = {}
         for path in files(root, *SOURCES):
-            self.functions.update(WORD.findall("\n".join(lines(root, path))))
+            text = "\n".join(lines(root, path))
+            self.functions.update(WORD.findall(text))
+            if path.suffix == ".h":
+                self._add_types(COMMENT.sub("", text))
+
+    def _add_types(self, text: str) -> None:
+        for body, name, alias in TYPE.findall(text):
+            self.fields.setdefault(name or alias, set()).update(re.findall(r"\w+", body))
+
+    def has_field(self, name: str, field: str) -> bool:
+        """A type, and a field of it if one is named. Types of the C standard have none."""
+        return name in STANDARD or (name in self.fields and (not field or field in self.fields[name]))
 
     def has_path(self, name: str) -> bool:
         """A file or folder, or a pattern that fits one."""
@@ -60,6 +78,8 @@ def name_problems(tree: Tree, line: str) -> Iterator[str]:
                 yield f"there is no file {code}"
         elif (match := FUNCTION.fullmatch(code)) and match.group(1) not in tree.functions:
             yield f"there is no function {code}"
+        elif (match := FIELD.fullmatch(code)) and not tree.has_field(match.group(1), match.group(2) or ""):
+            yield f"there is no {code}"
 
 
 def check(root: Path) -> Iterator[Violation]:
