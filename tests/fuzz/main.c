@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The receive path under random and mutated frames:  fuzz_bus <frames> <seed>
- * The whole ECU runs, millisecond by millisecond; after each of them its idea of what was commanded must be the
- * oracle's, and the torque request must lie between what it was and what the oracle allows. */
+ * The whole ECU runs, millisecond by millisecond. After each one the values that it has accepted must equal those of an
+ * independent model (oracle.c), and the requested torque must lie between its last value and what the model allows. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,7 +14,7 @@
 #include "sender.h"
 #include "vecu/machine_data.h"
 
-#define BURST_MAX 30U /* frames per millisecond: what one task takes */
+#define BURST_MAX 30U /* frames per millisecond that one step of the task can process */
 #define PERIODS_PER_MS 10
 #define CAPACITANCE_F 500e-6
 #define ROUNDING_NM 0.02 /* two counts of the torque */
@@ -105,7 +105,7 @@ static void set(const char *name, double value)
     check(sim_set(sim, name, value) == SIM_OK, name);
 }
 
-/* The machine, turned slowly by someone else. */
+/* The machine, turned slowly from outside. */
 static void start_plant(void)
 {
     const machine_data_t *m = &machine_data;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef FUZZ_ORACLE_H
 #define FUZZ_ORACLE_H
-/** A second opinion on which frames may command the inverter: written from docs/howto/can.md, with another CRC
- * algorithm, another model of time and raw bytes instead of generated code. Shares only can_frame_t with the firmware.
+/** An independent model of which frames may command the inverter. It was written from docs/howto/can.md, with another
+ * CRC algorithm, another model of time and raw bytes instead of generated code, and shares only can_frame_t with the
+ * firmware.
  * Source   docs/howto/can.md
  * Context  fuzz campaign only */
 #include <stdbool.h>
@@ -28,9 +29,9 @@ typedef struct {
 } oracle_t;
 
 void oracle_start(oracle_t *oracle);
-/** Whether the frame is to be obeyed. */
+/** Whether the frame must be accepted. */
 bool oracle_frame(oracle_t *oracle, const can_frame_t *frame);
-/** A millisecond is over. */
+/** Ends a millisecond. */
 void oracle_tick(oracle_t *oracle);
 bool oracle_failed(const oracle_channel_t *channel);
 

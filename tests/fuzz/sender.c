@@ -44,7 +44,7 @@ static void sign(sender_t *s, unsigned which, can_frame_t *frame)
     s->counter[which] = counter;
 }
 
-/* The way out of a fault and into run, over and over: reset, idle, enable, torque; and now and then something else. */
+/* Repeats the sequence from a fault to the state run: reset, idle, enable, torque; sometimes with another frame. */
 static void make_up_mind(sender_t *s)
 {
     s->step = (s->step + 1U) % STEPS;
@@ -95,7 +95,7 @@ static can_frame_t noise(sender_t *s)
     return frame;
 }
 
-/* A good CRC and a right counter, but anything in between. */
+/* Valid CRC and counter, random signals. */
 static can_frame_t signed_noise(sender_t *s)
 {
     const unsigned which = sender_random(s, 2);

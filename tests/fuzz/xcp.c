@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The calibration protocol under commands that make sense one by one, in an order that need not:
+/* The calibration protocol under commands that are valid one by one, in a random order:
  *   fuzz_xcp <commands> <seed>
- * Random frames hardly ever get beyond CONNECT; these ask for the right addresses, know the key, and build lists. */
+ * Purely random frames hardly ever get beyond CONNECT. These use valid addresses and the key, and allocate lists. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,14 +50,14 @@ static void check(bool good, const char *what)
     }
 }
 
-/* Mostly near something that exists. */
+/* Mostly near a valid address. */
 static uint32_t some_address(void)
 {
     const uint32_t base = (below(2) == 0U) ? xcp_address(measured) : xcp_address(working);
     return (below(20) == 0U) ? below(UINT32_MAX) : base + below(36) - 2U;
 }
 
-/* One that exists, with arguments near those that do. */
+/* A valid command with arguments near the valid ones. */
 static can_frame_t some_command(void)
 {
     const bool wild = below(30) == 0U;
@@ -95,7 +95,7 @@ static void give(const can_frame_t *frame)
     sent++;
 }
 
-/* A step of a session as it should be; now and then something else comes in between, or the step is left out. */
+/* A step of a valid session; sometimes another command is inserted, or the step is left out. */
 static void step(const uint8_t data[8])
 {
     can_frame_t frame = {.length = FRAME_MAX};

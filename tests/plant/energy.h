@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_ENERGY_H
 #define PLANT_ENERGY_H
-/** Where the energy goes, substep by substep:
+/** Energy balance, substep by substep:
  *   dc = inverter + electrical,  electrical = copper + iron + mechanical + field
  * Source   docs/theory/plant.md (PL-20)
  * Units    J over a period; the mean voltage and torque as integrals
- * Rounding each term is integrated by itself: the balance closes to second order, not trivially
+ * Rounding each term is integrated separately: the balance is exact to second order and therefore a test
  * Context  simulation only */
 #include "machine.h"
 

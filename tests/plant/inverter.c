@@ -66,7 +66,7 @@ static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], 
     from_phases(leg, u_s);
 }
 
-/* Do the currents keep the signs that the errors were chosen for, outside the zone? */
+/* Whether the currents outside the zone keep the signs for which the errors were chosen. */
 static int consistent(const inverter_t *v, const double error_V[3], const double i_abc[3])
 {
     for (int x = 0; x < 3; x++) {
@@ -103,7 +103,7 @@ static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, con
             return 0;
         }
     }
-    const double soft = v->zone_A[0] / bound; /* no bound at all: the legs were exact */
+    const double soft = v->zone_A[0] / bound; /* without any bound the legs are exact */
     const double per_det = h / (jac[0] * jac[3] - jac[1] * jac[2]);
     const double a[4] = {jac[3] * per_det + soft, -jac[1] * per_det, -jac[2] * per_det, jac[0] * per_det + soft};
     double ab[2], dq[2], error_dq[2], e[3];

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_INVERTER_H
 #define PLANT_INVERTER_H
-/** Two-level inverter, averaged over the PWM period; every leg obeys one law, like dry friction:
- *   v_x = v_dc d_x - e_x,  e_x = hi_x for i_x > 0, -lo_x for i_x < 0, between: what holds i_x at 0
+/** Two-level inverter, averaged over the PWM period. All legs have the same characteristic, similar to dry friction:
+ *   v_x = v_dc d_x - e_x,  e_x = hi_x for i_x > 0, -lo_x for i_x < 0, between: the value that holds i_x at 0
  *   switching:  hi, lo = dead-time loss + drop;   gates off:  d = 1/2, hi = lo = v_dc/2 + drop
  * Source   docs/theory/plant.md (PL-11) ... (PL-14)
  * Units    V, A, s

@@ -48,8 +48,8 @@ static void model_flux(const void *context, const double i[2], double psi[2], do
     }
 }
 
-/* The currents of psi_dq, searched from i. None found, or where many currents have this flux:
- * counted, and currents and slopes stay those of before, which are numbers. */
+/* The currents of psi_dq, searched from i. If none is found, or many currents have this flux, this is counted, and
+ * currents and slopes keep their last values, which are finite. */
 static void search_current(machine_t *m, double i[2])
 {
     double jac[4];
@@ -61,8 +61,8 @@ static void search_current(machine_t *m, double i[2])
     memcpy(m->jac, jac, sizeof jac);
 }
 
-/* start is a Newton step old at most: one evaluation and a correction do, unless the residual says
- * that quadratic convergence is not yet below the tolerance. */
+/* start is at most one Newton step away: one evaluation and one correction suffice, unless the residual shows that the
+ * tolerance is not reached yet. */
 static void find_current(machine_t *m, const double start[2])
 {
     double i[2] = {start[0], start[1]}, psi[2], r[2], step[2], jac[4];

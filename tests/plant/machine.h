@@ -8,7 +8,7 @@
  * Units    SI, amplitude-invariant; _s stationary frame, _dq rotor frame
  * Rounding second order in the substep
  * Errors   counts the substeps whose currents could not be found (residual above 1e-10 Vs) and
- *          leaves the currents of before
+ *          keeps the last currents
  * Context  simulation only */
 #include "plant_map.h"
 #include "plant_params.h"

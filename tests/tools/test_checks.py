@@ -218,9 +218,7 @@ LONG = "word " * 25 + "end"
 
 
 def test_what_a_reader_does_not_see_does_not_count_as_width(tree: Path) -> None:
-    text = (
-        "word " * 15 + "<!-- figure: command_time_out -->30 ms, see [can](../howto/can.md#a-long-anchor)"
-    )
+    text = "word " * 15 + "<!-- figure: command_time_out -->30 ms, see [can](../howto/can.md#a-long-anchor)"
     write(tree, "docs/good.md", text + "\n")
     assert check("style", tree) == (0, "")
 

@@ -67,7 +67,7 @@ static void finish(bench_t *bench)
     bench->runner = -1;
 }
 
-/* The run may begin when its client has been heard with the frames it says it has sent. */
+/* A run begins when the stated number of frames of its client has been received. */
 static bool may_begin(bench_t *bench)
 {
     uint64_t received = 0, sent = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_BENCH_H
 #define VECU_BENCH_H
-/** The bench channel: what a test stand does that is not on CAN. One command per line, one answer per command:
- *   hello                             who we are
+/** The bench channel: control of the test stand beside CAN. One command per line, one answer per command:
+ *   hello                             name and versions
  *   names                             every name of the board, the plant and its truth
  *   set <name> <value> [...]          "plant." and "board.": parameters and faults, from the next period on
  *   get <name> [...]
@@ -31,9 +31,9 @@ bench_t *bench_create(uint16_t port, vecu_t *vecu, bool realtime, char *why, siz
 void bench_destroy(bench_t *bench);
 line_server_t *bench_server(bench_t *bench);
 
-/** Carries out what the clients ask for, up to the next run. */
+/** Carries out the clients' commands up to the next run. */
 void bench_service(bench_t *bench);
-/** Lets one period pass if a run is under way, or `anyway`; false: time stands still. */
+/** Advances the time by one period if a run is under way, or if `anyway`; false: the time did not advance. */
 bool bench_step(bench_t *bench, bool anyway);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_BENCH_PRIVATE_H
 #define VECU_BENCH_PRIVATE_H
-/** What the bench channel's commands and its runs share.
+/** Shared by the commands and the runs of the bench channel.
  * Context  tests/vecu/bench*.c only */
 #include "bench.h"
 
@@ -31,7 +31,7 @@ struct bench {
 
 /** One line of answer. */
 __attribute__((format(printf, 3, 4))) void bench_say(bench_t *bench, int client, const char *format, ...);
-/** Does what a line asks for; a run is only noted. */
+/** Carries out the command of a line; a run is only recorded. */
 void bench_obey(bench_t *bench, int client, char *text);
 
 #define REFUSE(...) \

@@ -17,8 +17,7 @@ uint32_t can_bus_bits(const can_frame_t *frame)
     return frame->extended ? 67U + data + (53U + data) / 4U : 47U + data + (33U + data) / 4U;
 }
 
-/* Orders identifiers as the wire does: bit by bit, dominant (0) wins, and of two with the same first 11 bits the
- * standard frame wins. */
+/* Arbitration of the bus: bit by bit, dominant (0) wins; with the same first 11 bits the standard frame wins. */
 static uint32_t rank(const can_frame_t *frame)
 {
     if (!frame->extended) {

@@ -7,7 +7,7 @@
  *   (VB-2)  bits = 67 + 8 n + floor((53 + 8 n)/4)    extended
  * Source   ISO 11898-1; g + 8n bits are open to stuffing (g = 34 or 54), at most one stuff bit after each 4 of them
  * Units    ns of simulated time
- * Errors   a node whose queue is full loses the frame, counted. No bit errors, no bus-off: not a test of a transceiver
+ * Errors   a frame for which a node's queue is full is lost and counted. Bit errors and bus-off are not modelled
  * Context  simulation only; pure */
 #include <stdbool.h>
 #include <stdint.h>
@@ -16,7 +16,7 @@
 
 enum { CAN_BUS_NODES = 17, CAN_BUS_QUEUE = 1024, CAN_BUS_ECU = 0, CAN_BUS_MAILBOXES = 16 /* of the ECU */ };
 #define CAN_BUS_WINDOW_NS 100000000ULL /* the load is counted in windows of 100 ms */
-#define CAN_BUS_LOAD_MAX 0.7           /* beyond it low priorities wait for long: flagged */
+#define CAN_BUS_LOAD_MAX 0.7           /* above it low priorities wait long, which is reported */
 
 typedef struct {
     can_frame_t frame;
@@ -56,7 +56,7 @@ void can_bus_init(can_bus_t *bus, uint32_t bit_rate);
 uint32_t can_bus_bits(const can_frame_t *frame);
 /** False: the node's queue is full. */
 bool can_bus_post(can_bus_t *bus, int node, const can_frame_t *frame, uint64_t now_ns);
-/** The next frame that has passed by `until`; false: none. */
+/** The next frame that has been transmitted by `until`; false: none. */
 bool can_bus_next(can_bus_t *bus, uint64_t until_ns, can_bus_passed_t *passed);
 /** The ECU is switched off: what it was sending and had queued is lost. */
 void can_bus_silence_ecu(can_bus_t *bus);

@@ -8,8 +8,8 @@
 
 #include "socketcand.h"
 
-/* A client reads "< ok >" with one read and takes a frame glued to it for a broken greeting: it gets this long, by the
- * wall clock, to read it. */
+/* A client reads "< ok >" with one read and takes a frame that follows immediately for a broken greeting. It gets this
+ * time, by the wall clock, to read the greeting. */
 #define GREETING_MS 100
 enum { ECU_QUEUE = 64 };
 

@@ -31,11 +31,11 @@ void hub_destroy(hub_t *hub);
 
 /** The server behind the port, for a caller that waits for several at once (line_server_wait). */
 line_server_t *hub_server(hub_t *hub);
-/** Takes what the clients have said; call it after waiting. */
+/** Processes the clients' input; call it after waiting. */
 void hub_service(hub_t *hub, uint64_t now_ns);
 /** Waits at most timeout_ms for the clients, then hub_service(). */
 void hub_poll(hub_t *hub, uint64_t now_ns, int timeout_ms);
-/** Lets the bus run until now: frames that have passed by are handed to everybody but their sender. */
+/** Advances the bus until now: transmitted frames are delivered to all nodes but their sender. */
 void hub_run(hub_t *hub, uint64_t now_ns);
 
 /** Whether hub_send() would take a frame. */
@@ -43,7 +43,7 @@ bool hub_can_queue(const hub_t *hub);
 bool hub_send(hub_t *hub, const can_frame_t *frame, uint64_t now_ns);
 bool hub_receive(hub_t *hub, can_frame_t *frame);
 
-/** The ECU is switched off: nothing of its own is on the bus any more, and it has heard nothing. */
+/** The ECU is switched off: its frames and its received frames are discarded. */
 void hub_detach_ecu(hub_t *hub);
 
 /** What passed between us and the client whose side of the connection has this port: frames it sent, good or bad, and

@@ -26,7 +26,7 @@ static bool take(line_buffer_t *b, size_t from, size_t to, char *text)
     return good;
 }
 
-/* Gives up what cannot become a text any more. */
+/* Discards input that cannot become a text. */
 static void give_up(line_buffer_t *b)
 {
     b->dropped += b->skipping ? 0U : 1U;
@@ -49,7 +49,7 @@ static bool next_line(line_buffer_t *b, char *text)
     return false;
 }
 
-/* Anything but white space between '>' and '<' has no business there. */
+/* Only white space is allowed between '>' and '<'. */
 static void skip_to_bracket(line_buffer_t *b)
 {
     bool rubbish = false;
@@ -74,7 +74,7 @@ static bool next_bracketed(line_buffer_t *b, char *text)
         if (at == b->end) {
             if (at - b->begin > LINE_LENGTH) {
                 b->dropped++;
-                b->begin = b->end; /* the rest is rubbish before the next '<' */
+                b->begin = b->end; /* the rest before the next '<' is invalid */
             }
             return false;
         }

@@ -4,8 +4,8 @@
 /** A TCP port on 127.0.0.1 whose clients speak in short texts: lines, or words between '<' and '>'.
  * Source   docs/howto/bench.md
  * Range    LINE_CLIENTS clients, texts of up to LINE_LENGTH characters without NUL
- * Errors   whatever is no text (too long, a NUL in it, cut off by the end of the connection) is dropped and counted; a
- *          client that does not read what it is sent is disconnected and counted; no input can stop the server
+ * Errors   input that is not a text (too long, with a NUL, cut off by the end of the connection) is dropped and
+ *          counted; a client that does not read its output is disconnected and counted; no input can stop the server
  * Context  simulation only; one thread; nothing blocks but line_server_wait() */
 #include <stdbool.h>
 #include <stddef.h>
@@ -38,7 +38,7 @@ line_counts_t line_server_counts(const line_server_t *server);
  * (negative: for ever), then reads and writes what there is. */
 void line_server_wait(line_server_t *const *servers, int count, int timeout_ms);
 
-/** The next event; a text is without its frame, NUL-terminated. */
+/** The next event; a text without its delimiters, NUL-terminated. */
 line_event_t line_server_next(line_server_t *server, int *client, char text[LINE_LENGTH + 1]);
 
 /** Queues a text as it is, frame and all. */
@@ -50,7 +50,7 @@ size_t line_server_backlog(const line_server_t *server);
 void line_server_drop_slow(line_server_t *server, size_t bytes);
 /** The port on the client's side, 0 if there is no such client: how a client names its own connection. */
 uint16_t line_server_peer(const line_server_t *server, int client);
-/** False: nothing more will come from it. */
+/** False: the client has ended. */
 bool line_server_connected(const line_server_t *server, int client);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The virtual ECU: fluxtrue_vecu [--fast] [--port N] [--bench-port N] [--bit-rate N] [--seed N] [--nvm FILE]
- * Says on standard output where it listens, in one line, as soon as it does. */
+ * Prints the address on which it listens in one line on standard output. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <signal.h>
@@ -18,8 +18,9 @@
 enum { EXIT_USAGE = 2, PERIODS_PER_LOOP = 100 };
 #define BACKLOG_MAX ((size_t)1 << 18) /* fast: time waits for a client with more than this to read */
 #define PATIENCE_NS 2000000000LL      /* so long, by the wall clock; then it is disconnected */
-/* Realtime: a host further behind gives up the rest. What it caught up in one go would be a bus without commands: the
- * clients have been waiting as well. With a command each 10 ms this stays below the time-out of 30 ms. */
+/* Real time: a host that is further behind skips the rest. If it caught up at once, the bus would have no commands
+ * during that time, because the clients have been waiting too. With a command every 10 ms this stays below the time-out
+ * of 30 ms. */
 #define LAG_MAX_NS 10000000LL
 
 static volatile sig_atomic_t stop;
@@ -92,7 +93,7 @@ static bool parse(int count, char **words, options_t *o)
     return true;
 }
 
-/* A client that does not read holds up a fast run; after a while it is let go. */
+/* A client that does not read delays a fast run; after PATIENCE_NS it is disconnected. */
 static bool must_wait(line_server_t *const *servers, int64_t *since_ns)
 {
     const size_t waits = line_server_backlog(servers[0]) + line_server_backlog(servers[1]);

@@ -21,7 +21,7 @@ static int digit(char c)
     return (c >= 'A' && c <= 'F') ? c - 'A' + 10 : -1;
 }
 
-/* A hexadecimal word; answers its digits, 0 if it is none or has more than 8. */
+/* Parses a hexadecimal word; returns the number of digits, 0 if it is not one or has more than 8. */
 static int hex_word(const char **at, uint32_t *value)
 {
     const char *s = skip_spaces(*at);

@@ -18,7 +18,7 @@ typedef enum { SOCKETCAND_BAD, SOCKETCAND_OPEN, SOCKETCAND_RAW, SOCKETCAND_SEND 
 
 enum { SOCKETCAND_TEXT = 80 };
 
-/** What a text (without its brackets) asks for; the frame is written for SOCKETCAND_SEND. */
+/** The command in a text without its brackets; the frame is written for SOCKETCAND_SEND. */
 socketcand_t socketcand_parse(const char *text, can_frame_t *frame);
 /** The frame as a text with its brackets; answers its length. */
 size_t socketcand_format(char text[SOCKETCAND_TEXT], const can_frame_t *frame, uint64_t time_ns);

@@ -31,11 +31,11 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed);
 void vecu_destroy(vecu_t *vecu);
 /** One PWM period; answers whether `row` (SIM_API sim_record) has been written. */
 bool vecu_step(vecu_t *vecu, double *row);
-/** Everything that has a name: "plant.", "truth.", "board.", and the firmware's (to be read only: on a bench the ECU
- * is asked over CAN). False and NaN: unknown, read only or out of range. */
+/** All names: "plant.", "truth.", "board.", and those of the firmware, which can only be read, because on a bench the
+ * ECU is commanded over CAN. False and NaN: unknown, read only or out of range. */
 bool vecu_set(vecu_t *vecu, const char *name, double value);
 double vecu_get(const vecu_t *vecu, const char *name);
-/** The hash, which starts anew. */
+/** The hash since the last call. */
 uint64_t vecu_take_hash(vecu_t *vecu);
 
 #endif

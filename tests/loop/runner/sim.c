@@ -44,7 +44,7 @@ int sim_map(sim_t *sim, const double *id_A, int nd, const double *iq_A, int nq, 
             const double *psi_q_Vs)
 {
     if (sim->plant != NULL) {
-        return SIM_READ_ONLY; /* the plant holds on to its map */
+        return SIM_READ_ONLY; /* the plant uses its map */
     }
     plant_map_t *map = plant_map_create(id_A, nd, iq_A, nq, psi_d_Vs, psi_q_Vs);
     if (map == NULL) {

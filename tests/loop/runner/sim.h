@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef LOOP_RUNNER_SIM_H
 #define LOOP_RUNNER_SIM_H
-/** Closed loop: the simulated drive with the firmware, or with its double-precision twin, period by
- * period. period k: sample, control step, then the plant advances with the duties computed in
- * period k-1. Names: "plant.<field>" (array fields end in _a _b _c), "truth.<field>" (read only),
- * the rest is the controller's. Source   docs/howto/simulate.md Units    SI; a name ends in its
- * unit Errors   the codes below; a refused call changes nothing Context  host; any number of
- * instances, one thread per instance at a time order of calls: sim_create, sim_map and sim_set of
- * the plant, sim_start, then everything else */
+/** Closed loop: the simulated drive with the firmware, or with its double-precision twin, period by period.
+ *   period k: sample, control step, then the plant advances with the duties computed in period k-1
+ *   Names: "plant.<field>" (array fields end in _a _b _c), "truth.<field>" (read only); all others are the
+ *   controller's.
+ * Source   docs/howto/simulate.md
+ * Units    SI; a name ends in its unit
+ * Errors   the codes below; a refused call changes nothing
+ * Context  host; any number of instances, one thread per instance at a time. Order of the calls: sim_create, sim_map
+ *          and sim_set of the plant, sim_start, then all others */
 #ifdef __GNUC__
 #define SIM_API __attribute__((visibility("default")))
 #else
@@ -57,11 +59,10 @@ SIM_API int sim_record(sim_t *sim, const char *const *names, int count, int ever
 /** During the next sim_run() the name goes linearly from one value to the other: plant fields every
  * period, the controller's once per millisecond. */
 SIM_API int sim_ramp(sim_t *sim, const char *name, double from, double to);
-/** Runs; answers the rows written, or a negative code: SIM_FULL when they would not fit (then
- * nothing runs), SIM_FAILED when the controller cannot go on or the plant
- * found no current for its flux linkage. */
+/** Runs; returns the number of rows written, or a negative code: SIM_FULL if they would not fit (then nothing runs),
+ * SIM_FAILED if the controller cannot continue or the plant found no current for its flux linkage. */
 SIM_API int sim_run(sim_t *sim, int periods, double *rows, int capacity_rows);
-/** Why, after SIM_FAILED; else NULL. */
+/** The reason after SIM_FAILED, else NULL. */
 SIM_API const char *sim_failure(const sim_t *sim);
 
 #endif

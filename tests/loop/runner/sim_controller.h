@@ -23,7 +23,7 @@ typedef struct {
     bool (*switches)(const void *self, plant_switches_t *on);
 } sim_controller_t;
 
-/** Takes the controller over, also when it answers NULL (out of memory). */
+/** Takes ownership of the controller, also if it returns NULL (out of memory). */
 sim_t *sim_create_with(sim_controller_t controller);
 
 #endif

@@ -56,7 +56,7 @@ int sim_ramp(sim_t *sim, const char *name, double from, double to)
     if (sim->ramps == RAMPS_MAX || strlen(name) >= NAME_MAX_LENGTH) {
         return SIM_FULL;
     }
-    /* Both ends tried now, the end first: every value between two allowed ones is allowed. */
+    /* Both ends are checked now, the last one first: every value between two allowed values is allowed. */
     int code = sim_set(sim, name, to);
     if (code == SIM_OK) {
         code = sim_set(sim, name, from);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef LOOP_RUNNER_SIM_PRIVATE_H
 #define LOOP_RUNNER_SIM_PRIVATE_H
-/** What the two halves of the runner share. Context: host. */
+/** Shared by the files of the runner. Context: host. */
 #include "plant/plant.h"
 #include "sim.h"
 #include "sim_controller.h"

@@ -73,7 +73,7 @@ static bool voltage_limited(const twin_t *twin)
     return twin->current.limited || twin->modulation_limited;
 }
 
-/* With every limit of the vehicle open and a cold inverter. */
+/* Without limits of the vehicle, and with a cold inverter. */
 static double limited_torque(twin_t *twin)
 {
     const twin_limit_in_t in = {
@@ -177,7 +177,7 @@ static void task(twin_t *twin)
 static void identify(twin_t *twin)
 {
     const twin_mrai_in_t *now = &twin->sample;
-    if (twin->periods_on >= 3) { /* else the voltage of the period that has passed was not ours */
+    if (twin->periods_on >= 3) { /* before that the voltage of the last period is unknown */
         twin_mrai(&twin->motor, &twin->schedule, &twin->mrai, now);
     } else {
         twin_mrai_reset(&twin->mrai, now);
@@ -231,7 +231,7 @@ static void sample(twin_t *twin, const double in[6])
     for (int n = 0; n < 6; n++) {
         if (!isfinite(in[n])) {
             twin->fault_word |= TWIN_FAULT_INPUT;
-            return; /* the last good samples stay */
+            return; /* the last valid samples are kept */
         }
     }
     twin->last_i = (twin_abc_t){in[0], in[1], in[2]};

@@ -10,15 +10,15 @@ static double integral(const motor_si_t *motor, double e, double cut)
     return motor->sigma_rad_s * motor->integral_ratio * realisable;
 }
 
-/* What the unit circle leaves beside x, in the stage's 256 steps; never less than a quarter. */
+/* Largest value of one axis inside the unit circle beside x, in the stage's 256 steps; at least a quarter. */
 static double remaining_voltage(double x)
 {
     const double end = (fmin(floor(fabs(x) * 256.0), 255.0) + 1.0) / 256.0;
     return fmax(sqrt(1.0 - end * end), 0.25);
 }
 
-/* The circle: d first while it takes flux away, what it is short of taken off the q flux that binds it; q first while d
- * asks for flux back, which keeps 0.7. */
+/* The circle: while the d flux is to fall, d has priority, and its excess is subtracted from q; while it is to rise, q
+ * has priority and d keeps 0.7. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};

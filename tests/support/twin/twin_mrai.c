@@ -22,7 +22,7 @@ static double adapt(double step, double proportional, double lo, double hi, doub
     return *integral + proportional * step;
 }
 
-/* What the voltage has to overcome besides the change of the flux, at one instant. */
+/* Resistive and rotational voltage at one instant. */
 static twin_dq_t burden(const motor_si_t *motor, const twin_mrai_in_t *at, double psi_used, double r_used)
 {
     const double r = motor->r_ohm_20 + r_used;
@@ -59,7 +59,7 @@ static double sinc(double x)
     return (fabs(x) < 1e-9) ? 1.0 : sin(x) / x;
 }
 
-/* The drift of a parameter per step shows what the adaptation still has to do. */
+/* The drift of a parameter per step shows how far it is from its final value. */
 static double quality(double now, double rate, bool known, double drift, double full)
 {
     const double target = known ? twin_clamp(1.0 - fabs(drift) / full, 0.0, 1.0) : 0.0;
@@ -71,7 +71,7 @@ static double psi_full_drift(const motor_si_t *motor)
     return 0.05 * motor->psi_f_Vs * motor->flux_bandwidth_rad_s * motor->step_s;
 }
 
-/* What the resistance law divides by. */
+/* Divisor of the resistance law. */
 static double excitation(const twin_mrai_in_t *at)
 {
     return weight_d * at->i.d * weight_d * at->i.d + at->i.q * at->i.q;
@@ -100,7 +100,7 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
     const double psi_drift = identifier->psi_delta - quality_state->psi_last;
     const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
     const bool adapt_resistance = adapt_flux && settled && (fabs(w) <= motor->omega_r_max_rad_s);
-    /* A current step is over before the next task: the gain must suit both of its ends. */
+    /* A current step ends before the next step of the task: the gain must be valid at both of its ends. */
     const double norm = fmax(excitation(sample), excitation(next));
     update_quality(motor, quality_state, identifier, adapt_flux, adapt_resistance);
     return (twin_mrai_schedule_t){

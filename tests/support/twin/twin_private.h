@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_PRIVATE_H
 #define TWIN_PRIVATE_H
-/** The controller object behind twin.h: what its step and its names share. */
+/** The controller object behind twin.h, shared by its step and its names. */
 #include <stdint.h>
 
 #include "twin/twin.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_STAGES_H
 #define TWIN_STAGES_H
-/** The control chain stage by stage in SI doubles: what each fixed-point stage is held to.
+/** The control chain stage by stage in SI doubles: the reference for each fixed-point stage.
  *   Written from the equations of docs/theory; no header, format or scaling is shared with the firmware.
  * Source   docs/theory: current-control, angle-tracker, flux-tables, modulation, mrai, torque-loop, current-reference
  * Units    SI, peak phase quantities, electrical angles; the configuration of every stage is motor_si_t

@@ -25,7 +25,7 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, con
     const double authority = motor->torque_authority * in->confidence;
     const double limit = authority * fabs(in->torque_commanded);
     const double direction = (in->torque_commanded > 0.0) - (in->torque_commanded < 0.0);
-    /* The estimate is the mean of the time that has passed: it meets the model of before this step. */
+    /* The estimate is a mean over the last step and is compared with the model's value before this step. */
     const double e = state->model - in->torque_estimated;
     state->model += motor->torque_model_rate * (in->torque_commanded - state->model);
     double p = 0.0;
@@ -35,10 +35,10 @@ double twin_torque_loop(const motor_si_t *motor, twin_torque_state_t *state, con
         p = motor->torque_kp * e;
     }
     if (in->enabled && (fabs(in->torque_commanded) >= 0.5 * motor->torque_min_Nm)) {
-        /* More than 100 % of error is no measurement: it may not move the ratio faster. */
+        /* The relative error is limited to 100 %. */
         const double relative = e * direction / fmax(fabs(in->torque_commanded), motor->torque_min_Nm);
         const double moved = state->correction + motor->torque_ki * twin_clamp(relative, -1.0, 1.0);
-        /* In a limit the correction grows up to the command itself, not beyond. */
+        /* At a limit the correction may rise to 0, not above. */
         const double max = (in->limited && (relative >= 0.0)) ? fmax(state->correction, 0.0) : 1e9;
         state->correction = fmin(moved, max);
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What tests and tools see of a running emulator. */
+/* Access of tests and tools to a running emulator. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -55,7 +55,7 @@ bool emu_gate_driver(const emu_t *emu)
     return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;
 }
 
-/* The shaft turns on between two settings. */
+/* Between two settings the shaft keeps turning. */
 uint32_t emu_angle(const emu_t *emu)
 {
     const int64_t passed = (int64_t)(emu_instant(emu) - emu->s.pins_set_at);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Every access to a peripheral passes here: is it there, modelled, clocked, and does it leave reserved bits alone? */
+/* Every access to a peripheral is checked here: the register exists, is modelled and clocked, and reserved bits
+ * stay. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -28,7 +28,7 @@ static bool inside(const elf_t *elf, size_t at, size_t size)
     return at <= elf->size && size <= elf->size - at;
 }
 
-/* Everything that the tables speak of lies in the file. */
+/* All ranges in the tables lie inside the file. */
 static bool complete(const elf_t *elf)
 {
     const uint32_t programs = half(elf, 44), sections = half(elf, 48);

@@ -20,7 +20,7 @@ EMU_API sim_t *sim_create_emulated(const char *elf, const char *layout, int mode
 EMU_API emu_t *sim_emulator(sim_t *sim);
 /** Where the shadow differed first ("part, period"); NULL: nowhere. */
 EMU_API const char *sim_shadow_difference(sim_t *sim);
-/** Changes one bit of the shadow's state: a test that it would be noticed. */
+/** Changes one bit of the shadow's state, to test that a difference is detected. */
 EMU_API void sim_shadow_disturb(sim_t *sim);
 
 #endif

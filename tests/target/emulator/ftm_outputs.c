@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What FTM0's outputs do: which of them may switch on, and the bridge as the plant is given it.
+/* FTM0's outputs: which of them may switch on, and the state of the bridge for the plant.
  *
  * documented behaviour                              | modelled | test
  * ------------------------------------------------- | -------- | --------------------------------------------

@@ -94,7 +94,7 @@ void mirror_pull(mirror_t *mirror)
 int mirror_set(mirror_t *mirror, const char *name, double value)
 {
     if (!mirror->waiting) {
-        copy_from_image(mirror, 0, LAYOUT_TRIMMED); /* only this side changes the rest of the calibration */
+        copy_from_image(mirror, 0, LAYOUT_TRIMMED); /* the rest of the calibration is changed by this side only */
     }
     const int code = fluxtrue_set(mirror->host, name, value);
     mirror->waiting = mirror->waiting || code == FLUXTRUE_OK;

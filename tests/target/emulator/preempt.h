@@ -2,8 +2,8 @@
 #ifndef EMULATOR_PREEMPT_H
 #define EMULATOR_PREEMPT_H
 /** Interrupts one activity (the victim) at each of its instructions by the fast ISR, and by the identification that it
- * pends, and asks whether anybody saw half of a value. The same firmware on the host computes the only outcomes that
- * are allowed, bit for bit:
+ * pends, and checks that no activity reads a half-written value. The same firmware on the host computes the only
+ * allowed outcomes, bit for bit:
  *   the victim   finds everything as it was when it was entered, or everything as the interrupts have left it;
  *                the latter only if it had handed nothing over before
  *   the ISRs     find each thing that the victim hands over (a word, or a box by its generation) as it was or as the

@@ -172,7 +172,7 @@ static const char *bridge_differs(const emulated_t *e)
 void shadow_compare(emulated_t *e)
 {
     if (emu_active_vector(e->emu) != 0) {
-        return; /* in the middle of something: the next period will do */
+        return; /* an activity is under way: compare in the next period */
     }
     char where[64];
     bool differs = mirror_differs(&e->mirror, e->shadow, where, sizeof where);
