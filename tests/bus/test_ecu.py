@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ECU as a whole, in simulated milliseconds: what a command does, and what a bad one does not."""
+"""The ECU as a whole, in simulated milliseconds: effects of valid commands, and none of bad ones."""
 
 import math
 

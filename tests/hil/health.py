@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What must be true after every test: no fault, no error counted, no cyclic frame missing, stack and time in reserve.
+"""Conditions after every test: no fault, no error counted, no cyclic frame missing, reserve of stack and time.
 
 A test that provokes errors says which: rig.expected.faults, .counters, .load, .frames.
 """

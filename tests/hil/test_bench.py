@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The suite as it runs on a bench: an interface that is given, no plant to command, time that is not ours."""
+"""The suite as it runs on a bench: given interface, no plant to command, time of the computer."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start-up: who talks, how often, and what an ECU does without commands."""
+"""Start-up: messages and their cycles, and the behaviour without commands."""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Other nodes that misbehave: the control does not notice, unless its commands cannot get through any more."""
+"""Other nodes that misbehave: the control is not affected unless its commands are lost."""
 
 from collections.abc import Iterator
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A long drive: no cyclic frame is missing, no counter moves, and torque stays true to the end."""
+"""A long drive: no cyclic frame is missing, no counter changes, and the torque stays accurate to the end."""
 
 import can
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque asked for over CAN against the plant's truth, and what the bus says about it."""
+"""Torque requested over CAN against the plant's torque, and the signals of the bus."""
 
 from typing import Any
 

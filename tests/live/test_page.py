@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a person sees and does on the page, done by a browser."""
+"""The page in a browser: its contents, and the effect of its controls."""
 
 import json
 import urllib.error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dead man, one hand on the slider, and bad messages: without a browser, and on a clock of the test's own."""
+"""Dead man, one commanding page, and bad messages: without a browser, on a clock of the test."""
 
 import asyncio
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys without effect are refused, and only those: what is refused changes nothing, what is taken changes something."""
+"""Keys without effect are refused, and only those: a refused key has no effect, an accepted one has."""
 
 import numpy as np
 import pytest

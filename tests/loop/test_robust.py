@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robust identification on drives with much wrong at once; torque is the plant's."""
+"""The robust identification on drives with many deviations at once; torque is the plant's."""
 
 import math
 from collections.abc import Iterator

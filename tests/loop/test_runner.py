@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C runner behind its Python face: names, ramps, rows, delay, determinism."""
+"""The C runner through its Python interface: names, ramps, rows, delay, determinism."""
 
 import math
 from typing import Any

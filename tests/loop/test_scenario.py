@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: what is taken, what is refused and how, what a profile means."""
+"""Scenario files: accepted and refused values, messages, meaning of profiles."""
 
 import math
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flux maps of two machines that do not exist: one saturates strongly, one hardly.
+"""Flux maps of two invented machines: one saturates strongly, one hardly.
 
     i_d = (a_d + b_d |psi_d|^4 + c/2 |psi_d| psi_q^2) psi_d - i_f
     i_q = (a_q + b_q |psi_q|^4 + c/3 |psi_d|^3) psi_q

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""libfluxtrue_sil.so by ctypes, as a stranger with only the header would bind it."""
+"""libfluxtrue_sil.so by ctypes, bound with the header as the only source."""
 
 import ctypes
 import os

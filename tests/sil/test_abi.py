@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C interface of hal/host/fluxtrue.h, attacked."""
+"""The C interface of hal/host/fluxtrue.h with valid and invalid calls."""
 
 import ctypes
 import math

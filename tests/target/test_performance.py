@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/performance.md tells what the firmware costs now."""
+"""docs/performance.md states the present cost of the firmware."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The description file: what two independent readers find in it, and what no firmware gives."""
+"""The description file: contents as two independent readers find them, and files that are not firmware."""
 
 import os
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checkers find what is planted, and leave alone what is allowed."""
+"""The checkers find planted errors and accept what is allowed."""
 
 import importlib
 import subprocess
@@ -215,6 +215,11 @@ def test_ordinary_words_are_left_alone(tree: Path, text: str) -> None:
 
 
 LONG = "word " * 25 + "end"
+
+
+def test_a_planted_paragraph_in_a_cell_is_found(tree: Path) -> None:
+    write(tree, "docs/bad.md", f"| a | b |\n|---|---|\n| short | {LONG} |\n| short | {LONG} {LONG} |\n")
+    assert check("style", tree) == (1, "docs/bad.md:5: 257 columns in a cell, at most 130\n")
 
 
 def test_what_a_reader_does_not_see_does_not_count_as_width(tree: Path) -> None:

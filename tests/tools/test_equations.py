@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of equation numbers finds what is planted, and leaves alone what is allowed."""
+"""The checker of equation numbers finds planted errors and accepts what is allowed."""
 
 import subprocess
 import sys

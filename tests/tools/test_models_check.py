@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of the models' tables finds what is planted, and leaves alone what is allowed."""
+"""The checker of the models' tables finds planted errors and accepts what is allowed."""
 
 import subprocess
 import sys

@@ -106,7 +106,7 @@ def is_page(path: Path) -> bool:
 
 
 def unknown_in(line: str) -> Iterator[str]:
-    """Tags that no check covers: no page owns their prefix, or they are no number at all."""
+    """Tags whose prefix no page owns, or which are not numbers."""
     for match in TAG.finditer(line):
         if not re.fullmatch(NUMBER, match.group(1)):
             yield match.group(1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prose of the Markdown pages: width of the lines. Code, equations, tables, the targets of
+"""Prose of the Markdown pages: width of the lines and of the cells of tables. Code, equations, tables, the targets of
 links and comments are exempt."""
 
 import re
@@ -9,6 +9,8 @@ from pathlib import Path
 from tree import Violation
 
 MAX_COLUMNS = 120
+# A cell holds a phrase; whole sentences stand below the table.
+MAX_CELL = 130
 
 LINK_TARGET = re.compile(r"\]\([^()\s]*\)")
 MARK = re.compile(r"<!--.*?-->")
@@ -47,8 +49,16 @@ def prose(text: list[str]) -> Iterator[tuple[int, str]]:
                 yield number, line
 
 
+def widest_cell(line: str) -> int:
+    """Columns of the widest cell of a table's row."""
+    return max((len(cell.strip()) for cell in visible(line).split("|")), default=0)
+
+
 def check_markdown(path: Path, text: list[str]) -> Iterator[Violation]:
     """Everything about one page."""
+    for number, line in fences(text):
+        if line.startswith("|") and (width := widest_cell(line)) > MAX_CELL:
+            yield Violation(path, number, f"{width} columns in a cell, at most {MAX_CELL}")
     for number, line in prose(text):
         width = len(visible(line))
         if width > MAX_COLUMNS and not IMAGE.fullmatch(line):

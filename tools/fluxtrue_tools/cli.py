@@ -82,7 +82,7 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_print_version,
               help="Print the version and exit.")  # fmt: skip
 def main() -> None:
-    """Fluxtrue: torque control that stays true when the machine changes."""
+    """Fluxtrue: torque control that stays accurate when the machine changes."""
 
 
 def _usage(error: click.ClickException) -> str:

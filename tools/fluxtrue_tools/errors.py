@@ -3,7 +3,7 @@
 
 
 class FluxtrueError(Exception):
-    """Something the user can put right.
+    """An error that the user can correct.
 
     The text is one line naming file, field, value and what was allowed. The command line prints
     it and exits with 2; every other exception is a bug and shows its traceback.

@@ -26,7 +26,7 @@ def _label(param: click.Parameter | None) -> str:
 
 
 class GivenPath(click.ParamType):
-    """Any path: refuses what is no name at all."""
+    """Any path; refuses text that is not a name."""
 
     name = "path"
 
@@ -84,7 +84,7 @@ class OutputFolder(GivenPath):
 
 
 class BuildFolder(GivenPath):
-    """A folder for what is built on the way, kept for the next call."""
+    """A folder for intermediate results, kept for the next call."""
 
     name = "folder"
 

@@ -40,7 +40,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def number(value: Any) -> Any:
-    """TOML tells 1 from 1.0; which makes no difference in a scenario."""
+    """TOML distinguishes 1 and 1.0, which means the same here."""
     if not isinstance(value, int) or isinstance(value, bool):
         return value
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign on machines it was not written for: strong saturation, hardly any."""
+"""The campaign on two invented machines: strong saturation, and nearly none."""
 
 import importlib.util
 import json

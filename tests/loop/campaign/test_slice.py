@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign's slice for every test run: 40 plants in closed loop, bounds included for who is held to them."""
+"""The campaign's slice for every test run: 40 plants in closed loop, with the bounds of the checked controllers."""
 
 import json
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No activity ever sees half of a value: it is interrupted at each of its instructions."""
+"""No activity ever reads a half-written value: it is interrupted at each of its instructions."""
 
 import ctypes
 from collections.abc import Callable, Iterator

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The image keeps its promises when something fails, and each of these checks finds the error it is there for."""
+"""The image reacts to failures as specified, and each of these checks finds its planted error."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A good motor folder to spoil, and the command line to run on it."""
+"""A valid motor folder for tests to change, and the command line to run on it."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""motor.toml: everything that can be wrong with it is said in one line, and nothing is written."""
+"""motor.toml: every error is reported in one line, and nothing is written."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""flux_map.csv: what is wrong with it is said with its line number."""
+"""flux_map.csv: errors are reported with their line number."""
 
 import pytest
 from conftest import plane, straight

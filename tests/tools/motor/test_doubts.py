@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is hardly meant is warned of, a slip of the units goes before its consequences, what is offered is accepted."""
+"""Improbable values cause a warning, errors of units are named first, offered values are accepted."""
 
 import re
 from collections.abc import Callable

@@ -18,7 +18,7 @@ FLOAT_SIZE = 4
 
 
 def _cycle(step_s: float) -> str:
-    """Cycle and unit of the raster that comes in each step: 1 ms is told as such, another step in 10 us."""
+    """Cycle and unit of the raster of each step: 1 ms for a step of 1 ms, otherwise in units of 10 us."""
     ten_us = round(step_s * 1e5)
     return f"1 {MS}" if ten_us == 100 else f"{ten_us} {TEN_US}"
 

@@ -28,13 +28,13 @@ FIGURES = dict[str, Any]
 
 
 def budget() -> dict[str, Any]:
-    """What the port says of itself."""
+    """The port's own data."""
     with BUDGET.open("rb") as file:
         return tomllib.load(file)
 
 
 def _spread(values: NDArray[np.int64]) -> list[float]:
-    """Least, mean to a tenth, most."""
+    """Minimum, mean to a tenth, maximum."""
     return [int(values.min()), round(float(values.mean()), 1), int(values.max())]
 
 
@@ -80,7 +80,7 @@ def _pointers(listed: list[dict[str, Any]], names: list[str]) -> dict[str, list[
 
 
 def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tuple[list[stack.Use], list[str]]:
-    """Worst case of each priority, and what speaks against relying on it."""
+    """Worst case of each priority, and the reasons why it may be too small."""
     nodes = stack.graph(functions)
     depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
     uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])

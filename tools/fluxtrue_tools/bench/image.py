@@ -64,7 +64,7 @@ def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
 
 @dataclass
 class Recording:
-    """Rows of vector, instructions, cycles; and what the run met."""
+    """Rows of vector, instructions, cycles; and the events of the run."""
 
     spans: NDArray[np.int64]
     periods: int

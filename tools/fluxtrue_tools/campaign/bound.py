@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a perfect linear estimator could reach with the same data, docs/theory/information-bound.md.
+"""The error of an ideal linear estimator with the same data, docs/theory/information-bound.md.
 
 Units    torque error in percent of max(|requested torque|, a tenth of rated), one standard deviation
 """

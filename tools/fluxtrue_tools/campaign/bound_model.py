@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Voltage and torque of a perturbed drive over what its controller measures, docs/theory/information-bound.md.
+"""Voltage and torque of a perturbed drive as functions of its measured currents, docs/theory/information-bound.md.
 
 Units    SI; complex numbers d + jq in the controller's frame; amplitude-invariant
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be known of a campaign before its first case: what cannot be reached, and keys that have no effect."""
+"""Checks of a campaign before its first case: windows that cannot be reached, and keys without effect."""
 
 from collections.abc import Iterator
 

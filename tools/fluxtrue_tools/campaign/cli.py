@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fluxtrue campaign: many plants, one table."""
+"""fluxtrue campaign: random plants, every controller on each."""
 
 import shlex
 from pathlib import Path

@@ -62,7 +62,7 @@ def _cruise(speed: float, rate: float, seconds: float, rng: np.random.Generator)
 
 
 def _trip(phase: Phase, rng: np.random.Generator) -> Array:
-    """Standstill, off with the phase's acceleration, cruise near its mean, on to its top speed, brake to standstill."""
+    """Standstill, acceleration, cruise near the mean speed, acceleration to the top speed, braking to standstill."""
     mean, top = phase.moving_kmh / 3.6 * rng.uniform(0.85, 1.15), phase.top_kmh / 3.6
     up, down = (rate * rng.uniform(0.6, 1.0) for rate in (phase.accelerate, phase.brake))
     parts = [
@@ -77,7 +77,7 @@ def _trip(phase: Phase, rng: np.random.Generator) -> Array:
 
 
 def _torque(speed: Array, vehicle: Vehicle) -> Array:
-    """Road load and acceleration at the motor's shaft; the force of standstill is none."""
+    """Road load and acceleration at the motor's shaft; zero at standstill."""
     acceleration = np.gradient(speed, STEP_S)
     rolling = vehicle.rolling_N * np.tanh(speed / 0.3)
     force = rolling + vehicle.drag_N_per_m2_s2 * speed**2 + vehicle.mass_kg * acceleration
@@ -85,7 +85,7 @@ def _torque(speed: Array, vehicle: Vehicle) -> Array:
 
 
 def make_profile(drive: Drive, envelope: Envelope, rng: np.random.Generator) -> Profile:
-    """A trip per phase, low to extra high, then the time axis pressed into the wanted duration."""
+    """A trip per phase, low to extra high, then the time axis compressed to the requested duration."""
     speed = np.concatenate([_trip(phase, rng) for phase in PHASES] + [np.zeros(2)])
     torque = _torque(speed, drive.vehicle)
     motor = np.minimum(speed / drive.vehicle.wheel_radius_m * drive.vehicle.gear_ratio,

@@ -48,7 +48,7 @@ def _speed_edges(table: pd.DataFrame) -> np.ndarray:
 
 
 def _plain_ticks(axes: Any, edges: np.ndarray) -> None:
-    """A logarithmic axis with the numbers that people use."""
+    """A logarithmic axis with round numbers."""
     wanted = [n for n in (300, 500, 1000, 2000, 5000, 10000) if edges[0] <= n <= edges[-1] * 1.01]
     axes.set_xscale("log")
     axes.set_xlim(edges[0], edges[-1])
@@ -123,7 +123,7 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
 
 
 def headline(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """The campaign at a glance, from 300 rpm: how many windows are how wrong, and where."""
+    """Overview of the campaign from 300 rpm on: distribution of the errors, and their place."""
     table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
     table = table[table["band"] != CRAWL]
     with plt.rc_context(STYLE):
@@ -150,7 +150,7 @@ def headline(campaign: Campaign, table: pd.DataFrame) -> Figure:
 
 @_styled
 def histograms(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """Before and after: how often which error, band by band."""
+    """Histograms of the errors with and without correction, by speed range."""
     bands = [band for band in (*BANDS, CRAWL) if (table["band"] == band).any()]
     figure, axes = plt.subplots(1, len(bands), figsize=(11, 3.6), layout="constrained", sharey=True, squeeze=False)
     bins = np.linspace(-SCALE_PERCENT, SCALE_PERCENT, 81)

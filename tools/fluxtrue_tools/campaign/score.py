@@ -23,7 +23,7 @@ def band_of(speed_rpm: pd.Series, split_rpm: float) -> pd.Series:
 
 
 def rms(values: Sequence[float] | pd.Series) -> float:
-    """NaN for nothing: it keeps no bound."""
+    """NaN without values; NaN meets no bound."""
     array = np.asarray(values, dtype=float)
     return float(np.sqrt(np.mean(array**2))) if array.size else float("nan")
 
@@ -45,7 +45,7 @@ class Figures:
 
     @property
     def ratio(self) -> float:
-        """Achieved over possible."""
+        """Error over its information bound."""
         return self.rms / self.bound_rms if self.bound_rms > 0.0 else float("nan")
 
 
@@ -79,7 +79,7 @@ def harm(rows: pd.DataFrame, reference: pd.DataFrame, limits: Limits) -> Harm:
 
 @dataclass(frozen=True)
 class Trouble:
-    """What must not happen at all, in cases and windows of one controller."""
+    """Trips and instabilities in cases and windows of one controller."""
 
     trips: int
     unstable: int
@@ -87,7 +87,7 @@ class Trouble:
 
 
 def trouble(rows: pd.DataFrame, counted: Sequence[str]) -> Trouble:
-    """A case trips when a fault bit was ever set; it is unstable when numbers run away or torque oscillates."""
+    """A case trips when a fault bit was ever set; it is unstable with NaN, infinity or oscillating torque."""
     cases = rows.groupby("case")
     trips = int((cases["run_fault_word"].max() != 0).sum())
     unstable = int((~cases["run_finite"].min() | cases["oscillates"].max()).sum())
@@ -120,7 +120,7 @@ def score(campaign: Campaign, table: pd.DataFrame) -> list[Score]:
 
 
 def bounds(campaign: Campaign, scored: Score) -> list[Bound]:
-    """What a checked controller has promised."""
+    """Bounds of a checked controller."""
     limits, split = campaign.check.limits, campaign.check.band_rpm
     low, high = scored.bands[LOW], scored.bands[HIGH]
     promised = []

@@ -29,7 +29,7 @@ def _list(value: Any) -> Any:
 
 
 def _within(low: float, high: float) -> Any:
-    """A range inside given limits: what lies beyond them is a slip of the units."""
+    """A range inside given limits; a value beyond them is probably an error of units."""
     number = Annotated[Number, Field(ge=low, le=high)]
     return Annotated[tuple[number, number], BeforeValidator(_pair)]  # type: ignore[valid-type]
 
@@ -54,7 +54,7 @@ class Spread(Strict):
 
 
 class Nominal(Strict):
-    """What the spread is about where the motor's data say nothing (or 0)."""
+    """Nominal values of the spread that the motor's data do not give (or give as 0)."""
 
     device_drop_V: NotNegative = 0.0
     iron_k_h: NotNegative = 0.0
@@ -62,7 +62,7 @@ class Nominal(Strict):
 
 
 class Vehicle(Strict):
-    """Turns a car's speed into the motor's torque and speed."""
+    """Converts a car's speed to the motor's torque and speed."""
 
     mass_kg: Positive = 1600.0
     wheel_radius_m: Positive = 0.32
@@ -122,7 +122,7 @@ class Limits(Strict):
 
 
 class Check(Strict):
-    """Who is held to the bounds, and against whom harm is measured."""
+    """Controllers that must meet the bounds, and the reference for harm."""
 
     controllers: Annotated[tuple[str, ...], BeforeValidator(_list)] = ()
     reference: str = "tables"

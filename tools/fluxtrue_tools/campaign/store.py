@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign's folder: one Parquet file per finished case, so that a run can stop anywhere and go on."""
+"""The campaign's folder: one Parquet file per finished case, so that a run can be stopped and continued."""
 
 import contextlib
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where torque is measured: stratified random points, toured without absurd jumps of speed."""
+"""Where torque is measured: stratified random points, visited without large steps of speed."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ QUADRANTS = ((1, 1), (1, -1), (-1, 1), (-1, -1))  # (direction, sign of torque)
 
 @dataclass(frozen=True)
 class Window:
-    """One measurement: first get there, then settle, then average whole turns."""
+    """One measurement: approach, settle, average over whole turns."""
 
     speed_rpm: float
     torque_Nm: float

@@ -24,11 +24,11 @@ class Demonstration:
 
     @property
     def realtime(self) -> Bound:
-        """The promise about speed."""
+        """The bound of the simulation's speed."""
         return Bound("simulated over wall time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True)
 
     def missed(self) -> list[str]:
-        """One line for each promise that was not kept."""
+        """One line for each bound that was missed."""
         lines = [f"{r.name}: {b.text()}" for r in self.results for b in r.bounds if not b.met]
         return lines + ([] if self.realtime.met else [f"realtime_factor: {self.realtime.text()}"])
 

@@ -11,7 +11,7 @@ from fluxtrue_tools.sim.scenario import Scenario
 
 @dataclass(frozen=True)
 class Bound:
-    """One promise and what came of it."""
+    """One bound and its result."""
 
     what: str
     value: float
@@ -21,7 +21,7 @@ class Bound:
 
     @property
     def met(self) -> bool:
-        """NaN keeps no promise."""
+        """NaN meets no bound."""
         return self.value >= self.limit if self.at_least else abs(self.value) <= self.limit
 
     def text(self) -> str:
@@ -46,7 +46,7 @@ class Result:
 
     @property
     def met(self) -> bool:
-        """Every promise kept."""
+        """All bounds met."""
         return all(bound.met for bound in self.bounds)
 
 
@@ -69,5 +69,5 @@ def run(motor: Motor, scenario: dict[str, Any]) -> Recording:
 
 
 def number(value: float | None, digits: int = 5) -> float:
-    """Figures for summary.json; a missing value is NaN and keeps no bound."""
+    """Figures for summary.json; a missing value is NaN and meets no bound."""
     return float("nan") if value is None else float(f"{value:.{digits}g}")

@@ -54,7 +54,7 @@ def _zoom(axes: Axes, requested: float) -> None:
 
 @_styled
 def story(run: Recording, parts: Sequence[tuple[float, float, str, str]]) -> Figure:
-    """Torque lost and given back, and what the firmware identified on the way."""
+    """Torque before and after the loop is closed, and the identified values."""
     figure, axes = _sheet(2, 1, (9, 5.2), sharex=True, height_ratios=[2, 1])
     top, bottom = axes[:, 0]
     torque(top, run)
@@ -143,7 +143,7 @@ def grid(points: list[dict[str, float]]) -> Figure:
 
 @_styled
 def twin(points: list[dict[str, float]]) -> Figure:
-    """How much the fixed-point arithmetic costs."""
+    """Error of the fixed-point arithmetic."""
     figure, axes = _sheet(1, 1, (11, 2.9))
     axis = axes[0, 0]
     at = np.arange(len(points))

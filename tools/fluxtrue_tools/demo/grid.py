@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The measured machine in four quadrants with everything wrong at once; firmware and twin."""
+"""The measured machine in four quadrants with all deviations at once; firmware and twin."""
 
 import os
 from collections.abc import Callable

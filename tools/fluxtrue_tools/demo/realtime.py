@@ -44,7 +44,7 @@ EVERYTHING_WRONG: Final = {
 def ours(bench: Bench) -> float:
     """Simulated over wall time: measured machine, firmware, every imperfection, one core.
 
-    The best of a few runs: what else the computer is doing is not the simulation's speed.
+    The best of a few runs: other load of the computer is not part of the simulation's speed.
     """
     scenario = {
         "duration_s": SIMULATED_S,

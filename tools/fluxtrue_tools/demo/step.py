@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How fast: a torque step and a current step on the measured machine."""
+"""A torque step and a current step on the measured machine."""
 
 from typing import Final
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A page for the eyes: what the inverter says on the bus, drawn live, and a slider for its torque."""
+"""A page in the browser: signals of the bus, drawn live, and a slider for the torque."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of the inverter, and what becomes of it when the hand on the slider is gone.
+"""The commands to the inverter, and their end when the page with control is gone.
 
 Pure decisions on a clock that the caller brings: called every 10 ms, it says what the next command frame holds.
 """
@@ -18,7 +18,7 @@ AGAIN: Final = "Press Enable to go on."
 
 
 class Wish(StrEnum):
-    """What the user has pressed last."""
+    """The last button of the user."""
 
     OFF = "off"  # dc link discharged
     READY = "ready"  # dc link charged, no torque

@@ -83,7 +83,7 @@ class Link:
         self._thread.start()
 
     def act(self, action: Callable[[Commander, float], None]) -> None:
-        """Something a user did."""
+        """An action of a user."""
         with self._lock:
             action(self._commander, self._pace.now_s)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The web side: one page, one WebSocket per viewer, one of them with its hand on the slider.
+"""The web side: one page, one WebSocket per viewer, one of which may command.
 
 Bound to the loopback address. Requests that name another host, and WebSockets that another page opens, are refused: a
 site in the same browser must not move a motor.
@@ -57,7 +57,7 @@ class Session:
     last_file: str = ""
 
     def stopped(self) -> str:
-        """Why nothing drives although somebody has asked for it."""
+        """Why the drive does not run although it was requested."""
         return (self.link.lost if self.link is not None else "") or self.commander.stopped
 
     def wall_s(self, seconds: float) -> float | None:

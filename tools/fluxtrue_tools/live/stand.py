@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plant behind a virtual ECU: what a test stand can do to it, and its true torque."""
+"""The plant behind a virtual ECU: the parameters that a test stand can change, and its true torque."""
 
 import contextlib
 import math

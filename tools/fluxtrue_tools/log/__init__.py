@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded drives: decoded, told, drawn, exported."""
+"""Recorded drives: decoded, summarised, plotted, exported."""

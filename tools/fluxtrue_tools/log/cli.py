@@ -44,7 +44,7 @@ def _wanted(signals: Signals, names: tuple[str, ...]) -> Signals:
 
 
 def _table(signals: Signals) -> pd.DataFrame:
-    """One row per instant at which anything was said; a signal keeps its value until it is said anew."""
+    """One row per time stamp; a signal keeps its value until its next frame."""
     series = [values[~values.index.duplicated(keep="last")].rename(name) for name, values in signals.items()]
     return pd.concat(series, axis=1).sort_index().ffill()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A derived number that does not fit the firmware, said in the user's own keys with the values that would be accepted.
+"""A derived number that does not fit the firmware, reported by the user's keys with the values that would be accepted.
 
 Which keys a number depends on, and how, is found by trying: each key alone is moved away from its value until the
 number fits, the edge is found by halving, and what is offered has been accepted once by all that motor build does.

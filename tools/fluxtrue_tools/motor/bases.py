@@ -64,7 +64,7 @@ def _voltage(config: MotorConfig, psi_max_Vs: float, omega_rad_s: float) -> floa
 
 
 def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
-    """The bases of one machine and its inverter; the speed reserve gives way before anything saturates."""
+    """The bases of one machine and its inverter; the speed reserve is reduced before anything saturates."""
     current, period = config.inverter.current_full_scale_A, 1.0 / config.inverter.pwm_hz
     psi_max = flux_max(model, config.machine.i_max_A)
     l_min = inductance_min(model, config.machine.i_max_A)

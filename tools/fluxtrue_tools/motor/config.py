@@ -65,7 +65,7 @@ class Control(Strict):
 
 
 class Identification(Strict):
-    """[identification], all optional: what is not known before the first drive, as standard deviations"""
+    """[identification], all optional: uncertainty before the first drive, as standard deviations"""
 
     magnet_uncertainty: Annotated[float, Field(ge=0.001, le=0.5)] = 0.12  # of psi_f
     lq_uncertainty: Annotated[float, Field(ge=0.001, le=0.3)] = 0.06
@@ -91,7 +91,7 @@ class Thermal(Strict):
 
 
 class Magnet(Strict):
-    """[magnet], all optional: what weakening the magnets bear"""
+    """[magnet], all optional: demagnetisation limit and temperature of the magnets"""
 
     i_d_demag_A: Annotated[float, Field(gt=0, le=10000)] | None = None
     i_d_demag_A_per_K: Annotated[float, Field(ge=0, le=100)] = 0.0
@@ -121,7 +121,7 @@ class MotorConfig(Strict):
 
     @property
     def torque_slew_Nm_per_s(self) -> float:
-        """0 is open; by default all torque in 10 ms: a full reversal in field weakening then stays below the trip."""
+        """0: no limit; by default full torque in 10 ms, so that a reversal in field weakening stays below the trip."""
         given = self.control.torque_slew_Nm_per_s
         return SLEW_PER_TORQUE_MAX * self.machine.torque_max_Nm if given is None else given
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values that are possible but hardly meant: a unit that is off by 1000, a map that no machine has, tables too coarse.
+"""Values that are possible but probably not intended: a unit that is off by 1000, an impossible map, coarse tables.
 
 A doubt is a warning of motor check and build. Where a motor is refused for any reason, a doubt about its units goes
 first: what follows from a slip of the units says nothing about the slip.

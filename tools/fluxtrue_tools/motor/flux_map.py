@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""flux_map.csv: reading it, refusing a bad one, and making it symmetric openly."""
+"""flux_map.csv: reading, checking and symmetrising it, with a report of the change."""
 
 import csv
 import math

@@ -14,7 +14,7 @@ Q31_ONE = 1 << 31
 
 
 class Unfit(FluxtrueError):
-    """A number that follows from the user's values and that the firmware cannot hold."""
+    """A number that follows from the user's values and does not fit the firmware's format."""
 
 
 def _words(low: int, high: int, one: int) -> str:

@@ -24,7 +24,7 @@ PARTS = 5  # samples per table cell and axis
 
 @dataclass(frozen=True)
 class Contour:
-    """One contour of constant torque from its MTPA point to where voltage can help no more."""
+    """One contour of constant torque from its MTPA point to its point of least flux."""
 
     torque_Nm: float
     id_A: Array  # falling
@@ -151,7 +151,7 @@ class References:
 
 @dataclass(frozen=True)
 class ReferenceErrors:
-    """What the stored tables ask for, read as the firmware does."""
+    """Currents of the stored tables, read as the firmware does."""
 
     torque_mtpa_max_Nm: float
     torque_weak_max_Nm: float

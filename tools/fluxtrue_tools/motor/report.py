@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report as text: what was read, what was changed, how good the tables are."""
+"""The report as text: input, changes, accuracy of the tables."""
 
 from dataclasses import asdict
 

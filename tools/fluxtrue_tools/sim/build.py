@@ -49,7 +49,7 @@ class MotorFolder:
 
     @property
     def data(self) -> Path:
-        """What the motor tool found out: motor.json."""
+        """Result of the motor tool: motor.json."""
         return self.folder / "motor.json"
 
 
@@ -177,7 +177,7 @@ def _make_from(name: str, build_dir: Path, folder: Path) -> MotorFolder:
 
 
 def _check_motor(folder: Path) -> None:
-    """Bad motor data explain themselves better than a build log."""
+    """Reports bad motor data instead of the build log."""
     from fluxtrue_tools.motor.build import generate
     from fluxtrue_tools.motor.motor import load_motor, naming
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be known of a scenario before its first period: keys without effect, every value's range, the rows."""
+"""Checks of a scenario before its first period: keys without effect, ranges of all values, number of rows."""
 
 import difflib
 import math
@@ -36,7 +36,7 @@ def effective(scenario: Scenario, motor: Motor, where: str) -> None:
 
 
 def _edge(accepts: Callable[[float], bool], good: float, sign: float) -> float:
-    """The last accepted value in a direction; infinite where nothing is too much."""
+    """The last accepted value in a direction; infinite without a limit."""
     step = SMALL * max(abs(good), 1.0)
     while accepts(good + sign * step):
         if step > HUGE:
@@ -69,7 +69,7 @@ class Range:
 
 
 def limits(loop: lib.Loop, name: str, factor: float = 1.0) -> Range:
-    """What a name takes now, found by trying; in the unit of a key that is `factor` times smaller."""
+    """Range that a name accepts now, found by trial; in the unit of a key that is `factor` times smaller."""
 
     def accepts(value: float) -> bool:
         try:
@@ -137,7 +137,7 @@ def rows(scenario: Scenario, period_s: float, columns: int, where: str) -> int:
 
 
 def speed(scenario: Scenario, motor: Motor, period_s: float, where: str) -> None:
-    """Beyond half an electrical turn per period a sampled angle says nothing of the speed."""
+    """Beyond half an electrical turn per period a sampled angle does not determine the speed."""
     limit = 60.0 / (2.0 * period_s * motor.plant["pole_pairs"])
     key = scenario.profile.key("speed_rpm")
     for _, rpm in scenario.profile.speed_rpm:

@@ -96,7 +96,7 @@ def _line(label: str, values: list[tuple[Any, str]]) -> str:
 
 
 def table(data: dict[str, Any]) -> str:
-    """What a reader wants to know first."""
+    """Summary of the results."""
     mean, window = data["mean"], data["window"]
     return "\n".join(
         [

@@ -34,7 +34,7 @@ class Motor:
 
 
 def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[str, float]:
-    """The drive as its data sheet has it: its dead time and its converter, nothing wrong."""
+    """The drive of the data sheet: its dead time and its converter, without errors."""
     return {
         "pole_pairs": machine["pole_pairs"],
         "r_ohm_20": machine["r_ohm"],

@@ -13,7 +13,7 @@ from fluxtrue_tools.sim.run import Recording
 
 
 def csv_text(recording: Recording) -> str:
-    """Units are in the headers; nine digits are more than any sensor has."""
+    """Units are in the headers; values have nine digits."""
     stream = io.StringIO()
     header = ",".join(recording.columns)
     np.savetxt(stream, recording.rows, fmt="%.9g", delimiter=",", header=header, comments="")

@@ -16,7 +16,7 @@ POINTS_ALLOWED = "allowed: a number, or a list of [t, value]"
 
 
 def _points(value: Any) -> Any:
-    """A plain number holds for ever; a list of [time, value] is piecewise linear."""
+    """A plain number is constant; a list of [time, value] is piecewise linear."""
     value = number(value)
     if isinstance(value, float):
         return ((0.0, value),)
@@ -88,7 +88,7 @@ class Controller(BaseModel):
 
 
 class Profile(Strict):
-    """What the drive is asked to do and what happens around it, over time."""
+    """Requests and surroundings of the drive over time."""
 
     torque_Nm: Points = ((0.0, 0.0),)
     torque_share: Points | None = None  # of the motor's torque_max_Nm, instead
@@ -134,7 +134,7 @@ class Mechanics(Strict):
 
 
 class Plant(Strict):
-    """What is wrong with the drive. Left out: the motor's own data, and nothing wrong."""
+    """Deviations of the drive. Left out: the motor's own data without errors."""
 
     r_ohm_20: Positive | None = None
     r_temp_coeff_per_K: Number | None = None

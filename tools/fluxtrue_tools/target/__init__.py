@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a microcontroller's image needs besides the compiler: register header, checksum."""
+"""Tools for a microcontroller's image: register header, checksum."""

@@ -59,7 +59,7 @@ VERSION = struct.Struct("<16s3I12s")  # version_t there
 
 @dataclass(frozen=True)
 class Version:
-    """What an image says of itself: the three numbers, and the text."""
+    """Version in an image: three numbers and a text."""
 
     numbers: tuple[int, int, int]
     text: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bench channel: what a test stand does that is not on CAN. The commands are in tests/vecu/bench.h."""
+"""The bench channel: control of the test stand beside CAN. The commands are in tests/vecu/bench.h."""
 
 import socket
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ TIMEOUT_S = 600.0  # only ends a hang: how long a run takes is its own affair
 
 
 class BenchRefused(FluxtrueError):
-    """The bench did not do what it was asked for; the text is its own."""
+    """The bench refused a command; the text is its answer."""
 
 
 @dataclass
