@@ -422,3 +422,30 @@ def test_a_time_out_that_does_not_follow_from_the_recorded_time_is_found(
 
 def test_a_time_out_that_follows_from_the_recorded_time_is_accepted(told: Callable[..., list[str]]) -> None:
     assert told("slow", TIMEOUT=1500.0, COST=300.0) == told("quick", TIMEOUT=1800.0, COST=1.0) == []
+
+
+LOG = """\
+      Start  2: slow
+ 1/3 Test  #2: slow .............................   Passed  120.40 sec
+ 2/3 Test  #1: quick ............................   Passed    0.52 sec
+ 3/3 Test #13: a-test-with-a-name-that-is-so-long-that-hardly-any-dot-follows ...   Passed   21.6 sec
+
+100% tests passed, 0 tests failed out of 3
+"""
+
+
+def test_the_log_of_a_whole_run_is_written_down_in_one_command(
+    told: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert told("slow", TIMEOUT=3000.0, COST=300.0) == []
+    times = importlib.import_module("times")
+    log, seconds = tmp_path / "host-ctest.log", tmp_path / "tests" / "seconds.txt"
+    seconds.write_text("# a comment\nslow 300\ngone 40\nlong-campaign 500\n")
+    log.write_text(LOG.replace("100% tests passed, 0", "67% tests passed, 1"))
+    known = ["slow", "quick", "long-campaign", "a-test-with-a-name-that-is-so-long-that-hardly-any-dot-follows"]
+    with pytest.raises(SystemExit, match="not ctest's log of a run in which every test passed"):
+        times.record_log(tmp_path, log, known)
+    log.write_text(LOG)
+    assert times.record_log(tmp_path, log, known) == 0
+    assert times.recorded(tmp_path) == {"long-campaign": 500, "slow": 120, known[3]: 22}
+    assert "gone" not in seconds.read_text() and seconds.read_text().startswith("# SPDX-License-Identifier")

@@ -2,18 +2,21 @@
 """Time-outs of the tests: every one follows from tests/seconds.txt, by tools/cmake/TestTime.cmake.
 
     times.py BUILD                       check what ctest was told
+    times.py BUILD --record LOG          write down what the tests took in a whole run on an idle computer: ctest's log,
+                                         which tools/test leaves in build/host-ctest.log
     times.py BUILD --record TEST ...     run these tests one by one and write down how long they take
 
-What is written down are the processor's seconds of the test and its child processes. They say how long it takes on an
-idle computer, and can be measured on a busy one.
+Of a test that is run alone the processor's seconds are written down, its child processes included. They say how long it
+takes on an idle computer, and can be measured on a busy one.
 """
 
 import argparse
 import json
+import re
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +25,11 @@ from tree import PROJECT, Violation, report
 SECONDS = Path("tests/seconds.txt")
 FACTOR = 5  # the least that a time-out may be, in idle times; TestTime.cmake takes twice as much
 NOTEWORTHY_S = 10
+HEAD = f"""# SPDX-License-Identifier: Apache-2.0
+# Seconds of the tests that take more than {NOTEWORTHY_S} s, longest first, after a whole run on an idle computer by:
+# python tools/checks/times.py build/host --record build/host-ctest.log
+"""
+PASSED = re.compile(r"^ *\d+/\d+ Test +#\d+: (\S+) \.* *Passed +([\d.]+) sec$", re.MULTILINE)
 
 
 def recorded(root: Path) -> dict[str, int]:
@@ -61,16 +69,33 @@ def spent(build: Path, name: str) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def record(root: Path, build: Path, names: list[str]) -> None:
+def write(root: Path, seconds: dict[str, int]) -> None:
+    """The file, the longest test first."""
+    rows = [
+        f"{test} {s}\n" for test, s in sorted(seconds.items(), key=lambda row: (-row[1], row[0])) if s >= NOTEWORTHY_S
+    ]
+    (root / SECONDS).write_text(HEAD + "".join(rows), encoding="utf-8")
+
+
+def record_log(root: Path, log: Path, tests: Iterable[str]) -> int:
+    """Write down what ctest's log says; what it does not tell stays, as long as there is such a test."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    measured = {name: round(float(seconds)) for name, seconds in PASSED.findall(text)}
+    if not measured or not re.search("^100% tests passed", text, re.MULTILINE):
+        sys.exit(f"error: {log} is not ctest's log of a run in which every test passed")
+    known = set(tests)
+    write(root, {name: s for name, s in (recorded(root) | measured).items() if name in known})
+    print(f"{SECONDS}: {len(measured)} tests of {log}")
+    return 0
+
+
+def record(root: Path, build: Path, names: list[str]) -> int:
     """Write the file anew, test by test."""
     for name in names:
         measured = round(spent(build, name))
-        seconds = recorded(root)
-        seconds[name] = measured
-        head = [line for line in (root / SECONDS).read_text(encoding="utf-8").splitlines() if line.startswith("#")]
-        rows = [f"{test} {s}" for test, s in sorted(seconds.items(), key=lambda row: -row[1]) if s >= NOTEWORTHY_S]
-        (root / SECONDS).write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+        write(root, recorded(root) | {name: measured})
         print(f"{name}: {measured} s", flush=True)
+    return 0
 
 
 def main() -> int:
@@ -78,11 +103,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("build", type=Path)
     parser.add_argument("--root", type=Path, default=PROJECT)
-    parser.add_argument("--record", nargs="+", metavar="TEST")
+    parser.add_argument("--record", nargs="+", metavar="LOG|TEST")
     given = parser.parse_args()
+    if given.record and Path(given.record[0]).is_file():
+        return record_log(given.root, Path(given.record[0]), described(given.build))
     if given.record:
-        record(given.root, given.build, given.record)
-        return 0
+        return record(given.root, given.build, given.record)
     return report(check(given.root, described(given.build)), "time-outs")
 
 

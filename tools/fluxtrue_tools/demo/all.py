@@ -25,7 +25,7 @@ class Demonstration:
     @property
     def realtime(self) -> Bound:
         """The bound of the simulation's speed."""
-        return Bound("simulated over wall time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True)
+        return Bound("simulated over processor time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True)
 
     def missed(self) -> list[str]:
         """One line for each bound that was missed."""

@@ -45,7 +45,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "faults": [{"t": _rounded(time_s), "names": names} for time_s, names in recording.faults()],
         "motor_check": faults.refused_data(recording.motor_check) or None,
         "expect_fault": scenario.expect_fault,
-        "realtime_factor": _rounded(scenario.duration_s / recording.wall_s),
+        "realtime_factor": _rounded(scenario.duration_s / recording.processor_s),
         "mean": means,
     }
 

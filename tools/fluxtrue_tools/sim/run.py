@@ -71,7 +71,7 @@ class Recording:
     motor: Motor
     columns: list[str]
     rows: NDArray[np.float64]
-    wall_s: float = 0.0
+    processor_s: float = 0.0
     motor_check: int = 0  # why the motor data were refused, as faults.refused_data() tells it
     _index: dict[str, int] = field(default_factory=dict)
 
@@ -194,7 +194,7 @@ def simulate(
         check.speed(scenario, motor, probe.period_s, where)
         every = check.rows(scenario, probe.period_s, len(columns), where)
         check.ranges(scenario, motor, probe, where)
-    begin = time.perf_counter()
+    begin = time.thread_time()
     with _start(scenario, motor, where) as loop:
         try:
             loop.record(channels, every)
@@ -204,7 +204,7 @@ def simulate(
             raise check.refused(error, scenario, motor, where) from error
         except FluxtrueError as error:
             raise FluxtrueError(f"{where}: {error}") from error
-    return Recording(scenario, motor, columns, rows, time.perf_counter() - begin, check_number)
+    return Recording(scenario, motor, columns, rows, time.thread_time() - begin, check_number)
 
 
 def _run(
