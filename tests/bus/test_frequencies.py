@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The times of docs/howto/can.md at other PWM frequencies, in simulated time, within one step of the task."""
 
-import os
 from collections import defaultdict
-from pathlib import Path
 
 import pytest
-from ecu import ROOT, Ecu
+from ecu import BUILD, Ecu
 
 from fluxtrue_tools.motor.bases import periods_per_step
 from fluxtrue_tools.sim import motor as sim_motor
+from fluxtrue_tools.sim.build import MotorFolder
 
-HSM1 = ROOT / "firmware" / "motors" / "hsm1"
-# hsm1 is refused below 10 kHz with a full scale of 400 A, and above 9500 rpm at 5 kHz. 22.5 kHz: a step of 1.022 ms.
-CHANGES = {5000.0: {"current_full_scale_A": 800.0, "speed_max_rpm": 8000.0}, 8000.0: {"current_full_scale_A": 500.0}}
+# Machines of tests/motors. 22.5 kHz: a step of 1.022 ms.
+KHZ = (5.0, 8.0, 16.0, 20.0, 22.5, 40.0)
 TORQUE = "torque_commanded_Nm"
 
 
@@ -48,20 +46,11 @@ class Clocked(Ecu):
         return self.now_ms - start
 
 
-@pytest.fixture(scope="module", params=[5000.0, 8000.0, 16000.0, 20000.0, 22500.0, 40000.0])
+@pytest.fixture(scope="module", params=KHZ, ids="{:g}kHz".format)
 def built(request: pytest.FixtureRequest) -> tuple[sim_motor.Motor, float]:
-    """hsm1 with another frequency, built."""
-    pwm_hz: float = request.param
-    folder = Path(os.environ["FLUXTRUE_BUILD_DIR"]) / "frequencies" / f"hsm1_{pwm_hz:g}"
-    folder.mkdir(parents=True, exist_ok=True)
-    text = (HSM1 / "motor.toml").read_text(encoding="utf-8")
-    for key, value in {"pwm_hz": pwm_hz, **CHANGES.get(pwm_hz, {})}.items():
-        lines = [f"{key} = {value}" if line.startswith(f"{key} =") else line for line in text.splitlines()]
-        text = "\n".join(lines) + "\n"
-    for name, content in (("motor.toml", text), ("flux_map.csv", (HSM1 / "flux_map.csv").read_text(encoding="utf-8"))):
-        if not (folder / name).is_file() or (folder / name).read_text(encoding="utf-8") != content:
-            (folder / name).write_text(content, encoding="utf-8")
-    return sim_motor.load(str(folder)), pwm_hz
+    """hsm1 with another frequency."""
+    name = f"hsm1_{request.param:g}kHz"
+    return sim_motor.read(MotorFolder(name, BUILD / "motors" / name)), 1e3 * request.param
 
 
 @pytest.fixture

@@ -2,10 +2,11 @@
 # A linked image of a port (hal/<port>): the firmware for FLUXTRUE_MOTOR with start-up code and drivers.
 
 # fluxtrue_image(<name> SOURCES <file> ... SCRIPT <linker script> [FLASH <bytes> RAM <bytes>] [SEAL]
-#                [DEFINITIONS <D> ...] [LINK <option> ...])
-#   <build>/<name>.elf and .bin; SEAL writes the checksum; FLASH and RAM are bounds
+#                [BUDGET <file>] [DEFINITIONS <D> ...] [LINK <option> ...])
+#   <build>/<name>.elf and .bin; SEAL writes the checksum; FLASH and RAM are bounds; a machine beyond the BUDGET of the
+#   port is refused before the image is linked
 function(fluxtrue_image name)
-    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;FLASH;RAM" "SOURCES;DEFINITIONS;LINK")
+    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;FLASH;RAM;BUDGET" "SOURCES;DEFINITIONS;LINK")
     if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES OR NOT arg_SCRIPT OR
        (DEFINED arg_FLASH AND NOT DEFINED arg_RAM) OR (DEFINED arg_RAM AND NOT DEFINED arg_FLASH))
         message(FATAL_ERROR "fluxtrue_image(${name}): wants SOURCES and SCRIPT, FLASH and RAM together or neither; "
@@ -25,6 +26,13 @@ function(fluxtrue_image name)
         -Wl,--gc-sections,--fatal-warnings "-Wl,-Map=${CMAKE_BINARY_DIR}/${name}.map")
     set(tool ${CMAKE_COMMAND} -E env "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1
         "${FLUXTRUE_PYTHON}" -m fluxtrue_tools target)
+    if(arg_BUDGET)
+        cmake_path(ABSOLUTE_PATH arg_BUDGET)
+        string(REGEX REPLACE "^motor_" "" machine "${motor}")
+        add_custom_command(TARGET ${name}_image PRE_LINK VERBATIM
+            COMMAND ${tool} fits "${CMAKE_BINARY_DIR}/motors/${machine}/motor.json" --budget "${arg_BUDGET}")
+        set_property(TARGET ${name}_image APPEND PROPERTY LINK_DEPENDS "${arg_BUDGET}")
+    endif()
     if(arg_SEAL)
         add_custom_command(TARGET ${name}_image POST_BUILD VERBATIM
             COMMAND ${tool} seal "$<TARGET_FILE:${name}_image>")

@@ -1,6 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # From a motor's folder (motor.toml, flux map) to the libraries for that motor.
 
+# Which folders this configuration builds, for tools/fluxtrue_tools/sim/build.py. Notes of the last one are removed.
+file(GLOB notes "${CMAKE_BINARY_DIR}/motors/*/folder.txt")
+if(notes)
+    file(REMOVE ${notes})
+endif()
+
 function(_fluxtrue_motor_tool output)
     set(${output} ${CMAKE_COMMAND} -E env
         "PYTHONPATH=${CMAKE_SOURCE_DIR}/tools" PYTHONDONTWRITEBYTECODE=1
@@ -13,6 +19,12 @@ function(_fluxtrue_motor_tables name folder out)
         "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/motor/*")
     list(FILTER tool EXCLUDE REGEX "__pycache__")
     file(GLOB data CONFIGURE_DEPENDS "${folder}/*.toml" "${folder}/*.csv")
+    file(STRINGS "${folder}/motor.toml" map REGEX "^flux_map *= *\"[^\"]+\"")
+    if(map MATCHES "\"([^\"]+)\"") # which may lie elsewhere
+        cmake_path(ABSOLUTE_PATH CMAKE_MATCH_1 BASE_DIRECTORY "${folder}" NORMALIZE OUTPUT_VARIABLE map)
+        list(APPEND data "${map}")
+        list(REMOVE_DUPLICATES data)
+    endif()
     set(sources "${out}/motor_tables.c")
     if(NOT CMAKE_CROSSCOMPILING)
         list(APPEND sources "${out}/motor_si.c")
@@ -37,12 +49,13 @@ function(_fluxtrue_motor_tables name folder out)
 endfunction()
 
 # fluxtrue_add_motor(<name> <folder>)
-#   motor_<name>          object library with the tables
+#   motor_<name>          object library with the tables; <build>/motors/<name>/folder.txt names the folder
 #   fluxtrue_sil_<name>   host: <build>/motors/<name>/libfluxtrue_sil.so
 #   fluxtrue_sim_<name>   host: <build>/motors/<name>/libfluxtrue_sim.so
 #   fluxtrue_vecu_<name>  host: <build>/motors/<name>/fluxtrue_vecu
 function(fluxtrue_add_motor name folder)
     set(out "${CMAKE_BINARY_DIR}/motors/${name}")
+    file(CONFIGURE OUTPUT "${out}/folder.txt" CONTENT "${folder}\n" @ONLY)
     _fluxtrue_motor_tables(${name} "${folder}" "${out}")
     if(TARGET fluxtrue_hal_host)
         fluxtrue_shared(fluxtrue_sil_${name} fluxtrue_sil "${out}"

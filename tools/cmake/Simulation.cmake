@@ -28,8 +28,13 @@ fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
 fluxtrue_part(fluxtrue_vecu_parts OBJECT tests/vecu
     "${tests}" "${tests}/vecu" "${firmware}" "${CMAKE_SOURCE_DIR}")
 
-# Everything the tools load at run time: what tools/demo builds.
+# Everything the tools load at run time: what tools/demo builds. Not the machines of tests/motors.
 add_custom_target(fluxtrue_libraries)
+function(_fluxtrue_loaded target)
+    if("${FLUXTRUE_MACHINE_OF_TESTS}" STREQUAL "")
+        add_dependencies(fluxtrue_libraries ${target})
+    endif()
+endfunction()
 
 # fluxtrue_shared(<target> <output name> <folder> <library or object library> ...)
 function(fluxtrue_shared target output folder)
@@ -49,7 +54,7 @@ function(fluxtrue_shared target output folder)
         $<$<NOT:$<BOOL:${FLUXTRUE_SANITIZE}>>:-Wl,--no-undefined>)
     set_target_properties(${target} PROPERTIES LINKER_LANGUAGE C
         OUTPUT_NAME ${output} LIBRARY_OUTPUT_DIRECTORY "${folder}")
-    add_dependencies(fluxtrue_libraries ${target})
+    _fluxtrue_loaded(${target})
 endfunction()
 
 # fluxtrue_vecu(<name> <folder> <library or object library> ...)
@@ -78,5 +83,5 @@ function(fluxtrue_vecu name folder)
     target_link_libraries(${target} PRIVATE m)
     target_link_options(${target} PRIVATE -no-pie)
     set_target_properties(${target} PROPERTIES OUTPUT_NAME fluxtrue_vecu RUNTIME_OUTPUT_DIRECTORY "${folder}")
-    add_dependencies(fluxtrue_libraries ${target})
+    _fluxtrue_loaded(${target})
 endfunction()

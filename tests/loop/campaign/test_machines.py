@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign on two invented machines: strong saturation, and nearly none."""
+"""The campaign on two invented machines, strong saturation and nearly none, and at half and twice the PWM frequency."""
 
 import importlib.util
 import json
@@ -11,17 +11,19 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from fluxtrue_tools.sim.build import prepare
+
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
-CASES = 4
+CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2}
 
 
-@pytest.mark.parametrize("name", ["saturated", "linear"])
+@pytest.mark.parametrize("name", CASES)
 def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_path: Path, name: str) -> None:
-    """The file's own 100 cases with: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
+    """All of the file's own cases with: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
     file = Path(__file__).with_name(f"{name}.toml")
-    command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES), "--out",
-               str(tmp_path)]  # fmt: skip
+    command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES[name]),
+               "--out", str(tmp_path)]  # fmt: skip
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
     result = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
@@ -29,7 +31,7 @@ def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_pa
     assert bounds
     assert all(b["met"] for b in bounds)
     table = pd.read_parquet(tmp_path / "results.parquet")
-    assert table["case"].nunique() == CASES
+    assert table["case"].nunique() == CASES[name]
     tables = table[table["controller"] == "tables"]
     assert (tables["run_fault_word"] == 0).all()
     # What there was to repair: a magnet up to 20 % weak, inductances 10 % off.
@@ -51,3 +53,10 @@ def test_the_map_is_what_its_script_makes(name: str) -> None:
     assert (shipped - made).abs().max(axis=None) < 1e-9
     i_d, i_q = iron.currents(*shipped.loc[300, ["psi_d_Vs", "psi_q_Vs"]])
     assert (i_d, i_q) == pytest.approx((shipped.loc[300, "id_A"], shipped.loc[300, "iq_A"]), abs=1e-3)
+
+
+def test_the_machines_are_part_of_the_tests_build() -> None:
+    """A build folder of its own would compile the firmware once more for each."""
+    built = Path(os.environ["FLUXTRUE_BUILD_DIR"])
+    for name in ("saturated", "linear", "hsm1_5kHz", "hsm1_20kHz"):
+        assert prepare(str(MOTORS / name)).folder == built / "motors" / name

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An image with one deliberate error: a source file of the port is changed, compiled and linked in place of its own."""
+"""An image that differs from a built one in a file: with one deliberate error, or for another machine. The file is
+compiled by the command of the build and linked in place of its own."""
 
 from __future__ import annotations
 
@@ -40,21 +41,39 @@ def _only(lines: list[str], part: str) -> str:
     return found[0]
 
 
-def plant(built: Path, what: Plant, folder: Path) -> Path:
-    """The image `built` with the error in it, sealed."""
+def relinked(built: Path, instead: dict[Path, Path], folder: Path) -> Path:
+    """The image `built` with some of its source files compiled from other ones, sealed."""
+    commands, elf = _commands(built.parent), folder / "relinked.elf"
+    link = _only(_only(commands, "-o fluxtrue.elf").split(" && "), "-o fluxtrue.elf")
+    for original, source in instead.items():
+        compile_it = _only(commands, f"-c {original}")
+        place = shlex.split(compile_it)[shlex.split(compile_it).index("-o") + 1]
+        another = str(folder / Path(place).name)  # the linker script places the motor's data by this name
+        _run(shlex.split(compile_it.replace(place, another).replace(f"-c {original}", f"-c {source}")), built.parent)
+        link = link.replace(place, another)
+    link = link.replace("-o fluxtrue.elf", f"-o {elf}").replace("fluxtrue.map", f"{folder.name}.map")
+    _run(shlex.split(link), built.parent)
+    image.seal(elf)
+    return elf
+
+
+def with_motor(built: Path, tables: Path) -> dict[Path, Path]:
+    """For relinked(): the data of another machine, as `tools/fluxtrue motor build` has written them."""
+    found = list(built.parent.glob("motors/*/motor_tables.c"))
+    assert len(found) == 1, f"{len(found)} machines in {built.parent}"
+    return {found[0]: tables}
+
+
+def with_error(what: Plant, folder: Path) -> dict[Path, Path]:
+    """For relinked(): the file with the error in it."""
     original = PORT / what.file
     text = original.read_text(encoding="utf-8")
     assert text.count(what.text) == 1, f"{what.file} contains {text.count(what.text)} times: {what.text}"
     source = folder / what.file
     source.write_text(text.replace(what.text, what.instead), encoding="utf-8")
-    commands = _commands(built.parent)
-    compile_it = _only(commands, f"-c {original}")
-    place = shlex.split(compile_it)[shlex.split(compile_it).index("-o") + 1]
-    planted_object, elf = str(folder / "planted.obj"), folder / "planted.elf"
-    compile_it = compile_it.replace(place, planted_object).replace(f"-c {original}", f"-c {source}")
-    _run(shlex.split(compile_it), built.parent)
-    link = _only(_only(commands, "-o fluxtrue.elf").split(" && "), "-o fluxtrue.elf")
-    link = link.replace(place, planted_object).replace("-o fluxtrue.elf", f"-o {elf}")
-    _run(shlex.split(link.replace("fluxtrue.map", "planted.map")), built.parent)
-    image.seal(elf)
-    return elf
+    return {original: source}
+
+
+def plant(built: Path, what: Plant, folder: Path) -> Path:
+    """The image `built` with the error in it, sealed."""
+    return relinked(built, with_error(what, folder), folder)

@@ -3,6 +3,8 @@
 
 import math
 import re
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +12,8 @@ from fluxtrue_tools.motor.bases import periods_per_step
 from fluxtrue_tools.motor.emit_c import motor_si_c, motor_tables_c
 from fluxtrue_tools.motor.motor import load_motor
 
+ROOT = Path(__file__).resolve().parents[3]
+HSM1 = ROOT / "firmware" / "motors" / "hsm1"
 SLEW = {"control": {"torque_slew_Nm_per_s": 1000.0, "torque_loop_bandwidth_rad_s": 40.0}}
 
 
@@ -116,3 +120,21 @@ def test_the_model_of_the_torque_loop_waits_for_the_current_loop_of_its_own_freq
     for pwm_hz, missing_ms in ((5000.0, 3.75 / 5 + 0.291667), (10000.0, 0.666667), (40000.0, 3.75 / 40 + 0.291667)):
         c, _, _ = generated(pwm_hz)
         assert int(c["model_rate"]) == pytest.approx(2**15 / (1.0 + missing_ms), abs=0.6)
+
+
+@pytest.mark.parametrize(("khz", "changed"), [
+    ("5", {"current_full_scale_A": 800.0, "speed_max_rpm": 8000.0}), ("8", {"current_full_scale_A": 500.0}),
+    ("16", {}), ("20", {}), ("22.5", {}), ("40", {}),
+])  # fmt: skip
+def test_the_machines_at_other_frequencies_are_hsm1_in_everything_else(khz, changed):
+    """hsm1 is refused below 10 kHz with a full scale of 400 A, and above 9500 rpm at 5 kHz."""
+
+    def flat(path):
+        tables = tomllib.loads(path.read_text(encoding="utf-8")).values()
+        return {key: value for table in tables for key, value in table.items()}
+
+    machine = flat(ROOT / "tests" / "motors" / f"hsm1_{khz}kHz" / "motor.toml")
+    assert (ROOT / "tests/motors/hsm1_5kHz" / machine["flux_map"]).resolve() == HSM1 / "flux_map.csv"
+    expected = flat(HSM1 / "motor.toml") | changed
+    expected |= {"name": f"hsm1_{khz}kHz", "pwm_hz": 1e3 * float(khz), "flux_map": machine["flux_map"]}
+    assert machine == expected

@@ -83,6 +83,7 @@ class Stand:
 
     loop: Loop
     command: Command = field(default_factory=Command)
+    periods_per_ms: int = PERIODS_PER_MS
 
     def __post_init__(self) -> None:
         library = self.library = self.loop._library
@@ -97,7 +98,7 @@ class Stand:
         if self.time_ms % 10 == 0:
             self.library.can_frame_arrives(self.handle, ctypes.byref(self.command.frame()))
         self.time_ms += 1
-        return self.loop.run(PERIODS_PER_MS, ramps)
+        return self.loop.run(self.periods_per_ms, ramps)
 
     def run(self, milliseconds: int, **values: float | str) -> None:
         self.command.values.update(values)

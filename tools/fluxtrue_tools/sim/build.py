@@ -149,8 +149,8 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None,
     is_shipped = folder == SHIPPED / name
     if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
         build_dir = Path(os.environ["FLUXTRUE_BUILD_DIR"])
-    if build_dir is not None and (is_shipped or _selected(build_dir) == folder):
-        target = name if is_shipped else "selected"
+    target = name if is_shipped or build_dir is None else _target(build_dir, folder)
+    if build_dir is not None and target is not None:
         built = MotorFolder(name, build_dir / "motors" / target)
         if not built.library.is_file():
             raise FluxtrueError(f"{built.library} is missing: cmake --build {build_dir} --target fluxtrue_sim_{target}")
@@ -186,10 +186,9 @@ def _check_motor(folder: Path) -> None:
         generate(motor)
 
 
-def _selected(build_dir: Path) -> Path | None:
-    """The motor folder a build folder was configured for."""
-    cache = build_dir / "CMakeCache.txt"
-    if not cache.is_file():
-        return None
-    found = re.search(r"^FLUXTRUE_MOTOR:\w+=(.*)$", cache.read_text(), re.MULTILINE)
-    return Path(found[1]).resolve() if found else None
+def _target(build_dir: Path, folder: Path) -> str | None:
+    """The name by which a build folder has a motor's folder: FLUXTRUE_MOTOR, or one of the tests' machines."""
+    for note in sorted(build_dir.glob("motors/*/folder.txt")):
+        if Path(note.read_text(encoding="utf-8").strip()).resolve() == folder:
+            return note.parent.name
+    return None

@@ -54,6 +54,16 @@ def size(elf: Path, flash: int, ram: int) -> None:
 
 
 @target.command(cls=paths.Command)
+@click.argument("motor", type=paths.InputFile())
+@click.option("--budget", type=paths.InputFile(), required=True, help="The port's limits (budget.toml).")
+def fits(motor: Path, budget: Path) -> None:
+    """Refuse a machine (motor.json of a build) whose PWM the port cannot carry; print how busy it makes the port."""
+    from fluxtrue_tools.target import fits as limits
+
+    click.echo(limits.check(motor, budget))
+
+
+@target.command(cls=paths.Command)
 @click.argument("file", type=paths.InputFile())
 def version(file: Path) -> None:
     """Print the version of an image: an ELF file, a .bin or a dump of the flash."""

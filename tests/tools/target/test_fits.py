@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which machines a port can carry."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fluxtrue_tools.cli import main
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.target import fits
+
+PORT = Path(__file__).resolve().parents[3] / "hal" / "s32k144"
+# Cycles (least, mean, most) of a period's interrupts, a task, a received command.
+COSTS = {"10 kHz work": [1, 1, 1000], "1 kHz task": [1, 1, 20000], "CAN ISR": [1, 1, 300]}
+
+
+@pytest.fixture
+def checked(tmp_path):
+    """fits.check() for a frequency and a dead time, a core, and costs that are known."""
+
+    def _checked(pwm_hz, dead_time_s=1e-6, core_Hz=112e6):
+        folder = tmp_path / "aport"
+        folder.mkdir(exist_ok=True)
+        motor, measured, budget = tmp_path / "motor.json", tmp_path / "performance.json", folder / "budget.toml"
+        motor.write_text(json.dumps({"inverter": {"pwm_hz": pwm_hz, "dead_time_s": dead_time_s}}))
+        dear = {name: {"cycles": cycles} for name, cycles in COSTS.items()}
+        cheap = {name: {"cycles": [1, 1, 1]} for name in COSTS}
+        measured.write_text(json.dumps({"drives": {"a": {"runs": cheap}, "b": {"runs": dear}}}))
+        pwm = "\n".join(f"{key} = {value}" for key, value in _port()["pwm"].items())
+        budget.write_text(f"core_Hz = {core_Hz}\nbusy_share_max = 0.75\n[pwm]\n{pwm}\n")
+        return fits.check(motor, budget, measured)
+
+    return _checked
+
+
+def _port():
+    return tomllib.loads((PORT / "budget.toml").read_text(encoding="utf-8"))
+
+
+def test_the_share_is_periods_tasks_and_commands_of_the_dearer_identification(checked):
+    # 40e3 * 1000 + 1000 * 20000 + 100 * 300 of 112e6: 53.6 %
+    assert checked(40e3) == "busy for at most 54 % of the time at inverter.pwm_hz = 40000, without wait states"
+    # 4.5 kHz: five periods a step, 900 steps a second: 4.5e6 + 18e6 + 0.03e6: 20.1 %
+    assert "20 %" in checked(4.5e3)
+
+
+def test_a_processor_that_would_be_busy_too_long_is_named_with_the_bound(checked):
+    # (0.75 * 70e6 - 20.03e6)/1000 = 32.47 kHz
+    checked(32e3, core_Hz=70e6)
+    with pytest.raises(FluxtrueError) as refused:
+        checked(33e3, core_Hz=70e6)
+    assert str(refused.value) == (
+        "the processor of the aport would be busy for 76 % of the time at inverter.pwm_hz = 33000, allowed: up to 75 %"
+    )
+
+
+@pytest.mark.parametrize(("pwm_hz", "dead_time_s", "most"), [(40e3, 3.2e-6, "3.125e-06"), (40e3, 0.0, "3.125e-06"),
+                                                             (2e3, 40e-6, "3.654e-05")])  # fmt: skip
+def test_a_dead_time_that_the_timer_cannot_keep_is_refused_with_what_it_can(checked, pwm_hz, dead_time_s, most):
+    with pytest.raises(FluxtrueError, match=rf"inverter.dead_time_s = {dead_time_s:g}, allowed on the aport at "
+                                            rf"inverter.pwm_hz = {pwm_hz:g}: more than 0, up to {most}"):  # fmt: skip
+        checked(pwm_hz, dead_time_s)
+
+
+def test_an_eighth_of_the_period_is_allowed(checked):
+    assert checked(40e3, 3.125e-6)
+
+
+def test_a_period_beyond_the_timer_is_refused(checked):
+    with pytest.raises(FluxtrueError, match=r"inverter.pwm_hz = 1700, allowed on the aport: from 1709"):
+        checked(1.7e3)
+
+
+def test_the_limits_are_those_of_the_port_s_timer():
+    source = (PORT / "pwm.c").read_text(encoding="utf-8")
+    pwm = _port()["pwm"]
+    assert int(re.search(r"#define PERIOD_MAX (\d+)U", source)[1]) == pwm["period_ticks_max"]
+    assert 4 * int(re.search(r"#define DEAD_TIME_MAX (\d+)U", source)[1]) == pwm["dead_time_ticks_max"]
+    assert f"dead_time_ticks <= config->period_ticks / {1 / pwm['dead_time_share_max']:g}U" in source
+    assert pwm["timer_Hz"] == _port()["core_Hz"]
+
+
+@pytest.mark.parametrize("pwm_hz", [4e3, 5e3, 8e3, 10e3, 16e3, 20e3, 40e3])
+def test_the_s32k144_carries_every_frequency_that_a_motor_may_have(tmp_path, pwm_hz):
+    """As measured: at 40 kHz half of the processor."""
+    motor = tmp_path / "motor.json"
+    motor.write_text(json.dumps({"inverter": {"pwm_hz": pwm_hz, "dead_time_s": 2e-6}}))
+    assert "busy for at most" in fits.check(motor, PORT / "budget.toml")
+
+
+def test_on_the_command_line_a_refusal_is_one_message(tmp_path):
+    motor = tmp_path / "motor.json"
+    motor.write_text(json.dumps({"inverter": {"pwm_hz": 40e3, "dead_time_s": 4e-6}}))
+    done = CliRunner().invoke(main, ["target", "fits", str(motor), "--budget", str(PORT / "budget.toml")])
+    assert isinstance(done.exception, FluxtrueError)
+    assert "allowed on the s32k144 at inverter.pwm_hz = 40000" in str(done.exception)
