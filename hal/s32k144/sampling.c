@@ -12,7 +12,7 @@
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
 #define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
-#define APART_MS 10U  /* a longer interval between errors restarts the count */
+#define APART_STEPS 10U  /* a longer interval between errors restarts the count */
 
 /* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). */
 enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3, ADC0_CONVERSIONS = 4 };
@@ -29,9 +29,9 @@ typedef struct {
 
 static struct {
     uint32_t in_a_row;
-    uint32_t last;                     /* in milliseconds */
-} errors;                              /* written by the sequence errors' interrupt */
-static volatile uint32_t milliseconds; /* written by the 1 kHz task */
+    uint32_t last;              /* in steps of the 1 kHz task */
+} errors;                       /* written by the sequence errors' interrupt */
+static volatile uint32_t steps; /* counted by the 1 kHz task */
 
 /* Calibration starts from zero; results of an earlier run would falsify it. */
 static void clear_calibration(adc_t *adc)
@@ -137,15 +137,15 @@ bool sampling_error_isr(void)
     if ((PDB1->CH0S & PDB_CH0S_ERR_MASK) != 0U) {
         restart(PDB1, ADC1, ADC1_CONVERSIONS);
     }
-    const uint32_t now = milliseconds;
-    errors.in_a_row = now - errors.last <= APART_MS ? errors.in_a_row + 1U : 1U;
+    const uint32_t now = steps;
+    errors.in_a_row = now - errors.last <= APART_STEPS ? errors.in_a_row + 1U : 1U;
     errors.last = now;
     return errors.in_a_row >= ERRORS_MAX;
 }
 
 void sampling_tick(void)
 {
-    milliseconds = milliseconds + 1U;
+    steps = steps + 1U;
 }
 
 uint16_t sampling_winding(void)

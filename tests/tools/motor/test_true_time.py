@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No constant of the firmware takes a step of the task for a millisecond, or a period for 100 us.
+
+What the firmware counts or filters in steps and periods is generated for the motor (docs/decisions/010-true-time.md);
+what it defines itself is either a time, which code turns into true time, or a number of events that is none.
+"""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from fluxtrue_tools.motor.emit_c import motor_tables_c
+from fluxtrue_tools.motor.motor import load_motor
+
+ROOT = Path(__file__).resolve().parents[3]
+HSM1 = ROOT / "firmware" / "motors" / "hsm1"
+SOURCES = sorted(
+    path
+    for folder in ("firmware", "hal/s32k144", "hal/host", "hal/template")
+    for path in (ROOT / folder).rglob("*.[ch]")
+    if path.name != "registers.h"
+)
+
+# Members of motor_t that follow the PWM period, and those that follow the step of the task. Both: N periods a step.
+PERIOD = {
+    "bases.period_s",
+    "angle_tracker.kp", "angle_tracker.ki_q29", "angle_tracker.pu_to_turn", "angle_tracker.turn_to_pu",
+    "current_control.sigma_q24", "current_control.drop_gain", "current_control.integral_gain",
+    "current_control.clear_q30",
+    "modulate.dead_time_q16", "modulate.longest_q31", "modulate.nearer_rail_q31",
+    "mrai.period", "mrai.sinc_gain", "mrai.r_delta_max",
+    "identify.sinc_gain", "identify.sigma", "torque_loop.model_rate",
+}  # fmt: skip
+PERIODS_PER_STEP = {
+    "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
+    "identify.limited_noise",
+}  # fmt: skip
+STEP = {
+    "bases.step_s", "trim_steps", "torque_slew", "torque_slew_weak",
+    "mrai.psi_drift_full", "mrai.r_drift_full", "mrai.quality_rate",
+    "identify.rate_gain_q28", "identify.window_turns_q29", "identify.turn_to_pu", "identify.leak",
+    "identify.noise_voltage_q30", "identify.noise_flux_q30", "identify.noise_rate_q30", "identify.local_rate",
+    "identify.mismatch_rate", "identify.confidence_rate",
+    "torque_loop.ki", "torque_loop.model_rate", "voltage_reserve.gain", "torque_limit.loss_rate",
+    "plausibility.deviation_steps", "plausibility.lost_steps", "plausibility.equal_steps", "plausibility.fast_steps",
+    "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate", "torque_monitor.torque_steps",
+    "torque_monitor.angle_steps", "torque_monitor.settle_steps", "commission.settle_steps",
+    "commission.measure_steps", "commission.mean_gain_q31",
+}  # fmt: skip
+# A member whose name promises a time, a rate or a count of steps.
+TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
+SPEED = re.compile(r"_rad_s$")
+TIMED_OTHERWISE = {"dead_time_s", "torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
+# Times that the firmware itself defines, and what makes true time of one in each line that uses it.
+TIMES = {
+    "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",
+    "SELF_TEST_TIME_OUT_MS": r"is_timed_out\(", "PRECHARGE_TIME_OUT_MS": r"is_timed_out\(",
+    "DISCHARGE_TIME_OUT_MS": r"is_timed_out\(",
+    "SLEW_MS": r"per_step\(", "JERK_MS": r"per_step\(", "RAMP_OUT_MS": r"per_step\(",
+    "MEMORY_REST_MS": r"in_steps\(", "MEMORY_INTERVAL_MS": r"in_steps\(",
+}  # fmt: skip
+# Numbers that are no time, or none of the task.
+COUNTS = {
+    "CONSECUTIVE_MAX": "steps, as docs/howto/can.md says",
+    "RESET_STEPS": "a reset on its way to the drive",
+    "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
+    "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",
+    "TIME_CONSTANT": "moves of the trim, one each trim_steps",
+    "PARTS_PER_STEP": "steps, as docs/theory/angle-tracker.md says",
+    "ADVANCE_MIN": "angle of a step, as that page says",
+    "ADVANCE_MAX": "angle of a step, as that page says",
+    "DIFFERENCE_MAX_SHIFT": "share of that angle",
+    "PERIODS_TO_ACT": "delay from duty to voltage",
+    "FRAMES_PER_TASK": "frames, more than a bus carries in the longest step",
+    "CHECKSUM_MAX": "bytes",
+    "FREEZE_FRAME_SAMPLES": "entries, one each millisecond of the clock",
+    "XCP_DAQ_EVENTS": "events",
+    "TIMESTAMP_MODE": "a code",
+    "DEAD_TIME_MAX": "ticks of the timer", "DEAD_TIME_BY_4": "a code", "SAMPLE_PULSE_TICKS": "ticks of the timer",
+    "PERIODS_MAX": "periods of the longest step",
+    "PER_STEP": "share of an update", "STEP_CLOCK_NOMINAL_NS": "of the clock itself",
+    "STEP_1MS": "a step that is exactly 1 ms", "STEP_DC": "of a temperature",
+    "APART_STEPS": "steps, as hal/s32k144/README.md says",
+    "AWAIT_LOOPS": "loops before there is a task",
+    "STOPPED_PERIODS": "of a timer that never runs",
+    "FIRST_TICKS": "ticks of the watchdog", "TIMEOUT_TICKS": "ticks of the watchdog",
+    "WINDOW_TICKS": "ticks of the watchdog",
+}  # fmt: skip
+DEFINE = re.compile(r"^#define (\w+)\s+\(?-?[0-9].*$", re.MULTILINE)
+NAMED = re.compile(r"(_MS|_US|_S|_SAMPLES|_TICKS|_CYCLES|_ROW)$|STEP|PERIODS|CONSECUTIVE|TIME_|_PER_TASK")
+UNITS = re.compile(r"_RAD_S$")
+TOLD = re.compile(r"\b(steps?|ms|milliseconds?|seconds?|updates?|tasks?)\b")
+
+
+def members(text: str) -> dict[str, str]:
+    """{"plausibility.hot_steps": "110"} of the generated motor_t."""
+    found, path = {}, []
+    for line in text[text.index("const motor_t motor") :].splitlines()[1:]:
+        begun = re.match(r"\s*\.(\w+) = (.*)$", line)
+        if begun and begun[2].strip() == "{":
+            path.append(begun[1])
+        elif begun:
+            found[".".join([*path, begun[1]])] = begun[2].partition("/*")[0].strip().rstrip(",")
+        elif line.strip().startswith("}") and path:
+            path.pop()
+    return found
+
+
+@pytest.fixture(scope="module")
+def at(tmp_path_factory):
+    """Members for hsm1 at a frequency, with a full scale that keeps the per-unit bases."""
+
+    def _at(pwm_hz):
+        folder = tmp_path_factory.mktemp(f"{pwm_hz:g}")
+        text = (HSM1 / "motor.toml").read_text(encoding="utf-8")
+        for key, value in (("pwm_hz", pwm_hz), ("current_full_scale_A", 500.0)):
+            text = re.sub(rf"^{key} = .*$", f"{key} = {value}", text, flags=re.MULTILINE)
+        (folder / "motor.toml").write_text(text.replace('"flux_map.csv"', f'"{HSM1 / "flux_map.csv"}"'))
+        return members(motor_tables_c(load_motor(folder)))
+
+    return _at
+
+
+def changed(a, b):
+    assert a.keys() == b.keys() and len(a) > 150
+    return {name for name in a if a[name] != b[name]}
+
+
+def test_twice_the_frequency_with_the_same_step_changes_what_counts_periods_and_nothing_else(at):
+    assert changed(at(16000.0), at(32000.0)) == PERIOD | PERIODS_PER_STEP
+
+
+def test_a_shorter_step_of_as_many_periods_changes_what_counts_steps_too(at):
+    """16 periods of 16.4 kHz: 0.976 ms. Every count of at least 5 steps grows by one or more."""
+    assert changed(at(16000.0), at(16400.0)) == PERIOD | STEP
+
+
+def test_every_member_whose_name_promises_a_time_is_among_them(at):
+    timed = {name for name in at(16000.0) if TIMED.search(name) and not SPEED.search(name)}
+    assert timed - PERIOD - PERIODS_PER_STEP - STEP == TIMED_OTHERWISE
+
+
+def defined(text: str) -> set[str]:
+    """Numbers with a name or a comment of time."""
+    found = {m[1]: m[0].partition("/*")[2] for m in DEFINE.finditer(text)}
+    return {name for name, comment in found.items() if NAMED.search(name) or TOLD.search(comment)}
+
+
+def test_every_number_that_tells_of_time_or_steps_is_listed_with_what_it_is():
+    names = {name for path in SOURCES for name in defined(path.read_text(encoding="utf-8"))}
+    assert {name for name in names if not UNITS.search(name)} == TIMES.keys() | COUNTS.keys()
+
+
+@pytest.mark.parametrize("line", ["#define HOLD_MS 30U", "#define LOST 30U /* ms */", "#define WAIT_STEPS 12",
+                                  "#define WAIT 12 /* steps of the task */"])  # fmt: skip
+def test_a_new_number_of_time_is_found(line):
+    assert len(defined(f"#include <x.h>\n{line}\n#define OTHER 3\n")) == 1
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_a_time_becomes_true_in_each_line_that_uses_it(name):
+    lines = [line for path in SOURCES for line in path.read_text(encoding="utf-8").splitlines()]
+    users = [line for line in lines if re.search(rf"\b{name}\b", line) and not re.match(r"#define| \*", line)]
+    assert users
+    assert all(re.search(TIMES[name], line) for line in users), users
