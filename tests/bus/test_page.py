@@ -10,7 +10,7 @@ from cantools.database.can import Database, Message
 from fluxtrue_tools.bus import DBC
 
 ROOT = DBC.parents[2]
-PAGE = (ROOT / "docs/howto/can.md").read_text(encoding="utf-8")
+PAGE = re.sub(r"<!-- figure: \w+ -->", "", (ROOT / "docs/howto/can.md").read_text(encoding="utf-8"))
 ROW = re.compile(r"^\| 0x(\w+)(?:–0x(\w+))? \| `(\w+)…?` \| (vehicle|inverter) \| (\d+) \| (.*) \|$", re.M)
 SENDER = {"vehicle": "VCU", "inverter": "INV"}
 
