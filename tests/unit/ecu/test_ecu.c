@@ -128,6 +128,30 @@ static void tasks(int count)
     }
 }
 
+/* 132 N·m are 14679 counts, 962002944 in q31: in 40 ms, their rate in 10 ms, from full torque to none in 15 ms. The
+ * ramp is rounded up, so that it has ended in time. 0.25 N·m of 294.664 N·m are 27.8 counts. */
+void test_the_torque_moves_at_the_rates_of_the_page_of_the_bus(void)
+{
+    TEST_ASSERT_EQUAL_INT32(24050073, ecu.arbitration_config.slew);
+    TEST_ASSERT_EQUAL_INT32(2405007, ecu.arbitration_config.jerk);
+    TEST_ASSERT_EQUAL_INT32(64133530, ecu.arbitration_config.ramp_out);
+    TEST_ASSERT_EQUAL_INT(27, ecu.arbitration_config.dead_band);
+}
+
+/* 8 periods at 9 kHz are 888.889 us: so much of a millisecond's change belongs to a step; 2^-24 of single precision. */
+void test_the_rates_hold_in_true_time_for_a_step_that_is_not_a_millisecond(void)
+{
+    static motor_t other;
+    other = motor;
+    other.bases.step_s = 8.0F / 9000.0F;
+    ecu_init(&ecu, &other);
+    TEST_ASSERT_EQUAL_UINT32(888, ecu.clock.step_us);
+    TEST_ASSERT_UINT32_WITHIN(1, 889, ecu.clock.step_ns);
+    TEST_ASSERT_INT32_WITHIN(30, 21377843, ecu.arbitration_config.slew);
+    TEST_ASSERT_INT32_WITHIN(3, 1900253, ecu.arbitration_config.jerk);
+    TEST_ASSERT_INT32_WITHIN(80, 57007582, ecu.arbitration_config.ramp_out);
+}
+
 void test_the_watchdog_is_started_once_and_then_served_by_every_task(void)
 {
     tasks(100);

@@ -47,13 +47,17 @@ static uint32_t told_reason(void)
     return telemetry.derating_reason;
 }
 
-/* 140 V and 437.5 V, each with its count of 1/61 V. */
-void test_the_dc_voltage_is_in_range_between_the_monitors_limits(void)
+/* 140 V and 437.5 V are 8495 and 26548 counts. */
+void test_the_dc_voltage_is_in_range_between_the_monitors_limits_and_at_them(void)
 {
-    TEST_ASSERT_FALSE(observe_v(139.9)->dc_in_range);
-    TEST_ASSERT_TRUE(observe_v(140.1)->dc_in_range);
-    TEST_ASSERT_TRUE(observe_v(437.4)->dc_in_range);
-    TEST_ASSERT_FALSE(observe_v(437.6)->dc_in_range);
+    static const struct {
+        int32_t v_dc;
+        bool in_range;
+    } cases[] = {{8494, false}, {8495, true}, {26548, true}, {26549, false}};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        sample.v_dc = cases[n].v_dc;
+        TEST_ASSERT_EQUAL(cases[n].in_range, observe()->dc_in_range);
+    }
 }
 
 void test_the_dc_voltage_is_safe_to_touch_below_60_V(void)
@@ -62,7 +66,7 @@ void test_the_dc_voltage_is_safe_to_touch_below_60_V(void)
     TEST_ASSERT_FALSE(observe_v(60.1)->dc_safe);
 }
 
-/* The band is 1 % of V_b, 5.4 V to either side of where the voltage was first seen. */
+/* The band is 1 % of V_b, 5.4 V or 328 counts to either side of where the voltage was first seen. */
 static void settles_in_50_ms_at(double v_dc_V)
 {
     for (int ms = 0; ms < 50; ms++) {
@@ -74,10 +78,13 @@ static void settles_in_50_ms_at(double v_dc_V)
 void test_the_dc_voltage_has_settled_after_50_ms_within_one_percent_of_the_base(void)
 {
     settles_in_50_ms_at(350.0);
-    TEST_ASSERT_TRUE(observe_v(355.0)->dc_settled);
-    TEST_ASSERT_TRUE(observe_v(345.0)->dc_settled);
-    settles_in_50_ms_at(356.0);
-    settles_in_50_ms_at(350.0);
+    const int32_t reference = sample.v_dc;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        sample.v_dc = reference + sign * 328;
+        TEST_ASSERT_TRUE(observe()->dc_settled);
+    }
+    settles_in_50_ms_at((reference + 329.5) / COUNT_PER_V);
+    settles_in_50_ms_at((reference + 0.5) / COUNT_PER_V);
 }
 
 void test_a_voltage_that_moves_must_settle_again_however_long_it_has_stayed(void)
@@ -146,13 +153,13 @@ void test_the_command_of_the_bus_is_passed_on(void)
     TEST_ASSERT_TRUE(ecu_observe(&ecu, true).gate_fault);
 }
 
-/* The dead band is 0.25 N·m, rounded to 27 counts of 0.009 N·m. */
+/* The dead band is 0.25 N·m, rounded to 27 counts of 0.009 N·m: 0.2473 N·m are 27 counts, 0.2525 N·m are 28. */
 void test_a_requested_torque_within_the_dead_band_is_zero(void)
 {
     static const struct {
         float torque_Nm;
         bool is_zero;
-    } cases[] = {{0.0F, true}, {0.24F, true}, {-0.24F, true}, {0.26F, false}, {-0.26F, false}, {-1e6F, false}};
+    } cases[] = {{0.0F, true}, {0.2473F, true}, {-0.2473F, true}, {0.2525F, false}, {-0.26F, false}, {-1e6F, false}};
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
         TEST_ASSERT_EQUAL(cases[n].is_zero, observe()->torque_requested_is_zero);
