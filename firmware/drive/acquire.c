@@ -7,9 +7,7 @@
 /* The known error of the angle sensor at this position. */
 static uint32_t angle_correction(const drive_t *drive, uint32_t theta_m)
 {
-    const volatile int32_t *parts = drive->task.angle_correction;
-    __asm__("" : "+r"(parts)); /* the address once: not part of every index */
-    return (uint32_t)parts[theta_m >> ANGLE_HARMONICS_SHIFT];
+    return (uint32_t)drive->task.angle_correction[theta_m >> ANGLE_HARMONICS_SHIFT];
 }
 
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
@@ -17,7 +15,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     adc_counts_t counts;
     hal_adc_read(&counts);
     const measure_t measured = measure_step(&drive->motor.measure, &counts);
-    const fx_pair_t i_ab = fx_arch_pkhbt(measured.i.alpha, measured.i.beta);
+    const fx_pair_t i_ab = fx_pair(measured.i.alpha, measured.i.beta);
     sample->i_ab = i_ab;
     sample->zero_q28 = measured.zero_q28;
     const uint32_t read = hal_angle_read();

@@ -128,7 +128,7 @@ typedef struct {
     int16_t inverter_dC, winding_dC;
 } snapshot_t;
 
-/** The samples are first, because their address is then that of the drive. */
+/** All of a drive. */
 typedef struct {
     sample_box_t samples;
     motor_t motor; /* a copy in RAM, which calibration may change; the original is in flash */

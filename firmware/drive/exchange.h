@@ -14,6 +14,7 @@
 
 #include "control/current/current_control.h"
 #include "control/identify/window.h"
+#include "fx/codegen.h"
 #include "types/frames.h"
 #include "types/operating_point.h"
 #include "types/samples.h"
@@ -29,8 +30,10 @@ typedef struct {
     bool acting;          /* the bridge switched throughout the last period and is switching now */
     bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
-    uint32_t to_64_bytes; /* unused: a size that is a power of two makes the slot's address cheaper to compute */
+    FX_PADDING_WORD;
 } sample_t;
+
+FX_POWER_OF_TWO_SIZE(sample_t);
 
 typedef struct {
     sample_t slot[2];
@@ -57,8 +60,10 @@ typedef struct {
     safe_t safe;
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: the fast ISR clears its faults once for each count */
-    uint32_t to_32_bytes;  /* unused, as to_64_bytes */
+    FX_PADDING_WORD;
 } command_t;
+
+FX_POWER_OF_TWO_SIZE(command_t);
 
 typedef struct {
     command_t slot[2];
@@ -68,14 +73,14 @@ typedef struct {
 /* Prevents the compiler from moving the stores to the slot behind the store to the generation. */
 static inline void exchange_barrier(void)
 {
-    __asm__ volatile("" ::: "memory");
+    fx_compiler_barrier();
 }
 
 /* The slot that publishing will complete. */
 static inline sample_t *sample_box_begin(sample_box_t *box)
 {
     sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
-    __asm__("" : "+r"(slot)); /* the address is computed once, not at every use */
+    FX_ADDRESS_ONCE(slot);
     return slot;
 }
 
@@ -101,9 +106,7 @@ static inline sample_t sample_box_read(const sample_box_t *box)
 /* In place: a reader that the fast ISR may interrupt must copy it and then compare the generation again. */
 static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t generation)
 {
-    const sample_t *slot = &box->slot[generation & 1U];
-    __asm__("" : "+r"(slot));
-    return slot;
+    return &box->slot[generation & 1U];
 }
 
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)
@@ -129,7 +132,7 @@ static inline void command_box_write(command_box_t *box, command_t command)
 static inline const command_t *command_box_read(const command_box_t *box)
 {
     const command_t *slot = &box->slot[box->generation & 1U];
-    __asm__("" : "+r"(slot));
+    FX_ADDRESS_ONCE(slot);
     return slot;
 }
 

@@ -140,9 +140,7 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
     sample->point.flux = flux_table_step(&drive->motor.flux_table, measured);
-    /* Read again from the sample: kept in registers over the look-up, both would be spilled to the stack. */
-    const fx_arch_two_t i = fx_arch_load_two(&sample->point.i.d);
-    return (rotor_frame_t){fx_arch_pkhbt(i.first, i.second), advanced, sample->v_dc, sample->point.omega};
+    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega};
 }
 
 static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)

@@ -32,39 +32,10 @@ static inline int32_t fx_arch_smlabb(int16_t a, int16_t b, int32_t acc)
     return fx_arch_add_wrap(acc, (int32_t)a * b);
 }
 
-/* The same value, of which the compiler knows nothing: it is kept in a register and not taken apart again. */
-static inline int32_t fx_arch_opaque(int32_t x)
-{
-    __asm__("" : "+r"(x));
-    return x;
-}
-
-/* Two neighbours of memory, wanted at the same time: the compiler loads both by one instruction. */
-// NOLINTNEXTLINE(readability-non-const-parameter): the operands are outputs, too
-static inline void fx_arch_together(int32_t *a, int32_t *b)
-{
-    __asm__("" : "+r"(*a), "+r"(*b));
-}
-
-/* Two neighbours of memory, whatever they are there. */
-typedef struct {
-    int32_t first, second;
-} __attribute__((may_alias)) fx_arch_two_t;
-
 #ifdef __ARM_FEATURE_DSP
 /* GCOVR_EXCL_START: instructions of the Cortex-M4, which tests/target/test_fx.py compares with the other half. */
 
 #include <arm_acle.h>
-
-typedef int64_t fx_arch_double_word_t __attribute__((may_alias, aligned(4)));
-
-/* The compiler would load the two one by one, as each is needed. Uv: it may add a constant that fits LDRD. */
-static inline fx_arch_two_t fx_arch_load_two(const int32_t *from)
-{
-    fx_arch_two_t y;
-    __asm__("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const fx_arch_double_word_t *)from));
-    return y;
-}
 
 static inline int32_t fx_arch_qadd(int32_t a, int32_t b)
 {

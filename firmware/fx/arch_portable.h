@@ -15,11 +15,6 @@ static inline int32_t fx_arch_clip32(int64_t x)
     return (int32_t)((low > INT32_MAX) ? INT32_MAX : low);
 }
 
-static inline fx_arch_two_t fx_arch_load_two(const int32_t *from)
-{
-    return *(const fx_arch_two_t *)from;
-}
-
 static inline int32_t fx_arch_qadd(int32_t a, int32_t b)
 {
     return fx_arch_clip32((int64_t)a + b);

@@ -11,24 +11,6 @@ q15_t fx_div_q15(q15_t num, q15_t den)
     return fx_sat_q15((((int32_t)num * 32768) + ((num < 0) ? -half : half)) / den);
 }
 
-/* One base-2^16 digit of rem * 2^16 / d, for d >= 2^31 and rem < d. The estimate from d's upper
- * half is at most 2 too large (FX-11). Leaves the next remainder in *rem. */
-static inline uint32_t next_digit(uint32_t *rem, uint32_t d)
-{
-    const uint32_t d_high = d >> 16;
-    const uint32_t d_low = d & 0xFFFFU;
-    uint32_t digit = *rem / d_high;
-    uint32_t left = *rem - (digit * d_high);
-    for (unsigned i = 0U; i < 2U; i++) {
-        if ((left <= 0xFFFFU) && ((digit * d_low) > (left << 16))) {
-            digit--;
-            left += d_high;
-        }
-    }
-    *rem = (left << 16) - (digit * d_low);
-    return digit;
-}
-
 q31_t fx_div_q31(int32_t num, int32_t den)
 {
     const uint32_t n = (num < 0) ? (0U - (uint32_t)num) : (uint32_t)num;
@@ -39,10 +21,21 @@ q31_t fx_div_q31(int32_t num, int32_t den)
     }
     /* n < d keeps its order under the common shift; n / d * 2^32 is halved when rounded. */
     const unsigned shift = (unsigned)__builtin_clz(d);
-    const uint32_t divisor = d << shift;
-    uint32_t rem = n << shift;
-    uint32_t quotient = next_digit(&rem, divisor) << 16;
-    quotient += next_digit(&rem, divisor);
+    const uint32_t d_high = (d << shift) >> 16;
+    const uint32_t d_low = (d << shift) & 0xFFFFU;
+    uint32_t remainder = n << shift;
+    uint32_t quotient = 0U;
+    /* Two digits of base 2^16. The estimate from the divisor's upper half is at most 2 too large (FX-11). */
+    for (unsigned k = 0U; k < 2U; k++) {
+        uint32_t digit = remainder / d_high;
+        uint32_t left = remainder - (digit * d_high);
+        while ((left <= 0xFFFFU) && ((digit * d_low) > (left << 16))) {
+            digit--;
+            left += d_high;
+        }
+        remainder = (left << 16) - (digit * d_low);
+        quotient = (quotient << 16) + digit;
+    }
     /* At most 2^32 - 2, because n <= d - 1 and d <= 2^31. */
     const int32_t magnitude = (int32_t)((quotient + 1U) >> 1);
     return (sign != 0) ? -magnitude : magnitude;

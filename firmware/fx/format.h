@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "fx/arch.h"
+#include "fx/codegen.h"
 
 typedef int16_t q15_t;
 typedef int32_t q31_t;
@@ -89,8 +90,19 @@ static inline q15_t fx_neg_q15(q15_t a)
 
 static inline q15_t fx_abs_q15(q15_t a)
 {
-    const int32_t x = fx_arch_opaque(a); /* else the compiler would take the magnitude in 16 bits, and extend it */
+    const int32_t x = fx_in_register(a); /* otherwise the magnitude is computed in 16 bits and then extended */
     return fx_sat_q15((x < 0) ? -x : x);
+}
+
+/* Modulo 2^32, without undefined behaviour. */
+static inline int32_t fx_add_wrap(int32_t a, int32_t b)
+{
+    return fx_arch_add_wrap(a, b);
+}
+
+static inline int32_t fx_sub_wrap(int32_t a, int32_t b)
+{
+    return fx_arch_sub_wrap(a, b);
 }
 
 static inline q31_t fx_add_q31(q31_t a, q31_t b)

@@ -138,16 +138,13 @@ static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
 /* fx_cell() of a q15 x and |y|, without its flag; inside the grid nothing needs to be limited. */
 static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t y)
 {
-    const fx_arch_two_t origin = fx_arch_load_two(&mesh->x0);
-    const fx_arch_two_t last = fx_arch_load_two((const int32_t *)&mesh->x_last);
-    const uint32_t x_last = (uint32_t)last.first;
-    uint32_t px = (uint32_t)(x - origin.first) << origin.second;
-    uint32_t py = y << origin.second;
-    if (__builtin_expect(px > x_last, 0)) { /* a negative one is very large */
-        px = (x < mesh->x0) ? 0U : x_last;
+    uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
+    uint32_t py = y << mesh->up;
+    if (__builtin_expect(px > mesh->x_last, 0)) { /* a negative one is very large */
+        px = (x < mesh->x0) ? 0U : mesh->x_last;
     }
-    if (__builtin_expect(py > (uint32_t)last.second, 0)) {
-        py = (uint32_t)fx_arch_opaque(last.second); /* a branch: nothing in every other period */
+    if (__builtin_expect(py > mesh->y_last, 0)) {
+        py = mesh->y_last;
     }
     return fx_cell_at(px, py, mesh->ny);
 }

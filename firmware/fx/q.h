@@ -78,7 +78,8 @@ static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
 /* Q16 * Q31 = Q47 -> Q31. */
 q31_t fx_mul_gain_q31(q16_t gain, q31_t x);
 
-static inline fx_pair_t fx_pair(q15_t lo, q15_t hi)
+/* Of the lower halves of two words, whatever their upper halves hold. */
+static inline fx_pair_t fx_pair(int32_t lo, int32_t hi)
 {
     return fx_arch_pkhbt(lo, hi);
 }

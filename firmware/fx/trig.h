@@ -28,7 +28,6 @@ static inline fx_sincos_t fx_sincos(uint16_t angle)
 {
     const uint32_t a = angle;
     const fx_point_t *point = &fx_sin_table[((a + 64U) >> 7) & 511U];
-    __asm__("" : "+r"(point));
     const int32_t sin0 = point->sin;
     const int32_t cos0 = point->cos;
     /* The signed low 7 bits, -64..63, times 2 pi / 2^16 in Q32. */
@@ -43,12 +42,15 @@ static inline fx_sincos_t fx_sincos(uint16_t angle)
 static inline fx_pair_t fx_rotation(uint32_t turn)
 {
     const fx_point_t *point = &fx_sin_table[(turn + (1U << 22)) >> 23];
-    __asm__("" : "+r"(point)); /* the address once, not as an index for each */
+    FX_ADDRESS_ONCE(point);
     const int32_t sin0 = point->sin;
     const int32_t cos0 = point->cos;
     /* The signed low 23 bits, as a fraction of 2^32, times 2 pi / 2^9 in Q32. */
     const int32_t delta = fx_mulhi((int32_t)(turn << 9), 52707179);
     return fx_arch_pkhtb(fx_mulhi_add(sin0, cos0, delta), fx_mulhi_sub(cos0, sin0, delta));
 }
+
+/* The same as a call: no interrupt needs it, and several copies would take more memory. */
+fx_pair_t fx_unit_vector(uint32_t turn);
 
 #endif

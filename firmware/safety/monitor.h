@@ -19,7 +19,7 @@
 /* Why monitor_step() must be called although the sample is normal. */
 enum { MONITOR_COUNTING = 1, MONITOR_ANGLE_JUMP = 2 };
 
-/** q15 in a word each unless the name says otherwise. monitor_is_sample_normal() loads the first four in pairs. */
+/** q15 in a word each unless the name says otherwise. */
 typedef struct {
     int32_t i_normal_squared_q30; /* (i_trip - sum_max/3)^2: no phase of a shorter vector exceeds i_trip */
     int32_t zero_max;             /* a third of sum_max */
@@ -42,17 +42,14 @@ typedef struct {
  * current is its projection of the vector plus a third of the phases' sum, so |i_x| <= |i| + |sum|/3. */
 static inline bool monitor_is_sample_normal(const monitor_config_t *config, fx_pair_t i, int32_t zero_q28, int32_t v_dc)
 {
-    const fx_arch_two_t current = fx_arch_load_two(&config->i_normal_squared_q30);
-    const uint32_t zero_max = (uint32_t)current.second;
-    const fx_arch_two_t v = fx_arch_load_two(&config->v_min);
-    return (uint32_t)fx_dot2(i, i) < (uint32_t)current.first && (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max &&
-           v_dc >= v.first && v_dc <= v.second;
+    const uint32_t zero_max = (uint32_t)config->zero_max;
+    return (uint32_t)fx_dot2(i, i) < (uint32_t)config->i_normal_squared_q30 &&
+           (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max && v_dc >= config->v_min && v_dc <= config->v_max;
 }
 
 /** The angle has jumped: monitor_step() must be called in this period. */
 static inline void monitor_report_angle_jump(monitor_state_t *state)
 {
-    __asm__ volatile(""); /* keeps a branch: without it the compiler computes the new value in every period */
     state->pending |= MONITOR_ANGLE_JUMP;
 }
 

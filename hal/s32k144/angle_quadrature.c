@@ -13,7 +13,7 @@
 static struct {
     int32_t at_last;      /* reading of the period before */
     int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
-} encoder;                /* adjacent, so that one instruction reads both */
+} encoder;
 
 void angle_init(uint32_t period_ticks)
 {
@@ -46,10 +46,9 @@ bool angle_fault(void)
  * negative. */
 uint32_t hal_angle_read(void)
 {
-    const fx_arch_two_t last = fx_arch_load_two(&encoder.at_last);
     const uint32_t now = FTM2->CNT << TURN_SHIFT;
-    const int32_t passed = (int32_t)(FTM0->CNT * (uint32_t)last.second);
-    const int32_t travel = (int32_t)(now - (uint32_t)last.first);
+    const int32_t passed = (int32_t)(FTM0->CNT * (uint32_t)encoder.q32_per_tick);
+    const int32_t travel = (int32_t)(now - (uint32_t)encoder.at_last);
     encoder.at_last = (int32_t)now;
     return now - (uint32_t)fx_mulhi(travel, passed);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/can.h"
 
+#include "fx/codegen.h"
 #include "hal/can.h"
 #include "hal/s32k144/can_mailbox.h"
 #include "hal/s32k144/registers.h"
@@ -48,7 +49,7 @@ static void keep(const can_box_t *box)
         return;
     }
     queue[at % QUEUE] = can_box_unpack(box);
-    __asm__ volatile("" ::: "memory");
+    fx_compiler_barrier();
     put = at + 1U;
 }
 
@@ -83,7 +84,7 @@ bool hal_can_receive(can_frame_t *frame)
         return false;
     }
     *frame = queue[at % QUEUE];
-    __asm__ volatile("" ::: "memory");
+    fx_compiler_barrier();
     taken = at + 1U;
     return true;
 }

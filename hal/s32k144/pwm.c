@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/pwm.h"
 
-#include "fx/arch.h"
+#include "fx/codegen.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
@@ -144,7 +144,7 @@ static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_
     const uint32_t ticks = (duty * period + half) >> 15;
     uint32_t rise = (period - ticks) >> 1;
     if (__builtin_expect(ticks == 0U, 0)) {
-        rise = (uint32_t)fx_arch_opaque((int32_t)period); /* a branch, free in every other period */
+        rise = (uint32_t)fx_in_register((int32_t)period); /* a branch, free in every other period */
     }
     *from = rise;
     *to = rise + ticks;
@@ -153,9 +153,9 @@ static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_
 void hal_pwm_write(duty_t duty)
 {
     const uint32_t period = bridge.period;
-    const uint32_t half = (uint32_t)fx_arch_opaque(16384); /* in a register: part of the multiplication */
+    const uint32_t half = (uint32_t)fx_in_register(16384); /* in a register: part of the multiply-accumulate */
     ftm_t *timer = FTM0;
-    __asm__("" : "+r"(timer)); /* the address is loaded once, not for every pulse */
+    FX_ADDRESS_ONCE(timer);
     pulse(&timer->C0V, &timer->C1V, duty.a, period, half);
     pulse(&timer->C2V, &timer->C3V, duty.b, period, half);
     pulse(&timer->C4V, &timer->C5V, duty.c, period, half);

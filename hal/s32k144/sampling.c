@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/s32k144/sampling.h"
 
+#include "fx/codegen.h"
 #include "hal/adc.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/startup.h"
@@ -21,11 +22,6 @@ enum {
     FIRST = 0,
     SLOW = 2
 }; /* conversions that are started by a delay; each other one follows the end of the one before */
-
-typedef uint64_t double_word_t __attribute__((may_alias, aligned(4)));
-typedef struct {
-    uint32_t first, second;
-} results_t;
 
 static struct {
     uint32_t in_a_row;
@@ -89,31 +85,18 @@ void sampling_init(uint32_t period_ticks)
     chain(PDB1, ADC1_CONVERSIONS, period_ticks);
 }
 
-/* Two adjacent results, read by one instruction where the core has one. */
-static inline results_t read_two(const volatile uint32_t *from)
-{
-    results_t y;
-#if defined(__arm__)
-    __asm__ volatile("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const volatile double_word_t *)from));
-#else
-    y.first = from[0];
-    y.second = from[1];
-#endif
-    return y;
-}
-
 /* Reads all results of the sequence, also those of the slow channels, so that no pre-trigger stays locked. The slow
  * results stay in their registers for the 1 kHz task. */
 void hal_adc_read(adc_counts_t *counts)
 {
-    const results_t from_adc0 = read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
-    const results_t from_adc1 = read_two(&ADC1->R[I_B]);
-    (void)read_two(&ADC0->R[WINDING]);
+    const fx_two_words_t from_adc0 = fx_read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
+    const fx_two_words_t from_adc1 = fx_read_two(&ADC1->R[I_B]);
+    (void)fx_read_two(&ADC0->R[WINDING]);
     (void)ADC1->R[INVERTER];
-    counts->i_a = from_adc0.first;
-    counts->i_c = from_adc0.second;
-    counts->i_b = from_adc1.first;
-    counts->v_dc = from_adc1.second;
+    counts->i_a = (uint32_t)from_adc0.first;
+    counts->i_c = (uint32_t)from_adc0.second;
+    counts->i_b = (uint32_t)from_adc1.first;
+    counts->v_dc = (uint32_t)from_adc1.second;
 }
 
 /* Disabling the block releases its locks; reading the results lets every conversion complete again. The block then

@@ -197,6 +197,9 @@ def test_a_readme_with_another_order_than_the_table_is_found(tree: Path, text: s
         ("firmware/drive/bad.c", "\n" * 251, "at most 250"),
         ("hal/bad.h", "\n" * 61, "at most 60"),
         ("firmware/types/bad.h", "\n" * 81, "at most 80"),
+        ("firmware/drive/bad.c", '__asm__("" : "+r"(x));', "'__asm__' belongs into firmware/fx"),
+        ("firmware/safety/bad.c", '__asm__ volatile("");', "'__asm__' belongs into firmware/fx"),
+        ("hal/s32k144/bad.c", "x = fx_arch_qadd(a, b);", "'fx_arch_qadd' belongs into firmware/fx"),
     ],
 )
 def test_a_planted_breach_of_style_is_found(tree: Path, path: str, line: str, word: str) -> None:
@@ -206,6 +209,15 @@ def test_a_planted_breach_of_style_is_found(tree: Path, path: str, line: str, wo
     assert code == 1
     assert word in messages
     assert len(messages.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "line"),
+    [("firmware/fx/good.c", '__asm__("" : "+r"(x));'), ("hal/s32k144/good.c", '__asm__ volatile("nop");')],
+)
+def test_the_library_and_the_ports_may_name_instructions(tree: Path, path: str, line: str) -> None:
+    write(tree, path, line + "\n")
+    assert check("style", tree) == (0, "")
 
 
 @pytest.mark.parametrize("text", ["a diagnostic session", "an issue", "todo es posible"])

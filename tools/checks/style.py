@@ -54,6 +54,8 @@ FORBIDDEN = (
 )
 WORDS = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 CASED = re.compile(FORBIDDEN[0])
+# Compiler tricks and single instructions have names in firmware/fx, which say what they save (fx/codegen.h).
+TRICK = re.compile(r"\b(__asm__|asm|fx_arch_\w+)\b\s*(?:volatile\b|goto\b)?\s*\(")
 # Files that must spell out what they forbid.
 EXEMPT = {"tools/checks/style.py", "tests/tools/test_checks.py"}
 
@@ -94,6 +96,18 @@ def guard_problem(path: Path, text: list[str]) -> str | None:
     return None
 
 
+def hidden_trick(path: Path, line: str) -> str | None:
+    """An instruction by hand outside firmware/fx; a port needs some of its own, but none of the library's."""
+    if (
+        path.suffix not in {".c", ".h"}
+        or path.parts[0] not in {"firmware", "hal"}
+        or path.parts[:2] == ("firmware", "fx")
+    ):
+        return None
+    found = TRICK.search(line)
+    return found[1] if found and (path.parts[0] == "firmware" or found[1].startswith("fx_arch_")) else None
+
+
 def check_file(root: Path, path: Path) -> Iterator[Violation]:
     """Everything about one file."""
     text = lines(root, path)
@@ -109,6 +123,8 @@ def check_file(root: Path, path: Path) -> Iterator[Violation]:
     for number, line in enumerate(text, start=1):
         if word := forbidden_word(path, line):
             yield Violation(path, number, f"'{word}' does not belong here")
+        if trick := hidden_trick(path, line):
+            yield Violation(path, number, f"'{trick}' belongs into firmware/fx, behind a name that says what it does")
         if path.suffix in {".c", ".h", ".py"} and len(line) > MAX_COLUMNS:
             yield Violation(path, number, f"{len(line)} columns, at most {MAX_COLUMNS}")
 

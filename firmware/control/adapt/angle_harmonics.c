@@ -15,7 +15,7 @@ typedef struct {
 
 static __attribute__((noinline)) void cos_sin(int32_t *q31, uint32_t theta)
 {
-    const fx_pair_t at = fx_rotation(theta);
+    const fx_pair_t at = fx_unit_vector(theta);
     q31[0] = (int32_t)(at << 16);
     q31[1] = (int32_t)(at & 0xFFFF0000U);
 }

@@ -73,10 +73,8 @@ static void solve_knot(const commission_data_t *data, commission_curve_t *curve,
  * half and twice the current removes (CM-7). */
 static void smooth(commission_curve_t *curve)
 {
-    int32_t v[COMMISSION_LEVELS];
-    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
-        v[k] = curve->v[k];
-    }
+    const commission_curve_t before = *curve;
+    const int32_t *v = before.v;
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
         const int32_t lower = (k >= 2U) ? v[k - 2U] : v[k + 2U];
         const int32_t upper = (k + 2U < COMMISSION_LEVELS) ? v[k + 2U] : v[k - 2U];

@@ -38,10 +38,10 @@ __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *c
 angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
-    const fx_arch_two_t before = fx_arch_load_two((const int32_t *)&state->predicted);
+    const fx_two_words_t before = FX_LOAD_TWO(state, predicted, omega_q30);
     const uint32_t predicted = (uint32_t)before.first;
     const int32_t error = (int32_t)(theta_e - predicted);
-    const fx_arch_two_t gains = fx_arch_load_two(&config->kp); /* and ki_q29 */
+    const fx_two_words_t gains = FX_LOAD_TWO(config, kp, ki_q29);
     /* Turns in Q32 * Q29 = Q29, counted twice. */
     const int32_t omega_q30 = fx_add2_q31(before.second, fx_mulhi(gains.second, error));
     const bool jumped = (uint32_t)error + config->max_step > 2U * config->max_step;

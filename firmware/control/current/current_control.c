@@ -55,15 +55,13 @@ static int32_t reciprocal_v_max(const current_control_config_t *config, int32_t 
 /* Clamps to [-limit - 1, limit]. The magnitude is the ones' complement, so that one comparison is enough. */
 static int32_t clamp_symmetric(int32_t x, int32_t limit)
 {
-    return fx_min_s32(x ^ (x >> 31), limit) ^ (fx_arch_opaque(x) >> 31);
+    return fx_min_s32(x ^ (x >> 31), limit) ^ (x >> 31);
 }
 
 /* Largest voltage of one axis inside the unit circle, given the other axis' voltage; at least a quarter (CC-11). */
 static int32_t remaining_voltage(int32_t other)
 {
-    const uint16_t *table = fx_circle_table;
-    __asm__("" : "+r"(table)); /* otherwise computed from the address of another table */
-    return table[(other ^ (other >> 31)) >> 7];
+    return fx_circle_table[(other ^ (other >> 31)) >> 7];
 }
 
 /* While the d flux is to fall, the d axis has priority, and its excess is subtracted from q (CC-14). While the d flux
@@ -92,10 +90,10 @@ current_control_out_t current_control_step(const current_control_config_t *confi
 {
     const dq_q15_t psi = {in->flux->psi_d, in->flux->psi_q};
     const current_target_t to = *in->target;
-    const fx_arch_two_t slow = fx_arch_load_two(&state->s_d_q30);
-    const current_control_state_t s = {slow.first, slow.second};
+    const fx_two_words_t integrators = FX_LOAD_TWO(state, s_d_q30, s_q_q30);
+    const current_control_state_t s = {integrators.first, integrators.second};
     const int32_t error_d = to.psi.d - psi.d;
-    const int32_t omega = fx_arch_opaque(in->omega >> 16);
+    const int32_t omega = fx_in_register(in->omega >> 16);
     const int32_t psi_d = fx_sat_q15_word(psi.d + in->psi_delta);
     /* |s| <= 1 and |w psi| <= 1: at most 2^31 - 1. */
     const dq_q22_t u_q22 = {unlimited_voltage(config->sigma_q24, to.weighted.d, psi.d, s.s_d_q30 - omega * psi.q),
@@ -107,7 +105,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
     const int32_t per_v_max_q25 = reciprocal_v_max(config, in->v_dc);
     /* Q25 * Q22 = Q15, below 2^30. */
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
-    const fx_pair_t v_pair = fx_arch_pkhbt(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
+    const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));
     if (__builtin_expect((uint32_t)fx_dot2(v_pair, v_pair) < config->clear_q30, 1)) {
         *state = next;
         return (current_control_out_t){.u = u, .v = v_pair, .clear = true};
@@ -119,7 +117,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
                                        anti_windup(next.s_q_q30, gain_q33, change.q)};
     return (current_control_out_t){
         .u = u,
-        .v = fx_arch_pkhbt(limited.d, limited.q),
+        .v = fx_pair(limited.d, limited.q),
         .limited = (uint32_t)(change.d | change.q),
     };
 }

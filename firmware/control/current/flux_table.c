@@ -27,16 +27,15 @@ static fx_cell_t cell_of(const flux_table_config_t *config, dq_q15_t i)
     return fx_mesh_cell(&config->mesh, i.d, (uint32_t)((i.q < 0) ? -i.q : i.q));
 }
 
-/* l in Q29 times i 2^(3 + l_shift), high word: Q15. fx_arch_opaque() finishes one table before the next is begun, so
- * that no intermediate result is spilled to the stack. */
+/* l in Q29 times i 2^(3 + l_shift), high word: Q15. */
 flux_point_t flux_table_step(const flux_table_config_t *config, dq_q15_t i)
 {
     const fx_cell_t cell = cell_of(config, i);
     const uint32_t ny = config->mesh.ny;
-    const int32_t psi_f0 = fx_arch_opaque(fx_cell_interp_y(config->psi_f0, cell));
-    const int32_t g = fx_arch_opaque(fx_cell_interp(config->g, ny, cell));
+    const int32_t psi_f0 = fx_cell_interp_y(config->psi_f0, cell);
+    const int32_t g = fx_cell_interp(config->g, ny, cell);
     const int32_t i_scale = config->i_scale;
-    const int32_t psi_d = fx_arch_opaque(fx_mulhi_add(psi_f0, fx_cell_sum(config->l_d, ny, cell), i.d * i_scale));
+    const int32_t psi_d = fx_mulhi_add(psi_f0, fx_cell_sum(config->l_d, ny, cell), i.d * i_scale);
     const int32_t psi_q = fx_mulhi(fx_cell_sum(config->l_q, ny, cell), i.q * i_scale);
     return (flux_point_t){
         .psi_d = fx_sat_q15_word(psi_d),

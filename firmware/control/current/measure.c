@@ -19,11 +19,11 @@ measure_t measure_step(const measure_config_t *config, const adc_counts_t *count
     const int32_t a = line(&config->phase[0], counts->i_a);
     const int32_t minus_b = line(&config->phase[1], counts->i_b);
     const int32_t minus_c = line(&config->phase[2], counts->i_c);
-    const int32_t minus_others = fx_arch_add_wrap(minus_b, minus_c);
+    const int32_t minus_others = fx_add_wrap(minus_b, minus_c);
     return (measure_t){
         .i = {fx_sat_q15_word((int32_t)((uint32_t)minus_others + 2U * (uint32_t)a) >> 13),
-              fx_sat_q15_word(fx_mulhi(fx_arch_sub_wrap(minus_c, minus_b), ROOT_THREE_Q19))}, /* Q28 * Q19 = Q15 */
-        .zero_q28 = fx_arch_sub_wrap(a, minus_others),
+              fx_sat_q15_word(fx_mulhi(fx_sub_wrap(minus_c, minus_b), ROOT_THREE_Q19))}, /* Q28 * Q19 = Q15 */
+        .zero_q28 = fx_sub_wrap(a, minus_others),
         .v_dc = fx_usat_q15_word(line(&config->v_dc, counts->v_dc) >> 15),
     };
 }
@@ -31,7 +31,7 @@ measure_t measure_step(const measure_config_t *config, const adc_counts_t *count
 abc_q15_t measure_phases(fx_pair_t i_ab, int32_t zero_q28)
 {
     const ab_q15_t i = {(int16_t)(i_ab & 0xFFFFU), (int16_t)(i_ab >> 16)};
-    const int32_t zero = fx_arch_add_wrap(zero_q28, QUARTER_LSB_Q28) >> 13; /* rounds with the quarter LSB of phase a */
+    const int32_t zero = fx_add_wrap(zero_q28, QUARTER_LSB_Q28) >> 13; /* rounds with the quarter LSB of phase a */
     const int32_t side = fx_mulhi(i.beta * 65536, Q16(0.86602540378443865)); /* Q31 * Q16 = Q15 */
     const int32_t half = i.alpha >> 1;
     return (abc_q15_t){fx_sat_q15_word(i.alpha + zero), fx_sat_q15_word(zero - half + side),

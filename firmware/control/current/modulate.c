@@ -11,7 +11,7 @@ static abc_q29_t phases(const modulate_config_t *config, fx_pair_t v, fx_pair_t 
 {
     int32_t alpha_q31 = config->alpha_q31;
     int32_t side_q31 = config->side_q31;
-    fx_arch_together(&alpha_q31, &side_q31);
+    fx_both_loaded(&alpha_q31, &side_q31);
     const int32_t a = fx_mulhi(alpha_q31, fx_difference2(v, at));
     const int32_t side = fx_mulhi(side_q31, fx_dot2_cross(v, at));
     const int32_t b = side - (a >> 1);
@@ -30,7 +30,7 @@ static int32_t middle(abc_q29_t x)
 /* Distance of a phase's duty from one half, Q31. May wrap; adding half a duty then wraps it back. */
 static int32_t phase_q31(int32_t common_q31, int32_t x_q29, int32_t dead_time_q16, int32_t sign)
 {
-    const int32_t level = fx_arch_opaque((int32_t)((uint32_t)common_q31 + (uint32_t)(dead_time_q16 * sign)));
+    const int32_t level = fx_in_register((int32_t)((uint32_t)common_q31 + (uint32_t)(dead_time_q16 * sign)));
     return (int32_t)((uint32_t)level + 4U * (uint32_t)x_q29);
 }
 
@@ -50,7 +50,7 @@ static uint32_t limit_pulse(pulse_limits_t limits, int32_t x_q31, uint32_t *limi
     }
     *limited = 1U;
     const int32_t possible = (distance < limits.nearer_rail) ? limits.longest : HALF_Q31;
-    return ((uint32_t)(possible ^ (fx_arch_opaque(x_q31) >> 31)) + (uint32_t)limits.middle) >> 16;
+    return ((uint32_t)(possible ^ (fx_in_register(x_q31) >> 31)) + (uint32_t)limits.middle) >> 16;
 }
 
 modulate_out_t modulate_step(const modulate_config_t *config, fx_pair_t v, fx_pair_t i, fx_pair_t advanced)
@@ -59,8 +59,7 @@ modulate_out_t modulate_step(const modulate_config_t *config, fx_pair_t v, fx_pa
     const abc_q15_t sign = polarity(config, i, advanced);
     const int32_t shift = 2 * middle(x);
     const int32_t dead_time = config->dead_time_q16;
-    const fx_arch_two_t pair = fx_arch_load_two(&config->longest_q31); /* and nearer_rail_q31 */
-    const pulse_limits_t limits = {pair.first, pair.second, fx_arch_opaque(HALF_Q31 + ROUND_Q31)};
+    const pulse_limits_t limits = {config->longest_q31, config->nearer_rail_q31, fx_in_register(HALF_Q31 + ROUND_Q31)};
     uint32_t limited = 0;
     const uint32_t a = limit_pulse(limits, phase_q31(shift, x.a, dead_time, sign.a), &limited);
     const uint32_t b = limit_pulse(limits, phase_q31(shift, x.b, dead_time, sign.b), &limited);
@@ -72,7 +71,7 @@ duty_t modulate_clear(const modulate_config_t *config, fx_pair_t v, fx_pair_t i,
 {
     const abc_q29_t x = phases(config, v, advanced);
     const abc_q15_t sign = polarity(config, i, advanced);
-    const int32_t common = fx_arch_opaque(HALF_Q31 + ROUND_Q31) + 2 * middle(x);
+    const int32_t common = fx_in_register(HALF_Q31 + ROUND_Q31) + 2 * middle(x);
     const int32_t dead_time = config->dead_time_q16;
     return (duty_t){(uint32_t)phase_q31(common, x.a, dead_time, sign.a) >> 16,
                     (uint32_t)phase_q31(common, x.b, dead_time, sign.b) >> 16,

@@ -20,7 +20,7 @@ static inline abc_q15_t polarity(const modulate_config_t *config, fx_pair_t i, f
     const ab_q30_t x = {fx_difference2(i, at), fx_dot2_cross(i, at)};
     int32_t knee_q17 = config->knee_q17;
     int32_t knee_side_q17 = config->knee_side_q17;
-    fx_arch_together(&knee_q17, &knee_side_q17);
+    fx_both_loaded(&knee_q17, &knee_side_q17);
     const int32_t a = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
     const int32_t side = fx_mulhi(knee_side_q17, x.beta);
     const int32_t b = side - (a >> 1);

@@ -28,12 +28,12 @@ static inline dq_q15_t park_pair(fx_pair_t v, fx_pair_t at)
 
 static inline dq_q15_t park(ab_q15_t x, fx_pair_t at)
 {
-    return park_pair(fx_arch_pkhbt(x.alpha, x.beta), at);
+    return park_pair(fx_pair(x.alpha, x.beta), at);
 }
 
 static inline ab_q30_t inverse_park_q30(dq_q15_t x, fx_pair_t at)
 {
-    const fx_pair_t v = fx_arch_pkhbt(x.d, x.q);
+    const fx_pair_t v = fx_pair(x.d, x.q);
     return (ab_q30_t){fx_difference2(v, at), fx_dot2_cross(v, at)};
 }
 

@@ -40,10 +40,12 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
     const int32_t level = fx_add_q31(config->noise_voltage_q30,
                                      fx_add_q31(identify_mul(fx_abs_q31(point->omega / 2), config->noise_flux_q30),
                                                 identify_mul(change, config->noise_rate_q30)));
-    return fx_sat_q31(level + (((int64_t)level * point->limited * config->limited_noise) >> 16));
+    const int32_t share = point->limited * config->limited_noise; /* Q16: up to 40 periods of 5/N */
+    return fx_sat_q31(level + (((int64_t)level * share) >> 16));
 }
 
-static void average_row(jacobian_row_t *mean, const jacobian_row_t *row)
+/* Not inlined: two calls take less memory than two copies. */
+static __attribute__((noinline)) void average_row(jacobian_row_t *mean, const jacobian_row_t *row)
 {
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         mean->h_q30[j] = fx_mulhi_add(mean->h_q30[j], row->h_q30[j], PER_STEP);
@@ -55,22 +57,22 @@ static void average_step(const identify_config_t *config, identify_state_t *stat
 {
     const bool step_valid = in->point->valid && model->current && in->enabled;
     state->update_valid = (state->update_valid || state->steps == 0U) && step_valid;
-    average_row(&state->mean_d, &model->d);
-    average_row(&state->mean_q, &model->q);
-    state->mean_e.d = fx_mulhi_add(state->mean_e.d, e.d, PER_STEP);
-    state->mean_e.q = fx_mulhi_add(state->mean_e.q, e.q, PER_STEP);
-    state->mean_noise_q30 = fx_mulhi_add(state->mean_noise_q30, measurement_noise(config, in->point), PER_STEP);
+    average_row(&state->mean.d, &model->d);
+    average_row(&state->mean.q, &model->q);
+    state->mean.e.d = fx_mulhi_add(state->mean.e.d, e.d, PER_STEP);
+    state->mean.e.q = fx_mulhi_add(state->mean.e.q, e.q, PER_STEP);
+    state->mean.noise_q30 = fx_mulhi_add(state->mean.noise_q30, measurement_noise(config, in->point), PER_STEP);
     state->steps++;
 }
 
 /* The measurements of both axes, one after the other: the second innovation takes the first update into account. */
 static void update_parameters(const identify_config_t *config, identify_state_t *state)
 {
-    const int64_t r = (int64_t)state->mean_noise_q30 * state->mean_noise_q30;
-    const int32_t output_before = kalman_output(&state->kalman, &state->mean_q);
-    const kalman_update_t d = kalman_update(&state->kalman, &state->mean_d, state->mean_e.d, r);
-    const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean_q), output_before);
-    const kalman_update_t q = kalman_update(&state->kalman, &state->mean_q, fx_sub_q31(state->mean_e.q, change), r);
+    const int64_t r = (int64_t)state->mean.noise_q30 * state->mean.noise_q30;
+    const int32_t output_before = kalman_output(&state->kalman, &state->mean.q);
+    const kalman_update_t d = kalman_update(&state->kalman, &state->mean.d, state->mean.e.d, r);
+    const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean.q), output_before);
+    const kalman_update_t q = kalman_update(&state->kalman, &state->mean.q, fx_sub_q31(state->mean.e.q, change), r);
     state->clamped = d.clamped || q.clamped;
     const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->clamped) ? Q15_MAX : 0;
     const q15_t error = fx_sat_q15(target - state->mismatch_share);
@@ -110,10 +112,7 @@ static void kalman_step(const identify_config_t *config, identify_state_t *state
     }
     kalman_predict(config, &state->kalman, state->r_known);
     update_confidence(config, state, model, torque);
-    state->mean_d = (jacobian_row_t){{0}};
-    state->mean_q = (jacobian_row_t){{0}};
-    state->mean_e = (dq_q30_t){0, 0};
-    state->mean_noise_q30 = 0;
+    state->mean = (identify_mean_t){.noise_q30 = 0};
     state->steps = 0;
 }
 

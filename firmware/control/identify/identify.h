@@ -17,10 +17,15 @@
 
 #define IDENTIFY_STEPS 10 /* per update */
 
+/** Means over the steps of one update. */
 typedef struct {
-    jacobian_row_t mean_d, mean_q; /* over the steps of one update */
-    dq_q30_t mean_e;
-    int32_t mean_noise_q30; /* standard deviation of the measurement noise */
+    jacobian_row_t d, q;
+    dq_q30_t e;        /* predicted residual */
+    int32_t noise_q30; /* standard deviation of the measurement noise */
+} identify_mean_t;
+
+typedef struct {
+    identify_mean_t mean;
     uint8_t steps;
     bool update_valid; /* every step of this update so far was valid */
     bool clamped;      /* a state reached its limit in the last update */
@@ -31,8 +36,10 @@ typedef struct {
     int32_t torque_variance_q30; /* at the last update */
     q15_t confidence;
     bool torque_certain; /* the confidence rises, else it falls */
-    kalman_t kalman;     /* last: the fields before it are then in reach of 16-bit load instructions */
+    kalman_t kalman;     /* last, because it is large */
 } identify_state_t;
+
+FX_SHORT_LOADS_BEFORE(identify_state_t, kalman);
 
 typedef struct {
     const identify_point_t *point;

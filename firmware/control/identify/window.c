@@ -3,10 +3,10 @@
 
 static void add(dq_q15_t *sum, dq_q15_t x)
 {
-    const fx_arch_two_t s = fx_arch_load_two(&sum->d);
+    const fx_two_words_t s = FX_LOAD_TWO(sum, d, q);
     int32_t d = s.first + x.d;
     int32_t q = s.second + x.q;
-    fx_arch_together(&d, &q);
+    fx_both_loaded(&d, &q);
     *sum = (dq_q15_t){d, q};
 }
 

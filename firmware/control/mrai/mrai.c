@@ -52,15 +52,11 @@ static int32_t innovation(int32_t s2e_q27)
     return fx_sat_bits(s2e_q27, INNOVATION_BITS) * INNOVATION_SCALE;
 }
 
-/* One law: I -= step, clamped (MR-9, MR-10). limits: the lower and the upper one. */
-static q31_t adapt(q31_t integral, q31_t step, fx_arch_two_t limits)
+/* One law: I -= step, clamped (MR-9, MR-10). */
+static q31_t adapt(q31_t integral, q31_t step, q31_t min, q31_t max)
 {
     const q31_t moved = fx_sub_q31(integral, step);
-    if (__builtin_expect(moved < limits.first || moved > limits.second, 0)) {
-        return fx_arch_opaque(
-            fx_clamp_q31(moved, limits.first, limits.second)); /* a branch, free while no limit acts */
-    }
-    return moved;
+    return fx_clamp_q31(moved, min, max);
 }
 
 /* The parameter used in this step: integral part plus proportional part. Q31 * Q24 = Q23; limited to 1/2 pu, so that
@@ -74,7 +70,7 @@ static q31_t with_proportional_part(q31_t integral, q31_t step, int32_t proporti
 static q31_t adapt_flux(const mrai_config_t *config, int32_t step_q28, mrai_state_t *state, int32_t innovation_q)
 {
     const q31_t step = fx_mulhi(step_q28, innovation_q);
-    const q31_t moved = adapt(state->psi_delta, step, fx_arch_load_two(&config->psi_delta_min));
+    const q31_t moved = adapt(state->psi_delta, step, config->psi_delta_min, config->psi_delta_max);
     state->psi_delta = moved;
     return with_proportional_part(moved, step, config->flux_proportional_q24);
 }
@@ -86,7 +82,7 @@ static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mra
 {
     const int32_t power_q31 = fx_mulhi_add(fx_mulhi(innovation.d, i.d), innovation.q, i.q);
     const q31_t step = fx_sat_bits(fx_mulhi(step_q26, power_q31), 26) * 64;
-    const q31_t moved = adapt(state->r_delta, step, fx_arch_load_two(&config->r_delta_min));
+    const q31_t moved = adapt(state->r_delta, step, config->r_delta_min, config->r_delta_max);
     state->r_delta = moved;
     return with_proportional_part(moved, step, config->resistance_proportional_q24);
 }
@@ -94,8 +90,7 @@ static q31_t adapt_resistance(const mrai_config_t *config, int32_t step_q26, mra
 /* Current with the weight of each equation. */
 static dq_q28_t weighted(const dq_q15_t *i)
 {
-    const fx_arch_two_t read = fx_arch_load_two(&i->d);
-    return (dq_q28_t){read.first * (8192 * WEIGHT_D), read.second * 8192};
+    return (dq_q28_t){i->d * (8192 * WEIGHT_D), i->q * 8192};
 }
 
 /* One of the two terms of the trapezoidal mean of rotational and resistive voltage, as flux: T_s/2 (R^ i_d - w psi_q)
@@ -104,12 +99,10 @@ static dq_q28_t weighted(const dq_q15_t *i)
 static dq_q27_t half_voltage(const mrai_config_t *config, const operating_point_t *in, dq_q28_t i, q31_t psi_used,
                              q31_t r_used, dq_q15_t *psi)
 {
-    const fx_arch_two_t r0_period = fx_arch_load_two(&config->r0);
-    const int32_t drop_q30 = fx_mulhi(fx_add_q31(r0_period.first, r_used), r0_period.second);
+    const int32_t drop_q30 = fx_mulhi(fx_add_q31(config->r0, r_used), config->period);
     const dq_q27_t drop = {fx_mulhi(drop_q30, i.d), fx_mulhi(drop_q30, i.q)};
-    const int32_t rotation_q30 = fx_mulhi(in->omega, r0_period.second);
-    const fx_arch_two_t table = fx_arch_load_two(&in->flux.psi_d);
-    *psi = (dq_q15_t){table.first, table.second};
+    const int32_t rotation_q30 = fx_mulhi(in->omega, config->period);
+    *psi = (dq_q15_t){in->flux.psi_d, in->flux.psi_q};
     const int32_t psi_d_q28 = psi->d * 8192 + (psi_used >> 3);
     return (dq_q27_t){fx_mulhi_sub(drop.d, rotation_q30, psi->q * (8192 * WEIGHT_D)),
                       fx_mulhi_add(drop.q, rotation_q30, psi_d_q28)};
@@ -121,18 +114,15 @@ static void begin_period(const mrai_schedule_t *schedule, mrai_state_t *state, c
 {
     state->e_d_q27 = e.d;
     state->e_q_q27 = e.q;
-    const fx_arch_two_t voltage_gain_q28 = fx_arch_load_two(&schedule->minus_voltage_d_q28);
-    const fx_arch_two_t u_q15 = fx_arch_load_two(&u->d);
-    const int32_t predicted_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, voltage_gain_q28.first,
-                                             u_q15.first * 65536);
-    const int32_t predicted_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, voltage_gain_q28.second,
-                                             u_q15.second * 65536);
+    const int32_t predicted_d = fx_mulhi_add(e.d - psi.d * (4096 * WEIGHT_D) + half.d, schedule->minus_voltage_d_q28,
+                                             u->d * 65536);
+    const int32_t predicted_q = fx_mulhi_add(e.q - psi.q * 4096 + half.q, schedule->minus_voltage_q28, u->q * 65536);
     state->predicted_d_q27 = predicted_d;
     state->predicted_q_q27 = predicted_q;
 }
 
-void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
-                const operating_point_t *in)
+__attribute__((cold)) void mrai_reset(const mrai_config_t *config, const mrai_schedule_t *schedule, mrai_state_t *state,
+                                      const operating_point_t *in)
 {
     dq_q15_t psi;
     const dq_q27_t half = half_voltage(config, in, weighted(&in->i), state->psi_delta, state->r_delta, &psi);
@@ -146,8 +136,7 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
 {
     /* (MR-7): 4 s2 in Q30, which is s2 in Q32, below 1/4. */
     const int32_t s2_q32 = fx_mul_q31_word(config->pole_gain, in->flux.g);
-    const fx_arch_two_t last = fx_arch_load_two(&state->e_d_q27);
-    const dq_q27_t s2e = {fx_mulhi(s2_q32, last.first), fx_mulhi(s2_q32, last.second)};
+    const dq_q27_t s2e = {fx_mulhi(s2_q32, state->e_d_q27), fx_mulhi(s2_q32, state->e_q_q27)};
     const int32_t innovation_q = innovation(s2e.q);
     const q31_t psi_used = adapt_flux(config, schedule->flux_step_q28, state, innovation_q);
     const dq_q35_t innovations = {innovation(s2e.d), innovation_q};
@@ -155,8 +144,7 @@ void mrai_step(const mrai_config_t *config, const mrai_schedule_t *schedule, mra
     const q31_t r_used = adapt_resistance(config, schedule->resistance_step_q26, state, i, innovations);
     dq_q15_t psi;
     const dq_q27_t half = half_voltage(config, in, i, psi_used, r_used, &psi);
-    const fx_arch_two_t predicted = fx_arch_load_two(&state->predicted_d_q27);
-    const dq_q27_t e = {predicted.first - s2e.d + s2e.q, predicted.second - s2e.d - s2e.q};
+    const dq_q27_t e = {state->predicted_d_q27 - s2e.d + s2e.q, state->predicted_q_q27 - s2e.d - s2e.q};
     const dq_q27_t now = {fx_sat_bits(e.d + psi.d * (4096 * WEIGHT_D) + half.d, ERROR_BITS),
                           fx_sat_bits(e.q + psi.q * 4096 + half.q, ERROR_BITS)};
     begin_period(schedule, state, &in->u, psi, now, half);

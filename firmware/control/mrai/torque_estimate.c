@@ -9,16 +9,11 @@
 
 void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_t *flux, int32_t psi_delta)
 {
-    const fx_arch_two_t current = fx_arch_load_two(&i->d);
-    const fx_arch_two_t psi = fx_arch_load_two(&flux->psi_d);
-    const fx_arch_two_t before = fx_arch_load_two(&sum->sum_q24);
-    const int32_t psi_d = fx_sat_q15_word(psi.first + psi_delta);
+    const int32_t psi_d = fx_sat_q15_word(flux->psi_d + psi_delta);
     /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, but nothing below -2^30 + 2^15 is subtracted from it. */
-    const int32_t t_q30 = psi_d * current.second - psi.second * current.first;
-    int32_t sum_q24 = fx_arch_add_wrap(before.first, t_q30 >> 6);
-    int32_t count = fx_arch_add_wrap(before.second, 1);
-    fx_arch_together(&sum_q24, &count);
-    *sum = (torque_sum_t){sum_q24, count};
+    const int32_t t_q30 = psi_d * i->q - flux->psi_q * i->d;
+    sum->sum_q24 = fx_add_wrap(sum->sum_q24, t_q30 >> 6);
+    sum->count = fx_add_wrap(sum->count, 1);
 }
 
 /* Rounded half up for either sign. Each term of the sum was truncated, by half an LSB of Q24 on average, which count/2
@@ -26,7 +21,7 @@ void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_
 __attribute__((cold)) q15_t torque_estimate_mean(torque_mean_t *state, const torque_sum_t *sum)
 {
     const uint32_t count = (uint32_t)sum->count - (uint32_t)state->last.count;
-    const int32_t total_q24 = fx_arch_sub_wrap(sum->sum_q24, state->last.sum_q24);
+    const int32_t total_q24 = fx_sub_wrap(sum->sum_q24, state->last.sum_q24);
     state->last = *sum;
     if (count - 1U < PERIODS_MAX) {
         const int32_t unit = (int32_t)count * Q24_PER_Q15;

@@ -48,7 +48,7 @@ static int32_t noise_with(int limited)
     point.limited = (uint8_t)limited;
     identify_reset(&c, &state);
     (void)identify_step(&c, &state, &in);
-    return state.mean_noise_q30;
+    return state.mean.noise_q30;
 }
 
 /* (ID-14): five times more if every period of the window has them, whatever their number; rounding of a tenth. */

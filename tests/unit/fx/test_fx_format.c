@@ -151,6 +151,8 @@ static void q31_pair(int32_t a, int32_t b)
     expect_equal("fx_sub_q31", a, b, fx_sub_q31(a, b), (int64_t)difference);
     const long double twice = clip((long double)b + b, INT32_MIN, INT32_MAX);
     expect_equal("fx_add2_q31", a, b, fx_add2_q31(a, b), (int64_t)clip(a + twice, INT32_MIN, INT32_MAX));
+    expect_equal("fx_add_wrap", a, b, fx_add_wrap(a, b), (int32_t)((uint32_t)a + (uint32_t)b));
+    expect_equal("fx_sub_wrap", a, b, fx_sub_wrap(a, b), (int32_t)((uint32_t)a - (uint32_t)b));
     expect_equal("fx_min_s32", a, b, fx_min_s32(a, b), (int64_t)fminl(a, b));
     expect_equal("fx_max_s32", a, b, fx_max_s32(a, b), (int64_t)fmaxl(a, b));
 }
@@ -164,6 +166,33 @@ void test_q31_sums_and_extremes_agree_with_long_double(void)
     }
     for (int32_t i = 0; i < 1000000; i++) {
         q31_pair(random_s32(), random_s32());
+    }
+}
+
+/* What chooses the instruction must not touch the value. */
+static void words_unchanged(int32_t a, int32_t b)
+{
+    const struct {
+        int32_t before, a, b, after;
+    } at = {~a, a, b, ~b};
+    fx_two_words_t two = FX_LOAD_TWO(&at, a, b);
+    fx_both_loaded(&two.first, &two.second);
+    expect_equal("FX_LOAD_TWO, first", a, b, two.first, a);
+    expect_equal("FX_LOAD_TWO, second", a, b, two.second, b);
+    const int32_t pair[3] = {~a, a, b};
+    expect_equal("fx_load_two_words", a, b, fx_load_two_words(&pair[1]).second, b);
+    const volatile uint32_t registers[3] = {~(uint32_t)a, (uint32_t)a, (uint32_t)b};
+    expect_equal("fx_read_two, first", a, b, fx_read_two(&registers[1]).first, a);
+    expect_equal("fx_read_two, second", a, b, fx_read_two(&registers[1]).second, b);
+    expect_equal("fx_in_register", a, b, fx_in_register(a), a);
+}
+
+void test_words_pass_the_choice_of_instructions_unchanged(void)
+{
+    for (int32_t i = 0; i < CORNERS; i++) {
+        for (int32_t j = 0; j < CORNERS; j++) {
+            words_unchanged(corner[i], corner[j]);
+        }
     }
 }
 

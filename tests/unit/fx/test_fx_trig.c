@@ -41,6 +41,7 @@ void test_the_rotation_by_any_angle_of_32_bits_is_as_exact(void)
     for (int32_t n = 0; n < 400000; n++) {
         angle += 1999999973U;
         const uint32_t got = fx_rotation(angle);
+        expect_equal("fx_unit_vector", (int64_t)angle, 0, fx_unit_vector(angle), got);
         const long double radians = angle * TURN / 4294967296.0L;
         worst_note(&sine, ((int16_t)(got >> 16) / 32768.0L) - sinl(radians), (int32_t)angle, (int16_t)(got >> 16));
         worst_note(&cosine, ((int16_t)(got & 0xFFFFU) / 32768.0L) - cosl(radians), (int32_t)angle,

@@ -245,7 +245,7 @@ STAGE void bench_current_tick(void)
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_follow(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
     const dq_q15_t i = park(measured.i, fx_rotation(angle.theta_e));
-    const fx_pair_t i_dq = fx_arch_pkhbt(i.d, i.q);
+    const fx_pair_t i_dq = fx_pair(i.d, i.q);
     const fx_pair_t advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1));
     const current_control_in_t control = {
         .target = found.target,
@@ -314,7 +314,7 @@ STAGE void bench_current_control(void)
 STAGE void bench_modulate(void)
 {
     const drive_t *d = the_copy();
-    modulate(&d->motor.modulate, &found.wanted, fx_arch_pkhbt(found.i.d, found.i.q), fx_rotation(found.theta_e));
+    modulate(&d->motor.modulate, &found.wanted, fx_pair(found.i.d, found.i.q), fx_rotation(found.theta_e));
 }
 
 STAGE void bench_torque_path(void)

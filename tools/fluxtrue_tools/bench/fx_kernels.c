@@ -63,6 +63,24 @@ KERNEL1(neg_q15, q15_t, q15_t, fx_neg_q15(a))
 KERNEL1(abs_q15, q15_t, q15_t, fx_abs_q15(a))
 KERNEL2(add_q31, q31_t, q31_t, q31_t, fx_add_q31(a, b))
 KERNEL2(sub_q31, q31_t, q31_t, q31_t, fx_sub_q31(a, b))
+KERNEL2(add_wrap, int32_t, int32_t, int32_t, fx_add_wrap(a, b))
+KERNEL2(sub_wrap, int32_t, int32_t, int32_t, fx_sub_wrap(a, b))
+KERNEL1(in_register, int32_t, int32_t, fx_in_register(a))
+/* Words stored and read again by one instruction, the first one distinguished from the second. */
+static inline int64_t two_words(int32_t a, int32_t b)
+{
+    const struct {
+        int32_t before, a, b;
+    } at = {0, a, b};
+    fx_two_words_t loaded = FX_LOAD_TWO(&at, a, b);
+    fx_both_loaded(&loaded.first, &loaded.second);
+    const volatile u32 registers[3] = {0U, (u32)a, (u32)b};
+    const fx_two_words_t twice = fx_read_two(&registers[1]);
+    const u32 same = (twice.first == loaded.first && twice.second == loaded.second) ? 0U : 1U;
+    return (int64_t)(((uint64_t)(u32)loaded.first << 32) | (u32)loaded.second) ^ (int64_t)same;
+}
+KERNEL2(two_words, int64_t, int32_t, int32_t, two_words(a, b))
+KERNEL2(load_two_words, int32_t, int32_t, int32_t, fx_load_two_words((const int32_t[2]){a, b}).second)
 KERNEL1(neg_q31, q31_t, q31_t, fx_neg_q31(a))
 KERNEL1(abs_q31, q31_t, q31_t, fx_abs_q31(a))
 KERNEL1(round_q15, q15_t, int32_t, fx_round_q15(a))
@@ -93,6 +111,7 @@ KERNEL2(difference2, int32_t, fx_pair_t, fx_pair_t, fx_difference2(a, b))
 KERNEL3(difference2_cross_acc, int32_t, int32_t, fx_pair_t, fx_pair_t, fx_difference2_cross_acc(a, b, c))
 KERNEL1(usat_q15_word, int32_t, int32_t, fx_usat_q15_word(a))
 KERNEL1(rotation, fx_pair_t, u32, fx_rotation(a))
+KERNEL1(unit_vector, fx_pair_t, u32, fx_unit_vector(a))
 KERNEL2(quotient, int32_t, u32, u32, fx_quotient(a, b))
 KERNEL2(div_q15, q15_t, q15_t, q15_t, fx_div_q15(a, b))
 KERNEL2(div_q31, q31_t, int32_t, int32_t, fx_div_q31(a, b))

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef FX_CODEGEN_H
+#define FX_CODEGEN_H
+/** Makes the compiler choose cheaper instructions; no function here changes a value.
+ *   Only what the bounds of the period need is kept. Each use saves these instructions per period (emulated Cortex-M4,
+ *   gcc 12.2, hsm1; measured with tools/fluxtrue bench without that one use):
+ *   use                                                   tick         fast ISR
+ *   FX_LOAD_TWO       angle tracker, state and gains      2
+ *                     current control, integrators        1
+ *                     window of the identification                     3
+ *   fx_both_loaded    window, sums stored together                     2
+ *                     modulation: slopes, gains           1 each       1, 0
+ *   fx_in_register    current control, speed              2            4
+ *                     modulation: level, half a duty      3 each       1, 2
+ *                     modulation: limited pulses          up to 3      up to 2
+ *                     magnitude of a q15                  (28 bytes of the library)
+ *                     hal/s32k144/pwm.c                                5, with the timer's address
+ *   FX_ADDRESS_ONCE   slot of the sample                               18
+ *                     slot of the command                              2
+ *                     point of the sine table             2            2 (1 kHz task: 11)
+ *   FX_PADDING_WORD   sample and command                               9 to 11
+ *   FX_SHORT_LOADS_BEFORE  state of the identification    (22 bytes of the library)
+ * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
+ * Units    none
+ * Range    every value and every address of two words
+ * Rounding none
+ * Errors   FX_LOAD_TWO, FX_SHORT_LOADS_BEFORE and FX_POWER_OF_TWO_SIZE do not compile where their assumption does not
+ *          hold
+ * Context  any */
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* The same value in a register, of which the compiler knows nothing: it neither recomputes it nor folds it into other
+ * operations, and a branch that computes it stays a branch. */
+static inline int32_t fx_in_register(int32_t x)
+{
+    __asm__("" : "+r"(x));
+    return x;
+}
+
+/* Both values are in registers at this point: words that lie side by side are loaded or stored by one instruction. */
+// NOLINTNEXTLINE(readability-non-const-parameter): the operands are outputs, too
+static inline void fx_both_loaded(int32_t *a, int32_t *b)
+{
+    __asm__("" : "+r"(*a), "+r"(*b));
+}
+
+/* The address is computed once, not as part of every access. */
+#define FX_ADDRESS_ONCE(pointer) __asm__("" : "+r"(pointer))
+
+/* The compiler moves no access to memory across this point; the processor has one core and needs nothing more. */
+static inline void fx_compiler_barrier(void)
+{
+    __asm__ volatile("" ::: "memory");
+}
+
+typedef struct {
+    int32_t first, second;
+} __attribute__((may_alias)) fx_two_words_t;
+
+static inline fx_two_words_t fx_load_two_words(const int32_t *from)
+{
+#ifdef __ARM_FEATURE_DSP
+    typedef int64_t double_word_t __attribute__((may_alias, aligned(4)));
+    fx_two_words_t y;
+    /* Uv: the address may contain a constant that fits LDRD. */
+    __asm__("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const double_word_t *)from));
+    return y;
+#else
+    return *(const fx_two_words_t *)from;
+#endif
+}
+
+/* Two registers of a peripheral that lie side by side, read once each and in this order. */
+static inline fx_two_words_t fx_read_two(const volatile uint32_t *from)
+{
+#ifdef __ARM_FEATURE_DSP
+    typedef uint64_t double_word_t __attribute__((may_alias, aligned(4)));
+    fx_two_words_t y;
+    __asm__ volatile("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const volatile double_word_t *)from));
+    return y;
+#else
+    const int32_t first = (int32_t)from[0];
+    return (fx_two_words_t){first, (int32_t)from[1]};
+#endif
+}
+
+/* 0, or an error of the compiler. */
+#define FX_ASSERTED_ZERO(condition) (sizeof(char[(condition) ? 1 : -1]) - 1U)
+
+/* Two fields of a structure by one LDRD; the compiler would load each where it is needed. Both are words, and the
+ * second follows the first. */
+#define FX_LOAD_TWO(pointer, a, b) \
+    fx_load_two_words((const int32_t *)&(pointer)->a + \
+                      FX_ASSERTED_ZERO(offsetof(__typeof__(*(pointer)), b) == \
+                                           offsetof(__typeof__(*(pointer)), a) + sizeof(int32_t) && \
+                                       sizeof (pointer)->a == sizeof(int32_t) && \
+                                       sizeof (pointer)->b == sizeof(int32_t)))
+
+/* The words before this field are in reach of 16-bit load instructions: at most 124 bytes from the address. */
+#define FX_SHORT_LOADS_BEFORE(type, field) \
+    _Static_assert(offsetof(type, field) <= 128U, #field " leaves earlier words beyond a 16-bit load")
+
+/* An unused word. With it a structure has a size that is a power of two, and the address of a slot is a shift. */
+#define FX_PADDING_WORD uint32_t fx_padding
+
+/* After a structure with FX_PADDING_WORD. Only the target's layout counts: other compilers have larger enumerations. */
+#ifdef __arm__
+#define FX_POWER_OF_TWO_SIZE(type) \
+    _Static_assert((sizeof(type) & (sizeof(type) - 1U)) == 0U, #type " needs another FX_PADDING_WORD, or none")
+#else
+#define FX_POWER_OF_TWO_SIZE(type) _Static_assert(sizeof(type) != 0U, #type)
+#endif
+
+#endif
