@@ -119,6 +119,7 @@ typedef struct {
 /** All inputs of one step of the 1 kHz task from higher priorities and from the port, from the same moment. */
 typedef struct {
     sample_t sample;
+    dq_q15_t i_last_period; /* measured in the period before the sample's */
     identify_window_t window;
 #if FLUXTRUE_MRAI
     mrai_snapshot_t mrai;

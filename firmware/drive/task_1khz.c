@@ -6,15 +6,30 @@
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
 
+/* Whether the measured currents are the machine's. The sum counts in this sample, not as a latched fault: in the first
+ * milliseconds of a short circuit the converters saturate, which is one. */
+static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
+{
+    const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
+    return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
+           sum <= drive->motor.monitor.zero_max;
+}
+
 /* The short circuit is commanded only if the bridge has been switching before; otherwise it may not be powered. */
 static safe_t decide_safe_state(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const uint32_t faults = snapshot->faults;
+    const operating_point_t *point = &snapshot->sample.point;
     const safe_state_in_t in = {
-        .omega = fx_q15_from_q31(snapshot->sample.point.omega),
+        .omega = fx_q15_from_q31(point->omega),
         .psi_delta = snapshot->psi_d_error,
         .v_dc = (q15_t)snapshot->sample.v_dc,
+        .i = point->i,
+        .i_last_period = snapshot->i_last_period,
+        .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
+        .shorted = task->armed && task->run_state != RUN_STATE_RUN && task->safe_state.short_circuit,
+        .currents_valid = currents_valid(drive, snapshot),
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
@@ -186,6 +201,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
         generation = drive->samples.generation;
         exchange_barrier();
         snapshot->sample = *sample_box_at(&drive->samples, generation);
+        snapshot->i_last_period = sample_box_at(&drive->samples, generation - 1U)->point.i;
         snapshot->window = *window_box_at(&drive->windows);
 #if FLUXTRUE_MRAI
         mrai_snapshot(drive, &snapshot->mrai);

@@ -9,7 +9,6 @@
 #define SETTLED_BAND Q15(0.01)  /* of V_b */
 #define SETTLED_US 50000U
 #define IDLE_CURRENT Q15(0.02)  /* of I_b: more, with switching disabled, is an offset or a broken sensor */
-#define SQRT3 1.7320508F
 
 /* The first reason that applies is transmitted. Rated torque and the reach of voltage and current are not derating. */
 static const struct {
@@ -60,11 +59,14 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
     return drive->samples.generation != 0U && (idle || drive->request.enable);
 }
 
-/* sqrt(3) w psi: peak of the line back-EMF. */
-static bool is_slow(const drive_t *drive, q31_t omega)
+/* Whether contactor and gate supply may be switched off. At the known speed (safety/safe_state.h) the magnets make less
+ * than what may be touched, and less than 0.8 of the lowest dc voltage at which the drive runs: without them the diodes
+ * would charge the dc link, beyond what the inverter withstands at high speed. */
+static bool is_slow(const drive_t *drive)
 {
-    const float v_V = SQRT3 * (float)omega / 2147483648.0F * drive->motor.bases.omega_rad_s * drive->motor.psi_f_Vs;
-    return v_V < TOUCH_SAFE_V && v_V > -TOUCH_SAFE_V;
+    const q15_t least = fx_mul_q15(drive->motor.safe_state.share_open, (q15_t)drive->motor.monitor.v_min);
+    const q15_t line_emf = drive->task.safe_state.line_emf;
+    return line_emf < least && (float)line_emf / 32768.0F * drive->motor.bases.voltage_V < TOUCH_SAFE_V;
 }
 
 static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
@@ -132,7 +134,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_settled = is_dc_settled(&ecu->settling, sample.v_dc, ecu->clock.elapsed_us),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .sensors_plausible = are_sensors_plausible(drive, &sample),
-        .slow = is_slow(drive, sample.point.omega),
+        .slow = is_slow(drive),
         .derated = derating_reason(ecu) != DERATING_REASON_NONE,
         .gate_fault = gate_fault,
         .task_late = ecu->liveness.late_in_a_row >= CONSECUTIVE_MAX,

@@ -74,7 +74,7 @@ typedef enum {
     WHEN_NO_TORQUE = 1U << 11,
     WHEN_DERATED = 1U << 12,
     WHEN_FULL = 1U << 13,           /* not derated */
-    WHEN_SLOW = 1U << 14,           /* back-EMF below the voltage that is safe to touch: it cannot charge the dc link */
+    WHEN_SLOW = 1U << 14,           /* at the known speed the machine cannot charge the dc link */
     WHEN_NOT_DISCHARGING = 1U << 15 /* discharging took too long */
 } supervisor_when_t;
 

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/supervisor.h"
 
-/* The first row that applies is taken, so urgent transitions come first. docs/howto/can.md contains a drawing of it. */
+/* The first row that applies is taken, so urgent transitions come first. docs/howto/can.md contains a drawing of it.
+ * Ready, run, derate and safe state hold contactor and gate supply. Every way out of these four needs WHEN_SLOW: a
+ * machine that turns fast would charge the dc link through the diodes. */
 const transition_t supervisor_table[] = {
     {STATE_INIT, WHEN_FAULTED, STATE_FAULT},
     {STATE_INIT, WHEN_SELF_TEST_PASSED, STATE_STANDBY},
@@ -11,15 +13,15 @@ const transition_t supervisor_table[] = {
     {STATE_PRECHARGE, WHEN_OFF, STATE_DISCHARGE},
     {STATE_PRECHARGE, WHEN_CHARGED, STATE_READY},
     {STATE_READY, WHEN_TRIPPED, STATE_SAFE_STATE},
-    {STATE_READY, WHEN_FAULTED, STATE_FAULT},
+    {STATE_READY, WHEN_FAULTED, STATE_SAFE_STATE},
     {STATE_READY, WHEN_OFF | WHEN_SLOW, STATE_DISCHARGE},
     {STATE_READY, WHEN_ENABLED, STATE_RUN},
     {STATE_RUN, WHEN_TRIPPED, STATE_SAFE_STATE},
-    {STATE_RUN, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_FAULT},
+    {STATE_RUN, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_SAFE_STATE},
     {STATE_RUN, WHEN_STOPPED, STATE_READY},
     {STATE_RUN, WHEN_DERATED, STATE_DERATE},
     {STATE_DERATE, WHEN_TRIPPED, STATE_SAFE_STATE},
-    {STATE_DERATE, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_FAULT},
+    {STATE_DERATE, WHEN_FAULTED | WHEN_NO_TORQUE, STATE_SAFE_STATE},
     {STATE_DERATE, WHEN_STOPPED, STATE_READY},
     {STATE_DERATE, WHEN_FULL, STATE_RUN},
     {STATE_SAFE_STATE, WHEN_SLOW, STATE_FAULT},

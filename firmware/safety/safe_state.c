@@ -1,18 +1,74 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "safety/safe_state.h"
 
-#define SQRT3 113512 /* Q15.16 */
+#define SQRT3 113512            /* Q15.16 */
+#define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
+#define CONFIRMED_STEPS 20
+#define UNKNOWN_MS 20000U
+
+/* Q30; below 2^31 + 1 for every argument. */
+static uint32_t squared(int32_t d, int32_t q)
+{
+    return (uint32_t)fx_mul_q30((q15_t)d, (q15_t)d) + (uint32_t)fx_mul_q30((q15_t)q, (q15_t)q);
+}
+
+/* Whether a vector has moved by less than a part of its length. */
+static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
+{
+    return squared(fx_sat_q15(now.d - before.d), fx_sat_q15(now.q - before.q)) < squared(now.d / part, now.q / part);
+}
+
+static bool confirmed(uint8_t *steps, bool again)
+{
+    *steps = again ? (uint8_t)fx_min_s32(*steps + 1, CONFIRMED_STEPS) : (uint8_t)0;
+    return *steps == CONFIRMED_STEPS;
+}
+
+/* The short circuit's currents are too small for a machine that turns (SS-7), whatever the angle says. */
+static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
+{
+    const bool none = squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
+    return confirmed(&state->without_current, in->shorted && in->currents_valid && none);
+}
+
+/* Whether the measured speed may be believed now. In the short circuit the currents must stand still in the rotor's
+ * frame (SS-6): from step to step, and within a period, without which a frozen angle at 1 kHz would pass. */
+static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
+{
+    const bool judged = in->shorted && in->currents_valid;
+    const bool steady = is_steady(in->i, state->i_before, 4) && is_steady(in->i, in->i_last_period, 8);
+    const bool agreed = confirmed(&state->steady, judged && steady);
+    state->i_before = in->i;
+    return in->speed_valid && (!judged || agreed);
+}
+
+static void follow_speed(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
+{
+    const q15_t measured = in->speed_valid ? fx_abs_q15(in->omega) : (q15_t)0;
+    const q15_t fallen = (q15_t)fx_max_s32(state->speed - FALL_PER_STEP, measured);
+    const bool at_rest = is_at_rest(config, state, in), known = is_speed_known(state, in);
+    if (at_rest) {
+        state->speed = measured;
+    } else if (known) {
+        state->speed = fallen;
+        state->unknown_ms = 0;
+    } else if (in->speed_valid) {
+        state->speed = (q15_t)fx_max_s32(state->speed, measured);
+    } else if (!state->short_circuit) {
+        const bool long_enough = state->unknown_ms >= UNKNOWN_MS;
+        state->unknown_ms = long_enough ? (uint16_t)UNKNOWN_MS : (uint16_t)(state->unknown_ms + 1U);
+        state->speed = long_enough ? fallen : state->speed;
+    }
+}
 
 bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
-    if (in->speed_valid) {
-        state->speed = fx_abs_q15(in->omega);
-    }
+    follow_speed(config, state, in);
     const q15_t psi = fx_sat_q15(config->psi_f + fx_max_s32(in->psi_delta, 0));
-    const q15_t line_emf = fx_mul_gain_q15(SQRT3, fx_mul_q15(state->speed, psi));
+    state->line_emf = fx_mul_gain_q15(SQRT3, fx_mul_q15(state->speed, psi));
     const bool lower_level = state->short_circuit || !in->speed_valid;
     const q15_t share = lower_level ? config->share_open : config->share_short;
-    const bool rectifies = line_emf > fx_mul_q15(share, in->v_dc);
+    const bool rectifies = state->line_emf > fx_mul_q15(share, in->v_dc);
     state->short_circuit = rectifies;
     return rectifies || (in->over_voltage && in->v_dc > config->v_release);
 }

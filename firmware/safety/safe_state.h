@@ -2,13 +2,17 @@
 #ifndef SAFETY_SAFE_STATE_H
 #define SAFETY_SAFE_STATE_H
 /** Safe state that a fault would need now: active short circuit by the low-side switches, or switching disabled.
- *   e = sqrt(3) |w| max(psi_f, psi_f + dpsi), the line back-EMF's peak
+ *   e = sqrt(3) w max(psi_f, psi_f + dpsi), the line back-EMF's peak at the known speed w
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
- *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds.
+ *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
+ *   valid speed 0.8 v_dc is the only level
  *   Short circuit also while an over-voltage is latched and v_dc is above v_release.
- *   Without a valid speed the last valid one is used, with 0.8 v_dc as the only level.
- * Source   docs/theory/safe-state.md (SS-1) ... (SS-4)
- * Units    per unit
+ *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
+ *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
+ *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
+ *   says. Without a valid speed the last one holds; with switching disabled it falls after 20 s.
+ * Source   docs/theory/safe-state.md (SS-1) ... (SS-7)
+ * Units    per unit; speeds are magnitudes
  * Range    every argument; e saturates at 1
  * Rounding 1 LSB q15, well inside the hysteresis
  * Errors   none
@@ -16,6 +20,7 @@
 #include <stdbool.h>
 
 #include "fx/q.h"
+#include "types/frames.h"
 
 typedef struct {
     q15_t psi_f;
@@ -24,14 +29,22 @@ typedef struct {
 } safe_state_config_t;
 
 typedef struct {
-    q15_t speed; /* last valid one */
+    q15_t speed;    /* known: the measured one, or what is left of the last valid one */
+    q15_t line_emf; /* at the known speed */
     bool short_circuit;
+    uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */
+    uint16_t unknown_ms;             /* steps without a valid speed and with switching disabled; saturates */
+    dq_q15_t i_before;               /* of the last step */
 } safe_state_state_t;
 
 typedef struct {
     q15_t omega;
     q15_t psi_delta; /* identified flux minus the table's */
     q15_t v_dc;
+    dq_q15_t i, i_last_period; /* measured in this period and in the one before it */
+    dq_q15_t psi_current;      /* tables' flux at i, less that at no current */
+    bool shorted;              /* the phases have been shorted for at least a step */
+    bool currents_valid;
     bool speed_valid;
     bool over_voltage; /* latched */
 } safe_state_in_t;

@@ -290,10 +290,14 @@ void test_bad_commands_and_a_late_task_end_the_torque_first_and_then_the_run(voi
     TEST_ASSERT_EQUAL_INT(STATE_RUN, steps(10));
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PROTECTION, s.faults);
     in.torque_arbitrated_is_zero = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     setUp();
     to_derate();
     in.task_late = true;
+    in.slow = false;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, steps(1000)); /* the contactor stays closed while the machine turns */
+    in.slow = true;
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_TASK, s.faults);
 }
@@ -495,9 +499,9 @@ static const unsigned allowed[STATES] = {
     [STATE_INIT] = TO(STANDBY) | TO(FAULT),
     [STATE_STANDBY] = TO(PRECHARGE) | TO(FAULT),
     [STATE_PRECHARGE] = TO(READY) | TO(DISCHARGE) | TO(FAULT),
-    [STATE_READY] = TO(RUN) | TO(DISCHARGE) | TO(SAFE_STATE) | TO(FAULT),
-    [STATE_RUN] = TO(READY) | TO(DERATE) | TO(SAFE_STATE) | TO(FAULT),
-    [STATE_DERATE] = TO(READY) | TO(RUN) | TO(SAFE_STATE) | TO(FAULT),
+    [STATE_READY] = TO(RUN) | TO(DISCHARGE) | TO(SAFE_STATE),
+    [STATE_RUN] = TO(READY) | TO(DERATE) | TO(SAFE_STATE),
+    [STATE_DERATE] = TO(READY) | TO(RUN) | TO(SAFE_STATE),
     [STATE_SAFE_STATE] = TO(FAULT),
     [STATE_FAULT] = TO(STANDBY) | TO(DISCHARGE),
     [STATE_DISCHARGE] = TO(STANDBY) | TO(FAULT),
@@ -542,6 +546,10 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
     if (now->drive_faults != 0U || now->gate_fault || now->stalled) {
         TEST_ASSERT_FALSE(runs);
     }
+    const state_outputs_t *was = &supervisor_outputs[before->state], *is = &supervisor_outputs[s.state];
+    if ((was->contactor && !is->contactor) || (was->gate_driver && !is->gate_driver)) {
+        TEST_ASSERT_TRUE(now->slow); /* a machine that turns fast would charge the dc link */
+    }
     if (ran && !runs && now->drive_faults == 0U && s.faults == 0U) {
         /* Torque is never cut by a state that could have ramped it down. */
         TEST_ASSERT_TRUE(now->torque_arbitrated_is_zero);
@@ -551,20 +559,23 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
     }
 }
 
+/* Every state, every combination of inputs, with and without faults that were latched before. */
 void test_no_combination_of_inputs_makes_a_forbidden_move(void)
 {
+    static const uint16_t latched[] = {0, ECU_FAULT_PROTECTION, ECU_FAULT_GATE | ECU_FAULT_DISCHARGE};
     unsigned seen[STATES] = {0};
-    for (unsigned state = 0; state < STATES; state++) {
+    for (unsigned state = 0; state < STATES * 3U; state++) {
         for (unsigned bits = 0; bits < 1U << 20; bits++) {
-            const supervisor_t before = {.state = (ecu_state_t)state,
+            const supervisor_t before = {.state = (ecu_state_t)(state % STATES),
                                          .us = 100000,
-                                         .enabled = (bits >> 18 & 1U) != 0U && supervisor_outputs[state].run,
+                                         .faults = latched[state / STATES],
+                                         .enabled = (bits >> 18 & 1U) != 0U && supervisor_outputs[state % STATES].run,
                                          .enable_seen = (bits >> 19 & 1U) != 0U};
             in = inputs_of(bits);
             s = before;
             supervisor_step(&s, &in);
             check_transition(&before, &in);
-            seen[state] |= (s.state != before.state) ? 1U << s.state : 0U;
+            seen[before.state] |= (s.state != before.state) ? 1U << s.state : 0U;
         }
     }
     /* The long time-outs have their own tests; every other move must have been seen. */

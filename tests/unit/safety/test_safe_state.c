@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "safety/safe_state.h"
 
+#include <math.h>
+
 #include "unity.h"
 
 /* psi_f = 0.4: the line back-EMF is 0.6928 w. v_dc = 0.6: short above w = 0.7794, open below 0.6928. */
@@ -12,17 +14,42 @@ static safe_state_in_t in;
 void setUp(void)
 {
     state = (safe_state_state_t){0};
-    in = (safe_state_in_t){.v_dc = 19661, .speed_valid = true};
+    in = (safe_state_in_t){.v_dc = 19661, .speed_valid = true, .currents_valid = true};
 }
 
 void tearDown(void)
 {
 }
 
+static bool steps(int count)
+{
+    bool short_circuit = false;
+    for (int k = 0; k < count; k++) {
+        short_circuit = safe_state_step(&config, &state, &in);
+    }
+    return short_circuit;
+}
+
+/* After 250 steps the known speed has followed any fall. */
 static bool at(double omega)
 {
     in.omega = (q15_t)(omega * 32768.0);
-    return safe_state_step(&config, &state, &in);
+    return steps(251);
+}
+
+static double known(void)
+{
+    return state.speed / 32768.0;
+}
+
+/* The flux and current of a shorted machine, turned by this angle against the frame that the drive believes in. */
+static void short_circuit_currents(double length, double angle, double angle_a_period_before)
+{
+    const double psi = length * config.psi_f;
+    in.psi_current = (dq_q15_t){(int32_t)(-psi * cos(angle)), (int32_t)(-psi * sin(angle))};
+    in.i = (dq_q15_t){in.psi_current.d / 2, in.psi_current.q / 2};
+    in.i_last_period = (dq_q15_t){(int32_t)(-psi / 2.0 * cos(angle_a_period_before)),
+                                  (int32_t)(-psi / 2.0 * sin(angle_a_period_before))};
 }
 
 void test_at_low_speed_switching_is_disabled_and_at_high_speed_the_phases_are_shorted(void)
@@ -70,6 +97,128 @@ void test_without_a_valid_speed_the_last_one_counts_and_the_short_circuit_comes_
     TEST_ASSERT_FALSE(at(0.6));
     in.speed_valid = false;
     TEST_ASSERT_FALSE(at(0.99));
+}
+
+/* 0.004 per step, the rounding of the constant included. */
+void test_the_known_speed_falls_no_faster_than_a_rotor_can_and_rises_at_once(void)
+{
+    TEST_ASSERT_TRUE(at(0.95));
+    in.omega = 0;
+    TEST_ASSERT_TRUE(steps(20));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.95 - 20.0 * 0.004, known());
+    in.omega = INT16_MIN;
+    (void)steps(1);
+    TEST_ASSERT_EQUAL_INT16(INT16_MAX, state.speed);
+}
+
+/* The angle fault comes late or never: the short circuit's currents show that the rotor turns. */
+void test_in_the_short_circuit_a_frozen_angle_does_not_look_like_a_standstill(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.omega = 0;
+    in.shorted = true;
+    for (int k = 0; k < 5000; k++) {
+        short_circuit_currents(1.0, 4.0 * k, 4.0 * k - 0.4);
+        TEST_ASSERT_TRUE(steps(1));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.9, known());
+}
+
+/* Exactly one turn in each step: from step to step they seem to stand still. */
+void test_a_frozen_angle_at_1_khz_is_seen_within_the_period(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.omega = 0;
+    in.shorted = true;
+    short_circuit_currents(1.0, 0.3, 0.3 - 0.63);
+    TEST_ASSERT_TRUE(steps(5000));
+}
+
+void test_currents_that_stand_still_confirm_the_speed(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.shorted = true;
+    short_circuit_currents(1.0, 0.3, 0.32);
+    TEST_ASSERT_FALSE(at(0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
+}
+
+/* Without an angle only the end of the currents tells that the rotor has come to rest. */
+void test_without_an_angle_the_short_circuit_lasts_until_its_currents_have_vanished(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.omega = 0;
+    in.shorted = true;
+    in.speed_valid = false;
+    short_circuit_currents(0.5, 0.3, 0.3);
+    TEST_ASSERT_TRUE(steps(100000));
+    short_circuit_currents(0.1, 0.3, 0.3);
+    TEST_ASSERT_TRUE(steps(19));
+    TEST_ASSERT_FALSE(steps(1));
+    TEST_ASSERT_EQUAL_INT16(0, state.speed);
+}
+
+void test_with_switching_disabled_an_unknown_speed_falls_after_20_s(void)
+{
+    TEST_ASSERT_FALSE(at(0.6));
+    in.omega = 0;
+    in.speed_valid = false;
+    (void)steps(20000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.6, known());
+    (void)steps(200);
+    TEST_ASSERT_EQUAL_INT16(0, state.speed);
+}
+
+/* With a current sensor that is known to be wrong the angle alone counts: one fault, not two. */
+void test_wrong_currents_do_not_hold_the_speed(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.shorted = true;
+    in.currents_valid = false;
+    short_circuit_currents(1.0, 0.3, 2.0);
+    TEST_ASSERT_FALSE(at(0.0));
+}
+
+enum { ANGLE_WORKS, ANGLE_FROZEN, ANGLE_FROZEN_AND_FLAGGED, ANGLES };
+
+/* A machine that turns by `turn` rad in a step at full speed and slows down by `fall` per step. Its short circuit draws
+ * w/sqrt(w^2 + r^2) of the largest current. After `fault` steps a fault is latched and the safe state acts. */
+static void model(double start, double fall, double turn, int angle, int fault)
+{
+    double w = start, theta = 0.0;
+    bool short_circuit = false;
+    setUp();
+    (void)at(start);
+    for (int k = 0; k < 1500; k++) {
+        const double length = w / sqrt(w * w + 0.02 * 0.02);
+        const double frame = (angle == ANGLE_WORKS) ? 0.0 : theta;
+        short_circuit_currents(length, frame, frame - ((angle == ANGLE_WORKS) ? 0.0 : w * turn / 20.0));
+        in.omega = (q15_t)((angle == ANGLE_WORKS) ? 32767.0 * w : 0.0);
+        in.speed_valid = k < fault || angle != ANGLE_FROZEN_AND_FLAGGED;
+        in.shorted = k > fault && short_circuit;
+        short_circuit = safe_state_step(&config, &state, &in);
+        const double e = sqrt(3.0) * 0.4 * w, limit = (angle == ANGLE_FROZEN) ? 0.91 : 0.81;
+        if (e > limit * 0.6) {
+            /* 0.8 of the lowest dc voltage, 0.6 of the nominal one: ecu/observe.c opens the contactor below it. */
+            TEST_ASSERT_TRUE(state.line_emf > 0.8 * 0.6 * 0.6 * 32768.0);
+        }
+        theta += w * turn;
+        w = fmax(w - fall, 0.0);
+    }
+}
+
+/* The property that the contactor's release rests on: however the angle fails, and whatever the rotor does, the known
+ * line voltage stays above the release level while the true one could charge the dc link. */
+void test_no_failure_of_the_angle_releases_a_machine_that_turns(void)
+{
+    static const double falls[] = {0.0, 0.0002, 0.001, 0.0039}, turns[] = {2.0, 4.0, 2.0 * 3.14159265 / 0.9, 12.0};
+    for (int start = 4; start <= 99; start += 5) {
+        for (int n = 0; n < 16; n++) {
+            for (int angle = 0; angle < ANGLES; angle++) {
+                model(start / 100.0, falls[n % 4], turns[n / 4], angle, 1 + n);
+            }
+        }
+    }
 }
 
 void test_an_over_voltage_is_shorted_at_any_speed_until_the_voltage_has_come_back(void)

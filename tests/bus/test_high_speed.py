@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults and leaving torque above the speed at which the magnets' line voltage exceeds the dc voltage.
+
+The plant has the dc link, contactor and gate supply of hardware: whoever opens the contactor there, or takes the gates'
+supply away, charges the capacitor through the diodes.
+"""
+
+from collections.abc import Iterator
+
+import pytest
+from ecu import COMMAND, Ecu
+
+RPM = 0.10471975511965978  # rad/s
+FAST_RPM = 9000.0  # 351 V of line voltage; the short circuit is chosen above 8085 rpm
+BATTERY_V = 350.0
+PROTECTION = 1
+
+
+@pytest.fixture
+def fast() -> Iterator[Ecu]:
+    """In state run at 9000 rpm without torque."""
+    ecu = Ecu()
+    ecu.power_up(BATTERY_V)
+    turn_to(ecu, FAST_RPM, 2.0)
+    assert ecu.state == "run"
+    yield ecu
+    ecu.close()
+
+
+def turn_to(ecu: Ecu, rpm: float, rad_s_per_ms: float) -> None:
+    """Changes the imposed speed, at 2 rad/s per ms within half a second from nothing to 9000 rpm."""
+    while abs(rpm * RPM - ecu.speed_rad_s) > 1e-9:
+        step = max(-rad_s_per_ms, min(rad_s_per_ms, rpm * RPM - ecu.speed_rad_s))
+        ecu.speed_rad_s += step
+        ecu.run(1)
+
+
+def highest_V(ecu: Ecu, milliseconds: int) -> float:
+    """The dc link's voltage meanwhile."""
+    highest = 0.0
+    for _ in range(milliseconds):
+        ecu.run(1)
+        highest = max(highest, ecu.truth("vdc_V"))
+    return highest
+
+
+def slow_down_to_fault(ecu: Ecu) -> None:
+    """The rotor comes to rest, and only then the state is left; the link discharges."""
+    turn_to(ecu, 0.0, 1.0)
+    ecu.run(500)
+    assert ecu.state == "fault"
+
+
+def test_an_angle_that_freezes_does_not_open_the_contactor_while_the_machine_turns(fast: Ecu) -> None:
+    fast.set("angle_stuck", 1.0)
+    assert highest_V(fast, 2000) < 1.02 * BATTERY_V
+    assert fast.state == "safe_state"
+    slow_down_to_fault(fast)
+
+
+def test_bad_commands_do_not_open_the_contactor_while_the_machine_turns(fast: Ecu) -> None:
+    frame_id = fast.dbc.get_message_by_name(COMMAND).frame_id
+    for _ in range(3):
+        data = fast.encode(COMMAND, fast.command)
+        fast.put(frame_id, bytes([data[0] ^ 1]) + data[1:])
+        fast.run(1)
+    assert highest_V(fast, 1000) < 1.02 * BATTERY_V
+    assert fast.state == "safe_state"
+    assert fast.last["INV_Faults"]["EcuFaults"] == PROTECTION
+    slow_down_to_fault(fast)
