@@ -82,6 +82,13 @@ typedef struct {
     int32_t measured; /* not zero: this is not motor.toml's */
 } compensation_t;
 
+/** Moving the currents to those of the short circuit. */
+typedef struct {
+    dq_q15_t from; /* reference when it began */
+    int32_t i_d;   /* of the short circuit */
+    uint8_t steps; /* 0: not active */
+} switch_off_t;
+
 /** Written by the 1 kHz task alone. */
 typedef struct {
     torque_limit_state_t torque_limit;
@@ -110,6 +117,7 @@ typedef struct {
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     safe_state_state_t safe_state;
+    switch_off_t switch_off;
     bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
@@ -171,6 +179,11 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 void drive_trim(drive_t *drive, q15_t v_dc);
 /** Adds a stored trim to the compensation in effect; 0 removes the trim. */
 void drive_retrim(drive_t *drive, int32_t trim);
+/** The drive does not run, and its safe state is the active short circuit. */
+static inline bool drive_is_shorted(const drive_t *drive)
+{
+    return drive->task.armed && drive->task.run_state != RUN_STATE_RUN && drive->task.safe_state.short_circuit;
+}
 /** Current references come from outside the torque path. */
 static inline bool drive_is_direct(const drive_t *drive)
 {

@@ -2,6 +2,7 @@
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
+#include "drive/switch_off.h"
 #include "fx/vec.h"
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
@@ -28,7 +29,7 @@ static safe_t decide_safe_state(drive_t *drive, const snapshot_t *snapshot)
         .i = point->i,
         .i_last_period = snapshot->i_last_period,
         .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
-        .shorted = task->armed && task->run_state != RUN_STATE_RUN && task->safe_state.short_circuit,
+        .shorted = drive_is_shorted(drive),
         .currents_valid = currents_valid(drive, snapshot),
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
@@ -170,6 +171,15 @@ static void reset_torque_path(drive_t *drive)
     task->torque_corrected = 0;
 }
 
+static dq_q15_t next_references(drive_t *drive, const snapshot_t *snapshot)
+{
+    if (switch_off_runs(drive)) {
+        reset_torque_path(drive);
+        return switch_off_reference(drive);
+    }
+    return compute_references(drive, snapshot);
+}
+
 /* Writes the command for the fast ISR. commanded: the operating point that follows from it. */
 static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
 {
@@ -180,7 +190,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         .fault_resets = task->fault_resets,
     };
     if (command.run) {
-        commanded->i = compute_references(drive, snapshot);
+        commanded->i = next_references(drive, snapshot);
         commanded->flux = flux_table_step(&drive->motor.flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
@@ -221,8 +231,8 @@ void task_1khz(drive_t *drive)
     take_snapshot(drive, &snapshot);
     angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
-    const uint32_t faults = slow_monitors_step(drive, &snapshot);
-    task->run_state = next_run_state(drive, snapshot.faults);
+    uint32_t faults = slow_monitors_step(drive, &snapshot);
+    task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);
     operating_point_t commanded = snapshot.sample.point;

@@ -56,7 +56,7 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
 {
     const dq_q15_t i = sample->point.i;
     const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
-    return drive->samples.generation != 0U && (idle || drive->request.enable);
+    return drive->samples.generation != 0U && (idle || drive->request.enable || drive_is_shorted(drive));
 }
 
 /* Whether contactor and gate supply may be switched off. At the known speed (safety/safe_state.h) the magnets make less

@@ -35,11 +35,11 @@ static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *st
  * frame (SS-6): from step to step, and within a period, without which a frozen angle at 1 kHz would pass. */
 static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
 {
-    const bool judged = in->shorted && in->currents_valid;
+    const bool checked = in->shorted && in->currents_valid;
     const bool steady = is_steady(in->i, state->i_before, 4) && is_steady(in->i, in->i_last_period, 8);
-    const bool agreed = confirmed(&state->steady, judged && steady);
+    const bool agreed = confirmed(&state->steady, checked && steady);
     state->i_before = in->i;
-    return in->speed_valid && (!judged || agreed);
+    return in->speed_valid && (!checked || agreed);
 }
 
 static void follow_speed(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults and leaving torque above the speed at which the magnets' line voltage exceeds the dc voltage.
 
-The plant has the dc link, contactor and gate supply of hardware: whoever opens the contactor there, or takes the gates'
-supply away, charges the capacitor through the diodes.
+The plant has the dc link, contactor and gate supply of hardware: with an open contactor, or without gate supply, the
+machine charges the capacitor through the diodes.
 """
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import pytest
 from ecu import COMMAND, Ecu
@@ -68,3 +70,57 @@ def test_bad_commands_do_not_open_the_contactor_while_the_machine_turns(fast: Ec
     assert fast.state == "safe_state"
     assert fast.last["INV_Faults"]["EcuFaults"] == PROTECTION
     slow_down_to_fault(fast)
+
+
+@dataclass(frozen=True)
+class Worst:
+    """Magnitudes of what happened."""
+
+    torque_Nm: float
+    current_A: float
+
+
+def worst(ecu: Ecu, milliseconds: int) -> Worst:
+    """Mean torque over 1 ms, and the current vector at its end."""
+    torque, current = 0.0, 0.0
+    for _ in range(milliseconds):
+        ecu.run(1)
+        torque = max(torque, abs(ecu.truth("torque_mean_Nm")))
+        current = max(current, math.hypot(ecu.truth("i_d_A"), ecu.truth("i_q_A")))
+    return Worst(torque, current)
+
+
+def runs_again(ecu: Ecu) -> None:
+    """At once, at the speed that it has, and with the torque that is asked for."""
+    ecu.run(30, Enable=0, TorqueRequested=0.0)
+    ecu.run(30, Enable=1)
+    assert ecu.state == "run", ecu.last["INV_DcLink"]["RefusedReason"]
+    ecu.run(150, TorqueRequested=20.0)
+    assert ecu.truth("torque_mean_Nm") == pytest.approx(20.0, abs=2.0)
+
+
+# Without the ramp 529 A and 98 N.m, a latched over-current, and no reset until the machine is slow.
+@pytest.mark.parametrize("rpm", [8200.0, 9000.0, 10000.0, -9500.0])
+def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fast: Ecu, rpm: float) -> None:
+    turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)
+    turn_to(fast, rpm, 2.0)
+    fast.command["Enable"] = 0
+    seen = worst(fast, 200)
+    assert seen.torque_Nm < 5.0
+    assert seen.current_A < 260.0
+    assert fast.state == "ready"
+    assert fast.get("fault_word") == 0.0
+    runs_again(fast)
+
+
+def test_a_lost_command_at_speed_is_gentle_too(fast: Ecu) -> None:
+    fast.run(150, TorqueRequested=40.0)
+    fast.talking = False
+    fast.run(45)  # 30 ms of waiting and 15 ms of ramp from full torque
+    seen = worst(fast, 200)
+    assert seen.torque_Nm < 5.0
+    assert seen.current_A < 260.0
+    assert fast.get("fault_word") == 0.0
+    fast.talking = True
+    fast.run(50, Enable=0, TorqueRequested=0.0)
+    runs_again(fast)
