@@ -180,3 +180,41 @@ def test_what_a_killed_set_up_left_is_removed_by_the_next(checkout: Path, bare_p
     done = run(checkout, "setup", "demo", env={"PATH": str(bare_path)})
     assert done.returncode == 0, done.stderr
     assert not list((checkout / "build").glob(".setup.*"))
+
+
+PROJECT = """
+cmake_minimum_required(VERSION 3.25)
+project(mocks C)
+list(APPEND CMAKE_MODULE_PATH "${CMAKE_SOURCE_DIR}/tools/cmake")
+include(Unity)
+_fluxtrue_mock("hal/adc.h" "${CMAKE_BINARY_DIR}/x.generated" mock)
+add_custom_target(mocks ALL DEPENDS "${mock}")
+"""
+
+
+@pytest.mark.parametrize("name", ["plain", "a space", "a päth (2)", "a+b,c@d"])
+def test_mocks_are_made_inside_of_the_checkout_whatever_its_path(tmp_path: Path, name: str) -> None:
+    root = tmp_path / name / "checkout"
+    shutil.copytree(TOOLS / "cmake", root / "tools" / "cmake")
+    for file in ("hal/adc.h", "tests/seconds.txt"):
+        (root / file).parent.mkdir(parents=True)
+        shutil.copy(TOOLS.parent / file, root / file)
+    (root / "CMakeLists.txt").write_text(PROJECT)
+    cmock = TOOLS.parent / "build" / "cmock" / "usr" / "share" / "cmock"
+    generate = [
+        "cmake",
+        "-G",
+        "Ninja",
+        "-S",
+        root,
+        "-B",
+        root / "build",
+        "-DFLUXTRUE_TESTS=ON",
+        f"-DFLUXTRUE_CMOCK={cmock}",
+    ]
+    environment = {key: value for key, value in os.environ.items() if key != "HOME"} | {"LC_ALL": "C"}
+    for command in (generate, ["cmake", "--build", root / "build"]):
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert (root / "build" / "x.generated" / "hal" / "mock_adc.h").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == [name]

@@ -47,13 +47,15 @@ function(_fluxtrue_mock header folder sources)
     cmake_path(GET header PARENT_PATH sub)
     cmake_path(GET header STEM stem)
     set(mock "${folder}/${sub}/mock_${stem}.c")
+    # CMock ends the value of an option at the first character that is no ASCII letter, digit or one of a few signs: the
+    # path of a checkout may have others, therefore it is told a relative one.
+    file(MAKE_DIRECTORY "${folder}/${sub}")
     add_custom_command(
         OUTPUT "${mock}"
         BYPRODUCTS "${folder}/${sub}/mock_${stem}.h"
-        COMMAND "${CMAKE_COMMAND}" -E make_directory "${folder}/${sub}"
         COMMAND "${FLUXTRUE_RUBY}" -W0 "${FLUXTRUE_CMOCK}/lib/cmock.rb"
-            "-o${CMAKE_BINARY_DIR}/cmock.yml" "--mock_path=${folder}" "--subdir=${sub}"
-            "${CMAKE_SOURCE_DIR}/${header}"
+            "-o${CMAKE_BINARY_DIR}/cmock.yml" --mock_path=. "--subdir=${sub}" "${CMAKE_SOURCE_DIR}/${header}"
+        WORKING_DIRECTORY "${folder}"
         DEPENDS "${CMAKE_SOURCE_DIR}/${header}" "${CMAKE_BINARY_DIR}/cmock.yml"
         COMMENT "Mocking ${header}"
         VERBATIM)
