@@ -4,11 +4,11 @@
 /** Temperatures: winding (NTC), inverter, and the processor, which is only measured and limits nothing.
  * Source   docs/howto/port.md
  * Units    tenths of a degree Celsius
- * Errors   HAL_TEMPERATURE_UNKNOWN: no sensor, or one that is broken or shorted
+ * Errors   TEMPERATURE_UNKNOWN: no sensor, or one that is broken or shorted
  * Context  1 kHz task */
 #include <stdint.h>
 
-#define HAL_TEMPERATURE_UNKNOWN INT16_MIN
+#include "types/temperature.h"
 
 int16_t hal_temperature_winding_dC(void);
 int16_t hal_temperature_inverter_dC(void);

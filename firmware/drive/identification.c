@@ -44,7 +44,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     const identify_in_t in = {
         .point = &point,
         .tables = &tables,
-        .temperature_known = snapshot->winding_dC != HAL_TEMPERATURE_UNKNOWN,
+        .temperature_known = snapshot->winding_dC != TEMPERATURE_UNKNOWN,
         .winding_dC = snapshot->winding_dC,
         .enabled = drive->request.identification && snapshot->sample.acting,
     };

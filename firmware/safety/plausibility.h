@@ -9,7 +9,7 @@
  *   over-temperature   110 ms beyond the end of a derating line
  *   These times are counted in steps of the task, rounded up.
  * Source   docs/theory/monitors.md (MN-1) ... (MN-5)
- * Units    per unit; temperatures in tenths of a degree C, INT16_MIN: unknown
+ * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
  * Context  1 kHz task; one square root per vector length, no division */

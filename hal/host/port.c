@@ -88,17 +88,17 @@ bool hal_board_gate_fault(void)
 
 int16_t hal_temperature_winding_dC(void)
 {
-    return active->board.winding_broken ? HAL_TEMPERATURE_UNKNOWN : (int16_t)lrint(active->winding_C * 10.0);
+    return active->board.winding_broken ? TEMPERATURE_UNKNOWN : (int16_t)lrint(active->winding_C * 10.0);
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return active->board.inverter_broken ? HAL_TEMPERATURE_UNKNOWN : (int16_t)lrint(active->board.inverter_C * 10.0);
+    return active->board.inverter_broken ? TEMPERATURE_UNKNOWN : (int16_t)lrint(active->board.inverter_C * 10.0);
 }
 
 int16_t hal_temperature_processor_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN; /* a PC has no such sensor */
+    return TEMPERATURE_UNKNOWN; /* a PC has no such sensor */
 }
 
 void hal_watchdog_start(void)

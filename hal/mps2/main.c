@@ -40,12 +40,12 @@ void hal_pwm_enable(bool on)
 
 int16_t hal_temperature_winding_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 void hal_irq_pend_mrai(void)

@@ -7,7 +7,7 @@
  * Units    tenths of a degree Celsius
  * Range    -50 ... 200 degrees
  * Rounding towards 25 degrees, 1 LSB, and 0.4 K of the offset
- * Errors   HAL_TEMPERATURE_UNKNOWN outside the range: no such sensor
+ * Errors   TEMPERATURE_UNKNOWN outside the range: no such sensor
  * Context  1 kHz task */
 #include <stdint.h>
 
@@ -21,7 +21,7 @@
 static inline int16_t die_dC(uint16_t count)
 {
     const int32_t dC = 250 - (((int32_t)count - DIE_COUNT_25) * DIE_DC_PER_COUNT_Q8) / 256;
-    return (dC < DIE_LEAST_DC || dC > DIE_MOST_DC) ? (int16_t)HAL_TEMPERATURE_UNKNOWN : (int16_t)dC;
+    return (dC < DIE_LEAST_DC || dC > DIE_MOST_DC) ? (int16_t)TEMPERATURE_UNKNOWN : (int16_t)dC;
 }
 
 #endif

@@ -14,7 +14,7 @@ static const uint16_t node[NODES] = {3937, 3814, 3628, 3368, 3038, 2654, 2249, 1
 int16_t ntc_dC(uint16_t count)
 {
     if (count > node[0] || count < node[NODES - 1]) {
-        return HAL_TEMPERATURE_UNKNOWN;
+        return TEMPERATURE_UNKNOWN;
     }
     int k = 0;
     while (count < node[k + 1]) {

@@ -7,7 +7,7 @@
  * Units    tenths of a degree Celsius
  * Range    -40 ... 150 degrees
  * Rounding within 0.7 K of the equation
- * Errors   HAL_TEMPERATURE_UNKNOWN outside the range: sensor open or shorted
+ * Errors   TEMPERATURE_UNKNOWN outside the range: sensor open or shorted
  * Context  1 kHz task; one division */
 #include <stdint.h>
 

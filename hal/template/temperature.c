@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/temperature.h"
 
-/* Write: convert the sensor's voltage to tenths of a degree; a broken or shorted sensor is HAL_TEMPERATURE_UNKNOWN. */
+/* Write: convert the sensor's voltage to tenths of a degree; a broken or shorted sensor is TEMPERATURE_UNKNOWN. */
 int16_t hal_temperature_winding_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 int16_t hal_temperature_processor_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }

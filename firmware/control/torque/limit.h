@@ -8,7 +8,7 @@
  *   regen <= min(torque_max f, torque_regen, (power_regen + loss)/|w|, reach)
  *   Near standstill the direction of power is not known, and the driving limit holds for both directions.
  * Source   docs/theory/limits.md (LM-1) ... (LM-7)
- * Units    per unit; temperatures in tenths of a degree C, TEMPERATURE_UNKNOWN as in hal/temperature.h
+ * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument; loss is kept in 0 ... 1/4
  * Rounding 1 LSB q15
  * Errors   derating contains the reason of every limit that the torque exceeds, not only of the smallest one; a
@@ -19,9 +19,8 @@
 
 #include "types/frames.h"
 #include "types/motor_check.h"
+#include "types/temperature.h"
 #include "types/torque_limits.h"
-
-#define TEMPERATURE_UNKNOWN INT16_MIN
 
 /* X(NAME, bit, explanation): the bits of `derating`, named and explained here only. */
 #define DERATING_LIST(X) \

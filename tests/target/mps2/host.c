@@ -43,12 +43,12 @@ void hal_irq_pend_mrai(void)
 
 int16_t hal_temperature_winding_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return HAL_TEMPERATURE_UNKNOWN;
+    return TEMPERATURE_UNKNOWN;
 }
 
 int main(void)

@@ -118,13 +118,13 @@ void test_a_temperature_without_a_sensor_is_told_as_invalid(void)
     TEST_ASSERT_TRUE(t->winding_valid && t->inverter_valid);
     TEST_ASSERT_EQUAL_FLOAT(95.5F, t->winding_C);
     TEST_ASSERT_EQUAL_FLOAT(-1.2F, t->inverter_C);
-    hal_temperature_winding_dC_IgnoreAndReturn(HAL_TEMPERATURE_UNKNOWN);
+    hal_temperature_winding_dC_IgnoreAndReturn(TEMPERATURE_UNKNOWN);
     t = read_back();
     TEST_ASSERT_TRUE(!t->winding_valid && t->inverter_valid);
     TEST_ASSERT_EQUAL_FLOAT(0.0F, t->winding_C);
     TEST_ASSERT_EQUAL_FLOAT(-1.2F, t->inverter_C);
     hal_temperature_winding_dC_IgnoreAndReturn(955);
-    hal_temperature_inverter_dC_IgnoreAndReturn(HAL_TEMPERATURE_UNKNOWN);
+    hal_temperature_inverter_dC_IgnoreAndReturn(TEMPERATURE_UNKNOWN);
     t = read_back();
     TEST_ASSERT_TRUE(t->winding_valid && !t->inverter_valid);
     TEST_ASSERT_EQUAL_FLOAT(95.5F, t->winding_C);
