@@ -26,6 +26,12 @@ static q15_t to_q15(float x)
     return fx_sat_q15(nearest(((x > 1.0F) ? 1.0F : (x < -1.0F) ? -1.0F : x) * Q15_SCALE));
 }
 
+/* A slew rate that rounds to zero would hold the torque for ever. */
+static q15_t at_least_one(q15_t x)
+{
+    return (x > 0) ? x : (q15_t)1;
+}
+
 /* The bridge's dead time as a share of the period. */
 static float dead_time_full(const motor_t *m)
 {
@@ -59,7 +65,7 @@ void calibration_set(motor_t *m, calibration_id_t id, float value)
 {
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        m->torque_slew = (value > 0.0F) ? to_q15(value * m->bases.step_s / m->bases.torque_Nm) : Q15_MAX;
+        m->torque_slew = (value > 0.0F) ? at_least_one(to_q15(value * m->bases.step_s / m->bases.torque_Nm)) : Q15_MAX;
         break;
     case CALIBRATION_observer_m:
         m->mrai.pole_gain = to_q31(4.0F * value * (float)m->mrai.r0 / Q31_SCALE);

@@ -82,11 +82,14 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
 }
 
 /* A fast change of torque needs voltage. Near the voltage limit it would make the currents oscillate. */
+static q15_t fastest_slew(const drive_t *drive)
+{
+    return (drive->task.reference.psi_plan < drive->motor.psi_weak) ? drive->motor.torque_slew_weak : Q15_MAX;
+}
+
 static q15_t slew_limit(const drive_t *drive)
 {
-    const motor_t *m = &drive->motor;
-    const bool weak = drive->task.reference.psi_plan < m->psi_weak;
-    return weak ? (q15_t)fx_min_s32(m->torque_slew, m->torque_slew_weak) : m->torque_slew;
+    return (q15_t)fx_min_s32(drive->motor.torque_slew, fastest_slew(drive));
 }
 
 static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
@@ -111,14 +114,17 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
 }
 
 /* Arbitrated -> limited -> commanded (slew) -> corrected (torque loop): docs/glossary.md. A falling limit
- * acts at once, without slew. */
+ * acts at once, whatever slew is calibrated. */
 static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const motor_t *m = &drive->motor;
     const q15_t limited = limit_torque(drive, snapshot);
-
-    task->torque_commanded = rate_limit_step(task->torque_commanded, limited, slew_limit(drive));
+    const q15_t before = task->torque_commanded;
+    const q15_t allowed = torque_limit_clamp(&task->allowed, before, snapshot->sample.point.omega < 0);
+    const q15_t inside = rate_limit_step(before, allowed, fastest_slew(drive));
+    const int32_t moved = fx_abs_q31(inside - before);
+    task->torque_commanded = rate_limit_step(inside, limited, (q15_t)fx_max_s32(slew_limit(drive) - moved, 0));
     const torque_loop_in_t loop = {
         .torque_commanded = task->torque_commanded,
         .torque_estimated = task->identification.torque_estimated,

@@ -40,13 +40,16 @@ void ecu_watch(ecu_t *ecu)
     liveness->finished = finished;
 }
 
-static bool is_dc_settled(settling_t *settling, int32_t v_dc, uint32_t elapsed_us)
+/* Counted from the start of the precharge: before it a turning machine may hold the dc link at another voltage than the
+ * battery's, through the diodes. */
+static bool is_dc_settled(ecu_t *ecu, int32_t v_dc)
 {
+    settling_t *settling = &ecu->settling;
     const int32_t away = v_dc - settling->reference;
-    if (away > SETTLED_BAND || away < -SETTLED_BAND) {
+    if (ecu->supervisor.state != STATE_PRECHARGE || away > SETTLED_BAND || away < -SETTLED_BAND) {
         *settling = (settling_t){.reference = v_dc};
     } else if (settling->us < SETTLED_US) {
-        settling->us += elapsed_us;
+        settling->us += ecu->clock.elapsed_us;
     }
     return settling->us >= SETTLED_US;
 }
@@ -131,7 +134,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
         .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
         .dc_in_range = sample.v_dc >= drive->motor.monitor.v_min && sample.v_dc <= drive->motor.monitor.v_max,
-        .dc_settled = is_dc_settled(&ecu->settling, sample.v_dc, ecu->clock.elapsed_us),
+        .dc_settled = is_dc_settled(ecu, sample.v_dc),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .sensors_plausible = are_sensors_plausible(drive, &sample),
         .slow = is_slow(drive),

@@ -33,6 +33,7 @@ static struct {
     bool switching;                   /* as last commanded */
 } bridge;                             /* adjacent: one address serves both in every period */
 static volatile bool fault_for_board; /* set by the fault interrupt, taken by its reader */
+static volatile bool ended_by_fault;  /* set by the fault interrupt, until switching is enabled again */
 
 /* Ten bits; larger values in steps of four, rounded up, so that the dead time is never shorter than requested. */
 static uint32_t dead_time(uint32_t ticks)
@@ -80,11 +81,18 @@ static void disable_switching(void)
     FTM0->SYNC = LOAD;
 }
 
+/* The timer holds the outputs off although the line is no longer active. */
+static bool is_fault_over(void)
+{
+    return (FTM0->FMS & (FTM_FMS_FAULTF | FTM_FMS_FAULTIN)) == FTM_FMS_FAULTF;
+}
+
 /* The outputs stay masked until the start of the next period, which takes over mask and duties together. */
 static void enable_switching(void)
 {
-    if ((FTM0->FMS & (FTM_FMS_FAULTF | FTM_FMS_FAULTIN)) == FTM_FMS_FAULTF) {
+    if (is_fault_over()) {
         FTM0->FMS = FTM_FMS_WPEN; /* clears FAULTF: the fault has ended and was reported to the drive */
+        ended_by_fault = false;
     }
     core_irq_clear(IRQ_FTM0_FAULT); /* still pending if the line stayed active after its interrupt */
     core_irq_enable(IRQ_FTM0_FAULT);
@@ -114,6 +122,7 @@ void pwm_init(const pwm_config_t *config)
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
     bridge.switching = false;
+    ended_by_fault = false;
 }
 
 static void pass_a_microsecond(void)
@@ -164,7 +173,9 @@ void hal_pwm_write(duty_t duty)
 
 void hal_pwm_enable(bool on)
 {
-    if (__builtin_expect(on == bridge.switching, 1)) {
+    /* The short circuit after a gate-driver fault at speed: switching was enabled, but the timer has ended it. */
+    const bool again = on && ended_by_fault && is_fault_over();
+    if (__builtin_expect(on == bridge.switching && !again, 1)) {
         return;
     }
     bridge.switching = on;
@@ -180,6 +191,7 @@ void hal_pwm_enable(bool on)
 void pwm_gate_fault_isr(void)
 {
     fault_for_board = true;
+    ended_by_fault = true;
     core_irq_disable(IRQ_FTM0_FAULT);
 }
 

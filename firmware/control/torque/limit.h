@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "fx/q.h"
 #include "types/frames.h"
 #include "types/motor_check.h"
 #include "types/temperature.h"
@@ -73,6 +74,13 @@ typedef struct {
     q15_t drive, regen;   /* magnitudes allowed now */
     uint16_t derating;
 } torque_limit_t;
+
+/** Another torque, for example that of the step before, inside the same limits. */
+static inline q15_t torque_limit_clamp(const torque_limit_t *limit, q15_t torque, bool backwards)
+{
+    const q15_t high = backwards ? limit->regen : limit->drive, low = backwards ? limit->drive : limit->regen;
+    return (q15_t)fx_clamp_q31(torque, -low, high);
+}
 
 motor_check_t torque_limit_check(const torque_limit_config_t *config);
 torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_limit_state_t *state,

@@ -125,6 +125,27 @@ void test_the_torque_request_is_limited_and_slewed(void)
     TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
 }
 
+/* A closing limit takes the torque away in the same step, in both directions and at the slowest slew rate. */
+void test_a_closing_limit_acts_at_once_whatever_slew_is_calibrated(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        drive.motor.torque_slew = Q15_MAX;
+        drive.request.limits = TORQUE_LIMITS_NONE;
+        drive.request.torque_arbitrated = (q15_t)(sign * INT16_MAX);
+        seam_run();
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT(sign * motor.torque_max, drive.task.torque_commanded);
+        drive.motor.torque_slew = 0;
+        drive.request.limits.torque_drive = 1000;
+        drive.request.limits.torque_regen = 1000;
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT(sign * 1000, drive.task.torque_commanded);
+        drive.request.limits = TORQUE_LIMITS_NONE;
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT(sign * 1000, drive.task.torque_commanded); /* what a limit allows again is slewed */
+    }
+}
+
 void test_stopping_resets_the_slew_and_the_correction(void)
 {
     drive.request.torque_arbitrated = 5000;

@@ -68,6 +68,7 @@ void test_the_dc_voltage_is_safe_to_touch_below_60_V(void)
 /* The band is 1 % of V_b, 5.4 V or 328 counts to either side of where the voltage was first seen. */
 static void settles_in_50_ms_at(double v_dc_V)
 {
+    ecu.supervisor.state = STATE_PRECHARGE;
     for (int ms = 0; ms < 50; ms++) {
         TEST_ASSERT_FALSE(observe_v(v_dc_V)->dc_settled);
     }
@@ -84,6 +85,19 @@ void test_the_dc_voltage_has_settled_after_50_ms_within_one_percent_of_the_base(
     }
     settles_in_50_ms_at((reference + 329.5) / COUNT_PER_V);
     settles_in_50_ms_at((reference + 0.5) / COUNT_PER_V);
+}
+
+/* 270 V that a turning machine has rectified for long are not the battery's 350 V. */
+void test_a_voltage_that_was_there_before_the_precharge_has_not_settled(void)
+{
+    ecu.supervisor.state = STATE_STANDBY;
+    for (int ms = 0; ms < 1000; ms++) {
+        TEST_ASSERT_FALSE(observe_v(270.0)->dc_settled);
+    }
+    ecu.supervisor.state = STATE_PRECHARGE;
+    for (int ms = 0; ms < 49; ms++) {
+        TEST_ASSERT_FALSE(observe_v(270.0)->dc_settled);
+    }
 }
 
 void test_a_voltage_that_moves_must_settle_again_however_long_it_has_stayed(void)

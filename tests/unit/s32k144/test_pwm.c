@@ -167,6 +167,24 @@ void test_a_fault_that_lasts_keeps_being_reported(void)
     TEST_ASSERT_TRUE(pwm_fault_reported());
 }
 
+/* The safe state at speed asks for switching in each period, without having disabled it. */
+void test_switching_that_a_fault_has_ended_is_enabled_again_when_the_line_allows_it(void)
+{
+    hal_pwm_enable(true);
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
+    hal_pwm_enable(true);
+    TEST_ASSERT_BITS_HIGH(FTM_FMS_FAULTF, FTM0->FMS); /* not before the interrupt has reported it */
+    pwm_gate_fault_isr();
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_FAULTIN | FTM_FMS_WPEN;
+    hal_pwm_enable(true);
+    TEST_ASSERT_BITS_HIGH(FTM_FMS_FAULTF, FTM0->FMS);
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
+    hal_pwm_enable(true);
+    TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->OUTMASK);
+    (void)pwm_fault_reported();
+}
+
 void test_enabling_clears_a_fault_only_when_it_has_ended(void)
 {
     FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_FAULTIN | FTM_FMS_WPEN;
