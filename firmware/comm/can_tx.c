@@ -21,6 +21,8 @@ static const tx_message_t messages[] = {
 
 #define MESSAGES (sizeof messages / sizeof messages[0])
 
+_Static_assert(MESSAGES <= CAN_TX_MESSAGES_MAX, "each message has room for its counter");
+
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
 {
     tx->time_ms += passed_ms;
@@ -47,7 +49,7 @@ tx_result_t can_tx_next(can_tx_t *tx, const telemetry_t *telemetry, can_frame_t 
             return TX_NOT_A_NUMBER;
         }
         if (message->data_id != 0U) {
-            e2e_protect(message->data_id, &tx->status_counter, frame);
+            e2e_protect(message->data_id, &tx->counter[message - messages], frame);
         }
         return TX_FRAME;
     }

@@ -14,11 +14,13 @@
 
 typedef enum { TX_NONE = 0, TX_FRAME, TX_NOT_A_NUMBER } tx_result_t;
 
+#define CAN_TX_MESSAGES_MAX 16U
+
 typedef struct {
     uint32_t time_ms;
-    uint8_t passed_ms;      /* in this step */
-    uint8_t next;           /* next message to be checked in this step */
-    uint8_t status_counter; /* end-to-end protection of INV_Status */
+    uint8_t passed_ms;                    /* in this step */
+    uint8_t next;                         /* next message to be checked in this step */
+    uint8_t counter[CAN_TX_MESSAGES_MAX]; /* end-to-end protection of each message that has it */
 } can_tx_t;
 
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms);

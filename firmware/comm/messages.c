@@ -20,9 +20,7 @@ bool message_inv_dc_link(const telemetry_t *t, uint8_t *data)
     bus_inv_dc_link_put_derating_reason(&m, t->derating_reason);
     bus_inv_dc_link_put_refused_reason(&m, t->refused_reason);
     bus_inv_dc_link_put_refused_count(&m, t->refused_count);
-    const bool finite = bus_inv_dc_link_put_dc_voltage(&m, t->v_dc_V) &&
-                        bus_inv_dc_link_put_dc_current(&m, t->i_dc_A) &&
-                        bus_inv_dc_link_put_torque_max(&m, t->torque_max_Nm);
+    const bool finite = bus_inv_dc_link_put_dc_voltage(&m, t->v_dc_V) && bus_inv_dc_link_put_dc_current(&m, t->i_dc_A);
     return finite && bus_inv_dc_link_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -55,6 +53,14 @@ bool message_inv_temperatures(const telemetry_t *t, uint8_t *data)
     const bool finite = bus_inv_temperatures_put_winding(&m, t->winding_C) &&
                         bus_inv_temperatures_put_inverter(&m, t->inverter_C);
     return finite && bus_inv_temperatures_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
+}
+
+bool message_inv_limits(const telemetry_t *t, uint8_t *data)
+{
+    struct bus_inv_limits_t m = {0};
+    bus_inv_limits_put_request_limit(&m, t->request_limit);
+    const bool finite = bus_inv_limits_put_torque_max(&m, t->torque_max_Nm);
+    return finite && bus_inv_limits_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
 bool message_inv_faults(const telemetry_t *t, uint8_t *data)

@@ -12,7 +12,7 @@
 #include <stdint.h>
 
 #define MESSAGE_LENGTH 8U
-#define INTERFACE_VERSION 2U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
+#define INTERFACE_VERSION 3U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
 
 /* Why the torque is limited, as the bus tells it; X(NAME, value, explanation): named and explained here only. */
 #define DERATING_REASON_LIST(X) \
@@ -24,6 +24,17 @@
     X(MAGNET, 5, "i_d is at the limit that protects the magnets.") \
     X(BATTERY_LIMITS_LOST, 7, "The battery's limits were received once and are lost.") \
     X(SPEED, 8, "The speed is near its limit.")
+
+/* What the requested torque is beyond; X(NAME, value, explanation): named and explained here only. */
+#define REQUEST_LIMIT_LIST(X) \
+    X(NONE, 0, "The requested torque is within every limit.") \
+    X(RATED_TORQUE, 1, "The requested torque is beyond the rated torque of the machine.") \
+    X(VEHICLE_LIMIT, 2, "The requested torque is beyond the limit in the same command.") \
+    X(REACH, 3, "The requested torque is beyond TorqueMax, which voltage and current allow now.")
+
+#define REQUEST_LIMIT_VALUE(name, value, text) REQUEST_LIMIT_##name = (value),
+typedef enum { REQUEST_LIMIT_LIST(REQUEST_LIMIT_VALUE) } request_limit_t;
+#undef REQUEST_LIMIT_VALUE
 
 #define DERATING_REASON_VALUE(name, value, text) DERATING_REASON_##name = (value),
 typedef enum { DERATING_REASON_LIST(DERATING_REASON_VALUE) } derating_reason_t;
@@ -39,7 +50,7 @@ typedef struct {
     uint32_t state;
     float torque_estimated_Nm, torque_commanded_Nm, torque_max_Nm, speed_rpm;
     float v_dc_V, i_dc_A;
-    uint32_t derating_reason, refused_reason, refused_count;
+    uint32_t derating_reason, refused_reason, refused_count, request_limit;
     float id_A, iq_A, id_ref_A, iq_ref_A;
     float psi_f_mVs, r_mohm, psi_quality_percent, r_quality_percent, table_scale_percent;
     bool psi_clamped, r_clamped;
@@ -58,6 +69,7 @@ bool message_inv_dc_link(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_currents(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_identification(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_temperatures(const telemetry_t *telemetry, uint8_t *data);
+bool message_inv_limits(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_faults(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_configuration(const telemetry_t *telemetry, uint8_t *data);
 bool message_inv_diag_protection(const telemetry_t *telemetry, uint8_t *data);

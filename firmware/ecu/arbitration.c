@@ -3,11 +3,15 @@
 
 #define Q31_PER_Q15 65536
 
+bool arbitrate_is_braking(const arbitrate_config_t *config, q31_t omega, bool torque_is_negative)
+{
+    return fx_abs_q31(omega) > config->omega_standstill && (omega < 0) != torque_is_negative;
+}
+
 static q31_t torque_target(const arbitrate_config_t *config, const arbitrate_in_t *in)
 {
-    const bool moving = fx_abs_q31(in->omega) > config->omega_standstill;
-    const bool braking = moving && (in->omega < 0) != (in->torque_requested < 0);
-    const q15_t limit = braking ? in->limit_regen : in->limit_drive;
+    const q15_t limit = arbitrate_is_braking(config, in->omega, in->torque_requested < 0) ? in->limit_regen
+                                                                                          : in->limit_drive;
     if (in->stop || fx_abs_q15(in->torque_requested) <= config->dead_band) {
         return 0;
     }

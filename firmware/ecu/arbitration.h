@@ -42,6 +42,8 @@ typedef struct {
     bool ramp_out; /* the target is zero, reached with the rate ramp_out */
 } arbitrate_in_t;
 
+/** Whether the limit for braking applies, not the one for driving. */
+bool arbitrate_is_braking(const arbitrate_config_t *config, q31_t omega, bool torque_is_negative);
 /** Before the step; torque_limited is the drive's limited torque of the last step. */
 void arbitrate_hold(const arbitrate_config_t *config, arbitrate_state_t *state, q15_t torque_limited);
 q15_t arbitrate_step(const arbitrate_config_t *config, arbitrate_state_t *state, const arbitrate_in_t *in);

@@ -163,6 +163,23 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
     };
 }
 
+/* What the request is beyond. Of a frame out of the DBC's ranges nothing is used: RangeErrors counts it. */
+static request_limit_t request_limit(const ecu_t *ecu)
+{
+    const bus_command_t *command = &ecu->rx.command;
+    const float requested_Nm = command->torque_requested_Nm;
+    const float magnitude_Nm = (requested_Nm < 0.0F) ? -requested_Nm : requested_Nm;
+    const q31_t omega = sample_box_read(&ecu->drive.samples).point.omega;
+    const bool braking = arbitrate_is_braking(&ecu->arbitration_config, omega, requested_Nm < 0.0F);
+    if (magnitude_Nm > ecu->drive.motor.torque_max_Nm) {
+        return REQUEST_LIMIT_RATED_TORQUE;
+    }
+    if (magnitude_Nm > (braking ? command->limit_regen_Nm : command->limit_drive_Nm)) {
+        return REQUEST_LIMIT_VEHICLE_LIMIT;
+    }
+    return ((ecu->drive.task.derating & DERATING_REACH) != 0U) ? REQUEST_LIMIT_REACH : REQUEST_LIMIT_NONE;
+}
+
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
 {
     const can_rx_t *rx = &ecu->rx;
@@ -175,6 +192,7 @@ void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry)
     telemetry->refused_reason = s->refused;
     telemetry->refused_count = s->refused_count;
     telemetry->derating_reason = derating_reason(ecu);
+    telemetry->request_limit = (uint32_t)request_limit(ecu);
     d->crc_errors = rx->count[RX_CRC];
     d->repeated = rx->count[RX_REPEATED];
     d->jumps = rx->count[RX_JUMP];

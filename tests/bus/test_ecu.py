@@ -277,6 +277,30 @@ def test_mode_off_opens_the_contactor_and_discharges(running: Ecu) -> None:
     assert running.truth("vdc_V") < 60.0
 
 
+@pytest.mark.parametrize(("speed_rpm", "command", "limit", "torque_Nm"), [
+    (1000.0, {"TorqueRequested": 60.0}, "none", 60.0),
+    (1000.0, {"TorqueRequested": 900.0}, "rated_torque", 132.0),
+    (1000.0, {"TorqueRequested": -900.0}, "rated_torque", -132.0),
+    (1000.0, {"TorqueRequested": 100.0, "TorqueLimitDrive": 50.0}, "vehicle_limit", 50.0),
+    (1000.0, {"TorqueRequested": 50.0, "TorqueLimitDrive": 50.0}, "none", 50.0),
+    (1000.0, {"TorqueRequested": 100.0, "TorqueLimitRegen": 50.0}, "none", 100.0),
+    (1000.0, {"TorqueRequested": -100.0, "TorqueLimitRegen": 50.0}, "vehicle_limit", -50.0),
+    (7500.0, {"TorqueRequested": 132.0}, "reach", None),
+])  # fmt: skip
+def test_a_request_beyond_a_limit_is_told(
+    running: Ecu, speed_rpm: float, command: dict, limit: str, torque_Nm: float | None
+) -> None:
+    step_rad_s = (speed_rpm * math.pi / 30.0 - running.speed_rad_s) / 500
+    for _ in range(500):
+        running.speed_rad_s += step_rad_s
+        running.run(1)
+    running.run(500, **command)
+    told = running.last["INV_Limits"]
+    assert str(told["RequestLimit"]) == limit
+    wanted = told["TorqueMax"] if torque_Nm is None else torque_Nm
+    assert running.last["INV_Status"]["TorqueCommanded"] == pytest.approx(wanted, abs=0.03 * abs(wanted))
+
+
 def test_the_locked_commissioning_mode_is_refused(running: Ecu) -> None:
     running.run(30, Enable=0)
     running.run(30, Enable=1, Mode="current_locked")

@@ -56,5 +56,5 @@ def test_data_ids_and_time_outs_are_those_of_the_dbc(dbc: Database) -> None:
 def test_the_load_of_the_bus_is_the_one_stated(dbc: Database) -> None:
     """55 + 10 n bits: a frame with the most stuff bits it can need."""
     bits_per_s = sum((55 + 10 * m.length) * 1000 / m.cycle_time for m in dbc.messages if m.cycle_time)
-    assert 0.15 < bits_per_s / 500e3 < 0.16
-    assert "a bus of 500 kbit/s by at most 16 %" in " ".join(PAGE.split())
+    assert 0.18 < bits_per_s / 500e3 < 0.19
+    assert "a bus of 500 kbit/s by at most 19 %" in " ".join(PAGE.split())

@@ -54,7 +54,7 @@ def test_the_machine_gives_what_it_can_where_more_is_asked_for(rig: Rig, figures
     rig.turn(8000.0, 1.0)
     rig.start(132.0)
     truth_Nm = settled(rig, TRUTH)[0]
-    told_Nm = rig.signal("INV_DcLink", "TorqueMax")
+    told_Nm = rig.signal("INV_Limits", "TorqueMax")
     assert 5.0 < truth_Nm < 131.0
     figures.promise("shaft less what the bus calls available", 100.0 * (truth_Nm / told_Nm - 1.0), 10.0, "%")
 

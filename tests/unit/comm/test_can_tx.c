@@ -14,7 +14,7 @@ static const struct {
     uint32_t id;
     int cycle_ms;
 } wanted[] = {
-    {0x210, 10},  {0x211, 10},  {0x212, 10},  {0x213, 10},  {0x214, 100}, {0x220, 100},
+    {0x210, 10},  {0x211, 10},  {0x212, 10},  {0x213, 10},  {0x214, 100}, {0x215, 10},   {0x220, 100},
     {0x221, 100}, {0x230, 100}, {0x231, 100}, {0x232, 100}, {0x233, 100}, {0x240, 1000},
 };
 #define MESSAGES (int)(sizeof wanted / sizeof wanted[0])
@@ -111,18 +111,20 @@ void test_no_millisecond_has_more_than_one_frame(void)
     }
 }
 
-/* A receiver of ours would accept each of them. */
-void test_the_status_frame_is_protected(void)
+/* A receiver of ours would accept each of them: each has a counter of its own, which advances by one. */
+void test_status_and_limits_are_protected(void)
 {
-    e2e_state_t state = {0};
-    int good = 0;
+    e2e_state_t status = {0}, limits = {0};
+    int good_status = 0, good_limits = 0;
     for (int ms = 0; ms < 1000; ms++) {
         can_tx_begin(&tx, 1);
         while (can_tx_next(&tx, &telemetry, &frame) == TX_FRAME) {
-            good += (frame.id == 0x210 && e2e_check(0x2101, &state, &frame) == E2E_OK) ? 1 : 0;
+            good_status += (frame.id == 0x210 && e2e_check(0x2101, &status, &frame) == E2E_OK) ? 1 : 0;
+            good_limits += (frame.id == 0x215 && e2e_check(0x2151, &limits, &frame) == E2E_OK) ? 1 : 0;
         }
     }
-    TEST_ASSERT_EQUAL_INT(99, good);
+    TEST_ASSERT_EQUAL_INT(99, good_status);
+    TEST_ASSERT_EQUAL_INT(99, good_limits);
 }
 
 void test_a_frame_with_a_value_that_is_no_number_is_left_out_and_the_others_go(void)
