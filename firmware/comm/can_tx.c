@@ -21,7 +21,7 @@ static const tx_message_t messages[] = {
 
 #define MESSAGES (sizeof messages / sizeof messages[0])
 
-_Static_assert(MESSAGES <= CAN_TX_MESSAGES_MAX, "each message has room for its counter");
+_Static_assert(MESSAGES <= CAN_TX_MESSAGES_MAX, "each message has space for its counter");
 
 void can_tx_begin(can_tx_t *tx, uint32_t passed_ms)
 {
