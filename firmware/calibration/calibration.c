@@ -38,22 +38,24 @@ static float dead_time_full(const motor_t *m)
     return m->dead_time_s / m->bases.period_s;
 }
 
-float calibration_get(const motor_t *m, calibration_id_t id)
+float calibration_get(const drive_t *drive, calibration_id_t id)
 {
+    const motor_t *m = drive->motor;
+    const motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        return (m->torque_slew == Q15_MAX) ? 0.0F
-                                           : (float)m->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
+        return (p->torque_slew == Q15_MAX) ? 0.0F
+                                           : (float)p->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
     case CALIBRATION_observer_m:
-        return 0.25F * (float)m->mrai.pole_gain / (float)m->mrai.r0;
+        return 0.25F * (float)p->mrai.pole_gain / (float)p->mrai.r0;
     case CALIBRATION_flux_bandwidth_rad_s:
-        return (float)m->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+        return (float)p->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        return (float)m->mrai.resistance_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+        return (float)p->mrai.resistance_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
-        return (float)m->torque_loop.ki / Q15_SCALE / m->bases.step_s;
+        return (float)p->torque_loop.ki / Q15_SCALE / m->bases.step_s;
     case CALIBRATION_dead_time_compensation:
-        return (m->dead_time_s > 0.0F) ? (float)m->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m)
+        return (m->dead_time_s > 0.0F) ? (float)p->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m)
                                        : 0.0F;
     case CALIBRATION_COUNT:
     default:
@@ -61,28 +63,30 @@ float calibration_get(const motor_t *m, calibration_id_t id)
     }
 }
 
-void calibration_set(motor_t *m, calibration_id_t id, float value)
+void calibration_set(drive_t *drive, calibration_id_t id, float value)
 {
+    const motor_t *m = drive->motor;
+    motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        m->torque_slew = (value > 0.0F) ? at_least_one(to_q15(value * m->bases.step_s / m->bases.torque_Nm)) : Q15_MAX;
+        p->torque_slew = (value > 0.0F) ? at_least_one(to_q15(value * m->bases.step_s / m->bases.torque_Nm)) : Q15_MAX;
         break;
     case CALIBRATION_observer_m:
-        m->mrai.pole_gain = to_q31(4.0F * value * (float)m->mrai.r0 / Q31_SCALE);
+        p->mrai.pole_gain = to_q31(4.0F * value * (float)p->mrai.r0 / Q31_SCALE);
         break;
     case CALIBRATION_flux_bandwidth_rad_s:
-        m->mrai.flux_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
-        m->mrai.psi_drift_full = to_q31(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s);
+        p->mrai.flux_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
+        p->mrai.psi_drift_full = to_q31(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s);
         break;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        m->mrai.resistance_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
-        m->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * (float)m->mrai.r0 / Q31_SCALE * value * m->bases.step_s);
+        p->mrai.resistance_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
+        p->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * (float)p->mrai.r0 / Q31_SCALE * value * m->bases.step_s);
         break;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
-        m->torque_loop.ki = to_q15(value * m->bases.step_s);
+        p->torque_loop.ki = to_q15(value * m->bases.step_s);
         break;
     case CALIBRATION_dead_time_compensation:
-        m->modulate.dead_time_q16 = 2 * to_q15(value * dead_time_full(m));
+        p->modulate.dead_time_q16 = 2 * to_q15(value * dead_time_full(m));
         break;
     case CALIBRATION_COUNT:
     default:

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CALIBRATION_CALIBRATION_H
 #define CALIBRATION_CALIBRATION_H
-/** Calibration values in SI against the drive's motor data in RAM.
+/** Calibration values in SI against the drive's live parameters.
  *   Each value becomes one or two aligned words of the configuration, so that an interrupt sees the old or the new one.
  * Source   docs/howto/xcp.md; the relations of tools/fluxtrue_tools/motor/derived.py
  * Units    as named
@@ -9,7 +9,7 @@
  * Rounding to the nearest step of the configuration's format
  * Context  1 kHz task or below; floating point, hence in no interrupt above it */
 #include "calibration/calibration_list.h"
-#include "drive/motor.h"
+#include "drive/drive.h"
 
 #define CALIBRATION_ENUM(name, lo, hi, unit, text) CALIBRATION_##name,
 typedef enum { CALIBRATION_LIST(CALIBRATION_ENUM) CALIBRATION_COUNT } calibration_id_t;
@@ -21,8 +21,8 @@ typedef struct {
 
 extern const calibration_info_t calibration_info[CALIBRATION_COUNT];
 
-/** The present value in the motor data. */
-float calibration_get(const motor_t *motor, calibration_id_t id);
-void calibration_set(motor_t *motor, calibration_id_t id, float value);
+/** The present value in the drive's parameters. */
+float calibration_get(const drive_t *drive, calibration_id_t id);
+void calibration_set(drive_t *drive, calibration_id_t id, float value);
 
 #endif

@@ -11,20 +11,20 @@
 
 static float measured_speed_rpm(const drive_t *drive)
 {
-    const motor_t *m = &drive->motor;
+    const motor_t *m = drive->motor;
     const float omega = (float)MEASURED(drive).point.omega / Q31_SCALE * m->bases.omega_rad_s;
     return omega * RPM_PER_RAD_S / (float)m->angle_tracker.pole_pairs;
 }
 
 static float measured_psi_f_Vs(const drive_t *drive)
 {
-    const motor_t *m = &drive->motor;
+    const motor_t *m = drive->motor;
     return m->psi_f_Vs + (float)drive->task.identification.psi_delta / Q31_SCALE * m->bases.flux_Vs;
 }
 
 static float measured_r_ohm(const drive_t *drive)
 {
-    const motor_t *m = &drive->motor;
+    const motor_t *m = drive->motor;
     return m->r_ohm_20 + (float)drive->task.identification.r_delta / Q31_SCALE * m->bases.resistance_ohm;
 }
 

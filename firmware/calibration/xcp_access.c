@@ -26,7 +26,7 @@ static xcp_config_t protocol_config(xcp_access_t *access)
 void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed)
 {
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
-        access->reference[k] = calibration_get(&drive->motor, (calibration_id_t)k);
+        access->reference[k] = calibration_get(drive, (calibration_id_t)k);
         access->applied_value[k] = access->reference[k];
     }
     access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
@@ -34,7 +34,7 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
     access->answer_waits = false;
     const xcp_config_t config = protocol_config(access);
     xcp_reset(&access->xcp, &config, seed);
-    access->xcp.daq.step_10us = (uint8_t)(drive->motor.bases.step_s * 1e5F + 0.5F);
+    access->xcp.daq.step_10us = (uint8_t)(drive->motor->bases.step_s * 1e5F + 0.5F);
     access->applied = access->xcp.generation;
 }
 
@@ -54,7 +54,7 @@ static void apply(xcp_access_t *access, drive_t *drive)
         if (page[k] !=
             access->applied_value
                 [k]) { /* unchanged values are not converted again, so what the drive has measured itself is kept */
-            calibration_set(&drive->motor, id, page[k]);
+            calibration_set(drive, id, page[k]);
             access->applied_value[k] = page[k];
         }
     }

@@ -14,7 +14,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
 {
     adc_counts_t counts;
     hal_adc_read(&counts);
-    const measure_t measured = measure_step(&drive->motor.measure, &counts);
+    const measure_t measured = measure_step(&drive->period.measure, &counts);
     const fx_pair_t i_ab = fx_pair(measured.i.alpha, measured.i.beta);
     sample->i_ab = i_ab;
     sample->zero_q28 = measured.zero_q28;
@@ -22,7 +22,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     const uint32_t theta_m = read + angle_correction(drive, read);
     sample->v_dc = measured.v_dc;
     sample->theta_m = theta_m;
-    const angle_tracker_config_t *config = &drive->motor.angle_tracker;
+    const angle_tracker_config_t *config = &drive->period.angle_tracker;
     angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
     const angle_t angle = settled ? angle_tracker_follow(config, tracker, theta_m)
                                   : angle_tracker_step(config, tracker, theta_m);
@@ -32,6 +32,6 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
         monitor_report_angle_jump(&drive->fast.monitor);
         return (acquired_t){angle.step, false};
     }
-    const bool normal = monitor_is_sample_normal(&drive->motor.monitor, i_ab, measured.zero_q28, measured.v_dc);
+    const bool normal = monitor_is_sample_normal(&drive->period.monitor, i_ab, measured.zero_q28, measured.v_dc);
     return (acquired_t){angle.step, normal};
 }

@@ -35,7 +35,7 @@ static int32_t knee_gain(const modulate_config_t *config, const commission_curve
 
 static bool is_plausible(const drive_t *drive, const commission_curve_t *curve)
 {
-    const q31_t r0 = drive->motor.identify.r0;
+    const q31_t r0 = drive->motor->identify.r0;
     return curve->r > r0 / 4 && curve->r < r0 * INT64_C(3) / 2 && curve->level >= 0; /* Q30 against Q31 */
 }
 
@@ -43,7 +43,7 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
 {
     task_state_t *task = &drive->task;
     commission_curve_t *curve = &task->inverter;
-    const modulate_config_t *config = &drive->motor.modulate;
+    const modulate_config_t *config = &drive->parameters.modulate;
     const bool fits = commission_fit(&task->commission.data, curve);
     add_compensated(config, v_dc, curve);
     const q31_t dead_time = fx_div_q31(curve->level, v_dc * 32768);
@@ -52,27 +52,27 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
 }
 
 /* One word for the fast ISR. A smaller bound (MO-11) must be in effect before a larger compensation is. */
-static void set_dead_time(motor_t *m, q15_t dead_time)
+static void set_dead_time(motor_parameters_t *p, q15_t dead_time)
 {
-    const uint32_t clear_q30 = motor_clear_q30(m, dead_time);
-    if (clear_q30 < m->current_control.clear_q30) {
-        m->current_control.clear_q30 = clear_q30;
+    const uint32_t clear_q30 = motor_clear_q30(p, dead_time);
+    if (clear_q30 < p->current_control.clear_q30) {
+        p->current_control.clear_q30 = clear_q30;
     }
     exchange_barrier();
-    m->modulate.dead_time_q16 = 2 * dead_time;
+    p->modulate.dead_time_q16 = 2 * dead_time;
 }
 
 bool drive_compensate(drive_t *drive, const compensation_t *compensation)
 {
-    motor_t *m = &drive->motor;
+    motor_parameters_t *p = &drive->parameters;
     const int32_t dead_time = compensation->dead_time;
     if (dead_time < 0 || dead_time > DEAD_TIME_MAX || compensation->knee_q17 <= 0 ||
         compensation->knee_q17 >= 1 << 30) {
         return false;
     }
-    set_dead_time(m, (q15_t)dead_time);
-    m->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
-    m->modulate.knee_q17 = compensation->knee_q17;
+    set_dead_time(p, (q15_t)dead_time);
+    p->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
+    p->modulate.knee_q17 = compensation->knee_q17;
     drive->task.compensation = *compensation;
     drive->task.trim = (dead_time_trim_state_t){.base = (q15_t)dead_time};
     return true;
@@ -83,26 +83,26 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     task_state_t *task = &drive->task;
     kalman_t *kalman = &task->identify.kalman;
     const dead_time_trim_in_t in = {
-        .sigma = drive->motor.identify.sigma[IDENTIFY_DROP],
+        .sigma = drive->motor->identify.sigma[IDENTIFY_DROP],
         .x_q27 = kalman->x_q27[IDENTIFY_DROP],
         .variance_q30 = kalman->p_q30[kalman_p_index(IDENTIFY_DROP, IDENTIFY_DROP)],
         .v_dc = v_dc,
-        .dead_time = (q15_t)(drive->motor.modulate.dead_time_q16 / 2),
-        .period_steps = drive->motor.trim_steps,
+        .dead_time = (q15_t)(drive->parameters.modulate.dead_time_q16 / 2),
+        .period_steps = drive->motor->trim_steps,
         .identifying = drive->request.trim && task->identify.update_valid &&
                        task->identify.mismatch_share <= MISMATCH_MAX,
     };
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {
-        set_dead_time(&drive->motor, out.dead_time);
+        set_dead_time(&drive->parameters, out.dead_time);
         kalman->x_q27[IDENTIFY_DROP] = fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27);
     }
 }
 
 void drive_retrim(drive_t *drive, int32_t trim)
 {
-    motor_t *m = &drive->motor;
-    set_dead_time(m, dead_time_trim_restore(&drive->task.trim, (q15_t)(m->modulate.dead_time_q16 / 2), trim));
+    motor_parameters_t *p = &drive->parameters;
+    set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));
 }
 
 static void start_if_running(drive_t *drive, const commission_config_t *config)
@@ -120,7 +120,7 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
     task_state_t *task = &drive->task;
     const sample_t *sample = &snapshot->sample;
     const identify_window_t *window = &snapshot->window;
-    const commission_config_t *config = &drive->motor.commission;
+    const commission_config_t *config = &drive->motor->commission;
     const commission_in_t in = {
         .sum_i = window->sum_i,
         .sum_u = window->sum_u,

@@ -3,7 +3,9 @@
 
 void drive_init(drive_t *drive, const motor_t *source)
 {
-    *drive = (drive_t){.motor = *source,
+    *drive = (drive_t){.motor = source,
+                       .period = {source->measure, source->angle_tracker, source->monitor, source->flux_table},
+                       .parameters = source->parameters,
                        .request = {.torque_loop = true,
                                    .identification = true,
                                    .trim = true,
@@ -11,7 +13,7 @@ void drive_init(drive_t *drive, const motor_t *source)
                                    .limits = TORQUE_LIMITS_NONE},
                        .fast.window.left = source->bases.periods_per_step,
                        .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};
-    identify_reset(&drive->motor.identify, &drive->task.identify);
+    identify_reset(&drive->motor->identify, &drive->task.identify);
     drive_refuse(drive, motor_check(source));
 }
 

@@ -137,10 +137,21 @@ typedef struct {
     int16_t inverter_dC, winding_dC;
 } snapshot_t;
 
+/** The motor's constants that every PWM period reads, copied: in RAM they need neither a pointer nor an access to
+ * flash, and the look-up stays inside its tables when the flash is damaged later. Nothing changes them. */
+typedef struct {
+    measure_config_t measure;
+    angle_tracker_config_t angle_tracker;
+    monitor_config_t monitor;
+    flux_table_config_t flux_table;
+} period_data_t;
+
 /** All of a drive. */
 typedef struct {
     sample_box_t samples;
-    motor_t motor; /* a copy in RAM, which calibration may change; the original is in flash */
+    const motor_t *motor;          /* constant: in flash on a target */
+    period_data_t period;          /* constant: a copy */
+    motor_parameters_t parameters; /* live: what calibration, commissioning and the trim change */
     request_t request;
     fast_state_t fast;
     volatile q15_t psi_d_error; /* fed forward: the fast ISR copies the robust identification's, else the MRAI ISR's */

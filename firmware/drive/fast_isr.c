@@ -58,7 +58,7 @@ static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *driv
         sample->pulses_clamped = true;
         identify_window_count_limited(&drive->fast.window);
     }
-    drive->fast.u_next = modulate_applied(&drive->motor.modulate, made.duty, i, advanced, sample->v_dc);
+    drive->fast.u_next = modulate_applied(&drive->parameters.modulate, made.duty, i, advanced, sample->v_dc);
 }
 
 /* The duties of the first period act in the second; the third sample ends a period of which they are known. */
@@ -77,7 +77,7 @@ static void count_since_enable(fast_state_t *fast, sample_t *sample)
 static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_target_t *target)
 {
     fast_state_t *fast = &drive->fast;
-    const motor_t *m = &drive->motor;
+    const motor_parameters_t *p = &drive->parameters;
     const current_control_in_t control = {
         .target = target,
         .flux = &sample->point.flux,
@@ -85,7 +85,7 @@ static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame
         .psi_delta = drive->psi_d_error,
         .v_dc = now->v_dc,
     };
-    const current_control_out_t wanted = current_control_step(&m->current_control, &fast->current_control, &control);
+    const current_control_out_t wanted = current_control_step(&p->current_control, &fast->current_control, &control);
     sample->point.u.d = fast->u_next.d;
     sample->point.u.q = fast->u_next.q;
     sample->acting = true;
@@ -95,9 +95,9 @@ static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame
     fast->u_next.q = wanted.u.q;
     duty_t duty;
     if (__builtin_expect(wanted.clear, 1)) {
-        duty = modulate_clear(&m->modulate, wanted.v, now->i_dq, now->advanced);
+        duty = modulate_clear(&p->modulate, wanted.v, now->i_dq, now->advanced);
     } else {
-        const modulate_out_t made = modulate_step(&m->modulate, wanted.v, now->i_dq, now->advanced);
+        const modulate_out_t made = modulate_step(&p->modulate, wanted.v, now->i_dq, now->advanced);
         duty = made.duty;
         if ((made.limited | wanted.limited) != 0U) {
             sample->voltage_limited = wanted.limited != 0U;
@@ -121,8 +121,8 @@ static void reset_faults(drive_t *drive, uint32_t requested)
 static void check_samples(drive_t *drive, const sample_t *sample, bool run)
 {
     const monitor_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
-    const uint32_t faults = monitor_step(&drive->motor.monitor, &drive->fast.monitor, &in);
-    if (in.v_dc < drive->motor.monitor.v_min) {
+    const uint32_t faults = monitor_step(&drive->period.monitor, &drive->fast.monitor, &in);
+    if (in.v_dc < drive->period.monitor.v_min) {
         /* Below v_min the applied voltage is unknown; the three-period count starts again. */
         drive->fast.periods_since_enable = 0;
     }
@@ -139,7 +139,7 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     sample->point.i = measured;
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
-    sample->point.flux = flux_table_step(&drive->motor.flux_table, measured);
+    sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
     return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega};
 }
 

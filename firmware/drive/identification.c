@@ -16,7 +16,7 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
 
 static identification_t robust_identification(const drive_t *drive, const identify_out_t *out)
 {
-    const identify_config_t *config = &drive->motor.identify;
+    const identify_config_t *config = &drive->motor->identify;
     const identify_state_t *state = &drive->task.identify;
     return (identification_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
@@ -36,7 +36,7 @@ static identification_t robust_identification(const drive_t *drive, const identi
 /* One step from the window of the fast ISR and the tables at its magnetising current. */
 static void robust_step(drive_t *drive, const snapshot_t *snapshot)
 {
-    const motor_t *m = &drive->motor;
+    const motor_t *m = drive->motor;
     task_state_t *task = &drive->task;
     const identify_point_t point = identify_point(&m->identify, &snapshot->window, snapshot->sample.point.omega);
     const identify_tables_t tables = {flux_table_step(&m->flux_table, point.i_m),

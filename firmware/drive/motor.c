@@ -14,9 +14,9 @@ static bool step_valid(const bases_t *b)
 /* v_ratio is stored three times: itself, its inverse (Q15 * Q16 = Q31) and sqrt(3)/2 of it. 1/2 < v_ratio < 0.7. */
 static bool ratio_valid(const motor_t *m)
 {
-    const int32_t ratio_q31 = m->modulate.alpha_q31;
-    const uint32_t one_q31 = (uint32_t)(ratio_q31 >> 16) * (m->current_control.per_ratio_q31 >> 15);
-    const int32_t error = m->modulate.side_q31 - fx_mul_q31(ratio_q31, Q31(0.86602540378443865));
+    const int32_t ratio_q31 = m->parameters.modulate.alpha_q31;
+    const uint32_t one_q31 = (uint32_t)(ratio_q31 >> 16) * (m->parameters.current_control.per_ratio_q31 >> 15);
+    const int32_t error = m->parameters.modulate.side_q31 - fx_mul_q31(ratio_q31, Q31(0.86602540378443865));
     return ratio_q31 > Q31(0.5) && ratio_q31 < Q31(0.7) && one_q31 - 0x7FF80000U < 0x100000U && error > -16 &&
            error < 16;
 }
@@ -51,10 +51,10 @@ static motor_check_t monitors_check(const motor_t *m)
 
 /* (MO-11): the largest difference between two phases is sqrt(3) v_ratio |v|; current control may limit from 31/32 on.
  * 1/v_ratio is Q15 in two factors, below 2 each. */
-uint32_t motor_clear_q30(const motor_t *m, int32_t dead_time)
+uint32_t motor_clear_q30(const motor_parameters_t *p, int32_t dead_time)
 {
-    const int32_t span = 2 * ((m->modulate.longest_q31 >> 16) - dead_time);
-    const int64_t per_ratio = m->current_control.per_ratio_q31 >> 16;
+    const int32_t span = 2 * ((p->modulate.longest_q31 >> 16) - dead_time);
+    const int64_t per_ratio = p->current_control.per_ratio_q31 >> 16;
     const int64_t max_q30 = (((span > 0) ? span * span / 3 : 0) * per_ratio >> 15) * per_ratio >> 15;
     return (uint32_t)((max_q30 < CIRCLE_CLEAR_Q30) ? max_q30 : CIRCLE_CLEAR_Q30);
 }
@@ -66,7 +66,7 @@ static bool knee_valid(const modulate_config_t *c)
 
 static motor_check_t modulate_check(const motor_t *m)
 {
-    const modulate_config_t *c = &m->modulate;
+    const modulate_config_t *c = &m->parameters.modulate;
     if (c->longest_q31 <= Q31(0.25) || c->longest_q31 > c->nearer_rail_q31 || c->nearer_rail_q31 > Q31(0.5)) {
         return MOTOR_CHECK_SHORTEST_PULSE;
     }
@@ -76,13 +76,13 @@ static motor_check_t modulate_check(const motor_t *m)
     if (!knee_valid(c)) {
         return MOTOR_CHECK_CURRENT_KNEE;
     }
-    const uint32_t clear_max_q30 = motor_clear_q30(m, c->dead_time_q16 / 2);
-    return (m->current_control.clear_q30 <= clear_max_q30) ? MOTOR_CHECK_OK : MOTOR_CHECK_CLEAR_VOLTAGE;
+    const uint32_t clear_max_q30 = motor_clear_q30(&m->parameters, c->dead_time_q16 / 2);
+    return (m->parameters.current_control.clear_q30 <= clear_max_q30) ? MOTOR_CHECK_OK : MOTOR_CHECK_CLEAR_VOLTAGE;
 }
 
 static motor_check_t control_check(const motor_t *m)
 {
-    const current_control_config_t *c = &m->current_control;
+    const current_control_config_t *c = &m->parameters.current_control;
     const voltage_reserve_config_t *v = &m->voltage_reserve;
     if (c->sigma_q24 <= 0 || c->setpoint_weight <= 0 || c->integral_gain < 0 || c->integral_gain >= Q15(0.5) ||
         c->tracking_gain_q34 < 0) {
@@ -97,7 +97,7 @@ static motor_check_t control_check(const motor_t *m)
     if (v->v_ratio <= 0 || v->trim_min > 0 || v->trim_max < 0) {
         return MOTOR_CHECK_VOLTAGE_RESERVE;
     }
-    if (m->torque_loop.authority <= 0 || m->torque_loop.torque_min <= 0) {
+    if (m->parameters.torque_loop.authority <= 0 || m->parameters.torque_loop.torque_min <= 0) {
         return MOTOR_CHECK_TORQUE_LOOP;
     }
     return (m->torque_max > 0) ? MOTOR_CHECK_OK : MOTOR_CHECK_TORQUE_MAX;

@@ -4,7 +4,7 @@
 /** Everything that depends on the machine and its inverter: one constant, generated from motor.toml and the flux map.
  * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
  * Errors   motor_check() names the first of tables, gains and limits that no drive may run with
- * Context  const data in flash */
+ * Context  const data in flash; what changes while driving is motor_parameters_t, of which each drive has its own */
 #include "control/adapt/angle_harmonics.h"
 #include "control/commission/commission.h"
 #include "control/current/angle_tracker.h"
@@ -26,6 +26,17 @@
 #include "types/bases.h"
 #include "types/motor_check.h"
 
+/** What calibration, commissioning and the trim change while the drive runs: the blocks that contain such a value. A
+ * drive has its own; the motor data hold the values it starts with. */
+typedef struct {
+    q15_t torque_slew; /* per 1 kHz step; Q15_MAX: no limit */
+    current_control_config_t current_control;
+    modulate_config_t modulate;
+    mrai_config_t mrai;
+    torque_loop_config_t torque_loop;
+} motor_parameters_t;
+
+/** What nothing changes: drives point at it in flash, where its checksum is. */
 typedef struct {
     const char *name;
     bases_t bases;
@@ -38,18 +49,13 @@ typedef struct {
     float r_ohm_20;
     float dead_time_s; /* of the bridge: modulate.dead_time compensates a fraction of it */
     q15_t torque_max;
-    q15_t torque_slew;      /* per 1 kHz step; Q15_MAX: no limit */
     q15_t torque_slew_weak; /* largest slew while the planned flux is below psi_weak, where little voltage is left */
     q15_t psi_weak;
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;
     angle_harmonics_config_t angle_harmonics;
     flux_table_config_t flux_table;
-    current_control_config_t current_control;
-    modulate_config_t modulate;
-    mrai_config_t mrai;
     identify_config_t identify;
-    torque_loop_config_t torque_loop;
     current_reference_config_t current_reference;
     voltage_reserve_config_t voltage_reserve;
     torque_limit_config_t torque_limit;
@@ -59,6 +65,7 @@ typedef struct {
     plausibility_config_t plausibility;
     torque_monitor_config_t torque_monitor;
     commission_config_t commission;
+    motor_parameters_t parameters; /* to start with */
 } motor_t;
 
 extern const motor_t motor;
@@ -66,7 +73,7 @@ extern const motor_t motor;
 /** The first check that fails, in the order of the signal; MOTOR_CHECK_OK if none does. */
 motor_check_t motor_check(const motor_t *motor);
 
-/** The largest current_control.clear_q30 for this dead time. */
-uint32_t motor_clear_q30(const motor_t *motor, int32_t dead_time);
+/** The largest current_control.clear_q30 with such a dead time. */
+uint32_t motor_clear_q30(const motor_parameters_t *parameters, int32_t dead_time);
 
 #endif

@@ -21,6 +21,6 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     };
     if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
         window_box_write(&drive->windows, &fast->window);
-        identify_window_restart(&fast->window, drive->motor.bases.periods_per_step);
+        identify_window_restart(&fast->window, drive->motor->bases.periods_per_step);
     }
 }

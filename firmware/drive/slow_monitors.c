@@ -26,7 +26,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
     };
-    return plausibility_step(&drive->motor.plausibility, &task->plausibility, &in);
+    return plausibility_step(&drive->motor->plausibility, &task->plausibility, &in);
 }
 
 static uint32_t check_torque(drive_t *drive, const sample_t *sample)
@@ -40,7 +40,7 @@ static uint32_t check_torque(drive_t *drive, const sample_t *sample)
         .omega = fx_q15_from_q31(sample->point.omega),
         .torque = fx_q15_from_q31(task->torque_loop.model),
     };
-    return torque_monitor_step(&drive->motor.torque_monitor, &task->torque_monitor, &in);
+    return torque_monitor_step(&drive->motor->torque_monitor, &task->torque_monitor, &in);
 }
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)

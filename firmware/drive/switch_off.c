@@ -10,10 +10,10 @@
 /* The current at which it cancels the flux of the magnets, by bisection: psi_d rises with i_d. */
 static int32_t short_circuit_i_d(const drive_t *drive, const snapshot_t *snapshot)
 {
-    int32_t low = -i_d_limit_step(&drive->motor.i_d_limit, snapshot->psi_d_error, snapshot->winding_dC), high = 0;
+    int32_t low = -i_d_limit_step(&drive->motor->i_d_limit, snapshot->psi_d_error, snapshot->winding_dC), high = 0;
     for (int k = 0; k < BISECTIONS; k++) {
         const int32_t middle = (low + high) / 2;
-        const flux_point_t flux = flux_table_step(&drive->motor.flux_table, (dq_q15_t){middle, 0});
+        const flux_point_t flux = flux_table_step(&drive->motor->flux_table, (dq_q15_t){middle, 0});
         const bool below = flux.psi_d + snapshot->psi_d_error < 0;
         low = below ? middle : low;
         high = below ? high : middle;

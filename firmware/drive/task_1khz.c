@@ -13,7 +13,7 @@ static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 {
     const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
     return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
-           sum <= drive->motor.monitor.zero_max;
+           sum <= drive->motor->monitor.zero_max;
 }
 
 /* The short circuit is commanded only if the bridge has been switching before; otherwise it may not be powered. */
@@ -34,7 +34,7 @@ static safe_t decide_safe_state(drive_t *drive, const snapshot_t *snapshot)
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
-    const bool short_circuit = safe_state_step(&drive->motor.safe_state, &task->safe_state, &in);
+    const bool short_circuit = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
     task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));
     if (!task->armed) {
         return SAFE_FREEWHEEL;
@@ -57,7 +57,7 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
     if (request->identification_resets != task->identification_resets) {
         task->identification_resets = request->identification_resets;
         mrai_discard(drive);
-        identify_reset(&drive->motor.identify, &task->identify);
+        identify_reset(&drive->motor->identify, &task->identify);
         drive_retrim(drive, 0);
     }
     if (faults != 0U) {
@@ -78,18 +78,18 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
         .psi_delta = snapshot->psi_d_error,
         .acting = snapshot->sample.acting && !drive_is_direct(drive),
     };
-    return voltage_reserve_step(&drive->motor.voltage_reserve, &task->voltage_reserve, &in);
+    return voltage_reserve_step(&drive->motor->voltage_reserve, &task->voltage_reserve, &in);
 }
 
 /* A fast change of torque needs voltage. Near the voltage limit it would make the currents oscillate. */
 static q15_t fastest_slew(const drive_t *drive)
 {
-    return (drive->task.reference.psi_plan < drive->motor.psi_weak) ? drive->motor.torque_slew_weak : Q15_MAX;
+    return (drive->task.reference.psi_plan < drive->motor->psi_weak) ? drive->motor->torque_slew_weak : Q15_MAX;
 }
 
 static q15_t slew_limit(const drive_t *drive)
 {
-    return (q15_t)fx_min_s32(drive->motor.torque_slew, fastest_slew(drive));
+    return (q15_t)fx_min_s32(drive->parameters.torque_slew, fastest_slew(drive));
 }
 
 static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
@@ -107,7 +107,7 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
     };
-    task->allowed = torque_limit_step(&drive->motor.torque_limit, &task->torque_limit, &in);
+    task->allowed = torque_limit_step(&drive->motor->torque_limit, &task->torque_limit, &in);
     const uint32_t magnet = task->reference.i_d_limited ? DERATING_MAGNET : 0U;
     task->derating = (uint16_t)(task->allowed.derating | magnet);
     return task->allowed.torque_limited;
@@ -118,7 +118,6 @@ static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
 static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
-    const motor_t *m = &drive->motor;
     const q15_t limited = limit_torque(drive, snapshot);
     const q15_t before = task->torque_commanded;
     const q15_t allowed = torque_limit_clamp(&task->allowed, before, snapshot->sample.point.omega < 0);
@@ -132,7 +131,7 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
         .enabled = drive->request.torque_loop && !drive_is_direct(drive),
         .limited = task->reference.limited || snapshot->sample.voltage_limited,
     };
-    return torque_loop_step(&m->torque_loop, &task->torque_loop, &loop);
+    return torque_loop_step(&drive->parameters.torque_loop, &task->torque_loop, &loop);
 }
 
 /* Identified |psi_q| minus the tables'. */
@@ -154,10 +153,10 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
         .v_trim = trim.v_trim,
         .shift = trim.shift,
         .psi_delta = snapshot->psi_d_error,
-        .i_d_max = i_d_limit_step(&drive->motor.i_d_limit, snapshot->psi_d_error, snapshot->winding_dC),
+        .i_d_max = i_d_limit_step(&drive->motor->i_d_limit, snapshot->psi_d_error, snapshot->winding_dC),
         .psi_q_delta = psi_q_delta(drive),
     };
-    task->reference = current_reference_step(&drive->motor.current_reference, &in);
+    task->reference = current_reference_step(&drive->motor->current_reference, &in);
     if (commission_runs(&task->commission)) {
         return task->commission.i_ref;
     }
@@ -170,7 +169,7 @@ static void reset_torque_path(drive_t *drive)
     task->torque_loop = (torque_loop_state_t){0};
     task->torque_limit.loss = 0;
     task->derating = 0;
-    task->reference = (current_reference_t){.torque_max = drive->motor.torque_max, .psi_plan = Q15_MAX};
+    task->reference = (current_reference_t){.torque_max = drive->motor->torque_max, .psi_plan = Q15_MAX};
     task->voltage_reserve = (voltage_reserve_state_t){0};
     task->allowed.torque_limited = 0;
     task->torque_commanded = 0;
@@ -197,10 +196,10 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
     };
     if (command.run) {
         commanded->i = next_references(drive, snapshot);
-        commanded->flux = flux_table_step(&drive->motor.flux_table, commanded->i);
+        commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
         task->psi_ref = (dq_q15_t){commanded->flux.psi_d, commanded->flux.psi_q};
-        command.target = current_control_target(&drive->motor.current_control, commanded->i, &commanded->flux);
+        command.target = current_control_target(&drive->parameters.current_control, commanded->i, &commanded->flux);
     } else {
         reset_torque_path(drive);
     }
@@ -235,7 +234,7 @@ void task_1khz(drive_t *drive)
     task_state_t *task = &drive->task;
     snapshot_t snapshot;
     take_snapshot(drive, &snapshot);
-    angle_harmonics_step(&drive->motor.angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
+    angle_harmonics_step(&drive->motor->angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
     uint32_t faults = slow_monitors_step(drive, &snapshot);
     task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);

@@ -28,7 +28,7 @@ void ecu_watch(ecu_t *ecu)
     liveness_t *liveness = &ecu->liveness;
     const uint32_t periods = ecu->drive.samples.generation;
     const uint32_t finished = mrai_finished(&ecu->drive);
-    const uint32_t in_step = ecu->drive.motor.bases.periods_per_step;
+    const uint32_t in_step = ecu->drive.motor->bases.periods_per_step;
     const bool late = liveness->started && periods - liveness->periods >= in_step + in_step / 2U;
     const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == liveness->finished;
     (void)debounce_step(&liveness->late_in_a_row, late, CONSECUTIVE_MAX, 1U);
@@ -67,14 +67,14 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
  * would charge the dc link, beyond what the inverter withstands at high speed. */
 static bool is_slow(const drive_t *drive)
 {
-    const q15_t least = fx_mul_q15(drive->motor.safe_state.share_open, (q15_t)drive->motor.monitor.v_min);
+    const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, (q15_t)drive->motor->monitor.v_min);
     const q15_t line_emf = drive->task.safe_state.line_emf;
-    return line_emf < least && (float)line_emf / 32768.0F * drive->motor.bases.voltage_V < TOUCH_SAFE_V;
+    return line_emf < least && (float)line_emf / 32768.0F * drive->motor->bases.voltage_V < TOUCH_SAFE_V;
 }
 
 static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
 {
-    const float share = torque_Nm / ecu->drive.motor.bases.torque_Nm;
+    const float share = torque_Nm / ecu->drive.motor->bases.torque_Nm;
     return (share >= 1.0F) ? Q15_MAX : (share <= -1.0F) ? (q15_t)-Q15_MAX : (q15_t)(share * 32767.0F);
 }
 
@@ -98,7 +98,7 @@ static uint32_t derating_reason(const ecu_t *ecu)
 
 static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
 {
-    const bases_t *b = &ecu->drive.motor.bases;
+    const bases_t *b = &ecu->drive.motor->bases;
     const float share = 1000.0F * power_kW / (1.5F * b->voltage_V * b->current_A);
     return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
 }
@@ -121,7 +121,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
     const drive_t *drive = &ecu->drive;
     const bus_command_t *command = &ecu->rx.command;
     const sample_t sample = sample_box_read(&drive->samples);
-    const float v_dc_V = (float)sample.v_dc / 32768.0F * drive->motor.bases.voltage_V;
+    const float v_dc_V = (float)sample.v_dc / 32768.0F * drive->motor->bases.voltage_V;
     const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
     return (supervisor_in_t){
         .drive_faults = drive->fast.faults,
@@ -133,7 +133,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .reset = command->fault_reset,
         .torque_requested_is_zero = fx_abs_q15(torque_requested) <= ecu->arbitration_config.dead_band,
         .torque_arbitrated_is_zero = ecu->arbitration_state.torque_arbitrated == 0,
-        .dc_in_range = sample.v_dc >= drive->motor.monitor.v_min && sample.v_dc <= drive->motor.monitor.v_max,
+        .dc_in_range = sample.v_dc >= drive->motor->monitor.v_min && sample.v_dc <= drive->motor->monitor.v_max,
         .dc_settled = is_dc_settled(ecu, sample.v_dc),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
         .sensors_plausible = are_sensors_plausible(drive, &sample),
@@ -151,7 +151,7 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
     const bus_command_t *command = &ecu->rx.command;
     const supervisor_t *supervisor = &ecu->supervisor;
     /* At most the rated torque: a ramp to zero from a larger value would reach the machine late. */
-    const q15_t max = are_limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor.torque_max;
+    const q15_t max = are_limits_lost(ecu) ? (q15_t)0 : ecu->drive.motor->torque_max;
     return (arbitrate_in_t){
         .torque_requested = per_unit(ecu, command->torque_requested_Nm),
         .limit_drive = fx_clamp_q15(per_unit(ecu, command->limit_drive_Nm), 0, max),
@@ -171,7 +171,7 @@ static request_limit_t request_limit(const ecu_t *ecu)
     const float magnitude_Nm = (requested_Nm < 0.0F) ? -requested_Nm : requested_Nm;
     const q31_t omega = sample_box_read(&ecu->drive.samples).point.omega;
     const bool braking = arbitrate_is_braking(&ecu->arbitration_config, omega, requested_Nm < 0.0F);
-    if (magnitude_Nm > ecu->drive.motor.torque_max_Nm) {
+    if (magnitude_Nm > ecu->drive.motor->torque_max_Nm) {
         return REQUEST_LIMIT_RATED_TORQUE;
     }
     if (magnitude_Nm > (braking ? command->limit_regen_Nm : command->limit_drive_Nm)) {

@@ -21,7 +21,7 @@ static float from_q31(q31_t x, float base)
 
 static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t *t)
 {
-    const bases_t *b = &drive->motor.bases;
+    const bases_t *b = &drive->motor->bases;
     const dq_q15_t wanted = drive->request.current_mode ? drive->request.i_ref : drive->task.reference.i_ref;
     const float u_d = from_q15(sample->point.u.d, b->voltage_V);
     const float u_q = from_q15(sample->point.u.q, b->voltage_V);
@@ -31,13 +31,13 @@ static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t
     t->iq_ref_A = from_q15(wanted.q, b->current_A);
     t->v_dc_V = from_q15(sample->v_dc, b->voltage_V);
     t->i_dc_A = (t->v_dc_V > V_DC_MIN_V) ? 1.5F * (u_d * t->id_A + u_q * t->iq_A) / t->v_dc_V : 0.0F;
-    t->speed_rpm = from_q31(sample->point.omega, b->omega_rad_s) / (float)drive->motor.angle_tracker.pole_pairs *
+    t->speed_rpm = from_q31(sample->point.omega, b->omega_rad_s) / (float)drive->motor->angle_tracker.pole_pairs *
                    RPM_PER_RAD_S;
 }
 
 static void read_torque(const drive_t *drive, telemetry_t *t)
 {
-    const float base = drive->motor.bases.torque_Nm;
+    const float base = drive->motor->bases.torque_Nm;
     t->torque_estimated_Nm = from_q15(drive->task.identification.torque_estimated, base);
     t->torque_commanded_Nm = from_q15(drive->task.torque_commanded, base);
     t->torque_max_Nm = from_q15(drive->task.reference.torque_max, base);
@@ -45,7 +45,7 @@ static void read_torque(const drive_t *drive, telemetry_t *t)
 
 static void read_identification(const drive_t *drive, telemetry_t *t)
 {
-    const motor_t *m = &drive->motor;
+    const motor_t *m = drive->motor;
     const float psi_Vs = m->psi_f_Vs + from_q31(drive->task.identification.psi_delta, m->bases.flux_Vs);
     const float r_ohm = m->r_ohm_20 + from_q31(drive->task.identification.r_delta, m->bases.resistance_ohm);
     t->psi_f_mVs = 1000.0F * psi_Vs;
@@ -86,5 +86,5 @@ void telemetry_read(const drive_t *drive, telemetry_t *telemetry)
     telemetry->drive_faults = drive->fast.faults;
     telemetry->motor_check = (uint32_t)drive_motor_check(drive);
     telemetry->diagnostics.isr_overruns = mrai_overruns(drive);
-    telemetry->motor_id = hash(drive->motor.name);
+    telemetry->motor_id = hash(drive->motor->name);
 }

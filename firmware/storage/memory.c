@@ -28,7 +28,7 @@ void memory_recall(memory_t *memory, drive_t *drive)
 {
     record_t record;
     *memory = (memory_t){0};
-    if (store_load(memory_layout(&drive->motor), &record, sizeof record) == STORE_OK) {
+    if (store_load(memory_layout(drive->motor), &record, sizeof record) == STORE_OK) {
         memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
                            drive_recall(drive, &record.identified);
         if (memory->recalled) {
@@ -40,7 +40,7 @@ void memory_recall(memory_t *memory, drive_t *drive)
 /* The robust identification counts steps of the task. */
 static uint32_t in_steps(const drive_t *drive, uint32_t ms)
 {
-    return (uint32_t)((float)ms * 1e-3F / drive->motor.bases.step_s + 0.5F);
+    return (uint32_t)((float)ms * 1e-3F / drive->motor->bases.step_s + 0.5F);
 }
 
 static bool at_rest(const drive_t *drive)
@@ -69,7 +69,7 @@ bool memory_background(memory_t *memory, const drive_t *drive)
         return false;
     }
     const record_t record = {drive_identified_record(drive), drive->task.compensation, drive->task.trim.trim};
-    const bool saved = store_save(memory_layout(&drive->motor), &record, sizeof record);
+    const bool saved = store_save(memory_layout(drive->motor), &record, sizeof record);
     memory->has_tried = true;
     memory->tried_at = now;
     memory->has_run = !saved;

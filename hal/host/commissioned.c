@@ -22,7 +22,7 @@ double commissioned_failure(const fluxtrue_t *d)
 
 double commissioned_r_ohm(const fluxtrue_t *d)
 {
-    return (double)d->drive.task.inverter.r / ONE_Q30 * (double)d->drive.motor.bases.resistance_ohm;
+    return (double)d->drive.task.inverter.r / ONE_Q30 * (double)d->drive.motor->bases.resistance_ohm;
 }
 
 double commissioned_trims(const fluxtrue_t *d)
@@ -39,23 +39,23 @@ void commissioned_set_trim(fluxtrue_t *d, double value)
 double commissioned_level_V(const fluxtrue_t *d)
 {
     const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation & 1U].v_dc / 32768.0 *
-                          (double)d->drive.motor.bases.voltage_V;
-    return (double)d->drive.motor.modulate.dead_time_q16 / 65536.0 * v_dc_V;
+                          (double)d->drive.motor->bases.voltage_V;
+    return (double)d->drive.parameters.modulate.dead_time_q16 / 65536.0 * v_dc_V;
 }
 
 double commissioned_knee_A(const fluxtrue_t *d)
 {
-    return 131072.0 / (double)d->drive.motor.modulate.knee_q17 * (double)d->drive.motor.bases.current_A;
+    return 131072.0 / (double)d->drive.parameters.modulate.knee_q17 * (double)d->drive.motor->bases.current_A;
 }
 
 #define DEFINITION(k) \
     double commissioned_##k##_A(const fluxtrue_t *d) \
     { \
-        return (double)d->drive.task.inverter.knot[k] / ONE_Q30 * (double)d->drive.motor.bases.current_A; \
+        return (double)d->drive.task.inverter.knot[k] / ONE_Q30 * (double)d->drive.motor->bases.current_A; \
     } \
     double commissioned_##k##_V(const fluxtrue_t *d) \
     { \
-        return (double)d->drive.task.inverter.v[k] / ONE_Q30 * (double)d->drive.motor.bases.voltage_V; \
+        return (double)d->drive.task.inverter.v[k] / ONE_Q30 * (double)d->drive.motor->bases.voltage_V; \
     }
 
 COMMISSIONED_POINTS(DEFINITION)

@@ -24,7 +24,8 @@ void fluxtrue_init(fluxtrue_t *instance)
 {
     *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
     nvm_host_erase(&instance->nvm);
-    drive_init(&instance->drive, &motor);
+    instance->motor = motor;
+    drive_init(&instance->drive, &instance->motor);
 }
 
 const char *fluxtrue_version(void)
@@ -67,7 +68,7 @@ static uint16_t to_count(double share, unsigned bits)
 
 static void take_samples(fluxtrue_t *d, const double in[6])
 {
-    const motor_t *m = &d->drive.motor;
+    const motor_t *m = d->drive.motor;
     const double span_A = 2.0 * (double)m->current_full_scale_A;
     const double turns = in[4] / TURN_RAD;
     d->counts = (adc_counts_t){
@@ -93,7 +94,7 @@ static void run_period(fluxtrue_t *d)
         mrai_isr(&d->drive);
     }
     d->periods++;
-    if (d->periods % d->drive.motor.bases.periods_per_step == 0U) {
+    if (d->periods % d->drive.motor->bases.periods_per_step == 0U) {
         if (d->on_bus) {
             ecu_task_1khz(&d->ecu);
         } else {
@@ -106,7 +107,7 @@ static void run_period(fluxtrue_t *d)
 
 void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4])
 {
-    if (credible(&drive->drive.motor, in)) {
+    if (credible(drive->drive.motor, in)) {
         take_samples(drive, in);
     } else {
         /* The last credible samples are used again, so that filters and observers continue; the fault brings the safe

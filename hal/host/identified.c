@@ -18,25 +18,25 @@ static double pu(int32_t x, double one, float base)
 static double value(const fluxtrue_t *d, identify_index_t index, float base)
 {
     const drive_t *drive = &d->drive;
-    const q31_t identified = identify_value(&drive->motor.identify, &drive->task.identify, index);
+    const q31_t identified = identify_value(&drive->motor->identify, &drive->task.identify, index);
     return is_robust(d) ? pu(identified, 2147483648.0, base) : 0.0;
 }
 
 double identified_psi_f_Vs(const fluxtrue_t *d)
 {
-    const motor_t *m = &d->drive.motor;
+    const motor_t *m = d->drive.motor;
     return (double)m->psi_f_Vs + pu(d->drive.task.identification.psi_delta, 2147483648.0, m->bases.flux_Vs);
 }
 
 double identified_r_ohm(const fluxtrue_t *d)
 {
-    const motor_t *m = &d->drive.motor;
+    const motor_t *m = d->drive.motor;
     return (double)m->r_ohm_20 + pu(d->drive.task.identification.r_delta, 2147483648.0, m->bases.resistance_ohm);
 }
 
 double identified_drop_V(const fluxtrue_t *d)
 {
-    return value(d, IDENTIFY_DROP, d->drive.motor.bases.voltage_V);
+    return value(d, IDENTIFY_DROP, d->drive.motor->bases.voltage_V);
 }
 
 double identified_lq_scale(const fluxtrue_t *d)
@@ -78,5 +78,5 @@ double identified_local_Vs(const fluxtrue_t *d)
 {
     const dq_q30_t local = d->drive.task.identify.local;
     const double length = hypot((double)local.d, (double)local.q);
-    return is_robust(d) ? length / 1073741824.0 * (double)d->drive.motor.bases.flux_Vs : 0.0;
+    return is_robust(d) ? length / 1073741824.0 * (double)d->drive.motor->bases.flux_Vs : 0.0;
 }

@@ -37,7 +37,8 @@ struct fluxtrue {
         drive_t drive; /* also without a bus */
         ecu_t ecu;     /* begins with the drive */
     };
-    bool on_bus; /* ecu_task_1khz() runs instead of task_1khz() */
+    motor_t motor; /* the drive's: without a machine its slow monitors are disabled */
+    bool on_bus;   /* ecu_task_1khz() runs instead of task_1khz() */
     host_board_t board;
     nvm_host_t nvm;
     memory_t memory;

@@ -8,13 +8,13 @@
 
 static double torque_base(const fluxtrue_t *d)
 {
-    return (double)d->drive.motor.bases.torque_Nm;
+    return (double)d->drive.motor->bases.torque_Nm;
 }
 
 /* On the dc side: P_b = 1.5 V_b I_b. */
 static double power_base(const fluxtrue_t *d)
 {
-    return 1.5 * (double)d->drive.motor.bases.voltage_V * (double)d->drive.motor.bases.current_A;
+    return 1.5 * (double)d->drive.motor->bases.voltage_V * (double)d->drive.motor->bases.current_A;
 }
 
 static q15_t to_limit(double x, double base)
@@ -74,12 +74,12 @@ void limits_set_power_regen(fluxtrue_t *drive, double value)
 
 double limits_get_machine_monitors(const fluxtrue_t *drive)
 {
-    return drive->drive.motor.plausibility.e_0 != Q15_MAX;
+    return drive->drive.motor->plausibility.e_0 != Q15_MAX;
 }
 
 void limits_set_machine_monitors(fluxtrue_t *drive, double value)
 {
-    motor_t *m = &drive->drive.motor;
+    motor_t *m = &drive->motor;
     m->plausibility = motor.plausibility;
     m->torque_monitor = motor.torque_monitor;
     if (value == 0.0) {

@@ -38,7 +38,7 @@ static q15_t to_pu15(double x, float base)
 
 static const bases_t *bases(const fluxtrue_t *d)
 {
-    return &d->drive.motor.bases;
+    return &d->drive.motor->bases;
 }
 
 static const sample_t *sample(const fluxtrue_t *d)
@@ -76,7 +76,7 @@ GETTER(v_dc, pu15(sample(d)->v_dc, bases(d)->voltage_V))
 GETTER(fault_word, d->drive.fast.faults)
 GETTER(motor_check, drive_motor_check(&d->drive))
 GETTER(voltage_limited, sample(d)->voltage_limited)
-GETTER(table_clamped, flux_table_outside(&d->drive.motor.flux_table, sample(d)->point.i))
+GETTER(table_clamped, flux_table_outside(&d->drive.motor->flux_table, sample(d)->point.i))
 GETTER(overruns, mrai_overruns(&d->drive))
 GETTER(run_state, d->drive.task.run_state)
 GETTER(winding, d->winding_C)
@@ -86,7 +86,7 @@ GETTER(memory_saves, d->memory.saves)
 static double get_speed(const fluxtrue_t *d)
 {
     const double omega_rad_s = pu31(sample(d)->point.omega, bases(d)->omega_rad_s);
-    return omega_rad_s / d->drive.motor.angle_tracker.pole_pairs * 60.0 / 6.283185307179586;
+    return omega_rad_s / d->drive.motor->angle_tracker.pole_pairs * 60.0 / 6.283185307179586;
 }
 
 /* In current mode the requested reference, else the output of the current reference. */
@@ -228,9 +228,9 @@ static const parameter_t *find(const char *called)
 static double bound_of(const fluxtrue_t *d, const parameter_t *p)
 {
     if (p->set == stations_set_requested_Nm) {
-        return (double)d->drive.motor.torque_max_Nm;
+        return (double)d->drive.motor->torque_max_Nm;
     }
-    return pu15(d->drive.motor.current_reference.i_max, bases(d)->current_A);
+    return pu15(d->drive.motor->current_reference.i_max, bases(d)->current_A);
 }
 
 /* CALIBRATION_COUNT: no such name. */
@@ -253,7 +253,7 @@ static int set_calibration(fluxtrue_t *drive, const char *name, double value)
     if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi)) {
         return FLUXTRUE_OUT_OF_RANGE;
     }
-    calibration_set(&drive->drive.motor, id, (float)value);
+    calibration_set(&drive->drive, id, (float)value);
     return FLUXTRUE_OK;
 }
 
@@ -282,7 +282,7 @@ double fluxtrue_get(const fluxtrue_t *drive, const char *name)
         return p->get(drive);
     }
     const calibration_id_t id = find_calibration(name);
-    return (id == CALIBRATION_COUNT) ? (double)NAN : (double)calibration_get(&drive->drive.motor, id);
+    return (id == CALIBRATION_COUNT) ? (double)NAN : (double)calibration_get(&drive->drive, id);
 }
 
 const char *fluxtrue_name(int index)

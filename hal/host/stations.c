@@ -8,7 +8,7 @@
 
 static double base_Nm(const fluxtrue_t *d)
 {
-    return (double)d->drive.motor.bases.torque_Nm;
+    return (double)d->drive.motor->bases.torque_Nm;
 }
 
 static double in_Nm(const fluxtrue_t *d, q15_t torque)

@@ -62,7 +62,7 @@ void systick_handler(void)
     fast_isr(&the_drive);
     script_note(&script, duties, gates);
     done = done + 1U;
-    if (done % the_drive.motor.bases.periods_per_step == 0U) {
+    if (done % the_drive.motor->bases.periods_per_step == 0U) {
         NVIC_ISPR0 = 1U << IRQ_TASK;
     }
 }
@@ -90,8 +90,10 @@ static void start(void)
 
 __attribute__((noinline)) int main(void)
 {
-    drive_init(&the_drive, &motor);
-    slow_monitors_without_machine(&the_drive.motor);
+    static motor_t without_machine;
+    without_machine = motor;
+    slow_monitors_without_machine(&without_machine);
+    drive_init(&the_drive, &without_machine);
     start();
     while (done < SCRIPT_PERIODS) {
         __asm__ volatile("wfi" ::: "memory");

@@ -65,9 +65,9 @@ static void compare_command(void)
 
 static void compare_torque(double before_Nm)
 {
-    const double base_Nm = (double)ecu.drive.motor.bases.torque_Nm;
+    const double base_Nm = (double)ecu.drive.motor->bases.torque_Nm;
     const double now_Nm = ecu.drive.request.torque_arbitrated / 32768.0 * base_Nm;
-    const double most_Nm = (double)ecu.drive.motor.torque_max_Nm;
+    const double most_Nm = (double)ecu.drive.motor->torque_max_Nm;
     const double asked_Nm = oracle.command.alive ? oracle.torque_dNm / 10.0 : 0.0;
     check(fabs(now_Nm) <= most_Nm + ROUNDING_NM, "more torque than the machine may give");
     check(now_Nm <= fmax(fmax(before_Nm, asked_Nm), 0.0) + ROUNDING_NM, "torque that was not requested");
@@ -126,7 +126,7 @@ static void start_plant(void)
 static void millisecond(uint32_t ms)
 {
     can_frame_t sent;
-    const double before_Nm = ecu.drive.request.torque_arbitrated / 32768.0 * (double)ecu.drive.motor.bases.torque_Nm;
+    const double before_Nm = ecu.drive.request.torque_arbitrated / 32768.0 * (double)ecu.drive.motor->bases.torque_Nm;
     traffic(ms);
     oracle_tick(&oracle);
     check(sim_run(sim, PERIODS_PER_MS, NULL, 0) == 0, "the simulation cannot go on");

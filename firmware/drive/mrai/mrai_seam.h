@@ -14,7 +14,7 @@
 
 static inline motor_check_t mrai_data_check(const motor_t *m)
 {
-    return mrai_check(&m->mrai);
+    return mrai_check(&m->parameters.mrai);
 }
 
 static inline bool mrai_is_chosen(const drive_t *drive)

@@ -10,12 +10,11 @@
  * dead-time compensation that its task trims. */
 #define LAYOUT_TRIMMED 2
 #define LAYOUT_INPUTS(X) \
-    X(request)           \
-    X(motor.modulate)    \
-    X(motor.torque_slew) \
-    X(motor.mrai)        \
-    X(motor.torque_loop) \
-    X(motor.identify)
+    X(request)                \
+    X(parameters.modulate)    \
+    X(parameters.torque_slew) \
+    X(parameters.mrai)        \
+    X(parameters.torque_loop)
 
 /* What the activities write. */
 #define LAYOUT_STATE(X) \

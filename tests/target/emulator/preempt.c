@@ -101,6 +101,8 @@ static void load(preempt_t *p, const drive_t *drive)
 {
     p->host->drive = *drive;
     p->host->drive.motor = p->e->mirror.host->drive.motor;
+    p->host->drive.period = p->e->mirror.host->drive.period;
+    p->host->drive.parameters = p->e->mirror.host->drive.parameters;
     temperatures_take(p->e, p->host);
     host_port_select(p->host);
 }

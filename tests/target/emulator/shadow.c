@@ -78,8 +78,8 @@ static void task_ends(emulated_t *e)
     e->shadow->drive.commands = e->task_result.commands;
     e->shadow->drive.mrai.schedules = e->task_result.mrai.schedules;
     e->shadow->drive.mrai.task = e->task_result.mrai.task;
-    e->shadow->drive.motor.modulate = e->task_result.motor.modulate;
-    e->shadow->drive.motor.current_control = e->task_result.motor.current_control;
+    e->shadow->drive.parameters.modulate = e->task_result.parameters.modulate;
+    e->shadow->drive.parameters.current_control = e->task_result.parameters.current_control;
     e->task_runs = false;
 }
 
@@ -100,7 +100,7 @@ static void task_interrupted(emulated_t *e)
     part_take(e, offsetof(drive_t, commands), sizeof e->task_result.commands);
     part_take(e, offsetof(drive_t, mrai.schedules), sizeof e->task_result.mrai.schedules);
     part_take(e, offsetof(drive_t, mrai.task), sizeof e->task_result.mrai.task);
-    part_take(e, offsetof(drive_t, motor.modulate), sizeof e->task_result.motor.modulate);
+    part_take(e, offsetof(drive_t, parameters.modulate), sizeof e->task_result.parameters.modulate);
 }
 
 /* The fast ISR, which nothing interrupts, is followed when it has read its inputs: at its end. */
@@ -145,9 +145,11 @@ bool shadow_start(emulated_t *e)
         return false;
     }
     mirror_pull(&e->mirror);
-    const motor_t own = e->shadow->drive.motor; /* its tables are here */
+    const drive_t own = e->shadow->drive;
     e->shadow->drive = e->mirror.host->drive;
-    e->shadow->drive.motor = own;
+    e->shadow->drive.motor = own.motor; /* its tables are here */
+    e->shadow->drive.period = own.period;
+    e->shadow->drive.parameters = own.parameters;
     shadow_inputs(e);
     emu_on_exception(e->emu, follow, e);
     return true;

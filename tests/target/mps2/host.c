@@ -53,8 +53,10 @@ int16_t hal_temperature_inverter_dC(void)
 
 int main(void)
 {
-    drive_init(&drive, &motor);
-    slow_monitors_without_machine(&drive.motor);
+    static motor_t without_machine;
+    without_machine = motor;
+    slow_monitors_without_machine(&without_machine);
+    drive_init(&drive, &without_machine);
     for (uint32_t k = 1; k <= SCRIPT_PERIODS; k++) {
         script_next(&script);
         fast_isr(&drive);

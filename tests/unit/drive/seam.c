@@ -81,7 +81,8 @@ void seam_start(void)
     hal_pwm_enable_Stub(pwm_enable);
     hal_temperature_winding_dC_Stub(winding);
     hal_temperature_inverter_dC_Stub(inverter);
-    drive_init(&drive, &motor);
+    seam.motor = motor;
+    drive_init(&drive, &seam.motor);
     seam_current(0.0, 0.0, 0.0);
     seam_voltage(350.0);
 }

@@ -6,6 +6,7 @@
 #include "drive/drive.h"
 
 typedef struct {
+    motor_t motor; /* a copy of the compiled-in motor, which a test may change */
     adc_counts_t counts;
     uint32_t theta_m;
     int16_t winding_dC, inverter_dC;

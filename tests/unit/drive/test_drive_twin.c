@@ -24,16 +24,16 @@ void setUp(void)
     seam_start();
     twin = twin_create();
     twin->motor.integral_ratio = 0.0;
-    drive.motor.current_control.integral_gain = 0;
-    drive.motor.current_control.tracking_gain_q34 = 0;
+    drive.parameters.current_control.integral_gain = 0;
+    drive.parameters.current_control.tracking_gain_q34 = 0;
     twin->motor.torque_ki = 0.0;
-    drive.motor.torque_loop.ki = 0;
+    drive.parameters.torque_loop.ki = 0;
     twin_set(twin, "identification", 0.0);
     drive.request.identification = false;
     /* This machine's currents lag and its voltages are not physical: the monitors would report it. */
-    drive.motor.plausibility.e_0 = INT16_MAX;
-    drive.motor.plausibility.i_alive = INT16_MAX;
-    drive.motor.torque_monitor.v_0 = INT16_MAX;
+    seam.motor.plausibility.e_0 = INT16_MAX;
+    seam.motor.plausibility.i_alive = INT16_MAX;
+    seam.motor.torque_monitor.v_0 = INT16_MAX;
 }
 
 void tearDown(void)

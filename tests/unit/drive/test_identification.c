@@ -19,9 +19,9 @@ static uint32_t now; /* periods */
 static double lost;  /* counts of voltage along the current that nominal compensation leaves over */
 
 /* q15 */
-static int32_t dead_time(const motor_t *m)
+static int32_t dead_time(const motor_parameters_t *p)
 {
-    return m->modulate.dead_time_q16 / 2;
+    return p->modulate.dead_time_q16 / 2;
 }
 
 void setUp(void)
@@ -50,7 +50,8 @@ static void period(uint32_t k)
     s->point.u.d = (int32_t)(-omega * s->point.flux.psi_q + 0.0133 * i.d);
     s->point.u.q = (int32_t)(omega * (s->point.flux.psi_d - weak) + 0.0133 * i.q);
     /* What is compensated in addition need not be commanded any more. */
-    const double left = lost - 4.0 / 3.14159265 * 21238.0 * (dead_time(&drive.motor) - dead_time(&motor)) / 32768.0;
+    const double left = lost - 4.0 / 3.14159265 * 21238.0 *
+                                   (dead_time(&drive.parameters) - dead_time(&motor.parameters)) / 32768.0;
     s->point.u.d += (int32_t)lround(left * -3.0 / 5.831);
     s->point.u.q += (int32_t)lround(left * 5.0 / 5.831);
     s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
@@ -178,12 +179,13 @@ void test_the_compensation_takes_over_what_is_identified_of_the_voltage_error(vo
     const int last = drive.task.identification.torque_estimated;
     milliseconds(1000);
     TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_max / 1000U, last, drive.task.identification.torque_estimated);
-    TEST_ASSERT_INT_WITHIN(30, dead_time(&motor) + 121, dead_time(&drive.motor));
-    TEST_ASSERT_EQUAL_INT32(dead_time(&drive.motor) - dead_time(&motor), drive.task.trim.trim);
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
+    TEST_ASSERT_INT_WITHIN(30, dead_time(&motor.parameters) + 121, dead_time(&drive.parameters));
+    TEST_ASSERT_EQUAL_INT32(dead_time(&drive.parameters) - dead_time(&motor.parameters), drive.task.trim.trim);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(motor.parameters.current_control.clear_q30,
+                                     drive.parameters.current_control.clear_q30);
     drive.request.identification_resets++;
     task_1khz(&drive);
-    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
 }
 
 void test_who_does_not_want_the_compensation_moved_keeps_it(void)
@@ -191,6 +193,6 @@ void test_who_does_not_want_the_compensation_moved_keeps_it(void)
     at_town_speed();
     drive.request.trim = false;
     milliseconds(20000);
-    TEST_ASSERT_EQUAL_INT(dead_time(&motor), dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_DROP]);
 }

@@ -77,23 +77,23 @@ void test_current_control_and_modulation_are_the_si_values(void)
 {
     const double sigma = motor_si.sigma_rad_s / w_b;
     HELD(1.0 / (3.0 * motor_si.period_s), motor_si.sigma_rad_s, 1e-9);
-    HELD(sigma, motor.current_control.sigma_q24 / 16777216.0, 1.0 / 16777216.0);
-    HELD(motor_si.r_ohm_20 / z_b / sigma, motor.current_control.drop_gain / 65536.0, 1.0 / 65536.0);
-    HELD(motor_si.setpoint_weight, q15(motor.current_control.setpoint_weight), q15(1));
-    HELD(sigma * motor_si.integral_ratio, q15(motor.current_control.integral_gain), q15(1));
+    HELD(sigma, motor.parameters.current_control.sigma_q24 / 16777216.0, 1.0 / 16777216.0);
+    HELD(motor_si.r_ohm_20 / z_b / sigma, motor.parameters.current_control.drop_gain / 65536.0, 1.0 / 65536.0);
+    HELD(motor_si.setpoint_weight, q15(motor.parameters.current_control.setpoint_weight), q15(1));
+    HELD(sigma * motor_si.integral_ratio, q15(motor.parameters.current_control.integral_gain), q15(1));
     HELD(motor_si.integral_ratio / motor_si.setpoint_weight * motor_si.v_ratio,
-         q31(motor.current_control.tracking_gain_q34) / 8.0, q31(1) / 8.0);
-    HELD(1.0 / motor_si.v_ratio, motor.current_control.per_ratio_q31 / 2147483648.0, q31(1));
-    HELD(motor_si.v_ratio, q31(motor.modulate.alpha_q31), q31(1));
-    HELD(motor_si.v_ratio * sqrt(0.75), q31(motor.modulate.side_q31), q31(1));
-    HELD(motor_si.dead_time_duty, motor.modulate.dead_time_q16 / 65536.0, q15(1));
-    HELD(i_b / motor_si.knee_A, motor.modulate.knee_q17 / 131072.0, 1.0 / 131072.0);
-    HELD(0.5 * sqrt(3.0) * i_b / motor_si.knee_A, motor.modulate.knee_side_q17 / 131072.0, 1.0 / 131072.0);
-    HELD(0.5 - motor_si.min_pulse_duty, q31(motor.modulate.longest_q31), q15(1));
-    HELD(0.5 - 0.5 * motor_si.min_pulse_duty, q31(motor.modulate.nearer_rail_q31), q15(1));
+         q31(motor.parameters.current_control.tracking_gain_q34) / 8.0, q31(1) / 8.0);
+    HELD(1.0 / motor_si.v_ratio, motor.parameters.current_control.per_ratio_q31 / 2147483648.0, q31(1));
+    HELD(motor_si.v_ratio, q31(motor.parameters.modulate.alpha_q31), q31(1));
+    HELD(motor_si.v_ratio * sqrt(0.75), q31(motor.parameters.modulate.side_q31), q31(1));
+    HELD(motor_si.dead_time_duty, motor.parameters.modulate.dead_time_q16 / 65536.0, q15(1));
+    HELD(i_b / motor_si.knee_A, motor.parameters.modulate.knee_q17 / 131072.0, 1.0 / 131072.0);
+    HELD(0.5 * sqrt(3.0) * i_b / motor_si.knee_A, motor.parameters.modulate.knee_side_q17 / 131072.0, 1.0 / 131072.0);
+    HELD(0.5 - motor_si.min_pulse_duty, q31(motor.parameters.modulate.longest_q31), q15(1));
+    HELD(0.5 - 0.5 * motor_si.min_pulse_duty, q31(motor.parameters.modulate.nearer_rail_q31), q15(1));
     TEST_ASSERT_TRUE(motor_si.v_ratio <= 1.05 / sqrt(3.0)); /* all that the hexagon's boundary carries */
     /* (MO-11), and 31/32 of the voltage circle: inside, neither stage limits. */
-    const double clear = sqrt(motor.current_control.clear_q30 / 1073741824.0) * motor_si.v_ratio;
+    const double clear = sqrt(motor.parameters.current_control.clear_q30 / 1073741824.0) * motor_si.v_ratio;
     const double pulse = motor_si.min_pulse_duty + motor_si.dead_time_duty;
     TEST_ASSERT_TRUE(clear < 31.0 / 32.0 * motor_si.v_ratio && sqrt(3.0) * clear + 2.0 * pulse < 1.0);
     TEST_ASSERT_TRUE(clear > 0.9 / sqrt(3.0)); /* and that is most of the range */
@@ -101,7 +101,7 @@ void test_current_control_and_modulation_are_the_si_values(void)
 
 void test_the_identification_is_the_si_values(void)
 {
-    const mrai_config_t *c = &motor.mrai;
+    const mrai_config_t *c = &motor.parameters.mrai;
     const double r0 = motor_si.r_ohm_20 / z_b;
     HELD(r0, q31(c->r0), q31(1));
     HELD(4.0 * motor_si.observer_m * r0, q31(c->pole_gain), q31(1));
@@ -125,11 +125,11 @@ void test_the_identification_is_the_si_values(void)
 
 void test_torque_loop_references_and_monitors_are_the_si_values(void)
 {
-    HELD(motor_si.torque_ki, q15(motor.torque_loop.ki), q15(1));
-    HELD(motor_si.torque_kp, q15(motor.torque_loop.kp), q15(1));
-    HELD(motor_si.torque_model_rate, q15(motor.torque_loop.model_rate), q15(1));
-    HELD(motor_si.torque_authority, q15(motor.torque_loop.authority), q15(1));
-    HELD(motor_si.torque_min_Nm / t_b, q15(motor.torque_loop.torque_min), q15(1));
+    HELD(motor_si.torque_ki, q15(motor.parameters.torque_loop.ki), q15(1));
+    HELD(motor_si.torque_kp, q15(motor.parameters.torque_loop.kp), q15(1));
+    HELD(motor_si.torque_model_rate, q15(motor.parameters.torque_loop.model_rate), q15(1));
+    HELD(motor_si.torque_authority, q15(motor.parameters.torque_loop.authority), q15(1));
+    HELD(motor_si.torque_min_Nm / t_b, q15(motor.parameters.torque_loop.torque_min), q15(1));
     HELD(motor_si.torque_max_Nm / t_b, q15(motor.torque_max), q15(1));
     HELD(motor_si.ref_v_ratio, q15(motor.current_reference.v_ratio), q15(1));
     HELD(motor_si.i_max_A / i_b, q15(motor.current_reference.i_max), q15(1));

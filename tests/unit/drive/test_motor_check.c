@@ -88,49 +88,49 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)
 
 #define CONTROL(X) \
-    X(CURRENT_CONTROL_GAINS, m.current_control.sigma_q24 = 0) \
-    X(CURRENT_CONTROL_GAINS, m.current_control.setpoint_weight = 0) \
-    X(CURRENT_CONTROL_GAINS, m.current_control.integral_gain = -1) \
-    X(CURRENT_CONTROL_GAINS, m.current_control.integral_gain = Q15(0.5)) \
-    X(CURRENT_CONTROL_GAINS, m.current_control.tracking_gain_q34 = -1) \
-    X(VOLTAGE_RATIO, m.modulate.alpha_q31 = m.modulate.alpha_q31 / 1000 * 1001) \
-    X(VOLTAGE_RATIO, m.modulate.side_q31 += 20) \
-    X(VOLTAGE_RATIO, m.modulate.side_q31 -= 20) \
-    X(VOLTAGE_RATIO, m.current_control.per_ratio_q31 = 0) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.sigma_q24 = 0) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.setpoint_weight = 0) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.integral_gain = -1) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.integral_gain = Q15(0.5)) \
+    X(CURRENT_CONTROL_GAINS, m.parameters.current_control.tracking_gain_q34 = -1) \
+    X(VOLTAGE_RATIO, m.parameters.modulate.alpha_q31 = m.parameters.modulate.alpha_q31 / 1000 * 1001) \
+    X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 += 20) \
+    X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 -= 20) \
+    X(VOLTAGE_RATIO, m.parameters.current_control.per_ratio_q31 = 0) \
     X(VOLTAGE_RATIO, scale_ratio(&m, 0.499)) \
     X(VOLTAGE_RATIO, scale_ratio(&m, 0.701)) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.v_ratio = 0) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.trim_min = 1) \
     X(VOLTAGE_RESERVE, m.voltage_reserve.trim_max = -1) \
-    X(TORQUE_LOOP, m.torque_loop.authority = 0) \
-    X(TORQUE_LOOP, m.torque_loop.torque_min = 0) \
-    X(SHORTEST_PULSE, m.modulate.longest_q31 = Q31(0.25)) \
-    X(SHORTEST_PULSE, m.modulate.longest_q31 = m.modulate.nearer_rail_q31 + 1) \
-    X(SHORTEST_PULSE, m.modulate.nearer_rail_q31 = Q31(0.5) + 1) \
-    X(DEAD_TIME, m.modulate.dead_time_q16 = Q16(0.2)) \
-    X(DEAD_TIME, m.modulate.dead_time_q16 = -2) \
-    X(CURRENT_KNEE, m.modulate.knee_q17 = 0) \
-    X(CURRENT_KNEE, m.modulate.knee_q17 = 1 << 30) \
-    X(CURRENT_KNEE, m.modulate.knee_side_q17 = 0) \
-    X(CURRENT_KNEE, m.modulate.knee_side_q17 = 1 << 30) \
-    X(CLEAR_VOLTAGE, m.current_control.clear_q30 = UINT32_MAX) \
-    X(CLEAR_VOLTAGE, m.current_control.clear_q30 = m.current_control.clear_q30 / 8 * 9)
+    X(TORQUE_LOOP, m.parameters.torque_loop.authority = 0) \
+    X(TORQUE_LOOP, m.parameters.torque_loop.torque_min = 0) \
+    X(SHORTEST_PULSE, m.parameters.modulate.longest_q31 = Q31(0.25)) \
+    X(SHORTEST_PULSE, m.parameters.modulate.longest_q31 = m.parameters.modulate.nearer_rail_q31 + 1) \
+    X(SHORTEST_PULSE, m.parameters.modulate.nearer_rail_q31 = Q31(0.5) + 1) \
+    X(DEAD_TIME, m.parameters.modulate.dead_time_q16 = Q16(0.2)) \
+    X(DEAD_TIME, m.parameters.modulate.dead_time_q16 = -2) \
+    X(CURRENT_KNEE, m.parameters.modulate.knee_q17 = 0) \
+    X(CURRENT_KNEE, m.parameters.modulate.knee_q17 = 1 << 30) \
+    X(CURRENT_KNEE, m.parameters.modulate.knee_side_q17 = 0) \
+    X(CURRENT_KNEE, m.parameters.modulate.knee_side_q17 = 1 << 30) \
+    X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = UINT32_MAX) \
+    X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = m.parameters.current_control.clear_q30 / 8 * 9)
 
 #define MRAI(X) \
-    X(MRAI_GAINS, m.mrai.r0 = 0) \
-    X(MRAI_GAINS, m.mrai.pole_gain = 0) \
-    X(MRAI_GAINS, m.mrai.period = 0) \
-    X(MRAI_GAINS, m.mrai.period = Q31(0.79)) \
-    X(MRAI_GAINS, m.mrai.flux_gain = -1) \
-    X(MRAI_GAINS, m.mrai.resistance_gain = -1) \
-    X(MRAI_GAINS, m.mrai.flux_proportional_q24 = -1) \
-    X(MRAI_GAINS, m.mrai.resistance_proportional_q24 = -1) \
-    X(MRAI_LIMITS, m.mrai.psi_delta_min = m.mrai.psi_delta_max) \
-    X(MRAI_LIMITS, m.mrai.psi_delta_min = Q31(-0.5) - 1) \
-    X(MRAI_LIMITS, m.mrai.r_delta_max = Q31(0.5) + 1) \
-    X(MRAI_GATES, m.mrai.omega_min = 0) \
-    X(MRAI_GATES, m.mrai.psi_drift_full = 0) \
-    X(MRAI_GATES, m.mrai.r_drift_full = 0)
+    X(MRAI_GAINS, m.parameters.mrai.r0 = 0) \
+    X(MRAI_GAINS, m.parameters.mrai.pole_gain = 0) \
+    X(MRAI_GAINS, m.parameters.mrai.period = 0) \
+    X(MRAI_GAINS, m.parameters.mrai.period = Q31(0.79)) \
+    X(MRAI_GAINS, m.parameters.mrai.flux_gain = -1) \
+    X(MRAI_GAINS, m.parameters.mrai.resistance_gain = -1) \
+    X(MRAI_GAINS, m.parameters.mrai.flux_proportional_q24 = -1) \
+    X(MRAI_GAINS, m.parameters.mrai.resistance_proportional_q24 = -1) \
+    X(MRAI_LIMITS, m.parameters.mrai.psi_delta_min = m.parameters.mrai.psi_delta_max) \
+    X(MRAI_LIMITS, m.parameters.mrai.psi_delta_min = Q31(-0.5) - 1) \
+    X(MRAI_LIMITS, m.parameters.mrai.r_delta_max = Q31(0.5) + 1) \
+    X(MRAI_GATES, m.parameters.mrai.omega_min = 0) \
+    X(MRAI_GATES, m.parameters.mrai.psi_drift_full = 0) \
+    X(MRAI_GATES, m.parameters.mrai.r_drift_full = 0)
 
 #define IDENTIFY(X) \
     X(IDENTIFY_WINDOW, m.identify.l_shift = 15) \
@@ -163,10 +163,10 @@ static const int16_t *reference(const int16_t *good, int16_t last)
 /* All three copies of the ratio agree. */
 static void scale_ratio(motor_t *m, double ratio)
 {
-    m->modulate.alpha_q31 = (q31_t)(ratio * 2147483648.0);
-    m->modulate.side_q31 = (q31_t)(ratio * 2147483648.0 * 0.86602540378443865);
-    m->current_control.per_ratio_q31 = (uint32_t)(2147483648.0 / ratio > 4294967295.0 ? 4294967295.0
-                                                                                      : 2147483648.0 / ratio);
+    m->parameters.modulate.alpha_q31 = (q31_t)(ratio * 2147483648.0);
+    m->parameters.modulate.side_q31 = (q31_t)(ratio * 2147483648.0 * 0.86602540378443865);
+    m->parameters.current_control.per_ratio_q31 =
+        (uint32_t)(2147483648.0 / ratio > 4294967295.0 ? 4294967295.0 : 2147483648.0 / ratio);
 }
 
 typedef struct {

@@ -14,9 +14,9 @@ void setUp(void)
     seam_start();
     seam_periods(3); /* a sample with 350 V is there */
     /* The samples below are no machine's: the monitors would say so. */
-    drive.motor.plausibility.e_0 = INT16_MAX;
-    drive.motor.plausibility.i_alive = INT16_MAX;
-    drive.motor.torque_monitor.v_0 = INT16_MAX;
+    seam.motor.plausibility.e_0 = INT16_MAX;
+    seam.motor.plausibility.i_alive = INT16_MAX;
+    seam.motor.torque_monitor.v_0 = INT16_MAX;
 }
 
 void tearDown(void)
@@ -109,7 +109,7 @@ void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
 
 void test_the_torque_request_is_limited_and_slewed(void)
 {
-    drive.motor.torque_slew = 100;
+    drive.parameters.torque_slew = 100;
     drive.request.torque_arbitrated = INT16_MAX;
     seam_run();
     TEST_ASSERT_EQUAL_INT(100, drive.task.torque_commanded);
@@ -119,7 +119,7 @@ void test_the_torque_request_is_limited_and_slewed(void)
         task_1khz(&drive);
     }
     TEST_ASSERT_EQUAL_INT(motor.torque_max, drive.task.torque_commanded);
-    drive.motor.torque_slew = Q15_MAX;
+    drive.parameters.torque_slew = Q15_MAX;
     drive.request.torque_arbitrated = INT16_MIN;
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
@@ -129,13 +129,13 @@ void test_the_torque_request_is_limited_and_slewed(void)
 void test_a_closing_limit_acts_at_once_whatever_slew_is_calibrated(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        drive.motor.torque_slew = Q15_MAX;
+        drive.parameters.torque_slew = Q15_MAX;
         drive.request.limits = TORQUE_LIMITS_NONE;
         drive.request.torque_arbitrated = (q15_t)(sign * INT16_MAX);
         seam_run();
         task_1khz(&drive);
         TEST_ASSERT_EQUAL_INT(sign * motor.torque_max, drive.task.torque_commanded);
-        drive.motor.torque_slew = 0;
+        drive.parameters.torque_slew = 0;
         drive.request.limits.torque_drive = 1000;
         drive.request.limits.torque_regen = 1000;
         task_1khz(&drive);

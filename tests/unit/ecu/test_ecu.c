@@ -309,18 +309,19 @@ void test_without_a_bus_nothing_is_switched_on(void)
 
 void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
 {
-    const compensation_t measured = {motor.modulate.dead_time_q16 / 2 + 100, motor.modulate.knee_q17, 1};
+    const compensation_t measured = {motor.parameters.modulate.dead_time_q16 / 2 + 100,
+                                     motor.parameters.modulate.knee_q17, 1};
     TEST_ASSERT_TRUE(drive_compensate(&ecu.drive, &measured));
     ecu.xcp.xcp.ecu_page = XCP_PAGE_WORKING;
     ecu.xcp.working[CALIBRATION_observer_m] = 2.5F;
     ecu.xcp.xcp.generation++;
     xcp_access_step(&ecu.xcp, &ecu.drive, 1);
-    TEST_ASSERT_FLOAT_WITHIN(0.001F, 2.5F, calibration_get(&ecu.drive.motor, CALIBRATION_observer_m));
-    TEST_ASSERT_EQUAL_INT(motor.modulate.dead_time_q16 + 200, ecu.drive.motor.modulate.dead_time_q16);
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 2.5F, calibration_get(&ecu.drive, CALIBRATION_observer_m));
+    TEST_ASSERT_EQUAL_INT(motor.parameters.modulate.dead_time_q16 + 200, ecu.drive.parameters.modulate.dead_time_q16);
     ecu.xcp.working[CALIBRATION_dead_time_compensation] = 0.5F;
     ecu.xcp.xcp.generation++;
     xcp_access_step(&ecu.xcp, &ecu.drive, 1);
-    TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive.motor, CALIBRATION_dead_time_compensation));
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive, CALIBRATION_dead_time_compensation));
 }
 
 /* 32 ms of current before the fault, the newest last; a second fault and what the machine does then change nothing. */

@@ -137,7 +137,7 @@ void test_sensors_are_not_plausible_before_the_first_period(void)
 
 static bool slow_at(double line_emf_V)
 {
-    ecu.drive.task.safe_state.line_emf = (q15_t)(line_emf_V / (double)ecu.drive.motor.bases.voltage_V * 32768.0);
+    ecu.drive.task.safe_state.line_emf = (q15_t)(line_emf_V / (double)ecu.drive.motor->bases.voltage_V * 32768.0);
     return observe()->slow;
 }
 
@@ -153,7 +153,10 @@ void test_the_machine_is_slow_while_its_line_voltage_stays_below_60_V(void)
 /* A drive of 12 V never reaches 60 V: below 0.8 of the lowest dc voltage at which it runs, 20 V here. */
 void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_link(void)
 {
-    ecu.drive.motor.monitor.v_min = (int32_t)(20.0 / (double)ecu.drive.motor.bases.voltage_V * 32768.0);
+    static motor_t low;
+    low = motor;
+    low.monitor.v_min = (int32_t)(20.0 / (double)motor.bases.voltage_V * 32768.0);
+    ecu.drive.motor = &low;
     TEST_ASSERT_TRUE(slow_at(15.9));
     TEST_ASSERT_FALSE(slow_at(16.1));
 }

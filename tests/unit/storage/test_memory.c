@@ -42,9 +42,9 @@ static void power_on(const motor_t *source)
 }
 
 /* q15 */
-static int32_t dead_time(const motor_t *m)
+static int32_t dead_time(const motor_parameters_t *p)
 {
-    return m->modulate.dead_time_q16 / 2;
+    return p->modulate.dead_time_q16 / 2;
 }
 
 void setUp(void)
@@ -204,30 +204,33 @@ void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(vo
 
 void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
 {
-    const compensation_t measured = {dead_time(&drive.motor) + 1000, drive.motor.modulate.knee_q17 / 2, 1};
+    const compensation_t measured = {dead_time(&drive.parameters) + 1000, drive.parameters.modulate.knee_q17 / 2, 1};
     TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
     identify_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
-    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 1000, dead_time(&drive.motor));
-    TEST_ASSERT_EQUAL_INT32(motor.modulate.knee_q17 / 2, drive.motor.modulate.knee_q17);
-    TEST_ASSERT_INT32_WITHIN(1, motor.modulate.knee_side_q17 / 2, drive.motor.modulate.knee_side_q17);
-    TEST_ASSERT_LESS_THAN_UINT32(motor.current_control.clear_q30, drive.motor.current_control.clear_q30);
-    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&drive.motor)); /* (MO-11) among others */
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 1000, dead_time(&drive.parameters));
+    TEST_ASSERT_EQUAL_INT32(motor.parameters.modulate.knee_q17 / 2, drive.parameters.modulate.knee_q17);
+    TEST_ASSERT_INT32_WITHIN(1, motor.parameters.modulate.knee_side_q17 / 2, drive.parameters.modulate.knee_side_q17);
+    TEST_ASSERT_LESS_THAN_UINT32(motor.parameters.current_control.clear_q30,
+                                 drive.parameters.current_control.clear_q30);
+    motor_t with_them = motor;
+    with_them.parameters = drive.parameters;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&with_them)); /* (MO-11) among others */
 }
 
 void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)
 {
-    const int32_t measured = dead_time(&motor) + 40;
-    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    const int32_t measured = dead_time(&motor.parameters) + 40;
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.parameters.modulate.knee_q17, 1}));
     drive_retrim(&drive, -60);
-    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.parameters));
     identify_and_save();
     power_on(&motor);
-    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.parameters));
     TEST_ASSERT_EQUAL_INT32(-60, drive.task.trim.trim);
     /* A new measurement replaces both. */
-    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.modulate.knee_q17, 1}));
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.parameters.modulate.knee_q17, 1}));
     TEST_ASSERT_EQUAL_INT32(0, drive.task.trim.trim);
 }
 
@@ -236,15 +239,15 @@ void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
     drive_retrim(&drive, 60);
     identify_and_save();
     power_on(&motor);
-    TEST_ASSERT_EQUAL_INT(dead_time(&motor) + 60, dead_time(&drive.motor));
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 60, dead_time(&drive.parameters));
 }
 
 void test_a_compensation_that_no_inverter_needs_is_refused(void)
 {
-    const motor_t before = drive.motor;
+    const motor_parameters_t before = drive.parameters;
     const compensation_t wrong[] = {{-1, 1000, 1}, {4097, 1000, 1}, {300, 0, 1}, {300, 1 << 30, 1}};
     for (unsigned k = 0; k < sizeof wrong / sizeof wrong[0]; k++) {
         TEST_ASSERT_FALSE(drive_compensate(&drive, &wrong[k]));
     }
-    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.motor, sizeof before);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.parameters, sizeof before);
 }

@@ -209,13 +209,13 @@ static inline drive_t *the_copy(void)
 STAGE void bench_flux_table(void)
 {
     const drive_t *d = the_copy();
-    flux = flux_table_step(&d->motor.flux_table, found.i);
+    flux = flux_table_step(&d->period.flux_table, found.i);
 }
 
 STAGE void bench_mrai(void)
 {
     drive_t *d = the_copy();
-    mrai_step(&d->motor.mrai, found.schedule, &d->mrai.isr.law, found.sample);
+    mrai_step(&d->parameters.mrai, found.schedule, &d->mrai.isr.law, found.sample);
 }
 
 STAGE void bench_torque_estimate(void)
@@ -241,7 +241,7 @@ static void modulate(const modulate_config_t *config, const current_control_out_
 STAGE void bench_current_tick(void)
 {
     drive_t *d = the_copy();
-    const motor_t *m = &d->motor;
+    const period_data_t *m = &d->period;
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_follow(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
     const dq_q15_t i = park(measured.i, fx_rotation(angle.theta_e));
@@ -254,8 +254,9 @@ STAGE void bench_current_tick(void)
         .psi_delta = d->psi_d_error,
         .v_dc = measured.v_dc,
     };
-    const current_control_out_t wanted = current_control_step(&m->current_control, &d->fast.current_control, &control);
-    modulate(&m->modulate, &wanted, i_dq, advanced);
+    const current_control_out_t wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control,
+                                                              &control);
+    modulate(&d->parameters.modulate, &wanted, i_dq, advanced);
 }
 
 /* As a step of its own, (CC-1): in the firmware it is part of measure_step(), which also scales the counts. */
@@ -279,7 +280,7 @@ STAGE void bench_current_core(void)
     const dq_q15_t i = park(clarke(found.phases), at);
     const flux_point_t as_flux = {.psi_d = (q15_t)i.d, .psi_q = (q15_t)i.q};
     const current_control_in_t control = {.target = &found.core, .flux = &as_flux, .v_dc = CORE_V_DC};
-    const current_control_out_t wanted = current_control_step(&d->motor.current_control, &d->fast.current_control,
+    const current_control_out_t wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control,
                                                               &control);
     modulate(&bare, &wanted, 0, at);
 }
@@ -287,14 +288,14 @@ STAGE void bench_current_core(void)
 STAGE void bench_measure(void)
 {
     const drive_t *d = the_copy();
-    const measure_t measured = measure_step(&d->motor.measure, &port.counts);
+    const measure_t measured = measure_step(&d->period.measure, &port.counts);
     found.phases = (abc_q15_t){measured.i.alpha, measured.i.beta, measured.v_dc};
 }
 
 STAGE void bench_angle_tracker(void)
 {
     drive_t *d = the_copy();
-    found.theta_e = angle_tracker_follow(&d->motor.angle_tracker, &d->fast.angle_tracker, port.theta_m).theta_e;
+    found.theta_e = angle_tracker_follow(&d->period.angle_tracker, &d->fast.angle_tracker, port.theta_m).theta_e;
 }
 
 STAGE void bench_current_control(void)
@@ -307,14 +308,14 @@ STAGE void bench_current_control(void)
         .psi_delta = d->psi_d_error,
         .v_dc = sample_box_at(&d->samples, d->samples.generation)->v_dc,
     };
-    found.wanted = current_control_step(&d->motor.current_control, &d->fast.current_control, &control);
+    found.wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control, &control);
 }
 
 /* The voltage of bench_current_control(). */
 STAGE void bench_modulate(void)
 {
     const drive_t *d = the_copy();
-    modulate(&d->motor.modulate, &found.wanted, fx_pair(found.i.d, found.i.q), fx_rotation(found.theta_e));
+    modulate(&d->parameters.modulate, &found.wanted, fx_pair(found.i.d, found.i.q), fx_rotation(found.theta_e));
 }
 
 STAGE void bench_torque_path(void)
@@ -328,7 +329,7 @@ STAGE void bench_torque_path(void)
         .confidence = Q15_MAX,
         .enabled = true,
     };
-    d->task.torque_corrected = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &loop);
+    d->task.torque_corrected = torque_loop_step(&d->parameters.torque_loop, &d->task.torque_loop, &loop);
 }
 
 /* The fast ISR's share of the robust identification: one period summed, every tenth hands the sums over. */
@@ -344,6 +345,6 @@ STAGE void bench_window(void)
     };
     if (__builtin_expect(identify_window_step(&d->fast.window, &in), 0)) {
         window_box_write(&d->windows, &d->fast.window);
-        identify_window_restart(&d->fast.window, d->motor.bases.periods_per_step);
+        identify_window_restart(&d->fast.window, d->motor->bases.periods_per_step);
     }
 }

@@ -210,7 +210,8 @@ def page(figures: Figures) -> str:
         periods=met["periods"], limited=met["voltage limited"], weakened=met["field weakening"],
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
         task_steps=(PERIODS - WARM_UP) // TASK_PERIODS,
-        small=" ".join(SMALL), tables=figures["control library"]["tables"], motor_copy=figures["state"]["motor"],
+        small=" ".join(SMALL), tables=figures["control library"]["tables"], period_copy=figures["state"]["period"],
+        parameters=figures["state"]["parameters"],
         stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MOST),
         **{"return": cycles.RETURN},
     )  # fmt: skip

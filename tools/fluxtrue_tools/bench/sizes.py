@@ -20,7 +20,7 @@ from fluxtrue_tools.target.image import RAM_FROM, Image
 NM, SIZE = "arm-none-eabi-nm", "arm-none-eabi-size"
 LIBRARIES = ("fx", "signal", "control")
 TABLES = re.compile(r"\.rodata\.(fx_)?\w*_?table$")
-# The drive's state: what the stages keep, and what they hand to each other; not the copy of the motor's data.
+# The drive's state: what the stages keep, and what they hand to each other; not the motor's data.
 STATE = ("fast", "psi_d_error", "task", "samples", "windows", "commands", "mrai")
 _SECTION = re.compile(r"^\.(text|rodata|data|bss)(\S*)\s+(\d+)\s")
 

@@ -63,7 +63,7 @@ CALLED void task_nothing(void)
 CALLED void task_angle_harmonics(void)
 {
     drive_t *d = the_copy();
-    angle_harmonics_step(&d->motor.angle_harmonics, &d->task.angle_harmonics, snapshot.sample.theta_m,
+    angle_harmonics_step(&d->motor->angle_harmonics, &d->task.angle_harmonics, snapshot.sample.theta_m,
                          d->task.angle_correction);
 }
 
@@ -75,9 +75,9 @@ CALLED void task_slow_monitors(void)
 CALLED void task_identify(void)
 {
     drive_t *d = the_copy();
-    const identify_point_t point = identify_point(&d->motor.identify, &snapshot.window, snapshot.sample.point.omega);
-    const identify_tables_t tables = {flux_table_step(&d->motor.flux_table, point.i_m),
-                                      flux_table_inductances(&d->motor.flux_table, point.i_m)};
+    const identify_point_t point = identify_point(&d->motor->identify, &snapshot.window, snapshot.sample.point.omega);
+    const identify_tables_t tables = {flux_table_step(&d->motor->flux_table, point.i_m),
+                                      flux_table_inductances(&d->motor->flux_table, point.i_m)};
     const identify_in_t in = {
         .point = &point,
         .tables = &tables,
@@ -85,7 +85,7 @@ CALLED void task_identify(void)
         .winding_dC = snapshot.winding_dC,
         .enabled = d->request.identification && snapshot.sample.acting,
     };
-    const identify_out_t out = identify_step(&d->motor.identify, &d->task.identify, &in);
+    const identify_out_t out = identify_step(&d->motor->identify, &d->task.identify, &in);
     d->task.identification.torque_estimated = out.torque;
     d->task.psi_d_error = out.psi_delta;
 }
@@ -110,14 +110,14 @@ CALLED void task_torque_limit(void)
         .inverter_dC = snapshot.inverter_dC,
         .winding_dC = snapshot.winding_dC,
     };
-    d->task.allowed = torque_limit_step(&d->motor.torque_limit, &d->task.torque_limit, &in);
+    d->task.allowed = torque_limit_step(&d->motor->torque_limit, &d->task.torque_limit, &in);
 }
 
 CALLED void task_torque_loop(void)
 {
     drive_t *d = the_copy();
     const q15_t limited = d->task.allowed.torque_limited;
-    d->task.torque_commanded = rate_limit_step(d->task.torque_commanded, limited, d->motor.torque_slew);
+    d->task.torque_commanded = rate_limit_step(d->task.torque_commanded, limited, d->parameters.torque_slew);
     const torque_loop_in_t in = {
         .torque_commanded = d->task.torque_commanded,
         .torque_estimated = d->task.identification.torque_estimated,
@@ -125,7 +125,7 @@ CALLED void task_torque_loop(void)
         .enabled = d->request.torque_loop,
         .limited = d->task.reference.limited || snapshot.sample.voltage_limited,
     };
-    d->task.torque_corrected = torque_loop_step(&d->motor.torque_loop, &d->task.torque_loop, &in);
+    d->task.torque_corrected = torque_loop_step(&d->parameters.torque_loop, &d->task.torque_loop, &in);
 }
 
 CALLED void task_reference(void)
@@ -139,7 +139,7 @@ CALLED void task_reference(void)
         .psi_delta = snapshot.psi_d_error,
         .acting = snapshot.sample.acting,
     };
-    const voltage_reserve_t trim = voltage_reserve_step(&d->motor.voltage_reserve, &d->task.voltage_reserve, &voltage);
+    const voltage_reserve_t trim = voltage_reserve_step(&d->motor->voltage_reserve, &d->task.voltage_reserve, &voltage);
     const dq_q15_t i_ref = d->task.reference.i_ref;
     const current_reference_in_t in = {
         .torque_corrected = d->task.torque_corrected,
@@ -149,10 +149,10 @@ CALLED void task_reference(void)
         .v_trim = trim.v_trim,
         .shift = trim.shift,
         .psi_delta = snapshot.psi_d_error,
-        .i_d_max = i_d_limit_step(&d->motor.i_d_limit, snapshot.psi_d_error, snapshot.winding_dC),
+        .i_d_max = i_d_limit_step(&d->motor->i_d_limit, snapshot.psi_d_error, snapshot.winding_dC),
         .psi_q_delta = 0,
     };
-    d->task.reference = current_reference_step(&d->motor.current_reference, &in);
+    d->task.reference = current_reference_step(&d->motor->current_reference, &in);
 }
 
 CALLED void task_target(void)
@@ -160,9 +160,9 @@ CALLED void task_target(void)
     drive_t *d = the_copy();
     operating_point_t next;
     next.i = d->task.reference.i_ref;
-    next.flux = flux_table_step(&d->motor.flux_table, next.i);
+    next.flux = flux_table_step(&d->motor->flux_table, next.i);
     command_t command = {.run = true};
-    command.target = current_control_target(&d->motor.current_control, next.i, &next.flux);
+    command.target = current_control_target(&d->parameters.current_control, next.i, &next.flux);
     command_box_write(&d->commands, command);
 }
 
@@ -175,7 +175,7 @@ CALLED void task_safe_state(void)
         .v_dc = (q15_t)snapshot.sample.v_dc,
         .speed_valid = true,
     };
-    result = safe_state_step(&d->motor.safe_state, &d->task.safe_state, &in) ? 1 : 0;
+    result = safe_state_step(&d->motor->safe_state, &d->task.safe_state, &in) ? 1 : 0;
 }
 
 CALLED void task_schedule(void)
@@ -203,12 +203,12 @@ CALLED void task_supervisor(void)
 CALLED void task_arbitrate(void)
 {
     const drive_t *d = the_copy();
-    const q31_t slew = d->motor.torque_max * 65536 / 40;
+    const q31_t slew = d->motor->torque_max * 65536 / 40;
     const arbitrate_config_t config = {.slew = slew, .jerk = slew / 10, .ramp_out = slew};
     const arbitrate_in_t in = {
         .torque_requested = d->request.torque_arbitrated,
-        .limit_drive = d->motor.torque_max,
-        .limit_regen = d->motor.torque_max,
+        .limit_drive = d->motor->torque_max,
+        .limit_regen = d->motor->torque_max,
         .omega = snapshot.sample.point.omega,
         .run = true,
     };

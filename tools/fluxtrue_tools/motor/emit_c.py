@@ -391,6 +391,17 @@ def _torque_slew(motor: Motor) -> tuple[str, str]:
     return str(max(q15(slew, "torque_slew"), 1)), f"{motor.config.torque_slew_Nm_per_s:g} N·m/s"
 
 
+def _parameters(motor: Motor) -> list[Row]:
+    """motor_parameters_t: what a drive starts with and changes."""
+    return [
+        ("torque_slew", *_torque_slew(motor)),
+        ("current_control", _current_control(motor), ""),
+        ("modulate", _modulate(motor), ""),
+        ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
+        ("torque_loop", _torque_loop(motor), ""),
+    ]
+
+
 def _motor(motor: Motor) -> list[Row]:
     machine, inverter, b = motor.config.machine, motor.config.inverter, motor.bases
     return [
@@ -405,18 +416,13 @@ def _motor(motor: Motor) -> list[Row]:
         ("r_ohm_20", _float(machine.r_ohm), ""),
         ("dead_time_s", _float(inverter.dead_time_s), ""),
         ("torque_max", q15(machine.torque_max_Nm / b.torque_Nm, "torque_max"), f"{machine.torque_max_Nm:g} N·m"),
-        ("torque_slew", *_torque_slew(motor)),
         ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
         ("psi_weak", q15(min(motor.derived.psi_weak_Vs / b.flux_Vs, 1.0 - 1.0 / Q15_ONE), "psi_weak"), ""),
         ("measure", _measure(motor), ""),
         ("angle_tracker", _tracker(motor), ""),
         ("angle_harmonics", _harmonics(motor), ""),
         ("flux_table", _flux_table(motor), ""),
-        ("current_control", _current_control(motor), ""),
-        ("modulate", _modulate(motor), ""),
-        ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
-        ("torque_loop", _torque_loop(motor), ""),
         ("current_reference", _current_reference(motor), ""),
         ("voltage_reserve", _voltage_reserve(motor), ""),
         ("torque_limit", _torque_limit(motor), ""),
@@ -426,6 +432,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("plausibility", _plausibility(motor), ""),
         ("torque_monitor", _torque_monitor(motor), ""),
         ("commission", _commission(motor), ""),
+        ("parameters", _parameters(motor), ""),
     ]
 
 
