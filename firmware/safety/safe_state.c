@@ -4,7 +4,7 @@
 #define SQRT3 113512            /* Q15.16 */
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
-#define UNKNOWN_MS 20000U
+#define UNKNOWN_STEPS 20000U /* 18 to 22.5 s: a step is 0.89 to 1.125 ms */
 
 /* Q30; below 2^31 + 1 for every argument. */
 static uint32_t squared(int32_t d, int32_t q)
@@ -51,12 +51,12 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
         state->speed = measured;
     } else if (known) {
         state->speed = fallen;
-        state->unknown_ms = 0;
+        state->unknown_steps = 0;
     } else if (in->speed_valid) {
         state->speed = (q15_t)fx_max_s32(state->speed, measured);
     } else if (!state->short_circuit) {
-        const bool long_enough = state->unknown_ms >= UNKNOWN_MS;
-        state->unknown_ms = long_enough ? (uint16_t)UNKNOWN_MS : (uint16_t)(state->unknown_ms + 1U);
+        const bool long_enough = state->unknown_steps >= UNKNOWN_STEPS;
+        state->unknown_steps = long_enough ? (uint16_t)UNKNOWN_STEPS : (uint16_t)(state->unknown_steps + 1U);
         state->speed = long_enough ? fallen : state->speed;
     }
 }

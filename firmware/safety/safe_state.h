@@ -10,7 +10,7 @@
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
- *   says. Without a valid speed the last one holds; with switching disabled it falls after 20 s.
+ *   says. Without a valid speed the last one holds; with switching disabled it falls after 20,000 steps of the task.
  * Source   docs/theory/safe-state.md (SS-1) ... (SS-7)
  * Units    per unit; speeds are magnitudes
  * Range    every argument; e saturates at 1
@@ -33,7 +33,7 @@ typedef struct {
     q15_t line_emf; /* at the known speed */
     bool short_circuit;
     uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */
-    uint16_t unknown_ms;             /* steps without a valid speed and with switching disabled; saturates */
+    uint16_t unknown_steps;          /* steps without a valid speed and with switching disabled; saturates */
     dq_q15_t i_before;               /* of the last step */
 } safe_state_state_t;
 

@@ -86,6 +86,8 @@ class Page:
 def page(browser: webdriver.Chrome, server: Server) -> Page:
     """A page whose drive runs at 2000 rpm."""
     opened = Page(browser, server)
+    browser.get("about:blank")
+    browser.get_log("browser")  # ends what the last page had to say: its server has gone
     browser.get(server.url)
     opened.until(lambda: opened.text("state") == "standby", "standby")
     opened.find("ready").click()

@@ -20,6 +20,9 @@ MOVING = "[profile]\ntorque_Nm = 50\nspeed_rpm = 1500\n"
 ELSEWHERE = {  # plant fields that a scenario gives in another place, or the motor alone
     "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
+    # The dc link behind its contactor, which follows an ECU's lines: a scenario's bridge stays at the battery.
+    "dc_link_F", "precharge_s", "discharge_s", "avalanche_V", "vdc_start_V", "precharge_open", "discharge_open",
+    "contactor_open",
 }  # fmt: skip
 
 

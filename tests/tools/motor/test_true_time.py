@@ -26,23 +26,23 @@ SOURCES = sorted(
 PERIOD = {
     "bases.period_s",
     "angle_tracker.kp", "angle_tracker.ki_q29", "angle_tracker.pu_to_turn", "angle_tracker.turn_to_pu",
-    "current_control.sigma_q24", "current_control.drop_gain", "current_control.integral_gain",
-    "current_control.clear_q30",
-    "modulate.dead_time_q16", "modulate.longest_q31", "modulate.nearer_rail_q31",
-    "mrai.period", "mrai.sinc_gain", "mrai.r_delta_max",
-    "identify.sinc_gain", "identify.sigma", "torque_loop.model_rate",
+    "parameters.current_control.sigma_q24", "parameters.current_control.drop_gain", "parameters.current_control.integral_gain",
+    "parameters.current_control.clear_q30",
+    "parameters.modulate.dead_time_q16", "parameters.modulate.longest_q31", "parameters.modulate.nearer_rail_q31",
+    "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
+    "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
     "identify.limited_noise",
 }  # fmt: skip
 STEP = {
-    "bases.step_s", "trim_steps", "torque_slew", "torque_slew_weak",
-    "mrai.psi_drift_full", "mrai.r_drift_full", "mrai.quality_rate",
+    "bases.step_s", "trim_steps", "parameters.torque_slew", "torque_slew_weak",
+    "parameters.mrai.psi_drift_full", "parameters.mrai.r_drift_full", "parameters.mrai.quality_rate",
     "identify.rate_gain_q28", "identify.window_turns_q29", "identify.turn_to_pu", "identify.leak",
     "identify.noise_voltage_q30", "identify.noise_flux_q30", "identify.noise_rate_q30", "identify.local_rate",
     "identify.mismatch_rate", "identify.confidence_rate",
-    "torque_loop.ki", "torque_loop.model_rate", "voltage_reserve.gain", "torque_limit.loss_rate",
+    "parameters.torque_loop.ki", "parameters.torque_loop.model_rate", "voltage_reserve.gain", "torque_limit.loss_rate",
     "plausibility.deviation_steps", "plausibility.lost_steps", "plausibility.equal_steps", "plausibility.fast_steps",
     "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate", "torque_monitor.torque_steps",
     "torque_monitor.angle_steps", "torque_monitor.settle_steps", "commission.settle_steps",
@@ -51,7 +51,7 @@ STEP = {
 # A member whose name promises a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
 SPEED = re.compile(r"_rad_s$")
-TIMED_OTHERWISE = {"dead_time_s", "torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
+TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
 # Times that the firmware itself defines, and what makes true time of one in each line that uses it.
 TIMES = {
     "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",
@@ -63,6 +63,10 @@ TIMES = {
 # Numbers that are no time, or none of the task.
 COUNTS = {
     "CONSECUTIVE_MAX": "steps, as docs/howto/can.md says",
+    "CONFIRMED_STEPS": "steps, as docs/theory/safe-state.md says",
+    "UNKNOWN_STEPS": "steps, as that page says",
+    "STEPS": "steps of the switch-off, as that page says",
+    "RAMP_STEPS": "steps of its ramp, as that page says",
     "RESET_STEPS": "a reset on its way to the drive",
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
     "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",
