@@ -26,7 +26,8 @@ SOURCES = sorted(
 PERIOD = {
     "bases.period_s",
     "angle_tracker.kp", "angle_tracker.ki_q29", "angle_tracker.pu_to_turn", "angle_tracker.turn_to_pu",
-    "parameters.current_control.sigma_q24", "parameters.current_control.drop_gain", "parameters.current_control.integral_gain",
+    "parameters.current_control.sigma_q24", "parameters.current_control.drop_gain",
+    "parameters.current_control.integral_gain",
     "parameters.current_control.clear_q30",
     "parameters.modulate.dead_time_q16", "parameters.modulate.longest_q31", "parameters.modulate.nearer_rail_q31",
     "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
