@@ -5,7 +5,7 @@
  *                                                                        -> publish_sample -> identification
  *
  * Three routes lead through it. The usual one (the bridge runs, nothing is latched, counted or out of its limits) skips
- * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions of 345.
+ * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions.
  *   usual        fast_isr(): the order of the block diagram, written here once
  *   not settled  run_period_not_settled(): the bridge is disabled or has just been enabled, or a fault or a counter is
  *                pending

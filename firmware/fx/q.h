@@ -9,7 +9,8 @@
  * Range    every argument, except that the multiply-accumulates (mac, mulhi_add, mulhi_sub, dot2)
  *          wrap modulo 2^32: the caller proves that its sum stays inside int32_t
  * Rounding half up, 1/2 LSB of the result; fx_mul_q31_word and fx_mac_q31_word truncate towards minus
- *          infinity (bias 1/2 LSB of Q30): never feed an integrator with them
+ *          infinity (bias 1/2 LSB of Q30): feed no integrator with them all the time; the anti-windup of
+ *          control/current/current_control.c does so only while the voltage is limited
  * Errors   none
  * Context  any; 1 to 3 instructions, fx_mul_q31 9, fx_mul_gain_q31 11 */
 
