@@ -1,30 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibration/calibration.h"
 
-#define Q15_SCALE 32768.0F
-#define Q31_SCALE 2147483648.0F
+#include "types/si.h"
+
 /* Drift that means quality 0: an error of 5 % of psi_f, 20 % of R_0, at the law's own bandwidth. */
 #define PSI_DRIFT_SHARE 0.05F
 #define R_DRIFT_SHARE 0.20F
 
 #define INFO(name, lo, hi, unit, text) {#name, lo, hi},
 const calibration_info_t calibration_info[CALIBRATION_COUNT] = {CALIBRATION_LIST(INFO)};
-
-static int32_t nearest(float x)
-{
-    return (int32_t)((x < 0.0F) ? x - 0.5F : x + 0.5F);
-}
-
-/* The largest float below 2^31 is 2^31 - 128: the comparison keeps the conversion inside. */
-static q31_t to_q31(float x)
-{
-    return (x >= 1.0F) ? Q31_MAX : (x <= -1.0F) ? -Q31_MAX : nearest(x * Q31_SCALE);
-}
-
-static q15_t to_q15(float x)
-{
-    return fx_sat_q15(nearest(((x > 1.0F) ? 1.0F : (x < -1.0F) ? -1.0F : x) * Q15_SCALE));
-}
 
 /* A slew rate that rounds to zero would hold the torque for ever. */
 static q15_t at_least_one(q15_t x)
@@ -44,19 +28,17 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     const motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        return (p->torque_slew == Q15_MAX) ? 0.0F
-                                           : (float)p->torque_slew / Q15_SCALE * m->bases.torque_Nm / m->bases.step_s;
+        return (p->torque_slew == Q15_MAX) ? 0.0F : si_from_q15(p->torque_slew, m->bases.torque_Nm) / m->bases.step_s;
     case CALIBRATION_observer_m:
         return 0.25F * (float)p->mrai.pole_gain / (float)p->mrai.r0;
     case CALIBRATION_flux_bandwidth_rad_s:
-        return (float)p->mrai.flux_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+        return si_from_q31(p->mrai.flux_gain, m->bases.omega_rad_s) / 2.0F;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        return (float)p->mrai.resistance_gain / Q31_SCALE * m->bases.omega_rad_s / 2.0F;
+        return si_from_q31(p->mrai.resistance_gain, m->bases.omega_rad_s) / 2.0F;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
-        return (float)p->torque_loop.ki / Q15_SCALE / m->bases.step_s;
+        return si_from_q15(p->torque_loop.ki, 1.0F) / m->bases.step_s;
     case CALIBRATION_dead_time_compensation:
-        return (m->dead_time_s > 0.0F) ? (float)p->modulate.dead_time_q16 / (2.0F * Q15_SCALE) / dead_time_full(m)
-                                       : 0.0F;
+        return (m->dead_time_s > 0.0F) ? si_from_q15(p->modulate.dead_time_q16, 0.5F) / dead_time_full(m) : 0.0F;
     case CALIBRATION_COUNT:
     default:
         return 0.0F;
@@ -69,24 +51,27 @@ void calibration_set(drive_t *drive, calibration_id_t id, float value)
     motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        p->torque_slew = (value > 0.0F) ? at_least_one(to_q15(value * m->bases.step_s / m->bases.torque_Nm)) : Q15_MAX;
+        p->torque_slew = (value > 0.0F) ? at_least_one(q15_from_si(value * m->bases.step_s, m->bases.torque_Nm))
+                                        : Q15_MAX;
         break;
     case CALIBRATION_observer_m:
-        p->mrai.pole_gain = to_q31(4.0F * value * (float)p->mrai.r0 / Q31_SCALE);
+        p->mrai.pole_gain = q31_from_si(4.0F * value * si_from_q31(p->mrai.r0, 1.0F), 1.0F);
         break;
     case CALIBRATION_flux_bandwidth_rad_s:
-        p->mrai.flux_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
-        p->mrai.psi_drift_full = to_q31(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s);
+        p->mrai.flux_gain = q31_from_si(2.0F * value, m->bases.omega_rad_s);
+        p->mrai.psi_drift_full = q31_from_si(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s,
+                                             1.0F);
         break;
     case CALIBRATION_resistance_bandwidth_rad_s:
-        p->mrai.resistance_gain = to_q31(2.0F * value / m->bases.omega_rad_s);
-        p->mrai.r_drift_full = to_q31(R_DRIFT_SHARE * (float)p->mrai.r0 / Q31_SCALE * value * m->bases.step_s);
+        p->mrai.resistance_gain = q31_from_si(2.0F * value, m->bases.omega_rad_s);
+        p->mrai.r_drift_full = q31_from_si(R_DRIFT_SHARE * si_from_q31(p->mrai.r0, 1.0F) * value * m->bases.step_s,
+                                           1.0F);
         break;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
-        p->torque_loop.ki = to_q15(value * m->bases.step_s);
+        p->torque_loop.ki = q15_from_si(value * m->bases.step_s, 1.0F);
         break;
     case CALIBRATION_dead_time_compensation:
-        p->modulate.dead_time_q16 = 2 * to_q15(value * dead_time_full(m));
+        p->modulate.dead_time_q16 = 2 * q15_from_si(value * dead_time_full(m), 1.0F);
         break;
     case CALIBRATION_COUNT:
     default:

@@ -3,8 +3,8 @@
 
 #include "drive/mrai/mrai_seam.h"
 #include "hal/temperature.h"
+#include "types/si.h"
 
-#define Q31_SCALE 2147483648.0F
 #define RPM_PER_RAD_S 9.5492966F
 
 #define MEASURED(drive) ((drive)->samples.slot[(drive)->samples.generation & 1U])
@@ -12,20 +12,20 @@
 static float measured_speed_rpm(const drive_t *drive)
 {
     const motor_t *m = drive->motor;
-    const float omega = (float)MEASURED(drive).point.omega / Q31_SCALE * m->bases.omega_rad_s;
+    const float omega = si_from_q31(MEASURED(drive).point.omega, m->bases.omega_rad_s);
     return omega * RPM_PER_RAD_S / (float)m->angle_tracker.pole_pairs;
 }
 
 static float measured_psi_f_Vs(const drive_t *drive)
 {
     const motor_t *m = drive->motor;
-    return m->psi_f_Vs + (float)drive->task.identification.psi_delta / Q31_SCALE * m->bases.flux_Vs;
+    return m->psi_f_Vs + si_from_q31(drive->task.identification.psi_delta, m->bases.flux_Vs);
 }
 
 static float measured_r_ohm(const drive_t *drive)
 {
     const motor_t *m = drive->motor;
-    return m->r_ohm_20 + (float)drive->task.identification.r_delta / Q31_SCALE * m->bases.resistance_ohm;
+    return m->r_ohm_20 + si_from_q31(drive->task.identification.r_delta, m->bases.resistance_ohm);
 }
 
 #define FILL(name, type, base, expression, text) .name = (MEASUREMENT_TYPE_##type)(expression),

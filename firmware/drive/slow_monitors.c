@@ -7,8 +7,8 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
     const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
     const int32_t alpha = transform_round(q30.alpha);
-    const int32_t side = fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865));
-    return (abc_q15_t){alpha, side - alpha / 2, -side - alpha / 2};
+    const abc_t x = inverse_clarke(alpha, fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865)));
+    return (abc_q15_t){x.a, x.b, x.c};
 }
 
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)

@@ -8,6 +8,7 @@
 #include "hal/system.h"
 #include "hal/watchdog.h"
 #include "signal/counter.h"
+#include "types/si.h"
 
 #define FRAMES_PER_TASK 32 /* a bus of 1 Mbit/s delivers fewer in a millisecond */
 #define SLEW_MS 40         /* from zero to full torque */
@@ -36,7 +37,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
         .slew = slew,
         .jerk = per_step(&ecu->clock, slew / JERK_MS),
         .ramp_out = per_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
-        .dead_band = (q15_t)(DEAD_BAND_NM / source->bases.torque_Nm * 32768.0F),
+        .dead_band = q15_from_si(DEAD_BAND_NM, source->bases.torque_Nm),
         .omega_standstill = STANDSTILL,
     };
 }

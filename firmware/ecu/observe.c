@@ -3,6 +3,7 @@
 #include "ecu/ecu_private.h"
 #include "signal/counter.h"
 #include "signal/debounce.h"
+#include "types/si.h"
 
 #define CONSECUTIVE_MAX 3U
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
@@ -69,13 +70,12 @@ static bool is_slow(const drive_t *drive)
 {
     const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, (q15_t)drive->motor->monitor.v_min);
     const q15_t line_emf = drive->task.safe_state.line_emf;
-    return line_emf < least && (float)line_emf / 32768.0F * drive->motor->bases.voltage_V < TOUCH_SAFE_V;
+    return line_emf < least && si_from_q15(line_emf, drive->motor->bases.voltage_V) < TOUCH_SAFE_V;
 }
 
 static q15_t per_unit(const ecu_t *ecu, float torque_Nm)
 {
-    const float share = torque_Nm / ecu->drive.motor->bases.torque_Nm;
-    return (share >= 1.0F) ? Q15_MAX : (share <= -1.0F) ? (q15_t)-Q15_MAX : (q15_t)(share * 32767.0F);
+    return q15_from_si(torque_Nm, ecu->drive.motor->bases.torque_Nm);
 }
 
 static bool are_limits_lost(const ecu_t *ecu)
@@ -99,8 +99,7 @@ static uint32_t derating_reason(const ecu_t *ecu)
 static q15_t power_per_unit(const ecu_t *ecu, float power_kW)
 {
     const bases_t *b = &ecu->drive.motor->bases;
-    const float share = 1000.0F * power_kW / (1.5F * b->voltage_V * b->current_A);
-    return (share >= 1.0F) ? Q15_MAX : (q15_t)(share * 32767.0F);
+    return q15_from_si(1000.0F * power_kW, 1.5F * b->voltage_V * b->current_A);
 }
 
 /* Power limits of the battery. The torque limits are not among them: arbitration applies those, with its slew. When the
@@ -121,7 +120,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
     const drive_t *drive = &ecu->drive;
     const bus_command_t *command = &ecu->rx.command;
     const sample_t sample = sample_box_read(&drive->samples);
-    const float v_dc_V = (float)sample.v_dc / 32768.0F * drive->motor->bases.voltage_V;
+    const float v_dc_V = si_from_q15(sample.v_dc, drive->motor->bases.voltage_V);
     const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
     return (supervisor_in_t){
         .drive_faults = drive->fast.faults,

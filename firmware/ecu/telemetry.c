@@ -3,56 +3,47 @@
 
 #include "drive/mrai/mrai_seam.h"
 #include "hal/temperature.h"
+#include "types/si.h"
 
 #define FNV_START 2166136261U
 #define FNV_PRIME 16777619U
 #define RPM_PER_RAD_S 9.5492966F
 #define V_DC_MIN_V 1.0F
 
-static float from_q15(int32_t x, float base)
-{
-    return (float)x / 32768.0F * base;
-}
-
-static float from_q31(q31_t x, float base)
-{
-    return (float)x / 2147483648.0F * base;
-}
-
 static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t *t)
 {
     const bases_t *b = &drive->motor->bases;
     const dq_q15_t wanted = drive->request.current_mode ? drive->request.i_ref : drive->task.reference.i_ref;
-    const float u_d = from_q15(sample->point.u.d, b->voltage_V);
-    const float u_q = from_q15(sample->point.u.q, b->voltage_V);
-    t->id_A = from_q15(sample->point.i.d, b->current_A);
-    t->iq_A = from_q15(sample->point.i.q, b->current_A);
-    t->id_ref_A = from_q15(wanted.d, b->current_A);
-    t->iq_ref_A = from_q15(wanted.q, b->current_A);
-    t->v_dc_V = from_q15(sample->v_dc, b->voltage_V);
+    const float u_d = si_from_q15(sample->point.u.d, b->voltage_V);
+    const float u_q = si_from_q15(sample->point.u.q, b->voltage_V);
+    t->id_A = si_from_q15(sample->point.i.d, b->current_A);
+    t->iq_A = si_from_q15(sample->point.i.q, b->current_A);
+    t->id_ref_A = si_from_q15(wanted.d, b->current_A);
+    t->iq_ref_A = si_from_q15(wanted.q, b->current_A);
+    t->v_dc_V = si_from_q15(sample->v_dc, b->voltage_V);
     t->i_dc_A = (t->v_dc_V > V_DC_MIN_V) ? 1.5F * (u_d * t->id_A + u_q * t->iq_A) / t->v_dc_V : 0.0F;
-    t->speed_rpm = from_q31(sample->point.omega, b->omega_rad_s) / (float)drive->motor->angle_tracker.pole_pairs *
+    t->speed_rpm = si_from_q31(sample->point.omega, b->omega_rad_s) / (float)drive->motor->angle_tracker.pole_pairs *
                    RPM_PER_RAD_S;
 }
 
 static void read_torque(const drive_t *drive, telemetry_t *t)
 {
     const float base = drive->motor->bases.torque_Nm;
-    t->torque_estimated_Nm = from_q15(drive->task.identification.torque_estimated, base);
-    t->torque_commanded_Nm = from_q15(drive->task.torque_commanded, base);
-    t->torque_max_Nm = from_q15(drive->task.reference.torque_max, base);
+    t->torque_estimated_Nm = si_from_q15(drive->task.identification.torque_estimated, base);
+    t->torque_commanded_Nm = si_from_q15(drive->task.torque_commanded, base);
+    t->torque_max_Nm = si_from_q15(drive->task.reference.torque_max, base);
 }
 
 static void read_identification(const drive_t *drive, telemetry_t *t)
 {
     const motor_t *m = drive->motor;
-    const float psi_Vs = m->psi_f_Vs + from_q31(drive->task.identification.psi_delta, m->bases.flux_Vs);
-    const float r_ohm = m->r_ohm_20 + from_q31(drive->task.identification.r_delta, m->bases.resistance_ohm);
+    const float psi_Vs = m->psi_f_Vs + si_from_q31(drive->task.identification.psi_delta, m->bases.flux_Vs);
+    const float r_ohm = m->r_ohm_20 + si_from_q31(drive->task.identification.r_delta, m->bases.resistance_ohm);
     t->psi_f_mVs = 1000.0F * psi_Vs;
     t->r_mohm = 1000.0F * r_ohm;
-    t->table_scale_percent = 100.0F + from_q31(drive->task.identification.lq_error, 100.0F);
-    t->psi_quality_percent = from_q15(drive->task.identification.psi_quality, 100.0F);
-    t->r_quality_percent = from_q15(drive->task.identification.r_quality, 100.0F);
+    t->table_scale_percent = 100.0F + si_from_q31(drive->task.identification.lq_error, 100.0F);
+    t->psi_quality_percent = si_from_q15(drive->task.identification.psi_quality, 100.0F);
+    t->r_quality_percent = si_from_q15(drive->task.identification.r_quality, 100.0F);
     t->psi_clamped = drive->task.identification.psi_clamped;
     t->r_clamped = drive->task.identification.r_clamped;
 }

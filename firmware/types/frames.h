@@ -12,6 +12,11 @@
  * Context  values only, passed by copy; a component never changes its format without changing the type */
 #include "fx/q.h"
 
+/* In a scale that its user states. */
+typedef struct {
+    int32_t a, b, c;
+} abc_t;
+
 typedef struct {
     int32_t a, b, c;
 } abc_q15_t;

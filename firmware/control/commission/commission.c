@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/commission/commission.h"
 
+#include "control/current/transform.h"
 #include "fx/trig.h"
 
 #define CURRENT_TOLERANCE 256 /* q15, besides an eighth of the level */
@@ -41,10 +42,10 @@ void commission_start(const commission_config_t *config, commission_state_t *sta
 static void store_cosines(commission_data_t *data, uint32_t theta)
 {
     const fx_pair_t cos_sin = fx_unit_vector(theta);
-    const int32_t a = (int16_t)(cos_sin & 0xFFFFU) * Q15_MAX >> 15;
+    const int32_t alpha = (int16_t)(cos_sin & 0xFFFFU) * Q15_MAX >> 15;
     const int32_t beta_q30 = ((int32_t)cos_sin >> 16) * Q15_MAX;
-    const int32_t side = fx_mulhi(beta_q30, Q31(0.86602540378443865)) >> 14;
-    int32_t c[3] = {magnitude(a), magnitude(side - a / 2), magnitude(-side - a / 2)};
+    const abc_t phases = inverse_clarke(alpha, fx_mulhi(beta_q30, Q31(0.86602540378443865)) >> 14);
+    int32_t c[3] = {magnitude(phases.a), magnitude(phases.b), magnitude(phases.c)};
     for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
         c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);

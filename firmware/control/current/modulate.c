@@ -12,10 +12,9 @@ static abc_q29_t phases(const modulate_config_t *config, fx_pair_t v, fx_pair_t 
     int32_t alpha_q31 = config->alpha_q31;
     int32_t side_q31 = config->side_q31;
     fx_both_loaded(&alpha_q31, &side_q31);
-    const int32_t a = fx_mulhi(alpha_q31, fx_difference2(v, at));
-    const int32_t side = fx_mulhi(side_q31, fx_dot2_cross(v, at));
-    const int32_t b = side - (a >> 1);
-    return (abc_q29_t){a, b, b - 2 * side};
+    const int32_t alpha_q29 = fx_mulhi(alpha_q31, fx_difference2(v, at));
+    const abc_t x = inverse_clarke(alpha_q29, fx_mulhi(side_q31, fx_dot2_cross(v, at)));
+    return (abc_q29_t){x.a, x.b, x.c};
 }
 
 /* The middle one of the three. As they sum to zero, it is minus the sum of the largest and the smallest. */

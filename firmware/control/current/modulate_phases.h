@@ -10,6 +10,7 @@
  * Errors   saturates by design: the polarity is constant beyond the knee
  * Context  fast ISR; included by modulate.c and modulate_applied.c only */
 #include "control/current/modulate.h"
+#include "control/current/transform.h"
 #include "fx/q.h"
 
 #define DUTY_ONE 32768
@@ -21,10 +22,9 @@ static inline abc_q15_t polarity(const modulate_config_t *config, fx_pair_t i, f
     int32_t knee_q17 = config->knee_q17;
     int32_t knee_side_q17 = config->knee_side_q17;
     fx_both_loaded(&knee_q17, &knee_side_q17);
-    const int32_t a = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
-    const int32_t side = fx_mulhi(knee_side_q17, x.beta);
-    const int32_t b = side - (a >> 1);
-    return (abc_q15_t){fx_sat_q15_word(a), fx_sat_q15_word(b), fx_sat_q15_word(b - 2 * side)};
+    const int32_t alpha = fx_mulhi(knee_q17, x.alpha); /* Q17 * Q30 = Q15, below 2^29 */
+    const abc_t phases = inverse_clarke(alpha, fx_mulhi(knee_side_q17, x.beta));
+    return (abc_q15_t){fx_sat_q15_word(phases.a), fx_sat_q15_word(phases.b), fx_sat_q15_word(phases.c)};
 }
 
 #endif

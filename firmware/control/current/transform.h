@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef CURRENT_TRANSFORM_H
 #define CURRENT_TRANSFORM_H
-/** Park transform and its inverse, amplitude-invariant. The Clarke transform is part of measure_step().
+/** Park transform, its inverse and the inverse of Clarke's, amplitude-invariant. The Clarke transform is part of
+ * measure_step().
  *   Park  d = alpha cos + beta sin, q = beta cos - alpha sin;  inverse  alpha = d cos - q sin, beta = d sin + q cos
+ *   Clarke, inverse  a = alpha, b = side - alpha/2, c = -side - alpha/2, with side = sqrt(3)/2 beta
  * Source   docs/theory/current-control.md (CC-1)
  * Units    per unit; the angle as its (cos, sin), fx_rotation()
  * Range    every q15 vector with a unit sine and cosine: the sum of two products stays below 2 in Q30
- * Rounding half up once per component, 1/2 LSB q15; inverse_park_q30 is exact
+ * Rounding half up once per component, 1/2 LSB q15; inverse_park_q30 is exact; inverse_clarke rounds alpha/2 down
  * Errors   saturates
  * Context  fast ISR; 3 to 5 instructions each, no division, no loop */
 #include "fx/q.h"
@@ -35,6 +37,13 @@ static inline ab_q30_t inverse_park_q30(dq_q15_t x, fx_pair_t at)
 {
     const fx_pair_t v = fx_pair(x.d, x.q);
     return (ab_q30_t){fx_difference2(v, at), fx_dot2_cross(v, at)};
+}
+
+/* In the scale of both arguments. Their caller multiplies by sqrt(3)/2, each with another factor of its own. */
+static inline abc_t inverse_clarke(int32_t alpha, int32_t side)
+{
+    const int32_t b = side - (alpha >> 1);
+    return (abc_t){alpha, b, b - 2 * side};
 }
 
 #endif

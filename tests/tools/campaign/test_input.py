@@ -77,8 +77,8 @@ SHIPPED = Path(__file__).resolve().parents[2] / "loop" / "campaign"
 
 def test_no_two_shipped_campaigns_share_a_seed() -> None:
     seeds = [read(path).seed for path in SHIPPED.glob("*.toml")]
-    assert len(seeds) == 5
-    assert len(set(seeds)) == 5
+    assert len(seeds) >= 7
+    assert len(set(seeds)) == len(seeds)
 
 
 @pytest.mark.parametrize("name", ["ci", "development"])

@@ -135,7 +135,7 @@ void test_the_torque_moves_at_the_rates_of_the_page_of_the_bus(void)
     TEST_ASSERT_EQUAL_INT32(24050073, ecu.arbitration_config.slew);
     TEST_ASSERT_EQUAL_INT32(2405007, ecu.arbitration_config.jerk);
     TEST_ASSERT_EQUAL_INT32(64133530, ecu.arbitration_config.ramp_out);
-    TEST_ASSERT_EQUAL_INT(27, ecu.arbitration_config.dead_band);
+    TEST_ASSERT_EQUAL_INT(28, ecu.arbitration_config.dead_band);
 }
 
 /* 8 periods at 9 kHz are 888.889 us: so much of a millisecond's change belongs to a step; 2^-24 of single precision. */

@@ -128,6 +128,17 @@ void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_
     }
 }
 
+/* The magnets drive a current through a short circuit of the windings. */
+void test_current_in_a_short_circuit_is_plausible(void)
+{
+    sample.point.i = (dq_q15_t){-20000, 0};
+    ecu.drive.task.armed = true;
+    ecu.drive.task.safe_state.short_circuit = true;
+    TEST_ASSERT_TRUE(observe()->sensors_plausible);
+    ecu.drive.task.safe_state.short_circuit = false;
+    TEST_ASSERT_FALSE(observe()->sensors_plausible);
+}
+
 void test_sensors_are_not_plausible_before_the_first_period(void)
 {
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).sensors_plausible);
@@ -181,13 +192,13 @@ void test_the_command_of_the_bus_is_passed_on(void)
     TEST_ASSERT_TRUE(ecu_observe(&ecu, true).gate_fault);
 }
 
-/* The dead band is 0.25 N·m, rounded to 27 counts of 0.009 N·m: 0.2473 N·m are 27 counts, 0.2525 N·m are 28. */
+/* The dead band is 0.25 N·m, rounded to 28 counts of 0.009 N·m: 0.256 N·m are 28 counts, 0.257 N·m are 29. */
 void test_a_requested_torque_within_the_dead_band_is_zero(void)
 {
     static const struct {
         float torque_Nm;
         bool is_zero;
-    } cases[] = {{0.0F, true}, {0.2473F, true}, {-0.2473F, true}, {0.2525F, false}, {-0.26F, false}, {-1e6F, false}};
+    } cases[] = {{0.0F, true}, {0.256F, true}, {-0.256F, true}, {0.257F, false}, {-0.257F, false}, {-1e6F, false}};
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
         TEST_ASSERT_EQUAL(cases[n].is_zero, observe()->torque_requested_is_zero);
@@ -201,13 +212,13 @@ void test_arbitrated_torque_is_zero_only_when_not_one_count_is_left(void)
     TEST_ASSERT_FALSE(observe()->torque_arbitrated_is_zero);
 }
 
-/* 29.4664 N·m is a tenth of the base, 3276.7 counts. */
+/* 29.4664 N·m is a tenth of the base, 3276.8 counts. */
 void test_the_requested_torque_is_converted_and_limited_to_the_range_of_the_format(void)
 {
     ecu.rx.command.torque_requested_Nm = 29.4664F;
-    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).torque_requested);
     ecu.rx.command.torque_requested_Nm = -29.4664F;
-    TEST_ASSERT_INT_WITHIN(1, -3276, ecu_arbitration(&ecu).torque_requested);
+    TEST_ASSERT_EQUAL_INT(-3277, ecu_arbitration(&ecu).torque_requested);
     ecu.rx.command.torque_requested_Nm = 295.0F;
     TEST_ASSERT_EQUAL_INT(32767, ecu_arbitration(&ecu).torque_requested);
     ecu.rx.command.torque_requested_Nm = -295.0F;
@@ -219,10 +230,10 @@ void test_torque_limits_are_never_larger_than_the_machines_torque_nor_negative(v
     ecu.rx.command.limit_drive_Nm = 500.0F;
     ecu.rx.command.limit_regen_Nm = 29.4664F;
     TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).limit_regen);
+    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).limit_regen);
     ecu.rx.command.limit_drive_Nm = 29.4664F;
     ecu.rx.command.limit_regen_Nm = 500.0F;
-    TEST_ASSERT_INT_WITHIN(1, 3276, ecu_arbitration(&ecu).limit_drive);
+    TEST_ASSERT_EQUAL_INT(3277, ecu_arbitration(&ecu).limit_drive);
     TEST_ASSERT_EQUAL_INT(TORQUE_MAX, ecu_arbitration(&ecu).limit_regen);
     ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = -1.0F;
     TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
@@ -307,6 +318,43 @@ void test_the_first_reason_for_less_torque_is_told_by_the_number_of_the_dbc(void
         TEST_ASSERT_EQUAL_UINT32(cases[n].reason, told_reason());
         TEST_ASSERT_EQUAL(cases[n].reason != 0U, observe()->derated);
     }
+}
+
+/* The vehicle allows 60 N·m of driving and 40 N·m of braking torque; the machine has 132 N·m. */
+void test_what_a_request_is_beyond_is_told_in_all_four_quadrants(void)
+{
+    static const struct {
+        float torque_Nm;
+        q31_t omega;
+        request_limit_t told;
+    } cases[] = {
+        {60.0F, 1 << 28, REQUEST_LIMIT_NONE},           {60.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
+        {-40.0F, 1 << 28, REQUEST_LIMIT_NONE},          {-40.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
+        {-60.0F, -(1 << 28), REQUEST_LIMIT_NONE},       {-60.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
+        {40.0F, -(1 << 28), REQUEST_LIMIT_NONE},        {40.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
+        {132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},  {-132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},
+        {131.9F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT}, {0.0F, 0, REQUEST_LIMIT_NONE},
+    };
+    ecu.rx.command.limit_drive_Nm = 60.0F;
+    ecu.rx.command.limit_regen_Nm = 40.0F;
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
+        sample.point.omega = cases[n].omega;
+        (void)observe();
+        telemetry_t telemetry = {0};
+        ecu_telemetry(&ecu, &telemetry);
+        TEST_ASSERT_EQUAL_UINT32(cases[n].told, telemetry.request_limit);
+    }
+}
+
+void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_told(void)
+{
+    ecu.rx.command.limit_drive_Nm = 60.0F;
+    ecu.rx.command.torque_requested_Nm = 50.0F;
+    ecu.drive.task.derating = DERATING_REACH;
+    telemetry_t telemetry = {0};
+    ecu_telemetry(&ecu, &telemetry);
+    TEST_ASSERT_EQUAL_UINT32(REQUEST_LIMIT_REACH, telemetry.request_limit);
 }
 
 /* The paper's identification may still be at work on the newest point, as long as it has finished one since. */
