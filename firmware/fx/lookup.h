@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 typedef struct {
@@ -140,11 +141,14 @@ static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t 
 {
     uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
     uint32_t py = y << mesh->up;
-    if (__builtin_expect(px > mesh->x_last, 0)) { /* a negative one is very large */
-        px = (x < mesh->x0) ? 0U : mesh->x_last;
+    const fx_two_words_t last = FX_LOAD_TWO(mesh, x_last, y_last);
+    const uint32_t x_last = (uint32_t)last.first;
+    const uint32_t y_last = (uint32_t)last.second;
+    if (__builtin_expect(px > x_last, 0)) { /* a negative one is very large */
+        px = (x < mesh->x0) ? 0U : x_last;
     }
-    if (__builtin_expect(py > mesh->y_last, 0)) {
-        py = mesh->y_last;
+    if (__builtin_expect(py > y_last, 0)) {
+        py = y_last;
     }
     return fx_cell_at(px, py, mesh->ny);
 }
