@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # A linked image of a port (hal/<port>): the firmware for FLUXTRUE_MOTOR with start-up code and drivers.
 
-# fluxtrue_image(<name> SOURCES <file> ... SCRIPT <linker script> [FLASH <bytes> RAM <bytes>] [SEAL]
-#                [BUDGET <file>] [DEFINITIONS <D> ...] [LINK <option> ...])
-#   <build>/<name>.elf and .bin; SEAL writes the checksum; FLASH and RAM are bounds; a machine beyond the BUDGET of the
-#   port is refused before the image is linked
+# fluxtrue_image(<name> SOURCES <file> ... SCRIPT <linker script> [SEAL] [BUDGET <file>] [DEFINITIONS <D> ...]
+#                [LINK <option> ...])
+#   <build>/<name>.elf and .bin; SEAL writes the checksum; a machine beyond the BUDGET of the port is refused before the
+#   image is linked, an image larger than its bounds afterwards
 function(fluxtrue_image name)
-    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;FLASH;RAM;BUDGET" "SOURCES;DEFINITIONS;LINK")
-    if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES OR NOT arg_SCRIPT OR
-       (DEFINED arg_FLASH AND NOT DEFINED arg_RAM) OR (DEFINED arg_RAM AND NOT DEFINED arg_FLASH))
-        message(FATAL_ERROR "fluxtrue_image(${name}): wants SOURCES and SCRIPT, FLASH and RAM together or neither; "
-            "unknown: '${arg_UNPARSED_ARGUMENTS}'")
+    cmake_parse_arguments(PARSE_ARGV 1 arg "SEAL" "SCRIPT;BUDGET" "SOURCES;DEFINITIONS;LINK")
+    if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES OR NOT arg_SCRIPT)
+        message(FATAL_ERROR "fluxtrue_image(${name}): wants SOURCES and SCRIPT; unknown: '${arg_UNPARSED_ARGUMENTS}'")
     endif()
     cmake_path(ABSOLUTE_PATH arg_SCRIPT)
     get_property(layers GLOBAL PROPERTY FLUXTRUE_LAYERS)
@@ -37,9 +35,9 @@ function(fluxtrue_image name)
         add_custom_command(TARGET ${name}_image POST_BUILD VERBATIM
             COMMAND ${tool} seal "$<TARGET_FILE:${name}_image>")
     endif()
-    if(arg_FLASH)
+    if(arg_BUDGET)
         add_custom_command(TARGET ${name}_image POST_BUILD VERBATIM
-            COMMAND ${tool} size "$<TARGET_FILE:${name}_image>" --flash ${arg_FLASH} --ram ${arg_RAM})
+            COMMAND ${tool} size "$<TARGET_FILE:${name}_image>" --budget "${arg_BUDGET}")
     endif()
     add_custom_command(TARGET ${name}_image POST_BUILD VERBATIM
         COMMAND "${CMAKE_OBJCOPY}" -O binary "$<TARGET_FILE:${name}_image>" "${CMAKE_BINARY_DIR}/${name}.bin")

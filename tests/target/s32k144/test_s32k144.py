@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bench.figures import budget
 from fluxtrue_tools.target import image
 from fluxtrue_tools.target.build import image as build_image
 
 BUILD = Path(os.environ["FLUXTRUE_BUILD_DIR"]).parent
 PRESETS = ("s32k144", "s32k144-resolver")
-FLASH, RAM = 64 * 1024, 12 * 1024
 # Slot of the vector table: handler. 16 + the interrupt's number of the maker's list.
 VECTORS = {1: "reset_handler", 3: "fault_handler", 15: "fault_handler", 16 + 39: "adc_handler", 16 + 48: "tick_handler",
            16 + 69: "mrai_handler", 16 + 78: "can_bus_off_handler", 16 + 81: "can_message_handler",
@@ -41,7 +41,8 @@ def _read(elf: Path, address: int, size: int) -> bytes:
 
 
 def test_the_image_fits_its_bounds_with_the_stack(elf: Path) -> None:
-    print(image.size(elf, FLASH, RAM))
+    bounds = budget()
+    print(image.size(elf, bounds["flash_bytes"], bounds["ram_bytes"]))
 
 
 def test_the_vectors_name_the_handlers_and_every_other_entry_is_a_fault(elf: Path) -> None:

@@ -12,13 +12,15 @@ from typing import Any
 from fluxtrue_tools.bench import cycles
 from fluxtrue_tools.bench.build import SMALL
 from fluxtrue_tools.bench.drive import PERIODS, TASK_TITLES, TITLES, WARM_UP
+from fluxtrue_tools.bench.figures import budget
 from fluxtrue_tools.bench.peers import LOOPS
 from fluxtrue_tools.bench.sizes import STATE
 
 Figures = dict[str, Any]
 TASK_PERIODS = 10
 COLUMNS = 120
-CODE_MOST, STATE_MOST, FLASH_MOST, RAM_MOST = 11776, 1536, 65536, 12288
+CODE_MOST, STATE_MOST = 11776, 1536
+FLASH_MOST, RAM_MOST = (budget()[bound] for bound in ("flash_bytes", "ram_bytes"))
 UTILISATION_MOST = 10.0
 STACK_MOST = 0.5
 # Bounds of a kernel: average and most; None: none is set.

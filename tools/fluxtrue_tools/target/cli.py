@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import click
@@ -44,13 +45,13 @@ def seal(elf: Path) -> None:
 
 @target.command(cls=paths.Command)
 @click.argument("elf", type=ELF)
-@click.option("--flash", type=click.IntRange(0), required=True, help="Most bytes of flash.")
-@click.option("--ram", type=click.IntRange(0), required=True, help="Most bytes of RAM, stack included.")
-def size(elf: Path, flash: int, ram: int) -> None:
+@click.option("--budget", type=paths.InputFile(), required=True, help="The port's limits (budget.toml).")
+def size(elf: Path, budget: Path) -> None:
     """Print what the image occupies; fails beyond the bounds."""
     from fluxtrue_tools.target import image
 
-    click.echo(image.size(elf, flash, ram))
+    bounds = tomllib.loads(budget.read_text(encoding="utf-8"))
+    click.echo(image.size(elf, bounds["flash_bytes"], bounds["ram_bytes"]))
 
 
 @target.command(cls=paths.Command)
