@@ -84,7 +84,7 @@ static void take_samples(fluxtrue_t *d, const double in[6])
 static void run_period(fluxtrue_t *d)
 {
     host_port_select(d);
-    if (d->board.gate_fault && !d->board.gate_fault_told) {
+    if ((d->board.gate_fault || d->board.short_circuit_blocked) && !d->board.gate_fault_told) {
         d->board.gate_fault_told = true;
         drive_raise_fault(&d->drive, FAULT_GATE);
     }

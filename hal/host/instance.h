@@ -26,6 +26,7 @@ typedef struct {
     uint32_t lost, bus_off;
     bool output[BOARD_OUTPUTS];
     bool gate_fault, gate_fault_told;     /* the line; reported to the drive once until switching is enabled again */
+    bool short_circuit_blocked;           /* by the gate drivers, in the last period */
     bool winding_broken, inverter_broken; /* sensor defective */
     double inverter_C;
     bool watchdog_started;

@@ -83,7 +83,7 @@ void hal_board_set(board_output_t output, bool on)
 
 bool hal_board_gate_fault(void)
 {
-    return active->board.gate_fault;
+    return active->board.gate_fault || active->board.short_circuit_blocked;
 }
 
 int16_t hal_temperature_winding_dC(void)

@@ -3,58 +3,12 @@
 
 #include "flux_solve.h"
 
-/* Half the current that recharges the switches' output capacitance within the dead time (PL-12). */
-#define SWITCHING_ZONE_A 0.05
-/* A broken lead holds its current at zero against any voltage. */
-#define OPEN_LEAD_V 1e6
 #define SWEEPS 60
 #define SWEEP_END_V 1e-7
 
 static double clamp(double x, double lo, double hi)
 {
     return x < lo ? lo : (x > hi ? hi : x);
-}
-
-static void leg_off(inverter_t *v, int x)
-{
-    v->duty[x] = 0.5;
-    v->hi_d[x] = v->lo_d[x] = 0.5;
-    v->zone_A[x] = 0.0;
-}
-
-/* A pulse narrower than the dead time disappears: the loss is never larger than the pulse. */
-static void leg_on(inverter_t *v, int x, double duty, double dead)
-{
-    const double d = duty != duty ? 0.5 : clamp(duty, 0.0, 1.0);
-    const int switching = d > 0.0 && d < 1.0;
-    v->duty[x] = d;
-    v->hi_d[x] = switching ? fmin(dead, d) : 0.0;
-    v->lo_d[x] = switching ? fmin(dead, 1.0 - d) : 0.0;
-    v->zone_A[x] = SWITCHING_ZONE_A;
-}
-
-void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V)
-{
-    const double dead = p->ideal_inverter ? 0.0 : p->dead_time_s * p->pwm_hz;
-    const double drop = p->ideal_inverter ? 0.0 : p->device_drop_V;
-    v->exact = 1;
-    for (int x = 0; x < 3; x++) {
-        if (gates_on) {
-            leg_on(v, x, duty[x], dead);
-        } else {
-            leg_off(v, x);
-        }
-        v->hi_V[x] = v->hi_d[x] * vdc_V + drop;
-        v->lo_V[x] = v->lo_d[x] * vdc_V + drop;
-        if (p->phase_open[x]) {
-            v->duty[x] = 0.5;
-            v->hi_d[x] = v->lo_d[x] = 0.0;
-            v->hi_V[x] = v->lo_V[x] = OPEN_LEAD_V;
-            v->zone_A[x] = 0.0;
-        }
-        v->error_V[x] = clamp(v->error_V[x], -v->lo_V[x], v->hi_V[x]);
-        v->exact &= v->hi_V[x] == 0.0 && v->lo_V[x] == 0.0;
-    }
 }
 
 static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], double u_s[2])

@@ -4,7 +4,8 @@
 /** Two-level inverter, averaged over the PWM period. All legs have the same characteristic, similar to dry friction:
  *   v_x = v_dc d_x - e_x,  e_x = hi_x for i_x > 0, -lo_x for i_x < 0, between: the value that holds i_x at 0
  *   switching:  hi, lo = dead-time loss + drop;   gates off:  d = 1/2, hi = lo = v_dc/2 + drop
- * Source   docs/theory/plant.md (PL-11) ... (PL-14)
+ *   upper switch open:  hi = d v_dc + drop;   lower: lo = (1 - d) v_dc + drop;   shorted: d = 1 or 0, hi = lo = 0
+ * Source   docs/theory/plant.md (PL-11) ... (PL-14), (PL-23) ... (PL-25)
  * Units    V, A, s
  * Rounding polarity is taken at a substep's end: first order at a zero crossing, second elsewhere
  * Context  simulation only */
@@ -18,6 +19,9 @@ typedef struct {
     double error_V[3];       /* of the last substep */
     int exact;               /* no leg has an error */
 } inverter_t;
+
+/** Share of the period in which a switch that is switched on meets a shorted one: the dc link's short circuit. */
+double inverter_short_circuit(const plant_params_t *p, const double duty[3], int gates_on);
 
 /** The legs of one period. */
 void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V);

@@ -3,7 +3,7 @@
 #define PLANT_PLANT_H
 /** The simulated traction drive: inverter, machine, mechanics, sensors; the oracle of every test.
  *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
- * Source   docs/theory/plant.md (PL-1) ... (PL-22)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-25)
  * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
  * Errors   plant_create() returns NULL for bad parameters or no memory
  * Context  simulation only, double precision; one instance per drive, no global state.
@@ -25,6 +25,7 @@ typedef struct {
     double theta_m_rad; /* [0, 2 pi) */
     int32_t theta_count;
     double t_winding_C;
+    int gate_fault; /* the gate drivers have blocked a short circuit in the last period */
 } plant_sensors_t;
 
 typedef struct {
@@ -44,8 +45,9 @@ typedef struct {
     double copper_W, iron_W, mechanical_W, electrical_W, inverter_W;
     /* integrals since creation or plant_set_state() */
     double e_dc_J, e_electrical_J, e_copper_J, e_iron_J, e_mechanical_J;
-    double e_field_J;     /* 1.5 integral of i . dpsi in the rotor frame */
-    double e_avalanche_J; /* taken by the bridge above avalanche_V */
+    double e_field_J;         /* 1.5 integral of i . dpsi in the rotor frame */
+    double e_avalanche_J;     /* taken by the bridge above avalanche_V */
+    double e_short_circuit_J; /* taken by a leg whose two switches conduct */
 } plant_truth_t;
 
 /** The map is borrowed and must outlive the plant; NULL: ld_H, lq_H, psi_f_Vs are used.
@@ -65,7 +67,8 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 /** The board's switches from now on; at creation the battery is connected and the gates have their supply. */
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 
-/** One PWM period; duty 0..1 (clamped, NaN counts as 0.5). Gates off, or without their supply: the diodes conduct. */
+/** One PWM period; duty 0..1 (clamped, NaN counts as 0.5). Gates off, or without their supply, or after
+ * the gate drivers have blocked a short circuit in it: the diodes conduct. */
 void plant_advance(plant_t *plant, const double duty[3], int gates_on);
 
 const plant_truth_t *plant_truth(const plant_t *plant);

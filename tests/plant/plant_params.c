@@ -16,7 +16,9 @@ void plant_params_default(plant_params_t *params)
     params->cross_saturation_scale = 1.0;
     params->precharge_s = 0.02; /* assumed: charged to 95 % in 60 ms, discharged to 5 % in 0.3 s */
     params->discharge_s = 0.1;
-    params->avalanche_V = 1e6; /* none */
+    params->avalanche_V = 1e6;        /* none */
+    params->short_circuit_A = 2000.0; /* assumed, with the next: a module's transistors limit the current, */
+    params->desaturation_s = 3e-6;    /* which they withstand for some microseconds */
     params->substeps = 10;
     params->adc_bits = 12;
     for (int x = 0; x < 3; x++) {
@@ -104,6 +106,8 @@ static const char *bad_electronics(const plant_params_t *p)
         {"pwm_hz", above_zero(p->pwm_hz)},
         {"dead_time_s", not_below_zero(p->dead_time_s) && p->dead_time_s * p->pwm_hz < 0.5},
         {"device_drop_V", not_below_zero(p->device_drop_V)},
+        {"short_circuit_A", above_zero(p->short_circuit_A)},
+        {"desaturation_s", not_below_zero(p->desaturation_s)},
         {"substeps", p->substeps >= 10 && p->substeps <= 100000},
         {"current_full_scale_A", above_zero(p->current_full_scale_A)},
         {"adc_bits", p->adc_bits >= 1 && p->adc_bits <= 24},

@@ -29,6 +29,12 @@ typedef struct {
     int substeps;                                       /* per PWM period, at least 10 */
     int ideal_inverter;                                 /* no dead time, no device drop */
     int phase_open[3];                                  /* the motor lead is broken */
+    /* switches: upper a, b, c, lower a, b, c */
+    int switch_open[6];     /* never switched on; its diode remains */
+    int switch_shorted[6];  /* conducts always, both ways */
+    double short_circuit_A; /* what a switch conducts that is switched on against a shorted one */
+    double desaturation_s;  /* until the gate drivers block and report it */
+    int desaturation_open;  /* they do neither */
     /* sensors */
     double current_full_scale_A; /* the converter spans -full scale ... +full scale */
     int adc_bits;

@@ -5,6 +5,7 @@
  *   in:  ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start
  *   out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1
  *   switches(): the board's switches; left out, or false: the controller has no board, the battery stays connected
+ *   gate_fault(): before each step, whether the gate drivers have blocked a short circuit; it may be left out
  * Errors   set answers a SIM_ code; get of an unknown name is NaN; failure() is NULL, or why no further
  *          step can be run (it may be left out)
  * Context  host; owned by the runner, which destroys it */
@@ -21,6 +22,7 @@ typedef struct {
     const char *(*failure)(const void *self);
     void (*destroy)(void *self);
     bool (*switches)(const void *self, plant_switches_t *on);
+    void (*gate_fault)(void *self, bool reported);
 } sim_controller_t;
 
 /** Takes ownership of the controller, also if it returns NULL (out of memory). */

@@ -38,6 +38,11 @@ static bool firmware_switches(const void *self, plant_switches_t *on)
     return drive->on_bus;
 }
 
+static void firmware_gate_fault(void *self, bool reported)
+{
+    ((fluxtrue_t *)self)->board.short_circuit_blocked = reported;
+}
+
 /* Firmware of the caller. */
 static void firmware_keep(void *self)
 {
@@ -68,11 +73,11 @@ sim_t *sim_create(int controller)
 {
     if (controller == SIM_FIRMWARE) {
         return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
-                                                  firmware_destroy, firmware_switches});
+                                                  firmware_destroy, firmware_switches, firmware_gate_fault});
     }
     if (controller == SIM_TWIN) {
         return sim_create_with(
-            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL});
+            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL, NULL});
     }
     return NULL;
 }
@@ -80,7 +85,7 @@ sim_t *sim_create(int controller)
 sim_t *sim_create_around(fluxtrue_t *firmware)
 {
     return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep,
-                                              firmware_switches});
+                                              firmware_switches, firmware_gate_fault});
 }
 
 fluxtrue_t *sim_firmware(sim_t *sim)

@@ -94,6 +94,9 @@ static void period_run(sim_t *sim)
     plant_sample(sim->plant, &sensors);
     const double in[6] = {sensors.ia_A,  sensors.ib_A,        sensors.ic_A,
                           sensors.vdc_V, sensors.theta_m_rad, sensors.t_winding_C};
+    if (sim->controller.gate_fault != NULL) {
+        sim->controller.gate_fault(sim->controller.self, sensors.gate_fault != 0);
+    }
     double out[4] = {0.5, 0.5, 0.5, 0.0};
     sim->controller.step(sim->controller.self, in, out);
     plant_switches_t on;

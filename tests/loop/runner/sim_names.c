@@ -23,6 +23,10 @@ typedef struct {
     {"plant." #f "_a", offsetof(plant_params_t, f), KIND_INT},                                     \
     {"plant." #f "_b", offsetof(plant_params_t, f) + sizeof(int), KIND_INT},                       \
     {"plant." #f "_c", offsetof(plant_params_t, f) + 2u * sizeof(int), KIND_INT}
+#define FLAG6(f, first, x) {"plant." #f "_" x, offsetof(plant_params_t, f) + (first) * sizeof(int), KIND_INT}
+#define SWITCHES(f)                                                                                \
+    FLAG6(f, 0u, "upper_a"), FLAG6(f, 1u, "upper_b"), FLAG6(f, 2u, "upper_c"),                     \
+    FLAG6(f, 3u, "lower_a"), FLAG6(f, 4u, "lower_b"), FLAG6(f, 5u, "lower_c")
 
 static const field_t plant_fields[] = {
     REAL(pole_pairs), REAL(r_ohm_20), REAL(r_temp_coeff_per_K), REAL(winding_C), REAL(ld_H),
@@ -32,7 +36,8 @@ static const field_t plant_fields[] = {
     REAL(vdc_ripple_hz), REAL(vdc_start_V), REAL(dc_link_F), REAL(precharge_s), REAL(discharge_s), REAL(avalanche_V),
     FLAG(precharge_open), FLAG(discharge_open), FLAG(contactor_open),
     REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), FLAG(substeps),
-    FLAG(ideal_inverter), FLAG3(phase_open), REAL(current_full_scale_A), FLAG(adc_bits),
+    FLAG(ideal_inverter), FLAG3(phase_open), SWITCHES(switch_open), SWITCHES(switch_shorted),
+    REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), REAL(current_full_scale_A), FLAG(adc_bits),
     REAL3(current_gain), REAL3(current_offset_A), REAL(current_noise_A_rms),
     FLAG(current_quantise), FLAG3(current_stuck), FLAG3(current_open), REAL(vdc_full_scale_V),
     REAL(vdc_gain), FLAG(vdc_quantise), REAL(angle_offset_rad), REAL(angle_h1_rad),
@@ -61,6 +66,7 @@ static const truth_field_t truth_fields[] = {
     MEAN(torque_mean_Nm), MEAN(torque_shaft_mean_Nm), MEAN(idc_A), MEAN(copper_W), MEAN(iron_W),
     MEAN(mechanical_W), MEAN(electrical_W), MEAN(inverter_W), LAST(e_dc_J), LAST(e_electrical_J),
     LAST(e_copper_J), LAST(e_iron_J), LAST(e_mechanical_J), LAST(e_field_J), LAST(e_avalanche_J),
+    LAST(e_short_circuit_J),
 };
 /* clang-format on */
 enum { TRUTH_FIELDS = (int)(sizeof truth_fields / sizeof truth_fields[0]) };

@@ -85,6 +85,8 @@ void test_impossible_electronics_are_refused_by_name(void)
     REFUSE(dead_time_s, 50e-6);
     REFUSE(dead_time_s, -1e-6);
     REFUSE(device_drop_V, -0.1);
+    REFUSE(short_circuit_A, 0.0);
+    REFUSE(desaturation_s, -1e-6);
     REFUSE(substeps, 9);
     REFUSE(substeps, 100001);
     REFUSE(current_full_scale_A, 0.0);

@@ -156,6 +156,13 @@ class Plant(Strict):
     substeps: Annotated[int, Field(ge=10, le=1000)] | None = None
     ideal_inverter: bool | None = None
     phase_open: ThreeFlags | None = None
+    switch_open_upper: ThreeFlags | None = None
+    switch_open_lower: ThreeFlags | None = None
+    switch_shorted_upper: ThreeFlags | None = None
+    switch_shorted_lower: ThreeFlags | None = None
+    short_circuit_A: Positive | None = None
+    desaturation_s: NotNegative | None = None
+    desaturation_open: bool | None = None
     current_full_scale_A: Positive | None = None
     adc_bits: Annotated[int, Field(ge=1, le=24)] | None = None
     current_gain: Three | None = None
