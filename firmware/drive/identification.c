@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
-#include "hal/temperature.h"
 
 static bool is_at_limit(const identify_state_t *state, identify_index_t index)
 {
@@ -44,7 +43,6 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     const identify_in_t in = {
         .point = &point,
         .tables = &tables,
-        .temperature_known = snapshot->winding_dC != TEMPERATURE_UNKNOWN,
         .winding_dC = snapshot->winding_dC,
         .enabled = drive->request.identification && snapshot->sample.acting,
     };

@@ -14,6 +14,7 @@
  *          gate take the confidence to 0, the torque estimate goes on
  * Context  1 kHz task; five divisions per step, one more per update and axis */
 #include "control/identify/kalman.h"
+#include "types/temperature.h"
 
 #define IDENTIFY_STEPS 10 /* per update */
 
@@ -44,8 +45,7 @@ FX_SHORT_LOADS_BEFORE(identify_state_t, kalman);
 typedef struct {
     const identify_point_t *point;
     const identify_tables_t *tables;
-    bool temperature_known;
-    int16_t winding_dC;
+    int16_t winding_dC; /* tenths of a degree C, or TEMPERATURE_UNKNOWN */
     bool enabled;
 } identify_in_t;
 

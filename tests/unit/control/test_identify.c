@@ -11,7 +11,7 @@ static identify_config_t c;
 static identify_state_t state;
 static twin_identify_t twin;
 static identify_out_t out;
-static bool enabled, sensor;
+static bool enabled;
 static int16_t winding_dC;
 
 /* steady_window() makes the voltages of a machine without iron loss. */
@@ -31,8 +31,7 @@ void setUp(void)
     identify_reset(&c, &state);
     twin_identify_reset(&f.si, &twin);
     enabled = true;
-    sensor = false;
-    winding_dC = 200;
+    winding_dC = TEMPERATURE_UNKNOWN;
 }
 
 void tearDown(void)
@@ -44,7 +43,7 @@ static int32_t noise_with(int limited)
     const window_pair_t pair = steady_window(&f, (dq_q15_t){-4000, 8000}, 0.3, (dq_q15_t){0, 0});
     identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.3 * 2147483647.0));
     const identify_tables_t tables = tables_at(&f, point.i_m);
-    const identify_in_t in = {&point, &tables, sensor, winding_dC, enabled};
+    const identify_in_t in = {&point, &tables, winding_dC, enabled};
     point.limited = (uint8_t)limited;
     identify_reset(&c, &state);
     (void)identify_step(&c, &state, &in);
@@ -81,10 +80,11 @@ static void run(dq_q15_t i, double omega, truth_t truth, int steps)
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(omega * 2147483647.0));
     const twin_point_t si = twin_point(&f.si, &pair.twin, omega * f.w);
     const identify_tables_t tables = tables_at(&f, point.i_m);
-    const identify_in_t in = {&point, &tables, sensor, winding_dC, enabled};
+    const identify_in_t in = {&point, &tables, winding_dC, enabled};
+    const double winding_C = (winding_dC == TEMPERATURE_UNKNOWN) ? (double)NAN : winding_dC / 10.0;
     for (int n = 0; n < steps; n++) {
         out = identify_step(&c, &state, &in);
-        twin_identify(&f.si, &twin, &si, sensor ? winding_dC / 10.0 : (double)NAN, enabled);
+        twin_identify(&f.si, &twin, &si, winding_C, enabled);
     }
 }
 
@@ -164,7 +164,7 @@ void test_a_period_without_the_bridge_is_not_used_for_identification(void)
     pair.fixed.acting = false;
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.4 * 2147483647.0));
     const identify_tables_t tables = tables_at(&f, point.i_m);
-    const identify_in_t in = {&point, &tables, false, 0, true};
+    const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
     for (int n = 0; n < 500; n++) {
         (void)identify_step(&c, &state, &in);
     }
@@ -178,7 +178,7 @@ void test_an_update_needs_all_of_its_steps(void)
     const window_pair_t pair = steady_window(&f, i, 0.4, (dq_q15_t){0, 900});
     identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.4 * 2147483647.0));
     const identify_tables_t tables = tables_at(&f, point.i_m);
-    const identify_in_t in = {&point, &tables, false, 0, true};
+    const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
     for (int n = 0; n < 100; n++) {
         point.valid = n % 10 != 4;
         (void)identify_step(&c, &state, &in);
@@ -189,12 +189,11 @@ void test_an_update_needs_all_of_its_steps(void)
 /* 0.39 % per kelvin: 120 C is 39 % more; a lost sensor keeps the last temperature. */
 void test_the_winding_temperature_is_the_priors_mean_and_a_lost_sensor_keeps_it(void)
 {
-    sensor = true;
     winding_dC = 1200;
     run((dq_q15_t){0, 0}, 0.0, nothing, 10);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
     TEST_ASSERT_TRUE(state.r_known);
-    sensor = false;
+    winding_dC = TEMPERATURE_UNKNOWN;
     run((dq_q15_t){0, 0}, 0.0, nothing, 10);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
     TEST_ASSERT_FALSE(state.r_known);
@@ -305,7 +304,7 @@ void test_a_persistent_mismatch_takes_the_confidence_away(void)
     const window_pair_t pair = steady_window(&f, i, 0.5, turned);
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
     const identify_tables_t tables = tables_at(&f, point.i_m);
-    const identify_in_t in = {&point, &tables, false, 0, true};
+    const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
     for (int n = 0; n < 1500; n++) {
         (void)identify_step(&c, &state, &in);
     }
@@ -324,7 +323,7 @@ void test_a_mismatch_in_either_axis_alone_takes_the_confidence_away(void)
         const window_pair_t pair = steady_window(&f, i, 0.5, more);
         const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
         const identify_tables_t tables = tables_at(&f, point.i_m);
-        const identify_in_t in = {&point, &tables, false, 0, true};
+        const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
         for (int n = 0; n < 300; n++) {
             (void)identify_step(&c, &state, &in);
         }
@@ -388,7 +387,6 @@ void test_a_torque_step_does_not_move_the_flux(void)
 void test_the_whole_agrees_with_the_twin_after_a_minute(void)
 {
     worst_t x = {0}, t = {0}, p = {0};
-    sensor = true;
     winding_dC = 800;
     for (int n = 0; n < 60; n++) {
         drive(wrong, 1);

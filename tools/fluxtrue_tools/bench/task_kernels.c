@@ -81,7 +81,6 @@ CALLED void task_identify(void)
     const identify_in_t in = {
         .point = &point,
         .tables = &tables,
-        .temperature_known = true,
         .winding_dC = snapshot.winding_dC,
         .enabled = d->request.identification && snapshot.sample.acting,
     };
