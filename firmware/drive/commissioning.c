@@ -99,7 +99,7 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     }
 }
 
-void drive_retrim(drive_t *drive, int32_t trim)
+void drive_restore_trim(drive_t *drive, int32_t trim)
 {
     motor_parameters_t *p = &drive->parameters;
     set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));

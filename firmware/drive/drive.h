@@ -189,14 +189,14 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 /** Moves the identified voltage error into the compensation. From the task. */
 void drive_trim(drive_t *drive, q15_t v_dc);
 /** Adds a stored trim to the compensation in effect; 0 removes the trim. */
-void drive_retrim(drive_t *drive, int32_t trim);
+void drive_restore_trim(drive_t *drive, int32_t trim);
 /** The drive does not run, and its safe state is the active short circuit. */
 static inline bool drive_is_shorted(const drive_t *drive)
 {
     return drive->task.armed && drive->task.run_state != RUN_STATE_RUN && drive->task.safe_state.short_circuit;
 }
 /** Current references come from outside the torque path. */
-static inline bool drive_is_direct(const drive_t *drive)
+static inline bool drive_bypasses_torque_path(const drive_t *drive)
 {
     return drive->request.current_mode || commission_runs(&drive->task.commission);
 }

@@ -33,7 +33,7 @@ static uint32_t check_torque(drive_t *drive, const sample_t *sample)
 {
     task_state_t *task = &drive->task;
     const torque_monitor_in_t in = {
-        .acting = sample->acting && !drive_is_direct(drive),
+        .acting = sample->acting && !drive_bypasses_torque_path(drive),
         .u = sample->point.u,
         .i = sample->point.i,
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},

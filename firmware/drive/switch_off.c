@@ -28,7 +28,7 @@ run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_stat
     const bool controlled = (*faults & ~(uint32_t)CONTROLLED) == 0U;
     const bool ends = wanted == RUN_STATE_OFF || (wanted == RUN_STATE_RUN && *faults != 0U);
     const bool applies = task->run_state == RUN_STATE_RUN && controlled && ends && task->safe_state.short_circuit &&
-                         !drive_is_direct(drive);
+                         !drive_bypasses_torque_path(drive);
     if (!applies || off->steps == STEPS) {
         off->steps = 0;
         return wanted;

@@ -58,7 +58,7 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
         task->identification_resets = request->identification_resets;
         mrai_discard(drive);
         identify_reset(&drive->motor->identify, &task->identify);
-        drive_retrim(drive, 0);
+        drive_restore_trim(drive, 0);
     }
     if (faults != 0U) {
         return RUN_STATE_FAULT;
@@ -76,7 +76,7 @@ static voltage_reserve_t update_voltage_reserve(drive_t *drive, const snapshot_t
         .psi = task->psi_ref,
         .psi_plan = task->reference.psi_plan,
         .psi_delta = snapshot->psi_d_error,
-        .acting = snapshot->sample.acting && !drive_is_direct(drive),
+        .acting = snapshot->sample.acting && !drive_bypasses_torque_path(drive),
     };
     return voltage_reserve_step(&drive->motor->voltage_reserve, &task->voltage_reserve, &in);
 }
@@ -128,7 +128,7 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
         .torque_commanded = task->torque_commanded,
         .torque_estimated = task->identification.torque_estimated,
         .confidence = task->identification.confidence,
-        .enabled = drive->request.torque_loop && !drive_is_direct(drive),
+        .enabled = drive->request.torque_loop && !drive_bypasses_torque_path(drive),
         .limited = task->reference.limited || snapshot->sample.voltage_limited,
     };
     return torque_loop_step(&drive->parameters.torque_loop, &task->torque_loop, &loop);

@@ -140,11 +140,11 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
            bit_if(in->alive && in->torque_mode, WHEN_ON) |
            bit_if(in->alive && !in->torque_mode && !in->current_mode, WHEN_OFF) |
            bit_if(in->dc_in_range && in->dc_settled, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
-           bit_if(may_discharge, WHEN_DANGEROUS) | bit_if(s->enabled, WHEN_ENABLED) |
+           bit_if(may_discharge, WHEN_NOT_DISCHARGED) | bit_if(s->enabled, WHEN_ENABLED) |
            bit_if(!s->enabled && in->torque_arbitrated_is_zero, WHEN_STOPPED) |
            bit_if(in->torque_arbitrated_is_zero, WHEN_NO_TORQUE) | bit_if(in->derated, WHEN_DERATED) |
            bit_if(!in->derated, WHEN_FULL) | bit_if(in->slow, WHEN_SLOW) |
-           bit_if((s->faults & ECU_FAULT_DISCHARGE) != 0U, WHEN_NOT_DISCHARGING);
+           bit_if((s->faults & ECU_FAULT_DISCHARGE) != 0U, WHEN_DISCHARGE_FAILED);
 }
 
 static void take_transition(supervisor_t *s, uint32_t now)

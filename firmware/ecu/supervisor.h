@@ -68,14 +68,14 @@ typedef enum {
     WHEN_OFF = 1U << 5,     /* a live command asks for mode off */
     WHEN_CHARGED = 1U << 6, /* dc voltage in range and settled */
     WHEN_DISCHARGED = 1U << 7,
-    WHEN_DANGEROUS = 1U << 8, /* dc link charged, and discharging has not failed */
-    WHEN_ENABLED = 1U << 9,   /* enable was asked for and granted */
-    WHEN_STOPPED = 1U << 10,  /* not enabled and no torque left */
+    WHEN_NOT_DISCHARGED = 1U << 8, /* its opposite, unless discharge has failed */
+    WHEN_ENABLED = 1U << 9,        /* enable was asked for and granted */
+    WHEN_STOPPED = 1U << 10,       /* not enabled and no torque left */
     WHEN_NO_TORQUE = 1U << 11,
     WHEN_DERATED = 1U << 12,
-    WHEN_FULL = 1U << 13,           /* not derated */
-    WHEN_SLOW = 1U << 14,           /* at the known speed the machine cannot charge the dc link */
-    WHEN_NOT_DISCHARGING = 1U << 15 /* discharging took too long */
+    WHEN_FULL = 1U << 13,            /* not derated */
+    WHEN_SLOW = 1U << 14,            /* at the known speed the machine cannot charge the dc link */
+    WHEN_DISCHARGE_FAILED = 1U << 15 /* discharging took too long */
 } supervisor_when_t;
 
 typedef struct {

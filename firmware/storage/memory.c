@@ -32,7 +32,7 @@ void memory_recall(memory_t *memory, drive_t *drive)
         memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
                            drive_recall(drive, &record.identified);
         if (memory->recalled) {
-            drive_retrim(drive, record.trim);
+            drive_restore_trim(drive, record.trim);
         }
     }
 }

@@ -6,7 +6,7 @@
 #include "fx/q.h"
 
 #define HALF_LSB_Q22 64
-#define D_MIN Q15(0.7) /* the d axis may always use this much of the circle (CC-11) */
+#define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
 
 void current_control_reset(current_control_state_t *state)
 {
@@ -71,7 +71,7 @@ static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t omega)
 {
     const dq_q15_t clipped = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
     if (error_d > 0) {
-        return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), D_MIN)), clipped.q};
+        return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), V_D_MIN)), clipped.q};
     }
     const int32_t excess = fx_sat_q15_word(v.d - clipped.d);
     const int32_t sign = omega >> 31; /* two's complement: an excess of 0 must change nothing */

@@ -223,7 +223,7 @@ void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measu
 {
     const int32_t measured = dead_time(&motor.parameters) + 40;
     TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.parameters.modulate.knee_q17, 1}));
-    drive_retrim(&drive, -60);
+    drive_restore_trim(&drive, -60);
     TEST_ASSERT_EQUAL_INT(measured - 60, dead_time(&drive.parameters));
     identify_and_save();
     power_on(&motor);
@@ -236,7 +236,7 @@ void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measu
 
 void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
 {
-    drive_retrim(&drive, 60);
+    drive_restore_trim(&drive, 60);
     identify_and_save();
     power_on(&motor);
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 60, dead_time(&drive.parameters));
