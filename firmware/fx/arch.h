@@ -26,7 +26,7 @@ static inline int32_t fx_arch_sub_wrap(int32_t a, int32_t b)
     return (int32_t)((uint32_t)a - (uint32_t)b);
 }
 
-/* Written in plain C on both sides: gcc picks MLA or SMLABB, whichever needs no sign extension. */
+/* Plain C for all processors: gcc chooses MLA or SMLABB, whichever needs no sign extension. */
 static inline int32_t fx_arch_smlabb(int16_t a, int16_t b, int32_t acc)
 {
     return fx_arch_add_wrap(acc, (int32_t)a * b);
@@ -47,20 +47,20 @@ static inline int32_t fx_arch_qsub(int32_t a, int32_t b)
     return __qsub(a, b);
 }
 
-/* gcc's __ssat and __usat convert from unsigned inside the macro, out of our reach. */
+/* The macros __ssat and __usat of gcc contain a conversion from unsigned, to which no cast can be added. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 __attribute__((always_inline)) static inline int16_t fx_arch_ssat16(int32_t x)
 {
     const int32_t y = __ssat(x, 16);
-    /* Tells the compiler the range, which saves the SXTH after every narrowing. */
+    /* The range that this states to the compiler saves the SXTH after every narrowing. */
     if ((y < INT16_MIN) || (y > INT16_MAX)) {
         __builtin_unreachable();
     }
     return (int16_t)y;
 }
 
-/* In a word; the builtin lets the compiler fold a shift into the instruction. */
+/* The result stays in a word; with the builtin the compiler can make a shift part of the instruction. */
 static inline int32_t fx_arch_ssat16_word(int32_t x)
 {
     return __ssat(x, 16);
@@ -92,7 +92,7 @@ __attribute__((always_inline)) static inline int32_t fx_arch_usat(int32_t x, uns
     return y;
 }
 
-/* Without the trap that a port could ask for, a division by zero gives zero. */
+/* A division by zero gives zero, as long as the port leaves the trap for it (CCR.DIV_0_TRP) disabled. */
 static inline int32_t fx_arch_udiv(uint32_t a, uint32_t b)
 {
     int32_t y;
@@ -100,7 +100,7 @@ static inline int32_t fx_arch_udiv(uint32_t a, uint32_t b)
     return y;
 }
 
-/* The compiler makes two instructions of the builtins. */
+/* The builtins would make two instructions, a doubling and an addition. */
 static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
 {
     int32_t y;
@@ -108,7 +108,7 @@ static inline int32_t fx_arch_qdadd(int32_t a, int32_t b)
     return y;
 }
 
-/* b is the lower half of a word, whatever its upper half holds; the builtin would extend its sign first. */
+/* Only the lower half of b counts. The builtin would first extend its sign, by another instruction. */
 static inline int32_t fx_arch_smulwb(int32_t a, int32_t b)
 {
     int32_t y;

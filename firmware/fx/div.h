@@ -2,7 +2,7 @@
 #ifndef FX_DIV_H
 #define FX_DIV_H
 
-/** Guarded division: q = num / den in the named format. Every argument has a result, nothing traps.
+/** Division q = num / den in the named format, defined for every argument; none causes a trap.
  *   den = 0: the end of the format with the sign of num; 0 / 0 = 0. fx_quotient(): 0.
  * Source   docs/theory/fixed-point.md (FX-10) to (FX-12)
  * Units    per unit
@@ -14,8 +14,8 @@
 
 #include "fx/q.h"
 
-/* num / den of unsigned words, truncated, 0 for den = 0. A quotient of 2^31 and more has the bits of a negative
- * number. */
+/* num / den of unsigned words, truncated; 0 for den = 0. A quotient of 2^31 and more comes back as a negative number
+ * with the same bits. */
 static inline int32_t fx_quotient(uint32_t num, uint32_t den)
 {
     return fx_arch_udiv(num, den);

@@ -3,7 +3,7 @@
 #define FX_FORMAT_H
 
 /** Fixed-point formats: constants, saturation, addition, narrowing, shifts, limits.
- *   value = integer / 2^15 (q15), / 2^31 (q31), / 2^16 (q16: a gain). Users include fx/q.h.
+ *   value = integer / 2^15 (q15), / 2^31 (q31), / 2^16 (q16: a gain). Other folders include fx/q.h.
  * Source   docs/theory/fixed-point.md (FX-1) to (FX-3), (FX-9)
  * Units    q15, q31: per unit, [-1, 1); q16: gain, [-32768, 32768)
  * Range    every argument of every function, unless its comment says otherwise
@@ -26,8 +26,8 @@ typedef int32_t q16_t;
 #define Q31_MIN ((q31_t)INT32_MIN)
 #define Q16_ONE ((q16_t)65536)
 
-/* Compile-time constants only: rounded half away from zero, saturated. Never with a variable:
- * they would drag floating point into the firmware. */
+/* For constants of compile time only, rounded half away from zero, saturated. With a variable the firmware would
+ * compute in floating point at run time. */
 #define FX_CONST(x, one, lo, hi) \
     (((x) * (one) >= (hi)) ? (hi) \
      : ((x) * (one) <= (lo)) ? (lo) \
@@ -41,13 +41,13 @@ __attribute__((always_inline)) static inline q15_t fx_sat_q15(int32_t x)
     return fx_arch_ssat16(x);
 }
 
-/* As fx_sat_q15(), the result kept in a word: what is used at once needs no second extension. */
+/* As fx_sat_q15(), with the result in a word, so that its next use needs no sign extension. */
 static inline int32_t fx_sat_q15_word(int32_t x)
 {
     return fx_arch_ssat16_word(x);
 }
 
-/* Into [0, Q15_MAX]: what cannot be negative. */
+/* Into [0, Q15_MAX]: a negative number becomes 0. */
 static inline int32_t fx_usat_q15_word(int32_t x)
 {
     return fx_arch_usat15_word(x);
@@ -132,8 +132,8 @@ static inline q31_t fx_abs_q31(q31_t a)
     return fx_arch_qsub(a ^ sign, sign); /* ones' complement plus one, saturated */
 }
 
-/* The narrowing of a Q30 accumulator. The rounding half is added with saturation, so the whole
- * int32_t range is allowed: an accumulator of |sum| < 2 per unit needs no further proof. */
+/* Narrows a Q30 accumulator. The rounding half is added with saturation, so that every int32_t is allowed: the caller
+ * has to show only that its sum stays in -2 ... 2 per unit. */
 static inline q15_t fx_round_q15(int32_t q30)
 {
     return fx_sat_q15(fx_arch_qadd(q30, 0x4000) >> 15);
@@ -159,7 +159,7 @@ static inline int32_t fx_max_s32(int32_t a, int32_t b)
     return (a > b) ? a : b;
 }
 
-/* Limits: hi wins should the caller pass lo > hi. */
+/* Limits x to [lo, hi]; the result is hi if the caller passes lo > hi. */
 static inline q31_t fx_clamp_q31(q31_t x, q31_t lo, q31_t hi)
 {
     return fx_min_s32(fx_max_s32(x, lo), hi);
@@ -170,10 +170,12 @@ static inline q15_t fx_clamp_q15(q15_t x, q15_t lo, q15_t hi)
     return (q15_t)fx_clamp_q31(x, lo, hi);
 }
 
-/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). A call: no interrupt needs it. */
+/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). Not inlined, because no interrupt uses it
+ * and one copy is smaller. */
 q31_t fx_shl_q31(q31_t x, unsigned n);
 
-/* x / 2^n, half up; adds the bit below the cut instead of a half, so nothing can overflow. */
+/* x / 2^n, half up. The highest bit that is shifted out is added after the shift; adding a half before it could
+ * overflow. */
 static inline int32_t fx_shr_round(int32_t x, unsigned n)
 {
     if ((n == 0U) || (n > 31U)) {

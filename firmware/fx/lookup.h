@@ -4,7 +4,7 @@
 
 /** Linear and bilinear look-up on a uniform grid whose spacing is a power of two.
  *   z = sum of w_k z_k over the cell's corners, weights Q14, non-negative, summing to exactly one.
- *   For several tables on one grid find the cell once, fx_cell(), then fx_cell_interp() per table.
+ *   For several tables on one grid: fx_cell() once, then fx_cell_interp() for each table.
  * Source   docs/theory/fixed-point.md (FX-22) to (FX-26)
  * Units    x, y: integers, any unit; grid point i is at x0 + i * 2^shift. Values: 16-bit, any scale
  * Range    2 <= n <= 255, shift <= 14, (n - 1) * 2^shift < 2^17, any x0; see fx_axis_valid().
@@ -36,7 +36,7 @@ typedef struct {
     uint8_t ny;
 } fx_grid_t;
 
-/* A grid with one spacing, y from 0, as a look-up in every period wants it. */
+/* A grid with the same spacing in x and y, y from 0, in the form that the look-up of every period uses. */
 typedef struct {
     int32_t x0;
     uint32_t up;             /* 14 - shift */
@@ -85,13 +85,13 @@ static inline fx_axis_t fx_axis(int32_t x, int32_t x0, unsigned shift, uint32_t 
     return axis;
 }
 
-/* (1 - w, w) in Q14 for both halves at once; nothing carries between them. */
+/* (1 - w, w) in Q14, both halves of the word at once; no carry passes between them. */
 static inline fx_pair_t fx_weights(uint32_t weight)
 {
     return 0x4000U + (weight << 16) - weight;
 }
 
-/* Two neighbours by one load; a 32-bit load may be unaligned on the processors meant. */
+/* Two neighbours by one 32-bit load, which every processor that is supported allows to be unaligned. */
 static inline fx_pair_t fx_load_pair(const int16_t *z)
 {
     fx_pair_t pair;
@@ -107,7 +107,7 @@ static inline q15_t fx_lookup1(const fx_lut1_t *lut, int32_t x, bool *clamped)
     return (q15_t)(fx_dot2_acc(0x2000, fx_load_pair(&lut->y[a.position >> 14]), weights) >> 14);
 }
 
-/* From two positions in cells, Q14, each below its last. */
+/* The cell of two positions in cells, Q14, each below its last. */
 static inline fx_cell_t fx_cell_at(uint32_t x, uint32_t y, uint32_t ny)
 {
     const uint32_t wx = x & 0x3FFFU;
@@ -144,7 +144,7 @@ static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t 
     const fx_two_words_t last = FX_LOAD_TWO(mesh, x_last, y_last);
     const uint32_t x_last = (uint32_t)last.first;
     const uint32_t y_last = (uint32_t)last.second;
-    if (__builtin_expect(px > x_last, 0)) { /* a negative one is very large */
+    if (__builtin_expect(px > x_last, 0)) { /* x below the grid gives a very large number */
         px = (x < mesh->x0) ? 0U : x_last;
     }
     if (__builtin_expect(py > y_last, 0)) {
@@ -153,13 +153,13 @@ static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t 
     return fx_cell_at(px, py, mesh->ny);
 }
 
-/* What fx_cell() would flag. The last point itself, one count above, is inside. */
+/* True where fx_cell() would report x or y as outside. The last point itself, one count above, is inside. */
 static inline bool fx_mesh_outside(const fx_mesh_t *mesh, int32_t x, uint32_t y)
 {
     return (uint32_t)(x - mesh->x0) << mesh->up > mesh->x_last + 1U || y << mesh->up > mesh->y_last + 1U;
 }
 
-/* Not rounded: the table's format with 14 bits more. */
+/* The interpolated value before rounding: the table's format with 14 bits more. */
 static inline int32_t fx_cell_sum(const int16_t *z, uint32_t ny, fx_cell_t cell)
 {
     return fx_dot2_acc(fx_dot2(fx_load_pair(&z[cell.index]), cell.w0), fx_load_pair(&z[cell.index + ny]), cell.w1);
@@ -171,7 +171,7 @@ static inline int32_t fx_cell_interp(const int16_t *z, uint32_t ny, fx_cell_t ce
     return fx_dot2_acc(acc, fx_load_pair(&z[cell.index + ny]), cell.w1) >> 14;
 }
 
-/* A table of y alone: what fx_cell_interp() would give if every row were the same. */
+/* A table over y alone: the result of fx_cell_interp() for a table whose rows are all the same. */
 static inline int32_t fx_cell_interp_y(const int16_t *z, fx_cell_t cell)
 {
     return fx_dot2_acc(0x2000, fx_load_pair(&z[cell.column]), cell.wy) >> 14;

@@ -3,14 +3,15 @@
 #define FX_Q_H
 
 /** The fixed-point formats (fx/format.h) and their products: exact, rounded, accumulated, dual.
- *   The comment of each states the format sum; narrow once, at the end, with fx_round_q15().
+ *   The comment of each product adds up the formats. Sums are narrowed once, at the end, with fx_round_q15().
  * Source   docs/theory/fixed-point.md (FX-4) to (FX-8)
  * Units    per unit; gains in q16
  * Range    every argument, except that the multiply-accumulates (mac, mulhi_add, mulhi_sub, dot2)
  *          wrap modulo 2^32: the caller proves that its sum stays inside int32_t
  * Rounding half up, 1/2 LSB of the result; fx_mul_q31_word and fx_mac_q31_word truncate towards minus
- *          infinity (bias 1/2 LSB of Q30): feed no integrator with them all the time; the anti-windup of
- *          control/current/current_control.c does so only while the voltage is limited
+ *          infinity (bias 1/2 LSB of Q30). An integrator would accumulate this bias: use them for one only where it
+ *          acts for a short time, as the anti-windup of control/current/current_control.c does while the voltage is
+ *          limited
  * Errors   none
  * Context  any; 1 to 3 instructions, fx_mul_q31 9, fx_mul_gain_q31 11 */
 
@@ -55,10 +56,10 @@ static inline int32_t fx_mulhi_sub(int32_t acc, int32_t a, int32_t b)
     return fx_arch_smmls_r(a, b, acc);
 }
 
-/* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. A call, like fx_mul_gain_q31(): no interrupt needs it. */
+/* Q31 * Q31 = Q62 -> Q31; only -1 * -1 saturates. Not inlined, like fx_mul_gain_q31(): no interrupt uses them. */
 q31_t fx_mul_q31(q31_t a, q31_t b);
 
-/* Q31 * Q15 = Q46 -> Q30, truncated; b is the lower half of a word, whatever its upper half holds. */
+/* Q31 * Q15 = Q46 -> Q30, truncated; only the lower half of b counts. */
 static inline int32_t fx_mul_q31_word(q31_t a, int32_t b)
 {
     return fx_arch_smulwb(a, b);
@@ -79,7 +80,7 @@ static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
 /* Q16 * Q31 = Q47 -> Q31. */
 q31_t fx_mul_gain_q31(q16_t gain, q31_t x);
 
-/* Of the lower halves of two words, whatever their upper halves hold. */
+/* The lower halves of two words as a pair; their upper halves do not count. */
 static inline fx_pair_t fx_pair(int32_t lo, int32_t hi)
 {
     return fx_arch_pkhbt(lo, hi);

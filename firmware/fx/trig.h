@@ -17,7 +17,8 @@ typedef struct {
     q15_t cos;
 } fx_sincos_t;
 
-/* Of 2 pi i / 512, Q31, plus half an LSB of q15; side by side, so that one instruction loads both. */
+/* Sine and cosine of 2 pi i / 512 in Q31, plus half an LSB of q15; they lie side by side, so that one instruction loads
+ * both. */
 typedef struct {
     int32_t sin, cos;
 } fx_point_t;
@@ -50,7 +51,7 @@ static inline fx_pair_t fx_rotation(uint32_t turn)
     return fx_arch_pkhtb(fx_mulhi_add(sin0, cos0, delta), fx_mulhi_sub(cos0, sin0, delta));
 }
 
-/* The same as a call: no interrupt needs it, and several copies would take more memory. */
+/* fx_rotation(), not inlined: no interrupt uses it, and several copies would take more memory. */
 fx_pair_t fx_unit_vector(uint32_t turn);
 
 #endif

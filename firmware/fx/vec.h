@@ -14,7 +14,7 @@
 
 q15_t fx_magnitude(q15_t x, q15_t y);
 
-/* 0 if x is longer. */
+/* sqrt(length^2 - x^2); 0 if |x| exceeds the length. */
 q15_t fx_leg(q15_t length, q15_t x);
 
 #endif

@@ -12,7 +12,7 @@ void tearDown(void)
 }
 
 /* q = num * scale / den to nearest, exactly: num * scale - q * den lies in [-den/2, den/2).
- * The clipped ends are checked by the inequality that sent the quotient there. */
+ * At a saturated end the inequality that makes it saturate is checked instead. */
 static void check(const char *what, int64_t num, int64_t den, int64_t scale, int64_t q, int64_t low, int64_t high)
 {
     const int64_t n = (den < 0) ? -(num * scale) : (num * scale);
@@ -42,9 +42,9 @@ void test_quotients_of_q31_are_the_nearest_on_corners_and_at_random(void)
     }
 }
 
-/* Random denominators almost never need the second correction of a digit: aim at them. The upper
- * half small, the lower all ones, the numerator just below. */
-void test_quotients_survive_the_worst_digit_estimates(void)
+/* Random denominators almost never need the second correction of a digit. These do: the upper half is small, the lower
+ * half all ones, and the numerator just below. */
+void test_quotients_are_exact_where_the_estimates_of_their_digits_are_worst(void)
 {
     for (int32_t i = 0; i < 500000; i++) {
         const int32_t den = 0x40000000 + (int32_t)((random_u32() & 0xFU) << 16) + 0xFFFF;
@@ -97,7 +97,7 @@ void test_q15_quotients_are_the_nearest_over_the_whole_plane(void)
     }
 }
 
-void test_q15_quotients_of_full_scale_saturate_only_where_they_must(void)
+void test_q15_quotients_of_full_scale_saturate_only_beyond_the_format(void)
 {
     TEST_ASSERT_EQUAL_INT16(Q15_MAX, fx_div_q15(Q15_MIN, Q15_MIN));
     TEST_ASSERT_EQUAL_INT16(Q15_MAX, fx_div_q15(Q15_MIN, -1));
@@ -105,7 +105,7 @@ void test_q15_quotients_of_full_scale_saturate_only_where_they_must(void)
     TEST_ASSERT_EQUAL_INT16(-32767, fx_div_q15(32767, Q15_MIN));
 }
 
-/* quotient * den <= num < (quotient + 1) * den, in 64 bits: no division in the expectation. */
+/* quotient * den <= num < (quotient + 1) * den, in 64 bits: the expected value needs no division. */
 static void quotient(uint32_t num, uint32_t den)
 {
     const uint32_t got = (uint32_t)fx_quotient(num, den);
@@ -119,7 +119,7 @@ static void quotient(uint32_t num, uint32_t den)
 
 void test_the_quotient_of_words_is_truncated_and_zero_without_a_denominator(void)
 {
-    TEST_ASSERT_EQUAL_INT32(-1, fx_quotient(UINT32_MAX, 1U)); /* its bits */
+    TEST_ASSERT_EQUAL_INT32(-1, fx_quotient(UINT32_MAX, 1U)); /* the bits of 2^32 - 1 */
     TEST_ASSERT_EQUAL_INT32(1, fx_quotient(UINT32_MAX, UINT32_MAX));
     TEST_ASSERT_EQUAL_INT32(0, fx_quotient(UINT32_MAX - 1U, UINT32_MAX));
     TEST_ASSERT_EQUAL_INT32(0, fx_quotient(0U, 0U));
@@ -136,7 +136,7 @@ void test_the_quotient_of_words_is_truncated_and_zero_without_a_denominator(void
     for (int32_t i = 0; i < 1000000; i++) {
         quotient((uint32_t)random_s32(), (uint32_t)random_s32());
         const uint32_t den = (uint32_t)random_s32();
-        quotient((random_u32() % 65536U) * den, den); /* multiples of it, and one less */
+        quotient((random_u32() % 65536U) * den, den); /* multiples of den */
         quotient((random_u32() % 65536U) * den - 1U, den);
     }
 }

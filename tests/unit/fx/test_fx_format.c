@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #if defined(__OPTIMIZE__) && defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("O3") /* 2^33 sums: the plain loop takes twice as long */
+#pragma GCC optimize("O3") /* 2^33 sums: with -O2 the loop takes twice as long */
 #endif
 
 #include <math.h>
@@ -35,7 +35,8 @@ static int32_t larger(int32_t a, int32_t b)
     return (a > b) ? a : b;
 }
 
-/* For one a the sum is, as b rises, the minimum, then a + b, then the maximum: no clamp formula. */
+/* While b rises at a constant a, the sum is first the minimum, then a + b, then the maximum. The expected values follow
+ * from this order, not from the formula of a limit. */
 void test_adding_is_exact_or_saturated_for_every_pair_of_q15(void)
 {
     const int32_t stride = exhaustive_is_affordable() ? 1 : 251;
@@ -74,7 +75,7 @@ void test_negation_and_magnitude_of_every_q15_saturate_only_at_minus_one(void)
     }
 }
 
-void test_saturation_to_q15_leaves_the_range_alone_and_stops_at_its_ends(void)
+void test_saturation_to_q15_changes_only_values_beyond_the_range(void)
 {
     for (int32_t x = -32768; x <= 32767; x++) {
         expect_equal("fx_sat_q15", x, 0, fx_sat_q15(x), x);
@@ -113,7 +114,7 @@ static void saturate_to_bits(int32_t x)
     CHECK_UNSIGNED(x, 31);
 }
 
-void test_saturation_to_a_number_of_bits_leaves_the_range_alone_and_stops_at_its_ends(void)
+void test_saturation_to_a_number_of_bits_changes_only_values_beyond_the_range(void)
 {
     for (int32_t i = 0; i < CORNERS; i++) {
         saturate_to_bits(corner[i]);
@@ -129,7 +130,7 @@ void test_saturation_to_a_number_of_bits_leaves_the_range_alone_and_stops_at_its
     }
 }
 
-void test_saturation_to_q31_leaves_the_range_alone_and_stops_at_its_ends(void)
+void test_saturation_to_q31_changes_only_values_beyond_the_range(void)
 {
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_sat_q31(INT64_MAX));
     TEST_ASSERT_EQUAL_INT32(INT32_MIN, fx_sat_q31(INT64_MIN));
@@ -169,7 +170,7 @@ void test_q31_sums_and_extremes_agree_with_long_double(void)
     }
 }
 
-/* What chooses the instruction must not touch the value. */
+/* The functions of fx/codegen.h influence the choice of instructions only. */
 static void words_unchanged(int32_t a, int32_t b)
 {
     const struct {
@@ -187,7 +188,7 @@ static void words_unchanged(int32_t a, int32_t b)
     expect_equal("fx_in_register", a, b, fx_in_register(a), a);
 }
 
-void test_words_pass_the_choice_of_instructions_unchanged(void)
+void test_the_functions_that_choose_instructions_change_no_value(void)
 {
     for (int32_t i = 0; i < CORNERS; i++) {
         for (int32_t j = 0; j < CORNERS; j++) {
@@ -215,7 +216,7 @@ void test_narrowing_rounds_half_up_and_never_wraps_over_all_of_int32(void)
     TEST_ASSERT_EQUAL_INT16(-32768, fx_round_q15(INT32_MIN));
     TEST_ASSERT_EQUAL_INT16(1, fx_round_q15(0x4000));   /* +1/2 LSB */
     TEST_ASSERT_EQUAL_INT16(0, fx_round_q15(-0x4000));  /* -1/2 LSB */
-    TEST_ASSERT_EQUAL_INT16(-1, fx_round_q15(-0x4001)); /* just below */
+    TEST_ASSERT_EQUAL_INT16(-1, fx_round_q15(-0x4001)); /* one count below -1/2 LSB */
     TEST_ASSERT_EQUAL_INT16(32767, fx_q15_from_q31(INT32_MAX));
     for (int32_t i = 0; i < 2000000; i++) {
         const int32_t x = (i < CORNERS) ? corner[i] : random_s32();
@@ -226,7 +227,7 @@ void test_narrowing_rounds_half_up_and_never_wraps_over_all_of_int32(void)
     }
 }
 
-void test_every_q15_survives_the_way_to_q31_and_back(void)
+void test_every_q15_is_the_same_after_conversion_to_q31_and_back(void)
 {
     for (int32_t x = -32768; x <= 32767; x++) {
         expect_equal("fx_q31_from_q15", x, 0, fx_q31_from_q15((q15_t)x), (int64_t)x * 65536);
@@ -234,7 +235,7 @@ void test_every_q15_survives_the_way_to_q31_and_back(void)
     }
 }
 
-void test_limits_hold_between_their_ends_and_the_upper_wins_when_crossed(void)
+void test_a_clamp_keeps_values_between_its_limits_and_gives_the_upper_one_if_they_are_crossed(void)
 {
     TEST_ASSERT_EQUAL_INT16(-5, fx_clamp_q15(-5, -10, 10));
     TEST_ASSERT_EQUAL_INT16(-10, fx_clamp_q15(Q15_MIN, -10, 10));
@@ -253,7 +254,7 @@ static void shift_both_ways(int32_t x, unsigned n)
     expect_equal("fx_shr_round", x, n, fx_shr_round(x, n), (int64_t)half_up(x / scale));
 }
 
-/* Up to 40: a count beyond the word's width is where C itself is undefined. */
+/* Up to 40: beyond the width of the word a plain shift is undefined in C. */
 void test_shifts_of_any_count_saturate_upwards_and_round_half_up_downwards(void)
 {
     for (unsigned n = 0U; n <= 40U; n++) {
@@ -271,7 +272,7 @@ void test_shifts_of_any_count_saturate_upwards_and_round_half_up_downwards(void)
 
 void test_constants_are_rounded_and_stop_at_the_ends_of_their_format(void)
 {
-    static const q15_t half = Q15(0.5); /* usable where C wants a constant */
+    static const q15_t half = Q15(0.5); /* compiles only if the macro is a constant expression */
     TEST_ASSERT_EQUAL_INT16(16384, half);
     TEST_ASSERT_EQUAL_INT16(32767, Q15(1.0));
     TEST_ASSERT_EQUAL_INT16(-32768, Q15(-1.0));

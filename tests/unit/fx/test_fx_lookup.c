@@ -38,7 +38,7 @@ static long double place(int32_t x, int32_t x0, unsigned shift, int n, int *inde
     return inside - *index;
 }
 
-/* Bilinear interpolation as the text-book has it; and the error the header allows for this cell. */
+/* Bilinear interpolation by its textbook formula, and the error that the header allows in this cell. */
 static long double bilinear(const table2_t *lut, int32_t x, int32_t y, long double *allowed, bool *outside)
 {
     int ix;
@@ -97,7 +97,7 @@ void test_bilinear_look_up_agrees_with_long_double_inside_and_outside_any_grid(v
     }
 }
 
-void test_an_origin_at_the_end_of_int32_neither_wraps_nor_unflags(void)
+void test_an_origin_at_the_end_of_int32_neither_wraps_nor_hides_the_flag(void)
 {
     const table2_t low = {table, {INT32_MIN, INT32_MAX - 100, 4, 5, NX, NY}};
     for (int32_t i = 0; i < CORNERS; i++) {
@@ -115,7 +115,7 @@ void test_grid_points_give_their_own_value_and_no_flag(void)
             const int32_t want = table[(ix * NY) + iy];
             const int32_t got = lookup2(&lut, lut.grid.x0 + (ix << 13), iy << 11, &clamped);
             TEST_ASSERT_FALSE(clamped);
-            /* The last row and column lie 2^-14 of a step inside: steps here are up to 2^16. */
+            /* On the last row and column the result is that of 2^-14 of a step before; steps here are up to 2^16. */
             TEST_ASSERT_INT32_WITHIN(((ix == NX - 1) || (iy == NY - 1)) ? 8 : 0, want, got);
         }
     }
@@ -137,7 +137,7 @@ void test_one_count_beyond_the_grid_is_flagged_on_every_side(void)
     }
 }
 
-/* Weights that did not sum to one would scale the value; and -32768 allows no excess. */
+/* Weights whose sum is not one would scale the value; at -32768 any excess would overflow. */
 void test_a_constant_table_gives_its_constant_everywhere(void)
 {
     static const int16_t value[3] = {INT16_MIN, INT16_MAX, 12345};
@@ -187,7 +187,8 @@ void test_one_cell_serves_several_tables_on_one_grid(void)
         const int32_t y = (int32_t)(random_u32() % 700U) - 100;
         const fx_cell_t cell = fx_cell(&grid, x, y);
         for (int k = 0; k < 4; k++) {
-            const table2_t lut = {&table[7 + k], grid}; /* odd addresses, too: unaligned loads */
+            const table2_t lut = {&table[7 + k],
+                                  grid}; /* also at addresses that are not a multiple of four: unaligned loads */
             long double allowed;
             bool outside;
             const long double want = bilinear(&lut, x, y, &allowed, &outside);
@@ -345,7 +346,7 @@ void test_linear_look_up_agrees_with_long_double_inside_and_outside_any_grid(voi
     }
 }
 
-/* Between 0 and +-1, one count of Q14 around the middle: where rounding turns over. */
+/* Between 0 and +-1, one count of Q14 around the middle, where the rounded value changes. */
 void test_interpolated_values_round_half_up(void)
 {
     static const int16_t up[4] = {0, 1, 0, 1};

@@ -44,7 +44,7 @@ void test_minus_one_squared_saturates_in_every_format(void)
 
 void test_one_step_inside_minus_one_squared_does_not_saturate(void)
 {
-    /* 32767 * 32768 / 32768 = 32767 exactly: the largest result by right, not by the limit. */
+    /* 32767 * 32768 / 32768 = 32767 exactly: the largest result, reached without saturation. */
     TEST_ASSERT_EQUAL_INT16(32767, fx_mul_q15(-32767, Q15_MIN));
     TEST_ASSERT_EQUAL_INT16(-32767, fx_mul_q15(32767, Q15_MIN));
     TEST_ASSERT_EQUAL_INT32(INT32_MAX, fx_mul_q31(-INT32_MAX, Q31_MIN));
@@ -82,7 +82,7 @@ static void q31_pair(int32_t a, int32_t b)
 static void accumulate(int32_t acc, int32_t a, int32_t b)
 {
     const long double product = (long double)a * b / TWO32;
-    /* Half up of the whole: the accumulator is an integer. */
+    /* Rounding the sum is the same as rounding the product, because the accumulator is an integer. */
     expect_equal("fx_mulhi_add", a, b, fx_mulhi_add(acc, a, b), wrapped(acc + half_up(product)));
     expect_equal("fx_mulhi_sub", a, b, fx_mulhi_sub(acc, a, b), wrapped(acc + half_up(-product)));
 }
@@ -128,7 +128,7 @@ void test_gains_of_q15_round_half_up_and_saturate(void)
     }
 }
 
-/* b's lower half as a number; the upper half is whatever a larger word left there. */
+/* The lower half of b as a signed number; the products ignore the upper half. */
 static int32_t lower_half(int32_t b)
 {
     const int32_t low = (int32_t)((uint32_t)b % 65536U);

@@ -24,7 +24,7 @@ static void note_q30(worst_t *worst, int64_t x)
 
 /* Around every perfect square and around the halfway points between them, where a result changes.
  * 1/2 LSB is the format's own rounding, 0.19 LSB the table's error of 1.2e-5 of the root. */
-void test_the_root_of_a_sum_of_squares_is_right_around_every_q15_result(void)
+void test_the_root_of_a_sum_of_squares_is_within_its_bound_around_every_q15_result(void)
 {
     worst_t worst = {0};
     for (int64_t r = 0; r <= 65535; r++) {
@@ -36,7 +36,7 @@ void test_the_root_of_a_sum_of_squares_is_right_around_every_q15_result(void)
     worst_expect(&worst, "fx_sqrt_q30", 0.70L);
 }
 
-void test_the_root_of_a_sum_of_squares_is_right_at_random_and_for_all_small_ones(void)
+void test_the_root_of_a_sum_of_squares_is_within_its_bound_at_random_and_for_all_small_arguments(void)
 {
     worst_t worst = {0};
     for (int64_t x = 0; x <= 300000; x++) {
@@ -65,7 +65,7 @@ static void note_magnitude(worst_t *worst, int32_t x, int32_t y)
 }
 
 /* Along the unit circle the sum of squares crosses 2^30, where saturation begins. */
-void test_vector_lengths_are_right_on_both_sides_of_the_unit_circle(void)
+void test_vector_lengths_are_within_their_bound_on_both_sides_of_the_unit_circle(void)
 {
     worst_t worst = {0};
     for (int32_t i = 0; i < 100000; i++) {
@@ -92,7 +92,7 @@ void test_the_corners_of_the_square_have_the_largest_length(void)
     TEST_ASSERT_EQUAL_INT16(25000, fx_magnitude(-15000, 20000)); /* 3-4-5 */
 }
 
-/* Pythagorean triples by hand, and the root's own 0.7 LSB. */
+/* Pythagorean triples; the tolerance is the 0.7 LSB of the root. */
 void test_the_other_component_of_a_vector_is_the_leg_of_its_triangle(void)
 {
     TEST_ASSERT_INT16_WITHIN(1, 4000, fx_leg(5000, 3000));
@@ -102,7 +102,7 @@ void test_the_other_component_of_a_vector_is_the_leg_of_its_triangle(void)
     TEST_ASSERT_EQUAL_INT16(32767, fx_leg(Q15_MIN, 0));
 }
 
-void test_a_component_longer_than_the_vector_leaves_nothing(void)
+void test_a_component_longer_than_the_vector_gives_zero(void)
 {
     TEST_ASSERT_EQUAL_INT16(0, fx_leg(5000, 5001));
     TEST_ASSERT_EQUAL_INT16(0, fx_leg(0, Q15_MIN));

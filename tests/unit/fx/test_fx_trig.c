@@ -32,8 +32,8 @@ void test_sine_and_cosine_of_every_angle_are_within_four_in_a_hundred_thousand(v
     worst_expect(&cosine, "cos", 3.2e-5L);
 }
 
-/* The bound above for angles of 32 bits: every rest between two of 16 bits, by a stride that is a large prime. */
-void test_the_rotation_by_any_angle_of_32_bits_is_as_exact(void)
+/* The same bound for angles of 32 bits; the stride is a large prime, so that angles between those of 16 bits occur. */
+void test_the_rotation_by_an_angle_of_32_bits_keeps_the_same_bound(void)
 {
     worst_t sine = {0};
     worst_t cosine = {0};
