@@ -13,7 +13,7 @@ from tree import Violation, files, run
 
 @dataclass(frozen=True)
 class Limit:
-    """Most lines (comments included) and paths of a function below a folder."""
+    """Largest numbers of lines (comments included) and of paths of a function below a folder."""
 
     folder: str
     suffix: str
@@ -29,7 +29,7 @@ LIMITS = (
     Limit("tools", ".py", 60, 20),
     Limit("tests", ".py", 60, 20),
 )
-# A configuration's check is one chain of comparisons: many paths, nothing to lose one's way in.
+# The check of a configuration is one chain of comparisons: it has many paths and is easy to read nevertheless.
 VALIDATOR, VALIDATOR_COMPLEXITY = "_check", 30
 
 

@@ -75,7 +75,7 @@ def _exclusions(root: Path, path: Path) -> Iterator[Exclusion | Violation]:
 
 
 def all_exclusions(root: Path) -> list[Exclusion | Violation]:
-    """Every exclusion below firmware/, and every marker that is none."""
+    """Every exclusion below firmware/, and every marker that does not have the form of one."""
     return [e for path in files(root, ".c", ".h") if path.parts[0] == "firmware" for e in _exclusions(root, path)]
 
 
@@ -130,7 +130,7 @@ def _branches(root: Path, build: Path) -> dict[tuple[Path, int], dict[int, str]]
 
 
 def unlike(root: Path, build: Path) -> Iterator[Violation]:
-    """Lines of which two objects have different branches: their counts cannot be added up."""
+    """Lines for which two objects have different branches, so that their counts cannot be added up."""
     for (path, line), counts in _branches(root, build.resolve()).items():
         if len(counts) > 1:
             objects = ", ".join(f"{n} in {Path(name).name}" for n, name in sorted(counts.items()))

@@ -35,7 +35,7 @@ PAGES = {
 }
 SEARCHED = {"firmware", "hal", "tests", "tools", "docs"}
 SUFFIXES = (".c", ".h", ".py", ".md", ".toml", ".cmake", ".txt", ".rb", ".sh")
-# They must spell out what they forbid.
+# These files have to contain what they forbid.
 EXEMPT = {Path("tools/checks/equations.py"), Path("tests/tools/test_equations.py")}
 
 NUMBER = rf"({'|'.join(PAGES)})-(\d+)"
@@ -49,7 +49,7 @@ RANGE = re.compile(rf"\({NUMBER}\)\s*(?:\.\.\.|…|–|-|to|bis)\s*\({NUMBER}\)"
 
 @dataclass(frozen=True, order=True)
 class Equation:
-    """MR-7 is ("MR", 7)."""
+    """The number of an equation: MR-7 is ("MR", 7)."""
 
     prefix: str
     number: int
@@ -60,7 +60,7 @@ class Equation:
 
 @dataclass(frozen=True)
 class Place:
-    """A line of a file."""
+    """A place: a file and a line of it."""
 
     path: Path
     line: int
@@ -70,7 +70,7 @@ class Place:
 
 
 def equation(prefix: str, number: str) -> Equation:
-    """From the two groups of a match."""
+    """The equation that the two groups of a match name."""
     return Equation(prefix, int(number))
 
 
@@ -101,7 +101,7 @@ def searched(root: Path) -> Iterator[tuple[Place, str]]:
 
 
 def is_page(path: Path) -> bool:
-    """Definitions live here; anywhere else the same text is a citation."""
+    """Whether the file is a page that may define equations; in other files the same text is a citation."""
     return path.parent == THEORY or path == PAGES["SC"]
 
 

@@ -90,7 +90,7 @@ def matched(root: Path, file: str, pattern: str) -> float:
 
 
 def source_of(root: Path, figure: Figure, results: Path | None) -> tuple[str, float] | None:
-    """What a figure is taken from, by name, and the number there; nothing if there is nothing to compare with."""
+    """The source of a figure by name, and the number there; nothing for a figure without a source."""
     if "match" in figure:
         file, pattern = figure["match"]
         return file, matched(root, file, pattern)

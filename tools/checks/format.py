@@ -19,13 +19,13 @@ from tree import PROJECT, Violation, files, report
 
 # Written by programs, which have their own layout.
 GENERATED = {Path("hal/s32k144/registers.h")}
-BATCH = 40  # files of one call: few calls, but enough for every processor
+BATCH = 40  # files in one call: few calls, but at least one for every processor
 C_COMPLAINT = re.compile(r"^(.+?):(\d+):\d+: error: code should be clang-formatted")
 PYTHON_COMPLAINT = re.compile(r"^(.+?):(\d+):\d+: unformatted: ")
 
 
 def tool(name: str) -> str:
-    """The pinned program beside the Python that runs this."""
+    """The pinned program, which lies beside the Python interpreter that runs this file."""
     path = Path(sys.executable).with_name(name)
     if not path.is_file():
         sys.exit(f"error: {path} is missing: run tools/setup")
@@ -88,7 +88,7 @@ def fix(root: Path, c_files: Sequence[Path], python_files: Sequence[Path]) -> No
 
 
 def chosen(root: Path, named: Sequence[Path]) -> list[Path]:
-    """The files named, relative to the checkout; all of it if none are."""
+    """The files named on the command line, relative to the checkout; without names every file of it."""
     if not named:
         return list(files(root, ".c", ".h", ".py"))
     for path in named:

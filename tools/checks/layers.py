@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds every #include to the layer table of docs/architecture.md."""
+"""Every #include follows the layer table of docs/architecture.md."""
 
 import re
 import sys
@@ -42,7 +42,7 @@ ECU = (*DRIVE, "firmware/comm", "firmware/calibration")
 # First match wins: a folder comes before the folder that contains it. No folder of the chain that every drive needs
 # (current, identify, torque) includes one that can be left out (mrai, adapt, commission).
 LAYERS = (
-    # string.h: memcpy of a few bytes is how C spells a packed load.
+    # string.h: memcpy of a few bytes is the way to write an unaligned load in C.
     Layer("firmware/fx", (), FREESTANDING | {"arm_acle.h", "string.h"}, ordered=True),
     Layer("firmware/types", ("firmware/fx",), ordered=True),
     Layer("firmware/signal", ("firmware/fx", "firmware/types"), ordered=True),

@@ -25,13 +25,13 @@ SOURCES = (".c", ".h", ".py", ".in", ".js")
 STANDARD = {"int16_t", "int32_t", "int64_t", "uint8_t", "uint16_t", "uint32_t", "uint64_t", "size_t"}
 # Written by the build, or an example of a reader's own.
 ELSEWHERE = ("motor_si.c", "hal/acme/")
-# Pages about names of the past.
+# Pages that mention names of the past.
 PAST = {Path("CHANGELOG.md")}
 PAST_FOLDER = Path("docs/decisions")
 
 
 class Tree:
-    """Everything that a page may name."""
+    """The names that exist in a checkout, and that a page may therefore use."""
 
     def __init__(self, root: Path) -> None:
         self.root = root

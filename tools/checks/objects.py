@@ -3,7 +3,7 @@
 
 Two drives can run in one process only if no layer below drive/ owns a variable; a float or a
 division in an interrupt is an unintended cost. The compiler's output shows both exactly.
-The library for the target must be complete, but for the port.
+The library for the target must need nothing from outside but the port.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from pathlib import Path
 from tree import Violation, report
 
 LAYERS = ("fx", "signal", "control", "safety")
-# Divide instructions a file may contain: bounded, tested and counted, so that none creeps in.
+# Number of divide instructions that a file may contain. Each is bounded and tested; another one is an error.
 DIVISIONS = {
     "div.c": 2,  # all at 1 kHz
     "current_reference.c": 1,
@@ -60,7 +60,7 @@ def output(*command: str) -> list[str]:
 
 
 def member_name(raw: str) -> str:
-    """div.c.obj and div.c.o are both div.c."""
+    """The source file of an object: div.c for div.c.obj and for div.c.o."""
     return re.sub(r"\.o(bj)?$", "", raw)
 
 

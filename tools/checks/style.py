@@ -16,7 +16,7 @@ TOP_LEVEL = {
     ".clang-tidy", ".ruff.toml", ".pre-commit-config.yaml", ".github", "build", ".git",
 }  # fmt: skip
 
-# Most lines a file may have; first match wins. Constant tables are data, not code.
+# Largest number of lines of a file; the first match counts. Constant tables are data, not code.
 MAX_LINES = (
     ("firmware/fx/*_table.c", 2000),
     ("firmware/fx/*.c", 150),
@@ -40,7 +40,7 @@ SPDX = "SPDX-License-Identifier: Apache-2.0"
 # As in .clang-format and .editorconfig.
 MAX_COLUMNS = 120
 
-# Marks of unfinished work, and of the place where a text was written rather than of the project.
+# Marks of unfinished work, and words that describe how a text was written instead of the project.
 FORBIDDEN = (
     r"\b(TODO|FIXME|XXX|HACK)\b",
     r"/work/",
@@ -56,12 +56,12 @@ WORDS = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 CASED = re.compile(FORBIDDEN[0])
 # Compiler tricks and single instructions have names in firmware/fx, which say what they save (fx/codegen.h).
 TRICK = re.compile(r"\b(__asm__|asm|fx_arch_\w+)\b\s*(?:volatile\b|goto\b)?\s*\(")
-# Files that must spell out what they forbid.
+# Files that have to contain what they forbid.
 EXEMPT = {"tools/checks/style.py", "tests/tools/test_checks.py"}
 
 
 def size_limit(path: Path) -> int | None:
-    """Most lines this file may have."""
+    """The largest number of lines that this file may have."""
     for pattern, limit in MAX_LINES:
         if fnmatch.fnmatch(str(path), pattern) and pattern.count("/") == str(path).count("/"):
             return limit
@@ -97,7 +97,7 @@ def guard_problem(path: Path, text: list[str]) -> str | None:
 
 
 def hidden_trick(path: Path, line: str) -> str | None:
-    """An instruction by hand outside firmware/fx; a port needs some of its own, but none of the library's."""
+    """An instruction by hand outside firmware/fx. A port may contain some, but not the tricks of the library."""
     if (
         path.suffix not in {".c", ".h"}
         or path.parts[0] not in {"firmware", "hal"}

@@ -63,7 +63,9 @@ def needed(unit: Unit) -> list[Path]:
 def digest(root: Path, program: str, unit: Unit) -> str:
     """What the verdict on the file depends on."""
     seen = hashlib.sha256("\0".join((program, str(unit.folder), unit.compiler, *unit.options)).encode())
-    installed = Path(program).parent.parent / "stamp"  # made anew with another version of clang-tidy
+    installed = (
+        Path(program).parent.parent / "stamp"
+    )  # the environment is built again for another version of clang-tidy
     for path in (root / ".clang-tidy", Path(__file__), *([installed] if installed.is_file() else []), *needed(unit)):
         seen.update(f"\0{path}\0".encode() + path.read_bytes())
     return seen.hexdigest()

@@ -23,7 +23,7 @@ from typing import Any
 from tree import PROJECT, Violation, report
 
 SECONDS = Path("tests/seconds.txt")
-FACTOR = 5  # the least that a time-out may be, in idle times; TestTime.cmake takes twice as much
+FACTOR = 5  # smallest time-out as a multiple of the idle time; TestTime.cmake takes twice as much
 NOTEWORTHY_S = 10
 HEAD = f"""# SPDX-License-Identifier: Apache-2.0
 # Seconds of the tests that take more than {NOTEWORTHY_S} s, longest first, after a whole run on an idle computer by:
@@ -61,7 +61,7 @@ def check(root: Path, tests: dict[str, dict[str, Any]]) -> Iterator[Violation]:
 
 
 def spent(build: Path, name: str) -> float:
-    """Processor's seconds of one test."""
+    """Seconds of processor time that one test takes."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     command = ["ctest", "--test-dir", str(build), "--output-on-failure", "-R", f"^{name}$"]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
@@ -78,7 +78,7 @@ def write(root: Path, seconds: dict[str, int]) -> None:
 
 
 def record_log(root: Path, log: Path, tests: Iterable[str]) -> int:
-    """Write down what ctest's log says; what it does not tell stays, as long as there is such a test."""
+    """Record the times in ctest's log. A time that it does not contain stays, as long as the test exists."""
     text = log.read_text(encoding="utf-8", errors="replace")
     measured = {name: round(float(seconds)) for name, seconds in PASSED.findall(text)}
     if not measured or not re.search("^100% tests passed", text, re.MULTILINE):
@@ -90,7 +90,7 @@ def record_log(root: Path, log: Path, tests: Iterable[str]) -> int:
 
 
 def record(root: Path, build: Path, names: list[str]) -> int:
-    """Write the file anew, test by test."""
+    """Measure the tests one by one and rewrite the file."""
     for name in names:
         measured = round(spent(build, name))
         write(root, recorded(root) | {name: measured})

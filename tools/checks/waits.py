@@ -14,7 +14,7 @@ from pathlib import Path
 from tree import Violation, files, lines, run
 
 HELPER = Path("tests/support/progress.py")
-# The virtual ECU can keep pace with the wall clock; tests use it where time passes only when they ask for it.
+# The virtual ECU can follow the wall clock for its users; in tests its time passes only when they ask for it.
 REAL_TIME = {Path("tests/vecu/main.c"), Path("tests/vecu/hub.c")}
 
 CLOCKS = {"time", "sched", "timeit"}  # modules
@@ -33,7 +33,7 @@ def _is_number(node: ast.expr) -> bool:
 
 
 def _is_time(node: ast.expr, call: str) -> bool:
-    """A number that is a time: recv(64) takes bytes, recv(0.0) does not wait."""
+    """Whether an argument is a time: recv(64) takes bytes, and recv(0.0) does not wait."""
     if not (isinstance(node, ast.Constant) and _is_number(node)) or node.value == 0:
         return False
     return isinstance(node.value, float) or call != "recv"

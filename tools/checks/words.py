@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tree import Violation, files, lines, run
 
-# Anywhere: a word of a text or a part of a name between underscores.
+# These are not allowed anywhere: neither as a word of a text nor as a part of a name between underscores.
 WORDS = (
     (r"contradictions?", "mismatch"),
     (r"distrust\w*", "low confidence"),
@@ -30,7 +30,7 @@ WORDS = (
     (r"(?:open|opens|opened|opening|close|closes|closed|closing)[ _](?:(?:the|all|its|six)[ _])?gates",
      "switching enabled, disabled"),
 )  # fmt: skip
-# As a whole name in firmware and ports.
+# These are not allowed as a whole name in firmware and ports.
 NAMES = {"most": "max", "look": "check, read, sample", "cut": "limit", "note": "record", "guard": "protect, service"}
 NAMED = ("firmware", "hal")
 
@@ -40,7 +40,7 @@ NO_NAMES = re.compile(r'/\*.*?\*/|/\*.*$|^\s*\* .*$|"(?:\\.|[^"\\])*"')
 DATA = {".csv", ".json", ".svg", ".parquet", ".mf4"}
 
 # A gate of the paper's law is a condition of its adaptation, and opens and closes there.
-# The others spell out an old name or the words themselves.
+# The other files quote an old name or the words themselves.
 ALLOWED = {
     "gates": {"docs/theory/mrai.md"},
     "nobody": {"tests/tools/abuse/test_abuse.py"},  # a user of Unix

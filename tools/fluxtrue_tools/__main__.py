@@ -9,7 +9,7 @@ from fluxtrue_tools.cli import run
 
 def main() -> None:
     """Run the command of the command line."""
-    # As Ctrl-C does: what is half written goes, then the command ends.
+    # As after Ctrl-C: incomplete output files are removed, then the command ends.
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
     sys.exit(run(sys.argv[1:]))
 

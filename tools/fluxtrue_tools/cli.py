@@ -33,7 +33,7 @@ SHELL_COMMANDS = {"test": "Set up, build and test everything: tools/test."}
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
-EXIT_BROKEN_PIPE = 1  # as click does
+EXIT_BROKEN_PIPE = 1  # the same message as click's
 
 
 class LazyGroup(click.Group):
@@ -92,7 +92,7 @@ def _usage(error: click.ClickException) -> str:
 
 
 def _broken_pipe() -> int:
-    # The reader has gone: nothing more can be said on this stream, not even at exit.
+    # The reader has closed the pipe: nothing more may be written to this stream, not even at exit.
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return EXIT_BROKEN_PIPE
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tools raise for their users."""
+"""The exception for errors that a user can correct."""
 
 
 class FluxtrueError(Exception):

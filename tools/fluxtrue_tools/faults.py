@@ -28,7 +28,7 @@ def _signal(path: str) -> Any:
 
 @cache
 def names() -> dict[int, str]:
-    """Name by bit."""
+    """The names of the faults by their bits."""
     choices = _signal("INV_Faults.FirstFault").choices or {}
     return {int(value) - 1: str(name) for value, name in choices.items() if 1 <= int(value) <= BITS}
 

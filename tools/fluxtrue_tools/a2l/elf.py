@@ -68,7 +68,7 @@ class Word:
 
 @dataclass(frozen=True)
 class Description:
-    """Everything the description file is made from."""
+    """Everything that the description file contains."""
 
     machine: str
     values: tuple[Value, ...]

@@ -42,7 +42,7 @@ class Result:
 
 
 def call_overhead(machine: Machine) -> int:
-    """What a function that does nothing issues: its return."""
+    """Instructions that a function without a body issues: its return."""
     return machine.count("bench_nothing", 0)[1]
 
 

@@ -46,14 +46,14 @@ def load(path: Path = BASELINE) -> dict[str, Any]:
 
 
 def other_compiler(committed: dict[str, Any], here: str) -> str | None:
-    """Why nothing can be compared, if so."""
+    """Why the figures cannot be compared; empty if they can."""
     if committed["compiler"] == here:
         return None
     return f"not compared: the baseline is of '{committed['compiler']}', here is '{here}'"
 
 
 def compare(committed: dict[str, Any], figures: dict[str, Any], page: str, committed_page: str) -> list[str]:
-    """What differs; empty if nothing does."""
+    """Every difference; empty without any."""
     found = list(differences(committed, figures))
     if not found and page != committed_page:
         found.append(f"{PAGE.name} is not what the figures give")
@@ -61,6 +61,6 @@ def compare(committed: dict[str, Any], figures: dict[str, Any], page: str, commi
 
 
 def write(figures: dict[str, Any], page: str, baseline: Path = BASELINE, document: Path = PAGE) -> None:
-    """Both files, each of them whole or not at all."""
+    """Write both files; each is replaced only when it is complete."""
     for path, text in ((baseline, json.dumps(figures, indent=1, ensure_ascii=False) + "\n"), (document, page)):
         write_text(path, text)

@@ -41,7 +41,7 @@ def _run(command: Sequence[str], output: Path) -> Path:
 def build_target(
     output: Path, sources: Sequence[Path], flags: Sequence[str] = (), also_small: Sequence[Path] = ()
 ) -> Path:
-    """An ELF file without start-up code: its functions are called one by one. Fast or small as in the image."""
+    """An ELF file without start-up code, for calls of single functions; optimised for speed or for size."""
     if not have_arm_compiler():
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
     link = (

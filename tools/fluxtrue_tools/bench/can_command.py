@@ -16,7 +16,7 @@ COMMAND = "VCU_TorqueRequest"
 
 
 class Frame(ctypes.Structure):
-    """can_port_frame_t."""
+    """The C type can_port_frame_t."""
 
     _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
                 ("data", ctypes.c_uint8 * 8))  # fmt: skip
@@ -38,6 +38,6 @@ class Command:
         }  # fmt: skip
 
     def frame(self) -> Frame:
-        """The next one."""
+        """The next frame."""
         raw = self._protector.protect(self._message.encode({"Crc": 0, "Counter": 0, **self.values}))
         return Frame(self._message.frame_id, False, len(raw), (ctypes.c_uint8 * 8)(*raw))

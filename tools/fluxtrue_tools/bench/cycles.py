@@ -18,7 +18,7 @@ PIPELINE = 3  # P: 1 to 3
 DIVIDE = 12  # 2 to 12
 ENTRY, RETURN = 12, 10  # exception entry and return without wait states
 
-# Cycles by mnemonic; None: one and a word each of the register list.
+# Cycles by mnemonic; None stands for one cycle and another one for each word of the register list.
 COSTS: dict[str, int | None] = {}
 
 
@@ -59,7 +59,7 @@ _same(3, "vmla vmls vnmla vnmls vfma vfms vfnma vfnms")
 _same(14, "vdiv vsqrt")
 _same(2, "vldr vstr")
 
-DOUBLE = 1  # more for a double register, or for two words moved between the core and the floating-point unit
+DOUBLE = 1  # in addition, for a double register or for two words moved between the core and the floating-point unit
 
 
 def base(mnemonic: str) -> tuple[str, bool]:
@@ -78,7 +78,7 @@ def base(mnemonic: str) -> tuple[str, bool]:
 
 
 def cycles(instruction: Instruction) -> int:
-    """When its neighbour follows; PIPELINE more when something else does."""
+    """Cycles if the next instruction in memory follows; another one takes PIPELINE more."""
     name, _ = base(instruction.mnemonic)
     cost = COSTS[name]
     if cost is None:
@@ -90,7 +90,7 @@ def cycles(instruction: Instruction) -> int:
 
 
 def image_costs(functions: Iterable[Function], size: int) -> bytes:
-    """A byte for each half word of the flash, for the emulator's profile."""
+    """The cycles of each half word of the flash, one byte each, for the emulator's profile."""
     costs = bytearray(size // 2)
     for function in functions:
         for instruction in function.instructions:

@@ -36,7 +36,7 @@ class Instruction:
 
     @property
     def bare(self) -> str:
-        """Without width and type: movge.w is movge."""
+        """The mnemonic without width and type: movge for movge.w."""
         return self.mnemonic.partition(".")[0]
 
 

@@ -34,7 +34,7 @@ PAPER, ROBUST = 0, 1  # identification_mode
 
 
 class Processor(Protocol):
-    """Where the program runs."""
+    """The processor on which the program runs."""
 
     def call(self, symbol: str, *arguments: int) -> int: ...
 
@@ -115,7 +115,7 @@ class Load:
         return self.i[0], self.i[1]
 
     def _solve(self) -> None:
-        """The currents of psi, by Newton's steps from those of the step before."""
+        """The currents that belong to psi, by Newton's method from those of the step before."""
         for _ in range(2):
             d, q = self.i
             sign, q = (1.0 if q >= 0 else -1.0), abs(q)

@@ -28,7 +28,7 @@ FIGURES = dict[str, Any]
 
 
 def budget() -> dict[str, Any]:
-    """The port's own data."""
+    """The limits and lists in the budget.toml of the port."""
     with BUDGET.open("rb") as file:
         return tomllib.load(file)
 
@@ -74,7 +74,7 @@ def _pointers(listed: list[dict[str, Any]], names: list[str]) -> dict[str, list[
     found: dict[str, list[str]] = {}
     for entry in listed:
         for pattern in entry["calls"]:
-            # A target that was compiled into its caller, which is then no call any more, is not among the names.
+            # A target that was compiled into its caller is not among the names, and there is no call of it.
             found.setdefault(entry["in"], []).extend(fnmatch.filter(plain, pattern))
     return found
 
@@ -112,7 +112,7 @@ def _spreads(stages: list[Stage]) -> dict[str, list[float]]:
 
 
 def measure(folder: Path) -> FIGURES:
-    """Builds what is missing below `folder` and measures; takes a minute or two."""
+    """Build what is missing below `folder` and measure all figures; this takes a minute or two."""
     port = budget()
     parts = emulation.prepare("hsm1", flashed=True)
     functions = disassembly.read(parts.image)

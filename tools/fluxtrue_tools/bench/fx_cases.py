@@ -35,7 +35,7 @@ class Case:
 
 
 def signed(value: Ints, bits: int) -> Ints:
-    """The low bits as a two's complement number."""
+    """The lowest bits as a two's complement number."""
     half = 1 << (bits - 1)
     return ((value & ((1 << bits) - 1)) ^ half) - half
 
@@ -45,7 +45,7 @@ def _grid(*columns: tuple[int, ...]) -> Ints:
 
 
 def _arguments(bits: int, number: int, unsigned: bool = False) -> Ints:
-    """Corners in every combination, then random rows of uniformly distributed magnitude."""
+    """Every combination of the extreme values, then random rows of uniformly distributed magnitude."""
     rng = np.random.default_rng(20140101 + bits + number)
     corners = CORNERS_Q15 if bits == 16 else CORNERS_Q31
     shape = (RANDOM_ROWS, number)

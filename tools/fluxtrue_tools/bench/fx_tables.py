@@ -30,7 +30,7 @@ def sine_table() -> list[tuple[int, int]]:
     table = []
     for i in range(640):
         other = abs(exact[(i + 128) % 512]) + HALF_Q15
-        # Near +1 the raised entry would leave int32 on the way to its cell's edge.
+        # Near +1 the value with the half LSB would exceed int32 at the edge of its cell.
         bump = rotate(0, other, 64 * TURN_STEP)
         table.append(min(exact[i % 512] + HALF_Q15, INT32_MAX - bump))
     return [(table[i], table[i + 128]) for i in range(512)]
@@ -43,14 +43,14 @@ def rsqrt_table() -> list[tuple[int, int]]:
         low, high = i / 256.0, (i + 1) / 256.0
         at_low, at_high = low**-0.5, high**-0.5
         secant = (at_high - at_low) / (high - low)
-        touch = (-2.0 * secant) ** (-2.0 / 3.0)  # where the curve is parallel to the chord
+        touch = (-2.0 * secant) ** (-2.0 / 3.0)  # the point at which the curve is parallel to the chord
         sag = at_low + secant * (touch - low) - touch**-0.5
         rows.append((round((at_low - sag / 2.0) * 2.0**29), round((at_high - at_low) * 2.0**37)))
     return rows
 
 
 def circle_table() -> list[int]:
-    """What the unit circle leaves beside a leg of up to (i + 1)/256, q15, at least a quarter (FX-27)."""
+    """Other component of a unit vector with one of (i + 1)/256, q15, at least a quarter (FX-27)."""
     return [max(math.floor(math.sqrt(1.0 - ((i + 1) / 256.0) ** 2) * 2.0**15), 2**13) for i in range(256)]
 
 
@@ -70,7 +70,7 @@ def _source(header: str, declaration: str, body: str) -> str:
 
 
 def sources() -> dict[str, str]:
-    """The generated files by name."""
+    """The text of each generated file, by its name."""
     sine = _rows((f"{{{s}, {c}}}" for s, c in sine_table()), 4)
     root = _rows((f"{{{b}, {s}}}" for b, s in rsqrt_table()), 3)
     circle = _rows((str(v) for v in circle_table()), 12)

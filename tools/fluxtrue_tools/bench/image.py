@@ -34,7 +34,7 @@ V_DC: Final = 350.0
 RPM: Final = 2 * math.pi / 60
 PERIODS_PER_MS: Final = 10
 WARM_UP_MS: Final = 20
-# Milliseconds, torque wanted, speed in rpm at its end, dc voltage.
+# Milliseconds, requested torque, speed in rpm at the end, dc voltage.
 DRIVE: Final = (
     (50, 80.0, 3000.0, V_DC), (50, -60.0, 3000.0, V_DC), (30, 5.0, 3000.0, V_DC),
     (60, 400.0, 3000.0, V_DC), (80, -400.0, 3000.0, V_DC), (40, 0.0, 3000.0, V_DC),
@@ -94,7 +94,7 @@ class Stand:
         self.time_ms = 0
 
     def run_ms(self, ramps: dict[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
-        """One millisecond; in every tenth a command."""
+        """Run one millisecond; send a command in every tenth."""
         if self.time_ms % 10 == 0:
             self.library.can_frame_arrives(self.handle, ctypes.byref(self.command.frame()))
         self.time_ms += 1
@@ -106,7 +106,7 @@ class Stand:
             self.run_ms()
 
     def power_up(self) -> None:
-        """To the state run, as the vehicle does it."""
+        """Bring the inverter to the state run with the vehicle's commands."""
         self.run(100)
         self.run(20, Mode="torque")
         self.loop.set("plant.vdc_V", V_DC)
@@ -119,7 +119,7 @@ class Stand:
             raise FluxtrueError("the emulation is not in counting mode")
 
     def take(self) -> Iterator[tuple[int, int, int]]:
-        """Finished runs since the last time."""
+        """The runs that have finished since the last call."""
         return take(self.library, self.handle)
 
     def stack_used(self) -> int:
@@ -156,7 +156,7 @@ def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
         fault = int(loop.get("fault_word"))
         if fault != 0 or int(loop.get("identification_mode")) != mode:
             raise FluxtrueError(f"the measured drive ended with fault word {fault:#x}")
-        stand.core.pend(GATE)  # last of all: it ends the drive
+        stand.core.pend(GATE)  # at the end, because it stops the drive
         stand.run_ms()
         spans += (span for span in stand.take() if span[0] == GATE)
         seen = np.concatenate(rows)

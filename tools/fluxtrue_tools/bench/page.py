@@ -23,7 +23,7 @@ CODE_MOST, STATE_MOST = 11776, 1536
 FLASH_MOST, RAM_MOST = (budget()[bound] for bound in ("flash_bytes", "ram_bytes"))
 UTILISATION_MOST = 10.0
 STACK_MOST = 0.5
-# Bounds of a kernel: average and most; None: none is set.
+# Bounds of a kernel, average and maximum; None where there is no bound.
 BOUNDS: dict[str, tuple[float | None, float | None]] = {
     "current_tick": (180, 220), "current_core": (120, None), "flux_table": (70, 70), "mrai": (100, None),
     "torque_path": (40, None),
@@ -93,7 +93,7 @@ def _wrapped(line: str) -> str:
 
 
 def _bound(name: str, spread: list[float]) -> str:
-    """Each bound with its own verdict."""
+    """The text of both bounds, each met or missed."""
     average, maximum = BOUNDS.get(name, (None, None))
     parts = [f"avg ≤ {average} {verdict(spread[1] <= average)}"] if average is not None else []
     parts += [f"max ≤ {maximum} {verdict(spread[2] <= maximum)}"] if maximum is not None else []

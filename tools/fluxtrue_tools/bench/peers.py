@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the same functions cost elsewhere.
+"""The cost of the same functions in other projects.
 
 Measured with gcc 12.2 for Cortex-M4 (hard float ABI) in emulation, instructions issued, with the
 largest error found. Facts about published code; none of that code is here.
@@ -48,7 +48,7 @@ class Loop:
     maximum: int
 
 
-# 1000 ticks in closed loop each, in the same emulation; none has tables or identifies anything.
+# 1000 ticks in closed loop each, in the same emulation. No other project uses flux tables or identifies parameters.
 LOOPS = (
     Loop("teslabs/spinner 06be152", "float: sincos, 2 PID, clamp, SVM", 206, 208),
     Loop("CMSIS-DSP ec1bb75 composed", "q31: sincos, transforms, 2 PID; no SVM", 231, 231),

@@ -42,7 +42,7 @@ def _lines(*command: str) -> list[str]:
 
 
 def whole(elf: Path) -> Whole:
-    """As the linker counts."""
+    """Flash and RAM as the linker counts them."""
     image = Image(elf)
     flash = sum(s["sh_size"] for s in image.sections if s["sh_type"] == "SHT_PROGBITS")
     ram = sum(s["sh_size"] for s in image.sections if s["sh_addr"] >= RAM_FROM)
@@ -134,5 +134,5 @@ def state(elf: Path) -> dict[str, int]:
 
 
 def compiler() -> str:
-    """What the figures depend on."""
+    """The name and version of the compiler, on which the figures depend."""
     return _lines("arm-none-eabi-gcc", "--version")[0].strip()

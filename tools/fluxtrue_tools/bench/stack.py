@@ -54,7 +54,7 @@ def movement(instruction: Instruction) -> int | None:
 
 
 def _leaves(instruction: Instruction, name: str) -> bool:
-    """Ends the function here: a return, or a jump through a register."""
+    """Whether the instruction ends the function: a return, or a jump through a register."""
     into_pc = name in ("pop", "ldm", "ldmia") and "pc" in instruction.operands
     return name == "bx" or into_pc or (name in ("ldr", "mov") and instruction.operands.startswith("pc"))
 
@@ -72,7 +72,7 @@ class _Walk:
 
     def run(self) -> Node:
         self._drain()
-        # What only a table of jumps leads to, at the depth of that jump.
+        # Instructions that only a jump table leads to have the depth of that jump.
         while self.tables and (left := [a for a in self.code if a not in self.seen]):
             self.work.append((left[0], max(self.tables)))
             self._drain()
@@ -122,7 +122,7 @@ class _Walk:
             self.work.append((instruction.address + instruction.size, depth if leaves else after))
 
     def _goes_away(self, instruction: Instruction, name: str, conditional: bool, depth: int) -> bool:
-        """Notes where the instruction leads; true if its neighbour never follows."""
+        """Record where the instruction leads; true if the next one in memory never follows."""
         target = instruction.target
         into_pc = name == "ldr" and instruction.operands.startswith("pc") and "[sp]" not in instruction.operands
         if name in ("tbb", "tbh"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which bus: the arguments of python-can as they come from a command line."""
+"""The address of a bus: the arguments of python-can, taken from a command line."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -30,5 +30,7 @@ class BusAddress:
         try:
             return can.Bus(interface=self.interface, channel=self.channel, receive_own_messages=False,
                            **self.options)  # fmt: skip
-        except Exception as error:  # drivers and their Python fail in many ways, NameError and TypeError among them
+        except (
+            Exception
+        ) as error:  # a driver, or its Python package, can raise any exception, even NameError or TypeError
             raise FluxtrueError(f"--can-interface {self.interface}, --can-channel {self.channel}: {error}") from error

@@ -110,7 +110,7 @@ def x_macro(name: str, messages: list[Message]) -> str:
 
 
 def signals_header(sent: list[Message], received: list[Message]) -> str:
-    """The text of signals.h."""
+    """The text of the file signals.h."""
     parts = ["/* Generated from the DBC by fluxtrue_tools.bus.generate. */\n#ifndef BUS_SIGNALS_H\n"
              "#define BUS_SIGNALS_H\n#include <math.h>\n\n#include \"bus/bus.h\"\n"]  # fmt: skip
     parts += [constants(message) for message in (*sent, *received)]
@@ -147,8 +147,8 @@ def exports(sent: list[Message], received: list[Message]) -> Iterator[str]:
         yield f"    return {struct}_in_range(&m);\n}}\n"
 
 
-# What cantools writes, and what is enough for signals of 32 bits: on a processor without double precision the first
-# alone brings two kilobytes of library with it.
+# The conversion that cantools writes, and one that is enough for 32-bit signals. Without double-precision hardware
+# the first needs two kilobytes of the compiler's library.
 WIDE = "static uint64_t cantools_unsigned_from_double(double value)"
 NARROW = "static uint32_t cantools_unsigned_from_double(float value)"
 CASTS = ("    return (uint64_t)value;", "    return (uint32_t)value;")

@@ -25,7 +25,7 @@ ROW = re.compile(r"^\s*\{STATE_(\w+), ([^,{}]*), STATE_(\w+)\},$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Transition:
-    """A row of the table."""
+    """A transition: one row of the table."""
 
     source: str
     conditions: tuple[str, ...]
@@ -33,7 +33,7 @@ class Transition:
 
 
 def state_name(raw: str) -> str:
-    """As on the bus."""
+    """The name that the bus uses for the state."""
     return raw.lower()
 
 
@@ -49,7 +49,7 @@ def read_table(path: Path) -> list[Transition]:
 
 
 def draw(rows: list[Transition]) -> str:
-    """Mermaid; a number tells which row of its state is tried first."""
+    """The drawing in Mermaid; the numbers give the order in which the rows of a state are tested."""
     lines = ["```mermaid", "stateDiagram-v2", f"    [*] --> {rows[0].source}"]
     tried: dict[str, int] = {}
     for row in rows:
@@ -59,7 +59,7 @@ def draw(rows: list[Transition]) -> str:
 
 
 def with_drawing(page: str, drawing: str) -> str:
-    """The page with the drawing between its marks."""
+    """The text of the page with this drawing between the two marks."""
     if page.count(BEGIN) != 1 or page.count(END) != 1:
         raise FluxtrueError(f"{PAGE}: wanted one '{BEGIN.strip()}' and one '{END.strip()}'")
     head, rest = page.split(BEGIN)

@@ -81,7 +81,7 @@ LEAD: Final = re.compile(r"(.*?\.)(?: .*)?", re.DOTALL)
 
 @dataclass(frozen=True)
 class Word:
-    """One value or bit."""
+    """The name and explanation of one value or bit."""
 
     name: str
     value: int
@@ -114,7 +114,7 @@ def choices(lists: dict[str, list[Word]], signal: str) -> dict[int, str]:
 
 
 def explained(lists: dict[str, list[Word]], signal: str) -> str:
-    """What stands behind the first sentence of its comment."""
+    """The part of the comment behind its first sentence."""
     name = EXPLAINED[signal]
     kind = "Bit " if name in BITS else ""
     return " ".join(f"{kind}{word.value} {word.name}: {word.text}" for word in lists[name])
@@ -157,7 +157,7 @@ def table(lists: dict[str, list[Word]], name: str) -> str:
 
 
 def _spelt(text: str) -> str:
-    """As pages spell it: no full stop in a cell, a middle dot in a product of units."""
+    """The text as the pages write it: no full stop in a cell, and a middle dot in a product of units."""
     return re.sub(r"\bNm\b", "N·m", text).removesuffix(".")
 
 
@@ -176,7 +176,7 @@ def with_tables(page: str, lists: dict[str, list[Word]]) -> str:
 
 
 def wanted(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
-    """Every file that follows from the lists: path, what it says, what it has to say."""
+    """Every file that follows from the lists: its path, its present text and the required one."""
     lists = read(root)
     files = {root / DBC.relative_to(ROOT): with_dbc, **{root / page: with_tables for page in PAGES}}
     for path, make in files.items():

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 STEP: Final = 1e-4  # of every state, for the differences
-MIN_CURRENT_A: Final = 2.0  # below it the direction of the dead-time voltage is noise
+MIN_CURRENT_A: Final = 2.0  # below this current the direction of the dead-time voltage is random
 
 
 def prior_variances(campaign: Campaign, machine: Machine) -> Array:
@@ -42,7 +42,7 @@ def prior_variances(campaign: Campaign, machine: Machine) -> Array:
         "angle": np.radians(1.0) ** 2 * variance(spread.angle_offset_deg),
         "iron": variance(spread.iron_loss_scale),
     }
-    return np.maximum([known[name] for name in STATES], 1e-18)  # a range of one value is known, not impossible
+    return np.maximum([known[name] for name in STATES], 1e-18)  # a range of one value: the parameter is known
 
 
 def noise_variance(campaign: Campaign, machine: Machine, omega: Array, periods: float) -> Array:
@@ -69,7 +69,7 @@ def voltage_jacobian(physics: Physics, x: Array, i_seen: Complex, omega: Array) 
 
 
 def torque_jacobian(physics: Physics, x: Array, i_seen: Complex, omega: Array) -> Array:
-    """(n, states)."""
+    """Derivatives of the torque, (n, states)."""
     columns = []
     for k in range(x.size):
         step = np.zeros(x.size)
@@ -89,7 +89,9 @@ def torque_deviation(information_of_drive: Array, per_window: list[Array], slope
     deviation = []
     for own, slope in zip(per_window, slopes, strict=True):
         total = information_of_drive + own
-        scale = 1.0 / np.sqrt(np.diag(total))  # states of very different size: condition it
+        scale = 1.0 / np.sqrt(
+            np.diag(total)
+        )  # the states differ by orders of magnitude; scaling keeps the matrix well conditioned
         covariance = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
         deviation.append(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
     return np.array(deviation)
@@ -102,7 +104,7 @@ def _points(trace: "Trace", rows: Array) -> tuple[Complex, Array]:
 
 
 def of_case(campaign: Campaign, machine: Machine, drawn: Sample, trace: "Trace") -> list[float]:
-    """Percent for every window of one controller's run."""
+    """The bound in percent for every window of one controller's run."""
     physics, x = physics_of(machine, drawn), truth_of(machine, drawn)
     current, speed = _points(trace, trace.drive)
     kept = np.isfinite(current) & (np.abs(current) > MIN_CURRENT_A)

@@ -46,7 +46,7 @@ class Physics:
         i = i_seen / s["current_gain"] * np.exp(1j * s["angle"])
         per_flux = s["iron"] * (self.iron_k_h * np.sign(omega) + self.iron_k_e * omega) / 1.5
         i_m = i
-        for _ in range(3):  # the iron-loss current is some percent: three steps leave 1e-6 of it
+        for _ in range(3):  # the iron-loss current is a few percent of the current; three steps leave 1e-6 of it
             i_m = i - 1j * per_flux * self._flux(s, i_m)
         return i, i_m, self._flux(s, i_m)
 
@@ -64,13 +64,13 @@ class Physics:
         return np.asarray(1.5 * self.machine.pole_pairs * (np.conj(psi) * i_m).imag)
 
     def seen(self, x: Array, i_true: Complex) -> Complex:
-        """(IB-1) the other way round."""
+        """The inverse of (IB-1): the current that the controller measures."""
         s = self.split(x)
         return np.asarray(i_true * s["current_gain"] * np.exp(-1j * s["angle"]))
 
 
 def physics_of(machine: Machine, drawn: Sample) -> Physics:
-    """Nominal constants; the resistance is the one that the reported temperature promises."""
+    """Nominal constants; the resistance is that of the reported temperature."""
     plant = machine.motor.plant
     told = machine.motor.r_ohm * (1.0 + machine.r_temp_coeff_per_K * (drawn.plant["winding_C"] - 20.0))
     dead = machine.vdc_V * plant["dead_time_s"] * plant["pwm_hz"]
@@ -78,7 +78,7 @@ def physics_of(machine: Machine, drawn: Sample) -> Physics:
 
 
 def truth_of(machine: Machine, drawn: Sample) -> Array:
-    """The plant's own state vector."""
+    """The state vector with the plant's true values."""
     f = drawn.factors
     r_told = machine.motor.r_ohm * (1.0 + machine.r_temp_coeff_per_K * (drawn.plant["winding_C"] - 20.0))
     gain = float(np.mean([f[f"current_gain_{phase}"] for phase in "abc"]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One case: one plant, one drive, the same windows for every controller; a table of numbers comes back."""
+"""One case: one plant, one drive and the same windows for every controller. The result is a table of numbers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ RPM: Final = 2.0 * np.pi / 60.0
 DRIVE_ROW_S: Final = 0.01
 WINDOW_ROW_S: Final = 0.001
 START_S: Final = 0.1  # switching enabled, no torque
-TRANSITION_S: Final = 0.05  # at least, from one window to the next
+TRANSITION_S: Final = 0.05  # shortest time from one window to the next
 
 CHANNELS: Final = ("truth.time_s", "torque_requested_Nm", "truth.torque_mean_Nm", "truth.speed_rad_s", "truth.i_d_A",
                    "truth.i_q_A", "torque_estimated_Nm", "voltage_limited", "fault_word")  # fmt: skip
@@ -73,7 +73,7 @@ class _Run:
         self.rows: list[Array] = []
 
     def _move(self, seconds: float, speed_rad_s: float, torque_Nm: float) -> Array:
-        """Go to a speed and a torque on straight lines."""
+        """Change speed and torque linearly to new values."""
         ramps = {"torque_requested_Nm": (self.torque, torque_Nm), "plant.speed_rad_s": (self.speed, speed_rad_s)}
         rows = self.loop.run(round(seconds / self.loop.period_s), ramps)
         self.speed, self.torque = speed_rad_s, torque_Nm
@@ -83,7 +83,7 @@ class _Run:
         self.loop.record(self.columns, max(1, round(row_s / self.loop.period_s)))
 
     def warm_up(self) -> None:
-        """The drive, point by point."""
+        """Run the warm-up drive, point by point."""
         self._record(DRIVE_ROW_S)
         profile = self.plan.profile
         rows = [self._move(START_S, 0.0, 0.0)]
@@ -92,7 +92,7 @@ class _Run:
         self.drive = np.concatenate(rows)
 
     def measure(self) -> None:
-        """The tour of the windows."""
+        """Visit all windows and measure in each."""
         self._record(WINDOW_ROW_S)
         self._move(START_S, 0.0, 0.0)
         for window in self.plan.windows:
@@ -138,7 +138,7 @@ def _window_row(campaign: Campaign, machine: Machine, window: Window, columns: l
 
 
 def _drive_row(campaign: Campaign, trace: Trace) -> dict[str, Any]:
-    """What happened in the whole run of one controller."""
+    """Totals of the whole run of one controller."""
     every = np.concatenate([trace.drive, *trace.windows])
     fault = np.nan_to_num(every[:, trace.columns.index("fault_word")]).astype(np.int64)
     counted = {f"run_{name}": int(np.count_nonzero(every[:, trace.columns.index(name)]))
@@ -165,7 +165,7 @@ def run_case(campaign: Campaign, machine: Machine, case: int,
     """All controllers of a case, a row per window; the same numbers wherever and whenever it runs."""
     plan = make_plan(campaign, machine, case)
     if not plan.windows:
-        return []  # this plant reaches the smallest torque nowhere
+        return []  # this plant cannot reach the smallest torque at any speed
     truth = {f"plant_{name}": value for name, value in plan.sample.factors.items()}
     rows = []
     for controller in campaign.controller:

@@ -13,7 +13,7 @@ from fluxtrue_tools.sim import effects
 
 Found = tuple[str, str]  # key, why
 
-# Plant fields that every case draws, by what.
+# Plant fields that every case draws, and the key that sets each range.
 DRAWN = {
     "r_ohm_20": "spread.resistance_scale", "lq_scale": "spread.lq_scale", "ld_slope_scale": "spread.ld_slope_scale",
     "cross_saturation_scale": "spread.cross_saturation_scale", "iron_k_h": "spread.iron_loss_scale",

@@ -17,12 +17,12 @@ from fluxtrue_tools.campaign.spec import Drive, Vehicle
 
 Array = NDArray[np.float64]
 STEP_S: Final = 0.1
-STANDSTILL_S: Final = 2.0  # before every trip, in vehicle time
+STANDSTILL_S: Final = 2.0  # standstill before every trip, in the vehicle's time
 
 
 @dataclass(frozen=True)
 class Phase:
-    """What GTR 15 says of a phase; speeds in km/h, accelerations in m/s²."""
+    """Statistics of a phase in GTR 15; speeds in km/h, accelerations in m/s²."""
 
     duration_s: float
     top_kmh: float
@@ -48,13 +48,13 @@ class Profile:
 
 
 def _ramp(start: float, stop: float, rate: float) -> Array:
-    """Speeds from one to the other, one each STEP_S, the first left out."""
+    """Speeds from the first to the last, one per STEP_S, without the first."""
     count = max(1, math.ceil(abs(stop - start) / (rate * STEP_S)))
     return np.linspace(start, stop, count + 1)[1:]
 
 
 def _cruise(speed: float, rate: float, seconds: float, rng: np.random.Generator) -> Array:
-    """Traffic: the speed swings by what a sixth of the phase's acceleration makes in a swing of 4 to 8 s."""
+    """Traffic: the speed oscillates with a period of 4 to 8 s and a sixth of the phase's acceleration."""
     period = rng.uniform(4.0, 8.0)
     t = np.arange(STEP_S, seconds, STEP_S)
     amplitude = min(rate / 6.0 * period / (2.0 * math.pi), 0.2 * speed)

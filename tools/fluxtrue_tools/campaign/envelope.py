@@ -16,7 +16,7 @@ from fluxtrue_tools.motor.derived import V_RATIO_REFERENCE
 Array = NDArray[np.float64]
 NODES: Final = 121
 SPEEDS: Final = 41
-MARGIN: Final = 0.97  # of what the plant can give: a controller needs a margin to correct
+MARGIN: Final = 0.97  # share of the plant's largest torque; the rest is the margin with which a controller can correct
 NOTHING_WRONG: Final = {"magnet_scale": 1.0, "lq_scale": 1.0, "ld_slope_scale": 1.0, "cross_saturation_scale": 1.0,
                         "resistance_scale": 1.0}  # fmt: skip
 
@@ -49,7 +49,7 @@ def _largest(machine: Machine, factors: dict[str, float], omega: Array) -> Array
 
 
 def make_envelope(machine: Machine, factors: dict[str, float]) -> Envelope:
-    """Motoring is the harder direction, its answer serves both. The firmware plans with nominal data: both count."""
+    """Torque that plant and firmware both allow; computed for motoring, where less is possible than in braking."""
     speed = np.linspace(0.0, machine.speed_max_rpm, SPEEDS)
     omega = machine.pole_pairs * speed * 2.0 * np.pi / 60.0
     torque = np.minimum(_largest(machine, NOTHING_WRONG, omega), _largest(machine, factors, omega))

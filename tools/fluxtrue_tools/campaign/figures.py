@@ -157,7 +157,7 @@ def histograms(campaign: Campaign, table: pd.DataFrame) -> Figure:
     for axis, band in zip(axes[0], bands, strict=True):
         for name, colour in _colours(campaign).items():
             rows = table[(table["controller"] == name) & (table["band"] == band)]
-            # An error helps or hurts along the torque, whichever sign that has.
+            # The sign of an error is counted along the torque, so that both directions of torque can be added.
             error = np.clip(rows["error_percent"] * np.sign(rows["torque_requested_Nm"]), bins[0], bins[-1])
             weight = np.full(len(error), 100.0 / max(1, len(error)))
             axis.hist(error, bins=bins, weights=weight, histtype="step", color=colour, label=name, lw=1.4)
@@ -182,7 +182,7 @@ def _series(axes: Any, trace: Trace, colour: str, name: str) -> None:
 
 
 def case_figure(campaign: Campaign, traces: dict[str, Trace], title: str) -> Figure:
-    """One case over time: speed, torque, error, estimate's error."""
+    """One case over time: speed, torque, its error, and the error of the estimate."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(4, 1, figsize=(12, 9), sharex=True, layout="constrained")
         for name, colour in _colours(campaign).items():

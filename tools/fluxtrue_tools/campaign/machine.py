@@ -18,7 +18,7 @@ from fluxtrue_tools.sim.motor import Motor
 
 @dataclass(frozen=True)
 class Machine:
-    """The motor, resolved."""
+    """A motor with everything that follows from its data."""
 
     motor: Motor
     model: FluxModel
@@ -42,7 +42,7 @@ class Machine:
 
 
 def _nominal(given: Nominal, data: dict[str, dict[str, float]]) -> Nominal:
-    """The motor's data go first: the firmware is built from them."""
+    """The nominal values; those of the motor's data have priority, because the firmware is built from them."""
     known = {
         "device_drop_V": data["inverter"]["device_drop_V"],
         "iron_k_h": data["machine"].get("iron_loss_hysteresis", 0.0),
@@ -52,7 +52,7 @@ def _nominal(given: Nominal, data: dict[str, dict[str, float]]) -> Nominal:
 
 
 def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine:
-    """From a built motor."""
+    """The machine of a built motor."""
     motor = motors.read(folder)
     data = json.loads(folder.data.read_text(encoding="utf-8"))
     machine, grid = data["machine"], data["map"]
@@ -74,5 +74,5 @@ def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine
 
 @lru_cache(maxsize=2)
 def machine_of(name: str, folder: str, text: str) -> Machine:
-    """Once per worker process."""
+    """The machine, read once per worker process."""
     return make_machine(MotorFolder(name, Path(folder)), Campaign.model_validate_json(text), "campaign")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole campaign: what is missing is run, then everything is scored, reported and checked. And a single case."""
+"""A whole campaign: missing cases are run, then all are scored, reported and checked. A single case can be run, too."""
 
 import hashlib
 import sys
@@ -34,7 +34,7 @@ class Job:
     cases: range
     where: str  # for messages
     command: str  # that reproduces {case}
-    plot: Path | None = None  # the whole at a glance
+    plot: Path | None = None  # the overview
 
 
 def task(name: str, folder: str, text: str, case: int) -> list[dict[str, Any]]:

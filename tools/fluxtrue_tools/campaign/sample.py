@@ -59,7 +59,7 @@ def _factors(spread: Spread, rng: np.random.Generator) -> dict[str, float]:
 
 
 def _winding(factors: dict[str, float], machine: Machine) -> dict[str, float]:
-    """The true resistance follows from the true temperature; the plant's sensor reports a wrong one.
+    """The true resistance follows from the true temperature, of which the plant's sensor reports a wrong value.
 
     The plant derives R from the temperature it reports, so R at 20 C takes the difference up.
     """

@@ -13,11 +13,11 @@ from fluxtrue_tools.errors import FluxtrueError
 
 Task = Callable[[int], Any]
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
-SCHEDULER_S = 60  # a busy one answers, too
+SCHEDULER_S = 60  # long enough for a busy scheduler
 
 
 def _worker() -> None:
-    """The parent alone answers Ctrl-C; and no process keeps waiting when it is killed."""
+    """Workers ignore Ctrl-C, which the parent handles, and end when the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if sys.platform == "linux":

@@ -13,7 +13,7 @@ from fluxtrue_tools.demo.experiment import Bound
 
 LOW, HIGH, CRAWL = "low", "high", "crawl"
 BANDS: Final = (LOW, HIGH)
-CRAWL_RPM: Final = 299.999  # below it only harm is evaluated
+CRAWL_RPM: Final = 299.999  # below this speed only harm is evaluated
 
 
 def band_of(speed_rpm: pd.Series, split_rpm: float) -> pd.Series:
@@ -65,7 +65,7 @@ class Harm:
 
 
 def harm(rows: pd.DataFrame, reference: pd.DataFrame, limits: Limits) -> Harm:
-    """Both tables hold the same windows of the same cases."""
+    """Compare two controllers whose tables contain the same windows of the same cases."""
     both = rows.merge(reference[["case", "window", "error_percent"]], on=["case", "window"],
                       suffixes=("", "_reference"), validate="one_to_one")  # fmt: skip
     error, tables = both["error_percent"].abs(), both["error_percent_reference"].abs()

@@ -13,7 +13,7 @@ from fluxtrue_tools.strict import Flag, Number, Strict
 
 
 def _pair(value: Any) -> Any:
-    """A range [low, high]; a list is a list whatever TOML calls it."""
+    """The list [low, high] of a file as a tuple, after a check of its order."""
     if not isinstance(value, list) or len(value) != 2:
         raise ValueError("allowed: [low, high]")
     low, high = value

@@ -80,7 +80,7 @@ class Store:
         return [case for case in cases if not self._path(case).is_file()]
 
     def save(self, case: int, rows: list[dict[str, Any]]) -> None:
-        """Whole or not at all; a case without a window leaves nothing."""
+        """Save a case completely or not at all; a case without a window has no file."""
         if not rows:
             return
         with atomic(self._path(case)) as scratch:

@@ -16,7 +16,7 @@ def _columns(cells: list[tuple[str, ...]]) -> str:
 
 
 def band_name(campaign: Campaign, band: str) -> str:
-    """In words."""
+    """The name of a band in words."""
     split = campaign.check.band_rpm
     return {"low": f"300…{split:g} rpm", "high": f"above {split:g} rpm", CRAWL: "below 300 rpm"}[band]
 
@@ -46,7 +46,7 @@ def trouble_table(campaign: Campaign, scores: list[Score]) -> str:
 
 
 def bounds_table(promised: list[tuple[str, Bound]]) -> str:
-    """Met or missed."""
+    """Every bound of the checked controllers, met or missed."""
     cells: list[tuple[str, ...]] = [("controller", "figure of merit", "simulated", "allowed", "")]
     for name, bound in promised:
         relation = "≥" if bound.at_least else "≤"
@@ -62,7 +62,7 @@ def promises(campaign: Campaign, scores: list[Score]) -> list[tuple[str, Bound]]
 
 
 def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
-    """One case: its plant, then every window with all controllers side by side. Ten digits: it must reproduce."""
+    """One case: its plant, then every window with all controllers side by side, in ten digits for exact comparison."""
     first = table.iloc[0]
     plant = "\n".join(f"{name.removeprefix('plant_')} = {first[name]:.10g}"
                       for name in table.columns if name.startswith("plant_"))  # fmt: skip

@@ -23,7 +23,7 @@ class Window:
 
 
 def _measure_s(windows: Windows, speed_rpm: float) -> float:
-    """Whole mechanical turns, so that what ripples with the angle averages out."""
+    """Time of whole mechanical turns, so that errors that depend on the angle average out."""
     turn_s = 60.0 / abs(speed_rpm)
     return math.ceil(windows.measure_s / turn_s - 1e-9) * turn_s
 
@@ -42,7 +42,7 @@ def _speeds(windows: Windows, rng: np.random.Generator) -> list[tuple[float, int
 
 
 def _tour(points: list[Window]) -> list[Window]:
-    """Forwards up and down again, then backwards up and down: every other speed on the way down."""
+    """Order of the windows: forwards up and down, then backwards up and down; every other speed on the way down."""
     tour: list[Window] = []
     for direction in (1.0, -1.0):
         side = sorted((w for w in points if direction * w.speed_rpm > 0.0), key=lambda w: abs(w.speed_rpm))

@@ -24,7 +24,7 @@ class Demonstration:
 
     @property
     def realtime(self) -> Bound:
-        """The bound of the simulation's speed."""
+        """The bound of the simulation's speed relative to real time."""
         return Bound("simulated over processor time", self.realtime_factor, realtime.REALTIME_FACTOR, "x", True)
 
     def missed(self) -> list[str]:
@@ -33,7 +33,7 @@ class Demonstration:
         return lines + ([] if self.realtime.met else [f"realtime_factor: {self.realtime.text()}"])
 
     def summary(self) -> dict[str, Any]:
-        """summary.json; what could not be measured is null."""
+        """The content of summary.json; a value that could not be measured is null."""
         data = {
             "experiments": [result.summary for result in self.results],
             "realtime_factor": self.realtime_factor,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every experiment is made of: scenarios in, figures of merit and bounds out."""
+"""The parts of every experiment: from scenarios to figures of merit and bounds."""
 
 from dataclasses import dataclass, field
 from typing import Any

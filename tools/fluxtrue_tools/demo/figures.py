@@ -48,7 +48,7 @@ def _mark(axes: Axes, first: float, last: float, text: str, colour: str) -> None
 
 
 def _zoom(axes: Axes, requested: float) -> None:
-    """The axis shows at least ten percent."""
+    """Give the axis a range of at least ten percent."""
     axes.set_ylim(0.84 * requested, 1.06 * requested)
 
 

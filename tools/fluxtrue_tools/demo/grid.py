@@ -23,7 +23,7 @@ WRONG: Final = {
     "current_noise_A_rms": 0.5,
     "adc_bits": 12,
     "current_quantise": True,
-    "iron_k_h": 0.0,  # the paper's identification knows no iron loss
+    "iron_k_h": 0.0,  # the paper's identification has no iron loss in its model
     "iron_k_e": 0.0,
 }
 MAGNET_SCALE: Final = 0.85
@@ -51,7 +51,7 @@ def scenario(speed_rpm: float, torque_Nm: float, closed: bool, kind: str) -> dic
 
 
 def parallel(jobs: list[Callable[[], Recording]], done: Callable[[], None]) -> list[Recording]:
-    """All jobs on all cores: the simulation runs outside Python's lock."""
+    """Run all jobs on all cores; the simulation does not hold Python's global lock."""
 
     def one(job: Callable[[], Recording]) -> Recording:
         recording = job()

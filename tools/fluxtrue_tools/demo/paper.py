@@ -38,7 +38,7 @@ def _scenario(torque_Nm: Any, magnet: Any, controller: dict[str, Any], **more: A
         "duration_s": 1.5,
         "controller": controller | {"dead_time_compensation": 0.0, "identification_mode": "paper"},
         "profile": profile | more.pop("profile", {}),
-        # The currents are the states of the paper's (1): they go on when the magnet changes.
+        # The currents are the states of the paper's (1), so that they are continuous when the magnet changes.
         "plant": {"ideal_inverter": True, "magnet_step_keeps_current": True},
     } | more
 
@@ -124,7 +124,7 @@ def fig8(bench: Bench) -> Result:
 
 
 def _fig8_story(bench: Bench, scale: float) -> Recording:
-    """The same in one picture: the magnet weakens at 0.3 s, the loop is closed at 0.7 s."""
+    """The same experiment as one figure: the magnet weakens at 0.3 s, and the loop is closed at 0.7 s."""
     magnet = [[0, 1.0], [0.3, 1.0], [0.3, scale]]
     scenario = _scenario(40.0, magnet, OPEN, duration_s=1.2)
     events = [{"t": 0.7, "set": {"torque_loop": True, "identification": True}}]

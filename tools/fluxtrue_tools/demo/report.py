@@ -39,7 +39,7 @@ def _row(experiment: str, bound: Bound, what: str | None = None) -> Row:
 
 
 def _worst(result: Result) -> Row:
-    """Of many points the one that comes nearest to its bound, or goes farthest beyond it."""
+    """Of many points the one with the smallest margin to its bound."""
     worst = max(result.bounds, key=lambda bound: abs(bound.value) / bound.limit)
     return _row(result.name, worst, f"worst of {len(result.bounds)}: {worst.what}")
 
@@ -54,7 +54,7 @@ def rows(demonstration: Demonstration) -> list[Row]:
 
 
 def terminal(demonstration: Demonstration) -> str:
-    """Plain text, as wide as it needs to be."""
+    """The table as plain text."""
     cells = [("experiment", "figure of merit", "simulated", "allowed", "")]
     cells += [(r.experiment, r.what, r.value, r.allowed, "met" if r.met else "MISSED") for r in rows(demonstration)]
     widths = [max(len(line[k]) for line in cells) for k in range(5)]

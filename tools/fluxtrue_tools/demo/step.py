@@ -33,7 +33,7 @@ def rise_ms(now: NDArray[np.float64], value: NDArray[np.float64], final: float) 
 
 
 def overshoot_percent(value: NDArray[np.float64], final: float) -> float:
-    """How far beyond the final value."""
+    """Overshoot in percent of the final value."""
     return max(0.0, 100.0 * (float(value.max()) / final - 1.0))
 
 

@@ -17,14 +17,14 @@ from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.target.build import image
 
 ROOT: Final = sim_build.ROOT
-# Scenarios write the request themselves: the image in which no bus does.
+# The image without the bus: scenarios write the requests into its memory themselves.
 PRESETS: Final = {"encoder": "s32k144-direct", "resolver": "s32k144-resolver-direct"}
 FLASHED: Final = {"encoder": "s32k144", "resolver": "s32k144-resolver"}
 
 
 @dataclass(frozen=True)
 class Parts:
-    """A motor, and where its emulation's files are."""
+    """A motor, and the paths of its emulation's files."""
 
     motor: Motor
     image: Path
@@ -37,7 +37,7 @@ class Parts:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What that program is told its files by."""
+        """The environment variables that name the program's files."""
         return {"FLUXTRUE_IMAGE": str(self.image), "FLUXTRUE_LAYOUT": str(self.layout)}
 
     def emulated(self, mode: int = library.FAST) -> Motor:
@@ -46,14 +46,14 @@ class Parts:
 
 
 def _check_who_commands(elf: Path, flashed: bool) -> None:
-    """Without the bus the flashed image would stand still, and the other one never answers on it."""
+    """Refuse the flashed image without a bus, on which it would wait for ever, and the other image with one."""
     try:
         with elf.open("rb") as file:
             symbols = ELFFile(file).get_section_by_name(".symtab")
             ours = symbols is not None and bool(symbols.get_symbol_by_name("ecu"))
             direct = ours and bool(symbols.get_symbol_by_name("commanded_directly"))
     except (ELFError, OSError):
-        return  # what is wrong with it is said when it is loaded
+        return  # errors in it are reported when it is loaded
     if ours and direct == flashed:
         raise FluxtrueError(
             f"--elf {elf}: takes no commands from the bus, allowed with --serve: the image that is flashed (s32k144)"

@@ -18,21 +18,21 @@ _HERE, _TEXT = ctypes.c_void_p, ctypes.c_char_p
 
 
 class Bridge(ctypes.Structure):
-    """emu_bridge_t."""
+    """The C type emu_bridge_t."""
 
     _fields_ = (("duty", ctypes.c_double * 3), ("driven", ctypes.c_uint8), ("gates", _BOOL),
                 ("dead_time_s", ctypes.c_double), ("period_s", ctypes.c_double))  # fmt: skip
 
 
 class Pins(ctypes.Structure):
-    """emu_pins_t."""
+    """The C type emu_pins_t."""
 
     _fields_ = (("adc", ctypes.c_uint16 * 32 * 2), ("angle", _U32), ("angle_rate", ctypes.c_int32),
                 ("resolver_fault", _BOOL), ("gate_fault", _BOOL))  # fmt: skip
 
 
 class State(Enum):
-    """What the core does: it runs, is stuck with all interrupts masked, or is halted by a debugger."""
+    """State of the core: running, stuck with all interrupts masked, or halted by a debugger."""
 
     RUNS = 0
     STUCK = 1
@@ -40,11 +40,11 @@ class State(Enum):
 
 
 class EmulationStoppedError(FluxtrueError):
-    """The program did what the emulator refuses; no further time will pass on this processor."""
+    """The program did something that the emulator refuses; the processor stays stopped."""
 
 
 class Counts(ctypes.Structure):
-    """Instructions of one handler; what interrupted it is left out."""
+    """Instructions of one handler, without those of handlers that interrupted it."""
 
     _fields_ = (("runs", _U64), ("sum", _U64), ("least", _U32), ("most", _U32))
 
@@ -92,7 +92,7 @@ def declare(library: ctypes.CDLL) -> ctypes.CDLL:
 
 
 class Core:
-    """One processor: its own, running an ELF file, or the one inside a simulation."""
+    """One processor: one of its own that runs an ELF file, or the one inside a simulation."""
 
     def __init__(self, library: ctypes.CDLL, handle: int, owned: bool) -> None:
         self._library, self._handle, self._owned = declare(library), handle, owned
@@ -114,7 +114,7 @@ class Core:
         return cls(library, declare(library).sim_emulator(sim), owned=False)
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Release the memory."""
         if self._handle and self._owned:
             self._library.emu_destroy(self._handle)
         self._handle = 0
@@ -149,12 +149,12 @@ class Core:
 
     @property
     def instructions(self) -> int:
-        """Executed so far."""
+        """Number of instructions executed so far."""
         return int(self._library.emu_instructions(self._handle))
 
     @property
     def resets(self) -> int:
-        """Since creation."""
+        """Number of resets since creation."""
         return int(self._library.emu_resets(self._handle))
 
     @property
@@ -163,21 +163,21 @@ class Core:
         return int(self._library.emu_active_vector(self._handle))
 
     def symbol(self, name: str) -> int:
-        """Its address."""
+        """The address of a symbol."""
         address = int(self._library.emu_symbol(self._handle, name.encode()))
         if address == 0:
             raise KeyError(name)
         return address
 
     def read(self, address: int, size: int) -> bytes:
-        """Memory as a debugger sees it."""
+        """Read memory as a debugger does."""
         content = ctypes.create_string_buffer(size)
         if not self._library.emu_read(self._handle, address, content, size):
             raise ValueError(f"nothing is at {address:#x}")
         return content.raw
 
     def write(self, address: int, content: bytes) -> None:
-        """Memory, as a debugger changes it."""
+        """Write memory as a debugger does."""
         if not self._library.emu_write(self._handle, address, content, len(content)):
             raise ValueError(f"nothing is at {address:#x}")
 
@@ -193,7 +193,7 @@ class Core:
         return value
 
     def set_register(self, name: str, value: int) -> None:
-        """What the register holds from now on, without side effects."""
+        """Change the content of a register, without side effects."""
         if not self._library.emu_register_set(self._handle, name.encode(), value):
             raise KeyError(name)
 
@@ -227,12 +227,12 @@ class Core:
         return float(bridge.duty[pair])
 
     def turn(self, turns: float) -> None:
-        """The shaft stands at this angle from now on."""
+        """Turn the shaft to this angle, where it stays."""
         pins = self._library.emu_pins(self._handle).contents
         pins.angle, pins.angle_rate = round(turns % 1.0 * 2**32) % 2**32, 0
 
     def core_state(self, state: State) -> None:
-        """From now on; everything but the core goes on."""
+        """Change the state of the core; timers and peripherals continue."""
         self._library.emu_core_state(self._handle, state.value)
 
     def pend(self, vector: int) -> None:
@@ -245,16 +245,16 @@ class Core:
         self._library.emu_on_exception(self._handle, self._callback, None)
 
     def break_after(self, instructions: int) -> None:
-        """run() answers BREAK before the instruction that many from now (counting mode)."""
+        """Let run() stop with BREAK after so many instructions (in counting mode)."""
         self._library.emu_break_after(self._handle, instructions)
 
     def counts(self, vector: int) -> Counts:
-        """Of the handler's runs so far; when counting without what is skipped behind an IT."""
+        """The counts of a handler's runs so far; in counting mode without instructions that an IT block skipped."""
         counts: Counts = self._library.emu_counts(self._handle, vector)
         return counts
 
     def clear_counts(self) -> None:
-        """Count from here on."""
+        """Set all counts to zero."""
         self._library.emu_counts_clear(self._handle)
 
     def save(self) -> int:
@@ -262,9 +262,9 @@ class Core:
         return int(self._library.emu_save(self._handle))
 
     def restore(self, snapshot: int) -> None:
-        """Everything but the program as it was."""
+        """Restore everything but the program from a snapshot."""
         self._library.emu_restore(self._handle, snapshot)
 
     def free(self, snapshot: int) -> None:
-        """Give a snapshot's memory back."""
+        """Release a snapshot."""
         self._library.emu_snapshot_free(snapshot)

@@ -23,7 +23,7 @@ PERIPHERALS = (
     "PTA", "PTB", "PTC", "PTD", "PTE", "MCM", "LMEM",
 )  # fmt: skip
 
-# Where the SVD's fields are not the whole truth: the watchdog's counter takes 32-bit commands.
+# Masks that differ from the SVD's fields: the watchdog's counter register also takes 32-bit commands.
 ANY_VALUE = {("WDOG", "CNT")}
 
 

@@ -23,7 +23,7 @@ GATE: Final = 16 + 103
 RAM_END: Final = 0x20007000
 SLICE_S: Final = 1e-4
 SLICES: Final = 25
-# What the bridge does, as far as the software says it.
+# The registers that determine what the bridge does.
 BRIDGE: Final = (*(f"FTM0.C{n}V" for n in range(6)), "FTM0.SWOCTRL", "FTM0.OUTMASK", "FTM0.SYNC")
 
 
@@ -40,7 +40,7 @@ class _Report(ctypes.Structure):
 
 @dataclass(frozen=True)
 class Report:
-    """Boundaries tried, and outcomes that mix old with new."""
+    """Number of instruction boundaries tried, and the outcomes that mix old and new data."""
 
     instructions: int
     points: int
@@ -51,7 +51,7 @@ class Report:
 
 
 def interrupt_everywhere(loop: Loop, victim: int, rounds: int = 1) -> Report:
-    """From the victim's next run on; the simulation is left as it was."""
+    """Interrupt the activity's next run at each instruction; afterwards the simulation is in its former state."""
     library = loop._library
     library.preempt_run.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.POINTER(_Report)]
     report = _Report()
@@ -64,14 +64,14 @@ def interrupt_everywhere(loop: Loop, victim: int, rounds: int = 1) -> Report:
 
 @dataclass(frozen=True)
 class Sides:
-    """Boundaries tried, and on which side of the activity the interrupt seemed to have been."""
+    """Number of boundaries tried, and whether the outcome was that of an interrupt before or after the activity."""
 
     instructions: int
     before: int
     after: int
-    mixed: tuple[int, ...]  # after so many instructions: neither
-    same: bool  # before and after make no difference
-    snapshot_before: int  # the two outcomes, to be restored and to go on from
+    mixed: tuple[int, ...]  # instruction counts with neither of the two outcomes
+    same: bool  # both outcomes are the same
+    snapshot_before: int  # snapshots of the two outcomes, from which the run can continue
     snapshot_after: int
 
 

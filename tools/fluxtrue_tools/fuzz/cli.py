@@ -15,7 +15,7 @@ PROGRAM: Final = Path("tests", "fuzz", "fuzz_bus")
 
 
 def _program(build_dir: Path | None) -> Path:
-    """A given build folder is used as it is; else build/host is brought up to date."""
+    """The fuzzing program: of the given build folder as it is, or of build/host, which is built first."""
     if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
         build_dir = Path(os.environ["FLUXTRUE_BUILD_DIR"])
     if build_dir is None:

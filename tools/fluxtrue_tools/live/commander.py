@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-HAND_TIMEOUT_S: Final = 0.3  # a page that is closed, asleep or cut off
+HAND_TIMEOUT_S: Final = 0.3  # longer than this is a page that is closed, suspended or disconnected
 START_S: Final = 0.5  # the inverter answers an enable within milliseconds
 GAP_S: Final = 0.03  # between two commands: the inverter's time-out, docs/howto/can.md
 RAMP_Nm_per_s: Final = 150.0
@@ -18,7 +18,7 @@ AGAIN: Final = "Press Enable to go on."
 
 
 class Wish(StrEnum):
-    """The last button of the user."""
+    """The button that the user pressed last."""
 
     OFF = "off"  # dc link discharged
     READY = "ready"  # dc link charged, no torque
@@ -57,11 +57,11 @@ class Commander:
     _gap_s: float = 0.0  # longest time between two commands since the last press on a button
 
     def hand(self, now_s: float) -> None:
-        """A sign of life from the page that has control."""
+        """Record a sign of life from the page that has control."""
         self._seen_s = now_s
 
     def ask(self, wish: Wish, now_s: float) -> None:
-        """A button. Drive begins with no torque."""
+        """A button was pressed. After Enable the requested torque is zero."""
         self.hand(now_s)
         if wish is not self.wish:
             self.target_Nm = 0.0
@@ -69,17 +69,17 @@ class Commander:
         self.wish, self.stopped = wish, ""
 
     def slide(self, torque_requested_Nm: float, now_s: float) -> None:
-        """The slider; a value beyond the machine is its limit."""
+        """The slider was moved; a value beyond the machine's torque is limited to it."""
         self.hand(now_s)
         self.target_Nm = min(max(torque_requested_Nm, -self.torque_max_Nm), self.torque_max_Nm)
 
     def reset_faults(self, now_s: float) -> None:
-        """One edge of the reset bit, with enable off."""
+        """Send one edge of the reset bit, with enable off."""
         self.ask(Wish.READY, now_s)
         self._reset = True
 
     def let_go(self) -> None:
-        """The page with control has gone: no need to wait whether it says something again."""
+        """The page with control has closed; the command ends without waiting for its time-out."""
         self._seen_s = float("-inf")
         self._take_back(f"The page with control was closed or silent for {HAND_TIMEOUT_S:g} s.")
 

@@ -22,7 +22,7 @@ from fluxtrue_tools.vecu.mdf import BusLog
 
 COMMAND: Final = "VCU_TorqueRequest"
 CLOSING_S: Final = 3.0  # the largest torque is ramped out in less
-LIMIT_Nm: Final = 1000.0  # the message's own largest: the slider is the limit here
+LIMIT_Nm: Final = 1000.0  # the largest value of the message; the slider limits the torque
 
 
 class Recorder:
@@ -44,7 +44,7 @@ class Recorder:
                 self._log(frame)
 
     def start(self) -> None:
-        """Begin anew."""
+        """Start a new recording."""
         with self._lock:
             self._log = BusLog()
 
@@ -61,7 +61,7 @@ class Recorder:
         return path
 
 
-# It warns of every frame that a read has cut in two, and then puts it together.
+# It warns of every frame that arrives in two reads, although it then joins the parts.
 logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
 
 
@@ -88,7 +88,7 @@ class Link:
             action(self._commander, self._pace.now_s)
 
     def close(self) -> None:
-        """Torque to zero first; then leave the bus."""
+        """Ramp the torque to zero, then close the connection."""
         self.act(lambda commander, now: commander.ask(Wish.OFF, now))
         end_s = self._pace.now_s + CLOSING_S
         while self._commander.torque_requested_Nm != 0.0 and self._pace.now_s < end_s and self._thread.is_alive():

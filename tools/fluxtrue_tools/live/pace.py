@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whose time the commands follow: the wall clock's on a bench, simulated time before a virtual ECU.
+"""The clock that the commands follow: the wall clock on a bench, simulated time with a virtual ECU.
 
 Before a virtual ECU time passes only between two commands. A computer that stalls stalls the inverter and its machine
 with it: no command is late, whatever else runs. On a bench nothing waits, and a late command is late.
@@ -16,7 +16,7 @@ import can
 from fluxtrue_tools.vecu.stepped import SteppedBus
 
 PERIOD_S: Final = 0.010
-BATCH_PERIODS: Final = 4  # what a page draws at once
+BATCH_PERIODS: Final = 4  # time that one batch for the page covers
 
 Listener = Callable[[can.Message], None]
 
@@ -33,7 +33,7 @@ class Pace(Protocol):
 
 
 class WallClock:
-    """A bench."""
+    """The time of a bench: the wall clock."""
 
     def __init__(self, bus: can.BusABC, listeners: list[Listener]) -> None:
         self._bus = bus
@@ -56,11 +56,11 @@ class WallClock:
 
     @contextmanager
     def standing_still(self) -> Iterator[None]:
-        """A bench does not wait."""
+        """Nothing: the time of a bench cannot be held."""
         yield
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self._notifier.stop()
 
 
@@ -76,26 +76,26 @@ class InStep:
         self._due = self._open = False
 
     def turn(self) -> None:
-        """Time for a batch; goes on when it is done."""
+        """A batch is due; returns when the pages have drawn it."""
         with self._changed:
             self._due = not self._open
             self._changed.notify_all()
             self._changed.wait_for(lambda: not self._due)
 
     def due(self) -> bool:
-        """Waits for the next batch; False: there will be none."""
+        """Wait for the next batch; False after release()."""
         with self._changed:
             self._changed.wait_for(lambda: self._due or self._open)
             return not self._open
 
     def done(self) -> None:
-        """Time may go on."""
+        """The pages have drawn the batch; time continues."""
         with self._changed:
             self._due = False
             self._changed.notify_all()
 
     def release(self) -> None:
-        """No page will draw any more."""
+        """Let time continue without pages."""
         with self._changed:
             self._open, self._due = True, False
             self._changed.notify_all()
@@ -115,11 +115,11 @@ class SimulatedTime:
         return self._bus.now_s
 
     def send(self, frame: can.Message) -> None:
-        """One command, heard before time goes on."""
+        """Send one command, which the ECU receives before time continues."""
         self._bus.send(frame)
 
     def next_period(self, stop: threading.Event) -> None:
-        """Let 10 ms pass and hear what was said meanwhile."""
+        """Let 10 ms pass and receive the frames that were sent meanwhile."""
         for message in self._bus.run(1e3 * PERIOD_S)[0]:
             for listener in self._listeners:
                 listener(message)
@@ -135,4 +135,4 @@ class SimulatedTime:
         return self._bus.standing_still()
 
     def close(self) -> None:
-        """Nothing runs by itself."""
+        """Nothing to stop: time passes only in next_period()."""
