@@ -3,12 +3,40 @@
 
 #include "drive/mrai/mrai_seam.h"
 
+#define SILENT_STEPS_MAX 2U /* whole steps without a command: 2 to 3 ms, as task and window are not in step */
+
+/* Without the task the last torque would last until the watchdog resets the processor. Each step the task writes one
+ * command, whether the drive runs or not. */
+static void check_task(drive_t *drive)
+{
+    fast_state_t *fast = &drive->fast;
+    const uint32_t generation = drive->commands.generation;
+    if (__builtin_expect(generation != fast->command_seen, 1)) {
+        fast->command_seen = generation;
+        fast->silent_steps = 0;
+    } else if (command_box_read(&drive->commands)->run && ++fast->silent_steps >= SILENT_STEPS_MAX) {
+        drive_raise_fault(drive, FAULT_OVERRUN);
+    }
+}
+
+/* The window is not summed up, but its periods are counted: a step of the task. */
+static void count_period(drive_t *drive)
+{
+    identify_window_t *window = &drive->fast.window;
+    identify_window_invalidate(window);
+    window->left--;
+    if (window->left == 0U) {
+        window->left = drive->motor->bases.periods_per_step;
+        check_task(drive);
+    }
+}
+
 void publish_sample(drive_t *drive, const sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
     sample_box_publish(&drive->samples);
     if (__builtin_expect(mrai_is_chosen(drive), 0)) {
-        identify_window_invalidate(&fast->window); /* this period is missing in it */
+        count_period(drive);
         mrai_offer(drive, sample);
         return;
     }
@@ -22,5 +50,6 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
         window_box_write(&drive->windows, &fast->window);
         identify_window_restart(&fast->window, drive->motor->bases.periods_per_step);
+        check_task(drive);
     }
 }

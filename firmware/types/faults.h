@@ -15,7 +15,7 @@
     X(CURRENT_SUM, 3, "The sum of the phase currents exceeds 5 % of full scale in 5 samples.") \
     X(ANGLE, 4, "The angle changes implausibly 3 times in a row, or its sensor reports an error.") \
     X(INPUT, 5, "The samples are invalid, or the converters repeatedly deliver none.") \
-    X(OVERRUN, 6, "The paper's identification missed its period 3 times in a row.") \
+    X(OVERRUN, 6, "The 1 kHz task wrote no command for 2 steps, or the paper's law missed 3 periods in a row.") \
     X(CONFIG, 7, "The motor data or the port's settings failed a check; a separate value names the check.") \
     X(CONTROL, 8, "The current is off its reference for 20 ms, or for 100 ms while the voltage is limited.") \
     X(PHASE_LOST, 9, "A phase carries no current although it should, in 10 ms of samples.") \

@@ -300,6 +300,73 @@ void test_an_identification_that_is_late_now_and_then_is_counted_and_forgiven(vo
     TEST_ASSERT_EQUAL_INT(6, mrai_overruns(&drive));
 }
 
+/* Periods of the fast ISR alone after the last command, until switching is disabled. */
+static int periods_until_disabled(void)
+{
+    int count = 0;
+    while (seam.gates && count < 100) {
+        seam.log[0] = '\0';
+        const int before = seam.pended;
+        fast_isr(&drive);
+        if (seam.pended != before) {
+            mrai_isr(&drive);
+        }
+        count++;
+    }
+    return count;
+}
+
+/* The last command comes in any of the ten periods of a window. */
+static void check_stopped_task(identification_mode_t mode)
+{
+    for (int phase = 0; phase < 10; phase++) {
+        seam_start();
+        drive.request.identification_mode = mode;
+        seam_run();
+        seam_periods(30);
+        for (int n = 0; n < phase; n++) {
+            seam_period();
+        }
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+        TEST_ASSERT_TRUE(seam.gates);
+        const int count = periods_until_disabled();
+        TEST_ASSERT_TRUE(count > 20 && count <= 31); /* the safe state acts in the period after the third window */
+        TEST_ASSERT_EQUAL_HEX32(FAULT_OVERRUN, drive.fast.faults);
+    }
+}
+
+void test_a_task_that_stops_while_the_bridge_runs_brings_the_safe_state_within_three_steps(void)
+{
+    check_stopped_task(IDENTIFICATION_ROBUST);
+    check_stopped_task(IDENTIFICATION_PAPER);
+}
+
+void test_a_task_that_is_a_step_late_is_no_fault(void)
+{
+    seam_run();
+    seam_periods(30);
+    for (int n = 0; n < 20; n++) {
+        for (int k = 0; k < 19; k++) {
+            seam.log[0] = '\0';
+            fast_isr(&drive);
+        }
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    TEST_ASSERT_TRUE(seam.gates);
+}
+
+/* Before the first command, and while nothing is driven, no torque can become old. */
+void test_without_a_command_to_run_a_stopped_task_is_no_fault(void)
+{
+    for (int n = 0; n < 100; n++) {
+        seam.log[0] = '\0';
+        fast_isr(&drive);
+    }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+}
+
 void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
 {
     seam_run();
