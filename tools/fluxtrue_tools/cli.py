@@ -15,6 +15,11 @@ from fluxtrue_tools.version import in_checkout, version
 COMMANDS = {
     "demo": ("fluxtrue_tools.demo.cli", "demo", "The paper's experiments and ours, with a report."),
     "campaign": ("fluxtrue_tools.campaign.cli", "campaign", "Many random plants: how true is the torque?"),
+    "faults": (
+        "fluxtrue_tools.fault_campaign.cli",
+        "faults",
+        "Inject faults at every operating point, evaluate the reaction.",
+    ),
     "sim": ("fluxtrue_tools.sim.cli", "sim", "Run a scenario: plant, firmware, faults."),
     "vecu": ("fluxtrue_tools.vecu.cli", "vecu", "The virtual ECU: a CAN bus to talk to."),
     "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),

@@ -86,6 +86,23 @@ set = { torque_loop = false, identification = false }
 [check]
 controllers = ["tables"]
 """
+FAULTS = """fmea = "fmea.csv"
+points = [[0.2, 0.5], [0.8, -0.5]]
+signs = [1, -1]
+[[machine]]
+motor = "paper"
+current_A = 1000
+vdc_V = 500
+"""
+FMEA_HEAD = """id,element,failure,setup,injection,points,reaction,expected,detect_ms,torque_Nm,torque_ms,current_share,
+vdc_share,watch_ms,status,witness,result,reference"""
+FMEA = (
+    FMEA_HEAD.replace("\n", "")
+    + """
+open,sensor,input open,request=0,plant.current_open_a=1;plant.vdc_gain=x0.7@5..9,rpm>=500;torque!=0,safe_state,\
+over_current,5,,50,,,60,open,paper/0/+,measured,
+"""
+)
 MAP = "id_A,iq_A,psi_d_Vs,psi_q_Vs\n" + "".join(
     f"{d},{q},{0.084 + 2e-4 * d:.6g},{5e-4 * q:.6g}\n"
     for d in (-300, -200, -100, 0) for q in (0, 100, 200, 300)
@@ -115,6 +132,7 @@ def stubs() -> Iterator[None]:
     import fluxtrue_tools.bench as bench
     import fluxtrue_tools.campaign.run as campaign_run
     import fluxtrue_tools.demo.all as demo_all
+    import fluxtrue_tools.fault_campaign.run as fault_run
     import fluxtrue_tools.live.cli as live_cli
     from fluxtrue_tools.emulate import build as emulate_build
     from fluxtrue_tools.sim import build as sim_build
@@ -127,6 +145,8 @@ def stubs() -> Iterator[None]:
         patch.setattr(bench, "run", accepted)
         patch.setattr(campaign_run, "run_case", accepted)
         patch.setattr(campaign_run, "_simulate", accepted)
+        patch.setattr(fault_run, "whole", accepted)
+        patch.setattr(fault_run, "one_line", accepted)
         patch.setattr(demo_all, "demonstrate", accepted)
         patch.setattr(live_cli, "_session", accepted)
         patch.setattr(live_cli, "VirtualEcu", accepted)
@@ -277,12 +297,25 @@ def test_campaigns(changed: tuple[str | bytes, bool]) -> None:
     abuse({"in.toml": changed[0]}, ["campaign", "in.toml", "--out", "o"], [], must_fail=True)
 
 
+@ABUSED
+@given(mutated(FAULTS))
+def test_fault_campaigns(changed: tuple[str | bytes, bool]) -> None:
+    abuse({"in.toml": changed[0], "fmea.csv": FMEA}, ["faults", "in.toml", "--out", "o"], [], must_fail=True)
+
+
+@ABUSED
+@given(mutated(FMEA))
+def test_tables_of_faults(changed: tuple[str | bytes, bool]) -> None:
+    abuse({"in.toml": FAULTS, "fmea.csv": changed[0]}, ["faults", "in.toml", "--out", "o"], [], must_fail=True)
+
+
 COMMANDS = (
-    ("sim",), ("campaign",), ("motor", "check"), ("motor", "build"), ("emulate",), ("vecu",), ("fuzz",), ("live",),
-    ("log",), ("a2l",), ("bench",), ("demo",), ("target", "registers"), ("target", "seal"), ("target", "size"),
+    ("sim",), ("campaign",), ("faults",), ("motor", "check"), ("motor", "build"), ("emulate",), ("vecu",),
+    ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",), ("target", "registers"), ("target", "seal"), ("target", "size"),
 )  # fmt: skip
-NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("motor", "check"): ["m"], ("motor", "build"): ["m"],
-          ("target", "seal"): ["in.toml"], ("log",): ["in.toml"], ("a2l",): ["in.toml"]}  # fmt: skip
+NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("faults",): ["in.toml"], ("motor", "check"): ["m"],
+          ("motor", "build"): ["m"], ("target", "seal"): ["in.toml"], ("log",): ["in.toml"],
+          ("a2l",): ["in.toml"]}  # fmt: skip
 NOT_RUN = {"--check", "--update", "--scheduler", "--can-interface"}  # would measure for minutes, or wait for a network
 
 
@@ -305,8 +338,8 @@ def test_command_lines(name: tuple[str, ...]) -> None:
     known = [*options(name), "--nonsense", "-x"]
     words = st.sampled_from(known) | st.sampled_from(ODD_PATHS) | st.sampled_from(("1", "-1", "x", "1e9", "in.toml"))
 
-    files: dict[str, str | bytes] = {"in.toml": CAMPAIGN if name == ("campaign",) else SCENARIO}
-    files |= {"m/motor.toml": MOTOR, "m/flux_map.csv": MAP}
+    files: dict[str, str | bytes] = {"in.toml": {"campaign": CAMPAIGN, "faults": FAULTS}.get(name[0], SCENARIO)}
+    files |= {"fmea.csv": FMEA, "m/motor.toml": MOTOR, "m/flux_map.csv": MAP}
     # Half of them: what the command needs, and one option with an odd value; the rest: any words.
     pairs = st.tuples(st.sampled_from(options(name) or ["-x"]), st.sampled_from(ODD_PATHS))
 

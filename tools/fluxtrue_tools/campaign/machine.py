@@ -51,7 +51,7 @@ def _nominal(given: Nominal, data: dict[str, dict[str, float]]) -> Nominal:
     return Nominal(**{name: value or getattr(given, name) for name, value in known.items()})
 
 
-def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine:
+def data_sheet(folder: MotorFolder, nominal: Nominal) -> Machine:
     """The machine of a built motor."""
     motor = motors.read(folder)
     data = json.loads(folder.data.read_text(encoding="utf-8"))
@@ -62,14 +62,20 @@ def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine
         if grid is None
         else SplineModel(*(np.asarray(grid[axis], dtype=float) for axis in axes))
     )
-    nominal = _nominal(campaign.nominal, data)
-    low = campaign.spread.device_drop_error_V[0]
-    if nominal.device_drop_V + low < 0.0:
+    known = _nominal(nominal, data)
+    return Machine(motor, model, machine["i_max_A"], machine["speed_max_rpm"], machine["r_temp_coeff_per_K"], known)
+
+
+def make_machine(folder: MotorFolder, campaign: Campaign, where: str) -> Machine:
+    """The same for a campaign, whose spread must fit it."""
+    machine = data_sheet(folder, campaign.nominal)
+    low, drop_V = campaign.spread.device_drop_error_V[0], machine.nominal.device_drop_V
+    if drop_V + low < 0.0:
         raise FluxtrueError(
-            f"{where}: spread.device_drop_error_V = {low:g} about {nominal.device_drop_V:g} V, allowed: no drop below 0"
+            f"{where}: spread.device_drop_error_V = {low:g} about {drop_V:g} V, allowed: no drop below 0"
             " (give nominal.device_drop_V)"
         )
-    return Machine(motor, model, machine["i_max_A"], machine["speed_max_rpm"], machine["r_temp_coeff_per_K"], nominal)
+    return machine
 
 
 @lru_cache(maxsize=2)

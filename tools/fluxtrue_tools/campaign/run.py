@@ -2,14 +2,12 @@
 """A whole campaign: missing cases are run, then all are scored, reported and checked. A single case can be run, too."""
 
 import hashlib
-import sys
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from tqdm import tqdm
 
 from fluxtrue_tools.campaign import figures, report, schedule, terminal
 from fluxtrue_tools.campaign.case import Trace, check_names, run_case
@@ -50,13 +48,7 @@ def _manifest(job: Job) -> dict[str, str]:
 
 def _simulate(job: Job, store: Store, scheduler: str | None, workers: int | None) -> None:
     work = partial(task, job.folder.name, str(job.folder.folder), job.campaign.model_dump_json())
-    todo = store.missing(job.cases)
-    results = schedule.dask(work, todo, scheduler) if scheduler else schedule.local(work, todo, workers)
-    with tqdm(total=len(job.cases), initial=len(job.cases) - len(todo), unit="case",
-              disable=not sys.stderr.isatty()) as bar:  # fmt: skip
-        for case, rows in results:
-            store.save(case, rows)
-            bar.update()
+    schedule.missing(work, store, job.cases, scheduler, workers)
 
 
 def _draw(sheet: Any, plot: Path) -> None:

@@ -9,6 +9,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any
 
+from tqdm import tqdm
+
+from fluxtrue_tools.campaign.store import Store
 from fluxtrue_tools.errors import FluxtrueError
 
 Task = Callable[[int], Any]
@@ -49,3 +52,14 @@ def dask(task: Task, cases: list[int], address: str) -> Iterator[tuple[int, Any]
         case_of = {future.key: case for future, case in zip(futures, cases, strict=True)}
         for future, result in dask_completed(futures, with_results=True):
             yield case_of[future.key], result
+
+
+def missing(task: Task, store: Store, cases: range, scheduler: str | None, workers: int | None) -> None:
+    """Run what a folder does not have yet; each result is stored as it comes, so that a later call goes on."""
+    todo = store.missing(cases)
+    results = dask(task, todo, scheduler) if scheduler else local(task, todo, workers)
+    with tqdm(total=len(cases), initial=len(cases) - len(todo), unit="case",
+              disable=not sys.stderr.isatty()) as bar:  # fmt: skip
+        for case, rows in results:
+            store.save(case, rows)
+            bar.update()

@@ -9,7 +9,8 @@ from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.demo.experiment import Bound
 
 
-def _columns(cells: list[tuple[str, ...]]) -> str:
+def columns(cells: list[tuple[str, ...]]) -> str:
+    """A table with its head underlined."""
     widths = [max(len(line[k]) for line in cells) for k in range(len(cells[0]))]
     lines = ["  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip() for line in cells]
     return "\n".join([lines[0], "  ".join("-" * width for width in widths), *lines[1:]])
@@ -29,7 +30,7 @@ def figures_table(campaign: Campaign, scores: list[Score]) -> str:
             f = scored.bands[band]
             cells.append((scored.controller, band_name(campaign, band), str(f.windows), f"{f.rms:.2f}", f"{f.p99:.2f}",
                           f"{f.worst:.2f}", f"{f.bound_rms:.2f}", f"{f.ratio:.2f}"))  # fmt: skip
-    return _columns(cells)
+    return columns(cells)
 
 
 def trouble_table(campaign: Campaign, scores: list[Score]) -> str:
@@ -42,7 +43,7 @@ def trouble_table(campaign: Campaign, scores: list[Score]) -> str:
         if scored.harm is not None:
             harm = (f"{scored.harm.harmless_share:.2f}", f"{scored.harm.crawl_excess:+.2f} %")
         cells.append((scored.controller, *harm, str(t.trips), str(t.unstable), *map(str, t.saturated.values())))
-    return _columns(cells)
+    return columns(cells)
 
 
 def bounds_table(promised: list[tuple[str, Bound]]) -> str:
@@ -52,7 +53,7 @@ def bounds_table(promised: list[tuple[str, Bound]]) -> str:
         relation = "≥" if bound.at_least else "≤"
         cells.append((name, bound.what, f"{bound.value:.4g} {bound.unit}", f"{relation} {bound.limit:g} {bound.unit}",
                       "met" if bound.met else "MISSED"))  # fmt: skip
-    return _columns(cells)
+    return columns(cells)
 
 
 def promises(campaign: Campaign, scores: list[Score]) -> list[tuple[str, Bound]]:
@@ -77,4 +78,4 @@ def case_table(campaign: Campaign, table: pd.DataFrame) -> str:
     words = table.groupby("controller", sort=False)["run_fault_word"].first()
     said = [f"{name}: {', '.join(faults.named(int(word)))}" for name, word in words.items() if word]
     tripped = "; ".join(said) or "no trip"
-    return f"{plant}\n\n{_columns(cells)}\n\n{tripped}"
+    return f"{plant}\n\n{columns(cells)}\n\n{tripped}"

@@ -51,6 +51,12 @@ _SIGNATURES = {
     "fluxtrue_memory_read": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]),
     "fluxtrue_memory_write": (ctypes.c_int, [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int]),
     "fluxtrue_name": (ctypes.c_char_p, [ctypes.c_int]),
+    "fluxtrue_create": (ctypes.c_void_p, []),
+    "fluxtrue_destroy": (None, [ctypes.c_void_p]),
+    "sim_create_around": (ctypes.c_void_p, [ctypes.c_void_p]),
+    "can_host_attach": (None, [ctypes.c_void_p]),
+    "can_host_put": (ctypes.c_bool, [ctypes.c_void_p, ctypes.c_void_p]),
+    "can_host_take": (ctypes.c_bool, [ctypes.c_void_p, ctypes.c_void_p]),
 }
 
 
@@ -107,7 +113,7 @@ class Loop:
         controller: str = "firmware",
     ) -> None:
         self._library = library
-        self._sim = library.sim_create(CONTROLLERS[controller])
+        self._sim = self._create(controller)
         if not self._sim:
             raise MemoryError("sim_create")
         self._width = 0
@@ -121,6 +127,11 @@ class Loop:
             field = bad.decode()
             raise LoopError(f"plant.{field}", plant.get(field), OUT_OF_RANGE)
         self.period_s = 1.0 / self.get("plant.pwm_hz")
+
+    def _create(self, controller: str) -> int | None:
+        """The simulation without its plant."""
+        created: int | None = self._library.sim_create(CONTROLLERS[controller])
+        return created
 
     def close(self) -> None:
         """Give the memory back; the object is of no use afterwards."""

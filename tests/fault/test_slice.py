@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The fault campaign's slice for every test run: a few points of each line of docs/safety/fmea.csv."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from fluxtrue_tools.fault_campaign import fmea
+from fluxtrue_tools.fault_campaign.fmea import MET, OPEN
+
+ROOT = Path(__file__).resolve().parents[2]
+CAMPAIGN = Path(__file__).with_name("campaign.toml")
+TABLE = ROOT / "docs" / "safety" / "fmea.csv"
+
+
+def faults(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fluxtrue_tools", "faults", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("faults")
+    done = faults(CAMPAIGN, "--slice", "--out", folder)
+    print(done.stdout)
+    assert done.returncode in (0, 1), done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def summary(out: Path) -> Any:
+    return json.loads((out / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_the_slice_runs_every_line_of_the_table(out: Path, summary: Any) -> None:
+    table = pd.read_parquet(out / "results.parquet")
+    assert set(table["row"]) == {row.id for row in fmea.read(TABLE)}
+    assert len(table) == summary["runs"]
+
+
+def test_every_line_that_says_met_is_met(summary: Any) -> None:
+    missed = {s["id"]: s["why"] for s in summary["scores"] if s["status"] == MET and not s["is_met"]}
+    assert missed == {}
+
+
+def test_no_line_says_open_that_has_become_met(summary: Any) -> None:
+    """Then `tools/fluxtrue faults tests/fault/campaign.toml --record` says so in the table."""
+    assert [s["id"] for s in summary["scores"] if s["status"] == OPEN and s["is_met"]] == []
+
+
+def test_the_report_prints_what_is_not_met(out: Path, summary: Any) -> None:
+    page = (out / "report.html").read_text(encoding="utf-8")
+    for score in summary["scores"]:
+        assert f"<td>{score['id']}</td>" in page
+        assert score["is_met"] or score["worst"] in page
+
+
+# One fault that the drive detects at once, at one point: what a table says of it is put to the test.
+ONE = 'fmea = "fmea.csv"\npoints = [[0.2, 0.5]]\n[[machine]]\nmotor = "hsm1"\ncurrent_A = 600\nvdc_V = 500\n'
+DETECTED = (
+    "open,sensor,input open,,plant.current_open_a=1,,{reaction},{expected},{detect},,50,,,60,{status},{witness},,\n"
+)
+
+
+def one(folder: Path, **cells: str) -> Path:
+    line = {"reaction": "safe_state", "expected": "over_current", "detect": "5", "status": "met", "witness": ""} | cells
+    folder.mkdir(exist_ok=True)
+    (folder / "one.toml").write_text(ONE, encoding="utf-8")
+    (folder / "fmea.csv").write_text(",".join(fmea.COLUMNS) + "\n" + DETECTED.format(**line), encoding="utf-8")
+    return folder / "one.toml"
+
+
+@pytest.mark.parametrize(
+    ("cells", "code", "said"),
+    [
+        ({}, 0, "2 (100.00 %) as demanded"),
+        ({"expected": "over_speed"}, 1, "over_current"),
+        ({"detect": "0.05"}, 1, "after 0.1 ms"),
+        ({"reaction": "keep", "expected": ""}, 1, "false trip: over_current"),
+        ({"status": "open", "witness": "hsm1/0/+"}, 1, "status open is NOT TRUE"),
+        ({"status": "open", "expected": "over_speed", "witness": "hsm1/0/-"}, 0, "1 open"),
+    ],
+)
+def test_a_table_that_is_wrong_is_found_out(tmp_path: Path, cells: dict[str, str], code: int, said: str) -> None:
+    done = faults(one(tmp_path / "c", **cells), "--out", tmp_path / "out")
+    assert done.returncode == code, done.stderr
+    assert said in done.stdout
+
+
+def test_a_campaign_that_was_stopped_goes_on_and_another_table_is_refused(tmp_path: Path) -> None:
+    campaign, out = one(tmp_path / "c"), tmp_path / "out"
+    assert faults(campaign, "--out", out).returncode == 0
+    first = pd.read_parquet(out / "results.parquet")
+    stamp = next((out / "cases").glob("case-*")).stat().st_mtime_ns
+    assert faults(campaign, "--out", out).returncode == 0
+    assert next((out / "cases").glob("case-*")).stat().st_mtime_ns == stamp
+    shutil.rmtree(out / "cases")
+    assert faults(campaign, "--out", out).returncode == 0
+    pd.testing.assert_frame_equal(pd.read_parquet(out / "results.parquet"), first)
+    done = faults(one(tmp_path / "c", detect="6"), "--out", out)
+    assert done.returncode == 2
+    assert "another campaign file or table of faults" in done.stderr
+
+
+def test_what_was_found_is_recorded_and_is_then_true(tmp_path: Path) -> None:
+    campaign = one(tmp_path / "c", expected="over_speed")
+    assert faults(campaign, "--out", tmp_path / "out", "--record").returncode == 0
+    (row,) = fmea.read(tmp_path / "c" / "fmea.csv")
+    assert (row.status, row.witness) == (OPEN, "hsm1/0/+")
+    assert "over_current" in row.text["result"]
+    assert faults(campaign, "--out", tmp_path / "slice", "--slice").returncode == 0
+
+
+def test_one_line_shows_its_runs(tmp_path: Path) -> None:
+    done = faults(one(tmp_path / "c"), "--line", "open", "--run", "hsm1/0/-")
+    assert done.returncode == 0, done.stderr
+    assert "hsm1/0/-" in done.stdout
+    assert "hsm1/0/+" not in done.stdout

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of faults is read strictly, and the evaluation finds torque, current, voltage and time that are wrong."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.fault_campaign import fmea
+from fluxtrue_tools.fault_campaign.fmea import COLUMNS, Point, Row
+from fluxtrue_tools.fault_campaign.run_point import BEFORE_MS, CHANNELS, Trace
+from fluxtrue_tools.fault_campaign.spec import Bounded
+from fluxtrue_tools.fault_campaign.verdict import evaluate
+from fluxtrue_tools.sim.ecu_loop import RUN, EcuLoop
+from fluxtrue_tools.sim.motor import load
+
+CELLS = {"id": "a-line", "element": "sensor", "failure": "fails", "injection": "plant.vdc_gain=0.7",
+         "reaction": "safe_state", "expected": "over_current", "detect_ms": "10", "torque_ms": "50",
+         "status": "met"}  # fmt: skip
+POINT = Point(0, 1.0, "hsm1", 0.2, 0.5, 2000.0, 60.0)
+BOUNDS = Bounded(motor="hsm1", current_A=500.0, vdc_V=450.0)
+AFTER_MS, STEP_MS = 200, 0.1
+
+
+def text(**cells: str) -> str:
+    line = dict.fromkeys(COLUMNS, "") | CELLS | cells
+    return ",".join(COLUMNS) + "\n" + ",".join(line[name] for name in COLUMNS) + "\n"
+
+
+def row(**cells: str) -> Row:
+    return fmea.parse(text(**cells), "t.csv")[0]
+
+
+def trace(fault_ms: float = 5.0, torque: Any = None, amperes: float = 200.0, volts: float = 350.0,
+          requested: tuple[float, float] = (60.0, 60.0), state: int = 6) -> Trace:  # fmt: skip
+    """60 N·m until the fault, then none; one fault bit, over_current."""
+    count = round((BEFORE_MS + AFTER_MS) / STEP_MS)
+    time = (np.arange(count) + 1) * STEP_MS - BEFORE_MS
+    rows = np.zeros((count, len(CHANNELS)))
+    made = np.where(time < fault_ms, 60.0, 0.0) if torque is None else torque(time)
+    columns = {"truth.torque_shaft_mean_Nm": made, "truth.i_d_A": -amperes, "truth.vdc_V": volts,
+               "fault_word": np.where(time >= fault_ms, 1.0, 0.0)}  # fmt: skip
+    for name, values in columns.items():
+        rows[:, CHANNELS.index(name)] = values
+    return Trace(STEP_MS * 1e-3, rows, requested, [(ms + 1.0, 0, state) for ms in range(AFTER_MS)])
+
+
+def verdict(line: Row, run: Trace) -> dict[str, Any]:
+    return evaluate(line, BOUNDS, 132.0, POINT, run)
+
+
+def test_the_right_fault_in_time_with_safe_torque_is_met() -> None:
+    found = verdict(row(), trace())
+    assert found["met"], found["why"]
+    assert found["detect_ms"] == pytest.approx(5.0, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("run", "why"),
+    [
+        ({"fault_ms": 12.0}, "over_current after 12.0 ms"),
+        ({"fault_ms": math.inf}, "no fault"),
+        ({"torque": lambda t: np.where(t < 0, 60.0, -40.0)}, "30.0 N·m beyond its safe range until 200 ms"),
+        ({"torque": lambda t: np.where(t < 0.05, 60.0, 75.0)}, "5.0 N·m beyond its safe range until 200 ms"),
+        ({"amperes": 501.0}, "501 A"),
+        ({"volts": 451.0}, "451 V"),
+        ({"torque": lambda t: np.where(t < 150, 0.0, np.nan)}, "lost its numbers"),
+    ],
+)
+def test_each_thing_that_is_wrong_is_named(run: dict[str, Any], why: str) -> None:
+    found = verdict(row(), trace(**run))
+    assert not found["met"]
+    assert why in found["why"]
+
+
+def test_a_short_peak_of_torque_within_the_time_allowed_is_no_harm() -> None:
+    peak = trace(torque=lambda t: np.where((t > 0) & (t < 30), -100.0, np.where(t < 0, 60.0, 0.0)))
+    assert verdict(row(), peak)["met"]
+    assert not verdict(row(torque_ms="20"), peak)["met"]
+
+
+def test_a_healthy_drive_that_trips_or_gives_other_torque_is_found() -> None:
+    line = row(reaction="keep", expected="", torque_Nm="3", torque_ms="0")
+    steady = trace(fault_ms=math.inf, state=RUN, torque=lambda t: np.full(t.shape, 60.0))
+    assert verdict(line, steady)["met"]
+    assert "false trip" in verdict(line, trace())["why"]
+    assert not verdict(line, trace(fault_ms=math.inf, state=RUN, torque=lambda t: np.where(t < 0, 60.0, 50.0)))["met"]
+    assert "left state run" in verdict(line, trace(fault_ms=math.inf, state=3,
+                                                   torque=lambda t: np.full(t.shape, 60.0)))["why"]  # fmt: skip
+
+
+def test_a_changed_request_must_be_followed() -> None:
+    line = row(reaction="keep", expected="", torque_Nm="3", torque_ms="0")
+    run = trace(fault_ms=math.inf, state=RUN, requested=(60.0, 0.0), torque=lambda t: 60.0 * (t < 30.0))
+    assert verdict(line, run)["met"]
+    late = trace(fault_ms=math.inf, state=RUN, requested=(60.0, 0.0), torque=lambda t: 60.0 * (t < 100.0))
+    assert not verdict(line, late)["met"]
+
+
+def test_an_error_of_torque_may_be_bounded_instead_of_detected() -> None:
+    line = row(reaction="bounded")
+    assert verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 52.0)))["met"]
+    assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 45.0)))["met"]
+    assert verdict(line, trace(fault_ms=8.0, torque=lambda t: np.where(t < 0, 60.0, 0.0)))["met"]
+
+
+def test_a_lost_command_must_end_in_no_torque_without_a_fault() -> None:
+    line = row(reaction="ramp", expected="", torque_Nm="5", torque_ms="60")
+    assert verdict(line, trace(fault_ms=math.inf, torque=lambda t: 60.0 * (t < 50.0)))["met"]
+    assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.full(t.shape, 60.0)))["met"]
+
+
+@pytest.mark.parametrize(
+    ("cells", "said"),
+    [
+        ({"id": "A line"}, "id = 'A line', allowed: lower-case words joined by -"),
+        ({"reaction": "hope"}, "reaction = 'hope', allowed: safe_state, bounded, keep, ramp"),
+        ({"expected": ""}, "expected = '', allowed: names of faults"),
+        ({"injection": "plant.vdc_gain"}, "injection = 'plant.vdc_gain', allowed: name=value"),
+        ({"points": "rpm=5"}, "points = 'rpm=5', allowed: conditions such as"),
+        ({"detect_ms": "-1"}, "detect_ms = '-1', allowed: a number from 0"),
+        ({"status": "fine"}, "status = 'fine', allowed: met, open"),
+    ],
+)
+def test_a_bad_cell_is_named_with_its_line(cells: dict[str, str], said: str) -> None:
+    with pytest.raises(FluxtrueError) as refusal:
+        fmea.parse(text(**cells), "t.csv")
+    assert str(refusal.value).startswith(f"t.csv: line 2: {said}")
+
+
+def test_steps_change_values_as_they_say() -> None:
+    steps = row(injection="a=5; b=x0.5@3; c=+2@1..9; d=^6; e=point").injection
+    assert [step.applied(4.0, 60.0) for step in steps] == [5.0, 2.0, 6.0, 2.0, 60.0]
+    assert [(step.at_ms, step.until_ms) for step in steps] == [(0, 0), (3, 3), (1, 9), (0, 0), (0, 0)]
+
+
+def test_a_table_is_written_as_it_was_read() -> None:
+    assert fmea.write([row()]) == text()
+
+
+def test_members_of_the_state_are_found_by_their_names() -> None:
+    motor = load("hsm1")
+    with EcuLoop(motor, {}) as loop:
+        loop.power_up()
+        assert loop.read("ecu.supervisor.state") == RUN == loop.state
+        assert loop.read("drive.fast.faults") == loop.get("fault_word") == 0
+        loop.write("board.gate_fault", 1)
+        loop.steps(2)
+        assert loop.get("fault_word") != 0
+        with pytest.raises(FluxtrueError, match="no member 'nothing'"):
+            loop.read("drive.nothing")
+        with pytest.raises(FluxtrueError, match="not a number"):
+            loop.read("drive.fast")

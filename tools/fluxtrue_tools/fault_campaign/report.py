@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The campaign as one self-contained HTML page, as text for the terminal, and as summary.json."""
+
+import math
+from dataclasses import asdict
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from fluxtrue_tools.campaign.terminal import columns
+from fluxtrue_tools.fault_campaign.plan import Plan
+from fluxtrue_tools.fault_campaign.score import Score, Summary
+
+
+def _text(value: float, digits: int = 1) -> str:
+    return "–" if value != value else f"{value:.{digits}f}"
+
+
+def terminal(scores: list[Score], summary: Summary) -> str:
+    """What is not met, and the sums."""
+    cells: list[tuple[str, ...]] = [("line", "runs", "met", "fault, ms", "torque safe, ms", "A", "V", "status", "")]
+    for s in scores:
+        if not s.is_met or not s.is_true:
+            cells.append((s.row.id, str(s.runs), str(s.met), _text(s.detect_ms), _text(s.harm_ms, 0),
+                          _text(s.current_A, 0), _text(s.vdc_V, 0), s.row.status,
+                          s.result if s.is_true else f"status {s.row.status} is NOT TRUE. {s.result}"))  # fmt: skip
+    sums = (f"{summary.kinds} kinds of fault, {summary.lines} lines, {summary.runs} runs: {summary.runs_met} "
+            f"({summary.share:.2f} %) as demanded, {summary.lines_met} lines met, "
+            f"{summary.lines - summary.lines_met} open, {summary.false_trips} false trips")  # fmt: skip
+    return (columns(cells) + "\n\n" if len(cells) > 1 else "") + sums
+
+
+def runs_table(table: pd.DataFrame) -> str:
+    """Every run of one line."""
+    cells: list[tuple[str, ...]] = [("run", "rpm", "N·m", "first fault", "ms", "torque safe, ms", "beyond, N·m", "A",
+                                     "V", "")]  # fmt: skip
+    for _, run in table.iterrows():
+        name = f"{run['motor']}/{run['point']}/{'+' if run['sign'] > 0 else '-'}"
+        cells.append((name, f"{run['speed_rpm']:.0f}", f"{run['torque_Nm']:.1f}", run["first_fault"],
+                      _text(run["detect_ms"]), _text(run["harm_ms"], 0), _text(run["beyond_Nm"]),
+                      _text(run["current_A"], 0), _text(run["vdc_V"], 0), run["why"] or "met"))  # fmt: skip
+    return columns(cells)
+
+
+def summary_data(plan: Plan, scores: list[Score], summary: Summary) -> dict[str, Any]:
+    """For scripts; null where there is no figure."""
+
+    def plain(value: float) -> float | None:
+        return None if value != value else round(value, 6)
+
+    lines = [
+        {"id": s.row.id, "status": s.row.status, "is_met": s.is_met, "is_true": s.is_true, "runs": s.runs,
+         "met": s.met, "detect_ms": plain(s.detect_ms), "harm_ms": plain(s.harm_ms), "beyond_Nm": plain(s.beyond_Nm),
+         "current_A": plain(s.current_A), "vdc_V": plain(s.vdc_V), "worst": s.worst, "why": s.why}
+        for s in scores
+    ]  # fmt: skip
+    return asdict(summary) | {"digest": plan.digest(), "slice": plan.is_slice, "scores": lines}
+
+
+def html(plan: Plan, scores: list[Score], summary: Summary, command: str) -> str:
+    """The page."""
+    template = files("fluxtrue_tools.fault_campaign").joinpath("report.html.j2").read_text(encoding="utf-8")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    environment.globals["infinity"] = math.inf
+    environment.filters["figure"] = _text
+    elements: dict[str, list[Score]] = {}
+    for s in scores:
+        elements.setdefault(s.row.element, []).append(s)
+    return environment.from_string(template).render(
+        plan=plan, summary=summary, elements=elements, opened=[s for s in scores if not s.is_met], command=command
+    )

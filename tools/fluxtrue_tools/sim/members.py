@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Members of the firmware's state by the names of its source, found in the library's debug information.
+
+Tests use them to plant a fault in memory, and to read what no name of fluxtrue_get() tells.
+"""
+
+import ctypes
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from elftools.dwarf.die import DIE
+from elftools.elf.elffile import ELFFile
+
+from fluxtrue_tools.errors import FluxtrueError
+
+INSTANCE: Final = "fluxtrue"  # struct of hal/host/instance.h
+_PART: Final = re.compile(r"([A-Za-z_]\w*)((?:\[\d+\])*)")
+_SIGNED, _FLOAT, _BOOLEAN = (5, 6), 4, 2  # DW_ATE_signed, _signed_char, _float, _boolean
+_INTEGERS: Final = {1: ctypes.c_uint8, 2: ctypes.c_uint16, 4: ctypes.c_uint32, 8: ctypes.c_uint64}
+_SIGNED_INTEGERS: Final = {1: ctypes.c_int8, 2: ctypes.c_int16, 4: ctypes.c_int32, 8: ctypes.c_int64}
+_FLOATS: Final = {4: ctypes.c_float, 8: ctypes.c_double}
+
+
+def _name(die: DIE) -> str:
+    found = die.attributes.get("DW_AT_name")
+    return found.value.decode() if found else ""
+
+
+def _bare(die: DIE) -> DIE:
+    """Without typedef, const and volatile."""
+    while die.tag in ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"):
+        die = die.get_DIE_from_attribute("DW_AT_type")
+    return die
+
+
+def _size(die: DIE) -> int:
+    die = _bare(die)
+    if die.tag == "DW_TAG_array_type":
+        count = 1
+        for child in die.iter_children():
+            if child.tag == "DW_TAG_subrange_type":
+                count *= int(child.attributes["DW_AT_upper_bound"].value) + 1
+        return count * _size(die.get_DIE_from_attribute("DW_AT_type"))
+    return int(die.attributes["DW_AT_byte_size"].value)
+
+
+def _member(die: DIE, name: str) -> tuple[DIE, int] | None:
+    """Type and offset of a member, also of one in an unnamed struct or union."""
+    for child in die.iter_children():
+        if child.tag != "DW_TAG_member":
+            continue
+        at = child.attributes.get("DW_AT_data_member_location")
+        offset = int(at.value) if at else 0
+        kind = child.get_DIE_from_attribute("DW_AT_type")
+        if _name(child) == name:
+            return kind, offset
+        if not _name(child) and (inner := _member(_bare(kind), name)):
+            return inner[0], offset + inner[1]
+    return None
+
+
+@dataclass(frozen=True)
+class Members:
+    """The state's layout."""
+
+    path: str
+    root: DIE
+
+    def find(self, member: str) -> tuple[int, Any]:
+        """Offset and ctypes type of a number."""
+        die, offset = self.root, 0
+        for part in member.split("."):
+            match = _PART.fullmatch(part)
+            found = _member(_bare(die), match[1]) if match else None
+            if match is None or found is None:
+                raise FluxtrueError(f"{member}: the firmware's state has no member '{part}' there")
+            die, offset = found[0], offset + found[1]
+            for index in re.findall(r"\d+", match[2]):
+                element = _bare(_bare(die).get_DIE_from_attribute("DW_AT_type"))
+                die, offset = element, offset + int(index) * _size(element)
+        return offset, _number(member, _bare(die))
+
+    def read(self, address: int, member: str) -> float:
+        """The number at an instance."""
+        offset, kind = _found(self.path, member)
+        return float(kind.from_address(address + offset).value)
+
+    def write(self, address: int, member: str, value: float) -> None:
+        """Changes it; whole numbers wrap as in C."""
+        offset, kind = _found(self.path, member)
+        kind.from_address(address + offset).value = value if kind in _FLOATS.values() else int(value)
+
+
+def _number(member: str, die: DIE) -> Any:
+    if die.tag == "DW_TAG_enumeration_type":
+        return _INTEGERS[_size(die)]
+    if die.tag == "DW_TAG_base_type":
+        encoding = int(die.attributes["DW_AT_encoding"].value)
+        kinds = _FLOATS if encoding == _FLOAT else _SIGNED_INTEGERS if encoding in _SIGNED else _INTEGERS
+        return kinds[_size(die)]
+    raise FluxtrueError(f"{member}: not a number")
+
+
+@cache
+def _found(path: str, member: str) -> tuple[int, Any]:
+    return members(path).find(member)
+
+
+@cache
+def members(path: str) -> Members:
+    """Of a library built with debug information."""
+    file = Path(path).open("rb")  # noqa: SIM115 (pyelftools reads when it is asked)
+    elf = ELFFile(file)
+    if not elf.has_dwarf_info():
+        raise FluxtrueError(f"{path}: no debug information, allowed: a build with -g, as the presets make it")
+    for unit in elf.get_dwarf_info().iter_CUs():
+        for die in unit.get_top_DIE().iter_children():
+            if die.tag == "DW_TAG_structure_type" and _name(die) == INSTANCE and "DW_AT_byte_size" in die.attributes:
+                return Members(path, die)
+    raise FluxtrueError(f"{path}: no struct {INSTANCE} in its debug information")
