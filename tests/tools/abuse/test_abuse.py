@@ -311,7 +311,8 @@ def test_tables_of_faults(changed: tuple[str | bytes, bool]) -> None:
 
 COMMANDS = (
     ("sim",), ("campaign",), ("faults",), ("motor", "check"), ("motor", "build"), ("emulate",), ("vecu",),
-    ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",), ("target", "registers"), ("target", "seal"), ("target", "size"),
+    ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",),
+    ("target", "registers"), ("target", "seal"), ("target", "size"),
 )  # fmt: skip
 NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("faults",): ["in.toml"], ("motor", "check"): ["m"],
           ("motor", "build"): ["m"], ("target", "seal"): ["in.toml"], ("log",): ["in.toml"],
