@@ -23,6 +23,10 @@ class Plant:
     text: str
     instead: str
 
+    def __post_init__(self) -> None:
+        count = (PORT / self.file).read_text(encoding="utf-8").count(self.text)
+        assert count == 1, f"{self.file} contains {count} times: {self.text}"
+
 
 def _run(command: list[str], folder: Path) -> None:
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
@@ -67,10 +71,8 @@ def with_motor(built: Path, tables: Path) -> dict[Path, Path]:
 def with_error(what: Plant, folder: Path) -> dict[Path, Path]:
     """For relinked(): the file with the error in it."""
     original = PORT / what.file
-    text = original.read_text(encoding="utf-8")
-    assert text.count(what.text) == 1, f"{what.file} contains {text.count(what.text)} times: {what.text}"
     source = folder / what.file
-    source.write_text(text.replace(what.text, what.instead), encoding="utf-8")
+    source.write_text(original.read_text(encoding="utf-8").replace(what.text, what.instead), encoding="utf-8")
     return {original: source}
 
 

@@ -53,7 +53,7 @@ PLANTS: dict[str, tuple[Callable[[Parts], None], Plant]] = {
     ),
     "the slow results are not read": (
         checks.every_period_is_sampled,
-        Plant("sampling.c", "    (void)read_two(&ADC0->R[WINDING]);\n", ""),
+        Plant("sampling.c", "    (void)fx_read_two(&ADC0->R[WINDING]);\n", ""),
     ),
     "sequence errors do not interrupt": (
         checks.a_result_that_was_not_read_is_got_over,

@@ -188,10 +188,12 @@ def test_a_stuck_task_resets(parts: Parts, stuck: str) -> None:
         assert core.resets == 1
 
 
+TEN_PERIODS = Plant("main.c", "drivable ? motor.bases.periods_per_step", "drivable ? 10U")
+
+
 def test_a_task_of_ten_periods_at_40_khz_is_found(hsm1: Parts, tmp_path: Path) -> None:
     """What the firmware once did: a step of 0.25 ms, which the watchdog answers with a reset."""
-    ten = Plant("main.c", "drivable ? motor.bases.periods_per_step", "drivable ? 10U")
     parts = Parts(_motor(40), hsm1.image, hsm1.layout)
-    elf = relinked(hsm1.image, with_motor(hsm1.image, _tables(40)) | with_error(ten, tmp_path), tmp_path)
+    elf = relinked(hsm1.image, with_motor(hsm1.image, _tables(40)) | with_error(TEN_PERIODS, tmp_path), tmp_path)
     with pytest.raises(AssertionError, match=r"\.resets"):
         _served_once_a_step(parts, elf)
