@@ -2,6 +2,7 @@
 #include "drive/slow_monitors.h"
 
 #include "control/current/transform.h"
+#include "drive/mrai/mrai_seam.h"
 
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
@@ -9,6 +10,17 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     const int32_t alpha = transform_round(q30.alpha);
     const abc_t x = inverse_clarke(alpha, fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865)));
     return (abc_q15_t){x.a, x.b, x.c};
+}
+
+/* Of the last step; the paper's identification takes no sums. */
+static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
+{
+    if (mrai_is_chosen(drive) || !snapshot->window.acting) {
+        return snapshot->sample.point.i;
+    }
+    const int32_t half_gain_q32 = drive->motor->identify.mean_gain_q32;
+    return (dq_q15_t){fx_mulhi(2 * snapshot->window.sum_i.d, half_gain_q32),
+                      fx_mulhi(2 * snapshot->window.sum_i.q, half_gain_q32)};
 }
 
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
@@ -20,6 +32,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
         .voltage_limited = sample->voltage_limited,
         .i = sample->point.i,
         .i_ref = task->i_ref,
+        .i_mean = mean_current(drive, snapshot),
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
         .phases_ref = in_phases(task->i_ref, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),

@@ -19,16 +19,52 @@ static uint32_t deviation(const plausibility_config_t *config, plausibility_stat
     return (state->deviation >= config->deviation_steps) ? FAULT_CONTROL : 0;
 }
 
-/* (MN-2): only samples in which the reference is large count, not the zero crossings. */
-static bool is_phase_lost(const plausibility_config_t *config, int8_t *count, int32_t reference, int32_t measured)
+/* (MN-2): only samples in which the reference is large count, not the zero crossings. The two directions of the current
+ * count apart, because one open switch stops the current in one of them only. */
+static bool is_phase_lost(const plausibility_config_t *config, int8_t count[2], int32_t alive, int32_t reference,
+                          int32_t measured)
 {
-    const int32_t magnitude = fx_abs_q31(measured);
-    if (magnitude > config->i_dead) {
-        *count = (int8_t)fx_max_s32(*count - 1, 0);
-    } else if (fx_abs_q31(reference) > config->i_alive) {
-        *count = (int8_t)fx_min_s32(*count + 1, config->lost_steps);
+    if (fx_abs_q31(reference) > alive) {
+        const bool negative = reference < 0;
+        int8_t *c = &count[negative ? 1 : 0];
+        const bool missing = (negative ? -measured : measured) <= config->i_dead;
+        *c = (int8_t)fx_clamp_q31(*c + (missing ? 1 : -1), 0, config->lost_steps);
     }
-    return *count >= config->lost_steps;
+    return count[0] + count[1] >= config->lost_steps;
+}
+
+static uint32_t lost_phases(const plausibility_config_t *config, plausibility_state_t *state,
+                            const plausibility_in_t *in)
+{
+    const q15_t current = fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q);
+    const int32_t alive = fx_max_s32(config->i_alive, current >> 3);
+    const bool a_lost = is_phase_lost(config, state->lost[0], alive, in->phases_ref.a, in->phases.a);
+    const bool b_lost = is_phase_lost(config, state->lost[1], alive, in->phases_ref.b, in->phases.b);
+    const bool c_lost = is_phase_lost(config, state->lost[2], alive, in->phases_ref.c, in->phases.c);
+    return (a_lost || b_lost || c_lost) ? FAULT_PHASE_LOST : 0U;
+}
+
+/* Distance of a deviation from its own mean over 8 steps; a single large one counts as e_max on each axis. */
+static int32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
+{
+    const int32_t d = fx_clamp_q31(i.d - i_ref.d, -e_max, e_max), q = fx_clamp_q31(i.q - i_ref.q, -e_max, e_max);
+    const dq_q15_t ripple = {d - (mean_x8->d >> 3), q - (mean_x8->q >> 3)};
+    *mean_x8 = (dq_q15_t){mean_x8->d + ripple.d, mean_x8->q + ripple.q};
+    return fx_magnitude(fx_sat_q15(ripple.d), fx_sat_q15(ripple.q));
+}
+
+/* (MN-11): an open switch removes half a wave of one phase. In the rotor frame that is an oscillation about the
+ * reference, of which every other sample may be small: (MN-1) does not confirm it. Where the steps are half a turn
+ * apart the samples or the means of the steps may show a constant, but not both. */
+static uint32_t oscillation(const plausibility_config_t *config, plausibility_state_t *state,
+                            const plausibility_in_t *in)
+{
+    const int32_t e_max = config->ripple_max * 4;
+    const int32_t of_sample = distance_from_mean(&state->sample_x8, in->i, in->i_ref, e_max);
+    const int32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, in->i_ref, e_max);
+    state->ripple_x16 += fx_max_s32(of_sample, of_step) - (state->ripple_x16 >> 4);
+    const bool bad = (state->ripple_x16 >> 4) > config->ripple_max;
+    return debounce_step(&state->oscillating, bad, config->ripple_steps, FAULT_CONTROL);
 }
 
 /* (MN-3): while no other phase changes, the machine may stand still and equal samples are plausible. */
@@ -66,14 +102,9 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
     uint32_t faults = debounce_step(&state->hot, hot, config->hot_steps, FAULT_TEMPERATURE);
     faults |= debounce_step(&state->fast, fast, config->fast_steps, FAULT_OVER_SPEED);
     if (!in->acting) {
-        state->deviation = 0;
-        state->lost[0] = state->lost[1] = state->lost[2] = 0;
-        state->equal[0] = state->equal[1] = state->equal[2] = 0;
+        *state = (plausibility_state_t){.fast = state->fast, .hot = state->hot, .last = state->last};
         return faults;
     }
-    faults |= deviation(config, state, in) | stuck_sensors(config, state, in);
-    const bool a_lost = is_phase_lost(config, &state->lost[0], in->phases_ref.a, in->phases.a);
-    const bool b_lost = is_phase_lost(config, &state->lost[1], in->phases_ref.b, in->phases.b);
-    const bool c_lost = is_phase_lost(config, &state->lost[2], in->phases_ref.c, in->phases.c);
-    return faults | ((a_lost || b_lost || c_lost) ? FAULT_PHASE_LOST : 0U);
+    return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
+           lost_phases(config, state, in);
 }

@@ -3,12 +3,15 @@
 #define SAFETY_PLAUSIBILITY_H
 /** Slow monitors: currents, speed and temperatures are compared with the references and with their limits.
  *   control deviation  |i - i*| > e_0 + |i*|/8 for 20 ms, for 100 ms while the voltage is limited
- *   phase lost         |i_x| <= i_dead although |i_x*| > i_alive: 10 more such samples than samples with current
+ *   oscillation        mean of |i - i* - mean(i - i*)| over 16 ms above ripple_max for 20 ms; i is the sample or the
+ *                      mean of a step, whichever is further off; each deviation limited to 4 ripple_max
+ *   phase lost         i_x <= i_dead in the direction of i_x*, |i_x*| > max(i_alive, |i*|/8): 8 more such samples than
+ *                      samples with current, each direction counted by itself
  *   sensor stuck       20 equal samples of a phase while both others change by more than i_dead/4 in each
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
  *   These times are counted in steps of the task, rounded up.
- * Source   docs/theory/monitors.md (MN-1) ... (MN-5)
+ * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11)
  * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -22,24 +25,28 @@ typedef struct {
     q15_t e_0;     /* deviation allowed at no current */
     q15_t i_dead;  /* a phase current up to this counts as none */
     q15_t i_alive; /* a phase whose reference exceeds this must carry current */
+    q15_t ripple_max;
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
     int16_t deviation_steps; /* 100 ms: a step counts once while the voltage is cut, else five times */
-    uint8_t lost_steps, equal_steps, fast_steps, hot_steps; /* 10, 20, 5, 110 ms */
+    uint8_t ripple_steps, lost_steps, equal_steps, fast_steps, hot_steps; /* 20, 8, 20, 5, 110 ms */
 } plausibility_config_t;
 
 typedef struct {
     int16_t deviation;
-    int8_t lost[3];
+    dq_q15_t sample_x8, step_x8; /* mean deviation of samples and of means over 8 steps, times 8 */
+    int32_t ripple_x16;          /* mean distance from it over 16 steps, times 16 */
+    int8_t lost[3][2];           /* of each phase, in the positive and in the negative direction */
     uint8_t equal[3];
     abc_q15_t last;
-    uint8_t fast, hot;
+    uint8_t oscillating, fast, hot;
 } plausibility_state_t;
 
 typedef struct {
     bool acting; /* the bridge follows its references */
     bool voltage_limited;
     dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
+    dq_q15_t i_mean;      /* of the last step; the sample if there is none */
     abc_q15_t phases;     /* measured */
     abc_q15_t phases_ref; /* i_ref as phase currents at the instant of the samples */
     q15_t omega;

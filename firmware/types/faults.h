@@ -17,8 +17,8 @@
     X(INPUT, 5, "The samples are invalid, or the converters repeatedly deliver none.") \
     X(OVERRUN, 6, "The 1 kHz task wrote no command for 2 steps, or the paper's law missed 3 periods in a row.") \
     X(CONFIG, 7, "The motor data or the port's settings failed a check; a separate value names the check.") \
-    X(CONTROL, 8, "The current is off its reference for 20 ms, or for 100 ms while the voltage is limited.") \
-    X(PHASE_LOST, 9, "A phase carries no current although it should, in 10 ms of samples.") \
+    X(CONTROL, 8, "The current is off its reference for 20 ms, 100 ms at the voltage limit, or oscillates about it.") \
+    X(PHASE_LOST, 9, "A phase carries no current although it should, in 8 ms of samples.") \
     X(CURRENT_STUCK, 10, "A phase current has 20 equal samples at 1 kHz while the others change.") \
     X(OVER_SPEED, 11, "The speed exceeds 80 % of the reserve of the speed base for 5 ms.") \
     X(ANGLE_OFFSET, 12, "The direction of the back-EMF contradicts the measured angle for 5 ms.") \

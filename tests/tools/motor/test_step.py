@@ -76,8 +76,8 @@ def test_rates_and_gains_are_those_of_the_true_step(generated, pwm_hz, n, step_s
 def test_debouncing_counts_cover_their_times_and_no_step_more(generated, pwm_hz, step_s):
     """ms by hand from docs/theory/monitors.md and commissioning.md."""
     c, _, motor = generated(pwm_hz)
-    times_ms = {"deviation": 100, "lost": 10, "equal": 20, "fast": 5, "hot": 110, "torque": 20, "angle": 5, "settle": 5,
-                "measure": 64, "trim": 1000}  # fmt: skip
+    times_ms = {"deviation": 100, "lost": 8, "ripple": 20, "equal": 20, "fast": 5, "hot": 110, "torque": 20,
+                "angle": 5, "settle": 5, "measure": 64, "trim": 1000}  # fmt: skip
     for name, ms in times_ms.items():
         count = int(c[f"{name}_steps"])
         assert ms - 1e-3 <= 1e3 * count * step_s < ms + 1e3 * step_s, name
@@ -88,7 +88,7 @@ def test_debouncing_counts_cover_their_times_and_no_step_more(generated, pwm_hz,
 def test_at_10_kHz_the_counts_are_the_milliseconds(generated):
     c, _, _ = generated(10000.0)
     names = ("deviation", "lost", "equal", "fast", "hot", "torque", "angle", "settle", "measure", "trim")
-    assert [int(c[f"{name}_steps"]) for name in names] == [100, 10, 20, 5, 110, 20, 5, 5, 64, 1000]
+    assert [int(c[f"{name}_steps"]) for name in names] == [100, 8, 20, 5, 110, 20, 5, 5, 64, 1000]
     assert (int(c["mean_gain_q32"]), int(c["mean_gain_q31"])) == (214748365, 3355443)
 
 

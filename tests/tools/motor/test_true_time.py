@@ -32,6 +32,7 @@ PERIOD = {
     "parameters.modulate.dead_time_q16", "parameters.modulate.longest_q31", "parameters.modulate.nearer_rail_q31",
     "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
+    "plausibility.ripple_max",
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
@@ -44,10 +45,10 @@ STEP = {
     "identify.noise_voltage_q30", "identify.noise_flux_q30", "identify.noise_rate_q30", "identify.local_rate",
     "identify.mismatch_rate", "identify.confidence_rate",
     "parameters.torque_loop.ki", "parameters.torque_loop.model_rate", "voltage_reserve.gain", "torque_limit.loss_rate",
-    "plausibility.deviation_steps", "plausibility.lost_steps", "plausibility.equal_steps", "plausibility.fast_steps",
-    "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate", "torque_monitor.torque_steps",
-    "torque_monitor.angle_steps", "torque_monitor.settle_steps", "commission.settle_steps",
-    "commission.measure_steps", "commission.mean_gain_q31",
+    "plausibility.deviation_steps", "plausibility.ripple_steps", "plausibility.lost_steps", "plausibility.equal_steps",
+    "plausibility.fast_steps", "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate",
+    "torque_monitor.torque_steps", "torque_monitor.angle_steps", "torque_monitor.settle_steps",
+    "commission.settle_steps", "commission.measure_steps", "commission.mean_gain_q31",
 }  # fmt: skip
 # A member whose name promises a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")

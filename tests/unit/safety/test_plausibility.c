@@ -2,6 +2,7 @@
 #include "safety/plausibility.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "types/faults.h"
 #include "unity.h"
@@ -9,10 +10,12 @@
 static const plausibility_config_t config = {.e_0 = 2000,
                                              .i_dead = 400,
                                              .i_alive = 2400,
+                                             .ripple_max = 1600,
                                              .omega_trip = 32000,
                                              .inverter_trip_dC = 1050,
                                              .winding_trip_dC = 1800,
                                              .deviation_steps = 100,
+                                             .ripple_steps = 20,
                                              .lost_steps = 10,
                                              .equal_steps = 20,
                                              .fast_steps = 5,
@@ -25,7 +28,8 @@ void setUp(void)
 {
     state = (plausibility_state_t){0};
     now = 0;
-    in = (plausibility_in_t){.acting = true, .i = {-8000, 8000}, .i_ref = {-8000, 8000}, .omega = 10000};
+    in = (plausibility_in_t){
+        .acting = true, .i = {-8000, 8000}, .i_ref = {-8000, 8000}, .i_mean = {-8000, 8000}, .omega = 10000};
 }
 
 void tearDown(void)
@@ -54,6 +58,17 @@ static int steps_until(uint32_t fault, int broken)
     return -1;
 }
 
+/* The same sample again and again. */
+static int steps_until_the_same(uint32_t fault)
+{
+    for (int n = 1; n <= 1000; n++) {
+        if (plausibility_step(&config, &state, &in) & fault) {
+            return n;
+        }
+    }
+    return -1;
+}
+
 void test_a_machine_that_follows_raises_nothing(void)
 {
     TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, -1));
@@ -73,12 +88,62 @@ void test_a_current_that_does_not_follow_is_found_in_20_ms_and_in_100_while_the_
     TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_CONTROL, -1));
 }
 
-void test_a_deviation_every_other_sample_is_noise(void)
+/* The mean of 16 samples is far below ripple_max. */
+void test_a_deviation_every_eighth_sample_is_noise(void)
 {
     for (int n = 0; n < 1000; n++) {
-        in.i.q = in.i_ref.q + ((n & 1) ? 5000 : 0);
+        in.i.q = in.i_ref.q + ((n % 8 == 0) ? 5000 : 0);
         TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
     }
+}
+
+/* (MN-11) in double precision: steps until the fault for a deviation that alternates between 0 and `size`. */
+static int steps_of_the_twin(double size)
+{
+    double mean = 0.0, ripple = 0.0;
+    int bad = 0;
+    for (int n = 1; n <= 1000; n++) {
+        const double e = (n & 1) ? fmin(size, 4.0 * config.ripple_max) : 0.0;
+        ripple += (fabs(e - mean) - ripple) / 16.0;
+        mean += (e - mean) / 8.0;
+        bad = (ripple > config.ripple_max) ? bad + 1 : 0;
+        if (bad == config.ripple_steps) {
+            return n;
+        }
+    }
+    return -1;
+}
+
+static void find_oscillations(bool of_sample)
+{
+    for (int32_t size = 2900; size <= 8000; size += 100) {
+        setUp();
+        int found = -1;
+        for (int n = 1; n <= 1000 && found < 0; n++) {
+            in.i.d = in.i_ref.d + (((n & 1) && of_sample) ? size : 0);
+            in.i_mean.d = in.i_ref.d + (((n & 1) && !of_sample) ? size : 0);
+            found = (run_one_turn(-1) & FAULT_CONTROL) ? n : -1;
+        }
+        const int expected = steps_of_the_twin(size);
+        const bool same = abs(found - expected) <= 1; /* rounding may move a step */
+        TEST_ASSERT_TRUE_MESSAGE(same || abs(size - 3200) <= 100, "fixed point and double precision differ");
+    }
+}
+
+void test_a_deviation_every_other_sample_is_found_by_its_oscillation(void)
+{
+    find_oscillations(true);
+}
+
+void test_so_is_one_that_only_the_means_of_the_steps_show(void)
+{
+    find_oscillations(false);
+}
+
+void test_a_lasting_deviation_is_no_oscillation(void)
+{
+    in.i.d = in.i_mean.d = in.i_ref.d + 3000;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_CONTROL, -1));
 }
 
 void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
@@ -88,6 +153,39 @@ void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
         const int found = steps_until(FAULT_PHASE_LOST, x);
         TEST_ASSERT_TRUE(found > 0 && found <= 20);
     }
+}
+
+/* One switch open: the phase carries nothing in one direction. */
+void test_a_phase_without_current_in_one_direction_is_found_within_50_ms(void)
+{
+    for (int direction = -1; direction <= 1; direction += 2) {
+        for (int32_t size = 3000; size <= 30000; size += 9000) {
+            setUp();
+            in.i_ref = in.i = in.i_mean = (dq_q15_t){0, size};
+            int found = -1;
+            for (int n = 1; n <= 50 && found < 0; n++) {
+                const int32_t a = (int32_t)(size * cos(2.0 * n));
+                in.phases_ref = (abc_q15_t){a, 0, 0};
+                in.phases = (abc_q15_t){(direction * a > 0) ? 3 : a, 0, 0};
+                found = (plausibility_step(&config, &state, &in) & FAULT_PHASE_LOST) ? n : -1;
+            }
+            TEST_ASSERT_TRUE(found > 10);
+        }
+    }
+}
+
+/* Also a current in the wrong direction is none; below an eighth of the reference's length nothing counts. */
+void test_what_counts_as_a_lost_phase(void)
+{
+    in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
+    in.phases_ref = in.phases = (abc_q15_t){2999, -5999, 3000};
+    in.phases.a = -2999;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_PHASE_LOST));
+    setUp();
+    in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
+    in.phases_ref = in.phases = (abc_q15_t){3001, -6001, 3000};
+    in.phases.a = -2999;
+    TEST_ASSERT_EQUAL_INT(10, steps_until_the_same(FAULT_PHASE_LOST));
 }
 
 /* A phase that should carry nothing at this angle, and does not, is no evidence. */

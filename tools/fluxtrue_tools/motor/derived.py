@@ -40,12 +40,13 @@ TORQUE_MIN_SHARE = 0.1
 
 V_MAX_PER_VDC, V_MIN_PER_VDC = 1.25, 0.4
 SUM_MAX_PER_FULL_SCALE = 0.05
-DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.12  # of i_max
+DEVIATION_SHARE, PHASE_DEAD_SHARE, PHASE_ALIVE_SHARE = 0.1, 0.02, 0.05  # of i_max
+RIPPLE_SHARE = 0.015  # of i_max: noise, sensor harmonics and dead time in the controlled current
 SPEED_TRIP = 0.8  # of the reserve of the speed base
 TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
 INVERTER_ERROR_PER_VDC = 0.02
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
-DEVIATION_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.01, 0.02, 0.005, 0.11
+DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
 TORQUE_S, ANGLE_S, SETTLE_S = 0.02, 0.005, 0.005
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
 COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
@@ -127,6 +128,7 @@ class Derived:
     deviation_A: float
     phase_dead_A: float
     phase_alive_A: float
+    ripple_A: float
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
@@ -251,6 +253,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
     return {
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
         "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
+        # The fastest change of torque moves the current by this much per second; current control lags behind (TL-11).
+        "ripple_A": (RIPPLE_SHARE + SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS * bases.period_s) * machine.i_max_A,
         "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
         "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
         "monitor_torque_Nm": max(

@@ -19,6 +19,7 @@ from fluxtrue_tools.motor.derived import (
     FAST_S,
     HOT_S,
     LOST_S,
+    RIPPLE_S,
     SETTLE_S,
     STANDSTILL_SHARE,
     TORQUE_S,
@@ -352,10 +353,11 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("e_0", q15(d.deviation_A / b.current_A, "deviation"), f"{d.deviation_A:g} A"),
         ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
         ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
+        ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
         ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
-        *_counts(b, deviation=DEVIATION_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S),
+        *_counts(b, deviation=DEVIATION_S, ripple=RIPPLE_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S),
     ]
 
 
