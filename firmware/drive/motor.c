@@ -37,7 +37,7 @@ static motor_check_t monitors_check(const motor_t *m)
     if (c->v_min >= c->v_max) {
         return MOTOR_CHECK_DC_VOLTAGE_LEVELS;
     }
-    if (c->zero_max <= 0 || 3 * c->zero_max > c->sum_max) {
+    if (c->zero_max <= 0 || c->zero_max > c->sum_max / 3 || c->sum_max > 3 * Q15_MAX) {
         return MOTOR_CHECK_CURRENT_SUM_LEVEL;
     }
     if (!normal_current_valid(c)) {

@@ -24,6 +24,7 @@ COMMANDS = {
     "vecu": ("fluxtrue_tools.vecu.cli", "vecu", "The virtual ECU: a CAN bus to talk to."),
     "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),
     "fuzz": ("fluxtrue_tools.fuzz.cli", "fuzz", "Random and mutated frames through the receive path."),
+    "prove": ("fluxtrue_tools.prove.cli", "prove", "Prove properties of the firmware with a model checker."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
     "live": ("fluxtrue_tools.live.cli", "live", "Draw the drive live in a browser; command, tune, record."),
     "log": ("fluxtrue_tools.log.cli", "log", "Decode, plot and export a recorded drive."),

@@ -81,6 +81,8 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(UNDER_VOLTAGE_LEVEL, m.monitor.v_min = 800) /* 1/v_ratio in Q31 over 2^22 is 853 */ \
     X(CURRENT_SUM_LEVEL, m.monitor.zero_max = 0) \
     X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * m.monitor.zero_max - 1) \
+    X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * Q15_MAX + 1) \
+    X(CURRENT_SUM_LEVEL, m.monitor.zero_max = INT32_MAX; m.monitor.sum_max = INT32_MAX) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = -1) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.zero_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.zero_max) \
