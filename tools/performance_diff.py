@@ -26,7 +26,7 @@ class InputError(Exception):
 
 
 def leaves(figures: Any, at: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Every figure with the keys that lead to it. A list of numbers is one figure: least, mean, most."""
+    """Every figure with the keys that lead to it. A list of numbers is one figure: minimum, mean, maximum."""
     if isinstance(figures, dict):
         for key, value in figures.items():
             yield from leaves(value, (*at, str(key)))
@@ -38,7 +38,7 @@ def leaves(figures: Any, at: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, 
 
 
 def text(figure: Any) -> str:
-    """As a cell of the table."""
+    """The value as a cell of the table."""
     parts = figure if isinstance(figure, list) else [figure]
     return " / ".join(f"{part:.10g}" if is_number(part) else str(part) for part in parts).replace("|", "\\|")
 
@@ -100,7 +100,7 @@ def read(path: Path) -> Any:
 
 
 def read_commit(root: Path, commit: str) -> Any:
-    """The figures as they are in a commit."""
+    """The figures in a commit."""
     command = ["git", "-C", str(root), "show", "--end-of-options", f"{commit}:{BASELINE}"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:

@@ -15,13 +15,13 @@
 
 #define DIE_COUNT_25 607
 #define DIE_DC_PER_COUNT_Q8 1998 /* 7.805 in Q8 */
-#define DIE_LEAST_DC (-500)
-#define DIE_MOST_DC 2000
+#define DIE_MIN_DC (-500)
+#define DIE_MAX_DC 2000
 
 static inline int16_t die_dC(uint16_t count)
 {
     const int32_t dC = 250 - (((int32_t)count - DIE_COUNT_25) * DIE_DC_PER_COUNT_Q8) / 256;
-    return (dC < DIE_LEAST_DC || dC > DIE_MOST_DC) ? (int16_t)TEMPERATURE_UNKNOWN : (int16_t)dC;
+    return (dC < DIE_MIN_DC || dC > DIE_MAX_DC) ? (int16_t)TEMPERATURE_UNKNOWN : (int16_t)dC;
 }
 
 #endif

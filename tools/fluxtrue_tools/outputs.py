@@ -34,17 +34,17 @@ def _refused(label: str, path: Path | str, why: str) -> FluxtrueError:
 
 
 def _status(label: str, path: Path) -> os.stat_result | None:
-    """What is there; None when nothing is."""
+    """What exists at the path; None if nothing does."""
     try:
         return path.stat()
     except FileNotFoundError:
         return None
-    except (OSError, ValueError) as error:  # too long a name, a loop of links, a file as folder, a NUL
+    except (OSError, ValueError) as error:  # a name that is too long, a loop of links, a file as a folder, a NUL
         raise _refused(label, path, f"cannot be written ({_reason(error)})") from None
 
 
 def _key(path: Path) -> tuple[int, int] | str:
-    """What two names of one file have in common."""
+    """A key that is the same for all names of one file."""
     try:
         found = path.stat()
     except (OSError, ValueError):
@@ -53,7 +53,7 @@ def _key(path: Path) -> tuple[int, int] | str:
 
 
 def _probe(label: str, path: Path, folder: Path) -> None:
-    """Only making a file shows whether one can be made."""
+    """Find out whether a file can be made, by making one."""
     try:
         handle, name = tempfile.mkstemp(prefix=PREFIX, dir=folder)
         os.close(handle)
@@ -73,7 +73,7 @@ def _check_name(label: str, path: Path) -> None:
 
 @dataclass(frozen=True)
 class _Target:
-    """A declared output."""
+    """One declared output."""
 
     label: str
     given: Path
@@ -91,7 +91,7 @@ class _Target:
 
 @dataclass
 class Outputs:
-    """All outputs of one command; a context that renames them at its end, or leaves nothing."""
+    """All outputs of one command; a context that renames them at its end, or removes them after an error."""
 
     _inputs: list[tuple[str, Path]] = field(default_factory=list)
     _targets: list[_Target] = field(default_factory=list)
@@ -182,16 +182,16 @@ class Outputs:
         return made
 
     def remove(self, path: Path, name: str) -> None:
-        """A file of an older run, when the command succeeds."""
+        """Remove a file of an older run when the command succeeds."""
         self._stale.append(self._target(path).real / name)
 
     def text(self, path: Path, text: str) -> None:
-        """A whole file."""
+        """Write a file from text."""
         with self._complaining(path):
             self.scratch(path).write_text(text, encoding="utf-8")
 
     def data(self, path: Path, data: bytes) -> None:
-        """A whole file."""
+        """Write a file from bytes."""
         with self._complaining(path):
             self.scratch(path).write_bytes(data)
 
@@ -248,13 +248,13 @@ class Outputs:
                 made.unlink(missing_ok=True)
         self._staged.clear()
         for path in reversed(self._made):
-            with contextlib.suppress(OSError):  # something else is in it by now
+            with contextlib.suppress(OSError):  # another program has written into it meanwhile
                 path.rmdir()
         self._made.clear()
 
 
 def _moves(target: _Target, made: Path) -> Iterator[tuple[_Target, Path, Path]]:
-    """What is renamed: a file, a new folder as a whole, or each file of a folder that was there."""
+    """Every renaming: of a file, of a new folder as a whole, or of each file of an existing folder."""
     if target.is_folder and target.real.is_dir():
         yield from ((target, path, target.real / path.name) for path in sorted(made.iterdir()))
     else:
@@ -262,7 +262,7 @@ def _moves(target: _Target, made: Path) -> Iterator[tuple[_Target, Path, Path]]:
 
 
 def _permit(path: Path, place: Path) -> None:
-    """As the file that is replaced, or as if made directly: temporary files are for their owner alone."""
+    """Set the permissions of the replaced file, or those of a new file; a temporary file has only its owner's."""
     if place.is_file():
         path.chmod(stat.S_IMODE(place.stat().st_mode))
         return
@@ -274,7 +274,7 @@ def _permit(path: Path, place: Path) -> None:
 
 @contextlib.contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """One file outside a command's own outputs: complete when the block succeeds, else as it was."""
+    """One file that is not an output of the command: replaced when the block succeeds, else unchanged."""
     outputs = Outputs()
     outputs.file("output", path)
     with outputs:
@@ -282,6 +282,6 @@ def atomic(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """One file, whole or as it was."""
+    """Write one file; after an error it is unchanged."""
     with atomic(path) as scratch:
         scratch.write_text(text, encoding="utf-8")

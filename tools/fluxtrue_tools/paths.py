@@ -41,7 +41,7 @@ class GivenPath(click.ParamType):
 
 
 class InputFile(GivenPath):
-    """A file that is there and is only read."""
+    """An existing file that is only read."""
 
     name = "file"
 
@@ -60,7 +60,7 @@ class InputFile(GivenPath):
 
 
 class InputFolder(GivenPath):
-    """A folder that is only read; what must be in it is the command's business."""
+    """A folder that is only read; the command itself checks its content."""
 
     name = "folder"
 
@@ -96,7 +96,7 @@ class StateFile(GivenPath):
 
 
 def refuse_given(why: str, *names: str) -> None:
-    """An option that would be left aside is an error; of the command that is running."""
+    """Refuse an option that the running command would ignore."""
     context = click.get_current_context()
     for option in context.command.params:
         given = context.get_parameter_source(str(option.name)) is ParameterSource.COMMANDLINE
@@ -138,7 +138,7 @@ def declared(ctx: click.Context) -> Outputs:
 
 
 def outputs() -> Outputs:
-    """Of the command that is running."""
+    """The outputs of the running command."""
     found = click.get_current_context().meta[_KEY]
     assert isinstance(found, Outputs)
     return found

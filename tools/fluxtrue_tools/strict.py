@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from fluxtrue_tools.errors import FluxtrueError
 
-SIZE_MAX = 10_000_000  # bytes; the largest that ships has two thousand
+SIZE_MAX = 10_000_000  # bytes; the largest file of the project has two thousand
 SHOWN_MAX = 60  # characters of a bad value in a message
 UNITS = {
     "Nm_per_s": "N·m/s", "rpm_per_s": "rpm/s", "A_per_K": "A/K", "N_per_m2_s2": "N/(m/s)²", "per_K": "1/K",
@@ -32,7 +32,7 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
     def given(self) -> set[str]:
-        """Keys that the file has, as against those left at their default."""
+        """Keys that the file contains; all others have their default."""
         return set(self.model_fields_set)
 
 
@@ -65,13 +65,13 @@ def unit_of(key: str) -> str:
 
 
 def down(value: float) -> float:
-    """A largest allowed value to four digits: what a message offers is accepted."""
+    """Round a largest value down to four digits, so that the value in a message is accepted."""
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 3) if value else 1.0
     return math.floor(value / step * (1.0 + 1e-12)) * step
 
 
 def quantity(key: str, value: Any) -> str:
-    """`key = value unit`, short."""
+    """`key = value unit` as a short text."""
     shown = repr(value)
     shown = shown if len(shown) <= SHOWN_MAX else f"{shown[: SHOWN_MAX - 3]}..."
     last = [part for part in key.split(".") if not part.isdigit()][-1]
@@ -162,7 +162,7 @@ def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str
     if first["type"] == "value_error":
         text = first["msg"].removeprefix("Value error, ")
         own_name = not where or text.startswith(where)
-        if own_name or isinstance(first["input"], dict):  # a table's complaint names a key below it
+        if own_name or isinstance(first["input"], dict):  # the complaint about a table names a key in it
             return text if own_name else f"{where}.{text}"
         return f"{quantity(where, first['input'])}: {text}"
     if not where:
@@ -171,7 +171,7 @@ def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str
 
 
 def read_text(path: Path) -> str:
-    """A text file, whole."""
+    """Read a text file completely."""
     try:
         if path.stat().st_size > SIZE_MAX:
             raise FluxtrueError(f"{path}: {path.stat().st_size} bytes, allowed: up to {SIZE_MAX}")

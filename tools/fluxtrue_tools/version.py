@@ -35,6 +35,6 @@ def version() -> str:
     """From the checkout the tools run in; outside of one, from the installed package."""
     if in_checkout():
         return read(HEADER)
-    import importlib.metadata  # slow, and needed only here
+    import importlib.metadata  # a slow import that only this function needs
 
     return importlib.metadata.version(DISTRIBUTION)

@@ -65,7 +65,7 @@ def test_the_committed_page_is_what_the_committed_figures_give() -> None:
 
 def test_a_bound_that_is_missed_is_called_missed() -> None:
     figures = baseline.load()
-    figures["image"]["flash"] = page.FLASH_MOST + 1
-    assert f"| image, flash | {page.FLASH_MOST + 1} | {page.FLASH_MOST} | **missed** |" in page.page(figures)
-    figures["image"]["flash"] = page.FLASH_MOST
-    assert f"| image, flash | {page.FLASH_MOST} | {page.FLASH_MOST} | met |" in page.page(figures)
+    figures["image"]["flash"] = page.FLASH_MAX + 1
+    assert f"| image, flash | {page.FLASH_MAX + 1} | {page.FLASH_MAX} | **missed** |" in page.page(figures)
+    figures["image"]["flash"] = page.FLASH_MAX
+    assert f"| image, flash | {page.FLASH_MAX} | {page.FLASH_MAX} | met |" in page.page(figures)

@@ -14,7 +14,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import fits
 
 PORT = Path(__file__).resolve().parents[3] / "hal" / "s32k144"
-# Cycles (least, mean, most) of a period's interrupts, a task, a received command.
+# Cycles (minimum, mean, maximum) of a period's interrupts, a task, a received command.
 COSTS = {"10 kHz work": [1, 1, 1000], "1 kHz task": [1, 1, 20000], "CAN ISR": [1, 1, 300]}
 
 

@@ -101,7 +101,7 @@ def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
     task, can = runs["1 kHz task"]["cycles"][1] / TASK_PERIODS, runs["CAN ISR"]["cycles"][1] * COMMAND_HZ
     return {
         "10 kHz work, average": round(100 * work[1] * PWM_HZ / core_hz, 2),
-        "10 kHz work, most": round(100 * work[2] * PWM_HZ / core_hz, 2),
+        "10 kHz work, maximum": round(100 * work[2] * PWM_HZ / core_hz, 2),
         "with task and CAN, average": round(100 * ((work[1] + task) * PWM_HZ + can) / core_hz, 2),
         "highest PWM frequency at 50 %": int((0.5 * core_hz - can - task * PWM_HZ) / work[1] // 100 * 100),
     }

@@ -29,7 +29,7 @@ from fluxtrue_tools.sim.library import Loop
 FAST, MRAI, CAN, TASK, GATE = 16 + 39, 16 + 69, 16 + 81, 16 + 48, 16 + 103
 FLASH_SIZE: Final = 0x80000
 STACK_PATTERN: Final = b"\xc5" * 4
-SPANS_MOST: Final = 4096
+SPANS_MAX: Final = 4096
 V_DC: Final = 350.0
 RPM: Final = 2 * math.pi / 60
 PERIODS_PER_MS: Final = 10
@@ -57,8 +57,8 @@ def declare(library: ctypes.CDLL) -> None:
 
 def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
     """Vector, instructions, cost of each run that has finished since the last time."""
-    spans = (_Span * SPANS_MOST)()
-    while count := library.emu_profile_take(handle, spans, SPANS_MOST):
+    spans = (_Span * SPANS_MAX)()
+    while count := library.emu_profile_take(handle, spans, SPANS_MAX):
         yield from ((s.vector, s.instructions, s.cost) for s in spans[:count])
 
 

@@ -19,10 +19,10 @@ from fluxtrue_tools.bench.sizes import STATE
 Figures = dict[str, Any]
 TASK_PERIODS = 10
 COLUMNS = 120
-CODE_MOST, STATE_MOST = 11776, 1536
-FLASH_MOST, RAM_MOST = (budget()[bound] for bound in ("flash_bytes", "ram_bytes"))
-UTILISATION_MOST = 10.0
-STACK_MOST = 0.5
+CODE_MAX, STATE_MAX = 11776, 1536
+FLASH_MAX, RAM_MAX = (budget()[bound] for bound in ("flash_bytes", "ram_bytes"))
+UTILISATION_MAX = 10.0
+STACK_MAX = 0.5
 # Bounds of a kernel, average and maximum; None where there is no bound.
 BOUNDS: dict[str, tuple[float | None, float | None]] = {
     "current_tick": (180, 220), "current_core": (120, None), "flux_table": (70, 70), "mrai": (100, None),
@@ -66,8 +66,8 @@ TASK_CONTAINS = {
     "supervisor": "state machine while torque is made",
     "arbitrate": "limits, dead band, slew and jerk of the torque that the bus requests",
 }
-WHOLE_MOST = 400
-SHARE_MOST = 40
+WHOLE_MAX = 400
+SHARE_MAX = 40
 TEMPLATE = Path(__file__).with_name("performance.md.in")
 
 
@@ -105,7 +105,7 @@ def _interrupts(figures: Figures) -> list[str]:
     for mode, drive in figures["drives"].items():
         for name, run in drive["runs"].items():
             whole = name == "10 kHz work"
-            bound = f"avg ≤ {WHOLE_MOST} {verdict(run['instructions'][1] <= WHOLE_MOST)}" if whole else ""
+            bound = f"avg ≤ {WHOLE_MAX} {verdict(run['instructions'][1] <= WHOLE_MAX)}" if whole else ""
             title = f"**{name}: fast + MRAI ISR, HAL included**" if whole else name
             rows.append((mode, title, run["runs"], *run["instructions"], *run["cycles"], bound))
     return table("identification|interrupt|  runs |  min |  avg |  max |  cycles min |  avg |  max |bound", rows)
@@ -146,11 +146,11 @@ def _memory(figures: Figures) -> list[str]:
     image, library = figures["image"], figures["control library"]
     state = sum(figures["state"][name] for name in STATE)
     rows = [
-        ("image, flash", image["flash"], FLASH_MOST),
-        ("image, RAM with the stack", image["RAM"], RAM_MOST),
+        ("image, flash", image["flash"], FLASH_MAX),
+        ("image, RAM with the stack", image["RAM"], RAM_MAX),
         ("control library (`fx`, `signal`, `control`), flash without tables",
-         library["code"] + library["constants"], CODE_MOST),
-        ("control library, RAM: state of a drive", state, STATE_MOST),
+         library["code"] + library["constants"], CODE_MAX),
+        ("control library, RAM: state of a drive", state, STATE_MAX),
     ]  # fmt: skip
     return table("what|  bytes |  bound |", ((*row, verdict(row[1] <= row[2])) for row in rows))
 
@@ -171,7 +171,7 @@ def _stack_sum(figures: Figures) -> str:
     share = found["total"] / reserved
     return (
         f"Sum, every priority preempted at its deepest point by the next: **{found['total']} of {reserved} bytes, "
-        f"{100 * share:.0f} %** (bound 50 %: {verdict(share <= STACK_MOST)}). "
+        f"{100 * share:.0f} %** (bound 50 %: {verdict(share <= STACK_MAX)}). "
         f"The emulated drive touched {found['seen in emulation']}."
     )
 
@@ -180,11 +180,11 @@ def _utilisation(figures: Figures) -> list[str]:
     rows = []
     for mode, share in figures["utilisation"].items():
         average = share["10 kHz work, average"]
-        rows.append((mode, f"{average} %", f"{share['10 kHz work, most']} %",
-                     f"≤ {UTILISATION_MOST:g} % {verdict(average <= UTILISATION_MOST)}",
+        rows.append((mode, f"{average} %", f"{share['10 kHz work, maximum']} %",
+                     f"≤ {UTILISATION_MAX:g} % {verdict(average <= UTILISATION_MAX)}",
                      f"{share['with task and CAN, average']} %",
                      f"{share['highest PWM frequency at 50 %'] / 1000:.1f} kHz"))  # fmt: skip
-    head = "identification|  ISRs, average |  ISRs, most |bound of the average|  with task and CAN |"
+    head = "identification|  ISRs, average |  ISRs, maximum |bound of the average|  with task and CAN |"
     return table(head + "  highest PWM frequency at 50 % ", rows)
 
 
@@ -214,7 +214,7 @@ def page(figures: Figures) -> str:
         task_steps=(PERIODS - WARM_UP) // TASK_PERIODS,
         small=" ".join(SMALL), tables=figures["control library"]["tables"], period_copy=figures["state"]["period"],
         parameters=figures["state"]["parameters"],
-        stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MOST),
+        stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MAX),
         **{"return": cycles.RETURN},
     )  # fmt: skip
     return "\n".join(_wrapped(line) for line in text.split("\n"))

@@ -20,7 +20,7 @@ def load(path: Path) -> list[can.Message]:
     try:
         with can.LogReader(path) as reader:
             frames = list(reader)
-    except Exception as error:  # every format's reader has errors of its own
+    except Exception as error:  # every format's reader raises exceptions of its own
         raise FluxtrueError(f"--replay {path}: not a readable log ({error})") from error
     if not frames:
         raise FluxtrueError(f"--replay {path}: holds no frame")
@@ -38,7 +38,7 @@ class Replay:
         self._thread.start()
 
     def close(self) -> None:
-        """End it."""
+        """Stop the replay."""
         self._stop.set()
         self._thread.join(1.0)
 

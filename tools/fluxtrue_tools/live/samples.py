@@ -7,7 +7,7 @@ from typing import Any, Final
 import can
 import cantools.database
 
-# What is drawn; everything else is only shown as its last value.
+# Signals that are drawn; of all others the page shows the last value.
 DRAWN: Final = {
     "INV_Status": ("TorqueEstimated", "TorqueCommanded", "Speed"),
     "INV_Currents": ("Id", "Iq", "IdRef", "IqRef"),
@@ -47,7 +47,7 @@ class Samples:
             self._last[message.name] = signals
 
     def choice(self, message: str, signal: str) -> str:
-        """The name of a signal's last value; empty before it has been heard."""
+        """The name of a signal's last value; empty before its first frame."""
         with self._lock:
             signals = self._last.get(message)
         if signals is None:
@@ -56,11 +56,11 @@ class Samples:
         return str((described.choices or {}).get(int(signals[signal]), ""))
 
     def state(self) -> str:
-        """The inverter's state by name; empty before it has said anything."""
+        """The inverter's state by name; empty before its first frame."""
         return self.choice("INV_Status", "State")
 
     def take(self) -> dict[str, dict[str, list[float]]]:
-        """Columns since the last time."""
+        """The columns since the last call."""
         with self._lock:
             columns, self._columns = self._columns, {}
         return columns

@@ -28,7 +28,7 @@ from fluxtrue_tools.live.tuning import Tuning
 
 HOST: Final = "127.0.0.1"
 BATCH_S: Final = 0.04  # 25 per second
-SEND_S: Final = 1.0  # a page that does not take its batch for so long goes without it
+SEND_S: Final = 1.0  # a page that does not accept a batch in this time does not get it
 HEARTBEAT_S: Final = 5.0  # of a connection
 SLOW_EVERY: Final = 5  # last values, with every fifth batch
 PAGE: Final = Path(__file__).parent / "static"
@@ -46,13 +46,13 @@ class Session:
     samples: Samples
     recorder: Recorder
     explanations: dict[str, dict[int, tuple[str, str]]]  # of fault bits and checks: name, sentence
-    link: Link | None = None  # None: a replay, nothing can be commanded
+    link: Link | None = None  # None in a replay, where nothing can be commanded
     tuning: Tuning | None = None
     stand: Stand | None = None
     in_step: InStep | None = None  # simulated time waits for the pages
     viewers: list[web.WebSocketResponse] = field(default_factory=list)
     drawn: dict[web.WebSocketResponse, int] = field(default_factory=dict)  # number of the last batch, page by page
-    changed: asyncio.Event = field(default_factory=asyncio.Event)  # a page has come, drawn or gone
+    changed: asyncio.Event = field(default_factory=asyncio.Event)  # a page has connected, drawn or disconnected
     hand: web.WebSocketResponse | None = None
     last_file: str = ""
 
@@ -101,7 +101,7 @@ def _hello(session: Session) -> dict[str, Any]:
 def _number(value: Any, what: str) -> float:
     try:
         number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
-    except OverflowError:  # a whole number of three hundred digits
+    except OverflowError:  # an integer of three hundred digits
         number = math.inf
     if not math.isfinite(number):
         raise FluxtrueError(f"{what}: not a number")
@@ -127,7 +127,7 @@ def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, A
 
 
 def _drawn(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
-    """A page has drawn a batch. The page is alive."""
+    """A page has drawn a batch, which is also a sign of life."""
     session.drawn[socket] = int(_number(message.get("batch"), "batch"))
     session.changed.set()
     if message.get("visible") and session.hand is socket and session.link is not None:
@@ -162,7 +162,7 @@ async def _record(session: Session, message: dict[str, Any]) -> dict[str, Any]:
 
 
 def _obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[dict[str, Any]] | None:
-    """What one message of a page does. What takes its time, and has an answer, is left to be waited for."""
+    """Carry out one message of a page. A slow action is returned, to be awaited for its answer."""
     match message.get("type"):
         case "drawn":
             _drawn(session, socket, message)
@@ -184,8 +184,8 @@ def _refusal(error: Exception) -> dict[str, Any]:
 
 
 async def _answer_later(socket: web.WebSocketResponse, answer: Awaitable[dict[str, Any]]) -> None:
-    """While the page goes on to tell that it lives."""
-    with contextlib.suppress(ConnectionError, RuntimeError):  # it has gone meanwhile
+    """Send the answer of a slow action, while the page keeps sending signs of life."""
+    with contextlib.suppress(ConnectionError, RuntimeError):  # the page has disconnected meanwhile
         try:
             await socket.send_json(await answer)
         except REFUSED as error:
@@ -241,14 +241,14 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
 
 
 async def _send_batch(session: Session, number: int) -> list[web.WebSocketResponse]:
-    """To every page; those that took it."""
+    """Send a batch to every page; the result is the set of pages that accepted it."""
     batch = _batch(session, number)
     if session.stand is not None and session.viewers:
         with contextlib.suppress(FluxtrueError, OSError):
             batch["truth_Nm"] = await asyncio.to_thread(session.stand.truth_Nm)
     text, taken = json.dumps(batch), []
     for viewer in list(session.viewers):
-        with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the others still read
+        with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the other pages still read
             await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
             taken.append(viewer)
     return taken
@@ -261,7 +261,7 @@ async def _broadcast(session: Session) -> None:
 
 
 async def _broadcast_in_step(session: Session, in_step: InStep) -> None:
-    """Without a page nothing is drawn, and time stands still."""
+    """Send the batches in step with simulated time, which stops while no page is connected."""
     number = 0
     while await asyncio.to_thread(in_step.due):
         while not session.viewers:

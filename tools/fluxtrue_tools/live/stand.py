@@ -15,7 +15,7 @@ TRUTH: Final = "truth.torque_mean_Nm"
 
 @dataclass(frozen=True)
 class Knob:
-    """One plant parameter in the page's unit; no stand changes its speed in an instant."""
+    """One plant parameter in the page's unit, with the rate at which it may change."""
 
     parameter: str
     factor: float
@@ -42,12 +42,12 @@ class Stand:
         self._now = dict(self._target)
 
     def turn(self, name: str, value: float) -> None:
-        """One knob; beyond its range is its end."""
+        """Change one knob; a value beyond its range is limited to it."""
         knob = KNOBS[name]
         self._target[name] = min(max(value, knob.lo), knob.hi)
 
     def step(self, seconds: float) -> None:
-        """The plant follows its knobs."""
+        """Move the plant's parameters towards their knobs."""
         values = {}
         for name, knob in KNOBS.items():
             step_max = knob.per_s * seconds
@@ -65,5 +65,5 @@ class Stand:
             return self._channel.get(TRUTH)[0]
 
     def close(self) -> None:
-        """Leave it as it is."""
+        """Close the connection; the plant keeps its parameters."""
         self._channel.close()

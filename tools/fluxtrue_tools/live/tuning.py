@@ -19,7 +19,7 @@ from fluxtrue_tools.errors import FluxtrueError
 
 FLOAT: Final = struct.Struct("<f")
 BENCH_ANSWER_S: Final = 2.0
-SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, which says nothing about simulated time: only ends a hang
+SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, independent of simulated time: it only ends a hang
 
 
 def _key(resource: int, seed: bytes) -> bytes:
@@ -84,7 +84,7 @@ class Tuning:
                 for value in self._values.values()]  # fmt: skip
 
     def write(self, name: str, value: float) -> float:
-        """Ask the ECU to take it; what it holds then. It is the ECU that refuses."""
+        """Write a value to the ECU, which checks it; the result is the value that the ECU then holds."""
         if name not in self._values:
             raise FluxtrueError(f"no calibration value '{name}', allowed: {', '.join(self._values)}")
         info = self._values[name]

@@ -17,7 +17,7 @@ from fluxtrue_tools.log.decode import signals_of
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
 
 Signals = dict[str, pd.Series]
-# Title, and what is drawn under which name, how.
+# Title of a plot; signal, label and style of its lines.
 BACK: Final = {"color": COMMAND, "linestyle": "--"}
 PANELS: Final[tuple[tuple[str, dict[str, tuple[str, dict[str, str]]]], ...]] = (
     ("Torque", {"INV_Status.TorqueCommanded": ("commanded", BACK), "INV_Status.TorqueEstimated": ("estimated", {})}),
@@ -29,7 +29,7 @@ PANELS: Final[tuple[tuple[str, dict[str, tuple[str, dict[str, str]]]], ...]] = (
 )  # fmt: skip
 UNITS: Final = {"Nm": "N·m", "mOhm": "mΩ"}  # the DBC is ASCII
 STATE: Final = "INV_Status.State"
-GAP_S: Final = 1.0  # nothing for so long was not recorded: no line is drawn across
+GAP_S: Final = 1.0  # a gap of this length was not recorded, so that no line is drawn across it
 EXPORTS: Final[dict[str, Callable[[pd.DataFrame, Path], None]]] = {
     ".csv": lambda table, path: table.to_csv(path, index_label="time_s"),
     ".parquet": lambda table, path: table.to_parquet(path),
@@ -50,7 +50,7 @@ def _table(signals: Signals) -> pd.DataFrame:
 
 
 def _line(values: pd.Series) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values, broken where nothing was recorded."""
+    """Times and values of a line, interrupted where nothing was recorded."""
     times, numbers = values.index.to_numpy(dtype=float), values.to_numpy(dtype=float)
     gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
     return np.insert(times, gaps, times[gaps - 1]), np.insert(numbers, gaps, np.nan)

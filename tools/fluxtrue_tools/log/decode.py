@@ -26,7 +26,7 @@ def signals_of(path: Path) -> dict[str, pd.Series]:
     try:
         with MDF(path) as recorded:
             frames = recorded.get(FRAMES)
-    except Exception as error:  # the reader stumbles over a bad file in many ways
+    except Exception as error:  # for a bad file the reader raises many kinds of exceptions
         raise FluxtrueError(f"{path}: not an MDF4 bus log ({error})") from error
     missing = FIELDS - set(frames.samples.dtype.names or ())
     if missing:

@@ -15,7 +15,7 @@ from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.config import MotorConfig
 
-# Where two help alike: keys of one thing alone first, then the inverter's set-up, the machine's nature last.
+# Order of keys that help equally: first those with a single effect, then the inverter's, last the machine's.
 KEYS = (
     "machine.iron_loss_hysteresis", "machine.iron_loss_eddy", "inverter.v_dc_full_scale_V", "inverter.dead_time_s",
     "inverter.min_pulse_s", "inverter.device_drop_V", "control.observer_m", "control.flux_bandwidth_rad_s",
@@ -42,11 +42,11 @@ class Change:
 
     @property
     def size(self) -> float:
-        """How far away, as a ratio."""
+        """Distance of the change, as a ratio."""
         return abs(math.log(self.value / self.now))
 
     def text(self) -> str:
-        """As part of a sentence."""
+        """The change as part of a sentence."""
         unit = strict.unit_of(self.key)
         return f"{self.key} {'up to' if self.value < self.now else 'from'} {self.value:g} {unit}".rstrip()
 
@@ -74,7 +74,7 @@ def _passes(test: Test, config: MotorConfig, key: str, value: float) -> bool:
 
 
 def _rounded(now: float, value: float) -> float:
-    """Three digits, away from where it is now: what is offered must be accepted."""
+    """Three digits, rounded away from the present value, because a value that is offered must be accepted."""
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 2)
     whole = value / step
     return (math.floor(whole + 1e-9) if value < now else math.ceil(whole - 1e-9)) * step

@@ -12,13 +12,13 @@ from fluxtrue_tools.motor.quantise import Unfit
 
 VOLTAGE_PER_VDC = 1.5
 VOLTAGE_STEP_V = 10.0
-OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05, 1.02)  # the first that fits
+OMEGA_PER_OMEGA_MAX = (1.25, 1.2, 1.15, 1.1, 1.05, 1.02)  # the first one that fits is taken
 OMEGA_MIN_PER_PWM = 0.02  # rad/s per Hz: below it the current controller's integral gain leaves its format
 OMEGA_STEP_MIN = 1.0 / 7.9  # rad per step of the task: below it 1/(omega_b T) leaves its format
-FLUX_USE_MIN = 0.3  # of psi_b, by the largest flux: less leaves torque and tables without resolution
+FLUX_USE_MIN = 0.3  # smallest share of psi_b that the largest flux may have; below it torque and tables lose resolution
 FLUX_USE_MAX = 0.97  # of psi_b, by the largest flux on the i_max circle
 STEP_USE_MAX = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
-TASK_HZ = 1000.0  # what a whole number of PWM periods comes nearest to
+TASK_HZ = 1000.0  # a step is the whole number of PWM periods nearest to this
 
 
 @dataclass(frozen=True)

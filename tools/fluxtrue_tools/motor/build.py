@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""motor build: all files or none."""
+"""motor build: writes all files or none."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def generate(motor: Motor) -> dict[str, str]:
 
 
 def build(folder: Path, out: Path, report: bool) -> Motor:
-    """What `motor build` does, for other tools."""
+    """The function of `motor build` for other tools."""
     outputs = Outputs()
     outputs.reads(folder, *source_files(folder))
     outputs.folder("--out", out, BUILT)
@@ -43,6 +43,6 @@ def build_into(folder: Path, outputs: Outputs, out: Path, report: bool) -> Motor
 
         write_report(motor, files["report.txt"], staging)
     else:
-        for name in (HTML, *PLOTS):  # of an older build would be taken for these tables'
+        for name in (HTML, *PLOTS):  # a file of an older build would seem to belong to these tables
             outputs.remove(out, name)
     return motor

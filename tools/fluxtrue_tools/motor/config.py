@@ -13,7 +13,7 @@ from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.strict import Strict
 
 TRIP_PER_I_MAX = 1.2
-TRIP_PER_FULL_SCALE = 0.78  # the docs promise: below 80 % of the converter's range
+TRIP_PER_FULL_SCALE = 0.78  # documented in bring-your-motor.md: below 80 % of the converter's range
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 THERMAL_SPAN_MIN_K = 5.0
@@ -71,7 +71,9 @@ class Identification(Strict):
     lq_uncertainty: Annotated[float, Field(ge=0.001, le=0.3)] = 0.06
     ld_uncertainty: Annotated[float, Field(ge=0.001, le=0.3)] = 0.06
     resistance_uncertainty: Annotated[float, Field(ge=0.01, le=1.0)] = 0.25  # without a winding sensor
-    winding_uncertainty_K: Annotated[float, Field(ge=0.5, le=50)] = 10.0  # with one: it is not everywhere
+    winding_uncertainty_K: Annotated[float, Field(ge=0.5, le=50)] = (
+        10.0  # with a sensor, which does not measure the whole winding
+    )
     dead_time_uncertainty: Annotated[float, Field(ge=0.01, le=1.0)] = 0.12
     device_drop_uncertainty_V: Annotated[float, Field(ge=0.01, le=5)] = 0.3
     angle_uncertainty_deg: Annotated[float, Field(ge=0.01, le=5)] = 0.3  # electrical

@@ -2,7 +2,7 @@
 """Values that are possible but probably not intended: a unit that is off by 1000, an impossible map, coarse tables.
 
 A doubt is a warning of motor check and build. Where a motor is refused for any reason, a doubt about its units goes
-first: what follows from a slip of the units says nothing about the slip.
+first, because a consequence of a wrong unit does not tell the user its cause.
 """
 
 import math
@@ -21,18 +21,18 @@ from fluxtrue_tools.motor.references import ERROR_WANTED, ERROR_WANTED_WEAK
 if TYPE_CHECKING:
     from fluxtrue_tools.motor.motor import Motor
 
-EMF_MOST = 60.0  # of what the dc link can balance, by the magnet alone at top speed: field weakening has its limits
-EMF_LEAST = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
-SALIENCE_MOST = 100.0  # flux of i_max in the q axis over the magnet's
-DROP_LEAST = 5e-5  # of vdc, by i_max on the resistance
+EMF_MAX = 60.0  # of what the dc link can balance, by the magnet alone at top speed: field weakening has its limits
+EMF_MIN = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
+SALIENCE_MAX = 100.0  # flux of i_max in the q axis over the magnet's
+DROP_MIN = 5e-5  # of vdc, by i_max on the resistance
 RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
-OFFSET_MOST = 0.05  # of the largest psi_q
-CURL_MOST = 0.05  # of the mean inductance
+OFFSET_MAX = 0.05  # of the largest psi_q
+CURL_MAX = 0.05  # of the mean inductance
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """One warning; conclusive where nothing else that is refused needs to be said beside it."""
+    """One warning; a conclusive one replaces every other complaint about the motor."""
 
     text: str
     conclusive: bool = False
@@ -51,17 +51,17 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     machine = config.machine
     psi_f = float(model.psi_d(0.0, 0.0))
     emf = config.omega_max_rad_s * psi_f / _reach_V(config)
-    if emf > EMF_MOST:
+    if emf > EMF_MAX:
         yield Doubt(f"{_flux_key(config, psi_f)} looks like mV·s: at speed_max_rpm the magnet alone would induce "
                     f"{emf:.0f} times what vdc_V can balance; wanted: V·s ({psi_f / 1000:g})", True)  # fmt: skip
     psi_q = float(model.psi_q(0.0, machine.i_max_A))
-    if psi_q > SALIENCE_MOST * psi_f:
+    if psi_q > SALIENCE_MAX * psi_f:
         key = "machine.lq_H" if machine.flux_map is None else f"{machine.flux_map}: psi_q_Vs"
         yield Doubt(f"{key}: i_max_A makes {psi_q / psi_f:.0f} times the magnet's flux in the q axis, as if an "
                     "inductance were in mH; wanted: H, V·s and A", True)  # fmt: skip
     whole = float(np.hypot(model.psi_d(0.0, machine.i_max_A), psi_q))
     used = config.omega_max_rad_s * whole / _reach_V(config)
-    if used < EMF_LEAST:
+    if used < EMF_MIN:
         rad_s = machine.speed_max_rpm * 60.0 / (2.0 * math.pi)
         yield Doubt(f"machine.speed_max_rpm = {machine.speed_max_rpm:g} rpm: there all flux needs {100 * used:.1g} % "
                     f"of vdc_V = {config.inverter.vdc_V:g} V; as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
@@ -69,7 +69,7 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
 
 def _values(config: MotorConfig) -> Iterator[Doubt]:
     machine = config.machine
-    if machine.r_ohm * machine.i_max_A < DROP_LEAST * config.inverter.vdc_V:
+    if machine.r_ohm * machine.i_max_A < DROP_MIN * config.inverter.vdc_V:
         yield Doubt(f"machine.r_ohm = {machine.r_ohm:g} Ω drops {machine.r_ohm * machine.i_max_A:.2g} V at i_max_A: "
                     f"is it {1000 * machine.r_ohm:g} Ω?")  # fmt: skip
     run_up = machine.inertia_kgm2 * config.omega_max_rad_s / machine.pole_pairs / machine.torque_max_Nm
@@ -79,7 +79,7 @@ def _values(config: MotorConfig) -> Iterator[Doubt]:
 
 
 def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
-    """Keys whose value takes their effect away; keys whose combination does are refused (config.py)."""
+    """Keys that have no effect because of their value; a combination of keys without effect is refused (config.py)."""
     machine, given = config.machine, config.identification.given()
     if "iron_loss_uncertainty" in given and machine.iron_loss_hysteresis == machine.iron_loss_eddy == 0.0:
         yield Doubt("identification.iron_loss_uncertainty has no effect: both iron_loss keys are 0")
@@ -107,14 +107,14 @@ def _map(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> Ite
         return
     name, offset = config.machine.flux_map, flux_map.symmetry.psi_q_offset_Vs
     largest = float(np.abs(flux_map.psi_q_Vs).max())
-    if abs(offset) > OFFSET_MOST * largest:
+    if abs(offset) > OFFSET_MAX * largest:
         yield Doubt(f"{name}: psi_q_Vs has an offset of {1e3 * offset:.3g} mV·s, {100 * abs(offset) / largest:.2g} % "
                     "of its largest value; it is taken away (allowed without a warning: "
-                    f"{100 * OFFSET_MOST:g} %). An angle that is off turns psi_d into psi_q")  # fmt: skip
+                    f"{100 * OFFSET_MAX:g} %). An angle that is off turns psi_d into psi_q")  # fmt: skip
     turned = curl(model, config.machine.i_max_A)
-    if turned > CURL_MOST:
+    if turned > CURL_MAX:
         yield Doubt(f"{name}: not reciprocal: d psi_d/d i_q and d psi_q/d i_d differ by {100 * turned:.3g} % of the "
-                    f"mean inductance (allowed without a warning: {100 * CURL_MOST:g} %); no lossless machine has "
+                    f"mean inductance (allowed without a warning: {100 * CURL_MAX:g} %); no lossless machine has "
                     "such a map")  # fmt: skip
 
 

@@ -36,7 +36,7 @@ INDENT = "    "
 
 
 def _float(value: float) -> str:
-    """A float literal that reads back as the nearest float."""
+    """A float literal that the compiler reads as the nearest float."""
     text = str(np.float32(value))
     return (text if "." in text or "e" in text else text + ".0") + "f"
 
@@ -96,7 +96,7 @@ def _measure(motor: Motor) -> list[Row]:
     u16(ratio, Q15_ONE, "v_dc_full_scale_V/V_b")  # below 2
     gain = round(math.ldexp(ratio, 14 + shift))
     scale = round(2 ** (13 + shift) / 3)
-    # Mid scale stays exactly no current; half an LSB of alpha, which takes twice phase a.
+    # Mid scale is exactly no current; the offset rounds alpha, which contains twice phase a, by half an LSB.
     bias = -scale << 15 - shift
     phases = [(scale, bias + 2048), (-scale, -bias), (-scale, -bias)]
     return [
@@ -475,7 +475,7 @@ def _q15_tables(motor: Motor) -> list[str]:
 
 
 def check_numbers(motor: Motor) -> None:
-    """Refuse what does not fit the firmware's formats, without making the text."""
+    """Refuse numbers that do not fit the firmware's formats, without generating the files."""
     _motor(motor)
 
 

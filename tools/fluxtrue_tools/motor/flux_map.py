@@ -23,7 +23,7 @@ SEPARATORS = {";": "';'", "\t": "tabs"}
 
 @dataclass(frozen=True)
 class Symmetry:
-    """What symmetrising took away: (f(i_q) -+ f(-i_q))/2 over the nodes, V·s."""
+    """The parts that symmetrising removed: (f(i_q) -+ f(-i_q))/2 over the nodes, V·s."""
 
     source: str  # which part of the plane the file covers
     psi_d_max_Vs: float
@@ -55,7 +55,7 @@ class _Grid:
 
 def _number(path: Path, line: int, column: str, text: str) -> float:
     try:
-        value = float(text.replace("_", "?"))  # Python would take 1_0 for 10
+        value = float(text.replace("_", "?"))  # Python would read 1_0 as 10
     except ValueError:
         raise FluxtrueError(f"{path}:{line}: {column} = '{text.strip()[:40]}', allowed: a number") from None
     if not math.isfinite(value) or abs(value) > VALUE_MAX:
@@ -194,7 +194,7 @@ def _both_halves(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
         q_plus, q_minus = model.psi_q(d, q), model.psi_q(d, -q)
     lost_d, lost_q = (d_plus - d_minus) / 2, (q_plus + q_minus) / 2
     source = "both halves" if shared else "both halves, mirrored nodes interpolated"
-    # The removed parts over the whole plane: every node but i_q = 0 stands for two.
+    # The removed parts over the whole plane: every node except those at i_q = 0 counts twice.
     both = np.concatenate((np.arange(len(iq)), np.arange(1, len(iq))))
     symmetry = Symmetry(
         source,
@@ -211,7 +211,7 @@ def _one_half(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
     """One half mirrored. psi_q(i_q = 0) must become 0: that offset is taken from its whole i_d row."""
     negative = grid.iq_A[0] < 0
     iq = -grid.iq_A[::-1] if negative else grid.iq_A
-    iq = np.abs(iq)  # no minus zero
+    iq = np.abs(iq)  # avoids minus zero
     psi_d = grid.psi_d[:, ::-1] if negative else grid.psi_d
     psi_q = -grid.psi_q[:, ::-1] if negative else grid.psi_q
     offset = psi_q[:, :1]
@@ -228,7 +228,7 @@ def _one_half(grid: _Grid) -> tuple[Array, Array, Array, Symmetry]:
 
 
 def _place(grid: _Grid, i_d: float, i_q: float) -> str:
-    """Where the file has a point of the symmetrised half plane; in the half that it has."""
+    """The point of the file that belongs to a point of the symmetrised half plane."""
     for q in (i_q, -i_q):
         line = grid.line_of.get((i_d, q + 0.0)) or grid.line_of.get((i_d, -0.0 if q == 0.0 else q))
         if line is not None:
@@ -237,7 +237,7 @@ def _place(grid: _Grid, i_d: float, i_q: float) -> str:
 
 
 def _check_rising(path: Path, grid: _Grid, iq: Array, name: str, psi: Array, axis: int) -> None:
-    """A flux that falls with its own current: where, in terms of the file."""
+    """Refuse a flux that falls while its own current rises, and name the place in the file."""
     falls = np.diff(psi, axis=axis) <= 0
     if not falls.any():
         return

@@ -80,7 +80,7 @@ class SplineModel:
         return _Surface(xf, yf, zxy)
 
     def _rises(self, id_A: Array, iq_A: Array) -> bool:
-        """No overshoot of the spline: both incremental inductances positive between the nodes too."""
+        """Whether the spline rises everywhere: both incremental inductances are positive between the nodes, too."""
         x = np.interp(np.linspace(0, len(id_A) - 1, 4 * len(id_A) - 3), np.arange(len(id_A)), id_A)
         y = np.interp(np.linspace(0, len(iq_A) - 1, 4 * len(iq_A) - 3), np.arange(len(iq_A)), iq_A)
         d, q = np.meshgrid(x, y, indexing="ij")

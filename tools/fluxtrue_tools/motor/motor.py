@@ -22,7 +22,7 @@ from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.motor.quantise import Unfit
 from fluxtrue_tools.motor.references import Limits, ReferenceErrors, References, Solver, make_references
 
-TORQUE_SHARE_MIN = 0.01  # of the torque at i_max: less is a slip of the units, and below the formats' resolution
+TORQUE_SHARE_MIN = 0.01  # of the torque at i_max: less is a wrong unit, and below the resolution of the formats
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def resolve(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> 
 
 
 def _whole(flux_map: FluxMap | None, model: FluxModel) -> Test:
-    """Everything that motor build refuses a configuration for."""
+    """Every check for which motor build refuses a configuration."""
     from fluxtrue_tools.motor.emit_c import check_numbers
 
     def test(config: MotorConfig) -> None:
@@ -118,7 +118,7 @@ def _whole(flux_map: FluxMap | None, model: FluxModel) -> Test:
 def _advised(
     config: MotorConfig, flux_map: FluxMap | None, model: FluxModel, error: Unfit, quick: Test
 ) -> FluxtrueError:
-    """What does not fit, with a doubt about the units first, else with the keys that help."""
+    """The complaint about a number that does not fit: the doubt about its unit, else the keys that help."""
     doubt = doubts.explaining(config, model)
     if doubt is not None and doubt.conclusive:
         return FluxtrueError(doubt.text)

@@ -16,4 +16,4 @@ def source_files(folder: Path) -> tuple[Path, ...]:
     try:
         return path, folder / tomllib.loads(path.read_text(encoding="utf-8-sig"))["machine"]["flux_map"]
     except (OSError, ValueError, TypeError, LookupError, RecursionError):
-        return (path,)  # no map, or nothing that can be read: said when it is loaded
+        return (path,)  # a missing or unreadable map is reported when it is loaded

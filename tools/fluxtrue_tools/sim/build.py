@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the simulation library of a motor is, and how it gets there."""
+"""The place of a motor's simulation library, and its build."""
 
 import contextlib
 import fcntl
@@ -71,7 +71,7 @@ def locate(motor: str, base: Path, where: str = "motor") -> tuple[str, Path]:
         found = stat.S_ISREG((folder / "motor.toml").stat().st_mode)
     except FileNotFoundError:
         found = False
-    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, too long a name
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, an unknown ~user, a name that is too long
         raise FluxtrueError(f"{where} = {motor!r}: {getattr(error, 'strerror', None) or error}") from None
     if not found:
         raise FluxtrueError(f"{where} = {motor!r}: neither a folder with a motor.toml nor one of {shipped}")
@@ -121,7 +121,7 @@ def run_logged(command: list[str], log: Path, label: str) -> None:
 
 
 def configure_build(build_dir: Path, folder: Path | None, log: Path) -> None:
-    """A build folder that is not there yet; a folder with motor data: for that machine alone, without tests."""
+    """Configure a new build folder; with a folder of motor data for that machine alone, without tests."""
     if (build_dir / "build.ninja").is_file():
         return
     command = ["cmake", "--preset", "host", "-B", str(build_dir)]
@@ -144,7 +144,7 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
 
 
 def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor") -> MotorFolder:
-    """The built motor. A given build folder is used as it is; else build/ is brought up to date."""
+    """The built motor. A given build folder is used as it is; otherwise build/ is brought up to date."""
     name, folder = locate(motor, base or Path.cwd(), where)
     is_shipped = folder == SHIPPED / name
     if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
@@ -162,7 +162,7 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None,
 
 
 def _make_from(name: str, build_dir: Path, folder: Path) -> MotorFolder:
-    """A build of its own for a folder anywhere; motor data that are refused leave none behind."""
+    """Build a motor from any folder in a build folder of its own, which is removed if the motor data are refused."""
     is_new = not build_dir.exists()
     if is_new:
         _check_motor(folder)
@@ -177,7 +177,7 @@ def _make_from(name: str, build_dir: Path, folder: Path) -> MotorFolder:
 
 
 def _check_motor(folder: Path) -> None:
-    """Reports bad motor data instead of the build log."""
+    """Report bad motor data themselves instead of the build log."""
     from fluxtrue_tools.motor.build import generate
     from fluxtrue_tools.motor.motor import load_motor, naming
 

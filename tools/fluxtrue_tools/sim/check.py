@@ -17,9 +17,9 @@ from fluxtrue_tools.sim.scenario import Scenario
 
 VALUES_MAX: Final = 100_000_000  # of a recording in memory, 800 MB
 SMALL, HUGE = 1e-9, 1e30
-HALVINGS: Final = 60  # from an accepted to a refused value: to the last digit of a float
+HALVINGS: Final = 60  # bisections between an accepted and a refused value, down to the last digit of a float
 
-# Where a scenario gives what the plant calls otherwise.
+# Keys of a scenario for parameters that have another name in the plant.
 GIVEN_AS: Final = {
     "plant.speed_rad_s": "profile.speed_rpm", "plant.vdc_V": "profile.vdc_V", "plant.winding_C": "profile.winding_C",
     "plant.magnet_scale": "profile.magnet_scale", "plant.load_Nm": "profile.load_Nm",
@@ -59,7 +59,7 @@ class Range:
     takes_high: bool = True
 
     def text(self, unit: str) -> str:
-        """In words."""
+        """The range in words."""
         low = f"{'from' if self.takes_low else 'above'} {self.low:g}" if math.isfinite(self.low) else ""
         high = f"{'up to' if self.takes_high else 'below'} {self.high:g}" if math.isfinite(self.high) else ""
         if low.startswith("from") and high.startswith("up"):
@@ -92,7 +92,7 @@ def _key(scenario: Scenario, name: str) -> str:
 
 
 def tidy(value: float) -> float | int:
-    """3.0 as it was written: 3."""
+    """A number as a user writes it: 3 instead of 3.0."""
     return int(value) if value.is_integer() and abs(value) < 1e6 else value
 
 
@@ -113,7 +113,7 @@ def complaint(error: lib.LoopError, key: str, motor: Motor, loop: lib.Loop | Non
 
 
 def refused(error: lib.LoopError, scenario: Scenario, motor: Motor, where: str) -> FluxtrueError:
-    """A value of the start that the library does not take."""
+    """The complaint about an initial value that the library refuses."""
     return FluxtrueError(f"{where}: {complaint(error, _key(scenario, error.name), motor)}")
 
 
@@ -148,7 +148,7 @@ def speed(scenario: Scenario, motor: Motor, period_s: float, where: str) -> None
 
 
 def ranges(scenario: Scenario, motor: Motor, loop: lib.Loop, where: str) -> None:
-    """Walk through the whole run without its periods: every value of profiles and events in its turn."""
+    """Check every value of profiles and events in the order of the run, without simulating a period."""
     moving = profiles.moving(scenario)
     events = sorted(enumerate(scenario.event), key=lambda item: item[1].t)
     times = profiles.breakpoints(scenario)

@@ -19,7 +19,7 @@ AT_START = {"plant.seed": "seed", "plant.theta_m_rad": "plant.theta_m_rad"}
 
 
 class _Plant:
-    """What the plant's fields are during a run: as given, and as events change them."""
+    """The values of the plant's fields during a run: those given, and those that events set."""
 
     def __init__(self, table: "Plant", events: "tuple[Event, ...]" = ()) -> None:
         self.table = table

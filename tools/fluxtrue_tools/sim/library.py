@@ -134,7 +134,7 @@ class Loop:
         return created
 
     def close(self) -> None:
-        """Give the memory back; the object is of no use afterwards."""
+        """Release the memory; afterwards the object cannot be used."""
         if self._sim:
             self._library.sim_destroy(self._sim)
             self._sim = None
@@ -180,7 +180,7 @@ class Loop:
             raise LoopError("memory", None, code)
 
     def record(self, names: Sequence[str], every: int = 1) -> None:
-        """Columns of the rows that run() answers: one row each `every` periods."""
+        """Choose the columns that run() returns, with one row for each `every` periods."""
         array = (ctypes.c_char_p * len(names))(*[name.encode() for name in names])
         code = self._library.sim_record(self._sim, array, len(names), every)
         if code != 0:
@@ -204,7 +204,7 @@ class Loop:
         return rows[:written]
 
     def run_s(self, seconds: float) -> NDArray[np.float64]:
-        """Run a time, rounded to whole periods."""
+        """Run for a time, rounded to whole periods."""
         return self.run(round(seconds / self.period_s))
 
 
@@ -225,7 +225,7 @@ class FluxMap:
         self.psi_d_Vs, self.psi_q_Vs = tidy(psi_d_Vs), tidy(psi_q_Vs)
 
     def hand_over(self, library: ctypes.CDLL, sim: int) -> None:
-        """Give the plant its own copy."""
+        """Copy the map into the plant."""
         code = library.sim_map(
             sim,
             _pointer(self.id_A),

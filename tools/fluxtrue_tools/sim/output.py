@@ -51,5 +51,5 @@ def summary(recording: Recording) -> dict[str, Any]:
 
 
 def json_text(data: dict[str, Any]) -> str:
-    """Readable, and the same for the same run but for the realtime factor."""
+    """JSON text; the same run gives the same text except for the realtime factor."""
     return json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

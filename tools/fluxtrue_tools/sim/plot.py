@@ -90,7 +90,7 @@ def _voltage(axes: Axes, run: Recording) -> None:
 
 
 def _scales(axes: Axes, run: Recording) -> None:
-    """What the tables and the iron loss are multiplied with."""
+    """The identified factors of the tables and of the iron loss."""
     now = run["time_s"]
     for name, label, colour in (("lq_scale", "ψ_q", TRUTH), ("ld_scale", "ψ_d − ψ_f", ESTIMATE),
                                 ("iron_scale", "iron loss", SECOND)):  # fmt: skip
@@ -127,7 +127,7 @@ def _local(axes: Axes, run: Recording) -> None:
 
 
 def _widen(axes: Axes, span: float) -> None:
-    """A constant is drawn as a constant, not as the noise of its last digit."""
+    """Widen the axis of a constant, so that the noise of its last digit is not visible."""
     low, high = axes.get_ylim()
     if high - low < span:
         middle = 0.5 * (low + high)
@@ -145,7 +145,7 @@ def _mark_faults(axes: Axes, run: Recording, named: bool) -> None:
 
 
 def figure(run: Recording, title: str) -> Figure:
-    """Torque, currents, flux, resistance, speed, voltages; of the firmware what else it identified."""
+    """Torque, currents, flux, resistance, speed and voltages; for the firmware also what else it identified."""
     panels = [torque, _currents, flux, resistance, _speed, _voltage]
     panels += [_scales, _residues, _local, _confidence] if "lq_scale" in run.columns else []
     rows = len(panels) // 2

@@ -40,7 +40,7 @@ def value_at(points: Points, now: float, after: bool) -> float:
 
 
 def breakpoints(scenario: Scenario, chunk_s: float | None = None) -> list[float]:
-    """Beginning, end, events, points of moving profiles; and the chunks that a long run is cut into."""
+    """Times of the beginning, the end, events and points of moving profiles, and ends of the chunks of a long run."""
     end = scenario.duration_s
     times = {0.0, end} | {event.t for event in scenario.event}
     for _, points, _ in moving(scenario).values():

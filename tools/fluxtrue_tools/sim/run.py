@@ -88,11 +88,11 @@ class Recording:
         return np.asarray((now > first + 0.5 * every) & (now < last + 0.5 * every))
 
     def mean(self, column: str, span: tuple[float, float] | None = None) -> float:
-        """Mean over a time window; left out: the scenario's."""
+        """Mean over a time window, by default the scenario's."""
         return float(self[column][self.window(*(span or self.scenario.averaged()))].mean())
 
     def error_percent(self, column: str, truth: str) -> float | None:
-        """Mean of a column against the mean of its truth; None when that is nothing."""
+        """Error of a column's mean relative to the mean of the truth; None if the latter is zero."""
         true = self.mean(truth)
         return None if true == 0.0 else 100.0 * (self.mean(column) / true - 1.0)
 
@@ -118,12 +118,12 @@ class Recording:
         return found
 
     def in_words(self, fault: str) -> str:
-        """A fault's name; that of refused motor data with what is wrong with them."""
+        """A fault's name; with the configuration fault also the check that failed."""
         why = faults.refused_data(self.motor_check) if fault == faults.CONFIG else ""
         return f"{fault} ({why})" if why else fault
 
     def unexpected(self) -> str | None:
-        """What is wrong with the run's faults: a trip that the scenario does not expect, or the other way round."""
+        """Complaint about the run's faults: a trip that the scenario does not expect, or a missing one."""
         tripped, wanted = self.faults(), self.scenario.expect_fault
         if not tripped:
             return None if wanted is None else f"expect_fault = {wanted!r}: the drive did not trip"
@@ -190,7 +190,7 @@ def simulate(
     if channels is None:
         channels = (*CHANNELS, *IDENTIFIED) if scenario.controller.kind == "firmware" else CHANNELS
     columns = [column_name(c) for c in channels]
-    with _start(scenario, motor, where) as probe:  # a whole run without its periods
+    with _start(scenario, motor, where) as probe:  # all values of the run, without simulating it
         check.speed(scenario, motor, probe.period_s, where)
         every = check.rows(scenario, probe.period_s, len(columns), where)
         check.ranges(scenario, motor, probe, where)

@@ -115,7 +115,7 @@ class Profile(Strict):
         return f"profile.{other if other in self.given() else name}"
 
     def resolved(self, torque_max_Nm: float, speed_max_rpm: float) -> "Profile":
-        """With the shares worked out for a motor."""
+        """The profile with shares of rated values replaced by the values of a motor."""
         factors = {"torque_share": torque_max_Nm, "speed_share": speed_max_rpm}
         worked_out = {
             SHARES[share]: tuple((t, factor * value) for t, value in getattr(self, share))
@@ -201,7 +201,7 @@ FLAGS = ("enable", "torque_loop", "identification", "identification_mode", "trim
 
 
 def _kind_of(name: str) -> type | None:
-    """Of a name in an event: bool and int where the simulation would cut a fraction off."""
+    """Type of a name in an event: bool and int where the simulation would truncate a fraction."""
     if name in FLAGS:
         return bool
     base = name.removeprefix("plant.").removesuffix("_a").removesuffix("_b").removesuffix("_c")
@@ -235,17 +235,17 @@ def _events(value: Any) -> Any:
 
 
 class Window(Strict):
-    """What the summary averages; left out: the last 0.3 s."""
+    """The time window of the summary, by default the last 0.3 s."""
 
     from_s: NotNegative | None = None
     to_s: Positive | None = None
 
 
 class Scenario(Strict):
-    """One run."""
+    """A scenario: everything that describes one run."""
 
     motor: Annotated[str, Field(min_length=1)]
-    expect_fault: str | None = None  # a run that trips is a failure unless its fault is named here
+    expect_fault: str | None = None  # a run that trips fails unless its fault is named here
     duration_s: Annotated[Number, Field(gt=0, le=36000)]
     seed: Annotated[int, Field(ge=0, lt=2**53)] = 1
     record_every_s: Positive = 1e-3
@@ -277,7 +277,7 @@ class Scenario(Strict):
         return self
 
     def resolved(self, torque_max_Nm: float, speed_max_rpm: float) -> "Scenario":
-        """For a motor: torque and speed in their units."""
+        """The scenario for a motor, with torque and speed in their units."""
         return self.model_copy(update={"profile": self.profile.resolved(torque_max_Nm, speed_max_rpm)})
 
     def averaged(self) -> tuple[float, float]:

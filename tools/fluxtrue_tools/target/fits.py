@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a port can carry a machine: its timer the period and the dead time, its processor the PWM frequency.
+"""Whether a port suits a machine: its timer must make the period and the dead time, its processor the PWM frequency.
 
-The port tells its limits in budget.toml. What its interrupts cost is measured (docs/performance.json, emulated): the
-most that each of them took, added up as if they always did.
+The limits of a port are in its budget.toml. The cost of its interrupts is measured (docs/performance.json, emulated);
+the maxima of all interrupts are added up.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ ROOT = Path(__file__).resolve().parents[3]
 MEASURED = ROOT / "docs" / "performance.json"
 COMMAND_HZ = 100
 WORK, TASK, CAN = "10 kHz work", "1 kHz task", "CAN ISR"  # rows of performance.json; the work is that of a period
-MOST = 2
+MAXIMUM = 2  # after minimum and average
 
 
 def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any]) -> float:
-    """Of the processor, with the identification that takes more."""
+    """Share of the processor that is busy, with the identification that takes longer."""
     tasks_hz = pwm_hz / periods_per_step(pwm_hz)
 
     def cycles_per_s(runs: dict[str, Any]) -> float:
-        most = {name: float(runs[name]["cycles"][MOST]) for name in (WORK, TASK, CAN)}
-        return pwm_hz * most[WORK] + tasks_hz * most[TASK] + COMMAND_HZ * most[CAN]
+        cycles = {name: float(runs[name]["cycles"][MAXIMUM]) for name in (WORK, TASK, CAN)}
+        return pwm_hz * cycles[WORK] + tasks_hz * cycles[TASK] + COMMAND_HZ * cycles[CAN]
 
     return max(cycles_per_s(drive["runs"]) for drive in measured["drives"].values()) / core_hz
 
@@ -36,12 +36,12 @@ def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any]) -> float
 def _check_timer(pwm_hz: float, dead_time_s: float, pwm: dict[str, Any], port: str) -> None:
     ticks = round(pwm["timer_Hz"] / pwm_hz)
     if ticks > pwm["period_ticks_max"]:
-        least = pwm["timer_Hz"] / pwm["period_ticks_max"]
-        raise FluxtrueError(f"inverter.pwm_hz = {pwm_hz:g}, allowed on the {port}: from {least:.0f}")
-    most_s = min(pwm["dead_time_ticks_max"] / pwm["timer_Hz"], pwm["dead_time_share_max"] / pwm_hz)
-    if not 0.0 < dead_time_s <= most_s * (1.0 + 1e-9):
+        lowest_hz = pwm["timer_Hz"] / pwm["period_ticks_max"]
+        raise FluxtrueError(f"inverter.pwm_hz = {pwm_hz:g}, allowed on the {port}: from {lowest_hz:.0f}")
+    longest_s = min(pwm["dead_time_ticks_max"] / pwm["timer_Hz"], pwm["dead_time_share_max"] / pwm_hz)
+    if not 0.0 < dead_time_s <= longest_s * (1.0 + 1e-9):
         raise FluxtrueError(f"inverter.dead_time_s = {dead_time_s:g}, allowed on the {port} at inverter.pwm_hz = "
-                            f"{pwm_hz:g}: more than 0, up to {most_s:.4g}")  # fmt: skip
+                            f"{pwm_hz:g}: more than 0, up to {longest_s:.4g}")  # fmt: skip
 
 
 def check(motor: Path, budget: Path, measured: Path = MEASURED) -> str:
@@ -51,8 +51,10 @@ def check(motor: Path, budget: Path, measured: Path = MEASURED) -> str:
     pwm_hz = float(inverter["pwm_hz"])
     _check_timer(pwm_hz, float(inverter["dead_time_s"]), port["pwm"], name)
     costs = json.loads(measured.read_text(encoding="utf-8"))
-    share, most = busy_share(pwm_hz, port["core_Hz"], costs), port["busy_share_max"]
+    share, share_max = busy_share(pwm_hz, port["core_Hz"], costs), port["busy_share_max"]
     said = f"{100.0 * share:.0f} % of the time at inverter.pwm_hz = {pwm_hz:g}"
-    if share > most:
-        raise FluxtrueError(f"the processor of the {name} would be busy for {said}, allowed: up to {100.0 * most:g} %")
+    if share > share_max:
+        raise FluxtrueError(
+            f"the processor of the {name} would be busy for {said}, allowed: up to {100.0 * share_max:g} %"
+        )
     return f"busy for at most {said}, without wait states"

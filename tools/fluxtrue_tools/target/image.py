@@ -45,7 +45,7 @@ class Image:
         return self.symbols[name]
 
     def place(self, address: int, size: int) -> int:
-        """Where in the file the bytes at a run-time address are."""
+        """The offset in the file of the bytes at a run-time address."""
         for part in self.segments:
             inside = address - part["p_vaddr"]
             if inside >= 0 and inside + size <= part["p_filesz"]:
@@ -93,12 +93,12 @@ def seal(path: Path) -> str:
     return f"{path.name}: CRC-32 {crc:#010x} over {end - start} bytes at {start:#x}"
 
 
-def size(path: Path, flash_most: int, ram_most: int) -> str:
+def size(path: Path, flash_max: int, ram_max: int) -> str:
     """Flash and RAM, against bounds."""
     sections = Image(path).sections
     flash = sum(s["sh_size"] for s in sections if s["sh_type"] == "SHT_PROGBITS")
     ram = sum(s["sh_size"] for s in sections if s["sh_addr"] >= RAM_FROM)
-    text = f"{path.name}: flash {flash} of {flash_most} bytes, RAM {ram} of {ram_most} bytes with the stack"
-    if flash > flash_most or ram > ram_most:
+    text = f"{path.name}: flash {flash} of {flash_max} bytes, RAM {ram} of {ram_max} bytes with the stack"
+    if flash > flash_max or ram > ram_max:
         raise FluxtrueError(text)
     return text

@@ -70,7 +70,7 @@ class Device:
         return {i.findtext("name", ""): int(i.findtext("value", "0"), 0) for i in found}
 
     def registers(self, peripheral: str) -> dict[str, Register]:
-        """By name; ``NAME*`` is the array of NAME0, NAME1 ... and of SVD's NAME%s."""
+        """The registers by name; ``NAME*`` stands for the array NAME0, NAME1 ... and for SVD's NAME%s."""
         element = self._peripheral(peripheral)
         if parent := element.get("derivedFrom"):
             element = self._peripheral(parent)

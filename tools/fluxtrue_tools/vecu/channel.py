@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fluxtrue_tools.errors import FluxtrueError
 
-TIMEOUT_S = 600.0  # only ends a hang: how long a run takes is its own affair
+TIMEOUT_S = 600.0  # only ends a hang; the duration of a run is not limited
 
 
 class BenchRefused(FluxtrueError):
@@ -16,7 +16,7 @@ class BenchRefused(FluxtrueError):
 
 @dataclass
 class Ran:
-    """What a run answers: simulated time, frames sent to our CAN connection so far, recorded rows."""
+    """The answer to a run: simulated time, frames sent to our CAN connection so far, recorded rows."""
 
     now_ns: int
     frames: int
@@ -44,7 +44,7 @@ class Channel:
         self._file = self._socket.makefile("r", encoding="ascii", newline="\n")
 
     def another(self) -> "Channel":
-        """A second connection: while one waits for its run the other one may ask."""
+        """A second connection, for requests while this one waits for the end of a run."""
         return Channel(*self._address)
 
     def is_fast(self) -> bool:
@@ -52,7 +52,7 @@ class Channel:
         return self.ask("hello").split()[2] == "fast"
 
     def close(self) -> None:
-        """Leave; the bench goes on."""
+        """Close the connection; the bench continues."""
         self._file.close()
         self._socket.close()
 
@@ -73,7 +73,7 @@ class Channel:
         raise FluxtrueError("bench channel: the bench has closed the connection")
 
     def ask(self, command: str) -> str:
-        """Command and answer."""
+        """Send a command and return its answer."""
         self.send(command)
         return self.answer()
 
@@ -90,11 +90,11 @@ class Channel:
         self.ask(f"set {' '.join(pairs)}")
 
     def ramp(self, name: str, value: float, seconds: float) -> None:
-        """Linearly, during the runs to come."""
+        """Change values linearly during the next runs."""
         self.ask(f"ramp {name} {float(value)!r} {float(seconds)!r} s")
 
     def record(self, names: Sequence[str], periods: int = 10) -> None:
-        """Rows that the following runs answer; no names: none."""
+        """Choose the values that the following runs record; without names they record none."""
         self.ask(f"record {periods} {' '.join(names)}" if names else "record off")
 
     def run(self, milliseconds: float, port: int = 0, sent: int = 0) -> Ran:
@@ -105,11 +105,11 @@ class Channel:
         return Ran(int(now_ns), int(frames), rows)
 
     def counters(self) -> dict[str, float]:
-        """Of bus, hub and bench."""
+        """The counters of bus, hub and bench."""
         return {name: float(value) for name, value in (pair.split("=") for pair in self.ask("counters").split())}
 
     def duty_hash(self) -> str:
-        """Of all duties and gate states since it was last asked for."""
+        """Hash of all duties and gate states since the last call."""
         return self.ask("hash")
 
     def reset(self, seed: int = 1) -> None:

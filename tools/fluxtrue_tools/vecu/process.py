@@ -14,7 +14,7 @@ STOP_S = 10.0
 
 
 class VirtualEcu:
-    """Starts it on free ports, tells them, and stops it."""
+    """Starts the virtual ECU on free ports, gives their numbers, and stops it."""
 
     def __init__(self, program: Path, fast: bool = True, seed: int = 1, nvm: Path | None = None) -> None:
         command = [str(program), "--fast" if fast else "--realtime", "--port", "0", "--bench-port", "0",
@@ -33,7 +33,7 @@ class VirtualEcu:
         self.motor, self.can_port, self.bench_port = found[1], int(found[3]), int(found[4])
 
     def stop(self) -> int:
-        """End it as a user does; its exit code."""
+        """End it as a user does; the result is its exit code."""
         self._process.terminate()
         try:
             return self._process.wait(STOP_S)

@@ -17,13 +17,13 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST
 
-# A frame that the ECU has counted as sent is at most one turn of its loop away.
+# A frame that the ECU has counted as sent arrives after at most one more turn of its loop.
 TURNS: Final = 100
 TURN_S: Final = 0.1
 
 
 def client_port(bus: can.BusABC) -> int:
-    """Our side of a socketcand connection: how the bench channel knows us. 0: another interface."""
+    """Our port of a socketcand connection, by which the bench channel identifies us; 0 for another interface."""
     connection = getattr(bus, "_SocketCanDaemonBus__socket", None)
     return int(connection.getsockname()[1]) if isinstance(connection, socket.socket) else 0
 
@@ -53,7 +53,7 @@ class SteppedBus:
         self._sent += 1
 
     def run(self, milliseconds: float) -> tuple[list[can.Message], list[list[float]]]:
-        """Let time pass: the frames that came meanwhile, and the rows of a recording."""
+        """Let time pass; the result is the frames that arrived meanwhile, and the rows of a recording."""
         with self._time:
             ran = self._channel.run(milliseconds, self._port, self._sent)
         self._now_s = 1e-9 * ran.now_ns
@@ -63,8 +63,8 @@ class SteppedBus:
 
     @contextmanager
     def standing_still(self) -> Iterator[None]:
-        """Time does not pass here. Another client greets in peace: python-can takes a greeting that has a frame glued
-        to it for a broken one."""
+        """Time does not pass in this context, so that another client can connect: python-can refuses a greeting with
+        a frame appended."""
         with self._time:
             yield
 
@@ -73,5 +73,5 @@ class SteppedBus:
             message = self._bus.recv(TURN_S)
             if message is not None:
                 return message
-            self._channel.ask("hello")  # it lives, and another turn of its loop has passed
+            self._channel.ask("hello")  # it runs, and another turn of its loop has passed
         raise FluxtrueError("the virtual ECU says it has sent more frames than have arrived")
