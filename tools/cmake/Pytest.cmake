@@ -21,9 +21,10 @@ function(_fluxtrue_python_test name labels)
     fluxtrue_test_time(${name})
 endfunction()
 
-# fluxtrue_pytest(NAME <n> PATH <file or folder> [ARGS <pytest argument> ...] [LABELS <label> ...])
+# fluxtrue_pytest(NAME <n> PATH <file or folder> [ARGS <pytest argument> ...] [LABELS <label> ...]
+#                 [IMPORTS <folder below tests, whose modules the test imports> ...])
 function(fluxtrue_pytest)
-    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;PATH" "ARGS;LABELS")
+    cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;PATH" "ARGS;LABELS;IMPORTS")
     if(arg_UNPARSED_ARGUMENTS OR NOT arg_NAME OR NOT arg_PATH)
         message(FATAL_ERROR "fluxtrue_pytest: NAME and PATH wanted; unknown: "
                             "${arg_UNPARSED_ARGUMENTS}")
@@ -37,11 +38,17 @@ function(fluxtrue_pytest)
     if(arg_NAME MATCHES "abuse")
         set(plugins "")
     endif()
+    # Relative to tests/pytest.ini: pytest splits the value at blanks, which the path of the checkout may contain.
+    set(imports)
+    if(arg_IMPORTS)
+        list(JOIN arg_IMPORTS " " folders)
+        set(imports -o "pythonpath=support ${folders}")
+    endif()
     cmake_path(ABSOLUTE_PATH arg_PATH BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
     add_test(NAME ${arg_NAME}
         COMMAND "${CMAKE_COMMAND}" -E env ${FLUXTRUE_PRELOAD}
             "${FLUXTRUE_PYTHON}" -m pytest -q -c "${CMAKE_SOURCE_DIR}/tests/pytest.ini"
-            -p no:cacheprovider ${plugins} ${arg_ARGS} "${arg_PATH}"
+            -p no:cacheprovider ${plugins} ${imports} ${arg_ARGS} "${arg_PATH}"
         WORKING_DIRECTORY "${CMAKE_SOURCE_DIR}")
     _fluxtrue_python_test(${arg_NAME} "${arg_LABELS}")
 endfunction()
