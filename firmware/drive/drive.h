@@ -61,6 +61,18 @@ typedef struct {
 typedef enum { RUN_STATE_LIST(RUN_STATE_VALUE) } run_state_t;
 #undef RUN_STATE_VALUE
 
+/** The active short circuit at the bridge (drive/short_circuit.h). */
+typedef enum {
+    SHORT_CIRCUIT_LOWER = 0, /* by the lower switches, */
+    SHORT_CIRCUIT_UPPER = 1, /* by the upper ones, because the gate drivers ended the first, */
+    SHORT_CIRCUIT_NONE = 2   /* or by none, because they ended both */
+} short_circuit_side_t;
+
+typedef struct {
+    short_circuit_side_t side;
+    bool holds; /* as read back */
+} short_circuit_t;
+
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */
 typedef struct {
     angle_tracker_state_t angle_tracker;
@@ -73,8 +85,9 @@ typedef struct {
     uint32_t command_seen;        /* generation of the last command that the task wrote in time */
     uint8_t motor_check;          /* motor_check_t: the first check of the motor data that failed */
     bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
-    uint32_t fault_resets;        /* of the command, as far as carried out */
-    volatile uint32_t faults;     /* latched */
+    short_circuit_t short_circuit;
+    uint32_t fault_resets;    /* of the command, as far as carried out */
+    volatile uint32_t faults; /* latched */
 } fast_state_t;
 
 /** What the modulation adds against dead time and device drop, if it has been measured. */
@@ -119,6 +132,7 @@ typedef struct {
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     safe_state_state_t safe_state;
+    gate_fault_state_t gate_fault;
     switch_off_t switch_off;
     bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
@@ -137,6 +151,7 @@ typedef struct {
     q15_t psi_d_error;
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
+    bool gates; /* as read back: the switches follow the duties */
 } snapshot_t;
 
 /** The motor's constants that every PWM period reads, copied: in RAM they need neither a pointer nor an access to
@@ -192,10 +207,10 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 void drive_trim(drive_t *drive, q15_t v_dc);
 /** Adds a stored trim to the compensation in effect; 0 removes the trim. */
 void drive_restore_trim(drive_t *drive, int32_t trim);
-/** The drive does not run, and its safe state is the active short circuit. */
+/** The active short circuit is on, as read back from the bridge. From any priority. */
 static inline bool drive_is_shorted(const drive_t *drive)
 {
-    return drive->task.armed && drive->task.run_state != RUN_STATE_RUN && drive->task.safe_state.short_circuit;
+    return drive->fast.short_circuit.holds;
 }
 /** Current references come from outside the torque path. */
 static inline bool drive_bypasses_torque_path(const drive_t *drive)

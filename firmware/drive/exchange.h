@@ -49,8 +49,9 @@ typedef struct {
 /** Safe state: decided by the task before a fault occurs, applied by the fast ISR in the period of the fault. */
 typedef enum {
     SAFE_FREEWHEEL = 0,             /* switching disabled */
-    SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* low sides on if the fault is an over-voltage, else disabled */
-    SAFE_SHORT_CIRCUIT = 2          /* low sides on */
+    SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* short circuit if the fault is an over-voltage, else disabled */
+    SAFE_SHORT_ON_GATE_FAULT = 2,   /* short circuit if it is an over-voltage or a gate-driver fault, else disabled */
+    SAFE_SHORT_CIRCUIT = 3          /* short circuit */
 } safe_t;
 
 /** Command of the task to the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */

@@ -15,6 +15,7 @@
 #include "drive/acquire.h"
 #include "drive/drive.h"
 #include "drive/publish.h"
+#include "drive/short_circuit.h"
 #include "hal/pwm.h"
 
 #define DUTY_MIDDLE 16384
@@ -27,18 +28,22 @@ typedef struct {
     q31_t omega;
 } rotor_frame_t;
 
-/* The safe state: all low sides on (short circuit), or switching disabled (freewheel). */
+/* Whether the fault that is latched needs the short circuit. */
+static bool needs_short_circuit(uint32_t faults, safe_t safe)
+{
+    return safe == SAFE_SHORT_CIRCUIT || (safe != SAFE_FREEWHEEL && (faults & FAULT_OVER_VOLTAGE) != 0U) ||
+           (safe == SAFE_SHORT_ON_GATE_FAULT && (faults & FAULT_GATE) != 0U);
+}
+
+/* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
 static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
 {
-    const bool over_voltage = (drive->fast.faults & FAULT_OVER_VOLTAGE) != 0U;
-    const bool short_circuit = safe == SAFE_SHORT_CIRCUIT || (safe == SAFE_SHORT_ON_OVER_VOLTAGE && over_voltage);
-    const uint16_t duty = short_circuit ? 0U : DUTY_MIDDLE;
-    if (!short_circuit) {
+    if (needs_short_circuit(drive->fast.faults, safe)) {
+        short_circuit_apply(&drive->fast);
+    } else {
+        drive->fast.short_circuit.holds = false;
         hal_pwm_enable(false);
-    }
-    hal_pwm_write((duty_t){duty, duty, duty});
-    if (short_circuit) {
-        hal_pwm_enable(true); /* with the duties, not before them */
+        hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
     }
     current_control_reset(&drive->fast.current_control);
     sample->point.u = (dq_q15_t){0, 0};
@@ -114,6 +119,7 @@ static void reset_faults(drive_t *drive, uint32_t requested)
     if (drive->fast.fault_resets != requested) {
         drive->fast.fault_resets = requested;
         drive->fast.faults = drive->fast.faults & FAULT_CONFIG;
+        short_circuit_reset(&drive->fast);
     }
 }
 
@@ -152,6 +158,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
     if (command->run && fast->faults == 0) {
         control_currents(drive, sample, &now, &command->target);
         hal_pwm_enable(true);
+        fast->short_circuit.holds = false;
         count_since_enable(fast, sample);
     } else {
         if (command->faults != 0U) {

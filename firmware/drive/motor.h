@@ -19,6 +19,7 @@
 #include "control/torque/limit.h"
 #include "control/torque/loop.h"
 #include "control/torque/voltage_reserve.h"
+#include "safety/gate_fault.h"
 #include "safety/monitor.h"
 #include "safety/plausibility.h"
 #include "safety/safe_state.h"
@@ -62,6 +63,7 @@ typedef struct {
     i_d_limit_config_t i_d_limit;
     monitor_config_t monitor;
     safe_state_config_t safe_state;
+    gate_fault_config_t gate_fault;
     plausibility_config_t plausibility;
     torque_monitor_config_t torque_monitor;
     commission_config_t commission;

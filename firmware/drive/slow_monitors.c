@@ -58,5 +58,6 @@ static uint32_t check_torque(drive_t *drive, const sample_t *sample)
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
-    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample);
+    const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
+    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample) | shorted;
 }

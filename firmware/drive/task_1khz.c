@@ -1,49 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
+#include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
 #include "drive/switch_off.h"
 #include "fx/vec.h"
+#include "hal/pwm.h"
 #include "hal/temperature.h"
 #include "signal/rate_limit.h"
-
-/* Whether the measured currents are the machine's. The sum counts in this sample, not as a latched fault: in the first
- * milliseconds of a short circuit the converters saturate, which is one. */
-static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
-{
-    const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
-    return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
-           sum <= drive->motor->monitor.zero_max;
-}
-
-/* The short circuit is commanded only if the bridge has been switching before; otherwise it may not be powered. */
-static safe_t decide_safe_state(drive_t *drive, const snapshot_t *snapshot)
-{
-    task_state_t *task = &drive->task;
-    const uint32_t faults = snapshot->faults;
-    const operating_point_t *point = &snapshot->sample.point;
-    const safe_state_in_t in = {
-        .omega = fx_q15_from_q31(point->omega),
-        .psi_delta = snapshot->psi_d_error,
-        .v_dc = (q15_t)snapshot->sample.v_dc,
-        .i = point->i,
-        .i_last_period = snapshot->i_last_period,
-        .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
-        .shorted = drive_is_shorted(drive),
-        .currents_valid = currents_valid(drive, snapshot),
-        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
-        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
-    };
-    const bool short_circuit = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
-    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));
-    if (!task->armed) {
-        return SAFE_FREEWHEEL;
-    }
-    if (short_circuit) {
-        return SAFE_SHORT_CIRCUIT;
-    }
-    return in.over_voltage ? SAFE_FREEWHEEL : SAFE_SHORT_ON_OVER_VOLTAGE;
-}
 
 static run_state_t next_run_state(drive_t *drive, uint32_t faults)
 {
@@ -203,7 +167,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
     } else {
         reset_torque_path(drive);
     }
-    command.safe = decide_safe_state(drive, snapshot);
+    command.safe = safe_decision_step(drive, snapshot);
     command_box_write(&drive->commands, command);
 }
 
@@ -225,6 +189,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
         snapshot->faults = drive->fast.faults;
         exchange_barrier();
     } while (drive->samples.generation != generation);
+    snapshot->gates = hal_pwm_gates();
     snapshot->inverter_dC = hal_temperature_inverter_dC();
     snapshot->winding_dC = hal_temperature_winding_dC();
 }

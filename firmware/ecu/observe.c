@@ -65,12 +65,14 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
 
 /* Whether contactor and gate supply may be switched off. At the known speed (safety/safe_state.h) the magnets make less
  * than what may be touched, and less than 0.8 of the lowest dc voltage at which the drive runs: without them the diodes
- * would charge the dc link, beyond what the inverter withstands at high speed. */
+ * would charge the dc link, beyond what the inverter withstands at high speed. A gate fault may need them for longer
+ * (safety/gate_fault.h). */
 static bool is_slow(const drive_t *drive)
 {
     const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, (q15_t)drive->motor->monitor.v_min);
     const q15_t line_emf = drive->task.safe_state.line_emf;
-    return line_emf < least && si_from_q15(line_emf, drive->motor->bases.voltage_V) < TOUCH_SAFE_V;
+    return !drive->task.gate_fault.holds_supply && line_emf < least &&
+           si_from_q15(line_emf, drive->motor->bases.voltage_V) < TOUCH_SAFE_V;
 }
 
 static q15_t per_unit(const ecu_t *ecu, float torque_Nm)

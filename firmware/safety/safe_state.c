@@ -54,7 +54,7 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
         state->unknown_steps = 0;
     } else if (in->speed_valid) {
         state->speed = (q15_t)fx_max_s32(state->speed, measured);
-    } else if (!state->short_circuit) {
+    } else if (!state->short_circuit && !in->shorted) {
         const bool long_enough = state->unknown_steps >= UNKNOWN_STEPS;
         state->unknown_steps = long_enough ? (uint16_t)UNKNOWN_STEPS : (uint16_t)(state->unknown_steps + 1U);
         state->speed = long_enough ? fallen : state->speed;

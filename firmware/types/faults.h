@@ -24,7 +24,7 @@
     X(ANGLE_OFFSET, 12, "The direction of the back-EMF contradicts the measured angle for 5 ms.") \
     X(TORQUE, 13, "The torque from electrical power exceeds the command by max(10 Nm, 5 %) and 1/8 for 25 ms.") \
     X(TEMPERATURE, 14, "The inverter or the winding is at the end of its derating line for 110 ms.") \
-    X(GATE, 15, "The gate driver reports a fault; the hardware has disabled switching.")
+    X(GATE, 15, "The gate driver reports a fault, or a current flows although switching is disabled.")
 
 #define FAULT_BIT(name, bit, text) FAULT_##name = 1u << (bit),
 enum { FAULT_LIST(FAULT_BIT) };

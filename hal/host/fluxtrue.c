@@ -84,8 +84,7 @@ static void take_samples(fluxtrue_t *d, const double in[6])
 static void run_period(fluxtrue_t *d)
 {
     host_port_select(d);
-    if ((d->board.gate_fault || d->board.short_circuit_blocked) && !d->board.gate_fault_told) {
-        d->board.gate_fault_told = true;
+    if (host_port_fault_line(d)) {
         drive_raise_fault(&d->drive, FAULT_GATE);
     }
     fast_isr(&d->drive);
@@ -118,5 +117,5 @@ void fluxtrue_step(fluxtrue_t *drive, const double in[6], double out[4])
     out[0] = drive->duty.a / DUTY_ONE;
     out[1] = drive->duty.b / DUTY_ONE;
     out[2] = drive->duty.c / DUTY_ONE;
-    out[3] = drive->gates ? 1.0 : 0.0;
+    out[3] = drive->gates && !drive->board.fault_latched ? 1.0 : 0.0;
 }

@@ -25,8 +25,11 @@ typedef struct {
     can_queue_t received, sent;
     uint32_t lost, bus_off;
     bool output[BOARD_OUTPUTS];
-    bool gate_fault, gate_fault_told;     /* the line; reported to the drive once until switching is enabled again */
-    bool short_circuit_blocked;           /* by the gate drivers, in the last period */
+    bool gate_fault;                      /* the gate drivers' line */
+    bool short_circuit_blocked;           /* by the gate drivers in the last period: a pulse of the line */
+    bool fault_latched;                   /* by the timer, which disables switching */
+    bool gate_fault_told;                 /* to the drive: once until switching is enabled again */
+    bool gate_fault_for_board;            /* not read yet */
     bool winding_broken, inverter_broken; /* sensor defective */
     double inverter_C;
     bool watchdog_started;

@@ -45,10 +45,37 @@ void hal_pwm_write(duty_t duty)
     active->duty = duty;
 }
 
+static bool fault_line(const host_board_t *board)
+{
+    return board->gate_fault || board->short_circuit_blocked;
+}
+
+/* A controller's timer disables switching at the fault's edge, and its interrupt is masked until switching is enabled
+ * again. */
+bool host_port_fault_line(fluxtrue_t *instance)
+{
+    host_board_t *board = &instance->board;
+    if (!fault_line(board) || board->gate_fault_told) {
+        return false;
+    }
+    board->fault_latched = board->gate_fault_told = board->gate_fault_for_board = true;
+    return true;
+}
+
+/* Enabling ends the latch if the line is no longer active. */
 void hal_pwm_enable(bool on)
 {
-    active->board.gate_fault_told = active->board.gate_fault_told && (!on || active->gates);
+    host_board_t *board = &active->board;
+    if (on && !fault_line(board)) {
+        board->fault_latched = false;
+    }
+    board->gate_fault_told = board->gate_fault_told && !(on && (!active->gates || !board->fault_latched));
     active->gates = on;
+}
+
+bool hal_pwm_gates(void)
+{
+    return active->gates && !active->board.fault_latched;
 }
 
 void hal_irq_pend_mrai(void)
@@ -83,7 +110,9 @@ void hal_board_set(board_output_t output, bool on)
 
 bool hal_board_gate_fault(void)
 {
-    return active->board.gate_fault || active->board.short_circuit_blocked;
+    const bool reported = active->board.gate_fault_for_board || fault_line(&active->board);
+    active->board.gate_fault_for_board = false;
+    return reported;
 }
 
 int16_t hal_temperature_winding_dC(void)

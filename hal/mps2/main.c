@@ -38,6 +38,11 @@ void hal_pwm_enable(bool on)
     gates = on;
 }
 
+bool hal_pwm_gates(void)
+{
+    return gates;
+}
+
 int16_t hal_temperature_winding_dC(void)
 {
     return TEMPERATURE_UNKNOWN;

@@ -186,6 +186,12 @@ void hal_pwm_enable(bool on)
     }
 }
 
+/* FAULTF holds the outputs off. */
+bool hal_pwm_gates(void)
+{
+    return bridge.switching && (FTM0->FMS & FTM_FMS_FAULTF) == 0U;
+}
+
 /* The interrupt request persists until FAULTF is cleared, which happens only when switching is enabled again; therefore
  * the interrupt is masked here. */
 void pwm_gate_fault_isr(void)

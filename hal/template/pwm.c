@@ -13,3 +13,10 @@ void hal_pwm_enable(bool on)
 {
     (void)on;
 }
+
+/* Write: whether the six outputs follow the duties, read from the timer: false while they are disabled, and while the
+ * latch of its fault input holds them off. */
+bool hal_pwm_gates(void)
+{
+    return false;
+}

@@ -36,6 +36,11 @@ void hal_pwm_enable(bool on)
     gates = on;
 }
 
+bool hal_pwm_gates(void)
+{
+    return gates;
+}
+
 void hal_irq_pend_mrai(void)
 {
     pending = true;

@@ -58,6 +58,12 @@ static void pwm_enable(bool on, int calls)
     seam.gates = on;
 }
 
+static bool pwm_gates(int calls)
+{
+    (void)calls;
+    return seam.gates && !seam.gates_blocked;
+}
+
 static int16_t winding(int calls)
 {
     (void)calls;
@@ -79,6 +85,7 @@ void seam_start(void)
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Stub(pwm_write);
     hal_pwm_enable_Stub(pwm_enable);
+    hal_pwm_gates_Stub(pwm_gates);
     hal_temperature_winding_dC_Stub(winding);
     hal_temperature_inverter_dC_Stub(inverter);
     seam.motor = motor;

@@ -12,6 +12,7 @@ typedef struct {
     int16_t winding_dC, inverter_dC;
     duty_t duty;
     bool gates;
+    bool gates_blocked; /* by the gate drivers: what is enabled does not switch */
     int pended;
     char log[64];
 } seam_t;

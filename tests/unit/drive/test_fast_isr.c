@@ -130,6 +130,99 @@ void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_s
     shorted(true);
 }
 
+static void by_the_upper_switches(void)
+{
+    TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(32768, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(32768, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(32768, seam.duty.c);
+}
+
+/* The gate drivers end the short circuit by the lower switches a period after it was on: one of the upper ones is
+ * shorted. They end that by the upper ones, too: there is none. A reset tries both again. */
+void test_a_side_whose_short_circuit_the_gate_drivers_end_is_left_to_the_other_one(void)
+{
+    seam_run();
+    seam_periods(3);
+    told(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
+    seam_period();
+    shorted(true);
+    TEST_ASSERT_TRUE(drive_is_shorted(&drive));
+    seam.gates_blocked = true;
+    seam_period();
+    by_the_upper_switches();
+    TEST_ASSERT_FALSE(drive_is_shorted(&drive)); /* not before the bridge shows it */
+    seam.gates_blocked = false;
+    seam_period();
+    by_the_upper_switches();
+    TEST_ASSERT_TRUE(drive_is_shorted(&drive));
+    seam.gates_blocked = true;
+    seam_period();
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
+    seam.gates_blocked = false;
+    seam_periods(2);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_FALSE(drive_is_shorted(&drive));
+    command_t command = *command_box_read(&drive.commands);
+    command.fault_resets++;
+    command_box_write(&drive.commands, command);
+    seam_period();
+    shorted(true);
+}
+
+/* What has not been on has not failed: the line is still active from the fault before. */
+void test_while_the_fault_line_is_active_no_side_fails(void)
+{
+    seam_run();
+    seam_periods(3);
+    seam.gates_blocked = true;
+    told(SAFE_SHORT_CIRCUIT, FAULT_GATE);
+    for (int k = 0; k < 5; k++) {
+        seam_period();
+        shorted(true);
+        TEST_ASSERT_FALSE(drive_is_shorted(&drive));
+    }
+    seam.gates_blocked = false;
+    seam_period();
+    shorted(true);
+    TEST_ASSERT_TRUE(drive_is_shorted(&drive));
+}
+
+void test_a_gate_fault_shorts_the_phases_where_the_task_has_said_so(void)
+{
+    for (int n = 0; n < 2; n++) {
+        seam_start();
+        seam_run();
+        seam_periods(3);
+        told(n == 0 ? SAFE_SHORT_ON_OVER_VOLTAGE : SAFE_SHORT_ON_GATE_FAULT, 0);
+        drive_raise_fault(&drive, FAULT_GATE);
+        seam_period();
+        shorted(n == 1);
+    }
+    seam_start();
+    seam_run();
+    seam_periods(3);
+    told(SAFE_SHORT_ON_GATE_FAULT, FAULT_TORQUE);
+    seam_period();
+    shorted(false);
+}
+
+/* Switching is disabled, the machine turns slowly and still carries 100 A in the next step of the task, too. */
+void test_a_current_with_switching_disabled_is_a_gate_fault_and_shorts_the_phases(void)
+{
+    seam_run();
+    seam_periods(15);
+    drive_raise_fault(&drive, FAULT_TORQUE);
+    seam_periods(10);
+    shorted(false);
+    seam_current(100.0, -50.0, -50.0);
+    seam_periods(40);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_GATE, drive.fast.faults);
+    TEST_ASSERT_TRUE(drive.task.gate_fault.switch_shorted);
+    shorted(true);
+}
+
 /* Two samples in a row: the good one between them, which alone would be the usual period, must count as well. */
 void test_single_samples_of_over_voltage_with_good_ones_between_are_no_fault(void)
 {

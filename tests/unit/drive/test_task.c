@@ -219,6 +219,7 @@ static void sample_at(double omega_pu, bool acting, bool limited)
                     .voltage_limited = limited};
     s->point.flux = flux_table_step(&motor.flux_table, s->point.i);
     sample_box_publish(&drive.samples);
+    seam.gates = true;
 }
 
 void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)

@@ -89,6 +89,7 @@ void setUp(void)
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Ignore();
     hal_pwm_enable_Ignore();
+    hal_pwm_gates_IgnoreAndReturn(true);
     hal_board_set_Stub(board_set);
     hal_board_gate_fault_Stub(board_gate_fault);
     hal_can_receive_Stub(can_receive);

@@ -132,10 +132,9 @@ void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_
 void test_current_in_a_short_circuit_is_plausible(void)
 {
     sample.point.i = (dq_q15_t){-20000, 0};
-    ecu.drive.task.armed = true;
-    ecu.drive.task.safe_state.short_circuit = true;
+    ecu.drive.fast.short_circuit.holds = true;
     TEST_ASSERT_TRUE(observe()->sensors_plausible);
-    ecu.drive.task.safe_state.short_circuit = false;
+    ecu.drive.fast.short_circuit.holds = false;
     TEST_ASSERT_FALSE(observe()->sensors_plausible);
 }
 
@@ -159,6 +158,14 @@ void test_the_machine_is_slow_while_its_line_voltage_stays_below_60_V(void)
     TEST_ASSERT_TRUE(slow_at(59.9));
     sample.point.omega = 0;
     TEST_ASSERT_FALSE(slow_at(60.1));
+}
+
+void test_a_gate_fault_may_need_contactor_and_supply_for_longer(void)
+{
+    ecu.drive.task.gate_fault.holds_supply = true;
+    TEST_ASSERT_FALSE(slow_at(0.0));
+    ecu.drive.task.gate_fault.holds_supply = false;
+    TEST_ASSERT_TRUE(slow_at(0.0));
 }
 
 /* A drive of 12 V never reaches 60 V: below 0.8 of the lowest dc voltage at which it runs, 20 V here. */

@@ -152,6 +152,20 @@ void test_gates_that_stay_as_they_are_cost_no_register(void)
     TEST_ASSERT_EQUAL_HEX32(0x2A, FTM0->SWOCTRL);
 }
 
+/* Switching is enabled, and the latch of the fault input does not hold the outputs off. */
+void test_the_gates_are_read_back_from_the_timer(void)
+{
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+    hal_pwm_enable(true);
+    TEST_ASSERT_TRUE(hal_pwm_gates());
+    FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+    FTM0->FMS = FTM_FMS_WPEN;
+    TEST_ASSERT_TRUE(hal_pwm_gates());
+    hal_pwm_enable(false);
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+}
+
 void test_a_gate_fault_is_told_once_to_the_board_and_masks_itself(void)
 {
     pwm_gate_fault_isr();

@@ -22,6 +22,11 @@ void hal_pwm_enable(bool on)
     enabled = on;
 }
 
+bool hal_pwm_gates(void)
+{
+    return enabled;
+}
+
 void setUp(void)
 {
     writes = 0;

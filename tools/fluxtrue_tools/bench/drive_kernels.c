@@ -83,6 +83,11 @@ void hal_pwm_enable(bool on)
     port.gates = on;
 }
 
+bool hal_pwm_gates(void)
+{
+    return port.gates;
+}
+
 void hal_irq_pend_mrai(void)
 {
 }

@@ -32,6 +32,7 @@ from fluxtrue_tools.motor.quantise import Q15_ONE, Unfit, q15, q16, q31, u16
 Row = tuple[str, object, str]  # member, literal, comment
 
 COLUMNS = 100
+GATE_FAULT_FLUX = 1.5  # psi_b: more than any current of the machine links
 INDENT = "    "
 
 
@@ -386,6 +387,15 @@ def _safe_state(motor: Motor) -> list[Row]:
     ]
 
 
+def _gate_fault(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    steps_of_flux = GATE_FAULT_FLUX * math.sqrt(3.0) / (b.omega_rad_s * b.step_s)
+    return [
+        ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
+        ("volt_steps", str(round(steps_of_flux * Q15_ONE)), f"{steps_of_flux:.4g} V_b T"),
+    ]
+
+
 def _torque_slew(motor: Motor) -> tuple[str, str]:
     slew = motor.derived.torque_slew_Nm / motor.bases.torque_Nm
     if slew <= 0 or slew >= 1:
@@ -431,6 +441,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("i_d_limit", _i_d_limit(motor), ""),
         ("monitor", _monitor(motor), ""),
         ("safe_state", _safe_state(motor), ""),
+        ("gate_fault", _gate_fault(motor), ""),
         ("plausibility", _plausibility(motor), ""),
         ("torque_monitor", _torque_monitor(motor), ""),
         ("commission", _commission(motor), ""),

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/safe_decision.h"
+
+/* Whether the measured currents are the machine's. The sum counts in this sample, not as a latched fault: in the first
+ * milliseconds of a short circuit the converters saturate, which is one. */
+static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
+{
+    const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
+    return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
+           sum <= drive->motor->monitor.zero_max;
+}
+
+/* With the known speed of the last step. */
+static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *snapshot)
+{
+    const safe_state_state_t *safe = &drive->task.safe_state;
+    const gate_fault_in_t in = {
+        .latched = (snapshot->faults & FAULT_GATE) != 0U,
+        .gates = snapshot->gates,
+        .rectifies = safe->short_circuit,
+        .currents_valid = currents_valid(drive, snapshot),
+        .line_emf = safe->line_emf,
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .i = snapshot->sample.point.i,
+    };
+    return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);
+}
+
+safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const uint32_t faults = snapshot->faults;
+    const operating_point_t *point = &snapshot->sample.point;
+    const safe_state_in_t in = {
+        .omega = fx_q15_from_q31(point->omega),
+        .psi_delta = snapshot->psi_d_error,
+        .v_dc = (q15_t)snapshot->sample.v_dc,
+        .i = point->i,
+        .i_last_period = snapshot->i_last_period,
+        .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
+        .shorted = drive_is_shorted(drive),
+        .currents_valid = currents_valid(drive, snapshot),
+        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
+    };
+    const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot);
+    const bool by_speed = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
+    const bool short_circuit = by_speed || (by_gate && (faults & FAULT_GATE) != 0U);
+    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));
+    if (!task->armed) {
+        return SAFE_FREEWHEEL;
+    }
+    if (short_circuit) {
+        return SAFE_SHORT_CIRCUIT;
+    }
+    if (in.over_voltage) {
+        return SAFE_FREEWHEEL;
+    }
+    return by_gate ? SAFE_SHORT_ON_GATE_FAULT : SAFE_SHORT_ON_OVER_VOLTAGE;
+}

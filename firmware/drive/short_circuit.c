@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/short_circuit.h"
+
+#include "hal/pwm.h"
+
+#define DUTY_MIDDLE 16384
+#define DUTY_UPPER 32768
+
+void short_circuit_apply(fast_state_t *fast)
+{
+    short_circuit_t *state = &fast->short_circuit;
+    if (state->holds && !hal_pwm_gates()) {
+        state->side = (state->side == SHORT_CIRCUIT_LOWER) ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_NONE;
+    }
+    const bool on = state->side != SHORT_CIRCUIT_NONE;
+    const uint16_t all = (state->side == SHORT_CIRCUIT_UPPER) ? DUTY_UPPER : 0U;
+    const uint16_t duty = on ? all : DUTY_MIDDLE;
+    if (!on) {
+        hal_pwm_enable(false);
+    }
+    hal_pwm_write((duty_t){duty, duty, duty});
+    if (on) {
+        hal_pwm_enable(true); /* with the duties, not before them */
+    }
+    state->holds = on && hal_pwm_gates();
+}
+
+void short_circuit_reset(fast_state_t *fast)
+{
+    fast->short_circuit = (short_circuit_t){SHORT_CIRCUIT_LOWER, false};
+}

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_SHORT_CIRCUIT_H
+#define DRIVE_SHORT_CIRCUIT_H
+/** The active short circuit at the bridge: all lower switches on, or all upper ones where the lower cannot be.
+ *   The gates are read back. If those that were on are off a period later, the gate drivers have ended the short
+ *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
+ *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
+ *   disabled.
+ *   While the fault line is active nothing can be switched on: that is no failure of a side.
+ * Source   docs/theory/safe-state.md (SS-11)
+ * Context  fast ISR, in every period of the short circuit */
+#include "drive/drive.h"
+
+void short_circuit_apply(fast_state_t *fast);
+
+/** Both sides may be tried again: the faults are reset. */
+void short_circuit_reset(fast_state_t *fast);
+
+#endif

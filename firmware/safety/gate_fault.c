@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/gate_fault.h"
+
+#include "fx/vec.h"
+
+#define QUIET_STEPS 50
+#define REST 16 /* q15: e at rest without dc voltage, 0.25 V where V_b is 500 V */
+
+/* A current that flows although switching is disabled and the dc link has opposed it for long enough (SS-10). */
+static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in,
+                              bool flows)
+{
+    const int32_t opposed = state->opposed + fx_max_s32(in->v_dc - in->line_emf, 0);
+    state->opposed = (flows && !in->rectifies) ? fx_min_s32(opposed, config->volt_steps) : 0;
+    return state->opposed == config->volt_steps || (state->switch_shorted && in->latched);
+}
+
+/* At rest, or sound: the machine turns without a current. */
+static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bool none)
+{
+    state->quiet = none ? (uint8_t)fx_min_s32(state->quiet + 1, QUIET_STEPS) : (uint8_t)0;
+    const bool at_rest = in->line_emf <= fx_max_s32(in->v_dc >> 6, REST);
+    return at_rest || (state->quiet == QUIET_STEPS && !state->switch_shorted);
+}
+
+bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in)
+{
+    const bool carries = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q) > config->i_alive;
+    const bool disabled = !in->gates && in->currents_valid;
+    state->switch_shorted = is_switch_shorted(config, state, in, disabled && carries);
+    state->above = in->line_emf > in->v_dc >> (state->above ? 4 : 3);
+    const bool released = may_release(state, in, disabled && !carries);
+    state->holds_supply = in->latched && !released;
+    return state->above || state->switch_shorted;
+}

@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SAFETY_GATE_FAULT_H
+#define SAFETY_GATE_FAULT_H
+/** What a gate-driver fault needs. Its usual cause is a shorted switch: with switching disabled a turning machine is
+ * then braked by half waves, at any speed.
+ *   e > v_dc/8: short circuit at once; e < v_dc/16: switching disabled; between: as before
+ *   A current above i_alive although switching is disabled, while the sum of (v_dc - e) T over the steps exceeds
+ *   1.5 sqrt(3) psi_b: no flux of the windings lasts that long against the dc link, so a switch is shorted. That is a
+ *   gate fault, too, and needs the short circuit until the faults are reset.
+ *   Contactor and gate supply may be switched off with a gate fault when the machine has no current for 50 steps with
+ *   switching disabled, or is at rest (e <= v_dc/64).
+ * Source   docs/theory/safe-state.md (SS-9), (SS-10)
+ * Units    per unit
+ * Range    every argument
+ * Errors   none
+ * Context  1 kHz task; no division */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "fx/q.h"
+#include "types/frames.h"
+
+typedef struct {
+    q15_t i_alive;      /* a phase current above it is no measuring error */
+    int32_t volt_steps; /* 1.5 sqrt(3) psi_b in V_b times a step */
+} gate_fault_config_t;
+
+typedef struct {
+    int32_t opposed;     /* sum of v_dc - e, q15, while a current flows with switching disabled; saturates */
+    uint8_t quiet;       /* steps without current with switching disabled; saturates */
+    bool above;          /* a gate fault needs the short circuit now, or would need it */
+    bool switch_shorted; /* found by its current; until the gate fault is reset */
+    bool holds_supply;   /* contactor and gate supply must stay on for a gate fault */
+} gate_fault_state_t;
+
+typedef struct {
+    bool latched;   /* a gate fault */
+    bool gates;     /* as read back: the switches follow the duties */
+    bool rectifies; /* the diodes of a sound bridge may conduct (safety/safe_state.h) */
+    bool currents_valid;
+    q15_t line_emf, v_dc;
+    dq_q15_t i;
+} gate_fault_in_t;
+
+/** Whether a gate fault needs the short circuit now, or would need it. */
+bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in);
+
+#endif

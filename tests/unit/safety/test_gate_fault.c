@@ -1,0 +1,153 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What a gate-driver fault needs, and how a shorted switch is found, against hand calculations. */
+#include "safety/gate_fault.h"
+
+#include "unity.h"
+
+#define V_DC 21845 /* 350 V of 525 V */
+
+/* i_alive 0.06; 1.5 sqrt(3) psi_b = 0.66 V_b T, about that of hsm1. */
+static const gate_fault_config_t config = {.i_alive = 1966, .volt_steps = 21679};
+static gate_fault_state_t state;
+static gate_fault_in_t in;
+
+void setUp(void)
+{
+    state = (gate_fault_state_t){0};
+    in = (gate_fault_in_t){.v_dc = V_DC, .currents_valid = true};
+}
+
+void tearDown(void)
+{
+}
+
+static bool steps(int count)
+{
+    bool short_circuit = false;
+    for (int k = 0; k < count; k++) {
+        short_circuit = gate_fault_step(&config, &state, &in);
+    }
+    return short_circuit;
+}
+
+static bool at(int line_emf)
+{
+    in.line_emf = (q15_t)line_emf;
+    return steps(1);
+}
+
+void test_above_an_eighth_of_the_dc_voltage_a_gate_fault_needs_the_short_circuit(void)
+{
+    TEST_ASSERT_FALSE(at(V_DC / 8));
+    TEST_ASSERT_TRUE(at(V_DC / 8 + 1));
+    TEST_ASSERT_TRUE(at(V_DC / 16 + 1));
+    TEST_ASSERT_FALSE(at(V_DC / 16));
+    TEST_ASSERT_FALSE(at(V_DC / 8));
+}
+
+/* Without back-EMF 0.667 V_b T per step; with 0.5 V_b of it 0.167: 4 steps. */
+void test_a_current_that_outlasts_the_flux_of_the_windings_is_a_shorted_switch(void)
+{
+    in.i = (dq_q15_t){-2000, 0};
+    (void)steps(1);
+    TEST_ASSERT_TRUE(state.switch_shorted);
+    setUp();
+    in.i = (dq_q15_t){0, 2000};
+    in.line_emf = 16384;
+    (void)steps(3);
+    TEST_ASSERT_FALSE(state.switch_shorted);
+    (void)steps(1);
+    TEST_ASSERT_TRUE(state.switch_shorted);
+}
+
+void test_what_is_no_shorted_switch(void)
+{
+    const gate_fault_in_t not_found[] = {
+        {.v_dc = V_DC, .currents_valid = true, .i = {1966, 0}},                      /* no current */
+        {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .gates = true},       /* the bridge conducts */
+        {.v_dc = V_DC, .currents_valid = false, .i = {9000, 0}},                     /* the sensors are wrong */
+        {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .rectifies = true},   /* the diodes conduct */
+        {.v_dc = 9000, .line_emf = 9000, .currents_valid = true, .i = {9000, 9000}}, /* nothing opposes it */
+        {.v_dc = -50, .line_emf = 0, .currents_valid = true, .i = {9000, 9000}},
+    };
+    for (unsigned n = 0; n < sizeof not_found / sizeof not_found[0]; n++) {
+        setUp();
+        in = not_found[n];
+        (void)steps(1000);
+        TEST_ASSERT_FALSE(state.switch_shorted);
+    }
+}
+
+void test_a_gap_in_the_current_begins_the_sum_again(void)
+{
+    in.line_emf = 10923; /* 0.333 V_b T per step: 2 steps do */
+    for (int k = 0; k < 100; k++) {
+        in.i = (dq_q15_t){0, k % 2 == 0 ? 9000 : 0};
+        (void)steps(1);
+        TEST_ASSERT_FALSE(state.switch_shorted);
+    }
+    in.i = (dq_q15_t){0, 9000};
+    (void)steps(2);
+    TEST_ASSERT_TRUE(state.switch_shorted);
+}
+
+/* Found, it needs the short circuit at any speed for as long as the gate fault is latched, although the current is that
+ * of the short circuit now. */
+void test_a_shorted_switch_needs_the_short_circuit_until_the_fault_is_reset(void)
+{
+    in.i = (dq_q15_t){9000, 0};
+    TEST_ASSERT_TRUE(steps(2));
+    in.latched = in.gates = true;
+    TEST_ASSERT_TRUE(steps(1000));
+    in.i = (dq_q15_t){0, 0};
+    TEST_ASSERT_TRUE(steps(1000));
+    in.latched = false;
+    TEST_ASSERT_FALSE(steps(1));
+}
+
+void test_without_a_gate_fault_the_supply_is_free(void)
+{
+    in.line_emf = 20000;
+    (void)steps(1);
+    TEST_ASSERT_FALSE(state.holds_supply);
+}
+
+/* 50 steps without a current although the machine turns; at rest, 1/64 of the dc voltage, at once. */
+void test_with_a_gate_fault_the_supply_is_held_until_no_switch_can_be_shorted_or_the_machine_rests(void)
+{
+    in.latched = true;
+    in.line_emf = V_DC / 64 + 1;
+    (void)steps(49);
+    TEST_ASSERT_TRUE(state.holds_supply);
+    (void)steps(1);
+    TEST_ASSERT_FALSE(state.holds_supply);
+    in.i = (dq_q15_t){9000, 0};
+    (void)steps(1);
+    TEST_ASSERT_TRUE(state.holds_supply);
+    in.line_emf = V_DC / 64;
+    (void)steps(1);
+    TEST_ASSERT_FALSE(state.holds_supply);
+    setUp();
+    in.latched = in.gates = true; /* the short circuit shows nothing */
+    in.line_emf = 1000;
+    (void)steps(1000);
+    TEST_ASSERT_TRUE(state.holds_supply);
+    in.v_dc = 0;
+    in.line_emf = 17;
+    (void)steps(1);
+    TEST_ASSERT_TRUE(state.holds_supply);
+    in.line_emf = 16;
+    (void)steps(1);
+    TEST_ASSERT_FALSE(state.holds_supply);
+}
+
+void test_a_shorted_switch_holds_the_supply_however_long_it_is_quiet(void)
+{
+    in.i = (dq_q15_t){9000, 0};
+    (void)steps(2);
+    in.latched = true;
+    in.i = (dq_q15_t){0, 0};
+    in.line_emf = 1000;
+    (void)steps(1000);
+    TEST_ASSERT_TRUE(state.holds_supply);
+}
