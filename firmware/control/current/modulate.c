@@ -17,7 +17,8 @@ static abc_q29_t phases(const modulate_config_t *config, fx_pair_t v, fx_pair_t 
     return (abc_q29_t){x.a, x.b, x.c};
 }
 
-/* The middle one of the three. As they sum to zero, it is minus the sum of the largest and the smallest. */
+/* The middle one of the three phase voltages. As they sum to zero, it is minus the sum of the largest and the smallest:
+ * half of it, added to all phases, is the zero sequence (MO-4). */
 static int32_t middle(abc_q29_t x)
 {
     if (x.a < x.b) {
