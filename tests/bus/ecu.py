@@ -29,7 +29,7 @@ def load_dbc() -> Database:
 
 
 class Frame(ctypes.Structure):
-    """can_frame_t."""
+    """The C type can_frame_t."""
 
     _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
                 ("data", ctypes.c_uint8 * 8))  # fmt: skip
@@ -66,7 +66,7 @@ class Ecu:
         self.last: dict[str, dict] = {}
 
     def close(self) -> None:
-        """Gives the memory back."""
+        """Release the memory."""
         self.lib.sim_destroy(self.sim)
         self.lib.fluxtrue_destroy(self.handle)
 
@@ -75,7 +75,7 @@ class Ecu:
         assert self.lib.sim_set(self.sim, f"plant.{name}".encode(), float(value)) == 0, name
 
     def truth(self, name: str) -> float:
-        """What the plant knows."""
+        """A true value of the plant."""
         return float(self.lib.sim_get(self.sim, f"truth.{name}".encode()))
 
     def get(self, name: str) -> float:
@@ -117,13 +117,13 @@ class Ecu:
             self.last[message.name] = message.decode(data)
 
     def run(self, milliseconds: int, **command: object) -> None:
-        """Some time, after a change of the command."""
+        """Change the command, then let some time pass."""
         self.command.update(command)
         for _ in range(milliseconds):
             self.step_ms()
 
     def run_until(self, name: str) -> dict:
-        """To the end of the millisecond in which the message is sent; its values."""
+        """Run to the end of the millisecond in which the message is sent; the result is its values."""
         self.last.pop(name, None)
         while name not in self.last:
             self.run(1)
@@ -131,11 +131,11 @@ class Ecu:
 
     @property
     def state(self) -> str:
-        """As told on the bus."""
+        """The state that the bus reports."""
         return str(self.last["INV_Status"]["State"])
 
     def power_up(self, v_dc_V: float = 350.0) -> None:
-        """To the state run, without torque."""
+        """Bring the inverter to the state run, without torque."""
         self.set("vdc_V", v_dc_V)
         self.run(100)
         self.run(20, Mode="torque")

@@ -29,7 +29,7 @@ class Clocked(Ecu):
         return self.steps * self.step
 
     def run_for(self, ms: float, **command: object) -> None:
-        """Steps that cover a time; a command goes out in the step in which its 10 ms have passed."""
+        """Run the steps that cover a time; a command is sent in the step in which its 10 ms have passed."""
         self.command.update(command)
         end = self.now_ms + ms - 1e-6
         while self.now_ms < end:
@@ -38,7 +38,7 @@ class Clocked(Ecu):
             self.steps += 1
 
     def wait_for(self, state: str, ms: float = 6000.0) -> float:
-        """Until the drive's state on the bus is this one: how long it took."""
+        """Run until the bus reports this state; the result is the time that it took."""
         start = self.now_ms
         while "INV_Status" not in self.last or self.state != state:
             assert self.now_ms - start < ms, f"{state} wanted, still {self.state}"
@@ -55,7 +55,7 @@ def built(request: pytest.FixtureRequest) -> tuple[sim_motor.Motor, float]:
 
 @pytest.fixture
 def ecu(built: tuple[sim_motor.Motor, float]):
-    """Just started."""
+    """An ECU that has just started."""
     made = Clocked(*built)
     yield made
     made.close()

@@ -38,7 +38,7 @@ def turn_to(ecu: Ecu, rpm: float, rad_s_per_ms: float) -> None:
 
 
 def highest_V(ecu: Ecu, milliseconds: int) -> float:
-    """The dc link's voltage meanwhile."""
+    """Highest voltage of the dc link during this time."""
     highest = 0.0
     for _ in range(milliseconds):
         ecu.run(1)
@@ -74,7 +74,7 @@ def test_bad_commands_do_not_open_the_contactor_while_the_machine_turns(fast: Ec
 
 @dataclass(frozen=True)
 class Worst:
-    """Magnitudes of what happened."""
+    """Largest magnitudes during a run."""
 
     torque_Nm: float
     current_A: float
@@ -91,7 +91,7 @@ def worst(ecu: Ecu, milliseconds: int) -> Worst:
 
 
 def runs_again(ecu: Ecu) -> None:
-    """At once, at the speed that it has, and with the torque that is asked for."""
+    """Whether the drive can be enabled at once, at the present speed, and delivers the requested torque."""
     ecu.run(30, Enable=0, TorqueRequested=0.0)
     ecu.run(30, Enable=1)
     assert ecu.state == "run", ecu.last["INV_DcLink"]["RefusedReason"]

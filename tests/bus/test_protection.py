@@ -18,7 +18,7 @@ def test_the_independent_crc_has_the_catalogues_check_value() -> None:
 
 
 def syndromes() -> np.ndarray:
-    """What flipping each bit of a frame does to received CRC xor computed CRC."""
+    """Change of (received CRC xor computed CRC) for each bit of a frame that is flipped."""
     effect = []
     for bit in range(FRAME_BITS):
         error = (1 << bit).to_bytes(8, "big")
@@ -44,7 +44,7 @@ def undetected(weight: int) -> tuple[int, int]:
 def test_every_one_and_two_bit_error_is_detected_and_few_of_three_and_four_are_not() -> None:
     assert undetected(1) == (0, 64)
     assert undetected(2) == (0, 2016)
-    assert undetected(3) == (198, 41664)  # 0.48 %; the documentation says so
+    assert undetected(3) == (198, 41664)  # 0.48 %, as the documentation states
     assert undetected(4) == (2453, 635376)  # 0.39 %
 
 

@@ -24,7 +24,7 @@ def signals(messages: list[Message]) -> list[tuple[Message, int]]:
 
 
 def physical(messages: list[Message]) -> list[tuple[Message, int]]:
-    """Those that are not just a number of things: the firmware computes them in floating point."""
+    """The signals that are no counts; the firmware computes them in floating point."""
     return [(m, k) for m, k in signals(messages) if m.signals[k].scale != 1 or m.signals[k].unit]
 
 
@@ -64,7 +64,7 @@ def raw_range(signal: Signal) -> np.ndarray:
 
 
 def raw_of(message: Message, index: int, data: bytes) -> int:
-    """What cantools reads back, unscaled."""
+    """The unscaled value that cantools decodes."""
     decoded = message.decode(data, decode_choices=False, scaling=False)
     return int(decoded[message.signals[index].name])
 
@@ -83,7 +83,7 @@ def test_every_count_of_a_sent_signal_is_encoded_as_cantools_does(case: tuple[Me
         assert raw_of(message, index, data) == raw
 
 
-# Between two counts the nearer one must win; a float has 24 bits, so that a value within a
+# Between two counts the nearer one is required; a float has 24 bits, so that a value within a
 # thousandth of a count of the middle may go either way.
 @pytest.mark.parametrize("case", physical(SENT), ids=names)
 def test_values_between_counts_are_rounded_to_the_nearest(case: tuple[Message, int]) -> None:

@@ -33,7 +33,7 @@ MARKERS = {
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """What tools/hil passes on."""
+    """The options that tools/hil passes on."""
     group = parser.getgroup("hil")
     group.addoption("--vecu", help="program of the virtual ECU; used when no interface is given")
     group.addoption("--can-interface", help="python-can interface: socketcand, socketcan, pcan, kvaser ...")
@@ -55,7 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Markers, and the report that hooks and fixtures share."""
-    # It warns of every frame that a read has cut in two, and then puts it together.
+    # It warns of every frame that arrives in two reads, although it then joins the parts.
     logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
     for name, text in MARKERS.items():
         config.addinivalue_line("markers", f"{name}: {text}")
@@ -71,7 +71,7 @@ REPORT = pytest.StashKey[Report]()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without a plant that obeys, say which tests cannot run and why."""
+    """Without a plant that can be commanded, report which tests cannot run, and why."""
     has_program = config.getoption("--can-interface") is None
     has_plant = has_program or config.getoption("--bench") is not None
     for item in items:
@@ -105,13 +105,13 @@ def program(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="session")
 def database() -> cantools.database.Database:
-    """The one DBC."""
+    """The DBC file of the bus."""
     return cantools.database.load_file(DBC)
 
 
 @dataclass
 class Target:
-    """What the suite talks to."""
+    """The ECU under test and its connections."""
 
     bus: can.BusABC
     stand: Channel | None
@@ -156,7 +156,7 @@ def target(request: pytest.FixtureRequest) -> Iterator[Target]:
 
 @pytest.fixture(scope="session")
 def bus_log(request: pytest.FixtureRequest) -> Iterator[BusLog]:
-    """Everything that was said, for bus.mf4."""
+    """All frames on the bus, for bus.mf4."""
     log = BusLog()
     yield log
     folder = Path(request.config.getoption("--report"))
@@ -185,7 +185,7 @@ def connected(
 
 
 def _note_stack(about: dict[str, str], unused_bytes: int) -> None:
-    """The high-water mark: the least after any test."""
+    """Record the smallest unused stack after any test."""
     was = about.get(STACK, "").partition(" ")[0]
     if unused_bytes == 0:
         about.setdefault(STACK, "not told by this target: not checked")
@@ -237,5 +237,5 @@ def figures(request: pytest.FixtureRequest) -> Figures:
 
 @pytest.fixture
 def make_vecu(program: Path) -> Callable[..., VirtualEcu]:
-    """Further virtual ECUs, for tests that end or torment them."""
+    """Further virtual ECUs, for tests that end or overload them."""
     return lambda **options: VirtualEcu(program, **options)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AUTOSAR end-to-end profile 11A once more, from the specification, by polynomial division instead of a table.
+"""AUTOSAR end-to-end profile 11A, independent of the firmware: from the specification, without a table.
 
 The CRC is the remainder of (data id low, data id high, bytes 1 ... n) x^8 divided by the SAE J1850 polynomial. The
 profile undoes the standard's start value and final inversion: both are 0 here.
@@ -23,12 +23,12 @@ def remainder(bits: int, polynomial: int = POLYNOMIAL) -> int:
 
 @cache
 def _share(byte: int, behind: int) -> int:
-    """What a byte with so many bytes behind it adds to the remainder: division is linear."""
+    """Contribution to the remainder of a byte that so many bytes follow; the division is linear."""
     return remainder(byte << 8 * (behind + 1))
 
 
 def crc(data_id: int, data: bytes) -> int:
-    """What byte 0 of the frame must be; byte 0 of `data` is not checked."""
+    """The value that byte 0 of the frame must have; byte 0 of `data` is ignored."""
     message = bytes([data_id & 0xFF, data_id >> 8]) + data[1:]
     found = 0
     for behind, byte in enumerate(reversed(message)):
@@ -56,7 +56,7 @@ def is_intact(data_id: int, data: bytes) -> bool:
 
 @dataclass
 class Sender:
-    """Counts for one message."""
+    """The sender of one message, with its counter."""
 
     data_id: int
     counter: int = 0
@@ -70,14 +70,14 @@ class Sender:
 
 @dataclass
 class Receiver:
-    """Counts what is wrong with the frames of one message; a repetition or a gap is wrong, too."""
+    """Counts the errors in the frames of one message; a repetition or a gap is an error, too."""
 
     data_id: int
     counter: int | None = None
     wrong: int = 0
 
     def take(self, data: bytes) -> None:
-        """One received frame."""
+        """Check one received frame."""
         if not is_intact(self.data_id, data):
             self.wrong += 1
             return

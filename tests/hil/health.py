@@ -22,12 +22,12 @@ COUNTERS = {
 JITTER_S = 2 * MS
 JITTER_BENCH_S = 20 * MS  # time stamps of an adapter and of an operating system
 STACK_RESERVE_BYTES = 256
-LATE_S = 25 * MS  # between two commands: then a time-out of 30 ms is this computer's doing
-DIAGNOSTICS_S = 0.12  # their cycle, and some
+LATE_S = 25 * MS  # longest time between two commands; beyond it a time-out of 30 ms is caused by this computer
+DIAGNOSTICS_S = 0.12  # their cycle and a margin
 
 
 def note(rig: Rig) -> dict[str, Any]:
-    """The counters before a test: a bench keeps them from test to test."""
+    """Record the counters before a test, because a bench keeps them from test to test."""
     rig.advance(DIAGNOSTICS_S)
     return {
         "counters": {(m, s): rig.signal(m, s) for m, signals in COUNTERS.items() for s in signals},
@@ -98,12 +98,12 @@ def _bus(rig: Rig, before: dict[str, Any]) -> list[str]:
 
 
 def stack_unused(rig: Rig) -> int:
-    """Bytes that nothing has touched since start-up; 0: this target cannot tell (the virtual ECU is a process)."""
+    """Bytes of stack never used since start-up; 0 on a target that cannot measure them, as the virtual ECU."""
     return int(rig.signal("INV_DiagTask", "StackUnused"))
 
 
 def problems(rig: Rig, before: dict[str, Any]) -> list[str]:
-    """Everything that is not as it must be, in words."""
+    """All violated conditions, in words."""
     rig.is_sending = True
     rig.advance(DIAGNOSTICS_S)
     found = _faults(rig) + _counters(rig, before)

@@ -15,12 +15,12 @@ from numpy.typing import ArrayLike
 from fluxtrue_tools.demo.experiment import Bound
 
 TEMPLATE = Path(__file__).with_name("report.html.j2")
-POINTS = 50  # measured one by one: shown as such
+POINTS = 50  # measured point by point, and drawn as points
 Line = tuple[str, ArrayLike, ArrayLike]
 
 
 def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -> str:
-    import matplotlib.pyplot as plt  # a second that a run without plots does not need
+    import matplotlib.pyplot as plt  # an import of a second that a run without plots does not need
 
     from fluxtrue_tools.sim.plot import STYLE
 
@@ -45,7 +45,7 @@ def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -
 
 @dataclass
 class Figures:
-    """What one test has to show."""
+    """Plots and figures of merit of one test."""
 
     name: str
     outcome: str = "not run"
@@ -72,7 +72,7 @@ class Figures:
 
 
 class Report:
-    """Of one session."""
+    """The report of one session."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -85,7 +85,7 @@ class Report:
         return self._tests.setdefault(node, Figures(name))
 
     def outcome(self, node: str, result: pytest.TestReport) -> None:
-        """What a phase of a test came to; a failure in any phase is one."""
+        """Record the outcome of a phase of a test; a failure in any phase is a failure of the test."""
         test = self.figures(node)
         test.seconds += result.duration
         if result.failed or (result.when == "call" and test.outcome != "failed") or result.skipped:

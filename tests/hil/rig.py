@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The test stand as a test sees it: an ECU on CAN, and perhaps a plant that can be told what to do.
+"""The test stand for a test: an ECU on CAN and, on some stands, a plant that can be commanded.
 
 With a bench channel time is simulated: advance() sends the cyclic commands, lets the virtual ECU run and reads what it
 has sent, and nothing depends on how fast the computer is. Without one time is the wall clock's.
@@ -34,7 +34,7 @@ EXACT = 1e-9  # s: a step's end and a frame's due time are the same instant
 
 @dataclass(frozen=True)
 class Command:
-    """What the vehicle asks for, in the DBC's units."""
+    """The vehicle's requests, in the DBC's units."""
 
     enable: bool = False
     reset: bool = False
@@ -65,7 +65,7 @@ class Trace:
 
 @dataclass
 class Expected:
-    """What a test provokes and the check after it must not complain about."""
+    """Faults and errors that a test provokes, and that the check after it therefore accepts."""
 
     faults: bool = False
     load: bool = False  # of the bus
@@ -104,7 +104,7 @@ class Rig:
         self.clear_history()
 
     def clear_history(self) -> None:
-        """As after connecting: nothing sent, nothing received."""
+        """Reset the history to that after connecting: nothing sent, nothing received."""
         self.command = Command()
         self.is_sending = True
         self.power_limits_kW: tuple[float, float] | None = None
@@ -146,7 +146,7 @@ class Rig:
 
     @property
     def now_s(self) -> float:
-        """Of the frames' time stamps, as far as this side knows."""
+        """Time on the clock of the frames' time stamps, as far as it is known here."""
         return (self._stepped or self._bench_time).now_s
 
     def advance(self, seconds: float) -> None:
@@ -186,7 +186,7 @@ class Rig:
         return self._senders[COMMAND].protect(self.encode(self.command))
 
     def skip_counters(self, count: int) -> None:
-        """The sender loses count."""
+        """Let the sender skip counter values."""
         sender = self._senders[COMMAND]
         sender.counter = (sender.counter + count) % e2e.COUNTERS
 
@@ -263,7 +263,7 @@ class Rig:
         self.command = wanted
 
     def wait_for(self, state: str, seconds: float = 2.0) -> float:
-        """Until the status says so; how long it took."""
+        """Run until the status satisfies the condition; the result is the time that it took."""
         start_s = self.now_s
         while STATUS not in self.last or self.state != state:
             assert self.now_s - start_s < seconds, f"state {state} wanted, after {seconds:g} s still {self.state}"
@@ -284,7 +284,7 @@ class Rig:
         self.advance(seconds + 0.1)
 
     def warm_up(self, seconds: float) -> None:
-        """Drive about, so that the identification sees speeds and torques in all quadrants; afterwards slow, 20 N·m."""
+        """Drive at speeds and torques in all quadrants for the identification; afterwards slowly, with 20 N·m."""
         assert self.state == "run"
         end_s, k = self.now_s + seconds - 3.0, 0
         while self.now_s < end_s:
@@ -298,12 +298,12 @@ class Rig:
         self.advance(end_s + 3.0 - self.now_s)
 
     def record(self, names: Sequence[str], periods: int = 10) -> Trace:
-        """The plant's truth from now on: a row each so many PWM periods."""
+        """Record the plant's true values from now on, one row in each so many PWM periods."""
         self.stand.record(names, periods)
         self.trace = Trace(list(names))
         return self.trace
 
     def power_cycle(self, seed: int = 1) -> None:
-        """ECU and plant from the start; the commands stop being what they were."""
+        """Restart ECU and plant; the commands have their initial values again."""
         self.stand.reset(seed)
         self.clear_history()

@@ -16,13 +16,13 @@ TRUTH = "truth.torque_shaft_mean_Nm"
 
 
 class Peer:
-    """Another node; what it posts is certain to have arrived before time goes on."""
+    """Another node; its frames have arrived before simulated time continues."""
 
     def __init__(self, rig: Rig, client: can.BusABC) -> None:
         self._rig, self._client, self._posted = rig, client, 0
 
     def post(self, frame_id: int, data: bytes, count: int = 1) -> None:
-        """So many frames at once."""
+        """Send so many frames at once."""
         for _ in range(count):
             self._client.send(can.Message(arbitration_id=frame_id, data=data, is_extended_id=False))
         self._posted += count
@@ -35,7 +35,7 @@ def peer(rig: Rig, second_client: can.BusABC) -> Iterator[Peer]:
 
 
 def drive(rig: Rig, peer: Peer | None, frame_id: int = 0, per_ms: float = 0.0, seconds: float = 1.0) -> str:
-    """A little journey with another node sending; the hash of every duty on the way."""
+    """A short drive while another node sends; the result is the hash of all duties."""
     rig.power_cycle(seed=7)
     rig.expected.load = rig.expected.frames = True
     rig.expected.counters |= {"Ignored"}
@@ -74,7 +74,7 @@ def test_a_node_that_fills_the_bus_changes_no_duty(
 
 @pytest.mark.plant
 def test_the_hash_of_duties_tells_journeys_apart(rig: Rig) -> None:
-    """Else the test above could not fail."""
+    """Without this the test above could not fail."""
     assert drive(rig, None, seconds=0.3) == drive(rig, None, seconds=0.3)
     assert drive(rig, None, seconds=0.3) != drive(rig, None, seconds=0.301)
 
@@ -98,7 +98,7 @@ def test_a_node_that_blocks_the_bus_takes_the_torque_away_within_50_ms(rig: Rig,
 
 @pytest.mark.plant
 def test_a_second_commander_is_found_out(rig: Rig, peer: Peer) -> None:
-    """Two vehicles on one bus, each counting for itself: the counters contradict each other."""
+    """Two vehicles on one bus count independently, so that their counters do not fit each other."""
     rig.expected.faults = rig.expected.load = rig.expected.frames = True
     rig.expected.counters |= {"Jumps", "Repeated", "SkippedCommands", "TimeOuts"}
     rig.start(30.0)

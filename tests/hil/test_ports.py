@@ -148,7 +148,7 @@ def test_every_client_hears_the_others_but_not_itself(ecu: VirtualEcu, stand: Ch
         assert heard is not None and (heard.arbitration_id, heard.is_extended_id, heard.dlc) == (0x1FFFFFFF, True, 0)
         # (VB-2) with no data: 67 + 53/4 = 80 bit of 2 us.
         assert heard.timestamp == pytest.approx(160e-6, abs=1e-9)
-    # Up to what another one says later, nothing that it hears is its own.
+    # The sender receives none of its own frames: nothing comes before a frame of another client.
     two.send(can.Message(arbitration_id=0x1FFFFFFE, data=b"", is_extended_id=True))
     stand.run(1.0, client_port(two), 1)
     while (heard := one.recv(HANG_S)) is not None and heard.arbitration_id != 0x1FFFFFFE:

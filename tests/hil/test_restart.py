@@ -30,7 +30,7 @@ def test_a_second_process_starts_with_what_the_first_has_identified(
         rig.stand.set(magnet_scale=0.88)
         rig.start()
         rig.warm_up(15.0)
-        assert not flash.exists()  # nothing is written while it runs
+        assert not flash.exists()  # the file is not written while switching is enabled
         rig.ask(enable=False, mode="off", torque_Nm=0.0)
         rig.turn(0.0, 1.0)
         rig.advance(0.5)
