@@ -10,6 +10,17 @@ static uint32_t angle_correction(const drive_t *drive, uint32_t theta_m)
     return (uint32_t)drive->task.angle_correction[theta_m >> ANGLE_HARMONICS_SHIFT];
 }
 
+/* A sample of the angle that no rotor can have: the prediction replaces it. Only the advance per period is still the
+ * one of the sample, by at most k_i/2 of a turn, 0.2 degrees. */
+static __attribute__((noinline)) void replace_angle(drive_t *drive, sample_t *sample)
+{
+    const angle_t angle = angle_tracker_coast(&drive->period.angle_tracker, &drive->fast.angle_tracker,
+                                              sample->theta_e);
+    sample->point.omega = angle.omega_q31;
+    sample->theta_e = angle.theta_e;
+    monitor_report_angle_jump(&drive->fast.monitor);
+}
+
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
 {
     adc_counts_t counts;
@@ -29,7 +40,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     sample->point.omega = angle.omega_q31;
     sample->theta_e = angle.theta_e;
     if (__builtin_expect(angle.jumped, 0)) {
-        monitor_report_angle_jump(&drive->fast.monitor);
+        replace_angle(drive, sample);
         return (acquired_t){angle.step, false};
     }
     const bool normal = monitor_is_sample_normal(&drive->period.monitor, i_ab, measured.zero_q28, measured.v_dc);

@@ -3,7 +3,7 @@
 #define DRIVE_ACQUIRE_H
 /** The first part of a period: samples of converters and angle sensor in per unit, checked against their limits.
  * Source   docs/architecture.md
- * Errors   an implausible step of the angle is reported to the monitors
+ * Errors   an implausible step of the angle is replaced by the prediction and reported to the monitors
  * Context  fast ISR */
 #include "drive/drive.h"
 

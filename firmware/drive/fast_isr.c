@@ -133,6 +133,9 @@ static void check_samples(drive_t *drive, const sample_t *sample, bool run)
         drive->fast.periods_since_enable = 0;
     }
     /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
+    if ((faults & FAULT_ANGLE) != 0U) {
+        drive->fast.angle_tracker.samples = 0; /* what it predicts has long been contradicted: it starts again */
+    }
     if (faults != 0) {
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
     }

@@ -4,12 +4,28 @@
 #include "fx/q.h"
 #include "signal/debounce.h"
 
-enum { OVER_VOLTAGE_SAMPLES = 2, UNDER_VOLTAGE_SAMPLES = 10, CURRENT_SUM_SAMPLES = 5, ANGLE_SAMPLES = 3 };
+enum { OVER_VOLTAGE_SAMPLES = 2, UNDER_VOLTAGE_SAMPLES = 10, CURRENT_SUM_SAMPLES = 5 };
+/* Of the angle's count: glitches may last 5 ms, single spikes may not be frequent (MN-21). */
+enum { ANGLE_JUMP = 4, ANGLE_FIRST_JUMP = 40 };
 
 /* |x| > limit by one unsigned comparison. */
 static bool exceeds(int32_t x, int32_t limit)
 {
     return (uint32_t)(x + limit) > 2U * (uint32_t)limit;
+}
+
+static uint32_t count_angle_jumps(const monitor_config_t *config, monitor_state_t *state, bool jumped)
+{
+    const bool first = (state->pending & MONITOR_ANGLE_LOST) == 0U;
+    const int32_t change = jumped ? (first ? ANGLE_FIRST_JUMP : ANGLE_JUMP) : -1;
+    state->angle = (uint16_t)fx_clamp_q31(state->angle + change, 0, config->angle_count_max);
+    return (state->angle >= config->angle_count_max) ? FAULT_ANGLE : 0U;
+}
+
+static uint8_t pending(const monitor_state_t *state, bool jumped)
+{
+    const bool counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
+    return (uint8_t)((counting ? MONITOR_COUNTING : 0) | (jumped ? MONITOR_ANGLE_LOST : 0));
 }
 
 uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, const monitor_in_t *in)
@@ -28,8 +44,7 @@ uint32_t monitor_step(const monitor_config_t *config, monitor_state_t *state, co
     faults |= debounce_step(&state->over_voltage, over_voltage, OVER_VOLTAGE_SAMPLES, FAULT_OVER_VOLTAGE);
     faults |= debounce_step(&state->under_voltage, under_voltage, UNDER_VOLTAGE_SAMPLES, FAULT_UNDER_VOLTAGE);
     faults |= debounce_step(&state->current_sum, unbalanced, CURRENT_SUM_SAMPLES, FAULT_CURRENT_SUM);
-    faults |= debounce_step(&state->angle, jumped, ANGLE_SAMPLES, FAULT_ANGLE);
-    const bool counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
-    state->pending = counting ? MONITOR_COUNTING : 0;
+    faults |= count_angle_jumps(config, state, jumped);
+    state->pending = pending(state, jumped);
     return faults;
 }

@@ -4,8 +4,9 @@
 /** Monitors of the fast ISR: faults from one set of samples and a few counters, without side effects.
  *   over-current  any |i_x| > i_trip in one sample;          over-voltage  v_dc > v_max for 2 samples
  *   under-voltage v_dc < v_min for 10 samples;               current sum   |i_a + i_b + i_c| > sum_max for 5 samples
- *   angle         3 jumps of the angle in a row, reported by the angle tracker
- * Source   docs/architecture.md, fault table
+ *   angle         implausible samples of the angle, reported by the angle tracker: each adds 4 to a count, the first
+ *                 after a good one 36 more, and a good one takes 1 away; at 30 ms of periods it is a fault
+ * Source   docs/architecture.md, fault table; docs/theory/monitors.md (MN-21)
  * Units    per unit
  * Range    i_trip < 0.8: the trip comes before the converter saturates
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -17,7 +18,7 @@
 #include "types/frames.h"
 
 /* Why monitor_step() must be called although the sample is normal. */
-enum { MONITOR_COUNTING = 1, MONITOR_ANGLE_JUMP = 2 };
+enum { MONITOR_COUNTING = 1, MONITOR_ANGLE_JUMP = 2, MONITOR_ANGLE_LOST = 4 /* the last sample was a jump */ };
 
 /** q15 in a word each unless the name says otherwise. */
 typedef struct {
@@ -26,11 +27,13 @@ typedef struct {
     int32_t v_min, v_max;
     int32_t i_trip;
     int32_t sum_max;
+    int32_t angle_count_max; /* not q15: 30 ms of periods */
 } monitor_config_t;
 
 typedef struct {
-    uint8_t over_voltage, under_voltage, current_sum, angle;
+    uint8_t over_voltage, under_voltage, current_sum;
     uint8_t pending; /* MONITOR_...; 0: a normal sample needs no monitor_step() */
+    uint16_t angle;
 } monitor_state_t;
 
 typedef struct {

@@ -13,7 +13,7 @@
     X(OVER_VOLTAGE, 1, "The dc voltage exceeds its upper limit in 2 samples.") \
     X(UNDER_VOLTAGE, 2, "The dc voltage is below its lower limit in 10 samples while the drive runs.") \
     X(CURRENT_SUM, 3, "The sum of the phase currents exceeds 5 % of full scale in 5 samples.") \
-    X(ANGLE, 4, "The angle changes implausibly 3 times in a row, or its sensor reports an error.") \
+    X(ANGLE, 4, "The angle is implausible for 7 ms or in every tenth sample, or its sensor reports an error.") \
     X(INPUT, 5, "The samples are invalid, or the converters repeatedly deliver none.") \
     X(OVERRUN, 6, "The 1 kHz task wrote no command for 2 steps, or the paper's law missed 3 periods in a row.") \
     X(CONFIG, 7, "The motor data or the port's settings failed a check; a separate value names the check.") \

@@ -86,7 +86,13 @@ static const char *bad_sensor(const plant_params_t *p)
             return "current_offset_A";
         }
     }
-    return NULL;
+    if (p->angle_spike_every < 0) {
+        return "angle_spike_every";
+    }
+    if (p->angle_spike_samples < 0) {
+        return "angle_spike_samples";
+    }
+    return isfinite(p->angle_spike_rad) ? NULL : "angle_spike_rad";
 }
 
 static const char *bad_electronics(const plant_params_t *p)

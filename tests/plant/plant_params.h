@@ -51,6 +51,8 @@ typedef struct {
     int angle_bits;                      /* of a mechanical turn; 0: not quantised */
     double angle_delay_s;
     int angle_stuck;
+    int angle_spike_every, angle_spike_samples; /* the first so many of every so many samples are off; 0: none */
+    double angle_spike_rad;                     /* electrical, by so much */
     /* mechanics */
     int imposed_speed;
     double speed_rad_s;                        /* mechanical: imposed, or the initial one */

@@ -49,12 +49,24 @@ static void sample_vdc(const plant_params_t *p, double vdc_V, plant_sensors_t *o
     out->vdc_count = (int32_t)whole;
 }
 
+/* What disturbs single samples: the first of each sequence. */
+static double angle_spike(sensors_t *s, const plant_params_t *p)
+{
+    if (p->angle_spike_every == 0) {
+        s->spike_sample = 0;
+        return 0.0;
+    }
+    const int sample = s->spike_sample;
+    s->spike_sample = (sample + 1) % p->angle_spike_every;
+    return (sample < p->angle_spike_samples) ? p->angle_spike_rad : 0.0;
+}
+
 /* (PL-18), (PL-19) */
 static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth)
 {
     const double theta = truth->theta_m_rad - truth->speed_rad_s * p->angle_delay_s;
     const double turn = p->resolver_pole_pairs * theta;
-    double error = p->angle_offset_rad;
+    double error = p->angle_offset_rad + angle_spike(s, p);
     if (p->angle_h1_rad != 0.0) {
         error += p->angle_h1_rad * sin(turn + p->angle_h1_phase);
     }

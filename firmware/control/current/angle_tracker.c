@@ -3,6 +3,8 @@
 
 #include "fx/q.h"
 
+#define COAST_ROUNDS 10
+
 static angle_t result(const angle_tracker_config_t *config, uint32_t theta_e, int32_t omega_q30, bool jumped)
 {
     return (angle_t){
@@ -49,5 +51,23 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
     /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
     state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(gains.first, error);
     state->omega_q30 = omega_q30;
+    return angle;
+}
+
+/* The step of the loop is undone. The new prediction is the old one + step + k_p e with e = theta_e - the old one, so
+ * e = difference + k_p e; each round leaves the share k_p < 1/8 of its error. */
+__attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                                  uint32_t theta_e)
+{
+    const uint32_t step = (uint32_t)fx_mulhi(config->pu_to_turn, state->omega_q30);
+    const int32_t difference = (int32_t)(theta_e + step - state->predicted);
+    int32_t error = difference;
+    for (int n = 0; n < COAST_ROUNDS; n++) {
+        error = (int32_t)((uint32_t)difference + 2U * (uint32_t)fx_mulhi(config->kp, error));
+    }
+    const int32_t correction = fx_mulhi(config->ki_q29, error);
+    state->omega_q30 = fx_sat_q31((int64_t)state->omega_q30 - 2 * (int64_t)correction);
+    const angle_t angle = result(config, theta_e - (uint32_t)error, state->omega_q30, true);
+    state->predicted = angle.theta_e + (uint32_t)angle.step;
     return angle;
 }

@@ -42,7 +42,8 @@ static const field_t plant_fields[] = {
     FLAG(current_quantise), FLAG3(current_stuck), FLAG3(current_open), REAL(vdc_full_scale_V),
     REAL(vdc_gain), FLAG(vdc_quantise), REAL(angle_offset_rad), REAL(angle_h1_rad),
     REAL(angle_h1_phase), REAL(angle_h2_rad), REAL(angle_h2_phase), REAL(resolver_pole_pairs),
-    FLAG(angle_bits), REAL(angle_delay_s), FLAG(angle_stuck), FLAG(imposed_speed),
+    FLAG(angle_bits), REAL(angle_delay_s), FLAG(angle_stuck), FLAG(angle_spike_every),
+    FLAG(angle_spike_samples), REAL(angle_spike_rad), FLAG(imposed_speed),
     REAL(speed_rad_s), REAL(theta_m_rad), REAL(inertia_kgm2), REAL(load_Nm), REAL(viscous_Nms),
     {"plant.seed", offsetof(plant_params_t, seed), KIND_U64},
 };

@@ -14,6 +14,7 @@ typedef struct {
     int adc_bits;
     /* angle tracker */
     double tracker_bandwidth_rad_s;
+    double tracker_jump_turns; /* electrical: a sample further off is not followed */
     /* flux tables: node (ix, iy) is i_d = id0_A + ix did_A, |i_q| = iy diq_A; row-major [ix * nq + iy] */
     int nd, nq;
     double id0_A, did_A, diq_A;

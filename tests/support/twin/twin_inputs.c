@@ -23,6 +23,10 @@ twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *sta
         state->samples++;
     } else {
         const double e = twin_wrap(theta - state->theta - state->step);
+        if (fabs(e) > motor->tracker_jump_turns * 2.0 * 3.14159265358979323846) { /* not followed */
+            state->theta = twin_wrap(state->theta + state->step);
+            return (twin_angle_t){state->theta, state->step, state->step / motor->period_s};
+        }
         state->theta = twin_wrap(state->theta + state->step + 2.0 * wn * e);
         state->step += wn * wn * e;
     }

@@ -30,7 +30,7 @@ PERIOD = {
     "parameters.current_control.integral_gain",
     "parameters.current_control.clear_q30",
     "parameters.modulate.dead_time_q16", "parameters.modulate.longest_q31", "parameters.modulate.nearer_rail_q31",
-    "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
+    "monitor.angle_count_max", "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
     "plausibility.ripple_max",
 }  # fmt: skip

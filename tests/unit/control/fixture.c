@@ -161,6 +161,7 @@ static void inputs(fixture_t *f)
     f->si.periods_per_step = 10;
     f->si.step_s = 10 * period;
     f->si.tracker_bandwidth_rad_s = 600.0;
+    f->si.tracker_jump_turns = 0.125;
     f->si.r_ohm_20 = 674.0 / 65536.0 * f->z;
     f->si.psi_f_Vs = from_q15(psi_f0[0]) * f->psi;
     f->si.i_base_A = f->si.current_full_scale_A = f->i;

@@ -26,6 +26,13 @@ static angle_t step(uint32_t theta_m)
     return angle_tracker_step(&f.angle_tracker, &state, theta_m);
 }
 
+/* As a period does it: an implausible sample is replaced. */
+static angle_t step_or_coast(uint32_t theta_m)
+{
+    const angle_t y = step(theta_m);
+    return y.jumped ? angle_tracker_coast(&f.angle_tracker, &state, y.theta_e) : y;
+}
+
 void test_the_electrical_angle_is_pole_pairs_times_mechanical_plus_offset_and_wraps(void)
 {
     f.angle_tracker.offset = 0x12345678u;
@@ -125,6 +132,45 @@ void test_a_jump_beyond_the_credible_step_is_reported_and_a_smaller_one_is_not(v
     f.angle_tracker.max_step = 0x7FFFFFFEu;
     f.angle_tracker.pole_pairs = 1;
     TEST_ASSERT_TRUE(step(0x80000000u).jumped); /* half a turn: -2^31 has no positive */
+}
+
+/* By hand: at constant speed the prediction of a locked loop is the angle itself. */
+void test_implausible_samples_are_replaced_by_the_prediction_and_leave_no_trace(void)
+{
+    const uint32_t advance = 10000000u;
+    uint32_t theta = 0;
+    for (int n = 0; n < 3000; n++, theta += advance) {
+        TEST_ASSERT_FALSE(step_or_coast(theta).jumped);
+    }
+    for (int n = 0; n < 200; n++, theta += advance) {
+        const bool bad = n >= 10 && (n < 60 || n % 10 == 0);
+        const angle_t y = step_or_coast(bad ? theta + 0x30000000u : theta);
+        TEST_ASSERT_EQUAL(bad, y.jumped);
+        TEST_ASSERT_INT_WITHIN(2000, 0, (int32_t)(y.theta_e - 3U * theta)); /* 50 periods of a speed to 4 LSB */
+        TEST_ASSERT_INT_WITHIN(4, 3 * (int32_t)advance, y.step);
+    }
+}
+
+/* Spikes and a frozen angle on an accelerating rotor: both coast. */
+void test_an_angle_that_fails_now_and_then_gives_the_twins_angle_and_speed(void)
+{
+    twin_angle_state_t twin = {0};
+    worst_t worst = {0};
+    double theta = 0.0, frozen = 0.0;
+    int replaced = 0;
+    for (int n = 0; n < 100000; n++) {
+        theta += 0.15 / 3.0 * sin(n * 1e-4);
+        frozen = (n % 500 >= 450) ? frozen : theta;
+        const double seen = (n % 7 == 6) ? theta + 1.0 : frozen;
+        const uint32_t raw = (uint32_t)(int64_t)floor(fmod(seen, two_pi) / two_pi * turn);
+        const angle_t y = step_or_coast(raw);
+        const twin_angle_t t = twin_angle_tracker(&f.si, &twin, raw / turn * two_pi);
+        worst_note(&worst, y.step - t.step / two_pi * turn, "step of period %d", n);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, twin_wrap(y.theta_e / turn * two_pi - t.theta));
+        replaced += y.jumped ? 1 : 0;
+    }
+    ASSERT_WORST(worst, 100.0);
+    TEST_ASSERT_GREATER_THAN(14000, replaced);
 }
 
 /* k_i e below half an LSB may not creep: an error of one LSB must not build up speed. */

@@ -302,20 +302,37 @@ void test_an_over_voltage_while_off_is_a_fault_too(void)
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
 }
 
-/* One jump is not a fault; the tracker needs some periods to agree with the new angle again. */
-void test_an_angle_that_jumps_three_times_in_a_row_is_a_fault(void)
+/* Meanwhile the prediction is used, so that the currents stay in the rotor's frame. */
+void test_an_angle_that_jumps_is_not_followed_and_a_fault_when_it_stays_away(void)
 {
     seam_periods(5);
     seam.theta_m = 0x40000000u / 3U;
-    seam_period();
-    seam.theta_m = 0;
-    seam_periods(20);
-    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
-    for (int n = 0; n < 3; n++) {
-        seam.theta_m += 0x30000000u;
+    for (int n = 1; n < 66; n++) {
         seam_period();
+        TEST_ASSERT_EQUAL_HEX32(0, published()->theta_e);
     }
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    seam_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, drive.fast.faults);
+    seam_period(); /* from here on the new angle is the one that is followed */
+    TEST_ASSERT_EQUAL_HEX32(0x3FFFFFFFu, published()->theta_e);
+    seam_periods(400);
+    TEST_ASSERT_EQUAL_HEX32(0x3FFFFFFFu, published()->theta_e);
+    TEST_ASSERT_EQUAL(0, drive.fast.monitor.pending);
+}
+
+void test_a_glitch_of_the_angle_of_50_samples_is_no_fault_and_the_bridge_runs_on(void)
+{
+    seam_run();
+    seam_periods(5);
+    seam.theta_m = 0x40000000u / 3U;
+    seam_periods(50);
+    TEST_ASSERT_EQUAL_HEX32(0, published()->theta_e);
+    seam.theta_m = 0;
+    seam_periods(300);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
+    TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_TRUE(drive.fast.is_settled);
 }
 
 /* The voltage of period k acts in period k + 1: what is published is the previous period's. */

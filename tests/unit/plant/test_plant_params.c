@@ -96,6 +96,9 @@ void test_impossible_electronics_are_refused_by_name(void)
     REFUSE(vdc_full_scale_V, 0.0);
     REFUSE(vdc_gain, nan);
     REFUSE(angle_offset_rad, nan);
+    REFUSE(angle_spike_every, -1);
+    REFUSE(angle_spike_samples, -1);
+    REFUSE(angle_spike_rad, nan);
     REFUSE(angle_h1_rad, nan);
     REFUSE(angle_h2_rad, nan);
     REFUSE(resolver_pole_pairs, 0.0);

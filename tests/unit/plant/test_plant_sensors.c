@@ -261,6 +261,26 @@ void test_a_stuck_sensor_repeats_its_last_sample(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, seen.theta_m_rad);
 }
 
+/* Two of five samples, from the first on; the sequence starts again after it was off. */
+void test_spikes_disturb_the_first_samples_of_each_sequence(void)
+{
+    p.angle_spike_every = 5;
+    p.angle_spike_samples = 2;
+    p.angle_spike_rad = 0.3;
+    start();
+    plant_set_state(plant, 0.0, 0.0, 2.0, 0.0);
+    for (int n = 0; n < 22; n++) {
+        plant_sample(plant, &seen);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, (n % 5 < 2) ? 2.1 : 2.0, seen.theta_m_rad);
+    }
+    plant_params(plant)->angle_spike_every = 0;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0, seen.theta_m_rad);
+    plant_params(plant)->angle_spike_every = 5;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.1, seen.theta_m_rad);
+}
+
 void test_an_open_current_input_reads_the_negative_full_scale(void)
 {
     p.current_open[2] = 1;

@@ -3,7 +3,7 @@
 #include "unity.h"
 
 static const monitor_config_t config = {
-    .i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_max = 300};
+    .i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_max = 300, .angle_count_max = 300};
 static monitor_state_t state;
 static monitor_in_t in;
 static bool jumped;
@@ -110,21 +110,51 @@ void test_a_current_sum_needs_five_samples_in_a_row_with_either_sign(void)
     }
 }
 
-void test_three_angle_jumps_in_a_row_are_an_angle_fault(void)
+/* 40 for the first, 4 for each further one: 300 with the 66th. */
+void test_an_angle_that_stays_implausible_for_66_samples_is_a_fault(void)
 {
     for (int round = 0; round < 2; round++) {
         jumped = true;
-        TEST_ASSERT_EQUAL_HEX32(0, step());
-        TEST_ASSERT_EQUAL_HEX32(0, step());
+        for (int n = 1; n < 66; n++) {
+            TEST_ASSERT_EQUAL_HEX32(0, step());
+        }
         TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
         TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
         jumped = false;
-        TEST_ASSERT_EQUAL_HEX32(0, step());
+        for (int n = 0; n < 300; n++) { /* as long as the count is there */
+            TEST_ASSERT_EQUAL(MONITOR_COUNTING, state.pending & MONITOR_COUNTING);
+            TEST_ASSERT_EQUAL_HEX32(0, step());
+        }
+        TEST_ASSERT_EQUAL(0, state.pending);
     }
-    for (int n = 0; n < 100; n++) { /* never three in a row */
-        jumped = n % 3 != 0;
-        TEST_ASSERT_EQUAL_HEX32(0, step());
+}
+
+/* A sequence of good samples between two bad ones; the fault's sample, 0: none. */
+static int faulted_after(int every, int bad, int samples)
+{
+    state = (monitor_state_t){0};
+    for (int n = 0; n < samples; n++) {
+        jumped = n % every < bad;
+        if (step() == FAULT_ANGLE) {
+            return n + 1;
+        }
     }
+    return 0;
+}
+
+/* By hand, 31 more with each ten samples and 40 with the first of them: 300 in the tenth sequence. */
+void test_single_spikes_are_a_fault_if_they_are_frequent_and_tolerated_if_they_are_rare(void)
+{
+    TEST_ASSERT_EQUAL_INT(91, faulted_after(10, 1, 1000));
+    TEST_ASSERT_EQUAL_INT(7 * 2 + 1, faulted_after(2, 1, 1000)); /* 39 with each two */
+    TEST_ASSERT_EQUAL_INT(0, faulted_after(41, 1, 1000000));     /* 40 up, 40 down */
+    TEST_ASSERT_GREATER_THAN(0, faulted_after(39, 1, 1000000));
+}
+
+void test_a_glitch_of_50_samples_every_286_is_tolerated(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, faulted_after(50 + 236, 50, 1000000));
+    TEST_ASSERT_EQUAL_INT(66, faulted_after(1000, 66, 1000));
 }
 
 /* A jump is noted for one period: after a good one nothing counts any more. */
@@ -134,9 +164,10 @@ void test_a_jump_is_evaluated_once_and_then_cleared(void)
     monitor_report_angle_jump(&state);
     TEST_ASSERT_EQUAL(MONITOR_ANGLE_JUMP, state.pending);
     (void)step(); /* counts one */
+    TEST_ASSERT_EQUAL(MONITOR_COUNTING | MONITOR_ANGLE_LOST, state.pending);
+    (void)step(); /* a good one */
     TEST_ASSERT_EQUAL(MONITOR_COUNTING, state.pending);
-    (void)step(); /* a good one: counts no longer */
-    TEST_ASSERT_EQUAL(0, state.pending);
+    TEST_ASSERT_EQUAL(39, state.angle);
 }
 
 void test_several_faults_are_reported_together(void)
@@ -145,7 +176,7 @@ void test_several_faults_are_reported_together(void)
     in.v_dc = 32767;
     jumped = true;
     uint32_t faults = 0;
-    for (int n = 0; n < 5; n++) {
+    for (int n = 0; n < 66; n++) {
         faults = step();
     }
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT | FAULT_OVER_VOLTAGE | FAULT_CURRENT_SUM | FAULT_ANGLE, faults);

@@ -18,7 +18,8 @@ TRIM_RATE_RAD_S = 50.0
 TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 
 TRACKER_BANDWIDTH_RAD_S = 300.0
-TRACKER_JUMP_TURNS = 1 / 16
+TRACKER_JUMP_TURNS = 1 / 20
+ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
 ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
 KNEE_LSB = 4

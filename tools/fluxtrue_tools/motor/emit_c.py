@@ -11,6 +11,7 @@ from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.derived import (
     ANGLE_HARMONIC_MAX_TURNS,
+    ANGLE_JUMPS_S,
     ANGLE_S,
     COMMISSION_MEASURE_S,
     COMMISSION_SETTLE_S,
@@ -328,6 +329,7 @@ def _monitor(motor: Motor) -> list[Row]:
         ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
         ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
         ("sum_max", sum_max, f"{d.sum_max_A:g} A"),
+        ("angle_count_max", f"{round(ANGLE_JUMPS_S / b.period_s)}", f"{1e3 * ANGLE_JUMPS_S:g} ms of periods"),
     ]
 
 
@@ -498,6 +500,7 @@ def motor_tables_c(motor: Motor) -> str:
 
 _SI_DERIVED = (
     "tracker_bandwidth_rad_s",
+    "tracker_jump_turns",
     "sigma_rad_s",
     "setpoint_weight",
     "integral_ratio",

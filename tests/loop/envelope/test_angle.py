@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A defective angle sensor: found in time, and glitches that change nothing. Torque is the plant's."""
+
+import math
+
+import numpy as np
+import pytest
+from rig import ANGLE, Rig, Trace
+
+from fluxtrue_tools.sim.motor import Motor
+
+SPEEDS = [0.0, 20.0, -100.0, 500.0, 2000.0, -5000.0, 10000.0]
+TORQUES = [100.0, -80.0, 5.0]
+
+
+def _steady(hsm1: Motor, rpm: float, torque: float) -> tuple[Rig, float]:
+    rig = Rig(hsm1, rpm, 0.3 * torque if abs(rpm) > 5000.0 else torque)
+    return rig, rig.run(0.25).settled()
+
+
+def _largest_before(trace: Trace, ms: float, mean: float) -> float:
+    return float(np.abs(trace.torque[: round(ms * 10.0)] - mean).max())
+
+
+@pytest.mark.parametrize("torque", TORQUES)
+@pytest.mark.parametrize("rpm", SPEEDS)
+def test_spikes_in_one_sample_of_ten_are_found_in_20_ms(hsm1: Motor, rpm: float, torque: float) -> None:
+    rig, before = _steady(hsm1, rpm, torque)
+    rig.set(plant_angle_spike_every=10, plant_angle_spike_samples=1, plant_angle_spike_rad=math.radians(60.0))
+    trace = rig.run(0.03)
+    found_ms = trace.fault_ms(ANGLE)
+    assert found_ms <= 20.0
+    assert _largest_before(trace, found_ms, before) <= 5.0
+
+
+@pytest.mark.parametrize("degrees", [25.0, 90.0, 180.0])
+@pytest.mark.parametrize("rpm", SPEEDS)
+def test_a_glitch_of_5_ms_changes_no_torque_and_is_no_fault(hsm1: Motor, rpm: float, degrees: float) -> None:
+    rig, before = _steady(hsm1, rpm, 100.0)
+    rig.set(plant_angle_spike_every=100000, plant_angle_spike_samples=50, plant_angle_spike_rad=math.radians(degrees))
+    trace = rig.run(0.1)
+    assert trace.faults == 0
+    assert np.abs(trace.torque - before).max() <= 5.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: float) -> None:
+    """(AT-15): 2.1 degrees after 5 ms at 2000 rpm/s."""
+    rig, before = _steady(hsm1, 2000.0, 80.0 * sign)
+    faster = (2000.0 * math.pi / 30.0, 2200.0 * math.pi / 30.0)
+    rig.run(0.1, plant_speed_rad_s=faster)
+    rig.set(plant_angle_spike_every=100000, plant_angle_spike_samples=50, plant_angle_spike_rad=1.0)
+    trace = rig.run(0.02, plant_speed_rad_s=(faster[1], faster[1] * 2240.0 / 2200.0))
+    assert trace.faults == 0
+    assert np.abs(trace.torque - before).max() <= 5.0
+
+
+@pytest.mark.parametrize("degrees", [20.0, -20.0, 120.0])
+@pytest.mark.parametrize("torque", TORQUES)
+@pytest.mark.parametrize("rpm", SPEEDS)
+def test_a_sensor_that_slips_is_found_in_20_ms(hsm1: Motor, rpm: float, torque: float, degrees: float) -> None:
+    rig, before = _steady(hsm1, rpm, torque)
+    trace = rig.set(plant_angle_offset_rad=math.radians(degrees)).run(0.03)
+    found_ms = trace.fault_ms(ANGLE)
+    assert found_ms <= 20.0
+    assert _largest_before(trace, found_ms, before) <= 5.0
+
+
+@pytest.mark.parametrize("rpm_per_s", [40000.0, -40000.0])
+def test_the_fastest_acceleration_is_no_fault_of_the_angle(hsm1: Motor, rpm_per_s: float) -> None:
+    rig = Rig(hsm1, 0.0)
+    rig.run(0.1)
+    end = math.copysign(9000.0 * math.pi / 30.0, rpm_per_s)
+    trace = rig.run(9000.0 / 40000.0, plant_speed_rad_s=(0.0, end))
+    back = rig.run(9000.0 / 40000.0, plant_speed_rad_s=(end, 0.0))
+    assert (trace.faults | back.faults) & ANGLE == 0
