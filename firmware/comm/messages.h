@@ -22,6 +22,7 @@
     X(DC_VOLTAGE, 3, "The dc voltage is near a limit.") \
     X(BATTERY_POWER, 4, "The battery's power limit is reached.") \
     X(MAGNET, 5, "i_d is at the limit that protects the magnets.") \
+    X(TEMPERATURE_SENSOR, 6, "A temperature sensor is out of its range.") \
     X(BATTERY_LIMITS_LOST, 7, "The battery's limits were received once and are lost.") \
     X(SPEED, 8, "The speed is near its limit.")
 

@@ -52,8 +52,8 @@ static void read_temperatures(telemetry_t *t)
 {
     const int16_t winding = hal_temperature_winding_dC();
     const int16_t inverter = hal_temperature_inverter_dC();
-    t->winding_valid = winding != TEMPERATURE_UNKNOWN;
-    t->inverter_valid = inverter != TEMPERATURE_UNKNOWN;
+    t->winding_valid = temperature_is_known(winding);
+    t->inverter_valid = temperature_is_known(inverter);
     t->winding_C = t->winding_valid ? (float)winding / 10.0F : 0.0F;
     t->inverter_C = t->inverter_valid ? (float)inverter / 10.0F : 0.0F;
 }

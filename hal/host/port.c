@@ -117,12 +117,12 @@ bool hal_board_gate_fault(void)
 
 int16_t hal_temperature_winding_dC(void)
 {
-    return active->board.winding_broken ? TEMPERATURE_UNKNOWN : (int16_t)lrint(active->winding_C * 10.0);
+    return active->board.winding_broken ? TEMPERATURE_OUT_OF_RANGE : (int16_t)lrint(active->winding_C * 10.0);
 }
 
 int16_t hal_temperature_inverter_dC(void)
 {
-    return active->board.inverter_broken ? TEMPERATURE_UNKNOWN : (int16_t)lrint(active->board.inverter_C * 10.0);
+    return active->board.inverter_broken ? TEMPERATURE_OUT_OF_RANGE : (int16_t)lrint(active->board.inverter_C * 10.0);
 }
 
 int16_t hal_temperature_processor_dC(void)

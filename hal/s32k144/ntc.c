@@ -3,18 +3,19 @@
 
 #include "hal/temperature.h"
 
-#define NODES 20
+#define NODES 35
 #define FIRST_DC (-400)
 #define STEP_DC 100
 
-/* Counts at -40, -30 ... 150 degrees: falling. */
-static const uint16_t node[NODES] = {3937, 3814, 3628, 3368, 3038, 2654, 2249, 1854, 1497, 1191,
-                                     941,  741,  584,  462,  368,  295,  238,  194,  159,  132};
+/* Counts at -40, -30 ... 300 degrees: falling. */
+static const uint16_t node[NODES] = {3937, 3814, 3628, 3368, 3038, 2654, 2249, 1854, 1497, 1191, 941, 741,
+                                     584,  462,  368,  295,  238,  194,  159,  132,  110,  92,   78,  66,
+                                     57,   49,   43,   37,   33,   29,   25,   23,   20,   18,   16};
 
 int16_t ntc_dC(uint16_t count)
 {
     if (count > node[0] || count < node[NODES - 1]) {
-        return TEMPERATURE_UNKNOWN;
+        return TEMPERATURE_OUT_OF_RANGE;
     }
     int k = 0;
     while (count < node[k + 1]) {

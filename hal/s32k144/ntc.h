@@ -5,9 +5,9 @@
  *   count/4096 = r/(1 + r),  r = exp(B (1/T - 1/298.15 K)),  B = 3435 K; straight lines between nodes every 10 K
  * Source   the beta equation of a thermistor; the table is recomputed by its test
  * Units    tenths of a degree Celsius
- * Range    -40 ... 150 degrees
- * Rounding within 0.7 K of the equation
- * Errors   TEMPERATURE_UNKNOWN outside the range: sensor open or shorted
+ * Range    -40 ... 300 degrees: beyond every temperature at which the drive may trip
+ * Rounding within 0.7 K of the equation up to 150 degrees, 4 K at 300, where a count is 6 K
+ * Errors   TEMPERATURE_OUT_OF_RANGE outside the range: sensor open or shorted
  * Context  1 kHz task; one division */
 #include <stdint.h>
 

@@ -27,7 +27,7 @@ q31_t identify_value(const identify_config_t *config, const identify_state_t *st
 /* R = r0 (1 + alpha (theta - 20 C)); without a sensor the last one holds (ID-13). */
 static void resistance_prior(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
-    state->r_known = in->winding_dC != TEMPERATURE_UNKNOWN;
+    state->r_known = temperature_is_known(in->winding_dC);
     if (state->r_known) {
         state->r_prior = fx_sat_q31(config->r0 + (int64_t)config->r_per_dC * (in->winding_dC - REFERENCE_dC));
     }

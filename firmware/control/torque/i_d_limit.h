@@ -27,7 +27,7 @@ typedef struct {
 static inline q15_t i_d_limit_step(const i_d_limit_config_t *config, q15_t psi_delta, int16_t winding_dC)
 {
     int32_t dC = config->assumed_dC;
-    if (winding_dC != TEMPERATURE_UNKNOWN) {
+    if (temperature_is_known(winding_dC)) {
         const int32_t magnet = 200 + fx_mul_gain_q15(config->dC_per_psi, psi_delta);
         dC = fx_max_s32(winding_dC, fx_min_s32(magnet, config->assumed_dC));
     }

@@ -88,11 +88,11 @@ static __attribute__((noinline)) void limit_by_line(bound_t *bound, const derati
 static __attribute__((noinline)) void limit_by_temperature(bound_t *bound, const derating_line_t *at, int16_t dC,
                                                            bool *was_known, uint32_t reason)
 {
-    if (dC != TEMPERATURE_UNKNOWN) {
+    if (temperature_is_known(dC)) {
         *was_known = true;
         limit_by_line(bound, at, dC, reason);
-    } else if (*was_known) {
-        limit_by_factor(bound, FACTOR_SENSOR_LOST, reason);
+    } else if (*was_known || dC == TEMPERATURE_OUT_OF_RANGE) {
+        limit_by_factor(bound, FACTOR_SENSOR_LOST, DERATING_SENSOR);
     }
 }
 

@@ -12,7 +12,7 @@
  * Range    every argument; loss is kept in 0 ... 1/4
  * Rounding 1 LSB q15
  * Errors   derating contains the reason of every limit that the torque exceeds, not only of the smallest one; a
- *          temperature that was known and is lost counts as a factor of 1/2
+ *          temperature whose sensor is out of its range, or that was known and is lost, counts as a factor of 1/2
  * Context  1 kHz task; two bounded divisions */
 #include <stdbool.h>
 #include <stdint.h>
@@ -33,7 +33,8 @@
     X(DC_LOW, 5, "The dc voltage is low.") \
     X(DC_HIGH, 6, "The dc voltage is high.") \
     X(SPEED, 7, "Speed.") \
-    X(MAGNET, 8, "i_d is at the demagnetisation limit.") /* set by the 1 kHz task */
+    X(MAGNET, 8, "i_d is at the demagnetisation limit.") /* set by the 1 kHz task */ \
+    X(SENSOR, 9, "A temperature sensor is out of its range.")
 
 #define DERATING_BIT(name, bit, text) DERATING_##name = 1u << (bit),
 enum { DERATING_LIST(DERATING_BIT) };

@@ -124,7 +124,7 @@ static int pin_set(emulated_t *e, const char *name, double value)
                           : strcmp(name, "emulator.processor_C") == 0 ? &e->processor_C
                                                                       : NULL;
     if (temperature != NULL) {
-        const bool possible = value >= -40.0 && value <= 150.0;
+        const bool possible = value >= -40.0 && value <= (temperature == &e->inverter_C ? 300.0 : 150.0);
         *temperature = possible ? value : *temperature;
         return possible ? SIM_OK : SIM_OUT_OF_RANGE;
     }

@@ -49,7 +49,7 @@ static void faults_take(emulated_t *e)
 static double temperature(uint32_t count, bool *broken)
 {
     const int16_t dC = ntc_dC((uint16_t)count);
-    *broken = dC == TEMPERATURE_UNKNOWN;
+    *broken = !temperature_is_known(dC);
     return *broken ? 0.0 : dC / 10.0;
 }
 

@@ -170,7 +170,7 @@ void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(voi
         in.inverter_dC = hot[n];
         TEST_ASSERT_EQUAL_INT(0, step().torque_limited);
     }
-    in.inverter_dC = INT16_MIN + 1;
+    in.inverter_dC = INT16_MIN + 2;
     TEST_ASSERT_EQUAL_INT(counts(0.25), step().torque_limited);
 }
 
@@ -184,7 +184,22 @@ void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves
     (void)step();
     in.winding_dC = TEMPERATURE_UNKNOWN;
     TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque_limited);
-    TEST_ASSERT_EQUAL_HEX16(DERATING_WINDING, step().derating);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_SENSOR, step().derating);
+}
+
+/* From the first step on, and of either sensor. */
+void test_a_sensor_out_of_its_range_halves_and_is_a_reason_of_its_own(void)
+{
+    in.torque_arbitrated = 15000;
+    in.inverter_dC = TEMPERATURE_UNKNOWN;
+    in.winding_dC = TEMPERATURE_OUT_OF_RANGE;
+    TEST_ASSERT_INT_WITHIN(1, RATED / 2, step().torque_limited);
+    TEST_ASSERT_EQUAL_HEX16(DERATING_SENSOR, step().derating);
+    in.winding_dC = AMBIENT_C;
+    in.inverter_dC = TEMPERATURE_OUT_OF_RANGE;
+    TEST_ASSERT_EQUAL_HEX16(DERATING_SENSOR, step().derating);
+    in.inverter_dC = AMBIENT_C;
+    TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
 }
 
 void test_what_the_machine_cannot_reach_is_not_asked_for(void)

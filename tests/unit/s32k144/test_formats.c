@@ -69,22 +69,30 @@ void test_a_resolver_frame_is_the_value_and_then_the_faults(void)
     TEST_ASSERT_EQUAL_HEX8(AD2S1210_SIGNAL_LOSS | AD2S1210_TRACKING, frame.fault);
 }
 
-/* Straight lines over 10 K bend away from the beta equation by 0.6 K at most, rounding 0.05 K. */
+/* Straight lines over 10 K bend away from the beta equation by 0.6 K at most, rounding 0.05 K. Above 150 degrees the
+ * rounding of the nodes to whole counts is more: half a count is 0.6 K there and 3.2 K at 300. */
 void test_the_ntc_follows_the_beta_equation_over_its_range(void)
 {
-    for (uint16_t count = 132; count <= 3937; count++) {
+    for (uint16_t count = 16; count <= 3937; count++) {
         const double r = count / (4096.0 - count);
         const double exact_dC = 10.0 * (1.0 / (1.0 / 298.15 + log(r) / 3435.0) - 273.15);
-        TEST_ASSERT_DOUBLE_WITHIN(7.0, exact_dC, ntc_dC(count));
+        TEST_ASSERT_DOUBLE_WITHIN(count < 132 ? 40.0 : 7.0, exact_dC, ntc_dC(count));
     }
 }
 
-void test_an_open_or_shorted_ntc_is_unknown(void)
+void test_an_open_or_shorted_ntc_is_out_of_range(void)
 {
-    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, ntc_dC(4095));
-    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, ntc_dC(3938));
-    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, ntc_dC(131));
-    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_UNKNOWN, ntc_dC(0));
+    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_OUT_OF_RANGE, ntc_dC(4095));
+    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_OUT_OF_RANGE, ntc_dC(3938));
+    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_OUT_OF_RANGE, ntc_dC(15));
+    TEST_ASSERT_EQUAL_INT16(TEMPERATURE_OUT_OF_RANGE, ntc_dC(0));
+}
+
+/* motor.toml allows trip levels up to 300 degrees. */
+void test_the_ntc_reaches_every_temperature_at_which_a_drive_trips(void)
+{
+    TEST_ASSERT_EQUAL_INT16(3000, ntc_dC(16));
+    TEST_ASSERT_EQUAL_INT16(2300, ntc_dC(37));
 }
 
 /* 740.5 mV at 25 degrees, 1.564 mV less for each kelvin, of 5 V and 4096 counts: 606.6 counts, 0.7805 K each. */
