@@ -10,12 +10,6 @@
 #define INFO(name, lo, hi, unit, text) {#name, lo, hi},
 const calibration_info_t calibration_info[CALIBRATION_COUNT] = {CALIBRATION_LIST(INFO)};
 
-/* A slew rate that rounds to zero would hold the torque for ever. */
-static q15_t at_least_one(q15_t x)
-{
-    return (x > 0) ? x : (q15_t)1;
-}
-
 /* The bridge's dead time as a share of the period. */
 static float dead_time_full(const motor_t *m)
 {
@@ -45,14 +39,41 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     }
 }
 
+static float larger(float a, float b)
+{
+    return (a > b) ? a : b;
+}
+
+float calibration_least(const drive_t *drive, calibration_id_t id)
+{
+    const motor_t *m = drive->motor;
+    const float psi_drift = PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * m->bases.step_s;
+    const float r_drift = R_DRIFT_SHARE * si_from_q31(drive->parameters.mrai.r0, 1.0F) * m->bases.step_s;
+    switch (id) {
+    case CALIBRATION_torque_slew_Nm_per_s:
+        return si_from_q15(1, m->bases.torque_Nm) / m->bases.step_s;
+    case CALIBRATION_flux_bandwidth_rad_s:
+        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / psi_drift);
+    case CALIBRATION_resistance_bandwidth_rad_s:
+        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / r_drift);
+    case CALIBRATION_torque_loop_bandwidth_rad_s:
+        return si_from_q15(1, 1.0F) / m->bases.step_s;
+    case CALIBRATION_dead_time_compensation:
+        return (m->dead_time_s > 0.0F) ? si_from_q15(1, 1.0F) / dead_time_full(m) : 0.0F;
+    case CALIBRATION_observer_m:
+    case CALIBRATION_COUNT:
+    default:
+        return 0.0F;
+    }
+}
+
 void calibration_set(drive_t *drive, calibration_id_t id, float value)
 {
     const motor_t *m = drive->motor;
     motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
-        p->torque_slew = (value > 0.0F) ? at_least_one(q15_from_si(value * m->bases.step_s, m->bases.torque_Nm))
-                                        : Q15_MAX;
+        p->torque_slew = (value > 0.0F) ? q15_from_si(value * m->bases.step_s, m->bases.torque_Nm) : Q15_MAX;
         break;
     case CALIBRATION_observer_m:
         p->mrai.pole_gain = q31_from_si(4.0F * value * si_from_q31(p->mrai.r0, 1.0F), 1.0F);

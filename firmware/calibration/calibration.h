@@ -5,7 +5,8 @@
  *   Each value becomes one or two aligned words of the configuration, so that an interrupt sees the old or the new one.
  * Source   docs/howto/xcp.md; the relations of tools/fluxtrue_tools/motor/derived.py
  * Units    as named
- * Range    calibration/calibration_list.h; calibration_set() expects a value in range
+ * Range    calibration/calibration_list.h; calibration_set() expects a value in range, and 0 or at least
+ *          calibration_least(): a smaller one would become zero and mean something else
  * Rounding to the nearest step of the configuration's format
  * Context  1 kHz task or below; floating point, hence in no interrupt above it */
 #include "calibration/calibration_list.h"
@@ -23,6 +24,8 @@ extern const calibration_info_t calibration_info[CALIBRATION_COUNT];
 
 /** The present value in the drive's parameters. */
 float calibration_get(const drive_t *drive, calibration_id_t id);
+/** What one step of the format is. */
+float calibration_least(const drive_t *drive, calibration_id_t id);
 void calibration_set(drive_t *drive, calibration_id_t id, float value);
 
 #endif

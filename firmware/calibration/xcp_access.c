@@ -1,10 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibration/xcp_access.h"
 
-#define LIMITS(name, lo, hi, unit, text) {lo, hi},
-
-static const xcp_limits_t limits[CALIBRATION_COUNT] = {CALIBRATION_LIST(LIMITS)};
-
 /* Protects against accidental writes only. A product that needs protection against attacks must replace it. */
 static uint32_t compute_key(uint32_t seed)
 {
@@ -17,7 +13,7 @@ static xcp_config_t protocol_config(xcp_access_t *access)
         .memory = {access->area, XCP_ACCESS_AREAS},
         .working = access->working,
         .reference = access->reference,
-        .limits = limits,
+        .limits = access->limits,
         .parameters = CALIBRATION_COUNT,
         .key = compute_key,
     };
@@ -28,6 +24,8 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(drive, (calibration_id_t)k);
         access->applied_value[k] = access->reference[k];
+        access->limits[k] = (xcp_limits_t){calibration_info[k].lo, calibration_info[k].hi,
+                                           calibration_least(drive, (calibration_id_t)k)};
     }
     access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
     access->area[1] = (xcp_area_t){frame, sizeof *frame};

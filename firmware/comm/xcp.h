@@ -22,6 +22,7 @@ enum { XCP_PAGE_REFERENCE = 0, XCP_PAGE_WORKING = 1 };
 /** One calibratable value: a float at word `index` of the page. */
 typedef struct {
     float lo, hi;
+    float least; /* a smaller magnitude, except 0, is refused: the format would make it zero */
 } xcp_limits_t;
 
 typedef struct {

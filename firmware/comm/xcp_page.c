@@ -32,7 +32,9 @@ void xcp_page_discard(xcp_t *xcp)
 
 static bool in_range(const xcp_limits_t *limits, float value)
 {
-    return value >= limits->lo && value <= limits->hi; /* false for a NaN */
+    const float magnitude = (value < 0.0F) ? -value : value;
+    const bool meant = magnitude == 0.0F || magnitude >= limits->least;
+    return value >= limits->lo && value <= limits->hi && meant; /* false for a NaN */
 }
 
 static float waiting_value(const xcp_t *xcp, uint32_t parameter)

@@ -65,13 +65,24 @@ static void set_outputs(const ecu_t *ecu)
     hal_board_set(BOARD_SAFE_STATE, (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U);
 }
 
+/* A limit of the vehicle that closes, and a ramp to zero, do not wait for the calibrated slew: the torque may be beyond
+ * the limit only for as long as the arbitrated torque is on its way there. */
+static void close_limits(torque_limits_t *limits, const arbitrate_in_t *in, q15_t arbitrated)
+{
+    const q15_t magnitude = fx_abs_q15(arbitrated);
+    limits->torque_drive = (q15_t)fx_max_s32(in->ramp_out ? (q15_t)0 : in->limit_drive, magnitude);
+    limits->torque_regen = (q15_t)fx_max_s32(in->ramp_out ? (q15_t)0 : in->limit_regen, magnitude);
+}
+
 static void command_drive(ecu_t *ecu)
 {
     request_t *request = &ecu->drive.request;
     const arbitrate_in_t in = ecu_arbitration(ecu);
     arbitrate_hold(&ecu->arbitration_config, &ecu->arbitration_state, ecu->drive.task.allowed.torque_limited);
     request->torque_arbitrated = arbitrate_step(&ecu->arbitration_config, &ecu->arbitration_state, &in);
-    request->limits = ecu_limits(ecu);
+    torque_limits_t limits = ecu_limits(ecu);
+    close_limits(&limits, &in, request->torque_arbitrated);
+    request->limits = limits;
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
 }

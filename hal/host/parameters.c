@@ -250,7 +250,8 @@ static int set_calibration(fluxtrue_t *drive, const char *name, double value)
     if (id == CALIBRATION_COUNT) {
         return FLUXTRUE_UNKNOWN_NAME;
     }
-    if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi)) {
+    const bool meant = value == 0.0 || (float)value >= calibration_least(&drive->drive, id);
+    if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi && meant)) {
         return FLUXTRUE_OUT_OF_RANGE;
     }
     calibration_set(&drive->drive, id, (float)value);

@@ -186,6 +186,22 @@ void test_a_command_that_completes_a_good_and_a_bad_value_stores_neither(void)
     TEST_ASSERT_EQUAL_UINT32(0, slave.generation);
 }
 
+/* A step of the format is 0.25: less would become zero, which means something else. Zero itself is meant. */
+void test_a_value_that_its_format_would_make_zero_is_refused(void)
+{
+    const float zero = 0.0F, less = 0.249F, least = 0.25F;
+    ready();
+    master_download(xcp_address(working), &less, 4);
+    EXPECT_ERROR(0x22);
+    TEST_ASSERT_EQUAL_FLOAT(1.0F, working[0]);
+    master_download(xcp_address(working), &least, 4);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(0.25F, working[0]);
+    master_download(xcp_address(working), &zero, 4);
+    EXPECT(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, working[0]);
+}
+
 void test_the_master_may_write_the_whole_page_in_pieces_of_any_size(void)
 {
     const float page[3] = {0.5F, 2.5F, -0.5F};

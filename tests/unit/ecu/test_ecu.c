@@ -325,6 +325,25 @@ void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive, CALIBRATION_dead_time_compensation));
 }
 
+/* The least value of each calibration is not zero for the drive, and half of it, which is refused, is. */
+void test_the_least_value_of_a_calibration_is_one_step_of_its_format(void)
+{
+    for (int k = 0; k < CALIBRATION_COUNT; k++) {
+        const calibration_id_t id = (calibration_id_t)k;
+        const float least = calibration_least(&ecu.drive, id);
+        TEST_ASSERT_EQUAL_FLOAT(least, ecu.xcp.limits[k].least);
+        TEST_ASSERT_TRUE(least >= 0.0F && least < 0.05F * calibration_info[k].hi);
+        if (least > 0.0F) {
+            calibration_set(&ecu.drive, id, 1.001F * least);
+            TEST_ASSERT_TRUE(calibration_get(&ecu.drive, id) > 0.0F);
+            TEST_ASSERT_TRUE(ecu.drive.parameters.mrai.psi_drift_full > 0);
+            TEST_ASSERT_TRUE(ecu.drive.parameters.mrai.r_drift_full > 0);
+        }
+    }
+    calibration_set(&ecu.drive, CALIBRATION_torque_slew_Nm_per_s, 0.0F);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, ecu.drive.parameters.torque_slew);
+}
+
 /* 32 ms of current before the fault, the newest last; a second fault and what the machine does then change nothing. */
 void test_the_first_fault_freezes_what_was_before_it(void)
 {

@@ -94,7 +94,8 @@ class Tuning:
             master.download(FLOAT.pack(value))
         except XcpResponseError as error:
             raise FluxtrueError(f"{name} = {value:g}: refused by the ECU ({error}), "
-                                f"allowed: {info.lo:g} … {info.hi:g} {info.unit}") from error  # fmt: skip
+                                f"allowed: {info.lo:g} … {info.hi:g} {info.unit}, nothing so small that the drive "
+                                "would make it zero") from error  # fmt: skip
         return float(self._tried(lambda: self._read(name)))
 
     def close(self) -> None:
