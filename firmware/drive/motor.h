@@ -24,6 +24,7 @@
 #include "safety/plausibility.h"
 #include "safety/safe_state.h"
 #include "safety/torque_monitor.h"
+#include "second_level/constants.h"
 #include "types/bases.h"
 #include "types/motor_check.h"
 
@@ -67,7 +68,8 @@ typedef struct {
     plausibility_config_t plausibility;
     torque_monitor_config_t torque_monitor;
     commission_config_t commission;
-    motor_parameters_t parameters; /* to start with */
+    motor_parameters_t parameters;                /* to start with */
+    const second_level_constants_t *second_level; /* of the second level alone */
 } motor_t;
 
 extern const motor_t motor;

@@ -201,7 +201,7 @@ void task_1khz(drive_t *drive)
     take_snapshot(drive, &snapshot);
     angle_harmonics_step(&drive->motor->angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
-    uint32_t faults = slow_monitors_step(drive, &snapshot);
+    uint32_t faults = slow_monitors_step(drive, &snapshot) | drive->request.faults;
     task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);

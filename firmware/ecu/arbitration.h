@@ -11,7 +11,8 @@
  *   ramp_out ends the torque with the rate ramp_out, without a limit of jerk
  * arbitrate_hold(): limits the arbitrated torque to the drive's limited torque plus one jerk. When the drive's limits
  *   rise again, the torque then rises from its present value, with slew and jerk. The one jerk keeps the arbitrated
- *   torque beyond the limit, so that the limit continues to be reported.
+ *   torque beyond the limit, so that the limit continues to be reported. A rate towards zero is kept: a falling limit
+ *   does not delay the answer to a smaller request.
  * Source   docs/howto/can.md, torque path
  * Units    per unit of T_b, q15; slew, jerk and ramp_out in q31 per step (and per step squared)
  * Range    slew, jerk, ramp_out > 0 and below 2^29

@@ -49,6 +49,7 @@ static void receive(ecu_t *ecu)
         if (frame.id == XCP_ID_COMMAND && !frame.extended) {
             xcp_access_receive(&ecu->xcp, &frame);
         } else {
+            second_level_frame(&ecu->second_level.frames, &frame);
             (void)can_rx_frame(&ecu->rx, &frame);
         }
     }
@@ -85,6 +86,23 @@ static void command_drive(ecu_t *ecu)
     request->limits = limits;
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
+}
+
+/* The second level uses the samples and its own constants; what it finds, the drive latches in its next step. */
+static void check_by_second_level(ecu_t *ecu)
+{
+    drive_t *drive = &ecu->drive;
+    const sample_t sample = sample_box_read(&drive->samples);
+    const fx_pair_t i_ab = sample.i_ab;
+    const second_level_in_t in = {
+        .sample = {.alpha = (int16_t)i_ab, .beta = (int16_t)(i_ab >> 16), .theta_m = sample.theta_m},
+        .acting = sample.acting,
+        .slew = drive->parameters.torque_slew,
+        .correction = fx_q15_from_q31(drive->task.torque_loop.correction),
+        .elapsed_us = ecu->clock.elapsed_us,
+    };
+    const bool excessive = second_level_step(drive->motor->second_level, &ecu->second_level, &in);
+    drive->request.faults = excessive ? FAULT_TORQUE : 0U;
 }
 
 static void service_watchdog(ecu_t *ecu)
@@ -137,6 +155,7 @@ void ecu_task_1khz(ecu_t *ecu)
     set_outputs(ecu);
     command_drive(ecu);
     task_1khz(&ecu->drive);
+    check_by_second_level(ecu);
     service_watchdog(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
     freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,

@@ -15,6 +15,7 @@
 #include "drive/drive.h"
 #include "ecu/arbitration.h"
 #include "ecu/supervisor.h"
+#include "second_level/second_level.h"
 #include "signal/step_clock.h"
 
 typedef struct {
@@ -34,6 +35,7 @@ typedef struct {
     step_clock_t clock;
     can_rx_t rx;
     can_tx_t tx;
+    second_level_t second_level;
     supervisor_t supervisor;
     arbitrate_config_t arbitration_config;
     arbitrate_state_t arbitration_state;

@@ -30,6 +30,7 @@ PAGES = {
     "MR": THEORY / "mrai.md",
     "PL": THEORY / "plant.md",
     "SC": Path("docs/scaling.md"),
+    "SL": THEORY / "second-level.md",
     "SS": THEORY / "safe-state.md",
     "TL": THEORY / "torque-loop.md",
 }

@@ -36,7 +36,7 @@ CURRENT, IDENTIFY = "firmware/control/current", "firmware/control/identify"
 TORQUE, COMMISSION = "firmware/control/torque", "firmware/control/commission"
 ADAPT, MRAI = "firmware/control/adapt", "firmware/control/mrai"
 CONTROL = (CURRENT, IDENTIFY, MRAI, ADAPT, COMMISSION, TORQUE)
-DRIVE = (*BASE, *CONTROL, "firmware/safety", "firmware/drive", "hal")
+DRIVE = (*BASE, *CONTROL, "firmware/safety", "firmware/second_level", "firmware/drive", "hal")
 ECU = (*DRIVE, "firmware/comm", "firmware/calibration")
 
 # First match wins: a folder comes before the folder that contains it. No folder of the chain that every drive needs
@@ -53,6 +53,8 @@ LAYERS = (
     Layer(COMMISSION, BASE, values_of=(CURRENT,), ordered=True),
     Layer(TORQUE, BASE, values_of=(CURRENT,), stages=True, ordered=True),
     Layer("firmware/safety", BASE, stages=True, ordered=True),
+    # Shares nothing with the layers above except the fixed-point library and value types.
+    Layer("firmware/second_level", ("firmware/fx", "firmware/types"), ordered=True),
     Layer("firmware/comm", BASE, FREESTANDING | {"string.h"}),
     Layer("firmware/drive", DRIVE, FREESTANDING | {"string.h"}, ordered=True),
     Layer("firmware/storage", DRIVE, FREESTANDING | {"string.h"}),

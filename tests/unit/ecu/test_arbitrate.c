@@ -204,6 +204,23 @@ void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_it_opens(v
     TEST_ASSERT_EQUAL_INT(16000, asked);
 }
 
+/* From 16000 held at a limit that falls by 100 each step, to a request of -16000: with the rate kept the torque is at
+ * zero after slew and jerk, 16000/400 + 5 steps; if each step began with the jerk again, 180 a step would take 89. */
+void test_a_falling_limit_does_not_delay_the_answer_to_a_request_in_the_other_direction(void)
+{
+    in.torque_requested = 16000;
+    (void)steps(200);
+    in.torque_requested = -16000;
+    q15_t limited = 16000;
+    int taken = 0;
+    for (; fx_q15_from_q31(state.torque_arbitrated) > 0 && taken < 200; taken++) {
+        limited = (q15_t)fx_min_s32(fx_max_s32(limited - 100, 0), fx_q15_from_q31(state.torque_arbitrated));
+        arbitrate_hold(&config, &state, limited);
+        (void)step();
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT(46, taken);
+}
+
 void test_a_limit_that_does_not_limit_changes_nothing(void)
 {
     in.torque_requested = -12000;

@@ -54,7 +54,18 @@ def _module(source: str, name: str) -> str:
     path = source.rpartition(":")[0]
     if "motor_tables.c" in path:
         return "motor data and tables"
-    for layer in ("fx", "signal", "control", "safety", "comm", "drive", "storage", "calibration", "ecu"):
+    for layer in (
+        "fx",
+        "signal",
+        "control",
+        "safety",
+        "second_level",
+        "comm",
+        "drive",
+        "storage",
+        "calibration",
+        "ecu",
+    ):
         if f"/firmware/{layer}/" in path or (layer == "fx" and name.startswith("fx_")):
             return f"firmware/{layer}"
     if "/bus/" in path:

@@ -29,6 +29,7 @@ from fluxtrue_tools.motor.derived import (
 )
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, Unfit, q15, q16, q31, u16
+from fluxtrue_tools.motor.second_level import make_second_level
 
 Row = tuple[str, object, str]  # member, literal, comment
 
@@ -448,7 +449,28 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_monitor", _torque_monitor(motor), ""),
         ("commission", _commission(motor), ""),
         ("parameters", _parameters(motor), ""),
+        ("second_level", "&second_level", ""),
     ]
+
+
+def _second_level(motor: Motor) -> str:
+    """The second level's constants, which the motor data only point at."""
+    own = make_second_level(motor.config, motor.model, motor.bases, motor.derived)
+    lines = [f"{INDENT}.{name} = {value}," for name, value in own.words.items()]
+    table = "\n".join(line for row in own.torque for line in _wrap([str(int(v)) for v in row]))
+    return "\n".join(
+        [
+            "/* Of the second level alone. */",
+            "static const second_level_constants_t second_level = {",
+            f"{INDENT}.checksum = {own.checksum}u,",
+            *lines,
+            f"{INDENT}.torque = {{",
+            table,
+            f"{INDENT}}},",
+            "};",
+            "",
+        ]
+    )
 
 
 def _q15_tables(motor: Motor) -> list[str]:
@@ -495,7 +517,14 @@ def check_numbers(motor: Motor) -> None:
 def motor_tables_c(motor: Motor) -> str:
     """motor_tables.c."""
     body = "\n".join(_struct(_motor(motor), INDENT))
-    return "\n".join([_head(motor, "drive/motor.h"), *_q15_tables(motor), f"const motor_t motor = {{\n{body}\n}};\n"])
+    return "\n".join(
+        [
+            _head(motor, "drive/motor.h"),
+            *_q15_tables(motor),
+            _second_level(motor),
+            f"const motor_t motor = {{\n{body}\n}};\n",
+        ]
+    )
 
 
 _SI_DERIVED = (

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SECOND_LEVEL_CONSTANTS_H
+#define SECOND_LEVEL_CONSTANTS_H
+/** Everything about the machine that the second level knows: its own constant, generated from motor.toml and the flux
+ * map beside the motor data of the first level, and under a checksum of its own.
+ *   torque[d][q]  torque at i_d = (d - 16)/16 I_b, |i_q| = q/16 I_b, with the nominal magnet: two entries differ by a
+ *                 sixteenth of the full scale of the current, because torque is almost bilinear in the currents (SL-4)
+ *   checksum      CRC-32 (IEEE 802.3) of all bytes behind it, in the processor's (little-endian) order
+ * Source   docs/theory/second-level.md; written by `tools/fluxtrue motor build`
+ * Units    per unit of the motor's bases; the bus's 0.1 N·m
+ * Range    no pointers and no padding, so that the checksum covers what is used
+ * Context  const data in flash */
+#include <stdint.h>
+
+#include "fx/q.h"
+
+#define SECOND_LEVEL_ROWS 18
+#define SECOND_LEVEL_COLUMNS 17
+
+typedef struct {
+    uint32_t checksum;
+    q16_t torque_per_count;                 /* of 0.1 N·m */
+    int32_t torque_max;                     /* rated */
+    int32_t fall;                           /* slowest legal decrease of the torque, per step */
+    int32_t tolerance;                      /* of the torque from currents, at no torque */
+    q16_t tolerance_share;                  /* and per permitted torque */
+    int32_t correction_min, correction_max; /* plausible deviation of the tables, q15 */
+    uint32_t pole_pairs;
+    uint32_t angle_offset;   /* electrical, 2^32 = one turn */
+    int32_t turn_standstill; /* change of the mechanical angle in one step, 2^32 = one turn: below it the direction of
+                                rotation is uncertain */
+    int32_t mean_shift;      /* of the first-order mean: 1/2^shift per step */
+    int32_t hold_steps;      /* a fourth of the time for which a reduced request is not yet expected to act */
+    int32_t confirm_steps;
+    int16_t torque[SECOND_LEVEL_ROWS * SECOND_LEVEL_COLUMNS];
+} second_level_constants_t;
+
+#endif

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SECOND_LEVEL_SECOND_LEVEL_H
+#define SECOND_LEVEL_SECOND_LEVEL_H
+/** The independent second level: compares the torque that it computes from the currents with the torque that it
+ * permits from the received frames. It shares with the first level the fixed-point library and the measured samples,
+ * nothing else: neither code, nor tables, nor references, nor limits.
+ *   |mean of the own torque over some milliseconds| > (1 + x) bound + t_0 + share bound for `confirm_steps`: fault
+ *   bound is that of the permitted torque in the same direction; x is the first level's correction of its tables
+ *   (positive: a weak magnet needs more current), believed as far as a healthy machine can need it
+ * Source   docs/theory/second-level.md (SL-6); docs/decisions/017-second-level.md
+ * Units    per unit of the motor's bases
+ * Errors   true: confirmed now; the caller latches it
+ * Context  1 kHz task, after the frames of the step */
+#include "second_level/own_torque.h"
+#include "second_level/permitted.h"
+
+typedef struct {
+    second_level_frames_t frames;
+    second_level_permitted_t permitted;
+    int32_t mean_q8; /* own torque, first-order mean */
+    uint32_t theta_m;
+    int32_t confirmed_steps;
+} second_level_t;
+
+typedef struct {
+    second_level_sample_t sample;
+    bool acting;        /* the bridge switches: otherwise the torque is the safe state's */
+    int32_t slew;       /* calibrated limit of the torque's change, per step */
+    int32_t correction; /* x, q15 */
+    uint32_t elapsed_us;
+} second_level_in_t;
+
+bool second_level_step(const second_level_constants_t *constants, second_level_t *level, const second_level_in_t *in);
+
+#endif

@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The second level's own reception against the first level's protection, which signs the frames here. */
+#include "comm/can_rx.h"
+#include "comm/e2e.h"
+#include "second_level/frames.h"
+#include "unity.h"
+
+#define COMMAND_ID 0x110U
+#define BATTERY_ID 0x111U
+#define ENABLED_TORQUE 0x50U
+
+static second_level_frames_t frames;
+static uint8_t counter;
+
+void setUp(void)
+{
+    frames = (second_level_frames_t){0};
+    counter = 0;
+}
+
+void tearDown(void)
+{
+}
+
+static void put16(can_frame_t *frame, unsigned at, int value)
+{
+    frame->data[at] = (uint8_t)((unsigned)value & 0xFFU);
+    frame->data[at + 1U] = (uint8_t)((unsigned)value >> 8 & 0xFFU);
+}
+
+static can_frame_t signed_frame(uint32_t id, uint8_t bits, int a, int b, int c)
+{
+    can_frame_t frame = {.id = id, .length = 8};
+    frame.data[1] = bits;
+    put16(&frame, 2, a);
+    put16(&frame, 4, b);
+    put16(&frame, 6, c);
+    e2e_protect((id == COMMAND_ID) ? 0x1101U : 0x1111U, &counter, &frame);
+    return frame;
+}
+
+static void receive(can_frame_t frame)
+{
+    second_level_frame(&frames, &frame);
+}
+
+/* The first frame only synchronises. */
+static void synchronise(uint32_t id)
+{
+    receive(signed_frame(id, ENABLED_TORQUE, 0, 0, 0));
+}
+
+static void command(int torque_dNm)
+{
+    receive(signed_frame(COMMAND_ID, ENABLED_TORQUE, torque_dNm, 2000, 1500));
+}
+
+void test_a_command_is_decoded_as_the_description_of_the_bus_says(void)
+{
+    synchronise(COMMAND_ID);
+    TEST_ASSERT_FALSE(frames.command.alive);
+    command(-321);
+    TEST_ASSERT_TRUE(frames.command.alive && frames.command.seen);
+    TEST_ASSERT_EQUAL_INT32(-321, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(2000, frames.drive_dNm);
+    TEST_ASSERT_EQUAL_INT32(1500, frames.regen_dNm);
+}
+
+void test_the_limits_of_the_battery_are_decoded(void)
+{
+    synchronise(BATTERY_ID);
+    receive(signed_frame(BATTERY_ID, 0, 60000, 59999, 0));
+    TEST_ASSERT_TRUE(frames.battery.seen);
+    TEST_ASSERT_EQUAL_INT32(60000, frames.power_drive_10W);
+    TEST_ASSERT_EQUAL_INT32(59999, frames.power_regen_10W);
+}
+
+/* Every value of every byte, by another algorithm: a changed bit is refused, an unchanged frame accepted. */
+void test_the_checksum_is_that_of_the_protection_for_every_byte(void)
+{
+    synchronise(COMMAND_ID);
+    for (int n = 0; n < 2000; n++) {
+        command((n * 7919) % 10001);
+        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_dNm);
+        can_frame_t wrong = signed_frame(COMMAND_ID, ENABLED_TORQUE, 1, 2000, 1500);
+        wrong.data[n % 8] ^= (uint8_t)(1U << (n / 8 % 8));
+        receive(wrong);
+        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_dNm);
+    }
+}
+
+void test_without_enable_or_in_another_mode_no_torque_is_requested(void)
+{
+    synchronise(COMMAND_ID);
+    receive(signed_frame(COMMAND_ID, 0x40, 500, 2000, 2000));
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    command(500);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    receive(signed_frame(COMMAND_ID, 0x90, 500, 2000, 2000)); /* current mode */
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+}
+
+void test_a_value_out_of_range_refuses_the_frame(void)
+{
+    static const struct {
+        uint8_t bits;
+        int torque, drive, regen;
+    } bad[] = {{ENABLED_TORQUE, 10001, 0, 0},
+               {ENABLED_TORQUE, -10001, 0, 0},
+               {ENABLED_TORQUE, 0, 10001, 0},
+               {ENABLED_TORQUE, 0, 0, 10001},
+               {0xD0, 0, 0, 0}};
+    synchronise(COMMAND_ID);
+    command(500);
+    for (unsigned n = 0; n < sizeof bad / sizeof bad[0]; n++) {
+        receive(signed_frame(COMMAND_ID, bad[n].bits, bad[n].torque, bad[n].drive, bad[n].regen));
+        TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    }
+    counter = 0;
+    synchronise(BATTERY_ID);
+    receive(signed_frame(BATTERY_ID, 0, 60001, 0, 0));
+    receive(signed_frame(BATTERY_ID, 0, 0, 60001, 0));
+    TEST_ASSERT_FALSE(frames.battery.seen);
+}
+
+void test_other_frames_change_nothing(void)
+{
+    synchronise(COMMAND_ID);
+    command(500);
+    const second_level_frames_t before = frames;
+    can_frame_t other = signed_frame(COMMAND_ID, ENABLED_TORQUE, 1, 2000, 2000);
+    other.id = 0x112;
+    receive(other);
+    other.id = COMMAND_ID;
+    other.extended = true;
+    receive(other);
+    other.extended = false;
+    other.length = 7;
+    receive(other);
+    other = signed_frame(COMMAND_ID, ENABLED_TORQUE, 1, 2000, 2000);
+    other.id = BATTERY_ID; /* the checksum of another message */
+    receive(other);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &frames, sizeof before);
+}
+
+void test_a_repetition_and_a_jump_are_refused_and_one_lost_frame_is_not(void)
+{
+    synchronise(COMMAND_ID);
+    command(500);
+    counter = 1;
+    command(600); /* repeated */
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    counter = 3;
+    command(700); /* one lost */
+    TEST_ASSERT_EQUAL_INT32(700, frames.torque_dNm);
+    counter = 6;
+    command(800); /* two lost */
+    TEST_ASSERT_EQUAL_INT32(700, frames.torque_dNm);
+    command(900); /* follows the new counter */
+    TEST_ASSERT_EQUAL_INT32(900, frames.torque_dNm);
+    can_frame_t invalid = {.id = COMMAND_ID, .length = 8, .data = {0, ENABLED_TORQUE | 0x0FU}};
+    invalid.data[0] = e2e_crc(0x1101U, &invalid);
+    receive(invalid);
+    TEST_ASSERT_EQUAL_INT32(900, frames.torque_dNm);
+}
+
+void test_a_command_that_stops_requests_no_torque_after_35_ms_and_must_synchronise_again(void)
+{
+    synchronise(COMMAND_ID);
+    command(500);
+    for (int n = 0; n < 34; n++) {
+        second_level_frames_tick(&frames, 1000);
+    }
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    second_level_frames_tick(&frames, 1000);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    command(500);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    command(500);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+}
+
+void test_limits_that_stop_are_zero_after_310_ms(void)
+{
+    synchronise(BATTERY_ID);
+    receive(signed_frame(BATTERY_ID, 0, 100, 200, 0));
+    for (int n = 0; n < 309; n++) {
+        second_level_frames_tick(&frames, 1000);
+    }
+    TEST_ASSERT_EQUAL_INT32(200, frames.power_regen_10W);
+    second_level_frames_tick(&frames, 1000);
+    TEST_ASSERT_EQUAL_INT32(0, frames.power_drive_10W + frames.power_regen_10W);
+    TEST_ASSERT_TRUE(frames.battery.seen && !frames.battery.alive);
+}

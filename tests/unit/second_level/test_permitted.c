@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "second_level/permitted.h"
+#include "unity.h"
+
+/* 10 counts are 0.1 N·m; 100 counts per step; parts of the hold time of 5 steps. */
+static const second_level_constants_t constants = {
+    .torque_per_count = 10 << 16, .torque_max = 15000, .fall = 100, .turn_standstill = 1000, .hold_steps = 5};
+#define TURN 5000
+#define OPEN 32767
+
+static second_level_permitted_t permitted;
+static second_level_frames_t frames;
+
+void setUp(void)
+{
+    permitted = (second_level_permitted_t){0};
+    frames = (second_level_frames_t){.drive_dNm = 10000, .regen_dNm = 10000};
+}
+
+void tearDown(void)
+{
+}
+
+static void steps(int count, int32_t turn, int32_t slew)
+{
+    for (int n = 0; n < count; n++) {
+        second_level_permitted_step(&constants, &permitted, &frames, turn, slew);
+    }
+}
+
+void test_the_band_rises_at_once_on_the_side_of_the_request(void)
+{
+    frames.torque_dNm = 500;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
+    TEST_ASSERT_EQUAL_INT32(0, permitted.negative.bound);
+    frames.torque_dNm = -700;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(7000, permitted.negative.bound);
+}
+
+/* Held for 15 to 20 steps, then 100 per step. */
+void test_the_band_falls_after_the_hold_time_at_the_legal_rate(void)
+{
+    frames.torque_dNm = 500;
+    steps(20, TURN, OPEN);
+    frames.torque_dNm = 100;
+    steps(15, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
+    steps(6, TURN, OPEN);
+    const int32_t start = permitted.positive.bound;
+    TEST_ASSERT_LESS_THAN_INT32(5000, start);
+    steps(10, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(start - 1000, permitted.positive.bound);
+    steps(100, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(1000, permitted.positive.bound);
+}
+
+void test_a_calibrated_slew_that_is_slower_slows_the_band_down(void)
+{
+    frames.torque_dNm = 500;
+    steps(1, TURN, OPEN);
+    frames.torque_dNm = 0;
+    steps(21, TURN, 10);
+    const int32_t start = permitted.positive.bound;
+    steps(10, TURN, 10);
+    TEST_ASSERT_EQUAL_INT32(start - 100, permitted.positive.bound);
+}
+
+void test_the_limit_of_the_direction_applies(void)
+{
+    frames.drive_dNm = 300;
+    frames.regen_dNm = 200;
+    frames.torque_dNm = 500;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(3000, permitted.positive.bound);
+    frames.torque_dNm = -500;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(2000, permitted.negative.bound);
+}
+
+void test_backwards_the_limits_are_those_of_the_other_direction(void)
+{
+    frames.drive_dNm = 300;
+    frames.regen_dNm = 200;
+    frames.torque_dNm = 500;
+    steps(1, -TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(2000, permitted.positive.bound);
+    frames.torque_dNm = -500;
+    steps(1, -TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(3000, permitted.negative.bound);
+}
+
+/* The direction of rotation may be wrong there: the larger limit. */
+void test_near_standstill_the_larger_limit_applies(void)
+{
+    frames.drive_dNm = 200;
+    frames.regen_dNm = 300;
+    frames.torque_dNm = 500;
+    steps(1, 1000, OPEN);
+    TEST_ASSERT_EQUAL_INT32(3000, permitted.positive.bound);
+    permitted = (second_level_permitted_t){0};
+    steps(1, 1001, OPEN);
+    TEST_ASSERT_EQUAL_INT32(2000, permitted.positive.bound);
+}
+
+void test_no_limit_permits_more_than_the_rated_torque(void)
+{
+    frames.torque_dNm = 9000;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(15000, permitted.positive.bound);
+}
+
+void test_lost_limits_of_the_battery_permit_no_torque(void)
+{
+    frames.torque_dNm = 500;
+    frames.battery.seen = true;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(0, permitted.positive.bound);
+    frames.battery.alive = true;
+    steps(1, TURN, OPEN);
+    TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
+}

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* With constant inductances the torque is bilinear in the currents, so that the coarse table is exact between its
+ * points: t = psi_f i_q + (l_d - l_q) i_d i_q, here with psi_f = 0.2, l_d - l_q = -0.3. */
+#include <math.h>
+
+#include "comm/e2e.h"
+#include "second_level/second_level.h"
+#include "unity.h"
+
+#define ONE 32768.0
+#define PI 3.14159265358979323846
+
+static second_level_constants_t constants;
+static second_level_t level;
+static second_level_in_t in;
+
+static double torque(double i_d, double i_q)
+{
+    return 0.2 * i_q - 0.3 * i_d * i_q;
+}
+
+void setUp(void)
+{
+    constants = (second_level_constants_t){.torque_per_count = 10 << 16,
+                                           .torque_max = 15000,
+                                           .fall = 100,
+                                           .tolerance = 600,
+                                           .tolerance_share = 1024,
+                                           .correction_min = -1966,
+                                           .correction_max = 8192,
+                                           .pole_pairs = 3,
+                                           .turn_standstill = 1000,
+                                           .mean_shift = 2,
+                                           .hold_steps = 5,
+                                           .confirm_steps = 15};
+    for (int d = 0; d < SECOND_LEVEL_ROWS; d++) {
+        for (int q = 0; q < SECOND_LEVEL_COLUMNS; q++) {
+            constants.torque[d * SECOND_LEVEL_COLUMNS + q] = (int16_t)lrint(ONE * torque((d - 16) / 16.0, q / 16.0));
+        }
+    }
+    level = (second_level_t){0};
+    in = (second_level_in_t){.acting = true, .slew = 32767, .elapsed_us = 1000};
+}
+
+void tearDown(void)
+{
+}
+
+/* The sample of a current in the rotor frame at a mechanical angle. */
+static second_level_sample_t sample(double i_d, double i_q, double theta_m)
+{
+    const double e = 3.0 * theta_m + (double)constants.angle_offset / 4294967296.0 * 2.0 * PI;
+    return (second_level_sample_t){.alpha = (int32_t)lrint(ONE * (i_d * cos(e) - i_q * sin(e))),
+                                   .beta = (int32_t)lrint(ONE * (i_d * sin(e) + i_q * cos(e))),
+                                   .theta_m = (uint32_t)(int64_t)lrint(theta_m / (2.0 * PI) * 4294967296.0)};
+}
+
+/* Roundings: of the table 1/2, of the interpolation 1/2, of each current 1 LSB times its slope, below 1. */
+void test_the_own_torque_is_that_of_the_machine_at_every_angle_and_current(void)
+{
+    for (int n = 0; n < 5000; n++) {
+        const double i_d = -0.7 + 0.75 * ((n * 37) % 1000) / 1000.0;
+        const double i_q = -0.65 + 1.3 * ((n * 71) % 1000) / 1000.0;
+        const second_level_sample_t at = sample(i_d, i_q, ((n * 13) % 628) / 100.0);
+        TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(i_d, i_q)), second_level_own_torque(&constants, &at));
+    }
+}
+
+void test_the_offset_of_the_angle_belongs_to_the_electrical_angle(void)
+{
+    constants.angle_offset = 500000000U;
+    const second_level_sample_t at = sample(-0.3, 0.4, 1.0);
+    TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(-0.3, 0.4)), second_level_own_torque(&constants, &at));
+}
+
+/* The level's frames, as if the vehicle requested so much all the time. */
+static void request(int32_t torque_dNm)
+{
+    level.frames.command = (second_level_channel_t){.alive = true, .seen = true};
+    level.frames.torque_dNm = torque_dNm;
+    level.frames.drive_dNm = 10000;
+    level.frames.regen_dNm = 10000;
+}
+
+static int steps_to_fault(int most)
+{
+    for (int n = 1; n <= most; n++) {
+        level.frames.command.age_us = 0;
+        if (second_level_step(&constants, &level, &in)) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+/* i_q = 0.3 gives 0.06, 1966 counts; with 1000 + 600 + 1000/64 permitted. */
+void test_torque_beyond_the_request_is_reported_and_stays_so(void)
+{
+    request(100);
+    in.sample = sample(0.0, 0.3, 0.0);
+    const int found = steps_to_fault(100);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(15, found);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(25, found); /* the mean takes some steps */
+    TEST_ASSERT_EQUAL_INT(1, steps_to_fault(1));
+}
+
+void test_torque_within_the_tolerance_is_not_reported(void)
+{
+    request(140);
+    in.sample = sample(0.0, 0.3, 0.0);
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
+}
+
+void test_torque_against_the_request_is_reported(void)
+{
+    request(2000);
+    in.sample = sample(0.0, -0.12, 0.0); /* 786 counts */
+    TEST_ASSERT_GREATER_THAN_INT(0, steps_to_fault(100));
+}
+
+void test_too_little_torque_is_not_reported(void)
+{
+    request(1500);
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
+}
+
+/* 1966 counts for a request of 1100: permitted with a correction of 25 %, 1100 x 1.25 + 600 + 17 = 1992. */
+void test_a_correction_of_the_tables_is_believed_up_to_its_plausible_limits(void)
+{
+    request(110);
+    in.sample = sample(0.0, 0.3, 0.0);
+    in.correction = 8192;
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
+    in.correction = 32767;
+    request(105);
+    TEST_ASSERT_GREATER_THAN_INT(0, steps_to_fault(500));
+}
+
+void test_while_the_bridge_does_not_switch_nothing_is_reported(void)
+{
+    request(0);
+    in.sample = sample(0.0, 0.3, 0.0);
+    in.acting = false;
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
+    in.acting = true;
+    TEST_ASSERT_GREATER_THAN_INT(14, steps_to_fault(500));
+}
