@@ -25,7 +25,7 @@ def terminal(scores: list[Score], summary: Summary) -> str:
         if not s.is_met or not s.is_true:
             cells.append((s.row.id, str(s.runs), str(s.met), _text(s.detect_ms), _text(s.harm_ms, 0),
                           _text(s.current_A, 0), _text(s.vdc_V, 0), s.row.status,
-                          s.result if s.is_true else f"status {s.row.status} is NOT TRUE. {s.result}"))  # fmt: skip
+                          s.missed if s.is_true else f"status {s.row.status} is NOT TRUE. {s.missed}"))  # fmt: skip
     sums = (f"{summary.kinds} kinds of fault, {summary.lines} lines, {summary.runs} runs: {summary.runs_met} "
             f"({summary.share:.2f} %) as demanded, {summary.lines_met} lines met, "
             f"{summary.lines - summary.lines_met} open, {summary.false_trips} false trips")  # fmt: skip

@@ -12,7 +12,8 @@ from fluxtrue_tools.campaign import schedule
 from fluxtrue_tools.campaign.store import Store
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea, report
-from fluxtrue_tools.fault_campaign.plan import Plan, points_of, run_case, run_one
+from fluxtrue_tools.fault_campaign.plan import Plan, machine_of, points_of, run_case, run_one
+from fluxtrue_tools.fault_campaign.run_point import check_names
 from fluxtrue_tools.fault_campaign.score import score, summarise
 from fluxtrue_tools.outputs import write_text
 from fluxtrue_tools.sim.build import MotorFolder
@@ -37,6 +38,8 @@ def _manifest(plan: Plan) -> dict[str, str]:
 def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) -> tuple[str, bool]:
     """The text for the terminal, and whether the table's status is true in every line."""
     plan, store = job.plan, Store(job.out)
+    for name, folder in plan.folders:
+        check_names(machine_of(name, folder).motor, plan.rows)
     with store.opened(_manifest(plan), fresh):
         schedule.missing(partial(run_case, plan), store, plan.cases, scheduler, workers)
         table = store.load(plan.cases)

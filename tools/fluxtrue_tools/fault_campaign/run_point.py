@@ -2,6 +2,7 @@
 """One fault at one operating point: the drive is started, brought there, the fault is injected, and all is recorded."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign.fmea import Point, Row, Step
 from fluxtrue_tools.fault_campaign.spec import Faults
-from fluxtrue_tools.sim.ecu_loop import EcuLoop
+from fluxtrue_tools.sim.ecu_loop import WRONG, EcuLoop
 from fluxtrue_tools.sim.motor import Motor
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ RPM: Final = math.pi / 30.0  # rad/s
 START_SPEED: Final = 0.8  # of the largest
 SLEW_RPM_PER_MS: Final = 20.0
 REQUEST: Final = "bus.command.TorqueRequested"
+REQUEST_LATER: Final = "request"  # in a line's setup: what is requested until the injection
 CHANNELS: Final = ("truth.torque_shaft_mean_Nm", "truth.i_d_A", "truth.i_q_A", "truth.vdc_V", "fault_word",
                    "truth.theta_m_rad")  # fmt: skip
 # Lost below this size of the current to quantisation alone, as in the shipped scenarios: 0.5 A of noise, 12-bit angle.
@@ -55,11 +57,12 @@ class _Drive:
         kind, _, rest = name.partition(".")
         if kind == "memory":
             return self.loop.read(rest)
-        if name.startswith("bus.command."):
-            return float(self.loop.sender.command.values[rest.removeprefix("command.")])
+        if name.startswith("bus.command.") and rest.removeprefix("command.") in self.loop.sender.command.values:
+            value = self.loop.sender.command.values[rest.removeprefix("command.")]
+            return math.nan if isinstance(value, str) else value
         if name.startswith("bus.limits."):
             return self.loop.sender.limits.get(rest.removeprefix("limits."), 0.0)
-        if kind == "bus":
+        if kind == "bus" and rest in WRONG:
             return self.loop.sender.wrong.get(rest, 0.0)
         value = self.loop.get(name)
         if math.isnan(value):
@@ -91,6 +94,20 @@ class _Drive:
         return {step.name: (at[0], at[1])}
 
 
+def check_names(motor: Motor, rows: Iterable[Row]) -> None:
+    """Refuse a name that is not there, before the first run."""
+    point = Point(0, 1.0, motor.name, 0.0, 0.0, 0.0, 0.0)
+    with EcuLoop(motor, {}) as loop:
+        drive = _Drive(loop, point)
+        for row in rows:
+            for step in (*row.setup, *row.injection):
+                try:
+                    if step.name != REQUEST_LATER:
+                        drive.get(step.name)
+                except FluxtrueError as error:
+                    raise FluxtrueError(f"line {row.id}: {error}") from error
+
+
 def _slow(motor: Motor, rpm: float) -> float:
     """Where the drive is started: enable is refused where the magnets already charge the dc link through the diodes."""
     return math.copysign(min(abs(rpm), START_SPEED * motor.speed_max_rpm), rpm)
@@ -114,7 +131,7 @@ def _start(campaign: Faults, motor: Motor, row: Row, point: Point) -> _Drive:
         plant[name] = step.applied(base.get(name, 1.0 if name.endswith(("gain_a", "gain_b", "gain_c")) else 0.0), 0.0)
     drive = _Drive(EcuLoop(motor, plant), point)
     for step in row.setup:
-        if step.name not in ("request",) and not step.name.startswith("plant."):
+        if step.name != REQUEST_LATER and not step.name.startswith("plant."):
             drive.apply(step)
     return drive
 
@@ -141,7 +158,7 @@ def run_point(campaign: Faults, motor: Motor, row: Row, point: Point) -> Trace:
     drive = _start(campaign, motor, row, point)
     loop = drive.loop
     with loop:
-        waits = next((step.applied(0.0, point.torque_Nm) for step in row.setup if step.name == "request"), None)
+        waits = next((step.applied(0.0, point.torque_Nm) for step in row.setup if step.name == REQUEST_LATER), None)
         loop.power_up()
         _accelerate(loop, _slow(motor, point.speed_rpm), point.speed_rpm)
         loop.steps(campaign.settle_ms, TorqueRequested=point.torque_Nm if waits is None else waits)

@@ -41,7 +41,14 @@ class Score:
 
     @property
     def result(self) -> str:
-        """For the table."""
+        """For the table: the latest times and largest values, and what is not met."""
+        detect = "–" if math.isnan(self.detect_ms) else f"{self.detect_ms:.1f}"
+        figures = f"fault {detect} ms, torque safe {self.harm_ms:.0f} ms, {self.current_A:.0f} A, {self.vdc_V:.0f} V"
+        return figures if self.is_met else f"{figures}; {self.missed}"
+
+    @property
+    def missed(self) -> str:
+        """What is not met, and where."""
         return "" if self.is_met else f"{self.runs - self.met} of {self.runs} runs not met; {self.worst}: {self.why}"
 
 

@@ -60,12 +60,12 @@ def _first_fault(trace: Trace, after: NDArray[np.bool_]) -> tuple[str, float]:
     return "|".join(found[1]), found[0] if found[1] else math.nan
 
 
-def _beyond(trace: Trace, row: Row, tolerance: float) -> Array:
-    """Distance of the mean torque from its safe range; 0 inside."""
+def _beyond(trace: Trace, row: Row, tolerance: float, rated_Nm: float) -> Array:
+    """Distance of the mean torque from its safe range; 0 inside. No request is worth more than the largest torque."""
     mean, time = _mean(trace["truth.torque_shaft_mean_Nm"], trace.period_s), trace.time_ms
     before = float(trace["truth.torque_shaft_mean_Nm"][time <= 0.0].mean())
     old, new = trace.requested_Nm
-    target = before if new == old else new
+    target = before if new == old else min(max(new, -rated_Nm), rated_Nm)
     ends = [before, target] if row.reaction == KEEP else [before, target, 0.0]
     low, high = np.full(len(mean), min(ends)), np.full(len(mean), max(ends))
     if row.reaction == KEEP:
@@ -108,7 +108,7 @@ def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Tr
     after = trace.time_ms > 0.0
     name, detect_ms = _first_fault(trace, after)
     tolerance = max(TOLERANCE_NM, TOLERANCE_SHARE * rated_Nm) if math.isnan(row.torque_Nm) else row.torque_Nm
-    beyond = _beyond(trace, row, tolerance)
+    beyond = _beyond(trace, row, tolerance, rated_Nm)
     hits = np.flatnonzero(beyond > 0.0)
     current = np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"])[after]
     measured: dict[str, Any] = {
@@ -122,7 +122,7 @@ def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Tr
     }
     mean = _mean(trace["truth.torque_shaft_mean_Nm"], trace.period_s)
     before = float(trace["truth.torque_shaft_mean_Nm"][~after].mean())
-    unnoticed = after & (trace.time_ms < (math.inf if math.isnan(detect_ms) else detect_ms))
+    unnoticed = (trace.time_ms > row.torque_ms) & (trace.time_ms < (math.inf if math.isnan(detect_ms) else detect_ms))
     departs = bool((np.abs(mean - before)[unnoticed] > tolerance).any())
     why = _complaints(row, bounds, measured, departs)
     if not np.isfinite(trace.rows).all():

@@ -23,6 +23,8 @@ COMMAND_MS, LIMITS_MS = 10, 100
 DC_LINK_F: Final = 500e-6
 AVALANCHE_PER_BATTERY: Final = 2.0
 RUN: Final = 4
+# What Sender.wrong may hold: not 0 is wrong; `skipped` counters are left out before every command.
+WRONG: Final = ("lost", "crc", "byte", "repeated", "other_id", "extended", "short", "skipped", "limits_lost")
 
 
 @cache

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from fluxtrue_tools import paths
+from fluxtrue_tools.errors import FluxtrueError
 
 ELF = paths.InputFile()
 
@@ -71,3 +72,26 @@ def version(file: Path) -> None:
     from fluxtrue_tools.target import image
 
     click.echo(image.version(file).text)
+
+
+@target.command(cls=paths.Command)
+@click.option(
+    "--out", type=paths.OutputFile(".json"), required=True, help="File to write, for example fluxtrue.spdx.json."
+)
+def sbom(out: Path) -> None:
+    """Write the software bill of materials (SPDX 2.3); its time is SOURCE_DATE_EPOCH if that is set."""
+    import json
+    import os
+    import time
+
+    from fluxtrue_tools.target import sbom as bill
+    from fluxtrue_tools.version import HEADER, in_checkout
+
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not in_checkout():
+        raise FluxtrueError("sbom needs the firmware's sources: run tools/fluxtrue in a checkout")
+    if given and not given.isdecimal():
+        raise FluxtrueError(f"SOURCE_DATE_EPOCH = {given!r}, allowed: whole seconds since 1970")
+    with paths.outputs() as outputs:
+        document = bill.document(HEADER.parents[2], int(given or time.time()))
+        outputs.text(out, json.dumps(document, indent=1) + "\n")
