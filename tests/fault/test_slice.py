@@ -44,6 +44,8 @@ def test_the_slice_runs_every_line_of_the_table(out: Path, summary: Any) -> None
     table = pd.read_parquet(out / "results.parquet")
     assert set(table["row"]) == {row.id for row in fmea.read(TABLE)}
     assert len(table) == summary["runs"]
+    assert summary["runs"] >= 300
+    assert summary["kinds"] >= 60
 
 
 def test_every_line_that_says_met_is_met(summary: Any) -> None:
@@ -117,6 +119,18 @@ def test_what_was_found_is_recorded_and_is_then_true(tmp_path: Path) -> None:
     assert (row.status, row.witness) == (OPEN, "hsm1/0/+")
     assert "over_current" in row.text["result"]
     assert faults(campaign, "--out", tmp_path / "slice", "--slice").returncode == 0
+
+
+def test_only_the_lines_that_fit_are_run_and_recorded(tmp_path: Path) -> None:
+    campaign = one(tmp_path / "c", expected="over_speed")
+    table = tmp_path / "c" / "fmea.csv"
+    line = DETECTED.format(reaction="safe_state", expected="over_speed", detect="5", status="met", witness="")
+    table.write_text(table.read_text(encoding="utf-8") + "b-" + line, encoding="utf-8")
+    assert faults(campaign, "--out", tmp_path / "out", "--record", "--lines", "b-*").returncode == 0
+    assert [row.status for row in fmea.read(table)] == [MET, OPEN]
+    done = faults(campaign, "--out", tmp_path / "none", "--lines", "angle-*")
+    assert done.returncode == 2
+    assert "--lines angle-*: no line of" in done.stderr
 
 
 def test_one_line_shows_its_runs(tmp_path: Path) -> None:

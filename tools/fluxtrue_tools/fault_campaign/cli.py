@@ -2,6 +2,7 @@
 """fluxtrue faults: every fault of a table at every operating point."""
 
 import shlex
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import click
@@ -19,12 +20,13 @@ _FOLDER = paths.OutputFolder("campaign.json", "results.parquet", "summary.json",
 @click.option("--fresh", is_flag=True, help="Throw away the results that are there.")
 @click.option("--slice", "is_slice", is_flag=True, help="A few points of each line, and where open lines are not met.")
 @click.option("--record", is_flag=True, help="Write status, witness and result of each line into the table.")
+@click.option("--lines", metavar="PATTERN", default="*", help="Only lines whose id fits, for example 'angle-*'.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: a core each]")
 @click.option("--scheduler", metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead.")
 @click.option("--line", metavar="ID", help="Run one line of the table and show its runs; nothing is stored.")
 @click.option("--run", "only", metavar="MOTOR/POINT/SIGN", help="With --line: this run only.")
 @click.option("--build-dir", type=paths.InputFolder(), help="Take the libraries from this build folder as they are.")
-def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record: bool, workers: int | None,
+def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record: bool, lines: str, workers: int | None,
            scheduler: str | None, line: str | None, only: str | None, build_dir: Path | None) -> int:  # fmt: skip
     """Inject the faults of a CAMPAIGN (TOML) and evaluate what the simulated machine does.
 
@@ -46,16 +48,19 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
         folders.append((folder.name, str(folder.folder)))
     table, rows = plans.read_rows(read, campaign.parent)
     files.reads(table)
-    plan = plans.Plan(read, tuple(rows), tuple(folders), is_slice)
+    chosen = tuple(row for row in rows if fnmatchcase(row.id, lines))
+    if not chosen:
+        raise FluxtrueError(f"--lines {lines}: no line of {table} fits")
+    plan = plans.Plan(read, chosen, tuple(folders), is_slice)
     if line is not None:
         click.echo(run.one_line(plan, line, only))
         return 0
     if out is None:
-        out = ROOT / "build" / "faults" / campaign.stem
+        out = ROOT / "build" / "faults" / (campaign.stem + ("-slice" if is_slice else ""))
         files.folder("--out", out, _FOLDER.names)
     command = f"tools/fluxtrue faults {shlex.quote(str(campaign))}"
     with files:
-        text, is_true = run.whole(run.Job(plan, out, command, table if record else None),
+        text, is_true = run.whole(run.Job(plan, out, command, run.Record(table, tuple(rows)) if record else None),
                                   fresh=fresh, scheduler=scheduler, workers=workers)  # fmt: skip
     click.echo(text)
     return 0 if is_true or record else EXIT_NOT_TRUE
@@ -63,7 +68,7 @@ def faults(campaign: Path, out: Path | None, fresh: bool, is_slice: bool, record
 
 def _check_options(line: str | None, only: str | None, is_slice: bool, record: bool, scheduler: str | None) -> None:
     if line is not None:
-        paths.refuse_given("with --line", "out", "fresh", "is_slice", "record", "workers", "scheduler")
+        paths.refuse_given("with --line", "out", "fresh", "is_slice", "record", "lines", "workers", "scheduler")
     elif only is not None:
         raise FluxtrueError("--run: has no effect without --line")
     if is_slice and record:

@@ -12,6 +12,7 @@ from fluxtrue_tools.campaign import schedule
 from fluxtrue_tools.campaign.store import Store
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea, report
+from fluxtrue_tools.fault_campaign.fmea import Row
 from fluxtrue_tools.fault_campaign.plan import Plan, machine_of, points_of, run_case, run_one
 from fluxtrue_tools.fault_campaign.run_point import check_names
 from fluxtrue_tools.fault_campaign.score import score, summarise
@@ -21,13 +22,21 @@ from fluxtrue_tools.sim.output import json_text
 
 
 @dataclass(frozen=True)
+class Record:
+    """The table to write what was found to, with all its lines."""
+
+    path: Path
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
 class Job:
     """What to run and where its results go."""
 
     plan: Plan
     out: Path
     command: str
-    record: Path | None = None  # the table to write what was found to
+    record: Record | None = None
 
 
 def _manifest(plan: Plan) -> dict[str, str]:
@@ -49,7 +58,7 @@ def whole(job: Job, *, fresh: bool, scheduler: str | None, workers: int | None) 
     write_text(job.out / "report.html", report.html(plan, scores, summary, job.command))
     if job.record is not None:
         found = {s.row.id: fmea.recorded(s.row, s.status, s.worst, s.result) for s in scores}
-        write_text(job.record, fmea.write([found.get(row.id, row) for row in plan.rows]))
+        write_text(job.record.path, fmea.write([found.get(row.id, row) for row in job.record.rows]))
     return f"{report.terminal(scores, summary)}\n\n{job.out / 'report.html'}", not summary.untrue
 
 

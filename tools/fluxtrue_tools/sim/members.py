@@ -36,13 +36,19 @@ def _bare(die: DIE) -> DIE:
     return die
 
 
+def _length(subrange: DIE) -> int:
+    """gcc gives the last index, clang the number."""
+    given = subrange.attributes
+    return int(given["DW_AT_count"].value) if "DW_AT_count" in given else int(given["DW_AT_upper_bound"].value) + 1
+
+
 def _size(die: DIE) -> int:
     die = _bare(die)
     if die.tag == "DW_TAG_array_type":
         count = 1
         for child in die.iter_children():
             if child.tag == "DW_TAG_subrange_type":
-                count *= int(child.attributes["DW_AT_upper_bound"].value) + 1
+                count *= _length(child)
         return count * _size(die.get_DIE_from_attribute("DW_AT_type"))
     return int(die.attributes["DW_AT_byte_size"].value)
 
