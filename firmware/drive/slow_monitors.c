@@ -23,6 +23,11 @@ static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
                       fx_mulhi(2 * snapshot->window.sum_i.q, half_gain_q32)};
 }
 
+static uint8_t contradicted_steps(const drive_t *drive)
+{
+    return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.contradicted_updates);
+}
+
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
 {
     const sample_t *sample = &snapshot->sample;
@@ -38,6 +43,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
         .omega = fx_q15_from_q31(sample->point.omega),
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
+        .contradicted_steps = contradicted_steps(drive),
     };
     return plausibility_step(&drive->motor->plausibility, &task->plausibility, &in);
 }

@@ -105,6 +105,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         *state = (plausibility_state_t){.fast = state->fast, .hot = state->hot, .last = state->last};
         return faults;
     }
+    faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;
     return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
            lost_phases(config, state, in);
 }

@@ -8,10 +8,11 @@
  *   phase lost         i_x <= i_dead in the direction of i_x*, |i_x*| > max(i_alive, |i*|/8): 8 more such samples than
  *                      samples with current, each direction counted by itself
  *   sensor stuck       20 equal samples of a phase while both others change by more than i_dead/4 in each
+ *   mismatch           the d-axis voltage contradicts the currents, the speed and the identified machine for 70 ms
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
  *   These times are counted in steps of the task, rounded up.
- * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11)
+ * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12)
  * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -28,7 +29,8 @@ typedef struct {
     q15_t ripple_max;
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
-    int16_t deviation_steps; /* 100 ms: a step counts once while the voltage is cut, else five times */
+    int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is cut, else five times */
+    uint8_t contradicted_steps; /* 70 ms */
     uint8_t ripple_steps, lost_steps, equal_steps, fast_steps, hot_steps; /* 20, 8, 20, 5, 110 ms */
 } plausibility_config_t;
 
@@ -51,6 +53,7 @@ typedef struct {
     abc_q15_t phases_ref; /* i_ref as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;
+    uint8_t contradicted_steps; /* in a row, told by the identification */
 } plausibility_in_t;
 
 uint32_t plausibility_step(const plausibility_config_t *config, plausibility_state_t *state,

@@ -7,6 +7,7 @@
 #define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
 #define REFERENCE_dC 200   /* 20 C */
 #define MISMATCH_MAX Q15(0.5)
+#define CONTRADICTED_MAX 25 /* ten times as many steps fit into a byte */
 
 typedef struct {
     dq_q30_t psi, i;    /* identified */
@@ -73,6 +74,9 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
     const kalman_update_t d = kalman_update(&state->kalman, &state->mean.d, state->mean.e.d, r);
     const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean.q), output_before);
     const kalman_update_t q = kalman_update(&state->kalman, &state->mean.q, fx_sub_q31(state->mean.e.q, change), r);
+    state->contradicted_updates = d.innovation_gate_exceeded
+                                      ? (uint8_t)fx_min_s32(state->contradicted_updates + 1, CONTRADICTED_MAX)
+                                      : 0U;
     state->clamped = d.clamped || q.clamped;
     const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->clamped) ? Q15_MAX : 0;
     const q15_t error = fx_sat_q15(target - state->mismatch_share);
@@ -109,6 +113,8 @@ static void kalman_step(const identify_config_t *config, identify_state_t *state
 {
     if (state->update_valid) {
         update_parameters(config, state);
+    } else {
+        state->contradicted_updates = 0;
     }
     kalman_predict(config, &state->kalman, state->r_known);
     update_confidence(config, state, model, torque);

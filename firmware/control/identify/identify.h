@@ -28,9 +28,10 @@ typedef struct {
 typedef struct {
     identify_mean_t mean;
     uint8_t steps;
-    bool update_valid; /* every step of this update so far was valid */
-    bool clamped;      /* a state reached its limit in the last update */
-    dq_q30_t local;    /* flux error of this operating point */
+    bool update_valid;            /* every step of this update so far was valid */
+    uint8_t contradicted_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
+    bool clamped;                 /* a state reached its limit in the last update */
+    dq_q30_t local;               /* flux error of this operating point */
     q31_t r_prior;
     bool r_known;                /* the winding temperature is measured */
     q15_t mismatch_share;        /* of recent updates: those beyond the innovation gate or with a clamped state */

@@ -327,9 +327,21 @@ void test_a_mismatch_in_either_axis_alone_takes_the_confidence_away(void)
         for (int n = 0; n < 300; n++) {
             (void)identify_step(&c, &state, &in);
         }
+        /* The voltage along d contradicts the current; one along q is a magnet that has changed. */
+        TEST_ASSERT_EQUAL_UINT8((axis == 0) ? 25 : 0, state.contradicted_updates);
         TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
         TEST_ASSERT_FALSE(state.torque_certain);
     }
+}
+
+void test_a_mismatch_ends_with_the_updates(void)
+{
+    state.contradicted_updates = 7;
+    drive(nothing, 3);
+    TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
+    state.contradicted_updates = 7;
+    run((dq_q15_t){0, 0}, 0.5, nothing, 20); /* too little current for an update */
+    TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
 }
 
 /* A magnet 7 standard deviations weaker than assumed, which so large a noise does not contradict: the estimate creeps

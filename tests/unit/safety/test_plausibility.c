@@ -15,6 +15,7 @@ static const plausibility_config_t config = {.e_0 = 2000,
                                              .inverter_trip_dC = 1050,
                                              .winding_trip_dC = 1800,
                                              .deviation_steps = 100,
+                                             .contradicted_steps = 60,
                                              .ripple_steps = 20,
                                              .lost_steps = 10,
                                              .equal_steps = 20,
@@ -229,6 +230,16 @@ void test_a_machine_at_rest_repeats_all_its_currents(void)
     for (int n = 0; n < 1000; n++) {
         TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
     }
+}
+
+void test_a_mismatch_of_60_steps_is_a_fault_of_the_torque(void)
+{
+    in.contradicted_steps = 59;
+    TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
+    in.contradicted_steps = 60;
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE, run_one_turn(-1));
+    in.acting = false;
+    TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
 }
 
 void test_over_speed_needs_five_samples_in_a_row_in_either_direction(void)

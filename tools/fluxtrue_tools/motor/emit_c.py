@@ -15,6 +15,7 @@ from fluxtrue_tools.motor.derived import (
     ANGLE_S,
     COMMISSION_MEASURE_S,
     COMMISSION_SETTLE_S,
+    CONTRADICTED_S,
     DEVIATION_S,
     EQUAL_S,
     FAST_S,
@@ -361,7 +362,16 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
         ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
-        *_counts(b, deviation=DEVIATION_S, ripple=RIPPLE_S, lost=LOST_S, equal=EQUAL_S, fast=FAST_S, hot=HOT_S),
+        *_counts(
+            b,
+            deviation=DEVIATION_S,
+            ripple=RIPPLE_S,
+            lost=LOST_S,
+            equal=EQUAL_S,
+            fast=FAST_S,
+            hot=HOT_S,
+            contradicted=CONTRADICTED_S,
+        ),
     ]
 
 
