@@ -15,8 +15,8 @@
 /* A magnitude in the same format. */
 #define IS_MAGNITUDE(x) WITHIN((x), 0, INT16_MAX)
 
-/* A function without a body returns every value. */
-bool any_bool(void);
+/* Both values, and no other content of the byte. */
+bool nondet_bool(void);
 
 /* The nearest number that a format holds. */
 static inline int64_t nearest_within(int64_t x, int64_t low, int64_t high)
