@@ -152,6 +152,8 @@ def test_a_resolver_that_slips_takes_the_confidence_away(driven: Drive) -> None:
     rows = driven.to(2000, 30, 1.0)
     assert rows[-1, CONFIDENCE] == 1.0
     driven.loop.set("machine_monitors", 0.0)  # which would end the drive first
+    driven.loop.set("plant.angle_offset_rad", math.radians(10.0))  # twice less than what the prediction replaces
+    driven.to(2000, 30, 0.01)
     driven.loop.set("plant.angle_offset_rad", math.radians(20.0))
     rows = driven.to(2000, 30, 1.5)
     assert rows[-1, CONFIDENCE] == 0.0

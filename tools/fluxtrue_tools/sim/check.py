@@ -51,19 +51,21 @@ def _edge(accepts: Callable[[float], bool], good: float, sign: float) -> float:
 
 @dataclass(frozen=True)
 class Range:
-    """Smallest and largest value that a name takes, and whether they are taken themselves."""
+    """Smallest and largest value that a name takes, whether they are taken themselves, and whether zero is, too."""
 
     low: float
     high: float
     takes_low: bool = True
     takes_high: bool = True
+    or_zero: bool = False
 
     def text(self, unit: str) -> str:
         """The range in words."""
         low = f"{'from' if self.takes_low else 'above'} {self.low:g}" if math.isfinite(self.low) else ""
         high = f"{'up to' if self.takes_high else 'below'} {self.high:g}" if math.isfinite(self.high) else ""
         if low.startswith("from") and high.startswith("up"):
-            return f"{self.low:g} to {self.high:g} {unit}".rstrip()
+            zero = "0, or " if self.or_zero else ""
+            return f"{zero}{self.low:g} to {self.high:g} {unit}".rstrip()
         words = " and ".join(part for part in (low, high) if part)
         return f"{words} {unit}".rstrip() if words else "a finite number"
 
@@ -78,10 +80,12 @@ def limits(loop: lib.Loop, name: str, factor: float = 1.0) -> Range:
             return False
         return True
 
-    good = next((value for value in (loop.get(name) / factor, 0.0, 1.0) if accepts(value)), 0.0)
+    # Around zero a value may be refused because its format has no step so small: the search starts elsewhere.
+    present = loop.get(name) / factor
+    good = next((value for value in (present, 1.0) if value != 0.0 and accepts(value)), 0.0)
     low, high = (float(f"{_edge(accepts, good, sign):.6g}") for sign in (-1.0, 1.0))
-    found = Range(low, high, accepts(low), accepts(high))
-    accepts(good)
+    found = Range(low, high, accepts(low), accepts(high), or_zero=low > 0.0 and accepts(0.0))
+    accepts(present)
     return found
 
 
