@@ -61,6 +61,7 @@ TIMES = {
     "SELF_TEST_TIME_OUT_MS": r"is_timed_out\(", "PRECHARGE_TIME_OUT_MS": r"is_timed_out\(",
     "DISCHARGE_TIME_OUT_MS": r"is_timed_out\(",
     "SLEW_MS": r"per_step\(", "JERK_MS": r"per_step\(", "RAMP_OUT_MS": r"per_step\(",
+    "COMMAND_TIME_OUT_US": r"grow_old\(", "BATTERY_TIME_OUT_US": r"grow_old\(",
     "MEMORY_REST_MS": r"in_steps\(", "MEMORY_INTERVAL_MS": r"in_steps\(",
 }  # fmt: skip
 # Numbers that are no time, or none of the task.

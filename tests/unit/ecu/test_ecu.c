@@ -379,3 +379,21 @@ void test_the_first_fault_freezes_what_was_before_it(void)
     TEST_ASSERT_EQUAL_INT(8, frame.ecu_faults);
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);
 }
+
+/* 0.37 of the full scale in the q axis without any request: 19 steps for the mean and the confirmation, one more until
+ * the drive takes it over. */
+void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
+{
+    sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation & 1U];
+    sample->acting = true;
+    sample->i_ab = fx_pair(0, 12000);
+    for (int n = 0; n < 20; n++) {
+        ecu_task_1khz(&ecu);
+    }
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE, ecu.drive.request.faults);
+    sample->acting = false;
+    ecu_task_1khz(&ecu);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE,
+                            ecu.drive.commands.slot[ecu.drive.commands.generation & 1U].faults & FAULT_TORQUE);
+    TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
+}

@@ -87,6 +87,7 @@ def build_task(folder: Path) -> Path:
     """The stages of the 1 kHz task, in a program of their own: called from two places they would be compiled apart."""
     stages = Path(__file__).with_name("task_kernels.c")
     ecu = [FIRMWARE / "ecu" / f"{name}.c" for name in ("arbitration", "supervisor", "supervisor_table")]
+    ecu += sorted((FIRMWARE / "second_level").glob("*.c"))
     return build_target(folder / "task.elf", [*sources(folder), stages, *ecu], (*LTO, f"-I{ROOT}"), [stages])
 
 
@@ -224,6 +225,8 @@ TASK_TITLES = {
     "schedule": "the paper's schedule",
     "supervisor": "state machine of the bus",
     "arbitrate": "torque arbitration",
+    "second_level": "second level",
+    "second_level_frame": "second level, a frame",
 }
 PAPERS = ("schedule",)
 

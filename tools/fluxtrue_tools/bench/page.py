@@ -65,6 +65,8 @@ TASK_CONTAINS = {
     "schedule": "gains and gates of the paper's identification, hand-over; with the paper's identification only",
     "supervisor": "state machine while torque is made",
     "arbitrate": "limits, dead band, slew and jerk of the torque that the bus requests",
+    "second_level": "permitted torque, torque from the currents by its own table, comparison",
+    "second_level_frame": "its own check and decoding of a torque command, which comes every 10 ms",
 }
 WHOLE_MAX = 400
 SHARE_MAX = 40

@@ -9,6 +9,7 @@
 #include "ecu/supervisor.h"
 #include "fx/vec.h"
 #include "hal/temperature.h"
+#include "second_level/second_level.h"
 #include "signal/rate_limit.h"
 
 #define CALLED __attribute__((used, externally_visible, noinline))
@@ -28,12 +29,15 @@ void task_safe_state(void);
 void task_schedule(void);
 void task_supervisor(void);
 void task_arbitrate(void);
+void task_second_level(void);
+void task_second_level_frame(void);
 
 static drive_t copy;
 static snapshot_t snapshot;
 static volatile int32_t result;
 static supervisor_t supervisor = {.state = STATE_RUN, .enabled = true, .enable_seen = true};
 static arbitrate_state_t arbitration;
+static second_level_t second_level;
 
 /* The drive by its address, as the task has it. */
 static drive_t *the_copy(void)
@@ -213,4 +217,29 @@ CALLED void task_arbitrate(void)
     };
     arbitrate_hold(&config, &arbitration, d->task.allowed.torque_limited);
     result = arbitrate_step(&config, &arbitration, &in);
+}
+
+/* With a request of the rated torque, so that the drive's is permitted. */
+CALLED void task_second_level(void)
+{
+    const drive_t *d = the_copy();
+    const fx_pair_t i_ab = snapshot.sample.i_ab;
+    const second_level_in_t in = {
+        .sample = {.alpha = (int16_t)i_ab, .beta = (int16_t)(i_ab >> 16), .theta_m = snapshot.sample.theta_m},
+        .acting = snapshot.sample.acting,
+        .slew = d->parameters.torque_slew,
+        .correction = fx_q15_from_q31(d->task.torque_loop.correction),
+        .elapsed_us = 1000,
+    };
+    result = second_level_step(d->motor->second_level, &second_level, &in);
+}
+
+/* A torque command of 100 N.m whose checksum is right. */
+CALLED void task_second_level_frame(void)
+{
+    static const can_frame_t frame = {
+        .id = 0x110, .length = 8, .data = {0x57, 0x50, 0xE8, 0x03, 0x10, 0x27, 0x10, 0x27}};
+    second_level.frames.command.synced = true;
+    second_level.frames.command.counter = 14;
+    second_level_frame(&second_level.frames, &frame);
 }
