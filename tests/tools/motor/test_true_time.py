@@ -50,6 +50,7 @@ STEP = {
     "plausibility.fast_steps", "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate",
     "torque_monitor.torque_steps", "torque_monitor.angle_steps", "torque_monitor.settle_steps",
     "commission.settle_steps", "commission.measure_steps", "commission.mean_gain_q31",
+    "gate_fault.volt_steps",
 }  # fmt: skip
 # A member whose name promises a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
@@ -71,6 +72,9 @@ COUNTS = {
     "UNKNOWN_STEPS": "steps, as that page says",
     "STEPS": "steps of the switch-off, as that page says",
     "RAMP_STEPS": "steps of its ramp, as that page says",
+    "QUIET_STEPS": "steps without current, as that page says",
+    "SILENT_STEPS_MAX": "steps without a command, as docs/architecture.md says",
+    "CONTRADICTED_MAX": "updates of the identification",
     "RESET_STEPS": "a reset on its way to the drive",
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
     "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",
