@@ -79,10 +79,12 @@ void proof_a_lost_temperature_limits_to_half(void)
     derating_line_t line;
     bound_t bound = any_bound();
     bool was_known = nondet_bool();
+    int16_t dC;
+    ASSUME(!temperature_is_known(dC));
     const bool known_before = was_known;
-    limit_by_temperature(&bound, &line, TEMPERATURE_UNKNOWN, &was_known, 1U);
+    limit_by_temperature(&bound, &line, dC, &was_known, 1U);
     PROVE(was_known == known_before);
-    PROVE(!known_before || bound.max <= bound.rated / 2 + 1);
+    PROVE(!(known_before || dC == TEMPERATURE_OUT_OF_RANGE) || bound.max <= bound.rated / 2 + 1);
 }
 
 void proof_torque_inside_both_limits(void)

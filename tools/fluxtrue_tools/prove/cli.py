@@ -56,7 +56,8 @@ def _proved(checker: Checker, proof: Proof, planted: bool) -> tuple[bool, Verdic
 @click.option("--planted/--no-planted", default=True, help="Also with the planted error of each, which must be found.")
 @click.option("--seconds", type=click.IntRange(1, 100_000), default=CPU_S, show_default=True,
               help="Of a processor, for each run; what takes longer is not proved.")  # fmt: skip
-@click.option("--list", "only_list", is_flag=True, help="Name the proofs.")
+@click.option("--list", "only_list", is_flag=True,
+              help="Name the proofs, and check that their errors still fit the firmware.")  # fmt: skip
 @click.option("--page", "write_page", is_flag=True, help="Prove all and write docs/safety/proofs.md.")
 def prove(names: tuple[str, ...], groups: tuple[str, ...], long: bool, fresh: bool, planted: bool, seconds: int,
           only_list: bool, write_page: bool) -> int:  # fmt: skip
@@ -68,6 +69,8 @@ def prove(names: tuple[str, ...], groups: tuple[str, ...], long: bool, fresh: bo
     proofs = load(ROOT)
     chosen = proofs if write_page else _chosen(proofs, names, groups, long)
     if only_list:
+        for proof in chosen:
+            proof.planted.apply(ROOT)  # a text that the firmware no longer has is an error
         click.echo("\n".join(f"{proof.group:12} {proof.name:40} {proof.statement}" for proof in chosen))
         return 0
     checker = Checker(ROOT, ROOT / "build", fresh, seconds)

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The record that survives a power cycle: storage/store on a flash memory with every content that may fail at every
+ * operation. The CRC has every value, so that nothing depends on damage being detected by it. Records are at most 64
+ * bytes long: one piece. */
+#include "proof.h"
+
+#include "storage/store.c"
+
+#define LONGEST 64U
+
+static uint32_t erased; /* one bit for each slot */
+static uint32_t programmed;
+
+uint32_t crc32_update(uint32_t crc, const void *data, uint32_t size)
+{
+    uint32_t any;
+    PROVE(__CPROVER_r_ok(data, size));
+    (void)crc;
+    return any;
+}
+
+bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
+{
+    PROVE(slot < HAL_NVM_SLOTS && offset <= HAL_NVM_SLOT_SIZE && size <= HAL_NVM_SLOT_SIZE - offset);
+    PROVE(__CPROVER_w_ok(data, size));
+    __CPROVER_havoc_slice(data, size);
+    if (offset == 0U) {
+        ASSUME(((header_t *)data)->size <= LONGEST || ((header_t *)data)->size > STORE_RECORD_MAX);
+    }
+    return nondet_bool();
+}
+
+bool hal_nvm_erase(uint32_t slot)
+{
+    PROVE(slot < HAL_NVM_SLOTS);
+    erased |= 1U << slot;
+    return nondet_bool();
+}
+
+bool hal_nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size)
+{
+    PROVE(slot < HAL_NVM_SLOTS && offset <= HAL_NVM_SLOT_SIZE && size <= HAL_NVM_SLOT_SIZE - offset);
+    PROVE(size % HAL_NVM_UNIT == 0U && offset % HAL_NVM_UNIT == 0U);
+    PROVE(__CPROVER_r_ok(data, size));
+    PROVE((erased & 1U << slot) != 0U);
+    programmed |= 1U << slot;
+    return nondet_bool();
+}
+
+void proof_store_load_stays_inside_the_record(void)
+{
+    uint8_t record[LONGEST], size;
+    uint32_t layout;
+    ASSUME(size <= LONGEST);
+    const store_result_t result = store_load(layout, record, size);
+    PROVE(result == STORE_OK || result == STORE_EMPTY || result == STORE_DAMAGED);
+    PROVE(erased == 0U && programmed == 0U);
+}
+
+void proof_store_save_changes_one_slot(void)
+{
+    uint8_t record[LONGEST], size;
+    uint32_t layout;
+    ASSUME(size <= LONGEST);
+    (void)store_save(layout, record, size);
+    PROVE(erased != 3U && (programmed & ~erased) == 0U);
+}
+
+void proof_store_newest_record_is_intact(void)
+{
+    slot_t slot[HAL_NVM_SLOTS];
+    ASSUME(WITHIN((int)slot[0].state, 0, 2) && WITHIN((int)slot[1].state, 0, 2));
+    const uint32_t found = newest(slot);
+    PROVE(found <= HAL_NVM_SLOTS);
+    PROVE(found == HAL_NVM_SLOTS || slot[found].state == SLOT_INTACT);
+    PROVE(found != HAL_NVM_SLOTS || (slot[0].state != SLOT_INTACT && slot[1].state != SLOT_INTACT));
+    if (slot[0].state == SLOT_INTACT && slot[1].state == SLOT_INTACT &&
+        slot[1].header.sequence == slot[0].header.sequence + 1U) {
+        PROVE(found == 1U);
+    }
+    if (slot[0].state == SLOT_INTACT && slot[1].state == SLOT_INTACT &&
+        slot[0].header.sequence == slot[1].header.sequence + 1U) {
+        PROVE(found == 0U);
+    }
+}
