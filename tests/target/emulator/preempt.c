@@ -104,6 +104,9 @@ static void load(preempt_t *p, const drive_t *drive)
     p->host->drive.period = p->e->mirror.host->drive.period;
     p->host->drive.parameters = p->e->mirror.host->drive.parameters;
     temperatures_take(p->e, p->host);
+    emu_bridge_t bridge;
+    emu_bridge(p->e->emu, &bridge);
+    p->host->gates = bridge.gates; /* the task reads them back */
     host_port_select(p->host);
 }
 
