@@ -121,6 +121,7 @@ typedef struct {
     volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
+    frozen_angle_state_t frozen_angle;
     commission_state_t commission;
     commission_curve_t inverter; /* voltage error against current, as last measured */
     compensation_t compensation;

@@ -19,6 +19,7 @@
 #include "control/torque/limit.h"
 #include "control/torque/loop.h"
 #include "control/torque/voltage_reserve.h"
+#include "safety/frozen_angle.h"
 #include "safety/gate_fault.h"
 #include "safety/monitor.h"
 #include "safety/plausibility.h"
@@ -67,6 +68,7 @@ typedef struct {
     gate_fault_config_t gate_fault;
     plausibility_config_t plausibility;
     torque_monitor_config_t torque_monitor;
+    frozen_angle_config_t frozen_angle;
     commission_config_t commission;
     motor_parameters_t parameters;                /* to start with */
     const second_level_constants_t *second_level; /* of the second level alone */

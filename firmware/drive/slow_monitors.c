@@ -62,8 +62,28 @@ static uint32_t check_torque(drive_t *drive, const sample_t *sample)
     return torque_monitor_step(&drive->motor->torque_monitor, &task->torque_monitor, &in);
 }
 
+static q15_t least_of(abc_q15_t i)
+{
+    return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
+}
+
+static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot)
+{
+    const identify_window_t *window = &snapshot->window;
+    task_state_t *task = &drive->task;
+    const frozen_angle_in_t in = {
+        .acting = window->acting && snapshot->sample.acting,
+        .u_sum = window->sum_u,
+        .i_ref = task->i_ref,
+        .i_least = least_of(in_phases(task->i_ref, snapshot->sample.theta_e)),
+        .theta_e = snapshot->sample.theta_e,
+    };
+    return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
+}
+
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
-    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample) | shorted;
+    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample) | check_angle(drive, snapshot) |
+           shorted;
 }

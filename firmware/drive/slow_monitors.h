@@ -18,6 +18,7 @@ static inline void slow_monitors_without_machine(motor_t *m)
     m->gate_fault.i_alive = Q15_MAX;
     m->plausibility.contradicted_steps = UINT8_MAX;
     m->torque_monitor.v_0 = Q15_MAX;
+    m->frozen_angle.v_0 = Q15_MAX;
 }
 
 #endif

@@ -21,7 +21,7 @@
     X(PHASE_LOST, 9, "A phase carries no current although it should, in 8 ms of samples.") \
     X(CURRENT_STUCK, 10, "A phase current has 20 equal samples at 1 kHz while the others change.") \
     X(OVER_SPEED, 11, "The speed exceeds 80 % of the reserve of the speed base for 5 ms.") \
-    X(ANGLE_OFFSET, 12, "The direction of the back-EMF contradicts the measured angle for 5 ms.") \
+    X(ANGLE_OFFSET, 12, "The back-EMF contradicts the measured angle, or changes while it stands still, for 5 ms.") \
     X(TORQUE, 13, "The torque is off by max(10 Nm, 5 %) and 1/8 for 25 ms, or voltages contradict the currents.") \
     X(TEMPERATURE, 14, "The inverter or the winding is at the end of its derating line for 110 ms.") \
     X(GATE, 15, "The gate driver reports a fault, or a current flows although switching is disabled.")

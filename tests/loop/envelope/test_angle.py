@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from rig import ANGLE, Rig, Trace
+from rig import ANGLE, ANGLE_OFFSET, Rig, Trace
 
 from fluxtrue_tools.sim.motor import Motor
 
@@ -74,3 +74,27 @@ def test_the_fastest_acceleration_is_no_fault_of_the_angle(hsm1: Motor, rpm_per_
     trace = rig.run(9000.0 / 40000.0, plant_speed_rad_s=(0.0, end))
     back = rig.run(9000.0 / 40000.0, plant_speed_rad_s=(end, 0.0))
     assert (trace.faults | back.faults) & ANGLE == 0
+
+
+@pytest.mark.parametrize("torque", [120.0, 60.0, -60.0, -120.0])
+@pytest.mark.parametrize("rpm", [60.0, -100.0, 200.0, 500.0, -700.0, 900.0, 3000.0, 10000.0])
+def test_an_angle_that_freezes_is_found(hsm1: Motor, rpm: float, torque: float) -> None:
+    """100 ms below 500 rpm, 20 ms from there on; two of the three rotor angles leave no leg without current."""
+    found = []
+    for theta_m in (0.0, 0.4, 0.9):
+        rig = Rig(hsm1, rpm, 0.3 * torque if abs(rpm) > 5000.0 else torque, angle_bits=12, theta_m_rad=theta_m)
+        assert rig.run(0.25).faults == 0
+        found.append(rig.set(plant_angle_stuck=1.0).run(0.3).fault_ms(ANGLE | ANGLE_OFFSET))
+    assert sorted(found, key=lambda ms: math.inf if math.isnan(ms) else ms)[1] <= (100.0 if abs(rpm) < 500.0 else 20.0)
+
+
+@pytest.mark.parametrize("torque", [130.0, 40.0, 0.0, -40.0, -130.0])
+@pytest.mark.parametrize("roll_rpm", [0.0, -2.0, -10.0, -60.0])
+def test_a_blocked_or_slowly_rolling_rotor_is_no_fault(hsm1: Motor, torque: float, roll_rpm: float) -> None:
+    """Hill hold: the torque against the roll, with noise and a dead time that is not the data sheet's."""
+    rig = Rig(hsm1, 0.0, torque, angle_bits=12, current_noise_A_rms=0.8, dead_time_s=2.4e-6, winding_C=140.0)
+    rig.run(0.5)
+    rig.run(0.1, plant_speed_rad_s=(0.0, roll_rpm * math.pi / 30.0))
+    rig.run(0.7)
+    assert rig.run(0.05, plant_speed_rad_s=(roll_rpm * math.pi / 30.0, 0.0)).faults == 0
+    assert rig.run(0.5).faults == 0

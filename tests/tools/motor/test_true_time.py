@@ -36,7 +36,7 @@ PERIOD = {
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
-    "identify.limited_noise",
+    "identify.limited_noise", "frozen_angle.v_0",
 }  # fmt: skip
 STEP = {
     "bases.step_s", "trim_steps", "parameters.torque_slew", "torque_slew_weak",
@@ -48,7 +48,8 @@ STEP = {
     "plausibility.deviation_steps", "plausibility.ripple_steps", "plausibility.contradicted_steps",
     "plausibility.lost_steps", "plausibility.equal_steps",
     "plausibility.fast_steps", "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate",
-    "torque_monitor.torque_steps", "torque_monitor.angle_steps", "torque_monitor.settle_steps",
+    "torque_monitor.torque_steps", "torque_monitor.angle_steps",
+    "frozen_angle.settle_steps", "frozen_angle.fault_steps", "torque_monitor.settle_steps",
     "commission.settle_steps", "commission.measure_steps", "commission.mean_gain_q31",
     "gate_fault.volt_steps",
 }  # fmt: skip
@@ -75,6 +76,7 @@ COUNTS = {
     "QUIET_STEPS": "steps without current, as that page says",
     "SILENT_STEPS_MAX": "steps without a command, as docs/architecture.md says",
     "CONTRADICTED_MAX": "updates of the identification",
+    "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
     "RESET_STEPS": "a reset on its way to the drive",
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
     "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",

@@ -46,6 +46,7 @@ RIPPLE_SHARE = 0.015  # of i_max: noise, sensor harmonics and dead time in the c
 SPEED_TRIP = 0.8  # of the reserve of the speed base
 TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
 INVERTER_ERROR_PER_VDC = 0.02
+FROZEN_SHARE, FROZEN_SETTLE_S = 0.25, 0.01  # of the inverter's voltage error; for the mean to settle
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
 DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
 TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
@@ -133,6 +134,7 @@ class Derived:
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
+    frozen_V: float
     monitor_A: float
     monitor_mean_rate: float
     share_short: float
@@ -262,6 +264,7 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
             min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm), TORQUE_MONITOR_SHARE * machine.torque_max_Nm
         ),
         "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
+        "frozen_V": FROZEN_SHARE * INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
         "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
         "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
     }

@@ -19,6 +19,7 @@ from fluxtrue_tools.motor.derived import (
     DEVIATION_S,
     EQUAL_S,
     FAST_S,
+    FROZEN_SETTLE_S,
     HOT_S,
     LOST_S,
     RIPPLE_S,
@@ -390,6 +391,16 @@ def _torque_monitor(motor: Motor) -> list[Row]:
     ]
 
 
+def _frozen_angle(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    v_0 = q15(d.frozen_V / b.voltage_V, "frozen_V") * b.periods_per_step
+    return [
+        ("v_0", str(v_0), f"{d.frozen_V:g} V in each of {b.periods_per_step} periods"),
+        ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
+        *_counts(b, settle=FROZEN_SETTLE_S, fault=ANGLE_S),
+    ]
+
+
 def _safe_state(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     return [
@@ -457,6 +468,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("gate_fault", _gate_fault(motor), ""),
         ("plausibility", _plausibility(motor), ""),
         ("torque_monitor", _torque_monitor(motor), ""),
+        ("frozen_angle", _frozen_angle(motor), ""),
         ("commission", _commission(motor), ""),
         ("parameters", _parameters(motor), ""),
         ("second_level", "&second_level", ""),

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/frozen_angle.h"
+
+#include "fx/q.h"
+#include "fx/vec.h"
+#include "signal/debounce.h"
+#include "types/faults.h"
+
+#define STANDING_ANGLE (1U << 25) /* 1/128 of a turn, 2.8 degrees */
+#define UNCERTAIN 8 /* times v_0: a leg without current may be off by the whole dead time, either way */
+#define MOVING_STEPS 4 /* the voltage that moved the currents is no part of the mean */
+#define MEAN_SHIFT 2
+#define FIRST_SHIFT 10
+
+static bool has_moved(const frozen_angle_config_t *config, const frozen_angle_state_t *state,
+                      const frozen_angle_in_t *in)
+{
+    return in->theta_e - state->theta_e + STANDING_ANGLE > 2U * STANDING_ANGLE ||
+           fx_abs_q31(in->i_ref.d - state->i_ref.d) > config->i_0 ||
+           fx_abs_q31(in->i_ref.q - state->i_ref.q) > config->i_0;
+}
+
+static int32_t approach(int32_t mean, int32_t x, int shift)
+{
+    return mean + ((x - mean) >> shift);
+}
+
+/* (MN-22); true while there is a voltage to compare with. */
+static bool follow(const frozen_angle_config_t *config, frozen_angle_state_t *state, const frozen_angle_in_t *in)
+{
+    if (has_moved(config, state, in)) {
+        state->i_ref = in->i_ref;
+        state->theta_e = in->theta_e;
+        state->standing = 0;
+    }
+    const int shift = (state->standing < MOVING_STEPS) ? 0 : MEAN_SHIFT;
+    state->mean_q8.d = approach(state->mean_q8.d, in->u_sum.d * 256, shift);
+    state->mean_q8.q = approach(state->mean_q8.q, in->u_sum.q * 256, shift);
+    if (state->standing < config->settle_steps) {
+        state->standing++;
+        state->first_q8 = state->mean_q8;
+        return false;
+    }
+    state->first_q8.d = approach(state->first_q8.d, state->mean_q8.d, FIRST_SHIFT);
+    state->first_q8.q = approach(state->first_q8.q, state->mean_q8.q, FIRST_SHIFT);
+    return true;
+}
+
+/* (MN-23) */
+static bool has_changed(const frozen_angle_config_t *config, const frozen_angle_state_t *state,
+                        const frozen_angle_in_t *in)
+{
+    const int32_t i_held = 2 * config->i_0;
+    if (fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q) <= 2 * i_held) {
+        return false; /* two legs may be without current */
+    }
+    const q15_t d = fx_sat_q15((state->mean_q8.d - state->first_q8.d) >> 8);
+    const q15_t q = fx_sat_q15((state->mean_q8.q - state->first_q8.q) >> 8);
+    return fx_magnitude(d, q) > ((in->i_least > i_held) ? config->v_0 : UNCERTAIN * config->v_0);
+}
+
+uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_state_t *state,
+                           const frozen_angle_in_t *in)
+{
+    if (!in->acting) {
+        *state = (frozen_angle_state_t){0};
+        return 0;
+    }
+    const bool changed = follow(config, state, in) && has_changed(config, state, in);
+    return debounce_step(&state->frozen, changed, config->fault_steps, FAULT_ANGLE_OFFSET);
+}

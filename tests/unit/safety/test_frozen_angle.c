@@ -1,0 +1,232 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/frozen_angle.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "types/faults.h"
+#include "unity.h"
+
+/* Ten periods a step; 0.00325 per unit in each: 1.75 V on hsm1. */
+static const frozen_angle_config_t config = {.v_0 = 1060, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
+static frozen_angle_state_t state;
+static frozen_angle_in_t in;
+
+enum { SETTLED = 10, CONFIRMED = 5 };
+
+void setUp(void)
+{
+    state = (frozen_angle_state_t){0};
+    in = (frozen_angle_in_t){
+        .acting = true, .u_sum = {-3000, 2500}, .i_ref = {-9000, 12000}, .i_least = 4000, .theta_e = 0x30000000u};
+}
+
+void tearDown(void)
+{
+}
+
+static uint32_t step(void)
+{
+    return frozen_angle_step(&config, &state, &in);
+}
+
+static void steps(int n)
+{
+    for (int k = 0; k < n; k++) {
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+}
+
+/* Steps until the fault, 0: none in 200. */
+static int found(void)
+{
+    for (int n = 1; n <= 200; n++) {
+        if (step() == FAULT_ANGLE_OFFSET) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+static void settle(void)
+{
+    steps(40);
+}
+
+void test_a_blocked_rotor_is_no_fault_for_minutes_and_may_warm_up(void)
+{
+    settle();
+    const int32_t start = in.u_sum.d;
+    for (int n = 0; n < 180000; n++) {
+        in.u_sum.d = start - n / 90; /* 2000, twice the threshold, in three minutes */
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+}
+
+/* The 15,000 that reverse the torque are no part of the mean: they would leave 845 after the ten steps. */
+void test_the_voltage_that_moves_the_currents_is_no_change_afterwards(void)
+{
+    settle();
+    for (int n = 0; n < 4; n++) {
+        in.i_ref.q -= 6000;
+        in.u_sum.q -= 15000;
+        (void)step();
+        in.u_sum.q += 15000;
+    }
+    TEST_ASSERT_EQUAL_INT(0, found());
+}
+
+/* By hand: (3/4)^n of a step of twice the threshold is left, below half of it after 3 steps; then 5 in a row. */
+void test_a_voltage_that_changes_although_nothing_moves_is_a_turning_rotor(void)
+{
+    static const dq_q15_t directions[] = {{2120, 0}, {-2120, 0}, {0, 2120}, {0, -2120}};
+    for (int k = 0; k < 4; k++) {
+        setUp();
+        settle();
+        in.u_sum.d += directions[k].d;
+        in.u_sum.q += directions[k].q;
+        TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found());
+    }
+}
+
+void test_a_smaller_change_or_a_shorter_one_is_none(void)
+{
+    settle();
+    in.u_sum.d += 1050;
+    TEST_ASSERT_EQUAL_INT(0, found());
+    setUp();
+    settle();
+    in.u_sum.d += 2120;
+    steps(3 + CONFIRMED - 2);
+    in.u_sum.d -= 2 * 2120;
+    (void)step();
+    in.u_sum.d += 2120;
+    TEST_ASSERT_EQUAL_INT(0, found());
+}
+
+/* The whole dead time of a leg either way: eight times as much. */
+void test_a_leg_without_current_may_change_its_voltage(void)
+{
+    settle();
+    in.i_least = 2 * 819;
+    in.u_sum.q += 8000;
+    TEST_ASSERT_EQUAL_INT(0, found());
+    setUp();
+    settle();
+    in.i_least = 2 * 819;
+    in.u_sum.q += 9000;
+    TEST_ASSERT_GREATER_THAN(0, found());
+}
+
+/* Both currents of two legs may be below 2 i_0 while the length is up to 4 i_0. */
+void test_without_current_nothing_is_claimed(void)
+{
+    in.i_ref = (dq_q15_t){-3276, 0};
+    settle();
+    in.u_sum.d += 20000;
+    TEST_ASSERT_EQUAL_INT(0, found());
+    in.i_ref = (dq_q15_t){-3278, 0};
+    in.u_sum.d -= 20000;
+    TEST_ASSERT_GREATER_THAN(0, found());
+}
+
+void test_an_angle_or_a_reference_that_moves_starts_again(void)
+{
+    for (int k = 0; k < 6; k++) {
+        setUp();
+        settle();
+        in.u_sum.d += 2120;
+        in.theta_e += (k == 0) ? (1U << 25) + 1U : (k == 1) ? 0U - (1U << 25) - 1U : 0U;
+        in.i_ref.d += (k == 2) ? 820 : (k == 3) ? -820 : 0;
+        in.i_ref.q += (k == 4) ? 820 : (k == 5) ? -820 : 0;
+        TEST_ASSERT_EQUAL_INT(0, found());
+    }
+    setUp();
+    settle();
+    in.u_sum.d += 2120;
+    in.theta_e += 1U << 25;
+    in.i_ref.d += 819;
+    in.i_ref.q -= 819;
+    TEST_ASSERT_GREATER_THAN(0, found());
+}
+
+/* Rolling on a hill at a few turns a minute: each 1/128 of a turn starts again before the reference is there. */
+void test_a_slow_rotor_is_no_frozen_one(void)
+{
+    for (int n = 0; n < 20000; n++) {
+        in.theta_e += 1U << 22;
+        in.u_sum.d = (int32_t)lround(3000.0 * sin(n * 0.1));
+        in.u_sum.q = (int32_t)lround(3000.0 * cos(n * 0.1));
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+}
+
+void test_a_bridge_that_is_off_is_not_checked_and_starts_again(void)
+{
+    settle();
+    in.acting = false;
+    TEST_ASSERT_EQUAL_HEX32(0, step());
+    TEST_ASSERT_EQUAL_UINT8(0, state.standing);
+    TEST_ASSERT_EQUAL_INT32(0, state.mean_q8.d);
+}
+
+/* (MN-22), (MN-23) in double precision, from the equations. */
+typedef struct {
+    double m[2], first[2];
+    int standing, changed;
+} twin_t;
+
+static bool twin_step(twin_t *t, const double u[2])
+{
+    double change = 0.0;
+    for (int x = 0; x < 2; x++) {
+        t->m[x] += (u[x] - t->m[x]) / ((t->standing < 4) ? 1.0 : 4.0);
+    }
+    if (t->standing < SETTLED) {
+        t->standing++;
+        t->first[0] = t->m[0];
+        t->first[1] = t->m[1];
+        return false;
+    }
+    for (int x = 0; x < 2; x++) {
+        t->first[x] += (t->m[x] - t->first[x]) / 1024.0;
+        change += (t->m[x] - t->first[x]) * (t->m[x] - t->first[x]);
+    }
+    t->changed = (sqrt(change) > 1060.0) ? t->changed + 1 : 0;
+    return t->changed >= CONFIRMED;
+}
+
+/* A rotor that turns below the frozen angle at 0.02 to 2 rad per step, with an amplitude around the threshold. Rounding
+ * of the mean and of the length: 3 counts; where the twin is that close to its threshold either answer is right. */
+void test_a_rotor_that_turns_below_the_angle_is_found_when_the_twin_finds_it(void)
+{
+    int agreed = 0;
+    for (int k = 0; k < 400; k++) {
+        setUp();
+        twin_t twin = {0};
+        const double amplitude = 200.0 + 20.0 * k, omega = 0.02 * pow(100.0, (k * 37 % 400) / 400.0);
+        int fixed = 0, exact = 0;
+        for (int n = 1; n <= 150; n++) {
+            const double u[2] = {floor(amplitude * sin(omega * n)), floor(amplitude * cos(omega * n))};
+            in.u_sum = (dq_q15_t){(int32_t)u[0], (int32_t)u[1]};
+            fixed = (step() != 0U && fixed == 0) ? n : fixed;
+            exact = (twin_step(&twin, u) && exact == 0) ? n : exact;
+        }
+        agreed += (fixed == exact) ? 1 : 0;
+    }
+    TEST_ASSERT_GREATER_OR_EQUAL_INT(390, agreed);
+}
+
+void test_no_argument_wraps(void)
+{
+    static const int32_t ends[] = {-40 * 32768, 40 * 32767};
+    for (int n = 0; n < 256; n++) {
+        in = (frozen_angle_in_t){true,
+                                 {ends[n & 1], ends[(n >> 1) & 1]},
+                                 {((n >> 2) & 1) ? 32767 : -32768, ((n >> 3) & 1) ? 32767 : -32768},
+                                 INT16_MAX,
+                                 (uint32_t)n << 30};
+        (void)step();
+        TEST_ASSERT_TRUE(abs(state.mean_q8.d) <= 40 * 32768 * 256);
+    }
+}
