@@ -81,8 +81,9 @@ def follow(loop: Loop, seconds: float) -> tuple[int, int]:
 def check_followed(loop: Loop, periods: int) -> None:
     difference = loop._library.sim_shadow_difference(loop._sim)
     assert difference is None, difference
-    # At a few of the periods' ends the task is still at work, and nothing can be compared.
-    assert loop.get("emulator.compared") >= 0.98 * periods
+    # At the end of its first period the task may still be at work, and nothing can be compared; at the ends of the
+    # other nine of a step it rests, but for a few steps that take longer.
+    assert loop.get("emulator.compared") >= 0.89 * periods
 
 
 @pytest.mark.parametrize("mode", [0, 1], ids=["paper", "robust"])
