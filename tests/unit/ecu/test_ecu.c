@@ -129,6 +129,21 @@ static void tasks(int count)
     }
 }
 
+/* A tenth and a fifth of T_b; a command that is lost takes both away. */
+void test_the_vehicles_limits_reach_the_drive_in_the_same_step(void)
+{
+    ecu.rx.command.limit_drive_Nm = 29.4664F;
+    ecu.rx.command.limit_regen_Nm = 58.9328F;
+    ecu.rx.command_channel.alive = true;
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(3277, ecu.drive.request.limits.torque_drive);
+    TEST_ASSERT_EQUAL_INT(6554, ecu.drive.request.limits.torque_regen);
+    ecu.rx.command_channel.alive = false;
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(0, ecu.drive.request.limits.torque_drive);
+    TEST_ASSERT_EQUAL_INT(0, ecu.drive.request.limits.torque_regen);
+}
+
 /* 132 N·m are 14679 counts, 962002944 in q31: in 40 ms, their rate in 10 ms, from full torque to none in 15 ms. The
  * ramp is rounded up, so that it has ended in time. 0.25 N·m of 294.664 N·m are 27.8 counts. */
 void test_the_torque_moves_at_the_rates_of_the_page_of_the_bus(void)

@@ -143,6 +143,20 @@ void test_currents_that_stand_still_confirm_the_speed(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
 }
 
+/* A bridge that stays shorted below the speed that asks for it: the currents turn, so the rotor does. */
+void test_without_an_angle_the_speed_does_not_fall_while_the_phases_are_shorted(void)
+{
+    TEST_ASSERT_FALSE(at(0.5));
+    in.omega = 0;
+    in.shorted = true;
+    in.speed_valid = false;
+    for (int k = 0; k < 30000; k++) {
+        short_circuit_currents(1.0, 4.0 * k, 4.0 * k - 0.4);
+        TEST_ASSERT_FALSE(steps(1));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
+}
+
 /* Without an angle only the end of the currents tells that the rotor has come to rest. */
 void test_without_an_angle_the_short_circuit_lasts_until_its_currents_have_vanished(void)
 {
