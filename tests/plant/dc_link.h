@@ -6,7 +6,7 @@
  *   v = V_bat while the contactor is closed;  v <= V_avalanche: above it the semiconductors conduct
  * Source   docs/theory/plant.md (PL-21), (PL-22)
  * Units    V, A, s
- * Range    v >= 1 V: the duties of the inverter's model are shares of it
+ * Range    v >= 1 V, so that the errors of the inverter model, which are shares of v, do not vanish
  * Rounding exact for a bridge current that is constant over the step
  * Context  simulation only; pure */
 #include "plant_params.h"
@@ -16,7 +16,7 @@ typedef struct {
     int gate_supply; /* off: no gate can be switched on */
 } plant_switches_t;
 
-/** The voltage after dt; avalanche_J grows by the energy that the semiconductors take. */
+/** Returns the voltage after dt_s; adds the energy that the semiconductors dissipate to avalanche_J. */
 double dc_link_step(const plant_params_t *p, const plant_switches_t *on, double v_V, double battery_V,
                     double i_bridge_A, double dt_s, double *avalanche_J);
 

@@ -22,7 +22,7 @@ void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double v
     e->mechanical += h * torque_Nm * speed_rad_s;
 }
 
-void energy_voltage(energy_t *e, const double u_s[2], turn_t mid, double half_rad, double h)
+void energy_voltage(energy_t *e, const double u_s[2], rotation_t mid, double half_rad, double h)
 {
     double u_dq[2];
     const double sinc = sinc_of(half_rad);

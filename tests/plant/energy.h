@@ -4,8 +4,8 @@
 /** Energy balance, substep by substep:
  *   dc = inverter + electrical,  electrical = copper + iron + mechanical + field
  * Source   docs/theory/plant.md (PL-20)
- * Units    J over a period; the mean voltage and torque as integrals
- * Rounding each term is integrated separately: the balance is exact to second order and therefore a test
+ * Units    J over a period; voltage and torque as integrals over time
+ * Rounding each term is integrated by its own rule to second order; the balance is therefore a test, not an identity
  * Context  simulation only */
 #include "machine.h"
 
@@ -15,7 +15,7 @@ typedef struct {
 
 typedef struct {
     double u_dq[2], torque, torque_shaft; /* integrals over time */
-    double charge;                        /* out of the dc link */
+    double charge;                        /* drawn from the dc link */
     double dc, electrical, copper, iron, mechanical, field;
 } energy_t;
 
@@ -34,7 +34,7 @@ void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, con
 /** The mechanical part: mean torque of the substep, speed in its middle. */
 void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms, double h);
 
-/** Mean of the constant u_s over the substep in the rotor frame that turns by 2 x half_rad. */
-void energy_voltage(energy_t *e, const double u_s[2], turn_t mid, double half_rad, double h);
+/** Adds u_s, which is constant, as seen from the rotor, which turns by 2 half_rad in the substep. */
+void energy_voltage(energy_t *e, const double u_s[2], rotation_t mid, double half_rad, double h);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_FLUX_SOLVE_H
 #define PLANT_FLUX_SOLVE_H
-/** Damped Newton: the currents of a given flux linkage.
+/** Currents of a given flux linkage, by Newton's method with step halving.
  *   i <- i + s J^-1 (psi - psi(i)),  s = 1, 1/2, 1/4 ... until the residual shrinks
  * Source   docs/theory/plant.md (PL-3)
  * Units    A, Vs, H
@@ -14,7 +14,7 @@
 /* jac row-major, never NULL. */
 typedef void flux_fn_t(const void *model, const double i[2], double psi[2], double jac[4]);
 
-/** i: in the start, out the solution; jac: out, the incremental inductances there. */
+/** i: start value in, solution out; jac: incremental inductances at the solution. */
 int flux_solve(flux_fn_t *flux, const void *model, const double psi[2], double i[2], double jac[4]);
 
 /** x = J^-1 r. */

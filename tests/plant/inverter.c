@@ -32,7 +32,7 @@ static int consistent(const inverter_t *v, const double error_V[3], const double
 }
 
 /* di_abc = -gain x error_V over one substep (PL-13). */
-static void current_gain(const machine_t *m, double h, turn_t end, double gain[3][3])
+static void current_gain(const machine_t *m, double h, rotation_t end, double gain[3][3])
 {
     for (int y = 0; y < 3; y++) {
         double dq[2], di[2], ab[2], abc[3];
@@ -46,10 +46,10 @@ static void current_gain(const machine_t *m, double h, turn_t end, double gain[3
     }
 }
 
-/* The frequent case in closed form: three equal legs that hold all currents at zero, or inside the
- * zone. (h J^-1 + zone/bound) e = i_free, in the rotor frame; without a zone the common mode is
- * free. 0 when a leg would have to go beyond its bound. */
-static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, const double free_A[3])
+/* The frequent case in closed form: three equal legs that keep all currents at zero or inside the zone.
+ * (h J^-1 + zone/bound) e = i_free in the rotor frame; without a zone the common mode of the errors is arbitrary and is
+ * centred between the bounds. 0 if a leg's error would exceed its bound. */
+static int hold_all(inverter_t *v, const machine_t *m, double h, rotation_t end, const double free_A[3])
 {
     const double bound = v->hi_V[0], *jac = m->jac;
     for (int x = 0; x < 3; x++) {
@@ -57,9 +57,9 @@ static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, con
             return 0;
         }
     }
-    const double soft = v->zone_A[0] / bound; /* without any bound the legs are exact */
+    const double zone = v->zone_A[0] / bound; /* bound > 0: without bounds v->exact is set */
     const double per_det = h / (jac[0] * jac[3] - jac[1] * jac[2]);
-    const double a[4] = {jac[3] * per_det + soft, -jac[1] * per_det, -jac[2] * per_det, jac[0] * per_det + soft};
+    const double a[4] = {jac[3] * per_det + zone, -jac[1] * per_det, -jac[2] * per_det, jac[0] * per_det + zone};
     double ab[2], dq[2], error_dq[2], e[3];
     from_phases(free_A, ab);
     to_rotor(end, ab, dq);
@@ -67,7 +67,7 @@ static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, con
     to_stationary(end, error_dq, ab);
     to_phases(ab, e);
     const double top = fmax(e[0], fmax(e[1], e[2])), bottom = fmin(e[0], fmin(e[1], e[2]));
-    const double shift = soft > 0.0 ? 0.0 : -0.5 * (top + bottom);
+    const double shift = zone > 0.0 ? 0.0 : -0.5 * (top + bottom);
     if (top + shift > bound || bottom + shift < -bound) {
         return 0;
     }
@@ -77,19 +77,19 @@ static int hold_all(inverter_t *v, const machine_t *m, double h, turn_t end, con
     return 1;
 }
 
-/* Projected Gauss-Seidel on the three legs; free_A: the end currents with no error at all. */
+/* Projected Gauss-Seidel on the three legs; free_A: the currents at the end without any error. */
 static void solve_errors(inverter_t *v, double gain[3][3], const double free_A[3])
 {
-    double moved = 1.0;
-    for (int n = 0; n < SWEEPS && moved > SWEEP_END_V; n++) {
-        moved = 0.0;
+    double change = 1.0;
+    for (int n = 0; n < SWEEPS && change > SWEEP_END_V; n++) {
+        change = 0.0;
         for (int x = 0; x < 3; x++) {
             const double *g = gain[x], *e = v->error_V;
-            const double drive = free_A[x] - (g[0] * e[0] + g[1] * e[1] + g[2] * e[2]) + g[x] * e[x];
-            const double bound = drive > 0.0 ? v->hi_V[x] : v->lo_V[x];
+            const double without_A = free_A[x] - (g[0] * e[0] + g[1] * e[1] + g[2] * e[2]) + g[x] * e[x];
+            const double bound = without_A > 0.0 ? v->hi_V[x] : v->lo_V[x];
             if (bound > 0.0) {
-                const double now = clamp(drive / (g[x] + v->zone_A[x] / bound), -bound, bound);
-                moved = fmax(moved, fabs(now - e[x]));
+                const double now = clamp(without_A / (g[x] + v->zone_A[x] / bound), -bound, bound);
+                change = fmax(change, fabs(now - e[x]));
                 v->error_V[x] = now;
             } else {
                 v->error_V[x] = 0.0;
@@ -98,7 +98,7 @@ static void solve_errors(inverter_t *v, double gain[3][3], const double free_A[3
     }
 }
 
-void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, turn_t start, turn_t end,
+void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h, rotation_t start, rotation_t end,
                       double u_s[2], double i_end_dq[2])
 {
     double i[2], i_s[2], i_abc[3], error_V[3] = {0.0, 0.0, 0.0}, gain[3][3], free_A[3];

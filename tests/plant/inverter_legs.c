@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What each leg of the inverter does in a period: sound, with an open or a shorted switch, with a broken lead. */
+/* Duty and error bounds of each leg in a period: intact, with an open or a shorted switch, with a broken motor lead. */
 #include "inverter.h"
 
 #define UPPER(x) (x)
 #define LOWER(x) ((x) + 3)
 
-/* Half the current that recharges the switches' output capacitance within the dead time (PL-12). */
+/* The current that just recharges the output capacitance of a leg within the dead time (PL-12). */
 #define SWITCHING_ZONE_A 0.05
-/* A broken lead holds its current at zero against any voltage. */
+/* Error bound of a broken lead: larger than any voltage, so that its current stays zero. */
 #define OPEN_LEAD_V 1e6
 
 static double clamp(double x, double lo, double hi)
@@ -32,7 +32,7 @@ static void leg_off(inverter_t *v, int x)
     v->zone_A[x] = 0.0;
 }
 
-/* A pulse narrower than the dead time disappears: the loss is never larger than the pulse. */
+/* A pulse shorter than the dead time disappears: the loss is never larger than the pulse. */
 static void leg_on(inverter_t *v, int x, double duty, double dead)
 {
     const double d = duty_of(duty);
@@ -51,7 +51,7 @@ static void leg_open(inverter_t *v, const plant_params_t *p, int x)
     v->zone_A[x] = p->switch_open[UPPER(x)] && p->switch_open[LOWER(x)] ? 0.0 : v->zone_A[x];
 }
 
-/* The terminal is at the shorted switch's rail, whatever the gates and the current do (PL-24). */
+/* A shorted switch holds the terminal at its rail for any gate signal and any current (PL-24). */
 static void leg_shorted(inverter_t *v, const plant_params_t *p, int x)
 {
     const int upper = p->switch_shorted[UPPER(x)], lower = p->switch_shorted[LOWER(x)];

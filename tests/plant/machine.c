@@ -48,8 +48,8 @@ static void model_flux(const void *context, const double i[2], double psi[2], do
     }
 }
 
-/* The currents of psi_dq, searched from i. If none is found, or many currents have this flux, this is counted, and
- * currents and slopes keep their last values, which are finite. */
+/* Searches the currents of psi_dq, starting at i. If none is found, or if the inductance matrix is singular there, the
+ * failure is counted, and currents and slopes keep their last values, which are finite. */
 static void search_current(machine_t *m, double i[2])
 {
     double jac[4];
@@ -61,8 +61,8 @@ static void search_current(machine_t *m, double i[2])
     memcpy(m->jac, jac, sizeof jac);
 }
 
-/* start is at most one Newton step away: one evaluation and one correction suffice, unless the residual shows that the
- * tolerance is not reached yet. */
+/* start is the linear prediction: one Newton step usually suffices. If the step is larger than 1e-3 A, its quadratic
+ * error may exceed the tolerance and the full search follows. */
 static void find_current(machine_t *m, const double start[2])
 {
     double i[2] = {start[0], start[1]}, psi[2], r[2], step[2], jac[4];
@@ -83,10 +83,10 @@ static void find_current(machine_t *m, const double start[2])
     search_current(m, i);
 }
 
-static void set_flux_from_current(machine_t *m, turn_t turn)
+static void set_flux_from_current(machine_t *m, rotation_t rotor)
 {
     model_flux(&m->flux, m->im_dq, m->psi_dq, m->jac);
-    to_stationary(turn, m->psi_dq, m->psi_s);
+    to_stationary(rotor, m->psi_dq, m->psi_s);
 }
 
 void machine_create(machine_t *m, const plant_params_t *p, const plant_map_t *map)
@@ -105,7 +105,7 @@ static int same_model(const flux_model_t *a, const flux_model_t *b)
            a->offset_Vs == b->offset_Vs && a->psi_f_Vs == b->psi_f_Vs;
 }
 
-void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double omega_e)
+void machine_update(machine_t *m, const plant_params_t *p, rotation_t rotor, double omega_e)
 {
     const double w = omega_e;
     m->pole_pairs = p->pole_pairs;
@@ -117,17 +117,17 @@ void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double o
     }
     m->flux = now;
     if (p->magnet_step_keeps_current) {
-        set_flux_from_current(m, turn);
+        set_flux_from_current(m, rotor);
     } else {
         search_current(m, (double[2]){m->im_dq[0], m->im_dq[1]});
     }
 }
 
-void machine_set_current(machine_t *m, const double im_dq[2], turn_t turn)
+void machine_set_current(machine_t *m, const double im_dq[2], rotation_t rotor)
 {
     m->im_dq[0] = im_dq[0];
     m->im_dq[1] = im_dq[1];
-    set_flux_from_current(m, turn);
+    set_flux_from_current(m, rotor);
 }
 
 void machine_current(const machine_t *m, double i_dq[2])
@@ -136,7 +136,8 @@ void machine_current(const machine_t *m, double i_dq[2])
     i_dq[1] = m->im_dq[1] + m->iron_A_per_Vs * m->psi_dq[0];
 }
 
-void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end, double i_dq[2])
+void machine_predict(const machine_t *m, const double u_s[2], double h, rotation_t start, rotation_t end,
+                     double i_dq[2])
 {
     double i[2], i_s[2], psi[2], r[2], step[2];
     machine_current(m, i);
@@ -152,7 +153,7 @@ void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t s
     i_dq[1] = m->im_dq[1] + step[1] + m->iron_A_per_Vs * psi[0];
 }
 
-void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end)
+void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, rotation_t end)
 {
     double r[2], start[2], before[2] = {m->psi_dq[0], m->psi_dq[1]};
     for (int k = 0; k < 2; k++) {

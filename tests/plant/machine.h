@@ -7,8 +7,7 @@
  * Source   docs/theory/plant.md (PL-4) ... (PL-10)
  * Units    SI, amplitude-invariant; _s stationary frame, _dq rotor frame
  * Rounding second order in the substep
- * Errors   counts the substeps whose currents could not be found (residual above 1e-10 Vs) and
- *          keeps the last currents
+ * Errors   a substep whose currents cannot be found (residual above 1e-10 Vs) is counted and keeps the last currents
  * Context  simulation only */
 #include "plant_map.h"
 #include "plant_params.h"
@@ -28,25 +27,26 @@ typedef struct {
     double pole_pairs, r_ohm;
     double iron_A_per_Vs; /* i_fe = j psi times this (PL-8) */
     double psi_s[2];
-    double psi_dq[2], im_dq[2], jac[4]; /* of the present instant; jac of the last iterate */
+    double psi_dq[2], im_dq[2], jac[4]; /* at the present instant; jac at the last iterate of the inversion */
     long failures;
 } machine_t;
 
 void machine_create(machine_t *m, const plant_params_t *p, const plant_map_t *map);
 
-/** Takes over changed parameters; turn is the present rotor angle. */
-void machine_update(machine_t *m, const plant_params_t *p, turn_t turn, double omega_e);
+/** Applies changed parameters; rotor: the present angle. */
+void machine_update(machine_t *m, const plant_params_t *p, rotation_t rotor, double omega_e);
 
-void machine_set_current(machine_t *m, const double im_dq[2], turn_t turn);
+void machine_set_current(machine_t *m, const double im_dq[2], rotation_t rotor);
 
 /** Terminal current in the rotor frame at the present instant. */
 void machine_current(const machine_t *m, double i_dq[2]);
 
 /** Terminal current at the end of a substep with voltage u_s, linearised. */
-void machine_predict(const machine_t *m, const double u_s[2], double h, turn_t start, turn_t end, double i_dq[2]);
+void machine_predict(const machine_t *m, const double u_s[2], double h, rotation_t start, rotation_t end,
+                     double i_dq[2]);
 
 /** One substep of length h; i_mid_s: the terminal current in its middle. */
-void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, turn_t end);
+void machine_step(machine_t *m, const double u_s[2], const double i_mid_s[2], double h, rotation_t end);
 
 double machine_torque(const machine_t *m);
 

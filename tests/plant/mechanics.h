@@ -15,12 +15,13 @@ typedef struct {
 
 void mechanics_set(mechanics_t *m, double theta_m_rad, double speed_rad_s);
 
-/** Speed in the middle of the coming substep. */
+/** Speed in the middle of the next substep. */
 double mechanics_mid_speed(const mechanics_t *m, const plant_params_t *p, double torque_Nm, double h);
 
-/** Ends the substep that ran at mid_rad_s with the mean air-gap torque. */
+/** Completes a substep: mid_rad_s is the speed in its middle, torque_Nm its mean air-gap torque. */
 void mechanics_step(mechanics_t *m, const plant_params_t *p, double mid_rad_s, double torque_Nm, double h);
 
-double wrap_turn(double angle_rad);
+/** To [0, 2 pi). */
+double wrap_angle(double angle_rad);
 
 #endif

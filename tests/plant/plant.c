@@ -24,18 +24,18 @@ struct plant {
     plant_truth_t truth;
 };
 
-/* What does not change within a period. */
+/* Constant within a period. */
 typedef struct {
     const double *duty;
     int switching;
     double battery_V;
-    double short_circuit_A; /* through both switches of a leg, mean of the period */
+    double short_circuit_A; /* through both switches of a leg, mean over the period */
 } bridge_t;
 
-static turn_t rotor_turn(const plant_t *plant)
+static rotation_t rotor_angle(const plant_t *plant)
 {
     const double theta_e = plant->params.pole_pairs * plant->mechanics.theta_m_rad;
-    return (turn_t){cos(theta_e), sin(theta_e)};
+    return (rotation_t){cos(theta_e), sin(theta_e)};
 }
 
 static double vdc_at(const plant_params_t *p, double time_s)
@@ -46,7 +46,7 @@ static double vdc_at(const plant_params_t *p, double time_s)
     return p->vdc_V + p->vdc_ripple_V * sin(TWO_PI * p->vdc_ripple_hz * time_s);
 }
 
-/* Without a capacitor the bridge is at the battery. */
+/* Without a capacitor the bridge is connected to the battery. */
 static double bridge_V(const plant_t *plant, double time_s)
 {
     const plant_params_t *p = &plant->params;
@@ -54,25 +54,25 @@ static double bridge_V(const plant_t *plant, double time_s)
     return at_battery ? vdc_at(p, time_s) : plant->link_V;
 }
 
-/* Brings the model up to date with the live parameters; returns the rotor's orientation. */
-static turn_t update(plant_t *plant)
+/* Applies changed parameters; returns the rotor's electrical angle. */
+static rotation_t update(plant_t *plant)
 {
     const plant_params_t *p = &plant->params;
     if (p->imposed_speed) {
         plant->mechanics.speed_rad_s = p->speed_rad_s;
     }
-    const turn_t turn = rotor_turn(plant);
-    machine_update(&plant->machine, p, turn, p->pole_pairs * plant->mechanics.speed_rad_s);
-    return turn;
+    const rotation_t rotor = rotor_angle(plant);
+    machine_update(&plant->machine, p, rotor, p->pole_pairs * plant->mechanics.speed_rad_s);
+    return rotor;
 }
 
-static void instant_truth(plant_t *plant, turn_t turn)
+static void instant_truth(plant_t *plant, rotation_t rotor)
 {
     const machine_t *m = &plant->machine;
     plant_truth_t *t = &plant->truth;
     double i_dq[2], i_s[2];
     machine_current(m, i_dq);
-    to_stationary(turn, i_dq, i_s);
+    to_stationary(rotor, i_dq, i_s);
     to_phases(i_s, t->i_abc_A);
     t->i_d_A = i_dq[0];
     t->i_q_A = i_dq[1];
@@ -84,7 +84,7 @@ static void instant_truth(plant_t *plant, turn_t turn)
     t->speed_rad_s = plant->mechanics.speed_rad_s;
     t->speed_rpm = t->speed_rad_s * 60.0 / TWO_PI;
     t->theta_m_rad = plant->mechanics.theta_m_rad;
-    t->theta_e_rad = wrap_turn(t->theta_m_rad * plant->params.pole_pairs);
+    t->theta_e_rad = wrap_angle(t->theta_m_rad * plant->params.pole_pairs);
     t->r_ohm = m->r_ohm;
     t->psi_f_Vs = m->flux.psi_f_Vs;
     t->vdc_V = bridge_V(plant, t->time_s);
@@ -131,11 +131,11 @@ void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_ra
         plant->params.speed_rad_s = speed_rad_s;
     }
     mechanics_set(&plant->mechanics, theta_m_rad, speed_rad_s);
-    const turn_t turn = update(plant);
-    machine_set_current(&plant->machine, im_dq, turn);
+    const rotation_t rotor = update(plant);
+    machine_set_current(&plant->machine, im_dq, rotor);
     memset(&plant->truth, 0, sizeof plant->truth);
     plant->truth.time_s = time_s;
-    instant_truth(plant, turn);
+    instant_truth(plant, rotor);
 }
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors)
@@ -145,18 +145,18 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors)
     sensors->gate_fault = plant->gate_fault;
 }
 
-static void substep(plant_t *plant, turn_t *turn, double vdc_V, double short_circuit_A, double h, energy_t *sum)
+static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double short_circuit_A, double h, energy_t *sum)
 {
     const plant_params_t *p = &plant->params;
     machine_t *m = &plant->machine;
     const instant_t from = energy_instant(m);
     const double mid_rad_s = mechanics_mid_speed(&plant->mechanics, p, from.torque_Nm, h);
     const double half_rad = 0.5 * h * p->pole_pairs * mid_rad_s;
-    const turn_t half = turn_of(half_rad), mid = turn_add(*turn, half), end = turn_add(mid, half);
+    const rotation_t half = rotation_of(half_rad), mid = rotation_add(*rotor, half), end = rotation_add(mid, half);
     double u_s[2], i_dq[2], i_end[2], i_s[2], i_abc[3];
 
     machine_current(m, i_dq);
-    inverter_voltage(&plant->inverter, m, vdc_V, h, *turn, end, u_s, i_end);
+    inverter_voltage(&plant->inverter, m, vdc_V, h, *rotor, end, u_s, i_end);
     i_dq[0] = 0.5 * (i_dq[0] + i_end[0]);
     i_dq[1] = 0.5 * (i_dq[1] + i_end[1]);
     to_stationary(mid, i_dq, i_s);
@@ -173,10 +173,10 @@ static void substep(plant_t *plant, turn_t *turn, double vdc_V, double short_cir
     sum->dc += vdc_V * charge_As;
     sum->charge += charge_As;
     plant->truth.e_short_circuit_J += vdc_V * h * short_circuit_A;
-    *turn = end;
+    *rotor = end;
 }
 
-/* The capacitor after the substep, and the legs, whose errors are shares of its voltage. */
+/* Advances the capacitor by a substep and updates the legs, whose voltage errors depend on its voltage. */
 static double link_substep(plant_t *plant, const bridge_t *bridge, double vdc_V, double charge_As, double h)
 {
     const plant_params_t *p = &plant->params;
@@ -216,8 +216,8 @@ void plant_switch(plant_t *plant, const plant_switches_t *on)
     plant->on = *on;
 }
 
-/* A switch that is switched on against a shorted one (PL-25). The gate drivers notice it by its desaturation, and their
- * line to the timer's fault input switches all six off, unless the pulse is over before. */
+/* One switch of a leg is shorted and the other is switched on (PL-25). If the pulse lasts longer than desaturation_s,
+ * the gate driver detects the desaturation and the timer's fault input switches all six off. */
 static double short_circuit(plant_t *plant, bridge_t *bridge)
 {
     const plant_params_t *p = &plant->params;
@@ -240,14 +240,14 @@ void plant_advance(plant_t *plant, const double duty[3], int gates_on)
     bridge.short_circuit_A = short_circuit(plant, &bridge);
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};
-    turn_t turn = update(plant);
+    rotation_t rotor = update(plant);
     inverter_set(&plant->inverter, p, duty, bridge.switching, vdc_V);
     for (int k = 0; k < n; k++) {
         const double before_As = sum.charge;
-        substep(plant, &turn, vdc_V, bridge.short_circuit_A, period_s / n, &sum);
+        substep(plant, &rotor, vdc_V, bridge.short_circuit_A, period_s / n, &sum);
         vdc_V = link_substep(plant, &bridge, vdc_V, sum.charge - before_As, period_s / n);
     }
     mean_truth(&plant->truth, &sum, period_s);
     plant->truth.time_s += period_s;
-    instant_truth(plant, rotor_turn(plant));
+    instant_truth(plant, rotor_angle(plant));
 }

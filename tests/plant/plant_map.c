@@ -21,7 +21,7 @@ double plant_map_slope(const double *x, const double *f, int stride, int n, int 
     return k == 0 ? 2.0 * s0 - mid : (k == n - 1 ? 2.0 * s1 - mid : mid);
 }
 
-/* Values, slopes and twists at the given nodes, which begin behind the nodes beyond the edge. */
+/* Values, slopes and twists at the given nodes; their indices follow those of the MAP_BEYOND added nodes. */
 static void fill_inside(const plant_map_t *map, map_node_t *node, const double *psi)
 {
     const int edge = MAP_BEYOND, row = map->q.n, nd = map->d.n - 2 * edge, nq = row - 2 * edge;
@@ -83,7 +83,7 @@ void plant_map_fill_cells(plant_map_t *map, map_nodes_t *nodes, map_block_t bloc
     }
 }
 
-/* psi_d(0, i_q) is one cubic per i_q cell: taken from the map itself, extrapolated or not. */
+/* psi_d(0, i_q) is one cubic per i_q cell, computed from the map, also where i_d = 0 is outside its grid. */
 static void fill_zero(plant_map_t *map)
 {
     for (int j = 0; j + 1 < map->q.n; j++) {
@@ -104,7 +104,7 @@ map_margin_t plant_map_margin(const plant_map_t *map, map_block_t block)
             double psi[2], jac[4];
             plant_map_cell_flux(map, ci, cj, (i - 4 * ci) / 4.0, (j - 4 * cj) / 4.0, psi, jac);
             const double product = jac[0] * jac[3];
-            least.d = jac[0] > least.d ? least.d : jac[0]; /* NaN stays */
+            least.d = jac[0] > least.d ? least.d : jac[0]; /* keeps a NaN */
             least.q = jac[3] > least.q ? least.q : jac[3];
             const double det = (product - jac[1] * jac[2]) / product;
             least.det = det > least.det ? least.det : det;
@@ -133,7 +133,7 @@ static int all_finite(const double *x, int n)
     return 1;
 }
 
-/* The given nodes, with space for those beyond the edge on either side. */
+/* Copies the given nodes and leaves space for MAP_BEYOND nodes on either side. */
 static int axis_copy(map_axis_t *axis, const double *x, int n)
 {
     axis->n = n + 2 * MAP_BEYOND;
@@ -148,7 +148,7 @@ static int axis_copy(map_axis_t *axis, const double *x, int n)
     return 1;
 }
 
-/* Everything that is allocated; 0 when something was not. */
+/* Cells and nodes; 0 if an allocation fails. */
 static int allocate(plant_map_t *map, map_nodes_t *nodes, int nd, int nq)
 {
     const size_t ed = (size_t)nd + (size_t)2 * MAP_BEYOND, eq = (size_t)nq + (size_t)2 * MAP_BEYOND;
@@ -168,7 +168,7 @@ static int fill(plant_map_t *map, map_nodes_t *nodes, const double *psi_d_Vs, co
     fill_inside(map, nodes->psi[1], psi_q_Vs);
     plant_map_fill_cells(map, nodes, inside);
     const map_margin_t least = plant_map_margin(map, inside);
-    if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) || !plant_map_go_beyond(map, nodes, least)) {
+    if (!(least.d > 0.0 && least.q > 0.0 && least.det > 1e-6) || !plant_map_extrapolate(map, nodes, least)) {
         return 0;
     }
     fill_zero(map);

@@ -2,11 +2,12 @@
 #ifndef PLANT_PLANT_MAP_H
 #define PLANT_PLANT_MAP_H
 /** Flux map of a saturated machine: bicubic Hermite interpolation of psi_d, psi_q over (i_d, i_q).
- *   C1 everywhere; outside the grid the edge slopes fade into constant, uncoupled ones.
+ *   Continuous with its first derivatives. Outside the grid the slopes of the edge change gradually to constant ones
+ *   without cross coupling.
  * Source   docs/theory/plant.md (PL-1) ... (PL-3)
  * Units    A, Vs, H; amplitude-invariant dq frame
- * Range    every current; the inversion is unique where both incremental inductances and the
- *          determinant of their matrix are positive: checked over the grid, so made outside it
+ * Range    every current; the inversion is unique where both incremental inductances and the determinant of their
+ *          matrix are positive. This is checked over the grid, and the extrapolation is chosen to keep it
  * Errors   create returns NULL, invert returns non-zero when the residual stays above 1e-10 Vs
  * Context  simulation only; a map is constant after creation and may be shared by many plants */
 
@@ -22,10 +23,10 @@ void plant_map_destroy(plant_map_t *map);
 void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs, double *psi_q_Vs,
                     double jac[4]);
 
-/** psi_d(0, i_q) and its slope, cheaper than the whole map. */
+/** psi_d(0, i_q) and its slope; needs less computation than plant_map_flux(). */
 double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H);
 
-/** Damped Newton from the given currents (any start) to 1e-10 Vs. 0, or -1. */
+/** Newton's method with step halving, from the given currents (any start) to 1e-10 Vs. Returns 0, or -1 on failure. */
 int plant_map_invert(const plant_map_t *map, double psi_d_Vs, double psi_q_Vs, double *id_A, double *iq_A);
 
 #endif

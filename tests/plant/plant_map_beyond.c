@@ -1,26 +1,26 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The map beyond its edges (PL-2): three more grid lines on each side, then constant slopes. */
+/* Extrapolation of the map beyond its edges (PL-2): three more grid lines on each side, then constant slopes. */
 #include <math.h>
 
 #include "plant_map_impl.h"
 
-/* One edge seen from inside: N is the flux component along the outward axis, T the other one. */
+/* One edge: n is the flux component of the axis across the edge, t the other one (N and T in PL-2). */
 typedef struct {
     map_node_t *n, *t;     /* first node of the edge */
     int count, along, out; /* nodes of the edge; steps in nodes along it and outwards */
-    int by_n, by_t;        /* which slope is the one across and along the edge */
-    double sign;           /* +1: outwards is up the axis */
+    int by_n, by_t;        /* index of the slope across and along the edge */
+    double sign;           /* +1: the current increases outwards */
     const double *x;       /* the currents along the edge */
     double *line;          /* current of the edge's grid line; outward by line[sign * k] */
-    double reach_A;        /* how far from zero the map goes along the outward axis */
+    double reach_A;        /* largest current of the map on the axis across the edge */
 } edge_t;
 
-/* How the edge's slopes fade: own within near_A, cross within far_A, by the part cross. */
+/* Distances within which the edge's slopes change: own slope near_A, cross slope far_A; cross: kappa of (PL-2). */
 typedef struct {
     double near_A, far_A, cross;
 } fade_t;
 
-/* The fading functions of (PL-2) and their integral or derivative at a distance x. */
+/* The functions of (PL-2) and their derivatives (_x) or integrals (_int) at the distance x. */
 typedef struct {
     double x, own, own_x, skew, skew_int, cross, cross_x, cross_int;
 } shape_t;
@@ -45,12 +45,12 @@ static shape_t shape_at(const fade_t *f, double x)
     return k;
 }
 
-/* What the whole edge shares: the constant slope far out and the flux that N tends to. */
+/* Common to the whole edge: the constant slope at large distance and the flux that N tends to. */
 typedef struct {
     double slope_H, level_Vs;
-} far_t;
+} asymptote_t;
 
-static far_t far_of(const edge_t *e)
+static asymptote_t asymptote_of(const edge_t *e)
 {
     double sum = 0.0, max = 0.0, low = INFINITY, high = -INFINITY;
     for (int j = 0; j < e->count; j++) {
@@ -60,21 +60,21 @@ static far_t far_of(const edge_t *e)
         low = fmin(low, v[MAP_F]);
         high = fmax(high, v[MAP_F]);
     }
-    return (far_t){fmax(sum / e->count, 0.5 * max), 0.5 * (low + high)};
+    return (asymptote_t){fmax(sum / e->count, 0.5 * max), 0.5 * (low + high)};
 }
 
-static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, shape_t k, int out_by)
+static void set_outer_node(const edge_t *e, int j, const asymptote_t *far, const fade_t *fade, shape_t k, int out_by)
 {
     const int at = j * e->along, to = at + out_by * e->out, by_n = e->by_n, by_t = e->by_t;
     const int stride = (int)(sizeof *e->n / sizeof(double)) * e->along;
     const double *n = e->n[at].v, *t = e->t[at].v, sign = e->sign;
     const double c = fade->cross * n[by_t];
     const double c_t = fade->cross * plant_map_slope(e->x, &e->n[0].v[by_t], stride, e->count, j);
-    const double level = fade->cross * (n[MAP_F] - far->level_Vs), more = n[by_n] - far->slope_H;
+    const double level = fade->cross * (n[MAP_F] - far->level_Vs), slope_excess = n[by_n] - far->slope_H;
     double *to_n = e->n[to].v, *to_t = e->t[to].v;
 
-    to_n[MAP_F] = n[MAP_F] + (k.cross - 1.0) * level + sign * (k.own * more + k.x * far->slope_H);
-    to_n[by_n] = sign * k.cross_x * level + k.own_x * more + far->slope_H;
+    to_n[MAP_F] = n[MAP_F] + (k.cross - 1.0) * level + sign * (k.own * slope_excess + k.x * far->slope_H);
+    to_n[by_n] = sign * k.cross_x * level + k.own_x * slope_excess + far->slope_H;
     to_n[by_t] = n[by_t] + (k.cross - 1.0) * c + sign * k.own * n[MAP_TWIST];
     to_n[MAP_TWIST] = sign * k.cross_x * c + k.own_x * n[MAP_TWIST];
 
@@ -87,18 +87,18 @@ static void place(const edge_t *e, int j, const far_t *far, const fade_t *fade, 
 static void extend(const edge_t *e, const fade_t *fade)
 {
     const double out_A[MAP_BEYOND] = {fade->near_A, 0.5 * fade->far_A, fade->far_A};
-    const far_t far = far_of(e);
+    const asymptote_t far = asymptote_of(e);
     for (int k = 0; k < MAP_BEYOND; k++) {
         const shape_t shape = shape_at(fade, out_A[k]);
         e->line[(ptrdiff_t)(k + 1) * (int)e->sign] = *e->line + e->sign * out_A[k];
         for (int j = 0; j < e->count; j++) {
-            place(e, j, &far, fade, shape, k + 1);
+            set_outer_node(e, j, &far, fade, shape, k + 1);
         }
     }
 }
 
-/* The longest fade and the largest cross part that leave the given margins. Without a cross part
- * and near 0 J tends to the edge's own with a growing share of the far slope: that one passes. */
+/* Tries the largest cross part and the longest distance first and takes the first that keeps the given margins. With
+ * cross = 0 and near_A towards 0, J is that of the edge with a growing share of the far slope, which always passes. */
 static int extend_within(plant_map_t *map, map_nodes_t *nodes, const edge_t *e, map_block_t block, map_margin_t least)
 {
     for (int part = 4; part >= 0; part--) {
@@ -115,7 +115,7 @@ static int extend_within(plant_map_t *map, map_nodes_t *nodes, const edge_t *e, 
     return 0;
 }
 
-static map_margin_t share(map_margin_t m, double part)
+static map_margin_t scaled(map_margin_t m, double part)
 {
     return (map_margin_t){part * m.d, part * m.q, part * m.det};
 }
@@ -137,10 +137,10 @@ static int extend_d(plant_map_t *map, map_nodes_t *nodes, int up, map_margin_t l
                       .line = &d[i],
                       .reach_A = fmax(fabs(d[b]), fabs(d[d_hi]))};
     const map_block_t strip = {up ? d_hi : 0, up ? d_hi + b : b, b, q_hi};
-    return extend_within(map, nodes, &e, strip, share(least, 0.5));
+    return extend_within(map, nodes, &e, strip, scaled(least, 0.5));
 }
 
-/* With the corners, hence after the d axis. */
+/* Includes the corners, therefore called after extend_d(). */
 static int extend_q(plant_map_t *map, map_nodes_t *nodes, int up, map_margin_t least)
 {
     const int b = MAP_BEYOND, row = map->q.n, d_hi = map->d.n - 1 - b, q_hi = map->q.n - 1 - b;
@@ -158,10 +158,10 @@ static int extend_q(plant_map_t *map, map_nodes_t *nodes, int up, map_margin_t l
                       .line = &q[j],
                       .reach_A = fmax(fabs(q[b]), fabs(q[q_hi]))};
     const map_block_t strip = {0, d_hi + b, up ? q_hi : 0, up ? q_hi + b : b};
-    return extend_within(map, nodes, &e, strip, share(least, 0.25));
+    return extend_within(map, nodes, &e, strip, scaled(least, 0.25));
 }
 
-int plant_map_go_beyond(plant_map_t *map, map_nodes_t *nodes, map_margin_t least)
+int plant_map_extrapolate(plant_map_t *map, map_nodes_t *nodes, map_margin_t least)
 {
     return extend_d(map, nodes, 0, least) && extend_d(map, nodes, 1, least) && extend_q(map, nodes, 0, least) &&
            extend_q(map, nodes, 1, least);

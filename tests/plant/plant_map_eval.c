@@ -2,18 +2,18 @@
 #include "flux_solve.h"
 #include "plant_map_impl.h"
 
-/* Where a current lies on an axis: the cell, the local coordinate held inside it, and how far
- * beyond the edge (in cells, 0 inside). */
+/* Position of a current on an axis: cell k, local coordinate t limited to 0 ... 1, and the distance beyond the last
+ * grid line in cells, 0 inside. */
 typedef struct {
     int k;
     double t, beyond, per_h;
-} spot_t;
+} grid_position_t;
 
-static inline spot_t locate(const map_axis_t *axis, double x)
+static inline grid_position_t locate(const map_axis_t *axis, double x)
 {
     const double *node = axis->node;
     double guess = (x - axis->first) * axis->per_step + MAP_BEYOND;
-    const int top = axis->n - 2 - (x > axis->last ? 0 : MAP_BEYOND); /* the edge itself is inside */
+    const int top = axis->n - 2 - (x > axis->last ? 0 : MAP_BEYOND); /* the edge itself counts as inside */
     int k = guess > 0.0 ? (guess < top ? (int)guess : top) : 0;      /* NaN: 0 */
     while (k > 0 && x < node[k]) {
         k--;
@@ -23,11 +23,12 @@ static inline spot_t locate(const map_axis_t *axis, double x)
     }
     double per_h = 1.0 / (node[k + 1] - node[k]);
     double t = (x - node[k]) * per_h;
-    double held = t < 0.0 ? 0.0 : (t > 1.0 ? 1.0 : t);
-    return (spot_t){.k = k, .t = held, .beyond = t - held, .per_h = per_h};
+    double limited = t < 0.0 ? 0.0 : (t > 1.0 ? 1.0 : t);
+    return (grid_position_t){.k = k, .t = limited, .beyond = t - limited, .per_h = per_h};
 }
 
-static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[2], double jac[4])
+static inline void evaluate_cell(const plant_map_t *map, grid_position_t d, grid_position_t q, double psi[2],
+                                 double jac[4])
 {
     const map_cell_t *cell = &map->cell[d.k * (map->q.n - 1) + q.k];
     const double t = d.t, u = q.t;
@@ -41,7 +42,7 @@ static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[
         double f = p[0] + t * (p[1] + t * (p[2] + t * p[3]));
         double ft = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]);
         double fu = pu[0] + t * (pu[1] + t * (pu[2] + t * pu[3]));
-        /* beyond the last grid line the tangent of the section, whose twist is zero (PL-2) */
+        /* Beyond the last added grid line: the tangent; the twist is zero there (PL-2). */
         psi[a] = f + d.beyond * ft + q.beyond * fu;
         jac[(ptrdiff_t)2 * a] = ft * d.per_h;
         jac[(ptrdiff_t)2 * a + 1] = fu * q.per_h;
@@ -51,7 +52,7 @@ static inline void patch(const plant_map_t *map, spot_t d, spot_t q, double psi[
 void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *psi_d_Vs, double *psi_q_Vs, double jac[4])
 {
     double psi[2], unused[4];
-    patch(map, locate(&map->d, id_A), locate(&map->q, iq_A), psi, jac != NULL ? jac : unused);
+    evaluate_cell(map, locate(&map->d, id_A), locate(&map->q, iq_A), psi, jac != NULL ? jac : unused);
     *psi_d_Vs = psi[0];
     *psi_q_Vs = psi[1];
 }
@@ -59,13 +60,13 @@ void plant_map_flux(const plant_map_t *map, double id_A, double iq_A, double *ps
 void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2], double jac[4])
 {
     const double *d = &map->d.node[i], *q = &map->q.node[j];
-    patch(map, (spot_t){.k = i, .t = t, .per_h = 1.0 / (d[1] - d[0])},
-          (spot_t){.k = j, .t = u, .per_h = 1.0 / (q[1] - q[0])}, psi, jac);
+    evaluate_cell(map, (grid_position_t){.k = i, .t = t, .per_h = 1.0 / (d[1] - d[0])},
+                  (grid_position_t){.k = j, .t = u, .per_h = 1.0 / (q[1] - q[0])}, psi, jac);
 }
 
 double plant_map_axis_flux(const plant_map_t *map, double iq_A, double *slope_H)
 {
-    const spot_t q = locate(&map->q, iq_A);
+    const grid_position_t q = locate(&map->q, iq_A);
     const double *c = map->zero[q.k], u = q.t;
     double slope = c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]);
     *slope_H = slope * q.per_h;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_PLANT_MAP_IMPL_H
 #define PLANT_PLANT_MAP_IMPL_H
-/** What plant_map.c and plant_map_beyond.c build and plant_map_eval.c reads. */
+/** Data of a map: plant_map.c and plant_map_beyond.c build them, plant_map_eval.c evaluates them. */
 #include <stddef.h>
 
 #include "plant_map.h"
@@ -9,15 +9,15 @@
 /* Grid lines that are added beyond each edge (PL-2). */
 #define MAP_BEYOND 3
 
-/* Powers of the two local coordinates t (i_d) and u (i_q): psi = sum c[i][j] t^i u^j. */
+/* Polynomial in the local coordinates t (along i_d) and u (along i_q): psi = sum c[i][j] t^i u^j. */
 typedef struct {
-    double c[4][4][2]; /* [2]: psi_d, psi_q */
+    double c[4][4][2]; /* last index: psi_d, psi_q */
 } map_cell_t;
 
 typedef struct {
-    double *node; /* n strictly increasing currents: MAP_BEYOND, those given, MAP_BEYOND */
+    double *node; /* n strictly increasing currents: MAP_BEYOND added, the given ones, MAP_BEYOND added */
     int n;
-    double first, last, per_step; /* of those given; (count - 1)/span: where the search begins */
+    double first, last, per_step; /* of the given nodes; per_step: (count - 1)/span, for the first guess of a cell */
 } map_axis_t;
 
 struct plant_map {
@@ -42,7 +42,7 @@ typedef struct {
     int d0, d1, q0, q1;
 } map_block_t;
 
-/* The least incremental inductances and det J over their product in a block; NaN when any is. */
+/* Smallest incremental inductances of a block, and smallest ratio of det J to their product; NaN if any is NaN. */
 typedef struct {
     double d, q, det;
 } map_margin_t;
@@ -53,13 +53,15 @@ double plant_map_slope(const double *x, const double *f, int stride, int n, int 
 
 void plant_map_fill_cells(plant_map_t *map, map_nodes_t *nodes, map_block_t block);
 
-/* At the nodes and at three points between: a cubic that dips between good nodes is found. */
+/* Evaluated at the nodes and at three points between neighbours: between two nodes with positive slopes a cubic may
+ * fall. */
 map_margin_t plant_map_margin(const plant_map_t *map, map_block_t block);
 
 /* Flux and its derivatives (as plant_map_flux()) at t, u of cell (i, j). */
 void plant_map_cell_flux(const plant_map_t *map, int i, int j, double t, double u, double psi[2], double jac[4]);
 
-/* Nodes and cells beyond the four edges; least: of the inside. 0 when they cannot be inverted. */
-int plant_map_go_beyond(plant_map_t *map, map_nodes_t *nodes, map_margin_t least);
+/* Adds nodes and cells beyond the four edges; least: margins of the inside. 0: no extrapolation keeps the required
+ * share of them. */
+int plant_map_extrapolate(plant_map_t *map, map_nodes_t *nodes, map_margin_t least);
 
 #endif

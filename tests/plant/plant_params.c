@@ -17,8 +17,8 @@ void plant_params_default(plant_params_t *params)
     params->precharge_s = 0.02; /* assumed: charged to 95 % in 60 ms, discharged to 5 % in 0.3 s */
     params->discharge_s = 0.1;
     params->avalanche_V = 1e6;        /* none */
-    params->short_circuit_A = 2000.0; /* assumed, with the next: a module's transistors limit the current, */
-    params->desaturation_s = 3e-6;    /* which they withstand for some microseconds */
+    params->short_circuit_A = 2000.0; /* assumed: the transistors of a module limit their current */
+    params->desaturation_s = 3e-6;    /* assumed: they withstand it for some microseconds */
     params->substeps = 10;
     params->adc_bits = 12;
     for (int x = 0; x < 3; x++) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_PLANT_PARAMS_H
 #define PLANT_PLANT_PARAMS_H
-/** Every number that describes the simulated drive. All may change at run time, between periods.
+/** The parameters of the simulated drive. All but those taken at creation may change between periods.
  * Source   docs/theory/plant.md
  * Units    SI; angles in radians, electrical where the comment says so; temperatures in degrees C
  * Errors   plant_params_bad_field() names what plant_create() refuses; later changes go unchecked
@@ -22,8 +22,8 @@ typedef struct {
     double vdc_V, vdc_ripple_V, vdc_ripple_hz; /* of the battery */
     double pwm_hz, dead_time_s, device_drop_V;
     double vdc_start_V;              /* of the dc link's capacitor, taken at creation */
-    double dc_link_F;                /* 0: the bridge is always at the battery, whatever the switches do */
-    double precharge_s, discharge_s; /* time constants of the capacitor with its resistors */
+    double dc_link_F;                /* 0: no capacitor, the bridge is always connected to the battery */
+    double precharge_s, discharge_s; /* time constants of the capacitor with the resistor of each */
     double avalanche_V;              /* switches and diodes of the bridge conduct above it */
     int precharge_open, discharge_open, contactor_open; /* the switch does not close */
     int substeps;                                       /* per PWM period, at least 10 */
@@ -31,10 +31,10 @@ typedef struct {
     int phase_open[3];                                  /* the motor lead is broken */
     /* switches: upper a, b, c, lower a, b, c */
     int switch_open[6];     /* never switched on; its diode remains */
-    int switch_shorted[6];  /* conducts always, both ways */
-    double short_circuit_A; /* what a switch conducts that is switched on against a shorted one */
-    double desaturation_s;  /* until the gate drivers block and report it */
-    int desaturation_open;  /* they do neither */
+    int switch_shorted[6];  /* always conducts, in both directions */
+    double short_circuit_A; /* current of a leg with one switch shorted and the other switched on */
+    double desaturation_s;  /* time until the gate drivers block and report this current */
+    int desaturation_open;  /* the gate drivers neither block nor report it */
     /* sensors */
     double current_full_scale_A; /* the converter spans -full scale ... +full scale */
     int adc_bits;
@@ -45,24 +45,24 @@ typedef struct {
     double vdc_full_scale_V, vdc_gain;
     int vdc_quantise;
     double angle_offset_rad;             /* electrical */
-    double angle_h1_rad, angle_h1_phase; /* electrical amplitude, per turn of the resolver */
-    double angle_h2_rad, angle_h2_phase; /* the same, twice per turn of the resolver */
+    double angle_h1_rad, angle_h1_phase; /* electrical amplitude, once per turn of the resolver */
+    double angle_h2_rad, angle_h2_phase; /* the same, second harmonic */
     double resolver_pole_pairs;          /* resolver turns per mechanical turn */
     int angle_bits;                      /* of a mechanical turn; 0: not quantised */
     double angle_delay_s;
     int angle_stuck;
-    int angle_spike_every, angle_spike_samples; /* the first so many of every so many samples are off; 0: none */
-    double angle_spike_rad;                     /* electrical, by so much */
+    int angle_spike_every, angle_spike_samples; /* of every angle_spike_every samples, the first are wrong; 0: none */
+    double angle_spike_rad;                     /* electrical: error of these samples */
     /* mechanics */
     int imposed_speed;
-    double speed_rad_s;                        /* mechanical: imposed, or the initial one */
+    double speed_rad_s;                        /* mechanical: the imposed speed, or the initial one */
     double theta_m_rad;                        /* initial rotor angle */
     double inertia_kgm2, load_Nm, viscous_Nms; /* load_Nm > 0 brakes a positive speed */
     uint64_t seed;                             /* taken at creation */
 } plant_params_t;
 
 /** Neutral values: unit gains and scales, no imperfection, 10 substeps, speed imposed 0, 20 C.
- * Machine, inverter and sensor ranges stay 0 and must be given: plant_create() refuses them. */
+ * Data of machine and inverter and the sensor ranges are 0; plant_create() refuses parameters without them. */
 void plant_params_default(plant_params_t *params);
 
 /** NULL when plant_create() would accept the parameters, else the name of the first bad field. */

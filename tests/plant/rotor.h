@@ -1,30 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PLANT_ROTOR_H
 #define PLANT_ROTOR_H
-/** Rotations between the stationary and the rotor frame; an angle is carried as (cos, sin).
+/** Rotations between the stationary and the rotor frame; an angle is represented by its cosine and sine.
  *   x_s = e^{j theta} x_dq
  * Source   docs/theory/plant.md (PL-9)
- * Rounding turn_of() within 1e-16 of libm up to 0.3 rad, libm above
+ * Rounding rotation_of() within 1e-16 of libm up to 0.3 rad, libm above
  * Context  simulation only */
 #include <math.h>
 
 typedef struct {
     double c, s;
-} turn_t;
+} rotation_t;
 
-static inline turn_t turn_of(double angle)
+static inline rotation_t rotation_of(double angle)
 {
     if (fabs(angle) > 0.3) {
-        return (turn_t){cos(angle), sin(angle)};
+        return (rotation_t){cos(angle), sin(angle)};
     }
     const double x = angle * angle; /* Taylor to x^6: the next term is below 3e-17 */
     const double c = x * (1.0 / 56.0) * (1.0 - x * (1.0 / 90.0) * (1.0 - x * (1.0 / 132.0)));
     const double s = x * (1.0 / 42.0) * (1.0 - x * (1.0 / 72.0) * (1.0 - x * (1.0 / 110.0)));
-    return (turn_t){1.0 - x * 0.5 * (1.0 - x * (1.0 / 12.0) * (1.0 - x * (1.0 / 30.0) * (1.0 - c))),
-                    angle * (1.0 - x * (1.0 / 6.0) * (1.0 - x * (1.0 / 20.0) * (1.0 - s)))};
+    return (rotation_t){1.0 - x * 0.5 * (1.0 - x * (1.0 / 12.0) * (1.0 - x * (1.0 / 30.0) * (1.0 - c))),
+                        angle * (1.0 - x * (1.0 / 6.0) * (1.0 - x * (1.0 / 20.0) * (1.0 - s)))};
 }
 
-/* sin(angle)/angle: the mean of a vector that turns by +-angle, relative to its middle. */
+/* sin(angle)/angle: the length of the mean of a unit vector that rotates from -angle to +angle. */
 static inline double sinc_of(double angle)
 {
     if (fabs(angle) > 0.3) {
@@ -35,19 +35,19 @@ static inline double sinc_of(double angle)
     return 1.0 - x * (1.0 / 6.0) * (1.0 - x * (1.0 / 20.0) * (1.0 - s));
 }
 
-static inline turn_t turn_add(turn_t a, turn_t b)
+static inline rotation_t rotation_add(rotation_t a, rotation_t b)
 {
-    return (turn_t){a.c * b.c - a.s * b.s, a.s * b.c + a.c * b.s};
+    return (rotation_t){a.c * b.c - a.s * b.s, a.s * b.c + a.c * b.s};
 }
 
-static inline void to_stationary(turn_t t, const double dq[2], double ab[2])
+static inline void to_stationary(rotation_t t, const double dq[2], double ab[2])
 {
     const double d = dq[0], q = dq[1];
     ab[0] = t.c * d - t.s * q;
     ab[1] = t.s * d + t.c * q;
 }
 
-static inline void to_rotor(turn_t t, const double ab[2], double dq[2])
+static inline void to_rotor(rotation_t t, const double ab[2], double dq[2])
 {
     const double a = ab[0], b = ab[1];
     dq[0] = t.c * a + t.s * b;

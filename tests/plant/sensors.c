@@ -20,7 +20,7 @@ void sensors_create(sensors_t *s, const plant_params_t *p)
     for (int x = 0; x < 3; x++) {
         s->current_count[x] = (int32_t)1 << (p->adc_bits - 1);
     }
-    s->theta_m_rad = wrap_turn(p->theta_m_rad);
+    s->theta_m_rad = wrap_angle(p->theta_m_rad);
 }
 
 /* (PL-17): the top code is one step below the full scale, as in a converter. */
@@ -49,7 +49,7 @@ static void sample_vdc(const plant_params_t *p, double vdc_V, plant_sensors_t *o
     out->vdc_count = (int32_t)whole;
 }
 
-/* What disturbs single samples: the first of each sequence. */
+/* The error of the first samples of each sequence, 0 for the others. */
 static double angle_spike(sensors_t *s, const plant_params_t *p)
 {
     if (p->angle_spike_every == 0) {
@@ -65,15 +65,15 @@ static double angle_spike(sensors_t *s, const plant_params_t *p)
 static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth)
 {
     const double theta = truth->theta_m_rad - truth->speed_rad_s * p->angle_delay_s;
-    const double turn = p->resolver_pole_pairs * theta;
+    const double resolver_rad = p->resolver_pole_pairs * theta;
     double error = p->angle_offset_rad + angle_spike(s, p);
     if (p->angle_h1_rad != 0.0) {
-        error += p->angle_h1_rad * sin(turn + p->angle_h1_phase);
+        error += p->angle_h1_rad * sin(resolver_rad + p->angle_h1_phase);
     }
     if (p->angle_h2_rad != 0.0) {
-        error += p->angle_h2_rad * sin(2.0 * turn + p->angle_h2_phase);
+        error += p->angle_h2_rad * sin(2.0 * resolver_rad + p->angle_h2_phase);
     }
-    const double measured = wrap_turn(theta + error / p->pole_pairs);
+    const double measured = wrap_angle(theta + error / p->pole_pairs);
     if (p->angle_bits > 0) {
         const double codes = ldexp(1.0, p->angle_bits);
         const double whole = fmod(floor(measured / TWO_PI * codes + 0.5), codes);

@@ -5,7 +5,7 @@
  *   current: gain, offset, noise, saturation at the full scale, quantisation
  *   angle:   delay, offset, first and second harmonic per resolver turn, spikes, quantisation
  * Source   docs/theory/plant.md (PL-17) ... (PL-19)
- * Units    A, V, rad; counts as a converter with mid-scale zero gives them
+ * Units    A, V, rad; counts of a converter whose mid-scale is zero current
  * Rounding half up to the nearest code
  * Context  simulation only */
 #include "plant.h"
@@ -13,11 +13,11 @@
 
 typedef struct {
     random_t rng;
-    double current_A[3]; /* last delivered, for a stuck sensor */
+    double current_A[3]; /* last output, repeated by a stuck sensor */
     int32_t current_count[3];
     double theta_m_rad;
     int32_t theta_count;
-    int spike_sample; /* in its sequence of angle_spike_every */
+    int spike_sample; /* index of the next sample in a sequence of angle_spike_every */
 } sensors_t;
 
 void sensors_create(sensors_t *s, const plant_params_t *p);

@@ -11,11 +11,11 @@ void tearDown(void)
 {
 }
 
-/* A few roundings of a number of size 1 on each side. */
-void test_a_turn_is_cosine_and_sine_of_its_angle(void)
+/* Tolerance: a few roundings of numbers around 1. */
+void test_a_rotation_is_cosine_and_sine_of_its_angle(void)
 {
     for (double a = -0.5; a <= 0.5; a += 0.00013) {
-        const turn_t t = turn_of(a);
+        const rotation_t t = rotation_of(a);
         TEST_ASSERT_DOUBLE_WITHIN(3e-16, cos(a), t.c);
         TEST_ASSERT_DOUBLE_WITHIN(3e-16, sin(a), t.s);
     }
@@ -30,17 +30,17 @@ void test_sinc_is_one_at_zero_and_sine_over_angle_elsewhere(void)
     }
 }
 
-void test_turns_add_like_angles(void)
+void test_rotations_add_like_angles(void)
 {
-    const turn_t t = turn_add(turn_of(2.0), turn_of(-0.2));
+    const rotation_t t = rotation_add(rotation_of(2.0), rotation_of(-0.2));
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, cos(1.8), t.c);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, sin(1.8), t.s);
 }
 
-/* d = 3 at 90 degrees is the beta axis, q = 2 there the negative alpha axis. */
-void test_rotor_and_stationary_frame_are_turned_by_the_angle(void)
+/* At 90 degrees d = 3 lies along beta and q = 2 along negative alpha. */
+void test_rotor_and_stationary_frame_differ_by_the_angle(void)
 {
-    const turn_t quarter = {0.0, 1.0};
+    const rotation_t quarter = {0.0, 1.0};
     const double dq[2] = {3.0, 2.0};
     double ab[2], back[2];
     to_stationary(quarter, dq, ab);
@@ -51,7 +51,7 @@ void test_rotor_and_stationary_frame_are_turned_by_the_angle(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2.0, back[1]);
 }
 
-/* Amplitude-invariant, alpha along phase a; a zero sequence does not show. */
+/* Amplitude-invariant, alpha along phase a; a zero sequence has no effect. */
 void test_phases_are_the_projections_of_the_vector(void)
 {
     const double third = 2.0943951023931953, ab[2] = {5.0 * cos(0.7), 5.0 * sin(0.7)};
