@@ -28,7 +28,7 @@ void poly_flux(double id, double iq, double psi[2])
     psi[1] = POLY_B * iq - 2.0 * POLY_X * id * iq;
 }
 
-/* i . psi - W' */
+/* Field energy: i . psi - W' */
 double poly_field_energy(double id, double iq)
 {
     double psi[2];
@@ -53,7 +53,7 @@ plant_map_t *poly_map(void)
     return plant_map_create(id, 13, iq, 21, &psi_d[0][0], &psi_q[0][0]);
 }
 
-/* 26 x 51 nodes, 10 A apart; even psi_d and odd psi_q, as the tools make it. */
+/* 26 x 51 nodes, 10 A apart; psi_d is made even and psi_q odd in i_q, as the tools do. */
 plant_map_t *hsm1_map(void)
 {
     static double psi_d[26][51], psi_q[26][51], d[26][51], q[26][51];
@@ -94,8 +94,8 @@ void bench_drive(plant_t *plant, double complex u_dq)
 {
     const plant_params_t *p = plant_params(plant);
     const plant_truth_t *t = plant_truth(plant);
-    const double turn = t->theta_e_rad + 0.5 * p->pole_pairs * t->speed_rad_s / p->pwm_hz;
+    const double middle_rad = t->theta_e_rad + 0.5 * p->pole_pairs * t->speed_rad_s / p->pwm_hz;
     double duty[3];
-    bench_duty(u_dq * cexp(I * turn), p->vdc_V, duty);
+    bench_duty(u_dq * cexp(I * middle_rad), p->vdc_V, duty);
     plant_advance(plant, duty, 1);
 }

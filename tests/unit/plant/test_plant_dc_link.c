@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The capacitor between battery and bridge against closed forms, and what a bridge without supply does to it. */
+/* The capacitor between battery and bridge against closed forms, and the gates without their supply. */
 #include "plant_bench.h"
 
 #include <math.h>
@@ -53,7 +53,7 @@ void test_precharge_is_an_exponential(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.02, V_BAT, t->vdc_V);
 }
 
-void test_discharge_is_an_exponential_down_to_the_least(void)
+void test_discharge_is_an_exponential_down_to_the_lowest_voltage(void)
 {
     p.vdc_start_V = V_BAT;
     const plant_truth_t *t = start((plant_switches_t){.discharge = 1});
@@ -63,7 +63,7 @@ void test_discharge_is_an_exponential_down_to_the_least(void)
     TEST_ASSERT_EQUAL_DOUBLE(1.0, t->vdc_V);
 }
 
-/* Both resistors at once: v -> V tau_dis/(tau_pre + tau_dis), with 1/tau = 1/tau_pre + 1/tau_dis. */
+/* Both resistors at the same time: v -> V tau_dis/(tau_pre + tau_dis), with 1/tau = 1/tau_pre + 1/tau_dis. */
 void test_precharge_and_discharge_together_are_a_divider(void)
 {
     const plant_truth_t *t = start((plant_switches_t){.precharge = 1, .discharge = 1});
@@ -71,7 +71,7 @@ void test_precharge_and_discharge_together_are_a_divider(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, V_BAT * 0.1 / 0.12, t->vdc_V);
 }
 
-void test_the_contactor_ties_the_link_to_the_battery_unless_it_does_not_close(void)
+void test_the_contactor_connects_the_link_to_the_battery_unless_it_fails_to_close(void)
 {
     const plant_truth_t *t = start((plant_switches_t){.contactor = 1});
     run(1e-4, 0);
@@ -79,7 +79,7 @@ void test_the_contactor_ties_the_link_to_the_battery_unless_it_does_not_close(vo
     plant_switch(plant, &(plant_switches_t){0});
     plant_params(plant)->vdc_V = 100.0;
     run(0.1, 0);
-    TEST_ASSERT_EQUAL_DOUBLE(V_BAT, t->vdc_V); /* kept by the capacitor */
+    TEST_ASSERT_EQUAL_DOUBLE(V_BAT, t->vdc_V); /* the capacitor keeps its voltage */
     plant_params(plant)->contactor_open = 1;
     plant_switch(plant, &(plant_switches_t){.contactor = 1});
     run(0.1, 0);
@@ -98,7 +98,7 @@ void test_resistors_whose_switch_does_not_close_do_nothing(void)
     TEST_ASSERT_EQUAL_DOUBLE(123.0, t->vdc_V);
 }
 
-void test_without_a_capacitor_the_bridge_is_at_the_battery_whatever_the_switches_do(void)
+void test_without_a_capacitor_the_bridge_is_always_connected_to_the_battery(void)
 {
     p.dc_link_F = 0.0;
     const plant_truth_t *t = start((plant_switches_t){0});
@@ -106,7 +106,7 @@ void test_without_a_capacitor_the_bridge_is_at_the_battery_whatever_the_switches
     TEST_ASSERT_EQUAL_DOUBLE(V_BAT, t->vdc_V);
 }
 
-/* 1 A for 10 ms out of 500 uF is 20 V. */
+/* 1 A for 10 ms changes the voltage of 500 uF by 20 V. */
 void test_the_bridge_current_charges_and_discharges_the_capacitor(void)
 {
     const plant_switches_t none = {0};
@@ -116,9 +116,10 @@ void test_the_bridge_current_charges_and_discharges_the_capacitor(void)
     TEST_ASSERT_EQUAL_DOUBLE(0.0, avalanche_J);
 }
 
-/* At rest with i_d = 200 A: 3/4 L I^2 = 6 J go through the diodes into the capacitor, less what the copper takes. The
- * legs see the voltage at the start of a substep, half a step of 0.2 V too low: 0.03 % of the energy, 0.01 V. */
-void test_the_energy_of_the_windings_ends_in_the_capacitor(void)
+/* At standstill with i_d = 200 A the energy of 3/4 L I^2 = 6 J flows through the diodes into the capacitor, minus the
+ * copper loss. The legs use the voltage at the start of a substep, on average half a step of 0.2 V too low: 0.03 % of
+ * the energy, 0.01 V. */
+void test_the_energy_of_the_windings_charges_the_capacitor(void)
 {
     p.vdc_start_V = V_BAT;
     p.substeps = 200;
@@ -130,7 +131,7 @@ void test_the_energy_of_the_windings_ends_in_the_capacitor(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, t->i_d_A);
 }
 
-void test_above_the_avalanche_voltage_the_semiconductors_take_the_energy(void)
+void test_above_the_avalanche_voltage_the_semiconductors_dissipate_the_energy(void)
 {
     p.vdc_start_V = V_BAT;
     p.avalanche_V = 360.0;
@@ -143,8 +144,8 @@ void test_above_the_avalanche_voltage_the_semiconductors_take_the_energy(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.003, 6.0 - t->e_copper_J - stored_J, t->e_avalanche_J);
 }
 
-/* sqrt(3) w psi: charged through the diodes up to the peak of the line voltage. A capacitor so large that the windings
- * do not ring above it; below the peak charging slows down, hence from one side. */
+/* The diodes charge the capacitor up to the peak of the line voltage, sqrt(3) w psi_f. It is so large that the
+ * inductance of the windings does not charge it above the peak; it approaches the peak slowly from below. */
 void test_a_turning_machine_charges_the_link_to_its_line_voltage(void)
 {
     p.dc_link_F = 5e-3;
@@ -157,8 +158,8 @@ void test_a_turning_machine_charges_the_link_to_its_line_voltage(void)
     TEST_ASSERT_TRUE(t->e_dc_J < 0.0);
 }
 
-/* Commanded to hold the windings shorted: with supply no current reaches the link, without it the diodes rectify as if
- * nothing had been commanded. */
+/* The duties short-circuit the windings: with gate supply no current reaches the link; without it the diodes rectify as
+ * with switching disabled. */
 void test_gates_without_supply_do_not_switch(void)
 {
     static const double short_circuit[3] = {0.0, 0.0, 0.0};

@@ -8,7 +8,8 @@
 static plant_params_t p;
 static plant_t *plant;
 
-/* 400 V, 10 kHz, 2 us: a leg loses 8 V. Inductive, so that the current is a clean sine. */
+/* At 400 V and 10 kHz a dead time of 2 us reduces a leg's voltage by 8 V. The inductance makes the current
+ * sinusoidal. */
 void setUp(void)
 {
     p = bench_params();
@@ -31,7 +32,7 @@ static const plant_truth_t *start(void)
     return plant_truth(plant);
 }
 
-/* Locked rotor at angle 0: i_d = i_a, and legs b and c share the return. */
+/* Locked rotor at angle 0: i_d = i_a, and half of it returns through each of legs b and c. */
 static const plant_truth_t *one_period(double id, double a, double b, double c)
 {
     const double duty[3] = {a, b, c};
@@ -41,17 +42,16 @@ static const plant_truth_t *one_period(double id, double a, double b, double c)
     return t;
 }
 
-/* Three square waves of 8 V, no zero sequence: fundamental 4/pi x 8 V along the current. The
- * current is no perfect sine: the 5th and 7th harmonic of the loss, 2.0 and 1.5 V, are 0.4 % and
- * 0.2 % of it and move its zero crossings, hence the loss's phase, by up to 0.015 rad: 0.15 V
- * across the current. */
-void test_dead_time_costs_four_over_pi_of_the_leg_loss_along_the_current(void)
+/* The loss is three square waves of 8 V; their fundamental is 4/pi x 8 V along the current. The 5th and 7th harmonic of
+ * the loss, 2.0 and 1.5 V, make harmonics of 0.4 % and 0.2 % of the current. They shift its zero crossings, and with
+ * them the phase of the loss, by up to 0.015 rad: 0.15 V perpendicular to the current. */
+void test_the_fundamental_of_the_dead_time_loss_is_four_over_pi_of_the_leg_loss_along_the_current(void)
 {
     p.dead_time_s = 2e-6;
     p.speed_rad_s = TWO_PI * 50.0 / 3.0;
     const plant_truth_t *t = start();
     double complex u = 0.0, i = 0.0;
-    for (int k = 0; k < 4200; k++) { /* 20 turns to settle, one to measure */
+    for (int k = 0; k < 4200; k++) { /* 20 electrical turns to settle, one to measure */
         bench_drive(plant, 100.0 * I);
         if (k >= 4000) {
             u += (t->u_d_V + I * t->u_q_V) / 200.0;
@@ -74,9 +74,8 @@ void test_an_ideal_inverter_loses_nothing(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.0, t->inverter_W);
 }
 
-/* i_a > 0: leg a 8 V down, b and c 8 V up: u_d changes by -2/3 (8 + 8) V; and the other way round.
- */
-void test_every_leg_errs_against_its_current(void)
+/* i_a > 0: leg a loses 8 V, b and c gain 8 V: u_d changes by -2/3 (8 + 8) V. With i_a < 0 the sign is opposite. */
+void test_the_voltage_error_of_every_leg_opposes_its_current(void)
 {
     p.dead_time_s = 2e-6;
     const plant_truth_t *t = one_period(50.0, 0.5, 0.5, 0.5);
@@ -86,7 +85,7 @@ void test_every_leg_errs_against_its_current(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 32.0 / 3.0, t->u_d_V);
 }
 
-/* Legs at 0 or 1 do not switch: leg a alone errs, +-8 V, u_d +-16/3 V. */
+/* Legs at 0 or 1 do not switch. If leg a alone switches, its error of 8 V changes u_d by 16/3 V. */
 void test_a_leg_that_does_not_switch_has_no_dead_time(void)
 {
     p.dead_time_s = 2e-6;
@@ -100,8 +99,8 @@ void test_a_leg_that_does_not_switch_has_no_dead_time(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 400.0 / 3.0 + 16.0 / 3.0, t->u_d_V);
 }
 
-/* 0.5 us of pulse, 2 us of dead time. Current out of the leg: the pulse is gone, no more than that.
- * Current into the leg: the lower switch is off for 2.5 us. Mirrored at the upper end. */
+/* A pulse of 0.5 us and a dead time of 2 us. With current out of the leg exactly the pulse is lost. With current into
+ * the leg the lower switch is off for 2.5 us. The same holds, mirrored, for a duty near 1. */
 void test_a_pulse_shorter_than_the_dead_time_vanishes(void)
 {
     const double d = 0.005, per_leg = 800.0 / 3.0;
@@ -111,7 +110,7 @@ void test_a_pulse_shorter_than_the_dead_time_vanishes(void)
     plant_destroy(plant);
     t = one_period(-50.0, d, 0.0, 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, per_leg * (d + 0.02), t->u_d_V);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.0, t->inverter_W); /* no drop, nothing burnt */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.0, t->inverter_W); /* without a device drop there is no loss */
     plant_destroy(plant);
     t = one_period(-50.0, 1.0 - d, 0.0, 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, per_leg, t->u_d_V);
@@ -121,9 +120,9 @@ void test_a_pulse_shorter_than_the_dead_time_vanishes(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.0, t->inverter_W);
 }
 
-/* 1.5 V against each current, also in legs that do not switch: -2/3 (1.5 + 1.5) V; the heat is
- * 1.5 V x (60 + 30 + 30) A, less the 0.06 % that the current falls in the period. */
-void test_the_devices_drop_their_voltage_and_burn_it(void)
+/* 1.5 V against each current, also in legs that do not switch: -2/3 (1.5 + 1.5) V. The loss is 1.5 V x (60 + 30 + 30)
+ * A, while the current falls by 0.07 % in the period. */
+void test_the_device_drop_opposes_the_current_and_its_power_is_the_inverters_loss(void)
 {
     p.device_drop_V = 1.5;
     p.r_ohm_20 = 0.0;
@@ -133,9 +132,9 @@ void test_the_devices_drop_their_voltage_and_burn_it(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, t->idc_A);
 }
 
-/* Inside +-0.05 A the loss is proportional: 0.025 A gives -4 V in leg a, +2 V in b and c each. The
- * 50 H keep the current where it is. */
-void test_the_loss_passes_through_zero_in_proportion_to_a_tiny_current(void)
+/* Within +-0.05 A the loss is proportional to the current: with 0.025 A leg a loses 4 V, b and c gain 2 V each. 50 H
+ * keep the current constant. */
+void test_the_loss_is_proportional_to_a_small_current(void)
 {
     p.dead_time_s = 2e-6;
     p.ld_H = p.lq_H = 50.0;
@@ -143,7 +142,7 @@ void test_the_loss_passes_through_zero_in_proportion_to_a_tiny_current(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01, -4.0, t->u_d_V);
 }
 
-/* 3 V asked for, up to 10.7 V in the way: the current hangs at zero, without chattering. */
+/* 3 V are applied and the dead time opposes up to 10.7 V: the current stays near zero without oscillating. */
 void test_the_dead_time_holds_a_small_current_at_zero(void)
 {
     p.dead_time_s = 2e-6;
@@ -158,8 +157,8 @@ void test_the_dead_time_holds_a_small_current_at_zero(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, before, t->i_d_A);
 }
 
-/* What leaves the dc link arrives at the terminals when there is no drop: dead time is lossless. */
-void test_dead_time_moves_voltage_but_burns_nothing(void)
+/* Without a device drop the dc power is the power at the terminals. */
+void test_dead_time_changes_the_voltage_but_dissipates_nothing(void)
 {
     p.dead_time_s = 3e-6;
     p.psi_f_Vs = 0.1;
@@ -173,7 +172,7 @@ void test_dead_time_moves_voltage_but_burns_nothing(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, t->electrical_W, t->idc_A * 400.0);
 }
 
-void test_duties_beyond_their_range_are_held_and_a_nan_is_a_half(void)
+void test_duties_beyond_their_range_are_limited_and_nan_counts_as_one_half(void)
 {
     p.r_ohm_20 = 0.0;
     const plant_truth_t *t = one_period(0.0, 1.7, -3.0, -(double)INFINITY);
@@ -183,9 +182,8 @@ void test_duties_beyond_their_range_are_held_and_a_nan_is_a_half(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 400.0 / 3.0, t->u_d_V);
 }
 
-/* 20 V of ripple at 300 Hz: the quarter wave is at 1/1200 s = 25/3 periods of 10 kHz. What acts in
- * a period is the middle's voltage, what is sampled the start's. */
-void test_dc_ripple_is_seen_at_the_start_and_acts_in_the_middle_of_a_period(void)
+/* 20 V of ripple at 300 Hz. The value at the start of a period is sampled; the value in its middle acts. */
+void test_dc_ripple_is_sampled_at_the_start_of_a_period_and_acts_with_its_value_in_the_middle(void)
 {
     p.vdc_ripple_V = 20.0;
     p.vdc_ripple_hz = 300.0;
@@ -199,9 +197,9 @@ void test_dc_ripple_is_seen_at_the_start_and_acts_in_the_middle_of_a_period(void
     }
 }
 
-/* 9 V in phase a: leg a can lose 8 V, so b and c must each lose e with i_a = 2 x 0.05 A x e/8 V and
- * 9 V - 1 ohm x i_a = 2/3 (8 V + e): e = 5.399 V, i_a = 0.06749 A. */
-void test_a_leg_at_its_bound_and_two_within_theirs_share_the_voltage(void)
+/* 9 V along phase a: leg a is at its bound of 8 V, b and c are within theirs with an error e. By hand from
+ * i_a = 2 x 0.05 A x e/8 V and 9 V - 1 ohm x i_a = 2/3 (8 V + e): e = 5.399 V, i_a = 0.06749 A. */
+void test_one_leg_at_its_error_bound_and_two_within_theirs_match_the_closed_form(void)
 {
     p.dead_time_s = 2e-6;
     p.ld_H = p.lq_H = 0.2e-3;

@@ -29,14 +29,14 @@ static const plant_truth_t *start(const plant_map_t *with)
     return plant_truth(plant);
 }
 
-/* What the truth shows after a change of parameters, with no time gone by. */
+/* Applies changed parameters and updates the truth without advancing time. */
 static void sample(void)
 {
     plant_sensors_t unused;
     plant_sample(plant, &unused);
 }
 
-/* Every scale at once, each term of the polynomial taken apart by hand:
+/* All scales at once; each term of the polynomial belongs to one of them:
  * psi_d = F | -X i_q^2 (cross) | A i_d - C i_d^2 (slope); psi_q = B i_q - 2 X i_d i_q (q). */
 void test_each_perturbation_scales_its_own_part_of_the_flux(void)
 {
@@ -56,9 +56,8 @@ void test_each_perturbation_scales_its_own_part_of_the_flux(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.85 * POLY_F, t->psi_f_Vs);
 }
 
-/* The incremental inductances must carry the scales too, or the currents would not be found:
- * twenty periods of +-100 V from 60 A, the flux recomputed by hand from the currents that came out.
- */
+/* The incremental inductances must be scaled as well, or the currents would not be found: twenty periods of +-100 V
+ * from 60 A; the expected flux is computed here from the resulting currents. */
 void test_perturbed_currents_are_those_of_the_perturbed_flux(void)
 {
     p.magnet_scale = 0.9;
@@ -77,7 +76,7 @@ void test_perturbed_currents_are_those_of_the_perturbed_flux(void)
     TEST_ASSERT_EQUAL(0, t->inversion_failures);
 }
 
-/* At constant flux linkage any change of the flux functions must show in the currents at once. */
+/* At constant flux linkage any change of the flux functions must change the currents immediately. */
 void test_each_scale_acts_when_it_alone_changes_at_run_time(void)
 {
     double *scale[4];
@@ -102,14 +101,14 @@ void test_constants_obey_the_same_scales(void)
     p.magnet_scale = 0.9;
     p.ld_slope_scale = 1.3;
     p.lq_scale = 0.8;
-    p.cross_saturation_scale = 5.0; /* there is none to scale */
+    p.cross_saturation_scale = 5.0; /* constants have no cross saturation */
     const plant_truth_t *t = start(NULL);
     plant_set_state(plant, -50.0, 70.0, 0.0, 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.9 * 0.084 - 1.3 * 0.2e-3 * 50.0, t->psi_d_Vs);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.8 * 0.5e-3 * 70.0, t->psi_q_Vs);
 }
 
-/* At constant flux: i_d = -0.2 mH x 50 A/L_d', and +10 % of the magnet takes 42 A off. */
+/* At constant flux: i_d = -0.2 mH x 50 A/L_d', and a magnet 10 % stronger reduces i_d by 42 A. */
 void test_each_constant_acts_when_it_alone_changes_at_run_time(void)
 {
     const plant_truth_t *t = start(NULL);
@@ -137,8 +136,8 @@ void test_a_warm_rotor_weakens_the_magnet(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.9 * POLY_F, t->psi_f_Vs);
 }
 
-/* 0.84 mVs less of magnet at constant flux linkage is 4.2 A more in the d axis at 0.2 mH. */
-void test_a_magnet_step_leaves_the_flux_linkage_and_moves_the_current(void)
+/* A magnet weaker by 0.84 mVs increases i_d by 4.2 A at constant flux linkage and 0.2 mH. */
+void test_a_magnet_step_keeps_the_flux_linkage_and_changes_the_current(void)
 {
     const plant_truth_t *t = start(NULL);
     plant_set_state(plant, -30.0, 60.0, 0.5, 100.0);
@@ -151,7 +150,7 @@ void test_a_magnet_step_leaves_the_flux_linkage_and_moves_the_current(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 60.0, t->i_q_A);
 }
 
-void test_a_magnet_step_may_be_told_to_leave_the_current_instead(void)
+void test_a_magnet_step_keeps_the_current_if_so_configured(void)
 {
     p.magnet_step_keeps_current = 1;
     const plant_truth_t *t = start(map);
@@ -162,16 +161,15 @@ void test_a_magnet_step_may_be_told_to_leave_the_current_instead(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, -30.0, t->i_d_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 60.0, t->i_q_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, psi_d - 0.2 * POLY_F, t->psi_d_Vs);
-    /* the stationary-frame state has followed: a period of the steady voltage changes nothing */
+    /* the flux in the stationary frame has changed too: a period with the steady voltage changes nothing */
     bench_drive(plant, p.r_ohm_20 * (-30.0 + 60.0 * I));
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, -30.0, t->i_d_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 60.0, t->i_q_A);
 }
 
-/* Weakened by 15 % in 1000 periods: each step of 1.5e-4 psi_f induces in the
- * shorted winding what a slow change induces: the current follows L di/dt + R i = -dpsi_f/dt. At
- * standstill that is i_d = (rate/R) (1 - e^(-R t/L)), rate = 0.15 x 0.084 Vs / 0.1 s = 0.126 V;
- * the staircase lags the ramp by half a period: 0.126 V x 50 us / 0.2 mH = 0.03 A. */
+/* The magnet is weakened by 15 % in 1000 periods. In the shorted winding each small step has the effect of a slow
+ * change: L di/dt + R i = -dpsi_f/dt. At standstill i_d = (rate/R) (1 - e^(-R t/L)), rate = 0.15 x 0.084 Vs / 0.1 s
+ * = 0.126 V. The steps differ from the ramp by half a period: 0.126 V x 50 us / 0.2 mH = 0.03 A. */
 void test_a_magnet_ramp_induces_its_voltage_in_a_shorted_winding(void)
 {
     const plant_truth_t *t = start(NULL);

@@ -18,8 +18,8 @@ void tearDown(void)
     plant_map_destroy(map);
 }
 
-/* A parabola's slopes at the nodes are exact, so a cubic through them is the parabola; the values
- * are below 1 Vs: 1e-14 is a few roundings. */
+/* The slopes of a parabola are exact at the nodes, so that the interpolating cubic is this parabola. The fluxes are
+ * below 1 Vs: 1e-14 is a few roundings. */
 void test_quadratic_fluxes_are_reproduced_between_the_nodes(void)
 {
     for (double id = -250.0; id <= 50.0; id += 7.3) {
@@ -37,10 +37,10 @@ void test_quadratic_fluxes_are_reproduced_between_the_nodes(void)
     }
 }
 
-/* 1 A beyond, the own slopes have moved by (1 - s)(1 - 3 s) - 1 = -3.96 %, s = 1/(0.4 x 250), of
- * their distance from the far ones, here less than the edge's own, and the cross slopes by
- * 1 - 2/250^2: the tangent of the edge holds within 5 % x 0.2 mH x 1 A / 2 = 5 uVs. */
-void test_just_outside_the_grid_the_flux_runs_on_with_its_edge_slope(void)
+/* 1 A beyond the edge the own slope has changed by 3.96 % of its difference from the constant slope far outside
+ * ((1 - s)(1 - 3 s) - 1 with s = 1/(0.4 x 250)), and the cross slope by the factor 1 - 2/250^2. The tangent of the edge
+ * is therefore accurate within 5 % x 0.2 mH x 1 A / 2 = 5 uVs. */
+void test_just_outside_the_grid_the_flux_continues_with_the_slope_of_the_edge(void)
 {
     double d, q, psi[2];
     poly_flux(50.0, -120.0, psi);
@@ -53,10 +53,10 @@ void test_just_outside_the_grid_the_flux_runs_on_with_its_edge_slope(void)
     TEST_ASSERT_DOUBLE_WITHIN(5e-6, psi[1] - (POLY_B - 2.0 * POLY_X * -100.0), q);
 }
 
-/* The polynomial is symmetric, so all of its cross slope fades, within 250 A. The upper d edge ends
- * at the mean of its own slopes, A - 2 C x 50 A everywhere on it; psi_q has gained
- * integral (1 - 2 w^2 | 2 (1 - w)^2) = 125 A times the cross slope. */
-void test_far_outside_the_axes_are_decoupled_and_the_slopes_constant(void)
+/* The cross slopes of the polynomial are equal, so that they decrease to zero within 250 A. The own slope beyond the
+ * upper d edge tends to the mean over this edge, A - 2 C x 50 A. psi_q changes by 125 A, the integral of c(x) in
+ * (PL-2), times the cross slope. */
+void test_far_outside_the_grid_the_axes_are_decoupled_and_the_slopes_constant(void)
 {
     for (double iq = -250.0; iq <= 250.0; iq += 50.0) {
         double d, q, psi[2], jac[4];
@@ -70,8 +70,8 @@ void test_far_outside_the_axes_are_decoupled_and_the_slopes_constant(void)
     }
 }
 
-/* An uneven, non-polynomial map: values and slopes either side of every grid line agree, the edges
- * included. 1e-9 A away the smooth functions move by < 1e-12 Vs and their slopes by < 1e-12 H. */
+/* A map with uneven grid and no polynomial: values and slopes on both sides of every grid line are equal, edges
+ * included. Over 1e-9 A the functions themselves change by < 1e-12 Vs and their slopes by < 1e-12 H. */
 void test_value_and_slope_are_continuous_across_grid_lines_and_edges(void)
 {
     const double id[] = {-200.0, -120.0, -50.0, 0.0, 20.0}, iq[] = {-200.0, -60.0, 0.0, 90.0, 200.0};
@@ -103,8 +103,8 @@ void test_value_and_slope_are_continuous_across_grid_lines_and_edges(void)
     plant_map_destroy(uneven);
 }
 
-/* Central difference over 1 mA: truncation ~ f''' h^2 < 1e-12 H, rounding 1e-16/1e-3. The points
- * keep clear of the grid lines, where the second derivative jumps. */
+/* Central difference over 1 mA: truncation ~ f''' h^2 < 1e-12 H, rounding 1e-16/1e-3. The points are not near the grid
+ * lines, where the second derivative jumps. */
 static void check_jacobian(const plant_map_t *m)
 {
     const double h = 1e-3;
@@ -143,7 +143,7 @@ static void check_axis(const plant_map_t *m)
     }
 }
 
-void test_the_flux_on_the_q_axis_is_that_of_the_map(void)
+void test_the_flux_at_zero_i_d_is_that_of_the_map(void)
 {
     check_axis(map);
     plant_map_t *hsm1 = hsm1_map();
@@ -152,8 +152,8 @@ void test_the_flux_on_the_q_axis_is_that_of_the_map(void)
     plant_map_destroy(hsm1);
 }
 
-/* Residual 1e-10 Vs over the smallest incremental inductance, 0.1 mH: 1e-6 A, doubled for the
- * coupling. Starts: the origin and all four corners. */
+/* Tolerance: a residual of 1e-10 Vs divided by the smallest incremental inductance, 0.1 mH, is 1e-6 A; doubled because
+ * of the coupling. Start values: the origin and the four corners. */
 static void round_trip(const plant_map_t *m, double id_hi)
 {
     const double start[5][2] = {{0.0, 0.0}, {-250.0, -250.0}, {-250.0, 250.0}, {0.0, 250.0}, {0.0, -250.0}};
@@ -171,7 +171,7 @@ static void round_trip(const plant_map_t *m, double id_hi)
     }
 }
 
-void test_inversion_returns_every_current_of_the_plane_from_cold_starts(void)
+void test_inversion_returns_every_current_of_the_plane_from_distant_start_values(void)
 {
     round_trip(map, 80.0);
 }
@@ -184,21 +184,21 @@ void test_inversion_returns_every_current_of_the_measured_machine(void)
     plant_map_destroy(hsm1);
 }
 
-/* x . J x > 0 for every x: between two points of a plane the flux difference then has a component
- * along the current difference, so no two currents share a flux. The smallest eigenvalue of the
- * symmetric part is at least half of that inside. */
-static void check_rises(const plant_map_t *m, double id_lo, double id_hi)
+/* If x . J x > 0 for every x, the flux difference of two points has a positive component along their current
+ * difference, so that no two currents have the same flux. Outside the grid the smallest eigenvalue of the symmetric
+ * part of J must be at least half of that inside. */
+static void check_monotonic(const plant_map_t *m, double id_lo, double id_hi)
 {
     double inside = INFINITY, outside = INFINITY;
     for (double id = -750.0; id <= 750.0; id += 3.1) {
         for (double iq = -750.0; iq <= 750.0; iq += 2.9) {
             double d, q, jac[4];
             plant_map_flux(m, id, iq, &d, &q, jac);
-            const double least = 0.5 * (jac[0] + jac[3] - hypot(jac[0] - jac[3], jac[1] + jac[2]));
+            const double eigenvalue = 0.5 * (jac[0] + jac[3] - hypot(jac[0] - jac[3], jac[1] + jac[2]));
             if (id >= id_lo && id <= id_hi && fabs(iq) <= 250.0) {
-                inside = fmin(inside, least);
+                inside = fmin(inside, eigenvalue);
             } else {
-                outside = fmin(outside, least);
+                outside = fmin(outside, eigenvalue);
             }
         }
     }
@@ -206,17 +206,17 @@ static void check_rises(const plant_map_t *m, double id_lo, double id_hi)
     TEST_ASSERT_TRUE(outside > 0.5 * inside);
 }
 
-void test_the_flux_rises_along_every_direction_three_maps_out(void)
+void test_the_flux_increases_in_every_direction_up_to_three_times_the_map(void)
 {
-    check_rises(map, -250.0, 50.0);
+    check_monotonic(map, -250.0, 50.0);
     plant_map_t *hsm1 = hsm1_map();
     TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
-    check_rises(hsm1, -250.0, 0.0);
+    check_monotonic(hsm1, -250.0, 0.0);
     plant_map_destroy(hsm1);
 }
 
-/* From the origin and from the far corner opposite; tolerance as above. */
-void test_inversion_returns_every_current_three_maps_out(void)
+/* From the origin and from the opposite corner; tolerance as in round_trip(). */
+void test_inversion_returns_every_current_up_to_three_times_the_map(void)
 {
     plant_map_t *hsm1 = hsm1_map();
     TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
@@ -237,9 +237,9 @@ void test_inversion_returns_every_current_three_maps_out(void)
     plant_map_destroy(hsm1);
 }
 
-/* The gradient of a convex co-energy that saturates steeply along both diagonals: the tangents of
- * its edges, straight on, fold within 100 A. The smallest slope is some uH: 1e-10 Vs over it. */
-void test_a_map_that_bends_at_its_edge_does_not_fold_beyond_it(void)
+/* The gradient of a convex co-energy that saturates steeply along both diagonals. An extrapolation along the tangents
+ * of its edges would become ambiguous within 100 A. The smallest slope is some uH, hence the tolerance of 1e-4 A. */
+void test_a_map_that_saturates_steeply_at_its_edge_stays_invertible_beyond_it(void)
 {
     double x[9], d[9][9], q[9][9];
     for (int i = 0; i < 9; i++) {
@@ -247,9 +247,9 @@ void test_a_map_that_bends_at_its_edge_does_not_fold_beyond_it(void)
     }
     for (int i = 0; i < 9; i++) {
         for (int j = 0; j < 9; j++) {
-            const double sum = x[i] + x[j], less = x[i] - x[j];
-            d[i][j] = 0.08 * tanh(sum / 160.0) + 0.03 * tanh(less / 130.0) + 1e-5 * x[i];
-            q[i][j] = 0.08 * tanh(sum / 160.0) - 0.03 * tanh(less / 130.0) + 1e-5 * x[j];
+            const double sum = x[i] + x[j], difference = x[i] - x[j];
+            d[i][j] = 0.08 * tanh(sum / 160.0) + 0.03 * tanh(difference / 130.0) + 1e-5 * x[i];
+            q[i][j] = 0.08 * tanh(sum / 160.0) - 0.03 * tanh(difference / 130.0) + 1e-5 * x[j];
         }
     }
     plant_map_t *bent = plant_map_create(x, 9, x, 9, &d[0][0], &q[0][0]);
@@ -268,9 +268,9 @@ void test_a_map_that_bends_at_its_edge_does_not_fold_beyond_it(void)
     plant_map_destroy(bent);
 }
 
-/* Found, or said not to be; never something that is not a number. Above 1e5 Vs an ulp of the flux
- * is more than the tolerance. */
-void test_no_finite_flux_or_current_makes_a_not_a_number(void)
+/* The inversion finds the currents or reports a failure; it never returns NaN. It may fail above 1e5 Vs, where the
+ * spacing of double-precision numbers exceeds the tolerance. */
+void test_no_finite_flux_or_current_gives_nan(void)
 {
     plant_map_t *hsm1 = hsm1_map();
     TEST_ASSERT_NOT_NULL_MESSAGE(hsm1, "cannot read " HSM1_CSV);
@@ -291,7 +291,7 @@ void test_no_finite_flux_or_current_makes_a_not_a_number(void)
     plant_map_destroy(hsm1);
 }
 
-void test_inversion_says_so_when_no_current_gives_the_flux(void)
+void test_inversion_fails_if_no_current_gives_the_flux(void)
 {
     double id = 0.0, iq = 0.0;
     TEST_ASSERT_NOT_EQUAL(0, plant_map_invert(map, (double)NAN, 0.0, &id, &iq));
@@ -318,10 +318,10 @@ void test_bad_grids_are_refused(void)
     TEST_ASSERT_NULL(plant_map_create(x, 3, x, 3, d, hole));
     TEST_ASSERT_NULL(plant_map_create(x, 3, x, 3, d, back));
     TEST_ASSERT_NULL(plant_map_create(x, 3, x, 3, level, q));
-    TEST_ASSERT_NULL(plant_map_create(x, 3, x, 3, d, d)); /* psi_q follows i_d only */
+    TEST_ASSERT_NULL(plant_map_create(x, 3, x, 3, d, d)); /* psi_q depends on i_d only */
 }
 
-/* Both own inductances positive, yet 1 x 1 - 2 x 2 < 0: two currents would share one flux. */
+/* Both own inductances are positive, but det J = 1 x 1 - 2 x 2 < 0: two currents would have the same flux. */
 void test_a_map_whose_axes_are_coupled_more_than_one_to_one_is_refused(void)
 {
     const double x[] = {-1.0, 1.0};
@@ -329,9 +329,9 @@ void test_a_map_whose_axes_are_coupled_more_than_one_to_one_is_refused(void)
     TEST_ASSERT_NULL(plant_map_create(x, 2, x, 2, d, q));
 }
 
-/* Steep, flat, steep: the slopes at all four nodes are positive (1.495, 0.505, 0.505, 1.495), but
- * the cubic between the middle ones must fall. Along either axis. */
-void test_a_dip_between_good_nodes_is_found(void)
+/* The slopes at all four nodes are positive (1.495, 0.505, 0.505, 1.495), but the cubic between the middle nodes must
+ * fall, because their values are nearly equal. Along either axis. */
+void test_a_negative_slope_between_nodes_with_positive_slopes_is_found(void)
 {
     const double x[] = {0.0, 1.0, 2.0, 3.0}, dip[] = {0.0, 1.0, 1.01, 2.01};
     double along_d[16], along_q[16], even_d[16], even_q[16];

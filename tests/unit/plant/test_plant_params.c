@@ -41,7 +41,7 @@ void test_complete_parameters_are_accepted(void)
     plant_destroy(NULL);
 }
 
-void test_the_defaults_alone_are_no_drive(void)
+void test_the_defaults_alone_are_refused(void)
 {
     plant_params_default(&p);
     refused("pole_pairs");

@@ -35,7 +35,7 @@ static void sample_at(double id, double iq)
     plant_sample(plant, &seen);
 }
 
-void test_unquantised_sensors_show_the_phase_currents_themselves(void)
+void test_unquantised_sensors_give_the_phase_currents_themselves(void)
 {
     start();
     plant_set_state(plant, -70.0, 110.0, 0.2, 0.0);
@@ -44,7 +44,7 @@ void test_unquantised_sensors_show_the_phase_currents_themselves(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, t->i_abc_A[0], seen.ia_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, t->i_abc_A[1], seen.ib_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, t->i_abc_A[2], seen.ic_A);
-    /* phase b is the d axis seen from 120 degrees further on */
+    /* phase b: its axis is 120 degrees ahead of phase a */
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, -70.0 * cos(0.6 - TWO_PI / 3) - 110.0 * sin(0.6 - TWO_PI / 3), seen.ib_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 400.0, seen.vdc_V);
     TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.2, seen.theta_m_rad);
@@ -71,7 +71,7 @@ void test_quantised_currents_are_the_nearest_code(void)
     TEST_ASSERT_EQUAL(2047, seen.i_count[0]);
 }
 
-void test_currents_beyond_the_converter_stop_at_its_end_codes(void)
+void test_currents_beyond_the_converters_range_give_its_end_codes(void)
 {
     for (int quantise = 0; quantise < 2; quantise++) {
         p.current_quantise = quantise;
@@ -86,7 +86,7 @@ void test_currents_beyond_the_converter_stop_at_its_end_codes(void)
     plant = NULL;
 }
 
-void test_gain_and_offset_act_phase_by_phase(void)
+void test_gain_and_offset_act_on_each_phase_separately(void)
 {
     p.current_gain[0] = 1.01;
     p.current_gain[2] = 0.5;
@@ -98,7 +98,7 @@ void test_gain_and_offset_act_phase_by_phase(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, -25.0, seen.ic_A);
 }
 
-/* The generators' published first outputs. */
+/* First outputs that are published with the generators. */
 void test_the_random_bits_are_those_of_the_published_generators(void)
 {
     random_t rng = {.s = {1, 2, 3, 4}};
@@ -112,8 +112,8 @@ void test_the_random_bits_are_those_of_the_published_generators(void)
     TEST_ASSERT_EQUAL_UINT64(9817491932198370423u, rng.s[2]);
 }
 
-/* 300 000 deviates: the mean's sigma is 0.5/548 = 9e-4 A, the variance's relative sigma 0.26 %, the
- * fourth moment's 1.8 % (kurtosis 3), P(|x| > 2 sigma) = 4.55 +- 0.04 %: five sigmas each. */
+/* 300 000 deviates. Standard deviation of the mean: 0.5/548 = 9e-4 A; of the variance, relative: 0.26 %; of the fourth
+ * moment: 1.8 % (kurtosis 3); P(|x| > 2 sigma) = 4.55 +- 0.04 %. The tolerances are five standard deviations. */
 void test_noise_is_normal_with_the_stated_rms_and_white(void)
 {
     const int n = 100000;
@@ -167,7 +167,7 @@ void test_a_seed_repeats_a_run_bit_by_bit_and_another_does_not(void)
 }
 
 /* 0 ... 500 V in 4096 codes: 400 V is code 3276.8, read as 3277 x 500/4096 = 400.024 V */
-void test_the_dc_voltage_is_read_in_codes_and_ends_at_full_scale(void)
+void test_the_dc_voltage_is_quantised_and_limited_to_full_scale(void)
 {
     p.vdc_quantise = 1;
     start();
@@ -189,7 +189,7 @@ void test_the_dc_voltage_is_read_in_codes_and_ends_at_full_scale(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 398.0, seen.vdc_V);
 }
 
-/* Electrical errors are a third of that mechanically with three pole pairs. */
+/* With three pole pairs an electrical error is a third of it mechanically. */
 void test_the_angle_carries_its_offset_and_both_harmonics_of_the_turn(void)
 {
     p.angle_offset_rad = 0.03;
@@ -236,7 +236,7 @@ void test_a_quantised_angle_is_the_nearest_code(void)
     }
 }
 
-/* 50 us at 200 rad/s: 0.01 rad behind, ahead when it turns backwards */
+/* 50 us at 200 rad/s: 0.01 rad too small; too large with backward rotation. */
 void test_a_delayed_angle_lags_behind_the_motion(void)
 {
     p.angle_delay_s = 50e-6;
@@ -261,7 +261,7 @@ void test_a_stuck_sensor_repeats_its_last_sample(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, seen.theta_m_rad);
 }
 
-/* Two of five samples, from the first on; the sequence starts again after it was off. */
+/* The first two of five samples; after the spikes were switched off, the sequence starts again. */
 void test_spikes_disturb_the_first_samples_of_each_sequence(void)
 {
     p.angle_spike_every = 5;
@@ -292,7 +292,7 @@ void test_an_open_current_input_reads_the_negative_full_scale(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.2, 100.0, seen.ia_A);
 }
 
-void test_sampling_moves_nothing_in_the_drive(void)
+void test_sampling_changes_nothing_in_the_drive(void)
 {
     p.speed_rad_s = 300.0;
     start();

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Open and shorted switches: conduction against closed forms, and what the gate drivers do about a short circuit. */
+/* Open and shorted switches: conduction against closed forms, and the reaction of the gate drivers to a short
+ * circuit. */
 #include "plant_bench.h"
 
 #include <math.h>
@@ -39,7 +40,7 @@ static int reported(void)
     return sensors.gate_fault;
 }
 
-/* One period at rest with i_a = id and the return in b and c, inductive enough to keep it. */
+/* One period at standstill with i_a = id, which returns through b and c; the inductance keeps it constant. */
 static const plant_truth_t *one_period(double id, double a, double b, double c)
 {
     const double duty[3] = {a, b, c};
@@ -52,8 +53,9 @@ static const plant_truth_t *one_period(double id, double a, double b, double c)
     return t;
 }
 
-/* Duties 0.75, 0, 0; the drop is 2 V. Sound: v_a = 300 - 8 - 2 V for i_a > 0 and 300 + 8 + 2 V for i_a < 0, b and c
- * 2 V against their currents. With the upper switch of a open, i_a > 0 has the lower diode only: v_a = -2 V. */
+/* Duties 0.75, 0, 0; the drop is 2 V. Intact leg: v_a = 300 - 8 - 2 V for i_a > 0 and 300 + 8 + 2 V for i_a < 0; b and
+ * c have 2 V against their currents. With the upper switch of a open, i_a > 0 flows through the lower diode for the
+ * whole period: v_a = -2 V. */
 void test_an_open_upper_switch_leaves_the_lower_diode_to_a_current_out_of_the_leg(void)
 {
     p.device_drop_V = 2.0;
@@ -62,12 +64,12 @@ void test_an_open_upper_switch_leaves_the_lower_diode_to_a_current_out_of_the_le
     p.switch_open[UPPER_A] = 1;
     t = one_period(100.0, 0.75, 0.0, 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0 / 3.0 * (-2.0 - 2.0), t->u_d_V);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, t->idc_A); /* it circulates below */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, t->idc_A); /* it circulates through the lower rail */
     t = one_period(-100.0, 0.75, 0.0, 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0 / 3.0 * (310.0 + 2.0), t->u_d_V);
 }
 
-/* The mirror image: with the lower switch open, i_a < 0 has the upper diode only: v_a = 400 + 2 V. */
+/* Mirrored: with the lower switch of a open, i_a < 0 flows through the upper diode: v_a = 400 + 2 V. */
 void test_an_open_lower_switch_leaves_the_upper_diode_to_a_current_into_the_leg(void)
 {
     p.device_drop_V = 2.0;
@@ -78,8 +80,7 @@ void test_an_open_lower_switch_leaves_the_upper_diode_to_a_current_into_the_leg(
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0 / 3.0 * (90.0 - 402.0), t->u_d_V);
 }
 
-/* With all six open the bridge does what one with switching disabled does, at any duty. */
-void test_six_open_switches_are_a_bridge_with_switching_disabled(void)
+void test_with_six_open_switches_the_bridge_behaves_as_with_switching_disabled(void)
 {
     double i_A[2], idc_A[2];
     for (int n = 0; n < 2; n++) {
@@ -97,27 +98,27 @@ void test_six_open_switches_are_a_bridge_with_switching_disabled(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, idc_A[0], idc_A[1]);
 }
 
-/* A phase with an open upper switch drives no current out of its leg: half waves. */
+/* With an open upper switch no current flows out of the leg: only the negative half waves remain. */
 void test_one_open_switch_leaves_half_waves_in_its_phase(void)
 {
     p.switch_open[UPPER_B] = 1;
     p.ideal_inverter = 1;
     p.speed_rad_s = 50.0;
     const plant_truth_t *t = start();
-    double most = 0.0, least = 0.0;
+    double i_max = 0.0, i_min = 0.0;
     for (int k = 0; k < 2000; k++) {
         bench_drive(plant, 2.0 + 17.0 * I);
-        most = fmax(most, t->i_abc_A[1]);
-        least = fmin(least, t->i_abc_A[1]);
+        i_max = fmax(i_max, t->i_abc_A[1]);
+        i_min = fmin(i_min, t->i_abc_A[1]);
     }
-    TEST_ASSERT_TRUE(most < 1.0);
-    TEST_ASSERT_TRUE(least < -50.0);
+    TEST_ASSERT_TRUE(i_max < 1.0);
+    TEST_ASSERT_TRUE(i_min < -50.0);
     TEST_ASSERT_EQUAL(0, t->inversion_failures);
 }
 
-/* Switching disabled, at rest, i_a = 100 A out of a leg whose upper switch is shorted: it returns through the upper
- * diodes of b and c, and the loop has their drop alone: u_d = 2/3 x (0 - 2) V, no current in the dc link. */
-void test_a_current_out_of_a_shorted_upper_switch_circulates_above(void)
+/* Switching is disabled at standstill; i_a = 100 A flows out of a leg whose upper switch is shorted. It returns through
+ * the upper diodes of b and c, whose drop is the only voltage: u_d = 2/3 x (0 - 2) V, no current in the dc link. */
+void test_a_current_out_of_a_shorted_upper_switch_circulates_through_the_upper_rail(void)
 {
     p.device_drop_V = 2.0;
     p.switch_shorted[UPPER_A] = 1;
@@ -128,17 +129,17 @@ void test_a_current_out_of_a_shorted_upper_switch_circulates_above(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0 / 3.0 * -2.0, t->u_d_V);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, t->idc_A);
     TEST_ASSERT_FALSE(reported());
-    /* the other way it returns through the lower diodes, against the link: 2/3 x (400 - (-2)) V, and charges it */
+    /* a current into the leg flows through the lower diodes of b and c and charges the link: 2/3 x (400 - (-2)) V */
     plant_set_state(plant, -100.0, 0.0, 0.0, 0.0);
     plant_advance(plant, half, 0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 2.0 / 3.0 * 402.0, t->u_d_V);
     TEST_ASSERT_TRUE(t->idc_A < -50.0);
 }
 
-/* Half waves at a speed at which a sound bridge is without current (line voltage 66 of 400 V): each phase current has
- * one sign, that of the shorted leg out of it for an upper switch, into it for a lower one; the machine is braked.
- * Mirrored machines give mirrored currents. */
-static double braking(int shorted, double *most_A, double *least_A)
+/* Mean torque with one shorted switch at a speed at which an intact bridge has no current (line voltage 66 V of 400 V).
+ * The diodes let the current of the shorted leg flow in one direction only: out of it for an upper switch, into it for
+ * a lower one; the other two phases have the opposite sign. */
+static double braking(int shorted, double *i_max_A, double *i_min_A)
 {
     double torque_Nm = 0.0;
     const int leg = shorted % 3;
@@ -146,14 +147,15 @@ static double braking(int shorted, double *most_A, double *least_A)
     p.speed_rad_s = 150.0;
     plant_destroy(plant);
     const plant_truth_t *t = start();
-    *most_A = *least_A = 0.0;
+    *i_max_A = *i_min_A = 0.0;
     for (int k = 0; k < 4189; k++) { /* 30 electrical turns of 139.6 periods */
         plant_advance(plant, half, 0);
         torque_Nm += t->torque_mean_Nm / 4189.0;
-        *most_A = fmax(*most_A, t->i_abc_A[leg]);
-        *least_A = fmin(*least_A, t->i_abc_A[leg]);
+        *i_max_A = fmax(*i_max_A, t->i_abc_A[leg]);
+        *i_min_A = fmin(*i_min_A, t->i_abc_A[leg]);
         TEST_ASSERT_TRUE((shorted < 3 ? 1.0 : -1.0) * t->i_abc_A[(leg + 1) % 3] < 1e-3);
-        TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0, t->idc_A); /* all of it circulates at the shorted switch's rail */
+        TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.0,
+                                  t->idc_A); /* the current circulates through the rail of the shorted switch */
     }
     TEST_ASSERT_EQUAL(0, t->inversion_failures);
     p.switch_shorted[shorted] = 0;
@@ -162,21 +164,22 @@ static double braking(int shorted, double *most_A, double *least_A)
 
 void test_freewheel_with_a_shorted_switch_brakes_by_half_waves(void)
 {
-    double most, least, first_A = 0.0, first_Nm = 0.0;
+    double i_max, i_min, first_A = 0.0, first_Nm = 0.0;
     const double short_circuit_A = 0.084 / 0.2e-3; /* of the symmetrical short circuit at high speed */
     for (int k = 0; k < 6; k++) {
-        const double torque_Nm = braking(k, &most, &least);
-        first_A = k == 0 ? most : first_A;
+        const double torque_Nm = braking(k, &i_max, &i_min);
+        first_A = k == 0 ? i_max : first_A;
         first_Nm = k == 0 ? torque_Nm : first_Nm;
         TEST_ASSERT_TRUE(torque_Nm < -5.0);
         TEST_ASSERT_DOUBLE_WITHIN(0.05 * fabs(first_Nm), first_Nm, torque_Nm);
-        TEST_ASSERT_DOUBLE_WITHIN(0.02 * first_A, first_A, k < 3 ? most : -least);
-        TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, k < 3 ? least : most);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * first_A, first_A, k < 3 ? i_max : -i_min);
+        TEST_ASSERT_DOUBLE_WITHIN(1.0, 0.0, k < 3 ? i_min : i_max);
     }
     TEST_ASSERT_TRUE(first_A > short_circuit_A);
 }
 
-/* The short circuit on the side of the shorted switch is the symmetrical one, and no driver reports a fault. */
+/* All switches on the side of the shorted one are on: a symmetrical short circuit, and no gate driver reports a
+ * fault. */
 void test_the_short_circuit_on_the_side_of_a_shorted_switch_is_symmetrical(void)
 {
     double i_A[4];
@@ -199,9 +202,9 @@ void test_the_short_circuit_on_the_side_of_a_shorted_switch_is_symmetrical(void)
     TEST_ASSERT_TRUE(i_A[0] > 300.0);
 }
 
-/* 2000 A for 3 us is 6 mC, 12 V of a capacitor of 500 uF; the gates are off in that period: i_a = 100 A falls against
- * the shorted rail only, and the report comes again with the next attempt. */
-void test_a_short_circuit_of_the_link_is_blocked_reported_and_seen_in_the_voltage(void)
+/* 2000 A for 3 us are 6 mC, 12 V of a capacitor of 500 uF. In this period the gate drivers block all switches: i_a =
+ * 100 A circulates through the shorted rail. The next attempt to switch is reported again. */
+void test_a_short_circuit_of_the_link_is_blocked_and_reported_and_lowers_the_voltage(void)
 {
     p.dc_link_F = 500e-6;
     p.vdc_start_V = 400.0;
@@ -222,9 +225,10 @@ void test_a_short_circuit_of_the_link_is_blocked_reported_and_seen_in_the_voltag
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 376.0, t->vdc_V);
 }
 
-/* Nothing is switched on against it: all upper switches on, a pulse shorter than the dead time, an open counterpart, no
- * supply of the drivers. A pulse of 2 us after dead time is noticed by a driver of 1 us only. */
-void test_what_the_gate_drivers_do_not_report(void)
+/* There is no short circuit while the lower switch of the leg is not switched on: with its upper switch on, with a
+ * pulse shorter than the dead time, with an open lower switch, without supply of the drivers. A pulse of 2 us after
+ * dead time is too short for a desaturation time of 3 us and is reported with one of 1 us. */
+void test_the_gate_drivers_report_only_a_short_circuit_longer_than_the_desaturation_time(void)
 {
     p.switch_shorted[UPPER_A] = 1;
     (void)one_period(0.0, 1.0, 0.0, 0.0);
@@ -245,8 +249,8 @@ void test_what_the_gate_drivers_do_not_report(void)
     TEST_ASSERT_FALSE(reported());
 }
 
-/* Without desaturation, or with both switches of a leg shorted, 2000 A empty 500 uF within a period. */
-void test_a_short_circuit_that_is_not_blocked_empties_the_link(void)
+/* Without desaturation detection, or with both switches of a leg shorted, 2000 A discharge 500 uF within a period. */
+void test_a_short_circuit_that_is_not_blocked_discharges_the_link(void)
 {
     p.dc_link_F = 500e-6;
     p.vdc_start_V = 400.0;
@@ -268,8 +272,7 @@ void test_a_short_circuit_that_is_not_blocked_empties_the_link(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, t->vdc_V);
 }
 
-/* A broken lead carries nothing, whatever the switches of its leg do. */
-void test_a_broken_lead_outlasts_a_shorted_switch(void)
+void test_a_broken_lead_has_no_current_even_with_a_shorted_switch(void)
 {
     p.phase_open[0] = p.switch_shorted[UPPER_A] = 1;
     p.speed_rad_s = 150.0;
