@@ -10,7 +10,7 @@ void tearDown(void)
 {
 }
 
-void test_every_event_counts_one_until_the_largest_value_which_stays(void)
+void test_every_event_adds_one_up_to_the_largest_value(void)
 {
     TEST_ASSERT_EQUAL_UINT32(1, count_up_to(0, 3));
     TEST_ASSERT_EQUAL_UINT32(3, count_up_to(2, 3));

@@ -33,7 +33,7 @@ void test_one_sample_without_the_condition_starts_the_count_again(void)
     }
 }
 
-/* 8 bits would wrap after 256 samples. */
+/* The counter has 8 bits and must not wrap after 256 samples. */
 void test_a_lasting_condition_stays_confirmed(void)
 {
     uint8_t one = 0, longest = 0;
@@ -44,7 +44,7 @@ void test_a_lasting_condition_stays_confirmed(void)
     TEST_ASSERT_EQUAL_HEX32(0, debounce_step(&one, false, 1, 2));
 }
 
-void test_a_count_beyond_the_limit_is_brought_back_to_it(void)
+void test_a_count_beyond_the_number_of_samples_is_limited_to_it(void)
 {
     uint8_t count = 200;
     TEST_ASSERT_EQUAL_HEX32(1, debounce_step(&count, true, 3, 1));

@@ -23,8 +23,8 @@ void test_at_10_kHz_every_step_is_one_millisecond(void)
     }
 }
 
-/* Lengths of 4.5, 5.5, 22.5, 10.5, 4.4999 and 8.9 kHz, against their exact sums. */
-void test_after_an_hour_the_clock_is_where_the_exact_sum_is(void)
+/* Step lengths at PWM frequencies of 4.5, 5.5, 22.5, 10.5, 4.4999 and 8.9 kHz, against the exact sum of the steps. */
+void test_for_an_hour_the_clock_equals_the_exact_sum_of_the_steps(void)
 {
     static const uint32_t step_ns[] = {888889U, 1090909U, 977778U, 1047619U, 1111136U, 1011236U};
     for (unsigned k = 0; k < sizeof step_ns / sizeof step_ns[0]; k++) {
@@ -52,8 +52,8 @@ void test_no_millisecond_is_lost_or_counted_twice(void)
     }
 }
 
-/* Damaged motor data: the bus must go on telling so. */
-void test_a_length_that_no_step_has_counts_as_a_millisecond(void)
+/* With damaged motor data time must still pass, so that the bus reports the fault. */
+void test_a_step_length_out_of_range_counts_as_a_millisecond(void)
 {
     static const uint32_t bad[] = {0U, 799999U, 1250001U, 4294967295U};
     for (unsigned k = 0; k < sizeof bad / sizeof bad[0]; k++) {
