@@ -13,7 +13,7 @@ enum { NX = 15, NY = 15, NT = 9, NPSI = 9, POLE_PAIRS = 3, L_SHIFT = 2 };
 #define V_RATIO 0.57
 
 static const double period = 1e-4;
-static const int cell = 2048; /* counts of q15 between table nodes: 1/16 of the current base */
+static const int cell = 2048; /* distance of the table nodes in counts of q15: 1/16 of the current base */
 
 static int16_t l_d[NX * NY], l_q[NX * NY], l_qq[NX * NY], g[NX * NY];
 static int16_t psi_f0[NX * NY], ref_d[NT * NPSI], ref_q[NT * NPSI], ref_max[NPSI];
@@ -48,14 +48,14 @@ static void bases(fixture_t *f)
     f->t = 1.5 * POLE_PAIRS * f->psi * f->i;
 }
 
-/* Inductances that fall with the current; all of them below 4 L_b. */
+/* Inductances that decrease with the current, all below 4 L_b. */
 static void machine_at(double id, double iq, double l[4], double *flux)
 {
-    const double soft = 1.0 / sqrt(1.0 + 4.0 * iq * iq);
+    const double saturation = 1.0 / sqrt(1.0 + 4.0 * iq * iq);
     l[0] = 0.95 + 0.2 * id + 0.1 * iq;
-    l[1] = 3.7 * soft * (1.0 + 0.1 * id);
+    l[1] = 3.7 * saturation * (1.0 + 0.1 * id);
     l[2] = 0.95 + 0.4 * id + 0.1 * iq;
-    l[3] = l[1] * soft * soft + 0.2;
+    l[3] = l[1] * saturation * saturation + 0.2;
     *flux = 0.53 - 0.12 * iq * iq;
 }
 
@@ -98,7 +98,7 @@ static void flux_tables(fixture_t *f)
     f->si.psi_f0_Vs = si_psi_f0;
 }
 
-/* Not an optimum, but the shape of one: more -i_d for more torque and for less flux. */
+/* Not an optimum, but similar to one: more negative i_d for more torque and for less flux. */
 static void reference_tables(fixture_t *f)
 {
     for (int ix = 0; ix < NT; ix++) {
@@ -267,7 +267,7 @@ static void torque(fixture_t *f)
     f->si.torque_max_Nm = 0.6 * f->t;
 }
 
-/* From no torque at `end` to all of it at `start`, in counts. */
+/* Derating from full torque at `start` to none at `end`, in counts. */
 static derating_line_t line_of(int end, int start)
 {
     return (derating_line_t){(q15_t)end, (q16_t)floor(2147483648.0 / (start - end) + 0.5)};
@@ -302,7 +302,7 @@ static void limits(fixture_t *f)
     f->si.dc_low_start_V = 12288 * volt;
     f->si.dc_high_end_V = 27000 * volt;
     f->si.dc_high_start_V = 26000 * volt;
-    /* 0.9 of I_b at 20 C, 0.002 I_b less per K; psi_f (0.53 psi_b) falls by 0.1 % per K. */
+    /* 0.9 I_b at 20 C, 0.002 I_b less per K; psi_f (0.53 psi_b) decreases by 0.1 % per K. */
     f->i_d_limit = (i_d_limit_config_t){
         .i_20 = q15_of(0.9),
         .slope = q16_of(0.0002 * 32768.0),
@@ -332,7 +332,7 @@ fixture_t fixture(void)
 
 void worst_note(worst_t *worst, double error, const char *format, ...)
 {
-    /* The negation lets a NaN through as the worst of all. */
+    /* Written as a negation so that NaN counts as the largest error. */
     if ((worst->where[0] == '\0') || !(fabs(error) <= worst->error)) {
         va_list arguments;
         va_start(arguments, format);

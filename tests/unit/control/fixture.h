@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef UNIT_CONTROL_FIXTURE_H
 #define UNIT_CONTROL_FIXTURE_H
-/** One invented saturating machine, twice: as fixed-point configurations and as the SI data of the twin.
- *   The SI side is made from the rounded fixed-point constants, so that a test's tolerance is that of
- *   the arithmetic alone. The conversions are this file's own, from the units stated in the headers.
- * Units    bases in SI; q15 helpers in counts */
+/** An invented saturating machine, as fixed-point configurations and as the SI data of the twin.
+ *   The SI data are computed from the rounded fixed-point constants, so that the tolerance of a test contains only the
+ *   errors of the arithmetic. The conversions follow the units stated in the headers and use no code of the firmware.
+ * Units    bases in SI; q15 values in counts */
 #include <stdint.h>
 
 #include "control/current/angle_tracker.h"
@@ -34,14 +34,14 @@ typedef struct {
     i_d_limit_config_t i_d_limit;
 } fixture_t;
 
-/* A fresh copy each time: tests may change it. */
+/* Returns a new copy, which a test may change. */
 fixture_t fixture(void);
 
-/* The modulation's, and the twin's. */
+/* Dead time and shortest pulse, as shares of the period, of the modulation and of the twin. */
 void fixture_dead_time(fixture_t *f, double duty);
 void fixture_min_pulse(fixture_t *f, double duty);
 
-/* The largest deviation of a sweep and where it was: one readable failure instead of thousands. */
+/* The largest error of a sweep and the arguments at which it occurred, so that a sweep reports one failure. */
 typedef struct {
     double error;
     char where[200];

@@ -13,7 +13,7 @@ static double noise(double volts, double base)
     return volts / base;
 }
 
-/* Assumed priors, some of them coarse, so that every state moves. */
+/* Assumed priors. Some are wide, so that every state changes. */
 void identify_fixture(fixture_t *f, identify_config_t *c)
 {
     static const double sigma_pu[IDENTIFY_STATES] = {0.0025, 0.002, 0.06, 0.06, 0.06, 0.005, 0.2};
@@ -94,19 +94,19 @@ identify_tables_t tables_at(const fixture_t *f, dq_q15_t i_m)
     return (identify_tables_t){flux_table_step(&f->flux_table, i_m), flux_table_inductances(&f->flux_table, i_m)};
 }
 
-/* A window of steady periods of the machine that the tables describe, and both forms of them. */
 window_pair_t steady_window(const fixture_t *f, dq_q15_t i, double omega_pu, dq_q15_t extra_u)
 {
     const flux_point_t flux = flux_table_step(&f->flux_table, i);
     const double r = from_q31(f->mrai.r0), theta_step = omega_pu * f->w * f->si.period_s;
-    const double sinc = 1.0 / (1.0 + theta_step * theta_step / 24.0); /* what the held voltage has to be (MR-5) */
+    const double sinc =
+        1.0 / (1.0 + theta_step * theta_step / 24.0); /* the voltage is constant in the stationary frame (MR-5) */
     const dq_q15_t u = {(int32_t)lround(sinc * (r * i.d - omega_pu * flux.psi_q + extra_u.d)),
                         (int32_t)lround(sinc * (r * i.q + omega_pu * flux.psi_d + extra_u.q))};
     window_pair_t pair = {.twin = {.count = f->si.periods_per_step}};
     for (int k = 0; k <= f->si.periods_per_step; k++) {
         const double theta = k * theta_step;
-        const double turn = theta / 6.283185307179586;
-        const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turn - floor(turn)) * 4294967296.0)};
+        const double turns = theta / 6.283185307179586;
+        const identify_sample_t s = {i, u, &flux, (uint32_t)(int64_t)llround((turns - floor(turns)) * 4294967296.0)};
         const twin_end_t t = {{from_q15(i.d) * f->i, from_q15(i.q) * f->i},
                               {from_q15(u.d) * f->v, from_q15(u.q) * f->v},
                               {from_q15(flux.psi_d) * f->psi, from_q15(flux.psi_q) * f->psi},
@@ -134,11 +134,11 @@ double mean_on_the_chord(const fixture_t *f, dq_q15_t i_m, double psi_d, double 
     double sum = 0.0;
     for (int k = 0; k < PIECES; k++) {
         const double s = (k + 0.5) / PIECES - 0.5; /* of the period, from its middle */
-        /* The ends are psi e^(-j theta/2) and psi e^(j theta/2) as seen from the rotor's place in the middle. */
+        /* In the frame of the rotor at mid-period, the ends are psi e^(-j theta/2) and psi e^(j theta/2). */
         const double along = cos(0.5 * theta), across = 2.0 * s * sin(0.5 * theta);
         const double x = psi_d * along - psi_q * across, y = psi_q * along + psi_d * across;
-        const double turn = s * theta;
-        const double d = x * cos(turn) + y * sin(turn), q_axis = y * cos(turn) - x * sin(turn);
+        const double rotor = s * theta;
+        const double d = x * cos(rotor) + y * sin(rotor), q_axis = y * cos(rotor) - x * sin(rotor);
         const double i_d = from_q15(i_m.d) + (d - psi_d) / (from_q15(l.l_d) * scale);
         const double i_q = from_q15(i_m.q) + (q_axis - psi_q) / (from_q15(l.l_qq) * scale);
         sum += d * i_q - q_axis * i_d;

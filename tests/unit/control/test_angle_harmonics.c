@@ -5,7 +5,7 @@
 #include "control/adapt/angle_harmonics.h"
 #include "unity.h"
 
-static const double turn = 4294967296.0;
+static const double turn = 4294967296.0; /* counts per turn */
 static const double two_pi = 6.283185307179586476925;
 static const double degree = 4294967296.0 / 360.0; /* mechanical */
 
@@ -31,21 +31,21 @@ static uint32_t counts(double turns)
     return (uint32_t)(int64_t)llround((turns - floor(turns)) * turn);
 }
 
-/* What a sensor with 0.3 degrees once and 0.25 degrees twice per turn adds: with three pole pairs nearly a degree
- * electrical each. */
-static double wrong(double at)
+/* Error of a sensor with harmonics of 0.3 degrees once and 0.25 degrees twice per turn, in turns. With three pole pairs
+ * each is nearly one electrical degree. */
+static double sensor_error(double at)
 {
     return (0.3 * cos(two_pi * at - 1.0) + 0.25 * sin(2.0 * two_pi * at + 0.4)) / 360.0;
 }
 
-/* Steps of a millisecond as the drive makes them: corrected and used for adaptation. The worst remaining error of the
- * last turn or more, in degrees. */
+/* Steps of 1 ms as in the drive: each sample is corrected with the table and then used for adaptation. Returns the
+ * largest remaining error of the last 100 steps, in degrees. */
 static double drive(double rpm, double rpm_per_s, int steps)
 {
     double worst = 0.0;
     for (int k = 0; k < steps; k++) {
         theta += (rpm + rpm_per_s * k * 1e-3) / 60e3;
-        const uint32_t read = counts(theta + wrong(theta));
+        const uint32_t read = counts(theta + sensor_error(theta));
         const uint32_t corrected = read + (uint32_t)table[read >> ANGLE_HARMONICS_SHIFT];
         if (k >= steps - 100) {
             worst = fmax(worst, fabs((double)(int32_t)(corrected - counts(theta)) / degree));
@@ -55,9 +55,9 @@ static double drive(double rpm, double rpm_per_s, int steps)
     return worst;
 }
 
-/* Five of the slower time constants (AT-13) leave 0.7 % of 0.3 degrees; the table without interpolation half a part:
- * (0.3 + 2 * 0.25) pi/64 = 0.04 degrees. */
-void test_a_sensors_first_two_harmonics_are_removed_in_both_directions(void)
+/* After five of the longer time constants (AT-13) 0.7 % of 0.3 degrees remain. The table without interpolation has an
+ * error of half a part: (0.3 + 2 * 0.25) pi/64 = 0.04 degrees. */
+void test_the_first_two_harmonics_of_the_sensor_are_removed_in_both_directions(void)
 {
     TEST_ASSERT_TRUE(drive(8400.0, 0.0, 200) > 0.05);
     TEST_ASSERT_TRUE(drive(8400.0, 0.0, 900) < 0.05);
@@ -65,12 +65,12 @@ void test_a_sensors_first_two_harmonics_are_removed_in_both_directions(void)
     TEST_ASSERT_TRUE(drive(-5000.0, 0.0, 2500) < 0.05);
 }
 
-void test_acceleration_is_no_harmonic(void)
+void test_acceleration_is_not_taken_for_a_harmonic(void)
 {
     TEST_ASSERT_TRUE(drive(3000.0, 6000.0, 1000) < 0.06);
 }
 
-/* By (AT-13) 10 s at 900 rpm would take away nine tenths of the second harmonic. */
+/* By (AT-13), adaptation for 10 s at 900 rpm would remove nine tenths of the second harmonic. */
 void test_below_940_rpm_the_coefficients_are_kept(void)
 {
     (void)drive(900.0, 0.0, 10000);
@@ -84,8 +84,8 @@ void test_below_940_rpm_the_coefficients_are_kept(void)
     TEST_ASSERT_TRUE(drive(500.0, 0.0, 200) < 0.05);
 }
 
-/* Every seventh sample is one period late, a tenth of the step. */
-void test_late_samples_teach_nothing(void)
+/* Every seventh sample is taken one period late, which is a tenth of the step. */
+void test_late_samples_are_not_used_for_adaptation(void)
 {
     for (int k = 0; k < 4000; k++) {
         theta += 6000.0 / 60e3;
@@ -95,7 +95,7 @@ void test_late_samples_teach_nothing(void)
     TEST_ASSERT_INT32_WITHIN(64, 0, state.c[3]);
 }
 
-void test_what_is_identified_stays_within_its_bound(void)
+void test_the_coefficients_stay_within_their_limit(void)
 {
     for (int k = 0; k < 5000; k++) {
         theta += 7000.0 / 60e3;
@@ -104,14 +104,14 @@ void test_what_is_identified_stays_within_its_bound(void)
     TEST_ASSERT_EQUAL_INT32(config.max, state.c[0]);
 }
 
-/* The same sequence, not corrected, through (AT-11) and (AT-12) in double. The fixed point rounds each step to
- * 1/2 LSB, and its waves to 2^-15: 100 steps of up to 1.3e5 LSB of d/64, 4 LSB each. */
-void test_coefficients_and_table_are_the_twins(void)
+/* Uncorrected samples through (AT-11) and (AT-12) in double precision. The fixed point rounds each step by up to 1/2
+ * LSB and sine and cosine to 2^-15: 100 steps of up to 1.3e5 LSB of d/64 have an error of 4 LSB each. */
+void test_coefficients_and_table_match_their_equations(void)
 {
     double c[4] = {0}, last = 0.0, before = 0.0;
     for (int k = 0; k < 100; k++) {
         theta += 6500.0 / 60e3;
-        const double at = theta + wrong(theta);
+        const double at = theta + sensor_error(theta);
         const double d = (at - 2.0 * last + before) * turn;
         if (k > 1) {
             const double w = two_pi * last;
@@ -132,7 +132,7 @@ void test_coefficients_and_table_are_the_twins(void)
     state.c[0] = 3000000;
     state.c[3] = -2000000;
     state.c[1] = state.c[2] = 0;
-    for (int k = 0; k < 16; k++) { /* standing still: renewed only */
+    for (int k = 0; k < 16; k++) { /* at standstill the table is only computed again */
         angle_harmonics_step(&config, &state, state.last, table);
     }
     for (int j = 0; j < ANGLE_HARMONICS_PARTS; j++) {

@@ -8,7 +8,7 @@
 static fixture_t f;
 static angle_tracker_state_t state;
 
-static const double turn = 4294967296.0;
+static const double turn = 4294967296.0; /* counts per turn */
 static const double two_pi = 6.283185307179586476925;
 
 void setUp(void)
@@ -26,7 +26,7 @@ static angle_t step(uint32_t theta_m)
     return angle_tracker_step(&f.angle_tracker, &state, theta_m);
 }
 
-/* As a period does it: an implausible sample is replaced. */
+/* As in the fast ISR: an implausible sample is replaced by the prediction. */
 static angle_t step_or_coast(uint32_t theta_m)
 {
     const angle_t y = step(theta_m);
@@ -41,20 +41,20 @@ void test_the_electrical_angle_is_pole_pairs_times_mechanical_plus_offset_and_wr
     TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFDu + 0x12345678u, step(0xFFFFFFFFu).theta_e);
 }
 
-/* 0.8 omega_b is 0.05 turn per period: p times an eighth of a mechanical step each. */
-void test_the_second_sample_already_knows_the_speed_and_no_cycle_is_slipped(void)
+/* 0.8 omega_b is an electrical advance of 0.05 turn per period, 0.05/3 turn mechanically. */
+void test_the_speed_is_correct_from_the_second_sample_on_without_a_cycle_slip(void)
 {
     const uint32_t advance = (uint32_t)(0.05 / 3.0 * turn);
     (void)step(0xF0000000u);
     TEST_ASSERT_EQUAL_INT(0, state.omega_q30);
     const angle_t y = step(0xF0000000u + advance);
-    /* turn_to_pu in Q15.16 (2e-6), there and back */
+    /* turn_to_pu in Q15.16 has a relative error of up to 1e-6. */
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, y.step / (3.0 * advance));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.8, from_q31(y.omega_q31)); /* turn_to_pu in Q15.16: 2e-6 */
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.8, from_q31(y.omega_q31));
     TEST_ASSERT_FALSE(y.jumped);
 }
 
-/* The error of one sample is a multiple of k_i e, rounded to 2 LSB. A type-2 loop has no error on a ramp. */
+/* A second-order tracking loop has no steady error on a ramp; what remains is the rounding of the speed. */
 void test_a_ramp_is_tracked_without_a_speed_error_in_both_directions(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
@@ -80,16 +80,16 @@ void test_a_speed_step_settles_with_both_poles_at_the_configured_bandwidth(void)
         theta += advance;
         const angle_t y = step(theta);
         worst_overshoot = fmax(worst_overshoot, y.step / (3.0 * advance));
-        if (n ==
-            99) { /* 10 ms are six time constants: (1 + 6) e^-6 = 1.7 % are missing; w_n T_s = 0.06 spreads the poles */
+        if (n == 99) {
+            /* After 10 ms, six time constants, (1 + 6) e^-6 = 1.7 % are missing; w_n T_s = 0.06 changes the poles. */
             TEST_ASSERT_DOUBLE_WITHIN(0.003, 1.0 - 0.01735, y.step / (3.0 * advance));
         }
     }
-    /* Two equal real poles and no zero: no overshoot but the rounding. */
+    /* Two equal real poles and no zero: no overshoot beyond the rounding. */
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, worst_overshoot);
 }
 
-/* Gains in q31 (5e-10) on an error below 0.1 turn, a rounding of 2 LSB each of which decays: < 100 LSB. */
+/* Tolerance: gains in q31 (5e-10) times an error below 0.1 turn; each rounding of 2 LSB decays: below 100 LSB. */
 void test_a_noisy_accelerating_rotor_gives_the_twins_angle_and_speed(void)
 {
     twin_angle_state_t twin = {0};
@@ -118,7 +118,7 @@ void test_the_speed_scale_is_one_at_omega_b(void)
     }
 }
 
-void test_a_jump_beyond_the_credible_step_is_reported_and_a_smaller_one_is_not(void)
+void test_a_jump_beyond_the_plausible_step_is_reported_and_a_smaller_one_is_not(void)
 {
     (void)step(0);
     (void)step(0);
@@ -131,11 +131,11 @@ void test_a_jump_beyond_the_credible_step_is_reported_and_a_smaller_one_is_not(v
     state = (angle_tracker_state_t){.samples = 2};
     f.angle_tracker.max_step = 0x7FFFFFFEu;
     f.angle_tracker.pole_pairs = 1;
-    TEST_ASSERT_TRUE(step(0x80000000u).jumped); /* half a turn: -2^31 has no positive */
+    TEST_ASSERT_TRUE(step(0x80000000u).jumped); /* half a turn: the magnitude of -2^31 does not fit 32 bits */
 }
 
-/* By hand: at constant speed the prediction of a locked loop is the angle itself. */
-void test_implausible_samples_are_replaced_by_the_prediction_and_leave_no_trace(void)
+/* At constant speed the prediction of a locked loop is the true angle. */
+void test_implausible_samples_are_replaced_by_the_prediction_and_do_not_change_the_speed(void)
 {
     const uint32_t advance = 10000000u;
     uint32_t theta = 0;
@@ -146,13 +146,14 @@ void test_implausible_samples_are_replaced_by_the_prediction_and_leave_no_trace(
         const bool bad = n >= 10 && (n < 60 || n % 10 == 0);
         const angle_t y = step_or_coast(bad ? theta + 0x30000000u : theta);
         TEST_ASSERT_EQUAL(bad, y.jumped);
-        TEST_ASSERT_INT_WITHIN(2000, 0, (int32_t)(y.theta_e - 3U * theta)); /* 50 periods of a speed to 4 LSB */
+        TEST_ASSERT_INT_WITHIN(2000, 0,
+                               (int32_t)(y.theta_e - 3U * theta)); /* 50 periods with a speed error of up to 4 LSB */
         TEST_ASSERT_INT_WITHIN(4, 3 * (int32_t)advance, y.step);
     }
 }
 
-/* Spikes and a frozen angle on an accelerating rotor: both coast. */
-void test_an_angle_that_fails_now_and_then_gives_the_twins_angle_and_speed(void)
+/* Spikes and a frozen angle on an accelerating rotor: tracker and twin replace the same samples. */
+void test_intermittent_angle_faults_give_the_twins_angle_and_speed(void)
 {
     twin_angle_state_t twin = {0};
     worst_t worst = {0};
@@ -161,8 +162,8 @@ void test_an_angle_that_fails_now_and_then_gives_the_twins_angle_and_speed(void)
     for (int n = 0; n < 100000; n++) {
         theta += 0.15 / 3.0 * sin(n * 1e-4);
         frozen = (n % 500 >= 450) ? frozen : theta;
-        const double seen = (n % 7 == 6) ? theta + 1.0 : frozen;
-        const uint32_t raw = (uint32_t)(int64_t)floor(fmod(seen, two_pi) / two_pi * turn);
+        const double sampled = (n % 7 == 6) ? theta + 1.0 : frozen;
+        const uint32_t raw = (uint32_t)(int64_t)floor(fmod(sampled, two_pi) / two_pi * turn);
         const angle_t y = step_or_coast(raw);
         const twin_angle_t t = twin_angle_tracker(&f.si, &twin, raw / turn * two_pi);
         worst_note(&worst, y.step - t.step / two_pi * turn, "step of period %d", n);
@@ -173,8 +174,8 @@ void test_an_angle_that_fails_now_and_then_gives_the_twins_angle_and_speed(void)
     TEST_ASSERT_GREATER_THAN(14000, replaced);
 }
 
-/* k_i e below half an LSB may not creep: an error of one LSB must not build up speed. */
-void test_a_resting_rotor_with_one_lsb_of_jitter_keeps_its_speed_at_zero(void)
+/* Rounding has no bias: an angle that alternates by one LSB must not accumulate to a speed. */
+void test_at_standstill_an_angle_jitter_of_one_lsb_leaves_the_speed_at_zero(void)
 {
     (void)step(1000);
     (void)step(1000);

@@ -28,13 +28,13 @@ static int32_t q30(double x)
     return (int32_t)lround(x * ONE);
 }
 
-/* A leg's error: an arc through zero that ends at the level. */
+/* Voltage error of a leg: rises smoothly through zero to the level. */
 static double smooth(double i, double zone)
 {
     return LEVEL * tanh(i / zone);
 }
 
-/* What ten levels at an angle measure, by the definition of the dq voltage (2/3 of the phases' projections). */
+/* The measurement of ten levels at an angle; the d voltage is 2/3 of the phases' projections. */
 static commission_data_t measured(double theta, double zone, twin_curve_t *twin)
 {
     commission_data_t data;
@@ -71,8 +71,8 @@ void test_resistance_and_a_constant_error_are_found_at_every_angle_of_the_rotor(
     }
 }
 
-/* A few 2^-15 of the cosines, times the level, and the division's 2^-31. */
-void test_a_smooth_curve_is_what_the_twin_finds(void)
+/* Tolerance: a few 2^-15 of the cosines times the level, and 2^-31 of the division. */
+void test_the_result_for_a_smooth_curve_is_that_of_the_twin(void)
 {
     for (double theta = 0.0; theta < 6.3; theta += 0.05) {
         twin_curve_t twin;
@@ -88,8 +88,9 @@ void test_a_smooth_curve_is_what_the_twin_finds(void)
     }
 }
 
-/* The zone is half of the first knot. What lies below it counts as constant, which the first knots feel most. */
-void test_the_curve_is_the_legs_own_within_a_few_percent(void)
+/* The current at which tanh() bends is half of the first knot. Below that knot the fit takes the curve as constant,
+ * which affects the first knots most. */
+void test_the_curve_is_that_of_the_leg_within_a_few_percent(void)
 {
     for (double theta = 0.0; theta < 6.3; theta += 0.05) {
         twin_curve_t twin;
@@ -104,8 +105,9 @@ void test_the_curve_is_the_legs_own_within_a_few_percent(void)
     }
 }
 
-/* A leg with output capacitance: the dead time is lost in full only if the current recharges it in time. Below the zone
- * the loss is linear, above it is 1 - zone/(2 i). Device and diode add a constant and a slope. */
+/* A leg with output capacitance loses the whole dead time only if the current recharges the capacitance in time (CM-8).
+ * Below `zone` the loss is proportional to the current, above it is 1 - zone/(2 i). Switches and diodes add a constant
+ * and a slope. */
 typedef struct {
     double dead, drop, slope, zone;
 } leg_t;
@@ -121,7 +123,7 @@ static double compensated(const commission_curve_t *curve, double knee, double i
     return curve->level / ONE * fmin(i / knee, 1.0);
 }
 
-/* Amplitude of the fundamental along the current, over the phase's quarter turn. */
+/* Amplitude of the fundamental of the remaining error along the current, from a quarter of a turn. */
 static double fundamental(const leg_t *leg, const commission_curve_t *curve, double knee, double i)
 {
     double sum = 0.0;
@@ -133,7 +135,7 @@ static double fundamental(const leg_t *leg, const commission_curve_t *curve, dou
     return 4.0 / 3.1415926535897932 * sum * 1.5707963267948966 / 500.0;
 }
 
-/* The measurement of such a leg at an angle; the knee is not narrower than the one in effect, 0.002 (0.8 A). */
+/* The result of commissioning such a leg at an angle; the knee is at least the previous one, 0.002 (0.8 A). */
 static commission_curve_t commissioned(const leg_t *leg, double theta, double *knee)
 {
     commission_data_t data;
@@ -155,24 +157,24 @@ static commission_curve_t commissioned(const leg_t *leg, double theta, double *k
     return curve;
 }
 
-/* Largest share of the level by which the fundamental is missed, from the smallest current with identification
- * (3 %) to the largest; what the linear term holds is resistance to the drive. */
-static double missed(const leg_t *leg)
+/* Largest error of the fundamental as a share of the level, from the smallest current with identification (3 %) to the
+ * largest. The linear part of the error counts as resistance. */
+static double fundamental_error(const leg_t *leg)
 {
     double worst = 0.0;
     for (double theta = 0.0; theta < 1.6; theta += 0.05) {
         double knee;
         const commission_curve_t curve = commissioned(leg, theta, &knee);
         for (double i = 0.018; i < 0.6; i *= 1.1) {
-            const double left = fundamental(leg, &curve, knee, i) - (curve.r / ONE - R) * i;
-            worst = fmax(worst, fabs(left) / (4.0 / 3.1415926535897932 * LEVEL));
+            const double remaining = fundamental(leg, &curve, knee, i) - (curve.r / ONE - R) * i;
+            worst = fmax(worst, fabs(remaining) / (4.0 / 3.1415926535897932 * LEVEL));
         }
     }
     return worst;
 }
 
 /* The same for the ten points of the curve. */
-static double missed_by_the_curve(const leg_t *leg)
+static double curve_error(const leg_t *leg)
 {
     double worst = 0.0;
     for (double theta = 0.0; theta < 1.6; theta += 0.05) {
@@ -180,28 +182,28 @@ static double missed_by_the_curve(const leg_t *leg)
         const commission_curve_t curve = commissioned(leg, theta, &knee);
         for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
             const double i = curve.knot[k] / ONE;
-            const double left = leg_error(leg, i) - (curve.r / ONE - R) * i - curve.v[k] / ONE;
-            worst = fmax(worst, fabs(left) / LEVEL);
+            const double remaining = leg_error(leg, i) - (curve.r / ONE - R) * i - curve.v[k] / ONE;
+            worst = fmax(worst, fabs(remaining) / LEVEL);
         }
     }
     return worst;
 }
 
-/* 0.4, 0.8 and 2 A recharge the leg within the dead time: 2, 5 and 12 nF at 350 V and 2 us. The level alone spreads by
- * 20 %; a quarter of that is what may be left of it. */
-void test_level_and_knee_meet_the_fundamental_of_a_leg_with_capacitance_drop_and_slope(void)
+/* 0.4, 0.8 and 2 A recharge the leg within the dead time: 2, 5 and 11 nF at 350 V and 2 us. The bounds are those of the
+ * table in docs/theory/commissioning.md, section 3, rounded up. */
+void test_level_and_knee_match_the_fundamental_of_a_leg_with_capacitance_drop_and_slope(void)
 {
     const struct {
         double zone, error_max, curve_error_max;
     } legs[] = {{0.001, 0.03, 0.02}, {0.002, 0.05, 0.03}, {0.005, 0.11, 0.06}};
     for (unsigned n = 0; n < sizeof legs / sizeof legs[0]; n++) {
         const leg_t leg = {0.875 * LEVEL, 0.125 * LEVEL, 0.3 * R, legs[n].zone};
-        TEST_ASSERT_DOUBLE_WITHIN(legs[n].error_max, 0.0, missed(&leg));
-        TEST_ASSERT_DOUBLE_WITHIN(legs[n].curve_error_max, 0.0, missed_by_the_curve(&leg));
+        TEST_ASSERT_DOUBLE_WITHIN(legs[n].error_max, 0.0, fundamental_error(&leg));
+        TEST_ASSERT_DOUBLE_WITHIN(legs[n].curve_error_max, 0.0, curve_error(&leg));
     }
 }
 
-/* By hand: a line to 0.0625 that passes 0.0125, 0.025, 0.05 and the constant after it. */
+/* By hand: a straight line up to 0.0625 and a constant above it, with a knot every 0.0125. */
 void test_the_knee_of_a_straight_line_is_its_end(void)
 {
     commission_curve_t curve = {.level = q30(LEVEL)};
@@ -210,14 +212,15 @@ void test_the_knee_of_a_straight_line_is_its_end(void)
         curve.knot[k] = q30(i);
         curve.v[k] = q30(LEVEL * fmin(i / 0.0625, 1.0));
     }
-    /* Half a knot's step is missing, the constant up to the first one: 0.0125^2/0.0625 of area, twice half of it. */
+    /* Below the first knot the curve is taken as constant; a triangle of the area, 0.0125^2/0.0625 of the knee, is
+     * missing. */
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0625 - 0.0125 * 0.0125 / 0.0625, commission_knee(&curve) / ONE);
     curve.level = 0;
     TEST_ASSERT_EQUAL_INT32(0, commission_knee(&curve));
 }
 
-/* A curve that lies above its level has no area below it; one without voltage up to 0.9 would have its knee at 1.8. */
-void test_a_knee_is_neither_negative_nor_beyond_one(void)
+/* For a curve above its level the area is negative; for one that is 0 up to 0.9 the knee would be 1.8. */
+void test_the_knee_is_limited_to_between_zero_and_one(void)
 {
     commission_curve_t curve = {.level = q30(LEVEL)};
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
@@ -231,8 +234,8 @@ void test_a_knee_is_neither_negative_nor_beyond_one(void)
     TEST_ASSERT_EQUAL_INT32(q30(1.0) - 1, commission_knee(&curve));
 }
 
-/* The resistance is below Z_b in every machine; a larger one would not fit its format. */
-void test_a_slope_of_one_or_more_does_not_fit(void)
+/* The resistance is below Z_b in every machine; its format cannot represent more. */
+void test_a_slope_of_one_or_more_is_refused(void)
 {
     commission_curve_t curve;
     twin_curve_t twin;
@@ -248,7 +251,7 @@ void test_a_slope_of_one_or_more_does_not_fit(void)
     TEST_ASSERT_FALSE(commission_fit(&data, &curve));
 }
 
-void test_currents_that_do_not_rise_and_a_falling_voltage_do_not_fit(void)
+void test_currents_that_do_not_rise_and_a_falling_voltage_are_refused(void)
 {
     twin_curve_t twin;
     commission_curve_t curve;
@@ -265,8 +268,8 @@ void test_currents_that_do_not_rise_and_a_falling_voltage_do_not_fit(void)
     TEST_ASSERT_FALSE(commission_fit(&data, &curve));
 }
 
-/* A machine at rest with offsets in both sensors; ten periods. */
-static commission_in_t answer(void)
+/* A step of ten periods of a machine at standstill, with offsets of current and voltage. */
+static commission_in_t response(void)
 {
     const double i = state.i_ref.d, sign = (state.i_ref.d > 0) ? 1.0 : -1.0;
     const double u = R * (i - 40.0) + sign * 4.0 / 3.0 * LEVEL * 32768.0 + 25.0;
@@ -277,7 +280,7 @@ static int run(void)
 {
     int ms = 0;
     while (commission_runs(&state) && ms < 5000) {
-        const commission_in_t in = answer();
+        const commission_in_t in = response();
         TEST_ASSERT_EQUAL_INT32(0, state.i_ref.q);
         commission_step(&config, &state, &in);
         ms++;
@@ -285,68 +288,69 @@ static int run(void)
     return ms;
 }
 
-void test_it_ends_after_two_seconds_with_no_current_and_offsets_cancelled(void)
+void test_commissioning_ends_after_two_seconds_without_current_and_the_offsets_cancel(void)
 {
     commission_curve_t curve;
     TEST_ASSERT_EQUAL_INT(20 * (40 + 64), run());
     TEST_ASSERT_EQUAL_INT(COMMISSION_DONE, state.phase);
     TEST_ASSERT_EQUAL_INT32(0, state.i_ref.d);
     TEST_ASSERT_TRUE(commission_fit(&state.data, &curve));
-    TEST_ASSERT_DOUBLE_WITHIN(2e-4, R, curve.r / ONE); /* a tenth of a count of voltage in each level */
+    TEST_ASSERT_DOUBLE_WITHIN(2e-4, R, curve.r / ONE); /* rounding: a tenth of a count of voltage in each level */
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, LEVEL, curve.level / ONE);
 }
 
-void test_the_levels_double_every_second_time_and_both_polarities_are_used(void)
+void test_every_second_level_is_doubled_and_each_level_is_used_with_both_polarities(void)
 {
     TEST_ASSERT_INT_WITHIN(1, lround(0.6 * 512.0), state.i_ref.d);
     for (int k = 0; k < 104; k++) {
-        const commission_in_t in = answer();
+        const commission_in_t in = response();
         commission_step(&config, &state, &in);
     }
     TEST_ASSERT_INT_WITHIN(1, -lround(0.6 * 512.0), state.i_ref.d);
     for (int k = 0; k < 3 * 104; k++) {
-        const commission_in_t in = answer();
+        const commission_in_t in = response();
         commission_step(&config, &state, &in);
     }
     TEST_ASSERT_INT_WITHIN(1, lround(0.6 * 1024.0), state.i_ref.d);
 }
 
-static commission_failure_t after(int ms, commission_in_t wrong)
+/* Good steps for ms milliseconds, then a bad one. */
+static commission_failure_t failure_after(int ms, commission_in_t bad)
 {
     commission_start(&config, &state);
     for (int k = 0; k < ms; k++) {
-        const commission_in_t in = answer();
+        const commission_in_t in = response();
         commission_step(&config, &state, &in);
     }
-    commission_step(&config, &state, &wrong);
+    commission_step(&config, &state, &bad);
     TEST_ASSERT_EQUAL_INT32(0, state.i_ref.d);
     TEST_ASSERT_FALSE(commission_runs(&state));
     return state.failure;
 }
 
-void test_it_fails_if_the_rotor_moves_switching_stops_the_voltage_is_limited_or_the_current_is_wrong(void)
+void test_commissioning_fails_if_the_rotor_moves_switching_stops_the_voltage_is_limited_or_the_current_is_wrong(void)
 {
-    const commission_in_t good = answer();
+    const commission_in_t good = response();
     commission_in_t in = good;
     in.omega = -OMEGA_MAX - 1;
-    TEST_ASSERT_EQUAL_INT(COMMISSION_MOVED, after(10, in));
+    TEST_ASSERT_EQUAL_INT(COMMISSION_MOVED, failure_after(10, in));
     in = good;
     in.acting = false;
-    TEST_ASSERT_EQUAL_INT(COMMISSION_STOPPED, after(10, in));
+    TEST_ASSERT_EQUAL_INT(COMMISSION_STOPPED, failure_after(10, in));
     in = good;
     in.limited = true;
-    TEST_ASSERT_EQUAL_INT(COMMISSION_LIMITED, after(50, in));
+    TEST_ASSERT_EQUAL_INT(COMMISSION_LIMITED, failure_after(50, in));
     in = good;
     in.sum_i.d = good.sum_i.d + 6000;
-    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, after(50, in));
+    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, failure_after(50, in));
     in = good;
     in.sum_i.q = -6000;
-    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, after(50, in));
+    TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, failure_after(50, in));
 }
 
-void test_while_a_current_settles_the_voltage_may_be_cut(void)
+void test_while_a_current_settles_the_voltage_may_be_limited(void)
 {
-    commission_in_t in = answer();
+    commission_in_t in = response();
     in.limited = true;
     commission_step(&config, &state, &in);
     TEST_ASSERT_TRUE(commission_runs(&state));

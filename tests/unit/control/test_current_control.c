@@ -24,7 +24,7 @@ void setUp(void)
     current_control_reset(&state);
     flux = flux_table_step(&f.flux_table, (dq_q15_t){-4000, 6000});
     const dq_q15_t psi = {flux.psi_d, flux.psi_q};
-    target = (current_target_t){psi, q30(psi)}; /* no error at all */
+    target = (current_target_t){psi, q30(psi)}; /* no flux error */
     in = (current_control_in_t){.target = &target, .flux = &flux, .v_dc = 21845 /* 350 V */};
 }
 
@@ -32,18 +32,19 @@ void tearDown(void)
 {
 }
 
-/* In LSB of q15: a whole v. */
+/* |v| = 1 in LSB of q15. */
 static double v_max(void)
 {
     return f.si.v_ratio * in.v_dc;
 }
 
+/* One axis of v in LSB of q15; half 0 is d, half 1 is q. */
 static double of_v(int half)
 {
     return (int16_t)(out.v >> (16 * half)) / 32768.0 * v_max();
 }
 
-/* What is left of the voltage, in LSB of q15. */
+/* The voltage after the limit, in LSB of q15. */
 static dq_q15_t step(void)
 {
     out = current_control_step(&f.current_control, &state, &in);
@@ -52,7 +53,7 @@ static dq_q15_t step(void)
     if (limited) {
         return (dq_q15_t){(int32_t)lround(of_v(0)), (int32_t)lround(of_v(1))};
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(0), out.u.d); /* half an LSB of each, where v's is the smaller one */
+    TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(0), out.u.d); /* half an LSB of u and of v, whose LSB is smaller */
     TEST_ASSERT_DOUBLE_WITHIN(1.01, of_v(1), out.u.q);
     return out.u;
 }
@@ -62,7 +63,7 @@ static twin_dq_t si_psi(dq_q15_t psi)
     return (twin_dq_t){from_q15(psi.d) * f.psi, from_q15(psi.q) * f.psi};
 }
 
-/* The twin on exactly what the stage was given: the rounded fluxes. Its answer in LSB of q15. */
+/* The twin with the inputs of the stage, that is with the rounded fluxes. Returns the voltage in LSB of q15. */
 static twin_dq_t twin_step(twin_current_state_t *twin)
 {
     const twin_dq_t psi = si_psi((dq_q15_t){flux.psi_d, flux.psi_q});
@@ -84,7 +85,8 @@ static dq_q15_t random_dq(uint64_t *seed, int largest)
 
 /* --- the target ------------------------------------------------------------------------------ */
 
-/* psi* is the tables' (4 LSB, see their own test); the weighted one adds two roundings and (1 - b) of those. */
+/* psi* has the error of the tables (4 LSB, see test_flux_table.c); the weighted one adds two roundings and (1 - b) of
+ * that error. */
 void test_the_target_of_every_reference_follows_the_twin(void)
 {
     worst_t worst = {0};
@@ -106,7 +108,7 @@ void test_the_target_of_every_reference_follows_the_twin(void)
     ASSERT_WORST(worst, 6.0);
 }
 
-void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
+void test_the_target_of_zero_current_is_the_magnets_flux(void)
 {
     const flux_point_t at = flux_table_step(&f.flux_table, (dq_q15_t){0, 0});
     const current_target_t y = current_control_target(&f.current_control, (dq_q15_t){0, 0}, &at);
@@ -116,9 +118,9 @@ void test_no_reference_asks_for_the_magnets_flux_and_nothing_else(void)
     TEST_ASSERT_EQUAL_INT(0, y.weighted.q);
 }
 
-/* By hand: psi* = 10000 with a magnet of 17000 is a lift of -7000; b = 1/2 leaves half of it; the drop adds 1/8 of
- * i*. */
-void test_the_set_point_weight_takes_of_the_currents_share_only(void)
+/* By hand: psi* = 10000 with a magnet of 17000 contains -7000 of the current; b = 1/2 keeps half of it; the resistive
+ * drop adds 1/8 of i*. */
+void test_the_set_point_weight_reduces_only_the_flux_of_the_current(void)
 {
     const flux_point_t at = {.psi_d = 10000, .psi_q = 8000, .psi_f0 = 17000};
     f.current_control.setpoint_weight = 16384;
@@ -132,21 +134,22 @@ void test_the_set_point_weight_takes_of_the_currents_share_only(void)
 
 /* --- the step -------------------------------------------------------------------------------- */
 
-/* Near the edge of one of the 256 steps the two may stand on different sides. */
+/* Near a boundary of the 256 table steps, stage and twin may use different steps. */
 static bool between_steps(double v)
 {
     const double cells = fabs(v) * 256.0;
     return fabs(v) < 1.0 && fabs(cells - round(cells)) < 0.05;
 }
 
-/* |psi* - psi| and psi_d + dpsi stay below 1 here: beyond, the stage saturates them.
- * v: 0.5 LSB of the product, 1e-5 of it of the quotient, 0.5 of the saturation's end; q takes two of them. */
+/* |psi* - psi| and psi_d + dpsi stay below 1, above which the stage saturates them.
+ * Errors of v: 0.5 LSB of the product, relative 1e-5 of the quotient, 0.5 LSB at the end of the saturation; those of d
+ * also enter q. */
 void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
 {
     worst_t worst = {0};
     worst_t integrator = {0};
     uint64_t seed = 51;
-    int seen = 0;
+    int limited_steps = 0;
     for (int n = 0; n < 400000; n++) {
         const int largest = (n % 2) ? 11000 : 4000;
         const dq_q15_t psi = random_dq(&seed, largest);
@@ -164,20 +167,20 @@ void test_a_single_step_follows_the_twin_over_the_whole_plane(void)
         if ((limited || twin.limited) && between_steps(((target.psi.d > psi.d) ? t.q : t.d) / v_max())) {
             continue;
         }
-        seen += twin.limited ? 1 : 0;
+        limited_steps += twin.limited ? 1 : 0;
         worst_note(&worst, u.d - t.d, "u_d %d, psi %d %d w %d v %d", u.d, psi.d, psi.q, in.omega, in.v_dc);
         worst_note(&worst, u.q - t.q, "u_q %d not %.1f (u_d %d), psi %d %d w %d v %d", u.q, t.q, u.d, psi.d, psi.q,
                    in.omega, in.v_dc);
         worst_note(&integrator, 2.0 * from_q31(state.s_d_q30) - twin.s.d / f.v, "s_d, psi %d %d", psi.d, psi.q);
         worst_note(&integrator, 2.0 * from_q31(state.s_q_q30) - twin.s.q / f.v, "s_q, psi %d %d", psi.d, psi.q);
     }
-    TEST_ASSERT_GREATER_THAN_INT(200000, seen);
+    TEST_ASSERT_GREATER_THAN_INT(200000, limited_steps);
     ASSERT_WORST(worst, 3.0);
-    ASSERT_WORST(integrator, 8e-6); /* the step is exact; the cut is known to 4 + 2 LSB of v, 1/14 of it counts */
+    ASSERT_WORST(integrator, 8e-6); /* 1/14 of the error of u_limited - u, 4 + 2 LSB of v */
 }
 
-/* Without limit the two integrators do the same sums; the stage's are exact. */
-void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
+/* While nothing limits, the integrators are exact. */
+void test_after_ten_thousand_periods_the_integrators_equal_those_of_the_twin(void)
 {
     worst_t worst = {0};
     uint64_t seed = 52;
@@ -195,20 +198,21 @@ void test_ten_thousand_periods_leave_the_integrators_where_the_twins_are(void)
     ASSERT_WORST(worst, 1e-9);
 }
 
-/* Alternating +-1 LSB is no error: a truncating step would drift by 1e6/2 LSB of its own unit. */
+/* An error that alternates between +-1 LSB has a mean of 0; with truncation the integrator would drift by 1e6/2 of its
+ * LSB. */
 void test_a_million_periods_of_one_lsb_ripple_do_not_bias_the_integrators(void)
 {
-    const dq_q15_t rest = target.psi;
+    const dq_q15_t initial = target.psi;
     for (int n = 0; n < 1000000; n++) {
         const int e = (n & 1) ? 1 : -1;
-        target.psi = (dq_q15_t){(q15_t)(rest.d + e), (q15_t)(rest.q + e)};
+        target.psi = (dq_q15_t){(q15_t)(initial.d + e), (q15_t)(initial.q + e)};
         (void)step();
     }
     TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
     TEST_ASSERT_EQUAL_INT32(0, state.s_q_q30);
 }
 
-/* One LSB of flux for 10^4 periods: the exact ramp N sigma a_i 2^-15, bit for bit. */
+/* One LSB of flux for 10^4 periods: exactly N sigma a_i 2^-15. */
 void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
 {
     target.psi.q = (q15_t)(target.psi.q + 1);
@@ -219,7 +223,7 @@ void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
     TEST_ASSERT_EQUAL_INT32(0, state.s_d_q30);
 }
 
-void test_at_standstill_without_error_nothing_but_the_integrator_is_put_out(void)
+void test_at_standstill_without_error_the_voltage_is_that_of_the_integrators(void)
 {
     state.s_d_q30 = 1000 * 32768;
     state.s_q_q30 = -2000 * 32768;
@@ -229,7 +233,7 @@ void test_at_standstill_without_error_nothing_but_the_integrator_is_put_out(void
     TEST_ASSERT_EQUAL_INT32(1000 * 32768, state.s_d_q30);
 }
 
-/* u_d = -w psi_q, u_q = w (psi_d + dpsi), by hand: w = 1/2, so half of the fluxes. */
+/* By hand: u_d = -w psi_q, u_q = w (psi_d + dpsi) with w = 1/2. */
 void test_the_rotational_voltages_are_fed_forward_with_the_identified_flux(void)
 {
     in.omega = 16384 * 65536;
@@ -260,8 +264,8 @@ void test_the_proportional_part_follows_the_weighted_target_and_the_integral_par
                               2.0 * from_q31(state.s_d_q30));
 }
 
-/* 3 : 4 : 5 by hand; the step of 0.6 ends at 154/256, which leaves 0.7988. */
-void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the_circle(void)
+/* By hand: v_d = 3/5. The table step that contains 0.6 ends at 154/256 and leaves 0.7988 for v_q, instead of 4/5. */
+void test_the_d_axis_has_priority_and_the_q_axis_gets_the_rest_of_the_circle(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state.s_d_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
@@ -271,17 +275,18 @@ void test_the_d_axis_keeps_its_voltage_first_and_the_q_axis_gets_the_rest_of_the
         TEST_ASSERT_INT_WITHIN(2, sign * 0.7988 * v_max(), u.q);
         TEST_ASSERT_TRUE(limited);
         state.s_d_q30 = -32767 * 32768;
-        u = step(); /* the q axis always keeps a quarter, to get out of there */
+        u = step(); /* the q axis always keeps a quarter, so that its current can change */
         TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
         TEST_ASSERT_INT_WITHIN(1, sign * 0.25 * v_max(), u.q);
     }
 }
 
-/* By hand: u_d is 200 LSB beyond the circle; with u_q at nothing, q gets just these, to shed the flux -w psi_q. */
-void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_of_rotation(void)
+/* By hand: u_d exceeds the circle by 200 LSB and u_q is 0: q gets these 200 LSB, which reduce psi_q and with it the
+ * rotational voltage -w psi_q of the d axis. */
+void test_the_excess_of_the_d_voltage_is_subtracted_from_the_q_voltage_in_the_direction_of_rotation(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        in.omega = sign; /* nothing but its sign */
+        in.omega = sign; /* too small for a rotational voltage: only its sign acts */
         state = (current_control_state_t){.s_d_q30 = -(int32_t)(v_max() + 200.0) * 32768};
         const dq_q15_t u = step();
         TEST_ASSERT_INT_WITHIN(1, -v_max(), u.d);
@@ -289,9 +294,9 @@ void test_what_the_d_axis_is_short_of_is_taken_off_the_q_axis_in_the_direction_o
     }
 }
 
-/* By hand: 3/5 for q, whose step ends at 154/256 and leaves 0.7988; psi_d* one LSB above psi_d decides. Beside the
- * whole of q d keeps 0.7. */
-void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
+/* psi_d* is one LSB above psi_d, so that the d flux is to rise. By hand: v_q = 3/5, whose table step ends at 154/256
+ * and leaves 0.7988 for v_d. With |v_q| = 1 the d axis keeps 0.7. */
+void test_while_the_d_flux_is_to_rise_the_q_axis_has_priority(void)
 {
     state.s_d_q30 = -(int32_t)(v_max() * 6 / 5) * 32768;
     state.s_q_q30 = (int32_t)(v_max() * 3 / 5) * 32768;
@@ -305,11 +310,11 @@ void test_while_the_d_axis_asks_for_flux_back_the_q_axis_comes_first(void)
     TEST_ASSERT_INT_WITHIN(1, -v_max(), of_v(1));
 }
 
-/* Between the circle that is clear and the whole one, in all directions: nothing is cut, and nothing is said to be. */
-void test_inside_the_circle_nothing_is_cut_whatever_the_direction_of_rotation(void)
+/* |v| between the circle of `clear` and the unit circle, in all directions. */
+void test_inside_the_circle_nothing_is_limited_in_either_direction_of_rotation(void)
 {
     uint64_t seed = 55;
-    int seen = 0;
+    int not_clear = 0;
     for (int n = 0; n < 100000; n++) {
         const double phi = random_in(&seed, 0, 65535) * (2.0 * 3.14159265358979323846 / 65536.0);
         const double length = random_in(&seed, 880, 985) * 1e-3 * v_max();
@@ -320,13 +325,13 @@ void test_inside_the_circle_nothing_is_cut_whatever_the_direction_of_rotation(vo
         TEST_ASSERT_FALSE(limited);
         TEST_ASSERT_EQUAL_INT32(before.s_d_q30, state.s_d_q30);
         TEST_ASSERT_EQUAL_INT32(before.s_q_q30, state.s_q_q30);
-        seen += out.clear ? 0 : 1;
+        not_clear += out.clear ? 0 : 1;
     }
-    TEST_ASSERT_GREATER_THAN_INT(80000, seen);
+    TEST_ASSERT_GREATER_THAN_INT(80000, not_clear);
 }
 
-/* All of u_d may go to the axis that asks for flux back, and that is not yet a limit. */
-void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
+/* With v_q = 0 the d axis may use the whole circle although the q axis has priority. */
+void test_a_d_voltage_inside_the_circle_is_not_limited_while_the_d_flux_is_to_rise(void)
 {
     state.s_d_q30 = (int32_t)(0.99 * v_max()) * 32768;
     target.psi.d = (q15_t)(target.psi.d + 1);
@@ -335,22 +340,21 @@ void test_asking_for_flux_back_up_to_the_circle_is_no_limit(void)
     TEST_ASSERT_FALSE(out.clear);
 }
 
-/* A machine that brakes at high speed with the flux that the voltage just holds, and is then asked for none: flux in
- * the
- * stator's own equations, dpsi/dt = u - j w psi, far from the reference. Serving d first it would stay for ever at
- * u = (0.97, -0.25) v_max with this flux. Every corner of the ring must come home. */
-void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
+/* A machine at high speed has the largest flux that the voltage can hold (|psi| = v_max/|w|, any angle), and the
+ * reference is then set to zero current. The flux follows dpsi/dt = u - j w psi. If the d axis always had priority, the
+ * machine would stay at u = (0.97, -0.25) v_max with this flux. From every angle the target must be reached. */
+void test_from_every_flux_at_the_voltage_limit_the_target_is_reached(void)
 {
     const double w = -1885.0; /* 6000 rpm, three pole pairs */
-    const twin_flux_t rest = twin_flux_table(&f.si, (twin_dq_t){0.0, 0.0});
+    const twin_flux_t magnet = twin_flux_table(&f.si, (twin_dq_t){0.0, 0.0});
     for (int n = 0; n < 24; n++) {
         const double phi = n * (2.0 * 3.14159265358979323846 / 24.0);
-        const double ring = f.si.v_ratio * 350.0 / 1885.0;
-        double psi_d = ring * cos(phi);
-        double psi_q = ring * sin(phi);
+        const double psi_max = f.si.v_ratio * 350.0 / 1885.0;
+        double psi_d = psi_max * cos(phi);
+        double psi_q = psi_max * sin(phi);
         twin_dq_t acting = {-w * psi_q, w * psi_d};
         current_control_reset(&state);
-        target.psi = (dq_q15_t){(q15_t)lround(rest.psi_d / f.psi * 32768.0), 0};
+        target.psi = (dq_q15_t){(q15_t)lround(magnet.psi_d / f.psi * 32768.0), 0};
         target.weighted = q30(target.psi);
         in.omega = (q31_t)lround(w / f.w * 2147483648.0);
         in.psi_delta = 0;
@@ -366,13 +370,13 @@ void test_no_flux_that_the_voltage_can_hold_binds_the_machine(void)
             }
             acting = (twin_dq_t){from_q15(u.d) * f.v, from_q15(u.q) * f.v};
         }
-        TEST_ASSERT_DOUBLE_WITHIN(0.02 * ring, rest.psi_d, psi_d);
-        TEST_ASSERT_DOUBLE_WITHIN(0.02 * ring, 0.0, psi_q);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * psi_max, magnet.psi_d, psi_d);
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * psi_max, 0.0, psi_q);
     }
 }
 
-/* Beside no u_d the first of the 256 steps leaves sqrt(1 - 1/256^2). */
-void test_a_voltage_inside_the_circle_is_not_called_limited(void)
+/* With u_d = 0 the first of the 256 table steps leaves sqrt(1 - 1/256^2). */
+void test_a_voltage_inside_the_circle_is_not_reported_as_limited(void)
 {
     state.s_q_q30 = (int32_t)(0.9999 * v_max()) * 32768;
     TEST_ASSERT_INT_WITHIN(1, 0.9999 * v_max(), step().q);
@@ -380,7 +384,7 @@ void test_a_voltage_inside_the_circle_is_not_called_limited(void)
     state.s_q_q30 = (int32_t)(v_max() + 1.0) * 32768;
     TEST_ASSERT_INT_WITHIN(1, v_max(), step().q);
     TEST_ASSERT_TRUE(limited);
-    for (int sign = -1; sign <= 1; sign++) { /* d is short of nothing: nothing to take off q, whichever way it turns */
+    for (int sign = -1; sign <= 1; sign++) { /* d is inside the circle: nothing is subtracted from q in any direction */
         in.omega = sign;
         state = (current_control_state_t){.s_d_q30 = (int32_t)(0.98 * v_max()) * 32768};
         TEST_ASSERT_INT_WITHIN(1, 0, step().q);
@@ -389,8 +393,8 @@ void test_a_voltage_inside_the_circle_is_not_called_limited(void)
     }
 }
 
-/* The promise to the modulation: clear says that |v| is below its bound, and never that something was cut. */
-void test_clear_is_said_inside_its_circle_only(void)
+/* The modulation relies on it: `clear` means that |v| is below this bound, where no pulse can be limited (MO-11). */
+void test_clear_is_set_exactly_inside_its_circle(void)
 {
     uint64_t seed = 54;
     const double bound = f.current_control.clear_q30 / 1073741824.0;
@@ -403,33 +407,34 @@ void test_clear_is_said_inside_its_circle_only(void)
     }
 }
 
-/* Ten seconds against the limit: the integrator stops where what is cut away balances the error, u = v_max + sigma b e,
- * and a reversed error of the same size leads off the limit in the same period. */
-void test_the_integrator_settles_at_the_limit_and_recovers_at_once(void)
+/* Ten seconds at the limit: the integrator settles where the anti-windup balances the integrated error; the voltage
+ * before the limit is then v_max + sigma b e. When the error reverses with the same magnitude, the voltage leaves the
+ * limit in the same period. */
+void test_the_integrator_settles_at_the_limit_and_leaves_it_immediately(void)
 {
     in.v_dc = 4000;
-    const int32_t rest = target.psi.q;
-    target.psi.q = rest + 200;
+    const int32_t initial = target.psi.q;
+    target.psi.q = initial + 200;
     target.weighted = q30(target.psi);
     for (int n = 0; n < 5000; n++) {
         (void)step();
     }
-    const q31_t held = state.s_q_q30;
+    const q31_t settled = state.s_q_q30;
     for (int n = 0; n < 100000; n++) {
         (void)step();
     }
     TEST_ASSERT_TRUE(limited);
-    TEST_ASSERT_INT_WITHIN(32768, held, state.s_q_q30);
-    TEST_ASSERT_INT_WITHIN(2, v_max() + 0.8488 * 200 * (0.7 - 1.0), held >> 15);
-    target.psi.q = rest - 200;
+    TEST_ASSERT_INT_WITHIN(32768, settled, state.s_q_q30);
+    TEST_ASSERT_INT_WITHIN(2, v_max() + 0.8488 * 200 * (0.7 - 1.0), settled >> 15);
+    target.psi.q = initial - 200;
     target.weighted = q30(target.psi);
     TEST_ASSERT_LESS_THAN_INT((int)v_max(), step().q);
-    TEST_ASSERT_LESS_THAN_INT32(held, state.s_q_q30);
+    TEST_ASSERT_LESS_THAN_INT32(settled, state.s_q_q30);
 }
 
-/* By hand: v_max = 2280; s = 8000 leaves a cut of 5720, a_i/b = 1/14 of it comes off per period; of 20000 no more than
- * four times the circle counts. */
-void test_an_integrator_far_beyond_the_limit_is_led_back_in_both_signs(void)
+/* By hand: v_max = 2280. With s = 8000 the limit removes 5720, and s is reduced by a_i/b = 1/14 of that per period.
+ * With s = 20000 the reduction is computed from four times the circle at most. */
+void test_an_integrator_far_beyond_the_limit_returns_to_it_with_either_sign(void)
 {
     in.v_dc = 4000;
     for (int sign = -1; sign <= 1; sign += 2) {
@@ -446,8 +451,8 @@ void test_an_integrator_far_beyond_the_limit_is_led_back_in_both_signs(void)
     }
 }
 
-/* Each axis follows its own cut only: u_q at its limit must not disturb the d integrator. */
-void test_one_axis_at_the_limit_does_not_hold_the_other(void)
+/* The anti-windup of each axis uses the limit of this axis only. */
+void test_an_axis_at_its_limit_does_not_affect_the_integrator_of_the_other(void)
 {
     in.v_dc = 4000;
     state.s_d_q30 = 1000 * 32768;
@@ -458,16 +463,16 @@ void test_one_axis_at_the_limit_does_not_hold_the_other(void)
     TEST_ASSERT_LESS_THAN_INT32(20000 * 32768, state.s_q_q30);
 }
 
-/* Below 1/(64 v_ratio), 898 LSB, the voltage is normalised as if it were that; at 0 and 1 LSB nothing is put out. */
-void test_without_dc_voltage_nothing_is_put_out(void)
+/* A v_dc below 1/(64 v_ratio), 898 LSB, is replaced by that value; at 0 and 1 LSB the output is 0. */
+void test_without_dc_voltage_the_output_is_zero(void)
 {
     state.s_d_q30 = -100 * 32768;
     in.v_dc = 898;
     TEST_ASSERT_INT_WITHIN(1, -100, step().d);
-    const fx_pair_t there = out.v;
+    const fx_pair_t at_898 = out.v;
     in.v_dc = 200;
     out = current_control_step(&f.current_control, &state, &in);
-    TEST_ASSERT_INT_WITHIN(64, (int16_t)there, (int16_t)out.v);
+    TEST_ASSERT_INT_WITHIN(64, (int16_t)at_898, (int16_t)out.v);
     for (in.v_dc = 0; in.v_dc < 2; in.v_dc++) {
         target.weighted = q30((dq_q15_t){-20000, 20000});
         out = current_control_step(&f.current_control, &state, &in);
@@ -487,7 +492,7 @@ void test_the_worst_corner_of_every_input_neither_wraps_nor_leaves_the_circle(vo
         in.psi_delta = end[(n >> 7) & 1];
         state.s_d_q30 = state.s_q_q30 = (n & 256) ? -(1 << 30) : (1 << 30) - 1;
         in.v_dc = (n & 1) ? 32767 : 900;
-        const dq_q15_t u = step(); /* q whole, and what d has beside it in any case */
+        const dq_q15_t u = step(); /* at most |v_q| = 1 and the 0.7 that the d axis always keeps */
         TEST_ASSERT_TRUE(hypot(u.d, u.q) <= v_max() * hypot(1.0, 0.7) + 1.5);
     }
 }

@@ -23,7 +23,7 @@ static current_reference_t step(void)
     return current_reference_step(&f.current_reference, &in);
 }
 
-/* At low speed every voltage is enough: the last row of the table, maximum torque per ampere. */
+/* At low speed the voltage is sufficient for any flux: the last row of the table, maximum torque per ampere. */
 void test_at_low_speed_a_node_gives_the_tabulated_mtpa_currents(void)
 {
     for (int ix = 0; ix < 7; ix++) {
@@ -57,29 +57,30 @@ void test_the_direction_of_rotation_does_not_matter(void)
     TEST_ASSERT_EQUAL_INT(forward.i_ref.q, backward.i_ref.q);
 }
 
-/* By hand: v_ratio v_dc = 0.55 * 0.6667 = 0.3667; w = 0.8 leaves 0.4583: between flux nodes 5 and 6. */
+/* By hand: v_ratio v_dc = 0.55 * 0.6667 = 0.3667; at w = 0.8 this is a flux of 0.4583, between flux nodes 5 and 6. */
 void test_the_available_flux_is_the_planned_voltage_over_the_speed(void)
 {
     in.omega = 26214;
     in.torque_corrected = 0;
     const double psi = 0.55 * 21845.0 / 32768.0 / 0.8;
-    TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * psi) * 32768.0, step().torque_max); /* the fixture's own line */
-    in.i_magnitude = 16384; /* takes r/2 = 0.00514 of the voltage */
+    /* 0.2 + 0.4 psi: torque_max of the fixture. */
+    TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * psi) * 32768.0, step().torque_max);
+    in.i_magnitude = 16384; /* resistive drop: r/2 = 0.00514 */
     TEST_ASSERT_DOUBLE_WITHIN(2.0, (0.2 + 0.4 * (psi - 0.5 * 674.0 / 65536.0 / 0.8)) * 32768.0, step().torque_max);
 }
 
-void test_torque_beyond_the_limit_is_cut_to_it_and_flagged(void)
+void test_torque_beyond_the_limit_is_reduced_to_it_and_flagged(void)
 {
     in.omega = 26214;
     in.torque_corrected = 32767;
-    const current_reference_t cut = step();
-    TEST_ASSERT_TRUE(cut.limited);
-    in.torque_corrected = cut.torque_max;
+    const current_reference_t limited = step();
+    TEST_ASSERT_TRUE(limited.limited);
+    in.torque_corrected = limited.torque_max;
     const current_reference_t full = step();
     TEST_ASSERT_FALSE(full.limited);
-    TEST_ASSERT_EQUAL_INT(full.i_ref.d, cut.i_ref.d);
-    TEST_ASSERT_EQUAL_INT(full.i_ref.q, cut.i_ref.q);
-    in.torque_corrected = (q15_t)(-cut.torque_max - 1);
+    TEST_ASSERT_EQUAL_INT(full.i_ref.d, limited.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(full.i_ref.q, limited.i_ref.q);
+    in.torque_corrected = (q15_t)(-limited.torque_max - 1);
     TEST_ASSERT_TRUE(step().limited);
     in.torque_corrected = INT16_MIN;
     TEST_ASSERT_EQUAL_INT(-full.i_ref.q, step().i_ref.q);
@@ -101,8 +102,8 @@ void test_flux_below_the_table_is_flagged_and_uses_its_edge(void)
     TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
 }
 
-/* By hand, at w = 0.8: 0.02 of voltage is worth 0.025 of flux, and the magnet's share is taken off one to one. */
-void test_the_trim_adds_voltage_and_the_magnets_share_takes_flux_away(void)
+/* By hand, at w = 0.8: 0.02 of voltage is 0.025 of flux; shift is subtracted directly. */
+void test_the_trim_adds_voltage_and_the_identified_flux_error_reduces_the_planned_flux(void)
 {
     in.omega = 26214;
     const double psi = 0.55 * 21845.0 / 32768.0 / 0.8;
@@ -117,7 +118,7 @@ void test_the_trim_adds_voltage_and_the_magnets_share_takes_flux_away(void)
     TEST_ASSERT_DOUBLE_WITHIN(2.0, (psi - 0.025) * 32768.0 + 1000.0, step().psi_plan);
 }
 
-void test_where_voltage_is_no_limit_a_stronger_magnet_takes_no_flux_away(void)
+void test_a_stronger_magnet_reduces_the_planned_flux_only_where_the_voltage_limits(void)
 {
     in.shift = 3000;
     TEST_ASSERT_EQUAL_INT(INT16_MAX, step().psi_plan);
@@ -126,8 +127,9 @@ void test_where_voltage_is_no_limit_a_stronger_magnet_takes_no_flux_away(void)
     TEST_ASSERT_EQUAL_INT(0, step().psi_plan);
 }
 
-/* The fixture at t_max = 0.3833: i_q = 1.1 t - 0.2 t^2, linear between nodes 1/16 apart (below 2e-4 off). */
-void test_the_reachable_torque_counts_what_the_magnet_differs_by(void)
+/* In the fixture i_q = 1.1 t - 0.2 t^2, here at t_max = 0.3833; its linear interpolation between nodes at a distance of
+ * 1/16 is accurate to 2e-4. */
+void test_the_largest_torque_includes_the_identified_error_of_the_magnet_flux(void)
 {
     in.omega = 26214;
     const q15_t nominal = step().torque_max;
@@ -138,8 +140,8 @@ void test_the_reachable_torque_counts_what_the_magnet_differs_by(void)
     TEST_ASSERT_GREATER_OR_EQUAL_INT(0, step().torque_max);
 }
 
-/* Reluctance torque is -psi_q i_d: at a table node, one tenth more q flux gives a tenth of its i_d. */
-void test_the_reachable_torque_counts_what_the_q_axis_differs_by(void)
+/* The reluctance torque is -psi_q i_d: 0.1 more q flux changes it by -0.1 i_d. */
+void test_the_largest_torque_includes_the_identified_error_of_the_q_flux(void)
 {
     in.omega = 26214;
     const q15_t nominal = step().torque_max;
@@ -152,24 +154,24 @@ void test_the_reachable_torque_counts_what_the_q_axis_differs_by(void)
     TEST_ASSERT_DOUBLE_WITHIN(2.0, nominal + 0.1 * i_d, step().torque_max);
 }
 
-void test_i_d_goes_no_further_than_the_magnets_bear_and_says_so(void)
+void test_i_d_is_limited_to_the_demagnetisation_limit_and_reported(void)
 {
-    const current_reference_t free = step();
-    TEST_ASSERT_FALSE(free.i_d_limited);
-    in.i_d_max = (q15_t)(-free.i_ref.d - 10);
-    const current_reference_t cut = step();
-    TEST_ASSERT_EQUAL_INT(free.i_ref.d + 10, cut.i_ref.d);
-    TEST_ASSERT_EQUAL_INT(free.i_ref.q, cut.i_ref.q);
-    TEST_ASSERT_TRUE(cut.i_d_limited);
+    const current_reference_t unlimited = step();
+    TEST_ASSERT_FALSE(unlimited.i_d_limited);
+    in.i_d_max = (q15_t)(-unlimited.i_ref.d - 10);
+    const current_reference_t limited = step();
+    TEST_ASSERT_EQUAL_INT(unlimited.i_ref.d + 10, limited.i_ref.d);
+    TEST_ASSERT_EQUAL_INT(unlimited.i_ref.q, limited.i_ref.q);
+    TEST_ASSERT_TRUE(limited.i_d_limited);
 }
 
-void test_standstill_divides_by_nothing(void)
+void test_at_standstill_there_is_no_division_by_zero(void)
 {
     in.omega = 0;
-    const current_reference_t rest = step();
+    const current_reference_t standstill = step();
     in.omega = 1;
-    TEST_ASSERT_EQUAL_INT(step().i_ref.q, rest.i_ref.q);
-    TEST_ASSERT_FALSE(rest.limited);
+    TEST_ASSERT_EQUAL_INT(step().i_ref.q, standstill.i_ref.q);
+    TEST_ASSERT_FALSE(standstill.limited);
     in.v_dc = 0;
     TEST_ASSERT_TRUE(step().limited);
     in.omega = INT16_MIN;
@@ -177,7 +179,8 @@ void test_standstill_divides_by_nothing(void)
     (void)step();
 }
 
-/* psi: 1/2 LSB of quotient, 1 LSB of the drop over |w| -> below 1.5/0.1; slopes of i over psi below 0.2. */
+/* The planned flux has an error of 1/2 LSB of the quotient and 1 LSB of the drop divided by |w| > 0.09: below 16 LSB.
+ * The slope of the currents over it is below 0.2. */
 void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
 {
     worst_t worst = {0};
@@ -205,14 +208,14 @@ void test_the_references_follow_the_twin_over_torque_speed_and_voltage(void)
     ASSERT_WORST(worst, 8.0);
 }
 
-void test_the_current_circle_cuts_i_q_and_keeps_i_d(void)
+void test_the_current_circle_limits_i_q_and_keeps_i_d(void)
 {
     f.current_reference.i_max = 7000;
     in.torque_corrected = 8192;
     const current_reference_t y = step();
-    const current_reference_config_t open = fixture().current_reference;
-    const current_reference_t free = current_reference_step(&open, &in);
-    TEST_ASSERT_EQUAL_INT(free.i_ref.d, y.i_ref.d);
+    const current_reference_config_t wide = fixture().current_reference;
+    const current_reference_t unlimited = current_reference_step(&wide, &in);
+    TEST_ASSERT_EQUAL_INT(unlimited.i_ref.d, y.i_ref.d);
     TEST_ASSERT_DOUBLE_WITHIN(1.5, 7000.0, hypot(y.i_ref.d, y.i_ref.q));
     f.current_reference.i_max = 3000; /* less than i_d alone */
     const current_reference_t d_only = step();

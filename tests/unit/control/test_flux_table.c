@@ -21,9 +21,10 @@ static twin_dq_t amperes(dq_q15_t i)
     return (twin_dq_t){from_q15(i.d) * f.i, from_q15(i.q) * f.i};
 }
 
-/* Table values: one rounding (0.5) and the weights' 2^-15 of the twist, below 0.1 here.
- * psi = psi_f0 + l i with nothing rounded off l: 0.6 + 0.5, the twist times |i| < 1 and the shift 2^l_shift = 4. */
-static void hold_to_twin(worst_t *value, worst_t *flux, dq_q15_t i)
+/* Tolerances in LSB. Table values: one rounding (0.5), and 2^-15 of the mixed difference of the four nodes (below 0.1)
+ * from the interpolation weights. psi = psi_f0 + l i with unrounded l: 0.6 + 0.5, and the error of l times |i| < 1 and
+ * 2^l_shift = 4. */
+static void compare_with_twin(worst_t *value, worst_t *flux, dq_q15_t i)
 {
     const flux_point_t y = flux_table_step(&f.flux_table, i);
     const flux_inductances_t x = flux_table_inductances(&f.flux_table, i);
@@ -34,7 +35,7 @@ static void hold_to_twin(worst_t *value, worst_t *flux, dq_q15_t i)
     worst_note(value, x.l_d - t.l_d * l, "l_d of %d %d", i.d, i.q);
     worst_note(value, x.l_qq - t.l_qq * l, "l_qq of %d %d", i.d, i.q);
     worst_note(value, y.psi_f0 - t.psi_f0 * psi, "psi_f0 of %d %d", i.d, i.q);
-    /* The node of g is itself rounded. */
+    /* The nodes of g are themselves rounded by up to 0.5. */
     worst_note(value, fmax(fabs(y.g - 0.5 * (t.g_d + t.g_q) * g) - 0.5, 0.0), "g of %d %d", i.d, i.q);
     worst_note(flux, y.psi_d - twin_clamp(t.psi_d * psi, -32768, 32767), "psi_d of %d %d", i.d, i.q);
     worst_note(flux, y.psi_q - twin_clamp(t.psi_q * psi, -32768, 32767), "psi_q of %d %d", i.d, i.q);
@@ -48,20 +49,20 @@ void test_the_whole_current_plane_follows_the_twin(void)
     uint64_t seed = 41;
     for (int d = -32768; d <= 32767; d += 257) {
         for (int q = -32768; q <= 32767; q += 255) {
-            hold_to_twin(&value, &flux, (dq_q15_t){(q15_t)d, (q15_t)q});
+            compare_with_twin(&value, &flux, (dq_q15_t){(q15_t)d, (q15_t)q});
         }
     }
     for (int n = 0; n < 100000; n++) {
-        hold_to_twin(&value, &flux,
-                     (dq_q15_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
+        compare_with_twin(&value, &flux,
+                          (dq_q15_t){(q15_t)random_in(&seed, -32768, 32767), (q15_t)random_in(&seed, -32768, 32767)});
     }
-    hold_to_twin(&value, &flux, (dq_q15_t){INT16_MIN, INT16_MIN});
-    hold_to_twin(&value, &flux, (dq_q15_t){INT16_MAX, INT16_MIN});
+    compare_with_twin(&value, &flux, (dq_q15_t){INT16_MIN, INT16_MIN});
+    compare_with_twin(&value, &flux, (dq_q15_t){INT16_MAX, INT16_MIN});
     ASSERT_WORST(value, 0.6);
     ASSERT_WORST(flux, 3.6);
 }
 
-void test_a_node_gives_exactly_what_is_tabulated(void)
+void test_at_a_node_the_result_is_exactly_the_tabulated_value(void)
 {
     const int nx = (int)(f.flux_table.mesh.x_last >> 14) + 2;
     const int ny = (int)f.flux_table.mesh.ny;
@@ -80,8 +81,8 @@ void test_a_node_gives_exactly_what_is_tabulated(void)
     }
 }
 
-/* psi_d is even in i_q; psi_q is odd, to the one LSB by which half-up rounding differs for -x. */
-void test_the_half_planes_mirror_each_other(void)
+/* psi_d is even in i_q; psi_q is odd up to one LSB, by which rounding half up differs between x and -x. */
+void test_the_half_planes_of_i_q_are_symmetrical(void)
 {
     uint64_t seed = 42;
     for (int n = 0; n < 50000; n++) {
@@ -114,14 +115,14 @@ void test_one_count_outside_each_edge_is_flagged_and_keeps_the_edges_inductance(
     }
 }
 
-/* Continuity: a neighbour one count away may differ by the slope only, never by a cell. */
+/* At a distance of one count the results differ by the slope only. */
 void test_there_is_no_step_at_a_cell_boundary(void)
 {
     for (int q = -20000; q < 20000; q++) {
         const flux_point_t a = flux_table_step(&f.flux_table, (dq_q15_t){-8192, (q15_t)q});
         const flux_point_t b = flux_table_step(&f.flux_table, (dq_q15_t){-8192, (q15_t)(q + 1)});
         TEST_ASSERT_INT_WITHIN(2, a.g, b.g);
-        TEST_ASSERT_INT_WITHIN(8, a.psi_q, b.psi_q); /* l_q below 4, doubled by the slope of l_q, roundings */
+        TEST_ASSERT_INT_WITHIN(8, a.psi_q, b.psi_q); /* l_q below 4, twice that with the slope of l_q, and roundings */
     }
 }
 
@@ -141,7 +142,7 @@ void test_a_table_that_would_break_a_later_stage_is_rejected(void)
         TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, flux_table_check(&f.flux_table));
         *pointers[n] = good;
     }
-    for (int n = 1; n < 4; n++) { /* all inductances but l_d, which may change its sign near i_d = 0 */
+    for (int n = 1; n < 4; n++) { /* l_q, l_qq and g must be positive; l_d may change its sign near i_d = 0 */
         const int16_t *good = *pointers[n];
         for (int k = 0; k < 225; k++) {
             bad[k] = good[k];

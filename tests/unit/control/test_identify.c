@@ -4,7 +4,7 @@
 #include "identify_fixture.h"
 #include "unity.h"
 
-/* The whole identification on the invented machine: what it identifies, when it does not, and its confidence. */
+/* The complete identification on the machine of fixture.h: parameters, conditions of an update, confidence. */
 
 static fixture_t f;
 static identify_config_t c;
@@ -14,8 +14,8 @@ static identify_out_t out;
 static bool enabled;
 static int16_t winding_dC;
 
-/* steady_window() makes the voltages of a machine without iron loss. */
-static void iron_free(void)
+/* steady_window() computes the voltages of a machine without iron loss. */
+static void remove_iron_loss(void)
 {
     c.iron_hysteresis = 0;
     c.iron_eddy = 0;
@@ -27,7 +27,7 @@ void setUp(void)
 {
     f = fixture();
     identify_fixture(&f, &c);
-    iron_free();
+    remove_iron_loss();
     identify_reset(&c, &state);
     twin_identify_reset(&f.si, &twin);
     enabled = true;
@@ -50,8 +50,8 @@ static int32_t noise_with(int limited)
     return state.mean.noise_q30;
 }
 
-/* (ID-14): five times more if every period of the window has them, whatever their number; rounding of a tenth. */
-void test_pulses_that_the_bridge_cannot_make_add_noise_by_their_share_of_the_window(void)
+/* (ID-14): six times the noise if every period of the window has limited pulses, for any number of periods. */
+void test_limited_pulses_increase_the_noise_by_their_share_of_the_window(void)
 {
     static const int counts[] = {4, 10, 40};
     for (unsigned k = 0; k < sizeof counts / sizeof counts[0]; k++) {
@@ -61,7 +61,7 @@ void test_pulses_that_the_bridge_cannot_make_add_noise_by_their_share_of_the_win
     }
 }
 
-/* The machine's flux and drop differ from the tables: what the voltage shows of it. */
+/* Deviations of the true machine from the tables; extra() is their voltage. */
 typedef struct {
     double magnet_pu, lq_scale, drop_pu;
 } truth_t;
@@ -88,7 +88,7 @@ static void run(dq_q15_t i, double omega, truth_t truth, int steps)
     }
 }
 
-/* A drive through speeds and torques of both signs, as many seconds. */
+/* The given number of seconds with changing speeds and torques of both signs. */
 static void drive(truth_t truth, int seconds)
 {
     static const double speed[5] = {0.1, 0.25, 0.5, 0.8, 0.35};
@@ -103,8 +103,8 @@ static double value(identify_index_t index)
     return from_q31(identify_value(&c, &state, index));
 }
 
-static const truth_t nothing = {0.0, 1.0, 0.0};
-static const truth_t wrong = {-0.06, 1.05, 0.002};
+static const truth_t nominal = {0.0, 1.0, 0.0};
+static const truth_t deviating = {-0.06, 1.05, 0.002};
 
 static void assert_untouched(void)
 {
@@ -115,21 +115,21 @@ static void assert_untouched(void)
     TEST_ASSERT_EQUAL_INT32(0, state.local.q);
 }
 
-void test_magnet_inductance_and_drop_are_told_apart_in_a_drive(void)
+void test_magnet_flux_inductance_and_drop_are_identified_separately(void)
 {
-    drive(wrong, 30);
-    TEST_ASSERT_DOUBLE_WITHIN(0.003, -0.06, value(IDENTIFY_FLUX)); /* half a per cent of the magnet's 0.53 */
+    drive(deviating, 30);
+    TEST_ASSERT_DOUBLE_WITHIN(0.003, -0.06, value(IDENTIFY_FLUX)); /* half a per cent of the magnet flux of 0.53 */
     TEST_ASSERT_DOUBLE_WITHIN(0.005, 0.05, value(IDENTIFY_LQ));
     TEST_ASSERT_DOUBLE_WITHIN(0.0007, 0.002, value(IDENTIFY_DROP)); /* a third of its prior */
 }
 
-/* 0.5 % of the rated torque of the invented machine, 0.6 T_b, where the tables alone are 10 % wrong. */
-void test_after_a_drive_the_torque_is_that_of_the_true_flux_everywhere(void)
+/* Tolerance: 0.5 % of the rated torque of 0.6 T_b. The magnet flux of the tables is 11 % wrong. */
+void test_after_identification_the_torque_is_that_of_the_true_flux_at_other_operating_points(void)
 {
-    drive(wrong, 30);
+    drive(deviating, 30);
     for (int n = 0; n < 4; n++) {
         const dq_q15_t i = {-3000 - 1500 * n, (n % 2 == 0) ? 9000 : -6000};
-        run(i, 0.05 + 0.2 * n, wrong, 300);
+        run(i, 0.05 + 0.2 * n, deviating, 300);
         const flux_point_t flux = flux_table_step(&f.flux_table, i);
         const double psi_d = from_q15(flux.psi_d) - 0.06, psi_q = 1.05 * from_q15(flux.psi_q);
         const double expected = mean_on_the_chord(&f, i, psi_d, psi_q, 0.05 + 0.2 * n);
@@ -139,7 +139,7 @@ void test_after_a_drive_the_torque_is_that_of_the_true_flux_everywhere(void)
 
 void test_near_standstill_nothing_is_identified(void)
 {
-    run((dq_q15_t){-4000, 8000}, 0.019, wrong, 5000);
+    run((dq_q15_t){-4000, 8000}, 0.019, deviating, 5000);
     assert_untouched();
 }
 
@@ -151,14 +151,14 @@ void test_without_current_no_parameter_is_identified(void)
     }
 }
 
-void test_switched_off_nothing_is_identified(void)
+void test_while_disabled_nothing_is_identified(void)
 {
     enabled = false;
-    drive(wrong, 2);
+    drive(deviating, 2);
     assert_untouched();
 }
 
-void test_a_period_without_the_bridge_is_not_used_for_identification(void)
+void test_a_window_with_a_period_without_switching_is_not_used_for_identification(void)
 {
     window_pair_t pair = steady_window(&f, (dq_q15_t){-4000, 8000}, 0.4, (dq_q15_t){0, 900});
     pair.fixed.acting = false;
@@ -171,8 +171,8 @@ void test_a_period_without_the_bridge_is_not_used_for_identification(void)
     assert_untouched();
 }
 
-/* One invalid step among ten excludes the ten from identification. */
-void test_an_update_needs_all_of_its_steps(void)
+/* One invalid step excludes all ten steps of an update. */
+void test_an_update_needs_ten_valid_steps(void)
 {
     const dq_q15_t i = {-4000, 8000};
     const window_pair_t pair = steady_window(&f, i, 0.4, (dq_q15_t){0, 900});
@@ -186,26 +186,26 @@ void test_an_update_needs_all_of_its_steps(void)
     TEST_ASSERT_EQUAL_INT32(0, state.kalman.x_q27[IDENTIFY_FLUX]);
 }
 
-/* 0.39 % per kelvin: 120 C is 39 % more; a lost sensor keeps the last temperature. */
-void test_the_winding_temperature_is_the_priors_mean_and_a_lost_sensor_keeps_it(void)
+/* 0.39 % per kelvin: 39 % more at 120 C. */
+void test_the_winding_temperature_sets_the_prior_resistance_and_a_lost_sensor_keeps_it(void)
 {
     winding_dC = 1200;
-    run((dq_q15_t){0, 0}, 0.0, nothing, 10);
+    run((dq_q15_t){0, 0}, 0.0, nominal, 10);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
     TEST_ASSERT_TRUE(state.r_known);
     winding_dC = TEMPERATURE_UNKNOWN;
-    run((dq_q15_t){0, 0}, 0.0, nothing, 10);
+    run((dq_q15_t){0, 0}, 0.0, nominal, 10);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
     TEST_ASSERT_FALSE(state.r_known);
 }
 
-/* T^ with nothing identified is the tables' torque at the magnetising current. */
-void test_with_nothing_identified_the_torque_is_the_tables_less_the_iron_loss(void)
+/* Without identification T^ is the torque of the tables at the magnetising current. */
+void test_with_nothing_identified_the_torque_is_that_of_the_tables_minus_the_iron_loss(void)
 {
     const dq_q15_t i = {-4000, 8000};
     enabled = false;
     identify_fixture(&f, &c);
-    run(i, 0.5, nothing, 1);
+    run(i, 0.5, nominal, 1);
     const flux_point_t at_i = flux_table_step(&f.flux_table, i);
     /* (13 + 0.01 w)/1.5 A/Vs at half of w_b = 3927 rad/s: i_m = i + a (psi_q, -psi_d), counts of q15. */
     const double a = (13.0 + 0.01 * 0.5 * f.w) / 1.5 * f.psi / f.i;
@@ -215,21 +215,21 @@ void test_with_nothing_identified_the_torque_is_the_tables_less_the_iron_loss(vo
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, expected, from_q15(out.torque)); /* q15 of current, flux and torque */
 }
 
-void test_confidence_starts_at_nothing_and_comes_with_knowledge_in_half_a_second(void)
+void test_the_confidence_starts_at_zero_and_rises_within_half_a_second_after_identification(void)
 {
-    run((dq_q15_t){-4000, 8000}, 0.01, nothing, 1000);
+    run((dq_q15_t){-4000, 8000}, 0.01, nominal, 1000);
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
-    drive(nothing, 1);
+    drive(nominal, 1);
     TEST_ASSERT_TRUE(state.torque_certain);
     const q15_t before = state.confidence;
-    run((dq_q15_t){-4000, 8000}, 0.5, nothing, 10);
-    TEST_ASSERT_INT_WITHIN(655, before, state.confidence); /* 2 % per update: 10 ms of half a second */
-    drive(nothing, 1);
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 10);
+    TEST_ASSERT_INT_WITHIN(655, before, state.confidence); /* 2 % per update: half a second for the full range */
+    drive(nominal, 1);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
 }
 
-/* Share of the tables' torque variance that is left here, from the twin's covariance. */
-static double left_of_variance(dq_q15_t i, double omega)
+/* Variance of the torque at this operating point relative to that with the tables alone, from the twin's covariance. */
+static double relative_variance(dq_q15_t i, double omega)
 {
     const window_pair_t pair = steady_window(&f, i, omega, (dq_q15_t){0, 0});
     const twin_point_t point = twin_point(&f.si, &pair.twin, omega * f.w);
@@ -244,64 +244,67 @@ static double left_of_variance(dq_q15_t i, double omega)
     return posterior / prior;
 }
 
-/* No torque is certain to be no torque, whatever is known; it must not open the loop for the torque that follows. */
-void test_without_torque_no_confidence_comes_at_any_speed(void)
+/* A torque of zero is certain whatever the parameters are; this must not raise the confidence for the torque that
+ * follows. */
+void test_without_torque_the_confidence_stays_zero_at_any_speed(void)
 {
     static const double speed[4] = {0.0, 0.015, 0.3, -0.8};
     for (int n = 0; n < 4; n++) {
-        run((dq_q15_t){0, 0}, speed[n], nothing, 2000);
-        run((dq_q15_t){-100, 300}, speed[n], nothing, 2000); /* too little to identify anything */
+        run((dq_q15_t){0, 0}, speed[n], nominal, 2000);
+        run((dq_q15_t){-100, 300}, speed[n], nominal, 2000); /* too little to identify anything */
         TEST_ASSERT_FALSE(state.torque_certain);
         TEST_ASSERT_EQUAL_INT(0, state.confidence);
     }
 }
 
-/* Three eighths of the tables' variance must be left at most, approached from above at one point and speed by speed. */
-void test_confidence_comes_when_a_point_has_told_five_eighths_and_not_before(void)
+/* The confidence rises if the variance is below three eighths of that with the tables alone. One operating point at
+ * increasing speeds reaches lower variances, on both sides of this level. */
+void test_the_confidence_rises_below_three_eighths_of_the_prior_variance_and_not_above(void)
 {
     const dq_q15_t i = {-4000, 8000};
     bool below = false, above = false;
     for (double omega = 0.022; omega < 0.3; omega *= 1.1) {
         identify_reset(&c, &state);
         twin_identify_reset(&f.si, &twin);
-        run(i, omega, nothing, 20000);
-        const double left = left_of_variance(i, omega);
-        TEST_ASSERT_EQUAL_INT((left < 0.375) ? Q15_MAX : 0, state.confidence);
-        below = below || (left < 0.375 && left > 0.3);
-        above = above || (left > 0.375 && left < 0.45);
+        run(i, omega, nominal, 20000);
+        const double variance = relative_variance(i, omega);
+        TEST_ASSERT_EQUAL_INT((variance < 0.375) ? Q15_MAX : 0, state.confidence);
+        below = below || (variance < 0.375 && variance > 0.3);
+        above = above || (variance > 0.375 && variance < 0.45);
     }
     TEST_ASSERT_TRUE(below && above);
 }
 
-/* A long stop: the leak returns the parameters to their priors. Half a second after the upper level nothing is left,
- * before it all. */
-void test_confidence_goes_when_three_quarters_of_the_information_are_lost_and_not_before(void)
+/* During a long stop the leak returns the variance to the prior. Below three quarters of it the confidence stays 1;
+ * half a second after this level it is 0. */
+void test_the_confidence_falls_above_three_quarters_of_the_prior_variance_and_not_before(void)
 {
     const dq_q15_t i = {-4000, 8000};
-    const double slow = 0.01; /* nothing is identified */
-    drive(nothing, 3);
-    double left = left_of_variance(i, slow);
-    TEST_ASSERT_TRUE(left < 0.375);
-    for (int n = 0; n < 1000 && left < 0.745; n++) {
+    const double slow = 0.01; /* below the lowest speed of identification */
+    drive(nominal, 3);
+    double variance = relative_variance(i, slow);
+    TEST_ASSERT_TRUE(variance < 0.375);
+    for (int n = 0; n < 1000 && variance < 0.745; n++) {
         TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
-        run(i, slow, nothing, 100);
-        left = left_of_variance(i, slow);
+        run(i, slow, nominal, 100);
+        variance = relative_variance(i, slow);
     }
-    TEST_ASSERT_TRUE(left < 0.75);
-    run(i, slow, nothing, 3000);
-    TEST_ASSERT_TRUE(left_of_variance(i, slow) < 0.78);
+    TEST_ASSERT_TRUE(variance < 0.75);
+    run(i, slow, nominal, 3000);
+    TEST_ASSERT_TRUE(relative_variance(i, slow) < 0.78);
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
 }
 
-/* A resolver that is 30 degrees off: no parameter explains it. */
-void test_a_persistent_mismatch_takes_the_confidence_away(void)
+/* The voltage of a resolver that is 27 degrees off: half of the rotational voltage, perpendicular to it. No parameter
+ * describes it. */
+void test_a_persistent_mismatch_removes_the_confidence(void)
 {
-    drive(nothing, 3);
+    drive(nominal, 3);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
     const dq_q15_t i = {-4000, 8000};
     const flux_point_t flux = flux_table_step(&f.flux_table, i);
-    const dq_q15_t turned = {(int32_t)(0.5 * 0.5 * flux.psi_d), (int32_t)(0.5 * 0.5 * flux.psi_q)};
-    const window_pair_t pair = steady_window(&f, i, 0.5, turned);
+    const dq_q15_t extra_u = {(int32_t)(0.5 * 0.5 * flux.psi_d), (int32_t)(0.5 * 0.5 * flux.psi_q)};
+    const window_pair_t pair = steady_window(&f, i, 0.5, extra_u);
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
     const identify_tables_t tables = tables_at(&f, point.i_m);
     const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
@@ -311,42 +314,43 @@ void test_a_persistent_mismatch_takes_the_confidence_away(void)
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
 }
 
-/* 0.15 of the base voltage in one axis alone, ten times the noise: the gate of that axis must see it. */
-void test_a_mismatch_in_either_axis_alone_takes_the_confidence_away(void)
+/* 0.15 of the base voltage in one axis alone, more than six times the measurement noise of 0.008 + 0.5 * 0.03: the
+ * innovation gate of that axis must be exceeded. */
+void test_a_mismatch_in_either_axis_alone_removes_the_confidence(void)
 {
     const dq_q15_t i = {-4000, 8000};
     for (int axis = 0; axis < 2; axis++) {
         setUp();
-        drive(nothing, 3);
+        drive(nominal, 3);
         TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
-        const dq_q15_t more = {(axis == 0) ? 5000 : 0, (axis == 1) ? 5000 : 0};
-        const window_pair_t pair = steady_window(&f, i, 0.5, more);
+        const dq_q15_t extra_u = {(axis == 0) ? 5000 : 0, (axis == 1) ? 5000 : 0};
+        const window_pair_t pair = steady_window(&f, i, 0.5, extra_u);
         const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
         const identify_tables_t tables = tables_at(&f, point.i_m);
         const identify_in_t in = {&point, &tables, TEMPERATURE_UNKNOWN, true};
         for (int n = 0; n < 300; n++) {
             (void)identify_step(&c, &state, &in);
         }
-        /* The voltage along d contradicts the current; one along q is a magnet that has changed. */
+        /* Only the gate of the d axis counts: a voltage along q may be caused by a changed magnet. */
         TEST_ASSERT_EQUAL_UINT8((axis == 0) ? 25 : 0, state.contradicted_updates);
         TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
         TEST_ASSERT_FALSE(state.torque_certain);
     }
 }
 
-void test_a_mismatch_ends_with_the_updates(void)
+void test_the_count_of_contradicted_updates_is_cleared_by_a_good_update_and_without_one(void)
 {
     state.contradicted_updates = 7;
-    drive(nothing, 3);
+    drive(nominal, 3);
     TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
     state.contradicted_updates = 7;
-    run((dq_q15_t){0, 0}, 0.5, nothing, 20); /* too little current for an update */
+    run((dq_q15_t){0, 0}, 0.5, nominal, 20); /* too little current for an update */
     TEST_ASSERT_EQUAL_UINT8(0, state.contradicted_updates);
 }
 
-/* A magnet 7 standard deviations weaker than assumed, which so large a noise does not contradict: the estimate creeps
- * to its limit of 4 and what is left is in no parameter. */
-void test_a_parameter_at_its_limit_takes_the_confidence_away(void)
+/* The magnet is 7 standard deviations of its prior weaker than assumed. With so large a noise the innovation stays
+ * within the gate; the parameter slowly reaches its limit of 4, and no parameter describes the rest. */
+void test_a_parameter_at_its_limit_removes_the_confidence(void)
 {
     c.noise_voltage_q30 = (int32_t)(0.2 * 1073741824.0);
     run((dq_q15_t){-4000, 8000}, 0.5, (truth_t){-0.42, 1.0, 0.0}, 20000);
@@ -355,24 +359,24 @@ void test_a_parameter_at_its_limit_takes_the_confidence_away(void)
     TEST_ASSERT_FALSE(state.torque_certain);
 }
 
-/* With nothing identified the torque is uncertain by about a tenth: enough where half of it may be wrong, but never at
- * no torque. */
-void test_an_uncertainty_that_is_small_against_the_torque_is_confidence_enough(void)
+/* With nothing identified the standard deviation of the torque is about a tenth of it. This is below a level of one
+ * half, except without torque. */
+void test_the_confidence_also_rises_if_the_uncertainty_is_small_relative_to_the_torque(void)
 {
     enabled = false;
-    run((dq_q15_t){-4000, 8000}, 0.5, nothing, 1000);
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1000);
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
     c.confidence_full = Q15(0.5);
     c.confidence_none = Q15(0.6);
-    run((dq_q15_t){0, 0}, 0.5, nothing, 1000);
+    run((dq_q15_t){0, 0}, 0.5, nominal, 1000);
     TEST_ASSERT_EQUAL_INT(0, state.confidence);
-    run((dq_q15_t){-4000, 8000}, 0.5, nothing, 1000);
+    run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1000);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
 }
 
-/* At the corner speed half of an unexplained flux is taken, far above it all: with 20 steps the filter has 1 - 0.95^20
- * of it. Parameters are frozen by a huge noise. */
-void test_the_local_flux_error_takes_over_with_speed(void)
+/* At the corner speed the local flux error is half of a flux error that no parameter describes, far above it nearly
+ * all. After 200 steps the filter has 1 - 0.95^200 of it. The large noise keeps the parameters constant. */
+void test_the_weight_of_the_local_flux_error_rises_with_speed(void)
 {
     const double corner = from_q15(c.local_corner), settled = 1.0 - pow(0.95, 200.0);
     static const double factor[3] = {0.25, 1.0, 3.0};
@@ -386,22 +390,22 @@ void test_the_local_flux_error_takes_over_with_speed(void)
     }
 }
 
-/* Knowledge of one operating point serves at once at another: no transient of the flux beyond 1 % of the magnet's. */
-void test_a_torque_step_does_not_move_the_flux(void)
+/* The parameters are valid at every operating point: the flux changes by less than 1 % of the magnet flux. */
+void test_a_torque_step_does_not_change_the_identified_flux(void)
 {
-    drive(wrong, 20);
-    run((dq_q15_t){-300, 1500}, 0.4, wrong, 500);
+    drive(deviating, 20);
+    run((dq_q15_t){-300, 1500}, 0.4, deviating, 500);
     const double before = value(IDENTIFY_FLUX);
-    run((dq_q15_t){-9000, 13000}, 0.4, wrong, 100);
+    run((dq_q15_t){-9000, 13000}, 0.4, deviating, 100);
     TEST_ASSERT_DOUBLE_WITHIN(0.0053, before, value(IDENTIFY_FLUX));
 }
 
-void test_the_whole_agrees_with_the_twin_after_a_minute(void)
+void test_the_identification_agrees_with_the_twin_for_a_minute(void)
 {
     worst_t x = {0}, t = {0}, p = {0};
     winding_dC = 800;
     for (int n = 0; n < 60; n++) {
-        drive(wrong, 1);
+        drive(deviating, 1);
         for (int j = 0; j < IDENTIFY_STATES; j++) {
             const double sigmas = state.kalman.x_q27[j] / (double)IDENTIFY_ONE_Q27;
             worst_note(&x, sigmas - twin.kalman.x[j], "second %d, state %d", n, j);
@@ -410,7 +414,7 @@ void test_the_whole_agrees_with_the_twin_after_a_minute(void)
         worst_note(&t, from_q15(out.torque) - twin.torque / f.t, "second %d", n);
         TEST_ASSERT_EQUAL(twin.torque_certain, state.torque_certain);
     }
-    /* The residual is 1.5e-4 off (q15 of the table's flux); a state answers with sigma/h of it, 1/0.05 at most. */
+    /* The residual has an error of 1.5e-4 (q15 of the tables' flux), which changes a state by at most 20 times that. */
     ASSERT_WORST(x, 0.02);
     ASSERT_WORST(p, 1e-4);
     ASSERT_WORST(t, 3e-4);
@@ -450,9 +454,9 @@ void test_bad_configurations_are_rejected(void)
     BAD(leak[IDENTIFY_R] = Q31(0.3));
 }
 
-void test_what_was_identified_survives_a_power_cycle_with_less_certainty(void)
+void test_the_parameters_survive_a_power_cycle_with_a_larger_variance(void)
 {
-    drive(wrong, 20);
+    drive(deviating, 20);
     const identify_record_t record = identify_record_get(&state);
     const double magnet = value(IDENTIFY_FLUX);
     identify_state_t restored;
@@ -464,15 +468,16 @@ void test_what_was_identified_survives_a_power_cycle_with_less_certainty(void)
         TEST_ASSERT_TRUE(again.variance_q30[j] > record.variance_q30[j] || record.variance_q30[j] == IDENTIFY_ONE_Q30);
         TEST_ASSERT_TRUE(again.variance_q30[j] <= IDENTIFY_ONE_Q30);
     }
-    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, again.variance_q30[IDENTIFY_R]); /* the winding has cooled */
+    TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30, again.variance_q30[IDENTIFY_R]); /* the winding may have cooled */
     TEST_ASSERT_EQUAL_INT32(record.variance_q30[IDENTIFY_FLUX] + IDENTIFY_ONE_Q30 / 4,
                             again.variance_q30[IDENTIFY_FLUX]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, magnet, from_q31(identify_value(&c, &restored, IDENTIFY_FLUX)));
     TEST_ASSERT_EQUAL_INT(Q15_MAX, restored.confidence);
 }
 
-/* The magnet's quarter on top of an eighth is the level; the q axis has hardly changed. */
-void test_a_record_that_knows_too_little_of_magnet_or_q_axis_is_not_trusted_at_once(void)
+/* A restored magnet flux gets a quarter of its prior variance on top: an eighth is just too much for the level of three
+ * eighths. The q axis gets hardly any. */
+void test_a_record_with_a_large_variance_of_magnet_or_q_axis_starts_without_confidence(void)
 {
     identify_record_t record = identify_record_get(&state);
     for (int n = 0; n < 4; n++) {
@@ -483,9 +488,9 @@ void test_a_record_that_knows_too_little_of_magnet_or_q_axis_is_not_trusted_at_o
     }
 }
 
-void test_a_foreign_record_is_refused_and_changes_nothing(void)
+void test_a_record_of_another_version_or_out_of_range_is_refused_and_changes_nothing(void)
 {
-    drive(wrong, 1);
+    drive(deviating, 1);
     const identify_record_t good = identify_record_get(&state);
     identify_record_t bad[5] = {good, good, good, good, good};
     bad[0].version++;
@@ -495,7 +500,7 @@ void test_a_foreign_record_is_refused_and_changes_nothing(void)
     bad[4].variance_q30[3] = IDENTIFY_ONE_Q30 + 1;
     for (int n = 0; n < 5; n++) {
         TEST_ASSERT_FALSE(identify_record_restore(&state, &bad[n]));
-        const identify_record_t still = identify_record_get(&state);
-        TEST_ASSERT_EQUAL_MEMORY(&good, &still, sizeof good);
+        const identify_record_t after = identify_record_get(&state);
+        TEST_ASSERT_EQUAL_MEMORY(&good, &after, sizeof good);
     }
 }

@@ -4,7 +4,7 @@
 #include "identify_fixture.h"
 #include "unity.h"
 
-/* Window, operating point, model and filter one by one. */
+/* The parts of the identification one by one: window, operating point, model, Kalman filter. */
 
 static fixture_t f;
 static identify_config_t c;
@@ -20,7 +20,7 @@ void tearDown(void)
 {
 }
 
-void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(void)
+void test_a_window_sums_ten_periods_and_keeps_the_samples_at_its_ends(void)
 {
     identify_window_t window = {.left = 7, .last = {.u = {7, -7}, .i = {100, 0}}};
     identify_window_restart(&window, 10);
@@ -35,7 +35,7 @@ void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(v
     TEST_ASSERT_EQUAL_INT(1055, window.sum_i.d); /* 10 * 100 + 55 */
     TEST_ASSERT_EQUAL_INT(-55, window.sum_i.q);
     TEST_ASSERT_EQUAL_INT(550, window.sum_u.d);
-    TEST_ASSERT_EQUAL_INT(7, window.first.u.d); /* sample 0 is the last of the window before */
+    TEST_ASSERT_EQUAL_INT(7, window.first.u.d); /* sample 0 is the last one of the window before */
     TEST_ASSERT_EQUAL_INT(100, window.last.u.d);
     TEST_ASSERT_EQUAL_INT(22, window.last.psi.q);
     TEST_ASSERT_EQUAL_UINT32(10000U, window.last.theta);
@@ -43,7 +43,7 @@ void test_a_window_is_ten_periods_and_their_voltages_are_those_that_began_them(v
     TEST_ASSERT_TRUE(window.acting);
 }
 
-void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
+void test_one_period_without_switching_invalidates_its_window_only(void)
 {
     identify_window_t window = {0};
     identify_window_restart(&window, 10);
@@ -60,9 +60,9 @@ void test_one_period_without_the_bridge_spoils_its_window_and_no_other(void)
     }
 }
 
-/* A ramp of current: the mean is that of both ends. A ramp of voltage by 20 per sample from 0: the ten periods have 0,
- * 20, ... 180: 90 in the mean, divided by sinc. */
-void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
+/* The mean of a current ramp is the mean of its ends. The voltage of a sample acts until the next one: a ramp from 0 by
+ * 20 per sample acts in the ten periods as 0, 20, ... 180, with a mean of 90. */
+void test_the_mean_is_trapezoidal_for_currents_and_that_of_constant_periods_for_voltages(void)
 {
     identify_window_t window = {0};
     identify_window_restart(&window, 10);
@@ -72,26 +72,26 @@ void test_means_are_trapezoidal_for_currents_and_held_for_voltages(void)
         (void)identify_window_step(&window, &s);
     }
     const identify_point_t point = identify_point(&c, &window, 0);
-    TEST_ASSERT_INT32_WITHIN(40, -1000 * 65536, point.i.d); /* the gain's own rounding: 4e-10 */
+    TEST_ASSERT_INT32_WITHIN(40, -1000 * 65536, point.i.d); /* rounding of mean_gain_q32: 4e-10 */
     TEST_ASSERT_INT32_WITHIN(40, 500 * 65536, point.i.q);
     TEST_ASSERT_INT32_WITHIN(40, 90 * 32768, point.u.d);
     TEST_ASSERT_INT32_WITHIN(40, -9000 * 32768, point.u.q);
     TEST_ASSERT_FALSE(point.valid); /* standstill */
 }
 
-/* At 0.9 pu the angle of the fixture turns 0.563 times in a window: more than a half. */
-void test_speed_counts_whole_turns_by_the_tracked_one_and_the_rest_by_the_measured_angle(void)
+/* At 0.9 pu the rotor of the fixture turns 0.563 times in a window, so that the angle alone would be ambiguous. */
+void test_the_mean_speed_has_its_whole_turns_from_the_tracked_speed_and_the_rest_from_the_angle(void)
 {
     const double true_pu = 0.9, tracked_pu = 0.87;
     const window_pair_t pair = steady_window(&f, (dq_q15_t){-2000, 4000}, true_pu, (dq_q15_t){0, 0});
     const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(tracked_pu * 2147483648.0));
-    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(point.omega)); /* turn_to_pu has 17 bits of 0.03 */
-    const identify_point_t back = identify_point(&c, &pair.fixed, (q31_t)(0.93 * 2147483648.0));
-    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(back.omega));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(point.omega)); /* turn_to_pu has 17 bits, applied to 0.03 */
+    const identify_point_t above = identify_point(&c, &pair.fixed, (q31_t)(0.93 * 2147483648.0));
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, true_pu, from_q31(above.omega));
 }
 
-/* Any samples up to the formats' ends, as many as a step has from 4 to 40 kHz: sums are exact, means to the gain's own
- * rounding, below 1e-8. */
+/* Random and extreme samples, with the numbers of periods of PWM frequencies from 4 to 40 kHz: the sums are exact, the
+ * means have the relative error of mean_gain_q32, below 1e-8. */
 void test_the_mean_of_a_window_is_exact_for_any_number_of_periods(void)
 {
     static const int counts[] = {4, 5, 8, 10, 22, 39, 40};
@@ -121,7 +121,7 @@ void test_the_mean_of_a_window_is_exact_for_any_number_of_periods(void)
     }
 }
 
-static void points_agree(int periods)
+static void compare_points(int periods)
 {
     worst_t u = {0}, i_m = {0}, w = {0};
     uint64_t seed = 7;
@@ -144,18 +144,18 @@ static void points_agree(int periods)
 
 void test_points_agree_with_the_twin_over_the_range_and_for_any_number_of_periods(void)
 {
-    points_agree(4);
-    points_agree(10);
-    points_agree(17);
-    points_agree(40);
+    compare_points(4);
+    compare_points(10);
+    compare_points(17);
+    compare_points(40);
 }
 
-void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
+void test_residuals_and_jacobian_rows_agree_with_the_twin_over_the_range(void)
 {
     worst_t y = {0}, h = {0}, t = {0};
     uint64_t seed = 9;
     for (int n = 0; n < 3000; n++) {
-        /* Flux and voltage below 1. */
+        /* Currents for which flux and voltage are below 1. */
         const dq_q15_t i = {random_in(&seed, -14000, 1000), random_in(&seed, -7000, 7000)};
         const double omega = random_in(&seed, -95, 95) / 100.0;
         const window_pair_t pair = steady_window(&f, i, omega, (dq_q15_t){random_in(&seed, -300, 300), 100});
@@ -183,12 +183,12 @@ void test_residuals_and_sensitivities_agree_with_the_twin_over_the_range(void)
             worst_note(&t, from_q31(row.h_q30[j]) * 2.0 - b.torque[j] / (f.psi * f.i), "%d: torque, state %d", n, j);
         }
     }
-    ASSERT_WORST(y, 1.5e-4); /* the table's q15 flux, 2 LSB, twice: quotient and products of q15 */
+    ASSERT_WORST(y, 1.5e-4); /* errors of q15: flux of the tables (2 LSB in both axes), quotient and products */
     ASSERT_WORST(h, 1e-5);
     ASSERT_WORST(t, 1e-5);
 }
 
-/* psi = (0.4, 0.2), i = (-0.1, 0.3), a twelfth of theta^2 = 0.02, l_d = 0.25, l_qq = 0.5:
+/* psi = (0.4, 0.2), i = (-0.1, 0.3), theta^2/12 = 0.02, l_d = 0.25, l_qq = 0.5:
  * 0.14 - 0.02 (0.14 + 0.4 0.2 (1/0.5 - 1/0.25)) = 0.14 - 0.02 (0.14 - 0.16) = 0.1404; with l_d = l_qq 0.1372. */
 void test_the_mean_torque_of_a_period_by_hand(void)
 {
@@ -204,10 +204,9 @@ void test_the_mean_torque_of_a_period_by_hand(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.14, identify_mean_torque(&c, &salient, 0, psi, i) / one);
 }
 
-/* Against a sum over a thousand pieces of the chord, to 0.75 rad per period. Tolerances: the quotient's LSB of q15
- * times psi = 0.5; at 0.75 rad theta^4/360 of a torque of 0.12, which the expansion leaves out. Without the correction
- * 3e-3 would be missing there. */
-void test_the_mean_torque_is_that_of_a_flux_that_moves_along_the_chord(void)
+/* Against a sum over a thousand pieces of the chord, up to 0.37 rad per period. Tolerances: the rounding of the two
+ * quotients, and at the highest speed the terms from theta^4 on, which the expansion omits. */
+void test_the_mean_torque_agrees_with_a_sum_along_the_chord_of_the_flux(void)
 {
     static const double omega[3] = {0.1, -0.47, 0.95}, tolerance[3] = {2e-5, 2e-5, 1e-4};
     for (int k = 0; k < 3; k++) {
@@ -229,8 +228,8 @@ void test_the_mean_torque_is_that_of_a_flux_that_moves_along_the_chord(void)
     }
 }
 
-/* One state: h = 0.1, P = 1, r = 0.01 gives s = 0.02, k = 5; e = 0.02 moves x by 0.1 and leaves P = 1 - 5 * 0.1. */
-void test_one_measurement_of_one_state_by_hand(void)
+/* One state: h = 0.1, P = 1, r = 0.01 gives s = 0.02, k = 5; e = 0.02 changes x by 0.1, and P becomes 1 - 5 * 0.1. */
+void test_an_update_of_one_state_by_hand(void)
 {
     kalman_t kalman;
     kalman_reset(&kalman);
@@ -248,12 +247,12 @@ void test_one_measurement_of_one_state_by_hand(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, (double)kalman_output_variance_prior(&row) / one_q60);
 }
 
-void test_what_the_model_cannot_explain_is_reported_and_limited(void)
+void test_an_innovation_beyond_the_gate_is_reported_and_the_state_is_clamped(void)
 {
     kalman_t kalman;
     kalman_reset(&kalman);
     const jacobian_row_t row = {{[IDENTIFY_DROP] = (int32_t)(0.01 * IDENTIFY_ONE_Q30)}};
-    const int64_t r = (int64_t)(1e-4 * one_q60); /* 8 * 1e-4 + 1e-4 is 0.03 squared */
+    const int64_t r = (int64_t)(1e-4 * one_q60); /* the gate: e^2 > 8 h P h' + r = 8 * 1e-4 + 1e-4 = 0.03^2 */
     TEST_ASSERT_FALSE(kalman_update(&kalman, &row, (int32_t)(0.0296 * IDENTIFY_ONE_Q30), r).innovation_gate_exceeded);
     kalman_reset(&kalman);
     TEST_ASSERT_TRUE(kalman_update(&kalman, &row, (int32_t)(0.0304 * IDENTIFY_ONE_Q30), r).innovation_gate_exceeded);
@@ -265,8 +264,8 @@ void test_what_the_model_cannot_explain_is_reported_and_limited(void)
     TEST_ASSERT_EQUAL_INT32(4 * IDENTIFY_ONE_Q27, kalman.x_q27[IDENTIFY_DROP]);
 }
 
-/* x falls by a factor e in 1/lambda updates, P returns to the prior twice as fast. */
-void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
+/* In 1/lambda updates x decreases by the factor e; P returns to the prior twice as fast. */
+void test_without_measurements_the_parameters_return_to_their_priors(void)
 {
     kalman_t kalman;
     kalman_reset(&kalman);
@@ -281,7 +280,7 @@ void test_what_is_no_longer_seen_leaks_back_to_its_prior(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5 * exp(-2.0),
                               kalman.p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_DROP)] / (double)IDENTIFY_ONE_Q30);
     for (int n = 0; n < 60000; n++) {
-        kalman_predict(&c, &kalman, true); /* a winding sensor: resistance is known to sqrt(0.03) sigma */
+        kalman_predict(&c, &kalman, true); /* with a winding sensor the prior of the resistance is sqrt(0.03) sigma */
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.03, kalman.p_q30[0] / (double)IDENTIFY_ONE_Q30);
 }
@@ -305,7 +304,7 @@ static double smallest_pivot(const kalman_t *kalman)
     return least;
 }
 
-/* Rows as strong as they come, with the smallest noise, for an hour of updates: Cholesky's pivots stay positive. */
+/* Rows of up to 2^-4 with small noise for an hour of updates: the pivots of an elimination stay positive. */
 void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
 {
     kalman_t kalman;
@@ -337,5 +336,5 @@ void test_the_covariance_stays_positive_and_agrees_with_the_twin(void)
         }
     }
     ASSERT_WORST(p, 1e-5);
-    ASSERT_WORST(x, 1e-3); /* of a prior's standard deviation */
+    ASSERT_WORST(x, 1e-3); /* of the prior's standard deviation */
 }

@@ -5,21 +5,21 @@
 #include "fixture.h"
 #include "unity.h"
 
-/* What a calibration knows; configured() puts it into the stage's own terms. */
+/* Calibration data; configured() converts them to the configuration of the stage. */
 static struct {
     int shift; /* 16 - adc_bits */
     int32_t offset[3], gain_q14[3];
     uint32_t v_dc_gain_q15;
 } config;
 
-/* 12 bits, left-aligned by 4; the middle is 2048 counts. */
+/* A converter of 12 bits, whose counts are shifted left by 4; its mid-scale is 2048 counts. */
 void setUp(void)
 {
     config.shift = 4;
     config.v_dc_gain_q15 = 32768;
     for (int x = 0; x < 3; x++) {
         config.offset[x] = 32768;
-        config.gain_q14[x] = 16386; /* 1.0001, of which Q13 holds a third */
+        config.gain_q14[x] = 16386; /* 1.0001, a multiple of 6: Q13 represents a third of it exactly */
     }
 }
 
@@ -50,20 +50,20 @@ void tearDown(void)
 {
 }
 
-void test_mid_scale_is_no_current_and_the_ends_are_full_scale(void)
+void test_mid_scale_is_zero_current_and_the_ends_are_full_scale(void)
 {
     const adc_counts_t low = {2048, 2048, 2048, 0};
     TEST_ASSERT_EQUAL_INT(0, measured(&low).i.alpha);
     TEST_ASSERT_EQUAL_INT(0, measured(&low).i.beta);
     TEST_ASSERT_EQUAL_INT(0, measured(&low).v_dc);
-    const adc_counts_t ends = {0, 4095, 4095, 0}; /* (-2 - 1 - 1)/3 is beyond the format */
+    const adc_counts_t ends = {0, 4095, 4095, 0}; /* (-2 - 1 - 1)/3 is below -1 and saturates */
     TEST_ASSERT_EQUAL_INT(-32768, measured(&ends).i.alpha);
     TEST_ASSERT_EQUAL_INT(0, measured(&ends).i.beta);
 }
 
-/* By hand: (2 * 1600 + 800 + 800)/3, no beta; then phase b alone: -800/3 and 800/sqrt(3). The mean is in Q28, and a
- * quarter LSB more. */
-void test_the_vector_and_the_sum_of_the_phases_are_those_of_their_definition(void)
+/* By hand: (2 * 1600 + 800 + 800)/3 without beta; with phase b alone -800/3 and 800/sqrt(3). zero_q28 is the mean of
+ * the phases in Q28 plus a quarter LSB of q15. */
+void test_the_current_vector_and_the_zero_sequence_match_their_definitions(void)
 {
     const adc_counts_t balanced = {2048 + 100, 2048 - 50, 2048 - 50, 0};
     measure_t m = measured(&balanced);
@@ -77,7 +77,7 @@ void test_the_vector_and_the_sum_of_the_phases_are_those_of_their_definition(voi
     TEST_ASSERT_INT_WITHIN(300, 800 * 8192 / 3 + 2048, m.zero_q28);
 }
 
-/* Half scale is half of the full-scale voltage, which is one V_b with a gain of 1.0. */
+/* With a gain of 1.0 the full-scale voltage is V_b, and half scale is half of it. */
 void test_the_dc_voltage_scales_with_its_gain(void)
 {
     const adc_counts_t half = {2048, 2048, 2048, 2048};
@@ -100,7 +100,7 @@ void test_an_offset_and_a_gain_belong_to_their_own_phase(void)
     TEST_ASSERT_INT_WITHIN(1, 80, i.c);
 }
 
-static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
+static void compare_with_twin(worst_t *worst, int bits, const adc_counts_t *c)
 {
     motor_si_t si = {.adc_bits = bits, .current_full_scale_A = 32768.0, .v_dc_full_scale_V = 32768.0};
     const double lsb = 1 << config.shift;
@@ -118,15 +118,16 @@ static void hold_to_twin(worst_t *worst, int bits, const adc_counts_t *c)
     worst_note(worst, (m.zero_q28 - 2048) * 3.0 / 8192.0 - (t.i.a + t.i.b + t.i.c), "sum of %d %d %d", c->i_a, c->i_b,
                c->i_c);
     worst_note(worst, m.v_dc - twin_clamp(t.v_dc, 0, 32767), "v_dc of %d", c->v_dc);
-    if (fabs(vector.alpha) < 32767.0 && fabs(vector.beta) < 32767.0) { /* five roundings, 2.2 LSB at most */
+    /* The phases have five roundings: 2.2 LSB at most, 0.55 after the factor. */
+    if (fabs(vector.alpha) < 32767.0 && fabs(vector.beta) < 32767.0) {
         worst_note(worst, 0.25 * (i.a - twin_clamp(t.i.a, -32768, 32767)), "i_a of %d %d %d", c->i_a, c->i_b, c->i_c);
         worst_note(worst, 0.25 * (i.b - twin_clamp(t.i.b, -32768, 32767)), "i_b of %d %d %d", c->i_a, c->i_b, c->i_c);
         worst_note(worst, 0.25 * (i.c - twin_clamp(t.i.c, -32768, 32767)), "i_c of %d %d %d", c->i_a, c->i_b, c->i_c);
     }
 }
 
-/* One rounding to q15, half an LSB; sqrt(3) in Q19 is 1e-7 off. Gains of
- * which Q13 holds a third. */
+/* Tolerance: one rounding to q15, half an LSB; sqrt(3) in Q19 has an error of 1e-7. The gains are multiples of 6, so
+ * that Q13 represents a third of each exactly. */
 void test_every_count_with_random_offsets_and_gains_follows_the_twin(void)
 {
     worst_t worst = {0};
@@ -141,8 +142,8 @@ void test_every_count_with_random_offsets_and_gains_follows_the_twin(void)
             config.v_dc_gain_q15 = 2U * (uint32_t)random_in(&seed, 1, 32767);
             const uint16_t c = (uint16_t)count;
             const uint16_t other = (uint16_t)random_in(&seed, 0, (1 << bits) - 1);
-            hold_to_twin(&worst, bits, &(adc_counts_t){c, c, c, c});
-            hold_to_twin(&worst, bits, &(adc_counts_t){c, other, (uint16_t)(c ^ other), other});
+            compare_with_twin(&worst, bits, &(adc_counts_t){c, c, c, c});
+            compare_with_twin(&worst, bits, &(adc_counts_t){c, other, (uint16_t)(c ^ other), other});
         }
     }
     ASSERT_WORST(worst, 0.6);
@@ -158,12 +159,12 @@ void test_the_widest_product_neither_wraps_nor_changes_sign(void)
     config.v_dc_gain_q15 = 65534;
     config.offset[0] = 0;
     config.offset[1] = 65535;
-    hold_to_twin(&worst, 16, &(adc_counts_t){65535, 0, 65535, 65535});
-    hold_to_twin(&worst, 16, &(adc_counts_t){0, 65535, 0, 0});
+    compare_with_twin(&worst, 16, &(adc_counts_t){65535, 0, 65535, 65535});
+    compare_with_twin(&worst, 16, &(adc_counts_t){0, 65535, 0, 0});
     ASSERT_WORST(worst, 0.6);
 }
 
-/* A HAL that delivers bits above the converter's width must meet no undefined behaviour: any current, but in range. */
+/* If a HAL delivers bits above the converter's width, the behaviour is defined: the current is wrong but in range. */
 void test_counts_above_the_converters_width_still_give_a_current_within_range(void)
 {
     const measure_t m = measured(&(adc_counts_t){65535, 65535, 65535, 65535});

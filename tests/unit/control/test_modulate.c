@@ -7,16 +7,16 @@
 
 static fixture_t f;
 static struct {
-    dq_q15_t v, i; /* q15 of v_ratio v_dc, of I_b */
+    dq_q15_t v, i; /* per unit of v_ratio v_dc, of I_b */
     fx_pair_t advanced;
     int32_t v_dc;
 } in;
 
 typedef struct {
     duty_t duty;
-    dq_q15_t acted; /* of duties that are limited */
+    dq_q15_t applied; /* by modulate_applied() */
     bool limited;
-} made_t;
+} modulated_t;
 
 static const double pi = 3.14159265358979323846;
 static double theta;
@@ -55,20 +55,21 @@ static fx_pair_t pair(dq_q15_t x)
     return fx_pair((q15_t)x.d, (q15_t)x.q);
 }
 
-static made_t step(void)
+static modulated_t step(void)
 {
-    /* Current control's promise: half of v_dc here, with the pulse and the dead time that a test sets. */
-    const double reach = (1.0 - 2.0 * (f.si.min_pulse_duty + f.si.dead_time_duty)) / sqrt(3.0) / f.si.v_ratio * 32768.0;
-    const modulate_out_t made = modulate_step(&f.modulate, pair(in.v), pair(in.i), in.advanced);
-    if (hypot(in.v.d, in.v.q) < 0.999 * reach) { /* the short way must say the same */
+    /* Below this |v| no pulse can be limited with the shortest pulse and the dead time of the test (MO-11). */
+    const double clear_max = (1.0 - 2.0 * (f.si.min_pulse_duty + f.si.dead_time_duty)) / sqrt(3.0) / f.si.v_ratio *
+                             32768.0;
+    const modulate_out_t out = modulate_step(&f.modulate, pair(in.v), pair(in.i), in.advanced);
+    if (hypot(in.v.d, in.v.q) < 0.999 * clear_max) {
         const duty_t duty = modulate_clear(&f.modulate, pair(in.v), pair(in.i), in.advanced);
-        TEST_ASSERT_EQUAL_UINT32(duty.a, made.duty.a);
-        TEST_ASSERT_EQUAL_UINT32(duty.b, made.duty.b);
-        TEST_ASSERT_EQUAL_UINT32(duty.c, made.duty.c);
-        TEST_ASSERT_EQUAL_UINT32(0, made.limited);
+        TEST_ASSERT_EQUAL_UINT32(duty.a, out.duty.a);
+        TEST_ASSERT_EQUAL_UINT32(duty.b, out.duty.b);
+        TEST_ASSERT_EQUAL_UINT32(duty.c, out.duty.c);
+        TEST_ASSERT_EQUAL_UINT32(0, out.limited);
     }
-    return (made_t){made.duty, modulate_applied(&f.modulate, made.duty, pair(in.i), in.advanced, in.v_dc),
-                    made.limited != 0U};
+    return (modulated_t){out.duty, modulate_applied(&f.modulate, out.duty, pair(in.i), in.advanced, in.v_dc),
+                         out.limited != 0U};
 }
 
 static twin_modulate_t twin_step(void)
@@ -81,18 +82,18 @@ static twin_modulate_t twin_step(void)
     return twin_modulate(&f.si, &t);
 }
 
-static void against_twin(worst_t *duty, worst_t *acted)
+static void compare_with_twin(worst_t *duty, worst_t *applied)
 {
-    const made_t y = step();
+    const modulated_t y = step();
     const twin_modulate_t t = twin_step();
-    const int32_t is[3] = {(int32_t)y.duty.a, (int32_t)y.duty.b, (int32_t)y.duty.c};
+    const int32_t duties[3] = {(int32_t)y.duty.a, (int32_t)y.duty.b, (int32_t)y.duty.c};
     for (int x = 0; x < 3; x++) {
-        worst_note(duty, is[x] - t.duty[x] * 32768, "%d, v %d %d i %d %d at %.4f", x, in.v.d, in.v.q, in.i.d, in.i.q,
-                   theta);
+        worst_note(duty, duties[x] - t.duty[x] * 32768, "%d, v %d %d i %d %d at %.4f", x, in.v.d, in.v.q, in.i.d,
+                   in.i.q, theta);
     }
-    worst_note(acted, y.acted.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
+    worst_note(applied, y.applied.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
                in.v_dc, in.i.d, in.i.q, theta);
-    worst_note(acted, y.acted.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
+    worst_note(applied, y.applied.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
                in.v_dc, in.i.d, in.i.q, theta);
 }
 
@@ -101,50 +102,50 @@ static dq_q15_t random_dq(uint64_t *seed, int largest)
     return (dq_q15_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
 }
 
-void test_no_voltage_is_half_duty_on_every_phase(void)
+void test_zero_voltage_gives_a_duty_of_one_half_on_every_phase(void)
 {
-    const made_t y = step();
+    const modulated_t y = step();
     TEST_ASSERT_EQUAL_INT(16384, y.duty.a);
     TEST_ASSERT_EQUAL_INT(16384, y.duty.b);
     TEST_ASSERT_EQUAL_INT(16384, y.duty.c);
     TEST_ASSERT_FALSE(y.limited);
 }
 
-/* The six corners: 2/3 v_dc along a phase axis. There each leg is at a rail: 100 110 010 011 001 101. */
-void test_the_corners_of_the_hexagon_put_every_leg_on_its_rail(void)
+/* At the six corners, 2/3 v_dc along a phase axis, each leg is at a rail: 100 110 010 011 001 101. */
+void test_at_the_corners_of_the_hexagon_every_leg_is_at_a_rail(void)
 {
     static const int pattern[6][3] = {{1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 1, 1}, {0, 0, 1}, {1, 0, 1}};
     ratio(2.0 / 3.0);
     for (int n = 0; n < 6; n++) {
         at_angle((n * 65536 + 3) / 6);
         in.v.d = 32767;
-        const made_t y = step();
+        const modulated_t y = step();
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][0], y.duty.a);
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][1], y.duty.b);
         TEST_ASSERT_INT_WITHIN(5, 32768 * pattern[n][2], y.duty.c);
     }
 }
 
-/* In the middle of a side the longest vector is v_dc/sqrt(3); by hand at 30 degrees: v = (1/2, 0, -1/2). */
+/* In the middle of a side of the hexagon |v| = v_dc/sqrt(3); by hand at 30 degrees: v = (1/2, 0, -1/2). */
 void test_the_middle_of_a_side_has_one_leg_at_each_rail_and_one_in_the_middle(void)
 {
     at_angle(65536 / 12);
-    in.v.d = 32767; /* 0.57 of 0.57735: 0.4936 to either side */
-    const made_t y = step();
+    in.v.d = 32767; /* 0.57 of 0.57735: 0.4936 above and below one half */
+    const modulated_t y = step();
     TEST_ASSERT_INT_WITHIN(5, 16384 + 0.4936 * 32768, y.duty.a);
     TEST_ASSERT_INT_WITHIN(5, 16384, y.duty.b);
     TEST_ASSERT_INT_WITHIN(5, 16384 - 0.4936 * 32768, y.duty.c);
     TEST_ASSERT_FALSE(y.limited);
 }
 
-/* Min-max: the highest and the lowest duty are always equally far from their rails. */
-void test_the_zero_sequence_centres_the_outer_legs(void)
+/* Min-max zero sequence: the largest and the smallest duty always have the same distance from their rails. */
+void test_the_zero_sequence_centres_the_largest_and_the_smallest_duty(void)
 {
     uint64_t seed = 61;
     for (int n = 0; n < 200000; n++) {
         at_angle(random_in(&seed, 0, 65535));
         in.v = random_dq(&seed, 23000);
-        const made_t y = step();
+        const modulated_t y = step();
         const int a = (int)y.duty.a, b = (int)y.duty.b, c = (int)y.duty.c;
         const int hi = fx_max_s32(a, fx_max_s32(b, c));
         const int lo = fx_min_s32(a, fx_min_s32(b, c));
@@ -152,12 +153,13 @@ void test_the_zero_sequence_centres_the_outer_legs(void)
     }
 }
 
-/* Duty per LSB of v: 0.57 times up to sqrt(3). Sine and cosine are 1 LSB off at a length of 1: 0.57 * 1.73 * sqrt(2);
- * 0.5 of the duty, 1 of the compensation. acted: a duty's errors in volts, and 1.5 of the way back. */
+/* Tolerance in LSB. 1 LSB of v changes a duty by up to 0.57 sqrt(3). Sine and cosine have an error of 1 LSB:
+ * 0.57 * 1.73 * sqrt(2) at |v| = 1; the rounding of the duty adds 0.5, the compensation 1. The applied voltage has the
+ * errors of the duties and 1.5 of its own computation. */
 void test_inside_the_hexagon_every_duty_follows_the_twin(void)
 {
     worst_t worst = {0};
-    worst_t acted = {0};
+    worst_t applied = {0};
     uint64_t seed = 62;
     fixture_dead_time(&f, 0.02);
     for (int n = 0; n < 300000; n++) {
@@ -167,36 +169,36 @@ void test_inside_the_hexagon_every_duty_follows_the_twin(void)
         const double length = random_in(&seed, 0, 950) * 32.768;
         in.v = (dq_q15_t){(int32_t)lround(length * cos(phi)), (int32_t)lround(length * sin(phi))};
         in.i = random_dq(&seed, 20000);
-        against_twin(&worst, &acted);
+        compare_with_twin(&worst, &applied);
     }
     ASSERT_WORST(worst, 4.0);
-    ASSERT_WORST(acted, 4.0);
+    ASSERT_WORST(applied, 4.0);
 }
 
-/* Beyond a side the outer legs stay at their rails and the middle one as it is: the nearest point of that side. By hand
- * at 40 degrees: the side from 0 to 60 degrees is 1/sqrt(3) away from the middle, along 30 degrees. */
-void test_beyond_the_hexagon_the_nearest_point_of_its_side_is_made(void)
+/* Beyond a side the outer legs are limited to their rails and the middle one is unchanged, which is the nearest point
+ * of that side. By hand: the side from 0 to 60 degrees has the distance 1/sqrt(3) from the centre, at 30 degrees. */
+void test_beyond_the_hexagon_the_nearest_point_of_its_side_is_applied(void)
 {
     ratio(0.65); /* 1.13 of the inscribed circle */
     in.v_dc = 32767;
     for (int degrees = 12; degrees < 50; degrees += 7) {
         at_angle(degrees * 65536 / 360);
         in.v.d = 32767;
-        const made_t y = step();
-        const double off = (degrees - 30) * pi / 180.0;
-        const double along = 0.65 * sin(off), across = fmin(0.65 * cos(off), 1.0 / sqrt(3.0));
-        /* seen from the rotor, which is at that angle */
-        TEST_ASSERT_INT_WITHIN(8, 32767 * (across * cos(off) + along * sin(off)), y.acted.d);
-        TEST_ASSERT_INT_WITHIN(8, 32767 * (along * cos(off) - across * sin(off)), y.acted.q);
+        const modulated_t y = step();
+        const double angle = (degrees - 30) * pi / 180.0;
+        const double along = 0.65 * sin(angle), across = fmin(0.65 * cos(angle), 1.0 / sqrt(3.0));
+        /* In the frame of the rotor, whose d axis is at `degrees`. */
+        TEST_ASSERT_INT_WITHIN(8, 32767 * (across * cos(angle) + along * sin(angle)), y.applied.d);
+        TEST_ASSERT_INT_WITHIN(8, 32767 * (along * cos(angle) - across * sin(angle)), y.applied.q);
         TEST_ASSERT_TRUE(y.limited);
     }
 }
 
-/* Up to 1 and 0.7, what current control leaves: longer than the hexagon's corners. */
+/* Components up to 1 and 0.7, the largest after the limit of the current control: beyond the hexagon's corners. */
 void test_beyond_the_hexagon_every_duty_follows_the_twin(void)
 {
     worst_t worst = {0};
-    worst_t acted = {0};
+    worst_t applied = {0};
     uint64_t seed = 63;
     ratio(0.65);
     for (int n = 0; n < 200000; n++) {
@@ -206,13 +208,13 @@ void test_beyond_the_hexagon_every_duty_follows_the_twin(void)
         if (n & 1) {
             in.v = (dq_q15_t){in.v.q, in.v.d};
         }
-        against_twin(&worst, &acted);
+        compare_with_twin(&worst, &applied);
     }
     ASSERT_WORST(worst, 4.0);
-    ASSERT_WORST(acted, 4.0);
+    ASSERT_WORST(applied, 4.0);
 }
 
-void test_limited_is_said_exactly_when_a_pulse_was_changed(void)
+void test_limited_is_set_exactly_if_a_pulse_was_changed(void)
 {
     ratio(0.65); /* the side is at 0.8882 */
     at_angle(65536 / 12);
@@ -224,8 +226,8 @@ void test_limited_is_said_exactly_when_a_pulse_was_changed(void)
     TEST_ASSERT_FALSE(step().limited);
 }
 
-/* The way back from duties that were not changed: rounding alone, 1 LSB of duty and 1.5 of volts. */
-void test_the_acted_voltage_is_the_command_while_nothing_limits(void)
+/* modulate_applied() of duties that were not limited: only roundings, 1 LSB of duty and 1.5 LSB of voltage. */
+void test_the_applied_voltage_is_the_commanded_one_while_nothing_is_limited(void)
 {
     worst_t worst = {0};
     uint64_t seed = 64;
@@ -234,20 +236,20 @@ void test_the_acted_voltage_is_the_command_while_nothing_limits(void)
         at_angle(random_in(&seed, 0, 65535));
         in.v = random_dq(&seed, 20000);
         in.i = random_dq(&seed, 20000);
-        const made_t y = step();
+        const modulated_t y = step();
         TEST_ASSERT_FALSE(y.limited);
-        worst_note(&worst, y.acted.d - in.v.d * f.si.v_ratio * in.v_dc / 32768.0, "d of %d %d", in.v.d, in.v.q);
-        worst_note(&worst, y.acted.q - in.v.q * f.si.v_ratio * in.v_dc / 32768.0, "q of %d %d", in.v.d, in.v.q);
+        worst_note(&worst, y.applied.d - in.v.d * f.si.v_ratio * in.v_dc / 32768.0, "d of %d %d", in.v.d, in.v.q);
+        worst_note(&worst, y.applied.q - in.v.q * f.si.v_ratio * in.v_dc / 32768.0, "q of %d %d", in.v.d, in.v.q);
     }
     ASSERT_WORST(worst, 4.0);
 }
 
-/* Full current: +c on the phase that delivers it, -c on the others that take half each (beyond the knee). */
-void test_the_compensation_adds_the_dead_time_to_legs_that_deliver_current(void)
+/* Currents above the knee: +c on the phase with positive current, -c on the other two, which have half each. */
+void test_the_compensation_adds_the_dead_time_to_legs_with_positive_current(void)
 {
     fixture_dead_time(&f, 0.02);
     in.i.d = 10000;
-    const made_t y = step();
+    const modulated_t y = step();
     TEST_ASSERT_INT_WITHIN(1, 16384 + 655, y.duty.a);
     TEST_ASSERT_INT_WITHIN(1, 16384 - 655, y.duty.b);
     TEST_ASSERT_INT_WITHIN(1, 16384 - 655, y.duty.c);
@@ -263,7 +265,7 @@ void test_the_compensation_is_odd_in_the_current_and_smooth_through_zero(void)
         in.i.d = (q15_t)-count;
         const int down = (int)step().duty.a - 16384;
         TEST_ASSERT_INT_WITHIN(1, -up, down);
-        if (count > -2000) { /* 655 LSB over 2 * 328 counts of current: at most 2, rounded up to 3 */
+        if (count > -2000) { /* slope: 655 LSB per 328 counts of current, 2; with roundings 3 */
             TEST_ASSERT_INT_WITHIN(3, last, up);
             TEST_ASSERT_TRUE(up >= last);
         }
@@ -271,22 +273,22 @@ void test_the_compensation_is_odd_in_the_current_and_smooth_through_zero(void)
     }
     in.i.d = 0;
     TEST_ASSERT_EQUAL_INT(16384, step().duty.a);
-    in.i.d = 164; /* half of the knee: half of the dead time */
+    in.i.d = 164; /* half of the knee current: half of the dead time */
     TEST_ASSERT_INT_WITHIN(3, 16384 + 328, step().duty.a);
 }
 
-/* 3277 counts are the shortest pulse here; the sweep drives leg a from the middle to its rail. */
-void test_short_pulses_snap_to_the_nearer_of_nothing_and_the_shortest(void)
+/* The shortest pulse is 3277 LSB. The sweep moves leg a from one half to its rail. */
+void test_a_short_pulse_becomes_zero_or_the_shortest_one_whichever_is_nearer(void)
 {
     fixture_min_pulse(&f, 0.1);
     ratio(2.0 / 3.0);
     for (int v = 0; v <= 32767; v += 3) {
         in.v.d = v;
-        const made_t y = step();
+        const modulated_t y = step();
         const int ideal = 16384 + (int)lround(0.75 * v * 2.0 / 3.0); /* v (1 - 1/4) on leg a */
         TEST_ASSERT_TRUE(y.duty.a == 32768 || y.duty.a <= 32768 - 3277);
         TEST_ASSERT_TRUE(y.duty.b == 0 || y.duty.b >= 3277);
-        if (ideal < 32768 - 3277 - 3) { /* the bands between are the rounding of v and duty */
+        if (ideal < 32768 - 3277 - 3) { /* in the bands between, the roundings of v and duty decide */
             TEST_ASSERT_INT_WITHIN(3, ideal, y.duty.a);
             TEST_ASSERT_FALSE(y.limited);
         } else if (ideal > 32768 - 3277 + 3 && ideal < 32768 - 1638 - 3) {
@@ -300,22 +302,22 @@ void test_short_pulses_snap_to_the_nearer_of_nothing_and_the_shortest(void)
     }
 }
 
-/* On the rail nothing switches and no dead time is lost: acted is what the duties make, by hand 2/3 v_dc. */
-void test_a_leg_on_its_rail_loses_nothing_to_the_dead_time(void)
+/* A leg at its rail does not switch, so that no dead time acts: the applied voltage is by hand 2/3 v_dc. */
+void test_the_dead_time_does_not_act_on_a_leg_at_its_rail(void)
 {
     fixture_dead_time(&f, 0.02);
     fixture_min_pulse(&f, 0.05);
     ratio(2.0 / 3.0);
     in.v.d = 32767;
     in.i.d = 10000;
-    const made_t y = step();
+    const modulated_t y = step();
     TEST_ASSERT_EQUAL_INT(32768, y.duty.a);
     TEST_ASSERT_EQUAL_INT(0, y.duty.b);
-    TEST_ASSERT_INT_WITHIN(3, 13333, y.acted.d);
-    TEST_ASSERT_INT_WITHIN(2, 0, y.acted.q);
+    TEST_ASSERT_INT_WITHIN(3, 13333, y.applied.d);
+    TEST_ASSERT_INT_WITHIN(2, 0, y.applied.q);
 }
 
-void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
+void test_the_applied_voltage_of_limited_pulses_follows_the_twin(void)
 {
     worst_t worst = {0};
     uint64_t seed = 65;
@@ -326,24 +328,24 @@ void test_the_acted_voltage_of_clipped_pulses_follows_the_twin(void)
         in.v_dc = (q15_t)random_in(&seed, 15000, 32767);
         in.v = random_dq(&seed, 23000);
         in.i = random_dq(&seed, 20000);
-        const made_t y = step();
+        const modulated_t y = step();
         const twin_modulate_t t = twin_step();
         const double jump =
             fmax(fabs((double)y.duty.a - t.duty[0] * 32768),
                  fmax(fabs((double)y.duty.b - t.duty[1] * 32768), fabs((double)y.duty.c - t.duty[2] * 32768)));
-        if (jump < 4.0) { /* else the two stand on different sides of a snap, half a pulse of 983 LSB away */
-            worst_note(&worst, y.acted.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
+        if (jump < 4.0) {
+            worst_note(&worst, y.applied.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
                        in.v.q, in.v_dc, in.i.d, in.i.q, theta);
-            worst_note(&worst, y.acted.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
+            worst_note(&worst, y.applied.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
                        in.v.q, in.v_dc, in.i.d, in.i.q, theta);
-        } else {
+        } else { /* rounding decided between zero and the shortest pulse */
             TEST_ASSERT_DOUBLE_WITHIN(4.0, 983.0, jump);
         }
     }
     ASSERT_WORST(worst, 4.0);
 }
 
-void test_every_duty_is_realisable_for_every_input(void)
+void test_every_duty_can_be_made_by_the_bridge_for_every_input(void)
 {
     uint64_t seed = 66;
     fixture_dead_time(&f, 0.03);
@@ -353,7 +355,7 @@ void test_every_duty_is_realisable_for_every_input(void)
         in.v_dc = (q15_t)random_in(&seed, 0, 32767);
         in.v = random_dq(&seed, 32767);
         in.i = random_dq(&seed, 32767);
-        const made_t y = step();
+        const modulated_t y = step();
         const int duty[3] = {(int)y.duty.a, (int)y.duty.b, (int)y.duty.c};
         for (int x = 0; x < 3; x++) {
             TEST_ASSERT_TRUE(duty[x] == 0 || duty[x] == 32768 || (duty[x] >= 655 && duty[x] <= 32768 - 655));

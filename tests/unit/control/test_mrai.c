@@ -9,12 +9,12 @@
 static fixture_t f;
 static mrai_state_t state;
 static twin_mrai_state_t twin;
-static mrai_schedule_t schedule; /* all zero: no adaptation, no voltage correction */
+static mrai_schedule_t schedule;
 static twin_mrai_schedule_t twin_schedule;
 
 static const double q27 = 134217728.0;
 
-/* No adaptation. */
+/* Schedule without adaptation. */
 static mrai_schedule_t voltage(int32_t minus_q28)
 {
     return (mrai_schedule_t){.minus_voltage_d_q28 = 2 * minus_q28, .minus_voltage_q28 = minus_q28};
@@ -40,8 +40,8 @@ static operating_point_t at(int id, int iq, double omega)
     return (operating_point_t){.i = i, .flux = flux_table_step(&f.flux_table, i), .omega = speed};
 }
 
-/* The SI view of the very numbers the stage gets. */
-static twin_mrai_in_t si(const operating_point_t *in)
+/* The inputs of the stage in SI units. */
+static twin_mrai_in_t to_si(const operating_point_t *in)
 {
     twin_mrai_in_t t = {{from_q15(in->i.d) * f.i, from_q15(in->i.q) * f.i},
                         {from_q15(in->u.d) * f.v, from_q15(in->u.q) * f.v},
@@ -53,15 +53,15 @@ static twin_mrai_in_t si(const operating_point_t *in)
     return t;
 }
 
-/* Both observers at rest at `in`, parameters kept. */
-static void rest(const operating_point_t *in)
+/* Resets both observers at `in`; the parameters are kept. */
+static void reset_both(const operating_point_t *in)
 {
-    const twin_mrai_in_t t = si(in);
+    const twin_mrai_in_t t = to_si(in);
     mrai_reset(&f.mrai, &schedule, &state, in);
     twin_mrai_reset(&twin, &t);
 }
 
-static void error(double e_d, double e_q)
+static void set_error(double e_d, double e_q)
 {
     const int32_t d = (int32_t)lround(e_d * q27);
     const int32_t q = (int32_t)lround(e_q * q27);
@@ -72,14 +72,14 @@ static void error(double e_d, double e_q)
     twin.e = (twin_dq_t){d / q27 * f.psi, q / q27 * f.psi};
 }
 
-static void both(const operating_point_t *in)
+static void step_both(const operating_point_t *in)
 {
-    const twin_mrai_in_t t = si(in);
+    const twin_mrai_in_t t = to_si(in);
     mrai_step(&f.mrai, &schedule, &state, in);
     twin_mrai(&f.si, &twin_schedule, &twin, &t);
 }
 
-/* The voltage under which the nominal machine with dpsi, dR rests at in->i: u = R i + j w psi. */
+/* Steady-state voltage at in->i of a machine with the deviations dpsi and dR: u = R i + j w psi. */
 static void steady_voltage(operating_point_t *in, double psi_delta, double r_delta)
 {
     const double w = from_q31(in->omega);
@@ -88,14 +88,14 @@ static void steady_voltage(operating_point_t *in, double psi_delta, double r_del
     in->u.q = (q15_t)lround(r * in->i.q + w * (in->flux.psi_d + psi_delta * 32768.0));
 }
 
-static void open_flux_gate(const operating_point_t *in)
+static void enable_flux_law(const operating_point_t *in)
 {
     const double w = from_q31(in->omega);
     twin_schedule.flux_gain = 2.0 * f.si.flux_bandwidth_rad_s / (w * f.w);
     schedule.flux_step_q28 = (int32_t)lround(2.0 * f.si.flux_bandwidth_rad_s / (w * f.w) * 268435456.0);
 }
 
-static void open_resistance_gate(const operating_point_t *in)
+static void enable_resistance_law(const operating_point_t *in)
 {
     const double a = 2.0 * from_q15(in->i.d);
     const double b = from_q15(in->i.q);
@@ -117,9 +117,9 @@ static void jacobian(bool fixed, const operating_point_t *in, double j[2][2])
             const double shift = (side == 0) ? -h : h;
             state = (mrai_state_t){0};
             twin = (twin_mrai_state_t){0};
-            rest(in);
-            error((column == 0) ? shift : 0.0, (column == 1) ? shift : 0.0);
-            both(in);
+            reset_both(in);
+            set_error((column == 0) ? shift : 0.0, (column == 1) ? shift : 0.0);
+            step_both(in);
             out[side][0] = fixed ? state.e_d_q27 / q27 : twin.e.d / f.psi;
             out[side][1] = fixed ? state.e_q_q27 / q27 : twin.e.q / f.psi;
         }
@@ -128,7 +128,7 @@ static void jacobian(bool fixed, const operating_point_t *in, double j[2][2])
     }
 }
 
-/* I + (A + K) T_s with A + K = (S/2) [-1 1; -1 -1], whatever the speed; S from the header's definition, in SI. */
+/* Expected: I + (A + K) T_s with A + K = (S/2) [-1 1; -1 -1] at every speed; S as defined in the header, in SI. */
 static void check_pole_placement(bool fixed, double tolerance)
 {
     worst_t worst = {0};
@@ -157,16 +157,16 @@ void test_the_twins_error_dynamics_are_s_half_times_minus1_1_minus1_minus1_at_ev
     check_pole_placement(false, 1e-9);
 }
 
-/* Two steps of 2 LSB q27 rounding over 2 h = 1.7e7 LSB: 2e-7; s2 in Q29 adds 1e-8. */
+/* Tolerance: two steps with 2 LSB of rounding in q27 over 2 h = 1.7e7 LSB: 2e-7; s2 in Q29 adds 1e-8. */
 void test_the_fixed_point_error_dynamics_are_the_same_at_every_speed(void)
 {
     check_pole_placement(true, 1e-6);
 }
 
 /* The paper prints k2 + w L_q/L_d = k3 + w L_d/L_q = sqrt(m^2/2 R^2/(L_d L_q) + (m^2+m)/4 (R^2/L_d^2 + R^2/L_q^2)).
- * Its own condition (11) is then missed by m R^2 (L_d^2 + L_q^2)/(4 L_d^2 L_q^2); with m/2 (R/L_d + R/L_q) it is met.
- * */
-void test_the_printed_gains_miss_the_papers_own_pole_condition_and_the_corrected_ones_meet_it(void)
+ * With it the paper's condition (11) has a residual of m R^2 (L_d^2 + L_q^2)/(4 L_d^2 L_q^2); with
+ * m/2 (R/L_d + R/L_q) the condition holds. */
+void test_the_printed_gains_violate_the_papers_pole_condition_and_the_corrected_ones_satisfy_it(void)
 {
     for (int m = 2; m <= 4; m++) {
         for (double l_q = 0.3e-3; l_q < 2e-3; l_q *= 1.3) {
@@ -184,26 +184,26 @@ void test_the_printed_gains_miss_the_papers_own_pole_condition_and_the_corrected
     }
 }
 
-/* |1 - s2 + j s2| < 1 needs s2 < 1; the stage allows 1/4. The error must shrink by exactly that factor,
- * at omega_b T_s = 0.39 rad as at standstill: a 0.1 pu error, steady operating point. */
-void test_the_explicit_step_is_stable_and_equally_fast_over_the_whole_speed_range(void)
+/* |1 - s2 + j s2| < 1 requires s2 < 1; the stage allows 1/4. At a steady operating point an error of 0.1 pu must
+ * decrease by this factor per period at every speed, from standstill to omega_b T_s = 0.39 rad. */
+void test_the_explicit_step_is_stable_with_the_same_poles_over_the_whole_speed_range(void)
 {
     for (int w = -20; w <= 20; w++) {
         operating_point_t in = at(-12000, 9000, w / 20.0 * 0.99);
         steady_voltage(&in, 0.0, 0.0);
         state = (mrai_state_t){0};
-        rest(&in);
-        error(0.1, -0.1);
+        reset_both(&in);
+        set_error(0.1, -0.1);
         const double s2 = 3.0 * 674.0 / 65536.0 * from_q15(in.flux.g);
         const double start = 0.1 * sqrt(2.0);
         const int steps = 100;
         for (int n = 0; n < steps; n++) {
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
-        const double left = hypot(state.e_d_q27 / q27, state.e_q_q27 / q27);
+        const double remaining = hypot(state.e_d_q27 / q27, state.e_q_q27 / q27);
         const double expected = start * pow((1.0 - s2) * (1.0 - s2) + s2 * s2, 0.5 * steps);
-        /* The voltage is rounded to q15: an error of w_b T_s 2^-16/s2 < 1e-3 stays. */
-        TEST_ASSERT_DOUBLE_WITHIN(1.5e-3, expected, left);
+        /* The voltage is rounded to q15, which leaves an error of w_b T_s 2^-16/s2 < 1e-3. */
+        TEST_ASSERT_DOUBLE_WITHIN(1.5e-3, expected, remaining);
     }
 }
 
@@ -213,8 +213,8 @@ void test_the_fastest_poles_the_stage_accepts_are_still_stable(void)
     operating_point_t in = at(-8000, 8000, 0.9);
     in.flux.g = 32767; /* s2 = 1/4: |3/4 + j/4| = 0.79 per period */
     steady_voltage(&in, 0.0, 0.0);
-    rest(&in);
-    error(0.1, -0.1);
+    reset_both(&in);
+    set_error(0.1, -0.1);
     for (int n = 0; n < 60; n++) {
         mrai_step(&f.mrai, &schedule, &state, &in);
     }
@@ -224,8 +224,8 @@ void test_the_fastest_poles_the_stage_accepts_are_still_stable(void)
 
 /* --- against the twin ------------------------------------------------------------------------ */
 
-/* One step from random states. e: seven roundings of Q27, and the used parameters' errors through w_b T_s/2.
- * psi, R: s2 e in Q27, s2 itself known to 2^-29, times gains of 0.5 and more. */
+/* One step from random states. Errors of e: seven roundings in Q27, and the errors of the parameters times w_b T_s/2.
+ * Errors of psi and R: s2 e in Q27, with s2 rounded to 2^-29, times gains of 0.5 and more. */
 void test_a_single_step_follows_the_twin_over_the_whole_range(void)
 {
     worst_t current = {0};
@@ -238,9 +238,9 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
         operating_point_t in = at(last.i.d + random_in(&seed, -500, 500), last.i.q + random_in(&seed, -500, 500), w);
         last.u = (dq_q15_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
         in.u = (dq_q15_t){(q15_t)random_in(&seed, -14000, 14000), (q15_t)random_in(&seed, -14000, 14000)};
-        open_flux_gate(&in);
+        enable_flux_law(&in);
         if (abs(in.i.d) + abs(in.i.q) > 1700) {
-            open_resistance_gate(&in);
+            enable_resistance_law(&in);
         }
         const int32_t minus_q28 = -(f.mrai.period / 8 + random_in(&seed, 0, f.mrai.period / 512));
         schedule.minus_voltage_d_q28 = 2 * minus_q28;
@@ -250,10 +250,10 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
                                .r_delta = random_in(&seed, f.mrai.r_delta_min / 2, f.mrai.r_delta_max / 2)};
         twin = (twin_mrai_state_t){.psi_delta = from_q31(state.psi_delta) * f.psi,
                                    .r_delta = from_q31(state.r_delta) * f.z};
-        rest(&last);
-        error(random_in(&seed, -200, 200) * 1e-3, random_in(&seed, -200, 200) * 1e-3);
-        both(&in);
-        if (fabs(twin.e.d) < 3.9 * f.psi && fabs(twin.e.q) < 3.9 * f.psi) { /* beyond, the stage limits the error */
+        reset_both(&last);
+        set_error(random_in(&seed, -200, 200) * 1e-3, random_in(&seed, -200, 200) * 1e-3);
+        step_both(&in);
+        if (fabs(twin.e.d) < 3.9 * f.psi && fabs(twin.e.q) < 3.9 * f.psi) { /* the stage limits e to 4 */
             worst_note(&current, state.e_d_q27 - twin.e.d / f.psi * q27, "e_d of i %d %d u %d %d w %.3f", in.i.d,
                        in.i.q, last.u.d, last.u.q, w);
             worst_note(&current, state.e_q_q27 - twin.e.q / f.psi * q27, "e_q of i %d %d u %d %d w %.3f", in.i.d,
@@ -267,11 +267,12 @@ void test_a_single_step_follows_the_twin_over_the_whole_range(void)
     }
     ASSERT_WORST(psi, 2e-6);
     ASSERT_WORST(r, 2e-6);
-    ASSERT_WORST(current, 100.0); /* dpsi used off by 1e-6 acts through w_b T_s/2: 30 LSB of q27 */
+    ASSERT_WORST(current, 100.0); /* an error of dpsi of 1e-6 times w_b T_s/2: 30 LSB of q27 */
 }
 
-/* A current that changes brings its flux along: no error arises from it, whatever the saturation on the way. */
-void test_a_current_ramp_through_saturation_leaves_no_error_when_the_voltage_explains_it(void)
+/* The observer uses the change of the tables' flux, so that a changing current causes no error in spite of
+ * saturation. */
+void test_a_current_ramp_through_saturation_with_the_matching_voltage_causes_no_error(void)
 {
     const double rate = 1.0 / (f.w * f.si.period_s);
     const double r = 674.0 / 65536.0;
@@ -283,47 +284,47 @@ void test_a_current_ramp_through_saturation_leaves_no_error_when_the_voltage_exp
         in.u.q = (q15_t)lround((next.flux.psi_q - in.flux.psi_q) * rate + r * 0.5 * (next.i.q + in.i.q) +
                                0.3 * 0.5 * (next.flux.psi_d + in.flux.psi_d));
         if (n == 0) {
-            rest(&in);
+            reset_both(&in);
         } else {
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
         in = next;
     }
-    /* u in q15: 100 roundings of w_b T_s 2^-16, random: 0.4 * 1.5e-5 * 10 */
+    /* 100 random roundings of u in q15, each w_b T_s 2^-16: 0.4 * 1.5e-5 * 10 */
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, state.e_d_q27 / q27);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, state.e_q_q27 / q27);
 }
 
-/* One second of noisy operation: the twin and the stage must tell the same flux and resistance. */
+/* One second with noise: twin and stage must identify the same flux and resistance. */
 void test_ten_thousand_noisy_periods_give_the_twins_parameters(void)
 {
     uint64_t seed = 72;
     worst_t psi = {0};
     worst_t r = {0};
     operating_point_t base = at(-9000, 12000, 0.3);
-    open_flux_gate(&base);
-    open_resistance_gate(&base);
-    rest(&base);
+    enable_flux_law(&base);
+    enable_resistance_law(&base);
+    reset_both(&base);
     for (int n = 0; n < 10000; n++) {
         operating_point_t in = at(-9000 + random_in(&seed, -60, 60), 12000 + random_in(&seed, -60, 60), 0.3);
         steady_voltage(&in, -0.08, 0.004);
         in.u.d = (q15_t)(in.u.d + random_in(&seed, -20, 20));
         in.u.q = (q15_t)(in.u.q + random_in(&seed, -20, 20));
-        both(&in);
+        step_both(&in);
         worst_note(&psi, from_q31(state.psi_delta) - twin.psi_delta / f.psi, "period %d", n);
         worst_note(&r, from_q31(state.r_delta) - twin.r_delta / f.z, "period %d", n);
     }
     ASSERT_WORST(psi, 5e-6);
     ASSERT_WORST(r, 5e-6);
-    /* and what they tell is the plant: to the 1e-3 of one noisy sample's share */
+    /* and these must be those of the machine; the noise of single samples moves them by about 1e-3 */
     TEST_ASSERT_DOUBLE_WITHIN(3e-3, -0.08, from_q31(state.psi_delta));
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.004, from_q31(state.r_delta));
 }
 
 /* --- adaptation ------------------------------------------------------------------------------ */
 
-/* The integral part alone is a first-order lag of bandwidth k_psi: after 1/k_psi 63 % are there, at every speed
- * and in both directions. The observer (S/2 = 95 rad/s) is 16 times faster: 6 % of the time. */
+/* With the integral part alone the flux has a first-order response of bandwidth k_psi: 63 % after 1/k_psi, at every
+ * speed and in both directions. The observer (S/2 = 95 rad/s) is 16 times faster and adds 6 % of that time. */
 void test_the_flux_bandwidth_is_the_same_at_every_speed(void)
 {
     f.mrai.flux_proportional_q24 = 0;
@@ -334,9 +335,9 @@ void test_the_flux_bandwidth_is_the_same_at_every_speed(void)
         }
         operating_point_t in = at(-6000, 8000, w / 10.0);
         steady_voltage(&in, -0.1, 0.0);
-        open_flux_gate(&in);
+        enable_flux_law(&in);
         state = (mrai_state_t){0};
-        rest(&in);
+        reset_both(&in);
         for (int n = 0; n < 1667; n++) {
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
@@ -344,7 +345,7 @@ void test_the_flux_bandwidth_is_the_same_at_every_speed(void)
         for (int n = 0; n < 15000; n++) {
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
-        /* u in q15: 2^-16/w of flux from u_q and, through the coupled poles, L_q/L_d times that from u_d */
+        /* Rounding of u to q15: 2^-16/w of flux from u_q and, by the coupled poles, L_q/L_d times that from u_d. */
         TEST_ASSERT_DOUBLE_WITHIN(3e-4, -0.1, from_q31(state.psi_delta));
     }
 }
@@ -355,9 +356,9 @@ void test_the_resistance_bandwidth_is_the_same_at_every_current(void)
     for (int i = 6000; i <= 20000; i += 3500) {
         operating_point_t in = at(-i, i, 0.2);
         steady_voltage(&in, 0.0, 0.005);
-        open_resistance_gate(&in);
+        enable_resistance_law(&in);
         state = (mrai_state_t){0};
-        rest(&in);
+        reset_both(&in);
         for (int n = 0; n < 500; n++) { /* 1/k_r */
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
@@ -369,8 +370,8 @@ void test_the_resistance_bandwidth_is_the_same_at_every_current(void)
     }
 }
 
-/* A magnet 19 % weak met at full speed: the observer is 0.7 pu off before the flux has moved. A bound on the error
- * that cuts this winds the observer up, and the flux overshoots by half. */
+/* Identification starts at full speed with a magnet that is 19 % weak: the observer error reaches 0.7 pu before the
+ * flux has changed. A limit of the error below that would make the flux overshoot by half. */
 void test_a_large_deviation_at_high_speed_is_identified_without_overshoot(void)
 {
     for (int w = -9; w <= 9; w += 3) {
@@ -379,9 +380,9 @@ void test_a_large_deviation_at_high_speed_is_identified_without_overshoot(void)
         }
         operating_point_t in = at(-6000, 8000, w / 10.0);
         steady_voltage(&in, -0.1, 0.0);
-        open_flux_gate(&in);
+        enable_flux_law(&in);
         state = (mrai_state_t){0};
-        rest(&in);
+        reset_both(&in);
         q31_t lowest = 0;
         for (int n = 0; n < 2000; n++) {
             mrai_step(&f.mrai, &schedule, &state, &in);
@@ -392,16 +393,15 @@ void test_a_large_deviation_at_high_speed_is_identified_without_overshoot(void)
     }
 }
 
-/* A stronger magnet than assumed slows i_q down: less current than the model's means more flux. */
-void test_the_flux_moves_towards_the_plant_for_both_signs_of_speed_and_of_deviation(void)
+void test_the_flux_changes_towards_the_machines_for_both_signs_of_speed_and_of_deviation(void)
 {
     for (int w = -1; w <= 1; w += 2) {
         for (int sign = -1; sign <= 1; sign += 2) {
             operating_point_t in = at(-6000, 8000, 0.4 * w);
             steady_voltage(&in, 0.05 * sign, 0.0);
-            open_flux_gate(&in);
+            enable_flux_law(&in);
             state = (mrai_state_t){0};
-            rest(&in);
+            reset_both(&in);
             for (int n = 0; n < 50; n++) {
                 mrai_step(&f.mrai, &schedule, &state, &in);
             }
@@ -410,13 +410,13 @@ void test_the_flux_moves_towards_the_plant_for_both_signs_of_speed_and_of_deviat
     }
 }
 
-void test_a_closed_gate_freezes_the_parameter_to_the_bit_while_the_observer_goes_on(void)
+void test_without_adaptation_the_parameters_are_kept_to_the_bit_while_the_observer_continues(void)
 {
     operating_point_t in = at(-6000, 8000, 0.4);
     steady_voltage(&in, -0.1, 0.005);
     state.psi_delta = 12345;
     state.r_delta = -6789;
-    rest(&in);
+    reset_both(&in);
     for (int n = 0; n < 10000; n++) {
         mrai_step(&f.mrai, &schedule, &state, &in);
     }
@@ -426,12 +426,12 @@ void test_a_closed_gate_freezes_the_parameter_to_the_bit_while_the_observer_goes
     TEST_ASSERT_FALSE(mrai_flux_clamped(&f.mrai, &state));
 }
 
-void test_one_gate_does_not_open_the_other(void)
+void test_adaptation_of_the_flux_does_not_change_the_resistance(void)
 {
     operating_point_t in = at(-6000, 8000, 0.4);
     steady_voltage(&in, -0.1, 0.005);
-    rest(&in);
-    open_flux_gate(&in);
+    reset_both(&in);
+    enable_flux_law(&in);
     for (int n = 0; n < 100; n++) {
         mrai_step(&f.mrai, &schedule, &state, &in);
     }
@@ -439,12 +439,13 @@ void test_one_gate_does_not_open_the_other(void)
     TEST_ASSERT_NOT_EQUAL(0, state.psi_delta);
 }
 
-/* A magnet outside of what is plausible: the parameter rests on its limit, says so, and leaves it when it may. */
-void test_the_limits_hold_are_flagged_and_let_go_again(void)
+/* A magnet beyond the limits: the parameter stays at its limit, is reported as clamped, and leaves the limit when the
+ * deviation reverses. */
+void test_the_flux_is_clamped_at_its_limits_reported_and_released(void)
 {
     operating_point_t in = at(-6000, 8000, 0.5);
-    open_flux_gate(&in);
-    rest(&in);
+    enable_flux_law(&in);
+    reset_both(&in);
     steady_voltage(&in, -0.3, 0.0);
     for (int n = 0; n < 3000; n++) {
         mrai_step(&f.mrai, &schedule, &state, &in);
@@ -455,7 +456,7 @@ void test_the_limits_hold_are_flagged_and_let_go_again(void)
     for (int n = 0; n < 200; n++) { /* two time constants of the observer */
         mrai_step(&f.mrai, &schedule, &state, &in);
     }
-    TEST_ASSERT_FALSE(mrai_flux_clamped(&f.mrai, &state)); /* no wind-up behind the limit */
+    TEST_ASSERT_FALSE(mrai_flux_clamped(&f.mrai, &state)); /* no windup beyond the limit */
     for (int n = 0; n < 3000; n++) {
         mrai_step(&f.mrai, &schedule, &state, &in);
     }
@@ -463,13 +464,13 @@ void test_the_limits_hold_are_flagged_and_let_go_again(void)
     TEST_ASSERT_TRUE(mrai_flux_clamped(&f.mrai, &state));
 }
 
-void test_the_resistance_limits_hold_and_are_flagged(void)
+void test_the_resistance_is_clamped_at_its_limits_and_reported(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         operating_point_t in = at(-12000, 12000, 0.2);
-        open_resistance_gate(&in);
+        enable_resistance_law(&in);
         state = (mrai_state_t){0};
-        rest(&in);
+        reset_both(&in);
         steady_voltage(&in, 0.0, (sign > 0) ? 0.03 : -0.0102);
         for (int n = 0; n < 6000; n++) {
             mrai_step(&f.mrai, &schedule, &state, &in);
@@ -479,40 +480,40 @@ void test_the_resistance_limits_hold_and_are_flagged(void)
     }
 }
 
-/* The observer runs on dpsi - k_P step: from the same state with and without it, the error differs by half a period's
- * rotational voltage of 20 steps, and the integral does not. By hand: w w_b T_s/2 * 20 dpsi. */
-void test_the_proportional_part_adds_its_multiple_of_the_step_for_this_period_only(void)
+/* The observer uses dpsi - k_P step. From the same state, with and without the proportional part, the integral is the
+ * same and the error differs by half a period's rotational voltage of 20 steps; by hand: w w_b T_s/2 * 20 dpsi. */
+void test_the_proportional_part_adds_its_multiple_of_the_step_in_this_period_only(void)
 {
     operating_point_t in = at(-6000, 8000, 0.5);
-    open_flux_gate(&in);
+    enable_flux_law(&in);
     steady_voltage(&in, 0.0, 0.0);
-    rest(&in);
-    error(0.0, -0.005);
+    reset_both(&in);
+    set_error(0.0, -0.005);
     mrai_state_t without = state;
     mrai_step(&f.mrai, &schedule, &state, &in);
     f.mrai.flux_proportional_q24 = 0;
     mrai_step(&f.mrai, &schedule, &without, &in);
     TEST_ASSERT_NOT_EQUAL(0, state.psi_delta);
     TEST_ASSERT_EQUAL_INT32(without.psi_delta, state.psi_delta);
-    const double more = 0.5 * 0.5 * f.w * f.si.period_s * 20.0 * from_q31(state.psi_delta);
-    /* k_P step in Q23: 1/2 LSB of it is 6e-8, through w_b T_s/4 0.8 LSB of q27 */
-    TEST_ASSERT_DOUBLE_WITHIN(3.0, more * q27, state.e_q_q27 - without.e_q_q27);
+    const double difference = 0.5 * 0.5 * f.w * f.si.period_s * 20.0 * from_q31(state.psi_delta);
+    /* k_P step in Q23: half an LSB is 6e-8, times w_b T_s/4 0.8 LSB of q27. */
+    TEST_ASSERT_DOUBLE_WITHIN(3.0, difference * q27, state.e_q_q27 - without.e_q_q27);
     TEST_ASSERT_EQUAL_INT32(without.e_d_q27, state.e_d_q27);
 }
 
 /* --- rounding -------------------------------------------------------------------------------- */
 
-/* 10^6 periods (100 s) of zero-mean noise, mean difference to the twin: an unbiased step leaves its wander
- * (2000 LSB, correlated over 100 periods: a mean of 20), a truncated one the equilibrium of 1/2 LSB of q29
- * per period against k_psi T_s: 2/(6e-3) LSB and more. */
+/* Mean difference to the twin over 10^6 periods (100 s) of noise with zero mean. Unbiased rounding leaves a random
+ * difference of 2000 LSB that is correlated over 100 periods: 20 LSB in the mean. Truncation would leave a constant
+ * difference where half an LSB of q29 per period balances k_psi T_s: 2/(6e-3) LSB and more. */
 void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
 {
     operating_point_t base = at(-9000, 12000, 0.3);
     uint64_t seed = 73;
-    open_flux_gate(&base);
-    open_resistance_gate(&base);
-    rest(&base);
-    /* a voltage that leaves nothing to identify but its own rounding, which both see */
+    enable_flux_law(&base);
+    enable_resistance_law(&base);
+    reset_both(&base);
+    /* the voltage of the nominal machine; its rounding acts on stage and twin alike */
     steady_voltage(&base, 0.0, 0.0);
     double psi = 0.0;
     double r = 0.0;
@@ -520,7 +521,7 @@ void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
         operating_point_t in = base;
         in.u.d = (q15_t)(in.u.d + random_in(&seed, -8, 8));
         in.u.q = (q15_t)(in.u.q + random_in(&seed, -8, 8));
-        both(&in);
+        step_both(&in);
         psi += from_q31(state.psi_delta) - twin.psi_delta / f.psi;
         r += from_q31(state.r_delta) - twin.r_delta / f.z;
     }
@@ -528,32 +529,32 @@ void test_a_million_periods_of_zero_mean_noise_leave_no_bias(void)
     TEST_ASSERT_DOUBLE_WITHIN(100.0, 0.0, r / 1e6 * 2147483648.0);
 }
 
-/* The observer held at an error of 1 LSB of q15: the ramp is N 2 k_psi s2 e/w exactly, with either sign. */
+/* With a constant observer error of 1 LSB of q15 the integral is N 2 k_psi s2 e/w, with either sign. */
 void test_the_smallest_constant_error_integrates_to_the_exact_ramp(void)
 {
     const operating_point_t in = at(-6000, 8000, 0.3);
-    open_flux_gate(&in);
+    enable_flux_law(&in);
     f.mrai.flux_proportional_q24 = 0;
     const double s2 = 3.0 * 674.0 / 65536.0 * from_q15(in.flux.g);
     const double step = 2.0 * 60.0 / (0.3 * f.w) * s2 / 32768.0;
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (mrai_state_t){0};
         for (int n = 0; n < 100000; n++) {
-            error(0.0, sign / 32768.0);
+            set_error(0.0, sign / 32768.0);
             mrai_step(&f.mrai, &schedule, &state, &in);
         }
-        /* 2 LSB of rounding in each step, which is deterministic here: nothing dithers it. */
+        /* 2 LSB of rounding in each step; without noise it has the same sign in every step. */
         TEST_ASSERT_DOUBLE_WITHIN(1e5 * 3.0 / 2147483648.0, -sign * 1e5 * step, from_q31(state.psi_delta));
     }
 }
 
-/* Errors that alternate exactly leave exactly nothing: rounding half up of +x and -x may differ in a tie only. */
-void test_an_alternating_error_does_not_walk(void)
+/* The steps of errors +x and -x cancel: rounding half up differs between them only in a tie. */
+void test_an_alternating_error_does_not_accumulate(void)
 {
     const operating_point_t in = at(-6000, 8000, 0.3);
-    open_flux_gate(&in);
-    open_resistance_gate(&in);
-    rest(&in);
+    enable_flux_law(&in);
+    enable_resistance_law(&in);
+    reset_both(&in);
     for (int n = 0; n < 1000000; n++) {
         const int sign = (n & 1) ? 1 : -1;
         state.e_d_q27 = sign * 1000003;
@@ -565,16 +566,16 @@ void test_an_alternating_error_does_not_walk(void)
 
 /* --- ends of the range ----------------------------------------------------------------------- */
 
-void test_no_corner_of_the_input_wraps_a_state(void)
+void test_no_extreme_input_wraps_a_state(void)
 {
     uint64_t seed = 74;
     for (int n = 0; n < 200000; n++) {
-        static const int16_t corner[4] = {INT16_MIN, -1, 0, INT16_MAX};
-        operating_point_t in = {.i = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
-                                .u = {corner[random_in(&seed, 0, 3)], corner[random_in(&seed, 0, 3)]},
+        static const int16_t extreme[4] = {INT16_MIN, -1, 0, INT16_MAX};
+        operating_point_t in = {.i = {extreme[random_in(&seed, 0, 3)], extreme[random_in(&seed, 0, 3)]},
+                                .u = {extreme[random_in(&seed, 0, 3)], extreme[random_in(&seed, 0, 3)]},
                                 .omega = random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX};
         in.flux = (flux_point_t){
-            .g = 32767, .psi_d = corner[random_in(&seed, 0, 3)], .psi_q = corner[random_in(&seed, 0, 3)]};
+            .g = 32767, .psi_d = extreme[random_in(&seed, 0, 3)], .psi_q = extreme[random_in(&seed, 0, 3)]};
         schedule = (mrai_schedule_t){random_in(&seed, 0, 1) ? INT32_MIN : INT32_MAX,
                                      random_in(&seed, 0, 1) ? 0 : INT32_MAX, 0,
                                      random_in(&seed, 0, 1) ? 0 : -209000000};
@@ -588,8 +589,8 @@ void test_no_corner_of_the_input_wraps_a_state(void)
     }
 }
 
-/* From a reset on nothing is wrong: a voltage that explains the sample leaves the error where the reset put it. */
-void test_reset_clears_the_error_and_keeps_what_was_identified(void)
+/* After a reset the steady-state voltage of the sample keeps the error at 0. */
+void test_reset_clears_the_error_and_keeps_the_identified_parameters(void)
 {
     operating_point_t in = at(-3000, 4000, 0.2);
     steady_voltage(&in, 300.0 / 32768.0, 0.001);
@@ -611,7 +612,7 @@ void test_reset_clears_the_error_and_keeps_what_was_identified(void)
         TEST_ASSERT_NOT_EQUAL_INT_MESSAGE(MOTOR_CHECK_OK, mrai_check(&c), #field " = " #value); \
     } while (0)
 
-void test_a_configuration_outside_its_proven_range_is_rejected(void)
+void test_a_configuration_outside_its_range_is_rejected(void)
 {
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, mrai_check(&f.mrai));
     REJECTED(r0, 0);

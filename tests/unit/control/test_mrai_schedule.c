@@ -36,9 +36,9 @@ static void at(int id, int iq, int omega)
     sample.omega = omega * 65536;
 }
 
-/* Gains only: the quotient of flux_gain in Q16 truncates at 1 of 2000/|w|; a 64th of the resistance gain has 15 bits.
- * Where the gain passes 32 it saturates. */
-void test_the_factors_follow_the_twin_over_speed_and_current(void)
+/* Relative errors: the quotient flux_gain/w is truncated to an integer of 2000 or more; resistance_gain/256 has 17
+ * bits. A resistance gain of 32 or more saturates. */
+void test_the_gains_follow_the_twin_over_speed_and_current(void)
 {
     worst_t flux = {0};
     worst_t resistance = {0};
@@ -58,7 +58,7 @@ void test_the_factors_follow_the_twin_over_speed_and_current(void)
         worst_note(&voltage, -y.minus_voltage_q28 / 268435456.0 / (f.w * f.si.period_s) - s.voltage_scale, "w %d",
                    sample.omega);
         if (fabs(magnitude - f.mrai.i_min) < 1.5) {
-            continue; /* the magnitude is rounded: either side is right */
+            continue; /* rounding of the magnitude decides */
         }
         TEST_ASSERT_EQUAL(s.flux_gain != 0.0, y.flux_step_q28 != 0);
         if (s.flux_gain != 0.0) {
@@ -74,7 +74,7 @@ void test_the_factors_follow_the_twin_over_speed_and_current(void)
     ASSERT_WORST(voltage, 3e-5); /* 7/360 (w T_s/2)^4 of the series at omega_b */
 }
 
-void test_disabled_identification_closes_both_gates_but_not_the_voltage_correction(void)
+void test_disabled_identification_stops_both_laws_but_keeps_the_voltage_correction(void)
 {
     at(-9000, 12000, 16000);
     const mrai_schedule_t on = step(true);
@@ -88,7 +88,7 @@ void test_disabled_identification_closes_both_gates_but_not_the_voltage_correcti
     TEST_ASSERT_EQUAL_INT32(2 * on.minus_voltage_q28, on.minus_voltage_d_q28);
 }
 
-void test_the_flux_adapts_from_its_speed_on_in_both_directions(void)
+void test_the_flux_adapts_above_its_lowest_speed_in_both_directions(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         at(-9000, 12000, sign * f.mrai.omega_min);
@@ -99,7 +99,7 @@ void test_the_flux_adapts_from_its_speed_on_in_both_directions(void)
     }
 }
 
-void test_both_gates_need_current_and_the_resistance_gate_not_too_much_speed(void)
+void test_both_laws_need_current_and_the_resistance_law_a_speed_below_its_limit(void)
 {
     at(0, f.mrai.i_min, 5000);
     TEST_ASSERT_TRUE(step(true).resistance_step_q26 > 0);
@@ -116,8 +116,8 @@ void test_both_gates_need_current_and_the_resistance_gate_not_too_much_speed(voi
     }
 }
 
-/* Without a current gate the norm may be nothing at all: the reciprocal saturates, it does not trap. */
-void test_no_current_and_no_gate_saturate_the_factor(void)
+/* With i_min = 0 the norm of the current may be 0: the quotient saturates, without a division by zero. */
+void test_at_zero_current_without_a_lower_limit_the_gains_saturate(void)
 {
     f.mrai.i_min = 0;
     at(0, 0, 2000);
@@ -128,8 +128,8 @@ void test_no_current_and_no_gate_saturate_the_factor(void)
     TEST_ASSERT_EQUAL_INT32(INT32_MIN, step(true).flux_step_q28);
 }
 
-/* 1 - 0.98^n: after 35 steps half, after 500 all but 4e-5; rounding to q15 stops at 1/2 LSB/0.02 = 25 LSB. */
-void test_a_parameter_at_rest_gains_quality_at_the_filters_rate(void)
+/* 1 - 0.98^n: one half after 35 steps; the rounding to q15 ends the rise 1/2 LSB/0.02 = 25 LSB below 1. */
+void test_the_quality_of_a_constant_parameter_rises_at_the_rate_of_the_filter(void)
 {
     at(-9000, 12000, 16000);
     for (int n = 0; n < 35; n++) {
@@ -144,13 +144,13 @@ void test_a_parameter_at_rest_gains_quality_at_the_filters_rate(void)
     TEST_ASSERT_INT_WITHIN(40, 32767, quality.r_quality);
 }
 
-void test_a_parameter_that_still_moves_has_no_quality_and_a_slow_one_has_its_share(void)
+void test_the_quality_is_zero_at_full_drift_and_three_quarters_at_a_quarter_of_it(void)
 {
     at(-9000, 12000, 16000);
     f.mrai.psi_delta_max = Q31(0.5);
     f.mrai.r_delta_min = Q31(-0.5);
     for (int n = 0; n < 1000; n++) {
-        identifier.psi_delta += f.mrai.psi_drift_full / 4; /* the drift wraps nothing: 1000 steps of 2e-4 */
+        identifier.psi_delta += f.mrai.psi_drift_full / 4; /* 1000 such steps do not wrap */
         identifier.r_delta -= 2 * f.mrai.r_drift_full / 2;
         (void)step(true);
     }
@@ -158,33 +158,33 @@ void test_a_parameter_that_still_moves_has_no_quality_and_a_slow_one_has_its_sha
     TEST_ASSERT_INT_WITHIN(60, 0, quality.r_quality);
 }
 
-/* 1000 against 12000 counts of i_q: the gain of the small current would meet the large one 144 times too strong. */
-void test_the_resistance_gain_suits_the_current_now_and_the_one_just_commanded(void)
+/* i_q steps between 1000 and 12000 counts: the gain for the small current is 144 times too high for the large one. */
+void test_the_resistance_gain_is_the_smaller_one_of_the_present_and_the_commanded_current(void)
 {
     f.mrai.i_min = 0;
     at(0, 1000, 16000);
     const operating_point_t small = sample;
-    const int32_t slow = step(true).resistance_step_q26;
+    const int32_t gain_at_small = step(true).resistance_step_q26;
     at(0, 12000, 16000);
-    const int32_t fast = step(true).resistance_step_q26;
-    TEST_ASSERT_TRUE(slow / 20 > fast); /* saturated, else 144 */
+    const int32_t gain_at_large = step(true).resistance_step_q26;
+    TEST_ASSERT_TRUE(gain_at_small / 20 > gain_at_large); /* 144 times, but the larger one is saturated */
     const mrai_schedule_in_t up = {&small, &sample, &identifier, true};
-    TEST_ASSERT_EQUAL_INT32(fast, mrai_schedule_step(&f.mrai, &quality, &up).resistance_step_q26);
+    TEST_ASSERT_EQUAL_INT32(gain_at_large, mrai_schedule_step(&f.mrai, &quality, &up).resistance_step_q26);
     const mrai_schedule_in_t down = {&sample, &small, &identifier, true};
-    TEST_ASSERT_EQUAL_INT32(fast, mrai_schedule_step(&f.mrai, &quality, &down).resistance_step_q26);
+    TEST_ASSERT_EQUAL_INT32(gain_at_large, mrai_schedule_step(&f.mrai, &quality, &down).resistance_step_q26);
 }
 
-/* Through a wrong flux the resistance would be seen wrong as well. */
+/* A flux error would falsify the identified resistance. */
 void test_the_resistance_law_waits_until_the_flux_has_settled(void)
 {
     at(-9000, 12000, 16000);
     identifier.psi_delta = f.mrai.psi_drift_full / 4;
-    const mrai_schedule_t moving = step(true);
-    TEST_ASSERT_NOT_EQUAL(0, moving.flux_step_q28);
-    TEST_ASSERT_EQUAL_INT32(0, moving.resistance_step_q26);
+    const mrai_schedule_t drifting = step(true);
+    TEST_ASSERT_NOT_EQUAL(0, drifting.flux_step_q28);
+    TEST_ASSERT_EQUAL_INT32(0, drifting.resistance_step_q26);
     identifier.psi_delta += f.mrai.psi_drift_full / 6;
     TEST_ASSERT_TRUE(step(true).resistance_step_q26 > 0);
-    identifier.psi_delta -= f.mrai.psi_drift_full / 4; /* backwards is moving as well */
+    identifier.psi_delta -= f.mrai.psi_drift_full / 4; /* a negative drift */
     TEST_ASSERT_EQUAL_INT32(0, step(true).resistance_step_q26);
 }
 
@@ -214,7 +214,7 @@ void test_parameters_that_do_not_adapt_or_are_clamped_lose_their_quality(void)
     TEST_ASSERT_INT_WITHIN(40, 0, quality.r_quality);
 }
 
-void test_the_quality_follows_the_twins_through_a_drive(void)
+void test_the_quality_follows_the_twin_over_changing_operating_points(void)
 {
     twin_mrai_quality_t twin = {0};
     worst_t worst = {0};
@@ -225,7 +225,7 @@ void test_the_quality_follows_the_twins_through_a_drive(void)
         if (n % 500 == 0) {
             at(random_in(&seed, -20000, 0), random_in(&seed, -20000, 20000), random_in(&seed, -32000, 32000));
         }
-        /* Shares of the full drift, none of them near the 0.2 that lets the resistance law begin. */
+        /* Shares of the full drift, none of them near 0.2, below which the resistance adapts. */
         static const double share[8] = {0.0, 0.05, 0.1, -0.15, 0.3, -0.6, 0.9, 1.7};
         identifier.psi_delta +=
             (q31_t)(share[random_in(&seed, 0, 7)] * (random_in(&seed, 0, 1) ? 1 : -1) * f.mrai.psi_drift_full);
@@ -240,5 +240,5 @@ void test_the_quality_follows_the_twins_through_a_drive(void)
         worst_note(&worst, quality.psi_quality - twin.psi_quality * 32768.0, "psi, step %d", n);
         worst_note(&worst, quality.r_quality - twin.r_quality * 32768.0, "r, step %d", n);
     }
-    ASSERT_WORST(worst, 60.0); /* the filter's dead band of 25 LSB, and the 1e-3 of drift_full in q31 */
+    ASSERT_WORST(worst, 60.0); /* the filter's dead band of 25 LSB, and a relative error of 1e-3 of drift_full in q31 */
 }

@@ -25,7 +25,7 @@ static void add(int32_t i_d, int32_t i_q, int32_t psi_d, int32_t psi_q, int32_t 
     torque_estimate_add(&sum, &i, &flux, delta);
 }
 
-/* Of one period alone. */
+/* Torque of a single period. */
 static q15_t torque(int32_t i_d, int32_t i_q, int32_t psi_d, int32_t psi_q, int32_t delta)
 {
     add(i_d, i_q, psi_d, psi_q, delta);
@@ -38,13 +38,13 @@ void test_the_torque_is_psi_d_i_q_minus_psi_q_i_d_with_the_identified_flux(void)
     TEST_ASSERT_INT_WITHIN(1, 8192, torque(-16384, 8192, 16384, 6554, 3277));
 }
 
-void test_motor_and_generator_mirror_each_other(void)
+void test_the_torque_of_motor_and_generator_has_the_same_magnitude(void)
 {
     const q15_t a = torque(-7000, 11000, 16000, 9000, -188);
     TEST_ASSERT_INT_WITHIN(1, -a, torque(-7000, -11000, 16000, -9000, -188));
 }
 
-/* Exact but for the mean's rounding (0.5) and the sum's LSB. */
+/* Errors: the rounding of the mean (0.5) and the LSB of the sum. */
 void test_every_operating_point_follows_the_twin(void)
 {
     const fixture_t f = fixture();
@@ -64,8 +64,8 @@ void test_every_operating_point_follows_the_twin(void)
     ASSERT_WORST(worst, 0.51);
 }
 
-/* However many have come in since: the task may be a period early or late. psi = 1/2: mean of 250 n. */
-void test_the_mean_is_that_of_the_periods_since_the_last_one(void)
+/* The number of periods varies, because the task may be a period early or late. With psi = 1/2 period n has 250 n. */
+void test_the_mean_is_taken_over_the_periods_since_the_last_mean(void)
 {
     int n = 0;
     for (int block = 9; block <= 12; block++) {
@@ -77,14 +77,14 @@ void test_the_mean_is_that_of_the_periods_since_the_last_one(void)
     }
 }
 
-void test_without_a_new_period_the_mean_stays(void)
+void test_without_a_new_period_the_mean_keeps_its_value(void)
 {
     TEST_ASSERT_EQUAL_INT(5000, torque(0, 10000, 16384, 0, 0));
     TEST_ASSERT_EQUAL_INT(5000, torque_estimate_mean(&mean, &sum));
 }
 
-/* Its sum may have wrapped: nothing can be said but what was said before. */
-void test_after_more_periods_than_the_sum_holds_the_mean_stays(void)
+/* The difference of the sums may have wrapped and cannot be used. */
+void test_after_more_periods_than_the_sum_holds_the_mean_keeps_its_value(void)
 {
     TEST_ASSERT_EQUAL_INT(5000, torque(0, 10000, 16384, 0, 0));
     for (int n = 0; n < 64; n++) {
@@ -99,7 +99,7 @@ void test_sum_and_count_may_wrap(void)
     sum = (torque_sum_t){INT32_MAX - 5, -1};
     mean.last = sum;
     for (int n = 0; n < 63; n++) {
-        add(-32768, 32767, 32767, 32767, 0); /* nearly two: the most that the sum takes */
+        add(-32768, 32767, 32767, 32767, 0); /* nearly two, the largest torque of a period */
     }
     TEST_ASSERT_EQUAL_INT32(62, sum.count);
     TEST_ASSERT_EQUAL_INT(32767, torque_estimate_mean(&mean, &sum));
@@ -111,7 +111,8 @@ void test_sum_and_count_may_wrap(void)
     TEST_ASSERT_EQUAL_INT(-5000, torque_estimate_mean(&mean, &sum));
 }
 
-/* The mean rounds half up, of either sign, as the exact quotient does; each period has cut off half an LSB of Q24. */
+/* The mean is rounded half up with either sign. Each period adds a truncation of half an LSB of Q24 on average, which
+ * the expected value contains. */
 void test_the_mean_is_rounded_to_half_an_lsb_for_every_sum(void)
 {
     worst_t worst = {0};

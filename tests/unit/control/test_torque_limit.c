@@ -18,7 +18,7 @@ static q15_t counts(double x)
     return (q15_t)lround(x * 32768.0);
 }
 
-/* Half speed, 350 V, cold, everything open; the machine makes 0.25 without loss. */
+/* Half speed, 350 V, 20 C, no limit active; 0.25 of torque is arbitrated, and no loss is measured. */
 void setUp(void)
 {
     f = fixture();
@@ -42,7 +42,7 @@ static torque_limit_t step(void)
     return torque_limit_step(&f.torque_limit, &state, &in);
 }
 
-void test_with_everything_open_the_request_passes_untouched(void)
+void test_without_an_active_limit_the_arbitrated_torque_is_not_changed(void)
 {
     for (int sign = -1; sign <= 1; sign++) {
         in.torque_arbitrated = (q15_t)(sign * 8000);
@@ -54,8 +54,8 @@ void test_with_everything_open_the_request_passes_untouched(void)
     }
 }
 
-/* Whatever unit a wrong command comes in, the machine's rating is the most it can do. */
-void test_no_request_exceeds_the_rated_torque(void)
+/* Also a torque sent in a wrong unit is limited to the rated one. */
+void test_the_limited_torque_does_not_exceed_the_rated_one(void)
 {
     in.torque_arbitrated = INT16_MAX;
     TEST_ASSERT_EQUAL_INT(RATED, step().torque_limited);
@@ -64,8 +64,8 @@ void test_no_request_exceeds_the_rated_torque(void)
     TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, step().derating);
 }
 
-/* Driving is torque with the rotation, generating against it: four quadrants. */
-void test_driving_and_generating_are_limited_apart_in_both_directions_of_rotation(void)
+/* Driving torque acts in the direction of rotation, regenerating torque against it: four quadrants. */
+void test_driving_and_regenerating_are_limited_separately_in_both_directions_of_rotation(void)
 {
     limits.torque_drive = 5000;
     limits.torque_regen = 3000;
@@ -79,8 +79,8 @@ void test_driving_and_generating_are_limited_apart_in_both_directions_of_rotatio
     }
 }
 
-/* p = t w: 0.1 at half speed is 0.2 of torque; no loss is known yet. */
-void test_power_limits_become_torque_by_the_speed(void)
+/* p = t w: a power of 0.1 at half speed is a torque of 0.2; the loss is still 0. */
+void test_a_power_limit_divided_by_the_speed_limits_the_torque(void)
 {
     limits.power_drive = counts(0.1);
     limits.power_regen = counts(0.05);
@@ -88,13 +88,13 @@ void test_power_limits_become_torque_by_the_speed(void)
     TEST_ASSERT_EQUAL_HEX16(DERATING_POWER, step().derating);
     in.torque_arbitrated = counts(-0.25);
     TEST_ASSERT_INT_WITHIN(2, counts(-0.1), step().torque_limited);
-    in.omega = 1000; /* slow: the same power is no limit */
+    in.omega = 1000; /* slow: the same power does not limit */
     TEST_ASSERT_EQUAL_INT(counts(-0.25), step().torque_limited);
 }
 
-/* u.i - t w = 0.2 * 0.5 - 0 = 0.1, plus drop 0.004 * 0.5, is the loss: the battery pays for it when driving, and it
- * relieves it when generating. 100 steps of 0.05: settled to 0.6 %. */
-void test_losses_count_on_the_dc_side(void)
+/* The loss is u.i - t w = 0.2 * 0.5 - 0 = 0.1, plus drop |i| = 0.004 * 0.5. It reduces the shaft power that the battery
+ * allows when driving and increases it when regenerating. After 100 steps of 0.05 the filter has settled to 0.6 %. */
+void test_the_power_limits_apply_to_the_dc_side(void)
 {
     in.u = (dq_q15_t){0, counts(0.2)};
     in.i = (dq_q15_t){0, counts(0.5)};
@@ -117,53 +117,53 @@ void test_a_power_below_the_losses_allows_no_driving_torque(void)
     TEST_ASSERT_EQUAL_INT(0, step().torque_limited);
 }
 
-/* Halfway down each line half the rated torque is left: 9830. */
-static void halved(uint16_t reason, int driving, int generating)
+/* In the middle of each derating line half the rated torque remains: 9830. */
+static void assert_halved(uint16_t reason, int driving, int regenerating)
 {
     in.torque_arbitrated = 15000;
     const torque_limit_t up = step();
     in.torque_arbitrated = -15000;
     const torque_limit_t down = step();
     TEST_ASSERT_INT_WITHIN(20, driving ? RATED / 2 : 15000, up.torque_limited);
-    TEST_ASSERT_INT_WITHIN(20, generating ? -RATED / 2 : -15000, down.torque_limited);
+    TEST_ASSERT_INT_WITHIN(20, regenerating ? -RATED / 2 : -15000, down.torque_limited);
     TEST_ASSERT_EQUAL_HEX16(driving ? reason : 0, up.derating);
-    TEST_ASSERT_EQUAL_HEX16(generating ? reason : 0, down.derating);
+    TEST_ASSERT_EQUAL_HEX16(regenerating ? reason : 0, down.derating);
 }
 
-void test_a_hot_inverter_halves_both_directions_halfway_down_its_line(void)
+void test_in_the_middle_of_the_inverters_derating_line_both_directions_are_halved(void)
 {
     in.inverter_dC = 950;
-    halved(DERATING_INVERTER, 1, 1);
+    assert_halved(DERATING_INVERTER, 1, 1);
 }
 
-void test_a_hot_winding_halves_both_directions_halfway_down_its_line(void)
+void test_in_the_middle_of_the_windings_derating_line_both_directions_are_halved(void)
 {
     in.winding_dC = 1675;
-    halved(DERATING_WINDING, 1, 1);
+    assert_halved(DERATING_WINDING, 1, 1);
 }
 
-void test_low_dc_voltage_takes_driving_torque_only(void)
+void test_low_dc_voltage_limits_driving_torque_only(void)
 {
     in.v_dc = 10240;
-    halved(DERATING_DC_LOW, 1, 0);
+    assert_halved(DERATING_DC_LOW, 1, 0);
 }
 
-void test_high_dc_voltage_takes_generating_torque_only(void)
+void test_high_dc_voltage_limits_regenerating_torque_only(void)
 {
     in.v_dc = 26500;
-    halved(DERATING_DC_HIGH, 0, 1);
+    assert_halved(DERATING_DC_HIGH, 0, 1);
 }
 
-void test_beyond_maximum_speed_only_driving_torque_goes(void)
+void test_near_maximum_speed_only_driving_torque_is_limited(void)
 {
     in.omega = 29000;
-    halved(DERATING_SPEED, 1, 0);
+    assert_halved(DERATING_SPEED, 1, 0);
     in.omega = -29000;
     in.torque_arbitrated = 15000; /* brakes */
     TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
 }
 
-void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(void)
+void test_from_the_end_of_a_derating_line_on_the_torque_is_zero_and_nothing_wraps(void)
 {
     static const int16_t hot[] = {1050, 2000, INT16_MAX};
     for (int n = 0; n < 3; n++) {
@@ -174,7 +174,7 @@ void test_at_the_end_of_its_line_nothing_is_left_and_beyond_it_nothing_wraps(voi
     TEST_ASSERT_EQUAL_INT(counts(0.25), step().torque_limited);
 }
 
-void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves(void)
+void test_a_missing_temperature_sensor_does_not_limit_and_a_lost_one_halves_the_torque(void)
 {
     in.torque_arbitrated = 15000;
     in.inverter_dC = TEMPERATURE_UNKNOWN;
@@ -187,8 +187,8 @@ void test_a_sensor_that_was_never_there_is_no_reason_and_one_that_is_lost_halves
     TEST_ASSERT_EQUAL_HEX16(DERATING_SENSOR, step().derating);
 }
 
-/* From the first step on, and of either sensor. */
-void test_a_sensor_out_of_its_range_halves_and_is_a_reason_of_its_own(void)
+/* From the first step on, with either sensor. */
+void test_a_temperature_sensor_out_of_its_range_halves_the_torque_and_is_reported(void)
 {
     in.torque_arbitrated = 15000;
     in.inverter_dC = TEMPERATURE_UNKNOWN;
@@ -202,7 +202,7 @@ void test_a_sensor_out_of_its_range_halves_and_is_a_reason_of_its_own(void)
     TEST_ASSERT_EQUAL_INT(15000, step().torque_limited);
 }
 
-void test_what_the_machine_cannot_reach_is_not_asked_for(void)
+void test_the_torque_is_limited_to_the_reach_of_the_machine(void)
 {
     in.reach = 4000;
     TEST_ASSERT_EQUAL_INT(4000, step().torque_limited);
@@ -213,8 +213,9 @@ void test_what_the_machine_cannot_reach_is_not_asked_for(void)
     TEST_ASSERT_EQUAL_HEX16(0, step().derating);
 }
 
-/* Holding a car on a slope must not depend on which way it rolls: the driving limit holds for both. */
-void test_near_standstill_the_driving_limit_holds_for_both_signs_and_nothing_jumps(void)
+/* Holding a vehicle on a slope must not depend on the direction in which it rolls: near standstill the driving limit
+ * holds for both signs of the torque. */
+void test_near_standstill_the_driving_limit_holds_for_both_signs_and_the_limit_is_continuous(void)
 {
     limits.torque_drive = 8000;
     limits.torque_regen = 2000;
@@ -233,7 +234,7 @@ void test_near_standstill_the_driving_limit_holds_for_both_signs_and_nothing_jum
     TEST_ASSERT_EQUAL_INT(8000, step().torque_limited);
 }
 
-/* The quotient of power and speed: 1/2 LSB of power over |w| >= 0.02; the loss carries 2 LSB. */
+/* Tolerance: half an LSB of power divided by |w| >= 0.02, and 2 LSB of the loss. */
 void test_the_limit_follows_the_twin(void)
 {
     worst_t worst = {0};
@@ -277,7 +278,7 @@ void test_the_limit_follows_the_twin(void)
     ASSERT_WORST(worst, 60.0);
 }
 
-void test_lines_that_lead_the_wrong_way_are_rejected(void)
+void test_derating_lines_with_the_wrong_sign_and_other_bad_configurations_are_rejected(void)
 {
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&f.torque_limit));
     torque_limit_config_t c = f.torque_limit;

@@ -25,18 +25,18 @@ static q15_t step(void)
     return torque_loop_step(&f.torque_loop, &state, &in);
 }
 
-/* A plant whose torque is a fixed share of the request, one period late. */
+/* A machine whose torque is a fixed share of the corrected torque, one step later. Returns the corrected torque. */
 static q15_t run(double share, int steps)
 {
-    q15_t request = 0;
+    q15_t corrected = 0;
     for (int n = 0; n < steps; n++) {
-        request = step();
-        in.torque_estimated = (q15_t)lround(share * request);
+        corrected = step();
+        in.torque_estimated = (q15_t)lround(share * corrected);
     }
-    return request;
+    return corrected;
 }
 
-void test_switched_off_the_command_passes_unchanged(void)
+void test_while_the_loop_is_disabled_the_commanded_torque_is_not_changed(void)
 {
     in.enabled = false;
     for (int c = -32768; c <= 32767; c += 111) {
@@ -46,8 +46,8 @@ void test_switched_off_the_command_passes_unchanged(void)
     }
 }
 
-/* A machine that makes 8.75 % too little is asked for 1/(1 - 0.0875) of the command. */
-void test_the_correction_makes_the_estimate_equal_the_command(void)
+/* With a machine that makes 8.75 % too little, the corrected torque is 1/(1 - 0.0875) of the commanded one. */
+void test_the_correction_makes_the_estimated_torque_equal_to_the_commanded(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){0};
@@ -60,19 +60,19 @@ void test_the_correction_makes_the_estimate_equal_the_command(void)
     }
 }
 
-/* x is a ratio: identified at 100 it serves at 30 and in the other direction at once. */
-void test_what_was_identified_at_one_torque_serves_at_another_and_in_the_other_direction(void)
+/* x is a ratio: found at 10000, it is valid at -3000. */
+void test_a_correction_found_at_one_torque_is_valid_at_another_and_in_the_other_direction(void)
 {
     in.torque_commanded = 10000;
     (void)run(0.9125, 2000);
     in.enabled = true;
     in.torque_commanded = in.torque_estimated = -3000;
-    state.model = -3000 * 65536; /* settled: only x acts */
+    state.model = -3000 * 65536; /* no error: only x acts */
     TEST_ASSERT_INT_WITHIN(2, -3288, step());
 }
 
-/* ki e/|T*|: the error dies with ki = 0.03 per ms whatever the torque; kp and the model left out here. */
-void test_the_loop_is_equally_fast_at_every_torque(void)
+/* The integral part ki e/|T*| has the same time constant at every torque, here without kp and with a settled model. */
+void test_the_loop_has_the_same_time_constant_at_every_torque(void)
 {
     f.torque_loop.kp = 0;
     for (int c = 1000; c <= 16000; c *= 2) {
@@ -86,7 +86,7 @@ void test_the_loop_is_equally_fast_at_every_torque(void)
 
 void test_a_step_of_a_perfect_machine_excites_no_integrator(void)
 {
-    /* T^ follows as the model does, first order with model_rate, and tells of the time that has passed. */
+    /* T^ has the first-order response of the model and is the torque of the step before. */
     double torque = 0.0;
     in.torque_commanded = 12000;
     for (int n = 0; n < 200; n++) {
@@ -116,8 +116,9 @@ void test_switching_on_and_off_is_bumpless(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, from_q31(state.correction));
 }
 
-/* 0.4 of the command, whatever the estimate says; the integrator stays inside and comes back at once. */
-void test_the_authority_bounds_the_request_and_the_integrator(void)
+/* The correction is at most 0.4 of the commanded torque for any estimate; the integrator is limited too and leaves the
+ * limit immediately. */
+void test_the_authority_limits_the_corrected_torque_and_the_integrator(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){0};
@@ -148,8 +149,8 @@ void test_the_lower_bound_of_the_authority_holds_as_well(void)
     TEST_ASSERT_TRUE(state.saturated);
 }
 
-/* While voltage or current are at their limit, asking for more would only wind up; asking for less may act. */
-void test_the_correction_is_held_while_limited_and_asked_for_more(void)
+/* While voltage or current are at their limit, a larger correction would only be windup; a smaller one takes effect. */
+void test_while_limited_the_correction_does_not_rise_but_may_fall(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){.correction = 100000000, .model = (sign > 0) ? 655360000 : -655360000};
@@ -166,8 +167,8 @@ void test_the_correction_is_held_while_limited_and_asked_for_more(void)
     }
 }
 
-/* Nothing asked for, nothing corrected: a torque estimate's offset must not creep in at standstill. */
-void test_a_zero_command_asks_for_zero_and_keeps_what_was_identified(void)
+/* An offset of the torque estimate must not enter the correction while no torque is commanded. */
+void test_a_commanded_torque_of_zero_stays_zero_and_keeps_the_correction(void)
 {
     state.correction = 123456789;
     in.torque_commanded = 0;
@@ -178,8 +179,8 @@ void test_a_zero_command_asks_for_zero_and_keeps_what_was_identified(void)
     TEST_ASSERT_EQUAL_INT32(123456789, state.correction);
 }
 
-/* Below T_min the relative error is that of T_min: no division by a vanishing command. */
-void test_small_commands_integrate_more_slowly_without_more_noise(void)
+/* Dividing by a small torque would amplify the noise of the estimate. */
+void test_below_t_min_the_error_is_divided_by_t_min(void)
 {
     f.torque_loop.kp = 0;
     in.torque_commanded = 400; /* T_min = 655 */
@@ -189,9 +190,9 @@ void test_small_commands_integrate_more_slowly_without_more_noise(void)
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 400.0 / 655.0, from_q31(state.correction));
 }
 
-/* Coasting at a 100th of T_min with an estimate that is a little off: as a ratio it would be all of the authority, and
- * the next request would be wrong by it. What was identified is kept. */
-void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
+/* A commanded torque of a hundredth of T_min and an offset of the estimate: as a ratio the offset would use the whole
+ * authority and falsify the next torque. Below T_min/2 the correction is kept. */
+void test_an_offset_at_a_small_torque_does_not_change_the_correction(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         state = (torque_loop_state_t){.correction = Q31(0.1), .model = sign * 6 * 65536};
@@ -206,7 +207,7 @@ void test_an_offset_at_a_small_command_does_not_become_a_ratio(void)
     }
 }
 
-void test_one_lsb_of_alternating_error_does_not_walk_in_a_million_steps(void)
+void test_an_alternating_error_of_one_lsb_does_not_accumulate_in_a_million_steps(void)
 {
     in.torque_commanded = 10000;
     state.model = 10000 * 65536;
@@ -221,7 +222,7 @@ void test_one_lsb_of_alternating_error_does_not_walk_in_a_million_steps(void)
 void test_random_commands_and_estimates_follow_the_twin(void)
 {
     twin_torque_state_t twin = {0};
-    worst_t request = {0};
+    worst_t corrected = {0};
     worst_t correction = {0};
     uint64_t seed = 101;
     for (int n = 0; n < 50000; n++) {
@@ -236,17 +237,18 @@ void test_random_commands_and_estimates_follow_the_twin(void)
                                     from_q15(in.confidence), in.enabled, in.limited};
         const q15_t r = step();
         const double expected = twin_torque_loop(&f.si, &twin, &t);
-        worst_note(&request, r - expected / f.t * 32768.0, "step %d, command %d", n, in.torque_commanded);
-        worst_note(&correction, from_q31(state.correction) - twin.correction, "step %d, command %d", n,
+        worst_note(&corrected, r - expected / f.t * 32768.0, "step %d, commanded %d", n, in.torque_commanded);
+        worst_note(&correction, from_q31(state.correction) - twin.correction, "step %d, commanded %d", n,
                    in.torque_commanded);
     }
-    /* T_m and the division round to q15: 1 LSB of 655 in e/T_min at worst, 1.5e-3 times ki, averaged over 1/ki. */
+    /* T_m and the quotient are rounded to q15: at worst 1 LSB of T_min = 655 LSB, 1.5e-3, which the loop averages. */
     ASSERT_WORST(correction, 1.5e-3);
-    ASSERT_WORST(request, 30.0); /* 1.5e-3 of 18000 */
+    ASSERT_WORST(corrected, 30.0); /* 1.5e-3 of 18000 */
 }
 
-/* Identified -10 % elsewhere; at the limit 0.97 of the request arrives. The way back is open up to the command. */
-void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond(void)
+/* The correction is -10 % from another operating point, while at the limit the torque is 0.97 of the corrected one. The
+ * correction may rise to 0, but not above it. */
+void test_at_a_limit_a_negative_correction_rises_to_zero_and_not_beyond(void)
 {
     in.torque_commanded = 10000;
     in.limited = true;
@@ -259,8 +261,8 @@ void test_at_a_limit_a_negative_correction_returns_to_the_command_and_not_beyond
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, 1.0 / 0.97 - 1.0, from_q31(state.correction));
 }
 
-/* Authority 0.4: half of the confidence leaves 0.2, none leaves the command. */
-void test_without_confidence_the_request_is_the_command(void)
+/* The authority of 0.4 is scaled by the confidence: 0.2 at one half. */
+void test_without_confidence_the_corrected_torque_is_the_commanded_one(void)
 {
     in.torque_commanded = 10000;
     in.confidence = 16384;
@@ -272,11 +274,11 @@ void test_without_confidence_the_request_is_the_command(void)
     TEST_ASSERT_EQUAL_INT(-10000, step());
 }
 
-void test_no_corner_wraps_or_leaves_the_authority(void)
+void test_no_extreme_input_wraps_or_exceeds_the_authority(void)
 {
-    static const int16_t corner[5] = {INT16_MIN, -1, 0, 1, INT16_MAX};
+    static const int16_t extreme[5] = {INT16_MIN, -1, 0, 1, INT16_MAX};
     for (int n = 0; n < 5 * 5 * 4 * 3; n++) {
-        in = (torque_loop_in_t){corner[n % 5], corner[n / 5 % 5], Q15_MAX, (n / 25) & 1, (n / 50) & 1};
+        in = (torque_loop_in_t){extreme[n % 5], extreme[n / 5 % 5], Q15_MAX, (n / 25) & 1, (n / 50) & 1};
         state.correction = (n / 100 == 0) ? INT32_MIN : (n / 100 == 1) ? 0 : INT32_MAX;
         state.model = (n & 1) ? INT32_MIN : INT32_MAX;
         const int r = step();

@@ -18,8 +18,8 @@ static double clip(double x)
     return twin_clamp(x, -32768.0, 32767.0);
 }
 
-/* The angle of a is exact in the twin; sine and cosine are each good to 1.05 LSB, so |v| 1.05 sqrt(2) at most, plus
- * 0.5. */
+/* The twin's angle is exact. Sine and cosine have an error of up to 1.05 LSB each: 1.05 sqrt(2) |v|, plus 0.5 of
+ * rounding. */
 void test_park_and_its_inverse_follow_the_twin_at_every_angle(void)
 {
     worst_t worst = {0};
@@ -40,7 +40,7 @@ void test_park_and_its_inverse_follow_the_twin_at_every_angle(void)
     ASSERT_WORST(worst, 2.0);
 }
 
-/* Saturation instead of a wrap where the rotated vector leaves the square. */
+/* A rotated component may exceed the format and must saturate, not wrap. */
 void test_park_of_the_longest_vector_saturates_and_keeps_its_sign(void)
 {
     const fx_pair_t at = fx_rotation(0x20000000U); /* 45 degrees */

@@ -10,7 +10,7 @@ static fixture_t f;
 static voltage_reserve_state_t state;
 static voltage_reserve_in_t in;
 
-/* v_ratio v_dc = 0.55 * 0.6667 = 0.36667, 12015 counts: the voltage is 0.3, the references sit on their flux. */
+/* v_ratio v_dc = 0.55 * 0.6667 = 0.36667, 12015 counts; the voltage is 0.3, and the references use the planned flux. */
 void setUp(void)
 {
     f = fixture();
@@ -32,17 +32,17 @@ static int32_t trim(void)
     return state.trim / 65536;
 }
 
-void test_on_the_limit_a_twentieth_of_the_missing_voltage_is_added_each_step(void)
+void test_at_the_flux_limit_a_twentieth_of_the_voltage_error_is_added_each_step(void)
 {
     (void)step();
     TEST_ASSERT_INT32_WITHIN(1, (12015 - 9830) / 20, trim());
-    in.u.q = 13000; /* too much */
+    in.u.q = 13000; /* above the planned voltage */
     state.trim = 0;
     (void)step();
     TEST_ASSERT_INT32_WITHIN(1, (12015 - 13000) / 20, trim());
 }
 
-void test_voltage_left_away_from_the_limit_is_no_reason_to_ask_for_more(void)
+void test_unused_voltage_away_from_the_flux_limit_does_not_change_the_trim(void)
 {
     in.psi = (dq_q15_t){4800, 3600};
     for (int n = 0; n < 100; n++) {
@@ -51,7 +51,7 @@ void test_voltage_left_away_from_the_limit_is_no_reason_to_ask_for_more(void)
     TEST_ASSERT_EQUAL_INT32(0, state.trim);
 }
 
-void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
+void test_excess_voltage_lowers_the_trim_also_away_from_the_flux_limit(void)
 {
     in.psi = (dq_q15_t){4800, 3600};
     in.u.q = -13000;
@@ -60,7 +60,7 @@ void test_too_much_voltage_is_taken_off_wherever_the_references_are(void)
 }
 
 /* 0.95^100 = 0.0059 */
-void test_away_from_the_limit_and_with_the_bridge_off_the_trim_returns_to_zero(void)
+void test_away_from_the_flux_limit_and_with_switching_disabled_the_trim_returns_to_zero(void)
 {
     for (int off = 0; off < 2; off++) {
         in.psi = off ? (dq_q15_t){8000, 6000} : (dq_q15_t){4800, 3600};
@@ -73,7 +73,7 @@ void test_away_from_the_limit_and_with_the_bridge_off_the_trim_returns_to_zero(v
     }
 }
 
-void test_the_trim_stays_within_its_authority(void)
+void test_the_trim_stays_within_its_limits(void)
 {
     for (int n = 0; n < 1000; n++) {
         (void)step();
@@ -86,8 +86,8 @@ void test_the_trim_stays_within_its_authority(void)
     TEST_ASSERT_EQUAL_INT32(f.voltage_reserve.trim_min, trim());
 }
 
-/* |(0.8, 0.6) + (0.1, 0)| = 1.0817 in units of 10000. */
-void test_the_magnets_share_is_what_it_adds_to_the_flux(void)
+/* In units of 10000: |(0.8, 0.6) + (0.1, 0)| = 1.0817. */
+void test_the_shift_is_the_change_of_the_flux_magnitude_by_the_identified_error(void)
 {
     TEST_ASSERT_EQUAL_INT(0, step().shift);
     in.psi_delta = 1000;
@@ -96,7 +96,7 @@ void test_the_magnets_share_is_what_it_adds_to_the_flux(void)
     TEST_ASSERT_INT_WITHIN(2, (int)(sqrt(49e6 + 36e6) - 10000), step().shift);
 }
 
-/* Three lengths of 0.7 LSB each; the gain makes the trim's part of that small. */
+/* Tolerance: three magnitudes with an error of 0.7 LSB each; the gain reduces their effect on the trim. */
 void test_the_reserve_follows_the_twin(void)
 {
     worst_t worst = {0};
@@ -110,7 +110,7 @@ void test_the_reserve_follows_the_twin(void)
         in.psi_plan = (q15_t)((n & 1) ? hypot(in.psi.d, in.psi.q) : 32767);
         in.acting = (n % 7) != 0;
         if (fabs(0.55 * in.v_dc - hypot(in.u.d, in.u.q)) < 4.0) {
-            continue; /* either side of the limit */
+            continue; /* rounding decides on which side of the limit the voltage is */
         }
         const twin_reserve_in_t t = {
             .u = {in.u.d / 32768.0 * f.v, in.u.q / 32768.0 * f.v},
