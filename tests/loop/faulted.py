@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One fault of the plant at one operating point: when the firmware finds it, and the torque of the shaft before."""
+"""One fault of the plant at one operating point: when the firmware reports it, and the torque error until then."""
 
 import math
 from dataclasses import dataclass
@@ -22,16 +22,16 @@ def allowed_Nm(torque_Nm: float) -> float:
 class Outcome:
     """Times in milliseconds; NaN: never."""
 
-    found_ms: float  # from the fault of the plant to the firmware's
-    moved_ms: float  # from the first torque error beyond what is allowed to the firmware's fault
-    error_ms: float  # how long the torque error was beyond it until then
+    found_ms: float  # from the fault of the plant to the fault that the firmware reports
+    moved_ms: float  # from the first torque error beyond the allowed one to the reported fault
+    error_ms: float  # time in which the torque error was beyond the allowed one until then
     largest_Nm: float
     lasting_Nm: float  # mean of the torque error over the last tenth of a second, if nothing was found
     names: tuple[str, ...]
 
 
 def outcome(torque: np.ndarray, words: np.ndarray, before_Nm: float, period_ms: float) -> Outcome:
-    """From the rows of every period after the fault."""
+    """Evaluate the recorded periods after the fault."""
     found = int(np.argmax(words > 0)) if words[-1] > 0 else None
     error = torque[:found] - before_Nm
     beyond = np.abs(error) > allowed_Nm(before_Nm)
@@ -50,7 +50,7 @@ def outcome(torque: np.ndarray, words: np.ndarray, before_Nm: float, period_ms: 
 def inject(
     motor: Motor, rpm: float, torque_Nm: float, fault: dict[str, float], seconds: float, **plant: float
 ) -> Outcome:
-    """At an imposed speed, in steady state, with the plant's parameters `plant` and then with `fault` too."""
+    """Inject `fault` in steady state at an imposed speed; `plant` are parameters of the plant from the start."""
     parameters = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": rpm * RPM} | plant
     with Loop(motor.library, parameters, motor.flux_map) as loop:
         loop.record(("truth.torque_mean_Nm", "fault_word"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fluxtrue sim as a user calls it: files, messages, exit codes, the shipped scenarios."""
+"""`fluxtrue sim` as a user calls it: files, messages, exit codes, the shipped scenarios."""
 
 import csv
 import json
@@ -48,7 +48,7 @@ def test_a_run_writes_csv_json_and_plot_that_agree(tmp_path: Path, scenario: Pat
     assert data["fault_word"] == 0
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert "shaft torque" in result.stdout
-    # Nothing but what was asked for.
+    # No other file is written.
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.json", "run.png", "run.toml"]
 
 
@@ -138,7 +138,7 @@ def test_a_missing_scenario_is_named() -> None:
     assert result.stderr == "error: nowhere.toml: cannot be read (No such file or directory)\n"
 
 
-def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_utf_8_is_refused(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_bytes(b"\xff\xfe\x00")
     result = sim("bad.toml", cwd=tmp_path)
     assert result.returncode == 2
@@ -147,9 +147,9 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
 
 def test_an_older_file_survives_a_failed_run(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text(GOOD + "[controller]\nobserver_m = 99")
-    (tmp_path / "out.csv").write_text("precious")
+    (tmp_path / "out.csv").write_text("an older result")
     assert sim("bad.toml", "--out", "out.csv", cwd=tmp_path).returncode == 2
-    assert (tmp_path / "out.csv").read_text() == "precious"
+    assert (tmp_path / "out.csv").read_text() == "an older result"
 
 
 SHIPPED = sorted(SCENARIOS.glob("*.toml"))
@@ -166,5 +166,5 @@ def test_a_shipped_scenario_runs_as_its_comment_says(path: Path, paper: Motor, h
         return
     assert run.fault_word == 0
     error = run.torque_error_percent
-    # Steady driving with weak magnets: 1 % covers the slow profiles' own lag.
+    # Steady driving with weak magnets: 1 % includes the lag of the torque behind the slow profiles.
     assert error is not None and abs(error) <= 1.0

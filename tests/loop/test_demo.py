@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report and the verdict of tools/demo, on results that were made up or cut short."""
+"""The report and the bounds of tools/demo, on invented results and on one run of the demonstration."""
 
 import json
 import math
@@ -52,7 +52,7 @@ def test_rise_is_interpolated_between_samples() -> None:
 
 
 def test_the_magnet_is_weakened_to_the_wanted_loss() -> None:
-    # A loss of 90 % of the flux change: -8.75 % at 1 - 0.0875/0.9.
+    # The torque falls by 0.9 of the flux change: -8.75 % at a magnet of 1 - 0.0875/0.9.
     found = weaken_until(lambda scale: -90.0 * (1.0 - scale), -8.75)
     assert found == pytest.approx(1.0 - 0.0875 / 0.9, abs=1e-4)
 
@@ -60,7 +60,7 @@ def test_the_magnet_is_weakened_to_the_wanted_loss() -> None:
 @pytest.fixture(scope="module")
 def whole(machines: Bench) -> Demonstration:
     with pytest.MonkeyPatch.context() as patch:
-        # The other simulator's speed needs seconds and tests nothing of ours.
+        # Measuring the speed of the other simulator takes seconds and tests nothing of this project.
         patch.setattr("fluxtrue_tools.demo.realtime.motulator", lambda: 0.3)
         return demonstrate(machines, lambda _: None, lambda: None)
 
@@ -85,7 +85,7 @@ def test_the_summary_has_every_experiment_with_its_fields(whole: Demonstration) 
                 "torque_error_closed_percent", "psi_error_percent", "r_error_percent"} <= set(point)  # fmt: skip
 
 
-def test_the_report_stands_alone_and_shows_every_figure(whole: Demonstration) -> None:
+def test_the_report_needs_no_other_file_and_shows_every_figure(whole: Demonstration) -> None:
     page = report.html(whole)
     sources = re.findall(r'src="([^"]{0,40})', page)
     assert len(sources) == 7
@@ -94,7 +94,7 @@ def test_the_report_stands_alone_and_shows_every_figure(whole: Demonstration) ->
     assert "nan" not in re.sub(r"base64,[^\"]*", "", page).lower()
 
 
-def test_the_terminal_table_has_a_verdict_for_every_promise(whole: Demonstration) -> None:
+def test_the_terminal_table_states_for_every_bound_whether_it_is_met(whole: Demonstration) -> None:
     table = report.terminal(whole)
     rows = report.rows(whole)
     assert len(re.findall(r"\b(met|MISSED)$", table, re.MULTILINE)) == len(rows)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys without effect are refused, and only those: a refused key has no effect, an accepted one has."""
+"""Keys of a scenario without effect are refused, and only those: a refused key changes no bit, an accepted one does."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from fluxtrue_tools.sim.scenario import Scenario, parse
 HEAD = 'motor = "hsm1"\nduration_s = 0.06\n'
 PROFILE = "[profile]\ntorque_Nm = 60\nspeed_rpm = 2500\n"
 
-# What is added, the key that is named, what makes the same key effective.
+# The text that is added, the key that the refusal names, a text in which the same key has an effect.
 CASES = [
     ("[plant]\nideal_inverter = true\ndead_time_s = 3e-6", "plant.dead_time_s",
      "[plant]\nideal_inverter = false\ndead_time_s = 3e-6"),
@@ -63,7 +63,7 @@ def test_a_key_without_effect_is_refused_by_name(added: str, key: str, _: str | 
 
 
 @pytest.mark.parametrize(("added", "key", "_"), CASES, ids=IDS)
-def test_what_is_refused_would_not_have_changed_a_bit(
+def test_a_refused_key_would_not_have_changed_a_bit(
     added: str, key: str, _: str | None, hsm1: Motor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(effects, "check", lambda *_: None)
@@ -74,7 +74,7 @@ def test_what_is_refused_would_not_have_changed_a_bit(
 
 
 @pytest.mark.parametrize(("key", "effective"), [(k, e) for _, k, e in CASES if e], ids=[k for _, k, e in CASES if e])
-def test_where_it_has_an_effect_the_key_is_taken(key: str, effective: str, hsm1: Motor) -> None:
+def test_a_key_that_has_an_effect_is_accepted(key: str, effective: str, hsm1: Motor) -> None:
     whole = text_of(effective)
     name = key.rsplit(".", 1)[1]
     lines = [line for line in whole.splitlines() if not line.startswith(name)]
@@ -106,10 +106,10 @@ def test_cross_saturation_of_a_machine_with_constants_is_refused(hsm1: Motor, pa
 
 
 def test_every_value_is_checked_before_the_first_period(hsm1: Motor, monkeypatch: pytest.MonkeyPatch) -> None:
-    def never(*_: object) -> None:
+    def fail(*_: object) -> None:
         raise AssertionError("a period was simulated")
 
-    monkeypatch.setattr(Loop, "run", never)
+    monkeypatch.setattr(Loop, "run", fail)
     late = [
         ("torque_Nm = [[0, 0], [100, 500]]",
          "profile.torque_Nm reaches 500 N·m at t = 100 s, allowed: -132 to 132 N·m"),
@@ -127,7 +127,7 @@ def test_every_value_is_checked_before_the_first_period(hsm1: Motor, monkeypatch
         assert str(refusal.value).startswith(f"s.toml: {message}"), refusal.value
 
 
-def test_the_range_that_a_message_gives_is_the_range_that_is_taken(hsm1: Motor) -> None:
+def test_the_range_that_a_message_states_is_the_accepted_range(hsm1: Motor) -> None:
     with Loop(hsm1.library, hsm1.plant, hsm1.flux_map) as loop:
         for name in ("observer_m", "torque_requested_Nm", "plant.dead_time_s", "plant.vdc_V", "inverter_C"):
             found = check.limits(loop, name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was identified survives a power cycle; torque is the plant's."""
+"""The identified values survive a power cycle. The torque is that of the plant."""
 
 import math
 
@@ -23,7 +23,7 @@ def power_on(motor: Motor, memory: bytes | None = None) -> Loop:
 
 
 def to(loop: Loop, before: tuple[float, float], after: tuple[float, float], seconds: float) -> float:
-    """From one speed and torque to another; the mean torque of the last 10 ms."""
+    """Ramp from one speed and torque to another; the mean torque of the last 10 ms."""
     ramps = {"plant.speed_rad_s": (before[0] * RPM, after[0] * RPM), "torque_requested_Nm": (before[1], after[1])}
     rows = loop.run(round(seconds * 1e4), ramps)
     assert rows[:, 1].max() == 0.0
@@ -31,7 +31,7 @@ def to(loop: Loop, before: tuple[float, float], after: tuple[float, float], seco
 
 
 def error_after_enabling(motor: Motor, memory: bytes | None) -> float:
-    """Percent, 0.1 s after switching was enabled at speed and 50 ms after the torque was there."""
+    """Torque error in percent, 0.1 s after switching was enabled at speed and 50 ms after the torque was reached."""
     with power_on(motor, memory) as loop:
         assert loop.get("memory_recalled") == float(memory is not None)
         to(loop, (0.0, 0.0), (SPEED_RPM, 0.0), 0.5)
@@ -42,7 +42,7 @@ def error_after_enabling(motor: Motor, memory: bytes | None) -> float:
 
 @pytest.fixture(scope="module")
 def memory(hsm1: Motor) -> bytes:
-    """The flash after twenty seconds of driving and a stop."""
+    """The contents of the flash after twenty seconds of driving and a stop."""
     with power_on(hsm1) as loop:
         loop.set("enable", 1.0)
         at = (0.0, 0.0)
@@ -51,7 +51,7 @@ def memory(hsm1: Motor) -> bytes:
             at = (rpm, torque / 2)
             to(loop, (rpm, torque), at, 1.5)
         to(loop, at, (0.0, 0.0), 1.0)
-        assert loop.get("memory_saves") == 0.0  # not while it runs
+        assert loop.get("memory_saves") == 0.0  # nothing is saved while the drive runs
         loop.set("enable", 0.0)
         to(loop, (0.0, 0.0), (0.0, 0.0), 0.2)
         assert loop.get("memory_saves") == 1.0
@@ -67,15 +67,15 @@ def without_loop(motor: Motor) -> float:
         return 100.0 * (to(loop, (SPEED_RPM, COMMAND_NM), (SPEED_RPM, COMMAND_NM), 0.05) / COMMAND_NM - 1.0)
 
 
-def test_with_the_memory_torque_is_right_as_soon_as_it_is_there(hsm1: Motor, memory: bytes) -> None:
+def test_with_the_memory_the_first_torque_is_right(hsm1: Motor, memory: bytes) -> None:
     kept = error_after_enabling(hsm1, memory)
     print(f"tables {without_loop(hsm1):.2f} %, first start {error_after_enabling(hsm1, None):.2f} %, kept {kept:.2f} %")
-    # The magnet is 12 % weak and makes some two thirds of the torque.
+    # The magnet is 12 % weak and makes about two thirds of the torque.
     assert without_loop(hsm1) < -6.0
     assert abs(kept) <= 1.0
 
 
-def test_a_damaged_memory_is_a_first_start(hsm1: Motor, memory: bytes) -> None:
+def test_after_a_damaged_memory_the_drive_starts_from_the_priors(hsm1: Motor, memory: bytes) -> None:
     with power_on(hsm1, bytes(b ^ 0x01 for b in memory)) as damaged, power_on(hsm1) as fresh:
         assert damaged.get("memory_recalled") == 0.0
         for name in ("psi_f_Vs", "r_ohm", "lq_scale", "drop_V"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The C runner through its Python interface: names, ramps, rows, delay, determinism."""
+"""The C runner through its Python interface: names, ramps, rows, delay, reproducible results."""
 
 import math
 from typing import Any
@@ -36,7 +36,7 @@ def test_every_plant_field_holds_the_value_it_is_given_and_only_that_field(hsm1:
             except LoopError as error:
                 assert error.code == lib.OUT_OF_RANGE
                 continue
-            # Whole numbers take the whole part.
+            # A field that is a whole number keeps the integer part.
             assert sim.get(name) in (value, math.floor(value)), name
             assert {other: sim.get(other) for other in others} == others, name
             sim.set(name, others.get(name, sim.get(name)))
@@ -63,7 +63,7 @@ def test_a_refused_value_changes_nothing(hsm1: Motor, name: str, value: float, c
         assert sim.get(name) == before or math.isnan(before)
 
 
-def test_a_plant_that_cannot_be_is_refused_by_its_first_bad_field(hsm1: Motor) -> None:
+def test_an_impossible_plant_is_refused_by_its_first_bad_field(hsm1: Motor) -> None:
     with pytest.raises(LoopError, match=r"plant\.substeps = 3"):
         loop(hsm1, substeps=3)
 
@@ -82,7 +82,7 @@ def test_the_same_seed_gives_the_same_run_to_the_last_bit(hsm1: Motor, controlle
     assert not np.array_equal(first, rows(4.0))
 
 
-def test_two_loops_side_by_side_do_not_see_each_other(hsm1: Motor) -> None:
+def test_two_loops_in_one_process_do_not_affect_each_other(hsm1: Motor) -> None:
     def one(torque: float) -> Loop:
         sim = loop(hsm1, speed_rad_s=100.0)
         sim.set("enable", 1.0)
@@ -100,7 +100,7 @@ def test_two_loops_side_by_side_do_not_see_each_other(hsm1: Motor) -> None:
     assert np.array_equal(np.concatenate(mixed), expected)
 
 
-def test_rows_do_not_depend_on_how_a_run_is_cut(hsm1: Motor) -> None:
+def test_rows_do_not_depend_on_how_a_run_is_divided(hsm1: Motor) -> None:
     def rows(chunks: list[int]) -> Any:
         with loop(hsm1, speed_rad_s=50.0) as sim:
             sim.set("enable", 1.0)
@@ -134,7 +134,7 @@ def test_a_ramp_is_linear_every_period_for_the_plant_and_every_millisecond_for_t
         rows = sim.run(100, {"plant.vdc_V": (300.0, 400.0), "torque_requested_Nm": (0.0, 10.0)})
         assert np.allclose(rows[:, 0], 300.0 + np.arange(100))
         assert np.allclose(rows[:, 1], np.repeat(np.arange(10.0), 10))
-        # It ends where it was told to, and stays there.
+        # The ramp ends at its last value, which is kept.
         assert sim.get("plant.vdc_V") == 400.0
         assert sim.get("torque_requested_Nm") == 10.0
         assert set(sim.run(5)[:, 0]) == {400.0}
@@ -146,9 +146,8 @@ def test_a_ramp_to_a_value_that_is_not_allowed_is_refused(hsm1: Motor) -> None:
 
 
 def test_the_duties_of_a_period_act_in_the_next_one(hsm1: Motor) -> None:
-    # At standstill, with the current loop asked for 10 A: the first voltage that is not zero is
-    # computed in the period whose 1 kHz task passed the reference on, and moves the current one
-    # period after that period's own end.
+    # At standstill 10 A are requested. The first voltage that is not zero is computed in the first period that uses the
+    # new reference, and it acts one period later.
     with loop(hsm1, speed_rad_s=0.0, dead_time_s=0.0, current_quantise=0.0) as sim:
         for name, value in {"enable": 1.0, "current_mode": 1.0, "iq_ref_A": 0.0, "id_ref_A": 0.0}.items():
             sim.set(name, value)
@@ -162,7 +161,7 @@ def test_the_duties_of_a_period_act_in_the_next_one(hsm1: Motor) -> None:
 
 
 def test_a_plant_that_finds_no_current_ends_the_run_with_an_error(hsm1: Motor) -> None:
-    """A gigaohm: L/R is far below a substep, so that the voltage R i grows from substep to substep."""
+    """With 1 GΩ the time constant L/R is far below a substep, and the integration is unstable."""
     refused = pytest.raises(FluxtrueError, match="no current for the plant's flux linkage")
     with loop(hsm1, imposed_speed=1.0, speed_rad_s=150.0, r_ohm_20=1e9) as sim, refused:
         sim.run_s(1.0)

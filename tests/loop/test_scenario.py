@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: accepted and refused values, messages, meaning of profiles."""
+"""Scenario files: accepted and refused values, messages, the effect of profiles and events."""
 
 import math
 import re
@@ -17,16 +17,16 @@ from fluxtrue_tools.sim.scenario import Plant, Profile, Scenario, parse
 
 HEAD = 'motor = "hsm1"\nduration_s = 0.05\n'
 MOVING = "[profile]\ntorque_Nm = 50\nspeed_rpm = 1500\n"
-ELSEWHERE = {  # plant fields that a scenario gives in another place, or the motor alone
+ELSEWHERE = {  # plant fields that a scenario gives in another section, or that only the motor gives
     "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
-    # The dc link behind its contactor, which follows an ECU's lines: a scenario's bridge stays at the battery.
+    # The dc link and its contactor, which an ECU controls: in a scenario the battery is always connected.
     "dc_link_F", "precharge_s", "discharge_s", "avalanche_V", "vdc_start_V", "precharge_open", "discharge_open",
     "contactor_open",
 }  # fmt: skip
 
 
-def test_every_imperfection_of_the_plant_can_be_given(hsm1: Motor) -> None:
+def test_every_deviation_of_the_plant_can_be_given(hsm1: Motor) -> None:
     inside = {
         re.sub(r"_[abc]$", "", name.removeprefix("plant."))
         for name in lib.plant_names(hsm1.library)
@@ -120,7 +120,7 @@ def test_a_bad_scenario_is_refused_in_one_line_that_names_file_and_field(text: s
         ("[[event]]\nt = 0.01\nset = { 'plant.vdc_V' = -3 }", "event.0.set.plant.vdc_V = -3 V, allowed: above 0 V"),
     ],
 )
-def test_what_only_the_library_can_know_is_refused_in_one_line_too(hsm1: Motor, text: str, message: str) -> None:
+def test_what_only_the_library_can_check_is_refused_in_one_line_too(hsm1: Motor, text: str, message: str) -> None:
     with pytest.raises(FluxtrueError) as refusal:
         simulate(parse(HEAD + text, "bad.toml"), hsm1, where="bad.toml")
     line = str(refusal.value)
@@ -156,7 +156,7 @@ def test_profiles_reach_plant_and_controller(hsm1: Motor) -> None:
     assert len(run.rows) == 400
     now = run["time_s"]
     assert np.allclose(now, 1e-3 * np.arange(1, 401), atol=1e-9)
-    # A row is the mean of ten periods: half a row's slope of tolerance.
+    # A row is the mean of ten periods: the tolerance is the change of half a row.
     assert np.allclose(run["true_speed_rpm"], np.minimum(now / 0.2, 1.0) * 1000.0, atol=5.0)
     assert np.allclose(run["true_vdc_V"], 350.0 - 125.0 * now, atol=0.2)
     assert run["true_r_ohm"][-1] == pytest.approx(0.018 * (1 + 0.00393 * 100.0), rel=2e-3)
@@ -183,7 +183,7 @@ def test_events_change_plant_and_controller_at_their_time(hsm1: Motor) -> None:
     assert run["run_state"][now > 0.2025][0] == 0.0
 
 
-def test_an_inertia_turns_with_what_the_machine_gives(hsm1: Motor) -> None:
+def test_an_inertia_accelerates_with_the_torque_of_the_machine(hsm1: Motor) -> None:
     run = simulate(
         parse(
             'motor = "hsm1"\nduration_s = 1\n[profile]\ntorque_Nm = 30\nload_Nm = 10\n'
@@ -192,13 +192,13 @@ def test_an_inertia_turns_with_what_the_machine_gives(hsm1: Motor) -> None:
         ),
         hsm1,
     )
-    # (T - load)/J over the run, with the torque the plant itself reports.
+    # The integral of (T - load)/J over the run, with the torque of the plant.
     gained = float(np.sum(run["true_torque_Nm"] - 10.0)) * 1e-3 / 0.2 * 60.0 / math.tau
     assert run["true_speed_rpm"][-1] == pytest.approx(gained, rel=5e-3)
     assert gained > 800.0
 
 
-def test_the_defaults_are_a_drive_with_nothing_wrong() -> None:
+def test_the_defaults_are_a_nominal_drive() -> None:
     scenario = parse(HEAD, "plain.toml")
     assert scenario.plant.values() == {}
     assert scenario.profile == Profile()
@@ -246,6 +246,6 @@ def test_a_window_of_one_row_has_a_mean(hsm1: Motor, text: str) -> None:
 
 
 @pytest.mark.parametrize("motor", ["a\x00b", "~no-such-user/x"])
-def test_a_motor_that_is_no_path_is_refused(motor: str, tmp_path: Path) -> None:
+def test_a_motor_that_is_not_a_path_is_refused(motor: str, tmp_path: Path) -> None:
     with pytest.raises(FluxtrueError, match="^motor "):
         locate(motor, tmp_path)

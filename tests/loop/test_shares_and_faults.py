@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque and speed as shares of a motor's maxima, and runs that trip."""
+"""Torque and speed as shares of the largest values of a motor, and runs that trip."""
 
 import json
 import os
@@ -97,7 +97,7 @@ def test_a_drive_that_should_have_tripped_and_did_not_is_a_failure(hsm1: Motor) 
     assert run.unexpected() == "expect_fault = 'over_current': the drive did not trip"
 
 
-def test_a_fault_that_is_none_is_refused() -> None:
+def test_an_unknown_fault_name_is_refused() -> None:
     with pytest.raises(FluxtrueError, match="expect_fault = 'explosion', allowed: over_current, over_voltage"):
         parse(HEAD + 'expect_fault = "explosion"', "s.toml")
 
@@ -113,7 +113,7 @@ def test_a_trip_is_marked_in_every_panel_and_named_in_one(hsm1: Motor) -> None:
     plt.close(sheet)
 
 
-def test_the_command_line_says_it_with_its_exit_code_and_keeps_the_files(tmp_path: Path) -> None:
+def test_the_command_line_reports_a_trip_with_its_exit_code_and_keeps_the_files(tmp_path: Path) -> None:
     (tmp_path / "run.toml").write_text(AFTER_A_TRIP)
     command = [sys.executable, "-m", "fluxtrue_tools", "sim", "run.toml", "--json", "run.json"]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "tools")}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A reference of the converters that makes all currents wrong together, and a wrong dc voltage, while driving (MN-12).
+"""All currents measured too small, a wrong zero of a current, and a wrong dc voltage, while driving (MN-12).
 
-What is found, is found within 100 ms, although the identification has just started: it still has the tolerances of its
-priors. What is not found moves the torque by no more than stated here. Wrong currents at low speed stay: nothing
-tells them from a warm winding (docs/theory/monitors.md).
+An error that is found is found within 100 ms, although the identification has just started and its parameters still
+have the uncertainty of their priors. An error that is not found changes the torque by no more than is stated here.
+Wrong currents at low speed are not found: their effect is that of a warm winding (docs/theory/monitors.md).
 """
 
 import itertools
@@ -27,15 +27,17 @@ def test_all_currents_30_percent_too_small_are_found_at_speed_and_torque(
 
 
 @pytest.mark.parametrize("gain", [0.7, 0.8, 0.9, 1.1, 1.2, 1.3])
-def test_a_wrong_dc_voltage_is_found_or_leaves_the_torque(hsm1: Motor, gain: float) -> None:
+def test_a_wrong_dc_voltage_is_found_or_does_not_change_the_torque(hsm1: Motor, gain: float) -> None:
     for (rpm, torque), sign in itertools.product(POINTS, (1, -1)):
         seen = inject(hsm1, rpm, sign * torque, {"vdc_gain": gain}, 0.3)
         assert seen.found_ms <= FOUND_MS or abs(seen.lasting_Nm) <= 10.0, (rpm, sign * torque, seen)
 
 
 @pytest.mark.parametrize("offset_A", [(8.0, 0.0, 0.0), (-16.0, 0.0, 0.0), (0.0, 19.0, 0.0), (10.0, -10.0, 0.0)])
-def test_a_wrong_auto_zero_is_found_or_leaves_the_torque(hsm1: Motor, offset_A: tuple[float, ...]) -> None:
-    # 20 A, 5 % of full scale, in one phase are found by the sum of the currents.
+def test_a_wrong_zero_of_a_current_is_found_or_does_not_change_the_torque(
+    hsm1: Motor, offset_A: tuple[float, ...]
+) -> None:
+    # From 20 A in one phase, 5 % of full scale, the sum of the currents shows the error at once.
     fault = {f"current_offset_A_{x}": value for x, value in zip("abc", offset_A, strict=True)}
     for rpm, torque in ((0, 100), (20, -20), *POINTS, (10000, 0)):
         seen = inject(hsm1, rpm, torque, fault, 0.3)

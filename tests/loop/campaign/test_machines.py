@@ -20,7 +20,7 @@ CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2}
 
 @pytest.mark.parametrize("name", CASES)
 def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_path: Path, name: str) -> None:
-    """All of the file's own cases with: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
+    """A few cases of each file; all of them: tools/fluxtrue campaign tests/loop/campaign/saturated.toml"""
     file = Path(__file__).with_name(f"{name}.toml")
     command = [sys.executable, "-m", "fluxtrue_tools", "campaign", str(file), "--cases", str(CASES[name]),
                "--out", str(tmp_path)]  # fmt: skip
@@ -34,7 +34,7 @@ def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_pa
     assert table["case"].nunique() == CASES[name]
     tables = table[table["controller"] == "tables"]
     assert (tables["run_fault_word"] == 0).all()
-    # What there was to repair: a magnet up to 20 % weak, inductances 10 % off.
+    # Without identification the error is large: the magnet is up to 20 % weak, the inductances differ by up to 10 %.
     assert (tables["error_percent"] ** 2).mean() ** 0.5 > 3.0
 
 
@@ -44,19 +44,19 @@ def test_the_map_is_what_its_script_makes(name: str) -> None:
     assert spec is not None
     assert spec.loader is not None
     make_maps = importlib.util.module_from_spec(spec)
-    sys.modules["make_maps"] = make_maps  # dataclasses look their module up
+    sys.modules["make_maps"] = make_maps  # dataclasses need their module in sys.modules
     spec.loader.exec_module(make_maps)
     shipped = pd.read_csv(MOTORS / name / "flux_map.csv", comment="#")
     iron = make_maps.MACHINES[name]
     made = pd.DataFrame(make_maps.rows(iron), columns=list(shipped.columns))
-    # Nine decimals are written.
+    # The file has nine decimals.
     assert (shipped - made).abs().max(axis=None) < 1e-9
     i_d, i_q = iron.currents(*shipped.loc[300, ["psi_d_Vs", "psi_q_Vs"]])
     assert (i_d, i_q) == pytest.approx((shipped.loc[300, "id_A"], shipped.loc[300, "iq_A"]), abs=1e-3)
 
 
 def test_the_machines_are_part_of_the_tests_build() -> None:
-    """A build folder of its own would compile the firmware once more for each."""
+    """A separate build folder for each machine would compile the firmware again."""
     built = Path(os.environ["FLUXTRUE_BUILD_DIR"])
     for name in ("saturated", "linear", "hsm1_5kHz", "hsm1_20kHz"):
         assert prepare(str(MOTORS / name)).folder == built / "motors" / name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign's slice for every test run: 40 plants in closed loop, with the bounds of the checked controllers."""
+"""The campaign of every test run: 40 plants in closed loop, with the bounds of the checked controllers."""
 
 import json
 import os
@@ -30,22 +30,23 @@ def table(out: Path) -> pd.DataFrame:
     return pd.read_parquet(out / "results.parquet")
 
 
-def test_every_controller_is_measured_on_forty_plants_without_a_number_running_away(table: pd.DataFrame) -> None:
+def test_every_controller_is_measured_on_forty_plants_and_every_value_is_finite(table: pd.DataFrame) -> None:
     counts = table.groupby("controller")["case"].nunique()
     assert (counts == 40).all()
     assert table["finite"].all()
     assert table["run_finite"].all()
 
 
-def test_the_tables_alone_are_wrong_by_what_the_spread_makes_them(table: pd.DataFrame) -> None:
+def test_without_identification_the_torque_error_is_that_of_the_spread(table: pd.DataFrame) -> None:
     rows = table[(table["controller"] == "tables") & table["speed_rpm"].abs().between(300.0, 5000.0)]
     rms = float((rows["error_percent"] ** 2).mean() ** 0.5)
-    # A magnet from -20 to +5 % alone is 7.2 % rms off its mean of -7.5 %; magnet torque is half to all of the torque.
+    # The magnet's deviation, uniform from -20 to +5 %, has a standard deviation of 7.2 %; the magnet makes half to all
+    # of the torque.
     assert 4.0 < rms < 9.0
     assert (rows["run_fault_word"] == 0).all()
 
 
-def test_no_controller_beats_what_the_data_can_tell(out: Path) -> None:
+def test_no_controller_is_more_accurate_than_the_information_bound(out: Path) -> None:
     scores = json.loads((out / "summary.json").read_text())["controllers"]
     identified = [s for s in scores if s["bands"]["low"]["bound_rms"] is not None]
     assert identified
@@ -61,9 +62,9 @@ def missed(out: Path, above: bool) -> list[str]:
     return [f"{b['controller']}: {b['what']} = {b['value']}" for b in chosen if not b["met"]]
 
 
-def test_who_is_held_to_the_bounds_meets_them(out: Path) -> None:
+def test_the_checked_controllers_meet_their_bounds(out: Path) -> None:
     assert missed(out, above=False) == []
 
 
-def test_who_is_held_to_the_bounds_meets_them_in_field_weakening(out: Path) -> None:
+def test_the_checked_controllers_meet_their_bounds_in_field_weakening(out: Path) -> None:
     assert missed(out, above=True) == []

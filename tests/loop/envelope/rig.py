@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One simulated drive at an imposed speed, recorded by name; torque is the plant's."""
+"""One simulated drive at an imposed speed, recorded by name. The torque is that of the plant."""
 
 import math
 
@@ -20,7 +20,7 @@ CONTROL, PHASE_LOST, CURRENT_STUCK, OVER_SPEED, ANGLE_OFFSET, TORQUE, TEMPERATUR
 
 
 class Rig:
-    """A drive with the motor's own plant, half an ampere of noise, and whatever is wrong with it."""
+    """A drive with the plant of its motor data, 0.5 A rms of current noise, and the given plant parameters changed."""
 
     def __init__(self, motor: Motor, rpm: float, torque_Nm: float = 0.0, enable: bool = True, **plant: float) -> None:
         parameters = (
@@ -34,18 +34,18 @@ class Rig:
         self.loop.set("enable", float(enable))
 
     def set(self, **values: float) -> "Rig":
-        """Controller names as they are; plant_… is the plant's."""
+        """Set values by name; a name that begins with plant_ belongs to the plant."""
         for name, value in values.items():
             self.loop.set(name.replace("plant_", "plant.", 1) if name.startswith("plant_") else name, value)
         return self
 
     def run(self, seconds: float, **ramps: tuple[float, float]) -> "Trace":
-        """Rows of every period; ramps named as in set()."""
+        """Simulate and record every period; the ramps have names as in set()."""
         named = {n.replace("plant_", "plant.", 1): span for n, span in ramps.items()}
         return Trace(self.loop.run(round(seconds / self.loop.period_s), named))
 
     def get(self, name: str) -> float:
-        """A value now."""
+        """The present value."""
         return self.loop.get(name)
 
 
@@ -64,13 +64,13 @@ class Trace:
         return self["truth.torque_Nm"]
 
     def settled(self, name: str = "truth.torque_Nm", share: float = 0.25) -> float:
-        """Mean over the end of the run."""
+        """Mean over the last part of the run."""
         values = self[name]
         return float(values[-max(int(len(values) * share), 1) :].mean())
 
     @property
     def voltage(self) -> float:
-        """Length of the acting voltage at the end."""
+        """Magnitude of the acting voltage, mean of the last quarter of the run."""
         u = np.hypot(self["truth.u_d_V"], self["truth.u_q_V"])
         return float(u[-len(u) // 4 :].mean())
 
@@ -79,6 +79,6 @@ class Trace:
         return int(self["fault_word"][-1])
 
     def fault_ms(self, fault: int) -> float:
-        """Milliseconds from the start of the run to the fault; NaN: none."""
+        """Milliseconds from the start of the run to the fault, at 10 kHz; NaN: none."""
         found = self["fault_word"].astype(int) & fault > 0
         return float(np.argmax(found)) * 0.1 if found.any() else math.nan

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A defective angle sensor: found in time, and glitches that change nothing. Torque is the plant's."""
+"""A defective angle sensor is found in time, and short glitches change nothing. The torque is that of the plant."""
 
 import math
 
@@ -24,7 +24,7 @@ def _largest_before(trace: Trace, ms: float, mean: float) -> float:
 
 @pytest.mark.parametrize("torque", TORQUES)
 @pytest.mark.parametrize("rpm", SPEEDS)
-def test_spikes_in_one_sample_of_ten_are_found_in_20_ms(hsm1: Motor, rpm: float, torque: float) -> None:
+def test_spikes_in_every_tenth_sample_are_found_in_20_ms(hsm1: Motor, rpm: float, torque: float) -> None:
     rig, before = _steady(hsm1, rpm, torque)
     rig.set(plant_angle_spike_every=10, plant_angle_spike_samples=1, plant_angle_spike_rad=math.radians(60.0))
     trace = rig.run(0.03)
@@ -45,7 +45,7 @@ def test_a_glitch_of_5_ms_changes_no_torque_and_is_no_fault(hsm1: Motor, rpm: fl
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: float) -> None:
-    """(AT-15): 2.1 degrees after 5 ms at 2000 rpm/s."""
+    """The predicted angle deviates by 2.1 degrees electrical after 5 ms at 2000 rpm/s (AT-15)."""
     rig, before = _steady(hsm1, 2000.0, 80.0 * sign)
     faster = (2000.0 * math.pi / 30.0, 2200.0 * math.pi / 30.0)
     rig.run(0.1, plant_speed_rad_s=faster)
@@ -58,7 +58,9 @@ def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: fl
 @pytest.mark.parametrize("degrees", [20.0, -20.0, 120.0])
 @pytest.mark.parametrize("torque", TORQUES)
 @pytest.mark.parametrize("rpm", SPEEDS)
-def test_a_sensor_that_slips_is_found_in_20_ms(hsm1: Motor, rpm: float, torque: float, degrees: float) -> None:
+def test_a_sensor_that_slips_on_the_shaft_is_found_in_20_ms(
+    hsm1: Motor, rpm: float, torque: float, degrees: float
+) -> None:
     rig, before = _steady(hsm1, rpm, torque)
     trace = rig.set(plant_angle_offset_rad=math.radians(degrees)).run(0.03)
     found_ms = trace.fault_ms(ANGLE)
@@ -79,7 +81,8 @@ def test_the_fastest_acceleration_is_no_fault_of_the_angle(hsm1: Motor, rpm_per_
 @pytest.mark.parametrize("torque", [120.0, 60.0, -60.0, -120.0])
 @pytest.mark.parametrize("rpm", [60.0, -100.0, 200.0, 500.0, -700.0, 900.0, 3000.0, 10000.0])
 def test_an_angle_that_freezes_is_found(hsm1: Motor, rpm: float, torque: float) -> None:
-    """100 ms below 500 rpm, 20 ms from there on; two of the three rotor angles leave no leg without current."""
+    """Within 100 ms below 500 rpm and within 20 ms from 500 rpm on, at two of three rotor angles at least: the current
+    of a leg may be zero at one of them."""
     found = []
     for theta_m in (0.0, 0.4, 0.9):
         rig = Rig(hsm1, rpm, 0.3 * torque if abs(rpm) > 5000.0 else torque, angle_bits=12, theta_m_rad=theta_m)
@@ -91,7 +94,8 @@ def test_an_angle_that_freezes_is_found(hsm1: Motor, rpm: float, torque: float) 
 @pytest.mark.parametrize("torque", [130.0, 40.0, 0.0, -40.0, -130.0])
 @pytest.mark.parametrize("roll_rpm", [0.0, -2.0, -10.0, -60.0])
 def test_a_blocked_or_slowly_rolling_rotor_is_no_fault(hsm1: Motor, torque: float, roll_rpm: float) -> None:
-    """Hill hold: the torque against the roll, with noise and a dead time that is not the data sheet's."""
+    """Hill hold: the rotor stands or rolls slowly under torque, with noise and a dead time that differs from the data
+    sheet."""
     rig = Rig(hsm1, 0.0, torque, angle_bits=12, current_noise_A_rms=0.8, dead_time_s=2.4e-6, winding_C=140.0)
     rig.run(0.5)
     rig.run(0.1, plant_speed_rad_s=(0.0, roll_rpm * math.pi / 30.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque, power and temperature limits, measured by the plant's torque and its dc power."""
+"""Torque, power and temperature limits, measured by the torque and the dc power of the plant."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,8 @@ def test_driving_stays_at_the_batterys_power(hsm1: Motor, rpm: float, torque: fl
     trace = rig.run(0.6)
     assert trace.faults == 0
     power = trace.settled("truth.idc_A") * 350.0
-    # 12-bit converter, dead time and identification: 2 % of the limit; never more than 1 % beyond it.
+    # Converter of 12 bits, dead time and identification together make 2 % of the limit; the limit is exceeded by 1 % at
+    # most.
     assert 0.98 * 20e3 <= power <= 1.01 * 20e3
     assert int(trace["derating"][-1]) & 2
 
@@ -29,12 +30,12 @@ def test_generating_stays_at_the_batterys_power(hsm1: Motor, rpm: float, torque:
     assert 0.97 * 15e3 <= power <= 1.015 * 15e3
 
 
-def test_a_power_limit_that_closes_while_driving_is_obeyed_at_once(hsm1: Motor) -> None:
+def test_a_power_limit_that_falls_while_driving_is_kept_at_once(hsm1: Motor) -> None:
     rig = Rig(hsm1, 6000.0, 90.0)
     rig.run(0.3)
     trace = rig.set(power_limit_drive_W=10e3).run(0.1)
     power = trace["truth.electrical_W"]
-    assert power[300:].max() <= 11e3  # 30 ms: 90 N·m at 13 N·m/ms, then the filter of the losses
+    assert power[300:].max() <= 11e3  # after 30 ms: 90 N·m at 13.2 N·m/ms, then the filter of the losses
 
 
 def test_vehicle_torque_limits_hold_for_each_direction(hsm1: Motor) -> None:
@@ -44,7 +45,7 @@ def test_vehicle_torque_limits_hold_for_each_direction(hsm1: Motor) -> None:
 
 
 def test_a_command_in_amperes_instead_of_newton_metres_cannot_multiply_the_torque(hsm1: Motor) -> None:
-    """The request's format ends at the torque base, the limit at the machine's rating."""
+    """The torque base bounds what can be requested, the rated torque of the machine what is made."""
     rig = Rig(hsm1, 2000.0)
     with pytest.raises(Exception, match="out of range"):
         rig.set(torque_requested_Nm=250.0)
@@ -53,7 +54,9 @@ def test_a_command_in_amperes_instead_of_newton_metres_cannot_multiply_the_torqu
 
 
 @pytest.mark.parametrize(("name", "start", "trip"), [("inverter_C", 85.0, 105.0), ("plant_winding_C", 210.0, 230.0)])
-def test_heat_takes_torque_along_a_line_and_then_trips(hsm1: Motor, name: str, start: float, trip: float) -> None:
+def test_temperature_derates_the_torque_linearly_and_then_trips(
+    hsm1: Motor, name: str, start: float, trip: float
+) -> None:
     rig = Rig(hsm1, 2000.0, RATED_NM)
     rig.run(0.2)
     half = rig.set(**{name: 0.5 * (start + trip)}).run(0.3)
@@ -62,16 +65,16 @@ def test_heat_takes_torque_along_a_line_and_then_trips(hsm1: Motor, name: str, s
     over = rig.set(**{name: trip}).run(0.2)
     assert over.faults == TEMPERATURE
     assert over.fault_ms(TEMPERATURE) == pytest.approx(110.0, abs=2.0)
-    assert abs(over.torque[1000]) <= 1.0  # nothing was left when it tripped
+    assert abs(over.torque[1000]) <= 1.0  # derated to zero before it tripped
 
 
-def test_low_dc_voltage_takes_driving_and_high_dc_voltage_generating_torque(hsm1: Motor) -> None:
+def test_low_dc_voltage_derates_driving_torque_and_high_dc_voltage_generating_torque(hsm1: Motor) -> None:
     low = Rig(hsm1, 1000.0, 60.0, vdc_V=154.0).run(0.3)  # a fifth of the way from 140 to 210 V
     assert low.faults == 0
     assert low.settled() == pytest.approx(0.2 * RATED_NM, abs=1.0)
     assert Rig(hsm1, 1000.0, -60.0, vdc_V=154.0).run(0.3).settled() == pytest.approx(-60.0, abs=1.2)
-    high = Rig(hsm1, 1000.0, -60.0, vdc_V=433.0).run(0.3)  # 434 V is the end of the line
+    high = Rig(hsm1, 1000.0, -60.0, vdc_V=433.0).run(0.3)  # derating ends at 434 V
     assert high.faults == 0
     assert abs(high.settled()) <= 15.0
-    # The tables alone are 0.7 N·m short: a second and a half until the loop is trusted and has closed.
+    # Without the torque loop 0.7 N·m are missing. It takes 1.5 s until the confidence is high and the loop has settled.
     assert Rig(hsm1, 1000.0, 60.0, vdc_V=433.0).run(1.5).settled() == pytest.approx(60.0, abs=0.5)

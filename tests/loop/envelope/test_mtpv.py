@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where more current would give less torque, and where the hexagon is used to its corners."""
+"""Maximum torque per volt, where more current would give less torque, and the use of the whole voltage hexagon."""
 
 import math
 from pathlib import Path
@@ -38,16 +38,18 @@ def largest(motor: Motor, magnet: float, rpm: float, sign: int) -> tuple[float, 
 
 @pytest.mark.parametrize("magnet", [0.8, 0.85, 0.9])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_where_torque_per_volt_is_the_limit_no_more_current_is_spent(gem: Motor, magnet: float, sign: int) -> None:
+def test_where_torque_per_volt_is_the_limit_the_current_stays_below_its_limit(
+    gem: Motor, magnet: float, sign: int
+) -> None:
     torque, current = largest(gem, magnet, TOP_RPM, sign)
     assert current < 0.96 * I_MAX_A  # the voltage alone is the limit, not the current circle
     trace = Rig(gem, TOP_RPM, sign * 132.0, magnet_scale=magnet, vdc_V=LOW_V).run(0.8)
     assert trace.faults == 0
     made = sign * trace.settled()
-    assert made == pytest.approx(trace.settled("torque_max_Nm"), abs=1.0)  # what it says it can
+    assert made == pytest.approx(trace.settled("torque_max_Nm"), abs=1.0)  # the reported reach
     assert made >= 0.98 * torque
-    spent = math.hypot(trace.settled("truth.i_d_A"), trace.settled("truth.i_q_A"))
-    assert spent <= 1.05 * current
+    measured = math.hypot(trace.settled("truth.i_d_A"), trace.settled("truth.i_q_A"))
+    assert measured <= 1.05 * current
 
 
 def test_a_reversal_through_maximum_torque_per_volt_neither_trips_nor_overshoots(gem: Motor) -> None:
@@ -60,7 +62,7 @@ def test_a_reversal_through_maximum_torque_per_volt_neither_trips_nor_overshoots
     assert abs(trace.settled()) <= 2.0
 
 
-def test_a_step_at_speed_uses_the_hexagon_beyond_its_inner_circle_and_comes_back_to_the_reserve(hsm1: Motor) -> None:
+def test_a_step_at_speed_uses_the_hexagon_beyond_its_inner_circle_and_returns_to_the_reserve(hsm1: Motor) -> None:
     rig = Rig(hsm1, 4500.0)
     rig.run(0.3)
     trace = rig.set(torque_requested_Nm=120.0).run(0.3)

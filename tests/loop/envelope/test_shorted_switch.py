@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One switch shorted: the short circuit on the side that holds it, checked with the plant's currents and torque."""
+"""One switch shorted: the drive shorts the phases on the side of that switch. Checked with the plant's currents and
+torque."""
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ GATE = 1 << 15
 SWITCHES = tuple(f"{side}_{leg}" for side in ("upper", "lower") for leg in "abc")
 LARGEST_A = 830.0  # docs/theory/safe-state.md, section 5
 STEADY_A = 250.0  # psi_f/L_d of the saturated machine, and the least of the demagnetisation limit
-REPORT_J = 2000.0 * 3e-6 * 350.0  # what the dc link loses until the drivers have blocked one short circuit
+REPORT_J = 2000.0 * 3e-6 * 350.0  # energy from the dc link until the drivers have blocked one short circuit
 
 
 @pytest.mark.parametrize("torque", [-60.0, 0.0, 60.0])
@@ -30,7 +31,8 @@ def test_a_shorted_switch_ends_in_a_symmetrical_short_circuit(
     assert current.max() <= LARGEST_A
     steady = current[-500:]
     assert steady.max() <= STEADY_A
-    # Half waves would change between nothing and the peak. At low speed the drop of the switches shows.
+    # An unsymmetrical short circuit would draw half waves between zero and the peak. The margin is for the voltage drop
+    # of the switches at low speed.
     assert steady.max() - steady.min() <= 0.17 * STEADY_A
     assert np.ptp(trace.torque[-500:]) <= 20.0
     assert rig.get("truth.e_short_circuit_J") <= 3.0 * REPORT_J  # two reports, and pulses too short for one
@@ -38,8 +40,8 @@ def test_a_shorted_switch_ends_in_a_symmetrical_short_circuit(
 
 @pytest.mark.parametrize("rpm", [300.0, 3000.0, 7000.0])
 @pytest.mark.parametrize("torque", [-100.0, 100.0])
-def test_the_currents_of_a_sound_bridge_are_no_shorted_switch(hsm1: Motor, rpm: float, torque: float) -> None:
-    """Switching is disabled under torque: what remains of the currents lasts up to 2.3 ms at 7900 rpm."""
+def test_the_decaying_currents_of_a_sound_bridge_are_no_shorted_switch(hsm1: Motor, rpm: float, torque: float) -> None:
+    """Switching is disabled under torque: the currents take up to 2.3 ms to decay at 7900 rpm."""
     rig = Rig(hsm1, rpm, torque)
     rig.run(0.3)
     trace = rig.set(enable=0.0).run(0.1)
@@ -47,8 +49,8 @@ def test_the_currents_of_a_sound_bridge_are_no_shorted_switch(hsm1: Motor, rpm: 
     assert abs(trace.torque[-1]) < 1.0
 
 
-def test_a_gate_fault_of_a_sound_bridge_frees_the_machine_when_it_is_slow(hsm1: Motor) -> None:
-    """The drivers report one fault that is over at once: a switch is shorted for 200 us."""
+def test_after_a_gate_fault_of_a_sound_bridge_switching_is_disabled_when_the_machine_is_slow(hsm1: Motor) -> None:
+    """The drivers report one short fault: a switch is shorted for 200 us."""
     rig = Rig(hsm1, 3000.0, 40.0)
     rig.run(0.2)
     rig.set(plant_switch_shorted_upper_b=1.0).run(2e-4)

@@ -3,7 +3,7 @@
 
 #define TURN_RAD 6.283185307179586
 #define SUBSTEPS 8
-#define DEAD_SHARE 0.02 /* dead time of a period */
+#define DEAD_SHARE 0.02 /* dead time as a share of the period */
 #define DROP_V 1.0
 
 static double fraction(double turns)
@@ -13,7 +13,7 @@ static double fraction(double turns)
     return (rest < 0.0) ? rest + 1.0 : rest;
 }
 
-/* Taylor's series up to x^15: the error in the first quadrant is below 1e-11. */
+/* Taylor series up to x^15: the error in the first quadrant is below 1e-11. */
 double exact_sin_turns(double turns)
 {
     double part = fraction(turns);

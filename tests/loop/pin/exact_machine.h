@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef LOOP_PIN_EXACT_MACHINE_H
 #define LOOP_PIN_EXACT_MACHINE_H
-/** A machine and its speed for tests that compare bits: the same result on every computer and compiler.
+/** A machine for tests that compare bits: the same result on every computer and with every compiler.
  *   psi_d = psi_f + L_d i_d, psi_q = L_q i_q / (1 + |i_q| / i_sat), d(psi)/dt = v - R i - omega J psi
- *   the bridge loses its dead time and a device drop against the direction of each phase current
+ *   dead time and device drop reduce the voltage of each phase against the direction of its current
  *   Only additions, multiplications, divisions and comparisons of doubles, which IEEE 754 defines to the last bit; the
  *   sine is a polynomial of this file. Accuracy is measured with tests/plant, not with this machine.
  * Units    SI

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The drive's outputs to the bit: 200,000 periods in each of four scenarios, hashed. A change of structure leaves the
- * hashes as they are; a change of behaviour states in its commit why they move. They say nothing about accuracy. */
+/* The outputs of the drive to the bit: 200,000 periods in each of four scenarios, hashed. A change of structure keeps
+ * the hashes; a commit that changes the behaviour states why the hashes change. They say nothing about accuracy. */
 #include <inttypes.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -95,7 +95,7 @@ static void period(rig_t *rig)
     rig->periods_on += rig->on ? 1 : 0;
 }
 
-/* Slow values are taken once in 100 periods: identified parameters, torque, faults. */
+/* Identified parameters, torque and faults change slowly and are hashed once in 100 periods. */
 static void slow_values(rig_t *rig)
 {
     static const char *const names[] = {"torque_estimated_Nm", "psi_f_Vs", "r_ohm",    "torque_confidence",
@@ -108,7 +108,7 @@ static void slow_values(rig_t *rig)
     }
 }
 
-/* Goes up and down between -1 and 1, n times in all. */
+/* A triangle wave between -1 and 1 with n cycles in all periods. */
 static double triangle(int k, int n)
 {
     const double turns = (double)k * (double)n / (double)PERIODS;
@@ -120,9 +120,9 @@ static void finish(rig_t *rig, uint64_t expected, const char *name)
 {
     char text[120];
     fluxtrue_destroy(rig->drive);
-    snprintf(text, sizeof text, "%s: hash 0x%016" PRIX64 ", torque and duties differ from what is pinned", name,
+    snprintf(text, sizeof text, "%s: hash 0x%016" PRIX64 ", torque or duties differ from the expected ones", name,
              rig->hash);
-    TEST_ASSERT_GREATER_THAN_INT_MESSAGE(PERIODS / 3, rig->periods_on, "the bridge must run to show anything");
+    TEST_ASSERT_GREATER_THAN_INT_MESSAGE(PERIODS / 3, rig->periods_on, "the bridge switched too rarely");
     TEST_ASSERT_EQUAL_HEX64_MESSAGE(expected, rig->hash, text);
 }
 
@@ -208,7 +208,7 @@ static void disturb(rig_t *rig, int k)
 void test_faults_resets_and_restarts_drive_the_same_duties(void)
 {
     if (!FLUXTRUE_MRAI) {
-        TEST_IGNORE_MESSAGE("changes to an identification that is left out of this build");
+        TEST_IGNORE_MESSAGE("selects an identification that is left out of this build");
     }
     rig_t rig = rig_start(&warm);
     set(&rig, "enable", 1.0);

@@ -35,7 +35,7 @@ const char *sim_failure(const sim_t *sim)
 {
     if (sim->plant != NULL && plant_truth(sim->plant)->inversion_failures > 0) {
         return "the simulation left the range of numbers (no current for the plant's flux linkage): "
-               "a value of the plant or its load is absurd";
+               "a value of the plant or its load is impossible";
     }
     return sim->controller.failure != NULL ? sim->controller.failure(sim->controller.self) : NULL;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef LOOP_RUNNER_SIM_H
 #define LOOP_RUNNER_SIM_H
-/** Closed loop: the simulated drive with the firmware, or with its double-precision twin, period by period.
+/** Closed loop: the simulated drive with the firmware or with its double-precision twin, period by period.
  *   period k: sample, control step, then the plant advances with the duties computed in period k-1
  *   Names: "plant.<field>" (array fields end in _a _b _c), "truth.<field>" (read only); all others are the
  *   controller's.
@@ -35,7 +35,7 @@ SIM_API sim_t *sim_create(int controller);
 /** The same with firmware that belongs to the caller and outlives the simulation. */
 SIM_API sim_t *sim_create_around(struct fluxtrue *firmware);
 SIM_API void sim_destroy(sim_t *sim);
-/** The firmware in it, for fluxtrue_memory_read() and _write(); NULL: another controller. */
+/** The firmware of this simulation, for fluxtrue_memory_read() and _write(); NULL: another controller. */
 SIM_API struct fluxtrue *sim_firmware(sim_t *sim);
 /** The machine's flux map, full plane, row-major [i_d][i_q]; copied. Without one the machine has
  * constant inductances. */

@@ -4,10 +4,10 @@
 /** A controller as the runner sees it: the firmware, its twin, or an emulated processor.
  *   in:  ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start
  *   out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1
- *   switches(): the board's switches; left out, or false: the controller has no board, the battery stays connected
- *   gate_fault(): before each step, whether the gate drivers have blocked a short circuit; it may be left out
- * Errors   set answers a SIM_ code; get of an unknown name is NaN; failure() is NULL, or why no further
- *          step can be run (it may be left out)
+ *   switches(): the switches of the board; NULL or false: the controller has no board and the battery stays connected
+ *   gate_fault(): tells before each step whether the gate drivers have blocked a short circuit; may be NULL
+ * Errors   set() returns a SIM_ code; get() of an unknown name returns NaN; failure() returns NULL, or the reason why
+ *          no further step can be run, and may itself be NULL
  * Context  host; owned by the runner, which destroys it */
 #include <stdbool.h>
 

@@ -43,7 +43,7 @@ static void firmware_gate_fault(void *self, bool reported)
     ((fluxtrue_t *)self)->board.short_circuit_blocked = reported;
 }
 
-/* Firmware of the caller. */
+/* The caller owns the firmware. */
 static void firmware_keep(void *self)
 {
     (void)self;

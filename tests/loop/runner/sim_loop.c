@@ -96,7 +96,7 @@ static void period_run(sim_t *sim)
                           sensors.vdc_V, sensors.theta_m_rad, sensors.t_winding_C};
     if (sim->controller.gate_fault != NULL) {
         sim->controller.gate_fault(sim->controller.self, sensors.gate_fault != 0);
-        sim->gates_on = sim->gates_on && !sensors.gate_fault; /* the timer's latch, without the processor */
+        sim->gates_on = sim->gates_on && !sensors.gate_fault; /* the timer disables switching without the processor */
     }
     double out[4] = {0.5, 0.5, 0.5, 0.0};
     sim->controller.step(sim->controller.self, in, out);

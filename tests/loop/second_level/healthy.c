@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Driving without any error, with machines and inverters of the spread of a production:
+/* Driving without any error, with the spread of machines and inverters in production:
  *   second_level_healthy <seconds> <seed>
- * Speed changes by up to 40,000 rpm/s, requests and limits jump, commands stop, the battery's voltage steps. No fault
- * may be reported. */
+ * The speed changes by up to 40,000 rpm/s, requests and limits jump, commands stop, the battery voltage steps. The
+ * second level may report no fault; faults of other monitors end a drive and are counted. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,8 +56,8 @@ static double torque_max_Nm;
 static double speed_max_rpm;
 static double vdc_V;
 
-/* What the vehicle asks for next. */
-static void choose(void)
+/* Draws the next command of the vehicle. */
+static void draw_command(void)
 {
     vehicle_command_t *command = &vehicle.command;
     const double kind = chance();
@@ -76,7 +76,7 @@ static void choose(void)
     }
 }
 
-/* To a speed at most 0.9 of the largest, at a rate of up to 40,000 rpm/s; sometimes to standstill. */
+/* Drives to another speed, up to 0.9 of the largest and sometimes standstill, at up to 40,000 rpm/s. */
 static void drive_once(int *ms)
 {
     const double now_rpm = sim_get(vehicle.sim, "plant.speed_rad_s") * 30.0 / 3.141592653589793;
@@ -86,11 +86,11 @@ static void drive_once(int *ms)
     int next = 0;
     for (int n = 0; n < steps; n++, (*ms)++) {
         if (n == next) {
-            choose();
+            draw_command();
             next = n + (int)between(10.0, 150.0);
         }
-        vehicle_slope(&vehicle, now_rpm + (to_rpm - now_rpm) * n / steps,
-                      now_rpm + (to_rpm - now_rpm) * (n + 1) / steps);
+        vehicle_ramp_speed(&vehicle, now_rpm + (to_rpm - now_rpm) * n / steps,
+                           now_rpm + (to_rpm - now_rpm) * (n + 1) / steps);
         if (vehicle.ecu.drive.fast.faults != 0U) {
             return;
         }
@@ -123,8 +123,8 @@ int main(int argc, char **argv)
         const uint32_t faults = vehicle.ecu.drive.fast.faults;
         if (faults != 0U) {
             const second_level_t *level = &vehicle.ecu.ecu.second_level;
-            printf("drive %d: faults 0x%x after %d ms, at %.0f rpm, %.1f N.m asked, %.1f of the shaft; own %.1f within "
-                   "-%.1f ... %.1f, second level %d\n",
+            printf("drive %d: faults 0x%x after %d ms, at %.0f rpm, requested %.1f N.m, at the shaft %.1f; own torque "
+                   "%.1f, permitted -%.1f ... %.1f, second level %d\n",
                    (int)n, (unsigned)faults, ms, sim_get(vehicle.sim, "truth.speed_rpm"), vehicle.command.torque_Nm,
                    vehicle.torque_Nm, level->mean_q8 / 256.0 / 32768.0 * (double)vehicle.ecu.motor.bases.torque_Nm,
                    level->permitted.negative.bound / 32768.0 * (double)vehicle.ecu.motor.bases.torque_Nm,

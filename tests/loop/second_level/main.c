@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Errors planted in the first level, classified by the torque of the simulated shaft:  second_level_planted [<error>]
- * Each error is tried at every operating point. While the torque is beyond the permitted one by more than 10 N·m, time
- * counts; 50 ms are allowed until the drive has left torque. Each is also tried without the second level, which shows
- * what it does to the torque, and what the other monitors find by themselves. */
+ * Each error is tried at every operating point. The torque may exceed the permitted one by more than 10 N·m for 50 ms
+ * in a row at most. Each error is also tried without the second level: this shows its effect on the torque, and what
+ * the other monitors detect without the second level. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,8 +14,8 @@
 #define ALLOWED_MS 50
 #define STEADY_MS 120
 #define AFTER_MS 220
-#define LEGAL_FALL_MS 60 /* slew, jerk and the time until a frame has arrived */
-#define LOST_MS 45       /* time-out and ramp */
+#define LEGAL_FALL_MS 60 /* slew and jerk of a falling torque, and the time until a frame has arrived */
+#define LOST_MS 45       /* time-out of the command and ramp to zero */
 #define EFFECTIVE_MIN 40
 
 /* What the vehicle does 100 ms after the error has begun. */
@@ -33,7 +33,7 @@ static const point_t points[] = {
 };
 enum { POINTS = (int)(sizeof points / sizeof points[0]) };
 
-/* Errors that the second level does not yet find: docs/theory/second-level.md, what is left. */
+/* Errors that the second level does not find yet: docs/theory/second-level.md, section 4. */
 static const char *const open_errors[] = {"LOOP_ESTIMATE_70", "UNITS_CURRENT_80"};
 
 typedef struct {
@@ -86,14 +86,14 @@ static double beyond(double torque_Nm, double permitted_Nm_)
 
 static verdict_t try_error(int error, const point_t *at, bool watched)
 {
-    static second_level_constants_t blind;
+    static second_level_constants_t tolerant; /* never reports a fault */
     verdict_t verdict = {0};
     int in_a_row = 0;
     vehicle_start(&vehicle, at->speed_rpm);
     if (!watched) {
-        blind = *vehicle.ecu.motor.second_level;
-        blind.tolerance = INT32_MAX / 2;
-        vehicle.ecu.motor.second_level = &blind;
+        tolerant = *vehicle.ecu.motor.second_level;
+        tolerant.tolerance = INT32_MAX / 2;
+        vehicle.ecu.motor.second_level = &tolerant;
     }
     vehicle_request(&vehicle, at->torque_Nm);
     vehicle_run(&vehicle, STEADY_MS);
@@ -126,7 +126,7 @@ static bool is_open(const char *name)
     return false;
 }
 
-/* The worst of all points. */
+/* The largest values of all points. */
 static verdict_t try_everywhere(int error, const char *name, bool watched, bool verbose)
 {
     verdict_t worst = {0};
@@ -157,13 +157,13 @@ int main(int argc, char **argv)
         const verdict_t watched = try_everywhere(error, name, true, argc > 1);
         const bool is_late = watched.longest_ms > ALLOWED_MS;
         printf("%-24s without the second level %6.1f N.m, %3d ms; with it %6.1f N.m, %3d ms%s\n", name, alone.beyond_Nm,
-               alone.longest_ms, watched.beyond_Nm, watched.longest_ms, is_open(name) ? " (open)" : "");
+               alone.longest_ms, watched.beyond_Nm, watched.longest_ms, is_open(name) ? " (not found yet)" : "");
         effective += (alone.beyond_Nm > ALLOWED_NM) ? 1 : 0;
         late += (alone.longest_ms > ALLOWED_MS) ? 1 : 0;
         missed += (is_late != is_open(name)) ? 1 : 0;
     }
-    printf("%d errors take the torque beyond %.0f N.m, %d of them for more than %d ms without the second level; with "
-           "it %d are not as expected\n",
+    printf("%d errors exceed the permitted torque by more than %.0f N.m, %d of them for more than %d ms without the "
+           "second level; with it %d results are not as expected\n",
            effective, ALLOWED_NM, late, ALLOWED_MS, missed);
     return (missed == 0 && (argc > 1 || effective >= EFFECTIVE_MIN)) ? 0 : 1;
 }

@@ -10,7 +10,7 @@
 
 #define CELLS_MAX 4096
 
-/* X(name): the identifiers of errors in functions, and the order of all. */
+/* The planted errors; a value is the index into planted_errors. */
 typedef enum {
     NOTHING = -1,
     REF_ID_30,
@@ -76,12 +76,12 @@ typedef enum {
 } error_t;
 
 static error_t active = NOTHING;
-static vehicle_t *on;
+static vehicle_t *under_test;
 static q15_t kept;
 
 static int16_t tables[4][CELLS_MAX];
 
-/* A table of the motor data, damaged. */
+/* A copy of a table of the motor data with each value multiplied by the factor. */
 static const int16_t *scaled(int slot, const int16_t *from, int count, double factor)
 {
     for (int n = 0; n < count; n++) {
@@ -275,7 +275,7 @@ const int planted_count = ERRORS;
 void planted_begin(int index, vehicle_t *vehicle)
 {
     active = (error_t)index;
-    on = vehicle;
+    under_test = vehicle;
     kept = vehicle->ecu.drive.request.torque_arbitrated;
     if (index >= 0 && planted_errors[index].damage != NULL) {
         planted_errors[index].damage(vehicle);
@@ -335,7 +335,7 @@ arbitrate_in_t __wrap_ecu_arbitration(const ecu_t *ecu)
     const q15_t drive = in.limit_drive;
     switch (active) {
     case LIMIT_VEHICLE_IGNORED:
-        in.limit_drive = in.limit_regen = on->ecu.motor.torque_max;
+        in.limit_drive = in.limit_regen = under_test->ecu.motor.torque_max;
         break;
     case LIMITS_SWAPPED:
         in.limit_drive = in.limit_regen;
@@ -449,19 +449,19 @@ current_target_t __wrap_current_control_target(const current_control_config_t *c
 current_target_t __wrap_current_control_target(const current_control_config_t *config, dq_q15_t i_ref,
                                                const flux_point_t *flux)
 {
-    static dq_q15_t first;
+    static dq_q15_t kept_i_ref;
     if (active == TARGET_125 || active == TARGET_SIGN || active == TARGET_OFFSET) {
         const dq_q15_t wrong = (active == TARGET_125)    ? (dq_q15_t){i_ref.d * 5 / 4, i_ref.q * 5 / 4}
                                : (active == TARGET_SIGN) ? (dq_q15_t){i_ref.d, -i_ref.q}
                                                          : (dq_q15_t){i_ref.d, i_ref.q - 4000};
-        const flux_point_t there = flux_table_step(&on->ecu.motor.flux_table, wrong);
+        const flux_point_t there = flux_table_step(&under_test->ecu.motor.flux_table, wrong);
         return __real_current_control_target(config, wrong, &there);
     }
     if (active == TARGET_STUCK) {
-        const flux_point_t there = flux_table_step(&on->ecu.motor.flux_table, first);
-        return __real_current_control_target(config, first, &there);
+        const flux_point_t there = flux_table_step(&under_test->ecu.motor.flux_table, kept_i_ref);
+        return __real_current_control_target(config, kept_i_ref, &there);
     }
-    first = i_ref;
+    kept_i_ref = i_ref;
     return __real_current_control_target(config, i_ref, flux);
 }
 

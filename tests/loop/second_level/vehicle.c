@@ -18,7 +18,7 @@
 #define RPM 0.10471975511965977
 #define READY_MS 1200
 #define RPM_PER_MS 20.0
-#define SPEED_TRIP_RESERVE 0.1 /* of the largest speed, at most, up to the over-speed trip */
+#define SPEED_TRIP_RESERVE 0.1 /* largest distance from the largest speed to the over-speed trip, as a share of it */
 
 static void check(bool good, const char *what)
 {
@@ -59,7 +59,7 @@ void vehicle_millisecond(vehicle_t *vehicle)
         send(vehicle);
     }
     const int periods = (int)vehicle->ecu.drive.motor->bases.periods_per_step;
-    check(sim_run(vehicle->sim, periods, &vehicle->torque_Nm, 1) >= 0, "the simulation cannot go on");
+    check(sim_run(vehicle->sim, periods, &vehicle->torque_Nm, 1) >= 0, "the simulation cannot continue");
     while (can_host_take(&vehicle->ecu, &sent)) {
     }
     vehicle->second_level_found |= vehicle->ecu.drive.request.faults != 0U;
@@ -92,7 +92,7 @@ static void start_plant(vehicle_t *vehicle)
     check(sim_record(vehicle->sim, names, 1, periods) == SIM_OK, "record");
 }
 
-void vehicle_slope(vehicle_t *vehicle, double from_rpm, double to_rpm)
+void vehicle_ramp_speed(vehicle_t *vehicle, double from_rpm, double to_rpm)
 {
     check(sim_ramp(vehicle->sim, "plant.speed_rad_s", from_rpm * RPM, to_rpm * RPM) == SIM_OK, "ramp");
     vehicle_millisecond(vehicle);
@@ -105,14 +105,14 @@ double vehicle_speed_max_rpm(const vehicle_t *vehicle)
     return trip / (double)m->angle_tracker.pole_pairs / RPM / (1.0 + SPEED_TRIP_RESERVE);
 }
 
-void vehicle_turn(vehicle_t *vehicle, double speed_rpm)
+void vehicle_to_speed(vehicle_t *vehicle, double speed_rpm)
 {
     const double start_rad_s = sim_get(vehicle->sim, "plant.speed_rad_s");
-    const double way_rad_s = speed_rpm * RPM - start_rad_s;
-    const int steps = (int)ceil(fabs(way_rad_s) / RPM / RPM_PER_MS);
+    const double change_rad_s = speed_rpm * RPM - start_rad_s;
+    const int steps = (int)ceil(fabs(change_rad_s) / RPM / RPM_PER_MS);
     for (int n = 0; n < steps; n++) {
-        const double from_rpm = (start_rad_s + way_rad_s * n / steps) / RPM;
-        vehicle_slope(vehicle, from_rpm, from_rpm + way_rad_s / steps / RPM);
+        const double from_rpm = (start_rad_s + change_rad_s * n / steps) / RPM;
+        vehicle_ramp_speed(vehicle, from_rpm, from_rpm + change_rad_s / steps / RPM);
     }
 }
 
@@ -128,8 +128,8 @@ void vehicle_start(vehicle_t *vehicle, double speed_rpm)
     for (int n = 0; n < READY_MS && vehicle->ecu.ecu.supervisor.state != STATE_READY; n++) {
         vehicle_millisecond(vehicle);
     }
-    check(vehicle->ecu.ecu.supervisor.state == STATE_READY, "the ECU did not get ready");
-    vehicle_turn(vehicle, speed_rpm);
+    check(vehicle->ecu.ecu.supervisor.state == STATE_READY, "the ECU did not reach the state ready");
+    vehicle_to_speed(vehicle, speed_rpm);
 }
 
 void vehicle_stop(vehicle_t *vehicle)

@@ -3,7 +3,7 @@
 #define LOOP_SECOND_LEVEL_VEHICLE_H
 /** An ECU on a bus with its simulated machine at an imposed speed, and the vehicle that commands it, millisecond by
  * millisecond. One instance.
- * Units    the names end in them
+ * Units    in the names
  * Errors   a call that cannot be carried out ends the program
  * Context  simulation only */
 #include "hal/host/instance.h"
@@ -26,17 +26,17 @@ typedef struct {
 
 /** A new ECU and plant, charged and ready for torque, at a speed. */
 void vehicle_start(vehicle_t *vehicle, double speed_rpm);
-/** Takes the machine to another speed, by 20,000 rpm/s. */
-void vehicle_turn(vehicle_t *vehicle, double speed_rpm);
-/** One millisecond in which the speed changes so. */
-void vehicle_slope(vehicle_t *vehicle, double from_rpm, double to_rpm);
-/** The machine's largest speed, less some per cent. */
+/** Changes the speed of the machine at 20,000 rpm/s. */
+void vehicle_to_speed(vehicle_t *vehicle, double speed_rpm);
+/** One millisecond in which the speed changes linearly from one value to the other. */
+void vehicle_ramp_speed(vehicle_t *vehicle, double from_rpm, double to_rpm);
+/** The over-speed trip less its largest reserve: at most the largest speed of the machine. */
 double vehicle_speed_max_rpm(const vehicle_t *vehicle);
 void vehicle_stop(vehicle_t *vehicle);
 void vehicle_set(vehicle_t *vehicle, const char *name, double value);
 void vehicle_millisecond(vehicle_t *vehicle);
 void vehicle_run(vehicle_t *vehicle, int milliseconds);
-/** Enables with these limits and requests the torque. */
+/** Enables with zero torque and the present limits, and requests the torque 25 ms later. */
 void vehicle_request(vehicle_t *vehicle, double torque_Nm);
 
 #endif
