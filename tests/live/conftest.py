@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page's server as a child process, a browser before it, and simulated time that waits for both.
+"""The page's server as a child process, a browser that shows the page, and simulated time that waits for both.
 
-The virtual ECU is the test's own: its time passes when the server asks for it, and the server waits until every page
-has drawn what there was (--in-step). However long a browser takes, no command is late and no page is silent.
+Each test has its own virtual ECU. Its time advances when the server asks for it, and the server waits until every page
+has drawn the previous values (--in-step). However long a browser takes, no command is late and no page is silent.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ CHROMIUM, DRIVER = Path("/usr/bin/chromium"), Path("/usr/bin/chromedriver")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """From ctest."""
+    """Options that ctest passes."""
     parser.addoption("--vecu", help="program of the virtual ECU")
     parser.addoption("--pictures", default=str(ROOT / "build" / "live"), help="folder for screenshots")
 
@@ -43,7 +43,7 @@ class Server:
     stand: Channel | None = None
 
     def now_s(self) -> float:
-        """Simulated time; fails when the server has ended, because then it would stand still for ever."""
+        """Simulated time. Fails when the server has ended, because then the time would never advance."""
         assert self.process.poll() is None, "the server has ended"
         assert self.stand is not None
         return 1e-9 * self.stand.run(0.0).now_ns
@@ -58,30 +58,30 @@ def launch(records: Path, *arguments: str) -> Server:
     line = process.stdout.readline()
     if not re.fullmatch(r"http://127\.0\.0\.1:\d+/\n", line):
         process.kill()
-        pytest.fail(f"the server said '{line}'")
+        pytest.fail(f"the server printed '{line}'")
     return Server(line.strip(), records, process)
 
 
 def end(server: Server) -> None:
-    """As a user ends it."""
+    """End the server as a user does."""
     server.process.terminate()
     assert server.process.wait(HANG_S) == 0
 
 
 @pytest.fixture
 def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
-    """Before a virtual ECU that has just been started."""
-    yield from _before(Path(request.config.getoption("--vecu")), tmp_path)
+    """A server connected to a virtual ECU that has just been started."""
+    yield from _connected(Path(request.config.getoption("--vecu")), tmp_path)
 
 
 @pytest.fixture
 def refused(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
-    """Before a virtual ECU whose motor data fail a check."""
+    """A server connected to a virtual ECU whose motor data fail a check."""
     program = Path(request.config.getoption("--vecu"))
-    yield from _before(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
+    yield from _connected(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
 
 
-def _before(program: Path, tmp_path: Path) -> Iterator[Server]:
+def _connected(program: Path, tmp_path: Path) -> Iterator[Server]:
     with VirtualEcu(program) as ecu:
         options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
         records = tmp_path / "records"
@@ -111,7 +111,7 @@ def replay(tmp_path: Path) -> Iterator[Callable[[Path], Server]]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[webdriver.Chrome]:
-    """Debian's Chromium without a screen."""
+    """Debian's Chromium, headless."""
     if not (CHROMIUM.exists() and DRIVER.exists()):
         pytest.skip("needs the Debian packages chromium and chromium-driver")
     options = webdriver.ChromeOptions()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page's bus side before the virtual ECU, without a browser: the test lets time pass, 40 ms at a time."""
+"""The bus side of the page with the virtual ECU, without a browser. The test advances time, 40 ms at a time."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,11 +19,11 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import SteppedBus, connect
 
 BATCH_S = 0.04
-MOST_S = 5.0  # of simulated time: any change of state takes less
+TIME_OUT_S = 5.0  # of simulated time; every change of state takes less
 
 
 class Drive:
-    """What the server has, with the test in the place of pages and server."""
+    """The objects of the server; the test takes the place of the pages and of the server's loop."""
 
     def __init__(self, ecu: VirtualEcu, folder: Path) -> None:
         database = cantools.database.load_file(DBC)
@@ -36,24 +36,24 @@ class Drive:
         assert self.in_step.due()
 
     def pass_batch(self, alive: bool = True) -> None:
-        """40 ms; the hand is at the slider at their beginning."""
+        """Advance time by 40 ms. If alive, the page gives a sign of life at the beginning."""
         if alive:
             self.link.act(lambda commander, now: commander.hand(now))
         self.in_step.done()
         assert self.in_step.due(), self.link.lost
 
     def until(self, true: Callable[[], bool], alive: bool = True) -> None:
-        for _ in range(round(MOST_S / BATCH_S)):
+        for _ in range(round(TIME_OUT_S / BATCH_S)):
             if true():
                 return
             self.pass_batch(alive)
-        pytest.fail(f"after {MOST_S} s: state {self.samples.state()}, {self.commander}")
+        pytest.fail(f"after {TIME_OUT_S} s: state {self.samples.state()}, {self.commander}")
 
     def press(self, wish: Wish) -> None:
         self.link.act(lambda commander, now: commander.ask(wish, now))
 
     def torques(self) -> np.ndarray:
-        """Times and what the inverter says it has been asked for, since the last call."""
+        """Times and commanded torques that the inverter has reported since the last call."""
         columns = self.samples.take()["INV_Status"]
         return np.array([columns["t"], columns["TorqueCommanded"]])
 
@@ -66,7 +66,7 @@ class Drive:
 
 @pytest.fixture
 def driving(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Drive]:
-    """At 2000 rpm, 60 N·m."""
+    """A drive at 2000 rpm and 60 N·m."""
     with VirtualEcu(Path(request.config.getoption("--vecu"))) as ecu:
         drive = Drive(ecu, tmp_path)
         for wish, state in ((Wish.READY, "ready"), (Wish.DRIVE, "run")):
@@ -79,7 +79,7 @@ def driving(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Drive]:
         drive.close()
 
 
-def test_a_gap_in_the_commands_takes_the_wish_back_and_one_press_on_enable_goes_on(driving: Drive) -> None:
+def test_a_gap_in_the_commands_disables_and_one_press_on_enable_continues(driving: Drive) -> None:
     driving.channel.run(60.0)  # time passes without a command
     driving.until(lambda: driving.samples.state() == "ready")
     driving.pass_batch()
@@ -93,14 +93,14 @@ def test_a_gap_in_the_commands_takes_the_wish_back_and_one_press_on_enable_goes_
     assert driving.commander.stopped == ""
 
 
-def test_a_hand_that_is_gone_keeps_its_torque_for_300_ms_and_loses_it_by_a_ramp(driving: Drive) -> None:
+def test_without_a_sign_of_life_the_torque_stays_for_300_ms_and_ramps_to_zero(driving: Drive) -> None:
     driving.pass_batch()
     gone_s = driving.samples.newest_s
     driving.link.act(lambda commander, now: commander.hand(now))
     driving.torques()
     driving.until(lambda: driving.samples.newest_s > gone_s + 1.0, alive=False)
     times, torques = driving.torques()
-    # The status comes each 10 ms and tells the command that came up to 10 ms before it.
+    # The status is sent every 10 ms and reports a command that arrived up to 10 ms before.
     held = torques[times < gone_s + 0.3]
     assert abs(held - 60.0).max() < 0.1
     assert abs(torques[times > gone_s + 0.3 + 60.0 / 150.0 + 0.03]).max() < 0.1
@@ -116,11 +116,13 @@ def test_closing_the_link_while_it_drives_ramps_the_torque_out_first(driving: Dr
     driving.link.close()
     _, torques = driving.torques()
     assert driving.commander.torque_requested_Nm == 0.0
-    assert torques[-1] < 1.6  # the answer to the last command may not have been heard
+    assert torques[-1] < 1.6  # the status after the last command may not have been received
     assert np.diff(torques).min() >= -1.61
 
 
-def test_a_virtual_ecu_that_ends_is_told_and_nothing_hangs(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_the_end_of_the_virtual_ecu_is_reported_and_nothing_hangs(
+    request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     with VirtualEcu(Path(request.config.getoption("--vecu"))) as ecu:
         drive = Drive(ecu, tmp_path)
     drive.in_step.release()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page in a browser: its contents, and the effect of its controls."""
+"""The page in a browser: its contents and the effect of its controls."""
 
 import json
 import urllib.error
@@ -15,7 +15,7 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.remote.webelement import WebElement
 
-PATIENCE_S = 60.0  # of simulated time
+TIME_OUT_S = 60.0  # of simulated time
 HAND_TIMEOUT_S = 0.3  # docs/howto/live.md
 RAMP_Nm_per_s = 150.0
 BATCH_S = 0.04
@@ -34,14 +34,14 @@ class Page:
         return self.find(name).text
 
     def until(self, true: Callable[[], bool], what: str) -> None:
-        """Wait in simulated time."""
-        until(true, self.server.now_s, PATIENCE_S, what)
+        """Wait for the condition in simulated time."""
+        until(true, self.server.now_s, TIME_OUT_S, what)
 
     def run(self, script: str, *arguments: object) -> object:
         return self.browser.execute_script(script, *arguments)
 
     def drawn(self, ring: str, name: str) -> list[tuple[float, float]]:
-        """Times and values, oldest first."""
+        """Times and values of a signal on the page, oldest first."""
         script = "const r = rings[arguments[0]]; return [r.data[0], r.data[r.names.indexOf(arguments[1]) + 1]];"
         columns = self.run(script, ring, name)
         assert isinstance(columns, list)
@@ -52,7 +52,7 @@ class Page:
         return drawn[-1][1] if drawn else 0.0
 
     def newest_s(self) -> float:
-        """The time up to which there is a picture."""
+        """The time of the newest drawn value."""
         drawn = self.drawn("INV_Status", "Speed")
         return drawn[-1][0] if drawn else 0.0
 
@@ -61,7 +61,7 @@ class Page:
         self.run(script, self.find(name), value)
 
     def drive(self, torque_Nm: float) -> None:
-        """The slider, once; then wait for the torque."""
+        """Move the slider once and wait for the torque."""
         assert self.find("torque").is_enabled()
         self.slide("torque", torque_Nm)
         for signal, within_Nm in (("TorqueCommanded", 0.1), ("TorqueEstimated", 1.0)):
@@ -69,12 +69,12 @@ class Page:
                        abs(self.newest("INV_Status", signal) - torque_Nm) < within_Nm, f"{torque_Nm} N·m")  # fmt: skip
 
     def enable(self) -> None:
-        """Pressed once."""
+        """Press Enable once and wait until the drive runs."""
         self.find("enable").click()
         self.until(lambda: self.text("state") == "run" and self.find("torque").is_enabled(), "run, the slider")
 
     def hide(self, hidden: bool) -> float:
-        """As if the page lay in the background, or came back; the time up to which there was a picture."""
+        """Make the page believe that it is in the background, or visible again; the time of the newest drawn value."""
         newest_s = self.run("Object.defineProperty(document, 'hidden', {value: arguments[0], configurable: true});"
                             "document.dispatchEvent(new Event('visibilitychange'));"
                             "return rings.INV_Status.data[0].at(-1);", hidden)  # fmt: skip
@@ -87,7 +87,7 @@ def page(browser: webdriver.Chrome, server: Server) -> Page:
     """A page whose drive runs at 2000 rpm."""
     opened = Page(browser, server)
     browser.get("about:blank")
-    browser.get_log("browser")  # ends what the last page had to say: its server has gone
+    browser.get_log("browser")  # discards the messages of the previous page, whose server has ended
     browser.get(server.url)
     opened.until(lambda: opened.text("state") == "standby", "standby")
     opened.find("ready").click()
@@ -98,7 +98,7 @@ def page(browser: webdriver.Chrome, server: Server) -> Page:
     return opened
 
 
-def test_the_page_says_which_check_the_motor_data_failed(browser: webdriver.Chrome, refused: Server) -> None:
+def test_the_page_names_the_check_that_the_motor_data_failed(browser: webdriver.Chrome, refused: Server) -> None:
     page = Page(browser, refused)
     browser.get(refused.url)
     page.until(lambda: page.text("state") == "fault" and "config" in page.text("faults"), "the fault")
@@ -113,7 +113,7 @@ def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request
     page.drive(60.0)
     page.slide("magnet_percent", 88.0)
     weakened_s = page.server.now_s()
-    # For the picture: the flux has been found, the torque is back.
+    # The screenshot shows the identified flux and the restored torque.
     page.until(lambda: page.server.now_s() > weakened_s + 8.0, "8 s")
     page.until(lambda: abs(page.newest("truth", "Torque") - 60.0) < 1.5, "60 N·m at the shaft")
     pictures = Path(request.config.getoption("--pictures"))
@@ -123,7 +123,7 @@ def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request
 
 
 def test_every_batch_that_arrives_is_drawn(page: Page) -> None:
-    """25 batches a second of simulated time; the next one comes when this one has been drawn."""
+    """25 batches per second of simulated time; each is sent when the one before has been drawn."""
     read = "return {...fluxtrueStats}"
     first = last = page.run(read)
     assert isinstance(first, dict) and isinstance(last, dict)
@@ -151,13 +151,13 @@ def test_closing_the_page_ramps_the_torque_to_zero_and_ends_the_switching(page: 
     assert "closed or silent" in page.text("stopped")
 
 
-def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_goes_on(page: Page) -> None:
+def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_continues(page: Page) -> None:
     page.drive(60.0)
     silent_s = page.hide(True)
     latest_s = HAND_TIMEOUT_S + 60.0 / RAMP_Nm_per_s + 3 * BATCH_S
     page.until(lambda: page.text("state") == "ready" and page.newest_s() > silent_s + latest_s, "ready")
     after = [(t - silent_s, torque) for t, torque in page.drawn("INV_Status", "TorqueCommanded") if t > silent_s]
-    # It gave its last sign of life with this batch or the one before.
+    # The page gave its last sign of life with this batch or the one before.
     assert all(abs(torque - 60.0) < 0.1 for t, torque in after if t < HAND_TIMEOUT_S - 2 * BATCH_S)
     assert all(abs(torque) < 0.2 for t, torque in after if t > latest_s)
     assert "closed or silent for 0.3 s" in page.text("stopped")
@@ -168,7 +168,7 @@ def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_goe
     page.drive(20.0)
 
 
-def test_after_a_gap_in_the_commands_the_page_says_why_and_one_press_on_enable_goes_on(page: Page) -> None:
+def test_after_a_gap_in_the_commands_the_page_gives_the_reason_and_one_press_on_enable_continues(page: Page) -> None:
     page.drive(60.0)
     assert page.server.stand is not None
     page.server.stand.run(60.0)  # time passes without a command
@@ -220,9 +220,9 @@ def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: 
     played.browser.get(played.server.url)
 
     def wait(true: Callable[[], bool], what: str) -> None:
-        """In the recording's time, as far as it has been drawn; it is a date, and 0 before the first sample."""
+        """Wait in the time of the recording, which is a date, and 0 before the first sample has been drawn."""
         polled(lambda: played.newest_s() > 0.0)
-        until(true, played.newest_s, PATIENCE_S, what)
+        until(true, played.newest_s, TIME_OUT_S, what)
 
     wait(lambda: played.newest("INV_Status", "TorqueEstimated") > 20.0, "the drive")
     assert not played.find("enable").is_enabled()
@@ -249,7 +249,7 @@ def test_other_hosts_and_other_pages_are_refused(server: Server) -> None:
     assert _status(url + "static/../cli.py") == 404
 
 
-def test_garbage_from_a_page_is_answered_and_moves_nothing(page: Page) -> None:
+def test_an_invalid_message_from_a_page_is_answered_and_changes_nothing(page: Page) -> None:
     for message in ([], {"type": "torque"}, {"type": "torque", "torque_requested_Nm": "40"}, {"type": "launch"},
                     {"type": "knob", "name": "speed_rpm", "value": None}, {"type": "drawn", "batch": "9"}):  # fmt: skip
         page.run("say('')")

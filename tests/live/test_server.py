@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Dead man, one commanding page, and bad messages: without a browser, on a clock of the test."""
+"""Dead-man function, control by one page only, and bad messages: without a browser, with the clock of the test."""
 
 import asyncio
 import json
@@ -29,9 +29,9 @@ RAMP_S = 0.4  # 60 N·m at 150 N·m/s
 
 
 class Drive:
-    """The bus side, in place of a Link: the commander is stepped by the test, the inverter does what it is told.
+    """The bus side, in place of a Link: the test steps the commander, and a model of the inverter follows it.
 
-    As the state machine of docs/howto/can.md: enable is an edge, and a command that is missing for 30 ms takes it back.
+    The model has two rules of docs/howto/can.md: enable acts on its edge, and 30 ms without a command disable.
     """
 
     lost = ""
@@ -44,11 +44,11 @@ class Drive:
         self._enable_seen = self._enabled = False
 
     def act(self, action: Callable[[Commander, float], None]) -> None:
-        """As Link.act(), with the test's clock."""
+        """As Link.act(), with the clock of the test."""
         action(self.commander, self.now_s)
 
     def run(self, seconds: float, alive: bool = False) -> list[float]:
-        """Time passes; the torque asked for on the way. Ready and run follow the command at once."""
+        """Let time pass; the requested torque of each step. The states ready and run follow the command at once."""
         torques = []
         for _ in range(round(seconds / TICK_S)):
             self.now_s += TICK_S
@@ -66,7 +66,7 @@ class Drive:
         self.state = "run" if self._enabled else "ready" if self.order.mode == "torque" else "standby"
 
     def gap(self, seconds: float) -> None:
-        """No command is sent."""
+        """Let time pass without a command."""
         self.now_s += seconds
         self.commander.hand(self.now_s)
         if seconds > 0.03 and self._enabled:
@@ -75,7 +75,7 @@ class Drive:
 
 @pytest.fixture
 def driving() -> Drive:
-    """60 N·m, and a hand that has just said so."""
+    """A drive at 60 N·m, whose page has just given a sign of life."""
     drive = Drive()
     drive.act(lambda commander, now: commander.ask(Wish.READY, now))
     drive.run(0.1, alive=True)
@@ -92,7 +92,7 @@ def test_signs_of_life_keep_the_torque(driving: Drive) -> None:
         assert set(driving.run(0.29)) == {60.0}
 
 
-def test_a_page_that_says_nothing_for_300_ms_loses_the_torque_by_a_ramp_and_must_press_enable_again(
+def test_a_page_silent_for_300_ms_loses_the_torque_by_a_ramp_and_must_press_enable_again(
     driving: Drive,
 ) -> None:
     assert set(driving.run(0.29)) == {60.0}
@@ -100,7 +100,7 @@ def test_a_page_that_says_nothing_for_300_ms_loses_the_torque_by_a_ramp_and_must
     steps = [before - after for before, after in pairwise(torques)]
     assert min(steps) >= 0.0 and max(steps) <= 150.0 * TICK_S + 1e-9
     assert torques[-1] == 0.0 and not driving.order.enable and driving.state == "ready"
-    driving.act(lambda commander, now: commander.slide(60.0, now))  # it wakes up, its slider still there
+    driving.act(lambda commander, now: commander.slide(60.0, now))  # the page is back, its slider at the old value
     assert set(driving.run(1.0, alive=True)) == {0.0} and not driving.order.enable
     assert "closed or silent for 0.3 s. Press Enable" in driving.commander.stopped
     press(driving, Wish.DRIVE)
@@ -108,12 +108,12 @@ def test_a_page_that_says_nothing_for_300_ms_loses_the_torque_by_a_ramp_and_must
 
 
 def press(drive: Drive, wish: Wish) -> None:
-    """A button, once; and the hand stays."""
+    """Press a button once, and give signs of life for 0.1 s."""
     drive.act(lambda commander, now: commander.ask(wish, now))
     drive.run(0.1, alive=True)
 
 
-def test_a_gap_in_the_commands_takes_the_wish_back_says_why_and_one_press_goes_on(driving: Drive) -> None:
+def test_a_gap_in_the_commands_disables_with_a_reason_and_one_press_continues(driving: Drive) -> None:
     driving.gap(0.05)
     driving.run(0.05, alive=True)
     commander = driving.commander
@@ -127,7 +127,7 @@ def test_a_gap_in_the_commands_takes_the_wish_back_says_why_and_one_press_goes_o
     assert driving.state == "run" and commander.stopped == "" and driving.order.torque_requested_Nm == 0.0
 
 
-def test_a_gap_that_the_inverter_bears_changes_nothing(driving: Drive) -> None:
+def test_a_gap_shorter_than_the_time_out_changes_nothing(driving: Drive) -> None:
     driving.gap(0.015)
     assert set(driving.run(0.2, alive=True)) == {60.0}
     assert driving.commander.stopped == "" and driving.state == "run"
@@ -139,7 +139,7 @@ def test_a_gap_that_the_inverter_bears_changes_nothing(driving: Drive) -> None:
     ("ready", "The inverter stopped. Its state is ready. Press Enable to go on."),
     ("discharge", "The inverter stopped. Its state is discharge. Press Enable to go on."),
 ])  # fmt: skip
-def test_an_inverter_that_stops_by_itself_takes_the_wish_back_and_the_reason_names_its_state(
+def test_an_inverter_that_stops_by_itself_ends_the_request_and_the_reason_names_its_state(
     driving: Drive, state: str, why: str
 ) -> None:
     driving.state = state
@@ -147,7 +147,7 @@ def test_an_inverter_that_stops_by_itself_takes_the_wish_back_and_the_reason_nam
     assert (driving.commander.wish, driving.commander.stopped) == (Wish.READY, why)
 
 
-def test_an_enable_that_is_not_obeyed_is_taken_back_after_half_a_second_with_the_inverter_s_reason() -> None:
+def test_an_enable_without_effect_is_withdrawn_after_half_a_second_with_the_inverters_reason() -> None:
     drive = Drive()
     press(drive, Wish.READY)
     drive.obeys, drive.refused = False, "dc_voltage_out_of_range"
@@ -166,7 +166,7 @@ Talk = Callable[[TestClient[Any, Any], Session], Awaitable[None]]
 
 
 def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None) -> None:
-    """A server for the length of one conversation."""
+    """Run a server while talk() runs."""
 
     async def conversation() -> None:
         samples = Samples(cantools.database.load_file(DBC))
@@ -180,14 +180,14 @@ def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None)
 
 
 async def page(client: TestClient[Any, Any]) -> ClientWebSocketResponse:
-    """A page that has just been opened."""
+    """Open a page: connect a socket and receive the greeting."""
     socket = await client.ws_connect("/ws", headers={"Origin": f"http://127.0.0.1:{client.port}"})
     assert (await socket.receive_json(timeout=HANG_S))["type"] == "hello"
     return socket
 
 
 async def refusal(socket: ClientWebSocketResponse, text: str) -> str:
-    """What the page is told about one message."""
+    """Send one message and return the text of its refusal."""
     await socket.send_str(text)
     while (answer := await socket.receive_json(timeout=HANG_S))["type"] != "refused":
         assert answer["type"] == "rows", answer
@@ -195,17 +195,17 @@ async def refusal(socket: ClientWebSocketResponse, text: str) -> str:
 
 
 async def obeyed(socket: ClientWebSocketResponse) -> None:
-    """Everything sent before has been read: messages are answered in their order."""
+    """Wait until every earlier message has been read: messages are answered in their order."""
     assert "unknown message" in await refusal(socket, '{"type": "are you there"}')
 
 
 async def until_gone(session: Session, viewers: int) -> None:
-    """The server has noticed that a page has gone."""
+    """Wait until the server has noticed that a page has closed."""
     await polled_async(lambda: len(session.viewers) <= viewers)
 
 
 @pytest.mark.parametrize("cut", [False, True], ids=["closed", "cut off"])
-def test_a_lost_page_lets_go_at_once_and_no_other_page_inherits_its_torque(tmp_path: Path, cut: bool) -> None:
+def test_a_lost_page_ramps_out_at_once_and_no_other_page_takes_over_its_torque(tmp_path: Path, cut: bool) -> None:
     drive = Drive()
 
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
@@ -241,7 +241,7 @@ def test_a_lost_page_lets_go_at_once_and_no_other_page_inherits_its_torque(tmp_p
     '{"type": "torque", "torque_requested_Nm": true}', '{"type": "torque", "torque_requested_Nm": 1' + "0" * 400 + "}",
     '{"type": "knob", "name": ["speed_rpm"], "value": 1}', '{"type": "tune", "name": "observer_m", "value": 3}',
 ], ids=range(12))  # fmt: skip
-def test_a_bad_message_is_answered_and_moves_nothing(driving: Drive, tmp_path: Path, text: str) -> None:
+def test_a_bad_message_is_answered_and_changes_nothing(driving: Drive, tmp_path: Path, text: str) -> None:
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         socket = await page(client)
         assert await refusal(socket, text)
@@ -251,7 +251,7 @@ def test_a_bad_message_is_answered_and_moves_nothing(driving: Drive, tmp_path: P
     serve(driving, tmp_path, talk)
 
 
-def test_a_page_that_does_not_read_leaves_the_others_their_pictures(tmp_path: Path) -> None:
+def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path) -> None:
     class Stuck:
         """A viewer that never takes a batch."""
 
@@ -263,7 +263,7 @@ def test_a_page_that_does_not_read_leaves_the_others_their_pictures(tmp_path: Pa
             raise TimeoutError
 
         async def close(self, **_: Any) -> None:
-            """There is no connection."""
+            """Do nothing: there is no connection."""
 
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         session.viewers.append(Stuck())  # type: ignore[arg-type]
@@ -275,12 +275,12 @@ def test_a_page_that_does_not_read_leaves_the_others_their_pictures(tmp_path: Pa
     serve(Drive(), tmp_path, talk)
 
 
-def test_a_long_answer_does_not_keep_the_signs_of_life_from_being_heard(driving: Drive, tmp_path: Path) -> None:
-    """Reading all calibration values takes longer than a page may be silent."""
+def test_signs_of_life_are_received_during_a_long_answer(driving: Drive, tmp_path: Path) -> None:
+    """To read all calibration values takes longer than a page may be silent."""
     read = threading.Event()
 
     class Slow:
-        """An ECU that answers when the test says so."""
+        """An ECU that answers when the test allows it."""
 
         thread = ThreadPoolExecutor(1)
 
@@ -306,7 +306,7 @@ def test_a_long_answer_does_not_keep_the_signs_of_life_from_being_heard(driving:
 
 
 @pytest.mark.parametrize("visible", [True, False])
-def test_only_a_page_that_can_be_seen_gives_a_sign_of_life(driving: Drive, tmp_path: Path, visible: bool) -> None:
+def test_only_a_visible_page_gives_a_sign_of_life(driving: Drive, tmp_path: Path, visible: bool) -> None:
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         socket = await page(client)
         await socket.send_json({"type": "torque", "torque_requested_Nm": 60.0})
@@ -319,8 +319,8 @@ def test_only_a_page_that_can_be_seen_gives_a_sign_of_life(driving: Drive, tmp_p
     serve(driving, tmp_path, talk)
 
 
-def test_in_step_time_waits_until_each_page_has_drawn_and_for_a_page_to_draw(tmp_path: Path) -> None:
-    in_step, turns = InStep(), []
+def test_in_step_time_waits_for_a_page_and_until_each_page_has_drawn(tmp_path: Path) -> None:
+    in_step, batches = InStep(), []
 
     async def batch(socket: ClientWebSocketResponse) -> int:
         while (message := await socket.receive_json(timeout=HANG_S))["type"] != "rows":
@@ -329,23 +329,23 @@ def test_in_step_time_waits_until_each_page_has_drawn_and_for_a_page_to_draw(tmp
 
     async def talk(client: TestClient[Any, Any], session: Session) -> None:
         def time_passes() -> None:
-            while len(turns) < 2:
+            while len(batches) < 2:
                 in_step.turn()
-                turns.append(1)
+                batches.append(1)
 
         first, second = await page(client), await page(client)
         passing = asyncio.get_running_loop().run_in_executor(None, time_passes)
         assert (await batch(first), await batch(second)) == (0, 0)
         await first.send_json({"type": "drawn", "batch": 0, "visible": True})
         await obeyed(first)
-        assert not turns  # the second has not drawn yet
+        assert not batches  # the second page has not drawn yet
         await second.send_json({"type": "drawn", "batch": 0, "visible": False})
         assert (await batch(first), await batch(second)) == (1, 1)
-        assert len(turns) == 1
-        await second.close()  # nothing waits for a closed page
+        assert len(batches) == 1
+        await second.close()  # a closed page is not waited for
         await first.send_json({"type": "drawn", "batch": 1, "visible": True})
         await passing
-        assert len(turns) == 2
+        assert len(batches) == 2
 
     serve(Drive(), tmp_path, talk, in_step)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""libfluxtrue_sil.so by ctypes, bound with the header as the only source."""
+"""libfluxtrue_sil.so by ctypes, with prototypes written from the header alone."""
 
 import ctypes
 import os
@@ -17,12 +17,12 @@ def library_path(motor: str) -> Path:
 
 
 def load(motor: str) -> ctypes.CDLL:
-    """A shipped motor's library."""
+    """Load the library of a shipped motor."""
     return load_library(library_path(motor))
 
 
 def load_library(path: Path) -> ctypes.CDLL:
-    """The library with the header's prototypes."""
+    """Load a library and declare the prototypes of the header."""
     library = ctypes.CDLL(str(path))
     pointer, text, number = ctypes.c_void_p, ctypes.c_char_p, ctypes.c_double
     library.fluxtrue_create.restype = pointer
@@ -40,7 +40,7 @@ def load_library(path: Path) -> ctypes.CDLL:
 
 
 class Drive:
-    """One instance."""
+    """One instance of the drive."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self.library = library
@@ -48,16 +48,16 @@ class Drive:
         assert self.handle
 
     def close(self) -> None:
-        """Free it."""
+        """Destroy the instance."""
         self.library.fluxtrue_destroy(self.handle)
         self.handle = None
 
     def set(self, name: str, value: float) -> int:
-        """The library's code."""
+        """Set a value; the return code of the library."""
         return int(self.library.fluxtrue_set(self.handle, name.encode(), value))
 
     def get(self, name: str) -> float:
-        """The library's number."""
+        """Read a value; NaN for an unknown name."""
         return float(self.library.fluxtrue_get(self.handle, name.encode()))
 
     def step(self, sample: Sequence[float]) -> tuple[float, float, float, float]:

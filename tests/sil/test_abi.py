@@ -72,8 +72,8 @@ def test_a_name_of_version_0_1_still_works_and_is_not_listed(
 ) -> None:
     drive = running(make())
     assert drive.set("torque_requested_Nm", 8.0) == OK
-    for _ in range(80):  # within the 10 ms that a lost phase takes
-        drive.step((0.0, 2.0, -2.0, 350.0, 0.0, 20.0))  # i_q, so that there is a torque to estimate
+    for _ in range(80):  # 8 ms, less than the confirmation of a lost phase
+        drive.step((0.0, 2.0, -2.0, 350.0, 0.0, 20.0))  # a current in the q axis, so that the torque is not zero
     assert drive.get(old) == drive.get(present) != 0.0
     assert drive.set(old, 5.0) == drive.set(present, 5.0)
     assert drive.get(old) == drive.get(present)
@@ -124,7 +124,7 @@ def test_a_result_cannot_be_set(make: Callable[[], Drive], name: str) -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e30, -1e30])
-def test_an_absurd_value_is_refused_and_changes_nothing(
+def test_a_value_that_is_not_finite_or_far_out_of_range_is_refused_and_changes_nothing(
     library: ctypes.CDLL, make: Callable[[], Drive], value: float
 ) -> None:
     drive = make()
@@ -135,7 +135,7 @@ def test_an_absurd_value_is_refused_and_changes_nothing(
         assert drive.get(name) == before, name
 
 
-def test_what_is_set_is_what_is_read(make: Callable[[], Drive]) -> None:
+def test_a_value_that_was_set_is_read_back(make: Callable[[], Drive]) -> None:
     drive = make()
     for name, value in [("torque_requested_Nm", -33.25), ("torque_loop", 1.0), ("torque_loop", 0.0),
                         ("identification", 1.0), ("identification", 0.0), ("enable", 1.0)]:  # fmt: skip
@@ -160,11 +160,11 @@ def test_a_sample_that_is_nan_disables_switching_at_once_and_sets_a_fault_bit(
     assert out[3] == 0.0
     assert all(0.0 <= duty <= 1.0 for duty in out[:3])
     assert drive.get("fault_word") != 0.0
-    # The fault stays although the samples are good again.
+    # The fault is latched although the samples are good again.
     assert {drive.step(IDLE)[3] for _ in range(50)} == {0.0}
 
 
-def test_a_reversed_dc_link_is_no_measurement(make: Callable[[], Drive]) -> None:
+def test_a_negative_dc_voltage_is_a_fault(make: Callable[[], Drive]) -> None:
     drive = running(make())
     sample = list(IDLE)
     sample[INPUTS.index("vdc_V")] = -50.0
@@ -194,8 +194,8 @@ def test_a_fault_cannot_be_reset_while_the_drive_is_enabled(make: Callable[[], D
     assert drive.get("fault_word") != 0.0
 
 
-def test_whatever_comes_in_the_outputs_stay_duties(make: Callable[[], Drive]) -> None:
-    # Hostile on purpose: numbers of every size, special values, and plausible ones in between.
+def test_for_any_input_the_outputs_are_duties(make: Callable[[], Drive]) -> None:
+    # Numbers of every size, special values such as NaN, and plausible values between them.
     rng = random.Random(20)
     drive = make()
     special = [math.nan, math.inf, -math.inf, 0.0, -0.0, 5e-324, 1e308, -1e308, 1e5, -1e5]
@@ -213,7 +213,7 @@ def test_whatever_comes_in_the_outputs_stay_duties(make: Callable[[], Drive]) ->
 
 
 def spin(drive: Drive, seed: int, periods: int) -> list[tuple[float, float, float, float]]:
-    """The same made-up samples for the same seed."""
+    """Step with random samples, which are the same for the same seed."""
     rng = random.Random(seed)
     drive.set("enable", 1.0)
     drive.set("torque_requested_Nm", 10.0 * seed)
@@ -224,7 +224,7 @@ def spin(drive: Drive, seed: int, periods: int) -> list[tuple[float, float, floa
     return outs
 
 
-def test_two_drives_in_one_process_do_not_see_each_other(make: Callable[[], Drive]) -> None:
+def test_two_drives_in_one_process_do_not_affect_each_other(make: Callable[[], Drive]) -> None:
     alone = {seed: spin(make(), seed, 400) for seed in (1, 2)}
     first, second = make(), make()
     ran = {1: random.Random(1), 2: random.Random(2)}
@@ -240,7 +240,7 @@ def test_two_drives_in_one_process_do_not_see_each_other(make: Callable[[], Driv
     assert alone[1] != alone[2]
 
 
-def test_a_calibration_of_one_drive_is_not_the_other_ones(make: Callable[[], Drive]) -> None:
+def test_a_calibration_of_one_drive_does_not_change_another(make: Callable[[], Drive]) -> None:
     first, second = make(), make()
     before = second.get("flux_bandwidth_rad_s")
     assert first.set("flux_bandwidth_rad_s", 2.0 * before) == OK
@@ -248,7 +248,7 @@ def test_a_calibration_of_one_drive_is_not_the_other_ones(make: Callable[[], Dri
     assert second.get("flux_bandwidth_rad_s") == before
 
 
-def test_a_hundred_drives_can_come_and_go(library: ctypes.CDLL) -> None:
+def test_a_hundred_drives_can_be_created_and_destroyed_repeatedly(library: ctypes.CDLL) -> None:
     for _ in range(3):
         drives = [Drive(library) for _ in range(100)]
         assert {drive.step(IDLE)[3] for drive in drives} == {0.0}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The example of docs/howto/software-in-the-loop.md, as a reader would run it."""
+"""The example of docs/howto/software-in-the-loop.md, run as a reader would run it."""
 
 import os
 import re
@@ -31,8 +31,8 @@ def test_the_example_runs_and_the_torque_loop_repairs_the_torque(example: str) -
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     alone, closed = (float(x) for x in re.findall(r"([\d.]+) N·m", result.stdout))
-    # Weaker magnets cost torque in proportion to the magnet's share of it: 15 % of 86 % of 40 N·m
-    # (MTPA of this machine at 40 N·m: i_d = -18 A, i_q = 74 A; 1.5 p psi_f i_q = 37.4 N·m).
+    # The magnet is 15 % weak and makes 37.4 of the 40 N·m: maximum torque per ampere is at i_d = -18 A, i_q = 74 A for
+    # this machine, and 1.5 p psi_f i_q = 37.4 N·m.
     assert alone == pytest.approx(40.0 - 0.15 * 37.4, abs=0.5)
-    # The bound of our own plant: 0.5 %.
+    # 0.5 %, the bound that also holds with the plant of this project.
     assert closed == pytest.approx(40.0, abs=0.2)

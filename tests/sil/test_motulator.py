@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The firmware drives motulator's PMSM: equations, transforms and solver that we did not write."""
+"""The firmware drives motulator's PMSM: equations, transforms and solver of another project."""
 
 import ctypes
 import math
@@ -28,19 +28,19 @@ class Firmware:
             assert self.drive.set(name, value) == OK
 
     def __call__(self, mdl: Any) -> tuple[float, list[float]]:
-        """Sample, step, hand back the duties; motulator's own delay makes them act one period later."""
+        """Sample and step; motulator itself delays the returned duties by one period."""
         currents = mdl.machine.meas_currents()
         angle = float(mdl.mechanics.meas_position())
         out = self.drive.step((*map(float, currents), float(mdl.converter.meas_dc_voltage()), angle, 20.0))
         return PERIOD_S, list(out[:3])
 
     def post_process(self) -> None:
-        """Nothing to tidy up."""
+        """Do nothing: motulator requires this method."""
 
 
 def shaft(speed_rpm: float, torque_Nm: float) -> tuple[float, float]:
     """Mean torque of motulator's machine without and with the torque loop."""
-    # The paper's machine, magnets 15 % weaker, resistance 25 % higher than the firmware has it.
+    # The paper's machine with magnets 15 % weaker and a resistance 25 % higher than in the motor data.
     parameters = SynchronousMachinePars(n_p=4, R_s=0.025, L_d=0.2e-3, L_q=0.5e-3, psi_f=MAGNET * 0.084)
     final = speed_rpm * math.tau / 60.0
     drive = model.Drive(
@@ -63,17 +63,19 @@ def shaft(speed_rpm: float, torque_Nm: float) -> tuple[float, float]:
 
 
 def mean(drive: Any, end: float) -> float:
-    """Over the last 0.15 s before `end`; the solver's steps are not equally long."""
+    """Mean torque of the last 0.15 s before `end`; the steps of the solver differ in length."""
     now, torque = np.asarray(drive.machine.data.t), np.asarray(drive.machine.data.tau_M)
     some = (now > end - 0.15) & (now <= end)
     return float(np.trapezoid(torque[some], now[some]) / (now[some][-1] - now[some][0]))
 
 
 @pytest.mark.parametrize(("speed_rpm", "torque_Nm"), [(1500.0, 40.0), (3000.0, 80.0), (-1500.0, 40.0), (1000.0, -80.0)])
-def test_torque_of_a_foreign_machine_with_weak_magnets_comes_back(speed_rpm: float, torque_Nm: float) -> None:
+def test_the_torque_loop_restores_the_torque_of_motulators_machine_with_weak_magnets(
+    speed_rpm: float, torque_Nm: float
+) -> None:
     alone, closed = shaft(speed_rpm, torque_Nm)
     error = 100.0 * (alone / torque_Nm - 1.0)
     # 15 % less flux costs between 15 % (all magnet torque) and, with the machine's reluctance, 10 %.
     assert -15.5 < error < -10.0
-    # The bound of our own plant: 0.5 % or 0.15 N·m, whichever is larger.
+    # The bound that also holds with the plant of this project: 0.5 % or 0.15 N·m, whichever is larger.
     assert abs(100.0 * (closed / torque_Nm - 1.0)) <= allowed_percent(torque_Nm)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign's bounds on machine models of other projects: motulator's with saturation, gym-electric-motor's.
+"""The bounds of the campaign on machine models of other projects: motulator with saturation, and gym-electric-motor.
 
-FLUXTRUE_PLANTS=20 draws twenty plants of each instead of three."""
+FLUXTRUE_PLANTS=20 draws twenty plants for each model instead of three."""
 
 import importlib.util
 import math
@@ -29,7 +29,7 @@ SIMPSON = np.array([1, 4, 2, 4, 1]) / 12.0
 FULL_SCALE_A = 400.0
 
 Point = tuple[float, float, float]
-# time, speed, torque: two seconds of identification.
+# Time in s, speed in rpm, torque in N·m: two seconds of driving for the identification.
 IDENTIFY: list[Point] = [(0.0, 0, 0), (0.1, 800, 60), (0.4, 800, -90), (0.7, 2000, 100), (1.1, 3200, 50),
                       (1.5, 3200, -80), (1.9, 1500, 30)]  # fmt: skip
 IDENTIFIED_S = 2.2
@@ -44,7 +44,8 @@ Wave = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Spread:
-    """What differs from the firmware's data: the campaign's ranges, uniform. The models know no dead time, no iron."""
+    """Deviations from the motor data, uniform in the ranges of the campaign. The models have no dead time and no iron
+    loss."""
 
     magnet: float
     lq: float
@@ -70,18 +71,19 @@ def draw(rng: np.random.Generator, k: int) -> Spread:
 
 
 def windows(rng: np.random.Generator) -> list[Point]:
-    """Stratified in speed, up the even and down the odd strata; the sign of the torque alternates."""
+    """One window in each stratum of speed: first the even strata upwards, then the odd ones downwards. The sign of the
+    torque alternates."""
     points = []
     for (low, high), (lowest, highest), count in ((LOW_RPM, LOW_NM, LOW_WINDOWS), (HIGH_RPM, HIGH_NM, HIGH_WINDOWS)):
         edges = np.geomspace(low, high, count + 1)
         points += [(float(rng.uniform(a, b)), float(np.exp(rng.uniform(np.log(lowest), np.log(highest)))))
                    for a, b in pairwise(edges)]  # fmt: skip
-    tour = points[::2] + points[1::2][::-1]
-    return [(IDENTIFIED_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(tour)]
+    order = points[::2] + points[1::2][::-1]
+    return [(IDENTIFIED_S + k * WINDOW_S, speed, torque * (1 - 2 * (k % 2))) for k, (speed, torque) in enumerate(order)]
 
 
 class Firmware:
-    """The library behind sensors that are a little wrong: duties for the next period."""
+    """The library with small errors of its sensors; it returns the duties for the next period."""
 
     def __init__(self, motor: str, spread: Spread, settings: dict[str, float], points: list[Point]) -> None:
         self.drive = Drive(load_library(prepare(str(MOTORS / motor)).sil))
@@ -92,7 +94,7 @@ class Firmware:
         self.speed, self.torque = profile(1, points), profile(2, points)
 
     def step(self, now: float, currents: Any, angle: float) -> list[float]:
-        """Sample, step; noise is 0.2 % of full scale rms."""
+        """Sample and step; the noise is 0.2 % of full scale rms."""
         s = self.spread
         assert self.drive.set("torque_requested_Nm", float(self.torque(now)) * s.direction) == OK
         seen = np.asarray(currents) * s.gains + s.offsets_A + self.rng.normal(0.0, 0.002 * FULL_SCALE_A, 3)
@@ -100,12 +102,12 @@ class Firmware:
         return list(self.drive.step(sample)[:3])
 
     def omega(self, now: Any) -> Any:
-        """Mechanical, rad/s."""
+        """Mechanical speed in rad/s."""
         return self.speed(now) * self.spread.direction * math.tau / 60.0
 
 
 def profile(column: int, points: list[Point]) -> Wave:
-    """From point to point in MOVE_S, constant in between."""
+    """Ramp from point to point in MOVE_S, constant between the ramps."""
     times: list[float] = []
     values: list[float] = []
     for before, point in zip([points[0], *points], points, strict=False):
@@ -119,7 +121,7 @@ Plant = Callable[[Firmware], tuple[Any, Any]]
 
 def errors(plant: Plant, motor: str, rated_Nm: float, spread: Spread, settings: dict[str, float],
            points: list[Point], count: int) -> list[float]:  # fmt: skip
-    """Percent of the command, but of a tenth of rated torque at least, in the last windows."""
+    """Torque errors in the last windows, in percent of the command or of a tenth of rated torque if that is larger."""
     firmware = Firmware(motor, spread, settings, points)
     now, true = plant(firmware)
     assert firmware.drive.get("fault_word") == 0.0
@@ -133,18 +135,19 @@ def errors(plant: Plant, motor: str, rated_Nm: float, spread: Spread, settings: 
 
 
 def assert_accurate(plant: Plant, motor: str, rated_Nm: float) -> None:
-    """The campaign's bounds over all plants' windows; the tables are asked where only they can tell harm."""
+    """Check the bounds of the campaign over the windows of all plants. The tables without identification are run only
+    for a plant with an error above 2 %: smaller errors are no harm, whatever the tables make."""
     speeds, found, harmless = [], [], 0
     for k in range(PLANTS):
         rng = np.random.default_rng((SEED, k))
-        spread, tour = draw(rng, k), windows(rng)
-        robust = errors(plant, motor, rated_Nm, spread, ROBUST, IDENTIFY + tour, len(tour))
+        spread, points = draw(rng, k), windows(rng)
+        robust = errors(plant, motor, rated_Nm, spread, ROBUST, IDENTIFY + points, len(points))
         tables = robust
         if max(map(abs, robust)) > 2.0:
-            alone: list[Point] = [(0.0, 0, 0), *((t - IDENTIFIED_S + 0.1, n, torque) for t, n, torque in tour)]
-            tables = errors(plant, motor, rated_Nm, spread, TABLES, alone, len(tour))
+            alone: list[Point] = [(0.0, 0, 0), *((t - IDENTIFIED_S + 0.1, n, torque) for t, n, torque in points)]
+            tables = errors(plant, motor, rated_Nm, spread, TABLES, alone, len(points))
         harmless += sum(abs(a) <= max(abs(b) + 0.5, 2.0) for a, b in zip(robust, tables, strict=True))
-        speeds += [n for _, n, _ in tour]
+        speeds += [n for _, n, _ in points]
         found += robust
         print(motor, k, f"magnet {spread.magnet:.2f} lq {spread.lq:.2f}", np.round(robust, 2))
     error, low = np.abs(found), np.array(speeds) <= LOW_RPM[1]
@@ -157,12 +160,12 @@ def assert_accurate(plant: Plant, motor: str, rated_Nm: float) -> None:
 
 
 def iron() -> Any:
-    """tests/motors/make_maps.py: the machine's currents as closed formulas of its fluxes."""
+    """The currents of the machine as closed formulas of its fluxes, from tests/motors/make_maps.py."""
     spec = importlib.util.spec_from_file_location("make_maps", MOTORS / "make_maps.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules["make_maps"] = module  # dataclasses look their module up
+    sys.modules["make_maps"] = module  # dataclasses need their module in sys.modules
     spec.loader.exec_module(module)
     return module.MACHINES["saturated"]
 
@@ -171,7 +174,7 @@ IRON = iron()
 
 
 def saturation(spread: Spread) -> Wave:
-    """What motulator asks for, current over flux, with another magnet and other inductances."""
+    """The current as a function of the flux, as motulator needs it, with changed magnet and inductances."""
 
     def current(psi: Any) -> Any:
         psi_d = IRON.psi_f_Vs + (psi.real - spread.magnet * IRON.psi_f_Vs) / spread.ld
@@ -182,7 +185,7 @@ def saturation(spread: Spread) -> Wave:
 
 
 class Control:
-    """In the place of motulator's control system; motulator itself delays the duties by a period."""
+    """Takes the place of motulator's control system; motulator itself delays the duties by a period."""
 
     def __init__(self, firmware: Firmware) -> None:
         self.firmware = firmware
@@ -192,7 +195,7 @@ class Control:
         return PERIOD_S, self.firmware.step(mdl.t0, currents, angle)
 
     def post_process(self) -> None:
-        """Nothing to tidy up."""
+        """Do nothing: motulator requires this method."""
 
 
 def motulator(firmware: Firmware) -> tuple[Any, Any]:
@@ -205,13 +208,15 @@ def motulator(firmware: Firmware) -> tuple[Any, Any]:
         model.SynchronousMachine(machine, i_s=saturation(spread), psi_s0=psi_f),
         model.ExternalRotorSpeed(w_M=firmware.omega),
     )
-    # The solver's own steps are whole periods: with the middle three quarters of what the chord lacks are in the mean.
+    # The solver would step by whole periods. With half periods the mean by trapezoids contains three quarters of the
+    # torque that whole periods leave out.
     model.Simulation(plant, Control(firmware)).simulate(firmware.end_s, max_step=PERIOD_S / 2)
     return np.asarray(plant.machine.data.t), np.asarray(plant.machine.data.tau_M)
 
 
 def gym(firmware: Firmware) -> tuple[Any, Any]:
-    """Time and torque of gym-electric-motor's PMSM: its differential equation, torque and transforms; RK4 is ours."""
+    """Time and torque of gym-electric-motor's PMSM: its differential equation, torque and transforms, with the
+    Runge-Kutta solver of this function."""
     spread = firmware.spread
     given = {"p": 3, "r_s": 0.018 * spread.resistance, "l_d": 0.37e-3 * spread.ld, "l_q": 1.2e-3 * spread.lq,
              "psi_p": spread.magnet * 0.066}  # fmt: skip
@@ -227,7 +232,7 @@ def gym(firmware: Firmware) -> tuple[Any, Any]:
         def slope(x: Any, u: Any = u_ab, w: float = omega) -> Any:
             return motor.electrical_ode(x, motor.q_inv(u, x[2]), w)
 
-        mean = 0.0  # of the torque over the period: the firmware's samples lie at its ends, where the torque is another
+        mean = 0.0  # torque over the period: it differs from the torque at the ends, where the firmware samples
         for k in range(SUBSTEPS):
             mean += SIMPSON[k] * motor.torque(state)
             a = slope(state)
