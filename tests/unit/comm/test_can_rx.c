@@ -3,7 +3,7 @@
 #include "signal/step_clock.h"
 #include "unity.h"
 
-/* From firmware/comm/fluxtrue.dbc, by hand. */
+/* Copied by hand from firmware/comm/fluxtrue.dbc. */
 #define COMMAND_ID 0x110U
 #define COMMAND_DATA_ID 0x1101U
 #define LIMITS_ID 0x111U
@@ -22,7 +22,7 @@ void tearDown(void)
 {
 }
 
-/* enable, mode torque, request in 0.1 Nm, limits 100.0 and 50.0 Nm */
+/* Enabled, torque mode, request in 0.1 N·m, limits 100.0 and 50.0 N·m. */
 static can_frame_t command(int tenths_Nm)
 {
     const unsigned raw = (unsigned)tenths_Nm & 0xFFFFU;
@@ -46,7 +46,7 @@ static void milliseconds(int count)
     }
 }
 
-void test_a_good_command_is_taken_in_physical_units(void)
+void test_a_valid_command_is_decoded_to_physical_units(void)
 {
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(400));
     TEST_ASSERT_FALSE(rx.command_channel.alive);
@@ -78,7 +78,7 @@ void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
     can_frame_t frame = command(200);
     frame.data[0] ^= 0x01U;
     refused(RX_CRC, &frame);
-    counter = (uint8_t)(counter + 14U) % 15U; /* the bad one did not count */
+    counter = (uint8_t)(counter + 14U) % 15U; /* the receiver did not count the bad frame */
     frame = command(200);
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &frame));
     refused(RX_REPEATED, &frame);
@@ -89,19 +89,19 @@ void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
     frame.length = 7;
     refused(RX_LENGTH, &frame);
     counter = (uint8_t)(counter + 14U) % 15U;
-    frame = command(10001); /* 1000.1 Nm: beyond the DBC's range, with a good CRC */
+    frame = command(10001); /* 1000.1 N·m: beyond the range of the DBC, with a good CRC */
     refused(RX_RANGE, &frame);
     frame = command(100);
     frame.extended = true;
     refused(RX_ID, &frame);
     frame.extended = false;
-    frame.data[0] = e2e_crc(LIMITS_DATA_ID, &frame); /* meant for another message */
+    frame.data[0] = e2e_crc(LIMITS_DATA_ID, &frame); /* the data id of another message */
     refused(RX_ID, &frame);
     frame.id = 0x112;
     refused(RX_IGNORED, &frame);
 }
 
-/* 1000.0 Nm is raw 10000; both ends of each signal. */
+/* 1000.0 N·m are 10000 counts. Both ends of the requested torque, and the upper ends of mode and limit. */
 void test_the_ends_of_the_ranges_are_accepted_and_one_count_beyond_is_not(void)
 {
     (void)send(0);
@@ -115,12 +115,12 @@ void test_the_ends_of_the_ranges_are_accepted_and_one_count_beyond_is_not(void)
     frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
     TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
     frame = command(1);
-    frame.data[5] = 0x28; /* limit 0x28E8 = 1047.2 Nm */
+    frame.data[5] = 0x28; /* limit 0x28E8 = 1047.2 N·m */
     frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
     TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
 }
 
-void test_one_lost_frame_is_forgiven_and_counted_two_are_a_jump(void)
+void test_one_lost_frame_is_tolerated_and_counted_two_are_a_jump(void)
 {
     (void)send(0);
     (void)command(0);
@@ -132,8 +132,8 @@ void test_one_lost_frame_is_forgiven_and_counted_two_are_a_jump(void)
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(20));
 }
 
-/* 30 ms after the last good frame, not a millisecond earlier: no torque, not enabled; the mode stays. */
-void test_a_command_dies_after_30_ms_and_takes_torque_and_enable_along(void)
+/* 30 ms after the last good frame, and not a millisecond earlier, torque and enable are cleared; the mode stays. */
+void test_a_command_times_out_after_30_ms_and_clears_torque_and_enable(void)
 {
     (void)send(0);
     (void)send(500);
@@ -147,11 +147,12 @@ void test_a_command_dies_after_30_ms_and_takes_torque_and_enable_along(void)
     TEST_ASSERT_EQUAL_INT(COMMAND_MODE_TORQUE, rx.command.mode);
     milliseconds(1000);
     TEST_ASSERT_EQUAL_UINT16(1, rx.time_outs);
-    TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(500)); /* then it begins anew */
+    TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(500)); /* the next frame synchronises again */
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(500));
 }
 
-/* 22 of 22.5 periods: 977.8 us a step. 30 steps are 29.33 ms, 31 are 30.31 ms: never early, less than a step late. */
+/* 22 periods at 22.5 kHz are a step of 977.8 us: 30 steps are 29.33 ms, 31 are 30.31 ms. The time-out is never early
+ * and less than a step late. */
 void test_a_time_out_ends_in_the_first_step_in_which_its_time_has_passed(void)
 {
     static const uint32_t step_ns[] = {888889U, 977778U, 1000000U, 1111111U, 1125000U};
@@ -172,7 +173,7 @@ void test_a_time_out_ends_in_the_first_step_in_which_its_time_has_passed(void)
 }
 
 /* Bad frames do not keep a command alive. */
-void test_frames_with_a_wrong_crc_do_not_stop_the_clock(void)
+void test_frames_with_a_wrong_crc_do_not_delay_the_time_out(void)
 {
     (void)send(0);
     (void)send(500);
@@ -217,8 +218,8 @@ static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
     return can_rx_frame(&rx, &frame);
 }
 
-/* 45.00 kW is raw 4500, 600.01 kW raw 60001; time-out 300 ms. */
-void test_battery_limits_are_a_channel_of_their_own_and_become_zero_when_lost(void)
+/* 45.00 kW are 4500 counts, 600.01 kW are 60001; the time-out is 300 ms. */
+void test_battery_limits_have_their_own_channel_and_become_zero_when_lost(void)
 {
     uint8_t count = 0;
     TEST_ASSERT_FALSE(rx.limits_channel.seen);

@@ -9,7 +9,7 @@
 
 #define RUN_MS 10000
 
-/* Identifier and cycle time, by hand from the DBC. */
+/* Identifier and cycle time, copied by hand from the DBC. */
 static const struct {
     uint32_t id;
     int cycle_ms;
@@ -66,7 +66,8 @@ void test_every_message_comes_exactly_in_its_cycle_time(void)
     }
 }
 
-/* Each frame within a step of its millisecond, all of them in the long run, for steps of 4.5, 5.5 and 22.5 kHz. */
+/* Steps of PWM frequencies such as 4.5, 5.5 and 22.5 kHz: each frame is sent less than a step from its due time, and in
+ * 10 s none is missing. */
 void test_with_another_step_every_message_keeps_its_cycle_time_in_the_mean_and_each_frame_within_a_step(void)
 {
     static const uint32_t step_ns[] = {888889U, 977778U, 1090909U, 1111111U};
@@ -111,7 +112,8 @@ void test_no_millisecond_has_more_than_one_frame(void)
     }
 }
 
-/* A receiver of ours would accept each of them: each has a counter of its own, which advances by one. */
+/* The receiver of this project accepts every frame after the first: each message has its own counter, which advances by
+ * one. */
 void test_status_and_limits_are_protected(void)
 {
     e2e_state_t status = {0}, limits = {0};
@@ -127,7 +129,7 @@ void test_status_and_limits_are_protected(void)
     TEST_ASSERT_EQUAL_INT(99, good_limits);
 }
 
-void test_a_frame_with_a_value_that_is_no_number_is_left_out_and_the_others_go(void)
+void test_a_frame_with_nan_or_infinity_is_left_out_and_the_others_are_sent(void)
 {
     telemetry.v_dc_V = NAN;
     telemetry.iq_ref_A = INFINITY;

@@ -28,8 +28,8 @@ static e2e_status_t check(uint8_t counter)
     return e2e_check(DATA_ID, &state, &frame);
 }
 
-/* Data id 0x0123, eight bytes of zero: the remainders of 0x2301 x^64 and 0x2301 x^64 + x^56 (counter 1 in byte 1)
- * modulo x^8 + x^4 + x^3 + x^2 + 1, worked out by long division outside this project. */
+/* Data id 0x0123 and eight zero bytes: the remainders of 0x2301 x^64 and 0x2301 x^64 + x^56 (counter 1 in byte 1)
+ * modulo x^8 + x^4 + x^3 + x^2 + 1, computed by long division outside this project. */
 void test_the_crc_of_a_known_frame_is_that_of_the_specification(void)
 {
     can_frame_t frame = {.length = 8};
@@ -51,13 +51,13 @@ void test_the_counter_runs_from_0_to_14_and_leaves_the_other_nibble_alone(void)
     }
 }
 
-void test_the_first_frame_only_tells_where_the_sender_counts(void)
+void test_the_first_frame_only_synchronises_the_counter(void)
 {
     TEST_ASSERT_EQUAL_INT(E2E_FIRST, check(7));
     TEST_ASSERT_EQUAL_INT(E2E_OK, check(8));
 }
 
-/* From every counter to every other: 1 ahead is right, 2 is one lost, 0 a repetition, the rest a jump. */
+/* From every counter to every other: 1 ahead is right, 2 ahead is one lost frame, 0 a repetition, the rest a jump. */
 void test_every_step_of_the_counter_is_checked_by_how_far_it_is_ahead(void)
 {
     for (uint8_t from = 0; from < 15; from++) {
@@ -70,13 +70,13 @@ void test_every_step_of_the_counter_is_checked_by_how_far_it_is_ahead(void)
                                         : (ahead == 2) ? E2E_SKIPPED
                                                        : E2E_JUMP;
             TEST_ASSERT_EQUAL_INT(wanted, check(to));
-            /* and the next one follows the new place */
+            /* The next frame is compared with the new counter. */
             TEST_ASSERT_EQUAL_INT(E2E_OK, check((uint8_t)((to + 1) % 15)));
         }
     }
 }
 
-void test_counter_15_is_never_right_and_moves_nothing(void)
+void test_counter_15_is_refused_and_does_not_advance_the_counter(void)
 {
     can_frame_t frame = frame_with(3);
     TEST_ASSERT_EQUAL_INT(E2E_FIRST, e2e_check(DATA_ID, &state, &frame));
@@ -86,7 +86,7 @@ void test_counter_15_is_never_right_and_moves_nothing(void)
     TEST_ASSERT_EQUAL_INT(E2E_OK, check(4));
 }
 
-void test_a_wrong_crc_moves_nothing(void)
+void test_a_wrong_crc_does_not_advance_the_counter(void)
 {
     (void)check(3);
     for (unsigned bit = 0; bit < 64; bit++) {

@@ -34,7 +34,7 @@ void test_before_connect_the_slave_is_silent(void)
     TEST_ASSERT_EQUAL_UINT32(2, slave.counts.ignored);
 }
 
-void test_connect_tells_resources_and_packet_sizes(void)
+void test_connect_reports_resources_and_packet_sizes(void)
 {
     SEND(0xFF, 0);
     EXPECT(0xFF, 0x05, 0x80, 8, 8, 0, 1, 1);
@@ -53,7 +53,7 @@ void test_after_disconnect_the_slave_is_silent_again_and_locked(void)
     EXPECT(0xFF, 0x00, 0x01);
 }
 
-void test_an_unknown_command_and_a_short_one_are_told_apart(void)
+void test_an_unknown_command_and_a_short_one_have_different_errors(void)
 {
     master_connect();
     SEND(0x01);
@@ -111,7 +111,7 @@ void test_a_write_needs_the_key(void)
     TEST_ASSERT_EQUAL_UINT32(1, slave.generation);
 }
 
-void test_a_wrong_key_ends_the_session_and_the_third_closes_the_door(void)
+void test_a_wrong_key_ends_the_session_and_after_the_third_no_seed_is_given(void)
 {
     for (int round = 0; round < 3; round++) {
         master_connect();
@@ -128,7 +128,7 @@ void test_a_wrong_key_ends_the_session_and_the_third_closes_the_door(void)
     TEST_ASSERT_EQUAL_UINT32(1, slave.counts.locked_out);
 }
 
-void test_a_seed_is_good_for_one_key_and_no_key_comes_without_a_seed(void)
+void test_a_key_needs_a_seed_and_each_seed_is_different(void)
 {
     master_connect();
     SEND(0xF7, 4, 0, 0, 0, 0);
@@ -156,7 +156,7 @@ void test_the_limits_themselves_are_allowed_and_what_lies_outside_is_refused(voi
     }
 }
 
-void test_a_value_acts_only_when_its_last_byte_has_arrived(void)
+void test_a_value_acts_only_when_all_its_bytes_have_been_written(void)
 {
     const float value = 7.25F;
     uint8_t byte[4];
@@ -186,7 +186,8 @@ void test_a_command_that_completes_a_good_and_a_bad_value_stores_neither(void)
     TEST_ASSERT_EQUAL_UINT32(0, slave.generation);
 }
 
-/* A step of the format is 0.25: less would become zero, which means something else. Zero itself is meant. */
+/* A step of the format is 0.25. A smaller value would be stored as zero, which has another meaning. It is refused; zero
+ * itself is accepted. */
 void test_a_value_that_its_format_would_make_zero_is_refused(void)
 {
     const float zero = 0.0F, less = 0.249F, least = 0.25F;
@@ -213,7 +214,7 @@ void test_the_master_may_write_the_whole_page_in_pieces_of_any_size(void)
     TEST_ASSERT_EQUAL_MEMORY(page, working, sizeof page);
 }
 
-void test_no_write_goes_beside_the_page(void)
+void test_no_write_outside_the_page_is_accepted(void)
 {
     const uint32_t value = 0;
     ready();
@@ -239,7 +240,7 @@ void test_the_reference_page_can_be_read_and_not_written(void)
     const float three = 3.0F;
     ready();
     write_float(0, 8.0F);
-    SEND(0xEB, 0x02, 0, 0); /* the master reads the reference page */
+    SEND(0xEB, 0x02, 0, 0); /* select the reference page for the master */
     EXPECT(0xFF);
     SEND(0xF4, 4, 0, 0, AT(working));
     EXPECT(0xFF, 0x00, 0x00, 0x80, 0x3F); /* 1.0 */
@@ -248,7 +249,7 @@ void test_the_reference_page_can_be_read_and_not_written(void)
     TEST_ASSERT_EQUAL_FLOAT(8.0F, working[0]);
 }
 
-void test_the_drive_changes_pages_at_once_and_needs_the_key_for_it(void)
+void test_the_page_of_the_drive_changes_at_once_and_only_with_the_key(void)
 {
     ready();
     write_float(0, 8.0F);
@@ -261,7 +262,7 @@ void test_the_drive_changes_pages_at_once_and_needs_the_key_for_it(void)
     EXPECT(0xFF, 0, 0, 0);
     SEND(0xEA, 2, 0);
     EXPECT(0xFF, 0, 0, 1);
-    master_connect(); /* locks */
+    master_connect(); /* locks the slave again */
     SEND(0xEB, 0x01, 0, 1);
     EXPECT_ERROR(0x25);
 }
@@ -287,7 +288,7 @@ void test_pages_and_segments_that_do_not_exist_are_refused(void)
     EXPECT_ERROR(0x28);
 }
 
-void test_copying_the_reference_page_brings_the_built_in_values_back(void)
+void test_copying_the_reference_page_restores_the_built_in_values(void)
 {
     ready();
     write_float(0, 8.0F);
@@ -304,7 +305,7 @@ void test_the_checksum_is_that_of_the_bytes(void)
     memcpy(measured, "123456789", 9);
     SEND(0xF6, 0, 0, 0, AT(measured));
     SEND(0xF3, 0, 0, 0, 9, 0, 0, 0);
-    EXPECT(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB); /* the published check value */
+    EXPECT(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB); /* the published check value of CRC-32 */
     SEND(0xF6, 0, 0, 0, AT(measured));
     SEND(0xF3, 0, 0, 0, 0, 0, 1, 0);
     EXPECT_ERROR(0x22);

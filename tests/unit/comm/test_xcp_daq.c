@@ -30,7 +30,7 @@ static bool next(void)
     return true;
 }
 
-/* One list of one frame: two bytes of measured[1], one of measured[9]. */
+/* One list of one frame: two bytes from measured[1], one from measured[9]. */
 static void one_list(uint8_t event_number, uint8_t prescaler, uint8_t mode)
 {
     SEND(0xD6);
@@ -71,7 +71,7 @@ void test_a_running_list_sends_its_bytes_each_millisecond(void)
     }
 }
 
-void test_the_slow_raster_comes_every_tenth_millisecond_and_the_prescaler_thins_it(void)
+void test_the_slow_event_occurs_every_tenth_millisecond_and_the_prescaler_divides_it(void)
 {
     const struct {
         uint8_t event, prescaler;
@@ -127,7 +127,7 @@ void test_a_list_that_does_not_fit_is_dropped_whole_and_announced(void)
     TEST_ASSERT_EQUAL_HEX8(0, dto.data[0]);
 }
 
-void test_allocation_has_its_order_and_its_limits(void)
+void test_allocation_has_a_fixed_order_and_limits(void)
 {
     SEND(0xD4, 0, 0, 0, 1);
     EXPECT_ERROR(0x29);
@@ -165,7 +165,7 @@ void test_more_entries_than_the_pool_has_are_refused(void)
     TEST_ASSERT_EQUAL_INT(XCP_DAQ_ENTRIES / 7 * 7, granted);
 }
 
-void test_a_list_with_a_hole_or_an_overfull_frame_does_not_start(void)
+void test_a_list_with_an_empty_entry_or_a_frame_that_is_too_long_does_not_start(void)
 {
     SEND(0xD6);
     SEND(0xD5, 0, 1, 0);
@@ -201,7 +201,7 @@ void test_an_entry_reads_only_what_may_be_read(void)
     SEND(0xD4, 0, 0, 0, 1);
     SEND(0xD3, 0, 0, 0, 0, 1);
     SEND(0xE1, 0xFF, 1, 0, AT(measured));
-    EXPECT_ERROR(0x29); /* no pointer yet */
+    EXPECT_ERROR(0x29); /* no entry has been selected */
     SEND(0xE2, 0, 0, 0, 0, 0);
     SEND(0xE1, 0xFF, 1, 0, AT(&slave));
     EXPECT_ERROR(0x24);
@@ -212,7 +212,7 @@ void test_an_entry_reads_only_what_may_be_read(void)
     SEND(0xE1, 0xFF, 1, 0, AT(measured));
     EXPECT(0xFF);
     SEND(0xE1, 0xFF, 1, 0, AT(measured));
-    EXPECT_ERROR(0x29); /* behind the last entry */
+    EXPECT_ERROR(0x29); /* after the last entry */
 }
 
 void test_a_running_list_cannot_be_changed(void)
@@ -225,7 +225,7 @@ void test_a_running_list_cannot_be_changed(void)
     EXPECT_ERROR(0x11);
 }
 
-/* A frame that is full, and a pointer from before the start: what WRITE_DAQ added would lie behind the frame. */
+/* The entry was selected before the start: WRITE_DAQ would make the frame longer than eight bytes. */
 void test_an_entry_cannot_be_written_into_a_list_that_was_started_meanwhile(void)
 {
     one_list(0, 1, 0);
@@ -238,7 +238,7 @@ void test_an_entry_cannot_be_written_into_a_list_that_was_started_meanwhile(void
     TEST_ASSERT_EQUAL_UINT8(4, dto.length);
 }
 
-/* Two lists are selected; the second is made too long afterwards, by an entry or by the time stamp. */
+/* Two lists are selected; afterwards an entry or the time stamp makes the second one too long. */
 void test_lists_that_changed_after_they_were_selected_start_together_or_not_at_all(void)
 {
     for (unsigned by_entry = 0; by_entry < 2; by_entry++) {
@@ -294,7 +294,7 @@ void test_numbers_that_do_not_exist_are_refused(void)
     EXPECT_ERROR(0x22);
 }
 
-void test_a_cleared_list_is_stopped_and_must_be_written_anew(void)
+void test_a_cleared_list_is_stopped_and_must_be_written_again(void)
 {
     one_list(0, 1, 0x10);
     start();
@@ -323,8 +323,8 @@ void test_the_slave_describes_its_lists_clock_and_events(void)
     EXPECT(0xFF, 0x04, XCP_DAQ_LISTS, 0, 1, 6, 0);
 }
 
-/* 22 periods at 22.5 kHz: 0.978 ms, told as 98 times 10 us. */
-void test_a_step_that_is_not_a_millisecond_is_told_as_it_is_also_after_the_lists_were_cleared(void)
+/* 22 periods at 22.5 kHz are 0.978 ms, reported as 98 times 10 us. */
+void test_a_step_that_is_not_a_millisecond_is_reported_exactly_also_after_the_lists_were_cleared(void)
 {
     slave.daq.step_10us = 98;
     xcp_daq_reset(&slave.daq);
@@ -335,7 +335,7 @@ void test_a_step_that_is_not_a_millisecond_is_told_as_it_is_also_after_the_lists
 }
 
 /* Steps in which none, one or two milliseconds pass: event 0 samples in each step, event 1 once in ten milliseconds. */
-void test_the_tenth_millisecond_is_sampled_once_whatever_the_steps_are(void)
+void test_the_tenth_millisecond_is_sampled_once_for_any_length_of_the_steps(void)
 {
     for (uint32_t passed = 0; passed <= 2; passed++) {
         master_reset();

@@ -50,7 +50,7 @@ void master_expect(const uint8_t *data, unsigned length, int line)
 {
     UNITY_TEST_ASSERT(answered, (unsigned)line, "no answer");
     UNITY_TEST_ASSERT(last_answer.length >= length, (unsigned)line, "the answer is too short");
-    UNITY_TEST_ASSERT_EQUAL_HEX8_ARRAY(data, last_answer.data, length, (unsigned)line, "another answer");
+    UNITY_TEST_ASSERT_EQUAL_HEX8_ARRAY(data, last_answer.data, length, (unsigned)line, "a different answer");
 }
 
 void master_connect(void)

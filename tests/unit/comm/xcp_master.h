@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef UNIT_COMM_XCP_MASTER_H
 #define UNIT_COMM_XCP_MASTER_H
-/** A master for the tests: sends bytes, expects bytes.
+/** An XCP master for the tests: sends commands and compares the answers.
  * Context  unit tests of the XCP slave */
 #include "comm/xcp.h"
 
 #define SEND(...) master_send((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
 #define EXPECT(...) master_expect((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}), __LINE__)
 #define EXPECT_ERROR(code) EXPECT(0xFE, (code))
-/* An address as four bytes. */
+/* An address as four bytes, the lowest first. */
 #define AT(pointer) BYTE_OF(pointer, 0), BYTE_OF(pointer, 8), BYTE_OF(pointer, 16), BYTE_OF(pointer, 24)
 #define BYTE_OF(pointer, shift) (uint8_t)(xcp_address(pointer) >> (shift))
 
@@ -23,7 +23,7 @@ extern bool answered;
 
 void master_reset(void);
 void master_send(const uint8_t *data, unsigned length);
-/* The answer begins with these bytes. */
+/* Checks that the answer begins with these bytes. */
 void master_expect(const uint8_t *data, unsigned length, int line);
 void master_connect(void);
 void master_unlock(void);

@@ -18,7 +18,7 @@ static int periods;
 static void note(char event)
 {
     const size_t n = strlen(seam.log);
-    TEST_ASSERT_TRUE_MESSAGE(n < sizeof seam.log - 1U, "more hardware calls than any period makes");
+    TEST_ASSERT_TRUE_MESSAGE(n < sizeof seam.log - 1U, "too many hardware calls in one period");
     seam.log[n] = event;
     seam.log[n + 1U] = '\0';
 }

@@ -11,10 +11,10 @@
 #include "twin/twin_private.h"
 #include "unity.h"
 
-/* The whole drive and its double-precision twin see the same quantised samples of a machine that follows the
- * twin's references with a first-order lag; every duty must agree. Identification is disabled, that is, the integrators
- * of currents and torque and the identification: it has no effect on this machine, so that it would add up a rounding
- * for ever. The closed loop of both with a real machine model is compared elsewhere (tests/loop). */
+/* The whole drive and its double-precision twin get the same quantised samples of a machine that follows the references
+ * of the twin with a first-order lag; every duty must agree. The integrators of current control and torque loop and the
+ * identification are off: they have no effect on this machine and would only accumulate rounding errors. tests/loop
+ * compares the closed loop of both with a real machine model. */
 
 static twin_t *twin;
 static const double two_pi = 6.283185307179586476925;
@@ -30,7 +30,7 @@ void setUp(void)
     drive.parameters.torque_loop.ki = 0;
     twin_set(twin, "identification", 0.0);
     drive.request.identification = false;
-    /* This machine's currents lag and its voltages are not physical: the monitors would report it. */
+    /* The currents of this machine lag and its voltages are not physical: the monitors would report faults. */
     seam.motor.plausibility.e_0 = INT16_MAX;
     seam.motor.plausibility.i_alive = INT16_MAX;
     seam.motor.torque_monitor.v_0 = INT16_MAX;
@@ -50,7 +50,7 @@ typedef struct {
     double theta_m, i_d, i_q;
 } machine_t;
 
-/* Samples of the machine now, to both; answers the largest difference of a duty in LSB of 2^-15. */
+/* One period of both with the present samples of the machine. Returns the largest difference of a duty in 2^-15. */
 static double period(machine_t *m, double rpm)
 {
     double out[4];
@@ -97,9 +97,10 @@ static void drive_at(double rpm, double torque_Nm)
         }
         const double difference = period(&m, rpm);
         worst = fmax(worst, difference);
-        off += difference > 40.0; /* a pulse that snaps to the other side: 655 LSB for one period */
+        off += difference > 40.0; /* a short pulse rounded to the other limit differs by 655 LSB for one period */
     }
-    (void)snprintf(where, sizeof where, "%g rpm, %g N m: worst %.1f LSB, %d periods apart", rpm, torque_Nm, worst, off);
+    (void)snprintf(where, sizeof where, "%g rpm, %g N m: at most %.1f LSB, %d periods differ", rpm, torque_Nm, worst,
+                   off);
     TEST_ASSERT_TRUE_MESSAGE(off <= 3, where);
     const double rated = (double)motor.torque_max_Nm;
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(
@@ -136,8 +137,8 @@ void test_both_disable_switching_in_the_same_period(void)
         (void)period(&m, 1000.0);
     }
     TEST_ASSERT_TRUE(seam.gates);
-    m.i_d = -390.0;           /* at least 338 A in some phase */
-    (void)period(&m, 1000.0); /* compares the enable signal */
+    m.i_d = -390.0;           /* at least 338 A in one of the phases */
+    (void)period(&m, 1000.0); /* compares whether switching is enabled */
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_INT((int)drive.fast.faults, (int)twin_get(twin, "fault_word"));
 }

@@ -41,12 +41,12 @@ void test_the_robust_identification_needs_no_interrupt_of_its_own(void)
     TEST_ASSERT_EQUAL_UINT32(0, mrai_overruns(&drive));
 }
 
-/* By hand: ten samples of the same current, ten of the voltages that acted, each published with its sample. */
+/* The expected sums are those of ten published samples of current and acting voltage. */
 void test_ten_periods_make_a_window_of_sums(void)
 {
     seam_current(100.0, -50.0, -50.0);
     seam_run();
-    seam_periods(10); /* the first two of them do not act yet */
+    seam_periods(10); /* no voltage acts in the first two of them */
     TEST_ASSERT_EQUAL_UINT32(1, drive.windows.generation);
     TEST_ASSERT_FALSE(window_box_at(&drive.windows)->acting);
     dq_q15_t sum_i = {0, 0}, sum_u = {0, 0};
@@ -75,7 +75,7 @@ void test_the_flux_of_the_robust_identification_is_fed_forward_from_the_next_per
 }
 
 /* Switching is disabled before anything else is written. */
-void test_while_off_switching_is_disabled_first_and_the_duties_are_one_half(void)
+void test_while_the_drive_is_off_switching_is_disabled_first_and_the_duties_are_one_half(void)
 {
     seam_period();
     TEST_ASSERT_EQUAL_STRING("ar-w", seam.log);
@@ -101,7 +101,7 @@ void test_an_over_current_disables_switching_in_the_same_period_and_stays_latche
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
 }
 
-static void told(safe_t safe, uint32_t faults)
+static void write_command(safe_t safe, uint32_t faults)
 {
     command_t command = *command_box_read(&drive.commands);
     command.safe = safe;
@@ -110,7 +110,8 @@ static void told(safe_t safe, uint32_t faults)
     command_box_write(&drive.commands, command);
 }
 
-static void shorted(bool is)
+/* Either shorted by the lower switches, or switching disabled. */
+static void expect_shorted(bool is)
 {
     TEST_ASSERT_EQUAL(is, seam.gates);
     TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.a);
@@ -119,18 +120,18 @@ static void shorted(bool is)
 }
 
 /* The duties of the short circuit are written before switching is enabled. */
-void test_a_fault_shorts_the_phases_in_the_same_period_where_the_task_has_said_so(void)
+void test_a_fault_shorts_the_phases_in_the_same_period_if_the_task_has_decided_so(void)
 {
     seam_run();
     seam_periods(3);
-    told(SAFE_SHORT_CIRCUIT, 0);
+    write_command(SAFE_SHORT_CIRCUIT, 0);
     seam_current(310.0, -155.0, -155.0);
     seam_period();
     TEST_ASSERT_EQUAL_STRING("arw+", seam.log);
-    shorted(true);
+    expect_shorted(true);
 }
 
-static void by_the_upper_switches(void)
+static void expect_shorted_by_the_upper_switches(void)
 {
     TEST_ASSERT_TRUE(seam.gates);
     TEST_ASSERT_EQUAL_INT(32768, seam.duty.a);
@@ -138,23 +139,24 @@ static void by_the_upper_switches(void)
     TEST_ASSERT_EQUAL_INT(32768, seam.duty.c);
 }
 
-/* The gate drivers end the short circuit by the lower switches a period after it was on: one of the upper ones is
- * shorted. They end that by the upper ones, too: there is none. A reset tries both again. */
-void test_a_side_whose_short_circuit_the_gate_drivers_end_is_left_to_the_other_one(void)
+/* The gate drivers block the short circuit by the lower switches one period after it was on, because one of the upper
+ * switches is shorted. They block that by the upper switches, too, so that switching is disabled. After a reset both
+ * sides are tried again. */
+void test_a_short_circuit_that_the_gate_drivers_block_is_made_on_the_other_side(void)
 {
     seam_run();
     seam_periods(3);
-    told(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
+    write_command(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
     seam_period();
-    shorted(true);
+    expect_shorted(true);
     TEST_ASSERT_TRUE(drive_is_shorted(&drive));
     seam.gates_blocked = true;
     seam_period();
-    by_the_upper_switches();
-    TEST_ASSERT_FALSE(drive_is_shorted(&drive)); /* not before the bridge shows it */
+    expect_shorted_by_the_upper_switches();
+    TEST_ASSERT_FALSE(drive_is_shorted(&drive)); /* the bridge is still blocked */
     seam.gates_blocked = false;
     seam_period();
-    by_the_upper_switches();
+    expect_shorted_by_the_upper_switches();
     TEST_ASSERT_TRUE(drive_is_shorted(&drive));
     seam.gates_blocked = true;
     seam_period();
@@ -168,62 +170,63 @@ void test_a_side_whose_short_circuit_the_gate_drivers_end_is_left_to_the_other_o
     command.fault_resets++;
     command_box_write(&drive.commands, command);
     seam_period();
-    shorted(true);
+    expect_shorted(true);
 }
 
-/* What has not been on has not failed: the line is still active from the fault before. */
+/* While the fault line is still active from the fault before, no side can be on, and so none has failed. */
 void test_while_the_fault_line_is_active_no_side_fails(void)
 {
     seam_run();
     seam_periods(3);
     seam.gates_blocked = true;
-    told(SAFE_SHORT_CIRCUIT, FAULT_GATE);
+    write_command(SAFE_SHORT_CIRCUIT, FAULT_GATE);
     for (int k = 0; k < 5; k++) {
         seam_period();
-        shorted(true);
+        expect_shorted(true);
         TEST_ASSERT_FALSE(drive_is_shorted(&drive));
     }
     seam.gates_blocked = false;
     seam_period();
-    shorted(true);
+    expect_shorted(true);
     TEST_ASSERT_TRUE(drive_is_shorted(&drive));
 }
 
-void test_a_gate_fault_shorts_the_phases_where_the_task_has_said_so(void)
+void test_a_gate_fault_shorts_the_phases_if_the_task_has_decided_so(void)
 {
     for (int n = 0; n < 2; n++) {
         seam_start();
         seam_run();
         seam_periods(3);
-        told(n == 0 ? SAFE_SHORT_ON_OVER_VOLTAGE : SAFE_SHORT_ON_GATE_FAULT, 0);
+        write_command(n == 0 ? SAFE_SHORT_ON_OVER_VOLTAGE : SAFE_SHORT_ON_GATE_FAULT, 0);
         drive_raise_fault(&drive, FAULT_GATE);
         seam_period();
-        shorted(n == 1);
+        expect_shorted(n == 1);
     }
     seam_start();
     seam_run();
     seam_periods(3);
-    told(SAFE_SHORT_ON_GATE_FAULT, FAULT_TORQUE);
+    write_command(SAFE_SHORT_ON_GATE_FAULT, FAULT_TORQUE);
     seam_period();
-    shorted(false);
+    expect_shorted(false);
 }
 
-/* Switching is disabled, the machine turns slowly and still carries 100 A in the next step of the task, too. */
+/* Switching is disabled, the machine turns slowly, and 100 A still flow in the next steps of the task. */
 void test_a_current_with_switching_disabled_is_a_gate_fault_and_shorts_the_phases(void)
 {
     seam_run();
     seam_periods(15);
     drive_raise_fault(&drive, FAULT_TORQUE);
     seam_periods(10);
-    shorted(false);
+    expect_shorted(false);
     seam_current(100.0, -50.0, -50.0);
     seam_periods(40);
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_GATE, drive.fast.faults);
     TEST_ASSERT_TRUE(drive.task.gate_fault.switch_shorted);
-    shorted(true);
+    expect_shorted(true);
 }
 
-/* Two samples in a row: the good one between them, which alone would be the usual period, must count as well. */
+/* Over-voltage needs two samples in a row. A good sample between two bad ones, which alone takes the fast route of the
+ * period, must reset the count. */
 void test_single_samples_of_over_voltage_with_good_ones_between_are_no_fault(void)
 {
     seam_run();
@@ -246,12 +249,12 @@ void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
     seam_voltage(450.0);
     seam_periods(2);
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
-    shorted(true);
-    seam_periods(30); /* the task keeps it while the voltage is there */
-    shorted(true);
+    expect_shorted(true);
+    seam_periods(30); /* the task keeps the short circuit while the voltage is high */
+    expect_shorted(true);
     seam_voltage(350.0);
     seam_periods(30);
-    shorted(false);
+    expect_shorted(false);
 }
 
 void test_an_over_voltage_never_enables_a_bridge_that_has_not_run(void)
@@ -259,18 +262,18 @@ void test_an_over_voltage_never_enables_a_bridge_that_has_not_run(void)
     seam_voltage(450.0);
     seam_periods(30);
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
-    shorted(false);
+    expect_shorted(false);
 }
 
-void test_what_the_tasks_monitors_find_is_latched_and_stops_the_bridge(void)
+void test_a_fault_of_the_tasks_monitors_is_latched_and_disables_switching(void)
 {
     seam_run();
     seam_periods(3);
-    told(SAFE_FREEWHEEL, FAULT_TORQUE | FAULT_PHASE_LOST);
+    write_command(SAFE_FREEWHEEL, FAULT_TORQUE | FAULT_PHASE_LOST);
     seam_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
     TEST_ASSERT_FALSE(seam.gates);
-    told(SAFE_FREEWHEEL, 0);
+    write_command(SAFE_FREEWHEEL, 0);
     seam_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_PHASE_LOST, drive.fast.faults);
 }
@@ -295,15 +298,15 @@ void test_an_unpowered_dc_link_is_a_fault_only_while_switching(void)
     TEST_ASSERT_FALSE(seam.gates);
 }
 
-void test_an_over_voltage_while_off_is_a_fault_too(void)
+void test_an_over_voltage_while_the_drive_is_off_is_a_fault_too(void)
 {
     seam_voltage(500.0);
     seam_periods(2);
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
 }
 
-/* Meanwhile the prediction is used, so that the currents stay in the rotor's frame. */
-void test_an_angle_that_jumps_is_not_followed_and_a_fault_when_it_stays_away(void)
+/* Until then the predicted angle is used, so that the currents stay in the frame of the rotor. */
+void test_an_angle_that_jumps_is_not_followed_and_is_a_fault_when_it_stays(void)
 {
     seam_periods(5);
     seam.theta_m = 0x40000000u / 3U;
@@ -314,7 +317,7 @@ void test_an_angle_that_jumps_is_not_followed_and_a_fault_when_it_stays_away(voi
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
     seam_period();
     TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, drive.fast.faults);
-    seam_period(); /* from here on the new angle is the one that is followed */
+    seam_period(); /* from this period on the tracker follows the new angle */
     TEST_ASSERT_EQUAL_HEX32(0x3FFFFFFFu, published()->theta_e);
     seam_periods(400);
     TEST_ASSERT_EQUAL_HEX32(0x3FFFFFFFu, published()->theta_e);
@@ -335,7 +338,7 @@ void test_a_glitch_of_the_angle_of_50_samples_is_no_fault_and_the_bridge_runs_on
     TEST_ASSERT_TRUE(drive.fast.is_settled);
 }
 
-/* The voltage of period k acts in period k + 1: what is published is the previous period's. */
+/* The voltage computed in period k acts in period k + 1, so the published one was computed in the previous period. */
 void test_the_published_voltage_is_the_one_that_acts_now(void)
 {
     seam_run();
@@ -347,7 +350,7 @@ void test_the_published_voltage_is_the_one_that_acts_now(void)
     TEST_ASSERT_EQUAL_INT(-567, published()->point.u.q);
 }
 
-/* The duties of period 1 act in 2; the first period whose voltage is known from end to end ends with sample 3. */
+/* The duties of period 1 act in period 2; the first period whose whole voltage is known ends with sample 3. */
 void test_the_identification_gets_voltages_only_after_the_bridge_has_acted_for_a_whole_period(void)
 {
     seam_run();
@@ -374,7 +377,7 @@ void test_the_samples_are_published_in_the_rotors_frame(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.2, 350.0, published()->v_dc * 540.0 / 32768.0);
 }
 
-/* An identification that does not finish: the sample is still published, the third in a row is a fault. */
+/* While an identification does not finish, samples are still published; the third overrun in a row is a fault. */
 void test_three_unfinished_identifications_in_a_row_are_an_overrun(void)
 {
     drive.request.identification_mode = IDENTIFICATION_PAPER;
@@ -395,7 +398,7 @@ void test_three_unfinished_identifications_in_a_row_are_an_overrun(void)
     TEST_ASSERT_EQUAL_INT(3, drive.mrai.mailbox.overruns_in_a_row);
 }
 
-void test_an_identification_that_is_late_now_and_then_is_counted_and_forgiven(void)
+void test_an_identification_that_is_sometimes_late_is_counted_and_is_no_fault(void)
 {
     drive.request.identification_mode = IDENTIFICATION_PAPER;
     seam_run();
@@ -410,7 +413,7 @@ void test_an_identification_that_is_late_now_and_then_is_counted_and_forgiven(vo
     TEST_ASSERT_EQUAL_INT(6, mrai_overruns(&drive));
 }
 
-/* Periods of the fast ISR alone after the last command, until switching is disabled. */
+/* Number of periods without the task, after its last command, until switching is disabled. */
 static int periods_until_disabled(void)
 {
     int count = 0;
@@ -426,7 +429,7 @@ static int periods_until_disabled(void)
     return count;
 }
 
-/* The last command comes in any of the ten periods of a window. */
+/* The last command is written in each of the ten periods of a window in turn. */
 static void check_stopped_task(identification_mode_t mode)
 {
     for (int phase = 0; phase < 10; phase++) {
@@ -467,7 +470,7 @@ void test_a_task_that_is_a_step_late_is_no_fault(void)
     TEST_ASSERT_TRUE(seam.gates);
 }
 
-/* Before the first command, and while nothing is driven, no torque can become old. */
+/* Before the first command, and while the drive is not enabled, there is no torque that could last too long. */
 void test_without_a_command_to_run_a_stopped_task_is_no_fault(void)
 {
     for (int n = 0; n < 100; n++) {
@@ -490,16 +493,17 @@ void test_switching_on_starts_without_the_integrators_of_the_last_run(void)
     seam_run();
     seam_period();
     TEST_ASSERT_TRUE(seam.gates);
-    TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* only what the noise-free zero current asks for */
+    TEST_ASSERT_INT_WITHIN(700, 16384, seam.duty.a); /* the small voltage of the first period at zero current */
 }
 
-/* At a v_dc too small to normalise with: neither identification may take the command for what acts. */
+/* A dc voltage too small to compute duties from: neither identification may take the commanded voltage for the acting
+ * one. */
 void test_a_dc_voltage_below_its_bound_makes_the_acting_voltage_unknown(void)
 {
     seam_run();
     seam_periods(4);
     TEST_ASSERT_TRUE(published()->acting);
-    seam_voltage(100.0); /* 140 V is the bound */
+    seam_voltage(100.0); /* the bound is 140 V */
     seam_period();
     TEST_ASSERT_FALSE(published()->acting);
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
@@ -510,7 +514,7 @@ void test_a_dc_voltage_below_its_bound_makes_the_acting_voltage_unknown(void)
     TEST_ASSERT_TRUE(published()->acting);
 }
 
-void test_a_voltage_at_its_limit_is_told_to_the_task(void)
+void test_a_voltage_at_its_limit_is_reported_to_the_task(void)
 {
     seam_run();
     seam_periods(2);
@@ -520,7 +524,7 @@ void test_a_voltage_at_its_limit_is_told_to_the_task(void)
     TEST_ASSERT_TRUE(published()->voltage_limited);
 }
 
-void test_two_drives_in_one_process_do_not_share_a_thing(void)
+void test_two_drives_in_one_process_share_nothing(void)
 {
     static drive_t other;
     drive_init(&other, &motor);

@@ -10,15 +10,15 @@
 #include "seam.h"
 #include "unity.h"
 
-/* The robust identification between the priorities: window, step, answer, memory. */
+/* The path of the robust identification between the priorities: window, step, result, stored record. */
 
-static double omega; /* of omega_b */
-static int32_t unit; /* of the current: (-3, 5) of them */
-static int weak;     /* counts of magnet flux that are missing */
-static uint32_t now; /* periods */
-static double lost;  /* counts of voltage along the current that nominal compensation leaves over */
+static double omega; /* per unit of omega_b */
+static int32_t unit; /* the current is (-3, 5) times this, in counts */
+static int weak;     /* missing magnet flux in counts */
+static uint32_t now; /* in periods */
+static double lost;  /* voltage in counts along the current that the nominal compensation does not compensate */
 
-/* q15 */
+/* In q15. */
 static int32_t dead_time(const motor_parameters_t *p)
 {
     return p->modulate.dead_time_q16 / 2;
@@ -39,7 +39,7 @@ void tearDown(void)
 {
 }
 
-/* A sample as the fast ISR publishes it: 60 A unless said otherwise, a magnet that is 10 % weak. */
+/* A sample as the fast ISR publishes it: 71 A and a magnet that is 10 % weak, unless a test changes them. */
 static void period(uint32_t k)
 {
     sample_t *s = sample_box_begin(&drive.samples);
@@ -49,7 +49,7 @@ static void period(uint32_t k)
     *s = (sample_t){.point = in, .acting = true, .v_dc = 21238};
     s->point.u.d = (int32_t)(-omega * s->point.flux.psi_q + 0.0133 * i.d);
     s->point.u.q = (int32_t)(omega * (s->point.flux.psi_d - weak) + 0.0133 * i.q);
-    /* What is compensated in addition need not be commanded any more. */
+    /* A voltage that the compensation adds need not be commanded any more. */
     const double left = lost - 4.0 / 3.14159265 * 21238.0 *
                                    (dead_time(&drive.parameters) - dead_time(&motor.parameters)) / 32768.0;
     s->point.u.d += (int32_t)lround(left * -3.0 / 5.831);
@@ -90,10 +90,10 @@ void test_robust_is_the_default_and_ten_periods_make_a_window(void)
     TEST_ASSERT_TRUE(window.acting);
 }
 
-void test_a_weak_magnet_is_identified_and_its_flux_handed_to_the_current_control(void)
+void test_a_weak_magnet_is_identified_and_its_flux_passed_to_the_current_control(void)
 {
     milliseconds(3000);
-    /* 10 % of psi_f, 1434 counts; magnet and inductances share what a single point shows. */
+    /* 10 % of psi_f are 1434 counts. A single point cannot separate magnet and inductances, which share the error. */
     TEST_ASSERT_LESS_THAN_INT(-700, drive.task.psi_d_error);
     fast_isr(&drive);
     TEST_ASSERT_EQUAL_INT(drive.task.psi_d_error, drive.psi_d_error);
@@ -160,18 +160,18 @@ void test_the_window_box_survives_the_wrap_of_its_generation(void)
     }
 }
 
-/* Slow enough to be told from the magnet. */
-static void at_town_speed(void)
+/* At low speed the voltage error of the inverter can be separated from the magnet flux. */
+static void at_low_speed(void)
 {
     omega = 0.04;
     weak = 0;
     lost = 100.0;
 }
 
-/* 100 counts are 1.65 V: pi/4 of them, over 21238 of dc voltage, are 121 LSB of duty. */
-void test_the_compensation_takes_over_what_is_identified_of_the_voltage_error(void)
+/* 100 counts are 1.65 V: pi/4 of that, divided by the dc voltage of 21238 counts, are 121 LSB of duty. */
+void test_the_identified_voltage_error_is_added_to_the_compensation(void)
 {
-    at_town_speed();
+    at_low_speed();
     for (int n = 0; n < 30; n++) {
         unit = (n % 2 == 0) ? 1500 : 300;
         milliseconds(4000);
@@ -188,9 +188,9 @@ void test_the_compensation_takes_over_what_is_identified_of_the_voltage_error(vo
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
 }
 
-void test_who_does_not_want_the_compensation_moved_keeps_it(void)
+void test_without_trim_the_compensation_does_not_change(void)
 {
-    at_town_speed();
+    at_low_speed();
     drive.request.trim = false;
     milliseconds(20000);
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));

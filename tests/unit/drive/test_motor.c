@@ -6,8 +6,8 @@
 #include "twin/twin_stages.h"
 #include "unity.h"
 
-/* The generated constants of a shipped machine: the fixed-point ones against the SI ones, recomputed here from the
- * units that the headers state, and both against what the stages need. */
+/* The generated constants of a shipped machine: the fixed-point ones against those in SI, by the units that the headers
+ * state, and both against the requirements of the stages. */
 
 static double v_b, i_b, w_b, psi_b, z_b, t_b;
 
@@ -35,7 +35,7 @@ static double q31(int32_t x)
     return x / 2147483648.0;
 }
 
-/* bases are floats: 6e-8 */
+/* The bases are floats, with a relative rounding of 6e-8. */
 #define NEAR(expected, is) TEST_ASSERT_DOUBLE_WITHIN(fabs(expected) * 2e-7, (expected), (double)(is))
 
 void test_the_derived_bases_follow_from_voltage_current_and_frequency(void)
@@ -51,7 +51,7 @@ void test_the_derived_bases_follow_from_voltage_current_and_frequency(void)
     NEAR(i_b, motor.current_full_scale_A);
 }
 
-/* Every constant within the rounding of its own format. */
+/* A constant may differ by the rounding of its format. */
 #define HELD(expected, is, lsb) TEST_ASSERT_DOUBLE_WITHIN(0.51 * (lsb) + 1e-6 * fabs(expected), (expected), (is))
 
 void test_measurement_and_angle_are_the_si_values(void)
@@ -61,7 +61,7 @@ void test_measurement_and_angle_are_the_si_values(void)
     const double lsb = 65536.0 / (1 << motor_si.adc_bits); /* of the converter, in 16-bit counts */
     HELD(motor_si.v_dc_full_scale_V / v_b, motor.measure.v_dc.scale / lsb / 16384.0, 1.0 / lsb / 16384.0);
     for (int phase = 0; phase < 3; phase++) {
-        const int sign = (phase == 0) ? 1 : -1; /* half an LSB of alpha, which takes twice phase a */
+        const int sign = (phase == 0) ? 1 : -1; /* b and c are negated; the bias of a is half an LSB of alpha */
         HELD(sign * lsb * 8192.0 / 3.0, motor.measure.phase[phase].scale, 1.0);
         const int32_t at_middle = (int)(32768.0 / lsb) * motor.measure.phase[phase].scale;
         TEST_ASSERT_EQUAL_INT((phase == 0) ? 2048 : 0, at_middle + motor.measure.phase[phase].bias);
@@ -91,12 +91,12 @@ void test_current_control_and_modulation_are_the_si_values(void)
     HELD(0.5 * sqrt(3.0) * i_b / motor_si.knee_A, motor.parameters.modulate.knee_side_q17 / 131072.0, 1.0 / 131072.0);
     HELD(0.5 - motor_si.min_pulse_duty, q31(motor.parameters.modulate.longest_q31), q15(1));
     HELD(0.5 - 0.5 * motor_si.min_pulse_duty, q31(motor.parameters.modulate.nearer_rail_q31), q15(1));
-    TEST_ASSERT_TRUE(motor_si.v_ratio <= 1.05 / sqrt(3.0)); /* all that the hexagon's boundary carries */
-    /* (MO-11), and 31/32 of the voltage circle: inside, neither stage limits. */
+    TEST_ASSERT_TRUE(motor_si.v_ratio <= 1.05 / sqrt(3.0)); /* the largest fundamental within the hexagon */
+    /* (MO-11), and 31/32 of the voltage circle: below this voltage neither current control nor modulation limits. */
     const double clear = sqrt(motor.parameters.current_control.clear_q30 / 1073741824.0) * motor_si.v_ratio;
     const double pulse = motor_si.min_pulse_duty + motor_si.dead_time_duty;
     TEST_ASSERT_TRUE(clear < 31.0 / 32.0 * motor_si.v_ratio && sqrt(3.0) * clear + 2.0 * pulse < 1.0);
-    TEST_ASSERT_TRUE(clear > 0.9 / sqrt(3.0)); /* and that is most of the range */
+    TEST_ASSERT_TRUE(clear > 0.9 / sqrt(3.0)); /* most of the voltage range */
 }
 
 void test_the_identification_is_the_si_values(void)
@@ -146,9 +146,9 @@ void test_torque_loop_references_and_monitors_are_the_si_values(void)
     TEST_ASSERT_TRUE(motor_si.i_max_A < motor_si.i_trip_A);
 }
 
-/* Node values are rounded (1/2 LSB), the look-up rounds (1/2) and twists (a little): 1.2 LSB each.
- * psi: 1.2 of psi_f0 plus 2^l_shift |i| 1.2 of l i plus 1/2. */
-void test_the_flux_tables_say_what_the_unquantised_ones_say(void)
+/* Rounding of the nodes (1/2 LSB), of the look-up (1/2) and of its bilinear term (below 0.2) make 1.2 LSB for each
+ * table. For psi: 1.2 of psi_f0, 1.2 * 2^l_shift |i| of l i, and 1/2. */
+void test_the_flux_tables_agree_with_the_unquantised_ones(void)
 {
     const double l = 32768.0 * w_b / z_b / (1 << motor.flux_table.l_shift);
     double value = 0.0;
@@ -173,7 +173,7 @@ void test_the_flux_tables_say_what_the_unquantised_ones_say(void)
 
 static current_reference_t reference(double torque_Nm, double psi_Vs)
 {
-    /* The speed at which the planned voltage leaves just this flux. */
+    /* The speed at which the planned voltage allows exactly this flux. */
     const double v = motor_si.v_dc_full_scale_V * 0.7;
     const double w = motor_si.ref_v_ratio * v / psi_Vs;
     const current_reference_in_t in = {.torque_corrected = (q15_t)lround(torque_Nm / t_b * 32768.0),
@@ -194,9 +194,10 @@ static twin_dq_t amperes(dq_q15_t i)
     return (twin_dq_t){q15(i.d) * i_b, q15(i.q) * i_b};
 }
 
-/* With all voltage there is: the torque asked for is made (to the table's interpolation, 0.3 % of the largest),
- * inside the circle, and no neighbour at the same torque needs 0.5 % less current: maximum torque per ampere. */
-void test_the_references_make_the_torque_asked_for_with_the_least_current(void)
+/* Where the voltage is no limit, the reference makes the requested torque (to 0.3 % of the largest, the interpolation
+ * of the table) within the current circle, and no other point with this torque needs 0.5 % less current: maximum torque
+ * per ampere. */
+void test_the_references_make_the_requested_torque_with_the_least_current(void)
 {
     for (int n = -20; n <= 20; n++) {
         const double torque = 0.05 * n * motor_si.torque_max_Nm * 0.98;
@@ -209,7 +210,7 @@ void test_the_references_make_the_torque_asked_for_with_the_least_current(void)
             const double d = fmin(i.d + 0.02 * step * motor_si.i_max_A, 0.0);
             double lo = 0.0;
             double hi = 2.0 * motor_si.i_max_A;
-            for (int k = 0; k < 50; k++) { /* i_q for the same torque at another i_d */
+            for (int k = 0; k < 50; k++) { /* bisection: i_q for the same torque at another i_d */
                 const double mid = 0.5 * (lo + hi);
                 if (torque_of((twin_dq_t){d, mid}) < fabs(torque_of(i))) {
                     lo = mid;
@@ -222,7 +223,7 @@ void test_the_references_make_the_torque_asked_for_with_the_least_current(void)
     }
 }
 
-/* The machine's flux at the reference stays inside the available flux: 1 % between the table's nodes. */
+/* Between the nodes of the table the flux at the reference may exceed the available flux by 1 % at most. */
 void test_the_references_respect_the_available_flux(void)
 {
     const double psi_low = motor_si.psi0_Vs * 1.02;

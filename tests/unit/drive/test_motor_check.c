@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Valid motor data with one thing broken at a time: the check that notices has that thing's name. */
+/* Valid motor data with one wrong value at a time: the check that reports it has the name of that value. */
 #include <string.h>
 
 #include "drive/drive.h"
 #include "unity.h"
 
-static int16_t table[4096]; /* a copy of one of the motor's, to be damaged */
+static int16_t table[4096]; /* a copy of a table of the motor with a wrong value */
 
 void setUp(void)
 {
@@ -15,7 +15,7 @@ void tearDown(void)
 {
 }
 
-/* The table's last value is the one that a check with a wrong size would miss. */
+/* A check with a wrong size would miss the last value of the table, so that one is damaged. */
 static const int16_t *damaged(const int16_t *good, size_t n, int16_t last)
 {
     TEST_ASSERT_LESS_OR_EQUAL(sizeof table / sizeof *table, n);
@@ -36,7 +36,7 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     return damaged(good, (size_t)grid->nx * grid->ny, last);
 }
 
-/* Every comparison of every check, from both sides of its bound where it has two. */
+/* Every comparison of every check, beyond both bounds where there are two. */
 #define TABLES(X) \
     X(TASK_STEP, m.bases.periods_per_step = 3) \
     X(TASK_STEP, m.bases.periods_per_step = 41) \
@@ -189,7 +189,7 @@ static named_t *named(motor_check_t value)
             return &checks[n];
         }
     }
-    TEST_FAIL_MESSAGE("a check that the list does not name");
+    TEST_FAIL_MESSAGE("the list does not name this check");
     return checks;
 }
 
@@ -222,7 +222,7 @@ static void break_identification(void)
     IDENTIFY(BREAK)
 }
 
-void test_one_broken_thing_is_reported_by_its_name_and_every_name_can_be_reported(void)
+void test_one_wrong_value_is_reported_by_its_check_and_every_check_can_be_reported(void)
 {
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&motor));
     break_tables();
@@ -230,14 +230,14 @@ void test_one_broken_thing_is_reported_by_its_name_and_every_name_can_be_reporte
     break_control();
     break_identification();
     named(MOTOR_CHECK_OK)->seen = true;
-    named(MOTOR_CHECK_IMAGE_CHECKSUM)->seen = true; /* the port's own */
+    named(MOTOR_CHECK_IMAGE_CHECKSUM)->seen = true; /* reported by the port, as the next one */
     named(MOTOR_CHECK_PWM_TIMER)->seen = true;
     for (size_t n = 0; n < CHECKS; n++) {
         TEST_ASSERT_TRUE_MESSAGE(checks[n].seen, checks[n].name);
     }
 }
 
-void test_the_first_reason_is_kept_and_no_reason_is_no_fault(void)
+void test_the_first_reason_is_kept_and_a_passed_check_is_no_fault(void)
 {
     static drive_t drive;
     drive_init(&drive, &motor);

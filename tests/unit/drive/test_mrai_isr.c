@@ -19,7 +19,7 @@ void tearDown(void)
 {
 }
 
-/* A sample as the fast ISR offers it: 60 A, 0.3 omega_b, the voltage that belongs to it. */
+/* A sample as the fast ISR offers it: 71 A, 0.3 omega_b, and the voltage of a machine with a weak magnet. */
 static void publish(bool acting)
 {
     sample_t *s = sample_box_begin(&drive.samples);
@@ -27,19 +27,19 @@ static void publish(bool acting)
     const operating_point_t in = {.i = i, .flux = flux_table_step(&motor.flux_table, i), .omega = 0x26666666};
     *s = (sample_t){.point = in, .acting = acting};
     s->point.u.d = (q15_t)(-0.3 * s->point.flux.psi_q - 0.0133 * 3000);
-    s->point.u.q = (q15_t)(0.3 * (s->point.flux.psi_d - 1500) + 0.0133 * 5000); /* a weak magnet */
+    s->point.u.q = (q15_t)(0.3 * (s->point.flux.psi_d - 1500) + 0.0133 * 5000);
     sample_box_publish(&drive.samples);
     seam.log[0] = '\0';
     mrai_offer(&drive, s);
 }
 
-static void disable_switching(void)
+static void enable_adaptation(void)
 {
     drive.request.identification = true;
     schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = 60000000});
 }
 
-void test_it_tells_that_it_has_finished(void)
+void test_the_interrupt_reports_that_it_has_finished(void)
 {
     publish(false);
     TEST_ASSERT_NOT_EQUAL(mrai_offered(&drive), mrai_finished(&drive));
@@ -47,9 +47,9 @@ void test_it_tells_that_it_has_finished(void)
     TEST_ASSERT_EQUAL_INT(mrai_offered(&drive), mrai_finished(&drive));
 }
 
-void test_with_the_bridge_off_nothing_is_identified(void)
+void test_while_the_bridge_does_not_act_nothing_is_identified(void)
 {
-    disable_switching();
+    enable_adaptation();
     for (int n = 0; n < 100; n++) {
         publish(false);
         mrai_isr(&drive);
@@ -58,9 +58,9 @@ void test_with_the_bridge_off_nothing_is_identified(void)
     TEST_ASSERT_EQUAL_INT32(0, drive.mrai.isr.law.e_q_q27);
 }
 
-void test_with_the_bridge_on_the_flux_is_identified_and_handed_to_the_fast_isr_rounded(void)
+void test_while_the_bridge_acts_the_flux_is_identified_and_passed_to_the_fast_isr_rounded(void)
 {
-    disable_switching();
+    enable_adaptation();
     publish(false);
     mrai_isr(&drive);
     for (int n = 0; n < 500; n++) {
@@ -71,14 +71,15 @@ void test_with_the_bridge_on_the_flux_is_identified_and_handed_to_the_fast_isr_r
     TEST_ASSERT_EQUAL_INT((drive.mrai.isr.law.psi_delta + 32768) >> 16, drive.psi_d_error);
 }
 
-/* The observer starts from the last sample with the bridge off: switching on is no event to it. */
-void test_the_first_acting_sample_continues_the_last_resting_one(void)
+/* The observer starts from the last sample before switching was enabled, so that enabling is no step for it. */
+void test_the_first_acting_sample_continues_the_last_one_before_it(void)
 {
     publish(false);
     mrai_isr(&drive);
     publish(true);
     mrai_isr(&drive);
-    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_d_q27); /* 1/64 pu: one period of a weak magnet */
+    /* 1/8 pu; one period of the weak magnet makes 0.005. */
+    TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_d_q27);
     TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_q_q27);
 }
 
@@ -93,9 +94,9 @@ void test_the_torque_estimate_runs_with_the_bridge_on_or_off(void)
                            torque_estimate_mean(&drive.mrai.task.torque_mean, &drive.mrai.isr.torque));
 }
 
-void test_a_reset_discards_what_was_identified_without_a_kick(void)
+void test_a_reset_discards_what_was_identified_without_a_step(void)
 {
-    disable_switching();
+    enable_adaptation();
     publish(false);
     mrai_isr(&drive);
     for (int n = 0; n < 500; n++) {
@@ -113,7 +114,7 @@ void test_a_reset_discards_what_was_identified_without_a_kick(void)
     TEST_ASSERT_INT_WITHIN(1 << 24, 0, drive.mrai.isr.law.e_q_q27);
 }
 
-/* Sums that were begun before a gap say nothing about the period that ends after it. */
+/* After a gap the errors of the observer are zero again: its sums from before do not fit the period after it. */
 static void expect_restart(void)
 {
     publish(true);

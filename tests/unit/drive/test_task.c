@@ -12,8 +12,8 @@
 void setUp(void)
 {
     seam_start();
-    seam_periods(3); /* a sample with 350 V is there */
-    /* The samples below are no machine's: the monitors would say so. */
+    seam_periods(3); /* until a sample with 350 V has been published */
+    /* The samples of these tests are not those of a machine: the monitors would report faults. */
     seam.motor.plausibility.e_0 = INT16_MAX;
     seam.motor.plausibility.i_alive = INT16_MAX;
     seam.motor.torque_monitor.v_0 = INT16_MAX;
@@ -33,7 +33,7 @@ static const mrai_schedule_t *schedule(void)
     return &drive.mrai.schedules.slot[drive.mrai.schedules.generation & 1U];
 }
 
-/* What the task asks is done by the fast ISR of the next period. */
+/* The fast ISR of the next period carries out the command of the task. */
 static void task_and_period(void)
 {
     task_1khz(&drive);
@@ -67,7 +67,7 @@ void test_a_fault_is_reset_only_while_enable_is_off(void)
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
     TEST_ASSERT_FALSE(command()->run);
-    drive.request.fault_resets++; /* taken, refused, not kept for later */
+    drive.request.fault_resets++; /* refused, and not kept for later */
     task_and_period();
     drive.request.enable = false;
     task_and_period();
@@ -80,7 +80,7 @@ void test_a_fault_is_reset_only_while_enable_is_off(void)
     TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
 }
 
-void test_a_fault_that_is_still_there_is_latched_again_at_once(void)
+void test_a_fault_that_persists_is_latched_again_at_once(void)
 {
     seam_run();
     seam.counts.i_a = 4095;
@@ -96,7 +96,7 @@ void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
 {
     static motor_t bad;
     bad = motor;
-    bad.monitor.i_trip = 26215; /* 0.8: would trip after the converter's end stop */
+    bad.monitor.i_trip = 26215; /* 0.8 of full scale: the converter could saturate before the trip */
     drive_init(&drive, &bad);
     TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, drive.fast.faults);
     drive.request.fault_resets++;
@@ -125,8 +125,8 @@ void test_the_torque_request_is_limited_and_slewed(void)
     TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
 }
 
-/* A closing limit takes the torque away in the same step, in both directions and at the slowest slew rate. */
-void test_a_closing_limit_acts_at_once_whatever_slew_is_calibrated(void)
+/* A falling limit reduces the torque in the same step, in both directions and at the slowest slew rate. */
+void test_a_falling_limit_acts_at_once_with_any_calibrated_slew(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         drive.parameters.torque_slew = Q15_MAX;
@@ -142,7 +142,7 @@ void test_a_closing_limit_acts_at_once_whatever_slew_is_calibrated(void)
         TEST_ASSERT_EQUAL_INT(sign * 1000, drive.task.torque_commanded);
         drive.request.limits = TORQUE_LIMITS_NONE;
         task_1khz(&drive);
-        TEST_ASSERT_EQUAL_INT(sign * 1000, drive.task.torque_commanded); /* what a limit allows again is slewed */
+        TEST_ASSERT_EQUAL_INT(sign * 1000, drive.task.torque_commanded); /* a rise is slewed */
     }
 }
 
@@ -158,7 +158,7 @@ void test_stopping_resets_the_slew_and_the_correction(void)
     TEST_ASSERT_EQUAL_INT(0, drive.task.reference.i_ref.q);
 }
 
-void test_the_target_handed_down_is_the_flux_of_the_current_reference(void)
+void test_the_target_of_the_command_is_the_flux_of_the_current_reference(void)
 {
     drive.request.torque_arbitrated = 5000;
     seam_run();
@@ -181,7 +181,7 @@ void test_in_current_mode_the_requested_currents_are_the_target(void)
     TEST_ASSERT_EQUAL_INT(at.psi_q, command()->target.psi.q);
 }
 
-/* The torque does not follow the request there: the torque loop must not take that for its own fault. */
+/* The torque does not follow the request in current mode: the torque loop must not integrate the difference. */
 void test_in_current_mode_the_torque_loop_does_not_wind_up(void)
 {
     drive.request.torque_arbitrated = 5000;
@@ -195,7 +195,7 @@ void test_in_current_mode_the_torque_loop_does_not_wind_up(void)
 
 void test_the_torque_loop_can_be_switched_off(void)
 {
-    drive.request.identification_mode = IDENTIFICATION_PAPER; /* trusts itself at once */
+    drive.request.identification_mode = IDENTIFICATION_PAPER; /* its confidence is high at once */
     drive.request.torque_arbitrated = 5000;
     drive.request.torque_loop = false;
     seam_run();
@@ -207,7 +207,7 @@ void test_the_torque_loop_can_be_switched_off(void)
     for (int n = 0; n < 100; n++) {
         task_1khz(&drive);
     }
-    TEST_ASSERT_GREATER_THAN_INT(5000, drive.task.torque_corrected); /* the estimate is 0: more is wanted */
+    TEST_ASSERT_GREATER_THAN_INT(5000, drive.task.torque_corrected); /* the estimate is 0, so the loop adds torque */
 }
 
 static void sample_at(double omega_pu, bool acting, bool limited)
@@ -222,7 +222,7 @@ static void sample_at(double omega_pu, bool acting, bool limited)
     seam.gates = true;
 }
 
-void test_the_gates_of_the_identification_open_only_while_the_bridge_acts_and_it_is_wanted(void)
+void test_the_papers_law_adapts_only_while_the_bridge_acts_and_identification_is_requested(void)
 {
     drive.request.identification_mode = IDENTIFICATION_PAPER;
     seam_run();
@@ -253,9 +253,9 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
 }
 
-/* --- the boxes ------------------------------------------------------------------------------- */
+/* The exchange boxes. */
 
-void test_what_is_being_written_is_not_seen_before_it_is_published(void)
+void test_a_sample_is_not_read_before_it_is_published(void)
 {
     sample_at(0.1, true, false);
     sample_t *next = sample_box_begin(&drive.samples);
