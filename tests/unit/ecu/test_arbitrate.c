@@ -5,7 +5,8 @@
 
 #include "unity.h"
 
-/* Full torque 16000 counts in 40 ms, full slew in 10 ms, from full to none in 15 ms; dead band 28 counts. */
+/* Full torque of 16000 counts in 40 ms, full slew in 10 ms, ramp from full torque to zero in 15 ms; dead band of 28
+ * counts. */
 #define COUNT 65536
 #define SLEW (400 * COUNT)
 #define JERK (40 * COUNT)
@@ -63,17 +64,17 @@ void test_rate_and_its_growth_stay_within_slew_and_jerk_and_nothing_overshoots(v
         const q31_t wanted = (abs(in.torque_requested) <= 28) ? 0 : in.torque_requested * COUNT;
         const int64_t moved = (int64_t)state.torque_arbitrated - before;
         TEST_ASSERT_TRUE(llabs(moved) <= SLEW);
-        /* towards the target, never past it */
+        /* The torque moves towards the target and never past it. */
         TEST_ASSERT_TRUE((moved >= 0) == (wanted >= before) || moved == 0);
         TEST_ASSERT_TRUE(llabs((int64_t)wanted - state.torque_arbitrated) <= llabs((int64_t)wanted - before));
-        /* faster by one jerk at most, unless the direction changed: then it began at zero */
+        /* The rate grows by one jerk at most; after a change of direction it starts at zero. */
         TEST_ASSERT_TRUE(llabs(moved) <= labs(rate_before) + JERK);
         rate_before = (q31_t)moved;
     }
 }
 
-/* The last step ends a braking that jerk allows: the rate before it is at most two jerks. */
-void test_it_arrives_gently(void)
+/* The rate falls with the jerk before the target: the last step is at most two jerks. */
+void test_the_rate_falls_with_the_jerk_before_the_target(void)
 {
     for (int target = 100; target <= 16000; target += 173) {
         setUp();
@@ -87,7 +88,7 @@ void test_it_arrives_gently(void)
     }
 }
 
-void test_a_request_taken_back_stops_the_rise_at_once(void)
+void test_a_request_of_zero_stops_the_rise_at_once(void)
 {
     in.torque_requested = 16000;
     const q15_t before = steps(20);
@@ -95,7 +96,7 @@ void test_a_request_taken_back_stops_the_rise_at_once(void)
     TEST_ASSERT_LESS_THAN_INT(before, step());
 }
 
-/* 28 counts are the dead band: neither sign of a smaller request makes the vehicle creep. */
+/* The dead band is 28 counts: a request within it, of either sign, must not make the vehicle creep. */
 void test_requests_within_the_dead_band_are_exactly_zero(void)
 {
     for (int request = -28; request <= 28; request++) {
@@ -122,7 +123,7 @@ void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
             {
                 {16000, 1 << 28, 9000},      {-16000, 1 << 28, -3000}, {16000, -(1 << 28), 3000},
                 {-16000, -(1 << 28), -9000}, {16000, 0, 9000},         {-16000, 0, -9000},
-                {-16000, 900000, -9000}, /* rolling slower than standstill: to start backwards is driving */
+                {-16000, 900000, -9000}, /* below the speed of standstill a torque against the rotation is driving */
     };
     for (unsigned n = 0; n < sizeof quadrants / sizeof quadrants[0]; n++) {
         state = (arbitrate_state_t){0};
@@ -132,7 +133,7 @@ void test_four_quadrants_drive_and_brake_with_their_own_limits(void)
     }
 }
 
-void test_a_limit_that_falls_takes_the_torque_down_with_slew(void)
+void test_a_limit_that_falls_reduces_the_torque_with_slew(void)
 {
     in.torque_requested = 16000;
     (void)steps(100);
@@ -142,8 +143,8 @@ void test_a_limit_that_falls_takes_the_torque_down_with_slew(void)
     TEST_ASSERT_EQUAL_INT(1000, steps(100));
 }
 
-/* Full torque, wherever it came from, is gone after 15 steps: no jerk limit may delay it. */
-void test_drop_ends_full_torque_within_15_steps(void)
+/* The ramp takes full torque of either sign to zero in 15 steps, without a jerk limit. */
+void test_the_ramp_out_ends_full_torque_within_15_steps(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
         setUp();
@@ -155,7 +156,7 @@ void test_drop_ends_full_torque_within_15_steps(void)
     }
 }
 
-void test_stop_ends_torque_with_slew_and_off_at_once(void)
+void test_a_stop_ends_the_torque_with_slew_and_off_at_once(void)
 {
     in.torque_requested = 16000;
     (void)steps(100);
@@ -167,11 +168,11 @@ void test_stop_ends_torque_with_slew_and_off_at_once(void)
     in.run = false;
     TEST_ASSERT_EQUAL_INT(0, step());
     in.run = true;
-    TEST_ASSERT_LESS_OR_EQUAL_INT(40, step()); /* and begins anew */
+    TEST_ASSERT_LESS_OR_EQUAL_INT(40, step()); /* it starts again from zero */
 }
 
 /* The most negative count has no positive counterpart. */
-void test_the_ends_of_the_format_do_no_harm(void)
+void test_the_ends_of_the_format_do_not_overflow(void)
 {
     in = (arbitrate_in_t){
         .torque_requested = Q15_MIN, .limit_drive = Q15_MAX, .limit_regen = Q15_MAX, .omega = Q31_MIN, .run = true};
@@ -180,33 +181,35 @@ void test_the_ends_of_the_format_do_no_harm(void)
     TEST_ASSERT_EQUAL_INT(Q15_MAX, steps(1000));
 }
 
-/* The drive allows 5000 of 16000; opened after a while, it rises from there: 40 more each millisecond. */
-void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_it_opens(void)
+/* The drive limits the torque to 5000 of 16000 counts. When the limit ends, the torque rises from there with a rate
+ * that grows by 40 per step. */
+void test_torque_that_a_limit_held_back_rises_with_slew_and_jerk_when_the_limit_ends(void)
 {
     in.torque_requested = 16000;
-    q15_t asked = 0;
+    q15_t arbitrated = 0;
     for (int n = 0; n < 200; n++) {
-        arbitrate_hold(&config, &state, (q15_t)(asked < 5000 ? asked : 5000));
-        asked = step();
-        TEST_ASSERT_LESS_OR_EQUAL_INT(5000 + 400, asked); /* at most the last step before it was held */
+        arbitrate_hold(&config, &state, (q15_t)(arbitrated < 5000 ? arbitrated : 5000));
+        arbitrated = step();
+        TEST_ASSERT_LESS_OR_EQUAL_INT(5000 + 400, arbitrated); /* at most one step of full slew beyond the limit */
     }
-    TEST_ASSERT_EQUAL_INT(5080, asked); /* beyond the limit, which so is seen to limit */
+    TEST_ASSERT_EQUAL_INT(5080, arbitrated); /* stays beyond the limit, so that the drive reports the limit */
     q15_t before = 5000;
     q15_t rate = 0;
-    while (asked < 16000) {
-        TEST_ASSERT_LESS_OR_EQUAL_INT(rate + 81, asked - before);
-        rate = (q15_t)(asked - before);
+    while (arbitrated < 16000) {
+        TEST_ASSERT_LESS_OR_EQUAL_INT(rate + 81, arbitrated - before);
+        rate = (q15_t)(arbitrated - before);
         TEST_ASSERT_LESS_OR_EQUAL_INT(400, rate);
-        before = asked;
-        arbitrate_hold(&config, &state, asked);
-        asked = step();
+        before = arbitrated;
+        arbitrate_hold(&config, &state, arbitrated);
+        arbitrated = step();
     }
-    TEST_ASSERT_EQUAL_INT(16000, asked);
+    TEST_ASSERT_EQUAL_INT(16000, arbitrated);
 }
 
-/* From 16000 held at a limit that falls by 100 each step, to a request of -16000: with the rate kept the torque is at
- * zero after slew and jerk, 16000/400 + 5 steps; if each step began with the jerk again, 180 a step would take 89. */
-void test_a_falling_limit_does_not_delay_the_answer_to_a_request_in_the_other_direction(void)
+/* From 16000, with a limit that falls by 100 per step, to a request of -16000. Because the rate is kept, the torque is
+ * zero after slew and jerk, 16000/400 + 5 steps. If each step started again with the jerk, it would be 180 per step and
+ * take 89 steps. */
+void test_a_falling_limit_does_not_delay_a_request_in_the_other_direction(void)
 {
     in.torque_requested = 16000;
     (void)steps(200);

@@ -47,7 +47,7 @@ static bool board_gate_fault(int calls)
     return gate_fault;
 }
 
-/* `waiting` times the same frame. */
+/* Delivers the same frame `waiting` times. */
 static bool can_receive(can_frame_t *frame, int calls)
 {
     (void)calls;
@@ -110,7 +110,7 @@ void tearDown(void)
 {
 }
 
-/* So many periods, then the task. */
+/* This number of periods, then the task. */
 static void task_after(int periods)
 {
     for (int n = 0; n < periods; n++) {
@@ -129,7 +129,7 @@ static void tasks(int count)
     }
 }
 
-/* A tenth and a fifth of T_b; a command that is lost takes both away. */
+/* A tenth and a fifth of T_b; without a valid command both are zero. */
 void test_the_vehicles_limits_reach_the_drive_in_the_same_step(void)
 {
     ecu.rx.command.limit_drive_Nm = 29.4664F;
@@ -144,9 +144,10 @@ void test_the_vehicles_limits_reach_the_drive_in_the_same_step(void)
     TEST_ASSERT_EQUAL_INT(0, ecu.drive.request.limits.torque_regen);
 }
 
-/* 132 N·m are 14679 counts, 962002944 in q31: in 40 ms, their rate in 10 ms, from full torque to none in 15 ms. The
- * ramp is rounded up, so that it has ended in time. 0.25 N·m of 294.664 N·m are 27.8 counts. */
-void test_the_torque_moves_at_the_rates_of_the_page_of_the_bus(void)
+/* 132 N·m are 14679 counts, 962002944 in q31. The slew makes this in 40 ms, the jerk makes the full rate in 10 ms, the
+ * ramp takes full torque to zero in 15 ms; it is rounded up, so that it ends in time. 0.25 N·m of 294.664 N·m are 27.8
+ * counts. */
+void test_the_torque_changes_at_the_rates_of_the_bus_documentation(void)
 {
     TEST_ASSERT_EQUAL_INT32(24050073, ecu.arbitration_config.slew);
     TEST_ASSERT_EQUAL_INT32(2405007, ecu.arbitration_config.jerk);
@@ -154,7 +155,8 @@ void test_the_torque_moves_at_the_rates_of_the_page_of_the_bus(void)
     TEST_ASSERT_EQUAL_INT(28, ecu.arbitration_config.dead_band);
 }
 
-/* 8 periods at 9 kHz are 888.889 us: so much of a millisecond's change belongs to a step; 2^-24 of single precision. */
+/* 8 periods at 9 kHz are a step of 888.889 us, in which 0.889 of the change per millisecond is allowed. The tolerance
+ * is 2^-24, the rounding of single precision. */
 void test_the_rates_hold_in_true_time_for_a_step_that_is_not_a_millisecond(void)
 {
     static motor_t other;
@@ -176,7 +178,7 @@ void test_the_watchdog_is_started_once_and_then_served_by_every_task(void)
     TEST_ASSERT_EQUAL_UINT16(0, ecu.liveness.held);
 }
 
-void test_the_watchdog_is_not_served_while_the_fast_interrupt_stands_still(void)
+void test_the_watchdog_is_not_served_while_the_fast_interrupt_is_stalled(void)
 {
     tasks(10);
     const int before = watchdog_services;
@@ -189,7 +191,7 @@ void test_the_watchdog_is_not_served_while_the_fast_interrupt_stands_still(void)
     TEST_ASSERT_TRUE((ecu.supervisor.faults & ECU_FAULT_STALL) != 0U);
 }
 
-void test_the_watchdog_is_not_served_while_the_identification_stands_still(void)
+void test_the_watchdog_is_not_served_while_the_identification_is_stalled(void)
 {
     tasks(10);
     const int before = watchdog_services;
@@ -243,7 +245,7 @@ void test_a_gate_driver_fault_reaches_the_fault_word(void)
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, ecu.supervisor.faults);
 }
 
-/* In 100 ms: five messages of 10 ms and seven of 100 ms; the one of 1 s is due in the first 100 ms. */
+/* In 100 ms: five messages every 10 ms, seven every 100 ms; the message of 1 s is due in the first 100 ms. */
 void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
 {
     tasks(100);
@@ -258,8 +260,8 @@ void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
     TEST_ASSERT_LESS_OR_EQUAL_INT(before + 1, sent);
 }
 
-/* R is told by INV_Identification alone, every 10 ms. */
-void test_a_frame_with_a_value_that_is_no_number_is_counted_and_not_sent(void)
+/* Only INV_Identification, every 10 ms, contains the resistance. */
+void test_a_frame_with_nan_is_counted_and_not_sent(void)
 {
     static motor_t broken;
     broken = motor;
@@ -295,7 +297,7 @@ void test_an_answer_that_finds_no_mailbox_waits_for_one(void)
     TEST_ASSERT_EQUAL_INT(1, answers);
 }
 
-/* 29 bits with the same number are another sender's. */
+/* The same number as an extended identifier of 29 bits belongs to another sender. */
 void test_an_extended_identifier_is_no_command_of_the_calibration_tool(void)
 {
     arriving = (can_frame_t){.id = XCP_ID_COMMAND, .extended = true, .length = 2, .data = {0xFF, 0}};
@@ -305,7 +307,7 @@ void test_an_extended_identifier_is_no_command_of_the_calibration_tool(void)
     TEST_ASSERT_EQUAL_UINT16(1, ecu.rx.count[RX_IGNORED]);
 }
 
-/* 32 frames are more than a bus of 1 Mbit/s can bring in a millisecond: the task's time stays bounded. */
+/* 32 frames are more than a bus of 1 Mbit/s can transmit in a millisecond. The limit bounds the time of the task. */
 void test_a_task_takes_a_bounded_number_of_frames(void)
 {
     waiting = 100;
@@ -323,7 +325,7 @@ void test_without_a_bus_nothing_is_switched_on(void)
     TEST_ASSERT_FALSE(ecu.drive.request.enable);
 }
 
-void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
+void test_calibrating_one_value_keeps_the_measured_compensation(void)
 {
     const compensation_t measured = {motor.parameters.modulate.dead_time_q16 / 2 + 100,
                                      motor.parameters.modulate.knee_q17, 1};
@@ -340,8 +342,8 @@ void test_calibrating_one_value_leaves_what_the_drive_has_measured(void)
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive, CALIBRATION_dead_time_compensation));
 }
 
-/* The least value of each calibration is not zero for the drive, and half of it, which is refused, is. */
-void test_the_least_value_of_a_calibration_is_one_step_of_its_format(void)
+/* The drive stores the smallest accepted value of each calibration as a value above zero. */
+void test_the_smallest_value_of_a_calibration_is_one_step_of_its_format(void)
 {
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
         const calibration_id_t id = (calibration_id_t)k;
@@ -359,8 +361,9 @@ void test_the_least_value_of_a_calibration_is_one_step_of_its_format(void)
     TEST_ASSERT_EQUAL_INT(Q15_MAX, ecu.drive.parameters.torque_slew);
 }
 
-/* 32 ms of current before the fault, the newest last; a second fault and what the machine does then change nothing. */
-void test_the_first_fault_freezes_what_was_before_it(void)
+/* The frame contains the 32 ms of current before the fault, the newest last. A second fault and later currents do not
+ * change it. */
+void test_the_first_fault_freezes_the_values_before_it(void)
 {
     freeze_frame_t frame = {0};
     measurements_t now = {.psi_f_Vs = 0.07F, .r_ohm = 0.02F};
@@ -384,7 +387,7 @@ void test_the_first_fault_freezes_what_was_before_it(void)
     }
     TEST_ASSERT_EQUAL_INT(-50, frame.speed_rpm[frame.oldest]);
     TEST_ASSERT_EQUAL_INT(32767, frame.speed_rpm[(frame.oldest + 30U) % FREEZE_FRAME_SAMPLES]);
-    /* After the reset it records again, and the next fault is kept. */
+    /* After the reset it records again, and the next fault is frozen. */
     now.fault_word = 0;
     freeze_frame_step(&frame, &now, 0, STATE_STANDBY, 1);
     TEST_ASSERT_EQUAL_INT(0, frame.frozen);
@@ -395,8 +398,8 @@ void test_the_first_fault_freezes_what_was_before_it(void)
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);
 }
 
-/* 0.37 of the full scale in the q axis without any request: 19 steps for the mean and the confirmation, one more until
- * the drive takes it over. */
+/* 0.37 of full scale in the q axis without any request: 19 steps for the mean and the confirmation, and one step until
+ * the drive has latched the fault. */
 void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
     sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation & 1U];

@@ -24,7 +24,7 @@ void tearDown(void)
 {
 }
 
-/* One period with this sample, then what the state machine is told. */
+/* Publishes the sample of a period and returns the inputs of the state machine. */
 static const supervisor_in_t *observe(void)
 {
     *sample_box_begin(&ecu.drive.samples) = sample;
@@ -39,14 +39,14 @@ static const supervisor_in_t *observe_v(double v_dc_V)
     return observe();
 }
 
-static uint32_t told_reason(void)
+static uint32_t reported_derating_reason(void)
 {
     telemetry_t telemetry = {0};
     ecu_telemetry(&ecu, &telemetry);
     return telemetry.derating_reason;
 }
 
-/* 140 V and 437.5 V are 8495 and 26548 counts. */
+/* The limits of 140 V and 437.5 V are 8495 and 26548 counts. */
 void test_the_dc_voltage_is_in_range_between_the_monitors_limits_and_at_them(void)
 {
     static const struct {
@@ -65,7 +65,7 @@ void test_the_dc_voltage_is_safe_to_touch_below_60_V(void)
     TEST_ASSERT_FALSE(observe_v(60.1)->dc_safe);
 }
 
-/* The band is 1 % of V_b, 5.4 V or 328 counts to either side of where the voltage was first seen. */
+/* The band is 1 % of V_b, 5.4 V or 328 counts, on both sides of the voltage at its start. */
 static void settles_in_50_ms_at(double v_dc_V)
 {
     ecu.supervisor.state = STATE_PRECHARGE;
@@ -87,7 +87,7 @@ void test_the_dc_voltage_has_settled_after_50_ms_within_one_percent_of_the_base(
     settles_in_50_ms_at((reference + 0.5) / COUNT_PER_V);
 }
 
-/* 270 V that a turning machine has rectified for long are not the battery's 350 V. */
+/* A turning machine can rectify 270 V for a long time before the precharge to the 350 V of the battery. */
 void test_a_voltage_that_was_there_before_the_precharge_has_not_settled(void)
 {
     ecu.supervisor.state = STATE_STANDBY;
@@ -110,7 +110,7 @@ void test_a_voltage_that_moves_must_settle_again_however_long_it_has_stayed(void
     settles_in_50_ms_at(340.0);
 }
 
-/* 2 % of 400 A: 655 counts. */
+/* The limit is 2 % of 400 A, 655 counts. */
 void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_direction(void)
 {
     static const dq_q15_t allowed[] = {{655, 0}, {-655, 0}, {0, 655}, {0, -655}, {655, -655}};
@@ -151,7 +151,7 @@ static bool slow_at(double line_emf_V)
     return observe()->slow;
 }
 
-/* Of the known speed; the measured one does not count. */
+/* The line voltage follows from the known speed; the measured speed has no effect. */
 void test_the_machine_is_slow_while_its_line_voltage_stays_below_60_V(void)
 {
     sample.point.omega = INT32_MAX;
@@ -160,7 +160,7 @@ void test_the_machine_is_slow_while_its_line_voltage_stays_below_60_V(void)
     TEST_ASSERT_FALSE(slow_at(60.1));
 }
 
-void test_a_gate_fault_may_need_contactor_and_supply_for_longer(void)
+void test_the_machine_is_not_slow_while_a_gate_fault_needs_contactor_and_supply(void)
 {
     ecu.drive.task.gate_fault.holds_supply = true;
     TEST_ASSERT_FALSE(slow_at(0.0));
@@ -168,7 +168,7 @@ void test_a_gate_fault_may_need_contactor_and_supply_for_longer(void)
     TEST_ASSERT_TRUE(slow_at(0.0));
 }
 
-/* A drive of 12 V never reaches 60 V: below 0.8 of the lowest dc voltage at which it runs, 20 V here. */
+/* A drive for a low voltage never reaches 60 V. Its limit is 0.8 of the lowest dc voltage at which it runs: 20 V. */
 void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_link(void)
 {
     static motor_t low;
@@ -181,25 +181,25 @@ void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_li
 
 void test_the_command_of_the_bus_is_passed_on(void)
 {
-    const supervisor_in_t *told = observe();
-    TEST_ASSERT_FALSE(told->alive || told->failed || told->torque_mode || told->current_mode || told->enable ||
-                      told->reset || told->gate_fault);
+    const supervisor_in_t *out = observe();
+    TEST_ASSERT_FALSE(out->alive || out->failed || out->torque_mode || out->current_mode || out->enable || out->reset ||
+                      out->gate_fault);
     ecu.rx.command_channel = (rx_channel_t){.alive = true, .failed = true};
     ecu.rx.command = (bus_command_t){.enable = true, .mode = COMMAND_MODE_TORQUE};
     ecu.drive.fast.faults = 0x2005U;
-    told = observe();
-    TEST_ASSERT_TRUE(told->alive && told->failed && told->torque_mode && told->enable);
-    TEST_ASSERT_FALSE(told->current_mode || told->reset);
-    TEST_ASSERT_EQUAL_HEX32(0x2005U, told->drive_faults);
-    TEST_ASSERT_EQUAL_UINT32(US, told->elapsed_us);
+    out = observe();
+    TEST_ASSERT_TRUE(out->alive && out->failed && out->torque_mode && out->enable);
+    TEST_ASSERT_FALSE(out->current_mode || out->reset);
+    TEST_ASSERT_EQUAL_HEX32(0x2005U, out->drive_faults);
+    TEST_ASSERT_EQUAL_UINT32(US, out->elapsed_us);
     ecu.rx.command = (bus_command_t){.fault_reset = true, .mode = COMMAND_MODE_CURRENT_LOCKED};
-    told = observe();
-    TEST_ASSERT_TRUE(told->current_mode && told->reset);
-    TEST_ASSERT_FALSE(told->torque_mode || told->enable);
+    out = observe();
+    TEST_ASSERT_TRUE(out->current_mode && out->reset);
+    TEST_ASSERT_FALSE(out->torque_mode || out->enable);
     TEST_ASSERT_TRUE(ecu_observe(&ecu, true).gate_fault);
 }
 
-/* The dead band is 0.25 N·m, rounded to 28 counts of 0.009 N·m: 0.256 N·m are 28 counts, 0.257 N·m are 29. */
+/* The dead band of 0.25 N·m is rounded to 28 counts of 0.009 N·m: 0.256 N·m are 28 counts, 0.257 N·m are 29. */
 void test_a_requested_torque_within_the_dead_band_is_zero(void)
 {
     static const struct {
@@ -247,7 +247,7 @@ void test_torque_limits_are_never_larger_than_the_machines_torque_nor_negative(v
     TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
 }
 
-void test_the_torque_runs_stops_and_ramps_out_as_state_enable_command_and_faults_say(void)
+void test_state_enable_command_and_faults_decide_whether_torque_runs_stops_or_ramps_out(void)
 {
     ecu.rx.command_channel.alive = true;
     ecu.supervisor = (supervisor_t){.state = STATE_RUN, .enabled = true};
@@ -285,7 +285,7 @@ void test_the_batterys_power_limits_act_while_they_arrive(void)
     TEST_ASSERT_EQUAL_INT(Q15_MAX, ecu_limits(&ecu).power_drive);
 }
 
-void test_lost_battery_limits_keep_the_last_ones_take_the_torque_away_and_are_the_reason_told(void)
+void test_lost_battery_limits_keep_the_last_ones_end_the_torque_and_are_the_reported_reason(void)
 {
     const torque_limits_t last = {.torque_drive = 1, .torque_regen = 2, .power_drive = 3276, .power_regen = 4};
     ecu.drive.request.limits = last;
@@ -293,18 +293,18 @@ void test_lost_battery_limits_keep_the_last_ones_take_the_torque_away_and_are_th
     ecu.rx.command.limit_drive_Nm = ecu.rx.command.limit_regen_Nm = 100.0F;
     ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
     TEST_ASSERT_GREATER_THAN_INT(0, ecu_arbitration(&ecu).limit_drive);
-    TEST_ASSERT_EQUAL_UINT32(1, told_reason());
+    TEST_ASSERT_EQUAL_UINT32(1, reported_derating_reason());
     ecu.rx.limits_channel.alive = false;
     const torque_limits_t limits = ecu_limits(&ecu);
     TEST_ASSERT_EQUAL_MEMORY(&last, &limits, sizeof last);
     TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_drive);
     TEST_ASSERT_EQUAL_INT(0, ecu_arbitration(&ecu).limit_regen);
-    TEST_ASSERT_EQUAL_UINT32(7, told_reason());
+    TEST_ASSERT_EQUAL_UINT32(7, reported_derating_reason());
     TEST_ASSERT_TRUE(observe()->derated);
 }
 
-/* Numbers of DeratingReason in the DBC. */
-void test_the_first_reason_for_less_torque_is_told_by_the_number_of_the_dbc(void)
+/* The numbers are those of DeratingReason in the DBC. */
+void test_the_first_derating_reason_is_reported_by_its_number_in_the_dbc(void)
 {
     static const struct {
         uint32_t derating, reason;
@@ -322,18 +322,18 @@ void test_the_first_reason_for_less_torque_is_told_by_the_number_of_the_dbc(void
     };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         ecu.drive.task.derating = (uint16_t)cases[n].derating;
-        TEST_ASSERT_EQUAL_UINT32(cases[n].reason, told_reason());
+        TEST_ASSERT_EQUAL_UINT32(cases[n].reason, reported_derating_reason());
         TEST_ASSERT_EQUAL(cases[n].reason != 0U, observe()->derated);
     }
 }
 
 /* The vehicle allows 60 N·m of driving and 40 N·m of braking torque; the machine has 132 N·m. */
-void test_what_a_request_is_beyond_is_told_in_all_four_quadrants(void)
+void test_the_limit_that_a_request_exceeds_is_reported_in_all_four_quadrants(void)
 {
     static const struct {
         float torque_Nm;
         q31_t omega;
-        request_limit_t told;
+        request_limit_t reported;
     } cases[] = {
         {60.0F, 1 << 28, REQUEST_LIMIT_NONE},           {60.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
         {-40.0F, 1 << 28, REQUEST_LIMIT_NONE},          {-40.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
@@ -350,11 +350,11 @@ void test_what_a_request_is_beyond_is_told_in_all_four_quadrants(void)
         (void)observe();
         telemetry_t telemetry = {0};
         ecu_telemetry(&ecu, &telemetry);
-        TEST_ASSERT_EQUAL_UINT32(cases[n].told, telemetry.request_limit);
+        TEST_ASSERT_EQUAL_UINT32(cases[n].reported, telemetry.request_limit);
     }
 }
 
-void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_told(void)
+void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_reported(void)
 {
     ecu.rx.command.limit_drive_Nm = 60.0F;
     ecu.rx.command.torque_requested_Nm = 50.0F;
@@ -364,8 +364,9 @@ void test_a_request_within_all_limits_that_the_machine_cannot_reach_is_told(void
     TEST_ASSERT_EQUAL_UINT32(REQUEST_LIMIT_REACH, telemetry.request_limit);
 }
 
-/* The paper's identification may still be at work on the newest point, as long as it has finished one since. */
-void test_an_identification_that_works_is_not_stalled_and_one_that_stands_still_is(void)
+/* The paper's identification is not stalled while it works on the newest point, if it has finished one since the last
+ * check. */
+void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(void)
 {
     ecu.drive.mrai.mailbox.generation = 10;
     ecu.drive.mrai.isr.finished = 9;
@@ -385,7 +386,7 @@ void test_an_identification_that_works_is_not_stalled_and_one_that_stands_still_
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
 }
 
-/* Every counter has a value of its own. */
+/* Every counter has a different value, so that two exchanged ones are found. */
 void test_every_counter_of_the_bus_reaches_its_place_in_the_telemetry(void)
 {
     for (uint16_t n = 0; n < RX_RESULTS; n++) {

@@ -5,7 +5,7 @@
 static supervisor_t s;
 static supervisor_in_t in;
 
-/* Healthy, on the bus, mode off, no voltage, at rest. */
+/* No fault, valid commands, mode off, no dc voltage, standstill. */
 void setUp(void)
 {
     s = (supervisor_t){0};
@@ -37,7 +37,7 @@ static ecu_state_t steps(int count)
     return s.state;
 }
 
-/* In every single step: two states that take turns would look like one to every second step. */
+/* Checks every step: with a check in every second step only, two alternating states would look like one. */
 static void stays(ecu_state_t state, int count)
 {
     for (int n = 0; n < count; n++) {
@@ -126,7 +126,7 @@ void test_start_up_without_a_plausible_measurement_is_a_fault_after_500_ms(void)
     TEST_ASSERT_EQUAL_UINT8(33 + 6, s.first_fault);
 }
 
-/* Steps of 4.5, 22.5 and 5.5 kHz: left in the first step in which more than the time has passed. */
+/* The state is left in the first step in which more than its time has passed. */
 static void leaves_after(ecu_state_t state, uint32_t ms)
 {
     uint32_t us = 0;
@@ -159,7 +159,7 @@ void test_the_times_of_the_states_hold_for_steps_that_are_not_a_millisecond(void
     }
 }
 
-/* 32 bits of microseconds would wrap after 72 minutes; the time stops at one. */
+/* 32 bits of microseconds would wrap after 72 minutes; the count stops at one minute. */
 void test_the_time_in_a_state_does_not_wrap(void)
 {
     to_standby();
@@ -213,7 +213,7 @@ void test_mode_off_ends_precharge_and_ready_in_discharge(void)
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
 }
 
-/* Without the battery a machine that turns fast would charge the capacitor as fast as it is discharged. */
+/* Without the battery a machine that turns fast would charge the capacitor again while it is discharged. */
 void test_the_contactor_stays_closed_until_the_machine_is_slow(void)
 {
     to_ready();
@@ -247,7 +247,7 @@ void test_disable_leaves_run_and_derate_only_when_no_torque_is_left(void)
     }
 }
 
-void test_derating_comes_and_goes(void)
+void test_derating_starts_and_ends(void)
 {
     to_derate();
     TEST_ASSERT_EQUAL_INT(STATE_DERATE, steps(5));
@@ -302,7 +302,7 @@ void test_bad_commands_and_a_late_task_end_the_torque_first_and_then_the_run(voi
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_TASK, s.faults);
 }
 
-void test_the_safe_state_is_left_only_when_the_machine_can_feed_nothing(void)
+void test_the_safe_state_is_left_only_when_the_machine_is_slow(void)
 {
     to_safe();
     TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, steps(1000));
@@ -323,7 +323,7 @@ void test_mode_off_in_fault_discharges_and_comes_back_to_fault(void)
     stays(STATE_FAULT, 100);
 }
 
-void test_a_time_out_ends_run_in_ready_and_needs_enable_off_before_on(void)
+void test_a_time_out_leads_from_run_to_ready_and_enable_must_be_off_before_on(void)
 {
     to_run();
     in.alive = false;
@@ -350,7 +350,7 @@ static void refused(refused_t why)
     TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
     TEST_ASSERT_EQUAL_INT(why, s.refused);
     TEST_ASSERT_EQUAL_UINT8(before + 1, s.refused_count);
-    /* what made it forbidden goes: a held enable is still none */
+    /* The reason of the refusal ends: an enable that is still held must not act. */
     in.torque_requested_is_zero = true;
     in.dc_in_range = true;
     in.sensors_plausible = true;
@@ -425,7 +425,7 @@ void test_a_reset_with_enable_off_clears_faults_that_have_ended(void)
     (void)step();
     reset();
     TEST_ASSERT_EQUAL_UINT32(1, s.resets);
-    in.drive_faults = 0; /* the drive has followed */
+    in.drive_faults = 0; /* the drive has reset its faults */
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
     TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
     TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, step());
@@ -439,7 +439,7 @@ void test_a_reset_does_not_clear_a_fault_that_persists(void)
     (void)step();
     reset();
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, s.faults);
-    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault); /* seen at once; the drive's needs its own reset first */
+    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault); /* latched again at once, before the drive has reset its fault */
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
     setUp();
     to_fault();
@@ -448,7 +448,7 @@ void test_a_reset_does_not_clear_a_fault_that_persists(void)
     reset();
     TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
-    TEST_ASSERT_EQUAL_UINT8(1, s.first_fault); /* the drive's fault never went: it is told again */
+    TEST_ASSERT_EQUAL_UINT8(1, s.first_fault); /* the fault of the drive persists and is reported again */
 }
 
 void test_a_reset_while_enabled_or_outside_fault_is_refused(void)
@@ -474,7 +474,7 @@ void test_a_held_reset_counts_once(void)
     TEST_ASSERT_EQUAL_UINT32(1, s.resets);
 }
 
-void test_the_numbers_of_faults_and_refusals_stop_at_255(void)
+void test_the_counts_of_faults_and_refusals_stop_at_255(void)
 {
     to_standby();
     for (int n = 0; n < 300; n++) {
@@ -493,7 +493,7 @@ void test_the_numbers_of_faults_and_refusals_stop_at_255(void)
     TEST_ASSERT_EQUAL_UINT8(255, s.fault_count);
 }
 
-/* The moves a reader of docs/howto/can.md is told of: one row per state, one bit per state that may follow. */
+/* The transitions that docs/howto/can.md describes: one row per state, one bit per state that may follow. */
 #define TO(state) (1U << STATE_##state)
 static const unsigned allowed[STATES] = {
     [STATE_INIT] = TO(STANDBY) | TO(FAULT),
@@ -531,7 +531,7 @@ static supervisor_in_t inputs_of(unsigned bits)
     };
 }
 
-/* What must hold whatever the inputs were; the conditions are spelled out again, not taken from the table. */
+/* Conditions that hold for any inputs. They are written here independently, not taken from the table of transitions. */
 static void check_transition(const supervisor_t *before, const supervisor_in_t *now)
 {
     const bool ran = before->state == STATE_RUN || before->state == STATE_DERATE;
@@ -559,8 +559,8 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
     }
 }
 
-/* Every state, every combination of inputs, with and without faults that were latched before. */
-void test_no_combination_of_inputs_makes_a_forbidden_move(void)
+/* Every state with every combination of inputs, with and without faults that were latched before. */
+void test_no_combination_of_inputs_makes_a_forbidden_transition(void)
 {
     static const uint16_t latched[] = {0, ECU_FAULT_PROTECTION, ECU_FAULT_GATE | ECU_FAULT_DISCHARGE};
     unsigned seen[STATES] = {0};
@@ -578,13 +578,13 @@ void test_no_combination_of_inputs_makes_a_forbidden_move(void)
             seen[before.state] |= (s.state != before.state) ? 1U << s.state : 0U;
         }
     }
-    /* The long time-outs have their own tests; every other move must have been seen. */
+    /* Every allowed transition must have been seen. The long time-outs have their own tests. */
     for (unsigned state = 0; state < STATES; state++) {
         TEST_ASSERT_EQUAL_HEX(allowed[state], seen[state]);
     }
 }
 
-void test_no_two_outputs_fight(void)
+void test_no_two_outputs_conflict(void)
 {
     for (int state = 0; state < STATES; state++) {
         const state_outputs_t *o = &supervisor_outputs[state];

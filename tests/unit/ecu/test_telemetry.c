@@ -10,7 +10,7 @@
 
 static drive_t drive;
 static sample_t sample;
-static telemetry_t told;
+static telemetry_t telemetry;
 
 void setUp(void)
 {
@@ -28,9 +28,9 @@ static const telemetry_t *read_back(void)
 {
     *sample_box_begin(&drive.samples) = sample;
     sample_box_publish(&drive.samples);
-    told = (telemetry_t){0};
-    telemetry_read(&drive, &told);
-    return &told;
+    telemetry = (telemetry_t){0};
+    telemetry_read(&drive, &telemetry);
+    return &telemetry;
 }
 
 /* One count is 400/32768 A = 0.012 A or 0.016 V. 1.5 (-30 V * -50 A + 100 V * 120 A)/350 V = 57.857 A. */
@@ -45,8 +45,8 @@ void test_the_dc_current_follows_from_the_power_of_the_bridge(void)
     TEST_ASSERT_FLOAT_WITHIN(0.03F, 57.857F, t->i_dc_A);
 }
 
-/* 61 counts are 1.005 V, 60 are 0.989 V: with noise alone on the link the quotient means nothing. */
-void test_below_1_V_of_dc_voltage_no_dc_current_is_told(void)
+/* 61 counts are 1.005 V, 60 are 0.989 V. Below 1 V the quotient of power and voltage would be noise. */
+void test_below_1_V_of_dc_voltage_the_reported_dc_current_is_zero(void)
 {
     sample.point.i.q = Q15_OF(100.0, 400.0);
     sample.point.u.q = Q15_OF(1.0, 540.0);
@@ -58,14 +58,14 @@ void test_below_1_V_of_dc_voltage_no_dc_current_is_told(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0F, read_back()->i_dc_A);
 }
 
-/* 3000 rpm with 3 pole pairs are 942.478 rad/s, electrical. */
+/* 3000 rpm with 3 pole pairs are 942.478 rad/s electrical. */
 void test_the_speed_is_mechanical_and_signed(void)
 {
     sample.point.omega = Q31_OF(-942.478, 3298.6724);
     TEST_ASSERT_FLOAT_WITHIN(0.01F, -3000.0F, read_back()->speed_rpm);
 }
 
-void test_the_current_reference_told_is_the_one_that_acts(void)
+void test_the_reported_current_reference_is_the_one_that_acts(void)
 {
     drive.request.i_ref = (dq_q15_t){Q15_OF(-10.0, 400.0), Q15_OF(20.0, 400.0)};
     drive.task.reference.i_ref = (dq_q15_t){Q15_OF(-30.0, 400.0), Q15_OF(40.0, 400.0)};
@@ -78,7 +78,7 @@ void test_the_current_reference_told_is_the_one_that_acts(void)
     TEST_ASSERT_FLOAT_WITHIN(0.013F, 20.0F, t->iq_ref_A);
 }
 
-void test_the_torques_are_told_in_newton_metres(void)
+void test_the_torques_are_reported_in_newton_metres(void)
 {
     drive.task.identification.torque_estimated = (q15_t)Q15_OF(55.0, 294.664);
     drive.task.torque_commanded = (q15_t)Q15_OF(-60.0, 294.664);
@@ -112,7 +112,7 @@ void test_the_identified_parameters_are_the_motors_plus_what_was_found(void)
     TEST_ASSERT_FALSE(t->r_clamped);
 }
 
-void test_a_temperature_without_a_sensor_is_told_as_invalid(void)
+void test_a_temperature_without_a_sensor_is_reported_as_invalid(void)
 {
     const telemetry_t *t = read_back();
     TEST_ASSERT_TRUE(t->winding_valid && t->inverter_valid);
@@ -131,8 +131,8 @@ void test_a_temperature_without_a_sensor_is_told_as_invalid(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0F, t->inverter_C);
 }
 
-/* FNV-1a of "hsm1", 32 bits, computed apart. */
-void test_faults_overruns_and_the_motors_name_are_told(void)
+/* The motor id is FNV-1a of "hsm1" with 32 bits, computed outside this project. */
+void test_faults_overruns_and_the_motor_id_are_reported(void)
 {
     drive.fast.faults = 0x1004;
     drive.mrai.mailbox.overruns = 9;
