@@ -7,7 +7,7 @@
 #include "types/faults.h"
 #include "unity.h"
 
-/* Ten periods a step; 0.00325 per unit in each: 1.75 V on hsm1. */
+/* Ten periods per step, in each a threshold of 0.00325 per unit: 1.75 V on hsm1. */
 static const frozen_angle_config_t config = {.v_0 = 1060, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
 static frozen_angle_state_t state;
 static frozen_angle_in_t in;
@@ -37,7 +37,7 @@ static void steps(int n)
     }
 }
 
-/* Steps until the fault, 0: none in 200. */
+/* Number of steps until the fault; 0: none in 200 steps. */
 static int found(void)
 {
     for (int n = 1; n <= 200; n++) {
@@ -58,12 +58,12 @@ void test_a_blocked_rotor_is_no_fault_for_minutes_and_may_warm_up(void)
     settle();
     const int32_t start = in.u_sum.d;
     for (int n = 0; n < 180000; n++) {
-        in.u_sum.d = start - n / 90; /* 2000, twice the threshold, in three minutes */
+        in.u_sum.d = start - n / 90; /* a change of 2000, twice the threshold, in three minutes */
         TEST_ASSERT_EQUAL_HEX32(0, step());
     }
 }
 
-/* The 15,000 that reverse the torque are no part of the mean: they would leave 845 after the ten steps. */
+/* The voltage of 15,000 that reverses the torque must not enter the mean: 845 of it would be left after ten steps. */
 void test_the_voltage_that_moves_the_currents_is_no_change_afterwards(void)
 {
     settle();
@@ -76,7 +76,8 @@ void test_the_voltage_that_moves_the_currents_is_no_change_afterwards(void)
     TEST_ASSERT_EQUAL_INT(0, found());
 }
 
-/* By hand: (3/4)^n of a step of twice the threshold is left, below half of it after 3 steps; then 5 in a row. */
+/* After n steps the mean lacks (3/4)^n of a change of twice the threshold: it is beyond the threshold from the third
+ * step on, and 5 steps confirm. */
 void test_a_voltage_that_changes_although_nothing_moves_is_a_turning_rotor(void)
 {
     static const dq_q15_t directions[] = {{2120, 0}, {-2120, 0}, {0, 2120}, {0, -2120}};
@@ -89,7 +90,7 @@ void test_a_voltage_that_changes_although_nothing_moves_is_a_turning_rotor(void)
     }
 }
 
-void test_a_smaller_change_or_a_shorter_one_is_none(void)
+void test_a_smaller_or_shorter_change_is_no_fault(void)
 {
     settle();
     in.u_sum.d += 1050;
@@ -104,7 +105,8 @@ void test_a_smaller_change_or_a_shorter_one_is_none(void)
     TEST_ASSERT_EQUAL_INT(0, found());
 }
 
-/* The whole dead time of a leg either way: eight times as much. */
+/* The voltage of a leg without current may change by its whole dead time in both directions: the threshold is eight
+ * times as large. */
 void test_a_leg_without_current_may_change_its_voltage(void)
 {
     settle();
@@ -118,8 +120,8 @@ void test_a_leg_without_current_may_change_its_voltage(void)
     TEST_ASSERT_GREATER_THAN(0, found());
 }
 
-/* Both currents of two legs may be below 2 i_0 while the length is up to 4 i_0. */
-void test_without_current_nothing_is_claimed(void)
+/* Two phase currents may both be below 2 i_0 while the current vector is up to 4 i_0 long. */
+void test_without_current_nothing_is_checked(void)
 {
     in.i_ref = (dq_q15_t){-3276, 0};
     settle();
@@ -150,8 +152,9 @@ void test_an_angle_or_a_reference_that_moves_starts_again(void)
     TEST_ASSERT_GREATER_THAN(0, found());
 }
 
-/* Rolling on a hill at a few turns a minute: each 1/128 of a turn starts again before the reference is there. */
-void test_a_slow_rotor_is_no_frozen_one(void)
+/* A rotor that rolls at a few revolutions per minute: the angle moves by 1/128 of a turn, and the check starts again,
+ * before the settling ends. */
+void test_a_slow_rotor_is_no_fault(void)
 {
     for (int n = 0; n < 20000; n++) {
         in.theta_e += 1U << 22;
@@ -170,7 +173,7 @@ void test_a_bridge_that_is_off_is_not_checked_and_starts_again(void)
     TEST_ASSERT_EQUAL_INT32(0, state.mean_q8.d);
 }
 
-/* (MN-22), (MN-23) in double precision, from the equations. */
+/* (MN-22) and (MN-23) in double precision, written from the equations. */
 typedef struct {
     double m[2], first[2];
     int standing, changed;
@@ -196,8 +199,8 @@ static bool twin_step(twin_t *t, const double u[2])
     return t->changed >= CONFIRMED;
 }
 
-/* A rotor that turns below the frozen angle at 0.02 to 2 rad per step, with an amplitude around the threshold. Rounding
- * of the mean and of the length: 3 counts; where the twin is that close to its threshold either answer is right. */
+/* A rotor that turns at 0.02 to 2 rad per step while the angle is frozen, with voltages around the threshold. Mean and
+ * length are rounded by up to 3 counts; where the twin is so close to its threshold both results are right. */
 void test_a_rotor_that_turns_below_the_angle_is_found_when_the_twin_finds_it(void)
 {
     int agreed = 0;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What a gate-driver fault needs, and how a shorted switch is found, against hand calculations. */
+/* The safe state after a gate-driver fault, and the detection of a shorted switch, against hand calculations. */
 #include "safety/gate_fault.h"
 
 #include "unity.h"
 
 #define V_DC 21845 /* 350 V of 525 V */
 
-/* i_alive 0.06; 1.5 sqrt(3) psi_b = 0.66 V_b T, about that of hsm1. */
+/* i_alive is 0.06; 1.5 sqrt(3) psi_b is 0.66 V_b T, about that of hsm1. */
 static const gate_fault_config_t config = {.i_alive = 1966, .volt_steps = 21679};
 static gate_fault_state_t state;
 static gate_fault_in_t in;
@@ -45,7 +45,7 @@ void test_above_an_eighth_of_the_dc_voltage_a_gate_fault_needs_the_short_circuit
     TEST_ASSERT_FALSE(at(V_DC / 8));
 }
 
-/* Without back-EMF 0.667 V_b T per step; with 0.5 V_b of it 0.167: 4 steps. */
+/* The dc voltage opposes 0.667 V_b T per step without back-EMF, and 0.167 with a back-EMF of 0.5 V_b: 4 steps. */
 void test_a_current_that_outlasts_the_flux_of_the_windings_is_a_shorted_switch(void)
 {
     in.i = (dq_q15_t){-2000, 0};
@@ -60,14 +60,14 @@ void test_a_current_that_outlasts_the_flux_of_the_windings_is_a_shorted_switch(v
     TEST_ASSERT_TRUE(state.switch_shorted);
 }
 
-void test_what_is_no_shorted_switch(void)
+void test_other_causes_of_a_current_are_no_shorted_switch(void)
 {
     const gate_fault_in_t not_found[] = {
         {.v_dc = V_DC, .currents_valid = true, .i = {1966, 0}},                      /* no current */
         {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .gates = true},       /* the bridge conducts */
         {.v_dc = V_DC, .currents_valid = false, .i = {9000, 0}},                     /* the sensors are wrong */
         {.v_dc = V_DC, .currents_valid = true, .i = {9000, 0}, .rectifies = true},   /* the diodes conduct */
-        {.v_dc = 9000, .line_emf = 9000, .currents_valid = true, .i = {9000, 9000}}, /* nothing opposes it */
+        {.v_dc = 9000, .line_emf = 9000, .currents_valid = true, .i = {9000, 9000}}, /* the dc voltage is too low */
         {.v_dc = -50, .line_emf = 0, .currents_valid = true, .i = {9000, 9000}},
     };
     for (unsigned n = 0; n < sizeof not_found / sizeof not_found[0]; n++) {
@@ -78,9 +78,9 @@ void test_what_is_no_shorted_switch(void)
     }
 }
 
-void test_a_gap_in_the_current_begins_the_sum_again(void)
+void test_a_gap_in_the_current_restarts_the_sum(void)
 {
-    in.line_emf = 10923; /* 0.333 V_b T per step: 2 steps do */
+    in.line_emf = 10923; /* 0.333 V_b T per step: 2 steps suffice */
     for (int k = 0; k < 100; k++) {
         in.i = (dq_q15_t){0, k % 2 == 0 ? 9000 : 0};
         (void)steps(1);
@@ -91,8 +91,8 @@ void test_a_gap_in_the_current_begins_the_sum_again(void)
     TEST_ASSERT_TRUE(state.switch_shorted);
 }
 
-/* Found, it needs the short circuit at any speed for as long as the gate fault is latched, although the current is that
- * of the short circuit now. */
+/* A shorted switch that has been found needs the short circuit at any speed as long as the gate fault is latched, with
+ * and without the current of the short circuit. */
 void test_a_shorted_switch_needs_the_short_circuit_until_the_fault_is_reset(void)
 {
     in.i = (dq_q15_t){9000, 0};
@@ -105,15 +105,16 @@ void test_a_shorted_switch_needs_the_short_circuit_until_the_fault_is_reset(void
     TEST_ASSERT_FALSE(steps(1));
 }
 
-void test_without_a_gate_fault_the_supply_is_free(void)
+void test_without_a_gate_fault_the_supply_is_not_held(void)
 {
     in.line_emf = 20000;
     (void)steps(1);
     TEST_ASSERT_FALSE(state.holds_supply);
 }
 
-/* 50 steps without a current although the machine turns; at rest, 1/64 of the dc voltage, at once. */
-void test_with_a_gate_fault_the_supply_is_held_until_no_switch_can_be_shorted_or_the_machine_rests(void)
+/* While the machine turns, the supply is held until 50 steps have passed without a current. It is released at once when
+ * the back-EMF is at most 1/64 of the dc voltage. */
+void test_with_a_gate_fault_the_supply_is_held_until_no_switch_is_shorted_or_the_machine_is_at_rest(void)
 {
     in.latched = true;
     in.line_emf = V_DC / 64 + 1;
@@ -128,7 +129,7 @@ void test_with_a_gate_fault_the_supply_is_held_until_no_switch_can_be_shorted_or
     (void)steps(1);
     TEST_ASSERT_FALSE(state.holds_supply);
     setUp();
-    in.latched = in.gates = true; /* the short circuit shows nothing */
+    in.latched = in.gates = true; /* during the short circuit a shorted switch cannot be excluded */
     in.line_emf = 1000;
     (void)steps(1000);
     TEST_ASSERT_TRUE(state.holds_supply);
@@ -141,7 +142,7 @@ void test_with_a_gate_fault_the_supply_is_held_until_no_switch_can_be_shorted_or
     TEST_ASSERT_FALSE(state.holds_supply);
 }
 
-void test_a_shorted_switch_holds_the_supply_however_long_it_is_quiet(void)
+void test_a_shorted_switch_holds_the_supply_however_long_no_current_flows(void)
 {
     in.i = (dq_q15_t){9000, 0};
     (void)steps(2);

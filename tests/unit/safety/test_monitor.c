@@ -27,7 +27,7 @@ static uint32_t step(void)
     return monitor_step(&config, &state, &in);
 }
 
-/* The fault appears in the sample `samples` and not before, and goes with the first good one. */
+/* The fault appears with this number of bad samples in a row and not before, and ends with the first good one. */
 static void confirmed_after(int samples, uint32_t fault, monitor_in_t bad)
 {
     const monitor_in_t good = in;
@@ -43,7 +43,7 @@ static void confirmed_after(int samples, uint32_t fault, monitor_in_t bad)
         in = good;
         TEST_ASSERT_EQUAL_HEX32(0, step());
     }
-    for (int n = 0; n < 100; n++) { /* never that many in a row */
+    for (int n = 0; n < 100; n++) { /* always one bad sample in a row too few */
         in = (n % samples == samples - 1) ? good : bad;
         TEST_ASSERT_EQUAL_HEX32(0, step());
     }
@@ -69,7 +69,7 @@ void test_one_sample_above_the_trip_current_of_any_phase_and_sign_is_an_over_cur
     TEST_ASSERT_EQUAL_HEX32(0, step());
 }
 
-/* -1 has no positive counterpart: a negation that wraps would hide the largest current there is. */
+/* -1 has no positive counterpart: a negation that wraps would hide the largest current. */
 void test_the_lower_end_stop_of_the_converter_is_an_over_current(void)
 {
     in.i = (abc_q15_t){INT16_MIN, 16384, 16384};
@@ -110,7 +110,7 @@ void test_a_current_sum_needs_five_samples_in_a_row_with_either_sign(void)
     }
 }
 
-/* 40 for the first, 4 for each further one: 300 with the 66th. */
+/* The count rises by 40 with the first sample and by 4 with each further one: it reaches 300 with the 66th. */
 void test_an_angle_that_stays_implausible_for_66_samples_is_a_fault(void)
 {
     for (int round = 0; round < 2; round++) {
@@ -121,7 +121,7 @@ void test_an_angle_that_stays_implausible_for_66_samples_is_a_fault(void)
         TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
         TEST_ASSERT_EQUAL_HEX32(FAULT_ANGLE, step());
         jumped = false;
-        for (int n = 0; n < 300; n++) { /* as long as the count is there */
+        for (int n = 0; n < 300; n++) { /* until the count is zero again */
             TEST_ASSERT_EQUAL(MONITOR_COUNTING, state.pending & MONITOR_COUNTING);
             TEST_ASSERT_EQUAL_HEX32(0, step());
         }
@@ -129,7 +129,7 @@ void test_an_angle_that_stays_implausible_for_66_samples_is_a_fault(void)
     }
 }
 
-/* A sequence of good samples between two bad ones; the fault's sample, 0: none. */
+/* In every group of `every` samples the first `bad` ones are bad. Returns the sample with the fault; 0: none. */
 static int faulted_after(int every, int bad, int samples)
 {
     state = (monitor_state_t){0};
@@ -142,11 +142,11 @@ static int faulted_after(int every, int bad, int samples)
     return 0;
 }
 
-/* By hand, 31 more with each ten samples and 40 with the first of them: 300 in the tenth sequence. */
+/* The count rises by 31 in each ten samples, with 40 at the first of them: it reaches 300 in the tenth group. */
 void test_single_spikes_are_a_fault_if_they_are_frequent_and_tolerated_if_they_are_rare(void)
 {
     TEST_ASSERT_EQUAL_INT(91, faulted_after(10, 1, 1000));
-    TEST_ASSERT_EQUAL_INT(7 * 2 + 1, faulted_after(2, 1, 1000)); /* 39 with each two */
+    TEST_ASSERT_EQUAL_INT(7 * 2 + 1, faulted_after(2, 1, 1000)); /* 39 in each two */
     TEST_ASSERT_EQUAL_INT(0, faulted_after(41, 1, 1000000));     /* 40 up, 40 down */
     TEST_ASSERT_GREATER_THAN(0, faulted_after(39, 1, 1000000));
 }
@@ -157,15 +157,15 @@ void test_a_glitch_of_50_samples_every_286_is_tolerated(void)
     TEST_ASSERT_EQUAL_INT(66, faulted_after(1000, 66, 1000));
 }
 
-/* A jump is noted for one period: after a good one nothing counts any more. */
+/* A reported jump is evaluated in one period only; a good period after it lowers the count. */
 void test_a_jump_is_evaluated_once_and_then_cleared(void)
 {
     TEST_ASSERT_EQUAL(0, state.pending);
     monitor_report_angle_jump(&state);
     TEST_ASSERT_EQUAL(MONITOR_ANGLE_JUMP, state.pending);
-    (void)step(); /* counts one */
+    (void)step(); /* counts the jump */
     TEST_ASSERT_EQUAL(MONITOR_COUNTING | MONITOR_ANGLE_LOST, state.pending);
-    (void)step(); /* a good one */
+    (void)step(); /* a good period */
     TEST_ASSERT_EQUAL(MONITOR_COUNTING, state.pending);
     TEST_ASSERT_EQUAL(39, state.angle);
 }

@@ -37,7 +37,7 @@ void tearDown(void)
 {
 }
 
-/* One millisecond of a machine that turns 0.7 rad in it; `broken`: that phase carries nothing. */
+/* One step, in which the machine turns by 0.7 rad; the phase `broken` carries no current. */
 static uint32_t run_one_turn(int broken)
 {
     const double a = 0.7 * now++;
@@ -59,7 +59,7 @@ static int steps_until(uint32_t fault, int broken)
     return -1;
 }
 
-/* The same sample again and again. */
+/* Repeats the same sample until the fault. */
 static int steps_until_the_same(uint32_t fault)
 {
     for (int n = 1; n <= 1000; n++) {
@@ -70,13 +70,13 @@ static int steps_until_the_same(uint32_t fault)
     return -1;
 }
 
-void test_a_machine_that_follows_raises_nothing(void)
+void test_currents_that_follow_their_references_raise_nothing(void)
 {
     TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, -1));
 }
 
-/* e_0 + |i_ref|/8 = 2000 + 1414. */
-void test_a_current_that_does_not_follow_is_found_in_20_ms_and_in_100_while_the_voltage_is_cut(void)
+/* The threshold is e_0 + |i_ref|/8 = 2000 + 1414. */
+void test_a_current_off_its_reference_is_found_in_20_ms_and_in_100_at_the_voltage_limit(void)
 {
     in.i.q = in.i_ref.q - 3500;
     TEST_ASSERT_EQUAL_INT(20, steps_until(FAULT_CONTROL, -1));
@@ -126,7 +126,7 @@ static void find_oscillations(bool of_sample)
             found = (run_one_turn(-1) & FAULT_CONTROL) ? n : -1;
         }
         const int expected = steps_of_the_twin(size);
-        const bool same = abs(found - expected) <= 1; /* rounding may move a step */
+        const bool same = abs(found - expected) <= 1; /* rounding may shift the fault by a step */
         TEST_ASSERT_TRUE_MESSAGE(same || abs(size - 3200) <= 100, "fixed point and double precision differ");
     }
 }
@@ -136,7 +136,7 @@ void test_a_deviation_every_other_sample_is_found_by_its_oscillation(void)
     find_oscillations(true);
 }
 
-void test_so_is_one_that_only_the_means_of_the_steps_show(void)
+void test_an_oscillation_that_only_the_means_of_the_steps_show_is_found(void)
 {
     find_oscillations(false);
 }
@@ -156,7 +156,7 @@ void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)
     }
 }
 
-/* One switch open: the phase carries nothing in one direction. */
+/* With an open switch the phase carries no current in one direction. */
 void test_a_phase_without_current_in_one_direction_is_found_within_50_ms(void)
 {
     for (int direction = -1; direction <= 1; direction += 2) {
@@ -175,8 +175,9 @@ void test_a_phase_without_current_in_one_direction_is_found_within_50_ms(void)
     }
 }
 
-/* Also a current in the wrong direction is none; below an eighth of the reference's length nothing counts. */
-void test_what_counts_as_a_lost_phase(void)
+/* A current in the wrong direction counts as none. A phase is checked only if its reference is above an eighth of the
+ * length of the current reference. */
+void test_a_phase_is_lost_only_if_its_reference_is_large_enough(void)
 {
     in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
     in.phases_ref = in.phases = (abc_q15_t){2999, -5999, 3000};
@@ -189,7 +190,7 @@ void test_what_counts_as_a_lost_phase(void)
     TEST_ASSERT_EQUAL_INT(10, steps_until_the_same(FAULT_PHASE_LOST));
 }
 
-/* A phase that should carry nothing at this angle, and does not, is no evidence. */
+/* A phase without current is not lost if its reference is zero at this angle. */
 void test_a_phase_at_its_zero_crossing_is_not_missed(void)
 {
     in.phases_ref = (abc_q15_t){0, 9800, -9800};
@@ -211,12 +212,12 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_move_is_stuck(v
             in.phases_ref = in.phases;
             found = (plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK) ? n : 0;
         }
-        TEST_ASSERT_EQUAL_INT(21, found); /* the first sample is equal to nothing */
+        TEST_ASSERT_EQUAL_INT(21, found); /* the first sample has none before it to be equal to */
     }
 }
 
-/* A quantised current at the edge of a step flickers by one of them while another phase repeats: 16 counts. */
-void test_phases_that_only_flicker_are_no_evidence(void)
+/* A quantised current near the edge of a step changes by one step of 16 counts while another phase repeats. */
+void test_phases_that_change_by_one_quantisation_step_are_not_stuck(void)
 {
     for (int n = 0; n < 1000; n++) {
         in.phases = in.phases_ref = (abc_q15_t){5000, -2500 + 16 * (n & 1), -2500 - 16 * (n & 1)};
@@ -224,7 +225,7 @@ void test_phases_that_only_flicker_are_no_evidence(void)
     }
 }
 
-void test_a_machine_at_rest_repeats_all_its_currents(void)
+void test_equal_currents_at_standstill_are_not_stuck(void)
 {
     in.phases = in.phases_ref = (abc_q15_t){5000, -2500, -2500};
     for (int n = 0; n < 1000; n++) {
@@ -267,7 +268,7 @@ void test_over_temperature_is_confirmed_after_110_ms_also_at_rest(void)
     TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_TEMPERATURE, -1));
 }
 
-void test_a_bridge_that_is_off_follows_nothing(void)
+void test_while_the_bridge_does_not_act_nothing_is_checked(void)
 {
     in.acting = false;
     in.i = (dq_q15_t){0, 0};

@@ -5,7 +5,8 @@
 
 #include "unity.h"
 
-/* psi_f = 0.4: the line back-EMF is 0.6928 w. v_dc = 0.6: short above w = 0.7794, open below 0.6928. */
+/* With psi_f = 0.4 the line back-EMF is 0.6928 w. With v_dc = 0.6 the safe state is the short circuit above w = 0.7794,
+ * and switching disabled below 0.6928. */
 static const safe_state_config_t config = {
     .psi_f = 13107, .share_short = 29491, .share_open = 26214, .v_release = 24000};
 static safe_state_state_t state;
@@ -30,7 +31,7 @@ static bool steps(int count)
     return short_circuit;
 }
 
-/* After 250 steps the known speed has followed any fall. */
+/* After 250 steps the known speed has followed any decrease. */
 static bool at(double omega)
 {
     in.omega = (q15_t)(omega * 32768.0);
@@ -42,7 +43,7 @@ static double known(void)
     return state.speed / 32768.0;
 }
 
-/* The flux and current of a shorted machine, turned by this angle against the frame that the drive believes in. */
+/* The flux and current of a shorted machine, turned by this angle against the rotor frame of the drive. */
 static void short_circuit_currents(double length, double angle, double angle_a_period_before)
 {
     const double psi = length * config.psi_f;
@@ -61,7 +62,7 @@ void test_at_low_speed_switching_is_disabled_and_at_high_speed_the_phases_are_sh
     TEST_ASSERT_FALSE(at(-0.5));
 }
 
-void test_between_the_thresholds_it_stays_as_it_was(void)
+void test_between_the_thresholds_the_decision_stays(void)
 {
     TEST_ASSERT_FALSE(at(0.778));
     TEST_ASSERT_TRUE(at(0.781));
@@ -70,9 +71,9 @@ void test_between_the_thresholds_it_stays_as_it_was(void)
     TEST_ASSERT_FALSE(at(0.778));
 }
 
-void test_a_magnet_found_stronger_counts_and_one_found_weaker_does_not(void)
+void test_a_stronger_identified_magnet_counts_and_a_weaker_one_does_not(void)
 {
-    in.psi_delta = 1311; /* + 10 %: short above 0.7085 */
+    in.psi_delta = 1311; /* 10 % stronger: short circuit above 0.7085 */
     TEST_ASSERT_TRUE(at(0.72));
     in.psi_delta = -6000;
     TEST_ASSERT_FALSE(at(0.691));
@@ -88,9 +89,9 @@ void test_without_dc_voltage_any_rotation_is_shorted(void)
     TEST_ASSERT_TRUE(at(0.01));
 }
 
-void test_without_a_valid_speed_the_last_one_counts_and_the_short_circuit_comes_earlier(void)
+void test_without_a_valid_speed_the_last_one_counts_and_the_lower_threshold_decides(void)
 {
-    TEST_ASSERT_FALSE(at(0.72)); /* above the lower threshold */
+    TEST_ASSERT_FALSE(at(0.72)); /* between the thresholds */
     in.speed_valid = false;
     TEST_ASSERT_TRUE(at(0.0));
     setUp();
@@ -99,8 +100,8 @@ void test_without_a_valid_speed_the_last_one_counts_and_the_short_circuit_comes_
     TEST_ASSERT_FALSE(at(0.99));
 }
 
-/* 0.004 per step, the rounding of the constant included. */
-void test_the_known_speed_falls_no_faster_than_a_rotor_can_and_rises_at_once(void)
+/* The known speed falls by 0.004 per step, including the rounding of the constant. */
+void test_the_known_speed_falls_no_faster_than_a_rotor_and_rises_at_once(void)
 {
     TEST_ASSERT_TRUE(at(0.95));
     in.omega = 0;
@@ -111,8 +112,8 @@ void test_the_known_speed_falls_no_faster_than_a_rotor_can_and_rises_at_once(voi
     TEST_ASSERT_EQUAL_INT16(INT16_MAX, state.speed);
 }
 
-/* The angle fault comes late or never: the short circuit's currents show that the rotor turns. */
-void test_in_the_short_circuit_a_frozen_angle_does_not_look_like_a_standstill(void)
+/* A frozen angle is reported late or never: the currents of the short circuit show that the rotor turns. */
+void test_in_the_short_circuit_a_frozen_angle_is_not_taken_for_standstill(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
     in.omega = 0;
@@ -124,7 +125,7 @@ void test_in_the_short_circuit_a_frozen_angle_does_not_look_like_a_standstill(vo
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.9, known());
 }
 
-/* Exactly one turn in each step: from step to step they seem to stand still. */
+/* At exactly one turn per step the currents are the same in each step. Therefore those of two periods are compared. */
 void test_a_frozen_angle_at_1_khz_is_seen_within_the_period(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
@@ -134,7 +135,7 @@ void test_a_frozen_angle_at_1_khz_is_seen_within_the_period(void)
     TEST_ASSERT_TRUE(steps(5000));
 }
 
-void test_currents_that_stand_still_confirm_the_speed(void)
+void test_constant_currents_confirm_the_speed(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
     in.shorted = true;
@@ -143,7 +144,7 @@ void test_currents_that_stand_still_confirm_the_speed(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
 }
 
-/* A bridge that stays shorted below the speed that asks for it: the currents turn, so the rotor does. */
+/* The bridge is shorted below the speed that requires it: the currents turn, so the rotor turns. */
 void test_without_an_angle_the_speed_does_not_fall_while_the_phases_are_shorted(void)
 {
     TEST_ASSERT_FALSE(at(0.5));
@@ -157,7 +158,7 @@ void test_without_an_angle_the_speed_does_not_fall_while_the_phases_are_shorted(
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
 }
 
-/* Without an angle only the end of the currents tells that the rotor has come to rest. */
+/* Without a valid angle only the end of the currents shows that the rotor has stopped. */
 void test_without_an_angle_the_short_circuit_lasts_until_its_currents_have_vanished(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
@@ -183,8 +184,9 @@ void test_with_switching_disabled_an_unknown_speed_falls_after_20_s(void)
     TEST_ASSERT_EQUAL_INT16(0, state.speed);
 }
 
-/* With a current sensor that is known to be wrong the angle alone counts: one fault, not two. */
-void test_wrong_currents_do_not_hold_the_speed(void)
+/* With a current sensor that is known to be wrong the speed follows the angle alone: two independent faults are not
+ * assumed. */
+void test_wrong_currents_do_not_keep_the_speed_from_falling(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
     in.shorted = true;
@@ -195,8 +197,8 @@ void test_wrong_currents_do_not_hold_the_speed(void)
 
 enum { ANGLE_WORKS, ANGLE_FROZEN, ANGLE_FROZEN_AND_FLAGGED, ANGLES };
 
-/* A machine that turns by `turn` rad in a step at full speed and slows down by `fall` per step. Its short circuit draws
- * w/sqrt(w^2 + r^2) of the largest current. After `fault` steps a fault is latched and the safe state acts. */
+/* A machine that turns by `turn` rad per step at full speed and slows down by `fall` per step. Its short-circuit
+ * current is w/sqrt(w^2 + r^2) of the largest. After `fault` steps a fault is latched and the safe state acts. */
 static void model(double start, double fall, double turn, int angle, int fault)
 {
     double w = start, theta = 0.0;
@@ -213,7 +215,7 @@ static void model(double start, double fall, double turn, int angle, int fault)
         short_circuit = safe_state_step(&config, &state, &in);
         const double e = sqrt(3.0) * 0.4 * w, limit = (angle == ANGLE_FROZEN) ? 0.91 : 0.81;
         if (e > limit * 0.6) {
-            /* 0.8 of the lowest dc voltage, 0.6 of the nominal one: ecu/observe.c opens the contactor below it. */
+            /* ecu/observe.c opens the contactor below 0.8 of the lowest dc voltage, which is 0.6 of the nominal one. */
             TEST_ASSERT_TRUE(state.line_emf > 0.8 * 0.6 * 0.6 * 32768.0);
         }
         theta += w * turn;
@@ -221,8 +223,8 @@ static void model(double start, double fall, double turn, int angle, int fault)
     }
 }
 
-/* The property that the contactor's release rests on: however the angle fails, and whatever the rotor does, the known
- * line voltage stays above the release level while the true one could charge the dc link. */
+/* The release of the contactor relies on this property: with any failure of the angle and any speed of the rotor, the
+ * known line voltage stays above the release level while the true one could charge the dc link. */
 void test_no_failure_of_the_angle_releases_a_machine_that_turns(void)
 {
     static const double falls[] = {0.0, 0.0002, 0.001, 0.0039}, turns[] = {2.0, 4.0, 2.0 * 3.14159265 / 0.9, 12.0};
@@ -235,7 +237,7 @@ void test_no_failure_of_the_angle_releases_a_machine_that_turns(void)
     }
 }
 
-void test_an_over_voltage_is_shorted_at_any_speed_until_the_voltage_has_come_back(void)
+void test_an_over_voltage_needs_the_short_circuit_at_any_speed_until_the_voltage_is_low(void)
 {
     in.over_voltage = true;
     in.v_dc = 28000;
