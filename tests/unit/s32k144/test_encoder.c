@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The encoder's counter, read some ticks after the instant it is wanted for. */
+/* The counter of the encoder is read some ticks after the start of the period, for which the angle is needed. */
 #include "hal/angle.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/registers.h"
@@ -22,7 +22,7 @@ void tearDown(void)
 {
 }
 
-void test_a_shaft_at_rest_is_where_the_counter_says(void)
+void test_at_rest_the_angle_is_that_of_the_counter(void)
 {
     FTM2->CNT = 4096;
     (void)hal_angle_read();
@@ -30,9 +30,9 @@ void test_a_shaft_at_rest_is_where_the_counter_says(void)
     TEST_ASSERT_EQUAL_HEX32(0x40000000, hal_angle_read());
 }
 
-/* 200 counts a period, read 336 of 11200 ticks late: 6 counts too many. The share is rounded down by less than 2^-32
- * a tick, and the product to 2^-32 turn. */
-void test_the_travel_since_the_start_of_the_period_is_taken_away(void)
+/* The shaft moves by 200 counts per period, and the counter is read 336 of 11200 ticks late, 6 counts too far. The
+ * share per tick is rounded down by less than 2^-32, and the product to 2^-32 turn. */
+void test_the_movement_since_the_start_of_the_period_is_subtracted(void)
 {
     FTM2->CNT = 1000;
     (void)hal_angle_read();
@@ -41,7 +41,7 @@ void test_the_travel_since_the_start_of_the_period_is_taken_away(void)
     TEST_ASSERT_UINT32_WITHIN(8, 1194U * COUNT_Q32, hal_angle_read());
 }
 
-void test_turning_backwards_through_zero_is_no_different(void)
+void test_the_movement_is_subtracted_also_backwards_through_zero(void)
 {
     FTM2->CNT = 50;
     (void)hal_angle_read();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What leaves and enters the processor bit by bit: CAN message buffers, resolver frames, NTC. */
+/* Formats and conversions of the port: CAN message buffers, resolver frames, temperature sensors. */
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ void tearDown(void)
 {
 }
 
-/* Words by hand: identifier 0x123 << 18 = 0x048C0000, length 8, code 12. */
+/* The words by hand: identifier 0x123 << 18 = 0x048C0000, length 8, code 12. */
 void test_a_standard_frame_fills_the_buffer_from_the_top_byte_down(void)
 {
     const can_frame_t frame = {.id = 0x123, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
@@ -26,7 +26,7 @@ void test_a_standard_frame_fills_the_buffer_from_the_top_byte_down(void)
     TEST_ASSERT_EQUAL_HEX32_ARRAY(expected, box.word, 4);
 }
 
-void test_an_extended_frame_says_so(void)
+void test_an_extended_frame_is_marked_as_extended(void)
 {
     const can_frame_t frame = {.id = 0x1ABCDEF0, .extended = true, .length = 0};
     const can_box_t box = can_box_pack(&frame);
@@ -50,7 +50,7 @@ void test_what_was_packed_unpacks_to_the_same_frame(void)
     }
 }
 
-void test_impossible_lengths_become_eight_and_a_remote_request_carries_nothing(void)
+void test_impossible_lengths_become_eight_and_a_remote_request_has_no_data(void)
 {
     const can_box_t nine = {{15U << 16, 0, 0, 0}};
     TEST_ASSERT_EQUAL_UINT8(8, can_box_unpack(&nine).length);
@@ -69,8 +69,8 @@ void test_a_resolver_frame_is_the_value_and_then_the_faults(void)
     TEST_ASSERT_EQUAL_HEX8(AD2S1210_SIGNAL_LOSS | AD2S1210_TRACKING, frame.fault);
 }
 
-/* Straight lines over 10 K bend away from the beta equation by 0.6 K at most, rounding 0.05 K. Above 150 degrees the
- * rounding of the nodes to whole counts is more: half a count is 0.6 K there and 3.2 K at 300. */
+/* Linear interpolation over 10 K deviates from the beta equation by 0.6 K at most, the rounding by 0.05 K. Above 150 °C
+ * the nodes are rounded to whole counts, and half a count is 0.6 K at 150 °C and 3.2 K at 300 °C. */
 void test_the_ntc_follows_the_beta_equation_over_its_range(void)
 {
     for (uint16_t count = 16; count <= 3937; count++) {
@@ -88,15 +88,15 @@ void test_an_open_or_shorted_ntc_is_out_of_range(void)
     TEST_ASSERT_EQUAL_INT16(TEMPERATURE_OUT_OF_RANGE, ntc_dC(0));
 }
 
-/* motor.toml allows trip levels up to 300 degrees. */
+/* motor.toml allows trip levels up to 300 °C. */
 void test_the_ntc_reaches_every_temperature_at_which_a_drive_trips(void)
 {
     TEST_ASSERT_EQUAL_INT16(3000, ntc_dC(16));
     TEST_ASSERT_EQUAL_INT16(2300, ntc_dC(37));
 }
 
-/* 740.5 mV at 25 degrees, 1.564 mV less for each kelvin, of 5 V and 4096 counts: 606.6 counts, 0.7805 K each. */
-void test_the_sensor_on_the_die_follows_its_line_and_is_unknown_where_no_processor_lives(void)
+/* 740.5 mV at 25 °C and 1.564 mV less per kelvin, 4096 counts for 5 V: 606.6 counts at 25 °C, 0.7805 K per count. */
+void test_the_sensor_on_the_die_follows_its_line_and_is_unknown_outside_the_range_of_the_processor(void)
 {
     for (uint16_t count = 383; count <= 703; count++) {
         const double exact_dC = 250.0 - 10.0 * (count * 5000.0 / 4096.0 - 740.5) / 1.564;

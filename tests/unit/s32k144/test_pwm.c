@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* FTM0 with variables for registers: what is written, not what the timer makes of it. */
+/* FTM0 with variables in place of registers: the tests check the written values, not the behaviour of the timer. */
 #include "hal/pwm.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/pwm.h"
@@ -44,11 +44,11 @@ void test_no_duty_never_matches_and_full_duty_matches_at_the_start_only(void)
     TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C1V);
     TEST_ASSERT_EQUAL_UINT32(0, FTM0->C2V);
     TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C3V);
-    /* 1/32768 of 11200 ticks is a third of a tick: rounds to nothing. */
+    /* 1/32768 of 11200 ticks is a third of a tick and is rounded to zero. */
     TEST_ASSERT_GREATER_THAN_UINT32(FTM0->MOD, FTM0->C4V);
 }
 
-/* The pulse is within half a tick of duty * 11200 for every duty there is, and inside the period. */
+/* For every possible duty the pulse is within half a tick of duty * 11200, and within the period. */
 void test_every_duty_gives_its_width_to_half_a_tick(void)
 {
     for (uint32_t duty = 0; duty <= 32768U; duty++) {
@@ -60,7 +60,7 @@ void test_every_duty_gives_its_width_to_half_a_tick(void)
     }
 }
 
-void test_compare_values_are_released_together_after_the_last(void)
+void test_the_compare_values_take_effect_together_after_the_last(void)
 {
     FTM0->SYNC = 0;
     hal_pwm_write((duty_t){1, 2, 3});
@@ -72,14 +72,15 @@ void test_after_start_up_switching_is_disabled_and_the_configuration_locked(void
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
     TEST_ASSERT_EQUAL_UINT32(PERIOD - 1U, FTM0->MOD);
-    TEST_ASSERT_EQUAL_HEX32(0, FTM0->FMS); /* or the counter could not be started */
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->FMS); /* not locked yet: otherwise the counter could not be started */
     pwm_start();
     TEST_ASSERT_BITS_HIGH(FTM_SC_CLKS(1), FTM0->SC);
     TEST_ASSERT_EQUAL_HEX32(FTM_FMS_WPEN, FTM0->FMS);
 }
 
-/* Opening is followed by duties in the same period: their write must not disarm the mask's trigger. */
-void test_duties_written_after_opening_leave_the_mask_armed(void)
+/* After switching has been disabled, duties are written in the same period. This must not clear the trigger that
+ * applies the output mask. */
+void test_duties_written_after_disabling_keep_the_trigger_of_the_output_mask(void)
 {
     hal_pwm_enable(true);
     hal_pwm_enable(false);
@@ -109,13 +110,13 @@ void test_a_period_or_a_dead_time_that_the_timer_cannot_keep_is_impossible(void)
     TEST_ASSERT_TRUE(pwm_possible(&(pwm_config_t){11200, 224}));
     TEST_ASSERT_TRUE(pwm_possible(&(pwm_config_t){65532, 4092}));
     TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){65536, 224}));
-    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11202, 224})); /* no whole number of the tick timer's clocks */
+    TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11202, 224})); /* not a whole number of the tick timer's clocks */
     TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11200, 0}));   /* both switches of a phase on together */
     TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){11200, 1401}));
     TEST_ASSERT_FALSE(pwm_possible(&(pwm_config_t){65532, 4093}));
 }
 
-/* All seven: an odd channel without an edge leaves its pin, the lower switch's gate, undriven. */
+/* All seven channels: an odd channel without an edge would leave its pin, the gate of a lower switch, undriven. */
 void test_both_channels_of_every_pair_have_an_edge(void)
 {
     const volatile uint32_t *const control[] = {&FTM0->C0SC, &FTM0->C1SC, &FTM0->C2SC, &FTM0->C3SC,
@@ -125,7 +126,7 @@ void test_both_channels_of_every_pair_have_an_edge(void)
     }
 }
 
-void test_sampling_by_hand_leaves_the_gates_held_and_the_line_to_the_timer(void)
+void test_sampling_by_software_keeps_switching_disabled_and_the_sample_line_with_the_timer(void)
 {
     pwm_sample_by_hand();
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
@@ -142,7 +143,7 @@ void test_enabling_waits_for_the_period_and_disabling_does_not(void)
     TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
 }
 
-void test_gates_that_stay_as_they_are_cost_no_register(void)
+void test_an_unchanged_request_writes_no_register(void)
 {
     hal_pwm_enable(true);
     FTM0->OUTMASK = 0x15;
@@ -152,7 +153,7 @@ void test_gates_that_stay_as_they_are_cost_no_register(void)
     TEST_ASSERT_EQUAL_HEX32(0x2A, FTM0->SWOCTRL);
 }
 
-/* Switching is enabled, and the latch of the fault input does not hold the outputs off. */
+/* Switching is reported as enabled only if the latch of the fault input does not disable the outputs. */
 void test_the_gates_are_read_back_from_the_timer(void)
 {
     TEST_ASSERT_FALSE(hal_pwm_gates());
@@ -166,7 +167,7 @@ void test_the_gates_are_read_back_from_the_timer(void)
     TEST_ASSERT_FALSE(hal_pwm_gates());
 }
 
-void test_a_gate_fault_is_told_once_to_the_board_and_masks_itself(void)
+void test_a_gate_fault_is_reported_once_to_the_board_and_masks_its_interrupt(void)
 {
     pwm_gate_fault_isr();
     TEST_ASSERT_EQUAL_HEX32(1U << (IRQ_FTM0_FAULT & 31U), NVIC->ICER[IRQ_FTM0_FAULT >> 5]);
@@ -181,7 +182,7 @@ void test_a_fault_that_lasts_keeps_being_reported(void)
     TEST_ASSERT_TRUE(pwm_fault_reported());
 }
 
-/* The safe state at speed asks for switching in each period, without having disabled it. */
+/* The safe state at speed enables switching in each period without disabling it before. */
 void test_switching_that_a_fault_has_ended_is_enabled_again_when_the_line_allows_it(void)
 {
     hal_pwm_enable(true);

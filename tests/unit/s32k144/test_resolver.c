@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The AD2S1210 over a LPSPI of variables: RSR says whether something was received, RDR what. */
+/* The AD2S1210 with variables as LPSPI registers: RSR tells whether a frame was received, and RDR contains it. */
 #include <string.h>
 
 #include "hal/angle.h"
@@ -57,7 +57,7 @@ void test_start_up_reads_the_fault_register_after_a_sample_and_leaves_the_conver
     TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PSOR);
     TEST_ASSERT_EQUAL_HEX32(AD2S1210_FAULT_REGISTER, fake_LPSPI0.TDR);
     TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PCOR);
-    TEST_ASSERT_EQUAL_HEX32(23, fake_LPSPI0.TCR & 0xFFFU); /* 24 bits from here on */
+    TEST_ASSERT_EQUAL_HEX32(23, fake_LPSPI0.TCR & 0xFFFU); /* frames of 24 bits */
 }
 
 void test_the_position_is_the_upper_half_of_the_angle(void)
@@ -67,7 +67,7 @@ void test_the_position_is_the_upper_half_of_the_angle(void)
     TEST_ASSERT_FALSE(angle_fault());
 }
 
-void test_any_bit_of_the_fault_register_is_a_fault_until_it_is_gone(void)
+void test_any_bit_of_the_fault_register_is_a_fault_until_it_is_clear(void)
 {
     for (uint32_t bit = 0; bit < 8; bit++) {
         received(0x123400U | 1U << bit);
@@ -79,7 +79,7 @@ void test_any_bit_of_the_fault_register_is_a_fault_until_it_is_gone(void)
     TEST_ASSERT_FALSE(angle_fault());
 }
 
-void test_a_frame_that_does_not_come_is_a_fault_and_the_last_angle_stays(void)
+void test_a_missing_frame_is_a_fault_and_the_last_angle_stays(void)
 {
     received(0xABCD00);
     (void)hal_angle_read();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The second level's own reception against the first level's protection, which signs the frames here. */
+/* The reception of the second level against the end-to-end protection of the first level, which makes the frames. */
 #include "comm/can_rx.h"
 #include "comm/e2e.h"
 #include "second_level/frames.h"
@@ -44,7 +44,7 @@ static void receive(can_frame_t frame)
     second_level_frame(&frames, &frame);
 }
 
-/* The first frame only synchronises. */
+/* The first frame only synchronises the counter. */
 static void synchronise(uint32_t id)
 {
     receive(signed_frame(id, ENABLED_TORQUE, 0, 0, 0));
@@ -75,7 +75,8 @@ void test_the_limits_of_the_battery_are_decoded(void)
     TEST_ASSERT_EQUAL_INT32(59999, frames.power_regen_10W);
 }
 
-/* Every value of every byte, by another algorithm: a changed bit is refused, an unchanged frame accepted. */
+/* The two levels compute the checksum by different algorithms: a frame of the first level is accepted, and refused when
+ * one of its bits has changed. */
 void test_the_checksum_is_that_of_the_protection_for_every_byte(void)
 {
     synchronise(COMMAND_ID);

@@ -2,7 +2,7 @@
 #include "second_level/permitted.h"
 #include "unity.h"
 
-/* 10 counts are 0.1 N·m; 100 counts per step; parts of the hold time of 5 steps. */
+/* 10 counts are 0.1 N·m; the bound falls by 100 counts per step; the hold time has parts of 5 steps. */
 static const second_level_constants_t constants = {
     .torque_per_count = 10 << 16, .torque_max = 15000, .fall = 100, .turn_standstill = 1000, .hold_steps = 5};
 #define TURN 5000
@@ -39,7 +39,7 @@ void test_the_band_rises_at_once_on_the_side_of_the_request(void)
     TEST_ASSERT_EQUAL_INT32(7000, permitted.negative.bound);
 }
 
-/* Held for 15 to 20 steps, then 100 per step. */
+/* The bound is held for 15 to 20 steps and then falls by 100 counts per step. */
 void test_the_band_falls_after_the_hold_time_at_the_legal_rate(void)
 {
     frames.torque_dNm = 500;
@@ -56,7 +56,7 @@ void test_the_band_falls_after_the_hold_time_at_the_legal_rate(void)
     TEST_ASSERT_EQUAL_INT32(1000, permitted.positive.bound);
 }
 
-void test_a_calibrated_slew_that_is_slower_slows_the_band_down(void)
+void test_a_slower_calibrated_slew_makes_the_band_fall_more_slowly(void)
 {
     frames.torque_dNm = 500;
     steps(1, TURN, OPEN);
@@ -91,7 +91,7 @@ void test_backwards_the_limits_are_those_of_the_other_direction(void)
     TEST_ASSERT_EQUAL_INT32(3000, permitted.negative.bound);
 }
 
-/* The direction of rotation may be wrong there: the larger limit. */
+/* Near standstill the sign of the speed may be wrong. */
 void test_near_standstill_the_larger_limit_applies(void)
 {
     frames.drive_dNm = 200;

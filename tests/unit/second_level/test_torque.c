@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* With constant inductances the torque is bilinear in the currents, so that the coarse table is exact between its
- * points: t = psi_f i_q + (l_d - l_q) i_d i_q, here with psi_f = 0.2, l_d - l_q = -0.3. */
+/* With constant inductances the torque is bilinear in the currents, so that interpolation in the coarse table is exact:
+ * t = psi_f i_q + (l_d - l_q) i_d i_q, here with psi_f = 0.2 and l_d - l_q = -0.3. */
 #include <math.h>
 
 #include "comm/e2e.h"
@@ -55,7 +55,7 @@ static second_level_sample_t sample(double i_d, double i_q, double theta_m)
                                    .theta_m = (uint32_t)(int64_t)lrint(theta_m / (2.0 * PI) * 4294967296.0)};
 }
 
-/* Roundings: of the table 1/2, of the interpolation 1/2, of each current 1 LSB times its slope, below 1. */
+/* Rounding of the table 1/2 LSB, of the interpolation 1/2, of each current 1 LSB times its slope, which is below 1. */
 void test_the_own_torque_is_that_of_the_machine_at_every_angle_and_current(void)
 {
     for (int n = 0; n < 5000; n++) {
@@ -73,7 +73,7 @@ void test_the_offset_of_the_angle_belongs_to_the_electrical_angle(void)
     TEST_ASSERT_INT32_WITHIN(4, (int32_t)lrint(ONE * torque(-0.3, 0.4)), second_level_own_torque(&constants, &at));
 }
 
-/* The level's frames, as if the vehicle requested so much all the time. */
+/* The state of the reception while the vehicle requests this torque all the time. */
 static void request(int32_t torque_dNm)
 {
     level.frames.command = (second_level_channel_t){.alive = true, .seen = true};
@@ -82,9 +82,9 @@ static void request(int32_t torque_dNm)
     level.frames.regen_dNm = 10000;
 }
 
-static int steps_to_fault(int most)
+static int steps_to_fault(int steps_max)
 {
-    for (int n = 1; n <= most; n++) {
+    for (int n = 1; n <= steps_max; n++) {
         level.frames.command.age_us = 0;
         if (second_level_step(&constants, &level, &in)) {
             return n;
@@ -93,8 +93,8 @@ static int steps_to_fault(int most)
     return 0;
 }
 
-/* i_q = 0.3 gives 0.06, 1966 counts; with 1000 + 600 + 1000/64 permitted. */
-void test_torque_beyond_the_request_is_reported_and_stays_so(void)
+/* i_q = 0.3 makes a torque of 0.06, 1966 counts; 1000 + 600 + 1000/64 counts are permitted. */
+void test_torque_beyond_the_request_is_reported_and_stays_reported(void)
 {
     request(100);
     in.sample = sample(0.0, 0.3, 0.0);
@@ -125,7 +125,7 @@ void test_too_little_torque_is_not_reported(void)
 }
 
 /* 1966 counts for a request of 1100: permitted with a correction of 25 %, 1100 x 1.25 + 600 + 17 = 1992. */
-void test_a_correction_of_the_tables_is_believed_up_to_its_plausible_limits(void)
+void test_a_correction_of_the_tables_is_accepted_up_to_its_plausible_limits(void)
 {
     request(110);
     in.sample = sample(0.0, 0.3, 0.0);

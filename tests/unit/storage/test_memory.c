@@ -5,7 +5,7 @@
 #include "storage/memory.h"
 #include "unity.h"
 
-/* The keeper above the store: what is taken at the start, when is saved. */
+/* The layer above the store: what is recalled at the start, and when it is saved. */
 
 static uint8_t flash[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int erases;
@@ -41,7 +41,7 @@ static void power_on(const motor_t *source)
     memory_recall(&memory, &drive);
 }
 
-/* q15 */
+/* In q15. */
 static int32_t dead_time(const motor_parameters_t *p)
 {
     return p->modulate.dead_time_q16 / 2;
@@ -62,7 +62,7 @@ void tearDown(void)
 {
 }
 
-/* The background runs once per millisecond; the number of saves. */
+/* Runs the background once per millisecond; returns the number of saves. */
 static uint32_t milliseconds(uint32_t n)
 {
     const uint32_t before = memory.saves;
@@ -80,7 +80,7 @@ static void run(uint32_t ms)
     drive.task.run_state = RUN_STATE_OFF;
 }
 
-/* A magnet half a standard deviation weak, well known. */
+/* A magnet that is weak by half a standard deviation, with a small uncertainty. */
 static void identify(void)
 {
     drive.task.identify.kalman.x_q27[IDENTIFY_FLUX] = -IDENTIFY_ONE_Q27 / 2;
@@ -94,13 +94,13 @@ static void identify_and_save(void)
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
 }
 
-void test_what_was_identified_is_there_after_power_on_with_a_wider_uncertainty(void)
+void test_identified_values_are_recalled_at_power_on_with_a_larger_uncertainty(void)
 {
     identify_and_save();
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
     TEST_ASSERT_EQUAL_INT32(-IDENTIFY_ONE_Q27 / 2, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
-    /* (ID-19): a quarter of the prior's variance more. */
+    /* (ID-19): the variance grows by a quarter of that of the prior. */
     TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30 / 64 + IDENTIFY_ONE_Q30 / 4,
                             drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
 }
@@ -125,7 +125,7 @@ void test_a_damaged_memory_leaves_the_priors(void)
     }
 }
 
-/* A copy of the motor with one statement's difference does not take the record. */
+/* A motor that differs by one statement does not use the record. */
 #define FOREIGN(statement) \
     do { \
         static motor_t m; \
@@ -152,14 +152,14 @@ void test_nothing_is_written_without_a_run(void)
     TEST_ASSERT_EQUAL_INT(0, erases);
 }
 
-void test_it_waits_until_the_drive_has_rested(void)
+void test_nothing_is_written_until_the_drive_has_rested(void)
 {
     identify();
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
     run(1);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1));
-    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(2U * MEMORY_INTERVAL_MS)); /* once is enough */
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(2U * MEMORY_INTERVAL_MS)); /* the drive has not run since */
 }
 
 void test_the_second_save_waits_for_the_interval(void)
@@ -171,7 +171,7 @@ void test_the_second_save_waits_for_the_interval(void)
     TEST_ASSERT_EQUAL_INT(2, erases);
 }
 
-void test_a_fault_or_a_short_circuit_is_no_rest(void)
+void test_a_drive_with_a_fault_or_a_short_circuit_is_not_at_rest(void)
 {
     identify();
     drive_raise_fault(&drive, FAULT_ANGLE_OFFSET);
@@ -183,7 +183,7 @@ void test_a_fault_or_a_short_circuit_is_no_rest(void)
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1000));
 }
 
-void test_parameters_that_the_model_contradicts_are_not_kept(void)
+void test_parameters_with_a_large_mismatch_are_not_kept(void)
 {
     identify();
     drive.task.identify.mismatch_share = Q15(0.3);
@@ -191,7 +191,7 @@ void test_parameters_that_the_model_contradicts_are_not_kept(void)
     TEST_ASSERT_EQUAL_INT(0, erases);
 }
 
-void test_a_memory_that_refuses_is_counted_and_tried_again_after_the_interval(void)
+void test_a_failed_write_is_counted_and_tried_again_after_the_interval(void)
 {
     broken = true;
     identify();
@@ -216,10 +216,10 @@ void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
                                  drive.parameters.current_control.clear_q30);
     motor_t with_them = motor;
     with_them.parameters = drive.parameters;
-    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&with_them)); /* (MO-11) among others */
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&with_them)); /* this includes (MO-11) */
 }
 
-void test_what_driving_has_added_to_the_compensation_is_kept_with_what_was_measured(void)
+void test_the_trim_of_the_compensation_is_kept_with_the_measurement(void)
 {
     const int32_t measured = dead_time(&motor.parameters) + 40;
     TEST_ASSERT_TRUE(drive_compensate(&drive, &(compensation_t){measured, motor.parameters.modulate.knee_q17, 1}));
@@ -242,7 +242,7 @@ void test_without_a_measurement_the_trim_is_kept_on_the_motors_own_data(void)
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters) + 60, dead_time(&drive.parameters));
 }
 
-void test_a_compensation_that_no_inverter_needs_is_refused(void)
+void test_an_impossible_compensation_is_refused(void)
 {
     const motor_parameters_t before = drive.parameters;
     const compensation_t wrong[] = {{-1, 1000, 1}, {4097, 1000, 1}, {300, 0, 1}, {300, 1 << 30, 1}};

@@ -8,15 +8,15 @@
 #define LAYOUT 0x46540001U
 #define NEVER INT32_MAX
 
-/* A flash with named faults. Writing can only clear bits; power is cut when `energy` bytes have been written. */
+/* A simulated flash. Writing can only clear bits; the power fails when `energy` bytes have been written or erased. */
 static uint8_t memory[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int32_t energy;
 static bool erase_fails;
-static int stuck_offset; /* this byte of every slot keeps one bit; -1: none */
+static int stuck_offset; /* this byte of every slot is stored with one wrong bit; -1: none */
 
 typedef struct {
     uint32_t number;
-    uint8_t body[173]; /* neither a whole unit nor a whole chunk */
+    uint8_t body[173]; /* neither a whole number of flash units nor of chunks of the store */
 } record_t;
 
 static record_t record_of(uint32_t number)
@@ -37,7 +37,7 @@ bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
 
 bool hal_nvm_erase(uint32_t slot)
 {
-    /* An interrupted erase leaves a part erased. */
+    /* After an interrupted erase only a part is erased. */
     for (uint32_t k = 0; k < HAL_NVM_SLOT_SIZE && !erase_fails; k++) {
         if (energy <= 0) {
             return false;
@@ -99,7 +99,7 @@ void test_the_check_value_of_the_crc_is_the_published_one(void)
     TEST_ASSERT_EQUAL_HEX32(0xCBF43926, ~crc32_update(crc32_update(CRC32_START, "1234", 4), "56789", 5));
 }
 
-void test_a_blank_memory_is_empty_and_leaves_the_record_alone(void)
+void test_an_erased_memory_is_empty_and_does_not_change_the_record(void)
 {
     record_t r = record_of(9);
     const record_t before = r;
@@ -107,13 +107,13 @@ void test_a_blank_memory_is_empty_and_leaves_the_record_alone(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, &r, sizeof r);
 }
 
-void test_the_newest_of_many_saves_is_loaded_and_both_slots_take_turns(void)
+void test_the_newest_of_many_saves_is_loaded_and_the_slots_alternate(void)
 {
     for (uint32_t number = 1; number <= 10; number++) {
         TEST_ASSERT_TRUE(save(number));
         TEST_ASSERT_EQUAL_UINT32(number, loaded());
     }
-    memset(memory[1], 0xFF, sizeof memory[1]); /* the tenth went here */
+    memset(memory[1], 0xFF, sizeof memory[1]); /* erase the slot of the tenth */
     TEST_ASSERT_EQUAL_UINT32(9, loaded());
 }
 
@@ -140,7 +140,7 @@ void test_a_cut_at_any_byte_of_a_save_leaves_the_old_or_the_new_record(void)
         const bool done = save(3);
         TEST_ASSERT_EQUAL(cut == whole, done);
         TEST_ASSERT_EQUAL_UINT32(done ? 3 : 2, loaded());
-        energy = NEVER; /* and the next save works on what the cut left */
+        energy = NEVER; /* the next save works on the interrupted one */
         TEST_ASSERT_TRUE(save(4));
         TEST_ASSERT_EQUAL_UINT32(4, loaded());
     }
@@ -182,7 +182,7 @@ void test_another_layout_or_size_is_not_found(void)
     TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT, &r, sizeof r - 1U));
 }
 
-void test_a_memory_that_does_not_keep_what_was_written_is_noticed(void)
+void test_a_memory_that_stores_wrong_data_is_detected(void)
 {
     TEST_ASSERT_TRUE(save(1));
     stuck_offset = 60;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A port whose drivers are still those of hal/template never enables switching, whatever it is asked. */
+/* A port whose drivers are still those of hal/template never enables switching, whatever is requested. */
 #include "drive/drive.h"
 #include "hal/pwm.h"
 #include "unity.h"
@@ -65,7 +65,7 @@ void test_a_request_does_not_enable_switching(void)
     TEST_ASSERT_EQUAL_UINT32(0, periods_enabled);
 }
 
-void test_neither_does_a_reset_of_the_faults_before_it(void)
+void test_a_reset_of_the_faults_and_a_request_do_not_enable_switching(void)
 {
     run(PERIODS);
     drive.request.fault_resets++;

@@ -41,7 +41,7 @@ static void next_is(uint32_t id, uint64_t end_ns)
     TEST_ASSERT_EQUAL_UINT64(end_ns, passed.end_ns);
 }
 
-/* Davis, Burns, Bril, Lukkien, Controller Area Network schedulability analysis, 2007: 55 + 10 n and 80 + 10 n bit. */
+/* 55 + 10 n and 80 + 10 n bits: Davis, Burns, Bril, Lukkien, Controller Area Network schedulability analysis, 2007. */
 void test_a_frame_is_as_long_as_its_worst_case(void)
 {
     for (uint8_t n = 0; n <= 8; n++) {
@@ -52,7 +52,7 @@ void test_a_frame_is_as_long_as_its_worst_case(void)
     }
 }
 
-void test_a_frame_passes_when_its_last_bit_has(void)
+void test_a_frame_is_received_after_its_last_bit(void)
 {
     post(1, frame(0x100, 8), 5 * MS);
     TEST_ASSERT_FALSE(can_bus_next(&bus, 5 * MS + 135 * BIT - 1, &passed));
@@ -82,7 +82,7 @@ void test_a_node_sends_its_own_frames_in_the_order_it_was_given_them(void)
     next_is(0x100, 165 * BIT);
 }
 
-/* ISO 11898-1: of equal first 11 bits the standard frame wins; a lower base identifier wins over all. */
+/* ISO 11898-1: with equal first 11 bits the standard frame wins; a lower base identifier wins in any format. */
 void test_standard_and_extended_identifiers_are_compared_bit_by_bit(void)
 {
     post(1, extended(0x100U << 18 | 5U), 0);
@@ -109,7 +109,7 @@ void test_a_full_queue_loses_the_frame_and_counts_it(void)
     TEST_ASSERT_FALSE(can_bus_post(&bus, CAN_BUS_ECU, &f, 0));
 }
 
-/* 100 ms at 500 kbit/s are 50 000 bit: 370 frames of 135 bit are 49 950. */
+/* 100 ms at 500 kbit/s are 50,000 bits; 370 frames of 135 bits are 49,950. */
 void test_the_load_is_counted_and_flagged_beyond_70_percent(void)
 {
     for (int i = 0; i < 400; i++) {
@@ -137,12 +137,12 @@ void test_idle_windows_are_counted_as_idle(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 135.0 / 50000.0, bus.counts.own_load_peak);
 }
 
-void test_an_ecu_that_is_switched_off_says_nothing_more(void)
+void test_an_ecu_that_is_switched_off_sends_nothing_more(void)
 {
     post(CAN_BUS_ECU, frame(0x100, 8), 0);
     post(CAN_BUS_ECU, frame(0x101, 8), 0);
     post(1, frame(0x200, 8), 0);
-    TEST_ASSERT_FALSE(can_bus_next(&bus, 10 * BIT, &passed)); /* the first is on the wire */
+    TEST_ASSERT_FALSE(can_bus_next(&bus, 10 * BIT, &passed)); /* the first frame is being transmitted */
     can_bus_silence_ecu(&bus);
     next_is(0x200, 270 * BIT);
     TEST_ASSERT_FALSE(can_bus_next(&bus, 100 * MS, &passed));

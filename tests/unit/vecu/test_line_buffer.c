@@ -40,7 +40,7 @@ static void nothing(void)
     TEST_ASSERT_FALSE(line_buffer_next(&buffer, text));
 }
 
-void test_lines_are_found_however_they_arrive(void)
+void test_lines_are_found_in_portions_of_any_size(void)
 {
     feed("one\ntwo\nth");
     next_is("one");
@@ -88,7 +88,7 @@ void test_a_line_with_a_nul_in_it_is_dropped(void)
     TEST_ASSERT_EQUAL_UINT64(1, buffer.dropped);
 }
 
-void test_words_in_brackets_are_found_and_white_space_between_them_is_nothing(void)
+void test_words_in_brackets_are_found_and_white_space_between_them_is_ignored(void)
 {
     buffer.framing = LINE_IN_BRACKETS;
     feed("< one >< two >\r\n \t< thr");
@@ -101,7 +101,7 @@ void test_words_in_brackets_are_found_and_white_space_between_them_is_nothing(vo
     TEST_ASSERT_TRUE(line_buffer_empty(&buffer));
 }
 
-void test_rubbish_between_brackets_and_words_that_never_end_are_counted(void)
+void test_bytes_outside_brackets_and_words_without_an_end_are_counted(void)
 {
     buffer.framing = LINE_IN_BRACKETS;
     feed("rubbish< good >more< half < good >>");
@@ -124,9 +124,9 @@ void test_a_word_in_brackets_that_is_too_long_is_dropped(void)
     TEST_ASSERT_GREATER_OR_EQUAL_UINT64(1, buffer.dropped);
 }
 
-/* Any bytes in any portions: there is always free space again, and no text is longer than allowed (the sanitizers
- * watch). */
-void test_random_bytes_never_block_it(void)
+/* With any bytes in portions of any size there is always free space again, and no text is longer than allowed. The
+ * sanitizers report accesses outside the buffer. */
+void test_random_bytes_never_fill_the_buffer_for_good(void)
 {
     srand(2);
     for (int framing = 0; framing < 2; framing++) {

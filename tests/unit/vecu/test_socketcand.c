@@ -15,7 +15,7 @@ void tearDown(void)
 {
 }
 
-/* As python-can writes them. */
+/* The texts are those that python-can writes. */
 void test_a_frame_is_read_as_a_client_writes_it(void)
 {
     TEST_ASSERT_EQUAL_INT(SOCKETCAND_SEND, socketcand_parse(" send 123 3 1 ab ff ", &frame));
@@ -30,7 +30,7 @@ void test_a_frame_is_read_as_a_client_writes_it(void)
     TEST_ASSERT_EQUAL_HEX32(0x1FFFFFFF, frame.id);
 }
 
-void test_the_greetings_are_known(void)
+void test_the_commands_open_and_rawmode_are_known(void)
 {
     TEST_ASSERT_EQUAL_INT(SOCKETCAND_OPEN, socketcand_parse(" open can0 ", &frame));
     TEST_ASSERT_EQUAL_INT(SOCKETCAND_RAW, socketcand_parse(" rawmode ", &frame));
@@ -78,13 +78,14 @@ void test_a_frame_is_written_as_a_client_reads_it(void)
     TEST_ASSERT_EQUAL_size_t(strlen(text), length);
     const can_frame_t empty = {.id = 0x123, .extended = true};
     (void)socketcand_format(text, &empty, 1000);
-    TEST_ASSERT_EQUAL_STRING("< frame 00000123 0.000001  >", text); /* two blanks: an empty field, not a missing one */
+    TEST_ASSERT_EQUAL_STRING("< frame 00000123 0.000001  >", text); /* two spaces: the field of the data is empty */
     const can_frame_t longest = {.id = 0x1FFFFFFF, .extended = true, .length = 8};
     length = socketcand_format(text, &longest, UINT64_MAX);
     TEST_ASSERT_LESS_THAN_size_t(SOCKETCAND_TEXT, length);
 }
 
-/* Good texts with some characters exchanged: never a crash (the sanitizers watch), never a frame no bus could carry. */
+/* Valid texts with some characters replaced give no frame that is impossible on a bus. The sanitizers report accesses
+ * outside the text. */
 void test_a_million_damaged_texts_give_no_impossible_frame(void)
 {
     static const char alphabet[] = "send open rawmode 0123456789abcdefABCDEFxg<>\t\xff";
@@ -102,5 +103,5 @@ void test_a_million_damaged_texts_give_no_impossible_frame(void)
             TEST_ASSERT_TRUE(frame.length <= 8 && frame.id <= (frame.extended ? 0x1FFFFFFFU : 0x7FFU));
         }
     }
-    TEST_ASSERT_INT_WITHIN(400000, 500000, accepted); /* some of both */
+    TEST_ASSERT_INT_WITHIN(400000, 500000, accepted); /* some texts are accepted and some refused */
 }
