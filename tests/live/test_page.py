@@ -74,7 +74,7 @@ class Page:
         self.until(lambda: self.text("state") == "run" and self.find("torque").is_enabled(), "run, the slider")
 
     def hide(self, hidden: bool) -> float:
-        """Make the page believe that it is in the background, or visible again; the time of the newest drawn value."""
+        """Report the page as hidden or visible to its script; the time of the newest drawn value."""
         newest_s = self.run("Object.defineProperty(document, 'hidden', {value: arguments[0], configurable: true});"
                             "document.dispatchEvent(new Event('visibilitychange'));"
                             "return rings.INV_Status.data[0].at(-1);", hidden)  # fmt: skip

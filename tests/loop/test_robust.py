@@ -66,7 +66,7 @@ def test_after_a_drive_torque_is_right_at_every_speed_in_every_quadrant(driven: 
     # The campaign evaluates the distribution; here no point may exceed its 99th percentile. Where the voltage limit
     # decides the torque, only the estimate must be right.
     for rpm, torque, percent in ((150, 40, 2.5), (400, -30, 2.5), (800, 100, 2.5), (1500, -60, 2.5), (3000, 15, 2.5),
-                              (4500, -70, 2.5), (6000, 40, 3.0), (8000, -25, 3.0), (-2500, 60, 2.5)):  # fmt: skip
+                                 (4500, -70, 2.5), (6000, 40, 3.0), (8000, -25, 3.0), (-2500, 60, 2.5)):  # fmt: skip
         driven.to(rpm, torque, max(0.3, abs(rpm * RPM - driven.speed) / 1000.0))
         rows = driven.to(rpm, torque, 0.25 + 60.0 / abs(rpm))
         true, estimate, limited = rows[250:, [TORQUE, ESTIMATE, LIMITED]].mean(axis=0)

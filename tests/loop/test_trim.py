@@ -50,7 +50,7 @@ def test_after_a_minute_a_quarter_of_the_error_is_left_and_the_torque_is_no_wors
     worse = (with_ - without).max()
     rms = [float(np.sqrt(np.mean(np.square(e)))) for e in (without, with_)]
     print(f"{before_V:+.2f} V, {after_V:+.2f} V left; rms and largest error {rms[0]:.2f}, {without.max():.2f} % fixed, "
-          f"{rms[1]:.2f}, {with_.max():.2f} % trimmed, most worse {worse:+.2f} %")  # fmt: skip
+          f"{rms[1]:.2f}, {with_.max():.2f} % trimmed, largest increase {worse:+.2f} %")  # fmt: skip
     assert abs(after_V) <= 0.25 * abs(before_V)
     # No window may be worse by more than 0.5 %. The rms error may be 0.1 % larger, because the identifications of two
     # drives differ a little.

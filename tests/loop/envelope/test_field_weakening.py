@@ -112,8 +112,8 @@ def test_a_run_up_through_base_speed_at_full_request_follows_the_reported_reach(
 # angle sensor of 0.9 and 1.0 degrees electrical once and twice per turn. The currents may vary by the noise of the
 # converters, but not by the errors of the angle sensor.
 REACH_PLANT = {"lq_scale": 1.07, "cross_saturation_scale": 1.16, "ld_slope_scale": 1.06, "magnet_scale": 1.02,
-                "r_ohm_20": 0.022, "current_noise_A_rms": 0.8, "angle_bits": 12.0, "angle_h1_rad": 0.0152,
-                "angle_h1_phase": 2.86, "angle_h2_rad": 0.0171, "angle_h2_phase": 3.02}  # fmt: skip
+               "r_ohm_20": 0.022, "current_noise_A_rms": 0.8, "angle_bits": 12.0, "angle_h1_rad": 0.0152,
+               "angle_h1_phase": 2.86, "angle_h2_rad": 0.0171, "angle_h2_phase": 3.02}  # fmt: skip
 
 
 @pytest.mark.parametrize("sign", [1, -1])

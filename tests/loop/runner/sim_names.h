@@ -15,7 +15,7 @@ const char *sim_names_at(int index);
 void sim_plant_write(plant_params_t *params, int index, double value);
 double sim_plant_read(const plant_params_t *params, int index);
 double sim_truth_read(const plant_truth_t *truth, int index);
-/** False where a mean over periods means nothing: time, angles, integrals. */
+/** False for values whose mean over periods has no meaning: time, angles, integrals. */
 bool sim_truth_averages(int index);
 
 #endif
