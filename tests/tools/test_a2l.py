@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The description file: contents as two independent readers find them, and files that are not firmware."""
+"""The A2L file: its contents as two independent readers find them, and refusal of files that are not firmware."""
 
 import os
 import re
@@ -48,7 +48,7 @@ def test_the_freeze_frame_is_described_with_its_samples() -> None:
     assert frozen["freeze_time_ms"].count == 0
 
 
-# 22 periods at 22.5 kHz; XCP's units: 6 is 1 ms, 4 is 10 us.
+# The cycle as a whole number of units; XCP codes of the units: 6 is 1 ms, 4 is 10 us.
 @pytest.mark.parametrize(("step_s", "cycle"), [(1e-3, "1 6"), (22 / 22500, "98 4"), (5 / 4500, "111 4")])
 def test_the_raster_of_a_step_is_described_with_the_step_s_true_length(step_s: float, cycle: str) -> None:
     description = read(PROGRAM)

@@ -41,7 +41,7 @@ def tree(tmp_path: Path) -> Path:
 
 
 def write_structure(root: Path, *names: str) -> None:
-    """The table of files, in this order."""
+    """The STRUCTURE table with these files in this order."""
     rows, last = [], ""
     for name in names:
         folder, _, file = name.rpartition("/")
@@ -55,7 +55,7 @@ def write_structure(root: Path, *names: str) -> None:
 
 
 def write_readmes(root: Path, names: Iterable[str]) -> None:
-    """Of each folder: its files, or its folders, in this order after those that are there."""
+    """A README for each folder with its files, or its folders, in this order after those that it lists already."""
     stems: dict[Path, dict[str, None]] = {}
     for path in map(Path, names):
         stems.setdefault(path.parent, {})[path.stem] = None
@@ -71,7 +71,7 @@ def write_readmes(root: Path, names: Iterable[str]) -> None:
 
 
 def append_structure(root: Path, *names: str) -> None:
-    """More files, each at the end of the table."""
+    """Add each of these files at the end of the table."""
     table = root / "docs" / "architecture.md"
     before = table.read_text()
     write_structure(root, *names)
@@ -79,7 +79,7 @@ def append_structure(root: Path, *names: str) -> None:
 
 
 def write(root: Path, name: str, text: str) -> None:
-    """A source file with everything the style wants."""
+    """Write a source file with the licence line and the include guard that the checker of style requires."""
     path = root / name
     path.parent.mkdir(parents=True, exist_ok=True)
     folder = path.parent.name.upper()
@@ -407,7 +407,7 @@ def test_a_wait_that_follows_progress_is_left_alone(tree: Path, path: str, line:
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., list[str]]:
-    """What the checker of time-outs says about one test of which ctest knows these properties."""
+    """A function that returns the messages of the checker of time-outs for one test with these ctest properties."""
     monkeypatch.syspath_prepend(str(CHECKS))
     times = importlib.import_module("times")
     (tmp_path / "tests").mkdir(exist_ok=True)

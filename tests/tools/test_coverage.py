@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coverage gate finds what no test reaches, and refuses an exclusion that does not say why."""
+"""The coverage gate finds code that no test reaches, and refuses an exclusion without a reason."""
 
 import json
 import subprocess
@@ -13,7 +13,7 @@ REASON = "the compiler needs a value here"
 
 
 def check(root: Path, *arguments: str | Path) -> tuple[int, str, str]:
-    """Exit code, what is printed, what is complained about."""
+    """Exit code, standard output, error output."""
     done = subprocess.run([sys.executable, CHECKER, "--root", root, *arguments], capture_output=True, text=True,
                           check=False)  # fmt: skip
     assert "Traceback" not in done.stderr
@@ -69,7 +69,7 @@ SOURCE = ["int both(int a, int b)", "{", "    return a > 0 && b > 0;", "}"]
 
 
 def report_of(root: Path, lines: list[dict]) -> Path:
-    """What gcovr would have written about SOURCE."""
+    """Write a report as gcovr would write it for SOURCE."""
     write(root, "firmware/fx/a.c", *SOURCE)
     path = root / "coverage.json"
     path.write_text(json.dumps({"files": [{"file": "firmware/fx/a.c", "lines": lines}]}))
@@ -130,7 +130,10 @@ PROGRAM = [
 
 
 def built(root: Path, *optimised: str) -> Path:
-    """Two objects with the same inline function, run; gcovr's report. Of the first, n > 31 is never tried."""
+    """Compile two objects with the same inline function, run them, and return gcovr's report.
+
+    n > 31 is never true, so that one of the four branches is not taken.
+    """
     build = root / "build"
     build.mkdir(exist_ok=True)
     write(root, "firmware/fx/range.h", *PROGRAM)
@@ -161,7 +164,7 @@ def test_the_gate_reads_what_compiler_and_gcovr_write(tmp_path: Path) -> None:
 
 
 def test_an_inline_function_with_other_branches_in_another_object_is_refused(tmp_path: Path) -> None:
-    """An optimised object has two branches where the other one has four: added up they mean nothing."""
+    """An optimised object has two branches where the other one has four: the sum of their counts means nothing."""
     report = built(tmp_path, "-O3")
     code, _, complaint = check(tmp_path, "--report", report, "--build", tmp_path / "build")
     assert code == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layout's checker finds what is laid out otherwise, repairs it, and leaves alone what is right."""
+"""The checker of the layout finds files that differ from it, repairs them, and leaves the others unchanged."""
 
 import shutil
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The hooks before a commit and the workflow run programs of this checkout, and fetch nothing from elsewhere."""
+"""The pre-commit hooks and the workflow run programs of this checkout and download nothing from elsewhere."""
 
 import os
 import re

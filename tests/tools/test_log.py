@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded drive comes back as it was: signals, table, picture."""
+"""`fluxtrue log` reads a recorded drive without loss: signals, table, plot."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCom
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Half a second: the estimate rises to 40 N·m, one frame is of a stranger, one too short."""
+    """Half a second: the estimate rises to 40 N·m; one frame has an identifier not in the DBC, one is too short."""
     message = cantools.database.load_file(DBC).get_message_by_name("INV_Status")
     recorder = BusLog()
     for k in range(50):

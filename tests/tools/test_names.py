@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of names finds pages that name what is not there."""
+"""The checker of names finds pages that name a file, a function or a field that does not exist."""
 
 import subprocess
 import sys

@@ -14,7 +14,7 @@ needs_arm = pytest.mark.skipif(not shutil.which(ARM[0]), reason="no Arm compiler
 
 
 def check(folder: Path, source: str, compiler: tuple[str, ...], name: str = "fx/bad.c") -> str:
-    """What the checker says about a layer with this one file; empty if it is content."""
+    """The messages of the checker for a layer with this one file; empty if it finds nothing."""
     layer, file_name = name.split("/")
     code = folder / file_name
     code.write_text(source)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a command writes is checked before it works, and is there whole or not at all; every command takes part."""
+"""Outputs of every command are checked before its work begins, and appear complete or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ def test_a_path_that_cannot_be_written_is_refused_at_once(
 def test_a_write_protected_file_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "x.csv"
     path.write_text("old")
-    # Root may write everything: the answer of the system for another user.
+    # Root may write every file: this is the system's answer for another user.
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(FluxtrueError, match="write-protected"):
         declare(path)

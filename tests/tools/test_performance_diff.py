@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The difference of two performance.json: every change is a row, nothing else is."""
+"""The difference of two performance.json files: one row for each change, and no other row."""
 
 import copy
 import json
@@ -71,7 +71,7 @@ def test_the_committed_figures_can_be_read() -> None:
 
 @pytest.fixture
 def repository(tmp_path: Path) -> Path:
-    """A repository with one commit of the figures, and other figures in its tree."""
+    """A repository with the figures in one commit, and other figures in its working tree."""
     page = tmp_path / "docs" / "performance.json"
     page.parent.mkdir()
     page.write_text(json.dumps(FIGURES), encoding="utf-8")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shell scripts from any folder, in a path with spaces, without network and without root."""
+"""The shell scripts work from any folder and in a path with spaces, and report a missing network or root clearly."""
 
 import fcntl
 import os
@@ -45,7 +45,7 @@ def stub(folder: Path, name: str, text: str) -> None:
 
 @pytest.fixture
 def bare_path(tmp_path: Path) -> Path:
-    """A PATH with everything the demonstration needs, but Ninja; apt-get has no network."""
+    """A PATH with everything that the demonstration needs except Ninja; apt-get fails as without a network."""
     folder = tmp_path / "bin"
     folder.mkdir()
     for name in (*BASICS, "gcc", "cmake"):

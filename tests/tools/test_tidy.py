@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of C finds planted errors, and remembers only what its verdict still holds for."""
+"""The checker of C finds planted errors, and uses a stored verdict only while it is still valid."""
 
 import json
 import shutil
@@ -58,7 +58,7 @@ def write(root: Path, name: str, text: str) -> None:
 
 
 def database(root: Path, *names: str) -> None:
-    """What CMake writes down for these files."""
+    """The compile_commands.json that CMake writes for these files."""
     entries = [
         {
             "directory": str(root / "build" / "host"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The checker of words finds the ones that are not terms of the field, and says what to use instead."""
+"""The checker of words finds words that are not terms of the field, and says which to use instead."""
 
 import subprocess
 import sys

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mutated files and command lines: one line and exit code 2, or a whole result; never a traceback, never half of it.
+"""Mutated files and command lines: every command ends with one message and exit code 2, or with a complete result.
 
-FLUXTRUE_ABUSE is the number of inputs of each test: 12 by default, CONTRIBUTING.md has the command for the full count.
-What would start a program, a server or a long run is replaced by a refusal that says so ("accepted").
+No input may cause a traceback or a partial output. FLUXTRUE_ABUSE is the number of inputs of each test: 12 by default;
+CONTRIBUTING.md has the command for the full count. Functions that would start a program, a server or a long run are
+replaced by one that refuses with the message "accepted".
 """
 
 import contextlib
@@ -26,7 +27,7 @@ from fluxtrue_tools.errors import FluxtrueError
 
 COUNT = int(os.environ.get("FLUXTRUE_ABUSE", "12"))
 ROOT = Path(__file__).resolve().parents[3]
-set_hypothesis_home_dir(ROOT / "build" / "hypothesis")  # it keeps files of its own even without a database
+set_hypothesis_home_dir(ROOT / "build" / "hypothesis")  # Hypothesis writes files there even without a database
 ABUSED = settings(max_examples=COUNT, deadline=None, derandomize=True, database=None,
                   suppress_health_check=list(HealthCheck))  # fmt: skip
 
@@ -119,7 +120,7 @@ ODD_CELLS = ("nan", "1e300", "-1e300", "", "x", "0", "1e-300", "1_0", "-5", "1e5
 
 
 class Accepted(FluxtrueError):
-    """In place of what a command would go on to do."""
+    """Raised in place of the work that would follow once the input has been accepted."""
 
 
 def accepted(*_: Any, **__: Any) -> Any:
@@ -128,7 +129,7 @@ def accepted(*_: Any, **__: Any) -> Any:
 
 @pytest.fixture(scope="module", autouse=True)
 def stubs() -> Iterator[None]:
-    """No build, no server, no other program, no long run."""
+    """Replace everything that builds, serves, starts another program or runs for long."""
     import fluxtrue_tools.bench as bench
     import fluxtrue_tools.campaign.run as campaign_run
     import fluxtrue_tools.demo.all as demo_all
@@ -180,7 +181,7 @@ def workplace(files: dict[str, str | bytes]) -> Iterator[Path]:
 
 
 def abuse(files: dict[str, str | bytes], arguments: list[str], outputs: list[str], must_fail: bool = False) -> None:
-    """Run it and hold it to the promise."""
+    """Run the command and check exit code, messages, inputs and outputs."""
     with workplace(files) as folder:
         before, out, err = snapshot(folder), io.StringIO(), io.StringIO()
         told = f"fluxtrue {arguments!r}"
@@ -213,7 +214,7 @@ LINES = st.integers(0, 10**6)
 
 @st.composite
 def mutated(draw: Callable[..., Any], good: str) -> tuple[str | bytes, bool]:
-    """A file's text with something done to it, and whether it must be refused whatever that was."""
+    """The text of a file with one mutation, and whether the file must be refused because of it."""
     lines = good.splitlines()
     kind = draw(st.sampled_from(["value", "value", "value", "unknown", "twice", "drop", "cut", "bytes", "swap"]))
     at = draw(LINES) % len(lines)
@@ -246,7 +247,7 @@ def mutated(draw: Callable[..., Any], good: str) -> tuple[str | bytes, bool]:
 
 @st.composite
 def mutated_table(draw: Callable[..., Any], good: str) -> str | bytes:
-    """A table of text and numbers with something done to it."""
+    """A table of text and numbers with one mutation."""
     rows = [line.split(",") for line in good.splitlines()]
     kind = draw(st.sampled_from(["cell", "cell", "cell", "drop", "twice", "column", "cut", "bytes"]))
     row = draw(LINES) % len(rows)
@@ -271,7 +272,7 @@ def mutated_table(draw: Callable[..., Any], good: str) -> str | bytes:
 
 @st.composite
 def mutated_map(draw: Callable[..., Any]) -> str | bytes:
-    """A flux map with something done to it."""
+    """A flux map with one mutation."""
     rows = [line.split(",") for line in MAP.splitlines()]
     kinds = ["cell", "cell", "drop", "twice", "column", "separator", "scale", "sign", "offset", "bytes"]
     kind = draw(st.sampled_from(kinds))
@@ -342,7 +343,7 @@ COMMANDS = (
 NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("faults",): ["in.toml"], ("motor", "check"): ["m"],
           ("motor", "build"): ["m"], ("target", "seal"): ["in.toml"], ("log",): ["in.toml"],
           ("a2l",): ["in.toml"]}  # fmt: skip
-NOT_RUN = {"--check", "--update", "--scheduler", "--can-interface"}  # would measure for minutes, or wait for a network
+NOT_RUN = {"--check", "--update", "--scheduler", "--can-interface"}  # would run for minutes or need a network
 
 
 def options(name: tuple[str, ...]) -> list[str]:
@@ -366,7 +367,7 @@ def test_command_lines(name: tuple[str, ...]) -> None:
 
     files: dict[str, str | bytes] = {"in.toml": {"campaign": CAMPAIGN, "faults": FAULTS}.get(name[0], SCENARIO)}
     files |= {"fmea.csv": FMEA, "m/motor.toml": MOTOR, "m/flux_map.csv": MAP}
-    # Half of them: what the command needs, and one option with an odd value; the rest: any words.
+    # Half of the command lines have valid inputs and one option with an odd value, the rest any words.
     pairs = st.tuples(st.sampled_from(options(name) or ["-x"]), st.sampled_from(ODD_PATHS))
 
     @ABUSED

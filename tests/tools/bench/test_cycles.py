@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cycles by opcode: the tables of the Cortex-M4 Technical Reference Manual, one line each class."""
+"""Cycles by opcode: the tables of the Cortex-M4 Technical Reference Manual, one line for each class."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_an_opcode_costs_what_the_manual_says(mnemonic: str, operands: str, expe
 def test_an_unknown_instruction_is_an_error_that_names_it() -> None:
     with pytest.raises(FluxtrueError, match="'vsel.f32'"):
         cycles.cycles(Instruction(0, 4, "vsel.f32", "s0, s1, s2"))
-    with pytest.raises(FluxtrueError, match="'wfi'"):  # as one in an image would be: it waits, however long
+    with pytest.raises(FluxtrueError, match="'wfi'"):  # not counted: how long it waits is unknown
         cycles.image_costs(parse("00000410 <f>:\n 410:\tbf30      \twfi\n"), 0x420)
 
 

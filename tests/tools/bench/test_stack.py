@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The deepest stack of small programs, worked out by hand, and planted violations that must be found."""
+"""The deepest stack of small programs, compared with hand calculation; planted violations are found."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_levels_add_the_frame_of_what_they_interrupt(tmp_path: Path) -> None:
     depths = stack.Depths(nodes(tmp_path, source), {})
     wanted = [stack.Level(name, (name,)) for name in ("start", "middle", "top")]
     uses = stack.levels(depths, wanted)
-    # 26 words over a context with floating point, 8 over one without, one word more for alignment.
+    # An exception pushes 26 words above a context with floating point, 8 above one without, and one to align the stack.
     assert [(u.frame, u.stack) for u in uses] == [(0, 8), (108, 4), (36, 8)]
     assert depths.problems == []
     stack.levels(depths, [stack.Level("gone", ("vanished",))])

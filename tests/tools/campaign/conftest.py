@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A campaign that takes seconds, and the machine it runs on."""
+"""A campaign that takes seconds, and its motor."""
 
 import os
 import subprocess

@@ -22,7 +22,7 @@ from fluxtrue_tools.sim.library import Loop
 
 
 def test_two_states_and_three_measurements_give_the_covariance_worked_out_by_hand() -> None:
-    # Priors 4 and 1; y1 = x1 twice with variance 2, y2 = x1 + x2 with variance 1, and the window sees x2 with 0.5.
+    # Prior variances 4 and 1; x1 measured twice (variance 2), x1 + x2 once (variance 1); the window measures x2 (0.5).
     rows = np.array([[1.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
     information_of_drive = np.diag([0.25, 1.0]) + information(rows, np.array([2.0, 2.0, 1.0]))
     assert information_of_drive == pytest.approx(np.array([[2.25, 1.0], [1.0, 2.0]]))
@@ -63,7 +63,7 @@ def test_the_noise_of_a_mean_falls_with_its_length(small: Campaign, machine: Mac
 def test_the_slopes_are_those_of_the_steady_state_equations(small: Campaign, machine: Machine) -> None:
     drawn = sample(small, machine, draws(small.seed, 0))
     physics, x = physics_of(machine, drawn), truth_of(machine, drawn)
-    # Nothing wrong but what is asked for: gains 1, no angle error, no iron loss.
+    # No errors of the sensors and no iron loss, so that the slopes can be calculated by hand.
     for name, value in {"vdc_gain": 1.0, "current_gain": 1.0, "angle": 0.0, "iron": 0.0}.items():
         x[STATES.index(name)] = value
     i, omega = np.array([-60.0 + 80.0j]), np.array([1000.0])
@@ -88,7 +88,7 @@ def test_the_model_says_what_the_simulated_drive_does(
     small: Campaign, machine: Machine, speed_rpm: float, torque_Nm: float
 ) -> None:
     drawn = sample(small, machine, draws(small.seed, 2))
-    # Means over turns leave nothing of these; without them a short run is enough.
+    # These vanish in a mean over whole turns; without them a short run is enough.
     still = dict.fromkeys(("angle_h1_rad", "angle_h2_rad", "current_noise_A_rms"), 0.0)
     omega_m = speed_rpm * 2.0 * math.pi / 60.0
     with Loop(machine.motor.library, drawn.plant | still | {"speed_rad_s": omega_m}, machine.motor.flux_map) as loop:
@@ -100,7 +100,7 @@ def test_the_model_says_what_the_simulated_drive_does(
         loop.record(names, 1000)
         i_d, i_q, u_d, u_q, torque = loop.run(1000)[0]
     physics, x = physics_of(machine, drawn), truth_of(machine, drawn)
-    # The terminals know neither sensors nor the inverter's losses.
+    # The recorded voltages are those at the terminals: no errors of sensors, no losses of the inverter.
     for name, value in {"dead_time": 0.0, "device_drop": 0.0, "vdc_gain": 1.0, "current_gain": 1.0,
                         "angle": 0.0}.items():  # fmt: skip
         x[STATES.index(name)] = value

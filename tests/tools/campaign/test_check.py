@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What cannot be measured, and keys without effect, are refused by their keys before anything is run or written."""
+"""Campaigns that cannot be measured and keys without effect are refused, by key, before anything is run or written."""
 
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def test_a_band_without_windows_has_no_bounds_and_no_verdict(machine: Machine) -
 
 
 def test_plants_that_reach_no_window_are_said_and_leave_no_folder(tmp_path: Path) -> None:
-    """The nominal machine reaches the torque, none of the drawn ones does: their magnets are a third."""
+    """The nominal machine reaches the torque; no drawn one does, because its magnet has a third of the flux."""
     weak = SMALL.replace("settle_s", "torque_min_Nm = 120\nsettle_s").replace("cases = 4", "cases = 1")
     (tmp_path / "c.toml").write_text(weak + "[spread]\nmagnet_scale = [0.3, 0.3]\n")
     result = campaign("c.toml", "--out", "out", "--workers", 1, cwd=tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bad campaigns get one line that names file, field, value and what was allowed."""
+"""A bad campaign file is refused with one line that names file, key, value and what is allowed."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole campaigns, small ones: the same numbers however they are run, interrupted or spread."""
+"""Small campaigns from start to end: the results do not depend on workers, interruptions or a cluster."""
 
 import json
 import os
@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(folder: Path) -> pd.DataFrame:
-    """All cases by one worker: what every other way must reproduce."""
+    """Results of all cases by one worker, which every other way to run them must reproduce."""
     result = campaign("small.toml", "--out", "whole", "--workers", 1, cwd=folder)
     assert result.returncode == 0, result.stderr
     return pd.read_parquet(folder / "whole" / "results.parquet")
@@ -103,9 +103,9 @@ def _kill_after_first_case(folder: Path, campaign_file: str, out: str) -> None:
 
 
 def test_a_killed_campaign_goes_on_where_it_was(folder: Path, whole: pd.DataFrame) -> None:
-    """Far more cases than any computer finishes before the kill; then two more than the last it has finished.
+    """The killed run has far more cases than can finish before the kill; the second run ends two cases after the last.
 
-    Cases that finish together are stored in any order, so the finished ones need not be the first ones.
+    Cases that finish at the same time are stored in any order, so the finished ones need not be the first ones.
     """
     (folder / "many.toml").write_text(SMALL.replace("cases = 4", "cases = 100000"))
     _kill_after_first_case(folder, "many.toml", "killed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a case draws: inside its ranges, all over them, and independent of the caller."""
+"""The values drawn for a case lie in their ranges, fill them, and do not depend on the caller."""
 
 import math
 
@@ -85,7 +85,7 @@ def test_what_the_plant_gets_is_the_nominal_value_times_its_factor(small: Campai
 
 
 def test_the_motors_own_nominal_values_go_before_those_of_the_campaign(small: Campaign, machine: Machine) -> None:
-    # hsm1's motor.toml has all three; the campaign's are for motors that have none.
+    # hsm1's motor.toml has all three; values in a campaign are for motors without them.
     assert (machine.nominal.device_drop_V, machine.nominal.iron_k_h, machine.nominal.iron_k_e) == (1.0, 13.0, 0.0103)
     other = small.model_copy(update={"nominal": Nominal(device_drop_V=3.0, iron_k_h=1.0)})
     assert make_machine(machine.motor.folder, other, "c.toml").nominal == machine.nominal
@@ -121,7 +121,7 @@ def test_a_weak_magnet_shrinks_the_envelope_and_a_strong_one_never_exceeds_what_
     nominal = make_envelope(machine, NOTHING_WRONG)
     weak = make_envelope(machine, NOTHING_WRONG | {"magnet_scale": 0.8})
     strong = make_envelope(machine, NOTHING_WRONG | {"magnet_scale": 1.05})
-    # All the torque there is at 250 A is 132.3 N·m; 3 % are kept as a margin.
+    # The largest torque at 250 A is 132.3 N·m; 3 % are kept as a margin.
     assert nominal.at(0.0) == pytest.approx(0.97 * 132.3, rel=2e-3)
     assert (weak.torque_Nm < nominal.torque_Nm).all()
     assert (strong.torque_Nm <= nominal.torque_Nm).all()
@@ -136,7 +136,7 @@ def test_the_drive_lasts_as_asked_starts_and_ends_at_rest_and_reaches_the_cycles
     profile = make_profile(drive, envelope, np.random.default_rng(3))
     assert profile.speed_rad_s.size == 60.0 / STEP_S + 1
     assert profile.speed_rad_s[0] == profile.speed_rad_s[-1] == 0.0
-    # 131.3 km/h at 0.32 m and 9:1 are 1025.7 rad/s, pressed by up to a traffic swing and the time axis' steps.
+    # 131.3 km/h at 0.32 m and 9:1 are 1025.7 rad/s; random traffic and the time steps move it a little.
     assert profile.speed_rad_s.max() == pytest.approx(131.3 / 3.6 / 0.32 * 9.0, rel=0.03)
     speed_rpm = profile.speed_rad_s * 60.0 / (2.0 * math.pi)
     assert all(abs(t) <= envelope.at(n) + 1e-9 for t, n in zip(profile.torque_Nm, speed_rpm, strict=True))

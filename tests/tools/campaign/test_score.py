@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of merit from hand-made errors."""
+"""Figures of merit calculated from given errors."""
 
 import math
 

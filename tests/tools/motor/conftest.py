@@ -38,7 +38,7 @@ MAPPED: dict[str, Any] = {"flux_map": '"flux_map.csv"', "ld_H": None, "lq_H": No
 
 
 def toml(changes: dict[str, dict[str, Any]]) -> str:
-    """The good file with changes: {section: {key: raw TOML or None to leave out}}."""
+    """The good motor.toml with changes: {section: {key: raw TOML, or None to leave the key out}}."""
     text = []
     for section in {**GOOD, **changes}:
         keys = {**GOOD.get(section, {}), **changes.get(section, {})}
@@ -86,10 +86,10 @@ def plane(id_A: list[float], iq_A: list[float], psi: Callable[[float, float], tu
 
 
 def straight(d: float, q: float) -> tuple[float, float]:
-    """The good machine's constants as a map."""
+    """A map of the constant inductances of the good machine."""
     return 0.084 + 0.2e-3 * d, 0.5e-3 * q
 
 
 def saturating(d: float, q: float) -> tuple[float, float]:
-    """A smooth machine with saturation and cross-saturation, odd and even as it should be."""
+    """A smooth machine with saturation and cross-saturation; psi_d is even in i_q and psi_q odd."""
     return 0.084 + 0.2e-3 * d - 2e-7 * q * q * (1 + d / 600), 0.6e-3 * q / (1 + abs(q) / 400) * (1 + d / 2500)

@@ -10,7 +10,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.motor import load_motor
 
-# change, words the message must have
+# change, words that the message must contain
 BAD = [
     ({"machine": {"pole_pairs": None}}, ["machine.pole_pairs", "missing", "whole number from 1 to 50"]),
     ({"machine": {"pole_pairs": 0}}, ["machine.pole_pairs = 0", "from 1 to 50"]),

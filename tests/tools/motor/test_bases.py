@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bases, gains and what the generated C says of them."""
+"""Per-unit bases and gains, and their values in the generated C."""
 
 import math
 import re
@@ -87,7 +87,7 @@ def test_the_over_current_trip_lies_above_i_max_and_below_80_percent_of_full_sca
 
 
 def test_current_control_gains_come_from_the_delay(motor):
-    """T_d = 150 us: sigma = 1/300 us = 3333 rad/s. Zero and closed loop share sigma, b is the loop's share."""
+    """T_d = 150 us: sigma = 1/(2 T_d) = 3333 rad/s; closed loop w_c = b sigma, zero a = (1 - b) sigma."""
     c = members(motor_tables_c(motor))
     sigma = c["sigma_q24"] / 2**24 * motor.bases.omega_rad_s
     assert sigma == pytest.approx(10000 / 3, rel=1e-4)
@@ -122,7 +122,7 @@ def test_options_reach_the_tables(write):
     c = members(motor_tables_c(motor))
     # Dead time: (0.02 + 1.75/350) half compensated.
     assert c["dead_time_q16"] / 65536 == pytest.approx(0.0125, abs=2**-15)
-    # A pulse of 4 us in 100 us: half a duty less all of it, and less half of it.
+    # A pulse of 4 us in 100 us is 0.04: 0.5 less the whole pulse, and less half of it.
     assert c["longest_q31"] / 2**31 == pytest.approx(0.46, abs=2**-15)
     assert c["nearer_rail_q31"] / 2**31 == pytest.approx(0.48, abs=2**-15)
     assert c["torque_slew"] / 32768 * motor.bases.torque_Nm == pytest.approx(1.0, rel=0.01)

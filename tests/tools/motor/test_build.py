@@ -194,7 +194,7 @@ double first_l_d(void)
 
 @pytest.fixture(scope="module", params=["hsm1", "paper"])
 def firmware(request, tmp_path_factory):
-    """The generated file with the firmware's own stages, as a library; and the motor as Python has it."""
+    """The generated file and the stages of the firmware in a library; and the motor as loaded by Python."""
     folder = tmp_path_factory.mktemp(request.param)
     motor = build(MOTORS / request.param, folder, report=False)
     (folder / "shim.c").write_text(SHIM, encoding="utf-8")
@@ -220,7 +220,7 @@ def test_the_firmware_accepts_the_generated_data(firmware):
 
 
 def test_the_reports_table_error_is_that_of_the_firmwares_own_look_up(firmware):
-    """Python's integer model of the look-up and the C one agree to the last bit, clamping included."""
+    """The integer model of the look-up in Python and the C code agree to the last bit, also where they clamp."""
     library, motor = firmware
     rng = np.random.default_rng(3)
     full = motor.config.machine.i_max_A / motor.bases.current_A * 32768

@@ -98,7 +98,7 @@ def test_an_offset_of_psi_q_is_warned_of(write: Write, iq_A: list[float], offset
 
 
 def test_a_map_that_no_energy_belongs_to_is_warned_of(write: Write) -> None:
-    """psi_d falls with i_q² and psi_q knows nothing of it: the curl is 2 twist i_q, by hand 21 % here.
+    """psi_d falls with i_q² while psi_q does not depend on i_d: the curl is 2 twist i_q, by hand 24 % here.
 
     Mean of i_q² over the half disc: i_max²/4, so rms(curl) = 2·3e-7·125 A = 75 µH; sqrt(0.2·0.5) mH = 316 µH.
     """

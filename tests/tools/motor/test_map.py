@@ -80,14 +80,14 @@ def test_a_straight_machine_on_a_non_uniform_map_gives_the_tables_of_its_constan
     mapped = load_motor(write(flux_map=plane(ID, FULL, straight)))
     constant = load_motor(write())
     for name in ("l_d_H", "l_q_H", "l_dd_H", "l_qq_H", "psi_f0_Vs"):
-        # A cubic reproduces a straight line; 1e-9 relative is what the division by i leaves.
+        # A cubic reproduces a straight line; the division by i leaves a relative error of 1e-9.
         assert getattr(mapped.tables, name) == pytest.approx(getattr(constant.tables, name), rel=1e-9)
     for name, table in stored(constant).items():
         assert np.abs(np.array(stored(mapped)[name]) - np.array(table)).max() <= 1, name
 
 
 def test_a_half_map_loses_its_psi_q_at_no_iq_openly(write):
-    """psi_q(i_d, 0) = 2 mVs everywhere is a measuring offset: taken away, and reported."""
+    """psi_q(i_d, 0) = 2 mVs everywhere is an offset of the measurement: it is removed and reported."""
     text = plane(ID, HALF, lambda d, q: (saturating(d, q)[0], saturating(d, q)[1] + 0.002))
     shifted = load_motor(write(flux_map=text, machine={"torque_max_Nm": 60.0}))
     assert shifted.flux_map.symmetry.psi_q_max_Vs == pytest.approx(0.002, abs=1e-15)
@@ -107,7 +107,7 @@ def test_halves_on_different_nodes_are_interpolated_onto_each_other(write):
 
 
 def test_a_map_a_plain_spline_would_overshoot_keeps_rising_inductances(write):
-    """A knee in psi_q: 2 mH up to 20 A, then 200 uH. A cubic spline through it swings below zero slope."""
+    """A knee in psi_q: 2 mH up to 20 A, then 200 uH. A plain cubic spline would have a negative slope there."""
 
     def knee(d, q):
         bent = 2e-3 * min(abs(q), 20.0) + 2e-4 * max(abs(q) - 20.0, 0.0)

@@ -36,7 +36,7 @@ def test_mtpa_of_constant_inductances_is_the_textbook_formula(paper, current):
     q = math.sqrt(current**2 - d**2)
     torque = 1.5 * P * (PSI * q + (L_D - L_Q) * d * q)
     contour = paper.solver.contours(np.array([torque]))[0]
-    # The minimum is flat: a parabola through three points 0.83 A apart finds it to some mA.
+    # The minimum is flat: a parabola through three points 0.83 A apart finds it within a few mA.
     assert contour.id_A[0] == pytest.approx(d, abs=0.02)
     assert contour.iq_A[0] == pytest.approx(q, abs=0.02)
 
@@ -60,7 +60,7 @@ def test_weakening_of_constant_inductances_solves_both_equations(paper, torque, 
 
 @pytest.fixture(scope="module")
 def brute(hsm1):
-    """Torque, flux and current of hsm1 over a half-ampere grid, by another interpolation: straight lines."""
+    """Torque, flux and current of hsm1 on a grid of 0.5 A, by linear interpolation instead of the splines."""
     m = hsm1.flux_map
     d, q = np.meshgrid(np.linspace(-250, 0, 501), np.linspace(0, 250, 501), indexing="ij")
     psi_d, psi_q = (RegularGridInterpolator((m.id_A, m.iq_A), z)((d, q)) for z in (m.psi_d_Vs, m.psi_q_Vs))
@@ -72,7 +72,7 @@ def test_hsm1_mtpa_needs_no_more_current_than_an_exhaustive_search_finds(hsm1, b
     _, _, t, _, current = brute
     best = current[(t >= torque) & (current <= 250)].min()
     contour = hsm1.solver.contours(np.array([torque]))[0]
-    # The search sees a 0.5 A grid (up to 0.7 A too much) and chords of the map (10 A long: up to 0.5 %).
+    # The grid of 0.5 A makes up to 0.7 A too much, and linear interpolation between nodes 10 A apart up to 0.5 %.
     assert best - 0.7 - 0.005 * best <= math.hypot(contour.id_A[0], contour.iq_A[0]) <= best + 0.005 * best
 
 
@@ -81,7 +81,7 @@ def test_hsm1_weakening_needs_no_more_current_than_an_exhaustive_search_finds(hs
     _, _, t, flux, current = brute
     best = current[(t >= torque) & (flux <= psi) & (current <= 250)].min()
     i_d, i_q = hsm1.solver.contours(np.array([torque]))[0].at(np.array([psi]))
-    # Torque and flux contours cross at a flat angle: half an ampere across is up to 2.5 A along.
+    # The contours of torque and flux cross at a small angle: 0.5 A across them is up to 2.5 A along them.
     assert best - 3.0 - 0.005 * best <= math.hypot(i_d[0], i_q[0]) <= best + 0.005 * best
 
 
@@ -103,7 +103,7 @@ def test_stored_references_keep_torque_current_and_flux(name):
 
 
 def bilinear(table, x, y):
-    """By hand, in floating point."""
+    """Bilinear interpolation in floating point."""
     i, j = min(int(x), table.shape[0] - 2), min(int(y), table.shape[1] - 2)
     a, b = x - i, y - j
     return ((1 - a) * (1 - b) * table[i, j] + (1 - a) * b * table[i, j + 1]
@@ -155,7 +155,7 @@ def test_a_machine_that_cannot_weaken_enough_is_told(write):
 
 
 def test_flux_that_no_current_can_reach_does_not_count_as_an_error_of_the_table(write):
-    """Smallest |psi| within 250 A is 46.5 mVs: below it the table can only do its best."""
+    """The smallest |psi| within 250 A is 46.5 mVs: less flux than that cannot be reached by any entry of the table."""
     motor = load_motor(write(machine={"ld_H": 0.15e-3, "lq_H": 0.2e-3, "torque_max_Nm": 100.0}))
     assert motor.references.psi_Vs[0] < 0.0465 < motor.references.psi_Vs[-1]
     assert motor.references.torque_max_Nm[0] == 0.0

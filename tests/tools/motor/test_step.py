@@ -47,7 +47,7 @@ def test_every_length_of_a_step_is_within_an_eighth_of_a_millisecond():
     assert 0.888e-3 < min(steps) < max(steps) < 1.125e-3 + 1e-9
 
 
-# 22.5 and 4.5 lie in the middle: the larger number.
+# 22.5 and 4.5 periods per millisecond lie in the middle between two whole numbers: the larger one is taken.
 @pytest.mark.parametrize(("pwm_hz", "n", "step_s"), [(22500.0, 23, 23 / 22500), (4500.0, 5, 5 / 4500),
                                                       (8000.0, 8, 1e-3)])  # fmt: skip
 def test_rates_and_gains_are_those_of_the_true_step(generated, pwm_hz, n, step_s):
@@ -74,7 +74,7 @@ def test_rates_and_gains_are_those_of_the_true_step(generated, pwm_hz, n, step_s
 @pytest.mark.parametrize(("pwm_hz", "step_s"), [(4499.0, 4 / 4499), (4500.0, 5 / 4500), (10000.0, 1e-3),
                                                 (16400.0, 16 / 16400)])  # fmt: skip
 def test_debouncing_counts_cover_their_times_and_no_step_more(generated, pwm_hz, step_s):
-    """ms by hand from docs/theory/monitors.md and commissioning.md."""
+    """The times in ms are those of docs/theory/monitors.md and commissioning.md."""
     c, _, motor = generated(pwm_hz)
     times_ms = {"deviation": 100, "lost": 8, "ripple": 20, "equal": 20, "fast": 5, "hot": 110, "torque": 20,
                 "angle": 5, "settle": 5, "contradicted": 70, "measure": 64, "trim": 1000}  # fmt: skip
@@ -104,7 +104,7 @@ def test_a_slow_machine_with_much_flux_keeps_its_rate_of_flux_in_32_bits(write, 
 
 
 def test_the_fastest_machine_keeps_its_turns_in_a_step_in_32_bits(write):
-    """0.59 rad per period at 40 kHz are 3.76 turns in a step, 4.7 with the reserve of the speed base: Q29, no sign."""
+    """0.59 rad per period at 40 kHz: 3.76 turns in a step, 4.7 with the margin of the speed base, fit unsigned Q29."""
     machine = {"speed_max_rpm": 0.59 * 40000.0 * 60 / (2 * math.pi * 4), "psi_f_Vs": 0.005, "torque_max_Nm": 5.0}
     inverter = {"pwm_hz": 40000.0, "dead_time_s": 1e-6, "current_full_scale_A": 500.0}
     motor = load_motor(write(machine=machine, inverter=inverter))
@@ -127,7 +127,7 @@ def test_the_model_of_the_torque_loop_waits_for_the_current_loop_of_its_own_freq
     ("16", {}), ("20", {}), ("22.5", {}), ("40", {}),
 ])  # fmt: skip
 def test_the_machines_at_other_frequencies_are_hsm1_in_everything_else(khz, changed):
-    """hsm1 is refused below 10 kHz with a full scale of 400 A, and above 9500 rpm at 5 kHz."""
+    """hsm1 is refused below 9.66 kHz with a full scale of 400 A, and above 9549 rpm at 5 kHz."""
 
     def flat(path):
         tables = tomllib.loads(path.read_text(encoding="utf-8")).values()

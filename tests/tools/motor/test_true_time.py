@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """No constant of the firmware takes a step of the task for a millisecond, or a period for 100 us.
 
-What the firmware counts or filters in steps and periods is generated for the motor (docs/decisions/010-true-time.md);
-what it defines itself is either a time, which code turns into true time, or a number of events that is none.
+Numbers with which the firmware counts or filters in steps and periods are generated for the motor
+(docs/decisions/010-true-time.md). A number that the firmware defines itself is either a time, which code converts into
+steps or microseconds of true time, or a count that is not a time.
 """
 
 import re
@@ -22,7 +23,7 @@ SOURCES = sorted(
     if path.name != "registers.h"
 )
 
-# Members of motor_t that follow the PWM period, and those that follow the step of the task. Both: N periods a step.
+# Members of motor_t that depend on the PWM period, on the number of periods per step, and on the length of a step.
 PERIOD = {
     "bases.period_s",
     "angle_tracker.kp", "angle_tracker.ki_q29", "angle_tracker.pu_to_turn", "angle_tracker.turn_to_pu",
@@ -53,11 +54,11 @@ STEP = {
     "commission.settle_steps", "commission.measure_steps", "commission.mean_gain_q31",
     "gate_fault.volt_steps",
 }  # fmt: skip
-# A member whose name promises a time, a rate or a count of steps.
+# Names of members that are a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
 SPEED = re.compile(r"_rad_s$")
 TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
-# Times that the firmware itself defines, and what makes true time of one in each line that uses it.
+# Times that the firmware defines, and the expression that converts each to true time in every line that uses it.
 TIMES = {
     "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",
     "SELF_TEST_TIME_OUT_MS": r"is_timed_out\(", "PRECHARGE_TIME_OUT_MS": r"is_timed_out\(",
@@ -66,7 +67,7 @@ TIMES = {
     "COMMAND_TIME_OUT_US": r"grow_old\(", "BATTERY_TIME_OUT_US": r"grow_old\(",
     "MEMORY_REST_MS": r"in_steps\(", "MEMORY_INTERVAL_MS": r"in_steps\(",
 }  # fmt: skip
-# Numbers that are no time, or none of the task.
+# Numbers that are not a time, or not one of the task.
 COUNTS = {
     "CONSECUTIVE_MAX": "steps, as docs/howto/can.md says",
     "CONFIRMED_STEPS": "steps, as docs/theory/safe-state.md says",
@@ -156,7 +157,7 @@ def test_every_member_whose_name_promises_a_time_is_among_them(at):
 
 
 def defined(text: str) -> set[str]:
-    """Numbers with a name or a comment of time."""
+    """Defined numbers whose name or comment is about time."""
     found = {m[1]: m[0].partition("/*")[2] for m in DEFINE.finditer(text)}
     return {name for name, comment in found.items() if NAMED.search(name) or TOLD.search(comment)}
 

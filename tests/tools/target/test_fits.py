@@ -20,7 +20,7 @@ COSTS = {"10 kHz work": [1, 1, 1000], "1 kHz task": [1, 1, 20000], "CAN ISR": [1
 
 @pytest.fixture
 def checked(tmp_path):
-    """fits.check() for a frequency and a dead time, a core, and costs that are known."""
+    """fits.check() for a PWM frequency, a dead time and a clock of the core, with the known costs above."""
 
     def _checked(pwm_hz, dead_time_s=1e-6, core_Hz=112e6):
         folder = tmp_path / "aport"
@@ -86,7 +86,7 @@ def test_the_limits_are_those_of_the_port_s_timer():
 
 @pytest.mark.parametrize("pwm_hz", [4e3, 5e3, 8e3, 10e3, 16e3, 20e3, 40e3])
 def test_the_s32k144_carries_every_frequency_that_a_motor_may_have(tmp_path, pwm_hz):
-    """As measured: at 40 kHz half of the processor."""
+    """With the measured costs; at 40 kHz the interrupts and the task need half of the processor."""
     motor = tmp_path / "motor.json"
     motor.write_text(json.dumps({"inverter": {"pwm_hz": pwm_hz, "dead_time_s": 2e-6}}))
     assert "busy for at most" in fits.check(motor, PORT / "budget.toml")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The register header says what the maker's file says, and refuses what it does not know."""
+"""The register header agrees with the maker's file; names that the file does not have are refused."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_a_file_that_is_no_svd_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_committed_header_has_every_register_and_field_of_its_list_and_no_other() -> None:
-    """Without the maker's file only names can be compared; a field beyond the list would be an addition by hand."""
+    """The maker's file is not in the repository: only names are compared. A field not in the list was added by hand."""
     text = (PORT / "registers.h").read_text(encoding="utf-8")
     macros = set(re.findall(r"#define (\w+?)(?:_MASK)?(?:\(x\))? ", text))
     with (PORT / "registers.toml").open("rb") as stream:

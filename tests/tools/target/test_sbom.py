@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The software bill of materials names every file of the firmware and every pinned package, as SPDX 2.3 wants it."""
+"""The software bill of materials lists every file of the firmware and every pinned package in the form of SPDX 2.3."""
 
 import hashlib
 import json
