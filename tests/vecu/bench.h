@@ -6,13 +6,13 @@
  *   names                             every name of the board, the plant and its truth
  *   set <name> <value> [...]          "plant." and "board.": parameters and faults, from the next period on
  *   get <name> [...]
- *   ramp <name> <value> <n> <unit>    linearly during the runs to come
- *   record <periods> <name> [...]     during a run one line "row <value> ..." each so many periods; "record off"
- *   run <n> <unit> [<port> <count>]   lets time pass; before it, waits until the CAN client with this port has been
- *                                     heard with so many frames. Answers the time in ns and the frames sent to that
- *                                     client so far
- *   hash                              of all duties and gate states since the last time it was asked for
- *   counters                          of bus, hub and bench
+ *   ramp <name> <value> <n> <unit>    changes the value linearly during the next runs
+ *   record <periods> <name> [...]     during a run, one line "row <value> ..." every <periods>; "record off" ends it
+ *   run <n> <unit> [<port> <count>]   lets time pass; with port and count it first waits until that many frames of the
+ *                                     CAN client with this port have been received. Answers the time in ns and the
+ *                                     number of frames sent to that client so far
+ *   hash                              hash of all duties and gate states since the previous command "hash"
+ *   counters                          counters of bus, hub and bench
  *   reset [<seed>]                    power cycle of ECU and plant
  *   units: periods, us, ms, s. Answers: "ok ..." or "error <why>"
  * Source   docs/howto/bench.md
@@ -31,9 +31,9 @@ bench_t *bench_create(uint16_t port, vecu_t *vecu, bool realtime, char *why, siz
 void bench_destroy(bench_t *bench);
 line_server_t *bench_server(bench_t *bench);
 
-/** Carries out the clients' commands up to the next run. */
+/** Executes the clients' commands up to the next run. */
 void bench_service(bench_t *bench);
-/** Advances the time by one period if a run is under way, or if `anyway`; false: the time did not advance. */
+/** Advances the time by one period during a run, and always if `anyway`. Answers false if time did not advance. */
 bool bench_step(bench_t *bench, bool anyway);
 
 #endif

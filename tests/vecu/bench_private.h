@@ -19,19 +19,19 @@ struct bench {
     bool realtime;
     uint64_t refused;
     int columns;
-    /* the run under way */
-    int runner; /* the client that has asked; -1: no run */
+    /* The present run. */
+    int runner; /* the client that requested it; -1: no run */
     bool begun;
     uint64_t periods;
-    uint16_t peer; /* 0: does not wait */
+    uint16_t peer; /* CAN client whose frames it waits for; 0: none */
     uint64_t wanted;
     bench_ramp_t ramp[RAMPS_MAX];
     int ramps;
 };
 
-/** One line of answer. */
+/** Sends one line of an answer. */
 __attribute__((format(printf, 3, 4))) void bench_say(bench_t *bench, int client, const char *format, ...);
-/** Carries out the command of a line; a run is only recorded. */
+/** Executes the command in a line; a run is only noted, and begins in bench_step(). */
 void bench_obey(bench_t *bench, int client, char *text);
 
 #define REFUSE(...) \

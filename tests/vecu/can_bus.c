@@ -64,7 +64,7 @@ static void account(can_bus_t *bus, uint64_t until_ns, uint32_t bits)
     bus->counts.frames += bits > 0U ? 1U : 0U;
 }
 
-/* The wire is idle from free_ns on: who may begin, and when? -1: none before `until`. */
+/* The node that transmits next, and when it begins; the bus is idle from free_ns on. -1: none before `until`. */
 static int arbitrate(const can_bus_t *bus, uint64_t until_ns, uint64_t *start_ns)
 {
     uint64_t first_ns = until_ns;

@@ -8,8 +8,8 @@
 
 #include "socketcand.h"
 
-/* A client reads "< ok >" with one read and takes a frame that follows immediately for a broken greeting. It gets this
- * time, by the wall clock, to read the greeting. */
+/* python-can's client expects "< ok >" alone in one read and fails if a frame follows in the same read. Frames are sent
+ * to a client only after this time on the wall clock, or once it has sent a text itself. */
 #define GREETING_MS 100
 enum { ECU_QUEUE = 64 };
 

@@ -2,11 +2,11 @@
 #ifndef VECU_HUB_H
 #define VECU_HUB_H
 /** One simulated CAN bus with an ECU on it, offered to any number of socketcand clients on 127.0.0.1.
- *   each step of simulated time: hub_poll(); hub_run(now); the ECU takes hub_receive() and gives hub_send()
+ *   each step of simulated time: hub_poll(); hub_run(now); the ECU calls hub_receive() and hub_send()
  * Source   docs/howto/bench.md; tests/vecu/can_bus.h for the bus
  * Units    ns of simulated time, which must not go back; frames are stamped with the end of their last bit
  * Errors   hub_create() answers NULL and the reason; hub_send() false: the ECU's queue is full and the frame was not
- *          taken. Texts that are no protocol are dropped and counted
+ *          taken. Texts that are not of the protocol are dropped and counted
  * Context  simulation only; one thread; knows neither firmware nor plant */
 #include <stdbool.h>
 #include <stddef.h>
@@ -19,9 +19,9 @@
 typedef struct hub hub_t;
 
 typedef struct {
-    uint64_t malformed; /* texts of the clients that were no protocol */
+    uint64_t malformed; /* texts of clients that are not of the protocol */
     uint64_t from_clients, to_ecu, from_ecu;
-    uint64_t ecu_lost; /* frames that found the ECU's receive queue full */
+    uint64_t ecu_lost; /* frames lost because the ECU's receive queue was full */
     can_bus_counts_t bus;
     line_counts_t lines;
 } hub_counts_t;
@@ -46,9 +46,9 @@ bool hub_receive(hub_t *hub, can_frame_t *frame);
 /** The ECU is switched off: its frames and its received frames are discarded. */
 void hub_detach_ecu(hub_t *hub);
 
-/** What passed between us and the client whose side of the connection has this port: frames it sent, good or bad, and
- * frames sent to it. False: no such client. A client that knows its own port has read the greetings: frames flow at
- * once. */
+/** For the client whose side of the connection has this port: the number of frames that it sent, valid or not, and of
+ * frames sent to it. False: no such client. To this client frames are sent at once from now on, because a client that
+ * knows its own port has read the greetings. */
 bool hub_client_counts(hub_t *hub, uint16_t peer, uint64_t *received, uint64_t *sent);
 hub_counts_t hub_counts(const hub_t *hub);
 

@@ -11,7 +11,7 @@ size_t line_buffer_free(line_buffer_t *b)
     return sizeof b->bytes - b->end;
 }
 
-/* Takes the text that starts at `from` and ends before in[to]; the frame's last character stands there. */
+/* Takes the text that starts at `from` and ends before `to`, the position of the delimiter. */
 static bool take(line_buffer_t *b, size_t from, size_t to, char *text)
 {
     const size_t length = to - from;
@@ -21,7 +21,7 @@ static bool take(line_buffer_t *b, size_t from, size_t to, char *text)
         text[length] = '\0';
     }
     b->begin = to + 1U;
-    b->dropped += (good || b->skipping) ? 0U : 1U; /* one that is skipped has been counted */
+    b->dropped += (good || b->skipping) ? 0U : 1U; /* a skipped text has been counted already */
     b->skipping = false;
     return good;
 }
@@ -78,7 +78,7 @@ static bool next_bracketed(line_buffer_t *b, char *text)
             }
             return false;
         }
-        if (b->bytes[at] == '<') { /* a text that never ended */
+        if (b->bytes[at] == '<') { /* the text before it has no end */
             b->dropped++;
             b->begin = at;
         } else if (take(b, b->begin + 1U, at, text)) {

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_LINE_BUFFER_H
 #define VECU_LINE_BUFFER_H
-/** Finds the texts in a stream of bytes: lines, or words between '<' and '>'.
+/** Divides a stream of bytes into texts: lines, or texts between '<' and '>'.
  * Range    texts of up to LINE_LENGTH characters
- * Errors   a text that is too long, has a NUL in it, or is interrupted by another '<', and whatever stands between
- *          '>' and '<' but white space, is dropped and counted
+ * Errors   a text that is too long, contains a NUL or is interrupted by another '<' is dropped and counted, and so is
+ *          anything but white space between '>' and '<'
  * Context  simulation only; pure: the caller reads line_buffer_free() bytes at most into bytes[end] and advances end */
 #include <stdbool.h>
 #include <stddef.h>
@@ -22,9 +22,9 @@ typedef struct {
     char bytes[LINE_BUFFER_SIZE];
 } line_buffer_t;
 
-/** Moves what is left to the front; bytes that fit behind it. */
+/** Moves the unread bytes to the front; answers how many bytes fit behind them. */
 size_t line_buffer_free(line_buffer_t *b);
-/** The next text, without its frame, NUL-terminated; false: none is complete. */
+/** The next text, without its delimiters, NUL-terminated; false: none is complete. */
 bool line_buffer_next(line_buffer_t *b, char text[LINE_LENGTH + 1]);
 bool line_buffer_empty(const line_buffer_t *b);
 

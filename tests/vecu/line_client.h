@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_LINE_CLIENT_H
 #define VECU_LINE_CLIENT_H
-/** One connection of a line server: what has come and what waits to go. Nothing blocks.
- * Errors   a connection that breaks, or for whose answers there is no memory, is marked as ended
+/** One connection of a line server: the input received and the output still to be sent. No function blocks.
+ * Errors   a connection that breaks, or whose output finds no memory, is marked as ended
  * Context  tests/vecu/line_server.c only */
 #include <stdbool.h>
 #include <stddef.h>
@@ -12,7 +12,7 @@
 
 typedef struct {
     int fd;              /* -1: free */
-    bool greeted, ended; /* ended: nothing more comes, but what has come is still served and answered */
+    bool greeted, ended; /* ended: no more input; received texts are still answered */
     uint16_t peer;
     line_buffer_t in;
     char *out;
@@ -22,7 +22,7 @@ typedef struct {
 void line_client_close(line_client_t *c);
 void line_client_read(line_client_t *c);
 void line_client_write(line_client_t *c);
-/** What to poll for. */
+/** The events to give to poll(). */
 short line_client_wants(const line_client_t *c);
 void line_client_send(line_client_t *c, const char *text, size_t length);
 

@@ -24,7 +24,7 @@ struct line_server {
     line_framing_t framing;
     line_counts_t counts;
     line_client_t client[LINE_CLIENTS];
-    int next_client; /* whose texts come next, so that no client delays the others */
+    int next_client; /* the client whose text is taken next: clients take turns */
 };
 
 static bool set_nonblocking(int fd)
@@ -107,7 +107,7 @@ static void client_accept(line_server_t *server)
     struct sockaddr_in from;
     socklen_t size = sizeof from;
     const int on = 1;
-    const int send_size = 1 << 17; /* what does not fit waits with us, where it is counted */
+    const int send_size = 1 << 17; /* the rest waits in line_client, where it is counted */
     const int fd = accept(server->listener, (struct sockaddr *)&from, &size);
     if (fd < 0) {
         return;
@@ -165,7 +165,7 @@ void line_server_wait(line_server_t *const *servers, int count, int timeout_ms)
         n += collect(servers[s], fds + n);
     }
     if (poll(fds, n, timeout_ms) <= 0) {
-        return; /* a signal counts as nothing */
+        return; /* interrupted by a signal, for example */
     }
     for (int s = 0; s < count && s < SERVERS_MAX; s++) {
         serve(servers[s], fds + s * (1 + LINE_CLIENTS));
@@ -188,7 +188,7 @@ static line_event_t client_next(line_server_t *server, line_client_t *c, char *t
     if (!c->ended) {
         return LINE_NONE;
     }
-    server->counts.dropped += c->in.dropped + (line_buffer_empty(&c->in) ? 0U : 1U); /* half a text counts, too */
+    server->counts.dropped += c->in.dropped + (line_buffer_empty(&c->in) ? 0U : 1U); /* an incomplete text counts */
     line_client_write(c);
     line_client_close(c);
     return LINE_CLOSED;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef VECU_MACHINE_DATA_H
 #define VECU_MACHINE_DATA_H
-/** The plant that fits the firmware's motor: the parameters its data give, and its flux map.
+/** The plant for the motor of the firmware: the parameters that the motor's data give, and its flux map.
  * Source   generated from motor.json by tools/fluxtrue_tools/vecu/emit.py
  * Units    SI; names of tests/loop/runner/sim.h
  * Context  simulation only */

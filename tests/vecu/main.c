@@ -16,11 +16,11 @@
 #include "vecu.h"
 
 enum { EXIT_USAGE = 2, PERIODS_PER_LOOP = 100 };
-#define BACKLOG_MAX ((size_t)1 << 18) /* fast: time waits for a client with more than this to read */
-#define PATIENCE_NS 2000000000LL      /* so long, by the wall clock; then it is disconnected */
-/* Real time: a host that is further behind skips the rest. If it caught up at once, the bus would have no commands
- * during that time, because the clients have been waiting too. With a command every 10 ms this stays below the time-out
- * of 30 ms. */
+#define BACKLOG_MAX ((size_t)1 << 18) /* fast: time stops while more bytes than this wait for a client */
+#define PATIENCE_NS 2000000000LL      /* longest stop on the wall clock; then the client is disconnected */
+/* Real time: a host that is further behind than this does not make up for the rest. While it did, the bus would have no
+ * commands, because the clients were delayed like this process. With a command every 10 ms, 10 ms more stay below the
+ * time-out of 30 ms. */
 #define LAG_MAX_NS 10000000LL
 
 static volatile sig_atomic_t stop;

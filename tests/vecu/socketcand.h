@@ -6,8 +6,8 @@
  *   server  < hi >  < ok >  < frame <id> <s.us> <data> >
  * Source   the protocol description of github.com/linux-can/socketcand; checked against python-can's client
  * Range    identifiers of 1 to 3 hexadecimal digits are standard, of 8 extended; 0 to 8 bytes
- * Errors   SOCKETCAND_BAD for everything else: another number of bytes than announced, digits that are none, a value
- *          too large
+ * Errors   SOCKETCAND_BAD for everything else: a number of bytes other than the announced one, characters that are not
+ *          digits, a value that is too large
  * Context  simulation only; pure */
 #include <stddef.h>
 #include <stdint.h>

@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Assumed: 500 uF, and semiconductors that withstand twice the battery's voltage. */
+/* Assumed: 500 uF, and semiconductors that begin to conduct (avalanche) at twice the battery's voltage. */
 #define CAPACITANCE_F 500e-6
 #define AVALANCHE_PER_BATTERY 2.0
 

@@ -13,7 +13,7 @@
 #define FNV_START 14695981039346656037ULL
 #define FNV_PRIME 1099511628211ULL
 
-/* Not on the heap: in a program at a fixed address a calibration tool finds it by this name where the ELF says. */
+/* Not on the heap: a calibration tool finds it by its name, at the address in the ELF file. */
 static fluxtrue_t ecu;
 
 static const char *plant_set_up(sim_t *sim, uint64_t seed)
@@ -33,7 +33,7 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
     return stand_dc_link(sim) ? sim_start(sim) : "dc link";
 }
 
-/* The ECU runs nevertheless, as one on a bus does: it reports its fault. */
+/* Only a warning: the ECU runs and reports its fault on the bus, as hardware would. */
 static void tell_refused_data(void)
 {
     const motor_check_t check = drive_motor_check(&ecu.drive);
@@ -84,7 +84,7 @@ static void hash_word(vecu_t *vecu, uint32_t word)
     }
 }
 
-/* The lines that the next task will read. */
+/* Sets the inputs of the board that the next task reads. */
 static void stand_step(vecu_t *vecu)
 {
     ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
