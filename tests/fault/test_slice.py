@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fault campaign's slice for every test run: a few points of each line of docs/safety/fmea.csv."""
+"""The slice of the fault campaign for every test run: a few points of each line of docs/safety/fmea.csv."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def test_every_line_that_says_met_is_met(summary: Any) -> None:
 
 
 def test_no_line_says_open_that_has_become_met(summary: Any) -> None:
-    """Then `tools/fluxtrue faults tests/fault/campaign.toml --record` says so in the table."""
+    """If it fails, `tools/fluxtrue faults tests/fault/campaign.toml --record` writes the new status into the table."""
     assert [s["id"] for s in summary["scores"] if s["status"] == OPEN and s["is_met"]] == []
 
 
@@ -65,7 +65,7 @@ def test_the_report_prints_what_is_not_met(out: Path, summary: Any) -> None:
         assert score["is_met"] or score["worst"] in page
 
 
-# One fault that the drive detects at once, at one point: what a table says of it is put to the test.
+# One fault that the drive detects at once, at one point: the tests below change what the table says about it.
 ONE = 'fmea = "fmea.csv"\npoints = [[0.2, 0.5]]\n[[machine]]\nmotor = "hsm1"\ncurrent_A = 600\nvdc_V = 500\n'
 DETECTED = (
     "open,sensor,input open,,plant.current_open_a=1,,{reaction},{expected},{detect},,50,,,60,{status},{witness},,\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of faults is read strictly, and the evaluation finds torque, current, voltage and time that are wrong."""
+"""The table of faults is read strictly, and the evaluation finds wrong torque, current, voltage and times."""
 
 import math
 from typing import Any
@@ -35,7 +35,7 @@ def row(**cells: str) -> Row:
 
 def trace(fault_ms: float = 5.0, torque: Any = None, amperes: float = 200.0, volts: float = 350.0,
           requested: tuple[float, float] = (60.0, 60.0), state: int = 6) -> Trace:  # fmt: skip
-    """60 N·m until the fault, then none; one fault bit, over_current."""
+    """A recorded run: 60 N·m until fault_ms, then no torque; from there on the fault over_current."""
     count = round((BEFORE_MS + AFTER_MS) / STEP_MS)
     time = (np.arange(count) + 1) * STEP_MS - BEFORE_MS
     rows = np.zeros((count, len(CHANNELS)))
