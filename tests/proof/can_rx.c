@@ -35,7 +35,7 @@ void proof_e2e_burst_is_detected(void)
     unsigned byte, shift;
     uint8_t pattern;
     ASSUME(WITHIN(byte, 1U, 6U) && shift <= 8U && pattern != 0U);
-    const uint32_t burst = (uint32_t)pattern << shift; /* the CRC takes the highest bit of a byte first */
+    const uint32_t burst = (uint32_t)pattern << shift; /* the CRC processes the highest bit of a byte first */
     frame.data[byte] ^= (uint8_t)(burst >> 8);
     frame.data[byte + 1U] ^= (uint8_t)burst;
     PROVE(frame.data[0] != e2e_crc(id, &frame));

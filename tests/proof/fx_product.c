@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The products of fx/q.h. The equality of two different multipliers is out of the solvers' reach: a specification
- * either multiplies in the width of the function, or one factor is a power of two of either sign, and its product a
- * shift. */
+/* The products of fx/q.h. The solvers cannot show that multiplications of different width are equal. Therefore a
+ * specification either multiplies in the width of the function, or one factor is plus or minus a power of two, so that
+ * the product is a shift. */
 #include "proof.h"
 
 #include "fx/q.c"

@@ -5,7 +5,7 @@
 #include "drive/motor.c"
 #include "safety/monitor.c"
 
-/* What the harnesses below assume of the data; the first one shows that motor_check() guarantees it. */
+/* The harnesses below assume this of the data; the first one shows that motor_check() guarantees it. */
 static bool is_guaranteed(const monitor_config_t *c)
 {
     return WITHIN(c->i_trip, 1, Q15(0.8) - 1) && c->v_min < c->v_max && WITHIN(c->zero_max, 1, c->sum_max / 3) &&

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef PROOF_H
 #define PROOF_H
-/** What the harnesses of this folder need. To CBMC a local variable without a value has every value of its type.
+/** Macros of the harnesses. For CBMC a local variable that is not initialised stands for every value of its type.
  * Context  CBMC only: no program contains these functions */
 #include <stdbool.h>
 #include <stdint.h>
@@ -15,7 +15,7 @@
 /* A magnitude in the same format. */
 #define IS_MAGNITUDE(x) WITHIN((x), 0, INT16_MAX)
 
-/* Both values, and no other content of the byte. */
+/* Only false or true: an uninitialised bool could also hold any other content of its byte. */
 bool nondet_bool(void);
 
 /* The nearest number that a format holds. */

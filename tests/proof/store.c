@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The record that survives a power cycle: storage/store on a flash memory with every content that may fail at every
- * operation. The CRC has every value, so that nothing depends on damage being detected by it. Records are at most 64
- * bytes long: one piece. */
+/* The record that survives a power cycle: storage/store on a flash memory that may have any content and may fail in any
+ * operation. crc32_update() returns any value, so that no property relies on the CRC to detect damage. Records are at
+ * most 64 bytes long, which is one piece. */
 #include "proof.h"
 
 #include "storage/store.c"

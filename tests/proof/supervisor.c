@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The state machine, ecu/supervisor, over its real table, and the observer's decision that the machine is slow. Each
- * harness takes one step from every content of the state, so that what holds for it holds in every reachable state. */
+/* The state machine, ecu/supervisor, with its real table, and the observer's decision that the machine is slow. Each
+ * harness makes one step from any content of the state: what holds there holds in every state that can be reached. */
 #include "proof.h"
 
 /* The table first: CBMC takes the size of an array from the declaration that it meets before a use. */
@@ -12,7 +12,7 @@
 
 #define STEP_MAX_US 10000U
 
-/* Every result: the harness of the observer does not depend on volts. */
+/* Returns any value: the harness of the observer does not depend on voltages in volts. */
 float si_from_q15(q15_t x, float base)
 {
     float any;
@@ -44,7 +44,7 @@ static supervisor_in_t any_input(void)
     return in;
 }
 
-/* Contactor and gate supply are on: the machine can be short-circuited, and the battery takes what it makes. */
+/* Contactor and gate supply are on: the bridge can short-circuit the machine, and the battery absorbs its power. */
 static bool holds(ecu_state_t state)
 {
     return supervisor_outputs[state].contactor && supervisor_outputs[state].gate_driver;

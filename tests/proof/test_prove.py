@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tool of the proofs: what must not pass does not pass."""
+"""The tool for proofs accepts no harness that proves nothing, and no planted error that is not found."""
 
 import shutil
 from dataclasses import replace

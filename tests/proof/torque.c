@@ -5,7 +5,7 @@
 #include "control/torque/i_d_limit.h"
 #include "control/torque/limit.c"
 
-/* What limit.c calls, with every result that their headers allow. */
+/* The functions that limit.c calls, with any result that their headers allow. */
 q15_t fx_magnitude(q15_t x, q15_t y)
 {
     q15_t length;

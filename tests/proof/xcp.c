@@ -16,7 +16,7 @@ static const xcp_area_t area[1] = {{readable, sizeof readable}};
 static const xcp_config_t config = {
     .memory = {area, 1}, .working = working, .reference = reference, .limits = limits, .parameters = 3};
 
-/* What every command leaves true of the lists. */
+/* A property of the lists that holds after every command. */
 static bool is_consistent(const xcp_daq_t *daq)
 {
     bool ok = daq->lists <= XCP_DAQ_LISTS && daq->odts <= XCP_DAQ_ODTS && daq->entries <= XCP_DAQ_ENTRIES;
