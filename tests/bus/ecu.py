@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An inverter on a bus, in this process: the firmware with the simulated machine, fed with frames."""
+"""An inverter on a bus in this process: the firmware with the simulated machine, which receives and sends frames."""
 
 import ctypes
 import os
@@ -16,13 +16,13 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 PERIODS_PER_MS = 10
-DC_LINK = {"dc_link_F": 500e-6, "avalanche_V": 700.0}  # assumed; empty at the start
+DC_LINK = {"dc_link_F": 500e-6, "avalanche_V": 700.0}  # assumed values; the capacitor is empty at the start
 COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"
 
 
 def load_dbc() -> Database:
-    """The one description of the bus."""
+    """The DBC, which is the only description of the bus."""
     database = cantools.database.load_file(DBC)
     assert isinstance(database, Database)
     return database
@@ -36,7 +36,7 @@ class Frame(ctypes.Structure):
 
 
 class Ecu:
-    """One instance with its machine at an imposed speed, one millisecond at a time."""
+    """One ECU and its machine at an imposed speed; time passes in steps of the task."""
 
     def __init__(self, motor: sim_motor.Motor | None = None) -> None:
         self.dbc = load_dbc()
@@ -117,7 +117,7 @@ class Ecu:
             self.last[message.name] = message.decode(data)
 
     def run(self, milliseconds: int, **command: object) -> None:
-        """Change the command, then let some time pass."""
+        """Change the command, then simulate this time."""
         self.command.update(command)
         for _ in range(milliseconds):
             self.step_ms()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AUTOSAR E2E profile 11, variant 11A, written from the specification and from nothing else.
+"""AUTOSAR E2E profile 11, variant 11A, written from the specification alone.
 
-The CRC is worked out as a polynomial's remainder with Python's integers, so that it shares no
-table, no loop and no trick with the firmware.
+The CRC is calculated as the remainder of a polynomial division with Python's integers, so that it has nothing in common
+with the firmware's code.
 """
 
 GENERATOR = 0b1_0001_1101  # x^8 + x^4 + x^3 + x^2 + 1
@@ -17,7 +17,7 @@ def crc8(data: bytes) -> int:
 
 
 def crc_of(data_id: int, frame: bytes) -> int:
-    """Over the data id, low byte first, and what follows the CRC."""
+    """CRC over the data id, low byte first, and the bytes after the CRC."""
     return crc8(data_id.to_bytes(2, "little") + bytes(frame[1:]))
 
 

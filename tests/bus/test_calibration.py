@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Limits, end-to-end reactions and time-outs act whatever is calibrated: each value at both ends of its range."""
+"""Limits, reactions to bad frames and time-outs work with each calibratable value at both ends of its range."""
 
 import ctypes
 import math
@@ -9,7 +9,7 @@ import pytest
 from ecu import COMMAND, LIMITS, Ecu
 
 OUT_OF_RANGE = -2
-# Name, lowest, least that is not zero (None: the lowest is not zero), highest; firmware/calibration/calibration_list.h
+# Name, lowest, smallest non-zero (None: the lowest is not zero), highest; from firmware/calibration/calibration_list.h
 RANGES = {
     "torque_slew_Nm_per_s": (0.0, 10.0, 1e6),
     "observer_m": (2.0, None, 4.0),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The drawing in the documentation shows the table that runs, and the DBC names the same states."""
+"""The drawing in the documentation agrees with the state machine's table, and the DBC names the same states."""
 
 import subprocess
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ECU as a whole, in simulated milliseconds: effects of valid commands, and none of bad ones."""
+"""The whole ECU in simulated milliseconds: valid commands take effect, bad ones do not."""
 
 import math
 
@@ -49,7 +49,7 @@ def test_power_up_passes_through_all_states_in_order(ecu: Ecu) -> None:
     assert ecu.get("run_state") == 1.0
 
 
-# 0.1 Nm on the wire; one count of the control is 9 mNm on this machine.
+# The resolution on the bus is 0.1 N·m; one count of the control is 9 mN·m on this machine.
 @pytest.mark.parametrize("torque_Nm", [40.0, -40.0, 0.3, 132.0])
 def test_a_command_reaches_the_torque_path_with_its_sign(running: Ecu, torque_Nm: float) -> None:
     running.run(200, TorqueRequested=torque_Nm)
@@ -61,7 +61,7 @@ def test_no_torque_exceeds_what_the_machine_may_give(running: Ecu) -> None:
     assert running.get(TORQUE) == pytest.approx(132.0, abs=0.02)
 
 
-# Forwards: 100 rad/s of the rotor. Positive torque drives, negative brakes.
+# Speed of the rotor in rad/s, requested torque, torque wanted: drive limit 30 N·m, regeneration limit 20 N·m.
 @pytest.mark.parametrize(("speed", "torque_Nm", "wanted"), [
     (100.0, 80.0, 30.0), (100.0, -80.0, -20.0), (-100.0, 80.0, 20.0), (-100.0, -80.0, -30.0)])  # fmt: skip
 def test_drive_and_regen_limits_hold_in_four_quadrants(
@@ -76,7 +76,7 @@ def test_drive_and_regen_limits_hold_in_four_quadrants(
     assert running.get(TORQUE) == pytest.approx(wanted, abs=0.02)
 
 
-# The last good frame is at t = 0; 30 ms later the command is dead, and 15 ms of ramp end full torque.
+# The last good frame is at t = 0; 30 ms later the command times out, and a ramp of 15 ms takes full torque to zero.
 def test_a_lost_command_ends_full_torque_within_50_ms_of_the_last_good_frame(running: Ecu) -> None:
     running.run(300, TorqueRequested=1000.0)
     while running.time_ms % 10 != 1:
@@ -116,7 +116,7 @@ def bad_crc(data: bytes) -> bytes:
     return bytes([data[0] ^ 1]) + data[1:]
 
 
-# 7 good and 3 bad of ten frames, in any window.
+# Three bad ones of the last ten frames are the limit.
 def test_three_bad_of_ten_end_the_torque_and_are_a_latched_fault(running: Ecu) -> None:
     at_40_Nm(running)
     frame_id = running.dbc.get_message_by_name(COMMAND).frame_id
@@ -144,7 +144,7 @@ def test_a_fault_is_left_by_a_reset_with_enable_off_and_a_new_power_up(running: 
     assert running.last["INV_DcLink"]["RefusedReason"] == "reset_while_enabled"
     running.run(30, FaultReset=0, Enable=0, TorqueRequested=0.0)
     running.run(100, FaultReset=1)
-    assert running.state == "ready"  # by standby and precharge, as the dc voltage is still there
+    assert running.state == "ready"  # through standby and precharge at once, because the dc link is still charged
     assert running.last["INV_Faults"]["EcuFaults"] == 0
     running.run(30, FaultReset=0, Enable=1)
     assert running.state == "run"
@@ -160,7 +160,7 @@ def test_a_trip_reaches_the_bus_as_safe_state_with_its_first_fault(running: Ecu)
     at_40_Nm(running)
     running.set("current_offset_A_a", 390.0)  # beyond the trip of 300 A
     running.run(200)
-    assert running.state == "fault"  # so slow that the safe state has nothing to hold
+    assert running.state == "fault"  # the machine is slow, so the safe state need not be held
     assert running.last["INV_Faults"]["FirstFault"] == "over_current"
     assert int(running.last["INV_Faults"]["DriveFaults"]) & 1
     assert running.get("run_state") != 1.0
@@ -175,14 +175,14 @@ def test_the_safe_state_is_held_while_the_machine_turns_fast(running: Ecu) -> No
     running.set("current_offset_A_a", 0.0)
     running.run(200)
     assert running.state == "safe_state"
-    while running.speed_rad_s > 0.0:  # a stop at once would be a fault of the angle, which leaves the speed unknown
+    while running.speed_rad_s > 0.0:  # a sudden stop would be an angle fault, after which the speed is unknown
         running.speed_rad_s = max(running.speed_rad_s - 2.0, 0.0)
         running.run(1)
     running.run(300)
     assert running.state == "fault"
 
 
-# 60.1 Nm would be a large change; each of these frames asks for it and none may be heard.
+# Each of these frames requests 60.1 N·m, a large change; none may take effect.
 @pytest.mark.parametrize(("kind", "counter"), [
     ("CrcErrors", "INV_DiagProtection"), ("Repeated", "INV_DiagProtection"), ("Jumps", "INV_DiagProtection"),
     ("LengthErrors", "INV_DiagProtection"), ("RangeErrors", "INV_DiagReceive"), ("IdErrors", "INV_DiagReceive"),
@@ -216,7 +216,7 @@ def test_one_violation_is_counted_by_its_kind_and_not_obeyed(running: Ecu, kind:
     assert running.last[counter][kind] >= 1
     others = {name: value for frame in ("INV_DiagProtection", "INV_DiagReceive")
               for name, value in running.last[frame].items() if name not in (kind, "Accepted")}  # fmt: skip
-    # a jump leaves the true sender out of step once: its next frame is a jump or a repetition too
+    # after a jump the next frame of the true sender is a jump or a repetition, too
     allowed = {"Jumps": ("Repeated",), "RangeErrors": ("Repeated",)}.get(kind, ())
     assert all(value == 0 for name, value in others.items() if name not in allowed)
 
@@ -251,7 +251,7 @@ def test_lost_battery_limits_take_the_torque_away_and_tell_why(running: Ecu) -> 
     assert running.get(TORQUE) == pytest.approx(40.0, abs=0.02)
 
 
-# 210 rad/s: 5 kW are less than 24 Nm at the shaft, by the losses. Sent every 100 ms.
+# At 210 rad/s 5 kW are 24 N·m without losses, so less at the shaft. The limits are sent every 100 ms.
 def test_battery_power_limits_hold_in_both_directions_and_tell_why(running: Ecu) -> None:
     for _ in range(360):
         running.speed_rad_s += 0.5
@@ -313,7 +313,7 @@ def test_what_is_sent_is_what_the_drive_has(running: Ecu) -> None:
     running.run(300, TorqueRequested=25.0)
     status, dc_link = running.last["INV_Status"], running.last["INV_DcLink"]
     assert status["TorqueCommanded"] == pytest.approx(25.0, abs=0.05)
-    assert dc_link["DcVoltage"] == pytest.approx(350.0, abs=0.3)  # a count of the converter is 0.13 V
+    assert dc_link["DcVoltage"] == pytest.approx(350.0, abs=0.3)  # one count of the converter is 0.13 V
     assert running.last["INV_Temperatures"]["Winding"] == pytest.approx(63.4, abs=0.05)
     assert running.last["INV_Temperatures"]["WindingValid"] == "yes"
     assert running.run_until("INV_Currents")["IqRef"] == pytest.approx(running.get("iq_ref_A"), abs=0.051)
@@ -322,8 +322,8 @@ def test_what_is_sent_is_what_the_drive_has(running: Ecu) -> None:
     assert running.last["INV_Version"]["Minor"] == 1
 
 
-# 2200 rpm, 40 Nm: 9.2 kW at the shaft. Torque estimate as everywhere on hsm1; the dc current is an estimate without the
-# bridge's losses (dead time), which the plant's truth contains.
+# 2200 rpm and 40 N·m are 9.2 kW at the shaft. The dc current on the bus is an estimate without the losses of the bridge
+# (dead time), which the plant's true current contains.
 def test_torque_speed_and_dc_current_are_those_of_the_plant(running: Ecu) -> None:
     for _ in range(400):
         running.speed_rad_s += 0.5
@@ -337,7 +337,7 @@ def test_torque_speed_and_dc_current_are_those_of_the_plant(running: Ecu) -> Non
         assert running.last["INV_DcLink"]["DcCurrent"] == pytest.approx(running.truth("idc_A"), abs=2.0)
 
 
-# The plant's inductance in q is 8 % above the tables': the identified scale goes there, on the bus as in the drive.
+# The plant's L_q is 8 % above the tables: the identified scale approaches 108 %, in the drive and on the bus.
 def test_a_wrong_table_shows_in_the_table_scale(running: Ecu) -> None:
     running.set("lq_scale", 1.08)
     for _ in range(600):
@@ -356,7 +356,7 @@ def test_speed_is_told_in_revolutions_per_minute_with_its_sign(ecu: Ecu) -> None
         assert ecu.last["INV_Status"]["Speed"] == pytest.approx(speed_rad_s * 30.0 / math.pi, abs=2.0)
 
 
-# 64 places: the queue of the receive interrupt. The command of that millisecond is lost too.
+# The queue of the receive interrupt holds 64 frames. The command of that millisecond is lost, too.
 def test_a_flood_of_frames_between_two_tasks_is_counted_and_harms_nothing(running: Ecu) -> None:
     at_40_Nm(running)
     for k in range(1000):

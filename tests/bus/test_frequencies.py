@@ -110,7 +110,7 @@ def test_a_lost_command_is_noticed_after_30_ms_and_torque_is_gone_within_50(runn
 
 
 def test_full_torque_takes_50_ms_from_zero(running: Clocked) -> None:
-    """Slew of full torque in 40 ms, its build-up 10 ms."""
+    """The slew rate gives full torque in 40 ms; the jerk limit adds 10 ms."""
     start = running.now_ms
     running.command["TorqueRequested"] = 1000.0
     while running.get(TORQUE) == 0.0:
@@ -123,7 +123,7 @@ def test_full_torque_takes_50_ms_from_zero(running: Clocked) -> None:
 
 
 def test_states_last_as_long_as_they_should(ecu: Clocked) -> None:
-    """50 ms at least in init; 2 s without a charged dc link are a fault; a status comes each 10 ms."""
+    """Init lasts at least 50 ms; 2 s without a charged dc link are a fault; the status is sent every 10 ms."""
     ecu.set("precharge_open", 1.0)
     took = ecu.wait_for("standby")
     assert 50.0 <= took <= 50.0 + 10.0 + 2.0 * ecu.step

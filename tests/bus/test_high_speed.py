@@ -30,7 +30,7 @@ def fast() -> Iterator[Ecu]:
 
 
 def turn_to(ecu: Ecu, rpm: float, rad_s_per_ms: float) -> None:
-    """Changes the imposed speed, at 2 rad/s per ms within half a second from nothing to 9000 rpm."""
+    """Change the imposed speed at this rate; 2 rad/s per ms takes half a second from standstill to 9000 rpm."""
     while abs(rpm * RPM - ecu.speed_rad_s) > 1e-9:
         step = max(-rad_s_per_ms, min(rad_s_per_ms, rpm * RPM - ecu.speed_rad_s))
         ecu.speed_rad_s += step
@@ -47,7 +47,7 @@ def highest_V(ecu: Ecu, milliseconds: int) -> float:
 
 
 def slow_down_to_fault(ecu: Ecu) -> None:
-    """The rotor comes to rest, and only then the state is left; the link discharges."""
+    """Bring the rotor to rest: only then the safe state is left, and the dc link discharges."""
     turn_to(ecu, 0.0, 1.0)
     ecu.run(500)
     assert ecu.state == "fault"
@@ -81,7 +81,7 @@ class Worst:
 
 
 def worst(ecu: Ecu, milliseconds: int) -> Worst:
-    """Mean torque over 1 ms, and the current vector at its end."""
+    """Largest mean torque over 1 ms, and largest current vector at the end of a millisecond."""
     torque, current = 0.0, 0.0
     for _ in range(milliseconds):
         ecu.run(1)
@@ -99,7 +99,7 @@ def runs_again(ecu: Ecu) -> None:
     assert ecu.truth("torque_mean_Nm") == pytest.approx(20.0, abs=2.0)
 
 
-# Without the ramp 529 A and 98 N.m, a latched over-current, and no reset until the machine is slow.
+# Without the ramp: 529 A, 98 N·m and a latched over-current, which cannot be reset until the machine is slow.
 @pytest.mark.parametrize("rpm", [8200.0, 9000.0, 10000.0, -9500.0])
 def test_enable_off_at_speed_is_gentle_latches_nothing_and_can_be_taken_back(fast: Ecu, rpm: float) -> None:
     turn_to(fast, 0.0 if rpm < 0.0 else rpm, 2.0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The version of the bus interface counts up when a signal changes its name, its place or its meaning.
+"""The version of the bus interface must increase when a signal changes its name, position, scale or unit.
 
-interface.txt lists the signals of the version that it names first. `python tests/bus/test_interface.py` writes it.
+interface.txt lists the signals of the version in its first line. `python tests/bus/test_interface.py` writes it.
 """
 
 import re

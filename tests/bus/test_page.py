@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/howto/can.md and the DBC say the same about the messages; test_words.py holds names and explanations."""
+"""docs/howto/can.md and the DBC agree about the messages; test_words.py compares names and explanations."""
 
 import re
 
@@ -54,7 +54,7 @@ def test_data_ids_and_time_outs_are_those_of_the_dbc(dbc: Database) -> None:
 
 
 def test_the_load_of_the_bus_is_the_one_stated(dbc: Database) -> None:
-    """55 + 10 n bits: a frame with the most stuff bits it can need."""
+    """A frame with n data bytes and the most stuff bits that it can need has 55 + 10 n bits."""
     bits_per_s = sum((55 + 10 * m.length) * 1000 / m.cycle_time for m in dbc.messages if m.cycle_time)
     assert 0.18 < bits_per_s / 500e3 < 0.19
     assert "a bus of 500 kbit/s by at most 19 %" in " ".join(PAGE.split())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the end-to-end protection detects: computed for every pattern, and tried on the firmware."""
+"""Errors that the end-to-end protection detects: calculated for every pattern, and tested on the firmware."""
 
 import itertools
 
@@ -27,13 +27,13 @@ def syndromes() -> np.ndarray:
 
 
 def undetected(weight: int) -> tuple[int, int]:
-    """(patterns of so many flipped bits that the CRC does not see, all of them)."""
+    """Number of patterns with so many flipped bits that the CRC does not detect, and number of all such patterns."""
     effect = syndromes()
-    if weight == 4:  # pairs that cancel: no need to list 635376 tuples in Python
+    if weight == 4:  # by pairs: faster than 635376 tuples in Python
         pairs = np.array([effect[i] ^ effect[j] for i, j in itertools.combinations(range(FRAME_BITS), 2)])
         counts = np.bincount(pairs, minlength=256)
-        # each undetected quadruple is three ways two pairs with the same syndrome; pairs that share
-        # a bit cannot have the same one, as all syndromes differ
+        # An undetected set of four bits divides in three ways into two pairs with the same syndrome. Pairs that share a
+        # bit cannot have the same syndrome, because the syndromes of all bits differ.
         return int((counts * (counts - 1) // 2).sum() // 3), 635376
     flipped = np.array(list(itertools.combinations(range(FRAME_BITS), weight)))
     return int((np.bitwise_xor.reduce(effect[flipped], axis=1) == 0).sum()), len(flipped)
@@ -48,9 +48,9 @@ def test_every_one_and_two_bit_error_is_detected_and_few_of_three_and_four_are_n
     assert undetected(4) == (2453, 635376)  # 0.39 %
 
 
-# A burst of at most 8 bits is a polynomial of degree below 8 times x^n: never a multiple of the generator. That holds
-# where the bits follow each other as in the CRC's own order, highest first; the CRC is sent before the data, so that a
-# burst across their border is no burst to the CRC: a few of those pass, and are left to the bus's own CRC-15.
+# A burst of at most 8 bits is a polynomial of degree below 8 times x^n, which is never a multiple of the generator, as
+# long as the bits are sent in the order of the division. The CRC is sent before the data but divided after them, so a
+# burst across their border is not one in that order: a few of those pass, and only the CRC-15 of CAN detects them.
 def test_every_burst_of_up_to_eight_bits_is_detected_but_a_few_across_the_border_of_crc_and_data() -> None:
     effect = syndromes()[::-1]  # in the order of the wire
     missed = bursts = 0
@@ -76,8 +76,8 @@ def ecu():
     made.close()
 
 
-# With a Hamming distance of 3 not one may pass; the torque request is a large one, so that an accepted frame would
-# show at the wheel as well.
+# With a Hamming distance of 3 none of them may be accepted. The requested torque is large, so that an accepted frame
+# would also show in the torque.
 def test_the_firmware_accepts_no_command_with_one_or_two_bits_wrong_at_any_counter(ecu: Ecu) -> None:
     message = ecu.dbc.get_message_by_name(COMMAND)
     patterns = [(1 << k) for k in range(FRAME_BITS)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motor data that the drive refuses, without a bus between: the library and a simulated scenario say why."""
+"""Motor data that the drive refuses: the library and a simulated scenario say why, without a bus."""
 
 import math
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The firmware's encoding of every signal, held to cantools' own in Python over the whole range."""
+"""The firmware's encoding of every signal equals that of cantools over the whole range."""
 
 import ctypes
 import math
@@ -19,12 +19,12 @@ STEPS = 4001
 
 
 def signals(messages: list[Message]) -> list[tuple[Message, int]]:
-    """Each signal as (message, place)."""
+    """Each signal as (message, index in the message)."""
     return [(message, index) for message in messages for index in range(len(message.signals))]
 
 
 def physical(messages: list[Message]) -> list[tuple[Message, int]]:
-    """The signals that are no counts; the firmware computes them in floating point."""
+    """The signals that are not plain integers: the firmware converts them in floating point."""
     return [(m, k) for m, k in signals(messages) if m.signals[k].scale != 1 or m.signals[k].unit]
 
 
@@ -34,7 +34,7 @@ def names(case: tuple[Message, int]) -> str:
 
 
 def c_encode(message: Message, values: list[float]) -> tuple[int, bytes]:
-    """The firmware's frame, and how many values it took."""
+    """The frame that the firmware encodes, and the number of values that it used."""
     data = (ctypes.c_uint8 * 8)()
     function = getattr(LIB, f"test_{camel_to_snake_case(message.name)}")
     taken = function((ctypes.c_double * len(values))(*values), data)
@@ -42,7 +42,7 @@ def c_encode(message: Message, values: list[float]) -> tuple[int, bytes]:
 
 
 def c_decode(message: Message, data: bytes) -> tuple[bool, list[float]]:
-    """The firmware's values of a frame, and whether it finds them in range."""
+    """Whether the firmware finds the values of a frame in range, and the values."""
     values = (ctypes.c_double * len(message.signals))()
     function = getattr(LIB, f"test_{camel_to_snake_case(message.name)}")
     in_range = function(values, (ctypes.c_uint8 * 8)(*data))
@@ -50,7 +50,7 @@ def c_decode(message: Message, data: bytes) -> tuple[bool, list[float]]:
 
 
 def smallest(message: Message) -> list[float]:
-    """Every signal at zero, or at its least if zero is out of range."""
+    """Every signal at zero, or at its smallest value if zero is out of range."""
     return [max(0.0, float(signal.minimum)) for signal in message.signals]
 
 
@@ -83,8 +83,8 @@ def test_every_count_of_a_sent_signal_is_encoded_as_cantools_does(case: tuple[Me
         assert raw_of(message, index, data) == raw
 
 
-# Between two counts the nearer one is required; a float has 24 bits, so that a value within a
-# thousandth of a count of the middle may go either way.
+# A value between two counts is rounded to the nearer one. A float has 24 bits, so that a value within a thousandth of a
+# count of the middle may be rounded to either.
 @pytest.mark.parametrize("case", physical(SENT), ids=names)
 def test_values_between_counts_are_rounded_to_the_nearest(case: tuple[Message, int]) -> None:
     message, index = case

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults, states, reasons and results have one name and one explanation, from the firmware's lists to every channel."""
+"""Faults, states, reasons and results have the names and explanations of the firmware's lists on every channel."""
 
 import ctypes
 import re
