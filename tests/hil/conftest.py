@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One suite for the virtual ECU and for a bench: which bus, which plant, and what is checked after every test."""
+"""One suite for the virtual ECU and for a bench: its options, its connections, and the checks after every test."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -55,7 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Markers, and the report that hooks and fixtures share."""
-    # It warns of every frame that arrives in two reads, although it then joins the parts.
+    # python-can warns of every frame that arrives in two reads, although it joins the parts correctly.
     logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
     for name, text in MARKERS.items():
         config.addinivalue_line("markers", f"{name}: {text}")
@@ -115,7 +115,7 @@ class Target:
 
     bus: can.BusABC
     stand: Channel | None
-    can_port: int = 0  # of our virtual ECU: where further clients connect
+    can_port: int = 0  # of the virtual ECU, for further clients
     clock: Channel | None = None  # lets time pass, for a plant that cannot be commanded
 
 
@@ -138,7 +138,7 @@ def _bench_target(config: pytest.Config) -> Target:
 
 @pytest.fixture(scope="session")
 def target(request: pytest.FixtureRequest) -> Iterator[Target]:
-    """The bench that was asked for, else a virtual ECU; without either there is nothing to test."""
+    """The bench given on the command line, else a virtual ECU; the suite ends without either."""
     try:
         is_bench = request.config.getoption("--can-interface") is not None
         found = _bench_target(request.config) if is_bench else VirtualEcu(request.getfixturevalue("program"))
@@ -168,7 +168,7 @@ def bus_log(request: pytest.FixtureRequest) -> Iterator[BusLog]:
 def connected(
     request: pytest.FixtureRequest, target: Target, database: cantools.database.Database, bus_log: BusLog
 ) -> Rig:
-    """The one connection of the session."""
+    """The connection that all tests of the session share."""
     about = request.config.stash[REPORT].about
 
     def note_version(message: can.Message) -> None:

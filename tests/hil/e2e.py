@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""AUTOSAR end-to-end profile 11A, independent of the firmware: from the specification, without a table.
+"""AUTOSAR end-to-end profile 11A, written from the specification, without a table: independent of the firmware.
 
 The CRC is the remainder of (data id low, data id high, bytes 1 ... n) x^8 divided by the SAE J1850 polynomial. The
-profile undoes the standard's start value and final inversion: both are 0 here.
+profile cancels the start value and the final inversion of that standard: both are 0 here.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ COUNTER_MASK = 0x0F
 
 
 def remainder(bits: int, polynomial: int = POLYNOMIAL) -> int:
-    """Of polynomial division over GF(2)."""
+    """Remainder of polynomial division over GF(2)."""
     degree = polynomial.bit_length() - 1
     while bits.bit_length() > degree:
         bits ^= polynomial << (bits.bit_length() - 1 - degree)
@@ -23,7 +23,7 @@ def remainder(bits: int, polynomial: int = POLYNOMIAL) -> int:
 
 @cache
 def _share(byte: int, behind: int) -> int:
-    """Contribution to the remainder of a byte that so many bytes follow; the division is linear."""
+    """Contribution of a byte with `behind` bytes after it to the remainder; the division is linear."""
     return remainder(byte << 8 * (behind + 1))
 
 

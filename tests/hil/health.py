@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Conditions after every test: no fault, no error counted, no cyclic frame missing, reserve of stack and time.
 
-A test that provokes errors says which: rig.expected.faults, .counters, .load, .frames.
+A test that provokes errors declares them in rig.expected.faults, .counters, .load and .frames.
 """
 
 from itertools import pairwise
@@ -18,12 +18,12 @@ COUNTERS = {
     "INV_DiagBus": ("LostFrames", "NotSent", "Ignored", "BusOff", "SkippedCommands"),
     "INV_DiagTask": ("IsrOverruns", "TaskOverruns", "WatchdogHeld"),
 }
-# Two frames of ours and one of another's may stand before it, and the period's own millisecond: 3 x 0.27 ms + 1 ms.
+# Two frames of the ECU and one of another node may delay it, and a cycle is kept within a step: 3 x 0.27 ms + 1 ms.
 JITTER_S = 2 * MS
 JITTER_BENCH_S = 20 * MS  # time stamps of an adapter and of an operating system
 STACK_RESERVE_BYTES = 256
 LATE_S = 25 * MS  # longest time between two commands; beyond it a time-out of 30 ms is caused by this computer
-DIAGNOSTICS_S = 0.12  # their cycle and a margin
+DIAGNOSTICS_S = 0.12  # the cycle of the diagnostic messages and a margin
 
 
 def note(rig: Rig) -> dict[str, Any]:
@@ -98,7 +98,7 @@ def _bus(rig: Rig, before: dict[str, Any]) -> list[str]:
 
 
 def stack_unused(rig: Rig) -> int:
-    """Bytes of stack never used since start-up; 0 on a target that cannot measure them, as the virtual ECU."""
+    """Bytes of stack never used since start-up; 0 on a target that cannot measure them, such as the virtual ECU."""
     return int(rig.signal("INV_DiagTask", "StackUnused"))
 
 

@@ -20,7 +20,7 @@ Line = tuple[str, ArrayLike, ArrayLike]
 
 
 def _svg(title: str, axes: Sequence[tuple[str, Sequence[Line]]], x_label: str) -> str:
-    import matplotlib.pyplot as plt  # an import of a second that a run without plots does not need
+    import matplotlib.pyplot as plt  # imported here because it takes a second, which a run without plots saves
 
     from fluxtrue_tools.sim.plot import STYLE
 
@@ -65,7 +65,7 @@ class Figures:
         self.tables.append((title, head, shown))
 
     def promise(self, what: str, value: float, limit: float, unit: str) -> None:
-        """A figure of merit that must not be larger in magnitude; missed ones fail the test at once."""
+        """A figure of merit whose magnitude must not exceed the limit; otherwise the test fails at once."""
         bound = Bound(what, float(value), limit, unit)
         self.bounds.append(bound)
         assert bound.met, bound.text()
@@ -76,7 +76,7 @@ class Report:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self.about: dict[str, str] = {}  # when, what and by which way was tested
+        self.about: dict[str, str] = {}  # what was tested, when, and over which interface
         self._tests: dict[str, Figures] = {}
 
     def figures(self, node: str) -> Figures:

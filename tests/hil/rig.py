@@ -2,7 +2,7 @@
 """The test stand for a test: an ECU on CAN and, on some stands, a plant that can be commanded.
 
 With a bench channel time is simulated: advance() sends the cyclic commands, lets the virtual ECU run and reads what it
-has sent, and nothing depends on how fast the computer is. Without one time is the wall clock's.
+has sent; no result depends on how fast the computer is. Without a bench channel time is the wall clock's.
 """
 
 from collections import defaultdict
@@ -44,7 +44,7 @@ class Command:
     limit_regen_Nm: float = 1000.0
 
     def signals(self) -> dict[str, Any]:
-        """For cantools; CRC and counter are put in afterwards."""
+        """Signal values for cantools; CRC and counter are set later."""
         return {
             "Crc": 0, "Counter": 0, "Enable": int(self.enable), "FaultReset": int(self.reset), "Mode": self.mode,
             "TorqueRequested": self.torque_Nm, "TorqueLimitDrive": self.limit_drive_Nm,
@@ -84,7 +84,7 @@ class Frame:
 class Rig:
     """Bus, DBC, the cyclic commands, and what has been received.
 
-    A `clock` is a bench channel that lets time pass and does nothing else, for a plant that cannot be commanded.
+    A `clock` is a bench channel that only advances simulated time, for a plant that cannot be commanded.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Rig:
         self.clear_history()
 
     def clear_history(self) -> None:
-        """Reset the history to that after connecting: nothing sent, nothing received."""
+        """Return to the state after connecting: nothing sent, nothing received."""
         self.command = Command()
         self.is_sending = True
         self.power_limits_kW: tuple[float, float] | None = None
@@ -113,10 +113,10 @@ class Rig:
         self.status_protection = e2e.Receiver(self.data_id(STATUS))
         self.frames: dict[str, list[Frame]] = defaultdict(list)
         self.last: dict[str, Frame] = {}
-        self.others: dict[int, list[Frame]] = defaultdict(list)  # by identifier: what the DBC does not describe
+        self.others: dict[int, list[Frame]] = defaultdict(list)  # frames that the DBC does not describe, by identifier
         self.keep_frames = True
         self._commanded_s: float | None = None  # when the last cyclic command went out
-        self.longest_gap_s = 0.0  # between two of them: on the wall clock this computer may be late
+        self.longest_gap_s = 0.0  # longest time between two of them; with the wall clock this computer may be late
         self.counted: dict[str, int] = defaultdict(int)
         self.trace = Trace([])
         self.expected = Expected()
@@ -124,11 +124,11 @@ class Rig:
     # What the DBC says.
 
     def data_id(self, name: str) -> int:
-        """Of the end-to-end protection."""
+        """The data id of the end-to-end protection."""
         return int(self.by_name[name].dbc.attributes["E2EDataId"].value)
 
     def cycle_s(self, name: str) -> float:
-        """How often a message is sent."""
+        """The time from one frame of this message to the next."""
         return (self.by_name[name].cycle_time or 0) * MS
 
     # Time.
@@ -141,16 +141,16 @@ class Rig:
 
     @property
     def has_stand(self) -> bool:
-        """Whether the plant can be told what to do, and time is simulated."""
+        """Whether the plant can be commanded and time is simulated."""
         return self._stand is not None
 
     @property
     def now_s(self) -> float:
-        """Time on the clock of the frames' time stamps, as far as it is known here."""
+        """The present time on the clock of the frames' time stamps, as far as it is known here."""
         return (self._stepped or self._bench_time).now_s
 
     def advance(self, seconds: float) -> None:
-        """Let time pass; the commands go out in their cycle."""
+        """Let time pass; the commands are sent in their cycle."""
         end_s = self.now_s + seconds
         while end_s - self.now_s > EXACT:
             self._send_due()
@@ -169,7 +169,7 @@ class Rig:
     # Sending.
 
     def send(self, frame_id: int, data: bytes, extended: bool = False) -> None:
-        """One frame, as it is."""
+        """Send one frame unchanged."""
         message = can.Message(arbitration_id=frame_id, data=data, is_extended_id=extended, timestamp=self.now_s)
         (self._stepped or self.bus).send(message)
         for listener in self.listeners:
@@ -182,7 +182,7 @@ class Rig:
         return self._encoded[command]
 
     def next_command(self) -> bytes:
-        """The protected frame that is next in turn."""
+        """The next protected command frame."""
         return self._senders[COMMAND].protect(self.encode(self.command))
 
     def skip_counters(self, count: int) -> None:
@@ -191,7 +191,7 @@ class Rig:
         sender.counter = (sender.counter + count) % e2e.COUNTERS
 
     def _is_due(self, name: str) -> bool:
-        """Whether a cyclic message must go out now; its next time is noted."""
+        """Whether a cyclic message must be sent now; if so, its next time is set."""
         if self._due[name] > self.now_s + EXACT:
             return False
         self._due[name] = max(self._due[name], self.now_s - EXACT) + self.cycle_s(name)
@@ -232,7 +232,7 @@ class Rig:
             self.frames[name].append(frame)
 
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
-        """Signals; choices stay numbers."""
+        """Values of the signals; named values stay numbers."""
         return dict(self.by_name[name].decode(data, decode_choices=False))
 
     def signal(self, name: str, signal: str) -> float:
@@ -248,7 +248,7 @@ class Rig:
 
     @property
     def state(self) -> str:
-        """Of the inverter, by its name in the DBC."""
+        """The state of the inverter, by its name in the DBC."""
         signal = self.by_name[STATUS].get_signal_by_name("State")
         assert signal.choices is not None
         return str(signal.choices[int(self.signal(STATUS, "State"))])
@@ -263,7 +263,7 @@ class Rig:
         self.command = wanted
 
     def wait_for(self, state: str, seconds: float = 2.0) -> float:
-        """Run until the status satisfies the condition; the result is the time that it took."""
+        """Run until the status reports this state; the result is the time that it took."""
         start_s = self.now_s
         while STATUS not in self.last or self.state != state:
             assert self.now_s - start_s < seconds, f"state {state} wanted, after {seconds:g} s still {self.state}"
@@ -284,7 +284,7 @@ class Rig:
         self.advance(seconds + 0.1)
 
     def warm_up(self, seconds: float) -> None:
-        """Drive at speeds and torques in all quadrants for the identification; afterwards slowly, with 20 N·m."""
+        """Drive in all quadrants for the identification, and end with 20 N·m at 1000 rpm."""
         assert self.state == "run"
         end_s, k = self.now_s + seconds - 3.0, 0
         while self.now_s < end_s:
@@ -298,7 +298,7 @@ class Rig:
         self.advance(end_s + 3.0 - self.now_s)
 
     def record(self, names: Sequence[str], periods: int = 10) -> Trace:
-        """Record the plant's true values from now on, one row in each so many PWM periods."""
+        """Record true values of the plant from now on, one row every `periods` PWM periods."""
         self.stand.record(names, periods)
         self.trace = Trace(list(names))
         return self.trace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The suite as it runs on a bench: given interface, no plant to command, time of the computer."""
+"""The suite as on a bench: with a given interface, without a plant that can be commanded, on the wall clock."""
 
 import os
 import subprocess
@@ -30,7 +30,7 @@ def over(ecu: VirtualEcu, *more: str) -> list[str]:
 
 
 def test_without_a_plant_the_rest_of_the_suite_runs_and_says_what_it_left_out(program: Path, tmp_path: Path) -> None:
-    # Only time comes from the bench channel: on the wall clock a computer that stalls for 30 ms loses a command.
+    # The bench channel only advances time: on the wall clock a computer that stalls for 30 ms would lose a command.
     with VirtualEcu(program) as ecu:
         done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", f"--junitxml={tmp_path}/junit.xml",
                      *over(ecu, f"--clock={HOST}:{ecu.bench_port}"))  # fmt: skip
@@ -42,7 +42,7 @@ def test_without_a_plant_the_rest_of_the_suite_runs_and_says_what_it_left_out(pr
 
 
 def test_without_any_bench_channel_time_is_the_wall_clock_s(database: cantools.database.Database) -> None:
-    """On a bus without a virtual ECU: nothing here depends on how fast this computer is, except that time passes."""
+    """On a bus without a virtual ECU: only that time passes is tested, not how fast this computer is."""
     with can.Bus(interface="virtual", channel="wall") as ours, can.Bus(interface="virtual", channel="wall") as other:
         rig = Rig(ours, database, None)
         status = rig.by_name[STATUS]

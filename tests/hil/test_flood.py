@@ -16,7 +16,7 @@ TRUTH = "truth.torque_shaft_mean_Nm"
 
 
 class Peer:
-    """Another node; its frames have arrived before simulated time continues."""
+    """Another node; simulated time continues only when the virtual ECU has received its frames."""
 
     def __init__(self, rig: Rig, client: can.BusABC) -> None:
         self._rig, self._client, self._posted = rig, client, 0
@@ -58,7 +58,7 @@ def drive(rig: Rig, peer: Peer | None, frame_id: int = 0, per_ms: float = 0.0, s
 @pytest.mark.plant
 @pytest.mark.parametrize(
     ("frame_id", "per_ms", "load"),
-    # Above us two frames each millisecond: then a command, though always last, still comes in its millisecond.
+    # 0x001 has priority over all others: with two such frames per millisecond the command still arrives in its step.
     [(0x7FF, 4.0, 0.99), (0x400, 4.0, 0.99), (0x001, 2.0, 0.7)],
     ids=["full_load_below_us", "full_load_in_between", "babbling_above_us"],
 )
@@ -74,7 +74,7 @@ def test_a_node_that_fills_the_bus_changes_no_duty(
 
 @pytest.mark.plant
 def test_the_hash_of_duties_tells_journeys_apart(rig: Rig) -> None:
-    """Without this the test above could not fail."""
+    """The hash depends on the duties: otherwise the test above could not fail."""
     assert drive(rig, None, seconds=0.3) == drive(rig, None, seconds=0.3)
     assert drive(rig, None, seconds=0.3) != drive(rig, None, seconds=0.301)
 
@@ -90,15 +90,15 @@ def test_a_node_that_blocks_the_bus_takes_the_torque_away_within_50_ms(rig: Rig,
     for _ in range(15):
         peer.post(0x000, bytes(8), FULL)
         rig.advance(10 * MS)
-    # The bus was blocked from the first frame on; the last command had come 10 ms before.
+    # The bus is blocked from the first frame on; the last command was received 10 ms before.
     assert np.abs(trace[TRUTH][round(50 * MS / 1e-4) :]).max() < 1.0
-    rig.advance(1.0)  # what is still queued passes
+    rig.advance(1.0)  # the frames that are still queued are transmitted
     assert rig.state == "ready"
 
 
 @pytest.mark.plant
 def test_a_second_commander_is_found_out(rig: Rig, peer: Peer) -> None:
-    """Two vehicles on one bus count independently, so that their counters do not fit each other."""
+    """Two senders of commands count independently, so that the sequence of counters is invalid."""
     rig.expected.faults = rig.expected.load = rig.expected.frames = True
     rig.expected.counters |= {"Jumps", "Repeated", "SkippedCommands", "TimeOuts"}
     rig.start(30.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Limits the vehicle sets, and what the drive does beyond its own."""
+"""Limits set by the vehicle, and limits of the drive itself."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def settled(rig: Rig, *names: str) -> list[float]:
 @pytest.mark.plant
 @pytest.mark.parametrize("speed_rpm", [1500.0, -1500.0])
 def test_torque_limits_hold_in_all_four_quadrants(rig: Rig, figures: Figures, speed_rpm: float) -> None:
-    """50 N·m to drive and 20 N·m to brake, asked for 90 N·m either way."""
+    """Limits of 50 N·m to drive and 20 N·m to brake, with requests of 90 N·m in both directions."""
     rig.turn(speed_rpm)
     rig.ask(limit_drive_Nm=50.0, limit_regen_Nm=20.0)
     rig.start()
@@ -50,7 +50,7 @@ def test_a_limit_of_zero_is_no_torque(rig: Rig) -> None:
 
 @pytest.mark.plant
 def test_the_machine_gives_what_it_can_where_more_is_asked_for(rig: Rig, figures: Figures) -> None:
-    """At high speed the voltage limits the torque: what the bus calls available is what comes."""
+    """At high speed the voltage limits the torque: the shaft torque is the available torque on the bus."""
     rig.turn(8000.0, 1.0)
     rig.start(132.0)
     truth_Nm = settled(rig, TRUTH)[0]

@@ -74,7 +74,7 @@ def test_malformed_texts_are_counted_and_good_ones_between_them_still_count(ecu:
         connection.shutdown(socket.SHUT_WR)
         assert connection.recv(64) == b""  # everything has been read
     counters = stand.counters()
-    # Two of the texts swallow what follows them, as any reader must: the one without an end loses itself alone.
+    # The text without an end is lost at the next '<', so that none of the good texts is lost.
     assert counters["from_clients"] == len(MALFORMED)
     assert counters["malformed"] + counters["dropped"] >= len(MALFORMED)
 
@@ -146,7 +146,7 @@ def test_every_client_hears_the_others_but_not_itself(ecu: VirtualEcu, stand: Ch
     for client in (two, three):
         heard = client.recv(HANG_S)
         assert heard is not None and (heard.arbitration_id, heard.is_extended_id, heard.dlc) == (0x1FFFFFFF, True, 0)
-        # (VB-2) with no data: 67 + 53/4 = 80 bit of 2 us.
+        # (VB-2) without data: 67 + 53/4 = 80 bits of 2 us each.
         assert heard.timestamp == pytest.approx(160e-6, abs=1e-9)
     # The sender receives none of its own frames: nothing comes before a frame of another client.
     two.send(can.Message(arbitration_id=0x1FFFFFFE, data=b"", is_extended_id=True))
@@ -218,8 +218,8 @@ def frames(connection: socket.socket, already: bytes = b"") -> Iterator[tuple[in
 
 
 def test_in_real_time_time_passes_by_itself_and_frames_keep_their_simulated_period(program: Path) -> None:
-    """Without reading the clock. Read by hand: python-can takes a greeting with a frame glued to it for a broken one,
-    and how much time passes until it has read the greeting is this computer's business."""
+    """The test does not read the clock. It uses a plain socket because python-can fails if a frame arrives in the same
+    read as the greeting, which depends on how busy this computer is."""
     times: list[float] = []
     with VirtualEcu(program, fast=False) as ecu, raw(ecu.can_port) as connection:
         connection.sendall(b"< open can0 >< rawmode >")

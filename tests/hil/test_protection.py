@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""End-to-end protection against an attacker that knows everything but the CRC.
+"""End-to-end protection: corrupted commands, repetitions, jumps, and valid frames with values out of range.
 
 Why no corruption of one or two bits can be taken for a good frame: the CRC is linear, so a corruption e(x) of the 64
 bits of a frame (7 bytes of data, then the CRC) goes unnoticed if and only if p(x) = x^8 + x^4 + x^3 + x^2 + 1 divides
 e(x). p is primitive: x has order 255 modulo p, a fact test_the_proof_holds() computes. One bit is e = x^i, which p
 never divides; two are e = x^i (x^k + 1) with 1 <= k <= 63 < 255, and p divides x^k + 1 only if 255 divides k. The data
-id is a constant in front and cancels. Corruptions of three and more bits pass with a probability of about 2^-8 each;
-then counter and range checks stand behind the CRC.
+id is the same in both CRCs and cancels. A corruption of three or more bits passes with a probability of about 2^-8;
+after the CRC the counter and the ranges are checked.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from crccheck.crc import Crc8Base
 from rig import COMMAND, MS, Rig
 
 BITS = 64
-PER_COMMAND = 15  # corrupted frames between two good ones: 60 % load
+PER_COMMAND = 15  # corrupted frames between two good ones; with them the load of the bus is 60 %
 
 
 class _J1850(Crc8Base):  # type: ignore[misc]
@@ -52,9 +52,9 @@ def test_the_proof_holds() -> None:
 
 @pytest.mark.plant
 def test_no_corruption_of_one_or_two_bits_is_accepted_with_any_counter(rig: Rig) -> None:
-    """2080 corruptions of a dangerous command x 15 counters, each while exactly that counter is expected."""
+    """2080 corruptions of a dangerous command with each of 15 counters, sent while that counter is the expected one."""
     rig.expected.faults = rig.expected.frames = rig.expected.load = True
-    rig.expected.counters |= {"CrcErrors", "IdErrors", "TimeOuts"}  # the latter before and after
+    rig.expected.counters |= {"CrcErrors", "IdErrors", "TimeOuts"}  # TimeOuts before and after the frames
     corruptions = [(i,) for i in range(BITS)] + list(combinations(range(BITS), 2))
     todo = {counter: list(corruptions) for counter in range(e2e.COUNTERS)}
     command_id, data_id = rig.by_name[COMMAND].frame_id, rig.data_id(COMMAND)
@@ -84,7 +84,7 @@ def test_no_corruption_of_one_or_two_bits_is_accepted_with_any_counter(rig: Rig)
     assert sent == 31200
     now = rig.signal("INV_DiagProtection", "CrcErrors") + rig.signal("INV_DiagReceive", "IdErrors")
     assert now - refused == sent
-    # Every good frame was taken, but for the first, which only tells where the sender counts.
+    # Every good frame was accepted except the first one, which only synchronises the counter.
     assert (rig.signal("INV_DiagReceive", "Accepted") - accepted) % 65536 == good - 1
     assert rig.state in ("standby", "fault")
     rig.skip_counters(counter - 1)

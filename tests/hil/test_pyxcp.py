@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A calibration master that this project did not write, and that waits for its answers by the wall clock."""
+"""A calibration master from outside this project, which waits for its answers on the wall clock."""
 
 import re
 import struct
@@ -33,7 +33,7 @@ def _key(resource: int, seed: bytes) -> bytes:
 
 
 def _let_time_pass(stand: Channel, ended: threading.Event) -> None:
-    """From the first frame on: the master has read its greeting then, with no frame glued to it."""
+    """Let time pass from the master's first frame on: by then it has read the greeting without a frame behind it."""
     polled(lambda: ended.is_set() or stand.counters()["from_clients"] > 0)
     while not ended.is_set():
         stand.run(10.0)
@@ -41,7 +41,7 @@ def _let_time_pass(stand: Channel, ended: threading.Event) -> None:
 
 @pytest.fixture
 def ecu(program: Path) -> Iterator[VirtualEcu]:
-    """Its time passes by itself as soon as somebody has said something."""
+    """A virtual ECU whose time begins to pass with the first frame on the bus."""
     with VirtualEcu(program) as running, ThreadPoolExecutor(1) as pool:
         stand, ended = Channel(HOST, running.bench_port), threading.Event()
         passing = pool.submit(_let_time_pass, stand, ended)
@@ -70,7 +70,7 @@ def master(ecu: VirtualEcu) -> Iterator[Master]:
 
 @pytest.fixture
 def address(description: Description) -> Callable[[str], int]:
-    """Where the A2L file says a value lies."""
+    """The address of a value according to the A2L file."""
     where = {value.name: value.address for value in (*description.values, *description.measurements)}
     return lambda name: where[name]
 

@@ -47,7 +47,7 @@ def test_the_bus_names_the_check_that_failed_while_the_fault_stands(rig_of: Rig,
     assert rig_of.state == "fault"
     assert str(signal.choices[int(rig_of.signal(CONFIG, "MotorCheck"))]) == refused[1]
     assert f"{refused[1]}: " in signal.comment
-    rig_of.ask(reset=True)  # changes nothing: the data are what they are
+    rig_of.ask(reset=True)  # changes nothing, because the data stay wrong
     sent = rig_of.counted[CONFIG]
     rig_of.advance(1.0)
     assert rig_of.counted[CONFIG] - sent == 10

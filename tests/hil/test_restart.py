@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The virtual ECU's flash in a file: what was identified is there after the process has ended."""
+"""The virtual ECU's flash in a file: a new process has the values identified by the previous one."""
 
 import subprocess
 from collections.abc import Callable
@@ -41,7 +41,7 @@ def test_a_second_process_starts_with_what_the_first_has_identified(
         stand = Channel(HOST, ecu.bench_port)
         assert stand.get("memory_recalled") == [1.0]
         stand.run(5.0)
-        # The flux is transmitted after the first millisecond. With switching disabled only the leak acts.
+        # The flux is on the bus after 1 ms. While switching is disabled, only the leak changes it.
         assert stand.get(*IDENTIFIED) == pytest.approx(before, rel=2e-3)
         assert before[0] < 0.94 * 0.0717
         stand.close()

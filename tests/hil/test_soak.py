@@ -10,14 +10,14 @@ from rig import Rig
 
 TRUTH = "truth.torque_shaft_mean_Nm"
 ROUND_S = 20.0
-ROUNDS_FOR_RMS = 40  # every pairing of torque and speed once: fewer say nothing about the mean
+ROUNDS_FOR_RMS = 40  # every pair of torque and speed once; fewer are not enough for a mean
 WAVE_ROUNDS = 60  # winding and magnet warm up and cool down in 20 minutes
 TORQUES_NM = (40.0, 90.0, -60.0, 0.0, 20.0, -100.0, 70.0, -20.0)
 SPEEDS_RPM = (1500.0, 3000.0, 800.0, -2000.0, 2500.0)
 
 
 class Metronome:
-    """Counts the periods of each cyclic message, and those that are not its cycle."""
+    """Counts the periods of each cyclic message, and the periods that differ from its cycle."""
 
     def __init__(self, rig: Rig) -> None:
         self._cycle_s = {m.frame_id: rig.cycle_s(m.name) for m in rig.by_name.values() if "INV" in m.senders}
@@ -75,13 +75,13 @@ def _check_frames(rig: Rig, metronome: Metronome, figures: Figures) -> None:
     rows = [[names[frame_id], count, metronome.wrong[frame_id]] for frame_id, count in metronome.periods.items()]
     figures.table("Periods of the cyclic messages", ["message", "periods", "not the cycle"], rows)
     drive_s = rig.now_s - metronome.begun_s
-    for name, count, _ in rows:  # one that is never heard again has no wrong period
+    for name, count, _ in rows:  # a message that stops would have no wrong period
         assert count >= drive_s / rig.cycle_s(name) - 2.0, name
     figures.promise("periods with a frame missing, early or late", sum(row[2] for row in rows), 0.0, "periods")
 
 
 def _check_torque(rows: list[list[float]], figures: Figures) -> None:
-    """The campaign's bounds, for a machine that warms up and cools down meanwhile."""
+    """The bounds of the campaign, for a machine that warms up and cools down during the drive."""
     errors = [100.0 * (row[2] - row[1]) / max(abs(row[1]), 13.2) for row in rows]
     line = ("shaft less asked", [row[0] for row in rows], errors)
     figures.plot("Torque at the end of each round", [("error, %", [line])])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state machine as the bus sees it: the way to torque and back, refused requests, faults and their reset."""
+"""The state machine on the bus: from standby to torque and back, refused requests, faults and their reset."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ REFUSED = ("none", "torque_request_not_zero", "fault", "dc_voltage_out_of_range"
            "mode_locked", "command_timed_out", "reset_while_enabled")  # fmt: skip
 PROTECTION, PRECHARGE, DISCHARGE, GATE = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 OVER_CURRENT, OVER_VOLTAGE, UNDER_VOLTAGE, CURRENT_SUM = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-DRIVER = 1 << 15  # the same fault as GATE, as the interrupts tell it
+DRIVER = 1 << 15  # the same fault in the word of the drive, set by the interrupts
 
 
 def refusal(rig: Rig) -> str:
@@ -18,7 +18,7 @@ def refusal(rig: Rig) -> str:
 
 
 def faults(rig: Rig) -> tuple[int, int]:
-    rig.advance(0.11)  # their cycle
+    rig.advance(0.11)  # the cycle of the message and a margin
     return int(rig.signal("INV_Faults", "DriveFaults")), int(rig.signal("INV_Faults", "EcuFaults"))
 
 
@@ -95,7 +95,7 @@ def test_disable_under_torque_ramps_to_zero_and_then_disables_switching(rig: Rig
 @pytest.mark.parametrize("speed_rpm", [0.0, 3.0, 30.0, 300.0])
 @pytest.mark.parametrize("noise_A", [0.0, 0.05, 0.2, 0.5, 1.0])
 def test_a_healthy_drive_does_not_trip_however_slow_and_noisy(rig: Rig, noise_A: float, speed_rpm: float) -> None:
-    """Monitors that divide by speed, or wait for samples to move, are wrong here first."""
+    """Near standstill a monitor that divides by the speed or waits for samples to change would trip first."""
     rig.stand.set(current_noise_A_rms=noise_A)
     rig.turn(speed_rpm)
     rig.start()
@@ -127,7 +127,7 @@ def test_a_fault_under_torque_ends_in_fault_with_no_torque_and_is_told(
     bit = (drive or ecu).bit_length()
     assert int(rig.signal("INV_Faults", "FirstFault")) == (bit if drive else 32 + bit)
     assert abs(rig.stand.get("truth.torque_mean_Nm")[0]) < 0.5
-    # With the cause gone and the dc link discharged, a reset helps.
+    # Without the cause, and with the dc link discharged, a reset clears the fault.
     rig.stand.set(**{name: {"vdc_V": 350.0}.get(name, 0.0) for name in cause})
     rig.ask(enable=False, mode="off", torque_Nm=0.0)
     rig.advance(1.0)

@@ -22,7 +22,7 @@ def test_50_ms_after_the_last_command_there_is_no_torque(
     rig.advance(10 * MS)
     trace = rig.record(["truth.time_s", TRUTH], 1)
     rig.is_sending = False
-    # The last command went out one cycle before now.
+    # The last command was sent one cycle ago.
     rig.advance(90 * MS)
     after_s = trace["truth.time_s"] - trace["truth.time_s"][0] + 10 * MS
     figures.plot(f"{torque_Nm:g} N·m at {speed_rpm:g} rpm; the last command at 0 s",
@@ -40,7 +40,7 @@ def test_two_lost_commands_in_a_row_change_nothing(rig: Rig) -> None:
     rig.advance(0.3)
     for _ in range(5):
         rig.is_sending = False
-        rig.advance(10 * MS)  # this command was never sent
+        rig.advance(10 * MS)  # in this cycle no command was sent
         rig.is_sending = True
         rig.skip_counters(1)
         rig.advance(40 * MS)
@@ -54,7 +54,7 @@ def test_after_a_time_out_enable_must_be_given_anew(rig: Rig) -> None:
     rig.advance(0.3)
     rig.is_sending = False
     rig.advance(0.2)
-    rig.is_sending = True  # with enable and torque, as if nothing had happened
+    rig.is_sending = True  # still with enable and torque
     rig.advance(0.3)
     assert rig.state == "ready"
     assert rig.signal("INV_Status", "TorqueCommanded") == 0.0
@@ -83,7 +83,7 @@ def test_power_limits_that_stop_coming_take_the_torque_back(rig: Rig, figures: F
 def test_power_limits_that_stop_coming_while_they_limit_let_no_more_power_through_on_the_way(
     rig: Rig, figures: Figures
 ) -> None:
-    """100 N·m asked for, 12 kW allowed: about 36 N·m; the ramp that ends the torque begins beyond."""
+    """100 N·m requested, 12 kW allowed, about 36 N·m; the ramp that ends the torque must let no more power through."""
     rig.turn(3000.0)
     rig.power_limits_kW = (12.0, 60.0)
     rig.start(100.0)

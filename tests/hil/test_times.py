@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The times of docs/howto/can.md on the bus, each within one step of the task, at the PWM frequency of whatever is
-tested. frequencies/ runs this file at six of them, on the virtual ECU and on the image.
+"""The times of docs/howto/can.md on the bus, each within one step of the task, at the PWM frequency of the target.
 
-The plant is recorded in every period. Frames carry the time at which they were put on the bus, where frames of their
-own ECU and a command may stand before them.
+CMakeLists.txt runs this file on virtual ECUs at six frequencies, tests/target/s32k144/test_frequencies.py on images.
+The plant is recorded in every period. The time stamp of a received frame is the end of its transmission, which other
+frames of the ECU and a command can delay.
 """
 
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class Clock:
         told = dict(word.split("=") for word in rig.stand.ask("hello").split() if "=" in word)
         self.period_s = 1e-9 * int(told["period_ns"])
         self.step_s = self.period_s * periods_per_step(1.0 / self.period_s)
-        # What is recorded is what a period began with.
+        # A recorded row has the values at the beginning of its period.
         self.within_s = self.step_s + self.period_s + 1e-6
 
 
@@ -41,7 +41,7 @@ def clock(rig: Rig) -> Clock:
 
 @pytest.fixture
 def sent_s(rig: Rig) -> Iterator[dict[str, float]]:
-    """When the last command and the last battery limits went out."""
+    """Times at which the last command and the last battery limits were sent."""
     times: dict[str, float] = {}
     names = {rig.by_name[name].frame_id: name for name in (COMMAND, LIMITS)}
 
@@ -55,7 +55,7 @@ def sent_s(rig: Rig) -> Iterator[dict[str, float]]:
 
 
 def test_every_cycle_and_the_time_of_each_state_hold_within_a_step(rig: Rig, clock: Clock, figures: Figures) -> None:
-    """Init 50 ms; precharge until its time-out of 2 s, as the dc link tells that rises while precharge is on."""
+    """Init: 50 ms. Precharge: 2 s until its time-out, measured by the dc voltage, which rises while precharge is on."""
     rig.power_cycle()
     rig.expected.faults = True
     rig.stand.set(precharge_s=SLOW_CHARGE_S)
@@ -79,16 +79,16 @@ def _check_cycle(rig: Rig, clock: Clock, name: str) -> None:
     cycle_s = rig.cycle_s(name)
     away_s = times - times[0] - cycle_s * np.arange(len(times))
     assert len(times) >= 2.0 / cycle_s, name
-    # Two of its own frames and a command may be on the wire when a frame is due.
+    # Two other frames of the ECU and a command may be ahead of a frame when it is due.
     assert np.ptp(away_s) < clock.step_s + 3 * WIRE_S, f"{name}: {np.ptp(away_s) / MS:.2f} ms"
-    # In the mean it is exact: a cycle that were a number of steps would add up.
+    # The mean is exact: if cycles were counted in steps of not exactly 1 ms, the deviations would add up.
     assert abs(away_s[-1]) < clock.step_s + 3 * WIRE_S, f"{name}: {away_s[-1] / MS:.2f} ms after {times[-1]:.1f} s"
 
 
 def test_ramp_and_lost_command_hold_within_a_step(
     rig: Rig, clock: Clock, figures: Figures, sent_s: dict[str, float]
 ) -> None:
-    """Full torque in 50 ms; it falls 30 ms after the last command, is gone 50 ms after it, and the state is ready."""
+    """Full torque in 50 ms; it falls 30 ms after the last command and is zero 50 ms after it, in the state ready."""
     rig.expected.counters |= {"TimeOuts", "Jumps", "Repeated", "SkippedCommands"}
     rig.start()
     trace = rig.record([TIME, TORQUE], 1)
@@ -98,7 +98,7 @@ def test_ramp_and_lost_command_hold_within_a_step(
     assert full > 100.0
     first, last = np.flatnonzero(trace[TORQUE] > 0.0)[0], np.flatnonzero(trace[TORQUE] >= full - 0.1)[0]
     took_s = trace[TIME][last] - trace[TIME][first]
-    # Two steps, and 0.1 ms twice: the trace's period, and that the task ends in the first or in the second of a step.
+    # Two steps, one period of the trace, and one period more because the task ends in the first or second of a step.
     figures.promise("build-up", abs(took_s - 50 * MS) / MS, 2 * clock.step_s / MS + 0.2, "ms away from 50 ms")
 
     trace.rows.clear()
@@ -108,7 +108,7 @@ def test_ramp_and_lost_command_hold_within_a_step(
     age_s = age_s + trace[TIME] - trace[TIME][0]
     falls_s = age_s[np.flatnonzero(trace[TORQUE] < full - 0.5)[0]]
     gone_s = age_s[np.flatnonzero(trace[TORQUE] == 0.0)[0]]
-    # The command is good when the wire has brought it, behind at most one frame of the ECU.
+    # The age of a command counts from the end of its transmission, which one frame of the ECU can delay.
     figures.promise("time-out", abs(falls_s - 30 * MS - WIRE_S) / MS, (clock.within_s + WIRE_S) / MS,
                     "ms away from 30 ms")  # fmt: skip
     figures.promise("torque is gone", gone_s / MS, 50.0, "ms after the last command")
@@ -132,7 +132,7 @@ def test_battery_limits_are_missed_after_300_ms(
 
 
 def test_a_dc_link_that_stays_charged_is_a_fault_after_5_s(rig: Rig, clock: Clock, figures: Figures) -> None:
-    """As the status tells, which comes each 10 ms."""
+    """Measured by the status, which is sent every 10 ms."""
     rig.expected.faults = True
     rig.start()
     rig.stand.set(discharge_open=1.0)

@@ -10,15 +10,15 @@ from rig import Rig, Trace
 
 from fluxtrue_tools.demo.step import overshoot_percent, rise_ms
 
-# Everything wrong at once, as in the demonstration: noise, a winding at 118 C that reports 20 C, a magnet 15 % weaker.
+# As in the demonstration: noise, a resistance as at 119 °C while the sensor reports 20 °C, a magnet 15 % weaker.
 WRONG: dict[str, Any] = {"r_ohm_20": 0.025, "current_noise_A_rms": 0.5, "magnet_scale": 0.85}
 TRUTH = "truth.torque_shaft_mean_Nm"
 WARM_UP_S = 60.0
 COLD_PERCENT = 4.0
 LEAST_NM = 13.2  # errors are of |torque|, or of a tenth of the machine's 132 N·m if that is more
-# After a drive. Tighter than the campaign, 0.8 % and 2.5 %: one plant, the same in every run, no gain error of sensors.
+# After a drive. The bounds of the campaign are wider, 0.8 % and 2.5 %: here sensors have no gain error.
 RMS_PERCENT, WORST_PERCENT = 0.6, 1.5
-# The bus says torque in steps of 0.1 N·m, 0.25 % of 20 N·m either way; the rest is the identification's.
+# Of this the resolution of 0.1 N·m on the bus is +-0.25 % of 20 N·m, the rest the error of the estimate.
 TOLD_PERCENT = 1.5
 
 
@@ -33,7 +33,7 @@ def percent(error_Nm: float, torque_Nm: float) -> float:
 
 
 def _row(rig: Rig, torque_Nm: float) -> list[float]:
-    """Asked, shaft, error in percent, told on CAN."""
+    """Requested torque, shaft torque, its error in percent, estimated torque on CAN."""
     rig.ask(torque_Nm=torque_Nm)
     rig.advance(0.5)
     since_s = rig.now_s
@@ -51,7 +51,7 @@ def test_after_a_drive_shaft_torque_is_the_torque_asked_for_with_everything_wron
     errors, told = [], []
     for speed_rpm in (1000.0, 3000.0, 5000.0, -3000.0, -1000.0):
         rig.turn(speed_rpm, 1.0)
-        # 5000 rpm and more than 80 N·m is beyond the voltage of a weak magnet's machine.
+        # At 5000 rpm the dc voltage is not sufficient for more than 80 N·m with this machine.
         torques = [t for t in (-120.0, -80.0, -40.0, -20.0, 20.0, 40.0, 80.0, 120.0) if abs(t) * abs(speed_rpm) <= 4e5]
         rows = [_row(rig, torque_Nm) for torque_Nm in torques]
         errors += [row[2] for row in rows]
@@ -71,7 +71,7 @@ def test_after_a_drive_shaft_torque_is_the_torque_asked_for_with_everything_wron
 def test_from_a_cold_start_torque_is_close_at_the_first_requests_and_true_when_they_come_back(
     rig: Rig, figures: Figures
 ) -> None:
-    """The same machine without identification: the tables alone are wrong by 5 to 10 %, as the demonstration shows."""
+    """The same machine at the first requests; with the tables alone the error is 5 to 10 % (see the demonstration)."""
     rig.stand.set(**WRONG)
     rig.turn(2000.0)
     rig.start()
@@ -105,9 +105,9 @@ def test_zero_torque_gives_no_torque_at_any_speed(rig: Rig, figures: Figures) ->
 
 @pytest.mark.plant
 def test_a_weaker_magnet_costs_no_torque_as_in_figure_8_of_the_paper(rig: Rig, figures: Figures) -> None:
-    """40 N·m; the magnet loses 8.75 % of its flux in one step, which no magnet does; identification has to find it.
+    """40 N·m; the magnet loses 8.75 % of its flux in one step, faster than a real magnet; the identification finds it.
 
-    The paper brings a loss of 8.75 % back to 1.25 %: so must this, at a standing point and without any further drive.
+    In the paper a loss of 8.75 % is reduced to 1.25 %. The same is required here, at one operating point.
     """
     rig.turn(1000.0)
     rig.start()
@@ -163,7 +163,7 @@ def _step(rig: Rig, figures: Figures, first_Nm: float, second_Nm: float) -> tupl
 def test_a_torque_step_over_can_follows_the_ramp_and_overshoots_little(rig: Rig, figures: Figures) -> None:
     trace, at = _step(rig, figures, 0.0, 100.0)
     after = np.arange(len(trace.rows)) >= at
-    # 100 N·m at full slew (the machine's torque in 40 ms) is 30 ms, jerk adds 10 ms at each end.
+    # The slew rate of the machine's torque in 40 ms takes 30 ms for 100 N·m; the jerk limit adds 10 ms at each end.
     figures.promise("rise 10 - 90 %", rise_ms(1e-4 * np.arange(after.sum()), trace[TRUTH][after], 100.0), 45.0, "ms")
     figures.promise("overshoot", overshoot_percent(trace[TRUTH][after], 100.0), 5.0, "%")
 

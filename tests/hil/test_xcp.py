@@ -30,7 +30,7 @@ def test_a_measurement_read_over_xcp_is_what_the_plant_does(rig: Rig, descriptio
     rig.advance(1.0)
     master = Master(rig, description)
     assert master.measurement("speed_rpm") == pytest.approx(2000.0, abs=2.0)
-    # The estimate against the shaft, not against the request it is controlled to.
+    # The estimate is compared with the shaft, not with the request that it is controlled to.
     assert master.measurement("torque_estimated_Nm") == pytest.approx(rig.stand.get(TRUTH)[0], abs=0.5)
     assert master.measurement("v_dc_V") == pytest.approx(350.0, abs=1.0)
     assert master.measurement("fault_word") == 0.0
@@ -65,7 +65,7 @@ def test_measuring_changes_no_duty(rig: Rig, description: Description) -> None:
         rig.power_cycle(seed=3)
         rig.turn(2000.0)
         rig.start(40.0)
-        # The session takes some 30 ms to set up; without it the same time passes.
+        # The set-up of the session takes some 30 ms; the drive without it waits as long.
         begun_s = rig.now_s
         if measure:
             Master(rig, description).sample(["i_d_A", "i_q_A", "u_d_V", "u_q_V", "psi_f_Vs"], 1, 0.5)

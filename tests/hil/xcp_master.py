@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small XCP master on the rig's bus, in the rig's time: commands one by one, measurement lists."""
+"""A small XCP master on the rig's bus and in its time: single commands and measurement lists."""
 
 import struct
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ ANSWER_MS = 10
 
 
 def key_of(seed: int) -> int:
-    """The published function of firmware/calibration/xcp_access.c."""
+    """The key for a seed: the same function as in firmware/calibration/xcp_access.c."""
     return ((seed << 7 | seed >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C
 
 
@@ -53,7 +53,7 @@ class Master:
         self.command(0xFF, 0)
 
     def command(self, *data: int) -> bytes:
-        """One command; what follows the positive answer's first byte."""
+        """Send one command; returns the positive answer without its first byte."""
         self._rig.send(COMMAND_ID, bytes(data))
         for _ in range(ANSWER_MS):
             self._rig.advance(MS)
@@ -88,12 +88,12 @@ class Master:
         return self._raw(self.values[name])
 
     def measurement(self, name: str) -> float:
-        """A measurement, now, in its unit."""
+        """The present value of a measurement in its unit."""
         value = self.measurements[name]
         return self._raw(value) * self._factors.get(value.base, 1.0)
 
     def write(self, name: str, value: float) -> None:
-        """A calibratable value; XcpError if it is refused."""
+        """Write a calibratable value; XcpError if it is refused."""
         self._point(self.values[name].address)
         self.command(0xF0, 4, *struct.pack("<f", value))
 
@@ -107,7 +107,7 @@ class Master:
         self.command(0xEB, 0x03, 0, page)
 
     def sample(self, names: Sequence[str], event: int, seconds: float) -> Sampled:
-        """Run a list for a while: event 0 each millisecond, 1 each tenth. One frame per two bytes more than five."""
+        """Run a measurement list for a while; event 0 is every millisecond, 1 every tenth."""
         frames = self._lay_out(names)
         self.command(0xD6)
         self.command(0xD5, 0, 1, 0)
