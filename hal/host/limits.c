@@ -79,10 +79,8 @@ double limits_get_machine_monitors(const fluxtrue_t *drive)
 
 void limits_set_machine_monitors(fluxtrue_t *drive, double value)
 {
-    motor_t *m = &drive->motor;
-    m->plausibility = motor.plausibility;
-    m->torque_monitor = motor.torque_monitor;
+    drive->motor = motor;
     if (value == 0.0) {
-        slow_monitors_without_machine(m);
+        slow_monitors_without_machine(&drive->motor);
     }
 }

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 import pytest
 from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Drive, load, names
 
+from fluxtrue_tools.sim.members import members
+
 IDLE = (0.0, 0.0, 0.0, 350.0, 0.0, 20.0)
 SETTABLE = ("torque_requested_Nm", "enable", "torque_loop", "identification")
 READABLE = (
@@ -254,3 +256,13 @@ def test_a_hundred_drives_can_be_created_and_destroyed_repeatedly(library: ctype
         assert {drive.step(IDLE)[3] for drive in drives} == {0.0}
         for drive in drives:
             drive.close()
+
+
+def test_the_monitors_of_the_machine_are_all_enabled_again(make: Callable[[], Drive]) -> None:
+    drive, new = make(), make()
+    assert drive.set("machine_monitors", 0.0) == OK
+    assert drive.set("machine_monitors", 1.0) == OK
+    layout = members(drive.library._name)
+    for name in ("plausibility.e_0", "plausibility.i_alive", "plausibility.ripple_max", "torque_monitor.v_0",
+                 "plausibility.contradicted_steps", "gate_fault.i_alive", "frozen_angle.v_0"):  # fmt: skip
+        assert layout.read(drive.handle, f"motor.{name}") == layout.read(new.handle, f"motor.{name}"), name
