@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/host/fluxtrue.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
+#include "hal/host/can_host.h"
 #include "hal/host/instance.h"
 #include "hal/host/port.h"
 #include "types/version.h"
@@ -33,6 +35,24 @@ const char *fluxtrue_version(void)
     return firmware_version.text;
 }
 
+int fluxtrue_abi(void)
+{
+    return FLUXTRUE_ABI;
+}
+
+const char *fluxtrue_motor(void)
+{
+    return motor.name;
+}
+
+/* The motor data hold it as a float: of a whole number of Hz the exact period is given. */
+double fluxtrue_period_s(void)
+{
+    const double pwm_hz = 1.0 / (double)motor.bases.period_s;
+    const double whole = round(pwm_hz);
+    return 1.0 / ((fabs(pwm_hz - whole) <= pwm_hz * FLT_EPSILON) ? whole : pwm_hz);
+}
+
 fluxtrue_t *fluxtrue_create(void)
 {
     fluxtrue_t *instance = malloc(sizeof *instance);
@@ -45,6 +65,15 @@ fluxtrue_t *fluxtrue_create(void)
 void fluxtrue_destroy(fluxtrue_t *drive)
 {
     free(drive);
+}
+
+void fluxtrue_reset(fluxtrue_t *drive)
+{
+    const bool on_bus = drive->on_bus;
+    fluxtrue_init(drive);
+    if (on_bus) {
+        can_host_attach(drive);
+    }
 }
 
 /* Written so that a NaN fails: every comparison with it is false. */

@@ -3,23 +3,13 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "calibration/calibration.h"
 #include "drive/mrai/mrai_seam.h"
 #include "hal/host/commissioned.h"
 #include "hal/host/identified.h"
 #include "hal/host/instance.h"
 #include "hal/host/limits.h"
+#include "hal/host/parameters.h"
 #include "hal/host/stations.h"
-
-typedef double (*get_fn)(const fluxtrue_t *);
-typedef void (*set_fn)(fluxtrue_t *, double);
-
-typedef struct {
-    const char *name;
-    get_fn get;
-    set_fn set; /* NULL: read only */
-    double lo, hi;
-} parameter_t;
 
 static double pu15(int32_t x, float base)
 {
@@ -146,8 +136,8 @@ static void set_identification_reset(fluxtrue_t *d, double x)
 #define POINT_NAME(k) \
     {"inverter_" #k "_A", commissioned_##k##_A, NULL, 0, 0}, {"inverter_" #k "_V", commissioned_##k##_V, NULL, 0, 0},
 
-/* The range of torque and current is the motor's own: see limits_of(). */
-static const parameter_t parameters[] = {
+/* The range of torque and current is that of the motor: see bound_of() in access.c. */
+const parameter_t parameters[] = {
     {"torque_requested_Nm", stations_requested_Nm, stations_set_requested_Nm, -INFINITY, INFINITY},
     {"enable", get_enable, set_enable, 0.0, 1.0},
     {"torque_loop", get_torque_loop, set_torque_loop, 0.0, 1.0},
@@ -211,85 +201,4 @@ static const parameter_t parameters[] = {
     {"memory_saves", get_memory_saves, NULL, 0, 0},
 };
 
-#define PARAMETERS ((int)(sizeof parameters / sizeof parameters[0]))
-
-static const parameter_t *find(const char *called)
-{
-    const char *name = stations_name(called);
-    for (int k = 0; name && k < PARAMETERS; k++) {
-        if (strcmp(name, parameters[k].name) == 0) {
-            return &parameters[k];
-        }
-    }
-    return NULL;
-}
-
-/* Torque and current requests are bounded by what the motor data allow. */
-static double bound_of(const fluxtrue_t *d, const parameter_t *p)
-{
-    if (p->set == stations_set_requested_Nm) {
-        return (double)d->drive.motor->torque_max_Nm;
-    }
-    return pu15(d->drive.motor->current_reference.i_max, bases(d)->current_A);
-}
-
-/* CALIBRATION_COUNT: no such name. */
-static calibration_id_t find_calibration(const char *name)
-{
-    for (int k = 0; name && k < CALIBRATION_COUNT; k++) {
-        if (strcmp(name, calibration_info[k].name) == 0) {
-            return (calibration_id_t)k;
-        }
-    }
-    return CALIBRATION_COUNT;
-}
-
-static int set_calibration(fluxtrue_t *drive, const char *name, double value)
-{
-    const calibration_id_t id = find_calibration(name);
-    if (id == CALIBRATION_COUNT) {
-        return FLUXTRUE_UNKNOWN_NAME;
-    }
-    const bool meant = value == 0.0 || (float)value >= calibration_least(&drive->drive, id);
-    if (!(value >= (double)calibration_info[id].lo && value <= (double)calibration_info[id].hi && meant)) {
-        return FLUXTRUE_OUT_OF_RANGE;
-    }
-    calibration_set(&drive->drive, id, (float)value);
-    return FLUXTRUE_OK;
-}
-
-int fluxtrue_set(fluxtrue_t *drive, const char *name, double value)
-{
-    const parameter_t *p = find(name);
-    if (!p) {
-        return set_calibration(drive, name, value);
-    }
-    if (!p->set) {
-        return FLUXTRUE_READ_ONLY;
-    }
-    const double hi = isinf(p->hi) ? bound_of(drive, p) : p->hi;
-    const double lo = isinf(p->lo) ? -hi : p->lo;
-    if (!(value >= lo && value <= hi)) {
-        return FLUXTRUE_OUT_OF_RANGE;
-    }
-    p->set(drive, value);
-    return FLUXTRUE_OK;
-}
-
-double fluxtrue_get(const fluxtrue_t *drive, const char *name)
-{
-    const parameter_t *p = find(name);
-    if (p) {
-        return p->get(drive);
-    }
-    const calibration_id_t id = find_calibration(name);
-    return (id == CALIBRATION_COUNT) ? (double)NAN : (double)calibration_get(&drive->drive, id);
-}
-
-const char *fluxtrue_name(int index)
-{
-    if (index < 0 || index >= PARAMETERS + CALIBRATION_COUNT) {
-        return NULL;
-    }
-    return (index < PARAMETERS) ? parameters[index].name : calibration_info[index - PARAMETERS].name;
-}
+const int parameters_count = (int)(sizeof parameters / sizeof parameters[0]);

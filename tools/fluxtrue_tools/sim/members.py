@@ -6,6 +6,7 @@ Tests use them to plant a fault in memory, and to read what no name of fluxtrue_
 
 import ctypes
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -98,6 +99,24 @@ class Members:
         """Changes it; whole numbers wrap as in C."""
         offset, kind = _found(self.path, member)
         kind.from_address(address + offset).value = value if kind in _FLOATS.values() else int(value)
+
+
+def _pointers(die: DIE, path: str) -> Iterator[str]:
+    die = _bare(die)
+    if die.tag == "DW_TAG_pointer_type":
+        yield path
+    elif die.tag == "DW_TAG_array_type":
+        yield from _pointers(die.get_DIE_from_attribute("DW_AT_type"), path)
+    elif die.tag in ("DW_TAG_structure_type", "DW_TAG_union_type"):
+        for child in die.iter_children():
+            if child.tag == "DW_TAG_member":
+                inside = ".".join(part for part in (path, _name(child)) if part)
+                yield from _pointers(child.get_DIE_from_attribute("DW_AT_type"), inside)
+
+
+def pointers(path: str) -> list[str]:
+    """Names of all members of the state that are addresses; the elements of an array have the name of the array."""
+    return list(_pointers(members(path).root, ""))
 
 
 def _number(member: str, die: DIE) -> Any:
