@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include <float.h>
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -15,6 +16,12 @@ static double bound_of(const parameter_t *p)
         return (double)motor.torque_max_Nm;
     }
     return (double)motor.current_reference.i_max / 32768.0 * (double)motor.bases.current_A;
+}
+
+/* Not isinf(): MinGW's macro converts its argument to a float. */
+static bool is_number(double bound)
+{
+    return fabs(bound) <= DBL_MAX;
 }
 
 static bool is_parameter(int handle)
@@ -64,8 +71,8 @@ parameters_range_t parameters_range(const fluxtrue_t *drive, int handle)
                                     (double)calibration_least(&drive->drive, calibration_of(handle))};
     }
     const parameter_t *p = &parameters[handle];
-    const double hi = isinf(p->hi) ? bound_of(p) : p->hi;
-    return (parameters_range_t){isinf(p->lo) ? -hi : p->lo, hi, 0.0};
+    const double hi = is_number(p->hi) ? p->hi : bound_of(p);
+    return (parameters_range_t){is_number(p->lo) ? p->lo : -hi, hi, 0.0};
 }
 
 int parameters_check(const fluxtrue_t *drive, int handle, double value)

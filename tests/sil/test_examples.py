@@ -9,16 +9,21 @@ import sys
 from sil import BUILD, ROOT, library_path
 
 
-def test_the_c_program_continues_one_state_several_times() -> None:
-    done = subprocess.run([BUILD / "tests" / "sil" / "what_if"], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    head, *torques, last = done.stdout.splitlines()
+def check_what_if(output: str) -> None:
+    """Requested torque at the shaft, and the same torque again from the same state."""
+    head, *torques, last = output.splitlines()
     assert re.fullmatch(r"firmware \d+\.\d+\.\d+, ABI 2, motor paper, period 100 us", head)
     assert last == "The repetition is the same to the last bit."
     pairs = [tuple(map(float, re.findall(r"(-?[\d.]+) N", line))) for line in torques]
     assert [requested for requested, _ in pairs] == [40.0, -40.0, 80.0, 40.0]
     assert all(abs(made - requested) < 0.01 * abs(requested) for requested, made in pairs)
     assert pairs[0] == pairs[3]
+
+
+def test_the_c_program_continues_one_state_several_times() -> None:
+    done = subprocess.run([BUILD / "tests" / "sil" / "what_if"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    check_what_if(done.stdout)
 
 
 def test_the_python_program_finds_the_open_sensor_of_a_recording() -> None:

@@ -39,7 +39,7 @@ function(_fluxtrue_motor_tables name folder out)
         VERBATIM)
     add_library(motor_${name} OBJECT ${sources})
     target_link_libraries(motor_${name} PRIVATE fluxtrue_strict fluxtrue_firmware)
-    if(CMAKE_CROSSCOMPILING)
+    if(FLUXTRUE_BARE_METAL)
         # Data, which an image places by the name of this file; no constant of it may melt into code.
         target_compile_options(motor_${name} PRIVATE -fno-lto)
     else()
@@ -72,6 +72,7 @@ endfunction()
 
 # fluxtrue_build_for(<folder>): the firmware for one machine, any folder on disk.
 #   host      <build>/libfluxtrue_sil.so
+#   windows   <build>/fluxtrue_sil.dll and its import library libfluxtrue_sil.dll.a
 #   target    <build>/libfluxtrue.a: all layers and the machine's tables
 function(fluxtrue_build_for folder)
     file(REAL_PATH "${folder}" folder)
@@ -89,7 +90,7 @@ function(fluxtrue_build_for folder)
         fluxtrue_add_motor(${name} "${folder}")
     endif()
     set_property(GLOBAL PROPERTY FLUXTRUE_MOTOR_TARGET motor_${name})
-    if(CMAKE_CROSSCOMPILING)
+    if(FLUXTRUE_BARE_METAL)
         get_property(layers GLOBAL PROPERTY FLUXTRUE_LAYERS)
         list(TRANSFORM layers REPLACE "(.+)" "$<TARGET_OBJECTS:\\1>" OUTPUT_VARIABLE objects)
         add_library(fluxtrue STATIC ${objects} $<TARGET_OBJECTS:motor_${name}>)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What the simulation on the host is made of. A part whose folder is empty is left out.
+# What the simulation on the host is made of. A part whose folder is empty is left out. For Windows only the first.
 #   fluxtrue_hal_host    the firmware as a library for any plant (hal/host)
 #   fluxtrue_plant       the simulated drive: knows nothing of the firmware (tests/plant)
 #   fluxtrue_twin        the controller again in double precision (tests/support/twin)
@@ -21,12 +21,16 @@ set(firmware "${CMAKE_SOURCE_DIR}/firmware")
 
 # Object libraries where the exported functions must be kept although nothing calls them.
 fluxtrue_part(fluxtrue_hal_host OBJECT hal/host "${firmware}" "${CMAKE_SOURCE_DIR}")
-fluxtrue_part(fluxtrue_plant STATIC tests/plant "${tests}" "${tests}/plant")
-fluxtrue_part(fluxtrue_twin STATIC tests/support/twin "${tests}" "${tests}/support" "${firmware}")
-fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
-    "${tests}" "${tests}/support" "${firmware}" "${CMAKE_SOURCE_DIR}")
-fluxtrue_part(fluxtrue_vecu_parts OBJECT tests/vecu
-    "${tests}" "${tests}/vecu" "${firmware}" "${CMAKE_SOURCE_DIR}")
+if(WIN32)
+    target_compile_definitions(fluxtrue_hal_host PRIVATE FLUXTRUE_BUILD) # its functions are exported
+else()
+    fluxtrue_part(fluxtrue_plant STATIC tests/plant "${tests}" "${tests}/plant")
+    fluxtrue_part(fluxtrue_twin STATIC tests/support/twin "${tests}" "${tests}/support" "${firmware}")
+    fluxtrue_part(fluxtrue_sim_runner OBJECT tests/loop/runner
+        "${tests}" "${tests}/support" "${firmware}" "${CMAKE_SOURCE_DIR}")
+    fluxtrue_part(fluxtrue_vecu_parts OBJECT tests/vecu
+        "${tests}" "${tests}/vecu" "${firmware}" "${CMAKE_SOURCE_DIR}")
+endif()
 
 # Everything the tools load at run time: what tools/demo builds. Not the machines of tests/motors.
 add_custom_target(fluxtrue_libraries)
@@ -54,6 +58,11 @@ function(fluxtrue_shared target output folder)
         $<$<NOT:$<BOOL:${FLUXTRUE_SANITIZE}>>:-Wl,--no-undefined>)
     set_target_properties(${target} PROPERTIES LINKER_LANGUAGE C
         OUTPUT_NAME ${output} LIBRARY_OUTPUT_DIRECTORY "${folder}")
+    if(WIN32) # named as there, and without a library of the compiler beside it
+        set_target_properties(${target} PROPERTIES PREFIX ""
+            RUNTIME_OUTPUT_DIRECTORY "${folder}" ARCHIVE_OUTPUT_DIRECTORY "${folder}")
+        target_link_options(${target} PRIVATE -static-libgcc)
+    endif()
     _fluxtrue_loaded(${target})
 endfunction()
 
