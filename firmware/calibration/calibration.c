@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibration/calibration.h"
 
+#include "drive/data_check.h"
 #include "types/si.h"
 
 /* Drift that means quality 0: an error of 5 % of psi_f, 20 % of R_0, at the law's own bandwidth. */
@@ -67,10 +68,8 @@ float calibration_least(const drive_t *drive, calibration_id_t id)
     }
 }
 
-void calibration_set(drive_t *drive, calibration_id_t id, float value)
+static void write_parameter(const motor_t *m, motor_parameters_t *p, calibration_id_t id, float value)
 {
-    const motor_t *m = drive->motor;
-    motor_parameters_t *p = &drive->parameters;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
         p->torque_slew = (value > 0.0F) ? q15_from_si(value * m->bases.step_s, m->bases.torque_Nm) : Q15_MAX;
@@ -98,4 +97,11 @@ void calibration_set(drive_t *drive, calibration_id_t id, float value)
     default:
         break;
     }
+}
+
+void calibration_set(drive_t *drive, calibration_id_t id, float value)
+{
+    const motor_parameters_t before = drive->parameters;
+    write_parameter(drive->motor, &drive->parameters, id, value);
+    data_check_accept(drive, &before);
 }

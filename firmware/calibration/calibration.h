@@ -8,7 +8,7 @@
  * Range    calibration/calibration_list.h; calibration_set() expects a value in range, and 0 or at least
  *          calibration_least(): a smaller one would become zero and mean something else
  * Rounding to the nearest step of the configuration's format
- * Context  1 kHz task or below; floating point, hence in no interrupt above it */
+ * Context  1 kHz task, or before it starts: not below it, as the task compares each word with its complement */
 #include "calibration/calibration_list.h"
 #include "drive/drive.h"
 

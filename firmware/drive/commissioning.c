@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/data_check.h"
 #include "drive/mrai/mrai_seam.h"
 #include "fx/div.h"
 
@@ -70,9 +71,11 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
         compensation->knee_q17 >= 1 << 30) {
         return false;
     }
+    const motor_parameters_t before = *p;
     set_dead_time(p, (q15_t)dead_time);
     p->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
     p->modulate.knee_q17 = compensation->knee_q17;
+    data_check_accept(drive, &before);
     drive->task.compensation = *compensation;
     drive->task.trim = (dead_time_trim_state_t){.base = (q15_t)dead_time};
     return true;
@@ -81,7 +84,7 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
 void drive_trim(drive_t *drive, q15_t v_dc)
 {
     task_state_t *task = &drive->task;
-    kalman_t *kalman = &task->identify.kalman;
+    const kalman_t *kalman = &task->identify.kalman;
     const dead_time_trim_in_t in = {
         .sigma = drive->motor->identify.sigma[IDENTIFY_DROP],
         .x_q27 = kalman->x_q27[IDENTIFY_DROP],
@@ -94,15 +97,19 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     };
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {
+        const motor_parameters_t before = drive->parameters;
         set_dead_time(&drive->parameters, out.dead_time);
-        kalman->x_q27[IDENTIFY_DROP] = fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27);
+        data_check_accept(drive, &before);
+        identify_set(&task->identify, IDENTIFY_DROP, fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27));
     }
 }
 
 void drive_restore_trim(drive_t *drive, int32_t trim)
 {
     motor_parameters_t *p = &drive->parameters;
+    const motor_parameters_t before = *p;
     set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));
+    data_check_accept(drive, &before);
 }
 
 static void start_if_running(drive_t *drive, const commission_config_t *config)
@@ -139,7 +146,7 @@ void drive_commission(drive_t *drive, const snapshot_t *snapshot)
         return;
     }
     if (evaluate(drive, (q15_t)sample->v_dc)) {
-        task->identify.kalman.x_q27[IDENTIFY_DROP] = 0; /* the compensation now contains this voltage drop */
+        identify_set(&task->identify, IDENTIFY_DROP, 0); /* the compensation now contains this voltage drop */
     } else {
         task->commission.phase = COMMISSION_FAILED;
         task->commission.failure = COMMISSION_FIT;

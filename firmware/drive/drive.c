@@ -4,7 +4,8 @@
 void drive_init(drive_t *drive, const motor_t *source)
 {
     *drive = (drive_t){.motor = source,
-                       .period = {source->measure, source->angle_tracker, source->monitor, source->flux_table},
+                       .period = {source->measure, source->angle_tracker, source->monitor, source->flux_table,
+                                  source->bases.periods_per_step},
                        .parameters = source->parameters,
                        .request = {.torque_loop = true,
                                    .identification = true,
@@ -14,6 +15,7 @@ void drive_init(drive_t *drive, const motor_t *source)
                        .fast.window.left = source->bases.periods_per_step,
                        .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};
     identify_reset(&drive->motor->identify, &drive->task.identify);
+    data_check_start(drive);
     drive_refuse(drive, motor_check(source));
 }
 

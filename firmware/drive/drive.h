@@ -163,7 +163,24 @@ typedef struct {
     angle_tracker_config_t angle_tracker;
     monitor_config_t monitor;
     flux_table_config_t flux_table;
+    uint32_t periods_per_step;
 } period_data_t;
+
+#define DATA_CHECK_PERIOD_WORDS ((uint32_t)(sizeof(period_data_t) / sizeof(uint32_t)))
+#define DATA_CHECK_PARAMETERS_WORDS ((uint32_t)(sizeof(motor_parameters_t) / sizeof(uint32_t)))
+
+/** What drive/data_check.h compares the motor data with. Written by the 1 kHz task, and before it starts. */
+typedef struct {
+    uint32_t period[DATA_CHECK_PERIOD_WORDS];         /* complements, */
+    uint32_t parameters[DATA_CHECK_PARAMETERS_WORDS]; /* one after the other as the data themselves */
+    uint32_t options;                                 /* of the request */
+    const motor_t *motor;
+    uintptr_t motor_complement;
+    uint32_t at;      /* word to be compared next */
+    uint32_t windows; /* command_seen of the fast ISR at the last change of it */
+    uint32_t periods; /* generation of the samples then */
+    bool damaged;     /* until the next start */
+} data_check_t;
 
 /** All of a drive. */
 typedef struct {
@@ -171,6 +188,7 @@ typedef struct {
     const motor_t *motor;          /* constant: in flash on a target */
     period_data_t period;          /* constant: a copy */
     motor_parameters_t parameters; /* live: what calibration, commissioning and the trim change */
+    data_check_t data_check;
     request_t request;
     fast_state_t fast;
     volatile q15_t psi_d_error; /* fed forward: the fast ISR copies the robust identification's, else the MRAI ISR's */
@@ -183,6 +201,8 @@ typedef struct {
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);
+/** All complements of drive/data_check.h; at the end of a change of everything. */
+void data_check_start(drive_t *drive);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
 /** FAULT_CONFIG, and why: the first check that failed is kept until the next start. Nothing for MOTOR_CHECK_OK. From
  * the fast ISR's priority, or before the interrupts start. */
@@ -190,7 +210,8 @@ void drive_refuse(drive_t *drive, motor_check_t check);
 /** What FAULT_CONFIG stands for; MOTOR_CHECK_OK while there is none. From any priority. */
 static inline motor_check_t drive_motor_check(const drive_t *drive)
 {
-    return (motor_check_t)drive->fast.motor_check;
+    const motor_check_t check = (motor_check_t)drive->fast.motor_check;
+    return (check == MOTOR_CHECK_OK && drive->data_check.damaged) ? MOTOR_CHECK_LIVE_DATA : check;
 }
 
 /** The identified values, for the store that survives a power cycle. Called in the background. */

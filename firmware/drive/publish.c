@@ -26,7 +26,7 @@ static void count_period(drive_t *drive)
     identify_window_invalidate(window);
     window->left--;
     if (window->left == 0U) {
-        window->left = drive->motor->bases.periods_per_step;
+        window->left = drive->period.periods_per_step;
         check_task(drive);
     }
 }
@@ -49,7 +49,7 @@ void publish_sample(drive_t *drive, const sample_t *sample)
     };
     if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
         window_box_write(&drive->windows, &fast->window);
-        identify_window_restart(&fast->window, drive->motor->bases.periods_per_step);
+        identify_window_restart(&fast->window, drive->period.periods_per_step);
         check_task(drive);
     }
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/data_check.h"
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/safe_decision.h"
@@ -198,10 +199,11 @@ void task_1khz(drive_t *drive)
 {
     task_state_t *task = &drive->task;
     snapshot_t snapshot;
+    data_check_restore_pointer(drive);
     take_snapshot(drive, &snapshot);
     angle_harmonics_step(&drive->motor->angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
-    uint32_t faults = slow_monitors_step(drive, &snapshot) | drive->request.faults;
+    uint32_t faults = slow_monitors_step(drive, &snapshot) | data_check_step(drive) | drive->request.faults;
     task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);

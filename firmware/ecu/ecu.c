@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/ecu.h"
 
+#include "drive/data_check.h"
 #include "ecu/ecu_private.h"
 #include "ecu/telemetry.h"
 #include "hal/board.h"
@@ -40,6 +41,8 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
         .dead_band = q15_from_si(DEAD_BAND_NM, source->bases.torque_Nm),
         .omega_standstill = STANDSTILL,
     };
+    ecu_seal_rates(ecu);
+    ecu_seal_flags(ecu);
 }
 
 static void receive(ecu_t *ecu)
@@ -147,6 +150,8 @@ static void send_xcp(ecu_t *ecu)
 
 void ecu_task_1khz(ecu_t *ecu)
 {
+    data_check_restore_pointer(&ecu->drive);
+    ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
     receive(ecu);
     ecu_watch(ecu);
@@ -162,4 +167,5 @@ void ecu_task_1khz(ecu_t *ecu)
                       ecu->clock.passed_ms);
     send_frames(ecu);
     send_xcp(ecu);
+    ecu_seal_flags(ecu);
 }

@@ -38,6 +38,8 @@ typedef struct {
     second_level_t second_level;
     supervisor_t supervisor;
     arbitrate_config_t arbitration_config;
+    uint32_t rates_seal;       /* of arbitration_config, which nothing changes after ecu_init() */
+    uint32_t flags_complement; /* of flags of bus and state machine, as the last step left them */
     arbitrate_state_t arbitration_state;
     liveness_t liveness;
     settling_t settling;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef ECU_ECU_PRIVATE_H
 #define ECU_ECU_PRIVATE_H
-/** Inputs of supervisor, arbitration and telemetry, computed from the state of drive and bus.
- * Source   docs/howto/can.md
+/** Inputs of supervisor, arbitration and telemetry, computed from the state of drive and bus; checks of what the ECU
+ * keeps from step to step.
+ * Source   docs/howto/can.md, docs/theory/data-integrity.md
  * Context  1 kHz task; ecu.c only */
 #include "comm/messages.h"
 #include "ecu/ecu.h"
@@ -15,5 +16,12 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu);
 torque_limits_t ecu_limits(const ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry);
+
+/* Compares the rates of the arbitration, the flags and the options of the request with what the last step left; first
+ * in each step. A difference is FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA. */
+void ecu_check_integrity(ecu_t *ecu);
+/* Seals the rates of the arbitration, once, and the flags, last in each step. */
+void ecu_seal_rates(ecu_t *ecu);
+void ecu_seal_flags(ecu_t *ecu);
 
 #endif

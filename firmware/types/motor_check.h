@@ -51,7 +51,8 @@
     X(SHORTEST_PULSE, 39, "The shortest pulse of the bridge is out of its range.") \
     X(DEAD_TIME, 40, "The compensated dead time is negative or beyond a fifth of the PWM period.") \
     X(CURRENT_KNEE, 41, "The current at which the dead-time compensation is complete is out of its range.") \
-    X(CLEAR_VOLTAGE, 42, "The voltage that is modulated without limits could be limited.")
+    X(CLEAR_VOLTAGE, 42, "The voltage that is modulated without limits could be limited.") \
+    X(LIVE_DATA, 43, "The data in RAM have changed by themselves: a complement or a seal does not match.")
 
 #define MOTOR_CHECK_VALUE(name, value, text) MOTOR_CHECK_##name = (value),
 typedef enum { MOTOR_CHECK_LIST(MOTOR_CHECK_VALUE) } motor_check_t;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "calibration/calibration.h"
+#include "drive/data_check.h"
 #include "hal/host/instance.h"
 #include "hal/host/parameters.h"
 #include "hal/host/stations.h"
@@ -96,6 +97,7 @@ int fluxtrue_set_by(fluxtrue_t *drive, int handle, double value)
         calibration_set(&drive->drive, calibration_of(handle), (float)value);
     } else if (code == FLUXTRUE_OK) {
         parameters[handle].set(drive, value);
+        data_check_accept_options(&drive->drive);
     }
     return code;
 }

@@ -122,7 +122,7 @@ static void run_period(fluxtrue_t *d)
         mrai_isr(&d->drive);
     }
     d->periods++;
-    if (d->periods % d->drive.motor->bases.periods_per_step == 0U) {
+    if (d->periods % d->motor.bases.periods_per_step == 0U) {
         if (d->on_bus) {
             ecu_task_1khz(&d->ecu);
         } else {

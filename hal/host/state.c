@@ -43,6 +43,9 @@ static void remove_addresses(unsigned char *instance)
     memset(instance + offsetof(fluxtrue_t, motor), 0, sizeof(motor_t));
     memset(instance + offsetof(fluxtrue_t, drive.period.flux_table), 0, sizeof(flux_table_config_t));
     memset(instance + offsetof(fluxtrue_t, drive.motor), 0, sizeof(const motor_t *));
+    memset(instance + offsetof(fluxtrue_t, drive.data_check.motor), 0, sizeof(const motor_t *));
+    memset(instance + offsetof(fluxtrue_t, drive.data_check.motor_complement), 0, sizeof(uintptr_t));
+    memset(instance + offsetof(fluxtrue_t, drive.data_check.period), 0, sizeof(uint32_t[DATA_CHECK_PERIOD_WORDS]));
 }
 
 static void add_addresses(fluxtrue_t *instance, bool machine_monitors)
@@ -50,6 +53,7 @@ static void add_addresses(fluxtrue_t *instance, bool machine_monitors)
     limits_set_machine_monitors(instance, machine_monitors ? 1.0 : 0.0);
     instance->drive.period.flux_table = motor.flux_table;
     instance->drive.motor = &instance->motor;
+    data_check_start(&instance->drive);
 }
 
 static uint32_t state_checksum(const header_t *header, const unsigned char *instance)

@@ -19,6 +19,7 @@ PAGES = {
     "CC": THEORY / "current-control.md",
     "CM": THEORY / "commissioning.md",
     "CR": THEORY / "current-reference.md",
+    "DI": THEORY / "data-integrity.md",
     "DT": THEORY / "dead-time-trim.md",
     "FT": THEORY / "flux-tables.md",
     "FX": THEORY / "fixed-point.md",

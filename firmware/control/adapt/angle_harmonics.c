@@ -3,6 +3,7 @@
 
 #include "fx/q.h"
 #include "fx/trig.h"
+#include "signal/seal.h"
 
 #define PARTS_PER_STEP 4        /* the whole table in 16 steps */
 #define ADVANCE_MIN (1 << 26)   /* 1/64 turn per step: below, the second difference of a harmonic is too small */
@@ -48,14 +49,27 @@ static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
     return 2 * half;
 }
 
+/* Of the coefficients, complemented, so that a state of zeros is sealed (DI-3). */
+static uint32_t seal_complement(const int32_t c[ANGLE_HARMONICS])
+{
+    uint32_t seal = seal_add(SEAL_START, (uint32_t)c[0]);
+    seal = seal_add(seal, (uint32_t)c[1]);
+    seal = seal_add(seal, (uint32_t)c[2]);
+    return ~seal_add(seal, (uint32_t)c[3]);
+}
+
+_Static_assert(ANGLE_HARMONICS == 4, "all of them are sealed");
+
 void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,
                           volatile int32_t table[ANGLE_HARMONICS_PARTS])
 {
     const int32_t advance = (int32_t)(theta - state->last);
     const int32_t d = (int32_t)(theta - 2U * state->last + state->before);
     const int32_t speed = fx_abs_q31(advance);
+    state->damaged |= state->seal_complement != seal_complement(state->c);
     if (speed >= ADVANCE_MIN && speed <= ADVANCE_MAX && fx_abs_q31(d) <= speed >> DIFFERENCE_MAX_SHIFT) {
         update_coefficients(config, state, d);
+        state->seal_complement = seal_complement(state->c);
     }
     state->before = state->last;
     state->last = theta;

@@ -12,7 +12,9 @@
  * Range    every angle; adapts between 1/64 and 1/4 turn per step: 940 and 15 000 rpm at 1 ms a step
  * Rounding 1 LSB in 2^-16 turn of the step, half up
  * Errors   a |d| above 1/16 of the step means a late sample or a faulty sensor: no adaptation in this step
+ *          coefficients that the memory has changed are reported
  * Context  1 kHz task; no division. table is read by the fast ISR word by word */
+#include <stdbool.h>
 #include <stdint.h>
 
 #define ANGLE_HARMONICS_PARTS 64
@@ -26,7 +28,9 @@ typedef struct {
 typedef struct {
     uint32_t last, before;
     int32_t c[ANGLE_HARMONICS];
-    uint8_t part; /* of the table, the next to be computed */
+    uint8_t part;             /* of the table, the next to be computed */
+    bool damaged;             /* the seal did not match: the memory has changed a coefficient */
+    uint32_t seal_complement; /* of the coefficients; 0 for a state of zeros */
 } angle_harmonics_state_t;
 
 void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,

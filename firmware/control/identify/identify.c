@@ -18,6 +18,7 @@ void identify_reset(const identify_config_t *config, identify_state_t *state)
 {
     *state = (identify_state_t){.r_prior = config->r0, .torque_variance_q30 = Q31_MAX};
     kalman_reset(&state->kalman);
+    identify_seal(state);
 }
 
 q31_t identify_value(const identify_config_t *config, const identify_state_t *state, identify_index_t index)
@@ -111,12 +112,14 @@ static void update_confidence(const identify_config_t *config, identify_state_t 
 static void kalman_step(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
                         q15_t torque)
 {
+    identify_check_parameters(state);
     if (state->update_valid) {
         update_parameters(config, state);
     } else {
         state->contradicted_updates = 0;
     }
     kalman_predict(config, &state->kalman, state->r_known);
+    identify_seal_parameters(state);
     update_confidence(config, state, model, torque);
     state->mean = (identify_mean_t){.noise_q30 = 0};
     state->steps = 0;
@@ -158,6 +161,7 @@ static corrected_t correct(const identify_config_t *config, const identify_state
 
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
+    identify_check_kept(state);
     resistance_prior(config, state, in);
     identify_model_t model;
     identify_model(config, in->point, in->tables, state->r_prior, &model);
@@ -171,5 +175,6 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     if (state->steps >= IDENTIFY_STEPS) {
         kalman_step(config, state, &model, out.torque);
     }
+    identify_seal_kept(state);
     return out;
 }

@@ -10,7 +10,9 @@
  * Units    per unit
  * Range    as in its parts
  * Rounding 1/2 LSB q15 in the torque
- * Errors   without valid windows the parameters only return to their priors; clamped states and innovations beyond the
+ * Errors   what is kept from step to step is sealed at the end of each and compared at the next, parameters and their
+ *          variances at each update: damage by the memory is reported until the reset of the processor
+ *          without valid windows the parameters only return to their priors; clamped states and innovations beyond the
  *          gate take the confidence to 0, the torque estimate goes on
  * Context  1 kHz task; five divisions per step, one more per update and axis */
 #include "control/identify/kalman.h"
@@ -38,7 +40,10 @@ typedef struct {
     int32_t torque_variance_q30; /* at the last update */
     q15_t confidence;
     bool torque_certain; /* the confidence rises, else it falls */
-    kalman_t kalman;     /* last, because it is large */
+    bool damaged;        /* a seal did not match: the memory has changed what only this stage writes */
+    uint32_t seal;       /* of what is kept from step to step */
+    uint32_t kalman_seal;
+    kalman_t kalman; /* last, because it is large */
 } identify_state_t;
 
 FX_SHORT_LOADS_BEFORE(identify_state_t, kalman);
@@ -55,6 +60,15 @@ typedef struct {
     q15_t psi_delta; /* identified minus table's flux in the d axis, here */
 } identify_out_t;
 
+/* The seals of what is kept from step to step, and of parameters with covariance. */
+void identify_check_kept(identify_state_t *state);
+void identify_check_parameters(identify_state_t *state);
+void identify_seal_kept(identify_state_t *state);
+void identify_seal_parameters(identify_state_t *state);
+/** Both, after the state was set from outside as a whole. */
+void identify_seal(identify_state_t *state);
+/** Sets one parameter, in standard deviations of its prior. */
+void identify_set(identify_state_t *state, identify_index_t index, int32_t x_q27);
 void identify_reset(const identify_config_t *config, identify_state_t *state);
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in);
 /** Value of a parameter, per unit, q31: sigma x, limited to +-1. */

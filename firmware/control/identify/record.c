@@ -52,5 +52,6 @@ bool identify_record_restore(identify_state_t *state, const identify_record_t *r
     }
     state->torque_certain = is_torque_certain(&state->kalman);
     state->confidence = state->torque_certain ? Q15_MAX : 0;
+    identify_seal(state);
     return true;
 }

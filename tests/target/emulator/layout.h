@@ -7,11 +7,13 @@
  * Context  emulator only */
 
 /* What the outside writes, and what calibration changes; the first ones the image writes, too: the request, and the
- * dead-time compensation that its task trims. */
-#define LAYOUT_TRIMMED 2
+ * dead-time compensation that its task trims, with the complements of the parameters. */
+#define LAYOUT_TRIMMED 4
 #define LAYOUT_INPUTS(X) \
     X(request)                \
     X(parameters.modulate)    \
+    X(data_check.parameters)       \
+    X(data_check.options)          \
     X(parameters.torque_slew) \
     X(parameters.mrai)        \
     X(parameters.torque_loop)

@@ -103,6 +103,7 @@ static void load(preempt_t *p, const drive_t *drive)
     p->host->drive.motor = p->e->mirror.host->drive.motor;
     p->host->drive.period = p->e->mirror.host->drive.period;
     p->host->drive.parameters = p->e->mirror.host->drive.parameters;
+    p->host->drive.data_check = p->e->mirror.host->drive.data_check;
     temperatures_take(p->e, p->host);
     emu_bridge_t bridge;
     emu_bridge(p->e->emu, &bridge);

@@ -81,6 +81,7 @@ static void task_ends(emulated_t *e)
     e->shadow->drive.mrai.task = e->task_result.mrai.task;
     e->shadow->drive.parameters.modulate = e->task_result.parameters.modulate;
     e->shadow->drive.parameters.current_control = e->task_result.parameters.current_control;
+    e->shadow->drive.data_check = e->task_result.data_check;
     e->task_runs = false;
 }
 
@@ -152,6 +153,7 @@ bool shadow_start(emulated_t *e)
     e->shadow->drive.motor = own.motor; /* its tables are here */
     e->shadow->drive.period = own.period;
     e->shadow->drive.parameters = own.parameters;
+    e->shadow->drive.data_check = own.data_check;
     shadow_inputs(e);
     emu_on_exception(e->emu, follow, e);
     return true;

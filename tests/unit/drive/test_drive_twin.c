@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "drive/data_check.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -28,6 +29,7 @@ void setUp(void)
     drive.parameters.current_control.tracking_gain_q34 = 0;
     twin->motor.torque_ki = 0.0;
     drive.parameters.torque_loop.ki = 0;
+    data_check_start(&drive);
     twin_set(twin, "identification", 0.0);
     drive.request.identification = false;
     /* The currents of this machine lag and its voltages are not physical: the monitors would report faults. */

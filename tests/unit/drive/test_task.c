@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/data_check.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
 #include "hal/mock_adc.h"
@@ -107,9 +108,15 @@ void test_bad_motor_data_are_a_fault_that_no_reset_removes(void)
     TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
 }
 
+static void calibrate_slew(q15_t slew)
+{
+    drive.parameters.torque_slew = slew;
+    data_check_start(&drive); /* on purpose */
+}
+
 void test_the_torque_request_is_limited_and_slewed(void)
 {
-    drive.parameters.torque_slew = 100;
+    calibrate_slew(100);
     drive.request.torque_arbitrated = INT16_MAX;
     seam_run();
     TEST_ASSERT_EQUAL_INT(100, drive.task.torque_commanded);
@@ -119,7 +126,7 @@ void test_the_torque_request_is_limited_and_slewed(void)
         task_1khz(&drive);
     }
     TEST_ASSERT_EQUAL_INT(motor.torque_max, drive.task.torque_commanded);
-    drive.parameters.torque_slew = Q15_MAX;
+    calibrate_slew(Q15_MAX);
     drive.request.torque_arbitrated = INT16_MIN;
     task_1khz(&drive);
     TEST_ASSERT_EQUAL_INT(-motor.torque_max, drive.task.torque_commanded);
@@ -129,13 +136,13 @@ void test_the_torque_request_is_limited_and_slewed(void)
 void test_a_falling_limit_acts_at_once_with_any_calibrated_slew(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
-        drive.parameters.torque_slew = Q15_MAX;
+        calibrate_slew(Q15_MAX);
         drive.request.limits = TORQUE_LIMITS_NONE;
         drive.request.torque_arbitrated = (q15_t)(sign * INT16_MAX);
         seam_run();
         task_1khz(&drive);
         TEST_ASSERT_EQUAL_INT(sign * motor.torque_max, drive.task.torque_commanded);
-        drive.parameters.torque_slew = 0;
+        calibrate_slew(0);
         drive.request.limits.torque_drive = 1000;
         drive.request.limits.torque_regen = 1000;
         task_1khz(&drive);

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "calibration/calibration.h"
+#include "drive/data_check.h"
 #include "ecu/ecu.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
@@ -196,10 +197,51 @@ void test_the_watchdog_is_not_served_while_the_identification_is_stalled(void)
     tasks(10);
     const int before = watchdog_services;
     ecu.drive.request.identification_mode = IDENTIFICATION_PAPER;
+    data_check_accept_options(&ecu.drive);
     mrai_hangs = true;
     tasks(5);
     TEST_ASSERT_EQUAL_INT(before, watchdog_services);
     TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.held);
+}
+
+/* All of it would act until the next start. */
+void test_damaged_options_and_rates_are_a_fault_in_the_next_step(void)
+{
+    bool *const options[] = {&ecu.drive.request.current_mode, &ecu.drive.request.torque_loop,
+                             &ecu.drive.request.identification, &ecu.drive.request.trim};
+    int32_t *const rates[] = {&ecu.arbitration_config.slew, &ecu.arbitration_config.jerk,
+                              &ecu.arbitration_config.ramp_out, &ecu.arbitration_config.omega_standstill};
+    for (unsigned k = 0; k < 9U; k++) {
+        ecu_init(&ecu, &motor);
+        tasks(10);
+        TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.fast.faults);
+        if (k < 4U) {
+            *options[k] = !*options[k];
+        } else if (k < 8U) {
+            *rates[k - 4U] ^= 0x100;
+        } else {
+            ecu.arbitration_config.dead_band ^= 0x100;
+        }
+        tasks(2);
+        TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, ecu.drive.fast.faults);
+        TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_LIVE_DATA, drive_motor_check(&ecu.drive));
+    }
+}
+
+/* Only a frame or a transition of the state machine would set them again. */
+void test_a_damaged_flag_of_bus_or_state_machine_is_a_fault_in_the_next_step(void)
+{
+    void *const flags[] = {&ecu.rx.limits_channel.alive,   &ecu.rx.limits_channel.seen, &ecu.rx.command_channel.alive,
+                           &ecu.rx.command_channel.failed, &ecu.supervisor.enabled,     &ecu.supervisor.enable_seen,
+                           &ecu.supervisor.reset_seen,     &ecu.supervisor.state};
+    for (unsigned k = 0; k < sizeof flags / sizeof flags[0]; k++) {
+        ecu_init(&ecu, &motor);
+        tasks(10);
+        *(uint8_t *)flags[k] ^= 1U;
+        tasks(2);
+        TEST_ASSERT_EQUAL_HEX32(FAULT_CONFIG, ecu.drive.fast.faults);
+        TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_LIVE_DATA, drive_motor_check(&ecu.drive));
+    }
 }
 
 void test_one_millisecond_without_interrupts_is_no_fault_yet(void)

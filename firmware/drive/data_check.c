@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/data_check.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define WORDS_PER_STEP 4U
+#define STEPS_WITHOUT_WINDOW 4U /* whole ones; the fast ISR completes one in each */
+
+#define WORDS (DATA_CHECK_PERIOD_WORDS + DATA_CHECK_PARAMETERS_WORDS)
+#define LIVE offsetof(drive_t, period)
+#define COMPLEMENTS offsetof(drive_t, data_check.period)
+
+_Static_assert(offsetof(drive_t, parameters) == LIVE + sizeof(period_data_t), "one after the other");
+_Static_assert(offsetof(drive_t, data_check.parameters) == COMPLEMENTS + sizeof(period_data_t), "in the same order");
+_Static_assert(WORDS <= WORDS_PER_STEP * DATA_CHECK_ROUND_MAX, "a round in time");
+_Static_assert(sizeof(motor_parameters_t) % sizeof(uint32_t) == 0U, "whole words");
+_Static_assert(sizeof(period_data_t) % sizeof(uint32_t) == 0U, "whole words");
+
+static uint32_t word_at(const void *data, uint32_t n)
+{
+    uint32_t word;
+    memcpy(&word, (const uint8_t *)data + n * sizeof word, sizeof word);
+    return word;
+}
+
+_Static_assert(offsetof(request_t, trim) - offsetof(request_t, current_mode) == 3U, "four flags, one after the other");
+
+static uint32_t options_of(const request_t *request)
+{
+    uint32_t flags;
+    memcpy(&flags, (const uint8_t *)request + offsetof(request_t, current_mode), sizeof flags);
+    return flags ^ (uint32_t)request->identification_mode;
+}
+
+void data_check_accept_options(drive_t *drive)
+{
+    drive->data_check.options = options_of(&drive->request);
+}
+
+void data_check_check_options(drive_t *drive)
+{
+    drive->data_check.damaged |= drive->data_check.options != options_of(&drive->request);
+}
+
+void data_check_start(drive_t *drive)
+{
+    data_check_t *data_check = &drive->data_check;
+    data_check_accept_options(drive);
+    data_check->motor = drive->motor;
+    data_check->motor_complement = ~(uintptr_t)drive->motor;
+    for (uint32_t n = 0; n < DATA_CHECK_PERIOD_WORDS; n++) {
+        data_check->period[n] = ~word_at(&drive->period, n);
+    }
+    for (uint32_t n = 0; n < DATA_CHECK_PARAMETERS_WORDS; n++) {
+        data_check->parameters[n] = ~word_at(&drive->parameters, n);
+    }
+}
+
+void data_check_accept(drive_t *drive, const motor_parameters_t *before)
+{
+    for (uint32_t n = 0; n < DATA_CHECK_PARAMETERS_WORDS; n++) {
+        const uint32_t now = word_at(&drive->parameters, n);
+        if (now != word_at(before, n)) {
+            drive->data_check.parameters[n] = ~now;
+        }
+    }
+}
+
+void data_check_restore_pointer(drive_t *drive)
+{
+    data_check_t *data_check = &drive->data_check;
+    if (drive->motor != data_check->motor && (uintptr_t)data_check->motor == ~data_check->motor_complement) {
+        drive->motor = data_check->motor;
+    }
+}
+
+/* The words of this step; the last step of a round has fewer. */
+static bool words_match(drive_t *drive)
+{
+    data_check_t *data_check = &drive->data_check;
+    const uint8_t *live = (const uint8_t *)drive + LIVE;
+    const uint8_t *complements = (const uint8_t *)drive + COMPLEMENTS;
+    const uint32_t first = (data_check->at < WORDS) ? data_check->at : 0U;
+    uint32_t differing_bits = UINT32_MAX; /* of word and complement: all of them */
+    for (uint32_t n = first; n < first + WORDS_PER_STEP && n < WORDS; n++) {
+        differing_bits &= word_at(live, n) ^ word_at(complements, n);
+    }
+    data_check->at = first + WORDS_PER_STEP;
+    return differing_bits == UINT32_MAX;
+}
+
+/* The fast ISR notes the command with each window that it completes. If it runs and does not, its count of the periods
+ * left is damaged: the identification would use the last window for ever, and nothing would check the task. */
+static bool windows_complete(drive_t *drive)
+{
+    data_check_t *data_check = &drive->data_check;
+    const uint32_t periods = drive->samples.generation;
+    if (drive->fast.command_seen != data_check->windows) {
+        data_check->windows = drive->fast.command_seen;
+        data_check->periods = periods;
+    }
+    return periods - data_check->periods <= STEPS_WITHOUT_WINDOW * drive->motor->bases.periods_per_step;
+}
+
+uint32_t data_check_step(drive_t *drive)
+{
+    const bool seals_match = !drive->task.identify.damaged && !drive->task.angle_harmonics.damaged;
+    const bool good = words_match(drive) && windows_complete(drive) && seals_match;
+    drive->data_check.damaged |= !good;
+    return drive->data_check.damaged ? FAULT_CONFIG : 0U;
+}

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_DATA_CHECK_H
+#define DRIVE_DATA_CHECK_H
+/** Finds what the memory has changed by itself in the data that nothing, or only few functions, may write.
+ *   drive->motor           three copies, one of them complemented; the majority is restored before each step
+ *   period, parameters     each word has its complement; a few words are compared in each step, all of them within
+ *                          DATA_CHECK_ROUND_MAX steps
+ *   state kept for long    seals of the identification and of the angle correction
+ *   options of the request one word, for an owner that alone writes them: the ECU
+ *   window                 the fast ISR must complete windows while it runs
+ * A function that changes the parameters takes a copy of them first and passes it to data_check_accept(), which renews
+ * the complements of the words that differ: damage elsewhere stays visible.
+ * Source   docs/theory/data-integrity.md (DI-1), (DI-2)
+ * Errors   FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA, until the next start: what else the memory changed is not known
+ * Context  1 kHz task, and before the interrupts start */
+#include "drive/drive.h"
+
+#define DATA_CHECK_ROUND_MAX 20U
+
+/** The words that differ from `before` have been changed on purpose. */
+void data_check_accept(drive_t *drive, const motor_parameters_t *before);
+/** The options of the request have been changed on purpose. */
+void data_check_accept_options(drive_t *drive);
+/** Each step of an owner of the request; a difference is a fault in this step's data_check_step(). */
+void data_check_check_options(drive_t *drive);
+/** First of all in each step: the pointer to the motor data. */
+void data_check_restore_pointer(drive_t *drive);
+/** The faults of this step. */
+uint32_t data_check_step(drive_t *drive);
+
+#endif
