@@ -11,11 +11,11 @@ BAD_REFERENCE = ("table_ref_i_d", 0, b"\x01\x00")  # a positive i_d
 
 
 def damaged(elf: Path, out: Path, symbol: str, at: int, data: bytes) -> Path:
-    """A copy of an ELF file in which the bytes behind a symbol are others."""
+    """A copy of an ELF file in which the bytes at an offset from a symbol are replaced."""
     image = Image(elf)
     place = image.place(image.symbol(symbol) + at, len(data))
-    assert image.content[place : place + len(data)] != data, "nothing would be damaged"
+    assert image.content[place : place + len(data)] != data, "the file has these bytes already"
     image.content[place : place + len(data)] = data
-    shutil.copy(elf, out)  # may be executed if the original may
+    shutil.copy(elf, out)  # copies the permission to execute, too
     out.write_bytes(image.content)
     return out

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_MOTOR_SI_H
 #define TWIN_MOTOR_SI_H
-/** The same machine data as drive/motor.h, in SI doubles and before any quantisation: what the double-precision twin
- * runs on.
+/** The machine data of drive/motor.h in SI doubles, before any quantisation, for the double-precision twin.
  *   Written beside the fixed-point tables by `tools/fluxtrue motor build`; shares no number format with the firmware.
  * Units    SI, electrical rad/s, per-second gains */
 
@@ -14,7 +13,7 @@ typedef struct {
     int adc_bits;
     /* angle tracker */
     double tracker_bandwidth_rad_s;
-    double tracker_jump_turns; /* electrical: a sample further off is not followed */
+    double tracker_jump_turns; /* electrical: a sample that deviates by more is ignored */
     /* flux tables: node (ix, iy) is i_d = id0_A + ix did_A, |i_q| = iy diq_A; row-major [ix * nq + iy] */
     int nd, nq;
     double id0_A, did_A, diq_A;
@@ -39,7 +38,7 @@ typedef struct {
     double identify_confidence_full, identify_confidence_none, identify_confidence_rate;
     /* torque loop, per 1 kHz step */
     double torque_ki, torque_kp, torque_model_rate, torque_authority, torque_min_Nm;
-    double torque_max_Nm, torque_slew_Nm; /* slew per 1 kHz step, <= 0: open */
+    double torque_max_Nm, torque_slew_Nm; /* slew per 1 kHz step, <= 0: not limited */
     /* current references: torque node ix torque_step_Nm, flux node psi0_Vs + iy psi_step_Vs, row-major [ix * ref_npsi
      * + iy] */
     int ref_nt, ref_npsi;
@@ -49,7 +48,7 @@ typedef struct {
     double ref_v_ratio, i_max_A;
     /* voltage reserve, gain per 1 kHz step */
     double trim_gain, trim_min_V, trim_max_V;
-    /* torque limits, rates per 1 kHz step; lines: no torque at end, all of it from start on */
+    /* torque limits, rates per 1 kHz step; derating lines: no torque at _end, full torque at _start */
     double torque_slew_weak_Nm, psi_weak_Vs, loss_rate, loss_drop_V;
     double moving_end_rad_s, moving_start_rad_s, speed_end_rad_s, speed_start_rad_s;
     double inverter_end_C, inverter_start_C, winding_end_C, winding_start_C;

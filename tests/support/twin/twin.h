@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_H
 #define TWIN_H
-/** The whole controller in SI doubles, with the call shape of the software-in-the-loop library.
+/** The whole controller in SI doubles; called in the same way as the software-in-the-loop library.
  *   One call to twin_step() is one PWM period: samples at its start in, duties for the next period out.
  * Source   docs/theory; the stages are in twin_stages.h
  * Units    SI; names end in their unit

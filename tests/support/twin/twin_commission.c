@@ -50,7 +50,7 @@ static double line(const twin_curve_t *curve, int last, double i)
     return curve->v[last];
 }
 
-static double folded(twin_curve_t *curve, int k, double v, const double c[3], double i)
+static double phase_error_sum(twin_curve_t *curve, int k, double v, const double c[3], double i)
 {
     double sum = 0.0;
     curve->v[k] = v;
@@ -79,8 +79,8 @@ twin_curve_t twin_commission(const double *i, const double *u, const double cosi
     twin_curve_t curve = {.r = slope(i, u)};
     for (int k = 0; k < N; k++) {
         curve.knot[k] = cosine[0] * i[k];
-        const double at_zero = folded(&curve, k, 0.0, cosine, i[k]);
-        const double per_volt = folded(&curve, k, 1.0, cosine, i[k]) - at_zero;
+        const double at_zero = phase_error_sum(&curve, k, 0.0, cosine, i[k]);
+        const double per_volt = phase_error_sum(&curve, k, 1.0, cosine, i[k]) - at_zero;
         curve.v[k] = (1.5 * (u[k] - curve.r * i[k]) - at_zero) / per_volt;
     }
     smooth(curve.v);

@@ -25,7 +25,7 @@ void twin_destroy(twin_t *twin)
     free(twin);
 }
 
-/* Confirmed after `samples` in a row. */
+/* True when the condition has held in `samples` consecutive samples. */
 static bool confirmed(int *count, bool now, int samples)
 {
     *count = now ? *count + 1 : 0;
@@ -73,7 +73,7 @@ static bool voltage_limited(const twin_t *twin)
     return twin->current.limited || twin->modulation_limited;
 }
 
-/* Without limits of the vehicle, and with a cold inverter. */
+/* The twin has no limits set by the vehicle and no inverter temperature: a cold inverter is assumed. */
 static double limited_torque(twin_t *twin)
 {
     const twin_limit_in_t in = {
@@ -98,8 +98,8 @@ static double slew_now(const twin_t *twin)
 {
     const motor_si_t *m = &twin->motor;
     const bool weak = twin->reference.psi_plan < m->psi_weak_Vs;
-    const double open = (m->torque_slew_Nm > 0.0) ? m->torque_slew_Nm : HUGE_VAL;
-    return weak ? fmin(open, m->torque_slew_weak_Nm) : open;
+    const double slew_max = (m->torque_slew_Nm > 0.0) ? m->torque_slew_Nm : HUGE_VAL;
+    return weak ? fmin(slew_max, m->torque_slew_weak_Nm) : slew_max;
 }
 
 static void torque_path(twin_t *twin)
@@ -177,7 +177,7 @@ static void task(twin_t *twin)
 static void identify(twin_t *twin)
 {
     const twin_mrai_in_t *now = &twin->sample;
-    if (twin->periods_on >= 3) { /* before that the voltage of the last period is unknown */
+    if (twin->periods_on >= 3) { /* in the first three periods the voltage of the last period is unknown */
         twin_mrai(&twin->motor, &twin->schedule, &twin->mrai, now);
     } else {
         twin_mrai_reset(&twin->mrai, now);
@@ -187,11 +187,11 @@ static void identify(twin_t *twin)
     twin->psi_delta = twin->mrai.psi_delta;
 }
 
-static void collect(twin_t *twin, bool snapped)
+static void collect(twin_t *twin, bool pulses_limited)
 {
     const twin_mrai_in_t *now = &twin->sample;
     const twin_end_t end = {now->i, now->u, {now->flux.psi_d, now->flux.psi_q}, twin->theta};
-    if (twin_window(&twin->motor, &twin->window, &end, twin->periods_on >= 3, snapped)) {
+    if (twin_window(&twin->motor, &twin->window, &end, twin->periods_on >= 3, pulses_limited)) {
         twin->complete = twin->window;
     }
     twin->psi_delta = twin->identify.psi_delta;

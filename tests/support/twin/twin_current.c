@@ -3,22 +3,24 @@
 
 #include "twin/twin_stages.h"
 
-/* The integrator of one axis follows a reference that the voltage can realise. */
-static double integral(const motor_si_t *motor, double e, double cut)
+/* Anti-windup: the integrator of one axis follows the reference that the limited voltage can realise.
+ * limiting: limited minus unlimited voltage. */
+static double integral(const motor_si_t *motor, double e, double limiting)
 {
-    const double realisable = e + cut / (motor->sigma_rad_s * motor->setpoint_weight);
+    const double realisable = e + limiting / (motor->sigma_rad_s * motor->setpoint_weight);
     return motor->sigma_rad_s * motor->integral_ratio * realisable;
 }
 
-/* Largest value of one axis inside the unit circle beside x, in the stage's 256 steps; at least a quarter. */
+/* Largest value of one axis for which the vector stays inside the unit circle when the other axis is x. As in the
+ * firmware's table, |x| is rounded up to the next 1/256 and the result is at least 1/4. */
 static double remaining_voltage(double x)
 {
     const double end = (fmin(floor(fabs(x) * 256.0), 255.0) + 1.0) / 256.0;
     return fmax(sqrt(1.0 - end * end), 0.25);
 }
 
-/* The circle: while the d flux is to fall, d has priority, and its excess is subtracted from q; while it is to rise, q
- * has priority and d keeps 0.7. */
+/* The voltage circle. While the d flux must fall, the d axis has priority, and its excess is subtracted from q. While
+ * the d flux must rise, the q axis has priority, but d may always use 0.7 of the radius. */
 static twin_dq_t circle(twin_dq_t u, double u_max, bool more_flux, double omega)
 {
     const twin_dq_t v = {u.d / u_max, u.q / u_max};
@@ -62,7 +64,7 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     return u;
 }
 
-static double snap(double duty, double min_pulse)
+static double limit_pulse(double duty, double min_pulse)
 {
     const double d = twin_clamp(duty, 0.0, 1.0);
     if (d < min_pulse) {
@@ -83,17 +85,17 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
     const double current[3] = {i.a, i.b, i.c};
     const double top = fmax(v[0], fmax(v[1], v[2]));
     const double bottom = fmin(v[0], fmin(v[1], v[2]));
-    double made[3];
+    double leg_voltage[3];
     twin_modulate_t out;
     for (int x = 0; x < 3; x++) {
         const double c = motor->dead_time_duty * twin_clamp(current[x] / motor->knee_A, -1.0, 1.0);
         const double d = 0.5 + v[x] - 0.5 * (top + bottom) + c;
-        out.duty[x] = snap(d, motor->min_pulse_duty);
+        out.duty[x] = limit_pulse(d, motor->min_pulse_duty);
         /* A phase that does not switch loses nothing to the dead time. */
         const bool switches = (out.duty[x] > 0.0) && (out.duty[x] < 1.0);
-        made[x] = (out.duty[x] - (switches ? c : 0.0)) * in->v_dc;
+        leg_voltage[x] = (out.duty[x] - (switches ? c : 0.0)) * in->v_dc;
     }
-    out.acted = twin_park(twin_clarke((twin_abc_t){made[0], made[1], made[2]}), in->theta);
+    out.acted = twin_park(twin_clarke((twin_abc_t){leg_voltage[0], leg_voltage[1], leg_voltage[2]}), in->theta);
     out.limited = hypot(out.acted.d - in->u.d, out.acted.q - in->u.q) > 1e-4 * motor->v_base_V;
     return out;
 }

@@ -33,7 +33,7 @@ static double variance(const twin_kalman_t *kalman, const double h[TWIN_STATES])
     return sum;
 }
 
-/* h, e in units in which e is limited to 1/16. */
+/* h and e are per unit: in these units e is limited to 1/16. */
 bool twin_kalman_update(twin_kalman_t *kalman, const double h[TWIN_STATES], double e, double r)
 {
     const double hph = variance(kalman, h);
@@ -132,7 +132,8 @@ static void update_local_flux_error(const motor_si_t *motor, twin_identify_t *s,
     s->local.q += motor->identify_local_rate * (-gain * e.d - s->local.q);
 }
 
-static void correct(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point, const twin_model_t *m)
+static void estimate_torque(const motor_si_t *motor, twin_identify_t *s, const twin_point_t *point,
+                            const twin_model_t *m)
 {
     double v[TWIN_STATES];
     for (int j = 0; j < TWIN_STATES; j++) {
@@ -160,7 +161,7 @@ void twin_identify(const motor_si_t *motor, twin_identify_t *s, const twin_point
     const twin_dq_t e = {m.y.d - dot(m.d, s->kalman.x), m.y.q - dot(m.q, s->kalman.x)};
     update_local_flux_error(motor, s, point, e, point->valid && enabled);
     average_step(motor, s, point, &m, e, enabled);
-    correct(motor, s, point, &m);
+    estimate_torque(motor, s, point, &m);
     if (s->steps < STEPS) {
         return;
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_IDENTIFY_H
 #define TWIN_IDENTIFY_H
-/** The robust identification in SI doubles, from docs/theory/identification.md; parameters in prior sigmas.
- * Units    SI; x and P relative to the priors
+/** The robust identification in SI doubles, from docs/theory/identification.md.
+ * Units    SI; the parameters x and their covariance P in standard deviations of the priors
  * Context  tests and simulation on a host */
 #include "twin/twin_stages.h"
 
@@ -13,7 +13,7 @@ typedef struct {
     double theta;
 } twin_end_t;
 
-/* N periods of one step: sums over samples 1 ... N and both ends. */
+/* The N periods of one step: sums over the samples 1 ... N, and the samples at both ends. */
 typedef struct {
     twin_end_t first, last;
     twin_dq_t sum_i, sum_u;
@@ -21,7 +21,7 @@ typedef struct {
     bool acting;
 } twin_window_t;
 
-/* One period more; true when all are complete. */
+/* Adds one period; true when the window is complete. */
 bool twin_window(const motor_si_t *motor, twin_window_t *window, const twin_end_t *sample, bool acting, bool limited);
 
 typedef struct {
@@ -35,7 +35,7 @@ twin_point_t twin_point(const motor_si_t *motor, const twin_window_t *window, do
 
 typedef struct {
     twin_dq_t y, psi, angle_flux, iron_psi, iron_i;
-    double d[TWIN_STATES], q[TWIN_STATES], torque[TWIN_STATES]; /* per sigma; torque in Vs A */
+    double d[TWIN_STATES], q[TWIN_STATES], torque[TWIN_STATES]; /* per prior sigma; torque in Vs A */
     double slope, l_d, l_qq;
     bool current;
 } twin_model_t;

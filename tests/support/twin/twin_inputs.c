@@ -17,13 +17,13 @@ twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *sta
 {
     const double theta = twin_wrap(motor->pole_pairs * theta_m_rad);
     const double wn = motor->tracker_bandwidth_rad_s * motor->period_s;
-    if (state->samples < 2) { /* two samples are one angle and one speed */
+    if (state->samples < 2) { /* the first two samples determine the first angle and speed */
         state->step = (state->samples == 1) ? twin_wrap(theta - state->theta) : 0.0;
         state->theta = theta;
         state->samples++;
     } else {
         const double e = twin_wrap(theta - state->theta - state->step);
-        if (fabs(e) > motor->tracker_jump_turns * 2.0 * 3.14159265358979323846) { /* not followed */
+        if (fabs(e) > motor->tracker_jump_turns * 2.0 * 3.14159265358979323846) { /* ignored: a jump */
             state->theta = twin_wrap(state->theta + state->step);
             return (twin_angle_t){state->theta, state->step, state->step / motor->period_s};
         }
@@ -35,7 +35,7 @@ twin_angle_t twin_angle_tracker(const motor_si_t *motor, twin_angle_state_t *sta
 
 static double inverse_lookup(const twin_grid_t *grid, const double *l, double period, double x, double y)
 {
-    /* The service tabulates T_s/l itself, so it is what gets interpolated. */
+    /* The firmware's table contains T_s/l, so T_s/l is interpolated here, too, and not l. */
     double corner[4];
     twin_grid_t cell = {0.0, grid->dx, 0.0, grid->dy, 2, 2};
     const double u = twin_clamp((x - grid->x0) / grid->dx, 0.0, grid->nx - 1);

@@ -3,11 +3,13 @@
 
 #include "twin/twin_stages.h"
 
+/* Derating line: 0 at `end`, 1 at `start`, linear between them, constant beyond. */
 static double line(double end, double start, double x)
 {
     return twin_clamp((x - end) / (start - end), 0.0, 1.0);
 }
 
+/* An unknown temperature (NaN) derates to one half, but only if the sensor has worked before. */
 static double thermal(double end, double start, double celsius, bool *seen)
 {
     if (isnan(celsius)) {
@@ -30,7 +32,7 @@ static double loss(const motor_si_t *m, twin_limit_state_t *state, const twin_li
 double twin_torque_limit(const motor_si_t *m, twin_limit_state_t *state, const twin_limit_in_t *in)
 {
     const double speed = fabs(in->omega);
-    const double lost = loss(m, state, in);
+    const double loss_W = loss(m, state, in);
     const double hot = fmin(thermal(m->inverter_end_C, m->inverter_start_C, in->inverter_C, &state->inverter_seen),
                             thermal(m->winding_end_C, m->winding_start_C, in->winding_C, &state->winding_seen));
     const double both = fmin(m->torque_max_Nm * hot, in->reach);
@@ -39,13 +41,13 @@ double twin_torque_limit(const motor_si_t *m, twin_limit_state_t *state, const t
     const double high = line(m->dc_high_end_V, m->dc_high_start_V, in->v_dc);
     const double shaft = speed / m->pole_pairs;
     const double drive = fmin(fmin(both, m->torque_max_Nm * low),
-                              fmin(in->torque_drive, fmax(in->power_drive - lost, 0.0) / shaft));
+                              fmin(in->torque_drive, fmax(in->power_drive - loss_W, 0.0) / shaft));
     const double regen = fmin(fmin(both, m->torque_max_Nm * high),
-                              fmin(in->torque_regen, fmax(in->power_regen + lost, 0.0) / shaft));
+                              fmin(in->torque_regen, fmax(in->power_regen + loss_W, 0.0) / shaft));
     const double moving = line(m->moving_end_rad_s, m->moving_start_rad_s, speed);
-    const double against = drive + moving * (regen - drive);
-    return (in->omega < 0.0) ? twin_clamp(in->torque_arbitrated, -drive, against)
-                             : twin_clamp(in->torque_arbitrated, -against, drive);
+    const double against_rotation = drive + moving * (regen - drive);
+    return (in->omega < 0.0) ? twin_clamp(in->torque_arbitrated, -drive, against_rotation)
+                             : twin_clamp(in->torque_arbitrated, -against_rotation, drive);
 }
 
 double twin_i_d_limit(const motor_si_t *m, double psi_delta, double winding_C)

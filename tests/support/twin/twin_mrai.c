@@ -3,7 +3,7 @@
 
 #include "twin/twin_stages.h"
 
-/* Of the d equation (MR-7). */
+/* Weight of the d equation (MR-7). */
 static const double weight_d = 2.0;
 
 void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
@@ -14,7 +14,7 @@ void twin_mrai_reset(twin_mrai_state_t *state, const twin_mrai_in_t *in)
     state->last = *in;
 }
 
-/* One adaptation law: proportional and integral part, the integral inside its limits. */
+/* One adaptation law: proportional part plus integral part; only the integral part is limited. */
 static double adapt(double step, double proportional, double lo, double hi, double *integral, bool *clamped)
 {
     *integral = twin_clamp(*integral + step, lo, hi);
@@ -22,15 +22,15 @@ static double adapt(double step, double proportional, double lo, double hi, doub
     return *integral + proportional * step;
 }
 
-/* Resistive and rotational voltage at one instant. */
-static twin_dq_t burden(const motor_si_t *motor, const twin_mrai_in_t *at, double psi_used, double r_used)
+/* Resistive voltage drop plus rotational voltage at one instant. */
+static twin_dq_t drop_and_rotational(const motor_si_t *motor, const twin_mrai_in_t *at, double psi_used, double r_used)
 {
     const double r = motor->r_ohm_20 + r_used;
     return (twin_dq_t){r * at->i.d - at->omega * at->flux.psi_q, r * at->i.q + at->omega * (at->flux.psi_d + psi_used)};
 }
 
-/* The voltage equation over the period that has just passed, in means and differences of its two
- * ends; the observer error, a flux, takes the share of it that its poles leave. */
+/* Evaluates the voltage equation over the last period, with means and differences of the samples at its two ends. The
+ * residual, a flux, is added to the observer error, which decays with the observer's poles. */
 void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule, twin_mrai_state_t *state,
                const twin_mrai_in_t *in)
 {
@@ -40,12 +40,12 @@ void twin_mrai(const motor_si_t *motor, const twin_mrai_schedule_t *schedule, tw
     const double s2 = 0.5 * motor->observer_m * motor->r_ohm_20 * (in->flux.g_d + in->flux.g_q);
     const double flux_step = -schedule->flux_gain * s2 * e.q;
     const double resistance_step = -schedule->resistance_gain * s2 * (weight_d * in->i.d * e.d + in->i.q * e.q);
-    const twin_dq_t before = burden(motor, last, state->psi_used, state->r_used);
+    const twin_dq_t before = drop_and_rotational(motor, last, state->psi_used, state->r_used);
     state->psi_used = adapt(flux_step, motor->flux_proportional, motor->psi_delta_min_Vs, motor->psi_delta_max_Vs,
                             &state->psi_delta, &state->psi_clamped);
     state->r_used = adapt(resistance_step, motor->resistance_proportional, motor->r_delta_min_ohm,
                           motor->r_delta_max_ohm, &state->r_delta, &state->r_clamped);
-    const twin_dq_t after = burden(motor, in, state->psi_used, state->r_used);
+    const twin_dq_t after = drop_and_rotational(motor, in, state->psi_used, state->r_used);
     const double t = motor->period_s;
     const twin_dq_t u = {last->u.d * schedule->voltage_scale, last->u.q * schedule->voltage_scale};
     state->e.d = e.d + weight_d * (in->flux.psi_d - last->flux.psi_d - t * (u.d - 0.5 * (before.d + after.d))) +
@@ -100,7 +100,7 @@ twin_mrai_schedule_t twin_mrai_schedule(const motor_si_t *motor, twin_mrai_quali
     const double psi_drift = identifier->psi_delta - quality_state->psi_last;
     const bool settled = fabs(psi_drift) <= 0.2 * psi_full_drift(motor);
     const bool adapt_resistance = adapt_flux && settled && (fabs(w) <= motor->omega_r_max_rad_s);
-    /* A current step ends before the next step of the task: the gain must be valid at both of its ends. */
+    /* A current step is over before the task runs again, so the gain must suit the current before and after it. */
     const double norm = fmax(excitation(sample), excitation(next));
     update_quality(motor, quality_state, identifier, adapt_flux, adapt_resistance);
     return (twin_mrai_schedule_t){

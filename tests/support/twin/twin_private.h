@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TWIN_PRIVATE_H
 #define TWIN_PRIVATE_H
-/** The controller object behind twin.h, shared by its step and its names. */
+/** The controller object of twin.h, shared by the files that implement its step and its named values. */
 #include <stdint.h>
 
 #include "twin/twin.h"
@@ -53,7 +53,7 @@ struct twin {
     double trim;
     twin_limit_state_t limit;
     twin_dq_t psi_ref; /* tables' flux at the last reference */
-    twin_abc_t last_i; /* good samples, kept when an implausible one comes */
+    twin_abc_t last_i; /* the last finite samples; kept while a sample is NaN or infinite */
     double last_theta_m, theta;
     double v_dc, winding_C;
 };

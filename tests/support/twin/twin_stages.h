@@ -31,7 +31,7 @@ twin_ab_t twin_park_inverse(twin_dq_t x, double theta_rad);
 double twin_wrap(double angle_rad); /* to [-pi, pi) */
 double twin_clamp(double x, double lo, double hi);
 
-/* Bilinear on a regular grid, row-major [ix * ny + iy]; outside, the edge. */
+/* Bilinear interpolation on a regular grid, row-major [ix * ny + iy]; beyond the grid the value at its edge. */
 typedef struct {
     double x0, dx, y0, dy;
     int nx, ny;
@@ -82,7 +82,8 @@ typedef struct {
     bool limited;
 } twin_current_state_t;
 
-/* Where the current shall go, in flux linkage: what the integral and the proportional part follow. */
+/* The current reference as flux linkage: psi for the integral part; weighted, which includes set-point weight and
+ * resistive drop, for the proportional part. */
 typedef struct {
     twin_dq_t psi, weighted;
 } twin_target_t;
@@ -126,7 +127,7 @@ typedef struct {
 
 typedef struct {
     twin_dq_t e;         /* observer error, V s */
-    twin_mrai_in_t last; /* the other end of the period that has just passed */
+    twin_mrai_in_t last; /* the sample at the start of the last period */
     double psi_delta, r_delta;
     double psi_used, r_used;
     bool psi_clamped, r_clamped;
@@ -153,7 +154,7 @@ typedef struct {
 double twin_torque(const motor_si_t *motor, twin_dq_t i, const twin_flux_t *flux, double psi_delta);
 double twin_torque_estimate(const motor_si_t *motor, twin_torque_estimate_t *state, double torque_Nm);
 
-/* Temperatures NaN: unknown. Limits infinite: open. */
+/* A temperature that is NaN is unknown; a limit that is infinite has no effect. */
 typedef struct {
     double torque_arbitrated, torque_drive, torque_regen, power_drive, power_regen;
     twin_dq_t u, i;
@@ -196,7 +197,7 @@ typedef struct {
     bool acting;
 } twin_reserve_in_t;
 
-/* trim: the state. Answers |psi + dpsi| - |psi|. */
+/* trim: the state. Returns |psi + dpsi| - |psi|. */
 double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_reserve_in_t *in);
 
 twin_reference_t twin_current_reference(const motor_si_t *motor, const twin_reference_in_t *in);
