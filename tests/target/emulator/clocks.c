@@ -3,7 +3,7 @@
  *
  * documented behaviour                           | modelled | test
  * ---------------------------------------------- | -------- | --------------------------------------------
- * sources, dividers, PLL multiplication          | yes      | test_the_processor_runs_guarded_at_112_mhz
+ * sources, dividers, PLL multiplication          | yes      | test_the_processor_runs_at_112_mhz_with_clock_monitors
  * highest frequencies of RUN and HSRUN           | refused  | test_clocks_beyond_the_data_sheet_are_refused
  * factor of two at most in HSRUN, PMPROT once    | refused  | test_what_is_not_modelled_is_an_error
  * settings of a running oscillator or PLL        | refused  | test_a_running_source_keeps_its_settings

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an image of the S32K144 must do on the emulated processor. Each check raises when the image does not.
+"""What an image of the S32K144 must do on the emulated processor. Each check raises an exception if it does not.
 
-test_faults.py holds the image to all of them, test_plants.py plants one error after the other that a check must find.
+test_faults.py applies all checks to the image, and to images with planted errors, which the checks must find.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fluxtrue_tools.emulate.core import CENTRE, Core, State
 from fluxtrue_tools.sim.library import Loop
 
 PERIOD_S = 1e-4
-FILTER_S = 8 / 112e6  # README.md, PWM: 4 + FFVAL cycles of the timer's clock
+FILTER_S = 8 / 112e6  # hal/s32k144/README.md, PWM: 4 + FFVAL cycles of the timer's clock
 SLACK_S = 1 / 112e6
 ALL_OUTPUTS, NO_OUTPUTS = 0x3F, 0
 FAULTF = 0x80
@@ -25,7 +25,7 @@ CONVERSION_COMPLETE = 0x80
 
 @contextmanager
 def driving(parts: Parts) -> Iterator[tuple[Loop, Core]]:
-    """80 N·m at 3000 rpm."""
+    """A simulated drive that makes torque at 3000 rpm, and its emulated processor."""
     motor = parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:
@@ -41,7 +41,7 @@ def driving(parts: Parts) -> Iterator[tuple[Loop, Core]]:
 
 @contextmanager
 def alone(parts: Parts) -> Iterator[Core]:
-    """The processor without a drive around it, out of reset."""
+    """The processor without a simulated drive, just out of reset."""
     with Core.of_program(parts.emulated().library, parts.image) as core:
         yield core
 
@@ -51,15 +51,15 @@ def started(core: Core) -> None:
 
 
 def run(core: Core, seconds: float) -> int:
-    """However many periods begin meanwhile; how many."""
+    """Run for this time; return the number of PWM periods that began in it."""
     end, periods = core.now_s + seconds, 0
     while end - core.now_s > SLACK_S:
         periods += core.run(end - core.now_s) == CENTRE
     return periods
 
 
-def a_gate_fault_opens_every_output_in_the_filter_time(parts: Parts) -> None:
-    """Whatever the core does meanwhile: it computes, or it is stuck with all interrupts masked."""
+def a_gate_fault_switches_off_every_output_within_the_filter_time(parts: Parts) -> None:
+    """The timer must not need the core: the test is repeated with a core that executes nothing."""
     for state in (State.RUNS, State.STUCK):
         with driving(parts) as (_, core):
             core.run(0.4 * PERIOD_S)
@@ -67,11 +67,11 @@ def a_gate_fault_opens_every_output_in_the_filter_time(parts: Parts) -> None:
             assert core.outputs == ALL_OUTPUTS
             core.board(gate_fault=True)
             core.run(FILTER_S)
-            assert core.outputs == NO_OUTPUTS, f"outputs 0x{core.outputs:02x} while the core {state.name.lower()}"
+            assert core.outputs == NO_OUTPUTS, f"outputs 0x{core.outputs:02x}, state of the core: {state.name}"
 
 
-def a_fault_line_that_is_up_at_power_on_keeps_the_outputs_off(parts: Parts) -> None:
-    """For each alignment of its filter with the program's writes: up from the start on, or from just before them."""
+def a_fault_line_that_is_active_at_power_on_keeps_the_outputs_off(parts: Parts) -> None:
+    """The line is active from reset on: its edge comes when the program enables the fault input."""
     with alone(parts) as core:
         core.board(gate_fault=True)
         started(core)
@@ -80,7 +80,7 @@ def a_fault_line_that_is_up_at_power_on_keeps_the_outputs_off(parts: Parts) -> N
         assert core.outputs == NO_OUTPUTS
 
 
-def a_halted_core_opens_every_output(parts: Parts) -> None:
+def a_halted_core_switches_off_every_output(parts: Parts) -> None:
     with driving(parts) as (_, core):
         core.run(0.4 * PERIOD_S)
         core.core_state(State.HALTED)
@@ -96,7 +96,7 @@ def every_period_is_sampled(parts: Parts) -> None:
         assert core.resets == 0
 
 
-def a_result_that_was_not_read_is_got_over(parts: Parts) -> None:
+def sampling_recovers_from_an_unread_result(parts: Parts) -> None:
     with alone(parts) as core:
         started(core)
         run(core, 0.02)
@@ -105,12 +105,13 @@ def a_result_that_was_not_read_is_got_over(parts: Parts) -> None:
         entered = _entries(core)
         periods = run(core, 0.02)
         assert periods - entered.get(ADC0_IRQ, 0) <= 3
-        assert entered.get(PDB0_IRQ, 0) + entered.get(PDB1_IRQ, 0) <= 2  # more: the fast ISR is only pended for it
+        # More errors would mean that only their handler still pends the fast ISR.
+        assert entered.get(PDB0_IRQ, 0) + entered.get(PDB1_IRQ, 0) <= 2
         assert core.resets == 0
 
 
-def a_stack_near_its_end_resets(parts: Parts) -> None:
-    """The reserve is never touched by a sound program."""
+def a_stack_that_uses_its_reserve_resets(parts: Parts) -> None:
+    """A correct program never writes to the reserve at the end of the stack."""
     with alone(parts) as core:
         started(core)
         run(core, 0.02)
@@ -126,23 +127,23 @@ def the_code_cache_is_on(parts: Parts) -> None:
 
 
 CHECKS = (
-    a_gate_fault_opens_every_output_in_the_filter_time,
-    a_fault_line_that_is_up_at_power_on_keeps_the_outputs_off,
-    a_halted_core_opens_every_output,
+    a_gate_fault_switches_off_every_output_within_the_filter_time,
+    a_fault_line_that_is_active_at_power_on_keeps_the_outputs_off,
+    a_halted_core_switches_off_every_output,
     every_period_is_sampled,
-    a_result_that_was_not_read_is_got_over,
-    a_stack_near_its_end_resets,
+    sampling_recovers_from_an_unread_result,
+    a_stack_that_uses_its_reserve_resets,
     the_code_cache_is_on,
 )
 
 
 def _entries(core: Core) -> dict[int, int]:
-    """Entries of each handler from now on, by interrupt number."""
+    """Counts the entries of each handler from now on, by interrupt number."""
     entered: dict[int, int] = {}
 
-    def note(vector: int, enters: bool) -> None:
-        if enters:
+    def count_entry(vector: int, is_entry: bool) -> None:
+        if is_entry:
             entered[vector - 16] = entered.get(vector - 16, 0) + 1
 
-    core.on_exception(note)
+    core.on_exception(count_entry)
     return entered

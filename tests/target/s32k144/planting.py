@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An image that differs from a built one in a file: with one deliberate error, or for another machine. The file is
-compiled by the command of the build and linked in place of its own."""
+"""Images that differ from a built image in some source files: with a planted error, or with another machine's data.
+
+Each changed file is compiled by the build's own command and linked in place of the original.
+"""
 
 from __future__ import annotations
 
@@ -16,16 +18,16 @@ PORT = ROOT / "hal" / "s32k144"
 
 
 @dataclass(frozen=True)
-class Plant:
-    """Text of a file of the port, which must occur exactly once, and what stands there instead."""
+class PlantedError:
+    """A text of a file of the port, which must occur exactly once, and the text that replaces it."""
 
     file: str
     text: str
-    instead: str
+    replacement: str
 
     def __post_init__(self) -> None:
         count = (PORT / self.file).read_text(encoding="utf-8").count(self.text)
-        assert count == 1, f"{self.file} contains {count} times: {self.text}"
+        assert count == 1, f"{self.file} must contain this text once, not {count} times: {self.text}"
 
 
 def _run(command: list[str], folder: Path) -> None:
@@ -34,7 +36,7 @@ def _run(command: list[str], folder: Path) -> None:
 
 
 def _commands(folder: Path) -> list[str]:
-    """What ninja would run for the image, in order."""
+    """The commands that ninja would run for the image, in order."""
     command = ["ninja", "-t", "commands", "fluxtrue.elf"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.splitlines()
 
@@ -45,16 +47,17 @@ def _only(lines: list[str], part: str) -> str:
     return found[0]
 
 
-def relinked(built: Path, instead: dict[Path, Path], folder: Path) -> Path:
-    """The image `built` with some of its source files compiled from other ones, sealed."""
+def relinked(built: Path, replacements: dict[Path, Path], folder: Path) -> Path:
+    """The image `built` with some of its source files replaced by others, sealed."""
     commands, elf = _commands(built.parent), folder / "relinked.elf"
     link = _only(_only(commands, "-o fluxtrue.elf").split(" && "), "-o fluxtrue.elf")
-    for original, source in instead.items():
-        compile_it = _only(commands, f"-c {original}")
-        place = shlex.split(compile_it)[shlex.split(compile_it).index("-o") + 1]
-        another = str(folder / Path(place).name)  # the linker script places the motor's data by this name
-        _run(shlex.split(compile_it.replace(place, another).replace(f"-c {original}", f"-c {source}")), built.parent)
-        link = link.replace(place, another)
+    for original, source in replacements.items():
+        command = _only(commands, f"-c {original}")
+        built_object = shlex.split(command)[shlex.split(command).index("-o") + 1]
+        new_object = str(folder / Path(built_object).name)  # the linker script places the motor's data by this name
+        command = command.replace(built_object, new_object).replace(f"-c {original}", f"-c {source}")
+        _run(shlex.split(command), built.parent)
+        link = link.replace(built_object, new_object)
     link = link.replace("-o fluxtrue.elf", f"-o {elf}").replace("fluxtrue.map", f"{folder.name}.map")
     _run(shlex.split(link), built.parent)
     image.seal(elf)
@@ -68,14 +71,15 @@ def with_motor(built: Path, tables: Path) -> dict[Path, Path]:
     return {found[0]: tables}
 
 
-def with_error(what: Plant, folder: Path) -> dict[Path, Path]:
-    """For relinked(): the file with the error in it."""
-    original = PORT / what.file
-    source = folder / what.file
-    source.write_text(original.read_text(encoding="utf-8").replace(what.text, what.instead), encoding="utf-8")
+def with_error(error: PlantedError, folder: Path) -> dict[Path, Path]:
+    """For relinked(): the file with the planted error."""
+    original = PORT / error.file
+    source = folder / error.file
+    text = original.read_text(encoding="utf-8").replace(error.text, error.replacement)
+    source.write_text(text, encoding="utf-8")
     return {original: source}
 
 
-def plant(built: Path, what: Plant, folder: Path) -> Path:
-    """The image `built` with the error in it, sealed."""
-    return relinked(built, with_error(what, folder), folder)
+def image_with_error(built: Path, error: PlantedError, folder: Path) -> Path:
+    """The image `built` with the planted error, sealed."""
+    return relinked(built, with_error(error, folder), folder)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The S32K144's image boots on the emulated processor, and does not drive with data it was not built with."""
+"""The S32K144's image boots on the emulated processor, and does not enable switching with damaged data."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FAULT_CONFIG = 1 << 7
 ADC0_IRQ, PDB0_IRQ, PDB1_IRQ = 39, 52, 68
 COCO = 0x80
 CLOCK_S = 1 / 112e6
-FOREVER = 0.1  # eight times the 12 ms of the watchdog
+RUN_S = 0.1  # eight times the watchdog's time-out of 12 ms
 
 
 @pytest.fixture(scope="module")
@@ -49,29 +49,29 @@ def _core(parts: build.Parts, elf: Path) -> Core:
 
 def _periods(core: Core, seconds: float) -> Iterator[int]:
     end = core.now_s + seconds
-    while end - core.now_s > CLOCK_S:  # less takes the core nowhere
+    while end - core.now_s > CLOCK_S:  # a shorter time than one clock would not advance the core
         yield core.run(end - core.now_s)
 
 
 def test_the_pwm_runs_soon_after_reset_and_nothing_resets_again(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        assert core.run(FOREVER) == CENTRE
+        assert core.run(RUN_S) == CENTRE
         assert core.now_s < 0.05
-        stops = list(_periods(core, FOREVER))
-        assert stops.count(CENTRE) == pytest.approx(FOREVER * 10_000, abs=2)
+        stops = list(_periods(core, RUN_S))
+        assert stops.count(CENTRE) == pytest.approx(RUN_S * 10_000, abs=2)
         assert core.resets == 0
 
 
 def test_a_stopped_emulation_ends_the_test_at_once(parts: build.Parts, elf: Path) -> None:
-    """Time no longer advances then: a wait for an end time would never end."""
+    """After a stop the emulated time no longer advances, so a loop that waits for an end time would never end."""
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         core.set_register("PCC.PCC_ADC0", 0)  # the fast ISR reads from a converter without a clock
         with pytest.raises(EmulationStoppedError, match=r"read of ADC0\.R\d .* the peripheral's clock is off"):
-            list(_periods(core, FOREVER))
+            list(_periods(core, RUN_S))
 
 
-def test_a_damaged_table_keeps_the_pwm_from_starting_and_the_bus_alive(
+def test_with_a_damaged_table_the_pwm_never_starts_but_the_bus_runs(
     parts: build.Parts, elf: Path, tmp_path: Path
 ) -> None:
     sealed = image.Image(elf)
@@ -79,14 +79,14 @@ def test_a_damaged_table_keeps_the_pwm_from_starting_and_the_bus_alive(
     damaged = tmp_path / "damaged.elf"
     damaged.write_bytes(sealed.content)
     with _core(parts, damaged) as core:
-        assert core.run(FOREVER) == LIMIT
+        assert core.run(RUN_S) == LIMIT
         assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
         assert core.register("CAN0.MCR") & 0x8000_0000 == 0  # the module is enabled
         assert core.resets == 0
 
 
 class _Frame(ctypes.Structure):
-    """can_port_frame_t."""
+    """can_port_frame_t of tests/target/emulator/can_port.h."""
 
     _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
                 ("data", ctypes.c_uint8 * 8))  # fmt: skip
@@ -96,33 +96,33 @@ _SENT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.POINTER(_Frame), ctypes.c
 
 
 class _Port(ctypes.Structure):
-    """can_port_t."""
+    """can_port_t of tests/target/emulator/can_port.h."""
 
     _fields_ = (("sent", _SENT), ("user", ctypes.c_void_p))
 
 
-def _told(parts: build.Parts, elf: Path) -> dict[str, dict[str, object]]:
-    """The newest frame of each message that an image sends in its first 0.3 s, decoded; its PWM does not start."""
+def _sent_messages(parts: build.Parts, elf: Path) -> dict[str, dict[str, object]]:
+    """The last frame of each message that an image sends in its first 0.3 s, decoded. The PWM must not start."""
     database = cantools.database.load_file(DBC)
-    told: dict[str, dict[str, object]] = {}
+    messages: dict[str, dict[str, object]] = {}
 
     def on_sent(_: int, frame: ctypes._Pointer[_Frame], _now: int) -> None:
         message = database.get_message_by_frame_id(frame[0].id)
-        told[message.name] = message.decode(bytes(frame[0].data))
+        messages[message.name] = message.decode(bytes(frame[0].data))
 
     with _core(parts, elf) as core:
         port = _Port(_SENT(on_sent), None)
         core._library.emu_can_port(ctypes.c_void_p(core._handle), ctypes.byref(port))
         assert core.run(0.3) == LIMIT
         assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
-    return told
+    return messages
 
 
 def test_a_damaged_table_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
-    told = _told(parts, damaged(elf, tmp_path / "damaged.elf", "table_g", 100, b"\x01\x00"))
-    assert told["INV_Status"]["State"] == "fault"
-    assert told["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
-    assert told["INV_Configuration"]["MotorCheck"] == "image_checksum"
+    messages = _sent_messages(parts, damaged(elf, tmp_path / "damaged.elf", "table_g", 100, b"\x01\x00"))
+    assert messages["INV_Status"]["State"] == "fault"
+    assert messages["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
+    assert messages["INV_Configuration"]["MotorCheck"] == "image_checksum"
 
 
 def test_a_dead_time_beyond_the_timer_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
@@ -131,9 +131,9 @@ def test_a_dead_time_beyond_the_timer_is_named_on_the_bus(parts: build.Parts, el
     dead_time = content.content[at : at + 128].index(struct.pack("<f", 2e-6))
     impossible = damaged(elf, tmp_path / "impossible.elf", "motor", dead_time, struct.pack("<f", 1e-3))
     image.seal(impossible)
-    told = _told(parts, impossible)
-    assert told["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
-    assert told["INV_Configuration"]["MotorCheck"] == "pwm_timer"
+    messages = _sent_messages(parts, impossible)
+    assert messages["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
+    assert messages["INV_Configuration"]["MotorCheck"] == "pwm_timer"
 
 
 def test_an_image_that_was_never_sealed_does_not_drive(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
@@ -143,13 +143,13 @@ def test_an_image_that_was_never_sealed_does_not_drive(parts: build.Parts, elf: 
     unsealed = tmp_path / "unsealed.elf"
     unsealed.write_bytes(content.content)
     with _core(parts, unsealed) as core:
-        assert core.run(FOREVER) == LIMIT
+        assert core.run(RUN_S) == LIMIT
 
 
 def test_most_of_the_stack_is_never_touched(parts: build.Parts, elf: Path) -> None:
-    """Half of it is what the worst case may need; an idle drive with a quiet bus needs far less."""
+    """The worst case may need half of the stack. An idle drive without frames on the bus must need less."""
     with _core(parts, elf) as core:
-        list(_periods(core, FOREVER))
+        list(_periods(core, RUN_S))
         bottom, top = core.symbol("stack_bottom"), core.symbol("stack_top")
         stack = core.read(bottom, top - bottom)
         untouched = len(stack) - len(stack.lstrip(b"\xc5"))
@@ -176,15 +176,15 @@ def test_a_table_that_is_damaged_later_disables_switching(parts: build.Parts) ->
 
 def test_interrupts_rank_fault_fast_identification_bus_task(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         by_irq = {irq: core.read(0xE000_E400 + irq, 1)[0] >> 4 for irq in (103, 39, 69, 81, 78, 48)}
     assert list(by_irq.values()) == [0, 1, 2, 3, 3, 4]
 
 
-def test_the_processor_runs_guarded_at_112_mhz(parts: build.Parts, elf: Path) -> None:
-    """8 MHz * 28 / 2; bus and flash at a half and a quarter; lost oscillator or lost lock resets."""
+def test_the_processor_runs_at_112_mhz_with_clock_monitors(parts: build.Parts, elf: Path) -> None:
+    """8 MHz * 28 / 2; bus and flash at a half and a quarter; loss of the oscillator or of the PLL's lock resets."""
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         assert core.register("SMC.PMCTRL") >> 5 & 3 == 3  # HSRUN
         assert core.register("SCG.HCCR") == 6 << 24 | 0 << 16 | 1 << 4 | 3
         assert core.register("SCG.SPLLCFG") == 12 << 16
@@ -194,7 +194,7 @@ def test_the_processor_runs_guarded_at_112_mhz(parts: build.Parts, elf: Path) ->
 
 def test_the_bus_runs_at_500_kbit_per_second_and_samples_at_87_5_percent(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         control = core.register("CAN0.CTRL1")
     assert control >> 13 & 1 == 0  # clocked by the oscillator of 8 MHz
     before = 1 + (control & 7) + 1 + (control >> 19 & 7) + 1  # synchronisation, propagation, segment 1
@@ -204,9 +204,10 @@ def test_the_bus_runs_at_500_kbit_per_second_and_samples_at_87_5_percent(parts: 
 
 
 def test_the_watchdog_has_a_window_and_can_no_longer_be_changed(parts: build.Parts, elf: Path) -> None:
-    """12 ms at the slowest of its oscillator, 113 kHz, are 1356 ticks; the task comes every 113 or more."""
+    """At the lowest oscillator frequency, 113 kHz, the time-out of 12 ms is 1356 ticks. The task services the watchdog
+    at intervals of at least 113 ticks, and the closed window must be shorter."""
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         list(_periods(core, 0.01))
         control = core.register("WDOG.CS")
         assert control & 0x8080 == 0x8080  # WIN, EN
@@ -215,38 +216,38 @@ def test_the_watchdog_has_a_window_and_can_no_longer_be_changed(parts: build.Par
         assert 0 < core.register("WDOG.WIN") < 113
 
 
-def test_all_lines_to_the_board_are_outputs_and_off_until_asked_for(parts: build.Parts, elf: Path) -> None:
+def test_all_lines_to_the_board_are_outputs_and_off_after_start(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         assert core.register("PTC.PDDR") == 0b11_0100_1111  # precharge ... driver supply, safe state, A0, A1
         assert core.register("PTC.PDOR") & 0b100_1111 == 0
         assert core.register("FTM0.OUTMASK") & 0x3F == 0x3F
 
 
-def test_no_conversion_is_asked_for_while_another_runs(parts: build.Parts, elf: Path) -> None:
+def test_no_conversion_is_triggered_while_another_runs(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        list(_periods(core, FOREVER))
+        list(_periods(core, RUN_S))
         assert core.register("PDB0.CH0S") & 0xFF == 0
         assert core.register("PDB1.CH0S") & 0xFF == 0
 
 
 def _count_entries(core: Core) -> dict[int, int]:
-    """Entries of each handler from now on, by interrupt number."""
+    """Counts the entries of each handler from now on, by interrupt number."""
     entered: dict[int, int] = {}
 
-    def note(vector: int, enters: bool) -> None:
-        if enters:
+    def count_entry(vector: int, is_entry: bool) -> None:
+        if is_entry:
             entered[vector - 16] = entered.get(vector - 16, 0) + 1
 
-    core.on_exception(note)
+    core.on_exception(count_entry)
     return entered
 
 
 def test_every_period_is_sampled(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
-        core.run(FOREVER)
+        core.run(RUN_S)
         entered = _count_entries(core)
-        periods = list(_periods(core, FOREVER)).count(CENTRE)
+        periods = list(_periods(core, RUN_S)).count(CENTRE)
         assert entered[ADC0_IRQ] == pytest.approx(periods, abs=1)
         assert not {PDB0_IRQ, PDB1_IRQ} & entered.keys()
 
@@ -255,8 +256,9 @@ def test_every_period_is_sampled(parts: build.Parts, elf: Path) -> None:
 def test_a_result_that_was_not_read_in_time_costs_at_most_three_periods(
     parts: build.Parts, elf: Path, register: str
 ) -> None:
-    """Its next conversion leaves the delay block locked, until the sequence error's interrupt restarts the block. A
-    period without the fast ISR leaves the other converter's results unread, so that its block may follow."""
+    """The next conversion into the register leaves the delay block locked until the interrupt of the sequence error
+    restarts the block. In a period without the fast ISR the results of the other converter stay unread, so that its
+    block may be locked as well."""
     with _core(parts, elf) as core:
         list(_periods(core, 0.02))
         entered = _count_entries(core)
@@ -270,23 +272,24 @@ def test_a_result_that_was_not_read_in_time_costs_at_most_three_periods(
         assert core.resets == 0
 
 
-@pytest.mark.parametrize(("built", "wanted"), [(2e-6, 0.0), (2e-6, 1.3e-5), (1e-4, 1e-3)])
-def test_a_period_or_dead_time_the_timer_cannot_keep_never_starts_the_pwm(
-    parts: build.Parts, elf: Path, tmp_path: Path, built: float, wanted: float
+@pytest.mark.parametrize(("built", "impossible_value"), [(2e-6, 0.0), (2e-6, 1.3e-5), (1e-4, 1e-3)])
+def test_with_a_period_or_dead_time_that_the_timer_cannot_make_the_pwm_never_starts(
+    parts: build.Parts, elf: Path, tmp_path: Path, built: float, impossible_value: float
 ) -> None:
-    """dead_time_s (none; more than an eighth of the period) and period_s (beyond 16 bits), properly sealed."""
+    """A dead time of zero, or of more than an eighth of the period; a period of more than 16 bits. The image's checksum
+    is right."""
     changed = image.Image(elf)
     start = changed.place(changed.symbol("motor"), 4)
     end = changed.place(changed.symbol("cal_end") - 4, 4)
     word = struct.pack("<f", built)
     assert changed.content.count(word, start, end) == 1
     at = changed.content.index(word, start, end)
-    changed.content[at : at + 4] = struct.pack("<f", wanted)
+    changed.content[at : at + 4] = struct.pack("<f", impossible_value)
     path = tmp_path / "changed.elf"
     path.write_bytes(changed.content)
     image.seal(path)
     with _core(parts, path) as core:
-        assert core.run(FOREVER) == LIMIT
+        assert core.run(RUN_S) == LIMIT
         assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
         assert core.resets == 0
 
@@ -295,10 +298,11 @@ def test_a_period_or_dead_time_the_timer_cannot_keep_never_starts_the_pwm(
 def test_a_task_or_a_fast_interrupt_that_no_longer_comes_resets_within_20_ms(
     parts: build.Parts, elf: Path, register: str, value: int
 ) -> None:
-    """Without its timer's interrupt the task serves nothing; without the fast ISR it finds nothing that advanced and
-    holds the service back. 12 ms at the slowest oscillator, and up to three tasks until the stall is noticed."""
+    """Without its timer's interrupt the task does not run and does not service the watchdog. Without the fast ISR the
+    task finds that no period has passed and stops servicing. The 20 ms are the time-out, 12 ms at the slowest
+    oscillator, plus up to three steps until the task detects the stall."""
     with _core(parts, elf) as core:
-        list(_periods(core, FOREVER))
+        list(_periods(core, RUN_S))
         assert core.resets == 0
         core.set_register(register, value)
         stopped_s = core.now_s
@@ -308,5 +312,5 @@ def test_a_task_or_a_fast_interrupt_that_no_longer_comes_resets_within_20_ms(
                 break
         assert core.resets == 1
         assert core.now_s - stopped_s < 0.02
-        assert core.run(FOREVER) == CENTRE  # it starts again
-        assert core.word("cause") & 0x20  # RCM_SRS.WDOG, what the bus is told
+        assert core.run(RUN_S) == CENTRE  # it starts again
+        assert core.word("cause") & 0x20  # RCM_SRS.WDOG: the cause of the reset that the bus reports

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The image at other PWM frequencies, for machines of tests/motors: times on the bus, watchdog, processor load.
 
-Only the machine's data differ from the image that test_faults.py holds to the rest.
+The image differs from that of test_faults.py only in the data of the machine.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from planting import Plant, relinked, with_error, with_motor
+from planting import PlantedError, relinked, with_error, with_motor
 
 from fluxtrue_tools.bench import cycles, disassembly, figures
 from fluxtrue_tools.bench.build import have_arm_compiler
@@ -33,8 +33,8 @@ BUILD = Path(os.environ["FLUXTRUE_BUILD_DIR"])
 KHZ = (5, 8, 10, 16, 20, 40)
 REFRESH = 0xB480_A602
 LPO_HZ, LPO_SLOWEST_HZ, LPO_FASTEST_HZ = 128e3, 113e3, 143e3
-STARTED_S = 0.08  # self-test, watchdog and all
-LOOK_S = 10e-6
+STARTED_S = 0.08  # start-up, including self-test and start of the watchdog
+POLL_S = 10e-6
 LOADED_MS = 50
 
 
@@ -69,7 +69,7 @@ def _step_s(parts: Parts) -> float:
     return periods_per_step(pwm_hz) / pwm_hz
 
 
-def _pass(core: Core, seconds: float) -> None:
+def _advance(core: Core, seconds: float) -> None:
     end = core.now_s + seconds
     while end - core.now_s > 1e-8:
         core.run(end - core.now_s)
@@ -77,15 +77,15 @@ def _pass(core: Core, seconds: float) -> None:
 
 def _started(parts: Parts, elf: Path | None = None) -> Core:
     core = Core.of_program(parts.emulated().library, elf or parts.image)
-    _pass(core, STARTED_S)
+    _advance(core, STARTED_S)
     return core
 
 
 def _services(core: Core, seconds: float) -> list[float]:
-    """When the watchdog's counter began anew."""
+    """The times at which the watchdog's counter restarted."""
     found, before, end = [], core.load("WDOG.CNT"), core.now_s + seconds
     while core.now_s < end:
-        _pass(core, LOOK_S)
+        _advance(core, POLL_S)
         count = core.load("WDOG.CNT")
         if count < before:
             found.append(core.now_s)
@@ -93,23 +93,23 @@ def _services(core: Core, seconds: float) -> list[float]:
     return found
 
 
-def _served_once_a_step(parts: Parts, elf: Path | None = None) -> None:
-    """Well inside the open window, whichever clock within its tolerance the watchdog has."""
+def _check_service_once_per_step(parts: Parts, elf: Path | None = None) -> None:
+    """Every service lies well inside the open window, for each oscillator frequency within the tolerance."""
     step_s = _step_s(parts)
     with _started(parts, elf) as core:
         assert core.resets == 0
-        closed, bites = core.register("WDOG.WIN"), core.register("WDOG.TOVAL")
+        closed, timeout = core.register("WDOG.WIN"), core.register("WDOG.TOVAL")
         times = _services(core, 10.5 * step_s)
         gaps = [b - a for a, b in pairwise(times)]
         assert len(gaps) >= 9
         assert min(gaps) * LPO_SLOWEST_HZ > 1.5 * closed > 0
-        assert max(gaps) * LPO_FASTEST_HZ < bites / 5
-        assert (times[-1] - times[0]) / len(gaps) == pytest.approx(step_s, abs=2 * LOOK_S)
+        assert max(gaps) * LPO_FASTEST_HZ < timeout / 5
+        assert (times[-1] - times[0]) / len(gaps) == pytest.approx(step_s, abs=2 * POLL_S)
         assert core.resets == 0
 
 
 def test_a_machine_is_checked_before_its_image_is_linked(hsm1: Parts) -> None:
-    """What fits() refuses is in tests/tools/target/test_fits.py."""
+    """The machines that fits() refuses are tested in tests/tools/target/test_fits.py."""
     command = ["ninja", "-t", "commands", "fluxtrue.elf"]
     done = subprocess.run(command, cwd=hsm1.image.parent, capture_output=True, text=True, check=True)
     link = next(line for line in done.stdout.splitlines() if "-o fluxtrue.elf" in line)
@@ -118,7 +118,7 @@ def test_a_machine_is_checked_before_its_image_is_linked(hsm1: Parts) -> None:
 
 
 def test_the_times_of_the_bus_hold_within_a_step(parts: Parts, tmp_path: Path) -> None:
-    """tests/hil/test_times.py on the image. The 5 s of the discharge are left to the virtual ECU."""
+    """tests/hil/test_times.py on the image. The discharge time of 5 s is tested on the virtual ECU only."""
     command = [sys.executable, "-m", "pytest", "-q", "-c", str(ROOT / "tests" / "pytest.ini"), "-p",
                "no:cacheprovider", "-p", "no:hypothesispytest", f"--vecu={parts.program}", f"--report={tmp_path}",
                "-k", "not after_5_s", str(ROOT / "tests" / "hil" / "test_times.py")]  # fmt: skip
@@ -129,8 +129,9 @@ def test_the_times_of_the_bus_hold_within_a_step(parts: Parts, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("identification", ["paper", "robust"])
-def test_the_processor_is_no_busier_than_the_build_was_told(parts: Parts, identification: str) -> None:
-    """While 80 N·m are asked for and the machine runs up; estimated, without wait states (docs/performance.md)."""
+def test_the_processor_load_is_below_the_share_that_the_build_assumes(parts: Parts, identification: str) -> None:
+    """The load while 80 N·m are requested and the machine accelerates: estimated cycles, without wait states
+    (docs/performance.md)."""
     motor, functions = parts.emulated(COUNTING), disassembly.read(parts.image)
     pwm_hz = motor.plant["pwm_hz"]
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0, "current_noise_A_rms": 0.5}
@@ -140,21 +141,21 @@ def test_the_processor_is_no_busier_than_the_build_was_told(parts: Parts, identi
         stand.power_up()
         stand.command.values["TorqueRequested"] = 80.0
         stand.profile(functions)
-        taken = []
+        run_cycles = []
         for k in range(LOADED_MS):
             stand.run_ms({"plant.speed_rad_s": (5.0 * k, 5.0 * (k + 1))})
-            taken += [cost + cycles.ENTRY + cycles.RETURN for _, _, cost in stand.take()]
+            run_cycles += [cost + cycles.ENTRY + cycles.RETURN for _, _, cost in stand.take()]
         assert loop.get("fault_word") == 0
         assert loop.get("truth.torque_Nm") > 50.0
     port = figures.budget()
-    busy = sum(taken) / (1e-3 * LOADED_MS * port["core_Hz"])
-    most = fits.busy_share(pwm_hz, port["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
-    print(f"{pwm_hz:g} Hz, {identification}: {100 * busy:.1f} % of the processor, at most {100 * most:.1f} %")
-    assert 0.3 * most < busy < most <= port["busy_share_max"]
+    load = sum(run_cycles) / (1e-3 * LOADED_MS * port["core_Hz"])
+    max_load = fits.busy_share(pwm_hz, port["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
+    print(f"{pwm_hz:g} Hz, {identification}: {100 * load:.1f} % of the processor, at most {100 * max_load:.1f} %")
+    assert 0.3 * max_load < load < max_load <= port["busy_share_max"]
 
 
 def test_the_watchdog_is_served_in_its_open_window(parts: Parts) -> None:
-    _served_once_a_step(parts)
+    _check_service_once_per_step(parts)
 
 
 def test_a_service_in_the_closed_window_resets_and_a_later_one_does_not(parts: Parts) -> None:
@@ -164,36 +165,37 @@ def test_a_service_in_the_closed_window_resets_and_a_later_one_does_not(parts: P
         for after_s, resets in ((0.8 * closed_s, 1), (1.2 * closed_s, 0)):
             core.restore(snapshot)
             before = core.resets
-            while not _services(core, LOOK_S):
+            while not _services(core, POLL_S):
                 pass
-            _pass(core, after_s)
+            _advance(core, after_s)
             core.store("WDOG.CNT", REFRESH)
-            _pass(core, LOOK_S)
+            _advance(core, POLL_S)
             assert core.resets - before == resets, f"serviced {after_s} s after the last service"
         core.free(snapshot)
 
 
 @pytest.mark.parametrize("stuck", ["core", "task"])
 def test_a_stuck_task_resets(parts: Parts, stuck: str) -> None:
-    """All interrupts are masked; or the fast ISR goes on, and only the task's interrupt no longer comes."""
+    """core: all interrupts are masked. task: the fast ISR continues, but the task's interrupt no longer comes."""
     with _started(parts) as core:
-        bites_s = core.register("WDOG.TOVAL") / LPO_HZ
+        timeout_s = core.register("WDOG.TOVAL") / LPO_HZ
         if stuck == "core":
             core.core_state(State.STUCK)
         else:
             core.store("LPIT0.MIER", 0)
-        _pass(core, bites_s - 1.5 * _step_s(parts))
+        _advance(core, timeout_s - 1.5 * _step_s(parts))
         assert core.resets == 0
-        _pass(core, 2 * _step_s(parts))
+        _advance(core, 2 * _step_s(parts))
         assert core.resets == 1
 
 
-TEN_PERIODS = Plant("main.c", "drivable ? motor.bases.periods_per_step", "drivable ? 10U")
+TEN_PERIODS = PlantedError("main.c", "drivable ? motor.bases.periods_per_step", "drivable ? 10U")
 
 
 def test_a_task_of_ten_periods_at_40_khz_is_found(hsm1: Parts, tmp_path: Path) -> None:
-    """What the firmware once did: a step of 0.25 ms, which the watchdog answers with a reset."""
+    """With the planted error a step is always ten periods, 0.25 ms here: the watchdog resets, because it is serviced
+    in its closed window."""
     parts = Parts(_motor(40), hsm1.image, hsm1.layout)
     elf = relinked(hsm1.image, with_motor(hsm1.image, _tables(40)) | with_error(TEN_PERIODS, tmp_path), tmp_path)
     with pytest.raises(AssertionError, match=r"\.resets"):
-        _served_once_a_step(parts, elf)
+        _check_service_once_per_step(parts, elf)

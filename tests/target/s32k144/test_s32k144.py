@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The S32K144's image as it would be flashed: where things lie, what the interrupts are made of, how large it is."""
+"""The S32K144's image as it would be flashed: memory layout, instructions of the interrupts, size."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fluxtrue_tools.target.build import image as build_image
 
 BUILD = Path(os.environ["FLUXTRUE_BUILD_DIR"]).parent
 PRESETS = ("s32k144", "s32k144-resolver")
-# Slot of the vector table: handler. 16 + the interrupt's number of the maker's list.
+# Slot of the vector table: handler. The slot is 16 + the number of the interrupt in the manufacturer's list.
 VECTORS = {1: "reset_handler", 3: "fault_handler", 15: "fault_handler", 16 + 39: "adc_handler", 16 + 48: "tick_handler",
            16 + 69: "mrai_handler", 16 + 78: "can_bus_off_handler", 16 + 81: "can_message_handler",
            16 + 52: "sampling_error_handler", 16 + 68: "sampling_error_handler",
@@ -54,10 +54,10 @@ def test_the_vectors_name_the_handlers_and_every_other_entry_is_a_fault(elf: Pat
     assert others == {symbols["fault_handler"] | 1}
 
 
-def test_the_stack_starts_at_its_top_and_ends_where_the_memory_ends(elf: Path) -> None:
+def test_the_stack_begins_at_its_top_and_ends_at_the_first_byte_of_the_ram(elf: Path) -> None:
     symbols = image.Image(elf).symbols
     assert struct.unpack("<I", _read(elf, 0, 4))[0] == symbols["stack_top"]
-    assert symbols["stack_bottom"] == 0x1FFF_8000  # the first byte of the RAM: below it nothing answers
+    assert symbols["stack_bottom"] == 0x1FFF_8000  # an access below this address is a fault
 
 
 def test_the_flash_configuration_leaves_the_processor_unsecured(elf: Path) -> None:
@@ -75,7 +75,7 @@ def test_configuration_and_tables_are_sealed(elf: Path) -> None:
 
 @pytest.mark.parametrize("handler", ["adc_handler", "sampling_error_handler", "mrai_handler", "gate_fault_handler"])
 def test_no_interrupt_of_the_control_uses_floating_point(elf: Path, handler: str) -> None:
-    """All it calls is in it or in the same ranges: what link-time optimisation left as calls is followed."""
+    """Link-time optimisation inlines most called functions; those that remain calls are followed."""
     todo, seen = [handler], set()
     while todo:
         name = todo.pop()
@@ -95,6 +95,6 @@ def test_reserved_memory_keeps_its_sectors(elf: Path) -> None:
     assert symbols["nvm_end"] - symbols["nvm_start"] == 2 * 2048
 
 
-def test_nothing_of_a_heap_is_linked(elf: Path) -> None:
+def test_no_heap_function_is_linked(elf: Path) -> None:
     heap = re.compile(r"_*(malloc|calloc|realloc|free|sbrk|morecore)(_r)?")
     assert not [name for name in image.Image(elf).symbols if heap.fullmatch(name)]
