@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The whole drive on an emulated Cortex-M4: the same bits as on this computer, period by period."""
+"""The whole drive on an emulated Cortex-M4: in every period its outputs are bit for bit those of the host."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import pytest
 
 from fluxtrue_tools.bench import build, drive
 
-ENOUGH = 2000
+PERIODS_MIN = 2000
 
 
 class Recorder(drive.Target):
-    """Keeps every call, so that another processor can be given the same."""
+    """Records every call, so that the same calls can be made on the host."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -47,30 +47,32 @@ def recorder(
 def test_target_and_host_agree_bit_for_bit_through_a_drive_cycle(
     recorder: tuple[Recorder, list[list[int]]], tmp_path: Path
 ) -> None:
-    target, there = recorder
-    # Undefined behaviour on the way ends the run with a message.
+    target, target_outputs = recorder
+    # Undefined behaviour ends the run with a message.
     flags = ("-fsanitize=undefined", "-fno-sanitize-recover=all")
     host = drive.Host(drive.build_drive_host(tmp_path, flags))
-    here = []
+    host_outputs = []
     for symbol, arguments in target.calls:
         host.call(symbol, *arguments)
         if symbol == "bench_mrai_isr":
-            here.append(host.outputs())
-    assert len(there) >= ENOUGH
-    differing = [k for k, (a, b) in enumerate(zip(here, there, strict=True)) if a != b]
-    assert not differing, f"period {differing[0]}: host {here[differing[0]]}, target {there[differing[0]]}"
+            host_outputs.append(host.outputs())
+    assert len(target_outputs) >= PERIODS_MIN
+    differing = [k for k, (a, b) in enumerate(zip(host_outputs, target_outputs, strict=True)) if a != b]
+    assert not differing, (
+        f"period {differing[0]}: host {host_outputs[differing[0]]}, target {target_outputs[differing[0]]}"
+    )
 
 
-def test_the_cycle_drives_both_ways_meets_the_limit_and_ends_without_a_fault(
+def test_the_cycle_has_torque_of_both_signs_reaches_the_voltage_limit_and_ends_without_a_fault(
     recorder: tuple[Recorder, list[list[int]]],
 ) -> None:
     _, trace = recorder
-    gates, faults = 3, 13
+    gates, faults = 3, 13  # positions among the outputs
     settled = trace[drive.WARM_UP :]
     assert all(row[gates] == 1 for row in settled)
     assert trace[-1][faults] == 0
     assert min(row[5] for row in settled) < -2000 < 2000 < max(row[5] for row in settled)  # i_q
-    assert len({tuple(row[:3]) for row in settled}) > ENOUGH // 2
-    acted = [row[9] ** 2 + row[10] ** 2 for row in settled]  # u_d, u_q
-    assert max(acted) > (0.55 * 350 / 525 * 32768) ** 2
+    assert len({tuple(row[:3]) for row in settled}) > PERIODS_MIN // 2
+    voltage_squared = [row[9] ** 2 + row[10] ** 2 for row in settled]  # u_d, u_q
+    assert max(voltage_squared) > (0.55 * 350 / 525 * 32768) ** 2
     assert max(abs(row[21]) for row in settled) > 0  # the magnet is being identified

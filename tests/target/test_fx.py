@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fixed-point library on an emulated Cortex-M4: the host's bits, the promised cost and error."""
+"""The fixed-point library on an emulated Cortex-M4: same results as on the host, cost and error within their bounds."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def results(machine: Machine) -> dict[str, bench.Result]:
 
 @pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    """The portable side; undefined behaviour ends the run with a message."""
+    """The portable implementation; undefined behaviour ends the run with a message."""
     flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
     path = build.build_host(tmp_path_factory.mktemp("host") / "fx.so", build.FX_SOURCES, flags)
     return ctypes.CDLL(str(path))
@@ -53,7 +53,7 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
 
 @pytest.fixture(scope="module")
 def rows() -> np.ndarray:
-    """Corners in every combination of two, every 16-bit number, and random magnitudes."""
+    """Every pair of corner values, every 16-bit number, and random numbers of all magnitudes."""
     rng = np.random.default_rng(7)
     corners = np.array(sorted({*fx_cases.CORNERS_Q15, *fx_cases.CORNERS_Q31, 32768, 65535, 31, 32}))
     pairs = np.stack([axis.ravel() for axis in np.meshgrid(corners, corners)], axis=1)
@@ -66,25 +66,25 @@ def rows() -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 def test_target_and_host_agree_bit_for_bit(name: str, program: Path, host: ctypes.CDLL, rows: np.ndarray) -> None:
     machine = Machine(program)
-    here = np.empty(len(rows), dtype=np.int64)
+    host_results = np.empty(len(rows), dtype=np.int64)
     function = getattr(host, f"batch_{name}")
-    function(rows.ctypes.data_as(ctypes.c_void_p), here.ctypes.data_as(ctypes.c_void_p),
+    function(rows.ctypes.data_as(ctypes.c_void_p), host_results.ctypes.data_as(ctypes.c_void_p),
              ctypes.c_uint32(len(rows)))  # fmt: skip
     arguments = machine.place(rows.tobytes())
     answers = machine.place(bytes(8 * len(rows)))
     machine.call(f"batch_{name}", arguments, answers, len(rows))
-    there = np.frombuffer(machine.read(answers, 8 * len(rows)), dtype=np.int64)
-    differing = np.flatnonzero(here != there)
+    target_results = np.frombuffer(machine.read(answers, 8 * len(rows)), dtype=np.int64)
+    differing = np.flatnonzero(host_results != target_results)
     first = differing[:1]
-    assert differing.size == 0, f"{name}{rows[first]}: host {here[first]}, target {there[first]}"
+    assert differing.size == 0, f"{name}{rows[first]}: host {host_results[first]}, target {target_results[first]}"
 
 
 def test_every_function_that_is_measured_is_also_compared(results: dict[str, bench.Result]) -> None:
     assert set(results) - {"sincos_struct"} <= set(NAMES)
 
 
-# Parts of others, which the results of those contain; and what has no result.
-INSIDE = {
+# Not compared by themselves: functions that others of the library call, and functions without a result.
+NOT_COMPARED = {
     "fx_compiler_barrier",
     "fx_axis",
     "fx_axis_right",
@@ -99,17 +99,17 @@ DEFINED = re.compile(r"^(?:__attribute__\(\(always_inline\)\) )?(?:static inline
 @pytest.mark.parametrize("where", ["tools/fluxtrue_tools/bench/fx_kernels.c", "tests/unit/fx"])
 def test_every_function_of_the_library_is_compared_with_the_target_and_with_an_exact_reference(where: str) -> None:
     headers = [path for path in (build.FIRMWARE / "fx").glob("*.h") if not path.name.startswith("arch")]
-    names = {name for path in headers for name in DEFINED.findall(path.read_text(encoding="utf-8"))} - INSIDE
-    assert {"fx_mesh_cell", "fx_quotient", "fx_div_q31", "fx_add_q15"} <= names, "the pattern finds what is there"
+    names = {name for path in headers for name in DEFINED.findall(path.read_text(encoding="utf-8"))} - NOT_COMPARED
+    assert {"fx_mesh_cell", "fx_quotient", "fx_div_q31", "fx_add_q15"} <= names, "the pattern finds the functions"
     place = build.ROOT / where
     text = "".join(path.read_text(encoding="utf-8") for path in ([place] if place.is_file() else place.glob("*.c")))
-    named = set(re.findall(r"\bfx_\w+", re.sub(r'"[^"\n]*"', "", text)))
-    assert sorted(names - named) == []
+    mentioned = set(re.findall(r"\bfx_\w+", re.sub(r'"[^"\n]*"', "", text)))
+    assert sorted(names - mentioned) == []
 
 
-# The product's own promises; as calls, so that saved registers count and the return does not.
+# The product's own bounds. The cost is that of a call: saving registers counts, the return does not.
 @pytest.mark.parametrize(
-    ("name", "most_instructions", "largest_error"),
+    ("name", "max_instructions", "max_error"),
     [
         ("sincos", 20, 4e-5),
         ("sincos_struct", 20, None),
@@ -117,13 +117,13 @@ def test_every_function_of_the_library_is_compared_with_the_target_and_with_an_e
         ("magnitude", 50, 2.0**-15),
     ],
 )
-def test_cost_and_error_stay_inside_the_promise(
-    results: dict[str, bench.Result], name: str, most_instructions: int, largest_error: float | None
+def test_cost_and_error_stay_within_their_bounds(
+    results: dict[str, bench.Result], name: str, max_instructions: int, max_error: float | None
 ) -> None:
     result = results[name]
-    assert result.maximum <= most_instructions
-    if largest_error is not None:
-        assert result.error is not None and result.error <= largest_error
+    assert result.maximum <= max_instructions
+    if max_error is not None:
+        assert result.error is not None and result.error <= max_error
 
 
 @pytest.mark.parametrize("peer", PEERS, ids=lambda peer: peer.name)
@@ -147,7 +147,7 @@ def test_counting_by_block_equals_counting_one_by_one(program: Path, name: str, 
     seen: list[int] = []
     single.uc.hook_add(UC_HOOK_CODE, lambda _uc, at, _size, _data: seen.append(at))
     single.call(f"bench_{name}", *arguments)
-    # Only the block counts a slot of an IT instruction (0xBFxx) that is skipped: at most 4 each.
+    # Only counting by block includes the instructions that an IT instruction (0xBFxx) skips: at most 4 for each IT.
     conditional = sum(single.read(at + 1, 1) == b"\xbf" for at in seen)
     assert len(seen) <= by_block <= len(seen) + 4 * conditional
     if conditional == 0:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The script of hal/mps2 on this computer: the activities called in the order of their priorities. */
+/* The script of hal/mps2 on the host: the activities are called in the order of their priorities. */
 #include <stdio.h>
 
 #include "drive/mrai/mrai_seam.h"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The image of hal/mps2 on QEMU's M4F, M7 and M33: interrupts, priorities and arithmetic as on this computer."""
+"""The image of hal/mps2 on QEMU's M4F, M7 and M33: same duties, faults and identified values as on the host."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fluxtrue_tools.target.build import image
 
 BUILD = Path(os.environ["FLUXTRUE_BUILD_DIR"])
 QEMU = "qemu-system-arm"
-# An instruction takes 8 ns of virtual time and idling none: the run is the same every time.
+# Each instruction takes 8 ns of virtual time, and idle time is skipped: every run is identical.
 CLOCK = ("-icount", "shift=3,sleep=off")
 BOARDS = ("mps2-an386", "mps2-an500", "mps2-an505")
 PERIODS = 4000
@@ -44,11 +44,11 @@ def _boot(board: str) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("board", BOARDS)
-def test_an_emulated_board_computes_the_duties_of_this_computer(board: str, expected: dict[str, int]) -> None:
+def test_an_emulated_board_computes_the_same_results_as_the_host(board: str, expected: dict[str, int]) -> None:
     assert _boot(board) == expected
 
 
-def test_the_script_keeps_the_drive_running_and_busy(expected: dict[str, int]) -> None:
+def test_the_script_keeps_the_drive_switching_and_identifying_without_a_fault(expected: dict[str, int]) -> None:
     assert expected["faults"] == 0
     assert expected["overruns"] == 0
     assert expected["differing"] > PERIODS // 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""hal/template defines every function that the headers of hal/ declare, and says in each file what is to be written."""
+"""hal/template defines every function that the headers of hal/ declare; each file says what the porter has to write."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ FUNCTION = re.compile(r"^[a-z]\w*(?: \w+)*[ *]+(hal_\w+)\([^;{]*\)\s*(;|\{)", re
 
 
 def functions(path: Path, end: str) -> set[str]:
-    """The functions a file declares (';') or defines ('{')."""
+    """The functions that a file declares (end ';') or defines (end '{')."""
     return {name for name, sign in FUNCTION.findall(path.read_text(encoding="utf-8")) if sign == end}
 
 
-def test_every_mention_of_a_function_is_found_in_the_headers() -> None:
-    # A prototype in a form that FUNCTION does not know would otherwise be left out silently.
+def test_the_pattern_finds_every_prototype_in_the_headers() -> None:
+    # Otherwise a prototype that FUNCTION does not match would be left out without a message.
     for header in HEADERS:
         code = re.sub(r"/\*.*?\*/", "", header.read_text(encoding="utf-8"), flags=re.DOTALL)
         assert functions(header, ";") == set(re.findall(r"\b(hal_\w+)\(", code)), header.name

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The image of hal/template: it links, and lies in memory as a port should."""
+"""The image of hal/template links, and its memory layout is that of a port."""
 
 from __future__ import annotations
 
@@ -41,6 +41,6 @@ def test_the_motors_data_are_sealed_in_flash(image: Image) -> None:
     assert stored == zlib.crc32(image.content[at : at + end - start])
 
 
-def test_tools_find_the_drive_and_the_version(image: Image) -> None:
+def test_the_image_has_the_symbols_that_tools_need(image: Image) -> None:
     assert image.symbol("ecu") >= 0x2000_0000
     assert image.symbol("firmware_version") < 0x2000_0000
