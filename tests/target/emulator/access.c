@@ -10,7 +10,7 @@
 
 emu_pins_t *emu_pins(emu_t *emu)
 {
-    emu->s.pins_set_at = emu->s.ftm[0].triggers_due ? emu->s.ftm[0].start : emu->s.now; /* the period's begin */
+    emu->s.pins_set_at = emu->s.ftm[0].triggers_due ? emu->s.ftm[0].start : emu->s.now; /* start of the period */
     return &emu->s.pins;
 }
 
@@ -55,7 +55,7 @@ bool emu_gate_driver(const emu_t *emu)
     return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;
 }
 
-/* Between two settings the shaft keeps turning. */
+/* The shaft keeps turning between two settings of the pins. */
 uint32_t emu_angle(const emu_t *emu)
 {
     const int64_t passed = (int64_t)(emu_instant(emu) - emu->s.pins_set_at);
@@ -104,7 +104,7 @@ uint32_t emu_symbol_size(const emu_t *emu, const char *name)
     return size;
 }
 
-/* "FTM0.MOD" among all registers; false: no such. */
+/* Finds a register by its name, for example "FTM0.MOD"; false: there is none. */
 static bool find_named(const emu_t *emu, const char *name, int *peripheral, int *number)
 {
     const char *dot = strchr(name, '.');
@@ -140,7 +140,7 @@ bool emu_register_set(emu_t *emu, const char *name, uint32_t value)
     return true;
 }
 
-/* The cache's controller lies beside the core's own registers, everything else on the peripheral bus. */
+/* The registers of the cache (LMEM) have addresses among the core's own; all others are on the peripheral bus. */
 uint64_t emu_register_load(emu_t *emu, const char *name)
 {
     int p, r;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Analogue-to-digital converters. Results are what the pins carry when the conversion ends; they change once per PWM
- * period, at its begin. A conversion takes SMPLTS + 1 + 30 converter clocks (of the order of the data sheet's).
+/* Analogue-to-digital converters. A result is the value at the pin when the conversion ends; the values at the pins
+ * change once per PWM period, at its start. A conversion takes SMPLTS + 1 + 30 converter clocks, about as long as in
+ * the data sheet.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
@@ -8,12 +9,13 @@
  * software trigger by SC1A while ADTRG is 0          | yes      | test_a_written_sc1a_converts_at_once
  * conversion takes SMPLTS + 31 clocks, averages more | yes      | test_averaging_takes_as_many_conversions
  * COCO set at the end, cleared by Rn or SC1n         | yes      | test_complete_is_cleared_by_result_or_control
- * AIEN: interrupt while COCO is set                  | yes      | test_a_complete_conversion_interrupts_if_asked_to
+ * AIEN: interrupt while COCO is set                  | yes      | test_a_complete_conversion_interrupts_if_enabled
  * ADCH 31: no conversion                             | yes      | test_the_disabled_input_is_not_converted
  * a trigger during a conversion is ignored           | yes      | test_a_trigger_during_a_conversion_is_ignored
  * calibration before use, and its conditions         | refused  | test_what_is_not_modelled_is_an_error
- * least sample time, fastest clock                   | refused  | test_what_is_not_modelled_is_an_error
- * 8 and 10 bits, comparison, DMA                     | refused  | test_other_converter_modes_are_refused
+ * shortest sample time, fastest clock                | refused  | test_what_is_not_modelled_is_an_error
+ * 8 and 10 bits                                      | refused  | test_other_resolutions_are_refused
+ * comparison, DMA                                    | refused  | test_other_converter_modes_are_refused
  * noise, offset, gain and their calibration          | no       | -
  */
 #include "emu_private.h"
@@ -104,19 +106,20 @@ static bool start(emu_t *emu, const peripheral_t *self, int channel)
     return true;
 }
 
-/* The manual's conditions: started by software, average of 32, at most half the fastest clock, from nothing. */
+/* The reference manual's conditions: software trigger, average of 32, at most half the fastest clock, and the results
+ * of earlier calibrations cleared. */
 static void calibrate(emu_t *emu, const peripheral_t *self)
 {
-    (void)conversion_ticks(emu, self); /* it needs a clock, too */
+    (void)conversion_ticks(emu, self); /* calibration needs a clock, too */
     bool clear = true;
     for (uint32_t at = CLPS; at <= CLP9; at += 4U) {
         clear = clear && bus_get(emu, self, at) == 0U;
     }
     const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (bus_get(emu, self, CFG1) >> 5 & 3U);
     if ((bus_get(emu, self, SC2) & 0x40U) != 0 || (bus_get(emu, self, SC3) & 7U) != 7U || clock < 2U * 67U) {
-        emu_fail(emu, "write of %s.SC3: calibration wants ADTRG = 0, an average of 32 and at most 25 MHz", self->name);
+        emu_fail(emu, "write of %s.SC3: calibration requires ADTRG = 0, average 32, at most 25 MHz", self->name);
     } else if (!clear) {
-        emu_fail(emu, "write of %s.SC3: calibration wants CLPS ... CLP9 to be 0", self->name);
+        emu_fail(emu, "write of %s.SC3: calibration requires CLPS ... CLP9 to be 0", self->name);
     }
     emu->s.adc[self->instance].calibrated = true;
     bus_put(emu, self, SC3, bus_get(emu, self, SC3) & ~0x80U);
@@ -160,7 +163,7 @@ void adc_fire(emu_t *emu, int instance)
     bus_put(emu, self, R + control, emu->s.pins.adc[instance][input] & 0xFFFU);
     bus_put(emu, self, control, bus_get(emu, self, control) | COCO);
     line_update(emu, self);
-    if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* COCO rises: an unread result leaves it as it is */
+    if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* COCO has risen: the last result was read */
         pdb_acknowledge(emu, instance, channel);
     }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Every access to a peripheral is checked here: the register exists, is modelled and clocked, and reserved bits
- * stay. */
+/* Every access to a peripheral is checked here: the register must exist, be modelled and clocked, and reserved bits
+ * must keep their reset values. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -68,7 +68,7 @@ bool bus_create(emu_t *emu)
         }
         memset(index, 0xFF, PAGE * sizeof *index);
         for (int r = of->count - 1; r >= 0; r--) {
-            index[of->fact[r].offset] = (int16_t)r; /* the widest comes first in the table and stays */
+            index[of->fact[r].offset] = (int16_t)r; /* of several at one offset the first, the widest, counts */
         }
         emu->facts_of[p] = of;
         emu->index_of[p] = index;
@@ -123,7 +123,7 @@ typedef struct {
     const peripheral_t *peripheral;
     const fact_t *fact;
     uint32_t *value;
-    uint32_t shift; /* of a narrow access within its register */
+    uint32_t shift; /* position of a narrow access within its register */
 } place_t;
 
 static bool clocked(const emu_t *emu, const peripheral_t *peripheral)
@@ -132,7 +132,7 @@ static bool clocked(const emu_t *emu, const peripheral_t *peripheral)
     return peripheral->gate == 0 || (bus_get(emu, bus_find("PCC"), peripheral->gate) & cgc) != 0;
 }
 
-/* False: refused, and the emulation stops with the reason. */
+/* False: the access is refused, and the emulation stops with the reason. */
 static bool find(emu_t *emu, int p, uint32_t address, uint32_t size, const char *what, place_t *place)
 {
     const peripheral_t *peripheral = &peripherals[p];
@@ -238,7 +238,7 @@ void bus_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, vo
     write_at(user, peripheral_at(user, address, "write"), address, size, (uint32_t)value);
 }
 
-/* LMEM lies beside the core's own registers. */
+/* The registers of LMEM have addresses among the core's own. */
 static int private_peripheral(const emu_t *emu, uint32_t address)
 {
     for (int p = peripherals_count - 1; p >= 0; p--) {

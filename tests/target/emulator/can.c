@@ -4,13 +4,13 @@
  *
  * documented behaviour                                | modelled | test
  * --------------------------------------------------- | -------- | --------------------------------------------
- * freeze handshake, bits only writable in it          | refused  | test_what_is_not_modelled_is_an_error
- * message memory wants initialising                   | refused  | test_what_is_not_modelled_is_an_error
- * legacy FIFO of six: shown in box 0, BUF5I           | yes      | test_received_frames_queue_for_the_program
+ * bits that can be written in freeze mode only        | refused  | test_what_is_not_modelled_is_an_error
+ * message memory must be initialised                  | refused  | test_what_is_not_modelled_is_an_error
+ * legacy FIFO of six, read in mailbox 0; BUF5I        | yes      | test_received_frames_queue_for_the_program
  * FIFO warning, overflow                              | yes      | test_received_frames_queue_for_the_program
- * boxes sent lowest identifier first, CODE 12 to 8    | yes      | test_boxes_are_sent_lowest_identifier_first
- * bit time from CTRL1 and its clock                   | yes      | test_boxes_are_sent_lowest_identifier_first
- * interrupt of boxes 0 to 15                          | yes      | test_received_frames_queue_for_the_program
+ * lowest identifier is sent first, CODE 12 to 8       | yes      | test_mailboxes_are_sent_lowest_identifier_first
+ * bit time from CTRL1 and its clock                   | yes      | test_mailboxes_are_sent_lowest_identifier_first
+ * interrupt of mailboxes 0 to 15                      | yes      | test_received_frames_queue_for_the_program
  * filters of the FIFO, soft reset, flexible data rate | refused  | test_other_bus_modes_are_refused
  * stuff bits, errors, arbitration, bus off            | no       | -
  */
@@ -100,7 +100,7 @@ static uint32_t word_of(const uint8_t *byte)
     return (uint32_t)byte[0] << 24 | (uint32_t)byte[1] << 16 | (uint32_t)byte[2] << 8 | byte[3];
 }
 
-/* The FIFO's first frame is seen through mailbox 0. */
+/* The program reads the FIFO's first frame in mailbox 0. */
 static void fifo_show(emu_t *emu)
 {
     const peripheral_t *self = can0();
@@ -122,7 +122,7 @@ void can_frame_arrives(emu_t *emu, const can_port_frame_t *frame)
     const peripheral_t *self = can0();
     can_t *c = &emu->s.can;
     if (!running(emu) || (bus_get(emu, self, MCR) & RFEN) == 0) {
-        return; /* no receiver */
+        return; /* the module does not receive */
     }
     if (c->fifo_count == EMU_CAN_FIFO) {
         bus_put(emu, self, IFLAG1, bus_get(emu, self, IFLAG1) | FIFO_OVERFLOW);
@@ -170,7 +170,7 @@ static can_port_frame_t frame_in(const emu_t *emu, int box)
     return frame;
 }
 
-/* The lowest identifier goes first. */
+/* The mailbox with the lowest identifier is sent first. */
 static int box_to_send(const emu_t *emu)
 {
     int best = -1;
@@ -188,7 +188,7 @@ static int box_to_send(const emu_t *emu)
     return best;
 }
 
-/* 8 MHz oscillator or system clock, PRESDIV, and the quanta of one bit. */
+/* Time of a bit: clock (8 MHz oscillator or system clock), PRESDIV and number of quanta. */
 static uint64_t bit_ticks(emu_t *emu)
 {
     const uint32_t c = bus_get(emu, can0(), CTRL1);
@@ -238,7 +238,7 @@ static bool memory_filled(const emu_t *emu)
     return (filled[0] & filled[1] & filled[2] & filled[3]) == 0xFFFFFFFFU;
 }
 
-/* Outside of freeze mode some bits keep their values. */
+/* Outside freeze mode some bits keep their values. */
 static void control_written(emu_t *emu, uint32_t old, uint32_t value)
 {
     const bool was_frozen = (old & (MDIS | FRZ | HALT)) == (FRZ | HALT);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_CAN_PORT_H
 #define EMULATOR_CAN_PORT_H
-/** Where the emulated controller's frames go and where they come from.
+/** Connects the emulated CAN controller to a bus: frames that it sends, and frames that it receives.
  * Source   docs/howto/emulate.md
  * Context  sent() is called while the emulation runs; can_frame_arrives() between two runs */
 #include <stdbool.h>

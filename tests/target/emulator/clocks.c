@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: sources, dividers, run modes, gates. An enabled source is stable at once.
+/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: clock sources, dividers, run modes, clock gates. An enabled source is stable at
+ * once.
  *
  * documented behaviour                           | modelled | test
  * ---------------------------------------------- | -------- | --------------------------------------------
@@ -7,10 +8,10 @@
  * highest frequencies of RUN and HSRUN           | refused  | test_clocks_beyond_the_data_sheet_are_refused
  * factor of two at most in HSRUN, PMPROT once    | refused  | test_what_is_not_modelled_is_an_error
  * settings of a running oscillator or PLL        | refused  | test_a_running_source_keeps_its_settings
- * PCC: gates, source only while closed, HSRUN    | refused  | test_what_is_not_modelled_is_an_error
- * RCM: cause of the last reset                   | yes      | test_an_unserviced_watchdog_resets_and_tells_why
+ * PCC: clock gates must not change in HSRUN      | refused  | test_what_is_not_modelled_is_an_error
+ * RCM: cause of the last reset                   | yes      | test_an_unserviced_watchdog_resets_and_reports_why
  * LMEM: cache commands are done at once          | yes      | test_a_cache_command_is_done_at_once
- * SIM: trigger sources of the converters but PDB | refused  | test_other_trigger_sources_are_refused
+ * SIM: converter triggers other than the PDB     | refused  | test_other_trigger_sources_are_refused
  * VLPR, STOP                                     | refused  | test_other_run_modes_are_refused
  * start-up times, monitors, jitter, cache hits   | no       | -
  */
@@ -68,7 +69,7 @@ static bool source_on(const emu_t *emu, int source)
     return enabled(emu, source) && (source != SPLL || enabled(emu, SOSC));
 }
 
-/* (PREDIV, MULT) of 8 MHz: f = 8 MHz (MULT + 16) / (PREDIV + 1) / 2; 0 when ticks would not be whole. */
+/* (PREDIV, MULT) of 8 MHz: f = 8 MHz (MULT + 16) / (PREDIV + 1) / 2; 0: no whole number of ticks. */
 static uint32_t spll_ticks(const emu_t *emu)
 {
     const uint32_t cfg = bus_get(emu, bus_find("SCG"), SPLLCFG);
@@ -84,7 +85,7 @@ static uint32_t source_ticks(const emu_t *emu, int source)
     return source == SPLL ? spll_ticks(emu) : source == FIRC ? FIRC_TICKS : source == SOSC ? CRYSTAL_TICKS : SIRC_TICKS;
 }
 
-/* The peripheral's own clock: source behind its divider 1 or 2; 0: none. */
+/* Period of a clock of the peripherals: a source after its divider 1 or 2; 0: there is no clock. */
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider)
 {
     const uint32_t ticks = source_ticks(emu, source);
@@ -113,7 +114,7 @@ static uint32_t selected(const emu_t *emu)
 }
 
 /* In high-speed run no clock may change by more than a factor of two at once. */
-static bool steps(uint32_t before, uint32_t after)
+static bool changes_too_much(uint32_t before, uint32_t after)
 {
     return after > 2U * before || before > 2U * after;
 }
@@ -131,7 +132,7 @@ static void core_update(emu_t *emu)
         const uint32_t ticks_per_ms = EMU_TICKS_PER_S / 1000U;
         emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core, ticks_per_ms / bus,
                  ticks_per_ms / flash, high ? "HSRUN" : "RUN");
-    } else if (high && steps(emu->s.core_ticks, core)) {
+    } else if (high && changes_too_much(emu->s.core_ticks, core)) {
         emu_fail(emu, "SCG: in HSRUN the core's clock changes by more than a factor of two");
     } else {
         emu_core_clock(emu, core);
@@ -234,7 +235,7 @@ void pcc_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
     }
 }
 
-/* ---- what only has to be there ---- */
+/* ---- modules of which only some registers are modelled, most without an effect ---- */
 
 bool pmc_models(uint32_t offset)
 {
@@ -289,7 +290,7 @@ void sim_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
     }
 }
 
-/* The cache: a command is done at once; hits and misses make no difference here. */
+/* The cache: a command completes at once; hits and misses are not modelled. */
 bool lmem_models(uint32_t offset)
 {
     return offset == 0U;

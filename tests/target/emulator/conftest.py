@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emulated inverter, built once; without the cross compiler there is nothing to emulate."""
+"""The emulated inverter, built once for all tests; without the cross compiler the tests are skipped."""
 
 import ctypes
 import subprocess
@@ -34,7 +34,7 @@ def resolver_parts() -> Parts:
 
 @pytest.fixture
 def drive(parts: Parts) -> Iterator[Loop]:
-    """At 3000 rpm, asked for nothing yet."""
+    """A drive at 3000 rpm, not enabled yet."""
     motor = parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
@@ -53,7 +53,8 @@ def library(parts: Parts) -> ctypes.CDLL:
 
 @pytest.fixture(scope="session")
 def program(here: Path, tmp_path_factory: pytest.TempPathFactory, parts: Parts) -> Program:
-    """Compiles programs/<name>.c with more flags, for memory at these addresses; answers the ELF file."""
+    """A function that compiles programs/<name>.c with additional flags, its data at these addresses; returns the ELF
+    file."""
     folder = tmp_path_factory.mktemp("programs")
 
     def compiled(name: str, *flags: str, data: int = 0x1FFF_8800, bss: int = 0x1FFF_8000) -> Path:

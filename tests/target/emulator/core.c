@@ -7,7 +7,7 @@
 #include "emu_private.h"
 
 enum {
-    FIRC_TICKS = 70, /* 48 MHz: what the core starts with */
+    FIRC_TICKS = 70, /* 48 MHz: the core's clock after reset */
     MMIO_BASE = 0x40000000,
     MMIO_SIZE = 0x100000,
     PPB_SIZE = 0x100000,
@@ -105,7 +105,8 @@ static void timer_fire(emu_t *emu)
     emu->s.event = NEVER;
 }
 
-/* In the order in which they are due; what a period's begin is followed by waits for the pins. */
+/* Fires the timers in the order in which they are due. At the start of a period the rest waits until emu_run() has
+ * returned and its caller has set the pins. */
 static void timers_fire(emu_t *emu)
 {
     while (!emu->s.centre && emu->s.due[timer_next(emu)] <= emu->s.now) {
@@ -124,7 +125,7 @@ static uint16_t count_instructions(const uint8_t *code, uint32_t size)
     return count;
 }
 
-/* An IT's mask: the lowest set bit ends it. */
+/* Number of instructions that an IT instruction makes conditional: the lowest set bit ends its mask. */
 static uint8_t conditional(const uint8_t it[2])
 {
     uint8_t slots = 0;
@@ -158,7 +159,7 @@ static bool must_stop(const state_t *s)
     return s->stop || s->now >= s->limit || s->reschedule || s->instructions >= s->break_at;
 }
 
-static bool masks_opened(emu_t *emu)
+static bool is_exception_unmasked(emu_t *emu)
 {
     if (emu->s.poll_masks && nvic_best(emu) >= 0) {
         emu->s.reschedule = true;
@@ -166,18 +167,18 @@ static bool masks_opened(emu_t *emu)
     return emu->s.reschedule;
 }
 
-/* A block (or, when counting, one instruction) is about to run; a stop from here comes before it. Nothing else stops
- * the core: from within an access it would repeat the instruction. */
+/* Called before a block (in counting mode: before an instruction) runs; a stop from here takes effect before it. Timers
+ * and interrupts stop the core only here, because a stop from within an access would repeat the instruction. */
 static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
 {
     emu_t *emu = user;
-    if (must_stop(&emu->s) || masks_opened(emu)) {
+    if (must_stop(&emu->s) || is_exception_unmasked(emu)) {
         (void)uc_emu_stop(uc);
         return;
     }
     const block_t block = block_at(emu, (uint32_t)address, size);
     if (block.idle) {
-        emu->s.now = emu->s.limit; /* waiting in a loop of one branch is sleeping */
+        emu->s.now = emu->s.limit; /* a branch to itself waits: the same as sleep */
         (void)uc_emu_stop(uc);
         return;
     }
@@ -188,7 +189,8 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
     emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
-/* There before every access to a peripheral, so that the program counter is exact when one is refused. */
+/* Because this hook exists, unicorn updates the program counter before every access to a peripheral. The message about
+ * a refused access can therefore state it exactly. */
 static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
     (void)uc, (void)type, (void)address, (void)size, (void)value, (void)user;
@@ -200,7 +202,7 @@ static bool on_unmapped(uc_engine *uc, uc_mem_type type, uint64_t address, int s
     const bool fetch = type == UC_MEM_FETCH_UNMAPPED || type == UC_MEM_FETCH_PROT;
     const bool write = type == UC_MEM_WRITE_UNMAPPED || type == UC_MEM_WRITE_PROT;
     const char *what = fetch ? "fetch" : write ? "write" : "read";
-    emu_fail(user, "%s of %d bytes at 0x%08x, where nothing is or may be changed", what, size, (uint32_t)address);
+    emu_fail(user, "%s of %d bytes at 0x%08x: no memory, or not permitted", what, size, (uint32_t)address);
     return false;
 }
 
@@ -222,7 +224,7 @@ static bool asleep(emu_t *emu)
     uint8_t code[2] = {0, 0};
     const uint32_t pc = emu_pc(emu);
     (void)uc_mem_read(emu->uc, pc - 2U, code, 2);
-    return code[0] == 0x30 && code[1] == 0xBF; /* wfi: unicorn stops behind it without a word */
+    return code[0] == 0x30 && code[1] == 0xBF; /* wfi: unicorn stops after it and gives no reason */
 }
 
 static void run_core(emu_t *emu)

@@ -55,7 +55,7 @@ const char *elf_read(elf_t *elf, const char *path)
     const long size = ftell(file);
     (void)fseek(file, 0, SEEK_SET);
     elf->size = size > 0 ? (size_t)size : 0U;
-    elf->image = calloc(1, elf->size + 4U); /* text at the end is ended */
+    elf->image = calloc(1, elf->size + 4U); /* zeros terminate a text at the end of the file */
     const bool whole = elf->image != NULL && fread(elf->image, 1, elf->size, file) == elf->size;
     (void)fclose(file);
     if (!whole) {
@@ -96,7 +96,7 @@ typedef struct {
     unsigned kind;
 } symbol_t;
 
-/* Walks the symbol table; index is the walk's own. */
+/* Reads the symbol table entry by entry; *index is the position, 0 for the first call. */
 static bool next_symbol(const elf_t *elf, uint32_t *index, symbol_t *symbol)
 {
     const uint32_t sections = word(elf, 32), count = half(elf, 48);

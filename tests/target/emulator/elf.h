@@ -2,7 +2,7 @@
 #ifndef EMULATOR_ELF_H
 #define EMULATOR_ELF_H
 /** A 32-bit little-endian ELF file for Arm: its loadable parts and symbols.
- * Errors   elf_read() answers NULL, or what is wrong with the file
+ * Errors   elf_read() returns NULL, or a text that says what is wrong with the file
  * Context  emulator only */
 #include <stddef.h>
 #include <stdint.h>
@@ -23,7 +23,7 @@ void elf_free(elf_t *elf);
 int elf_segment(const elf_t *elf, int index, elf_segment_t *segment);
 /** 0: no such symbol. */
 uint32_t elf_symbol(const elf_t *elf, const char *name, uint32_t *size);
-/** Name of the function around an address, "?" when there is none. */
+/** Name of the function that contains an address, "?" if there is none. */
 const char *elf_function(const elf_t *elf, uint32_t address, uint32_t *offset);
 
 #endif

@@ -2,8 +2,8 @@
 #ifndef EMULATOR_EMU_H
 #define EMULATOR_EMU_H
 /** An emulated S32K144 that runs an unmodified ELF file: a Cortex-M4F (unicorn) with register-level models of the
- * peripherals the firmware uses. Time advances by executed instructions (3/2 core cycles each: a
- * convention of the emulation, not a measurement) and by the peripherals' events; a sleeping core jumps to the next.
+ * peripherals that the firmware uses. Time advances by 3/2 core cycles with each executed instruction (a convention of
+ * the emulation, not a measurement), and from event to event of the peripherals while the core sleeps.
  * Source   docs/howto/emulate.md
  * Units    time in ticks of 1/3.36 GHz: every clock of the chip is a whole number of them
  * Errors   an access to a register that is not modelled or not clocked, a reserved bit, a fault of the core: the
@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 #define EMU_TICKS_PER_S 3360000000ULL
-/* The clocks are even numbers of ticks. */
+/* Exact in ticks, because the period of the core's clock is an even number of ticks at every frequency. */
 #define EMU_HALF_CYCLES_PER_INSTRUCTION 3U
 #define EMU_PWM_CHANNELS 6
 
@@ -27,45 +27,46 @@
 typedef struct emu emu_t;
 
 typedef enum { EMU_FAST = 0, EMU_COUNTING = 1 } emu_mode_t;
-/** The core stuck: it executes nothing, as in a loop with all interrupts masked. Halted: by a debugger. */
+/** Stuck: the core executes nothing, as in a loop with all interrupts masked. Halted: a debugger has stopped it. */
 typedef enum { EMU_RUNS = 0, EMU_STUCK = 1, EMU_HALTED = 2 } emu_core_state_t;
 typedef enum { EMU_LIMIT = 0, EMU_CENTRE = 1, EMU_BREAK = 2, EMU_FAILED = -1 } emu_stop_t;
 
-/** What the pins carry into the chip. */
+/** Inputs of the chip. */
 typedef struct {
     uint16_t adc[2][32]; /* 12-bit result of each converter's channel */
     uint32_t angle;      /* of the shaft, 2^32 = one turn */
-    int32_t angle_rate;  /* 2^-32 turns per tick, 2^16 = 1: the shaft turns on between two settings */
+    int32_t angle_rate;  /* speed of the shaft between two settings, in 2^-48 turns per tick */
     bool resolver_fault;
-    bool gate_fault; /* the gate driver pulls the fault input */
+    bool gate_fault; /* the gate driver pulls the fault input low */
 } emu_pins_t;
 
-/** What the pins of the bridge do: compare values that act in this period, as a share of it. */
+/** State of the bridge in this period; duty: the acting compare values as a share of the period. */
 typedef struct {
     double duty[3];
-    uint8_t driven; /* outputs that may switch on, one bit each, even ones the upper switches */
-    bool gates;     /* all six follow the timer, complementary */
+    uint8_t driven; /* outputs that may switch on, one bit each; the even ones are the upper switches */
+    bool gates;     /* switching is enabled: all six outputs, in complementary pairs */
     double dead_time_s;
     double period_s;
 } emu_bridge_t;
 
-/** NULL: error names why. EMU_COUNTING counts every instruction one by one and allows emu_break_after(). */
+/** NULL: failed, and error holds the reason. EMU_COUNTING counts the instructions one by one and allows
+ * emu_break_after(). */
 EMU_API emu_t *emu_create(const char *elf, int mode, char *error, size_t size);
 EMU_API void emu_destroy(emu_t *emu);
 
-/** To be written now: the shaft turns on from this instant. */
+/** The inputs, to be set by the caller at once: the shaft continues from the new angle at this instant. */
 EMU_API emu_pins_t *emu_pins(emu_t *emu);
 EMU_API const emu_pins_t *emu_pins_now(const emu_t *emu);
-/** Lines that do not belong to an instant. */
+/** Lines that may change at any time, not only at the start of a period. */
 EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 EMU_API uint32_t emu_outputs(const emu_t *emu);
 EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);
-/** The line that supplies the gate driver. */
+/** State of the line that switches the supply of the gate drivers. */
 EMU_API bool emu_gate_driver(const emu_t *emu);
 
-/** Runs for at most so many ticks; EMU_CENTRE: FTM0 has just begun a period, its buffered values are loaded, and the
- * triggers of this instant come with the next call. */
+/** Runs for at most this number of ticks. EMU_CENTRE: FTM0 has just begun a period and loaded its buffered values; the
+ * triggers of this instant follow with the next call, after the caller has set the pins. */
 EMU_API int emu_run(emu_t *emu, uint64_t ticks);
 EMU_API const char *emu_error(const emu_t *emu);
 EMU_API uint64_t emu_now(const emu_t *emu);
@@ -78,9 +79,10 @@ EMU_API bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t 
 EMU_API uint32_t emu_symbol(const emu_t *emu, const char *name);
 EMU_API uint32_t emu_symbol_size(const emu_t *emu, const char *name);
 
-/** What the program has last read from FTM0's (0) or FTM2's (1) counter, and the time before that. */
+/** The value that the program has read last from the counter of FTM0 (timer 0) or FTM2 (timer 1); before: the value
+ * that it read before that one. */
 EMU_API uint32_t emu_counter_read(const emu_t *emu, int timer, bool before);
-/** The angle that the resolver converter holds. */
+/** The angle that the resolver converter has latched. */
 EMU_API uint32_t emu_resolver_angle(const emu_t *emu);
 
 /** A register by name, "FTM0.MOD", without side effects; UINT64_MAX: no such register. */
@@ -97,8 +99,8 @@ EMU_API int emu_active_vector(const emu_t *emu);
 /** Makes an interrupt pending, as its peripheral would. */
 EMU_API void emu_pend(emu_t *emu, int vector);
 
-/** Instructions of one handler, what interrupted it left out, since creation or emu_counts_clear(). EMU_FAST counts
- * issued ones, by blocks; EMU_COUNTING leaves out the slots of IT instructions that are skipped. */
+/** Instructions of one handler, without those of handlers that interrupted it, since creation or emu_counts_clear().
+ * EMU_FAST counts whole blocks; EMU_COUNTING leaves out the instructions that an IT instruction skips. */
 typedef struct {
     uint64_t runs, sum;
     uint32_t least, most;
@@ -106,13 +108,13 @@ typedef struct {
 EMU_API emu_counts_t emu_counts(const emu_t *emu, int vector);
 EMU_API void emu_counts_clear(emu_t *emu);
 
-/** Everything but the program, in one piece. */
+/** A snapshot of everything but the program. */
 typedef struct emu_snapshot emu_snapshot_t;
 EMU_API emu_snapshot_t *emu_save(emu_t *emu);
 EMU_API void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot);
 EMU_API void emu_snapshot_free(emu_snapshot_t *snapshot);
 
-/** Counting mode: emu_run() answers EMU_BREAK before the instruction that many from now. */
+/** In counting mode: emu_run() returns EMU_BREAK after this number of further instructions. */
 EMU_API void emu_break_after(emu_t *emu, uint64_t instructions);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_EMU_PRIVATE_H
 #define EMULATOR_EMU_PRIVATE_H
-/** What the emulator's files share. All that changes while it runs is in state_t, which can be copied.
+/** Types and functions that the emulator's files share. All state but that of unicorn is in state_t.
  * Context  emulator only */
 #include <unicorn/unicorn.h>
 
@@ -44,13 +44,13 @@ typedef enum {
     TIMERS
 } timer_t_;
 
-/* ---- what changes ---- */
+/* ---- state, part of a snapshot ---- */
 typedef struct {
     uint32_t pending[VECTOR_WORDS], enabled[VECTOR_WORDS], line[VECTOR_WORDS];
     uint8_t priority[VECTORS];
     uint8_t active[NEST_MAX];
     uint64_t spent[NEST_MAX]; /* instructions of each active handler so far */
-    uint64_t resumed;         /* count of instructions when the innermost last began or went on */
+    uint64_t resumed;         /* count of instructions when the innermost handler began or was resumed */
     int nest;
     uint32_t vtor, aircr, scr, ccr, cpacr, fpccr, fpcar, shcsr, demcr, dwt_ctrl, cyccnt_offset;
     uint32_t systick_csr, systick_rvr;
@@ -61,25 +61,25 @@ typedef struct {
 typedef struct {
     bool running;
     uint64_t start;             /* when the counter was last at CNTIN */
-    uint32_t mod, cntin, cv[8]; /* that act; the registers are their buffers */
+    uint32_t mod, cntin, cv[8]; /* acting values; the registers are their buffers */
     bool software_trigger;
     uint32_t outmask;  /* acting */
-    bool triggers_due; /* the instant's triggers wait for the pins */
+    bool triggers_due; /* triggers of the period's start that wait until the pins are set */
     bool tof;
-    bool fault_input;                            /* behind the filter */
+    bool fault_input;                            /* after the filter */
     bool fault_latched, fault_seen, fault_holds; /* FAULTF; FMS was read while it was set; the outputs are off */
-    uint64_t stopped_at;                         /* by a debugger, 0: not */
-    bool closed;                                 /* the bridge, at the last check */
+    uint64_t stopped_at;                         /* when a debugger halted the counter, 0: it is not halted */
+    bool switching;                              /* switching was enabled at the last check */
     uint32_t quad_offset;
-    uint32_t read[2]; /* the counter as the program has read it last, and before that */
+    uint32_t read[2]; /* the values of the counter that the program has read last and before that */
 } ftm_t;
 
 typedef struct {
     bool running;
     uint64_t start;
-    uint32_t mod, idly, dly[8]; /* that act: loaded by LDOK */
-    uint64_t due[8];            /* trigger outputs to come */
-    uint32_t locked;            /* pre-triggers whose conversion has not risen COCO */
+    uint32_t mod, idly, dly[8]; /* acting values, loaded by LDOK */
+    uint64_t due[8];            /* when each trigger output is due */
+    uint32_t locked;            /* pre-triggers whose conversion has not set COCO yet */
 } pdb_t;
 
 typedef struct {
@@ -105,20 +105,20 @@ typedef struct {
 typedef struct {
     uint32_t latched;             /* angle at the last SAMPLE */
     uint8_t fault, sampled_fault; /* kept until it has been read in configuration mode and SAMPLE falls again */
-    bool read, high;              /* the fault register so; SAMPLE while software holds it */
+    bool read, high;              /* the fault register was read; level of SAMPLE while software sets it */
     uint8_t address;
 } rdc_t;
 
 typedef struct {
     bool unlocked, configured;
     uint64_t start;
-    uint64_t unlock_end; /* of the time for writing after an unlock */
-    uint64_t acts_from;  /* the written configuration, then CS.RCS is set */
+    uint64_t unlock_end; /* until then registers may be written after an unlock */
+    uint64_t acts_from;  /* from then on the written configuration acts and CS.RCS is set */
 } wdog_t;
 
 typedef struct {
     uint64_t now, limit, due[TIMERS];
-    uint64_t event; /* when the event under way was due, NEVER: none is */
+    uint64_t event; /* when the event that is being handled was due, NEVER: there is none */
     uint64_t instructions, break_at;
     uint32_t value[PERIPHERALS_MAX][REGISTERS_MAX];
     nvic_t nvic;
@@ -129,24 +129,24 @@ typedef struct {
     spi_t spi[3];
     rdc_t rdc;
     wdog_t wdog;
-    uint64_t lpit_ready; /* the timer takes its registers from here on */
+    uint64_t lpit_ready; /* from then on the registers of LPIT0 may be written */
     uint32_t core_ticks; /* per core cycle */
     uint32_t pc, resets, reset_cause;
     bool centre, reset_wanted, poll_masks, reschedule, stop;
-    bool halted, stuck; /* by a debugger; executing nothing while everything else goes on */
+    bool halted, stuck; /* emu_core_state_t: in both the core executes nothing while the peripherals continue */
     uint32_t exc_return;
     emu_pins_t pins;
     uint64_t pins_set_at;
 } state_t;
 
-/* ---- what does not ---- */
+/* ---- not part of a snapshot ---- */
 typedef struct peripheral peripheral_t;
 struct peripheral {
     const char *name;
     bool (*models)(uint32_t offset);
-    /** NULL: what is stored. */
+    /** The value that a read returns; stored: content of the register. */
     uint32_t (*read)(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored);
-    /** After the store; value: as written, reserved and read-only bits included. */
+    /** Called after the store. value: as written, including reserved and read-only bits. */
     void (*written)(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value);
     uint16_t gate; /* offset in PCC, 0: always clocked */
     uint8_t instance;
@@ -156,10 +156,10 @@ struct peripheral {
 typedef struct {
     uint16_t size, count;
     bool idle;           /* a branch to itself */
-    uint8_t conditional; /* instructions behind one IT */
+    uint8_t conditional; /* instructions that an IT makes conditional */
 } block_t;
 
-enum { THUMB_32BIT = 0xE8 }; /* the second byte of a longer instruction is at least this */
+enum { THUMB_32BIT = 0xE8 }; /* the second byte of a 32-bit instruction is at least this */
 
 typedef struct profile profile_t;
 
@@ -190,7 +190,8 @@ struct emu_snapshot {
 void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));
 uint32_t emu_pc(const emu_t *emu);
 void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);
-/** What an event sets going begins when it was due, not when the core's instruction was over: no timer drifts. */
+/** The time at which the event that is being handled was due; without an event, now. What an event starts begins at
+ * that time, not at the end of the core's instruction, so that no timer drifts. */
 uint64_t emu_instant(const emu_t *emu);
 void emu_reset(emu_t *emu, uint32_t cause);
 void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle);
@@ -246,7 +247,7 @@ void lpit_fire(emu_t *emu, int channel);
 void wdog_fire(emu_t *emu);
 void can_fire(emu_t *emu);
 void trgmux_event(emu_t *emu, uint32_t source);
-/** An error unless every pin of the peripheral is multiplexed to it. */
+/** Stops the emulation unless every pin of the peripheral is multiplexed to it. */
 void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);

@@ -23,14 +23,15 @@ static uint16_t to_count(double share, unsigned bits)
     return (uint16_t)fmin(fmax(floor(share * (top + 1.0) + 0.5), 0.0), top);
 }
 
-/* A 3435 K thermistor below its own 25-degree resistance, hal/s32k144/ntc.h. */
+/* An NTC of B = 3435 K with a pull-up equal to its resistance at 25 degrees Celsius, hal/s32k144/ntc.h. */
 static uint16_t ntc_count(double celsius)
 {
     const double r = exp(3435.0 * (1.0 / (celsius + 273.15) - 1.0 / 298.15));
     return to_count(r / (1.0 + r), 12);
 }
 
-/* The sensor on the die: 740.5 mV at 25 degrees, 1.564 mV less for each kelvin, of 5 V, hal/s32k144/die.h. */
+/* The sensor on the die: 740.5 mV at 25 degrees Celsius, 1.564 mV less for each kelvin; the reference is 5 V
+ * (hal/s32k144/die.h). */
 static uint16_t die_count(double celsius)
 {
     return to_count((0.7405 - 0.001564 * (celsius - 25.0)) / 5.0, 12);
@@ -42,7 +43,7 @@ static uint32_t angle_of(double rad)
     return (uint32_t)(uint64_t)((turns - floor(turns)) * ANGLE_ONE);
 }
 
-/* The shaft goes on as fast as it came here since the last sample. */
+/* Until the next sample the shaft turns at the mean speed of the last period. */
 static void angle_to_pins(emulated_t *e, emu_pins_t *pins, uint32_t angle)
 {
     const int32_t moved = (int32_t)(angle - pins->angle);
@@ -184,7 +185,7 @@ double emulated_get(emulated_t *e, const char *name)
 
 static double get(const void *self, const char *name)
 {
-    emulated_t *e = (emulated_t *)(uintptr_t)self; /* the mirror is a cache */
+    emulated_t *e = (emulated_t *)(uintptr_t)self; /* reading may update the mirror */
     return strncmp(name, "emulator.", 9) == 0 ? emulated_get(e, name) : mirror_get(&e->mirror, name);
 }
 
@@ -199,14 +200,14 @@ static void destroy(void *self)
     free(e);
 }
 
-/* From reset until the PWM runs, with the shaft at its zero and no current. */
+/* Runs from reset until the PWM starts, with the shaft at angle zero and no current. */
 static const char *boot(emulated_t *e)
 {
-    const double still[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
+    const double at_rest[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
     e->inverter_C = 40.0;
     e->processor_C = 60.0;
     e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
-    samples_to_pins(e, still);
+    samples_to_pins(e, at_rest);
     const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));
     if (stopped == EMU_FAILED) {
         return emu_error(e->emu);

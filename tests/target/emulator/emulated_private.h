@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_EMULATED_PRIVATE_H
 #define EMULATOR_EMULATED_PRIVATE_H
-/** What the emulated controller and its shadow on the host share.
+/** Types and functions that the emulated controller and its shadow on the host share.
  * Context  emulator only */
 #include "emu.h"
 #include "mirror.h"
@@ -13,18 +13,18 @@ typedef struct {
     double period_ticks;
     uint64_t steps;
     double inverter_C, processor_C;
-    bool board;          /* the image's lines act: contactor, precharge, discharge, supply of the gates */
-    fluxtrue_t *shadow;  /* NULL: not followed */
-    drive_t task_result; /* of the shadow's task, while the image is still at it */
+    bool board;          /* the image's outputs control contactor, precharge, discharge and gate-driver supply */
+    fluxtrue_t *shadow;  /* NULL: there is none */
+    drive_t task_result; /* result of the shadow's task, while the image's task still runs */
     bool task_runs;
-    bool gate_fault; /* its interrupt has come, the next fast ISR tells the shadow */
+    bool gate_fault; /* the fault interrupt has run; the shadow's next fast ISR raises the fault */
     uint64_t compared, differing;
     char difference[96];
 } emulated_t;
 
 double emulated_get(emulated_t *e, const char *name);
 
-/** What the image makes of the thermistors, for a drive on the host. */
+/** Gives a drive on the host the temperatures that the image computes from the thermistors. */
 void temperatures_take(const emulated_t *e, fluxtrue_t *host);
 
 bool shadow_start(emulated_t *e);

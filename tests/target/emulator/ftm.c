@@ -86,7 +86,7 @@ uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
 }
 
-/* The counter is at CNTIN and runs: emu_run() returns, so that the pins can be given this instant's values. */
+/* The counter starts a period at CNTIN: emu_run() returns, so that its caller can set the pins for this instant. */
 static void period_begins(emu_t *emu, const peripheral_t *self)
 {
     if (self->instance == 0) {
@@ -153,7 +153,7 @@ static void mode_written(emu_t *emu, const peripheral_t *self, uint32_t value)
     }
 }
 
-/* WPDIS is its negation. */
+/* Writing WPEN = 1 clears WPDIS, which is its negation. */
 static void protection_written(emu_t *emu, const peripheral_t *self, uint32_t value)
 {
     if ((value & 0x40U) != 0) {
@@ -193,7 +193,7 @@ static void check_protection(emu_t *emu, const peripheral_t *self, uint32_t offs
     }
 }
 
-/* SAMPLE of the resolver converter is channel 6: low from the period's start to C6V, high from there on. */
+/* Channel 6 is SAMPLE of the resolver converter. True if it falls at the period's start: low up to C6V, then high. */
 static bool sample_falls(const emu_t *emu)
 {
     const peripheral_t *self = ftm0();
@@ -203,7 +203,7 @@ static bool sample_falls(const emu_t *emu)
            f->cv[6] > f->cntin && f->cv[7] > f->mod;
 }
 
-/* While software holds the line: what it is held at. */
+/* Software sets the level of SAMPLE; a falling level samples the resolver. */
 static void sample_held(emu_t *emu, uint32_t forced)
 {
     const bool high = (forced >> 6 & 1U) != 0 && (forced >> 14 & 1U) != 0;
@@ -213,7 +213,7 @@ static void sample_held(emu_t *emu, uint32_t forced)
     emu->s.rdc.high = high;
 }
 
-static void act(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t value)
+static void apply_write(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t value)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
     if (offset == SC) {
@@ -262,7 +262,7 @@ void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
 {
     const bool ran = emu->s.ftm[self->instance].running;
     check_protection(emu, self, offset, old, value);
-    act(emu, self, offset, value);
+    apply_write(emu, self, offset, value);
     if (self->instance == 0 && sets_fault_control(offset)) {
         ftm_fault_written(emu, offset, value);
     }
@@ -274,7 +274,8 @@ void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
 
 /* ---- events ---- */
 
-/* The hardware trigger that TRGMUX gives to FTM0, from its own start: with HWOM it takes over the output mask. */
+/* FTM0's hardware trigger is its own initialisation trigger, if TRGMUX connects it. With HWOM it loads the output
+ * mask. */
 static void hardware_trigger(emu_t *emu)
 {
     const peripheral_t *self = ftm0();
@@ -294,7 +295,7 @@ static void hardware_trigger(emu_t *emu)
     }
 }
 
-/* The counter goes from MOD to CNTIN: the loading point (SYNC.CNTMAX), and the period's begin. */
+/* The counter goes from MOD to CNTIN: the loading point (SYNC.CNTMAX) and the start of the period. */
 void ftm_fire(emu_t *emu, int instance)
 {
     const peripheral_t *self = of(instance);
@@ -318,7 +319,7 @@ void ftm_fire(emu_t *emu, int instance)
     }
 }
 
-/* What the period's begin sets off outside, once the pins carry this instant's values. */
+/* The effects of the period's start on other modules, after the pins have been set for this instant. */
 void ftm_triggers(emu_t *emu)
 {
     ftm_fault_input(emu);
@@ -336,7 +337,7 @@ void ftm_triggers(emu_t *emu)
     emu->s.event = NEVER;
 }
 
-/* The core is halted by a debugger, or goes on: BDMMODE 3 lets the counter run. */
+/* A debugger has halted the core, or lets it continue. With BDMMODE 3 the counter runs on meanwhile. */
 void ftm_debug(emu_t *emu, bool halted)
 {
     ftm_t *f = &emu->s.ftm[0];

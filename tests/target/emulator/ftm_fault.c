@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* FTM0's fault control: from the pin to the outputs without the core.
  *
- * The pin is pulled down by the gate driver's fault. Synchroniser and filter take 3 cycles of the timer's clock without
- * the filter and 4 + FFVAL (FLTPS + 1) with it; a shorter pulse is ignored. The edge behind them sets FAULTF.
+ * A fault of the gate driver pulls the pin low. The delay of the input is 3 cycles of the timer's clock without the
+ * filter and 4 + FFVAL (FLTPS + 1) with it; a shorter pulse is ignored. The edge after the filter sets FAULTF.
  *
  * documented behaviour                                 | modelled | test
  * ---------------------------------------------------- | -------- | --------------------------------------------
@@ -72,7 +72,8 @@ static uint64_t filter_ticks(const emu_t *emu)
     return (uint64_t)(filtered ? FILTER_CYCLES + value * prescaler : NO_FILTER_CYCLES) * emu->s.core_ticks;
 }
 
-/* The pin or its settings have changed: what differs from the filter's output arrives there after the delay. */
+/* The pin or its settings have changed: a level that differs from the filter's output reaches it after the delay,
+ * unless the level changes back before. */
 void ftm_fault_input(emu_t *emu)
 {
     ftm_t *f = &emu->s.ftm[0];
@@ -108,7 +109,7 @@ static void settings_check(emu_t *emu, uint32_t offset, uint32_t value)
     }
 }
 
-/* FAULTF falls when it has been read as 1 and is then written 0 while the input is quiet. */
+/* FAULTF is cleared if it has been read as 1 and is then written 0 while the input is inactive. */
 static void status_written(emu_t *emu, uint32_t value)
 {
     ftm_t *f = &emu->s.ftm[0];
@@ -128,7 +129,7 @@ void ftm_fault_written(emu_t *emu, uint32_t offset, uint32_t value)
     ftm_fault_input(emu);
 }
 
-/* Outputs that a fault has switched off come back with a period, never in its middle. */
+/* Outputs that a fault has switched off return only at the start of a period. */
 void ftm_fault_period(emu_t *emu)
 {
     ftm_t *f = &emu->s.ftm[0];

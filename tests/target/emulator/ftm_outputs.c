@@ -3,13 +3,13 @@
  *
  * documented behaviour                              | modelled | test
  * ------------------------------------------------- | -------- | --------------------------------------------
- * PWMEN and ELSB:ELSA let a channel drive its pin   | yes      | test_an_output_wants_its_enable_and_its_edge
+ * PWMEN and ELSB:ELSA let a channel drive its pin   | yes      | test_an_output_requires_its_enable_and_its_edge
  * OUTMASK: inactive; SWOCTRL: forced low            | yes      | test_mask_and_software_control_switch_off
- * a fault acts behind all of these                  | yes      | test_the_fault_mode_chooses_the_channels
+ * a fault overrides all of these                    | yes      | test_the_fault_mode_chooses_the_channels
  * COMBINE, COMP, DTEN: complementary with dead time | yes      | test_the_timer_is_set_up_as_the_motor_file_says
  * BDMMODE: outputs while the core is halted         | yes      | test_a_halted_core_leaves_outputs_as_bdmmode_says
  * SWOCTRL forcing high; POL: active low             | refused  | test_other_output_settings_are_refused
- * only some outputs drive                           | refused  | test_a_bridge_that_drives_in_part_is_refused
+ * only some outputs may switch on                   | refused  | test_a_bridge_with_only_some_outputs_on_is_refused
  * a pair without COMBINE, COMP, DTEN                | refused  | test_a_pair_without_dead_time_is_refused
  */
 #include "ftm_private.h"
@@ -70,7 +70,7 @@ void emu_bridge(const emu_t *emu, emu_bridge_t *bridge)
     bridge->period_s = (double)(f->mod - f->cntin + 1U) * clock_s(emu);
 }
 
-/* The plant takes one state of the bridge per period: it may open within one, but not close. */
+/* The plant takes one state of the bridge per period: within a period switching may be disabled, but not enabled. */
 void ftm_outputs_check(emu_t *emu, bool period_begins)
 {
     emu_bridge_t now;
@@ -79,10 +79,10 @@ void ftm_outputs_check(emu_t *emu, bool period_begins)
         emu_fail(emu, "FTM0 drives the outputs 0x%02x of 0x3f, or a pair without COMBINE, COMP and DTEN",
                  (unsigned)now.driven);
     }
-    if (now.gates && !emu->s.ftm[0].closed && !period_begins) {
-        emu_fail(emu, "FTM0: the bridge closes in the middle of a period");
+    if (now.gates && !emu->s.ftm[0].switching && !period_begins) {
+        emu_fail(emu, "FTM0: switching is enabled in the middle of a period");
     }
-    emu->s.ftm[0].closed = now.gates;
+    emu->s.ftm[0].switching = now.gates;
 }
 
 void ftm_outputs_written(emu_t *emu, uint32_t offset, uint32_t value)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_FTM_PRIVATE_H
 #define EMULATOR_FTM_PRIVATE_H
-/** What the files of the FlexTimer's model share: registers, and FTM0's fault control and outputs.
+/** Definitions that the files of the FlexTimer's model share: registers, FTM0's fault control and outputs.
  * Context  emulator only */
 #include "emu_private.h"
 
@@ -53,7 +53,8 @@ uint32_t ftm_fault_channels(const emu_t *emu);
 
 /** ftm_outputs.c. Outputs 0 ... 5 that may switch on in this period. */
 uint32_t ftm_driven(const emu_t *emu);
-/** Errors unless a plant can be given the bridge's state: all outputs or none, and none closes within a period. */
+/** Stops the emulation in states that the plant cannot represent: only some outputs on, or switching enabled within a
+ * period. */
 void ftm_outputs_check(emu_t *emu, bool period_begins);
 void ftm_outputs_written(emu_t *emu, uint32_t offset, uint32_t value);
 

@@ -6,8 +6,8 @@
  * Source   drive/drive.h
  * Context  emulator only */
 
-/* What the outside writes, and what calibration changes; the first ones the image writes, too: the request, and the
- * dead-time compensation that its task trims, with the complements of the parameters. */
+/* The request and the calibration. The image itself writes the first LAYOUT_TRIMMED of them as well: the request, and
+ * the dead-time compensation that its task trims, with the complements that belong to both. */
 #define LAYOUT_TRIMMED 4
 #define LAYOUT_INPUTS(X) \
     X(request)                \
@@ -18,7 +18,7 @@
     X(parameters.mrai)        \
     X(parameters.torque_loop)
 
-/* What the activities write. */
+/* The state that the activities write. */
 #define LAYOUT_STATE(X) \
     X(fast)             \
     X(psi_d_error)      \

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame arrives when its bits have been
- * clocked; what the converter answers is fixed when the frame begins.
+/* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame is received when all its bits have
+ * been clocked; the converter's answer is determined when the frame begins.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
  * master, single frames, FIFOs of four words         | yes      | test_a_frame_arrives_when_its_bits_have_been_clocked
  * frame time from CCR, prescaler and clock           | yes      | test_a_frame_arrives_when_its_bits_have_been_clocked
- * an empty receive FIFO, a full one                  | refused  | test_a_missing_word_and_one_too_many_are_refused
+ * a read of an empty receive FIFO                    | refused  | test_reading_an_empty_fifo_is_refused
+ * a frame with a full receive FIFO                   | refused  | test_a_frame_with_a_full_fifo_is_refused
  * interrupts, DMA, continuous and wide transfers     | refused  | test_other_transfer_modes_are_refused
  * AD2S1210: position latched by SAMPLE               | yes      | test_a_resolver_image_computes_the_same_bits
  * AD2S1210: faults kept until read and sampled again | yes      | test_a_fault_of_the_resolver_raises_the_angle_fault
@@ -127,19 +128,19 @@ void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
     } else if ((offset == IER || offset == DER) && value != 0) {
         emu_fail(emu, "write of %s offset 0x%x: interrupts and DMA are not modelled", self->name, offset);
     } else if (offset == TCR && (value & 0x00FF0000U) != 0) {
-        emu_fail(emu, "write of %s.TCR: only single frames of one wire, most significant bit first", self->name);
+        emu_fail(emu, "write of %s.TCR: only single frames on one wire, most significant bit first", self->name);
     }
 }
 
 /* ---- the converter at LPSPI0 ---- */
 
-/* Its fault register starts with what was missing while it was powered up: signals and tracking. */
+/* After power-up the fault register reports loss of signal and loss of tracking, from the time without signals. */
 void rdc_power_on(emu_t *emu)
 {
     emu->s.rdc.fault = 0x48;
 }
 
-/* SAMPLE falls: position and faults are taken over; faults that have been read are cleared, unless they persist. */
+/* SAMPLE falls: position and faults are latched; faults that have been read are cleared, unless they persist. */
 void rdc_sample(emu_t *emu)
 {
     rdc_t *rdc = &emu->s.rdc;
@@ -150,7 +151,8 @@ void rdc_sample(emu_t *emu)
     rdc->sampled_fault = rdc->fault;
 }
 
-/* Configuration mode, eight bits each: first an address, then what is there. Only the fault register is modelled. */
+/* Configuration mode, frames of eight bits: an address, then the content of that register. Only the fault register is
+ * modelled. */
 static uint32_t rdc_configure(emu_t *emu, uint32_t sent, uint32_t bits)
 {
     rdc_t *rdc = &emu->s.rdc;

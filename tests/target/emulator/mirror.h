@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_MIRROR_H
 #define EMULATOR_MIRROR_H
-/** The drive in the emulated memory, seen through the names of the software-in-the-loop library: a drive_t on the
- * host is kept equal to the one in the image, part by part, and fluxtrue_get(), fluxtrue_set() work on it. Setting
- * writes the request (or calibration) into the image's memory, as a debugger would: no CAN command is needed.
+/** Access to the drive in the emulated memory by the names of the software-in-the-loop library: a drive_t on the host
+ * is kept equal to the one in the image, part by part, and fluxtrue_get() and fluxtrue_set() work on it. Setting writes
+ * the request (or the calibration) into the image's memory, as a debugger would: no CAN command is needed.
  * Source   layout.h
- * Errors   mirror_open() answers NULL or what is wrong
+ * Errors   mirror_open() returns NULL, or a text that says what is wrong
  * Context  emulator only; between two runs */
 #include "emu.h"
 #include "hal/host/instance.h"
@@ -14,7 +14,7 @@ enum { MIRROR_PARTS_MAX = 16 };
 
 typedef struct {
     const char *name;
-    uint32_t here, there, size;
+    uint32_t host_offset, image_offset, size;
 } mirror_part_t;
 
 typedef struct {
@@ -29,12 +29,12 @@ typedef struct {
 
 const char *mirror_open(mirror_t *mirror, emu_t *emu, const char *layout_file);
 void mirror_close(mirror_t *mirror);
-/** True when the image's calibration is the one compiled in here: it was built for the same motor. */
+/** True if the image has the calibration of this library, that is, if both were built for the same motor. */
 bool mirror_same_motor(mirror_t *mirror);
-/** A copy whose bytes between the fields are 0. */
+/** A copy whose padding bytes are 0. */
 drive_t drive_plain(const drive_t *drive);
 void mirror_pull(mirror_t *mirror);
-/** Takes effect with the next mirror_push(), which waits until no activity is under way: it reads some inputs late. */
+/** Takes effect with the next mirror_push() at which no activity is running: an activity reads some inputs late. */
 int mirror_set(mirror_t *mirror, const char *name, double value);
 /** True when something has been written into the image's memory. */
 bool mirror_push(mirror_t *mirror);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Exceptions: what is pending, what may interrupt what, entry and return. Every active exception has its frame on the
- * stack; registers of the floating-point unit are stacked at once, never lazily.
+/* Exceptions: pending state, priorities, entry and return. Every active exception has its frame on the stack; registers
+ * of the floating-point unit are stacked at once, never lazily.
  *
  * documented behaviour                             | modelled | test
  * ------------------------------------------------ | -------- | --------------------------------------------
  * priorities, groups, nesting, PRIMASK, BASEPRI    | yes      | test_qemu_takes_the_same_exceptions
- * what is pended under a mask comes when it opens  | yes      | test_qemu_takes_the_same_exceptions
+ * pended while masked: taken when unmasked         | yes      | test_qemu_takes_the_same_exceptions
  * stacking, alignment, floating-point registers    | yes      | test_exceptions_nest_by_priority
- * a level that stands pends again after the return | yes      | test_a_level_that_stands_interrupts_again
+ * an active level pends again after the return     | yes      | test_a_level_that_stays_active_interrupts_again
  * sleep, wake-up                                   | yes      | test_a_sleeping_core_is_woken_by_each_tick
  * a vector without a handler                       | refused  | test_what_is_not_modelled_is_an_error
  * MPU, faults as exceptions                        | refused  | test_what_is_not_modelled_is_an_error
@@ -25,7 +25,7 @@ enum {
     EXTENDED_WORDS = 26,
     FPCA = 4,
     SPSEL = 2,
-    SFPA = 8, /* unicorn's core has it, and without it takes the context for a new one: FPSCR would be lost */
+    SFPA = 8, /* unicorn's core implements it; without it the context counts as a new one, and FPSCR would be lost */
     LOWEST = 256,
     XPSR_ALIGNED = 1 << 9,
     XPSR_VECTOR = 0x1FF,
@@ -66,7 +66,7 @@ static void bit_set(uint32_t *set, int vector, bool on)
     set[vector / 32] = on ? set[vector / 32] | mask : set[vector / 32] & ~mask;
 }
 
-/* Group priority: below AIRCR.PRIGROUP nothing preempts. */
+/* Group priority: the priority without the bits below AIRCR.PRIGROUP, which do not preempt. */
 static int priority_of(const nvic_t *n, int vector)
 {
     if (vector == NMI || vector == HARD_FAULT) {
@@ -80,7 +80,7 @@ static bool enabled(const nvic_t *n, int vector)
     return vector < 16 || bit(n->enabled, vector);
 }
 
-/* With its lower part, by which exceptions of one group are ordered. */
+/* Group priority and subpriority, which orders the pending exceptions of one group. */
 static int whole_priority(const nvic_t *n, int vector)
 {
     return vector == NMI || vector == HARD_FAULT ? priority_of(n, vector) : n->priority[vector];
@@ -126,7 +126,7 @@ static int masked_priority(const emu_t *emu, int priority)
     return basepri != 0 && basepri < priority ? basepri : priority;
 }
 
-/* What may be taken now; -1: nothing. */
+/* The exception that may be taken now; -1: none. */
 int nvic_best(const emu_t *emu)
 {
     const int vector = first_pending(&emu->s.nvic);
@@ -137,8 +137,8 @@ int nvic_best(const emu_t *emu)
     return priority < current && priority < masked_priority(emu, current) ? vector : -1;
 }
 
-/* Something is pending that is more urgent than what runs: taken at once, or, while it is masked, as soon as the masks
- * open, for which nvic_take() has them polled. */
+/* A pending exception of higher priority than the running code is taken at once. While it is masked, nvic_take() lets
+ * the core poll the masks, so that it is taken as soon as it is unmasked. */
 void nvic_reconsider(emu_t *emu)
 {
     const int vector = first_pending(&emu->s.nvic);
@@ -167,7 +167,7 @@ static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uin
     if (uc_mem_write(emu->uc, address, words, (size_t)4U * count) == UC_ERR_OK) {
         return true;
     }
-    emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", address);
+    emu_fail(emu, "the stack is outside the memory: exception frame at 0x%08x", address);
     return false;
 }
 
@@ -208,7 +208,7 @@ static bool unsupported(emu_t *emu)
     return false;
 }
 
-/* The innermost handler is left, for good or for one that interrupts it. */
+/* Adds the instructions since the last call to the innermost handler, which returns or is interrupted now. */
 static void account(emu_t *emu)
 {
     nvic_t *n = &emu->s.nvic;
@@ -279,7 +279,7 @@ static bool pop_frame(emu_t *emu, bool extended)
     uint32_t frame[EXTENDED_WORDS];
     const uint32_t words = extended ? EXTENDED_WORDS : FRAME_WORDS, sp = get(emu, UC_ARM_REG_SP);
     if (uc_mem_read(emu->uc, sp, frame, (size_t)4U * words) != UC_ERR_OK) {
-        emu_fail(emu, "the stack left the memory: exception frame at 0x%08x", sp);
+        emu_fail(emu, "the stack is outside the memory: exception frame at 0x%08x", sp);
         return false;
     }
     put(emu, UC_ARM_REG_IPSR, frame[7] & XPSR_VECTOR);
@@ -314,7 +314,7 @@ void nvic_return(emu_t *emu)
         return;
     }
     if (bit(n->line, vector)) {
-        bit_set(n->pending, vector, true); /* its cause still stands */
+        bit_set(n->pending, vector, true); /* its cause is still active */
     }
     emu->s.now += 10ULL * emu->s.core_ticks;
     if (emu->profile != NULL) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Programmable delay block: from one trigger to the converter's pre-triggers. Channel 0 only.
+/* Programmable delay block: a trigger starts the converter's pre-triggers, each after its delay. Channel 0 only.
  *
  * A pre-trigger that starts a conversion takes a lock; while any lock of the channel is held, a further pre-trigger
  * starts nothing and sets its sequence error. A lock is released when the conversion's COCO rises, when the
@@ -10,10 +10,10 @@
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | ---------------------------------------------------
  * counter, MULT, PRESCALER, delays up to MOD         | yes      | test_a_delay_counts_from_the_trigger
- * a delay beyond MOD never comes                     | yes      | test_a_delay_beyond_the_modulus_never_comes
+ * a delay beyond MOD never triggers                  | yes      | test_a_delay_beyond_the_modulus_never_triggers
  * registers act after LDOK (LDMOD 0)                 | yes      | test_a_delay_acts_only_after_it_was_loaded
  * pre-trigger 2 cycles after its cause, trigger 3    | yes      | test_a_delay_counts_from_the_trigger
- * back-to-back follows the rise of COCO before it    | yes      | test_back_to_back_conversions_follow_at_once
+ * back-to-back: starts when the COCO before it rises | yes      | test_back_to_back_conversions_follow_at_once
  * lock until COCO rises; sequence error meanwhile    | yes      | test_an_unread_result_stops_the_sequence
  * disabling PDB or pre-trigger releases locks        | yes      | test_disabling_releases_the_locks
  * sequence error interrupt, flags cleared by zeros   | yes      | test_a_sequence_error_interrupts_until_it_is_cleared
@@ -76,7 +76,7 @@ uint32_t pdb_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     const pdb_t *p = &emu->s.pdb[self->instance];
     if (offset == CNT) {
         const uint64_t counted = p->running ? (emu->s.now - p->start) / clock_ticks(emu, self) : 0U;
-        return counted <= p->mod ? (uint32_t)counted : 0U; /* one shot: back to zero behind MOD */
+        return counted <= p->mod ? (uint32_t)counted : 0U; /* one shot: the counter returns to zero after MOD */
     }
     return stored;
 }
@@ -97,7 +97,7 @@ static void load(emu_t *emu, const peripheral_t *self)
     }
 }
 
-/* The earliest trigger output that is due; NEVER: none is left. */
+/* When the next trigger output is due; NEVER: none is left. */
 static uint64_t next_due(const pdb_t *p, uint32_t *which)
 {
     uint64_t next = NEVER;
@@ -116,7 +116,7 @@ static void arm(emu_t *emu, int instance)
     emu_timer(emu, instance == 0 ? TIMER_PDB0 : TIMER_PDB1, next_due(&emu->s.pdb[instance], &which));
 }
 
-/* Disabled pre-triggers neither fire nor hold a lock; without PDBEN that is all of them. */
+/* Disabled pre-triggers neither start conversions nor hold a lock; without PDBEN all of them are disabled. */
 static void disable(emu_t *emu, const peripheral_t *self, uint32_t pretriggers)
 {
     pdb_t *p = &emu->s.pdb[self->instance];
@@ -153,7 +153,7 @@ static void control_written(emu_t *emu, const peripheral_t *self, uint32_t value
 void pdb_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     if (offset == S) {
-        bus_put(emu, self, S, old & value); /* flags fall when written 0 */
+        bus_put(emu, self, S, old & value); /* writing 0 clears a flag */
         line_update(emu, self);
     } else if (offset == C1) {
         disable(emu, self, ~value & ERRORS);
@@ -210,7 +210,7 @@ void pdb_fire(emu_t *emu, int instance)
     arm(emu, instance);
 }
 
-/* COCO has risen: the lock is released, and the pre-trigger behind it follows if it waits for that. */
+/* COCO has risen: the lock is released, and the next pre-trigger follows if it is in back-to-back mode. */
 void pdb_acknowledge(emu_t *emu, int instance, int channel)
 {
     const peripheral_t *self = of(instance);

@@ -3,13 +3,14 @@
  *
  * documented behaviour                       | modelled | test
  * ------------------------------------------ | -------- | --------------------------------------------
- * PORT: multiplexing, which peripherals need | refused  | test_what_is_not_modelled_is_an_error
- * PORT: lock; interrupts of pins             | refused  | test_a_locked_pin_and_pin_interrupts_are_refused
+ * PORT: pin functions that peripherals need  | refused  | test_what_is_not_modelled_is_an_error
+ * PORT: lock                                 | refused  | test_writing_a_locked_pin_is_refused
+ * PORT: interrupts of pins                   | refused  | test_pin_interrupts_are_refused
  * PORT: GPCLR, GPCHR                         | yes      | test_many_pins_are_set_at_once
  * GPIO: set, clear, toggle                   | yes      | test_lines_are_set_cleared_and_toggled
  * GPIO: a line that is no output             | refused  | test_what_is_not_modelled_is_an_error
  * TRGMUX: source of PDB0, PDB1, FTM0; lock   | refused  | test_a_locked_trigger_keeps_its_source
- * TRGMUX: every other target                 | refused  | test_a_locked_trigger_keeps_its_source
+ * TRGMUX: every other target                 | refused  | test_other_trigger_targets_are_refused
  * GPIO: levels from outside                  | no       | -
  */
 #include <string.h>
@@ -33,7 +34,7 @@ enum {
 };
 #define LOCK (1U << 31)
 
-/* Which function of which pin a peripheral needs: the maker's signal multiplexing table. */
+/* The pins and pin functions that a peripheral needs, from the manufacturer's table of signal multiplexing. */
 static const struct {
     const char *peripheral, *port;
     uint8_t pin, function;
@@ -47,7 +48,7 @@ static const struct {
 static void check_pin(emu_t *emu, const char *peripheral, const char *port, uint32_t pin, uint32_t function)
 {
     if ((bus_get(emu, bus_find(port), 4U * pin) >> 8 & 7U) != function) {
-        emu_fail(emu, "%s is used, but %s.PCR%u does not give it its pin (MUX %u)", peripheral, port, pin, function);
+        emu_fail(emu, "%s is used, but %s.PCR%u does not give it the pin (MUX %u)", peripheral, port, pin, function);
     }
 }
 
@@ -60,7 +61,7 @@ void pins_check(emu_t *emu, const char *peripheral)
     }
 }
 
-/* A line is driven by a pin that is an output and belongs to the GPIO. */
+/* A line that is switched on must be an output, and its pin must be connected to the GPIO. */
 static void check_lines(emu_t *emu, const peripheral_t *self, uint32_t lines)
 {
     const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
@@ -86,7 +87,7 @@ uint32_t port_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
     return stored;
 }
 
-static void many(emu_t *emu, const peripheral_t *self, uint32_t first, uint32_t value)
+static void write_many_pins(emu_t *emu, const peripheral_t *self, uint32_t first, uint32_t value)
 {
     for (uint32_t i = 0; i < 16U; i++) {
         const uint32_t at = 4U * (first + i);
@@ -107,7 +108,7 @@ void port_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
         }
         bus_put(emu, self, offset, value & ~(uint32_t)FLAG);
     } else if (offset == GPCLR || offset == GPCHR) {
-        many(emu, self, offset == GPCLR ? 0U : 16U, value);
+        write_many_pins(emu, self, offset == GPCLR ? 0U : 16U, value);
     }
 }
 

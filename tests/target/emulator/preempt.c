@@ -17,13 +17,13 @@ enum { PERIODS_TO_FIND = 25, ENCODER_SHIFT = 18 };
 typedef struct {
     emulated_t *e;
     int victim, rounds;
-    int last_vector;                            /* of a round: the identification's, if the fast ISR pends it */
-    bool catch_entry, catch_exit, catch_return; /* what emu_run() is to stop at */
+    int last_vector;                            /* last handler of a round: the identification's if it was pended */
+    bool catch_entry, catch_exit, catch_return; /* the events at which emu_run() must stop */
     fluxtrue_t *host;
     adc_counts_t counts;             /* of the last sample at the victim's entry */
     drive_t before;                  /* at the victim's entry */
     drive_t outcome[OUTCOMES];       /* of the victim */
-    drive_t interrupts[CHOICES_MAX]; /* what the interrupts make of what the victim has handed over by then */
+    drive_t interrupts[CHOICES_MAX]; /* after the interrupts, for each set of results that were handed over before */
     int choices;
     bool seen[OUTCOMES], chosen[CHOICES_MAX];
 } preempt_t;
@@ -58,15 +58,15 @@ static bool run_to_break(preempt_t *p)
     return false;
 }
 
-static drive_t drive_there(preempt_t *p)
+static drive_t image_drive(preempt_t *p)
 {
     p->e->mirror.pulled_at = UINT64_MAX;
     mirror_pull(&p->e->mirror);
     return p->e->mirror.host->drive;
 }
 
-/* Another sample than the last: the currents have moved. The shaft stands where the encoder was read last, because
- * what the image takes away for the time since the sample would depend on when it is interrupted. */
+/* A sample that differs from the last one in its currents. The shaft stands at the angle that was read last: otherwise
+ * the image would correct the angle for the time since the sample, which depends on where it is interrupted. */
 static adc_counts_t sample_of(const preempt_t *p, int round)
 {
     const adc_counts_t *c = &p->counts;
@@ -82,7 +82,7 @@ static uint32_t shaft(const preempt_t *p)
     return emu_counter_read(p->e->emu, 1, false) << ENCODER_SHIFT;
 }
 
-static void round_there(preempt_t *p, int round)
+static void interrupt_image(preempt_t *p, int round)
 {
     const adc_counts_t counts = sample_of(p, round);
     (void)emu_register_set(p->e->emu, "ADC0.R0", counts.i_a);
@@ -118,7 +118,7 @@ static drive_t unload(preempt_t *p)
 }
 
 /* The interrupts that come at one boundary; the identification's does not interrupt itself. */
-static drive_t interrupts_here(preempt_t *p, const drive_t *drive)
+static drive_t interrupts_on_host(preempt_t *p, const drive_t *drive)
 {
     load(p, drive);
     p->host->theta_m = shaft(p);
@@ -134,7 +134,7 @@ static drive_t interrupts_here(preempt_t *p, const drive_t *drive)
     return unload(p);
 }
 
-static drive_t victim_here(preempt_t *p, const drive_t *inputs)
+static drive_t victim_on_host(preempt_t *p, const drive_t *inputs)
 {
     load(p, inputs);
     if (p->victim == PREEMPT_MRAI) {
@@ -151,12 +151,12 @@ typedef struct {
     size_t offset, size;
 } part_t;
 
-/* What a victim hands over to the interrupts, each a word of its own or a box that one word opens. */
+/* The results that a victim hands over to the interrupts: each is one word, or a box whose generation is one word. */
 static const part_t by_mrai[] = {PART(psi_d_error), PART(mrai.isr.finished)};
 static const part_t by_task[] = {PART(commands), PART(mrai.schedules), PART(task.psi_d_error),
                                  PART(task.angle_correction)};
 
-/* The victim interrupted after it has handed over some of its results. */
+/* The drive as the interrupts find it after the victim has handed over some of its results: one bit of choice each. */
 static drive_t handed_over(const preempt_t *p, int choice)
 {
     const part_t *part = p->victim == PREEMPT_MRAI ? by_mrai : by_task;
@@ -169,21 +169,22 @@ static drive_t handed_over(const preempt_t *p, int choice)
     return drive;
 }
 
-/* The victim finds everything as it was when it was entered, or everything as the interrupts have left it. */
+/* Computes the allowed outcomes: the victim finds everything as it was when it was entered, or everything as the
+ * interrupts have left it. */
 static void allowed_compute(preempt_t *p)
 {
-    p->outcome[OLD] = victim_here(p, &p->before);
-    drive_t after = interrupts_here(p, &p->before);
+    p->outcome[OLD] = victim_on_host(p, &p->before);
+    drive_t after = interrupts_on_host(p, &p->before);
     if (p->victim == PREEMPT_MRAI) {
-        after.mrai.isr = p->before.mrai.isr; /* and only the mailbox is the victim's input */
+        after.mrai.isr = p->before.mrai.isr; /* only the mailbox is an input of this victim */
         after.psi_d_error = p->before.psi_d_error;
         after.fast = p->before.fast;
     }
-    p->outcome[NEW] = victim_here(p, &after);
+    p->outcome[NEW] = victim_on_host(p, &after);
     p->choices = p->victim == PREEMPT_MRAI ? 4 : 16;
     for (int choice = 0; choice < p->choices; choice++) {
         const drive_t drive = handed_over(p, choice);
-        p->interrupts[choice] = interrupts_here(p, &drive);
+        p->interrupts[choice] = interrupts_on_host(p, &drive);
     }
 }
 
@@ -191,8 +192,8 @@ static void allowed_compute(preempt_t *p)
 
 // NOLINTBEGIN(bugprone-suspicious-memory-comparison,cert-exp42-c,cert-flp37-c): mirror.c has cleared the padding
 
-/* What the victim alone writes; for the identification without its count of finished periods: it counts the one that
- * it was pended for, whichever sample it found. */
+/* Compares what only the victim writes. The identification's count of finished periods is left out, because it counts
+ * the period for which it was pended, whichever sample it found. */
 static bool same_victim(const preempt_t *p, const drive_t *a, const drive_t *b)
 {
     if (p->victim == PREEMPT_TASK) {
@@ -218,7 +219,7 @@ static bool same_interrupts(const preempt_t *p, const drive_t *a, const drive_t 
 
 // NOLINTEND(bugprone-suspicious-memory-comparison,cert-exp42-c,cert-flp37-c)
 
-/* False: the victim had finished before so many instructions. */
+/* False: the victim had finished before this number of instructions. */
 static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_t n)
 {
     emu_restore(p->e->emu, start);
@@ -228,7 +229,7 @@ static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_
     }
     for (int round = 0; round < p->rounds; round++) {
         p->catch_return = round + 1 < p->rounds;
-        round_there(p, round);
+        interrupt_image(p, round);
         if (p->catch_return && !run_to_break(p)) {
             return false;
         }
@@ -240,13 +241,14 @@ static bool interrupted_after(preempt_t *p, const emu_snapshot_t *start, uint64_
     return ended;
 }
 
-/* A victim that reads its inputs after the interrupts has handed nothing over before them. */
-static bool explained(preempt_t *p, const drive_t *there)
+/* A victim that reads its inputs after the interrupts has handed over nothing before them: then only choice 0 is
+ * allowed. */
+static bool is_allowed(preempt_t *p, const drive_t *image)
 {
     for (int outcome = OLD; outcome < OUTCOMES; outcome++) {
         const int choices = outcome == NEW ? 1 : p->choices;
         for (int choice = 0; choice < choices; choice++) {
-            if (same_victim(p, there, &p->outcome[outcome]) && same_interrupts(p, there, &p->interrupts[choice])) {
+            if (same_victim(p, image, &p->outcome[outcome]) && same_interrupts(p, image, &p->interrupts[choice])) {
                 p->seen[outcome] = true;
                 p->chosen[choice] = true;
                 return true;
@@ -258,9 +260,9 @@ static bool explained(preempt_t *p, const drive_t *there)
 
 static void classify_outcome(preempt_t *p, preempt_report_t *report, int n)
 {
-    const drive_t there = drive_there(p), plain = drive_plain(&there);
+    const drive_t drive = image_drive(p), plain = drive_plain(&drive);
     report->points++;
-    if (!explained(p, &plain) && report->mixed++ == 0) {
+    if (!is_allowed(p, &plain) && report->mixed++ == 0) {
         (void)snprintf(report->first, sizeof report->first, "interrupted after %d instructions", n);
     }
 }
@@ -275,16 +277,16 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
     return ended ? (int)(emu_instructions(p->e->emu) - from) : -1;
 }
 
-/* When the task is entered a window has just been handed over, the next one would be N periods later: it lacks one
- * period now, so that the first interrupt hands it over wherever the task is. */
-static void window_next(preempt_t *p)
+/* When the task is entered, a window has just been handed over; the next would be complete N periods later. Here only
+ * one period is left to it, so that the first interrupt hands it over, wherever the task is interrupted. */
+static void complete_window_next(preempt_t *p)
 {
     const mirror_t *m = &p->e->mirror;
     const uint32_t left = 1;
     for (int i = m->inputs; i < m->parts; i++) {
-        if (m->part[i].here == offsetof(drive_t, fast)) {
+        if (m->part[i].host_offset == offsetof(drive_t, fast)) {
             const size_t inside = offsetof(drive_t, fast.window.left) - offsetof(drive_t, fast);
-            (void)emu_write(p->e->emu, m->base + m->part[i].there + (uint32_t)inside, &left, sizeof left);
+            (void)emu_write(p->e->emu, m->base + m->part[i].image_offset + (uint32_t)inside, &left, sizeof left);
         }
     }
 }
@@ -298,11 +300,11 @@ static int try_all(preempt_t *p, preempt_report_t *report)
         (void)snprintf(report->first, sizeof report->first, "vector %d was never entered", p->victim);
         return -1;
     }
-    (void)emu_register_set(p->e->emu, "PDB0.SC", 0); /* no conversions: the only fast ISRs are ours */
+    (void)emu_register_set(p->e->emu, "PDB0.SC", 0); /* no conversions: only this test starts fast ISRs */
     (void)emu_register_set(p->e->emu, "PDB1.SC", 0);
-    window_next(p);
+    complete_window_next(p);
     emu_snapshot_t *start = emu_save(p->e->emu);
-    p->before = drive_there(p);
+    p->before = image_drive(p);
     p->counts = (adc_counts_t){.i_a = (uint16_t)emu_register(p->e->emu, "ADC0.R0"),
                                .i_b = (uint16_t)emu_register(p->e->emu, "ADC1.R0"),
                                .i_c = (uint16_t)emu_register(p->e->emu, "ADC0.R1"),
@@ -327,12 +329,12 @@ int preempt_run(sim_t *sim, int victim, int rounds, preempt_report_t *report)
     p->victim = victim;
     p->rounds = rounds;
     p->host = fluxtrue_create();
-    emu_snapshot_t *as_it_was = emu_save(p->e->emu);
+    emu_snapshot_t *initial = emu_save(p->e->emu);
     emu_on_exception(p->e->emu, on_exception, p);
     const int code = p->host != NULL ? try_all(p, report) : -1;
     emu_on_exception(p->e->emu, NULL, NULL);
-    emu_restore(p->e->emu, as_it_was);
-    emu_snapshot_free(as_it_was);
+    emu_restore(p->e->emu, initial);
+    emu_snapshot_free(initial);
     fluxtrue_destroy(p->host);
     report->outcomes = p->seen[OLD] + p->seen[NEW];
     for (int i = 0; i < p->choices; i++) {

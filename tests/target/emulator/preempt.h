@@ -6,11 +6,12 @@
  * allowed outcomes, bit for bit:
  *   the victim   finds everything as it was when it was entered, or everything as the interrupts have left it;
  *                the latter only if it had handed nothing over before
- *   the ISRs     find each thing that the victim hands over (a word, or a box by its generation) as it was or as the
- *                undisturbed victim makes it
- * All else is mixed: a value of which a part is old and a part is new, or two values that belong together and do not.
+ *   the ISRs     find each result that the victim hands over (a word, or a box by its generation) as it was, or as the
+ *                victim writes it without interruption
+ * Every other outcome is mixed: a value of which a part is old and a part is new, or an old and a new value that do not
+ * belong together.
  * Source   docs/architecture.md, shared data
- * Errors   preempt_run(): a negative number, and why in the report
+ * Errors   preempt_run(): a negative number, and the reason in the report
  * Context  a test, in counting mode, with the image in which nothing but the drive runs in the 1 kHz task; the
  *          simulation is left as it was */
 #include "emu.h"
@@ -23,7 +24,7 @@ typedef struct {
     int points;       /* boundaries tried */
     int mixed;        /* outcomes that are not allowed */
     int outcomes;     /* of the victim's two, how many were seen */
-    int choices;      /* of what it hands over: combinations of old and new that the interrupts have found */
+    int choices;      /* combinations of old and new results of the victim that the interrupts have found */
     char first[160];  /* the first mixed outcome, or why nothing could be tried */
 } preempt_report_t;
 

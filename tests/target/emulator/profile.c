@@ -10,7 +10,7 @@ enum { SPANS_MAX = 1 << 16, NOWHERE = -1 };
 
 typedef struct {
     emu_span_t span;
-    int64_t next; /* where the last instruction's neighbour is */
+    int64_t next; /* address of the instruction that follows the last one in memory */
 } level_t;
 
 struct profile {
@@ -20,7 +20,7 @@ struct profile {
     uint32_t count;
     uint32_t taken;
     uint8_t cost[FLASH_SIZE / 2];
-    bool conditional[FLASH_SIZE / 2]; /* stands behind an IT that has run: counted with it */
+    bool conditional[FLASH_SIZE / 2]; /* made conditional by an IT that has run: counted with the IT */
 };
 
 bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
@@ -39,10 +39,10 @@ bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uin
     return true;
 }
 
-uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t most)
+uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t max_count)
 {
     profile_t *p = emu->profile;
-    const uint32_t count = p == NULL ? 0 : p->count < most ? p->count : most;
+    const uint32_t count = p == NULL ? 0 : p->count < max_count ? p->count : max_count;
     if (count > 0) {
         memcpy(to, p->done, count * sizeof *to);
         memmove(p->done, p->done + count, (p->count - count) * sizeof *to);
@@ -71,7 +71,8 @@ static bool is_conditional(const profile_t *p, int64_t address)
     return address < FLASH_SIZE && p->conditional[address / 2];
 }
 
-/* The emulated core never shows an instruction that is skipped: all that an IT makes conditional counts with it. */
+/* The emulated core does not report skipped instructions. Therefore all instructions that an IT makes conditional are
+ * counted together with the IT. */
 static void count_conditional(emu_t *emu, emu_span_t *span, uint32_t address, uint32_t slots)
 {
     for (uint32_t at = address; slots > 0 && at < FLASH_SIZE; slots--) {
@@ -89,7 +90,7 @@ void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
     profile_t *p = emu->profile;
     level_t *level = &p->level[p->depth];
     if (level->next != NOWHERE && level->next != address && !is_conditional(p, level->next)) {
-        level->span.cost += p->taken; /* of the instruction before */
+        level->span.cost += p->taken; /* for the previous instruction */
     }
     level->next = (int64_t)address + size;
     if (is_conditional(p, address)) {

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_PROFILE_H
 #define EMULATOR_PROFILE_H
-/** What each run of an exception's handler executes: instructions, and a sum of costs that the caller gives each
- * instruction. A handler that is interrupted is not charged with what interrupts it.
+/** For each run of an exception's handler: the number of instructions, and the sum of the costs that the caller assigns
+ * to them. Handlers that interrupt it are not included.
  * Source   docs/performance.md
- * Errors   only in counting mode; else nothing is ever recorded. An instruction without a cost stops the emulation
+ * Errors   emu_profile_start(): false outside counting mode, and nothing is recorded. An instruction without a cost
+ *          stops the emulation
  * Context  host */
 #include <stdbool.h>
 #include <stdint.h>
@@ -17,10 +18,10 @@ typedef struct {
     uint32_t cost;
 } emu_span_t;
 
-/** cost: one byte for each half word of the flash, of the instruction that starts there; taken: more for each
- * instruction that is not followed by its neighbour. Copied. */
+/** cost: one byte for each half word of the flash, the cost of the instruction that starts there; copied. taken:
+ * additional cost of an instruction after which another one than the next in memory runs. */
 EMU_API bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken);
-/** Moves up to `most` finished runs, the oldest first; the number of runs. */
-EMU_API uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t most);
+/** Moves up to max_count finished runs, the oldest first; returns their number. */
+EMU_API uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t max_count);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The core's own registers: NVIC, SCB, SysTick, cycle counter; beside them LMEM.
+/* The core's own registers: NVIC, SCB, SysTick, cycle counter; LMEM has addresses among them.
  *
  * documented behaviour                       | modelled | test
  * ------------------------------------------ | -------- | --------------------------------------------
@@ -53,7 +53,7 @@ static bool within(uint32_t at, uint32_t first, uint32_t words)
     return at >= first && at < first + 4U * words;
 }
 
-/* Interrupt n is vector n + 16: the sets are kept by vector. */
+/* Interrupt n is vector n + 16, and the bit sets are indexed by vector. */
 static uint32_t by_interrupt(const uint32_t *set, uint32_t word)
 {
     const uint32_t low = set[word] >> 16;
@@ -189,7 +189,7 @@ static bool system_word(emu_t *emu, uint32_t at, uint32_t *value)
     case CFSR:
     case HFSR:
         *value = 0;
-        break; /* a fault ends the emulation before anybody could ask */
+        break; /* always 0, because a fault ends the emulation */
     case CPACR:
         *value = n->cpacr;
         break;
@@ -271,7 +271,7 @@ static bool nvic_store(emu_t *emu, uint32_t at, uint32_t value)
 static void control_store(emu_t *emu, uint32_t value)
 {
     if (value >> 16 != 0x05FAU) {
-        emu_fail(emu, "write of SCB.AIRCR: 0x%08x has not the key 0x05FA", value);
+        emu_fail(emu, "write of SCB.AIRCR: 0x%08x does not contain the key 0x05FA", value);
     }
     emu->s.nvic.aircr = 0xFA050000U | (value & 0x700U);
     if ((value & 4U) != 0) { /* SYSRESETREQ */
@@ -349,7 +349,7 @@ static bool system_store(emu_t *emu, uint32_t at, uint32_t value)
     return true;
 }
 
-/* Four bits of each priority are there. */
+/* Only the upper four bits of each priority are implemented. */
 static void priorities_store(uint8_t *priority, unsigned size, uint32_t value)
 {
     for (unsigned i = 0; i < size; i++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The same firmware compiled for the host follows the emulated one: each activity runs when the emulated core runs
- * its handler, with the counts and the angle that this has read. */
+/* The shadow is the same firmware compiled for the host. Each of its activities runs when the emulated core runs the
+ * handler, with the counts and the angle that the handler has read. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -16,7 +16,7 @@ enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE
 #define PWM_TICK_S (1.0 / 112e6)
 enum { ENCODER_SHIFT = 18 };
 
-/* hal/s32k144/angle_quadrature.c and angle_resolver.c, from what they have read. */
+/* Computes the angle as hal/s32k144/angle_quadrature.c and angle_resolver.c do, from the values that they have read. */
 static uint32_t angle_read(const emulated_t *e)
 {
     if ((emu_register(e->emu, "FTM2.QDCTRL") & 1U) == 0) {
@@ -37,14 +37,14 @@ static void samples_take(emulated_t *e)
     e->shadow->theta_m = angle_read(e);
 }
 
-/* Before the period's ISR, as hal/s32k144/main.c has it. */
+/* Raises the faults before the fast ISR, as hal/s32k144/main.c does. */
 static void faults_take(emulated_t *e)
 {
     if (e->gate_fault) {
         drive_raise_fault(&e->shadow->drive, FAULT_GATE);
     }
     e->gate_fault = false;
-    e->shadow->board.gate_fault = e->pins_of_board.gate_fault; /* read back with the gates */
+    e->shadow->board.gate_fault = e->pins_of_board.gate_fault; /* read back by hal/host */
 }
 
 static double temperature(uint32_t count, bool *broken)
@@ -60,9 +60,9 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
 }
 
-/* The task reads all its inputs as it begins, far from the next interrupt, and so is computed as a whole then; what it
- * writes reaches the shadow as the image writes it: at its end, or, when it is interrupted, byte by byte as far as the
- * image's memory already has the new values. */
+/* The task reads all its inputs when it begins, long before the next interrupt, so the shadow computes the whole task
+ * at this time. The results are copied to the shadow when the image writes them: all of them when the task ends; when
+ * it is interrupted, those bytes that already have their new values in the image's memory. */
 static void task_begins(emulated_t *e)
 {
     const drive_t before = e->shadow->drive;
@@ -87,11 +87,11 @@ static void task_ends(emulated_t *e)
 
 static void part_take(emulated_t *e, size_t offset, size_t size)
 {
-    const uint8_t *there = (const uint8_t *)&e->mirror.host->drive + offset;
+    const uint8_t *image = (const uint8_t *)&e->mirror.host->drive + offset;
     const uint8_t *result = (const uint8_t *)&e->task_result + offset;
-    uint8_t *here = (uint8_t *)&e->shadow->drive + offset;
+    uint8_t *shadow = (uint8_t *)&e->shadow->drive + offset;
     for (size_t i = 0; i < size; i++) {
-        here[i] = there[i] == result[i] ? result[i] : here[i];
+        shadow[i] = image[i] == result[i] ? result[i] : shadow[i];
     }
 }
 
@@ -105,7 +105,8 @@ static void task_interrupted(emulated_t *e)
     part_take(e, offsetof(drive_t, parameters.modulate), sizeof e->task_result.parameters.modulate);
 }
 
-/* The fast ISR, which nothing interrupts, is followed when it has read its inputs: at its end. */
+/* The shadow's fast ISR runs at the end of the image's, which has then read its inputs; no other activity of the drive
+ * interrupts it. The other activities run at their beginning. */
 static void follow(void *user, int vector, bool entered)
 {
     emulated_t *e = user;
@@ -133,12 +134,12 @@ void shadow_inputs(emulated_t *e)
 {
     const mirror_t *m = &e->mirror;
     for (int i = 0; i < m->inputs; i++) {
-        memcpy((uint8_t *)&e->shadow->drive + m->part[i].here, (uint8_t *)&m->host->drive + m->part[i].here,
-               m->part[i].size);
+        memcpy((uint8_t *)&e->shadow->drive + m->part[i].host_offset,
+               (uint8_t *)&m->host->drive + m->part[i].host_offset, m->part[i].size);
     }
 }
 
-/* It starts from the state that the image has now. */
+/* The shadow starts from the present state of the image. */
 bool shadow_start(emulated_t *e)
 {
     if (e->shadow == NULL) {
@@ -150,7 +151,7 @@ bool shadow_start(emulated_t *e)
     mirror_pull(&e->mirror);
     const drive_t own = e->shadow->drive;
     e->shadow->drive = e->mirror.host->drive;
-    e->shadow->drive.motor = own.motor; /* its tables are here */
+    e->shadow->drive.motor = own.motor; /* with pointers to the host's tables */
     e->shadow->drive.period = own.period;
     e->shadow->drive.parameters = own.parameters;
     e->shadow->drive.data_check = own.data_check;
@@ -159,7 +160,8 @@ bool shadow_start(emulated_t *e)
     return true;
 }
 
-/* What the timer has just loaded against the duties of the period: hal/s32k144/pwm.c rounds to whole ticks. */
+/* Compares the values that the timer has just loaded with the shadow's duties; hal/s32k144/pwm.c rounds to whole
+ * ticks. */
 static const char *bridge_differs(const emulated_t *e)
 {
     const duty_t duty = e->shadow->duty;
@@ -178,7 +180,7 @@ static const char *bridge_differs(const emulated_t *e)
 void shadow_compare(emulated_t *e)
 {
     if (emu_active_vector(e->emu) != 0) {
-        return; /* an activity is under way: compare in the next period */
+        return; /* an activity is running: the next period is compared */
     }
     char where[64];
     bool differs = mirror_differs(&e->mirror, e->shadow, where, sizeof where);

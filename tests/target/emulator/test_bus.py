@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The image that would be flashed, on the bus: a slice of the suite for bench and virtual ECU."""
+"""The image that would be flashed, on the bus: a part of the suite for bench and virtual ECU."""
 
 import os
 import re
@@ -17,7 +17,7 @@ from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import ROOT, Parts
 from fluxtrue_tools.sim.library import Loop
 
-SLICE = ("test_boot.py", "test_states.py")
+SUITE_PART = ("test_boot.py", "test_states.py")
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def flashed() -> Parts:
 
 
 def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_path: Path) -> None:
-    files = [str(ROOT / "tests" / "hil" / name) for name in SLICE]
+    files = [str(ROOT / "tests" / "hil" / name) for name in SUITE_PART]
     settings = ["-c", str(ROOT / "tests" / "pytest.ini"), "-p", "no:cacheprovider"]
     target = [f"--vecu={flashed.program}", f"--report={tmp_path}"]
     command = [sys.executable, "-m", "pytest", "-q", *settings, *target, *files]
@@ -37,12 +37,12 @@ def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_p
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert re.search(r"<th>unused stack</th><td>[1-9]\d+ bytes", page), "the check of the stack was idle"
+    assert re.search(r"<th>unused stack</th><td>[1-9]\d+ bytes", page), "the unused stack was not measured"
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-300:]
 
 
 @pytest.mark.parametrize("celsius", [-20.0, 60.0, 125.0])
-def test_the_processor_s_own_temperature_is_among_the_measurements(flashed: Parts, celsius: float) -> None:
+def test_the_temperature_of_the_processor_s_die_is_measured(flashed: Parts, celsius: float) -> None:
     motor = flashed.emulated()
     with Loop(motor.library, motor.plant, motor.flux_map) as loop:
         core = Stand(loop).core
@@ -50,7 +50,7 @@ def test_the_processor_s_own_temperature_is_among_the_measurements(flashed: Part
         loop.run(30)
         address = next(m.address for m in read(flashed.image).measurements if m.name == "processor_dC")
         (measured_dC,) = struct.unpack("<h", core.read(address, 2))
-    # A count is 0.78 K, and its offset is rounded by 0.3 K.
+    # Resolution 0.78 K per count; the offset is rounded by 0.3 K.
     assert measured_dC / 10 == pytest.approx(celsius, abs=1.1)
 
 

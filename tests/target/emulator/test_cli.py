@@ -31,7 +31,7 @@ def scenario(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_run_tells_torque_and_which_image_it_ran(parts: Parts, scenario: Path, tmp_path: Path) -> None:
+def test_a_run_reports_the_torque_and_the_name_of_the_image(parts: Parts, scenario: Path, tmp_path: Path) -> None:
     summary = tmp_path / "run.json"
     done = emulate("--scenario", scenario, "--elf", parts.image, "--json", summary)
     assert done.returncode == 0, done.stderr
@@ -84,7 +84,7 @@ def test_bad_input_is_one_clear_message(
     assert done.stderr.count("\n") == 1
 
 
-def test_an_image_that_does_not_listen_is_refused_on_the_bus(parts: Parts) -> None:
+def test_an_image_without_a_bus_is_refused_with_serve(parts: Parts) -> None:
     done = emulate("--serve", "--elf", parts.image)
     assert done.returncode == 2
     assert "takes no commands from the bus, allowed with --serve" in done.stderr

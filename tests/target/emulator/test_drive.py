@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The image that would be flashed, in closed loop: the demonstration's bounds, and the host's bits."""
+"""The image in closed loop: torque within the demonstration's bounds, and bit for bit the same state as on the host."""
 
 import numpy as np
 import pytest
@@ -30,15 +30,16 @@ def test_the_measured_machine_keeps_its_torque_in_four_quadrants(parts: Parts) -
         assert abs(error) <= max(0.5, 15.0 / abs(torque)), f"{speed} rpm, {torque} N·m: {error} %"
 
 
-def test_a_torque_step_is_as_fast_as_promised(parts: Parts) -> None:
+def test_a_torque_step_meets_the_demonstrations_bounds(parts: Parts) -> None:
     result = step.torque_step(Bench(parts.motor, parts.emulated()))
     assert len(result.bounds) == 4
     for bound in result.bounds:
         assert bound.met, bound.text()
 
 
-# Every limit, both ways a fault comes about, resets, the other identification: from which part of the drive on, and
-# within a part from one value to another.
+# The drive consists of parts of PART_S. EVENTS: values that are set at the start of a part, so that every torque limit,
+# a fault of the gate driver and every reset occur. RAMPS: dc voltage at the start and the end of a part. OTHER_MODE:
+# parts with the other identification.
 EVENTS: dict[int, dict[str, float]] = {
     2: {"torque_limit_drive_Nm": 60.0}, 3: {"torque_limit_drive_Nm": 1e4},
     10: {"power_limit_drive_W": 20e3}, 11: {"power_limit_drive_W": 1e6},
@@ -54,9 +55,9 @@ RAMPS: dict[int, tuple[float, float]] = {5: (350.0, 170.0), 6: (170.0, 350.0), 2
 OTHER_MODE = range(36, 38)
 
 
-def follow(loop: Loop, seconds: float) -> tuple[int, int]:
-    """Torques of both signs, speeds into field weakening and back, a weakening magnet, and all the events; with a
-    shadow on the host. Answers which deratings and which faults there have been."""
+def drive_with_shadow(loop: Loop, seconds: float) -> tuple[int, int]:
+    """Drive with the shadow on the host: torques of both signs, speeds into field weakening and back, a weakening
+    magnet, and all events. Returns the deratings and the faults that occurred."""
     torques = (80.0, -60.0, 120.0, -20.0, 5.0)
     speeds = (3000.0, 800.0, 6500.0, -2500.0)
     derating = faults = 0
@@ -78,37 +79,37 @@ def follow(loop: Loop, seconds: float) -> tuple[int, int]:
     return derating, faults
 
 
-def check_followed(loop: Loop, periods: int) -> None:
+def check_shadow(loop: Loop, periods: int) -> None:
     difference = loop._library.sim_shadow_difference(loop._sim)
     assert difference is None, difference
-    # At the end of its first period the task may still be at work, and nothing can be compared; at the ends of the
-    # other nine of a step it rests, but for a few steps that take longer.
+    # A period is compared if no activity is running at its end. The task may still run at the end of the first period
+    # of a step; at the ends of the other nine it is idle, except in a few steps that take longer.
     assert loop.get("emulator.compared") >= 0.89 * periods
 
 
 @pytest.mark.parametrize("mode", [0, 1], ids=["paper", "robust"])
 def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(drive: Loop, mode: int) -> None:
     drive.set("identification_mode", mode)
-    derating, faults = follow(drive, 10.0)
-    check_followed(drive, 100_000)
+    derating, faults = drive_with_shadow(drive, 10.0)
+    check_shadow(drive, 100_000)
     assert derating & EVERY_LIMIT == EVERY_LIMIT
-    # Closing the low sides against the over-voltage starts with a current beyond the trip.
+    # The short circuit against the over-voltage starts with a current above the over-current level.
     assert faults == OVER_VOLTAGE | OVER_CURRENT | GATE
     assert drive.get("fault_word") == 0
-    assert drive.get("truth.torque_Nm") == pytest.approx(5.0, abs=1.0)  # it drives
+    assert drive.get("truth.torque_Nm") == pytest.approx(5.0, abs=1.0)  # it makes torque again
 
 
 def test_a_resolver_image_computes_the_same_bits(resolver_parts: Parts) -> None:
     motor = resolver_parts.emulated()
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
-        follow(loop, 1.0)
-        check_followed(loop, 10_000)
+        drive_with_shadow(loop, 1.0)
+        check_shadow(loop, 10_000)
         assert loop.get("fault_word") == 0
 
 
-def test_a_shadow_that_is_given_another_calibration_is_caught(drive: Loop) -> None:
-    follow(drive, 0.25)
+def test_a_changed_bit_in_the_state_of_the_shadow_is_detected(drive: Loop) -> None:
+    drive_with_shadow(drive, 0.25)
     before = drive.get("emulator.differing")
     drive._library.sim_shadow_disturb(drive._sim)
     drive.run(10)
@@ -121,19 +122,20 @@ def test_the_timer_is_set_up_as_the_motor_file_says(parts: Parts, drive: Loop) -
     assert drive.get("emulator.pwm_period_s") == pytest.approx(1 / parts.motor.plant["pwm_hz"], rel=1e-6)
 
 
-def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Loop) -> None:
+def test_a_fault_of_the_gate_driver_ends_torque_control_until_it_is_reset(drive: Loop) -> None:
     drive.set("enable", 1)
     drive.set("torque_requested_Nm", 80.0)
     drive.run(3000)
     assert drive.get("truth.torque_Nm") > 50
     drive.set("emulator.gate_fault", 1)
     drive.run(50)
-    # 3000 rpm: the back-EMF stays below the dc link, and the diodes carry nothing while the line holds the gates off.
+    # At 3000 rpm the back-EMF is below the dc voltage, so no current flows through the diodes while the fault line
+    # keeps the outputs off.
     assert int(drive.get("fault_word")) == GATE
     assert abs(drive.get("truth.torque_Nm")) < 0.5
     drive.set("emulator.gate_fault", 0)
     drive.run(2000)
-    # Then the firmware has the short circuit that it believes in: docs/theory/safe-state.md, section 5.
+    # Now the short circuit that the firmware commands as safe state takes effect: docs/theory/safe-state.md, section 5.
     assert int(drive.get("fault_word")) & GATE
     assert -10.0 < drive.get("truth.torque_Nm") < -3.0
     drive.set("enable", 0)
@@ -148,8 +150,8 @@ def test_a_fault_of_the_gate_driver_opens_the_bridge_until_it_is_reset(drive: Lo
 
 @pytest.mark.parametrize("failure", ["no conversion", "no interrupt"])
 def test_samples_that_keep_failing_bring_the_safe_state(drive: Loop, failure: str) -> None:
-    """Each period's first conversion finds its last result unread, or no conversion's end interrupts any more: the
-    fast ISR no longer comes by itself. The fault stays while its cause does."""
+    """Either the first conversion of each period finds its previous result unread, or the end of a conversion causes no
+    interrupt: no conversion starts the fast ISR any more. The fault stays as long as its cause."""
     drive.set("enable", 1)
     drive.set("torque_requested_Nm", 80.0)
     drive.run(3000)
@@ -184,7 +186,7 @@ def test_a_fault_of_the_resolver_raises_the_angle_fault(resolver_parts: Parts) -
         loop.set("emulator.resolver_fault", 1)
         loop.run(10)
         assert int(loop.get("fault_word")) & 1 << 4
-        loop.set("emulator.resolver_fault", 0)  # the converter remembers it until its register is read
+        loop.set("emulator.resolver_fault", 0)  # the converter keeps it until its register is read
         loop.set("fault_reset", 1)
         loop.run(100)
         assert int(loop.get("fault_word")) & 1 << 4

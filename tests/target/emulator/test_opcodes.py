@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The estimate of cycles, opcode by opcode: each is assembled, executed, and compared with the manual's number.
+"""The estimate of cycles for each opcode: it is assembled, executed, and its cost compared with the manual's number.
 
-The numbers are written by hand from the instruction timings of the Cortex-M4 Technical Reference Manual (Arm DDI 0439,
-table 3-1 and, for floating point, 7-1), the larger end of every span: P = 3, divisions 12, MRS, MSR and CPS 2,
-ISB 1 + P. A case lists one number for each executed instruction.
+The numbers were entered by hand from the instruction timings of the Cortex-M4 Technical Reference Manual (Arm DDI 0439,
+table 3-1 and, for floating point, 7-1). Where the manual gives a range, it is the upper end: P = 3, divisions 12, MRS,
+MSR and CPS 2, ISB 1 + P. A case lists one number for each executed instruction.
 """
 
 import ctypes
@@ -56,7 +56,7 @@ ldrex r4, [r0]|ldrexb r4, [r0]|ldrexh r4, [r0]|str r1, [r0, #4]|str r1, [r0, #4]
 strex r4, r1, [r0]|strexb r4, r1, [r0]|strexh r4, r1, [r0]|vldr s2, [r0]|vstr s0, [r0]|mrs r4, primask
 msr basepri, r5|vmov r4, r5, s0, s1|vmov s2, s3, r1, r2|vmov r4, r5, d0|vmov d1, r1, r2
 """
-# What is not a line of its own: several instructions, registers of a list, branches, what an IT skips.
+# Cases with other costs, with several instructions, register lists, branches or IT blocks.
 OTHER: dict[str, tuple[int, ...]] = {
     "sdiv r4, r1, r2": (12,), "udiv r4, r1, r2": (12,), "vdiv.f32 s2, s0, s1": (14,), "vsqrt.f32 s2, s0": (14,),
     "vmla.f32 s2, s0, s1": (3,), "vmls.f32 s2, s0, s1": (3,), "vnmla.f32 s2, s0, s1": (3,),
@@ -64,7 +64,7 @@ OTHER: dict[str, tuple[int, ...]] = {
     "vfnma.f32 s2, s0, s1": (3,), "vfnms.f32 s2, s0, s1": (3,),
     "vldr d1, [r0]": (3,), "vstr d0, [r0]": (3,), "ldrd r4, r5, [r0]": (3,), "strd r1, r2, [r0, #8]": (3,),
     "isb": (1 + P,), "cpsid i; cpsie i": (2, 2),
-    # One and a word each; P more where the program counter is among them.
+    # 1, and 1 more for each word; P more if the program counter is loaded.
     "ldmia r0, {r4}": (1 + 1,), "ldmia r0, {r4, r5, r6, r7}": (1 + 4,), "ldmdb r0!, {r4, r5, r6}": (1 + 3,),
     "stmia r0!, {r1, r2}": (1 + 2,), "stmdb r0, {r1, r2, r3}": (1 + 3,),
     "push {r1}; pop {r4}": (1 + 1, 1 + 1), "push {r1, r2, lr}; pop {r4, r5, r6}": (1 + 3, 1 + 3),
@@ -84,7 +84,7 @@ OTHER: dict[str, tuple[int, ...]] = {
     "bl 1f; b 2f; 1: bx lr; 2:": (1 + P, 1 + P, 1 + P),
     "movs r4, #0; tbb [pc, r4]; 2: .byte (1f - 2b)/2, 0; nop; 1:": (1, 2 + P),
     "movs r4, #0; tbh [pc, r4, lsl #1]; 2: .short (1f - 2b)/2, 0; nop; 1:": (1, 2 + P),
-    # Behind an IT: what runs and what is skipped alike.
+    # After an IT: executed and skipped instructions cost the same.
     "it eq; moveq r4, r1": (1, 1), "it ne; movne r4, r1": (1, 1), "it ne; ldrne r4, [r0]": (1, 2),
     "ite eq; addeq r4, r1; ldrne r4, [r0]": (1, 1, 2), "itttt ne; movne r4, r1; addne r4, #1; strne r4, [r0]; "
     "ldrne r5, [r0]": (1, 1, 1, 2, 2), "it eq; beq 1f; nop; 1:": (1, 1 + P), "it ne; bne 1f; 1: nop": (1, 1, 1),
@@ -134,7 +134,7 @@ done: pop {r4-r11, pc}
 
 @dataclass
 class Measured:
-    """The program's code, and what each case took more than an empty one."""
+    """The program's code, and the instructions and cost of each case minus those of an empty one."""
 
     functions: list[disassembly.Function]
     instructions: list[int]
@@ -182,13 +182,13 @@ def _names(functions: list[disassembly.Function]) -> set[str]:
     return {cycles.base(i.mnemonic)[0] for function in functions for i in function.instructions}
 
 
-def _tried(measured: Measured) -> set[str]:
+def _tested(measured: Measured) -> set[str]:
     return _names([function for function in measured.functions if function.name.startswith("case_")])
 
 
-def test_each_entry_of_the_cost_table_is_tried(measured: Measured) -> None:
-    assert set(cycles.COSTS) - _tried(measured) == set()
+def test_each_entry_of_the_cost_table_is_tested(measured: Measured) -> None:
+    assert set(cycles.COSTS) - _tested(measured) == set()
 
 
-def test_each_opcode_of_the_flashed_image_is_tried(measured: Measured) -> None:
-    assert _names(disassembly.read(build.prepare("hsm1", flashed=True).image)) - _tried(measured) == set()
+def test_each_opcode_of_the_flashed_image_is_tested(measured: Measured) -> None:
+    assert _names(disassembly.read(build.prepare("hsm1", flashed=True).image)) - _tested(measured) == set()

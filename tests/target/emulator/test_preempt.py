@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No activity ever reads a half-written value: it is interrupted at each of its instructions."""
+"""No activity reads a half-written value: each is interrupted at every one of its instructions."""
 
 import ctypes
 from collections.abc import Callable, Iterator
@@ -20,7 +20,8 @@ STEPS, PERIODS = 10, 10
 
 @pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
 def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
-    """Identifying a weak magnet at 3000 rpm in either way, counted instruction by instruction."""
+    """A drive at 3000 rpm that identifies a weak magnet, with the paper's and the robust identification; every
+    instruction is counted."""
     motor = parts.emulated(library.COUNTING)
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0, "current_noise_A_rms": 0.5,
                            "magnet_scale": 0.9}  # fmt: skip
@@ -33,8 +34,8 @@ def loop(parts: Parts, request: pytest.FixtureRequest) -> Iterator[Loop]:
         yield loop
 
 
-def longest_step_next(loop: Loop) -> None:
-    """To just before the longest of ten steps: the one in which the identification updates its parameters."""
+def run_to_longest_step(loop: Loop) -> None:
+    """Run to just before the longest of ten steps, in which the identification updates its parameters."""
     core = Stand(loop).core
     lengths = []
     for _ in range(STEPS):
@@ -46,34 +47,32 @@ def longest_step_next(loop: Loop) -> None:
 
 def check(report: preempt.Report, outcomes: int = 2) -> None:
     assert report.mixed == 0, report
-    # Every boundary was tried, and both the old inputs and the new ones were seen.
+    # Every boundary was tried. `outcomes` is 2 if the activity found the old inputs in some cases, the new in others.
     assert report.points == report.instructions > 50
     assert report.outcomes == outcomes
 
 
 @pytest.mark.parametrize("periods", [1, 7, 9])
-def test_the_identification_sees_the_old_sample_or_the_new_one_wherever_it_is_interrupted(
-    loop: Loop, periods: int
-) -> None:
+def test_the_identification_uses_the_sample_it_was_pended_for_wherever_interrupted(loop: Loop, periods: int) -> None:
     if loop.get("identification_mode") == ROBUST:
         pytest.skip("the robust identification has no interrupt of its own: the fast ISR sums its windows")
     loop.run(periods)
-    # Its mailbox is not written before it has finished: it always finds the point that it was pended for.
+    # Its mailbox is not written before it has finished, so it always finds the sample for which it was pended.
     check(preempt.interrupt_everywhere(loop, preempt.MRAI), outcomes=1)
 
 
-# Two rounds at one place overwrite the slot that the task may be copying from.
+# Two rounds of interrupts at the same instruction overwrite the slot that the task may be copying.
 @pytest.mark.parametrize("rounds", [1, 2])
 @pytest.mark.parametrize("longest", [False, True], ids=["next", "longest"])
-def test_the_task_sees_one_moment_wherever_both_interrupts_come(loop: Loop, longest: bool, rounds: int) -> None:
+def test_the_task_reads_inputs_of_one_instant_wherever_interrupted(loop: Loop, longest: bool, rounds: int) -> None:
     if longest:
-        longest_step_next(loop)
+        run_to_longest_step(loop)
     report = preempt.interrupt_everywhere(loop, preempt.TASK, rounds)
     check(report)
-    assert report.choices >= 2  # interrupts before and after something was handed over to them
+    assert report.choices >= 2  # there were interrupts before and after the task handed over a result
 
 
-def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop) -> None:
+def test_the_drive_continues_unchanged_after_these_tests(parts: Parts, loop: Loop) -> None:
     before = loop.get("truth.time_s")
     loop.run(100)
     assert loop.get("truth.time_s") == pytest.approx(before + 0.01)
@@ -81,12 +80,12 @@ def test_the_drive_goes_on_as_if_nothing_had_been_tried(parts: Parts, loop: Loop
     assert loop.get("truth.torque_Nm") == pytest.approx(80, abs=3)
 
 
-# ---- interrupts that share nothing with the control but a flag or a queue, on the image that would be flashed ----
+# ---- interrupts that share only a flag or a queue with the control, on the image that would be flashed ----
 
 
 @pytest.fixture(scope="module", params=[PAPER, ROBUST], ids=["paper", "robust"])
 def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
-    """Torque at standstill, commanded over the bus."""
+    """A drive at standstill with torque, commanded over the bus."""
     if not have_arm_compiler():
         pytest.skip("no cross compiler: there is no image to emulate")
     motor = build.prepare("hsm1", flashed=True).emulated(library.COUNTING)
@@ -102,7 +101,7 @@ def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
 
 
 @contextmanager
-def undone(core: Core) -> Iterator[None]:
+def restored_afterwards(core: Core) -> Iterator[None]:
     snapshot = core.save()
     yield
     core.restore(snapshot)
@@ -112,8 +111,8 @@ def undone(core: Core) -> Iterator[None]:
 GATE_FAULT = 1 << 15
 
 
-def arrival(stand: Stand, by: int) -> Callable[[], None]:
-    """How the interrupt comes about; a frame finds one before it in the queue."""
+def trigger(stand: Stand, by: int) -> Callable[[], None]:
+    """A function that causes the interrupt. If a CAN frame causes it, another frame is already in the queue."""
     if by == preempt.GATE:
         return lambda: stand.core.pend(preempt.GATE)
     first, frame = stand.command.frame(), stand.command.frame()
@@ -121,26 +120,26 @@ def arrival(stand: Stand, by: int) -> Callable[[], None]:
     return lambda: stand.library.can_frame_arrives(stand.handle, ctypes.byref(frame))
 
 
-# Activities that read what the interrupt writes may find either value; the interrupt does not affect the others.
-LOOKS = ((preempt.FAST, preempt.GATE), (preempt.TASK, preempt.GATE), (preempt.TASK, preempt.CAN))
+# Activities that read what the interrupt writes: they may find the old or the new value. It does not affect the others.
+READERS = ((preempt.FAST, preempt.GATE), (preempt.TASK, preempt.GATE), (preempt.TASK, preempt.CAN))
 VICTIMS = {preempt.FAST: "fast", preempt.MRAI: "mrai", preempt.TASK: "task"}
 PAIRS = [(victim, by) for by in (preempt.GATE, preempt.CAN) for victim in VICTIMS]
 
 
 @pytest.mark.parametrize(("victim", "by"), PAIRS, ids=[f"{VICTIMS[v]}-{'gate' if b == preempt.GATE else 'can'}"
                                                        for v, b in PAIRS])  # fmt: skip
-def test_an_interrupt_within_an_activity_leaves_what_it_would_have_left_just_before_or_just_after_it(
+def test_an_interrupt_within_an_activity_has_the_same_result_as_just_before_or_just_after_it(
     stand: Stand, victim: int, by: int
 ) -> None:
     if victim == preempt.MRAI and stand.loop.get("identification_mode") == ROBUST:
         pytest.skip("the robust identification has no interrupt of its own")
     with (
-        undone(stand.core),
-        preempt.interrupt_from_both_sides(stand.core, victim, by, arrival(stand, by)) as sides,
+        restored_afterwards(stand.core),
+        preempt.interrupt_from_both_sides(stand.core, victim, by, trigger(stand, by)) as sides,
     ):
         assert sides.mixed == ()
         assert sides.before + sides.after == sides.instructions > 50
-        if (victim, by) in LOOKS:
+        if (victim, by) in READERS:
             assert not sides.same and sides.before > 0 and sides.after > 0
         else:
             assert sides.same
@@ -148,7 +147,7 @@ def test_an_interrupt_within_an_activity_leaves_what_it_would_have_left_just_bef
 
 def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand) -> None:
     core, loop = stand.core, stand.loop
-    with preempt.interrupt_from_both_sides(core, preempt.FAST, preempt.GATE, arrival(stand, preempt.GATE)) as sides:
+    with preempt.interrupt_from_both_sides(core, preempt.FAST, preempt.GATE, trigger(stand, preempt.GATE)) as sides:
         core.restore(sides.snapshot_before)
         assert loop.get("fault_word") == GATE_FAULT
         core.restore(sides.snapshot_after)
@@ -162,8 +161,8 @@ def test_a_gate_fault_is_latched_in_its_own_period_or_in_the_next(stand: Stand) 
 def test_a_frame_that_comes_within_the_task_is_taken_by_it_or_waits_for_the_next(stand: Stand) -> None:
     core = stand.core
     with (
-        undone(core),
-        preempt.interrupt_from_both_sides(core, preempt.TASK, preempt.CAN, arrival(stand, preempt.CAN)) as sides,
+        restored_afterwards(core),
+        preempt.interrupt_from_both_sides(core, preempt.TASK, preempt.CAN, trigger(stand, preempt.CAN)) as sides,
     ):
         core.restore(sides.snapshot_before)
         taken, put = core.word("taken"), core.word("put")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emulated processor by itself: small programs that do one wrong thing, and exceptions of every kind."""
+"""The emulated processor by itself: small programs with one wrong access each, and exceptions of every kind."""
 
 import ctypes
 import struct
@@ -21,25 +21,25 @@ REFUSED = {
     4: "write of FTM0.MOD offset 0x8: 0x00010000 changes the reserved bits 0x00010000",
     5: "read of 0x40025000: no peripheral is modelled there",
     6: "write of FTM0.MOD offset 0x8: 1 bytes, the register has 4",
-    7: "write of 4 bytes at 0x00008000, where nothing is or may be changed",
-    8: "write of 4 bytes at 0x1fff7ffc, where nothing is or may be changed",
+    7: "write of 4 bytes at 0x00008000: no memory, or not permitted",
+    8: "write of 4 bytes at 0x1fff7ffc: no memory, or not permitted",
     9: "write of 0x00000001 to the core's register 0xe000ed94 (4 bytes): not modelled",
     10: "the bits 0x8 are write protected (FMS.WPEN)",
     11: "HSRUN is not allowed by PMPROT.AHSRUN",
     12: "0x12345678 is neither unlock nor refresh",
     13: "vector 21 (IRQ 5) has no handler",
-    14: "has not the key 0x05FA",
+    14: "does not contain the key 0x05FA",
     15: "a floating-point instruction ran although CPACR does not allow it",
     16: "in HSRUN the core's clock changes by more than a factor of two",
     17: "clock gates must not be changed in HSRUN",
     18: "write of SMC.PMPROT: it can be written once after a reset",
-    19: "write of ADC0.SC3: calibration wants CLPS ... CLP9 to be 0",
+    19: "write of ADC0.SC3: calibration requires CLPS ... CLP9 to be 0",
     20: "ADC0: a sample takes less than 275 ns",
     21: "ADC0 converts without having been calibrated",
     22: "write of LPIT0 offset 0x10: the module was not enabled four clocks before",
     23: "write of CAN0.MCR: the bits 0x20000000 can be written in freeze mode only",
     24: "write of CAN0.MCR: its message memory has not been initialised",
-    25: "FTM0 is used, but PORTD.PCR15 does not give it its pin (MUX 2)",
+    25: "FTM0 is used, but PORTD.PCR15 does not give it the pin (MUX 2)",
     26: "PTC: line 0 is switched on, but it is an input (PDDR)",
 }
 
@@ -51,9 +51,9 @@ def test_what_is_not_modelled_is_an_error(library: ctypes.CDLL, program: Program
             core.run(1e-3)
         assert core.error is not None
         assert REFUSED[case] in core.error
-        assert "(reset+0x" in core.error, core.error  # and where in the program
+        assert "(reset+0x" in core.error, core.error  # the place in the program
         with pytest.raises(EmulationStoppedError, match="the emulation stopped"):
-            core.run(1e-3)  # it stays stopped
+            core.run(1e-3)  # it cannot be continued
 
 
 def test_the_program_counter_of_a_refused_access_is_exact(library: ctypes.CDLL, program: Program) -> None:
@@ -77,14 +77,15 @@ def exceptions(program: Program) -> Path:
 def test_exceptions_nest_by_priority(library: ctypes.CDLL, exceptions: Path, counting: bool) -> None:
     with Core.of_program(library, exceptions, counting) as core:
         core.run(5.5e-3)
-        # Masked first; then LOW interrupted by HIGH and MIDDLE, which pends LOW again; the whole once more; HIGH.
+        # HIGH after it was masked; LOW, interrupted by HIGH and by MIDDLE, which pends LOW again; LOW once more with
+        # the same interruptions; HIGH.
         first = [6]
         once = [1, 6, 2, 4, 5, 3]
         order = [core.word("order", k) for k in range(core.word("at"))]
         assert core.word("masked") == 0
         assert order == first + once + once + first
         assert core.word("wrong") == 0
-        # HIGH doubles: it has run as often as the order says.
+        # Each run of HIGH doubles the value, which therefore counts its runs.
         (value,) = struct.unpack("<f", core.read(core.symbol("value"), 4))
         assert value == 2.0 ** order.count(6)
 
@@ -102,11 +103,11 @@ def test_handlers_are_counted_without_what_interrupts_them(
             counts.append([[getattr(core.counts(v), n) for n, _ in core.counts(v)._fields_]
                            for v in (LOW, MIDDLE, HIGH, LPIT)])  # fmt: skip
     low, middle, high, _ = counts[0]
-    # Only blocks count the slot of an IT instruction that is skipped: one for each comparison, two of them in LOW.
+    # Only counting by blocks includes an instruction that an IT skips: one for each comparison, of which LOW has two.
     assert [one[0] for one in counts[0]] == [one[0] for one in counts[1]]
     assert all(0 <= block[1] - one[1] <= 2 * one[0] for block, one in zip(*counts, strict=True))
     assert (low[0], middle[0], high[0]) == (2, 2, 4)
-    # HIGH has no branch: the same each time, and as many as the listing has from its symbol to its return.
+    # HIGH has no branch: each run has as many instructions as the listing from the symbol to the return.
     listing = subprocess.run(["arm-none-eabi-objdump", "-d", "--disassemble=high", str(exceptions)], check=True,
                              capture_output=True, text=True).stdout  # fmt: skip
     instructions = [line for line in listing.splitlines() if "\t" in line and ".word" not in line]
@@ -115,7 +116,7 @@ def test_handlers_are_counted_without_what_interrupts_them(
     assert middle[2] < middle[3]  # it pends LOW in its first run only
 
 
-def test_a_profile_counts_what_is_skipped_behind_an_it_and_takes_it_for_no_branch(
+def test_a_profile_counts_instructions_that_an_it_skips_and_no_branch_for_them(
     library: ctypes.CDLL, exceptions: Path
 ) -> None:
     with Core.of_program(library, exceptions) as core:
@@ -133,7 +134,7 @@ def test_a_profile_counts_what_is_skipped_behind_an_it_and_takes_it_for_no_branc
         assert (len(issued), min(issued), max(issued), sum(issued)) == (
             block.runs, block.least, block.most, block.sum)  # fmt: skip
     assert sum(executed) < sum(block.sum for block in blocks)  # something was skipped
-    # LOW and HIGH compare, but have no branch: nothing but one for each instruction.
+    # LOW and HIGH compare, but have no branch: their cost is one for each instruction.
     assert all(cost == count for v, count, cost in spans if v in (LOW, HIGH))
 
 
@@ -146,7 +147,7 @@ def test_a_sleeping_core_is_woken_by_each_tick(library: ctypes.CDLL, exceptions:
         assert core.instructions - executed < 100
 
 
-def test_an_unserviced_watchdog_resets_and_tells_why(library: ctypes.CDLL, exceptions: Path) -> None:
+def test_an_unserviced_watchdog_resets_and_reports_why(library: ctypes.CDLL, exceptions: Path) -> None:
     with Core.of_program(library, exceptions) as core:
         core.run(9.9e-3)
         assert core.resets == 0
@@ -158,7 +159,7 @@ def test_an_unserviced_watchdog_resets_and_tells_why(library: ctypes.CDLL, excep
         assert core.resets == 3
 
 
-def test_a_snapshot_takes_everything_back(library: ctypes.CDLL, exceptions: Path) -> None:
+def test_a_snapshot_restores_everything(library: ctypes.CDLL, exceptions: Path) -> None:
     with Core.of_program(library, exceptions) as core:
         core.run(3.2e-3)
         snapshot = core.save()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The profile of each handler's runs, against the emulator's own counters and against programs counted by hand."""
+"""The profile of each handler's runs, compared with the emulator's own counters."""
 
 import ctypes
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ def start(stand: image.Stand, cost: int, taken: int) -> None:
     assert stand.library.emu_profile_start(stand.handle, costs, len(costs), taken)
 
 
-def test_the_runs_add_up_to_what_the_emulators_counters_say_and_what_is_skipped(stand: image.Stand) -> None:
+def test_the_runs_add_up_to_the_emulators_counters_plus_skipped_instructions(stand: image.Stand) -> None:
     start(stand, 1, 0)
     stand.library.emu_counts_clear(stand.handle)
     stand.loop.run(200)
@@ -41,11 +41,11 @@ def test_the_runs_add_up_to_what_the_emulators_counters_say_and_what_is_skipped(
         counts = stand.core.counts(vector)
         assert len(issued) == counts.runs
         assert min(issued) >= counts.least
-        # The counters do not see what is skipped behind an IT: some per cent of a handler.
+        # The counters do not include the instructions that an IT skips: some per cent of a handler.
         assert counts.sum <= sum(issued) < 1.05 * counts.sum
 
 
-def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_come_on_top(stand: image.Stand) -> None:
+def test_a_run_costs_the_sum_over_its_instructions_and_its_taken_branches(stand: image.Stand) -> None:
     start(stand, 1, 0)
     stand.loop.run(50)
     assert all(cost == instructions for _, instructions, cost in stand.take())
@@ -54,20 +54,20 @@ def test_with_a_cost_of_one_each_a_run_costs_its_instructions_and_its_branches_c
     assert all(cost == 3 * instructions for _, instructions, cost in stand.take())
     start(stand, 1, 1)
     stand.loop.run(50)
-    # Some instructions, and never all, are not followed by their neighbour: none where an interrupt is one straight
-    # line, whose return has none, but the task calls.
+    # After some instructions, but never after all, another one runs than the next in memory. An interrupt without
+    # branches may have none (its return is not counted as one); the task has some, because it calls functions.
     spans = list(stand.take())
     assert {vector for vector, _, _ in spans} == set(VECTORS)
     assert [span for span in spans if not span[1] + (span[0] == image.TASK) <= span[2] < 1.5 * span[1]] == []
 
 
-def test_an_instruction_without_a_cost_is_an_error_that_tells_where_it_is(stand: image.Stand) -> None:
+def test_an_instruction_without_a_cost_is_an_error_with_its_address(stand: image.Stand) -> None:
     start(stand, 0, 0)
     with pytest.raises(FluxtrueError, match="the instruction at 0x0000.* ran, but no cost was given for it"):
         stand.loop.run(1)
 
 
-def test_what_is_taken_is_not_given_again(stand: image.Stand) -> None:
+def test_each_run_is_returned_only_once(stand: image.Stand) -> None:
     start(stand, 1, 0)
     stand.loop.run(20)
     assert len(list(stand.take())) >= 40

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The other peripherals by themselves: a program that idles, and registers used from outside."""
+"""The other peripherals by themselves: an idle program runs, and the test accesses the registers from outside."""
 
 import ctypes
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from conftest import Program
 from fluxtrue_tools.bench.image import Frame
 from fluxtrue_tools.emulate.core import CENTRE, Core, EmulationStoppedError
 
-CORE_S = 1 / 48e6  # out of reset the fast internal clock runs everything
+CORE_S = 1 / 48e6  # after reset the core runs from the fast internal clock
 CLOCK_S = 1 / 12e6  # of the converter and the interval timer, as set up here
 CONVERSION_S = 43 * CLOCK_S  # SMPLTS 12: 13 + 30 clocks
 COCO, AIEN, ADTRG = 0x80, 0x40, 0x40
@@ -27,7 +27,7 @@ def core(library: ctypes.CDLL, program: Program) -> Iterator[Core]:
 
 
 def clock(core: Core, *names: str) -> None:
-    """On, from the 12 MHz of the internal clock where there is a choice."""
+    """Switch the clocks on; peripherals with a choice get 12 MHz from the internal clock."""
     for name in names:
         register = f"PCC.PCC_{name}"
         if core.register(register) & 0x4000_0000 == 0 and name[:3] in {"ADC", "LPI", "LPS"}:
@@ -83,11 +83,11 @@ def test_complete_is_cleared_by_result_or_control(adc: Core, by: str) -> None:
     assert adc.register("ADC0.SC10") & COCO == 0
 
 
-@pytest.mark.parametrize("asked", [0, AIEN])
-def test_a_complete_conversion_interrupts_if_asked_to(adc: Core, asked: int) -> None:
-    adc.store("ADC0.SC10", 3 | asked)
+@pytest.mark.parametrize("enable", [0, AIEN])
+def test_a_complete_conversion_interrupts_if_enabled(adc: Core, enable: int) -> None:
+    adc.store("ADC0.SC10", 3 | enable)
     adc.run(CONVERSION_S + 1e-6)
-    assert adc.word("taken", ADC0_IRQ) == (1 if asked else 0)
+    assert adc.word("taken", ADC0_IRQ) == (1 if enable else 0)
 
 
 def test_the_disabled_input_is_not_converted(adc: Core) -> None:
@@ -131,7 +131,7 @@ def test_a_channel_expires_periodically(lpit: Core) -> None:
         lpit.run(CLOCK_S)
         assert lpit.register("LPIT0.MSR") & 1
         lpit.store("LPIT0.MSR", 1)
-    assert lpit.word("taken", LPIT0_IRQ) == 1  # it masks itself then
+    assert lpit.word("taken", LPIT0_IRQ) == 1  # then the program disables it
 
 
 def test_a_new_value_acts_after_the_next_expiry(lpit: Core) -> None:
@@ -158,7 +158,7 @@ def test_other_channel_modes_are_refused(lpit: Core, name: str, value: int) -> N
 
 @pytest.fixture
 def spi(core: Core) -> Core:
-    """LPSPI1, at which nothing answers: all ones."""
+    """LPSPI1 without a device: it receives ones."""
     clock(core, "LPSPI1")
     core.store("LPSPI1.CFGR1", 1)
     core.store("LPSPI1.CCR", 1 << 24 | 1 << 16 | 1 << 8 | 2)  # four clocks a bit
@@ -179,13 +179,13 @@ def test_a_frame_arrives_when_its_bits_have_been_clocked(spi: Core) -> None:
     assert spi.load("LPSPI1.RSR") & 2
 
 
-def test_a_missing_word_and_one_too_many_are_refused(spi: Core) -> None:
+def test_a_frame_with_a_full_fifo_is_refused(spi: Core) -> None:
     for _ in range(4):
         spi.store("LPSPI1.TDR", 0)
     refused(spi, "LPSPI1.TDR", 0, "4 words waiting do not fit")
 
 
-def test_an_empty_fifo_is_not_read(spi: Core) -> None:
+def test_reading_an_empty_fifo_is_refused(spi: Core) -> None:
     with pytest.raises(EmulationStoppedError, match="nothing has been received"):
         spi.load("LPSPI1.RDR")
 
@@ -200,7 +200,7 @@ def test_other_transfer_modes_are_refused(spi: Core, name: str, value: int) -> N
 
 @pytest.fixture
 def ftm(core: Core) -> Core:
-    """FTM0 counts from 100 to 1099, its pins connected, no output enabled."""
+    """FTM0 set up to count from 100 to 1099, with its pins connected and no output enabled."""
     clock(core, "PORTA", "PORTB", "PORTD", "PORTE", "FTM0", "FTM2")
     for pin in ("D.PCR15", "D.PCR16", "D.PCR0", "D.PCR1", "B.PCR4", "B.PCR5", "E.PCR8", "A.PCR14"):
         core.store(f"PORT{pin}", 2 << 8)
@@ -212,7 +212,7 @@ def ftm(core: Core) -> Core:
 
 def test_the_counter_wraps_at_its_modulus(ftm: Core) -> None:
     ftm.store("FTM0.SC", 1 << 3 | 1)  # half of the clock
-    ftm.run(0)  # the period's begin
+    ftm.run(0)  # start of the period
     assert ftm.run(CORE_S) != CENTRE
     ftm.run(1997 * CORE_S)
     assert ftm.load("FTM0.CNT") == 1099
@@ -220,8 +220,8 @@ def test_the_counter_wraps_at_its_modulus(ftm: Core) -> None:
     assert ftm.load("FTM0.CNT") == 100
 
 
-def acting(core: Core) -> float:
-    """Share of the period for which the first pair's pulse lasts."""
+def acting_duty(core: Core) -> float:
+    """The duty of the first pair that acts in this period."""
     return core.duty(0)
 
 
@@ -230,20 +230,20 @@ def test_compare_values_wait_for_their_trigger(ftm: Core) -> None:
     ftm.store("FTM0.C1V", 600)
     ftm.store("FTM0.SC", 1 << 3)
     ftm.run(0)
-    assert acting(ftm) == pytest.approx(0.5)
+    assert acting_duty(ftm) == pytest.approx(0.5)
     ftm.store("FTM0.C1V", 350)
     for _ in range(2):
         assert ftm.run(1e-3) == CENTRE
-        assert acting(ftm) == pytest.approx(0.5)  # no trigger
+        assert acting_duty(ftm) == pytest.approx(0.5)  # no trigger
     ftm.store("FTM0.SYNC", 0x8A)
-    assert acting(ftm) == pytest.approx(0.5)
+    assert acting_duty(ftm) == pytest.approx(0.5)
     assert ftm.run(1e-3) == CENTRE
-    assert acting(ftm) == pytest.approx(0.25)
+    assert acting_duty(ftm) == pytest.approx(0.25)
     assert ftm.register("FTM0.SYNC") & 0x80 == 0
 
 
 def test_the_mask_waits_for_the_hardware_trigger(ftm: Core) -> None:
-    """Channels 0 and 1 drive; TRGMUX gives FTM0 its own initialisation trigger, which EXTTRIG lets out."""
+    """All six channels drive their pins. TRGMUX connects FTM0's own initialisation trigger, which EXTTRIG enables."""
     ftm.store("FTM0.SYNC", 0)
     ftm.store("FTM0.OUTMASK", 0x3F)
     ftm.store("FTM0.SYNC", 0x0A)
@@ -267,7 +267,7 @@ def test_the_mask_waits_for_the_hardware_trigger(ftm: Core) -> None:
 
 
 def test_the_counter_follows_the_encoder(ftm: Core) -> None:
-    """The shaft stands at the encoder's zero; what is written is what it is at from then on."""
+    """The shaft starts at the encoder's zero; a value that is written to the counter is its position from then on."""
     for pin in ("D.PCR10", "D.PCR11"):
         ftm.store(f"PORT{pin}", 3 << 8)
     ftm.store("FTM2.MOD", 16383)
@@ -299,7 +299,7 @@ def test_other_timer_modes_are_refused(ftm: Core, name: str, value: int, message
 
 
 def test_clocks_beyond_the_data_sheet_are_refused(core: Core) -> None:
-    """48 MHz for the flash, which may have 26.7."""
+    """48 MHz for the flash, which may run at up to 26.7 MHz."""
     refused(core, "SCG.RCCR", 3 << 24 | 0 << 16 | 0 << 4 | 0, "flash 48000 kHz are too fast for RUN")
 
 
@@ -325,7 +325,7 @@ def test_other_trigger_sources_are_refused(core: Core) -> None:
 # ---- pins
 
 
-def test_a_locked_pin_and_pin_interrupts_are_refused(core: Core) -> None:
+def test_writing_a_locked_pin_is_refused(core: Core) -> None:
     clock(core, "PORTC")
     core.store("PORTC.PCR3", 1 << 15 | 1 << 8)
     refused(core, "PORTC.PCR3", 1 << 8, "the pin is locked")
@@ -378,7 +378,7 @@ def test_the_watchdog_locks_again(core: Core) -> None:
     refused(core, "WDOG.TOVAL", 100, "the watchdog is locked")
 
 
-def test_without_update_the_watchdog_is_not_configured_again(core: Core) -> None:
+def test_without_update_the_watchdog_stays_configured(core: Core) -> None:
     unlock(core)
     core.store("WDOG.TOVAL", 1280)
     core.store("WDOG.CS", 0x2180)  # on, no UPDATE
@@ -386,7 +386,7 @@ def test_without_update_the_watchdog_is_not_configured_again(core: Core) -> None
 
 
 @pytest.mark.parametrize(("after_s", "resets"), [(2e-3, 1), (5e-3, 0)])
-def test_a_refresh_within_the_window_resets(core: Core, after_s: float, resets: int) -> None:
+def test_a_refresh_in_the_closed_window_resets(core: Core, after_s: float, resets: int) -> None:
     unlock(core)
     core.store("WDOG.WIN", 512)  # 4 ms of 128 kHz
     core.store("WDOG.TOVAL", 1280)
@@ -405,9 +405,9 @@ def test_a_watchdog_interrupt_is_refused(core: Core) -> None:
 # ---- interrupts
 
 
-def test_a_level_that_stands_interrupts_again(adc: Core) -> None:
-    """Its cause, the result, is never read."""
-    adc.write(adc.symbol("most"), (3).to_bytes(4, "little"))
+def test_a_level_that_stays_active_interrupts_again(adc: Core) -> None:
+    """The result, which is the cause of the interrupt, is never read."""
+    adc.write(adc.symbol("taken_max"), (3).to_bytes(4, "little"))
     adc.store("ADC0.SC10", 3 | AIEN)
     adc.run(CONVERSION_S + 1e-5)
     assert adc.word("taken", ADC0_IRQ) == 3
@@ -454,8 +454,8 @@ def test_received_frames_queue_for_the_program(can: Core) -> None:
     assert can.load("CAN0.IFLAG1") & 1 << 5 == 0
 
 
-def test_boxes_are_sent_lowest_identifier_first(can: Core) -> None:
-    """47 + 64 bits of 2 us each. The first box is on the bus already when the others are filled."""
+def test_mailboxes_are_sent_lowest_identifier_first(can: Core) -> None:
+    """A frame has 47 + 64 bits of 2 us each. The first mailbox is being sent already when the others are filled."""
     frame_s = 111 * 2e-6
     for box, identifier in ((8, 0x300), (9, 0x200), (10, 0x100)):
         can.store(f"CAN0.EmbeddedRAM{4 * box + 1}", identifier << 18)

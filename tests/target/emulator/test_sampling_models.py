@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Delay block and converter by themselves: a program that idles, and registers used from outside."""
+"""Delay block and converter by themselves: an idle program runs, and the test accesses the registers from outside."""
 
 import ctypes
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from conftest import Program
 
 from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
 
-CORE_S = 1 / 48e6  # out of reset the fast internal clock runs everything
+CORE_S = 1 / 48e6  # after reset the core runs from the fast internal clock
 ADC_S = 1 / 12e6
 CONVERSION_S = 43 * ADC_S  # SMPLTS 12: 13 + 30 clocks
 OUTPUT_S = 3 * CORE_S  # pre-trigger two cycles after its cause, trigger one later
@@ -59,7 +59,7 @@ def test_a_delay_counts_from_the_trigger(core: Core) -> None:
     assert done(core) == [2]
 
 
-def test_a_delay_beyond_the_modulus_never_comes(core: Core) -> None:
+def test_a_delay_beyond_the_modulus_never_triggers(core: Core) -> None:
     arm(core, 0b001, 0b001, 0, CH0DLY0=480, MOD=479)
     trigger(core)
     core.run(1e-3)
@@ -75,7 +75,7 @@ def test_a_delay_acts_only_after_it_was_loaded(core: Core) -> None:
 
 
 def chain(core: Core) -> None:
-    """Three conversions, each after the one before; long enough for all of them."""
+    """Run three conversions, each of which starts at the end of the one before, until all are complete."""
     arm(core, 0b111, 0b001, 0b110, CH0DLY0=0, MOD=1000)
     trigger(core)
     core.run(3 * (OUTPUT_S + CONVERSION_S))
@@ -107,7 +107,8 @@ def test_results_that_are_read_let_the_chain_run_again(core: Core) -> None:
 
 @pytest.mark.parametrize("unread", [0, 1, 2])
 def test_an_unread_result_stops_the_sequence(core: Core, unread: int) -> None:
-    """Its conversion ends again, but COCO does not rise: nothing follows, and the next trigger finds the lock."""
+    """COCO does not rise when the next conversion of the unread result ends: nothing follows, and the pre-trigger is
+    still locked at the next trigger."""
     chain(core)
     for k in {0, 1, 2} - {unread}:
         core.load(f"ADC0.R{k}")
@@ -123,7 +124,7 @@ def test_an_unread_result_stops_the_sequence(core: Core, unread: int) -> None:
         assert core.register("PDB0.CH0S") & 0xFF == 1
 
 
-def stuck(core: Core, more: int = 0) -> None:
+def leave_locked(core: Core, more: int = 0) -> None:
     chain(core)
     trigger(core, more)
     core.run(3 * (OUTPUT_S + CONVERSION_S))
@@ -132,7 +133,7 @@ def stuck(core: Core, more: int = 0) -> None:
 
 @pytest.mark.parametrize("by", ["PDBEN", "EN"])
 def test_disabling_releases_the_locks(core: Core, by: str) -> None:
-    stuck(core)
+    leave_locked(core)
     if by == "PDBEN":
         core.store("PDB0.SC", 0)
     else:
@@ -143,7 +144,7 @@ def test_disabling_releases_the_locks(core: Core, by: str) -> None:
 
 
 def test_a_trigger_during_a_conversion_is_ignored(core: Core) -> None:
-    arm(core, 0b011, 0b011, 0, CH0DLY0=0, CH0DLY1=48, MOD=1000)  # the second 1 us later, in the first conversion
+    arm(core, 0b011, 0b011, 0, CH0DLY0=0, CH0DLY1=48, MOD=1000)  # 1 us later: during the first conversion
     trigger(core)
     core.run(3 * CONVERSION_S)
     assert done(core) == [0]
@@ -151,18 +152,18 @@ def test_a_trigger_during_a_conversion_is_ignored(core: Core) -> None:
 
 
 def test_a_sequence_error_interrupts_until_it_is_cleared(core: Core) -> None:
-    stuck(core, PDBEIE)
+    leave_locked(core, PDBEIE)
     assert core.word("taken", PDB0_IRQ) == 0
     trigger(core, PDBEIE)
     core.run(1e-6)
     assert core.word("taken", PDB0_IRQ) == 1
-    assert core.read(0xE000_E200 + 4 * (PDB0_IRQ // 32), 4)[PDB0_IRQ % 32 // 8] >> PDB0_IRQ % 8 & 1  # still asked for
+    assert core.read(0xE000_E200 + 4 * (PDB0_IRQ // 32), 4)[PDB0_IRQ % 32 // 8] >> PDB0_IRQ % 8 & 1  # still pending
     core.store("PDB0.CH0S", 0xFF0000)  # zeros clear the errors, ones keep the flags
     assert core.register("PDB0.CH0S") == 0x070000
 
 
 def test_without_its_enable_a_sequence_error_does_not_interrupt(core: Core) -> None:
-    stuck(core)
+    leave_locked(core)
     trigger(core)
     core.run(1e-5)
     assert core.register("PDB0.CH0S") & 0xFF == 1

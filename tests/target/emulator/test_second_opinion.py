@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The core's exceptions, masks, priorities, SysTick and floating-point context, in this emulator's own models
-(nvic.c, scs.c) and in QEMU's, which share nothing with them."""
+"""The core's exceptions, masks, priorities, SysTick and floating-point context: this emulator's models (nvic.c, scs.c)
+behave like those of QEMU, which were written independently."""
 
 import ctypes
 import shutil
@@ -14,12 +14,12 @@ from fluxtrue_tools.emulate.core import Core
 QEMU = "qemu-system-arm"
 ANY_M4F = "mps2-an386"
 CLOCK = ("-icount", "shift=3,sleep=off")
-MARKS = 16  # steps that begin with a mark
+MARKS = 16  # every step begins with a mark
 
 
 def qemu(program: Program) -> list[int]:
     if shutil.which(QEMU) is None:
-        pytest.skip(f"{QEMU} is not installed: there is no second opinion")
+        pytest.skip(f"{QEMU} is not installed: there is nothing to compare with")
     elf = program("core_slice", "-DSEMIHOSTING", data=0x2000_0800, bss=0x2000_0000)
     command = [QEMU, "-M", ANY_M4F, "-nographic", "-monitor", "none", "-serial", "none", *CLOCK,
                "-semihosting-config", "enable=on,target=native", "-kernel", str(elf)]  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bridge's timer by itself, its fault control and outputs: a program that idles, registers used from outside."""
+"""The bridge's timer, its fault control and its outputs: an idle program runs, and the test accesses the registers."""
 
 import ctypes
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from conftest import Program
 
 from fluxtrue_tools.emulate.core import CENTRE, Core, EmulationStoppedError, State
 
-CORE_S = 1 / 48e6  # out of reset the fast internal clock runs everything
+CORE_S = 1 / 48e6  # after reset the core runs from the fast internal clock
 PERIOD_S = 1000 * CORE_S
 ALL, EVEN = 0x3F, 0x15
 FTMEN, WPDIS, FAULTIE = 1, 4, 1 << 7
@@ -25,7 +25,7 @@ PINS = ("PORTD.PCR15", "PORTD.PCR16", "PORTD.PCR0", "PORTD.PCR1", "PORTB.PCR4", 
 
 
 def set_up(core: Core, **changed: int) -> None:
-    """Three complementary pairs at half duty, fault control as the port has it; `changed` in place of these."""
+    """Three complementary pairs at half duty, with the fault control of the port; `changed` replaces single values."""
     core.run(1e-4)
     for port in "ABDE":
         core.store(f"PCC.PCC_PORT{port}", 1 << 30)
@@ -56,7 +56,7 @@ def core(bare: Core) -> Core:
 
 
 def advance(core: Core, seconds: float) -> None:
-    """However many periods begin meanwhile."""
+    """Run for this time, over any number of periods."""
     end = core.now_s + seconds
     while end - core.now_s > CORE_S / 100:
         core.run(end - core.now_s)
@@ -91,7 +91,7 @@ def test_the_filter_delays_and_ignores_pulses(bare: Core, control: int, prescale
 
 
 def test_the_level_of_fltpol_is_the_fault(bare: Core) -> None:
-    """Active high, with a line that is high while all is well: off at once, whatever the gate driver says."""
+    """The line is high without a fault. If high is set as the active level, the outputs are switched off."""
     set_up(bare, FLTPOL=0)
     advance(bare, FILTER_S)
     assert bare.outputs == 0
@@ -117,7 +117,7 @@ def test_only_pairs_with_faulten_are_switched_off(bare: Core, pair: int) -> None
     assert bare.outputs == 3 << 2 * pair
 
 
-def test_a_bridge_that_drives_in_part_is_refused(bare: Core) -> None:
+def test_a_bridge_with_only_some_outputs_on_is_refused(bare: Core) -> None:
     set_up(bare, MODE=FTMEN | WPDIS | 1 << 5)
     fault(bare, 10 * CORE_S)
     with pytest.raises(EmulationStoppedError, match="drives the outputs 0x2a of 0x3f"):
@@ -130,7 +130,7 @@ def test_a_pair_without_dead_time_is_refused(bare: Core) -> None:
 
 
 def test_a_fault_before_fault_control_sets_no_flag(bare: Core) -> None:
-    """The flag is set by an edge: a line that is up before FAULTM is set is seen in FAULTIN only."""
+    """An edge sets the flag: a line that is active before FAULTM is set appears in FAULTIN only."""
     bare.board(gate_fault=True)
     set_up(bare, MODE=FTMEN | WPDIS)
     advance(bare, PERIOD_S)
@@ -143,7 +143,7 @@ def test_a_fault_before_fault_control_sets_no_flag(bare: Core) -> None:
 def test_the_flag_is_cleared_by_read_then_write(core: Core) -> None:
     fault(core, FILTER_S)
     assert core.load("FTM0.FMS") & FAULTF
-    core.store("FTM0.FMS", 0)  # the filter still tells of the fault
+    core.store("FTM0.FMS", 0)  # the fault is still at the filter's output
     assert core.load("FTM0.FMS") & (FAULTF | FAULTIN) == FAULTF | FAULTIN
     advance(core, FILTER_S)
     core.store("FTM0.FMS", FAULTF)  # a one clears nothing
@@ -215,7 +215,7 @@ def test_mask_and_software_control_switch_off(core: Core) -> None:
 
 
 @pytest.mark.parametrize("changed", [{"SC": RUNS & ~(1 << 18)}, {"C2SC": 0}])
-def test_an_output_wants_its_enable_and_its_edge(bare: Core, changed: dict[str, int]) -> None:
+def test_an_output_requires_its_enable_and_its_edge(bare: Core, changed: dict[str, int]) -> None:
     with pytest.raises(EmulationStoppedError, match="drives the outputs 0x3b of 0x3f"):
         set_up(bare, **changed)
 

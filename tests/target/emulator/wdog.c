@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Watchdog: runs from reset on, is configured within 128 bus clocks of an unlock, resets when it is not serviced, or
- * serviced within its window.
+/* Watchdog: runs from reset on, is configured within 128 bus clocks after an unlock, and resets the processor if it is
+ * not serviced in time or is serviced in its closed window.
  *
  * documented behaviour                             | modelled | test
  * ------------------------------------------------ | -------- | --------------------------------------------
- * runs from reset, resets after TOVAL              | yes      | test_an_unserviced_watchdog_resets_and_tells_why
+ * runs from reset, resets after TOVAL              | yes      | test_an_unserviced_watchdog_resets_and_reports_why
  * unlock for 128 bus clocks, then locked           | refused  | test_the_watchdog_locks_again
- * refresh restarts; too early in the window resets | yes      | test_a_refresh_within_the_window_resets
- * UPDATE 0: not configured again                   | refused  | test_the_watchdog_locks_again
- * a word that is neither                           | refused  | test_what_is_not_modelled_is_an_error
+ * refresh restarts; in the closed window it resets | yes      | test_a_refresh_in_the_closed_window_resets
+ * UPDATE 0: not configured again                   | refused  | test_without_update_the_watchdog_stays_configured
+ * neither refresh nor unlock                       | refused  | test_what_is_not_modelled_is_an_error
  * interrupt before the reset                       | refused  | test_a_watchdog_interrupt_is_refused
  * tolerance of the LPO, debug and stop modes       | no       | -
  */
@@ -37,7 +37,7 @@ bool wdog_models(uint32_t offset)
     return true;
 }
 
-static bool open_for_writing(const emu_t *emu)
+static bool is_unlocked(const emu_t *emu)
 {
     return emu->s.wdog.unlocked && emu->s.now < emu->s.wdog.unlock_end;
 }
@@ -56,7 +56,7 @@ uint32_t wdog_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
         return (uint32_t)((emu->s.now - w->start) / clock_ticks(emu, self)) & 0xFFFFU;
     }
     if (offset == CS) {
-        const uint32_t unlocked = open_for_writing(emu) && !w->configured ? 0x800U : 0U;
+        const uint32_t unlocked = is_unlocked(emu) && !w->configured ? 0x800U : 0U;
         return (stored & ~0xC00U) | (w->configured && emu->s.now >= w->acts_from ? 0x400U : 0U) | unlocked;
     }
     return stored;
@@ -111,7 +111,7 @@ void wdog_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
         count_written(emu, self, value);
         return;
     }
-    if (!open_for_writing(emu)) {
+    if (!is_unlocked(emu)) {
         emu_fail(emu, "write of WDOG offset 0x%x: the watchdog is locked", offset);
         return;
     }
@@ -120,7 +120,7 @@ void wdog_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
     if (offset == CS) {
         emu->s.wdog.configured = true;
-        emu->s.wdog.acts_from = emu->s.now + ACTS_AFTER; /* some ticks of its own clock */
+        emu->s.wdog.acts_from = emu->s.now + ACTS_AFTER; /* after some ticks of its own clock */
     }
     wdog_restart(emu);
 }

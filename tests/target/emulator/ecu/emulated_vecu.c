@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The virtual ECU's stand around the emulated processor: vecu.h once more, so that bus, bench channel and program of
- * tests/vecu serve the image that would be flashed. Image and layout are named by the environment (FLUXTRUE_IMAGE,
- * FLUXTRUE_LAYOUT). A frame waits for the wire twice, in the controller's model and on the hub's bus. */
+/* The virtual ECU with the emulated processor: a second implementation of vecu.h, with which the bus, the bench channel
+ * and the program of tests/vecu serve the image that would be flashed. The environment names image and layout
+ * (FLUXTRUE_IMAGE, FLUXTRUE_LAYOUT). A sent frame takes its time on the bus twice: in the controller's model and on the
+ * hub's bus. */
 #include "vecu.h"
 
 #include <math.h>
@@ -46,14 +47,14 @@ static const char *plant_set_up(sim_t *sim, uint64_t seed)
 
 static const char *processor_start(vecu_t *vecu)
 {
-    static char why[512];
+    static char reason[512];
     const char *image = getenv("FLUXTRUE_IMAGE"), *layout = getenv("FLUXTRUE_LAYOUT");
     if (image == NULL || layout == NULL) {
         return "FLUXTRUE_IMAGE and FLUXTRUE_LAYOUT must name files (tools/fluxtrue emulate --serve does)";
     }
-    vecu->sim = sim_create_emulated(image, layout, EMU_FAST, why, sizeof why);
+    vecu->sim = sim_create_emulated(image, layout, EMU_FAST, reason, sizeof reason);
     if (vecu->sim == NULL) {
-        return why;
+        return reason;
     }
     port = (can_port_t){on_sent, vecu};
     emu_can_port(sim_emulator(vecu->sim), &port);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef EMULATOR_PROGRAMS_BARE_H
 #define EMULATOR_PROGRAMS_BARE_H
-/** What a test program without start-up code needs: vectors, registers by address, a result to be read from outside.
+/** Definitions for test programs without start-up code: vectors, registers by address. A test reads the results.
  * Context  test programs only; variables in .data and .bss are not initialised */
 #include <stdint.h>
 

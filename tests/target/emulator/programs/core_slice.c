@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Exceptions, masks, priorities, SysTick and floating-point context of any Cortex-M4F, written down step by step: two
- * emulators that know nothing of each other must write the same. With SEMIHOSTING the words are printed at the end. */
+/* Records step by step how a Cortex-M4F handles exceptions, masks, priorities, SysTick and the floating-point context.
+ * Two independent emulators must record the same words. With SEMIHOSTING the words are printed at the end. */
 #include "bare.h"
 
 enum { A = 24, B = 25, C = 26, D = 27, WORDS = 256, PENDSV = 14, SYSTICK = 15 };
@@ -41,7 +41,7 @@ static void put(uint32_t word)
     }
 }
 
-static void settle(void)
+static void barrier(void)
 {
     __asm__ volatile("dsb\n isb" ::: "memory");
 }
@@ -68,7 +68,8 @@ static uint32_t vector_now(void)
     return vector;
 }
 
-/* Who runs, what is active, what is pending; then what this step asks for: one more interrupt, once; again itself. */
+/* Records its vector, and what is active and pending. Then it does what the step requests: it pends another interrupt
+ * once (`inner`), or pends itself (`again`). */
 void handler(void)
 {
     const uint32_t vector = vector_now();
@@ -81,13 +82,13 @@ void handler(void)
     if (more != 0U) {
         kept = kept * 2.0F;
         ISPR(0) = more;
-        settle();
+        barrier();
         put(vector | 0x100U);
     }
     if (again != 0U) {
         again = again - 1U;
         ISPR(0) = 1U << (vector - 16U);
-        settle();
+        barrier();
         put(vector | 0x200U);
     }
 }
@@ -106,7 +107,7 @@ static void all_at_once(uint32_t number, uint32_t a, uint32_t b, uint32_t c, uin
     priorities(a, b, c, d);
     mask();
     ISPR(0) = ALL;
-    settle();
+    barrier();
     put(ISPR(0) & ALL);
     unmask();
 }
@@ -116,7 +117,7 @@ static void nested(uint32_t number, uint32_t first, uint32_t then)
     put(MARK(number));
     inner = 1U << then;
     ISPR(0) = 1U << first;
-    settle();
+    barrier();
 }
 
 static void order(void)
@@ -125,12 +126,12 @@ static void order(void)
     all_at_once(2, 0x40, 0x40, 0x40, 0x40); /* by number */
     priorities(0x80, 0x40, 0x80, 0xC0);
     nested(3, A, B); /* preempts */
-    nested(4, A, C); /* waits: as urgent */
-    nested(5, A, D); /* waits: less urgent */
+    nested(4, A, C); /* waits: same priority */
+    nested(5, A, D); /* waits: lower priority */
     put(MARK(6));
     again = 2;
-    ISPR(0) = 1U << A; /* comes again after its return */
-    settle();
+    ISPR(0) = 1U << A; /* runs again after its return */
+    barrier();
 }
 
 static void masks(void)
@@ -138,7 +139,7 @@ static void masks(void)
     put(MARK(7));
     base_priority(0x80);
     ISPR(0) = ALL;
-    settle();
+    barrier();
     put(ISPR(0) & ALL); /* B alone has run */
     base_priority(0);
     put(ISPR(0) & ALL);
@@ -146,20 +147,20 @@ static void masks(void)
     mask();
     ISPR(0) = 1U << A;
     ICPR(0) = 1U << A;
-    unmask(); /* nothing */
+    unmask(); /* nothing runs */
     put(MARK(9));
     ICER(0) = 1U << B;
     ISPR(0) = 1U << B;
-    settle();
+    barrier();
     put(ISPR(0) & ALL);
     ISER(0) = 1U << B;
-    settle();
+    barrier();
     put(MARK(10));
     STIR = C;
-    settle();
+    barrier();
 }
 
-/* Groups of two bits: what differs in the lower ones only orders. */
+/* Priority groups of two bits: the bits below them order pending exceptions, but do not preempt. */
 static void groups(void)
 {
     put(MARK(11));
@@ -183,7 +184,7 @@ static void system_exceptions(void)
     ICSR = PENDSVSET;
     ICSR = PENDSTSET;
     ISPR(0) = 1U << A;
-    settle();
+    barrier();
     put(ICSR & (PENDSVSET | PENDSTSET));
     unmask();
     put(MARK(15));
@@ -193,11 +194,11 @@ static void system_exceptions(void)
     put(SYST_CSR & 7U);
     while ((SYST_CSR & 1U << 16) == 0U) {
     }
-    put(SYST_CSR >> 16 & 1U); /* reading has cleared it */
+    put(SYST_CSR >> 16 & 1U); /* 0: the read in the loop has cleared it */
     SYST_CSR = 0;
 }
 
-/* Sixteen registers and the flags live across a handler that uses them, too. */
+/* Floating-point registers and flags must be preserved across a handler that uses them, too. */
 static void context(void)
 {
     float low = 1.5F, high = 2.5F;
@@ -237,7 +238,7 @@ static void print(uint32_t word)
     (void)call(4, text);
 }
 
-static void tell(void)
+static void report(void)
 {
     for (uint32_t k = 0; k < used; k++) {
         print(out[k]);
@@ -245,7 +246,7 @@ static void tell(void)
     (void)call(0x18, (const void *)0x20026U); /* exits with status 0 */
 }
 #else
-static void tell(void)
+static void report(void)
 {
 }
 #endif
@@ -256,7 +257,7 @@ __attribute__((used)) void reset(void)
     watchdog_off();
 #endif
     CPACR = 15U << 20;
-    settle();
+    barrier();
     used = inner = again = 0;
     kept = 1.0F;
     ISER(0) = ALL;
@@ -266,7 +267,7 @@ __attribute__((used)) void reset(void)
     groups();
     system_exceptions();
     context();
-    tell();
+    report();
     for (;;) {
     }
 }

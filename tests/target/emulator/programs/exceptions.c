@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Three interrupts of different priority that pend each other, with floating point in all of them; then sleep, woken by
- * the timer, until the watchdog ends it. */
+/* Three interrupts of different priority pend each other and use floating point. Then the core sleeps and is woken by
+ * the timer, until the watchdog resets it. */
 #include "bare.h"
 
 enum { LOW = 10, MIDDLE = 11, HIGH = 12, LPIT = 48 };
@@ -18,13 +18,13 @@ __attribute__((section(".vectors"), used)) const vector_t vectors[16 + 64] = {
     (vector_t)STACK_TOP, reset, [16 + LOW] = low, [16 + MIDDLE] = middle, [16 + HIGH] = high, [16 + LPIT] = tick,
 };
 
-static void note(uint32_t what)
+static void record(uint32_t what)
 {
     order[at] = what;
     at = at + 1U;
 }
 
-/* Values that live in registers across the interruption, and the flags of their comparison. */
+/* Keeps two values in registers, and the flags of their comparison, while the interrupt that it pends may run. */
 static float busy(float from, uint32_t pend)
 {
     register float a = from * 3.0F, b = from * 5.0F;
@@ -32,32 +32,32 @@ static float busy(float from, uint32_t pend)
     __asm__ volatile("vcmp.f32 %0, %1" : "+t"(a), "+t"(b));
     ISPR(0) = 1U << pend;
     __asm__ volatile("dsb\n isb\n vmrs %2, fpscr" : "+t"(a), "+t"(b), "=r"(flags)::"memory");
-    wrong += 1U - (flags >> 31); /* less: without a branch, which would change what is counted */
+    wrong += 1U - (flags >> 31); /* flag N: a < b. Without a branch, because a test counts the instructions */
     return a + b;
 }
 
 void low(void)
 {
-    note(1);
+    record(1);
     wrong += busy(1.0F, HIGH) != 8.0F;
-    note(2);
+    record(2);
     wrong += busy(2.0F, MIDDLE) != 16.0F;
-    note(3);
+    record(3);
 }
 
 void middle(void)
 {
-    note(4);
+    record(4);
     if (again == 0U) {
         again = 1;
         wrong += busy(3.0F, LOW) != 24.0F; /* waits: it is of lower priority */
     }
-    note(5);
+    record(5);
 }
 
 void high(void)
 {
-    note(6);
+    record(6);
     value = value * 2.0F;
 }
 
@@ -90,7 +90,7 @@ static void start_timer(void)
     PCC(0xDCU) = 3U << 24;
     PCC(0xDCU) = 3U << 24 | CLOCK_ON;
     REG(0x40037008U) = 1;         /* module on */
-    for (int k = 0; k < 8; k++) { /* four clocks before it takes anything else */
+    for (int k = 0; k < 8; k++) { /* other registers may be written after four clocks */
         __asm__ volatile("nop");
     }
     REG(0x40037010U) = 1;           /* channel 0 interrupts */

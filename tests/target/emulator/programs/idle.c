@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Does nothing: a test uses the peripherals from outside. Each interrupt is counted, and masks itself once it has come
- * as often as `most` says. */
+/* Does nothing while a test accesses the peripherals from outside. Each interrupt is counted, and disabled after it has
+ * been taken `taken_max` times. */
 #include "bare.h"
 
 enum { IRQS = 123 };
 
-volatile uint32_t taken[IRQS], most;
+volatile uint32_t taken[IRQS], taken_max;
 
 void reset(void);
 void count(void);
@@ -22,7 +22,7 @@ void count(void)
     __asm__ volatile("mrs %0, ipsr" : "=r"(vector));
     const uint32_t irq = vector - 16U;
     taken[irq]++;
-    if (taken[irq] >= most) {
+    if (taken[irq] >= taken_max) {
         REG(0xE000E180U + 4U * (irq / 32U)) = 1U << irq % 32U;
     }
 }
@@ -30,7 +30,7 @@ void count(void)
 __attribute__((used)) void reset(void)
 {
     watchdog_off();
-    most = 1;
+    taken_max = 1;
     for (uint32_t irq = 0; irq < IRQS; irq++) {
         taken[irq] = 0;
         ISER(irq / 32U) = 1U << irq % 32U;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* One access that is wrong, chosen by CASE. */
+/* One wrong access, chosen by CASE. */
 #include "bare.h"
 
 volatile uint32_t seen;
@@ -8,7 +8,7 @@ void reset(void);
 __attribute__((section(".vectors"), used)) const vector_t vectors[16] = {(vector_t)STACK_TOP, reset};
 
 #if CASE >= 16 && CASE <= 18
-/* 112 MHz, by way of half of it unless at once. */
+/* Switches to 112 MHz, by way of half of it unless at_once. */
 static void high_speed(uint32_t at_once)
 {
     REG(0x40064104U) = 0x101U;
@@ -47,7 +47,7 @@ __attribute__((used)) void reset(void)
     REG(0x00008000U) = 1;
 #elif CASE == 8  /* below the RAM */
     REG(0x1FFF7FFCU) = 1;
-#elif CASE == 9  /* the core's own: MPU */
+#elif CASE == 9  /* a register of the core: MPU */
     REG(0xE000ED94U) = 1;
 #elif CASE == 10 /* write protected after WPEN */
     PCC(0xE0U) = CLOCK_ON;
@@ -95,7 +95,7 @@ __attribute__((used)) void reset(void)
     PCC(0xDCU) = 3U << 24 | CLOCK_ON;
     REG(0x40037008U) = 1;
     REG(0x40037010U) = 1;
-#elif CASE == 23 || CASE == 24 /* FlexCAN: bits for freeze mode later, message memory as it comes */
+#elif CASE == 23 || CASE == 24 /* FlexCAN: RFEN outside freeze mode; message memory not initialised */
     REG(0x40064100U) = 1;
     REG(0x40064104U) = 0x101U;
     PCC(0x90U) = CLOCK_ON;
