@@ -11,12 +11,6 @@
 #define INFO(name, lo, hi, unit, text) {#name, lo, hi},
 const calibration_info_t calibration_info[CALIBRATION_COUNT] = {CALIBRATION_LIST(INFO)};
 
-/* The bridge's dead time as a share of the period. */
-static float dead_time_full(const motor_t *m)
-{
-    return m->dead_time_s / m->bases.period_s;
-}
-
 float calibration_get(const drive_t *drive, calibration_id_t id)
 {
     const motor_t *m = drive->motor;
@@ -33,7 +27,7 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         return si_from_q15(p->torque_loop.ki, 1.0F) / m->bases.step_s;
     case CALIBRATION_dead_time_compensation:
-        return (m->dead_time_s > 0.0F) ? si_from_q15(p->modulate.dead_time_q16, 0.5F) / dead_time_full(m) : 0.0F;
+        return (m->bridge_duty > 0.0F) ? si_from_q15(p->modulate.dead_time_q16, 0.5F) / m->bridge_duty : 0.0F;
     case CALIBRATION_COUNT:
     default:
         return 0.0F;
@@ -60,7 +54,7 @@ float calibration_least(const drive_t *drive, calibration_id_t id)
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         return si_from_q15(1, 1.0F) / m->bases.step_s;
     case CALIBRATION_dead_time_compensation:
-        return (m->dead_time_s > 0.0F) ? si_from_q15(1, 1.0F) / dead_time_full(m) : 0.0F;
+        return (m->bridge_duty > 0.0F) ? si_from_q15(1, 1.0F) / m->bridge_duty : 0.0F;
     case CALIBRATION_observer_m:
     case CALIBRATION_COUNT:
     default:
@@ -91,7 +85,7 @@ static void write_parameter(const motor_t *m, motor_parameters_t *p, calibration
         p->torque_loop.ki = q15_from_si(value * m->bases.step_s, 1.0F);
         break;
     case CALIBRATION_dead_time_compensation:
-        p->modulate.dead_time_q16 = 2 * q15_from_si(value * dead_time_full(m), 1.0F);
+        drive_set_dead_time(p, q15_from_si(value * m->bridge_duty, 1.0F));
         break;
     case CALIBRATION_COUNT:
     default:

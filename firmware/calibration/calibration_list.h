@@ -14,6 +14,6 @@
     X(flux_bandwidth_rad_s, 0.0F, 500.0F, "rad/s", "Bandwidth of the flux identification") \
     X(resistance_bandwidth_rad_s, 0.0F, 150.0F, "rad/s", "Bandwidth of the resistance identification") \
     X(torque_loop_bandwidth_rad_s, 0.0F, 500.0F, "rad/s", "Bandwidth of the torque loop") \
-    X(dead_time_compensation, 0.0F, 1.0F, "", "Compensated share of dead time and device drop")
+    X(dead_time_compensation, 0.0F, 1.5F, "", "Compensated share of dead time and device drop, 1: of motor.toml")
 
 #endif

@@ -53,7 +53,7 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
 }
 
 /* One word for the fast ISR. A smaller bound (MO-11) must be in effect before a larger compensation is. */
-static void set_dead_time(motor_parameters_t *p, q15_t dead_time)
+void drive_set_dead_time(motor_parameters_t *p, q15_t dead_time)
 {
     const uint32_t clear_q30 = motor_clear_q30(p, dead_time);
     if (clear_q30 < p->current_control.clear_q30) {
@@ -72,7 +72,7 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
         return false;
     }
     const motor_parameters_t before = *p;
-    set_dead_time(p, (q15_t)dead_time);
+    drive_set_dead_time(p, (q15_t)dead_time);
     p->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
     p->modulate.knee_q17 = compensation->knee_q17;
     data_check_accept(drive, &before);
@@ -98,7 +98,7 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {
         const motor_parameters_t before = drive->parameters;
-        set_dead_time(&drive->parameters, out.dead_time);
+        drive_set_dead_time(&drive->parameters, out.dead_time);
         data_check_accept(drive, &before);
         identify_set(&task->identify, IDENTIFY_DROP, fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27));
     }
@@ -108,7 +108,7 @@ void drive_restore_trim(drive_t *drive, int32_t trim)
 {
     motor_parameters_t *p = &drive->parameters;
     const motor_parameters_t before = *p;
-    set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));
+    drive_set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));
     data_check_accept(drive, &before);
 }
 

@@ -226,6 +226,8 @@ void drive_identify(drive_t *drive, const snapshot_t *snapshot);
 void drive_commission(drive_t *drive, const snapshot_t *snapshot);
 /** Sets the compensation; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
+/** The compensated dead time, a share of the period, with the bound that follows from it (MO-11). */
+void drive_set_dead_time(motor_parameters_t *p, q15_t dead_time);
 /** Moves the identified voltage error into the compensation. From the task. */
 void drive_trim(drive_t *drive, q15_t v_dc);
 /** Adds a stored trim to the compensation in effect; 0 removes the trim. */

@@ -16,7 +16,7 @@ RANGES = {
     "flux_bandwidth_rad_s": (0.0, 1e-3, 500.0),
     "resistance_bandwidth_rad_s": (0.0, 1e-3, 150.0),
     "torque_loop_bandwidth_rad_s": (0.0, 0.04, 500.0),
-    "dead_time_compensation": (0.0, 0.01, 1.0),
+    "dead_time_compensation": (0.0, 0.01, 1.5),
 }
 ENDS = [(name, value) for name, ends in RANGES.items() for value in ends if value is not None]
 

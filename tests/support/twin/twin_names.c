@@ -106,7 +106,7 @@ static const entry_t entries[] = {
     {"flux_bandwidth_rad_s", get_flux_bandwidth, set_flux_bandwidth, 0.0, 1e4},
     {"resistance_bandwidth_rad_s", get_resistance_bandwidth, set_resistance_bandwidth, 0.0, 1e4},
     {"torque_loop_bandwidth_rad_s", get_loop_bandwidth, set_loop_bandwidth, 0.0, 500.0},
-    {"dead_time_compensation", get_compensation, set_compensation, 0.0, 1.0},
+    {"dead_time_compensation", get_compensation, set_compensation, 0.0, 1.5},
     {"identification_reset", get_nothing, set_identification_reset, 0.0, 1.0},
     {"torque_estimated_Nm", get_torque_estimated, NULL, 0.0, 0.0},
     {"torque_commanded_Nm", get_torque_commanded, NULL, 0.0, 0.0},

@@ -384,6 +384,20 @@ void test_calibrating_one_value_keeps_the_measured_compensation(void)
     TEST_ASSERT_FLOAT_WITHIN(0.001F, 0.5F, calibration_get(&ecu.drive, CALIBRATION_dead_time_compensation));
 }
 
+/* Also that of a motor with a device drop, which the compensation contains. */
+void test_a_calibration_value_that_was_read_may_be_written_back_and_changes_nothing(void)
+{
+    for (calibration_id_t id = (calibration_id_t)0; id < CALIBRATION_COUNT; id++) {
+        const motor_parameters_t before = ecu.drive.parameters;
+        const float value = calibration_get(&ecu.drive, id);
+        TEST_ASSERT_TRUE(value >= calibration_info[id].lo && value <= calibration_info[id].hi);
+        calibration_set(&ecu.drive, id, value);
+        TEST_ASSERT_FLOAT_WITHIN(1e-3F * value, value, calibration_get(&ecu.drive, id));
+        TEST_ASSERT_INT_WITHIN(2, before.modulate.dead_time_q16, ecu.drive.parameters.modulate.dead_time_q16);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(0.001F, 1.0F, calibration_get(&ecu.drive, CALIBRATION_dead_time_compensation));
+}
+
 /* The drive stores the smallest accepted value of each calibration as a value above zero. */
 void test_the_smallest_value_of_a_calibration_is_one_step_of_its_format(void)
 {

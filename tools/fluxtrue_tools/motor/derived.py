@@ -78,6 +78,7 @@ class Derived:
     integral_ratio: float
     v_ratio: float
     v_clear: float
+    bridge_duty: float
     dead_time_duty: float
     knee_A: float
     min_pulse_duty: float
@@ -163,6 +164,7 @@ def _modulation(config: MotorConfig) -> dict[str, float]:
     # Inside this circle no pulse can be too short, with the whole dead time on top: (MO-11).
     clear = (1.0 - 2.0 * (min_pulse + duty * max(1.0, config.control.dead_time_compensation))) / math.sqrt(3.0)
     return {
+        "bridge_duty": duty,
         "dead_time_duty": duty * config.control.dead_time_compensation,
         "knee_A": KNEE_LSB * lsb_A,
         "min_pulse_duty": min_pulse,
