@@ -115,7 +115,7 @@ def test_every_value_is_checked_before_the_first_period(hsm1: Motor, monkeypatch
          "profile.torque_Nm reaches 500 N·m at t = 100 s, allowed: -132 to 132 N·m"),
         ("vdc_V = [[0, 350], [99, -1]]", "profile.vdc_V reaches -1 V at t = 99 s, allowed: above 0 V"),
         ("[[event]]\nt = 99\nset = { dead_time_compensation = 3 }",
-         "event.0.set.dead_time_compensation = 3, allowed: 0 to 1.5"),
+         "event.0.set.dead_time_compensation = 3, allowed: 0, or 0.00133"),
         ("[[event]]\nt = 99\nset = { 'plant.adc_bits' = 30 }",
          "event.0.set.plant.adc_bits = 30, allowed: from 1 and below 25"),
         ("[[event]]\nt = 99\nset = { enabel = 1 }", "event.0.set.enabel = 1: no such name, allowed: enable"),

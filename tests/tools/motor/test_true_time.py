@@ -25,7 +25,7 @@ SOURCES = sorted(
 
 # Members of motor_t that depend on the PWM period, on the number of periods per step, and on the length of a step.
 PERIOD = {
-    "bases.period_s",
+    "bases.period_s", "bridge_duty",
     "angle_tracker.kp", "angle_tracker.ki_q29", "angle_tracker.pu_to_turn", "angle_tracker.turn_to_pu",
     "parameters.current_control.sigma_q24", "parameters.current_control.drop_gain",
     "parameters.current_control.integral_gain",
@@ -57,7 +57,7 @@ STEP = {
 # Names of members that are a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
 SPEED = re.compile(r"_rad_s$")
-TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
+TIMED_OTHERWISE = {"parameters.torque_loop.kp"}  # hsm1's loop has no proportional part
 # Times that the firmware defines, and the expression that converts each to true time in every line that uses it.
 TIMES = {
     "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",
@@ -94,6 +94,8 @@ COUNTS = {
     "TIMESTAMP_MODE": "a code",
     "DEAD_TIME_MAX": "ticks of the timer", "DEAD_TIME_BY_4": "a code", "SAMPLE_PULSE_TICKS": "ticks of the timer",
     "PERIODS_MAX": "periods of the longest step",
+    "WORDS_PER_STEP": "words, as docs/theory/data-integrity.md says",
+    "STEPS_WITHOUT_WINDOW": "steps, as that page says",
     "PER_STEP": "share of an update", "STEP_CLOCK_NOMINAL_NS": "of the clock itself",
     "STEP_1MS": "a step that is exactly 1 ms", "STEP_DC": "of a temperature",
     "APART_STEPS": "steps, as hal/s32k144/README.md says",

@@ -17,6 +17,7 @@ from fluxtrue_tools.sim.scenario import Scenario
 
 VALUES_MAX: Final = 100_000_000  # of a recording in memory, 800 MB
 SMALL, HUGE = 1e-9, 1e30
+ROUNDING: Final = 1e-5  # more than the error of six digits
 HALVINGS: Final = 60  # bisections between an accepted and a refused value, down to the last digit of a float
 
 # Keys of a scenario for parameters that have another name in the plant.
@@ -84,7 +85,10 @@ def limits(loop: lib.Loop, name: str, factor: float = 1.0) -> Range:
     present = loop.get(name) / factor
     good = next((value for value in (present, 1.0) if value != 0.0 and accepts(value)), 0.0)
     low, high = (float(f"{_edge(accepts, good, sign):.6g}") for sign in (-1.0, 1.0))
-    found = Range(low, high, accepts(low), accepts(high), or_zero=low > 0.0 and accepts(0.0))
+    or_zero = low > 0.0 and accepts(0.0)
+    if or_zero and not accepts(low):
+        low = float(f"{low * (1.0 + ROUNDING):.6g}")  # six digits had rounded the smallest step down
+    found = Range(low, high, accepts(low), accepts(high), or_zero)
     accepts(present)
     return found
 
