@@ -24,6 +24,7 @@ from hypothesis.configuration import set_hypothesis_home_dir
 
 from fluxtrue_tools import cli
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.map_import.cli import IMPORTED
 
 COUNT = int(os.environ.get("FLUXTRUE_ABUSE", "12"))
 ROOT = Path(__file__).resolve().parents[3]
@@ -135,6 +136,7 @@ def stubs() -> Iterator[None]:
     import fluxtrue_tools.demo.all as demo_all
     import fluxtrue_tools.fault_campaign.run as fault_run
     import fluxtrue_tools.live.cli as live_cli
+    import fluxtrue_tools.motor.map_import.plot as import_plot
     from fluxtrue_tools.emulate import build as emulate_build
     from fluxtrue_tools.sim import build as sim_build
 
@@ -151,6 +153,7 @@ def stubs() -> Iterator[None]:
         patch.setattr(demo_all, "demonstrate", accepted)
         patch.setattr(live_cli, "_session", accepted)
         patch.setattr(live_cli, "VirtualEcu", accepted)
+        patch.setattr(import_plot, "write", lambda _, path: path.write_bytes(b"a picture"))  # takes a second
         yield
 
 
@@ -270,6 +273,32 @@ def mutated_table(draw: Callable[..., Any], good: str) -> str | bytes:
     return text
 
 
+def arrays() -> dict[str, Any]:
+    """The map by the names of every layout."""
+    import numpy as np
+
+    d, q, psi_d, psi_q = np.array([[float(cell) for cell in line.split(",")] for line in MAP.splitlines()[1:]]).T
+    return {"i_s": d + 1j * q, "psi_s": psi_d + 1j * psi_q, "Id": d, "Iq": q, "Fd": psi_d, "Fq": psi_q,
+            "OP_matrix": np.column_stack((d, d, q)) / 2**0.5,
+            "Phi_dqh_mean": np.column_stack((psi_d, psi_q, d))}  # fmt: skip
+
+
+def npz() -> bytes:
+    import numpy as np
+
+    file = io.BytesIO()
+    np.savez(file, **arrays())
+    return file.getvalue()
+
+
+def mat() -> bytes:
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, arrays())
+    return file.getvalue()
+
+
 @st.composite
 def mutated_map(draw: Callable[..., Any]) -> str | bytes:
     """A flux map with one mutation."""
@@ -335,14 +364,36 @@ def test_tables_of_faults(changed: str | bytes) -> None:
     abuse({"in.toml": FAULTS, "fmea.csv": changed}, ["faults", "in.toml", "--out", "o"], [], must_fail=True)
 
 
+IMPORT = ("--format", "csv", "--motor", "m/motor.toml", "--out", "o")
+
+
+@ABUSED
+@given(mutated_map() | mutated_table("# made\nId;Iq;Psi d;Psi q\nA;A;Vs;Vs\n" + MAP.partition("\n")[2]))
+def test_imported_maps(changed: str | bytes) -> None:
+    files: dict[str, str | bytes] = {"m/motor.toml": MOTOR, "map.csv": changed}
+    abuse(files, ["motor", "import", "map.csv", *IMPORT], [f"o/{name}" for name in IMPORTED])
+
+
+@ABUSED
+@given(st.data(), st.sampled_from(["map.npz", "map.mat"]), st.sampled_from(["arrays", "syre", "motulator", "pyleecan"]))
+def test_imported_arrays(data: st.DataObject, name: str, kind: str) -> None:
+    good = bytearray((npz if name.endswith("npz") else mat)())
+    for _ in range(data.draw(st.integers(0, 3))):
+        at = data.draw(LINES) % len(good)
+        good[at : at + data.draw(st.integers(0, 4))] = data.draw(st.binary(max_size=6))
+    files: dict[str, str | bytes] = {"m/motor.toml": MOTOR, name: bytes(good)}
+    options = ["--format", kind, "--motor", "m/motor.toml", "--out", "o"]
+    abuse(files, ["motor", "import", name, *options], [f"o/{file}" for file in IMPORTED])
+
+
 COMMANDS = (
-    ("sim",), ("campaign",), ("faults",), ("motor", "check"), ("motor", "build"), ("emulate",), ("vecu",),
-    ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",),
+    ("sim",), ("campaign",), ("faults",), ("motor", "check"), ("motor", "build"), ("motor", "import"),
+    ("emulate",), ("vecu",), ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",),
     ("target", "registers"), ("target", "seal"), ("target", "size"),
 )  # fmt: skip
 NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("faults",): ["in.toml"], ("motor", "check"): ["m"],
-          ("motor", "build"): ["m"], ("target", "seal"): ["in.toml"], ("log",): ["in.toml"],
-          ("a2l",): ["in.toml"]}  # fmt: skip
+          ("motor", "build"): ["m"], ("motor", "import"): ["m/flux_map.csv", *IMPORT],
+          ("target", "seal"): ["in.toml"], ("log",): ["in.toml"], ("a2l",): ["in.toml"]}  # fmt: skip
 NOT_RUN = {"--check", "--update", "--scheduler", "--can-interface"}  # would run for minutes or need a network
 
 

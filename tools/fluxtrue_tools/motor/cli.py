@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fluxtrue motor check | build."""
+"""fluxtrue motor check | build | import."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from fluxtrue_tools import paths
+from fluxtrue_tools.motor.map_import.cli import import_
 from fluxtrue_tools.motor.names import BUILT, PLOTS, source_files
 
 if TYPE_CHECKING:
@@ -61,3 +62,6 @@ def build(folder: Path, out: Path, report: bool) -> None:
         resolved = build_into(folder, outputs, out, report)
     _warn(resolved)
     click.echo(f"motor {resolved.config.machine.name}: written to {out}")
+
+
+motor.add_command(import_)

@@ -141,7 +141,8 @@ class MotorConfig(Strict):
 NAME_ALLOWED = {"machine.name": "1 to 48 letters, digits, spaces or _ . + -", "machine.flux_map": "1 to 255 characters"}
 
 
-def _complaint(error: ValidationError) -> str:
+def complaint(error: ValidationError) -> str:
+    """The first complaint about motor.toml as one line."""
     first = error.errors()[0]
     where = ".".join(map(str, first["loc"]))
     if len(first["loc"]) == 1 and where in MotorConfig.model_fields and first["type"] != "extra_forbidden":
@@ -274,7 +275,7 @@ def _read(path: Path) -> str:
 def load_config(folder: Path) -> MotorConfig:
     """Read and validate <folder>/motor.toml."""
     path = folder / FILE_NAME
-    config = strict.parse(MotorConfig, _read(path), str(path), _complaint)
+    config = strict.parse(MotorConfig, _read(path), str(path), complaint)
     try:
         check_config(config)
     except FluxtrueError as error:

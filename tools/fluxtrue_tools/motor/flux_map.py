@@ -1,24 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """flux_map.csv: reading, checking and symmetrising it, with a report of the change."""
 
-import csv
-import math
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array, SplineModel
+from fluxtrue_tools.motor.text_table import ROWS_MAX, SEPARATORS, cells, data_lines, number
 
 COLUMNS = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
 NODES_MIN = 4
-ROWS_MAX = 1_000_000
-SIZE_MAX = 200_000_000  # bytes
-VALUE_MAX = 1e5  # A, V·s
-SEPARATORS = {";": "';'", "\t": "tabs"}
 
 
 @dataclass(frozen=True)
@@ -53,47 +46,13 @@ class _Grid:
     line_of: dict[tuple[float, float], int]
 
 
-def _number(path: Path, line: int, column: str, text: str) -> float:
-    try:
-        value = float(text.replace("_", "?"))  # Python would read 1_0 as 10
-    except ValueError:
-        raise FluxtrueError(f"{path}:{line}: {column} = '{text.strip()[:40]}', allowed: a number") from None
-    if not math.isfinite(value) or abs(value) > VALUE_MAX:
-        unit = strict.unit_of(column)
-        raise FluxtrueError(
-            f"{path}:{line}: {column} = {text.strip()[:40]}, allowed: a finite number from "
-            f"{-VALUE_MAX:g} to {VALUE_MAX:g} {unit}"
-        )
-    return value
-
-
-def _lines(path: Path) -> list[tuple[int, str]]:
-    try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise FluxtrueError(f"{path}: cannot be read: not a file")
-        if status.st_size > SIZE_MAX:
-            raise FluxtrueError(f"{path}: {status.st_size} bytes, allowed: up to {SIZE_MAX}")
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise FluxtrueError(f"{path}: no such file, named by machine.flux_map") from None
-    except ValueError as error:
-        if isinstance(error, UnicodeDecodeError):
-            raise FluxtrueError(f"{path}: not UTF-8 text") from None
-        raise FluxtrueError(f"machine.flux_map = {path.name!r}: {error}") from None  # a NUL in the name
-    except OSError as error:
-        raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None
-    numbered = enumerate(text.splitlines(), start=1)
-    return [(n, line) for n, line in numbered if line.strip() and not line.lstrip().startswith("#")]
-
-
 def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
-    lines = _lines(path)
+    lines = data_lines(path, "machine.flux_map")
     if not lines:
         raise FluxtrueError(f"{path}: empty, wanted: a header line with {', '.join(COLUMNS)}")
     if len(lines) > ROWS_MAX:
         raise FluxtrueError(f"{path}: {len(lines)} rows, allowed: up to {ROWS_MAX}")
-    header = [cell.strip() for cell in next(csv.reader([lines[0][1]]))]
+    header = cells(path, *lines[0])
     for sign, words in SEPARATORS.items():
         if len(header) == 1 and sign in lines[0][1]:
             raise FluxtrueError(
@@ -107,11 +66,12 @@ def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
             )
     places = [header.index(column) for column in COLUMNS]
     rows = []
-    for (number, _), cells in zip(lines[1:], csv.reader(line for _, line in lines[1:]), strict=True):
-        if len(cells) != len(header):
-            raise FluxtrueError(f"{path}:{number}: {len(cells)} columns, wanted: {len(header)} as in the header")
-        values = [_number(path, number, column, cells[k]) for column, k in zip(COLUMNS, places, strict=True)]
-        rows.append((number, *values))
+    for line, text in lines[1:]:
+        row = cells(path, line, text)
+        if len(row) != len(header):
+            raise FluxtrueError(f"{path}:{line}: {len(row)} columns, wanted: {len(header)} as in the header")
+        values = [number(path, line, column, row[k]) for column, k in zip(COLUMNS, places, strict=True)]
+        rows.append((line, *values))
     return rows  # type: ignore[return-value]
 
 

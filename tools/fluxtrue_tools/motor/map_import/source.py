@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a file gives: quantities by name, values for motor.toml, and what its format fixes."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+
+PLACES = (("i_d", "i_q"), ("i_s", "gamma"))
+FLUXES = ("psi_d", "psi_q")
+QUANTITIES = ("i_d", "i_q", "i_s", "gamma", "psi_d", "psi_q", "torque")
+LOSS_QUANTITIES = ("i_d", "i_q", "i_s", "gamma", "speed", "frequency", "loss")
+
+# Names that are understood without --column, in small letters without signs and spaces.
+ALIASES = {
+    "i_d": ("id", "ida", "idmap", "idpeak", "currentd", "daxiscurrent"),
+    "i_q": ("iq", "iqa", "iqmap", "iqpeak", "currentq", "qaxiscurrent"),
+    "i_s": ("is", "isa", "ipeak", "ipeaka", "irms", "irmsa", "current", "currenta", "statorcurrent"),
+    "gamma": ("gamma", "gammadeg", "beta", "betadeg", "phaseadvance", "phaseadvancedeg", "currentangle"),
+    "psi_d": ("psid", "psidvs", "psidwb", "psidmap", "fd", "fluxd", "fluxlinkaged", "lambdad", "phid"),
+    "psi_q": ("psiq", "psiqvs", "psiqwb", "psiqmap", "fq", "fluxq", "fluxlinkageq", "lambdaq", "phiq"),
+    "torque": ("torque", "torquenm", "t", "tnm", "tem", "taum"),
+    "speed": ("speed", "speedrpm", "n", "nrpm", "rpm"),
+    "frequency": ("frequency", "frequencyhz", "f", "fhz", "hz"),
+    "loss": ("loss", "lossw", "ironloss", "ironlossw", "pfe", "pfew", "coreloss"),
+}
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Iron losses at currents as the file has them."""
+
+    i_d: Array
+    i_q: Array
+    omega_rad_s: Array  # electrical
+    loss_W: Array
+
+
+@dataclass(frozen=True)
+class Raw:
+    """One file as it is."""
+
+    path: Path
+    quantities: dict[str, Array]
+    fixed: dict[str, str] = field(default_factory=dict)  # options that the format answers itself
+    facts: dict[str, Any] = field(default_factory=dict)  # "machine.pole_pairs" and so on
+    notes: list[str] = field(default_factory=list)
+    losses: Losses | None = None
+
+
+def plain(name: str) -> str:
+    """A name without capitals, signs and spaces."""
+    return "".join(character for character in name.lower() if character.isalnum())
+
+
+def known_as(quantity: str, name: str) -> bool:
+    """Whether a name is one of the usual ones of a quantity."""
+    return plain(name) in ALIASES[quantity]
+
+
+def mapping(given: tuple[str, ...], option: str, quantities: tuple[str, ...]) -> dict[str, str]:
+    """NAME=HEADER of a command line."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, sign, header = text.partition("=")
+        if not sign or name not in quantities or not header.strip():
+            raise FluxtrueError(f"{option} {text[:60]!r}: allowed: NAME=HEADER, NAME one of {', '.join(quantities)}")
+        if name in found:
+            raise FluxtrueError(f"{option} {text[:60]!r}: {name} given twice, allowed: once")
+        found[name] = header.strip()
+    return found
+
+
+def place_of(present: set[str], path: Path, option: str) -> tuple[str, str]:
+    """Which two quantities say where a point is."""
+    given = [pair for pair in PLACES if present.issuperset(pair)]
+    if len(given) == 1:
+        return given[0]
+    if len(given) == 2:
+        raise FluxtrueError(f"{path}: i_d, i_q and i_s, gamma are both there; allowed: one pair, chosen with {option}")
+    raise FluxtrueError(f"{path}: no currents found, wanted: i_d and i_q, or i_s and gamma; name them with {option}")
