@@ -193,6 +193,16 @@ def test_axes_and_matrices_by_their_names(tmp_path: Path, rows: str, write: Call
         assert found == pytest.approx(OURS[OURS[:, 1] <= AXIS[11] + 1e-9][:, :4], rel=1e-12, abs=1e-12)
 
 
+def test_motor_cads_names_are_known(tmp_path: Path) -> None:
+    """Both pairs of currents are there: the rectangular one is taken."""
+    d, q = np.meshgrid(-AXIS[::-1], AXIS)
+    flux = psi(d, q)
+    maps = {"Id_Peak": d, "Iq_Peak": q, "Flux_Linkage_D": flux[0], "Flux_Linkage_Q": flux[1], "Phase_Advance": d,
+            "Stator_Current_Phase_Peak": q, "Electromagnetic_Torque": torque(d, q), "Speed": 3000.0}  # fmt: skip
+    raw = named(mat5(tmp_path / "saturation_map.mat", maps), (), None)
+    assert sorted_table(raw) == pytest.approx(OURS, rel=1e-12, abs=1e-12)
+
+
 def test_square_matrices_need_their_rows(tmp_path: Path) -> None:
     d, q = np.meshgrid(-AXIS[::-1], AXIS, indexing="ij")
     flux = psi(d, q)

@@ -69,6 +69,8 @@ GOOD = text(USUAL)
         (GOOD, ("psi_q=flux",), ["psi_q = 'flux'"]),
         (GOOD, ("psi=flux",), ["--column 'psi=flux': allowed: NAME=HEADER, NAME one of i_d, i_q, i_s, gamma, psi_d"]),
         (GOOD, ("psi_q=flux", "psi_q=x"), ["psi_q given twice"]),
+        ("is,gamma,id_A,iq_A,psi_d,psi_q\n1,2,3,4,5,6\n",
+         ("i_d=id_A", "i_q=iq_A", "i_s=is", "gamma=gamma"), ["--column: i_d, i_q and i_s, gamma are both named"]),
         (GOOD + "1,2,3\n", (), ["map.csv:227: 3 columns, wanted: 4 as in the header"]),
         (GOOD + "1,2,x,4\n", (), ["map.csv:227: psi_d = 'x', allowed: a number"]),
         (GOOD + "1,2,nan,4\n", (), ["map.csv:227: psi_d = nan, allowed: a finite number from -1e+09 to 1e+09"]),

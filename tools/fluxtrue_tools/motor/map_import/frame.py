@@ -174,7 +174,7 @@ def check_torque(raw: Raw, points: Points, pole_pairs: int) -> tuple[Points, lis
 
 def to_frame(raw: Raw, convention: Convention) -> Framed:
     """Points of flux_map.csv's frame from those of the file."""
-    pair = place_of(set(raw.quantities), raw.path, "--column")
+    pair = place_of(set(raw.quantities), {}, raw.path, "--column")
     i = currents(raw.quantities, convention, pair)
     psi = convention.volt_seconds * (raw.quantities["psi_d"] + 1j * raw.quantities["psi_q"])
     if len(np.unique(i)) < POINTS_MIN:

@@ -67,11 +67,7 @@ def named(path: Path, columns: tuple[str, ...], rows: str | None) -> Raw:
         usual = [name for name in everything if known_as(quantity, name.rpartition(".")[2])]
         if quantity not in present and len(usual) == 1:
             present[quantity] = usual[0]
-    for pair in PLACES:  # a pair that was chosen replaces the other one
-        if {*pair} <= {*chosen}:
-            others = {name for other in PLACES for name in other} - {*pair}
-            present = {name: where for name, where in present.items() if name not in others}
-    pair = place_of(set(present), path, "--column")
+    pair = place_of(set(present), chosen, path, "--column")
     present = {name: where for name, where in present.items() if name in (*pair, *FLUXES, "torque")}
     missing = [name for name in FLUXES if name not in present]
     if missing:

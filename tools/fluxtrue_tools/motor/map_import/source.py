@@ -13,15 +13,28 @@ FLUXES = ("psi_d", "psi_q")
 QUANTITIES = ("i_d", "i_q", "i_s", "gamma", "psi_d", "psi_q", "torque")
 LOSS_QUANTITIES = ("i_d", "i_q", "i_s", "gamma", "speed", "frequency", "loss")
 
-# Names that are understood without --column, in small letters without signs and spaces.
+# Names that are understood without --column, in small letters without signs and spaces. Id_Peak, Flux_Linkage_D,
+# Phase_Advance, Electromagnetic_Torque and their neighbours are those of Motor-CAD's saturation maps, as its Python
+# examples read them (pymotorcad, Id_Peak and so on of the exported .mat).
 ALIASES = {
     "i_d": ("id", "ida", "idmap", "idpeak", "currentd", "daxiscurrent"),
     "i_q": ("iq", "iqa", "iqmap", "iqpeak", "currentq", "qaxiscurrent"),
-    "i_s": ("is", "isa", "ipeak", "ipeaka", "irms", "irmsa", "current", "currenta", "statorcurrent"),
+    "i_s": (
+        "is",
+        "isa",
+        "ipeak",
+        "ipeaka",
+        "irms",
+        "irmsa",
+        "current",
+        "currenta",
+        "statorcurrent",
+        "statorcurrentphasepeak",
+    ),
     "gamma": ("gamma", "gammadeg", "beta", "betadeg", "phaseadvance", "phaseadvancedeg", "currentangle"),
     "psi_d": ("psid", "psidvs", "psidwb", "psidmap", "fd", "fluxd", "fluxlinkaged", "lambdad", "phid"),
     "psi_q": ("psiq", "psiqvs", "psiqwb", "psiqmap", "fq", "fluxq", "fluxlinkageq", "lambdaq", "phiq"),
-    "torque": ("torque", "torquenm", "t", "tnm", "tem", "taum"),
+    "torque": ("torque", "torquenm", "t", "tnm", "tem", "taum", "electromagnetictorque"),
     "speed": ("speed", "speedrpm", "n", "nrpm", "rpm"),
     "frequency": ("frequency", "frequencyhz", "f", "fhz", "hz"),
     "loss": ("loss", "lossw", "ironloss", "ironlossw", "pfe", "pfew", "coreloss"),
@@ -73,11 +86,12 @@ def mapping(given: tuple[str, ...], option: str, quantities: tuple[str, ...]) ->
     return found
 
 
-def place_of(present: set[str], path: Path, option: str) -> tuple[str, str]:
-    """Which two quantities say where a point is."""
+def place_of(present: set[str], chosen: dict[str, str], path: Path, option: str) -> tuple[str, str]:
+    """Which two quantities say where a point is: the pair that is named, else the first that is there."""
     given = [pair for pair in PLACES if present.issuperset(pair)]
-    if len(given) == 1:
-        return given[0]
-    if len(given) == 2:
-        raise FluxtrueError(f"{path}: i_d, i_q and i_s, gamma are both there; allowed: one pair, chosen with {option}")
+    named = [pair for pair in given if {*pair} <= {*chosen}]
+    if len(named) > 1:
+        raise FluxtrueError(f"{option}: i_d, i_q and i_s, gamma are both named, allowed: one pair")
+    if given:
+        return (named or given)[0]
     raise FluxtrueError(f"{path}: no currents found, wanted: i_d and i_q, or i_s and gamma; name them with {option}")

@@ -2,13 +2,14 @@
 """A list of points as text: any separator, decimal point or comma, lines above the header and below it with units."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
-from fluxtrue_tools.motor.map_import.source import PLACES, Raw, known_as, mapping
+from fluxtrue_tools.motor.map_import.source import PLACES, Raw, known_as, mapping, place_of
 from fluxtrue_tools.motor.text_table import ROWS_MAX, cells, number, numbered_lines
 
 SEPARATORS = (";", "\t", ",")
@@ -28,10 +29,6 @@ def _found(header: list[str], chosen: dict[str, str], quantities: tuple[str, ...
               if (name == wanted if wanted is not None else known_as(quantity, name))]  # fmt: skip
         if len(at) == 1:
             places[quantity] = at[0]
-    if any({*pair} <= {*chosen} for pair in PLACES):  # a pair that was chosen replaces what else is there
-        for pair in PLACES:
-            if not {*pair} <= {*chosen}:
-                places = {name: place for name, place in places.items() if name not in pair}
     return places
 
 
@@ -75,6 +72,22 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def _rows(path: Path, lines: Lines, separator: str, places: dict[str, int], width: int) -> Iterator[list[float]]:
+    """The numbers below the header, in the order of the places."""
+    units_possible = True
+    for line, text in lines:
+        if text.lstrip().startswith(("#", "%")):
+            continue
+        row = cells(path, line, text, separator)
+        if len(row) != width and not (len(row) == width + 1 and not row[-1]):
+            raise FluxtrueError(f"{path}:{line}: {len(row)} columns, wanted: {width} as in the header")
+        units, units_possible = units_possible and not any(_is_number(row[k]) for k in places.values()), False
+        if units:
+            continue
+        comma = separator != "," and any(DECIMAL_COMMA.fullmatch(row[k]) for k in places.values())
+        yield [_value(path, line, name, row[k], comma) for name, k in places.items()]
+
+
 def read(
     path: Path, given: tuple[str, ...], quantities: tuple[str, ...], wanted: tuple[str, ...], option: str = OPTION
 ) -> dict[str, Array]:
@@ -84,22 +97,13 @@ def read(
         raise FluxtrueError(f"{path}: {len(lines)} rows, allowed: up to {ROWS_MAX}")
     chosen = mapping(given, option, quantities)
     top, separator, places, width = _header(path, lines, chosen, quantities, wanted, option)
-    values: dict[str, list[float]] = {name: [] for name in places}
-    units_possible = True
-    for line, text in lines[top + 1 :]:
-        if text.lstrip().startswith(("#", "%")):
-            continue
-        row = cells(path, line, text, separator)
-        if len(row) != width and not (len(row) == width + 1 and not row[-1]):
-            raise FluxtrueError(f"{path}:{line}: {len(row)} columns, wanted: {width} as in the header")
-        if units_possible and not any(_is_number(row[k]) for k in places.values()):
-            units_possible = False  # the line of the units
-            continue
-        units_possible = False
-        comma = separator != "," and any(DECIMAL_COMMA.fullmatch(row[k]) for k in places.values())
-        for name, k in places.items():
-            values[name].append(_value(path, line, name, row[k], comma))
-    return {name: np.array(column, dtype=float) for name, column in values.items()}
+    if any({*pair} <= {*places} for pair in PLACES):
+        pair = place_of(set(places), chosen, path, option)
+        spare = {name for other in PLACES for name in other} - {*pair}
+        places = {name: place for name, place in places.items() if name not in spare}
+    rows = list(_rows(path, lines[top + 1 :], separator, places, width))
+    values = np.array(rows, dtype=float).reshape(len(rows), len(places)).T
+    return dict(zip(places, values, strict=True))
 
 
 def read_map(path: Path, given: tuple[str, ...]) -> Raw:
