@@ -36,6 +36,12 @@ def test_a_machine_with_a_co_energy_is_met(places: tuple[Array, Array]) -> None:
     assert np.abs(model.psi_q(D, Q) - psi_q)[INSIDE].max() < 1e-3 * psi_q.max()
 
 
+def test_a_grid_of_programs_with_many_points_is_no_burden() -> None:
+    """SyR-e writes 256 x 256 points."""
+    fine = np.linspace(0.0, I_MAX, 256)
+    assert torque_error(fit(points_at(*plane(-fine[::-1], fine)), I_MAX).model) < 2e-5
+
+
 def test_the_surface_is_reciprocal_and_symmetric_whatever_the_points_are() -> None:
     """Noise of 2 mV·s: no energy belongs to it. Both mixed derivatives are one sum of splines."""
     noise = np.random.default_rng(1).normal(0.0, 2e-3, (2, len(FULL[0])))

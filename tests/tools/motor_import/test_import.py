@@ -16,6 +16,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.map_import import report
 from fluxtrue_tools.motor.motor import load_motor
+from fluxtrue_tools.motor.report import report_text
 
 HEADER = "i_d,i_q,psi_d,psi_q,torque"
 
@@ -84,13 +85,14 @@ def test_the_measured_map_keeps_its_torque_and_says_what_it_lost(importer: Impor
     assert 0.03 < done.curl < 0.05 and done.curl_left < 1e-3
     assert done.fit.offset_Vs == pytest.approx(-4.4e-3, abs=0.3e-3)
     assert motor.config == load_motor(HSM1).config
+    assert float(motor.model.psi_d(0.0, 0.0)) == pytest.approx(float(load_motor(HSM1).model.psi_d(0.0, 0.0)), rel=5e-3)
     text = report.text(done)
     assert "extrapolated: 0 of 961 nodes" in text and "of which its offset -4." in text
 
 
 def test_extrapolation_is_warned_of_and_marked(tmp_path: Path, importer: Importer) -> None:
     path = written(tmp_path / "map.csv", HEADER, *polar(220.0), *psi(*polar(220.0)), torque(*polar(220.0)))
-    done, _ = importer(path, given=(*SETTINGS, "machine.i_max_A=250"))
+    done, motor = importer(path, given=(*SETTINGS, "machine.i_max_A=250"))
     warned = report.warnings(done)
     assert len(warned) == 1
     assert re.search(r"no points in 2\d % of the circle of machine.i_max_A = 250 A; the map goes on there", warned[0])
@@ -98,14 +100,17 @@ def test_extrapolation_is_warned_of_and_marked(tmp_path: Path, importer: Importe
     marked = [row for row in rows if row["extrapolated"] == "1"]
     assert marked and min(np.hypot(float(row["id_A"]), float(row["iq_A"])) for row in marked) > 215.0
     assert len(marked) == int(done.grid.extrapolated.sum())
+    assert f"extrapolated       {len(marked)} of {len(rows)} rows, marked when it was imported" in report_text(motor)
 
 
 def test_what_hurts_is_warned_of(tmp_path: Path, importer: Importer) -> None:
-    """An offset of 15 mV·s (6 % of psi_q) and a twist that no energy belongs to."""
+    """An offset of 15 mV·s (6 % of psi_q), a twist that no energy belongs to, losses like no iron's."""
     psi_d, psi_q = psi(*FULL)
     path = written(tmp_path / "map.csv", HEADER[:-7], *FULL, psi_d - 2e-7 * FULL[1] ** 2, psi_q + 0.015)
-    done, _ = importer(path)
+    done, _ = importer(path, iron_loss_points=("10@1000", "10@3000", "300@6000"))
+    assert done.iron_loss is not None and done.iron_loss.share > 0.2
     warned = " | ".join(report.warnings(done))
+    assert "the iron losses are not (k_h w + k_e w²)|psi|²: the fit leaves" in warned
     assert "psi_q has an offset of 15 mV·s" in warned and "allowed without a warning: 5 %" in warned
     assert re.search(r"not reciprocal: d psi_d/d i_q and d psi_q/d i_d differ by [\d.]+ %", warned)
 

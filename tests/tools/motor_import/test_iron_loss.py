@@ -39,7 +39,7 @@ def test_a_map_of_losses_gives_both_coefficients(tmp_path: Path, clock: str) -> 
     chosen = ("speed=Speed (rpm)",) if clock != "f" else ()
     found = iron_loss.fit(iron_loss.read(path, chosen, Convention(), 1.0, POLE_PAIRS), MODEL, I_MAX, str(path))
     assert (found.hysteresis, found.eddy) == pytest.approx((K_H, K_E), rel=1e-3)
-    assert found.max_W < 1e-3 * found.largest_W and not found.assumed
+    assert found.max_W < 1e-3 * found.largest_W and found.share < 1e-3 and not found.assumed
 
 
 def test_losses_are_turned_like_the_map(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from fluxtrue_tools.motor.flux_model import Array, SplineModel
 from fluxtrue_tools.motor.text_table import ROWS_MAX, SEPARATORS, cells, data_lines, number
 
 COLUMNS = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
+MARK = "extrapolated"  # a further column, of imported maps: 1 where the source has no points
 NODES_MIN = 4
 
 
@@ -35,6 +36,7 @@ class FluxMap:
     psi_d_Vs: Array
     psi_q_Vs: Array
     symmetry: Symmetry
+    marked: tuple[int, int] = (0, 0)  # rows of the file that are marked as extrapolated, and all rows
 
 
 @dataclass(frozen=True)
@@ -44,9 +46,11 @@ class _Grid:
     psi_d: Array
     psi_q: Array
     line_of: dict[tuple[float, float], int]
+    marked: int
 
 
-def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
+def _rows(path: Path) -> tuple[list[tuple[int, float, float, float, float]], int]:
+    """The numbers with their lines, and how many rows are marked as extrapolated."""
     lines = data_lines(path, "machine.flux_map")
     if not lines:
         raise FluxtrueError(f"{path}: empty, wanted: a header line with {', '.join(COLUMNS)}")
@@ -65,19 +69,21 @@ def _rows(path: Path) -> list[tuple[int, float, float, float, float]]:
                 f"wanted once: {', '.join(COLUMNS)}"
             )
     places = [header.index(column) for column in COLUMNS]
-    rows = []
+    mark = header.index(MARK) if header.count(MARK) == 1 else None
+    rows, marked = [], 0
     for line, text in lines[1:]:
         row = cells(path, line, text)
         if len(row) != len(header):
             raise FluxtrueError(f"{path}:{line}: {len(row)} columns, wanted: {len(header)} as in the header")
         values = [number(path, line, column, row[k]) for column, k in zip(COLUMNS, places, strict=True)]
         rows.append((line, *values))
-    return rows  # type: ignore[return-value]
+        marked += mark is not None and row[mark] == "1"
+    return rows, marked  # type: ignore[return-value]
 
 
 def _grid(path: Path) -> _Grid:
     """Rows in any order to a rectangular grid; every cell exactly once."""
-    rows = _rows(path)
+    rows, marked = _rows(path)
     id_A = np.array(sorted({row[1] for row in rows}))
     iq_A = np.array(sorted({row[2] for row in rows}))
     if len(id_A) < NODES_MIN or len(iq_A) < NODES_MIN:
@@ -104,7 +110,7 @@ def _grid(path: Path) -> _Grid:
             f"id_A = {id_A[k]:g} stands on lines {lines[0]} to {lines[-1]}); "
             "wanted: a full rectangular grid"
         )
-    return _Grid(id_A, iq_A, psi_d, psi_q, line_of)
+    return _Grid(id_A, iq_A, psi_d, psi_q, line_of, marked)
 
 
 def _check_cover(path: Path, grid: _Grid, i_max_A: float) -> None:
@@ -233,4 +239,4 @@ def load_flux_map(path: Path, i_max_A: float) -> FluxMap:
     psi_q[:, 0] = 0.0
     _check_physics(path, grid, iq, psi_d, psi_q)
     full_iq, full_d, full_q = _mirror(iq, psi_d, psi_q)
-    return FluxMap(grid.id_A, full_iq, full_d, full_q, symmetry)
+    return FluxMap(grid.id_A, full_iq, full_d, full_q, symmetry, (grid.marked, len(grid.line_of)))

@@ -51,6 +51,10 @@ def _map(motor: Motor) -> Lines:
         f"({'even part in i_q' if s.source.startswith('both') else 'its value at i_q = 0, per i_d'})",
         f"  interpolation      {how}",
     ]
+    if flux_map.marked[0]:
+        lines.append(
+            f"  extrapolated       {flux_map.marked[0]} of {flux_map.marked[1]} rows, marked when it was imported"
+        )
     if flux_map.id_A[-1] < motor.tables.id_A[-1]:
         lines.append(
             f"  extended           to id = {motor.tables.id_A[-1]:g} A, one table node, along the edge's slope"

@@ -10,14 +10,15 @@ validation (P. Craven, G. Wahba, "Smoothing noisy data with spline functions", N
 
 Flux linkages that are not the slopes of one energy can only be met in the mean. The torque, 1.5 p (psi_d i_q - psi_q
 i_d), is 1.5 p times the slope of W along a circle of constant current. Its weight keeps the torque; the change goes
-to the other component of the flux, the one along the current.
+to the other component of the flux, the one along the current. Errors at small currents weigh more, so that the flux
+of the magnet alone and the torque per ampere stay as well.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
 from scipy.interpolate import BSpline
 from scipy.linalg import cholesky, eigh, solve_triangular
 
@@ -27,13 +28,13 @@ DEGREE = 4
 INTERVALS_MIN, INTERVALS_MAX = 4, 24  # over the longer side of the plane
 INTERVALS_PER_POINT = 0.9  # of the square root of the number of points, each of which gives three equations
 INTERVALS_SEPARATE = 0.6  # the same for one surface, to which each point gives one
+SMALL = 0.1  # of i_max: above it an error of the flux weighs as 1/i, for the torque there is less at small currents
 TORQUE_WEIGHT = 10.0  # of an error of the flux across the current, over that of one along it
 SMOOTHING = 10.0 ** np.arange(-12.0, 6.1, 0.5)  # candidates, relative to the points' share
 SCORE_SLACK = 1.05  # the least smoothing that is nearly as good: a detail of the source is kept rather than lost
 MIDDLE = 1e-4  # the candidate whose equations are decomposed: all others follow from its eigenvalues
 FLOOR = 1e-15  # relative: what the computation cannot resolve
 NOISE_MIN = 1e-5  # of the rms flux: no measured or computed map is more exact
-CHUNK = 2000  # points at a time
 
 
 @dataclass(frozen=True)
@@ -78,14 +79,16 @@ class _Axis:
         rows = np.diff(np.eye(len(self.fold)), order, axis=0) @ self.fold / self.step**order
         return np.asarray(rows.T @ rows * self.step)
 
-    def rows(self, x: Array, order: int) -> Array:
-        """The splines' order-th derivatives at x."""
+    def rows(self, x: Array, order: int) -> tuple[Array, Array, sparse.csr_matrix]:
+        """The order-th derivatives at x: columns and values of splines of lower degree, and those from the splines."""
         inside = np.clip(x, self.knots[DEGREE], self.knots[-DEGREE - 1])
         knots, degree, chain = self.knots, DEGREE, self.fold
         for _ in range(order):
             chain = np.diff(chain, axis=0) * degree / (knots[degree + 1 : -1] - knots[1 : -degree - 1])[:, None]
             knots, degree = knots[1:-1], degree - 1
-        return np.asarray(BSpline.design_matrix(inside, knots, degree) @ chain)
+        splines = BSpline.design_matrix(inside, knots, degree)
+        shape = len(x), degree + 1
+        return splines.indices.reshape(shape), splines.data.reshape(shape), sparse.csr_matrix(chain)
 
 
 class _Basis:
@@ -98,10 +101,16 @@ class _Basis:
         self.q = _Axis(-reach, reach, 2 * max(INTERVALS_MIN, round(reach / step)), parity)
         self.count = self.d.count * self.q.count
 
-    def rows(self, u_d: Array, u_q: Array, nd: int, nq: int) -> Array:
+    def rows(self, u_d: Array, u_q: Array, nd: int, nq: int) -> sparse.csr_matrix:
         """Derivatives of all products."""
-        products = self.d.rows(u_d, nd)[:, :, None] * self.q.rows(u_q, nq)[:, None, :]
-        return np.asarray(products.reshape(len(u_d), self.count))
+        at_d, value_d, chain_d = self.d.rows(u_d, nd)
+        at_q, value_q, chain_q = self.q.rows(u_q, nq)
+        columns = at_d[:, :, None] * chain_q.shape[0] + at_q[:, None, :]
+        values = value_d[:, :, None] * value_q[:, None, :]
+        ends = np.arange(len(u_d) + 1) * (at_d.shape[1] * at_q.shape[1])
+        shape = len(u_d), chain_d.shape[0] * chain_q.shape[0]
+        products = sparse.csr_matrix((values.ravel(), columns.ravel(), ends), shape=shape)
+        return sparse.csr_matrix(products @ sparse.kron(chain_d, chain_q, format="csr"))
 
     def penalty(self) -> Array:
         """All third derivatives, squared."""
@@ -117,9 +126,9 @@ class _System:
         self.matrix, self.right = np.zeros((count, count)), np.zeros(count)
         self.power, self.total = 0.0, 0
 
-    def add(self, rows: Array, values: Array, counted: bool = True) -> None:
+    def add(self, rows: sparse.csr_matrix, values: Array, counted: bool = True) -> None:
         """Some more equations; those that follow from others do not count."""
-        self.matrix += rows.T @ rows
+        self.matrix += (rows.T @ rows).toarray()
         self.right += rows.T @ values
         self.power += float(values @ values)
         self.total += len(values) if counted else 0
@@ -152,9 +161,8 @@ class CoEnergy:
 
     def _slope(self, i_d: ArrayLike, i_q: ArrayLike, nd: int, nq: int) -> Array:
         d, q = np.broadcast_arrays(np.asarray(i_d, float), np.asarray(i_q, float))
-        parts = [self._basis.rows(u_d, u_q, nd, nq) @ self._coefficients
-                 for u_d, u_q in _chunks(d.ravel() / self._i_max, q.ravel() / self._i_max)]  # fmt: skip
-        return np.concatenate(parts).reshape(d.shape) / self._i_max ** (nd + nq)
+        rows = self._basis.rows(d.ravel() / self._i_max, q.ravel() / self._i_max, nd, nq)
+        return np.asarray(rows @ self._coefficients).reshape(d.shape) / self._i_max ** (nd + nq)
 
     def psi_d(self, i_d: ArrayLike, i_q: ArrayLike, nd: int = 0, nq: int = 0) -> Array:
         """Flux linkage of the d axis or a derivative of it."""
@@ -174,9 +182,8 @@ class Separate:
     def _value(self, which: int, i_d: ArrayLike, i_q: ArrayLike, nd: int, nq: int) -> Array:
         d, q = np.broadcast_arrays(np.asarray(i_d, float), np.asarray(i_q, float))
         basis, coefficients = self._surfaces[which]
-        parts = [basis.rows(u_d, u_q, nd, nq) @ coefficients
-                 for u_d, u_q in _chunks(d.ravel() / self._i_max, q.ravel() / self._i_max)]  # fmt: skip
-        return np.concatenate(parts).reshape(d.shape) / self._i_max ** (nd + nq)
+        rows = basis.rows(d.ravel() / self._i_max, q.ravel() / self._i_max, nd, nq)
+        return np.asarray(rows @ coefficients).reshape(d.shape) / self._i_max ** (nd + nq)
 
     def psi_d(self, i_d: ArrayLike, i_q: ArrayLike, nd: int = 0, nq: int = 0) -> Array:
         """Flux linkage of the d axis or a derivative of it."""
@@ -199,11 +206,6 @@ class Fit:
     psi_q_left: Array
 
 
-def _chunks(*arrays: Array) -> Iterator[tuple[Array, ...]]:
-    for k in range(0, max(len(arrays[0]), 1), CHUNK):
-        yield tuple(array[k : k + CHUNK] for array in arrays)
-
-
 def _plane(
     points: Points, i_max_A: float, per_point: float = INTERVALS_PER_POINT
 ) -> tuple[tuple[float, float, float], int]:
@@ -214,25 +216,27 @@ def _plane(
     return plane, int(np.clip(per_point * np.sqrt(places), INTERVALS_MIN, INTERVALS_MAX))
 
 
-def _pair(basis: _Basis, u_d: Array, u_q: Array) -> tuple[Array, Array]:
+def _pair(basis: _Basis, u_d: Array, u_q: Array) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
     """Rows of psi_d and psi_q; the constant of the energy (the first coefficient) becomes the offset of psi_q."""
-    d, q = basis.rows(u_d, u_q, 1, 0), basis.rows(u_d, u_q, 0, 1)
-    d[:, 0], q[:, 0] = 0.0, 1.0
-    return d, q
+    d, q = (basis.rows(u_d, u_q, *order)[:, 1:] for order in ((1, 0), (0, 1)))
+    ones = np.ones((len(u_d), 1))
+    return sparse.hstack((0.0 * ones, d), format="csr"), sparse.hstack((ones, q), format="csr")
 
 
 def fit(points: Points, i_max_A: float) -> Fit:
     """The co-energy of all points over the current circle, and as far as the points reach."""
     basis = _Basis(*_plane(points, i_max_A))
     scale = float(np.sqrt(np.mean(points.psi_d**2 + points.psi_q**2)))
-    data = points.i_d / i_max_A, points.i_q / i_max_A, points.psi_d / scale, points.psi_q / scale
+    u_d, u_q = points.i_d / i_max_A, points.i_q / i_max_A
+    d, q = _pair(basis, u_d, u_q)
+    weight = 1.0 / (SMALL + np.hypot(u_d, u_q))
+    psi_d, psi_q = weight * points.psi_d / scale, weight * points.psi_q / scale
+    d, q = (sparse.diags(weight) @ rows for rows in (d, q))
     system = _System(basis.count)
-    for u_d, u_q, psi_d, psi_q in _chunks(*data):
-        d, q = _pair(basis, u_d, u_q)
-        system.add(d, psi_d)
-        system.add(q, psi_q)
-        across = TORQUE_WEIGHT * (u_q[:, None] * d - u_d[:, None] * q)
-        system.add(across, TORQUE_WEIGHT * (u_q * psi_d - u_d * psi_q), counted=False)
+    system.add(d, psi_d)
+    system.add(q, psi_q)
+    across = sparse.csr_matrix(TORQUE_WEIGHT * (sparse.diags(u_q) @ d - sparse.diags(u_d) @ q))
+    system.add(across, TORQUE_WEIGHT * (u_q * psi_d - u_d * psi_q), counted=False)
     penalty = basis.penalty()
     penalty[0, :] = penalty[:, 0] = 0.0  # differences do not change when all coefficients lose the first one
     unknowns, x = system.solve(penalty)
@@ -251,7 +255,6 @@ def fit_separately(points: Points, i_max_A: float) -> Separate:
     for psi, parity in ((points.psi_d, 1), (points.psi_q, -1)):
         basis = _Basis(plane, intervals, parity)
         system = _System(basis.count)
-        for u_d, u_q, values in _chunks(points.i_d / i_max_A, points.i_q / i_max_A, psi):
-            system.add(basis.rows(u_d, u_q, 0, 0), values)
+        system.add(basis.rows(points.i_d / i_max_A, points.i_q / i_max_A, 0, 0), psi)
         surfaces.append((basis, system.solve(basis.penalty())[1]))
     return Separate((surfaces[0], surfaces[1]), i_max_A)

@@ -15,8 +15,6 @@ from fluxtrue_tools.motor.map_import.grid import Grid
 from fluxtrue_tools.motor.names import FILE_NAME
 
 MAP = "flux_map.csv"
-REPORT, PLOT = "import.txt", "import.png"
-IMPORTED = (FILE_NAME, MAP, REPORT, PLOT)
 SOURCES = ("flux_map", "ld_H", "lq_H", "psi_f_Vs")
 ASSUMED: dict[str, Any] = {
     "machine.r_temp_coeff_per_K": 0.00393,  # copper

@@ -19,7 +19,7 @@ from fluxtrue_tools.motor.map_import.source import Raw, place_of
 
 TO_PEAK = {"peak": 1.0, "rms": math.sqrt(2.0), "power": math.sqrt(2.0 / 3.0)}
 TO_VS = {"Vs": 1.0, "mVs": 1e-3}
-POINTS_MIN, POINTS_MAX = 16, 20_000  # different currents
+POINTS_MIN, POINTS_MAX = 16, 200_000  # different currents
 NEAR = 0.4  # of the largest current: where the flux is nearly a plane
 MAGNET_MIN = 0.005  # of the largest flux: below it there is none
 TORQUE_SLACK = 0.05  # measured torque lacks friction and iron loss

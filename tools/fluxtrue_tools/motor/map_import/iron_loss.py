@@ -28,6 +28,7 @@ class IronLoss:
     rms_W: float
     max_W: float
     largest_W: float
+    share: float  # of the rms loss that is left
     assumed: bool  # that both shares are equal, for want of a second speed
 
 
@@ -85,4 +86,5 @@ def fit(losses: Losses, model: FluxModel, i_max_A: float, where: str) -> IronLos
         coefficients[1] /= scale
     left = loss - (coefficients[0] * omega + coefficients[1] * omega**2) * squared
     return IronLoss(float(coefficients[0]), float(coefficients[1]), len(omega), float(np.sqrt(np.mean(left**2))),
-                    float(np.abs(left).max()), float(loss.max()), single)  # fmt: skip
+                    float(np.abs(left).max()), float(loss.max()),
+                    float(np.sqrt(np.sum(left**2) / max(np.sum(loss**2), 1e-300))), single)  # fmt: skip

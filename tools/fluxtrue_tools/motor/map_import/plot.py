@@ -13,13 +13,15 @@ from matplotlib.axes import Axes
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.map_import.run import Imported
 
+MANY = 3000  # points
 LEVELS = 5  # currents of the other axis for which a curve is drawn
 
 
 def _places(axes: Axes, done: Imported) -> None:
     grid, points = done.grid, done.points
     d, q = np.meshgrid(grid.id_A, grid.iq_A, indexing="ij")
-    axes.plot(points.i_d, points.i_q, ".", color="tab:blue", ms=4, label="points of the file")
+    size = 4.0 if len(points) < MANY else 1.0
+    axes.plot(points.i_d, points.i_q, ".", color="tab:blue", ms=size, label="points of the file")
     beyond = grid.extrapolated
     axes.plot(d[~beyond], q[~beyond], "+", color="0.6", ms=4, label="nodes of the map")
     if beyond.any():
@@ -53,10 +55,12 @@ def _curves(axes: Axes, done: Imported, of_d: bool) -> None:
 
 
 def _change(axes: Axes, done: Imported, values: Array, title: str, unit: str) -> None:
-    limit = float(np.abs(values).max()) or 1.0
-    shown = axes.scatter(done.points.i_d, done.points.i_q, c=values, s=14, cmap="coolwarm", vmin=-limit, vmax=limit)
+    inside = done.changes.inside
+    limit = float(np.abs(values[inside]).max()) or 1.0
+    places = done.points.i_d[inside], done.points.i_q[inside]
+    shown = axes.scatter(*places, c=values[inside], s=14, cmap="coolwarm", vmin=-limit, vmax=limit)
     axes.figure.colorbar(shown, ax=axes, label=unit)
-    axes.set(title=title, xlabel="i_d, A", ylabel="i_q, A")
+    axes.set(title=f"{title} inside the current limit", xlabel="i_d, A", ylabel="i_q, A")
 
 
 def write(done: Imported, path: Path) -> None:
@@ -67,8 +71,8 @@ def write(done: Imported, path: Path) -> None:
     _curves(axes[0, 1], done, of_d=True)
     _curves(axes[0, 2], done, of_d=False)
     c = done.changes
-    _change(axes[1, 0], done, 1e3 * c.psi_d_Vs, "psi_d changed by", "mVs")
-    _change(axes[1, 1], done, 1e3 * c.psi_q_Vs, "psi_q changed by", "mVs")
-    _change(axes[1, 2], done, 100.0 * c.torque, f"torque changed by (% of {c.largest_Nm:.4g} N·m)", "%")
+    _change(axes[1, 0], done, 1e3 * c.psi_d_Vs, "Change of psi_d", "mVs")
+    _change(axes[1, 1], done, 1e3 * c.psi_q_Vs, "Change of psi_q", "mVs")
+    _change(axes[1, 2], done, 100.0 * c.torque, "Change of the torque", f"% of {c.largest_Nm:.4g} N·m")
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)

@@ -6,6 +6,7 @@ from fluxtrue_tools.motor.map_import.run import Imported
 
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
+LOSS_MAX = 0.2  # of the rms iron loss that the two coefficients leave
 
 
 def _mVs(value: float) -> str:
@@ -43,6 +44,12 @@ def warnings(done: Imported) -> list[str]:
             f"{path}: no points in {100 * grid.circle_outside:.2g} % of the circle of machine.i_max_A = {i_max:g} A; "
             "the map goes on there with the last inductances (column extrapolated)"
         )
+    loss = done.iron_loss
+    if loss is not None and loss.share > LOSS_MAX:
+        found.append(
+            f"{path}: the iron losses are not (k_h w + k_e w²)|psi|²: the fit leaves {100 * loss.share:.2g} % of their "
+            f"rms value (allowed without a warning: {100 * LOSS_MAX:g} %)"
+        )
     return found
 
 
@@ -52,7 +59,7 @@ def _iron(done: Imported) -> list[str]:
         return ["iron loss: none given"]
     lines = [
         f"iron loss: {loss.points} points up to {loss.largest_W:.4g} W, k_h {loss.hysteresis:.4g}, k_e {loss.eddy:.4g}",
-        f"  left               rms {loss.rms_W:.3g} W, max {loss.max_W:.3g} W",
+        f"  left               rms {loss.rms_W:.3g} W ({100 * loss.share:.2g} %), max {loss.max_W:.3g} W",
     ]
     if loss.assumed:
         lines.append("  assumed            half hysteresis, half eddy currents: one speed cannot tell them apart")
