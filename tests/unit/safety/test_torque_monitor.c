@@ -221,16 +221,103 @@ void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_o
     }
 }
 
+/* The value as the monitor can represent it. */
+static double saturated(double x)
+{
+    return fmin(fmax(x, -1.0), 32767.0 / 32768.0);
+}
+
+typedef struct {
+    double psi_d, psi_q, deviation;
+} reference_t;
+
+/* By how much the torque and the angle exceed their thresholds, per unit: the header's equations in double precision.
+ */
+typedef struct {
+    double torque, angle;
+} excess_t;
+
+static double torque_excess(reference_t *reference, double e_d, double e_q, double rates)
+{
+    const double i_d = in.i.d / 32768.0, i_q = in.i.q / 32768.0, w = in.omega / 32768.0, t = in.torque / 32768.0;
+    const double error = saturated(e_d * i_d + e_q * i_q) - t * w;
+    reference->deviation = saturated(reference->deviation + 0.25 * saturated(error - reference->deviation));
+    const double v_error = saturated(425.0 / 32768.0 + rates / 2.0);
+    const double limit = fabs(w) * (1112.0 / 32768.0 + fabs(t) / 8.0) + v_error * saturated(hypot(i_d, i_q));
+    if (fabs(t) < 1112.0 / 32768.0) {
+        return fabs(reference->deviation) - limit;
+    }
+    const double along = (t * w < 0.0) ? -reference->deviation : reference->deviation;
+    return fmax(along, -along - fabs(t * w)) - limit;
+}
+
+static double angle_excess(double e_d, double e_q, double rates)
+{
+    const double w = in.omega / 32768.0, psi_d = in.psi.d / 32768.0, psi_q = in.psi.q / 32768.0;
+    const double magnet = fabs(w) * 14418.0 / 32768.0, v_0 = 425.0 / 32768.0;
+    const double current = saturated(hypot(in.i.d, in.i.q) / 32768.0);
+    const double v = v_0 / 2.0 + 898.0 / 65536.0 * current + rates / 2.0 + fmax(rates - v_0, 0.0);
+    const double d = fabs(e_d + w * psi_q) - magnet / 5.0 - fabs(w * psi_q) / 8.0 - v;
+    const double q = copysign(1.0, w) * (e_q - w * psi_d);
+    return fmax(d, fmax(q - 0.35 * magnet, -q - 0.5 * magnet) - v);
+}
+
+static excess_t reference_step(reference_t *reference)
+{
+    const double gain = 19867.0 / 65536.0, r = 898.0 / 65536.0;
+    const double rate_d = gain * saturated(in.psi.d / 32768.0 - reference->psi_d);
+    const double rate_q = gain * saturated(in.psi.q / 32768.0 - reference->psi_q);
+    const double e_d = saturated((in.u.d - r * in.i.d) / 32768.0 - rate_d);
+    const double e_q = saturated((in.u.q - r * in.i.q) / 32768.0 - rate_q);
+    const double rates = fabs(rate_d) + fabs(rate_q);
+    reference->psi_d = in.psi.d / 32768.0;
+    reference->psi_q = in.psi.q / 32768.0;
+    return (excess_t){torque_excess(reference, e_d, e_q, rates), angle_excess(e_d, e_q, rates)};
+}
+
+/* Compares one decision that is not within 20 LSB of its threshold; counts it by its result. */
+static void compare(double excess, bool found, int counts[2])
+{
+    if (fabs(excess) > 20.0 / 32768.0) {
+        TEST_ASSERT_EQUAL_INT(excess > 0.0, found);
+        counts[found]++;
+    }
+}
+
+static int16_t end_of(int bits, int bit)
+{
+    return (bits >> bit & 1) ? INT16_MAX : INT16_MIN;
+}
+
+/* All combinations of largest and smallest arguments with five torques, and the same flux or the opposite one before: a
+ * sum or product that wraps instead of saturating changes its sign, and the decision with it. */
 void test_no_argument_wraps(void)
 {
-    static const int16_t ends[] = {INT16_MIN, INT16_MAX};
-    for (int n = 0; n < 64; n++) {
+    static const q15_t torques[5] = {INT16_MIN, -2000, 0, 2000, INT16_MAX};
+    torque_monitor_config_t immediate = config;
+    int torque[2] = {0}, angle[2] = {0};
+    immediate.torque_steps = immediate.angle_steps = 1;
+    for (int bits = 0; bits < 5 << 9; bits++) {
+        in = (torque_monitor_in_t){.acting = true, .psi = {end_of(bits, 0), end_of(bits, 1)}};
+        fresh();
+        for (int n = 0; n < SETTLING; n++) {
+            (void)torque_monitor_step(&immediate, &state, &in);
+        }
+        reference_t reference = {in.psi.d / 32768.0, in.psi.q / 32768.0, 0.0};
         in = (torque_monitor_in_t){true,
-                                   {ends[n & 1], ends[(n >> 1) & 1]},
-                                   {ends[(n >> 2) & 1], ends[n & 1]},
-                                   {ends[(n >> 3) & 1], ends[(n >> 4) & 1]},
-                                   ends[(n >> 5) & 1],
-                                   ends[n & 1]};
-        (void)torque_monitor_step(&config, &state, &in);
+                                   {end_of(bits, 2), end_of(bits, 3)},
+                                   {end_of(bits, 4), end_of(bits, 5)},
+                                   {end_of(bits, 6), end_of(bits, 7)},
+                                   end_of(bits, 8),
+                                   torques[bits >> 9]};
+        for (int n = 0; n < 30; n++) {
+            const uint32_t faults = torque_monitor_step(&immediate, &state, &in);
+            const excess_t excess = reference_step(&reference);
+            compare(excess.torque, (faults & FAULT_TORQUE) != 0, torque);
+            compare(excess.angle, (faults & FAULT_ANGLE_OFFSET) != 0, angle);
+        }
     }
+    /* Both decisions occur, and all but a few of 5 * 512 * 30 are compared. */
+    TEST_ASSERT_TRUE(torque[0] > 10000 && torque[1] > 10000 && torque[0] + torque[1] > 76000);
+    TEST_ASSERT_TRUE(angle[0] > 10000 && angle[1] > 10000 && angle[0] + angle[1] > 76000);
 }
