@@ -139,6 +139,36 @@ void test_a_key_needs_a_seed_and_each_seed_is_different(void)
     TEST_ASSERT_NOT_EQUAL(first, last_answer.data[2]);
 }
 
+/* Locks the slave again and sends the key of this seed, which is the seed's complement. */
+static void try_old_key(const uint8_t seed[4])
+{
+    master_connect();
+    SEND(0xF7, 4, (uint8_t)~seed[0], (uint8_t)~seed[1], (uint8_t)~seed[2], (uint8_t)~seed[3]);
+    EXPECT_ERROR(0x29);
+    SEND(0xFD);
+    EXPECT(0xFF, 0x00, 0x01); /* still locked */
+    TEST_ASSERT_EQUAL_UINT8(0, slave.wrong_keys);
+}
+
+/* A recorded key must not unlock a second time, and a wrong key must not be corrected with the same seed. */
+void test_a_seed_is_valid_for_one_key_only(void)
+{
+    uint8_t seed[4];
+    master_connect();
+    SEND(0xF8, 0, 1);
+    EXPECT(0xFF, 4);
+    memcpy(seed, &last_answer.data[2], 4);
+    SEND(0xF7, 4, seed[0], seed[1], seed[2], seed[3]);
+    EXPECT_ERROR(0x25);
+    slave.wrong_keys = 0;
+    try_old_key(seed);
+    SEND(0xF8, 0, 1);
+    memcpy(seed, &last_answer.data[2], 4);
+    SEND(0xF7, 4, (uint8_t)~seed[0], (uint8_t)~seed[1], (uint8_t)~seed[2], (uint8_t)~seed[3]);
+    EXPECT(0xFF, 0);
+    try_old_key(seed);
+}
+
 void test_the_limits_themselves_are_allowed_and_what_lies_outside_is_refused(void)
 {
     const float good[] = {2.0F, 4.0F};
