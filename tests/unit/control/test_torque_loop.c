@@ -190,20 +190,39 @@ void test_below_t_min_the_error_is_divided_by_t_min(void)
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.03 * 400.0 / 655.0, from_q31(state.correction));
 }
 
-/* A commanded torque of a hundredth of T_min and an offset of the estimate: as a ratio the offset would use the whole
- * authority and falsify the next torque. Below T_min/2 the correction is kept. */
+/* A commanded torque below T_min/2 = 327 and an offset of the estimate: as a ratio the offset would use the whole
+ * authority in either direction and falsify the next torque. There the correction is kept, whatever its sign. */
 void test_an_offset_at_a_small_torque_does_not_change_the_correction(void)
 {
-    for (int sign = -1; sign <= 1; sign += 2) {
-        state = (torque_loop_state_t){.correction = Q31(0.1), .model = sign * 6 * 65536};
-        in.torque_commanded = (q15_t)(sign * 6);
-        in.torque_estimated = (q15_t)(-20 * sign);
-        for (int n = 0; n < 10000; n++) {
+    static const int torques[] = {1, 6, 326};
+    for (int n = 0; n < 3 * 8; n++) {
+        const int sign = (n & 1) ? 1 : -1;
+        const int offset = (n & 2) ? 20 : -20;
+        const double correction = (n & 4) ? 0.1 : -0.1;
+        state = (torque_loop_state_t){.correction = Q31(correction), .model = sign * torques[n / 8] * 65536};
+        in.torque_commanded = (q15_t)(sign * torques[n / 8]);
+        in.torque_estimated = (q15_t)(in.torque_commanded + offset);
+        for (int k = 0; k < 10000; k++) {
             (void)step();
         }
+        TEST_ASSERT_EQUAL_INT32(Q31(correction), state.correction);
         in.torque_commanded = in.torque_estimated = (q15_t)(sign * 10000);
         state.model = sign * 10000 * 65536;
-        TEST_ASSERT_INT_WITHIN(2, sign * 11000, step());
+        TEST_ASSERT_INT_WITHIN(2, sign * lround(10000.0 * (1.0 + correction)), step());
+    }
+}
+
+/* From T_min/2 on the loop corrects, upwards and downwards. */
+void test_from_half_of_t_min_on_the_correction_follows_the_error(void)
+{
+    for (int n = 0; n < 4; n++) {
+        const int sign = (n & 1) ? 1 : -1;
+        const int offset = (n & 2) ? 20 : -20; /* positive: more torque than commanded, if the sign is positive */
+        state = (torque_loop_state_t){.correction = Q31(0.1), .model = sign * 327 * 65536};
+        in.torque_commanded = (q15_t)(sign * 327);
+        in.torque_estimated = (q15_t)(in.torque_commanded + offset);
+        (void)step();
+        TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.1 - 0.03 * sign * offset / 655.0, from_q31(state.correction));
     }
 }
 
