@@ -206,7 +206,7 @@ static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
     twin->u = twin_current_control(&motor, &twin->current, &request);
     const twin_modulate_in_t voltage = {twin->u, now->i, angle->theta + 1.5 * angle->step, twin->v_dc};
     const twin_modulate_t m = twin_modulate(&motor, &voltage);
-    twin->acted = m.acted;
+    twin->applied = m.applied;
     twin->modulation_limited = m.limited;
     twin->periods_on = (twin->periods_on < 3) ? twin->periods_on + 1 : 3;
     for (int x = 0; x < 3; x++) {
@@ -218,7 +218,7 @@ static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
 static void bridge_off(twin_t *twin, double out[4])
 {
     twin->u = (twin_dq_t){0.0, 0.0};
-    twin->acted = (twin_dq_t){0.0, 0.0};
+    twin->applied = (twin_dq_t){0.0, 0.0};
     twin->current = (twin_current_state_t){0};
     twin->modulation_limited = false;
     twin->periods_on = 0;
@@ -245,7 +245,7 @@ void twin_step(twin_t *twin, const double in[6], double out[4])
     sample(twin, in);
     const twin_angle_t angle = twin_angle_tracker(&twin->motor, &twin->tracker, twin->last_theta_m);
     twin->sample.i = twin_park(twin_clarke(twin->last_i), angle.theta);
-    twin->sample.u = twin->acted; /* computed in the last period, acts in this one */
+    twin->sample.u = twin->applied; /* computed in the last period, acts in this one */
     twin->sample.omega = angle.omega;
     twin->theta = angle.theta;
     twin->sample.flux = twin_flux_table(&twin->motor, twin->sample.i);

@@ -95,7 +95,7 @@ twin_modulate_t twin_modulate(const motor_si_t *motor, const twin_modulate_in_t 
         const bool switches = (out.duty[x] > 0.0) && (out.duty[x] < 1.0);
         leg_voltage[x] = (out.duty[x] - (switches ? c : 0.0)) * in->v_dc;
     }
-    out.acted = twin_park(twin_clarke((twin_abc_t){leg_voltage[0], leg_voltage[1], leg_voltage[2]}), in->theta);
-    out.limited = hypot(out.acted.d - in->u.d, out.acted.q - in->u.q) > 1e-4 * motor->v_base_V;
+    out.applied = twin_park(twin_clarke((twin_abc_t){leg_voltage[0], leg_voltage[1], leg_voltage[2]}), in->theta);
+    out.limited = hypot(out.applied.d - in->u.d, out.applied.q - in->u.q) > 1e-4 * motor->v_base_V;
     return out;
 }

@@ -47,7 +47,7 @@ struct twin {
     int periods_on; /* since switching was enabled, saturates at 3 */
     /* latest signals */
     twin_mrai_in_t sample; /* its u acts during the present period */
-    twin_dq_t i_ref, u, acted;
+    twin_dq_t i_ref, u, applied;
     twin_target_t target;
     twin_reference_t reference;
     double trim;

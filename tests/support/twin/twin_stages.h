@@ -106,7 +106,7 @@ typedef struct {
 
 typedef struct {
     double duty[3];
-    twin_dq_t acted;
+    twin_dq_t applied;
     bool limited;
 } twin_modulate_t;
 

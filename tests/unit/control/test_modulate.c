@@ -91,9 +91,9 @@ static void compare_with_twin(worst_t *duty, worst_t *applied)
         worst_note(duty, duties[x] - t.duty[x] * 32768, "%d, v %d %d i %d %d at %.4f", x, in.v.d, in.v.q, in.i.d,
                    in.i.q, theta);
     }
-    worst_note(applied, y.applied.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
+    worst_note(applied, y.applied.d - t.applied.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
                in.v_dc, in.i.d, in.i.q, theta);
-    worst_note(applied, y.applied.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
+    worst_note(applied, y.applied.q - t.applied.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d, in.v.q,
                in.v_dc, in.i.d, in.i.q, theta);
 }
 
@@ -334,9 +334,9 @@ void test_the_applied_voltage_of_limited_pulses_follows_the_twin(void)
             fmax(fabs((double)y.duty.a - t.duty[0] * 32768),
                  fmax(fabs((double)y.duty.b - t.duty[1] * 32768), fabs((double)y.duty.c - t.duty[2] * 32768)));
         if (jump < 4.0) {
-            worst_note(&worst, y.applied.d - t.acted.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
+            worst_note(&worst, y.applied.d - t.applied.d / f.v * 32768, "d, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
                        in.v.q, in.v_dc, in.i.d, in.i.q, theta);
-            worst_note(&worst, y.applied.q - t.acted.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
+            worst_note(&worst, y.applied.q - t.applied.q / f.v * 32768, "q, v %d %d v_dc %d i %d %d at %.4f", in.v.d,
                        in.v.q, in.v_dc, in.i.d, in.i.q, theta);
         } else { /* rounding decided between zero and the shortest pulse */
             TEST_ASSERT_DOUBLE_WITHIN(4.0, 983.0, jump);
