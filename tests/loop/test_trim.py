@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from test_robust import CONFIDENCE, RATED_NM, SOFT, STIFF, TORQUE, Drive
+from test_robust import RATED_NM, SOFT, STIFF, TORQUE, Drive
 
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
@@ -93,10 +93,21 @@ def test_it_survives_a_power_cycle(hsm1: Motor) -> None:
 
 
 def test_at_standstill_and_without_current_the_compensation_does_not_change(hsm1: Motor) -> None:
+    """Although a voltage error is identified and not compensated yet: at low speed with current it is."""
     drive = Drive(hsm1, {"dead_time_s": 2.4e-6, "device_drop_V": 1.5})
     with drive.loop as loop:
+        loop.set("trim", 0.0)
+        drive.warm_up()
+        drive.to(600, 60, 4.0)
+        drive.to(0, 60, 1.0)
         before = loop.get("dead_time_compensation")
+        loop.set("trim", 1.0)
         drive.to(0, 60, 3.0)
+        assert loop.get("dead_time_compensation") == before
+        loop.set("trim", 0.0)
+        drive.to(1500, 0, 1.5)
+        loop.set("trim", 1.0)
         drive.to(1500, 0, 3.0)
         assert loop.get("dead_time_compensation") == before
-        assert drive.to(1500, 0, 0.1)[-1, CONFIDENCE] <= 1.0
+        drive.to(600, 60, 5.0)
+        assert loop.get("dead_time_compensation") > before
