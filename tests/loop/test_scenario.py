@@ -12,7 +12,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.build import locate
 from fluxtrue_tools.sim.motor import Motor
-from fluxtrue_tools.sim.run import simulate, value_at
+from fluxtrue_tools.sim.run import check_finite, simulate, value_at
 from fluxtrue_tools.sim.scenario import Plant, Profile, Scenario, parse
 
 HEAD = 'motor = "hsm1"\nduration_s = 0.05\n'
@@ -219,8 +219,8 @@ def test_the_defaults_are_a_nominal_drive() -> None:
         # Three pole pairs at 10 kHz: half an electrical turn per period is 100 000 rpm.
         (HEAD + "[profile]\nspeed_rpm = 1e9", "profile.speed_rpm = 1e+09 rpm, allowed: up to 100000 rpm"),
         (HEAD + "[profile]\nspeed_rpm = [[0, 0], [0.1, -1e6]]", "profile.speed_rpm = -1e+06 rpm, allowed"),
-        (HEAD + MOVING + "winding_C = 1e9", "left the range of numbers"),
-        (HEAD + MOVING + "[plant]\nr_ohm_20 = 1e9", "left the range of numbers"),
+        (HEAD + MOVING + "winding_C = 1e9", "the plant or its load is impossible"),
+        (HEAD + MOVING + "[plant]\nr_ohm_20 = 1e9", "the plant or its load is impossible"),
     ],
 )
 def test_what_cannot_be_simulated_or_averaged_is_refused_in_one_line(hsm1: Motor, text: str, message: str) -> None:
@@ -228,6 +228,13 @@ def test_what_cannot_be_simulated_or_averaged_is_refused_in_one_line(hsm1: Motor
         simulate(parse(text, "bad.toml"), hsm1, where="bad.toml")
     line = str(refusal.value)
     assert line.startswith("bad.toml: ") and message in line, line
+
+
+def test_a_row_without_a_number_is_refused_with_its_column() -> None:
+    """In the words of the runner, which refuses a flux linkage without a current."""
+    rows = np.array([[0.0, 1.0], [1e-4, np.inf]])
+    with pytest.raises(FluxtrueError, match=r"left the range of numbers \(i_d_A = inf\): .* an event is impossible$"):
+        check_finite(["time_s", "i_d_A"], rows)
 
 
 @pytest.mark.parametrize(

@@ -166,13 +166,14 @@ def _start(scenario: Scenario, motor: Motor, where: str) -> lib.Loop:
     return loop
 
 
-def _check_finite(columns: list[str], rows: NDArray[np.float64]) -> None:
+def check_finite(columns: list[str], rows: NDArray[np.float64]) -> None:
+    """Refuse rows with a value that is infinite or no number."""
     bad = np.argwhere(~np.isfinite(rows))
     if bad.size:
         row, column = bad[0]
         raise FluxtrueError(
             f"the simulation left the range of numbers ({columns[column]} = {rows[row, column]:g}): "
-            "a value in [plant], [profile], [mechanics] or an event is absurd"
+            "a value in [plant], [profile], [mechanics] or an event is impossible"
         )
 
 
@@ -224,7 +225,7 @@ def _run(
         }
         periods = round(stop / loop.period_s) - round(start / loop.period_s)
         rows.append(loop.run(periods, ramps))
-        _check_finite(columns, rows[-1])
+        check_finite(columns, rows[-1])
         if progress is not None:
             progress(stop - start)
     return np.concatenate(rows)
