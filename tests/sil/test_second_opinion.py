@@ -3,16 +3,15 @@
 
 FLUXTRUE_PLANTS=20 draws twenty plants for each model instead of three."""
 
-import importlib.util
 import math
 import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import make_maps
 import numpy as np
 from gym_electric_motor.physical_systems.electric_motors import PermanentMagnetSynchronousMotor
 from motulator.drive import model
@@ -159,18 +158,8 @@ def assert_accurate(plant: Plant, motor: str, rated_Nm: float) -> None:
     assert harmless >= 0.99 * len(found)
 
 
-def iron() -> Any:
-    """The currents of the machine as closed formulas of its fluxes, from tests/motors/make_maps.py."""
-    spec = importlib.util.spec_from_file_location("make_maps", MOTORS / "make_maps.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["make_maps"] = module  # dataclasses need their module in sys.modules
-    spec.loader.exec_module(module)
-    return module.MACHINES["saturated"]
-
-
-IRON = iron()
+# The currents of the machine as closed formulas of its fluxes.
+IRON = make_maps.MACHINES["saturated"]
 
 
 def saturation(spread: Spread) -> Wave:

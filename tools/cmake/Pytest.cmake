@@ -42,7 +42,7 @@ function(fluxtrue_pytest)
     set(imports)
     if(arg_IMPORTS)
         list(JOIN arg_IMPORTS " " folders)
-        set(imports -o "pythonpath=support ${folders}")
+        set(imports -o "pythonpath=support motors ${folders}")
     endif()
     cmake_path(ABSOLUTE_PATH arg_PATH BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
     add_test(NAME ${arg_NAME}
