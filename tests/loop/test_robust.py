@@ -12,7 +12,7 @@ from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 RPM = 2.0 * math.pi / 60.0
-PER_S = 10000
+ROW_S = 1e-3
 RATED_NM = 132.0
 COLUMNS = ("truth.torque_mean_Nm", "torque_estimated_Nm", "psi_f_Vs", "torque_confidence", "torque_correction",
            "voltage_limited", "fault_word")  # fmt: skip
@@ -35,13 +35,13 @@ class Drive:
     def __init__(self, motor: Motor, plant: dict[str, float]) -> None:
         self.loop = Loop(motor.library, motor.plant | {"imposed_speed": 1.0} | plant, motor.flux_map)
         self.loop.set("enable", 1.0)
-        self.loop.record(COLUMNS, 10)
+        self.loop.record(COLUMNS, round(ROW_S / self.loop.period_s))
         self.speed, self.torque = 0.0, 0.0
 
     def to(self, rpm: float, torque_Nm: float, seconds: float) -> NDArray[np.float64]:
         """Ramp speed and torque linearly; a row for each millisecond."""
         ramps = {"plant.speed_rad_s": (self.speed, rpm * RPM), "torque_requested_Nm": (self.torque, torque_Nm)}
-        rows = self.loop.run(round(seconds * PER_S), ramps)
+        rows = self.loop.run(round(seconds / self.loop.period_s), ramps)
         self.speed, self.torque = rpm * RPM, torque_Nm
         assert rows[:, FAULT].max() == 0.0
         return rows

@@ -42,7 +42,11 @@ class Rig:
     def run(self, seconds: float, **ramps: tuple[float, float]) -> "Trace":
         """Simulate and record every period; the ramps have names as in set()."""
         named = {n.replace("plant_", "plant.", 1): span for n, span in ramps.items()}
-        return Trace(self.loop.run(round(seconds / self.loop.period_s), named))
+        return Trace(self.loop.run(round(seconds / self.loop.period_s), named), self.loop.period_s)
+
+    def periods(self, ms: float) -> int:
+        """How many PWM periods a time has."""
+        return round(ms * 1e-3 / self.loop.period_s)
 
     def get(self, name: str) -> float:
         """The present value."""
@@ -50,10 +54,11 @@ class Rig:
 
 
 class Trace:
-    """What a run recorded."""
+    """What a run recorded: a row for each PWM period."""
 
-    def __init__(self, rows: NDArray[np.float64]) -> None:
+    def __init__(self, rows: NDArray[np.float64], period_s: float) -> None:
         self._rows = rows
+        self._period_ms = 1e3 * period_s
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return self._rows[:, NAMES.index(name)]
@@ -78,7 +83,14 @@ class Trace:
     def faults(self) -> int:
         return int(self["fault_word"][-1])
 
+    def row(self, ms: float) -> int:
+        """The row at a time after the start of the run; negative: before its end."""
+        return round(ms / self._period_ms)
+
+    def first_ms(self, found: NDArray[np.bool_]) -> float:
+        """Milliseconds from the start of the run to the first row of a condition; NaN: none."""
+        return float(np.argmax(found)) * self._period_ms if found.any() else math.nan
+
     def fault_ms(self, fault: int) -> float:
-        """Milliseconds from the start of the run to the fault, at 10 kHz; NaN: none."""
-        found = self["fault_word"].astype(int) & fault > 0
-        return float(np.argmax(found)) * 0.1 if found.any() else math.nan
+        """Milliseconds from the start of the run to the fault; NaN: none."""
+        return self.first_ms(self["fault_word"].astype(int) & fault > 0)

@@ -11,6 +11,8 @@ from fluxtrue_tools.sim.motor import Motor
 
 SPEEDS = [0.0, 20.0, -100.0, 500.0, 2000.0, -5000.0, 10000.0]
 TORQUES = [100.0, -80.0, 5.0]
+GLITCH_MS = 5.0
+ONCE = 100000  # samples between two glitches: more than a run has
 
 
 def _steady(hsm1: Motor, rpm: float, torque: float) -> tuple[Rig, float]:
@@ -19,7 +21,12 @@ def _steady(hsm1: Motor, rpm: float, torque: float) -> tuple[Rig, float]:
 
 
 def _largest_before(trace: Trace, ms: float, mean: float) -> float:
-    return float(np.abs(trace.torque[: round(ms * 10.0)] - mean).max())
+    return float(np.abs(trace.torque[: trace.row(ms)] - mean).max())
+
+
+def _glitch(rig: Rig, angle_rad: float) -> None:
+    samples = rig.periods(GLITCH_MS)
+    rig.set(plant_angle_spike_every=ONCE, plant_angle_spike_samples=samples, plant_angle_spike_rad=angle_rad)
 
 
 @pytest.mark.parametrize("torque", TORQUES)
@@ -37,7 +44,7 @@ def test_spikes_in_every_tenth_sample_are_found_in_20_ms(hsm1: Motor, rpm: float
 @pytest.mark.parametrize("rpm", SPEEDS)
 def test_a_glitch_of_5_ms_changes_no_torque_and_is_no_fault(hsm1: Motor, rpm: float, degrees: float) -> None:
     rig, before = _steady(hsm1, rpm, 100.0)
-    rig.set(plant_angle_spike_every=100000, plant_angle_spike_samples=50, plant_angle_spike_rad=math.radians(degrees))
+    _glitch(rig, math.radians(degrees))
     trace = rig.run(0.1)
     assert trace.faults == 0
     assert np.abs(trace.torque - before).max() <= 5.0
@@ -49,7 +56,7 @@ def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: fl
     rig, before = _steady(hsm1, 2000.0, 80.0 * sign)
     faster = (2000.0 * math.pi / 30.0, 2200.0 * math.pi / 30.0)
     rig.run(0.1, plant_speed_rad_s=faster)
-    rig.set(plant_angle_spike_every=100000, plant_angle_spike_samples=50, plant_angle_spike_rad=1.0)
+    _glitch(rig, 1.0)
     trace = rig.run(0.02, plant_speed_rad_s=(faster[1], faster[1] * 2240.0 / 2200.0))
     assert trace.faults == 0
     assert np.abs(trace.torque - before).max() <= 5.0

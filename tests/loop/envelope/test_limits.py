@@ -8,6 +8,8 @@ from rig import TEMPERATURE, Rig
 from fluxtrue_tools.sim.motor import Motor
 
 RATED_NM = 132.0
+LIMITED_MS = 30.0  # 90 N·m at 13.2 N·m/ms, then the filter of the losses
+DERATED_MS, TRIPPED_MS = 100.0, 110.0
 
 
 @pytest.mark.parametrize(("rpm", "torque"), [(4000.0, 100.0), (-4000.0, -100.0), (9000.0, 60.0)])
@@ -35,7 +37,7 @@ def test_a_power_limit_that_falls_while_driving_is_kept_at_once(hsm1: Motor) -> 
     rig.run(0.3)
     trace = rig.set(power_limit_drive_W=10e3).run(0.1)
     power = trace["truth.electrical_W"]
-    assert power[300:].max() <= 11e3  # after 30 ms: 90 N·m at 13.2 N·m/ms, then the filter of the losses
+    assert power[trace.row(LIMITED_MS) :].max() <= 11e3
 
 
 def test_vehicle_torque_limits_hold_for_each_direction(hsm1: Motor) -> None:
@@ -64,8 +66,8 @@ def test_temperature_derates_the_torque_linearly_and_then_trips(
     assert half.settled() == pytest.approx(0.5 * RATED_NM, abs=1.0)
     over = rig.set(**{name: trip}).run(0.2)
     assert over.faults == TEMPERATURE
-    assert over.fault_ms(TEMPERATURE) == pytest.approx(110.0, abs=2.0)
-    assert abs(over.torque[1000]) <= 1.0  # derated to zero before it tripped
+    assert over.fault_ms(TEMPERATURE) == pytest.approx(TRIPPED_MS, abs=2.0)
+    assert abs(over.torque[over.row(DERATED_MS)]) <= 1.0  # derated to zero before it tripped
 
 
 def test_low_dc_voltage_derates_driving_torque_and_high_dc_voltage_generating_torque(hsm1: Motor) -> None:

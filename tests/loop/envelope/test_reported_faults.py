@@ -44,7 +44,7 @@ def test_throttle_release_at_high_speed_does_not_brake_the_car(hsm1: Motor, torq
     assert trace.torque.min() >= -2.0
     assert trace.torque.max() <= before + 3.0
     # The slew of 13.2 N·m/ms starts at the torque that was made, not at the requested torque.
-    released_ms = float(np.argmax(trace.torque < 0.1 * before)) * 0.1
+    released_ms = trace.first_ms(trace.torque < 0.1 * before)
     assert released_ms <= before / 13.2 + 3.0
 
 
@@ -70,7 +70,7 @@ def test_a_resolver_that_jumps_by_30_degrees_while_running_is_found_and_not_foll
     trace = rig.set(plant_angle_offset_rad=math.radians(30.0)).run(0.02)
     found_ms = trace.fault_ms(ANGLE)
     assert found_ms <= 6.7
-    assert np.abs(trace.torque[: round(found_ms * 10.0)] - before).max() <= 5.0
+    assert np.abs(trace.torque[: trace.row(found_ms)] - before).max() <= 5.0
 
 
 @pytest.mark.parametrize("rpm", [6000.0, 10000.0])
@@ -91,9 +91,10 @@ def test_a_battery_disconnected_while_generating_does_not_damage_the_inverter(hs
     rig = Rig(hsm1, rpm, -50.0)
     rig.run(0.3)
     volts, highest, trace = 350.0, 350.0, None
-    for _ in range(500):
-        trace = rig.set(plant_vdc_V=volts).run(1e-4)
-        volts = max(volts - trace["truth.idc_A"][-1] * 1e-4 / 500e-6, 1.0)
+    period_s = rig.loop.period_s
+    for _ in range(rig.periods(50.0)):
+        trace = rig.set(plant_vdc_V=volts).run(period_s)
+        volts = max(volts - trace["truth.idc_A"][-1] * period_s / 500e-6, 1.0)
         highest = max(highest, volts)
     assert trace is not None
     assert trace.faults & OVER_VOLTAGE
