@@ -98,11 +98,12 @@ typedef struct {
     int32_t measured; /* not zero: this is not motor.toml's */
 } compensation_t;
 
-/** Moving the currents to those of the short circuit. */
+/** Leaving torque at speed (drive/switch_off.h). */
 typedef struct {
-    dq_q15_t from; /* reference when it began */
+    dq_q15_t from; /* reference when the currents began to move to those of the short circuit */
     int32_t i_d;   /* of the short circuit */
-    uint8_t steps; /* 0: not active */
+    uint8_t steps; /* of that movement; 0: not active */
+    bool holds;    /* enable is off, the torque is held at zero */
 } switch_off_t;
 
 /** Written by the 1 kHz task alone. */

@@ -21,17 +21,24 @@ static int32_t short_circuit_i_d(const drive_t *drive, const snapshot_t *snapsho
     return high;
 }
 
+/* Whether the currents are controlled at a speed at which disabled switching would rectify. */
+static bool controls_at_speed(const drive_t *drive, run_state_t wanted)
+{
+    const task_state_t *task = &drive->task;
+    return task->run_state == RUN_STATE_RUN && wanted != RUN_STATE_FAULT && task->safe_state.short_circuit &&
+           !drive_bypasses_torque_path(drive);
+}
+
 run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_state_t wanted, uint32_t *faults)
 {
     task_state_t *task = &drive->task;
     switch_off_t *off = &task->switch_off;
-    const bool controlled = (*faults & ~(uint32_t)CONTROLLED) == 0U;
-    const bool ends = wanted == RUN_STATE_OFF || (wanted == RUN_STATE_RUN && *faults != 0U);
-    const bool applies = task->run_state == RUN_STATE_RUN && controlled && ends && task->safe_state.short_circuit &&
-                         !drive_bypasses_torque_path(drive);
-    if (!applies || off->steps == STEPS) {
+    const bool controls = controls_at_speed(drive, wanted);
+    off->holds = controls && wanted == RUN_STATE_OFF && *faults == 0U; /* (SS-12) */
+    const bool moves = controls && *faults != 0U && (*faults & ~(uint32_t)CONTROLLED) == 0U;
+    if (!moves || off->steps == STEPS) {
         off->steps = 0;
-        return wanted;
+        return off->holds ? RUN_STATE_RUN : wanted;
     }
     if (off->steps == 0U) {
         off->from = task->i_ref;

@@ -1,20 +1,29 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_SWITCH_OFF_H
 #define DRIVE_SWITCH_OFF_H
-/** Leaving torque where the safe state is the short circuit: the current control first moves the currents to those of
- * the short circuit, so that closing it changes nothing.
- *   i* goes in 8 steps from where it is to i_d with psi_d(i_d, 0) + dpsi = 0, i_q = 0, and stays there for 2
- *   Applies when enable goes off, and to faults that leave the control intact: over-temperature and over-speed, which
- *   are raised afterwards. Every other fault brings the short circuit at once.
- * Source   docs/theory/safe-state.md (SS-8)
+/** Leaving torque where disabled switching would rectify.
+ *   Enable off: the torque goes to zero at the fastest slew rate, and the current control holds it there until
+ *     switching can be disabled. The currents are those of field weakening without torque: far below those of the short
+ *     circuit, which some machines cannot withstand.
+ *   Over-temperature and over-speed leave the control intact, but must be latched, which ends it: before, i* goes in 8
+ *     steps from where it is to the short circuit's i_d with psi_d(i_d, 0) + dpsi = 0, i_q = 0, and stays there for 2.
+ *   Every other fault brings the short circuit at once.
+ * Source   docs/theory/safe-state.md (SS-8), (SS-12)
  * Range    i_d down to the demagnetisation limit at the present temperature
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 
-/** The run state of this step. While the currents are being moved it stays RUN and *faults becomes 0. */
+/** The run state of this step. While the torque is held at zero it stays RUN; while the currents are being moved to
+ * those of the short circuit it does, too, and *faults becomes 0. */
 run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_state_t wanted, uint32_t *faults);
 
-/** The currents are being moved: the torque path has no part in the reference. */
+/** Enable is off, and the torque is held at zero. */
+static inline bool switch_off_holds(const drive_t *drive)
+{
+    return drive->task.switch_off.holds;
+}
+
+/** The currents are being moved to those of the short circuit: the torque path has no part in the reference. */
 static inline bool switch_off_runs(const drive_t *drive)
 {
     return drive->task.switch_off.steps != 0U;

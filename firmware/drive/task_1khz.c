@@ -16,8 +16,8 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
     task_state_t *task = &drive->task;
     const bool enable = request->enable; /* read once, so that a reset is never sent together with the command to run */
     if (request->fault_resets != task->fault_resets_asked) {
-        task->fault_resets_asked = request->fault_resets; /* refused while enabled, and not carried out later */
-        task->fault_resets += enable ? 0U : 1U;
+        task->fault_resets_asked = request->fault_resets; /* refused while running, and not carried out later */
+        task->fault_resets += (enable || switch_off_holds(drive)) ? 0U : 1U;
     }
     if (request->identification_resets != task->identification_resets) {
         task->identification_resets = request->identification_resets;
@@ -59,10 +59,11 @@ static q15_t slew_limit(const drive_t *drive)
 
 static q15_t limit_torque(drive_t *drive, const snapshot_t *snapshot)
 {
+    static const torque_limits_t no_torque = {.power_drive = Q15_MAX, .power_regen = Q15_MAX};
     task_state_t *task = &drive->task;
     const torque_limit_in_t in = {
         .torque_arbitrated = drive->request.torque_arbitrated,
-        .limits = &drive->request.limits,
+        .limits = switch_off_holds(drive) ? &no_torque : &drive->request.limits,
         .u = snapshot->sample.point.u,
         .i = snapshot->sample.point.i,
         .torque_estimated = task->identification.torque_estimated,

@@ -56,12 +56,20 @@ static bool is_dc_settled(ecu_t *ecu, int32_t v_dc)
     return settling->us >= SETTLED_US;
 }
 
-/* With switching disabled there is no current; while the bridge switches, the monitors check it. */
+/* Above this speed the line back-EMF may drive currents through the diodes into the dc link. */
+static bool may_rectify(const drive_t *drive, const sample_t *sample)
+{
+    return drive->task.safe_state.short_circuit && sample->v_dc >= drive->motor->monitor.v_min;
+}
+
+/* With switching disabled there is no current below the speed at which the diodes conduct; while the bridge switches,
+ * the monitors check it. */
 static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
 {
     const dq_q15_t i = sample->point.i;
     const bool idle = i.d <= IDLE_CURRENT && i.d >= -IDLE_CURRENT && i.q <= IDLE_CURRENT && i.q >= -IDLE_CURRENT;
-    return drive->samples.generation != 0U && (idle || drive->request.enable || drive_is_shorted(drive));
+    const bool switches = drive->task.run_state == RUN_STATE_RUN || drive_is_shorted(drive);
+    return drive->samples.generation != 0U && (idle || switches || may_rectify(drive, sample));
 }
 
 /* Whether contactor and gate supply may be switched off. At the known speed (safety/safe_state.h) the magnets make less

@@ -2,6 +2,7 @@
 #include "drive/data_check.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
+#include "drive/slow_monitors.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -258,6 +259,100 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
     sample_at(0.3, true, false);
     task_1khz(&drive);
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
+}
+
+/* Leaving torque at speed. */
+
+/* hsm1: the short circuit is the safe state above 0.77 of the speed base, which is 10 500 rpm. */
+static void run_at(double omega_pu, double torque_pu)
+{
+    slow_monitors_without_machine(&seam.motor);
+    seam_run();
+    drive.parameters.torque_slew = Q15_MAX;
+    drive.request.torque_arbitrated = (q15_t)(torque_pu * 32768.0);
+    for (int n = 0; n < 50; n++) {
+        sample_at(omega_pu, true, false);
+        task_1khz(&drive);
+    }
+}
+
+void test_enable_off_at_speed_holds_the_torque_at_zero_until_switching_can_be_disabled(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        setUp();
+        run_at(0.9 * sign, 0.1);
+        drive.parameters.torque_slew = 1; /* of no account when the torque has to go */
+        TEST_ASSERT_GREATER_THAN_INT(2000, drive.task.torque_commanded);
+        drive.request.enable = false;
+        for (int n = 0; n < 1000; n++) {
+            sample_at(0.9 * sign, true, false);
+            task_1khz(&drive);
+            TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, drive.task.run_state);
+            TEST_ASSERT_TRUE(command()->run);
+            TEST_ASSERT_TRUE(n < 10 || drive.task.torque_commanded == 0);
+        }
+        TEST_ASSERT_INT_WITHIN(300, 0, drive.task.i_ref.q);
+        TEST_ASSERT_LESS_THAN_INT(0, drive.task.i_ref.d); /* field weakening goes on */
+        for (int n = 0; n < 200; n++) {
+            sample_at(0.5 * sign, true, false);
+            task_1khz(&drive);
+        }
+        TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+        TEST_ASSERT_FALSE(command()->run);
+    }
+}
+
+void test_the_torque_comes_back_when_enable_does(void)
+{
+    run_at(0.9, 0.1);
+    drive.request.enable = false;
+    for (int n = 0; n < 20; n++) {
+        sample_at(0.9, true, false);
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_EQUAL_INT(0, drive.task.torque_commanded);
+    drive.request.enable = true;
+    for (int n = 0; n < 20; n++) {
+        sample_at(0.9, true, false);
+        task_1khz(&drive);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(2000, drive.task.torque_commanded);
+}
+
+/* A reset must not wait for the next fault. */
+void test_a_reset_while_the_torque_is_held_at_zero_is_refused(void)
+{
+    run_at(0.9, 0.1);
+    drive.request.enable = false;
+    task_1khz(&drive);
+    drive.request.fault_resets++;
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_UINT32(0, command()->fault_resets);
+    drive_raise_fault(&drive, FAULT_OVER_CURRENT);
+    task_and_period();
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_FAULT, drive.task.run_state);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_CURRENT, drive.fast.faults & FAULT_OVER_CURRENT);
+}
+
+/* It is found while the torque is held at zero or while the drive runs: 8 steps to the currents of the short circuit,
+ * 2 with them, then it is latched. */
+void test_over_temperature_at_speed_is_latched_after_the_currents_have_become_those_of_the_short_circuit(void)
+{
+    for (int enabled = 0; enabled < 2; enabled++) {
+        setUp();
+        run_at(0.9, 0.1);
+        drive.request.enable = enabled != 0;
+        seam.winding_dC = 2400; /* 10 K beyond the trip */
+        int last = 0;
+        for (int n = 0; n < 200 && command()->run; n++) {
+            sample_at(0.9, true, false);
+            task_1khz(&drive);
+            last = (drive.task.switch_off.steps != 0U) ? drive.task.i_ref.d : last;
+        }
+        TEST_ASSERT_EQUAL_HEX32(FAULT_TEMPERATURE, command()->faults);
+        const flux_point_t at = flux_table_step(&motor.flux_table, (dq_q15_t){last, 0});
+        TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_monitor.psi_f / 20U, 0, at.psi_d);
+    }
 }
 
 /* The exchange boxes. */

@@ -121,11 +121,22 @@ void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_
     }
     for (unsigned n = 0; n < sizeof too_much / sizeof too_much[0]; n++) {
         sample.point.i = too_much[n];
-        ecu.drive.request.enable = false;
+        ecu.drive.task.run_state = RUN_STATE_OFF;
         TEST_ASSERT_FALSE(observe()->sensors_plausible);
-        ecu.drive.request.enable = true;
+        ecu.drive.task.run_state = RUN_STATE_RUN;
         TEST_ASSERT_TRUE(observe()->sensors_plausible);
     }
+}
+
+/* The diodes conduct where the short circuit is the safe state, but not without a dc voltage, where that level is 0. */
+void test_current_at_a_speed_at_which_the_diodes_conduct_is_plausible(void)
+{
+    sample.point.i = (dq_q15_t){-2000, 500};
+    TEST_ASSERT_FALSE(observe()->sensors_plausible);
+    ecu.drive.task.safe_state.short_circuit = true;
+    TEST_ASSERT_TRUE(observe()->sensors_plausible);
+    sample.v_dc = 8494;
+    TEST_ASSERT_FALSE(observe()->sensors_plausible);
 }
 
 /* The magnets drive a current through a short circuit of the windings. */
