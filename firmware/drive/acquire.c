@@ -7,18 +7,38 @@
 /* The known error of the angle sensor at this position. */
 static uint32_t angle_correction(const drive_t *drive, uint32_t theta_m)
 {
-    return (uint32_t)drive->task.angle_correction[theta_m >> ANGLE_HARMONICS_SHIFT];
+    const volatile int32_t *correction = &drive->task.angle_correction[0] + (theta_m >> ANGLE_HARMONICS_SHIFT);
+    return (uint32_t)*correction;
 }
 
 /* A sample of the angle that no rotor can have: the prediction replaces it. Only the advance per period is still the
  * one of the sample, by at most k_i/2 of a turn, 0.2 degrees. */
-static __attribute__((noinline)) void replace_angle(drive_t *drive, sample_t *sample)
+static void replace_angle(drive_t *drive, sample_t *sample)
 {
     const angle_t angle = angle_tracker_coast(&drive->period.angle_tracker, &drive->fast.angle_tracker,
                                               sample->theta_e);
     sample->point.omega = angle.omega_q31;
     sample->theta_e = angle.theta_e;
-    monitor_report_angle_jump(&drive->fast.monitor);
+}
+
+/* A sample that has jumped or repeats the last reading. */
+static __attribute__((noinline)) void check_angle(drive_t *drive, sample_t *sample, int32_t step, bool jumped,
+                                                  bool repeated)
+{
+    angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
+    angle_t angle = {sample->theta_e, step, sample->point.omega, jumped};
+    angle_repeat_t meaning = ANGLE_FOLLOWED;
+    if (repeated) {
+        meaning = angle_tracker_repeated(&drive->period.angle_tracker, tracker, &angle, drive->samples.generation);
+    }
+    if (meaning == ANGLE_STUCK ? !angle_tracker_may_stop(tracker) : angle.jumped) {
+        monitor_report_angle_jump(&drive->fast.monitor);
+    }
+    if (meaning == ANGLE_STUCK || angle.jumped) {
+        replace_angle(drive, sample);
+    } else {
+        sample->point.omega = angle.omega_q31;
+    }
 }
 
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
@@ -39,8 +59,10 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
                                   : angle_tracker_step(config, tracker, theta_m);
     sample->point.omega = angle.omega_q31;
     sample->theta_e = angle.theta_e;
-    if (__builtin_expect(angle.jumped, 0)) {
-        replace_angle(drive, sample);
+    /* In the usual route a repeated reading is noticed at the end of the period (publish_sample()). */
+    const bool repeated = !settled && theta_m == tracker->theta_m;
+    if (__builtin_expect(angle.jumped | repeated, 0)) {
+        check_angle(drive, sample, angle.step, angle.jumped, repeated);
         return (acquired_t){angle.step, false};
     }
     const bool normal = monitor_is_sample_normal(&drive->period.monitor, i_ab, measured.zero_q28, measured.v_dc);

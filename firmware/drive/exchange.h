@@ -30,6 +30,7 @@ typedef struct {
     bool acting;          /* the bridge switched throughout the last period and is switching now */
     bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
+    bool unused;          /* false: the four are written by one instruction */
     FX_PADDING_WORD;
 } sample_t;
 

@@ -96,6 +96,7 @@ static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame
     sample->acting = true;
     sample->voltage_limited = false;
     sample->pulses_clamped = false;
+    sample->unused = false;
     fast->u_next.d = wanted.u.d;
     fast->u_next.q = wanted.u.q;
     duty_t duty;

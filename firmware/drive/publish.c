@@ -31,9 +31,29 @@ static void count_period(drive_t *drive)
     }
 }
 
+/* A sensor that repeats its angle may have failed: the next period checks it, outside the usual route. A function of
+ * its own, because the compiler would make three conditional instructions of it, where one branch is not taken. */
+static __attribute__((noinline, cold)) void leave_usual_route(drive_t *drive)
+{
+    if (angle_tracker_may_stick(&drive->period.angle_tracker, &drive->fast.angle_tracker)) {
+        drive->fast.is_settled = false;
+    }
+}
+
+static inline void watch_angle(drive_t *drive, uint32_t theta_m)
+{
+    angle_tracker_state_t *tracker = &drive->fast.angle_tracker;
+    const uint32_t before = tracker->theta_m;
+    tracker->theta_m = theta_m;
+    if (__builtin_expect(theta_m == before, 0)) {
+        leave_usual_route(drive);
+    }
+}
+
 void publish_sample(drive_t *drive, const sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
+    watch_angle(drive, sample->theta_m);
     sample_box_publish(&drive->samples);
     if (__builtin_expect(mrai_is_chosen(drive), 0)) {
         count_period(drive);

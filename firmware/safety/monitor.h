@@ -14,6 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "fx/codegen.h"
 #include "types/faults.h"
 #include "types/frames.h"
 
@@ -45,9 +46,13 @@ typedef struct {
  * current is its projection of the vector plus a third of the phases' sum, so |i_x| <= |i| + |sum|/3. */
 static inline bool monitor_is_sample_normal(const monitor_config_t *config, fx_pair_t i, int32_t zero_q28, int32_t v_dc)
 {
-    const uint32_t zero_max = (uint32_t)config->zero_max;
-    return (uint32_t)fx_dot2(i, i) < (uint32_t)config->i_normal_squared_q30 &&
-           (uint32_t)(zero_q28 >> 13) + zero_max < 2U * zero_max && v_dc >= config->v_min && v_dc <= config->v_max;
+    const fx_two_words_t current = FX_LOAD_TWO(config, i_normal_squared_q30, zero_max);
+    const uint32_t zero_max = (uint32_t)current.second;
+    if ((uint32_t)fx_dot2(i, i) >= (uint32_t)current.first || (uint32_t)(zero_q28 >> 13) + zero_max >= 2U * zero_max) {
+        return false;
+    }
+    const fx_two_words_t v = FX_LOAD_TWO(config, v_min, v_max);
+    return v_dc >= v.first && v_dc <= v.second;
 }
 
 /** The angle has jumped: monitor_step() must be called in this period. */

@@ -4,6 +4,7 @@
 #include "fx/q.h"
 
 #define COAST_ROUNDS 10
+#define STOP_SPEED ((1 << 30) / 50) /* Q30, 0.02 of the speed base: 5 ms with the deceleration of safety/safe_state.c */
 
 static angle_t result(const angle_tracker_config_t *config, uint32_t theta_e, int32_t omega_q30, bool jumped)
 {
@@ -54,10 +55,10 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
     return angle;
 }
 
-/* The step of the loop is undone. The new prediction is the old one + step + k_p e with e = theta_e - the old one, so
- * e = difference + k_p e; each round leaves the share k_p < 1/8 of its error. */
-__attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
-                                                  uint32_t theta_e)
+/* By how much the sample was off its prediction, from what the loop has made of it: the new prediction is the old one +
+ * step + k_p e with e = theta_e - the old one, so e = difference + k_p e; each round leaves the share k_p < 1/8 of its
+ * error. */
+static int32_t error_of(const angle_tracker_config_t *config, const angle_tracker_state_t *state, uint32_t theta_e)
 {
     const uint32_t step = (uint32_t)fx_mulhi(config->pu_to_turn, state->omega_q30);
     const int32_t difference = (int32_t)(theta_e + step - state->predicted);
@@ -65,9 +66,78 @@ __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *
     for (int n = 0; n < COAST_ROUNDS; n++) {
         error = (int32_t)((uint32_t)difference + 2U * (uint32_t)fx_mulhi(config->kp, error));
     }
+    return error;
+}
+
+/* The speed before a sample with this error. */
+static int32_t speed_before(const angle_tracker_config_t *config, const angle_tracker_state_t *state, int32_t error)
+{
     const int32_t correction = fx_mulhi(config->ki_q29, error);
-    state->omega_q30 = fx_sat_q31((int64_t)state->omega_q30 - 2 * (int64_t)correction);
+    return fx_sat_q31((int64_t)state->omega_q30 - 2 * (int64_t)correction);
+}
+
+/* The step of the loop is undone. */
+__attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
+                                                  uint32_t theta_e)
+{
+    const int32_t error = error_of(config, state, theta_e);
+    state->omega_q30 = speed_before(config, state, error);
     const angle_t angle = result(config, theta_e - (uint32_t)error, state->omega_q30, true);
     state->predicted = angle.theta_e + (uint32_t)angle.step;
     return angle;
+}
+
+/* An angle that is repeated for longer than the sensor's resolution explains (AT-16) is the sensor's, unless the lag of
+ * a rotor that is being stopped came first (AT-17). */
+static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
+                                     const angle_t *angle)
+{
+    if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * state->repeats <= config->repeat_max) {
+        return REPEATS_UNDECIDED; /* at rest: what follows would find the same, with a hundred instructions more */
+    }
+    const int32_t error = error_of(config, state, angle->theta_e);
+    const int32_t signed_step = fx_mulhi(config->pu_to_turn, speed_before(config, state, error));
+    const int64_t step = fx_abs_q31(signed_step);
+    const int64_t advance = step * state->repeats;
+    const int64_t behind = (signed_step < 0) ? (int64_t)error : -(int64_t)error;
+    if (advance <= config->repeat_max) {
+        return REPEATS_UNDECIDED;
+    }
+    return (behind - advance <= step * config->lag_steps) ? REPEATS_OF_SENSOR : REPEATS_OF_ROTOR;
+}
+
+__attribute__((cold)) angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *config,
+                                                            angle_tracker_state_t *state, angle_t *angle,
+                                                            uint32_t period)
+{
+    const bool in_a_row = period - state->repeat_period == 1U;
+    state->repeats = in_a_row ? state->repeats + (state->repeats < UINT16_MAX ? 1U : 0U) : 1U;
+    state->repeat_period = period;
+    state->whose = in_a_row ? state->whose : REPEATS_UNDECIDED;
+    if (state->whose == REPEATS_UNDECIDED) {
+        state->whose = whose_repeats(config, state, angle);
+    }
+    if (state->whose != REPEATS_OF_SENSOR) {
+        return ANGLE_FOLLOWED;
+    }
+    if (state->repeats <= config->stop_periods || !angle_tracker_may_stop(state)) {
+        return ANGLE_STUCK;
+    }
+    state->whose = REPEATS_OF_ROTOR; /* (AT-18) */
+    state->omega_q30 = 0;
+    state->predicted = angle->theta_e;
+    *angle = result(config, angle->theta_e, 0, false);
+    return ANGLE_STANDING;
+}
+
+__attribute__((cold)) bool angle_tracker_may_stick(const angle_tracker_config_t *config,
+                                                   const angle_tracker_state_t *state)
+{
+    const int64_t step = fx_abs_q31(fx_mulhi(config->pu_to_turn, state->omega_q30));
+    return step * config->stop_periods > config->repeat_max;
+}
+
+bool angle_tracker_may_stop(const angle_tracker_state_t *state)
+{
+    return state->omega_q30 <= STOP_SPEED && state->omega_q30 >= -STOP_SPEED;
 }

@@ -20,10 +20,11 @@ bool identify_window_step(identify_window_t *window, const identify_sample_t *in
     add(&window->sum_i, in->i);
     add(&window->sum_u, in->u);
     const uint32_t left = window->left - 1U;
-    window->left = left;
     if (__builtin_expect(left != 0U, 1)) {
+        window->left = left; /* in this branch: before it, the comparison would cost an instruction */
         return false;
     }
+    window->left = 0;
     window->last = (identify_end_t){
         .i = halfwords(in->i.d, in->i.q),
         .u = halfwords(in->u.d, in->u.q),

@@ -50,6 +50,30 @@ def test_a_glitch_of_5_ms_changes_no_torque_and_is_no_fault(hsm1: Motor, rpm: fl
     assert np.abs(trace.torque - before).max() <= 5.0
 
 
+@pytest.mark.parametrize("torque", [120.0, -60.0, 20.0])
+@pytest.mark.parametrize("rpm", [60.0, -150.0, 300.0, 500.0, -800.0, 1000.0, 3000.0, -10000.0])
+def test_an_angle_that_freezes_for_5_ms_changes_no_torque_and_is_no_fault(
+    hsm1: Motor, rpm: float, torque: float
+) -> None:
+    rig = Rig(hsm1, rpm, 0.3 * torque if abs(rpm) > 5000.0 else torque, angle_bits=12)
+    before = rig.run(0.25).settled()
+    frozen = rig.set(plant_angle_stuck=1.0).run(0.005)
+    after = rig.set(plant_angle_stuck=0.0).run(0.1)
+    assert after.faults == 0
+    assert np.abs(np.concatenate([frozen.torque, after.torque]) - before).max() <= 5.0
+
+
+@pytest.mark.parametrize("rpm", [30.0, -100.0, 200.0, 400.0, -900.0])
+def test_a_rotor_that_is_blocked_within_milliseconds_keeps_its_torque(hsm1: Motor, rpm: float) -> None:
+    """A wheel at the kerb, 40,000 rpm/s: a repeated angle is the rotor's here."""
+    rig = Rig(hsm1, rpm, 100.0, angle_bits=12)
+    before = rig.run(0.25).settled()
+    stop = rig.run(abs(rpm) / 40000.0, plant_speed_rad_s=(rpm * math.pi / 30.0, 0.0))
+    after = rig.run(0.2)
+    assert after.faults == 0
+    assert np.abs(np.concatenate([stop.torque, after.torque]) - before).max() <= 5.0
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: float) -> None:
     """The predicted angle deviates by 2.1 degrees electrical after 5 ms at 2000 rpm/s (AT-15)."""

@@ -34,6 +34,7 @@ PERIOD = {
     "monitor.angle_count_max", "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
     "plausibility.ripple_max",
+    "angle_tracker.lag_steps", "angle_tracker.stop_periods",
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",

@@ -155,6 +155,9 @@ static void inputs(fixture_t *f)
         .pu_to_turn = q31_of(8.0 * turns),
         .turn_to_pu = q16_of(0.5 / turns),
         .max_step = 1u << 29,
+        .repeat_max = POLE_PAIRS * (1u << 21),
+        .lag_steps = 4,
+        .stop_periods = 50,
     };
     f->si.pole_pairs = POLE_PAIRS;
     f->si.period_s = period;

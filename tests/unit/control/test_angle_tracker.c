@@ -174,6 +174,120 @@ void test_intermittent_angle_faults_give_the_twins_angle_and_speed(void)
     TEST_ASSERT_GREATER_THAN(14000, replaced);
 }
 
+/* An angle that repeats. */
+
+static uint32_t last_read, now_period;
+
+/* As a period does it. */
+static angle_repeat_t read_angle(uint32_t theta_m, angle_t *y)
+{
+    const bool repeated = theta_m == last_read;
+    last_read = theta_m;
+    now_period++;
+    *y = step(theta_m);
+    const angle_repeat_t meaning = repeated ? angle_tracker_repeated(&f.angle_tracker, &state, y, now_period)
+                                            : ANGLE_FOLLOWED;
+    if (meaning == ANGLE_STUCK) {
+        *y = angle_tracker_coast(&f.angle_tracker, &state, y->theta_e);
+    }
+    return meaning;
+}
+
+/* A locked loop at so many units of the mechanical angle per period; the next angle. */
+static uint32_t turn_at(int32_t advance)
+{
+    uint32_t theta = 12345;
+    angle_t y;
+    state = (angle_tracker_state_t){0};
+    for (int n = 0; n < 3000; n++, theta += (uint32_t)advance) {
+        TEST_ASSERT_EQUAL(ANGLE_FOLLOWED, read_angle(theta, &y));
+    }
+    return theta;
+}
+
+/* 3 10^7 of the electrical turn per period are beyond two counts of 12 bits, 6.3 10^6, in the first repeat. */
+void test_a_turning_rotors_angle_that_repeats_is_replaced_by_the_prediction_from_the_first_repeat_on(void)
+{
+    for (int32_t advance = -10000000; advance <= 10000000; advance += 20000000) {
+        uint32_t theta = turn_at(advance);
+        const uint32_t frozen = last_read;
+        angle_t y;
+        for (int n = 0; n < 300; n++, theta += (uint32_t)advance) {
+            TEST_ASSERT_EQUAL(ANGLE_STUCK, read_angle(frozen, &y));
+            TEST_ASSERT_INT_WITHIN(5000, 0, (int32_t)(y.theta_e - 3U * theta));
+            TEST_ASSERT_INT_WITHIN(100, 3 * advance, y.step);
+            TEST_ASSERT_FALSE(angle_tracker_may_stop(&state));
+        }
+        TEST_ASSERT_EQUAL(ANGLE_FOLLOWED, read_angle(theta, &y)); /* the sensor is back */
+        TEST_ASSERT_FALSE(y.jumped);
+        TEST_ASSERT_INT_WITHIN(100, 3 * advance, y.step);
+    }
+}
+
+/* 900 000 per period: the seventh repeat is beyond 6 291 456, or a later one, because the loop has begun to follow.
+ * After 50 repeats a rotor may stand: it is followed. */
+void test_a_slow_rotors_angle_is_replaced_for_5_ms_and_then_followed(void)
+{
+    for (int32_t advance = -300000; advance <= 300000; advance += 600000) {
+        (void)turn_at(advance);
+        angle_t y;
+        for (int n = 1; n <= 50; n++) {
+            const angle_repeat_t meaning = read_angle(last_read, &y);
+            TEST_ASSERT_TRUE(meaning == ANGLE_STUCK || n < 9);
+            TEST_ASSERT_TRUE(meaning == ANGLE_FOLLOWED || n >= 7);
+            TEST_ASSERT_TRUE(angle_tracker_may_stop(&state));
+        }
+        TEST_ASSERT_EQUAL(ANGLE_STANDING, read_angle(last_read, &y));
+        TEST_ASSERT_EQUAL_INT(0, y.omega_q31);
+        TEST_ASSERT_EQUAL_INT(0, y.step);
+        TEST_ASSERT_FALSE(y.jumped);
+        for (int n = 0; n < 70000; n++) { /* beyond 16 bits */
+            TEST_ASSERT_EQUAL(ANGLE_FOLLOWED, read_angle(last_read, &y));
+        }
+        TEST_ASSERT_EQUAL_UINT32(UINT16_MAX, state.repeats);
+        TEST_ASSERT_EQUAL_INT(0, state.omega_q30);
+    }
+}
+
+/* In 16 to 40 periods: the loop's lag shows it after 0.77/(w_n T_s) = 13 periods (AT-17). */
+void test_a_rotor_that_is_stopped_is_followed(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int32_t slower = 100000; slower <= 250000; slower += 50000) {
+            int32_t advance = sign * 4000000;
+            uint32_t theta = turn_at(advance);
+            angle_t y;
+            for (int n = 0; n < 400; n++, theta += (uint32_t)advance) {
+                TEST_ASSERT_EQUAL(ANGLE_FOLLOWED, read_angle(theta, &y));
+                advance -= sign * ((sign * advance > slower) ? slower : sign * advance);
+            }
+            TEST_ASSERT_INT_WITHIN(10000, 0, y.step);
+        }
+    }
+}
+
+/* 6 291 456 in 50 periods: 125 829 per period. */
+void test_a_rotor_that_turns_by_less_than_two_counts_in_5_ms_cannot_stick(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        (void)turn_at(sign * 41000);
+        TEST_ASSERT_FALSE(angle_tracker_may_stick(&f.angle_tracker, &state));
+        (void)turn_at(sign * 43000);
+        TEST_ASSERT_TRUE(angle_tracker_may_stick(&f.angle_tracker, &state));
+    }
+}
+
+/* A 12-bit sensor repeats each angle three or four times; that is no failure, however long it goes on. */
+void test_the_repeats_of_a_slow_rotor_do_not_add_up(void)
+{
+    uint32_t theta = turn_at(300000);
+    angle_t y;
+    for (int n = 0; n < 5000; n++, theta += 300000U) {
+        TEST_ASSERT_EQUAL(ANGLE_FOLLOWED, read_angle(theta & 0xFFF00000U, &y));
+    }
+    TEST_ASSERT_LESS_THAN(5, state.repeats);
+}
+
 /* Rounding has no bias: an angle that alternates by one LSB must not accumulate to a speed. */
 void test_at_standstill_an_angle_jitter_of_one_lsb_leaves_the_speed_at_zero(void)
 {

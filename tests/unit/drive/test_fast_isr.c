@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
+#include "drive/slow_monitors.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -335,6 +336,52 @@ void test_a_glitch_of_the_angle_of_50_samples_is_no_fault_and_the_bridge_runs_on
     seam_periods(300);
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
     TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_TRUE(drive.fast.is_settled);
+}
+
+/* 5 10^7 of a mechanical turn per period are 6980 rpm; what is measured then is the prediction. */
+void test_an_angle_that_freezes_for_5_ms_is_replaced_and_is_a_fault_when_it_stays_so(void)
+{
+    for (int samples = 50; samples <= 70; samples += 20) {
+        setUp();
+        slow_monitors_without_machine(&seam.motor);
+        seam_run();
+        for (int n = 0; n < 400; n++) {
+            seam.theta_m += 50000000U;
+            seam_period();
+        }
+        TEST_ASSERT_TRUE(drive.fast.is_settled);
+        uint32_t theta = seam.theta_m;
+        for (int n = 0; n < samples; n++) {
+            theta += 50000000U;
+            seam_period();
+            if (n > 0 && n < 65) { /* the first repeat is noticed at the end of its period */
+                TEST_ASSERT_INT_WITHIN(25000000, 0, (int32_t)(published()->theta_e - 3U * theta)); /* 2 degrees */
+            }
+        }
+        TEST_ASSERT_EQUAL_HEX32(samples > 65 ? FAULT_ANGLE : 0, drive.fast.faults);
+        TEST_ASSERT_EQUAL(samples <= 65, seam.gates);
+    }
+}
+
+/* 10^6 per period are 140 rpm: such a rotor can stop within 5 ms. */
+void test_a_slow_angle_that_freezes_is_replaced_for_5_ms_and_then_that_of_a_rotor_at_rest(void)
+{
+    seam_run();
+    for (int n = 0; n < 2000; n++) {
+        seam.theta_m += 1000000U;
+        seam_period();
+    }
+    const uint32_t frozen = seam.theta_m;
+    for (int n = 1; n <= 50; n++) {
+        seam_period();
+        TEST_ASSERT_INT_WITHIN(12000000, 0, (int32_t)(published()->theta_e - 3U * (frozen + (uint32_t)n * 1000000U)));
+    }
+    seam_periods(2); /* the first repeat was noticed at the end of its period */
+    TEST_ASSERT_EQUAL_HEX32(3U * frozen, published()->theta_e);
+    TEST_ASSERT_EQUAL_INT32(0, published()->point.omega);
+    seam_periods(100);
+    TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
     TEST_ASSERT_TRUE(drive.fast.is_settled);
 }
 

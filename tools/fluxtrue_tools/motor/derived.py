@@ -20,6 +20,9 @@ TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 TRACKER_BANDWIDTH_RAD_S = 300.0
 TRACKER_JUMP_TURNS = 1 / 20
 ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
+REPEAT_TURNS = 2 / 4096  # mechanical: two counts of the coarsest sensor, (AT-16)
+LAG_SHARE = 0.25  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
+STOP_S = 0.005  # in which a slow rotor can stop: (AT-18)
 ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
 KNEE_LSB = 4

@@ -21,10 +21,13 @@ from fluxtrue_tools.motor.derived import (
     FAST_S,
     FROZEN_SETTLE_S,
     HOT_S,
+    LAG_SHARE,
     LOST_S,
+    REPEAT_TURNS,
     RIPPLE_S,
     SETTLE_S,
     STANDSTILL_SHARE,
+    STOP_S,
     TORQUE_S,
     TRIM_S,
     steps,
@@ -126,6 +129,13 @@ def _tracker(motor: Motor) -> list[Row]:
         ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
         ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
         ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn"),
+        (
+            "repeat_max",
+            f"{int(REPEAT_TURNS * motor.config.machine.pole_pairs * 2**32)}u",
+            f"{REPEAT_TURNS:g} turn mechanical",
+        ),
+        ("lag_steps", f"{round(LAG_SHARE / w_ts)}u", f"{LAG_SHARE:g}/(w_n T_s)"),
+        ("stop_periods", f"{round(STOP_S / b.period_s)}u", f"{1e3 * STOP_S:g} ms of periods"),
     ]
 
 
