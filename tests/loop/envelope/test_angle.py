@@ -2,12 +2,19 @@
 """A defective angle sensor is found in time, and short glitches change nothing. The torque is that of the plant."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rig import ANGLE, ANGLE_OFFSET, Rig, Trace
 
+from fluxtrue_tools.sim import motor as sim_motor
+from fluxtrue_tools.sim.build import MotorFolder
 from fluxtrue_tools.sim.motor import Motor
+
+ROOT = Path(__file__).resolve().parents[3]
+BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
 
 SPEEDS = [0.0, 20.0, -100.0, 500.0, 2000.0, -5000.0, 10000.0]
 TORQUES = [100.0, -80.0, 5.0]
@@ -133,3 +140,13 @@ def test_a_blocked_or_slowly_rolling_rotor_is_no_fault(hsm1: Motor, torque: floa
     rig.run(0.7)
     assert rig.run(0.05, plant_speed_rad_s=(roll_rpm * math.pi / 30.0, 0.0)).faults == 0
     assert rig.run(0.5).faults == 0
+
+
+@pytest.mark.parametrize("share", [0.8, 1.2])
+@pytest.mark.parametrize("rpm", [800.0, -1000.0, 1300.0])
+def test_a_dead_time_of_the_spread_is_no_wrong_angle_at_40_khz(rpm: float, share: float) -> None:
+    """There the dead time is 8 % of a period: what is left of 28 V looks like a back-EMF."""
+    motor = sim_motor.read(MotorFolder("hsm1_40kHz", BUILD / "motors" / "hsm1_40kHz"))
+    for torque in (20.0, 60.0, -120.0):
+        rig = Rig(motor, rpm, torque, dead_time_s=share * 2e-6, current_noise_A_rms=0.8)
+        assert rig.run(0.3).faults == 0

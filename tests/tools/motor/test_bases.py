@@ -134,3 +134,11 @@ def test_without_a_slew_limit_given_all_the_torque_takes_ten_milliseconds(write)
     motor = load_motor(write())
     step_Nm = members(motor_tables_c(motor))["torque_slew"] / 32768 * motor.bases.torque_Nm
     assert 10 * step_Nm == pytest.approx(motor.config.machine.torque_max_Nm, rel=0.01)
+
+
+def test_the_monitors_allow_for_the_spread_of_the_dead_time_at_every_frequency():
+    """hsm1 at 40 kHz: 0.5 * 4/pi * (350 V * 2 us * 40 kHz + 1 V) = 18.462 V; at 10 kHz 5.1 V are below 2 % of 350 V."""
+    fast = load_motor(MOTORS.parents[1] / "tests" / "motors" / "hsm1_40kHz").derived
+    assert fast.monitor_V == pytest.approx(18.4620, abs=1e-4)
+    assert fast.frozen_V == pytest.approx(18.4620 / 4.0, abs=1e-4)
+    assert load_motor(MOTORS / "hsm1").derived.monitor_V == pytest.approx(7.0, rel=1e-12)

@@ -35,6 +35,7 @@ PERIOD = {
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
     "plausibility.ripple_max",
     "angle_tracker.lag_steps", "angle_tracker.stop_periods",
+    "torque_monitor.v_0", "frozen_angle.v_0",  # the share of the dead time in a period: (MN-25)
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",

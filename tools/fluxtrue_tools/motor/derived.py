@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fluxtrue_tools.motor import identification
 from fluxtrue_tools.motor.bases import Bases
-from fluxtrue_tools.motor.config import MotorConfig
+from fluxtrue_tools.motor.config import Inverter, MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
@@ -49,6 +49,7 @@ RIPPLE_SHARE = 0.015  # of i_max: noise, sensor harmonics and dead time in the c
 SPEED_TRIP = 0.8  # of the reserve of the speed base
 TORQUE_MONITOR_NM, TORQUE_MONITOR_SHARE = 10.0, 0.05
 INVERTER_ERROR_PER_VDC = 0.02
+LEG_ERROR_SHARE = 0.25  # of dead time and device drop: 20 % of spread, at a dc voltage up to a quarter above nominal
 FROZEN_SHARE, FROZEN_SETTLE_S = 0.25, 0.01  # of the inverter's voltage error; for the mean to settle
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
 DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
@@ -255,8 +256,15 @@ def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[st
     }
 
 
+def inverter_error_V(inverter: Inverter) -> float:
+    """V_0: half of it covers the fundamental of what compensating dead time and device drop may leave (MN-25)."""
+    legs_V = inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V
+    return max(INVERTER_ERROR_PER_VDC * inverter.vdc_V, 2.0 * LEG_ERROR_SHARE * 4.0 / math.pi * legs_V)
+
+
 def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
     machine, omega = config.machine, config.omega_max_rad_s
+    error_V = inverter_error_V(config.inverter)
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
     return {
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
@@ -268,8 +276,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
         "monitor_torque_Nm": max(
             min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm), TORQUE_MONITOR_SHARE * machine.torque_max_Nm
         ),
-        "monitor_V": INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
-        "frozen_V": FROZEN_SHARE * INVERTER_ERROR_PER_VDC * config.inverter.vdc_V,
+        "monitor_V": error_V,
+        "frozen_V": FROZEN_SHARE * error_V,
         "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
         "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
     }
