@@ -50,6 +50,7 @@ typedef struct {
     float torque_max_Nm;
     float psi_f_Vs; /* table value at no current: psi_f^ = psi_f_Vs + dpsi */
     float r_ohm_20;
+    float dead_time_s; /* of the bridge, for the port */
     float bridge_duty; /* dead time and device drop as a share of the period: the compensation 1 */
     q15_t torque_max;
     q15_t torque_slew_weak; /* largest slew while the planned flux is below psi_weak, where little voltage is left */

@@ -59,7 +59,7 @@ STEP = {
 # Names of members that are a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
 SPEED = re.compile(r"_rad_s$")
-TIMED_OTHERWISE = {"parameters.torque_loop.kp"}  # hsm1's loop has no proportional part
+TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
 # Times that the firmware defines, and the expression that converts each to true time in every line that uses it.
 TIMES = {
     "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",

@@ -227,6 +227,7 @@ static void sample_at(double omega_pu, bool acting, bool limited)
                     .voltage_limited = limited};
     s->point.flux = flux_table_step(&motor.flux_table, s->point.i);
     sample_box_publish(&drive.samples);
+    drive.fast.command_seen++; /* as the fast ISR does with each window */
     seam.gates = true;
 }
 
@@ -269,6 +270,7 @@ static void run_at(double omega_pu, double torque_pu)
     slow_monitors_without_machine(&seam.motor);
     seam_run();
     drive.parameters.torque_slew = Q15_MAX;
+    data_check_start(&drive);
     drive.request.torque_arbitrated = (q15_t)(torque_pu * 32768.0);
     for (int n = 0; n < 50; n++) {
         sample_at(omega_pu, true, false);
@@ -282,6 +284,7 @@ void test_enable_off_at_speed_holds_the_torque_at_zero_until_switching_can_be_di
         setUp();
         run_at(0.9 * sign, 0.1);
         drive.parameters.torque_slew = 1; /* of no account when the torque has to go */
+        data_check_start(&drive);
         TEST_ASSERT_GREATER_THAN_INT(2000, drive.task.torque_commanded);
         drive.request.enable = false;
         for (int n = 0; n < 1000; n++) {

@@ -460,6 +460,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_max_Nm", _float(machine.torque_max_Nm), ""),
         ("psi_f_Vs", _float(motor.derived.psi_f_Vs), ""),
         ("r_ohm_20", _float(machine.r_ohm), ""),
+        ("dead_time_s", _float(inverter.dead_time_s), ""),
         ("bridge_duty", _float(motor.derived.bridge_duty), ""),
         ("torque_max", q15(machine.torque_max_Nm / b.torque_Nm, "torque_max"), f"{machine.torque_max_Nm:g} N·m"),
         ("torque_slew_weak", q15(motor.derived.torque_slew_weak_Nm / b.torque_Nm, "torque_slew_weak"), ""),
