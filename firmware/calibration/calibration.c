@@ -34,6 +34,17 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     }
 }
 
+/* Drift that means quality 0 at this bandwidth, per unit and step. */
+static float psi_drift_full(const motor_t *m, float bandwidth)
+{
+    return PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * bandwidth * m->bases.step_s;
+}
+
+static float r_drift_full(const drive_t *drive, float bandwidth)
+{
+    return R_DRIFT_SHARE * si_from_q31(drive->parameters.mrai.r0, 1.0F) * bandwidth * drive->motor->bases.step_s;
+}
+
 static float larger(float a, float b)
 {
     return (a > b) ? a : b;
@@ -42,15 +53,13 @@ static float larger(float a, float b)
 float calibration_least(const drive_t *drive, calibration_id_t id)
 {
     const motor_t *m = drive->motor;
-    const float psi_drift = PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * m->bases.step_s;
-    const float r_drift = R_DRIFT_SHARE * si_from_q31(drive->parameters.mrai.r0, 1.0F) * m->bases.step_s;
     switch (id) {
     case CALIBRATION_torque_slew_Nm_per_s:
         return si_from_q15(1, m->bases.torque_Nm) / m->bases.step_s;
     case CALIBRATION_flux_bandwidth_rad_s:
-        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / psi_drift);
+        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / psi_drift_full(m, 1.0F));
     case CALIBRATION_resistance_bandwidth_rad_s:
-        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / r_drift);
+        return larger(si_from_q31(1, m->bases.omega_rad_s) / 2.0F, si_from_q31(1, 1.0F) / r_drift_full(drive, 1.0F));
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         return si_from_q15(1, 1.0F) / m->bases.step_s;
     case CALIBRATION_dead_time_compensation:
@@ -73,13 +82,11 @@ static void write_parameter(const motor_t *m, motor_parameters_t *p, calibration
         break;
     case CALIBRATION_flux_bandwidth_rad_s:
         p->mrai.flux_gain = q31_from_si(2.0F * value, m->bases.omega_rad_s);
-        p->mrai.psi_drift_full = q31_from_si(PSI_DRIFT_SHARE * m->psi_f_Vs / m->bases.flux_Vs * value * m->bases.step_s,
-                                             1.0F);
+        p->mrai.psi_drift_full = q31_from_si(psi_drift_full(m, value), 1.0F);
         break;
     case CALIBRATION_resistance_bandwidth_rad_s:
         p->mrai.resistance_gain = q31_from_si(2.0F * value, m->bases.omega_rad_s);
-        p->mrai.r_drift_full = q31_from_si(R_DRIFT_SHARE * si_from_q31(p->mrai.r0, 1.0F) * value * m->bases.step_s,
-                                           1.0F);
+        p->mrai.r_drift_full = q31_from_si(r_drift_full(drive, value), 1.0F);
         break;
     case CALIBRATION_torque_loop_bandwidth_rad_s:
         p->torque_loop.ki = q15_from_si(value * m->bases.step_s, 1.0F);

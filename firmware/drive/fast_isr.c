@@ -18,7 +18,6 @@
 #include "drive/short_circuit.h"
 #include "hal/pwm.h"
 
-#define DUTY_MIDDLE 16384
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
 
 /* Currents and the angle at which the duties will act, as current control and modulation want them. */
@@ -41,9 +40,7 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
     if (needs_short_circuit(drive->fast.faults, safe)) {
         short_circuit_apply(&drive->fast);
     } else {
-        drive->fast.short_circuit.holds = false;
-        hal_pwm_enable(false);
-        hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
+        short_circuit_end(&drive->fast);
     }
     current_control_reset(&drive->fast.current_control);
     sample->point.u = (dq_q15_t){0, 0};

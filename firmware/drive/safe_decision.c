@@ -11,14 +11,14 @@ static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 }
 
 /* With the known speed of the last step. */
-static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *snapshot)
+static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *snapshot, bool are_currents_valid)
 {
     const safe_state_state_t *safe = &drive->task.safe_state;
     const gate_fault_in_t in = {
         .latched = (snapshot->faults & FAULT_GATE) != 0U,
         .gates = snapshot->gates,
         .rectifies = safe->short_circuit,
-        .currents_valid = currents_valid(drive, snapshot),
+        .currents_valid = are_currents_valid,
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .i = snapshot->sample.point.i,
@@ -43,7 +43,7 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
-    const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot);
+    const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot, in.currents_valid);
     const bool by_speed = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
     const bool short_circuit = by_speed || (by_gate && (faults & FAULT_GATE) != 0U);
     task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));

@@ -12,17 +12,21 @@ void short_circuit_apply(fast_state_t *fast)
     if (state->holds && !hal_pwm_gates()) {
         state->side = (state->side == SHORT_CIRCUIT_LOWER) ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_NONE;
     }
-    const bool on = state->side != SHORT_CIRCUIT_NONE;
-    const uint16_t all = (state->side == SHORT_CIRCUIT_UPPER) ? DUTY_UPPER : 0U;
-    const uint16_t duty = on ? all : DUTY_MIDDLE;
-    if (!on) {
-        hal_pwm_enable(false);
+    if (state->side == SHORT_CIRCUIT_NONE) {
+        short_circuit_end(fast);
+        return;
     }
+    const uint16_t duty = (state->side == SHORT_CIRCUIT_UPPER) ? DUTY_UPPER : 0U;
     hal_pwm_write((duty_t){duty, duty, duty});
-    if (on) {
-        hal_pwm_enable(true); /* with the duties, not before them */
-    }
-    state->holds = on && hal_pwm_gates();
+    hal_pwm_enable(true); /* with the duties, not before them */
+    state->holds = hal_pwm_gates();
+}
+
+void short_circuit_end(fast_state_t *fast)
+{
+    fast->short_circuit.holds = false;
+    hal_pwm_enable(false);
+    hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
 }
 
 void short_circuit_reset(fast_state_t *fast)

@@ -13,6 +13,9 @@
 
 void short_circuit_apply(fast_state_t *fast);
 
+/** No short circuit any more: switching is disabled, and the duties are one half. */
+void short_circuit_end(fast_state_t *fast);
+
 /** Both sides may be tried again: the faults are reset. */
 void short_circuit_reset(fast_state_t *fast);
 

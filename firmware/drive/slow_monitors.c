@@ -28,7 +28,7 @@ static uint8_t contradicted_steps(const drive_t *drive)
     return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.contradicted_updates);
 }
 
-static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
+static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
@@ -39,7 +39,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot)
         .i_ref = task->i_ref,
         .i_mean = mean_current(drive, snapshot),
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
-        .phases_ref = in_phases(task->i_ref, sample->theta_e),
+        .phases_ref = phases_ref,
         .omega = fx_q15_from_q31(sample->point.omega),
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
@@ -67,7 +67,7 @@ static q15_t least_of(abc_q15_t i)
     return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
 }
 
-static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot)
+static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const identify_window_t *window = &snapshot->window;
     task_state_t *task = &drive->task;
@@ -75,7 +75,7 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot)
         .acting = window->acting && snapshot->sample.acting,
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
-        .i_least = least_of(in_phases(task->i_ref, snapshot->sample.theta_e)),
+        .i_least = least_of(phases_ref),
         .theta_e = snapshot->sample.theta_e,
     };
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
@@ -84,6 +84,7 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot)
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
-    return check_currents(drive, snapshot) | check_torque(drive, &snapshot->sample) | check_angle(drive, snapshot) |
-           shorted;
+    const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
+    return check_currents(drive, snapshot, phases_ref) | check_torque(drive, &snapshot->sample) |
+           check_angle(drive, snapshot, phases_ref) | shorted;
 }

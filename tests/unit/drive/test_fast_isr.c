@@ -75,15 +75,31 @@ void test_the_flux_of_the_robust_identification_is_fed_forward_from_the_next_per
     TEST_ASSERT_EQUAL_INT(-1234, drive.psi_d_error);
 }
 
+static void expect_bridge(bool gates, int duty)
+{
+    TEST_ASSERT_EQUAL(gates, seam.gates);
+    TEST_ASSERT_EQUAL_INT(duty, seam.duty.a);
+    TEST_ASSERT_EQUAL_INT(duty, seam.duty.b);
+    TEST_ASSERT_EQUAL_INT(duty, seam.duty.c);
+}
+
+/* Either shorted by the lower switches, or switching disabled. */
+static void expect_shorted(bool is)
+{
+    expect_bridge(is, is ? 0 : 16384);
+}
+
+static void expect_shorted_by_the_upper_switches(void)
+{
+    expect_bridge(true, 32768);
+}
+
 /* Switching is disabled before anything else is written. */
 void test_while_the_drive_is_off_switching_is_disabled_first_and_the_duties_are_one_half(void)
 {
     seam_period();
     TEST_ASSERT_EQUAL_STRING("ar-w", seam.log);
-    TEST_ASSERT_FALSE(seam.gates);
-    TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
-    TEST_ASSERT_EQUAL_INT(16384, seam.duty.b);
-    TEST_ASSERT_EQUAL_INT(16384, seam.duty.c);
+    expect_shorted(false);
 }
 
 void test_an_over_current_disables_switching_in_the_same_period_and_stays_latched(void)
@@ -111,15 +127,6 @@ static void write_command(safe_t safe, uint32_t faults)
     command_box_write(&drive.commands, command);
 }
 
-/* Either shorted by the lower switches, or switching disabled. */
-static void expect_shorted(bool is)
-{
-    TEST_ASSERT_EQUAL(is, seam.gates);
-    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.a);
-    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.b);
-    TEST_ASSERT_EQUAL_INT(is ? 0 : 16384, seam.duty.c);
-}
-
 /* The duties of the short circuit are written before switching is enabled. */
 void test_a_fault_shorts_the_phases_in_the_same_period_if_the_task_has_decided_so(void)
 {
@@ -130,14 +137,6 @@ void test_a_fault_shorts_the_phases_in_the_same_period_if_the_task_has_decided_s
     seam_period();
     TEST_ASSERT_EQUAL_STRING("arw+", seam.log);
     expect_shorted(true);
-}
-
-static void expect_shorted_by_the_upper_switches(void)
-{
-    TEST_ASSERT_TRUE(seam.gates);
-    TEST_ASSERT_EQUAL_INT(32768, seam.duty.a);
-    TEST_ASSERT_EQUAL_INT(32768, seam.duty.b);
-    TEST_ASSERT_EQUAL_INT(32768, seam.duty.c);
 }
 
 /* The gate drivers block the short circuit by the lower switches one period after it was on, because one of the upper
