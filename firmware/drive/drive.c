@@ -12,7 +12,7 @@ void drive_init(drive_t *drive, const motor_t *source)
                                    .trim = true,
                                    .identification_mode = IDENTIFICATION_ROBUST,
                                    .limits = TORQUE_LIMITS_NONE},
-                       .fast.window.left = source->bases.periods_per_step,
+                       .fast.step_end = source->bases.periods_per_step,
                        .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};
     identify_reset(&drive->motor->identify, &drive->task.identify);
     data_check_start(drive);

@@ -86,10 +86,13 @@ static inline sample_t *sample_box_begin(sample_box_t *box)
     return slot;
 }
 
-static inline void sample_box_publish(sample_box_t *box)
+/* The number of this sample: periods since the start. */
+static inline uint32_t sample_box_publish(sample_box_t *box)
 {
     exchange_barrier();
-    box->generation = box->generation + 1U;
+    const uint32_t generation = box->generation + 1U;
+    box->generation = generation;
+    return generation;
 }
 
 static inline sample_t sample_box_read(const sample_box_t *box)

@@ -19,16 +19,22 @@ static void check_task(drive_t *drive)
     }
 }
 
-/* The window is not summed up, but its periods are counted: a step of the task. */
-static void count_period(drive_t *drive)
+/* The generation counts the periods of a step for either identification. */
+static void begin_step(drive_t *drive, uint32_t end)
+{
+    drive->fast.step_end = end;
+    check_task(drive);
+}
+
+/* A window lacks the periods that went to the paper's law. */
+static void hand_over_window(drive_t *drive, uint32_t generation, uint32_t periods)
 {
     identify_window_t *window = &drive->fast.window;
-    identify_window_invalidate(window);
-    window->left--;
-    if (window->left == 0U) {
-        window->left = drive->period.periods_per_step;
-        check_task(drive);
+    if (mrai_had_one_of(drive, generation, periods)) {
+        identify_window_invalidate(window);
     }
+    window_box_write(&drive->windows, window);
+    identify_window_restart(window);
 }
 
 /* A sensor that repeats its angle may have failed: the next period checks it, outside the usual route. A function of
@@ -54,10 +60,14 @@ void publish_sample(drive_t *drive, const sample_t *sample)
 {
     fast_state_t *fast = &drive->fast;
     watch_angle(drive, sample->theta_m);
-    sample_box_publish(&drive->samples);
+    const uint32_t generation = sample_box_publish(&drive->samples);
+    const bool completes_step = generation == fast->step_end;
     if (__builtin_expect(mrai_is_chosen(drive), 0)) {
-        count_period(drive);
-        mrai_offer(drive, sample);
+        mrai_offer(drive, sample, generation);
+        if (__builtin_expect(completes_step, 0)) {
+            identify_window_invalidate(&fast->window); /* the next one would lack its first sample */
+            begin_step(drive, generation + drive->period.periods_per_step);
+        }
         return;
     }
     drive->psi_d_error = drive->task.psi_d_error;
@@ -67,9 +77,11 @@ void publish_sample(drive_t *drive, const sample_t *sample)
         .flux = &sample->point.flux,
         .theta = sample->theta_e,
     };
-    if (__builtin_expect(identify_window_step(&fast->window, &in), 0)) {
-        window_box_write(&drive->windows, &fast->window);
-        identify_window_restart(&fast->window, drive->period.periods_per_step);
-        check_task(drive);
+    identify_window_add(&fast->window, &in);
+    if (__builtin_expect(completes_step, 0)) {
+        const uint32_t periods = drive->period.periods_per_step;
+        identify_window_end(&fast->window, &in);
+        hand_over_window(drive, generation, periods);
+        begin_step(drive, generation + periods);
     }
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef IDENTIFY_WINDOW_H
 #define IDENTIFY_WINDOW_H
-/** The identification's part of every period: sums over the N periods of one step of the 1 kHz task.
+/** The identification's part of every period: sums over the N periods of one step of the 1 kHz task. The caller counts
+ *   the periods, because the step is also counted while no window is summed up.
  *   sum_i over samples 1 ... N, sum_u over their voltages, and the samples at both ends of the N periods
  * Source   docs/theory/identification.md (ID-1)
  * Units    q15 counts in words; angles 2^32 = one turn
@@ -24,7 +25,6 @@ typedef struct {
 typedef struct {
     dq_q15_t sum_i, sum_u;
     identify_end_t first, last;
-    uint32_t left;   /* periods still to come */
     uint8_t limited; /* periods so far with clamped pulses */
     bool acting;
 } identify_window_t;
@@ -35,21 +35,22 @@ typedef struct {
     uint32_t theta;
 } identify_sample_t;
 
-/** Before the step of a period whose voltage is unknown. */
+/** A period of the window is missing, or its voltage is unknown. */
 static inline void identify_window_invalidate(identify_window_t *window)
 {
     window->acting = false;
 }
 
-/** Before the step of a period with clamped pulses. */
+/** A period of the window has clamped pulses. */
 static inline void identify_window_count_limited(identify_window_t *window)
 {
     window->limited++;
 }
 
-/** True: the window is complete; the caller copies it and then restarts it. */
-bool identify_window_step(identify_window_t *window, const identify_sample_t *in);
+void identify_window_add(identify_window_t *window, const identify_sample_t *in);
+/** The sample just added completes the window; the caller copies it and then restarts it. */
+void identify_window_end(identify_window_t *window, const identify_sample_t *in);
 /** The last sample becomes the first of the next window. */
-void identify_window_restart(identify_window_t *window, uint32_t periods);
+void identify_window_restart(identify_window_t *window);
 
 #endif

@@ -2,31 +2,29 @@
 #include "drive/mrai/mrai_seam.h"
 #include "hal/irq.h"
 
-#define OVERRUNS_TO_FAULT 3
+#define OVERRUNS_TO_FAULT 3U /* periods since the last point that was not dropped */
 
 /* The interrupt still uses the previous point: this one is dropped, and the law restarts with the next. */
-static __attribute__((noinline, cold)) void count_overrun(drive_t *drive)
+static __attribute__((noinline, cold)) void count_overrun(drive_t *drive, uint32_t generation)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     mailbox->overruns++;
-    mailbox->overruns_in_a_row++;
-    if (mailbox->overruns_in_a_row >= OVERRUNS_TO_FAULT) {
-        mailbox->overruns_in_a_row = OVERRUNS_TO_FAULT;
+    identify_window_invalidate(&drive->fast.window); /* mrai_had_one_of() does not know of this period */
+    if (generation - mailbox->generation >= OVERRUNS_TO_FAULT) {
         drive_raise_fault(drive, FAULT_OVERRUN);
     }
 }
 
-void mrai_offer(drive_t *drive, const sample_t *sample)
+void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation)
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     if (__builtin_expect(mailbox->generation != drive->mrai.isr.finished, 0)) {
-        count_overrun(drive);
+        count_overrun(drive, generation);
         return;
     }
-    mailbox->overruns_in_a_row = 0;
     mailbox->point = sample->point;
     mailbox->acting = sample->acting;
     exchange_barrier();
-    mailbox->generation = drive->samples.generation;
+    mailbox->generation = generation;
     hal_irq_pend_mrai();
 }

@@ -13,8 +13,7 @@
  * previous point (generation == finished), so the interrupt reads it in place. */
 typedef struct {
     operating_point_t point;
-    bool acting; /* the bridge was on throughout the last period and is on now */
-    uint8_t overruns_in_a_row;
+    bool acting;                  /* the bridge was on throughout the last period and is on now */
     volatile uint32_t generation; /* of the sample it was taken from */
     uint32_t overruns;            /* periods whose point was dropped because the previous one was not finished */
 } mrai_mailbox_t;

@@ -22,8 +22,15 @@ static inline bool mrai_is_chosen(const drive_t *drive)
     return drive->request.identification_mode == IDENTIFICATION_PAPER;
 }
 
-/** Fast ISR, after the sample has been published. */
-void mrai_offer(drive_t *drive, const sample_t *sample);
+/** Fast ISR, after the sample has been published as this generation. */
+void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation);
+/** Fast ISR: one of the last periods, up to this generation, went to the law. A dropped one is not known here. While
+ * the law is never chosen, the generation's overflow after 2^32 periods looks like one. */
+static inline bool mrai_had_one_of(const drive_t *drive, uint32_t generation, uint32_t periods)
+{
+    return generation - drive->mrai.mailbox.generation < periods;
+}
+
 /** 1 kHz task, as part of its snapshot. */
 void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot);
 /** 1 kHz task: the result of the law as the drive's identification. */
@@ -63,10 +70,19 @@ static inline bool mrai_is_chosen(const drive_t *drive)
     return false;
 }
 
-static inline void mrai_offer(drive_t *drive, const sample_t *sample)
+static inline void mrai_offer(drive_t *drive, const sample_t *sample, uint32_t generation)
 {
     (void)drive;
     (void)sample;
+    (void)generation;
+}
+
+static inline bool mrai_had_one_of(const drive_t *drive, uint32_t generation, uint32_t periods)
+{
+    (void)drive;
+    (void)generation;
+    (void)periods;
+    return false;
 }
 
 static inline void mrai_identify(drive_t *drive, const snapshot_t *snapshot)

@@ -277,16 +277,16 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
     return ended ? (int)(emu_instructions(p->e->emu) - from) : -1;
 }
 
-/* When the task is entered, a window has just been handed over; the next would be complete N periods later. Here only
- * one period is left to it, so that the first interrupt hands it over, wherever the task is interrupted. */
+/* When the task is entered, a window has just been handed over; the next would be complete N periods later. Here the
+ * next period completes it, so that the first interrupt hands it over, wherever the task is interrupted. */
 static void complete_window_next(preempt_t *p)
 {
+    const uint32_t step_end = drive_there(p).samples.generation + 1U;
     const mirror_t *m = &p->e->mirror;
-    const uint32_t left = 1;
     for (int i = m->inputs; i < m->parts; i++) {
         if (m->part[i].host_offset == offsetof(drive_t, fast)) {
-            const size_t inside = offsetof(drive_t, fast.window.left) - offsetof(drive_t, fast);
-            (void)emu_write(p->e->emu, m->base + m->part[i].image_offset + (uint32_t)inside, &left, sizeof left);
+            const size_t inside = offsetof(drive_t, fast.step_end) - offsetof(drive_t, fast);
+            (void)emu_write(p->e->emu, m->base + m->part[i].image_offset + (uint32_t)inside, &step_end, sizeof step_end);
         }
     }
 }

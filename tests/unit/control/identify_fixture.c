@@ -116,10 +116,13 @@ window_pair_t steady_window(const fixture_t *f, dq_q15_t i, double omega_pu, dq_
                                                {(q15_t)s.u.d, (q15_t)s.u.q},
                                                {(q15_t)flux.psi_d, (q15_t)flux.psi_q},
                                                s.theta};
-            identify_window_restart(&pair.fixed, (uint32_t)f->si.periods_per_step);
+            identify_window_restart(&pair.fixed);
             pair.twin.last = t;
         } else {
-            (void)identify_window_step(&pair.fixed, &s);
+            identify_window_add(&pair.fixed, &s);
+            if (k == f->si.periods_per_step) {
+                identify_window_end(&pair.fixed, &s);
+            }
             (void)twin_window(&f->si, &pair.twin, &t, true, false);
         }
     }

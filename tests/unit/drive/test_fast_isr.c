@@ -441,7 +441,6 @@ void test_three_unfinished_identifications_in_a_row_are_an_overrun(void)
     TEST_ASSERT_EQUAL_INT(3, mrai_overruns(&drive));
     fast_isr(&drive);
     TEST_ASSERT_FALSE(seam.gates);
-    TEST_ASSERT_EQUAL_INT(3, drive.mrai.mailbox.overruns_in_a_row);
 }
 
 void test_an_identification_that_is_sometimes_late_is_counted_and_is_no_fault(void)
@@ -457,6 +456,73 @@ void test_an_identification_that_is_sometimes_late_is_counted_and_is_no_fault(vo
     }
     TEST_ASSERT_EQUAL_HEX32(0, drive.fast.faults);
     TEST_ASSERT_EQUAL_INT(6, mrai_overruns(&drive));
+}
+
+/* The generation of the last period that went to the law tells. */
+static void expect_windows(const char *acting)
+{
+    for (; *acting != '\0'; acting++) {
+        const uint32_t seen = drive.windows.generation;
+        seam_periods(10 - (int)(drive.samples.generation % 10U));
+        TEST_ASSERT_EQUAL_UINT32(seen + 1U, drive.windows.generation);
+        TEST_ASSERT_EQUAL(*acting == '1', window_box_at(&drive.windows)->acting);
+    }
+}
+
+static void periods_of(identification_mode_t mode, int count)
+{
+    drive.request.identification_mode = mode;
+    seam_periods(count);
+}
+
+void test_a_window_that_lacks_a_period_or_its_first_sample_is_invalid_and_the_next_one_is_not(void)
+{
+    static const int before[] = {0, 1, 5, 9};
+    for (unsigned n = 0; n < sizeof before / sizeof before[0]; n++) {
+        for (int lacking = 1; lacking <= 23; lacking++) {
+            seam_start();
+            seam_run();
+            seam_periods(30 + before[n]);
+            periods_of(IDENTIFICATION_PAPER, lacking);
+            drive.request.identification_mode = IDENTIFICATION_ROBUST;
+            expect_windows("011");
+        }
+    }
+}
+
+static void fast_isr_alone(identification_mode_t mode)
+{
+    drive.request.identification_mode = mode;
+    seam.log[0] = '\0';
+    fast_isr(&drive);
+}
+
+/* The law takes the last period but one of a window and is still at work in the first one of the next. */
+void test_a_window_without_a_period_for_which_the_law_was_late_is_invalid(void)
+{
+    seam_run();
+    seam_periods(38);
+    fast_isr_alone(IDENTIFICATION_PAPER);
+    fast_isr_alone(IDENTIFICATION_ROBUST);
+    TEST_ASSERT_FALSE(window_box_at(&drive.windows)->acting);
+    fast_isr_alone(IDENTIFICATION_PAPER);
+    TEST_ASSERT_EQUAL_UINT32(1, mrai_overruns(&drive));
+    mrai_isr(&drive);
+    drive.request.identification_mode = IDENTIFICATION_ROBUST;
+    expect_windows("01");
+}
+
+/* 2^31 periods are 60 hours at 10 kHz. */
+void test_without_the_papers_identification_windows_are_valid_at_any_time(void)
+{
+    seam_run();
+    seam_periods(30);
+    for (uint32_t share = 1; share < 16U; share++) {
+        drive.samples.generation = share << 28U;
+        drive.fast.step_end = drive.samples.generation + 10U;
+        seam_periods(10);
+        TEST_ASSERT_TRUE(window_box_at(&drive.windows)->acting);
+    }
 }
 
 /* Number of periods without the task, after its last command, until switching is disabled. */

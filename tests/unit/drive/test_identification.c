@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include <math.h>
 
+#include "drive/publish.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -55,15 +56,10 @@ static void period(uint32_t k)
     s->point.u.d += (int32_t)lround(left * -3.0 / 5.831);
     s->point.u.q += (int32_t)lround(left * 5.0 / 5.831);
     s->theta_e = (uint32_t)(k * omega * 3298.672 * 1e-4 / 6.283185307 * 4294967296.0);
-    sample_box_publish(&drive.samples);
+    seam.log[0] = '\0';
+    publish_sample(&drive, s);
     if (drive.request.identification_mode == IDENTIFICATION_PAPER) {
         mrai_isr(&drive);
-        return;
-    }
-    const identify_sample_t sums = {s->point.i, s->point.u, &s->point.flux, s->theta_e};
-    if (identify_window_step(&drive.fast.window, &sums)) {
-        window_box_write(&drive.windows, &drive.fast.window);
-        identify_window_restart(&drive.fast.window, motor.bases.periods_per_step);
     }
 }
 
@@ -154,9 +150,9 @@ void test_the_window_box_survives_the_wrap_of_its_generation(void)
 {
     drive.windows.generation = UINT32_MAX;
     for (int n = 0; n < 4; n++) {
-        const identify_window_t window = {.left = (uint8_t)n};
+        const identify_window_t window = {.limited = (uint8_t)n};
         window_box_write(&drive.windows, &window);
-        TEST_ASSERT_EQUAL_INT(n, window_box_at(&drive.windows)->left);
+        TEST_ASSERT_EQUAL_INT(n, window_box_at(&drive.windows)->limited);
     }
 }
 

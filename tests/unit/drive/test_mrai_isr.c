@@ -28,9 +28,8 @@ static void publish(bool acting)
     *s = (sample_t){.point = in, .acting = acting};
     s->point.u.d = (q15_t)(-0.3 * s->point.flux.psi_q - 0.0133 * 3000);
     s->point.u.q = (q15_t)(0.3 * (s->point.flux.psi_d - 1500) + 0.0133 * 5000);
-    sample_box_publish(&drive.samples);
     seam.log[0] = '\0';
-    mrai_offer(&drive, s);
+    mrai_offer(&drive, s, sample_box_publish(&drive.samples));
 }
 
 /* As the 1 kHz task does: with weights of the voltage that are those of the period. 1/sinc is below 1.0005 here. */
@@ -171,5 +170,4 @@ void test_a_point_that_comes_too_early_is_dropped_and_the_law_restarts_after_it(
     mrai_isr(&drive);
     TEST_ASSERT_EQUAL_UINT32(mrai_offered(&drive), mrai_finished(&drive));
     expect_restart();
-    TEST_ASSERT_EQUAL_UINT(0, drive.mrai.mailbox.overruns_in_a_row);
 }

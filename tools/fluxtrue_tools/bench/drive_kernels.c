@@ -348,8 +348,11 @@ STAGE void bench_window(void)
         .flux = &sample->point.flux,
         .theta = sample->theta_e,
     };
-    if (__builtin_expect(identify_window_step(&d->fast.window, &in), 0)) {
+    identify_window_add(&d->fast.window, &in);
+    if (__builtin_expect(d->samples.generation + 1U == d->fast.step_end, 0)) {
+        d->fast.step_end += d->motor->bases.periods_per_step;
+        identify_window_end(&d->fast.window, &in);
         window_box_write(&d->windows, &d->fast.window);
-        identify_window_restart(&d->fast.window, d->motor->bases.periods_per_step);
+        identify_window_restart(&d->fast.window);
     }
 }
