@@ -34,3 +34,14 @@ void drive_refuse(drive_t *drive, motor_check_t check)
         drive_raise_fault(drive, FAULT_CONFIG);
     }
 }
+
+progress_t drive_progress(drive_t *drive)
+{
+    const uint32_t periods = drive->samples.generation;
+    const progress_t progress = {
+        .periods = periods - drive->task.periods_seen,
+        .stalled = mrai_is_stalled(drive) || periods == drive->task.periods_seen,
+    };
+    drive->task.periods_seen = periods;
+    return progress;
+}

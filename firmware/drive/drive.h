@@ -142,7 +142,14 @@ typedef struct {
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as carried out by the task */
+    uint32_t periods_seen;          /* of the fast ISR, at the last drive_progress() */
 } task_state_t;
+
+/** What the interrupts have done since they were last asked. */
+typedef struct {
+    uint32_t periods; /* of the fast ISR */
+    bool stalled;     /* an interrupt had work and has completed none of it */
+} progress_t;
 
 /** All inputs of one step of the 1 kHz task from higher priorities and from the port, from the same moment. */
 typedef struct {
@@ -215,6 +222,9 @@ static inline motor_check_t drive_motor_check(const drive_t *drive)
     const motor_check_t check = (motor_check_t)drive->fast.motor_check;
     return (check == MOTOR_CHECK_OK && drive->data_check.damaged) ? MOTOR_CHECK_LIVE_DATA : check;
 }
+
+/** Since the last call. Once per step, from the task or what calls it. */
+progress_t drive_progress(drive_t *drive);
 
 /** The identified values, for the store that survives a power cycle. Called in the background. */
 identify_record_t drive_identified_record(const drive_t *drive);

@@ -19,7 +19,6 @@
 #include "signal/step_clock.h"
 
 typedef struct {
-    uint32_t periods, finished;   /* of the interrupts, at the last task */
     uint16_t task_overruns, held; /* held: steps without service of the watchdog */
     uint8_t late_in_a_row, stalled_in_a_row;
     bool started;

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "drive/mrai/mrai_seam.h"
 #include "ecu/ecu_private.h"
 #include "signal/counter.h"
 #include "signal/debounce.h"
@@ -28,18 +27,14 @@ static const struct {
 void ecu_watch(ecu_t *ecu)
 {
     liveness_t *liveness = &ecu->liveness;
-    const uint32_t periods = ecu->drive.samples.generation;
-    const uint32_t finished = mrai_finished(&ecu->drive);
+    const progress_t progress = drive_progress(&ecu->drive);
     const uint32_t in_step = ecu->drive.motor->bases.periods_per_step;
-    const bool late = liveness->started && periods - liveness->periods >= in_step + in_step / 2U;
-    const bool unfinished = mrai_offered(&ecu->drive) != finished && finished == liveness->finished;
+    const bool late = liveness->started && progress.periods >= in_step + in_step / 2U;
     (void)debounce_step(&liveness->late_in_a_row, late, CONSECUTIVE_MAX, 1U);
-    (void)debounce_step(&liveness->stalled_in_a_row, periods == liveness->periods || unfinished, CONSECUTIVE_MAX, 1U);
+    (void)debounce_step(&liveness->stalled_in_a_row, progress.stalled, CONSECUTIVE_MAX, 1U);
     if (late) {
         count_up(&liveness->task_overruns);
     }
-    liveness->periods = periods;
-    liveness->finished = finished;
 }
 
 /* Counted from the start of the precharge: before it a turning machine may hold the dc link at another voltage than the

@@ -36,6 +36,7 @@ typedef struct {
 typedef struct {
     mrai_quality_t quality;
     torque_mean_t torque_mean;
+    uint32_t finished_seen; /* generation of the last point processed, at the last mrai_is_stalled() */
 } mrai_task_state_t;
 
 typedef struct {

@@ -40,16 +40,8 @@ void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating
 /** 1 kHz task: discards the identified parameters. */
 void mrai_discard(drive_t *drive);
 
-/** Generations offered and finished: equal unless the interrupt is running or has not had time to run. */
-static inline uint32_t mrai_offered(const drive_t *drive)
-{
-    return drive->mrai.mailbox.generation;
-}
-
-static inline uint32_t mrai_finished(const drive_t *drive)
-{
-    return drive->mrai.isr.finished;
-}
+/** 1 kHz task, once per step: a point waits, and the interrupt has finished none since the last call. */
+bool mrai_is_stalled(drive_t *drive);
 
 static inline uint32_t mrai_overruns(const drive_t *drive)
 {
@@ -103,16 +95,10 @@ static inline void mrai_discard(drive_t *drive)
     (void)drive;
 }
 
-static inline uint32_t mrai_offered(const drive_t *drive)
+static inline bool mrai_is_stalled(drive_t *drive)
 {
     (void)drive;
-    return 0;
-}
-
-static inline uint32_t mrai_finished(const drive_t *drive)
-{
-    (void)drive;
-    return 0;
+    return false;
 }
 
 static inline uint32_t mrai_overruns(const drive_t *drive)

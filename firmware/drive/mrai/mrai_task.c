@@ -46,3 +46,12 @@ void mrai_discard(drive_t *drive)
 {
     drive->mrai.task.quality = (mrai_quality_t){0};
 }
+
+bool mrai_is_stalled(drive_t *drive)
+{
+    const uint32_t finished = drive->mrai.isr.finished;
+    uint32_t *seen = &drive->mrai.task.finished_seen;
+    const bool stalled = drive->mrai.mailbox.generation != finished && *seen == finished;
+    *seen = finished;
+    return stalled;
+}

@@ -381,7 +381,8 @@ void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(v
 {
     ecu.drive.mrai.mailbox.generation = 10;
     ecu.drive.mrai.isr.finished = 9;
-    ecu.liveness = (liveness_t){.started = true, .finished = 8};
+    ecu.drive.mrai.task.finished_seen = 8;
+    ecu.liveness = (liveness_t){.started = true};
     for (uint32_t n = 1; n <= 3U; n++) {
         ecu.drive.samples.generation += 10U;
         ecu_watch(&ecu);
