@@ -16,10 +16,11 @@ void mrai_identify(drive_t *drive, const snapshot_t *snapshot)
     drive->task.identification = (identification_t){
         .psi_delta = law->psi_delta,
         .r_delta = law->r_delta,
-        .torque_variance_q30 = Q31_MAX,
+        .lq_error = 0,                  /* not identified: the psi_q of the tables holds */
+        .torque_variance_q30 = Q31_MAX, /* nor any uncertainty: the loop may use all of its authority */
         .psi_d_error = snapshot->psi_d_error,
         .torque_estimated = torque_estimate_mean(&task->torque_mean, &snapshot->mrai.torque),
-        .confidence = Q15_MAX, /* the law states no uncertainty */
+        .confidence = Q15_MAX,
         .psi_quality = task->quality.psi_quality,
         .r_quality = task->quality.r_quality,
         .psi_clamped = mrai_flux_clamped(config, law),

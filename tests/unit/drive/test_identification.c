@@ -146,6 +146,19 @@ void test_the_papers_identification_starts_from_its_sample_when_it_is_selected(v
     TEST_ASSERT_EQUAL_INT(drive.mrai.task.torque_mean.mean, drive.task.identification.torque_estimated);
 }
 
+/* The robust identification may have found a scale of psi_q: under the other law the torque path must not keep it. */
+void test_the_papers_identification_reports_what_it_does_not_identify_as_the_tables(void)
+{
+    drive.task.identify.kalman.x_q27[IDENTIFY_LQ] = IDENTIFY_ONE_Q27 / 2;
+    milliseconds(1);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identification.lq_error);
+    drive.request.identification_mode = IDENTIFICATION_PAPER;
+    milliseconds(1);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.identification.lq_error);
+    TEST_ASSERT_EQUAL_INT32(Q31_MAX, drive.task.identification.torque_variance_q30);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, drive.task.identification.confidence);
+}
+
 void test_the_window_box_survives_the_wrap_of_its_generation(void)
 {
     drive.windows.generation = UINT32_MAX;
