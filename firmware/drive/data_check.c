@@ -7,12 +7,19 @@
 #define WORDS_PER_STEP 4U
 #define STEPS_WITHOUT_WINDOW 4U /* whole ones; the fast ISR completes one in each */
 
-#define WORDS (DATA_CHECK_PERIOD_WORDS + DATA_CHECK_PARAMETERS_WORDS)
+#define WORDS (DATA_CHECK_PERIOD_WORDS + DATA_CHECK_PARAMETERS_WORDS + DATA_CHECK_MRAI_WORDS)
 #define LIVE offsetof(drive_t, period)
 #define COMPLEMENTS offsetof(drive_t, data_check.period)
 
 _Static_assert(offsetof(drive_t, parameters) == LIVE + sizeof(period_data_t), "one after the other");
 _Static_assert(offsetof(drive_t, data_check.parameters) == COMPLEMENTS + sizeof(period_data_t), "in the same order");
+#if FLUXTRUE_MRAI
+_Static_assert(offsetof(drive_t, mrai_parameters) == offsetof(drive_t, parameters) + sizeof(motor_parameters_t), "then");
+_Static_assert(offsetof(drive_t, data_check.mrai_parameters) ==
+                   offsetof(drive_t, data_check.parameters) + sizeof(motor_parameters_t),
+               "in the same order");
+_Static_assert(sizeof(mrai_config_t) % sizeof(uint32_t) == 0U, "whole words");
+#endif
 _Static_assert(WORDS <= WORDS_PER_STEP * DATA_CHECK_ROUND_MAX, "a round in time");
 _Static_assert(sizeof(motor_parameters_t) % sizeof(uint32_t) == 0U, "whole words");
 _Static_assert(sizeof(period_data_t) % sizeof(uint32_t) == 0U, "whole words");
@@ -49,23 +56,33 @@ void data_check_start(drive_t *drive)
     data_check_accept_options(drive);
     data_check->motor = drive->motor;
     data_check->motor_complement = ~(uintptr_t)drive->motor;
-    for (uint32_t n = 0; n < DATA_CHECK_PERIOD_WORDS; n++) {
-        data_check->period[n] = ~word_at(&drive->period, n);
+    for (uint32_t n = 0; n < WORDS; n++) {
+        const uint32_t complement = ~word_at((const uint8_t *)drive + LIVE, n);
+        memcpy((uint8_t *)drive + COMPLEMENTS + n * sizeof complement, &complement, sizeof complement);
     }
-    for (uint32_t n = 0; n < DATA_CHECK_PARAMETERS_WORDS; n++) {
-        data_check->parameters[n] = ~word_at(&drive->parameters, n);
+}
+
+static void accept(const void *now, const void *before, uint32_t complements[], uint32_t words)
+{
+    for (uint32_t n = 0; n < words; n++) {
+        const uint32_t word = word_at(now, n);
+        if (word != word_at(before, n)) {
+            complements[n] = ~word;
+        }
     }
 }
 
 void data_check_accept(drive_t *drive, const motor_parameters_t *before)
 {
-    for (uint32_t n = 0; n < DATA_CHECK_PARAMETERS_WORDS; n++) {
-        const uint32_t now = word_at(&drive->parameters, n);
-        if (now != word_at(before, n)) {
-            drive->data_check.parameters[n] = ~now;
-        }
-    }
+    accept(&drive->parameters, before, drive->data_check.parameters, DATA_CHECK_PARAMETERS_WORDS);
 }
+
+#if FLUXTRUE_MRAI
+void data_check_accept_mrai(drive_t *drive, const mrai_config_t *before)
+{
+    accept(&drive->mrai_parameters, before, drive->data_check.mrai_parameters, DATA_CHECK_MRAI_WORDS);
+}
+#endif
 
 void data_check_restore_pointer(drive_t *drive)
 {

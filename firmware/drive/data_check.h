@@ -19,6 +19,9 @@
 
 /** The words that differ from `before` have been changed on purpose. */
 void data_check_accept(drive_t *drive, const motor_parameters_t *before);
+#if FLUXTRUE_MRAI
+void data_check_accept_mrai(drive_t *drive, const mrai_config_t *before);
+#endif
 /** The options of the request have been changed on purpose. */
 void data_check_accept_options(drive_t *drive);
 /** Each step of an owner of the request; a difference is a fault in this step's data_check_step(). */

@@ -14,6 +14,7 @@ void drive_init(drive_t *drive, const motor_t *source)
                                    .limits = TORQUE_LIMITS_NONE},
                        .fast.step_end = source->bases.periods_per_step,
                        .task.reference = {.torque_max = source->torque_max, .psi_plan = Q15_MAX}};
+    mrai_init(drive);
     identify_reset(&drive->motor->identify, &drive->task.identify);
     data_check_start(drive);
     drive_refuse(drive, motor_check(source));

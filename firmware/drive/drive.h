@@ -177,11 +177,19 @@ typedef struct {
 
 #define DATA_CHECK_PERIOD_WORDS ((uint32_t)(sizeof(period_data_t) / sizeof(uint32_t)))
 #define DATA_CHECK_PARAMETERS_WORDS ((uint32_t)(sizeof(motor_parameters_t) / sizeof(uint32_t)))
+#if FLUXTRUE_MRAI
+#define DATA_CHECK_MRAI_WORDS ((uint32_t)(sizeof(mrai_config_t) / sizeof(uint32_t)))
+#else
+#define DATA_CHECK_MRAI_WORDS 0U
+#endif
 
 /** What drive/data_check.h compares the motor data with. Written by the 1 kHz task, and before it starts. */
 typedef struct {
     uint32_t period[DATA_CHECK_PERIOD_WORDS];         /* complements, */
     uint32_t parameters[DATA_CHECK_PARAMETERS_WORDS]; /* one after the other as the data themselves */
+#if FLUXTRUE_MRAI
+    uint32_t mrai_parameters[DATA_CHECK_MRAI_WORDS];
+#endif
     uint32_t options;                                 /* of the request */
     const motor_t *motor;
     uintptr_t motor_complement;
@@ -197,6 +205,9 @@ typedef struct {
     const motor_t *motor;          /* constant: in flash on a target */
     period_data_t period;          /* constant: a copy */
     motor_parameters_t parameters; /* live: what calibration, commissioning and the trim change */
+#if FLUXTRUE_MRAI
+    mrai_config_t mrai_parameters; /* the same of the paper's law */
+#endif
     data_check_t data_check;
     request_t request;
     fast_state_t fast;

@@ -13,7 +13,6 @@
 #include "control/current/measure.h"
 #include "control/current/modulate.h"
 #include "control/identify/config.h"
-#include "control/mrai/mrai.h"
 #include "control/torque/current_reference.h"
 #include "control/torque/i_d_limit.h"
 #include "control/torque/limit.h"
@@ -27,15 +26,20 @@
 #include "safety/torque_monitor.h"
 #include "second_level/constants.h"
 #include "types/bases.h"
+#include "types/features.h"
 #include "types/motor_check.h"
 
+#if FLUXTRUE_MRAI
+#include "control/mrai/mrai.h"
+#endif
+
 /** What calibration, commissioning and the trim change while the drive runs: the blocks that contain such a value. A
- * drive has its own; the motor data hold the values it starts with. */
+ * drive has its own; the motor data hold the values it starts with. What the paper's law has of this kind lies apart,
+ * so that a build without the law carries none of it. */
 typedef struct {
     q15_t torque_slew; /* per 1 kHz step; Q15_MAX: no limit */
     current_control_config_t current_control;
     modulate_config_t modulate;
-    mrai_config_t mrai;
     torque_loop_config_t torque_loop;
 } motor_parameters_t;
 
@@ -73,6 +77,9 @@ typedef struct {
     commission_config_t commission;
     motor_parameters_t parameters;                /* to start with */
     const second_level_constants_t *second_level; /* of the second level alone */
+#if FLUXTRUE_MRAI
+    const mrai_config_t *mrai; /* of the paper's law alone, to start with */
+#endif
 } motor_t;
 
 extern const motor_t motor;

@@ -22,8 +22,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "types/features.h"
 #include "types/motor_check.h"
 #include "types/operating_point.h"
+
+#if !FLUXTRUE_MRAI
+#error "A build without the paper's law includes nothing of it."
+#endif
 
 /** In the order of use: what every period reads comes first. */
 typedef struct {

@@ -12,7 +12,7 @@ static __attribute__((noinline, cold)) void restart(drive_t *drive, const mrai_s
         state->identification_resets = drive->request.identification_resets;
         state->law = (mrai_state_t){0};
     }
-    mrai_reset(&drive->parameters.mrai, schedule, &state->law, &drive->mrai.mailbox.point);
+    mrai_reset(&drive->mrai_parameters, schedule, &state->law, &drive->mrai.mailbox.point);
 }
 
 /* One PWM period of the paper's law: parameters, then torque. */
@@ -29,7 +29,7 @@ void mrai_isr(drive_t *drive)
                          0)) {
         restart(drive, schedule);
     } else {
-        mrai_step(&drive->parameters.mrai, schedule, &state->law, point);
+        mrai_step(&drive->mrai_parameters, schedule, &state->law, point);
     }
     const int32_t psi_delta = mrai_psi_delta_q15(&state->law);
     drive->psi_d_error = (q15_t)psi_delta;

@@ -14,7 +14,12 @@
 
 static inline motor_check_t mrai_data_check(const motor_t *m)
 {
-    return mrai_check(&m->parameters.mrai);
+    return mrai_check(m->mrai);
+}
+
+static inline void mrai_init(drive_t *drive)
+{
+    drive->mrai_parameters = *drive->motor->mrai;
 }
 
 static inline bool mrai_is_chosen(const drive_t *drive)
@@ -54,6 +59,11 @@ static inline motor_check_t mrai_data_check(const motor_t *m)
 {
     (void)m;
     return MOTOR_CHECK_OK;
+}
+
+static inline void mrai_init(drive_t *drive)
+{
+    (void)drive;
 }
 
 static inline bool mrai_is_chosen(const drive_t *drive)

@@ -10,7 +10,7 @@ void mrai_snapshot(const drive_t *drive, mrai_snapshot_t *snapshot)
 
 void mrai_identify(drive_t *drive, const snapshot_t *snapshot)
 {
-    const mrai_config_t *config = &drive->parameters.mrai;
+    const mrai_config_t *config = &drive->mrai_parameters;
     const mrai_state_t *law = &snapshot->mrai.law;
     mrai_task_state_t *task = &drive->mrai.task;
     drive->task.identification = (identification_t){
@@ -37,7 +37,7 @@ void mrai_reschedule(drive_t *drive, const snapshot_t *snapshot, const operating
         .enabled = drive->request.identification && snapshot->sample.acting,
     };
     mrai_quality_t *quality = &drive->mrai.task.quality;
-    schedule_box_write(&drive->mrai.schedules, mrai_schedule_step(&drive->parameters.mrai, quality, &in));
+    schedule_box_write(&drive->mrai.schedules, mrai_schedule_step(&drive->mrai_parameters, quality, &in));
     drive->task.identification.psi_quality = quality->psi_quality;
     drive->task.identification.r_quality = quality->r_quality;
 }

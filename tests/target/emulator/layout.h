@@ -15,7 +15,8 @@
     X(data_check.parameters)       \
     X(data_check.options)          \
     X(parameters.torque_slew) \
-    X(parameters.mrai)        \
+    X(mrai_parameters)        \
+    X(data_check.mrai_parameters) \
     X(parameters.torque_loop)
 
 /* The state that the activities write. */

@@ -162,7 +162,7 @@ int valid(void)
 {
     return flux_table_check(&motor.flux_table) == MOTOR_CHECK_OK &&
            current_reference_check(&motor.current_reference) == MOTOR_CHECK_OK &&
-           mrai_check(&motor.parameters.mrai) == MOTOR_CHECK_OK;
+           mrai_check(motor.mrai) == MOTOR_CHECK_OK;
 }
 
 void flux(int n, const int16_t *d, const int16_t *q, int16_t *psi_d, int16_t *psi_q);

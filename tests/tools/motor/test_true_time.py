@@ -31,7 +31,7 @@ PERIOD = {
     "parameters.current_control.integral_gain",
     "parameters.current_control.clear_q30",
     "parameters.modulate.dead_time_q16", "parameters.modulate.longest_q31", "parameters.modulate.nearer_rail_q31",
-    "monitor.angle_count_max", "parameters.mrai.period", "parameters.mrai.sinc_gain", "parameters.mrai.r_delta_max",
+    "monitor.angle_count_max", "mrai.period", "mrai.sinc_gain", "mrai.r_delta_max",
     "identify.sinc_gain", "identify.sigma", "parameters.torque_loop.model_rate",
     "plausibility.ripple_max",
     "angle_tracker.lag_steps", "angle_tracker.stop_periods",
@@ -43,7 +43,7 @@ PERIODS_PER_STEP = {
 }  # fmt: skip
 STEP = {
     "bases.step_s", "trim_steps", "parameters.torque_slew", "torque_slew_weak",
-    "parameters.mrai.psi_drift_full", "parameters.mrai.r_drift_full", "parameters.mrai.quality_rate",
+    "mrai.psi_drift_full", "mrai.r_drift_full", "mrai.quality_rate",
     "identify.rate_gain_q28", "identify.window_turns_q29", "identify.turn_to_pu", "identify.leak",
     "identify.noise_voltage_q30", "identify.noise_flux_q30", "identify.noise_rate_q30", "identify.local_rate",
     "identify.mismatch_rate", "identify.confidence_rate",
@@ -113,13 +113,15 @@ TOLD = re.compile(r"\b(steps?|ms|milliseconds?|seconds?|updates?|tasks?)\b")
 
 
 def members(text: str) -> dict[str, str]:
-    """{"plausibility.hot_steps": "110"} of the generated motor_t."""
+    """{"plausibility.hot_steps": "110"} of the generated motor_t, and of what the paper's law has beside it."""
     found, path = {}, []
-    for line in text[text.index("const motor_t motor") :].splitlines()[1:]:
+    law, _, rest = text[text.index("const mrai_config_t mrai =") :].partition("};\n")
+    lines = [".mrai = {", *law.splitlines()[1:], "}", *rest[rest.index("const motor_t motor") :].splitlines()[1:]]
+    for line in lines:
         begun = re.match(r"\s*\.(\w+) = (.*)$", line)
         if begun and begun[2].strip() == "{":
             path.append(begun[1])
-        elif begun:
+        elif begun and begun[2] != "&mrai,":
             found[".".join([*path, begun[1]])] = begun[2].partition("/*")[0].strip().rstrip(",")
         elif line.strip().startswith("}") and path:
             path.pop()

@@ -10,7 +10,7 @@
 /* Damage by the memory, one bit at a time, and changes on purpose. */
 
 #define LIVE_FIRST offsetof(drive_t, period)
-#define LIVE_END (offsetof(drive_t, parameters) + sizeof(motor_parameters_t))
+#define LIVE_END (offsetof(drive_t, mrai_parameters) + sizeof(mrai_config_t))
 
 void setUp(void)
 {

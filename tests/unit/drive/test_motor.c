@@ -104,7 +104,7 @@ void test_current_control_and_modulation_are_the_si_values(void)
 
 void test_the_identification_is_the_si_values(void)
 {
-    const mrai_config_t *c = &motor.parameters.mrai;
+    const mrai_config_t *c = motor.mrai;
     const double r0 = motor_si.r_ohm_20 / z_b;
     HELD(r0, q31(c->r0), q31(1));
     HELD(4.0 * motor_si.observer_m * r0, q31(c->pole_gain), q31(1));

@@ -119,20 +119,20 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CLEAR_VOLTAGE, m.parameters.current_control.clear_q30 = m.parameters.current_control.clear_q30 / 8 * 9)
 
 #define MRAI(X) \
-    X(MRAI_GAINS, m.parameters.mrai.r0 = 0) \
-    X(MRAI_GAINS, m.parameters.mrai.pole_gain = 0) \
-    X(MRAI_GAINS, m.parameters.mrai.period = 0) \
-    X(MRAI_GAINS, m.parameters.mrai.period = Q31(0.79)) \
-    X(MRAI_GAINS, m.parameters.mrai.flux_gain = -1) \
-    X(MRAI_GAINS, m.parameters.mrai.resistance_gain = -1) \
-    X(MRAI_GAINS, m.parameters.mrai.flux_proportional_q24 = -1) \
-    X(MRAI_GAINS, m.parameters.mrai.resistance_proportional_q24 = -1) \
-    X(MRAI_LIMITS, m.parameters.mrai.psi_delta_min = m.parameters.mrai.psi_delta_max) \
-    X(MRAI_LIMITS, m.parameters.mrai.psi_delta_min = Q31(-0.5) - 1) \
-    X(MRAI_LIMITS, m.parameters.mrai.r_delta_max = Q31(0.5) + 1) \
-    X(MRAI_GATES, m.parameters.mrai.omega_min = 0) \
-    X(MRAI_GATES, m.parameters.mrai.psi_drift_full = 0) \
-    X(MRAI_GATES, m.parameters.mrai.r_drift_full = 0)
+    X(MRAI_GAINS, law.r0 = 0) \
+    X(MRAI_GAINS, law.pole_gain = 0) \
+    X(MRAI_GAINS, law.period = 0) \
+    X(MRAI_GAINS, law.period = Q31(0.79)) \
+    X(MRAI_GAINS, law.flux_gain = -1) \
+    X(MRAI_GAINS, law.resistance_gain = -1) \
+    X(MRAI_GAINS, law.flux_proportional_q24 = -1) \
+    X(MRAI_GAINS, law.resistance_proportional_q24 = -1) \
+    X(MRAI_LIMITS, law.psi_delta_min = law.psi_delta_max) \
+    X(MRAI_LIMITS, law.psi_delta_min = Q31(-0.5) - 1) \
+    X(MRAI_LIMITS, law.r_delta_max = Q31(0.5) + 1) \
+    X(MRAI_GATES, law.omega_min = 0) \
+    X(MRAI_GATES, law.psi_drift_full = 0) \
+    X(MRAI_GATES, law.r_drift_full = 0)
 
 #define IDENTIFY(X) \
     X(IDENTIFY_WINDOW, m.identify.l_shift = 15) \
@@ -196,6 +196,8 @@ static named_t *named(motor_check_t value)
 #define BREAK(expected, ...) \
     do { \
         motor_t m = motor; \
+        mrai_config_t law = *motor.mrai; \
+        m.mrai = &law; \
         __VA_ARGS__; \
         TEST_ASSERT_EQUAL_STRING_MESSAGE(#expected, named(motor_check(&m))->name, #__VA_ARGS__); \
         named(MOTOR_CHECK_##expected)->seen = true; \

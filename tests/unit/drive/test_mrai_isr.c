@@ -35,7 +35,7 @@ static void publish(bool acting)
 /* As the 1 kHz task does: with weights of the voltage that are those of the period. 1/sinc is below 1.0005 here. */
 static void enable(int32_t flux_step_q28)
 {
-    const int32_t voltage_q28 = -(drive.parameters.mrai.period / 8);
+    const int32_t voltage_q28 = -(drive.mrai_parameters.period / 8);
     drive.request.identification = true;
     schedule_box_write(&drive.mrai.schedules, (mrai_schedule_t){.flux_step_q28 = flux_step_q28,
                                                                 .minus_voltage_d_q28 = 2 * voltage_q28,
@@ -51,7 +51,7 @@ static void enable_adaptation(void)
  * The voltages are truncated to whole LSB: 0.33 * 2^-15 = 1e-5 pu, twice of it in the d axis. */
 static void expect_the_error_of_one_period(void)
 {
-    const double period = drive.parameters.mrai.period / 2147483648.0;
+    const double period = drive.mrai_parameters.period / 2147483648.0;
     const double e_q = period * 0.3 * 1500.0 / 32768.0;
     TEST_ASSERT_DOUBLE_WITHIN(3e-5, 0.0, drive.mrai.isr.law.e_d_q27 / 134217728.0);
     TEST_ASSERT_DOUBLE_WITHIN(3e-5, e_q, drive.mrai.isr.law.e_q_q27 / 134217728.0);

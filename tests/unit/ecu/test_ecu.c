@@ -409,8 +409,8 @@ void test_the_smallest_value_of_a_calibration_is_one_step_of_its_format(void)
         if (least > 0.0F) {
             calibration_set(&ecu.drive, id, 1.001F * least);
             TEST_ASSERT_TRUE(calibration_get(&ecu.drive, id) > 0.0F);
-            TEST_ASSERT_TRUE(ecu.drive.parameters.mrai.psi_drift_full > 0);
-            TEST_ASSERT_TRUE(ecu.drive.parameters.mrai.r_drift_full > 0);
+            TEST_ASSERT_TRUE(ecu.drive.mrai_parameters.psi_drift_full > 0);
+            TEST_ASSERT_TRUE(ecu.drive.mrai_parameters.r_drift_full > 0);
         }
     }
     calibration_set(&ecu.drive, CALIBRATION_torque_slew_Nm_per_s, 0.0F);

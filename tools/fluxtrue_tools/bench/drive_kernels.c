@@ -220,7 +220,7 @@ STAGE void bench_flux_table(void)
 STAGE void bench_mrai(void)
 {
     drive_t *d = the_copy();
-    mrai_step(&d->parameters.mrai, found.schedule, &d->mrai.isr.law, found.sample);
+    mrai_step(&d->mrai_parameters, found.schedule, &d->mrai.isr.law, found.sample);
 }
 
 STAGE void bench_torque_estimate(void)

@@ -215,7 +215,8 @@ def page(figures: Figures) -> str:
         clamped=met["beyond the tables"], kernel_periods=kernels["periods"], kernel_limited=kernels["limited"],
         task_steps=(PERIODS - WARM_UP) // TASK_PERIODS,
         small=" ".join(SMALL), tables=figures["control library"]["tables"], period_copy=figures["state"]["period"],
-        parameters=figures["state"]["parameters"],
+        # An image without the paper's law has none of its parameters.
+        parameters=figures["state"]["parameters"] + figures["state"].get("mrai_parameters", 0),
         stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MAX),
         **{"return": cycles.RETURN},
     )  # fmt: skip

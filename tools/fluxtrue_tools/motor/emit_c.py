@@ -443,7 +443,6 @@ def _parameters(motor: Motor) -> list[Row]:
         ("torque_slew", *_torque_slew(motor)),
         ("current_control", _current_control(motor), ""),
         ("modulate", _modulate(motor), ""),
-        ("mrai", _mrai_gains(motor) + _mrai_limits(motor), ""),
         ("torque_loop", _torque_loop(motor), ""),
     ]
 
@@ -506,6 +505,16 @@ def _second_level(motor: Motor) -> str:
     )
 
 
+def _mrai(motor: Motor) -> str:
+    """What the paper's law starts with, which the motor data only point at; not in a build without it."""
+    rows = "\n".join(_struct(_mrai_gains(motor) + _mrai_limits(motor), INDENT))
+    return _optional(f"/* Of the paper's law alone. */\nstatic const mrai_config_t mrai = {{\n{rows}\n}};") + "\n"
+
+
+def _optional(text: str) -> str:
+    return f"#if FLUXTRUE_MRAI\n{text}\n#endif"
+
+
 def _q15_tables(motor: Motor) -> list[str]:
     b, tables, refs = motor.bases, motor.tables, motor.references
     l_unit = f"{b.inductance_H * 2**tables.l_shift / Q15_ONE:.6g} H per count"
@@ -545,16 +554,18 @@ def _q15_tables(motor: Motor) -> list[str]:
 def check_numbers(motor: Motor) -> None:
     """Refuse numbers that do not fit the firmware's formats, without generating the files."""
     _motor(motor)
+    _mrai(motor)
 
 
 def motor_tables_c(motor: Motor) -> str:
     """motor_tables.c."""
-    body = "\n".join(_struct(_motor(motor), INDENT))
+    body = "\n".join([*_struct(_motor(motor), INDENT), _optional(f"{INDENT}.mrai = &mrai,")])
     return "\n".join(
         [
             _head(motor, "drive/motor.h"),
             *_q15_tables(motor),
             _second_level(motor),
+            _mrai(motor),
             f"const motor_t motor = {{\n{body}\n}};\n",
         ]
     )
