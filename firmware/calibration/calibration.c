@@ -24,7 +24,8 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     }
 }
 
-float calibration_least(const drive_t *drive, calibration_id_t id)
+/* What one step of the format is. */
+static float least(const drive_t *drive, calibration_id_t id)
 {
     const motor_t *m = drive->motor;
     switch (id) {
@@ -37,6 +38,11 @@ float calibration_least(const drive_t *drive, calibration_id_t id)
     default:
         return mrai_calibration_least(drive, id);
     }
+}
+
+value_range_t calibration_range(const drive_t *drive, calibration_id_t id)
+{
+    return (value_range_t){calibration_info[id].lo, calibration_info[id].hi, least(drive, id)};
 }
 
 static void write_parameter(drive_t *drive, calibration_id_t id, float value)

@@ -23,9 +23,9 @@
     X(torque_estimated_Nm, S16, TORQUE, (d)->task.identification.torque_estimated, "Estimated air-gap torque") \
     X(psi_quality, S16, ONE, (d)->task.identification.psi_quality, "Quality of the identified flux") \
     X(r_quality, S16, ONE, (d)->task.identification.r_quality, "Quality of the identified resistance") \
-    X(speed_rpm, F32, NONE, measured_speed_rpm(d), "Speed of the rotor") \
-    X(psi_f_Vs, F32, NONE, measured_psi_f_Vs(d), "Identified magnet flux") \
-    X(r_ohm, F32, NONE, measured_r_ohm(d), "Identified resistance") \
+    X(speed_rpm, F32, NONE, drive_speed_rpm(d, MEASURED(d).point.omega), "Speed of the rotor") \
+    X(psi_f_Vs, F32, NONE, drive_psi_f_Vs(d), "Identified magnet flux") \
+    X(r_ohm, F32, NONE, drive_r_ohm(d), "Identified resistance") \
     X(fault_word, U32, FAULT, (d)->fast.faults, "Latched faults, one bit each") \
     X(motor_check, U8, MOTOR_CHECK, drive_motor_check(d), "What the fault config stands for") \
     X(processor_dC, S16, NONE, hal_temperature_processor_dC(), "Processor, tenths of a degree; -32768: unknown") \

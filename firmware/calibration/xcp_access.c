@@ -24,8 +24,7 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(drive, (calibration_id_t)k);
         access->applied_value[k] = access->reference[k];
-        access->limits[k] = (xcp_limits_t){calibration_info[k].lo, calibration_info[k].hi,
-                                           calibration_least(drive, (calibration_id_t)k)};
+        access->limits[k] = calibration_range(drive, (calibration_id_t)k);
     }
     access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
     access->area[1] = (xcp_area_t){frame, sizeof *frame};

@@ -24,7 +24,7 @@ typedef struct {
     float working[CALIBRATION_COUNT];
     float reference[CALIBRATION_COUNT];     /* the built-in values; written once at start-up */
     float applied_value[CALIBRATION_COUNT]; /* value that the drive uses */
-    xcp_limits_t limits[CALIBRATION_COUNT];
+    value_range_t limits[CALIBRATION_COUNT];
     measurements_t measurements;
     xcp_area_t area[XCP_ACCESS_AREAS];
     uint32_t applied; /* generation of the values that the drive runs on */

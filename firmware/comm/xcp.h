@@ -14,22 +14,17 @@
 
 #include "comm/xcp_daq.h"
 #include "types/can_frame.h"
+#include "types/value_range.h"
 
 #define XCP_PARAMETERS_MAX 32
 
 enum { XCP_PAGE_REFERENCE = 0, XCP_PAGE_WORKING = 1 };
 
-/** One calibratable value: a float at word `index` of the page. */
-typedef struct {
-    float lo, hi;
-    float least; /* a smaller magnitude, except 0, is refused: the format would make it zero */
-} xcp_limits_t;
-
 typedef struct {
     xcp_memory_t memory;            /* what may be read besides the page */
     float *working;                 /* the page the master writes; its address is the segment's */
     const float *reference;         /* never written */
-    const xcp_limits_t *limits;     /* one per parameter */
+    const value_range_t *limits;    /* one per parameter, which is a float at its word of the page */
     uint8_t parameters;             /* <= XCP_PARAMETERS_MAX */
     uint32_t (*key)(uint32_t seed); /* what the master must answer; called at task level only */
 } xcp_config_t;

@@ -30,13 +30,6 @@ void xcp_page_discard(xcp_t *xcp)
     memset(xcp->arrived, 0, sizeof xcp->arrived);
 }
 
-static bool in_range(const xcp_limits_t *limits, float value)
-{
-    const float magnitude = (value < 0.0F) ? -value : value;
-    const bool meant = magnitude == 0.0F || magnitude >= limits->least;
-    return value >= limits->lo && value <= limits->hi && meant; /* false for a NaN */
-}
-
 static float waiting_value(const xcp_t *xcp, uint32_t parameter)
 {
     float value;
@@ -49,7 +42,7 @@ static xcp_result_t check_whole(xcp_t *xcp, const xcp_config_t *config, uint32_t
 {
     xcp_result_t result = XCP_OK;
     for (uint32_t k = first; k <= last; k++) {
-        if (xcp->arrived[k] == WHOLE && !in_range(&config->limits[k], waiting_value(xcp, k))) {
+        if (xcp->arrived[k] == WHOLE && !value_range_holds(&config->limits[k], waiting_value(xcp, k))) {
             result = XCP_ERR_OUT_OF_RANGE;
         }
     }

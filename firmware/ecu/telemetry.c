@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/telemetry.h"
 
+#include "drive/drive_si.h"
 #include "drive/mrai/mrai_seam.h"
 #include "hal/temperature.h"
 #include "types/si.h"
 
 #define FNV_START 2166136261U
 #define FNV_PRIME 16777619U
-#define RPM_PER_RAD_S 9.5492966F
 #define V_DC_MIN_V 1.0F
 
 static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t *t)
@@ -22,8 +22,7 @@ static void read_point(const drive_t *drive, const sample_t *sample, telemetry_t
     t->iq_ref_A = si_from_q15(wanted.q, b->current_A);
     t->v_dc_V = si_from_q15(sample->v_dc, b->voltage_V);
     t->i_dc_A = (t->v_dc_V > V_DC_MIN_V) ? 1.5F * (u_d * t->id_A + u_q * t->iq_A) / t->v_dc_V : 0.0F;
-    t->speed_rpm = si_from_q31(sample->point.omega, b->omega_rad_s) / (float)drive->motor->angle_tracker.pole_pairs *
-                   RPM_PER_RAD_S;
+    t->speed_rpm = drive_speed_rpm(drive, sample->point.omega);
 }
 
 static void read_torque(const drive_t *drive, telemetry_t *t)
@@ -36,11 +35,8 @@ static void read_torque(const drive_t *drive, telemetry_t *t)
 
 static void read_identification(const drive_t *drive, telemetry_t *t)
 {
-    const motor_t *m = drive->motor;
-    const float psi_Vs = m->psi_f_Vs + si_from_q31(drive->task.identification.psi_delta, m->bases.flux_Vs);
-    const float r_ohm = m->r_ohm_20 + si_from_q31(drive->task.identification.r_delta, m->bases.resistance_ohm);
-    t->psi_f_mVs = 1000.0F * psi_Vs;
-    t->r_mohm = 1000.0F * r_ohm;
+    t->psi_f_mVs = 1000.0F * drive_psi_f_Vs(drive);
+    t->r_mohm = 1000.0F * drive_r_ohm(drive);
     t->table_scale_percent = 100.0F + si_from_q31(drive->task.identification.lq_error, 100.0F);
     t->psi_quality_percent = si_from_q15(drive->task.identification.psi_quality, 100.0F);
     t->r_quality_percent = si_from_q15(drive->task.identification.r_quality, 100.0F);

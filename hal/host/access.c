@@ -67,9 +67,8 @@ bool parameters_writable(int handle)
 parameters_range_t parameters_range(const fluxtrue_t *drive, int handle)
 {
     if (is_calibration(handle)) {
-        const calibration_info_t *info = &calibration_info[calibration_of(handle)];
-        return (parameters_range_t){(double)info->lo, (double)info->hi,
-                                    (double)calibration_least(&drive->drive, calibration_of(handle))};
+        const value_range_t range = calibration_range(&drive->drive, calibration_of(handle));
+        return (parameters_range_t){(double)range.lo, (double)range.hi, (double)range.least};
     }
     const parameter_t *p = &parameters[handle];
     const double hi = is_number(p->hi) ? p->hi : bound_of(p);

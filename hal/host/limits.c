@@ -32,45 +32,21 @@ void limits_set_inverter(fluxtrue_t *drive, double value)
     drive->board.inverter_C = value;
 }
 
-double limits_get_torque_drive(const fluxtrue_t *drive)
-{
-    return drive->drive.request.limits.torque_drive / 32768.0 * torque_base(drive);
-}
+/* A limit of the request, by its name there. */
+#define LIMIT(name, base) \
+    double limits_get_##name(const fluxtrue_t *drive) \
+    { \
+        return drive->drive.request.limits.name / 32768.0 * base(drive); \
+    } \
+    void limits_set_##name(fluxtrue_t *drive, double value) \
+    { \
+        drive->drive.request.limits.name = to_limit(value, base(drive)); \
+    }
 
-void limits_set_torque_drive(fluxtrue_t *drive, double value)
-{
-    drive->drive.request.limits.torque_drive = to_limit(value, torque_base(drive));
-}
-
-double limits_get_torque_regen(const fluxtrue_t *drive)
-{
-    return drive->drive.request.limits.torque_regen / 32768.0 * torque_base(drive);
-}
-
-void limits_set_torque_regen(fluxtrue_t *drive, double value)
-{
-    drive->drive.request.limits.torque_regen = to_limit(value, torque_base(drive));
-}
-
-double limits_get_power_drive(const fluxtrue_t *drive)
-{
-    return drive->drive.request.limits.power_drive / 32768.0 * power_base(drive);
-}
-
-void limits_set_power_drive(fluxtrue_t *drive, double value)
-{
-    drive->drive.request.limits.power_drive = to_limit(value, power_base(drive));
-}
-
-double limits_get_power_regen(const fluxtrue_t *drive)
-{
-    return drive->drive.request.limits.power_regen / 32768.0 * power_base(drive);
-}
-
-void limits_set_power_regen(fluxtrue_t *drive, double value)
-{
-    drive->drive.request.limits.power_regen = to_limit(value, power_base(drive));
-}
+LIMIT(torque_drive, torque_base)
+LIMIT(torque_regen, torque_base)
+LIMIT(power_drive, power_base)
+LIMIT(power_regen, power_base)
 
 double limits_get_machine_monitors(const fluxtrue_t *drive)
 {

@@ -11,7 +11,7 @@
 static uint8_t readable[12];
 static float working[3];
 static const float reference[3];
-static const xcp_limits_t limits[3] = {{0.0F, 1.0F}, {-1.0F, 1.0F}, {2.0F, 3.0F}};
+static const value_range_t limits[3] = {{0.0F, 1.0F}, {-1.0F, 1.0F}, {2.0F, 3.0F}};
 static const xcp_area_t area[1] = {{readable, sizeof readable}};
 static const xcp_config_t config = {
     .memory = {area, 1}, .working = working, .reference = reference, .limits = limits, .parameters = 3};

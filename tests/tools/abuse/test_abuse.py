@@ -215,6 +215,18 @@ def abuse(files: dict[str, str | bytes], arguments: list[str], outputs: list[str
 LINES = st.integers(0, 10**6)
 
 
+def at_key(draw: Callable[..., Any], lines: list[str]) -> int:
+    """A line of the form key = value."""
+    keys = [k for k, line in enumerate(lines) if " = " in line]
+    return keys[draw(LINES) % len(keys)]
+
+
+def with_other_bytes(draw: Callable[..., Any], text: str) -> bytes:
+    data, place = bytearray(text.encode()), draw(LINES) % len(text)
+    data[place : place + draw(st.integers(0, 4))] = draw(st.binary(max_size=6))
+    return bytes(data)
+
+
 @st.composite
 def mutated(draw: Callable[..., Any], good: str) -> tuple[str | bytes, bool]:
     """The text of a file with one mutation, and whether the file must be refused because of it."""
@@ -222,17 +234,13 @@ def mutated(draw: Callable[..., Any], good: str) -> tuple[str | bytes, bool]:
     kind = draw(st.sampled_from(["value", "value", "value", "unknown", "twice", "drop", "cut", "bytes", "swap"]))
     at = draw(LINES) % len(lines)
     if kind == "value":
-        keys = [k for k, line in enumerate(lines) if " = " in line]
-        at = keys[draw(LINES) % len(keys)]
+        at = at_key(draw, lines)
         lines[at] = lines[at].split(" = ")[0] + " = " + draw(st.sampled_from(ODD_VALUES))
     elif kind == "unknown":
         lines.insert(at, f"{draw(st.text('abcdefgh_', min_size=3, max_size=9))}x = 1")
-        return "\n".join(lines) + "\n", True
     elif kind == "twice":
-        keys = [k for k, line in enumerate(lines) if " = " in line]
-        at = keys[draw(LINES) % len(keys)]
+        at = at_key(draw, lines)
         lines.insert(at, lines[at])
-        return "\n".join(lines) + "\n", True
     elif kind == "drop":
         del lines[at]
     elif kind == "swap":
@@ -241,36 +249,36 @@ def mutated(draw: Callable[..., Any], good: str) -> tuple[str | bytes, bool]:
     text = "\n".join(lines) + "\n"
     if kind == "cut":
         return text[: draw(LINES) % len(text)], False
-    if kind == "bytes":
-        data, place = bytearray(text.encode()), draw(LINES) % len(text)
-        data[place : place + draw(st.integers(0, 4))] = draw(st.binary(max_size=6))
-        return bytes(data), False
-    return text, False
+    return with_other_bytes(draw, text) if kind == "bytes" else text, kind in ("unknown", "twice")
 
 
-@st.composite
-def mutated_table(draw: Callable[..., Any], good: str) -> str | bytes:
-    """A table of text and numbers with one mutation."""
-    rows = [line.split(",") for line in good.splitlines()]
-    kind = draw(st.sampled_from(["cell", "cell", "cell", "drop", "twice", "column", "cut", "bytes"]))
+def with_other_cells(
+    draw: Callable[..., Any], rows: list[list[str]], kind: str, cells: tuple[str, ...]
+) -> list[list[str]]:
+    """One cell has another value, one row is missing or there twice, or one column is missing."""
     row = draw(LINES) % len(rows)
     column = draw(LINES) % len(rows[row])
     if kind == "cell":
-        rows[row][column] = draw(st.sampled_from((*ODD_CELLS, '"', "=", "a=x", "b=^1@5..2", "rpm", "bus.lost=1@")))
+        rows[row][column] = draw(st.sampled_from(cells))
     elif kind == "drop":
         del rows[row]
     elif kind == "twice":
         rows.insert(row, rows[row])
     elif kind == "column":
-        rows = [cells[:column] + cells[column + 1 :] for cells in rows]
-    text = "\n".join(",".join(cells) for cells in rows) + "\n"
+        return [line[:column] + line[column + 1 :] for line in rows]
+    return rows
+
+
+@st.composite
+def mutated_table(draw: Callable[..., Any], good: str) -> str | bytes:
+    """A table of text and numbers with one mutation."""
+    kind = draw(st.sampled_from(["cell", "cell", "cell", "drop", "twice", "column", "cut", "bytes"]))
+    cells = (*ODD_CELLS, '"', "=", "a=x", "b=^1@5..2", "rpm", "bus.lost=1@")
+    rows = with_other_cells(draw, [line.split(",") for line in good.splitlines()], kind, cells)
+    text = "\n".join(",".join(row) for row in rows) + "\n"
     if kind == "cut":
         return text[: draw(LINES) % len(text)]
-    data, place = bytearray(text.encode()), draw(LINES) % len(text)
-    if kind == "bytes":
-        data[place : place + draw(st.integers(0, 4))] = draw(st.binary(max_size=6))
-        return bytes(data)
-    return text
+    return with_other_bytes(draw, text) if kind == "bytes" else text
 
 
 def arrays() -> dict[str, Any]:
@@ -302,28 +310,16 @@ def mat() -> bytes:
 @st.composite
 def mutated_map(draw: Callable[..., Any]) -> str | bytes:
     """A flux map with one mutation."""
-    rows = [line.split(",") for line in MAP.splitlines()]
     kinds = ["cell", "cell", "drop", "twice", "column", "separator", "scale", "sign", "offset", "bytes"]
     kind = draw(st.sampled_from(kinds))
-    row, column = draw(LINES) % len(rows), draw(LINES) % 4
-    if kind == "cell":
-        rows[row][column] = draw(st.sampled_from(ODD_CELLS))
-    elif kind == "drop":
-        del rows[row]
-    elif kind == "twice":
-        rows.insert(row, rows[row])
-    elif kind == "column":
-        rows = [cells[:column] + cells[column + 1 :] for cells in rows]
-    elif kind in ("scale", "sign", "offset"):
+    rows = with_other_cells(draw, [line.split(",") for line in MAP.splitlines()], kind, ODD_CELLS)
+    if kind in ("scale", "sign", "offset"):
+        column = draw(LINES) % 4
         number = draw(st.sampled_from((1e3, 1e-3, 1e6))) if kind == "scale" else -1.0 if kind == "sign" else 0.0
         for cells in rows[1:]:
             cells[column] = repr(float(cells[column]) + 0.5 if kind == "offset" else number * float(cells[column]))
     text = "\n".join((draw(st.sampled_from(";\t |")) if kind == "separator" else ",").join(r) for r in rows) + "\n"
-    if kind == "bytes":
-        data, place = bytearray(text.encode()), draw(LINES) % len(text)
-        data[place : place + draw(st.integers(0, 4))] = draw(st.binary(max_size=6))
-        return bytes(data)
-    return text
+    return with_other_bytes(draw, text) if kind == "bytes" else text
 
 
 @ABUSED

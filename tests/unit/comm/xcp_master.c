@@ -12,7 +12,7 @@ can_frame_t last_answer;
 bool answered;
 
 static const float reference[PARAMETERS] = {1.0F, 2.0F, 3.0F};
-static const xcp_limits_t limits[PARAMETERS] = {{0.0F, 10.0F, 0.25F}, {2.0F, 4.0F, 0.0F}, {-1.0F, 5.0F, 0.0F}};
+static const value_range_t limits[PARAMETERS] = {{0.0F, 10.0F, 0.25F}, {2.0F, 4.0F, 0.0F}, {-1.0F, 5.0F, 0.0F}};
 static const xcp_area_t areas[1] = {{measured, sizeof measured}};
 
 static uint32_t key(uint32_t seed)

@@ -403,7 +403,7 @@ void test_the_smallest_value_of_a_calibration_is_one_step_of_its_format(void)
 {
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
         const calibration_id_t id = (calibration_id_t)k;
-        const float least = calibration_least(&ecu.drive, id);
+        const float least = calibration_range(&ecu.drive, id).least;
         TEST_ASSERT_EQUAL_FLOAT(least, ecu.xcp.limits[k].least);
         TEST_ASSERT_TRUE(least >= 0.0F && least < 0.05F * calibration_info[k].hi);
         if (least > 0.0F) {

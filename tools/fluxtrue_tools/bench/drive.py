@@ -73,7 +73,7 @@ class Host:
 def sources(folder: Path) -> list[Path]:
     """All of the firmware with the tables of hsm1, which are generated into the folder."""
     build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
-    layers = ("fx", "signal", "control", "safety", "drive")
+    layers = ("fx", "types", "signal", "control", "safety", "drive")
     firmware = [path for layer in layers for path in (FIRMWARE / layer).rglob("*.c")]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
 
