@@ -2,7 +2,8 @@
 #ifndef FX_CODEGEN_H
 #define FX_CODEGEN_H
 /** Makes the compiler choose cheaper instructions; no function here changes a value.
- *   Only what the bounds of the period need is kept. Each use saves these instructions per period (emulated Cortex-M4,
+ *   Only what the bounds of the period need is kept: without any one use the average of the fast ISR or of the tick,
+ *   or the tick's maximum, exceeds its bound. Each use saves these instructions per period (emulated Cortex-M4,
  *   gcc 12.2, hsm1; measured with tools/fluxtrue bench without that one use):
  *   use                                                   tick         fast ISR
  *   FX_LOAD_TWO       angle tracker, state and gains      2
@@ -13,19 +14,18 @@
  *   fx_in_register    current control, speed              2            4
  *                     modulation: level, half a duty      3 each       1, 2
  *                     modulation: limited pulses          up to 3      up to 2
- *                     magnitude of a q15                  (28 bytes of the library)
- *                     hal/s32k144/pwm.c                                5, with the timer's address
+ *                     hal/s32k144/pwm.c: rounding, rise                2, 3
+ *   fx_read_two       hal/s32k144/sampling.c                           3
  *   FX_ADDRESS_ONCE   slot of the sample                               18
+ *                     timer of hal/s32k144/pwm.c                       2
  *                     slot of the command                              2
  *                     point of the sine table             2            2 (1 kHz task: 11)
  *   FX_PADDING_WORD   sample and command                               9 to 11
- *   FX_SHORT_LOADS_BEFORE  state of the identification    (22 bytes of the library)
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words
  * Rounding none
- * Errors   FX_LOAD_TWO, FX_SHORT_LOADS_BEFORE and FX_POWER_OF_TWO_SIZE do not compile where their assumption does not
- *          hold
+ * Errors   FX_LOAD_TWO and FX_POWER_OF_TWO_SIZE do not compile where their assumption does not hold
  * Context  any */
 
 #include <stddef.h>
@@ -97,10 +97,6 @@ static inline fx_two_words_t fx_read_two(const volatile uint32_t *from)
                                            offsetof(__typeof__(*(pointer)), a) + sizeof(int32_t) && \
                                        sizeof (pointer)->a == sizeof(int32_t) && \
                                        sizeof (pointer)->b == sizeof(int32_t)))
-
-/* The words before this field are in reach of 16-bit load instructions: at most 124 bytes from the address. */
-#define FX_SHORT_LOADS_BEFORE(type, field) \
-    _Static_assert(offsetof(type, field) <= 128U, #field " leaves earlier words beyond a 16-bit load")
 
 /* An unused word. With it a structure has a size that is a power of two, and the address of a slot is a shift. */
 #define FX_PADDING_WORD uint32_t fx_padding

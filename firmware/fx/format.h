@@ -14,7 +14,6 @@
 #include <stdint.h>
 
 #include "fx/arch.h"
-#include "fx/codegen.h"
 
 typedef int16_t q15_t;
 typedef int32_t q31_t;
@@ -90,8 +89,7 @@ static inline q15_t fx_neg_q15(q15_t a)
 
 static inline q15_t fx_abs_q15(q15_t a)
 {
-    const int32_t x = fx_in_register(a); /* otherwise the magnitude is computed in 16 bits and then extended */
-    return fx_sat_q15((x < 0) ? -x : x);
+    return fx_sat_q15((a < 0) ? -(int32_t)a : a);
 }
 
 /* Modulo 2^32, without undefined behaviour. */

@@ -17,7 +17,6 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "fx/codegen.h"
 #include "fx/q.h"
 
 typedef struct {
@@ -141,9 +140,8 @@ static inline fx_cell_t fx_mesh_cell(const fx_mesh_t *mesh, int32_t x, uint32_t 
 {
     uint32_t px = (uint32_t)(x - mesh->x0) << mesh->up;
     uint32_t py = y << mesh->up;
-    const fx_two_words_t last = FX_LOAD_TWO(mesh, x_last, y_last);
-    const uint32_t x_last = (uint32_t)last.first;
-    const uint32_t y_last = (uint32_t)last.second;
+    const uint32_t x_last = mesh->x_last;
+    const uint32_t y_last = mesh->y_last;
     if (__builtin_expect(px > x_last, 0)) { /* x below the grid gives a very large number */
         px = (x < mesh->x0) ? 0U : x_last;
     }

@@ -10,6 +10,7 @@
  * Errors   none
  * Context  any; 12 instructions as a call, no division, no loop */
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 typedef struct {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current/angle_tracker.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 #define COAST_ROUNDS 10

@@ -2,6 +2,7 @@
 #include "control/current/current_control.h"
 
 #include "fx/circle.h"
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/q.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current/modulate_phases.h"
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 /* Half a duty, and half an LSB to round it. */

@@ -11,6 +11,7 @@
  * Context  fast ISR; included by modulate.c and modulate_applied.c only */
 #include "control/current/modulate.h"
 #include "control/current/transform.h"
+#include "fx/codegen.h"
 #include "fx/q.h"
 
 #define DUTY_ONE 32768

@@ -46,8 +46,6 @@ typedef struct {
     kalman_t kalman; /* last, because it is large */
 } identify_state_t;
 
-FX_SHORT_LOADS_BEFORE(identify_state_t, kalman);
-
 typedef struct {
     const identify_point_t *point;
     const identify_tables_t *tables;

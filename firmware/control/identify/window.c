@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/identify/window.h"
 
+#include "fx/codegen.h"
+#include "fx/format.h"
+
 static void add(dq_q15_t *sum, dq_q15_t x)
 {
     const fx_two_words_t s = FX_LOAD_TWO(sum, d, q);

@@ -5,6 +5,7 @@
 
 #include <math.h>
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 #include "fx_vectors.h"
 #include "unity.h"

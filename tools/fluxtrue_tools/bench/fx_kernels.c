@@ -2,6 +2,7 @@
 /* Every function of firmware/fx behind a call, for counting instructions and for comparing the two
  * sides of fx/arch.h. bench_<name> has the function's own argument types, so that the count holds
  * no conversion; batch_<name> runs it over n rows of three integers. */
+#include "fx/codegen.h"
 #include "fx/div.h"
 #include "fx/lookup.h"
 #include "fx/q.h"
