@@ -14,7 +14,8 @@
 _Static_assert(offsetof(drive_t, parameters) == LIVE + sizeof(period_data_t), "one after the other");
 _Static_assert(offsetof(drive_t, data_check.parameters) == COMPLEMENTS + sizeof(period_data_t), "in the same order");
 #if FLUXTRUE_MRAI
-_Static_assert(offsetof(drive_t, mrai_parameters) == offsetof(drive_t, parameters) + sizeof(motor_parameters_t), "then");
+_Static_assert(offsetof(drive_t, mrai_parameters) == offsetof(drive_t, parameters) + sizeof(motor_parameters_t),
+               "then");
 _Static_assert(offsetof(drive_t, data_check.mrai_parameters) ==
                    offsetof(drive_t, data_check.parameters) + sizeof(motor_parameters_t),
                "in the same order");
@@ -107,8 +108,8 @@ static bool words_match(drive_t *drive)
     return differing_bits == UINT32_MAX;
 }
 
-/* The fast ISR notes the command with each window that it completes. If it runs and does not, its count of the periods
- * left is damaged: the identification would use the last window for ever, and nothing would check the task. */
+/* The fast ISR notes the command at the end of each step. If it runs and does not, the end of the step that it waits
+ * for is damaged: the identification would use the last window for ever, and nothing would check the task. */
 static bool windows_complete(drive_t *drive)
 {
     data_check_t *data_check = &drive->data_check;

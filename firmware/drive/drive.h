@@ -190,7 +190,7 @@ typedef struct {
 #if FLUXTRUE_MRAI
     uint32_t mrai_parameters[DATA_CHECK_MRAI_WORDS];
 #endif
-    uint32_t options;                                 /* of the request */
+    uint32_t options; /* of the request */
     const motor_t *motor;
     uintptr_t motor_complement;
     uint32_t at;      /* word to be compared next */

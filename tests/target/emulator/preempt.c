@@ -281,12 +281,13 @@ static int length_of(preempt_t *p, const emu_snapshot_t *start)
  * next period completes it, so that the first interrupt hands it over, wherever the task is interrupted. */
 static void complete_window_next(preempt_t *p)
 {
-    const uint32_t step_end = drive_there(p).samples.generation + 1U;
+    const uint32_t step_end = image_drive(p).samples.generation + 1U;
     const mirror_t *m = &p->e->mirror;
     for (int i = m->inputs; i < m->parts; i++) {
         if (m->part[i].host_offset == offsetof(drive_t, fast)) {
             const size_t inside = offsetof(drive_t, fast.step_end) - offsetof(drive_t, fast);
-            (void)emu_write(p->e->emu, m->base + m->part[i].image_offset + (uint32_t)inside, &step_end, sizeof step_end);
+            (void)emu_write(p->e->emu, m->base + m->part[i].image_offset + (uint32_t)inside, &step_end,
+                            sizeof step_end);
         }
     }
 }

@@ -123,7 +123,7 @@ void test_the_pointer_to_the_motor_data_is_restored_by_the_majority(void)
 
 void test_a_window_that_never_ends_is_found(void)
 {
-    drive.fast.window.left |= 1U << 20;
+    drive.fast.step_end += 1U << 20;
     expect_fault_within(5);
 }
 
