@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "comm/can_rx.h"
+#include "drive/data_check.h"
 #include "ecu/arbitration.h"
 #include "ecu/ecu_private.h"
 
@@ -279,6 +280,7 @@ void planted_begin(int index, vehicle_t *vehicle)
     kept = vehicle->ecu.drive.request.torque_arbitrated;
     if (index >= 0 && planted_errors[index].damage != NULL) {
         planted_errors[index].damage(vehicle);
+        data_check_start(&vehicle->ecu.drive); /* an error of the software: nothing but the torque shows it */
     }
 }
 
