@@ -49,6 +49,23 @@ static void confirmed_after(int samples, uint32_t fault, monitor_in_t bad)
     }
 }
 
+/* Each limit alone; the current by its magnitude, the sum by its third, in steps of 2^-13 of its format. */
+void test_a_sample_is_normal_only_inside_every_limit(void)
+{
+    monitor_config_t c = config;
+    c.i_normal_squared_q30 = 10000 * 10000;
+    const fx_pair_t below = fx_pair(9999, 0);
+    const fx_pair_t beyond = fx_pair(0, -10000);
+    const int32_t sum = (c.zero_max - 1) * 8192;
+    TEST_ASSERT_TRUE(monitor_is_sample_normal(&c, below, sum, c.v_min));
+    TEST_ASSERT_TRUE(monitor_is_sample_normal(&c, below, -sum, c.v_max));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, beyond, 0, c.v_min));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, c.zero_max * 8192, c.v_min));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, -(c.zero_max + 1) * 8192, c.v_min));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, 0, c.v_min - 1));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, 0, c.v_max + 1));
+}
+
 void test_good_samples_raise_nothing(void)
 {
     in.i = (abc_q15_t){25000, -12500, -12500};
