@@ -63,6 +63,13 @@ void drive_set_dead_time(motor_parameters_t *p, q15_t dead_time)
     p->modulate.dead_time_q16 = 2 * dead_time;
 }
 
+static void change_dead_time(drive_t *drive, q15_t dead_time)
+{
+    const motor_parameters_t before = drive->parameters;
+    drive_set_dead_time(&drive->parameters, dead_time);
+    data_check_accept(drive, &before);
+}
+
 bool drive_compensate(drive_t *drive, const compensation_t *compensation)
 {
     motor_parameters_t *p = &drive->parameters;
@@ -97,19 +104,15 @@ void drive_trim(drive_t *drive, q15_t v_dc)
     };
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {
-        const motor_parameters_t before = drive->parameters;
-        drive_set_dead_time(&drive->parameters, out.dead_time);
-        data_check_accept(drive, &before);
+        change_dead_time(drive, out.dead_time);
         identify_set(&task->identify, IDENTIFY_DROP, fx_add_q31(kalman->x_q27[IDENTIFY_DROP], out.x_shift_q27));
     }
 }
 
 void drive_restore_trim(drive_t *drive, int32_t trim)
 {
-    motor_parameters_t *p = &drive->parameters;
-    const motor_parameters_t before = *p;
-    drive_set_dead_time(p, dead_time_trim_restore(&drive->task.trim, (q15_t)(p->modulate.dead_time_q16 / 2), trim));
-    data_check_accept(drive, &before);
+    const q15_t present = (q15_t)(drive->parameters.modulate.dead_time_q16 / 2);
+    change_dead_time(drive, dead_time_trim_restore(&drive->task.trim, present, trim));
 }
 
 static void start_if_running(drive_t *drive, const commission_config_t *config)

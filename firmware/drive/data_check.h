@@ -3,8 +3,8 @@
 #define DRIVE_DATA_CHECK_H
 /** Finds what the memory has changed by itself in the data that nothing, or only few functions, may write.
  *   drive->motor           three copies, one of them complemented; the majority is restored before each step
- *   period, parameters     each word has its complement; a few words are compared in each step, all of them within
- *                          DATA_CHECK_ROUND_MAX steps
+ *   period, parameters,    each word has its complement; a few words are compared in each step, all of them within
+ *   mrai_parameters        DATA_CHECK_ROUND_MAX steps
  *   state kept for long    seals of the identification and of the angle correction
  *   options of the request one word, for an owner that alone writes them: the ECU
  *   window                 the fast ISR must complete windows while it runs

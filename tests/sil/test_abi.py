@@ -4,10 +4,10 @@
 import ctypes
 import math
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
-from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Drive, load, names
+from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Drive, names
 
 from fluxtrue_tools.sim.members import members
 
@@ -18,24 +18,6 @@ READABLE = (
     "ud_V", "uq_V", "speed_rpm", "psi_quality", "r_quality", "fault_word",
 )  # fmt: skip
 INPUTS = ("ia_A", "ib_A", "ic_A", "vdc_V", "theta_m_rad", "t_winding_C")
-
-
-@pytest.fixture(scope="module")
-def library() -> ctypes.CDLL:
-    return load("hsm1")
-
-
-@pytest.fixture
-def make(library: ctypes.CDLL) -> Iterator[Callable[[], Drive]]:
-    drives: list[Drive] = []
-
-    def new() -> Drive:
-        drives.append(Drive(library))
-        return drives[-1]
-
-    yield new
-    for drive in drives:
-        drive.close()
 
 
 def running(drive: Drive) -> Drive:

@@ -3,31 +3,13 @@
 
 import ctypes
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
-from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Batch, Drive, load, names, pointer
+from sil import OK, OUT_OF_RANGE, READ_ONLY, UNKNOWN_NAME, Batch, Drive, names, pointer
 
 PERIODS = 600
-
-
-@pytest.fixture(scope="module")
-def library() -> ctypes.CDLL:
-    return load("hsm1")
-
-
-@pytest.fixture
-def make(library: ctypes.CDLL) -> Iterator[Callable[[], Drive]]:
-    drives: list[Drive] = []
-
-    def new() -> Drive:
-        drives.append(Drive(library))
-        return drives[-1]
-
-    yield new
-    for drive in drives:
-        drive.close()
 
 
 def recorded() -> np.ndarray:

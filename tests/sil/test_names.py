@@ -31,11 +31,6 @@ UNITS = {"_Nm": "Nm", "_A": "A", "_V": "V", "_W": "W", "_C": "degC", "_Vs": "Vs"
          "_rad": "rad", "_rad_s": "rad/s", "_Nm_per_s": "Nm/s"}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def library() -> ctypes.CDLL:
-    return load("hsm1")
-
-
 @pytest.fixture
 def drive(library: ctypes.CDLL) -> Iterator[Drive]:
     made = Drive(library)

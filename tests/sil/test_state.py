@@ -6,7 +6,7 @@ import ctypes
 import hashlib
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -33,19 +33,6 @@ AFTER = 1500
 @pytest.fixture(scope="module")
 def library() -> ctypes.CDLL:
     return load("paper")
-
-
-@pytest.fixture
-def make(library: ctypes.CDLL) -> Iterator[Callable[[], Drive]]:
-    drives: list[Drive] = []
-
-    def new() -> Drive:
-        drives.append(Drive(library))
-        return drives[-1]
-
-    yield new
-    for drive in drives:
-        drive.close()
 
 
 def closed_loop(drive: Drive, plant: Plant, periods: int) -> np.ndarray:

@@ -12,7 +12,6 @@ from fluxtrue_tools.motor.flux_model import Array, FluxModel
 from fluxtrue_tools.motor.map_import.coenergy import Points
 from fluxtrue_tools.motor.map_import.frame import POINTS_MIN
 
-NODES, NODES_MIN, NODES_MAX = 31, 8, 200
 KEPT_BEYOND = 1.15  # of i_max, or the first point beyond i_max: points further out do not describe the circle
 KEPT_ABOVE = 0.3  # of i_max, on the magnetising side
 OUTSIDE_MAX = 0.5  # of the current circle without points

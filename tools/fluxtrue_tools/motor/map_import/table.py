@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
-from fluxtrue_tools.motor.map_import.source import PLACES, Raw, known_as, mapping, place_of
+from fluxtrue_tools.motor.map_import.source import FLUXES, PLACES, QUANTITIES, Raw, known_as, mapping, place_of
 from fluxtrue_tools.motor.text_table import ROWS_MAX, cells, number, numbered_lines
 
 SEPARATORS = (";", "\t", ",")
@@ -108,6 +108,4 @@ def read(
 
 def read_map(path: Path, given: tuple[str, ...]) -> Raw:
     """A flux map as a list of points."""
-    from fluxtrue_tools.motor.map_import.source import FLUXES, QUANTITIES
-
     return Raw(path, read(path, given, QUANTITIES, FLUXES))
