@@ -30,7 +30,7 @@ def driving(parts: Parts) -> Iterator[tuple[Loop, Core]]:
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:
         loop.set("enable", 1)
-        loop.set("torque_command_Nm", 80.0)
+        loop.set("torque_requested_Nm", 80.0)
         loop.run(500)
         assert loop.get("fault_word") == 0
         assert loop.get("truth.torque_Nm") > 50

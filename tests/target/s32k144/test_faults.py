@@ -72,6 +72,8 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
         PlantedError("clock.c", "LMEM->LMEM_PCCCR = LMEM_PCCCR_ENCACHE;", "LMEM->LMEM_PCCCR = 0;"),
     ),
 }
+# The line at rest keeps every output off, so that the drive makes no torque in the first place.
+NO_TORQUE = "inverted polarity of the fault input"
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +92,10 @@ def test_the_image_passes_each_check(parts: Parts, check: Callable[[Parts], None
 def test_a_planted_error_is_found(parts: Parts, name: str, tmp_path: Path) -> None:
     check, error = PLANTED_ERRORS[name]
     planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
-    with pytest.raises((AssertionError, EmulationStoppedError)):
+    with pytest.raises((AssertionError, EmulationStoppedError)) as found:
         check(planted)
+    places = [entry.name for entry in found.traceback if entry.path == Path(checks.__file__)]
+    assert places[-1] == (check.__name__ if name != NO_TORQUE else checks.driving.__name__)
 
 
 def test_each_check_has_a_planted_error() -> None:
