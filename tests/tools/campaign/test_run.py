@@ -92,35 +92,41 @@ def _cases(folder: Path, out: str) -> list[Path]:
     return sorted(folder.glob(f"{out}/cases/case-*.parquet"))
 
 
-def _kill_after_first_case(folder: Path, campaign_file: str, out: str) -> None:
+def _end_after_first_case(folder: Path, campaign_file: str, out: str, number: signal.Signals) -> int:
+    """The exit code of a campaign with all its workers, which are sent a signal."""
     process = subprocess.Popen(
         command(campaign_file, "--out", out, "--workers", 1), cwd=folder, env=environment(), start_new_session=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     polled(lambda: process.poll() is not None or bool(_cases(folder, out)))
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    os.killpg(process.pid, number)
+    return process.wait()
 
 
-def test_a_killed_campaign_goes_on_where_it_was(folder: Path, whole: pd.DataFrame) -> None:
-    """The killed run has far more cases than can finish before the kill; the second run ends two cases after the last.
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_campaign_that_was_ended_goes_on_where_it_was(
+    folder: Path, whole: pd.DataFrame, number: signal.Signals
+) -> None:
+    """The ended run has far more cases than can finish before the signal; the second run ends two cases after the last.
 
     Cases that finish at the same time are stored in any order, so the finished ones need not be the first ones.
     """
     (folder / "many.toml").write_text(SMALL.replace("cases = 4", "cases = 100000"))
-    _kill_after_first_case(folder, "many.toml", "killed")
-    done = {path: path.stat().st_mtime_ns for path in _cases(folder, "killed")}
+    out = number.name
+    code = _end_after_first_case(folder, "many.toml", out, number)
+    assert code == {signal.SIGKILL: -9, signal.SIGTERM: 143, signal.SIGINT: 130}[number]
+    done = {path: path.stat().st_mtime_ns for path in _cases(folder, out)}
     assert done
-    assert not (folder / "killed" / "results.parquet").exists()
+    assert not (folder / out / "results.parquet").exists()
     wanted = max(int(path.stem.removeprefix("case-")) for path in done) + 3
-    (folder / "killed" / "cases" / f"{PREFIX}case-{wanted - 1:05d}.x.parquet").write_bytes(b"half a file")
-    result = campaign("many.toml", "--out", "killed", "--cases", wanted, cwd=folder)
+    (folder / out / "cases" / f"{PREFIX}case-{wanted - 1:05d}.x.parquet").write_bytes(b"half a file")
+    result = campaign("many.toml", "--out", out, "--cases", wanted, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert {path: path.stat().st_mtime_ns for path in done} == done
-    names = sorted(path.name for path in (folder / "killed" / "cases").iterdir())
+    names = sorted(path.name for path in (folder / out / "cases").iterdir())
     assert names == [f"case-{k:05d}.parquet" for k in range(wanted)]
     # A case depends on the seed and its own number, not on how many there are.
-    again = results(folder, "killed")
+    again = results(folder, out)
     both = min(wanted, 4)
     pd.testing.assert_frame_equal(again[again["case"] < both], whole[whole["case"] < both], check_exact=True)
 

@@ -20,11 +20,14 @@ SCHEDULER_S = 60  # long enough for a busy scheduler
 
 
 def _worker() -> None:
-    """Workers ignore Ctrl-C, which the parent handles, and end when the parent is killed."""
+    """The parent alone handles the signals of a process group: it waits for the cases that run, or it is killed.
+
+    A pool whose workers have ended by themselves cannot always be shut down.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[int, Any]]:
