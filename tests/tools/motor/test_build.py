@@ -14,6 +14,7 @@ from fluxtrue_tools.cli import run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.build import build
 from fluxtrue_tools.motor.flux_tables import lookup_flux
+from fluxtrue_tools.motor.names import PLOTS
 from fluxtrue_tools.motor.references import lookup_references
 
 STRICT = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Werror"]
@@ -95,10 +96,10 @@ def test_a_file_in_place_of_the_output_folder_is_said(write, tmp_path):
 def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(write, tmp_path):
     out = tmp_path / "out"
     build(write(), out, report=True)
-    plots = {"plot_flux.png", "plot_inductances.png", "plot_loci.png", "plot_envelope.png", "plot_error.png"}
-    assert names(out) == PLAIN | plots | {"report.html"}
+    assert len(PLOTS) == 7
+    assert names(out) == PLAIN | {*PLOTS} | {"report.html"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    for plot in plots:
+    for plot in PLOTS:
         assert f'src="{plot}"' in page
         assert (out / plot).read_bytes().startswith(b"\x89PNG")
     (out / "plot_of_the_user.png").write_bytes(b"")
@@ -138,7 +139,7 @@ def test_check_refuses_what_build_refuses_and_both_name_the_file(write, tmp_path
 def test_check_writes_plots_only_when_asked(cli, write, tmp_path):
     result = cli("check", write(), "--plots", tmp_path / "plots")
     assert result.returncode == 0
-    assert len(list((tmp_path / "plots").glob("*.png"))) == 5
+    assert {path.name for path in (tmp_path / "plots").iterdir()} == set(PLOTS)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", "arm-none-eabi-gcc"])

@@ -7,9 +7,14 @@ from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.motor import Motor
 
 
-def torque_envelope(motor: Motor, speed_rpm: Array) -> Array:
-    """T_max at each speed, from psi_avail = (v_ratio vdc - R i_max)/w, before torque_max_Nm cuts it."""
+def available_flux(motor: Motor, speed_rpm: Array) -> Array:
+    """psi_avail = (v_ratio vdc - R i_max)/w, V·s."""
     machine = motor.config.machine
     omega = np.maximum(speed_rpm * machine.pole_pairs * 2 * np.pi / 60, 1e-6)
     volts = motor.derived.ref_v_ratio * motor.config.inverter.vdc_V - machine.r_ohm * machine.i_max_A
-    return motor.limits.torque_max(np.minimum(volts / omega, 10.0 * motor.bases.flux_Vs))
+    return np.minimum(volts / omega, 10.0 * motor.bases.flux_Vs)
+
+
+def torque_envelope(motor: Motor, speed_rpm: Array) -> Array:
+    """T_max at each speed, before torque_max_Nm cuts it."""
+    return motor.limits.torque_max(available_flux(motor, speed_rpm))

@@ -6,7 +6,9 @@ from pathlib import Path
 
 FILE_NAME = "motor.toml"
 HTML = "report.html"
-PLOTS = tuple(f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci"))
+PLOTS = tuple(
+    f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit")
+)
 BUILT = ("motor_tables.c", "motor_si.c", "motor.json", "report.txt", HTML, *PLOTS)
 
 

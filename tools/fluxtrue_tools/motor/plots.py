@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report's figures."""
+"""The report's figures, and those of them that lie over the current plane."""
 
 from collections.abc import Callable
 
@@ -11,12 +11,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fluxtrue_tools.motor.envelope import torque_envelope
 from fluxtrue_tools.motor.flux_model import Array, flux, torque
 from fluxtrue_tools.motor.flux_tables import error_plane
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE
 from fluxtrue_tools.motor.references import lookup_references
+from fluxtrue_tools.motor.speed_plots import envelope_figure, losses_figure, short_circuit_figure
 
 POINTS = 121
 
@@ -113,10 +113,28 @@ def loci_figure(motor: Motor) -> Figure:
     axes.plot([c.id_A[0] for c in contours], [c.iq_A[0] for c in contours], "tab:green", lw=2.5, label="MTPA")
     axes.plot(*_mtpv(motor), "tab:red", lw=2.5, label="MTPV")
     _stored_loci(axes, motor)
-    axes.set(xlabel="i_d, A", ylabel="i_q, A", xlim=(-1.02 * i_max, 0.03 * i_max), ylim=(0, 1.02 * i_max))
+    _demagnetisation(axes, motor)
+    axes.set(
+        title=f"Current references of {motor.config.machine.name}",
+        xlabel="i_d, A",
+        ylabel="i_q, A",
+        xlim=(-1.02 * i_max, 0.03 * i_max),
+        ylim=(0, 1.02 * i_max),
+    )
     axes.set_aspect("equal")
     axes.legend(loc="upper left", fontsize=8)
     return figure
+
+
+def _demagnetisation(axes: Axes, motor: Motor) -> None:
+    """The limit of the magnets at the ends of the temperatures, where it lies inside the figure."""
+    magnet, i_max = motor.config.magnet, motor.config.machine.i_max_A
+    if magnet.i_d_demag_A is None:
+        return
+    for celsius, style in ((20.0, "--"), (magnet.assumed_C, "-")):
+        limit = magnet.i_d_demag_A - magnet.i_d_demag_A_per_K * (celsius - 20.0)
+        if limit < 1.02 * i_max:
+            axes.axvline(-limit, color="tab:purple", ls=style, label=f"magnets at {celsius:g} °C")
 
 
 def _stored_loci(axes: Axes, motor: Motor) -> None:
@@ -128,26 +146,6 @@ def _stored_loci(axes: Axes, motor: Motor) -> None:
         level = np.full_like(counts, round(psi / b.flux_Vs * Q15_ONE))
         i_d, i_q = (x / Q15_ONE * b.current_A for x in lookup_references(refs, counts, level))
         axes.plot(i_d, i_q, "--", color="tab:orange", lw=1, label="stored references" if k == 0 else None)
-
-
-def envelope_figure(motor: Motor) -> Figure:
-    """Torque and power over speed."""
-    machine = motor.config.machine
-    figure, axes = plt.subplots(figsize=(9, 4.5), layout="constrained")
-    speed = np.linspace(0, machine.speed_max_rpm, 300)
-    possible = torque_envelope(motor, speed)
-    limited = np.minimum(possible, machine.torque_max_Nm)
-    axes.plot(speed, possible, "tab:gray", ls=":", label="current and voltage")
-    axes.plot(speed, limited, "tab:green", lw=2, label="with torque_max_Nm")
-    axes.set(xlabel="speed, rpm", ylabel="torque, N·m", ylim=(0, None), xlim=(0, machine.speed_max_rpm))
-    power = axes.twinx()
-    power.plot(speed, limited * speed * 2 * np.pi / 60 / 1e3, "tab:blue", lw=1, label="shaft power, kW (no losses)")
-    power.set(ylabel="kW", ylim=(0, None))
-    axes.set_title(
-        f"{motor.config.inverter.vdc_V:g} V, of which the references plan {motor.derived.ref_v_ratio:.3f} as phase peak"
-    )
-    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
-    return figure
 
 
 def error_figure(motor: Motor) -> Figure:
@@ -168,5 +166,7 @@ FIGURES: dict[str, tuple[str, Callable[[Motor], Figure]]] = {
     "plot_inductances.png": ("Inductances", inductance_figure),
     "plot_loci.png": ("Current references: MTPA, field weakening, MTPV", loci_figure),
     "plot_envelope.png": ("Torque-speed envelope", envelope_figure),
+    "plot_losses.png": ("Efficiency and losses", losses_figure),
+    "plot_short_circuit.png": ("Active short circuit", short_circuit_figure),
     "plot_error.png": ("Table error against the map", error_figure),
 }

@@ -3,8 +3,11 @@
 
 from dataclasses import asdict
 
+import numpy as np
+
 from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
 
 Lines = list[str]
 
@@ -94,6 +97,33 @@ def _references(motor: Motor) -> Lines:
     return lines
 
 
+def _short_circuit(motor: Motor) -> Lines:
+    found, machine = short_circuit(motor), motor.config.machine
+    most, used = int(np.argmin(found.torque_Nm)), used_from_rpm(motor)
+    harder = found.speed_rpm[found.torque_Nm < -machine.torque_max_Nm]
+    lines = [
+        f"active short circuit: {found.current_A[-1]:.4g} A at {machine.speed_max_rpm:g} rpm (steady state, "
+        "windings at 20 C)",
+        f"  brakes most        {-found.torque_Nm[most]:.4g} N·m at {found.speed_rpm[most]:.3g} rpm",
+    ]
+    if len(harder):
+        lines.append(
+            f"  note               brakes harder than torque_max_Nm between {harder[0]:.3g} and {harder[-1]:.3g} rpm: "
+            "there only disabled switching is safe"
+        )
+    if used < machine.speed_max_rpm:
+        lines.append(
+            f"  safe state         above {used:.0f} rpm, where it brakes with {-found.torque_at(used):.3g} N·m; "
+            "below, switching is disabled"
+        )
+    else:
+        lines.append(
+            "  safe state         only after an over-voltage: up to speed_max_rpm the back-EMF stays below "
+            f"{motor.derived.share_short:g} vdc_V"
+        )
+    return lines
+
+
 def _bases(motor: Motor) -> Lines:
     names = asdict(motor.bases)
     text = ", ".join(f"{name} {value:.6g}" for name, value in names.items())
@@ -113,6 +143,7 @@ def report_text(motor: Motor) -> str:
         _map(motor),
         _tables(motor),
         _references(motor),
+        _short_circuit(motor),
         _bases(motor),
         [
             f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "

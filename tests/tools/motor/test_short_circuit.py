@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Currents and torque of the shorted machine, and what the report says about them."""
+
+import math
+
+import numpy as np
+import pytest
+from conftest import GOOD, MOTORS
+
+from fluxtrue_tools.motor.motor import load_motor
+from fluxtrue_tools.motor.report import report_text
+from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
+
+
+def test_constant_inductances_give_the_closed_form(write):
+    machine = GOOD["machine"]
+    found = short_circuit(load_motor(write()))
+    w = found.speed_rpm * machine["pole_pairs"] * 2 * math.pi / 60
+    r, l_d, l_q, psi = (machine[key] for key in ("r_ohm", "ld_H", "lq_H", "psi_f_Vs"))
+    below = r**2 + w**2 * l_d * l_q
+    assert found.id_A == pytest.approx(-(w**2) * l_q * psi / below, abs=1e-6)
+    assert found.iq_A == pytest.approx(-w * r * psi / below, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hsm1", "paper"])
+def test_the_braking_power_is_what_the_windings_take(name):
+    motor = load_motor(MOTORS / name)
+    found = short_circuit(motor)
+    shaft = found.torque_Nm * found.speed_rpm * 2 * math.pi / 60
+    assert shaft == pytest.approx(-1.5 * motor.config.machine.r_ohm * found.current_A**2, rel=1e-6, abs=1e-6)
+
+
+def test_the_drive_shorts_the_phases_above_nine_tenths_of_the_dc_voltage():
+    motor = load_motor(MOTORS / "hsm1")
+    speed = used_from_rpm(motor)
+    emf = math.sqrt(3) * motor.derived.psi_f_Vs * speed * motor.config.machine.pole_pairs * 2 * math.pi / 60
+    assert emf == pytest.approx(0.9 * motor.config.inverter.vdc_V)
+
+
+def test_a_short_circuit_that_brakes_harder_than_the_drive_is_said_with_its_speeds(write):
+    # A weak drive for its machine: the current circle is small against the magnet.
+    motor = load_motor(write(machine={"i_max_A": 60.0, "torque_max_Nm": 28.0}))
+    found = short_circuit(motor)
+    harder = found.speed_rpm[found.torque_Nm < -28.0]
+    assert len(harder) > 10
+    assert f"between {harder[0]:.3g} and {harder[-1]:.3g} rpm" in report_text(motor)
+    assert "brakes harder" not in report_text(load_motor(write()))
+
+
+def test_a_machine_that_never_reaches_the_dc_voltage_is_not_shorted_at_speed(write):
+    motor = load_motor(write(machine={"speed_max_rpm": 3000.0}))
+    assert used_from_rpm(motor) > 3000.0
+    assert "only after an over-voltage" in report_text(motor)
+    assert np.all(np.diff(short_circuit(motor).speed_rpm) > 0)

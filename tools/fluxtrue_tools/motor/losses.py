@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Losses of machine and inverter over torque and speed, on the current references."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxtrue_tools.motor.envelope import available_flux
+from fluxtrue_tools.motor.flux_model import Array, flux
+from fluxtrue_tools.motor.motor import Motor
+
+SPEEDS, TORQUES = 100, 80
+SPEED_MIN_SHARE = 0.02  # of top speed: at standstill every efficiency is zero
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Power [torque][speed], W; NaN beyond the envelope. Windings at 20 °C."""
+
+    speed_rpm: Array
+    torque_Nm: Array
+    copper_W: Array
+    iron_W: Array
+    inverter_W: Array
+
+    @property
+    def total_W(self) -> Array:
+        """All of them."""
+        return self.copper_W + self.iron_W + self.inverter_W
+
+    @property
+    def efficiency(self) -> Array:
+        """Shaft power over dc power while driving."""
+        shaft = self.torque_Nm[:, None] * self.speed_rpm[None, :] * 2 * math.pi / 60
+        return shaft / (shaft + self.total_W)
+
+
+def losses(motor: Motor) -> Losses:
+    """Copper 3/2 R i^2; iron (k_h |w| + k_e w^2) |psi|^2 (PL-8); inverter: the device drop in three legs.
+
+    The mean of a sinusoidal phase current of peak i is 2/pi i. Switching losses are not known and not contained.
+    """
+    machine, drop_V = motor.config.machine, motor.config.inverter.device_drop_V
+    speed = np.linspace(SPEED_MIN_SHARE * machine.speed_max_rpm, machine.speed_max_rpm, SPEEDS)
+    torque = np.linspace(machine.torque_max_Nm / TORQUES, machine.torque_max_Nm * (1 - 1e-6), TORQUES)
+    omega = speed * machine.pole_pairs * 2 * math.pi / 60
+    psi = available_flux(motor, speed)
+    i_d, i_q = np.array([contour.at(psi) for contour in motor.solver.contours(torque)]).transpose(1, 0, 2)
+    possible = torque[:, None] <= motor.limits.torque_max(psi)[None, :]
+    i = np.where(possible, np.hypot(i_d, i_q), np.nan)
+    iron = machine.iron_loss_hysteresis * omega + machine.iron_loss_eddy * omega**2
+    return Losses(
+        speed_rpm=speed,
+        torque_Nm=torque,
+        copper_W=1.5 * machine.r_ohm * i**2,
+        iron_W=np.where(possible, iron * flux(motor.model, i_d, i_q) ** 2, np.nan),
+        inverter_W=3.0 * drop_V * 2.0 / math.pi * i,
+    )

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report's figures over speed: envelope, losses, short circuit."""
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+
+from fluxtrue_tools.motor.envelope import torque_envelope
+from fluxtrue_tools.motor.losses import losses
+from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
+
+SPEED, TORQUE = "speed, rpm", "torque, N·m"
+
+
+def envelope_figure(motor: Motor) -> Figure:
+    """Torque and power over speed, driving above the axis and generating below."""
+    machine = motor.config.machine
+    figure, axes = plt.subplots(figsize=(9, 5.5), layout="constrained")
+    speed = np.linspace(0, machine.speed_max_rpm, 300)
+    possible = torque_envelope(motor, speed)
+    limited = np.minimum(possible, machine.torque_max_Nm)
+    power = axes.twinx()
+    for sign in (1.0, -1.0):
+        named = sign > 0
+        axes.plot(speed, sign * possible, "tab:gray", ls=":", label="current and voltage" if named else None)
+        axes.plot(speed, sign * limited, "tab:green", lw=2, label="with torque_max_Nm" if named else None)
+        shaft_kW = sign * limited * speed * 2 * np.pi / 60 / 1e3
+        power.plot(speed, shaft_kW, "tab:blue", lw=1, label="shaft power" if named else None)
+    axes.axhline(0.0, color="k", lw=0.6)
+    axes.set(xlabel=SPEED, ylabel=f"{TORQUE} (generating below 0)", xlim=(0, machine.speed_max_rpm))
+    power.set(ylabel="shaft power, kW")
+    for ax in (axes, power):
+        top = max(abs(y) for y in ax.get_ylim())
+        ax.set_ylim(-top, top)
+    axes.set_title(
+        f"Torque at {motor.config.inverter.vdc_V:g} V; the references plan {motor.derived.ref_v_ratio:.3f} of it as "
+        "phase peak\nThe limits of the battery, which the bus sends, are not drawn"
+    )
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8)
+    return figure
+
+
+def losses_figure(motor: Motor) -> Figure:
+    """Efficiency while driving, and the losses it follows from."""
+    found = losses(motor)
+    figure, axes = plt.subplots(1, 2, figsize=(13, 5), layout="constrained", sharey=True)
+    panels = (
+        (axes[0], 100 * found.efficiency, [50, 70, 80, 85, 88, 90, 92, 94, 95, 96, 97, 98, 99], "efficiency, %"),
+        (axes[1], found.total_W / 1e3, 10, "losses, kW"),
+    )
+    for ax, z, levels, title in panels:
+        shown = ax.contourf(found.speed_rpm, found.torque_Nm, z, levels=levels, cmap="viridis", extend="both")
+        figure.colorbar(shown, ax=ax)
+        envelope = np.minimum(torque_envelope(motor, found.speed_rpm), motor.config.machine.torque_max_Nm)
+        ax.plot(found.speed_rpm, envelope, "k", lw=1.5, label="envelope")
+        ax.set(title=title, xlabel=SPEED)
+        ax.legend(fontsize=8, loc="upper right")
+    axes[0].set_ylabel(TORQUE)
+    parts = {"iron": found.iron_W, "device drop of the inverter": found.inverter_W}
+    known = ["copper at 20 °C", *(name for name, power_W in parts.items() if np.nanmax(power_W) > 0.0)]
+    figure.suptitle(f"Computed from motor.toml: {', '.join(known)}; nothing else, no switching losses")
+    return figure
+
+
+def short_circuit_figure(motor: Motor) -> Figure:
+    """Braking torque and current of the shorted machine."""
+    machine, found = motor.config.machine, short_circuit(motor)
+    figure, (upper, lower) = plt.subplots(2, 1, figsize=(9, 6.5), layout="constrained", sharex=True)
+    upper.plot(found.speed_rpm, found.torque_Nm, "tab:red", label="short circuit")
+    upper.axhline(-machine.torque_max_Nm, color="tab:green", ls=":", label="-torque_max_Nm")
+    upper.set(ylabel=TORQUE, title="Active short circuit in the steady state, windings at 20 °C")
+    lower.plot(found.speed_rpm, found.current_A, "tab:red", label="short circuit")
+    lower.axhline(machine.i_max_A, color="tab:green", ls=":", label="i_max_A")
+    lower.axhline(motor.derived.i_trip_A, color="k", ls=":", label="over-current trip")
+    lower.set(xlabel=SPEED, ylabel="peak phase current, A", xlim=(0, machine.speed_max_rpm), ylim=(0, None))
+    used = used_from_rpm(motor)
+    for ax in (upper, lower):
+        if used < machine.speed_max_rpm:
+            ax.axvspan(used, machine.speed_max_rpm, color="tab:blue", alpha=0.12, label="safe state of a fault")
+        ax.legend(fontsize=8, loc="center right")
+    return figure
