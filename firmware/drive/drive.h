@@ -88,8 +88,9 @@ typedef struct {
     uint8_t motor_check;          /* motor_check_t: the first check of the motor data that failed */
     bool is_settled;              /* the bridge runs, no fault, no counter: the next period can take the usual route */
     short_circuit_t short_circuit;
-    uint32_t fault_resets;    /* of the command, as far as carried out */
-    volatile uint32_t faults; /* latched */
+    uint32_t fault_resets;                   /* of the command, as far as carried out */
+    volatile uint32_t faults;                /* latched */
+    turning_control_state_t turning_control; /* of a motor that needs it, in place of current_control */
 } fast_state_t;
 
 /** What the modulation adds against dead time and device drop, if it has been measured. */

@@ -10,6 +10,7 @@
  *   not settled  run_period_not_settled(): the bridge is disabled or has just been enabled, or a fault or a counter is
  *                pending
  *   checked      run_period_checked(): a sample is out of its limits; also the second part of the route above
+ * A motor whose field turns far in a period (current_control_turning.h) always takes the second one.
  * tests/unit/drive/test_fast_isr.c shows that the routes agree. */
 #include "control/current/transform.h"
 #include "drive/acquire.h"
@@ -25,6 +26,7 @@ typedef struct {
     fx_pair_t i_dq, advanced;
     int32_t v_dc;
     q31_t omega;
+    int32_t angle_step;
 } rotor_frame_t;
 
 /* Whether the fault that is latched needs the short circuit. */
@@ -43,6 +45,7 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
         short_circuit_end(&drive->fast);
     }
     current_control_reset(&drive->fast.current_control);
+    turning_control_reset(&drive->fast.turning_control);
     sample->point.u = (dq_q15_t){0, 0};
     sample->voltage_limited = false;
     sample->pulses_clamped = false;
@@ -75,19 +78,39 @@ static void count_since_enable(fast_state_t *fast, sample_t *sample)
     }
 }
 
-/* Current control -> modulation -> duties. The voltage that acts now is the one computed a period ago. */
-static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_target_t *target)
+static current_control_in_t control_inputs(const drive_t *drive, const sample_t *sample, const rotor_frame_t *now,
+                                           const current_target_t *target)
 {
-    fast_state_t *fast = &drive->fast;
-    const motor_parameters_t *p = &drive->parameters;
-    const current_control_in_t control = {
+    return (current_control_in_t){
         .target = target,
         .flux = &sample->point.flux,
         .omega = now->omega,
         .psi_delta = drive->psi_d_error,
         .v_dc = now->v_dc,
     };
-    const current_control_out_t wanted = current_control_step(&p->current_control, &fast->current_control, &control);
+}
+
+/* The law of a motor whose field turns far in a period. */
+static __attribute__((noinline, cold)) current_control_out_t control_turning(drive_t *drive, const sample_t *sample,
+                                                                             const rotor_frame_t *now,
+                                                                             const current_target_t *target)
+{
+    const turning_control_in_t in = {
+        .control = control_inputs(drive, sample, now, target),
+        .i = sample->point.i,
+        .angle_step = now->angle_step,
+        .angle_to_act = (uint32_t)now->angle_step + (uint32_t)(now->angle_step >> 1),
+    };
+    return turning_control_step(&drive->motor->turning_control, &drive->parameters.current_control,
+                                &drive->fast.turning_control, &in);
+}
+
+/* Modulation -> duties. The voltage that acts now is the one computed a period ago. */
+static inline __attribute__((always_inline)) void write_duties(drive_t *drive, sample_t *sample,
+                                                               const rotor_frame_t *now, current_control_out_t wanted)
+{
+    fast_state_t *fast = &drive->fast;
+    const motor_parameters_t *p = &drive->parameters;
     sample->point.u.d = fast->u_next.d;
     sample->point.u.q = fast->u_next.q;
     sample->acting = true;
@@ -108,6 +131,15 @@ static void control_currents(drive_t *drive, sample_t *sample, const rotor_frame
         }
     }
     hal_pwm_write(duty);
+}
+
+/* Current control -> modulation -> duties. */
+static inline __attribute__((always_inline)) void
+control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_target_t *target)
+{
+    const current_control_in_t in = control_inputs(drive, sample, now, target);
+    write_duties(drive, sample, now,
+                 current_control_step(&drive->parameters.current_control, &drive->fast.current_control, &in));
 }
 
 /* Called before the monitors of this period, which latch a fault again at once if its cause persists. The task never
@@ -147,17 +179,22 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     const uint32_t ahead = (uint32_t)angle_step + (uint32_t)(angle_step >> 1);
     const fx_pair_t advanced = fx_rotation(sample->theta_e + ahead);
     sample->point.flux = flux_table_step(&drive->period.flux_table, measured);
-    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega};
+    return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega, angle_step};
 }
 
 static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)
 {
     const command_t *command = command_box_read(&drive->commands);
     fast_state_t *fast = &drive->fast;
+    const bool turning = turning_control_used(&drive->motor->turning_control);
     check_samples(drive, sample, command->run);
     const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
     if (command->run && fast->faults == 0) {
-        control_currents(drive, sample, &now, &command->target);
+        if (turning) {
+            write_duties(drive, sample, &now, control_turning(drive, sample, &now, &command->target));
+        } else {
+            control_currents(drive, sample, &now, &command->target);
+        }
         hal_pwm_enable(true);
         fast->short_circuit.holds = false;
         count_since_enable(fast, sample);
@@ -167,7 +204,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
         }
         apply_safe_state(drive, sample, command->safe);
     }
-    fast->is_settled = fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0;
+    fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0;
     publish_sample(drive, sample);
 }
 

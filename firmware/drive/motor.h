@@ -9,6 +9,7 @@
 #include "control/commission/commission.h"
 #include "control/current/angle_tracker.h"
 #include "control/current/current_control.h"
+#include "control/current/current_control_turning.h"
 #include "control/current/flux_table.h"
 #include "control/current/measure.h"
 #include "control/current/modulate.h"
@@ -75,6 +76,7 @@ typedef struct {
     torque_monitor_config_t torque_monitor;
     frozen_angle_config_t frozen_angle;
     commission_config_t commission;
+    turning_control_config_t turning_control;     /* in place of current_control where the field turns far */
     motor_parameters_t parameters;                /* to start with */
     const second_level_constants_t *second_level; /* of the second level alone */
 #if FLUXTRUE_MRAI

@@ -8,12 +8,19 @@
 #define PSI_DRIFT_SHARE 0.05F
 #define R_DRIFT_SHARE 0.20F
 
+/* pole_gain of m = 1: 4 R_0 2^g_shift. */
+static float pole_per_m(const mrai_config_t *config)
+{
+    const float scale = (config->g_shift < 0) ? 1.0F / (float)(1U << -config->g_shift) : (float)(1U << config->g_shift);
+    return 4.0F * scale * si_from_q31(config->r0, 1.0F);
+}
+
 float mrai_calibration_get(const drive_t *drive, calibration_id_t id)
 {
     const mrai_config_t *p = &drive->mrai_parameters;
     const float omega_rad_s = drive->motor->bases.omega_rad_s;
     if (id == CALIBRATION_observer_m) {
-        return 0.25F * (float)p->pole_gain / (float)p->r0;
+        return si_from_q31(p->pole_gain, 1.0F) / pole_per_m(p);
     }
     if (id == CALIBRATION_flux_bandwidth_rad_s) {
         return si_from_q31(p->flux_gain, omega_rad_s) / 2.0F;
@@ -57,7 +64,7 @@ void mrai_calibration_set(drive_t *drive, calibration_id_t id, float value)
     const mrai_config_t before = *p;
     const float omega_rad_s = drive->motor->bases.omega_rad_s;
     if (id == CALIBRATION_observer_m) {
-        p->pole_gain = q31_from_si(4.0F * value * si_from_q31(p->r0, 1.0F), 1.0F);
+        p->pole_gain = q31_from_si(value * pole_per_m(p), 1.0F);
     } else if (id == CALIBRATION_flux_bandwidth_rad_s) {
         p->flux_gain = q31_from_si(2.0F * value, omega_rad_s);
         p->psi_drift_full = q31_from_si(psi_drift_full(drive->motor, value), 1.0F);

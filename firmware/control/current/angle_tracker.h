@@ -9,7 +9,7 @@
  *   lags behind it before it stands.
  * Source   docs/theory/angle-tracker.md (AT-1) ... (AT-4), (AT-14), (AT-16) ... (AT-18)
  * Units    angles in turns times 2^32, so that they wrap as an angle does; speed per unit of omega_b
- * Range    tracks up to |omega| < 2, omega_q31 saturates at 1; omega_b T_s < 0.78
+ * Range    tracks up to |omega| < 2, omega_q31 saturates at 1; omega_b T_s < 0.78, with turn_shift 1 < 1.57
  * Rounding half up: speed to 1 LSB of 2^-29, angle to 1 LSB of 2^-32 turn
  * Errors   none; a sample that is off by more than max_step is reported in jumped and counted by the monitor
  * Context  fast ISR; no division, no loop */
@@ -28,7 +28,8 @@ typedef struct {
     q16_t turn_to_pu;      /* pi/(omega_b T_s), the inverse of pu_to_turn: used for the first two samples only */
     uint32_t repeat_max;   /* electrical advance during which a turning rotor's angle may repeat, 2^32 = one turn */
     uint32_t lag_steps;    /* lag behind the prediction, in steps, that precedes a standstill */
-    uint32_t stop_periods; /* 5 ms: in which a rotor of up to STOP_SPEED can stop */
+    uint16_t stop_periods; /* 5 ms: in which a rotor of up to STOP_SPEED can stop */
+    uint16_t turn_shift;   /* pu_to_turn is 2^turn_shift smaller; not 0: only angle_tracker_step() may be used */
 } angle_tracker_config_t;
 
 /** Whose standstill the repeats of an angle show. */
@@ -51,7 +52,8 @@ typedef struct {
     bool jumped;
 } angle_t;
 
-/** Takes any sample. From the third sample on, angle_tracker_follow() gives the same result without the check. */
+/** Takes any sample. From the third sample on and without a turn_shift, angle_tracker_follow() gives the same result
+ * without the checks. */
 angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
 angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
 

@@ -3,8 +3,7 @@
 #define CURRENT_FLUX_TABLE_TYPES_H
 /** Result of the flux tables for one operating point.
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
- * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/l < 1: one period of full
- *          voltage must not reach I_b
+ * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/(2^g_shift l)
  * Range    each q15 value is a word, because a halfword would have to be sign-extended at every use
  * Context  values only */
 #include "types/operating_point.h"

@@ -32,7 +32,7 @@
 
 /** In the order of use: what every period reads comes first. */
 typedef struct {
-    q31_t pole_gain;               /* 4 m R_0: s2 = pole_gain g/4, below 1/4 */
+    q31_t pole_gain;               /* 4 m R_0 2^g_shift: s2 = pole_gain g/4, below 1/4 */
     int32_t flux_proportional_q24; /* k_P/k_I of the flux law, in periods, < 128 */
     q31_t psi_delta_min, psi_delta_max;
     q31_t r_delta_min, r_delta_max;
@@ -48,6 +48,7 @@ typedef struct {
     q31_t psi_drift_full;                /* drift of dpsi per 1 kHz step that means quality 0: 5 % psi_f k_psi 1 ms */
     q31_t r_drift_full;                  /* drift of dR per 1 kHz step that means quality 0: 20 % R_0 k_r 1 ms */
     q15_t quality_rate;                  /* of the quality filters, per 1 kHz step */
+    int16_t g_shift;                     /* the flux table stores g/2^g_shift */
 } mrai_config_t;
 
 /** Slowly varying factors: written by the 1 kHz task, read by the MRAI ISR through a double buffer. */

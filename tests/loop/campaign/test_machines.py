@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The campaign on two invented machines, strong saturation and nearly none, and at half and twice the PWM frequency."""
+"""The campaign on machines of other kinds, and at half and twice the PWM frequency."""
 
 import json
 import os
@@ -15,7 +15,8 @@ from fluxtrue_tools.sim.build import prepare
 
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
-CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2}
+CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2, "prius": 2, "leaf": 2, "pmasynrm": 2,
+         "spm_12V": 1, "compressor": 1}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -38,7 +39,7 @@ def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_pa
     assert (tables["error_percent"] ** 2).mean() ** 0.5 > 3.0
 
 
-@pytest.mark.parametrize("name", ["saturated", "linear"])
+@pytest.mark.parametrize("name", ["saturated", "linear", "leaf"])
 def test_the_map_is_what_its_script_makes(name: str) -> None:
     shipped = pd.read_csv(MOTORS / name / "flux_map.csv", comment="#")
     iron = make_maps.MACHINES[name]
@@ -52,5 +53,15 @@ def test_the_map_is_what_its_script_makes(name: str) -> None:
 def test_the_machines_are_part_of_the_tests_build() -> None:
     """A separate build folder for each machine would compile the firmware again."""
     built = Path(os.environ["FLUXTRUE_BUILD_DIR"])
-    for name in ("saturated", "linear", "hsm1_5kHz", "hsm1_20kHz"):
+    for name in (
+        "saturated",
+        "linear",
+        "hsm1_5kHz",
+        "hsm1_20kHz",
+        "prius",
+        "leaf",
+        "pmasynrm",
+        "spm_12V",
+        "compressor",
+    ):
         assert prepare(str(MOTORS / name)).folder == built / "motors" / name

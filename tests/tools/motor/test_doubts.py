@@ -20,7 +20,9 @@ HALF = [0.0, 100.0, 200.0, 300.0]
 Write = Callable[..., Path]
 Psi = Callable[[float, float], tuple[float, float]]
 
-# The 12 V motor of 30 µH: with this full scale the observer's gain is one.
+MEANT = ("linear", "saturated", "gem", "prius", "leaf", "pmasynrm", "spm_12V", "compressor", "hsm1_5kHz", "hsm1_8kHz")
+
+# A 12 V motor of 30 µH: at any full scale one period of V_b moves the current by more than it.
 SMALL: dict[str, dict[str, Any]] = {
     "machine": {"pole_pairs": 4, "r_ohm": 0.015, "i_max_A": 60.0, "torque_max_Nm": 1.0, "speed_max_rpm": 5000.0,
                 "inertia_kgm2": 1e-5, "ld_H": 30e-6, "lq_H": 30e-6, "psi_f_Vs": 6e-3},
@@ -44,10 +46,18 @@ def scaled(psi: Psi, d_factor: float = 1.0, q_factor: float = 1.0, q_offset: flo
     return changed
 
 
-@pytest.mark.parametrize("motor", [MOTORS / "hsm1", MOTORS / "paper", TESTED / "linear", TESTED / "saturated",
-                                   TESTED / "gem"], ids=lambda path: path.name)  # fmt: skip
+@pytest.mark.parametrize("motor", [MOTORS / "hsm1", MOTORS / "paper", *(TESTED / name for name in MEANT)],
+                         ids=lambda path: path.name)  # fmt: skip
 def test_machines_that_are_meant_are_not_doubted(motor: Path) -> None:
     assert doubts.of_motor(load_motor(motor)) == []
+
+
+def test_dead_time_that_moves_a_small_inductance_by_much_is_doubted(write: Write) -> None:
+    """0.02 * 350 V in 0.1 ms on 80 µH: 8.75 A, 3.5 % of 250 A."""
+    found = doubts.of_motor(load_motor(write(machine={"ld_H": 80e-6, "torque_max_Nm": 120.0})))
+    assert [text for text in found if "move the current by 3.5 % of i_max_A in one PWM period" in text] == found
+    assert len(found) == 1
+    assert doubts.of_motor(load_motor(write(machine={"ld_H": 100e-6, "torque_max_Nm": 120.0}))) == []
 
 
 @pytest.mark.parametrize(
@@ -141,12 +151,17 @@ def test_the_command_warns_on_the_terminal_and_in_the_report(cli, write: Write, 
 
 OFFERED = re.compile(r"(\w+\.\w+)(?: = \S+ (?:\S+, )?allowed:)? (up to|from) ([\d.e+-]+)")
 UNFIT = [
-    SMALL,
     {"machine": {"iron_loss_hysteresis": 1e4}},
     {"machine": {"iron_loss_eddy": 1e3}},
     {"inverter": {"v_dc_full_scale_V": 3000.0}},
     *({"machine": {"speed_max_rpm": rpm}} for rpm in (1.0, 2.0, 3.0, 5.0, 7.0)),
 ]
+
+
+@pytest.mark.parametrize("full_scale_A", [81.0, 90.0, 100.0, 150.0, 300.0])
+def test_a_small_motor_is_accepted_at_any_full_scale_of_its_converter(write: Write, full_scale_A: float) -> None:
+    inverter = SMALL["inverter"] | {"current_full_scale_A": full_scale_A}
+    assert doubts.of_motor(load_motor(write(machine=SMALL["machine"], inverter=inverter))) == []
 
 
 @pytest.mark.parametrize("changes", UNFIT, ids=lambda changes: str(list(changes["machine"].items())[-1])

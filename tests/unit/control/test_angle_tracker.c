@@ -54,6 +54,25 @@ void test_the_speed_is_correct_from_the_second_sample_on_without_a_cycle_slip(vo
     TEST_ASSERT_FALSE(y.jumped);
 }
 
+/* omega_b T_s = 1.5 exceeds pu_to_turn's format: half of it, and a shift. */
+void test_with_a_shift_a_field_that_turns_far_is_tracked_through_a_lost_sample(void)
+{
+    const double turns = 1.5 / two_pi; /* per period at omega_b */
+    f.angle_tracker.turn_shift = 1;
+    f.angle_tracker.pu_to_turn = (int32_t)lround(turns * 8589934592.0);
+    f.angle_tracker.turn_to_pu = (int32_t)lround(0.5 / turns * 65536.0);
+    const uint32_t advance = (uint32_t)(0.8 * turns / 3.0 * turn);
+    for (uint32_t k = 0; k < 400; k++) {
+        const bool lost = k == 300;
+        const angle_t y = step_or_coast(k * advance + (lost ? 0x20000000U : 0U));
+        TEST_ASSERT_EQUAL(lost, y.jumped);
+        if (k > 0) {
+            TEST_ASSERT_DOUBLE_WITHIN(2e-5, 1.0, y.step / (3.0 * advance));
+            TEST_ASSERT_DOUBLE_WITHIN(2e-5, 0.8, from_q31(y.omega_q31));
+        }
+    }
+}
+
 /* A second-order tracking loop has no steady error on a ramp; what remains is the rounding of the speed. */
 void test_a_ramp_is_tracked_without_a_speed_error_in_both_directions(void)
 {

@@ -95,6 +95,8 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.integral_gain = -1) \
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.integral_gain = Q15(0.5)) \
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.tracking_gain_q34 = -1) \
+    X(CURRENT_CONTROL_GAINS, m.angle_tracker.turn_shift = 1) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control.per_period_q29 = Q31(0.16)) \
     X(VOLTAGE_RATIO, m.parameters.modulate.alpha_q31 = m.parameters.modulate.alpha_q31 / 1000 * 1001) \
     X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 += 20) \
     X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 -= 20) \

@@ -8,7 +8,6 @@ import numpy as np
 
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel, flux
-from fluxtrue_tools.motor.quantise import Unfit
 
 VOLTAGE_PER_VDC = 1.5
 VOLTAGE_STEP_V = 10.0
@@ -17,7 +16,8 @@ OMEGA_MIN_PER_PWM = 0.02  # rad/s per Hz: below it the current controller's inte
 OMEGA_STEP_MIN = 1.0 / 7.9  # rad per step of the task: below it 1/(omega_b T) leaves its format
 FLUX_USE_MIN = 0.3  # smallest share of psi_b that the largest flux may have; below it torque and tables lose resolution
 FLUX_USE_MAX = 0.97  # of psi_b, by the largest flux on the i_max circle
-STEP_USE_MAX = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
+STEP_USE_WANTED = 0.99  # of I_b, by one period of V_b on the smallest incremental inductance
+TURNS_PER_STEP_MAX = 7.99  # of the field, at omega_b: the identification counts them in a word
 TASK_HZ = 1000.0  # a step is the whole number of PWM periods nearest to this
 
 
@@ -63,30 +63,28 @@ def _voltage(config: MotorConfig, psi_max_Vs: float, omega_rad_s: float) -> floa
     return normal if needed <= normal else VOLTAGE_STEP_V * math.ceil(needed / VOLTAGE_STEP_V)
 
 
-def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
-    """The bases of one machine and its inverter; the speed reserve is reduced before anything saturates."""
-    current, period = config.inverter.current_full_scale_A, 1.0 / config.inverter.pwm_hz
+def _omega_and_voltage(config: MotorConfig, model: FluxModel) -> tuple[float, float]:
+    """(SC-7), (SC-8): the largest speed reserve with which (SC-9) holds; the whole reserve where it cannot hold."""
+    pwm_hz = config.inverter.pwm_hz
     psi_max = flux_max(model, config.machine.i_max_A)
-    l_min = inductance_min(model, config.machine.i_max_A)
-    voltage_max = STEP_USE_MAX * l_min * current / period
-    step_s = periods_per_step(config.inverter.pwm_hz) * period
     omega_min = max(
-        OMEGA_MIN_PER_PWM * config.inverter.pwm_hz,
-        OMEGA_STEP_MIN / step_s,
+        OMEGA_MIN_PER_PWM * pwm_hz,
+        OMEGA_STEP_MIN / (periods_per_step(pwm_hz) / pwm_hz),
         FLUX_USE_MIN * VOLTAGE_PER_VDC * config.inverter.vdc_V / psi_max,
     )
-    for ratio in OMEGA_PER_OMEGA_MAX:
-        omega = max(ratio * config.omega_max_rad_s, omega_min)
-        voltage = _voltage(config, psi_max, omega)
-        if voltage <= voltage_max:
-            break
-    else:
-        raise Unfit(
-            f"incremental inductance {l_min:.3g} H is too small: "
-            f"{voltage:.0f} V move the current by more than current_full_scale_A = {current:g} in one "
-            f"PWM period; allowed at pwm_hz = {config.inverter.pwm_hz:g}: from "
-            f"{voltage * period / current / STEP_USE_MAX:.3g} H (raise pwm_hz or current_full_scale_A)"
-        )
+    omega_turns = TURNS_PER_STEP_MAX * 2.0 * math.pi * pwm_hz / periods_per_step(pwm_hz)
+    omegas = [max(ratio * config.omega_max_rad_s, omega_min) for ratio in OMEGA_PER_OMEGA_MAX]
+    omegas = [omega for omega in omegas if omega <= omega_turns]
+    choices = [(omega, _voltage(config, psi_max, omega)) for omega in omegas]
+    l_min = inductance_min(model, config.machine.i_max_A)
+    wanted = STEP_USE_WANTED * l_min * config.inverter.current_full_scale_A * pwm_hz
+    return next((choice for choice in choices if choice[1] <= wanted), choices[0])
+
+
+def make_bases(config: MotorConfig, model: FluxModel) -> Bases:
+    """The bases of one machine and its inverter."""
+    current, period = config.inverter.current_full_scale_A, 1.0 / config.inverter.pwm_hz
+    omega, voltage = _omega_and_voltage(config, model)
     impedance = voltage / current
     return Bases(
         voltage_V=voltage,

@@ -17,7 +17,8 @@ TRIP_PER_FULL_SCALE = 0.78  # documented in bring-your-motor.md: below 80 % of t
 FULL_SCALE_PER_I_MAX = 1.35  # leaves 5 % between i_max and the trip for noise and overshoot
 SLEW_PER_TORQUE_MAX = 100.0  # 1/s
 THERMAL_SPAN_MIN_K = 5.0
-ANGLE_PER_PERIOD_MAX = 0.6  # rad: beyond it the observer and the sampled controller lose their margins
+ANGLE_PER_PERIOD_MAX = 1.2  # rad: five samples per turn of the field; beyond it the formats of angle and speed end
+ANGLE_TURNING = 0.35  # rad: from here on current_control_turning.c, whose margins do not depend on the speed
 
 
 class Machine(Strict):
@@ -137,6 +138,11 @@ class MotorConfig(Strict):
         """Electrical angular frequency at speed_max_rpm."""
         return self.machine.pole_pairs * self.machine.speed_max_rpm * 2 * math.pi / 60
 
+    @property
+    def is_turning(self) -> bool:
+        """The field turns so far in a PWM period that the motor needs the law for it."""
+        return self.omega_max_rad_s > ANGLE_TURNING * self.inverter.pwm_hz
+
 
 NAME_ALLOWED = {"machine.name": "1 to 48 letters, digits, spaces or _ . + -", "machine.flux_map": "1 to 255 characters"}
 
@@ -172,7 +178,7 @@ def _check_speed(config: MotorConfig) -> None:
         limit = ANGLE_PER_PERIOD_MAX * config.inverter.pwm_hz * 60 / (2 * math.pi * config.machine.pole_pairs)
         _fail(
             f"machine.speed_max_rpm = {config.machine.speed_max_rpm:g} turns {step:.3g} electrical radians "
-            f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {limit:.0f} rpm)"
+            f"per PWM period, allowed: up to {ANGLE_PER_PERIOD_MAX} (here {strict.down(limit):g} rpm)"
         )
 
 

@@ -11,6 +11,10 @@ from fluxtrue_tools.motor.flux_model import FluxModel
 
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
+TURNING_FEEDBACK, TURNING_INTEGRAL = 0.28, 0.045  # per period (CC-18), (CC-19)
+TURNING_APPROACH = 1.0 / 2.75  # per period: the flux then lags as far as with the other law (TL-11)
+SINC_SERIES_MAX = 0.6  # rad: up to here 1 + theta^2/24 is 1/sinc(theta/2), (MR-5); beyond it is fitted at maximum speed
+PAPER_TURN_MAX = 0.78  # rad at omega_b: the end of the formats of the paper's law
 V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
 V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
@@ -313,6 +317,15 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_slow_monitors(config, bases),
         identify=identification.derive(config, bases, psi_f),
     )
+
+
+def sinc_gain(config: MotorConfig, bases: Bases) -> float:
+    """c in 1/sinc(theta/2) = 1 + c theta^2, times (omega_b T_s)^2."""
+    theta = config.omega_max_rad_s * bases.period_s
+    gain = 1.0 / 24.0
+    if theta > SINC_SERIES_MAX:
+        gain = (0.5 * theta / math.sin(0.5 * theta) - 1.0) / theta**2
+    return gain * (bases.omega_rad_s * bases.period_s) ** 2
 
 
 def reference_flux_low(config: MotorConfig) -> float:

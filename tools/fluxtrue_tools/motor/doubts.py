@@ -25,6 +25,7 @@ EMF_MAX = 60.0  # of what the dc link can balance, by the magnet alone at top sp
 EMF_MIN = 0.2  # by the whole flux at the largest current: a machine so slow needs no such dc link
 SALIENCE_MAX = 100.0  # flux of i_max in the q axis over the magnet's
 DROP_MIN = 5e-5  # of vdc, by i_max on the resistance
+DEAD_TIME_MOST = 0.03  # of i_max, in one PWM period by dead time and device drop: beyond it currents near 0 oscillate
 RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
@@ -76,6 +77,20 @@ def _values(config: MotorConfig) -> Iterator[Doubt]:
     if not RUN_UP_LEAST_S <= run_up <= RUN_UP_MOST_S:
         yield Doubt(f"machine.inertia_kgm2 = {machine.inertia_kgm2:g} kg·m²: torque_max_Nm brings it to speed_max_rpm "
                     f"in {run_up:.2g} s; wanted: kg·m²")  # fmt: skip
+
+
+def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
+    """Near zero current the compensation acts by the current of 1.5 periods before."""
+    inverter, i_max_A = config.inverter, config.machine.i_max_A
+    least_H = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    volt = inverter.dead_time_s * inverter.pwm_hz * inverter.vdc_V + inverter.device_drop_V
+    moved_A = volt / inverter.pwm_hz / least_H
+    if moved_A > DEAD_TIME_MOST * i_max_A:
+        share = 100.0 * moved_A / i_max_A
+        yield Doubt(f"inverter.dead_time_s = {inverter.dead_time_s:g} s and device_drop_V = "
+                    f"{inverter.device_drop_V:g} V move the current by {share:.2g} % of i_max_A in one PWM period "
+                    f"(allowed without a warning: {100 * DEAD_TIME_MOST:g} %): near zero current it may oscillate; "
+                    "shorten the dead time")  # fmt: skip
 
 
 def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
@@ -140,6 +155,6 @@ def explaining(config: MotorConfig, model: FluxModel) -> Doubt | None:
 def of_motor(motor: "Motor") -> list[str]:
     """Every warning about a motor that is accepted."""
     config = motor.config
-    found = [*_units(config, motor.model), *_values(config), *_map(config, motor.flux_map, motor.model),
-             *_accuracy(motor), *_no_effect(config)]  # fmt: skip
+    found = [*_units(config, motor.model), *_values(config), *_dead_time(config, motor.model),
+             *_map(config, motor.flux_map, motor.model), *_accuracy(motor), *_no_effect(config)]  # fmt: skip
     return [doubt.text for doubt in found]

@@ -23,6 +23,7 @@ from fluxtrue_tools.motor.derived import (
     HOT_S,
     LAG_SHARE,
     LOST_S,
+    PAPER_TURN_MAX,
     REPEAT_TURNS,
     RIPPLE_S,
     SETTLE_S,
@@ -30,6 +31,10 @@ from fluxtrue_tools.motor.derived import (
     STOP_S,
     TORQUE_S,
     TRIM_S,
+    TURNING_APPROACH,
+    TURNING_FEEDBACK,
+    TURNING_INTEGRAL,
+    sinc_gain,
     steps,
 )
 from fluxtrue_tools.motor.motor import Motor
@@ -121,12 +126,13 @@ def _tracker(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     w_ts = d.tracker_bandwidth_rad_s * b.period_s
     to_pu = math.pi / (b.omega_rad_s * b.period_s)
+    shift = 1 if b.omega_rad_s * b.period_s > PAPER_TURN_MAX else 0
     return [
         ("pole_pairs", f"{motor.config.machine.pole_pairs}u", ""),
         ("offset", "0u", ""),
         ("kp", q31(2 * w_ts, "tracker kp"), f"2 w_n T_s, w_n = {d.tracker_bandwidth_rad_s:g} rad/s"),
         ("ki_q29", q31(w_ts**2 * 2 * to_pu / 4, "tracker ki"), "(w_n T_s)^2 2 pi/(omega_b T_s)"),
-        ("pu_to_turn", q31(4 / to_pu, "pu_to_turn"), "2^34 omega_b T_s/(2 pi)"),
+        ("pu_to_turn", q31(4 / to_pu / 2**shift, "pu_to_turn"), f"2^{34 - shift} omega_b T_s/(2 pi)"),
         ("turn_to_pu", q16(to_pu, "turn_to_pu"), f"{to_pu:.6g}"),
         ("max_step", f"{int(d.tracker_jump_turns * 2**32)}u", f"{d.tracker_jump_turns:g} turn"),
         (
@@ -136,6 +142,7 @@ def _tracker(motor: Motor) -> list[Row]:
         ),
         ("lag_steps", f"{round(LAG_SHARE / w_ts)}u", f"{LAG_SHARE:g}/(w_n T_s)"),
         ("stop_periods", f"{round(STOP_S / b.period_s)}u", f"{1e3 * STOP_S:g} ms of periods"),
+        ("turn_shift", f"{shift}u", ""),
     ]
 
 
@@ -186,6 +193,21 @@ def _current_control(motor: Motor) -> list[Row]:
     ]
 
 
+def _turning_control(motor: Motor) -> list[Row]:
+    b = motor.bases
+    turn = b.omega_rad_s * b.period_s
+    if not motor.config.is_turning:
+        return [("per_period_q29", "0", "not needed")]
+    return [
+        ("per_period_q29", q31(1 / turn / 4, "1/(omega_b T_s)"), f"1/(omega_b T_s) = {1 / turn:.6g}"),
+        ("approach", q31(TURNING_APPROACH, "approach"), f"{TURNING_APPROACH:.6g} per period"),
+        ("feedback", q31(TURNING_FEEDBACK / turn, "feedback"), f"{TURNING_FEEDBACK:g} per period"),
+        ("integral_q35", q31(TURNING_INTEGRAL * 16, "integral"), f"{TURNING_INTEGRAL:g} per period"),
+        ("r", q31(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
+        ("voltage_to_flux", q31(turn * motor.derived.v_ratio, "voltage_to_flux"), "omega_b T_s v_ratio"),
+    ]
+
+
 def _modulate(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     min_pulse = q15(d.min_pulse_duty, "min_pulse")
@@ -205,10 +227,11 @@ def _modulate(motor: Motor) -> list[Row]:
 def _mrai_gains(motor: Motor) -> list[Row]:
     d, b, control = motor.derived, motor.bases, motor.config.control
     r0 = motor.config.machine.r_ohm / b.resistance_ohm
+    pole = 4.0 * r0 * 2.0**motor.tables.g_shift
     return [
         ("r0", q31(r0, "r0"), "R at 20 C"),
-        ("pole_gain", q31(4 * control.observer_m * r0, "pole_gain"), f"4 m R_0, m = {control.observer_m:g}"),
-        ("period", q31(b.omega_rad_s * b.period_s, "omega_b T_s"), "omega_b T_s"),
+        ("pole_gain", q31(control.observer_m * pole, "pole_gain"), f"4 m R_0 2^g_shift, m = {control.observer_m:g}"),
+        ("period", q31(min(b.omega_rad_s * b.period_s, PAPER_TURN_MAX), "omega_b T_s"), "omega_b T_s"),
         (
             "flux_gain",
             q31(2 * control.flux_bandwidth_rad_s / b.omega_rad_s, "flux_gain"),
@@ -234,18 +257,22 @@ def _mrai_gains(motor: Motor) -> list[Row]:
 
 def _mrai_limits(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
+    omega_min = q15(d.omega_min_rad_s / b.omega_rad_s, "omega_min"), f"{d.omega_min_rad_s:.6g} rad/s"
+    if b.omega_rad_s * b.period_s > PAPER_TURN_MAX:
+        omega_min = Q15_ONE - 1, "never adapts: the field turns too far in a period"
     return [
         ("psi_delta_min", q31(d.psi_delta_min_Vs / b.flux_Vs, "psi_delta_min"), f"{d.psi_delta_min_Vs:.6g} Vs"),
         ("psi_delta_max", q31(d.psi_delta_max_Vs / b.flux_Vs, "psi_delta_max"), f"{d.psi_delta_max_Vs:.6g} Vs"),
         ("r_delta_min", q31(d.r_delta_min_ohm / b.resistance_ohm, "r_delta_min"), f"{d.r_delta_min_ohm:.6g} ohm"),
         ("r_delta_max", q31(d.r_delta_max_ohm / b.resistance_ohm, "r_delta_max"), f"{d.r_delta_max_ohm:.6g} ohm"),
-        ("omega_min", q15(d.omega_min_rad_s / b.omega_rad_s, "omega_min"), f"{d.omega_min_rad_s:.6g} rad/s"),
+        ("omega_min", *omega_min),
         ("omega_r_max", q15(d.omega_r_max_rad_s / b.omega_rad_s, "omega_r_max"), f"{d.omega_r_max_rad_s:.6g} rad/s"),
         ("i_min", q15(d.i_min_A / b.current_A, "i_min"), f"{d.i_min_A:.6g} A"),
-        ("sinc_gain", q31((b.omega_rad_s * b.period_s) ** 2 / 24, "sinc_gain"), "(omega_b T_s)^2/24"),
+        ("sinc_gain", q31(sinc_gain(motor.config, b), "sinc_gain"), "(omega_b T_s)^2/24"),
         ("psi_drift_full", q31(d.psi_drift_full_Vs / b.flux_Vs, "psi_drift_full"), f"{d.psi_drift_full_Vs:.6g} Vs"),
         ("r_drift_full", q31(d.r_drift_full_ohm / b.resistance_ohm, "r_drift_full"), f"{d.r_drift_full_ohm:.6g} ohm"),
         ("quality_rate", q15(d.quality_rate, "quality_rate"), f"{d.quality_rate:.6g}"),
+        ("g_shift", str(motor.tables.g_shift), ""),
     ]
 
 
@@ -447,6 +474,11 @@ def _parameters(motor: Motor) -> list[Row]:
     ]
 
 
+def _identify(motor: Motor) -> list[Row]:
+    gain = sinc_gain(motor.config, motor.bases)
+    return identification.rows(motor.config, motor.bases, motor.derived.identify, motor.tables.l_shift, gain)
+
+
 def _motor(motor: Motor) -> list[Row]:
     machine, inverter, b = motor.config.machine, motor.config.inverter, motor.bases
     return [
@@ -468,7 +500,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("angle_tracker", _tracker(motor), ""),
         ("angle_harmonics", _harmonics(motor), ""),
         ("flux_table", _flux_table(motor), ""),
-        ("identify", identification.rows(motor.config, b, motor.derived.identify, motor.tables.l_shift), ""),
+        ("identify", _identify(motor), ""),
         ("current_reference", _current_reference(motor), ""),
         ("voltage_reserve", _voltage_reserve(motor), ""),
         ("torque_limit", _torque_limit(motor), ""),
@@ -480,6 +512,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("torque_monitor", _torque_monitor(motor), ""),
         ("frozen_angle", _frozen_angle(motor), ""),
         ("commission", _commission(motor), ""),
+        ("turning_control", _turning_control(motor), ""),
         ("parameters", _parameters(motor), ""),
         ("second_level", "&second_level", ""),
     ]
@@ -528,7 +561,7 @@ def _q15_tables(motor: Motor) -> list[str]:
         "l_d": f"apparent L_d, {l_unit}",
         "l_q": f"apparent L_q, {l_unit}",
         "l_qq": f"incremental L_q, {l_unit}",
-        "g": "omega_b T_s/2 (1/l_dd + 1/l_qq), 2^-15 per count",
+        "g": f"omega_b T_s/2 (1/l_dd + 1/l_qq), 2^{tables.g_shift - 15} per count",
         "psi_f0": f"psi_d at i_d = 0, {psi_unit}",
     }
     out = [f"/* Flux tables: {grid}. */\n"]

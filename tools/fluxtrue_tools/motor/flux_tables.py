@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.config import Machine
 from fluxtrue_tools.motor.flux_model import Array, FluxModel, torque
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15_table, shift_for
 
@@ -16,6 +17,8 @@ SHIFT_COARSE, SHIFT_FINE = 10, 8
 ERROR_WANTED = 0.002  # of torque_max
 NODES_MAX = 255
 SHIFT_MAX = 13
+G_MAX, POLE_GAIN_MAX = 0.99, 0.999  # of their formats
+OBSERVER_M_MAX = 4.0  # the largest that motor.toml and calibration take
 
 IntTable = NDArray[np.int64]
 
@@ -33,6 +36,7 @@ class FluxTables:
     l_qq_H: Array
     psi_f0_Vs: Array
     l_shift: int
+    g_shift: int  # g is stored as g / 2^g_shift
     x0: int
     stored: dict[str, IntTable]
 
@@ -77,7 +81,15 @@ def _inductances(model: FluxModel, id_A: Array, iq_A: Array) -> dict[str, Array]
     return {"l_d": l_d, "l_q": l_q, "l_dd": l_dd, "l_qq": l_qq, "psi_f0": np.array(psi_f0)}
 
 
-def _build(model: FluxModel, bases: Bases, i_max_A: float, shift: int) -> FluxTables:
+def _g_shift(g_max: float, r_per_unit: float) -> int:
+    """The shift nearest to 0 with which g and pole_gain fit; where they cannot both, pole_gain (FT-5)."""
+    least = math.ceil(math.log2(g_max / G_MAX))
+    most = math.floor(math.log2(POLE_GAIN_MAX / (4.0 * OBSERVER_M_MAX * r_per_unit)))
+    return min(max(0, least), most)
+
+
+def _build(model: FluxModel, bases: Bases, machine: Machine, shift: int) -> FluxTables:
+    i_max_A = machine.i_max_A
     step_A = (1 << shift) / Q15_ONE * bases.current_A
     id_A, iq_A = _nodes(i_max_A, step_A)
     if max(len(id_A), len(iq_A)) > NODES_MAX:
@@ -98,16 +110,19 @@ def _build(model: FluxModel, bases: Bases, i_max_A: float, shift: int) -> FluxTa
             f"{bases.inductance_H:.3g} H; check ld/lq, current_full_scale_A and speed_max_rpm"
         )
     stored = {name: q15_table(per_unit[name] / (1 << l_shift), name) for name in ("l_d", "l_q", "l_qq")}
-    # Nodes in the corners beyond the current circle may exceed the format: limited, never used. (FT-5)
-    stored["g"] = q15_table(np.minimum(inverse, 1 - 1 / Q15_ONE), "g")
+    inside = np.hypot(*np.meshgrid(id_A, iq_A, indexing="ij")) <= i_max_A * (1 + 1e-9)
+    g_shift = _g_shift(float(inverse[inside].max()), machine.r_ohm / bases.resistance_ohm)
+    # What exceeds the format is limited: corners beyond the current circle, and poles faster than s2 = 1/4. (FT-5)
+    stored["g"] = q15_table(np.minimum(inverse / 2.0**g_shift, 1 - 1 / Q15_ONE), "g")
     stored["psi_f0"] = q15_table(si["psi_f0"] / bases.flux_Vs, "psi_f0")
     for name in ("l_q", "l_qq", "g"):
         if stored[name].min() <= 0:
             raise FluxtrueError(f"flux tables: {name} is too small for its format; inductances span too wide a range")
     x0 = -(len(id_A) - 2) << shift
     return FluxTables(
-        shift, id_A, iq_A, si["l_d"], si["l_q"], si["l_dd"], si["l_qq"], si["psi_f0"], l_shift, x0, stored
-    )
+        shift, id_A, iq_A, si["l_d"], si["l_q"], si["l_dd"], si["l_qq"], si["psi_f0"], l_shift, g_shift, x0,
+        stored,
+    )  # fmt: skip
 
 
 def _axis(x: IntTable, x0: int, shift: int, n: int) -> tuple[IntTable, IntTable]:
@@ -168,13 +183,11 @@ def table_error(tables: FluxTables, model: FluxModel, bases: Bases, i_max_A: flo
     )
 
 
-def make_flux_tables(
-    model: FluxModel, bases: Bases, i_max_A: float, pole_pairs: int, torque_max_Nm: float
-) -> tuple[FluxTables, TableError]:
+def make_flux_tables(model: FluxModel, bases: Bases, machine: Machine) -> tuple[FluxTables, TableError]:
     """The coarsest grid whose torque error is within 0.2 % of torque_max; else the finest."""
     for shift in range(SHIFT_COARSE, SHIFT_FINE - 1, -1):
-        tables = _build(model, bases, i_max_A, shift)
-        error = table_error(tables, model, bases, i_max_A, pole_pairs)
-        if error.torque_max_Nm <= ERROR_WANTED * torque_max_Nm:
+        tables = _build(model, bases, machine, shift)
+        error = table_error(tables, model, bases, machine.i_max_A, machine.pole_pairs)
+        if error.torque_max_Nm <= ERROR_WANTED * machine.torque_max_Nm:
             break
     return tables, error

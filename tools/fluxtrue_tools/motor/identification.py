@@ -17,6 +17,7 @@ IRON_SIGN_RAD_S = 8.0  # electrical; the hysteresis term is whole from 25 rpm on
 OMEGA_MIN_SHARE = 0.02  # of maximum speed
 I_MIN_SHARE = 0.03  # of i_max
 LOCAL_TIME_S = 0.02
+CORNER_MAX = 0.999  # of the speed base: a machine with little magnet; its voltage never tells the flux' shape
 CHANGE_UNCERTAINTY = 0.1  # of d psi/dt: what the window's ends and the tables' slope leave
 CONFIDENCE_FULL, CONFIDENCE_NONE, CONFIDENCE_TIME_S = 0.03, 0.06, 0.5
 TORQUE_MIN_SHARE = 0.1
@@ -67,7 +68,8 @@ def derive(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> Identify:
         noise_V=correlated * voltage_V, noise_Vs=correlated * flux_Vs, noise_rate=correlated * CHANGE_UNCERTAINTY,
         omega_min_rad_s=OMEGA_MIN_SHARE * config.omega_max_rad_s,
         i_min_A=I_MIN_SHARE * machine.i_max_A, i_smooth_A=0.5 * I_MIN_SHARE * machine.i_max_A,
-        local_corner_rad_s=voltage_V / flux_Vs, local_rate=1.0 - math.exp(-bases.step_s / LOCAL_TIME_S),
+        local_corner_rad_s=min(voltage_V / flux_Vs, CORNER_MAX * bases.omega_rad_s),
+        local_rate=1.0 - math.exp(-bases.step_s / LOCAL_TIME_S),
         limited_noise=LIMITED_NOISE / bases.periods_per_step,
         mismatch_rate=1.0 - math.exp(-update_s / MISMATCH_TIME_S),
         torque_min_Nm=TORQUE_MIN_SHARE * machine.torque_max_Nm,
@@ -83,7 +85,7 @@ def _q30(value: float, name: str) -> str:
     return str(int(q31(value / 2.0, name)))
 
 
-def _machine_rows(config: MotorConfig, bases: Bases, l_shift: int) -> list[Row]:
+def _machine_rows(config: MotorConfig, bases: Bases, l_shift: int, sinc: float) -> list[Row]:
     b, machine = bases, config.machine
     turns = b.omega_rad_s * b.step_s / (2.0 * math.pi)
     admittance = b.flux_Vs / (1.5 * b.current_A)
@@ -91,7 +93,7 @@ def _machine_rows(config: MotorConfig, bases: Bases, l_shift: int) -> list[Row]:
     return [
         ("l_shift", f"{l_shift}u", ""), ("r0", q31(r0, "r0"), "R at 20 C"),
         ("r_per_dC", q31(r0 * machine.r_temp_coeff_per_K / 10.0, "r_per_dC"), "per 0.1 K"),
-        ("sinc_gain", q31((b.omega_rad_s * b.period_s) ** 2 / 24, "sinc_gain"), "(omega_b T_s)^2/24"),
+        ("sinc_gain", q31(sinc, "sinc_gain"), "(omega_b T_s)^2/24"),
         ("mean_gain_q32", str(round(2**32 / (2 * b.periods_per_step))), f"1/(2 N), N = {b.periods_per_step}"),
         ("rate_gain_q28", str(round(2**28 / (b.omega_rad_s * b.step_s))), "1/(omega_b T)"),
         ("window_turns_q29", f"{round(2**29 * turns)}u", f"{turns:.6g} turns"),
@@ -102,14 +104,14 @@ def _machine_rows(config: MotorConfig, bases: Bases, l_shift: int) -> list[Row]:
     ]  # fmt: skip
 
 
-def rows(config: MotorConfig, bases: Bases, identify: Identify, l_shift: int) -> list[Row]:
+def rows(config: MotorConfig, bases: Bases, identify: Identify, l_shift: int, sinc: float) -> list[Row]:
     """identify_config_t."""
     b, d = bases, identify
     unit = (b.resistance_ohm, b.voltage_V, b.flux_Vs, 1.0, 1.0, 1.0, 1.0)
     sigma = [str(q31(s / u, f"sigma of {n}")) for n, s, u in zip(STATES, d.sigma, unit, strict=True)]
     leak = [str(q31(value, f"leak of {n}")) for n, value in zip(STATES, d.leak, strict=True)]
     return [
-        *_machine_rows(config, bases, l_shift),
+        *_machine_rows(config, bases, l_shift, sinc),
         ("sigma", _array(sigma), ", ".join(f"{n} {s:.4g}" for n, s in zip(STATES, d.sigma, strict=True))),
         ("leak", _array(leak), "per update"),
         ("r_known_q30", _q30(d.r_known, "r_known"), f"{d.r_known:.4g}"),

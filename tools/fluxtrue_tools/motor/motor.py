@@ -87,7 +87,7 @@ def resolve(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> 
     bases = make_bases(config, model)
     solver = Solver(model, machine.pole_pairs, machine.i_max_A)
     _check_torque(config, solver)
-    tables, table_error = make_flux_tables(model, bases, machine.i_max_A, machine.pole_pairs, machine.torque_max_Nm)
+    tables, table_error = make_flux_tables(model, bases, machine)
     references, limits, errors = make_references(solver, bases, reference_flux_low(config), machine.torque_max_Nm)
     return Motor(
         config,

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every sensible motor is accepted as it is, and its numbers keep their range."""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import toml
+from random_motors import random_motors
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.config import MotorConfig, check_config
+from fluxtrue_tools.motor.emit_c import check_numbers
+from fluxtrue_tools.motor.flux_model import ConstantModel
+from fluxtrue_tools.motor.flux_tables import OBSERVER_M_MAX
+from fluxtrue_tools.motor.motor import Motor, load_motor, resolve
+
+SEED, COUNT, PARTS, ACCEPTED = 12, 1000, 4, 0.99
+Values = dict[str, dict[str, object]]
+Write = Callable[..., Path]
+
+
+def made(values: Values) -> Motor:
+    """All that motor build refuses for, without the advice that follows a refusal."""
+    machine = values["machine"] | {"name": str(values["machine"]["name"]).strip('"')}
+    config = MotorConfig.model_validate(values | {"machine": machine})
+    check_config(config)
+    constants = config.machine.ld_H, config.machine.lq_H, config.machine.psi_f_Vs
+    assert None not in constants
+    with np.errstate(all="ignore"):
+        motor = resolve(config, None, ConstantModel(*constants))  # type: ignore[arg-type]
+    check_numbers(motor)
+    return motor
+
+
+def assert_in_range(motor: Motor) -> None:
+    """What the firmware's checks and formats ask of the numbers."""
+    b, config, tables = motor.bases, motor.config, motor.tables
+    turn = b.omega_rad_s * b.period_s
+    assert b.omega_rad_s >= 1.02 * config.omega_max_rad_s * (1 - 1e-12)
+    assert turn < math.pi / 2
+    assert turn * b.periods_per_step < 8 * 2 * math.pi
+    # What the observer multiplies is the machine's, whatever g_shift splits it into.
+    pole = 4.0 * config.machine.r_ohm / b.resistance_ohm * 2.0**tables.g_shift
+    assert 0 < OBSERVER_M_MAX * pole < 1
+    g = tables.stored["g"] / 2.0**15 * 2.0**tables.g_shift
+    wanted = b.period_s / 2 * (1 / tables.l_dd_H + 1 / tables.l_qq_H) * b.resistance_ohm
+    assert np.all((np.abs(g / wanted - 1.0) < 0.01) | ((tables.stored["g"] == 2**15 - 1) & (g < wanted)))
+    assert tables.stored["g"].min() > 100
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_of_1000_random_sensible_motors_99_percent_are_accepted(part: int) -> None:
+    """In four parts, each of which must keep the share."""
+    reasons: Counter[str] = Counter()
+    angles = []
+    for drawn in random_motors(COUNT, SEED)[part::PARTS]:
+        try:
+            assert_in_range(made(drawn.values))
+            angles.append(drawn.angle_rad)
+        except FluxtrueError as error:
+            reasons[str(error)] += 1
+    assert sum(reasons.values()) <= (1 - ACCEPTED) * COUNT / PARTS, reasons.most_common(10)
+    assert sum(angle > 0.6 for angle in angles) > 0.3 * COUNT / PARTS  # the fast ones are among them
+    assert max(angles) > 1.15
+
+
+def test_some_of_them_as_files_are_what_the_tool_accepts(tmp_path: Path) -> None:
+    for k, drawn in enumerate(random_motors(10, SEED + 1)):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        (folder / "motor.toml").write_text(toml(drawn.values), encoding="utf-8")
+        assert load_motor(folder).config.machine.pole_pairs == drawn.values["machine"]["pole_pairs"]
+
+
+def test_what_turns_too_far_is_refused_with_the_speed_that_is_accepted(write: Write) -> None:
+    said = r"speed_max_rpm = 30000 turns 1\.26 .* allowed: up to 1\.2 \(here 28640 rpm"
+    with pytest.raises(FluxtrueError, match=said):
+        load_motor(write(machine={"speed_max_rpm": 30000.0}))
+    load_motor(write(machine={"speed_max_rpm": 28640.0, "torque_max_Nm": 100.0}))
+
+
+def test_at_5_kHz_the_measured_machine_needs_a_shift() -> None:
+    tested = Path(__file__).resolve().parents[2] / "motors"
+    motor = load_motor(tested / "hsm1_5kHz")
+    assert motor.tables.g_shift == 1
+    assert motor.bases.omega_rad_s == pytest.approx(1.25 * motor.config.omega_max_rad_s, rel=1e-12)
+    assert load_motor(tested / "hsm1_20kHz").tables.g_shift == 0
+
+
+def test_a_resistance_too_large_for_its_format_shifts_the_other_way(write: Write) -> None:
+    """12 V, 60 A, 60 mΩ: 30 % of V_dc; R_0 is 0.27 of Z_b, 16 R_0 4.3."""
+    machine = {"r_ohm": 0.06, "i_max_A": 60.0, "torque_max_Nm": 1.0, "speed_max_rpm": 2000.0, "ld_H": 60e-6,
+               "lq_H": 60e-6, "psi_f_Vs": 6e-3}  # fmt: skip
+    motor = load_motor(write(machine=machine, inverter={"vdc_V": 12.0, "pwm_hz": 20000.0, "dead_time_s": 5e-7,
+                                                        "current_full_scale_A": 81.0}))  # fmt: skip
+    assert motor.tables.g_shift < 0
+    assert_in_range(motor)

@@ -1,0 +1,265 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include <complex.h>
+#include <math.h>
+
+#include "control/current/current_control_turning.h"
+#include "fixture.h"
+#include "unity.h"
+
+static const double turn = 1.5; /* omega_b T_s */
+static const double feedback = 0.28, integral = 0.045, approach = 1.0 / 2.75;
+static const double v_ratio = 0.6;
+static const double q30 = 1073741824.0;
+static const double two_pi = 6.283185307179586476925;
+
+static turning_control_config_t config;
+static current_control_config_t limits;
+static turning_control_state_t state;
+static current_target_t target;
+static flux_point_t flux;
+static turning_control_in_t in;
+static current_control_out_t out;
+
+static int32_t q31_of(double x)
+{
+    return (int32_t)lround(x * 2147483648.0);
+}
+
+void setUp(void)
+{
+    config = (turning_control_config_t){
+        .per_period_q29 = q31_of(1.0 / turn / 4.0),
+        .approach = q31_of(approach),
+        .feedback = q31_of(feedback / turn),
+        .integral_q35 = q31_of(16.0 * integral),
+        .r = q31_of(0.02),
+        .voltage_to_flux = q31_of(turn * v_ratio),
+    };
+    limits = (current_control_config_t){
+        .per_ratio_q31 = (uint32_t)lround(2147483648.0 / v_ratio),
+        .clear_q30 = (uint32_t)lround(q30 * 0.9),
+    };
+    turning_control_reset(&state);
+    target = (current_target_t){0};
+    flux = (flux_point_t){0};
+    in = (turning_control_in_t){.control = {.target = &target, .flux = &flux, .v_dc = 32767}};
+}
+
+void tearDown(void)
+{
+}
+
+static void turn_by(double theta)
+{
+    in.angle_step = (int32_t)lround(theta / two_pi * 4294967296.0);
+    in.angle_to_act = (uint32_t)in.angle_step + (uint32_t)(in.angle_step >> 1);
+    in.control.omega = q31_of(fmax(fmin(theta / turn, 0.999), -0.999));
+}
+
+static double complex of_q30(dq_q30_t x)
+{
+    return x.d / q30 + I * (x.q / q30);
+}
+
+static void step(void)
+{
+    out = turning_control_step(&config, &limits, &state, &in);
+}
+
+/* After the limit, per unit of V_b. */
+static double complex acting(void)
+{
+    const double v_max = v_ratio * from_q15(in.control.v_dc);
+    return v_max * (from_q15((int16_t)out.v) + I * from_q15((int16_t)(out.v >> 16)));
+}
+
+static double complex before_limit(void)
+{
+    return from_q15(out.u.d) + I * from_q15(out.u.q);
+}
+
+/* (CC-16) ... (CC-19) in complex numbers, from the state before. */
+typedef struct {
+    double complex u, next, s;
+} expected_t;
+
+static expected_t expected(const turning_control_state_t *from, double theta)
+{
+    const double complex half = cexp(0.5 * I * theta);
+    const double complex k = feedback * cexp(-1.5 * I * theta);
+    const double complex e = of_q30(from->now) - (from_q15(flux.psi_d) + I * from_q15(flux.psi_q));
+    const double complex psi_ref = from_q15(target.psi.d) + I * from_q15(target.psi.q);
+    const double complex r = of_q30(from->next), s = of_q30(from->s);
+    const double complex next = r + approach * (psi_ref - r);
+    const double complex i = from_q15(in.i.d) + I * from_q15(in.i.q);
+    const double complex rotational = 2.0 * I * sin(0.5 * theta);
+    return (expected_t){
+        .u = (half * next - r / half + k * e + rotational * from_q15(in.control.psi_delta)) / turn + s + 0.02 * i,
+        .next = next,
+        .s = s + integral * (k + rotational) * e / turn,
+    };
+}
+
+static dq_q30_t random_flux(uint64_t *seed, int32_t largest)
+{
+    return (dq_q30_t){random_in(seed, -largest, largest) * 32768, random_in(seed, -largest, largest) * 32768};
+}
+
+static void randomise(uint64_t *seed, int32_t largest)
+{
+    state = (turning_control_state_t){.s = random_flux(seed, 2000),
+                                      .now = random_flux(seed, largest),
+                                      .next = random_flux(seed, largest),
+                                      .begun = true};
+    flux = (flux_point_t){.psi_d = random_in(seed, -largest, largest), .psi_q = random_in(seed, -largest, largest)};
+    target.psi = (dq_q15_t){random_in(seed, -largest, largest), random_in(seed, -largest, largest)};
+    in.i = (dq_q15_t){random_in(seed, -20000, 20000), random_in(seed, -20000, 20000)};
+    in.control.psi_delta = (q15_t)random_in(seed, -3000, 3000);
+}
+
+/* Angles are read in 16 bits: 5e-5 rad, times sums of fluxes below 3, over omega_b T_s. */
+void test_a_step_is_the_equations_at_every_angle_in_both_directions(void)
+{
+    worst_t voltage = {0}, model = {0}, integrated = {0};
+    uint64_t seed = 91;
+    for (int n = 0; n < 50000; n++) {
+        randomise(&seed, 9000);
+        const double theta = random_in(&seed, -1200, 1200) * 1e-3;
+        turn_by(theta);
+        const expected_t want = expected(&state, theta);
+        step();
+        worst_note(&voltage, cabs(before_limit() - want.u), "theta %g", theta);
+        worst_note(&integrated, cabs(of_q30(state.s) - want.s), "theta %g", theta);
+        if (out.limited == 0U) {
+            worst_note(&model, cabs(of_q30(state.next) - want.next), "theta %g", theta);
+        }
+    }
+    ASSERT_WORST(voltage, 2e-4);
+    ASSERT_WORST(integrated, 1e-5);
+    ASSERT_WORST(model, 2e-9);
+}
+
+void test_the_model_starts_from_the_machines_flux_and_its_voltage_is_the_rotational_one(void)
+{
+    flux = (flux_point_t){.psi_d = 12000, .psi_q = -5000};
+    target.psi = (dq_q15_t){12000, -5000};
+    turn_by(1.0);
+    step();
+    const double complex psi = from_q15(12000) + I * from_q15(-5000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.0, cabs(before_limit() - 2.0 * I * sin(0.5) * psi / turn));
+    TEST_ASSERT_TRUE(out.clear);
+    TEST_ASSERT_TRUE(state.begun);
+    turning_control_reset(&state);
+    TEST_ASSERT_FALSE(state.begun);
+    TEST_ASSERT_EQUAL_INT32(0, state.s.d);
+}
+
+/* (CC-12) with a table whose slope is `slope` times the machine's. */
+typedef struct {
+    double complex psi, acts;
+    double slope;
+} machine_t;
+
+static void run(machine_t *machine, double theta, int periods)
+{
+    turn_by(theta);
+    for (int n = 0; n < periods; n++) {
+        flux = (flux_point_t){.psi_d = (int32_t)lround(32768.0 * creal(machine->psi)),
+                              .psi_q = (int32_t)lround(32768.0 * cimag(machine->psi))};
+        step();
+        machine->psi = cexp(-I * theta) * machine->psi + machine->slope * turn * cexp(-0.5 * I * theta) * machine->acts;
+        machine->acts = acting();
+    }
+}
+
+/* The flux follows the model, two periods after it, whatever the angle: no overshoot, nothing on the other axis. */
+void test_a_step_reaches_the_machine_without_overshoot_or_cross_coupling_at_every_speed(void)
+{
+    static const double angles[] = {-1.2, -0.5, 0.0, 0.1, 0.36, 0.6, 0.8, 1.0, 1.2};
+    for (unsigned k = 0; k < sizeof angles / sizeof *angles; k++) {
+        turning_control_reset(&state);
+        machine_t machine = {.psi = 0.3, .slope = 1.0};
+        machine.acts = 2.0 * I * sin(0.5 * angles[k]) / turn * machine.psi;
+        target.psi = (dq_q15_t){9830, 0};
+        run(&machine, angles[k], 30);
+        target.psi.q = 3000;
+        double largest_q = 0.0, smallest_d = 1.0;
+        for (int n = 0; n < 40; n++) {
+            run(&machine, angles[k], 1);
+            largest_q = fmax(largest_q, cimag(machine.psi));
+            smallest_d = fmin(smallest_d, creal(machine.psi));
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(3e-4, 3000.0 / 32768.0, cimag(machine.psi));
+        TEST_ASSERT_TRUE(largest_q < 3010.0 / 32768.0);
+        TEST_ASSERT_TRUE(smallest_d > 0.3 - 5e-4);
+    }
+}
+
+/* The phase margin of 44 degrees and more shows as tables that may be wrong by a factor. */
+void test_tables_at_half_and_at_twice_the_true_slope_are_stable_at_every_speed(void)
+{
+    for (double theta = -1.2; theta < 1.21; theta += 0.1) {
+        for (double slope = 0.5; slope < 2.1; slope *= 2.0) {
+            turning_control_reset(&state);
+            machine_t machine = {.psi = 0.2, .slope = slope};
+            machine.acts = 2.0 * I * sin(0.5 * theta) / turn * machine.psi;
+            target.psi = (dq_q15_t){6554, 1000};
+            run(&machine, theta, 400);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, cabs(machine.psi - (6554.0 + 1000.0 * I) / 32768.0));
+        }
+    }
+}
+
+/* (CC-20): what the voltage cannot do the model does not expect; afterwards nothing overshoots. */
+void test_at_the_voltage_limit_the_model_goes_as_far_as_the_voltage_reaches(void)
+{
+    machine_t machine = {.psi = 0.3, .slope = 1.0};
+    const double theta = 0.6;
+    machine.acts = 2.0 * I * sin(0.5 * theta) / turn * machine.psi;
+    target.psi = (dq_q15_t){9830, 0};
+    run(&machine, theta, 20);
+    target.psi = (dq_q15_t){9830, 14000};
+    in.control.v_dc = 11400; /* a circle of 0.209: the rotational voltage of the target needs 0.206 */
+    int limited = 0;
+    for (int n = 0; n < 12; n++) {
+        run(&machine, theta, 1);
+        limited += out.limited != 0U;
+        const turning_control_state_t *s = &state;
+        const double complex reached = cexp(-I * theta) * machine.psi + turn * cexp(-0.5 * I * theta) * machine.acts;
+        TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, cabs(of_q30(s->next) - reached));
+    }
+    TEST_ASSERT_TRUE(limited > 0);
+    double largest = 0.0;
+    for (int n = 0; n < 60; n++) {
+        run(&machine, theta, 1);
+        largest = fmax(largest, cimag(machine.psi));
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(2e-3, 14000.0 / 32768.0, cimag(machine.psi));
+    TEST_ASSERT_TRUE(largest < 1.05 * 14000.0 / 32768.0);
+}
+
+/* Nothing wraps: the sanitizers run this test too, and the results keep their limits. */
+void test_extreme_inputs_stay_within_their_limits(void)
+{
+    static const int32_t corner[3] = {-32768, 0, 32767};
+    uint64_t seed = 92;
+    for (int n = 0; n < 20000; n++) {
+        flux = (flux_point_t){.psi_d = corner[random_in(&seed, 0, 2)], .psi_q = corner[random_in(&seed, 0, 2)]};
+        target.psi = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
+        in.i = (dq_q15_t){corner[random_in(&seed, 0, 2)], corner[random_in(&seed, 0, 2)]};
+        in.control.psi_delta = (q15_t)corner[random_in(&seed, 0, 2)];
+        in.control.v_dc = random_in(&seed, 0, 1) ? 32767 : random_in(&seed, 0, 2000);
+        in.angle_step = (int32_t)random_u32(&seed);
+        in.angle_to_act = random_u32(&seed);
+        step();
+        TEST_ASSERT_TRUE(cabs(of_q30(state.next)) < 1.5 && cabs(of_q30(state.s)) < 1.5);
+        TEST_ASSERT_TRUE(out.u.d >= -32768 && out.u.d <= 32767);
+    }
+}
+
+void test_a_motor_without_these_constants_does_not_use_them(void)
+{
+    TEST_ASSERT_TRUE(turning_control_used(&config));
+    config.per_period_q29 = 0;
+    TEST_ASSERT_FALSE(turning_control_used(&config));
+}
