@@ -384,6 +384,27 @@ void test_a_slow_angle_that_freezes_is_replaced_for_5_ms_and_then_that_of_a_roto
     TEST_ASSERT_TRUE(drive.fast.is_settled);
 }
 
+/* Its own law on the checked route, which is never left. */
+void test_a_motor_whose_field_turns_far_runs_on_its_own_law(void)
+{
+    seam.motor.turning_control = (turning_control_config_t){.per_period_q29 = Q31(0.5),
+                                                            .approach = Q31(0.36),
+                                                            .feedback = Q31(0.5),
+                                                            .integral_q35 = Q31(0.72),
+                                                            .voltage_to_flux = Q31(0.3)};
+    seam_run();
+    seam_periods(5);
+    TEST_ASSERT_TRUE(seam.gates);
+    TEST_ASSERT_TRUE(drive.fast.turning_control.begun);
+    TEST_ASSERT_FALSE(drive.fast.is_settled);
+    TEST_ASSERT_TRUE(published()->acting);
+    TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_d_q30);
+    drive.request.enable = false;
+    seam_periods(20);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_FALSE(drive.fast.turning_control.begun);
+}
+
 /* The voltage computed in period k acts in period k + 1, so the published one was computed in the previous period. */
 void test_the_published_voltage_is_the_one_that_acts_now(void)
 {
