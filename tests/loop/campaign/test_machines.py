@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
 CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2, "prius": 2, "leaf": 2, "pmasynrm": 2,
          "spm_12V": 1, "compressor": 1}  # fmt: skip
+ERROR_WITHOUT_MIN = {"spm_12V": 1.5}  # percent: the magnet of its first plant is only 2 % weak
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -36,7 +37,7 @@ def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_pa
     tables = table[table["controller"] == "tables"]
     assert (tables["run_fault_word"] == 0).all()
     # Without identification the error is large: the magnet is up to 20 % weak, the inductances differ by up to 10 %.
-    assert (tables["error_percent"] ** 2).mean() ** 0.5 > 3.0
+    assert (tables["error_percent"] ** 2).mean() ** 0.5 > ERROR_WITHOUT_MIN.get(name, 3.0)
 
 
 @pytest.mark.parametrize("name", ["saturated", "linear", "leaf"])

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random sensible motors: what people build, drawn from ranges of published machines.
+"""Random sensible motors: what people build.
 
 Drawn are dc voltage, current, pole pairs, PWM frequency, electrical advance per PWM period, the share of maximum speed
 at which the voltage is used up, and the machine's kind; flux and inductances follow from these, because a machine is
 wound for its inverter. The ranges of the reactances per unit are our choice. They span the plane of magnet flux and
 saliency in which W. L. Soong, T. J. E. Miller, "Field-weakening performance of brushless synchronous AC motor drives",
-IEE Proc. Electr. Power Appl. 141 (1994), order surface-magnet, interior-magnet and reluctance machines, and contain the
-machines of tests/motors.
+IEE Proc. Electr. Power Appl. 141 (1994), order surface-magnet, interior-magnet and reluctance machines.
 """
 
 import math
@@ -23,7 +22,7 @@ SPEED_MAX_RPM, SPEED_MIN_RPM = 60000.0, 100.0
 ANGLE_MAX = 1.2  # rad of the field per PWM period
 REACTANCES = {  # L_d i_max over psi_f, L_q over L_d
     "surface": ((0.08, 1.0), (1.0, 1.1)),
-    "interior": ((0.2, 2.0), (1.3, 4.0)),
+    "interior": ((0.2, 1.2), (1.3, 4.0)),
     "reluctance": ((0.5, 2.0), (2.5, 6.0)),
 }
 
