@@ -45,7 +45,7 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
         short_circuit_end(&drive->fast);
     }
     current_control_reset(&drive->fast.current_control);
-    turning_control_reset(&drive->fast.turning_control);
+    turning_control_reset(&drive->fast.turning_control, &sample->point.flux);
     sample->point.u = (dq_q15_t){0, 0};
     sample->voltage_limited = false;
     sample->pulses_clamped = false;
@@ -95,12 +95,12 @@ static __attribute__((noinline, cold)) current_control_out_t control_turning(dri
                                                                              const rotor_frame_t *now,
                                                                              const current_target_t *target)
 {
-    const turning_control_in_t in = {
+    turning_control_in_t in = {
         .control = control_inputs(drive, sample, now, target),
         .i = sample->point.i,
         .angle_step = now->angle_step,
-        .angle_to_act = (uint32_t)now->angle_step + (uint32_t)(now->angle_step >> 1),
     };
+    in.control.omega = now->omega >> 31;
     return turning_control_step(&drive->motor->turning_control, &drive->parameters.current_control,
                                 &drive->fast.turning_control, &in);
 }

@@ -80,23 +80,26 @@ static motor_check_t modulate_check(const motor_t *m)
     return (m->parameters.current_control.clear_q30 <= clear_max_q30) ? MOTOR_CHECK_OK : MOTOR_CHECK_CLEAR_VOLTAGE;
 }
 
-/* Only the law for a field that turns far takes the route on which a tracker with a shift may run. */
+/* Only the law for a field that turns far takes the route on which a tracker with a shift may run, and only without
+ * gains is the usual law the limit of its voltage. */
 static bool turning_valid(const motor_t *m)
 {
     const turning_control_config_t *c = &m->turning_control;
+    const current_control_config_t *limits = &m->parameters.current_control;
     if (!turning_control_used(c)) {
-        return m->angle_tracker.turn_shift == 0U;
+        return m->angle_tracker.turn_shift == 0U && limits->sigma_q24 > 0;
     }
-    return c->per_period_q29 > 0 && c->approach > 0 && c->feedback > 0 && c->integral_q35 > 0 && c->r >= 0 &&
-           c->voltage_to_flux > 0 && m->angle_tracker.turn_shift <= 1U;
+    return c->per_period_q29 > 0 && c->approach_q32 > 0 && c->feedback_q32 > 0 && c->integral_q32 > 0 &&
+           c->drop_q29 >= 0 && limits->sigma_q24 == 0 && limits->integral_gain == 0 &&
+           m->angle_tracker.turn_shift <= 1U;
 }
 
 static motor_check_t control_check(const motor_t *m)
 {
     const current_control_config_t *c = &m->parameters.current_control;
     const voltage_reserve_config_t *v = &m->voltage_reserve;
-    if (c->sigma_q24 <= 0 || c->setpoint_weight <= 0 || c->integral_gain < 0 || c->integral_gain >= Q15(0.5) ||
-        c->tracking_gain_q34 < 0 || !turning_valid(m)) {
+    if (c->setpoint_weight <= 0 || c->integral_gain < 0 || c->integral_gain >= Q15(0.5) || c->tracking_gain_q34 < 0 ||
+        !turning_valid(m)) {
         return MOTOR_CHECK_CURRENT_CONTROL_GAINS;
     }
     if (!ratio_valid(m)) {

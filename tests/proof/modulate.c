@@ -107,7 +107,7 @@ void proof_reciprocal_of_the_dc_voltage(void)
     current_control_config_t c;
     int32_t v_dc;
     ASSUME(IS_MAGNITUDE(v_dc));
-    const int32_t per_v_max_q25 = reciprocal_v_max(c.per_ratio_q31, v_dc);
+    const int32_t per_v_max_q25 = reciprocal_v_max(&c, v_dc);
     PROVE(per_v_max_q25 >= 0 && per_v_max_q25 <= 0x7FFFFFFF);
     PROVE(v_dc != 0 || per_v_max_q25 == 0);
 }

@@ -8,9 +8,9 @@
 #define STOP_SPEED ((1 << 30) / 50) /* Q30, 0.02 of the speed base: 5 ms with the deceleration of safety/safe_state.c */
 
 /* Advance per period. It wraps beyond half a turn, as the angle does. */
-static int32_t advance_at(const angle_tracker_config_t *config, int32_t omega_q30, uint32_t turn_shift)
+static __attribute__((noinline, cold)) int32_t advance_at(const angle_tracker_config_t *config, int32_t omega_q30)
 {
-    return (int32_t)((uint32_t)fx_mulhi(config->pu_to_turn, omega_q30) << turn_shift);
+    return (int32_t)((uint32_t)fx_mulhi(config->pu_to_turn, omega_q30) << config->turn_shift);
 }
 
 static angle_t result(uint32_t theta_e, int32_t step, int32_t omega_q30, bool jumped)
@@ -30,13 +30,11 @@ static void start(const angle_tracker_config_t *config, angle_tracker_state_t *s
 {
     const int32_t advance = (state->samples == 1) ? (int32_t)(theta_e - state->predicted) : 0;
     state->omega_q30 = fx_mul_gain_q31(config->turn_to_pu, advance) >> 1;
-    state->predicted = theta_e + (uint32_t)advance_at(config, state->omega_q30, config->turn_shift);
+    state->predicted = theta_e + (uint32_t)advance_at(config, state->omega_q30);
     state->samples++;
 }
 
-static inline __attribute__((always_inline)) angle_t follow(const angle_tracker_config_t *config,
-                                                            angle_tracker_state_t *state, uint32_t theta_m,
-                                                            uint32_t turn_shift)
+angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
 {
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
     const fx_two_words_t before = FX_LOAD_TWO(state, predicted, omega_q30);
@@ -46,7 +44,7 @@ static inline __attribute__((always_inline)) angle_t follow(const angle_tracker_
     /* Turns in Q32 * Q29 = Q29, counted twice. */
     const int32_t omega_q30 = fx_add2_q31(before.second, fx_mulhi(gains.second, error));
     const bool jumped = (uint32_t)error + config->max_step > 2U * config->max_step;
-    const angle_t angle = result(theta_e, advance_at(config, omega_q30, turn_shift), omega_q30, jumped);
+    const angle_t angle = result(theta_e, fx_mulhi(config->pu_to_turn, omega_q30), omega_q30, jumped);
     /* Q31 gain * turns = half the correction; the doubling costs one LSB of 2^-32 turn. */
     state->predicted = predicted + (uint32_t)angle.step + 2U * (uint32_t)fx_mulhi(gains.first, error);
     state->omega_q30 = omega_q30;
@@ -57,16 +55,15 @@ __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *c
                                                  uint32_t theta_m)
 {
     if (state->samples >= 2) {
-        return follow(config, state, theta_m, config->turn_shift);
+        angle_t angle = angle_tracker_follow(config, state, theta_m);
+        const uint32_t step = (uint32_t)angle.step << config->turn_shift;
+        state->predicted += step - (uint32_t)angle.step;
+        angle.step = (int32_t)step;
+        return angle;
     }
     const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
     start(config, state, theta_e);
-    return result(theta_e, advance_at(config, state->omega_q30, config->turn_shift), state->omega_q30, false);
-}
-
-angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m)
-{
-    return follow(config, state, theta_m, 0);
+    return result(theta_e, advance_at(config, state->omega_q30), state->omega_q30, false);
 }
 
 /* By how much the sample was off its prediction, from what the loop has made of it: the new prediction is the old one +
@@ -74,7 +71,7 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
  * error. */
 static int32_t error_of(const angle_tracker_config_t *config, const angle_tracker_state_t *state, uint32_t theta_e)
 {
-    const uint32_t step = (uint32_t)advance_at(config, state->omega_q30, config->turn_shift);
+    const uint32_t step = (uint32_t)advance_at(config, state->omega_q30);
     const int32_t difference = (int32_t)(theta_e + step - state->predicted);
     int32_t error = difference;
     for (int n = 0; n < COAST_ROUNDS; n++) {
@@ -96,7 +93,7 @@ __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *
 {
     const int32_t error = error_of(config, state, theta_e);
     state->omega_q30 = speed_before(config, state, error);
-    const int32_t now = advance_at(config, state->omega_q30, config->turn_shift);
+    const int32_t now = advance_at(config, state->omega_q30);
     const angle_t angle = result(theta_e - (uint32_t)error, now, state->omega_q30, true);
     state->predicted = angle.theta_e + (uint32_t)angle.step;
     return angle;
@@ -111,7 +108,7 @@ static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const
         return REPEATS_UNDECIDED; /* at rest: what follows would find the same, with a hundred instructions more */
     }
     const int32_t error = error_of(config, state, angle->theta_e);
-    const int32_t signed_step = advance_at(config, speed_before(config, state, error), config->turn_shift);
+    const int32_t signed_step = advance_at(config, speed_before(config, state, error));
     const int64_t step = fx_abs_q31(signed_step);
     const int64_t advance = step * state->repeats;
     const int64_t behind = (signed_step < 0) ? (int64_t)error : -(int64_t)error;
@@ -148,7 +145,7 @@ __attribute__((cold)) angle_repeat_t angle_tracker_repeated(const angle_tracker_
 __attribute__((cold)) bool angle_tracker_may_stick(const angle_tracker_config_t *config,
                                                    const angle_tracker_state_t *state)
 {
-    const int64_t step = fx_abs_q31(advance_at(config, state->omega_q30, config->turn_shift));
+    const int64_t step = fx_abs_q31(advance_at(config, state->omega_q30));
     return step * config->stop_periods > config->repeat_max;
 }
 

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "control/current/current_control.h"
 
-#include "control/current/current_control_circle.h"
+#include "fx/circle.h"
 #include "fx/codegen.h"
+#include "fx/div.h"
+#include "fx/q.h"
 
 #define HALF_LSB_Q22 64
+#define V_D_MIN Q15(0.7) /* share of the circle that the d axis may always use (CC-11) */
 
 void current_control_reset(current_control_state_t *state)
 {
@@ -44,6 +47,39 @@ static int32_t integrate(int32_t s_q30, int32_t gain, int32_t error)
     return fx_sat_bits(s_q30 + gain * error, 31);
 }
 
+/* 1/(v_ratio v_dc), Q25 (CC-15), at most 64. Q31/Q15 = Q16. */
+static int32_t reciprocal_v_max(const current_control_config_t *config, int32_t v_dc)
+{
+    return fx_usat_bits(fx_quotient(config->per_ratio_q31, (uint32_t)v_dc), 22) * 512;
+}
+
+/* Clamps to [-limit - 1, limit]. The magnitude is the ones' complement, so that one comparison is enough. */
+static int32_t clamp_symmetric(int32_t x, int32_t limit)
+{
+    return fx_min_s32(x ^ (x >> 31), limit) ^ (x >> 31);
+}
+
+/* Largest voltage of one axis inside the unit circle, given the other axis' voltage; at least a quarter (CC-11). */
+static int32_t remaining_voltage(int32_t other)
+{
+    return fx_circle_table[(other ^ (other >> 31)) >> 7];
+}
+
+/* While the d flux is to fall, the d axis has priority, and its excess is subtracted from q (CC-14). While the d flux
+ * is to rise, the q axis has priority, because the q flux may be what limits the d axis; d keeps 0.7 of the circle, or
+ * else the d flux would fall further and i_d would grow (CC-11). */
+static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t omega)
+{
+    const dq_q15_t clipped = {fx_sat_q15_word(v.d), fx_sat_q15_word(v.q)};
+    if (error_d > 0) {
+        return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), V_D_MIN)), clipped.q};
+    }
+    const int32_t excess = fx_sat_q15_word(v.d - clipped.d);
+    const int32_t sign = omega >> 31; /* two's complement: an excess of 0 must change nothing */
+    const int32_t reduced_q = v.q + (excess ^ sign) - sign;
+    return (dq_q15_t){clipped.d, clamp_symmetric(reduced_q, remaining_voltage(clipped.d))};
+}
+
 /* s += a T_s (u_limited - u), the difference limited to four times the circle (CC-10). Q33 * Q13 = Q30. */
 static int32_t anti_windup(int32_t s_q30, int32_t gain_q33, int32_t change)
 {
@@ -67,7 +103,7 @@ current_control_out_t current_control_step(const current_control_config_t *confi
                                           integrate(s.s_q_q30, config->integral_gain, to.psi.q - psi.q)};
     const dq_q15_t u = {fx_sat_q15_word((u_q22.d + HALF_LSB_Q22) >> 7), fx_sat_q15_word((u_q22.q + HALF_LSB_Q22) >> 7)};
 
-    const int32_t per_v_max_q25 = reciprocal_v_max(config->per_ratio_q31, in->v_dc);
+    const int32_t per_v_max_q25 = reciprocal_v_max(config, in->v_dc);
     /* Q25 * Q22 = Q15, below 2^30. */
     const dq_q15_t v = {fx_mulhi(per_v_max_q25, u_q22.d), fx_mulhi(per_v_max_q25, u_q22.q)};
     const fx_pair_t v_pair = fx_pair(fx_sat_q15_word(v.d), fx_sat_q15_word(v.q));

@@ -31,7 +31,7 @@
 #include "types/frames.h"
 
 typedef struct {
-    int32_t sigma_q24;
+    int32_t sigma_q24;         /* 0, as integral_gain, where current_control_turning.h is used */
     q16_t drop_gain;           /* r/sigma: resistive voltage drop as a flux error */
     q15_t setpoint_weight;     /* b = w_c/(w_c + a) */
     q15_t integral_gain;       /* sigma a_i < 1/2 */

@@ -10,36 +10,44 @@
  * r is the model's flux at the coming sample, r' at the one after it, r_k at this one. The deviation from the model is
  * fed back in the direction that it had when it was sampled, hence -1.5 theta: in the stationary frame, in which the
  * machine is an integrator at every speed. The loop's margins therefore do not depend on the speed.
- * Voltage limit: as current_control.h; r' then becomes the flux that the limited voltage can reach.
+ * Voltage limit: that of current_control_step(), which gets u as its integrator and must have no gains of its own; r'
+ *   then becomes the flux that the limited voltage can reach.
  * Source   docs/theory/current-control.md (CC-16) ... (CC-20)
  * Units    per unit; angles in turns times 2^32
- * Range    0.36 < w_b T_s < 1.57; |r| <= 1, |s| <= 1
- * Rounding half up: 1/2 LSB q15 in u and v, 2^-28 per period in s, 2^-29 in r
+ * Range    0.36 < w_b T_s < 1.57; |r| <= 1, |u| <= 1, |s| w_b T_s < 2
+ * Rounding half up: 1/2 LSB q15 in u and v; 2^-28 of a flux in s, 2^-25 in r. The limit's feed-forward -+w psi is left
+ *          of the sign of w only: up to 1 LSB q15 in u
  * Errors   saturates and reports it in limited; raises no fault
- * Context  fast ISR, in place of current_control_step(); one bounded hardware division */
+ * Context  fast ISR, in place of current_control_step(), which it calls */
 #include "control/current/current_control.h"
 
 typedef struct {
     int32_t per_period_q29; /* 1/(w_b T_s) < 4; 0: the motor does not need this law */
-    q31_t approach;         /* alpha */
-    q31_t feedback;         /* k_0/(w_b T_s) */
-    int32_t integral_q35;   /* epsilon < 1/16 */
-    q31_t r;                /* R_0 */
-    q31_t voltage_to_flux;  /* w_b T_s v_ratio: flux of one period at the circle's radius and v_dc = 1 */
+    int32_t approach_q32;   /* alpha < 1/2 */
+    int32_t feedback_q32;   /* k_0 < 1/2 */
+    int32_t integral_q32;   /* epsilon */
+    int32_t drop_q29;       /* w_b T_s R_0 */
 } turning_control_config_t;
 
+/** Flux linkage, and flux of one period, which is the voltage times w_b T_s. */
 typedef struct {
-    dq_q30_t s;    /* integral part */
-    dq_q30_t now;  /* r_k: the model's flux at this sample */
-    dq_q30_t next; /* r: at the coming one */
-    bool begun;    /* the model started from the machine's flux */
+    int32_t d, q;
+} dq_q28_t;
+
+typedef struct {
+    int32_t d, q;
+} dq_q29_t;
+
+typedef struct {
+    dq_q28_t s;    /* integral part */
+    dq_q29_t now;  /* r_k: the model's flux at this sample */
+    dq_q29_t next; /* r: at the coming one */
 } turning_control_state_t;
 
 typedef struct {
-    current_control_in_t control;
+    current_control_in_t control; /* omega: 0 or -1, its sign */
     dq_q15_t i;
-    int32_t angle_step;    /* theta */
-    uint32_t angle_to_act; /* 1.5 theta */
+    int32_t angle_step; /* theta */
 } turning_control_in_t;
 
 static inline bool turning_control_used(const turning_control_config_t *config)
@@ -47,8 +55,9 @@ static inline bool turning_control_used(const turning_control_config_t *config)
     return config->per_period_q29 != 0;
 }
 
-void turning_control_reset(turning_control_state_t *state);
-/** limits: the same voltage circle as that of current_control_step(). */
+/** The model rests at the machine's flux. */
+void turning_control_reset(turning_control_state_t *state, const flux_point_t *flux);
+/** limits: gains of 0 and tracking_gain_q34 = w_b T_s v_ratio/16. */
 current_control_out_t turning_control_step(const turning_control_config_t *config,
                                            const current_control_config_t *limits, turning_control_state_t *state,
                                            const turning_control_in_t *in);

@@ -13,8 +13,6 @@
 /* Weight of the d equation (MR-7). */
 #define WEIGHT_D 2
 
-#define G_SHIFT_MAX 15
-
 /* Formats that only this law uses. */
 typedef struct {
     int32_t d, q;
@@ -35,9 +33,8 @@ static bool are_limits_valid(q31_t lo, q31_t hi)
 
 motor_check_t mrai_check(const mrai_config_t *c)
 {
-    if (c->r0 <= 0 || c->pole_gain <= 0 || c->g_shift < -G_SHIFT_MAX || c->g_shift > G_SHIFT_MAX || c->period <= 0 ||
-        c->period > Q31(0.78) || c->flux_gain < 0 || c->resistance_gain < 0 || c->flux_proportional_q24 < 0 ||
-        c->resistance_proportional_q24 < 0) {
+    if (c->r0 <= 0 || c->pole_gain <= 0 || c->period <= 0 || c->period > Q31(0.78) || c->flux_gain < 0 ||
+        c->resistance_gain < 0 || c->flux_proportional_q24 < 0 || c->resistance_proportional_q24 < 0) {
         return MOTOR_CHECK_MRAI_GAINS;
     }
     if (!are_limits_valid(c->psi_delta_min, c->psi_delta_max) || !are_limits_valid(c->r_delta_min, c->r_delta_max)) {

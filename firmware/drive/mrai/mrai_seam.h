@@ -14,7 +14,8 @@
 
 static inline motor_check_t mrai_data_check(const motor_t *m)
 {
-    return mrai_check(m->mrai);
+    const bool shift_fits = m->mrai->g_shift >= -15 && m->mrai->g_shift <= 15;
+    return shift_fits ? mrai_check(m->mrai) : MOTOR_CHECK_MRAI_GAINS;
 }
 
 static inline void mrai_init(drive_t *drive)

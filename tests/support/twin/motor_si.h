@@ -20,6 +20,7 @@ typedef struct {
     const double *l_d_H, *l_q_H, *l_dd_H, *l_qq_H, *psi_f0_Vs;
     /* current control */
     double sigma_rad_s, setpoint_weight, integral_ratio, v_ratio;
+    double turning_approach, turning_feedback, turning_integral; /* per period; 0: the field does not turn far */
     /* modulation */
     double dead_time_duty, knee_A, min_pulse_duty;
     /* identification */

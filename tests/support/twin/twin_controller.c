@@ -70,7 +70,7 @@ static double slew(double from, double to, double step)
 
 static bool voltage_limited(const twin_t *twin)
 {
-    return twin->current.limited || twin->modulation_limited;
+    return twin->current.limited || twin->turning.limited || twin->modulation_limited;
 }
 
 /* The twin has no limits set by the vehicle and no inverter temperature: a cold inverter is assumed. */
@@ -203,7 +203,12 @@ static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
     const twin_current_in_t request = {twin->target, &now->flux, now->omega, twin->psi_delta, twin->v_dc};
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
-    twin->u = twin_current_control(&motor, &twin->current, &request);
+    if (motor.turning_feedback > 0.0) {
+        const twin_turning_in_t far = {request, now->i, angle->step};
+        twin->u = twin_turning_control(&motor, &twin->turning, &far);
+    } else {
+        twin->u = twin_current_control(&motor, &twin->current, &request);
+    }
     const twin_modulate_in_t voltage = {twin->u, now->i, angle->theta + 1.5 * angle->step, twin->v_dc};
     const twin_modulate_t m = twin_modulate(&motor, &voltage);
     twin->applied = m.applied;
@@ -220,6 +225,7 @@ static void bridge_off(twin_t *twin, double out[4])
     twin->u = (twin_dq_t){0.0, 0.0};
     twin->applied = (twin_dq_t){0.0, 0.0};
     twin->current = (twin_current_state_t){0};
+    twin_turning_reset(&twin->turning, &twin->sample.flux);
     twin->modulation_limited = false;
     twin->periods_on = 0;
     out[0] = out[1] = out[2] = 0.5;

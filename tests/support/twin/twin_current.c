@@ -64,6 +64,54 @@ twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *st
     return u;
 }
 
+void twin_turning_reset(twin_turning_state_t *state, const twin_flux_t *flux)
+{
+    const twin_dq_t psi = {flux->psi_d, flux->psi_q};
+    *state = (twin_turning_state_t){.now = psi, .next = psi};
+}
+
+static twin_dq_t sum(twin_dq_t a, double factor, twin_dq_t b)
+{
+    return (twin_dq_t){a.d + factor * b.d, a.q + factor * b.q};
+}
+
+/* x e^(j angle). */
+static twin_dq_t turned(twin_dq_t x, double angle)
+{
+    const twin_ab_t y = twin_park_inverse(x, angle);
+    return (twin_dq_t){y.alpha, y.beta};
+}
+
+/* e^(j theta/2) to - e^(-j theta/2) from: the flux of the period that leads from one to the other. */
+static twin_dq_t between(twin_dq_t from, twin_dq_t to, double theta)
+{
+    return sum(turned(to, 0.5 * theta), -1.0, turned(from, -0.5 * theta));
+}
+
+twin_dq_t twin_turning_control(const motor_si_t *motor, twin_turning_state_t *state, const twin_turning_in_t *in)
+{
+    const twin_current_in_t *c = &in->control;
+    const double theta = in->step;
+    const twin_dq_t magnet = {c->psi_delta, 0.0};
+    const twin_dq_t e = {state->now.d - c->flux->psi_d, state->now.q - c->flux->psi_q};
+    const twin_dq_t to = sum(state->next, motor->turning_approach, sum(c->target.psi, -1.0, state->next));
+    const twin_dq_t model = between(sum(state->next, 1.0, magnet), sum(to, 1.0, magnet), theta);
+    const twin_dq_t fed_back = turned(e, -1.5 * theta);
+    const twin_dq_t flux = sum(model, motor->turning_feedback, fed_back);
+    state->unlimited = sum(sum(state->s, 1.0 / motor->period_s, flux), motor->r_ohm_20, in->i);
+    const double max = motor->v_ratio * c->v_dc;
+    const twin_dq_t u = circle(state->unlimited, max, c->target.psi.d > c->flux->psi_d, c->omega);
+    const twin_dq_t cut = {twin_clamp(u.d - state->unlimited.d, -4.0 * max, 4.0 * max),
+                           twin_clamp(u.q - state->unlimited.q, -4.0 * max, 4.0 * max)};
+    const double rounding = 1e-9 * motor->v_base_V;
+    state->limited = fabs(cut.d) > rounding || fabs(cut.q) > rounding;
+    const twin_dq_t direction = sum(between(e, e, theta), motor->turning_feedback, fed_back);
+    state->s = sum(state->s, motor->turning_integral / motor->period_s, direction);
+    state->now = state->next;
+    state->next = sum(to, motor->period_s, turned(cut, -0.5 * theta));
+    return u;
+}
+
 static double limit_pulse(double duty, double min_pulse)
 {
     const double d = twin_clamp(duty, 0.0, 1.0);

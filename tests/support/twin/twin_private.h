@@ -34,6 +34,7 @@ struct twin {
     twin_monitor_t monitor;
     twin_angle_state_t tracker;
     twin_current_state_t current;
+    twin_turning_state_t turning;
     twin_mrai_state_t mrai;
     twin_mrai_schedule_t schedule;
     twin_mrai_quality_t quality;

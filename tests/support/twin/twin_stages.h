@@ -99,6 +99,23 @@ twin_target_t twin_current_target(const motor_si_t *motor, twin_dq_t i_ref);
 twin_dq_t twin_current_control(const motor_si_t *motor, twin_current_state_t *state, const twin_current_in_t *in);
 
 typedef struct {
+    twin_dq_t s;         /* V */
+    twin_dq_t now, next; /* V s: the model's flux at this sample and at the coming one */
+    twin_dq_t unlimited; /* V, of the last step */
+    bool limited;
+} twin_turning_state_t;
+
+typedef struct {
+    twin_current_in_t control;
+    twin_dq_t i;
+    double step; /* advance of the angle, rad per period */
+} twin_turning_in_t;
+
+/* The law of a motor whose field turns far in a period. */
+void twin_turning_reset(twin_turning_state_t *state, const twin_flux_t *flux);
+twin_dq_t twin_turning_control(const motor_si_t *motor, twin_turning_state_t *state, const twin_turning_in_t *in);
+
+typedef struct {
     twin_dq_t u, i;
     double theta; /* the angle at the middle of the acting period */
     double v_dc;

@@ -617,8 +617,6 @@ void test_a_configuration_outside_its_range_is_rejected(void)
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, mrai_check(&f.mrai));
     REJECTED(r0, 0);
     REJECTED(pole_gain, 0);
-    REJECTED(g_shift, -16);
-    REJECTED(g_shift, 16);
     REJECTED(flux_gain, -1);
     REJECTED(resistance_gain, -1);
     REJECTED(flux_proportional_q24, -1);

@@ -387,22 +387,25 @@ void test_a_slow_angle_that_freezes_is_replaced_for_5_ms_and_then_that_of_a_roto
 /* Its own law on the checked route, which is never left. */
 void test_a_motor_whose_field_turns_far_runs_on_its_own_law(void)
 {
-    seam.motor.turning_control = (turning_control_config_t){.per_period_q29 = Q31(0.5),
-                                                            .approach = Q31(0.36),
-                                                            .feedback = Q31(0.5),
-                                                            .integral_q35 = Q31(0.72),
-                                                            .voltage_to_flux = Q31(0.3)};
+    seam.motor.turning_control = (turning_control_config_t){
+        .per_period_q29 = Q31(0.5), .approach_q32 = Q31(0.72), .feedback_q32 = Q31(0.56), .integral_q32 = Q31(0.09)};
+    seam.motor.parameters.current_control.sigma_q24 = 0;
+    seam.motor.parameters.current_control.integral_gain = 0;
+    drive.parameters.current_control = seam.motor.parameters.current_control;
     seam_run();
-    seam_periods(5);
+    seam_period();
+    seam_current(30.0, -15.0, -15.0);
+    seam_periods(4);
     TEST_ASSERT_TRUE(seam.gates);
-    TEST_ASSERT_TRUE(drive.fast.turning_control.begun);
     TEST_ASSERT_FALSE(drive.fast.is_settled);
     TEST_ASSERT_TRUE(published()->acting);
     TEST_ASSERT_EQUAL_INT32(0, drive.fast.current_control.s_d_q30);
+    TEST_ASSERT_NOT_EQUAL_INT32(0, drive.fast.turning_control.s.d);
     drive.request.enable = false;
     seam_periods(20);
     TEST_ASSERT_FALSE(seam.gates);
-    TEST_ASSERT_FALSE(drive.fast.turning_control.begun);
+    TEST_ASSERT_EQUAL_INT32(0, drive.fast.turning_control.s.d);
+    TEST_ASSERT_EQUAL_INT32(published()->point.flux.psi_d * 16384, drive.fast.turning_control.next.d);
 }
 
 /* The voltage computed in period k acts in period k + 1, so the published one was computed in the previous period. */

@@ -96,7 +96,14 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.integral_gain = Q15(0.5)) \
     X(CURRENT_CONTROL_GAINS, m.parameters.current_control.tracking_gain_q34 = -1) \
     X(CURRENT_CONTROL_GAINS, m.angle_tracker.turn_shift = 1) \
-    X(CURRENT_CONTROL_GAINS, m.turning_control.per_period_q29 = Q31(0.16)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.per_period_q29 = -1; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.approach_q32 = 0; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.feedback_q32 = 0; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.integral_q32 = 0; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.drop_q29 = -1; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; limit_only(&m); m.angle_tracker.turn_shift = 2) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.sigma_q24 = 0) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.integral_gain = 0) \
     X(VOLTAGE_RATIO, m.parameters.modulate.alpha_q31 = m.parameters.modulate.alpha_q31 / 1000 * 1001) \
     X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 += 20) \
     X(VOLTAGE_RATIO, m.parameters.modulate.side_q31 -= 20) \
@@ -123,6 +130,8 @@ static const int16_t *reference(const int16_t *good, int16_t last)
 #define MRAI(X) \
     X(MRAI_GAINS, law.r0 = 0) \
     X(MRAI_GAINS, law.pole_gain = 0) \
+    X(MRAI_GAINS, law.g_shift = -16) \
+    X(MRAI_GAINS, law.g_shift = 16) \
     X(MRAI_GAINS, law.period = 0) \
     X(MRAI_GAINS, law.period = Q31(0.79)) \
     X(MRAI_GAINS, law.flux_gain = -1) \
@@ -163,6 +172,29 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(IDENTIFY_PRIOR, m.identify.sigma[IDENTIFY_IRON] = 0) \
     X(IDENTIFY_PRIOR, m.identify.leak[IDENTIFY_IRON] = 0) \
     X(IDENTIFY_PRIOR, m.identify.leak[IDENTIFY_R] = Q31(0.25) + 1)
+
+static const turning_control_config_t turning = {.per_period_q29 = Q31(0.16),
+                                                 .approach_q32 = Q31(0.72),
+                                                 .feedback_q32 = Q31(0.56),
+                                                 .integral_q32 = Q31(0.09),
+                                                 .drop_q29 = Q31(0.01)};
+
+/* The usual law as the limit of the other one's voltage. */
+static void limit_only(motor_t *m)
+{
+    m->parameters.current_control.sigma_q24 = 0;
+    m->parameters.current_control.integral_gain = 0;
+}
+
+void test_both_laws_of_current_control_are_accepted_with_the_gains_that_they_need(void)
+{
+    motor_t m = motor;
+    TEST_ASSERT_EQUAL(MOTOR_CHECK_OK, motor_check(&m));
+    m.turning_control = turning;
+    limit_only(&m);
+    m.angle_tracker.turn_shift = 1;
+    TEST_ASSERT_EQUAL(MOTOR_CHECK_OK, motor_check(&m));
+}
 
 /* All three copies of the ratio agree. */
 static void scale_ratio(motor_t *m, double ratio)

@@ -174,20 +174,36 @@ def _flux_table(motor: Motor) -> list[Row]:
     ]
 
 
-def _current_control(motor: Motor) -> list[Row]:
+def _current_gains(motor: Motor) -> tuple[Row, Row, Row]:
+    """sigma, integral part and anti-windup; of the other law's voltage limit where the field turns far (CC-20)."""
     d, b = motor.derived, motor.bases
+    if motor.config.is_turning:
+        flux = b.omega_rad_s * b.period_s * d.v_ratio
+        tracking = "tracking_gain_q34", q31(flux / 2, "tracking_gain"), "omega_b T_s v_ratio/16: turning_control"
+        return ("sigma_q24", "0", ""), ("integral_gain", "0", ""), tracking
     sigma = d.sigma_rad_s / b.omega_rad_s
-    r_pu = motor.config.machine.r_ohm / b.resistance_ohm
-    return [
+    return (
         ("sigma_q24", q31(sigma / 128, "sigma"), f"sigma = {d.sigma_rad_s:.6g} rad/s, over omega_b"),
-        ("drop_gain", q16(r_pu / sigma, "drop_gain"), "R at 20 C over sigma_gain"),
-        ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
         ("integral_gain", q15(sigma * d.integral_ratio, "integral_gain"), f"sigma_gain {d.integral_ratio:.6g}"),
         (
             "tracking_gain_q34",
             q31(8 * d.integral_ratio / d.setpoint_weight * d.v_ratio, "tracking_gain"),
             "integral ratio over weight, times v_ratio",
         ),
+    )
+
+
+def _current_control(motor: Motor) -> list[Row]:
+    d, b = motor.derived, motor.bases
+    sigma, integral, tracking = _current_gains(motor)
+    r_pu = motor.config.machine.r_ohm / b.resistance_ohm
+    drop = r_pu * b.omega_rad_s / d.sigma_rad_s
+    return [
+        sigma,
+        ("drop_gain", q16(drop, "drop_gain"), "R at 20 C over sigma_gain"),
+        ("setpoint_weight", q15(d.setpoint_weight, "setpoint_weight"), f"{d.setpoint_weight:g}"),
+        integral,
+        tracking,
         ("per_ratio_q31", f"{round(2**31 / d.v_ratio)}u", f"1/{d.v_ratio:.6g}"),
         ("clear_q30", f"{round(2**30 * (d.v_clear / d.v_ratio) ** 2)}u", f"({d.v_clear:.6g} over v_ratio) squared"),
     ]
@@ -200,11 +216,10 @@ def _turning_control(motor: Motor) -> list[Row]:
         return [("per_period_q29", "0", "not needed")]
     return [
         ("per_period_q29", q31(1 / turn / 4, "1/(omega_b T_s)"), f"1/(omega_b T_s) = {1 / turn:.6g}"),
-        ("approach", q31(TURNING_APPROACH, "approach"), f"{TURNING_APPROACH:.6g} per period"),
-        ("feedback", q31(TURNING_FEEDBACK / turn, "feedback"), f"{TURNING_FEEDBACK:g} per period"),
-        ("integral_q35", q31(TURNING_INTEGRAL * 16, "integral"), f"{TURNING_INTEGRAL:g} per period"),
-        ("r", q31(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
-        ("voltage_to_flux", q31(turn * motor.derived.v_ratio, "voltage_to_flux"), "omega_b T_s v_ratio"),
+        ("approach_q32", q31(2 * TURNING_APPROACH, "approach"), f"{TURNING_APPROACH:.6g} per period"),
+        ("feedback_q32", q31(2 * TURNING_FEEDBACK, "feedback"), f"{TURNING_FEEDBACK:g} per period"),
+        ("integral_q32", q31(2 * TURNING_INTEGRAL, "integral"), f"{TURNING_INTEGRAL:g} per period"),
+        ("drop_q29", q31(turn * motor.config.machine.r_ohm / b.resistance_ohm / 4, "drop"), "omega_b T_s R at 20 C"),
     ]
 
 
@@ -687,6 +702,12 @@ def _si_rows(motor: Motor) -> list[Row]:
         "i_max_A": machine.i_max_A,
     }
     numbers |= {name: getattr(motor.derived, name) for name in _SI_DERIVED}
+    if motor.config.is_turning:
+        numbers |= {
+            "turning_approach": TURNING_APPROACH,
+            "turning_feedback": TURNING_FEEDBACK,
+            "turning_integral": TURNING_INTEGRAL,
+        }
     counts = {
         "pole_pairs": machine.pole_pairs,
         "periods_per_step": b.periods_per_step,
