@@ -96,7 +96,7 @@ def test_a_file_in_place_of_the_output_folder_is_said(write, tmp_path):
 def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(write, tmp_path):
     out = tmp_path / "out"
     build(write(), out, report=True)
-    assert len(PLOTS) == 7
+    assert len(PLOTS) == 8
     assert names(out) == PLAIN | {*PLOTS} | {"report.html"}
     page = (out / "report.html").read_text(encoding="utf-8")
     for plot in PLOTS:

@@ -1,60 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Margins of both laws of current control, computed from the generator's constants: docs/theory/current-control.md."""
 
-import math
-
 import numpy as np
 import pytest
+from conftest import MOTORS
 
 from fluxtrue_tools.motor.config import ANGLE_PER_PERIOD_MAX, ANGLE_TURNING
-from fluxtrue_tools.motor.derived import (
-    CLOSED_LOOP_SHARE,
-    DELAY_PERIODS,
-    LOOP_MISSING_PERIODS,
-    TURNING_APPROACH,
-    TURNING_FEEDBACK,
-    TURNING_INTEGRAL,
-)
+from fluxtrue_tools.motor.current_loop import SIGMA, current_loop, turning, usual
+from fluxtrue_tools.motor.derived import LOOP_MISSING_PERIODS, TURNING_APPROACH
+from fluxtrue_tools.motor.motor import load_motor
 
-SIGMA = 1.0 / (2.0 * DELAY_PERIODS)  # per period
-INTEGRAL = CLOSED_LOOP_SHARE * (1.0 - CLOSED_LOOP_SHARE) * SIGMA
 PHASE_MARGIN_MIN_DEG = 40.0
 # As in the document: phase margins of both, largest sensitivity, largest table slope over the true one.
 TABLE = {0.0: (52, 57, 1.50, 3.5), 0.2: (30, 48, 1.57, 3.3), 0.4: (17, 44, 1.63, 3.2), 0.6: (9, 48, 1.63, 3.1),
          0.8: (4, 57, 1.68, 2.5), 1.0: (None, 56, 1.76, 2.3), 1.2: (None, 57, 1.77, 2.3)}  # fmt: skip
-
-
-class Loop:
-    """The loop at the machine's voltage: feedback k and integral part i per period, R = 0, (CC-12)."""
-
-    def __init__(self, theta: float, k: complex, i: complex, slope: float = 1.0) -> None:
-        self.pole, self.k, self.i, self.slope = np.exp(-1j * theta), k, i, slope
-
-    def margins(self, points: int = 20001) -> tuple[float, float]:
-        """Phase margin in degrees over all frequencies of both signs, largest sensitivity."""
-        z = np.exp(1j * np.linspace(-np.pi, np.pi, points))
-        z = z[np.abs(z - 1.0) > 1e-3]
-        loop = self.slope * (self.k + self.i / (z - 1.0)) / (z * (z - self.pole))
-        crossings = np.flatnonzero(np.diff(np.sign(np.abs(loop) - 1.0)))
-        return float(np.abs(np.angle(-loop[crossings], deg=True)).min()), float(1.0 / np.abs(1.0 + loop).min())
-
-    def largest_pole(self) -> float:
-        """Magnitude of the slowest eigenvalue."""
-        plant = np.polymul([1.0, -self.pole], [1.0, -1.0, 0.0])
-        return float(np.abs(np.roots(np.polyadd(plant, self.slope * np.array([0, 0, self.k, self.i - self.k])))).max())
-
-
-def usual(theta: float, share: float = 1.0, advance: float = 0.0, sigma: float = SIGMA) -> Loop:
-    """Section 3, with a share of the feed-forward and an additional advance of the angle."""
-    turn = np.exp(1j * (advance - 0.5) * theta)
-    return Loop(theta, turn * (sigma - 1j * share * theta), turn * sigma * INTEGRAL)
-
-
-def turning(theta: float, slope: float = 1.0) -> Loop:
-    """Section 8: the voltage is stated half a period before the end of the one in which it acts."""
-    half = np.exp(-0.5j * theta)
-    k = TURNING_FEEDBACK * np.exp(-1.5j * theta)
-    return Loop(theta, half * k, half * TURNING_INTEGRAL * (k + 2j * math.sin(0.5 * theta)), slope)
 
 
 def test_the_phase_margin_is_40_degrees_and_more_at_every_speed_that_is_accepted() -> None:
@@ -98,3 +57,11 @@ def test_no_share_of_the_feed_forward_and_no_advance_replace_the_other_law() -> 
 def test_both_laws_lag_as_far_behind_a_reference() -> None:
     lag = 1.0 + 1.0 / TURNING_APPROACH
     assert lag == pytest.approx(LOOP_MISSING_PERIODS, abs=1e-9)
+
+
+def test_a_motor_has_the_law_that_its_firmware_has() -> None:
+    hsm1 = load_motor(MOTORS / "hsm1")
+    top = hsm1.config.omega_max_rad_s / hsm1.config.inverter.pwm_hz
+    assert not hsm1.config.is_turning
+    assert current_loop(hsm1, hsm1.config.machine.speed_max_rpm).margins() == usual(top).margins()
+    assert current_loop(hsm1, 0.0, 0.75).margins()[0] < current_loop(hsm1, 0.0, 1.25).margins()[0]

@@ -6,9 +6,8 @@ from pathlib import Path
 
 FILE_NAME = "motor.toml"
 HTML = "report.html"
-PLOTS = tuple(
-    f"plot_{what}.png" for what in ("envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit")
-)
+_FIGURES = ("current_loop", "envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit")
+PLOTS = tuple(f"plot_{what}.png" for what in _FIGURES)
 BUILT = ("motor_tables.c", "motor_si.c", "motor.json", "report.txt", HTML, *PLOTS)
 
 

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from fluxtrue_tools.motor.flux_model import Array, flux, torque
 from fluxtrue_tools.motor.flux_tables import error_plane
+from fluxtrue_tools.motor.loop_plots import current_loop_figure
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE
 from fluxtrue_tools.motor.references import lookup_references
@@ -168,5 +169,6 @@ FIGURES: dict[str, tuple[str, Callable[[Motor], Figure]]] = {
     "plot_envelope.png": ("Torque-speed envelope", envelope_figure),
     "plot_losses.png": ("Efficiency and losses", losses_figure),
     "plot_short_circuit.png": ("Active short circuit", short_circuit_figure),
+    "plot_current_loop.png": ("Current loop", current_loop_figure),
     "plot_error.png": ("Table error against the map", error_figure),
 }
