@@ -12,7 +12,7 @@ from fluxtrue_tools.motor.flux_model import FluxModel
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
 TURNING_FEEDBACK, TURNING_INTEGRAL = 0.28, 0.045  # per period (CC-18), (CC-19)
-TURNING_APPROACH = 1.0 / 2.75  # per period: the flux then lags as far as with the other law (TL-11)
+TURNING_APPROACH = 0.1  # per period: inductances 20 % too small overshoot by less than 10 % (CC-21)
 SINC_SERIES_MAX = 0.6  # rad: up to here 1 + theta^2/24 is 1/sinc(theta/2), (MR-5); beyond it is fitted at maximum speed
 PAPER_TURN_MAX = 0.78  # rad at omega_b: the end of the formats of the paper's law
 V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
@@ -206,6 +206,16 @@ def _identification(config: MotorConfig, model: FluxModel, bases: Bases, psi_f_V
     }
 
 
+def missing_periods(config: MotorConfig) -> float:
+    """Area between a small step of current and its answer (TL-11), (CC-21)."""
+    return 1.0 + 1.0 / TURNING_APPROACH if config.is_turning else LOOP_MISSING_PERIODS
+
+
+def slew_weak(config: MotorConfig) -> float:
+    """Per second: a slower answer of the currents gets a slower slew, so that (MN-11) is as sensitive with it."""
+    return SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS / missing_periods(config)
+
+
 def steps(seconds: float, step_s: float) -> int:
     """Steps of the task that cover a time."""
     return math.ceil(seconds / step_s - 1e-6)
@@ -213,7 +223,7 @@ def steps(seconds: float, step_s: float) -> int:
 
 def _torque_loop(config: MotorConfig, step_s: float) -> dict[str, float]:
     control = config.control
-    missing_s = LOOP_MISSING_PERIODS / config.inverter.pwm_hz + STEP_MISSING_S
+    missing_s = missing_periods(config) / config.inverter.pwm_hz + STEP_MISSING_S
     return {
         "torque_ki": control.torque_loop_bandwidth_rad_s * step_s,
         "torque_kp": 0.0,
@@ -237,7 +247,7 @@ def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[st
     vdc, omega, thermal, magnet = config.inverter.vdc_V, config.omega_max_rad_s, config.thermal, config.magnet
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
     return {
-        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * bases.step_s,
+        "torque_slew_weak_Nm": slew_weak(config) * config.machine.torque_max_Nm * bases.step_s,
         "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
         "loss_rate": 1.0 - math.exp(-bases.step_s / LOSS_TIME_S),
         "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
@@ -274,7 +284,7 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
         "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
         # The fastest change of torque moves the current by this much per second; current control lags behind (TL-11).
-        "ripple_A": (RIPPLE_SHARE + SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS * bases.period_s) * machine.i_max_A,
+        "ripple_A": (RIPPLE_SHARE + slew_weak(config) * missing_periods(config) * bases.period_s) * machine.i_max_A,
         "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
         "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
         "monitor_torque_Nm": max(
