@@ -26,6 +26,13 @@ static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *sna
     return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);
 }
 
+/* A bridge that switches off below the level of the short circuit, in the step in which the speed exceeds it, stays
+ * off: only a decision of an earlier step holds the permission. */
+static bool is_armed(const task_state_t *task, bool holds_short_circuit, uint32_t faults)
+{
+    return task->run_state == RUN_STATE_RUN || (task->armed && (holds_short_circuit || faults != 0U));
+}
+
 safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
@@ -43,10 +50,11 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
     };
+    const bool was_short_circuit = task->safe_state.short_circuit;
     const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot, in.currents_valid);
     const bool by_speed = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
     const bool short_circuit = by_speed || (by_gate && (faults & FAULT_GATE) != 0U);
-    task->armed = task->run_state == RUN_STATE_RUN || (task->armed && (short_circuit || faults != 0U));
+    task->armed = is_armed(task, short_circuit && was_short_circuit, faults);
     if (!task->armed) {
         return SAFE_FREEWHEEL;
     }

@@ -75,6 +75,7 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
         .acting = window->acting && snapshot->sample.acting,
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
+        .psi_ref = task->psi_ref,
         .i_least = least_of(phases_ref),
         .theta_e = snapshot->sample.theta_e,
     };

@@ -25,17 +25,28 @@ static int32_t approach(int32_t mean, int32_t x, int shift)
     return mean + ((x - mean) >> shift);
 }
 
+/* Without the voltage that changes the flux (MN-27): references that creep by less than i_0 are no movement. */
+static dq_q15_t standing_voltage(const frozen_angle_config_t *config, frozen_angle_state_t *state,
+                                 const frozen_angle_in_t *in)
+{
+    const q15_t d = fx_sat_q15(in->psi_ref.d - state->psi_ref.d), q = fx_sat_q15(in->psi_ref.q - state->psi_ref.q);
+    state->psi_ref = in->psi_ref;
+    return (dq_q15_t){in->u_sum.d - fx_mulhi(config->rate_gain, d * 65536),
+                      in->u_sum.q - fx_mulhi(config->rate_gain, q * 65536)};
+}
+
 /* (MN-22); true while there is a voltage to compare with. */
 static bool follow(const frozen_angle_config_t *config, frozen_angle_state_t *state, const frozen_angle_in_t *in)
 {
+    const dq_q15_t u_sum = standing_voltage(config, state, in);
     if (has_moved(config, state, in)) {
         state->i_ref = in->i_ref;
         state->theta_e = in->theta_e;
         state->standing = 0;
     }
     const int shift = (state->standing < MOVING_STEPS) ? 0 : MEAN_SHIFT;
-    state->mean_q8.d = approach(state->mean_q8.d, in->u_sum.d * 256, shift);
-    state->mean_q8.q = approach(state->mean_q8.q, in->u_sum.q * 256, shift);
+    state->mean_q8.d = approach(state->mean_q8.d, u_sum.d * 256, shift);
+    state->mean_q8.q = approach(state->mean_q8.q, u_sum.q * 256, shift);
     if (state->standing < config->settle_steps) {
         state->standing++;
         state->first_q8 = state->mean_q8;

@@ -20,6 +20,7 @@
 
 typedef struct {
     int32_t v_0;          /* voltage change without a turning rotor, times the periods of a step */
+    q16_t rate_gain;      /* change of flux to voltage, times the periods of a step */
     q15_t i_0;            /* change of the reference that starts again; phase current that fixes its leg's voltage */
     uint8_t settle_steps; /* until the mean has settled */
     uint8_t fault_steps;
@@ -28,15 +29,17 @@ typedef struct {
 typedef struct {
     dq_q15_t mean_q8, first_q8; /* of the sums */
     dq_q15_t i_ref;
+    dq_q15_t psi_ref; /* of the last step */
     uint32_t theta_e;
     uint8_t standing, frozen; /* steps, saturate */
 } frozen_angle_state_t;
 
 typedef struct {
     bool acting;
-    dq_q15_t u_sum; /* acting voltage, summed over the periods of a step */
-    dq_q15_t i_ref; /* in effect during that step */
-    q15_t i_least;  /* the smallest of its phase currents, magnitude */
+    dq_q15_t u_sum;   /* acting voltage, summed over the periods of a step */
+    dq_q15_t i_ref;   /* in effect during that step */
+    dq_q15_t psi_ref; /* tables' flux there */
+    q15_t i_least;    /* the smallest of its phase currents, magnitude */
     uint32_t theta_e;
 } frozen_angle_in_t;
 

@@ -15,6 +15,17 @@ static q15_t dot(dq_q15_t a, dq_q15_t b)
     return fx_sat_q15((fx_mul_q30((q15_t)a.d, (q15_t)b.d) >> 15) + (fx_mul_q30((q15_t)a.q, (q15_t)b.q) >> 15));
 }
 
+/* The speed without the tracker's lag, and how far it may still be off (MN-26). */
+typedef struct {
+    q15_t omega, doubt;
+} speed_t;
+
+static speed_t follow_speed(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked)
+{
+    const q15_t lag = fx_mul_gain_q15(config->lag_gain, fx_sat_q15(tracked - state->omega));
+    return (speed_t){fx_add_q15(tracked, lag), fx_abs_q15(lag)};
+}
+
 /* d psi/dt from the tables: the power that changes the field is not shaft power (MN-6). */
 static dq_q15_t flux_rate(const torque_monitor_config_t *config, const torque_monitor_state_t *state, dq_q15_t psi)
 {
@@ -24,9 +35,10 @@ static dq_q15_t flux_rate(const torque_monitor_config_t *config, const torque_mo
 
 /* Torque beyond the commanded one or against its direction; too little torque is no hazard (MN-7), (MN-8). */
 static bool is_torque_excessive(const torque_monitor_config_t *config, torque_monitor_state_t *state,
-                                const torque_monitor_in_t *in, dq_q15_t emf, dq_q15_t rate)
+                                const torque_monitor_in_t *in, speed_t speed, dq_q15_t emf, dq_q15_t rate)
 {
-    const int32_t error = dot(emf, in->i) - fx_mul_q15(in->torque, in->omega);
+    const int32_t commanded = fx_mul_q15(in->torque, speed.omega);
+    const int32_t error = dot(emf, in->i) - commanded;
     const q15_t step = fx_sat_q15(error - fx_q15_from_q31(state->deviation));
     state->deviation = fx_add2_q31(state->deviation, fx_mul_q30(config->mean_rate, step));
     const int32_t mean = fx_q15_from_q31(state->deviation);
@@ -35,24 +47,24 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
     const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2);
-    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(in->omega)) +
-                          fx_mul_q15(v_error, fx_add_q15(current, config->i_0));
-    const int32_t commanded = fx_mul_q15(in->torque, in->omega);
-    if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(in->omega))) {
+    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(speed.omega)) +
+                          fx_mul_q15(v_error, fx_add_q15(current, config->i_0)) +
+                          fx_mul_q15(fx_abs_q15(in->torque), speed.doubt);
+    if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(speed.omega))) {
         return fx_abs_q31(mean) > limit; /* near zero torque both directions count */
     }
     return (commanded < 0) ? (mean < -limit || mean > limit - commanded) : (mean > limit || mean < -limit - commanded);
 }
 
 /* The back-EMF does not fit the angle (MN-9), (MN-10). */
-static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in, dq_q15_t emf,
-                                 dq_q15_t rate)
+static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in, speed_t speed,
+                                 dq_q15_t emf, dq_q15_t rate)
 {
-    const q15_t speed = fx_abs_q15(in->omega);
-    const int32_t e_d = emf.d + fx_mul_q15(in->omega, (q15_t)in->psi.q);
-    const int32_t e_q = emf.q - fx_mul_q15(in->omega, (q15_t)in->psi.d);
-    const int32_t e_magnet = (in->omega < 0) ? -e_q : e_q;
-    const int32_t emf_nominal = fx_mul_q15(speed, config->psi_f);
+    const q15_t speed_abs = fx_abs_q15(speed.omega);
+    const int32_t e_d = emf.d + fx_mul_q15(speed.omega, (q15_t)in->psi.q);
+    const int32_t e_q = emf.q - fx_mul_q15(speed.omega, (q15_t)in->psi.d);
+    const int32_t e_magnet = (speed.omega < 0) ? -e_q : e_q;
+    const int32_t emf_nominal = fx_mul_q15(speed_abs, config->psi_f);
     const int32_t d_share = fx_mul_q15(PSI_D_AXIS, (q15_t)emf_nominal);
     if (d_share < config->v_0 >> 1) {
         return false; /* at low speed the inverter's voltage error hides the back-EMF */
@@ -63,9 +75,11 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
     const int32_t v_error = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current) + flux_rate_abs / 2 +
                             fx_max_s32(flux_rate_abs - config->v_0, 0);
-    const int32_t d_limit = d_share + (fx_mul_q15(speed, fx_abs_q15((q15_t)in->psi.q)) >> 3) + v_error;
-    return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, (q15_t)emf_nominal) + v_error ||
-           e_magnet < -fx_mul_q15(PSI_WEAK, (q15_t)emf_nominal) - v_error;
+    const q15_t psi_d = fx_abs_q15((q15_t)in->psi.d), psi_q = fx_abs_q15((q15_t)in->psi.q);
+    const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(speed.doubt, psi_q) + v_error;
+    const int32_t q_error = v_error + fx_mul_q15(speed.doubt, psi_d);
+    return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, (q15_t)emf_nominal) + q_error ||
+           e_magnet < -fx_mul_q15(PSI_WEAK, (q15_t)emf_nominal) - q_error;
 }
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,
@@ -73,16 +87,18 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
 {
     if (!in->acting || state->settling < config->settle_steps) {
         const uint8_t settling = in->acting ? (uint8_t)(state->settling + 1U) : 0U;
-        *state = (torque_monitor_state_t){.psi = in->psi, .settling = settling};
+        *state = (torque_monitor_state_t){.psi = in->psi, .omega = in->omega, .settling = settling};
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
+    const speed_t speed = follow_speed(config, state, in->omega);
     state->psi = in->psi;
+    state->omega = in->omega;
     const q15_t drop_d = fx_mul_gain_q15(config->r, (q15_t)in->i.d);
     const q15_t drop_q = fx_mul_gain_q15(config->r, (q15_t)in->i.q);
     const dq_q15_t emf = {fx_sat_q15(in->u.d - drop_d - rate.d), fx_sat_q15(in->u.q - drop_q - rate.q)};
-    const bool torque_bad = is_torque_excessive(config, state, in, emf, rate);
-    const bool angle_bad = is_angle_implausible(config, in, emf, rate);
+    const bool torque_bad = is_torque_excessive(config, state, in, speed, emf, rate);
+    const bool angle_bad = is_angle_implausible(config, in, speed, emf, rate);
     return debounce_step(&state->torque, torque_bad, config->torque_steps, FAULT_TORQUE) |
            debounce_step(&state->angle, angle_bad, config->angle_steps, FAULT_ANGLE_OFFSET);
 }

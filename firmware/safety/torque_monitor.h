@@ -3,14 +3,16 @@
 #define SAFETY_TORQUE_MONITOR_H
 /** Monitors torque and angle from the voltages: independent of the tables' torque and of the identification, which the
  * control uses.
+ *   speed   w = w_t + l, l = lag_gain (w_t - w_t of the last step): the tracked speed without its lag
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
- *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2) (|i| + i_0), or against the request
- *           by as much
+ *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2) (|i| + i_0) + |l t*|, or against
+ *           the request by as much
  *   angle   e = u - r i - j w psi(i): e_q shows a magnet that is too weak or too strong, e_d a wrong angle
- *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + v,  or e_q sign(w) outside |w| psi_f (-0.5 ... 0.35) -+ v,
+ *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + |l psi_q| + v,  or e_q sign(w) outside
+ *           |w| psi_f (-0.5 ... 0.35) -+ (|l psi_d| + v),
  *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
- * Source   docs/theory/monitors.md (MN-6) ... (MN-10)
+ * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 1 LSB q15, against thresholds of hundreds
@@ -28,21 +30,23 @@ typedef struct {
     q15_t v_0;                                       /* voltage error of the inverter */
     q15_t i_0;                                       /* current error of noise and of the current's zero crossings */
     q16_t rate_gain;                                 /* 1/(omega_b task period): flux step to voltage */
+    q16_t lag_gain;                                  /* lag of the tracked speed, in steps */
     q15_t mean_rate;                                 /* of the first-order mean, per step */
     uint8_t torque_steps, angle_steps, settle_steps; /* 20, 5, 5 ms */
 } torque_monitor_config_t;
 
 typedef struct {
     q31_t deviation;
-    dq_q15_t psi; /* of the last step */
+    dq_q15_t psi; /* of the last step, */
+    q15_t omega;  /* tracked */
     uint8_t torque, angle, settling;
 } torque_monitor_state_t;
 
 typedef struct {
     bool acting;
     dq_q15_t u, i, psi; /* acting voltage, current and the tables' flux there */
-    q15_t omega;
-    q15_t torque; /* commanded, as the closed loop follows it */
+    q15_t omega;        /* tracked: lags behind the rotor */
+    q15_t torque;       /* commanded, as the closed loop follows it */
 } torque_monitor_in_t;
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,

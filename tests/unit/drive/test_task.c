@@ -305,6 +305,20 @@ void test_enable_off_at_speed_holds_the_torque_at_zero_until_switching_can_be_di
     }
 }
 
+/* Enable goes off below the level, and in that step the speed exceeds it. The short circuit closed onto a bridge
+ * without current would drive twice its lasting current. */
+void test_a_level_that_is_exceeded_in_the_step_of_switching_off_closes_no_short_circuit(void)
+{
+    run_at(0.7, 0.0);
+    TEST_ASSERT_FALSE(drive.task.safe_state.short_circuit);
+    drive.request.enable = false;
+    sample_at(0.9, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_TRUE(drive.task.safe_state.short_circuit);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_EQUAL_INT(SAFE_FREEWHEEL, command()->safe);
+}
+
 void test_the_torque_comes_back_when_enable_does(void)
 {
     run_at(0.9, 0.1);

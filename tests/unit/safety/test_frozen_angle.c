@@ -8,7 +8,8 @@
 #include "unity.h"
 
 /* Ten periods per step, in each a threshold of 0.00325 per unit: 1.75 V on hsm1. */
-static const frozen_angle_config_t config = {.v_0 = 1060, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
+static const frozen_angle_config_t config = {
+    .v_0 = 1060, .rate_gain = 3 * 65536, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
 static frozen_angle_state_t state;
 static frozen_angle_in_t in;
 
@@ -103,6 +104,41 @@ void test_a_smaller_or_shorter_change_is_no_fault(void)
     (void)step();
     in.u_sum.d += 2120;
     TEST_ASSERT_EQUAL_INT(0, found());
+}
+
+/* The torque is slewed slowly at a blocked rotor: i_q moves by 70 per step, which is no movement within the ten steps
+ * of settling, and the flux by 700. The voltage of 2100 that this needs ends when the torque is reached. */
+void test_the_voltage_of_a_reference_that_creeps_is_no_change_when_it_ends(void)
+{
+    in.u_sum.q += 3 * 700;
+    for (int n = 0; n < 41; n++) { /* after the 12th, 24th, 36th step it begins again: the 41st is the 5th of a count */
+        in.i_ref.q += 70;
+        in.psi_ref.q += 700;
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+    for (int n = 0; n < 6; n++) {
+        in.i_ref.q += 70;
+        in.psi_ref.q += 700;
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+    }
+    TEST_ASSERT_EQUAL_UINT8(SETTLED, state.standing);
+    in.u_sum.q -= 3 * 700;
+    TEST_ASSERT_EQUAL_INT(0, found());
+}
+
+/* What is measured without the creeping reference is a turning rotor. */
+void test_a_rotor_that_turns_while_the_reference_creeps_is_found(void)
+{
+    steps(1);
+    in.u_sum.q += 3 * 700;
+    int last = 0;
+    for (int n = 1; n <= 23 && last == 0; n++) {
+        in.i_ref.q += 35;
+        in.psi_ref.q += 700;
+        in.u_sum.d += (n > 13) ? 400 : 0;
+        last = (step() != 0U) ? n : 0;
+    }
+    TEST_ASSERT_GREATER_THAN(13 + CONFIRMED - 1, last);
 }
 
 /* The voltage of a leg without current may change by its whole dead time in both directions: the threshold is eight
@@ -223,13 +259,15 @@ void test_a_rotor_that_turns_below_the_angle_is_found_when_the_twin_finds_it(voi
 void test_no_argument_wraps(void)
 {
     static const int32_t ends[] = {-40 * 32768, 40 * 32767};
-    for (int n = 0; n < 256; n++) {
-        in = (frozen_angle_in_t){true,
-                                 {ends[n & 1], ends[(n >> 1) & 1]},
-                                 {((n >> 2) & 1) ? 32767 : -32768, ((n >> 3) & 1) ? 32767 : -32768},
-                                 INT16_MAX,
-                                 (uint32_t)n << 30};
+    for (unsigned n = 0; n < 1024; n++) {
+        const int32_t i = (n >> 2 & 1U) ? 32767 : -32768, psi = (n >> 3 & 1U) ? 32767 : -32768;
+        in = (frozen_angle_in_t){.acting = true,
+                                 .u_sum = {ends[n & 1U], ends[n >> 1 & 1U]},
+                                 .i_ref = {i, -1 - i},
+                                 .psi_ref = {psi, -1 - psi},
+                                 .i_least = INT16_MAX,
+                                 .theta_e = n << 28};
         (void)step();
-        TEST_ASSERT_TRUE(abs(state.mean_q8.d) <= 40 * 32768 * 256);
+        TEST_ASSERT_TRUE(abs(state.mean_q8.d) <= (40 + 3) * 32768 * 256);
     }
 }

@@ -13,6 +13,7 @@ static const torque_monitor_config_t config = {.r = 898,
                                                .v_0 = 425,
                                                .i_0 = 0,
                                                .rate_gain = 19867,
+                                               .lag_gain = 433000, /* 6.6 steps */
                                                .mean_rate = 8192,
                                                .torque_steps = 20,
                                                .angle_steps = 5,
@@ -210,6 +211,65 @@ void test_a_slowly_changing_flux_hides_no_wrong_angle(void)
     }
 }
 
+/* The tracker of the drive, ten periods of it: w_n T_s = 0.03. */
+typedef struct {
+    double theta, omega, angle; /* tracked, tracked, of the rotor */
+} tracker_t;
+
+static void track(tracker_t *t, double omega, double acceleration)
+{
+    for (int n = 0; n < 10; n++) {
+        t->angle += omega - acceleration * (9 - n) / 10.0;
+        const double e = t->angle - t->theta - t->omega;
+        t->theta += t->omega + 0.06 * e;
+        t->omega += 0.0009 * e;
+    }
+}
+
+/* Faults while a machine at its largest torque accelerates from one speed to the other and turns on. */
+static uint32_t accelerated(const torque_monitor_config_t *c, double i_q, double from, double to)
+{
+    tracker_t tracker = {.omega = from};
+    uint32_t found = 0;
+    fresh();
+    for (int n = 0; n < 140; n++) {
+        const double share = fmin(fmax((n - 30) / 70.0, 0.0), 1.0), omega = from + (to - from) * share;
+        machine(omega, -0.5, i_q, 1.0, 0.0);
+        track(&tracker, omega, (share > 0.0 && share < 1.0) ? (to - from) / 70.0 : 0.0);
+        in.omega = (q15_t)q15(tracker.omega);
+        found |= torque_monitor_step(c, &state, &in);
+    }
+    return found;
+}
+
+/* The tracked speed lags by 0.05 while the speed changes by 0.0076 per step, 80,000 rpm/s on hsm1. Without (MN-26) both
+ * halves of the monitor find a fault in it. */
+void test_a_speed_that_lags_is_neither_torque_nor_a_wrong_angle(void)
+{
+    torque_monitor_config_t lagging = config;
+    lagging.lag_gain = 0;
+    uint32_t without = 0;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int direction = -1; direction <= 1; direction += 2) {
+            TEST_ASSERT_EQUAL_HEX32(0, accelerated(&config, 0.6 * sign, -0.266 * direction, 0.266 * direction));
+            without |= accelerated(&lagging, 0.6 * sign, -0.266 * direction, 0.266 * direction);
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE | FAULT_ANGLE_OFFSET, without);
+}
+
+/* 10,000 rpm/s on hsm1: the thresholds rise with the lag that has been corrected, here by 0.006 of the speed base. */
+void test_an_angle_that_is_30_degrees_off_is_found_while_the_speed_rises(void)
+{
+    int found = 0;
+    for (int n = 1; n <= 40 && found == 0; n++) {
+        machine(0.3 + 0.00095 * n, 0.0, 0.05, 1.0, 30.0);
+        in.omega = (q15_t)(in.omega - q15(6.6 * 0.00095));
+        found = (torque_monitor_step(&config, &state, &in) & FAULT_ANGLE_OFFSET) ? n : 0;
+    }
+    TEST_ASSERT_EQUAL_INT(SETTLING + 5, found);
+}
+
 void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_on(void)
 {
     in.torque = INT16_MIN;
@@ -229,6 +289,8 @@ static double saturated(double x)
 
 typedef struct {
     double psi_d, psi_q, deviation;
+    double tracked; /* speed of the last step */
+    double w, doubt;
 } reference_t;
 
 /* By how much the torque and the angle exceed their thresholds, per unit: the header's equations in double precision.
@@ -239,11 +301,13 @@ typedef struct {
 
 static double torque_excess(reference_t *reference, double e_d, double e_q, double rates)
 {
-    const double i_d = in.i.d / 32768.0, i_q = in.i.q / 32768.0, w = in.omega / 32768.0, t = in.torque / 32768.0;
+    const double i_d = in.i.d / 32768.0, i_q = in.i.q / 32768.0, w = reference->w;
+    const double t = in.torque / 32768.0;
     const double error = saturated(e_d * i_d + e_q * i_q) - t * w;
     reference->deviation = saturated(reference->deviation + 0.25 * saturated(error - reference->deviation));
     const double v_error = saturated(425.0 / 32768.0 + rates / 2.0);
-    const double limit = fabs(w) * (1112.0 / 32768.0 + fabs(t) / 8.0) + v_error * saturated(hypot(i_d, i_q));
+    const double limit = fabs(w) * (1112.0 / 32768.0 + fabs(t) / 8.0) + v_error * saturated(hypot(i_d, i_q)) +
+                         fabs(t) * reference->doubt;
     if (fabs(t) < 1112.0 / 32768.0) {
         return fabs(reference->deviation) - limit;
     }
@@ -251,15 +315,16 @@ static double torque_excess(reference_t *reference, double e_d, double e_q, doub
     return fmax(along, -along - fabs(t * w)) - limit;
 }
 
-static double angle_excess(double e_d, double e_q, double rates)
+static double angle_excess(const reference_t *reference, double e_d, double e_q, double rates)
 {
-    const double w = in.omega / 32768.0, psi_d = in.psi.d / 32768.0, psi_q = in.psi.q / 32768.0;
+    const double w = reference->w, psi_d = in.psi.d / 32768.0, psi_q = in.psi.q / 32768.0;
     const double magnet = fabs(w) * 14418.0 / 32768.0, v_0 = 425.0 / 32768.0;
     const double current = saturated(hypot(in.i.d, in.i.q) / 32768.0);
     const double v = v_0 / 2.0 + 898.0 / 65536.0 * current + rates / 2.0 + fmax(rates - v_0, 0.0);
-    const double d = fabs(e_d + w * psi_q) - magnet / 5.0 - fabs(w * psi_q) / 8.0 - v;
+    const double doubt_d = reference->doubt * fabs(psi_q), doubt_q = reference->doubt * fabs(psi_d);
+    const double d = fabs(e_d + w * psi_q) - magnet / 5.0 - fabs(w * psi_q) / 8.0 - doubt_d - v;
     const double q = copysign(1.0, w) * (e_q - w * psi_d);
-    return fmax(d, fmax(q - 0.35 * magnet, -q - 0.5 * magnet) - v);
+    return fmax(d, fmax(q - 0.35 * magnet, -q - 0.5 * magnet) - doubt_q - v);
 }
 
 static excess_t reference_step(reference_t *reference)
@@ -270,9 +335,14 @@ static excess_t reference_step(reference_t *reference)
     const double e_d = saturated((in.u.d - r * in.i.d) / 32768.0 - rate_d);
     const double e_q = saturated((in.u.q - r * in.i.q) / 32768.0 - rate_q);
     const double rates = fabs(rate_d) + fabs(rate_q);
+    const double tracked = in.omega / 32768.0;
+    const double lag = saturated(433000.0 / 65536.0 * saturated(tracked - reference->tracked));
     reference->psi_d = in.psi.d / 32768.0;
     reference->psi_q = in.psi.q / 32768.0;
-    return (excess_t){torque_excess(reference, e_d, e_q, rates), angle_excess(e_d, e_q, rates)};
+    reference->w = saturated(tracked + lag);
+    reference->doubt = fabs(lag);
+    reference->tracked = tracked;
+    return (excess_t){torque_excess(reference, e_d, e_q, rates), angle_excess(reference, e_d, e_q, rates)};
 }
 
 /* Compares one decision that is not within 20 LSB of its threshold; counts it by its result. */
@@ -303,7 +373,7 @@ void test_no_argument_wraps(void)
         for (int n = 0; n < SETTLING; n++) {
             (void)torque_monitor_step(&immediate, &state, &in);
         }
-        reference_t reference = {in.psi.d / 32768.0, in.psi.q / 32768.0, 0.0};
+        reference_t reference = {.psi_d = in.psi.d / 32768.0, .psi_q = in.psi.q / 32768.0};
         in = (torque_monitor_in_t){true,
                                    {end_of(bits, 2), end_of(bits, 3)},
                                    {end_of(bits, 4), end_of(bits, 5)},

@@ -431,6 +431,7 @@ def _plausibility(motor: Motor) -> list[Row]:
 def _torque_monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     rate = 1.0 / (b.omega_rad_s * b.step_s)
+    lag = (2.0 / d.tracker_bandwidth_rad_s - b.period_s / 2.0) / b.step_s  # (AT-7)
     return [
         ("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
         ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
@@ -438,6 +439,7 @@ def _torque_monitor(motor: Motor) -> list[Row]:
         ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
         ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
+        ("lag_gain", q16(lag, "lag_gain"), f"{lag:.4g} steps"),
         ("mean_rate", q15(d.monitor_mean_rate, "mean_rate"), f"{d.monitor_mean_rate:.6g}"),
         *_counts(b, torque=TORQUE_S, angle=ANGLE_S, settle=SETTLE_S),
     ]
@@ -446,8 +448,10 @@ def _torque_monitor(motor: Motor) -> list[Row]:
 def _frozen_angle(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     v_0 = q15(d.frozen_V / b.voltage_V, "frozen_V") * b.periods_per_step
+    rate = b.periods_per_step / (b.omega_rad_s * b.step_s)
     return [
         ("v_0", str(v_0), f"{d.frozen_V:g} V in each of {b.periods_per_step} periods"),
+        ("rate_gain", q16(rate, "rate_gain"), f"{b.periods_per_step}/(omega_b T)"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
         *_counts(b, settle=FROZEN_SETTLE_S, fault=ANGLE_S),
     ]
