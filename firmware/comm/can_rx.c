@@ -72,6 +72,7 @@ static bool take_limits(can_rx_t *rx, const can_frame_t *frame)
         .drive_kW = bus_vcu_battery_limits_power_limit_drive_decode(m.power_limit_drive),
         .regen_kW = bus_vcu_battery_limits_power_limit_regen_decode(m.power_limit_regen),
     };
+    rx->battery_V = bus_vcu_battery_limits_battery_voltage_decode(m.battery_voltage);
     return true;
 }
 

@@ -62,6 +62,7 @@ typedef struct {
     rx_channel_t command_channel, limits_channel;
     bus_command_t command;     /* after a time-out: disabled, no torque, the mode stays */
     bus_power_limits_t limits; /* after a time-out: zero */
+    float battery_V;           /* 0: not known; after a time-out the last one */
     uint16_t count[RX_RESULTS];
     uint16_t accepted; /* torque commands, wraps */
     uint16_t skipped;  /* accepted frames of either message before which one was lost */

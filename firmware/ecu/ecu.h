@@ -14,6 +14,7 @@
 #include "comm/can_tx.h"
 #include "drive/drive.h"
 #include "ecu/arbitration.h"
+#include "ecu/battery_voltage.h"
 #include "ecu/supervisor.h"
 #include "second_level/second_level.h"
 #include "signal/step_clock.h"
@@ -42,6 +43,7 @@ typedef struct {
     arbitrate_state_t arbitration_state;
     liveness_t liveness;
     settling_t settling;
+    battery_voltage_t battery_voltage;
     uint16_t not_sent;
     xcp_access_t xcp;
     freeze_frame_t freeze;

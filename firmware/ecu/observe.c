@@ -121,6 +121,16 @@ torque_limits_t ecu_limits(const ecu_t *ecu)
     return limits;
 }
 
+/* What the bus says about the battery, beside the dc voltage that the inverter measures. */
+static battery_voltage_in_t battery_voltage(const ecu_t *ecu, float v_dc_V)
+{
+    return (battery_voltage_in_t){.battery_V = ecu->rx.battery_V,
+                                  .v_dc_V = v_dc_V,
+                                  .alive = ecu->rx.limits_channel.alive,
+                                  .contactor = supervisor_outputs[ecu->supervisor.state].contactor,
+                                  .elapsed_us = ecu->clock.elapsed_us};
+}
+
 supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
 {
     const drive_t *drive = &ecu->drive;
@@ -128,6 +138,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
     const sample_t sample = sample_box_read(&drive->samples);
     const float v_dc_V = si_from_q15(sample.v_dc, drive->motor->bases.voltage_V);
     const q15_t torque_requested = per_unit(ecu, command->torque_requested_Nm);
+    const battery_voltage_in_t voltages = battery_voltage(ecu, v_dc_V);
     return (supervisor_in_t){
         .drive_faults = drive->fast.faults,
         .alive = ecu->rx.command_channel.alive,
@@ -141,6 +152,8 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_in_range = sample.v_dc >= drive->motor->monitor.v_min && sample.v_dc <= drive->motor->monitor.v_max,
         .dc_settled = is_dc_settled(ecu, sample.v_dc),
         .dc_safe = v_dc_V < TOUCH_SAFE_V,
+        .dc_near_battery = battery_voltage_is_near(&voltages),
+        .dc_contradicts = battery_voltage_contradicts(&ecu->battery_voltage, &voltages),
         .sensors_plausible = are_sensors_plausible(drive, &sample),
         .slow = is_slow(drive),
         .derated = derating_reason(ecu) != DERATING_REASON_NONE,

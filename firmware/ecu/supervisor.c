@@ -71,12 +71,25 @@ static bool is_timed_out(const supervisor_t *s, ecu_state_t state, uint32_t max_
     return s->state == state && s->us > max_ms * 1000U;
 }
 
+static bool is_settled_in_range(const supervisor_in_t *in)
+{
+    return in->dc_in_range && in->dc_settled;
+}
+
+/* A dc link that has settled at another voltage than the battery's is not a precharge that takes long. */
+static uint32_t precharge_fault(const supervisor_t *s, const supervisor_in_t *in)
+{
+    const bool elsewhere = is_settled_in_range(in) && !in->dc_near_battery;
+    const ecu_fault_t fault = elsewhere ? ECU_FAULT_BATTERY_VOLTAGE : ECU_FAULT_PRECHARGE;
+    return bit_if(is_timed_out(s, STATE_PRECHARGE, PRECHARGE_TIME_OUT_MS), fault);
+}
+
 static uint16_t present_faults(const supervisor_t *s, const supervisor_in_t *in)
 {
     const uint32_t now = bit_if(in->failed, ECU_FAULT_PROTECTION) | bit_if(in->gate_fault, ECU_FAULT_GATE) |
                          bit_if(in->task_late, ECU_FAULT_TASK) | bit_if(in->stalled, ECU_FAULT_STALL) |
                          bit_if(is_timed_out(s, STATE_INIT, SELF_TEST_TIME_OUT_MS), ECU_FAULT_SELF_TEST) |
-                         bit_if(is_timed_out(s, STATE_PRECHARGE, PRECHARGE_TIME_OUT_MS), ECU_FAULT_PRECHARGE) |
+                         bit_if(in->dc_contradicts, ECU_FAULT_BATTERY_VOLTAGE) | precharge_fault(s, in) |
                          bit_if(is_timed_out(s, STATE_DISCHARGE, DISCHARGE_TIME_OUT_MS), ECU_FAULT_DISCHARGE);
     return (uint16_t)now;
 }
@@ -139,7 +152,7 @@ static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
            bit_if(tripped, WHEN_TRIPPED) | bit_if(faulted, WHEN_FAULTED) | bit_if(!faulted, WHEN_HEALTHY) |
            bit_if(in->alive && in->torque_mode, WHEN_ON) |
            bit_if(in->alive && !in->torque_mode && !in->current_mode, WHEN_OFF) |
-           bit_if(in->dc_in_range && in->dc_settled, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
+           bit_if(is_settled_in_range(in) && in->dc_near_battery, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
            bit_if(may_discharge, WHEN_NOT_DISCHARGED) | bit_if(s->enabled, WHEN_ENABLED) |
            bit_if(!s->enabled && in->torque_arbitrated_is_zero, WHEN_STOPPED) |
            bit_if(in->torque_arbitrated_is_zero, WHEN_NO_TORQUE) | bit_if(in->derated, WHEN_DERATED) |

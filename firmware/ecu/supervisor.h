@@ -34,7 +34,8 @@
     X(GATE, 3, "The gate driver reports a fault.") \
     X(TASK, 4, "The 1 kHz task came late 3 times in a row.") \
     X(STALL, 5, "An interrupt stopped for 3 steps of the task.") \
-    X(SELF_TEST, 6, "The self-test did not pass in time after start-up.")
+    X(SELF_TEST, 6, "The self-test did not pass in time after start-up.") \
+    X(BATTERY_VOLTAGE, 7, "The dc voltage is not the battery's after precharge or with the contactor closed.")
 
 #define REFUSED_LIST(X) \
     X(NONE, 0, "Nothing was refused since the last enable that was granted.") \
@@ -66,7 +67,7 @@ typedef enum {
     WHEN_HEALTHY = 1U << 3, /* none */
     WHEN_ON = 1U << 4,      /* a live command asks for mode torque */
     WHEN_OFF = 1U << 5,     /* a live command asks for mode off */
-    WHEN_CHARGED = 1U << 6, /* dc voltage in range and settled */
+    WHEN_CHARGED = 1U << 6, /* dc voltage in range, settled, and the battery's where that is known */
     WHEN_DISCHARGED = 1U << 7,
     WHEN_NOT_DISCHARGED = 1U << 8, /* its opposite, unless discharge has failed */
     WHEN_ENABLED = 1U << 9,        /* enable was asked for and granted */
@@ -96,6 +97,7 @@ typedef struct {
     bool enable, reset;
     bool torque_requested_is_zero, torque_arbitrated_is_zero;
     bool dc_in_range, dc_settled, dc_safe; /* safe: below the voltage that is safe to touch */
+    bool dc_near_battery, dc_contradicts;  /* ecu/battery_voltage.h; near also while the battery's is not known */
     bool sensors_plausible;
     bool slow;
     bool derated;

@@ -8,6 +8,7 @@
 #define BATTERY_ID 0x111U
 #define BATTERY_DATA_ID 0x1111U
 #define BATTERY_MAX_10W 60000
+#define BATTERY_MAX_DV 15000
 #define BATTERY_TIME_OUT_US 310000U
 #define LENGTH 8U
 #define COUNTERS 15U
@@ -83,7 +84,7 @@ static void take_battery(second_level_frames_t *frames, const can_frame_t *frame
 {
     const int32_t drive = unsigned_at(frame, 2);
     const int32_t regen = unsigned_at(frame, 4);
-    if (drive > BATTERY_MAX_10W || regen > BATTERY_MAX_10W) {
+    if (drive > BATTERY_MAX_10W || regen > BATTERY_MAX_10W || unsigned_at(frame, 6) > BATTERY_MAX_DV) {
         return;
     }
     frames->power_drive_10W = drive;

@@ -90,7 +90,8 @@ class Ecu:
     def encode(self, name: str, values: dict) -> bytes:
         """A protected message with its next counter."""
         message = self.dbc.get_message_by_name(name)
-        raw = bytearray(message.encode({"Crc": 0, "Counter": self.counters[name], **values}))
+        absent = {"BatteryVoltage": 0.0} if name == LIMITS else {}
+        raw = bytearray(message.encode({"Crc": 0, "Counter": self.counters[name], **absent, **values}))
         self.counters[name] = (self.counters[name] + 1) % 15
         return protect(int(message.dbc.attributes["E2EDataId"].value), raw)
 

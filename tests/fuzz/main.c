@@ -58,6 +58,7 @@ static void compare_command(void)
     check(near(rx->command.limit_regen_Nm, oracle.regen_dNm), "regen limit differs");
     check(fabs((double)rx->limits.drive_kW - oracle.power_drive_10W / 100.0) < 1e-3, "power limit differs");
     check(fabs((double)rx->limits.regen_kW - oracle.power_regen_10W / 100.0) < 1e-3, "power limit differs");
+    check(near(rx->battery_V, oracle.battery_dV), "battery voltage differs");
     check(rx->command_channel.alive == oracle.command.alive, "the age of the command differs");
     check(rx->limits_channel.alive == oracle.limits.alive, "the age of the limits differs");
     check(rx->command_channel.failed == oracle_failed(&oracle.command), "3 of 10 evaluated differently");

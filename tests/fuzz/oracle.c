@@ -87,7 +87,7 @@ static bool command_in_range(const can_frame_t *frame)
 
 static bool limits_in_range(const can_frame_t *frame)
 {
-    return u16(frame, 2) <= 60000 && u16(frame, 4) <= 60000;
+    return u16(frame, 2) <= 60000 && u16(frame, 4) <= 60000 && u16(frame, 6) <= 15000;
 }
 
 bool oracle_frame(oracle_t *oracle, const can_frame_t *frame)
@@ -119,6 +119,7 @@ bool oracle_frame(oracle_t *oracle, const can_frame_t *frame)
     } else {
         oracle->power_drive_10W = u16(frame, 2);
         oracle->power_regen_10W = u16(frame, 4);
+        oracle->battery_dV = u16(frame, 6);
     }
     return true;
 }

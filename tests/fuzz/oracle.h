@@ -25,6 +25,7 @@ typedef struct {
     int mode;
     int torque_dNm, drive_dNm, regen_dNm; /* tenths of a newton metre */
     int power_drive_10W, power_regen_10W;
+    int battery_dV; /* the last one, also after a time-out */
     uint32_t accepted;
 } oracle_t;
 

@@ -74,6 +74,7 @@ can_frame_t sender_sane(sender_t *s, unsigned which)
     } else {
         put16(&frame, 2, sender_random(s, 60001));
         put16(&frame, 4, sender_random(s, 60001));
+        put16(&frame, 6, 3500); /* the plant's battery: 350 V */
     }
     sign(s, which, &frame);
     s->last = frame;

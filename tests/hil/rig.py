@@ -108,6 +108,7 @@ class Rig:
         self.command = Command()
         self.is_sending = True
         self.power_limits_kW: tuple[float, float] | None = None
+        self.battery_V = 0.0  # 0: not known
         self._due: dict[str, float] = {COMMAND: self.now_s, LIMITS: self.now_s}
         self._senders = {name: e2e.Sender(self.data_id(name)) for name in (COMMAND, LIMITS)}
         self.status_protection = e2e.Receiver(self.data_id(STATUS))
@@ -208,7 +209,8 @@ class Rig:
             self._commanded_s = self.now_s
         if self._is_due(LIMITS) and self.power_limits_kW is not None:
             drive, regen = self.power_limits_kW
-            signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen}
+            signals = {"Crc": 0, "Counter": 0, "PowerLimitDrive": drive, "PowerLimitRegen": regen,
+                       "BatteryVoltage": self.battery_V}  # fmt: skip
             data = self._senders[LIMITS].protect(bytes(self.by_name[LIMITS].encode(signals)))
             self.send(self._limits_id, data)
 

@@ -21,8 +21,8 @@ ELSEWHERE = {  # plant fields that a scenario gives in another section, or that 
     "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
     # The dc link and its contactor, which an ECU controls: in a scenario the battery is always connected.
-    "dc_link_F", "precharge_s", "discharge_s", "avalanche_V", "vdc_start_V", "precharge_open", "discharge_open",
-    "contactor_open",
+    "dc_link_F", "precharge_s", "discharge_s", "dc_load_ohm", "avalanche_V", "vdc_start_V", "precharge_open",
+    "discharge_open", "contactor_open",
 }  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 #ifndef PLANT_DC_LINK_H
 #define PLANT_DC_LINK_H
 /** The capacitor between battery and bridge, with the switches that the inverter's board controls.
- *   C dv/dt = (C/tau_pre)(V_bat - v) [precharge] - (C/tau_dis) v [discharge] - i_bridge
+ *   C dv/dt = (C/tau_pre)(V_bat - v) [precharge] - (C/tau_dis) v [discharge] - v/R_load - i_bridge
  *   v = V_bat while the contactor is closed;  v <= V_avalanche: above it the semiconductors conduct
  * Source   docs/theory/plant.md (PL-21), (PL-22)
  * Units    V, A, s

@@ -108,6 +108,7 @@ static const char *bad_electronics(const plant_params_t *p)
         {"dc_link_F", not_below_zero(p->dc_link_F)},
         {"precharge_s", above_zero(p->precharge_s)},
         {"discharge_s", above_zero(p->discharge_s)},
+        {"dc_load_ohm", not_below_zero(p->dc_load_ohm)},
         {"avalanche_V", above_zero(p->avalanche_V)},
         {"pwm_hz", above_zero(p->pwm_hz)},
         {"dead_time_s", not_below_zero(p->dead_time_s) && p->dead_time_s * p->pwm_hz < 0.5},

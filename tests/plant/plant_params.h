@@ -24,6 +24,7 @@ typedef struct {
     double vdc_start_V;              /* of the dc link's capacitor, taken at creation */
     double dc_link_F;                /* 0: no capacitor, the bridge is always connected to the battery */
     double precharge_s, discharge_s; /* time constants of the capacitor with the resistor of each */
+    double dc_load_ohm;              /* resistor across the capacitor, a short circuit near 0; 0: none */
     double avalanche_V;              /* switches and diodes of the bridge conduct above it */
     int precharge_open, discharge_open, contactor_open; /* the switch does not close */
     int substeps;                                       /* per PWM period, at least 10 */

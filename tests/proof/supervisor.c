@@ -40,6 +40,9 @@ static supervisor_in_t any_input(void)
     in.enable = nondet_bool();
     in.reset = nondet_bool();
     in.slow = nondet_bool();
+    in.dc_in_range = nondet_bool();
+    in.dc_settled = nondet_bool();
+    in.dc_near_battery = nondet_bool();
     ASSUME(in.elapsed_us <= STEP_MAX_US);
     return in;
 }
@@ -67,6 +70,15 @@ void proof_switching_only_with_supply(void)
     PROVE(WITHIN((int)s.state, 0, STATES - 1));
     PROVE(!supervisor_outputs[s.state].run || holds(s.state));
     PROVE(!supervisor_outputs[s.state].discharge || !supervisor_outputs[s.state].contactor);
+}
+
+void proof_the_contactor_closes_only_when_charged(void)
+{
+    supervisor_t s = any_state();
+    const supervisor_in_t in = any_input();
+    const bool closed = supervisor_outputs[s.state].contactor;
+    supervisor_step(&s, &in);
+    PROVE(closed || !supervisor_outputs[s.state].contactor || (in.dc_in_range && in.dc_settled && in.dc_near_battery));
 }
 
 void proof_slow_is_below_the_dc_link(void)
@@ -129,6 +141,7 @@ void proof_faults_stay_until_a_reset(void)
     PROVE((s.resets != before.resets) == reset);
     PROVE(!in.failed || (s.faults & ECU_FAULT_PROTECTION) != 0);
     PROVE(!in.stalled || (s.faults & ECU_FAULT_STALL) != 0);
+    PROVE(!in.dc_contradicts || (s.faults & ECU_FAULT_BATTERY_VOLTAGE) != 0);
     PROVE(!in.task_late || (s.faults & ECU_FAULT_TASK) != 0);
 }
 

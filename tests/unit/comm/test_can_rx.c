@@ -213,17 +213,18 @@ static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
     can_frame_t frame = {.id = LIMITS_ID,
                          .length = 8,
                          .data = {0, 0, (uint8_t)(drive & 0xFFU), (uint8_t)(drive >> 8), (uint8_t)(regen & 0xFFU),
-                                  (uint8_t)(regen >> 8), 0, 0}};
+                                  (uint8_t)(regen >> 8), 0xA7, 0x0D}};
     e2e_protect(LIMITS_DATA_ID, count, &frame);
     return can_rx_frame(&rx, &frame);
 }
 
-/* 45.00 kW are 4500 counts, 600.01 kW are 60001; the time-out is 300 ms. */
+/* 45.00 kW are 4500 counts, 600.01 kW are 60001; all frames have 349.5 V, 0x0DA7; the time-out is 300 ms. */
 void test_battery_limits_have_their_own_channel_and_become_zero_when_lost(void)
 {
     uint8_t count = 0;
     TEST_ASSERT_FALSE(rx.limits_channel.seen);
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, send_limits(&count, 4500, 2000));
+    TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.battery_V);
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send_limits(&count, 4500, 2000));
     TEST_ASSERT_EQUAL_FLOAT(45.0F, rx.limits.drive_kW);
     TEST_ASSERT_EQUAL_FLOAT(20.0F, rx.limits.regen_kW);
@@ -235,6 +236,7 @@ void test_battery_limits_have_their_own_channel_and_become_zero_when_lost(void)
     TEST_ASSERT_TRUE(rx.limits_channel.seen);
     TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.limits.drive_kW);
     TEST_ASSERT_EQUAL_FLOAT(0.0F, rx.limits.regen_kW);
+    TEST_ASSERT_EQUAL_FLOAT(349.5F, rx.battery_V); /* its age says that it is an old one */
     TEST_ASSERT_FALSE(rx.command_channel.alive);
 }
 

@@ -110,6 +110,26 @@ void test_a_voltage_that_moves_must_settle_again_however_long_it_has_stayed(void
     settles_in_50_ms_at(340.0);
 }
 
+/* 300 V against 350 V; the states differ in the contactor. */
+void test_the_dc_voltage_is_compared_with_the_battery_of_the_bus(void)
+{
+    TEST_ASSERT_TRUE(observe_v(300.0)->dc_near_battery);
+    ecu.rx.battery_V = 350.0F;
+    TEST_ASSERT_FALSE(observe_v(350.0)->dc_near_battery);
+    ecu.rx.limits_channel.alive = true;
+    TEST_ASSERT_TRUE(observe_v(350.0)->dc_near_battery);
+    ecu.supervisor.state = STATE_PRECHARGE;
+    for (int ms = 0; ms < 300; ms++) {
+        TEST_ASSERT_FALSE(observe_v(300.0)->dc_near_battery);
+        TEST_ASSERT_FALSE(seen.dc_contradicts);
+    }
+    ecu.supervisor.state = STATE_READY;
+    for (int ms = 0; ms < 250; ms++) {
+        TEST_ASSERT_FALSE(observe_v(300.0)->dc_contradicts);
+    }
+    TEST_ASSERT_TRUE(observe_v(300.0)->dc_contradicts);
+}
+
 /* The limit is 2 % of 400 A, 655 counts. */
 void test_current_while_switching_is_disabled_is_implausible_in_either_axis_and_direction(void)
 {

@@ -14,6 +14,7 @@ void setUp(void)
                            .torque_arbitrated_is_zero = true,
                            .dc_safe = true,
                            .dc_settled = true,
+                           .dc_near_battery = true,
                            .sensors_plausible = true,
                            .slow = true,
                            .elapsed_us = 1000};
@@ -198,6 +199,54 @@ void test_precharge_that_takes_longer_than_2_s_is_a_fault(void)
     TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, steps(2000));
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PRECHARGE, s.faults);
+}
+
+void test_a_dc_link_that_settles_beside_the_battery_is_a_fault_of_its_own_after_2_s(void)
+{
+    to_precharge();
+    voltage(true);
+    in.dc_near_battery = false;
+    stays(STATE_PRECHARGE, 2000);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_BATTERY_VOLTAGE, s.faults);
+    TEST_ASSERT_EQUAL_UINT8(33 + 7, s.first_fault);
+}
+
+/* Without a voltage in range that has settled the precharge has not ended, whatever the battery's voltage is. */
+void test_a_dc_link_that_does_not_charge_is_the_fault_of_the_precharge(void)
+{
+    for (int n = 0; n < 2; n++) {
+        setUp();
+        to_precharge();
+        in.dc_near_battery = false;
+        voltage(n == 1);
+        in.dc_settled = n == 0;
+        stays(STATE_PRECHARGE, 2000);
+        TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+        TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PRECHARGE, s.faults);
+    }
+}
+
+void test_a_precharge_ends_when_the_voltage_comes_near_the_battery(void)
+{
+    to_precharge();
+    voltage(true);
+    in.dc_near_battery = false;
+    stays(STATE_PRECHARGE, 1000);
+    in.dc_near_battery = true;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+}
+
+void test_a_dc_voltage_that_contradicts_the_battery_ends_the_torque_by_a_ramp(void)
+{
+    to_run();
+    in.torque_arbitrated_is_zero = false;
+    in.dc_contradicts = true;
+    stays(STATE_RUN, 10);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_BATTERY_VOLTAGE, s.faults);
+    in.torque_arbitrated_is_zero = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
 }
 
 void test_mode_off_ends_precharge_and_ready_in_discharge(void)
@@ -519,8 +568,9 @@ static supervisor_in_t inputs_of(unsigned bits)
         .reset = (bits >> 6 & 1U) != 0U,
         .torque_requested_is_zero = (bits >> 7 & 1U) != 0U,
         .torque_arbitrated_is_zero = (bits >> 8 & 1U) != 0U,
-        .dc_in_range = (bits >> 9 & 3U) == 1U,
+        .dc_in_range = (bits >> 9 & 1U) != 0U,
         .dc_safe = (bits >> 9 & 3U) == 2U, /* never both */
+        .dc_near_battery = (bits >> 9 & 3U) != 3U,
         .dc_settled = (bits >> 11 & 1U) != 0U,
         .sensors_plausible = (bits >> 12 & 1U) != 0U,
         .slow = (bits >> 13 & 1U) != 0U,
@@ -528,6 +578,7 @@ static supervisor_in_t inputs_of(unsigned bits)
         .gate_fault = (bits >> 15 & 1U) != 0U,
         .task_late = (bits >> 16 & 1U) != 0U,
         .stalled = (bits >> 17 & 1U) != 0U,
+        .dc_contradicts = (bits >> 20 & 1U) != 0U,
     };
 }
 
@@ -554,6 +605,9 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
         /* Torque is never cut by a state that could have ramped it down. */
         TEST_ASSERT_TRUE(now->torque_arbitrated_is_zero);
     }
+    if (is->contactor && !was->contactor) {
+        TEST_ASSERT_TRUE(now->dc_in_range && now->dc_settled && now->dc_near_battery);
+    }
     if (s.resets != before->resets) {
         TEST_ASSERT_TRUE(before->state == STATE_FAULT && now->alive && now->reset && !now->enable);
     }
@@ -565,7 +619,7 @@ void test_no_combination_of_inputs_makes_a_forbidden_transition(void)
     static const uint16_t latched[] = {0, ECU_FAULT_PROTECTION, ECU_FAULT_GATE | ECU_FAULT_DISCHARGE};
     unsigned seen[STATES] = {0};
     for (unsigned state = 0; state < STATES * 3U; state++) {
-        for (unsigned bits = 0; bits < 1U << 20; bits++) {
+        for (unsigned bits = 0; bits < 1U << 21; bits++) {
             const supervisor_t before = {.state = (ecu_state_t)(state % STATES),
                                          .us = 100000,
                                          .faults = latched[state / STATES],

@@ -71,6 +71,22 @@ void test_precharge_and_discharge_together_are_a_divider(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, V_BAT * 0.1 / 0.12, t->vdc_V);
 }
 
+/* The resistors of precharge and load: v -> V R_load/(R_pre + R_load), with tau = (R_pre || R_load) C. */
+void test_a_load_across_the_capacitor_leaves_the_precharge_below_the_battery(void)
+{
+    const double pre_ohm = p.precharge_s / FARAD;
+    p.vdc_start_V = 10.0;
+    p.dc_load_ohm = 4.0 * pre_ohm;
+    const plant_truth_t *t = start((plant_switches_t){.precharge = 1});
+    run(0.8 * p.precharge_s, 0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.8 * V_BAT + (10.0 - 0.8 * V_BAT) * exp(-1.0), t->vdc_V);
+    run(1.0, 0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.8 * V_BAT, t->vdc_V);
+    plant_params(plant)->dc_load_ohm = 1e-3;
+    run(0.1, 0);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, t->vdc_V); /* the lowest that there is */
+}
+
 void test_the_contactor_connects_the_link_to_the_battery_unless_it_fails_to_close(void)
 {
     const plant_truth_t *t = start((plant_switches_t){.contactor = 1});

@@ -73,6 +73,10 @@ void test_the_limits_of_the_battery_are_decoded(void)
     TEST_ASSERT_TRUE(frames.battery.seen);
     TEST_ASSERT_EQUAL_INT32(60000, frames.power_drive_10W);
     TEST_ASSERT_EQUAL_INT32(59999, frames.power_regen_10W);
+    receive(signed_frame(BATTERY_ID, 0, 100, 200, 15000)); /* 1500 V */
+    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_10W);
+    receive(signed_frame(BATTERY_ID, 0, 300, 400, 15001));
+    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_10W);
 }
 
 /* The two levels compute the checksum by different algorithms: a frame of the first level is accepted, and refused when

@@ -195,6 +195,7 @@ CALLED void task_supervisor(void)
         .enable = true,
         .dc_in_range = true,
         .dc_settled = true,
+        .dc_near_battery = true,
         .sensors_plausible = true,
         .derated = the_copy()->task.derating != 0U,
         .elapsed_us = 1000,

@@ -18,6 +18,7 @@ from fluxtrue_tools.sim.members import Members, members
 from fluxtrue_tools.sim.motor import Motor
 
 LIMITS: Final = "VCU_BatteryLimits"
+LIMITS_SIGNALS: Final = ("PowerLimitDrive", "PowerLimitRegen", "BatteryVoltage")
 COMMAND_MS, LIMITS_MS = 10, 100
 # Assumed, as in the virtual ECU: the dc link, and semiconductors that withstand twice the battery's voltage.
 DC_LINK_F: Final = 500e-6
@@ -39,7 +40,7 @@ class Sender:
 
     def __init__(self) -> None:
         self.command = Command()
-        self.limits: dict[str, float] = {}  # empty: not sent
+        self.limits: dict[str, float] = {}  # empty: not sent; without BatteryVoltage: not known
         self.wrong: dict[str, float] = {}
         message = _database().get_message_by_name(LIMITS)
         self._limits_message = message
@@ -72,7 +73,8 @@ class Sender:
                 self.command.frame()
             due.append(self._damaged(self.command.frame()))
         if time_ms % LIMITS_MS == 0 and self.limits and not self.wrong.get("limits_lost"):
-            raw = self._limits.protect(self._limits_message.encode({"Crc": 0, "Counter": 0, **self.limits}))
+            signals = {"Crc": 0, "Counter": 0, **dict.fromkeys(LIMITS_SIGNALS, 0.0), **self.limits}
+            raw = self._limits.protect(self._limits_message.encode(signals))
             due.append(Frame(self._limits_message.frame_id, False, len(raw), (ctypes.c_uint8 * 8)(*raw)))
         return [frame for frame in due if frame is not None]
 
