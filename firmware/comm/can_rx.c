@@ -44,7 +44,7 @@ static rx_result_t check(uint16_t data_id, rx_channel_t *channel, const can_fram
     }
 }
 
-static bool take_command(can_rx_t *rx, const can_frame_t *frame)
+static bool take_command(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     struct bus_vcu_torque_request_t m;
     if (bus_vcu_torque_request_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_request_in_range(&m)) {
@@ -54,25 +54,25 @@ static bool take_command(can_rx_t *rx, const can_frame_t *frame)
         .enable = m.enable != 0U,
         .fault_reset = m.fault_reset != 0U,
         .mode = (command_mode_t)m.mode,
-        .torque_requested_Nm = bus_vcu_torque_request_torque_requested_decode(m.torque_requested),
-        .limit_drive_Nm = bus_vcu_torque_request_torque_limit_drive_decode(m.torque_limit_drive),
-        .limit_regen_Nm = bus_vcu_torque_request_torque_limit_regen_decode(m.torque_limit_regen),
+        .torque_requested_Nm = bus_vcu_torque_request_get_torque_requested(&m, scales),
+        .limit_drive_Nm = bus_vcu_torque_request_get_torque_limit_drive(&m, scales),
+        .limit_regen_Nm = bus_vcu_torque_request_get_torque_limit_regen(&m, scales),
     };
     rx->accepted++;
     return true;
 }
 
-static bool take_limits(can_rx_t *rx, const can_frame_t *frame)
+static bool take_limits(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     struct bus_vcu_battery_limits_t m;
     if (bus_vcu_battery_limits_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_battery_limits_in_range(&m)) {
         return false;
     }
     rx->limits = (bus_power_limits_t){
-        .drive_kW = bus_vcu_battery_limits_power_limit_drive_decode(m.power_limit_drive),
-        .regen_kW = bus_vcu_battery_limits_power_limit_regen_decode(m.power_limit_regen),
+        .drive_kW = bus_vcu_battery_limits_get_power_limit_drive(&m, scales),
+        .regen_kW = bus_vcu_battery_limits_get_power_limit_regen(&m, scales),
     };
-    rx->battery_V = bus_vcu_battery_limits_battery_voltage_decode(m.battery_voltage);
+    rx->battery_V = bus_vcu_battery_limits_get_battery_voltage(&m, scales);
     return true;
 }
 
@@ -100,7 +100,7 @@ static void record_result(rx_channel_t *channel, rx_result_t result)
     }
 }
 
-static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
+static rx_result_t receive(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     const bool is_command = frame->id == BUS_VCU_TORQUE_REQUEST_FRAME_ID;
     if (!is_command && frame->id != BUS_VCU_BATTERY_LIMITS_FRAME_ID) {
@@ -114,7 +114,7 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
     rx_result_t result = check(is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel,
                                frame);
     if (result == RX_ACCEPTED) {
-        const bool taken = is_command ? take_command(rx, frame) : take_limits(rx, frame);
+        const bool taken = is_command ? take_command(rx, scales, frame) : take_limits(rx, scales, frame);
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;
         result = taken ? RX_ACCEPTED : RX_RANGE;
         if (!next) {
@@ -125,9 +125,9 @@ static rx_result_t receive(can_rx_t *rx, const can_frame_t *frame)
     return result;
 }
 
-rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame)
+rx_result_t can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
-    const rx_result_t result = receive(rx, frame);
+    const rx_result_t result = receive(rx, scales, frame);
     count_up(&rx->count[result]);
     return result;
 }

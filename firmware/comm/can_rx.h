@@ -6,12 +6,13 @@
  *   alive   a frame was accepted less than the message's time-out ago
  *   failed  three of the last ten frames with this identifier were bad
  *   After a time-out the next frame only synchronises the counter, the one after it may be accepted.
- * Source   firmware/comm/fluxtrue.dbc; docs/howto/can.md
+ * Source   firmware/comm/fluxtrue.dbc; docs/howto/can.md; docs/decisions/018-bus-scales.md
  * Units    SI, as the DBC says
  * Range    accepted values lie within the DBC's ranges
  * Errors   one counter per kind of violation, saturating; a refused frame changes nothing else
  * Context  1 kHz task: can_rx_frame() for each frame, then can_rx_tick() once with the time since the last one */
 #include "comm/e2e.h"
+#include "types/bus_scales.h"
 
 /* X(NAME, value, explanation): named and explained here only. */
 #define COMMAND_MODE_LIST(X) \
@@ -69,7 +70,7 @@ typedef struct {
     uint16_t time_outs;
 } can_rx_t;
 
-rx_result_t can_rx_frame(can_rx_t *rx, const can_frame_t *frame);
+rx_result_t can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);
 void can_rx_tick(can_rx_t *rx, uint32_t elapsed_us);
 
 #endif

@@ -8,9 +8,9 @@ bool message_inv_status(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_status_t m = {0};
     bus_inv_status_put_state(&m, t->state);
-    const bool finite = bus_inv_status_put_torque_estimated(&m, t->torque_estimated_Nm) &&
-                        bus_inv_status_put_torque_commanded(&m, t->torque_commanded_Nm) &&
-                        bus_inv_status_put_speed(&m, t->speed_rpm);
+    const bool finite = bus_inv_status_put_torque_estimated(&m, t->torque_estimated_Nm, t->scales) &&
+                        bus_inv_status_put_torque_commanded(&m, t->torque_commanded_Nm, t->scales) &&
+                        bus_inv_status_put_speed(&m, t->speed_rpm, t->scales);
     return finite && bus_inv_status_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -20,15 +20,18 @@ bool message_inv_dc_link(const telemetry_t *t, uint8_t *data)
     bus_inv_dc_link_put_derating_reason(&m, t->derating_reason);
     bus_inv_dc_link_put_refused_reason(&m, t->refused_reason);
     bus_inv_dc_link_put_refused_count(&m, t->refused_count);
-    const bool finite = bus_inv_dc_link_put_dc_voltage(&m, t->v_dc_V) && bus_inv_dc_link_put_dc_current(&m, t->i_dc_A);
+    const bool finite = bus_inv_dc_link_put_dc_voltage(&m, t->v_dc_V, t->scales) &&
+                        bus_inv_dc_link_put_dc_current(&m, t->i_dc_A, t->scales);
     return finite && bus_inv_dc_link_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
 bool message_inv_currents(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_currents_t m = {0};
-    const bool finite = bus_inv_currents_put_id(&m, t->id_A) && bus_inv_currents_put_iq(&m, t->iq_A) &&
-                        bus_inv_currents_put_id_ref(&m, t->id_ref_A) && bus_inv_currents_put_iq_ref(&m, t->iq_ref_A);
+    const bool finite = bus_inv_currents_put_id(&m, t->id_A, t->scales) &&
+                        bus_inv_currents_put_iq(&m, t->iq_A, t->scales) &&
+                        bus_inv_currents_put_id_ref(&m, t->id_ref_A, t->scales) &&
+                        bus_inv_currents_put_iq_ref(&m, t->iq_ref_A, t->scales);
     return finite && bus_inv_currents_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -37,8 +40,8 @@ bool message_inv_identification(const telemetry_t *t, uint8_t *data)
     struct bus_inv_identification_t m = {0};
     bus_inv_identification_put_psi_clamped(&m, t->psi_clamped);
     bus_inv_identification_put_resistance_clamped(&m, t->r_clamped);
-    const bool finite = bus_inv_identification_put_psi_f(&m, t->psi_f_mVs) &&
-                        bus_inv_identification_put_resistance(&m, t->r_mohm) &&
+    const bool finite = bus_inv_identification_put_psi_f(&m, t->psi_f_mVs, t->scales) &&
+                        bus_inv_identification_put_resistance(&m, t->r_mohm, t->scales) &&
                         bus_inv_identification_put_psi_quality(&m, t->psi_quality_percent) &&
                         bus_inv_identification_put_resistance_quality(&m, t->r_quality_percent) &&
                         bus_inv_identification_put_table_scale(&m, t->table_scale_percent);
@@ -59,7 +62,7 @@ bool message_inv_limits(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_limits_t m = {0};
     bus_inv_limits_put_request_limit(&m, t->request_limit);
-    const bool finite = bus_inv_limits_put_torque_max(&m, t->torque_max_Nm);
+    const bool finite = bus_inv_limits_put_torque_max(&m, t->torque_max_Nm, t->scales);
     return finite && bus_inv_limits_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 
@@ -77,6 +80,7 @@ bool message_inv_configuration(const telemetry_t *t, uint8_t *data)
 {
     struct bus_inv_configuration_t m = {0};
     bus_inv_configuration_put_motor_check(&m, t->motor_check);
+    bus_inv_configuration_put_interface_hash(&m, t->interface_hash);
     return bus_inv_configuration_pack(data, &m, MESSAGE_LENGTH) == (int)MESSAGE_LENGTH;
 }
 

@@ -3,13 +3,15 @@
 #define COMM_MESSAGES_H
 /** What the drive tells the bus, in physical units, and its encoding.
  *   Every value is clamped to the DBC's range of its signal; one that is no number refuses the whole frame.
- * Source   firmware/comm/fluxtrue.dbc
+ * Source   firmware/comm/fluxtrue.dbc; docs/decisions/018-bus-scales.md
  * Units    SI or as the names say; signs as in the DBC
- * Rounding to nearest in the DBC's scale
+ * Rounding to nearest in the motor's scale
  * Errors   encoders answer false for a value that is not finite: the frame must not be sent
  * Context  1 kHz task */
 #include <stdbool.h>
 #include <stdint.h>
+
+#include "types/bus_scales.h"
 
 #define MESSAGE_LENGTH 8U
 #define INTERFACE_VERSION 3U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
@@ -48,6 +50,7 @@ typedef struct {
 } diagnostics_t;
 
 typedef struct {
+    const bus_scales_t *scales;
     uint32_t state;
     float torque_estimated_Nm, torque_commanded_Nm, torque_max_Nm, speed_rpm;
     float v_dc_V, i_dc_A;
@@ -59,7 +62,7 @@ typedef struct {
     bool winding_valid, inverter_valid;
     uint32_t drive_faults, ecu_faults, first_fault, fault_count;
     uint32_t motor_check; /* motor_check_t */
-    uint32_t motor_id;
+    uint32_t motor_id, interface_hash;
     diagnostics_t diagnostics;
 } telemetry_t;
 

@@ -27,6 +27,7 @@
 #include "safety/torque_monitor.h"
 #include "second_level/constants.h"
 #include "types/bases.h"
+#include "types/bus_scales.h"
 #include "types/features.h"
 #include "types/motor_check.h"
 
@@ -48,6 +49,8 @@ typedef struct {
 typedef struct {
     const char *name;
     bases_t bases;
+    bus_scales_t bus_scales;
+    uint32_t interface_hash; /* of the DBC with these scales */
     uint8_t adc_bits;
     uint16_t trim_steps; /* steps of identification between two changes of the dead-time compensation */
     float current_full_scale_A;

@@ -16,7 +16,7 @@
 #define JERK_MS 10         /* from zero to full slew */
 #define RAMP_OUT_MS 15     /* from full torque to zero, after the time-out of 30 ms */
 #define ONE_Q30 1073741824.0F
-#define DEAD_BAND_NM 0.25F
+#define DEAD_BAND 2.5F /* counts of the requested torque on the bus */
 #define STANDSTILL Q31(0.002)
 
 /* A change per millisecond as a change per step. */
@@ -38,7 +38,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
         .slew = slew,
         .jerk = per_step(&ecu->clock, slew / JERK_MS),
         .ramp_out = per_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
-        .dead_band = q15_from_si(DEAD_BAND_NM, source->bases.torque_Nm),
+        .dead_band = q15_from_si(DEAD_BAND * source->bus_scales.torque_Nm, source->bases.torque_Nm),
         .omega_standstill = STANDSTILL,
     };
     ecu_seal_rates(ecu);
@@ -53,7 +53,7 @@ static void receive(ecu_t *ecu)
             xcp_access_receive(&ecu->xcp, &frame);
         } else {
             second_level_frame(&ecu->second_level.frames, &frame);
-            (void)can_rx_frame(&ecu->rx, &frame);
+            (void)can_rx_frame(&ecu->rx, &ecu->drive.motor->bus_scales, &frame);
         }
     }
     can_rx_tick(&ecu->rx, ecu->clock.elapsed_us);

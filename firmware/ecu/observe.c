@@ -189,7 +189,8 @@ static request_limit_t request_limit(const ecu_t *ecu)
     const float magnitude_Nm = (requested_Nm < 0.0F) ? -requested_Nm : requested_Nm;
     const q31_t omega = sample_box_read(&ecu->drive.samples).point.omega;
     const bool braking = arbitrate_is_braking(&ecu->arbitration_config, omega, requested_Nm < 0.0F);
-    if (magnitude_Nm > ecu->drive.motor->torque_max_Nm) {
+    const float half_count_Nm = 0.5F * ecu->drive.motor->bus_scales.torque_Nm; /* the bus rounds the rated torque */
+    if (magnitude_Nm > ecu->drive.motor->torque_max_Nm + half_count_Nm) {
         return REQUEST_LIMIT_RATED_TORQUE;
     }
     if (magnitude_Nm > (braking ? command->limit_regen_Nm : command->limit_drive_Nm)) {

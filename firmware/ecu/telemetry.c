@@ -66,6 +66,7 @@ static uint32_t hash(const char *name)
 void telemetry_read(const drive_t *drive, telemetry_t *telemetry)
 {
     const sample_t sample = sample_box_read(&drive->samples);
+    telemetry->scales = &drive->motor->bus_scales;
     read_point(drive, &sample, telemetry);
     read_torque(drive, telemetry);
     read_identification(drive, telemetry);
@@ -74,4 +75,5 @@ void telemetry_read(const drive_t *drive, telemetry_t *telemetry)
     telemetry->motor_check = (uint32_t)drive_motor_check(drive);
     telemetry->diagnostics.isr_overruns = mrai_overruns(drive);
     telemetry->motor_id = hash(drive->motor->name);
+    telemetry->interface_hash = drive->motor->interface_hash;
 }

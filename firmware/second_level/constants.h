@@ -7,7 +7,7 @@
  *                 sixteenth of the full scale of the current, because torque is almost bilinear in the currents (SL-4)
  *   checksum      CRC-32 (IEEE 802.3) of all bytes behind it, in the processor's (little-endian) order
  * Source   docs/theory/second-level.md; written by `tools/fluxtrue motor build`
- * Units    per unit of the motor's bases; the bus's 0.1 N·m
+ * Units    per unit of the motor's bases
  * Range    no pointers and no padding, so that the checksum covers what is used
  * Context  const data in flash */
 #include <stdint.h>
@@ -19,7 +19,7 @@
 
 typedef struct {
     uint32_t checksum;
-    q16_t torque_per_count;                 /* of 0.1 N·m */
+    q16_t torque_per_count;                 /* of the bus, in the motor's scale */
     int32_t torque_max;                     /* rated */
     int32_t fall;                           /* slowest legal decrease of the torque, per step */
     int32_t tolerance;                      /* of the torque from currents, at no torque */

@@ -3,12 +3,12 @@
 
 #define COMMAND_ID 0x110U
 #define COMMAND_DATA_ID 0x1101U
-#define COMMAND_MAX_DNM 10000
+#define COMMAND_MAX 10000
 #define COMMAND_TIME_OUT_US 35000U /* not before the first level's 30 ms */
 #define BATTERY_ID 0x111U
 #define BATTERY_DATA_ID 0x1111U
-#define BATTERY_MAX_10W 60000
-#define BATTERY_MAX_DV 15000
+#define BATTERY_MAX 60000
+#define BATTERY_VOLTAGE_MAX 15000
 #define BATTERY_TIME_OUT_US 310000U
 #define LENGTH 8U
 #define COUNTERS 15U
@@ -69,14 +69,14 @@ static void take_command(second_level_frames_t *frames, const can_frame_t *frame
     const int32_t drive = unsigned_at(frame, 4);
     const int32_t regen = unsigned_at(frame, 6);
     const unsigned mode = (unsigned)frame->data[1] >> MODE_SHIFT;
-    if (torque < -COMMAND_MAX_DNM || torque > COMMAND_MAX_DNM || drive > COMMAND_MAX_DNM || regen > COMMAND_MAX_DNM ||
+    if (torque < -COMMAND_MAX || torque > COMMAND_MAX || drive > COMMAND_MAX || regen > COMMAND_MAX ||
         mode > MODE_MAX) {
         return;
     }
     const bool enabled = (frame->data[1] & ENABLE) != 0U && mode == MODE_TORQUE;
-    frames->torque_dNm = enabled ? torque : 0;
-    frames->drive_dNm = drive;
-    frames->regen_dNm = regen;
+    frames->torque_counts = enabled ? torque : 0;
+    frames->drive_counts = drive;
+    frames->regen_counts = regen;
     refresh(&frames->command);
 }
 
@@ -84,11 +84,11 @@ static void take_battery(second_level_frames_t *frames, const can_frame_t *frame
 {
     const int32_t drive = unsigned_at(frame, 2);
     const int32_t regen = unsigned_at(frame, 4);
-    if (drive > BATTERY_MAX_10W || regen > BATTERY_MAX_10W || unsigned_at(frame, 6) > BATTERY_MAX_DV) {
+    if (drive > BATTERY_MAX || regen > BATTERY_MAX || unsigned_at(frame, 6) > BATTERY_VOLTAGE_MAX) {
         return;
     }
-    frames->power_drive_10W = drive;
-    frames->power_regen_10W = regen;
+    frames->power_drive_counts = drive;
+    frames->power_regen_counts = regen;
     refresh(&frames->battery);
 }
 
@@ -123,10 +123,10 @@ static bool grow_old(second_level_channel_t *channel, uint32_t elapsed_us, uint3
 void second_level_frames_tick(second_level_frames_t *frames, uint32_t elapsed_us)
 {
     if (grow_old(&frames->command, elapsed_us, COMMAND_TIME_OUT_US)) {
-        frames->torque_dNm = 0;
+        frames->torque_counts = 0;
     }
     if (grow_old(&frames->battery, elapsed_us, BATTERY_TIME_OUT_US)) {
-        frames->power_drive_10W = 0;
-        frames->power_regen_10W = 0;
+        frames->power_drive_counts = 0;
+        frames->power_regen_counts = 0;
     }
 }

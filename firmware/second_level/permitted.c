@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "second_level/permitted.h"
 
-static int32_t per_unit(const second_level_constants_t *constants, int32_t dNm)
+static int32_t per_unit(const second_level_constants_t *constants, int32_t counts)
 {
-    return (int32_t)(((int64_t)constants->torque_per_count * dNm + 0x8000) >> 16);
+    return (int32_t)(((int64_t)constants->torque_per_count * counts + 0x8000) >> 16);
 }
 
 /* The limit of torque in the direction `sign` (SL-1). */
@@ -12,8 +12,8 @@ static int32_t limit_of(const second_level_constants_t *constants, const second_
 {
     const bool certain = turn > constants->turn_standstill || turn < -constants->turn_standstill;
     const bool driving = (turn < 0) == (sign < 0);
-    const int32_t larger = fx_max_s32(frames->drive_dNm, frames->regen_dNm);
-    const int32_t limit = driving ? frames->drive_dNm : frames->regen_dNm;
+    const int32_t larger = fx_max_s32(frames->drive_counts, frames->regen_counts);
+    const int32_t limit = driving ? frames->drive_counts : frames->regen_counts;
     return fx_min_s32(per_unit(constants, certain ? limit : larger), constants->torque_max);
 }
 
@@ -21,7 +21,7 @@ static int32_t target_of(const second_level_constants_t *constants, const second
                          int32_t sign)
 {
     const bool battery_lost = frames->battery.seen && !frames->battery.alive;
-    const int32_t request = per_unit(constants, sign * frames->torque_dNm);
+    const int32_t request = per_unit(constants, sign * frames->torque_counts);
     return battery_lost ? 0 : fx_clamp_q31(request, 0, limit_of(constants, frames, turn, sign));
 }
 

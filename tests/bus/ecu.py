@@ -9,21 +9,22 @@ import cantools
 from cantools.database.can import Database
 from protection import protect
 
+from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.motor.bases import periods_per_step
 from fluxtrue_tools.sim import motor as sim_motor
 from fluxtrue_tools.sim.build import MotorFolder
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("FLUXTRUE_BUILD_DIR", ROOT / "build" / "host"))
-DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
-PERIODS_PER_MS = 10
-DC_LINK = {"dc_link_F": 500e-6, "avalanche_V": 700.0}  # assumed values; the capacitor is empty at the start
+# Assumed: the capacitor, empty at the start, and semiconductors that withstand twice the battery's voltage.
+DC_LINK_F, AVALANCHE_PER_BATTERY = 500e-6, 2.0
 COMMAND = "VCU_TorqueRequest"
 LIMITS = "VCU_BatteryLimits"
 
 
-def load_dbc() -> Database:
-    """The DBC, which is the only description of the bus."""
-    database = cantools.database.load_file(DBC)
+def load_dbc(path: Path = DBC) -> Database:
+    """The DBC of a motor, or the standard one: the only description of the bus."""
+    database = cantools.database.load_file(path)
     assert isinstance(database, Database)
     return database
 
@@ -39,8 +40,8 @@ class Ecu:
     """One ECU and its machine at an imposed speed; time passes in steps of the task."""
 
     def __init__(self, motor: sim_motor.Motor | None = None) -> None:
-        self.dbc = load_dbc()
         self.motor = motor or sim_motor.read(MotorFolder("hsm1", BUILD / "motors" / "hsm1"))
+        self.dbc = load_dbc(self.motor.folder.dbc)
         self.lib = self.motor.library
         self.lib.fluxtrue_create.restype = ctypes.c_void_p
         self.lib.fluxtrue_get.restype = ctypes.c_double
@@ -52,15 +53,18 @@ class Ecu:
         self.sim = ctypes.c_void_p(self.lib.sim_create_around(self.handle))
         if self.motor.flux_map is not None:
             self.motor.flux_map.hand_over(self.lib, self.sim)
-        for name, value in {**self.motor.plant, "imposed_speed": 1.0, **DC_LINK}.items():
+        link = {"dc_link_F": DC_LINK_F, "avalanche_V": AVALANCHE_PER_BATTERY * self.motor.plant["vdc_V"]}
+        for name, value in {**self.motor.plant, "imposed_speed": 1.0, **link}.items():
             self.set(name, value)
         bad = self.lib.sim_start(self.sim)
         assert bad is None, bad
         self.speed_rad_s = 0.0
+        self.periods_per_step = periods_per_step(self.motor.plant["pwm_hz"])
         self.time_ms = 0
         self.counters = {COMMAND: 0, LIMITS: 0}
+        self.torque_end_Nm = float(self.dbc.get_message_by_name(COMMAND).get_signal_by_name("TorqueRequested").maximum)
         self.command = {"Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequested": 0.0,
-                        "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0}  # fmt: skip
+                        "TorqueLimitDrive": self.torque_end_Nm, "TorqueLimitRegen": self.torque_end_Nm}  # fmt: skip
         self.talking = True
         self.sent: list[tuple[int, int, bytes]] = []
         self.last: dict[str, dict] = {}
@@ -101,7 +105,7 @@ class Ecu:
 
     def step_ms(self) -> None:
         """One millisecond of simulated time; the command goes out in every tenth."""
-        self.step_once(PERIODS_PER_MS, self.time_ms % 10 == 0)
+        self.step_once(self.periods_per_step, self.time_ms % 10 == 0)
 
     def step_once(self, periods: int, command_is_due: bool) -> None:
         """One step of the task, of so many periods."""

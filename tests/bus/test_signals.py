@@ -3,7 +3,9 @@
 
 import ctypes
 import math
+from decimal import Decimal
 
+import cantools
 import numpy as np
 import pytest
 from cantools.database.can import Message
@@ -11,7 +13,10 @@ from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
 from ecu import BUILD, load_dbc
 
+from fluxtrue_tools.bus.scales import dbc_of, standard_factors
+
 DBC = load_dbc()
+SCALES = (ctypes.c_float * 7)(*map(float, standard_factors().values()))  # bus_scales_t
 LIB = ctypes.CDLL(str(BUILD / "libfluxtrue_bus_exports.so"))
 SENT = [message for message in DBC.messages if "INV" in message.senders]
 RECEIVED = [message for message in DBC.messages if "INV" in message.receivers]
@@ -33,19 +38,19 @@ def names(case: tuple[Message, int]) -> str:
     return f"{case[0].name}.{case[0].signals[case[1]].name}"
 
 
-def c_encode(message: Message, values: list[float]) -> tuple[int, bytes]:
+def c_encode(message: Message, values: list[float], scales: ctypes.Array = SCALES) -> tuple[int, bytes]:
     """The frame that the firmware encodes, and the number of values that it used."""
     data = (ctypes.c_uint8 * 8)()
     function = getattr(LIB, f"test_{camel_to_snake_case(message.name)}")
-    taken = function((ctypes.c_double * len(values))(*values), data)
+    taken = function((ctypes.c_double * len(values))(*values), data, scales)
     return int(taken), bytes(data)
 
 
-def c_decode(message: Message, data: bytes) -> tuple[bool, list[float]]:
+def c_decode(message: Message, data: bytes, scales: ctypes.Array = SCALES) -> tuple[bool, list[float]]:
     """Whether the firmware finds the values of a frame in range, and the values."""
     values = (ctypes.c_double * len(message.signals))()
     function = getattr(LIB, f"test_{camel_to_snake_case(message.name)}")
-    in_range = function(values, (ctypes.c_uint8 * 8)(*data))
+    in_range = function(values, (ctypes.c_uint8 * 8)(*data), scales)
     return bool(in_range), list(values)
 
 
@@ -99,6 +104,24 @@ def test_values_between_counts_are_rounded_to_the_nearest(case: tuple[Message, i
         # float32 of the value and of the scale: relative 2^-23 each
         slack = 0.5 + 1e-3 + abs(wanted) * 3e-7
         assert abs(raw_of(message, index, data) - wanted) <= slack
+
+
+@pytest.mark.parametrize("digit", [1, 2, 5])
+def test_another_scale_is_encoded_and_decoded_as_its_dbc_says(digit: int) -> None:
+    factors = {name: Decimal(digit).scaleb(n - 4) for n, name in enumerate(standard_factors())}
+    messages = cantools.database.load_string(dbc_of(factors), "dbc").messages
+    scales = (ctypes.c_float * len(factors))(*map(float, factors.values()))
+    rng = np.random.default_rng(digit)
+    for message in (m for m in messages for _ in range(50)):
+        values = [float(rng.uniform(s.minimum, s.maximum) if s.unit else s.minimum) for s in message.signals]
+        named = {s.name: v for s, v in zip(message.signals, values, strict=True)}
+        if "INV" in message.senders:
+            told = message.decode(c_encode(message, values, scales)[1], decode_choices=False)
+        else:
+            told = dict(zip(named, c_decode(message, message.encode(named), scales)[1], strict=True))
+        for signal in message.signals:
+            slack = 0.501 * signal.scale + 3e-7 * abs(named[signal.name])  # half a count, and a float's resolution
+            assert abs(told[signal.name] - named[signal.name]) <= slack, signal.name
 
 
 @pytest.mark.parametrize("case", signals(SENT), ids=names)

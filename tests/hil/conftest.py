@@ -15,7 +15,9 @@ from report import Figures, Report
 from rig import Rig
 
 from fluxtrue_tools.a2l.elf import Description, read
+from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.address import BusAddress, parse_option
+from fluxtrue_tools.bus.interface import CONFIGURATION, Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.mdf import BusLog
@@ -23,7 +25,6 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import connect
 
 ROOT = Path(__file__).resolve().parents[2]
-DBC = ROOT / "firmware" / "comm" / "fluxtrue.dbc"
 VERSION = "INV_Version"
 STACK = "unused stack"
 MARKERS = {
@@ -48,6 +49,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     group.addoption("--allow-power", action="store_true",
                     help="on a bench: tests may charge the dc link, enable switching and request torque")  # fmt: skip
+    group.addoption("--dbc", help="DBC of the ECU's motor; default: beside --vecu, else in the standard scale")
     group.addoption("--elf", help="the ECU's ELF file: where its calibration values are; default: --vecu")
     group.addoption("--report", default=str(ROOT / "build" / "hil"), help="folder for report.html and bus.mf4")
     group.addoption("--soak-minutes", type=float, default=30.0, help="simulated length of the soak test")
@@ -104,9 +106,16 @@ def program(request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture(scope="session")
-def database() -> cantools.database.Database:
-    """The DBC file of the bus."""
-    return cantools.database.load_file(DBC)
+def interface(request: pytest.FixtureRequest) -> Interface:
+    """The DBC of the motor: --dbc, or the one built beside the virtual ECU; else in the standard scale."""
+    given, program = request.config.getoption("--dbc"), request.config.getoption("--vecu")
+    return read_interface(Path(given) if given else Path(program).with_name(DBC.name) if program else DBC)
+
+
+@pytest.fixture(scope="session")
+def database(interface: Interface) -> cantools.database.Database:
+    """The messages of the bus."""
+    return interface.database
 
 
 @dataclass
@@ -155,13 +164,13 @@ def target(request: pytest.FixtureRequest) -> Iterator[Target]:
 
 
 @pytest.fixture(scope="session")
-def bus_log(request: pytest.FixtureRequest) -> Iterator[BusLog]:
+def bus_log(request: pytest.FixtureRequest, interface: Interface) -> Iterator[BusLog]:
     """All frames on the bus, for bus.mf4."""
     log = BusLog()
     yield log
     folder = Path(request.config.getoption("--report"))
     folder.mkdir(parents=True, exist_ok=True)
-    log.write(folder / "bus.mf4", DBC)
+    log.write(folder / "bus.mf4", interface)
 
 
 @pytest.fixture(scope="session")
@@ -194,7 +203,7 @@ def _note_stack(about: dict[str, str], unused_bytes: int) -> None:
 
 
 @pytest.fixture
-def rig(connected: Rig, request: pytest.FixtureRequest) -> Iterator[Rig]:
+def rig(connected: Rig, interface: Interface, request: pytest.FixtureRequest) -> Iterator[Rig]:
     """An ECU just started (virtual) or brought to standby (bench); after the test its health is checked."""
     if connected.has_stand:
         connected.power_cycle()
@@ -204,6 +213,9 @@ def rig(connected: Rig, request: pytest.FixtureRequest) -> Iterator[Rig]:
         connected.advance(0.1)
         connected.ask(reset=False)
     connected.wait_for("standby")
+    problem = interface.mismatch(connected.newest(CONFIGURATION))
+    if problem:
+        pytest.exit(f"error: {problem}", returncode=2)
     before = health.note(connected)
     yield connected
     problems = health.problems(connected, before)

@@ -5,6 +5,7 @@ With a bench channel time is simulated: advance() sends the cyclic commands, let
 has sent; no result depends on how fast the computer is. Without a bench channel time is the wall clock's.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -40,8 +41,8 @@ class Command:
     reset: bool = False
     mode: str = "off"
     torque_Nm: float = 0.0
-    limit_drive_Nm: float = 1000.0
-    limit_regen_Nm: float = 1000.0
+    limit_drive_Nm: float = math.inf  # as large as the message can carry
+    limit_regen_Nm: float = math.inf
 
     def signals(self) -> dict[str, Any]:
         """Signal values for cantools; CRC and counter are set later."""
@@ -179,7 +180,10 @@ class Rig:
     def encode(self, command: Command) -> bytes:
         """A command's frame without protection."""
         if command not in self._encoded:
-            self._encoded[command] = bytes(self.by_name[COMMAND].encode(command.signals()))
+            message, values = self.by_name[COMMAND], command.signals()
+            for name in ("TorqueLimitDrive", "TorqueLimitRegen"):
+                values[name] = min(values[name], message.get_signal_by_name(name).maximum)
+            self._encoded[command] = bytes(message.encode(values))
         return self._encoded[command]
 
     def next_command(self) -> bytes:
@@ -236,6 +240,10 @@ class Rig:
     def decode(self, name: str, data: bytes) -> dict[str, Any]:
         """Values of the signals; named values stay numbers."""
         return dict(self.by_name[name].decode(data, decode_choices=False))
+
+    def newest(self, name: str) -> dict[str, Any] | None:
+        """The values of the newest frame; None before the first."""
+        return self.decode(name, self.last[name].data) if name in self.last else None
 
     def signal(self, name: str, signal: str) -> float:
         """The newest value."""

@@ -2,13 +2,14 @@
 """The bus side of the page with the virtual ECU, without a browser. The test advances time, 40 ms at a time."""
 
 from collections.abc import Callable, Iterator
+from decimal import Decimal
 from pathlib import Path
 
-import cantools.database
 import numpy as np
 import pytest
 
-from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.interface import Interface, read_interface
+from fluxtrue_tools.bus.scales import dbc_of, standard_factors
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Recorder
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
@@ -19,6 +20,7 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import SteppedBus, connect
 
 BATCH_S = 0.04
+HANG_S = 60.0  # the wait for what must come ends only if it does not
 TIME_OUT_S = 5.0  # of simulated time; every change of state takes less
 
 
@@ -26,13 +28,13 @@ class Drive:
     """The objects of the server; the test takes the place of the pages and of the server's loop."""
 
     def __init__(self, ecu: VirtualEcu, folder: Path) -> None:
-        database = cantools.database.load_file(DBC)
+        interface = read_interface()
         self.channel, bus = Channel(HOST, ecu.bench_port), connect(ecu.can_port)
-        self.commander, self.samples, self.in_step = Commander(132.0), Samples(database), InStep()
+        self.commander, self.samples, self.in_step = Commander(132.0), Samples(interface.database), InStep()
         pace = SimulatedTime(SteppedBus(bus, self.channel.another()), [self.samples], self.in_step)
         self.stand = Stand(self.channel.another())
-        recorder = Recorder(folder, DBC)
-        self.link = Link(bus, pace, database, self.commander, self.samples, recorder, self.stand)
+        recorder = Recorder(folder, interface)
+        self.link = Link(bus, pace, interface, self.commander, self.samples, recorder, self.stand)
         assert self.in_step.due()
 
     def pass_batch(self, alive: bool = True) -> None:
@@ -62,6 +64,20 @@ class Drive:
         self.link.close()
         self.stand.close()
         self.channel.close()
+
+
+def test_an_inverter_of_another_scale_is_not_commanded(request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    truck = Interface("truck.dbc", dbc_of(standard_factors() | {"torque_Nm": Decimal("0.2")}))
+    with VirtualEcu(Path(request.config.getoption("--vecu"))) as ecu:
+        channel, bus = Channel(HOST, ecu.bench_port), connect(ecu.can_port)
+        samples = Samples(truck.database)
+        pace = SimulatedTime(SteppedBus(bus, channel.another()), [samples])
+        link = Link(bus, pace, truck, Commander(1150.0), samples, Recorder(tmp_path, truck))
+        link.wait(HANG_S)
+        assert link.lost.startswith(f"truck.dbc (interface hash 0x{truck.hash:08X}) does not describe this inverter")
+        assert samples.newest_s < 0.2
+        link.close()
+        channel.close()
 
 
 @pytest.fixture

@@ -10,13 +10,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import cantools.database
 import pytest
 from aiohttp import ClientWebSocketResponse
 from aiohttp.test_utils import TestClient, TestServer
 from progress import HANG_S, polled_async
 
-from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.interface import read_interface
 from fluxtrue_tools.live.cli import _listen
 from fluxtrue_tools.live.commander import Commander, Order, Wish
 from fluxtrue_tools.live.link import Recorder
@@ -169,8 +168,8 @@ def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None)
     """Run a server while talk() runs."""
 
     async def conversation() -> None:
-        samples = Samples(cantools.database.load_file(DBC))
-        session = Session("test", drive.commander, samples, Recorder(folder, DBC), {})
+        samples = Samples(read_interface().database)
+        session = Session("test", drive.commander, samples, Recorder(folder, read_interface()), {})
         session.link = drive  # type: ignore[assignment]
         session.in_step = in_step
         async with TestClient(TestServer(make_app(session))) as client:

@@ -2,11 +2,13 @@
 /* Reception of the protected messages: comm/e2e and comm/can_rx. */
 #include "proof.h"
 
+#include "bus/bus.c" /* before the file that forbids its conversions */
+
 #include "comm/e2e.c"
 
 #include "comm/can_rx.c"
 
-#include "bus/bus.c"
+static const bus_scales_t scales = {.torque_Nm = 0.1F, .power_kW = 0.01F};
 
 static can_frame_t any_frame(void)
 {
@@ -124,7 +126,7 @@ void proof_a_refused_frame_changes_no_request(void)
     rx.limits_channel = any_channel();
     const can_frame_t frame = any_frame();
     const can_rx_t before = rx;
-    const rx_result_t result = can_rx_frame(&rx, &frame);
+    const rx_result_t result = can_rx_frame(&rx, &scales, &frame);
     PROVE(WITHIN((int)result, 0, RX_RESULTS - 1));
     const bool same = rx.command.enable == before.command.enable && rx.command.mode == before.command.mode &&
                       rx.command.fault_reset == before.command.fault_reset;

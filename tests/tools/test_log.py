@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """`fluxtrue log` reads a recorded drive without loss: signals, table, plot."""
 
+from decimal import Decimal
 from pathlib import Path
 
 import can
-import cantools.database
 import numpy as np
 import pandas as pd
 import pytest
 from asammdf import MDF, Signal
 from click.testing import CliRunner, Result
 
+from fluxtrue_tools.bus.interface import Interface, read_interface
+from fluxtrue_tools.bus.scales import dbc_of, standard_factors
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.cli import log
-from fluxtrue_tools.log.decode import DBC, signals_of
+from fluxtrue_tools.log.decode import attached_interface, signals_of
 from fluxtrue_tools.vecu.mdf import BusLog
 
 STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCommanded": 40.0, "Speed": 2000.0}
@@ -22,7 +24,7 @@ STATUS = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCom
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Half a second: the estimate rises to 40 N·m; one frame has an identifier not in the DBC, one is too short."""
-    message = cantools.database.load_file(DBC).get_message_by_name("INV_Status")
+    message = read_interface().message("INV_Status")
     recorder = BusLog()
     for k in range(50):
         data = message.encode(STATUS | {"TorqueEstimated": min(k, 40)})
@@ -30,8 +32,42 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     recorder(can.Message(timestamp=7.5, arbitration_id=0x7FF, data=b"12345678", is_extended_id=False))
     recorder(can.Message(timestamp=7.5, arbitration_id=0x210, data=b"123", is_extended_id=False))
     path = tmp_path_factory.mktemp("log") / "drive.mf4"
-    recorder.write(path, DBC)
+    recorder.write(path, read_interface())
     return path
+
+
+def _recording(path: Path, interface: Interface, told: int) -> Path:
+    """One frame with 2.5 N·m and one with the inverter's hash, beside the DBC."""
+    recorder = BusLog()
+    values = {
+        "INV_Status": STATUS | {"TorqueEstimated": 2.5},
+        "INV_Configuration": {"MotorCheck": 0, "InterfaceHash": told},
+    }
+    for name, signals in values.items():
+        message = interface.message(name)
+        recorder(can.Message(timestamp=1.0, arbitration_id=message.frame_id, data=message.encode(signals),
+                             is_extended_id=False))  # fmt: skip
+    recorder.write(path, interface)
+    return path
+
+
+def _servo() -> Interface:
+    return Interface("servo", dbc_of(standard_factors() | {"torque_Nm": Decimal("0.002")}))
+
+
+def test_a_recording_is_read_in_the_scale_of_the_dbc_that_is_attached_to_it(tmp_path: Path) -> None:
+    servo = _servo()
+    path = _recording(tmp_path / "servo.mf4", servo, servo.hash)
+    assert signals_of(path)["INV_Status.TorqueEstimated"].iloc[0] == pytest.approx(2.5)
+    assert attached_interface(path).hash == servo.hash != read_interface().hash
+
+
+def test_a_recording_with_the_dbc_of_another_motor_is_refused(tmp_path: Path) -> None:
+    path = _recording(tmp_path / "wrong.mf4", _servo(), read_interface().hash)
+    with pytest.raises(
+        FluxtrueError, match=r"fluxtrue\.dbc in wrong\.mf4 \(interface hash .*does not describe this inv"
+    ):
+        signals_of(path)
 
 
 def _run(*arguments: object) -> Result:

@@ -21,7 +21,7 @@ target_compile_options(fluxtrue_bus PRIVATE -w)
 if(NOT CMAKE_CROSSCOMPILING)
     # Every message's encoder and decoder, for comparison with cantools' in Python.
     add_library(fluxtrue_bus_exports SHARED "${generated}/bus/exports.c" "${generated}/bus/bus.c")
-    target_include_directories(fluxtrue_bus_exports PRIVATE "${generated}")
+    target_include_directories(fluxtrue_bus_exports PRIVATE "${generated}" "${CMAKE_SOURCE_DIR}/firmware")
     target_link_libraries(fluxtrue_bus_exports PRIVATE m)
     set_target_properties(fluxtrue_bus_exports PROPERTIES LIBRARY_OUTPUT_DIRECTORY "${CMAKE_BINARY_DIR}")
 endif()

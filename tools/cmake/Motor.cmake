@@ -18,6 +18,8 @@ function(_fluxtrue_motor_tables name folder out)
     file(GLOB_RECURSE tool CONFIGURE_DEPENDS
         "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/motor/*")
     list(FILTER tool EXCLUDE REGEX "__pycache__")
+    list(APPEND tool "${CMAKE_SOURCE_DIR}/tools/fluxtrue_tools/bus/scales.py"
+        "${CMAKE_SOURCE_DIR}/firmware/comm/fluxtrue.dbc")
     file(GLOB data CONFIGURE_DEPENDS "${folder}/*.toml" "${folder}/*.csv")
     file(STRINGS "${folder}/motor.toml" map REGEX "^flux_map *= *\"[^\"]+\"")
     if(map MATCHES "\"([^\"]+)\"") # which may lie elsewhere
@@ -32,7 +34,7 @@ function(_fluxtrue_motor_tables name folder out)
     _fluxtrue_motor_tool(motor_tool)
     add_custom_command(
         OUTPUT "${out}/motor_tables.c" "${out}/motor_si.c"
-        BYPRODUCTS "${out}/motor.json" "${out}/report.txt"
+        BYPRODUCTS "${out}/motor.json" "${out}/fluxtrue.dbc" "${out}/report.txt"
         COMMAND ${motor_tool} build "${folder}" --out "${out}" --no-report
         DEPENDS ${data} ${tool}
         COMMENT "Generating the tables of motor ${name}"

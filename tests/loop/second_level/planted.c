@@ -467,12 +467,12 @@ current_target_t __wrap_current_control_target(const current_control_config_t *c
     return __real_current_control_target(config, i_ref, flux);
 }
 
-rx_result_t __real_can_rx_frame(can_rx_t *rx, const can_frame_t *frame);
-rx_result_t __wrap_can_rx_frame(can_rx_t *rx, const can_frame_t *frame);
-rx_result_t __wrap_can_rx_frame(can_rx_t *rx, const can_frame_t *frame)
+rx_result_t __real_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);
+rx_result_t __wrap_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame);
+rx_result_t __wrap_can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     const bus_command_t before = rx->command;
-    const rx_result_t result = __real_can_rx_frame(rx, frame);
+    const rx_result_t result = __real_can_rx_frame(rx, scales, frame);
     bus_command_t *command = &rx->command;
     switch (active) {
     case DECODE_BYTES:

@@ -19,7 +19,7 @@ from fluxtrue_tools.motor.references import lookup_references
 
 STRICT = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Werror"]
 INCLUDES = [f"-I{ROOT / part}" for part in ("firmware", "tests", "tests/support")]
-PLAIN = {"motor_tables.c", "motor_si.c", "motor.json", "report.txt"}
+PLAIN = {"fluxtrue.dbc", "motor_tables.c", "motor_si.c", "motor.json", "report.txt"}
 
 
 def names(folder):

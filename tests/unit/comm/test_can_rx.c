@@ -9,11 +9,13 @@
 #define LIMITS_ID 0x111U
 #define LIMITS_DATA_ID 0x1111U
 
+static bus_scales_t scales;
 static can_rx_t rx;
 static uint8_t counter;
 
 void setUp(void)
 {
+    scales = (bus_scales_t){.torque_Nm = 0.1F, .power_kW = 0.01F};
     rx = (can_rx_t){0};
     counter = 0;
 }
@@ -36,7 +38,7 @@ static can_frame_t command(int tenths_Nm)
 static rx_result_t send(int tenths_Nm)
 {
     const can_frame_t frame = command(tenths_Nm);
-    return can_rx_frame(&rx, &frame);
+    return can_rx_frame(&rx, &scales, &frame);
 }
 
 static void milliseconds(int count)
@@ -62,11 +64,29 @@ void test_a_valid_command_is_decoded_to_physical_units(void)
     TEST_ASSERT_EQUAL_UINT16(1, rx.accepted);
 }
 
+void test_commands_and_limits_are_decoded_in_the_scale_of_the_motor(void)
+{
+    scales = (bus_scales_t){.torque_Nm = 0.0005F, .power_kW = 0.02F};
+    (void)send(400);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(-425));
+    TEST_ASSERT_EQUAL_FLOAT(-0.2125F, rx.command.torque_requested_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(0.5F, rx.command.limit_drive_Nm);
+    TEST_ASSERT_EQUAL_FLOAT(0.25F, rx.command.limit_regen_Nm);
+    uint8_t next = 0;
+    for (int n = 0; n < 2; n++) {
+        can_frame_t limits = {.id = LIMITS_ID, .length = 8, .data = {0, 0, 0x10, 0x27, 0x20, 0x4E}};
+        e2e_protect(LIMITS_DATA_ID, &next, &limits);
+        (void)can_rx_frame(&rx, &scales, &limits);
+    }
+    TEST_ASSERT_EQUAL_FLOAT(200.0F, rx.limits.drive_kW);
+    TEST_ASSERT_EQUAL_FLOAT(400.0F, rx.limits.regen_kW);
+}
+
 static void refused(rx_result_t why, const can_frame_t *frame)
 {
     const bus_command_t before = rx.command;
     const uint16_t counted = rx.count[why];
-    TEST_ASSERT_EQUAL_INT(why, can_rx_frame(&rx, frame));
+    TEST_ASSERT_EQUAL_INT(why, can_rx_frame(&rx, &scales, frame));
     TEST_ASSERT_EQUAL_UINT16(counted + 1, rx.count[why]);
     TEST_ASSERT_EQUAL_MEMORY(&before, &rx.command, sizeof before);
 }
@@ -80,7 +100,7 @@ void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
     refused(RX_CRC, &frame);
     counter = (uint8_t)(counter + 14U) % 15U; /* the receiver did not count the bad frame */
     frame = command(200);
-    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &frame));
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &scales, &frame));
     refused(RX_REPEATED, &frame);
     counter = (uint8_t)(counter + 3U) % 15U;
     frame = command(300);
@@ -113,11 +133,11 @@ void test_the_ends_of_the_ranges_are_accepted_and_one_count_beyond_is_not(void)
     can_frame_t frame = command(1);
     frame.data[1] |= 0xC0U; /* mode 3 */
     frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
-    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &scales, &frame));
     frame = command(1);
     frame.data[5] = 0x28; /* limit 0x28E8 = 1047.2 N·m */
     frame.data[0] = e2e_crc(COMMAND_DATA_ID, &frame);
-    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &frame));
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &scales, &frame));
 }
 
 void test_one_lost_frame_is_tolerated_and_counted_two_are_a_jump(void)
@@ -180,7 +200,7 @@ void test_frames_with_a_wrong_crc_do_not_delay_the_time_out(void)
     for (int n = 0; n < 30; n++) {
         can_frame_t frame = command(500);
         frame.data[0] ^= 0xFFU;
-        (void)can_rx_frame(&rx, &frame);
+        (void)can_rx_frame(&rx, &scales, &frame);
         can_rx_tick(&rx, 1000);
     }
     TEST_ASSERT_FALSE(rx.command_channel.alive);
@@ -198,7 +218,7 @@ void test_three_bad_frames_of_the_last_ten_fail_the_channel_until_they_have_pass
         for (int n = 0; n < 10; n++) {
             const bool is_bad = (pattern >> n & 1) != 0;
             count += is_bad ? 1 : 0;
-            (void)(is_bad ? can_rx_frame(&rx, &bad) : send(0));
+            (void)(is_bad ? can_rx_frame(&rx, &scales, &bad) : send(0));
         }
         TEST_ASSERT_EQUAL(count >= 3, rx.command_channel.failed);
     }
@@ -215,7 +235,7 @@ static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
                          .data = {0, 0, (uint8_t)(drive & 0xFFU), (uint8_t)(drive >> 8), (uint8_t)(regen & 0xFFU),
                                   (uint8_t)(regen >> 8), 0xA7, 0x0D}};
     e2e_protect(LIMITS_DATA_ID, count, &frame);
-    return can_rx_frame(&rx, &frame);
+    return can_rx_frame(&rx, &scales, &frame);
 }
 
 /* 45.00 kW are 4500 counts, 600.01 kW are 60001; all frames have 349.5 V, 0x0DA7; the time-out is 300 ms. */
@@ -245,7 +265,7 @@ void test_counters_saturate(void)
     rx.count[RX_IGNORED] = UINT16_MAX - 1U;
     const can_frame_t frame = {.id = 0x7FF};
     for (int n = 0; n < 3; n++) {
-        (void)can_rx_frame(&rx, &frame);
+        (void)can_rx_frame(&rx, &scales, &frame);
     }
     TEST_ASSERT_EQUAL_UINT16(UINT16_MAX, rx.count[RX_IGNORED]);
 }

@@ -19,6 +19,7 @@ static const struct {
 };
 #define MESSAGES (int)(sizeof wanted / sizeof wanted[0])
 
+static const bus_scales_t scales = {0.1F, 1.0F, 0.001F, 0.01F, 0.1F, 0.1F, 0.01F};
 static can_tx_t tx;
 static telemetry_t telemetry;
 static can_frame_t frame;
@@ -26,7 +27,7 @@ static can_frame_t frame;
 void setUp(void)
 {
     tx = (can_tx_t){0};
-    telemetry = (telemetry_t){0};
+    telemetry = (telemetry_t){.scales = &scales};
 }
 
 void tearDown(void)

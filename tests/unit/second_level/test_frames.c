@@ -50,9 +50,9 @@ static void synchronise(uint32_t id)
     receive(signed_frame(id, ENABLED_TORQUE, 0, 0, 0));
 }
 
-static void command(int torque_dNm)
+static void command(int torque_counts)
 {
-    receive(signed_frame(COMMAND_ID, ENABLED_TORQUE, torque_dNm, 2000, 1500));
+    receive(signed_frame(COMMAND_ID, ENABLED_TORQUE, torque_counts, 2000, 1500));
 }
 
 void test_a_command_is_decoded_as_the_description_of_the_bus_says(void)
@@ -61,9 +61,9 @@ void test_a_command_is_decoded_as_the_description_of_the_bus_says(void)
     TEST_ASSERT_FALSE(frames.command.alive);
     command(-321);
     TEST_ASSERT_TRUE(frames.command.alive && frames.command.seen);
-    TEST_ASSERT_EQUAL_INT32(-321, frames.torque_dNm);
-    TEST_ASSERT_EQUAL_INT32(2000, frames.drive_dNm);
-    TEST_ASSERT_EQUAL_INT32(1500, frames.regen_dNm);
+    TEST_ASSERT_EQUAL_INT32(-321, frames.torque_counts);
+    TEST_ASSERT_EQUAL_INT32(2000, frames.drive_counts);
+    TEST_ASSERT_EQUAL_INT32(1500, frames.regen_counts);
 }
 
 void test_the_limits_of_the_battery_are_decoded(void)
@@ -71,12 +71,12 @@ void test_the_limits_of_the_battery_are_decoded(void)
     synchronise(BATTERY_ID);
     receive(signed_frame(BATTERY_ID, 0, 60000, 59999, 0));
     TEST_ASSERT_TRUE(frames.battery.seen);
-    TEST_ASSERT_EQUAL_INT32(60000, frames.power_drive_10W);
-    TEST_ASSERT_EQUAL_INT32(59999, frames.power_regen_10W);
+    TEST_ASSERT_EQUAL_INT32(60000, frames.power_drive_counts);
+    TEST_ASSERT_EQUAL_INT32(59999, frames.power_regen_counts);
     receive(signed_frame(BATTERY_ID, 0, 100, 200, 15000)); /* 1500 V */
-    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_10W);
+    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_counts);
     receive(signed_frame(BATTERY_ID, 0, 300, 400, 15001));
-    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_10W);
+    TEST_ASSERT_EQUAL_INT32(100, frames.power_drive_counts);
 }
 
 /* The two levels compute the checksum by different algorithms: a frame of the first level is accepted, and refused when
@@ -86,11 +86,11 @@ void test_the_checksum_is_that_of_the_protection_for_every_byte(void)
     synchronise(COMMAND_ID);
     for (int n = 0; n < 2000; n++) {
         command((n * 7919) % 10001);
-        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_dNm);
+        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_counts);
         can_frame_t wrong = signed_frame(COMMAND_ID, ENABLED_TORQUE, 1, 2000, 1500);
         wrong.data[n % 8] ^= (uint8_t)(1U << (n / 8 % 8));
         receive(wrong);
-        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_dNm);
+        TEST_ASSERT_EQUAL_INT32((n * 7919) % 10001, frames.torque_counts);
     }
 }
 
@@ -98,11 +98,11 @@ void test_without_enable_or_in_another_mode_no_torque_is_requested(void)
 {
     synchronise(COMMAND_ID);
     receive(signed_frame(COMMAND_ID, 0x40, 500, 2000, 2000));
-    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
     command(500);
-    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
     receive(signed_frame(COMMAND_ID, 0x90, 500, 2000, 2000)); /* current mode */
-    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
 }
 
 void test_a_value_out_of_range_refuses_the_frame(void)
@@ -119,7 +119,7 @@ void test_a_value_out_of_range_refuses_the_frame(void)
     command(500);
     for (unsigned n = 0; n < sizeof bad / sizeof bad[0]; n++) {
         receive(signed_frame(COMMAND_ID, bad[n].bits, bad[n].torque, bad[n].drive, bad[n].regen));
-        TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+        TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
     }
     counter = 0;
     synchronise(BATTERY_ID);
@@ -154,19 +154,19 @@ void test_a_repetition_and_a_jump_are_refused_and_one_lost_frame_is_not(void)
     command(500);
     counter = 1;
     command(600); /* repeated */
-    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
     counter = 3;
     command(700); /* one lost */
-    TEST_ASSERT_EQUAL_INT32(700, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(700, frames.torque_counts);
     counter = 6;
     command(800); /* two lost */
-    TEST_ASSERT_EQUAL_INT32(700, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(700, frames.torque_counts);
     command(900); /* follows the new counter */
-    TEST_ASSERT_EQUAL_INT32(900, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(900, frames.torque_counts);
     can_frame_t invalid = {.id = COMMAND_ID, .length = 8, .data = {0, ENABLED_TORQUE | 0x0FU}};
     invalid.data[0] = e2e_crc(0x1101U, &invalid);
     receive(invalid);
-    TEST_ASSERT_EQUAL_INT32(900, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(900, frames.torque_counts);
 }
 
 void test_a_command_that_stops_requests_no_torque_after_35_ms_and_must_synchronise_again(void)
@@ -176,13 +176,13 @@ void test_a_command_that_stops_requests_no_torque_after_35_ms_and_must_synchroni
     for (int n = 0; n < 34; n++) {
         second_level_frames_tick(&frames, 1000);
     }
-    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
     second_level_frames_tick(&frames, 1000);
-    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
     command(500);
-    TEST_ASSERT_EQUAL_INT32(0, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(0, frames.torque_counts);
     command(500);
-    TEST_ASSERT_EQUAL_INT32(500, frames.torque_dNm);
+    TEST_ASSERT_EQUAL_INT32(500, frames.torque_counts);
 }
 
 void test_limits_that_stop_are_zero_after_310_ms(void)
@@ -192,8 +192,8 @@ void test_limits_that_stop_are_zero_after_310_ms(void)
     for (int n = 0; n < 309; n++) {
         second_level_frames_tick(&frames, 1000);
     }
-    TEST_ASSERT_EQUAL_INT32(200, frames.power_regen_10W);
+    TEST_ASSERT_EQUAL_INT32(200, frames.power_regen_counts);
     second_level_frames_tick(&frames, 1000);
-    TEST_ASSERT_EQUAL_INT32(0, frames.power_drive_10W + frames.power_regen_10W);
+    TEST_ASSERT_EQUAL_INT32(0, frames.power_drive_counts + frames.power_regen_counts);
     TEST_ASSERT_TRUE(frames.battery.seen && !frames.battery.alive);
 }

@@ -14,7 +14,7 @@ static second_level_frames_t frames;
 void setUp(void)
 {
     permitted = (second_level_permitted_t){0};
-    frames = (second_level_frames_t){.drive_dNm = 10000, .regen_dNm = 10000};
+    frames = (second_level_frames_t){.drive_counts = 10000, .regen_counts = 10000};
 }
 
 void tearDown(void)
@@ -30,11 +30,11 @@ static void steps(int count, int32_t turn, int32_t slew)
 
 void test_the_band_rises_at_once_on_the_side_of_the_request(void)
 {
-    frames.torque_dNm = 500;
+    frames.torque_counts = 500;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
     TEST_ASSERT_EQUAL_INT32(0, permitted.negative.bound);
-    frames.torque_dNm = -700;
+    frames.torque_counts = -700;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(7000, permitted.negative.bound);
 }
@@ -42,9 +42,9 @@ void test_the_band_rises_at_once_on_the_side_of_the_request(void)
 /* The bound is held for 15 to 20 steps and then falls by 100 counts per step. */
 void test_the_band_falls_after_the_hold_time_at_the_legal_rate(void)
 {
-    frames.torque_dNm = 500;
+    frames.torque_counts = 500;
     steps(20, TURN, OPEN);
-    frames.torque_dNm = 100;
+    frames.torque_counts = 100;
     steps(15, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(5000, permitted.positive.bound);
     steps(6, TURN, OPEN);
@@ -58,9 +58,9 @@ void test_the_band_falls_after_the_hold_time_at_the_legal_rate(void)
 
 void test_a_slower_calibrated_slew_makes_the_band_fall_more_slowly(void)
 {
-    frames.torque_dNm = 500;
+    frames.torque_counts = 500;
     steps(1, TURN, OPEN);
-    frames.torque_dNm = 0;
+    frames.torque_counts = 0;
     steps(21, TURN, 10);
     const int32_t start = permitted.positive.bound;
     steps(10, TURN, 10);
@@ -69,24 +69,24 @@ void test_a_slower_calibrated_slew_makes_the_band_fall_more_slowly(void)
 
 void test_the_limit_of_the_direction_applies(void)
 {
-    frames.drive_dNm = 300;
-    frames.regen_dNm = 200;
-    frames.torque_dNm = 500;
+    frames.drive_counts = 300;
+    frames.regen_counts = 200;
+    frames.torque_counts = 500;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(3000, permitted.positive.bound);
-    frames.torque_dNm = -500;
+    frames.torque_counts = -500;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(2000, permitted.negative.bound);
 }
 
 void test_backwards_the_limits_are_those_of_the_other_direction(void)
 {
-    frames.drive_dNm = 300;
-    frames.regen_dNm = 200;
-    frames.torque_dNm = 500;
+    frames.drive_counts = 300;
+    frames.regen_counts = 200;
+    frames.torque_counts = 500;
     steps(1, -TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(2000, permitted.positive.bound);
-    frames.torque_dNm = -500;
+    frames.torque_counts = -500;
     steps(1, -TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(3000, permitted.negative.bound);
 }
@@ -94,9 +94,9 @@ void test_backwards_the_limits_are_those_of_the_other_direction(void)
 /* Near standstill the sign of the speed may be wrong. */
 void test_near_standstill_the_larger_limit_applies(void)
 {
-    frames.drive_dNm = 200;
-    frames.regen_dNm = 300;
-    frames.torque_dNm = 500;
+    frames.drive_counts = 200;
+    frames.regen_counts = 300;
+    frames.torque_counts = 500;
     steps(1, 1000, OPEN);
     TEST_ASSERT_EQUAL_INT32(3000, permitted.positive.bound);
     permitted = (second_level_permitted_t){0};
@@ -106,14 +106,14 @@ void test_near_standstill_the_larger_limit_applies(void)
 
 void test_no_limit_permits_more_than_the_rated_torque(void)
 {
-    frames.torque_dNm = 9000;
+    frames.torque_counts = 9000;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(15000, permitted.positive.bound);
 }
 
 void test_lost_limits_of_the_battery_permit_no_torque(void)
 {
-    frames.torque_dNm = 500;
+    frames.torque_counts = 500;
     frames.battery.seen = true;
     steps(1, TURN, OPEN);
     TEST_ASSERT_EQUAL_INT32(0, permitted.positive.bound);

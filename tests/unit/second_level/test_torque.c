@@ -74,12 +74,12 @@ void test_the_offset_of_the_angle_belongs_to_the_electrical_angle(void)
 }
 
 /* The state of the reception while the vehicle requests this torque all the time. */
-static void request(int32_t torque_dNm)
+static void request(int32_t torque_counts)
 {
     level.frames.command = (second_level_channel_t){.alive = true, .seen = true};
-    level.frames.torque_dNm = torque_dNm;
-    level.frames.drive_dNm = 10000;
-    level.frames.regen_dNm = 10000;
+    level.frames.torque_counts = torque_counts;
+    level.frames.drive_counts = 10000;
+    level.frames.regen_counts = 10000;
 }
 
 static int steps_to_fault(int steps_max)

@@ -1,18 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The vehicle's part on the bus: the torque command, protected as firmware/comm/fluxtrue.dbc says."""
+"""The vehicle's part on the bus: the torque command, in the scale of the motor's DBC and protected as it says."""
 
 from __future__ import annotations
 
 import ctypes
 
-import cantools
-from cantools.database.can import Database
-
-from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.interface import COMMAND, Interface, read_interface
 from fluxtrue_tools.bus.protect import Protector
-from fluxtrue_tools.errors import FluxtrueError
-
-COMMAND = "VCU_TorqueRequest"
 
 
 class Frame(ctypes.Structure):
@@ -25,16 +19,14 @@ class Frame(ctypes.Structure):
 class Command:
     """The cyclic torque command and its counter."""
 
-    def __init__(self) -> None:
-        database = cantools.database.load_file(DBC)
-        if not isinstance(database, Database):
-            raise FluxtrueError(f"{DBC}: no CAN database")
-        self._message = database.get_message_by_name(COMMAND)
-        data_id = int(self._message.dbc.attributes["E2EDataId"].value)  # type: ignore[union-attr]
-        self._protector = Protector(data_id)
+    def __init__(self, interface: Interface | None = None) -> None:
+        """Without an interface: in the standard scale."""
+        interface = interface or read_interface()
+        self._message = interface.message(COMMAND)
+        self._protector = Protector(interface.data_id(COMMAND))
         self.values: dict[str, float | str] = {
             "Enable": 0, "FaultReset": 0, "Mode": "off", "TorqueRequested": 0.0,
-            "TorqueLimitDrive": 1000.0, "TorqueLimitRegen": 1000.0,
+            **{name: interface.largest(COMMAND, name) for name in ("TorqueLimitDrive", "TorqueLimitRegen")},
         }  # fmt: skip
 
     def frame(self) -> Frame:

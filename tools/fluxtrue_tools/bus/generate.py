@@ -5,6 +5,9 @@ cantools writes bus.[ch]; its encoder neither saturates nor checks for NaN. sign
 signal the node sends a function that clamps to the DBC's range and refuses what is no number, for
 every message it receives the check of all ranges, and the cycle times, time-outs and data ids that
 the DBC holds as attributes. exports.c makes all of it callable from the tests.
+
+One firmware serves every motor, so the code has raw values only: signals with a quantity that scales
+with the motor take their factor from the motor data (bus_scales_t).
 """
 
 import subprocess
@@ -20,6 +23,7 @@ from cantools.database.can.c_source import camel_to_snake_case
 from cantools.database.can.signal import Signal
 
 from fluxtrue_tools import paths
+from fluxtrue_tools.bus.scales import QUANTITIES, in_raw_values
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
@@ -42,6 +46,11 @@ def is_count(signal: Signal) -> bool:
     return signal.scale == 1 and signal.offset == 0 and not signal.unit
 
 
+def quantity(signal: Signal) -> str | None:
+    """The member of bus_scales_t that has the signal's factor, if it scales with the motor."""
+    return QUANTITIES.get(signal.unit or "")
+
+
 def limits(signal: Signal) -> tuple[float, float]:
     """Smallest and largest value."""
     if signal.minimum is None or signal.maximum is None:
@@ -61,10 +70,30 @@ def put(message: Message, signal: Signal) -> str:
         tests += [f"(x < {int(low)}{suffix}) ? {int(low)}{suffix} : "] if low != 0 or signal.is_signed else []
         return (f"static inline void {struct}_put_{name}{head}{kind} x)\n{{\n"
                 f"    m->{name} = (__typeof__(m->{name}))({''.join(tests)}x);\n}}\n")  # fmt: skip
+    if scale := quantity(signal):
+        return (f"static inline bool {struct}_put_{name}{head}float x, const bus_scales_t *scales)\n{{\n"
+                f"    const float counts = x / scales->{scale};\n"
+                f"    if (!isfinite(x)) {{\n        return false;\n    }}\n"
+                f"    m->{name} = (__typeof__(m->{name}))roundf("
+                f"(counts < {low!r}F) ? {low!r}F : (counts > {high!r}F) ? {high!r}F : counts);\n"
+                f"    return true;\n}}\n")  # fmt: skip
     return (f"static inline bool {struct}_put_{name}{head}float x)\n{{\n"
             f"    if (!isfinite(x)) {{\n        return false;\n    }}\n"
             f"    m->{name} = {struct}_{name}_encode((x < {low!r}F) ? {low!r}F : (x > {high!r}F) ? {high!r}F : x);\n"
             f"    return true;\n}}\n")  # fmt: skip
+
+
+def get(message: Message, signal: Signal) -> str:
+    """The function that reads one signal that scales with the motor."""
+    struct, name = f"{PREFIX}_{snake(message.name)}", snake(signal.name)
+    return (f"static inline float {struct}_get_{name}(const struct {struct}_t *m, const bus_scales_t *scales)\n{{\n"
+            f"    return (float)m->{name} * scales->{quantity(signal)};\n}}\n")  # fmt: skip
+
+
+def poison(message: Message, signal: Signal) -> str:
+    """What cantools writes for such a signal knows no factor: its use must not compile."""
+    struct = f"{PREFIX}_{snake(message.name)}_{snake(signal.name)}"
+    return f"#pragma GCC poison {struct}_encode {struct}_decode\n"
 
 
 def in_range(message: Message) -> str:
@@ -112,39 +141,54 @@ def x_macro(name: str, messages: list[Message]) -> str:
 def signals_header(sent: list[Message], received: list[Message]) -> str:
     """The text of the file signals.h."""
     parts = ["/* Generated from the DBC by fluxtrue_tools.bus.generate. */\n#ifndef BUS_SIGNALS_H\n"
-             "#define BUS_SIGNALS_H\n#include <math.h>\n\n#include \"bus/bus.h\"\n"]  # fmt: skip
+             "#define BUS_SIGNALS_H\n#include <math.h>\n\n#include \"bus/bus.h\"\n"
+             "#include \"types/bus_scales.h\"\n"]  # fmt: skip
     parts += [constants(message) for message in (*sent, *received)]
     parts.append(phase_constants(sent))
     protected = [message for message in (*sent, *received) if attribute(message, "E2EDataId")]
     parts += [x_macro("BUS_SENT", sent), x_macro("BUS_PROTECTED", protected)]
     parts += [put(message, signal) for message in sent for signal in message.signals]
     parts += [in_range(message) for message in received]
+    parts += [get(message, signal) for message in received for signal in message.signals if quantity(signal)]
+    every = (*sent, *received)
+    parts.append(
+        "".join(poison(message, signal) for message in every for signal in message.signals if quantity(signal))
+    )
     return "\n".join([*parts, "#endif\n"])
 
 
+def exported_sent(message: Message) -> str:
+    """exports.c: test_<message>(values, data, scales) packs all signals in the DBC's order."""
+    struct = f"{PREFIX}_{snake(message.name)}"
+    head = f"int test_{snake(message.name)}(const double *v, uint8_t *data, const bus_scales_t *scales)"
+    text = f"API {head};\n{head}\n{{\n    int taken = 0;\n    struct {struct}_t m = {{0}};\n    (void)scales;\n"
+    for index, signal in enumerate(message.signals):
+        call = f"{struct}_put_{snake(signal.name)}(&m, "
+        kind = "int32_t" if signal.is_signed else "uint32_t"
+        scales = ", scales" if quantity(signal) else ""
+        text += (f"    {call}({kind})v[{index}]);\n    taken++;\n" if is_count(signal)
+                 else f"    taken += {call}(float)v[{index}]{scales});\n")  # fmt: skip
+    return f"{text}    {struct}_pack(data, &m, 8);\n    return taken;\n}}\n"
+
+
+def exported_received(message: Message) -> str:
+    """exports.c: test_<message>(values, data, scales) unpacks all signals in the DBC's order."""
+    struct = f"{PREFIX}_{snake(message.name)}"
+    head = f"int test_{snake(message.name)}(double *v, const uint8_t *data, const bus_scales_t *scales)"
+    text = f"API {head};\n{head}\n{{\n    struct {struct}_t m;\n    (void)scales;\n    {struct}_unpack(&m, data, 8);\n"
+    for index, signal in enumerate(message.signals):
+        name = snake(signal.name)
+        value = f"get_{name}(&m, scales)" if quantity(signal) else f"{name}_decode(m.{name})"
+        text += f"    v[{index}] = (double){struct}_{value};\n"
+    return f"{text}    return {struct}_in_range(&m);\n}}\n"
+
+
 def exports(sent: list[Message], received: list[Message]) -> Iterator[str]:
-    """exports.c: test_<message>(values, data) packs or unpacks all signals in the DBC's order."""
+    """The text of the file exports.c."""
     yield '/* Generated for the tests. */\n#include "bus/signals.h"\n#include <stdint.h>\n'
     yield '#define API __attribute__((visibility("default")))\n'
-    for message in sent:
-        struct = f"{PREFIX}_{snake(message.name)}"
-        yield f"API int test_{snake(message.name)}(const double *v, uint8_t *data);\n"
-        yield f"int test_{snake(message.name)}(const double *v, uint8_t *data)\n{{\n    int taken = 0;\n"
-        yield f"    struct {struct}_t m = {{0}};\n"
-        for index, signal in enumerate(message.signals):
-            call = f"{struct}_put_{snake(signal.name)}(&m, "
-            kind = "int32_t" if signal.is_signed else "uint32_t"
-            yield (f"    {call}({kind})v[{index}]);\n    taken++;\n" if is_count(signal)
-                   else f"    taken += {call}(float)v[{index}]);\n")  # fmt: skip
-        yield f"    {struct}_pack(data, &m, 8);\n    return taken;\n}}\n"
-    for message in received:
-        struct = f"{PREFIX}_{snake(message.name)}"
-        yield f"API int test_{snake(message.name)}(double *v, const uint8_t *data);\n"
-        yield f"int test_{snake(message.name)}(double *v, const uint8_t *data)\n{{\n    struct {struct}_t m;\n"
-        yield f"    {struct}_unpack(&m, data, 8);\n"
-        for index, signal in enumerate(message.signals):
-            yield f"    v[{index}] = (double){struct}_{snake(signal.name)}_decode(m.{snake(signal.name)});\n"
-        yield f"    return {struct}_in_range(&m);\n}}\n"
+    yield from map(exported_sent, sent)
+    yield from map(exported_received, received)
 
 
 # The conversion that cantools writes, and one that is enough for 32-bit signals. Without double-precision hardware
@@ -165,14 +209,17 @@ def narrow(source: Path, database: Database) -> None:
 
 
 def generate(dbc: Path, out: Path, node: str) -> None:
-    """Writes bus.[ch], signals.h and exports.c to out/bus."""
-    database = cantools.database.load_file(dbc)
+    """Writes bus.[ch], signals.h and exports.c to out/bus, and there the DBC they are made from."""
+    raw = in_raw_values(dbc.read_text(encoding="utf-8"))
+    database = cantools.database.load_string(raw, "dbc")
     if not isinstance(database, Database) or node not in [entry.name for entry in database.nodes]:
         raise FluxtrueError(f"{dbc}: no CAN database with a node '{node}'")
     folder = out / PREFIX
     folder.mkdir(parents=True, exist_ok=True)
+    source = folder / "raw.dbc"
+    write_text(source, raw)
     subprocess.run([sys.executable, "-m", "cantools", "generate_c_source", "--use-float", "--use-round",
-                    "--node", node, "--database-name", PREFIX, "--output-directory", str(folder), str(dbc)],
+                    "--node", node, "--database-name", PREFIX, "--output-directory", str(folder), str(source)],
                    check=True, stdout=subprocess.DEVNULL)  # fmt: skip
     narrow(folder / "bus.c", database)
     sent = [message for message in database.messages if node in message.senders]

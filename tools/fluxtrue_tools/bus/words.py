@@ -19,6 +19,7 @@ from typing import Final
 import click
 
 from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.scales import with_hash
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import write_text
 
@@ -121,7 +122,7 @@ def explained(lists: dict[str, list[Word]], signal: str) -> str:
 
 
 def with_dbc(dbc: str, lists: dict[str, list[Word]]) -> str:
-    """The DBC with value tables and comments of the lists."""
+    """The DBC with value tables and comments of the lists, and its own hash."""
     numbers = {name: number for number, name in re.findall(r"^BO_ (\d+) (\w+):", dbc, re.MULTILINE)}
     for path in CHOICES | EXPLAINED:
         message, signal = path.split(".")
@@ -138,7 +139,7 @@ def with_dbc(dbc: str, lists: dict[str, list[Word]]) -> str:
                 raise FluxtrueError(f"{DBC.name}: {path} has no comment that begins with a sentence")
             comment = f'CM_ SG_ {place} "{lead.group(1)} {explained(lists, path)}";'
             dbc = _replaced(dbc, rf"^CM_ SG_ {place} .*$", comment)
-    return dbc
+    return with_hash(dbc)
 
 
 def _replaced(text: str, pattern: str, line: str) -> str:

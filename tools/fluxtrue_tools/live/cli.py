@@ -10,14 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import cantools.database
 import click
 from aiohttp import web
 
 from fluxtrue_tools import faults, paths
 from fluxtrue_tools.a2l.elf import read
-from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.address import BusAddress, parse_option
+from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander
 from fluxtrue_tools.live.link import Link, Recorder
@@ -27,6 +26,7 @@ from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.server import HOST, Session, make_app
 from fluxtrue_tools.live.stand import Stand
 from fluxtrue_tools.live.tuning import BENCH_ANSWER_S, SIMULATED_ANSWER_S, Tuning
+from fluxtrue_tools.log.decode import attached_interface
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.sim.build import locate, prepare
 from fluxtrue_tools.vecu.channel import Channel
@@ -48,6 +48,7 @@ class Source:
     """What the page shows: a bench, a virtual ECU with its bench channel, or a recorded drive."""
 
     title: str
+    interface: Interface
     address: BusAddress | None = None
     channel: Channel | None = None
     frames: Any = None
@@ -75,9 +76,9 @@ def _connect(source: Source, session: Session, stack: contextlib.ExitStack) -> N
     if source.channel is not None:
         session.stand = Stand(source.channel)
         stack.callback(session.stand.close)
-    database = cantools.database.load_file(DBC)
-    session.link = Link(bus, pace, database, session.commander, session.samples, session.recorder, session.stand)
-    stack.callback(session.link.close)
+    link = Link(bus, pace, source.interface, session.commander, session.samples, session.recorder, session.stand)
+    session.link = link
+    stack.callback(link.close)
     if source.elf is not None:
         answer_s = SIMULATED_ANSWER_S if source.is_stepped else BENCH_ANSWER_S
         session.tuning = Tuning(source.address, read(source.elf), answer_s, pace.standing_still)
@@ -86,8 +87,7 @@ def _connect(source: Source, session: Session, stack: contextlib.ExitStack) -> N
 
 @contextlib.contextmanager
 def _session(source: Source, torque_max_Nm: float, record_dir: Path) -> Iterator[Session]:
-    database = cantools.database.load_file(DBC)
-    samples, recorder = Samples(database), Recorder(record_dir, DBC)
+    samples, recorder = Samples(source.interface.database), Recorder(record_dir, source.interface)
     session = Session(source.title, Commander(torque_max_Nm), samples, recorder, _explanations())
     with contextlib.ExitStack() as stack:
         if source.address is None:
@@ -156,18 +156,19 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
         paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
     torque_max = load_config(locate(motor, Path.cwd(), "--motor")[1]).machine.torque_max_Nm
     machine = prepare(motor, build_dir, where="--motor")
+    interface = read_interface(machine.dbc)
     with contextlib.ExitStack() as stack:
         if replay is not None:
-            source = Source(f"{replay.name} (replay)", frames=load(replay))
+            source = Source(f"{replay.name} (replay)", attached_interface(replay), frames=load(replay))
         elif can_interface is not None:
             address = BusAddress(can_interface, can_channel, dict(map(parse_option, can_option)))
             channel = None if bench is None else Channel.at(bench, "--bench")
-            source = Source(f"{can_interface} {can_channel}", address, channel, elf=elf)
+            source = Source(f"{can_interface} {can_channel}", interface, address, channel, elf=elf)
         else:
             ecu = stack.enter_context(VirtualEcu(machine.vecu))
             options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
             address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
-            source = Source(f"{ecu.motor}, simulated", address, channel, elf=machine.vecu)
+            source = Source(f"{ecu.motor}, simulated", interface, address, channel, elf=machine.vecu)
         source.in_step = in_step
         if in_step and not source.is_stepped:
             raise FluxtrueError("--in-step: allowed before a virtual ECU with --fast only")

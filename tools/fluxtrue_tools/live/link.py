@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Final
 
 import can
-import cantools.database
 
+from fluxtrue_tools.bus.interface import COMMAND, CONFIGURATION, REQUEST, Interface
 from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import Commander, Order, Wish
@@ -20,16 +20,15 @@ from fluxtrue_tools.live.stand import Stand
 from fluxtrue_tools.outputs import atomic
 from fluxtrue_tools.vecu.mdf import BusLog
 
-COMMAND: Final = "VCU_TorqueRequest"
 CLOSING_S: Final = 3.0  # the largest torque is ramped out in less
-LIMIT_Nm: Final = 1000.0  # the largest value of the message; the slider limits the torque
+LIMITS: Final = ("TorqueLimitDrive", "TorqueLimitRegen")  # as large as they can be: the slider limits the torque
 
 
 class Recorder:
     """Keeps frames from start() to stop(), then writes one MDF4 file."""
 
-    def __init__(self, folder: Path, dbc: Path) -> None:
-        self._folder, self._dbc = folder, dbc
+    def __init__(self, folder: Path, interface: Interface) -> None:
+        self._folder, self._interface = folder, interface
         self._log: BusLog | None = None
         self._lock = threading.Lock()
 
@@ -57,7 +56,7 @@ class Recorder:
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"live-{datetime.now():%Y%m%d-%H%M%S}.mf4"
         with atomic(path) as scratch:
-            log.write(scratch, self._dbc)
+            log.write(scratch, self._interface)
         return path
 
 
@@ -68,12 +67,12 @@ logging.getLogger("can.interfaces.socketcand").setLevel(logging.ERROR)
 class Link:
     """One bus connection and the thread that commands, at the pace of the time base."""
 
-    def __init__(self, bus: can.BusABC, pace: Pace, database: cantools.database.Database, commander: Commander,
+    def __init__(self, bus: can.BusABC, pace: Pace, interface: Interface, commander: Commander,
                  samples: Samples, recorder: Recorder, stand: Stand | None = None) -> None:  # fmt: skip
         self._bus, self._pace, self._commander, self._samples = bus, pace, commander, samples
-        self._message = database.get_message_by_name(COMMAND)
-        data_id = int(self._message.dbc.attributes["E2EDataId"].value)  # type: ignore[union-attr]
-        self._protector = Protector(data_id)
+        self._interface, self._message = interface, interface.message(COMMAND)
+        self._protector = Protector(interface.data_id(COMMAND))
+        self._open = {name: interface.largest(COMMAND, name) for name in LIMITS}
         self._recorder, self._stand = recorder, stand
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -86,6 +85,10 @@ class Link:
         """An action of a user."""
         with self._lock:
             action(self._commander, self._pace.now_s)
+
+    def wait(self, seconds: float) -> None:
+        """Wait until nothing is commanded any more, at most so long."""
+        self._thread.join(seconds)
 
     def close(self) -> None:
         """Ramp the torque to zero, then close the connection."""
@@ -101,11 +104,16 @@ class Link:
     def _frame(self, order: Order) -> can.Message:
         data = self._message.encode({
             "Crc": 0, "Counter": 0, "Enable": int(order.enable), "FaultReset": int(order.fault_reset),
-            "Mode": order.mode, "TorqueRequested": round(order.torque_requested_Nm, 1),
-            "TorqueLimitDrive": LIMIT_Nm, "TorqueLimitRegen": LIMIT_Nm,
+            "Mode": order.mode, REQUEST: order.torque_requested_Nm, **self._open,
         })  # fmt: skip
         return can.Message(arbitration_id=self._message.frame_id, is_extended_id=False, is_rx=False,
                            data=self._protector.protect(data), timestamp=self._samples.newest_s)  # fmt: skip
+
+    def _check(self) -> None:
+        """Nothing is commanded in a scale that the inverter does not have."""
+        problem = self._interface.mismatch(self._samples.message(CONFIGURATION))
+        if problem:
+            raise FluxtrueError(problem)
 
     def _send(self) -> None:
         state, refused = self._samples.state(), self._samples.choice("INV_DcLink", "RefusedReason")
@@ -120,9 +128,10 @@ class Link:
     def _command(self) -> None:
         try:
             while not self._stop.is_set():
+                self._check()
                 self._send()
                 if self._stand is not None:
                     self._stand.step(PERIOD_S)
                 self._pace.next_period(self._stop)
         except (FluxtrueError, OSError) as error:
-            self.lost = str(error)  # the virtual ECU has ended
+            self.lost = str(error)  # the virtual ECU has ended, or it has another scale

@@ -46,10 +46,14 @@ class Samples:
                 self._columns[message.name].setdefault("t", []).append(frame.timestamp)
             self._last[message.name] = signals
 
+    def message(self, name: str) -> dict[str, Any] | None:
+        """The last values of a message; None before its first frame."""
+        with self._lock:
+            return self._last.get(name)
+
     def choice(self, message: str, signal: str) -> str:
         """The name of a signal's last value; empty before its first frame."""
-        with self._lock:
-            signals = self._last.get(message)
+        signals = self.message(message)
         if signals is None:
             return ""
         described = next(m for m in self._messages.values() if m.name == message).get_signal_by_name(signal)

@@ -6,7 +6,7 @@ from pathlib import Path
 from fluxtrue_tools.motor.emit_c import motor_si_c, motor_tables_c
 from fluxtrue_tools.motor.emit_json import motor_json
 from fluxtrue_tools.motor.motor import Motor, load_motor, naming
-from fluxtrue_tools.motor.names import BUILT, HTML, PLOTS, source_files
+from fluxtrue_tools.motor.names import BUILT, DBC_NAME, HTML, PLOTS, source_files
 from fluxtrue_tools.motor.report import report_text
 from fluxtrue_tools.outputs import Outputs
 
@@ -17,6 +17,7 @@ def generate(motor: Motor) -> dict[str, str]:
         "motor_tables.c": motor_tables_c(motor),
         "motor_si.c": motor_si_c(motor),
         "motor.json": motor_json(motor),
+        DBC_NAME: motor.bus.dbc,
         "report.txt": report_text(motor),
     }
 

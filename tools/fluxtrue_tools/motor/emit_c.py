@@ -503,6 +503,8 @@ def _motor(motor: Motor) -> list[Row]:
     return [
         ("name", f'"{machine.name}"', ""),
         ("bases", _bases(b), ""),
+        ("bus_scales", [(name, _float(float(factor)), "") for name, factor in motor.bus.factors.items()], ""),
+        ("interface_hash", f"{motor.bus.interface_hash}u", ""),
         ("adc_bits", f"{inverter.adc_bits}u", ""),
         ("trim_steps", f"{steps(TRIM_S, b.step_s)}u", f"{TRIM_S:g} s"),
         ("current_full_scale_A", _float(inverter.current_full_scale_A), ""),
@@ -539,7 +541,7 @@ def _motor(motor: Motor) -> list[Row]:
 
 def _second_level(motor: Motor) -> str:
     """The second level's constants, which the motor data only point at."""
-    own = make_second_level(motor.config, motor.model, motor.bases, motor.derived)
+    own = make_second_level(motor)
     lines = [f"{INDENT}.{name} = {value}," for name, value in own.words.items()]
     table = "\n".join(line for row in own.torque for line in _wrap([str(int(v)) for v in row]))
     return "\n".join(

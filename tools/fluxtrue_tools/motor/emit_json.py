@@ -52,6 +52,11 @@ def _references(motor: Motor) -> dict[str, Any]:
     }
 
 
+def _bus(motor: Motor) -> dict[str, Any]:
+    factors = {name: float(factor) for name, factor in motor.bus.factors.items()}
+    return {"factors": factors, "interface_hash": motor.bus.interface_hash}
+
+
 def motor_json(motor: Motor) -> str:
     """The text of motor.json."""
     data = {
@@ -63,6 +68,7 @@ def motor_json(motor: Motor) -> str:
         "magnet": motor.config.magnet.model_dump(),
         "bases": asdict(motor.bases),
         "derived": asdict(motor.derived),
+        "bus": _bus(motor),
         "map": _map(motor),
         "references": _references(motor),
         "errors": {"table": asdict(motor.table_error), "references": asdict(motor.reference_errors)},

@@ -13,6 +13,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.advice import Test, advice
 from fluxtrue_tools.motor.bases import Bases, make_bases
+from fluxtrue_tools.motor.bus import BusScales, make_bus_scales
 from fluxtrue_tools.motor.config import MotorConfig, check_config, load_config
 from fluxtrue_tools.motor.derived import Derived, derive, reference_flux_low
 from fluxtrue_tools.motor.flux_map import FluxMap, load_flux_map
@@ -34,6 +35,7 @@ class Motor:
     model: FluxModel
     bases: Bases
     derived: Derived
+    bus: BusScales
     tables: FluxTables
     table_error: TableError
     solver: Solver
@@ -89,12 +91,14 @@ def resolve(config: MotorConfig, flux_map: FluxMap | None, model: FluxModel) -> 
     _check_torque(config, solver)
     tables, table_error = make_flux_tables(model, bases, machine)
     references, limits, errors = make_references(solver, bases, reference_flux_low(config), machine.torque_max_Nm)
+    derived = derive(config, model, bases)
     return Motor(
         config,
         flux_map,
         model,
         bases,
-        derive(config, model, bases),
+        derived,
+        make_bus_scales(config, derived),
         tables,
         table_error,
         solver,
@@ -153,7 +157,9 @@ def fitted(motor: Motor) -> Motor:
     def quick(config: MotorConfig) -> None:
         check_config(config)
         bases = make_bases(config, motor.model)
-        check_numbers(replace(motor, config=config, bases=bases, derived=derive(config, motor.model, bases)))
+        derived = derive(config, motor.model, bases)
+        bus = make_bus_scales(config, derived)
+        check_numbers(replace(motor, config=config, bases=bases, derived=derived, bus=bus))
 
     try:
         check_numbers(motor)

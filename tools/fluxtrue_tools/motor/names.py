@@ -8,7 +8,8 @@ FILE_NAME = "motor.toml"
 HTML = "report.html"
 _FIGURES = ("current_loop", "envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit")
 PLOTS = tuple(f"plot_{what}.png" for what in _FIGURES)
-BUILT = ("motor_tables.c", "motor_si.c", "motor.json", "report.txt", HTML, *PLOTS)
+DBC_NAME = "fluxtrue.dbc"
+BUILT = ("motor_tables.c", "motor_si.c", "motor.json", DBC_NAME, "report.txt", HTML, *PLOTS)
 
 
 def source_files(folder: Path) -> tuple[Path, ...]:

@@ -5,8 +5,10 @@ from dataclasses import asdict
 
 import numpy as np
 
+from fluxtrue_tools.bus.scales import QUANTITIES, carriers, standard_factors
 from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.names import DBC_NAME
 from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
 
 Lines = list[str]
@@ -131,6 +133,20 @@ def _bases(motor: Motor) -> Lines:
     return [f"bases: {text}", f"  speed reserve      {_percent(ratio - 1)} above speed_max_rpm"]
 
 
+def _bus(motor: Motor) -> Lines:
+    """The resolution and the range of each quantity on the bus."""
+    carried, units = carriers(motor.bus.dbc), {name: unit for unit, name in QUANTITIES.items()}
+    own = "the standard" if motor.bus.factors == standard_factors() else "its own"
+    return [
+        f"bus: {own} scale, {DBC_NAME}, interface hash 0x{motor.bus.interface_hash:08X}",
+        *(
+            f"  {name.rpartition('_')[0]:<18} {carrier.factor:f} {units[name]} per count, "
+            f"to {carrier.factor * carrier.counts:f} {units[name]}"
+            for name, carrier in carried.items()
+        ),
+    ]
+
+
 def _warnings(motor: Motor) -> Lines:
     return [f"warning: {text}" for text in doubts.of_motor(motor)]
 
@@ -145,6 +161,7 @@ def report_text(motor: Motor) -> str:
         _references(motor),
         _short_circuit(motor),
         _bases(motor),
+        _bus(motor),
         [
             f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
             "references "

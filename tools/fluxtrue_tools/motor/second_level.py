@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fluxtrue_tools.motor.bases import Bases
-from fluxtrue_tools.motor.config import MotorConfig
-from fluxtrue_tools.motor.derived import Derived, steps
+from fluxtrue_tools.motor.derived import steps
 from fluxtrue_tools.motor.flux_model import FluxModel, torque
+from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, Q16_ONE, q15_table
 
 ROWS, COLUMNS, PARTS = 18, 17, 16  # as firmware/second_level/constants.h
@@ -45,15 +44,16 @@ def coarse_torque_Nm(model: FluxModel, pole_pairs: int, current_A: float) -> NDA
     return torque(model, pole_pairs, d, q)
 
 
-def make_second_level(config: MotorConfig, model: FluxModel, bases: Bases, derived: Derived) -> SecondLevel:
+def make_second_level(motor: Motor) -> SecondLevel:
     """All constants of the second level."""
+    config, bases, derived = motor.config, motor.bases, motor.derived
     machine = config.machine
-    table = coarse_torque_Nm(model, machine.pole_pairs, bases.current_A) / bases.torque_Nm
+    table = coarse_torque_Nm(motor.model, machine.pole_pairs, bases.current_A) / bases.torque_Nm
     rated = machine.torque_max_Nm / bases.torque_Nm * Q15_ONE
     slew = min(machine.torque_max_Nm / SLOWEST_S * bases.step_s, derived.torque_slew_Nm or np.inf)
     turns = config.omega_max_rad_s / machine.pole_pairs / (2.0 * np.pi) * bases.step_s
     words = {
-        "torque_per_count": round(0.1 / bases.torque_Nm * Q15_ONE * Q16_ONE),
+        "torque_per_count": round(float(motor.bus.factors["torque_Nm"]) / bases.torque_Nm * Q15_ONE * Q16_ONE),
         "torque_max": round(rated),
         "fall": max(int(slew / bases.torque_Nm * Q15_ONE), 1),
         "tolerance": round(TOLERANCE_SHARE_OF_MONITOR * derived.monitor_torque_Nm / bases.torque_Nm * Q15_ONE),

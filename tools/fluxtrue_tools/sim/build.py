@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.names import DBC_NAME
 
 ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = ROOT / "firmware" / "motors"
@@ -46,6 +47,11 @@ class MotorFolder:
     def vecu(self) -> Path:
         """Application and plant as a program that serves a CAN bus."""
         return self.folder / VECU
+
+    @property
+    def dbc(self) -> Path:
+        """The bus in the scale of this motor."""
+        return self.folder / DBC_NAME
 
     @property
     def data(self) -> Path:

@@ -3,21 +3,19 @@
 
 import ctypes
 from collections.abc import Mapping
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fluxtrue_tools.bench.can_command import Command, Frame
-from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.interface import LIMITS, Interface, read_interface
 from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.members import Members, members
 from fluxtrue_tools.sim.motor import Motor
 
-LIMITS: Final = "VCU_BatteryLimits"
 LIMITS_SIGNALS: Final = ("PowerLimitDrive", "PowerLimitRegen", "BatteryVoltage")
 COMMAND_MS, LIMITS_MS = 10, 100
 # Assumed, as in the virtual ECU: the dc link, and semiconductors that withstand twice the battery's voltage.
@@ -28,23 +26,15 @@ RUN: Final = 4
 WRONG: Final = ("lost", "crc", "byte", "repeated", "other_id", "extended", "short", "skipped", "limits_lost")
 
 
-@cache
-def _database() -> Any:
-    import cantools
-
-    return cantools.database.load_file(DBC)
-
-
 class Sender:
     """The vehicle: what it sends every 10 and 100 ms, and what is wrong with its frames."""
 
-    def __init__(self) -> None:
-        self.command = Command()
+    def __init__(self, interface: Interface) -> None:
+        self.command = Command(interface)
         self.limits: dict[str, float] = {}  # empty: not sent; without BatteryVoltage: not known
         self.wrong: dict[str, float] = {}
-        message = _database().get_message_by_name(LIMITS)
-        self._limits_message = message
-        self._limits = Protector(int(message.dbc.attributes["E2EDataId"].value))
+        self._limits_message = interface.message(LIMITS)
+        self._limits = Protector(interface.data_id(LIMITS))
         self._last: Frame | None = None
 
     def _damaged(self, frame: Frame) -> Frame | None:
@@ -58,7 +48,7 @@ class Sender:
         if wrong.get("byte"):
             frame.data[3] ^= 0x40
         if wrong.get("other_id"):
-            frame.id = int(_database().get_message_by_name(LIMITS).frame_id)
+            frame.id = int(self._limits_message.frame_id)
         if wrong.get("extended"):
             frame.extended = True
         if wrong.get("short"):
@@ -86,7 +76,7 @@ class EcuLoop(Loop):
         self._handle: int = 0
         link = {"dc_link_F": DC_LINK_F, "avalanche_V": AVALANCHE_PER_BATTERY * motor.plant["vdc_V"]}
         self.names: Members = members(str(motor.folder.library))
-        self.sender = Sender()
+        self.sender = Sender(read_interface(motor.folder.dbc))
         self.time_ms = 0
         super().__init__(motor.library, {**motor.plant, **link, "imposed_speed": 1.0, **plant}, motor.flux_map)
         self.periods_per_ms = round(1e-3 / self.period_s)

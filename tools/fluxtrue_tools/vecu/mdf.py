@@ -16,6 +16,9 @@ from asammdf.blocks.v4_blocks import SourceInformation
 from asammdf.blocks.v4_constants import BUS_TYPE_CAN, SOURCE_BUS
 from can.io.mf4 import STD_DTYPE
 
+from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.bus.interface import Interface
+
 
 class BusLog:
     """Collects data frames; a python-can listener."""
@@ -35,8 +38,8 @@ class BusLog:
     def __len__(self) -> int:
         return len(self._times)
 
-    def write(self, path: Path, database: Path | None = None) -> None:
-        """The file; the DBC goes in as an attachment."""
+    def write(self, path: Path, interface: Interface | None = None) -> None:
+        """The file; the DBC goes in as an attachment, because its factors are those of one motor."""
         frames = np.zeros(len(self), dtype=STD_DTYPE)
         flags = np.frombuffer(self._flags, dtype=np.uint8)
         frames["CAN_DataFrame.BusChannel"] = 1
@@ -47,9 +50,9 @@ class BusLog:
         frames["CAN_DataFrame.DataBytes"][:, :8] = np.frombuffer(self._data, dtype=np.uint8).reshape(-1, 8)
         times = np.maximum.accumulate(np.asarray(self._times, dtype=np.float64))
         attachment = None
-        if database is not None:
-            data = database.read_bytes()
-            attachment = (data, database.name, md5(data, usedforsecurity=False).digest())
+        if interface is not None:
+            data = interface.text.encode()
+            attachment = (data, DBC.name, md5(data, usedforsecurity=False).digest())
         with MDF(version="4.10") as mdf:
             mdf.header.start_time = datetime.now(UTC)
             source = SourceInformation(source_type=SOURCE_BUS, bus_type=BUS_TYPE_CAN)
