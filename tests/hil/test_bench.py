@@ -4,6 +4,7 @@
 import os
 import subprocess
 import sys
+from decimal import Decimal
 from pathlib import Path
 
 import can
@@ -12,6 +13,7 @@ import pytest
 from progress import HANG_S
 from rig import COMMAND, STATUS, Rig
 
+from fluxtrue_tools.bus.scales import dbc_of, standard_factors
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 pytestmark = pytest.mark.program
@@ -70,6 +72,17 @@ def test_with_a_bench_channel_the_same_tests_run_as_with_the_suites_own_target(p
         done = suite(str(HERE / "test_boot.py"), f"--report={tmp_path}", *over(ecu, bench))
     assert done.returncode == 0, done.stdout
     assert "skipped" not in done.stdout
+
+
+def test_an_inverter_of_another_scale_is_not_tested(program: Path, tmp_path: Path) -> None:
+    dbc = tmp_path / "truck.dbc"
+    dbc.write_text(dbc_of(standard_factors() | {"torque_Nm": Decimal("0.2")}))
+    with VirtualEcu(program) as ecu:
+        bench = over(ecu, f"--bench={HOST}:{ecu.bench_port}", f"--dbc={dbc}", f"--report={tmp_path}")
+        done = suite(str(HERE / "test_boot.py"), *bench)
+    said = done.stdout + done.stderr
+    assert done.returncode == 2, said
+    assert f"error: {dbc} (interface hash 0x" in said and "does not describe this inverter" in said
 
 
 def test_without_any_target_it_says_what_it_wants(tmp_path: Path) -> None:

@@ -366,12 +366,19 @@ void test_the_limit_that_a_request_exceeds_is_reported_in_all_four_quadrants(voi
         q31_t omega;
         request_limit_t reported;
     } cases[] = {
-        {60.0F, 1 << 28, REQUEST_LIMIT_NONE},           {60.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
-        {-40.0F, 1 << 28, REQUEST_LIMIT_NONE},          {-40.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
-        {-60.0F, -(1 << 28), REQUEST_LIMIT_NONE},       {-60.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
-        {40.0F, -(1 << 28), REQUEST_LIMIT_NONE},        {40.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
-        {132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},  {-132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},
-        {131.9F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT}, {0.0F, 0, REQUEST_LIMIT_NONE},
+        {60.0F, 1 << 28, REQUEST_LIMIT_NONE},
+        {60.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
+        {-40.0F, 1 << 28, REQUEST_LIMIT_NONE},
+        {-40.1F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
+        {-60.0F, -(1 << 28), REQUEST_LIMIT_NONE},
+        {-60.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
+        {40.0F, -(1 << 28), REQUEST_LIMIT_NONE},
+        {40.1F, -(1 << 28), REQUEST_LIMIT_VEHICLE_LIMIT},
+        {132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},
+        {-132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},
+        {131.9F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
+        {0.0F, 0, REQUEST_LIMIT_NONE},
+        {132.04F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT}, /* less than half a count: the rated torque, rounded */
     };
     ecu.rx.command.limit_drive_Nm = 60.0F;
     ecu.rx.command.limit_regen_Nm = 40.0F;

@@ -11,7 +11,7 @@ from typing import Final
 HAND_TIMEOUT_S: Final = 0.3  # longer than this is a page that is closed, suspended or disconnected
 START_S: Final = 0.5  # the inverter answers an enable within milliseconds
 GAP_S: Final = 0.03  # between two commands: the inverter's time-out, docs/howto/can.md
-RAMP_Nm_per_s: Final = 150.0
+RAMP_S: Final = 0.88  # from zero to the machine's torque
 RUNNING: Final = ("run", "derate")
 FAULTED: Final = ("fault", "safe_state")
 AGAIN: Final = "Press Enable to go on."
@@ -96,7 +96,7 @@ class Commander:
             self.let_go()
         self._follow(state, refused, step_s)
         wanted = self.target_Nm if self.wish is Wish.DRIVE and state in RUNNING else 0.0
-        step_max = RAMP_Nm_per_s * step_s
+        step_max = self.torque_max_Nm * step_s / RAMP_S
         self.torque_requested_Nm += min(max(wanted - self.torque_requested_Nm, -step_max), step_max)
         if state not in RUNNING:
             self.torque_requested_Nm = 0.0

@@ -46,6 +46,11 @@ class Samples:
                 self._columns[message.name].setdefault("t", []).append(frame.timestamp)
             self._last[message.name] = signals
 
+    def factors(self) -> dict[str, dict[str, float]]:
+        """What one count of each signal is, message by message."""
+        return {message.name: {signal.name: float(signal.scale) for signal in message.signals}
+                for message in self._messages.values()}  # fmt: skip
+
     def message(self, name: str) -> dict[str, Any] | None:
         """The last values of a message; None before its first frame."""
         with self._lock:

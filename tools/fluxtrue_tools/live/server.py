@@ -94,7 +94,8 @@ async def _page(request: web.Request) -> web.FileResponse:
 def _hello(session: Session) -> dict[str, Any]:
     stand = {name: [knob.lo, knob.hi, knob.start] for name, knob in KNOBS.items()} if session.stand else {}
     return {"type": "hello", "title": session.title, "torque_max_Nm": session.commander.torque_max_Nm,
-            "replay": session.link is None, "tuning": session.tuning is not None, "stand": stand,
+            "factors": session.samples.factors(), "replay": session.link is None,
+            "tuning": session.tuning is not None, "stand": stand,
             "explanations": session.explanations}  # fmt: skip
 
 

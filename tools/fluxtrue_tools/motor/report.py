@@ -135,7 +135,8 @@ def _bases(motor: Motor) -> Lines:
 
 def _bus(motor: Motor) -> Lines:
     """The resolution and the range of each quantity on the bus."""
-    carried, units = carriers(motor.bus.dbc), {name: unit for unit, name in QUANTITIES.items()}
+    carried = carriers(motor.bus.dbc)
+    units = {name: unit.replace("Nm", "N·m").replace("mOhm", "mohm") for unit, name in QUANTITIES.items()}
     own = "the standard" if motor.bus.factors == standard_factors() else "its own"
     return [
         f"bus: {own} scale, {DBC_NAME}, interface hash 0x{motor.bus.interface_hash:08X}",

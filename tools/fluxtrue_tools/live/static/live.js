@@ -150,20 +150,30 @@ function showFaults(faults, configuration) {
 }
 
 const NUMBERS = [
-  ["Torque estimated", "INV_Status", "TorqueEstimated", "N·m", 1], ["Speed", "INV_Status", "Speed", "rpm", 0],
-  ["dc voltage", "INV_DcLink", "DcVoltage", "V", 1], ["dc current (estimated)", "INV_DcLink", "DcCurrent", "A", 1],
-  ["ψ̂", "INV_Identification", "PsiF", "mVs", 2], ["quality of ψ̂", "INV_Identification", "PsiQuality", "%", 0],
-  ["R̂", "INV_Identification", "Resistance", "mΩ", 2], ["quality of R̂", "INV_Identification", "ResistanceQuality", "%", 0],
-  ["winding", "INV_Temperatures", "Winding", "°C", 0], ["inverter", "INV_Temperatures", "Inverter", "°C", 0],
+  ["Torque estimated", "INV_Status", "TorqueEstimated", "N·m"], ["Speed", "INV_Status", "Speed", "rpm"],
+  ["dc voltage", "INV_DcLink", "DcVoltage", "V"], ["dc current (estimated)", "INV_DcLink", "DcCurrent", "A"],
+  ["ψ̂", "INV_Identification", "PsiF", "mVs"], ["quality of ψ̂", "INV_Identification", "PsiQuality", "%"],
+  ["R̂", "INV_Identification", "Resistance", "mΩ"], ["quality of R̂", "INV_Identification", "ResistanceQuality", "%"],
+  ["winding", "INV_Temperatures", "Winding", "°C"], ["inverter", "INV_Temperatures", "Inverter", "°C"],
 ];
+const TORQUE_STEP_COUNTS = 5; // of the slider
+
+// As many decimals as one count of the signal has: its factor belongs to the motor.
+function inCounts(value, message, signal) {
+  return value.toFixed(Math.max(0, Math.ceil(-Math.log10(hello.factors[message][signal]) - 1e-9)));
+}
+
+function torqueText(torque) {
+  return `${inCounts(torque, "VCU_TorqueRequest", "TorqueRequested")} N·m`;
+}
 
 function showNumbers(last) {
   const rows = [];
-  for (const [label, message, signal, unit, digits] of NUMBERS) {
+  for (const [label, message, signal, unit] of NUMBERS) {
     const value = last[message] && last[message][signal];
     rows.push(Object.assign(document.createElement("dt"), { textContent: label }));
     rows.push(Object.assign(document.createElement("dd"), {
-      textContent: value === undefined ? "–" : `${value.toFixed(digits)} ${unit}` }));
+      textContent: value === undefined ? "–" : `${inCounts(value, message, signal)} ${unit}` }));
   }
   $("numbers").replaceChildren(...rows);
 }
@@ -176,7 +186,7 @@ function showState(state, wish, target) {
   if (wish !== "drive") mine = false;
   if (!mine) {
     $("torque").value = target;
-    $("torque-value").textContent = `${target.toFixed(1)} N·m`;
+    $("torque-value").textContent = torqueText(target);
   }
 }
 
@@ -219,8 +229,9 @@ function showTuning(values) {
 function onHello(message) {
   hello = message;
   $("title").textContent = message.title;
-  const limit = Math.floor(message.torque_max_Nm);
-  Object.assign($("torque"), { min: -limit, max: limit });
+  const step = TORQUE_STEP_COUNTS * message.factors.VCU_TorqueRequest.TorqueRequested;
+  const limit = Math.floor(message.torque_max_Nm / step + 1e-9) * step;
+  Object.assign($("torque"), { min: -limit, max: limit, step });
   for (const id of ["ready", "enable", "off", "reset"]) $(id).disabled = message.replay;
   $("record").disabled = message.replay;
   $("tune-read").disabled = !message.tuning;
@@ -282,7 +293,7 @@ $("record").onclick = () => send({ type: "record", on: !$("record").classList.co
 $("torque").oninput = () => {
   mine = true;
   const torque = Number($("torque").value);
-  $("torque-value").textContent = `${torque.toFixed(1)} N·m`;
+  $("torque-value").textContent = torqueText(torque);
   send({ type: "torque", torque_requested_Nm: torque });
 };
 document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
