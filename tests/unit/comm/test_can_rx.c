@@ -15,7 +15,7 @@ static uint8_t counter;
 
 void setUp(void)
 {
-    scales = (bus_scales_t){.torque_Nm = 0.1F, .power_kW = 0.01F};
+    scales = (bus_scales_t){.torque_Nm = 0.1F, .voltage_V = 0.1F, .power_kW = 0.01F};
     rx = (can_rx_t){0};
     counter = 0;
 }
