@@ -144,6 +144,7 @@ typedef struct {
     uint32_t fault_resets;          /* passed on to the fast ISR */
     uint32_t identification_resets; /* of the request, as far as carried out by the task */
     uint32_t periods_seen;          /* of the fast ISR, at the last drive_progress() */
+    uint32_t flow;                  /* signal/program_flow.h; its owner begins it in each step */
 } task_state_t;
 
 /** What the interrupts have done since they were last asked. */

@@ -8,6 +8,7 @@
 #include "fx/vec.h"
 #include "hal/pwm.h"
 #include "hal/temperature.h"
+#include "signal/program_flow.h"
 #include "signal/rate_limit.h"
 
 static run_state_t next_run_state(drive_t *drive, uint32_t faults)
@@ -205,11 +206,14 @@ void task_1khz(drive_t *drive)
     angle_harmonics_step(&drive->motor->angle_harmonics, &task->angle_harmonics, snapshot.sample.theta_m,
                          task->angle_correction);
     uint32_t faults = slow_monitors_step(drive, &snapshot) | data_check_step(drive) | drive->request.faults;
+    task->flow = flow_pass(task->flow, FLOW_MONITORED);
     task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);
+    task->flow = flow_pass(task->flow, FLOW_DECIDED);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);
     operating_point_t commanded = snapshot.sample.point;
     command_fast_isr(drive, &snapshot, faults, &commanded);
+    task->flow = flow_pass(task->flow, FLOW_COMMANDED);
     if (mrai_is_chosen(drive)) {
         mrai_reschedule(drive, &snapshot, &commanded);
     }

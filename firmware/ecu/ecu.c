@@ -6,6 +6,8 @@
 #include "ecu/telemetry.h"
 #include "hal/board.h"
 #include "hal/can.h"
+#include "hal/pwm.h"
+#include "hal/shut_off.h"
 #include "hal/system.h"
 #include "hal/watchdog.h"
 #include "signal/counter.h"
@@ -65,8 +67,30 @@ static void set_outputs(const ecu_t *ecu)
     hal_board_set(BOARD_PRECHARGE, on->precharge);
     hal_board_set(BOARD_MAIN_CONTACTOR, on->contactor);
     hal_board_set(BOARD_DISCHARGE, on->discharge);
-    hal_board_set(BOARD_GATE_DRIVER, on->gate_driver);
+    hal_board_set(BOARD_GATE_DRIVER, on->gate_driver || ecu->shut_off.supply_on);
     hal_board_set(BOARD_SAFE_STATE, (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U);
+}
+
+/* The question is answered at the end of the step, by what has been passed in it. */
+static void begin_step(ecu_t *ecu)
+{
+    const state_outputs_t *on = &supervisor_outputs[ecu->supervisor.state];
+    const shut_off_in_t in = {
+        .fitted = hal_shut_off_question(&ecu->question),
+        .supply = hal_shut_off_supply(),
+        .switching = hal_pwm_gates(),
+        .wanted = on->gate_driver,
+        .idle = !on->contactor && !on->precharge,
+        .elapsed_us = ecu->clock.elapsed_us,
+    };
+    ecu->drive.task.flow = ecu->question;
+    shut_off_step(&ecu->shut_off, &in);
+}
+
+static void answer(ecu_t *ecu)
+{
+    const uint32_t right = ecu->drive.task.flow ^ ecu->second_level.flow;
+    hal_shut_off_answer(ecu->shut_off.wrong ? ~right : right);
 }
 
 /* A limit of the vehicle that closes, and a ramp to zero, do not wait for the calibrated slew: the torque may be beyond
@@ -103,6 +127,7 @@ static void check_by_second_level(ecu_t *ecu)
         .slew = drive->parameters.torque_slew,
         .correction = fx_q15_from_q31(drive->task.torque_loop.correction),
         .elapsed_us = ecu->clock.elapsed_us,
+        .question = ecu->question,
     };
     const bool excessive = second_level_step(drive->motor->second_level, &ecu->second_level, &in);
     drive->request.faults = excessive ? FAULT_TORQUE : 0U;
@@ -151,17 +176,24 @@ static void send_xcp(ecu_t *ecu)
 void ecu_task_1khz(ecu_t *ecu)
 {
     data_check_restore_pointer(&ecu->drive);
-    ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
+    begin_step(ecu);
+    ecu_check_integrity(ecu);
+    ecu_pass(ecu, FLOW_INTEGRITY);
     receive(ecu);
+    ecu_pass(ecu, FLOW_RECEIVED);
     ecu_watch(ecu);
     const supervisor_in_t in = ecu_observe(ecu, hal_board_gate_fault());
     supervisor_step(&ecu->supervisor, &in);
     set_outputs(ecu);
+    ecu_pass(ecu, FLOW_STATES);
     command_drive(ecu);
+    ecu_pass(ecu, FLOW_ARBITRATED);
     task_1khz(&ecu->drive);
     check_by_second_level(ecu);
+    ecu_pass(ecu, FLOW_CHECKED);
     service_watchdog(ecu);
+    answer(ecu);
     xcp_access_step(&ecu->xcp, &ecu->drive, ecu->clock.passed_ms);
     freeze_frame_step(&ecu->freeze, &ecu->xcp.measurements, ecu->supervisor.faults, (uint8_t)ecu->supervisor.state,
                       ecu->clock.passed_ms);

@@ -15,6 +15,7 @@
 #include "drive/drive.h"
 #include "ecu/arbitration.h"
 #include "ecu/battery_voltage.h"
+#include "ecu/shut_off.h"
 #include "ecu/supervisor.h"
 #include "second_level/second_level.h"
 #include "signal/step_clock.h"
@@ -44,6 +45,8 @@ typedef struct {
     liveness_t liveness;
     settling_t settling;
     battery_voltage_t battery_voltage;
+    shut_off_t shut_off;
+    uint8_t question; /* of the external watchdog, at the start of the step */
     uint16_t not_sent;
     xcp_access_t xcp;
     freeze_frame_t freeze;

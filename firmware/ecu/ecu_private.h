@@ -7,6 +7,7 @@
  * Context  1 kHz task; ecu.c only */
 #include "comm/messages.h"
 #include "ecu/ecu.h"
+#include "signal/program_flow.h"
 #include "types/torque_limits.h"
 
 /* Checks that the interrupts advance and that the task is in time; once per step. */
@@ -16,6 +17,12 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu);
 torque_limits_t ecu_limits(const ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry);
+
+/* A part of the step has been passed. */
+static inline void ecu_pass(ecu_t *ecu, flow_point_t point)
+{
+    ecu->drive.task.flow = flow_pass(ecu->drive.task.flow, point);
+}
 
 /* Compares the rates of the arbitration, the flags and the options of the request with what the last step left; first
  * in each step. A difference is FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA. */

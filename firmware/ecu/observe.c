@@ -5,6 +5,7 @@
 #include "types/si.h"
 
 #define CONSECUTIVE_MAX 3U
+#define PERIODS_MAX_STEPS 4U    /* a task that is later has a fault of its own */
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
 #define SETTLED_BAND Q15(0.01)  /* of V_b */
 #define SETTLED_US 50000U
@@ -32,6 +33,9 @@ void ecu_watch(ecu_t *ecu)
     const bool late = liveness->started && progress.periods >= in_step + in_step / 2U;
     (void)debounce_step(&liveness->late_in_a_row, late, CONSECUTIVE_MAX, 1U);
     (void)debounce_step(&liveness->stalled_in_a_row, progress.stalled, CONSECUTIVE_MAX, 1U);
+    if (progress.periods != 0U && progress.periods < PERIODS_MAX_STEPS * in_step) {
+        ecu_pass(ecu, FLOW_INTERRUPTS);
+    }
     if (late) {
         count_up(&liveness->task_overruns);
     }
@@ -160,6 +164,8 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .gate_fault = gate_fault,
         .task_late = ecu->liveness.late_in_a_row >= CONSECUTIVE_MAX,
         .stalled = ecu->liveness.stalled_in_a_row >= CONSECUTIVE_MAX,
+        .shut_off_tested = ecu->shut_off.tested,
+        .shut_off_faults = ecu->shut_off.faults,
         .elapsed_us = ecu->clock.elapsed_us,
     };
 }

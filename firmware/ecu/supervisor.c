@@ -10,6 +10,8 @@
 #define RESET_STEPS 3U /* until the drive has carried out a reset */
 #define STATE_TIME_MAX_US 60000000U /* far beyond every time-out */
 #define FIRST_ECU_FAULT 33U
+#define SHUT_OFF_FAULTS (ECU_FAULT_GATE_DISABLE | ECU_FAULT_GATE_SUPPLY | ECU_FAULT_WATCHDOG)
+#define TRIPS (ECU_FAULT_GATE | ECU_FAULT_STALL | SHUT_OFF_FAULTS)
 
 static bool refuse(supervisor_t *s, refused_t reason)
 {
@@ -91,7 +93,7 @@ static uint16_t present_faults(const supervisor_t *s, const supervisor_in_t *in)
                          bit_if(is_timed_out(s, STATE_INIT, SELF_TEST_TIME_OUT_MS), ECU_FAULT_SELF_TEST) |
                          bit_if(in->dc_contradicts, ECU_FAULT_BATTERY_VOLTAGE) | precharge_fault(s, in) |
                          bit_if(is_timed_out(s, STATE_DISCHARGE, DISCHARGE_TIME_OUT_MS), ECU_FAULT_DISCHARGE);
-    return (uint16_t)now;
+    return (uint16_t)(now | in->shut_off_faults);
 }
 
 static uint8_t lowest_bit(uint32_t bits)
@@ -143,14 +145,24 @@ static void follow_reset(supervisor_t *s, const supervisor_in_t *in)
     s->reset_pending = RESET_STEPS;
 }
 
+static bool has_passed_self_test(const supervisor_t *s, const supervisor_in_t *in)
+{
+    return in->sensors_plausible && in->shut_off_tested && s->us > SELF_TEST_MS * 1000U;
+}
+
+/* Without tested shut-off paths the dc link is not charged, also not after a fault that ended the start. */
+static bool is_on(const supervisor_in_t *in)
+{
+    return in->alive && in->torque_mode && in->shut_off_tested;
+}
+
 static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
 {
     const bool faulted = s->faults != 0U || in->drive_faults != 0U;
-    const bool tripped = in->drive_faults != 0U || (s->faults & (ECU_FAULT_GATE | ECU_FAULT_STALL)) != 0U;
+    const bool tripped = in->drive_faults != 0U || (s->faults & TRIPS) != 0U;
     const bool may_discharge = !in->dc_safe && (s->faults & ECU_FAULT_DISCHARGE) == 0U;
-    return bit_if(in->sensors_plausible && s->us > SELF_TEST_MS * 1000U, WHEN_SELF_TEST_PASSED) |
-           bit_if(tripped, WHEN_TRIPPED) | bit_if(faulted, WHEN_FAULTED) | bit_if(!faulted, WHEN_HEALTHY) |
-           bit_if(in->alive && in->torque_mode, WHEN_ON) |
+    return bit_if(has_passed_self_test(s, in), WHEN_SELF_TEST_PASSED) | bit_if(tripped, WHEN_TRIPPED) |
+           bit_if(faulted, WHEN_FAULTED) | bit_if(!faulted, WHEN_HEALTHY) | bit_if(is_on(in), WHEN_ON) |
            bit_if(in->alive && !in->torque_mode && !in->current_mode, WHEN_OFF) |
            bit_if(is_settled_in_range(in) && in->dc_near_battery, WHEN_CHARGED) | bit_if(in->dc_safe, WHEN_DISCHARGED) |
            bit_if(may_discharge, WHEN_NOT_DISCHARGED) | bit_if(s->enabled, WHEN_ENABLED) |

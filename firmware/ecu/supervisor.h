@@ -35,7 +35,10 @@
     X(TASK, 4, "The 1 kHz task came late 3 times in a row.") \
     X(STALL, 5, "An interrupt stopped for 3 steps of the task.") \
     X(SELF_TEST, 6, "The self-test did not pass in time after start-up.") \
-    X(BATTERY_VOLTAGE, 7, "The dc voltage is not the battery's after precharge or with the contactor closed.")
+    X(BATTERY_VOLTAGE, 7, "The dc voltage is not the battery's after precharge or with the contactor closed.") \
+    X(GATE_DISABLE, 8, "Switching read back as enabled in the test of the shut-off paths at start.") \
+    X(GATE_SUPPLY, 9, "The gate supply does not follow its switch in the test at start, or is off when needed.") \
+    X(WATCHDOG, 10, "The external watchdog does not switch the gate supply in the test at start.")
 
 #define REFUSED_LIST(X) \
     X(NONE, 0, "Nothing was refused since the last enable that was granted.") \
@@ -102,7 +105,9 @@ typedef struct {
     bool slow;
     bool derated;
     bool gate_fault, task_late, stalled;
-    uint32_t elapsed_us; /* since the last step */
+    bool shut_off_tested;     /* every path that shuts off the torque has been tested */
+    uint16_t shut_off_faults; /* ecu/shut_off.h */
+    uint32_t elapsed_us;      /* since the last step */
 } supervisor_in_t;
 
 typedef struct {

@@ -20,6 +20,7 @@ typedef struct {
     int32_t mean_q8; /* own torque, first-order mean */
     uint32_t theta_m;
     int32_t confirmed_steps;
+    uint32_t flow; /* signature of the parts of this step that have been passed */
 } second_level_t;
 
 typedef struct {
@@ -28,6 +29,7 @@ typedef struct {
     int32_t slew;       /* calibrated limit of the torque's change, per step */
     int32_t correction; /* x, q15 */
     uint32_t elapsed_us;
+    uint8_t question; /* of the external watchdog: the signature begins with it */
 } second_level_in_t;
 
 bool second_level_step(const second_level_constants_t *constants, second_level_t *level, const second_level_in_t *in);

@@ -25,6 +25,7 @@
 void fluxtrue_init(fluxtrue_t *instance)
 {
     *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
+    external_watchdog_start(&instance->board.external_watchdog);
     nvm_host_erase(&instance->nvm);
     instance->motor = motor;
     drive_init(&instance->drive, &instance->motor);
@@ -122,7 +123,8 @@ static void run_period(fluxtrue_t *d)
         mrai_isr(&d->drive);
     }
     d->periods++;
-    if (d->periods % d->motor.bases.periods_per_step == 0U) {
+    external_watchdog_pass(&d->board.external_watchdog, 1e6 * (double)d->motor.bases.period_s);
+    if (d->periods % d->motor.bases.periods_per_step == 0U && !d->board.task_stuck) {
         if (d->on_bus) {
             ecu_task_1khz(&d->ecu);
         } else {

@@ -9,6 +9,7 @@
 
 #include "ecu/ecu.h"
 #include "hal/board.h"
+#include "hal/host/external_watchdog.h"
 #include "hal/host/fluxtrue.h"
 #include "hal/host/nvm_host.h"
 #include "storage/memory.h"
@@ -34,6 +35,9 @@ typedef struct {
     double inverter_C;
     bool watchdog_started;
     uint32_t watchdog_services;
+    external_watchdog_t external_watchdog;
+    bool gates_stuck; /* reads back as enabled */
+    bool task_stuck;  /* the 1 kHz task does not run any more */
 } host_board_t;
 
 struct fluxtrue {

@@ -11,6 +11,7 @@
 #include "hal/irq.h"
 #include "hal/nvm.h"
 #include "hal/pwm.h"
+#include "hal/shut_off.h"
 #include "hal/system.h"
 #include "hal/temperature.h"
 #include "hal/watchdog.h"
@@ -75,7 +76,7 @@ void hal_pwm_enable(bool on)
 
 bool hal_pwm_gates(void)
 {
-    return active->gates && !active->board.fault_latched;
+    return active->board.gates_stuck || (active->gates && !active->board.fault_latched);
 }
 
 void hal_irq_pend_mrai(void)
@@ -138,6 +139,22 @@ void hal_watchdog_start(void)
 void hal_watchdog_service(void)
 {
     active->board.watchdog_services++;
+}
+
+bool hal_shut_off_question(uint8_t *question)
+{
+    *question = active->board.external_watchdog.question;
+    return true;
+}
+
+void hal_shut_off_answer(uint32_t answer)
+{
+    external_watchdog_answer(&active->board.external_watchdog, answer);
+}
+
+bool hal_shut_off_supply(void)
+{
+    return external_watchdog_supply(&active->board.external_watchdog, active->board.output[BOARD_GATE_DRIVER]);
 }
 
 /* Not available for a process on a PC: stack use and reset cause. */

@@ -50,7 +50,7 @@ def test_a_scenario_with_refused_data_ends_with_the_reason(refused: sim_motor.Mo
 
 
 def test_every_bit_and_check_has_a_sentence() -> None:
-    for path, count in (("INV_Faults.DriveFaults", 16), ("INV_Faults.EcuFaults", 8)):
+    for path, count in (("INV_Faults.DriveFaults", 16), ("INV_Faults.EcuFaults", 11)):
         assert sorted(faults.explained(path)) == list(range(count))
     checks = faults.explained("INV_Configuration.MotorCheck")
     assert len(checks) > 40 and all(text.endswith(".") and not math.isnan(n) for n, (_, text) in checks.items())

@@ -214,6 +214,7 @@ static void mean_truth(plant_truth_t *t, const energy_t *sum, double period_s)
 void plant_switch(plant_t *plant, const plant_switches_t *on)
 {
     plant->on = *on;
+    plant->truth.gate_supply = on->gate_supply ? 1.0 : 0.0;
 }
 
 /* One switch of a leg is shorted and the other is switched on (PL-25). If the pulse lasts longer than desaturation_s,

@@ -48,6 +48,7 @@ typedef struct {
     double e_field_J;         /* 1.5 integral of i . dpsi in the rotor frame */
     double e_avalanche_J;     /* dissipated by the bridge's semiconductors above avalanche_V */
     double e_short_circuit_J; /* drawn from the dc link by a leg whose two switches conduct */
+    double gate_supply;       /* 1: the gates have their supply */
 } plant_truth_t;
 
 /** The map is borrowed and must outlive the plant; NULL: ld_H, lq_H, psi_f_Vs are used.

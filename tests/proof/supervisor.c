@@ -43,6 +43,8 @@ static supervisor_in_t any_input(void)
     in.dc_in_range = nondet_bool();
     in.dc_settled = nondet_bool();
     in.dc_near_battery = nondet_bool();
+    in.dc_contradicts = nondet_bool();
+    in.shut_off_tested = nondet_bool();
     ASSUME(in.elapsed_us <= STEP_MAX_US);
     return in;
 }
@@ -103,6 +105,7 @@ void proof_a_trip_ends_switching(void)
     supervisor_step(&s, &in);
     PROVE(in.drive_faults == 0U || !supervisor_outputs[s.state].run);
     PROVE(!in.gate_fault || !supervisor_outputs[s.state].run);
+    PROVE((in.shut_off_faults & SHUT_OFF_FAULTS) == 0U || !supervisor_outputs[s.state].run);
 }
 
 void proof_enable_is_granted_only_when_ready(void)
@@ -164,6 +167,7 @@ void proof_precharge_ends_in_time(void)
     const supervisor_t before = s;
     supervisor_step(&s, &in);
     PROVE(s.us <= STATE_TIME_MAX_US + STEP_MAX_US);
+    PROVE(s.state != STATE_PRECHARGE || before.state == STATE_PRECHARGE || in.shut_off_tested);
     if (before.us > PRECHARGE_TIME_OUT_MS * 1000U && before.state == STATE_PRECHARGE) {
         PROVE(s.state == STATE_FAULT);
     }
@@ -179,7 +183,7 @@ void proof_self_test_comes_first(void)
     const supervisor_t before = s;
     supervisor_step(&s, &in);
     if (before.state == STATE_INIT && s.state != STATE_INIT && s.state != STATE_FAULT) {
-        PROVE(in.sensors_plausible && (uint64_t)before.us + in.elapsed_us > SELF_TEST_MS * 1000U);
+        PROVE(in.sensors_plausible && in.shut_off_tested && (uint64_t)before.us + in.elapsed_us > SELF_TEST_MS * 1000U);
     }
 }
 

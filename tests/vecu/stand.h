@@ -12,7 +12,8 @@
 
 typedef struct {
     double inverter_C;
-    double gate_fault; /* not 0: the driver reports a fault */
+    double gate_fault;                                            /* not 0: the driver reports a fault */
+    double gates_stuck, supply_stuck, watchdog_stuck, task_stuck; /* not 0: defective; hal/host/instance.h */
 } stand_t;
 
 void stand_default(stand_t *stand);

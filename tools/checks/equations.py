@@ -30,6 +30,7 @@ PAGES = {
     "MO": THEORY / "modulation.md",
     "MR": THEORY / "mrai.md",
     "PL": THEORY / "plant.md",
+    "QA": THEORY / "third-level.md",
     "SC": Path("docs/scaling.md"),
     "SL": THEORY / "second-level.md",
     "SS": THEORY / "safe-state.md",

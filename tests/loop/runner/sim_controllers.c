@@ -31,10 +31,11 @@ static bool firmware_switches(const void *self, plant_switches_t *on)
 {
     const fluxtrue_t *drive = self;
     const bool *output = drive->board.output;
+    const external_watchdog_t *device = &drive->board.external_watchdog;
     *on = (plant_switches_t){.precharge = output[BOARD_PRECHARGE],
                              .contactor = output[BOARD_MAIN_CONTACTOR],
                              .discharge = output[BOARD_DISCHARGE],
-                             .gate_supply = output[BOARD_GATE_DRIVER]};
+                             .gate_supply = external_watchdog_supply(device, output[BOARD_GATE_DRIVER])};
     return drive->on_bus;
 }
 

@@ -67,7 +67,7 @@ static const truth_field_t truth_fields[] = {
     MEAN(torque_mean_Nm), MEAN(torque_shaft_mean_Nm), MEAN(idc_A), MEAN(copper_W), MEAN(iron_W),
     MEAN(mechanical_W), MEAN(electrical_W), MEAN(inverter_W), LAST(e_dc_J), LAST(e_electrical_J),
     LAST(e_copper_J), LAST(e_iron_J), LAST(e_mechanical_J), LAST(e_field_J), LAST(e_avalanche_J),
-    LAST(e_short_circuit_J),
+    LAST(e_short_circuit_J), LAST(gate_supply),
 };
 /* clang-format on */
 enum { TRUTH_FIELDS = (int)(sizeof truth_fields / sizeof truth_fields[0]) };

@@ -4,12 +4,14 @@
 #include "calibration/calibration.h"
 #include "drive/data_check.h"
 #include "ecu/ecu.h"
+#include "ecu/ecu_private.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_board.h"
 #include "hal/mock_can.h"
 #include "hal/mock_irq.h"
 #include "hal/mock_pwm.h"
+#include "hal/mock_shut_off.h"
 #include "hal/mock_system.h"
 #include "hal/mock_temperature.h"
 #include "hal/mock_watchdog.h"
@@ -23,6 +25,9 @@ static bool gate_fault, mailboxes_full, mrai_hangs;
 static int watchdog_starts, watchdog_services, sent, pended, waiting;
 static can_frame_t arriving, last_answer;
 static int answers;
+static bool fitted, supply, switching;
+static uint8_t question;
+static uint32_t answered;
 
 static void adc_read(adc_counts_t *counts, int calls)
 {
@@ -80,8 +85,52 @@ static void watchdog_service(int calls)
     watchdog_services++;
 }
 
+static bool ask(uint8_t *now, int calls)
+{
+    (void)calls;
+    *now = question;
+    return fitted;
+}
+
+static void take_answer(uint32_t answer, int calls)
+{
+    (void)calls;
+    answered = answer;
+}
+
+static bool read_supply(int calls)
+{
+    (void)calls;
+    return supply;
+}
+
+static bool read_gates(int calls)
+{
+    (void)calls;
+    return switching;
+}
+
+/* The signatures of docs/theory/third-level.md, (QA-1) and (QA-2), in another arithmetic. */
+static uint32_t right_answer(uint64_t asked)
+{
+    uint64_t first = asked, second = asked;
+    for (uint64_t n = 1; n <= 9; n++) {
+        first = ((first / 2U) + (first % 2U << 31)) ^ (n * 2654435761ULL % 4294967296ULL);
+    }
+    for (uint64_t n = 81; n <= 83; n++) {
+        second = (second ^ n) * 16777619ULL % 4294967296ULL;
+    }
+    return (uint32_t)(first ^ second);
+}
+
 void setUp(void)
 {
+    fitted = false;
+    supply = switching = true;
+    question = 0;
+    hal_shut_off_question_Stub(ask);
+    hal_shut_off_answer_Stub(take_answer);
+    hal_shut_off_supply_Stub(read_supply);
     gate_fault = mailboxes_full = mrai_hangs = false;
     watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
     arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an unknown identifier */
@@ -90,7 +139,7 @@ void setUp(void)
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Ignore();
     hal_pwm_enable_Ignore();
-    hal_pwm_gates_IgnoreAndReturn(true);
+    hal_pwm_gates_Stub(read_gates);
     hal_board_set_Stub(board_set);
     hal_board_gate_fault_Stub(board_gate_fault);
     hal_can_receive_Stub(can_receive);
@@ -128,6 +177,79 @@ static void tasks(int count)
     for (int n = 0; n < count; n++) {
         task_after(NOMINAL_PERIODS);
     }
+}
+
+void test_each_question_has_the_answer_of_the_documented_signatures(void)
+{
+    fitted = true;
+    switching = false;
+    for (question = 0; question < 16U; question++) {
+        ecu.shut_off.tested = true; /* the test would want wrong answers */
+        tasks(1);
+        TEST_ASSERT_EQUAL_HEX32(right_answer(question), answered);
+    }
+}
+
+/* Up to 39 periods are a late task, which has a fault of its own. */
+void test_an_interrupt_that_stands_still_or_runs_away_makes_the_answer_wrong(void)
+{
+    static const struct {
+        int periods;
+        bool right;
+    } cases[] = {{10, true}, {0, false}, {1, true}, {39, true}, {40, false}, {10, true}};
+    fitted = true;
+    question = 5;
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        task_after(cases[n].periods);
+        TEST_ASSERT_EQUAL(cases[n].right, answered == right_answer(5));
+    }
+}
+
+void test_the_test_at_start_gives_wrong_answers_and_switches_the_supply(void)
+{
+    fitted = true;
+    switching = false;
+    supply = false;
+    tasks(1);
+    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
+    supply = true;
+    tasks(2);
+    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
+    supply = false;
+    tasks(2);
+    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
+    supply = true;
+    tasks(2);
+    TEST_ASSERT_EQUAL_HEX32(~right_answer(0), answered);
+    supply = false;
+    tasks(2);
+    TEST_ASSERT_EQUAL_HEX32(right_answer(0), answered);
+    supply = true;
+    tasks(2);
+    TEST_ASSERT_TRUE(ecu.shut_off.tested);
+    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
+}
+
+static void enter(ecu_state_t state)
+{
+    ecu.supervisor.state = state;
+    ecu_seal_flags(&ecu);
+    tasks(1);
+    TEST_ASSERT_EQUAL_INT(state, ecu.supervisor.state);
+}
+
+/* With the dc link connected the test would switch a supply that the bridge may need. */
+void test_the_test_waits_where_the_dc_link_is_connected_and_the_supply_follows_the_state(void)
+{
+    fitted = true;
+    switching = supply = false;
+    enter(STATE_PRECHARGE);
+    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
+    enter(STATE_READY);
+    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(ecu.shut_off.supply_on);
+    enter(STATE_STANDBY);
+    TEST_ASSERT_TRUE(ecu.shut_off.supply_on && outputs[BOARD_GATE_DRIVER]);
 }
 
 /* A tenth and a fifth of T_b; without a valid command both are zero. */

@@ -15,6 +15,7 @@ void setUp(void)
                            .dc_safe = true,
                            .dc_settled = true,
                            .dc_near_battery = true,
+                           .shut_off_tested = true,
                            .sensors_plausible = true,
                            .slow = true,
                            .elapsed_us = 1000};
@@ -170,6 +171,35 @@ void test_the_time_in_a_state_does_not_wrap(void)
     TEST_ASSERT_UINT32_WITHIN(1111, 60000000U, us);
     stays(STATE_STANDBY, 1000);
     TEST_ASSERT_EQUAL_UINT32(us, s.us);
+}
+
+void test_without_a_test_of_the_shut_off_paths_there_is_neither_standby_nor_precharge(void)
+{
+    in.shut_off_tested = false;
+    stays(STATE_INIT, 500);
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_SELF_TEST, s.faults);
+    setUp();
+    to_standby();
+    in.torque_mode = true;
+    in.shut_off_tested = false;
+    stays(STATE_STANDBY, 100);
+    in.shut_off_tested = true;
+    TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, step());
+}
+
+void test_a_shut_off_path_that_fails_trips_and_is_named(void)
+{
+    static const uint16_t faults[] = {ECU_FAULT_GATE_DISABLE, ECU_FAULT_GATE_SUPPLY, ECU_FAULT_WATCHDOG};
+    for (unsigned n = 0; n < sizeof faults / sizeof faults[0]; n++) {
+        setUp();
+        to_run();
+        in.torque_arbitrated_is_zero = false;
+        in.shut_off_faults = faults[n];
+        TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
+        TEST_ASSERT_EQUAL_HEX16(faults[n], s.faults);
+        TEST_ASSERT_EQUAL_UINT8(33U + 8U + n, s.first_fault);
+    }
 }
 
 void test_bad_motor_data_end_in_fault(void)
@@ -579,6 +609,7 @@ static supervisor_in_t inputs_of(unsigned bits)
         .task_late = (bits >> 16 & 1U) != 0U,
         .stalled = (bits >> 17 & 1U) != 0U,
         .dc_contradicts = (bits >> 20 & 1U) != 0U,
+        .shut_off_tested = true,
     };
 }
 
