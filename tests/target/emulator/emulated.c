@@ -104,6 +104,13 @@ static bool switches(const void *self, plant_switches_t *on)
     return e->board;
 }
 
+/* The gate drivers hold their line for the period after they have blocked a short circuit. */
+static void gate_report(void *self, bool reported)
+{
+    emulated_t *e = self;
+    emu_board_pins(e->emu, e->pins_of_board.gate_fault || reported, e->pins_of_board.resolver_fault);
+}
+
 static const char *failure(const void *self)
 {
     return emu_error(((const emulated_t *)self)->emu);
@@ -237,7 +244,7 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         destroy(e);
         return NULL;
     }
-    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy, switches, NULL});
+    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report});
 }
 
 emu_t *sim_emulator(sim_t *sim)

@@ -17,6 +17,9 @@ PERIOD_S = 1e-4
 FILTER_S = 8 / 112e6  # hal/s32k144/README.md, PWM: 4 + FFVAL cycles of the timer's clock
 SLACK_S = 1 / 112e6
 ALL_OUTPUTS, NO_OUTPUTS = 0x3F, 0
+DRIVING_NM = 80.0
+WINDING_TRIP_C = 230.0  # firmware/motors/hsm1/motor.toml
+TEMPERATURE, GATE = 1 << 14, 1 << 15
 FAULTF = 0x80
 ENCACHE = 1
 ADC0_IRQ, PDB0_IRQ, PDB1_IRQ = 39, 52, 68
@@ -30,7 +33,7 @@ def driving(parts: Parts) -> Iterator[tuple[Loop, Core]]:
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 314.16, "vdc_V": 350.0}
     with Loop(motor.library, plant, motor.flux_map) as loop:
         loop.set("enable", 1)
-        loop.set("torque_requested_Nm", 80.0)
+        loop.set("torque_requested_Nm", DRIVING_NM)
         loop.run(500)
         assert loop.get("fault_word") == 0
         assert loop.get("truth.torque_Nm") > 50
@@ -126,6 +129,32 @@ def the_code_cache_is_on(parts: Parts) -> None:
         assert core.register("LMEM.LMEM_PCCCR") & ENCACHE
 
 
+def a_winding_at_the_end_of_its_line_trips(parts: Parts) -> None:
+    """Through the counts of the thermistor; 110 ms are the confirmation."""
+    with driving(parts) as (loop, core):
+        loop.set("plant.winding_C", WINDING_TRIP_C - 6.0)
+        loop.run(2000)
+        assert loop.get("fault_word") == 0
+        assert 10.0 < loop.get("truth.torque_Nm") < 0.7 * DRIVING_NM, "below the trip the torque is derated"
+        loop.set("plant.winding_C", WINDING_TRIP_C + 10.0)
+        loop.run(1300)
+        assert int(loop.get("fault_word")) == TEMPERATURE
+        assert core.outputs == NO_OUTPUTS
+        assert abs(loop.get("truth.torque_Nm")) < 1.0
+
+
+def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None:
+    """At the port: the three switches of that side on throughout the period, the others off."""
+    for switch, duty in (("upper_a", 1.0), ("lower_b", 0.0)):
+        with driving(parts) as (loop, core):
+            loop.set(f"plant.switch_shorted_{switch}", 1)
+            loop.run(2000)
+            assert int(loop.get("fault_word")) & GATE
+            assert core.outputs == ALL_OUTPUTS
+            assert [core.duty(pair) for pair in range(3)] == 3 * [duty], switch
+            assert abs(loop.get("truth.torque_Nm")) < 10.0, "the short circuit is symmetrical"
+
+
 CHECKS = (
     a_gate_fault_switches_off_every_output_within_the_filter_time,
     a_fault_line_that_is_active_at_power_on_keeps_the_outputs_off,
@@ -134,6 +163,8 @@ CHECKS = (
     sampling_recovers_from_an_unread_result,
     a_stack_that_uses_its_reserve_resets,
     the_code_cache_is_on,
+    a_winding_at_the_end_of_its_line_trips,
+    a_shorted_switch_ends_in_the_short_circuit_on_its_side,
 )
 
 

@@ -67,6 +67,14 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
         checks.a_stack_that_uses_its_reserve_resets,
         PlantedError("main.c", "if (stack_measure() < STACK_RESERVE)", "if (stack_measure() < 4U)"),
     ),
+    "the thermistor's range ends below the trip": (
+        checks.a_winding_at_the_end_of_its_line_trips,
+        PlantedError("ntc.c", "count < node[NODES - 1]", "count < node[19]"),
+    ),
+    "the latch of the fault input is never ended": (
+        checks.a_shorted_switch_ends_in_the_short_circuit_on_its_side,
+        PlantedError("pwm.c", "again = on && ended_by_fault", "again = !on && ended_by_fault"),
+    ),
     "no code cache": (
         checks.the_code_cache_is_on,
         PlantedError("clock.c", "LMEM->LMEM_PCCCR = LMEM_PCCCR_ENCACHE;", "LMEM->LMEM_PCCCR = 0;"),
