@@ -220,6 +220,7 @@ typedef struct {
 #if FLUXTRUE_MRAI
     mrai_data_t mrai;
 #endif
+    volatile bool held; /* switching stays disabled: written in the background, which writes the flash meanwhile */
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);
@@ -261,6 +262,11 @@ void drive_restore_trim(drive_t *drive, int32_t trim);
 static inline bool drive_is_shorted(const drive_t *drive)
 {
     return drive->fast.short_circuit.holds;
+}
+/** From the next step on a request to enable switching waits, while the drive is held. From the background. */
+static inline void drive_hold(drive_t *drive, bool held)
+{
+    drive->held = held;
 }
 /** Current references come from outside the torque path. */
 static inline bool drive_bypasses_torque_path(const drive_t *drive)

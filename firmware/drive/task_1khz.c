@@ -29,7 +29,7 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
     if (faults != 0U) {
         return RUN_STATE_FAULT;
     }
-    return enable ? RUN_STATE_RUN : RUN_STATE_OFF;
+    return (enable && !drive->held) ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* Compares the acting voltage with the plan of the last step. */

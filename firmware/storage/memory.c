@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "storage/memory.h"
 
-#include <string.h>
-
+#include "hal/nvm.h"
 #include "signal/crc32.h"
 
 #define VERSION 3U /* of record_t */
 #define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
+#define STANDSTILL Q31(0.002)  /* of the speed base */
 
 /* No padding: the store's checksum runs over its bytes. */
 typedef struct {
@@ -19,7 +19,9 @@ uint32_t memory_layout(const motor_t *m)
 {
     const uint32_t version[2] = {VERSION, (uint32_t)sizeof(record_t)};
     uint32_t crc = crc32_update(CRC32_START, version, sizeof version);
-    crc = crc32_update(crc, m->name, (uint32_t)strlen(m->name));
+    for (const char *letter = m->name; *letter != '\0'; letter++) {
+        crc = crc32_update(crc, letter, 1);
+    }
     crc = crc32_update(crc, &m->bases, sizeof m->bases);
     return ~crc32_update(crc, m->identify.sigma, sizeof m->identify.sigma);
 }
@@ -43,37 +45,66 @@ static uint32_t in_steps(const drive_t *drive, uint32_t ms)
     return (uint32_t)((float)ms * 1e-3F / drive->motor->bases.step_s + 0.5F);
 }
 
+static bool stands_still(const drive_t *drive)
+{
+    const q31_t omega = sample_box_read(&drive->samples).point.omega;
+    return omega <= STANDSTILL && omega >= -STANDSTILL;
+}
+
 static bool at_rest(const drive_t *drive)
 {
     return drive->task.run_state == RUN_STATE_OFF && drive->fast.faults == 0U &&
-           command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT;
+           command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT && stands_still(drive);
 }
 
-/* The counters wrap after 49 days; only differences are used. */
-static bool is_due(const memory_t *memory, const drive_t *drive, uint32_t now)
+/* A save is wanted as soon as the drive has rested for long enough. */
+static bool is_wanted(const memory_t *memory, const drive_t *drive, uint32_t now)
 {
-    return memory->has_run && now - memory->rest_since >= in_steps(drive, MEMORY_REST_MS) &&
-           (!memory->has_tried || now - memory->tried_at >= in_steps(drive, MEMORY_INTERVAL_MS)) &&
+    return memory->has_run &&
+           (!memory->has_tried || now - memory->tried_at + MEMORY_HOLD_STEPS >= in_steps(drive, MEMORY_INTERVAL_MS)) &&
            drive->task.identify.mismatch_share <= MISMATCH_MAX;
 }
 
-bool memory_background(memory_t *memory, const drive_t *drive)
+static bool save_record(memory_t *memory, const drive_t *drive, uint32_t now)
 {
-    const uint32_t now = drive->task.identifications;
-    if (!at_rest(drive)) {
-        memory->has_run = memory->has_run || drive->task.run_state == RUN_STATE_RUN;
-        memory->rest_since = now;
-        return false;
-    }
-    if (!is_due(memory, drive, now)) {
-        return false;
-    }
     const record_t record = {drive_identified_record(drive), drive->task.compensation, drive->task.trim.trim};
-    const bool saved = store_save(memory_layout(drive->motor), &record, sizeof record);
+    bool saved = false;
+    if (hal_nvm_begin()) {
+        saved = store_save(memory_layout(drive->motor), &record, sizeof record);
+        memory->erase_cycles = store_erase_cycles();
+        hal_nvm_end();
+    }
     memory->has_tried = true;
     memory->tried_at = now;
     memory->has_run = !saved;
     memory->saves += saved ? 1U : 0U;
     memory->failures += saved ? 0U : 1U;
+    return saved;
+}
+
+/* The counters wrap after 49 days; only differences are used. */
+bool memory_background(memory_t *memory, drive_t *drive)
+{
+    const uint32_t now = drive->task.identifications;
+    if (!at_rest(drive)) {
+        memory->has_run = memory->has_run || drive->task.run_state == RUN_STATE_RUN;
+        memory->rest_since = now;
+        drive_hold(drive, false);
+        return false;
+    }
+    const uint32_t rested = now - memory->rest_since, needed = in_steps(drive, MEMORY_REST_MS);
+    if (rested + MEMORY_HOLD_STEPS < needed || !is_wanted(memory, drive, now)) {
+        drive_hold(drive, false);
+        return false;
+    }
+    if (!drive->held) {
+        drive_hold(drive, true);
+        memory->held_since = now;
+    }
+    if (rested < needed || now - memory->held_since < MEMORY_HOLD_STEPS) {
+        return false;
+    }
+    const bool saved = save_record(memory, drive, now);
+    drive_hold(drive, false);
     return saved;
 }

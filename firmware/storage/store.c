@@ -3,83 +3,107 @@
 
 #include "signal/crc32.h"
 
-#define CHUNK 64U /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
+#define CHUNK 64U   /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
+#define ATTEMPTS 2U /* of a save: a place that fails is passed over once */
+#define WORDS ((HAL_NVM_SLOTS + 31U) / 32U)
 
 typedef struct {
     uint32_t layout, size, sequence, crc; /* crc over the three words before it, then the record */
 } header_t;
 
 _Static_assert(sizeof(header_t) == STORE_HEADER_SIZE && STORE_HEADER_SIZE % HAL_NVM_UNIT == 0, "whole flash units");
-
-typedef enum { SLOT_BLANK, SLOT_DAMAGED, SLOT_INTACT } slot_state_t;
+_Static_assert(HAL_NVM_SLOTS % HAL_NVM_SECTOR_SLOTS == 0U && HAL_NVM_SLOTS >= 2U * HAL_NVM_SECTOR_SLOTS,
+               "while a sector is erased, another one holds the newest record");
 
 typedef struct {
-    slot_state_t state;
+    uint32_t slot; /* HAL_NVM_SLOTS: there is none */
     header_t header;
-} slot_t;
+    bool damaged; /* a slot is neither blank nor intact */
+} newest_t;
 
 static uint32_t header_crc(const header_t *header)
 {
     return crc32_update(CRC32_START, header, STORE_HEADER_SIZE - sizeof header->crc);
 }
 
-/* CRC of header and stored record; false: not readable. */
-static bool stored_crc(uint32_t slot, const header_t *header, uint32_t *crc)
+static bool is_blank_header(const header_t *h)
+{
+    return (h->layout & h->size & h->sequence & h->crc) == UINT32_MAX;
+}
+
+static uint32_t least(uint32_t a, uint32_t b)
+{
+    return (a < b) ? a : b;
+}
+
+/* The header fits the record stored behind it. */
+static bool is_intact(uint32_t slot, const header_t *header)
 {
     uint8_t chunk[CHUNK];
     uint32_t sum = header_crc(header);
     for (uint32_t done = 0; done < header->size; done += CHUNK) {
-        const uint32_t left = header->size - done;
-        const uint32_t size_now = (left < CHUNK) ? left : CHUNK;
-        if (!hal_nvm_read(slot, STORE_HEADER_SIZE + done, chunk, size_now)) {
+        const uint32_t now = least(header->size - done, CHUNK);
+        if (!hal_nvm_read(slot, STORE_HEADER_SIZE + done, chunk, now)) {
             return false;
         }
-        sum = crc32_update(sum, chunk, size_now);
+        sum = crc32_update(sum, chunk, now);
     }
-    *crc = ~sum;
-    return true;
+    return ~sum == header->crc;
 }
 
-static slot_t check_slot(uint32_t slot)
+/* The slot with the highest sequence number, which may wrap, of those that are not excluded yet; slots whose header
+ * cannot be one are excluded here. HAL_NVM_SLOTS: none is left. */
+static uint32_t highest(uint32_t excluded[WORDS], newest_t *newest)
 {
-    slot_t result = {.state = SLOT_DAMAGED};
-    uint32_t crc = 0;
-    if (!hal_nvm_read(slot, 0, &result.header, STORE_HEADER_SIZE)) {
-        return result;
+    uint32_t found = HAL_NVM_SLOTS;
+    for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
+        const uint32_t bit = 1U << (slot % 32U);
+        header_t header;
+        if ((excluded[slot / 32U] & bit) != 0U) {
+            continue;
+        }
+        const bool readable = hal_nvm_read(slot, 0, &header, STORE_HEADER_SIZE);
+        if (!readable || header.size > STORE_RECORD_MAX) {
+            newest->damaged = newest->damaged || !readable || !is_blank_header(&header);
+            excluded[slot / 32U] |= bit;
+        } else if (found == HAL_NVM_SLOTS || header.sequence - newest->header.sequence < 0x80000000U) {
+            found = slot;
+            newest->header = header;
+        }
     }
-    const header_t *h = &result.header;
-    if (h->layout == UINT32_MAX && h->size == UINT32_MAX && h->sequence == UINT32_MAX && h->crc == UINT32_MAX) {
-        result.state = SLOT_BLANK;
-    } else if (h->size <= STORE_RECORD_MAX && stored_crc(slot, h, &crc) && crc == h->crc) {
-        result.state = SLOT_INTACT;
-    }
-    return result;
+    return found;
 }
 
-/* The slot with the newest intact record; HAL_NVM_SLOTS if there is none. The sequence may wrap. */
-static uint32_t newest(const slot_t slot[HAL_NVM_SLOTS])
+/* Only the records that may be the newest are read: at a start time matters. */
+static newest_t find_newest(void)
 {
-    if (slot[0].state != SLOT_INTACT) {
-        return (slot[1].state == SLOT_INTACT) ? 1U : HAL_NVM_SLOTS;
+    newest_t newest = {.slot = HAL_NVM_SLOTS};
+    uint32_t excluded[WORDS] = {0};
+    for (uint32_t k = 0; k < HAL_NVM_SLOTS; k++) {
+        const uint32_t slot = highest(excluded, &newest);
+        if (slot == HAL_NVM_SLOTS) {
+            break;
+        }
+        if (is_intact(slot, &newest.header)) {
+            newest.slot = slot;
+            break;
+        }
+        newest.damaged = true;
+        excluded[slot / 32U] |= 1U << (slot % 32U);
     }
-    if (slot[1].state != SLOT_INTACT) {
-        return 0U;
-    }
-    return (slot[1].header.sequence - slot[0].header.sequence < 0x80000000U) ? 1U : 0U;
+    return newest;
 }
 
 store_result_t store_load(uint32_t layout, void *record, uint32_t size)
 {
-    const slot_t slot[HAL_NVM_SLOTS] = {check_slot(0), check_slot(1)};
-    const uint32_t newest_slot = newest(slot);
-    if (newest_slot == HAL_NVM_SLOTS) {
-        const bool damaged = slot[0].state == SLOT_DAMAGED || slot[1].state == SLOT_DAMAGED;
-        return damaged ? STORE_DAMAGED : STORE_EMPTY;
+    const newest_t newest = find_newest();
+    if (newest.slot == HAL_NVM_SLOTS) {
+        return newest.damaged ? STORE_DAMAGED : STORE_EMPTY;
     }
-    if (slot[newest_slot].header.layout != layout || slot[newest_slot].header.size != size) {
+    if (newest.header.layout != layout || newest.header.size != size) {
         return STORE_EMPTY;
     }
-    return hal_nvm_read(newest_slot, STORE_HEADER_SIZE, record, size) ? STORE_OK : STORE_DAMAGED;
+    return hal_nvm_read(newest.slot, STORE_HEADER_SIZE, record, size) ? STORE_OK : STORE_DAMAGED;
 }
 
 static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
@@ -89,8 +113,7 @@ static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
         for (uint32_t k = 0; k < CHUNK; k++) {
             chunk[k] = (done + k < size) ? record[done + k] : 0xFFU;
         }
-        const uint32_t left = size - done;
-        const uint32_t used = (left < CHUNK) ? left : CHUNK;
+        const uint32_t used = least(size - done, CHUNK);
         const uint32_t whole = (used + HAL_NVM_UNIT - 1U) / HAL_NVM_UNIT * HAL_NVM_UNIT;
         if (!hal_nvm_program(slot, STORE_HEADER_SIZE + done, chunk, whole)) {
             return false;
@@ -99,17 +122,74 @@ static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
     return true;
 }
 
+static bool write_slot(uint32_t slot, const header_t *header, const void *record)
+{
+    return program_record(slot, record, header->size) && hal_nvm_program(slot, 0, header, STORE_HEADER_SIZE) &&
+           is_intact(slot, header);
+}
+
+#if HAL_NVM_SECTOR_SLOTS > 1U
+/* Nothing has been programmed since the sector was erased. */
+static bool is_blank(uint32_t slot)
+{
+    uint8_t chunk[CHUNK];
+    for (uint32_t done = 0; done < HAL_NVM_SLOT_SIZE; done += CHUNK) {
+        if (!hal_nvm_read(slot, done, chunk, CHUNK)) {
+            return false;
+        }
+        for (uint32_t k = 0; k < CHUNK; k++) {
+            if (chunk[k] != 0xFFU) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+#endif
+
+/* Whether the slot takes a record: it is the first of a sector, or blank. */
+static bool is_free(uint32_t slot)
+{
+#if HAL_NVM_SECTOR_SLOTS > 1U
+    return slot % HAL_NVM_SECTOR_SLOTS == 0U || is_blank(slot);
+#else
+    (void)slot;
+    return true;
+#endif
+}
+
+static bool prepare(uint32_t slot)
+{
+    return slot % HAL_NVM_SECTOR_SLOTS != 0U || hal_nvm_erase(slot);
+}
+
+/* From the slot after the newest record on, as far as the sector before that of the newest record. The sequence number
+ * advances with the place: it tells how often the sectors were erased. */
 bool store_save(uint32_t layout, const void *record, uint32_t size)
 {
-    const slot_t slot[HAL_NVM_SLOTS] = {check_slot(0), check_slot(1)};
-    const uint32_t newest_slot = newest(slot);
-    const uint32_t target = (newest_slot == 0U) ? 1U : 0U;
+    const newest_t newest = find_newest();
+    const bool first = newest.slot == HAL_NVM_SLOTS;
     header_t header = {.layout = layout, .size = size};
     if (size > STORE_RECORD_MAX) {
         return false;
     }
-    header.sequence = (newest_slot == HAL_NVM_SLOTS) ? 0U : slot[newest_slot].header.sequence + 1U;
-    header.crc = ~crc32_update(header_crc(&header), record, size);
-    return hal_nvm_erase(target) && program_record(target, record, size) &&
-           hal_nvm_program(target, 0, &header, STORE_HEADER_SIZE) && check_slot(target).state == SLOT_INTACT;
+    uint32_t attempts = 0;
+    for (uint32_t k = 0; k < HAL_NVM_SLOTS - HAL_NVM_SECTOR_SLOTS && attempts < ATTEMPTS; k++) {
+        const uint32_t slot = first ? k : (newest.slot + 1U + k) % HAL_NVM_SLOTS;
+        header.sequence = first ? k : newest.header.sequence + 1U + k;
+        header.crc = ~crc32_update(header_crc(&header), record, size);
+        if (is_free(slot)) {
+            if (prepare(slot) && write_slot(slot, &header, record)) {
+                return true;
+            }
+            attempts++;
+        }
+    }
+    return false;
+}
+
+uint32_t store_erase_cycles(void)
+{
+    const newest_t newest = find_newest();
+    return (newest.slot == HAL_NVM_SLOTS) ? 0U : newest.header.sequence / HAL_NVM_SLOTS + 1U;
 }

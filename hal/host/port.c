@@ -168,6 +168,15 @@ reset_cause_t hal_system_reset_cause(void)
     return RESET_POWER_ON;
 }
 
+bool hal_nvm_begin(void)
+{
+    return true;
+}
+
+void hal_nvm_end(void)
+{
+}
+
 bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
 {
     return nvm_host_read(&active->nvm, slot, offset, data, size);

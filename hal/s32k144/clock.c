@@ -10,7 +10,21 @@
 #define SOURCE_SPLL 6U
 #define HSRUN 3U
 #define STATUS_HSRUN 0x80U
+#define RUN 0U
+#define STATUS_RUN 0x01U
 #define PCS_SPLLDIV2 6U
+
+void clock_fast(void)
+{
+    SMC->PMCTRL = SMC_PMCTRL_RUNM(HSRUN);
+    await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_HSRUN);
+}
+
+void clock_slow(void)
+{
+    SMC->PMCTRL = SMC_PMCTRL_RUNM(RUN);
+    await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_RUN);
+}
 
 static void start_oscillator(void)
 {
@@ -41,8 +55,7 @@ static void enter_high_speed(void)
 {
     SCG->HCCR = SCG_HCCR_SCS(SOURCE_SPLL) | SCG_HCCR_DIVCORE(0) | SCG_HCCR_DIVBUS(1) | SCG_HCCR_DIVSLOW(3);
     SMC->PMPROT = SMC_PMPROT_AHSRUN;
-    SMC->PMCTRL = SMC_PMCTRL_RUNM(HSRUN);
-    await(&SMC->PMSTAT, SMC_PMSTAT_PMSTAT_MASK, STATUS_HSRUN);
+    clock_fast();
 }
 
 /* The loss of a clock resets the processor: the outputs become inputs, and pull-downs at the gate drivers keep the

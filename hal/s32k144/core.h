@@ -30,8 +30,10 @@ extern nvic_t fake_nvic;
 #endif
 #define SCB_VTOR (*(volatile uint32_t *)0xE000ED08U)
 #define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU)
+#define SCB_CCR (*(volatile uint32_t *)0xE000ED14U)
 #define SCB_CPACR (*(volatile uint32_t *)0xE000ED88U)
 #define AIRCR_RESET 0x05FA0004U /* key, SYSRESETREQ */
+#define CCR_BFHFNMIGN 0x100U    /* at the priority of FAULTMASK a bus fault of a data access is ignored */
 #define CPACR_FPU 0x00F00000U   /* CP10 and CP11, full access */
 
 #define IRQ_MRAI 69U /* FlexIO's, which has no clock here: only software pends it */

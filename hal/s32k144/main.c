@@ -9,6 +9,7 @@
 #include "hal/s32k144/clock.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/image.h"
+#include "hal/s32k144/nvm.h"
 #include "hal/s32k144/pins.h"
 #include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
@@ -16,6 +17,7 @@
 #include "hal/s32k144/startup.h"
 #include "hal/s32k144/tick.h"
 #include "hal/watchdog.h"
+#include "storage/memory.h"
 
 #define STACK_RESERVE 256U /* bytes at the end of the stack that must stay unused */
 #define PERIPHERAL_PER_CORE (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ)
@@ -24,7 +26,8 @@
 __asm__(".global commanded_directly\n.set commanded_directly, 1"); /* for tools; takes no memory */
 #endif
 
-ecu_t ecu; /* calibration tools find it by this name */
+ecu_t ecu;       /* calibration tools find it by this name */
+memory_t memory; /* debuggers find it by this name */
 /* For a counter that never runs, and the 1 kHz of the task. */
 #define STOPPED_PERIODS 10U
 static const pwm_config_t stopped = {11200, 1120};
@@ -179,6 +182,8 @@ __attribute__((noinline)) int main(void)
 {
     alarms.data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
+    nvm_init();
+    memory_recall(&memory, &ecu.drive);
     pwm_config_t pwm = stopped;
     const bool drivable = !alarms.data_damaged && timing(&pwm);
     if (!drivable) {
@@ -197,5 +202,6 @@ __attribute__((noinline)) int main(void)
         if (stack_measure() < STACK_RESERVE) {
             panic();
         }
+        (void)memory_background(&memory, &ecu.drive);
     }
 }

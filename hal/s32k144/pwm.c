@@ -147,6 +147,11 @@ void pwm_start(void)
     FTM0->FMS = FTM_FMS_WPEN; /* not before: it protects CLKS, too */
 }
 
+uint32_t pwm_elapsed(void)
+{
+    return FTM0->CNT;
+}
+
 /* First and last tick of the upper switch's pulse, in the middle of the period; beyond MOD there is no match. */
 static inline void pulse(volatile uint32_t *from, volatile uint32_t *to, uint32_t duty, uint32_t period, uint32_t half)
 {

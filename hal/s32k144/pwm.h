@@ -23,6 +23,8 @@ void pwm_init(const pwm_config_t *config);
 void pwm_start(void);
 /** A falling edge of SAMPLE, and a low microsecond after it; only before pwm_start(). */
 void pwm_sample_by_hand(void);
+/** Ticks since the start of the period. */
+uint32_t pwm_elapsed(void);
 void pwm_gate_fault_isr(void);
 /** True while the fault input is active, and once after it was active. */
 bool pwm_fault_reported(void);

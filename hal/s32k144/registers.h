@@ -147,12 +147,50 @@ _Static_assert(offsetof(rcm_t, SRS) == 0x8, "SRS");
 
 typedef struct {
     volatile uint32_t LMEM_PCCCR;
+    uint8_t reserved0[0x1c];
+    volatile uint32_t PCCRMR;
 } lmem_t;
 _Static_assert(offsetof(lmem_t, LMEM_PCCCR) == 0x0, "LMEM_PCCCR");
+_Static_assert(offsetof(lmem_t, PCCRMR) == 0x20, "PCCRMR");
 #define LMEM_PCCCR_ENCACHE 0x1U
 #define LMEM_PCCCR_INVW0 0x1000000U
 #define LMEM_PCCCR_INVW1 0x4000000U
 #define LMEM_PCCCR_GO 0x80000000U
+#define LMEM_PCCRMR_R2_MASK 0xc000000U
+#define LMEM_PCCRMR_R2(x) (((uint32_t)(x) << 26) & 0xc000000U)
+
+typedef struct {
+    uint8_t reserved0[0x404];
+    volatile uint32_t OCMDR1;
+} mscm_t;
+_Static_assert(offsetof(mscm_t, OCMDR1) == 0x404, "OCMDR1");
+#define MSCM_OCMDR1_OCM1_MASK 0xf0U
+#define MSCM_OCMDR1_OCM1(x) (((uint32_t)(x) << 4) & 0xf0U)
+
+typedef struct {
+    volatile uint8_t FSTAT;
+    uint8_t reserved0[0x3];
+    volatile uint8_t FCCOB3;
+    volatile uint8_t FCCOB2;
+    volatile uint8_t FCCOB1;
+    volatile uint8_t FCCOB0;
+    volatile uint8_t FCCOB7;
+    uint8_t reserved1[0x25];
+    volatile uint8_t FERSTAT;
+} ftfc_t;
+_Static_assert(offsetof(ftfc_t, FSTAT) == 0x0, "FSTAT");
+_Static_assert(offsetof(ftfc_t, FCCOB3) == 0x4, "FCCOB3");
+_Static_assert(offsetof(ftfc_t, FCCOB2) == 0x5, "FCCOB2");
+_Static_assert(offsetof(ftfc_t, FCCOB1) == 0x6, "FCCOB1");
+_Static_assert(offsetof(ftfc_t, FCCOB0) == 0x7, "FCCOB0");
+_Static_assert(offsetof(ftfc_t, FCCOB7) == 0x8, "FCCOB7");
+_Static_assert(offsetof(ftfc_t, FERSTAT) == 0x2e, "FERSTAT");
+#define FTFC_FSTAT_MGSTAT0 0x1U
+#define FTFC_FSTAT_FPVIOL 0x10U
+#define FTFC_FSTAT_ACCERR 0x20U
+#define FTFC_FSTAT_RDCOLERR 0x40U
+#define FTFC_FSTAT_CCIF 0x80U
+#define FTFC_FERSTAT_DFDIF 0x2U
 
 typedef struct {
     volatile uint32_t CS;
@@ -550,6 +588,10 @@ extern rcm_t fake_RCM;
 #define RCM (&fake_RCM)
 extern lmem_t fake_LMEM;
 #define LMEM (&fake_LMEM)
+extern mscm_t fake_MSCM;
+#define MSCM (&fake_MSCM)
+extern ftfc_t fake_FTFC;
+#define FTFC (&fake_FTFC)
 extern wdog_t fake_WDOG;
 #define WDOG (&fake_WDOG)
 extern port_t fake_PORTA;
@@ -590,6 +632,8 @@ extern can_t fake_CAN0;
 #define PCC ((pcc_t *)0x40065000U)
 #define RCM ((rcm_t *)0x4007f000U)
 #define LMEM ((lmem_t *)0xe0082000U)
+#define MSCM ((mscm_t *)0x40001000U)
+#define FTFC ((ftfc_t *)0x40020000U)
 #define WDOG ((wdog_t *)0x40052000U)
 #define PORTA ((port_t *)0x40049000U)
 #define PORTB ((port_t *)0x4004a000U)

@@ -5,7 +5,7 @@
 
 #define FOUR_TICKS_LOOPS 32 /* at least 4 ticks of 28 MHz, which are 16 of the core */
 
-static uint32_t step_ticks;
+static uint32_t step_ticks, first_ticks; /* a step; from the start of the PWM until the first tick */
 
 static void pass_four_ticks(void)
 {
@@ -20,7 +20,8 @@ void tick_init(uint32_t period_ticks, uint32_t periods)
     LPIT0->MCR = LPIT_MCR_M_CEN;
     pass_four_ticks(); /* the timer accepts no other access before that */
     LPIT0->MIER = LPIT_MIER_TIE0;
-    LPIT0->TVAL0 = step_ticks - period_ticks + period_ticks / 4U - 1U;
+    first_ticks = step_ticks - period_ticks + period_ticks / 4U;
+    LPIT0->TVAL0 = first_ticks - 1U;
 }
 
 void tick_start(void)
@@ -34,6 +35,15 @@ void tick_continue(void)
 {
     pass_four_ticks();
     LPIT0->TVAL0 = step_ticks - 1U;
+}
+
+void tick_align(uint32_t elapsed)
+{
+    LPIT0->TCTRL0 = 0;
+    pass_four_ticks();
+    LPIT0->TVAL0 = step_ticks + first_ticks - elapsed - 1U;
+    tick_start();
+    tick_continue();
 }
 
 void tick_cleared(void)

@@ -84,11 +84,21 @@ uint32_t emu_resets(const emu_t *emu)
 
 bool emu_read(const emu_t *emu, uint32_t address, void *to, uint32_t size)
 {
+    const uint8_t *cells = data_flash_at((emu_t *)(uintptr_t)emu, address, size);
+    if (cells != NULL) {
+        memcpy(to, cells, size);
+        return true;
+    }
     return uc_mem_read(emu->uc, address, to, size) == UC_ERR_OK;
 }
 
 bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size)
 {
+    uint8_t *cells = data_flash_at(emu, address, size);
+    if (cells != NULL) {
+        memcpy(cells, from, size);
+        return true;
+    }
     return uc_mem_write(emu->uc, address, from, size) == UC_ERR_OK;
 }
 
@@ -213,6 +223,7 @@ emu_snapshot_t *emu_save(emu_t *emu)
     if (snapshot != NULL && uc_context_alloc(emu->uc, &snapshot->context) == UC_ERR_OK) {
         (void)uc_context_save(emu->uc, snapshot->context);
         snapshot->state = emu->s;
+        snapshot->flash = emu->flash;
         (void)uc_mem_read(emu->uc, RAM_BASE, snapshot->ram, RAM_SIZE);
     }
     return snapshot;
@@ -223,6 +234,7 @@ void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot)
     (void)uc_context_restore(emu->uc, snapshot->context);
     (void)uc_mem_write(emu->uc, RAM_BASE, snapshot->ram, RAM_SIZE);
     emu->s = snapshot->state;
+    emu->flash = snapshot->flash;
     emu->error[0] = '\0';
 }
 

@@ -42,6 +42,8 @@ const peripheral_t peripherals[] = {
     {"PTD",    ON(gpio),   0,     3, false},
     {"PTE",    ON(gpio),   0,     4, false},
     {"LMEM",   ON(lmem),   0,     0, false},
+    {"FTFC",   ON(ftfc),   0x80,  0, false},
+    {"MSCM",   ON(mscm),   0,     0, false},
 };
 /* clang-format on */
 const int peripherals_count = (int)(sizeof peripherals / sizeof peripherals[0]);

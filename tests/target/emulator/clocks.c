@@ -50,6 +50,7 @@ enum {
 #define ENABLED 1U
 #define VALID (1U << 24)
 #define CGC (1U << 30)
+#define INVALIDATE_ALL 0x85000000U /* GO, INVW0, INVW1 */
 
 static uint32_t control_of(int source)
 {
@@ -106,6 +107,11 @@ uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset)
 static bool high_speed(const emu_t *emu)
 {
     return (bus_get(emu, bus_find("SMC"), PMCTRL) >> 5 & 3U) == 3U;
+}
+
+bool clocks_high_speed(const emu_t *emu)
+{
+    return high_speed(emu);
 }
 
 static uint32_t selected(const emu_t *emu)
@@ -293,7 +299,7 @@ void sim_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
 /* The cache: a command completes at once; hits and misses are not modelled. */
 bool lmem_models(uint32_t offset)
 {
-    return offset == 0U;
+    return offset == 0U || offset == DATA_FLASH_PCCRMR;
 }
 
 uint32_t lmem_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
@@ -305,5 +311,27 @@ uint32_t lmem_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
 void lmem_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)old;
-    bus_put(emu, self, offset, value & 0x7FFFFFFFU);
+    if (offset == 0U) {
+        bus_put(emu, self, offset, value & 0x7FFFFFFFU);
+    }
+    if (offset == 0U && (value & INVALIDATE_ALL) == INVALIDATE_ALL) {
+        data_flash_uncached(emu);
+    }
+}
+
+/* Control of the memories: only the speculation of the data flash. */
+bool mscm_models(uint32_t offset)
+{
+    return offset == 0x404U;
+}
+
+uint32_t mscm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
+{
+    (void)emu, (void)self, (void)offset;
+    return stored;
+}
+
+void mscm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
+{
+    (void)emu, (void)self, (void)offset, (void)old, (void)value;
 }

@@ -60,9 +60,40 @@ void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due)
     }
 }
 
+static uint64_t stretched(uint64_t instant, uint64_t now, uint32_t before, uint32_t after)
+{
+    const uint64_t distance = (instant > now ? instant - now : now - instant) * after / before;
+    return instant > now ? now + distance : now - distance;
+}
+
+static void stretch(uint64_t *instant, uint64_t now, uint32_t before, uint32_t after)
+{
+    if (*instant != NEVER && *instant != 0U) {
+        *instant = stretched(*instant, now, before, after);
+    }
+}
+
+/* What counts the core's clock keeps its count. */
 void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle)
 {
-    emu->s.core_ticks = ticks_per_cycle;
+    static const timer_t_ counted[] = {TIMER_FTM0, TIMER_FTM2, TIMER_PDB0, TIMER_PDB1, TIMER_FAULT, TIMER_SYSTICK};
+    state_t *s = &emu->s;
+    const uint32_t before = s->core_ticks;
+    s->core_ticks = ticks_per_cycle;
+    if (before == 0U || before == ticks_per_cycle) {
+        return;
+    }
+    for (size_t i = 0; i < sizeof counted / sizeof counted[0]; i++) {
+        stretch(&s->due[counted[i]], s->now, before, ticks_per_cycle);
+    }
+    for (int i = 0; i < 2; i++) {
+        stretch(&s->ftm[i].start, s->now, before, ticks_per_cycle);
+        stretch(&s->pdb[i].start, s->now, before, ticks_per_cycle);
+        for (int k = 0; k < 8; k++) {
+            stretch(&s->pdb[i].due[k], s->now, before, ticks_per_cycle);
+        }
+    }
+    s->stop = true; /* the next event is due at another time */
 }
 
 uint64_t emu_instant(const emu_t *emu)
@@ -99,6 +130,8 @@ static void timer_fire(emu_t *emu)
         wdog_fire(emu);
     } else if (i == TIMER_CAN) {
         can_fire(emu);
+    } else if (i == TIMER_FTFC) {
+        ftfc_fire(emu);
     } else {
         systick_fire(emu);
     }
@@ -285,6 +318,9 @@ void emu_reset(emu_t *emu, uint32_t cause)
 {
     state_t *s = &emu->s;
     const state_t old = *s;
+    if (old.core_ticks != 0U) {
+        ftfc_abort(emu);
+    }
     memset(s, 0, sizeof *s);
     s->now = old.now;
     s->instructions = old.instructions;
@@ -300,6 +336,8 @@ void emu_reset(emu_t *emu, uint32_t cause)
     rdc_power_on(emu);
     pdb_reset(emu);
     bus_reset(emu);
+    data_flash_uncached(emu);
+    ftfc_reset(emu);
     nvic_reset(emu);
     wdog_restart(emu);
     uint32_t vector[2] = {0, 0}, zero = 0;
@@ -312,6 +350,18 @@ void emu_reset(emu_t *emu, uint32_t cause)
     s->pc = vector[1] & ~1U;
 }
 
+/* What the RAM holds after the supply has returned is not known. */
+void emu_power_cycle(emu_t *emu)
+{
+    uint8_t lost[256];
+    memset(lost, 0xA5, sizeof lost);
+    emu_reset(emu, 0);
+    for (uint32_t at = 0; at < RAM_SIZE; at += sizeof lost) {
+        (void)uc_mem_write(emu->uc, RAM_BASE + at, lost, sizeof lost);
+    }
+    emu->error[0] = '\0';
+}
+
 /* ---- creation ---- */
 
 static bool maps_create(emu_t *emu)
@@ -322,11 +372,15 @@ static bool maps_create(emu_t *emu)
     const int kind = emu->mode == EMU_COUNTING ? UC_HOOK_CODE : UC_HOOK_BLOCK;
     return uc_mem_map(uc, 0, FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC) == UC_ERR_OK &&
            uc_mem_map(uc, RAM_BASE, RAM_SIZE, UC_PROT_ALL) == UC_ERR_OK &&
+           uc_mmio_map(uc, DATA_FLASH_BASE, DATA_FLASH_SIZE, data_flash_read, emu, data_flash_write, emu) ==
+               UC_ERR_OK &&
            uc_mmio_map(uc, MMIO_BASE, MMIO_SIZE, bus_read, emu, bus_write, emu) == UC_ERR_OK &&
            uc_mmio_map(uc, PPB_BASE, PPB_SIZE, scs_read, emu, scs_write, emu) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, kind, code, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_INTR, (void *)on_exception, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_unmapped, emu, 1, 0) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, DATA_FLASH_BASE,
+                       DATA_FLASH_BASE + DATA_FLASH_SIZE - 1) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, MMIO_BASE,
                        MMIO_BASE + MMIO_SIZE - 1) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, PPB_BASE,
@@ -373,6 +427,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
         emu_destroy(emu);
         return NULL;
     }
+    data_flash_create(emu);
     emu_reset(emu, 0);
     return emu;
 }

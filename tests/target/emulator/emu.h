@@ -108,6 +108,16 @@ typedef struct {
 EMU_API emu_counts_t emu_counts(const emu_t *emu, int vector);
 EMU_API void emu_counts_clear(emu_t *emu);
 
+/** The supply fails and returns: RAM is lost, a command of the flash controller is left half done. */
+EMU_API void emu_power_cycle(emu_t *emu);
+/** Data flash: commands take the data sheet's longest time instead of its typical one; a sector's erase fails; the seed
+ * of what a cut command leaves; completed or cut erases of a sector; the phrase at this address cannot be relied on. */
+EMU_API void emu_flash_slow(emu_t *emu, bool slow);
+EMU_API void emu_flash_worn(emu_t *emu, uint32_t sector, bool worn);
+EMU_API void emu_flash_random(emu_t *emu, uint32_t seed);
+EMU_API uint32_t emu_flash_erases(const emu_t *emu, uint32_t sector);
+EMU_API void emu_flash_spoil(emu_t *emu, uint32_t address);
+
 /** A snapshot of everything but the program. */
 typedef struct emu_snapshot emu_snapshot_t;
 EMU_API emu_snapshot_t *emu_save(emu_t *emu);

@@ -23,6 +23,12 @@ enum {
     RAM_BASE = 0x1FFF8000,
     RAM_SIZE = 0xF000,
     FLASH_SIZE = 0x80000,
+    DATA_FLASH_SIZE = 0x10000,
+    DATA_FLASH_SECTOR = 0x800,
+    DATA_FLASH_SECTORS = DATA_FLASH_SIZE / DATA_FLASH_SECTOR,
+    DATA_FLASH_PHRASE = 8,
+    DATA_FLASH_BASE = 0x10000000,
+    DATA_FLASH_PCCRMR = 0x20, /* of LMEM: caching by region */
 };
 #define NEVER UINT64_MAX
 
@@ -41,6 +47,7 @@ typedef enum {
     TIMER_WDOG,
     TIMER_CAN,
     TIMER_SYSTICK,
+    TIMER_FTFC,
     TIMERS
 } timer_t_;
 
@@ -117,6 +124,12 @@ typedef struct {
 } wdog_t;
 
 typedef struct {
+    uint8_t code, data[DATA_FLASH_PHRASE];
+    uint32_t address;
+    uint64_t start, end;
+} ftfc_t;
+
+typedef struct {
     uint64_t now, limit, due[TIMERS];
     uint64_t event; /* when the event that is being handled was due, NEVER: there is none */
     uint64_t instructions, break_at;
@@ -129,6 +142,7 @@ typedef struct {
     spi_t spi[3];
     rdc_t rdc;
     wdog_t wdog;
+    ftfc_t ftfc;
     uint64_t lpit_ready; /* from then on the registers of LPIT0 may be written */
     uint32_t core_ticks; /* per core cycle */
     uint32_t pc, resets, reset_cause;
@@ -138,6 +152,17 @@ typedef struct {
     emu_pins_t pins;
     uint64_t pins_set_at;
 } state_t;
+
+/* ---- part of a snapshot, kept over a reset ---- */
+typedef struct {
+    uint8_t cell[DATA_FLASH_SIZE];
+    bool uncertain[DATA_FLASH_SIZE / DATA_FLASH_PHRASE];          /* left half done, or programmed twice */
+    bool held[DATA_FLASH_SIZE / 16], stale[DATA_FLASH_SIZE / 16]; /* lines of a cache; stale: the cells have changed */
+    uint32_t erases[DATA_FLASH_SECTORS];
+    bool worn[DATA_FLASH_SECTORS]; /* an erase fails its verification */
+    bool slow;                     /* commands take as long as the data sheet allows */
+    uint32_t random;
+} data_flash_t;
 
 /* ---- not part of a snapshot ---- */
 typedef struct peripheral peripheral_t;
@@ -177,12 +202,14 @@ struct emu {
     emu_counts_t counts[VECTORS];
     profile_t *profile; /* NULL: not requested */
     char error[ERROR_SIZE];
+    data_flash_t flash;
     state_t s;
 };
 
 struct emu_snapshot {
     uc_context *context;
     state_t state;
+    data_flash_t flash;
     uint8_t ram[RAM_SIZE];
 };
 
@@ -245,6 +272,19 @@ void pdb_reset(emu_t *emu);
 void wdog_restart(emu_t *emu);
 void lpit_fire(emu_t *emu, int channel);
 void wdog_fire(emu_t *emu);
+void ftfc_fire(emu_t *emu);
+void ftfc_reset(emu_t *emu);
+void ftfc_abort(emu_t *emu);
+bool ftfc_is_busy(const emu_t *emu);
+void ftfc_double_bit_fault(emu_t *emu);
+
+/* data_flash.c */
+void data_flash_create(emu_t *emu);
+uint8_t *data_flash_at(emu_t *emu, uint32_t address, uint32_t size);
+void data_flash_uncached(emu_t *emu);
+uint64_t data_flash_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
+void data_flash_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
+bool clocks_high_speed(const emu_t *emu);
 void can_fire(emu_t *emu);
 void trgmux_event(emu_t *emu, uint32_t source);
 /** Stops the emulation unless every pin of the peripheral is multiplexed to it. */
@@ -278,5 +318,7 @@ MODEL(port);
 MODEL(gpio);
 MODEL(trgmux);
 MODEL(lmem);
+MODEL(ftfc);
+MODEL(mscm);
 
 #endif

@@ -116,6 +116,28 @@ static const char *failure(const void *self)
     return emu_error(((const emulated_t *)self)->emu);
 }
 
+/* ---- start ---- */
+
+/* Runs from reset until the PWM starts. */
+static const char *boot(emulated_t *e)
+{
+    const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));
+    if (stopped == EMU_FAILED) {
+        return emu_error(e->emu);
+    }
+    if (stopped != EMU_CENTRE) {
+        return "the image does not start its PWM";
+    }
+    return mirror_same_motor(&e->mirror) ? NULL : "the image was built for another motor than this library";
+}
+
+/* The supply of the processor fails and returns; the machine is not affected. */
+static bool power_cycle(emulated_t *e)
+{
+    emu_power_cycle(e->emu);
+    return e->shadow == NULL && boot(e) == NULL;
+}
+
 /* ---- names ---- */
 
 static int pin_set(emulated_t *e, const char *name, double value)
@@ -125,6 +147,9 @@ static int pin_set(emulated_t *e, const char *name, double value)
     bool *pin = strcmp(name, "emulator.gate_fault") == 0       ? &pins->gate_fault
                 : strcmp(name, "emulator.resolver_fault") == 0 ? &pins->resolver_fault
                                                                : NULL;
+    if (strcmp(name, "emulator.power_cycle") == 0) {
+        return value == 1.0 && power_cycle(e) ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
     if (strcmp(name, "emulator.shadow") == 0) {
         return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
     }
@@ -207,24 +232,6 @@ static void destroy(void *self)
     free(e);
 }
 
-/* Runs from reset until the PWM starts, with the shaft at angle zero and no current. */
-static const char *boot(emulated_t *e)
-{
-    const double at_rest[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0};
-    e->inverter_C = 40.0;
-    e->processor_C = 60.0;
-    e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
-    samples_to_pins(e, at_rest);
-    const int stopped = emu_run(e->emu, (uint64_t)(BOOT_LIMIT_S * (double)EMU_TICKS_PER_S));
-    if (stopped == EMU_FAILED) {
-        return emu_error(e->emu);
-    }
-    if (stopped != EMU_CENTRE) {
-        return "the image does not start its PWM";
-    }
-    return mirror_same_motor(&e->mirror) ? NULL : "the image was built for another motor than this library";
-}
-
 sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *error, size_t size)
 {
     emulated_t *e = calloc(1, sizeof *e);
@@ -237,8 +244,15 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         free(e);
         return NULL;
     }
+    e->inverter_C = 40.0;
+    e->processor_C = 60.0;
+    e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
     const char *bad = mirror_open(&e->mirror, e->emu, layout);
-    bad = bad != NULL ? bad : boot(e);
+    const double at_rest[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0}; /* the shaft at angle zero, no current */
+    if (bad == NULL) {
+        samples_to_pins(e, at_rest);
+        bad = boot(e);
+    }
     if (bad != NULL) {
         (void)snprintf(error, size, "%s: %s", elf, bad);
         destroy(e);

@@ -8,6 +8,7 @@
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
  *   emulator.inverter_C, emulator.processor_C    temperatures of the second thermistor and of the sensor on the die
  *   emulator.board         set 1: the image's outputs control contactor, precharge, discharge and gate-driver supply
+ *   emulator.power_cycle   set 1: the processor's supply fails and returns, the machine is not affected
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md
  * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation

@@ -91,8 +91,14 @@ def test_no_interrupt_of_the_control_uses_floating_point(elf: Path, handler: str
 
 def test_reserved_memory_keeps_its_sectors(elf: Path) -> None:
     symbols = image.Image(elf).symbols
-    assert symbols["nvm_start"] % 2048 == 0
-    assert symbols["nvm_end"] - symbols["nvm_start"] == 2 * 2048
+    assert symbols["nvm_start"] == 0x1000_0000
+    assert symbols["nvm_end"] - symbols["nvm_start"] == 32 * 2048
+
+
+def test_flash_commands_are_launched_in_sram(elf: Path) -> None:
+    symbols = image.Image(elf).symbols
+    assert 0x1FFF_8000 <= symbols["run_command"] < 0x2000_7000
+    assert symbols["data_start"] <= symbols["run_command"] < symbols["data_end"]  # copied there at start-up
 
 
 def test_no_heap_function_is_linked(elf: Path) -> None:

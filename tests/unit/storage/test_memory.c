@@ -9,7 +9,8 @@
 
 static uint8_t flash[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int erases;
-static bool broken;
+static bool broken, unwritable;
+static int open; /* begin() without end() */
 static drive_t drive;
 static memory_t memory;
 
@@ -20,9 +21,25 @@ static bool nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size, 
     return true;
 }
 
+static bool nvm_begin(int calls)
+{
+    (void)calls;
+    TEST_ASSERT_TRUE(drive.held);
+    open += unwritable ? 0 : 1;
+    return !unwritable;
+}
+
+static void nvm_end(int calls)
+{
+    (void)calls;
+    TEST_ASSERT_TRUE(drive.held);
+    open--;
+}
+
 static bool nvm_erase(uint32_t slot, int calls)
 {
     (void)calls;
+    TEST_ASSERT_EQUAL_INT(1, open);
     erases++;
     memset(flash[slot], 0xFF, sizeof flash[slot]);
     return !broken;
@@ -31,6 +48,7 @@ static bool nvm_erase(uint32_t slot, int calls)
 static bool nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size, int calls)
 {
     (void)calls;
+    TEST_ASSERT_EQUAL_INT(1, open);
     memcpy(&flash[slot][offset], data, size);
     return true;
 }
@@ -49,12 +67,14 @@ static int32_t dead_time(const motor_parameters_t *p)
 
 void setUp(void)
 {
+    hal_nvm_begin_Stub(nvm_begin);
+    hal_nvm_end_Stub(nvm_end);
     hal_nvm_read_Stub(nvm_read);
     hal_nvm_erase_Stub(nvm_erase);
     hal_nvm_program_Stub(nvm_program);
     memset(flash, 0xFF, sizeof flash);
-    erases = 0;
-    broken = false;
+    erases = open = 0;
+    broken = unwritable = false;
     power_on(&motor);
 }
 
@@ -181,6 +201,53 @@ void test_a_drive_with_a_fault_or_a_short_circuit_is_not_at_rest(void)
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     command_box_write(&drive.commands, (command_t){.safe = SAFE_FREEWHEEL});
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1000));
+}
+
+void test_a_turning_rotor_is_not_at_rest(void)
+{
+    identify();
+    for (int k = 0; k < 2; k++) {
+        drive.samples.slot[0].point.omega = Q31(k == 0 ? 0.003 : -0.003);
+        drive.samples.slot[1] = drive.samples.slot[0];
+        TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    }
+    drive.samples.slot[0].point.omega = drive.samples.slot[1].point.omega = Q31(0.001);
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1000));
+}
+
+void test_a_request_to_enable_switching_waits_only_while_the_record_is_written(void)
+{
+    identify();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - MEMORY_HOLD_STEPS - 1U));
+    TEST_ASSERT_FALSE(drive.held);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1));
+    TEST_ASSERT_TRUE(drive.held);
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_HOLD_STEPS));
+    TEST_ASSERT_FALSE(drive.held);
+    TEST_ASSERT_EQUAL_INT(0, open);
+}
+
+/* The drive was enabled by a step that began before it was held. */
+void test_a_drive_that_runs_is_not_held(void)
+{
+    identify();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
+    TEST_ASSERT_TRUE(drive.held);
+    run(1);
+    TEST_ASSERT_FALSE(drive.held);
+    TEST_ASSERT_EQUAL_INT(0, erases);
+}
+
+void test_a_memory_that_cannot_be_written_now_is_tried_again(void)
+{
+    unwritable = true;
+    identify();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    TEST_ASSERT_EQUAL_UINT32(1, memory.failures);
+    TEST_ASSERT_FALSE(drive.held);
+    unwritable = false;
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_INTERVAL_MS));
+    TEST_ASSERT_EQUAL_UINT32(1, memory.erase_cycles);
 }
 
 void test_parameters_with_a_large_mismatch_are_not_kept(void)

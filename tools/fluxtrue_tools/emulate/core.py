@@ -78,6 +78,12 @@ _SIGNATURES = {
     "emu_pins": (ctypes.POINTER(Pins), [_HERE]),
     "emu_outputs": (_U32, [_HERE]),
     "emu_core_state": (None, [_HERE, _INT]),
+    "emu_power_cycle": (None, [_HERE]),
+    "emu_flash_slow": (None, [_HERE, _BOOL]),
+    "emu_flash_worn": (None, [_HERE, _U32, _BOOL]),
+    "emu_flash_random": (None, [_HERE, _U32]),
+    "emu_flash_erases": (_U32, [_HERE, _U32]),
+    "emu_flash_spoil": (None, [_HERE, _U32]),
     "emu_board_pins": (None, [_HERE, _BOOL, _BOOL]),
     "sim_emulator": (_HERE, [_HERE]),
 }
@@ -234,6 +240,30 @@ class Core:
     def core_state(self, state: State) -> None:
         """Change the state of the core; timers and peripherals continue."""
         self._library.emu_core_state(self._handle, state.value)
+
+    def power_cycle(self) -> None:
+        """Let the supply fail and return: RAM is lost, a running flash command is left half done."""
+        self._library.emu_power_cycle(self._handle)
+
+    def flash_slow(self, slow: bool) -> None:
+        """Let flash commands take the data sheet's longest times instead of its typical ones."""
+        self._library.emu_flash_slow(self._handle, slow)
+
+    def flash_worn(self, sector: int, worn: bool) -> None:
+        """Let every erase of this sector of the data flash fail."""
+        self._library.emu_flash_worn(self._handle, sector, worn)
+
+    def flash_random(self, seed: int) -> None:
+        """Choose what half done commands leave."""
+        self._library.emu_flash_random(self._handle, seed)
+
+    def flash_erases(self, sector: int) -> int:
+        """How often this sector of the data flash has been erased."""
+        return int(self._library.emu_flash_erases(self._handle, sector))
+
+    def flash_spoil(self, address: int) -> None:
+        """Make the phrase at this address one that a read cannot rely on."""
+        self._library.emu_flash_spoil(self._handle, address)
 
     def pend(self, vector: int) -> None:
         """Make an exception pending."""

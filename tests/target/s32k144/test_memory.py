@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The image remembers what it has identified: saved at key-off, recalled at key-on, whenever the supply fails."""
+
+from __future__ import annotations
+
+import os
+import random
+
+import flash_saves as flash
+import pytest
+from flash_saves import Parts
+
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.core import Core
+from fluxtrue_tools.sim.library import Loop
+
+POINTS = ((1500.0, 50.0), (2500.0, 20.0), (600.0, -40.0))
+SHORT = ((900.0, 40.0),)
+SHARES = (0.02, 0.5, 0.98)
+
+
+@pytest.fixture(scope="module")
+def parts() -> Parts:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    return build.prepare("hsm1", angle="resolver")  # an absolute angle: the shaft may stand anywhere at key-on
+
+
+@pytest.fixture(scope="module")
+def flashed(parts: Parts) -> bytes:
+    """The data flash after a drive and a stop."""
+    with flash.key_on(parts) as (loop, core):
+        flash.drive(loop, POINTS, 0.5)
+        flash.until_saving(loop, core)
+        flash.until_saved(loop, core)
+        return core.read(flash.FLASH, flash.FLASH_BYTES)
+
+
+def test_a_drive_remembers_what_it_has_identified(parts: Parts) -> None:
+    with flash.key_on(parts) as (loop, core):
+        prior = flash.identified(loop)
+        assert not flash.is_recalled(core)
+        flash.drive(loop, POINTS, 0.5)
+        assert flash.saves(core) == 0
+        flash.until_saving(loop, core)
+        flash.until_saved(loop, core)
+        assert flash.saves(core) == 1
+        (record,) = flash.records(core)
+        before = flash.identified(loop)
+        assert before["psi_f_Vs"] < 0.95 * prior["psi_f_Vs"]
+        flash.power_cycle(loop)
+        assert flash.is_recalled(core)
+        loop.run(20)  # two steps of the task
+        # While switching is disabled, only the leak changes them.
+        assert flash.identified(loop) == pytest.approx(before, rel=2e-3)
+        assert record.slot == record.sequence == 0
+        flash.drive(loop, SHORT, 0.2)  # and it drives
+
+
+def test_the_values_recalled_are_those_of_the_record(parts: Parts, flashed: bytes) -> None:
+    with flash.key_on(parts, flashed) as (_, core):
+        (record,) = flash.records(core)
+        states = flash.RECORD.pack(*flash.RECORD.unpack(record.content))[4 : 4 + 4 * flash.STATES]
+        assert states in core.read(0x1FFF_8000, 0xF000)
+
+
+def test_the_bus_image_remembers_too(flashed: bytes) -> None:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    bus = build.prepare("hsm1", angle="resolver", flashed=True)
+    with Core.of_program(bus.emulated().library, bus.image) as core:
+        core.write(flash.FLASH, flashed)
+        core.run(0.1)
+        assert flash.is_recalled(core)
+
+
+def test_switching_waits_until_the_save_is_complete(parts: Parts) -> None:
+    with flash.key_on(parts) as (loop, core):
+        core.flash_slow(True)
+        flash.drive(loop, POINTS, 0.2)
+        flash.until_saving(loop, core)
+        loop.set("enable", 1)
+        while core.register("SMC.PMCTRL") == 0:
+            loop.run(1)
+            assert core.outputs == 0
+        loop.run(100)
+        assert core.outputs == 0x3F
+        assert flash.saves(core) == 1
+        assert loop.get("fault_word") == 0
+        assert core.resets == 0
+
+
+def test_the_tick_is_where_it_was_after_a_save(parts: Parts) -> None:
+    """A quarter period after the start of a period, so that a step always has the same number of periods."""
+    with flash.key_on(parts) as (loop, core):
+
+        def phase() -> float:
+            seen: list[int] = []
+            core.on_exception(
+                lambda vector, entered: seen.append(core.load("FTM0.CNT")) if vector == 16 + 48 and entered else None
+            )
+            loop.run(100)
+            core.on_exception(lambda *_: None)
+            assert len(seen) in {9, 10, 11}
+            return max(seen)
+
+        before = phase()
+        flash.drive(loop, POINTS, 0.2)
+        flash.until_saving(loop, core)
+        flash.until_saved(loop, core)
+        loop.run(100)
+        assert phase() == pytest.approx(before, abs=600)  # ticks of 112 MHz, of 11200
+
+
+# ---- a supply that fails
+
+
+def saved_once(parts: Parts, loop: Loop, core: Core) -> None:
+    """Everything up to the point where the next save begins."""
+    flash.drive(loop, SHORT, 0.15)
+    flash.until_saving(loop, core)
+
+
+def check_cuts(loop: Loop, core: Core, shares: tuple[float, ...], dice: random.Random) -> int:
+    """Cut the save that begins now at every step, each time from the same state; then let it complete. Every other cut
+    is followed by a second one, in the save after it. Returns the number of cuts."""
+    start = core.save()
+    old = flash.records(core)[-1]
+    times = flash.instants(core, shares)
+    new = flash.records(core)[-1]
+    assert new.sequence > old.sequence
+    for k, time in enumerate(times):
+        core.restore(start)
+        core.flash_random(dice.randrange(1, 2**32))
+        flash.advance(core, time)
+        flash.power_cycle(loop)
+        assert flash.is_recalled(core), f"cut {k} at {time} s"
+        assert recalled_states(core, old, new), f"cut {k} at {time} s: neither the old record nor the new one"
+        if k % 8 == 3:
+            flash.drive(loop, SHORT, 0.15)
+            flash.until_saving(loop, core)
+            flash.advance(core, dice.random() * times[-1])
+            flash.power_cycle(loop)
+            assert flash.is_recalled(core), f"second cut after {k}"
+    core.restore(start)
+    core.free(start)
+    flash.until_saved(loop, core)
+    flash.power_cycle(loop)
+    assert recalled_states(core, new, new)
+    return len(times)
+
+
+def recalled_states(core: Core, old: flash.Record, new: flash.Record) -> bool:
+    """The filter starts with all states of one of the two records."""
+    ram = core.read(0x1FFF_8000, 0xF000)
+    return any(record.content[4 : 4 + 4 * flash.STATES] in ram for record in (old, new))
+
+
+def campaign(parts: Parts, saves: int, shares: tuple[float, ...], last: int | None) -> int:
+    dice = random.Random(1)
+    cuts = 0
+    with flash.key_on(parts) as (loop, core):
+        saved_once(parts, loop, core)
+        flash.until_saved(loop, core)
+        if last is not None:
+            flash.fill(core, last)
+        flash.power_cycle(loop)
+        for _ in range(saves):
+            saved_once(parts, loop, core)
+            cuts += check_cuts(loop, core, shares, dice)
+    return cuts
+
+
+@pytest.mark.parametrize("last", [0, flash.SLOTS - 1], ids=["blank slot", "sector to be erased"])
+def test_a_cut_at_every_step_leaves_the_old_or_the_new_record(parts: Parts, last: int) -> None:
+    assert campaign(parts, 1, SHARES, last) > 30
+
+
+@pytest.mark.skipif("FLUXTRUE_LONG" not in os.environ, reason="the long campaign: FLUXTRUE_LONG=1")
+def test_two_hundred_saves_with_cuts_at_every_step() -> None:
+    cuts = campaign(build.prepare("hsm1", angle="resolver"), 200, SHARES, None)
+    print(f"{cuts} cuts")
+    assert cuts > 200 * 30
