@@ -128,7 +128,7 @@ static const char *boot(emulated_t *e)
     if (stopped != EMU_CENTRE) {
         return "the image does not start its PWM";
     }
-    return mirror_same_motor(&e->mirror) ? NULL : "the image was built for another motor than this library";
+    return NULL;
 }
 
 /* The supply of the processor fails and returns; the machine is not affected. */
@@ -252,6 +252,9 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
     if (bad == NULL) {
         samples_to_pins(e, at_rest);
         bad = boot(e);
+    }
+    if (bad == NULL && !mirror_same_motor(&e->mirror)) {
+        bad = "the image was built for another motor than this library";
     }
     if (bad != NULL) {
         (void)snprintf(error, size, "%s: %s", elf, bad);

@@ -90,9 +90,13 @@ def cycles(instruction: Instruction) -> int:
 
 
 def image_costs(functions: Iterable[Function], size: int) -> bytes:
-    """The cycles of each half word of the flash, one byte each, for the emulator's profile."""
+    """The cycles of each half word of the flash, one byte each, for the emulator's profile, which refuses other code.
+
+    Flash commands are launched from RAM, at standstill: no profile contains them.
+    """
     costs = bytearray(size // 2)
     for function in functions:
         for instruction in function.instructions:
-            costs[instruction.address // 2] = cycles(instruction)
+            if instruction.address < size:
+                costs[instruction.address // 2] = cycles(instruction)
     return bytes(costs)
