@@ -54,7 +54,7 @@ static uint8_t min_length(uint8_t command)
 void xcp_reset(xcp_t *xcp, const xcp_config_t *config, uint32_t seed)
 {
     *xcp = (xcp_t){.ecu_page = XCP_PAGE_WORKING, .xcp_page = XCP_PAGE_WORKING, .seed_counter = seed};
-    memcpy(config->working, config->reference, config->parameters * sizeof config->working[0]);
+    (void)memcpy(config->working, config->reference, config->parameters * sizeof config->working[0]);
 }
 
 const float *xcp_active_page(const xcp_t *xcp, const xcp_config_t *config)
@@ -72,14 +72,14 @@ static const uint8_t *readable_area(const xcp_t *xcp, const xcp_config_t *config
 
 static xcp_result_t upload(xcp_t *xcp, const xcp_config_t *config, uint8_t size, uint8_t *answer, uint8_t *length)
 {
-    if (size == 0 || size > DATA_MAX) {
+    if (size == 0U || size > DATA_MAX) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     const uint8_t *from = readable_area(xcp, config, size);
     if (!from) {
         return XCP_ERR_ACCESS_DENIED;
     }
-    memcpy(&answer[1], from, size);
+    (void)memcpy(&answer[1], from, size);
     xcp->mta += size;
     *length = (uint8_t)(1 + size);
     return XCP_OK;
@@ -88,7 +88,7 @@ static xcp_result_t upload(xcp_t *xcp, const xcp_config_t *config, uint8_t size,
 static xcp_result_t download(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command)
 {
     const uint8_t size = command->data[1];
-    if (size == 0 || size > command->length - 2) {
+    if (size == 0U || size > command->length - 2) {
         return XCP_ERR_CMD_SYNTAX;
     }
     const xcp_result_t result = xcp_page_write(xcp, config, &command->data[2], size);
@@ -98,7 +98,7 @@ static xcp_result_t download(xcp_t *xcp, const xcp_config_t *config, const can_f
 
 static xcp_result_t checksum(xcp_t *xcp, const xcp_config_t *config, uint32_t size, uint8_t *answer, uint8_t *length)
 {
-    if (size == 0 || size > CHECKSUM_MAX) {
+    if (size == 0U || size > CHECKSUM_MAX) {
         xcp_put_u32(&answer[4], CHECKSUM_MAX);
         *length = 8;
         return XCP_ERR_OUT_OF_RANGE;
@@ -116,7 +116,7 @@ static xcp_result_t checksum(xcp_t *xcp, const xcp_config_t *config, uint32_t si
 
 static xcp_result_t set_pointer(xcp_t *xcp, const uint8_t *command)
 {
-    if (command[3] != 0) {
+    if (command[3] != 0U) {
         return XCP_ERR_OUT_OF_RANGE; /* one address space */
     }
     xcp->mta = xcp_get_u32(&command[4]);
@@ -158,7 +158,7 @@ static xcp_result_t memory_command(xcp_t *xcp, const xcp_config_t *config, const
 static xcp_result_t execute(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, can_frame_t *answer)
 {
     const uint8_t code = command->data[0];
-    if (min_length(code) == 0) {
+    if (min_length(code) == 0U) {
         return XCP_ERR_CMD_UNKNOWN;
     }
     if (min_length(code) > command->length) {
@@ -171,7 +171,7 @@ static xcp_result_t execute(xcp_t *xcp, const xcp_config_t *config, const can_fr
 /* Without a connection a slave is silent, except to CONNECT. */
 bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, can_frame_t *answer)
 {
-    if (command->length == 0 || command->length > XCP_PACKET_MAX ||
+    if (command->length == 0U || command->length > XCP_PACKET_MAX ||
         (!xcp->connected && command->data[0] != XCP_CONNECT)) {
         xcp->counts.ignored++;
         return false;
@@ -183,7 +183,7 @@ bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *comm
         xcp->counts.refused += (result != XCP_ERR_CMD_SYNCH) ? 1U : 0U;
         answer->data[0] = XCP_PID_ERROR;
         answer->data[1] = (uint8_t)result;
-        answer->length = (uint8_t)((answer->length > 2) ? answer->length : 2);
+        answer->length = (uint8_t)((answer->length > 2U) ? answer->length : 2);
     }
     return true;
 }

@@ -37,15 +37,15 @@ static void sample_frame(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_l
     can_frame_t *frame = next_free_frame(daq);
     *frame = (can_frame_t){.length = 1};
     frame->data[0] = (uint8_t)(list->first_odt + odt);
-    if (list->timestamp && odt == 0) {
+    if (list->timestamp && odt == 0U) {
         xcp_put_u16(&frame->data[1], daq->now_ms);
         frame->length = 1 + XCP_DAQ_TIMESTAMP;
     }
     for (uint8_t e = 0; e < o->entries; e++) {
         const xcp_entry_t *entry = &daq->entry[o->first_entry + e];
         const uint8_t *from = xcp_memory_find(memory, entry->address, entry->size);
-        if (from) {
-            memcpy(&frame->data[frame->length], from, entry->size);
+        if (from != NULL) {
+            (void)memcpy(&frame->data[frame->length], from, entry->size);
         }
         frame->length = (uint8_t)(frame->length + entry->size);
     }
@@ -65,10 +65,10 @@ static void sample_list(xcp_daq_t *daq, const xcp_memory_t *memory, const xcp_li
 
 static bool is_due(xcp_list_t *list, bool tenth)
 {
-    if (!list->running || (list->event == 1 && !tenth)) {
+    if (!list->running || (list->event == 1U && !tenth)) {
         return false;
     }
-    if (list->countdown > 0) {
+    if (list->countdown > 0U) {
         list->countdown--;
         return false;
     }
@@ -85,7 +85,7 @@ void xcp_daq_event(xcp_daq_t *daq, const xcp_memory_t *memory, uint32_t passed_m
             sample_list(daq, memory, &daq->list[k]);
         }
     }
-    if (daq->overload_pending && free_frames(daq) > 0) {
+    if (daq->overload_pending && free_frames(daq) > 0U) {
         daq->overload_pending = false;
         *next_free_frame(daq) = (can_frame_t){.length = 2, .data = {XCP_PID_EVENT, XCP_EVENT_DAQ_OVERLOAD}};
     }

@@ -13,20 +13,20 @@ enum { STOP = 0, START = 1, SELECT = 2 };
 static bool frame_complete(const xcp_daq_t *daq, const xcp_list_t *list, uint8_t odt)
 {
     const xcp_odt_t *o = &daq->odt[list->first_odt + odt];
-    uint32_t size = (list->timestamp && odt == 0) ? XCP_DAQ_TIMESTAMP : 0U;
+    uint32_t size = (list->timestamp && odt == 0U) ? XCP_DAQ_TIMESTAMP : 0U;
     for (uint8_t e = 0; e < o->entries; e++) {
         const xcp_entry_t *entry = &daq->entry[o->first_entry + e];
-        if (entry->size == 0) {
+        if (entry->size == 0U) {
             return false;
         }
         size += entry->size;
     }
-    return o->entries > 0 && size <= XCP_DAQ_PAYLOAD;
+    return o->entries > 0U && size <= XCP_DAQ_PAYLOAD;
 }
 
 static bool list_complete(const xcp_daq_t *daq, const xcp_list_t *list)
 {
-    bool complete = list->odts > 0;
+    bool complete = list->odts > 0U;
     for (uint8_t k = 0; k < list->odts; k++) {
         complete = complete && frame_complete(daq, list, k);
     }
@@ -37,7 +37,7 @@ static xcp_result_t set_mode(xcp_daq_t *daq, const uint8_t *command)
 {
     const uint16_t number = xcp_get_u16(&command[2]);
     const uint16_t event = xcp_get_u16(&command[4]);
-    if (number >= daq->lists || event >= XCP_DAQ_EVENTS || command[6] == 0) {
+    if (number >= daq->lists || event >= XCP_DAQ_EVENTS || command[6] == 0U) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     if ((command[1] & ~MODE_TIMESTAMP) != 0) {
@@ -85,17 +85,17 @@ static xcp_result_t start_stop_list(xcp_daq_t *daq, const uint8_t *command, uint
 
 static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
 {
-    if (mode > 2) {
+    if (mode > 2U) {
         return XCP_ERR_MODE_NOT_VALID;
     }
     for (uint8_t k = 0; k < daq->lists; k++) { /* a list may have changed since it was selected; start all or none */
-        if (mode == 1 && daq->list[k].selected && !list_complete(daq, &daq->list[k])) {
+        if (mode == 1U && daq->list[k].selected && !list_complete(daq, &daq->list[k])) {
             return XCP_ERR_DAQ_CONFIG;
         }
     }
     for (uint8_t k = 0; k < daq->lists; k++) {
-        if (mode == 0 || daq->list[k].selected) {
-            run(&daq->list[k], mode == 1);
+        if (mode == 0U || daq->list[k].selected) {
+            run(&daq->list[k], mode == 1U);
         }
     }
     return XCP_OK;
@@ -104,10 +104,10 @@ static xcp_result_t start_stop_selected(xcp_daq_t *daq, uint8_t mode)
 /* A step of 1 ms is reported in the unit 1 ms, any other in the unit 10 us. */
 static void describe_event(const xcp_daq_t *daq, uint16_t event, uint8_t *answer)
 {
-    const bool whole = event != 0 || daq->step_10us == STEP_1MS;
+    const bool whole = event != 0U || daq->step_10us == STEP_1MS;
     answer[1] = 0x04; /* measurement */
     answer[2] = XCP_DAQ_LISTS;
-    answer[4] = (event != 0) ? XCP_DAQ_TENTH : whole ? 1 : daq->step_10us;
+    answer[4] = (event != 0U) ? XCP_DAQ_TENTH : whole ? 1 : daq->step_10us;
     answer[5] = whole ? EVENT_CYCLE_UNIT_1MS : EVENT_CYCLE_UNIT_10US;
 }
 

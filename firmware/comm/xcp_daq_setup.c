@@ -24,7 +24,7 @@ static xcp_result_t allocate_odts(xcp_daq_t *daq, uint16_t list, uint8_t count)
     if (daq->stage != ALLOC_LISTS && daq->stage != ALLOC_ODTS) {
         return XCP_ERR_SEQUENCE;
     }
-    if (list >= daq->lists || daq->list[list].odts > 0) {
+    if (list >= daq->lists || daq->list[list].odts > 0U) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     if (count > XCP_DAQ_ODTS - daq->odts) {
@@ -47,7 +47,7 @@ static xcp_result_t allocate_entries(xcp_daq_t *daq, uint16_t list, uint8_t odt,
         return XCP_ERR_OUT_OF_RANGE;
     }
     xcp_odt_t *o = &daq->odt[daq->list[list].first_odt + odt];
-    if (o->entries > 0) {
+    if (o->entries > 0U) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     if (count > XCP_DAQ_PAYLOAD || count > XCP_DAQ_ENTRIES - daq->entries) {
@@ -87,7 +87,7 @@ static xcp_result_t write_entry(xcp_daq_t *daq, const xcp_memory_t *memory, cons
     if (daq->list[daq->at_list].running) { /* it may have been started since the pointer was set */
         return XCP_ERR_DAQ_ACTIVE;
     }
-    if (command[1] != 0xFF || size == 0 || size > XCP_DAQ_PAYLOAD || command[3] != 0) {
+    if (command[1] != 0xFFU || size == 0U || size > XCP_DAQ_PAYLOAD || command[3] != 0U) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     if (!xcp_memory_find(memory, address, size)) {
@@ -118,7 +118,7 @@ static xcp_result_t clear_list(xcp_daq_t *daq, uint16_t number)
     list->selected = false;
     for (uint8_t k = 0; k < list->odts; k++) {
         const xcp_odt_t *o = &daq->odt[list->first_odt + k];
-        memset(&daq->entry[o->first_entry], 0, o->entries * sizeof daq->entry[0]);
+        (void)memset(&daq->entry[o->first_entry], 0, o->entries * sizeof daq->entry[0]);
     }
     return XCP_OK;
 }

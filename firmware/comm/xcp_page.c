@@ -27,13 +27,13 @@ const uint8_t *xcp_page_read(const xcp_t *xcp, const xcp_config_t *config, uint3
 
 void xcp_page_discard(xcp_t *xcp)
 {
-    memset(xcp->arrived, 0, sizeof xcp->arrived);
+    (void)memset(xcp->arrived, 0, sizeof xcp->arrived);
 }
 
 static float waiting_value(const xcp_t *xcp, uint32_t parameter)
 {
     float value;
-    memcpy(&value, &xcp->waiting[(size_t)WORD * parameter], sizeof value);
+    (void)memcpy(&value, &xcp->waiting[(size_t)WORD * parameter], sizeof value);
     return value;
 }
 
@@ -83,14 +83,14 @@ xcp_result_t xcp_page_write(xcp_t *xcp, const xcp_config_t *config, const uint8_
     if (result == XCP_OK) {
         store_whole(xcp, config, first, last);
     } else {
-        memset(&xcp->arrived[first], 0, last - first + 1U);
+        (void)memset(&xcp->arrived[first], 0, last - first + 1U);
     }
     return result;
 }
 
 static xcp_result_t set_page(xcp_t *xcp, uint8_t mode, uint8_t segment, uint8_t page)
 {
-    if (segment != 0 && (mode & MODE_ALL) == 0) {
+    if (segment != 0U && (mode & MODE_ALL) == 0) {
         return XCP_ERR_SEGMENT_NOT_VALID;
     }
     if (page > XCP_PAGE_WORKING) {
@@ -114,7 +114,7 @@ static xcp_result_t set_page(xcp_t *xcp, uint8_t mode, uint8_t segment, uint8_t 
 
 static xcp_result_t get_page(const xcp_t *xcp, uint8_t mode, uint8_t segment, uint8_t *answer, uint8_t *length)
 {
-    if (segment != 0) {
+    if (segment != 0U) {
         return XCP_ERR_SEGMENT_NOT_VALID;
     }
     if (mode != MODE_ECU && mode != MODE_XCP) {
@@ -128,7 +128,7 @@ static xcp_result_t get_page(const xcp_t *xcp, uint8_t mode, uint8_t segment, ui
 /* Only from flash to RAM: restores the built-in values. */
 static xcp_result_t copy_page(xcp_t *xcp, const xcp_config_t *config, const uint8_t *command)
 {
-    if (command[1] != 0 || command[3] != 0) {
+    if (command[1] != 0U || command[3] != 0U) {
         return XCP_ERR_SEGMENT_NOT_VALID;
     }
     if (command[2] != XCP_PAGE_REFERENCE || command[4] > XCP_PAGE_WORKING) {
@@ -140,7 +140,7 @@ static xcp_result_t copy_page(xcp_t *xcp, const xcp_config_t *config, const uint
     if (!xcp->unlocked) {
         return XCP_ERR_ACCESS_LOCKED;
     }
-    memcpy(config->working, config->reference, segment_size(config));
+    (void)memcpy(config->working, config->reference, segment_size(config));
     xcp_page_discard(xcp);
     xcp->generation++;
     return XCP_OK;

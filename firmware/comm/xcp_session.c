@@ -46,7 +46,7 @@ static xcp_result_t status(const xcp_t *xcp, uint8_t *answer, uint8_t *length)
 
 static xcp_result_t get_seed(xcp_t *xcp, const uint8_t *command, uint8_t *answer, uint8_t *length)
 {
-    if (command[1] != 0 || command[2] != XCP_RESOURCE_CALIBRATION) {
+    if (command[1] != 0U || command[2] != XCP_RESOURCE_CALIBRATION) {
         return XCP_ERR_OUT_OF_RANGE;
     }
     if (xcp->wrong_keys >= WRONG_KEYS_MAX) {
@@ -67,7 +67,7 @@ static xcp_result_t get_seed(xcp_t *xcp, const uint8_t *command, uint8_t *answer
 static xcp_result_t unlock(xcp_t *xcp, const xcp_config_t *config, const uint8_t *command, uint8_t *answer,
                            uint8_t *length)
 {
-    if (xcp->seed == 0) {
+    if (xcp->seed == 0U) {
         return XCP_ERR_SEQUENCE;
     }
     const bool right = command[1] == SEED_SIZE && xcp_get_u32(&command[2]) == config->key(xcp->seed);

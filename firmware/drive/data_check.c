@@ -28,7 +28,7 @@ _Static_assert(sizeof(period_data_t) % sizeof(uint32_t) == 0U, "whole words");
 static uint32_t word_at(const void *data, uint32_t n)
 {
     uint32_t word;
-    memcpy(&word, (const uint8_t *)data + n * sizeof word, sizeof word);
+    (void)memcpy(&word, (const uint8_t *)data + n * sizeof word, sizeof word);
     return word;
 }
 
@@ -37,7 +37,7 @@ _Static_assert(offsetof(request_t, trim) - offsetof(request_t, current_mode) == 
 static uint32_t options_of(const request_t *request)
 {
     uint32_t flags;
-    memcpy(&flags, (const uint8_t *)request + offsetof(request_t, current_mode), sizeof flags);
+    (void)memcpy(&flags, (const uint8_t *)request + offsetof(request_t, current_mode), sizeof flags);
     return flags ^ (uint32_t)request->identification_mode;
 }
 
@@ -59,7 +59,7 @@ void data_check_start(drive_t *drive)
     data_check->motor_complement = ~(uintptr_t)drive->motor;
     for (uint32_t n = 0; n < WORDS; n++) {
         const uint32_t complement = ~word_at((const uint8_t *)drive + LIVE, n);
-        memcpy((uint8_t *)drive + COMPLEMENTS + n * sizeof complement, &complement, sizeof complement);
+        (void)memcpy((uint8_t *)drive + COMPLEMENTS + n * sizeof complement, &complement, sizeof complement);
     }
 }
 

@@ -166,7 +166,7 @@ static void check_samples(drive_t *drive, const sample_t *sample, bool run)
     if ((faults & FAULT_ANGLE) != 0U) {
         drive->fast.angle_tracker.samples = 0; /* what it predicts has long been contradicted: it starts again */
     }
-    if (faults != 0) {
+    if (faults != 0U) {
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
     }
 }
@@ -189,7 +189,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
     const bool turning = turning_control_used(&drive->motor->turning_control);
     check_samples(drive, sample, command->run);
     const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
-    if (command->run && fast->faults == 0) {
+    if (command->run && fast->faults == 0U) {
         if (turning) {
             write_duties(drive, sample, &now, control_turning(drive, sample, &now, &command->target));
         } else {
@@ -204,7 +204,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
         }
         apply_safe_state(drive, sample, command->safe);
     }
-    fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0;
+    fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
     publish_sample(drive, sample);
 }
 

@@ -3,8 +3,8 @@
 
 #include "hal/pwm.h"
 
-#define DUTY_MIDDLE 16384
-#define DUTY_UPPER 32768
+#define DUTY_MIDDLE 16384U
+#define DUTY_UPPER 32768U
 
 void short_circuit_apply(fast_state_t *fast)
 {

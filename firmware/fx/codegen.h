@@ -76,9 +76,9 @@ static inline fx_two_words_t fx_load_two_words(const int32_t *from)
 static inline fx_two_words_t fx_read_two(const volatile uint32_t *from)
 {
 #ifdef __ARM_FEATURE_DSP
-    typedef uint64_t double_word_t __attribute__((may_alias, aligned(4)));
+    typedef uint64_t register_pair_t __attribute__((may_alias, aligned(4)));
     fx_two_words_t y;
-    __asm__ volatile("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const volatile double_word_t *)from));
+    __asm__ volatile("ldrd %0, %1, %2" : "=r"(y.first), "=r"(y.second) : "Uv"(*(const volatile register_pair_t *)from));
     return y;
 #else
     const int32_t first = (int32_t)from[0];

@@ -94,7 +94,7 @@ static inline fx_pair_t fx_weights(uint32_t weight)
 static inline fx_pair_t fx_load_pair(const int16_t *z)
 {
     fx_pair_t pair;
-    memcpy(&pair, z, sizeof pair);
+    (void)memcpy(&pair, z, sizeof pair);
     return pair;
 }
 

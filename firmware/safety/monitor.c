@@ -24,7 +24,7 @@ static uint32_t count_angle_jumps(const monitor_config_t *config, monitor_state_
 
 static uint8_t pending(const monitor_state_t *state, bool jumped)
 {
-    const bool counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0;
+    const bool counting = (state->over_voltage | state->under_voltage | state->current_sum | state->angle) != 0U;
     return (uint8_t)((counting ? MONITOR_COUNTING : 0) | (jumped ? MONITOR_ANGLE_LOST : 0));
 }
 

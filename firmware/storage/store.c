@@ -11,7 +11,7 @@ typedef struct {
     uint32_t layout, size, sequence, crc; /* crc over the three words before it, then the record */
 } header_t;
 
-_Static_assert(sizeof(header_t) == STORE_HEADER_SIZE && STORE_HEADER_SIZE % HAL_NVM_UNIT == 0, "whole flash units");
+_Static_assert(sizeof(header_t) == STORE_HEADER_SIZE && STORE_HEADER_SIZE % HAL_NVM_UNIT == 0U, "whole flash units");
 _Static_assert(HAL_NVM_SLOTS % HAL_NVM_SECTOR_SLOTS == 0U && HAL_NVM_SLOTS >= 2U * HAL_NVM_SECTOR_SLOTS,
                "while a sector is erased, another one holds the newest record");
 

@@ -28,7 +28,7 @@ static angle_t result(uint32_t theta_e, int32_t step, int32_t omega_q30, bool ju
  * */
 static void start(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e)
 {
-    const int32_t advance = (state->samples == 1) ? (int32_t)(theta_e - state->predicted) : 0;
+    const int32_t advance = (state->samples == 1U) ? (int32_t)(theta_e - state->predicted) : 0;
     state->omega_q30 = fx_mul_gain_q31(config->turn_to_pu, advance) >> 1;
     state->predicted = theta_e + (uint32_t)advance_at(config, state->omega_q30);
     state->samples++;
@@ -54,7 +54,7 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
 __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state,
                                                  uint32_t theta_m)
 {
-    if (state->samples >= 2) {
+    if (state->samples >= 2U) {
         angle_t angle = angle_tracker_follow(config, state, theta_m);
         const uint32_t step = (uint32_t)angle.step << config->turn_shift;
         state->predicted += step - (uint32_t)angle.step;

@@ -10,7 +10,7 @@ __attribute__((cold)) motor_check_t flux_table_check(const flux_table_config_t *
     if (!config->l_d || !config->l_q || !config->l_qq || !config->g || !config->psi_f0) {
         return MOTOR_CHECK_FLUX_TABLE_MISSING;
     }
-    if (!fx_mesh_valid(&config->mesh) || config->l_shift > 13 || config->i_scale != 8 << config->l_shift) {
+    if (!fx_mesh_valid(&config->mesh) || config->l_shift > 13U || config->i_scale != 8 << config->l_shift) {
         return MOTOR_CHECK_FLUX_TABLE_GRID;
     }
     const size_t nodes = (size_t)((config->mesh.x_last >> 14) + 2U) * config->mesh.ny;

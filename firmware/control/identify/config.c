@@ -15,7 +15,7 @@ static motor_check_t priors_check(const identify_config_t *c)
 
 motor_check_t identify_check(const identify_config_t *c)
 {
-    if (c->l_shift > 14 || c->mean_gain_q32 <= 0 || c->rate_gain_q28 <= 0 || c->window_turns_q29 == 0U ||
+    if (c->l_shift > 14U || c->mean_gain_q32 <= 0 || c->rate_gain_q28 <= 0 || c->window_turns_q29 == 0U ||
         c->turn_to_pu <= 0) {
         return MOTOR_CHECK_IDENTIFY_WINDOW;
     }
