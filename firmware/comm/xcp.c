@@ -81,7 +81,7 @@ static xcp_result_t upload(xcp_t *xcp, const xcp_config_t *config, uint8_t size,
     }
     (void)memcpy(&answer[1], from, size);
     xcp->mta += size;
-    *length = (uint8_t)(1 + size);
+    *length = (uint8_t)(1U + size);
     return XCP_OK;
 }
 
@@ -183,7 +183,7 @@ bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *comm
         xcp->counts.refused += (result != XCP_ERR_CMD_SYNCH) ? 1U : 0U;
         answer->data[0] = XCP_PID_ERROR;
         answer->data[1] = (uint8_t)result;
-        answer->length = (uint8_t)((answer->length > 2U) ? answer->length : 2);
+        answer->length = (uint8_t)((answer->length > 2U) ? answer->length : 2U);
     }
     return true;
 }

@@ -72,7 +72,7 @@ static bool is_due(xcp_list_t *list, bool tenth)
         list->countdown--;
         return false;
     }
-    list->countdown = (uint8_t)(list->prescaler - 1);
+    list->countdown = (uint8_t)(list->prescaler - 1U);
     return true;
 }
 

@@ -6,6 +6,7 @@
  * Units    32-bit addresses; on a host they fit because the program is linked at a fixed address
  * Errors   NULL: the range does not lie inside one area
  * Context  1 kHz task */
+#include <stddef.h>
 #include <stdint.h>
 
 typedef struct {
@@ -34,7 +35,7 @@ static inline const uint8_t *xcp_memory_find(const xcp_memory_t *memory, uint32_
             return (const uint8_t *)area->start + offset;
         }
     }
-    return (const uint8_t *)0;
+    return NULL;
 }
 
 #endif
