@@ -336,7 +336,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
     rdc_power_on(emu);
     pdb_reset(emu);
     bus_reset(emu);
-    data_flash_uncached(emu);
+    data_flash_reset(emu);
     ftfc_reset(emu);
     nvic_reset(emu);
     wdog_restart(emu);

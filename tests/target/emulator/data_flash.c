@@ -36,7 +36,7 @@ uint64_t data_flash_duration(const emu_t *emu, bool erase)
 static void changed(emu_t *emu, uint32_t address, uint32_t size)
 {
     for (uint32_t line = address / CACHE_LINE; line <= (address + size - 1U) / CACHE_LINE; line++) {
-        emu->flash.stale[line] = emu->flash.held[line];
+        emu->flash.stale[line] = emu->flash.held[line] || emu->flash.speculated[line];
     }
 }
 
@@ -100,12 +100,16 @@ void data_flash_program_cut(emu_t *emu, uint32_t address, const uint8_t data[DAT
 
 /* ---- reading ---- */
 
-static bool is_held(const emu_t *emu)
+static bool is_cached(const emu_t *emu)
 {
     const peripheral_t *cache = bus_find("LMEM");
     const uint32_t control = bus_get(emu, cache, 0), regions = bus_get(emu, cache, DATA_FLASH_PCCRMR);
-    const bool speculates = (bus_get(emu, bus_find("MSCM"), OCMDR1) & SPECULATION_OFF) != SPECULATION_OFF;
-    return ((control & ENCACHE) != 0U && (regions >> 26 & 3U) != 0U) || speculates;
+    return (control & ENCACHE) != 0U && (regions >> 26 & 3U) != 0U;
+}
+
+static bool is_speculated(const emu_t *emu)
+{
+    return (bus_get(emu, bus_find("MSCM"), OCMDR1) & SPECULATION_OFF) != SPECULATION_OFF;
 }
 
 static void check_caches(emu_t *emu, uint32_t offset)
@@ -115,7 +119,8 @@ static void check_caches(emu_t *emu, uint32_t offset)
         emu_fail(emu, "read of the data flash at 0x%08x: a cache or the speculation buffer may hold what was there",
                  DATA_FLASH_BASE + offset);
     }
-    emu->flash.held[line] = emu->flash.held[line] || is_held(emu);
+    emu->flash.held[line] = emu->flash.held[line] || is_cached(emu);
+    emu->flash.speculated[line] = emu->flash.speculated[line] || is_speculated(emu);
 }
 
 /* The core ignores a data bus fault at the priority of FAULTMASK with CCR.BFHFNMIGN (Armv7-M, B3.2.8). */
@@ -175,10 +180,20 @@ uint8_t *data_flash_at(emu_t *emu, uint32_t address, uint32_t size)
     return offset < DATA_FLASH_SIZE && size <= DATA_FLASH_SIZE - offset ? &emu->flash.cell[offset] : NULL;
 }
 
+/* The code cache is invalidated; nothing invalidates the speculation buffer. */
 void data_flash_uncached(emu_t *emu)
 {
-    memset(emu->flash.held, 0, sizeof emu->flash.held);
-    memset(emu->flash.stale, 0, sizeof emu->flash.stale);
+    data_flash_t *f = &emu->flash;
+    for (uint32_t line = 0; line < DATA_FLASH_SIZE / CACHE_LINE; line++) {
+        f->held[line] = false;
+        f->stale[line] = f->stale[line] && f->speculated[line];
+    }
+}
+
+void data_flash_reset(emu_t *emu)
+{
+    memset(emu->flash.speculated, 0, sizeof emu->flash.speculated);
+    data_flash_uncached(emu);
 }
 
 void emu_flash_slow(emu_t *emu, bool slow)

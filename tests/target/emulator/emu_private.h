@@ -156,8 +156,9 @@ typedef struct {
 /* ---- part of a snapshot, kept over a reset ---- */
 typedef struct {
     uint8_t cell[DATA_FLASH_SIZE];
-    bool uncertain[DATA_FLASH_SIZE / DATA_FLASH_PHRASE];          /* left half done, or programmed twice */
-    bool held[DATA_FLASH_SIZE / 16], stale[DATA_FLASH_SIZE / 16]; /* lines of a cache; stale: the cells have changed */
+    bool uncertain[DATA_FLASH_SIZE / DATA_FLASH_PHRASE]; /* left half done, or programmed twice */
+    /* Lines that the code cache may hold, that the speculation buffer may hold, and that have changed since. */
+    bool held[DATA_FLASH_SIZE / 16], speculated[DATA_FLASH_SIZE / 16], stale[DATA_FLASH_SIZE / 16];
     uint32_t erases[DATA_FLASH_SECTORS];
     bool worn[DATA_FLASH_SECTORS]; /* an erase fails its verification */
     bool slow;                     /* commands take as long as the data sheet allows */
@@ -282,6 +283,7 @@ void ftfc_double_bit_fault(emu_t *emu);
 void data_flash_create(emu_t *emu);
 uint8_t *data_flash_at(emu_t *emu, uint32_t address, uint32_t size);
 void data_flash_uncached(emu_t *emu);
+void data_flash_reset(emu_t *emu);
 uint64_t data_flash_read(uc_engine *uc, uint64_t offset, unsigned size, void *user);
 void data_flash_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t value, void *user);
 bool clocks_high_speed(const emu_t *emu);

@@ -137,6 +137,7 @@ def test_reading_beside_a_command_is_refused(library: ctypes.CDLL, program: Prog
 
 def test_a_cached_read_of_changed_cells_is_refused(library: ctypes.CDLL, program: Program) -> None:
     stopped(library, program, 2, "may hold what was there")
+    stopped(library, program, 6, "may hold what was there")
     with Core.of_program(library, program("flash", "-DCASE=3")) as core:
         core.run(0.05)
         assert core.word("seen") == 0x0403_0201

@@ -3,22 +3,23 @@
 
 from __future__ import annotations
 
-import os
-import random
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
+import flash_cuts
 import flash_saves as flash
 import numpy as np
 import pytest
 from flash_saves import Parts
+from planting import PlantedError, image_with_error
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
-from fluxtrue_tools.emulate.core import Core
-from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
+from fluxtrue_tools.errors import FluxtrueError
 
 POINTS = ((1500.0, 50.0), (2500.0, 20.0), (600.0, -40.0))
-SHORT = ((900.0, 40.0),)
-SHARES = (0.02, 0.5, 0.98)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_a_drive_remembers_what_it_has_identified(parts: Parts) -> None:
         # While switching is disabled, only the leak changes them.
         assert flash.identified(loop) == pytest.approx(before, rel=2e-3)
         assert record.slot == record.sequence == 0
-        flash.drive(loop, SHORT, 0.2)  # and it drives
+        flash.drive(loop, flash_cuts.SHORT, 0.2)  # and it drives
 
 
 def test_the_values_recalled_are_those_of_the_record(parts: Parts, flashed: bytes) -> None:
@@ -156,71 +157,37 @@ def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
 # ---- a supply that fails
 
 
-def saved_once(parts: Parts, loop: Loop, core: Core) -> None:
-    """Everything up to the point where the next save begins."""
-    flash.drive(loop, SHORT, 0.15)
-    flash.until_saving(loop, core)
-
-
-def check_cuts(loop: Loop, core: Core, shares: tuple[float, ...], dice: random.Random) -> int:
-    """Cut the save that begins now at every step, each time from the same state; then let it complete. Every other cut
-    is followed by a second one, in the save after it. Returns the number of cuts."""
-    start = core.save()
-    old = flash.records(core)[-1]
-    times = flash.instants(core, shares)
-    new = flash.records(core)[-1]
-    assert new.sequence > old.sequence
-    for k, time in enumerate(times):
-        core.restore(start)
-        core.flash_random(dice.randrange(1, 2**32))
-        flash.advance(core, time)
-        flash.power_cycle(loop)
-        assert flash.is_recalled(core), f"cut {k} at {time} s"
-        assert recalled_states(core, old, new), f"cut {k} at {time} s: neither the old record nor the new one"
-        if k % 8 == 3:
-            flash.drive(loop, SHORT, 0.15)
-            flash.until_saving(loop, core)
-            flash.advance(core, dice.random() * times[-1])
-            flash.power_cycle(loop)
-            assert flash.is_recalled(core), f"second cut after {k}"
-    core.restore(start)
-    core.free(start)
-    flash.until_saved(loop, core)
-    flash.power_cycle(loop)
-    assert recalled_states(core, new, new)
-    return len(times)
-
-
-def recalled_states(core: Core, old: flash.Record, new: flash.Record) -> bool:
-    """The filter starts with all states of one of the two records."""
-    ram = core.read(0x1FFF_8000, 0xF000)
-    return any(record.content[4 : 4 + 4 * flash.STATES] in ram for record in (old, new))
-
-
-def campaign(parts: Parts, saves: int, shares: tuple[float, ...], last: int | None) -> int:
-    dice = random.Random(1)
-    cuts = 0
-    with flash.key_on(parts) as (loop, core):
-        saved_once(parts, loop, core)
-        flash.until_saved(loop, core)
-        if last is not None:
-            flash.fill(core, last)
-        flash.power_cycle(loop)
-        for _ in range(saves):
-            saved_once(parts, loop, core)
-            cuts += check_cuts(loop, core, shares, dice)
-    return cuts
-
-
 @pytest.mark.parametrize("last", [0, flash.SLOTS - 1], ids=["blank slot", "sector to be erased"])
 def test_a_cut_at_every_step_leaves_the_old_or_the_new_record(parts: Parts, last: int) -> None:
-    assert campaign(parts, 1, SHARES, last) > 30
+    assert flash_cuts.campaign(parts, 1, last) > 40
 
 
-@pytest.mark.skipif("FLUXTRUE_SAVES" not in os.environ, reason="the long campaign: FLUXTRUE_SAVES=200 saves")
-def test_many_saves_with_cuts_at_every_step(parts: Parts) -> None:
-    """All slots are used once before every sector is erased again: 200 saves pass the end of the flash."""
-    saves = int(os.environ["FLUXTRUE_SAVES"])
-    cuts = campaign(parts, saves, SHARES, None)
-    print(f"{saves} saves, {cuts} cuts, no mixture")
-    assert cuts > saves * 30
+# ---- errors that the tests above must find
+
+
+def cut(parts: Parts) -> None:
+    flash_cuts.campaign(parts, 1, flash.SLOTS - 1)
+
+
+PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
+    "a command in HSRUN": (cut, PlantedError("nvm.c", "    clock_slow();\n", "")),
+    "the speculation stays on": (cut, PlantedError("nvm.c", "MSCM_OCMDR1_OCM1(SPECULATION_OFF)", "0U")),
+    "bus faults are not ignored": (cut, PlantedError("nvm.c", "SCB_CCR | CCR_BFHFNMIGN", "SCB_CCR")),
+    "nothing is erased": (cut, PlantedError("nvm.c", "flash_command(ERASE_SECTOR, slot, 0)", "true")),
+    "the clock stays slow": (
+        test_switching_waits_until_the_save_is_complete,
+        PlantedError("nvm.c", "    clock_fast();\n", ""),
+    ),
+    "the tick is not aligned": (
+        test_the_tick_is_where_it_was_after_a_save,
+        PlantedError("nvm.c", "    tick_align(pwm_elapsed() / (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ));\n", ""),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED_ERRORS)
+def test_a_planted_error_is_found(name: str, parts: Parts, tmp_path: Path) -> None:
+    check, error = PLANTED_ERRORS[name]
+    planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
+    with pytest.raises((AssertionError, EmulationStoppedError, FluxtrueError)):
+        check(planted)
