@@ -125,6 +125,7 @@ typedef struct {
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
     frozen_angle_state_t frozen_angle;
+    launch_power_state_t launch_power;
     commission_state_t commission;
     commission_curve_t inverter; /* voltage error against current, as last measured */
     compensation_t compensation;

@@ -21,6 +21,7 @@
 #include "control/torque/voltage_reserve.h"
 #include "safety/frozen_angle.h"
 #include "safety/gate_fault.h"
+#include "safety/launch_power.h"
 #include "safety/monitor.h"
 #include "safety/plausibility.h"
 #include "safety/safe_state.h"
@@ -78,6 +79,7 @@ typedef struct {
     plausibility_config_t plausibility;
     torque_monitor_config_t torque_monitor;
     frozen_angle_config_t frozen_angle;
+    launch_power_config_t launch_power;
     commission_config_t commission;
     turning_control_config_t turning_control;     /* in place of current_control where the field turns far */
     motor_parameters_t parameters;                /* to start with */

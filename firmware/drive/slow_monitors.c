@@ -82,10 +82,24 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
 }
 
+/* After check_angle(), which takes the flux out of the voltage. */
+static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const launch_power_in_t in = {
+        .acting = snapshot->window.acting && snapshot->sample.acting,
+        .u_standing = task->frozen_angle.u_standing,
+        .i_ref = task->i_ref,
+        .psi_ref = task->psi_ref,
+        .theta_e = snapshot->sample.theta_e,
+    };
+    return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
+}
+
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
     return check_currents(drive, snapshot, phases_ref) | check_torque(drive, &snapshot->sample) |
-           check_angle(drive, snapshot, phases_ref) | shorted;
+           check_angle(drive, snapshot, phases_ref) | check_launch(drive, snapshot) | shorted;
 }

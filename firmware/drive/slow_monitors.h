@@ -19,6 +19,7 @@ static inline void slow_monitors_without_machine(motor_t *m)
     m->plausibility.contradicted_steps = UINT8_MAX;
     m->torque_monitor.v_0 = Q15_MAX;
     m->frozen_angle.v_0 = Q15_MAX;
+    m->launch_power.i_min = Q15_MAX;
 }
 
 #endif

@@ -39,6 +39,7 @@ static dq_q15_t standing_voltage(const frozen_angle_config_t *config, frozen_ang
 static bool follow(const frozen_angle_config_t *config, frozen_angle_state_t *state, const frozen_angle_in_t *in)
 {
     const dq_q15_t u_sum = standing_voltage(config, state, in);
+    state->u_standing = u_sum;
     if (has_moved(config, state, in)) {
         state->i_ref = in->i_ref;
         state->theta_e = in->theta_e;

@@ -29,7 +29,8 @@ typedef struct {
 typedef struct {
     dq_q15_t mean_q8, first_q8; /* of the sums */
     dq_q15_t i_ref;
-    dq_q15_t psi_ref; /* of the last step */
+    dq_q15_t psi_ref;    /* of the last step */
+    dq_q15_t u_standing; /* of this step: u_sum without the voltage that changes the flux */
     uint32_t theta_e;
     uint8_t standing, frozen; /* steps, saturate */
 } frozen_angle_state_t;

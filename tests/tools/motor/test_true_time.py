@@ -36,11 +36,12 @@ PERIOD = {
     "plausibility.ripple_max",
     "angle_tracker.lag_steps", "angle_tracker.stop_periods",
     "torque_monitor.lag_gain",  # half a period of it: (AT-7)
-    "torque_monitor.v_0", "frozen_angle.v_0",  # the share of the dead time in a period: (MN-25)
+    "torque_monitor.v_0", "frozen_angle.v_0", "launch_power.v_1",  # the share of the dead time in a period: (MN-25)
 }  # fmt: skip
 PERIODS_PER_STEP = {
     "bases.periods_per_step", "commission.periods_per_step", "commission.mean_gain_q31", "identify.mean_gain_q32",
     "identify.limited_noise", "frozen_angle.v_0", "frozen_angle.rate_gain",
+    "launch_power.v_1", "launch_power.turn_gain",
 }  # fmt: skip
 STEP = {
     "bases.step_s", "trim_steps", "parameters.torque_slew", "torque_slew_weak",
@@ -52,7 +53,8 @@ STEP = {
     "plausibility.deviation_steps", "plausibility.ripple_steps", "plausibility.contradicted_steps",
     "plausibility.lost_steps", "plausibility.equal_steps",
     "plausibility.fast_steps", "plausibility.hot_steps", "torque_monitor.rate_gain", "torque_monitor.mean_rate",
-    "torque_monitor.lag_gain", "frozen_angle.rate_gain",
+    "torque_monitor.lag_gain", "frozen_angle.rate_gain", "launch_power.turn_gain",
+    "launch_power.settle_steps", "launch_power.fault_steps",
     "torque_monitor.torque_steps", "torque_monitor.angle_steps",
     "frozen_angle.settle_steps", "frozen_angle.fault_steps", "torque_monitor.settle_steps",
     "commission.settle_steps", "commission.measure_steps", "commission.mean_gain_q31",
@@ -82,6 +84,7 @@ COUNTS = {
     "SILENT_STEPS_MAX": "steps without a command, as docs/architecture.md says",
     "CONTRADICTED_MAX": "updates of the identification",
     "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
+    "FAST_ANGLE": "angle of a step, as that page says",
     "RESET_STEPS": "a reset on its way to the drive",
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
     "IDENTIFY_STEPS": "windows of an update, whose rates are generated for its true time",

@@ -57,6 +57,8 @@ LEG_ERROR_SHARE = 0.25  # of dead time and device drop: 20 % of spread, at a dc 
 FROZEN_SHARE, FROZEN_SETTLE_S = 0.25, 0.01  # of the inverter's voltage error; for the mean to settle
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
 DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
+LAUNCH_SHARE = 0.125  # of the inverter's voltage error: what a rotor's turning may change of its part along the current
+LAUNCH_FLUX_SHARE = 0.2  # of psi_f: deviation of the magnet
 TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
 COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
@@ -144,6 +146,8 @@ class Derived:
     monitor_torque_Nm: float
     monitor_V: float
     frozen_V: float
+    launch_V: float
+    launch_A: float
     monitor_A: float
     monitor_mean_rate: float
     share_short: float
@@ -292,6 +296,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
         ),
         "monitor_V": error_V,
         "frozen_V": FROZEN_SHARE * error_V,
+        "launch_V": LAUNCH_SHARE * error_V,
+        "launch_A": MONITOR_NOISE_SHARE / 4.0 * machine.i_max_A,
         "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
         "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
     }

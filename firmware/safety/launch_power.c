@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/launch_power.h"
+
+#include "fx/q.h"
+#include "fx/vec.h"
+#include "signal/debounce.h"
+#include "types/faults.h"
+
+#define FAST_ANGLE (1U << 28) /* 1/16 of a turn in a step */
+#define MOVING_STEPS 4      /* the voltage that moved the currents is no part of the mean */
+#define MEAN_SHIFT 2
+#define FIRST_SHIFT 12
+
+static int32_t approach(int32_t mean, int32_t x, int shift)
+{
+    return mean + ((x - mean) >> shift);
+}
+
+/* Products of a sum and a q15: half their size. */
+static int32_t times(int32_t sum, int32_t x)
+{
+    return fx_mulhi(sum, x * 65536);
+}
+
+static bool has_moved(const launch_power_config_t *config, const launch_power_state_t *state,
+                      const launch_power_in_t *in)
+{
+    return in->theta_e - state->theta_e + FAST_ANGLE > 2U * FAST_ANGLE ||
+           fx_abs_q31(in->i_ref.d - state->i_ref.d) > config->i_0 ||
+           fx_abs_q31(in->i_ref.q - state->i_ref.q) > config->i_0;
+}
+
+/* The power that neither the tables' torque nor the flux accounts for (MN-28). */
+static int32_t other_power(const launch_power_in_t *in, int32_t omega)
+{
+    const q15_t torque = fx_sat_q15((fx_mul_q30((q15_t)in->psi_ref.d, (q15_t)in->i_ref.q) >> 15) -
+                                    (fx_mul_q30((q15_t)in->psi_ref.q, (q15_t)in->i_ref.d) >> 15));
+    return times(in->u_standing.d, in->i_ref.d) + times(in->u_standing.q, in->i_ref.q) - times(omega, torque);
+}
+
+/* True while there is a power to compare with. */
+static bool follow(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
+{
+    const bool moved = has_moved(config, state, in);
+    const int32_t omega = moved ? 0 : fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
+    state->theta_e = in->theta_e;
+    if (moved) {
+        state->i_ref = in->i_ref;
+        state->steady = 0;
+    }
+    const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
+    state->power_q8 = approach(state->power_q8, other_power(in, omega) * 256, shift);
+    state->omega_q8 = approach(state->omega_q8, omega * 256, shift);
+    if (state->steady < config->settle_steps) {
+        state->steady++;
+        state->first_power_q8 = state->power_q8;
+        state->first_omega_q8 = state->omega_q8;
+        return false;
+    }
+    state->first_power_q8 = approach(state->first_power_q8, state->power_q8, FIRST_SHIFT);
+    state->first_omega_q8 = approach(state->first_omega_q8, state->omega_q8, FIRST_SHIFT);
+    return true;
+}
+
+/* (MN-29) */
+static bool is_wrong(const launch_power_config_t *config, const launch_power_state_t *state,
+                     const launch_power_in_t *in)
+{
+    const q15_t current = fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q);
+    const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
+    const int32_t psi = config->psi_share + (fx_abs_q15((q15_t)in->psi_ref.q) >> 3);
+    const int32_t v_max = config->v_1 + 2 * times(omega, psi);
+    const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
+    return current > config->i_min && fx_abs_q31(change) > times(v_max, current);
+}
+
+uint32_t launch_power_step(const launch_power_config_t *config, launch_power_state_t *state,
+                           const launch_power_in_t *in)
+{
+    if (!in->acting) {
+        *state = (launch_power_state_t){.theta_e = in->theta_e};
+        return 0;
+    }
+    const bool wrong = follow(config, state, in) && is_wrong(config, state, in);
+    return debounce_step(&state->wrong, wrong, config->fault_steps, FAULT_ANGLE_OFFSET);
+}

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SAFETY_LAUNCH_POWER_H
+#define SAFETY_LAUNCH_POWER_H
+/** Finds a wrong angle when the rotor begins to turn. At standstill all electrical power is loss, and the loss belongs
+ * to the currents. While the current reference stands still, the power may change only by that of the tables' torque.
+ *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
+ *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
+ *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
+ *   |m - m_0| > |i*| (v_1 + |n - n_0|(psi_f/5 + |psi_q|/8)) in a row of steps; no check below |i*| = i_min
+ * Source   docs/theory/monitors.md (MN-28), (MN-29)
+ * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
+ * Range    |u| <= 43 * 2^15; every other argument; begins anew when the angle moves by 1/16 of a turn in a step
+ * Rounding 2^-8 of a count of the sum
+ * Errors   returns FAULT_ANGLE_OFFSET while it is confirmed; the fast ISR latches it
+ * Context  1 kHz task; one square root, no division */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "types/frames.h"
+
+typedef struct {
+    int32_t turn_gain; /* change of the angle in a step to speed */
+    int32_t v_1;       /* in-phase voltage that inverter and resistance may change */
+    q15_t psi_share;   /* psi_f/5 */
+    q15_t i_0;         /* change of the reference that starts again */
+    q15_t i_min;
+    uint8_t settle_steps; /* until the means have settled */
+    uint8_t fault_steps;
+} launch_power_config_t;
+
+typedef struct {
+    int32_t power_q8, first_power_q8;
+    int32_t omega_q8, first_omega_q8;
+    dq_q15_t i_ref;
+    uint32_t theta_e;      /* of the last step */
+    uint8_t steady, wrong; /* steps, saturate */
+} launch_power_state_t;
+
+typedef struct {
+    bool acting;
+    dq_q15_t u_standing;     /* acting voltage without that of the flux, summed over the periods of a step */
+    dq_q15_t i_ref, psi_ref; /* in effect during that step, and the tables' flux there */
+    uint32_t theta_e;        /* at its end */
+} launch_power_in_t;
+
+uint32_t launch_power_step(const launch_power_config_t *config, launch_power_state_t *state,
+                           const launch_power_in_t *in);
+
+#endif

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "safety/launch_power.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "types/faults.h"
+#include "unity.h"
+
+#define PERIODS 10
+#define RAD_PER_STEP 3.3 /* at the speed base */
+
+/* About those of hsm1: psi_f = 0.44, 0.875 V = 0.00162 in each period, 40 A = 0.1. */
+static const launch_power_config_t config = {
+    .turn_gain = 623900, .v_1 = 530, .psi_share = 2884, .i_0 = 205, .i_min = 819, .settle_steps = 10, .fault_steps = 5};
+static launch_power_state_t state;
+static launch_power_in_t in;
+
+enum { SETTLED = 10, CONFIRMED = 5 };
+
+/* The rotor behind the samples: l_d = 0.65, l_q = 1.6, its angle measured by delta too large. */
+static struct {
+    double omega, angle, torque, voltage[2];
+} rotor;
+
+static int32_t q15(double x)
+{
+    return (int32_t)lround(x * 32768.0);
+}
+
+/* Voltages of the rotor at the present reference and speed, in the measured frame; the drop of a
+ * resistance that the monitor does not know belongs to the current. */
+static void turn(double i_d, double i_q, double delta)
+{
+    const double c = cos(delta), s = sin(delta), r = 0.02;
+    const double d = c * i_d - s * i_q, q = s * i_d + c * i_q; /* currents in the rotor's frame */
+    const double psi_d = 0.44 + 0.65 * d, psi_q = 1.6 * q;
+    const double u_d = -rotor.omega * psi_q, u_q = rotor.omega * psi_d;
+    rotor.torque = psi_d * q - psi_q * d;
+    rotor.voltage[0] = r * i_d + c * u_d + s * u_q;
+    rotor.voltage[1] = r * i_q + c * u_q - s * u_d;
+    rotor.angle += rotor.omega * RAD_PER_STEP;
+    in.u_standing = (dq_q15_t){q15(PERIODS * rotor.voltage[0]), q15(PERIODS * rotor.voltage[1])};
+    in.i_ref = (dq_q15_t){q15(i_d), q15(i_q)};
+    in.psi_ref = (dq_q15_t){q15(0.44 + 0.65 * i_d), q15(1.6 * i_q)};
+    in.theta_e = (uint32_t)(int64_t)floor(rotor.angle / 6.283185307179586 * 4294967296.0);
+}
+
+/* Steps until the fault while the rotor accelerates by its torque, 0.0002 of the speed base per step and unit of torque
+ * (a vehicle behind hsm1); 0: none in so many steps. */
+static int launch(double i_d, double i_q, double delta, int steps)
+{
+    for (int n = 1; n <= steps; n++) {
+        turn(i_d, i_q, delta);
+        rotor.omega += 0.0002 * rotor.torque;
+        if (launch_power_step(&config, &state, &in) == FAULT_ANGLE_OFFSET) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+void setUp(void)
+{
+    state = (launch_power_state_t){0};
+    in = (launch_power_in_t){.acting = true};
+    rotor.omega = rotor.angle = 0.0;
+}
+
+void tearDown(void)
+{
+}
+
+void test_a_rotor_that_accelerates_as_the_tables_say_is_no_fault(void)
+{
+    for (int n = 0; n < 4; n++) {
+        setUp();
+        rotor.omega = (n & 2) ? 0.03 : 0.0; /* it rolls back first, or coasts */
+        TEST_ASSERT_EQUAL_INT(0, launch(-0.2, (n & 1) ? 0.35 : -0.35, 0.0, 1500));
+        TEST_ASSERT_TRUE(fabs(rotor.omega) > 0.03);
+    }
+}
+
+void test_a_blocked_rotor_may_warm_up_for_minutes(void)
+{
+    turn(-0.2, 0.35, 0.0);
+    const int32_t start = in.u_standing.q;
+    for (int n = 0; n < 180000; n++) {
+        in.u_standing.q = start + n / 90; /* four times v_1 in three minutes */
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+}
+
+/* 4.2 rad of the electrical angle are 5 cm: 1600 kg, wheels of 0.32 m behind 9:1, three pole pairs. */
+void test_a_launch_with_a_wrong_angle_ends_within_5_cm(void)
+{
+    for (int n = 0; n < 8; n++) {
+        const int sign = (n & 1) ? 1 : -1;
+        setUp();
+        const int found = launch(-0.2, 0.35 * sign, sign * (90.0 + 30.0 * (n >> 1)) * 0.017453292519943, 1000);
+        TEST_ASSERT_GREATER_THAN_INT(SETTLED + CONFIRMED - 1, found);
+        TEST_ASSERT_TRUE(fabs(rotor.angle) < 4.2);
+    }
+}
+
+/* A step in the voltage along a current of 0.4, of so many counts; the mean lacks (3/4)^n of it after n steps. */
+static int found_after_change(int32_t u_q)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    in.psi_ref = (dq_q15_t){14418, 20971};
+    for (int n = 0; n < 40; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    in.u_standing.q += u_q;
+    for (int n = 1; n <= 60; n++) {
+        if (launch_power_step(&config, &state, &in) != 0U) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+void test_the_voltage_along_the_current_may_change_by_v_1(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, found_after_change(520));
+    setUp();
+    TEST_ASSERT_EQUAL_INT(0, found_after_change(-520));
+    setUp();
+    TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(1060));
+    setUp();
+    TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(-1060));
+}
+
+void test_a_small_current_is_not_checked(void)
+{
+    in.i_ref = (dq_q15_t){0, 819};
+    for (int n = 0; n < 200; n++) {
+        in.u_standing.q = (n < 40) ? 0 : 200000;
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+}
+
+void test_a_reference_or_an_angle_that_moves_starts_again(void)
+{
+    for (int k = 0; k < 6; k++) {
+        setUp();
+        in.i_ref = (dq_q15_t){0, 13107};
+        for (int n = 0; n < 100; n++) {
+            const int odd = n & 1;
+            in.u_standing.q = 200 * n;
+            in.i_ref.d = (k == 0) ? 206 * odd : (k == 1) ? -206 * odd : 0;
+            in.i_ref.q = 13107 + ((k == 2) ? 206 * odd : (k == 3) ? -206 * odd : 0);
+            in.theta_e += (k == 4) ? (1U << 28) + 1U : (k == 5) ? 0U - (1U << 28) - 1U : 0U;
+            TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+            TEST_ASSERT_LESS_THAN_UINT8(SETTLED, state.steady);
+        }
+    }
+}
+
+void test_a_bridge_that_is_off_is_not_checked_and_starts_again(void)
+{
+    TEST_ASSERT_NOT_EQUAL(0, found_after_change(4000));
+    in.acting = false;
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_UINT8(0, state.steady);
+    TEST_ASSERT_EQUAL_UINT8(0, state.wrong);
+}
+
+void test_no_argument_wraps(void)
+{
+    static const int32_t ends[] = {-43 * 32768, 43 * 32767};
+    for (unsigned n = 0; n < 4096; n++) {
+        const int32_t d = (n >> 2 & 1U) ? 32767 : -32768, q = (n >> 3 & 1U) ? 32767 : -32768;
+        const int32_t psi_d = (n >> 4 & 1U) ? 32767 : -32768, psi_q = (n >> 5 & 1U) ? 32767 : -32768;
+        in = (launch_power_in_t){.acting = true,
+                                 .u_standing = {ends[n & 1U], ends[n >> 1 & 1U]},
+                                 .i_ref = {d, q},
+                                 .psi_ref = {psi_d, psi_q},
+                                 .theta_e = n << 28};
+        (void)launch_power_step(&config, &state, &in);
+        TEST_ASSERT_TRUE(abs(state.power_q8) <= (43 * 32768 + 20000) * 256);
+    }
+}
