@@ -48,8 +48,9 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
     return plausibility_step(&drive->motor->plausibility, &task->plausibility, &in);
 }
 
-static uint32_t check_torque(drive_t *drive, const sample_t *sample)
+static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
 {
+    const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
     const torque_monitor_in_t in = {
         .acting = sample->acting && !drive_bypasses_torque_path(drive),
@@ -58,6 +59,7 @@ static uint32_t check_torque(drive_t *drive, const sample_t *sample)
         .psi = {sample->point.flux.psi_d, sample->point.flux.psi_q},
         .omega = fx_q15_from_q31(sample->point.omega),
         .torque = fx_q15_from_q31(task->torque_loop.model),
+        .winding_dC = snapshot->winding_dC,
     };
     return torque_monitor_step(&drive->motor->torque_monitor, &task->torque_monitor, &in);
 }
@@ -100,6 +102,6 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
-    return check_currents(drive, snapshot, phases_ref) | check_torque(drive, &snapshot->sample) |
+    return check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) |
            check_angle(drive, snapshot, phases_ref) | check_launch(drive, snapshot) | shorted;
 }

@@ -94,6 +94,23 @@ static uint32_t stuck_sensors(const plausibility_config_t *config, plausibility_
     return (a_stuck || b_stuck || c_stuck) ? FAULT_CURRENT_STUCK : 0;
 }
 
+static q15_t followed(q15_t from, int32_t to, q15_t rate)
+{
+    return (rate == Q15_MAX) ? (q15_t)to : fx_sat_q15(from + fx_mul_q15(rate, fx_sat_q15(to - from)));
+}
+
+/* Where the field turns far in a period, current control answers so slowly that a slope of the torque would look like
+ * a deviation (CC-21). */
+static plausibility_in_t against_the_answer(const plausibility_config_t *config, plausibility_state_t *state,
+                                            const plausibility_in_t *in)
+{
+    plausibility_in_t answer = *in;
+    answer.i_ref.d = followed((q15_t)state->expected.d, in->i_ref.d, config->answer_rate);
+    answer.i_ref.q = followed((q15_t)state->expected.q, in->i_ref.q, config->answer_rate);
+    state->expected = answer.i_ref;
+    return answer;
+}
+
 uint32_t plausibility_step(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in)
 {
@@ -106,6 +123,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         return faults;
     }
     faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;
-    return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
-           lost_phases(config, state, in);
+    const plausibility_in_t answer = against_the_answer(config, state, in);
+    return faults | deviation(config, state, &answer) | oscillation(config, state, &answer) |
+           stuck_sensors(config, state, in) | lost_phases(config, state, in);
 }

@@ -27,6 +27,7 @@ typedef struct {
     q15_t i_dead;  /* a phase current up to this counts as none */
     q15_t i_alive; /* a phase whose reference exceeds this must carry current */
     q15_t ripple_max;
+    q15_t answer_rate; /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
     int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is cut, else five times */
@@ -36,6 +37,7 @@ typedef struct {
 
 typedef struct {
     int16_t deviation;
+    dq_q15_t expected;           /* the reference as the current follows it */
     dq_q15_t sample_x8, step_x8; /* mean deviation of samples and of means over 8 steps, times 8 */
     int32_t ripple_x16;          /* mean distance from it over 16 steps, times 16 */
     int8_t lost[3][2];           /* of each phase, in the positive and in the negative direction */

@@ -6,6 +6,7 @@
 #include "signal/debounce.h"
 #include "types/faults.h"
 
+#define TOLERANCE 8          /* an eighth of the resistance: of the winding, the sensor and the skin effect */
 #define PSI_WEAK Q15(0.5)    /* largest plausible loss of magnet flux, of psi_f */
 #define PSI_STRONG Q15(0.35) /* largest plausible gain */
 #define PSI_D_AXIS Q15(0.2)  /* e_d allowed, of the magnet's back-EMF */
@@ -26,6 +27,36 @@ static speed_t follow_speed(const torque_monitor_config_t *config, const torque_
     return (speed_t){fx_add_q15(tracked, lag), fx_abs_q15(lag)};
 }
 
+/* Resistance that the winding has, and by how much it may differ. */
+typedef struct {
+    q16_t r, error;
+} resistance_t;
+
+static q31_t resistance_at(const torque_monitor_config_t *config, int32_t dC)
+{
+    return config->r + config->r_per_dC * (dC - 200); /* 20 C */
+}
+
+/* (MN-32). A sensor that reads beyond the range is not believed beyond it. */
+static resistance_t resistance(const torque_monitor_config_t *config, int16_t winding_dC)
+{
+    int32_t min_dC = config->winding_min_dC;
+    int32_t max_dC = config->winding_max_dC;
+    if (temperature_is_known(winding_dC)) {
+        min_dC = fx_clamp_q31(winding_dC, min_dC, max_dC);
+        max_dC = min_dC;
+    }
+    const q31_t middle = resistance_at(config, (min_dC + max_dC) / 2);
+    const q31_t half_range = resistance_at(config, max_dC) - middle;
+    return (resistance_t){middle >> 15, (half_range + middle / TOLERANCE) >> 15};
+}
+
+/* Speed and resistance that the machine has now, and how far each may be off. */
+typedef struct {
+    speed_t speed;
+    resistance_t r;
+} machine_t;
+
 /* d psi/dt from the tables: the power that changes the field is not shaft power (MN-6). */
 static dq_q15_t flux_rate(const torque_monitor_config_t *config, const torque_monitor_state_t *state, dq_q15_t psi)
 {
@@ -35,9 +66,9 @@ static dq_q15_t flux_rate(const torque_monitor_config_t *config, const torque_mo
 
 /* Torque beyond the commanded one or against its direction; too little torque is no hazard (MN-7), (MN-8). */
 static bool is_torque_excessive(const torque_monitor_config_t *config, torque_monitor_state_t *state,
-                                const torque_monitor_in_t *in, speed_t speed, dq_q15_t emf, dq_q15_t rate)
+                                const torque_monitor_in_t *in, const machine_t *now, dq_q15_t emf, dq_q15_t rate)
 {
-    const int32_t commanded = fx_mul_q15(in->torque, speed.omega);
+    const int32_t commanded = fx_mul_q15(in->torque, now->speed.omega);
     const int32_t error = dot(emf, in->i) - commanded;
     const q15_t step = fx_sat_q15(error - fx_q15_from_q31(state->deviation));
     state->deviation = fx_add2_q31(state->deviation, fx_mul_q30(config->mean_rate, step));
@@ -46,24 +77,25 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
-    const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2);
-    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(speed.omega)) +
+    const q15_t drop_error = fx_mul_gain_q15(now->r.error, current);
+    const q15_t v_error = fx_sat_q15(config->v_0 + (fx_abs_q31(rate.d) + fx_abs_q31(rate.q)) / 2 + drop_error);
+    const int32_t limit = fx_mul_q15(allowed, fx_abs_q15(now->speed.omega)) +
                           fx_mul_q15(v_error, fx_add_q15(current, config->i_0)) +
-                          fx_mul_q15(fx_abs_q15(in->torque), speed.doubt);
-    if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(speed.omega))) {
+                          fx_mul_q15(fx_abs_q15(in->torque), now->speed.doubt);
+    if (fx_abs_q31(commanded) < fx_mul_q15(config->t_0, fx_abs_q15(now->speed.omega))) {
         return fx_abs_q31(mean) > limit; /* near zero torque both directions count */
     }
     return (commanded < 0) ? (mean < -limit || mean > limit - commanded) : (mean > limit || mean < -limit - commanded);
 }
 
 /* The back-EMF does not fit the angle (MN-9), (MN-10). */
-static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in, speed_t speed,
-                                 dq_q15_t emf, dq_q15_t rate)
+static bool is_angle_implausible(const torque_monitor_config_t *config, const torque_monitor_in_t *in,
+                                 const machine_t *now, dq_q15_t emf, dq_q15_t rate)
 {
-    const q15_t speed_abs = fx_abs_q15(speed.omega);
-    const int32_t e_d = emf.d + fx_mul_q15(speed.omega, (q15_t)in->psi.q);
-    const int32_t e_q = emf.q - fx_mul_q15(speed.omega, (q15_t)in->psi.d);
-    const int32_t e_magnet = (speed.omega < 0) ? -e_q : e_q;
+    const q15_t speed_abs = fx_abs_q15(now->speed.omega);
+    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, (q15_t)in->psi.q);
+    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, (q15_t)in->psi.d);
+    const int32_t e_magnet = (now->speed.omega < 0) ? -e_q : e_q;
     const int32_t emf_nominal = fx_mul_q15(speed_abs, config->psi_f);
     const int32_t d_share = fx_mul_q15(PSI_D_AXIS, (q15_t)emf_nominal);
     if (d_share < config->v_0 >> 1) {
@@ -73,11 +105,12 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     /* Doubled resistance; half of the flux rate for noise, and all of it beyond v_0, because a real change may have
      * ended before the sample. */
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
-    const int32_t v_error = (config->v_0 >> 1) + fx_mul_gain_q15(config->r, current) + flux_rate_abs / 2 +
+    const int32_t v_error = (config->v_0 >> 1) + fx_mul_gain_q15(now->r.r, current) + flux_rate_abs / 2 +
                             fx_max_s32(flux_rate_abs - config->v_0, 0);
     const q15_t psi_d = fx_abs_q15((q15_t)in->psi.d), psi_q = fx_abs_q15((q15_t)in->psi.q);
-    const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(speed.doubt, psi_q) + v_error;
-    const int32_t q_error = v_error + fx_mul_q15(speed.doubt, psi_d);
+    const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(now->speed.doubt, psi_q) +
+                            v_error;
+    const int32_t q_error = v_error + fx_mul_q15(now->speed.doubt, psi_d);
     return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, (q15_t)emf_nominal) + q_error ||
            e_magnet < -fx_mul_q15(PSI_WEAK, (q15_t)emf_nominal) - q_error;
 }
@@ -91,14 +124,14 @@ uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monit
         return 0;
     }
     const dq_q15_t rate = flux_rate(config, state, in->psi);
-    const speed_t speed = follow_speed(config, state, in->omega);
+    const machine_t now = {follow_speed(config, state, in->omega), resistance(config, in->winding_dC)};
     state->psi = in->psi;
     state->omega = in->omega;
-    const q15_t drop_d = fx_mul_gain_q15(config->r, (q15_t)in->i.d);
-    const q15_t drop_q = fx_mul_gain_q15(config->r, (q15_t)in->i.q);
+    const q15_t drop_d = fx_mul_gain_q15(now.r.r, (q15_t)in->i.d);
+    const q15_t drop_q = fx_mul_gain_q15(now.r.r, (q15_t)in->i.q);
     const dq_q15_t emf = {fx_sat_q15(in->u.d - drop_d - rate.d), fx_sat_q15(in->u.q - drop_q - rate.q)};
-    const bool torque_bad = is_torque_excessive(config, state, in, speed, emf, rate);
-    const bool angle_bad = is_angle_implausible(config, in, speed, emf, rate);
+    const bool torque_bad = is_torque_excessive(config, state, in, &now, emf, rate);
+    const bool angle_bad = is_angle_implausible(config, in, &now, emf, rate);
     return debounce_step(&state->torque, torque_bad, config->torque_steps, FAULT_TORQUE) |
            debounce_step(&state->angle, angle_bad, config->angle_steps, FAULT_ANGLE_OFFSET);
 }

@@ -5,14 +5,16 @@
  * control uses.
  *   speed   w = w_t + l, l = lag_gain (w_t - w_t of the last step): the tracked speed without its lag
  *   torque  p = u.i - r |i|^2 - d psi.i/dt = t w;   dev = p - t* w, first-order mean over 4 ms
- *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2) (|i| + i_0) + |l t*|, or against
- *           the request by as much
+ *           too much: sign(t* w) dev > |w| (t_0 + |t*|/8) + (v_0 + |d psi/dt|/2 + r_error |i|) (|i| + i_0) + |l t*|,
+ *           or against the request by as much
  *   angle   e = u - r i - j w psi(i): e_q shows a magnet that is too weak or too strong, e_d a wrong angle
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + |l psi_q| + v,  or e_q sign(w) outside
  *           |w| psi_f (-0.5 ... 0.35) -+ (|l psi_d| + v),
  *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2
+ *   r     at the winding's temperature; without one, of the middle of its range; r_error, an eighth of it and half of
+ *         that range, allows r_error |i| more
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
- * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26)
+ * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26), (MN-32)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 1 LSB q15, against thresholds of hundreds
@@ -22,9 +24,12 @@
 #include <stdint.h>
 
 #include "types/frames.h"
+#include "types/temperature.h"
 
 typedef struct {
-    q16_t r; /* at 20 C */
+    q31_t r;                                /* at 20 C, < 1/4 */
+    q31_t r_per_dC;                         /* per 0.1 K */
+    int16_t winding_min_dC, winding_max_dC; /* what a winding may have: -40 C to its trip */
     q15_t psi_f;
     q15_t t_0;                                       /* torque error allowed at no torque */
     q15_t v_0;                                       /* voltage error of the inverter */
@@ -47,6 +52,7 @@ typedef struct {
     dq_q15_t u, i, psi; /* acting voltage, current and the tables' flux there */
     q15_t omega;        /* tracked: lags behind the rotor */
     q15_t torque;       /* commanded, as the closed loop follows it */
+    int16_t winding_dC; /* or one of types/temperature.h */
 } torque_monitor_in_t;
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of the current where the field turns far in a PWM period; the plant's inductances are right or 20 % too small."""
+"""Steps of the current where the field turns far in a PWM period, with the right inductances and with 20 % less."""
 
 import math
 from pathlib import Path

@@ -63,7 +63,8 @@ STEP = {
 # Names of members that are a time, a rate or a count of steps.
 TIMED = re.compile(r"_(steps|periods|rate|s|ms|us)$|slew|leak|\.k[ip](_q\d+)?$")
 SPEED = re.compile(r"_rad_s$")
-TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp"}  # SI for the port; hsm1's loop has no proportional part
+# SI for the port; hsm1's torque loop has no proportional part, and its currents follow in one step
+TIMED_OTHERWISE = {"dead_time_s", "parameters.torque_loop.kp", "plausibility.answer_rate"}
 # Times that the firmware defines, and the expression that converts each to true time in every line that uses it.
 TIMES = {
     "SETTLED_US": r"settling->us", "STATE_TIME_MAX_US": r"supervisor->us", "SELF_TEST_MS": r"s->us >",

@@ -7,7 +7,8 @@
 #include "types/faults.h"
 #include "unity.h"
 
-static const plausibility_config_t config = {.e_0 = 2000,
+static const plausibility_config_t config = {.answer_rate = Q15_MAX,
+                                             .e_0 = 2000,
                                              .i_dead = 400,
                                              .i_alive = 2400,
                                              .ripple_max = 1600,
@@ -145,6 +146,27 @@ void test_a_lasting_deviation_is_no_oscillation(void)
 {
     in.i.d = in.i_mean.d = in.i_ref.d + 3000;
     TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_CONTROL, -1));
+}
+
+/* A slope of 400 per step of the reference, and a current that follows 1/16 of what is missing. It lags by 6400. */
+void test_a_current_that_follows_as_slowly_as_expected_is_no_deviation(void)
+{
+    plausibility_config_t slow = config;
+    slow.e_0 = 300;
+    for (int known = 0; known <= 1; known++) {
+        slow.answer_rate = known ? (q15_t)2048 : Q15_MAX;
+        setUp();
+        double current = 0.0;
+        uint32_t found = 0;
+        for (int n = 0; n < 60; n++) {
+            in.i_ref = (dq_q15_t){0, 400 * n};
+            current += 0.0625 * (in.i_ref.q - current);
+            in.i = in.i_mean = (dq_q15_t){0, (int32_t)lround(current)};
+            in.phases = in.phases_ref = (abc_q15_t){n % 3, n % 5, n % 7};
+            found |= plausibility_step(&slow, &state, &in);
+        }
+        TEST_ASSERT_EQUAL_HEX32(known ? 0 : FAULT_CONTROL, found);
+    }
 }
 
 void test_a_phase_without_current_is_found_within_20_ms_whichever_it_is(void)

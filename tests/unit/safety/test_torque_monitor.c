@@ -7,7 +7,10 @@
 #include "unity.h"
 
 /* r = 0.0137, psi_f = 0.44, 10 N·m = 0.034, 7 V = 0.013: about those of hsm1. */
-static const torque_monitor_config_t config = {.r = 898,
+static const torque_monitor_config_t config = {.r = 898 << 15,
+                                               .r_per_dC = 11564, /* 0.00393/K */
+                                               .winding_min_dC = -400,
+                                               .winding_max_dC = 1800,
                                                .psi_f = 14418,
                                                .t_0 = 1112,
                                                .v_0 = 425,
@@ -46,6 +49,7 @@ static void machine(double omega, double i_d, double i_q, double magnet, double 
         .psi = {q15(0.44 + 0.65 * d), q15(1.6 * q)},
         .omega = (q15_t)q15(omega),
         .torque = (q15_t)q15(psi_d * i_q - psi_q * i_d),
+        .winding_dC = 200,
     };
 }
 
@@ -281,6 +285,44 @@ void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_o
     }
 }
 
+/* (MN-26): a winding of 12 V at standstill, where 0.1 of its voltage drops on it at 20 C and full current. */
+static const struct {
+    int16_t winding_dC, measured_dC;
+    bool found;
+} windings[] = {
+    {200, 200, false},
+    {1800, 1800, false},
+    {-400, -400, false},
+    {1800, 200, true},
+    {200, 1800, true}, /* a sensor that reads 20 C, and one that reads 180 C */
+    {1800, 3000, false},
+    {1800, TEMPERATURE_UNKNOWN, false},
+    {-400, TEMPERATURE_OUT_OF_RANGE, false},
+    {3000, 3000, true}, /* beyond its trip */
+};
+
+void test_the_resistance_is_that_of_the_windings_temperature_or_of_any_that_it_may_have(void)
+{
+    torque_monitor_config_t lossy = config;
+    lossy.r = 6554 << 15;
+    lossy.r_per_dC = 84406;
+    lossy.v_0 = 100;
+    lossy.t_0 = 100;
+    for (unsigned int k = 0; k < sizeof windings / sizeof windings[0]; k++) {
+        fresh();
+        machine(0.01, -0.6, 0.4, 1.0, 0.0);
+        const double r = 0.1 * (1.0 + 0.000393 * (windings[k].winding_dC - 200)) - 898.0 / 65536.0;
+        in.u.d += q15(-0.6 * r);
+        in.u.q += q15(0.4 * r);
+        in.winding_dC = windings[k].measured_dC;
+        uint32_t found = 0;
+        for (int n = 0; n < 60; n++) {
+            found |= torque_monitor_step(&lossy, &state, &in);
+        }
+        TEST_ASSERT_EQUAL_MESSAGE(windings[k].found, (found & FAULT_TORQUE) != 0U, "case of the table");
+    }
+}
+
 /* The value as the monitor can represent it. */
 static double saturated(double x)
 {
@@ -305,9 +347,9 @@ static double torque_excess(reference_t *reference, double e_d, double e_q, doub
     const double t = in.torque / 32768.0;
     const double error = saturated(e_d * i_d + e_q * i_q) - t * w;
     reference->deviation = saturated(reference->deviation + 0.25 * saturated(error - reference->deviation));
-    const double v_error = saturated(425.0 / 32768.0 + rates / 2.0);
-    const double limit = fabs(w) * (1112.0 / 32768.0 + fabs(t) / 8.0) + v_error * saturated(hypot(i_d, i_q)) +
-                         fabs(t) * reference->doubt;
+    const double current = saturated(hypot(i_d, i_q));
+    const double v_error = saturated(425.0 / 32768.0 + rates / 2.0 + 112.0 / 65536.0 * current);
+    const double limit = fabs(w) * (1112.0 / 32768.0 + fabs(t) / 8.0) + v_error * current + fabs(t) * reference->doubt;
     if (fabs(t) < 1112.0 / 32768.0) {
         return fabs(reference->deviation) - limit;
     }
@@ -379,7 +421,8 @@ void test_no_argument_wraps(void)
                                    {end_of(bits, 4), end_of(bits, 5)},
                                    {end_of(bits, 6), end_of(bits, 7)},
                                    end_of(bits, 8),
-                                   torques[bits >> 9]};
+                                   torques[bits >> 9],
+                                   200};
         for (int n = 0; n < 30; n++) {
             const uint32_t faults = torque_monitor_step(&immediate, &state, &in);
             const excess_t excess = reference_step(&reference);

@@ -67,6 +67,7 @@ MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise loo
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
 
+WINDING_MIN_C = -40.0  # the coldest winding that the torque monitor allows for
 SLEW_WEAK_PER_TORQUE_MAX = 100.0  # 1/s: a full reversal at top speed keeps its currents below the trip
 PSI_WEAK_PER_PSI_F = 1.0 / 0.6  # the magnet alone takes 60 % of the planned voltage
 LOSS_TIME_S = 0.02
@@ -142,6 +143,7 @@ class Derived:
     phase_dead_A: float
     phase_alive_A: float
     ripple_A: float
+    answer_rate: float
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
@@ -215,9 +217,9 @@ def missing_periods(config: MotorConfig) -> float:
     return 1.0 + 1.0 / TURNING_APPROACH if config.is_turning else LOOP_MISSING_PERIODS
 
 
-def slew_weak(config: MotorConfig) -> float:
-    """Per second: a slower answer of the currents gets a slower slew, so that (MN-11) is as sensitive with it."""
-    return SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS / missing_periods(config)
+def _answer_rate(config: MotorConfig, bases: Bases) -> float:
+    """Share of a change of the reference that the current follows in a step (CC-21); all with the usual law."""
+    return 1.0 - (1.0 - TURNING_APPROACH) ** bases.periods_per_step if config.is_turning else 1.0
 
 
 def steps(seconds: float, step_s: float) -> int:
@@ -251,7 +253,7 @@ def _torque_limit(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> dict[st
     vdc, omega, thermal, magnet = config.inverter.vdc_V, config.omega_max_rad_s, config.thermal, config.magnet
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
     return {
-        "torque_slew_weak_Nm": slew_weak(config) * config.machine.torque_max_Nm * bases.step_s,
+        "torque_slew_weak_Nm": SLEW_WEAK_PER_TORQUE_MAX * config.machine.torque_max_Nm * bases.step_s,
         "psi_weak_Vs": PSI_WEAK_PER_PSI_F * psi_f_Vs,
         "loss_rate": 1.0 - math.exp(-bases.step_s / LOSS_TIME_S),
         "loss_drop_V": 4.0 / math.pi * config.inverter.device_drop_V,
@@ -288,7 +290,8 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
         "phase_dead_A": PHASE_DEAD_SHARE * machine.i_max_A,
         # The fastest change of torque moves the current by this much per second; current control lags behind (TL-11).
-        "ripple_A": (RIPPLE_SHARE + slew_weak(config) * missing_periods(config) * bases.period_s) * machine.i_max_A,
+        "answer_rate": _answer_rate(config, bases),
+        "ripple_A": (RIPPLE_SHARE + SLEW_WEAK_PER_TORQUE_MAX * LOOP_MISSING_PERIODS * bases.period_s) * machine.i_max_A,
         "phase_alive_A": PHASE_ALIVE_SHARE * machine.i_max_A,
         "speed_trip_rad_s": (1.0 + SPEED_TRIP * reserve) * omega,
         "monitor_torque_Nm": max(

@@ -35,6 +35,7 @@ from fluxtrue_tools.motor.derived import (
     TURNING_APPROACH,
     TURNING_FEEDBACK,
     TURNING_INTEGRAL,
+    WINDING_MIN_C,
     sinc_gain,
     steps,
 )
@@ -413,6 +414,7 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
         ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
         ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
+        ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
         ("winding_trip_dC", str(round(10 * thermal.winding_trip_C)), ""),
@@ -433,8 +435,12 @@ def _torque_monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     rate = 1.0 / (b.omega_rad_s * b.step_s)
     lag = (2.0 / d.tracker_bandwidth_rad_s - b.period_s / 2.0) / b.step_s  # (AT-7)
+    r = motor.config.machine.r_ohm / b.resistance_ohm
     return [
-        ("r", q16(motor.config.machine.r_ohm / b.resistance_ohm, "r"), "R at 20 C"),
+        ("r", q31(r, "r"), "R at 20 C"),
+        ("r_per_dC", q31(r * motor.config.machine.r_temp_coeff_per_K / 10.0, "r_per_dC"), "per 0.1 K"),
+        ("winding_min_dC", str(round(10 * WINDING_MIN_C)), ""),
+        ("winding_max_dC", str(round(10 * motor.config.thermal.winding_trip_C)), ""),
         ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
         ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
         ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
