@@ -84,12 +84,20 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
 }
 
+/* With a broken lead the currents are not those of the reference, and neither is the power. */
+static bool is_controlled(const drive_t *drive, dq_q15_t i)
+{
+    const dq_q15_t i_ref = drive->task.i_ref;
+    const int32_t i_0 = drive->motor->torque_monitor.i_0;
+    return fx_abs_q31(i.d - i_ref.d) < i_0 && fx_abs_q31(i.q - i_ref.q) < i_0;
+}
+
 /* After check_angle(), which takes the flux out of the voltage. */
 static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
-        .acting = snapshot->window.acting && snapshot->sample.acting,
+        .acting = snapshot->window.acting && snapshot->sample.acting && is_controlled(drive, snapshot->sample.point.i),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,

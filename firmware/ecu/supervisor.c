@@ -11,7 +11,7 @@
 #define STATE_TIME_MAX_US 60000000U /* far beyond every time-out */
 #define FIRST_ECU_FAULT 33U
 #define SHUT_OFF_FAULTS (ECU_FAULT_GATE_DISABLE | ECU_FAULT_GATE_SUPPLY | ECU_FAULT_WATCHDOG)
-#define TRIPS (ECU_FAULT_GATE | ECU_FAULT_STALL | SHUT_OFF_FAULTS)
+#define TRIP_FAULTS (ECU_FAULT_GATE | ECU_FAULT_STALL | SHUT_OFF_FAULTS)
 
 static bool refuse(supervisor_t *s, refused_t reason)
 {
@@ -159,7 +159,7 @@ static bool is_on(const supervisor_in_t *in)
 static uint32_t conditions(const supervisor_t *s, const supervisor_in_t *in)
 {
     const bool faulted = s->faults != 0U || in->drive_faults != 0U;
-    const bool tripped = in->drive_faults != 0U || (s->faults & TRIPS) != 0U;
+    const bool tripped = in->drive_faults != 0U || (s->faults & TRIP_FAULTS) != 0U;
     const bool may_discharge = !in->dc_safe && (s->faults & ECU_FAULT_DISCHARGE) == 0U;
     return bit_if(has_passed_self_test(s, in), WHEN_SELF_TEST_PASSED) | bit_if(tripped, WHEN_TRIPPED) |
            bit_if(faulted, WHEN_FAULTED) | bit_if(!faulted, WHEN_HEALTHY) | bit_if(is_on(in), WHEN_ON) |

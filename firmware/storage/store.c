@@ -79,17 +79,11 @@ static newest_t find_newest(void)
 {
     newest_t newest = {.slot = HAL_NVM_SLOTS};
     uint32_t excluded[WORDS] = {0};
-    for (uint32_t k = 0; k < HAL_NVM_SLOTS; k++) {
-        const uint32_t slot = highest(excluded, &newest);
-        if (slot == HAL_NVM_SLOTS) {
-            break;
-        }
-        if (is_intact(slot, &newest.header)) {
-            newest.slot = slot;
-            break;
-        }
+    newest.slot = highest(excluded, &newest);
+    while (newest.slot < HAL_NVM_SLOTS && !is_intact(newest.slot, &newest.header)) {
         newest.damaged = true;
-        excluded[slot / 32U] |= 1U << (slot % 32U);
+        excluded[newest.slot / 32U] |= 1U << (newest.slot % 32U);
+        newest.slot = highest(excluded, &newest);
     }
     return newest;
 }

@@ -43,6 +43,18 @@ typedef struct {
 
 typedef struct {
     int32_t d, q;
+} dq_q27_t;
+
+typedef struct {
+    int32_t d, q;
+} dq_q28_t;
+
+typedef struct {
+    int32_t d, q;
+} dq_q29_t;
+
+typedef struct {
+    int32_t d, q;
 } dq_q30_t;
 
 typedef struct {

@@ -11,8 +11,9 @@
 /* pole_gain of m = 1: 4 R_0 2^g_shift. */
 static float pole_per_m(const mrai_config_t *config)
 {
-    const float scale = (config->g_shift < 0) ? 1.0F / (float)(1U << -config->g_shift) : (float)(1U << config->g_shift);
-    return 4.0F * scale * si_from_q31(config->r0, 1.0F);
+    const float four_r0 = 4.0F * si_from_q31(config->r0, 1.0F);
+    const float scale = (float)(1U << (uint32_t)fx_abs_q15(config->g_shift));
+    return (config->g_shift < 0) ? four_r0 / scale : four_r0 * scale;
 }
 
 float mrai_calibration_get(const drive_t *drive, calibration_id_t id)

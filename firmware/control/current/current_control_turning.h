@@ -29,15 +29,6 @@ typedef struct {
     int32_t drop_q29;       /* w_b T_s R_0 */
 } turning_control_config_t;
 
-/** Flux linkage, and flux of one period, which is the voltage times w_b T_s. */
-typedef struct {
-    int32_t d, q;
-} dq_q28_t;
-
-typedef struct {
-    int32_t d, q;
-} dq_q29_t;
-
 typedef struct {
     dq_q28_t s;    /* integral part */
     dq_q29_t now;  /* r_k: the model's flux at this sample */

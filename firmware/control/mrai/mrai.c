@@ -13,15 +13,6 @@
 /* Weight of the d equation (MR-7). */
 #define WEIGHT_D 2
 
-/* Formats that only this law uses. */
-typedef struct {
-    int32_t d, q;
-} dq_q27_t;
-
-typedef struct {
-    int32_t d, q;
-} dq_q28_t;
-
 typedef struct {
     int32_t d, q;
 } dq_q35_t;
