@@ -126,6 +126,7 @@ typedef struct {
     torque_monitor_state_t torque_monitor;
     frozen_angle_state_t frozen_angle;
     launch_power_state_t launch_power;
+    int32_t monitored_dead_time_q16; /* compensation of the last step, for the monitors of a standing angle */
     commission_state_t commission;
     commission_curve_t inverter; /* voltage error against current, as last measured */
     compensation_t compensation;

@@ -69,12 +69,21 @@ static q15_t least_of(abc_q15_t i)
     return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
 }
 
-static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+/* The voltages move with the compensation, whatever the rotor does: what compares them with earlier ones begins anew. */
+static bool is_compensation_new(drive_t *drive)
+{
+    const int32_t dead_time_q16 = drive->parameters.modulate.dead_time_q16;
+    const bool is_new = dead_time_q16 != drive->task.monitored_dead_time_q16;
+    drive->task.monitored_dead_time_q16 = dead_time_q16;
+    return is_new;
+}
+
+static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref, bool acting)
 {
     const identify_window_t *window = &snapshot->window;
     task_state_t *task = &drive->task;
     const frozen_angle_in_t in = {
-        .acting = window->acting && snapshot->sample.acting,
+        .acting = acting,
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
@@ -93,11 +102,11 @@ static bool is_controlled(const drive_t *drive, dq_q15_t i)
 }
 
 /* After check_angle(), which takes the flux out of the voltage. */
-static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot)
+static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting)
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
-        .acting = snapshot->window.acting && snapshot->sample.acting && is_controlled(drive, snapshot->sample.point.i),
+        .acting = acting && is_controlled(drive, snapshot->sample.point.i),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
@@ -110,6 +119,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
+    const bool acting = !is_compensation_new(drive) && snapshot->window.acting && snapshot->sample.acting;
     return check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) |
-           check_angle(drive, snapshot, phases_ref) | check_launch(drive, snapshot) | shorted;
+           check_angle(drive, snapshot, phases_ref, acting) | check_launch(drive, snapshot, acting) | shorted;
 }

@@ -12,8 +12,8 @@
 static float pole_per_m(const mrai_config_t *config)
 {
     const float four_r0 = 4.0F * si_from_q31(config->r0, 1.0F);
-    const float scale = (float)(1U << (uint32_t)fx_abs_q15(config->g_shift));
-    return (config->g_shift < 0) ? four_r0 / scale : four_r0 * scale;
+    const uint32_t scale = 1U << (uint32_t)fx_abs_q15(config->g_shift);
+    return (config->g_shift < 0) ? four_r0 / (float)scale : four_r0 * (float)scale;
 }
 
 float mrai_calibration_get(const drive_t *drive, calibration_id_t id)
