@@ -95,4 +95,4 @@ def test_the_torque_loop_and_the_monitor_of_the_current_know_the_slower_answer(w
         missing_ms = periods * period_ms + 0.291667
         assert derived.torque_model_rate == pytest.approx(step_ms / (step_ms + missing_ms), rel=1e-4)
     assert usual_motor.derived.answer_rate == 1.0
-    assert turning.derived.answer_rate == pytest.approx(1.0 - 0.9**10)
+    assert turning_motor.derived.answer_rate == pytest.approx(1.0 - 0.9**10)

@@ -72,6 +72,8 @@ TIMES = {
     "DISCHARGE_TIME_OUT_MS": r"is_timed_out\(",
     "SLEW_MS": r"per_step\(", "JERK_MS": r"per_step\(", "RAMP_OUT_MS": r"per_step\(",
     "COMMAND_TIME_OUT_US": r"grow_old\(", "BATTERY_TIME_OUT_US": r"grow_old\(",
+    "MISMATCH_US": r"state->us", "ABSENT_US": r"state->us", "STAGE_US": r"state->us",
+    "EARLY_US": r"since_us", "LATE_US": r"since_us",
     "MEMORY_REST_MS": r"in_steps\(", "MEMORY_INTERVAL_MS": r"in_steps\(",
 }  # fmt: skip
 # Numbers that are not a time, or not one of the task.
@@ -108,6 +110,9 @@ COUNTS = {
     "STEP_1MS": "a step that is exactly 1 ms", "STEP_DC": "of a temperature",
     "APART_STEPS": "steps, as hal/s32k144/README.md says",
     "AWAIT_LOOPS": "loops before there is a task",
+    "COMMAND_LOOPS": "loops of the background, longer than any flash command",
+    "MEMORY_HOLD_STEPS": "steps in which a save waits for the drive, as firmware/storage/memory.h says",
+    "PERIODS_MAX_STEPS": "steps after which the overrun is another fault's",
     "STOPPED_PERIODS": "of a timer that never runs",
     "FIRST_TICKS": "ticks of the watchdog", "TIMEOUT_TICKS": "ticks of the watchdog",
     "WINDOW_TICKS": "ticks of the watchdog",
