@@ -69,7 +69,7 @@ static q15_t least_of(abc_q15_t i)
     return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
 }
 
-/* The voltages move with the compensation, whatever the rotor does: what compares them with earlier ones begins anew. */
+/* The voltages move with the compensation, whatever the rotor does: comparisons with earlier ones begin anew. */
 static bool is_compensation_new(drive_t *drive)
 {
     const int32_t dead_time_q16 = drive->parameters.modulate.dead_time_q16;
