@@ -468,13 +468,14 @@ typedef struct {
     volatile uint32_t MIER;
     uint8_t reserved1[0xc];
     volatile uint32_t TVAL0;
-    uint8_t reserved2[0x4];
+    volatile uint32_t CVAL0;
     volatile uint32_t TCTRL0;
 } lpit_t;
 _Static_assert(offsetof(lpit_t, MCR) == 0x8, "MCR");
 _Static_assert(offsetof(lpit_t, MSR) == 0xc, "MSR");
 _Static_assert(offsetof(lpit_t, MIER) == 0x10, "MIER");
 _Static_assert(offsetof(lpit_t, TVAL0) == 0x20, "TVAL0");
+_Static_assert(offsetof(lpit_t, CVAL0) == 0x24, "CVAL0");
 _Static_assert(offsetof(lpit_t, TCTRL0) == 0x28, "TCTRL0");
 #define LPIT_MCR_M_CEN 0x1U
 #define LPIT_MSR_TIF0 0x1U

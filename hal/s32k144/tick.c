@@ -5,7 +5,8 @@
 
 #define FOUR_TICKS_LOOPS 32 /* at least 4 ticks of 28 MHz, which are 16 of the core */
 
-static uint32_t step_ticks, first_ticks; /* a step; from the start of the PWM until the first tick */
+static uint32_t pwm_ticks, step_ticks,
+    first_ticks; /* a PWM period; a step; from the start of the PWM to the first tick */
 
 static void pass_four_ticks(void)
 {
@@ -16,6 +17,7 @@ static void pass_four_ticks(void)
 
 void tick_init(uint32_t period_ticks, uint32_t periods)
 {
+    pwm_ticks = period_ticks;
     step_ticks = periods * period_ticks;
     LPIT0->MCR = LPIT_MCR_M_CEN;
     pass_four_ticks(); /* the timer accepts no other access before that */
@@ -39,9 +41,11 @@ void tick_continue(void)
 
 void tick_align(uint32_t elapsed)
 {
+    const uint32_t left = LPIT0->CVAL0;
+    const uint32_t phase = (elapsed + left) % pwm_ticks; /* at which the step would end, instead of a quarter */
     LPIT0->TCTRL0 = 0;
     pass_four_ticks();
-    LPIT0->TVAL0 = step_ticks + first_ticks - elapsed - 1U;
+    LPIT0->TVAL0 = left + pwm_ticks + pwm_ticks / 4U - phase - 1U;
     tick_start();
     tick_continue();
 }

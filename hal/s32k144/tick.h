@@ -6,7 +6,7 @@
  * Units    period_ticks: one PWM period in ticks of the 28 MHz timer; periods: N
  * Context  start-up; tick_start() right before pwm_start(), tick_continue() right after it;
  *          tick_align(): at any time with interrupts masked, elapsed: ticks since the start of the PWM period; the step
- *          that runs ends after N to N + 1 further periods. tick_cleared(): first in the tick interrupt */
+ *          that runs is lengthened by 1/4 to 5/4 of a period. tick_cleared(): first in the tick interrupt */
 #include <stdint.h>
 
 void tick_init(uint32_t period_ticks, uint32_t periods);
