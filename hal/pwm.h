@@ -7,8 +7,8 @@
  * Errors   none; duties are always in range
  * Context  fast ISR; write() once per period; enable() at a change, and possibly repeatedly: true takes effect
  *          together with the duties written in the same period, false at once.
- *          gates(): fast ISR and 1 kHz task; read back from the timer, not as commanded: false while switching
- *          is disabled, and from a gate-driver fault, which the hardware latches, until enable(true) ends the latch */
+ *          gates(): fast ISR and 1 kHz task; read back as far as the port can: false while switching is disabled,
+ *          and from a gate-driver fault, which the hardware latches, until enable(true) ends the latch */
 #include <stdbool.h>
 
 #include "types/samples.h"

@@ -110,7 +110,7 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
-        .theta_e = snapshot->sample.theta_e,
+        .theta_e = snapshot->window.last.theta,
     };
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }
@@ -119,7 +119,10 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
-    const bool acting = !is_compensation_new(drive) && snapshot->window.acting && snapshot->sample.acting;
-    return check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) |
-           check_angle(drive, snapshot, phases_ref, acting) | check_launch(drive, snapshot, acting) | shorted;
+    const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
+    const bool acting = !is_compensation_new(drive) && is_window_new;
+    uint32_t faults = check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) | shorted;
+    faults |= check_angle(drive, snapshot, phases_ref, acting);
+    faults |= check_launch(drive, snapshot, acting);
+    return faults;
 }

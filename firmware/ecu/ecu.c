@@ -176,9 +176,9 @@ static void send_xcp(ecu_t *ecu)
 void ecu_task_1khz(ecu_t *ecu)
 {
     data_check_restore_pointer(&ecu->drive);
+    ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
     begin_step(ecu);
-    ecu_check_integrity(ecu);
     ecu_pass(ecu, FLOW_INTEGRITY);
     receive(ecu);
     ecu_pass(ecu, FLOW_RECEIVED);

@@ -23,7 +23,10 @@ static uint32_t flags(const ecu_t *ecu)
                             (uint32_t)ecu->rx.command_channel.failed << 24;
     const uint32_t of_states = (uint32_t)supervisor->enabled | (uint32_t)supervisor->enable_seen << 8 |
                                (uint32_t)supervisor->reset_seen << 16 | (uint32_t)supervisor->state << 24;
-    return seal_add(of_states, of_bus);
+    const shut_off_t *shut_off = &ecu->shut_off;
+    const uint32_t of_shut_off = (uint32_t)shut_off->tested | (uint32_t)shut_off->supply_on << 8 |
+                                 (uint32_t)shut_off->wrong << 16 | (uint32_t)shut_off->stage << 24;
+    return seal_add(seal_add(seal_add(of_states, of_bus), of_shut_off), shut_off->failed);
 }
 
 void ecu_seal_rates(ecu_t *ecu)

@@ -3,7 +3,7 @@
 
 #include "ecu/supervisor.h"
 
-#define STAGE_US 20000U  /* longest time until the supply must have followed */
+#define GONE_US 20000U   /* longest time until a supply that is not wanted must have gone */
 #define ABSENT_US 10000U /* longest time without supply although it is wanted; its start included */
 
 typedef struct {
@@ -42,12 +42,13 @@ static void test_step(shut_off_t *state, const shut_off_in_t *in)
     if (state->us == 0U && state->stage == 0U) {
         begin_stage(state, 0);
     }
+    const uint32_t us_max = stages[state->stage].supply ? ABSENT_US : GONE_US;
     state->us += in->elapsed_us;
     if (in->switching) {
         end_test(state, ECU_FAULT_GATE_DISABLE);
     } else if (state->us > in->elapsed_us && in->supply == stages[state->stage].supply) {
         begin_stage(state, (uint8_t)(state->stage + 1U));
-    } else if (state->us > STAGE_US) {
+    } else if (state->us > us_max) {
         end_test(state, stages[state->stage].fault);
     }
 }
@@ -65,7 +66,7 @@ static uint16_t absent(shut_off_t *state, const shut_off_in_t *in)
 
 void shut_off_step(shut_off_t *state, const shut_off_in_t *in)
 {
-    if (!in->fitted) {
+    if (!in->fitted && state->stage == 0U && state->failed == 0U) { /* a device that was once there is still wanted */
         state->tested = true;
         return;
     }

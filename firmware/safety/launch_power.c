@@ -6,7 +6,7 @@
 #include "signal/debounce.h"
 #include "types/faults.h"
 
-#define FAST_ANGLE (1U << 28) /* 1/16 of a turn in a step */
+#define FAST_ANGLE (1U << 26) /* 1/64 of a turn in a step: above, the monitor of the back-EMF follows */
 #define MOVING_STEPS 4      /* the voltage that moved the currents is no part of the mean */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12

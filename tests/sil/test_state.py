@@ -134,9 +134,11 @@ def test_the_flash_of_a_restored_drive_is_written_as_that_of_the_saved_one(make:
     drive = make()
     plant = prepared(drive, "robust")
     assert drive.set("enable", 0.0) == OK
-    closed_loop(drive, plant, 303)  # the record is saved 100 ms after switching has been disabled
+    plant.reference = 0.0
+    closed_loop(drive, plant, 3003)
+    # The record is saved 100 ms after switching has been disabled and the rotor stands.
     state, later = drive.save(), make()
-    samples = closed_loop(drive, plant, 3000)
+    samples = closed_loop(drive, plant, 10000)
     assert drive.get("memory_saves") == 1.0
     assert later.restore(state) == OK
     assert later.get("memory_saves") == 0.0

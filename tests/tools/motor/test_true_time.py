@@ -72,7 +72,7 @@ TIMES = {
     "DISCHARGE_TIME_OUT_MS": r"is_timed_out\(",
     "SLEW_MS": r"per_step\(", "JERK_MS": r"per_step\(", "RAMP_OUT_MS": r"per_step\(",
     "COMMAND_TIME_OUT_US": r"grow_old\(", "BATTERY_TIME_OUT_US": r"grow_old\(",
-    "MISMATCH_US": r"state->us", "ABSENT_US": r"state->us", "STAGE_US": r"state->us",
+    "MISMATCH_US": r"state->us", "ABSENT_US": r"state->us|us_max", "GONE_US": r"us_max",
     "EARLY_US": r"since_us", "LATE_US": r"since_us",
     "MEMORY_REST_MS": r"in_steps\(", "MEMORY_INTERVAL_MS": r"in_steps\(",
 }  # fmt: skip

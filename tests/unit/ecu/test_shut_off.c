@@ -70,6 +70,37 @@ static void fails_with(uint16_t fault)
     TEST_ASSERT_FALSE(state.tested);
 }
 
+void test_a_watchdog_that_falls_silent_does_not_end_the_test(void)
+{
+    while (state.stage == 0U) {
+        step();
+    }
+    in.fitted = false;
+    watchdog_stuck = true;
+    steps(100);
+    TEST_ASSERT_FALSE(state.tested);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_WATCHDOG, state.faults);
+}
+
+void test_a_test_that_has_failed_stays_failed_without_a_watchdog(void)
+{
+    in.switching = true;
+    steps(2);
+    TEST_ASSERT_EQUAL_UINT8(0, state.stage);
+    in.fitted = false;
+    steps(10);
+    TEST_ASSERT_FALSE(state.tested);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_DISABLE, state.faults);
+}
+
+void test_a_supply_that_comes_later_than_the_drive_would_wait_is_a_fault(void)
+{
+    for (int n = 0; n < 15; n++) {
+        shut_off_step(&state, &in);
+    }
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_SUPPLY, state.faults);
+}
+
 void test_a_supply_that_does_not_come_is_a_fault_of_the_supply(void)
 {
     switch_open = true;

@@ -285,7 +285,7 @@ void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_o
     }
 }
 
-/* (MN-26): a winding of 12 V at standstill, where 0.1 of its voltage drops on it at 20 C and full current. */
+/* (MN-32): a winding of 12 V at standstill, where 0.1 of its voltage drops on it at 20 C and full current. */
 static const struct {
     int16_t winding_dC, measured_dC;
     bool found;
