@@ -9,7 +9,8 @@
  *   |m - m_0| > |i*| (v_1 + |n - n_0|(psi_f/5 + |psi_q|/8)) in a row of steps; no check below |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
- * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; every other argument; begins anew when the angle moves by 1/64 of a turn in a step
+ * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; every other argument
+ *          begins anew when the angle moves by 1/64 of a turn in a step
  * Rounding 2^-8 of a count of the sum
  * Errors   returns FAULT_ANGLE_OFFSET while it is confirmed; the fast ISR latches it
  * Context  1 kHz task; one square root, no division */

@@ -5,7 +5,8 @@
  *   Each slot: header {layout, size, sequence, crc}, then the record. A save writes the next blank slot after the one
  *   with the newest record, the header last, and erases a sector when it reaches its first slot, never the one with the
  *   newest record. A power cut at any byte therefore leaves either the previous or the new record intact. A slot that
- *   is not blank, for example because a cut left it half written, is passed over, and so is a sector that cannot be erased.
+ *   is not blank, for example because a cut left it half written, is passed over,
+ *   and so is a sector that cannot be erased.
  * Source   docs/decisions/007-store.md
  * Range    size <= STORE_RECORD_MAX; layout names the record's meaning: a record of another layout is not found
  * Errors   store_load(): STORE_EMPTY, no record was saved with this layout; STORE_DAMAGED, there are records but none
