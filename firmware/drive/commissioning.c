@@ -5,7 +5,6 @@
 
 #define DEAD_TIME_MAX Q15(0.125) /* a larger share of the dc voltage is not a plausible voltage error */
 #define KNEE_CHANGED Q31(0.8)    /* a measured knee counts from a quarter wider on; smaller differences are noise */
-#define KNEE_RANGE 16
 #define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
 
 static int32_t product_q30(int32_t a_q30, q15_t b)
@@ -31,7 +30,7 @@ static int32_t knee_gain(const modulate_config_t *config, const commission_curve
     if (gain >= fx_mul_q31(config->knee_q17, KNEE_CHANGED)) {
         return config->knee_q17;
     }
-    return fx_max_s32(gain, config->knee_q17 / KNEE_RANGE);
+    return fx_max_s32(gain, config->knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
 static bool is_plausible(const drive_t *drive, const commission_curve_t *curve)

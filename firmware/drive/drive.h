@@ -93,12 +93,21 @@ typedef struct {
     turning_control_state_t turning_control; /* of a motor that needs it, in place of current_control */
 } fast_state_t;
 
+#define COMPENSATION_KNEE_RANGE 16 /* a measured knee is at most so many times as wide as the nominal one */
+
 /** What the modulation adds against dead time and device drop, if it has been measured. */
 typedef struct {
     int32_t dead_time; /* q15 */
     int32_t knee_q17;
     int32_t measured; /* not zero: this is not motor.toml's */
 } compensation_t;
+
+/** Values that a start has recalled (drive/recall.h). */
+typedef struct {
+    uint8_t agreed; /* updates in a row */
+    uint8_t trials;
+    bool unconfirmed;
+} recall_t;
 
 /** Leaving torque at speed (drive/switch_off.h). */
 typedef struct {
@@ -141,6 +150,7 @@ typedef struct {
     safe_state_state_t safe_state;
     gate_fault_state_t gate_fault;
     switch_off_t switch_off;
+    recall_t recall;
     bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */
     uint32_t fault_resets_asked;    /* of the request, as far as seen */
     uint32_t fault_resets;          /* passed on to the fast ISR */
@@ -244,7 +254,8 @@ progress_t drive_progress(drive_t *drive);
 
 /** The identified values, for the store that survives a power cycle. Called in the background. */
 identify_record_t drive_identified_record(const drive_t *drive);
-/** After drive_init(), before the first task; false: the record is refused, nothing changed. */
+/** After drive_init(), before the first task; false: the record is refused, nothing changed. What is recalled acts when
+ * measured windows have confirmed it (drive/recall.h). */
 bool drive_recall(drive_t *drive, const identify_record_t *record);
 
 /** The identification's share of the 1 kHz task. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/drive.h"
 #include "drive/mrai/mrai_seam.h"
+#include "drive/recall.h"
 
 static bool is_at_limit(const identify_state_t *state, identify_index_t index)
 {
@@ -24,7 +25,7 @@ static identification_t robust_identification(const drive_t *drive, const identi
         .torque_variance_q30 = state->torque_variance_q30,
         .psi_d_error = out->psi_delta,
         .torque_estimated = out->torque,
-        .confidence = state->confidence,
+        .confidence = drive->task.recall.unconfirmed ? (q15_t)0 : state->confidence,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
         .r_quality = variance_reduction(state, IDENTIFY_R),
         .psi_clamped = is_at_limit(state, IDENTIFY_FLUX),
@@ -46,11 +47,12 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
         .winding_dC = snapshot->winding_dC,
         .enabled = drive->request.identification && snapshot->sample.acting,
     };
+    recall_step(drive, point.omega);
     const identify_out_t out = identify_step(&m->identify, &task->identify, &in);
     drive_trim(drive, (q15_t)snapshot->sample.v_dc);
     task->identifications = task->identifications + 1U;
     task->identification = robust_identification(drive, &out);
-    task->psi_d_error = out.psi_delta;
+    task->psi_d_error = task->recall.unconfirmed ? (q15_t)0 : out.psi_delta;
 }
 
 void drive_identify(drive_t *drive, const snapshot_t *snapshot)
@@ -77,5 +79,9 @@ identify_record_t drive_identified_record(const drive_t *drive)
 
 bool drive_recall(drive_t *drive, const identify_record_t *record)
 {
-    return identify_record_restore(&drive->task.identify, record);
+    const bool restored = identify_record_restore(&drive->task.identify, record);
+    if (restored) {
+        recall_begin(drive);
+    }
+    return restored;
 }

@@ -24,6 +24,7 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
         task->identification_resets = request->identification_resets;
         mrai_discard(drive);
         identify_reset(&drive->motor->identify, &task->identify);
+        task->recall.unconfirmed = false;
         drive_restore_trim(drive, 0);
     }
     if (faults != 0U) {
@@ -104,6 +105,9 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
 /* Identified |psi_q| minus the tables'. */
 static q15_t psi_q_delta(const drive_t *drive)
 {
+    if (drive->task.recall.unconfirmed) {
+        return 0;
+    }
     return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15((q15_t)drive->task.psi_ref.q));
 }
 

@@ -6,6 +6,9 @@
 
 #define VERSION 3U /* of record_t */
 #define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
+#define DISTANCE_MAX_Q26 1610612736   /* 24: of chi square with 7 degrees of freedom one in a thousand */
+#define DUTY_MARGIN 0.0078125F               /* of the period */
+#define LSB_Q15 3.0517578125e-5F
 #define STANDSTILL Q31(0.002)  /* of the speed base */
 
 /* No padding: the store's checksum runs over its bytes. */
@@ -26,11 +29,33 @@ uint32_t memory_layout(const motor_t *m)
     return ~crc32_update(crc, m->identify.sigma, sizeof m->identify.sigma);
 }
 
+/* The seven values together are no further from the motor data than one machine in a thousand is (ID-22). */
+static bool is_near_priors(const identify_record_t *identified)
+{
+    int64_t distance_q26 = 0;
+    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+        const int64_t x_q13 = identified->x_q27[j] / 16384;
+        distance_q26 += x_q13 * x_q13;
+    }
+    return distance_q26 <= DISTANCE_MAX_Q26;
+}
+
+/* From half to twice what motor.toml gives for dead time and device drop, and a knee that commissioning could find. */
+static bool is_near_bridge(const motor_t *m, const compensation_t *compensation)
+{
+    const float duty = (float)compensation->dead_time * LSB_Q15;
+    const int32_t knee_q17 = m->parameters.modulate.knee_q17;
+    return compensation->measured == 0 ||
+           (duty <= 2.0F * m->bridge_duty + DUTY_MARGIN && duty >= 0.5F * m->bridge_duty - DUTY_MARGIN &&
+            compensation->knee_q17 <= knee_q17 && compensation->knee_q17 >= knee_q17 / COMPENSATION_KNEE_RANGE);
+}
+
 void memory_recall(memory_t *memory, drive_t *drive)
 {
     record_t record;
     *memory = (memory_t){0};
-    if (store_load(memory_layout(drive->motor), &record, sizeof record) == STORE_OK) {
+    if (store_load(memory_layout(drive->motor), &record, sizeof record) == STORE_OK &&
+        is_near_priors(&record.identified) && is_near_bridge(drive->motor, &record.compensation)) {
         memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
                            drive_recall(drive, &record.identified);
         if (memory->recalled) {
@@ -70,7 +95,7 @@ static bool save_record(memory_t *memory, const drive_t *drive, uint32_t now)
     const record_t record = {drive_identified_record(drive), drive->task.compensation, drive->task.trim.trim};
     bool saved = false;
     if (hal_nvm_begin()) {
-        saved = store_save(memory_layout(drive->motor), &record, sizeof record);
+        saved = store_save(memory_layout(drive->motor), &record, sizeof record, &memory->failed_sectors);
         memory->erase_cycles = store_erase_cycles();
         hal_nvm_end();
     }

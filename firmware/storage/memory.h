@@ -24,6 +24,7 @@
 typedef struct {
     uint32_t saves, failures;
     uint32_t erase_cycles;                     /* of the flash, after the last save (store_erase_cycles()) */
+    uint32_t failed_sectors;                   /* that did not erase, program or verify and were passed over */
     uint32_t rest_since, held_since, tried_at; /* counts of the drive's identifications */
     bool recalled;                             /* a record was found and taken */
     bool has_run, has_tried;                   /* since the last save; since the start */

@@ -4,7 +4,7 @@
 #include "signal/crc32.h"
 
 #define CHUNK 64U   /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
-#define ATTEMPTS 2U /* of a save: a place that fails is passed over once */
+#define ATTEMPTS 4U /* of a save, each in another sector: an erase may take more than a tenth of a second */
 #define WORDS ((HAL_NVM_SLOTS + 31U) / 32U)
 
 typedef struct {
@@ -157,9 +157,10 @@ static bool prepare(uint32_t slot)
     return slot % HAL_NVM_SECTOR_SLOTS != 0U || hal_nvm_erase(slot);
 }
 
-/* From the slot after the newest record on, as far as the sector before that of the newest record. The sequence number
- * advances with the place: it tells how often the sectors were erased. */
-bool store_save(uint32_t layout, const void *record, uint32_t size)
+/* From the slot after the newest record on, as far as the sector before that of the newest record. Where a slot fails
+ * the rest of its sector is passed over: it would fail again at each save. The sequence number advances with the place:
+ * it tells how often the sectors were erased. */
+bool store_save(uint32_t layout, const void *record, uint32_t size, uint32_t *failed_sectors)
 {
     const newest_t newest = find_newest();
     const bool first = newest.slot == HAL_NVM_SLOTS;
@@ -168,14 +169,17 @@ bool store_save(uint32_t layout, const void *record, uint32_t size)
         return false;
     }
     uint32_t attempts = 0;
+    uint32_t failed = HAL_NVM_SLOTS; /* the last sector that failed; no sector has this number */
     for (uint32_t k = 0; k < HAL_NVM_SLOTS - HAL_NVM_SECTOR_SLOTS && attempts < ATTEMPTS; k++) {
         const uint32_t slot = first ? k : (newest.slot + 1U + k) % HAL_NVM_SLOTS;
         header.sequence = first ? k : newest.header.sequence + 1U + k;
         header.crc = ~crc32_update(header_crc(&header), record, size);
-        if (is_free(slot)) {
+        if (slot / HAL_NVM_SECTOR_SLOTS != failed && is_free(slot)) {
             if (prepare(slot) && write_slot(slot, &header, record)) {
                 return true;
             }
+            failed = slot / HAL_NVM_SECTOR_SLOTS;
+            *failed_sectors += 1U;
             attempts++;
         }
     }

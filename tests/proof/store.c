@@ -65,9 +65,9 @@ void proof_store_load_stays_inside_the_record(void)
 void proof_store_save_changes_one_slot(void)
 {
     uint8_t record[LONGEST], size;
-    uint32_t layout;
+    uint32_t layout, failed_sectors = 0;
     ASSUME(size <= LONGEST);
-    (void)store_save(layout, record, size);
+    (void)store_save(layout, record, size, &failed_sectors);
     PROVE(erased != 3U && (programmed & ~erased) == 0U);
 }
 

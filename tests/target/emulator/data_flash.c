@@ -65,7 +65,7 @@ bool data_flash_program(emu_t *emu, uint32_t address, const uint8_t data[DATA_FL
     const bool was_erased = memcmp(cell, erased, sizeof erased) == 0;
     changed(emu, address, DATA_FLASH_PHRASE);
     for (uint32_t k = 0; k < DATA_FLASH_PHRASE; k++) {
-        cell[k] &= data[k];
+        cell[k] &= (uint8_t)(data[k] | (f->weak[address / DATA_FLASH_SECTOR] ? 0x10U : 0U));
     }
     if (!was_erased) {
         f->uncertain[address / DATA_FLASH_PHRASE] = true;
@@ -204,6 +204,11 @@ void emu_flash_slow(emu_t *emu, bool slow)
 void emu_flash_worn(emu_t *emu, uint32_t sector, bool worn)
 {
     emu->flash.worn[sector % DATA_FLASH_SECTORS] = worn;
+}
+
+void emu_flash_weak(emu_t *emu, uint32_t sector, bool weak)
+{
+    emu->flash.weak[sector % DATA_FLASH_SECTORS] = weak;
 }
 
 void emu_flash_random(emu_t *emu, uint32_t seed)

@@ -114,6 +114,8 @@ EMU_API void emu_power_cycle(emu_t *emu);
  * of what a cut command leaves; completed or cut erases of a sector; the phrase at this address cannot be relied on. */
 EMU_API void emu_flash_slow(emu_t *emu, bool slow);
 EMU_API void emu_flash_worn(emu_t *emu, uint32_t sector, bool worn);
+/** One bit of each byte of this sector cannot be programmed, although the sector erases. */
+EMU_API void emu_flash_weak(emu_t *emu, uint32_t sector, bool weak);
 EMU_API void emu_flash_random(emu_t *emu, uint32_t seed);
 EMU_API uint32_t emu_flash_erases(const emu_t *emu, uint32_t sector);
 EMU_API void emu_flash_spoil(emu_t *emu, uint32_t address);

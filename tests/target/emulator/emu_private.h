@@ -161,6 +161,7 @@ typedef struct {
     bool held[DATA_FLASH_SIZE / 16], speculated[DATA_FLASH_SIZE / 16], stale[DATA_FLASH_SIZE / 16];
     uint32_t erases[DATA_FLASH_SECTORS];
     bool worn[DATA_FLASH_SECTORS]; /* an erase fails its verification */
+    bool weak[DATA_FLASH_SECTORS]; /* a bit that cannot be programmed */
     bool slow;                     /* commands take as long as the data sheet allows */
     uint32_t random;
 } data_flash_t;

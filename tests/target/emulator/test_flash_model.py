@@ -126,6 +126,9 @@ def test_cells_that_are_not_erased_fail_verification(core: Core) -> None:
     assert done(core, PROGRAM, 0, b"\x0f" * PHRASE) == CCIF | MGSTAT0
     core.flash_worn(3, True)
     assert done(core, ERASE, 3 * SECTOR) == CCIF | MGSTAT0
+    core.flash_weak(4, True)
+    assert done(core, ERASE, 4 * SECTOR) == CCIF
+    assert done(core, PROGRAM, 4 * SECTOR, b"\x00" * PHRASE) == CCIF | MGSTAT0
 
 
 # ---- read by a program: programs/flash.c

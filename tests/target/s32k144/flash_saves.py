@@ -23,7 +23,8 @@ HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/st
 STATES: Final = 7  # of the filter
 RECORD: Final = struct.Struct(f"<I{STATES}i{STATES}i4i")  # firmware/storage/memory.c
 CCIF: Final = 0x80
-RECALLED: Final = 24  # offset in memory_t, firmware/storage/memory.h
+FAILED_SECTORS: Final = 3  # word of memory_t, firmware/storage/memory.h
+RECALLED: Final = 28  # byte of it
 STEP_S: Final = 10e-6
 IDENTIFIED: Final = ("psi_f_Vs", "lq_scale", "ld_scale", "r_ohm", "drop_V")
 

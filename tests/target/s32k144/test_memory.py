@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import flash_cuts
@@ -12,12 +12,15 @@ import flash_saves as flash
 import numpy as np
 import pytest
 from flash_saves import Parts
+from listener import Listener
 from planting import PlantedError, image_with_error
 
 from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.bench.image import Stand
 from fluxtrue_tools.emulate import build
-from fluxtrue_tools.emulate.core import Core, EmulationStoppedError
+from fluxtrue_tools.emulate.core import Core
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.library import Loop
 
 POINTS = ((1500.0, 50.0), (2500.0, 20.0), (600.0, -40.0))
 
@@ -47,6 +50,7 @@ def test_a_drive_remembers_what_it_has_identified(parts: Parts) -> None:
         assert flash.saves(core) == 0
         flash.until_saving(loop, core)
         flash.until_saved(loop, core)
+        loop.run(1)  # the background counts the save once the clock is fast
         assert flash.saves(core) == 1
         (record,) = flash.records(core)
         before = flash.identified(loop)
@@ -77,6 +81,39 @@ def test_the_bus_image_remembers_too(flashed: bytes) -> None:
         assert flash.is_recalled(core)
 
 
+def _drive_on_the_bus(stand: Stand) -> None:
+    """To 1500 rpm and 50 N·m and back to standstill, then switched off."""
+    stand.power_up()
+    for rpm, torque, milliseconds in ((1500.0, 50.0, 300), (0.0, 0.0, 200)):
+        start = stand.loop.get("plant.speed_rad_s")
+        stand.command.values["TorqueRequested"] = torque
+        for k in range(milliseconds):
+            speed = [start + (rpm * flash.RPM - start) * (k + j) / milliseconds for j in (0, 1)]
+            stand.run_ms({"plant.speed_rad_s": (speed[0], speed[1])})
+    stand.command.values["Enable"] = 0
+
+
+def test_the_bus_image_saves_without_a_late_task() -> None:
+    """While it writes, the processor runs at half its speed and the frames of the bus go on."""
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    motor = (bus := build.prepare("hsm1", angle="resolver", flashed=True)).emulated()
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        stand = Stand(loop)
+        sent = Listener(stand.core)
+        _drive_on_the_bus(stand)
+        slow = [stand.core.register("SMC.PMCTRL") == 0 for _ in range(800) if stand.run_ms() is not None]
+        assert any(slow) and not slow[-1], "nothing was saved, or the save does not end"
+        assert flash.saves(stand.core) == 1
+        stand.run(300)
+        task = sent.last["INV_DiagTask"]
+        assert (task["TaskOverruns"], task["IsrOverruns"]) == (0, 0)
+        assert loop.get("fault_word") == 0
+        assert stand.core.resets == 0
+    assert bus.image.exists()
+
+
 def test_switching_waits_until_the_save_is_complete(parts: Parts) -> None:
     with flash.key_on(parts) as (loop, core):
         core.flash_slow(True)
@@ -93,26 +130,49 @@ def test_switching_waits_until_the_save_is_complete(parts: Parts) -> None:
         assert core.resets == 0
 
 
+def _tick_phase(loop: Loop, core: Core) -> float:
+    """Where in the PWM period the 1 kHz task starts, in ticks of 112 MHz, of 11200."""
+    seen: list[int] = []
+    core.on_exception(
+        lambda vector, entered: seen.append(core.load("FTM0.CNT")) if vector == 16 + 48 and entered else None
+    )
+    loop.run(100)
+    core.on_exception(lambda *_: None)
+    assert len(seen) in {9, 10, 11}
+    return max(seen)
+
+
 def test_the_tick_is_where_it_was_after_a_save(parts: Parts) -> None:
-    """A quarter period after the start of a period, so that a step always has the same number of periods."""
-    with flash.key_on(parts) as (loop, core):
+    """A quarter period after the start of a period, so that a step always has the same number of periods.
 
-        def phase() -> float:
-            seen: list[int] = []
-            core.on_exception(
-                lambda vector, entered: seen.append(core.load("FTM0.CNT")) if vector == 16 + 48 and entered else None
-            )
+    After saves of different lengths, because an offset could be a whole period by chance.
+    """
+    for slow in (False, True):
+        with flash.key_on(parts) as (loop, core):
+            core.flash_slow(slow)
+            before = _tick_phase(loop, core)
+            flash.drive(loop, POINTS, 0.2)
+            flash.until_saving(loop, core)
+            flash.until_saved(loop, core)
             loop.run(100)
-            core.on_exception(lambda *_: None)
-            assert len(seen) in {9, 10, 11}
-            return max(seen)
+            after = _tick_phase(loop, core)
+            assert after == pytest.approx(before, abs=300)
 
-        before = phase()
+
+def test_a_sector_that_cannot_be_programmed_is_passed_over(parts: Parts) -> None:
+    """The first two sectors erase; the record is then in the third, and the next start finds it there."""
+    with flash.key_on(parts) as (loop, core):
+        core.flash_weak(0, True)
+        core.flash_weak(1, True)
         flash.drive(loop, POINTS, 0.2)
         flash.until_saving(loop, core)
         flash.until_saved(loop, core)
-        loop.run(100)
-        assert phase() == pytest.approx(before, abs=600)  # ticks of 112 MHz, of 11200
+        loop.run(1)  # the background counts the save once the clock is fast
+        assert flash.saves(core) == 1
+        assert core.word("memory", flash.FAILED_SECTORS) == 2
+        assert [record.slot for record in flash.records(core)] == [2 * flash.SECTOR_BYTES // flash.SLOT_BYTES]
+        flash.power_cycle(loop)
+        assert flash.is_recalled(core)
 
 
 # ---- what it is good for
@@ -142,7 +202,10 @@ def torque_error_Nm(parts: Parts, memory: bytes | None) -> np.ndarray:
 
 
 def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
-    """The magnet is 12 % weak and makes about two thirds of the torque."""
+    """The magnet is 12 % weak and makes about two thirds of the torque.
+
+    In the first second the recalled values wait for three measured updates that confirm them (ID-22).
+    """
     with flash.key_on(parts) as (loop, core):
         flash.drive(loop, LONG, 1.0)
         flash.until_saving(loop, core)
@@ -150,7 +213,9 @@ def test_with_the_memory_the_first_torque_is_right(parts: Parts) -> None:
         memory = core.read(flash.FLASH, flash.FLASH_BYTES)
     kept, first = torque_error_Nm(parts, memory), torque_error_Nm(parts, None)
     print(f"with the memory {kept.round(2)}, without {first.round(2)} N·m")
-    assert kept.max() <= 0.3
+    assert kept[0] <= 0.6
+    assert kept[1:].max() <= 0.3
+    assert kept.mean() <= 0.2
     assert first[:2].min() > 2.0
 
 
@@ -169,25 +234,47 @@ def cut(parts: Parts) -> None:
     flash_cuts.campaign(parts, 1, flash.SLOTS - 1)
 
 
-PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
-    "a command in HSRUN": (cut, PlantedError("nvm.c", "    clock_slow();\n", "")),
-    "the speculation stays on": (cut, PlantedError("nvm.c", "MSCM_OCMDR1_OCM1(SPECULATION_OFF)", "0U")),
-    "bus faults are not ignored": (cut, PlantedError("nvm.c", "SCB_CCR | CCR_BFHFNMIGN", "SCB_CCR")),
-    "nothing is erased": (cut, PlantedError("nvm.c", "flash_command(ERASE_SECTOR, slot, 0)", "true")),
-    "the clock stays slow": (
+@dataclass(frozen=True)
+class Planted:
+    """A planted error, the test that finds it, and how."""
+
+    check: Callable[[Parts], None]
+    error: PlantedError
+    exception: type[Exception]
+    message: str
+
+
+NOT_IN_HSRUN = r"FTFC: a command must not be launched in HSRUN"
+SPECULATED = r"read of the data flash .*: a cache or the speculation buffer may hold what was there"
+PLANTED_ERRORS: dict[str, Planted] = {
+    "a command in HSRUN": Planted(cut, PlantedError("nvm.c", "    clock_slow();\n", ""), FluxtrueError, NOT_IN_HSRUN),
+    "the speculation stays on": Planted(
+        cut, PlantedError("nvm.c", "MSCM_OCMDR1_OCM1(SPECULATION_OFF)", "0U"), FluxtrueError, SPECULATED
+    ),
+    "bus faults are not ignored": Planted(
+        cut, PlantedError("nvm.c", "SCB_CCR | CCR_BFHFNMIGN", "SCB_CCR"), FluxtrueError, r"power_cycle"
+    ),
+    "nothing is erased": Planted(
+        cut, PlantedError("nvm.c", "flash_command(ERASE_SECTOR, slot, 0)", "true"), AssertionError, ""
+    ),
+    "the clock stays slow": Planted(
         test_switching_waits_until_the_save_is_complete,
         PlantedError("nvm.c", "    clock_fast();\n", ""),
+        AssertionError,
+        r"63 == 0",
     ),
-    "the tick is not aligned": (
+    "the tick is not aligned": Planted(
         test_the_tick_is_where_it_was_after_a_save,
         PlantedError("nvm.c", "    tick_align(pwm_elapsed() / (CLOCK_CORE_HZ / CLOCK_PERIPHERAL_HZ));\n", ""),
+        AssertionError,
+        r"±",
     ),
 }
 
 
 @pytest.mark.parametrize("name", PLANTED_ERRORS)
 def test_a_planted_error_is_found(name: str, parts: Parts, tmp_path: Path) -> None:
-    check, error = PLANTED_ERRORS[name]
-    planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
-    with pytest.raises((AssertionError, EmulationStoppedError, FluxtrueError)):
-        check(planted)
+    planted = PLANTED_ERRORS[name]
+    image = image_with_error(parts.image, planted.error, tmp_path)
+    with pytest.raises(planted.exception, match=planted.message):
+        planted.check(replace(parts, image=image))

@@ -18,6 +18,8 @@ static uint8_t memory[HAL_NVM_SLOTS * HAL_NVM_SLOT_SIZE];
 static int32_t energy;
 static uint32_t erases[SECTORS], state;
 static uint32_t failing_sector; /* its erase fails; SECTORS: none */
+static uint32_t weak_sectors;   /* from sector 1 on, this many erase but cannot be programmed */
+static uint32_t failed_sectors; /* as the store counts them */
 
 typedef struct {
     uint32_t number;
@@ -70,6 +72,9 @@ bool hal_nvm_erase(uint32_t slot)
 bool hal_nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size)
 {
     TEST_ASSERT_TRUE(offset % HAL_NVM_UNIT == 0 && size % HAL_NVM_UNIT == 0 && offset + size <= HAL_NVM_SLOT_SIZE);
+    if (slot / HAL_NVM_SECTOR_SLOTS - 1U < weak_sectors) {
+        return false;
+    }
     for (uint32_t k = 0; k < size; k++) {
         uint8_t *cell = &memory[slot * HAL_NVM_SLOT_SIZE + offset + k];
         const uint8_t byte = ((const uint8_t *)data)[k];
@@ -89,6 +94,7 @@ void setUp(void)
     memset(erases, 0, sizeof erases);
     energy = NEVER;
     failing_sector = SECTORS;
+    weak_sectors = failed_sectors = 0;
     state = 1;
 }
 
@@ -99,7 +105,7 @@ void tearDown(void)
 static bool save(uint32_t number)
 {
     const record_t r = record_of(number);
-    return store_save(LAYOUT, &r, sizeof r);
+    return store_save(LAYOUT, &r, sizeof r, &failed_sectors);
 }
 
 /* The number of the record that loads; fails unless every byte belongs to it. */
@@ -211,4 +217,32 @@ void test_a_sector_that_cannot_be_erased_is_passed_over(void)
     TEST_ASSERT_TRUE(save(1000));
     TEST_ASSERT_EQUAL_UINT32(1000, loaded());
     TEST_ASSERT_EQUAL_UINT32(2, erases[1]);
+    TEST_ASSERT_EQUAL_UINT32(1, failed_sectors);
+}
+
+/* From the last slot before them on: two attempts in the same sector would end each save. */
+void test_sectors_that_erase_but_cannot_be_programmed_are_passed_over(void)
+{
+    for (weak_sectors = 1; weak_sectors <= 3U; weak_sectors++) {
+        const uint32_t weak = weak_sectors;
+        setUp();
+        weak_sectors = weak;
+        for (uint32_t number = 1; number <= 3U * HAL_NVM_SLOTS; number++) {
+            TEST_ASSERT_TRUE(save(number));
+            TEST_ASSERT_EQUAL_UINT32(number, loaded());
+        }
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT32(3U * weak, failed_sectors);
+        TEST_ASSERT_EQUAL_UINT32(erases[1] * weak, failed_sectors);
+    }
+}
+
+void test_more_of_them_end_the_save_and_keep_the_record(void)
+{
+    for (uint32_t number = 1; number <= HAL_NVM_SECTOR_SLOTS; number++) {
+        TEST_ASSERT_TRUE(save(number));
+    }
+    weak_sectors = SECTORS - 1U;
+    TEST_ASSERT_FALSE(save(1000));
+    TEST_ASSERT_EQUAL_UINT32(4, failed_sectors);
+    TEST_ASSERT_EQUAL_UINT32(HAL_NVM_SECTOR_SLOTS, loaded());
 }

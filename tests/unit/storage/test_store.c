@@ -12,6 +12,7 @@
 static uint8_t memory[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int32_t energy;
 static bool erase_fails;
+static uint32_t failed_sectors;
 static int stuck_offset; /* this byte of every slot is stored with one wrong bit; -1: none */
 
 typedef struct {
@@ -70,6 +71,7 @@ void setUp(void)
     memset(memory, 0xFF, sizeof memory);
     energy = NEVER;
     erase_fails = false;
+    failed_sectors = 0;
     stuck_offset = -1;
 }
 
@@ -80,7 +82,7 @@ void tearDown(void)
 static bool save(uint32_t number)
 {
     const record_t r = record_of(number);
-    return store_save(LAYOUT, &r, sizeof r);
+    return store_save(LAYOUT, &r, sizeof r, &failed_sectors);
 }
 
 /* The number of the record that loads; fails unless every byte belongs to it. */
@@ -192,13 +194,14 @@ void test_a_memory_that_stores_wrong_data_is_detected(void)
     erase_fails = true;
     TEST_ASSERT_FALSE(save(3));
     TEST_ASSERT_EQUAL_UINT32(1, loaded());
+    TEST_ASSERT_EQUAL_UINT32(2, failed_sectors);
 }
 
 void test_a_record_larger_than_a_slot_is_refused_before_anything_is_erased(void)
 {
     static uint8_t large[HAL_NVM_SLOT_SIZE];
     TEST_ASSERT_TRUE(save(1) && save(2));
-    TEST_ASSERT_FALSE(store_save(LAYOUT, large, STORE_RECORD_MAX + 1U));
+    TEST_ASSERT_FALSE(store_save(LAYOUT, large, STORE_RECORD_MAX + 1U, &failed_sectors));
     memory[1][40] ^= 1;
     TEST_ASSERT_EQUAL_UINT32(1, loaded());
 }
@@ -207,7 +210,7 @@ void test_the_largest_record_fits(void)
 {
     static uint8_t large[STORE_RECORD_MAX], back[STORE_RECORD_MAX];
     memset(large, 0x5A, sizeof large);
-    TEST_ASSERT_TRUE(store_save(LAYOUT, large, sizeof large));
+    TEST_ASSERT_TRUE(store_save(LAYOUT, large, sizeof large, &failed_sectors));
     TEST_ASSERT_EQUAL(STORE_OK, store_load(LAYOUT, back, sizeof back));
     TEST_ASSERT_EQUAL_MEMORY(large, back, sizeof back);
 }

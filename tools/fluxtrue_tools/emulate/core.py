@@ -81,6 +81,7 @@ _SIGNATURES = {
     "emu_power_cycle": (None, [_HERE]),
     "emu_flash_slow": (None, [_HERE, _BOOL]),
     "emu_flash_worn": (None, [_HERE, _U32, _BOOL]),
+    "emu_flash_weak": (None, [_HERE, _U32, _BOOL]),
     "emu_flash_random": (None, [_HERE, _U32]),
     "emu_flash_erases": (_U32, [_HERE, _U32]),
     "emu_flash_spoil": (None, [_HERE, _U32]),
@@ -252,6 +253,10 @@ class Core:
     def flash_worn(self, sector: int, worn: bool) -> None:
         """Let every erase of this sector of the data flash fail."""
         self._library.emu_flash_worn(self._handle, sector, worn)
+
+    def flash_weak(self, sector: int, weak: bool) -> None:
+        """Let this sector of the data flash erase, but one bit of each of its bytes never be programmed."""
+        self._library.emu_flash_weak(self._handle, sector, weak)
 
     def flash_random(self, seed: int) -> None:
         """Choose what half done commands leave."""

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_RECALL_H
+#define DRIVE_RECALL_H
+/** Whether the values that a start has recalled describe this machine: until measured windows have confirmed them they
+ * are identified with, but neither the torque loop nor the references use them.
+ *   confirmed  in RECALL_AGREED updates in a row the residuals of both axes are those of a flux error of at most a
+ *              quarter of noise_flux, |e| <= |w| noise_flux/4, at torque_min (identify/config.h) or more
+ *   rejected   after RECALL_TRIALS such updates at half of the local corner or faster without that, or after
+ *              RECALL_CONTRADICTED updates in a row beyond the innovation gate, earlier than (MN-12) takes them for a
+ *              wrong angle: the identification starts from its priors
+ * Source   docs/theory/identification.md (ID-22)
+ * Units    residuals per unit of voltage, Q30
+ * Errors   none
+ * Context  1 kHz task, before the step of the identification; recall_begin() before the task starts */
+#include "drive/drive.h"
+
+#define RECALL_AGREED 3U
+#define RECALL_TRIALS 50U
+#define RECALL_CONTRADICTED 3U
+
+/** The values recalled have to be confirmed. */
+void recall_begin(drive_t *drive);
+/** omega: of the window, q31. */
+void recall_step(drive_t *drive, q31_t omega);
+
+#endif
