@@ -129,7 +129,9 @@ static void check_by_second_level(ecu_t *ecu)
         .elapsed_us = ecu->clock.elapsed_us,
         .question = ecu->question,
     };
-    const bool excessive = second_level_step(drive->motor->second_level, &ecu->second_level, &in);
+    const second_level_constants_t *constants = drive->motor->second_level;
+    drive->data_check.damaged |= !second_level_own_data_step(constants, &ecu->second_level.own_data);
+    const bool excessive = second_level_step(constants, &ecu->second_level, &in);
     drive->request.faults = excessive ? FAULT_TORQUE : 0U;
 }
 

@@ -11,12 +11,14 @@
  * Units    per unit of the motor's bases
  * Errors   true: confirmed now; the caller latches it
  * Context  1 kHz task, after the frames of the step */
+#include "second_level/own_data.h"
 #include "second_level/own_torque.h"
 #include "second_level/permitted.h"
 
 typedef struct {
     second_level_frames_t frames;
     second_level_permitted_t permitted;
+    second_level_own_data_t own_data;
     int32_t mean_q8; /* own torque, first-order mean */
     uint32_t theta_m;
     int32_t confirmed_steps;

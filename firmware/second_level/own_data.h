@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SECOND_LEVEL_OWN_DATA_H
+#define SECOND_LEVEL_OWN_DATA_H
+/** Whether the second level's constants are those that were generated, checked in slices while the drive runs.
+ *   CRC-32 (IEEE 802.3) of all bytes behind `checksum`, SECOND_LEVEL_SLICE of them in each step; damage is found at the
+ *   end of the pass after the one in which it happened at the latest, in 332 steps
+ * Source   docs/theory/second-level.md (SL-7)
+ * Errors   false at the end of a pass that does not match; the caller latches it
+ * Context  1 kHz task */
+#include <stdbool.h>
+
+#include "second_level/constants.h"
+
+#define SECOND_LEVEL_SLICE 4U
+
+typedef struct {
+    uint32_t at;  /* bytes of this pass that are done */
+    uint32_t sum; /* inverted, so that a pass begins with zeros */
+} second_level_own_data_t;
+
+bool second_level_own_data_step(const second_level_constants_t *constants, second_level_own_data_t *own);
+
+#endif
