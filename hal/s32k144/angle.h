@@ -5,14 +5,11 @@
  * Source   README.md, angle
  * Units    period_ticks: one PWM period in ticks of FTM0
  * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an encoder
- * Context  angle_init(): start-up, right before the PWM starts; the others: fast ISR, angle_begin() first,
- *          angle_end() last */
+ * Context  angle_init(): start-up, right before the PWM starts; angle_fault(): fast ISR, after hal_angle_read() */
 #include <stdbool.h>
 #include <stdint.h>
 
 void angle_init(uint32_t period_ticks);
-void angle_begin(void);
-void angle_end(void);
 bool angle_fault(void);
 
 #endif

@@ -28,14 +28,6 @@ void angle_init(uint32_t period_ticks)
     FTM2->SC = FTM_SC_CLKS(SYSTEM_CLOCK);
 }
 
-void angle_begin(void)
-{
-}
-
-void angle_end(void)
-{
-}
-
 bool angle_fault(void)
 {
     return false;

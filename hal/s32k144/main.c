@@ -59,7 +59,6 @@ static __attribute__((noinline, cold)) void alarms_take(void)
 
 void adc_handler(void)
 {
-    angle_begin();
     if (__builtin_expect(alarms.any != 0U, 0)) {
         alarms_take();
     }
@@ -67,7 +66,6 @@ void adc_handler(void)
     if (angle_fault()) {
         drive_raise_fault(&ecu.drive, FAULT_ANGLE);
     }
-    angle_end();
 }
 
 /* If sampling keeps failing, no end of a conversion starts the fast ISR. It is pended here, so that it brings the drive

@@ -237,16 +237,21 @@ typedef struct {
     uint8_t reserved1[0xc];
     volatile uint32_t TRGMUX_PDB0;
     volatile uint32_t TRGMUX_PDB1;
+    uint8_t reserved2[0x1c];
+    volatile uint32_t TRGMUX_LPSPI0;
 } trgmux_t;
 _Static_assert(offsetof(trgmux_t, TRGMUX_FTM0) == 0x28, "TRGMUX_FTM0");
 _Static_assert(offsetof(trgmux_t, TRGMUX_PDB0) == 0x38, "TRGMUX_PDB0");
 _Static_assert(offsetof(trgmux_t, TRGMUX_PDB1) == 0x3c, "TRGMUX_PDB1");
+_Static_assert(offsetof(trgmux_t, TRGMUX_LPSPI0) == 0x5c, "TRGMUX_LPSPI0");
 #define TRGMUX_FTM0_SEL0_MASK 0x3fU
 #define TRGMUX_FTM0_SEL0(x) (((uint32_t)(x) << 0) & 0x3fU)
 #define TRGMUX_PDB0_SEL0_MASK 0x3fU
 #define TRGMUX_PDB0_SEL0(x) (((uint32_t)(x) << 0) & 0x3fU)
 #define TRGMUX_PDB1_SEL0_MASK 0x3fU
 #define TRGMUX_PDB1_SEL0(x) (((uint32_t)(x) << 0) & 0x3fU)
+#define TRGMUX_LPSPI0_SEL0_MASK 0x3fU
+#define TRGMUX_LPSPI0_SEL0(x) (((uint32_t)(x) << 0) & 0x3fU)
 
 typedef struct {
     volatile uint32_t SC;
@@ -392,6 +397,9 @@ typedef struct {
     volatile uint32_t CH0DLY0;
     uint8_t reserved1[0x4];
     volatile uint32_t CH0DLY2;
+    uint8_t reserved2[0x16c];
+    volatile uint32_t POEN;
+    volatile uint32_t PODLY;
 } pdb_t;
 _Static_assert(offsetof(pdb_t, SC) == 0x0, "SC");
 _Static_assert(offsetof(pdb_t, MOD) == 0x4, "MOD");
@@ -399,6 +407,8 @@ _Static_assert(offsetof(pdb_t, CH0C1) == 0x10, "CH0C1");
 _Static_assert(offsetof(pdb_t, CH0S) == 0x14, "CH0S");
 _Static_assert(offsetof(pdb_t, CH0DLY0) == 0x18, "CH0DLY0");
 _Static_assert(offsetof(pdb_t, CH0DLY2) == 0x20, "CH0DLY2");
+_Static_assert(offsetof(pdb_t, POEN) == 0x190, "POEN");
+_Static_assert(offsetof(pdb_t, PODLY) == 0x194, "PODLY");
 #define PDB_SC_LDOK 0x1U
 #define PDB_SC_PDBEN 0x80U
 #define PDB_SC_PDBEIE 0x20000U
@@ -410,6 +420,10 @@ _Static_assert(offsetof(pdb_t, CH0DLY2) == 0x20, "CH0DLY2");
 #define PDB_CH0C1_BB(x) (((uint32_t)(x) << 16) & 0xff0000U)
 #define PDB_CH0S_ERR_MASK 0xffU
 #define PDB_CH0S_ERR(x) (((uint32_t)(x) << 0) & 0xffU)
+#define PDB_PODLY_DLY2_MASK 0xffffU
+#define PDB_PODLY_DLY2(x) (((uint32_t)(x) << 0) & 0xffffU)
+#define PDB_PODLY_DLY1_MASK 0xffff0000U
+#define PDB_PODLY_DLY1(x) (((uint32_t)(x) << 16) & 0xffff0000U)
 #define IRQ_PDB0 52U
 #define IRQ_PDB1 68U
 
@@ -487,11 +501,13 @@ typedef struct {
     uint8_t reserved0[0x10];
     volatile uint32_t CR;
     volatile uint32_t SR;
-    uint8_t reserved1[0xc];
+    uint8_t reserved1[0x8];
+    volatile uint32_t CFGR0;
     volatile uint32_t CFGR1;
     uint8_t reserved2[0x18];
     volatile uint32_t CCR;
-    uint8_t reserved3[0x1c];
+    uint8_t reserved3[0x18];
+    const volatile uint32_t FSR;
     volatile uint32_t TCR;
     volatile uint32_t TDR;
     uint8_t reserved4[0x8];
@@ -500,8 +516,10 @@ typedef struct {
 } lpspi_t;
 _Static_assert(offsetof(lpspi_t, CR) == 0x10, "CR");
 _Static_assert(offsetof(lpspi_t, SR) == 0x14, "SR");
+_Static_assert(offsetof(lpspi_t, CFGR0) == 0x20, "CFGR0");
 _Static_assert(offsetof(lpspi_t, CFGR1) == 0x24, "CFGR1");
 _Static_assert(offsetof(lpspi_t, CCR) == 0x40, "CCR");
+_Static_assert(offsetof(lpspi_t, FSR) == 0x5c, "FSR");
 _Static_assert(offsetof(lpspi_t, TCR) == 0x60, "TCR");
 _Static_assert(offsetof(lpspi_t, TDR) == 0x64, "TDR");
 _Static_assert(offsetof(lpspi_t, RSR) == 0x70, "RSR");
@@ -510,6 +528,9 @@ _Static_assert(offsetof(lpspi_t, RDR) == 0x74, "RDR");
 #define LPSPI_CR_RTF 0x100U
 #define LPSPI_CR_RRF 0x200U
 #define LPSPI_SR_RDF 0x2U
+#define LPSPI_CFGR0_HREN 0x1U
+#define LPSPI_CFGR0_HRPOL 0x2U
+#define LPSPI_CFGR0_HRSEL 0x4U
 #define LPSPI_CFGR1_MASTER 0x1U
 #define LPSPI_CCR_SCKDIV_MASK 0xffU
 #define LPSPI_CCR_SCKDIV(x) (((uint32_t)(x) << 0) & 0xffU)
@@ -519,6 +540,10 @@ _Static_assert(offsetof(lpspi_t, RDR) == 0x74, "RDR");
 #define LPSPI_CCR_PCSSCK(x) (((uint32_t)(x) << 16) & 0xff0000U)
 #define LPSPI_CCR_SCKPCS_MASK 0xff000000U
 #define LPSPI_CCR_SCKPCS(x) (((uint32_t)(x) << 24) & 0xff000000U)
+#define LPSPI_FSR_TXCOUNT_MASK 0x7U
+#define LPSPI_FSR_TXCOUNT(x) (((uint32_t)(x) << 0) & 0x7U)
+#define LPSPI_FSR_RXCOUNT_MASK 0x70000U
+#define LPSPI_FSR_RXCOUNT(x) (((uint32_t)(x) << 16) & 0x70000U)
 #define LPSPI_TCR_FRAMESZ_MASK 0xfffU
 #define LPSPI_TCR_FRAMESZ(x) (((uint32_t)(x) << 0) & 0xfffU)
 #define LPSPI_TCR_PRESCALE_MASK 0x38000000U

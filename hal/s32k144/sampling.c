@@ -12,6 +12,7 @@
 #define AVERAGE_32 3U
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
+#define PULSE_OUTPUT_0 1U
 #define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
 #define APART_STEPS 10U  /* a longer interval between errors restarts the count */
 
@@ -53,6 +54,13 @@ static void calibrate(adc_t *adc)
     adc->SC2 = ADC_SC2_ADTRG;
 }
 
+/* The values of the delays act from now on. */
+static void load(pdb_t *pdb)
+{
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE;
+    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
+}
+
 /* The trigger starts the first conversion, the end of the first one the second. The slow channels are converted in the
  * middle of the period, after the fast ISR has read all results of the previous one: a result that is still unread when
  * its next conversion ends leaves the pre-trigger locked, and a lock stops the whole sequence. */
@@ -64,8 +72,7 @@ static void chain(pdb_t *pdb, uint32_t conversions, uint32_t period_ticks)
     pdb->CH0DLY0 = 0;
     pdb->CH0DLY2 = period_ticks / 2U;
     pdb->CH0C1 = PDB_CH0C1_EN(all) | PDB_CH0C1_TOS(delayed) | PDB_CH0C1_BB(all & ~delayed);
-    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE;
-    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
+    load(pdb);
 }
 
 void sampling_init(uint32_t period_ticks)
@@ -83,6 +90,13 @@ void sampling_init(uint32_t period_ticks)
     TRGMUX->TRGMUX_PDB1 = TRGMUX_PDB1_SEL0(FTM0_INIT_TRIGGER);
     chain(PDB0, ADC0_CONVERSIONS, period_ticks);
     chain(PDB1, ADC1_CONVERSIONS, period_ticks);
+}
+
+void sampling_pulse(uint32_t from, uint32_t until)
+{
+    PDB0->PODLY = PDB_PODLY_DLY1(from) | PDB_PODLY_DLY2(until);
+    PDB0->POEN = PULSE_OUTPUT_0;
+    load(PDB0);
 }
 
 /* Reads all results of the sequence, also those of the slow channels, so that no pre-trigger stays locked. The slow
@@ -108,8 +122,7 @@ static void restart(pdb_t *pdb, const adc_t *adc, uint32_t conversions)
     for (uint32_t k = 0; k < conversions; k++) {
         (void)adc->R[k];
     }
-    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE;
-    pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
+    load(pdb);
 }
 
 bool sampling_error_isr(void)

@@ -8,12 +8,16 @@
  * Range    period_ticks up to 65535
  * Errors   a sequence error (a conversion was asked for while a lock was held) loses the samples of up to
  *          three periods; its interrupt restarts the delay block
- * Context  sampling_init(): start-up, before the PWM starts; sampling_error_isr(): both delay blocks' interrupts, at
- *          the fast ISR's priority; sampling_tick() and the slow channels, as converted last: 1 kHz task */
+ * Context  sampling_init(), sampling_pulse(): start-up, before the PWM starts; sampling_error_isr(): both delay blocks'
+ *          interrupts, at the fast ISR's priority; sampling_tick() and the slow channels, as converted last: 1 kHz
+ *          task */
 #include <stdbool.h>
 #include <stdint.h>
 
 void sampling_init(uint32_t period_ticks);
+/** From the next period on: a level for the trigger multiplexer, from and until these ticks of each period; both lie in
+ * its first half. */
+void sampling_pulse(uint32_t from, uint32_t until);
 /** True: the errors persist (five, less than 10 ms apart), and the caller must bring the drive into its safe state. */
 bool sampling_error_isr(void);
 void sampling_tick(void);

@@ -89,7 +89,7 @@ void emu_core_clock(emu_t *emu, uint32_t ticks_per_cycle)
     for (int i = 0; i < 2; i++) {
         stretch(&s->ftm[i].start, s->now, before, ticks_per_cycle);
         stretch(&s->pdb[i].start, s->now, before, ticks_per_cycle);
-        for (int k = 0; k < 8; k++) {
+        for (size_t k = 0; k < sizeof s->pdb[i].due / sizeof s->pdb[i].due[0]; k++) {
             stretch(&s->pdb[i].due[k], s->now, before, ticks_per_cycle);
         }
     }

@@ -84,9 +84,10 @@ typedef struct {
 typedef struct {
     bool running;
     uint64_t start;
-    uint32_t mod, idly, dly[8]; /* acting values, loaded by LDOK */
-    uint64_t due[8];            /* when each trigger output is due */
-    uint32_t locked;            /* pre-triggers whose conversion has not set COCO yet */
+    uint32_t mod, idly, dly[8];    /* acting values, loaded by LDOK */
+    uint64_t due[10];              /* when each trigger output is due; last: rise and fall of the pulse output */
+    uint32_t locked;               /* pre-triggers whose conversion has not set COCO yet */
+    uint32_t pulse_up, pulse_down; /* acting values of DLY1 and DLY2 */
 } pdb_t;
 
 typedef struct {
@@ -107,10 +108,15 @@ typedef struct {
     uint64_t ready[4];
     int rx_count;
     uint64_t busy_until;
+    uint32_t tx[4]; /* words that wait for the host request */
+    int tx_count;
+    bool requested;
+    uint64_t requested_at;
 } spi_t;
 
 typedef struct {
-    uint32_t latched;             /* angle at the last SAMPLE */
+    uint32_t latched; /* angle at the last SAMPLE */
+    uint64_t sampled_at;
     uint8_t fault, sampled_fault; /* kept until it has been read in configuration mode and SAMPLE falls again */
     bool read, high;              /* the fault register was read; level of SAMPLE while software sets it */
     uint8_t address;
@@ -290,12 +296,15 @@ void data_flash_write(uc_engine *uc, uint64_t offset, unsigned size, uint64_t va
 bool clocks_high_speed(const emu_t *emu);
 void can_fire(emu_t *emu);
 void trgmux_event(emu_t *emu, uint32_t source);
+/** A trigger that is a level: the pulse output of a delay block. */
+void trgmux_level(emu_t *emu, uint32_t source, bool level);
+void lpspi_request(emu_t *emu, int instance, bool level);
 /** Stops the emulation unless every pin of the peripheral is multiplexed to it. */
 void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);
-uint32_t rdc_transfer(emu_t *emu, uint32_t sent, uint32_t bits);
+uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits);
 void rdc_power_on(emu_t *emu);
 void rdc_sample(emu_t *emu);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame is received when all its bits have
- * been clocked; the converter's answer is determined when the frame begins.
+ * been clocked; the converter's answer is determined when the frame begins. With the host request enabled a word waits
+ * in the FIFO until the request rises; three clocks are assumed for its synchronisation.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
@@ -8,8 +9,11 @@
  * frame time from CCR, prescaler and clock           | yes      | test_a_frame_arrives_when_its_bits_have_been_clocked
  * a read of an empty receive FIFO                    | refused  | test_reading_an_empty_fifo_is_refused
  * a frame with a full receive FIFO                   | refused  | test_a_frame_with_a_full_fifo_is_refused
+ * host request by the input trigger                  | yes      | test_a_request_starts_one_frame_per_pulse
+ * a request shorter than a clock of the module       | refused  | test_a_request_that_is_too_short_is_refused
  * interrupts, DMA, continuous and wide transfers     | refused  | test_other_transfer_modes_are_refused
- * AD2S1210: position latched by SAMPLE               | yes      | test_a_resolver_image_computes_the_same_bits
+ * AD2S1210: position latched by SAMPLE, 14 bits      | yes      | test_a_resolver_image_computes_the_same_bits
+ * AD2S1210: read sooner than 6 clocks after SAMPLE   | refused  | test_an_angle_of_another_age_is_found
  * AD2S1210: faults kept until read and sampled again | yes      | test_a_fault_of_the_resolver_raises_the_angle_fault
  * AD2S1210: tracking error, dynamics, settling       | no       | -
  */
@@ -20,6 +24,7 @@ enum {
     SR = 0x14,
     IER = 0x18,
     DER = 0x1C,
+    CFGR0 = 0x20,
     CFGR1 = 0x24,
     CCR = 0x40,
     FCR = 0x58,
@@ -33,11 +38,15 @@ enum {
     RESET = 2,
     RTF = 1 << 8,
     RRF = 1 << 9,
+    HREN = 1,
+    BY_TRIGGER = 7, /* HREN, active high, input trigger */
+    REQUEST_CLOCKS = 3,
+    RDC_READY = 2528, /* ticks: 6 periods of 8.192 MHz and 20 ns, AD2S1210 data sheet, timing, t17 */
 };
 
 bool lpspi_models(uint32_t offset)
 {
-    return offset <= DER || offset == CFGR1 || offset == CCR || offset >= FCR;
+    return offset <= CFGR1 || offset == CCR || offset >= FCR;
 }
 
 static uint32_t arrived(const emu_t *emu, const spi_t *spi)
@@ -74,7 +83,7 @@ uint32_t lpspi_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint3
         return 1U | (count > (bus_get(emu, self, FCR) >> 16 & 3U) ? 2U : 0U) |
                (emu->s.now < spi->busy_until ? 1U << 24 : 0U);
     case FSR:
-        return count << 16;
+        return count << 16 | (uint32_t)spi->tx_count;
     case RSR:
         return count == 0 ? 2U : 0U;
     case RDR:
@@ -95,20 +104,83 @@ static uint64_t frame_ticks(emu_t *emu, const peripheral_t *self, uint32_t bits)
     return (uint64_t)clock * (bits * ((ccr & 0xFFU) + 2U) + gaps);
 }
 
-static void transfer(emu_t *emu, const peripheral_t *self)
+static uint32_t frame_bits(const emu_t *emu, const peripheral_t *self)
+{
+    return (bus_get(emu, self, TCR) & 0xFFFU) + 1U;
+}
+
+static void transfer(emu_t *emu, const peripheral_t *self, uint64_t earliest, uint32_t sent)
 {
     spi_t *spi = &emu->s.spi[self->instance];
-    const uint32_t bits = (bus_get(emu, self, TCR) & 0xFFFU) + 1U;
+    const uint32_t bits = frame_bits(emu, self);
+    const uint64_t begin = spi->busy_until > earliest ? spi->busy_until : earliest;
+    spi->busy_until = begin + frame_ticks(emu, self, bits);
+    const uint32_t no_answer = 0xFFFFFFFFU >> (32U - bits);
+    spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, begin, sent, bits) : no_answer;
+    spi->ready[spi->rx_count++] = spi->busy_until;
+}
+
+/* The first word that waits; a full receive FIFO stalls the module. */
+static bool next_waiting(emu_t *emu, const peripheral_t *self, uint64_t earliest)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    if (spi->tx_count == 0 || spi->rx_count == FIFO) {
+        return false;
+    }
+    const uint32_t sent = spi->tx[0];
+    spi->tx_count--;
+    for (int i = 0; i < spi->tx_count; i++) {
+        spi->tx[i] = spi->tx[i + 1];
+    }
+    transfer(emu, self, earliest, sent);
+    return true;
+}
+
+/* A further frame begins as long as the request lasts. */
+static void request_ended(emu_t *emu, const peripheral_t *self, uint64_t now)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    if (now - spi->requested_at <= clocks_peripheral_ticks(emu, self->gate)) {
+        emu_fail(emu, "%s: the request is not longer than a clock of the module and may be missed", self->name);
+    }
+    while (spi->busy_until < now && next_waiting(emu, self, spi->busy_until)) {
+    }
+}
+
+void lpspi_request(emu_t *emu, int instance, bool level)
+{
+    const peripheral_t *self = bus_find(instance == 0 ? "LPSPI0" : "LPSPI1");
+    spi_t *spi = &emu->s.spi[instance];
+    const uint64_t now = emu_instant(emu);
+    if (level == spi->requested || (bus_get(emu, self, CFGR0) & HREN) == 0 || (bus_get(emu, self, CR) & MEN) == 0) {
+        return;
+    }
+    spi->requested = level;
+    if (level) {
+        spi->requested_at = now;
+        (void)next_waiting(emu, self, now + (uint64_t)REQUEST_CLOCKS * clocks_peripheral_ticks(emu, self->gate));
+    } else {
+        request_ended(emu, self, now);
+    }
+}
+
+static void word_written(emu_t *emu, const peripheral_t *self)
+{
+    spi_t *spi = &emu->s.spi[self->instance];
+    const bool waits = (bus_get(emu, self, CFGR0) & HREN) != 0;
+    const uint32_t bits = frame_bits(emu, self);
     if ((bus_get(emu, self, CR) & MEN) == 0 || (bus_get(emu, self, CFGR1) & 1U) == 0) {
         emu_fail(emu, "write of %s.TDR: the module is not an enabled master", self->name);
-    } else if (bits > 32U || spi->rx_count == FIFO) {
-        emu_fail(emu, "write of %s.TDR: %u bits with %d words waiting do not fit", self->name, bits, spi->rx_count);
+    } else if (bits > 32U || (waits ? spi->tx_count : spi->rx_count) == FIFO) {
+        emu_fail(emu, "write of %s.TDR: %u bits with %d words waiting do not fit", self->name, bits,
+                 waits ? spi->tx_count : spi->rx_count);
+    } else if (!waits) {
+        transfer(emu, self, emu->s.now, bus_get(emu, self, TDR));
     } else {
-        const uint64_t begin = spi->busy_until > emu->s.now ? spi->busy_until : emu->s.now;
-        spi->busy_until = begin + frame_ticks(emu, self, bits);
-        const uint32_t no_answer = 0xFFFFFFFFU >> (32U - bits), sent = bus_get(emu, self, TDR);
-        spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, sent, bits) : no_answer;
-        spi->ready[spi->rx_count++] = spi->busy_until;
+        spi->tx[spi->tx_count++] = bus_get(emu, self, TDR);
+        if (spi->requested) {
+            (void)next_waiting(emu, self, emu->s.now);
+        }
     }
 }
 
@@ -116,15 +188,21 @@ void lpspi_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32
 {
     spi_t *spi = &emu->s.spi[self->instance];
     if (offset == TDR) {
-        transfer(emu, self);
+        word_written(emu, self);
     } else if (offset == CR) {
         spi->rx_count = (value & (RESET | RRF)) != 0 ? 0 : spi->rx_count;
+        spi->tx_count = (value & (RESET | RTF)) != 0 ? 0 : spi->tx_count;
         bus_put(emu, self, CR, value & ~(uint32_t)(RTF | RRF));
         if ((value & MEN) != 0) {
             pins_check(emu, self->name);
         }
     } else if (offset == CFGR1 && (old ^ value) != 0 && (bus_get(emu, self, CR) & MEN) != 0) {
         emu_fail(emu, "write of %s.CFGR1: the module is enabled", self->name);
+    } else if (offset == CFGR0 && (value & HREN) != 0 && (value != BY_TRIGGER || (bus_get(emu, self, CR) & MEN) != 0)) {
+        emu_fail(emu,
+                 "write of %s.CFGR0: only a request by the input trigger, active high, set while the module is "
+                 "disabled, is modelled",
+                 self->name);
     } else if ((offset == IER || offset == DER) && value != 0) {
         emu_fail(emu, "write of %s offset 0x%x: interrupts and DMA are not modelled", self->name, offset);
     } else if (offset == TCR && (value & 0x00FF0000U) != 0) {
@@ -144,7 +222,8 @@ void rdc_power_on(emu_t *emu)
 void rdc_sample(emu_t *emu)
 {
     rdc_t *rdc = &emu->s.rdc;
-    rdc->latched = emu_angle(emu);
+    rdc->latched = emu_angle(emu) & 0xFFFC0000U; /* 14 bits: the resolution pins of hal/s32k144/README.md */
+    rdc->sampled_at = emu_instant(emu);
     rdc->fault = rdc->read ? 0U : rdc->fault;
     rdc->read = false;
     rdc->fault |= emu->s.pins.resolver_fault ? 0x40U : 0U;
@@ -167,8 +246,11 @@ static uint32_t rdc_configure(emu_t *emu, uint32_t sent, uint32_t bits)
 }
 
 /* Normal mode: A1 = 0 position, A1 = 1 velocity; then the fault register. Latched by SAMPLE. */
-uint32_t rdc_transfer(emu_t *emu, uint32_t sent, uint32_t bits)
+uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits)
 {
+    if (begin < emu->s.rdc.sampled_at + RDC_READY) {
+        emu_fail(emu, "the AD2S1210 is read sooner than 6 of its clocks after SAMPLE fell");
+    }
     const uint32_t lines = bus_get(emu, bus_find("PTC"), 0);
     const bool a0 = (lines >> EMU_RDC_A0 & 1U) != 0, a1 = (lines >> EMU_RDC_A1 & 1U) != 0;
     if (a0 && a1) {

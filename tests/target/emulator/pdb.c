@@ -18,7 +18,8 @@
  * disabling PDB or pre-trigger releases locks        | yes      | test_disabling_releases_the_locks
  * sequence error interrupt, flags cleared by zeros   | yes      | test_a_sequence_error_interrupts_until_it_is_cleared
  * LDMOD 1 ... 3, CONT, PDBIE, DMAEN, other triggers  | refused  | test_other_modes_of_the_delay_block_are_refused
- * channel 1, pulse outputs                           | refused  | test_channel_1_and_the_pulse_output_are_refused
+ * pulse output 0 rises at DLY1 and falls at DLY2     | yes      | test_a_request_starts_one_frame_per_pulse
+ * channel 1, other pulse outputs, a pulse beyond MOD | refused  | test_channel_1_and_other_pulses_are_refused
  */
 #include "emu_private.h"
 
@@ -31,7 +32,13 @@ enum {
     S = 0x14,
     DLY0 = 0x18,
     DLY7 = 0x34,
+    POEN = 0x190,
+    PODLY = 0x194,
     PRETRIGGERS = 8,
+    PULSE_UP = PRETRIGGERS,
+    PULSE_DOWN = 9,
+    OUTPUTS = 10,
+    PULSE0 = 36, /* number of the pulse output in TRGMUX; the one of PDB1 is three more */
     PRETRIGGER_CYCLES = 2,
     TRIGGER_CYCLES = 1,
     PDB0_IRQ = 52,
@@ -52,13 +59,13 @@ static const peripheral_t *of(int instance)
 
 bool pdb_models(uint32_t offset)
 {
-    return offset <= DLY7;
+    return offset <= DLY7 || offset == POEN || offset == PODLY;
 }
 
 void pdb_reset(emu_t *emu)
 {
     for (int instance = 0; instance < 2; instance++) {
-        for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+        for (uint32_t i = 0; i < OUTPUTS; i++) {
             emu->s.pdb[instance].due[i] = NEVER;
         }
     }
@@ -95,13 +102,15 @@ static void load(emu_t *emu, const peripheral_t *self)
     for (uint32_t i = 0; i < PRETRIGGERS; i++) {
         p->dly[i] = bus_get(emu, self, DLY0 + 4U * i);
     }
+    p->pulse_up = bus_get(emu, self, PODLY) >> 16;
+    p->pulse_down = bus_get(emu, self, PODLY) & 0xFFFFU;
 }
 
 /* When the next trigger output is due; NEVER: none is left. */
 static uint64_t next_due(const pdb_t *p, uint32_t *which)
 {
     uint64_t next = NEVER;
-    for (uint32_t i = 0; i < PRETRIGGERS; i++) {
+    for (uint32_t i = 0; i < OUTPUTS; i++) {
         if (p->due[i] < next) {
             next = p->due[i];
             *which = i;
@@ -127,6 +136,34 @@ static void disable(emu_t *emu, const peripheral_t *self, uint32_t pretriggers)
     arm(emu, self->instance);
 }
 
+static void pulse(emu_t *emu, int instance, bool level)
+{
+    trgmux_level(emu, PULSE0 + (instance == 0 ? 0U : 3U), level);
+}
+
+/* A pulse that has begun ends as if the block were still enabled. */
+static void pulse_stop(emu_t *emu, int instance)
+{
+    pdb_t *p = &emu->s.pdb[instance];
+    if (p->due[PULSE_UP] != NEVER) {
+        p->due[PULSE_UP] = p->due[PULSE_DOWN] = NEVER;
+    }
+}
+
+static void pulse_start(emu_t *emu, const peripheral_t *self)
+{
+    pdb_t *p = &emu->s.pdb[self->instance];
+    if ((bus_get(emu, self, POEN) & 1U) == 0) {
+        return;
+    }
+    if (p->pulse_up >= p->pulse_down || p->pulse_down > p->mod) {
+        emu_fail(emu, "%s: a pulse from %u to %u with MOD %u is not modelled", self->name, p->pulse_up, p->pulse_down,
+                 p->mod);
+    }
+    p->due[PULSE_UP] = p->start + (uint64_t)p->pulse_up * clock_ticks(emu, self);
+    p->due[PULSE_DOWN] = p->start + (uint64_t)p->pulse_down * clock_ticks(emu, self);
+}
+
 static void control_written(emu_t *emu, const peripheral_t *self, uint32_t value)
 {
     const uint32_t source = value >> 8 & 15U;
@@ -138,6 +175,7 @@ static void control_written(emu_t *emu, const peripheral_t *self, uint32_t value
     }
     if ((value & PDBEN) == 0) {
         emu->s.pdb[self->instance].running = false;
+        pulse_stop(emu, self->instance);
         disable(emu, self, ERRORS);
     }
     if ((value & (PDBEN | LDOK)) == (PDBEN | LDOK)) {
@@ -157,6 +195,8 @@ void pdb_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
         line_update(emu, self);
     } else if (offset == C1) {
         disable(emu, self, ~value & ERRORS);
+    } else if (offset == POEN && (value & ~1U) != 0) {
+        emu_fail(emu, "write of %s.POEN: only pulse output 0 is modelled", self->name);
     } else if (offset == SC) {
         control_written(emu, self, value);
     }
@@ -183,6 +223,7 @@ void pdb_trigger(emu_t *emu, int instance)
             p->due[i] = p->start + (uint64_t)delay * clock_ticks(emu, self) + output_delay(emu);
         }
     }
+    pulse_start(emu, self);
     arm(emu, instance);
 }
 
@@ -205,7 +246,11 @@ void pdb_fire(emu_t *emu, int instance)
     uint32_t which = 0;
     while (next_due(p, &which) <= emu_instant(emu)) {
         p->due[which] = NEVER;
-        pretrigger(emu, of(instance), which);
+        if (which < PRETRIGGERS) {
+            pretrigger(emu, of(instance), which);
+        } else {
+            pulse(emu, instance, which == PULSE_UP);
+        }
     }
     arm(emu, instance);
 }

@@ -10,6 +10,7 @@
  * GPIO: set, clear, toggle                   | yes      | test_lines_are_set_cleared_and_toggled
  * GPIO: a line that is no output             | refused  | test_what_is_not_modelled_is_an_error
  * TRGMUX: source of PDB0, PDB1, FTM0; lock   | refused  | test_a_locked_trigger_keeps_its_source
+ * TRGMUX: pulse of PDB0 to LPSPI0 and LPSPI1 | yes      | test_a_request_starts_one_frame_per_pulse
  * TRGMUX: every other target                 | refused  | test_other_trigger_targets_are_refused
  * GPIO: levels from outside                  | no       | -
  */
@@ -30,6 +31,8 @@ enum {
     PDDR = 0x14,
     TO_PDB0 = 0x38,
     TO_PDB1 = 0x3C,
+    TO_LPSPI0 = 0x5C,
+    TO_LPSPI1 = 0x60,
     FLAG = 1 << 24,
 };
 #define LOCK (1U << 31)
@@ -141,7 +144,7 @@ void gpio_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 
 bool trgmux_models(uint32_t offset)
 {
-    return offset == 0x28 || offset == TO_PDB0 || offset == TO_PDB1;
+    return offset == 0x28 || offset == TO_PDB0 || offset == TO_PDB1 || offset == TO_LPSPI0 || offset == TO_LPSPI1;
 }
 
 uint32_t trgmux_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
@@ -166,5 +169,16 @@ void trgmux_event(emu_t *emu, uint32_t source)
     }
     if ((bus_get(emu, self, TO_PDB1) & 0x3FU) == source) {
         pdb_trigger(emu, 1);
+    }
+}
+
+void trgmux_level(emu_t *emu, uint32_t source, bool level)
+{
+    static const uint32_t target[2] = {TO_LPSPI0, TO_LPSPI1};
+    const peripheral_t *self = bus_find("TRGMUX");
+    for (int instance = 0; instance < 2; instance++) {
+        if ((bus_get(emu, self, target[instance]) & 0x3FU) == source) {
+            lpspi_request(emu, instance, level);
+        }
     }
 }

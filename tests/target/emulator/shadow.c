@@ -20,7 +20,7 @@ enum { ENCODER_SHIFT = 18 };
 static uint32_t angle_read(const emulated_t *e)
 {
     if ((emu_register(e->emu, "FTM2.QDCTRL") & 1U) == 0) {
-        return emu_resolver_angle(e->emu) & 0xFFFF0000U;
+        return emu_resolver_angle(e->emu);
     }
     const uint32_t q32_per_tick = UINT32_MAX / (uint32_t)(emu_register(e->emu, "FTM0.MOD") + 1U);
     const uint32_t now = emu_counter_read(e->emu, 1, false) << ENCODER_SHIFT;

@@ -185,6 +185,57 @@ def test_a_frame_with_a_full_fifo_is_refused(spi: Core) -> None:
     refused(spi, "LPSPI1.TDR", 0, "4 words waiting do not fit")
 
 
+PULSE_OF_PDB0 = 36
+UP, FRAME = 480, (16 * 4 + 3 + 4 + 3) * CLOCK_S  # ticks of 48 MHz; three clocks more for the request
+
+
+@pytest.fixture
+def requested(core: Core) -> Core:
+    """LPSPI1 with two words that wait for the pulse of PDB0."""
+    clock(core, "LPSPI1")
+    for name, value in (
+        ("LPSPI1.CFGR1", 1), ("LPSPI1.CCR", 1 << 24 | 1 << 16 | 1 << 8 | 2), ("LPSPI1.CFGR0", 7), ("LPSPI1.CR", 1),
+        ("LPSPI1.TCR", 15), ("LPSPI1.TDR", 1), ("LPSPI1.TDR", 2), ("TRGMUX.TRGMUX_LPSPI1", PULSE_OF_PDB0),
+        ("PCC.PCC_PDB0", 1 << 30), ("PDB0.MOD", 2000), ("PDB0.POEN", 1),
+    ):  # fmt: skip
+        core.store(name, value)
+    return core
+
+
+def pulse(core: Core, ticks: int) -> None:
+    core.store("PDB0.PODLY", UP << 16 | UP + ticks)
+    for more in (1, 1 << 16):  # load, trigger
+        core.store("PDB0.SC", 0x80 | 15 << 8 | more)
+
+
+def test_a_request_starts_one_frame_per_pulse(requested: Core) -> None:
+    for left in (1, 0):
+        pulse(requested, 48)
+        requested.run(UP / 48e6 + FRAME - CLOCK_S)
+        assert requested.load("LPSPI1.FSR") == left
+        requested.run(2 * CLOCK_S)
+        assert requested.load("LPSPI1.FSR") == 1 << 16 | left
+        assert requested.load("LPSPI1.RDR") == 0xFFFF
+
+
+def test_a_request_that_outlasts_a_frame_starts_the_next(requested: Core) -> None:
+    pulse(requested, 1000)
+    requested.run(1e-4)
+    assert requested.load("LPSPI1.FSR") == 2 << 16
+
+
+def test_a_request_that_is_too_short_is_refused(requested: Core) -> None:
+    pulse(requested, 1)
+    with pytest.raises(EmulationStoppedError, match="not longer than a clock of the module"):
+        requested.run(1e-4)
+
+
+@pytest.mark.parametrize("value", [1, 3, 5])
+def test_a_request_by_the_pin_or_active_low_is_refused(core: Core, value: int) -> None:
+    clock(core, "LPSPI1")
+    refused(core, "LPSPI1.CFGR0", value, "only a request by the input trigger")
+
+
 def test_reading_an_empty_fifo_is_refused(spi: Core) -> None:
     with pytest.raises(EmulationStoppedError, match="nothing has been received"):
         spi.load("LPSPI1.RDR")

@@ -176,7 +176,16 @@ def test_other_modes_of_the_delay_block_are_refused(core: Core, bit: int) -> Non
         core.store("PDB0.SC", bit)
 
 
-def test_channel_1_and_the_pulse_output_are_refused(core: Core) -> None:
-    for name in ("PDB0.CH1C1", "PDB0.POEN"):
-        with pytest.raises(EmulationStoppedError, match="not modelled"):
-            core.store(name, 0)
+@pytest.mark.parametrize(("name", "value"), [("CH1C1", 0), ("POEN", 2)])
+def test_channel_1_and_other_pulses_are_refused(core: Core, name: str, value: int) -> None:
+    with pytest.raises(EmulationStoppedError, match="not modelled|only pulse output 0"):
+        core.store(f"PDB0.{name}", value)
+
+
+@pytest.mark.parametrize(("delays", "modulus"), [(200 << 16 | 100, 1000), (100 << 16 | 300, 200)])
+def test_a_pulse_that_ends_before_it_begins_or_after_the_counter_is_refused(
+    core: Core, delays: int, modulus: int
+) -> None:
+    arm(core, 0, 0, 0, POEN=1, PODLY=delays, MOD=modulus)
+    with pytest.raises(EmulationStoppedError, match="a pulse from .* is not modelled"):
+        trigger(core)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The AD2S1210 with variables as LPSPI registers: RSR tells whether a frame was received, and RDR contains it. */
+/* The AD2S1210 with variables as LPSPI registers: FSR counts the words in both FIFOs, and RDR contains the frame. */
 #include <string.h>
 
 #include "hal/angle.h"
@@ -8,36 +8,63 @@
 #include "hal/s32k144/pins.h"
 #include "hal/s32k144/pwm.h"
 #include "hal/s32k144/registers.h"
-#include "hal/s32k144/resolver.h"
+#include "hal/s32k144/sampling.h"
+#include "hal/s32k144/startup.h"
 #include "unity.h"
+
+#define FIFO_WORDS 4U
 
 lpspi_t fake_LPSPI0;
 gpio_t fake_PTC;
+trgmux_t fake_TRGMUX;
 
 static int samples;
+static uint32_t pulse_from, pulse_until;
 
 void pwm_sample_by_hand(void)
 {
     samples++;
 }
 
-static void received(uint32_t frame)
+void sampling_pulse(uint32_t from, uint32_t until)
 {
-    const uint32_t not_empty = 0;
-    memcpy((void *)(uintptr_t)&fake_LPSPI0.RSR, &not_empty, sizeof not_empty);
-    memcpy((void *)(uintptr_t)&fake_LPSPI0.RDR, &frame, sizeof frame);
+    pulse_from = from;
+    pulse_until = until;
 }
 
-static void nothing_received(void)
+void await(const volatile uint32_t *word, uint32_t mask, uint32_t value)
 {
-    const uint32_t empty = LPSPI_RSR_RXEMPTY;
+    TEST_ASSERT_EQUAL_PTR(&fake_LPSPI0.FSR, word);
+    TEST_ASSERT_EQUAL_HEX32(value, *word & mask);
+}
+
+static void fifos(uint32_t received, uint32_t to_send)
+{
+    const uint32_t state = received << 16 | to_send, empty = received == 0U ? LPSPI_RSR_RXEMPTY : 0U;
+    memcpy((void *)(uintptr_t)&fake_LPSPI0.FSR, &state, sizeof state);
     memcpy((void *)(uintptr_t)&fake_LPSPI0.RSR, &empty, sizeof empty);
+}
+
+static void frame(uint32_t content)
+{
+    memcpy((void *)(uintptr_t)&fake_LPSPI0.RDR, &content, sizeof content);
+}
+
+static void received(uint32_t content)
+{
+    fifos(1, FIFO_WORDS - 1U);
+    frame(content);
+}
+
+static void initialised(void)
+{
+    fifos(0, 0);
+    angle_init(11200);
 }
 
 void setUp(void)
 {
-    nothing_received();
-    angle_init(11200);
+    initialised();
     received(0);
     (void)hal_angle_read();
 }
@@ -50,14 +77,22 @@ void test_start_up_reads_the_fault_register_after_a_sample_and_leaves_the_conver
 {
     const uint32_t both = 1U << PIN_RESOLVER_A0 | 1U << PIN_RESOLVER_A1;
     samples = 0;
-    received(0);
     fake_PTC = (gpio_t){0};
+    fifos(1, 0); /* answers at once */
     angle_init(11200);
     TEST_ASSERT_EQUAL_INT(1, samples);
     TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PSOR);
-    TEST_ASSERT_EQUAL_HEX32(AD2S1210_FAULT_REGISTER, fake_LPSPI0.TDR);
     TEST_ASSERT_EQUAL_HEX32(both, fake_PTC.PCOR);
     TEST_ASSERT_EQUAL_HEX32(23, fake_LPSPI0.TCR & 0xFFFU); /* frames of 24 bits */
+}
+
+void test_the_pulse_of_the_delay_block_starts_the_frames(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(7, fake_LPSPI0.CFGR0); /* request: enabled, active high, by the trigger */
+    TEST_ASSERT_EQUAL_UINT32(36, fake_TRGMUX.TRGMUX_LPSPI0);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(85, pulse_from);               /* 752 ns after SAMPLE */
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(pulse_from + 8U, pulse_until); /* two clocks of the LPSPI */
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(pulse_from + 192U, pulse_until);  /* 24 bits at 14 MHz */
 }
 
 void test_the_position_is_the_upper_half_of_the_angle(void)
@@ -79,22 +114,27 @@ void test_any_bit_of_the_fault_register_is_a_fault_until_it_is_clear(void)
     TEST_ASSERT_FALSE(angle_fault());
 }
 
-void test_a_missing_frame_is_a_fault_and_the_last_angle_stays(void)
+void test_the_third_missing_frame_is_a_fault_and_the_last_angle_stays(void)
 {
     received(0xABCD00);
     (void)hal_angle_read();
-    nothing_received();
-    TEST_ASSERT_EQUAL_HEX32(0xABCD0000, hal_angle_read());
-    TEST_ASSERT_TRUE(angle_fault());
+    fifos(0, FIFO_WORDS);
+    for (int lost = 1; lost <= 3; lost++) {
+        TEST_ASSERT_EQUAL_HEX32(0xABCD0000, hal_angle_read());
+        TEST_ASSERT_EQUAL(lost == 3, angle_fault());
+    }
 }
 
-void test_velocity_of_the_period_before_is_kept_and_position_is_asked_for(void)
+/* Without a word left to send, the last period may have had none: the newest frame may be old. */
+void test_a_frame_counts_only_while_a_word_is_left_to_send(void)
 {
-    fake_PTC.PCOR = 0;
-    received(0xFF3800);
-    angle_begin();
-    TEST_ASSERT_EQUAL_INT16(-200, resolver_velocity());
-    TEST_ASSERT_EQUAL_HEX32(1U << PIN_RESOLVER_A1, fake_PTC.PCOR);
-    angle_end();
-    TEST_ASSERT_EQUAL_HEX32(1U << PIN_RESOLVER_A1, fake_PTC.PSOR);
+    received(0xABCD00);
+    (void)hal_angle_read();
+    frame(0x111100);
+    fifos(3, 1);
+    TEST_ASSERT_EQUAL_HEX32(0x11110000, hal_angle_read());
+    TEST_ASSERT_FALSE(angle_fault());
+    frame(0x222200);
+    fifos(4, 0);
+    TEST_ASSERT_EQUAL_HEX32(0x11110000, hal_angle_read());
 }
