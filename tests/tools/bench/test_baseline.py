@@ -6,9 +6,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from fluxtrue_tools.bench import baseline, page
+from fluxtrue_tools.bench import baseline, figures, page
 from fluxtrue_tools.errors import FluxtrueError
 
 COMMITTED = {"compiler": "gcc 1", "drives": {"robust": {"fast": [1, 2.5, 3]}}, "image": {"flash": 10}}
@@ -64,8 +65,26 @@ def test_the_committed_page_is_what_the_committed_figures_give() -> None:
 
 
 def test_a_bound_that_is_missed_is_called_missed() -> None:
-    figures = baseline.load()
-    figures["image"]["flash"] = page.FLASH_MAX + 1
-    assert f"| image, flash | {page.FLASH_MAX + 1} | {page.FLASH_MAX} | **missed** |" in page.page(figures)
-    figures["image"]["flash"] = page.FLASH_MAX
-    assert f"| image, flash | {page.FLASH_MAX} | {page.FLASH_MAX} | met |" in page.page(figures)
+    committed = baseline.load()
+    committed["image"]["flash"] = page.FLASH_MAX + 1
+    assert f"| image, flash | {page.FLASH_MAX + 1} | {page.FLASH_MAX} | **missed** |" in page.page(committed)
+    committed["image"]["flash"] = page.FLASH_MAX
+    assert f"| image, flash | {page.FLASH_MAX} | {page.FLASH_MAX} | met |" in page.page(committed)
+
+
+def test_the_tick_meets_its_bounds_and_the_peers_stand_beside_the_one_with_the_look_up() -> None:
+    stages = baseline.load()["kernels"]["stages"]
+    tick, with_tables, tables = (stages[name] for name in ("current_tick", "current_tick_tables", "flux_table"))
+    assert page.BOUNDS["current_tick"] == (160, 214)
+    assert tick[1] <= 160 and tick[2] <= 214
+    assert with_tables[1] > tick[1] + tables[1] / 2
+    peers = baseline.PAGE.read_text(encoding="utf-8").split("## Beside others")[1]
+    ours = next(line for line in peers.splitlines() if "current control with its flux tables" in line)
+    assert ours.endswith(f"| {with_tables[1]} | {with_tables[2]} |")
+
+
+def test_the_maxima_contain_what_only_the_reactions_to_faults_have() -> None:
+    row = figures._row(np.array([[100, 200], [300, 500]]), np.array([[625, 450]]))
+    assert row == {"runs": 2, "instructions": [100, 200.0, 625], "cycles": [200, 350.0, 500]}
+    empty = np.empty((0, 2), dtype=np.int64)
+    assert figures._row(np.array([[100, 200]]), empty)["instructions"] == [100, 100.0, 100]

@@ -188,7 +188,8 @@ class Stage:
 
 
 TITLES = {
-    "current_tick": "current control, counts to duties",
+    "current_tick_tables": "current control with the flux tables, counts to duties",
+    "current_tick": "the same without the look-up of the tables",
     "current_core": "of it what the leanest peer has",
     "measure": "measure: counts to currents and dc voltage",
     "angle_tracker": "angle tracker",
@@ -209,7 +210,8 @@ TITLES = {
 
 # In this order: the tables' answer and the controller's voltage are used by those after them.
 STAGES = (
-    "flux_table", "current_tick", "current_core", "measure", "angle_tracker", "current_control", "modulate", "window",
+    "flux_table", "current_tick_tables", "current_tick", "current_core", "measure", "angle_tracker", "current_control",
+    "modulate", "window",
 )  # fmt: skip
 
 TASK_TITLES = {

@@ -30,6 +30,7 @@ void bench_task(void);
 void bench_flux_table(void);
 void bench_mrai(void);
 void bench_torque_estimate(void);
+void bench_current_tick_tables(void);
 void bench_current_tick(void);
 void bench_current_core(void);
 void bench_measure(void);
@@ -242,19 +243,22 @@ static void modulate(const modulate_config_t *config, const current_control_out_
     }
 }
 
-/* From converter counts and angle to duties; what the tables answer was found before. */
-STAGE void bench_current_tick(void)
+/* From converter counts and angle to duties. */
+static inline __attribute__((always_inline)) void tick(drive_t *d, bool looks_up)
 {
-    drive_t *d = the_copy();
     const period_data_t *m = &d->period;
     const measure_t measured = measure_step(&m->measure, &port.counts);
     const angle_t angle = angle_tracker_follow(&m->angle_tracker, &d->fast.angle_tracker, port.theta_m);
     const dq_q15_t i = park(measured.i, fx_rotation(angle.theta_e));
     const fx_pair_t i_dq = fx_pair(i.d, i.q);
     const fx_pair_t advanced = fx_rotation(angle.theta_e + (uint32_t)angle.step + (uint32_t)(angle.step >> 1));
+    flux_point_t here;
+    if (looks_up) {
+        here = flux_table_step(&m->flux_table, i);
+    }
     const current_control_in_t control = {
         .target = found.target,
-        .flux = &flux,
+        .flux = looks_up ? &here : &flux,
         .omega = angle.omega_q31,
         .psi_delta = d->psi_d_error,
         .v_dc = measured.v_dc,
@@ -262,6 +266,17 @@ STAGE void bench_current_tick(void)
     const current_control_out_t wanted = current_control_step(&d->parameters.current_control, &d->fast.current_control,
                                                               &control);
     modulate(&d->parameters.modulate, &wanted, i_dq, advanced);
+}
+
+STAGE void bench_current_tick_tables(void)
+{
+    tick(the_copy(), true);
+}
+
+/* What the tables answer was found before. */
+STAGE void bench_current_tick(void)
+{
+    tick(the_copy(), false);
 }
 
 /* As a step of its own, (CC-1): in the firmware it is part of measure_step(), which also scales the counts. */

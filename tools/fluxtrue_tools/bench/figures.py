@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fluxtrue_tools.bench import cycles, disassembly, image, sizes, stack
+from fluxtrue_tools.bench import disassembly, image, sizes, stack
 from fluxtrue_tools.bench.build import ROOT
 from fluxtrue_tools.bench.drive import Stage, build_drive, build_task, measure_drive, measure_task
 from fluxtrue_tools.emulate import build as emulation
@@ -33,38 +33,41 @@ def budget() -> dict[str, Any]:
         return tomllib.load(file)
 
 
-def _spread(values: NDArray[np.int64]) -> list[float]:
-    """Minimum, mean to a tenth, maximum."""
-    return [int(values.min()), round(float(values.mean()), 1), int(values.max())]
+def _spread(values: NDArray[np.int64], also: NDArray[np.int64]) -> list[float]:
+    """Minimum, mean to a tenth, maximum; the maximum also of further values."""
+    return [int(values.min()), round(float(values.mean()), 1), int(max(values.max(), also.max(initial=0)))]
 
 
-def _work(recording: image.Recording) -> NDArray[np.int64]:
-    """Instructions and cycles of the interrupts of each period, exception entry and return in the latter: the fast ISR
-    and, where the identification has one, the MRAI ISR that it pends."""
-    ours = recording.spans[np.isin(recording.spans[:, 0], (image.FAST, image.MRAI))]
+def _work(spans: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Instructions and cycles of the interrupts of each period: the fast ISR and, where the identification has one, the
+    MRAI ISR that it pends."""
+    ours = spans[np.isin(spans[:, 0], (image.FAST, image.MRAI))]
     begins = np.flatnonzero(ours[:, 0] == image.FAST)
-    cost = ours[begins[0] :, 1:] + np.array([0, cycles.ENTRY + cycles.RETURN])
-    both: NDArray[np.int64] = np.add.reduceat(cost, begins - begins[0])
+    both: NDArray[np.int64] = np.add.reduceat(ours[begins[0] :, 1:], begins - begins[0])
     return both
+
+
+COLUMNS = ("instructions", "cycles")  # of a recording
+
+
+def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
+    spreads = {name: _spread(runs[:, k], reactions[:, k]) for k, name in enumerate(COLUMNS)}
+    return {"runs": len(runs), **spreads}
 
 
 def _mode(parts: emulation.Parts, functions: list[disassembly.Function], mode: int) -> tuple[FIGURES, int]:
     recording = image.record(parts, functions, mode)
     rows: FIGURES = {}
     for name, vector in INTERRUPTS.items():
-        spans = recording.of(vector)
-        if len(spans) == 0 and (name, mode) == ("MRAI ISR", MODES["robust"]):
+        runs, reactions = recording.of(vector), recording.reactions_of(vector)
+        if len(runs) == 0 and (name, mode) == ("MRAI ISR", MODES["robust"]):
             continue  # what this identification does in every period is part of the fast ISR
-        if len(spans) == 0:
+        if len(runs) == 0 and len(reactions) == 0:
             raise FluxtrueError(f"the {name} never ran")
-        cost = spans[:, 1] + cycles.ENTRY + cycles.RETURN
-        rows[name] = {"runs": len(spans), "instructions": _spread(spans[:, 0]), "cycles": _spread(cost)}
-    both = _work(recording)
-    rows["10 kHz work"] = {
-        "runs": len(both), "instructions": _spread(both[:, 0]), "cycles": _spread(both[:, 1]),
-    }  # fmt: skip
+        rows[name] = _row(runs if len(runs) > 0 else reactions, reactions)
+    rows["10 kHz work"] = _row(_work(recording.spans), _work(recording.reacting))
     met = {"periods": recording.periods, "voltage limited": recording.limited, "beyond the tables": recording.clamped,
-           "field weakening": recording.weakened}  # fmt: skip
+           "field weakening": recording.weakened, "reacting": len(recording.reactions_of(image.FAST))}  # fmt: skip
     return {"met": met, "runs": rows}, recording.stack_bytes
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -34,6 +35,12 @@ V_DC: Final = 350.0
 RPM: Final = 2 * math.pi / 60
 PERIODS_PER_MS: Final = 10
 WARM_UP_MS: Final = 20
+# What a drive reacts to, while it makes torque: over-voltage, one phase current beyond the trip, and an interrupt.
+FAULTS: Final = {"plant.vdc_V": 520.0, "plant.current_gain_a": 20.0}
+GATE_DRIVER: Final = "the gate driver"
+FAULT_TORQUE, FAULT_RPM = 80.0, 3000.0
+FAULT_RAMP_MS: Final = 100
+REACTION_MS: Final = 5
 # Milliseconds, requested torque, speed in rpm at the end, dc voltage.
 DRIVE: Final = (
     (50, 80.0, 3000.0, V_DC), (50, -60.0, 3000.0, V_DC), (30, 5.0, 3000.0, V_DC),
@@ -64,9 +71,11 @@ def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
 
 @dataclass
 class Recording:
-    """Rows of vector, instructions, cycles; and the events of the run."""
+    """Rows of vector, instructions, and cycles with exception entry and return: those of the drive, and those while it
+    reacted to faults. And the events of the drive."""
 
     spans: NDArray[np.int64]
+    reacting: NDArray[np.int64]
     periods: int
     limited: int
     clamped: int
@@ -75,6 +84,9 @@ class Recording:
 
     def of(self, vector: int) -> NDArray[np.int64]:
         return self.spans[self.spans[:, 0] == vector, 1:]
+
+    def reactions_of(self, vector: int) -> NDArray[np.int64]:
+        return self.reacting[self.reacting[:, 0] == vector, 1:]
 
 
 @dataclass
@@ -122,6 +134,11 @@ class Stand:
         """The runs that have finished since the last call."""
         return take(self.library, self.handle)
 
+    def rows(self) -> list[tuple[int, int, int]]:
+        """The same as rows of a Recording."""
+        own = cycles.ENTRY + cycles.RETURN
+        return [(vector, instructions, cost + own) for vector, instructions, cost in self.take()]
+
     def stack_used(self) -> int:
         bottom, top = self.core.symbol("stack_bottom"), self.core.symbol("stack_top")
         content = self.core.read(bottom, top - bottom)
@@ -131,8 +148,9 @@ class Stand:
         return top - bottom - unused
 
 
-def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
-    """The whole drive; `mode`: identification_mode."""
+@contextmanager
+def _powered(parts: Parts, mode: int) -> Iterator[Stand]:
+    """The image with its plant, in the state run; `mode`: identification_mode."""
     motor = parts.emulated(emulation.COUNTING)
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0, "current_noise_A_rms": 0.5,
                            "seed": 1.0}  # fmt: skip
@@ -140,27 +158,58 @@ def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
         stand = Stand(loop)
         loop.set("identification_mode", mode)
         stand.power_up()
+        yield stand
+
+
+def _drive(stand: Stand, spans: list[tuple[int, int, int]]) -> NDArray[np.float64]:
+    """The whole drive; returns the recorded columns of each period."""
+    rows: list[NDArray[np.float64]] = []
+    speed = 0.0
+    for milliseconds, torque, rpm, v_dc in DRIVE:
+        stand.command.values["TorqueRequested"] = torque
+        stand.loop.set("plant.vdc_V", v_dc)
+        for k in range(milliseconds):
+            start, stop = (speed + (rpm - speed) * (k + j) / milliseconds for j in (0, 1))
+            rows.append(stand.run_ms({"plant.speed_rad_s": (start * RPM, stop * RPM)}))
+            spans += stand.rows()
+        speed = rpm
+    return np.concatenate(rows)
+
+
+def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) -> list[tuple[int, int, int]]:
+    """A drive of its own, because no fault is reset while the rotor turns: the runs of each interrupt from the cause of
+    the fault until switching has long been off."""
+    with _powered(parts, mode) as stand:
+        stand.command.values["TorqueRequested"] = FAULT_TORQUE
+        for k in range(FAULT_RAMP_MS):
+            start, stop = (FAULT_RPM * RPM * (k + j) / FAULT_RAMP_MS for j in (0, 1))
+            stand.run_ms({"plant.speed_rad_s": (start, stop)})
+        if int(stand.loop.get("fault_word")) != 0 or stand.loop.get("truth.torque_Nm") < FAULT_TORQUE / 2:
+            raise FluxtrueError(f"the drive does not make torque before the fault of {cause}")
+        stand.profile(functions)
+        if cause == GATE_DRIVER:
+            stand.core.pend(GATE)
+        else:
+            stand.loop.set(cause, FAULTS[cause])
+        stand.run(REACTION_MS)
+        if int(stand.loop.get("fault_word")) == 0:
+            raise FluxtrueError(f"{cause} was meant to be a fault")
+        return stand.rows()
+
+
+def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
+    """The whole drive, then the reactions to faults; `mode`: identification_mode."""
+    with _powered(parts, mode) as stand:
+        loop = stand.loop
         loop.record(["voltage_limited", "table_clamped", "id_A"])
         stand.profile(functions)
-        rows: list[NDArray[np.float64]] = []
         spans: list[tuple[int, int, int]] = []
-        speed = 0.0
-        for milliseconds, torque, rpm, v_dc in DRIVE:
-            stand.command.values["TorqueRequested"] = torque
-            loop.set("plant.vdc_V", v_dc)
-            for k in range(milliseconds):
-                start, stop = (speed + (rpm - speed) * (k + j) / milliseconds for j in (0, 1))
-                rows.append(stand.run_ms({"plant.speed_rad_s": (start * RPM, stop * RPM)}))
-                spans += stand.take()
-            speed = rpm
+        seen = _drive(stand, spans)
         fault = int(loop.get("fault_word"))
         if fault != 0 or int(loop.get("identification_mode")) != mode:
             raise FluxtrueError(f"the measured drive ended with fault word {fault:#x}")
-        stand.core.pend(GATE)  # at the end, because it stops the drive
-        stand.run_ms()
-        spans += (span for span in stand.take() if span[0] == GATE)
-        seen = np.concatenate(rows)
+        reacting = [row for cause in (*FAULTS, GATE_DRIVER) for row in _reaction(parts, functions, mode, cause)]
         return Recording(
-            np.array(spans, dtype=np.int64), len(seen), int(seen[:, 0].sum()), int(seen[:, 1].sum()),
-            int((seen[:, 2] < -100).sum()), stand.stack_used(),
+            np.array(spans, dtype=np.int64), np.array(reacting, dtype=np.int64), len(seen), int(seen[:, 0].sum()),
+            int(seen[:, 1].sum()), int((seen[:, 2] < -100).sum()), stand.stack_used(),
         )  # fmt: skip
