@@ -13,7 +13,7 @@
  * a request shorter than a clock of the module       | refused  | test_a_request_that_is_too_short_is_refused
  * interrupts, DMA, continuous and wide transfers     | refused  | test_other_transfer_modes_are_refused
  * AD2S1210: position latched by SAMPLE, 14 bits      | yes      | test_a_resolver_image_computes_the_same_bits
- * AD2S1210: read sooner than 6 clocks after SAMPLE   | refused  | test_an_angle_of_another_age_is_found
+ * AD2S1210: read sooner than 6 clocks after SAMPLE   | refused  | test_a_planted_error_of_the_angle_is_found
  * AD2S1210: faults kept until read and sampled again | yes      | test_a_fault_of_the_resolver_raises_the_angle_fault
  * AD2S1210: tracking error, dynamics, settling       | no       | -
  */
