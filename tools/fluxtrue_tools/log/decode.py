@@ -15,6 +15,9 @@ from fluxtrue_tools.errors import FluxtrueError
 FRAMES: Final = "CAN_DataFrame"
 FIELDS: Final = frozenset(f"{FRAMES}.{field}" for field in ("ID", "IDE", "DataLength", "DataBytes"))
 
+BESIDE: Final = ("XCP.", "truth.")
+"""How the names of signals begin that are not decoded from frames."""
+
 
 def signals_of(path: Path) -> dict[str, pd.Series]:
     """Every signal by its name Message.Signal, over seconds since the first frame.
@@ -27,6 +30,7 @@ def signals_of(path: Path) -> dict[str, pd.Series]:
     try:
         with MDF(path) as recorded:
             interface, frames = _attached(path, recorded), recorded.get(FRAMES)
+            beside = _beside(recorded, frames.timestamps[0] if len(frames.timestamps) else 0.0)
     except Exception as error:  # for a bad file the reader raises many kinds of exceptions
         raise FluxtrueError(f"{path}: not an MDF4 bus log ({error})") from error
     missing = FIELDS - set(frames.samples.dtype.names or ())
@@ -39,6 +43,17 @@ def signals_of(path: Path) -> dict[str, pd.Series]:
     problem = "" if told is None else interface.mismatch({HASH: told.iloc[-1]})
     if problem:
         raise FluxtrueError(f"{path}: {problem}")
+    return found | beside
+
+
+def _beside(recorded: MDF, begin_s: float) -> dict[str, pd.Series]:
+    """Signals that are recorded beside the frames: XCP measurements, truth of a simulation."""
+    found: dict[str, pd.Series] = {}
+    for name, places in recorded.channels_db.items():
+        if name.startswith(BESIDE):
+            signal = recorded.get(name, *places[0])
+            found[name] = values = pd.Series(signal.samples, index=signal.timestamps - begin_s)
+            values.attrs = {"unit": signal.unit or "", "choices": {}}
     return found
 
 

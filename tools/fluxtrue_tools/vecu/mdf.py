@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A bus log in MDF4, written in one go.
+"""A bus log in MDF4, with further signals beside its frames, written in one go.
 
 python-can's own writer appends frame by frame, which costs more than the simulation itself; the layout is the same.
 """
 
 from array import array
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from hashlib import md5
 from pathlib import Path
@@ -18,6 +19,29 @@ from can.io.mf4 import STD_DTYPE
 
 from fluxtrue_tools.bus import DBC
 from fluxtrue_tools.bus.interface import Interface
+
+
+class Group:
+    """Signals with common time stamps that are not decoded from frames of the DBC."""
+
+    def __init__(self, units: dict[str, str]) -> None:
+        self._units = units
+        self._times, self._columns = array("d"), [array("d") for _ in units]
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def add(self, time_s: float, *values: float) -> None:
+        """One value of each signal, in the order of their names."""
+        self._times.append(time_s)
+        for column, value in zip(self._columns, values, strict=True):
+            column.append(value)
+
+    def signals(self) -> list[Signal]:
+        """For asammdf."""
+        times = np.maximum.accumulate(np.asarray(self._times, dtype=np.float64))
+        return [Signal(name=name, unit=unit, samples=np.asarray(column, dtype=np.float64), timestamps=times)
+                for (name, unit), column in zip(self._units.items(), self._columns, strict=True)]  # fmt: skip
 
 
 class BusLog:
@@ -38,7 +62,7 @@ class BusLog:
     def __len__(self) -> int:
         return len(self._times)
 
-    def write(self, path: Path, interface: Interface | None = None) -> None:
+    def write(self, path: Path, interface: Interface | None = None, groups: Iterable[Group] = ()) -> None:
         """The file; the DBC goes in as an attachment, because its factors are those of one motor."""
         frames = np.zeros(len(self), dtype=STD_DTYPE)
         flags = np.frombuffer(self._flags, dtype=np.uint8)
@@ -59,4 +83,7 @@ class BusLog:
             mdf.append(
                 Signal(name="CAN_DataFrame", samples=frames, timestamps=times, attachment=attachment, source=source)
             )
+            for group in groups:
+                if len(group):
+                    mdf.append(group.signals())
             mdf.save(path, overwrite=True, compression=2)
