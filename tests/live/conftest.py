@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from damage import BAD_FLUX, damaged
+from driver import Page
 from progress import HANG_S
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
@@ -64,7 +65,8 @@ def launch(records: Path, *arguments: str) -> Server:
 
 def end(server: Server) -> None:
     """End the server as a user does."""
-    server.process.terminate()
+    if server.process.poll() is None:
+        server.process.terminate()
     assert server.process.wait(HANG_S) == 0
 
 
@@ -81,14 +83,20 @@ def refused(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
     yield from _connected(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
 
 
-def _connected(program: Path, tmp_path: Path) -> Iterator[Server]:
+@pytest.fixture
+def free_running(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
+    """A server whose simulated time does not wait for the pages."""
+    yield from _connected(Path(request.config.getoption("--vecu")), tmp_path, ())
+
+
+def _connected(program: Path, tmp_path: Path, further: tuple[str, ...] = ("--in-step",)) -> Iterator[Server]:
     with VirtualEcu(program) as ecu:
         options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
         records = tmp_path / "records"
         running = launch(
             records, "--record-dir", str(records), "--can-interface", "socketcand",
             *(f"--can-option={one}" for one in options),
-            "--bench", f"{HOST}:{ecu.bench_port}", "--elf", str(program), "--in-step",
+            "--bench", f"{HOST}:{ecu.bench_port}", "--elf", str(program), *further,
         )  # fmt: skip
         running.stand = Channel(HOST, ecu.bench_port)
         yield running
@@ -124,3 +132,19 @@ def browser() -> Iterator[webdriver.Chrome]:
     driver.set_script_timeout(HANG_S)
     yield driver
     driver.quit()
+
+
+@pytest.fixture
+def page(browser: webdriver.Chrome, server: Server) -> Page:
+    """A page whose drive runs at 2000 rpm."""
+    opened = Page(browser, server)
+    browser.get("about:blank")
+    browser.get_log("browser")  # discards the messages of the previous page, whose server has ended
+    browser.get(server.url)
+    opened.until(lambda: opened.text("state") == "standby", "standby")
+    opened.find("ready").click()
+    opened.until(lambda: opened.text("state") == "ready", "ready")
+    opened.enable()
+    opened.slide("speed_rpm", 2000.0)
+    opened.until(lambda: opened.newest("INV_Status", "Speed") > 1990.0, "2000 rpm")
+    return opened

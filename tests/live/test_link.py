@@ -11,7 +11,7 @@ import pytest
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
 from fluxtrue_tools.live.commander import Commander, Wish
-from fluxtrue_tools.live.link import Link, Recorder
+from fluxtrue_tools.live.link import Link
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.stand import Stand
@@ -20,6 +20,8 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import SteppedBus, connect
 
 BATCH_S = 0.04
+STOP_S = 0.08  # from 132 N·m to zero
+STOP_Nm_PER_PERIOD = 132.0 * 0.01 / STOP_S
 HANG_S = 60.0  # the wait for what must come ends only if it does not
 TIME_OUT_S = 5.0  # of simulated time; every change of state takes less
 
@@ -33,14 +35,13 @@ class Drive:
         self.commander, self.samples, self.in_step = Commander(132.0), Samples(interface.database), InStep()
         pace = SimulatedTime(SteppedBus(bus, self.channel.another()), [self.samples], self.in_step)
         self.stand = Stand(self.channel.another())
-        recorder = Recorder(folder, interface)
-        self.link = Link(bus, pace, interface, self.commander, self.samples, recorder, self.stand)
+        self.link = Link(bus, pace, interface, self.commander, self.samples, self.stand)
         assert self.in_step.due()
 
     def pass_batch(self, alive: bool = True) -> None:
         """Advance time by 40 ms. If alive, the page gives a sign of life at the beginning."""
         if alive:
-            self.link.act(lambda commander, now: commander.hand(now))
+            self.link.act("hand")
         self.in_step.done()
         assert self.in_step.due(), self.link.lost
 
@@ -52,11 +53,11 @@ class Drive:
         pytest.fail(f"after {TIME_OUT_S} s: state {self.samples.state()}, {self.commander}")
 
     def press(self, wish: Wish) -> None:
-        self.link.act(lambda commander, now: commander.ask(wish, now))
+        self.link.act("ask", wish)
 
     def torques(self) -> np.ndarray:
         """Times and commanded torques that the inverter has reported since the last call."""
-        columns = self.samples.take()["INV_Status"]
+        columns = self.samples.take()[1]["INV_Status"]
         return np.array([columns["t"], columns["TorqueCommanded"]])
 
     def close(self) -> None:
@@ -72,7 +73,7 @@ def test_an_inverter_of_another_scale_is_not_commanded(request: pytest.FixtureRe
         channel, bus = Channel(HOST, ecu.bench_port), connect(ecu.can_port)
         samples = Samples(truck.database)
         pace = SimulatedTime(SteppedBus(bus, channel.another()), [samples])
-        link = Link(bus, pace, truck, Commander(1150.0), samples, Recorder(tmp_path, truck))
+        link = Link(bus, pace, truck, Commander(1150.0), samples)
         link.wait(HANG_S)
         assert link.lost.startswith(f"truck.dbc (interface hash 0x{truck.hash:08X}) does not describe this inverter")
         assert samples.newest_s < 0.2
@@ -89,7 +90,7 @@ def driving(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Drive]:
             drive.press(wish)
             drive.until(lambda state=state: drive.samples.state() == state)
         drive.stand.turn("speed_rpm", 2000.0)
-        drive.link.act(lambda commander, now: commander.slide(60.0, now))
+        drive.link.act("slide", 60.0)
         drive.until(lambda: abs(drive.stand.truth_Nm() - 60.0) < 1.0)
         yield drive
         drive.close()
@@ -112,18 +113,33 @@ def test_a_gap_in_the_commands_disables_and_one_press_on_enable_continues(drivin
 def test_without_a_sign_of_life_the_torque_stays_for_300_ms_and_ramps_to_zero(driving: Drive) -> None:
     driving.pass_batch()
     gone_s = driving.samples.newest_s
-    driving.link.act(lambda commander, now: commander.hand(now))
+    driving.link.act("hand")
     driving.torques()
     driving.until(lambda: driving.samples.newest_s > gone_s + 1.0, alive=False)
     times, torques = driving.torques()
     # The status is sent every 10 ms and reports a command that arrived up to 10 ms before.
     held = torques[times < gone_s + 0.3]
     assert abs(held - 60.0).max() < 0.1
-    assert abs(torques[times > gone_s + 0.3 + 60.0 / 150.0 + 0.03]).max() < 0.1
-    ramp = torques[(times > gone_s + 0.33) & (times < gone_s + 0.68)]
-    assert np.diff(ramp) == pytest.approx(-1.5, abs=0.11)
+    assert abs(torques[times > gone_s + 0.3 + STOP_S + 0.03]).max() < 0.1
+    assert np.diff(torques[times > gone_s + 0.3]).min() > -1.1 * STOP_Nm_PER_PERIOD
     assert driving.samples.state() == "ready"
     assert "closed or silent for 0.3 s" in driving.commander.stopped
+
+
+@pytest.mark.parametrize("end", [("stop", "Stop was pressed."), ("ask", Wish.OFF), ("let_go",)], ids=lambda end: end[0])
+def test_stop_off_and_a_closed_page_end_the_torque_within_150_ms(driving: Drive, end: tuple[str, ...]) -> None:
+    driving.link.act("slide", 125.0)
+    driving.until(lambda: driving.stand.truth_Nm() > 123.0)
+    ended_s = driving.link._pace.now_s
+    driving.link.act(*end)
+    while driving.link._pace.now_s < ended_s + 0.15:
+        driving.in_step.done()
+        assert driving.in_step.due()
+    estimated = driving.samples.take()[1]["INV_Status"]
+    late = [
+        torque for t, torque in zip(estimated["t"], estimated["TorqueEstimated"], strict=True) if t > ended_s + 0.14
+    ]
+    assert late and max(map(abs, late)) < 0.5 and abs(driving.stand.truth_Nm()) < 0.5
 
 
 def test_closing_the_link_while_it_drives_ramps_the_torque_out_first(driving: Drive) -> None:
@@ -132,8 +148,8 @@ def test_closing_the_link_while_it_drives_ramps_the_torque_out_first(driving: Dr
     driving.link.close()
     _, torques = driving.torques()
     assert driving.commander.torque_requested_Nm == 0.0
-    assert torques[-1] < 1.6  # the status after the last command may not have been received
-    assert np.diff(torques).min() >= -1.61
+    assert torques[-1] < STOP_Nm_PER_PERIOD  # the status after the last command may not have been received
+    assert np.diff(torques).min() > -1.1 * STOP_Nm_PER_PERIOD
 
 
 def test_the_end_of_the_virtual_ecu_is_reported_and_nothing_hangs(

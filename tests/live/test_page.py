@@ -10,92 +10,16 @@ from pathlib import Path
 import pytest
 from asammdf import MDF
 from conftest import Server
+from driver import TIME_OUT_S, Page
 from progress import HANG_S, polled, until
 from selenium import webdriver
 from selenium.webdriver.common.by import By
-from selenium.webdriver.remote.webelement import WebElement
 
-TIME_OUT_S = 60.0  # of simulated time
+from fluxtrue_tools.log.decode import signals_of
+
 HAND_TIMEOUT_S = 0.3  # docs/howto/live.md
-RAMP_Nm_per_s = 150.0
+STOP_S = 0.08
 BATCH_S = 0.04
-
-
-class Page:
-    """The page as a person sees it, and the server behind it."""
-
-    def __init__(self, browser: webdriver.Chrome, server: Server) -> None:
-        self.browser, self.server = browser, server
-
-    def find(self, name: str) -> WebElement:
-        return self.browser.find_element(By.ID, name)
-
-    def text(self, name: str) -> str:
-        return self.find(name).text
-
-    def until(self, true: Callable[[], bool], what: str) -> None:
-        """Wait for the condition in simulated time."""
-        until(true, self.server.now_s, TIME_OUT_S, what)
-
-    def run(self, script: str, *arguments: object) -> object:
-        return self.browser.execute_script(script, *arguments)
-
-    def drawn(self, ring: str, name: str) -> list[tuple[float, float]]:
-        """Times and values of a signal on the page, oldest first."""
-        script = "const r = rings[arguments[0]]; return [r.data[0], r.data[r.names.indexOf(arguments[1]) + 1]];"
-        columns = self.run(script, ring, name)
-        assert isinstance(columns, list)
-        return list(zip(*columns, strict=True))
-
-    def newest(self, ring: str, name: str) -> float:
-        drawn = self.drawn(ring, name)
-        return drawn[-1][1] if drawn else 0.0
-
-    def newest_s(self) -> float:
-        """The time of the newest drawn value."""
-        drawn = self.drawn("INV_Status", "Speed")
-        return drawn[-1][0] if drawn else 0.0
-
-    def slide(self, name: str, value: float) -> None:
-        script = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'));"
-        self.run(script, self.find(name), value)
-
-    def drive(self, torque_Nm: float) -> None:
-        """Move the slider once and wait for the torque."""
-        assert self.find("torque").is_enabled()
-        self.slide("torque", torque_Nm)
-        for signal, within_Nm in (("TorqueCommanded", 0.1), ("TorqueEstimated", 1.0)):
-            self.until(lambda signal=signal, within_Nm=within_Nm:
-                       abs(self.newest("INV_Status", signal) - torque_Nm) < within_Nm, f"{torque_Nm} N·m")  # fmt: skip
-
-    def enable(self) -> None:
-        """Press Enable once and wait until the drive runs."""
-        self.find("enable").click()
-        self.until(lambda: self.text("state") == "run" and self.find("torque").is_enabled(), "run, the slider")
-
-    def hide(self, hidden: bool) -> float:
-        """Report the page as hidden or visible to its script; the time of the newest drawn value."""
-        newest_s = self.run("Object.defineProperty(document, 'hidden', {value: arguments[0], configurable: true});"
-                            "document.dispatchEvent(new Event('visibilitychange'));"
-                            "return rings.INV_Status.data[0].at(-1);", hidden)  # fmt: skip
-        assert isinstance(newest_s, float)
-        return newest_s
-
-
-@pytest.fixture
-def page(browser: webdriver.Chrome, server: Server) -> Page:
-    """A page whose drive runs at 2000 rpm."""
-    opened = Page(browser, server)
-    browser.get("about:blank")
-    browser.get_log("browser")  # discards the messages of the previous page, whose server has ended
-    browser.get(server.url)
-    opened.until(lambda: opened.text("state") == "standby", "standby")
-    opened.find("ready").click()
-    opened.until(lambda: opened.text("state") == "ready", "ready")
-    opened.enable()
-    opened.slide("speed_rpm", 2000.0)
-    opened.until(lambda: opened.newest("INV_Status", "Speed") > 1990.0, "2000 rpm")
-    return opened
 
 
 def test_the_page_names_the_check_that_the_motor_data_failed(browser: webdriver.Chrome, refused: Server) -> None:
@@ -105,8 +29,9 @@ def test_the_page_names_the_check_that_the_motor_data_failed(browser: webdriver.
     page.until(lambda: "flux table value" in page.text("faults"), "the check that failed")
     lines = page.text("faults").splitlines()
     assert lines[0] == "config" and lines[1].startswith("The motor data or the port's settings failed a check")
-    assert lines[2] == "flux table value"
-    assert lines[3] == "A flux table contains an inductance or observer gain that is not positive."
+    assert lines[3] == "flux table value"
+    assert lines[4] == "A flux table contains an inductance or observer gain that is not positive."
+    assert lines[5].startswith("Correct the motor data")
 
 
 def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request: pytest.FixtureRequest) -> None:
@@ -114,17 +39,20 @@ def test_the_slider_moves_the_torque_and_the_magnet_does_not(page: Page, request
     page.slide("magnet_percent", 88.0)
     weakened_s = page.server.now_s()
     # The screenshot shows the identified flux and the restored torque.
+    page.size(1440, 900, "light")
     page.until(lambda: page.server.now_s() > weakened_s + 8.0, "8 s")
     page.until(lambda: abs(page.newest("truth", "Torque") - 60.0) < 1.5, "60 N·m at the shaft")
     pictures = Path(request.config.getoption("--pictures"))
     pictures.mkdir(parents=True, exist_ok=True)
+    page.run("window.scrollTo(0, 0)")
     assert page.browser.save_screenshot(str(pictures / "live.png"))
+    page.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     assert not [entry for entry in page.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
 def test_every_batch_that_arrives_is_drawn(page: Page) -> None:
     """25 batches per second of simulated time; each is sent when the one before has been drawn."""
-    read = "return {...fluxtrueStats}"
+    read = "return {...fluxtrue.stats}"
     first = last = page.run(read)
     assert isinstance(first, dict) and isinstance(last, dict)
 
@@ -154,14 +82,14 @@ def test_closing_the_page_ramps_the_torque_to_zero_and_ends_the_switching(page: 
 def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_continues(page: Page) -> None:
     page.drive(60.0)
     silent_s = page.hide(True)
-    latest_s = HAND_TIMEOUT_S + 60.0 / RAMP_Nm_per_s + 3 * BATCH_S
+    latest_s = HAND_TIMEOUT_S + STOP_S + 3 * BATCH_S
     page.until(lambda: page.text("state") == "ready" and page.newest_s() > silent_s + latest_s, "ready")
     after = [(t - silent_s, torque) for t, torque in page.drawn("INV_Status", "TorqueCommanded") if t > silent_s]
     # The page gave its last sign of life with this batch or the one before.
     assert all(abs(torque - 60.0) < 0.1 for t, torque in after if t < HAND_TIMEOUT_S - 2 * BATCH_S)
     assert all(abs(torque) < 0.2 for t, torque in after if t > latest_s)
     assert "closed or silent for 0.3 s" in page.text("stopped")
-    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0 N·m"
+    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0"
     page.hide(False)
     page.enable()
     assert page.text("stopped") == ""
@@ -175,7 +103,7 @@ def test_after_a_gap_in_the_commands_the_page_gives_the_reason_and_one_press_on_
     page.until(lambda: page.text("stopped") != "", "the reason")
     assert "command timed out" in page.text("stopped") and "No command for 70 ms" in page.text("stopped")
     page.until(lambda: page.text("state") == "ready", "ready")
-    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0 N·m"
+    assert not page.find("torque").is_enabled() and page.text("torque-value") == "0.0"
     page.enable()
     assert page.text("stopped") == ""
     page.drive(20.0)
@@ -187,19 +115,19 @@ def test_a_second_page_shows_values_but_cannot_command(page: Page) -> None:
     page.browser.switch_to.new_window("tab")
     page.browser.get(page.server.url)
     page.until(lambda: page.text("state") in ("run", "ready"), "a state")
-    page.run("send({type: 'torque', torque_requested_Nm: 90})")
-    page.until(lambda: "hand on the slider" in page.text("message"), "a refusal")
+    page.run("fluxtrue.send({type: 'torque', torque_requested_Nm: 90})")
+    page.until(lambda: "another page has control" in page.text("message"), "a refusal")
     page.browser.close()
     page.browser.switch_to.window(first)
 
 
 def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
     page.find("tune-read").click()
-    page.until(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#tuning tr")) >= 6, "the values")
+    page.until(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#tuning tbody tr")) >= 6, "the values")
     script = "const i = document.querySelector('#tuning input[name=observer_m]'); i.value = arguments[0];" \
              "i.dispatchEvent(new Event('change'));"  # fmt: skip
     page.run(script, 3.5)
-    page.until(lambda: page.text("message") == "observer_m = 3.5000", "the new value")
+    page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the new value")
     page.run(script, 9)
     page.until(lambda: "refused by the ECU" in page.text("message"), "a refusal")
     assert "allowed: 2 … 4" in page.text("message")
@@ -207,27 +135,35 @@ def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
 
 def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: Callable[[Path], Server]) -> None:
     page.find("record").click()
-    page.until(lambda: page.text("record") == "Stop", "recording")
+    page.until(lambda: page.text("record") == "Stop recording", "recording")
     page.drive(30.0)
     driven_s = page.server.now_s()
     page.until(lambda: page.server.now_s() > driven_s + 2.0, "2 s")
     page.find("record").click()
-    page.until(lambda: "written" in page.text("file"), "the file")
+    page.until(lambda: "Written" in page.text("file"), "the file")
     (path,) = page.server.records.glob("*.mf4")
     with MDF(path) as log:
         assert log.get("CAN_DataFrame").samples.size > 500
+    signals = signals_of(path)
+    for name in ("truth.torque_mean_Nm", "XCP.torque_limited_Nm", "XCP.i_q_A"):
+        assert len(signals[name]) >= 150, name
+    assert abs(signals["truth.torque_mean_Nm"].iloc[-1] - 30.0) < 1.5
+    assert abs(signals["XCP.torque_limited_Nm"].iloc[-1] - 30.0) < 0.2
     played = Page(page.browser, replay(path))
     played.browser.get(played.server.url)
 
     def wait(true: Callable[[], bool], what: str) -> None:
-        """Wait in the time of the recording, which is a date, and 0 before the first sample has been drawn."""
+        """Wait in the time of the recording, which is 0 before the first sample has been drawn."""
         polled(lambda: played.newest_s() > 0.0)
         until(true, played.newest_s, TIME_OUT_S, what)
 
     wait(lambda: played.newest("INV_Status", "TorqueEstimated") > 20.0, "the drive")
     assert not played.find("enable").is_enabled()
-    played.run("send({type: 'drive'})")
+    played.run("fluxtrue.send({type: 'drive'})")
     wait(lambda: "takes no commands" in played.text("message"), "a refusal")
+    played.run("fluxtrue.send({type: 'pause', on: true}); fluxtrue.send({type: 'seek', position_s: 1.0})")
+    polled(lambda: played.text("pause") == "Play" and abs(played.newest_s() - 1.0) < 0.05)
+    assert played.drawn("truth", "Torque")
 
 
 def _status(url: str, **headers: str) -> int:
@@ -252,10 +188,10 @@ def test_other_hosts_and_other_pages_are_refused(server: Server) -> None:
 def test_an_invalid_message_from_a_page_is_answered_and_changes_nothing(page: Page) -> None:
     for message in ([], {"type": "torque"}, {"type": "torque", "torque_requested_Nm": "40"}, {"type": "launch"},
                     {"type": "knob", "name": "speed_rpm", "value": None}, {"type": "drawn", "batch": "9"}):  # fmt: skip
-        page.run("say('')")
-        page.run("socket.send(arguments[0])", json.dumps(message))
+        page.run("fluxtrue.say('')")
+        page.run("fluxtrue.sendText(arguments[0])", json.dumps(message))
         page.until(lambda: page.text("message") != "", f"an answer to {message}")
-    page.run("say(''); socket.send('{')")
+    page.run("fluxtrue.say(''); fluxtrue.sendText('{')")
     page.until(lambda: page.text("message") != "", "an answer to half an object")
     assert page.text("state") == "run"
     assert abs(page.newest("INV_Status", "TorqueCommanded")) < 0.1

@@ -8,39 +8,30 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
 
 import click
 from aiohttp import web
 
-from fluxtrue_tools import faults, paths
+from fluxtrue_tools import paths
 from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus.address import BusAddress, parse_option
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.live.commander import Commander
-from fluxtrue_tools.live.link import Link, Recorder
-from fluxtrue_tools.live.pace import InStep, Pace, SimulatedTime, WallClock
-from fluxtrue_tools.live.replay import Replay, load
+from fluxtrue_tools.live.bus_process import BusProcess, Setup
+from fluxtrue_tools.live.pace import InStep
+from fluxtrue_tools.live.recorder import Recorder
+from fluxtrue_tools.live.replay import Recording, Replay, load
 from fluxtrue_tools.live.samples import Samples
-from fluxtrue_tools.live.server import HOST, Session, make_app
-from fluxtrue_tools.live.stand import Stand
-from fluxtrue_tools.live.tuning import BENCH_ANSWER_S, SIMULATED_ANSWER_S, Tuning
+from fluxtrue_tools.live.server import HOST, make_app
+from fluxtrue_tools.live.session import Session
+from fluxtrue_tools.live.tuning import Tuning
+from fluxtrue_tools.live.words import words
+from fluxtrue_tools.live.xcp import BENCH_ANSWER_S, SIMULATED_ANSWER_S, Xcp
 from fluxtrue_tools.log.decode import attached_interface
 from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.sim.build import locate, prepare
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import VirtualEcu
-from fluxtrue_tools.vecu.stepped import SteppedBus
-
-EXPLAINED: Final = {"DriveFaults": "INV_Faults.DriveFaults", "EcuFaults": "INV_Faults.EcuFaults",
-                    "MotorCheck": "INV_Configuration.MotorCheck"}  # fmt: skip
-
-
-def _explanations() -> dict[str, dict[int, tuple[str, str]]]:
-    """Name and explanation of every bit of the fault words and of every check of the motor data."""
-    return {name: {value: (word.replace("_", " "), text) for value, (word, text) in faults.explained(path).items()}
-            for name, path in EXPLAINED.items()}  # fmt: skip
 
 
 @dataclass
@@ -51,7 +42,7 @@ class Source:
     interface: Interface
     address: BusAddress | None = None
     channel: Channel | None = None
-    frames: Any = None
+    recording: Recording | None = None
     elf: Path | None = None
     in_step: bool = False
 
@@ -61,39 +52,32 @@ class Source:
         return self.channel is not None and self.channel.is_fast()
 
 
-def _connect(source: Source, session: Session, stack: contextlib.ExitStack) -> None:
-    """Bus, time, stand and calibration of whatever can be commanded."""
+def _connect(source: Source, torque_max_Nm: float, session: Session, stack: contextlib.ExitStack) -> None:
+    """The process that commands, and the calibration of whatever can be commanded."""
     assert source.address is not None
-    bus = source.address.connect()
-    listeners = [session.samples, session.recorder]
-    pace: Pace
-    if source.is_stepped:
-        assert source.channel is not None
-        session.in_step = InStep() if source.in_step else None
-        pace = SimulatedTime(SteppedBus(bus, source.channel.another()), listeners, session.in_step)
-    else:
-        pace = WallClock(bus, listeners)
-    if source.channel is not None:
-        session.stand = Stand(source.channel)
-        stack.callback(session.stand.close)
-    link = Link(bus, pace, source.interface, session.commander, session.samples, session.recorder, session.stand)
-    session.link = link
+    is_stepped, interface = source.is_stepped, source.interface
+    session.in_step = InStep() if source.in_step else None
+    bench = source.channel.address if source.channel is not None else None
+    setup = Setup(source.address, interface.name, interface.text, torque_max_Nm, bench, is_stepped, source.in_step)
+    session.link = link = BusProcess(setup, [session.samples, session.recorder], session.in_step)
     stack.callback(link.close)
     if source.elf is not None:
-        answer_s = SIMULATED_ANSWER_S if source.is_stepped else BENCH_ANSWER_S
-        session.tuning = Tuning(source.address, read(source.elf), answer_s, pace.standing_still)
+        answer_s = SIMULATED_ANSWER_S if is_stepped else BENCH_ANSWER_S
+        held = link.standing_still if is_stepped else contextlib.nullcontext
+        session.tuning = Tuning(Xcp(source.address, answer_s, held), read(source.elf))
         stack.callback(session.tuning.close)
 
 
 @contextlib.contextmanager
 def _session(source: Source, torque_max_Nm: float, record_dir: Path) -> Iterator[Session]:
     samples, recorder = Samples(source.interface.database), Recorder(record_dir, source.interface)
-    session = Session(source.title, Commander(torque_max_Nm), samples, recorder, _explanations())
+    session = Session(source.title, torque_max_Nm, samples, recorder, words())
     with contextlib.ExitStack() as stack:
-        if source.address is None:
-            stack.callback(Replay(source.frames, [samples]).close)
+        if source.recording is not None:
+            session.replay = Replay(source.recording, samples)
+            stack.callback(session.replay.close)
         else:
-            _connect(source, session, stack)
+            _connect(source, torque_max_Nm, session, stack)
         yield session
 
 
@@ -159,7 +143,7 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
     interface = read_interface(machine.dbc)
     with contextlib.ExitStack() as stack:
         if replay is not None:
-            source = Source(f"{replay.name} (replay)", attached_interface(replay), frames=load(replay))
+            source = Source(f"{replay.name} (replay)", attached_interface(replay), recording=load(replay))
         elif can_interface is not None:
             address = BusAddress(can_interface, can_channel, dict(map(parse_option, can_option)))
             channel = None if bench is None else Channel.at(bench, "--bench")

@@ -12,6 +12,7 @@ HAND_TIMEOUT_S: Final = 0.3  # longer than this is a page that is closed, suspen
 START_S: Final = 0.5  # the inverter answers an enable within milliseconds
 GAP_S: Final = 0.03  # between two commands: the inverter's time-out, docs/howto/can.md
 RAMP_S: Final = 0.88  # from zero to the machine's torque
+STOP_S: Final = 0.08  # from the machine's torque to zero once the wish to drive has ended
 RUNNING: Final = ("run", "derate")
 FAULTED: Final = ("fault", "safe_state")
 AGAIN: Final = "Press Enable to go on."
@@ -41,7 +42,8 @@ class Commander:
 
     The wish to drive ends when the user ends it, when the page with control is not heard of any more, and when the
     inverter does not drive or no longer does. In the last two cases `stopped` says why, and one more press on Enable
-    goes on: the inverter wants to see enable off before it accepts it again, and it has been off since.
+    goes on: the inverter wants to see enable off before it accepts it again, and it has been off since. Torque that is
+    left when the wish ends is ramped out in STOP_S or less.
     """
 
     torque_max_Nm: float
@@ -60,9 +62,10 @@ class Commander:
         """Record a sign of life from the page that has control."""
         self._seen_s = now_s
 
-    def ask(self, wish: Wish, now_s: float) -> None:
+    def ask(self, wished: str, now_s: float) -> None:
         """A button was pressed. After Enable the requested torque is zero."""
         self.hand(now_s)
+        wish = Wish(wished)
         if wish is not self.wish:
             self.target_Nm = 0.0
             self._running, self._enabled_s, self._gap_s = False, 0.0, 0.0
@@ -78,7 +81,12 @@ class Commander:
         self.ask(Wish.READY, now_s)
         self._reset = True
 
-    def let_go(self) -> None:
+    def stop(self, why: str, _now_s: float) -> None:
+        """Torque to zero, switching disabled; the dc link stays as it is. Any page may ask for it."""
+        self._take_back(why)
+        self._reset = False
+
+    def let_go(self, _now_s: float) -> None:
         """The page with control has closed; the command ends without waiting for its time-out."""
         self._seen_s = float("-inf")
         self._take_back(f"The page with control was closed or silent for {HAND_TIMEOUT_S:g} s.")
@@ -93,10 +101,10 @@ class Commander:
         self._stepped_s = now_s
         self._gap_s = max(self._gap_s, step_s)
         if not self.alive(now_s):
-            self.let_go()
+            self.let_go(now_s)
         self._follow(state, refused, step_s)
         wanted = self.target_Nm if self.wish is Wish.DRIVE and state in RUNNING else 0.0
-        step_max = self.torque_max_Nm * step_s / RAMP_S
+        step_max = self.torque_max_Nm * step_s / (RAMP_S if self.wish is Wish.DRIVE else STOP_S)
         self.torque_requested_Nm += min(max(wanted - self.torque_requested_Nm, -step_max), step_max)
         if state not in RUNNING:
             self.torque_requested_Nm = 0.0
@@ -116,7 +124,9 @@ class Commander:
         self._enabled_s += step_s if state == "ready" else 0.0
         shown = state.replace("_", " ") or "not known"
         why = f": {refused.replace('_', ' ')}" if refused not in ("", "none") else ""
-        if state in FAULTED:
+        if not state:
+            self._take_back("Nothing is received from the inverter any more.")
+        elif state in FAULTED:
             self._take_back(f"The inverter reports {shown}. Reset its faults first.")
         elif self._running and self._gap_s > GAP_S:
             self._take_back(f"The inverter stopped{why}. No command for {1e3 * self._gap_s:.0f} ms; "

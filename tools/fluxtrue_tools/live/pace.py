@@ -21,6 +21,12 @@ BATCH_PERIODS: Final = 4  # time that one batch for the page covers
 Listener = Callable[[can.Message], None]
 
 
+class Turn(Protocol):
+    """What simulated time in step with the pages waits for."""
+
+    def turn(self) -> None: ...
+
+
 class Pace(Protocol):
     """A bus with its own time."""
 
@@ -104,7 +110,7 @@ class InStep:
 class SimulatedTime:
     """A virtual ECU whose time passes only here: not faster than the wall clock, or in step with the pages."""
 
-    def __init__(self, bus: SteppedBus, listeners: list[Listener], in_step: InStep | None = None) -> None:
+    def __init__(self, bus: SteppedBus, listeners: list[Listener], in_step: Turn | None = None) -> None:
         self._bus, self._listeners, self._in_step = bus, listeners, in_step
         self._due_s = time.monotonic()
         self._periods = 0

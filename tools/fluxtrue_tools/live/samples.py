@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames into columns: what the page draws, collected between two sendings."""
 
-import threading
 from typing import Any, Final
 
-import can
 import cantools.database
+
+from fluxtrue_tools.live.last import LastValues
 
 # Signals that are drawn; of all others the page shows the last value.
 DRAWN: Final = {
@@ -14,68 +14,46 @@ DRAWN: Final = {
     "INV_Identification": ("PsiF", "Resistance", "PsiQuality", "ResistanceQuality"),
     "INV_DcLink": ("DcVoltage", "DcCurrent"),
 }  # fmt: skip
+TRUTH: Final = "truth"  # the simulated machine's torque, beside the messages
+
+Columns = dict[str, dict[str, list[float]]]
 
 
-class Samples:
-    """A python-can listener that decodes; take() empties it. Any thread."""
+class Samples(LastValues):
+    """Columns of the drawn signals; take() empties them. Any thread."""
 
     def __init__(self, database: cantools.database.Database) -> None:
-        self._messages = {message.frame_id: message for message in database.messages}
-        self._lock = threading.Lock()
-        self._columns: dict[str, dict[str, list[float]]] = {}
-        self._last: dict[str, Any] = {}
-        self.undecoded = 0
-        self.newest_s = 0.0  # the bus's clock: simulated time on a virtual ECU
+        super().__init__(database)
+        self._columns: Columns = {}
+        self._run = 0  # counted up when the time of the samples begins anew
 
-    def __call__(self, frame: can.Message) -> None:
-        message = self._messages.get(frame.arbitration_id)
-        if message is None or frame.is_extended_id or frame.is_error_frame:
-            return
-        try:
-            signals = message.decode(bytes(frame.data), decode_choices=False)
-        except (ValueError, cantools.database.DecodeError):
-            self.undecoded += 1
-            return
-        assert isinstance(signals, dict)
-        self.newest_s = frame.timestamp
+    def _keep(self, name: str, time_s: float, signals: dict[str, Any]) -> None:
+        if name in DRAWN:
+            self._append(name, time_s, {signal: float(signals[signal]) for signal in DRAWN[name]})
+
+    def _append(self, name: str, time_s: float, values: dict[str, float]) -> None:
+        columns = self._columns.setdefault(name, {"t": []})
+        columns["t"].append(time_s)
+        for signal, value in values.items():
+            columns.setdefault(signal, []).append(value)
+
+    def truth(self, time_s: float, torque_Nm: float) -> None:
+        """The torque of the simulated machine at a time of the bus."""
         with self._lock:
-            for name in DRAWN.get(message.name, ()):
-                columns = self._columns.setdefault(message.name, {})
-                columns.setdefault(name, []).append(float(signals[name]))
-            if message.name in DRAWN:
-                self._columns[message.name].setdefault("t", []).append(frame.timestamp)
-            self._last[message.name] = signals
+            self._append(TRUTH, time_s, {"Torque": torque_Nm})
+
+    def restart(self) -> None:
+        """The following samples do not continue the earlier ones: a replay has moved to another time."""
+        with self._lock:
+            self._columns, self._run = {}, self._run + 1
 
     def factors(self) -> dict[str, dict[str, float]]:
         """What one count of each signal is, message by message."""
         return {message.name: {signal.name: float(signal.scale) for signal in message.signals}
                 for message in self._messages.values()}  # fmt: skip
 
-    def message(self, name: str) -> dict[str, Any] | None:
-        """The last values of a message; None before its first frame."""
-        with self._lock:
-            return self._last.get(name)
-
-    def choice(self, message: str, signal: str) -> str:
-        """The name of a signal's last value; empty before its first frame."""
-        signals = self.message(message)
-        if signals is None:
-            return ""
-        described = next(m for m in self._messages.values() if m.name == message).get_signal_by_name(signal)
-        return str((described.choices or {}).get(int(signals[signal]), ""))
-
-    def state(self) -> str:
-        """The inverter's state by name; empty before its first frame."""
-        return self.choice("INV_Status", "State")
-
-    def take(self) -> dict[str, dict[str, list[float]]]:
-        """The columns since the last call."""
+    def take(self) -> tuple[int, Columns]:
+        """The number of the run, and its columns since the last call."""
         with self._lock:
             columns, self._columns = self._columns, {}
-        return columns
-
-    def last(self) -> dict[str, Any]:
-        """The last value of every signal, message by message."""
-        with self._lock:
-            return {name: {key: float(value) for key, value in signals.items()}
-                    for name, signals in self._last.items()}  # fmt: skip
+            return self._run, columns

@@ -46,6 +46,10 @@ class Stand:
         knob = KNOBS[name]
         self._target[name] = min(max(value, knob.lo), knob.hi)
 
+    def targets(self) -> dict[str, float]:
+        """Where each knob stands."""
+        return dict(self._target)
+
     def step(self, seconds: float) -> None:
         """Move the plant's parameters towards their knobs."""
         values = {}

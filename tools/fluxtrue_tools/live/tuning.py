@@ -1,104 +1,101 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration values over XCP, by pyxcp, on a bus connection of its own."""
+"""Calibration values over XCP: read, written, loaded from a file, and brought back to those of the build."""
 
-import logging
+import math
 import struct
-from collections.abc import Callable
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ExitStack, nullcontext
 from typing import Any, Final
 
-from pyxcp.config import create_application_from_config
-from pyxcp.master import Master
-from pyxcp.types import XcpResponseError, XcpTimeoutError
+from pyxcp.types import XcpResponseError
 
-from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
-from fluxtrue_tools.a2l.elf import Description
-from fluxtrue_tools.bus.address import BusAddress
+from fluxtrue_tools.a2l.elf import Description, Value
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live import freeze, measuring
+from fluxtrue_tools.live.xcp import Xcp, reported
 
 FLOAT: Final = struct.Struct("<f")
-BENCH_ANSWER_S: Final = 2.0
-SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, independent of simulated time: it only ends a hang
-
-
-def _key(resource: int, seed: bytes) -> bytes:
-    """The published function of firmware/calibration/xcp_access.c."""
-    value = int.from_bytes(seed, "little")
-    return (((value << 7 | value >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C).to_bytes(4, "little")
-
-
-def _connect(address: BusAddress, answer_s: float) -> Master:
-    application = create_application_from_config({}, log_level=logging.CRITICAL)
-    can = application.transport.can
-    can.interface, can.channel = address.interface, address.channel
-    can.can_id_master, can.can_id_slave = COMMAND_ID, ANSWER_ID
-    section = getattr(can, address.interface, None)
-    for name, value in address.options.items():
-        if name == "bitrate":
-            can.bitrate = value
-        elif section is not None and hasattr(section, name):
-            setattr(section, name, value)
-    application.transport.timeout = answer_s
-    application.general.seed_n_key_function = _key
-    application.general.disable_error_handling = True
-    return Master("can", config=application)
+SEGMENT: Final = 0
+REFERENCE, WORKING = 0, 1  # pages: values of the build, present values
+BY_TOOL: Final = 0x02  # which page a read goes to; the drive keeps its own
 
 
 class Tuning:
-    """One session; every call runs in its one thread, since the master is not made for more."""
+    """The ECU's calibration values. Its calls run in `thread`."""
 
-    def __init__(self, address: BusAddress, description: Description, answer_s: float = BENCH_ANSWER_S,
-                 standing_still: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:  # fmt: skip
-        self._address, self._answer_s, self._standing_still = address, answer_s, standing_still
+    def __init__(self, xcp: Xcp, description: Description) -> None:
+        self._xcp, self._description = xcp, description
         self._values = {value.name: value for value in description.values}
-        self._master: Master | None = None
-        self._stack = ExitStack()  # closes the connection
-        self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="xcp")
 
-    def _session(self) -> Master:
-        if self._master is None:
-            with self._standing_still():
-                master = self._stack.enter_context(_connect(self._address, self._answer_s))
-            master.connect()
-            master.cond_unlock()
-            self._master = master
-        return self._master
+    @property
+    def thread(self) -> ThreadPoolExecutor:
+        """Where the calls run."""
+        return self._xcp.thread
 
-    def _read(self, name: str) -> float:
-        master = self._session()
-        master.setMta(self._values[name].address)
-        (value,) = FLOAT.unpack(master.upload(FLOAT.size))
-        return float(value)
-
-    def _tried(self, call: Any) -> Any:
-        try:
-            return call()
-        except (XcpResponseError, XcpTimeoutError, OSError, RuntimeError) as error:
-            raise FluxtrueError(f"XCP: {error}") from error
+    def _read(self, page: int) -> dict[str, float]:
+        """All values of one page."""
+        self._xcp.master().setCalPage(BY_TOOL, SEGMENT, page)
+        return {name: float(FLOAT.unpack(self._xcp.read(value.address, FLOAT.size))[0])
+                for name, value in self._values.items()}  # fmt: skip
 
     def table(self) -> list[dict[str, Any]]:
-        """Every value with its range."""
+        """Every value with its range and with the value of the build."""
+        with reported():
+            built, present = self._read(REFERENCE), self._read(WORKING)
         return [{"name": value.name, "text": value.text, "unit": value.unit, "lo": value.lo, "hi": value.hi,
-                 "value": self._tried(lambda name=value.name: self._read(name))}
+                 "value": present[value.name], "default": built[value.name]}
                 for value in self._values.values()]  # fmt: skip
 
-    def write(self, name: str, value: float) -> float:
-        """Write a value to the ECU, which checks it; the result is the value that the ECU then holds."""
+    def _known(self, name: str) -> Value:
         if name not in self._values:
             raise FluxtrueError(f"no calibration value '{name}', allowed: {', '.join(self._values)}")
-        info = self._values[name]
-        master = self._tried(self._session)
-        try:
+        return self._values[name]
+
+    def _in_range(self, name: str, value: float) -> None:
+        info = self._known(name)
+        if not (math.isfinite(value) and info.lo <= value <= info.hi):
+            raise FluxtrueError(f"{name} = {value:g}: allowed: {info.lo:g} … {info.hi:g} {info.unit}".rstrip())
+
+    def write(self, name: str, value: float) -> None:
+        """Write a value to the ECU, which checks it."""
+        info = self._known(name)
+        with reported():
+            master = self._xcp.master()
             master.setMta(info.address)
+        try:
             master.download(FLOAT.pack(value))
-        except XcpResponseError as error:
+        except (XcpResponseError, OverflowError) as error:
             raise FluxtrueError(f"{name} = {value:g}: refused by the ECU ({error}), "
                                 f"allowed: {info.lo:g} … {info.hi:g} {info.unit}, nothing so small that the drive "
                                 "would make it zero") from error  # fmt: skip
-        return float(self._tried(lambda: self._read(name)))
+
+    def load(self, values: Mapping[str, float]) -> None:
+        """Write the values of a file. Nothing is written if one of them is unknown or out of its range."""
+        for name, value in values.items():
+            self._in_range(name, value)
+        for name, value in values.items():
+            self.write(name, value)
+
+    def restore(self) -> None:
+        """Bring the values of the build back."""
+        with reported():
+            self._xcp.master().copyCalPage(SEGMENT, REFERENCE, SEGMENT, WORKING)
+
+    def freeze(self) -> dict[str, Any]:
+        """The freeze frame of the first fault."""
+        with reported():
+            return freeze.frame(self._xcp, self._description)
+
+    def measure(self) -> measuring.Layout:
+        """Let the ECU send measurements, for a recording."""
+        with reported():
+            return measuring.start(self._xcp.master(), self._description.measurements, self._description.bases)
+
+    def measure_no_more(self) -> None:
+        """The ECU sends no measurements any more."""
+        with reported():
+            measuring.stop(self._xcp.master())
 
     def close(self) -> None:
         """End the session."""
-        self.thread.submit(self._stack.close).result()
-        self.thread.shutdown()
+        self._xcp.close()

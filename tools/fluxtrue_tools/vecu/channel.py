@@ -43,6 +43,11 @@ class Channel:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._file = self._socket.makefile("r", encoding="ascii", newline="\n")
 
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port."""
+        return self._address
+
     def another(self) -> "Channel":
         """A second connection, for requests while this one waits for the end of a run."""
         return Channel(*self._address)

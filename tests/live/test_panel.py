@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What makes the page a control panel that can be trusted, in a browser."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+from conftest import Server, end
+from driver import Page
+from progress import polled, until
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+from fluxtrue_tools.live.words import TO_DO, words
+
+ALWAYS = {"theme"}  # acts without a connection
+
+
+def test_every_word_of_the_bus_has_advice() -> None:
+    for path, advice in TO_DO.items():
+        named = {name.replace("_", " ") for name in advice}
+        assert {name for name, _, _ in words()[path].values()} == named, path
+
+
+def test_torque_is_set_as_a_number_zeroed_and_stopped_by_escape(page: Page) -> None:
+    entry = page.find("torque-entry")
+    entry.send_keys("45", Keys.ENTER)
+    page.until(
+        lambda: page.text("torque-value") == "45.0" and page.text("torque-estimated").startswith("45."), "45 N·m"
+    )
+    for text, answer in (("", "holds no number"), ("133", "allowed are -132 … 132")):
+        entry.clear()
+        entry.send_keys(text, Keys.ENTER)
+        assert answer in page.text("message")
+    page.pass_time(0.3)
+    assert page.text("torque-value") == "45.0"
+    page.find("zero").click()
+    page.until(lambda: abs(page.newest("truth", "Torque")) < 1.0 and page.text("state") == "run", "zero, still running")
+    page.drive(60.0)
+    entry.send_keys(Keys.ESCAPE)
+    page.until(lambda: page.text("state") == "ready", "ready")
+    assert page.text("stopped") == "Stop was pressed. Press Enable to go on."
+    page.enable()
+    assert page.text("torque-value") == "0.0"
+
+
+def test_a_page_without_control_changes_nothing_but_can_stop(page: Page) -> None:
+    page.drive(20.0)
+    first = page.browser.current_window_handle
+    page.browser.switch_to.new_window("window")
+    page.browser.get(page.server.url)
+    page.until(lambda: page.text("control") == "control elsewhere", "the state of control")
+    assert page.text("speed-value") == "2000 rpm"
+    assert page.enabled() <= {"stop", "theme", "tune-read", "freeze"}
+    for message in ({"type": "knob", "name": "speed_rpm", "value": 0}, {"type": "record", "on": True},
+                    {"type": "tune", "name": "observer_m", "value": 3}, {"type": "tune_restore"}):  # fmt: skip
+        page.run("fluxtrue.say(''); fluxtrue.send(arguments[0])", message)
+        page.until(lambda: page.text("message") == "another page has control", f"a refusal of {message}")
+    page.find("stop").click()
+    page.until(lambda: page.text("state") == "ready", "the stop")
+    page.browser.close()
+    page.browser.switch_to.window(first)
+    page.until(lambda: "on another page" in page.text("stopped"), "the reason")
+
+
+def test_a_disconnected_page_shows_no_value_and_no_active_control(page: Page) -> None:
+    page.drive(20.0)
+    assert isinstance(page.server, Server)
+    end(page.server)
+    polled(lambda: page.text("connection") == "disconnected")
+    assert page.enabled() <= ALWAYS
+    assert page.text("torque-estimated") == page.text("torque-value") == page.text("speed-value") == "–"
+    values = page.browser.find_elements(By.CSS_SELECTOR, "#numbers dd:nth-of-type(odd)")
+    assert values and {value.text for value in values} == {"–"}
+    assert page.text("state") == "no bus"
+
+
+def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_path: Path) -> None:
+    page.find("tune-read").click()
+    page.until(lambda: "those of the build" in page.text("tune-text") and page.text("tuning") != "", "the values")
+    cells = page.browser.find_elements(By.CSS_SELECTOR, "#tuning input")
+    shown = {str(cell.get_attribute("name")): str(cell.get_attribute("value")) for cell in cells}
+    page.run("fluxtrue.send({type: 'tune_load', values: arguments[0]})", {name: float(x) for name, x in shown.items()})
+    page.until(
+        lambda: "refused" not in page.text("message") and page.text("message") != "Reading …", "all written back"
+    )
+
+    page.run("const i = document.querySelector('#tuning input[name=observer_m]'); i.value = '';"
+             "i.dispatchEvent(new Event('change'));")  # fmt: skip
+    page.until(lambda: "nothing was written" in page.text("message"), "no write")
+    file = tmp_path / "parameters.json"
+    file.write_text(json.dumps({"format": "fluxtrue-parameters", "values": {"observer_m": 3.5}}))
+    page.find("tune-file").send_keys(str(file))
+    page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the file")
+    assert page.text("tune-text").startswith("1 of ")
+    file.write_text(json.dumps({"format": "fluxtrue-parameters", "values": {"observer_m": 2.5, "nothing": 1}}))
+    page.find("tune-file").send_keys(str(file))
+    page.until(lambda: "no calibration value 'nothing'" in page.text("message"), "a refusal")
+    assert page.browser.find_element(By.CSS_SELECTOR, "#tuning input[name=observer_m]").get_attribute("value") == "3.5"
+    page.find("tune-restore").click()
+    page.until(lambda: page.text("tune-text") == "All values are those of the build.", "the defaults")
+
+
+def test_a_fault_is_explained_and_its_freeze_frame_drawn(page: Page) -> None:
+    page.drive(20.0)
+    page.server.stand.set(board_gate_fault=1)  # type: ignore[attr-defined]
+    page.until(lambda: "Check the gate driver" in page.text("faults"), "the explanation")
+    page.find("freeze").click()
+    page.until(lambda: page.find("freeze-frame").is_displayed(), "the frame")
+    assert len(page.browser.find_elements(By.CSS_SELECTOR, "#freeze-charts canvas")) == 5
+    assert "in state run" in page.text("freeze-text")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_a_phone_shows_torque_state_and_stop_without_scrolling(
+    browser: webdriver.Chrome, server: Server, theme: str, request: pytest.FixtureRequest
+) -> None:
+    page = Page(browser, server)
+    page.size(390, 844, theme)
+    browser.get(server.url)
+    page.until(lambda: page.text("state") == "standby", "standby")
+    for name in ("state", "stop", "torque-estimated", "torque-value", "torque", "enable"):
+        place = page.find(name).rect
+        assert place["y"] >= 0 and place["y"] + place["height"] <= 844, name
+        assert place["x"] >= 0 and place["x"] + place["width"] <= 390, name
+    assert page.run("return document.documentElement.scrollWidth") == 390
+    assert page.run("return document.documentElement.dataset.theme") == theme
+    sizes = page.run("return [...document.querySelectorAll('body *')].filter((e) => e.children.length === 0 &&"
+                     "e.textContent.trim()).map((e) => [parseFloat(getComputedStyle(e).fontSize), e.id])")  # fmt: skip
+    assert isinstance(sizes, list) and max(sizes)[1] == "torque-estimated"
+    page.find("theme").click()
+    assert page.text("theme-name") == "light"
+    page.run("localStorage.clear()")
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_commands_go_on_while_the_server_stands_still(request: pytest.FixtureRequest, free_running: Server) -> None:
+    """The commands come from another process: the dead-man function ramps out, no command is lost."""
+    server, browser = free_running, request.getfixturevalue("browser")
+    page = Page(browser, server)
+    browser.get(server.url)
+    page.until(lambda: page.text("state") == "standby", "standby")
+    page.find("ready").click()
+    page.until(lambda: page.text("state") == "ready", "ready")
+    page.enable()
+    server.process.send_signal(signal.SIGSTOP)
+    begin_s = server.now_s()
+    until(lambda: server.now_s() > begin_s + 1.0, server.now_s, 60.0, "a second")
+    server.process.send_signal(signal.SIGCONT)
+    page.until(lambda: "closed or silent" in page.text("stopped"), "the reason")
+    assert "command timed out" not in page.text("reasons")

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bus side in a process of its own: what the page's server does can delay no command.
+
+The child has the bus, the commander and the test stand; it passes what it receives on to the server. When the server
+ends, even by a crash, the child ramps the torque out and ends, too.
+"""
+
+import multiprocessing
+import queue
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any, Final, Protocol
+
+import can
+
+from fluxtrue_tools.bus.address import BusAddress
+from fluxtrue_tools.bus.interface import Interface
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.commander import Commander
+from fluxtrue_tools.live.last import LastValues
+from fluxtrue_tools.live.link import NEEDED, Link, Observer, Status
+from fluxtrue_tools.live.pace import InStep, Listener, Pace, SimulatedTime, WallClock
+from fluxtrue_tools.live.stand import Stand
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.stepped import SteppedBus
+
+WAITING_MAX: Final = 100_000  # messages that wait for a server that stands still; further ones are dropped
+ENDED: Final = "The process that commands has ended."
+END_S: Final = 10.0
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What the child needs to know."""
+
+    address: BusAddress
+    interface_name: str
+    interface_text: str
+    torque_max_Nm: float
+    bench: tuple[str, int] | None = None  # bench channel of a virtual ECU
+    is_stepped: bool = False
+    in_step: bool = False
+
+
+class _Outbox:
+    """Messages to the server, sent by a thread of their own: a server that does not read delays no command."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._waiting: queue.Queue[Any] = queue.Queue(WAITING_MAX)
+        self._thread = threading.Thread(target=self._send, name="outbox", daemon=True)
+        self._thread.start()
+
+    def put(self, kind: str, *content: Any) -> None:
+        """Send a message soon."""
+        try:
+            self._waiting.put_nowait((kind, *content))
+        except queue.Full:
+            return  # the server has stood still for minutes; commands go on
+
+    def close(self) -> None:
+        """Send what waits."""
+        self._waiting.put(None)
+        self._thread.join(END_S)
+
+    def _send(self) -> None:
+        try:
+            while (message := self._waiting.get()) is not None:
+                self._connection.send(message)
+        except OSError:
+            return  # the server has ended
+
+
+class _Turns:
+    """The child's end of InStep."""
+
+    def __init__(self, outbox: _Outbox) -> None:
+        self._outbox = outbox
+        self._done = threading.Event()
+        self._released = False
+
+    def turn(self) -> None:
+        """A batch is due; returns when the pages have drawn it."""
+        if self._released:
+            return
+        self._done.clear()
+        self._outbox.put("turn")
+        self._done.wait()
+
+    def done(self) -> None:
+        """The pages have drawn it."""
+        self._done.set()
+
+    def release(self) -> None:
+        """Let time continue without pages."""
+        self._released = True
+        self._done.set()
+
+
+class _Reporter(Observer):
+    """Tells the server what happens on the bus side."""
+
+    def __init__(self, outbox: _Outbox) -> None:
+        self._outbox = outbox
+        self._told: Status | None = None
+
+    def sent(self, frame: can.Message) -> None:
+        """A command goes into recordings."""
+        self.received(frame)
+
+    def received(self, frame: can.Message) -> None:
+        """A frame of the bus."""
+        self._outbox.put("frame", frame.timestamp, frame.arbitration_id, bytes(frame.data), frame.is_extended_id,
+                         frame.is_error_frame, frame.is_remote_frame, frame.is_rx)  # fmt: skip
+
+    def truth(self, time_s: float, torque_Nm: float) -> None:
+        """The torque of the simulated machine."""
+        self._outbox.put("truth", time_s, torque_Nm)
+
+    def period(self, status: Status) -> None:
+        """Only what has changed is told."""
+        if status != self._told:
+            self._told = status
+            self._outbox.put("status", status)
+
+
+def _link(setup: Setup, reporter: _Reporter, turns: _Turns, stack: ExitStack) -> Link:
+    """Bus, time and test stand of the child."""
+    interface = Interface(setup.interface_name, setup.interface_text)
+    values = LastValues(interface.database, NEEDED)
+    listeners: list[Listener] = [values, reporter.received]
+    bus = setup.address.connect()
+    channel = Channel(*setup.bench) if setup.bench is not None else None
+    stand = Stand(channel) if channel is not None else None
+    pace: Pace = WallClock(bus, listeners) if channel is None or not setup.is_stepped else SimulatedTime(
+        SteppedBus(bus, channel.another()), listeners, turns if setup.in_step else None)  # fmt: skip
+    if stand is not None:
+        stack.callback(stand.close)
+    link = Link(bus, pace, interface, Commander(setup.torque_max_Nm), values, stand, reporter)
+    stack.callback(link.close)
+    stack.callback(turns.release)  # first: closing needs time that passes
+    return link
+
+
+def _obey(link: Link, turns: _Turns, connection: Connection, outbox: _Outbox) -> None:
+    """Carry out what the server asks for, until it closes."""
+    with ExitStack() as held:  # simulated time, while the server makes another connection
+        while (message := connection.recv()) is not None:
+            match message:
+                case "act", name, *values:
+                    link.act(name, *values)
+                case "turn", knob, value:
+                    link.turn(knob, value)
+                case ("done",):
+                    turns.done()
+                case ("hold",):
+                    held.enter_context(link.standing_still())
+                    outbox.put("held")
+                case ("go",):
+                    held.close()
+
+
+def _run(setup: Setup, connection: Connection) -> None:
+    """The child's process."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # the server ends the child, after the torque
+        signal.signal(number, signal.SIG_IGN)
+    outbox = _Outbox(connection)
+    turns = _Turns(outbox)
+    with ExitStack() as stack:
+        stack.callback(outbox.close)
+        try:
+            link = _link(setup, _Reporter(outbox), turns, stack)
+        except FluxtrueError as error:
+            outbox.put("failed", str(error))
+            return
+        try:
+            _obey(link, turns, connection, outbox)
+        except (EOFError, OSError):
+            return  # the server has crashed: the torque is ramped out all the same
+
+
+class Receiver(Protocol):
+    """What takes the frames and the truth in the server."""
+
+    def __call__(self, frame: can.Message) -> None: ...
+    def truth(self, time_s: float, torque_Nm: float) -> None: ...
+
+
+class BusProcess:
+    """The server's end: the same calls as a Link."""
+
+    def __init__(self, setup: Setup, receivers: list[Receiver], in_step: InStep | None) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, theirs = context.Pipe()
+        self._receivers, self._in_step = receivers, in_step
+        self._status = Status()
+        self._sending, self._held = threading.Lock(), threading.Event()
+        self._process = context.Process(target=_run, args=(setup, theirs), name="fluxtrue-bus", daemon=True)
+        self._process.start()
+        theirs.close()
+        self._begin()
+        self._thread = threading.Thread(target=self._receive, name="bus", daemon=True)
+        self._thread.start()
+
+    def _begin(self) -> None:
+        """Wait for the first status, which comes before any frame."""
+        try:
+            kind, content = self._connection.recv()
+            if kind == "failed":
+                raise FluxtrueError(content)
+            self._status = content
+        except EOFError as error:
+            raise FluxtrueError(ENDED) from error
+
+    def act(self, action: str, *values: Any) -> None:
+        """An action of a user."""
+        self._send("act", action, *values)
+
+    def turn(self, knob: str, value: float) -> None:
+        """Change one parameter of the test stand."""
+        self._send("turn", knob, value)
+
+    def status(self) -> Status:
+        """What the pages show."""
+        return self._status
+
+    @contextmanager
+    def standing_still(self) -> Iterator[None]:
+        """Time does not pass while another connection is made."""
+        self._held.clear()
+        self._send("hold")
+        self._held.wait(END_S)
+        try:
+            yield
+        finally:
+            self._send("go")
+
+    def close(self) -> None:
+        """Ramp the torque to zero, then end the child."""
+        if self._in_step is not None:
+            self._in_step.release()
+        with self._sending, suppress(OSError):
+            self._connection.send(None)
+        self._thread.join()
+        self._process.join(END_S)
+
+    def _send(self, *message: Any) -> None:
+        with self._sending, suppress(OSError):  # the child has ended: the status says so
+            self._connection.send(message)
+
+    def _receive(self) -> None:
+        try:
+            while True:
+                self._take(self._connection.recv())
+        except (EOFError, OSError):
+            self._status = Status(stopped=self._status.stopped if not self._status.state else ENDED)
+        if self._in_step is not None:
+            self._in_step.release()
+
+    def _take(self, message: tuple[Any, ...]) -> None:
+        match message:
+            case "frame", time_s, number, data, extended, error, remote, received:
+                frame = can.Message(time_s, number, extended, remote, error, data=data, is_rx=received)
+                for receiver in self._receivers:
+                    receiver(frame)
+            case "truth", time_s, torque_Nm:
+                for receiver in self._receivers:
+                    receiver.truth(time_s, torque_Nm)
+            case "status", status:
+                self._status = status
+            case ("held",):
+                self._held.set()
+            case ("turn",):
+                if self._in_step is not None:
+                    self._in_step.turn()
+                self._send("done")

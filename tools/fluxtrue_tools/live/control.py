@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What pages may ask for. At most one page has control, and only that page changes anything."""
+
+import asyncio
+import math
+from collections.abc import Awaitable
+from typing import Any, Final
+
+from aiohttp import web
+
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.commander import RUNNING
+from fluxtrue_tools.live.session import Session
+from fluxtrue_tools.live.stand import KNOBS
+from fluxtrue_tools.live.tuning import Tuning
+
+OTHER: Final = "another page has control"
+STOPPED: Final = {True: "Stop was pressed.", False: "Stop was pressed on another page."}
+Answer = dict[str, Any]
+
+
+def number(value: Any, what: str) -> float:
+    """A finite number of a message."""
+    try:
+        found = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:  # an integer of three hundred digits
+        found = math.inf
+    if not math.isfinite(found):
+        raise FluxtrueError(f"{what}: not a number")
+    return found
+
+
+def take(session: Session, socket: web.WebSocketResponse) -> None:
+    """Control goes to the page that first asks for something; it stays there until the page closes or gives it up."""
+    if session.hand is not None and session.hand is not socket and not session.hand.closed:
+        raise FluxtrueError(OTHER)
+    session.hand = socket
+
+
+def give_up(session: Session, socket: web.WebSocketResponse) -> None:
+    """The page has closed, or lets another one command."""
+    if session.hand is socket:
+        session.hand = None
+        if session.link is not None:
+            session.link.act("let_go")
+
+
+def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+    """Buttons and slider."""
+    link, kind = session.link, message["type"]
+    if link is None:
+        raise FluxtrueError("a replay takes no commands")
+    if kind == "stop":  # any page may
+        link.act("stop", STOPPED[session.hand in (None, socket)])
+        return
+    take(session, socket)
+    if kind == "torque":
+        link.act("slide", number(message.get("torque_requested_Nm"), "torque_requested_Nm"))
+    elif kind == "reset":
+        link.act("reset_faults")
+    elif kind == "drive" and link.status().state not in ("ready", *RUNNING):
+        raise FluxtrueError("Enable is possible in state ready: press Ready first")
+    else:
+        link.act("ask", kind)
+
+
+def _knob(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+    name = str(message.get("name"))
+    if session.link is None or name not in KNOBS or not session.link.status().knobs:
+        raise FluxtrueError(f"no knob '{name}'")
+    value = number(message.get("value"), name)
+    take(session, socket)
+    session.link.turn(name, value)
+
+
+def drawn(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
+    """A page has drawn a batch, which is also a sign of life."""
+    session.drawn[socket] = int(number(message.get("batch"), "batch"))
+    session.changed.set()
+    if message.get("visible") and session.hand is socket and session.link is not None:
+        session.link.act("hand")
+
+
+def _tuning(session: Session) -> Tuning:
+    if session.tuning is None:
+        raise FluxtrueError("no calibration values: the ECU's ELF file is not known (--elf)")
+    return session.tuning
+
+
+async def _calibrate(tuning: Tuning, call: Any, *values: Any) -> Answer:
+    """Change values; the answer has all of them as the ECU then holds them, also after a refusal."""
+    run, refusal = asyncio.get_running_loop().run_in_executor, ""
+    try:
+        await run(tuning.thread, call, *values)
+    except FluxtrueError as error:
+        refusal = str(error)
+    return {"type": "parameters", "values": await run(tuning.thread, tuning.table), "refused": refusal}
+
+
+def _tune(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer]:
+    tuning = _tuning(session)
+    match message["type"]:
+        case "tune":
+            name, value = str(message.get("name")), number(message.get("value"), "value")
+            take(session, socket)
+            return _calibrate(tuning, tuning.write, name, value)
+        case "tune_load":
+            values = message.get("values")
+            if not isinstance(values, dict):
+                raise FluxtrueError("values: not an object")
+            values = {str(name): number(value, str(name)) for name, value in values.items()}
+            take(session, socket)
+            return _calibrate(tuning, tuning.load, values)
+        case _:
+            take(session, socket)
+            return _calibrate(tuning, tuning.restore)
+
+
+async def _read(session: Session, message: dict[str, Any]) -> Answer:
+    """What changes nothing: any page may."""
+    tuning, run = _tuning(session), asyncio.get_running_loop().run_in_executor
+    if message["type"] == "freeze":
+        return {"type": "freeze", **await run(tuning.thread, tuning.freeze)}
+    return {"type": "parameters", "values": await run(tuning.thread, tuning.table), "refused": ""}
+
+
+async def _record(session: Session, on: bool) -> Answer:
+    run, tuning = asyncio.get_running_loop().run_in_executor, session.tuning
+    if on:
+        layout = await run(tuning.thread, tuning.measure) if tuning is not None else None
+        session.recorder.start(layout)
+    else:
+        if tuning is not None:
+            await run(tuning.thread, tuning.measure_no_more)
+        path = await asyncio.to_thread(session.recorder.stop)
+        session.last_file = str(path) if path else ""
+    return {"type": "recording", "on": session.recorder.running, "file": session.last_file}
+
+
+def _replay(session: Session, message: dict[str, Any]) -> None:
+    if session.replay is None:
+        raise FluxtrueError("not a replay")
+    if message["type"] == "seek":
+        session.replay.seek(number(message.get("position_s"), "position_s"))
+    else:
+        session.replay.paused = bool(message.get("on"))
+
+
+def obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer] | None:
+    """Carry out one message of a page. A slow action is returned, to be awaited for its answer."""
+    match message.get("type"):
+        case "drawn":
+            drawn(session, socket, message)
+        case "torque" | "reset" | "off" | "ready" | "drive" | "stop":
+            _drive(session, socket, message)
+        case "knob":
+            _knob(session, socket, message)
+        case "release":
+            give_up(session, socket)
+        case "tune" | "tune_load" | "tune_restore":
+            return _tune(session, socket, message)
+        case "tune_list" | "freeze":
+            return _read(session, message)
+        case "record":
+            if session.link is None:
+                raise FluxtrueError("a replay is not recorded")
+            take(session, socket)
+            return _record(session, bool(message.get("on")))
+        case "seek" | "pause":
+            _replay(session, message)
+        case other:
+            raise FluxtrueError(f"unknown message {other!r}")
+    return None

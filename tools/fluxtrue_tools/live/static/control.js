@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which page has control: shown on every page, and given up by a press.
+import { badge, $ } from "./page.js";
+
+const TEXTS = { mine: ["control here", "good"], free: ["control free", ""], other: ["control elsewhere", "warn"] };
+
+export function showControl({ hello, live, control }) {
+  $("control").hidden = !live || hello.replay;
+  if (!$("control").hidden) badge("control", ...TEXTS[control]);
+}

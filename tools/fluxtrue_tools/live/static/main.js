@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts the parts of the page together: one view of what the server has said, shown by every part.
+import { chartsChanged, startCharts, stats } from "./charts.js";
+import { arrived, connect, isStale, send, sendText, setStale, showConnection, tellDrawn, watch } from "./connection.js";
+import { showControl } from "./control.js";
+import { showFaults, startFaults } from "./faults.js";
+import { showFreezeFrame } from "./freeze.js";
+import { showNumbers, startNumbers } from "./numbers.js";
+import { say, show } from "./page.js";
+import { onParameters, showParameters, startParameters } from "./parameters.js";
+import { recolor } from "./plot.js";
+import { onRecording, showRecording, startRecording } from "./recording.js";
+import { showReasons } from "./reasons.js";
+import { showReplay, startReplay } from "./replay.js";
+import { addGroups, rings } from "./rings.js";
+import { setStandRange, showStand, startStand } from "./stand.js";
+import { startTheme } from "./theme.js";
+import { setTorqueRange, showTorque, startTorque } from "./torque.js";
+
+const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, showParameters, showRecording, showControl];
+const NONE = { replay: false, tuning: false, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
+const said = { hello: NONE, status: null, last: null, control: "free" };
+
+// What the parts show. A page without present values is not live: it shows none, and none of its controls acts.
+function view() {
+  const { hello, status } = said;
+  const live = status !== null && !isStale() && status.state !== "";
+  return { ...said, live, mayAct: live && !hello.replay && said.control !== "other" };
+}
+
+function showAll() {
+  const now = view();
+  document.body.classList.toggle("stale", !now.live);
+  PARTS.forEach((part) => part(now));
+  showConnection(now.hello.replay, now.status?.state);
+}
+
+function onHello(hello) {
+  Object.assign(said, { hello, status: null, last: null, control: "free" });
+  show("title", hello.title);
+  setStale(hello.stale_s);
+  setTorqueRange(hello);
+  setStandRange(hello);
+  startCharts();
+}
+
+function onRows(message) {
+  const { control } = said;
+  stats.rows += addGroups(message.run, message.groups);
+  stats.batches++;
+  arrived(message.batch);
+  said.control = message.control;
+  if (message.status) Object.assign(said, { status: message.status, last: message.last });
+  if (message.status || control !== said.control) showAll();
+  showReplay(message.replay);
+  chartsChanged();
+  if (document.hidden) tellDrawn();
+}
+
+const HANDLERS = {
+  hello: onHello,
+  rows: onRows,
+  refused: (message) => say(message.text),
+  recording: onRecording,
+  parameters: onParameters,
+  freeze: (message) => showFreezeFrame(said.hello, message),
+};
+
+[startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay].forEach((start) => start());
+startTheme(recolor);
+document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
+connect((message) => HANDLERS[message.type](message), showAll);
+watch(showAll);
+window.fluxtrue = { rings, stats, send, sendText, say }; // read by the browser tests

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibration values: read, written one by one, compared with those of the build, saved to and loaded from a file.
+import { send } from "./connection.js";
+import { $, element, entered, say } from "./page.js";
+
+const FORMAT = "fluxtrue-parameters";
+const UNITS = { "Nm/s": "N·m/s" };
+let values = []; // as the ECU holds them
+let title = "";
+let mayWrite = false;
+
+const written = (value) => String(Number(value.toPrecision(6)));
+const differs = ({ value, default: built }) => written(value) !== written(built);
+
+function write(input, { name, value }) {
+  const wanted = entered(input);
+  if (wanted === null) {
+    say(`${name}: nothing was written, the field holds no number.`);
+    input.value = written(value);
+  } else if (wanted !== Number(input.defaultValue)) {
+    send({ type: "tune", name, value: wanted });
+  }
+}
+
+function row(info) {
+  const { name, text, unit, lo, hi, value, default: built } = info;
+  const made = document.createElement("tr");
+  made.className = differs(info) ? "differs" : "";
+  const input = Object.assign(document.createElement("input"), {
+    type: "number", step: "any", name, disabled: !mayWrite, ariaLabel: `${text}, ${unit || "no unit"}` });
+  input.defaultValue = written(value);
+  input.addEventListener("change", () => write(input, info));
+  const label = element("td", name.replace(/_(rad|Nm)_.*$/, "").replaceAll("_", " "));
+  label.title = text;
+  const field = document.createElement("td");
+  field.append(input);
+  made.append(label, field, element("td", written(built)), element("td", `${written(lo)} … ${written(hi)}`),
+    element("td", UNITS[unit] || unit));
+  return made;
+}
+
+export function onParameters(message) {
+  const before = new Map(values.map((info) => [info.name, info.value]));
+  values = message.values;
+  $("tuning").hidden = false;
+  $("tuning").tBodies[0].replaceChildren(...values.map(row));
+  const changed = values.filter((info) => before.has(info.name) && before.get(info.name) !== info.value);
+  const text = changed.map(({ name, value }) => `${name} = ${written(value)}`).join(", ");
+  say(message.refused || (text && `Written: ${text}`));
+  const count = values.filter(differs).length;
+  $("tune-text").textContent = count ? `${count} of ${values.length} differ from the values of the build.`
+    : "All values are those of the build.";
+}
+
+function save() {
+  const held = Object.fromEntries(values.map(({ name, value }) => [name, value]));
+  const text = JSON.stringify({ format: FORMAT, inverter: title, values: held }, null, 2);
+  const link = Object.assign(document.createElement("a"), {
+    href: URL.createObjectURL(new Blob([text], { type: "application/json" })), download: "parameters.json" });
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+async function load() {
+  const [file] = $("tune-file").files;
+  $("tune-file").value = "";
+  try {
+    const content = JSON.parse(await file.text());
+    if (content?.format !== FORMAT) throw new Error(`its format is not ${FORMAT}`);
+    send({ type: "tune_load", values: content.values });
+  } catch (error) {
+    say(`${file.name} was not loaded: ${error.message}`);
+  }
+}
+
+export function startParameters() {
+  $("tune-read").onclick = () => { say("Reading …"); send({ type: "tune_list" }); };
+  $("tune-save").onclick = save;
+  $("tune-load").onclick = () => $("tune-file").click();
+  $("tune-file").onchange = load;
+  $("tune-restore").onclick = () => send({ type: "tune_restore" });
+}
+
+export function showParameters({ hello, live, mayAct }) {
+  title = hello?.title ?? "";
+  const known = live && hello.tuning;
+  mayWrite = known && mayAct;
+  $("tune-read").disabled = !known;
+  $("tune-save").disabled = !(known && values.length);
+  $("tune-load").disabled = $("tune-restore").disabled = !mayWrite;
+  for (const input of $("tuning").querySelectorAll("input")) input.disabled = !mayWrite;
+  if (!live) {
+    values = [];
+    $("tuning").hidden = true;
+    $("tuning").tBodies[0].replaceChildren();
+    $("tune-text").textContent = "Read shows the values of the inverter and how they differ from those of the build.";
+  }
+}
