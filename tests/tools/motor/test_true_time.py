@@ -116,6 +116,9 @@ COUNTS = {
     "STOPPED_PERIODS": "of a timer that never runs",
     "FIRST_TICKS": "ticks of the watchdog", "TIMEOUT_TICKS": "ticks of the watchdog",
     "WINDOW_TICKS": "ticks of the watchdog",
+    "READY_TICKS": "ticks of the timer", "PULSE_TICKS": "ticks of the timer",
+    "LAST_BUT_ONE": "steps of an update, whose rates are generated for its true time",
+    "ATTEMPTS": "of a save",
 }  # fmt: skip
 DEFINE = re.compile(r"^#define (\w+)\s+\(?-?[0-9].*$", re.MULTILINE)
 NAMED = re.compile(r"(_MS|_US|_S|_SAMPLES|_TICKS|_CYCLES|_ROW)$|STEP|PERIODS|CONSECUTIVE|TIME_|_PER_TASK")
