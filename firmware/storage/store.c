@@ -5,7 +5,6 @@
 
 #define CHUNK 64U   /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
 #define ATTEMPTS 4U /* of a save, each in another sector: an erase may take more than a tenth of a second */
-#define WORDS ((HAL_NVM_SLOTS + 31U) / 32U)
 
 typedef struct {
     uint32_t layout, size, sequence, crc; /* crc over the three words before it, then the record */
@@ -51,39 +50,47 @@ static bool is_intact(uint32_t slot, const header_t *header)
     return ~sum == header->crc;
 }
 
-/* The slot with the highest sequence number, which may wrap, of those that are not excluded yet; slots whose header
- * cannot be one are excluded here. HAL_NVM_SLOTS: none is left. */
-static uint32_t highest(uint32_t excluded[WORDS], newest_t *newest)
+typedef struct {
+    uint32_t sequence[HAL_NVM_SLOTS];
+    bool possible[HAL_NVM_SLOTS]; /* the header can be one, and the record has not been found damaged */
+} candidates_t;
+
+static void read_headers(candidates_t *candidates, bool *damaged)
+{
+    for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
+        header_t header;
+        const bool readable = hal_nvm_read(slot, 0, &header, STORE_HEADER_SIZE);
+        candidates->possible[slot] = readable && header.size <= STORE_RECORD_MAX;
+        candidates->sequence[slot] = candidates->possible[slot] ? header.sequence : 0U;
+        *damaged = *damaged || !(candidates->possible[slot] || (readable && is_blank_header(&header)));
+    }
+}
+
+/* The slot with the highest sequence number, which may wrap; HAL_NVM_SLOTS: none is left. */
+static uint32_t highest(const candidates_t *c)
 {
     uint32_t found = HAL_NVM_SLOTS;
     for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
-        const uint32_t bit = 1U << (slot % 32U);
-        header_t header;
-        if ((excluded[slot / 32U] & bit) != 0U) {
-            continue;
-        }
-        const bool readable = hal_nvm_read(slot, 0, &header, STORE_HEADER_SIZE);
-        if (!readable || header.size > STORE_RECORD_MAX) {
-            newest->damaged = newest->damaged || !readable || !is_blank_header(&header);
-            excluded[slot / 32U] |= bit;
-        } else if (found == HAL_NVM_SLOTS || header.sequence - newest->header.sequence < 0x80000000U) {
-            found = slot;
-            newest->header = header;
-        }
+        const bool higher = found == HAL_NVM_SLOTS || c->sequence[slot] - c->sequence[found] < 0x80000000U;
+        found = (c->possible[slot] && higher) ? slot : found;
     }
     return found;
 }
 
-/* Only the records that may be the newest are read: at a start time matters. */
+/* Reading the flash takes most of the time of a start. Therefore only the records that may be the newest are read, and
+ * none twice: with every slot damaged the watchdog would otherwise reset before the end. */
 static newest_t find_newest(void)
 {
-    newest_t newest = {.slot = HAL_NVM_SLOTS};
-    uint32_t excluded[WORDS] = {0};
-    newest.slot = highest(excluded, &newest);
-    while (newest.slot < HAL_NVM_SLOTS && !is_intact(newest.slot, &newest.header)) {
+    newest_t newest = {.damaged = false};
+    candidates_t candidates;
+    read_headers(&candidates, &newest.damaged);
+    for (newest.slot = highest(&candidates); newest.slot < HAL_NVM_SLOTS; newest.slot = highest(&candidates)) {
+        if (hal_nvm_read(newest.slot, 0, &newest.header, STORE_HEADER_SIZE) && newest.header.size <= STORE_RECORD_MAX &&
+            is_intact(newest.slot, &newest.header)) {
+            return newest;
+        }
+        candidates.possible[newest.slot] = false;
         newest.damaged = true;
-        excluded[newest.slot / 32U] |= 1U << (newest.slot % 32U);
-        newest.slot = highest(excluded, &newest);
     }
     return newest;
 }

@@ -41,8 +41,11 @@ static uint8_t any(void)
     return (uint8_t)(state >> 24);
 }
 
+static uint32_t bytes_read;
+
 bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
 {
+    bytes_read += size;
     TEST_ASSERT_TRUE(slot < HAL_NVM_SLOTS && offset + size <= HAL_NVM_SLOT_SIZE);
     memcpy(data, &memory[slot * HAL_NVM_SLOT_SIZE + offset], size);
     return true;
@@ -245,4 +248,17 @@ void test_more_of_them_end_the_save_and_keep_the_record(void)
     TEST_ASSERT_FALSE(save(1000));
     TEST_ASSERT_EQUAL_UINT32(4, failed_sectors);
     TEST_ASSERT_EQUAL_UINT32(HAL_NVM_SECTOR_SLOTS, loaded());
+}
+
+/* At a start the watchdog allows 100 ms: every header is read twice at most, every record once. */
+void test_with_every_slot_damaged_each_is_read_once(void)
+{
+    for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
+        const uint32_t header[4] = {LAYOUT, STORE_RECORD_MAX, slot, 0};
+        memcpy(&memory[slot * HAL_NVM_SLOT_SIZE], header, sizeof header);
+    }
+    record_t record;
+    bytes_read = 0;
+    TEST_ASSERT_EQUAL_INT(STORE_DAMAGED, store_load(LAYOUT, &record, sizeof record));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT32(HAL_NVM_SLOTS * (STORE_RECORD_MAX + 2U * STORE_HEADER_SIZE), bytes_read);
 }
