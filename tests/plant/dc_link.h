@@ -13,7 +13,8 @@
 
 typedef struct {
     int precharge, contactor, discharge;
-    int gate_supply; /* off: no gate can be switched on */
+    int gate_supply;   /* off: no gate can be switched on by the processor */
+    int hardware_safe; /* the safe state of the board's hardware is requested */
 } plant_switches_t;
 
 /** Returns the voltage after dt_s; adds the energy that the semiconductors dissipate to avalanche_J. */

@@ -21,6 +21,7 @@ struct plant {
     plant_switches_t on;
     double link_V; /* of the capacitor */
     int gate_fault;
+    int hardware_short; /* held by the board */
     plant_truth_t truth;
 };
 
@@ -176,6 +177,27 @@ static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double shor
     *rotor = end;
 }
 
+/* The board's own safe state (PL-26): all lower switches on, from when the voltage is too high until the request ends.
+ * It has a supply of its own. */
+static int hardware_short(plant_t *plant)
+{
+    const double level_V = plant->params.hardware_safe_V;
+    const int above = level_V > 0.0 && plant->link_V > level_V;
+    plant->hardware_short = plant->on.hardware_safe && (plant->hardware_short || above);
+    return plant->hardware_short;
+}
+
+/* Applies it from the next substep on. */
+static void hardware_apply(plant_t *plant, bridge_t *bridge)
+{
+    static const double lower_on[3] = {0.0, 0.0, 0.0};
+    if (hardware_short(plant) && bridge->duty != lower_on) {
+        bridge->duty = lower_on;
+        bridge->switching = 1;
+        inverter_set(&plant->inverter, &plant->params, bridge->duty, 1, plant->link_V);
+    }
+}
+
 /* Advances the capacitor by a substep and updates the legs, whose voltage errors depend on its voltage. */
 static double link_substep(plant_t *plant, const bridge_t *bridge, double vdc_V, double charge_As, double h)
 {
@@ -243,10 +265,12 @@ void plant_advance(plant_t *plant, const double duty[3], int gates_on)
     energy_t sum = {0};
     rotation_t rotor = update(plant);
     inverter_set(&plant->inverter, p, duty, bridge.switching, vdc_V);
+    hardware_apply(plant, &bridge);
     for (int k = 0; k < n; k++) {
         const double before_As = sum.charge;
         substep(plant, &rotor, vdc_V, bridge.short_circuit_A, period_s / n, &sum);
         vdc_V = link_substep(plant, &bridge, vdc_V, sum.charge - before_As, period_s / n);
+        hardware_apply(plant, &bridge);
     }
     mean_truth(&plant->truth, &sum, period_s);
     plant->truth.time_s += period_s;

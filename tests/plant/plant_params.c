@@ -139,5 +139,8 @@ static const char *bad_electronics(const plant_params_t *p)
 const char *plant_params_bad_field(const plant_params_t *params, int has_map)
 {
     const char *bad = bad_machine(params, has_map);
+    if (bad == NULL && !not_below_zero(params->hardware_safe_V)) {
+        bad = "hardware_safe_V";
+    }
     return bad != NULL ? bad : bad_electronics(params);
 }

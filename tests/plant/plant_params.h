@@ -27,9 +27,10 @@ typedef struct {
     double dc_load_ohm;              /* resistor across the capacitor, a short circuit near 0; 0: none */
     double avalanche_V;              /* switches and diodes of the bridge conduct above it */
     int precharge_open, discharge_open, contactor_open; /* the switch does not close */
-    int substeps;                                       /* per PWM period, at least 10 */
-    int ideal_inverter;                                 /* no dead time, no device drop */
-    int phase_open[3];                                  /* the motor lead is broken */
+    double hardware_safe_V; /* the board shorts the phases above it while its safe state is requested; 0: it cannot */
+    int substeps;           /* per PWM period, at least 10 */
+    int ideal_inverter;     /* no dead time, no device drop */
+    int phase_open[3];      /* the motor lead is broken */
     /* switches: upper a, b, c, lower a, b, c */
     int switch_open[6];     /* never switched on; its diode remains */
     int switch_shorted[6];  /* always conducts, in both directions */

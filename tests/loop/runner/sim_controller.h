@@ -5,6 +5,7 @@
  *   in:  ia_A ib_A ic_A vdc_V theta_m_rad t_winding_C at the period's start
  *   out: duty_a duty_b duty_c in 0..1 for the next period; gates_on 0 or 1
  *   switches(): the switches of the board; NULL or false: the controller has no board and the battery stays connected
+ *   outputs_lost(): the controller was reset in this period, so that no gate is on from here on; may be NULL
  *   gate_fault(): tells before each step whether the gate drivers have blocked a short circuit; may be NULL
  * Errors   set() returns a SIM_ code; get() of an unknown name returns NaN; failure() returns NULL, or the reason why
  *          no further step can be run, and may itself be NULL
@@ -23,6 +24,7 @@ typedef struct {
     void (*destroy)(void *self);
     bool (*switches)(const void *self, plant_switches_t *on);
     void (*gate_fault)(void *self, bool reported);
+    bool (*outputs_lost)(const void *self);
 } sim_controller_t;
 
 /** Takes ownership of the controller, also if it returns NULL (out of memory). */

@@ -74,11 +74,11 @@ sim_t *sim_create(int controller)
 {
     if (controller == SIM_FIRMWARE) {
         return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
-                                                  firmware_destroy, firmware_switches, firmware_gate_fault});
+                                                  firmware_destroy, firmware_switches, firmware_gate_fault, NULL});
     }
     if (controller == SIM_TWIN) {
         return sim_create_with(
-            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL, NULL});
+            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL, NULL, NULL});
     }
     return NULL;
 }
@@ -86,7 +86,7 @@ sim_t *sim_create(int controller)
 sim_t *sim_create_around(fluxtrue_t *firmware)
 {
     return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep,
-                                              firmware_switches, firmware_gate_fault});
+                                              firmware_switches, firmware_gate_fault, NULL});
 }
 
 fluxtrue_t *sim_firmware(sim_t *sim)

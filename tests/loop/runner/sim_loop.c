@@ -100,6 +100,9 @@ static void period_run(sim_t *sim)
     }
     double out[4] = {0.5, 0.5, 0.5, 0.0};
     sim->controller.step(sim->controller.self, in, out);
+    if (sim->controller.outputs_lost != NULL && sim->controller.outputs_lost(sim->controller.self)) {
+        sim->gates_on = 0; /* for the whole period: the plant takes one state of the bridge in each */
+    }
     plant_switches_t on;
     if (sim->controller.switches != NULL && sim->controller.switches(sim->controller.self, &on)) {
         plant_switch(sim->plant, &on);

@@ -34,7 +34,7 @@ static const field_t plant_fields[] = {
     REAL(lq_scale), REAL(ld_slope_scale), REAL(cross_saturation_scale), REAL(iron_k_h),
     REAL(iron_k_e), FLAG(magnet_step_keeps_current), REAL(vdc_V), REAL(vdc_ripple_V),
     REAL(vdc_ripple_hz), REAL(vdc_start_V), REAL(dc_link_F), REAL(precharge_s), REAL(discharge_s), REAL(dc_load_ohm),
-    REAL(avalanche_V), FLAG(precharge_open), FLAG(discharge_open), FLAG(contactor_open),
+    REAL(avalanche_V), FLAG(precharge_open), FLAG(discharge_open), FLAG(contactor_open), REAL(hardware_safe_V),
     REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), FLAG(substeps),
     FLAG(ideal_inverter), FLAG3(phase_open), SWITCHES(switch_open), SWITCHES(switch_shorted),
     REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), REAL(current_full_scale_A), FLAG(adc_bits),

@@ -7,6 +7,7 @@
 
 #define PERIPHERAL_BUS 0x40000000U
 #define PRIVATE_BUS 0xE0000000U
+enum { PDOR = 0x00, PDDR = 0x14 };
 
 emu_pins_t *emu_pins(emu_t *emu)
 {
@@ -50,9 +51,26 @@ uint32_t emu_resolver_angle(const emu_t *emu)
     return emu->s.rdc.latched;
 }
 
+emu_line_t emu_line(const emu_t *emu, unsigned line)
+{
+    const bool connected = (bus_get(emu, bus_find("PORTC"), 4U * line) >> 8 & 7U) == 1U;
+    const peripheral_t *port = bus_find("PTC");
+    if (!connected || (bus_get(emu, port, PDDR) >> line & 1U) == 0U) {
+        return EMU_LINE_RELEASED;
+    }
+    return (bus_get(emu, port, PDOR) >> line & 1U) != 0U ? EMU_LINE_HIGH : EMU_LINE_LOW;
+}
+
+/* The board pulls it down. */
 bool emu_gate_driver(const emu_t *emu)
 {
-    return (bus_get(emu, bus_find("PTC"), 0) >> EMU_GATE_DRIVER & 1U) != 0;
+    return emu_line(emu, EMU_GATE_DRIVER) == EMU_LINE_HIGH;
+}
+
+/* The board pulls it up: a processor in reset requests the safe state. */
+bool emu_safe_state_requested(const emu_t *emu)
+{
+    return emu_line(emu, EMU_SAFE_STATE) != EMU_LINE_LOW;
 }
 
 /* The shaft keeps turning between two settings of the pins. */

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: clock sources, dividers, run modes, clock gates. An enabled source is stable at
- * once.
+/* SCG, PCC, SMC, PMC, RCM, SIM, LMEM: clock sources, dividers, run modes, clock gates.
  *
  * documented behaviour                           | modelled | test
  * ---------------------------------------------- | -------- | --------------------------------------------
@@ -10,10 +9,13 @@
  * settings of a running oscillator or PLL        | refused  | test_a_running_source_keeps_its_settings
  * PCC: clock gates must not change in HSRUN      | refused  | test_what_is_not_modelled_is_an_error
  * RCM: cause of the last reset                   | yes      | test_an_unserviced_watchdog_resets_and_reports_why
+ * start-up of the oscillator, lock of the PLL    | yes      | test_a_source_is_valid_after_its_start_up_time
+ * SIM_CHIPCTL: retention of SRAM_U over a reset  | yes      | test_ram_is_kept_over_a_reset_only_where_it_is_retained
+ * SIM_CHIPCTL: no access to retained RAM         | refused  | test_what_is_not_modelled_is_an_error
  * LMEM: cache commands are done at once          | yes      | test_a_cache_command_is_done_at_once
  * SIM: converter triggers other than the PDB     | refused  | test_other_trigger_sources_are_refused
  * VLPR, STOP                                     | refused  | test_other_run_modes_are_refused
- * start-up times, monitors, jitter, cache hits   | no       | -
+ * monitors, jitter, cache hits                   | no       | -
  */
 #include "emu_private.h"
 
@@ -47,6 +49,9 @@ enum {
     RUN = 1,
     HSRUN = 0x80,
 };
+/* Data sheet: 1.5 ms, typical, for a crystal of 8 MHz and low gain; 150 us + 1075 periods of 8 MHz. */
+#define OSCILLATOR_START (EMU_TICKS_PER_S / 2000U * 3U)
+#define PLL_LOCK (EMU_TICKS_PER_S / 20000U * 3U + 1075ULL * 420U)
 #define ENABLED 1U
 #define VALID (1U << 24)
 #define CGC (1U << 30)
@@ -68,6 +73,24 @@ static bool source_on(const emu_t *emu, int source)
         return false;
     }
     return enabled(emu, source) && (source != SPLL || enabled(emu, SOSC));
+}
+
+static bool source_valid(const emu_t *emu, int source)
+{
+    const uint64_t ready = source == SOSC ? emu->s.oscillator_ready : source == SPLL ? emu->s.pll_ready : 0U;
+    return source_on(emu, source) && emu->s.now >= ready;
+}
+
+static void source_started(emu_t *emu, uint32_t offset, bool was_on)
+{
+    if (was_on) {
+        return;
+    }
+    if (offset == SOSCCSR) {
+        emu->s.oscillator_ready = emu->s.now + OSCILLATOR_START;
+    } else if (offset == SPLLCSR) {
+        emu->s.pll_ready = emu->s.now + PLL_LOCK;
+    }
 }
 
 /* (PREDIV, MULT) of 8 MHz: f = 8 MHz (MULT + 16) / (PREDIV + 1) / 2; 0: no whole number of ticks. */
@@ -132,8 +155,9 @@ static void core_update(emu_t *emu)
     const uint32_t core = source * ((ccr >> 16 & 15U) + 1U);
     const uint32_t bus = core * ((ccr >> 4 & 15U) + 1U), flash = core * ((ccr & 15U) + 1U);
     const bool high = high_speed(emu);
-    if (source == 0) {
-        emu_fail(emu, "SCG selects clock source %u, which is off or no whole number of ticks", ccr >> 24 & 15U);
+    if (source == 0 || !source_valid(emu, (int)(ccr >> 24 & 15U))) {
+        emu_fail(emu, "SCG selects clock source %u, which is off, not valid yet or no whole number of ticks",
+                 ccr >> 24 & 15U);
     } else if (core < (high ? 30U : 42U) || bus < (high ? 60U : 70U) || flash < (high ? 120U : 126U)) {
         const uint32_t ticks_per_ms = EMU_TICKS_PER_S / 1000U;
         emu_fail(emu, "SCG: core %u, bus %u, flash %u kHz are too fast for %s", ticks_per_ms / core, ticks_per_ms / bus,
@@ -161,7 +185,7 @@ uint32_t scg_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     case SIRCCSR:
     case FIRCCSR:
     case SPLLCSR:
-        return (stored & 0x00FFFFFFU) | (source_on(emu, source) ? VALID : 0U) |
+        return (stored & 0x00FFFFFFU) | (source_valid(emu, source) ? VALID : 0U) |
                ((selected(emu) >> 24 & 15U) == (uint32_t)source ? 1U << 25 : 0U);
     default:
         return stored;
@@ -171,6 +195,7 @@ uint32_t scg_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 void scg_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)self;
+    source_started(emu, offset, (old & ENABLED) != 0);
     if (offset == SPLLCFG && source_on(emu, SPLL)) {
         emu_fail(emu, "write of SCG.SPLLCFG while the PLL runs: it has no effect");
     } else if (offset == SPLLCSR && (value & ENABLED) != 0 && spll_ticks(emu) == 0) {
@@ -291,6 +316,13 @@ uint32_t sim_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
 void sim_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     (void)self, (void)old;
+    enum { CHIPCTL = 0x04 };
+    if (offset == CHIPCTL) {
+        emu->s.upper_retained = (value & 1U << 20) == 0U;
+        if ((value & 1U << 21) == 0U) {
+            emu_fail(emu, "write of SIM.CHIPCTL: retention of SRAM_L, in which the stack lies, is not modelled");
+        }
+    }
     if (offset == 0x18U && value != 0U) {
         emu_fail(emu, "write of SIM.ADCOPT: only the PDB triggers the converters in this model");
     }

@@ -229,6 +229,17 @@ static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int siz
     (void)uc, (void)type, (void)address, (void)size, (void)value, (void)user;
 }
 
+/* The reference manual forbids every access to RAM whose content is retained. */
+static void on_upper_ram(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+{
+    (void)uc, (void)type, (void)size, (void)value;
+    emu_t *emu = user;
+    if (emu->s.upper_retained) {
+        emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
+                 (uint32_t)address);
+    }
+}
+
 static bool on_unmapped(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
     (void)uc, (void)value;
@@ -314,12 +325,26 @@ int emu_run(emu_t *emu, uint64_t ticks)
     }
 }
 
+/* RAM whose retention was not requested (SIM_CHIPCTL) has no known content after a reset. */
+static void ram_lose(emu_t *emu, uint32_t from, uint32_t end)
+{
+    uint8_t lost[256];
+    memset(lost, 0xA5, sizeof lost);
+    for (uint32_t at = from; at < end; at += sizeof lost) {
+        (void)uc_mem_write(emu->uc, at, lost, sizeof lost);
+    }
+}
+
 void emu_reset(emu_t *emu, uint32_t cause)
 {
     state_t *s = &emu->s;
     const state_t old = *s;
     if (old.core_ticks != 0U) {
         ftfc_abort(emu);
+    }
+    if (cause != 0U) {
+        ram_lose(emu, RAM_BASE, RAM_UPPER);
+        ram_lose(emu, old.upper_retained ? RAM_BASE + RAM_SIZE : RAM_UPPER, RAM_BASE + RAM_SIZE);
     }
     memset(s, 0, sizeof *s);
     s->now = old.now;
@@ -333,7 +358,10 @@ void emu_reset(emu_t *emu, uint32_t cause)
         s->due[i] = NEVER;
     }
     s->core_ticks = FIRC_TICKS;
-    rdc_power_on(emu);
+    s->rdc = old.rdc; /* a device of its own */
+    if (cause == 0U) {
+        rdc_power_on(emu);
+    }
     pdb_reset(emu);
     bus_reset(emu);
     data_flash_reset(emu);
@@ -353,13 +381,19 @@ void emu_reset(emu_t *emu, uint32_t cause)
 /* What the RAM holds after the supply has returned is not known. */
 void emu_power_cycle(emu_t *emu)
 {
-    uint8_t lost[256];
-    memset(lost, 0xA5, sizeof lost);
     emu_reset(emu, 0);
-    for (uint32_t at = 0; at < RAM_SIZE; at += sizeof lost) {
-        (void)uc_mem_write(emu->uc, RAM_BASE + at, lost, sizeof lost);
-    }
+    ram_lose(emu, RAM_BASE, RAM_BASE + RAM_SIZE);
     emu->error[0] = '\0';
+}
+
+void emu_reset_now(emu_t *emu, uint32_t cause)
+{
+    enum { POR = 0x80 };
+    if ((cause & POR) != 0U) {
+        emu_power_cycle(emu);
+    } else {
+        emu_reset(emu, cause);
+    }
 }
 
 /* ---- creation ---- */
@@ -381,6 +415,8 @@ static bool maps_create(emu_t *emu)
            uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_unmapped, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, DATA_FLASH_BASE,
                        DATA_FLASH_BASE + DATA_FLASH_SIZE - 1) == UC_ERR_OK &&
+           uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, (void *)on_upper_ram, emu, RAM_UPPER,
+                       RAM_BASE + RAM_SIZE - 1) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, MMIO_BASE,
                        MMIO_BASE + MMIO_SIZE - 1) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, PPB_BASE,

@@ -62,8 +62,11 @@ EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 EMU_API uint32_t emu_outputs(const emu_t *emu);
 EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);
-/** State of the line that switches the supply of the gate drivers. */
+/** State of a line of port C to the board: driven high or low; released while it is no output, as after a reset. */
+typedef enum { EMU_LINE_RELEASED = 0, EMU_LINE_LOW = 1, EMU_LINE_HIGH = 2 } emu_line_t;
+EMU_API emu_line_t emu_line(const emu_t *emu, unsigned line);
 EMU_API bool emu_gate_driver(const emu_t *emu);
+EMU_API bool emu_safe_state_requested(const emu_t *emu);
 
 /** Runs for at most this number of ticks. EMU_CENTRE: FTM0 has just begun a period and loaded its buffered values; the
  * triggers of this instant follow with the next call, after the caller has set the pins. */
@@ -108,6 +111,8 @@ typedef struct {
 EMU_API emu_counts_t emu_counts(const emu_t *emu, int vector);
 EMU_API void emu_counts_clear(emu_t *emu);
 
+/** Resets the processor now; cause: the bits of RCM_SRS, with POR set the supply has failed. */
+EMU_API void emu_reset_now(emu_t *emu, uint32_t cause);
 /** The supply fails and returns: RAM is lost, a command of the flash controller is left half done. */
 EMU_API void emu_power_cycle(emu_t *emu);
 /** Data flash: commands take the data sheet's longest time instead of its typical one; a sector's erase fails; the seed

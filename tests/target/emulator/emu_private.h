@@ -20,8 +20,10 @@ enum {
     EMU_RDC_A0 = 8, /* pins of port C, hal/s32k144/README.md */
     EMU_RDC_A1 = 9,
     EMU_GATE_DRIVER = 3,
+    EMU_SAFE_STATE = 6,
     RAM_BASE = 0x1FFF8000,
     RAM_SIZE = 0xF000,
+    RAM_UPPER = 0x20000000, /* SRAM_U; below it SRAM_L */
     FLASH_SIZE = 0x80000,
     DATA_FLASH_SIZE = 0x10000,
     DATA_FLASH_SECTOR = 0x800,
@@ -149,9 +151,11 @@ typedef struct {
     rdc_t rdc;
     wdog_t wdog;
     ftfc_t ftfc;
-    uint64_t lpit_ready; /* from then on the registers of LPIT0 may be written */
-    uint32_t core_ticks; /* per core cycle */
+    uint64_t lpit_ready;                  /* from then on the registers of LPIT0 may be written */
+    uint32_t core_ticks;                  /* per core cycle */
+    uint64_t oscillator_ready, pll_ready; /* from then on they are valid */
     uint32_t pc, resets, reset_cause;
+    bool upper_retained; /* SIM_CHIPCTL.SRAMU_RETEN is 0: the RAM must not be accessed and keeps its content */
     bool centre, reset_wanted, poll_masks, reschedule, stop;
     bool halted, stuck; /* emu_core_state_t: in both the core executes nothing while the peripherals continue */
     uint32_t exc_return;
@@ -306,6 +310,8 @@ uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);
 uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits);
 void rdc_power_on(emu_t *emu);
+/** The timer's outputs 0 ... 5 at this instant, one bit each. */
+uint32_t ftm_levels(const emu_t *emu);
 void rdc_sample(emu_t *emu);
 
 /* One line per kind of peripheral. */

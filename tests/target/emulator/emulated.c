@@ -70,6 +70,31 @@ static void samples_to_pins(emulated_t *e, const double in[6])
 
 /* ---- a period ---- */
 
+static bool counts(const emulated_t *e)
+{
+    return (emu_register(e->emu, "FTM0.SC") >> 3 & 3U) != 0U;
+}
+
+/* A running timer ends the period; without it the period has its nominal length, so that no time is lost. */
+static int run_period(emulated_t *e)
+{
+    double ticks = counts(e) ? 1.01 * e->period_ticks : e->period_ticks;
+    e->lost = e->reset_cause != 0U;
+    if (e->lost) {
+        ticks = e->reset_share * e->period_ticks;
+        (void)emu_run(e->emu, (uint64_t)ticks);
+        emu_reset_now(e->emu, e->reset_cause);
+        e->reset_cause = 0;
+        ticks = e->period_ticks - ticks;
+    }
+    return emu_run(e->emu, (uint64_t)ticks);
+}
+
+static bool outputs_lost(const void *self)
+{
+    return ((const emulated_t *)self)->lost;
+}
+
 static void step(void *self, const double in[6], double out[4])
 {
     emulated_t *e = self;
@@ -78,13 +103,15 @@ static void step(void *self, const double in[6], double out[4])
     if (mirror_push(&e->mirror) && e->shadow != NULL) {
         shadow_inputs(e);
     }
-    const int stopped = emu_run(e->emu, (uint64_t)(1.01 * e->period_ticks));
+    const int stopped = run_period(e);
     emu_bridge(e->emu, &bridge);
-    const bool runs = stopped == EMU_CENTRE;
+    const bool runs = stopped == EMU_CENTRE || !counts(e); /* without its counter the timer may hold its outputs */
     for (int x = 0; x < 3; x++) {
         out[x] = runs ? bridge.duty[x] : 0.5;
     }
     out[3] = runs && bridge.gates ? 1.0 : 0.0;
+    e->lost = e->lost || emu_resets(e->emu) != e->resets_seen;
+    e->resets_seen = emu_resets(e->emu);
     e->steps++;
     if (e->shadow != NULL && runs) {
         shadow_compare(e);
@@ -96,11 +123,11 @@ static bool switches(const void *self, plant_switches_t *on)
 {
     enum { PRECHARGE = 0, MAIN_CONTACTOR = 1, DISCHARGE = 2 };
     const emulated_t *e = self;
-    const uint64_t lines = emu_register(e->emu, "PTC.PDOR");
-    *on = (plant_switches_t){.precharge = (int)(lines >> PRECHARGE & 1U),
-                             .contactor = (int)(lines >> MAIN_CONTACTOR & 1U),
-                             .discharge = (int)(lines >> DISCHARGE & 1U),
-                             .gate_supply = emu_gate_driver(e->emu)};
+    *on = (plant_switches_t){.precharge = emu_line(e->emu, PRECHARGE) == EMU_LINE_HIGH,
+                             .contactor = emu_line(e->emu, MAIN_CONTACTOR) == EMU_LINE_HIGH,
+                             .discharge = emu_line(e->emu, DISCHARGE) == EMU_LINE_HIGH,
+                             .gate_supply = emu_gate_driver(e->emu),
+                             .hardware_safe = emu_safe_state_requested(e->emu)};
     return e->board;
 }
 
@@ -149,6 +176,14 @@ static int pin_set(emulated_t *e, const char *name, double value)
                                                                : NULL;
     if (strcmp(name, "emulator.power_cycle") == 0) {
         return value == 1.0 && power_cycle(e) ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
+    if (strcmp(name, "emulator.reset_share") == 0) {
+        e->reset_share = value;
+        return value >= 0.0 && value < 1.0 ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
+    if (strcmp(name, "emulator.reset") == 0) {
+        e->reset_cause = value > 0.0 && value < 65536.0 ? (uint32_t)value : 0U;
+        return e->reset_cause != 0U ? SIM_OK : SIM_OUT_OF_RANGE;
     }
     if (strcmp(name, "emulator.shadow") == 0) {
         return value == 1.0 && shadow_start(e) ? SIM_OK : SIM_OUT_OF_RANGE;
@@ -204,6 +239,9 @@ double emulated_get(emulated_t *e, const char *name)
         {"emulator.inverter_C", e->inverter_C},
         {"emulator.processor_C", e->processor_C},
         {"emulator.board", e->board},
+        {"emulator.gates", bridge.gates},
+        {"emulator.reset_share", e->reset_share},
+        {"emulator.safe_state", emu_safe_state_requested(e->emu)},
         {"emulator.dead_time_s", bridge.dead_time_s},
         {"emulator.pwm_period_s", bridge.period_s},
     };
@@ -261,7 +299,8 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         destroy(e);
         return NULL;
     }
-    return sim_create_with((sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report});
+    return sim_create_with(
+        (sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report, outputs_lost});
 }
 
 emu_t *sim_emulator(sim_t *sim)

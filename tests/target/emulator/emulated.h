@@ -9,6 +9,11 @@
  *   emulator.inverter_C, emulator.processor_C    temperatures of the second thermistor and of the sensor on the die
  *   emulator.board         set 1: the image's outputs control contactor, precharge, discharge and gate-driver supply
  *   emulator.power_cycle   set 1: the processor's supply fails and returns, the machine is not affected
+ *   emulator.reset         set to bits of RCM_SRS: the processor is reset for this reason in the next period, after the
+ *                          share emulator.reset_share of it; the plant continues while the image starts again. POR
+ *                          (128): its supply has failed
+ *   emulator.gates, .safe_state   read only: the bridge is switching or shorted; the board's hardware is asked for
+ *                          its safe state
  *   emulator.compared, .differing, .instructions, .resets, .time_s, .dead_time_s, .pwm_period_s   read only
  * Source   docs/howto/emulate.md
  * Errors   sim_create_emulated(): NULL, error says why; sim_failure() names what stopped the emulation

@@ -17,6 +17,10 @@ typedef struct {
     fluxtrue_t *shadow;  /* NULL: there is none */
     drive_t task_result; /* result of the shadow's task, while the image's task still runs */
     bool task_runs;
+    uint32_t reset_cause; /* of a reset that is to come in the next period, 0: none */
+    double reset_share;   /* of that period */
+    uint32_t resets_seen;
+    bool lost;       /* the processor was reset in this period */
     bool gate_fault; /* the fault interrupt has run; the shadow's next fast ISR raises the fault */
     uint64_t compared, differing;
     char difference[96];

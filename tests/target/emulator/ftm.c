@@ -12,6 +12,7 @@
  * write protection                                   | refused  | test_the_fault_settings_are_write_protected
  * channel 6: the edge that samples a resolver        | yes      | test_a_resolver_image_computes_the_same_bits
  * FTM2: quadrature decoder                           | yes      | test_the_counter_follows_the_encoder
+ * FTM2: counts from CNTIN, whatever the angle        | yes      | test_the_decoder_does_not_know_the_angle_at_its_start
  * BDMMODE: counter while the core is halted          | yes      | test_a_halted_core_leaves_outputs_as_bdmmode_says
  * up-down counting, interrupts, legacy sync, INVCTRL | refused  | test_other_timer_modes_are_refused
  * reload points, input capture                       | no       | -
@@ -213,6 +214,14 @@ static void sample_held(emu_t *emu, uint32_t forced)
     emu->s.rdc.high = high;
 }
 
+/* The counter continues from its value: the encoder has edges, no absolute angle. */
+static void decoder_starts(emu_t *emu, const peripheral_t *self)
+{
+    ftm_t *f = &emu->s.ftm[self->instance];
+    f->quad_offset = 0;
+    f->quad_offset = bus_get(emu, self, CNT) + bus_get(emu, self, MOD) + 1U - decoded(emu, self);
+}
+
 static void apply_write(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t value)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
@@ -228,8 +237,8 @@ static void apply_write(emu_t *emu, const peripheral_t *self, uint32_t offset, u
             trgmux_event(emu, INIT_TRIGGER); /* a write of the counter is an initialisation, too */
         }
     } else if (offset == CNT) {
-        f->quad_offset = 0;
-        f->quad_offset = bus_get(emu, self, CNTIN) + bus_get(emu, self, MOD) + 1U - decoded(emu, self);
+        bus_put(emu, self, CNT, bus_get(emu, self, CNTIN));
+        decoder_starts(emu, self);
     } else if (offset == OUTMASK && (bus_get(emu, self, SYNC) & 8U) == 0) {
         f->outmask = value;
     } else if (offset == SYNC) {
@@ -263,6 +272,9 @@ void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
     const bool ran = emu->s.ftm[self->instance].running;
     check_protection(emu, self, offset, old, value);
     apply_write(emu, self, offset, value);
+    if (offset == QDCTRL && (value & ~old & 1U) != 0) {
+        decoder_starts(emu, self);
+    }
     if (self->instance == 0 && sets_fault_control(offset)) {
         ftm_fault_written(emu, offset, value);
     }

@@ -12,6 +12,7 @@
  * TRGMUX: source of PDB0, PDB1, FTM0; lock   | refused  | test_a_locked_trigger_keeps_its_source
  * TRGMUX: pulse of PDB0 to LPSPI0 and LPSPI1 | yes      | test_a_request_starts_one_frame_per_pulse
  * TRGMUX: every other target                 | refused  | test_other_trigger_targets_are_refused
+ * GPIO: PDIR is the level of a digital pin   | yes      | test_a_pin_reads_what_the_timer_drives
  * GPIO: levels from outside                  | no       | -
  */
 #include <string.h>
@@ -115,6 +116,26 @@ void port_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     }
 }
 
+/* The level of FTM0's outputs 0 ... 5 at the pins of a port that they are given to. */
+static uint32_t timer_levels(const emu_t *emu, const char *port, uint32_t of_gpio)
+{
+    const uint32_t outputs = ftm_levels(emu);
+    for (uint32_t k = 0; k < EMU_PWM_CHANNELS; k++) {
+        const uint32_t pin = wiring[k].pin;
+        if (strcmp(wiring[k].port, port) == 0 &&
+            (bus_get(emu, bus_find(port), 4U * pin) >> 8 & 7U) == wiring[k].function) {
+            of_gpio = (of_gpio & ~(1U << pin)) | (outputs >> k & 1U) << pin;
+        }
+    }
+    return of_gpio;
+}
+
+static uint32_t levels(const emu_t *emu, const peripheral_t *self)
+{
+    const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
+    return timer_levels(emu, port, bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR));
+}
+
 bool gpio_models(uint32_t offset)
 {
     return offset <= PDDR;
@@ -123,7 +144,7 @@ bool gpio_models(uint32_t offset)
 uint32_t gpio_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
 {
     if (offset == PDIR) {
-        return bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR);
+        return levels(emu, self);
     }
     return offset == PSOR || offset == PCOR || offset == PTOR ? 0U : stored;
 }

@@ -172,6 +172,7 @@ def test_a_command_in_high_speed_run_is_refused(core: Core) -> None:
     values = (0x101, 0x24, 1, 0x302, 12 << 16, 1, 0x0600_0013, 0x0601_0013)
     for name, value in zip(registers, values, strict=True):
         core.store(f"SCG.{name}", value)
+        core.run(2e-3 if name.endswith("CSR") else 0)  # until the source is valid
     core.store("SMC.PMPROT", 0x80)
     core.store("SMC.PMCTRL", 0x60)
     refused(core, "must not be launched in HSRUN", ERASE, 0)

@@ -333,6 +333,18 @@ def test_the_counter_follows_the_encoder(ftm: Core) -> None:
     assert ftm.load("FTM2.CNT") == 16384 - 2048
 
 
+def test_the_decoder_does_not_know_the_angle_at_its_start(ftm: Core) -> None:
+    """After a reset of the processor the shaft stands anywhere, and the counter begins at its initial value."""
+    ftm.turn(0.375)
+    for pin in ("D.PCR10", "D.PCR11"):
+        ftm.store(f"PORT{pin}", 3 << 8)
+    for name, value in (("MOD", 16383), ("CNT", 0), ("QDCTRL", 1), ("SC", 1 << 3)):
+        ftm.store(f"FTM2.{name}", value)
+    assert ftm.load("FTM2.CNT") == 0
+    ftm.turn(0.5)
+    assert ftm.load("FTM2.CNT") == 2048
+
+
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
@@ -526,3 +538,45 @@ def test_mailboxes_are_sent_lowest_identifier_first(can: Core) -> None:
 def test_other_bus_modes_are_refused(can: Core, name: str, value: int) -> None:
     can.store("CAN0.MCR", 0x7080_000F)  # frozen
     refused(can, f"CAN0.{name}", value, "not modelled")
+
+
+# ---- clock sources, reset
+
+
+@pytest.mark.parametrize(
+    ("source", "start_s"), [("SOSC", 1.5e-3), ("SPLL", 150e-6 + 1075 / 8e6)], ids=["oscillator", "pll"]
+)
+def test_a_source_is_valid_after_its_start_up_time(core: Core, source: str, start_s: float) -> None:
+    core.store("SCG.SOSCCSR", 1)
+    if source == "SPLL":
+        core.run(2e-3)
+        core.store("SCG.SPLLCFG", 12 << 16)
+        core.store("SCG.SPLLCSR", 1)
+    register = f"SCG.{source}CSR"
+    core.run(start_s - CORE_S)
+    assert core.load(register) >> 24 & 1 == 0
+    core.run(2 * CORE_S)
+    assert core.load(register) >> 24 & 1 == 1
+
+
+SRAM_L, SRAM_U = 0x1FFF_9000, 0x2000_2000
+BOTH, LOWER_ONLY = 0x30_0000, 0x20_0000  # SIM_CHIPCTL: no retention at all; not of SRAM_L
+WATCHDOG, POWER_ON = 0x20, 0x82
+
+
+@pytest.mark.parametrize(
+    ("chipctl", "cause", "kept"), [(BOTH, WATCHDOG, False), (LOWER_ONLY, WATCHDOG, True), (LOWER_ONLY, POWER_ON, False)]
+)
+def test_ram_is_kept_over_a_reset_only_where_it_is_retained(core: Core, chipctl: int, cause: int, kept: bool) -> None:
+    for address in (SRAM_L, SRAM_U):
+        core.write(address, b"kept")
+    core.store("SIM.CHIPCTL", chipctl)
+    core.reset(cause)
+    assert core.register("RCM.SRS") == cause
+    assert core.read(SRAM_L, 4) != b"kept"
+    assert (core.read(SRAM_U, 4) == b"kept") == kept
+    assert core.register("SIM.CHIPCTL") == BOTH
+
+
+def test_retention_of_the_stack_is_refused(core: Core) -> None:
+    refused(core, "SIM.CHIPCTL", 0, "retention of SRAM_L, in which the stack lies, is not modelled")

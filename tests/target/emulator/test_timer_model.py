@@ -207,6 +207,49 @@ def test_other_output_settings_are_refused(core: Core, name: str, value: int) ->
         core.store(f"FTM0.{name}", value)
 
 
+LOWER = 0b10_1010
+FORCED = LOWER << 8 | ALL
+
+
+def levels(core: Core) -> int:
+    """The levels of outputs 0 ... 5, as the program reads them at the pins."""
+    ports = {"B": core.load("PTB.PDIR"), "D": core.load("PTD.PDIR")}
+    pins = (("D", 15), ("D", 16), ("D", 0), ("D", 1), ("B", 4), ("B", 5))
+    return sum((ports[port] >> pin & 1) << k for k, (port, pin) in enumerate(pins))
+
+
+def test_a_pin_reads_what_the_timer_drives(core: Core) -> None:
+    """Pulses from 250 to 750, dead times of 20 after each edge."""
+    to_next_period(core)
+    at = 0
+    for tick, expected in ((100, LOWER), (249, LOWER), (252, 0), (268, 0), (272, EVEN), (748, EVEN), (760, 0),
+                           (772, LOWER), (990, LOWER)):  # fmt: skip
+        core.run((tick - at) * CORE_S)
+        at = tick
+        assert levels(core) == expected, tick
+    core.store("FTM0.OUTMASK", 3)
+    assert levels(core) == LOWER & ~3
+    core.store("PORTB.PCR5", 1 << 8)  # no longer given to the timer
+    assert levels(core) == 0b1000
+
+
+def test_the_lower_outputs_are_forced_high_together(bare: Core) -> None:
+    set_up(bare, SC=RUNS & ~8)  # without its counter
+    bare.store("FTM0.SWOCTRL", FORCED)
+    assert bare.outputs == levels(bare) == LOWER
+    assert [bare.duty(pair) for pair in range(3)] == [0.0, 0.0, 0.0]
+    bare.store("FTM0.OUTMASK", 0b11)
+    assert bare.outputs == LOWER & ~0b11
+
+
+@pytest.mark.parametrize("state", [State.RUNS, State.STUCK])
+def test_a_fault_overrides_outputs_that_are_forced(core: Core, state: State) -> None:
+    core.store("FTM0.SWOCTRL", FORCED)
+    core.core_state(state)
+    fault(core, FILTER_S)
+    assert core.outputs == 0
+
+
 def test_mask_and_software_control_switch_off(core: Core) -> None:
     core.store("FTM0.SWOCTRL", 0b11)
     assert core.outputs == ALL & ~0b11

@@ -192,3 +192,30 @@ void test_gates_without_supply_do_not_switch(void)
     }
     TEST_ASSERT_TRUE(t->vdc_V > 436.0);
 }
+
+/* The board's own path needs no gate supply of the processor's; it holds until its request ends. */
+void test_the_hardware_s_safe_state_stops_the_rise_and_holds_while_it_is_requested(void)
+{
+    p.vdc_start_V = 300.0;
+    p.speed_rad_s = 1000.0;
+    p.hardware_safe_V = 350.0;
+    const plant_truth_t *t = start((plant_switches_t){.hardware_safe = 1});
+    run(0.1, 0);
+    const double held_V = t->vdc_V;
+    TEST_ASSERT_TRUE(held_V > 350.0 && held_V < 400.0);
+    run(0.1, 0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, held_V, t->vdc_V);
+    plant_switch(plant, &(plant_switches_t){0});
+    run(0.1, 0);
+    TEST_ASSERT_TRUE(t->vdc_V > 430.0);
+}
+
+void test_without_a_request_the_hardware_does_nothing(void)
+{
+    p.vdc_start_V = 300.0;
+    p.speed_rad_s = 1000.0;
+    p.hardware_safe_V = 350.0;
+    const plant_truth_t *t = start((plant_switches_t){0});
+    run(0.1, 0);
+    TEST_ASSERT_TRUE(t->vdc_V > 400.0);
+}

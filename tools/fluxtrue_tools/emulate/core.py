@@ -79,6 +79,7 @@ _SIGNATURES = {
     "emu_outputs": (_U32, [_HERE]),
     "emu_core_state": (None, [_HERE, _INT]),
     "emu_power_cycle": (None, [_HERE]),
+    "emu_reset_now": (None, [_HERE, _U32]),
     "emu_flash_slow": (None, [_HERE, _BOOL]),
     "emu_flash_worn": (None, [_HERE, _U32, _BOOL]),
     "emu_flash_weak": (None, [_HERE, _U32, _BOOL]),
@@ -241,6 +242,10 @@ class Core:
     def core_state(self, state: State) -> None:
         """Change the state of the core; timers and peripherals continue."""
         self._library.emu_core_state(self._handle, state.value)
+
+    def reset(self, cause: int) -> None:
+        """Reset the processor now; the bits of RCM_SRS say why. With POR (0x80) the supply has failed."""
+        self._library.emu_reset_now(self._handle, cause)
 
     def power_cycle(self) -> None:
         """Let the supply fail and return: RAM is lost, a running flash command is left half done."""
