@@ -11,6 +11,8 @@
 #define SAFE_IN_DEBUG 1U /* a halted core stops the counter and disables the outputs */
 #define FAULT_FILTER 4U
 #define SIX_OUTPUTS 0x3FU
+#define HELD (SIX_OUTPUTS | 0x2A00U) /* SWOCTRL: the lower outputs high, the upper ones low */
+#define ONE_OF_EACH_PAIR 0x15U
 #define SAMPLE_PULSE_TICKS 112U /* 1 us */
 #define SAMPLE_HELD 0x40U   /* SWOCTRL: channel 6 by software, */
 #define SAMPLE_HIGH 0x4000U /* at this level */
@@ -31,9 +33,12 @@
 static struct {
     uint32_t period;
     bool switching;                   /* as last commanded */
+    uint32_t dead_time;               /* ticks */
 } bridge;                             /* adjacent: one address serves both in every period */
 static volatile bool fault_for_board; /* set by the fault interrupt, taken by its reader */
 static volatile bool ended_by_fault;  /* set by the fault interrupt, until switching is enabled again */
+static uint32_t held;                 /* calls of hal_pwm_enable() until the timer takes the short circuit over */
+static bool pending;                  /* switching was enabled in this period: the outputs follow from the next on */
 
 /* Ten bits; larger values in steps of four, rounded up, so that the dead time is never shorter than requested. */
 static uint32_t dead_time(uint32_t ticks)
@@ -79,6 +84,8 @@ static void disable_switching(void)
     FTM0->SWOCTRL = SIX_OUTPUTS;
     FTM0->OUTMASK = SIX_OUTPUTS;
     FTM0->SYNC = LOAD;
+    held = 0;
+    pending = false;
 }
 
 /* The timer holds the outputs off although the line is no longer active. */
@@ -99,6 +106,8 @@ static void enable_switching(void)
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = 0;
     FTM0->SYNC = LOAD;
+    held = 0;
+    pending = true;
 }
 
 bool pwm_possible(const pwm_config_t *config)
@@ -122,7 +131,10 @@ void pwm_init(const pwm_config_t *config)
     FTM0->SC = ENABLED;
     hal_pwm_write((duty_t){16384, 16384, 16384});
     bridge.switching = false;
+    bridge.dead_time = config->dead_time_ticks;
     ended_by_fault = false;
+    held = 0;
+    pending = false;
 }
 
 static void pass_a_microsecond(void)
@@ -134,11 +146,25 @@ static void pass_a_microsecond(void)
 
 void pwm_sample_by_hand(void)
 {
-    FTM0->SWOCTRL = SIX_OUTPUTS | SAMPLE_HELD | SAMPLE_HIGH;
+    const uint32_t outputs = (held != 0U) ? HELD : SIX_OUTPUTS;
+    FTM0->SWOCTRL = outputs | SAMPLE_HELD | SAMPLE_HIGH;
     pass_a_microsecond();
-    FTM0->SWOCTRL = SIX_OUTPUTS | SAMPLE_HELD;
+    FTM0->SWOCTRL = outputs | SAMPLE_HELD;
     pass_a_microsecond();
-    FTM0->SWOCTRL = SIX_OUTPUTS;
+    FTM0->SWOCTRL = outputs;
+}
+
+/* The mask, which would override the level set by software, is written without SYNCHOM and therefore at once. A fault
+ * overrides both. */
+void pwm_hold_short_circuit(void)
+{
+    hal_pwm_write((duty_t){0, 0, 0}); /* what follows once the counter runs */
+    FTM0->SYNC = FTM_SYNC_CNTMAX;
+    FTM0->OUTMASK = 0;
+    FTM0->SWOCTRL = HELD;
+    FTM0->SYNC = LOAD;
+    bridge.switching = true;
+    held = 2;
 }
 
 void pwm_start(void)
@@ -180,21 +206,50 @@ void hal_pwm_enable(bool on)
 {
     /* The short circuit after a gate-driver fault at speed: switching was enabled, but the timer has ended it. */
     const bool again = on && ended_by_fault && is_fault_over();
-    if (__builtin_expect(on == bridge.switching && !again, 1)) {
+    if (__builtin_expect(on == bridge.switching && !again && held == 0U, 1)) {
+        pending = false;
         return;
     }
     bridge.switching = on;
-    if (on) {
-        enable_switching();
-    } else {
+    if (!on) {
         disable_switching();
+    } else if (held > 1U) {
+        held--; /* the duties of this call act from the next period on */
+    } else {
+        enable_switching();
     }
 }
 
-/* FAULTF holds the outputs off. */
+/* The levels of the outputs at their pins, PTD15, 16, 0, 1 and PTB4, 5 (pins.c): even bits are the upper ones. A pin
+ * reads its level whatever digital function it has. */
+static uint32_t output_levels(void)
+{
+    const uint32_t ab = PTD->PDIR, c = PTB->PDIR;
+    return (ab >> 15 & 3U) | (ab & 3U) << 2 | (c >> 4 & 3U) << 4;
+}
+
+static bool is_one_of_each_pair(uint32_t levels)
+{
+    return ((levels | levels >> 1) & ONE_OF_EACH_PAIR) == ONE_OF_EACH_PAIR;
+}
+
+/* What the pins of the outputs show, not what was commanded. In the dead time both outputs of a pair are off, therefore
+ * the levels are collected until it has passed; a reading takes 8 ticks or more. Switching that was not commanded is
+ * reported by any output that is on. */
 bool hal_pwm_gates(void)
 {
-    return bridge.switching && (FTM0->FMS & FTM_FMS_FAULTF) == 0U;
+    uint32_t seen = output_levels();
+    if (!bridge.switching) {
+        return seen != 0U;
+    }
+    const bool latched = (FTM0->FMS & FTM_FMS_FAULTF) != 0U;
+    if (pending || (latched && seen == 0U)) {
+        return !latched;
+    }
+    for (uint32_t passed = 0; passed <= bridge.dead_time && !is_one_of_each_pair(seen); passed += 8U) {
+        seen |= output_levels();
+    }
+    return is_one_of_each_pair(seen);
 }
 
 /* The interrupt request persists until FAULTF is cleared, which happens only when switching is enabled again; therefore

@@ -19,6 +19,9 @@ typedef struct {
 /** Whether the timer can make this period and dead time. Bits beyond its registers would shorten the dead time. */
 bool pwm_possible(const pwm_config_t *config);
 void pwm_init(const pwm_config_t *config);
+/** All lower switches on, at once and without the counter; only before pwm_start(). The counter takes over with the
+ * second hal_pwm_enable(true) after its start. */
+void pwm_hold_short_circuit(void);
 /** The counter runs from here on; its first period starts now. */
 void pwm_start(void);
 /** A falling edge of SAMPLE, and a low microsecond after it; only before pwm_start(). */

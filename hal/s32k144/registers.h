@@ -18,7 +18,9 @@ typedef struct {
     volatile uint32_t SOSCCSR;
     volatile uint32_t SOSCDIV;
     volatile uint32_t SOSCCFG;
-    uint8_t reserved3[0x4f4];
+    uint8_t reserved3[0x1f8];
+    volatile uint32_t FIRCDIV;
+    uint8_t reserved4[0x2f8];
     volatile uint32_t SPLLCSR;
     volatile uint32_t SPLLDIV;
     volatile uint32_t SPLLCFG;
@@ -29,6 +31,7 @@ _Static_assert(offsetof(scg_t, HCCR) == 0x1c, "HCCR");
 _Static_assert(offsetof(scg_t, SOSCCSR) == 0x100, "SOSCCSR");
 _Static_assert(offsetof(scg_t, SOSCDIV) == 0x104, "SOSCDIV");
 _Static_assert(offsetof(scg_t, SOSCCFG) == 0x108, "SOSCCFG");
+_Static_assert(offsetof(scg_t, FIRCDIV) == 0x304, "FIRCDIV");
 _Static_assert(offsetof(scg_t, SPLLCSR) == 0x600, "SPLLCSR");
 _Static_assert(offsetof(scg_t, SPLLDIV) == 0x604, "SPLLDIV");
 _Static_assert(offsetof(scg_t, SPLLCFG) == 0x608, "SPLLCFG");
@@ -61,6 +64,8 @@ _Static_assert(offsetof(scg_t, SPLLCFG) == 0x608, "SPLLCFG");
 #define SCG_SOSCCFG_EREFS 0x4U
 #define SCG_SOSCCFG_RANGE_MASK 0x30U
 #define SCG_SOSCCFG_RANGE(x) (((uint32_t)(x) << 4) & 0x30U)
+#define SCG_FIRCDIV_FIRCDIV2_MASK 0x700U
+#define SCG_FIRCDIV_FIRCDIV2(x) (((uint32_t)(x) << 8) & 0x700U)
 #define SCG_SPLLCSR_SPLLEN 0x1U
 #define SCG_SPLLCSR_SPLLCM 0x10000U
 #define SCG_SPLLCSR_SPLLCMRE 0x20000U
@@ -130,6 +135,13 @@ _Static_assert(offsetof(pcc_t, PCC_PORTE) == 0x134, "PCC_PORTE");
 #define PCC_FLEXCAN0_CGC 0x40000000U
 #define PCC_FTM0_PCS_MASK 0x7000000U
 #define PCC_FTM0_PCS(x) (((uint32_t)(x) << 24) & 0x7000000U)
+
+typedef struct {
+    uint8_t reserved0[0x4];
+    volatile uint32_t CHIPCTL;
+} sim_t;
+_Static_assert(offsetof(sim_t, CHIPCTL) == 0x4, "CHIPCTL");
+#define SIM_CHIPCTL_SRAMU_RETEN 0x100000U
 
 typedef struct {
     uint8_t reserved0[0x8];
@@ -224,11 +236,13 @@ typedef struct {
     uint8_t reserved0[0x4];
     volatile uint32_t PSOR;
     volatile uint32_t PCOR;
-    uint8_t reserved1[0x8];
+    uint8_t reserved1[0x4];
+    const volatile uint32_t PDIR;
     volatile uint32_t PDDR;
 } gpio_t;
 _Static_assert(offsetof(gpio_t, PSOR) == 0x4, "PSOR");
 _Static_assert(offsetof(gpio_t, PCOR) == 0x8, "PCOR");
+_Static_assert(offsetof(gpio_t, PDIR) == 0x10, "PDIR");
 _Static_assert(offsetof(gpio_t, PDDR) == 0x14, "PDDR");
 
 typedef struct {
@@ -460,6 +474,7 @@ _Static_assert(offsetof(adc_t, CLP9) == 0xcc, "CLP9");
 #define ADC_SC1_ADCH_MASK 0x1fU
 #define ADC_SC1_ADCH(x) (((uint32_t)(x) << 0) & 0x1fU)
 #define ADC_SC1_AIEN 0x40U
+#define ADC_SC1_COCO 0x80U
 #define ADC_CFG1_ADICLK_MASK 0x3U
 #define ADC_CFG1_ADICLK(x) (((uint32_t)(x) << 0) & 0x3U)
 #define ADC_CFG1_MODE_MASK 0xcU
@@ -610,6 +625,8 @@ extern smc_t fake_SMC;
 #define SMC (&fake_SMC)
 extern pcc_t fake_PCC;
 #define PCC (&fake_PCC)
+extern sim_t fake_SIM;
+#define SIM (&fake_SIM)
 extern rcm_t fake_RCM;
 #define RCM (&fake_RCM)
 extern lmem_t fake_LMEM;
@@ -630,8 +647,12 @@ extern port_t fake_PORTD;
 #define PORTD (&fake_PORTD)
 extern port_t fake_PORTE;
 #define PORTE (&fake_PORTE)
+extern gpio_t fake_PTB;
+#define PTB (&fake_PTB)
 extern gpio_t fake_PTC;
 #define PTC (&fake_PTC)
+extern gpio_t fake_PTD;
+#define PTD (&fake_PTD)
 extern trgmux_t fake_TRGMUX;
 #define TRGMUX (&fake_TRGMUX)
 extern ftm_t fake_FTM0;
@@ -656,6 +677,7 @@ extern can_t fake_CAN0;
 #define SCG ((scg_t *)0x40064000U)
 #define SMC ((smc_t *)0x4007e000U)
 #define PCC ((pcc_t *)0x40065000U)
+#define SIM ((sim_t *)0x40048000U)
 #define RCM ((rcm_t *)0x4007f000U)
 #define LMEM ((lmem_t *)0xe0082000U)
 #define MSCM ((mscm_t *)0x40001000U)
@@ -666,7 +688,9 @@ extern can_t fake_CAN0;
 #define PORTC ((port_t *)0x4004b000U)
 #define PORTD ((port_t *)0x4004c000U)
 #define PORTE ((port_t *)0x4004d000U)
+#define PTB ((gpio_t *)0x400ff040U)
 #define PTC ((gpio_t *)0x400ff080U)
+#define PTD ((gpio_t *)0x400ff0c0U)
 #define TRGMUX ((trgmux_t *)0x40063000U)
 #define FTM0 ((ftm_t *)0x40038000U)
 #define FTM2 ((ftm_t *)0x4003a000U)

@@ -24,6 +24,7 @@ FAULTF = 0x80
 ENCACHE = 1
 ADC0_IRQ, PDB0_IRQ, PDB1_IRQ = 39, 52, 68
 CONVERSION_COMPLETE = 0x80
+GPIO = 1 << 8
 
 
 @contextmanager
@@ -155,7 +156,20 @@ def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None
             assert abs(loop.get("truth.torque_Nm")) < 10.0, "the short circuit is symmetrical"
 
 
+def the_gates_are_read_back_at_their_pins(parts: Parts) -> None:
+    """A lower output that no longer reaches its pin ends the short circuit on this side, although the timer goes on."""
+    with driving(parts) as (loop, core):
+        loop.set("plant.switch_shorted_lower_b", 1)
+        loop.run(2000)
+        assert core.outputs == ALL_OUTPUTS
+        assert core.duty(0) == 0.0
+        core.set_register("PORTD.PCR16", GPIO)
+        loop.run(10)
+        assert core.outputs == NO_OUTPUTS or core.duty(0) == 1.0
+
+
 CHECKS = (
+    the_gates_are_read_back_at_their_pins,
     a_gate_fault_switches_off_every_output_within_the_filter_time,
     a_fault_line_that_is_active_at_power_on_keeps_the_outputs_off,
     a_halted_core_switches_off_every_output,

@@ -75,6 +75,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
         checks.a_shorted_switch_ends_in_the_short_circuit_on_its_side,
         PlantedError("pwm.c", "again = on && ended_by_fault", "again = !on && ended_by_fault"),
     ),
+    "the gates read back as they were commanded": (
+        checks.the_gates_are_read_back_at_their_pins,
+        PlantedError("pwm.c", "    return is_one_of_each_pair(seen);", "    return true;"),
+    ),
     "no code cache": (
         checks.the_code_cache_is_on,
         PlantedError("clock.c", "LMEM->LMEM_PCCCR = LMEM_PCCCR_ENCACHE;", "LMEM->LMEM_PCCCR = 0;"),

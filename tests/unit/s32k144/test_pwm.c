@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* FTM0 with variables in place of registers: the tests check the written values, not the behaviour of the timer. */
+#include <string.h>
+
 #include "hal/pwm.h"
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/pwm.h"
@@ -12,11 +14,21 @@
 ftm_t fake_FTM0;
 trgmux_t fake_TRGMUX;
 nvic_t fake_nvic;
+gpio_t fake_PTB, fake_PTD;
+
+/* The levels that the pins read: bits 0 to 5, even ones are the upper outputs. */
+static void set_levels(uint32_t levels)
+{
+    const uint32_t d = (levels & 3U) << 15 | (levels >> 2 & 3U), b = (levels >> 4 & 3U) << 4;
+    memcpy((void *)(uintptr_t)&fake_PTD.PDIR, &d, sizeof d);
+    memcpy((void *)(uintptr_t)&fake_PTB.PDIR, &b, sizeof b);
+}
 
 void setUp(void)
 {
     fake_FTM0 = (ftm_t){0};
     fake_nvic = (nvic_t){0};
+    set_levels(0);
     pwm_init(&(pwm_config_t){.period_ticks = PERIOD, .dead_time_ticks = 224});
 }
 
@@ -153,18 +165,63 @@ void test_an_unchanged_request_writes_no_register(void)
     TEST_ASSERT_EQUAL_HEX32(0x2A, FTM0->SWOCTRL);
 }
 
-/* Switching is reported as enabled only if the latch of the fault input does not disable the outputs. */
-void test_the_gates_are_read_back_from_the_timer(void)
+/* Switching is reported as enabled if one output of each pair is on, whatever was commanded. */
+void test_the_gates_are_read_back_from_the_pins(void)
 {
     TEST_ASSERT_FALSE(hal_pwm_gates());
+    hal_pwm_enable(true);
+    hal_pwm_enable(true); /* in the next period the outputs follow */
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+    set_levels(0x26); /* upper b, lower a, lower c */
+    TEST_ASSERT_TRUE(hal_pwm_gates());
+    set_levels(0x06);
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+    set_levels(0);
+    TEST_ASSERT_FALSE(hal_pwm_gates());
+}
+
+void test_an_output_that_is_on_although_switching_is_disabled_is_reported(void)
+{
+    for (uint32_t output = 0; output < 6U; output++) {
+        set_levels(1U << output);
+        TEST_ASSERT_TRUE(hal_pwm_gates());
+    }
+}
+
+/* In the period in which switching is enabled the outputs are still off; only the latch of the fault input tells. */
+void test_in_the_period_of_enabling_the_latch_of_the_fault_input_decides(void)
+{
     hal_pwm_enable(true);
     TEST_ASSERT_TRUE(hal_pwm_gates());
     FTM0->FMS = FTM_FMS_FAULTF | FTM_FMS_WPEN;
     TEST_ASSERT_FALSE(hal_pwm_gates());
     FTM0->FMS = FTM_FMS_WPEN;
-    TEST_ASSERT_TRUE(hal_pwm_gates());
     hal_pwm_enable(false);
     TEST_ASSERT_FALSE(hal_pwm_gates());
+}
+
+#define HELD 0x2A3FU
+
+void test_a_short_circuit_is_held_by_software_until_the_counter_can_take_it_over(void)
+{
+    pwm_hold_short_circuit();
+    TEST_ASSERT_EQUAL_HEX32(HELD, FTM0->SWOCTRL);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->OUTMASK);
+    pwm_sample_by_hand();
+    TEST_ASSERT_EQUAL_HEX32(HELD, FTM0->SWOCTRL);
+    hal_pwm_enable(true); /* the duties of this period act in the next one */
+    TEST_ASSERT_EQUAL_HEX32(HELD, FTM0->SWOCTRL);
+    hal_pwm_enable(true);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->SWOCTRL);
+    TEST_ASSERT_EQUAL_HEX32(0, FTM0->OUTMASK);
+}
+
+void test_a_short_circuit_held_by_software_is_ended_at_once(void)
+{
+    pwm_hold_short_circuit();
+    hal_pwm_enable(false);
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->SWOCTRL);
+    TEST_ASSERT_EQUAL_HEX32(SIX_OUTPUTS, FTM0->OUTMASK);
 }
 
 void test_a_gate_fault_is_reported_once_to_the_board_and_masks_its_interrupt(void)

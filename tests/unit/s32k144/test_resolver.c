@@ -77,7 +77,7 @@ void test_start_up_reads_the_fault_register_after_a_sample_and_leaves_the_conver
 {
     const uint32_t both = 1U << PIN_RESOLVER_A0 | 1U << PIN_RESOLVER_A1;
     samples = 0;
-    fake_PTC = (gpio_t){0};
+    fake_PTC.PSOR = fake_PTC.PCOR = 0;
     fifos(1, 0); /* answers at once */
     angle_init(11200);
     TEST_ASSERT_EQUAL_INT(1, samples);
