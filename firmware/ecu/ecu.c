@@ -47,6 +47,12 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
     ecu_seal_flags(ecu);
 }
 
+void ecu_continue(ecu_t *ecu)
+{
+    ecu->supervisor.state = STATE_SAFE_STATE;
+    ecu_seal_flags(ecu);
+}
+
 static void receive(ecu_t *ecu)
 {
     can_frame_t frame;
@@ -61,6 +67,14 @@ static void receive(ecu_t *ecu)
     can_rx_tick(&ecu->rx, ecu->clock.elapsed_us);
 }
 
+/* Whether the board's hardware must hold the bridge: the firmware does not advance, or has no gate supply for the short
+ * circuit that the speed needs. In the first step the speed is not known yet. */
+static bool needs_hardware(const ecu_t *ecu, const state_outputs_t *on)
+{
+    const bool may_rectify = !ecu->liveness.started || ecu->drive.task.safe_state.short_circuit;
+    return (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U || (may_rectify && !on->gate_driver);
+}
+
 static void set_outputs(const ecu_t *ecu)
 {
     const state_outputs_t *on = &supervisor_outputs[ecu->supervisor.state];
@@ -68,7 +82,7 @@ static void set_outputs(const ecu_t *ecu)
     hal_board_set(BOARD_MAIN_CONTACTOR, on->contactor);
     hal_board_set(BOARD_DISCHARGE, on->discharge);
     hal_board_set(BOARD_GATE_DRIVER, on->gate_driver || ecu->shut_off.supply_on);
-    hal_board_set(BOARD_SAFE_STATE, (ecu->supervisor.faults & ECU_FAULT_STALL) != 0U);
+    hal_board_set(BOARD_SAFE_STATE, needs_hardware(ecu, on));
 }
 
 /* The question is answered at the end of the step, by what has been passed in it. */

@@ -8,7 +8,8 @@
  * Source   docs/howto/can.md; docs/architecture.md
  * Units    per unit inside, the DBC's units on the bus
  * Errors   latched faults of drive and supervisor, transmitted on the bus
- * Context  ecu_init() once; ecu_task_1khz() every bases.periods_per_step periods */
+ * Context  ecu_init() once, then ecu_continue() if a reset has interrupted a drive; ecu_task_1khz() every
+ *          bases.periods_per_step periods */
 #include "calibration/xcp_access.h"
 #include "comm/can_rx.h"
 #include "comm/can_tx.h"
@@ -53,6 +54,9 @@ typedef struct {
 } ecu_t;
 
 void ecu_init(ecu_t *ecu, const motor_t *source);
+/** After ecu_init(): the drive holds the short circuit through a reset of the processor (drive/after_reset.h).
+ * Contactor and gate supply stay on until the machine is slow. */
+void ecu_continue(ecu_t *ecu);
 void ecu_task_1khz(ecu_t *ecu);
 
 #endif

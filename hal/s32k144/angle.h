@@ -10,6 +10,9 @@
 #include <stdint.h>
 
 void angle_init(uint32_t period_ticks);
+/** Magnitude of the mechanical speed in turns per second, on the clock of clock_first(); negative: the sensor reports a
+ * fault. Start-up, after pwm_init() and before angle_init(); takes up to 0.1 ms. */
+float angle_first_speed(void);
 bool angle_fault(void);
 
 #endif

@@ -3,22 +3,23 @@
 
 #include "fx/q.h"
 #include "hal/s32k144/angle.h"
+#include "hal/s32k144/clock.h"
+#include "hal/s32k144/core.h"
 #include "hal/s32k144/registers.h"
 
 #define COUNTS_PER_TURN 16384U /* 4096 lines, four edges each */
 #define TURN_SHIFT 18          /* 2^32 / COUNTS_PER_TURN */
 #define INPUT_FILTER 0x44U     /* channels 0 and 1: 4 clocks of 4 */
 #define SYSTEM_CLOCK 1U
+#define FIRST_PER_S 10000U /* length of the first measurement of the speed */
 
 static struct {
     int32_t at_last;      /* reading of the period before */
     int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
 } encoder;
 
-void angle_init(uint32_t period_ticks)
+static void start_decoder(void)
 {
-    encoder.q32_per_tick = (int32_t)(UINT32_MAX / period_ticks);
-    encoder.at_last = 0;
     FTM2->MODE = FTM_MODE_FTMEN | FTM_MODE_WPDIS;
     FTM2->CNTIN = 0;
     FTM2->MOD = COUNTS_PER_TURN - 1U;
@@ -26,6 +27,22 @@ void angle_init(uint32_t period_ticks)
     FTM2->FILTER = INPUT_FILTER;
     FTM2->QDCTRL = FTM_QDCTRL_QUADEN | FTM_QDCTRL_PHAFLTREN | FTM_QDCTRL_PHBFLTREN;
     FTM2->SC = FTM_SC_CLKS(SYSTEM_CLOCK);
+}
+
+void angle_init(uint32_t period_ticks)
+{
+    encoder.q32_per_tick = (int32_t)(UINT32_MAX / period_ticks);
+    encoder.at_last = 0;
+    start_decoder();
+}
+
+/* The counts of 0.1 ms: one is 37 rpm. */
+float angle_first_speed(void)
+{
+    start_decoder();
+    core_pass(CLOCK_FIRST_HZ / FIRST_PER_S);
+    const int32_t counts = (int32_t)(FTM2->CNT << TURN_SHIFT) >> TURN_SHIFT;
+    return (float)fx_abs_q31(counts) * ((float)FIRST_PER_S / (float)COUNTS_PER_TURN);
 }
 
 bool angle_fault(void)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/angle.h"
 
+#include "fx/q.h"
 #include "hal/s32k144/ad2s1210.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/pins.h"
@@ -8,6 +9,7 @@
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/serial_angle.h"
 
+#define VELOCITY_TURNS_PER_S (500.0F / 32768.0F) /* of one bit: resolution of 14 bits, 8.192 MHz */
 #define READY_TICKS 85U /* 0.759 us after SAMPLE falls: 6 periods of 8.192 MHz and 20 ns */
 #define MISSING_MAX 3U  /* a restart of the sampling may lose two */
 #define FRAME(bits) (LPSPI_TCR_FRAMESZ((bits) - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0))
@@ -36,6 +38,17 @@ void angle_init(uint32_t period_ticks)
     clear_faults();
     PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
     serial_angle_start(&(serial_angle_t){.command = FRAME(AD2S1210_BITS), .word = 0, .start = READY_TICKS});
+}
+
+/* The velocity that the converter has measured: a reset of the processor does not affect it. */
+float angle_first_speed(void)
+{
+    serial_angle_init(&timing);
+    PTC->PSOR = 1U << PIN_RESOLVER_A1;
+    LPSPI0->TCR = FRAME(AD2S1210_BITS);
+    pwm_sample_by_hand();
+    const ad2s1210_frame_t frame = ad2s1210_decode(serial_angle_exchange(0));
+    return (frame.fault != 0U) ? -1.0F : (float)fx_abs_q31((int16_t)frame.value) * VELOCITY_TURNS_PER_S;
 }
 
 uint32_t hal_angle_read(void)

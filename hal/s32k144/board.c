@@ -6,9 +6,10 @@
 #include "hal/s32k144/registers.h"
 
 static const uint8_t line[BOARD_OUTPUTS] = {
-    [BOARD_PRECHARGE] = PIN_PRECHARGE,   [BOARD_MAIN_CONTACTOR] = PIN_MAIN_CONTACTOR,
-    [BOARD_DISCHARGE] = PIN_DISCHARGE,   [BOARD_GATE_DRIVER] = PIN_GATE_DRIVER,
-    [BOARD_SAFE_STATE] = PIN_SAFE_STATE,
+    [BOARD_PRECHARGE] = PIN_PRECHARGE,
+    [BOARD_MAIN_CONTACTOR] = PIN_MAIN_CONTACTOR,
+    [BOARD_DISCHARGE] = PIN_DISCHARGE,
+    [BOARD_GATE_DRIVER] = PIN_GATE_DRIVER,
 };
 
 void hal_board_set(board_output_t output, bool on)
@@ -16,7 +17,9 @@ void hal_board_set(board_output_t output, bool on)
     if ((unsigned)output >= (unsigned)BOARD_OUTPUTS) {
         return;
     }
-    if (on) {
+    if (output == BOARD_SAFE_STATE) {
+        pins_keep_bridge(!on);
+    } else if (on) {
         PTC->PSOR = 1U << line[output];
     } else {
         PTC->PCOR = 1U << line[output];

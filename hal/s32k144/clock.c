@@ -13,6 +13,7 @@
 #define RUN 0U
 #define STATUS_RUN 0x01U
 #define PCS_SPLLDIV2 6U
+#define PCS_FIRCDIV2 3U
 
 void clock_fast(void)
 {
@@ -76,18 +77,19 @@ static void start_cache(void)
 #define GATE PCC_FLEXCAN0_CGC
 
 /* The clock source may only be changed while the clock gate is disabled. */
-static void enable_clock_gate(volatile uint32_t *gate)
+static void enable_clock_gate(volatile uint32_t *gate, uint32_t source)
 {
-    *gate = PCC_FTM0_PCS(PCS_SPLLDIV2);
-    *gate = PCC_FTM0_PCS(PCS_SPLLDIV2) | GATE;
+    *gate = 0;
+    *gate = PCC_FTM0_PCS(source);
+    *gate = PCC_FTM0_PCS(source) | GATE;
 }
 
-static void enable_clock_gates(void)
+static void enable_clock_gates(uint32_t source)
 {
-    enable_clock_gate(&PCC->PCC_ADC0);
-    enable_clock_gate(&PCC->PCC_ADC1);
-    enable_clock_gate(&PCC->PCC_LPIT);
-    enable_clock_gate(&PCC->PCC_LPSPI0);
+    enable_clock_gate(&PCC->PCC_ADC0, source);
+    enable_clock_gate(&PCC->PCC_ADC1, source);
+    enable_clock_gate(&PCC->PCC_LPIT, source);
+    enable_clock_gate(&PCC->PCC_LPSPI0, source);
     /* These run on the system clock, or choose their own. */
     PCC->PCC_FTM0 = GATE;
     PCC->PCC_FTM2 = GATE;
@@ -101,12 +103,19 @@ static void enable_clock_gates(void)
     PCC->PCC_PORTE = GATE;
 }
 
+/* The internal oscillator runs from reset; the crystal would need 1.5 ms. */
+void clock_first(void)
+{
+    SCG->FIRCDIV = SCG_FIRCDIV_FIRCDIV2(DIVIDE_BY_2);
+    enable_clock_gates(PCS_FIRCDIV2);
+}
+
 void clock_init(void)
 {
     start_oscillator();
     start_pll();
     select_pll();
-    enable_clock_gates(); /* in high-speed run they must not be changed */
+    enable_clock_gates(PCS_SPLLDIV2); /* in high-speed run they must not be changed */
     enter_high_speed();
     guard_clocks();
     start_cache();

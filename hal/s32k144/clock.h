@@ -9,8 +9,11 @@
 #include <stdint.h>
 
 #define CLOCK_CORE_HZ 112000000U
+#define CLOCK_FIRST_HZ 48000000U /* core after clock_first(); ADC, LPSPI: half of it */
 #define CLOCK_PERIPHERAL_HZ 28000000U /* SPLLDIV2: ADC, LPIT, LPSPI */
 
+/** The clock gates on the internal oscillator of 48 MHz, which runs from reset on; clock_init() may follow. */
+void clock_first(void);
 void clock_init(void);
 void clock_slow(void);
 void clock_fast(void);

@@ -4,6 +4,7 @@
 /** Registers of the Cortex-M4 itself, which the maker's SVD leaves out, and the priorities of this port's interrupts.
  * Source   Armv7-M Architecture Reference Manual, B3.2 and B3.4; README.md, interrupts
  * Context  start-up; pend and mask from any priority: single stores of set or clear registers */
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -32,6 +33,11 @@ extern nvic_t fake_nvic;
 #define SCB_AIRCR (*(volatile uint32_t *)0xE000ED0CU)
 #define SCB_CCR (*(volatile uint32_t *)0xE000ED14U)
 #define SCB_CPACR (*(volatile uint32_t *)0xE000ED88U)
+#define SYST_CSR (*(volatile uint32_t *)0xE000E010U)
+#define SYST_RVR (*(volatile uint32_t *)0xE000E014U)
+#define SYST_CVR (*(volatile uint32_t *)0xE000E018U)
+#define SYST_CORE_CLOCK 5U       /* counts the core's clock, no interrupt */
+#define SYST_COUNTFLAG 0x10000U
 #define AIRCR_RESET 0x05FA0004U /* key, SYSRESETREQ */
 #define CCR_BFHFNMIGN 0x100U    /* at the priority of FAULTMASK a bus fault of a data access is ignored */
 #define CPACR_FPU 0x00F00000U   /* CP10 and CP11, full access */
@@ -58,6 +64,30 @@ static inline void core_irq_pend(uint32_t irq)
 static inline void core_irq_clear(uint32_t irq)
 {
     NVIC->ICPR[irq >> 5] = 1U << (irq & 31U);
+}
+
+/* A bus fault of a data access is ignored between the two calls: the access returns anything. */
+static inline void core_ignore_bus_faults(bool ignore)
+{
+    if (ignore) {
+        __asm__ volatile("msr faultmask, %0" ::"r"(1) : "memory");
+        SCB_CCR = SCB_CCR | CCR_BFHFNMIGN;
+    } else {
+        __asm__ volatile("dsb" ::: "memory");
+        SCB_CCR = SCB_CCR & ~CCR_BFHFNMIGN;
+        __asm__ volatile("msr faultmask, %0" ::"r"(0) : "memory");
+    }
+}
+
+/* Lets so many clocks of the core pass, up to 2^24; start-up only. */
+static inline void core_pass(uint32_t clocks)
+{
+    SYST_RVR = clocks - 1U;
+    SYST_CVR = 0;
+    SYST_CSR = SYST_CORE_CLOCK;
+    while ((SYST_CSR & SYST_COUNTFLAG) == 0U) {
+    }
+    SYST_CSR = 0;
 }
 
 /* Four bits of priority, in the upper half of the byte. */

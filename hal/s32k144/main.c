@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "ecu/ecu.h"
+#include "hal/s32k144/after_reset.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/can.h"
 #include "hal/s32k144/clock.h"
@@ -98,6 +99,7 @@ void tick_handler(void)
     }
     ecu_task_1khz(&ecu);
 #endif
+    after_reset_note(&ecu.drive);
 }
 
 void can_message_handler(void)
@@ -150,12 +152,15 @@ static bool timing(pwm_config_t *pwm)
     return true;
 }
 
-static void init_hardware(const pwm_config_t *pwm, uint32_t periods_per_step)
+/* A short circuit that is held since the reset keeps its pins and its timer. */
+static void init_hardware(const pwm_config_t *pwm, uint32_t periods_per_step, bool holds)
 {
     clock_init();
-    pins_init();
+    if (!holds) {
+        pins_init();
+        pwm_init(pwm);
+    }
     sampling_init(pwm->period_ticks);
-    pwm_init(pwm);
     tick_init(pwm->period_ticks / PERIPHERAL_PER_CORE, periods_per_step);
     can_init();
 }
@@ -169,25 +174,45 @@ static void start(const pwm_config_t *pwm, bool drivable)
     tick_start();
     if (drivable) {
         pwm_start();
+        pins_offer_bridge();
+#if DIRECT
+        pins_keep_bridge(true); /* there is no state machine that decides it */
+#endif
         started = true;
     }
     tick_continue();
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-/* Separate from the reset handler, so that no floating-point instruction is moved before the FPU is enabled. */
+/* The drive goes on as after a fault at speed. */
+static void continue_short_circuit(void)
+{
+    after_reset_continue(&ecu.drive);
+#if !DIRECT
+    ecu_continue(&ecu);
+#endif
+}
+
+/* Separate from the reset handler, so that no floating-point instruction is moved before the FPU is enabled. What needs
+ * time comes after the short circuit that a fast machine needs. */
 __attribute__((noinline)) int main(void)
 {
+    pwm_config_t pwm = stopped;
+    const bool possible = timing(&pwm);
+    const bool was_held = possible && after_reset_begin(&pwm);
     alarms.data_damaged = !image_valid();
     ecu_init(&ecu, &motor);
-    nvm_init();
-    memory_recall(&memory, &ecu.drive);
-    pwm_config_t pwm = stopped;
-    const bool drivable = !alarms.data_damaged && timing(&pwm);
+    const bool drivable = possible && !alarms.data_damaged, holds = was_held && drivable;
     if (!drivable) {
+        pwm = stopped;
         drive_refuse(&ecu.drive, alarms.data_damaged ? MOTOR_CHECK_IMAGE_CHECKSUM : MOTOR_CHECK_PWM_TIMER);
     }
-    init_hardware(&pwm, drivable ? motor.bases.periods_per_step : STOPPED_PERIODS);
+    if (holds) {
+        continue_short_circuit();
+    }
+    init_hardware(&pwm, drivable ? motor.bases.periods_per_step : STOPPED_PERIODS, holds);
+    nvm_init();
+    memory_recall(&memory, &ecu.drive);
     enable_interrupts();
 #if DIRECT
     hal_watchdog_start();

@@ -96,14 +96,11 @@ void hal_nvm_end(void)
  * ignores in between, and the controller's flag tells it. */
 static void read_phrase(const volatile uint8_t *from, uint8_t *to, uint32_t size)
 {
-    __asm__ volatile("msr faultmask, %0" ::"r"(1) : "memory");
-    SCB_CCR = SCB_CCR | CCR_BFHFNMIGN;
+    core_ignore_bus_faults(true);
     for (uint32_t k = 0; k < size; k++) {
         to[k] = from[k];
     }
-    __asm__ volatile("dsb" ::: "memory");
-    SCB_CCR = SCB_CCR & ~CCR_BFHFNMIGN;
-    __asm__ volatile("msr faultmask, %0" ::"r"(0) : "memory");
+    core_ignore_bus_faults(false);
 }
 
 bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)

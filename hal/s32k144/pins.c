@@ -16,7 +16,7 @@ typedef struct {
 #define PULL_UP (PORT_PCR_PE | PORT_PCR_PS)
 #define OUTPUTS                                                                                              \
     ((1U << PIN_PRECHARGE) | (1U << PIN_MAIN_CONTACTOR) | (1U << PIN_DISCHARGE) | (1U << PIN_GATE_DRIVER) | \
-     (1U << PIN_SAFE_STATE) | (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1))
+     (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1))
 
 /* The analogue inputs, PTA0 ... PTA3, PTA6 and PTD2, are as reset leaves them. */
 static const pin_t pins[] = {
@@ -40,16 +40,31 @@ static const pin_t pins[] = {
     {PORTC, PIN_MAIN_CONTACTOR, GPIO, 0},
     {PORTC, PIN_DISCHARGE, GPIO, 0},
     {PORTC, PIN_GATE_DRIVER, GPIO, 0},
-    {PORTC, PIN_SAFE_STATE, GPIO, 0},
     {PORTC, PIN_RESOLVER_A0, GPIO, 0},
     {PORTC, PIN_RESOLVER_A1, GPIO, 0},
 };
 
+static bool offered; /* the line of the safe state may be driven low */
+
 void pins_init(void)
 {
+    offered = false;
     PTC->PCOR = OUTPUTS; /* all off before they become outputs */
     PTC->PDDR = OUTPUTS;
     for (size_t k = 0; k < sizeof pins / sizeof pins[0]; k++) {
         pins[k].port->PCR[pins[k].pin] = PORT_PCR_MUX(pins[k].function) | pins[k].pull;
     }
+}
+
+void pins_keep_bridge(bool keep)
+{
+    const uint32_t line = 1U << PIN_SAFE_STATE;
+    PTC->PDDR = (keep && offered) ? PTC->PDDR | line : PTC->PDDR & ~line;
+}
+
+void pins_offer_bridge(void)
+{
+    PTC->PCOR = 1U << PIN_SAFE_STATE;
+    PORTC->PCR[PIN_SAFE_STATE] = PORT_PCR_MUX(GPIO);
+    offered = true;
 }

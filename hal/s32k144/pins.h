@@ -3,7 +3,8 @@
 #define HAL_S32K144_PINS_H
 /** Which pin does what. GPIO lines are all on port C.
  * Source   README.md, pins
- * Context  start-up, once, before the timers start */
+ * Context  start-up, before the timers start */
+#include <stdbool.h>
 
 enum {
     PIN_PRECHARGE = 0,
@@ -15,6 +16,12 @@ enum {
     PIN_RESOLVER_A1 = 9
 };
 
+/** All lines off but the safe state's: it stays released, so that the board's hardware keeps the bridge. */
 void pins_init(void);
+/** The PWM is set up: from here on the line may be driven low. */
+void pins_offer_bridge(void);
+/** Drives the line low, so that the bridge is the processor's, or releases it; without an effect before
+ * pins_offer_bridge(). Start-up, 1 kHz task. */
+void pins_keep_bridge(bool keep);
 
 #endif

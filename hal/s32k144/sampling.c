@@ -44,6 +44,7 @@ static void clear_calibration(adc_t *adc)
 
 static void calibrate(adc_t *adc)
 {
+    adc->SC2 = 0;
     clear_calibration(adc);
     adc->CFG1 = ADC_CFG1_MODE(BITS_12) | ADC_CFG1_ADIV(HALF_CLOCK);
     adc->SC3 = ADC_SC3_CAL | ADC_SC3_AVGE | ADC_SC3_AVGS(AVERAGE_32);
@@ -97,6 +98,15 @@ void sampling_pulse(uint32_t from, uint32_t until)
     PDB0->PODLY = PDB_PODLY_DLY1(from) | PDB_PODLY_DLY2(until);
     PDB0->POEN = PULSE_OUTPUT_0;
     load(PDB0);
+}
+
+uint16_t sampling_first_v_dc(void)
+{
+    calibrate(ADC1);
+    ADC1->SC2 = 0; /* started by the write of SC1 */
+    ADC1->SC1[0] = ADC_SC1_ADCH(V_DC);
+    await(&ADC1->SC1[0], ADC_SC1_COCO, ADC_SC1_COCO);
+    return (uint16_t)ADC1->R[0];
 }
 
 /* Reads all results of the sequence, also those of the slow channels, so that no pre-trigger stays locked. The slow

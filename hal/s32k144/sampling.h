@@ -15,6 +15,8 @@
 #include <stdint.h>
 
 void sampling_init(uint32_t period_ticks);
+/** The dc voltage, converted at once; start-up, before sampling_init(). */
+uint16_t sampling_first_v_dc(void);
 /** From the next period on: a level for the trigger multiplexer, from and until these ticks of each period; both lie in
  * its first half. */
 void sampling_pulse(uint32_t from, uint32_t until);

@@ -212,6 +212,7 @@ def test_the_watchdog_has_a_window_and_can_no_longer_be_changed(parts: build.Par
 def test_all_lines_to_the_board_are_outputs_and_off_after_start(parts: build.Parts, elf: Path) -> None:
     with _core(parts, elf) as core:
         core.run(RUN_S)
+        list(_periods(core, 0.005))  # the second step of the task drives the line of the safe state
         assert core.register("PTC.PDDR") == 0b11_0100_1111  # precharge ... driver supply, safe state, A0, A1
         assert core.register("PTC.PDOR") & 0b100_1111 == 0
         assert core.register("FTM0.OUTMASK") & 0x3F == 0x3F

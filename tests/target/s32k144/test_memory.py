@@ -252,7 +252,10 @@ PLANTED_ERRORS: dict[str, Planted] = {
         cut, PlantedError("nvm.c", "MSCM_OCMDR1_OCM1(SPECULATION_OFF)", "0U"), FluxtrueError, SPECULATED
     ),
     "bus faults are not ignored": Planted(
-        cut, PlantedError("nvm.c", "SCB_CCR | CCR_BFHFNMIGN", "SCB_CCR"), FluxtrueError, r"power_cycle"
+        cut,
+        PlantedError("nvm.c", "core_ignore_bus_faults(true)", "core_ignore_bus_faults(false)"),
+        FluxtrueError,
+        r"power_cycle",
     ),
     "nothing is erased": Planted(
         cut, PlantedError("nvm.c", "flash_command(ERASE_SECTOR, slot, 0)", "true"), AssertionError, ""

@@ -366,6 +366,43 @@ void test_a_damaged_flag_of_bus_or_state_machine_is_a_fault_in_the_next_step(voi
     }
 }
 
+/* The machine turns at the speed of the short circuit, and the bridge has no supply: only the board's hardware can hold
+ * it. With the supply it is the firmware's. */
+void test_without_gate_supply_the_hardware_holds_the_bridge_of_a_fast_machine(void)
+{
+    tasks(10);
+    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    ecu.drive.task.safe_state.short_circuit = true;
+    task_after(10);
+    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    ecu.supervisor.state = STATE_SAFE_STATE;
+    ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
+    ecu_seal_flags(&ecu);
+    task_after(10);
+    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+}
+
+void test_until_the_speed_is_known_the_hardware_holds_the_bridge(void)
+{
+    task_after(10);
+    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    task_after(10);
+    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+}
+
+/* The speed is still known, by what has outlasted the reset. */
+void test_after_a_reset_at_speed_contactor_and_gate_supply_stay_on_from_the_first_step(void)
+{
+    ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
+    ecu_continue(&ecu);
+    task_after(10);
+    TEST_ASSERT_TRUE(outputs[BOARD_MAIN_CONTACTOR] && outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, ecu.supervisor.state);
+    TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.fast.faults);
+}
+
 void test_one_millisecond_without_interrupts_is_no_fault_yet(void)
 {
     tasks(10);

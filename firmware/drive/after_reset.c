@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "drive/after_reset.h"
+
+void before_reset(const drive_t *drive, before_reset_t *before)
+{
+    const uint32_t faults = drive->fast.faults;
+    *before = (before_reset_t){
+        .speed = drive->task.safe_state.speed,
+        .v_dc = (q15_t)sample_box_read(&drive->samples).v_dc,
+        .psi_delta = drive->psi_d_error,
+        .armed = drive->task.armed && (faults & FAULT_CONFIG) == 0U,
+        .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+    };
+}
+
+/* (SS-14). A rotor does not lose half of its speed within the time of a reset, but a broken sensor reads none. */
+static q15_t present_speed(const before_reset_t *before, q15_t speed)
+{
+    return (before->speed_valid && speed >= before->speed / 2) ? speed : before->speed;
+}
+
+/* By the lower level of (SS-2), and by the lower of both voltages: the rectified back-EMF may have raised the present
+ * one. */
+static bool decide(const motor_t *m, safe_state_state_t *state, const before_reset_t *before, q15_t speed, q15_t v_dc)
+{
+    const safe_state_in_t in = {
+        .omega = present_speed(before, speed),
+        .psi_delta = before->psi_delta,
+        .v_dc = (q15_t)fx_min_s32(v_dc, before->v_dc),
+        .speed_valid = true,
+    };
+    state->short_circuit = true;
+    return safe_state_step(&m->safe_state, state, &in);
+}
+
+bool after_reset_needs_short_circuit(const motor_t *m, const before_reset_t *before, q15_t speed, q15_t v_dc)
+{
+    safe_state_state_t state = {0};
+    return before->armed && decide(m, &state, before, speed, v_dc);
+}
+
+/* With the speed goes the back-EMF, for which contactor and gate supply stay on from the first step. */
+void after_reset_hold(drive_t *drive, const before_reset_t *before, q15_t speed)
+{
+    drive->task.armed = true;
+    (void)decide(drive->motor, &drive->task.safe_state, before, speed, before->v_dc);
+    command_box_write(&drive->commands, (command_t){.safe = SAFE_SHORT_CIRCUIT});
+}

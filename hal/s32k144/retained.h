@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef HAL_S32K144_RETAINED_H
+#define HAL_S32K144_RETAINED_H
+/** What outlasts a reset, in SRAM_U, which holds nothing else. Two copies are written in turn, each with a magic word,
+ * a sequence number and the complement of every word: a reset during a write leaves the previous copy.
+ *   SIM_CHIPCTL.SRAMU_RETEN = 0 makes the RAM keep its content through a reset; meanwhile nothing may access it.
+ *   Therefore it is 1 only while a copy is written. A reset sets it to 1 itself.
+ * Source   README.md, reset; reference manual, SRAM retention
+ * Errors   retained_read(): false after a power-on, or when no copy is intact
+ * Context  retained_read(): start-up, once; retained_write(): 1 kHz task, then */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "drive/after_reset.h"
+
+typedef struct {
+    before_reset_t drive;
+    uint32_t lines; /* outputs of port C that were on */
+} retained_t;
+
+bool retained_read(retained_t *retained);
+void retained_write(const retained_t *retained);
+
+#endif

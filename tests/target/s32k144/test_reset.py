@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Through a reset at 9500 rpm: the short circuit is there again within 2 ms, and the dc link stays below 1.2 of the
+battery's voltage. A slice of the campaign of resets.py, real resets, and planted errors."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import flash_saves as flash
+import pytest
+import resets
+from planting import PlantedError, image_with_error
+
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.emulate.core import CENTRE, LIMIT, Core
+from fluxtrue_tools.errors import FluxtrueError
+
+POINTS = 10
+WITHOUT_GATES_MS = 2.0
+VDC_SHARE = 1.2
+FIRST_WATCHDOG_S = 0.1
+COPIES = 0x2000_0000  # of the state, hal/s32k144/retained.c
+COPY_BYTES = 40
+SAFE_STATE = 6  # of port C, hal/s32k144/pins.h
+
+
+@pytest.fixture(scope="module")
+def parts() -> Parts:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    return build.prepare("hsm1", flashed=True)
+
+
+@pytest.fixture(scope="module")
+def resolver_parts() -> Parts:
+    if not have_arm_compiler():
+        pytest.skip("no cross compiler: there is no image to emulate")
+    return build.prepare("hsm1", angle="resolver", flashed=True)
+
+
+def holds(outcome: resets.Outcome) -> None:
+    """The bounds of one reset, with the hardware's path where the processor has nothing that it remembers."""
+    assert outcome.vdc_share <= VDC_SHARE, outcome
+    if outcome.kind == "power-on":
+        assert math.isnan(outcome.without_gates_ms), "the retained RAM is not valid: nothing may be switched on"
+    else:
+        assert outcome.without_gates_ms <= WITHOUT_GATES_MS, outcome
+        assert outcome.held, outcome
+
+
+def four_resets_stay_within_the_bounds(parts: Parts) -> None:
+    for outcome in resets.campaign(parts, 4, both=False):
+        holds(outcome)
+
+
+def the_hardware_has_the_bridge_until_the_pwm_runs(parts: Parts) -> None:
+    """Released, the line asks for the board's safe state; the task drives it low in its second step."""
+    with Core.of_program(parts.emulated().library, parts.image) as core:
+        while core.run(1e-4) == LIMIT:
+            assert not is_line_driven(core)
+        end_s = core.now_s + 5e-3
+        while core.now_s < end_s:
+            core.run(1e-4)
+        assert is_line_driven(core)
+
+
+def is_line_driven(core: Core) -> bool:
+    return core.register("PTC.PDDR") >> SAFE_STATE & 1 == 1
+
+
+def test_resets_of_every_kind_stay_within_the_bounds(parts: Parts) -> None:
+    for outcome in resets.campaign(parts, POINTS, both=False):
+        holds(outcome)
+
+
+def test_the_hardware_has_the_bridge_until_the_pwm_runs(parts: Parts) -> None:
+    the_hardware_has_the_bridge_until_the_pwm_runs(parts)
+
+
+def test_with_a_resolver_too(resolver_parts: Parts) -> None:
+    for outcome in resets.campaign(resolver_parts, 5, both=False):
+        holds(outcome)
+
+
+def test_without_the_hardware_path_a_power_on_reset_exceeds_the_bound(parts: Parts) -> None:
+    """The bound of the tests above can be missed, and the board's path is what keeps it."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        stand.run(60, TorqueRequested=-60.0)
+        outcome = resets.reset(loop, stand, "power-on", -60.0, 0.3, hardware=False)
+    assert outcome.vdc_share > VDC_SHARE
+
+
+@pytest.mark.parametrize("how", ["stack", "watchdog"])
+def test_a_reset_by_the_processor_itself(parts: Parts, how: str) -> None:
+    """A stack that uses its reserve ends in panic(); a task that no longer comes leaves the watchdog unserved."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        if how == "stack":
+            stand.core.write(stand.core.symbol("stack_bottom") + 128, bytes(4))
+        else:
+            stand.core.set_register("LPIT0.MIER", 0)
+        loop.record(("truth.vdc_V", "emulator.gates", "emulator.resets"), 1)
+        rows = [row for _ in range(100) for row in stand.run_ms()]
+        assert stand.core.resets == 1
+        first = next(k for k, row in enumerate(rows) if row[2] == 1)
+        off = [k for k, row in enumerate(rows) if row[1] == 0.0]
+        assert off and first - 1 <= off[0] <= off[-1] < first + 10 * WITHOUT_GATES_MS
+        assert max(row[0] for row in rows) <= VDC_SHARE * resets.BATTERY_V
+        assert rows[-1][1] == 1.0
+
+
+@pytest.mark.parametrize("damaged", [(0,), (1,), (0, 1)], ids=["first copy", "second copy", "both"])
+def test_a_damaged_copy_is_not_used(parts: Parts, damaged: tuple[int, ...]) -> None:
+    """Every bit is covered by its complement. With one copy left the drive goes on, without any it does not."""
+    random = Random(7)
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        for copy in damaged:
+            at = COPIES + COPY_BYTES * copy + random.randrange(COPY_BYTES)
+            stand.core.write(at, bytes([stand.core.read(at, 1)[0] ^ 1 << random.randrange(8)]))
+        outcome = resets.reset(loop, stand, "watchdog", 0.0, 0.3, hardware=True)
+    assert outcome.vdc_share <= VDC_SHARE
+    assert math.isnan(outcome.without_gates_ms) == (len(damaged) == 2)
+
+
+def test_a_slow_machine_is_not_shorted(parts: Parts) -> None:
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        rpm = (resets.SPEED_RPM, 3000.0)
+        for k in range(400):
+            at = [(rpm[0] + (rpm[1] - rpm[0]) * (k + j) / 400) * resets.RPM for j in (0, 1)]
+            stand.run_ms({"plant.speed_rad_s": (at[0], at[1])})
+        outcome = resets.reset(loop, stand, "watchdog", 0.0, 0.3, hardware=True)
+    assert math.isnan(outcome.without_gates_ms)
+    assert outcome.vdc_share < 1.01
+
+
+def slots(damaged: int) -> bytes:
+    """The data flash with so many slots whose headers are those of the longest record and whose records are damaged."""
+    random, record = Random(1), flash.SLOT_BYTES - 16
+    full = [struct.pack("<4I", 1, record, k, 0) + random.randbytes(record) for k in range(damaged)]
+    return b"".join(full).ljust(flash.FLASH_BYTES, b"\xff")
+
+
+def start_s(parts: Parts, damaged: int) -> float:
+    with Core.of_program(parts.emulated().library, parts.image) as core:
+        core.write(flash.FLASH, slots(damaged))
+        assert core.run(FIRST_WATCHDOG_S) == CENTRE, "the PWM does not start before the watchdog resets"
+        assert core.resets == 0
+        return core.now_s
+
+
+@pytest.mark.parametrize("damaged", [0, 1, flash.SLOTS])
+def test_the_pwm_starts_long_before_the_first_watchdog(parts: Parts, damaged: int) -> None:
+    seconds = start_s(parts, damaged)
+    print(f"{damaged} damaged slots: the PWM starts after {1e3 * seconds:.1f} ms")
+    assert seconds < FIRST_WATCHDOG_S / 2
+
+
+PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
+    "nothing is kept": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("main.c", "    after_reset_note(&ecu.drive);\n", ""),
+    ),
+    "the RAM is not retained": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("retained.c", "    SIM->CHIPCTL = SIM->CHIPCTL & ~SIM_CHIPCTL_SRAMU_RETEN;\n", ""),
+    ),
+    "the retained RAM is written": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("retained.c", "    SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;\n", ""),
+    ),
+    "the crystal is awaited first": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("after_reset.c", "    clock_first();\n", "    clock_init();\n    clock_first();\n"),
+    ),
+    "the gate supply stays off": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("after_reset.c", "    PTC->PSOR = retained.lines & KEPT_LINES;\n", ""),
+    ),
+    "the timer is set up again": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("main.c", "    if (!holds) {\n", "    if (!holds || holds) {\n"),
+    ),
+    "the state machine starts anew": (
+        four_resets_stay_within_the_bounds,
+        PlantedError("main.c", "    ecu_continue(&ecu);\n", ""),
+    ),
+    "the line of the safe state is low from the start": (
+        the_hardware_has_the_bridge_until_the_pwm_runs,
+        PlantedError("pins.c", "((1U << PIN_PRECHARGE) |", "((1U << PIN_SAFE_STATE) | (1U << PIN_PRECHARGE) |"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED_ERRORS)
+def test_a_planted_error_is_found(parts: Parts, name: str, tmp_path: Path) -> None:
+    check, error = PLANTED_ERRORS[name]
+    planted = replace(parts, image=image_with_error(parts.image, error, tmp_path))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)

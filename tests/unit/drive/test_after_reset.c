@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What outlasts a reset of the processor, and what the drive makes of it. */
+#include "drive/after_reset.h"
+
+#include "seam.h"
+#include "unity.h"
+
+static before_reset_t before;
+
+/* Of hsm1 at 350 V the short circuit is the safe state above 8085 rpm, and below 7186 rpm it is left. */
+static q15_t speed_of(float rpm)
+{
+    const float omega = rpm * 0.1047198F * (float)motor.angle_tracker.pole_pairs;
+    return (q15_t)(32768.0F * omega / motor.bases.omega_rad_s);
+}
+
+static q15_t volts(float value)
+{
+    return (q15_t)(32768.0F * value / motor.bases.voltage_V);
+}
+
+static bool needs(float rpm, float v)
+{
+    return after_reset_needs_short_circuit(&motor, &before, speed_of(rpm), volts(v));
+}
+
+void setUp(void)
+{
+    drive_init(&drive, &motor);
+    before = (before_reset_t){.speed = speed_of(9500.0F), .v_dc = volts(350.0F), .armed = true, .speed_valid = true};
+}
+
+void tearDown(void)
+{
+}
+
+void test_the_present_speed_decides_by_the_lower_level(void)
+{
+    TEST_ASSERT_TRUE(needs(9500.0F, 350.0F));
+    TEST_ASSERT_TRUE(needs(7300.0F, 350.0F));
+    TEST_ASSERT_FALSE(needs(7000.0F, 350.0F));
+}
+
+/* Rectifying, the machine raises the voltage with which its back-EMF is compared. */
+void test_a_voltage_that_has_risen_meanwhile_does_not_count(void)
+{
+    TEST_ASSERT_TRUE(needs(7300.0F, 420.0F));
+    TEST_ASSERT_TRUE(needs(7000.0F, 300.0F));
+}
+
+void test_a_sensor_that_shows_no_speed_is_not_believed(void)
+{
+    TEST_ASSERT_TRUE(needs(0.0F, 350.0F));
+    TEST_ASSERT_TRUE(after_reset_needs_short_circuit(&motor, &before, -1, volts(350.0F)));
+    before.speed_valid = false;
+    TEST_ASSERT_TRUE(needs(7000.0F, 350.0F));
+}
+
+void test_a_bridge_that_was_not_armed_is_left_alone(void)
+{
+    before.armed = false;
+    TEST_ASSERT_FALSE(needs(9500.0F, 350.0F));
+}
+
+void test_what_is_kept_is_what_the_drive_knows(void)
+{
+    drive.task.safe_state.speed = 1234;
+    drive.task.armed = true;
+    drive.psi_d_error = -5;
+    before_reset_t kept;
+    before_reset(&drive, &kept);
+    TEST_ASSERT_EQUAL_INT16(1234, kept.speed);
+    TEST_ASSERT_EQUAL_INT16(-5, kept.psi_delta);
+    TEST_ASSERT_TRUE(kept.armed && kept.speed_valid);
+    drive.fast.faults = FAULT_ANGLE;
+    before_reset(&drive, &kept);
+    TEST_ASSERT_TRUE(kept.armed && !kept.speed_valid);
+    drive.fast.faults = FAULT_INPUT;
+    before_reset(&drive, &kept);
+    TEST_ASSERT_FALSE(kept.speed_valid);
+    drive.fast.faults = FAULT_CONFIG;
+    before_reset(&drive, &kept);
+    TEST_ASSERT_FALSE(kept.armed);
+}
+
+void test_the_drive_goes_on_with_the_short_circuit(void)
+{
+    after_reset_hold(&drive, &before, speed_of(9000.0F));
+    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_CIRCUIT, command_box_read(&drive.commands)->safe);
+    TEST_ASSERT_FALSE(command_box_read(&drive.commands)->run);
+    TEST_ASSERT_EQUAL_INT16(speed_of(9000.0F), drive.task.safe_state.speed);
+    TEST_ASSERT_TRUE(drive.task.safe_state.line_emf > volts(315.0F));
+    TEST_ASSERT_TRUE(drive.task.armed && drive.task.safe_state.short_circuit);
+}
