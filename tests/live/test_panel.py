@@ -4,6 +4,7 @@
 import json
 import signal
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import Server, end
@@ -77,24 +78,37 @@ def test_a_disconnected_page_shows_no_value_and_no_active_control(page: Page) ->
     assert page.text("state") == "no bus"
 
 
+def saved_parameters(page: Page, folder: Path) -> dict[str, Any]:
+    """What Save puts into the browser's folder of downloads."""
+    page.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
+    file = folder / "parameters.json"
+    file.unlink(missing_ok=True)
+    page.find("tune-save").click()
+    polled(file.exists)
+    content = json.loads(file.read_text())
+    assert content["format"] == "fluxtrue-parameters"
+    assert isinstance(content, dict)
+    return content
+
+
 def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_path: Path) -> None:
     page.find("tune-read").click()
     page.until(lambda: "those of the build" in page.text("tune-text") and page.text("tuning") != "", "the values")
-    cells = page.browser.find_elements(By.CSS_SELECTOR, "#tuning input")
-    shown = {str(cell.get_attribute("name")): str(cell.get_attribute("value")) for cell in cells}
-    page.run("fluxtrue.send({type: 'tune_load', values: arguments[0]})", {name: float(x) for name, x in shown.items()})
-    page.until(
-        lambda: "refused" not in page.text("message") and page.text("message") != "Reading …", "all written back"
-    )
+    saved = saved_parameters(page, tmp_path)
+    assert page.run("return document.querySelectorAll('#tuning input').length") == len(saved["values"]) > 1
+    file = tmp_path / "written.json"
+    file.write_text(json.dumps(saved))
+    page.find("tune-file").send_keys(str(file))
+    page.until(lambda: page.text("message").startswith("Nothing changed"), "all written back")
 
     page.run("const i = document.querySelector('#tuning input[name=observer_m]'); i.value = '';"
              "i.dispatchEvent(new Event('change'));")  # fmt: skip
     page.until(lambda: "nothing was written" in page.text("message"), "no write")
-    file = tmp_path / "parameters.json"
     file.write_text(json.dumps({"format": "fluxtrue-parameters", "values": {"observer_m": 3.5}}))
     page.find("tune-file").send_keys(str(file))
     page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the file")
     assert page.text("tune-text").startswith("1 of ")
+    assert saved_parameters(page, tmp_path)["values"]["observer_m"] == 3.5
     file.write_text(json.dumps({"format": "fluxtrue-parameters", "values": {"observer_m": 2.5, "nothing": 1}}))
     page.find("tune-file").send_keys(str(file))
     page.until(lambda: "no calibration value 'nothing'" in page.text("message"), "a refusal")

@@ -305,7 +305,44 @@ def test_signs_of_life_are_received_during_a_long_answer(driving: Drive, tmp_pat
         read.set()
         while (answer := await socket.receive_json(timeout=HANG_S))["type"] == "rows":
             pass
-        assert answer == {"type": "parameters", "values": [], "refused": ""}
+        assert answer == {"type": "parameters", "values": [], "told": ""}
+
+    driving.run(0.2)
+    serve(driving, tmp_path, talk)
+
+
+def test_each_change_of_parameters_is_told_in_its_own_answer(driving: Drive, tmp_path: Path) -> None:
+    """Also when the next change is requested before the ECU has carried out the first."""
+    both = threading.Event()
+
+    class Ecu:
+        """An ECU with one value, which waits until both changes have been requested."""
+
+        thread = ThreadPoolExecutor(1)
+        gain = 1.0
+
+        def present(self) -> dict[str, float]:
+            return {"gain": self.gain}
+
+        def table(self) -> list[dict[str, Any]]:
+            return [{"name": "gain", "value": self.gain}]
+
+        def load(self, values: dict[str, float]) -> None:
+            both.wait()
+            self.gain = values["gain"]
+
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        session.tuning = Ecu()  # type: ignore[assignment]
+        socket = await page(client)
+        for gain in (2.0, 3.0, 3.0):
+            await socket.send_json({"type": "tune_load", "values": {"gain": gain}})
+        await obeyed(socket)
+        both.set()
+        told: list[str] = []
+        while len(told) < 3:
+            answer = await socket.receive_json(timeout=HANG_S)
+            told += [answer["told"]] if answer["type"] == "parameters" else []
+        assert told == ["Written: gain = 2", "Written: gain = 3", "Nothing changed: the inverter held these values."]
 
     driving.run(0.2)
     serve(driving, tmp_path, talk)

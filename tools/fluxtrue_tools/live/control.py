@@ -87,14 +87,26 @@ def _tuning(session: Session) -> Tuning:
     return session.tuning
 
 
-async def _calibrate(tuning: Tuning, call: Any, *values: Any) -> Answer:
-    """Change values; the answer has all of them as the ECU then holds them, also after a refusal."""
-    run, refusal = asyncio.get_running_loop().run_in_executor, ""
+def _changed(tuning: Tuning, call: Any, *values: Any) -> Answer:
+    """Change values; the answer has all of them as the ECU then holds them, also after a refusal.
+
+    One call of the tuning's thread: between the change and its answer no other change can act, so that each answer
+    tells what its own request has changed.
+    """
+    before, refusal = tuning.present(), ""
     try:
-        await run(tuning.thread, call, *values)
+        call(*values)
     except FluxtrueError as error:
         refusal = str(error)
-    return {"type": "parameters", "values": await run(tuning.thread, tuning.table), "refused": refusal}
+    table = tuning.table()
+    written = ", ".join(f"{row['name']} = {row['value']:.6g}" for row in table if row["value"] != before[row["name"]])
+    told = f"Written: {written}" if written else "" if refusal else "Nothing changed: the inverter held these values."
+    return {"type": "parameters", "values": table, "told": ". ".join(text for text in (refusal, told) if text)}
+
+
+async def _calibrate(tuning: Tuning, call: Any, *values: Any) -> Answer:
+    run = asyncio.get_running_loop().run_in_executor
+    return await run(tuning.thread, _changed, tuning, call, *values)
 
 
 def _tune(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer]:
@@ -121,7 +133,7 @@ async def _read(session: Session, message: dict[str, Any]) -> Answer:
     tuning, run = _tuning(session), asyncio.get_running_loop().run_in_executor
     if message["type"] == "freeze":
         return {"type": "freeze", **await run(tuning.thread, tuning.freeze)}
-    return {"type": "parameters", "values": await run(tuning.thread, tuning.table), "refused": ""}
+    return {"type": "parameters", "values": await run(tuning.thread, tuning.table), "told": ""}
 
 
 async def _record(session: Session, on: bool) -> Answer:

@@ -38,6 +38,11 @@ class Tuning:
         return {name: float(FLOAT.unpack(self._xcp.read(value.address, FLOAT.size))[0])
                 for name, value in self._values.items()}  # fmt: skip
 
+    def present(self) -> dict[str, float]:
+        """Every value as the ECU holds it."""
+        with reported():
+            return self._read(WORKING)
+
     def table(self) -> list[dict[str, Any]]:
         """Every value with its range and with the value of the build."""
         with reported():

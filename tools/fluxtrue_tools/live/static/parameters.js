@@ -40,13 +40,10 @@ function row(info) {
 }
 
 export function onParameters(message) {
-  const before = new Map(values.map((info) => [info.name, info.value]));
   values = message.values;
   $("tuning").hidden = false;
   $("tuning").tBodies[0].replaceChildren(...values.map(row));
-  const changed = values.filter((info) => before.has(info.name) && before.get(info.name) !== info.value);
-  const text = changed.map(({ name, value }) => `${name} = ${written(value)}`).join(", ");
-  say(message.refused || (text && `Written: ${text}`));
+  say(message.told);
   const count = values.filter(differs).length;
   $("tune-text").textContent = count ? `${count} of ${values.length} differ from the values of the build.`
     : "All values are those of the build.";
