@@ -50,29 +50,30 @@ static bool is_intact(uint32_t slot, const header_t *header)
     return ~sum == header->crc;
 }
 
-typedef struct {
+/* 640 bytes with 128 slots, too many for the stack. Only the start and the background use the store, never at once. */
+static struct {
     uint32_t sequence[HAL_NVM_SLOTS];
     bool possible[HAL_NVM_SLOTS]; /* the header can be one, and the record has not been found damaged */
-} candidates_t;
+} candidates;
 
-static void read_headers(candidates_t *candidates, bool *damaged)
+static void read_headers(bool *damaged)
 {
     for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
         header_t header;
         const bool readable = hal_nvm_read(slot, 0, &header, STORE_HEADER_SIZE);
-        candidates->possible[slot] = readable && header.size <= STORE_RECORD_MAX;
-        candidates->sequence[slot] = candidates->possible[slot] ? header.sequence : 0U;
-        *damaged = *damaged || !(candidates->possible[slot] || (readable && is_blank_header(&header)));
+        candidates.possible[slot] = readable && header.size <= STORE_RECORD_MAX;
+        candidates.sequence[slot] = candidates.possible[slot] ? header.sequence : 0U;
+        *damaged = *damaged || !(candidates.possible[slot] || (readable && is_blank_header(&header)));
     }
 }
 
 /* The slot with the highest sequence number, which may wrap; HAL_NVM_SLOTS: none is left. */
-static uint32_t highest(const candidates_t *c)
+static uint32_t highest(void)
 {
     uint32_t found = HAL_NVM_SLOTS;
     for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
-        const bool higher = found == HAL_NVM_SLOTS || c->sequence[slot] - c->sequence[found] < 0x80000000U;
-        found = (c->possible[slot] && higher) ? slot : found;
+        const uint32_t ahead = found < HAL_NVM_SLOTS ? candidates.sequence[slot] - candidates.sequence[found] : 0U;
+        found = (candidates.possible[slot] && ahead < 0x80000000U) ? slot : found;
     }
     return found;
 }
@@ -82,9 +83,8 @@ static uint32_t highest(const candidates_t *c)
 static newest_t find_newest(void)
 {
     newest_t newest = {.damaged = false};
-    candidates_t candidates;
-    read_headers(&candidates, &newest.damaged);
-    for (newest.slot = highest(&candidates); newest.slot < HAL_NVM_SLOTS; newest.slot = highest(&candidates)) {
+    read_headers(&newest.damaged);
+    for (newest.slot = highest(); newest.slot < HAL_NVM_SLOTS; newest.slot = highest()) {
         if (hal_nvm_read(newest.slot, 0, &newest.header, STORE_HEADER_SIZE) && newest.header.size <= STORE_RECORD_MAX &&
             is_intact(newest.slot, &newest.header)) {
             return newest;

@@ -74,11 +74,10 @@ void proof_store_save_changes_one_slot(void)
 void proof_store_newest_header_is_found(void)
 {
     header_t header[HAL_NVM_SLOTS];
-    candidates_t candidates;
     bool damaged = false;
     stored = header;
-    read_headers(&candidates, &damaged);
-    const uint32_t found = highest(&candidates);
+    read_headers(&damaged);
+    const uint32_t found = highest();
     const bool first = header[0].size <= STORE_RECORD_MAX, second = header[1].size <= STORE_RECORD_MAX;
     PROVE(found <= HAL_NVM_SLOTS && (found == HAL_NVM_SLOTS) == (!first && !second));
     PROVE(found == HAL_NVM_SLOTS || header[found].size <= STORE_RECORD_MAX);
