@@ -31,10 +31,18 @@ static bool read_copy(const volatile copy_t *from, uint32_t word[WORDS])
     return differing == 0U && word[MAGIC_WORD] == MAGIC;
 }
 
+/* RAM may keep its content without a supply for a while: what does not count now must not count after the next reset. */
+static void discard(void)
+{
+    copies[0].word[MAGIC_WORD] = 0;
+    copies[1].word[MAGIC_WORD] = 0;
+}
+
 bool retained_read(retained_t *retained)
 {
     uint32_t first[WORDS], second[WORDS];
     if ((RCM->SRS & (RCM_SRS_POR | RCM_SRS_LVD)) != 0U) {
+        discard();
         return false;
     }
     const bool is_first = read_copy(&copies[0], first), is_second = read_copy(&copies[1], second);

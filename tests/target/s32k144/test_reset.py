@@ -29,6 +29,7 @@ FIRST_WATCHDOG_S = 0.1
 COPIES = 0x2000_0000  # of the state, hal/s32k144/retained.c
 COPY_BYTES = 40
 SAFE_STATE = 6  # of port C, hal/s32k144/pins.h
+HELD = 0x2A3F  # FTM0.SWOCTRL: the short circuit
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,23 @@ def test_a_damaged_copy_is_not_used(parts: Parts, damaged: tuple[int, ...]) -> N
     assert math.isnan(outcome.without_gates_ms) == (len(damaged) == 2)
 
 
+def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
+    """A short power-off leaves them in the RAM, and the next reset comes before the task writes the first new one."""
+    loop, stand = resets.powered_up(parts)
+    with loop:
+        core, kept = stand.core, stand.core.read(COPIES, 2 * COPY_BYTES)
+        core.reset(resets.KINDS["power-on"])
+        core.write(COPIES, kept)
+        core.run(5e-3)
+        core.reset(resets.KINDS["pin"])
+        core.run(5e-3)
+        assert core.register("FTM0.SWOCTRL") != HELD
+
+
+def test_copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
+    copies_of_an_earlier_power_on_are_not_used(parts)
+
+
 def test_a_slow_machine_is_not_shorted(parts: Parts) -> None:
     loop, stand = resets.powered_up(parts)
     with loop:
@@ -177,6 +195,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
     "the retained RAM is written": (
         four_resets_stay_within_the_bounds,
         PlantedError("retained.c", "    SIM->CHIPCTL = SIM->CHIPCTL | SIM_CHIPCTL_SRAMU_RETEN;\n", ""),
+    ),
+    "copies stay in the RAM at power-on": (
+        copies_of_an_earlier_power_on_are_not_used,
+        PlantedError("retained.c", "        discard();\n", "        (void)discard;\n"),
     ),
     "the crystal is awaited first": (
         four_resets_stay_within_the_bounds,
