@@ -85,3 +85,9 @@ bool drive_recall(drive_t *drive, const identify_record_t *record)
     }
     return restored;
 }
+
+void drive_forget(drive_t *drive)
+{
+    identify_reset(&drive->motor->identify, &drive->task.identify);
+    drive->task.recall.unconfirmed = false;
+}

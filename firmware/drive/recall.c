@@ -53,8 +53,7 @@ void recall_step(drive_t *drive, q31_t omega)
     if (recall->agreed >= RECALL_AGREED) {
         recall->unconfirmed = false;
     } else if (rejected) {
-        recall->unconfirmed = false;
-        identify_reset(&drive->motor->identify, &drive->task.identify);
+        drive_forget(drive);
     } else {
         /* not decided yet */
     }

@@ -50,17 +50,27 @@ static bool is_near_bridge(const motor_t *m, const compensation_t *compensation)
             compensation->knee_q17 <= knee_q17 && compensation->knee_q17 >= knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
+/* All of the record or, where the drive refuses a part of it, nothing. */
+static bool take(drive_t *drive, const record_t *record)
+{
+    if (!drive_recall(drive, &record->identified)) {
+        return false;
+    }
+    if (record->compensation.measured != 0 && !drive_compensate(drive, &record->compensation)) {
+        drive_forget(drive);
+        return false;
+    }
+    drive_restore_trim(drive, record->trim);
+    return true;
+}
+
 void memory_recall(memory_t *memory, drive_t *drive)
 {
     record_t record;
     *memory = (memory_t){0};
     if (store_load(memory_layout(drive->motor), &record, sizeof record) == STORE_OK &&
         is_near_priors(&record.identified) && is_near_bridge(drive->motor, &record.compensation)) {
-        memory->recalled = (record.compensation.measured == 0 || drive_compensate(drive, &record.compensation)) &&
-                           drive_recall(drive, &record.identified);
-        if (memory->recalled) {
-            drive_restore_trim(drive, record.trim);
-        }
+        memory->recalled = take(drive, &record);
     }
 }
 

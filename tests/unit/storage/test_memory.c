@@ -286,6 +286,33 @@ void test_a_measured_compensation_is_kept_with_its_voltage_margin(void)
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, motor_check(&with_them)); /* this includes (MO-11) */
 }
 
+/* A record is taken whole or not at all. */
+void test_a_record_whose_values_are_refused_leaves_the_compensation(void)
+{
+    const compensation_t measured = {dead_time(&drive.parameters) + 40, drive.parameters.modulate.knee_q17 / 2, 1};
+    TEST_ASSERT_TRUE(drive_compensate(&drive, &measured));
+    drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_R, IDENTIFY_R)] = 0;
+    identify_and_save();
+    power_on(&motor);
+    TEST_ASSERT_FALSE(memory.recalled);
+    TEST_ASSERT_EQUAL_MEMORY(&motor.parameters, &drive.parameters, sizeof motor.parameters);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.compensation.measured);
+}
+
+void test_a_record_whose_compensation_is_refused_leaves_the_priors(void)
+{
+    static motor_t m;
+    m = motor;
+    m.bridge_duty = 0.1F; /* with it the record's dead time is near the motor data, and still more than a drive takes */
+    drive.task.compensation = (compensation_t){5000, motor.parameters.modulate.knee_q17, 1};
+    identify_and_save();
+    power_on(&m);
+    TEST_ASSERT_FALSE(memory.recalled);
+    TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
+    TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+    TEST_ASSERT_EQUAL_INT32(dead_time(&motor.parameters), dead_time(&drive.parameters));
+}
+
 void test_the_trim_of_the_compensation_is_kept_with_the_measurement(void)
 {
     const int32_t measured = dead_time(&motor.parameters) + 40;
