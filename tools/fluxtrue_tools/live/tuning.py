@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
 
+from pyxcp.master import Master
 from pyxcp.types import XcpResponseError
 
 from fluxtrue_tools.a2l.elf import Description, Value
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live import freeze, measuring
-from fluxtrue_tools.live.xcp import Xcp, reported
+from fluxtrue_tools.live.xcp import Xcp
 
 FLOAT: Final = struct.Struct("<f")
 SEGMENT: Final = 0
@@ -45,7 +46,7 @@ class Tuning:
 
     def table(self) -> list[dict[str, Any]]:
         """Every value with its range and with the value of the build."""
-        with reported():
+        with self._xcp.reported():
             built, present = self._read(REFERENCE), self._read(WORKING)
         return [{"name": value.name, "text": value.text, "unit": value.unit, "lo": value.lo, "hi": value.hi,
                  "value": present[value.name], "default": built[value.name]}
@@ -64,13 +65,16 @@ class Tuning:
     def write(self, name: str, value: float) -> None:
         """Write a value to the ECU, which checks it."""
         info = self._known(name)
-        with reported():
+        with self._xcp.reported():
             master = self._xcp.master()
             master.setMta(info.address)
+            self._download(master, info, value)
+
+    def _download(self, master: Master, info: Value, value: float) -> None:
         try:
             master.download(FLOAT.pack(value))
         except (XcpResponseError, OverflowError) as error:
-            raise FluxtrueError(f"{name} = {value:g}: refused by the ECU ({error}), "
+            raise FluxtrueError(f"{info.name} = {value:g}: refused by the ECU ({error}), "
                                 f"allowed: {info.lo:g} … {info.hi:g} {info.unit}, nothing so small that the drive "
                                 "would make it zero") from error  # fmt: skip
 
@@ -83,22 +87,22 @@ class Tuning:
 
     def restore(self) -> None:
         """Bring the values of the build back."""
-        with reported():
+        with self._xcp.reported():
             self._xcp.master().copyCalPage(SEGMENT, REFERENCE, SEGMENT, WORKING)
 
     def freeze(self) -> dict[str, Any]:
         """The freeze frame of the first fault."""
-        with reported():
+        with self._xcp.reported():
             return freeze.frame(self._xcp, self._description)
 
     def measure(self) -> measuring.Layout:
         """Let the ECU send measurements, for a recording."""
-        with reported():
+        with self._xcp.reported():
             return measuring.start(self._xcp.master(), self._description.measurements, self._description.bases)
 
     def measure_no_more(self) -> None:
         """The ECU sends no measurements any more."""
-        with reported():
+        with self._xcp.reported():
             measuring.stop(self._xcp.master())
 
     def close(self) -> None:

@@ -2,10 +2,10 @@
 """An XCP session by pyxcp, on a bus connection of its own."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
-from typing import Any, Final
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from typing import Final
 
 from pyxcp.config import create_application_from_config
 from pyxcp.master import Master
@@ -43,15 +43,6 @@ def _connect(address: BusAddress, answer_s: float) -> Master:
     return Master("can", config=application)
 
 
-@contextmanager
-def reported() -> Any:
-    """What goes wrong becomes one message."""
-    try:
-        yield
-    except (XcpResponseError, XcpTimeoutError, OSError, RuntimeError) as error:
-        raise FluxtrueError(f"XCP: {error}") from error
-
-
 class Xcp:
     """One session; every call runs in its one thread, since the master is not made for more."""
 
@@ -71,6 +62,20 @@ class Xcp:
             master.cond_unlock()
             self._master = master
         return self._master
+
+    @contextmanager
+    def reported(self) -> Iterator[None]:
+        """What goes wrong becomes one message. After an ECU that did not answer, which may have been reset, the next
+        call connects again."""
+        try:
+            yield
+        except XcpResponseError as error:
+            raise FluxtrueError(f"XCP: {error}") from error
+        except (XcpTimeoutError, OSError, RuntimeError) as error:
+            self._master = None
+            with suppress(XcpTimeoutError, OSError, RuntimeError):
+                self._stack.close()
+            raise FluxtrueError(f"XCP: {error}") from error
 
     def read(self, address: int, size: int) -> bytes:
         """Some bytes of the ECU."""
