@@ -10,8 +10,9 @@ import pytest
 
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
+from fluxtrue_tools.live.bus_process import _Reporter
 from fluxtrue_tools.live.commander import Commander, Wish
-from fluxtrue_tools.live.link import Link
+from fluxtrue_tools.live.link import Link, Status
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.stand import Stand
@@ -150,6 +151,25 @@ def test_closing_the_link_while_it_drives_ramps_the_torque_out_first(driving: Dr
     assert driving.commander.torque_requested_Nm == 0.0
     assert torques[-1] < STOP_Nm_PER_PERIOD  # the status after the last command may not have been received
     assert np.diff(torques).min() > -1.1 * STOP_Nm_PER_PERIOD
+
+
+def test_a_status_that_could_not_be_told_is_told_later() -> None:
+    class Outbox:
+        """The way to a server that stands still, then reads again."""
+
+        is_full, told = True, 0
+
+        def put(self, *_: object) -> bool:
+            self.told += not self.is_full
+            return not self.is_full
+
+    outbox = Outbox()
+    reporter = _Reporter(outbox)  # type: ignore[arg-type]
+    reporter.period(Status("fault"))
+    outbox.is_full = False
+    reporter.period(Status("fault"))
+    reporter.period(Status("fault"))
+    assert outbox.told == 1
 
 
 def test_the_end_of_the_virtual_ecu_is_reported_and_nothing_hangs(

@@ -10,12 +10,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import can
 import pytest
 from aiohttp import ClientWebSocketResponse
 from aiohttp.test_utils import TestClient, TestServer
+from asammdf import MDF
 from progress import HANG_S, polled_async
 
 from fluxtrue_tools.bus.interface import read_interface
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live import server
 from fluxtrue_tools.live.cli import _listen
 from fluxtrue_tools.live.commander import Commander, Order, Wish
 from fluxtrue_tools.live.link import Status
@@ -107,6 +111,7 @@ def test_a_page_silent_for_300_ms_loses_the_torque_by_a_ramp_and_must_press_enab
     assert min(steps) >= 0.0 and max(steps) <= 132.0 * TICK_S / STOP_S + 1e-9
     assert torques[-1] == 0.0 and not driving.order.enable and driving.state == "ready"
     driving.act("slide", 60.0)  # the page is back, its slider at the old value
+    assert driving.commander.target_Nm == 0.0
     assert set(driving.run(1.0, alive=True)) == {0.0} and not driving.order.enable
     assert "closed or silent for 0.3 s. Press Enable" in driving.commander.stopped
     press(driving, Wish.DRIVE)
@@ -257,7 +262,7 @@ def test_a_bad_message_is_answered_and_changes_nothing(driving: Drive, tmp_path:
     serve(driving, tmp_path, talk)
 
 
-def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path) -> None:
+def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Stuck:
         """A viewer that never takes a batch."""
 
@@ -266,7 +271,7 @@ def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path) -> 
         async def send_str(self, text: str) -> None:
             Stuck.sent += 1
             assert json.loads(text)["type"] == "rows"
-            raise TimeoutError
+            await asyncio.Event().wait()
 
         async def close(self, **_: Any) -> None:
             """Do nothing: there is no connection."""
@@ -276,8 +281,9 @@ def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path) -> 
         socket = await page(client)
         for _ in range(5):
             assert (await socket.receive_json(timeout=HANG_S))["type"] == "rows"
-        assert Stuck.sent >= 4
+        assert Stuck.sent == 1
 
+    monkeypatch.setattr(server, "SEND_S", 10.0 * HANG_S)
     serve(Drive(), tmp_path, talk)
 
 
@@ -346,6 +352,56 @@ def test_each_change_of_parameters_is_told_in_its_own_answer(driving: Drive, tmp
 
     driving.run(0.2)
     serve(driving, tmp_path, talk)
+
+
+def test_what_was_recorded_is_written_although_the_ecu_no_longer_answers(tmp_path: Path) -> None:
+    class Silent:
+        """An ECU that answers nothing."""
+
+        thread = ThreadPoolExecutor(1)
+
+        def measure(self) -> None:
+            """Let it send nothing."""
+
+        def measure_no_more(self) -> None:
+            raise FluxtrueError("XCP: no answer")
+
+    async def recording(socket: ClientWebSocketResponse, on: bool) -> dict[str, Any]:
+        await socket.send_json({"type": "record", "on": on})
+        while (answer := await socket.receive_json(timeout=HANG_S))["type"] == "rows":
+            pass
+        return dict(answer)
+
+    async def talk(client: TestClient[Any, Any], session: Session) -> None:
+        session.tuning = Silent()  # type: ignore[assignment]
+        socket = await page(client)
+        assert (await recording(socket, True))["on"]
+        session.recorder(can.Message(arbitration_id=0x100, is_extended_id=False, data=bytes(8), timestamp=1.0))
+        answer = await recording(socket, False)
+        assert (answer["type"], answer["on"]) == ("recording", False)
+        assert Path(answer["file"]).is_file()
+
+    serve(Drive(), tmp_path, talk)
+
+
+def test_a_recording_that_starts_while_another_is_written_does_not_change_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder, make = Recorder(tmp_path / "new", read_interface()), Path.mkdir
+
+    def start_another(self: Path, *arguments: Any, **options: Any) -> None:
+        make(self, *arguments, **options)
+        recorder.start()
+
+    recorder.start()
+    recorder(can.Message(arbitration_id=0x100, is_extended_id=False, data=bytes(8), timestamp=1.0))
+    for k in range(3):
+        recorder.truth(1.0 + k, 60.0)
+    monkeypatch.setattr(Path, "mkdir", start_another)
+    path = recorder.stop()
+    assert path is not None
+    with MDF(path) as log:
+        assert log.get("truth.torque_mean_Nm").samples.size == 3
 
 
 @pytest.mark.parametrize("visible", [True, False])

@@ -55,12 +55,13 @@ class _Outbox:
         self._thread = threading.Thread(target=self._send, name="outbox", daemon=True)
         self._thread.start()
 
-    def put(self, kind: str, *content: Any) -> None:
-        """Send a message soon."""
+    def put(self, kind: str, *content: Any) -> bool:
+        """Send a message soon; False: it is dropped."""
         try:
             self._waiting.put_nowait((kind, *content))
         except queue.Full:
-            return  # the server has stood still for minutes; commands go on
+            return False  # the server has stood still for minutes; commands go on
+        return True
 
     def close(self) -> None:
         """Send what waits."""
@@ -123,9 +124,8 @@ class _Reporter(Observer):
 
     def period(self, status: Status) -> None:
         """Only what has changed is told."""
-        if status != self._told:
+        if status != self._told and self._outbox.put("status", status):
             self._told = status
-            self._outbox.put("status", status)
 
 
 def _link(setup: Setup, reporter: _Reporter, turns: _Turns, stack: ExitStack) -> Link:

@@ -72,8 +72,11 @@ class Commander:
         self.wish, self.stopped = wish, ""
 
     def slide(self, torque_requested_Nm: float, now_s: float) -> None:
-        """The slider was moved; a value beyond the machine's torque is limited to it."""
+        """The slider was moved; a value beyond the machine's torque is limited to it. Without the wish to drive it
+        counts for nothing: the message may have been on its way when the wish ended."""
         self.hand(now_s)
+        if self.wish is not Wish.DRIVE:
+            return
         self.target_Nm = min(max(torque_requested_Nm, -self.torque_max_Nm), self.torque_max_Nm)
 
     def reset_faults(self, now_s: float) -> None:

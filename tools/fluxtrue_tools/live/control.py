@@ -2,6 +2,7 @@
 """What pages may ask for. At most one page has control, and only that page changes anything."""
 
 import asyncio
+import contextlib
 import math
 from collections.abc import Awaitable
 from typing import Any, Final
@@ -31,14 +32,14 @@ def number(value: Any, what: str) -> float:
 
 
 def take(session: Session, socket: web.WebSocketResponse) -> None:
-    """Control goes to the page that first asks for something; it stays there until the page closes or gives it up."""
+    """Control goes to the page that first asks for something; it stays there until the page closes."""
     if session.hand is not None and session.hand is not socket and not session.hand.closed:
         raise FluxtrueError(OTHER)
     session.hand = socket
 
 
 def give_up(session: Session, socket: web.WebSocketResponse) -> None:
-    """The page has closed, or lets another one command."""
+    """The page has closed."""
     if session.hand is socket:
         session.hand = None
         if session.link is not None:
@@ -143,7 +144,8 @@ async def _record(session: Session, on: bool) -> Answer:
         session.recorder.start(layout)
     else:
         if tuning is not None:
-            await run(tuning.thread, tuning.measure_no_more)
+            with contextlib.suppress(FluxtrueError):  # what was recorded is kept, also of an ECU that does not answer
+                await run(tuning.thread, tuning.measure_no_more)
         path = await asyncio.to_thread(session.recorder.stop)
         session.last_file = str(path) if path else ""
     return {"type": "recording", "on": session.recorder.running, "file": session.last_file}
@@ -167,8 +169,6 @@ def obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any
             _drive(session, socket, message)
         case "knob":
             _knob(session, socket, message)
-        case "release":
-            give_up(session, socket)
         case "tune" | "tune_load" | "tune_restore":
             return _tune(session, socket, message)
         case "tune_list" | "freeze":

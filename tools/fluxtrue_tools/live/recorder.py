@@ -54,10 +54,11 @@ class Recorder:
         """The file written; None when nothing was recorded."""
         with self._lock:
             log, self._log = self._log, None
+            groups = [self._truth, *self._measured]
         if log is None or len(log) == 0:
             return None
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"live-{datetime.now():%Y%m%d-%H%M%S}.mf4"
         with atomic(path) as scratch:
-            log.write(scratch, self._interface, [self._truth, *self._measured])
+            log.write(scratch, self._interface, groups)
         return path

@@ -129,21 +129,36 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
     return batch
 
 
+async def _send(session: Session, viewer: web.WebSocketResponse, text: str) -> bool:
+    """Send a batch to one page; whether the page has accepted it."""
+    try:
+        await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
+    except (ConnectionError, RuntimeError, TimeoutError):
+        return False
+    finally:
+        del session.sending[viewer]
+    return True
+
+
+def _begin_batch(session: Session, number: int) -> dict[web.WebSocketResponse, asyncio.Task[bool]]:
+    """Begin to send a batch to every page that has accepted the one before: a page that does not read delays none."""
+    rows, begun = json.dumps(_batch(session, number)).removesuffix("}"), {}
+    for viewer in session.viewers:
+        if viewer not in session.sending:
+            text = f'{rows}, "control": "{session.control(viewer)}"}}'
+            begun[viewer] = session.sending[viewer] = asyncio.create_task(_send(session, viewer, text))
+    return begun
+
+
 async def _send_batch(session: Session, number: int) -> list[web.WebSocketResponse]:
     """Send a batch to every page; the result is the set of pages that accepted it."""
-    taken, rows = [], json.dumps(_batch(session, number)).removesuffix("}")
-    for viewer in list(session.viewers):
-        text = f'{rows}, "control": "{session.control(viewer)}"}}'
-        with contextlib.suppress(ConnectionError, RuntimeError, TimeoutError):  # the other pages still read
-            await asyncio.wait_for(viewer.send_str(text), session.wall_s(SEND_S))
-            taken.append(viewer)
-    return taken
+    return [viewer for viewer, sent in _begin_batch(session, number).items() if await sent]
 
 
 async def _broadcast(session: Session) -> None:
     for number in itertools.count():
         await asyncio.sleep(BATCH_S)
-        await _send_batch(session, number)
+        _begin_batch(session, number)
 
 
 async def _broadcast_in_step(session: Session, in_step: InStep) -> None:
@@ -175,6 +190,8 @@ async def _background(app: web.Application) -> Any:
     yield
     if in_step is not None:
         in_step.release()
+    for sent in session.sending.values():
+        sent.cancel()
     task.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await task
