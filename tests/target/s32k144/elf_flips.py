@@ -4,11 +4,13 @@
 Each flip is a copy of this process (fork): it flips one bit at a random moment and drives on. The shaft torque of the
 simulated machine, in means of a millisecond, is compared with that of a copy without a flip.
 
-The campaign, with FLUXTRUE_BUILD_DIR and PYTHONPATH as for the tests: python elf_flips.py 2000 1
+    source tools/common.sh
+    build/venv/bin/python tests/target/s32k144/elf_flips.py 2000 [--seed 1]
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import random
@@ -19,7 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from fluxtrue_tools.bench.image import RPM, V_DC, Stand
+from fluxtrue_tools.bench.image import RPM, Stand
 from fluxtrue_tools.emulate import build
 from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.emulate.core import EmulationStoppedError
@@ -152,9 +154,16 @@ def campaign(parts: Parts, flips: int, seed: int) -> dict[str, Counter[str]]:
     return found
 
 
-if __name__ == "__main__":
-    assert V_DC == 350.0
-    table = campaign(build.prepare("hsm1", flashed=True), int(sys.argv[1]), int(sys.argv[2]))
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("flips", type=int)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    table = campaign(build.prepare("hsm1", flashed=True), arguments.flips, arguments.seed)
     for name, counts in table.items():
         print(name, dict(counts))
-    sys.exit(1 if any(counts["silent"] + counts["late"] for counts in table.values()) else 0)
+    return 1 if any(counts["silent"] + counts["late"] for counts in table.values()) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
