@@ -87,6 +87,8 @@ COUNTS = {
     "SILENT_STEPS_MAX": "steps without a command, as docs/architecture.md says",
     "CONTRADICTED_MAX": "updates of the identification",
     "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
+    "FIRST_PER_S": "a rate by the core's clock, before the task runs",
+    "VELOCITY_TURNS_PER_S": "the unit in which the converter sends the speed",
     "FAST_ANGLE": "angle of a step, as that page says",
     "RESET_STEPS": "a reset on its way to the drive",
     "DEVIATION_UNLIMITED": "weight of a step against deviation_steps",
