@@ -5,6 +5,7 @@ import { $, element, entered, say } from "./page.js";
 
 const FORMAT = "fluxtrue-parameters";
 const UNITS = { "Nm/s": "N·m/s" };
+const rows = new Map(); // by name
 let values = []; // as the ECU holds them
 let title = "";
 let mayWrite = false;
@@ -12,24 +13,36 @@ let mayWrite = false;
 const written = (value) => String(Number(value.toPrecision(6)));
 const differs = ({ value, default: built }) => written(value) !== written(built);
 
-function write(input, { name, value }) {
+function write(shown) {
+  const { input, info: { name, value } } = shown;
   const wanted = entered(input);
+  shown.entered = input.value;
   if (wanted === null) {
     say(`${name}: nothing was written, the field holds no number.`);
-    input.value = written(value);
+    input.value = shown.entered = written(value);
   } else if (wanted !== Number(input.defaultValue)) {
     send({ type: "tune", name, value: wanted });
   }
 }
 
-function row(info) {
-  const { name, text, unit, lo, hi, value, default: built } = info;
-  const made = document.createElement("tr");
+// A field in which the user has begun to enter the next value keeps it.
+function fill(shown, info) {
+  const { made, input } = shown;
+  const isEdited = document.activeElement === input && input.value !== shown.entered;
+  shown.info = info;
   made.className = differs(info) ? "differs" : "";
+  input.defaultValue = written(info.value);
+  if (!isEdited) input.value = shown.entered = input.defaultValue;
+}
+
+function row(info) {
+  const { name, text, unit, lo, hi, default: built } = info;
+  const made = document.createElement("tr");
   const input = Object.assign(document.createElement("input"), {
     type: "number", step: "any", name, disabled: !mayWrite, ariaLabel: `${text}, ${unit || "no unit"}` });
-  input.defaultValue = written(value);
-  input.addEventListener("change", () => write(input, info));
+  const shown = { made, input, info, entered: "" };
+  rows.set(name, shown);
+  input.addEventListener("change", () => write(shown));
   const label = element("td", name.replace(/_(rad|Nm)_.*$/, "").replaceAll("_", " "));
   label.title = text;
   const field = document.createElement("td");
@@ -42,7 +55,8 @@ function row(info) {
 export function onParameters(message) {
   values = message.values;
   $("tuning").hidden = false;
-  $("tuning").tBodies[0].replaceChildren(...values.map(row));
+  if (!rows.size) $("tuning").tBodies[0].append(...values.map(row));
+  values.forEach((info) => fill(rows.get(info.name), info));
   say(message.told);
   const count = values.filter(differs).length;
   $("tune-text").textContent = count ? `${count} of ${values.length} differ from the values of the build.`
@@ -88,6 +102,7 @@ export function showParameters({ hello, live, mayAct }) {
   for (const input of $("tuning").querySelectorAll("input")) input.disabled = !mayWrite;
   if (!live) {
     values = [];
+    rows.clear();
     $("tuning").hidden = true;
     $("tuning").tBodies[0].replaceChildren();
     $("tune-text").textContent = "Read shows the values of the inverter and how they differ from those of the build.";
