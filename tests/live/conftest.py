@@ -42,6 +42,7 @@ class Server:
     records: Path
     process: subprocess.Popen[str]
     stand: Channel | None = None
+    ecu: VirtualEcu | None = None
 
     def now_s(self) -> float:
         """Simulated time. Fails when the server has ended, because then the time would never advance."""
@@ -98,7 +99,7 @@ def _connected(program: Path, tmp_path: Path, further: tuple[str, ...] = ("--in-
             *(f"--can-option={one}" for one in options),
             "--bench", f"{HOST}:{ecu.bench_port}", "--elf", str(program), *further,
         )  # fmt: skip
-        running.stand = Channel(HOST, ecu.bench_port)
+        running.stand, running.ecu = Channel(HOST, ecu.bench_port), ecu
         yield running
         end(running)
         running.stand.close()

@@ -13,7 +13,9 @@ from conftest import Server
 from driver import TIME_OUT_S, Page
 from progress import HANG_S, polled, until
 from selenium import webdriver
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 
 from fluxtrue_tools.log.decode import signals_of
 
@@ -131,6 +133,42 @@ def test_calibration_values_are_read_written_and_refused(page: Page) -> None:
     page.run(script, 9)
     page.until(lambda: "refused by the ECU" in page.text("message"), "a refusal")
     assert "allowed: 2 … 4" in page.text("message")
+
+
+def test_an_answer_leaves_the_field_in_which_the_next_value_is_entered(page: Page) -> None:
+    page.find("tune-read").click()
+    page.until(lambda: len(page.browser.find_elements(By.CSS_SELECTOR, "#tuning tbody tr")) >= 6, "the values")
+    field = page.browser.find_element(By.CSS_SELECTOR, "#tuning input[name=observer_m]")
+    field.send_keys(Keys.CONTROL + "a")
+    field.send_keys("3.5", Keys.TAB)
+    page.run("document.activeElement.value = ''")
+    ActionChains(page.browser).send_keys("12").perform()
+    page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the answer")
+    name, text = page.run("return [document.activeElement.name, document.activeElement.value]")  # type: ignore[misc]
+    assert name not in (None, "", "observer_m") and text == "12"
+
+
+def test_off_discharges_the_dc_link_also_in_a_fault(page: Page) -> None:
+    assert page.server.stand is not None  # type: ignore[attr-defined]
+    page.server.stand.set(board_gate_fault=1)  # type: ignore[attr-defined]
+    page.slide("speed_rpm", 0.0)
+    page.until(lambda: page.text("state") == "fault" and page.find("off").is_enabled(), "a fault, and Off")
+    page.find("off").click()
+    page.until(lambda: page.text("state") == "discharge", "discharge")
+
+
+def test_at_the_end_of_the_virtual_ecu_the_page_gives_the_reason_and_the_recording_can_be_written(page: Page) -> None:
+    assert isinstance(page.server, Server) and page.server.ecu is not None
+    page.find("record").click()
+    page.until(lambda: page.text("record") == "Stop recording", "recording")
+    page.drive(20.0)
+    page.server.ecu.stop()
+    polled(lambda: "bench" in page.text("stopped"))
+    assert page.text("torque-estimated") == "–" and page.text("state") == "no bus"
+    assert page.enabled() == {"theme", "record"}
+    page.find("record").click()
+    polled(lambda: "Written" in page.text("file"))
+    polled(lambda: page.enabled() == {"theme"})
 
 
 def test_a_recording_is_an_mdf4_file_and_can_be_played_back(page: Page, replay: Callable[[Path], Server]) -> None:

@@ -127,6 +127,10 @@ class _Reporter(Observer):
         if status != self._told and self._outbox.put("status", status):
             self._told = status
 
+    def ended(self, status: Status) -> None:
+        """The pages need not wait for the next batch."""
+        self._outbox.put("ended", status)
+
 
 def _link(setup: Setup, reporter: _Reporter, turns: _Turns, stack: ExitStack) -> Link:
     """Bus, time and test stand of the child."""
@@ -272,6 +276,10 @@ class BusProcess:
                     receiver.truth(time_s, torque_Nm)
             case "status", status:
                 self._status = status
+            case "ended", status:
+                self._status = status
+                if self._in_step is not None:
+                    self._in_step.release()
             case ("held",):
                 self._held.set()
             case ("turn",):

@@ -143,7 +143,7 @@ async def _record(session: Session, on: bool) -> Answer:
         layout = await run(tuning.thread, tuning.measure) if tuning is not None else None
         session.recorder.start(layout)
     else:
-        if tuning is not None:
+        if tuning is not None and session.status().state:  # an ECU that has ended would never answer
             with contextlib.suppress(FluxtrueError):  # what was recorded is kept, also of an ECU that does not answer
                 await run(tuning.thread, tuning.measure_no_more)
         path = await asyncio.to_thread(session.recorder.stop)

@@ -50,6 +50,9 @@ class Observer:
     def period(self, status: Status) -> None:
         """A period begins."""
 
+    def ended(self, status: Status) -> None:
+        """Nothing is commanded any more, and simulated time does not pass."""
+
 
 class Link:
     """One bus connection and the thread that commands, at the pace of the time base."""
@@ -154,4 +157,4 @@ class Link:
                 self._pace.next_period(self._stop)
         except (FluxtrueError, OSError) as error:
             self.lost = str(error)  # the virtual ECU has ended, or it has another scale
-            self._observer.period(self.status())
+            self._observer.ended(self.status())

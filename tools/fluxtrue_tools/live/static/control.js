@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which page has control: shown on every page, and given up by a press.
+// Which page has control, shown on every page.
 import { badge, $ } from "./page.js";
 
 const TEXTS = { mine: ["control here", "good"], free: ["control free", ""], other: ["control elsewhere", "warn"] };

@@ -21,11 +21,13 @@ const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, show
 const NONE = { replay: false, tuning: false, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
 const said = { hello: NONE, status: null, last: null, control: "free" };
 
-// What the parts show. A page without present values is not live: it shows none, and none of its controls acts.
+// What the parts show. A page to which the server speaks is present. If the inverter does, too, it is live; otherwise
+// it shows no values, and none of its controls acts but the end of a recording.
 function view() {
   const { hello, status } = said;
-  const live = status !== null && !isStale() && status.state !== "";
-  return { ...said, live, mayAct: live && !hello.replay && said.control !== "other" };
+  const present = status !== null && !isStale();
+  const live = present && status.state !== "", mayCommand = !hello.replay && said.control !== "other";
+  return { ...said, present, live, mayAct: live && mayCommand, mayEnd: present && mayCommand };
 }
 
 function showAll() {

@@ -14,9 +14,10 @@ export function startRecording() {
   $("record").onclick = () => send({ type: "record", on: !on });
 }
 
-export function showRecording({ mayAct, status }) {
+// A recording of an inverter that has become silent can be ended.
+export function showRecording({ mayAct, mayEnd, status }) {
   if (status) on = status.recording;
-  $("record").disabled = !mayAct;
+  $("record").disabled = !(mayAct || (mayEnd && on));
   $("record").classList.toggle("on", on);
   $("record").ariaPressed = String(on);
   show("record", on ? "Stop recording" : "Record");

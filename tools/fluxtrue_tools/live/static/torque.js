@@ -5,6 +5,7 @@ import { $, badge, DASH, entered, inCounts, say, show } from "./page.js";
 
 const STEP_COUNTS = 5; // of the slider
 const ECHO_BATCHES = 10; // for the server to answer with the request that it took
+const DISCHARGED_BY_OFF = ["precharge", "ready", "run", "derate", "safe_state", "fault"];
 const KINDS = { run: "good", derate: "warn", ready: "good", fault: "bad", safe_state: "bad" };
 
 let limit = 0;
@@ -67,7 +68,7 @@ function showNumbers({ hello, live, last, status }) {
 }
 
 export function showTorque(view) {
-  const { live, mayAct, status } = view;
+  const { present, live, mayAct, status } = view;
   const state = live ? status.state : "";
   const running = state === "run" || state === "derate";
   const driving = mayAct && running && status.wish === "drive";
@@ -75,8 +76,8 @@ export function showTorque(view) {
   for (const id of ["torque", "torque-entry", "torque-set", "zero"]) $(id).disabled = !driving;
   $("ready").disabled = !(mayAct && (state === "standby" || state === "discharge"));
   $("enable").disabled = !(mayAct && state === "ready");
-  $("off").disabled = !(mayAct && ["ready", "run", "derate", "precharge"].includes(state));
+  $("off").disabled = !(mayAct && DISCHARGED_BY_OFF.includes(state));
   $("stop").disabled = !live || view.hello.replay;
-  show("stopped", live ? status.stopped : "");
+  show("stopped", present ? status.stopped : "");
   showNumbers(view);
 }
