@@ -258,7 +258,7 @@ identify_record_t drive_identified_record(const drive_t *drive);
  * measured windows have confirmed it (drive/recall.h). */
 bool drive_recall(drive_t *drive, const identify_record_t *record);
 /** The identification begins again with its priors. */
-void drive_forget(drive_t *drive);
+void drive_reset_identification(drive_t *drive);
 
 /** The identification's share of the 1 kHz task. */
 void drive_identify(drive_t *drive, const snapshot_t *snapshot);

@@ -86,7 +86,7 @@ bool drive_recall(drive_t *drive, const identify_record_t *record)
     return restored;
 }
 
-void drive_forget(drive_t *drive)
+void drive_reset_identification(drive_t *drive)
 {
     identify_reset(&drive->motor->identify, &drive->task.identify);
     drive->task.recall.unconfirmed = false;

@@ -53,7 +53,7 @@ void recall_step(drive_t *drive, q31_t omega)
     if (recall->agreed >= RECALL_AGREED) {
         recall->unconfirmed = false;
     } else if (rejected) {
-        drive_forget(drive);
+        drive_reset_identification(drive);
     } else {
         /* not decided yet */
     }

@@ -23,7 +23,7 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
     if (request->identification_resets != task->identification_resets) {
         task->identification_resets = request->identification_resets;
         mrai_discard(drive);
-        drive_forget(drive);
+        drive_reset_identification(drive);
         drive_restore_trim(drive, 0);
     }
     if (faults != 0U) {

@@ -57,7 +57,7 @@ static bool take(drive_t *drive, const record_t *record)
         return false;
     }
     if (record->compensation.measured != 0 && !drive_compensate(drive, &record->compensation)) {
-        drive_forget(drive);
+        drive_reset_identification(drive);
         return false;
     }
     drive_restore_trim(drive, record->trim);
