@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page's XCP session with an ECU that does not answer, without an ECU."""
 
+from typing import ClassVar
+
 import pytest
 from pyxcp.types import XcpTimeoutError
 
@@ -17,7 +19,7 @@ DESCRIPTION = Description("hsm1", (OBSERVER,), (), (), (), 1e-3)
 class Master:
     """A session that ends when the ECU is reset: afterwards nothing is answered."""
 
-    made: list["Master"] = []
+    made: ClassVar[list["Master"]] = []
 
     def __init__(self) -> None:
         self.is_reset, self.closed = False, False

@@ -41,7 +41,7 @@ class Tuning:
 
     def present(self) -> dict[str, float]:
         """Every value as the ECU holds it."""
-        with reported():
+        with self._xcp.reported():
             return self._read(WORKING)
 
     def table(self) -> list[dict[str, Any]]:
