@@ -20,9 +20,10 @@ MOVING = "[profile]\ntorque_Nm = 50\nspeed_rpm = 1500\n"
 ELSEWHERE = {  # plant fields that a scenario gives in another section, or that only the motor gives
     "pole_pairs", "pwm_hz", "winding_C", "magnet_scale", "vdc_V", "imposed_speed", "speed_rad_s",
     "inertia_kgm2", "load_Nm", "viscous_Nms", "seed",
-    # The dc link and its contactor, which an ECU controls: in a scenario the battery is always connected.
+    # The dc link, its contactor and the board's safe state, which an ECU controls: in a scenario the battery is always
+    # connected.
     "dc_link_F", "precharge_s", "discharge_s", "dc_load_ohm", "avalanche_V", "vdc_start_V", "precharge_open",
-    "discharge_open", "contactor_open",
+    "discharge_open", "contactor_open", "hardware_safe_V",
 }  # fmt: skip
 
 
