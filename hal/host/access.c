@@ -10,13 +10,13 @@
 #include "hal/host/parameters.h"
 #include "hal/host/stations.h"
 
-/* Torque and current requests are bounded by what the motor data allow. */
+/* Torque and current requests are bounded by what the motor data allow, which are floats. */
 static double bound_of(const parameter_t *p)
 {
     if (p->set == stations_set_requested_Nm) {
         return (double)motor.torque_max_Nm;
     }
-    return (double)motor.current_reference.i_max / 32768.0 * (double)motor.bases.current_A;
+    return (double)((float)motor.current_reference.i_max / 32768.0f * motor.bases.current_A);
 }
 
 /* Not isinf(): MinGW's macro converts its argument to a float. */
@@ -83,10 +83,12 @@ int parameters_check(const fluxtrue_t *drive, int handle, double value)
     if (!parameters_writable(handle)) {
         return FLUXTRUE_READ_ONLY;
     }
-    /* A calibration is compared as the float that it becomes. */
+    /* What is bounded by a float is compared as one: 1.8 as a double exceeds 1.8f. */
+    const bool of_floats = is_calibration(handle) || !is_number(parameters[handle].hi);
+    const double compared = of_floats ? (double)(float)value : value;
     const parameters_range_t range = parameters_range(drive, handle);
-    const bool meant = !is_calibration(handle) || value == 0.0 || (double)(float)value >= range.least;
-    return (value >= range.lo && value <= range.hi && meant) ? FLUXTRUE_OK : FLUXTRUE_OUT_OF_RANGE;
+    const bool meant = !is_calibration(handle) || value == 0.0 || compared >= range.least;
+    return (compared >= range.lo && compared <= range.hi && meant) ? FLUXTRUE_OK : FLUXTRUE_OUT_OF_RANGE;
 }
 
 int fluxtrue_set_by(fluxtrue_t *drive, int handle, double value)

@@ -102,7 +102,8 @@ def test_the_range_is_what_is_accepted(library: ctypes.CDLL, drive: Drive) -> No
         assert about.lo < about.hi, name
         for inside in (about.lo, about.hi, max(about.lo, about.least)):
             assert drive.set(name, inside) == OK, (name, inside)
-        for outside in (np.nextafter(about.lo, -math.inf), np.nextafter(about.hi, math.inf), math.nan, math.inf):
+        lower, upper = np.float32(about.lo), np.float32(about.hi)  # the firmware's own bounds are floats
+        for outside in (np.nextafter(lower, -np.inf), np.nextafter(upper, np.inf), math.nan, math.inf):
             assert drive.set(name, float(outside)) == OUT_OF_RANGE, (name, outside)
         if about.least > 0.0:
             assert drive.set(name, about.least / 2.0) == OUT_OF_RANGE, name

@@ -2,11 +2,13 @@
 """Who runs the cases: a process on each core, or the workers of an existing Dask cluster."""
 
 import ctypes
+import multiprocessing
 import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from tqdm import tqdm
@@ -32,11 +34,18 @@ def _worker() -> None:
 
 def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[int, Any]]:
     """(case, result) in the order they finish."""
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(max_workers=workers or len(os.sched_getaffinity(0)), initializer=_worker)
     try:
         waiting = {pool.submit(task, case): case for case in cases}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
+    except BrokenProcessPool as error:
+        # The pool sends its workers SIGTERM, which they ignore, and would wait for them without end.
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.kill()
+        raise FluxtrueError("a process with a case has ended (killed, or out of memory); what is finished is stored, "
+                            "and the same command continues") from error  # fmt: skip
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 

@@ -101,6 +101,10 @@ class LoopError(FluxtrueError):
         super().__init__(f"{name}{shown}: {REASONS.get(code, f'error {code}')}")
         self.name, self.value, self.code = name, value, code
 
+    def __reduce__(self) -> tuple[type["LoopError"], tuple[str, float | None, int]]:
+        """A worker hands the error to its parent as these arguments; by default only the text would go."""
+        return type(self), (self.name, self.value, self.code)
+
 
 class Loop:
     """One simulated drive. Calls into the library release the GIL: one thread per Loop works."""

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Worker processes that fail or end, and the errors that they hand over."""
+
+import os
+import pickle
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from fluxtrue_tools import errors
+from fluxtrue_tools.campaign import schedule
+from fluxtrue_tools.emulate import core  # noqa: F401 - defines an error
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor import quantise  # noqa: F401
+from fluxtrue_tools.sim.library import OUT_OF_RANGE, LoopError
+from fluxtrue_tools.vecu import channel  # noqa: F401
+
+
+def refused(case: int) -> None:
+    raise LoopError("plant.vdc_V", float(case), OUT_OF_RANGE)
+
+
+def ended(case: int) -> None:
+    """Case 0 ends its process; the others go on for ever."""
+    if case == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    while True:
+        signal.pause()
+
+
+def test_a_value_that_the_simulation_refuses_in_a_worker_reaches_the_user() -> None:
+    with pytest.raises(LoopError, match=r"^plant\.vdc_V = 3: out of range$") as raised:
+        list(schedule.local(refused, [3], 1))
+    assert (raised.value.name, raised.value.value, raised.value.code) == ("plant.vdc_V", 3.0, OUT_OF_RANGE)
+
+
+def test_a_worker_that_was_killed_ends_the_campaign_and_the_other_workers() -> None:
+    with pytest.raises(FluxtrueError, match="a process with a case has ended"):
+        list(schedule.local(ended, [0, 1], 2))
+
+
+def kinds(error: type[FluxtrueError]) -> Iterator[type[FluxtrueError]]:
+    yield error
+    for kind in error.__subclasses__():
+        yield from kinds(kind)
+
+
+@pytest.mark.parametrize("kind", list(kinds(errors.FluxtrueError)), ids=lambda kind: kind.__name__)
+def test_every_error_for_the_user_passes_between_processes(kind: type[FluxtrueError]) -> None:
+    given = ("name", 2.0, OUT_OF_RANGE) if kind is LoopError else ("a text",)
+    error = kind(*given)
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is kind
+    assert str(again) == str(error) != ""
