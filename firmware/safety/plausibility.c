@@ -67,12 +67,14 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
     return debounce_step(&state->oscillating, bad, config->ripple_steps, FAULT_CONTROL);
 }
 
-/* (MN-3): while no other phase changes, the machine may stand still and equal samples are plausible. */
-static bool is_sensor_stuck(const plausibility_config_t *config, uint8_t *count, bool equal, bool others_change)
+/* (MN-3): the sum of the phase currents does not change, so that a phase must change by as much as the other two
+ * together. It may well repeat itself while they change against each other, for example in a machine at rest. */
+static bool is_sensor_stuck(const plausibility_config_t *config, uint8_t *count, int32_t change, int32_t of_others)
 {
-    if (!equal) {
+    const int32_t change_min = config->i_dead >> 2; /* several converter counts: more than noise between two of them */
+    if (change != 0) {
         *count = 0;
-    } else if (others_change) {
+    } else if (fx_abs_q31(of_others) > change_min) {
         *count = (uint8_t)fx_min_s32(*count + 1, config->equal_steps);
     }
     return *count >= config->equal_steps;
@@ -82,15 +84,11 @@ static uint32_t stuck_sensors(const plausibility_config_t *config, plausibility_
                               const plausibility_in_t *in)
 {
     const abc_q15_t i = in->phases;
-    const int32_t change_min = config->i_dead >> 2; /* several converter counts: more than noise between two of them */
-    const int32_t a = fx_abs_q31(i.a - state->last.a);
-    const int32_t b = fx_abs_q31(i.b - state->last.b);
-    const int32_t c = fx_abs_q31(i.c - state->last.c);
+    const int32_t a = i.a - state->last.a, b = i.b - state->last.b, c = i.c - state->last.c;
     state->last = i;
-    const bool a_changes = a > change_min, b_changes = b > change_min, c_changes = c > change_min;
-    const bool a_stuck = is_sensor_stuck(config, &state->equal[0], a == 0, b_changes && c_changes);
-    const bool b_stuck = is_sensor_stuck(config, &state->equal[1], b == 0, a_changes && c_changes);
-    const bool c_stuck = is_sensor_stuck(config, &state->equal[2], c == 0, a_changes && b_changes);
+    const bool a_stuck = is_sensor_stuck(config, &state->equal[0], a, b + c);
+    const bool b_stuck = is_sensor_stuck(config, &state->equal[1], b, c + a);
+    const bool c_stuck = is_sensor_stuck(config, &state->equal[2], c, a + b);
     return (a_stuck || b_stuck || c_stuck) ? FAULT_CURRENT_STUCK : 0;
 }
 
