@@ -21,7 +21,7 @@
 
 typedef struct {
     int32_t turn_gain; /* change of the angle in a step to speed */
-    int32_t v_1;       /* in-phase voltage that inverter and resistance may change */
+    int32_t v_1;       /* in-phase voltage that the inverter's error and the angle's resolution may change */
     q15_t psi_share;   /* psi_f/5 */
     q15_t i_0;         /* change of the reference that starts again */
     q15_t i_min;

@@ -21,8 +21,10 @@ V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
 TRIM_RATE_RAD_S = 50.0
 TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
 
-TRACKER_BANDWIDTH_RAD_S = 300.0
-TRACKER_JUMP_TURNS = 1 / 20
+TRACKER_BANDWIDTH_RAD_S = 300.0  # or as much as the rotor's own acceleration needs, up to ...: (AT-19)
+TRACKER_BANDWIDTH_PER_PWM = 1 / 16
+TRACKER_JUMP_TURNS, TRACKER_JUMP_MAX_TURNS = 1 / 20, 1 / 8
+TRACKER_LAG_SHARE = 0.6  # of a jump, by the rotor alone with all torque
 ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
 REPEAT_TURNS = 2 / 4096  # mechanical: two counts of the coarsest sensor, (AT-16)
 LAG_SHARE = 0.25  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
@@ -58,6 +60,7 @@ FROZEN_SHARE, FROZEN_SETTLE_S = 0.25, 0.01  # of the inverter's voltage error; f
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
 DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
 LAUNCH_SHARE = 0.125  # of the inverter's voltage error: what a rotor's turning may change of its part along the current
+LAUNCH_ANGLE = 0.3 * 2.0 * math.pi / 4096  # of a turn of the rotor in a step: the resolution of a sensor of 12 bits
 LAUNCH_FLUX_SHARE = 0.2  # of psi_f: deviation of the magnet
 TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
@@ -319,13 +322,25 @@ def _monitors(config: MotorConfig) -> dict[str, float]:
     }
 
 
+def _tracker(config: MotorConfig) -> dict[str, float]:
+    """Bandwidth and jump with which the lag of a rotor that accelerates by itself is no jump (AT-19)."""
+    machine = config.machine
+    acceleration = machine.pole_pairs * machine.torque_max_Nm / machine.inertia_kgm2
+    wanted = math.sqrt(acceleration / (TRACKER_LAG_SHARE * TRACKER_JUMP_TURNS * 2.0 * math.pi))
+    bandwidth = max(TRACKER_BANDWIDTH_RAD_S, min(wanted, TRACKER_BANDWIDTH_PER_PWM * config.inverter.pwm_hz))
+    lag_turns = acceleration / bandwidth**2 / (2.0 * math.pi)
+    return {
+        "tracker_bandwidth_rad_s": bandwidth,
+        "tracker_jump_turns": min(max(TRACKER_JUMP_TURNS, lag_turns / TRACKER_LAG_SHARE), TRACKER_JUMP_MAX_TURNS),
+    }
+
+
 def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
     """All derived numbers of one motor."""
     psi_f = float(model.psi_d(0.0, 0.0))
     return Derived(
         psi_f_Vs=psi_f,
-        tracker_bandwidth_rad_s=TRACKER_BANDWIDTH_RAD_S,
-        tracker_jump_turns=TRACKER_JUMP_TURNS,
+        **_tracker(config),
         **_current_control(bases.period_s),
         **_modulation(config),
         **_identification(config, model, bases, psi_f),

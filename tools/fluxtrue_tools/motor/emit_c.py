@@ -22,6 +22,7 @@ from fluxtrue_tools.motor.derived import (
     FROZEN_SETTLE_S,
     HOT_S,
     LAG_SHARE,
+    LAUNCH_ANGLE,
     LAUNCH_FLUX_SHARE,
     LOST_S,
     PAPER_TURN_MAX,
@@ -466,11 +467,12 @@ def _frozen_angle(motor: Motor) -> list[Row]:
 
 def _launch_power(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    v_1 = q15(d.launch_V / b.voltage_V, "launch_V") * b.periods_per_step
+    launch_V = d.launch_V + LAUNCH_ANGLE * motor.config.machine.pole_pairs / b.step_s * d.psi_f_Vs
+    v_1 = q15(launch_V / b.voltage_V, "launch_V") * b.periods_per_step
     turn_gain = round(2 * math.pi * b.periods_per_step * Q15_ONE / (b.omega_rad_s * b.step_s))
     return [
         ("turn_gain", f"{turn_gain}", "2 pi times the periods of a step/(omega_b T), Q15"),
-        ("v_1", str(v_1), f"{d.launch_V:.4g} V in each of {b.periods_per_step} periods"),
+        ("v_1", str(v_1), f"{launch_V:.4g} V in each of {b.periods_per_step} periods"),
         ("psi_share", q15(LAUNCH_FLUX_SHARE * d.psi_f_Vs / b.flux_Vs, "psi_share"), f"{LAUNCH_FLUX_SHARE:g} psi_f"),
         ("i_0", q15(d.launch_A / b.current_A, "i_0"), f"{d.launch_A:g} A"),
         ("i_min", q15(d.monitor_A / b.current_A, "i_min"), f"{d.monitor_A:g} A"),
