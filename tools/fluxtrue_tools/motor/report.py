@@ -7,6 +7,7 @@ import numpy as np
 
 from fluxtrue_tools.bus.scales import QUANTITIES, carriers, standard_factors
 from fluxtrue_tools.motor import doubts
+from fluxtrue_tools.motor.load import load_lines
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.names import DBC_NAME
 from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
@@ -163,6 +164,7 @@ def report_text(motor: Motor) -> str:
         _short_circuit(motor),
         _bases(motor),
         _bus(motor),
+        load_lines(motor),
         [
             f"flash: {motor.tables.flash_bytes} bytes flux tables + {motor.references.flash_bytes} bytes "
             "references "
