@@ -5,9 +5,13 @@
  * Source   docs/howto/port.md
  * Units    fraction of a mechanical turn, 2^32 = one turn; wraps
  * Errors   none here; implausible steps are found by the angle tracker
- * Context  fast ISR, once per period */
+ * Context  hal_angle_read(): fast ISR, once per period; hal_angle_is_absolute(): 1 kHz task */
+#include <stdbool.h>
 #include <stdint.h>
 
 uint32_t hal_angle_read(void);
+/** Whether the angle is that of the shaft. An incremental encoder counts from an unknown angle until its index has
+ * passed: speed and direction are right from the start, and torque is refused. Once true it stays true. */
+bool hal_angle_is_absolute(void);
 
 #endif

@@ -177,6 +177,7 @@ typedef struct {
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
     bool gates; /* as read back: the switches follow the duties */
+    bool angle_absolute;
 } snapshot_t;
 
 /** The motor's constants that every PWM period reads, copied: in RAM they need neither a pointer nor an access to
@@ -282,6 +283,12 @@ static inline bool drive_is_shorted(const drive_t *drive)
 static inline void drive_hold(drive_t *drive, bool held)
 {
     drive->held = held;
+}
+/** The angle sensor's readings are larger by this part of a turn from the next one on, because it has found its zero;
+ * the rotor has not moved. With switching disabled; from the fast ISR's priority. */
+static inline void drive_move_angle(drive_t *drive, uint32_t by)
+{
+    angle_tracker_move(&drive->period.angle_tracker, &drive->fast.angle_tracker, by);
 }
 /** Current references come from outside the torque path. */
 static inline bool drive_bypasses_torque_path(const drive_t *drive)

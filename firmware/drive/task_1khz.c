@@ -6,12 +6,13 @@
 #include "drive/slow_monitors.h"
 #include "drive/switch_off.h"
 #include "fx/vec.h"
+#include "hal/angle.h"
 #include "hal/pwm.h"
 #include "hal/temperature.h"
 #include "signal/program_flow.h"
 #include "signal/rate_limit.h"
 
-static run_state_t next_run_state(drive_t *drive, uint32_t faults)
+static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
 {
     const request_t *request = &drive->request;
     task_state_t *task = &drive->task;
@@ -26,10 +27,10 @@ static run_state_t next_run_state(drive_t *drive, uint32_t faults)
         drive_reset_identification(drive);
         drive_restore_trim(drive, 0);
     }
-    if (faults != 0U) {
+    if (snapshot->faults != 0U) {
         return RUN_STATE_FAULT;
     }
-    return (enable && !drive->held) ? RUN_STATE_RUN : RUN_STATE_OFF;
+    return (enable && !drive->held && snapshot->angle_absolute) ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* Compares the acting voltage with the plan of the last step. */
@@ -196,6 +197,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
         exchange_barrier();
     } while (drive->samples.generation != generation);
     snapshot->gates = hal_pwm_gates();
+    snapshot->angle_absolute = hal_angle_is_absolute();
     snapshot->inverter_dC = hal_temperature_inverter_dC();
     snapshot->winding_dC = hal_temperature_winding_dC();
 }
@@ -210,7 +212,7 @@ void task_1khz(drive_t *drive)
                          task->angle_correction);
     uint32_t faults = slow_monitors_step(drive, &snapshot) | data_check_step(drive) | drive->request.faults;
     task->flow = flow_pass(task->flow, FLOW_MONITORED);
-    task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, snapshot.faults), &faults);
+    task->run_state = switch_off_step(drive, &snapshot, next_run_state(drive, &snapshot), &faults);
     task->flow = flow_pass(task->flow, FLOW_DECIDED);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/ecu_private.h"
+#include "hal/angle.h"
 #include "signal/counter.h"
 #include "signal/debounce.h"
 #include "types/si.h"
@@ -159,6 +160,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_near_battery = battery_voltage_is_near(&voltages),
         .dc_contradicts = battery_voltage_contradicts(&ecu->battery_voltage, &voltages),
         .sensors_plausible = are_sensors_plausible(drive, &sample),
+        .angle_absolute = hal_angle_is_absolute(),
         .slow = is_slow(drive),
         .derated = derating_reason(ecu) != DERATING_REASON_NONE,
         .gate_fault = gate_fault,

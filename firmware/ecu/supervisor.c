@@ -38,6 +38,9 @@ static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
     if (!in->sensors_plausible) {
         return refuse(s, REFUSED_SENSOR_IMPLAUSIBLE);
     }
+    if (!in->angle_absolute) {
+        return refuse(s, REFUSED_ANGLE_NOT_ABSOLUTE);
+    }
     if (!in->torque_requested_is_zero) {
         return refuse(s, REFUSED_TORQUE_REQUEST_NOT_ZERO);
     }

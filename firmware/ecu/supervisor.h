@@ -6,7 +6,8 @@
  *   the present state and whose conditions all hold is taken. Outputs depend on the state alone.
  *   Except for a trip, run and derate end only when a ramp has brought the torque to zero.
  *   Enable is accepted at a rising edge in a frame of the bus, in state ready, with no torque requested, no fault,
- *   plausible sensors and the dc voltage in range; otherwise it is refused and the reason is transmitted.
+ *   plausible sensors, an absolute angle and the dc voltage in range; otherwise it is refused and the reason is
+ *   transmitted.
  * Source   docs/howto/can.md, whose drawing is made from the same table
  * Units    us of true time; the longest time-out is 5 s
  * Errors   its own faults are latched in faults (ecu_fault_t) until a reset after their cause has gone
@@ -49,7 +50,8 @@
     X(NOT_READY, 5, "Enable in another state than ready, or in another mode than torque.") \
     X(MODE_LOCKED, 6, "Enable in the current mode for commissioning, which is locked on the bus.") \
     X(COMMAND_TIMED_OUT, 7, "The command was lost while the drive was enabled.") \
-    X(RESET_WHILE_ENABLED, 8, "Reset while enable was on, or in another state than fault.")
+    X(RESET_WHILE_ENABLED, 8, "Reset while enable was on, or in another state than fault.") \
+    X(ANGLE_NOT_ABSOLUTE, 9, "Enable before the angle sensor has found the absolute angle.")
 
 #define STATE_VALUE(name, value, text) STATE_##name = (value),
 #define ECU_FAULT_BIT(name, bit, text) ECU_FAULT_##name = 1U << (bit),
@@ -101,7 +103,7 @@ typedef struct {
     bool torque_requested_is_zero, torque_arbitrated_is_zero;
     bool dc_in_range, dc_settled, dc_safe; /* safe: below the voltage that is safe to touch */
     bool dc_near_battery, dc_contradicts;  /* ecu/battery_voltage.h; near also while the battery's is not known */
-    bool sensors_plausible;
+    bool sensors_plausible, angle_absolute;
     bool slow;
     bool derated;
     bool gate_fault, task_late, stalled;

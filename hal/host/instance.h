@@ -36,8 +36,9 @@ typedef struct {
     bool watchdog_started;
     uint32_t watchdog_services;
     external_watchdog_t external_watchdog;
-    bool gates_stuck; /* reads back as enabled */
-    bool task_stuck;  /* the 1 kHz task does not run any more */
+    bool angle_unknown; /* the sensor has not found the absolute angle */
+    bool gates_stuck;   /* reads back as enabled */
+    bool task_stuck;    /* the 1 kHz task does not run any more */
 } host_board_t;
 
 struct fluxtrue {

@@ -41,6 +41,11 @@ uint32_t hal_angle_read(void)
     return active->theta_m;
 }
 
+bool hal_angle_is_absolute(void)
+{
+    return !active->board.angle_unknown;
+}
+
 void hal_pwm_write(duty_t duty)
 {
     active->duty = duty;

@@ -5,7 +5,8 @@
  * Source   README.md, angle
  * Units    period_ticks: one PWM period in ticks of FTM0
  * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an encoder
- * Context  angle_init(): start-up, right before the PWM starts; angle_fault(): fast ISR, after hal_angle_read() */
+ * Context  angle_init(): start-up, right before the PWM starts; angle_fault(): fast ISR, after hal_angle_read();
+ *          angle_follow_index(): the fast ISR's priority, before hal_angle_read() */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -14,5 +15,8 @@ void angle_init(uint32_t period_ticks);
  * fault. Start-up, after pwm_init() and before angle_init(); takes up to 0.1 ms. */
 float angle_first_speed(void);
 bool angle_fault(void);
+/** While hal_angle_is_absolute() is false. Once the encoder's index has passed, the next angle is absolute; the result
+ * is the part of a turn by which it is larger than the angle from which it counted before. Otherwise 0. */
+uint32_t angle_follow_index(void);
 
 #endif

@@ -5,17 +5,20 @@
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/clock.h"
 #include "hal/s32k144/core.h"
+#include "hal/s32k144/pins.h"
 #include "hal/s32k144/registers.h"
 
 #define COUNTS_PER_TURN 16384U /* 4096 lines, four edges each */
 #define TURN_SHIFT 18          /* 2^32 / COUNTS_PER_TURN */
-#define INPUT_FILTER 0x44U     /* channels 0 and 1: 4 clocks of 4 */
+#define INPUT_FILTER 0x444U    /* channels 0 to 2: 4 clocks of 4 */
 #define SYSTEM_CLOCK 1U
 #define FIRST_PER_S 10000U /* length of the first measurement of the speed */
 
 static struct {
     int32_t at_last;      /* reading of the period before */
+    uint32_t at_index;    /* where the counter was when the index rose */
     int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+    volatile bool absolute;
 } encoder;
 
 static void start_decoder(void)
@@ -29,11 +32,37 @@ static void start_decoder(void)
     FTM2->SC = FTM_SC_CLKS(SYSTEM_CLOCK);
 }
 
+/* Channel 2 takes the counter's value when the index rises. A rotor that stands on its index makes no edge: the counter
+ * is then right from its start. */
+static void find_index(void)
+{
+    FTM2->C2SC = FTM_C2SC_ELSA;
+    encoder.at_index = 0;
+    encoder.absolute = (PTD->PDIR & 1U << PIN_INDEX) != 0U;
+}
+
 void angle_init(uint32_t period_ticks)
 {
     encoder.q32_per_tick = (int32_t)(UINT32_MAX / period_ticks);
     encoder.at_last = 0;
     start_decoder();
+    find_index();
+}
+
+bool hal_angle_is_absolute(void)
+{
+    return encoder.absolute;
+}
+
+uint32_t angle_follow_index(void)
+{
+    if (encoder.absolute || (FTM2->C2SC & FTM_C2SC_CHF) == 0U) {
+        return 0;
+    }
+    encoder.at_index = FTM2->C2V << TURN_SHIFT;
+    encoder.at_last = (int32_t)((uint32_t)encoder.at_last - encoder.at_index);
+    encoder.absolute = true;
+    return 0U - encoder.at_index;
 }
 
 /* The counts of 0.1 ms: one is 37 rpm. */
@@ -55,7 +84,7 @@ bool angle_fault(void)
  * negative. */
 uint32_t hal_angle_read(void)
 {
-    const uint32_t now = FTM2->CNT << TURN_SHIFT;
+    const uint32_t now = (FTM2->CNT << TURN_SHIFT) - encoder.at_index;
     const int32_t passed = (int32_t)(FTM0->CNT * (uint32_t)encoder.q32_per_tick);
     const int32_t travel = (int32_t)(now - (uint32_t)encoder.at_last);
     encoder.at_last = (int32_t)now;

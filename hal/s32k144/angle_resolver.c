@@ -63,6 +63,16 @@ uint32_t hal_angle_read(void)
     return (uint32_t)position.value << 16;
 }
 
+bool hal_angle_is_absolute(void)
+{
+    return true;
+}
+
+uint32_t angle_follow_index(void)
+{
+    return 0;
+}
+
 bool angle_fault(void)
 {
     return missing >= MISSING_MAX || position.fault != 0U;

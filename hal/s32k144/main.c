@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 #include "ecu/ecu.h"
+#include "hal/angle.h"
 #include "hal/s32k144/after_reset.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/can.h"
@@ -32,11 +33,12 @@ memory_t memory; /* debuggers find it by this name */
 /* For a counter that never runs, and the 1 kHz of the task. */
 #define STOPPED_PERIODS 10U
 static const pwm_config_t stopped = {11200, 1120};
-/* Faults found by the gate driver's interrupt, the converters' interrupt and the background loop. The fast ISR, which
- * alone raises faults, reads them as one word. */
+/* Faults found by the gate driver's interrupt, the converters' interrupt and the background loop, and an angle that is
+ * not absolute, found by the 1 kHz task. The fast ISR, which alone raises faults, reads them as one word. */
 static volatile union {
     struct {
         bool gate_driver, sampling, data_damaged;
+        bool angle_relative; /* the encoder's index has not passed */
     };
     uint32_t any;
 } alarms;
@@ -55,6 +57,9 @@ static __attribute__((noinline, cold)) void alarms_take(void)
     }
     if (alarms.data_damaged) {
         drive_refuse(&ecu.drive, MOTOR_CHECK_IMAGE_CHECKSUM);
+    }
+    if (alarms.angle_relative) {
+        drive_move_angle(&ecu.drive, angle_follow_index());
     }
 }
 
@@ -90,6 +95,7 @@ void tick_handler(void)
 {
     tick_cleared();
     sampling_tick();
+    alarms.angle_relative = !hal_angle_is_absolute();
 #if DIRECT
     hal_watchdog_service();
     task_1khz(&ecu.drive);

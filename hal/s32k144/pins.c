@@ -14,28 +14,30 @@ typedef struct {
 
 #define GPIO 1U
 #define PULL_UP (PORT_PCR_PE | PORT_PCR_PS)
+#define PULL_DOWN PORT_PCR_PE
 #define OUTPUTS                                                                                              \
     ((1U << PIN_PRECHARGE) | (1U << PIN_MAIN_CONTACTOR) | (1U << PIN_DISCHARGE) | (1U << PIN_GATE_DRIVER) | \
      (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1))
 
 /* The analogue inputs, PTA0 ... PTA3, PTA6 and PTD2, are as reset leaves them. */
 static const pin_t pins[] = {
-    {PORTD, 15, 2, 0},       /* FTM0_CH0, upper switch of phase a */
-    {PORTD, 16, 2, 0},       /* FTM0_CH1, lower switch of phase a */
-    {PORTD, 0, 2, 0},        /* FTM0_CH2 */
-    {PORTD, 1, 2, 0},        /* FTM0_CH3 */
-    {PORTB, 4, 2, 0},        /* FTM0_CH4 */
-    {PORTB, 5, 2, 0},        /* FTM0_CH5 */
-    {PORTE, 8, 2, 0},        /* FTM0_CH6, SAMPLE of the AD2S1210 */
-    {PORTA, 14, 2, PULL_UP}, /* FTM0_FLT0, gate driver fault, active low */
-    {PORTD, 10, 3, PULL_UP}, /* FTM2_QD_PHB */
-    {PORTD, 11, 3, PULL_UP}, /* FTM2_QD_PHA */
-    {PORTB, 0, 3, 0},        /* LPSPI0_PCS0, WR/FSYNC of the AD2S1210 */
-    {PORTB, 1, 3, 0},        /* LPSPI0_SOUT */
-    {PORTB, 2, 3, 0},        /* LPSPI0_SCK */
-    {PORTB, 3, 3, 0},        /* LPSPI0_SIN */
-    {PORTE, 4, 5, PULL_UP},  /* CAN0_RX */
-    {PORTE, 5, 5, 0},        /* CAN0_TX */
+    {PORTD, 15, 2, 0},                /* FTM0_CH0, upper switch of phase a */
+    {PORTD, 16, 2, 0},                /* FTM0_CH1, lower switch of phase a */
+    {PORTD, 0, 2, 0},                 /* FTM0_CH2 */
+    {PORTD, 1, 2, 0},                 /* FTM0_CH3 */
+    {PORTB, 4, 2, 0},                 /* FTM0_CH4 */
+    {PORTB, 5, 2, 0},                 /* FTM0_CH5 */
+    {PORTE, 8, 2, 0},                 /* FTM0_CH6, SAMPLE of the AD2S1210 */
+    {PORTA, 14, 2, PULL_UP},          /* FTM0_FLT0, gate driver fault, active low */
+    {PORTD, 10, 3, PULL_UP},          /* FTM2_QD_PHB */
+    {PORTD, 11, 3, PULL_UP},          /* FTM2_QD_PHA */
+    {PORTD, PIN_INDEX, 2, PULL_DOWN}, /* FTM2_CH2, index of the encoder; a broken wire never shows one */
+    {PORTB, 0, 3, 0},                 /* LPSPI0_PCS0, WR/FSYNC of the AD2S1210 */
+    {PORTB, 1, 3, 0},                 /* LPSPI0_SOUT */
+    {PORTB, 2, 3, 0},                 /* LPSPI0_SCK */
+    {PORTB, 3, 3, 0},                 /* LPSPI0_SIN */
+    {PORTE, 4, 5, PULL_UP},           /* CAN0_RX */
+    {PORTE, 5, 5, 0},                 /* CAN0_TX */
     {PORTC, PIN_PRECHARGE, GPIO, 0},
     {PORTC, PIN_MAIN_CONTACTOR, GPIO, 0},
     {PORTC, PIN_DISCHARGE, GPIO, 0},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_PINS_H
 #define HAL_S32K144_PINS_H
-/** Which pin does what. GPIO lines are all on port C.
+/** Which pin does what. GPIO lines are all on port C, the encoder's index is on port D.
  * Source   README.md, pins
  * Context  start-up, before the timers start */
 #include <stdbool.h>
@@ -13,7 +13,8 @@ enum {
     PIN_GATE_DRIVER = 3,
     PIN_SAFE_STATE = 6,
     PIN_RESOLVER_A0 = 8,
-    PIN_RESOLVER_A1 = 9
+    PIN_RESOLVER_A1 = 9,
+    PIN_INDEX = 12
 };
 
 /** All lines off but the safe state's: it stays released, so that the board's hardware keeps the bridge. */

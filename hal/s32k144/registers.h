@@ -352,6 +352,8 @@ _Static_assert(offsetof(ftm_t, SWOCTRL) == 0x94, "SWOCTRL");
 #define FTM_SC_PWMEN5 0x200000U
 #define FTM_SC_PWMEN6 0x400000U
 #define FTM_C0SC_ELSB 0x8U
+#define FTM_C2SC_ELSA 0x4U
+#define FTM_C2SC_CHF 0x80U
 #define FTM_MODE_FTMEN 0x1U
 #define FTM_MODE_WPDIS 0x4U
 #define FTM_MODE_FAULTM_MASK 0x60U

@@ -7,3 +7,10 @@ uint32_t hal_angle_read(void)
 {
     return 0;
 }
+
+/* Write: true for a resolver or an absolute encoder; for an incremental encoder from the time its index has passed and
+ * hal_angle_read() counts from it. Until then torque is refused. */
+bool hal_angle_is_absolute(void)
+{
+    return false;
+}

@@ -7,7 +7,7 @@ import pytest
 from rig import Rig
 
 REFUSED = ("none", "torque_request_not_zero", "fault", "dc_voltage_out_of_range", "sensor_implausible", "not_ready",
-           "mode_locked", "command_timed_out", "reset_while_enabled")  # fmt: skip
+           "mode_locked", "command_timed_out", "reset_while_enabled", "angle_not_absolute")  # fmt: skip
 PROTECTION, PRECHARGE, DISCHARGE, GATE = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 OVER_CURRENT, OVER_VOLTAGE, UNDER_VOLTAGE, CURRENT_SUM = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 DRIVER = 1 << 15  # the same fault in the word of the drive, set by the interrupts
@@ -79,6 +79,22 @@ def test_the_commissioning_mode_is_locked_on_the_bus(rig: Rig) -> None:
     rig.ask(enable=True)
     rig.advance(0.1)
     assert (rig.state, refusal(rig)) == ("standby", "mode_locked")
+
+
+@pytest.mark.plant
+def test_enable_before_the_angle_is_absolute_is_refused(rig: Rig) -> None:
+    """An encoder counts, and its index has not passed: the state machine waits in ready, without switching."""
+    rig.stand.set(board_angle_unknown=1.0)
+    rig.ask(mode="torque")
+    rig.wait_for("ready")
+    rig.ask(enable=True)
+    rig.advance(0.1)
+    assert (rig.state, refusal(rig)) == ("ready", "angle_not_absolute")
+    rig.stand.set(board_angle_unknown=0.0)
+    rig.ask(enable=False)
+    rig.advance(0.05)
+    rig.ask(enable=True)
+    rig.wait_for("run")
 
 
 def test_disable_under_torque_ramps_to_zero_and_then_disables_switching(rig: Rig) -> None:

@@ -18,6 +18,7 @@ typedef struct {
 static const stand_field_t fields[] = {
     {"board.inverter_C", offsetof(stand_t, inverter_C), -100.0, 300.0},
     {"board.gate_fault", offsetof(stand_t, gate_fault), 0.0, 1.0},
+    {"board.angle_unknown", offsetof(stand_t, angle_unknown), 0.0, 1.0},
     {"board.gates_stuck", offsetof(stand_t, gates_stuck), 0.0, 1.0},
     {"board.supply_stuck", offsetof(stand_t, supply_stuck), 0.0, 1.0},
     {"board.watchdog_stuck", offsetof(stand_t, watchdog_stuck), 0.0, 1.0},

@@ -13,6 +13,7 @@
 typedef struct {
     double inverter_C;
     double gate_fault;                                            /* not 0: the driver reports a fault */
+    double angle_unknown;                                         /* not 0: an encoder before its index */
     double gates_stuck, supply_stuck, watchdog_stuck, task_stuck; /* not 0: defective; hal/host/instance.h */
 } stand_t;
 

@@ -89,6 +89,7 @@ static void stand_step(vecu_t *vecu)
 {
     ecu.board.gate_fault = vecu->stand.gate_fault != 0.0;
     ecu.board.inverter_C = vecu->stand.inverter_C;
+    ecu.board.angle_unknown = vecu->stand.angle_unknown != 0.0;
     ecu.board.gates_stuck = vecu->stand.gates_stuck != 0.0;
     ecu.board.task_stuck = vecu->stand.task_stuck != 0.0;
     ecu.board.external_watchdog.supply_does_not_stop = vecu->stand.supply_stuck != 0.0;

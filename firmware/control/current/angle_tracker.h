@@ -57,6 +57,13 @@ typedef struct {
 angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
 angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_m);
 
+/** The sensor's zero has moved, not the rotor: from the next sample on theta_m is larger by this part of a turn. */
+static inline void angle_tracker_move(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t by)
+{
+    state->theta_m += by;
+    state->predicted += config->pole_pairs * by;
+}
+
 /** After a sample that jumped, in place of its result: what was predicted for it. The step of the loop is undone, and
  * the tracker continues at the speed before. theta_e: of the sample. */
 angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e);

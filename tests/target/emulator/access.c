@@ -11,6 +11,7 @@ enum { PDOR = 0x00, PDDR = 0x14 };
 
 emu_pins_t *emu_pins(emu_t *emu)
 {
+    ftm_shaft(emu);
     emu->s.pins_set_at = emu->s.ftm[0].triggers_due ? emu->s.ftm[0].start : emu->s.now; /* start of the period */
     return &emu->s.pins;
 }

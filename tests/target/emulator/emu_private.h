@@ -20,6 +20,7 @@ enum {
     EMU_RDC_A0 = 8, /* pins of port C, hal/s32k144/README.md */
     EMU_RDC_A1 = 9,
     EMU_GATE_DRIVER = 3,
+    EMU_INDEX = 12, /* of port D */
     EMU_SAFE_STATE = 6,
     RAM_BASE = 0x1FFF8000,
     RAM_SIZE = 0xF000,
@@ -80,6 +81,7 @@ typedef struct {
     uint64_t stopped_at;                         /* when a debugger halted the counter, 0: it is not halted */
     bool switching;                              /* switching was enabled at the last check */
     uint32_t quad_offset;
+    uint32_t shaft;   /* angle up to which the encoder's index has been followed */
     uint32_t read[2]; /* the values of the counter that the program has read last and before that */
 } ftm_t;
 
@@ -308,6 +310,9 @@ void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);
+/** Follows the shaft past the encoder's index; the index's level. */
+void ftm_shaft(emu_t *emu);
+bool ftm_index(const emu_t *emu);
 uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits);
 void rdc_power_on(emu_t *emu);
 /** The timer's outputs 0 ... 5 at this instant, one bit each. */

@@ -13,13 +13,14 @@
  * channel 6: the edge that samples a resolver        | yes      | test_a_resolver_image_computes_the_same_bits
  * FTM2: quadrature decoder                           | yes      | test_the_counter_follows_the_encoder
  * FTM2: counts from CNTIN, whatever the angle        | yes      | test_the_decoder_does_not_know_the_angle_at_its_start
+ * FTM2: channel 2 captures the counter at its edge   | yes      | test_the_counter_is_captured_where_the_index_rises
  * BDMMODE: counter while the core is halted          | yes      | test_a_halted_core_leaves_outputs_as_bdmmode_says
  * up-down counting, interrupts, legacy sync, INVCTRL | refused  | test_other_timer_modes_are_refused
- * reload points, input capture                       | no       | -
+ * reload points, capture by other channels           | no       | -
  */
 #include "ftm_private.h"
 
-enum { INIT_TRIGGER = 22 };
+enum { INIT_TRIGGER = 22, C2SC = C0SC + 16, C2V = C0V + 16, CHF = 0x80 };
 
 static const peripheral_t *of(int instance)
 {
@@ -56,6 +57,47 @@ static uint32_t decoded(const emu_t *emu, const peripheral_t *self)
     return (uint32_t)((at + emu->s.ftm[self->instance].quad_offset) % counts);
 }
 
+/* ---- index of the encoder: high for one count, at the shaft's zero ---- */
+
+static uint32_t index_width(const emu_t *emu)
+{
+    return (uint32_t)((1ULL << 32) / (bus_get(emu, of(1), MOD) + 1ULL));
+}
+
+bool ftm_index(const emu_t *emu)
+{
+    return emu_angle(emu) < index_width(emu);
+}
+
+/* Whether the shaft has come to the index on its way. */
+static bool index_rose(const emu_t *emu, uint32_t from, int32_t moved)
+{
+    const int64_t to = (int64_t)from + moved;
+    const int64_t width = index_width(emu);
+    return moved > 0 ? to >= 1LL << 32 : (int64_t)from >= width && to < width;
+}
+
+/* Channel 2 has the pin of the index and captures its rising edge (ELSA). */
+static bool captures_index(const emu_t *emu, const peripheral_t *self)
+{
+    const uint32_t function = bus_get(emu, bus_find("PORTD"), 4U * EMU_INDEX) >> 8 & 7U;
+    return decoding(emu, self) && function == 2U && (bus_get(emu, self, C2SC) & 0x3CU) == 4U;
+}
+
+/* Called whenever the shaft's motion changes, and before the capture is read. */
+void ftm_shaft(emu_t *emu)
+{
+    ftm_t *f = &emu->s.ftm[1];
+    const peripheral_t *self = of(1);
+    const uint32_t now = emu_angle(emu);
+    const bool rose = index_rose(emu, f->shaft, (int32_t)(now - f->shaft));
+    f->shaft = now;
+    if (rose && captures_index(emu, self)) {
+        bus_put(emu, self, C2V, f->quad_offset % (bus_get(emu, self, MOD) + 1U));
+        bus_put(emu, self, C2SC, bus_get(emu, self, C2SC) | CHF);
+    }
+}
+
 /* ---- registers ---- */
 
 static uint32_t counter(const emu_t *emu, const peripheral_t *self, uint32_t stored)
@@ -72,6 +114,10 @@ static uint32_t counter(const emu_t *emu, const peripheral_t *self, uint32_t sto
 uint32_t ftm_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t stored)
 {
     ftm_t *f = &emu->s.ftm[self->instance];
+    if (self->instance == 1 && (offset == C2SC || offset == C2V)) {
+        ftm_shaft(emu);
+        return bus_get(emu, self, offset);
+    }
     switch (offset) {
     case CNT:
         f->read[1] = f->read[0];

@@ -133,7 +133,8 @@ static uint32_t timer_levels(const emu_t *emu, const char *port, uint32_t of_gpi
 static uint32_t levels(const emu_t *emu, const peripheral_t *self)
 {
     const char port[] = {'P', 'O', 'R', 'T', self->name[2], '\0'};
-    return timer_levels(emu, port, bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR));
+    const uint32_t index = self->name[2] == 'D' && ftm_index(emu) ? 1U << EMU_INDEX : 0U;
+    return index | timer_levels(emu, port, bus_get(emu, self, PDOR) & bus_get(emu, self, PDDR));
 }
 
 bool gpio_models(uint32_t offset)

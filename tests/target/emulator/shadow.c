@@ -14,17 +14,20 @@
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE_VECTOR = 16 + 103 };
 #define PWM_TICK_S (1.0 / 112e6)
-enum { ENCODER_SHIFT = 18 };
+enum { ENCODER_SHIFT = 18, CAPTURED = 0x80 };
 
-/* Computes the angle as hal/s32k144/angle_quadrature.c and angle_resolver.c do, from the values that they have read. */
+/* Computes the angle as hal/s32k144/angle_quadrature.c and angle_resolver.c do, from the values that they have read. An
+ * encoder's index has passed before, or the counter started at it. */
 static uint32_t angle_read(const emulated_t *e)
 {
     if ((emu_register(e->emu, "FTM2.QDCTRL") & 1U) == 0) {
         return emu_resolver_angle(e->emu);
     }
     const uint32_t q32_per_tick = UINT32_MAX / (uint32_t)(emu_register(e->emu, "FTM0.MOD") + 1U);
-    const uint32_t now = emu_counter_read(e->emu, 1, false) << ENCODER_SHIFT;
-    const uint32_t last = emu_counter_read(e->emu, 1, true) << ENCODER_SHIFT;
+    const bool passed_index = (emu_register(e->emu, "FTM2.C2SC") & CAPTURED) != 0U;
+    const uint32_t at_index = passed_index ? (uint32_t)emu_register(e->emu, "FTM2.C2V") : 0U;
+    const uint32_t now = (emu_counter_read(e->emu, 1, false) - at_index) << ENCODER_SHIFT;
+    const uint32_t last = (emu_counter_read(e->emu, 1, true) - at_index) << ENCODER_SHIFT;
     const int32_t passed = (int32_t)(emu_counter_read(e->emu, 0, false) * q32_per_tick);
     return now - (uint32_t)fx_mulhi((int32_t)(now - last), passed);
 }

@@ -345,6 +345,31 @@ def test_the_decoder_does_not_know_the_angle_at_its_start(ftm: Core) -> None:
     assert ftm.load("FTM2.CNT") == 2048
 
 
+CAPTURED = 0x80
+
+
+@pytest.mark.parametrize("way", [(0.875, 0.125), (0.25, 0.9375)], ids=["forwards", "backwards"])
+def test_the_counter_is_captured_where_the_index_rises(ftm: Core, way: tuple[float, float]) -> None:
+    """The index is high for one count at the shaft's zero; the counter began at another angle. The flag is cleared by
+    writing 0."""
+    ftm.turn(0.5)
+    for pin, function in (("10", 3), ("11", 3), ("12", 2)):
+        ftm.store(f"PORTD.PCR{pin}", function << 8)
+    for name, value in (("MOD", 16383), ("CNT", 0), ("C2SC", 4), ("QDCTRL", 1), ("SC", 1 << 3)):
+        ftm.store(f"FTM2.{name}", value)
+    ftm.turn(way[0])
+    assert ftm.load("FTM2.C2SC") == 4
+    assert ftm.load("PTD.PDIR") >> 12 & 1 == 0
+    ftm.turn(way[1])
+    assert ftm.load("FTM2.C2SC") == 4 | CAPTURED
+    assert ftm.load("FTM2.C2V") == 8192
+    ftm.store("FTM2.C2SC", 4)
+    ftm.turn(way[1] + 0.03125)
+    assert ftm.load("FTM2.C2SC") == 4
+    ftm.turn(0.0)
+    assert ftm.load("PTD.PDIR") >> 12 & 1 == 1
+
+
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [

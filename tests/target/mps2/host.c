@@ -26,6 +26,11 @@ uint32_t hal_angle_read(void)
     return script.angle;
 }
 
+bool hal_angle_is_absolute(void)
+{
+    return true;
+}
+
 void hal_pwm_write(duty_t duty)
 {
     duties = duty;

@@ -54,6 +54,21 @@ void test_the_speed_is_correct_from_the_second_sample_on_without_a_cycle_slip(vo
     TEST_ASSERT_FALSE(y.jumped);
 }
 
+/* An encoder finds its index at speed: the readings are larger from the next sample on. */
+void test_a_zero_that_moves_is_no_movement_of_the_rotor(void)
+{
+    const uint32_t advance = (uint32_t)(0.05 / 3.0 * turn);
+    const uint32_t by = 0xC0FFEE00U;
+    (void)step(0xF0000000U);
+    (void)step(0xF0000000U + advance);
+    const angle_t before = step(0xF0000000U + 2U * advance);
+    angle_tracker_move(&f.angle_tracker, &state, by);
+    const angle_t y = step(0xF0000000U + by + 3U * advance);
+    TEST_ASSERT_FALSE(y.jumped);
+    TEST_ASSERT_INT_WITHIN(64, before.omega_q31, y.omega_q31);
+    TEST_ASSERT_EQUAL_HEX32(3U * (0xF0000000U + by + 3U * advance) + f.angle_tracker.offset, y.theta_e);
+}
+
 /* omega_b T_s = 1.5 exceeds pu_to_turn's format: half of it, and a shift. */
 void test_with_a_shift_a_field_that_turns_far_is_tracked_through_a_lost_sample(void)
 {

@@ -64,6 +64,12 @@ static bool pwm_gates(int calls)
     return seam.gates && !seam.gates_blocked;
 }
 
+static bool angle_is_absolute(int calls)
+{
+    (void)calls;
+    return !seam.angle_unknown;
+}
+
 static int16_t winding(int calls)
 {
     (void)calls;
@@ -82,6 +88,7 @@ void seam_start(void)
     periods = 0;
     hal_adc_read_Stub(adc_read);
     hal_angle_read_Stub(angle_read);
+    hal_angle_is_absolute_Stub(angle_is_absolute);
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Stub(pwm_write);
     hal_pwm_enable_Stub(pwm_enable);

@@ -9,6 +9,7 @@ typedef struct {
     motor_t motor; /* a copy of the compiled-in motor, which a test may change */
     adc_counts_t counts;
     uint32_t theta_m;
+    bool angle_unknown; /* an encoder before its index */
     int16_t winding_dC, inverter_dC;
     duty_t duty;
     bool gates;

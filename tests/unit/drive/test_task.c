@@ -278,6 +278,22 @@ static void run_at(double omega_pu, double torque_pu)
     }
 }
 
+/* Without the absolute angle the torque could have any sign. */
+void test_switching_waits_for_the_absolute_angle(void)
+{
+    seam.angle_unknown = true;
+    drive.request.enable = true;
+    for (int n = 0; n < 100; n++) {
+        sample_at(0.1, false, false);
+        task_1khz(&drive);
+        TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+        TEST_ASSERT_FALSE(command()->run);
+    }
+    seam.angle_unknown = false;
+    task_1khz(&drive);
+    TEST_ASSERT_TRUE(command()->run);
+}
+
 void test_enable_off_at_speed_holds_the_torque_at_zero_until_switching_can_be_disabled(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {

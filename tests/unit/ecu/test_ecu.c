@@ -136,6 +136,7 @@ void setUp(void)
     arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an unknown identifier */
     hal_adc_read_Stub(adc_read);
     hal_angle_read_IgnoreAndReturn(0);
+    hal_angle_is_absolute_IgnoreAndReturn(true);
     hal_irq_pend_mrai_Stub(pend);
     hal_pwm_write_Ignore();
     hal_pwm_enable_Ignore();

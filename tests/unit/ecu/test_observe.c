@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ecu/ecu_private.h"
+#include "hal/mock_angle.h"
 #include "hal/mock_system.h"
 #include "unity.h"
 
@@ -15,6 +16,7 @@ static supervisor_in_t seen;
 void setUp(void)
 {
     hal_system_reset_cause_IgnoreAndReturn(RESET_PIN);
+    hal_angle_is_absolute_IgnoreAndReturn(true);
     ecu_init(&ecu, &motor);
     ecu.clock.elapsed_us = US;
     sample = (sample_t){.v_dc = (int32_t)(350.0 * COUNT_PER_V)};

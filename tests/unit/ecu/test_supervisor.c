@@ -17,6 +17,7 @@ void setUp(void)
                            .dc_near_battery = true,
                            .shut_off_tested = true,
                            .sensors_plausible = true,
+                           .angle_absolute = true,
                            .slow = true,
                            .elapsed_us = 1000};
 }
@@ -433,6 +434,7 @@ static void refused(refused_t why)
     in.torque_requested_is_zero = true;
     in.dc_in_range = true;
     in.sensors_plausible = true;
+    in.angle_absolute = true;
     in.current_mode = false;
     (void)steps(5);
     TEST_ASSERT_FALSE(supervisor_outputs[s.state].run);
@@ -458,6 +460,18 @@ void test_enable_with_an_implausible_sensor_is_refused(void)
     to_ready();
     in.sensors_plausible = false;
     refused(REFUSED_SENSOR_IMPLAUSIBLE);
+}
+
+/* The encoder's index passes later: the next rising edge of enable is granted. */
+void test_enable_without_an_absolute_angle_is_refused(void)
+{
+    to_ready();
+    in.angle_absolute = false;
+    refused(REFUSED_ANGLE_NOT_ABSOLUTE);
+    in.enable = false;
+    (void)step();
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
 }
 
 void test_enable_in_the_locked_current_mode_is_refused(void)
@@ -605,6 +619,7 @@ static supervisor_in_t inputs_of(unsigned bits)
         .sensors_plausible = (bits >> 12 & 1U) != 0U,
         .slow = (bits >> 13 & 1U) != 0U,
         .derated = (bits >> 14 & 1U) != 0U,
+        .angle_absolute = (bits >> 13 & 3U) != 1U, /* whatever the other conditions of enable are */
         .gate_fault = (bits >> 15 & 1U) != 0U,
         .task_late = (bits >> 16 & 1U) != 0U,
         .stalled = (bits >> 17 & 1U) != 0U,
@@ -622,7 +637,7 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
     if (runs && !ran) {
         TEST_ASSERT_TRUE(before->state == STATE_READY && now->alive && now->torque_mode);
         TEST_ASSERT_TRUE(before->enabled || (now->enable && !before->enable_seen && now->torque_requested_is_zero &&
-                                             now->dc_in_range && now->sensors_plausible));
+                                             now->dc_in_range && now->sensors_plausible && now->angle_absolute));
         TEST_ASSERT_TRUE(s.faults == 0U && now->drive_faults == 0U);
     }
     if (now->drive_faults != 0U || now->gate_fault || now->stalled) {

@@ -74,6 +74,11 @@ uint32_t hal_angle_read(void)
     return port.theta_m;
 }
 
+bool hal_angle_is_absolute(void)
+{
+    return true;
+}
+
 void hal_pwm_write(duty_t duty)
 {
     port.duty = duty;
