@@ -222,17 +222,32 @@ static void on_code(uc_engine *uc, uint64_t address, uint32_t size, void *user)
     emu->s.now += (uint64_t)block.count * (emu->s.core_ticks * EMU_HALF_CYCLES_PER_INSTRUCTION / 2U);
 }
 
+/* Every hook of accesses begins with this. Before it calls one, unicorn writes the state of the IT block that contains
+ * the access to the processor's state, and never takes it back: what follows the block would be conditional, too. */
+static void it_state_clear(uc_engine *uc)
+{
+    enum { IT_BITS = 0x0600FC00 };
+    uint32_t state = 0;
+    (void)uc_reg_read(uc, UC_ARM_REG_CPSR, &state);
+    if ((state & IT_BITS) != 0U) {
+        state &= ~(uint32_t)IT_BITS;
+        (void)uc_reg_write(uc, UC_ARM_REG_CPSR, &state);
+    }
+}
+
 /* Because this hook exists, unicorn updates the program counter before every access to a peripheral. The message about
  * a refused access can therefore state it exactly. */
 static void on_access(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
-    (void)uc, (void)type, (void)address, (void)size, (void)value, (void)user;
+    (void)type, (void)address, (void)size, (void)value, (void)user;
+    it_state_clear(uc);
 }
 
 /* The reference manual forbids every access to RAM whose content is retained. */
 static void on_upper_ram(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
 {
-    (void)uc, (void)type, (void)size, (void)value;
+    (void)type, (void)size, (void)value;
+    it_state_clear(uc);
     emu_t *emu = user;
     if (emu->s.upper_retained) {
         emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",

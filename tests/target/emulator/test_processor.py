@@ -92,6 +92,17 @@ def test_exceptions_nest_by_priority(library: ctypes.CDLL, exceptions: Path, cou
         assert value == 2.0 ** order.count(6)
 
 
+@pytest.mark.parametrize("counting", [False, True])
+def test_what_follows_an_access_in_an_it_block_is_not_conditional(
+    library: ctypes.CDLL, program: Program, counting: bool
+) -> None:
+    """RAM below and above 0x20000000, a peripheral and the flash; loads, and stores to RAM."""
+    elf = program("conditional")
+    with Core.of_program(library, elf, counting) as core:
+        core.run(1e-3)
+        assert [core.word("sum", k) for k in range(4)] == [0x77] * 4
+
+
 LOW, MIDDLE, HIGH, LPIT = (16 + irq for irq in (10, 11, 12, 48))
 
 
