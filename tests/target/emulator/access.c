@@ -9,6 +9,8 @@
 #define PRIVATE_BUS 0xE0000000U
 enum { PDOR = 0x00, PDDR = 0x14 };
 
+enum { RAM_PIECE = 1024 }; /* divides RAM_SIZE */
+
 emu_pins_t *emu_pins(emu_t *emu)
 {
     ftm_shaft(emu);
@@ -118,6 +120,7 @@ bool emu_write(emu_t *emu, uint32_t address, const void *from, uint32_t size)
         memcpy(cells, from, size);
         return true;
     }
+    emu_code_changed(emu, address, size);
     return uc_mem_write(emu->uc, address, from, size) == UC_ERR_OK;
 }
 
@@ -248,10 +251,23 @@ emu_snapshot_t *emu_save(emu_t *emu)
     return snapshot;
 }
 
+/* Only what differs is written: unicorn translates code anew after every write to it. */
+static void ram_restore(emu_t *emu, const uint8_t *ram)
+{
+    uint8_t now[RAM_PIECE];
+    for (uint32_t at = 0; at < RAM_SIZE; at += RAM_PIECE) {
+        (void)uc_mem_read(emu->uc, RAM_BASE + at, now, RAM_PIECE);
+        if (memcmp(now, ram + at, RAM_PIECE) != 0) {
+            (void)uc_mem_write(emu->uc, RAM_BASE + at, ram + at, RAM_PIECE);
+            emu_code_changed(emu, RAM_BASE + at, RAM_PIECE);
+        }
+    }
+}
+
 void emu_restore(emu_t *emu, const emu_snapshot_t *snapshot)
 {
     (void)uc_context_restore(emu->uc, snapshot->context);
-    (void)uc_mem_write(emu->uc, RAM_BASE, snapshot->ram, RAM_SIZE);
+    ram_restore(emu, snapshot->ram);
     emu->s = snapshot->state;
     emu->flash = snapshot->flash;
     emu->error[0] = '\0';

@@ -170,7 +170,8 @@ static uint8_t conditional(const uint8_t it[2])
 
 static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
 {
-    block_t *known = address < FLASH_SIZE ? &emu->block[address / 2U] : NULL;
+    const uint32_t place = code_place(address);
+    block_t *known = place < CODE_SIZE / 2 ? &emu->block[place] : NULL;
     if (known != NULL && known->size == size) {
         return *known;
     }
@@ -185,6 +186,15 @@ static block_t block_at(emu_t *emu, uint32_t address, uint32_t size)
         *known = block;
     }
     return block;
+}
+
+void emu_code_changed(emu_t *emu, uint32_t address, uint32_t size)
+{
+    for (uint32_t at = address & ~1U; at < address + size; at += 2U) {
+        if (code_place(at) < CODE_SIZE / 2) {
+            emu->block[code_place(at)].size = 0;
+        }
+    }
 }
 
 static bool must_stop(const state_t *s)
@@ -252,6 +262,16 @@ static void on_upper_ram(uc_engine *uc, uc_mem_type type, uint64_t address, int 
     if (emu->s.upper_retained) {
         emu_fail(emu, "access to 0x%08x: SIM.CHIPCTL.SRAMU_RETEN keeps this RAM from being accessed",
                  (uint32_t)address);
+    }
+}
+
+static void on_data(uc_engine *uc, uc_mem_type type, uint64_t address, int size, int64_t value, void *user)
+{
+    (void)value;
+    it_state_clear(uc);
+    emu_t *emu = user;
+    if (emu->profile != NULL) {
+        profile_access(emu, (uint32_t)address, (uint32_t)size, type == UC_MEM_WRITE);
     }
 }
 
@@ -391,6 +411,7 @@ void emu_reset(emu_t *emu, uint32_t cause)
     (void)uc_reg_write(emu->uc, UC_ARM_REG_BASEPRI, &zero);
     (void)uc_reg_write(emu->uc, UC_ARM_REG_SP, &vector[0]);
     s->pc = vector[1] & ~1U;
+    emu_code_changed(emu, RAM_BASE, RAM_SIZE);
 }
 
 /* What the RAM holds after the supply has returned is not known. */
@@ -417,7 +438,7 @@ static bool maps_create(emu_t *emu)
 {
     uc_hook hook;
     uc_engine *uc = emu->uc;
-    void *code = (void *)on_code, *access = (void *)on_access;
+    void *code = (void *)on_code, *access = (void *)on_access, *data = (void *)on_data;
     const int kind = emu->mode == EMU_COUNTING ? UC_HOOK_CODE : UC_HOOK_BLOCK;
     return uc_mem_map(uc, 0, FLASH_SIZE, UC_PROT_READ | UC_PROT_EXEC) == UC_ERR_OK &&
            uc_mem_map(uc, RAM_BASE, RAM_SIZE, UC_PROT_ALL) == UC_ERR_OK &&
@@ -426,6 +447,8 @@ static bool maps_create(emu_t *emu)
            uc_mmio_map(uc, MMIO_BASE, MMIO_SIZE, bus_read, emu, bus_write, emu) == UC_ERR_OK &&
            uc_mmio_map(uc, PPB_BASE, PPB_SIZE, scs_read, emu, scs_write, emu) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, kind, code, emu, 1, 0) == UC_ERR_OK &&
+           (emu->mode != EMU_COUNTING ||
+            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, data, emu, 1, 0) == UC_ERR_OK) &&
            uc_hook_add(uc, &hook, UC_HOOK_INTR, (void *)on_exception, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_INVALID, (void *)on_unmapped, emu, 1, 0) == UC_ERR_OK &&
            uc_hook_add(uc, &hook, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, access, emu, DATA_FLASH_BASE,
@@ -458,7 +481,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
     const char *bad = emu == NULL ? "out of memory" : elf_read(&emu->elf, elf);
     if (bad == NULL) {
         emu->mode = (emu_mode_t)mode;
-        emu->block = calloc(FLASH_SIZE / 2, sizeof *emu->block);
+        emu->block = calloc(CODE_SIZE / 2, sizeof *emu->block);
         // NOLINTBEGIN(clang-analyzer-optin.core.EnumCastOutOfRange): Unicorn's flags are made to be combined
         if (emu->block == NULL || uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, &emu->uc) != UC_ERR_OK ||
             uc_ctl_set_cpu_model(emu->uc, UC_CPU_ARM_CORTEX_M4) != UC_ERR_OK || !maps_create(emu) || !bus_create(emu)) {

@@ -26,6 +26,7 @@ enum {
     RAM_SIZE = 0xF000,
     RAM_UPPER = 0x20000000, /* SRAM_U; below it SRAM_L */
     FLASH_SIZE = 0x80000,
+    CODE_SIZE = FLASH_SIZE + RAM_SIZE, /* memory from which instructions may come */
     DATA_FLASH_SIZE = 0x10000,
     DATA_FLASH_SECTOR = 0x800,
     DATA_FLASH_SECTORS = DATA_FLASH_SIZE / DATA_FLASH_SECTOR,
@@ -209,7 +210,7 @@ struct emu {
     const facts_t *facts_of[PERIPHERALS_MAX];
     int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
     int16_t page[256];
-    block_t *block; /* by address / 2 in flash */
+    block_t *block; /* by code_place() */
     emu_exception_fn on_exception;
     void *on_exception_user;
     can_port_t *can_port;
@@ -227,7 +228,18 @@ struct emu_snapshot {
     uint8_t ram[RAM_SIZE];
 };
 
+/** Half words of the flash, then those of the RAM, are numbered; CODE_SIZE / 2: neither. */
+static inline uint32_t code_place(uint32_t address)
+{
+    if (address < FLASH_SIZE) {
+        return address / 2U;
+    }
+    return address - RAM_BASE < RAM_SIZE ? (FLASH_SIZE + address - RAM_BASE) / 2U : CODE_SIZE / 2U;
+}
+
 /* core.c */
+/** Something other than the program has written this: what was known of code there is discarded. */
+void emu_code_changed(emu_t *emu, uint32_t address, uint32_t size);
 void emu_fail(emu_t *emu, const char *format, ...) __attribute__((format(printf, 2, 3)));
 uint32_t emu_pc(const emu_t *emu);
 void emu_timer(emu_t *emu, timer_t_ timer, uint64_t due);
@@ -267,8 +279,9 @@ int nvic_best(const emu_t *emu);
 /* profile.c, while emu->profile is not NULL */
 void profile_stop(emu_t *emu);
 void profile_instruction(emu_t *emu, uint32_t address, uint32_t size);
-void profile_enter(emu_t *emu, int vector);
-void profile_leave(emu_t *emu);
+void profile_access(emu_t *emu, uint32_t address, uint32_t size, bool store);
+void profile_enter(emu_t *emu, int vector, uint32_t stack, uint32_t words);
+void profile_leave(emu_t *emu, uint32_t stack, uint32_t words);
 
 /* the peripherals' events */
 void ftm_fire(emu_t *emu, int instance);

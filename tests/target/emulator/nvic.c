@@ -23,6 +23,7 @@ enum {
     SYSTICK = 15,
     FRAME_WORDS = 8,
     EXTENDED_WORDS = 26,
+    STANDARD_FRAME = 0x10, /* in EXC_RETURN */
     FPCA = 4,
     SPSEL = 2,
     SFPA = 8, /* unicorn's core implements it; without it the context counts as a new one, and FPSCR would be lost */
@@ -162,6 +163,11 @@ void nvic_line(emu_t *emu, int irq, bool level)
     bit_set(emu->s.nvic.line, vector, level);
 }
 
+static uint32_t words_of(uint32_t exc_return)
+{
+    return (exc_return & STANDARD_FRAME) == 0U ? EXTENDED_WORDS : FRAME_WORDS;
+}
+
 static bool stack_write(emu_t *emu, uint32_t address, const uint32_t *words, uint32_t count)
 {
     if (uc_mem_write(emu->uc, address, words, (size_t)4U * count) == UC_ERR_OK) {
@@ -255,7 +261,7 @@ static void enter(emu_t *emu, int vector)
     emu->s.pc = handler & ~1U;
     emu->s.now += 12ULL * emu->s.core_ticks; /* TRM: twelve cycles, without wait states */
     if (emu->profile != NULL) {
-        profile_enter(emu, vector);
+        profile_enter(emu, vector, get(emu, UC_ARM_REG_SP), words_of(code));
     }
     if (emu->on_exception != NULL) {
         emu->on_exception(emu->on_exception_user, vector, true);
@@ -310,7 +316,7 @@ void nvic_return(emu_t *emu)
     account(emu);
     const int vector = n->active[--n->nest];
     count_run(emu, vector, n->spent[n->nest]);
-    if (!pop_frame(emu, (code & 0x10U) == 0)) {
+    if (!pop_frame(emu, (code & STANDARD_FRAME) == 0)) {
         return;
     }
     if (bit(n->line, vector)) {
@@ -318,7 +324,7 @@ void nvic_return(emu_t *emu)
     }
     emu->s.now += 10ULL * emu->s.core_ticks;
     if (emu->profile != NULL) {
-        profile_leave(emu);
+        profile_leave(emu, get(emu, UC_ARM_REG_SP), words_of(code));
     }
     n->sleeping = n->nest == 0 && (n->scr & 2U) != 0; /* SLEEPONEXIT */
     if (emu->on_exception != NULL) {

@@ -19,13 +19,14 @@ struct profile {
     emu_span_t done[SPANS_MAX];
     uint32_t count;
     uint32_t taken;
-    uint8_t cost[FLASH_SIZE / 2];
-    bool conditional[FLASH_SIZE / 2]; /* made conditional by an IT that has run: counted with the IT */
+    uint8_t cost[CODE_SIZE / 2];
+    bool conditional[CODE_SIZE / 2]; /* made conditional by an IT that has run: counted with the IT */
+    memory_time_t *memory[EMU_MEMORIES];
 };
 
 bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
 {
-    if (emu->mode != EMU_COUNTING || half_words > FLASH_SIZE / 2) {
+    if (emu->mode != EMU_COUNTING || half_words > CODE_SIZE / 2) {
         return false;
     }
     profile_stop(emu);
@@ -53,13 +54,50 @@ uint32_t emu_profile_take(emu_t *emu, emu_span_t *to, uint32_t max_count)
 
 void profile_stop(emu_t *emu)
 {
-    free(emu->profile);
+    profile_t *p = emu->profile;
+    for (int k = 0; p != NULL && k < EMU_MEMORIES; k++) {
+        memory_time_destroy(p->memory[k]);
+    }
+    free(p);
     emu->profile = NULL;
+}
+
+void profile_access(emu_t *emu, uint32_t address, uint32_t size, bool store)
+{
+    profile_t *p = emu->profile;
+    for (int k = 0; k < EMU_MEMORIES && p->memory[k] != NULL; k++) {
+        p->level[p->depth].span.waited[k] += memory_time_access(p->memory[k], address, size, store);
+    }
+}
+
+bool emu_profile_memories(emu_t *emu, const memory_costs_t costs[EMU_MEMORIES])
+{
+    profile_t *p = emu->profile;
+    if (p == NULL || p->memory[0] != NULL) {
+        return false;
+    }
+    memory_time_t *first = memory_time_create(&costs[0]), *second = memory_time_create(&costs[1]);
+    if (first == NULL || second == NULL) {
+        memory_time_destroy(first);
+        memory_time_destroy(second);
+        return false;
+    }
+    p->memory[0] = first;
+    p->memory[1] = second;
+    return true;
+}
+
+static void fetch(const profile_t *p, emu_span_t *span, uint32_t address, uint32_t size)
+{
+    for (int k = 0; k < EMU_MEMORIES && p->memory[k] != NULL; k++) {
+        span->waited[k] += memory_time_fetch(p->memory[k], address, size);
+    }
 }
 
 static uint32_t cost_of(emu_t *emu, uint32_t address)
 {
-    const uint32_t cost = address < FLASH_SIZE ? emu->profile->cost[address / 2U] : 0U;
+    const uint32_t place = code_place(address);
+    const uint32_t cost = place < CODE_SIZE / 2 ? emu->profile->cost[place] : 0U;
     if (cost == 0U) {
         emu_fail(emu, "the instruction at 0x%08x ran, but no cost was given for it", address);
     }
@@ -68,20 +106,23 @@ static uint32_t cost_of(emu_t *emu, uint32_t address)
 
 static bool is_conditional(const profile_t *p, int64_t address)
 {
-    return address < FLASH_SIZE && p->conditional[address / 2];
+    const uint32_t place = code_place((uint32_t)address);
+    return place < CODE_SIZE / 2 && p->conditional[place];
 }
 
 /* The emulated core does not report skipped instructions. Therefore all instructions that an IT makes conditional are
  * counted together with the IT. */
 static void count_conditional(emu_t *emu, emu_span_t *span, uint32_t address, uint32_t slots)
 {
-    for (uint32_t at = address; slots > 0 && at < FLASH_SIZE; slots--) {
+    for (uint32_t at = address; slots > 0 && code_place(at) < CODE_SIZE / 2; slots--) {
         uint8_t code[2] = {0, 0};
         (void)uc_mem_read(emu->uc, at, code, sizeof code);
-        emu->profile->conditional[at / 2U] = true;
+        const uint32_t size = code[1] >= THUMB_32BIT ? 4U : 2U;
+        emu->profile->conditional[code_place(at)] = true;
         span->instructions++;
         span->cost += cost_of(emu, at);
-        at += code[1] >= THUMB_32BIT ? 4U : 2U;
+        fetch(emu->profile, span, at, size);
+        at += size;
     }
 }
 
@@ -98,25 +139,35 @@ void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
     }
     level->span.instructions++;
     level->span.cost += cost_of(emu, address);
-    if (address < FLASH_SIZE) {
-        count_conditional(emu, &level->span, address + size, emu->block[address / 2U].conditional);
+    fetch(p, &level->span, address, size);
+    if (code_place(address) < CODE_SIZE / 2) {
+        count_conditional(emu, &level->span, address + size, emu->block[code_place(address)].conditional);
     }
 }
 
-void profile_enter(emu_t *emu, int vector)
+void profile_enter(emu_t *emu, int vector, uint32_t stack, uint32_t words)
 {
     profile_t *p = emu->profile;
     if (p->depth < NEST_MAX) {
         p->depth++;
     }
-    p->level[p->depth] = (level_t){.span = {.vector = (uint32_t)vector}, .next = NOWHERE};
+    level_t *level = &p->level[p->depth];
+    *level = (level_t){.span = {.vector = (uint32_t)vector}, .next = NOWHERE};
+    const uint32_t at = emu->s.nvic.vtor + 4U * (uint32_t)vector;
+    for (int k = 0; k < EMU_MEMORIES && p->memory[k] != NULL; k++) {
+        level->span.waited[k] = memory_time_entry(p->memory[k], at, stack, words);
+    }
 }
 
-void profile_leave(emu_t *emu)
+void profile_leave(emu_t *emu, uint32_t stack, uint32_t words)
 {
     profile_t *p = emu->profile;
+    emu_span_t *span = &p->level[p->depth].span;
+    for (int k = 0; k < EMU_MEMORIES && p->memory[k] != NULL; k++) {
+        span->waited[k] += memory_time_return(p->memory[k], stack, words);
+    }
     if (p->count < SPANS_MAX && p->depth > 0) {
-        p->done[p->count++] = p->level[p->depth].span;
+        p->done[p->count++] = *span;
     }
     p->depth = p->depth > 0 ? p->depth - 1 : 0;
 }

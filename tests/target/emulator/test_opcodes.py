@@ -161,7 +161,7 @@ def measured(parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Measured
     library: ctypes.CDLL = lib.load(parts.motor.folder.folder / "libfluxtrue_emu.so")
     image.declare(library)
     functions = disassembly.read(elf)
-    costs = cycles.image_costs(functions, image.FLASH_SIZE)
+    costs = cycles.image_costs(functions, image.CODE)
     with Core.of_program(library, elf, counting=True) as core:
         assert library.emu_profile_start(core._handle, costs, len(costs), cycles.PIPELINE)
         core.run(2e-3)

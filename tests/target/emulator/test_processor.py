@@ -137,7 +137,7 @@ def test_a_profile_counts_instructions_that_an_it_skips_and_no_branch_for_them(
         blocks = [core.counts(v) for v in (LOW, MIDDLE, HIGH)]
     image.declare(library)
     with Core.of_program(library, exceptions, counting=True) as core:
-        size = image.FLASH_SIZE // 2
+        size = image.CODE_SIZE // 2
         assert library.emu_profile_start(core._handle, b"\1" * size, size, 1000)
         core.run(5.5e-3)
         executed = [core.counts(v).sum for v in (LOW, MIDDLE, HIGH)]

@@ -27,7 +27,7 @@ def stand(parts: Parts) -> Iterator[image.Stand]:
 
 
 def start(stand: image.Stand, cost: int, taken: int) -> None:
-    costs = bytes([cost]) * (image.FLASH_SIZE // 2)
+    costs = bytes([cost]) * (image.CODE_SIZE // 2)
     assert stand.library.emu_profile_start(stand.handle, costs, len(costs), taken)
 
 
@@ -79,4 +79,4 @@ def test_nothing_is_profiled_where_instructions_are_not_counted_one_by_one(parts
     with Loop(motor.library, motor.plant, motor.flux_map) as loop:
         stand = image.Stand(loop)
         assert not stand.library.emu_profile_start(stand.handle, b"\1" * 2, 2, 0)
-        assert ctypes.sizeof(image._Span) == 12
+        assert ctypes.sizeof(image._Span) == 20

@@ -84,7 +84,9 @@ def test_the_tick_meets_its_bounds_and_the_peers_stand_beside_the_one_with_the_l
 
 
 def test_the_maxima_contain_what_only_the_reactions_to_faults_have() -> None:
-    row = figures._row(np.array([[100, 200], [300, 500]]), np.array([[625, 450]]))
-    assert row == {"runs": 2, "instructions": [100, 200.0, 625], "cycles": [200, 350.0, 500]}
-    empty = np.empty((0, 2), dtype=np.int64)
-    assert figures._row(np.array([[100, 200]]), empty)["instructions"] == [100, 100.0, 100]
+    runs = np.array([[100, 200, 210, 300], [300, 500, 520, 900]])
+    row = figures._row(runs, np.array([[625, 450, 460, 800]]))
+    assert row == {"runs": 2, "instructions": [100, 200.0, 625], "cycles": [200, 350.0, 500],
+                   "least": [210, 365.0, 520], "most": [300, 600.0, 900]}  # fmt: skip
+    empty = np.empty((0, 4), dtype=np.int64)
+    assert figures._row(runs[:1], empty)["instructions"] == [100, 100.0, 100]

@@ -46,7 +46,7 @@ def test_an_unknown_instruction_is_an_error_that_names_it() -> None:
     with pytest.raises(FluxtrueError, match="'vsel.f32'"):
         cycles.cycles(Instruction(0, 4, "vsel.f32", "s0, s1, s2"))
     with pytest.raises(FluxtrueError, match="'wfi'"):  # not counted: how long it waits is unknown
-        cycles.image_costs(parse("00000410 <f>:\n 410:\tbf30      \twfi\n"), 0x420)
+        cycles.image_costs(parse("00000410 <f>:\n 410:\tbf30      \twfi\n"), [(0, 0x420)])
 
 
 @pytest.mark.parametrize(
@@ -68,5 +68,6 @@ def test_every_instruction_of_a_listing_gets_its_cost_and_constants_none() -> No
     listing = "00000410 <f>:\n 410:\tb510      \tpush\t{r4, lr}\n 412:\tf000 f801 \tbl\t418 <g>\n"
     listing += " 416:\tbd10      \tpop\t{r4, pc}\n\n00000418 <g>:\n 418:\t4770      \tbx\tlr\n"
     listing += " 41a:\tbf00      \tnop\n 41c:\t00001234 \t.word\t0x00001234\n"
-    costs = cycles.image_costs(parse(listing), 0x420)
+    costs = cycles.image_costs(parse(listing), [(0, 0x420)])
     assert list(costs[0x410 // 2 :]) == [3, 1, 0, 3, 1, 1, 0, 0]
+    assert cycles.image_costs(parse(listing), [(0, 0x414), (0x418, 4)])[0x410 // 2 :] == bytes([3, 1, 1, 1])

@@ -9,7 +9,7 @@ tests/target/emulator/test_opcodes.py executes each entry; what cannot be given 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from fluxtrue_tools.bench.disassembly import CONDITIONS, Function, Instruction, words
 from fluxtrue_tools.errors import FluxtrueError
@@ -89,14 +89,15 @@ def cycles(instruction: Instruction) -> int:
     return cost
 
 
-def image_costs(functions: Iterable[Function], size: int) -> bytes:
-    """The cycles of each half word of the flash, one byte each, for the emulator's profile, which refuses other code.
-
-    Flash commands are launched from RAM, at standstill: no profile contains them.
-    """
-    costs = bytearray(size // 2)
+def image_costs(functions: Iterable[Function], regions: Sequence[tuple[int, int]]) -> bytes:
+    """The cycles of each half word of the regions (start, bytes), one byte each, for the emulator's profile, which
+    refuses other code."""
+    costs = bytearray(sum(size for _, size in regions) // 2)
     for function in functions:
         for instruction in function.instructions:
-            if instruction.address < size:
-                costs[instruction.address // 2] = cycles(instruction)
+            begin = 0
+            for start, size in regions:
+                if start <= instruction.address < start + size:
+                    costs[(begin + instruction.address - start) // 2] = cycles(instruction)
+                begin += size
     return bytes(costs)

@@ -47,7 +47,7 @@ def _work(spans: NDArray[np.int64]) -> NDArray[np.int64]:
     return both
 
 
-COLUMNS = ("instructions", "cycles")  # of a recording
+COLUMNS = ("instructions", "cycles", "least", "most")  # of a recording; the last two with the memories
 
 
 def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
@@ -95,13 +95,13 @@ def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tu
     return uses, sorted(set(depths.problems)) + stack.heap(nodes)
 
 
-def _utilisation(runs: FIGURES, core_hz: int) -> FIGURES:
+def _utilisation(runs: FIGURES, core_hz: int, column: str) -> FIGURES:
     """Shares of the processor, estimated, and the PWM frequency at which all of it takes half.
 
     The task falls due a thousand times a second, whatever that frequency.
     """
-    work = runs["10 kHz work"]["cycles"]
-    task, can = runs["1 kHz task"]["cycles"][1] / TASK_PERIODS, runs["CAN ISR"]["cycles"][1] * COMMAND_HZ
+    work = runs["10 kHz work"][column]
+    task, can = runs["1 kHz task"][column][1] / TASK_PERIODS, runs["CAN ISR"][column][1] * COMMAND_HZ
     return {
         "10 kHz work, average": round(100 * work[1] * PWM_HZ / core_hz, 2),
         "10 kHz work, maximum": round(100 * work[2] * PWM_HZ / core_hz, 2),
@@ -135,7 +135,8 @@ def measure(folder: Path) -> FIGURES:
     return {
         "compiler": sizes.compiler(),
         "drives": drives,
-        "utilisation": {name: _utilisation(drive["runs"], port["core_Hz"]) for name, drive in drives.items()},
+        "utilisation": {name: {column: _utilisation(drive["runs"], port["core_Hz"], column) for column in COLUMNS[1:]}
+                        for name, drive in drives.items()},
         "kernels": {
             "periods": counted, "limited": limited,
             "stages": _spreads(stages),

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from fluxtrue_tools.bench import cycles
+from fluxtrue_tools.bench import cycles, memory
 from fluxtrue_tools.bench.can_command import Command, Frame
 from fluxtrue_tools.bench.disassembly import Function
 from fluxtrue_tools.emulate import library as emulation
@@ -28,7 +28,8 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
 FAST, MRAI, CAN, TASK, GATE = 16 + 39, 16 + 69, 16 + 81, 16 + 48, 16 + 103
-FLASH_SIZE: Final = 0x80000
+CODE: Final = ((0, 0x80000), (0x1FFF_8000, 0xF000))  # flash and RAM
+CODE_SIZE: Final = sum(size for _, size in CODE)
 STACK_PATTERN: Final = b"\xc5" * 4
 SPANS_MAX: Final = 4096
 V_DC: Final = 350.0
@@ -51,28 +52,37 @@ DRIVE: Final = (
 
 
 class _Span(ctypes.Structure):
-    _fields_ = (("vector", ctypes.c_uint32), ("instructions", ctypes.c_uint32), ("cost", ctypes.c_uint32))
+    _fields_ = (("vector", ctypes.c_uint32), ("instructions", ctypes.c_uint32), ("cost", ctypes.c_uint32),
+                ("waited", ctypes.c_uint32 * 2))  # fmt: skip
 
 
 def declare(library: ctypes.CDLL) -> None:
     """Prototypes of the profile's functions."""
     library.emu_profile_start.restype = ctypes.c_bool
     library.emu_profile_start.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32]
+    library.emu_profile_memories.restype = ctypes.c_bool
+    library.emu_profile_memories.argtypes = [ctypes.c_void_p, ctypes.POINTER(memory.Costs)]
     library.emu_profile_take.restype = ctypes.c_uint32
     library.emu_profile_take.argtypes = [ctypes.c_void_p, ctypes.POINTER(_Span), ctypes.c_uint32]
 
 
-def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
-    """Vector, instructions, cost of each run that has finished since the last time."""
+def take_waits(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int, int, int]]:
+    """Vector, instructions, cost, and the least and the most cycles waited for memories, of each run that has finished
+    since the last time."""
     spans = (_Span * SPANS_MAX)()
     while count := library.emu_profile_take(handle, spans, SPANS_MAX):
-        yield from ((s.vector, s.instructions, s.cost) for s in spans[:count])
+        yield from ((s.vector, s.instructions, s.cost, *s.waited) for s in spans[:count])
+
+
+def take(library: ctypes.CDLL, handle: int) -> Iterator[tuple[int, int, int]]:
+    """The first three of them."""
+    return (span[:3] for span in take_waits(library, handle))
 
 
 @dataclass
 class Recording:
-    """Rows of vector, instructions, and cycles with exception entry and return: those of the drive, and those while it
-    reacted to faults. And the events of the drive."""
+    """Rows of vector, instructions, and cycles without waiting, with the least and with the most waiting for memories;
+    those of the drive, and those while it reacted to faults. And the events of the drive."""
 
     spans: NDArray[np.int64]
     reacting: NDArray[np.int64]
@@ -125,19 +135,22 @@ class Stand:
         self.run(100)
         self.run(30, Enable=1)
 
-    def profile(self, functions: list[Function]) -> None:
-        costs = cycles.image_costs(functions, FLASH_SIZE)
+    def profile(self, functions: list[Function], memories: bool = False) -> None:
+        costs = cycles.image_costs(functions, CODE)
         if not self.library.emu_profile_start(self.handle, costs, len(costs), cycles.PIPELINE):
             raise FluxtrueError("the emulation is not in counting mode")
+        if memories and not self.library.emu_profile_memories(self.handle, (memory.Costs * 2)(*memory.BOTH)):
+            raise FluxtrueError("the emulator refuses the memories of the profile")
 
     def take(self) -> Iterator[tuple[int, int, int]]:
         """The runs that have finished since the last call."""
         return take(self.library, self.handle)
 
-    def rows(self) -> list[tuple[int, int, int]]:
+    def rows(self) -> list[tuple[int, ...]]:
         """The same as rows of a Recording."""
         own = cycles.ENTRY + cycles.RETURN
-        return [(vector, instructions, cost + own) for vector, instructions, cost in self.take()]
+        return [(vector, instructions, cost + own, cost + own + least, cost + own + most)
+                for vector, instructions, cost, least, most in take_waits(self.library, self.handle)]  # fmt: skip
 
     def stack_used(self) -> int:
         bottom, top = self.core.symbol("stack_bottom"), self.core.symbol("stack_top")
@@ -161,7 +174,7 @@ def _powered(parts: Parts, mode: int) -> Iterator[Stand]:
         yield stand
 
 
-def _drive(stand: Stand, spans: list[tuple[int, int, int]]) -> NDArray[np.float64]:
+def _drive(stand: Stand, spans: list[tuple[int, ...]]) -> NDArray[np.float64]:
     """The whole drive; returns the recorded columns of each period."""
     rows: list[NDArray[np.float64]] = []
     speed = 0.0
@@ -176,7 +189,7 @@ def _drive(stand: Stand, spans: list[tuple[int, int, int]]) -> NDArray[np.float6
     return np.concatenate(rows)
 
 
-def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) -> list[tuple[int, int, int]]:
+def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) -> list[tuple[int, ...]]:
     """A drive of its own, because no fault is reset while the rotor turns: the runs of each interrupt from the cause of
     the fault until switching has long been off."""
     with _powered(parts, mode) as stand:
@@ -186,7 +199,7 @@ def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) ->
             stand.run_ms({"plant.speed_rad_s": (start, stop)})
         if int(stand.loop.get("fault_word")) != 0 or stand.loop.get("truth.torque_Nm") < FAULT_TORQUE / 2:
             raise FluxtrueError(f"the drive does not make torque before the fault of {cause}")
-        stand.profile(functions)
+        stand.profile(functions, memories=True)
         if cause == GATE_DRIVER:
             stand.core.pend(GATE)
         else:
@@ -202,8 +215,8 @@ def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
     with _powered(parts, mode) as stand:
         loop = stand.loop
         loop.record(["voltage_limited", "table_clamped", "id_A"])
-        stand.profile(functions)
-        spans: list[tuple[int, int, int]] = []
+        stand.profile(functions, memories=True)
+        spans: list[tuple[int, ...]] = []
         seen = _drive(stand, spans)
         fault = int(loop.get("fault_word"))
         if fault != 0 or int(loop.get("identification_mode")) != mode:
