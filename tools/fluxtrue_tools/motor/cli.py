@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""fluxtrue motor check | build | import."""
+"""fluxtrue motor check | build | import | start."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +9,7 @@ import click
 from fluxtrue_tools import paths
 from fluxtrue_tools.motor.map_import.cli import import_
 from fluxtrue_tools.motor.names import BUILT, PLOTS, source_files
+from fluxtrue_tools.motor.start import start
 
 if TYPE_CHECKING:
     from fluxtrue_tools.motor.motor import Motor
@@ -65,3 +66,4 @@ def build(folder: Path, out: Path, report: bool) -> None:
 
 
 motor.add_command(import_)
+motor.add_command(start)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""fluxtrue motor start: a folder from a nameplate."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fluxtrue_tools.cli import run
+from fluxtrue_tools.motor.start import guess
+from fluxtrue_tools.sim.build import ROOT
+
+UNKNOWN = ["--i-max", "250", "--vdc", "350", "--pwm", "10", "--pole-pairs", "4", "--speed-max", "9000"]
+
+
+def test_the_folder_of_the_tests_is_what_the_command_makes(tmp_path: Path) -> None:
+    assert run(["motor", "start", *UNKNOWN, "--out", str(tmp_path / "unknown")]) == 0
+    made = (tmp_path / "unknown" / "motor.toml").read_text(encoding="utf-8")
+    kept = (ROOT / "tests" / "motors" / "unknown" / "motor.toml").read_text(encoding="utf-8")
+    assert kept == "# SPDX-License-Identifier: Apache-2.0\n" + made
+
+
+def test_the_gains_follow_from_a_tenth_of_the_guessed_inductance() -> None:
+    found = guess(250.0, 350.0, 1e4, 4, 9000.0)
+    assert found["ld_H"] == found["lq_H"] == pytest.approx(0.1 * found["psi_f_Vs"] / 250.0, rel=1e-3)
+    back_emf_V = found["psi_f_Vs"] * 4 * 9000.0 / 3.0 * 0.10472
+    assert back_emf_V == pytest.approx(350.0 / 3.0**0.5, rel=1e-3)
+
+
+def test_without_a_speed_one_is_assumed(tmp_path: Path) -> None:
+    assert run(["motor", "start", *UNKNOWN[:-2], "--out", str(tmp_path / "m")]) == 0
+    data = tomllib.loads((tmp_path / "m" / "motor.toml").read_text(encoding="utf-8"))
+    assert data["machine"]["speed_max_rpm"] == 5000.0
+
+
+def test_what_cannot_be_built_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["motor", "start", *UNKNOWN, "--full-scale", "100", "--out", str(tmp_path / "m")]) == 2
+    assert "full_scale" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
