@@ -68,3 +68,20 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
     const bool normal = monitor_is_sample_normal(&drive->period.monitor, i_ab, measured.zero_q28, measured.v_dc);
     return (acquired_t){angle.step, normal};
 }
+
+void acquire_check(drive_t *drive, const sample_t *sample, bool run)
+{
+    const monitor_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
+    const uint32_t faults = monitor_step(&drive->period.monitor, &drive->fast.monitor, &in);
+    if (in.v_dc < drive->period.monitor.v_min) {
+        /* Below v_min the applied voltage is unknown; the three-period count starts again. */
+        drive->fast.periods_since_enable = 0;
+    }
+    /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
+    if ((faults & FAULT_ANGLE) != 0U) {
+        drive->fast.angle_tracker.samples = 0; /* what it predicts has long been contradicted: it starts again */
+    }
+    if (faults != 0U) {
+        drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
+    }
+}

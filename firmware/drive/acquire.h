@@ -15,4 +15,7 @@ typedef struct {
 /** settled: angle and speed of the tracker have been set by its first two samples. */
 acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled);
 
+/** All sample monitors, with their counters; run: the bridge is commanded to act. */
+void acquire_check(drive_t *drive, const sample_t *sample, bool run);
+
 #endif

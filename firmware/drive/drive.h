@@ -19,6 +19,7 @@
 #include "control/identify/record.h"
 #include "drive/exchange.h"
 #include "drive/motor.h"
+#include "drive/pulses.h"
 #include "types/features.h"
 #include "types/identification.h"
 #include "types/motor_check.h"
@@ -33,6 +34,12 @@ typedef enum {
     IDENTIFICATION_PAPER = 0, /* model reference adaptive, each period: resistance and magnet flux */
     IDENTIFICATION_ROBUST = 1 /* seven parameters with their uncertainty, each millisecond */
 } identification_mode_t;
+
+/** Voltage pulses at standstill, as asked for. */
+typedef struct {
+    pulses_config_t config;
+    uint32_t starts; /* counts up: each count starts these pulses once, or refuses them */
+} pulses_request_t;
 
 /** Requests from outside. Writer: one (communication or test). Read by the 1 kHz task, identification_resets also by
  * the MRAI ISR, identification_mode by the fast ISR; every field is aligned and read word by word. */
@@ -50,6 +57,7 @@ typedef struct {
     uint32_t fault_resets;          /* counts up: each count clears the faults once, if enable is off */
     uint32_t identification_resets; /* counts up: each count resets the identification once */
     uint32_t commissionings; /* counts up: each count measures the inverter's voltage error once, at standstill */
+    pulses_request_t pulses;
 } request_t;
 
 /* X(NAME, value, explanation): named and explained here only. */
@@ -117,6 +125,13 @@ typedef struct {
     bool holds;    /* enable is off, the torque is held at zero */
 } switch_off_t;
 
+/** The 1 kHz task's part of the voltage pulses (drive/pulsing.c). */
+typedef struct {
+    pulses_phase_t phase;
+    pulses_failure_t failure;
+    uint32_t starts; /* of the request, as far as seen */
+} pulsing_t;
+
 /** Written by the 1 kHz task alone. */
 typedef struct {
     torque_limit_state_t torque_limit;
@@ -147,6 +162,7 @@ typedef struct {
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
+    pulsing_t pulsing;
     safe_state_state_t safe_state;
     gate_fault_state_t gate_fault;
     switch_off_t switch_off;
@@ -233,6 +249,8 @@ typedef struct {
 #if FLUXTRUE_MRAI
     mrai_data_t mrai;
 #endif
+    pulses_config_t pulses;      /* in effect: written by the 1 kHz task while no pulses are active */
+    pulses_state_t pulses_state; /* written by the fast ISR alone */
     volatile bool held; /* switching stays disabled: written in the background, which writes the flash meanwhile */
 } drive_t;
 
@@ -266,6 +284,12 @@ void drive_identify(drive_t *drive, const snapshot_t *snapshot);
 
 /** The commissioning's share of the 1 kHz task. */
 void drive_commission(drive_t *drive, const snapshot_t *snapshot);
+/** The voltage pulses' share of the 1 kHz task. */
+void drive_pulse(drive_t *drive, const snapshot_t *snapshot);
+static inline bool drive_pulses(const drive_t *drive)
+{
+    return drive->task.pulsing.phase == PULSES_PULSE;
+}
 /** Sets the compensation; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 /** The compensated dead time, a share of the period, with the bound that follows from it (MO-11). */

@@ -29,30 +29,29 @@ typedef struct {
     int32_t angle_step;
 } rotor_frame_t;
 
-/* Whether the fault that is latched needs the short circuit. */
-static bool needs_short_circuit(uint32_t faults, safe_t safe)
+/* No control acts: to the task and the identification, the drive does not act. */
+static void reset_control(drive_t *drive, sample_t *sample)
 {
-    return safe == SAFE_SHORT_CIRCUIT || (safe != SAFE_FREEWHEEL && (faults & FAULT_OVER_VOLTAGE) != 0U) ||
-           (safe == SAFE_SHORT_ON_GATE_FAULT && (faults & FAULT_GATE) != 0U);
+    current_control_reset(&drive->fast.current_control);
+    turning_control_reset(&drive->fast.turning_control, &sample->point.flux);
+    sample->acting = false;
+    identify_window_invalidate(&drive->fast.window);
+    drive->fast.periods_since_enable = 0;
 }
 
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
 static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
 {
-    if (needs_short_circuit(drive->fast.faults, safe)) {
+    if (short_circuit_is_needed(drive->fast.faults, safe)) {
         short_circuit_apply(&drive->fast);
     } else {
         short_circuit_end(&drive->fast);
     }
-    current_control_reset(&drive->fast.current_control);
-    turning_control_reset(&drive->fast.turning_control, &sample->point.flux);
+    reset_control(drive, sample);
     sample->point.u = (dq_q15_t){0, 0};
     sample->voltage_limited = false;
     sample->pulses_clamped = false;
-    sample->acting = false;
-    identify_window_invalidate(&drive->fast.window);
     drive->fast.u_next = (dq_q15_t){0, 0};
-    drive->fast.periods_since_enable = 0;
 }
 
 /* The voltage circle or a pulse limit is active: the voltage of the next period follows from the duties. */
@@ -153,24 +152,6 @@ static void reset_faults(drive_t *drive, uint32_t requested)
     }
 }
 
-/* All sample monitors, with their counters. */
-static void check_samples(drive_t *drive, const sample_t *sample, bool run)
-{
-    const monitor_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
-    const uint32_t faults = monitor_step(&drive->period.monitor, &drive->fast.monitor, &in);
-    if (in.v_dc < drive->period.monitor.v_min) {
-        /* Below v_min the applied voltage is unknown; the three-period count starts again. */
-        drive->fast.periods_since_enable = 0;
-    }
-    /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
-    if ((faults & FAULT_ANGLE) != 0U) {
-        drive->fast.angle_tracker.samples = 0; /* what it predicts has long been contradicted: it starts again */
-    }
-    if (faults != 0U) {
-        drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
-    }
-}
-
 /* Park, the flux tables, and the angle in the middle of the period in which the duties will act: 1.5 periods ahead. */
 static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t angle_step)
 {
@@ -182,22 +163,40 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega, angle_step};
 }
 
+/* Nothing identifies or monitors a machine during the pulses but the monitors of the samples. */
+static __attribute__((noinline, cold)) void apply_pulses(drive_t *drive, sample_t *sample, const rotor_frame_t *now)
+{
+    const dq_q15_t v = pulses_step(&drive->pulses, &drive->pulses_state, sample->point.i, sample->theta_e);
+    write_duties(drive, sample, now, pulses_voltage(v, drive->parameters.modulate.alpha_q31, now->v_dc));
+    reset_control(drive, sample);
+}
+
+static __attribute__((noinline, cold)) void control_checked(drive_t *drive, sample_t *sample, const rotor_frame_t *now,
+                                                            const current_target_t *target)
+{
+    if (turning_control_used(&drive->motor->turning_control)) {
+        write_duties(drive, sample, now, control_turning(drive, sample, now, target));
+    } else {
+        control_currents(drive, sample, now, target);
+    }
+    count_since_enable(&drive->fast, sample);
+}
+
 static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, sample_t *sample, int32_t angle_step)
 {
     const command_t *command = command_box_read(&drive->commands);
     fast_state_t *fast = &drive->fast;
     const bool turning = turning_control_used(&drive->motor->turning_control);
-    check_samples(drive, sample, command->run);
+    acquire_check(drive, sample, command->run != (uint8_t)BRIDGE_OFF);
     const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
-    if (command->run && fast->faults == 0U) {
-        if (turning) {
-            write_duties(drive, sample, &now, control_turning(drive, sample, &now, &command->target));
+    if (command->run != (uint8_t)BRIDGE_OFF && fast->faults == 0U) {
+        if (command->run == (uint8_t)BRIDGE_PULSES) {
+            apply_pulses(drive, sample, &now);
         } else {
-            control_currents(drive, sample, &now, &command->target);
+            control_checked(drive, sample, &now, &command->target);
         }
         hal_pwm_enable(true);
         fast->short_circuit.holds = false;
-        count_since_enable(fast, sample);
     } else {
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
@@ -211,7 +210,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
 static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
-    if (!command->run) {
+    if (command->run == (uint8_t)BRIDGE_OFF) {
         reset_faults(drive, command->fault_resets);
     }
     sample_t *sample = sample_box_begin(&drive->samples);
@@ -223,7 +222,7 @@ static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *driv
 __attribute__((flatten)) void fast_isr(drive_t *drive)
 {
     const command_t *command = command_box_read(&drive->commands);
-    if (__builtin_expect(!(drive->fast.is_settled & command->run), 0)) {
+    if (__builtin_expect(((uint8_t)drive->fast.is_settled & command->run) == 0U, 0)) {
         run_period_not_settled(drive);
         return;
     }

@@ -14,7 +14,7 @@ static void check_task(drive_t *drive)
     if (__builtin_expect(generation != fast->command_seen, 1)) {
         fast->command_seen = generation;
         fast->silent_steps = 0;
-    } else if (command_box_read(&drive->commands)->run) {
+    } else if (command_box_read(&drive->commands)->run != (uint8_t)BRIDGE_OFF) {
         fast->silent_steps++;
         if (fast->silent_steps >= SILENT_STEPS_MAX) {
             drive_raise_fault(drive, FAULT_OVERRUN);

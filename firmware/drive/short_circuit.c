@@ -33,3 +33,9 @@ void short_circuit_reset(fast_state_t *fast)
 {
     fast->short_circuit = (short_circuit_t){SHORT_CIRCUIT_LOWER, false};
 }
+
+bool short_circuit_is_needed(uint32_t faults, safe_t safe)
+{
+    return safe == SAFE_SHORT_CIRCUIT || (safe != SAFE_FREEWHEEL && (faults & FAULT_OVER_VOLTAGE) != 0U) ||
+           (safe == SAFE_SHORT_ON_GATE_FAULT && (faults & FAULT_GATE) != 0U);
+}

@@ -19,4 +19,7 @@ void short_circuit_end(fast_state_t *fast);
 /** Both sides may be tried again: the faults are reset. */
 void short_circuit_reset(fast_state_t *fast);
 
+/** Whether the fault that is latched needs the short circuit. */
+bool short_circuit_is_needed(uint32_t faults, safe_t safe);
+
 #endif

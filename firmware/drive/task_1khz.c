@@ -156,16 +156,25 @@ static dq_q15_t next_references(drive_t *drive, const snapshot_t *snapshot)
     return compute_references(drive, snapshot);
 }
 
+static uint8_t bridge_mode(const drive_t *drive, bool runs)
+{
+    if (!runs) {
+        return (uint8_t)BRIDGE_OFF;
+    }
+    return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
+}
+
 /* Writes the command for the fast ISR. commanded: the operating point that follows from it. */
 static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
 {
     task_state_t *task = &drive->task;
+    const bool runs = task->run_state == RUN_STATE_RUN && faults == 0U;
     command_t command = {
-        .run = task->run_state == RUN_STATE_RUN && faults == 0U,
+        .run = bridge_mode(drive, runs),
         .faults = faults,
         .fault_resets = task->fault_resets,
     };
-    if (command.run) {
+    if (runs) {
         commanded->i = next_references(drive, snapshot);
         commanded->flux = flux_table_step(&drive->motor->flux_table, commanded->i);
         task->i_ref = commanded->i;
@@ -216,6 +225,7 @@ void task_1khz(drive_t *drive)
     task->flow = flow_pass(task->flow, FLOW_DECIDED);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);
+    drive_pulse(drive, &snapshot);
     operating_point_t commanded = snapshot.sample.point;
     command_fast_isr(drive, &snapshot, faults, &commanded);
     task->flow = flow_pass(task->flow, FLOW_COMMANDED);

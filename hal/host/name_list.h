@@ -68,6 +68,20 @@
     X(commission_r_ohm, "ohm", NUMBER, "Resistance measured by the commissioning.") \
     X(compensation_V, "V", NUMBER, "Compensated voltage error of a phase at the present dc voltage.") \
     X(compensation_knee_A, "A", NUMBER, "Current from which the compensated voltage error is constant.") \
+    X(pulses, "", CHOICE, "Phase of the voltage pulses at standstill; 1 starts them.") \
+    X(pulses_failure, "", CHOICE, "Reason for which the voltage pulses ended early.") \
+    X(pulses_vd, "", NUMBER, "Voltage of the pulses in d, as a share of the largest voltage.") \
+    X(pulses_vq, "", NUMBER, "Voltage of the pulses in q, as a share of the largest voltage.") \
+    X(pulses_first, "", NUMBER, "Share of its bound at which the first half wave of the current in q ends.") \
+    X(pulses_id_low_A, "A", NUMBER, "Lower bound of the current in d: the voltage turns positive.") \
+    X(pulses_id_high_A, "A", NUMBER, "Upper bound of the current in d: the voltage turns negative.") \
+    X(pulses_iq_low_A, "A", NUMBER, "Lower bound of the current in q: the voltage turns positive.") \
+    X(pulses_iq_high_A, "A", NUMBER, "Upper bound of the current in q: the voltage turns negative.") \
+    X(pulses_angle_rad, "rad", NUMBER, "Electrical angle by which the rotor may move during the pulses.") \
+    X(pulses_delay, "", COUNT, "Periods before the voltage in q begins.") \
+    X(pulses_reversals, "", COUNT, "Reversals of the voltage, in q if it has one, after which the pulses end.") \
+    X(pulses_periods, "", COUNT, "Periods after which the pulses end in any case.") \
+    X(theta_e_rad, "rad", NUMBER, "Electrical angle of the last sample.") \
     X(memory_recalled, "", SWITCH, "1: this drive has started with a record of its flash.") \
     X(memory_saves, "", COUNT, "Records saved in the flash since the start.")
 

@@ -9,6 +9,7 @@
 #include "hal/host/instance.h"
 #include "hal/host/limits.h"
 #include "hal/host/parameters.h"
+#include "hal/host/pulsed.h"
 #include "hal/host/stations.h"
 
 static double pu15(int32_t x, float base)
@@ -197,6 +198,20 @@ const parameter_t parameters[] = {
     {"commission_r_ohm", commissioned_r_ohm, NULL, 0, 0},
     {"compensation_V", commissioned_level_V, NULL, 0, 0},
     {"compensation_knee_A", commissioned_knee_A, NULL, 0, 0},
+    {"pulses", pulsed_phase, pulsed_start, 0.0, 1.0},
+    {"pulses_failure", pulsed_failure, NULL, 0, 0},
+    {"pulses_vd", pulsed_vd, pulsed_set_vd, 0.0, 0.7},
+    {"pulses_vq", pulsed_vq, pulsed_set_vq, 0.0, 0.7},
+    {"pulses_first", pulsed_first, pulsed_set_first, 0.0, 1.0},
+    {"pulses_id_low_A", pulsed_id_low_A, pulsed_set_id_low_A, -INFINITY, INFINITY},
+    {"pulses_id_high_A", pulsed_id_high_A, pulsed_set_id_high_A, -INFINITY, INFINITY},
+    {"pulses_iq_low_A", pulsed_iq_low_A, pulsed_set_iq_low_A, -INFINITY, INFINITY},
+    {"pulses_iq_high_A", pulsed_iq_high_A, pulsed_set_iq_high_A, -INFINITY, INFINITY},
+    {"pulses_angle_rad", pulsed_angle_rad, pulsed_set_angle_rad, 0.0, 0.7853981633974483},
+    {"pulses_delay", pulsed_delay, pulsed_set_delay, 0.0, 20000.0},
+    {"pulses_reversals", pulsed_reversals, pulsed_set_reversals, 1.0, 1000.0},
+    {"pulses_periods", pulsed_periods, pulsed_set_periods, 1.0, 20000.0},
+    {"theta_e_rad", pulsed_theta_rad, NULL, 0, 0},
     COMMISSIONED_POINTS(POINT_NAME){"memory_recalled", get_memory_recalled, NULL, 0, 0},
     {"memory_saves", get_memory_saves, NULL, 0, 0},
 };

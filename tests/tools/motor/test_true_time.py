@@ -106,6 +106,7 @@ COUNTS = {
     "TIMESTAMP_MODE": "a code",
     "DEAD_TIME_MAX": "ticks of the timer", "DEAD_TIME_BY_4": "a code", "SAMPLE_PULSE_TICKS": "ticks of the timer",
     "PERIODS_MAX": "periods of the longest step",
+    "BURST_PERIODS_MAX": "periods of the longest burst of voltage pulses, an upper bound of what may be asked for",
     "WORDS_PER_STEP": "words, as docs/theory/data-integrity.md says",
     "STEPS_WITHOUT_WINDOW": "steps, as that page says",
     "PER_STEP": "share of an update", "STEP_CLOCK_NOMINAL_NS": "of the clock itself",

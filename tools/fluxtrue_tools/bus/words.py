@@ -33,6 +33,8 @@ SOURCES: Final = {
     "COMMISSION_PHASE_LIST": "firmware/control/commission/commission.h",
     "COMMISSION_FAILURE_LIST": "firmware/control/commission/commission.h",
     "RUN_STATE_LIST": "firmware/drive/drive.h",
+    "PULSES_PHASE_LIST": "firmware/drive/pulses.h",
+    "PULSES_FAILURE_LIST": "firmware/drive/pulses.h",
     "COMMAND_MODE_LIST": "firmware/comm/can_rx.h",
     "DERATING_REASON_LIST": "firmware/comm/messages.h",
     "REQUEST_LIMIT_LIST": "firmware/comm/messages.h",
