@@ -26,6 +26,11 @@ COMMANDS = {
     "fuzz": ("fluxtrue_tools.fuzz.cli", "fuzz", "Random and mutated frames through the receive path."),
     "prove": ("fluxtrue_tools.prove.cli", "prove", "Prove properties of the firmware with a model checker."),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
+    "commission": (
+        "fluxtrue_tools.commission.cli",
+        "commission",
+        "Measure an unknown motor, make its folder (simulated).",
+    ),
     "live": ("fluxtrue_tools.live.cli", "live", "Draw the drive live in a browser; command, tune, record."),
     "log": ("fluxtrue_tools.log.cli", "log", "Decode, plot and export a recorded drive."),
     "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),

@@ -91,7 +91,7 @@ class _Axis:
         return splines.indices.reshape(shape), splines.data.reshape(shape), sparse.csr_matrix(chain)
 
 
-class _Basis:
+class Basis:
     """The tensor product over a plane (i_d from, i_d to, largest i_q) in units of i_max."""
 
     def __init__(self, plane: tuple[float, float, float], intervals: int, parity: int = 1) -> None:
@@ -119,7 +119,7 @@ class _Basis:
         return np.asarray(np.sum(parts, axis=0))
 
 
-class _System:
+class System:
     """Normal equations of a penalised fit."""
 
     def __init__(self, count: int) -> None:
@@ -133,8 +133,9 @@ class _System:
         self.power += float(values @ values)
         self.total += len(values) if counted else 0
 
-    def solve(self, penalty: Array) -> tuple[float, Array]:
-        """Effective unknowns and solution, with the smoothing that generalised cross-validation chooses."""
+    def solve(self, penalty: Array, slack: float = SCORE_SLACK) -> tuple[float, Array]:
+        """Effective unknowns and solution, with the smoothing that generalised cross-validation chooses; slack: of its
+        score, for the least smoothing that is taken instead of the best."""
         penalty = penalty * (np.trace(self.matrix) / np.trace(penalty))
         size = len(self.matrix)
         base = self.matrix + MIDDLE * penalty + FLOOR * np.trace(self.matrix) / size * np.eye(size)
@@ -150,13 +151,13 @@ class _System:
             error = max(self.power - float(2.0 * x @ self.right - x @ self.matrix @ x), 0.0) + NOISE_MIN**2 * self.power
             found.append((error / max(self.total - unknowns, 1.0) ** 2, unknowns, x))
         least = min(score for score, _, _ in found)
-        return next((unknowns, x) for score, unknowns, x in found if score <= SCORE_SLACK * least)
+        return next((unknowns, x) for score, unknowns, x in found if score <= slack * least)
 
 
 class CoEnergy:
     """psi_d and psi_q as slopes of one energy (a FluxModel). Beyond the fitted plane the value at its edge holds."""
 
-    def __init__(self, basis: _Basis, coefficients: Array, i_max_A: float) -> None:
+    def __init__(self, basis: Basis, coefficients: Array, i_max_A: float) -> None:
         self._basis, self._coefficients, self._i_max = basis, coefficients, i_max_A
 
     def _slope(self, i_d: ArrayLike, i_q: ArrayLike, nd: int, nq: int) -> Array:
@@ -176,7 +177,7 @@ class CoEnergy:
 class Separate:
     """psi_d and psi_q as two surfaces of their own (a FluxModel): what the points themselves say of reciprocity."""
 
-    def __init__(self, surfaces: tuple[tuple[_Basis, Array], tuple[_Basis, Array]], i_max_A: float) -> None:
+    def __init__(self, surfaces: tuple[tuple[Basis, Array], tuple[Basis, Array]], i_max_A: float) -> None:
         self._surfaces, self._i_max = surfaces, i_max_A
 
     def _value(self, which: int, i_d: ArrayLike, i_q: ArrayLike, nd: int, nq: int) -> Array:
@@ -216,7 +217,7 @@ def _plane(
     return plane, int(np.clip(per_point * np.sqrt(places), INTERVALS_MIN, INTERVALS_MAX))
 
 
-def _pair(basis: _Basis, u_d: Array, u_q: Array) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
+def _pair(basis: Basis, u_d: Array, u_q: Array) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
     """Rows of psi_d and psi_q; the constant of the energy (the first coefficient) becomes the offset of psi_q."""
     d, q = (basis.rows(u_d, u_q, *order)[:, 1:] for order in ((1, 0), (0, 1)))
     ones = np.ones((len(u_d), 1))
@@ -225,14 +226,14 @@ def _pair(basis: _Basis, u_d: Array, u_q: Array) -> tuple[sparse.csr_matrix, spa
 
 def fit(points: Points, i_max_A: float) -> Fit:
     """The co-energy of all points over the current circle, and as far as the points reach."""
-    basis = _Basis(*_plane(points, i_max_A))
+    basis = Basis(*_plane(points, i_max_A))
     scale = float(np.sqrt(np.mean(points.psi_d**2 + points.psi_q**2)))
     u_d, u_q = points.i_d / i_max_A, points.i_q / i_max_A
     d, q = _pair(basis, u_d, u_q)
     weight = 1.0 / (SMALL + np.hypot(u_d, u_q))
     psi_d, psi_q = weight * points.psi_d / scale, weight * points.psi_q / scale
     d, q = (sparse.diags(weight) @ rows for rows in (d, q))
-    system = _System(basis.count)
+    system = System(basis.count)
     system.add(d, psi_d)
     system.add(q, psi_q)
     across = sparse.csr_matrix(TORQUE_WEIGHT * (sparse.diags(u_q) @ d - sparse.diags(u_d) @ q))
@@ -253,8 +254,8 @@ def fit_separately(points: Points, i_max_A: float) -> Separate:
     plane, intervals = _plane(points, i_max_A, INTERVALS_SEPARATE)
     surfaces = []
     for psi, parity in ((points.psi_d, 1), (points.psi_q, -1)):
-        basis = _Basis(plane, intervals, parity)
-        system = _System(basis.count)
+        basis = Basis(plane, intervals, parity)
+        system = System(basis.count)
         system.add(basis.rows(points.i_d / i_max_A, points.i_q / i_max_A, 0, 0), psi)
         surfaces.append((basis, system.solve(basis.penalty())[1]))
     return Separate((surfaces[0], surfaces[1]), i_max_A)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commissioning of hidden machines, scored with what only the test knows of them."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from fluxtrue_tools.cli import run as command
+from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.score import score
+from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_map import load_flux_map
+from fluxtrue_tools.motor.flux_model import SplineModel
+from fluxtrue_tools.sim.motor import Motor
+
+MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
+MAP_RMS, R_SHARE = 0.01, 0.01
+
+
+@pytest.mark.parametrize(("name", "seed"), MACHINES)
+def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: Motor, known: Nameplate) -> None:
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A)
+    found = run(drive, chosen(("map",)), known, lambda _: None)
+    assert found.surface is not None and found.resistance is not None
+    reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
+    error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
+    print(f"{name} {seed}: map {reached}, R {100 * error:+.2f} %, largest current {found.largest_A:.1f} A")
+    assert reached.map_rms <= MAP_RMS
+    assert abs(error) <= R_SHARE
+    assert found.largest_A <= known.i_max_A
+    assert drive.get("run_state") != 1.0
+    assert drive.get("fault_word") == 0.0
+
+
+def test_the_truth_cannot_be_read(unknown: Motor, known: Nameplate) -> None:
+    drive, _ = hidden.make("hsm1", 1, unknown, known.i_max_A)
+    for name in ("plant.r_ohm_20", "truth.torque_Nm"):
+        with pytest.raises(FluxtrueError, match="cannot read"):
+            drive.get(name)
+        with pytest.raises(FluxtrueError, match="cannot read"):
+            drive.capture((name,), 1)
+        with pytest.raises(FluxtrueError, match="cannot read"):
+            drive.set(name, 0.0)
+
+
+def test_settings_are_restored_after_a_refusal(unknown: Motor, known: Nameplate) -> None:
+    """A machine with a thousandth of the guessed inductance: its current trips at once."""
+    drive, _ = hidden.make("spm_12V", 1, unknown, known.i_max_A)
+    before = {name: drive.get(name) for name in ("dead_time_compensation", "trim")}
+    with pytest.raises(FluxtrueError, match="fault|exceeded"):
+        run(drive, chosen(("map",)), known, lambda _: None)
+    assert before == {name: drive.get(name) for name in before}
+    assert drive.get("enable") == 0.0
+
+
+def test_a_dry_run_announces_movement_and_current(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["commission", "--motor", str(folder), "--step", "map", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "beyond 15 electrical degrees a burst ends" in said
+    assert "up to 250 A" in said and "up to 212 A" in said
+
+
+@pytest.mark.parametrize("options", [["--step", "spin"], []])
+def test_a_wrong_call_is_refused(options: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["commission", "--motor", str(folder), *options]) == 2
+    assert "wanted" in (said := capsys.readouterr().err) or "allowed" in said
+
+
+def test_the_folder_says_where_each_value_comes_from(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], known: Nameplate
+) -> None:
+    out = tmp_path / "found"
+    options = ["--motor", str(folder), "--machine", "saturated", "--seed", "12", "--out", str(out)]
+    assert command(["commission", *options]) == 0
+    text = (out / "motor.toml").read_text(encoding="utf-8")
+    data = tomllib.loads(text)
+    assert {path.name for path in out.iterdir()} == {"motor.toml", "flux_map.csv", "commission.txt", "commission.png"}
+    for key in ("r_ohm", "flux_map", "dead_time_s"):
+        line = next(line for line in text.splitlines() if line.startswith(f"{key} = "))
+        assert "measured by fluxtrue commission" in line
+    grid = load_flux_map(out / data["machine"]["flux_map"], known.i_max_A)
+    model = SplineModel(grid.id_A, grid.iq_A, grid.psi_d_Vs, grid.psi_q_Vs)
+    assert float(model.psi_d(0.0, 0.0)) == pytest.approx(known.psi_f_Vs, rel=1e-6)
+    assert "nameplate's guess" in text
+    assert "cannot be seen at standstill" in capsys.readouterr().out
+    assert command(["motor", "check", str(out)]) == 0
+
+
+def test_after_a_refusal_nothing_is_written(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "found"
+    assert command(["commission", "--motor", str(folder), "--machine", "spm_12V", "--out", str(out)]) == 2
+    assert list(tmp_path.iterdir()) == []

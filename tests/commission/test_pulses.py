@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The firmware's voltage pulses: when they are refused, and how they end."""
+
+import pytest
+
+from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.bursts import SIGNALS, Burst
+from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.sim.motor import Motor
+
+PULSE, DONE, FAILED = 1.0, 3.0, 4.0
+REFUSED, STOPPED, TIME, CURRENT = 1.0, 2.0, 4.0, 5.0
+LONG = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=1000, periods=2000)
+
+
+@pytest.fixture
+def drive(unknown: Motor, known: Nameplate) -> SoftwareInTheLoop:
+    made, _ = hidden.make("saturated", 1, unknown, known.i_max_A)
+    made.set("enable", 1.0)
+    made.capture(SIGNALS, 500)
+    assert made.get("run_state") == 1.0
+    return made
+
+
+def outcome(drive: SoftwareInTheLoop) -> tuple[float, float]:
+    return drive.get("pulses"), drive.get("pulses_failure")
+
+
+def test_a_burst_ends_without_current(drive: SoftwareInTheLoop) -> None:
+    Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4).command(drive)
+    rows = drive.capture(SIGNALS, 500)
+    assert outcome(drive) == (DONE, 0.0)
+    assert 35.0 < abs(rows[:, 0]).max() < 55.0
+    assert abs(rows[-100:, 0]).max() < 5.0
+
+
+def test_without_switching_it_is_refused(drive: SoftwareInTheLoop) -> None:
+    drive.set("enable", 0.0)
+    drive.capture(SIGNALS, 500)
+    LONG.command(drive)
+    rows = drive.capture(SIGNALS, 100)
+    assert outcome(drive) == (FAILED, REFUSED)
+    assert abs(rows[:, 2:4]).max() == 0.0
+
+
+@pytest.mark.parametrize("name", ["torque_requested_Nm", "iq_ref_A"])
+def test_with_a_request_it_is_refused(name: str, drive: SoftwareInTheLoop) -> None:
+    drive.set("current_mode", float(name == "iq_ref_A"))
+    drive.set(name, 1.0)
+    drive.capture(SIGNALS, 20)
+    LONG.command(drive)
+    drive.capture(SIGNALS, 50)
+    assert outcome(drive) == (FAILED, REFUSED)
+
+
+@pytest.mark.parametrize(("name", "value"), [("pulses_id_low_A", 60.0), ("pulses_iq_high_A", -60.0)])
+def test_bounds_without_a_band_between_them_are_refused(name: str, value: float, drive: SoftwareInTheLoop) -> None:
+    wanted = {"pulses_vd": 0.2, "pulses_id_low_A": -50.0, "pulses_id_high_A": 50.0, "pulses_iq_low_A": -50.0,
+              "pulses_iq_high_A": 50.0, "pulses_reversals": 4.0, "pulses_periods": 100.0}  # fmt: skip
+    for each, amount in (wanted | {name: value}).items():
+        drive.set(each, amount)
+    drive.set("pulses", 1.0)
+    drive.capture(SIGNALS, 50)
+    assert outcome(drive) == (FAILED, REFUSED)
+
+
+def test_a_lost_command_ends_it_in_the_safe_state(drive: SoftwareInTheLoop) -> None:
+    LONG.command(drive)
+    drive.capture(SIGNALS, 50)
+    assert drive.get("pulses") == PULSE
+    drive.set("enable", 0.0)
+    rows = drive.capture(SIGNALS, 200)
+    assert outcome(drive) == (FAILED, STOPPED)
+    assert drive.get("run_state") != 1.0
+    assert abs(rows[100:, 2:4]).max() == 0.0
+
+
+def test_a_request_ends_it(drive: SoftwareInTheLoop) -> None:
+    LONG.command(drive)
+    drive.capture(SIGNALS, 50)
+    drive.set("torque_requested_Nm", 1.0)
+    drive.capture(SIGNALS, 50)
+    assert outcome(drive) == (FAILED, STOPPED)
+
+
+def test_its_time_is_limited(drive: SoftwareInTheLoop) -> None:
+    Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=1000, periods=100).command(drive)
+    drive.capture(SIGNALS, 300)
+    assert outcome(drive) == (FAILED, TIME)
+
+
+def test_a_current_beyond_the_largest_ends_it(unknown: Motor, known: Nameplate) -> None:
+    """The voltage is far too large for this machine: the prediction comes too late."""
+    drive, _ = hidden.make("spm_12V", 1, unknown, known.i_max_A)
+    drive.set("enable", 1.0)
+    drive.capture(SIGNALS, 500)
+    Burst(0.15, 0.0, (-25.0, 25.0), (-25.0, 25.0), reversals=10).command(drive)
+    drive.capture(SIGNALS, 100)
+    assert drive.get("pulses") != DONE
+    assert drive.get("pulses_failure") == CURRENT or drive.get("fault_word") != 0.0

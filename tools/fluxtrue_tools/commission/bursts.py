@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bursts of voltage pulses: commanded, recorded, integrated to flux linkages (CM-9) ... (CM-11)."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+
+SIGNALS = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "pulses")
+DONE, FAILED = 3.0, 4.0
+FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
+            5: "the current exceeded the machine's largest"}  # fmt: skip
+BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
+REST_S = 0.02  # after a burst: the drive controls the currents to zero
+CHUNK = 200  # periods recorded at once
+PERIODS_MAX = 4000
+TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Burst:
+    """What the firmware is asked for; voltages as a share of the largest one, currents in A."""
+
+    v_d: float
+    v_q: float
+    d: tuple[float, float]
+    q: tuple[float, float]
+    reversals: int
+    delay: int = 0
+    first: float = 0.7071  # without saturation: half of the impulse
+    angle_deg: float = 15.0
+    periods: int = PERIODS_MAX
+
+    @property
+    def axes(self) -> tuple[float, float]:
+        """An axis without voltage and current has a phase whose current is zero, and with it its voltage unknown."""
+        return float(self.v_d > 0.0), float(self.v_q > 0.0)
+
+    def shifted(self, by_A: complex) -> "Burst":
+        """With bounds for what the sensors will show."""
+        d, q = by_A.real, by_A.imag
+        return replace(self, d=(self.d[0] + d, self.d[1] + d), q=(self.q[0] + q, self.q[1] + q))
+
+    def command(self, drive: Capture) -> None:
+        """Set all values and start."""
+        values = {"pulses_vd": self.v_d, "pulses_vq": self.v_q, "pulses_first": self.first,
+                  "pulses_id_low_A": self.d[0], "pulses_id_high_A": self.d[1],
+                  "pulses_iq_low_A": self.q[0], "pulses_iq_high_A": self.q[1],
+                  "pulses_angle_rad": math.radians(self.angle_deg), "pulses_delay": self.delay,
+                  "pulses_reversals": self.reversals, "pulses_periods": self.periods}  # fmt: skip
+        for name, value in values.items():
+            drive.set(name, float(value))
+        drive.set("pulses", 1.0)
+
+
+@dataclass(frozen=True)
+class Raw:
+    """A recorded burst: currents of each sample, and the voltage that acts until the next one."""
+
+    i: Array  # complex, rotor frame
+    u: Array  # complex, in the frame of the middle of its period
+    theta: Array  # electrical, continuous
+    period_s: float
+    axes: tuple[float, float] = (1.0, 1.0)  # weights of psi_d and psi_q
+    failure: str = ""
+
+    @property
+    def moved_rad(self) -> float:
+        """Electrical."""
+        return float(np.abs(self.theta - self.theta[0]).max())
+
+    def within(self, low_A: float, high_A: float) -> "Raw":
+        """From the first sample on whose current along d is between the two."""
+        inside = (self.i.real > low_A) & (self.i.real < high_A)
+        kept = slice(int(np.argmax(inside)), None)
+        return replace(self, i=self.i[kept], u=self.u[kept], theta=self.theta[kept])
+
+    def without(self, offset: complex) -> "Raw":
+        """Without the offsets of the current sensors, which are constant in the stationary frame."""
+        return replace(self, i=self.i - offset * np.exp(-1j * self.theta))
+
+
+def _aligned(rows: Array, period_s: float, burst: Burst, failure: str) -> Raw:
+    """The voltage of a row acts in the period after its sample."""
+    i = rows[1:, 0] + 1j * rows[1:, 1]
+    u = rows[:-1, 2] + 1j * rows[:-1, 3]
+    return Raw(i, u, np.unwrap(rows[1:, 4]), period_s, burst.axes, failure)
+
+
+def _phase_word(drive: Capture) -> str:
+    return FAILURES.get(int(drive.get("pulses_failure")), "") if drive.get("pulses") == FAILED else ""
+
+
+def _shift(drive: Capture, known: Nameplate) -> complex:
+    """What the current sensors show without current, in the rotor frame now."""
+    return complex(known.offset_A * np.exp(-1j * drive.get("theta_e_rad")))
+
+
+def _brake(drive: Capture, known: Nameplate) -> None:
+    """The alternating torque leaves some speed: a small current along q takes it away."""
+    drive.set("current_mode", 1.0)
+    for _ in range(BRAKE_STEPS):
+        speed = float(np.mean(drive.capture(("speed_rpm",), round(BRAKE_S / drive.period_s))[-10:]))
+        if abs(speed) < STANDING_RPM:
+            break
+        wanted = 1j * known.brake_A(speed) + _shift(drive, known)
+        drive.set("id_ref_A", wanted.real)
+        drive.set("iq_ref_A", wanted.imag)
+    drive.set("id_ref_A", 0.0)
+    drive.set("iq_ref_A", 0.0)
+    drive.set("current_mode", 0.0)
+
+
+def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
+    """One burst, from zero current to zero current."""
+    _brake(drive, known)
+    drive.capture(SIGNALS, round(REST_S / drive.period_s))
+    burst.shifted(_shift(drive, known)).command(drive)
+    parts = [drive.capture(SIGNALS, CHUNK)]
+    while parts[-1][-1, -1] not in (DONE, FAILED):
+        parts.append(drive.capture(SIGNALS, CHUNK))
+        if len(parts) * CHUNK > 2 * PERIODS_MAX:
+            raise FluxtrueError("commission: the voltage pulses do not end")
+    fault = int(drive.get("fault_word"))
+    if fault:
+        raise FluxtrueError(f"commission: a fault ended the voltage pulses (fault word 0x{fault:x})")
+    rows = np.vstack(parts)
+    active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
+    failure = _phase_word(drive)
+    if failure == FAILURES[1] or not len(active):
+        raise FluxtrueError(f"commission: voltage pulses {failure or 'had no voltage'}")
+    running = np.nonzero(rows[:, -1] == 1.0)[0]
+    rows = rows[max(running[0] - 1, 0) : running[-1] + 1]
+    return _aligned(rows, drive.period_s, burst, failure).without(known.offset_A)
+
+
+def offset(drive: Capture, seconds: float = 0.1) -> tuple[complex, float]:
+    """Mean current with switching disabled, in the stationary frame, and the rms noise of a component."""
+    rows = drive.capture(SIGNALS, round(seconds / drive.period_s))
+    i_s = (rows[:, 0] + 1j * rows[:, 1]) * np.exp(1j * rows[:, 4])
+    return complex(i_s.mean()), float(i_s.std() / math.sqrt(2.0))
+
+
+@dataclass(frozen=True)
+class Linkage:
+    """A burst as flux linkages: the change since its start, and what an error of each kind would have added."""
+
+    i: Array
+    psi: Array  # complex, rotor frame
+    turned: Array  # e^(-j delta): what the magnet's flux of the start is multiplied by
+    of_r: Array  # change of psi per ohm of error
+    of_level: Array  # per volt that a leg loses
+    axes: tuple[float, float]
+
+
+def _legs(i_s: Array, knee_A: float) -> Array:
+    """The vector of three legs whose voltages are sat(i/knee)."""
+    total = np.zeros(len(i_s), complex)
+    for k in range(3):
+        axis = np.exp(2j * np.pi * k / 3.0)
+        total += 2.0 / 3.0 * axis * np.clip((i_s * np.conj(axis)).real / knee_A, -1.0, 1.0)
+    return total
+
+
+def _integral(values: Array, period_s: float) -> Array:
+    """Trapezoids from the first sample on."""
+    steps = 0.5 * period_s * (values[1:] + values[:-1])
+    return np.concatenate(([0.0], np.cumsum(steps)))
+
+
+def integrate(raw: Raw, r_ohm: float, knee_A: float) -> Linkage:
+    """(CM-11): in the stationary frame, so that a movement of the rotor is part of the model."""
+    turn = np.exp(1j * raw.theta)
+    middle = np.exp(0.5j * (raw.theta[1:] + raw.theta[:-1]))
+    i_s = raw.i * turn
+    volts = np.concatenate(([0.0], np.cumsum(raw.period_s * raw.u[:-1] * middle)))
+    r_part = _integral(i_s, raw.period_s)
+    back = np.exp(-1j * raw.theta)
+    level_part = _integral(_legs(i_s, knee_A), raw.period_s)
+    return Linkage(raw.i, (volts - r_ohm * r_part) * back, back * turn[0], -r_part * back, -level_part * back, raw.axes)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many hidden machines: python -m fluxtrue_tools.commission.campaign [--machines 40]. Refusals are counted."""
+
+from pathlib import Path
+
+import click
+import numpy as np
+
+from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.score import score
+from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim import motor as motors
+from fluxtrue_tools.sim.build import ROOT
+
+KINDS = ("hsm1", "saturated", "pmasynrm", "linear", "leaf")
+FOLDER = ROOT / "tests" / "motors" / "unknown"
+FIRST_SEED = 100
+
+
+def _one(name: str, seed: int, folder: Path) -> tuple[float, float, float, float] | None:
+    """Errors of map and resistance, share of i_max, movement in degrees; None after a refusal."""
+    motor = motors.load(str(folder))
+    known = nameplate_of(folder, motor)
+    drive, truth = hidden.make(name, seed, motor, known.i_max_A)
+    try:
+        found = run(drive, chosen(("map",)), known, lambda _: None)
+    except FluxtrueError as error:
+        click.echo(f"{name:10} {seed}  refused: {error}")
+        return None
+    assert found.surface is not None and found.resistance is not None
+    reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
+    r_error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
+    share, moved = found.largest_A / known.i_max_A, float(np.degrees(found.moved_rad))
+    click.echo(f"{name:10} {seed}  map {100 * reached.map_rms:5.2f} % (worst {100 * reached.map_worst:5.2f} %)  "
+               f"R {100 * r_error:+6.2f} %  {share:.3f} i_max  {moved:4.1f} deg")  # fmt: skip
+    return reached.map_rms, abs(r_error), share, moved
+
+
+@click.command()
+@click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
+def main(machines: int) -> None:
+    """Score hidden machines one after the other."""
+    results = [_one(KINDS[k % len(KINDS)], FIRST_SEED + k, FOLDER) for k in range(machines)]
+    done = np.array([result for result in results if result is not None])
+    click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
+    if len(done):
+        names = ("map rms, % of psi_max", "R, %", "largest current, % of i_max", "movement, deg")
+        for name, values in zip(names, (done * (100.0, 100.0, 100.0, 1.0)).T, strict=True):
+            click.echo(f"{name}: median {np.median(values):.2f}, 95 % within {np.percentile(values, 95):.2f}, "
+                       f"worst {values.max():.2f}")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated machines that the commissioning does not know: the map of one of the project's machines, changed at random.
+
+The changes keep the map the gradient of one energy, as that of any machine is: one scale for all flux linkages, one for
+the currents, and a magnet of its own. Resistance, inverter, sensors, inertia and friction are drawn, too.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.config import load_config
+from fluxtrue_tools.motor.flux_map import load_flux_map
+from fluxtrue_tools.motor.flux_model import Array, ConstantModel, FluxModel, SplineModel
+from fluxtrue_tools.sim.build import ROOT
+from fluxtrue_tools.sim.library import FluxMap, Loop
+from fluxtrue_tools.sim.motor import Motor
+
+FOLDERS = (ROOT / "firmware" / "motors", ROOT / "tests" / "motors")
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the tests compare with: never passed to the commissioning."""
+
+    source: FluxModel
+    source_i_max_A: float
+    flux_scale: float
+    current_scale: float  # of the currents at the same flux
+    magnet_scale: float
+    plant: dict[str, float]
+
+    def psi(self, i_d: ArrayLike, i_q: ArrayLike) -> tuple[Array, Array]:
+        """Flux linkages of the plant (PL-4)."""
+        d, q = np.asarray(i_d, float) / self.current_scale, np.asarray(i_q, float) / self.current_scale
+        more = (self.magnet_scale - self.flux_scale) * float(self.source.psi_d(0.0, 0.0))
+        return self.flux_scale * self.source.psi_d(d, q) + more, self.flux_scale * self.source.psi_q(d, q)
+
+    @property
+    def psi_f_Vs(self) -> float:
+        """Of the magnet."""
+        return float(self.psi(0.0, 0.0)[0])
+
+
+def _folder(name: str) -> Path:
+    found = next((folder / name for folder in FOLDERS if (folder / name / "motor.toml").is_file()), None)
+    if found is None:
+        known = sorted(path.parent.name for folder in FOLDERS for path in folder.glob("*/motor.toml"))
+        raise FluxtrueError(f"--machine {name}: allowed: {', '.join(known)}")
+    return found
+
+
+def _source(folder: Path) -> tuple[FluxModel, FluxMap | None, float]:
+    """Model, map for the plant, largest current of a machine of the project."""
+    machine = load_config(folder).machine
+    if machine.flux_map is None:
+        assert machine.ld_H and machine.lq_H and machine.psi_f_Vs
+        return ConstantModel(machine.ld_H, machine.lq_H, machine.psi_f_Vs), None, machine.i_max_A
+    grid = load_flux_map(folder / machine.flux_map, machine.i_max_A)
+    model = SplineModel(grid.id_A, grid.iq_A, grid.psi_d_Vs, grid.psi_q_Vs)
+    return model, FluxMap(grid.id_A, grid.iq_A, grid.psi_d_Vs, grid.psi_q_Vs), machine.i_max_A
+
+
+def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
+    errors = {"vdc_gain": float(rng.uniform(0.995, 1.005)), "current_noise_A_rms": 0.002 * full_scale_A}
+    for phase in "abc":
+        errors[f"current_gain_{phase}"] = float(rng.uniform(0.997, 1.003))
+        errors[f"current_offset_A_{phase}"] = float(rng.uniform(-0.005, 0.005)) * full_scale_A
+    return errors
+
+
+def draw(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[Truth, FluxMap | None, dict[str, float]]:
+    """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters."""
+    rng = np.random.default_rng([seed, sum(name.encode())])
+    model, flux_map, source_i_max = _source(_folder(name))
+    flux_scale, magnet = float(rng.uniform(0.85, 1.15)), float(rng.uniform(0.85, 1.15))
+    current = i_max_A / source_i_max * float(rng.uniform(0.9, 1.1))
+    base = motor.plant
+    r_ohm = float(rng.uniform(0.005, 0.03)) * base["vdc_V"] / math.sqrt(3.0) / i_max_A
+    plant = base | _sensors(rng, base["current_full_scale_A"]) | {
+        "r_ohm_20": r_ohm, "magnet_scale": magnet, "lq_scale": flux_scale, "ld_slope_scale": flux_scale,
+        "cross_saturation_scale": flux_scale, "dead_time_s": base["dead_time_s"] * float(rng.uniform(0.7, 1.3)),
+        "device_drop_V": 0.003 * base["vdc_V"] * float(rng.uniform(0.3, 1.7)), "iron_k_h": 0.0, "iron_k_e": 0.0,
+        "imposed_speed": 0.0, "theta_m_rad": float(rng.uniform(0.0, 2.0 * math.pi)),
+        "inertia_kgm2": 4e-4 * motor.torque_max_Nm * float(rng.uniform(0.7, 1.4)),
+        "viscous_Nms": 1e-4 * motor.torque_max_Nm * float(rng.uniform(0.5, 2.0)),
+        "seed": float(rng.integers(1, 1 << 40)),
+    }  # fmt: skip
+    if flux_map is None:
+        linear = model.psi_d(0.0, 0.0, nd=1), model.psi_q(0.0, 0.0, nq=1), model.psi_d(0.0, 0.0)
+        plant |= {"ld_H": float(linear[0]) / current, "lq_H": float(linear[1]) / current, "psi_f_Vs": float(linear[2])}
+    else:
+        flux_map = FluxMap(current * flux_map.id_A, current * flux_map.iq_A, flux_map.psi_d_Vs, flux_map.psi_q_Vs)
+    return Truth(model, source_i_max, flux_scale, current, magnet, plant), flux_map, plant
+
+
+def make(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[SoftwareInTheLoop, Truth]:
+    """A drive with a hidden machine at its terminals."""
+    truth, flux_map, plant = draw(name, seed, motor, i_max_A)
+    return SoftwareInTheLoop(Loop(motor.library, plant, flux_map)), truth

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a motor before it is commissioned."""
+
+import math
+from dataclasses import dataclass
+
+BRAKE_S = 0.02  # in which braking takes the speed away, with the guessed inertia
+BRAKE_SHARE = 0.02  # of i_max: small enough for the monitors of a current that follows slowly
+
+
+@dataclass(frozen=True)
+class Nameplate:
+    """Of the folder that `fluxtrue motor start` makes; guesses but for the current, the pole pairs and the speed."""
+
+    i_max_A: float
+    speed_max_rpm: float
+    r_ohm: float
+    psi_f_Vs: float
+    pole_pairs: int
+    inertia_kgm2: float
+    level_V: float  # lost by a leg of the inverter
+    offset_A: complex = 0.0  # of the current sensors in the stationary frame, as soon as it is measured
+
+    def brake_A(self, speed_rpm: float) -> float:
+        """A current in q that reduces the speed."""
+        torque_Nm = self.inertia_kgm2 * speed_rpm * 2.0 * math.pi / 60.0 / BRAKE_S
+        wanted = -torque_Nm / (1.5 * self.pole_pairs * self.psi_f_Vs)
+        most = BRAKE_SHARE * self.i_max_A
+        return min(max(wanted, -most), most)

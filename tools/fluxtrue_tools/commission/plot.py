@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""commission.png: the currents of all bursts, the surface with its samples, what is left, and the MTPA line."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from scipy.interpolate import RectBivariateSpline
+
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.steps import Found
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.motor.map_import.grid import Grid
+
+LINES = 5
+NEAR = 0.03  # of i_max: a sample belongs to a line
+
+
+def _places(axes: Axes, found: Found, known: Nameplate) -> None:
+    for raw in found.bursts:
+        axes.plot(raw.i.real, raw.i.imag, ".-", ms=2, lw=0.4)
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    axes.plot(known.i_max_A * np.cos(angle), known.i_max_A * np.sin(angle), "k", lw=1.0, label="i_max")
+    axes.set(title="Currents of all bursts", xlabel="i_d, A", ylabel="i_q, A", aspect="equal")
+    axes.legend(fontsize=8)
+
+
+def _in_time(axes: Axes, found: Found) -> None:
+    raw = max(found.bursts, key=lambda raw: len(raw.i) if all(raw.axes) else 0)
+    times = 1e3 * raw.period_s * np.arange(len(raw.i))
+    axes.plot(times, raw.i.real, label="i_d")
+    axes.plot(times, raw.i.imag, label="i_q")
+    axes.set(title="Longest burst", xlabel="time, ms", ylabel="A")
+    axes.legend(fontsize=8)
+
+
+def _samples(found: Found, of_d: bool) -> tuple[Array, Array]:
+    """Currents and corrected flux linkages of the bursts that measure this axis."""
+    assert found.surface is not None
+    surface = found.surface
+    which = [n for n, weights in enumerate(surface.weights) if weights[0 if of_d else 1] > 0.0]
+    return np.concatenate([surface.i[n] for n in which]), np.concatenate([surface.psi[n] for n in which])
+
+
+def _curves(axes: Axes, found: Found, known: Nameplate, of_d: bool) -> None:
+    assert found.surface is not None
+    i, psi = _samples(found, of_d)
+    own, other = (i.real, np.abs(i.imag)) if of_d else (np.abs(i.imag), i.real)
+    magnet = float(found.surface.model.psi_d(0.0, 0.0))
+    values = psi.real - magnet if of_d else psi.imag * np.sign(i.imag)
+    for k, share in enumerate(np.linspace(0.0, 0.8, LINES)):
+        level = share * known.i_max_A * (1.0 if of_d else -1.0)
+        reach = np.sqrt(1.0 - share**2) * known.i_max_A
+        line = np.linspace(-reach if of_d else 0.0, 0.0 if of_d else reach, 80)
+        there = np.full(len(line), level)
+        model = found.surface.model
+        drawn = model.psi_d(line, there) - magnet if of_d else model.psi_q(there, line)
+        axes.plot(line, 1e3 * drawn, color=f"C{k}", lw=1.2, label=f"{'|i_q|' if of_d else 'i_d'} = {level:.0f} A")
+        near = (np.abs(other - level) < NEAR * known.i_max_A) & (own >= line[0]) & (own <= line[-1])
+        axes.plot(own[near], 1e3 * values[near], ".", color=f"C{k}", ms=2)
+    name, along = ("psi_d", "i_d") if of_d else ("psi_q", "|i_q|")
+    axes.set(
+        title=f"{name}{' without psi_f' if of_d else ''}: surface (lines), samples (points)",
+        xlabel=f"{along}, A",
+        ylabel=f"{name}, mV·s",
+    )
+    axes.legend(fontsize=7)
+
+
+def _left(axes: Axes, found: Found) -> None:
+    assert found.surface is not None
+    for n, (i, rest) in enumerate(zip(found.surface.i, found.surface.left, strict=True)):
+        of_d, of_q = found.surface.weights[n]
+        for part, weight, colour in ((rest.real, of_d, "C0"), (rest.imag, of_q, "C1")):
+            if weight > 0.0:
+                axes.plot(np.abs(i), 1e3 * part, ".", color=colour, ms=1.5)
+    limit = 6e3 * found.surface.left_Vs
+    axes.plot([], [], ".", color="C0", label="psi_d")
+    axes.plot([], [], ".", color="C1", label="psi_q")
+    axes.set(title="Samples minus surface", xlabel="|i|, A", ylabel="mV·s", ylim=(-limit, limit))
+    axes.legend(fontsize=8)
+
+
+def _mtpa(axes: Axes, grid: Grid, known: Nameplate) -> None:
+    d, q = np.meshgrid(grid.id_A, grid.iq_A, indexing="ij")
+    torque = 1.5 * known.pole_pairs * (grid.psi_d_Vs * q - grid.psi_q_Vs * d)
+    torque = np.where(np.hypot(d, q) <= 1.02 * known.i_max_A, torque, np.nan)
+    shown = axes.contour(d, q, torque, levels=10, linewidths=0.8)
+    axes.clabel(shown, fontsize=7, fmt="%.0f N·m")
+    at = RectBivariateSpline(grid.id_A, grid.iq_A, 1.5 * known.pole_pairs * (grid.psi_d_Vs * q - grid.psi_q_Vs * d))
+    angles = np.linspace(0.5 * np.pi, np.pi, 181)
+    amplitudes = np.linspace(0.02, 1.0, 40) * known.i_max_A
+    best = [angles[int(np.argmax(at.ev(a * np.cos(angles), a * np.sin(angles))))] for a in amplitudes]
+    axes.plot(amplitudes * np.cos(best), amplitudes * np.sin(best), "r", lw=1.5, label="MTPA")
+    axes.set(title="Torque of this map, with the nameplate's psi_f", xlabel="i_d, A", ylabel="i_q, A")
+    axes.legend(fontsize=8)
+
+
+def write(found: Found, known: Nameplate, grid: Grid | None, path: Path) -> None:
+    """The figure."""
+    r = found.resistance
+    assert r is not None
+    figure, axes = plt.subplots(2, 3, figsize=(17, 9.5), layout="constrained")
+    if found.surface is None or grid is None:
+        for each in axes.flat[1:]:
+            each.set_visible(False)
+        axes[0, 0].plot(r.currents_A, r.volts, "o")
+        axes[0, 0].set(title="Direct currents", xlabel="mean i_d, A", ylabel="mean u_d, V")
+    else:
+        _places(axes[0, 0], found, known)
+        _curves(axes[0, 1], found, known, of_d=True)
+        _curves(axes[0, 2], found, known, of_d=False)
+        _in_time(axes[1, 0], found)
+        _left(axes[1, 1], found)
+        _mtpa(axes[1, 2], grid, known)
+    figure.savefig(path, dpi=90, metadata={"Software": None})
+    plt.close(figure)

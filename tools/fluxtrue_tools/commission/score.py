@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a fitted map is from that of a simulated machine: for tests and campaigns, which know the machine."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.motor.flux_model import FluxModel
+
+
+@dataclass(frozen=True)
+class Score:
+    """Shares of the largest flux linkage and of the largest torque in the current circle, i_d <= 0."""
+
+    map_rms: float
+    map_worst: float
+    torque_rms: float
+
+
+def score(model: FluxModel, truth: Truth, i_max_A: float, psi_f_Vs: float) -> Score:
+    """Over a grid in the half circle; psi_f_Vs: the magnet's flux in place of the map's own,
+    which a standstill cannot show."""
+    d, q = np.meshgrid(np.linspace(-i_max_A, 0.0, 41), np.linspace(0.0, i_max_A, 41), indexing="ij")
+    inside = np.hypot(d, q) <= i_max_A
+    d, q = d[inside], q[inside]
+    true_d, true_q = truth.psi(d, q)
+    shift = psi_f_Vs - float(model.psi_d(0.0, 0.0))
+    error_d, error_q = model.psi_d(d, q) + shift - true_d, model.psi_q(d, q) - true_q
+    largest = float(np.hypot(true_d, true_q).max())
+    torque = true_d * q - true_q * d
+    error = np.hypot(error_d, error_q)
+    return Score(float(np.sqrt(np.mean(error**2))) / largest, float(error.max()) / largest,
+                 float(np.sqrt(np.mean((error_d * q - error_q * d) ** 2))) / float(np.abs(torque).max()))  # fmt: skip

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The steps of a commissioning in their order: what each does to the machine, and what it finds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from fluxtrue_tools.commission import levels, plan, surface
+from fluxtrue_tools.commission.bursts import FAILURES, SIGNALS, Raw, integrate, offset
+from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.levels import Resistance
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.surface import Surface
+from fluxtrue_tools.errors import FluxtrueError
+
+SETTLE_S = 0.05
+MOVED = FAILURES[3]
+KNEE_PER_NOISE = 2.0  # below twice the noise the sign of a phase current is not certain
+# Corrections that would act by the guesses of the nameplate; the voltages are evaluated without them.
+SWITCHED_OFF = ("trim",)
+
+
+@dataclass
+class Found:
+    """What the steps have found so far."""
+
+    offset_A: complex = 0.0  # of the current sensors, stationary frame
+    knee_A: float = 0.0
+    resistance: Resistance | None = None
+    first: plan.First | None = None
+    bursts: list[Raw] = field(default_factory=list)
+    surface: Surface | None = None
+
+    @property
+    def largest_A(self) -> float:
+        """Of all bursts."""
+        return max((float(abs(raw.i).max()) for raw in self.bursts), default=0.0)
+
+    @property
+    def moved_rad(self) -> float:
+        """The electrical angle by which the rotor moved in a burst."""
+        return max((raw.moved_rad for raw in self.bursts), default=0.0)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step with its announcement."""
+
+    name: str
+    does: str
+    run: Callable[[Capture, Found, Nameplate], None]
+
+
+def _enable(drive: Capture) -> None:
+    drive.set("torque_requested_Nm", 0.0)
+    drive.set("enable", 1.0)
+    drive.capture(SIGNALS, round(SETTLE_S / drive.period_s))
+    if drive.get("run_state") != 1.0:
+        raise FluxtrueError(f"commission: switching cannot be enabled (fault word 0x{int(drive.get('fault_word')):x})")
+
+
+def _disable(drive: Capture) -> None:
+    drive.set("enable", 0.0)
+    drive.capture(SIGNALS, round(SETTLE_S / drive.period_s))
+
+
+def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
+    _disable(drive)
+    found.offset_A, noise_A = offset(drive)
+    found.knee_A = KNEE_PER_NOISE * noise_A
+
+
+def _losses(found: Found, known: Nameplate) -> plan.Losses:
+    if found.resistance is None:
+        return plan.Losses(known.r_ohm, known.level_V, found.knee_A)
+    return plan.Losses(found.resistance.r_ohm, found.resistance.level_V, found.knee_A)
+
+
+def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
+    _enable(drive)
+    found.first = plan.first(drive, known, _losses(found, known))
+    found.resistance = levels.measure(drive, known, found.first, found.knee_A)
+    found.first = plan.first(drive, known, _losses(found, known))
+
+
+def _map(drive: Capture, found: Found, known: Nameplate) -> None:
+    assert found.resistance is not None and found.first is not None
+    _enable(drive)
+    compensated = drive.get("dead_time_compensation")
+    drive.set("dead_time_compensation", 0.0)  # by the sign of currents with an offset: it can be computed better later
+    try:
+        found.bursts = plan.sweep(drive, found.first, known)
+    finally:
+        drive.set("dead_time_compensation", compensated)
+    used = [raw for raw in found.bursts if raw.failure in ("", MOVED)]  # up to its end by a movement a burst is valid
+    lost = [raw.failure for raw in found.bursts if raw.failure not in ("", MOVED)]
+    if len(lost) > plan.LOST_MAX:
+        raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
+    linkages = [integrate(raw, found.resistance.r_ohm, found.knee_A) for raw in used]
+    found.surface = surface.fit(linkages, known.i_max_A, found.resistance.r_ohm, known.psi_f_Vs,
+                                found.resistance.total_V)  # fmt: skip
+
+
+STEPS = (
+    Step("offsets", "switching is disabled, nothing moves, no current", _offsets),
+    Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",
+         _resistance),
+    Step("map", "voltage pulses with currents up to {reach:.3g} A; alternating torque: the rotor swings; beyond "
+         "{angle:.0f} electrical degrees a burst ends", _map),
+)  # fmt: skip
+NEEDS = {"offsets": ("offsets",), "resistance": ("offsets", "resistance"), "map": ("offsets", "resistance", "map")}
+
+
+def chosen(names: tuple[str, ...]) -> list[Step]:
+    """The named steps with those that they need."""
+    unknown = [name for name in names if name not in NEEDS]
+    if unknown:
+        raise FluxtrueError(f"--step {unknown[0]!r}: allowed: {', '.join(NEEDS)}, separated by commas")
+    wanted = {needed for name in names for needed in NEEDS[name]}
+    return [step for step in STEPS if step.name in wanted]
+
+
+def announcement(step: Step, known: Nameplate) -> str:
+    """What will move and how much current flows."""
+    return step.does.format(reach=known.i_max_A, level=levels.LEVELS[-1] * known.i_max_A, level_s=levels.duration_s(),
+                            angle=plan.ANGLE_DEG)  # fmt: skip
+
+
+def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None]) -> Found:
+    """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before."""
+    found = Found()
+    before = {name: drive.get(name) for name in SWITCHED_OFF}
+    try:
+        for name in SWITCHED_OFF:
+            drive.set(name, 0.0)
+        for step in steps:
+            say(f"{step.name}: {announcement(step, known)}")
+            step.run(drive, found, replace(known, offset_A=found.offset_A))
+    finally:
+        _disable(drive)
+        for name, value in before.items():
+            drive.set(name, value)
+    return found
