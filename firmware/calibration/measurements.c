@@ -5,7 +5,7 @@
 #include "drive/mrai/mrai_seam.h"
 #include "hal/temperature.h"
 
-#define MEASURED(drive) ((drive)->samples.slot[(drive)->samples.generation & 1U])
+#define MEASURED(drive) ((drive)->samples.slot[(drive)->samples.generation % SAMPLE_SLOTS])
 
 #define FILL(name, type, base, expression, text) .name = (MEASUREMENT_TYPE_##type)(expression),
 

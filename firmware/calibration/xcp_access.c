@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibration/xcp_access.h"
 
+#include <stddef.h>
+
 /* Protects against accidental writes only. A product that needs protection against attacks must replace it. */
 static uint32_t compute_key(uint32_t seed)
 {
@@ -19,7 +21,8 @@ static xcp_config_t protocol_config(xcp_access_t *access)
     };
 }
 
-void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed)
+void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, const scope_t *scope,
+                     uint32_t seed)
 {
     for (int k = 0; k < CALIBRATION_COUNT; k++) {
         access->reference[k] = calibration_get(drive, (calibration_id_t)k);
@@ -28,6 +31,8 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
     }
     access->area[0] = (xcp_area_t){&access->measurements, sizeof access->measurements};
     access->area[1] = (xcp_area_t){frame, sizeof *frame};
+    access->area[2] = (xcp_area_t){&scope->capture, offsetof(capture_t, next)};
+    access->area[3] = (xcp_area_t){scope->memory, sizeof scope->memory};
     access->answer_waits = false;
     const xcp_config_t config = protocol_config(access);
     xcp_reset(&access->xcp, &config, seed);
@@ -35,10 +40,26 @@ void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_fr
     access->applied = access->xcp.generation;
 }
 
-void xcp_access_receive(xcp_access_t *access, const can_frame_t *frame)
+static xcp_result_t scope_answer(scope_t *scope, const drive_t *drive, const can_frame_t *frame)
+{
+    static const xcp_result_t results[SCOPE_RESULTS] = {[SCOPE_OK] = XCP_OK,
+                                                        [SCOPE_UNKNOWN] = XCP_ERR_CMD_UNKNOWN,
+                                                        [SCOPE_TOO_SHORT] = XCP_ERR_CMD_SYNTAX,
+                                                        [SCOPE_OUT_OF_RANGE] = XCP_ERR_OUT_OF_RANGE,
+                                                        [SCOPE_BUSY] = XCP_ERR_CMD_BUSY};
+    return results[scope_command(scope, drive, &frame->data[1], (uint8_t)(frame->length - 1U))];
+}
+
+void xcp_access_receive(xcp_access_t *access, const drive_t *drive, scope_t *scope, const can_frame_t *frame)
 {
     const xcp_config_t config = protocol_config(access);
-    access->answer_waits = xcp_command(&access->xcp, &config, frame, &access->answer);
+    if (access->xcp.connected && frame->length > 0U && frame->length <= XCP_PACKET_MAX &&
+        frame->data[0] == XCP_USER_CMD) {
+        xcp_answer(&access->xcp, scope_answer(scope, drive, frame), &access->answer);
+        access->answer_waits = true;
+    } else {
+        access->answer_waits = xcp_command(&access->xcp, &config, frame, &access->answer);
+    }
     access->answer.id = XCP_ID_ANSWER;
 }
 

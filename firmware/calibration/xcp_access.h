@@ -10,12 +10,13 @@
 #include "calibration/freeze_frame.h"
 #include "calibration/measurements.h"
 #include "comm/xcp.h"
+#include "scope/scope.h"
 
 /** Identifiers on the bus, standard frames. */
 #define XCP_ID_COMMAND 0x650U /* master to slave */
 #define XCP_ID_ANSWER 0x651U  /* slave to master */
 
-#define XCP_ACCESS_AREAS 2
+#define XCP_ACCESS_AREAS 4
 
 _Static_assert(CALIBRATION_COUNT <= XCP_PARAMETERS_MAX, "the protocol's page holds every value");
 
@@ -32,10 +33,12 @@ typedef struct {
     bool answer_waits;
 } xcp_access_t;
 
-/** frame: readable besides the measurements. */
-void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, uint32_t seed);
-/** A frame with id XCP_ID_COMMAND. */
-void xcp_access_receive(xcp_access_t *access, const can_frame_t *frame);
+/** frame, scope: readable besides the measurements. */
+void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, const scope_t *scope,
+                     uint32_t seed);
+/** A frame with id XCP_ID_COMMAND. XCP_USER_CMD holds a command for the scope; it needs no key, as it changes nothing
+ * that the drive runs on. */
+void xcp_access_receive(xcp_access_t *access, const drive_t *drive, scope_t *scope, const can_frame_t *frame);
 /** Once per step: takes over changed values and samples the measurement lists. passed_ms: milliseconds that passed in
  * this step. */
 void xcp_access_step(xcp_access_t *access, drive_t *drive, uint32_t passed_ms);

@@ -168,6 +168,23 @@ static xcp_result_t execute(xcp_t *xcp, const xcp_config_t *config, const can_fr
                                 : memory_command(xcp, config, command, answer->data, &answer->length);
 }
 
+static void finish(xcp_t *xcp, xcp_result_t result, can_frame_t *answer)
+{
+    xcp->counts.commands++;
+    if (result != XCP_OK) {
+        xcp->counts.refused += (result != XCP_ERR_CMD_SYNCH) ? 1U : 0U;
+        answer->data[0] = XCP_PID_ERROR;
+        answer->data[1] = (uint8_t)result;
+        answer->length = (uint8_t)((answer->length > 2U) ? answer->length : 2U);
+    }
+}
+
+void xcp_answer(xcp_t *xcp, xcp_result_t result, can_frame_t *answer)
+{
+    *answer = (can_frame_t){.length = 1, .data = {XCP_PID_RESPONSE}};
+    finish(xcp, result, answer);
+}
+
 /* Without a connection a slave is silent, except to CONNECT. */
 bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, can_frame_t *answer)
 {
@@ -177,13 +194,6 @@ bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *comm
         return false;
     }
     *answer = (can_frame_t){.length = 1, .data = {XCP_PID_RESPONSE}};
-    const xcp_result_t result = execute(xcp, config, command, answer);
-    xcp->counts.commands++;
-    if (result != XCP_OK) {
-        xcp->counts.refused += (result != XCP_ERR_CMD_SYNCH) ? 1U : 0U;
-        answer->data[0] = XCP_PID_ERROR;
-        answer->data[1] = (uint8_t)result;
-        answer->length = (uint8_t)((answer->length > 2U) ? answer->length : 2U);
-    }
+    finish(xcp, execute(xcp, config, command, answer), answer);
     return true;
 }

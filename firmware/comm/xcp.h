@@ -50,6 +50,8 @@ typedef struct {
 void xcp_reset(xcp_t *xcp, const xcp_config_t *config, uint32_t seed);
 /** True: answer holds the frame to send (its id is the transport's). */
 bool xcp_command(xcp_t *xcp, const xcp_config_t *config, const can_frame_t *command, can_frame_t *answer);
+/** The answer to a command that the caller has carried out itself: XCP_USER_CMD, once connected. It counts as one. */
+void xcp_answer(xcp_t *xcp, xcp_result_t result, can_frame_t *answer);
 /** The page the drive runs on. */
 const float *xcp_active_page(const xcp_t *xcp, const xcp_config_t *config);
 

@@ -18,6 +18,7 @@ enum {
     XCP_UPLOAD = 0xF5,
     XCP_SHORT_UPLOAD = 0xF4,
     XCP_BUILD_CHECKSUM = 0xF3,
+    XCP_USER_CMD = 0xF1,
     XCP_DOWNLOAD = 0xF0,
     XCP_SET_CAL_PAGE = 0xEB,
     XCP_GET_CAL_PAGE = 0xEA,
@@ -43,6 +44,7 @@ enum {
 /** An error, or XCP_OK. */
 typedef enum {
     XCP_ERR_CMD_SYNCH = 0x00,
+    XCP_ERR_CMD_BUSY = 0x10,
     XCP_ERR_DAQ_ACTIVE = 0x11,
     XCP_ERR_CMD_UNKNOWN = 0x20,
     XCP_ERR_CMD_SYNTAX = 0x21,

@@ -22,6 +22,9 @@ void drive_init(drive_t *drive, const motor_t *source)
 
 void drive_raise_fault(drive_t *drive, uint32_t fault)
 {
+    if (drive->fast.faults == 0U) {
+        drive->fast.fault_period = drive->samples.generation + 1U; /* of the period whose sample is being made */
+    }
     drive->fast.faults = drive->fast.faults | fault;
     drive->fast.is_settled = false;
 }

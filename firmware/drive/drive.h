@@ -98,6 +98,7 @@ typedef struct {
     short_circuit_t short_circuit;
     uint32_t fault_resets;                   /* of the command, as far as carried out */
     volatile uint32_t faults;                /* latched */
+    uint32_t fault_period;                   /* generation of the sample in whose period the first of them was raised */
     turning_control_state_t turning_control; /* of a motor that needs it, in place of current_control */
 } fast_state_t;
 
@@ -232,7 +233,6 @@ typedef struct {
 
 /** All of a drive. */
 typedef struct {
-    sample_box_t samples;
     const motor_t *motor;          /* constant: in flash on a target */
     period_data_t period;          /* constant: a copy */
     motor_parameters_t parameters; /* live: what calibration, commissioning and the trim change */
@@ -252,6 +252,7 @@ typedef struct {
     pulses_config_t pulses;      /* in effect: written by the 1 kHz task while no pulses are active */
     pulses_state_t pulses_state; /* written by the fast ISR alone */
     volatile bool held; /* switching stays disabled: written in the background, which writes the flash meanwhile */
+    sample_box_t samples; /* last: with its slots in front, the offsets of the rest would be too large for a load */
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);

@@ -2,7 +2,8 @@
 #ifndef DRIVE_EXCHANGE_H
 #define DRIVE_EXCHANGE_H
 /** The boxes through which priorities exchange data; each has one writer.
- *   slot[generation & 1] is complete, the writer fills the other one and then advances generation.
+ *   slot[generation & 1] is complete, the writer fills the other one and then advances generation. The box of the
+ *   samples has more slots: it is the history that the scope captures from.
  *   From task to ISR, the writer cannot interrupt the reader: one read is enough.
  *   From fast ISR to task, it can: the task copies all it needs, and copies again if a period came in between.
  *   The paper's identification has a box of its own (drive/mrai).
@@ -36,9 +37,13 @@ typedef struct {
 
 FX_POWER_OF_TWO_SIZE(sample_t);
 
+/** Periods that stay readable. A power of two; more than a step of the task has, by what the scope's freeze frame wants
+ * from before a fault. */
+#define SAMPLE_SLOTS 64U
+
 typedef struct {
-    sample_t slot[2];
-    volatile uint32_t generation;
+    volatile uint32_t generation; /* slot[generation % SAMPLE_SLOTS] is complete */
+    sample_t slot[SAMPLE_SLOTS];
 } sample_box_t;
 
 /** One window of the robust identification. Writer: fast ISR. Reader: 1 kHz task. */
@@ -88,7 +93,7 @@ static inline void exchange_barrier(void)
 /* The slot that publishing will complete. */
 static inline sample_t *sample_box_begin(sample_box_t *box)
 {
-    sample_t *slot = &box->slot[(box->generation + 1U) & 1U];
+    sample_t *slot = &box->slot[(box->generation + 1U) % SAMPLE_SLOTS];
     FX_ADDRESS_ONCE(slot);
     return slot;
 }
@@ -109,7 +114,7 @@ static inline sample_t sample_box_read(const sample_box_t *box)
     do {
         seen = box->generation;
         exchange_barrier();
-        copy = box->slot[seen & 1U];
+        copy = box->slot[seen % SAMPLE_SLOTS];
         exchange_barrier();
     } while (box->generation - seen > 1U);
     return copy;
@@ -118,7 +123,7 @@ static inline sample_t sample_box_read(const sample_box_t *box)
 /* In place: a reader that the fast ISR may interrupt must copy it and then compare the generation again. */
 static inline const sample_t *sample_box_at(const sample_box_t *box, uint32_t generation)
 {
-    return &box->slot[generation & 1U];
+    return &box->slot[generation % SAMPLE_SLOTS];
 }
 
 static inline void window_box_write(window_box_t *box, const identify_window_t *window)

@@ -34,7 +34,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
     *ecu = (ecu_t){0};
     step_clock_start(&ecu->clock, (uint32_t)(source->bases.step_s * 1e9F + 0.5F));
     drive_init(&ecu->drive, source);
-    xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, (uint32_t)hal_system_reset_cause());
+    xcp_access_init(&ecu->xcp, &ecu->drive, &ecu->freeze, &ecu->scope, (uint32_t)hal_system_reset_cause());
     const q31_t slew = per_step(&ecu->clock, full / SLEW_MS);
     ecu->arbitration_config = (arbitrate_config_t){
         .slew = slew,
@@ -58,7 +58,7 @@ static void receive(ecu_t *ecu)
     can_frame_t frame;
     for (int n = 0; n < FRAMES_PER_TASK && hal_can_receive(&frame); n++) {
         if (frame.id == XCP_ID_COMMAND && !frame.extended) {
-            xcp_access_receive(&ecu->xcp, &frame);
+            xcp_access_receive(&ecu->xcp, &ecu->drive, &ecu->scope, &frame);
         } else {
             second_level_frame(&ecu->second_level.frames, &frame);
             (void)can_rx_frame(&ecu->rx, &ecu->drive.motor->bus_scales, &frame);
@@ -206,6 +206,7 @@ void ecu_task_1khz(ecu_t *ecu)
     command_drive(ecu);
     ecu_pass(ecu, FLOW_ARBITRATED);
     task_1khz(&ecu->drive);
+    scope_step(&ecu->scope, &ecu->drive, ecu->supervisor.faults != 0U);
     check_by_second_level(ecu);
     ecu_pass(ecu, FLOW_CHECKED);
     service_watchdog(ecu);

@@ -51,6 +51,7 @@ typedef struct {
     uint16_t not_sent;
     xcp_access_t xcp;
     freeze_frame_t freeze;
+    scope_t scope;
 } ecu_t;
 
 void ecu_init(ecu_t *ecu, const motor_t *source);

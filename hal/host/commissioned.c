@@ -38,7 +38,7 @@ void commissioned_set_trim(fluxtrue_t *d, double value)
 /* The compensation in effect, at the present dc voltage. */
 double commissioned_level_V(const fluxtrue_t *d)
 {
-    const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation & 1U].v_dc / 32768.0 *
+    const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation % SAMPLE_SLOTS].v_dc / 32768.0 *
                           (double)d->drive.motor->bases.voltage_V;
     return (double)d->drive.parameters.modulate.dead_time_q16 / 65536.0 * v_dc_V;
 }

@@ -34,7 +34,7 @@ static const bases_t *bases(const fluxtrue_t *d)
 
 static const sample_t *sample(const fluxtrue_t *d)
 {
-    return &d->drive.samples.slot[d->drive.samples.generation & 1U];
+    return &d->drive.samples.slot[d->drive.samples.generation % SAMPLE_SLOTS];
 }
 
 #define GETTER(name, expression) \

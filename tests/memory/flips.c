@@ -5,6 +5,7 @@
  * millisecond, is compared with that of a copy without a flip. The bus requests other torques meanwhile. */
 #include <inttypes.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +27,9 @@
 #define HANG_S 20 /* of this process's own processor time, some hundred times what it needs */
 #define RUN_MS 900U
 #define MOMENTS 200U /* periods among which the moment of the flip is drawn */
+/* Of the scope's history and memory, which the drive does not run on, only two slots take part: the samples in them are
+ * in use in every 32nd period. */
+#define SCOPE_MEMORY ((uint32_t)offsetof(ecu_t, scope.memory))
 #define DRIVE_SHARE 4U /* of five flips, this many in the drive, the others in the rest of the ECU */
 
 typedef struct {
@@ -199,7 +203,7 @@ static void run_point(const point_t *point, unsigned flips, uint64_t *random, tr
     for (unsigned n = 0; n < flips; n++) {
         const bool in_drive = draw(random, 5) < DRIVE_SHARE;
         const uint32_t begin = in_drive ? 0U : (uint32_t)sizeof(drive_t);
-        const uint32_t end = in_drive ? (uint32_t)sizeof(drive_t) : (uint32_t)sizeof(ecu_t);
+        const uint32_t end = in_drive ? (uint32_t)offsetof(drive_t, samples.slot[2]) : SCOPE_MEMORY;
         const place_t place = {begin + draw(random, end - begin), draw(random, 8)};
         in_a_copy(point, &place, draw(random, MOMENTS), trace);
         classify(tally, golden, trace, &place, point->rpm);

@@ -11,7 +11,6 @@ static const struct {
     const char *name;
     size_t offset;
 } blocks[] = {
-    AT(drive.samples),
     AT(drive.motor),
     AT(drive.period),
     AT(drive.parameters),
@@ -38,6 +37,7 @@ static const struct {
     AT(drive.windows),
     AT(drive.commands),
     AT(drive.mrai),
+    AT(drive.samples),
     AT(clock),
     AT(rx),
     AT(tx),
@@ -47,6 +47,7 @@ static const struct {
     AT(liveness),
     AT(xcp),
     AT(freeze),
+    AT(scope),
 };
 
 #define BLOCKS (sizeof blocks / sizeof blocks[0])

@@ -23,7 +23,9 @@ import lizard
 
 from tree import PROJECT, Violation, files, lines, report
 
-MEASURED = tuple(Path("firmware") / layer for layer in ("fx", "signal", "control", "safety", "second_level", "ecu"))
+MEASURED = tuple(
+    Path("firmware") / layer for layer in ("fx", "signal", "control", "safety", "second_level", "scope", "ecu")
+)
 MARKER = re.compile(r"\b[GL]COVR?_EXCL_\w*")
 EXCLUSION = re.compile(r"/\* GCOVR_EXCL_(LINE|BR_LINE|START): (.+?) \*/")
 STOP = re.compile(r"/\* GCOVR_EXCL_STOP \*/")

@@ -37,7 +37,7 @@ TORQUE, COMMISSION = "firmware/control/torque", "firmware/control/commission"
 ADAPT, MRAI = "firmware/control/adapt", "firmware/control/mrai"
 CONTROL = (CURRENT, IDENTIFY, MRAI, ADAPT, COMMISSION, TORQUE)
 DRIVE = (*BASE, *CONTROL, "firmware/safety", "firmware/second_level", "firmware/drive", "hal")
-ECU = (*DRIVE, "firmware/comm", "firmware/calibration")
+ECU = (*DRIVE, "firmware/scope", "firmware/comm", "firmware/calibration")
 
 # First match wins: a folder comes before the folder that contains it. No folder of the chain that every drive needs
 # (current, identify, torque) includes one that can be left out (mrai, adapt, commission).
@@ -57,8 +57,9 @@ LAYERS = (
     Layer("firmware/second_level", ("firmware/fx", "firmware/types"), ordered=True),
     Layer("firmware/comm", BASE, FREESTANDING | {"string.h"}),
     Layer("firmware/drive", DRIVE, FREESTANDING | {"string.h"}, ordered=True),
+    Layer("firmware/scope", DRIVE, ordered=True),
     Layer("firmware/storage", DRIVE, FREESTANDING | {"string.h"}),
-    Layer("firmware/calibration", (*DRIVE, "firmware/comm"), FREESTANDING | {"string.h"}),
+    Layer("firmware/calibration", (*DRIVE, "firmware/scope", "firmware/comm"), FREESTANDING | {"string.h"}),
     Layer("firmware/ecu", ECU, FREESTANDING | {"string.h"}),
     Layer("hal/host", (*BASE, *CONTROL, "firmware/drive", "firmware/storage", "firmware/calibration", "firmware/ecu",
                        "hal"), HOSTED),

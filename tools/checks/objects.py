@@ -37,6 +37,7 @@ TASK_LAYERS = {
     "comm": re.compile(r"^e2e\.c"),
     "drive": re.compile(r"(_isr|acquire|publish|mailbox)\.c"),
     "storage": NO_FILE,
+    "scope": re.compile(r""),
     "calibration": NO_FILE,
     "ecu": NO_FILE,
 }

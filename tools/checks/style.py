@@ -27,6 +27,7 @@ MAX_LINES = (
     ("firmware/comm/*.c", 200),
     ("firmware/drive/*.c", 250),
     ("firmware/storage/*.c", 200),
+    ("firmware/scope/*.c", 250),
     ("firmware/calibration/*.c", 200),
     ("firmware/ecu/*.c", 250),
     ("hal/*/registers.h", 2000),  # generated

@@ -32,6 +32,7 @@ COMMANDS = {
         "Measure an unknown motor, make its folder (simulated).",
     ),
     "live": ("fluxtrue_tools.live.cli", "live", "Draw the drive live in a browser; command, tune, record."),
+    "scope": ("fluxtrue_tools.scope.cli", "scope", "Capture signals of the drive at PWM rate around a trigger."),
     "log": ("fluxtrue_tools.log.cli", "log", "Decode, plot and export a recorded drive."),
     "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),

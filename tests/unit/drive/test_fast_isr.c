@@ -20,7 +20,7 @@ void tearDown(void)
 
 static const sample_t *published(void)
 {
-    return &drive.samples.slot[drive.samples.generation & 1U];
+    return &drive.samples.slot[drive.samples.generation % SAMPLE_SLOTS];
 }
 
 void test_a_period_samples_then_switches_then_pends_the_papers_identification_once(void)

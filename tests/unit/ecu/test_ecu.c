@@ -618,7 +618,7 @@ void test_the_first_fault_freezes_the_values_before_it(void)
  * the drive has latched the fault. */
 void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
-    sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation & 1U];
+    sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
     sample->acting = true;
     sample->i_ab = fx_pair(0, 12000);
     for (int n = 0; n < 20; n++) {

@@ -56,6 +56,16 @@ class Base:
 
 
 @dataclass(frozen=True)
+class Signal:
+    """One signal that the scope can capture."""
+
+    name: str
+    text: str
+    base: Base
+    number: int  # by which commands name it
+
+
+@dataclass(frozen=True)
 class Word:
     """What a value, or a bit, of a measurement with this base means."""
 
@@ -77,6 +87,9 @@ class Description:
     bases: tuple[Base, ...]
     step_s: float  # of the 1 kHz task: the faster raster
     words: tuple[Word, ...] = ()
+    period_s: float = 0.0  # of the PWM
+    scope: tuple[Value, ...] = ()  # state and memory of the scope
+    signals: tuple[Signal, ...] = ()
 
 
 def _text(raw: bytes) -> str:
@@ -146,25 +159,35 @@ def read(path: Path) -> Description:
         raise FluxtrueError(f"{path}: not an ELF file of the firmware ({error})") from error
 
 
+def _scale(name: str, bases: dict[str, Base]) -> Base:
+    """The base of a captured signal; two of them are not the motor's."""
+    fixed = {"ANGLE": Base("ANGLE", "deg", 180.0), "NONE": Base("NONE", "", Q15_ONE)}
+    if name == "ZERO":
+        return Base(name, "A", 8.0 * bases["CURRENT"].full)  # Q28: the upper half has three bits fewer than Q15
+    return fixed[name] if name in fixed else bases[name]
+
+
 def _describe(elf: ELFFile, path: Path) -> Description:
     records = _records(elf, path)
     ecu, motor = _symbol(elf, path, OBJECT), _symbol(elf, path, MOTOR)
-    bases, step_s = {"ONE": Base("ONE", "", 1.0)}, 1e-3
+    bases, times = {"ONE": Base("ONE", "", 1.0)}, {"step_s": 1e-3, "period_s": 0.0}
     for kind, value, offset in records:
         if kind in ("base", "step"):
             (number,) = struct.unpack("<f", _bytes_at(elf, path, motor + offset, 4))
             if kind == "base":
                 bases[value.name] = Base(value.name, value.unit, number)
             else:
-                step_s = number
+                times[value.name] = number
     placed = {
         wanted: tuple(
             _placed(value, path, ecu + offset, bases.get(value.base))
             for kind, value, offset in records if kind == wanted
         )
-        for wanted in ("value", "measure", "frozen")
+        for wanted in ("value", "measure", "frozen", "scope")
     }  # fmt: skip
     words = tuple(Word(value.base, kind == "bit", number, value.name.lower(), value.text)
                   for kind, value, number in records if kind in ("word", "bit"))  # fmt: skip
+    signals = tuple(Signal(value.name, value.text, _scale(value.base, bases), number)
+                    for kind, value, number in records if kind == "signal")  # fmt: skip
     return Description("fluxtrue", placed["value"], placed["measure"], placed["frozen"], tuple(bases.values()),
-                       step_s, words)  # fmt: skip
+                       times["step_s"], words, times["period_s"], placed["scope"], signals)  # fmt: skip

@@ -87,7 +87,7 @@ def build_task(folder: Path) -> Path:
     """The stages of the 1 kHz task, in a program of their own: called from two places they would be compiled apart."""
     stages = Path(__file__).with_name("task_kernels.c")
     ecu = [FIRMWARE / "ecu" / f"{name}.c" for name in ("arbitration", "supervisor", "supervisor_table")]
-    ecu += sorted((FIRMWARE / "second_level").glob("*.c"))
+    ecu += sorted(path for layer in ("second_level", "scope") for path in (FIRMWARE / layer).glob("*.c"))
     return build_target(folder / "task.elf", [*sources(folder), stages, *ecu], (*LTO, f"-I{ROOT}"), [stages])
 
 
@@ -229,6 +229,9 @@ TASK_TITLES = {
     "arbitrate": "torque arbitration",
     "second_level": "second level",
     "second_level_frame": "second level, a frame",
+    "scope_idle": "scope, nothing armed",
+    "scope_armed": "scope, armed: eight values of ten periods, and the search",
+    "scope_triggered": "scope, triggered: eight values of ten periods",
 }
 PAPERS = ("schedule",)
 

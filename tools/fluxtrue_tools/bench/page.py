@@ -156,7 +156,7 @@ def _memory(figures: Figures) -> list[str]:
         ("image, RAM with the stack", image["RAM"], RAM_MAX),
         ("control library (`fx`, `signal`, `control`), flash without tables",
          library["code"] + library["constants"], CODE_MAX),
-        ("control library, RAM: state of a drive", state, STATE_MAX),
+        ("control library, RAM: state of a drive, without the scope's history", state, STATE_MAX),
     ]  # fmt: skip
     return table("what|  bytes |  bound |", ((*row, verdict(row[1] <= row[2])) for row in rows))
 

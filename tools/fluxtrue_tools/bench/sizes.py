@@ -64,6 +64,7 @@ def _module(source: str, name: str) -> str:
         "drive",
         "storage",
         "calibration",
+        "scope",
         "ecu",
     ):
         if f"/firmware/{layer}/" in path or (layer == "fx" and name.startswith("fx_")):
@@ -140,8 +141,11 @@ def _members(elf: ELFFile, type_name: str) -> dict[str, int]:
 
 
 def state(elf: Path) -> dict[str, int]:
-    """Bytes of RAM of each part of drive_t."""
-    return _members(ELFFile(BytesIO(elf.read_bytes())), "drive_t")
+    """Bytes of RAM of each part of drive_t. Of the samples two slots hand over, the others are the scope's history."""
+    file = ELFFile(BytesIO(elf.read_bytes()))
+    parts, slot = _members(file, "drive_t"), _members(file, "sample_box_t")["slot"]
+    handed_over = _members(file, "sample_box_t")["generation"] + 2 * slot
+    return parts | {"samples": handed_over, "history": parts["samples"] - handed_over}
 
 
 def compiler() -> str:

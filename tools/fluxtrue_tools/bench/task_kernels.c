@@ -9,9 +9,11 @@
 #include "ecu/supervisor.h"
 #include "fx/vec.h"
 #include "hal/temperature.h"
+#include "scope/scope.h"
 #include "second_level/second_level.h"
 #include "signal/rate_limit.h"
 
+#define PERIODS_OF_A_STEP 10U
 #define CALLED __attribute__((used, externally_visible, noinline))
 
 const drive_t *drive_now(void);
@@ -31,6 +33,9 @@ void task_supervisor(void);
 void task_arbitrate(void);
 void task_second_level(void);
 void task_second_level_frame(void);
+void task_scope_idle(void);
+void task_scope_armed(void);
+void task_scope_triggered(void);
 
 static drive_t copy;
 static snapshot_t snapshot;
@@ -38,6 +43,7 @@ static volatile int32_t result;
 static supervisor_t supervisor = {.state = STATE_RUN, .enabled = true, .enable_seen = true};
 static arbitrate_state_t arbitration;
 static second_level_t second_level;
+static scope_t idle_scope, armed_scope, triggered_scope;
 
 /* The drive by its address, as the task has it. */
 static drive_t *the_copy(void)
@@ -45,6 +51,29 @@ static drive_t *the_copy(void)
     drive_t *address = &copy;
     __asm__("" : "+r"(address));
     return address;
+}
+
+/* Eight values of every period: one scope waits for a level that never comes, the other one has been triggered and is
+ * armed again when it is complete, before the step that is counted. */
+static void prepare_scopes(void)
+{
+    const capture_config_t config = {
+        .signals = CAPTURE_SIGNALS_MAX,
+        .signal = {CAPTURE_i_d_A, CAPTURE_i_q_A, CAPTURE_u_d_V, CAPTURE_u_q_V, CAPTURE_v_dc_V, CAPTURE_omega_rad_s,
+                   CAPTURE_theta_e_deg, CAPTURE_i_zero_A},
+        .trigger = TRIGGER_ABOVE,
+        .trigger_signal = CAPTURE_v_dc_V,
+        .divisor = 1,
+        .samples = CAPTURE_MEMORY / CAPTURE_SIGNALS_MAX,
+        .level = INT16_MAX,
+    };
+    const uint32_t before = copy.samples.generation - PERIODS_OF_A_STEP;
+    if (armed_scope.capture.state == CAPTURE_IDLE) {
+        capture_arm(&armed_scope.capture, &config, before);
+    }
+    if (triggered_scope.capture.state != CAPTURE_TRIGGERED) {
+        capture_freeze(&triggered_scope.capture, &config, before + 1U, before);
+    }
 }
 
 CALLED void task_copy(void)
@@ -57,6 +86,7 @@ CALLED void task_copy(void)
     snapshot.faults = copy.fast.faults;
     snapshot.inverter_dC = hal_temperature_inverter_dC();
     snapshot.winding_dC = hal_temperature_winding_dC();
+    prepare_scopes();
 }
 
 CALLED void task_nothing(void)
@@ -243,4 +273,19 @@ CALLED void task_second_level_frame(void)
     second_level.frames.command.synced = true;
     second_level.frames.command.counter = 14;
     second_level_frame(&second_level.frames, &frame);
+}
+
+CALLED void task_scope_idle(void)
+{
+    scope_step(&idle_scope, the_copy(), false);
+}
+
+CALLED void task_scope_armed(void)
+{
+    scope_step(&armed_scope, the_copy(), false);
+}
+
+CALLED void task_scope_triggered(void)
+{
+    scope_step(&triggered_scope, the_copy(), false);
 }

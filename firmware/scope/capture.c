@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "scope/capture.h"
+
+#include "scope/columns.h"
+#include "scope/trigger.h"
+
+#define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete so many periods while a step copies */
+
+bool capture_config_is_valid(const capture_config_t *config)
+{
+    if (config->signals == 0U || config->signals > CAPTURE_SIGNALS_MAX) {
+        return false;
+    }
+    for (uint8_t k = 0; k < config->signals; k++) {
+        if (config->signal[k] >= CAPTURE_SIGNALS) {
+            return false;
+        }
+    }
+    return config->trigger < TRIGGERS && config->trigger_signal < CAPTURE_SIGNALS && config->divisor > 0U &&
+           config->before < config->samples && (uint32_t)config->samples * config->signals <= CAPTURE_MEMORY;
+}
+
+static void begin(capture_t *capture, const capture_config_t *config, capture_state_t state)
+{
+    const uint16_t number = (uint16_t)(capture->number + 1U);
+    *capture = (capture_t){.config = *config, .state = (uint8_t)state, .number = number};
+    columns_find(capture);
+}
+
+void capture_arm(capture_t *capture, const capture_config_t *config, uint32_t newest)
+{
+    begin(capture, config, CAPTURE_ARMED);
+    trigger_reset(capture);
+    capture->next = newest + 1U;
+}
+
+void capture_freeze(capture_t *capture, const capture_config_t *config, uint32_t period, uint32_t newest)
+{
+    const uint32_t since = newest + 1U - period; /* the period may be the one after the newest */
+    const uint32_t reach = USABLE - lesser(since, USABLE);
+    const uint32_t before = lesser(lesser(config->before, reach), period - 1U); /* the first period has the number 1 */
+    begin(capture, config, CAPTURE_TRIGGERED);
+    capture->frozen = 1U;
+    capture->next = period - before;
+    capture->before = (uint16_t)before;
+    capture->remaining = (uint16_t)(config->samples - config->before + before);
+    capture->taken = capture->remaining;
+    capture->trigger_period = period;
+}
+
+void capture_trigger(capture_t *capture, uint32_t period)
+{
+    if (capture->state == CAPTURE_ARMED) {
+        capture->asked = true;
+        capture->asked_for = period;
+    }
+}
+
+void capture_stop(capture_t *capture)
+{
+    capture->state = CAPTURE_IDLE;
+}
+
+static void begin_after(capture_t *capture)
+{
+    const capture_config_t *config = &capture->config;
+    const uint32_t before = lesser(capture->filled, config->before);
+    capture->state = CAPTURE_TRIGGERED;
+    capture->before = (uint16_t)before;
+    capture->remaining = (uint16_t)(config->samples - before);
+    capture->taken = config->samples;
+    capture->first = (uint16_t)((capture->at + config->samples - before) % config->samples);
+    capture->trigger_period = capture->next;
+}
+
+/* Samples that lie side by side in the ring and in the memory. */
+static uint32_t contiguous(const capture_t *capture, uint32_t newest)
+{
+    const uint32_t divisor = capture->config.divisor;
+    const uint32_t slots = SAMPLE_SLOTS - 1U - capture->next % SAMPLE_SLOTS;
+    return lesser(lesser(newest - capture->next, slots) / divisor + 1U,
+                  (uint32_t)capture->config.samples - capture->at);
+}
+
+static void take(capture_t *capture, int16_t *memory, const capture_source_t *source, uint32_t count)
+{
+    const capture_config_t *config = &capture->config;
+    if (count == 0U) {
+        return; /* the trigger is the next sample */
+    }
+    columns_copy(capture, &memory[(uint32_t)capture->at * config->signals], source, count);
+    capture->next += count * config->divisor;
+    capture->at = (uint16_t)(capture->at + count);
+    if (capture->at == config->samples) {
+        capture->at = 0;
+    }
+}
+
+static void record(capture_t *capture, int16_t *memory, const capture_source_t *source)
+{
+    uint32_t count = contiguous(capture, source->newest);
+    if (capture->state == CAPTURE_ARMED) {
+        bool found;
+        count = trigger_search(capture, source, count, &found);
+        take(capture, memory, source, count);
+        capture->filled = (uint16_t)lesser(capture->filled + count, capture->config.samples);
+        if (found) {
+            begin_after(capture);
+        }
+        return;
+    }
+    count = lesser(count, capture->remaining);
+    take(capture, memory, source, count);
+    capture->remaining = (uint16_t)(capture->remaining - count);
+    if (capture->remaining == 0U) {
+        capture->state = CAPTURE_DONE;
+    }
+}
+
+/* The ring no longer has the next period. */
+static void lose(capture_t *capture, uint32_t newest)
+{
+    capture->lost++;
+    if (capture->state == CAPTURE_ARMED) {
+        capture->filled = 0;
+        trigger_reset(capture);
+        capture->next = newest;
+    } else {
+        capture->taken = (uint16_t)(capture->taken - capture->remaining);
+        capture->state = CAPTURE_DONE;
+    }
+}
+
+void capture_step(capture_t *capture, int16_t *memory, const capture_source_t *source)
+{
+    while ((capture->state == CAPTURE_ARMED || capture->state == CAPTURE_TRIGGERED) &&
+           (int32_t)(source->newest - capture->next) >= 0) {
+        if (source->newest - capture->next >= USABLE) {
+            lose(capture, source->newest);
+        } else {
+            record(capture, memory, source);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SCOPE_CAPTURE_STATE_H
+#define SCOPE_CAPTURE_STATE_H
+/** What is to be captured, how far a capture is, and what it is taken from.
+ * Source   docs/howto/scope.md
+ * Units    raw half words, scope/signal_list.h
+ * Range    capture_config_is_valid()
+ * Context  1 kHz task; the first part of capture_t is read by tools */
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "drive/exchange.h"
+#include "scope/signal_list.h"
+
+#define CAPTURE_SIGNALS_MAX 8U
+#define CAPTURE_MEMORY 6144U /* half words */
+
+#define CAPTURE_ENUM(name, base, place, text) CAPTURE_##name,
+typedef enum { SCOPE_SIGNAL_LIST(CAPTURE_ENUM) CAPTURE_SIGNALS } capture_signal_t;
+
+/** Values of the 1 kHz task, as they were commanded for the periods that are copied next. */
+typedef struct {
+    int16_t i_d_ref, i_q_ref;
+    int16_t torque_commanded, torque_corrected, torque_estimated;
+    int16_t psi_error;
+} scope_step_values_t;
+
+typedef enum {
+    CAPTURE_IDLE = 0,
+    CAPTURE_ARMED = 1,     /* records and waits for the trigger */
+    CAPTURE_TRIGGERED = 2, /* records the samples after it */
+    CAPTURE_DONE = 3       /* complete, until it is released */
+} capture_state_t;
+
+typedef enum {
+    TRIGGER_MANUAL = 0, /* by command only */
+    TRIGGER_FAULT = 1,  /* the first fault */
+    TRIGGER_RISING = 2, /* the signal was below the level and is not any more */
+    TRIGGER_FALLING = 3,
+    TRIGGER_ABOVE = 4, /* the signal is at or above the level */
+    TRIGGER_BELOW = 5,
+    TRIGGERS = 6
+} capture_trigger_t;
+
+typedef struct {
+    uint8_t signals;                     /* 1 ... 8 */
+    uint8_t signal[CAPTURE_SIGNALS_MAX]; /* capture_signal_t */
+    uint8_t trigger;                     /* capture_trigger_t; a command triggers in addition to all of them */
+    uint8_t trigger_signal;              /* need not be one of the captured */
+    uint16_t divisor;                    /* periods from one sample to the next, from 1 */
+    uint16_t samples;                    /* of each signal */
+    uint16_t before;                     /* how many of them lie before the trigger: fewer than samples */
+    int16_t level;                       /* raw, in the scale of the trigger's signal */
+} capture_config_t;
+
+typedef struct {
+    capture_config_t config;
+    uint8_t state;   /* capture_state_t */
+    uint8_t frozen;  /* 1: a freeze frame around a fault, not what a tool has armed */
+    uint16_t number; /* counts the captures; a tool compares it before and after it reads */
+    uint16_t first;  /* row of the oldest sample */
+    uint16_t before; /* samples before the trigger, fewer than wanted if it came early */
+    uint16_t taken;  /* samples in all, valid when done */
+    uint16_t lost;
+    uint32_t trigger_period; /* number of the PWM period of the trigger, since the start */
+    /* Not read by tools. */
+    uint32_t next;                      /* period of the next sample */
+    uint32_t asked_for;                 /* period in which a command or a fault triggers */
+    uint16_t at;                        /* row of the next sample */
+    uint16_t filled;                    /* samples since the arming, at most `samples` */
+    uint16_t remaining;                 /* samples until the end */
+    uint8_t place[CAPTURE_SIGNALS_MAX]; /* of the signals in a slot, or in the values of the step */
+    uint8_t of_step;                    /* bits of the signals that are values of the step */
+    bool asked;
+    bool ready; /* reaching the level triggers: before an edge, the signal has been on the other side of it */
+} capture_t;
+
+typedef struct {
+    const sample_t *slot; /* the ring */
+    uint32_t newest;      /* its newest period */
+    const scope_step_values_t *step;
+} capture_source_t;
+
+#endif

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SCOPE_COLUMNS_H
+#define SCOPE_COLUMNS_H
+/** Where a captured signal is found: one column of the ring's slots, or a value of the task's step.
+ * Source   the list in scope/signal_list.h
+ * Range    signals below CAPTURE_SIGNALS
+ * Errors   none
+ * Context  1 kHz task; the fast ISR may write other slots of the ring meanwhile */
+#include <stddef.h>
+
+#include "scope/capture_state.h"
+
+/** A signal from the capture's next period on. */
+typedef struct {
+    const uint8_t *from;
+    size_t stride; /* bytes from one sample to the next; 0: a value of the step */
+} column_t;
+
+typedef int16_t __attribute__((may_alias)) halfword_t;
+
+static inline int16_t value_at(const uint8_t *from)
+{
+    return *(const halfword_t *)(const void *)from;
+}
+
+static inline uint32_t lesser(uint32_t a, uint32_t b)
+{
+    return (a < b) ? a : b;
+}
+
+/** The places of the captured signals, for columns_copy(): once, when a capture begins. */
+void columns_find(capture_t *capture);
+column_t column_of(const capture_t *capture, const capture_source_t *source, uint8_t signal);
+/** So many samples, at least one, of all captured signals, from the next period on, which lie side by side in the
+ * ring. */
+void columns_copy(const capture_t *capture, int16_t *to, const capture_source_t *source, uint32_t count);
+
+#endif

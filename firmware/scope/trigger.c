@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "scope/trigger.h"
+
+/* Reached where (value ^ flip) >= level: a trigger from above compares complements, which reverses the order. */
+typedef struct {
+    column_t values;
+    int32_t level, flip;
+} condition_t;
+
+static bool is_edge(const capture_t *capture)
+{
+    return capture->config.trigger == TRIGGER_RISING || capture->config.trigger == TRIGGER_FALLING;
+}
+
+void trigger_reset(capture_t *capture)
+{
+    capture->ready = !is_edge(capture);
+}
+
+static condition_t condition(const capture_t *capture, const capture_source_t *source)
+{
+    const capture_config_t *config = &capture->config;
+    const int32_t flip = (config->trigger == TRIGGER_FALLING || config->trigger == TRIGGER_BELOW) ? -1 : 0;
+    return (condition_t){column_of(capture, source, config->trigger_signal), config->level ^ flip, flip};
+}
+
+/* x < level is the same as ~x >= -level. */
+static condition_t negated(condition_t condition)
+{
+    return (condition_t){condition.values, -condition.level, ~condition.flip};
+}
+
+/* The samples before the first that reaches the condition. */
+static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_t count)
+{
+    const uint8_t *value = &condition->values.from[from * condition->values.stride];
+    for (uint32_t k = from; k < count; k++) {
+        if ((value_at(value) ^ condition->flip) >= condition->level) {
+            return k;
+        }
+        value += condition->values.stride;
+    }
+    return count;
+}
+
+static uint32_t search(capture_t *capture, const capture_source_t *source, uint32_t count)
+{
+    const condition_t reached = condition(capture, source);
+    uint32_t from = 0;
+    if (!capture->ready) {
+        const condition_t below = negated(reached);
+        from = count_until(&below, 0, count);
+        capture->ready = from < count;
+    }
+    return count_until(&reached, from, count);
+}
+
+/* Of samples that are not searched: an edge may follow the last of them. */
+static void skip(capture_t *capture, const capture_source_t *source, uint32_t count)
+{
+    if (is_edge(capture)) {
+        const condition_t reached = condition(capture, source);
+        capture->ready = count_until(&reached, count - 1U, count) == count;
+    }
+}
+
+/* The samples that a command or a fault leaves before the trigger. */
+static uint32_t until_asked(const capture_t *capture)
+{
+    const uint32_t divisor = capture->config.divisor;
+    const int32_t periods = (int32_t)(capture->asked_for - capture->next);
+    return (periods <= 0) ? 0U : ((uint32_t)periods + divisor - 1U) / divisor;
+}
+
+uint32_t trigger_search(capture_t *capture, const capture_source_t *source, uint32_t count, bool *found)
+{
+    const capture_config_t *config = &capture->config;
+    uint32_t until = count;
+    *found = false;
+    if (capture->filled < config->before) {
+        until = lesser(count, (uint32_t)config->before - capture->filled);
+        skip(capture, source, until);
+    } else if (config->trigger >= TRIGGER_RISING) {
+        until = search(capture, source, count);
+        *found = until < count;
+    }
+    const uint32_t asked = capture->asked ? until_asked(capture) : count;
+    if (asked < count && asked <= until) {
+        until = asked;
+        *found = true;
+    }
+    return until;
+}

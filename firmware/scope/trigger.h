@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef SCOPE_TRIGGER_H
+#define SCOPE_TRIGGER_H
+/** What an armed capture waits for: a signal's level or edge, a command, a fault.
+ * Source   docs/howto/scope.md
+ * Range    a valid configuration
+ * Errors   none
+ * Context  1 kHz task */
+#include "scope/columns.h"
+
+/** Before an edge can trigger, the signal must have been on the other side of the level. */
+void trigger_reset(capture_t *capture);
+/** The samples before the trigger, at most `count`, from the next period on; *found: the trigger comes after them. The
+ * search begins when enough samples lie before it; a command or a fault is not kept waiting. */
+uint32_t trigger_search(capture_t *capture, const capture_source_t *source, uint32_t count, bool *found);
+
+#endif

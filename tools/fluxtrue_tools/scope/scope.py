@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Configure, arm, wait for and read captures. docs/howto/scope.md has an example."""
+
+import struct
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.scope.xcp import Master, XcpRefused, checksum, upload
+
+USER = 0xF1
+SELECT, SETUP, SAMPLES, ARM, TRIGGER, STOP = 1, 2, 3, 4, 5, 6  # firmware/scope/scope.h
+IDLE, ARMED, TRIGGERED, DONE = 0, 1, 2, 3
+STATES: Final = ("idle", "armed", "triggered", "done")
+TRIGGERS: Final = ("manual", "fault", "rising", "falling", "above", "below")
+LEVELS: Final = TRIGGERS[2:]
+SIGNALS_MAX, WORDS = 8, 6144
+BLOCK, ATTEMPTS = 2048, 3  # bytes of one checksum; readings of a block before it is an error
+BUSY = 0x10
+FORMATS: Final = {"U8": "B", "U16": "H", "S16": "h", "U32": "I"}
+POLL_S: Final = 0.01
+
+
+@dataclass(frozen=True)
+class Status:
+    """The scope's state: what has been armed, and how far the capture is."""
+
+    state: str
+    is_freeze_frame: bool
+    number: int
+    signals: tuple[int, ...]
+    trigger: str
+    trigger_signal: int
+    level: int
+    divisor: int
+    samples: int
+    wanted: int
+    first: int
+    before: int
+    taken: int
+    lost: int
+    trigger_period: int
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A capture that has been read; time 0 is the trigger's sample."""
+
+    time_s: NDArray[np.float64]
+    columns: dict[str, NDArray[np.float64]]
+    units: dict[str, str]
+    texts: dict[str, str]
+    trigger: int  # index of its sample
+    trigger_period: int  # PWM periods since the start of the drive
+    is_freeze_frame: bool
+    number: int
+
+
+class Scope:
+    """The scope of one ECU, over an XCP connection that others may use between two calls."""
+
+    def __init__(self, master: Master, description: Description) -> None:
+        if not description.signals:
+            raise FluxtrueError("this firmware has no scope")
+        self._master = master
+        self._period_s = description.period_s
+        self.signals = {signal.name: signal for signal in description.signals}
+        self._names = {signal.number: signal.name for signal in description.signals}
+        self._fields = {value.name.removeprefix("scope_"): value for value in description.scope}
+        self._armed: Status | None = None
+
+    def configure(self, signals: Sequence[str], trigger: str = "manual", on: str | None = None, level: float = 0.0,
+                  before: float = 0.25, samples: int | None = None, divisor: int = 1) -> None:  # fmt: skip
+        """What the next arm() captures.
+
+        signals   up to eight names of self.signals
+        trigger   manual, fault, rising, falling, above, below; the last four compare the signal `on` (by default the
+                  first) with the level, in its unit
+        before    share of the samples that lie before the trigger, from 0 to less than 1
+        samples   of each signal; by default as many as the memory holds
+        divisor   PWM periods from one sample to the next
+        """
+        if not 1 <= len(signals) <= SIGNALS_MAX:
+            raise FluxtrueError(f"{len(signals)} signals, allowed: 1 to {SIGNALS_MAX}")
+        capacity = WORDS // len(signals)
+        count = capacity if samples is None else samples
+        if not 1 <= count <= capacity:
+            raise FluxtrueError(f"{count} samples, allowed with {len(signals)} signals: 1 to {capacity}")
+        if not 0.0 <= before < 1.0:
+            raise FluxtrueError(f"share {before:g} before the trigger, allowed: 0 to less than 1")
+        if not 1 <= divisor <= 0xFFFF:
+            raise FluxtrueError(f"divisor {divisor}, allowed: 1 to {0xFFFF}")
+        if trigger not in TRIGGERS:
+            raise FluxtrueError(f"trigger '{trigger}', allowed: {', '.join(TRIGGERS)}")
+        numbers = [self._number(name) for name in signals]
+        source = self._number(on or signals[0])
+        raw = self._raw_level(on or signals[0], level) if trigger in LEVELS else 0
+        for position, number in enumerate(numbers):
+            self._user(SELECT, position, number)
+        self._user(SETUP, len(numbers), *divisor.to_bytes(2, "little"), TRIGGERS.index(trigger), source)
+        self._user(SAMPLES, *struct.pack("<HHh", count, int(before * count), raw))
+        self._wanted = (tuple(numbers), trigger, source, raw, divisor, count, int(before * count))
+
+    def arm(self) -> Status:
+        """Start to record and to wait for the trigger. Refused while another capture or a freeze frame is kept."""
+        try:
+            self._user(ARM)
+        except XcpRefused as error:
+            if error.code == BUSY:
+                raise FluxtrueError(f"the scope is in use ({self.status().state}): read it or stop() it") from error
+            raise
+        self._armed = armed = self.status()
+        told = (armed.signals, armed.trigger, armed.trigger_signal, armed.level, armed.divisor, armed.samples,
+                armed.wanted)  # fmt: skip
+        if told != self._wanted:
+            raise FluxtrueError("another XCP master has changed what the scope captures")
+        return armed
+
+    def trigger(self) -> None:
+        """Trigger now."""
+        self._user(TRIGGER)
+
+    def stop(self) -> None:
+        """End a capture, or release what it holds."""
+        self._user(STOP)
+        self._armed = None
+
+    def give_up(self) -> None:
+        """Stop the capture that was armed, if it is still ours."""
+        if self._armed is not None and self.status().number == self._armed.number:
+            self.stop()
+
+    def pass_periods(self, periods: int) -> None:
+        """Wait for so many PWM periods."""
+        self._master.pass_time(periods * self._period_s)
+
+    def status(self) -> Status:
+        """The present state."""
+        got = self._header()
+        return Status(
+            STATES[got["state"]], bool(got["frozen"]), got["number"],
+            tuple(got["signal"][: got["signals"]]), TRIGGERS[got["trigger"]], got["trigger_signal"], got["level"],
+            got["divisor"], got["samples"], got["wanted"], got["first"], got["before"], got["taken"], got["lost"],
+            got["trigger_period"],
+        )  # fmt: skip
+
+    def wait(self, seconds: float) -> Status:
+        """Wait until the capture that was armed is complete. A fault may leave a freeze frame in its place."""
+        waited_s = 0.0
+        while True:
+            status = self.status()
+            if self._armed is not None and status.number != self._armed.number:
+                self._armed = None
+                what = "a fault has come first: read() has its freeze frame" if status.is_freeze_frame else (
+                    "another XCP master has armed the scope")  # fmt: skip
+                raise FluxtrueError(f"the capture was given up: {what}")
+            if status.state in ("done", "idle"):
+                return status
+            if waited_s >= seconds:
+                raise FluxtrueError(f"no complete capture within {seconds:g} s (the scope is {status.state})")
+            self._master.pass_time(POLL_S)
+            waited_s += POLL_S
+
+    def read(self, release: bool = True) -> Capture:
+        """The complete capture or freeze frame; every block is compared with the checksum that the ECU computes."""
+        status = self.status()
+        if status.state != "done":
+            raise FluxtrueError(f"the scope is {status.state}: there is no capture to read")
+        data = self._memory(2 * status.samples * len(status.signals))
+        if self.status() != status:
+            raise FluxtrueError("the capture has changed while it was read")
+        if release:
+            self.stop()
+        arrays = np.frombuffer(data, dtype="<i2").reshape(status.samples, len(status.signals)).T
+        rows = (status.first + np.arange(status.taken)) % status.samples
+        chosen = [self.signals[self._names[number]] for number in status.signals]
+        index = np.arange(status.taken, dtype=np.float64) - status.before
+        return Capture(
+            index * status.divisor * self._period_s,
+            {signal.name: array[rows] * signal.base.factor for signal, array in zip(chosen, arrays, strict=True)},
+            {signal.name: signal.base.unit for signal in chosen}, {signal.name: signal.text for signal in chosen},
+            status.before, status.trigger_period, status.is_freeze_frame, status.number,
+        )  # fmt: skip
+
+    def _user(self, *command: int) -> None:
+        self._master.command(USER, *command)
+
+    def _number(self, name: str) -> int:
+        if name not in self.signals:
+            raise FluxtrueError(f"no signal '{name}', allowed: {', '.join(self.signals)}")
+        return self.signals[name].number
+
+    def _raw_level(self, name: str, level: float) -> int:
+        base = self.signals[name].base
+        raw = round(level / base.factor) if np.isfinite(level) else 1 << 15
+        if not -(1 << 15) <= raw < 1 << 15:
+            raise FluxtrueError(f"level {level:g} {base.unit} of {name}, allowed: {-base.full:g} to {base.full:g}")
+        return raw
+
+    def _header(self) -> dict[str, Any]:
+        fields = [value for value in self._fields.values() if value.name != "scope_memory"]
+        start = min(value.address for value in fields)
+        end = max(value.address + struct.calcsize(FORMATS[value.type]) for value in fields)
+        content = upload(self._master, start, end - start)
+        got: dict[str, Any] = {value.name.removeprefix("scope_"): struct.unpack_from("<" + FORMATS[value.type], content,
+                                                                     value.address - start)[0]
+               for value in fields}  # fmt: skip
+        at = self._fields["signal"].address - start
+        got["signal"] = content[at : at + SIGNALS_MAX]
+        return got
+
+    def _memory(self, size: int) -> bytes:
+        start, content = self._fields["memory"].address, b""
+        while len(content) < size:
+            content += self._block(start + len(content), min(BLOCK, size - len(content)))
+        return content
+
+    def _block(self, address: int, size: int) -> bytes:
+        for _ in range(ATTEMPTS):
+            block = upload(self._master, address, size)
+            if zlib.crc32(block) == checksum(self._master, address, size):
+                return block
+        raise FluxtrueError(f"{size} bytes of the capture have another checksum in the ECU, {ATTEMPTS} times")
