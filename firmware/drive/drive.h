@@ -251,7 +251,7 @@ typedef struct {
 #endif
     pulses_config_t pulses;      /* in effect: written by the 1 kHz task while no pulses are active */
     pulses_state_t pulses_state; /* written by the fast ISR alone */
-    volatile bool held; /* switching stays disabled: written in the background, which writes the flash meanwhile */
+    volatile bool held;   /* switching stays disabled: written in the background, which writes the flash meanwhile */
     sample_box_t samples; /* last: with its slots in front, the offsets of the rest would be too large for a load */
 } drive_t;
 

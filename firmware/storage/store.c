@@ -2,98 +2,12 @@
 #include "storage/store.h"
 
 #include "signal/crc32.h"
+#include "storage/slot.h"
 
-#define CHUNK 64U   /* bytes on the stack at a time; a multiple of HAL_NVM_UNIT */
 #define ATTEMPTS 4U /* of a save, each in another sector: an erase may take more than a tenth of a second */
 
-typedef struct {
-    uint32_t layout, size, sequence, crc; /* crc over the three words before it, then the record */
-} header_t;
-
-_Static_assert(sizeof(header_t) == STORE_HEADER_SIZE && STORE_HEADER_SIZE % HAL_NVM_UNIT == 0U, "whole flash units");
 _Static_assert(HAL_NVM_SLOTS % HAL_NVM_SECTOR_SLOTS == 0U && HAL_NVM_SLOTS >= 2U * HAL_NVM_SECTOR_SLOTS,
                "while a sector is erased, another one holds the newest record");
-
-typedef struct {
-    uint32_t slot; /* HAL_NVM_SLOTS: there is none */
-    header_t header;
-    bool damaged; /* a slot is neither blank nor intact */
-} newest_t;
-
-static uint32_t header_crc(const header_t *header)
-{
-    return crc32_update(CRC32_START, header, STORE_HEADER_SIZE - sizeof header->crc);
-}
-
-static bool is_blank_header(const header_t *h)
-{
-    return (h->layout & h->size & h->sequence & h->crc) == UINT32_MAX;
-}
-
-static uint32_t least(uint32_t a, uint32_t b)
-{
-    return (a < b) ? a : b;
-}
-
-/* The header fits the record stored behind it. */
-static bool is_intact(uint32_t slot, const header_t *header)
-{
-    uint8_t chunk[CHUNK];
-    uint32_t sum = header_crc(header);
-    for (uint32_t done = 0; done < header->size; done += CHUNK) {
-        const uint32_t now = least(header->size - done, CHUNK);
-        if (!hal_nvm_read(slot, STORE_HEADER_SIZE + done, chunk, now)) {
-            return false;
-        }
-        sum = crc32_update(sum, chunk, now);
-    }
-    return ~sum == header->crc;
-}
-
-/* 640 bytes with 128 slots, too many for the stack. Only the start and the background use the store, never at once. */
-static struct {
-    uint32_t sequence[HAL_NVM_SLOTS];
-    bool possible[HAL_NVM_SLOTS]; /* the header can be one, and the record has not been found damaged */
-} candidates;
-
-static void read_headers(bool *damaged)
-{
-    for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
-        header_t header;
-        const bool readable = hal_nvm_read(slot, 0, &header, STORE_HEADER_SIZE);
-        candidates.possible[slot] = readable && header.size <= STORE_RECORD_MAX;
-        candidates.sequence[slot] = candidates.possible[slot] ? header.sequence : 0U;
-        *damaged = *damaged || !(candidates.possible[slot] || (readable && is_blank_header(&header)));
-    }
-}
-
-/* The slot with the highest sequence number, which may wrap; HAL_NVM_SLOTS: none is left. */
-static uint32_t highest(void)
-{
-    uint32_t found = HAL_NVM_SLOTS;
-    for (uint32_t slot = 0; slot < HAL_NVM_SLOTS; slot++) {
-        const uint32_t ahead = found < HAL_NVM_SLOTS ? candidates.sequence[slot] - candidates.sequence[found] : 0U;
-        found = (candidates.possible[slot] && ahead < 0x80000000U) ? slot : found;
-    }
-    return found;
-}
-
-/* Reading the flash takes most of the time of a start. Therefore only the records that may be the newest are read, and
- * none twice: with every slot damaged the watchdog would otherwise reset before the end. */
-static newest_t find_newest(void)
-{
-    newest_t newest = {.damaged = false};
-    read_headers(&newest.damaged);
-    for (newest.slot = highest(); newest.slot < HAL_NVM_SLOTS; newest.slot = highest()) {
-        if (hal_nvm_read(newest.slot, 0, &newest.header, STORE_HEADER_SIZE) && newest.header.size <= STORE_RECORD_MAX &&
-            is_intact(newest.slot, &newest.header)) {
-            return newest;
-        }
-        candidates.possible[newest.slot] = false;
-        newest.damaged = true;
-    }
-    return newest;
-}
 
 store_result_t store_load(uint32_t layout, void *record, uint32_t size)
 {
@@ -114,7 +28,7 @@ static bool program_record(uint32_t slot, const uint8_t *record, uint32_t size)
         for (uint32_t k = 0; k < CHUNK; k++) {
             chunk[k] = (done + k < size) ? record[done + k] : 0xFFU;
         }
-        const uint32_t used = least(size - done, CHUNK);
+        const uint32_t used = slot_chunk(size - done);
         const uint32_t whole = (used + HAL_NVM_UNIT - 1U) / HAL_NVM_UNIT * HAL_NVM_UNIT;
         if (!hal_nvm_program(slot, STORE_HEADER_SIZE + done, chunk, whole)) {
             return false;

@@ -16,7 +16,7 @@ from fluxtrue_tools.sim.library import MEMORY_SIZE, Loop
 from fluxtrue_tools.sim.motor import Motor
 
 RPM: Final = 2.0 * math.pi / 60.0
-HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/storage/store.c
+HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/storage/slot.h
 STATES: Final = 7  # of the filter: control/identify/config.h
 RECORD: Final = struct.Struct(f"<I{STATES}i{STATES}i4i")  # firmware/storage/memory.c
 ONE_X, X_MAX, ONE_P = 1 << 27, 4 << 27, 1 << 30

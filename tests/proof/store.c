@@ -4,6 +4,7 @@
  * most 64 bytes long, which is one piece. */
 #include "proof.h"
 
+#include "storage/slot.c"
 #include "storage/store.c"
 
 #define LONGEST 64U

@@ -19,7 +19,7 @@ from fluxtrue_tools.sim.library import Loop
 RPM: Final = 2 * np.pi / 60
 FLASH, FLASH_BYTES, SLOT_BYTES, SECTOR_BYTES = 0x1000_0000, 0x1_0000, 512, 2048
 SLOTS: Final = FLASH_BYTES // SLOT_BYTES
-HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/storage/store.c
+HEADER: Final = struct.Struct("<4I")  # layout, size, sequence, CRC: firmware/storage/slot.h
 STATES: Final = 7  # of the filter
 RECORD: Final = struct.Struct(f"<I{STATES}i{STATES}i4i")  # firmware/storage/memory.c
 CCIF: Final = 0x80

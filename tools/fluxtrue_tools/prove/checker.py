@@ -13,6 +13,7 @@ import os
 import re
 import resource
 import shlex
+import shutil
 import subprocess
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -71,6 +72,7 @@ class Checker:
         folders = [self.root / FIRMWARE, self.root / "tests" / "proof", self.root, _generated(self.root)]
         if planted:
             overlay = self.kept / "planted" / proof.name
+            shutil.rmtree(overlay, ignore_errors=True)  # of an earlier error, in another file
             copy = overlay / proof.planted.file
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_text(proof.planted.apply(self.root), encoding="utf-8")
