@@ -384,7 +384,7 @@ def test_imported_arrays(data: st.DataObject, name: str, kind: str) -> None:
 
 COMMANDS = (
     ("sim",), ("campaign",), ("faults",), ("motor", "check"), ("motor", "build"), ("motor", "import"),
-    ("emulate",), ("vecu",), ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",),
+    ("motor", "start"), ("emulate",), ("vecu",), ("fuzz",), ("live",), ("log",), ("a2l",), ("bench",), ("demo",),
     ("target", "registers"), ("target", "seal"), ("target", "size"),
 )  # fmt: skip
 NEEDED = {("sim",): ["in.toml"], ("campaign",): ["in.toml"], ("faults",): ["in.toml"], ("motor", "check"): ["m"],
