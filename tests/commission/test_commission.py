@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commissioning of hidden machines, scored with what only the test knows of them."""
 
+import cmath
 import tomllib
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from fluxtrue_tools.motor.flux_model import SplineModel
 from fluxtrue_tools.sim.motor import Motor
 
 MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
-MAP_RMS, R_SHARE = 0.01, 0.01
+MAP_RMS, R_SHARE, OFFSET_SHARE = 0.01, 0.01, 0.001
 
 
 @pytest.mark.parametrize(("name", "seed"), MACHINES)
@@ -28,6 +29,9 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
     error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
     print(f"{name} {seed}: map {reached}, R {100 * error:+.2f} %, largest current {found.largest_A:.1f} A")
+    offset_A = sum(truth.plant[f"current_offset_A_{phase}"] * cmath.exp(2j * cmath.pi * k / 3.0) * 2.0 / 3.0
+                   for k, phase in enumerate("abc"))  # fmt: skip
+    assert abs(found.offset_A - offset_A) <= OFFSET_SHARE * truth.plant["current_full_scale_A"]
     assert reached.map_rms <= MAP_RMS
     assert abs(error) <= R_SHARE
     assert found.largest_A <= known.i_max_A
