@@ -71,7 +71,7 @@ acquired_t acquire_sample(drive_t *drive, sample_t *sample, bool settled)
 
 void acquire_check(drive_t *drive, const sample_t *sample, bool run)
 {
-    const monitor_in_t in = {measure_phases(sample->i_ab, sample->zero_q28), sample->v_dc};
+    const monitor_in_t in = {.i = measure_phases(sample->i_ab, sample->zero_q28), .v_dc = sample->v_dc};
     const uint32_t faults = monitor_step(&drive->period.monitor, &drive->fast.monitor, &in);
     if (in.v_dc < drive->period.monitor.v_min) {
         /* Below v_min the applied voltage is unknown; the three-period count starts again. */

@@ -60,17 +60,17 @@ typedef enum {
     SAFE_SHORT_CIRCUIT = 3          /* short circuit */
 } safe_t;
 
-/** What the bridge does. */
-typedef enum {
+/** What the bridge does: command_t.run. */
+enum {
     BRIDGE_OFF = 0,     /* switching is disabled */
     BRIDGE_CONTROL = 1, /* current control */
     BRIDGE_PULSES = 2   /* voltage pulses: an even number, for which fast_isr() leaves the usual route */
-} bridge_mode_t;
+};
 
 /** Command of the task to the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */
 typedef struct {
     current_target_t target;
-    uint8_t run; /* bridge_mode_t */
+    uint8_t run; /* BRIDGE_... */
     safe_t safe;
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: the fast ISR clears its faults once for each count */

@@ -77,7 +77,9 @@ void drive_pulse(drive_t *drive, const snapshot_t *snapshot)
     }
     if (drive->task.run_state != RUN_STATE_RUN || !has_no_request(&drive->request)) {
         end(&drive->task.pulsing, PULSES_STOPPED);
-    } else if (state->number == drive->pulses.number && !pulses_active(state)) {
+        return;
+    }
+    if (state->number == drive->pulses.number && !pulses_active(state)) {
         end(&drive->task.pulsing, state->failure);
     }
 }

@@ -78,6 +78,6 @@ double pulsed_failure(const fluxtrue_t *d)
 
 double pulsed_theta_rad(const fluxtrue_t *d)
 {
-    const sample_t *sample = &d->drive.samples.slot[d->drive.samples.generation & 1U];
+    const sample_t *sample = sample_box_at(&d->drive.samples, d->drive.samples.generation);
     return sample->theta_e / TURN * TURN_RAD;
 }
