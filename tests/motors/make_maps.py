@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flux maps of invented machines: one saturates strongly, one hardly, one is like that of an electric car.
+"""Flux maps of invented machines: one saturates strongly, one hardly, one is that of a car and one of a pump.
 
     i_d = (a_d + b_d |psi_d|^4 + c/2 |psi_d| psi_q^2) psi_d - i_f
     i_q = (a_q + b_q |psi_q|^4 + c/3 |psi_d|^3) psi_q
@@ -44,6 +44,7 @@ MACHINES = {
     "saturated": Iron(a_d=3000.0, b_d=9.1e6, a_q=1250.0, b_q=3.7e6, c=8e5, psi_f_Vs=0.09, i_max_A=300.0),
     "linear": Iron(a_d=5600.0, b_d=5e6, a_q=4500.0, b_q=5e6, c=1e5, psi_f_Vs=0.05, i_max_A=250.0),
     "leaf": Iron(a_d=4200.0, b_d=8e6, a_q=1300.0, b_q=1.2e6, c=3e5, psi_f_Vs=0.075, i_max_A=480.0),
+    "pmsyrm": Iron(a_d=50.0, b_d=150.0, a_q=6.0, b_q=8.0, c=14.0, psi_f_Vs=0.45, i_max_A=20.0),
 }
 
 
