@@ -9,6 +9,7 @@ from conftest import SMALL
 
 from fluxtrue_tools.campaign.score import Score, bounds, score
 from fluxtrue_tools.campaign.spec import Campaign, parse
+from fluxtrue_tools.errors import FluxtrueError
 
 CHECKED = SMALL + '[check]\ncontrollers = ["paper"]\n'
 
@@ -47,6 +48,16 @@ def test_errors_are_pooled_by_band_with_both_directions_together(campaign: Campa
     assert got["high"].rms == pytest.approx(math.sqrt((36 + 64) / 2))
     assert got["low"].worst == 4.0
     assert got["low"].ratio == pytest.approx(math.sqrt(12.5) / 0.5)
+
+
+def test_a_slow_machine_is_held_to_the_bounds_from_its_own_crawl_rpm_on() -> None:
+    slow = parse(CHECKED.replace("[check]\n", "[check]\ncrawl_rpm = 30\nband_rpm = 210\n"), "slow.toml")
+    data = table([(30, 1)] * 4, [(29, 3), (30, 1), (-210, 1), (211, 1)])
+    got = scored(slow, data)
+    assert [got.bands[band].windows for band in ("crawl", "low", "high")] == [1, 2, 1]
+    assert "below 30 rpm worse than the tables by" in [bound.what for bound in bounds(slow, got)]
+    with pytest.raises(FluxtrueError, match=r"check\.crawl_rpm: 300, allowed: below check\.band_rpm, 210"):
+        parse(CHECKED.replace("[check]\n", "[check]\nband_rpm = 210\n"), "slow.toml")
 
 
 def test_three_hundred_rpm_belongs_to_the_low_band(campaign: Campaign) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from fluxtrue_tools import strict
 from fluxtrue_tools.campaign.envelope import NOTHING_WRONG, make_envelope
 from fluxtrue_tools.campaign.machine import Machine
-from fluxtrue_tools.campaign.score import CRAWL_RPM
+from fluxtrue_tools.campaign.score import ROUNDING_RPM
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import effects
@@ -42,15 +42,16 @@ def _check_part(campaign: Campaign) -> Iterator[Found]:
         for name in sorted(limits):
             yield f"check.limits.{name}", "check.controllers is empty: nothing is held to a bound"
         return
+    crawl = check.crawl_rpm - ROUNDING_RPM
     top = max([high for _, high, _ in campaign.windows.speed_rpm] + list(campaign.windows.low_speed_rpm))
-    if not has_windows(campaign, CRAWL_RPM, top):
-        yield "check.controllers", "no window lies from 300 rpm on: there is nothing to check"
-    for names, low, high in ((LOW, CRAWL_RPM, check.band_rpm), (HIGH, check.band_rpm, max(top, check.band_rpm))):
+    if not has_windows(campaign, crawl, top):
+        yield "check.controllers", f"no window lies from {check.crawl_rpm:g} rpm on: there is nothing to check"
+    for names, low, high in ((LOW, crawl, check.band_rpm), (HIGH, check.band_rpm, max(top, check.band_rpm))):
         for name in names:
             if name in limits and not has_windows(campaign, low, high):
                 yield f"check.limits.{name}", f"no window lies above {round(low)} up to {high:g} rpm"
-    if "low_speed_slack" in limits and not has_windows(campaign, 0.0, CRAWL_RPM):
-        yield "check.limits.low_speed_slack", "no window lies below 300 rpm"
+    if "low_speed_slack" in limits and not has_windows(campaign, 0.0, crawl):
+        yield "check.limits.low_speed_slack", f"no window lies below {check.crawl_rpm:g} rpm"
 
 
 def _controllers(campaign: Campaign) -> Iterator[Found]:

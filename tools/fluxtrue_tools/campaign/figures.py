@@ -123,8 +123,8 @@ def over_speed(campaign: Campaign, table: pd.DataFrame) -> Figure:
 
 
 def headline(campaign: Campaign, table: pd.DataFrame) -> Figure:
-    """Overview of the campaign from 300 rpm on: distribution of the errors, and their place."""
-    table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
+    """Overview of the campaign from crawl_rpm on: distribution of the errors, and their place."""
+    table = table.assign(band=band_of(table["speed_rpm"], campaign.check))
     table = table[table["band"] != CRAWL]
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")

@@ -67,7 +67,7 @@ def summary(campaign: Campaign, table: pd.DataFrame, scores: list[Score],
 def html(campaign: Campaign, table: pd.DataFrame, scores: list[Score], promised: list[tuple[str, Bound]],
          nominal: Nominal, command: str) -> str:  # fmt: skip
     """The page, with its figures inside."""
-    table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
+    table = table.assign(band=band_of(table["speed_rpm"], campaign.check))
     shown = campaign.check.controllers or [c.name for c in campaign.controller if c.warm_up]
     template = files("fluxtrue_tools.campaign").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)

@@ -8,18 +8,19 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from fluxtrue_tools.campaign.spec import Campaign, Limits
+from fluxtrue_tools.campaign.spec import Campaign, Check, Limits
 from fluxtrue_tools.demo.experiment import Bound
 
 LOW, HIGH, CRAWL = "low", "high", "crawl"
 BANDS: Final = (LOW, HIGH)
-CRAWL_RPM: Final = 299.999  # below this speed only harm is evaluated
+ROUNDING_RPM: Final = 1e-3
 
 
-def band_of(speed_rpm: pd.Series, split_rpm: float) -> pd.Series:
-    """Which bounds a window belongs to."""
+def band_of(speed_rpm: pd.Series, check: Check) -> pd.Series:
+    """Which bounds a window belongs to; below crawl_rpm only harm is evaluated."""
     speed = speed_rpm.abs()
-    return pd.Series(np.select([speed < CRAWL_RPM, speed <= split_rpm], [CRAWL, LOW], HIGH), index=speed.index)
+    crawls = speed < check.crawl_rpm - ROUNDING_RPM
+    return pd.Series(np.select([crawls, speed <= check.band_rpm], [CRAWL, LOW], HIGH), index=speed.index)
 
 
 def rms(values: Sequence[float] | pd.Series) -> float:
@@ -60,7 +61,7 @@ def figures(rows: pd.DataFrame) -> Figures:
 class Harm:
     """One controller against the tables alone."""
 
-    harmless_share: float  # percent of the windows from 300 rpm on
+    harmless_share: float  # percent of the windows from crawl_rpm on
     crawl_excess: float  # largest |error| - |tables' error| below, percentage points
 
 
@@ -106,7 +107,7 @@ class Score:
 
 def score(campaign: Campaign, table: pd.DataFrame) -> list[Score]:
     """All controllers, in the campaign's order."""
-    table = table.assign(band=band_of(table["speed_rpm"], campaign.check.band_rpm))
+    table = table.assign(band=band_of(table["speed_rpm"], campaign.check))
     reference = table[table["controller"] == campaign.check.reference]
     scores = []
     for controller in campaign.controller:
@@ -121,12 +122,12 @@ def score(campaign: Campaign, table: pd.DataFrame) -> list[Score]:
 
 def bounds(campaign: Campaign, scored: Score) -> list[Bound]:
     """Bounds of a checked controller."""
-    limits, split = campaign.check.limits, campaign.check.band_rpm
+    limits, crawl, split = campaign.check.limits, campaign.check.crawl_rpm, campaign.check.band_rpm
     low, high = scored.bands[LOW], scored.bands[HIGH]
     promised = []
     if low.windows:
-        promised += [Bound(f"rms, 300 to {split:g} rpm", low.rms, limits.rms_low, "%"),
-                     Bound(f"99th percentile, 300 to {split:g} rpm", low.p99, limits.p99_low, "%")]  # fmt: skip
+        promised += [Bound(f"rms, {crawl:g} to {split:g} rpm", low.rms, limits.rms_low, "%"),
+                     Bound(f"99th percentile, {crawl:g} to {split:g} rpm", low.p99, limits.p99_low, "%")]  # fmt: skip
     if high.windows:
         promised += [Bound(f"rms, above {split:g} rpm", high.rms, limits.rms_high, "%"),
                      Bound(f"99th percentile, above {split:g} rpm", high.p99, limits.p99_high, "%")]  # fmt: skip
@@ -140,7 +141,7 @@ def bounds(campaign: Campaign, scored: Score) -> list[Bound]:
         )
     if scored.harm is not None and scored.bands[CRAWL].windows:
         promised += [
-            Bound("below 300 rpm worse than the tables by", max(0.0, scored.harm.crawl_excess),
+            Bound(f"below {crawl:g} rpm worse than the tables by", max(0.0, scored.harm.crawl_excess),
                   limits.low_speed_slack, "%"),
         ]  # fmt: skip
     promised += [Bound(f"cases with {name}", n, 0.0, "cases") for name, n in scored.trouble.saturated.items()]

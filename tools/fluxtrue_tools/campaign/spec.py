@@ -126,6 +126,7 @@ class Check(Strict):
 
     controllers: Annotated[tuple[str, ...], BeforeValidator(_list)] = ()
     reference: str = "tables"
+    crawl_rpm: Positive = 300.0
     band_rpm: Positive = 5000.0
     count_nonzero: Annotated[tuple[str, ...], BeforeValidator(_list)] = ("psi_clamped", "r_clamped")
     oscillation_share: Positive = 0.1
@@ -155,6 +156,9 @@ class Campaign(Strict):
         for name in self.check.controllers:
             if name not in names:
                 raise ValueError(f"check.controllers: '{name}', allowed: {', '.join(names)}")
+        if self.check.crawl_rpm >= self.check.band_rpm:
+            raise ValueError(f"check.crawl_rpm: {self.check.crawl_rpm:g}, allowed: below check.band_rpm, "
+                             f"{self.check.band_rpm:g}")  # fmt: skip
         if self.check.controllers and self.check.reference not in names:
             raise ValueError(f"check.reference: '{self.check.reference}', allowed: {', '.join(names)}")
         return self

@@ -18,8 +18,9 @@ def columns(cells: list[tuple[str, ...]]) -> str:
 
 def band_name(campaign: Campaign, band: str) -> str:
     """The name of a band in words."""
-    split = campaign.check.band_rpm
-    return {"low": f"300…{split:g} rpm", "high": f"above {split:g} rpm", CRAWL: "below 300 rpm"}[band]
+    crawl, split = campaign.check.crawl_rpm, campaign.check.band_rpm
+    names = {"low": f"{crawl:g}…{split:g} rpm", "high": f"above {split:g} rpm", CRAWL: f"below {crawl:g} rpm"}
+    return names[band]
 
 
 def figures_table(campaign: Campaign, scores: list[Score]) -> str:
