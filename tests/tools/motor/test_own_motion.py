@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers that follow from how the rotor moves by itself, and from how finely its angle is known."""
+"""Numbers that follow from how the rotor moves, how finely its angle is known, and how noisy its currents are."""
 
 import math
 import re
@@ -54,3 +54,12 @@ def test_the_launch_monitor_allows_for_the_resolution_of_the_angle(
     volts = emitted / motor.bases.periods_per_step / 2**15 * motor.bases.voltage_V
     assert volts - motor.derived.launch_V == pytest.approx(v_theta, abs=0.006)
     assert motor.derived.launch_V == pytest.approx(v_inverter, abs=0.01)
+
+
+@pytest.mark.parametrize(("name", "noise_V"), [("hsm1", 0.0), ("pmsyrm", 1.08 * 9.34 - 2.7), ("ebike", 0.0)])
+def test_the_monitors_of_a_slow_rotor_allow_for_noise_that_the_current_follows(name: str, noise_V: float) -> None:
+    """(MN-35) by hand: 156 mH·0.002·30 A/1 ms = 9.34 V; V_0/4 = 0.5 % of 540 V."""
+    derived = named(name).derived
+    assert derived.monitor_noise_V == pytest.approx(noise_V, abs=0.02)
+    assert derived.launch_V == pytest.approx(derived.monitor_V / 8.0 + noise_V, abs=0.02)
+    assert derived.frozen_V == pytest.approx(derived.monitor_V / 4.0 + noise_V, abs=0.02)

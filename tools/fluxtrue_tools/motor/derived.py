@@ -66,6 +66,8 @@ TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
 COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
 STANDSTILL_SHARE = 0.002  # of the speed base
+NOISE_SHARE = 0.002  # of a current converter's full scale, rms
+NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
@@ -150,6 +152,7 @@ class Derived:
     speed_trip_rad_s: float
     monitor_torque_Nm: float
     monitor_V: float
+    monitor_noise_V: float
     frozen_V: float
     launch_V: float
     launch_A: float
@@ -285,9 +288,16 @@ def inverter_error_V(inverter: Inverter) -> float:
     return max(INVERTER_ERROR_PER_VDC * inverter.vdc_V, 2.0 * LEG_ERROR_SHARE * 4.0 / math.pi * legs_V)
 
 
-def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
+def _voltage_noise(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
+    """The mean voltage with which the current follows the sensors' noise, beyond a quarter of V_0 (MN-35)."""
+    l_max = max(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    noise_A = NOISE_SHARE * config.inverter.current_full_scale_A
+    return max(0.0, NOISE_CREST * l_max * noise_A / bases.step_s - inverter_error_V(config.inverter) / 4.0)
+
+
+def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[str, float]:
     machine, omega = config.machine, config.omega_max_rad_s
-    error_V = inverter_error_V(config.inverter)
+    error_V, noise_V = inverter_error_V(config.inverter), _voltage_noise(config, model, bases)
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
     return {
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
@@ -301,8 +311,9 @@ def _slow_monitors(config: MotorConfig, bases: Bases) -> dict[str, float]:
             min(TORQUE_MONITOR_NM, 0.1 * machine.torque_max_Nm), TORQUE_MONITOR_SHARE * machine.torque_max_Nm
         ),
         "monitor_V": error_V,
-        "frozen_V": FROZEN_SHARE * error_V,
-        "launch_V": LAUNCH_SHARE * error_V,
+        "monitor_noise_V": noise_V,
+        "frozen_V": FROZEN_SHARE * error_V + noise_V,
+        "launch_V": LAUNCH_SHARE * error_V + noise_V,
         "launch_A": MONITOR_NOISE_SHARE / 4.0 * machine.i_max_A,
         "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
         "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
@@ -348,7 +359,7 @@ def derive(config: MotorConfig, model: FluxModel, bases: Bases) -> Derived:
         **_voltage_reserve(config, bases.step_s),
         **_torque_limit(config, bases, psi_f),
         **_monitors(config),
-        **_slow_monitors(config, bases),
+        **_slow_monitors(config, model, bases),
         identify=identification.derive(config, bases, psi_f),
     )
 
