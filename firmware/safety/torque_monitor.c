@@ -105,8 +105,8 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
     /* Doubled resistance; half of the flux rate for noise, and all of it beyond v_0, because a real change may have
      * ended before the sample. */
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
-    const int32_t v_error = (config->v_0 >> 1) + fx_mul_gain_q15(now->r.r, current) + flux_rate_abs / 2 +
-                            fx_max_s32(flux_rate_abs - config->v_0, 0);
+    const int32_t v_error = (config->v_0 >> 1) + config->v_noise + fx_mul_gain_q15(now->r.r, current) +
+                            flux_rate_abs / 2 + fx_max_s32(flux_rate_abs - config->v_0, 0);
     const q15_t psi_d = fx_abs_q15((q15_t)in->psi.d), psi_q = fx_abs_q15((q15_t)in->psi.q);
     const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(now->speed.doubt, psi_q) +
                             v_error;

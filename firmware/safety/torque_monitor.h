@@ -10,7 +10,7 @@
  *   angle   e = u - r i - j w psi(i): e_q shows a magnet that is too weak or too strong, e_d a wrong angle
  *           |e_d| > |w| (psi_f/5 + |psi_q|/8) + |l psi_q| + v,  or e_q sign(w) outside
  *           |w| psi_f (-0.5 ... 0.35) -+ (|l psi_d| + v),
- *           v = v_0/2 + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2
+ *           v = v_0/2 + v_noise + r |i| + c/2 + max(c - v_0, 0), c = |d psi/dt|; inactive while |w| psi_f/5 < v_0/2
  *   r     at the winding's temperature; without one, of the middle of its range; r_error, an eighth of it and half of
  *         that range, allows r_error |i| more
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
@@ -33,6 +33,7 @@ typedef struct {
     q15_t psi_f;
     q15_t t_0;                                       /* torque error allowed at no torque */
     q15_t v_0;                                       /* voltage error of the inverter */
+    q15_t v_noise;                                   /* of one period's voltage, beyond v_0 */
     q15_t i_0;                                       /* current error of noise and of the current's zero crossings */
     q16_t rate_gain;                                 /* 1/(omega_b task period): flux step to voltage */
     q16_t lag_gain;                                  /* lag of the tracked speed, in steps */

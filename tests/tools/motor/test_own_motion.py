@@ -63,3 +63,9 @@ def test_the_monitors_of_a_slow_rotor_allow_for_noise_that_the_current_follows(n
     assert derived.monitor_noise_V == pytest.approx(noise_V, abs=0.02)
     assert derived.launch_V == pytest.approx(derived.monitor_V / 8.0 + noise_V, abs=0.02)
     assert derived.frozen_V == pytest.approx(derived.monitor_V / 4.0 + noise_V, abs=0.02)
+
+
+@pytest.mark.parametrize(("name", "noise_V"), [("hsm1", 0.0), ("pmsyrm", 4.0 / 3.0 * 24.9 - 10.8), ("ebike", 0.0)])
+def test_the_angle_monitor_allows_for_noise_that_current_control_amplifies(name: str, noise_V: float) -> None:
+    """(MN-36) by hand: 8 kHz/3·156 mH·0.002·30 A = 24.9 V; V_0 = 2 % of 540 V."""
+    assert named(name).derived.period_noise_V == pytest.approx(noise_V, abs=0.05)

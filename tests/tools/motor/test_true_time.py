@@ -36,6 +36,7 @@ PERIOD = {
     "plausibility.ripple_max",
     "angle_tracker.lag_steps", "angle_tracker.stop_periods",
     "torque_monitor.lag_gain",  # half a period of it: (AT-7)
+    "torque_monitor.v_noise",  # of the gain of current control: (MN-36)
     "torque_monitor.v_0", "frozen_angle.v_0", "launch_power.v_1",  # the share of the dead time in a period: (MN-25)
 }  # fmt: skip
 PERIODS_PER_STEP = {

@@ -24,7 +24,7 @@ static const torque_monitor_config_t config = {.r = 898 << 15,
 static torque_monitor_state_t state;
 static torque_monitor_in_t in;
 
-enum { SETTLING = 5 };
+enum { SETTLING = 5, NOISE = 2000 };
 
 static int32_t q15(double x)
 {
@@ -148,6 +148,25 @@ void test_an_angle_that_is_30_degrees_off_is_found_in_5_ms(void)
         fresh();
         machine(0.5, 0.0, 0.05, 1.0, sign * 30.0);
         TEST_ASSERT_EQUAL_INT(SETTLING + 5, steps_until(FAULT_ANGLE_OFFSET));
+    }
+}
+
+/* e_d allowed at w = 0.1: 288 + 33, v_0/2 = 212 and r |i| = 22. The voltage of one period has noise beyond v_0. */
+void test_noise_of_one_periods_voltage_is_no_wrong_angle(void)
+{
+    torque_monitor_config_t noisy = config;
+    for (int32_t noise = 0; noise <= NOISE; noise += NOISE) {
+        noisy.v_noise = (q15_t)noise;
+        for (int beyond = 0; beyond <= 1; beyond++) {
+            uint32_t faults = 0;
+            fresh();
+            machine(0.1, 0.0, 0.05, 1.0, 0.0);
+            in.u.d += noise + (beyond ? 600 : 510);
+            for (int n = 0; n < 100; n++) {
+                faults |= torque_monitor_step(&noisy, &state, &in);
+            }
+            TEST_ASSERT_EQUAL_HEX32(beyond ? FAULT_ANGLE_OFFSET : 0U, faults & FAULT_ANGLE_OFFSET);
+        }
     }
 }
 
@@ -362,7 +381,7 @@ static double angle_excess(const reference_t *reference, double e_d, double e_q,
     const double w = reference->w, psi_d = in.psi.d / 32768.0, psi_q = in.psi.q / 32768.0;
     const double magnet = fabs(w) * 14418.0 / 32768.0, v_0 = 425.0 / 32768.0;
     const double current = saturated(hypot(in.i.d, in.i.q) / 32768.0);
-    const double v = v_0 / 2.0 + 898.0 / 65536.0 * current + rates / 2.0 + fmax(rates - v_0, 0.0);
+    const double v = v_0 / 2.0 + NOISE / 32768.0 + 898.0 / 65536.0 * current + rates / 2.0 + fmax(rates - v_0, 0.0);
     const double doubt_d = reference->doubt * fabs(psi_q), doubt_q = reference->doubt * fabs(psi_d);
     const double d = fabs(e_d + w * psi_q) - magnet / 5.0 - fabs(w * psi_q) / 8.0 - doubt_d - v;
     const double q = copysign(1.0, w) * (e_q - w * psi_d);
@@ -409,6 +428,7 @@ void test_no_argument_wraps(void)
     torque_monitor_config_t immediate = config;
     int torque[2] = {0}, angle[2] = {0};
     immediate.torque_steps = immediate.angle_steps = 1;
+    immediate.v_noise = NOISE;
     for (int bits = 0; bits < 5 << 9; bits++) {
         in = (torque_monitor_in_t){.acting = true, .psi = {end_of(bits, 0), end_of(bits, 1)}};
         fresh();

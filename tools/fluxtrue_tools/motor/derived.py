@@ -68,6 +68,7 @@ COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
 STANDSTILL_SHARE = 0.002  # of the speed base
 NOISE_SHARE = 0.002  # of a current converter's full scale, rms
 NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)
+PERIOD_NOISE_CREST = 4.0 / 3.0  # times the rms; hsm1 needs no more than its V_0
 MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise look like a voltage on no current
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
@@ -153,6 +154,7 @@ class Derived:
     monitor_torque_Nm: float
     monitor_V: float
     monitor_noise_V: float
+    period_noise_V: float
     frozen_V: float
     launch_V: float
     launch_A: float
@@ -288,11 +290,22 @@ def inverter_error_V(inverter: Inverter) -> float:
     return max(INVERTER_ERROR_PER_VDC * inverter.vdc_V, 2.0 * LEG_ERROR_SHARE * 4.0 / math.pi * legs_V)
 
 
+def _flux_noise(config: MotorConfig, model: FluxModel) -> float:
+    """The current sensors' noise, rms, as flux."""
+    l_max = max(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    return l_max * NOISE_SHARE * config.inverter.current_full_scale_A
+
+
 def _voltage_noise(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
     """The mean voltage with which the current follows the sensors' noise, beyond a quarter of V_0 (MN-35)."""
-    l_max = max(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
-    noise_A = NOISE_SHARE * config.inverter.current_full_scale_A
-    return max(0.0, NOISE_CREST * l_max * noise_A / bases.step_s - inverter_error_V(config.inverter) / 4.0)
+    noise_V = NOISE_CREST * _flux_noise(config, model) / bases.step_s
+    return max(0.0, noise_V - inverter_error_V(config.inverter) / 4.0)
+
+
+def _period_noise(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
+    """The voltage with which current control answers that noise in a period, beyond V_0 (MN-36)."""
+    noise_V = PERIOD_NOISE_CREST * _current_control(bases.period_s)["sigma_rad_s"] * _flux_noise(config, model)
+    return max(0.0, noise_V - inverter_error_V(config.inverter))
 
 
 def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[str, float]:
@@ -312,6 +325,7 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
         ),
         "monitor_V": error_V,
         "monitor_noise_V": noise_V,
+        "period_noise_V": _period_noise(config, model, bases),
         "frozen_V": FROZEN_SHARE * error_V + noise_V,
         "launch_V": LAUNCH_SHARE * error_V + noise_V,
         "launch_A": MONITOR_NOISE_SHARE / 4.0 * machine.i_max_A,

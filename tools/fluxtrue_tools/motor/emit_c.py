@@ -445,6 +445,7 @@ def _torque_monitor(motor: Motor) -> list[Row]:
         ("psi_f", q15(d.psi_f_Vs / b.flux_Vs, "psi_f"), f"{d.psi_f_Vs:.6g} Vs"),
         ("t_0", q15(d.monitor_torque_Nm / b.torque_Nm, "t_0"), f"{d.monitor_torque_Nm:g} N·m"),
         ("v_0", q15(d.monitor_V / b.voltage_V, "v_0"), f"{d.monitor_V:g} V"),
+        ("v_noise", q15(d.period_noise_V / b.voltage_V, "v_noise"), f"{d.period_noise_V:.4g} V"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
         ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
         ("lag_gain", q16(lag, "lag_gain"), f"{lag:.4g} steps"),
