@@ -13,7 +13,8 @@ from fluxtrue_tools.sim.motor import load
 ROOT = Path(__file__).resolve().parents[2]
 MOTORS = ROOT / "tests" / "motors"
 SHARES = (0.0, 0.02, 0.1, 0.3, 0.6, 1.0)  # of top speed
-MACHINES = ("hsm1", "prius", "leaf", "pmasynrm", "spm_12V", "compressor", "saturated", "linear", "gem")
+MACHINES = ("hsm1", "prius", "leaf", "pmasynrm", "pmsyrm", "ebike", "spm_12V", "compressor", "servo", "truck",
+            "saturated", "linear", "gem")  # fmt: skip
 TRIP_C, DERATE_C = 180.0, 155.0  # where motor.toml gives none
 TOP = {"compressor": 0.8}  # of top speed; beyond, it oscillates about zero current: tests/motors/README.md
 NOISE = 0.002  # of the current converter's full scale, as in the campaigns

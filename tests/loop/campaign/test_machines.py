@@ -16,7 +16,7 @@ from fluxtrue_tools.sim.build import prepare
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
 CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2, "prius": 2, "leaf": 2, "pmasynrm": 2,
-         "spm_12V": 1, "compressor": 1}  # fmt: skip
+         "spm_12V": 1, "compressor": 1, "ebike": 1, "pmsyrm": 1, "servo": 1, "truck": 1}  # fmt: skip
 ERROR_WITHOUT_MIN = {"spm_12V": 1.5}  # percent: the magnet of its first plant is only 2 % weak
 
 
@@ -40,7 +40,7 @@ def test_another_machine_needs_nothing_but_its_folder_to_meet_every_bound(tmp_pa
     assert (tables["error_percent"] ** 2).mean() ** 0.5 > ERROR_WITHOUT_MIN.get(name, 3.0)
 
 
-@pytest.mark.parametrize("name", ["saturated", "linear", "leaf"])
+@pytest.mark.parametrize("name", ["saturated", "linear", "leaf", "pmsyrm"])
 def test_the_map_is_what_its_script_makes(name: str) -> None:
     shipped = pd.read_csv(MOTORS / name / "flux_map.csv", comment="#")
     iron = make_maps.MACHINES[name]
@@ -64,5 +64,9 @@ def test_the_machines_are_part_of_the_tests_build() -> None:
         "pmasynrm",
         "spm_12V",
         "compressor",
+        "ebike",
+        "pmsyrm",
+        "servo",
+        "truck",
     ):
         assert prepare(str(MOTORS / name)).folder == built / "motors" / name
