@@ -297,6 +297,8 @@ static void apply_write(emu_t *emu, const peripheral_t *self, uint32_t offset, u
         protection_written(emu, self, value);
     } else if (offset == QDCTRL) {
         start_or_stop(emu, self);
+    } else if (offset == C2SC && (value & CHF) == 0U) {
+        bus_put(emu, self, C2SC, bus_get(emu, self, C2SC) & ~(uint32_t)CHF);
     }
     if (!f->running) {
         buffers_load(emu, self, true);

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from listener import Listener
 from planting import PlantedError, image_with_error
+from rotor_frame import error_A
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.bench.image import V_DC, Stand
@@ -78,6 +79,7 @@ def the_angle_keeps_its_speed_when_the_index_passes(parts: Parts) -> None:
         loop.set("enable", 1)
         loop.set("torque_requested_Nm", TORQUE)
         loop.run(1000)
+        assert error_A(loop) < 0.3
         assert loop.get("fault_word") == 0
         assert loop.get("truth.torque_Nm") == pytest.approx(TORQUE, abs=1.0)
 
