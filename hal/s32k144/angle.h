@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_ANGLE_H
 #define HAL_S32K144_ANGLE_H
-/** The angle sensor behind hal/angle.h; one of angle_quadrature.c and angle_resolver.c is linked.
+/** The angle sensor behind hal/angle.h; one of angle_quadrature.c, angle_resolver.c and angle_as5047.c is linked.
  * Source   README.md, angle
  * Units    period_ticks: one PWM period in ticks of FTM0
- * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an encoder
+ * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an
+ *          incremental encoder
  * Context  angle_init(): start-up, right before the PWM starts; angle_fault(): fast ISR, after hal_angle_read();
  *          angle_follow_index(): the fast ISR's priority, before hal_angle_read() */
 #include <stdbool.h>

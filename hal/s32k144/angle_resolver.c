@@ -14,8 +14,8 @@
 #define MISSING_MAX 3U  /* a restart of the sampling may lose two */
 #define FRAME(bits) (LPSPI_TCR_FRAMESZ((bits) - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0))
 
-static const serial_angle_timing_t timing = {.bit = 2, .select = 4}; /* 14 MHz, 143 ns */
-static ad2s1210_frame_t position;                                    /* of the last frame */
+static const serial_angle_timing_t timing = {.bit = 2, .select = 4, .gap = 5}; /* 14 MHz, 143 ns */
+static ad2s1210_frame_t position;                                              /* of the last frame */
 static uint32_t missing; /* periods in a row without a frame: the last angle is kept */
 
 /* The converter keeps every fault, including those of its own power-up, until its register has been read in

@@ -5,7 +5,6 @@
 #include "hal/s32k144/sampling.h"
 #include "hal/s32k144/startup.h"
 
-#define FRAME_GAP 3U       /* between frames: 5 clocks */
 #define FIFO_WORDS 4U
 #define WAIT_LOOPS 200U    /* 12 us and more; a frame takes 2 us */
 #define PDB0_PULSE 36U
@@ -19,7 +18,7 @@ void serial_angle_init(const serial_angle_timing_t *timing)
     LPSPI0->CR = 0;
     LPSPI0->CFGR0 = 0;
     LPSPI0->CFGR1 = LPSPI_CFGR1_MASTER;
-    LPSPI0->CCR = LPSPI_CCR_SCKDIV(timing->bit - 2U) | LPSPI_CCR_DBT(FRAME_GAP) |
+    LPSPI0->CCR = LPSPI_CCR_SCKDIV(timing->bit - 2U) | LPSPI_CCR_DBT(timing->gap - 2U) |
                   LPSPI_CCR_PCSSCK(timing->select - 1U) | LPSPI_CCR_SCKPCS(SERIAL_ANGLE_RELEASE - 1U);
     LPSPI0->CR = LPSPI_CR_MEN | LPSPI_CR_RTF | LPSPI_CR_RRF;
 }

@@ -19,9 +19,10 @@ typedef struct {
     uint32_t start;   /* of the frame in the period */
 } serial_angle_t;
 
-/** Clocks for each bit, from the chip select to the first bit (at least 2), and from the last bit to its end (4). */
+/** Clocks for each bit, from the chip select to the first bit, and between two frames (each at least 2); from the last
+ * bit to the chip select's end are 4. */
 typedef struct {
-    uint32_t bit, select;
+    uint32_t bit, select, gap;
 } serial_angle_timing_t;
 
 #define SERIAL_ANGLE_RELEASE 4U

@@ -23,6 +23,11 @@ const emu_pins_t *emu_pins_now(const emu_t *emu)
     return &emu->s.pins;
 }
 
+void emu_encoder_fault(emu_t *emu, emu_encoder_fault_t fault)
+{
+    emu->s.as5047.fault = fault;
+}
+
 void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault)
 {
     emu->s.pins.gate_fault = gate_fault;
@@ -79,7 +84,12 @@ bool emu_safe_state_requested(const emu_t *emu)
 /* The shaft keeps turning between two settings of the pins. */
 uint32_t emu_angle(const emu_t *emu)
 {
-    const int64_t passed = (int64_t)(emu_instant(emu) - emu->s.pins_set_at);
+    return emu_angle_at(emu, emu_instant(emu));
+}
+
+uint32_t emu_angle_at(const emu_t *emu, uint64_t when)
+{
+    const int64_t passed = (int64_t)(when - emu->s.pins_set_at);
     return emu->s.pins.angle + (uint32_t)((passed * emu->s.pins.angle_rate) / 65536);
 }
 

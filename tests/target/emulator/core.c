@@ -393,9 +393,11 @@ void emu_reset(emu_t *emu, uint32_t cause)
         s->due[i] = NEVER;
     }
     s->core_ticks = FIRC_TICKS;
-    s->rdc = old.rdc; /* a device of its own */
+    s->rdc = old.rdc; /* devices of their own */
+    s->as5047 = old.as5047;
     if (cause == 0U) {
         rdc_power_on(emu);
+        as5047_power_on(emu);
     }
     pdb_reset(emu);
     bus_reset(emu);
@@ -501,6 +503,7 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
         emu_destroy(emu);
         return NULL;
     }
+    emu->as5047 = emu_symbol(emu, "angle_sensor_as5047") != 0U;
     data_flash_create(emu);
     emu_reset(emu, 0);
     return emu;

@@ -59,6 +59,16 @@ EMU_API emu_pins_t *emu_pins(emu_t *emu);
 EMU_API const emu_pins_t *emu_pins_now(const emu_t *emu);
 /** Lines that may change at any time, not only at the start of a period. */
 EMU_API void emu_board_pins(emu_t *emu, bool gate_fault, bool resolver_fault);
+/** Faults of an AS5047P: each answer with one wrong bit; each with its error flag; its line stuck; no magnet. */
+typedef enum {
+    EMU_ENCODER_GOOD = 0,
+    EMU_ENCODER_PARITY = 1,
+    EMU_ENCODER_EF = 2,
+    EMU_ENCODER_LOW = 3,
+    EMU_ENCODER_HIGH = 4,
+    EMU_ENCODER_WEAK_FIELD = 5
+} emu_encoder_fault_t;
+EMU_API void emu_encoder_fault(emu_t *emu, emu_encoder_fault_t fault);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 EMU_API uint32_t emu_outputs(const emu_t *emu);
 EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);

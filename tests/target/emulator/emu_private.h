@@ -128,6 +128,11 @@ typedef struct {
 } rdc_t;
 
 typedef struct {
+    uint16_t answer, errors; /* to the last command; ERRFL */
+    emu_encoder_fault_t fault;
+} as5047_t;
+
+typedef struct {
     bool unlocked, configured;
     uint64_t start;
     uint64_t unlock_end; /* until then registers may be written after an unlock */
@@ -152,6 +157,7 @@ typedef struct {
     can_t can;
     spi_t spi[3];
     rdc_t rdc;
+    as5047_t as5047;
     wdog_t wdog;
     ftfc_t ftfc;
     uint64_t lpit_ready;                  /* from then on the registers of LPIT0 may be written */
@@ -207,6 +213,7 @@ struct emu {
     uc_engine *uc;
     elf_t elf;
     emu_mode_t mode;
+    bool as5047; /* the image was built for this encoder at LPSPI0 */
     const facts_t *facts_of[PERIPHERALS_MAX];
     int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
     int16_t page[256];
@@ -323,11 +330,14 @@ void pins_check(emu_t *emu, const char *peripheral);
 uint32_t clocks_peripheral_ticks(const emu_t *emu, uint32_t pcc_offset);
 uint32_t clocks_async_ticks(const emu_t *emu, int source, int divider);
 uint32_t emu_angle(const emu_t *emu);
+uint32_t emu_angle_at(const emu_t *emu, uint64_t when);
 /** Follows the shaft past the encoder's index; the index's level. */
 void ftm_shaft(emu_t *emu);
 bool ftm_index(const emu_t *emu);
 uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits);
 void rdc_power_on(emu_t *emu);
+uint32_t as5047_transfer(emu_t *emu, uint64_t end, uint32_t sent, uint32_t bits);
+void as5047_power_on(emu_t *emu);
 /** The timer's outputs 0 ... 5 at this instant, one bit each. */
 uint32_t ftm_levels(const emu_t *emu);
 void rdc_sample(emu_t *emu);

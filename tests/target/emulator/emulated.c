@@ -177,6 +177,10 @@ static int pin_set(emulated_t *e, const char *name, double value)
     if (strcmp(name, "emulator.power_cycle") == 0) {
         return value == 1.0 && power_cycle(e) ? SIM_OK : SIM_OUT_OF_RANGE;
     }
+    if (strcmp(name, "emulator.encoder_fault") == 0) {
+        emu_encoder_fault(e->emu, (emu_encoder_fault_t)value);
+        return value >= 0.0 && value <= EMU_ENCODER_WEAK_FIELD ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
     if (strcmp(name, "emulator.reset_share") == 0) {
         e->reset_share = value;
         return value >= 0.0 && value < 1.0 ? SIM_OK : SIM_OUT_OF_RANGE;

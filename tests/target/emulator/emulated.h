@@ -6,6 +6,7 @@
  *   emulator.shadow        set 1: the same firmware, compiled for the host, runs in parallel with the same counts and
  *                          angles, and its state is compared after every period
  *   emulator.gate_fault, emulator.resolver_fault      pins, 0 or 1
+ *   emulator.encoder_fault                            of an AS5047P, emu_encoder_fault_t; to be set only
  *   emulator.inverter_C, emulator.processor_C    temperatures of the second thermistor and of the sensor on the die
  *   emulator.board         set 1: the image's outputs control contactor, precharge, discharge and gate-driver supply
  *   emulator.power_cycle   set 1: the processor's supply fails and returns, the machine is not affected

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0. A frame is received when all its bits have
- * been clocked; the converter's answer is determined when the frame begins. With the host request enabled a word waits
- * in the FIFO until the request rises; three clocks are assumed for its synchronisation.
+/* LPSPI as master, and the AD2S1210 resolver-to-digital converter at LPSPI0 (the other device there: as5047.c). A frame
+ * is received when all its bits have been clocked; the converter's answer is determined when the frame begins. With the
+ * host request enabled a word waits in the FIFO until the request rises; three clocks are assumed for its
+ * synchronisation.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
@@ -116,7 +117,9 @@ static void transfer(emu_t *emu, const peripheral_t *self, uint64_t earliest, ui
     const uint64_t begin = spi->busy_until > earliest ? spi->busy_until : earliest;
     spi->busy_until = begin + frame_ticks(emu, self, bits);
     const uint32_t no_answer = 0xFFFFFFFFU >> (32U - bits);
-    spi->rx[spi->rx_count] = self->instance == 0 ? rdc_transfer(emu, begin, sent, bits) : no_answer;
+    spi->rx[spi->rx_count] = self->instance != 0 ? no_answer
+                             : emu->as5047       ? as5047_transfer(emu, spi->busy_until, sent, bits)
+                                                 : rdc_transfer(emu, begin, sent, bits);
     spi->ready[spi->rx_count++] = spi->busy_until;
 }
 

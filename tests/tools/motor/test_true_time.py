@@ -121,6 +121,7 @@ COUNTS = {
     "FIRST_TICKS": "ticks of the watchdog", "TIMEOUT_TICKS": "ticks of the watchdog",
     "WINDOW_TICKS": "ticks of the watchdog",
     "READY_TICKS": "ticks of the timer", "PULSE_TICKS": "ticks of the timer",
+    "START_TICKS": "ticks of the timer", "UNTIL_PWM_TICKS": "ticks of the timer",
     "LAST_BUT_ONE": "steps of an update, whose rates are generated for its true time",
     "ATTEMPTS": "of a save",
 }  # fmt: skip

@@ -4,6 +4,7 @@
 
 #include "hal/angle.h"
 #include "hal/s32k144/angle.h"
+#include "hal/s32k144/core.h"
 #include "hal/s32k144/registers.h"
 #include "unity.h"
 
@@ -16,6 +17,11 @@
 
 ftm_t fake_FTM0, fake_FTM2;
 gpio_t fake_PTD;
+
+void core_pass(uint32_t clocks)
+{
+    (void)clocks;
+}
 
 /* The level of the encoder's index. */
 static void index_is(bool high)

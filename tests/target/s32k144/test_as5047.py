@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The S32K144's image with an AS5047P encoder on the emulated processor: the angle is the one of the currents' sampling
+instant, a disturbed frame is an invalid sample, and planted errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from planting import PlantedError, image_with_error
+from rotor_frame import error_A
+
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.library import Loop
+
+FAST_RPM = 6500.0
+RAD_S = 0.10471975511965977
+TORQUE = 40.0
+ANGLE = 1 << 4
+PARITY, ERROR_FLAG, LOW, HIGH, WEAK_FIELD = 1.0, 2.0, 3.0, 4.0, 5.0  # emu_encoder_fault_t
+RAMP_PERIODS = 200
+CURRENT_A = 0.3
+
+
+@pytest.fixture(scope="module")
+def as5047() -> Parts:
+    if not have_arm_compiler():
+        pytest.skip("the Arm compiler is not installed: no image is built")
+    return build.prepare("hsm1", angle="as5047")
+
+
+@contextmanager
+def driving(parts: Parts, rpm: float = FAST_RPM) -> Iterator[Loop]:
+    motor = parts.emulated()
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        loop.run(3000, {"plant.speed_rad_s": (0.0, rpm * RAD_S)})
+        loop.set("enable", 1)
+        loop.set("torque_requested_Nm", TORQUE)
+        loop.run(1000)
+        yield loop
+
+
+def is_right(loop: Loop) -> bool:
+    near = error_A(loop) < CURRENT_A
+    return near and loop.get("fault_word") == 0 and abs(loop.get("truth.torque_Nm") - TORQUE) < 1.0
+
+
+def the_angle_is_that_of_the_sampling_instant(parts: Parts) -> None:
+    with driving(parts) as loop:
+        assert is_right(loop)
+        loop.run(RAMP_PERIODS, {"plant.speed_rad_s": (FAST_RPM * RAD_S, 0.98 * FAST_RPM * RAD_S)})
+        assert is_right(loop)
+
+
+def a_disturbed_frame_is_an_invalid_sample(parts: Parts) -> None:
+    """One or two frames cost nothing, at speed: the rotor's movement replaces them. The third is the angle fault. That
+    the movement is the right one shows in tests/unit/s32k144/test_as5047.c: here the tracker would mend a wrong one."""
+    for disturbance in (PARITY, ERROR_FLAG, HIGH):
+        with driving(parts) as loop:
+            for periods in (1, 2):
+                loop.set("emulator.encoder_fault", disturbance)
+                loop.run(periods)
+                loop.set("emulator.encoder_fault", 0.0)
+                loop.run(50)
+                assert is_right(loop)
+            loop.set("emulator.encoder_fault", disturbance)
+            loop.run(4)
+            assert int(loop.get("fault_word")) == ANGLE
+
+
+def a_line_that_is_stuck_is_found(parts: Parts) -> None:
+    """Low is a valid frame of angle 0: the tracker finds that no rotor turns that way."""
+    for disturbance in (LOW, HIGH):
+        with driving(parts) as loop:
+            loop.set("emulator.encoder_fault", disturbance)
+            loop.run(200)
+            assert int(loop.get("fault_word")) & ANGLE
+
+
+def a_start_without_an_encoder_is_refused(parts: Parts) -> None:
+    """No magnet, or a line that is stuck, before the processor starts."""
+    for disturbance in (WEAK_FIELD, LOW, HIGH):
+        motor = parts.emulated()
+        plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
+        with Loop(motor.library, plant, motor.flux_map) as loop:
+            loop.run(10)
+            loop.set("emulator.encoder_fault", disturbance)
+            loop.set("emulator.power_cycle", 1)
+            loop.set("enable", 1)
+            loop.run(100)
+            assert loop.get("emulator.gates") == 0
+            assert int(loop.get("fault_word")) & ANGLE
+
+
+Check = Callable[[Parts], None]
+PORT = "angle_as5047.c"
+PLANTED: dict[str, tuple[Check, PlantedError]] = {
+    "the angle of the period before": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, "return encoder.last + (uint32_t)encoder.travel", "return encoder.last"),
+    ),
+    "the age of the sample is left out": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, " - (uint32_t)fx_mulhi(encoder.travel, encoder.sampled_q32);", ";"),
+    ),
+    "faster than the encoder allows": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, ".bit = 4, .select = 10,", ".bit = 2, .select = 10,"),
+    ),
+    "selected for too short a time": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, ".bit = 4, .select = 10,", ".bit = 4, .select = 4,"),
+    ),
+    "the errors of the power-up are not read": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, "(AS5047_READ_ERRORS); /* clears", "(AS5047_READ_ANGLE); /* clears"),
+    ),
+    "the parity is not checked": (
+        a_disturbed_frame_is_an_invalid_sample,
+        PlantedError(PORT, "as5047_is_valid(frame), 1)", "(frame & AS5047_ERROR) == 0U, 1)"),
+    ),
+    "the error flag is not checked": (
+        a_disturbed_frame_is_an_invalid_sample,
+        PlantedError(PORT, "as5047_is_valid(frame), 1)", "as5047_is_even(frame), 1)"),
+    ),
+    "the encoder's state is not asked at the start": (
+        a_start_without_an_encoder_is_refused,
+        PlantedError(PORT, "as5047_is_healthy(diagnostics) && as5047_is_valid(angle)", "diagnostics != angle"),
+    ),
+}  # fmt: skip
+CHECKS = (the_angle_is_that_of_the_sampling_instant, a_disturbed_frame_is_an_invalid_sample,
+          a_line_that_is_stuck_is_found, a_start_without_an_encoder_is_refused)  # fmt: skip
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
+def test_the_as5047_image_passes_each_check(as5047: Parts, check: Check) -> None:
+    check(as5047)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_error_of_the_as5047_is_found(as5047: Parts, name: str, tmp_path: Path) -> None:
+    check, error = PLANTED[name]
+    planted = replace(as5047, image=image_with_error(as5047.image, error, tmp_path))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)
