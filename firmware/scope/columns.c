@@ -42,7 +42,7 @@ column_t column_of(const capture_t *capture, const capture_source_t *source, uin
 
 /* At least one row. The compiler knows the number of signals: their places stay in registers, and a value takes two
  * instructions. */
-static inline __attribute__((always_inline)) void copy_each(int16_t *to, rows_t rows, const uint8_t *places_in_row,
+static inline __attribute__((always_inline)) void copy_each(int16_t *first, rows_t rows, const uint8_t *places_in_row,
                                                             const uint32_t signals)
 {
     size_t place[CAPTURE_SIGNALS_MAX];
@@ -50,15 +50,18 @@ static inline __attribute__((always_inline)) void copy_each(int16_t *to, rows_t 
     for (uint32_t k = 0; k < signals; k++) {
         place[k] = places_in_row[k];
     }
+    const uint8_t *from = rows.from;
+    int16_t *to = first;
+    uint32_t left = rows.count;
     do {
 #pragma GCC unroll 8
         for (uint32_t k = 0; k < signals; k++) {
-            to[k] = value_at(&rows.from[place[k]]);
+            to[k] = value_at(&from[place[k]]);
         }
-        to += signals;
-        rows.from += rows.stride;
-        rows.count--;
-    } while (rows.count > 0U);
+        to = &to[signals];
+        from = &from[rows.stride];
+        left--;
+    } while (left > 0U);
 }
 
 #define COPY(signals) \

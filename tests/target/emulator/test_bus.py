@@ -18,6 +18,7 @@ from fluxtrue_tools.emulate.build import ROOT, Parts
 from fluxtrue_tools.sim.library import Loop
 
 SUITE_PART = ("test_boot.py", "test_states.py")
+SCOPE_PART = "torque_step or leaves_the_periods"
 
 
 @pytest.fixture(scope="module")
@@ -27,18 +28,28 @@ def flashed() -> Parts:
     return build.prepare("hsm1", flashed=True)
 
 
-def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_path: Path) -> None:
-    files = [str(ROOT / "tests" / "hil" / name) for name in SUITE_PART]
+def suite(flashed: Parts, folder: Path, *arguments: str) -> str:
+    """Run files of the bench suite with the image; they pass, and their output is the result."""
     settings = ["-c", str(ROOT / "tests" / "pytest.ini"), "-p", "no:cacheprovider"]
-    target = [f"--vecu={flashed.program}", f"--report={tmp_path}"]
-    command = [sys.executable, "-m", "pytest", "-q", *settings, *target, *files]
+    target = [f"--vecu={flashed.program}", f"--elf={flashed.image}", f"--report={folder}"]
+    command = [sys.executable, "-m", "pytest", "-q", *settings, *target, *arguments]
     done = subprocess.run(
         command, cwd=ROOT, env=os.environ | flashed.environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-300:]
+    return done.stdout
+
+
+def test_the_flashed_image_passes_the_bench_suite_over_can(flashed: Parts, tmp_path: Path) -> None:
+    suite(flashed, tmp_path, *(str(ROOT / "tests" / "hil" / name) for name in SUITE_PART))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert re.search(r"<th>unused stack</th><td>[1-9]\d+ bytes", page), "the unused stack was not measured"
-    assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-300:]
+
+
+def test_the_scope_of_the_flashed_image_captures_what_the_plant_does(flashed: Parts, tmp_path: Path) -> None:
+    said = suite(flashed, tmp_path, str(ROOT / "tests" / "hil" / "test_scope.py"), "-k", SCOPE_PART)
+    assert "2 passed" in said
 
 
 @pytest.mark.parametrize("celsius", [-20.0, 60.0, 125.0])

@@ -91,7 +91,8 @@ class Scope:
         capacity = WORDS // len(signals)
         count = capacity if samples is None else samples
         if not 1 <= count <= capacity:
-            raise FluxtrueError(f"{count} samples, allowed with {len(signals)} signals: 1 to {capacity}")
+            many = "signal" if len(signals) == 1 else "signals"
+            raise FluxtrueError(f"{count} samples, allowed with {len(signals)} {many}: 1 to {capacity}")
         if not 0.0 <= before < 1.0:
             raise FluxtrueError(f"share {before:g} before the trigger, allowed: 0 to less than 1")
         if not 1 <= divisor <= 0xFFFF:
