@@ -88,7 +88,7 @@ static void take(capture_t *capture, int16_t *memory, const capture_source_t *so
     if (count == 0U) {
         return; /* the trigger is the next sample */
     }
-    columns_copy(capture, &memory[(uint32_t)capture->at * config->signals], source, count);
+    columns_copy(capture, &memory[(size_t)capture->at * config->signals], source, count);
     capture->next += count * config->divisor;
     capture->at = (uint16_t)(capture->at + count);
     if (capture->at == config->samples) {

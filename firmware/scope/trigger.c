@@ -33,14 +33,15 @@ static condition_t negated(condition_t condition)
 /* The samples before the first that reaches the condition. */
 static uint32_t count_until(const condition_t *condition, uint32_t from, uint32_t count)
 {
-    const uint8_t *value = &condition->values.from[from * condition->values.stride];
-    for (uint32_t k = from; k < count; k++) {
-        if ((value_at(value) ^ condition->flip) >= condition->level) {
-            return k;
-        }
-        value += condition->values.stride;
+    const size_t stride = condition->values.stride;
+    const uint8_t *value = &condition->values.from[from * stride];
+    const int32_t level = condition->level, flip = condition->flip;
+    uint32_t k = from;
+    while (k < count && (value_at(value) ^ flip) < level) {
+        value = &value[stride];
+        k++;
     }
-    return count;
+    return k;
 }
 
 static uint32_t search(capture_t *capture, const capture_source_t *source, uint32_t count)

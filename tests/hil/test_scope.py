@@ -88,7 +88,7 @@ def test_a_torque_step_is_captured_as_the_plant_made_it(
     rig.advance(0.05)
     assert scope.status().state == "armed"
     rig.ask(torque_Nm=60.0)
-    status = scope.wait(1.0)
+    status = scope.until_complete(1.0)
     rig.record([])
     capture = scope.read()
     assert status.state == "done" and status.number == armed.number and scope.status().state == "idle"
@@ -159,7 +159,7 @@ def test_what_is_not_complete_cannot_be_read_and_a_bad_set_up_is_refused(scope: 
     with pytest.raises(FluxtrueError, match="the scope is armed: there is no capture to read"):
         scope.read()
     with pytest.raises(FluxtrueError, match="no complete capture within 0.1 s"):
-        scope.wait(0.1)
+        scope.until_complete(0.1)
     with pytest.raises(FluxtrueError, match="the scope is in use .armed."):
         scope.arm()
     scope.stop()
@@ -183,7 +183,7 @@ def test_a_block_that_was_damaged_on_the_way_is_read_again(
     scope.arm()
     scope.pass_periods(60)
     scope.trigger()
-    scope.wait(1.0)
+    scope.until_complete(1.0)
     whole = scope.read(release=False)
     memory = next(value.address for value in description.scope if value.name == "scope_memory")
     here, left = [False], [1]
@@ -203,6 +203,26 @@ def test_a_block_that_was_damaged_on_the_way_is_read_again(
     with pytest.raises(FluxtrueError, match="another checksum in the ECU, 3 times"):
         scope.read()
     scope.stop()
+
+
+@pytest.mark.plant
+def test_a_capture_changes_no_duty(rig: Rig, description: Description) -> None:
+    def drive(capture: bool) -> str:
+        rig.power_cycle(seed=3)
+        rig.turn(2000.0)
+        rig.start(40.0)
+        begun_s = rig.now_s
+        if capture:
+            scope = Scope(XcpMaster(RigLine(rig)), description)
+            scope.configure(["i_d_A", "i_q_A", "u_d_V", "u_q_V"], "above", "i_q_A", 20.0, samples=200)
+            scope.arm()
+            scope.until_complete(0.2)
+            scope.read()
+        rig.advance(2.0 - (rig.now_s - begun_s))
+        return rig.stand.duty_hash()
+
+    quiet = drive(False)
+    assert drive(True) == quiet
 
 
 def run(*arguments: str) -> tuple[int, str]:

@@ -174,6 +174,14 @@ void test_a_signal_that_is_above_from_the_start_is_no_edge(void)
     TEST_ASSERT_EQUAL_UINT32(75, triggered_in(TRIGGER_RISING, 0));
 }
 
+/* At the level is not below it. */
+void test_a_signal_that_begins_at_the_level_is_no_edge(void)
+{
+    config.before = 0;
+    run(26);
+    TEST_ASSERT_EQUAL_UINT32(80, triggered_in(TRIGGER_RISING, wave(30)));
+}
+
 /* The 25th sample is the last that need not be searched, and the next one rises. */
 void test_an_edge_at_the_first_sample_that_is_searched_is_found(void)
 {
@@ -413,6 +421,19 @@ void test_a_task_that_comes_too_late_begins_the_search_anew(void)
     TEST_ASSERT_EQUAL(CAPTURE_ARMED, capture.state);
     run_steps(20);
     TEST_ASSERT_EQUAL_UINT32(125, trigger_period());
+    expect_periods();
+}
+
+void test_samples_from_before_a_gap_are_not_taken(void)
+{
+    arm_for(TRIGGER_MANUAL, 0);
+    run_steps(20);
+    run(61);
+    step();
+    run_steps(1);
+    capture_trigger(&capture, newest + 1);
+    run_steps(20);
+    TEST_ASSERT_EQUAL_UINT16(11, capture.before);
     expect_periods();
 }
 

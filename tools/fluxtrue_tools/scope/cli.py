@@ -45,7 +45,7 @@ def _capture(scope: Scope, names: tuple[str, ...], trigger: str, on: str | None,
         if trigger == "manual":
             scope.pass_periods(armed.wanted * divisor)
             scope.trigger()
-        scope.wait(seconds)
+        scope.until_complete(seconds)
     except (FluxtrueError, KeyboardInterrupt):
         scope.give_up()
         raise

@@ -151,7 +151,7 @@ class Scope:
             got["trigger_period"],
         )  # fmt: skip
 
-    def wait(self, seconds: float) -> Status:
+    def until_complete(self, seconds: float) -> Status:
         """Wait until the capture that was armed is complete. A fault may leave a freeze frame in its place."""
         waited_s = 0.0
         while True:
