@@ -9,6 +9,7 @@
  *   FX_LOAD_TWO       angle tracker, state and gains      2
  *                     current control, integrators        1
  *                     window of the identification                     3
+ *                     hal/s32k144/angle_quadrature.c                   1
  *   fx_both_loaded    window, sums stored together                     2
  *                     modulation: slopes, gains           1 each       1, 0
  *   fx_in_register    current control, speed              2            4

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/angle.h"
 
+#include "fx/codegen.h"
 #include "fx/q.h"
 #include "hal/s32k144/angle.h"
 #include "hal/s32k144/clock.h"
@@ -15,9 +16,8 @@
 #define FIRST_PER_S 10000U /* length of the first measurement of the speed */
 
 static struct {
-    int32_t at_last;      /* reading of the period before */
-    uint32_t at_index;    /* where the counter was when the index rose */
-    int32_t q32_per_tick; /* share of a period, 2^32 = 1 */
+    int32_t at_last, at_index; /* reading of the period before; where the counter was when the index rose */
+    int32_t q32_per_tick;      /* share of a period, 2^32 = 1 */
     volatile bool absolute;
 } encoder;
 
@@ -59,10 +59,11 @@ uint32_t angle_follow_index(void)
     if (encoder.absolute || (FTM2->C2SC & FTM_C2SC_CHF) == 0U) {
         return 0;
     }
-    encoder.at_index = FTM2->C2V << TURN_SHIFT;
-    encoder.at_last = (int32_t)((uint32_t)encoder.at_last - encoder.at_index);
+    const uint32_t at_index = FTM2->C2V << TURN_SHIFT;
+    encoder.at_index = (int32_t)at_index;
+    encoder.at_last = (int32_t)((uint32_t)encoder.at_last - at_index);
     encoder.absolute = true;
-    return 0U - encoder.at_index;
+    return 0U - at_index;
 }
 
 /* The counts of 0.1 ms: one is 37 rpm. */
@@ -84,9 +85,10 @@ bool angle_fault(void)
  * negative. */
 uint32_t hal_angle_read(void)
 {
-    const uint32_t now = (FTM2->CNT << TURN_SHIFT) - encoder.at_index;
+    const fx_two_words_t at = FX_LOAD_TWO(&encoder, at_last, at_index);
+    const int32_t now = (int32_t)((FTM2->CNT << TURN_SHIFT) - (uint32_t)at.second);
     const int32_t passed = (int32_t)(FTM0->CNT * (uint32_t)encoder.q32_per_tick);
-    const int32_t travel = (int32_t)(now - (uint32_t)encoder.at_last);
-    encoder.at_last = (int32_t)now;
-    return now - (uint32_t)fx_mulhi(travel, passed);
+    const int32_t travel = (int32_t)((uint32_t)now - (uint32_t)at.first);
+    encoder.at_last = now;
+    return (uint32_t)fx_mulhi_sub(now, travel, passed);
 }

@@ -110,7 +110,7 @@ PLANTED: dict[str, tuple[Check, PlantedError]] = {
     ),
     "the wrong direction": (
         torque_waits_for_the_index,
-        PlantedError(QUADRATURE, "TURN_SHIFT) - encoder.at_index;", "TURN_SHIFT) + encoder.at_index;"),
+        PlantedError(QUADRATURE, "TURN_SHIFT) - (uint32_t)at.second", "TURN_SHIFT) + (uint32_t)at.second"),
     ),
     "the tracker is not told": (
         the_angle_keeps_its_speed_when_the_index_passes,

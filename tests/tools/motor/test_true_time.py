@@ -88,6 +88,7 @@ COUNTS = {
     "SILENT_STEPS_MAX": "steps without a command, as docs/architecture.md says",
     "CONTRADICTED_MAX": "updates of the identification",
     "MOVING_STEPS": "steps, as docs/theory/monitors.md says",
+    "SCOPE_FREEZE_SAMPLES": "samples around a fault, as docs/howto/scope.md says",
     "FIRST_PER_S": "a rate by the core's clock, before the task runs",
     "VELOCITY_TURNS_PER_S": "the unit in which the converter sends the speed",
     "FAST_ANGLE": "angle of a step, as that page says",

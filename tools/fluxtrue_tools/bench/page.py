@@ -167,7 +167,7 @@ def _modules(figures: Figures) -> list[str]:
 
 
 def _stack(figures: Figures) -> list[str]:
-    rows = ((x["level"], x["frame"] or "", x["stack"], " → ".join(f"`{f}`" for f in x["path"]))
+    rows = ((x["level"], x["frame"] or "", x["stack"], f"`{' → '.join(x['path'])}`")
             for x in figures["stack"]["levels"])  # fmt: skip
     return table("priority, lowest first|  exception frame |  stack |deepest path", rows)
 
