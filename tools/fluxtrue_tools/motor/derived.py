@@ -60,6 +60,7 @@ FROZEN_SHARE, FROZEN_SETTLE_S = 0.25, 0.01  # of the inverter's voltage error; f
 MONITOR_MEAN_S = -1e-3 / math.log(0.75)  # a quarter in 1 ms
 DEVIATION_S, RIPPLE_S, LOST_S, EQUAL_S, FAST_S, HOT_S = 0.1, 0.02, 0.008, 0.02, 0.005, 0.11
 LAUNCH_SHARE = 0.125  # of the inverter's voltage error: what a rotor's turning may change of its part along the current
+LAUNCH_SPARE = LAUNCH_SHARE - math.pi / 6.0 * (1.0 - math.cos(math.pi / 6.0))  # what (MN-33) leaves of it
 LAUNCH_ANGLE = 0.3 * 2.0 * math.pi / 4096  # of a turn of the rotor in a step: the resolution of a sensor of 12 bits
 LAUNCH_FLUX_SHARE = 0.2  # of psi_f: deviation of the magnet
 TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07

@@ -24,6 +24,7 @@ from fluxtrue_tools.motor.derived import (
     LAG_SHARE,
     LAUNCH_ANGLE,
     LAUNCH_FLUX_SHARE,
+    LAUNCH_SPARE,
     LOST_S,
     PAPER_TURN_MAX,
     REPEAT_TURNS,
@@ -468,7 +469,8 @@ def _frozen_angle(motor: Motor) -> list[Row]:
 
 def _launch_power(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    launch_V = d.launch_V + LAUNCH_ANGLE * motor.config.machine.pole_pairs / b.step_s * d.psi_f_Vs
+    resolution_V = LAUNCH_ANGLE * motor.config.machine.pole_pairs / b.step_s * d.psi_f_Vs
+    launch_V = d.launch_V + max(0.0, resolution_V - LAUNCH_SPARE * d.monitor_V)  # (MN-34)
     v_1 = q15(launch_V / b.voltage_V, "launch_V") * b.periods_per_step
     turn_gain = round(2 * math.pi * b.periods_per_step * Q15_ONE / (b.omega_rad_s * b.step_s))
     return [
