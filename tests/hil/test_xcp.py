@@ -101,7 +101,8 @@ def test_a_value_out_of_its_range_is_refused_whole(rig: Rig, description: Descri
 
 def test_memory_that_is_not_described_cannot_be_read(rig: Rig, description: Description) -> None:
     master = Master(rig, description)
-    end = max(value.address for value in description.measurements) + 4096
+    # Beyond everything that is described, the scope's memory included.
+    end = max(value.address for value in (*description.measurements, *description.scope)) + 65536
     for address in (0, 4, 0xFFFFFFFC, end):
         with pytest.raises(XcpError) as error:
             master.command(0xF4, 4, 0, 0, *address.to_bytes(4, "little"))

@@ -29,7 +29,7 @@ static uint32_t angle_read(const emulated_t *e)
     const uint32_t now = (emu_counter_read(e->emu, 1, false) - at_index) << ENCODER_SHIFT;
     const uint32_t last = (emu_counter_read(e->emu, 1, true) - at_index) << ENCODER_SHIFT;
     const int32_t passed = (int32_t)(emu_counter_read(e->emu, 0, false) * q32_per_tick);
-    return now - (uint32_t)fx_mulhi((int32_t)(now - last), passed);
+    return (uint32_t)fx_mulhi_sub((int32_t)now, (int32_t)(now - last), passed);
 }
 
 static void samples_take(emulated_t *e)
