@@ -254,7 +254,7 @@ def test_a_result_that_was_not_read_in_time_costs_at_most_three_periods(
     restarts the block. In a period without the fast ISR the results of the other converter stay unread, so that its
     block may be locked as well."""
     with _core(parts, elf) as core:
-        list(_periods(core, 0.02))
+        list(_periods(core, 0.0205))  # five periods after a start of the 1 kHz task, which reads results, too
         entered = _count_entries(core)
         assert core.run(1e-3) == CENTRE
         core.run(20e-6)  # the fast ISR of this period has read everything
