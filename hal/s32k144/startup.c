@@ -84,7 +84,11 @@ static void clear_and_copy(void)
     for (uint32_t *to = data_start; to < data_end; to++, from++) {
         *to = *from;
     }
-    for (uint32_t *to = bss_start; to < bss_end; to++) {
+    uint32_t *to = bss_start;
+    for (; bss_end - to >= 4; to += 4) { /* after a reset at speed the bridge waits for this */
+        to[0] = to[1] = to[2] = to[3] = 0;
+    }
+    for (; to < bss_end; to++) {
         *to = 0;
     }
 }
@@ -100,12 +104,13 @@ __attribute__((used)) void start_up(void)
     panic();
 }
 
-/* Writes all RAM in use in whole words before any of it is read or written in part, because until then its error
- * correction codes are undefined. The value is the stack's pattern, from which the high-water mark is found. */
+/* All RAM in use is written in whole words before any of it is read or written in part, because until then its error
+ * correction codes are undefined: the stack here, with the pattern from which the high-water mark is found, and the rest
+ * by clear_and_copy(). */
 __attribute__((naked)) void reset_handler(void)
 {
     __asm__ volatile("ldr r0, =stack_bottom\n"
-                     "ldr r1, =bss_end\n"
+                     "ldr r1, =stack_top\n"
                      "ldr r2, =%c0\n"
                      "1: str r2, [r0], #4\n"
                      "cmp r0, r1\n"

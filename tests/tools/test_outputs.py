@@ -199,6 +199,7 @@ def test_every_output_of_every_command_is_refused_before_any_work(
     for param in ALL[name].params:
         if param.required and param is not option:
             needed = "1" if isinstance(param.type, click.IntRange) else "input"
+            needed = str(param.type.min) if isinstance(param.type, click.FloatRange) else needed
             needed = str(param.type.choices[0]) if isinstance(param.type, click.Choice) else needed
             arguments += [needed] if isinstance(param, click.Argument) else [param.opts[-1], needed]
     assert cli.run(arguments) == 2

@@ -139,7 +139,7 @@ def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
         core, kept = stand.core, stand.core.read(COPIES, 2 * COPY_BYTES)
         core.reset(resets.KINDS["power-on"])
         core.write(COPIES, kept)
-        core.run(5e-3)
+        core.run(1e-3)
         core.reset(resets.KINDS["pin"])
         core.run(5e-3)
         assert core.register("FTM0.SWOCTRL") != HELD
