@@ -28,6 +28,7 @@ VDC_SHARE = 1.2
 FIRST_WATCHDOG_S = 0.1
 COPIES = 0x2000_0000  # of the state, hal/s32k144/retained.c
 COPY_BYTES = 40
+SRAMU_RETEN = 20  # SIM_CHIPCTL
 SAFE_STATE = 6  # of port C, hal/s32k144/pins.h
 HELD = 0x2A3F  # FTM0.SWOCTRL: the short circuit
 
@@ -133,13 +134,14 @@ def test_a_damaged_copy_is_not_used(parts: Parts, damaged: tuple[int, ...]) -> N
 
 
 def copies_of_an_earlier_power_on_are_not_used(parts: Parts) -> None:
-    """A short power-off leaves them in the RAM, and the next reset comes before the task writes the first new one."""
+    """A short power-off leaves them in the RAM, and the next reset comes when the task has written one of the two."""
     loop, stand = resets.powered_up(parts)
     with loop:
         core, kept = stand.core, stand.core.read(COPIES, 2 * COPY_BYTES)
         core.reset(resets.KINDS["power-on"])
         core.write(COPIES, kept)
-        core.run(1e-3)
+        while core.register("SIM.CHIPCTL") >> SRAMU_RETEN & 1:  # until the first copy is written
+            core.run(1e-4)
         core.reset(resets.KINDS["pin"])
         core.run(5e-3)
         assert core.register("FTM0.SWOCTRL") != HELD
