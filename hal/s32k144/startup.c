@@ -105,8 +105,8 @@ __attribute__((used)) void start_up(void)
 }
 
 /* All RAM in use is written in whole words before any of it is read or written in part, because until then its error
- * correction codes are undefined: the stack here, with the pattern from which the high-water mark is found, and the rest
- * by clear_and_copy(). */
+ * correction codes are undefined: the stack here, with the pattern from which the high-water mark is found, and the
+ * rest by clear_and_copy(). */
 __attribute__((naked)) void reset_handler(void)
 {
     __asm__ volatile("ldr r0, =stack_bottom\n"

@@ -48,8 +48,8 @@ def test_a_faster_rotor_has_a_tracker_of_a_sixteenth_of_the_pwm_and_a_wider_jump
 def test_the_launch_monitor_allows_for_the_resolution_of_the_angle(
     name: str, v_theta: float, v_inverter: float
 ) -> None:
-    """(MN-34) by hand: 0.3·2 pi·3/4096·71.7 mV·s/1 ms is 0.099 V, less than 0.055 of V_0; with 20 pole pairs and 24 mV·s
-    it is 0.221 V, of which V_0 = 0.96 V leaves 0.168 V."""
+    """(MN-34) by hand: 0.3·2 pi·3/4096·71.7 mV·s/1 ms is 0.099 V, less than 0.055 of V_0; with 20 pole pairs and
+    24 mV·s it is 0.221 V, of which V_0 = 0.96 V leaves 0.168 V."""
     motor = named(name)
     emitted = int(re.search(r"\.v_1 = (\d+),", motor_tables_c(motor))[1])
     volts = emitted / motor.bases.periods_per_step / 2**15 * motor.bases.voltage_V
