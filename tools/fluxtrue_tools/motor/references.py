@@ -36,8 +36,8 @@ class Contour:
         if len(self.id_A) < 2:
             return np.full_like(psi_Vs, self.id_A[0]), np.full_like(psi_Vs, self.iq_A[0])
         psi = np.clip(psi_Vs, self.psi_Vs[-1], self.psi_Vs[0])
-        rising = self.psi_Vs[::-1]
-        return (PchipInterpolator(rising, self.id_A[::-1])(psi), PchipInterpolator(rising, self.iq_A[::-1])(psi))
+        currents = PchipInterpolator(self.psi_Vs[::-1], np.array([self.id_A[::-1], self.iq_A[::-1]]), axis=1)(psi)
+        return currents[0], currents[1]
 
 
 class Solver:
@@ -94,13 +94,14 @@ class Solver:
         ok = np.isfinite(start)
         q = np.full_like(start, np.nan)
         q[ok] = self.iq_for(np.broadcast_to(torques, d.shape)[ok], d[ok], start[ok])
-        return [self._contour(float(t), q[:, k]) for k, t in enumerate(torques)]
+        return self._solved(torques, [self._near(q[:, k]) for k in range(len(torques))])
 
-    def _contour(self, t: float, q: Array) -> Contour:
+    def _near(self, q: Array) -> tuple[Array, Array]:
+        """Currents near one contour, from its MTPA point to the current circle; q: i_q over self.id_A."""
         current = np.hypot(self.id_A, q)
         inside = np.nan_to_num(current, nan=np.inf) <= self.i_max_A
         if not inside.any():
-            return self._contour_of(t, np.array([self.id_top_A]), np.array([self.iq_top_A]))
+            return np.array([self.id_top_A]), np.array([self.iq_top_A])
         best = int(np.argmin(np.where(inside, current, np.inf)))
         d_best = self.id_A[best]
         if 0 < best < POINTS - 1 and np.isfinite(q[best - 1]) and np.isfinite(q[best + 1]):
@@ -119,15 +120,23 @@ class Solver:
             if d_rim < ids[-1] - 1e-6:
                 ids.append(d_rim)
                 qs.append(q[first] + share * (q[first - 1] - q[first]))
-        return self._contour_of(t, np.array(ids), np.array(qs))
+        return np.array(ids), np.array(qs)
 
-    def _contour_of(self, t: float, d: Array, q: Array) -> Contour:
-        q = self.iq_for(np.full_like(d, t), d, q)
-        psi = flux(self.model, d, q)
-        last = 1
-        while last < len(psi) and psi[last] < psi[last - 1]:
-            last += 1  # beyond it the flux rises again: maximum torque per volt
-        return Contour(t, d[:last], q[:last], psi[:last])
+    def _solved(self, torques: Array, near: list[tuple[Array, Array]]) -> list[Contour]:
+        """Contours through the given currents; all are solved at once, because each call of the model is dear."""
+        lengths = [len(d) for d, _ in near]
+        t = np.repeat(torques, lengths)
+        d = np.concatenate([d for d, _ in near])
+        q = self.iq_for(t, d, np.concatenate([q for _, q in near]))
+        parts = (np.split(values, np.cumsum(lengths)[:-1]) for values in (d, q, flux(self.model, d, q)))
+        return [_falling(float(t), *part) for t, *part in zip(torques, *parts, strict=True)]
+
+
+def _falling(t: float, d: Array, q: Array, psi: Array) -> Contour:
+    """A contour up to its least flux: beyond it the flux rises again (maximum torque per volt)."""
+    rises = np.flatnonzero(np.diff(psi) >= 0)
+    last = int(rises[0]) + 1 if len(rises) else len(psi)
+    return Contour(t, d[:last], q[:last], psi[:last])
 
 
 @dataclass(frozen=True)
