@@ -30,6 +30,7 @@ PAGES = {
     "MO": THEORY / "modulation.md",
     "MR": THEORY / "mrai.md",
     "PL": THEORY / "plant.md",
+    "WC": THEORY / "worst-case-time.md",
     "QA": THEORY / "third-level.md",
     "SC": Path("docs/scaling.md"),
     "SL": THEORY / "second-level.md",

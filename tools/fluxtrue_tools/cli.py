@@ -36,6 +36,7 @@ COMMANDS = {
     "log": ("fluxtrue_tools.log.cli", "log", "Decode, plot and export a recorded drive."),
     "a2l": ("fluxtrue_tools.a2l.cli", "a2l", "Describe a firmware image to calibration tools."),
     "bench": ("fluxtrue_tools.bench.cli", "bench", "Accuracy and cost of the building blocks."),
+    "wcet": ("fluxtrue_tools.wcet.cli", "wcet", "Worst-case execution time of each interrupt handler."),
     "target": ("fluxtrue_tools.target.cli", "target", "Registers and images of microcontrollers."),
 }
 # Commands that need no other file of the repository: an installed wheel has only these.

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "emu_private.h"
+#include "passes_private.h"
 
 enum { SPANS_MAX = 1 << 16, NOWHERE = -1 };
 
@@ -22,6 +23,7 @@ struct profile {
     uint8_t cost[CODE_SIZE / 2];
     bool conditional[CODE_SIZE / 2]; /* made conditional by an IT that has run: counted with the IT */
     memory_time_t *memory[EMU_MEMORIES];
+    passes_t *passes; /* NULL: not requested */
 };
 
 bool emu_profile_start(emu_t *emu, const uint8_t *cost, uint32_t half_words, uint32_t taken)
@@ -58,6 +60,9 @@ void profile_stop(emu_t *emu)
     for (int k = 0; p != NULL && k < EMU_MEMORIES; k++) {
         memory_time_destroy(p->memory[k]);
     }
+    if (p != NULL) {
+        passes_destroy(p->passes);
+    }
     free(p);
     emu->profile = NULL;
 }
@@ -85,6 +90,27 @@ bool emu_profile_memories(emu_t *emu, const memory_costs_t costs[EMU_MEMORIES])
     p->memory[0] = first;
     p->memory[1] = second;
     return true;
+}
+
+bool emu_profile_passes(emu_t *emu, const uint16_t *of, uint32_t half_words, const emu_region_t *regions,
+                        uint32_t count)
+{
+    profile_t *p = emu->profile;
+    if (p == NULL || p->passes != NULL) {
+        return false;
+    }
+    p->passes = passes_create(of, half_words, regions, count);
+    return p->passes != NULL;
+}
+
+void emu_profile_most_passes(const emu_t *emu, uint32_t *most)
+{
+    passes_most(emu->profile->passes, most);
+}
+
+void emu_profile_ran(const emu_t *emu, uint8_t *ran, uint32_t half_words)
+{
+    passes_ran(emu->profile->passes, ran, half_words);
 }
 
 static void fetch(const profile_t *p, emu_span_t *span, uint32_t address, uint32_t size)
@@ -134,6 +160,9 @@ void profile_instruction(emu_t *emu, uint32_t address, uint32_t size)
         level->span.cost += p->taken; /* for the previous instruction */
     }
     level->next = (int64_t)address + size;
+    if (p->passes != NULL) {
+        passes_instruction(p->passes, p->depth, address);
+    }
     if (is_conditional(p, address)) {
         return;
     }
@@ -153,6 +182,9 @@ void profile_enter(emu_t *emu, int vector, uint32_t stack, uint32_t words)
     }
     level_t *level = &p->level[p->depth];
     *level = (level_t){.span = {.vector = (uint32_t)vector}, .next = NOWHERE};
+    if (p->passes != NULL) {
+        passes_enter(p->passes, p->depth);
+    }
     const uint32_t at = emu->s.nvic.vtor + 4U * (uint32_t)vector;
     for (int k = 0; k < EMU_MEMORIES && p->memory[k] != NULL; k++) {
         level->span.waited[k] = memory_time_entry(p->memory[k], at, stack, words);

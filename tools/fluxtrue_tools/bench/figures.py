@@ -71,11 +71,11 @@ def _mode(parts: emulation.Parts, functions: list[disassembly.Function], mode: i
     return {"met": met, "runs": rows}, recording.stack_bytes
 
 
-def _pointers(listed: list[dict[str, Any]], names: list[str]) -> dict[str, list[str]]:
+def pointers(port: dict[str, Any], names: list[str]) -> dict[str, list[str]]:
     """Patterns of the port's list against the image's names."""
     plain = sorted({disassembly.plain(name) for name in names})
     found: dict[str, list[str]] = {}
-    for entry in listed:
+    for entry in port["pointer"]:
         for pattern in entry["calls"]:
             # A target that was compiled into its caller is not among the names, and there is no call of it.
             found.setdefault(entry["in"], []).extend(fnmatch.filter(plain, pattern))
@@ -85,7 +85,7 @@ def _pointers(listed: list[dict[str, Any]], names: list[str]) -> dict[str, list[
 def stack_use(functions: list[disassembly.Function], port: dict[str, Any]) -> tuple[list[stack.Use], list[str]]:
     """Worst case of each priority, and the reasons why it may be too small."""
     nodes = stack.graph(functions)
-    depths = stack.Depths(nodes, _pointers(port["pointer"], list(nodes)))
+    depths = stack.Depths(nodes, pointers(port, list(nodes)))
     uses = stack.levels(depths, [stack.Level(x["name"], tuple(x["handlers"])) for x in port["level"]])
     sites = {entry["in"]: entry["sites"] for entry in port["pointer"]}
     for node in nodes.values():

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,12 +43,21 @@ FAULT_TORQUE, FAULT_RPM = 80.0, 3000.0
 FAULT_RAMP_MS: Final = 100
 REACTION_MS: Final = 5
 # Milliseconds, requested torque, speed in rpm at the end, dc voltage.
-DRIVE: Final = (
+Course = tuple[tuple[int, float, float, float], ...]
+DRIVE: Final[Course] = (
     (50, 80.0, 3000.0, V_DC), (50, -60.0, 3000.0, V_DC), (30, 5.0, 3000.0, V_DC),
     (60, 400.0, 3000.0, V_DC), (80, -400.0, 3000.0, V_DC), (40, 0.0, 3000.0, V_DC),
     (80, 60.0, 8000.0, V_DC), (20, 60.0, 8000.0, 300.0), (40, -40.0, 8000.0, 300.0), (10, 0.0, 8000.0, 200.0),
     (15, 0.0, 8000.0, 150.0),
 )  # fmt: skip
+
+
+class Watch(Protocol):
+    """Records what the core executes while it is profiled."""
+
+    def begin(self, stand: Stand) -> None: ...
+
+    def end(self, stand: Stand) -> None: ...
 
 
 class _Span(ctypes.Structure):
@@ -174,11 +183,11 @@ def _powered(parts: Parts, mode: int) -> Iterator[Stand]:
         yield stand
 
 
-def _drive(stand: Stand, spans: list[tuple[int, ...]]) -> NDArray[np.float64]:
+def _drive(stand: Stand, spans: list[tuple[int, ...]], course: Course) -> NDArray[np.float64]:
     """The whole drive; returns the recorded columns of each period."""
     rows: list[NDArray[np.float64]] = []
     speed = 0.0
-    for milliseconds, torque, rpm, v_dc in DRIVE:
+    for milliseconds, torque, rpm, v_dc in course:
         stand.command.values["TorqueRequested"] = torque
         stand.loop.set("plant.vdc_V", v_dc)
         for k in range(milliseconds):
@@ -189,7 +198,9 @@ def _drive(stand: Stand, spans: list[tuple[int, ...]]) -> NDArray[np.float64]:
     return np.concatenate(rows)
 
 
-def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) -> list[tuple[int, ...]]:
+def _reaction(
+    parts: Parts, functions: list[Function], mode: int, cause: str, watch: Watch | None
+) -> list[tuple[int, ...]]:
     """A drive of its own, because no fault is reset while the rotor turns: the runs of each interrupt from the cause of
     the fault until switching has long been off."""
     with _powered(parts, mode) as stand:
@@ -200,6 +211,8 @@ def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) ->
         if int(stand.loop.get("fault_word")) != 0 or stand.loop.get("truth.torque_Nm") < FAULT_TORQUE / 2:
             raise FluxtrueError(f"the drive does not make torque before the fault of {cause}")
         stand.profile(functions, memories=True)
+        if watch is not None:
+            watch.begin(stand)
         if cause == GATE_DRIVER:
             stand.core.pend(GATE)
         else:
@@ -207,21 +220,30 @@ def _reaction(parts: Parts, functions: list[Function], mode: int, cause: str) ->
         stand.run(REACTION_MS)
         if int(stand.loop.get("fault_word")) == 0:
             raise FluxtrueError(f"{cause} was meant to be a fault")
+        if watch is not None:
+            watch.end(stand)
         return stand.rows()
 
 
-def record(parts: Parts, functions: list[Function], mode: int) -> Recording:
-    """The whole drive, then the reactions to faults; `mode`: identification_mode."""
+def record(
+    parts: Parts, functions: list[Function], mode: int, watch: Watch | None = None, course: Course = DRIVE
+) -> Recording:
+    """The whole drive, then the reactions to faults; `mode`: identification_mode. `watch` sees what they execute."""
     with _powered(parts, mode) as stand:
         loop = stand.loop
         loop.record(["voltage_limited", "table_clamped", "id_A"])
         stand.profile(functions, memories=True)
+        if watch is not None:
+            watch.begin(stand)
         spans: list[tuple[int, ...]] = []
-        seen = _drive(stand, spans)
+        seen = _drive(stand, spans, course)
         fault = int(loop.get("fault_word"))
         if fault != 0 or int(loop.get("identification_mode")) != mode:
             raise FluxtrueError(f"the measured drive ended with fault word {fault:#x}")
-        reacting = [row for cause in (*FAULTS, GATE_DRIVER) for row in _reaction(parts, functions, mode, cause)]
+        if watch is not None:
+            watch.end(stand)
+        causes = (*FAULTS, GATE_DRIVER)
+        reacting = [row for cause in causes for row in _reaction(parts, functions, mode, cause, watch)]
         return Recording(
             np.array(spans, dtype=np.int64), np.array(reacting, dtype=np.int64), len(seen), int(seen[:, 0].sum()),
             int(seen[:, 1].sum()), int((seen[:, 2] < -100).sum()), stand.stack_used(),
