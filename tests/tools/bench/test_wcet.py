@@ -135,6 +135,29 @@ def test_the_length_of_a_copy_is_its_constant(tmp_path: Path) -> None:
     assert found.problems == set()
 
 
+def test_the_most_waiting_fetches_each_line_and_charges_each_access_by_its_memory(tmp_path: Path) -> None:
+    # At 0x400, with twelve bytes ahead: BX at 0x404 is the first to reach the next line of 16 bytes.
+    of = image(tmp_path, function("start", "nop; nop; bx lr"))
+    assert of.waits("start").blocks == {0x400: 2 * 12}
+    source = function(
+        "start", "push {r4}; ldr r0, =0x40001234; ldr r1, [r0, #4]; ldr r2, [r1]; str r2, [r0]; pop {r4}; bx lr"
+    )
+    of = image(tmp_path, source)
+    # Fetched are 14 bytes and 12 ahead, two lines. Stack 2 + 2, literal 1 + 2 * 12, peripheral 8, unknown 25, 8.
+    stack = (1 + 1) + 1
+    assert of.waits("start").blocks == {0x400: 2 * 12 + stack + 25 + 8 + 25 + 8}
+
+
+def test_an_argument_points_into_the_memory_that_all_callers_pass(tmp_path: Path) -> None:
+    source = function("start", "push {lr}; ldr r0, =0x40001234; bl both; ldr r0, =0x40002345; bl both; pop {pc}")
+    source += ".ltorg\n" + function("both", "ldr r1, [r0]; bx lr")
+    of = image(tmp_path, source)
+    of.enter(["start"], {})
+    fetched = of.waits("both")
+    again = image(tmp_path, source)
+    assert sum(again.waits("both").blocks.values()) - sum(fetched.blocks.values()) == 25 - 8
+
+
 def test_of_several_lengths_of_a_copy_the_largest_counts(tmp_path: Path) -> None:
     source = function("start", "push {lr}; movs r2, #64; cmp r0, #0; it ne; movne r2, #32; bl memset; pop {pc}")
     source += function("memset", "1: str r1, [r0], #4; subs r2, #4; bne 1b; bx lr")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fluxtrue_tools.bench import cycles, disassembly
 from fluxtrue_tools.bench.disassembly import Function, Instruction, plain
-from fluxtrue_tools.wcet import flow, lengths, lines, longest, loops, waits
+from fluxtrue_tools.wcet import flow, lengths, lines, longest, loops, places, waits
 from fluxtrue_tools.wcet.facts import Facts
 
 COPIES = ("memcpy", "memset", "memmove")
@@ -52,6 +52,7 @@ class Image:
         self._flows: dict[str, flow.Flow] = {}
         self._loops: dict[str, list[Annotated]] = {}
         self._waits: dict[str, waits.Waits] = {}
+        self._arguments: dict[str, places.State] = {}
 
     @classmethod
     def read(cls, elf: Path) -> Image:
@@ -85,8 +86,32 @@ class Image:
     def waits(self, name: str) -> waits.Waits:
         if name not in self._waits:
             listed = [one.loop for one in self.loops(name)]
-            self._waits[name] = waits.most(self.flow(name), listed, self._memory)
+            self._waits[name] = waits.most(self.flow(name), listed, self._memory, self._arguments.get(name, {}))
         return self._waits[name]
+
+    def enter(self, handlers: Iterable[str], pointers: Mapping[str, list[str]]) -> None:
+        """Find what the arguments of all functions that the handlers reach point into."""
+        order: list[str] = []
+        wanted = [*handlers, *(listed for functions in pointers.values() for listed in functions)]
+        unknown = [name for function in wanted for name in self.names(function)]
+        for name in unknown:
+            self._callees_first(name, order)
+        entered: dict[str, list[places.State]] = {name: [{}] for name in unknown}
+        for name in reversed(order):
+            self._arguments[name] = places.joined(entered[name])
+            states = places.follow(self.flow(name), self._memory, self._arguments[name]).calls
+            for call in (call for block in self.flow(name).blocks.values() for call in block.calls):
+                target = self.starts.get(call.target) if call.target is not None else None
+                if target is not None:
+                    entered.setdefault(target, []).append(states[call.site])
+
+    def _callees_first(self, name: str, order: list[str]) -> None:
+        if name in order:
+            return
+        for call in (call for block in self.flow(name).blocks.values() for call in block.calls):
+            if call.target is not None and call.target in self.starts:
+                self._callees_first(self.starts[call.target], order)
+        order.append(name)
 
     def _annotated(self, graph: flow.Flow, loop: loops.Loop, statement: lines.Statement | None) -> Annotated:
         if statement is not None:

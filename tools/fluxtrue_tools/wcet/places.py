@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from fluxtrue_tools.bench.cycles import base
 from fluxtrue_tools.bench.disassembly import Instruction, words
@@ -16,6 +17,7 @@ from fluxtrue_tools.wcet.flow import Flow, Memory
 
 UNKNOWN, FLASH, SRAM_L, SRAM_U, PERIPHERAL, PRIVATE = "unknown", "flash", "SRAM_L", "SRAM_U", "peripheral", "private"
 BEGINS = ((0xE000_0000, PRIVATE), (0x4000_0000, PERIPHERAL), (0x2000_0000, SRAM_U), (0x1C00_0000, SRAM_L), (0, FLASH))
+ARGUMENTS = ("r0", "r1", "r2", "r3")
 CLOBBERED = ("r0", "r1", "r2", "r3", "ip", "lr")
 STORES = ("str", "strb", "strh", "strd", "stmia", "stmdb", "push", "vpush", "vstr", "vstmia", "vstmdb")
 LOADS = ("ldr", "ldrb", "ldrh", "ldrsb", "ldrsh", "ldrd", "ldmia", "ldmdb", "pop", "vpop", "vldr", "vldmia", "vldmdb",
@@ -91,10 +93,10 @@ def _pointed(instruction: Instruction, name: str, state: State, memory: Memory) 
     place: str | None = None
     if (value := literal(instruction, memory)) is not None:
         place = memory_at(value)
-    elif name == "movt" and (number := _NUMBER.search(instruction.operands)):
-        place = memory_at(int(number.group(1)) << 16)
+    elif name in ("movt", "mov") and (number := _NUMBER.search(instruction.operands)):
+        place = memory_at(int(number.group(1)) << (16 if name == "movt" else 0) & 0xFFFF_FFFF)
     elif name in KEEPING:
-        sources = registers[1:] or ([] if name == "mov" else registers[:1])
+        sources = registers[1:] or registers[:1]
         place = next((state[r] for r in sources if r in state), SRAM_L if "sp" in registers[1:] else None)
     return None if place == FLASH else place
 
@@ -115,24 +117,38 @@ def after(instruction: Instruction, state: State, memory: Memory) -> State:
     return new
 
 
-def _joined(states: list[State]) -> State:
+def joined(states: list[State]) -> State:
+    """What holds in all of them."""
     first, *others = states
     return {r: place for r, place in first.items() if all(other.get(r) == place for other in others)}
 
 
-def follow(flow: Flow, memory: Memory) -> dict[int, tuple[str, bool]]:
-    """The memory of each access of a function, by the address of the instruction."""
+@dataclass
+class Followed:
+    """The memory of each access of a function and what its arguments point into at each call, by address."""
+
+    accesses: dict[int, tuple[str, bool]] = field(default_factory=dict)
+    calls: dict[int, State] = field(default_factory=dict)
+
+
+def follow(flow: Flow, memory: Memory, arguments: State) -> Followed:
+    """All of a function, of whose arguments is known what they point into."""
     before = flow.before()
     behind: dict[int, State] = {}
-    found: dict[int, tuple[str, bool]] = {}
+    found = Followed()
+    sites = {call.site for block in flow.blocks.values() for call in block.calls}
     work = [flow.entry]
     while work:
         at = work.pop()
         known = [behind[b] for b in before[at] if b in behind]
-        state: State = {} if at == flow.entry or not known else _joined(known)
+        if at == flow.entry:
+            known.append(arguments)
+        state = joined(known)
         for instruction in flow.blocks[at].instructions:
             if (place := access(instruction, state)) is not None:
-                found[instruction.address] = place
+                found.accesses[instruction.address] = place
+            if instruction.address in sites:
+                found.calls[instruction.address] = {r: state[r] for r in ARGUMENTS if r in state}
             state = after(instruction, state, memory)
         if behind.get(at) != state:
             behind[at] = state

@@ -108,12 +108,12 @@ def _fetches(flow: Flow, inside: set[int]) -> dict[int, int]:
     return waited
 
 
-def most(flow: Flow, loops: list[Loop], memory: Memory) -> Waits:
+def most(flow: Flow, loops: list[Loop], memory: Memory, arguments: places.State) -> Waits:
     """What one run of the function waits at most, apart from the functions that it calls."""
     steady = _steady(flow, loops)
     inside = {block for loop in loops if loop.header in steady for block in loop.blocks}
     waits = Waits(_fetches(flow, inside), {h: MOST.fill * len(lines) for h, lines in steady.items()})
-    accessed = places.follow(flow, memory)
+    accessed = places.follow(flow, memory, arguments).accesses
     for at, block in flow.blocks.items():
         for instruction in (i for i in block.instructions if i.address in accessed):
             place, store = accessed[instruction.address]

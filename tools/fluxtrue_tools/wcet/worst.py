@@ -41,6 +41,7 @@ def bounds(
 ) -> Worst:
     """All of it; anything that is not known is an error that names everything missing."""
     found = Worst(image, {}, {})
+    image.enter(data["handlers"].values(), pointers)
     problems: set[str] = set()
     modes = facts.modes(data)
     for mode, known in modes.items():
