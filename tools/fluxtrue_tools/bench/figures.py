@@ -16,6 +16,8 @@ from fluxtrue_tools.bench.build import ROOT
 from fluxtrue_tools.bench.drive import Stage, build_drive, build_task, measure_drive, measure_task
 from fluxtrue_tools.emulate import build as emulation
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.wcet import bound as wcet
+from fluxtrue_tools.wcet import facts, observed, worst
 
 BUDGET = ROOT / "hal" / "s32k144" / "budget.toml"
 MODES = {"paper": 0, "robust": 1}
@@ -55,8 +57,10 @@ def _row(runs: NDArray[np.int64], reactions: NDArray[np.int64]) -> FIGURES:
     return {"runs": len(runs), **spreads}
 
 
-def _mode(parts: emulation.Parts, functions: list[disassembly.Function], mode: int) -> tuple[FIGURES, int]:
-    recording = image.record(parts, functions, mode)
+def _mode(
+    parts: emulation.Parts, functions: list[disassembly.Function], mode: int, watch: image.Watch
+) -> tuple[FIGURES, int]:
+    recording = image.record(parts, functions, mode, watch)
     rows: FIGURES = {}
     for name, vector in INTERRUPTS.items():
         runs, reactions = recording.of(vector), recording.reactions_of(vector)
@@ -114,6 +118,17 @@ def _spreads(stages: list[Stage]) -> dict[str, list[float]]:
     return {s.name: [s.minimum, round(s.average, 1), s.maximum] for s in stages}
 
 
+def _worst(found: worst.Worst, watch: observed.Watch, drives: FIGURES) -> FIGURES:
+    """The bounds of the handlers, none of which the emulated drive exceeds."""
+    wrong = found.mismatches(watch)
+    for drive in drives.values():
+        wrong += worst.exceeded(found.figures[worst.OF_DRIVE], drive["runs"])
+    if wrong:
+        raise FluxtrueError("the bounds of the execution times are wrong:\n  " + "\n  ".join(wrong))
+    entered, loops = observed.entered(found.image, found.reached, watch)
+    return {"bounds": found.figures, "loops": loops, "loops entered": entered}
+
+
 def measure(folder: Path) -> FIGURES:
     """Build what is missing below `folder` and measure all figures; this takes a minute or two."""
     port = budget()
@@ -122,10 +137,13 @@ def measure(folder: Path) -> FIGURES:
     uses, problems = stack_use(functions, port)
     if problems:
         raise FluxtrueError("the image's stack is not bounded:\n  " + "\n  ".join(problems))
+    names = [function.name for function in functions]
+    bounds = worst.bounds(wcet.Image.read(parts.image), facts.load(), pointers(port, names))
+    watch = observed.Watch(bounds.plan())
     drives: FIGURES = {}
     deepest = 0
     for name, mode in MODES.items():
-        drives[name], used = _mode(parts, functions, mode)
+        drives[name], used = _mode(parts, functions, mode, watch)
         deepest = max(deepest, used)
     total = sum(u.frame + u.stack for u in uses)
     if deepest > total:
@@ -135,6 +153,7 @@ def measure(folder: Path) -> FIGURES:
     return {
         "compiler": sizes.compiler(),
         "drives": drives,
+        "worst case": _worst(bounds, watch, drives),
         "utilisation": {name: {column: _utilisation(drive["runs"], port["core_Hz"], column) for column in COLUMNS[1:]}
                         for name, drive in drives.items()},
         "kernels": {

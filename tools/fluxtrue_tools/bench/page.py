@@ -202,6 +202,37 @@ def _waiting(figures: Figures) -> list[str]:
     return table(head, rows)
 
 
+def _worst(figures: Figures) -> list[str]:
+    """What each handler executed at most, and the bounds of both modes of operation."""
+    rows = []
+    bounds = figures["worst case"]["bounds"]
+    for title in bounds["driving"]:
+        row: list[object] = [title]
+        for column in ("instructions", *ESTIMATES):
+            if column == "least":
+                continue
+            seen = [drive["runs"][title][column][2] for drive in figures["drives"].values() if title in drive["runs"]]
+            row += [max(seen, default=""), *(f"{bounds[mode][title][column]}" for mode in ("driving", "anything"))]
+        rows.append(row)
+    head = "interrupt|  instructions executed |  driving |  anything |  cycles executed |  driving |  anything |"
+    return table(head + "  most waiting, executed |  driving |  anything ", rows)
+
+
+LIMITS_US = {"fast ISR": 100, "1 kHz task": 1000}  # a PWM period, a step
+
+
+def _ends_in_time(figures: Figures) -> str:
+    """Whether each handler ends before it is due again, by its own bound in the mode driving."""
+    bounds, core_mhz = figures["worst case"]["bounds"]["driving"], budget()["core_Hz"] / 1e6
+    parts = []
+    for title, limit in LIMITS_US.items():
+        times = {name: bounds[title][column] / core_mhz for column, name in ESTIMATES.items() if column != "least"}
+        shown = " and ".join(f"{time:.0f} µs ({name}: {'within' if time <= limit else '**beyond**'})"
+                             for name, time in times.items())  # fmt: skip
+        parts.append(f"the {title} takes at most {shown} of its {limit} µs")
+    return "; ".join(parts)
+
+
 def _goal(mode: str, column: str, share: dict[str, float]) -> str:
     """The verdicts that stand beside the most waiting."""
     if (mode, column) != ("robust", "most"):
@@ -244,7 +275,7 @@ def page(figures: Figures) -> str:
     tables: dict[str, list[str]] = {
         "kernel_contents": _contents(stages, TITLES, CONTAINS),
         "task_contents": _contents(kernels["task stages"], TASK_TITLES, TASK_CONTAINS),
-        "waiting": _waiting(figures), "assumptions": _assumptions(),
+        "waiting": _waiting(figures), "worst": _worst(figures), "assumptions": _assumptions(),
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
         "task_stages": _task_stages(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
@@ -259,6 +290,8 @@ def page(figures: Figures) -> str:
         small=" ".join(SMALL), tables=figures["control library"]["tables"], period_copy=figures["state"]["period"],
         # An image without the paper's law has none of its parameters.
         parameters=figures["state"]["parameters"] + figures["state"].get("mrai_parameters", 0),
+        loops=figures["worst case"]["loops"], loops_entered=figures["worst case"]["loops entered"],
+        in_time=_ends_in_time(figures),
         stack_sum=_stack_sum(figures), torque_share=share, torque_share_verdict=verdict(share <= SHARE_MAX),
         **{"return": cycles.RETURN},
     )  # fmt: skip
