@@ -98,8 +98,8 @@ void drive_trim(drive_t *drive, q15_t v_dc)
         .v_dc = v_dc,
         .dead_time = (q15_t)(drive->parameters.modulate.dead_time_q16 / 2),
         .period_steps = drive->motor->trim_steps,
-        .identifying = drive->request.trim && task->identify.update_valid &&
-                       task->identify.mismatch_share <= MISMATCH_MAX,
+        .identifying = drive->request.trim && task->identify.kept.update_valid &&
+                       task->identify.kept.mismatch_share <= MISMATCH_MAX,
     };
     const dead_time_trim_t out = dead_time_trim_step(&task->trim, &in);
     if (out.dead_time != in.dead_time) {

@@ -20,12 +20,12 @@ static identification_t robust_identification(const drive_t *drive, const identi
     const identify_state_t *state = &drive->task.identify;
     return (identification_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
-        .r_delta = fx_add_q31(state->r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
+        .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
         .lq_error = identify_value(config, state, IDENTIFY_LQ),
         .torque_variance_q30 = state->torque_variance_q30,
         .psi_d_error = out->psi_delta,
         .torque_estimated = out->torque,
-        .confidence = drive->task.recall.unconfirmed ? (q15_t)0 : state->confidence,
+        .confidence = drive->task.recall.unconfirmed ? (q15_t)0 : state->kept.confidence,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
         .r_quality = variance_reduction(state, IDENTIFY_R),
         .psi_clamped = is_at_limit(state, IDENTIFY_FLUX),

@@ -16,7 +16,7 @@ void recall_begin(drive_t *drive)
 static bool is_telling(const drive_t *drive)
 {
     const identify_state_t *state = &drive->task.identify;
-    return state->steps == LAST_BUT_ONE && state->update_valid &&
+    return state->steps == LAST_BUT_ONE && state->kept.update_valid &&
            fx_abs_q15(drive->task.identification.torque_estimated) >= drive->motor->identify.torque_min;
 }
 

@@ -18,14 +18,7 @@ static inline uint32_t seal_add(uint32_t seal, uint32_t word)
     return word ^ (seal >> 1 | seal << 31);
 }
 
-static inline uint32_t seal_of(const void *data, uint32_t size)
-{
-    const uint32_t *word = data;
-    uint32_t seal = SEAL_START;
-    for (uint32_t k = 0; k < size / sizeof *word; k++) {
-        seal = seal_add(seal, word[k]);
-    }
-    return seal;
-}
+/** The seal of `size` bytes of words. */
+uint32_t seal_of(const void *data, uint32_t size);
 
 #endif

@@ -97,7 +97,7 @@ static bool is_wanted(const memory_t *memory, const drive_t *drive, uint32_t now
 {
     return memory->has_run &&
            (!memory->has_tried || now - memory->tried_at + MEMORY_HOLD_STEPS >= in_steps(drive, MEMORY_INTERVAL_MS)) &&
-           drive->task.identify.mismatch_share <= MISMATCH_MAX;
+           drive->task.identify.kept.mismatch_share <= MISMATCH_MAX;
 }
 
 static bool save_record(memory_t *memory, const drive_t *drive, uint32_t now)

@@ -61,22 +61,22 @@ double identified_iron_scale(const fluxtrue_t *d)
 
 double identified_clamped(const fluxtrue_t *d)
 {
-    return (double)(is_robust(d) && d->drive.task.identify.clamped);
+    return (double)(is_robust(d) && d->drive.task.identify.kept.clamped);
 }
 
 double identified_confidence(const fluxtrue_t *d)
 {
-    return is_robust(d) ? (double)d->drive.task.identify.confidence / 32767.0 : 1.0;
+    return is_robust(d) ? (double)d->drive.task.identify.kept.confidence / 32767.0 : 1.0;
 }
 
 double identified_mismatch_share(const fluxtrue_t *d)
 {
-    return is_robust(d) ? (double)d->drive.task.identify.mismatch_share / 32768.0 : 0.0;
+    return is_robust(d) ? (double)d->drive.task.identify.kept.mismatch_share / 32768.0 : 0.0;
 }
 
 double identified_local_Vs(const fluxtrue_t *d)
 {
-    const dq_q30_t local = d->drive.task.identify.local;
+    const dq_q30_t local = d->drive.task.identify.kept.local;
     const double length = hypot((double)local.d, (double)local.q);
     return is_robust(d) ? length / 1073741824.0 * (double)d->drive.motor->bases.flux_Vs : 0.0;
 }

@@ -10,55 +10,44 @@
 #define ADVANCE_MAX (1 << 30)   /* 1/4 turn per step: above, the second harmonic aliases */
 #define DIFFERENCE_MAX_SHIFT 4  /* 1/16 of the step: a sample one period late deviates by 1/10 of ten periods */
 
-typedef struct {
-    int32_t q31[ANGLE_HARMONICS];
-} harmonics_t;
-
-static __attribute__((noinline)) void cos_sin(int32_t *q31, uint32_t theta)
+/* cos theta, sin theta, cos 2 theta, sin 2 theta. */
+static __attribute__((noinline)) void harmonics(uint32_t theta, int32_t q31[ANGLE_HARMONICS])
 {
-    const fx_pair_t at = fx_unit_vector(theta);
-    q31[0] = (int32_t)(at << 16);
-    q31[1] = (int32_t)(at & 0xFFFF0000U);
-}
-
-static harmonics_t harmonics(uint32_t theta)
-{
-    harmonics_t at;
-    cos_sin(&at.q31[0], theta);
-    cos_sin(&at.q31[2], 2U * theta);
-    return at;
+    for (unsigned n = 0; n < ANGLE_HARMONICS; n += 2U) {
+        const fx_pair_t at = fx_unit_vector(theta);
+        q31[n] = (int32_t)(at << 16);
+        q31[n + 1U] = (int32_t)(at >> 16 << 16);
+        theta *= 2U;
+    }
 }
 
 /* c += d harmonic/64: the high word of Q32 * Q31 is half of the product in Q32. */
 static void update_coefficients(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, int32_t d)
 {
-    const harmonics_t at = harmonics(state->last);
+    int32_t at_q31[ANGLE_HARMONICS];
+    harmonics(state->last, at_q31);
     for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
-        const int32_t updated = state->c[n] + ((fx_mulhi(d, at.q31[n]) + 16) >> 5);
+        const int32_t updated = state->c[n] + ((fx_mulhi(d, at_q31[n]) + 16) >> 5);
         state->c[n] = fx_clamp_q31(updated, -config->max, config->max);
     }
 }
 
 static int32_t correction(const angle_harmonics_state_t *state, uint32_t part)
 {
-    const harmonics_t at = harmonics((2U * part + 1U) << (ANGLE_HARMONICS_SHIFT - 1));
+    int32_t at_q31[ANGLE_HARMONICS];
+    harmonics((2U * part + 1U) << (ANGLE_HARMONICS_SHIFT - 1), at_q31);
     int32_t half = 0;
     for (unsigned n = 0; n < ANGLE_HARMONICS; n++) {
-        half += fx_mulhi(state->c[n], at.q31[n]);
+        half += fx_mulhi(state->c[n], at_q31[n]);
     }
     return 2 * half;
 }
 
 /* Of the coefficients, complemented, so that a state of zeros is sealed (DI-3). */
-static uint32_t seal_complement(const int32_t c[ANGLE_HARMONICS])
+static uint32_t seal_complement(const angle_harmonics_state_t *state)
 {
-    uint32_t seal = seal_add(SEAL_START, (uint32_t)c[0]);
-    seal = seal_add(seal, (uint32_t)c[1]);
-    seal = seal_add(seal, (uint32_t)c[2]);
-    return ~seal_add(seal, (uint32_t)c[3]);
+    return ~seal_of(state->c, sizeof state->c);
 }
-
-_Static_assert(ANGLE_HARMONICS == 4, "all of them are sealed");
 
 void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonics_state_t *state, uint32_t theta,
                           volatile int32_t table[ANGLE_HARMONICS_PARTS])
@@ -66,10 +55,12 @@ void angle_harmonics_step(const angle_harmonics_config_t *config, angle_harmonic
     const int32_t advance = (int32_t)(theta - state->last);
     const int32_t d = (int32_t)(theta - 2U * state->last + state->before);
     const int32_t speed = fx_abs_q31(advance);
-    state->damaged |= state->seal_complement != seal_complement(state->c);
+    if (state->seal_complement != seal_complement(state)) {
+        state->damaged = true;
+    }
     if (speed >= ADVANCE_MIN && speed <= ADVANCE_MAX && fx_abs_q31(d) <= speed >> DIFFERENCE_MAX_SHIFT) {
         update_coefficients(config, state, d);
-        state->seal_complement = seal_complement(state->c);
+        state->seal_complement = seal_complement(state);
     }
     state->before = state->last;
     state->last = theta;

@@ -16,7 +16,7 @@ typedef struct {
 
 void identify_reset(const identify_config_t *config, identify_state_t *state)
 {
-    *state = (identify_state_t){.r_prior = config->r0, .torque_variance_q30 = Q31_MAX};
+    *state = (identify_state_t){.kept.r_prior = config->r0, .torque_variance_q30 = Q31_MAX};
     kalman_reset(&state->kalman);
     identify_seal(state);
 }
@@ -29,9 +29,9 @@ q31_t identify_value(const identify_config_t *config, const identify_state_t *st
 /* R = r0 (1 + alpha (theta - 20 C)); without a sensor the last one holds (ID-13). */
 static void resistance_prior(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
-    state->r_known = temperature_is_known(in->winding_dC);
-    if (state->r_known) {
-        state->r_prior = fx_sat_q31(config->r0 + (int64_t)config->r_per_dC * (in->winding_dC - REFERENCE_dC));
+    state->kept.r_known = temperature_is_known(in->winding_dC);
+    if (state->kept.r_known) {
+        state->kept.r_prior = fx_sat_q31(config->r0 + (int64_t)config->r_per_dC * (in->winding_dC - REFERENCE_dC));
     }
 }
 
@@ -58,7 +58,7 @@ static void average_step(const identify_config_t *config, identify_state_t *stat
                          const identify_model_t *model, dq_q30_t e)
 {
     const bool step_valid = in->point->valid && model->current && in->enabled;
-    state->update_valid = (state->update_valid || state->steps == 0U) && step_valid;
+    state->kept.update_valid = (state->kept.update_valid || state->steps == 0U) && step_valid;
     average_row(&state->mean.d, &model->d);
     average_row(&state->mean.q, &model->q);
     state->mean.e.d = fx_mulhi_add(state->mean.e.d, e.d, PER_STEP);
@@ -78,10 +78,10 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
     state->contradicted_updates = d.innovation_gate_exceeded
                                       ? (uint8_t)fx_min_s32(state->contradicted_updates + 1, CONTRADICTED_MAX)
                                       : 0U;
-    state->clamped = d.clamped || q.clamped;
-    const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->clamped) ? Q15_MAX : 0;
-    const q15_t error = fx_sat_q15(target - state->mismatch_share);
-    state->mismatch_share = fx_add_q15(state->mismatch_share, fx_mul_q15(config->mismatch_rate, error));
+    state->kept.clamped = d.clamped || q.clamped;
+    const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->kept.clamped) ? Q15_MAX : 0;
+    const q15_t error = fx_sat_q15(target - state->kept.mismatch_share);
+    state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
 }
 
 /* The torque's variance is compared with two levels: well below the variance of the tables alone, or small against the
@@ -100,25 +100,25 @@ static void update_confidence(const identify_config_t *config, identify_state_t 
     const int64_t none = (int64_t)fx_mul_q30(scale, config->confidence_none);
     const bool good = variance < (prior >> 2) + (prior >> 3) || variance < full * full;
     const bool bad = variance > prior - (prior >> 2) && variance > none * none;
-    if (bad || state->mismatch_share > MISMATCH_MAX) {
-        state->torque_certain = false;
+    if (bad || state->kept.mismatch_share > MISMATCH_MAX) {
+        state->kept.torque_certain = false;
     } else if (good) {
-        state->torque_certain = true;
+        state->kept.torque_certain = true;
     }
-    const int32_t step = state->torque_certain ? config->confidence_rate : -config->confidence_rate;
-    state->confidence = (q15_t)fx_clamp_q31(state->confidence + step, 0, Q15_MAX);
+    const int32_t step = state->kept.torque_certain ? config->confidence_rate : -config->confidence_rate;
+    state->kept.confidence = (q15_t)fx_clamp_q31(state->kept.confidence + step, 0, Q15_MAX);
 }
 
 static void kalman_step(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
                         q15_t torque)
 {
     identify_check_parameters(state);
-    if (state->update_valid) {
+    if (state->kept.update_valid) {
         update_parameters(config, state);
     } else {
         state->contradicted_updates = 0;
     }
-    kalman_predict(config, &state->kalman, state->r_known);
+    kalman_predict(config, &state->kalman, state->kept.r_known);
     identify_seal_parameters(state);
     update_confidence(config, state, model, torque);
     state->mean = (identify_mean_t){.noise_q30 = 0};
@@ -136,14 +136,14 @@ static void update_local_flux_error(const identify_config_t *config, identify_st
         const q16_t gain = in->point->omega / fx_max_s32(square >> 15, 1); /* Q31/Q15 */
         target = (dq_q30_t){fx_mul_gain_q31(gain, e.q), fx_neg_q31(fx_mul_gain_q31(gain, e.d))};
     }
-    state->local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->local.d));
-    state->local.q += fx_mul_q31(config->local_rate, fx_sub_q31(target.q, state->local.q));
+    state->kept.local.d += fx_mul_q31(config->local_rate, fx_sub_q31(target.d, state->kept.local.d));
+    state->kept.local.q += fx_mul_q31(config->local_rate, fx_sub_q31(target.q, state->kept.local.q));
 }
 
 /* The tables' flux and magnetising current, corrected by all parameters and by the local flux error (ID-15). */
 static corrected_t correct(const identify_config_t *config, const identify_state_t *state, const identify_model_t *m)
 {
-    dq_q30_t shift = state->local;
+    dq_q30_t shift = state->kept.local;
     int32_t value[IDENTIFY_STATES];
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         value[j] = identify_value(config, state, (identify_index_t)j) >> 1;
@@ -164,7 +164,7 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     identify_check_kept(state);
     resistance_prior(config, state, in);
     identify_model_t model;
-    identify_model(config, in->point, in->tables, state->r_prior, &model);
+    identify_model(config, in->point, in->tables, state->kept.r_prior, &model);
     const dq_q30_t e = {fx_sub_q31(model.y.d, kalman_output(&state->kalman, &model.d)),
                         fx_sub_q31(model.y.q, kalman_output(&state->kalman, &model.q))};
     update_local_flux_error(config, state, in, e);

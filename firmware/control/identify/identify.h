@@ -27,21 +27,26 @@ typedef struct {
     int32_t noise_q30; /* standard deviation of the measurement noise */
 } identify_mean_t;
 
+/** What is kept from step to step. Without bytes between the fields, which would have no value that a seal covers. */
 typedef struct {
-    identify_mean_t mean;
-    uint8_t steps;
-    bool update_valid;            /* every step of this update so far was valid */
-    uint8_t contradicted_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
-    bool clamped;                 /* a state reached its limit in the last update */
-    dq_q30_t local;               /* flux error of this operating point */
+    dq_q30_t local; /* flux error of this operating point */
     q31_t r_prior;
-    bool r_known;                /* the winding temperature is measured */
-    q15_t mismatch_share;        /* of recent updates: those beyond the innovation gate or with a clamped state */
-    int32_t torque_variance_q30; /* at the last update */
+    q15_t mismatch_share; /* of recent updates: those beyond the innovation gate or with a clamped state */
     q15_t confidence;
     bool torque_certain; /* the confidence rises, else it falls */
-    bool damaged;        /* a seal did not match: the memory has changed what only this stage writes */
-    uint32_t seal;       /* of what is kept from step to step */
+    bool update_valid;   /* every step of this update so far was valid */
+    bool clamped;        /* a state reached its limit in the last update */
+    bool r_known;        /* the winding temperature is measured */
+} identify_kept_t;
+
+typedef struct {
+    uint8_t steps;
+    uint8_t contradicted_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
+    bool damaged;                 /* a seal did not match: the memory has changed what only this stage writes */
+    identify_kept_t kept;
+    uint32_t seal; /* of kept */
+    int32_t torque_variance_q30; /* at the last update */
+    identify_mean_t mean;
     uint32_t kalman_seal;
     kalman_t kalman; /* last, because it is large */
 } identify_state_t;

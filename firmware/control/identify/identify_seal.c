@@ -2,40 +2,32 @@
 #include "control/identify/identify.h"
 #include "signal/seal.h"
 
-/* Field by field, as the bytes between fields have no value (DI-3). */
-static uint32_t kept_seal(const identify_state_t *state)
+/* size in bytes */
+static void check(identify_state_t *state, const void *data, uint32_t size, uint32_t seal)
 {
-    uint32_t seal = seal_add(SEAL_START, (uint32_t)state->local.d);
-    seal = seal_add(seal, (uint32_t)state->local.q);
-    seal = seal_add(seal, (uint32_t)state->r_prior);
-    seal = seal_add(seal, (uint32_t)state->mismatch_share);
-    seal = seal_add(seal, (uint32_t)state->confidence);
-    return seal_add(seal, state->torque_certain);
-}
-
-static uint32_t parameters_seal(const identify_state_t *state)
-{
-    return seal_of(&state->kalman, sizeof state->kalman);
+    if (seal_of(data, size) != seal) {
+        state->damaged = true;
+    }
 }
 
 void identify_check_kept(identify_state_t *state)
 {
-    state->damaged |= state->seal != kept_seal(state);
+    check(state, &state->kept, sizeof state->kept, state->seal);
 }
 
 void identify_check_parameters(identify_state_t *state)
 {
-    state->damaged |= state->kalman_seal != parameters_seal(state);
+    check(state, &state->kalman, sizeof state->kalman, state->kalman_seal);
 }
 
 void identify_seal_kept(identify_state_t *state)
 {
-    state->seal = kept_seal(state);
+    state->seal = seal_of(&state->kept, sizeof state->kept);
 }
 
 void identify_seal_parameters(identify_state_t *state)
 {
-    state->kalman_seal = parameters_seal(state);
+    state->kalman_seal = seal_of(&state->kalman, sizeof state->kalman);
 }
 
 void identify_seal(identify_state_t *state)

@@ -50,8 +50,8 @@ bool identify_record_restore(identify_state_t *state, const identify_record_t *r
         const int32_t variance = fx_add_q31(record->variance_q30[j], IDENTIFY_ONE_Q30 >> added_variance_shift[j]);
         state->kalman.p_q30[p] = fx_min_s32(variance, IDENTIFY_ONE_Q30);
     }
-    state->torque_certain = is_torque_certain(&state->kalman);
-    state->confidence = state->torque_certain ? Q15_MAX : 0;
+    state->kept.torque_certain = is_torque_certain(&state->kalman);
+    state->kept.confidence = state->kept.torque_certain ? Q15_MAX : 0;
     identify_seal(state);
     return true;
 }

@@ -111,8 +111,8 @@ static void assert_untouched(void)
     for (int j = 0; j < IDENTIFY_STATES; j++) {
         TEST_ASSERT_EQUAL_INT32(0, state.kalman.x_q27[j]);
     }
-    TEST_ASSERT_EQUAL_INT32(0, state.local.d);
-    TEST_ASSERT_EQUAL_INT32(0, state.local.q);
+    TEST_ASSERT_EQUAL_INT32(0, state.kept.local.d);
+    TEST_ASSERT_EQUAL_INT32(0, state.kept.local.q);
 }
 
 void test_magnet_flux_inductance_and_drop_are_identified_separately(void)
@@ -191,12 +191,12 @@ void test_the_winding_temperature_sets_the_prior_resistance_and_a_lost_sensor_ke
 {
     winding_dC = 1200;
     run((dq_q15_t){0, 0}, 0.0, nominal, 10);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
-    TEST_ASSERT_TRUE(state.r_known);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.kept.r_prior / (double)c.r0);
+    TEST_ASSERT_TRUE(state.kept.r_known);
     winding_dC = TEMPERATURE_UNKNOWN;
     run((dq_q15_t){0, 0}, 0.0, nominal, 10);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.r_prior / (double)c.r0);
-    TEST_ASSERT_FALSE(state.r_known);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1.39, (double)state.kept.r_prior / (double)c.r0);
+    TEST_ASSERT_FALSE(state.kept.r_known);
 }
 
 /* Without identification T^ is the torque of the tables at the magnetising current. */
@@ -218,14 +218,14 @@ void test_with_nothing_identified_the_torque_is_that_of_the_tables_minus_the_iro
 void test_the_confidence_starts_at_zero_and_rises_within_half_a_second_after_identification(void)
 {
     run((dq_q15_t){-4000, 8000}, 0.01, nominal, 1000);
-    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
     drive(nominal, 1);
-    TEST_ASSERT_TRUE(state.torque_certain);
-    const q15_t before = state.confidence;
+    TEST_ASSERT_TRUE(state.kept.torque_certain);
+    const q15_t before = state.kept.confidence;
     run((dq_q15_t){-4000, 8000}, 0.5, nominal, 10);
-    TEST_ASSERT_INT_WITHIN(655, before, state.confidence); /* 2 % per update: half a second for the full range */
+    TEST_ASSERT_INT_WITHIN(655, before, state.kept.confidence); /* 2 % per update: half a second for the full range */
     drive(nominal, 1);
-    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
 }
 
 /* Variance of the torque at this operating point relative to that with the tables alone, from the twin's covariance. */
@@ -252,8 +252,8 @@ void test_without_torque_the_confidence_stays_zero_at_any_speed(void)
     for (int n = 0; n < 4; n++) {
         run((dq_q15_t){0, 0}, speed[n], nominal, 2000);
         run((dq_q15_t){-100, 300}, speed[n], nominal, 2000); /* too little to identify anything */
-        TEST_ASSERT_FALSE(state.torque_certain);
-        TEST_ASSERT_EQUAL_INT(0, state.confidence);
+        TEST_ASSERT_FALSE(state.kept.torque_certain);
+        TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
     }
 }
 
@@ -268,7 +268,7 @@ void test_the_confidence_rises_below_three_eighths_of_the_prior_variance_and_not
         twin_identify_reset(&f.si, &twin);
         run(i, omega, nominal, 20000);
         const double variance = relative_variance(i, omega);
-        TEST_ASSERT_EQUAL_INT((variance < 0.375) ? Q15_MAX : 0, state.confidence);
+        TEST_ASSERT_EQUAL_INT((variance < 0.375) ? Q15_MAX : 0, state.kept.confidence);
         below = below || (variance < 0.375 && variance > 0.3);
         above = above || (variance > 0.375 && variance < 0.45);
     }
@@ -285,14 +285,14 @@ void test_the_confidence_falls_above_three_quarters_of_the_prior_variance_and_no
     double variance = relative_variance(i, slow);
     TEST_ASSERT_TRUE(variance < 0.375);
     for (int n = 0; n < 1000 && variance < 0.745; n++) {
-        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
         run(i, slow, nominal, 100);
         variance = relative_variance(i, slow);
     }
     TEST_ASSERT_TRUE(variance < 0.75);
     run(i, slow, nominal, 3000);
     TEST_ASSERT_TRUE(relative_variance(i, slow) < 0.78);
-    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
 }
 
 /* The voltage of a resolver that is 27 degrees off: half of the rotational voltage, perpendicular to it. No parameter
@@ -300,7 +300,7 @@ void test_the_confidence_falls_above_three_quarters_of_the_prior_variance_and_no
 void test_a_persistent_mismatch_removes_the_confidence(void)
 {
     drive(nominal, 3);
-    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
     const dq_q15_t i = {-4000, 8000};
     const flux_point_t flux = flux_table_step(&f.flux_table, i);
     const dq_q15_t extra_u = {(int32_t)(0.5 * 0.5 * flux.psi_d), (int32_t)(0.5 * 0.5 * flux.psi_q)};
@@ -311,7 +311,7 @@ void test_a_persistent_mismatch_removes_the_confidence(void)
     for (int n = 0; n < 1500; n++) {
         (void)identify_step(&c, &state, &in);
     }
-    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
 }
 
 /* 0.15 of the base voltage in one axis alone, more than six times the measurement noise of 0.008 + 0.5 * 0.03: the
@@ -322,7 +322,7 @@ void test_a_mismatch_in_either_axis_alone_removes_the_confidence(void)
     for (int axis = 0; axis < 2; axis++) {
         setUp();
         drive(nominal, 3);
-        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+        TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
         const dq_q15_t extra_u = {(axis == 0) ? 5000 : 0, (axis == 1) ? 5000 : 0};
         const window_pair_t pair = steady_window(&f, i, 0.5, extra_u);
         const identify_point_t point = identify_point(&c, &pair.fixed, (q31_t)(0.5 * 2147483647.0));
@@ -333,8 +333,8 @@ void test_a_mismatch_in_either_axis_alone_removes_the_confidence(void)
         }
         /* Only the gate of the d axis counts: a voltage along q may be caused by a changed magnet. */
         TEST_ASSERT_EQUAL_UINT8((axis == 0) ? 25 : 0, state.contradicted_updates);
-        TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
-        TEST_ASSERT_FALSE(state.torque_certain);
+        TEST_ASSERT_GREATER_THAN_INT(16384, state.kept.mismatch_share);
+        TEST_ASSERT_FALSE(state.kept.torque_certain);
     }
 }
 
@@ -354,9 +354,9 @@ void test_a_parameter_at_its_limit_removes_the_confidence(void)
 {
     c.noise_voltage_q30 = (int32_t)(0.2 * 1073741824.0);
     run((dq_q15_t){-4000, 8000}, 0.5, (truth_t){-0.42, 1.0, 0.0}, 20000);
-    TEST_ASSERT_TRUE(state.clamped);
-    TEST_ASSERT_GREATER_THAN_INT(16384, state.mismatch_share);
-    TEST_ASSERT_FALSE(state.torque_certain);
+    TEST_ASSERT_TRUE(state.kept.clamped);
+    TEST_ASSERT_GREATER_THAN_INT(16384, state.kept.mismatch_share);
+    TEST_ASSERT_FALSE(state.kept.torque_certain);
 }
 
 /* With nothing identified the standard deviation of the torque is about a tenth of it. This is below a level of one
@@ -365,13 +365,13 @@ void test_the_confidence_also_rises_if_the_uncertainty_is_small_relative_to_the_
 {
     enabled = false;
     run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1000);
-    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
     c.confidence_full = Q15(0.5);
     c.confidence_none = Q15(0.6);
     run((dq_q15_t){0, 0}, 0.5, nominal, 1000);
-    TEST_ASSERT_EQUAL_INT(0, state.confidence);
+    TEST_ASSERT_EQUAL_INT(0, state.kept.confidence);
     run((dq_q15_t){-4000, 8000}, 0.5, nominal, 1000);
-    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.confidence);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, state.kept.confidence);
 }
 
 /* At the corner speed the local flux error is half of a flux error that no parameter describes, far above it nearly
@@ -386,7 +386,7 @@ void test_the_weight_of_the_local_flux_error_rises_with_speed(void)
         const double w = factor[n] * corner;
         run((dq_q15_t){-4000, 8000}, w, (truth_t){-0.02, 1.0, 0.0}, 200);
         const double share = w * w / (w * w + corner * corner);
-        TEST_ASSERT_DOUBLE_WITHIN(5e-4, -0.02 * share * settled, from_q31(state.local.d) * 2.0);
+        TEST_ASSERT_DOUBLE_WITHIN(5e-4, -0.02 * share * settled, from_q31(state.kept.local.d) * 2.0);
     }
 }
 
@@ -412,7 +412,7 @@ void test_the_identification_agrees_with_the_twin_for_a_minute(void)
         }
         worst_note(&p, state.kalman.p_q30[0] / (double)IDENTIFY_ONE_Q30 - twin.kalman.p[0][0], "second %d", n);
         worst_note(&t, from_q15(out.torque) - twin.torque / f.t, "second %d", n);
-        TEST_ASSERT_EQUAL(twin.torque_certain, state.torque_certain);
+        TEST_ASSERT_EQUAL(twin.torque_certain, state.kept.torque_certain);
     }
     /* The residual has an error of 1.5e-4 (q15 of the tables' flux), which changes a state by at most 20 times that. */
     ASSERT_WORST(x, 0.02);
@@ -472,7 +472,7 @@ void test_the_parameters_survive_a_power_cycle_with_a_larger_variance(void)
     TEST_ASSERT_EQUAL_INT32(record.variance_q30[IDENTIFY_FLUX] + IDENTIFY_ONE_Q30 / 4,
                             again.variance_q30[IDENTIFY_FLUX]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, magnet, from_q31(identify_value(&c, &restored, IDENTIFY_FLUX)));
-    TEST_ASSERT_EQUAL_INT(Q15_MAX, restored.confidence);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, restored.kept.confidence);
 }
 
 /* A restored magnet flux gets a quarter of its prior variance on top: an eighth is just too much for the level of three
@@ -484,7 +484,7 @@ void test_a_record_with_a_large_variance_of_magnet_or_q_axis_starts_without_conf
         record.variance_q30[IDENTIFY_FLUX] = IDENTIFY_ONE_Q30 / 8 - (n & 1);
         record.variance_q30[IDENTIFY_LQ] = (n & 2) ? IDENTIFY_ONE_Q30 / 3 : IDENTIFY_ONE_Q30 / 2;
         TEST_ASSERT_TRUE(identify_record_restore(&state, &record));
-        TEST_ASSERT_EQUAL_INT((n == 3) ? Q15_MAX : 0, state.confidence);
+        TEST_ASSERT_EQUAL_INT((n == 3) ? Q15_MAX : 0, state.kept.confidence);
     }
 }
 

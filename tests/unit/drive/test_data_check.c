@@ -146,12 +146,12 @@ void test_damaged_parameters_of_the_identification_are_found_before_they_are_upd
 void test_what_the_task_keeps_from_step_to_step_is_found_in_the_next(void)
 {
     static const size_t words[] = {
-        offsetof(drive_t, task.identify.local.d),
-        offsetof(drive_t, task.identify.local.q),
-        offsetof(drive_t, task.identify.r_prior),
-        offsetof(drive_t, task.identify.mismatch_share),
-        offsetof(drive_t, task.identify.confidence),
-        offsetof(drive_t, task.identify.torque_certain),
+        offsetof(drive_t, task.identify.kept.local.d),
+        offsetof(drive_t, task.identify.kept.local.q),
+        offsetof(drive_t, task.identify.kept.r_prior),
+        offsetof(drive_t, task.identify.kept.mismatch_share),
+        offsetof(drive_t, task.identify.kept.confidence),
+        offsetof(drive_t, task.identify.kept.torque_certain),
         offsetof(drive_t, task.identify.seal),
         offsetof(drive_t, task.identify.damaged),
         offsetof(drive_t, task.angle_harmonics.c[0]),

@@ -116,7 +116,7 @@ void test_the_winding_temperature_reaches_the_resistance_and_a_broken_sensor_doe
     TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.identification.r_delta);
     seam.winding_dC = TEMPERATURE_UNKNOWN;
     milliseconds(1);
-    TEST_ASSERT_FALSE(drive.task.identify.r_known);
+    TEST_ASSERT_FALSE(drive.task.identify.kept.r_known);
     TEST_ASSERT_INT32_WITHIN(3000, (int32_t)(0.007074 / 1.35 * 2147483648.0), drive.task.identification.r_delta);
 }
 

@@ -253,7 +253,7 @@ void test_a_memory_that_cannot_be_written_now_is_tried_again(void)
 void test_parameters_with_a_large_mismatch_are_not_kept(void)
 {
     identify();
-    drive.task.identify.mismatch_share = Q15(0.3);
+    drive.task.identify.kept.mismatch_share = Q15(0.3);
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     TEST_ASSERT_EQUAL_INT(0, erases);
 }

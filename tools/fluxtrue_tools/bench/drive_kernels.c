@@ -174,7 +174,7 @@ CALLED const int32_t *drive_outputs(void)
         drive.task.identification.torque_estimated,
         drive.task.identification.psi_delta,
         drive.task.identify.kalman.p_q30[0],
-        drive.task.identify.local.q,
+        drive.task.identify.kept.local.q,
     };
     for (int k = 0; k < OUTPUTS; k++) {
         outputs[k] = all[k];

@@ -154,7 +154,7 @@ CALLED void task_torque_loop(void)
     const torque_loop_in_t in = {
         .torque_commanded = d->task.torque_commanded,
         .torque_estimated = d->task.identification.torque_estimated,
-        .confidence = d->task.identify.confidence,
+        .confidence = d->task.identify.kept.confidence,
         .enabled = d->request.torque_loop,
         .limited = d->task.reference.limited || snapshot.sample.voltage_limited,
     };
