@@ -44,7 +44,7 @@ static int32_t next_sign(const pulses_axis_t *axis, int32_t low, int32_t high)
 /* The first half wave ends at a share of the bound. */
 static int32_t bound_q(const pulses_config_t *config, const pulses_state_t *state, int32_t bound)
 {
-    return (state->reversals == 0U) ? fx_mul_q15(config->first, (q15_t)bound) : bound;
+    return (state->reversals == 0U) ? fx_mul_q15(config->first, bound) : bound;
 }
 
 /* The last half wave ends where the way back to zero, as long as that to here, brings the sum to zero. */

@@ -108,7 +108,7 @@ static q15_t psi_q_delta(const drive_t *drive)
     if (drive->task.recall.unconfirmed) {
         return 0;
     }
-    return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15((q15_t)drive->task.psi_ref.q));
+    return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15(drive->task.psi_ref.q));
 }
 
 static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
@@ -120,7 +120,7 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
         .torque_corrected = task->torque_corrected,
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .omega = fx_q15_from_q31(snapshot->sample.point.omega),
-        .i_magnitude = fx_magnitude((q15_t)task->reference.i_ref.d, (q15_t)task->reference.i_ref.q),
+        .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
         .v_trim = trim.v_trim,
         .shift = trim.shift,
         .psi_delta = snapshot->psi_d_error,

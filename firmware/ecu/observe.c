@@ -78,7 +78,7 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
  * (safety/gate_fault.h). */
 static bool is_slow(const drive_t *drive)
 {
-    const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, (q15_t)drive->motor->monitor.v_min);
+    const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, drive->motor->monitor.v_min);
     const q15_t line_emf = drive->task.safe_state.line_emf;
     return !drive->task.gate_fault.holds_supply && line_emf < least &&
            si_from_q15(line_emf, drive->motor->bases.voltage_V) < TOUCH_SAFE_V;

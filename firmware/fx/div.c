@@ -2,13 +2,13 @@
 #include "fx/div.h"
 
 /* 2^30 and half a denominator fit 32 bits. */
-q15_t fx_div_q15(q15_t num, q15_t den)
+q15_t fx_div_q15(int32_t num, int32_t den)
 {
     if (den == 0) {
-        return (q15_t)((num == 0) ? 0 : ((num >> 15) ^ INT16_MAX));
+        return (q15_t)((num == 0) ? 0 : ((num >> 31) ^ INT16_MAX));
     }
-    const int32_t half = ((den < 0) ? -(int32_t)den : den) >> 1;
-    return fx_sat_q15((((int32_t)num * 32768) + ((num < 0) ? -half : half)) / den);
+    const int32_t half = ((den < 0) ? -den : den) >> 1;
+    return fx_sat_q15((num * 32768 + ((num < 0) ? -half : half)) / den);
 }
 
 q31_t fx_div_q31(int32_t num, int32_t den)

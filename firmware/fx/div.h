@@ -21,8 +21,8 @@ static inline int32_t fx_quotient(uint32_t num, uint32_t den)
     return fx_arch_udiv(num, den);
 }
 
-/* (num * 2^15) / den. */
-q15_t fx_div_q15(q15_t num, q15_t den);
+/* (num * 2^15) / den of two q15 numbers, which may come in words. */
+q15_t fx_div_q15(int32_t num, int32_t den);
 
 /* (num * 2^31) / den, rounded, by two 16-bit digits. */
 q31_t fx_div_q31(int32_t num, int32_t den);

@@ -9,7 +9,8 @@
  * Range    every argument of every function, unless its comment says otherwise
  * Rounding half up (towards plus infinity); saturation to the nearest end of the format
  * Errors   none: saturation is the defined result, detect it by comparison where it matters
- * Context  any; 1 to 4 instructions each, no loop, no division */
+ * Context  any; 1 to 4 instructions each, no loop, no division. What is not inline is used by no settled period, and
+ *          one copy takes less memory than many */
 
 #include <stdint.h>
 
@@ -64,13 +65,7 @@ __attribute__((always_inline)) static inline int32_t fx_usat_bits(int32_t x, uns
     return fx_arch_usat(x, bits);
 }
 
-static inline q31_t fx_sat_q31(int64_t x)
-{
-    const int32_t high = (int32_t)(x >> 32);
-    const int32_t low = (int32_t)(uint32_t)((uint64_t)x & 0xFFFFFFFFU);
-    /* In range exactly when the upper word is the sign extension of the lower. */
-    return (high == (low >> 31)) ? low : ((high >> 31) ^ INT32_MAX);
-}
+q31_t fx_sat_q31(int64_t x);
 
 static inline q15_t fx_add_q15(q15_t a, q15_t b)
 {
@@ -87,10 +82,8 @@ static inline q15_t fx_neg_q15(q15_t a)
     return fx_sat_q15(-(int32_t)a);
 }
 
-static inline q15_t fx_abs_q15(q15_t a)
-{
-    return fx_sat_q15((a < 0) ? -(int32_t)a : a);
-}
+/* Of a q15 number, which may come in a word: no sign extension is needed. */
+q15_t fx_abs_q15(int32_t a);
 
 /* Modulo 2^32, without undefined behaviour. */
 static inline int32_t fx_add_wrap(int32_t a, int32_t b)
@@ -124,11 +117,7 @@ static inline q31_t fx_neg_q31(q31_t a)
     return fx_arch_qsub(0, a);
 }
 
-static inline q31_t fx_abs_q31(q31_t a)
-{
-    const int32_t sign = a >> 31;
-    return fx_arch_qsub(a ^ sign, sign); /* ones' complement plus one, saturated */
-}
+q31_t fx_abs_q31(q31_t a);
 
 /* Narrows a Q30 accumulator. The rounding half is added with saturation, so that every int32_t is allowed: the caller
  * has to show only that its sum stays in -2 ... 2 per unit. */
@@ -137,10 +126,7 @@ static inline q15_t fx_round_q15(int32_t q30)
     return fx_sat_q15(fx_arch_qadd(q30, 0x4000) >> 15);
 }
 
-static inline q15_t fx_q15_from_q31(q31_t x)
-{
-    return (q15_t)(fx_arch_qadd(x, 0x8000) >> 16);
-}
+q15_t fx_q15_from_q31(q31_t x);
 
 static inline q31_t fx_q31_from_q15(q15_t x)
 {
@@ -168,8 +154,7 @@ static inline q15_t fx_clamp_q15(q15_t x, q15_t lo, q15_t hi)
     return (q15_t)fx_clamp_q31(x, lo, hi);
 }
 
-/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). Not inlined, because no interrupt uses it
- * and one copy is smaller. */
+/* x * 2^n, saturated; every n is defined (beyond 31 only 0 stays in range). */
 q31_t fx_shl_q31(q31_t x, unsigned n);
 
 /* x / 2^n, half up. The highest bit that is shifted out is added after the shift; adding a half before it could

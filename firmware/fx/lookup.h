@@ -12,7 +12,7 @@
  * Rounding half up, 1/2 LSB, plus 2^-15 of the cell's twist |z00 - z01 - z10 + z11|; on the
  *          last grid point 2^-14 of the step across the cell before it
  * Errors   outside the grid: *clamped is true (.outside not zero, fx_mesh_outside()), else false
- * Context  any; fx_cell about 49 instructions, each fx_cell_interp 7, all branch-free */
+ * Context  any; fx_cell about 66 instructions, each fx_cell_interp 7, all branch-free */
 
 #include <stdbool.h>
 #include <string.h>
@@ -60,28 +60,17 @@ typedef struct {
     uint32_t outside;  /* zero inside the grid */
 } fx_axis_t;
 
-static inline bool fx_axis_valid(unsigned shift, uint32_t n)
-{
-    return (n >= 2U) && (n <= 255U) && (shift <= 14U) && (((n - 1U) << shift) < 0x20000U);
-}
+bool fx_axis_valid(unsigned shift, uint32_t n);
 
-/* From a distance of 0 to 2^17 - 1 to the first grid point. */
-static inline fx_axis_t fx_axis_right(uint32_t offset, unsigned shift, uint32_t n)
-{
-    const uint32_t cells = (offset << 14) >> shift;
-    /* One count short of the last point, so that a cell always has a right-hand neighbour. */
-    const uint32_t last = (n << 14) - 0x4001U;
-    const uint32_t position = (cells > last) ? last : cells;
-    /* The last point itself, one count above, is inside. */
-    return (fx_axis_t){position, (cells - position) >> 1};
-}
+/* Position of a distance to the first grid point, limited to the grid. Not inlined, like fx_axis_valid(): no settled
+ * period uses it. */
+uint32_t fx_axis_position(int32_t offset, unsigned shift, uint32_t n);
 
 static inline fx_axis_t fx_axis(int32_t x, int32_t x0, unsigned shift, uint32_t n)
 {
     const int32_t offset = fx_sub_q31(x, x0);
-    fx_axis_t axis = fx_axis_right(fx_arch_usat17(offset), shift, n);
-    axis.outside |= (uint32_t)offset >> 31;
-    return axis;
+    /* A negative offset is a very large number. The last point itself is inside. */
+    return (fx_axis_t){fx_axis_position(offset, shift, n), (uint32_t)offset > (n - 1U) << shift};
 }
 
 /* (1 - w, w) in Q14, both halves of the word at once; no carry passes between them. */
@@ -130,9 +119,9 @@ static inline fx_cell_t fx_cell(const fx_grid_t *grid, int32_t x, int32_t y)
 
 static inline bool fx_mesh_valid(const fx_mesh_t *mesh)
 {
-    return mesh->up <= 14U && fx_axis_valid(14U - mesh->up, (mesh->x_last >> 14) + 2U) &&
-           fx_axis_valid(14U - mesh->up, mesh->ny) && (mesh->x_last & 0x3FFFU) == 0x3FFFU &&
-           mesh->y_last == (mesh->ny << 14) - 0x4001U;
+    const unsigned shift = 14U - mesh->up;
+    return fx_axis_valid(shift, (mesh->x_last >> 14) + 2U) && (mesh->x_last & 0x3FFFU) == 0x3FFFU &&
+           fx_axis_valid(shift, mesh->ny) && mesh->y_last == (mesh->ny << 14) - 0x4001U;
 }
 
 /* fx_cell() of a q15 x and |y|, without its flag; inside the grid nothing needs to be limited. */

@@ -11,3 +11,8 @@ q31_t fx_mul_gain_q31(q16_t gain, q31_t x)
 {
     return fx_sat_q31(((int64_t)gain * x + 0x8000) >> 16);
 }
+
+q15_t fx_mul_q15(int32_t a, int32_t b)
+{
+    return fx_sat_q15(fx_mac_q30(0x4000, (q15_t)a, (q15_t)b) >> 15);
+}

@@ -13,7 +13,7 @@
  *          acts for a short time, as the anti-windup of control/current/current_control.c does while the voltage is
  *          limited
  * Errors   none
- * Context  any; 1 to 3 instructions, fx_mul_q31 9, fx_mul_gain_q31 11 */
+ * Context  any; 1 to 3 instructions, fx_mul_q15 5, fx_mul_q31 9, fx_mul_gain_q31 12 */
 
 #include "fx/format.h"
 
@@ -32,11 +32,9 @@ static inline int32_t fx_mac_q30(int32_t acc, q15_t a, q15_t b)
     return fx_arch_smlabb(a, b, acc);
 }
 
-/* Q15 * Q15 = Q30 -> Q15; only -1 * -1 saturates. 2^30 + 2^14 cannot overflow. */
-static inline q15_t fx_mul_q15(q15_t a, q15_t b)
-{
-    return fx_sat_q15(fx_mac_q30(0x4000, a, b) >> 15);
-}
+/* Q15 * Q15 = Q30 -> Q15; only -1 * -1 saturates. 2^30 + 2^14 cannot overflow. Only the lower halves of a and b count.
+ * Not inlined: no settled period uses it. */
+q15_t fx_mul_q15(int32_t a, int32_t b);
 
 /* (a * b) / 2^32, half up: Q31 * Q31 = Q30, Q16 * Q31 = Q15, Q16 * Q16 = Q0. */
 static inline int32_t fx_mulhi(int32_t a, int32_t b)

@@ -3,14 +3,18 @@
 
 #include "fx/sqrt.h"
 
-q15_t fx_magnitude(q15_t x, q15_t y)
+static int32_t square(int32_t x)
 {
-    /* Each square is at most 2^30, so the sum, at most 2^31, fits the unsigned argument. */
-    return fx_sqrt_q30((uint32_t)fx_mul_q30(x, x) + (uint32_t)fx_mul_q30(y, y));
+    return fx_mul_q30((q15_t)x, (q15_t)x);
 }
 
-q15_t fx_leg(q15_t length, q15_t x)
+q15_t fx_magnitude(int32_t x, int32_t y)
 {
-    const int32_t square = fx_mul_q30(length, length) - fx_mul_q30(x, x);
-    return fx_sqrt_q30((uint32_t)fx_max_s32(square, 0));
+    /* Each square is at most 2^30, so the sum, at most 2^31, fits the unsigned argument. */
+    return fx_sqrt_q30((uint32_t)square(x) + (uint32_t)square(y));
+}
+
+q15_t fx_leg(int32_t length, int32_t x)
+{
+    return fx_sqrt_q30((uint32_t)fx_max_s32(square(length) - square(x), 0));
 }

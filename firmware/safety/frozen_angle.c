@@ -63,7 +63,7 @@ static bool has_changed(const frozen_angle_config_t *config, const frozen_angle_
                         const frozen_angle_in_t *in)
 {
     const int32_t i_held = 2 * config->i_0;
-    if (fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q) <= 2 * i_held) {
+    if (fx_magnitude(in->i_ref.d, in->i_ref.q) <= 2 * i_held) {
         return false; /* two legs may be without current */
     }
     const q15_t d = fx_sat_q15((state->mean_q8.d - state->first_q8.d) >> 8);

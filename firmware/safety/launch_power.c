@@ -66,9 +66,9 @@ static bool follow(const launch_power_config_t *config, launch_power_state_t *st
 static bool is_wrong(const launch_power_config_t *config, const launch_power_state_t *state,
                      const launch_power_in_t *in)
 {
-    const q15_t current = fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q);
+    const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
-    const int32_t psi = config->psi_share + (fx_abs_q15((q15_t)in->psi_ref.q) >> 3);
+    const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
     const int32_t v_max = config->v_1 + 2 * times(omega, psi);
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
     return current > config->i_min && fx_abs_q31(change) > times(v_max, current);

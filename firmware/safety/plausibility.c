@@ -12,7 +12,7 @@
 static uint32_t deviation(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in)
 {
     const q15_t error = fx_magnitude(fx_sat_q15(in->i.d - in->i_ref.d), fx_sat_q15(in->i.q - in->i_ref.q));
-    const q15_t current = fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q);
+    const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const bool bad = error > config->e_0 + (current >> 3);
     const int32_t step = bad ? (in->voltage_limited ? 1 : DEVIATION_UNLIMITED) : -DEVIATION_UNLIMITED;
     state->deviation = (int16_t)fx_clamp_q31(state->deviation + step, 0, config->deviation_steps);
@@ -36,7 +36,7 @@ static bool is_phase_lost(const plausibility_config_t *config, int8_t count[2], 
 static uint32_t lost_phases(const plausibility_config_t *config, plausibility_state_t *state,
                             const plausibility_in_t *in)
 {
-    const q15_t current = fx_magnitude((q15_t)in->i_ref.d, (q15_t)in->i_ref.q);
+    const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t alive = fx_max_s32(config->i_alive, current >> 3);
     const bool a_lost = is_phase_lost(config, state->lost[0], alive, in->phases_ref.a, in->phases.a);
     const bool b_lost = is_phase_lost(config, state->lost[1], alive, in->phases_ref.b, in->phases.b);

@@ -74,7 +74,7 @@ static bool is_torque_excessive(const torque_monitor_config_t *config, torque_mo
     state->deviation = fx_add2_q31(state->deviation, fx_mul_q30(config->mean_rate, step));
     const int32_t mean = fx_q15_from_q31(state->deviation);
 
-    const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
+    const q15_t current = fx_magnitude(in->i.d, in->i.q);
     const q15_t allowed = fx_sat_q15(config->t_0 + (fx_abs_q15(in->torque) >> 3));
     /* The tables' slope is not exact, and the flux does not change uniformly during the step. */
     const q15_t drop_error = fx_mul_gain_q15(now->r.error, current);
@@ -93,26 +93,26 @@ static bool is_angle_implausible(const torque_monitor_config_t *config, const to
                                  const machine_t *now, dq_q15_t emf, dq_q15_t rate)
 {
     const q15_t speed_abs = fx_abs_q15(now->speed.omega);
-    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, (q15_t)in->psi.q);
-    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, (q15_t)in->psi.d);
+    const int32_t e_d = emf.d + fx_mul_q15(now->speed.omega, in->psi.q);
+    const int32_t e_q = emf.q - fx_mul_q15(now->speed.omega, in->psi.d);
     const int32_t e_magnet = (now->speed.omega < 0) ? -e_q : e_q;
     const int32_t emf_nominal = fx_mul_q15(speed_abs, config->psi_f);
-    const int32_t d_share = fx_mul_q15(PSI_D_AXIS, (q15_t)emf_nominal);
+    const int32_t d_share = fx_mul_q15(PSI_D_AXIS, emf_nominal);
     if (d_share < config->v_0 >> 1) {
         return false; /* at low speed the inverter's voltage error hides the back-EMF */
     }
-    const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
+    const q15_t current = fx_magnitude(in->i.d, in->i.q);
     /* Doubled resistance; half of the flux rate for noise, and all of it beyond v_0, because a real change may have
      * ended before the sample. */
     const int32_t flux_rate_abs = fx_abs_q31(rate.d) + fx_abs_q31(rate.q);
     const int32_t v_error = (config->v_0 >> 1) + config->v_noise + fx_mul_gain_q15(now->r.r, current) +
                             flux_rate_abs / 2 + fx_max_s32(flux_rate_abs - config->v_0, 0);
-    const q15_t psi_d = fx_abs_q15((q15_t)in->psi.d), psi_q = fx_abs_q15((q15_t)in->psi.q);
+    const q15_t psi_d = fx_abs_q15(in->psi.d), psi_q = fx_abs_q15(in->psi.q);
     const int32_t d_limit = d_share + (fx_mul_q15(speed_abs, psi_q) >> 3) + fx_mul_q15(now->speed.doubt, psi_q) +
                             v_error;
     const int32_t q_error = v_error + fx_mul_q15(now->speed.doubt, psi_d);
-    return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, (q15_t)emf_nominal) + q_error ||
-           e_magnet < -fx_mul_q15(PSI_WEAK, (q15_t)emf_nominal) - q_error;
+    return fx_abs_q31(e_d) > d_limit || e_magnet > fx_mul_q15(PSI_STRONG, emf_nominal) + q_error ||
+           e_magnet < -fx_mul_q15(PSI_WEAK, emf_nominal) - q_error;
 }
 
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,

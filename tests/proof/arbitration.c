@@ -3,6 +3,7 @@
 #include "proof.h"
 
 #include "ecu/arbitration.c"
+#include "fx/format.c"
 
 #define RATE_MAX (1 << 29) /* as the header of the file under proof says */
 

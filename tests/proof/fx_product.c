@@ -4,6 +4,7 @@
  * the product is a shift. */
 #include "proof.h"
 
+#include "fx/format.c"
 #include "fx/q.c"
 
 /* The lower half of a word, with its sign. */

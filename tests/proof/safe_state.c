@@ -2,6 +2,8 @@
 /* Freewheel or short circuit, and the speed that is known: safety/safe_state. */
 #include "proof.h"
 
+#include "fx/format.c"
+#include "fx/q.c"
 #include "safety/safe_state.c"
 
 static safe_state_config_t any_config(void)

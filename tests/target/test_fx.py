@@ -87,7 +87,7 @@ def test_every_function_that_is_measured_is_also_compared(results: dict[str, ben
 NOT_COMPARED = {
     "fx_compiler_barrier",
     "fx_axis",
-    "fx_axis_right",
+    "fx_axis_position",
     "fx_cell_at",
     "fx_load_pair",
     "fx_rsqrt_normalised",

@@ -9,12 +9,6 @@
 /* 2^(-6 + k/2) of the largest current. */
 static const q15_t level[COMMISSION_LEVELS] = {512, 724, 1024, 1448, 2048, 2896, 4096, 5793, 8192, 11585};
 
-/* Not inlined: seven copies would take more memory than the calls. */
-static __attribute__((noinline)) int32_t magnitude(int32_t x)
-{
-    return fx_abs_q31(x);
-}
-
 static void stop(commission_state_t *state, commission_phase_t phase, commission_failure_t why)
 {
     state->phase = phase;
@@ -34,7 +28,7 @@ static void next_current(const commission_config_t *config, commission_state_t *
 
 void commission_start(const commission_config_t *config, commission_state_t *state)
 {
-    *state = (commission_state_t){.phase = COMMISSION_SETTLE};
+    *state = (commission_state_t){.index = 0};
     next_current(config, state);
 }
 
@@ -45,7 +39,7 @@ static void store_cosines(commission_data_t *data, uint32_t theta)
     const int32_t alpha = (int16_t)(cos_sin & 0xFFFFU) * Q15_MAX >> 15;
     const int32_t beta_q30 = ((int32_t)cos_sin >> 16) * Q15_MAX;
     const abc_t phases = inverse_clarke(alpha, fx_mulhi(beta_q30, Q31(0.86602540378443865)) >> 14);
-    int32_t c[3] = {magnitude(phases.a), magnitude(phases.b), magnitude(phases.c)};
+    int32_t c[3] = {fx_abs_q31(phases.a), fx_abs_q31(phases.b), fx_abs_q31(phases.c)};
     for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);
         c[k + 1U] = fx_min_s32(c[k], c[k + 1U]);
@@ -60,13 +54,13 @@ static commission_failure_t check_step(const commission_config_t *config, const 
                                        const commission_in_t *in)
 {
     const int32_t periods = config->periods_per_step; /* all of it as sums over a step */
-    const int32_t error_d = magnitude(in->sum_i.d - periods * state->i_ref.d);
-    const int32_t error_q = magnitude(in->sum_i.q);
-    const int32_t allowed = periods * ((magnitude(state->i_ref.d) >> 3) + CURRENT_TOLERANCE);
+    const int32_t error_d = fx_abs_q31(in->sum_i.d - periods * state->i_ref.d);
+    const int32_t error_q = fx_abs_q31(in->sum_i.q);
+    const int32_t allowed = periods * ((fx_abs_q31(state->i_ref.d) >> 3) + CURRENT_TOLERANCE);
     if (!in->acting) {
         return COMMISSION_STOPPED;
     }
-    if (magnitude(in->omega) > config->omega_max) {
+    if (fx_abs_q31(in->omega) > config->omega_max) {
         return COMMISSION_MOVED;
     }
     if (state->phase != COMMISSION_MEASURE) {
