@@ -4,9 +4,11 @@
 
 #include "control/torque/i_d_limit.h"
 #include "control/torque/limit.c"
+#include "fx/format.c"
+#include "fx/q.c"
 
 /* The functions that limit.c calls, with any result that their headers allow. */
-q15_t fx_magnitude(q15_t x, q15_t y)
+q15_t fx_magnitude(int32_t x, int32_t y)
 {
     q15_t length;
     (void)x, (void)y;
@@ -14,7 +16,7 @@ q15_t fx_magnitude(q15_t x, q15_t y)
     return length;
 }
 
-q15_t fx_div_q15(q15_t num, q15_t den)
+q15_t fx_div_q15(int32_t num, int32_t den)
 {
     q15_t quotient;
     ASSUME(num < 0 || den <= 0 || quotient >= 0);
@@ -59,8 +61,8 @@ void proof_a_derating_factor_is_between_0_and_1(void)
 {
     derating_line_t line;
     q15_t x;
-    const q15_t factor = derating_factor(&line, x);
-    PROVE(factor >= 0);
+    const int32_t factor = derating_factor(&line, x);
+    PROVE(WITHIN(factor, 0, INT16_MAX));
     PROVE(x != line.end || factor == 0);
 }
 

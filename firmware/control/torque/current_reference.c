@@ -29,9 +29,9 @@ motor_check_t current_reference_check(const current_reference_config_t *config)
  * effect at low speed, where the voltage does not limit the flux. */
 static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
 {
-    const q15_t drop = fx_mul_gain_q15(config->r_pu, in->i_magnitude);
+    const int32_t drop = fx_sat_q15_word(fx_mulhi(config->r_pu, in->i_magnitude * 65536)); /* Q16 * Q31 = Q15 */
     const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
-    const int32_t flux = fx_clamp_q31(voltage, 0, Q15_MAX) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
+    const int32_t flux = fx_usat_q15_word(voltage) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
     return fx_max_s32(flux - in->shift, 0);
 }
 
@@ -42,18 +42,18 @@ static dq_q15_t limit_to_current_circle(dq_q15_t i, q15_t i_max)
     if (fx_mul_q30((q15_t)i.q, (q15_t)i.q) <= i_q_squared_max) {
         return i;
     }
-    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, (q15_t)i.d)};
+    return (dq_q15_t){fx_max_s32(i.d, -i_max), fx_leg(i_max, i.d)};
 }
 
-static __attribute__((noinline)) dq_q15_t currents_from_table(const current_reference_config_t *config, q15_t torque,
-                                                              q15_t psi)
+static __attribute__((noinline)) dq_q15_t currents_from_table(const current_reference_config_t *config, int32_t torque,
+                                                              int32_t psi)
 {
     const fx_cell_t cell = fx_cell(&config->grid, torque, psi);
     return (dq_q15_t){fx_cell_interp(config->i_d, config->grid.ny, cell),
                       fx_cell_interp(config->i_q, config->grid.ny, cell)};
 }
 
-static __attribute__((noinline)) q15_t torque_max_from_table(const current_reference_config_t *config, q15_t psi)
+static __attribute__((noinline)) int32_t torque_max_from_table(const current_reference_config_t *config, int32_t psi)
 {
     bool clamped = false;
     return fx_lookup1(&config->torque_max, psi, &clamped);
@@ -65,29 +65,30 @@ static __attribute__((noinline)) q15_t torque_max_from_table(const current_refer
 static q15_t torque_max_identified(const current_reference_config_t *config, const current_reference_in_t *in,
                                    int32_t planned)
 {
-    const q15_t psi = fx_sat_q15(planned + fx_min_s32(in->shift, 0));
-    const q15_t torque_max = torque_max_from_table(config, psi);
+    const int32_t psi = fx_sat_q15_word(planned + fx_min_s32(in->shift, 0));
+    const int32_t torque_max = torque_max_from_table(config, psi);
     const dq_q15_t i = currents_from_table(config, torque_max, psi);
-    const int32_t identified = fx_mul_q15(in->psi_delta, (q15_t)i.q) - fx_mul_q15(in->psi_q_delta, (q15_t)i.d);
-    return fx_sat_q15(fx_max_s32(torque_max + identified, 0));
+    const int32_t identified = fx_mul_q15(in->psi_delta, i.q) - fx_mul_q15(in->psi_q_delta, i.d);
+    return (q15_t)fx_usat_q15_word(torque_max + identified);
 }
 
 current_reference_t current_reference_step(const current_reference_config_t *config, const current_reference_in_t *in)
 {
     const int32_t planned = planned_flux(config, in);
-    const q15_t psi = fx_sat_q15(planned);
-    const q15_t torque_max = torque_max_from_table(config, psi);
-    const q15_t torque = (q15_t)fx_min_s32(fx_abs_q15(in->torque_corrected), torque_max);
+    const int32_t psi = fx_sat_q15_word(planned);
+    const int32_t torque = fx_abs_q15(in->torque_corrected);
+    const int32_t torque_max = torque_max_from_table(config, psi);
 
-    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, torque, psi), config->i_max);
+    dq_q15_t i_ref = limit_to_current_circle(currents_from_table(config, fx_min_s32(torque, torque_max), psi),
+                                             config->i_max);
     const bool i_d_limited = i_ref.d < -in->i_d_max;
     i_ref.d = fx_max_s32(i_ref.d, -in->i_d_max); /* (CR-11) */
-    i_ref.q = (in->torque_corrected < 0) ? fx_neg_q15((q15_t)i_ref.q) : i_ref.q;
+    i_ref.q = (in->torque_corrected < 0) ? -i_ref.q : i_ref.q;
     return (current_reference_t){
         .i_ref = i_ref,
         .torque_max = torque_max_identified(config, in, planned),
-        .psi_plan = psi,
-        .limited = fx_abs_q15(in->torque_corrected) > torque_max || psi < config->grid.y0,
+        .psi_plan = (q15_t)psi,
+        .limited = torque > torque_max || psi < config->grid.y0,
         .i_d_limited = i_d_limited,
     };
 }

@@ -32,16 +32,17 @@ typedef struct {
     q15_t i_max; /* current circle */
 } current_reference_config_t;
 
+/** q15 in words, which are loaded without a sign extension. */
 typedef struct {
-    q15_t torque_corrected;
-    q15_t v_dc;
-    q15_t omega;
-    q15_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
-    q15_t v_trim;
-    q15_t shift;
-    q15_t psi_delta;   /* identified flux minus the table's, d axis */
-    q15_t i_d_max;     /* magnitude of the demagnetisation limit at the present temperature */
-    q15_t psi_q_delta; /* identified |psi_q| minus the tables', at the last reference */
+    int32_t torque_corrected;
+    int32_t v_dc;
+    int32_t omega;
+    int32_t i_magnitude; /* |i_ref| of the last step: the resistive drop */
+    int32_t v_trim;
+    int32_t shift;
+    int32_t psi_delta;   /* identified flux minus the table's, d axis */
+    int32_t i_d_max;     /* magnitude of the demagnetisation limit at the present temperature */
+    int32_t psi_q_delta; /* identified |psi_q| minus the tables', at the last reference */
 } current_reference_in_t;
 
 typedef struct {

@@ -32,19 +32,19 @@ motor_check_t torque_limit_check(const torque_limit_config_t *config)
 }
 
 /* (x - end)/(start - end), 0 ... 1 (LM-4). */
-static q15_t derating_factor(const derating_line_t *at, q15_t x)
+static int32_t derating_factor(const derating_line_t *at, int32_t x)
 {
-    return (q15_t)fx_max_s32(fx_mul_gain_q15(at->gain, fx_sub_q15(x, at->end)), 0);
+    return fx_usat_q15_word(fx_mulhi(at->gain, fx_sat_q15_word(x - at->end) * 65536)); /* Q16 * Q31 = Q15 */
 }
 
 /* (LM-2). Both products are rounded half up, so that the mean has no bias. */
-static q15_t loss_step(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
+static int32_t loss_step(const torque_limit_config_t *config, torque_limit_state_t *state, const torque_limit_in_t *in)
 {
-    const q15_t current = fx_magnitude((q15_t)in->i.d, (q15_t)in->i.q);
-    const int32_t electrical = fx_mul_q15((q15_t)in->u.d, (q15_t)in->i.d) + fx_mul_q15((q15_t)in->u.q, (q15_t)in->i.q);
+    const q15_t current = fx_magnitude(in->i.d, in->i.q);
+    const int32_t electrical = fx_mul_q15(in->u.d, in->i.d) + fx_mul_q15(in->u.q, in->i.q);
     const int32_t now = electrical - fx_mul_q15(in->torque_estimated, in->omega) + fx_mul_q15(config->drop, current);
-    const q15_t error = fx_sat_q15(now - fx_q15_from_q31(state->loss));
-    const q31_t moved = fx_add2_q31(state->loss, fx_mul_q30(config->loss_rate, error));
+    const int32_t error = fx_sat_q15_word(now - fx_q15_from_q31(state->loss));
+    const q31_t moved = fx_add2_q31(state->loss, config->loss_rate * error);
     state->loss = fx_clamp_q31(moved, 0, LOSS_MAX);
     return fx_q15_from_q31(state->loss);
 }
@@ -61,26 +61,29 @@ static void limit_to(bound_t *bound, int32_t limit, uint32_t reason)
 {
     const int32_t max = fx_max_s32(limit, 0);
     bound->max = fx_min_s32(bound->max, max);
-    bound->reasons |= (bound->torque > max) ? reason : 0U;
-}
-
-/* (power -+ loss)/|w| (LM-3). Q15_MAX means that no limit is set. */
-static __attribute__((noinline)) void limit_by_power(bound_t *bound, q15_t limit, int32_t loss, q15_t speed)
-{
-    if (limit < Q15_MAX) {
-        const q15_t power = fx_sat_q15(fx_max_s32(limit - loss, 0));
-        limit_to(bound, fx_div_q15(power, (q15_t)fx_max_s32(speed, 1)), DERATING_POWER);
+    if (bound->torque > max) {
+        bound->reasons |= reason;
     }
 }
 
-static void limit_by_factor(bound_t *bound, q15_t factor, uint32_t reason)
+/* (power -+ loss)/|w| (LM-3). Q15_MAX means that no limit is set. */
+static __attribute__((noinline)) void limit_by_power(bound_t *bound, int32_t limit, int32_t loss, int32_t speed)
+{
+    if (limit < Q15_MAX) {
+        const int32_t power = fx_usat_q15_word(limit - loss);
+        limit_to(bound, fx_div_q15(power, fx_max_s32(speed, 1)), DERATING_POWER);
+    }
+}
+
+static __attribute__((noinline)) void limit_by_factor(bound_t *bound, int32_t factor, uint32_t reason)
 {
     if (factor < Q15_MAX) {
         limit_to(bound, fx_mul_q15(bound->rated, factor), reason);
     }
 }
 
-static __attribute__((noinline)) void limit_by_line(bound_t *bound, const derating_line_t *at, q15_t x, uint32_t reason)
+static __attribute__((noinline)) void limit_by_line(bound_t *bound, const derating_line_t *at, int32_t x,
+                                                    uint32_t reason)
 {
     limit_by_factor(bound, derating_factor(at, x), reason);
 }
@@ -113,7 +116,7 @@ torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_lim
 {
     const torque_limits_t *limits = in->limits;
     const q15_t speed = fx_abs_q15(in->omega);
-    const q15_t loss = loss_step(config, state, in);
+    const int32_t loss = loss_step(config, state, in);
     bound_t drive = limits_of_both_directions(config, state, in);
     bound_t regen = drive;
 
@@ -126,8 +129,8 @@ torque_limit_t torque_limit_step(const torque_limit_config_t *config, torque_lim
     limit_by_line(&regen, &config->dc_high, in->v_dc, DERATING_DC_HIGH);
 
     /* Torque against the rotation: from the driving limit at standstill to the regenerating one (LM-6). */
-    const q15_t direction_known = derating_factor(&config->moving, speed);
-    const int32_t against_rotation = drive.max + fx_mul_q15(direction_known, fx_sat_q15(regen.max - drive.max));
+    const int32_t direction_known = derating_factor(&config->moving, speed);
+    const int32_t against_rotation = drive.max + fx_mul_q15(direction_known, regen.max - drive.max);
     const bool negative_speed = in->omega < 0;
     const int32_t high = negative_speed ? against_rotation : drive.max;
     const int32_t low = negative_speed ? drive.max : against_rotation;

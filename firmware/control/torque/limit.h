@@ -59,14 +59,15 @@ typedef struct {
     bool inverter_seen, winding_seen;
 } torque_limit_state_t;
 
+/** q15 in words, which are loaded without a sign extension. */
 typedef struct {
-    q15_t torque_arbitrated;
+    int32_t torque_arbitrated;
     const torque_limits_t *limits;
     dq_q15_t u, i;
-    q15_t torque_estimated;
-    q15_t omega;
-    q15_t v_dc;
-    q15_t reach; /* the references' torque_max of the last step */
+    int32_t torque_estimated;
+    int32_t omega;
+    int32_t v_dc;
+    int32_t reach; /* the references' torque_max of the last step */
     int16_t inverter_dC, winding_dC;
 } torque_limit_in_t;
 

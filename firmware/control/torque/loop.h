@@ -33,10 +33,11 @@ typedef struct {
     bool saturated;
 } torque_loop_state_t;
 
+/** q15 in words, which are loaded without a sign extension. */
 typedef struct {
-    q15_t torque_commanded; /* T* */
-    q15_t torque_estimated; /* T^ */
-    q15_t confidence;       /* share of the authority that may be used, Q15_MAX: all of it */
+    int32_t torque_commanded; /* T* */
+    int32_t torque_estimated; /* T^ */
+    int32_t confidence;       /* share of the authority that may be used, Q15_MAX: all of it */
     bool enabled;
     bool limited; /* current or voltage limit active */
 } torque_loop_in_t;

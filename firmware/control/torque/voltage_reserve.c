@@ -11,9 +11,9 @@
 voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, voltage_reserve_state_t *state,
                                        const voltage_reserve_in_t *in)
 {
-    const q15_t psi = fx_magnitude((q15_t)in->psi.d, (q15_t)in->psi.q);
-    const q15_t with_magnet = fx_magnitude(fx_sat_q15(in->psi.d + in->psi_delta), (q15_t)in->psi.q);
-    const q15_t u = fx_magnitude((q15_t)in->u.d, (q15_t)in->u.q);
+    const int32_t psi = fx_magnitude(in->psi.d, in->psi.q);
+    const int32_t with_magnet = fx_magnitude(fx_sat_q15_word(in->psi.d + in->psi_delta), in->psi.q);
+    const int32_t u = fx_magnitude(in->u.d, in->u.q);
     const int32_t reserve = fx_mul_q15(config->v_ratio, in->v_dc) - u;
     const bool on_limit = psi > in->psi_plan - (in->psi_plan >> ON_LIMIT_SHIFT);
 
@@ -22,10 +22,10 @@ voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, v
         error = reserve;
     }
     /* Q15 * Q15 = Q30, twice: Q31. */
-    const q31_t moved = fx_add2_q31(state->trim, fx_mul_q30(config->gain, fx_sat_q15(error)));
+    const q31_t moved = fx_add2_q31(state->trim, config->gain * fx_sat_q15_word(error));
     state->trim = fx_clamp_q31(moved, fx_q31_from_q15(config->trim_min), fx_q31_from_q15(config->trim_max));
     return (voltage_reserve_t){
         .v_trim = fx_q15_from_q31(state->trim),
-        .shift = fx_sub_q15(with_magnet, psi),
+        .shift = (q15_t)(with_magnet - psi),
     };
 }

@@ -30,13 +30,14 @@ typedef struct {
     q31_t trim;
 } voltage_reserve_state_t;
 
+/** q15 in words, which are loaded without a sign extension. */
 typedef struct {
     dq_q15_t u; /* acting voltage */
-    q15_t v_dc;
-    dq_q15_t psi;    /* tables' flux at the last reference */
-    q15_t psi_plan;  /* of the last reference */
-    q15_t psi_delta; /* identified flux minus the table's */
-    bool acting;     /* the bridge makes u */
+    int32_t v_dc;
+    dq_q15_t psi;      /* tables' flux at the last reference */
+    int32_t psi_plan;  /* of the last reference */
+    int32_t psi_delta; /* identified flux minus the table's */
+    bool acting;       /* the bridge makes u */
 } voltage_reserve_in_t;
 
 typedef struct {

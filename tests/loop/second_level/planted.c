@@ -371,7 +371,7 @@ q15_t __wrap_torque_loop_step(const torque_loop_config_t *config, torque_loop_st
     case LOOP_SIGN:
         return times(right, -1.0);
     case LOOP_ESTIMATE_70:
-        wrong.torque_estimated = times(in->torque_estimated, 0.7);
+        wrong.torque_estimated = times((q15_t)in->torque_estimated, 0.7);
         return __real_torque_loop_step(config, state, &wrong);
     case LOOP_OFFSET:
         return (q15_t)(right + 1800);
