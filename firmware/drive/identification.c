@@ -23,8 +23,8 @@ static identification_t robust_identification(const drive_t *drive, const identi
         .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
         .lq_error = identify_value(config, state, IDENTIFY_LQ),
         .torque_variance_q30 = state->torque_variance_q30,
-        .psi_d_error = out->psi_delta,
-        .torque_estimated = out->torque,
+        .psi_d_error = (q15_t)out->psi_delta,
+        .torque_estimated = (q15_t)out->torque,
         .confidence = drive->task.recall.unconfirmed ? (q15_t)0 : state->kept.confidence,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
         .r_quality = variance_reduction(state, IDENTIFY_R),
@@ -52,7 +52,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     drive_trim(drive, (q15_t)snapshot->sample.v_dc);
     task->identifications = task->identifications + 1U;
     task->identification = robust_identification(drive, &out);
-    task->psi_d_error = task->recall.unconfirmed ? (q15_t)0 : out.psi_delta;
+    task->psi_d_error = task->recall.unconfirmed ? (q15_t)0 : (q15_t)out.psi_delta;
 }
 
 void drive_identify(drive_t *drive, const snapshot_t *snapshot)
@@ -71,7 +71,7 @@ identify_record_t drive_identified_record(const drive_t *drive)
     do {
         seen = drive->task.identifications;
         exchange_barrier();
-        record = identify_record_get(&drive->task.identify);
+        identify_record_get(&drive->task.identify, &record);
         exchange_barrier();
     } while (drive->task.identifications != seen);
     return record;

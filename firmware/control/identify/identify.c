@@ -3,6 +3,7 @@
 
 #include "control/identify/q30.h"
 #include "fx/div.h"
+#include "signal/counter.h"
 
 #define PER_STEP 429496730 /* 2^32/IDENTIFY_STEPS */
 #define REFERENCE_dC 200   /* 20 C */
@@ -10,7 +11,7 @@
 #define CONTRADICTED_MAX 25 /* ten times as many steps fit into a byte */
 
 typedef struct {
-    dq_q30_t psi, i;    /* identified */
+    identify_flux_t at; /* identified */
     int32_t magnet_q30; /* psi_d minus the tables', without the local error: for the current control */
 } corrected_t;
 
@@ -40,47 +41,45 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 {
     const int32_t change = fx_add_q31(fx_abs_q31(point->rate.d), fx_abs_q31(point->rate.q));
     const int32_t level = fx_add_q31(config->noise_voltage_q30,
-                                     fx_add_q31(identify_mul(fx_abs_q31(point->omega / 2), config->noise_flux_q30),
+                                     fx_add_q31(identify_mul(fx_abs_q31(point->omega) >> 1, config->noise_flux_q30),
                                                 identify_mul(change, config->noise_rate_q30)));
-    const int32_t share = point->limited * config->limited_noise; /* Q16: up to 40 periods of 5/N */
-    return fx_sat_q31(level + (((int64_t)level * share) >> 16));
+    const int32_t factor = Q16_ONE + point->limited * config->limited_noise; /* up to 40 periods of 5/N */
+    return fx_sat_q31((int64_t)level * factor >> 16);
 }
 
-/* Not inlined: two calls take less memory than two copies. */
-static __attribute__((noinline)) void average_row(jacobian_row_t *mean, const jacobian_row_t *row)
+/* Adds the step's share of each word of a measurement. */
+static void average(void *mean, const void *now)
 {
-    for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        mean->h_q30[j] = fx_mulhi_add(mean->h_q30[j], row->h_q30[j], PER_STEP);
+    int32_t *to = mean;
+    const int32_t *from = now;
+    for (unsigned n = 0; n < sizeof(identify_measurement_t) / sizeof *to; n++) {
+        to[n] = fx_mulhi_add(to[n], from[n], PER_STEP);
     }
 }
 
 static void average_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in,
-                         const identify_model_t *model, dq_q30_t e)
+                         identify_model_t *model)
 {
     const bool step_valid = in->point->valid && model->current && in->enabled;
     state->kept.update_valid = (state->kept.update_valid || state->steps == 0U) && step_valid;
-    average_row(&state->mean.d, &model->d);
-    average_row(&state->mean.q, &model->q);
-    state->mean.e.d = fx_mulhi_add(state->mean.e.d, e.d, PER_STEP);
-    state->mean.e.q = fx_mulhi_add(state->mean.e.q, e.q, PER_STEP);
-    state->mean.noise_q30 = fx_mulhi_add(state->mean.noise_q30, measurement_noise(config, in->point), PER_STEP);
+    model->now.noise_q30 = measurement_noise(config, in->point);
+    average(&state->mean, &model->now);
     state->steps++;
 }
 
 /* The measurements of both axes, one after the other: the second innovation takes the first update into account. */
 static void update_parameters(const identify_config_t *config, identify_state_t *state)
 {
-    const int64_t r = (int64_t)state->mean.noise_q30 * state->mean.noise_q30;
-    const int32_t output_before = kalman_output(&state->kalman, &state->mean.q);
-    const kalman_update_t d = kalman_update(&state->kalman, &state->mean.d, state->mean.e.d, r);
-    const int32_t change = fx_sub_q31(kalman_output(&state->kalman, &state->mean.q), output_before);
-    const kalman_update_t q = kalman_update(&state->kalman, &state->mean.q, fx_sub_q31(state->mean.e.q, change), r);
-    state->contradicted_updates = d.innovation_gate_exceeded
-                                      ? (uint8_t)fx_min_s32(state->contradicted_updates + 1, CONTRADICTED_MAX)
-                                      : 0U;
-    state->kept.clamped = d.clamped || q.clamped;
-    const int32_t target = (d.innovation_gate_exceeded || q.innovation_gate_exceeded || state->kept.clamped) ? Q15_MAX : 0;
-    const q15_t error = fx_sat_q15(target - state->kept.mismatch_share);
+    kalman_t *kalman = &state->kalman;
+    const identify_measurement_t *mean = &state->mean;
+    const int32_t output_before = kalman_output(kalman, &mean->q);
+    const uint32_t d = kalman_update(kalman, &mean->d, mean->e.d, mean->noise_q30);
+    const int32_t change = fx_sub_q31(kalman_output(kalman, &mean->q), output_before);
+    const uint32_t both = d | kalman_update(kalman, &mean->q, fx_sub_q31(mean->e.q, change), mean->noise_q30);
+    const uint32_t contradicted = count_up_to(state->contradicted_updates, CONTRADICTED_MAX);
+    state->contradicted_updates = ((d & KALMAN_GATE_EXCEEDED) != 0U) ? (uint8_t)contradicted : 0U;
+    state->kept.clamped = (both & KALMAN_CLAMPED) != 0U;
+    const int32_t error = fx_sat_q15_word(((both != 0U) ? Q15_MAX : 0) - state->kept.mismatch_share);
     state->kept.mismatch_share = fx_add_q15(state->kept.mismatch_share, fx_mul_q15(config->mismatch_rate, error));
 }
 
@@ -88,29 +87,27 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
  * torque; between the levels the last decision holds (ID-18). At no torque the relative test is not used to switch on:
  * a torque of zero is certain whatever the parameters are. */
 static void update_confidence(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
-                              q15_t torque)
+                              int32_t torque)
 {
-    const jacobian_row_t row = identify_torque_row(config, model);
+    jacobian_row_t row;
+    identify_torque_row(config, model, &row);
     const int64_t variance = kalman_output_variance(&state->kalman, &row); /* Q60 */
     state->torque_variance_q30 = fx_sat_q31(variance >> 30);
-    const int64_t prior = kalman_output_variance_prior(&row);
-    const q15_t size = fx_abs_q15(torque);
-    const q15_t scale = (q15_t)fx_max_s32(size, config->torque_min);
-    const int64_t full = (int64_t)fx_mul_q30(size, config->confidence_full); /* Q30 */
-    const int64_t none = (int64_t)fx_mul_q30(scale, config->confidence_none);
-    const bool good = variance < (prior >> 2) + (prior >> 3) || variance < full * full;
-    const bool bad = variance > prior - (prior >> 2) && variance > none * none;
-    if (bad || state->kept.mismatch_share > MISMATCH_MAX) {
+    const int64_t well_below = 3 * (kalman_output_variance_prior(&row) >> 3);
+    const int32_t size = fx_abs_q15(torque);
+    const int64_t full = size * config->confidence_full; /* Q30 */
+    const int64_t none = fx_max_s32(size, config->torque_min) * config->confidence_none;
+    if (state->kept.mismatch_share > MISMATCH_MAX || (variance > 2 * well_below && variance > none * none)) {
         state->kept.torque_certain = false;
-    } else if (good) {
+    } else if (variance < well_below || variance < full * full) {
         state->kept.torque_certain = true;
     }
     const int32_t step = state->kept.torque_certain ? config->confidence_rate : -config->confidence_rate;
-    state->kept.confidence = (q15_t)fx_clamp_q31(state->kept.confidence + step, 0, Q15_MAX);
+    state->kept.confidence = (q15_t)fx_usat_q15_word(state->kept.confidence + step);
 }
 
 static void kalman_step(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
-                        q15_t torque)
+                        int32_t torque)
 {
     identify_check_parameters(state);
     if (state->kept.update_valid) {
@@ -121,7 +118,7 @@ static void kalman_step(const identify_config_t *config, identify_state_t *state
     kalman_predict(config, &state->kalman, state->kept.r_known);
     identify_seal_parameters(state);
     update_confidence(config, state, model, torque);
-    state->mean = (identify_mean_t){.noise_q30 = 0};
+    state->mean = (identify_measurement_t){.noise_q30 = 0};
     state->steps = 0;
 }
 
@@ -153,10 +150,15 @@ static corrected_t correct(const identify_config_t *config, const identify_state
     const int32_t iron = value[IDENTIFY_IRON];
     const int32_t d_axis = identify_mul(value[IDENTIFY_LD], m->psi_d.h_q30[IDENTIFY_LD]);
     return (corrected_t){
-        .psi = {fx_add_q31(m->psi.d, fx_add_q31(shift.d, value[IDENTIFY_FLUX])), fx_add_q31(m->psi.q, shift.q)},
-        .i = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
+        .at.psi = {fx_add_q31(m->psi.d, fx_add_q31(shift.d, value[IDENTIFY_FLUX])), fx_add_q31(m->psi.q, shift.q)},
+        .at.i_m = {m->i_m.d + identify_mul(iron, m->iron_i.d), m->i_m.q + identify_mul(iron, m->iron_i.q)},
         .magnet_q30 = fx_add_q31(value[IDENTIFY_FLUX], d_axis),
     };
+}
+
+static int32_t rounded_q15(int32_t q30)
+{
+    return fx_sat_q15_word(fx_add_q31(q30, 0x4000) >> 15);
 }
 
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
@@ -165,13 +167,13 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     resistance_prior(config, state, in);
     identify_model_t model;
     identify_model(config, in->point, in->tables, state->kept.r_prior, &model);
-    const dq_q30_t e = {fx_sub_q31(model.y.d, kalman_output(&state->kalman, &model.d)),
-                        fx_sub_q31(model.y.q, kalman_output(&state->kalman, &model.q))};
-    update_local_flux_error(config, state, in, e);
-    average_step(config, state, in, &model, e);
+    model.now.e.d = fx_sub_q31(model.now.e.d, kalman_output(&state->kalman, &model.now.d));
+    model.now.e.q = fx_sub_q31(model.now.e.q, kalman_output(&state->kalman, &model.now.q));
+    update_local_flux_error(config, state, in, model.now.e);
+    average_step(config, state, in, &model);
     const corrected_t now = correct(config, state, &model);
-    const int32_t torque = identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, now.psi, now.i);
-    const identify_out_t out = {fx_round_q15(torque), fx_round_q15(now.magnet_q30)};
+    const int32_t torque = identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, &now.at);
+    const identify_out_t out = {rounded_q15(torque), rounded_q15(now.magnet_q30)};
     if (state->steps >= IDENTIFY_STEPS) {
         kalman_step(config, state, &model, out.torque);
     }

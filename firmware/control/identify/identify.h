@@ -20,13 +20,6 @@
 
 #define IDENTIFY_STEPS 10 /* per update */
 
-/** Means over the steps of one update. */
-typedef struct {
-    jacobian_row_t d, q;
-    dq_q30_t e;        /* predicted residual */
-    int32_t noise_q30; /* standard deviation of the measurement noise */
-} identify_mean_t;
-
 /** What is kept from step to step. Without bytes between the fields, which would have no value that a seal covers. */
 typedef struct {
     dq_q30_t local; /* flux error of this operating point */
@@ -44,9 +37,9 @@ typedef struct {
     uint8_t contradicted_updates; /* in a row, up to 25: the d axis exceeds the innovation gate (MN-12) */
     bool damaged;                 /* a seal did not match: the memory has changed what only this stage writes */
     identify_kept_t kept;
-    uint32_t seal; /* of kept */
+    uint32_t seal;               /* of kept */
     int32_t torque_variance_q30; /* at the last update */
-    identify_mean_t mean;
+    identify_measurement_t mean; /* over the steps of one update */
     uint32_t kalman_seal;
     kalman_t kalman; /* last, because it is large */
 } identify_state_t;
@@ -59,8 +52,8 @@ typedef struct {
 } identify_in_t;
 
 typedef struct {
-    q15_t torque;    /* air gap, mean over the window */
-    q15_t psi_delta; /* identified minus table's flux in the d axis, here */
+    int32_t torque;    /* q15: air gap, mean over the window */
+    int32_t psi_delta; /* q15: identified minus table's flux in the d axis, here */
 } identify_out_t;
 
 /* The seals of what is kept from step to step, and of parameters with covariance. */

@@ -32,16 +32,17 @@ static inline unsigned kalman_p_index(unsigned j, unsigned l)
     return j * (2U * IDENTIFY_STATES - 1U - j) / 2U + l;
 }
 
-typedef struct {
-    bool clamped;                  /* a state reached its limit */
-    bool innovation_gate_exceeded; /* the innovation is larger than P and the errors behind r can explain */
-} kalman_update_t;
+/** What an update reports, one bit each. */
+enum {
+    KALMAN_CLAMPED = 1U,      /* a state reached its limit */
+    KALMAN_GATE_EXCEEDED = 2U /* the innovation is larger than P and the errors behind the noise can explain */
+};
 
 /** x = 0, P = prior. */
 void kalman_reset(kalman_t *kalman);
 void kalman_predict(const identify_config_t *config, kalman_t *kalman, bool r_known);
-/** One scalar measurement with Jacobian row h, innovation e = z - h x and noise variance r. */
-kalman_update_t kalman_update(kalman_t *kalman, const jacobian_row_t *row, int32_t innovation_q30, int64_t r_q60);
+/** One scalar measurement with Jacobian row h, innovation e = z - h x and the standard deviation of its noise. */
+uint32_t kalman_update(kalman_t *kalman, const jacobian_row_t *row, int32_t innovation_q30, int32_t noise_q30);
 /** h x, Q30. */
 int32_t kalman_output(const kalman_t *kalman, const jacobian_row_t *row);
 /** Variance of h x: h P h', Q60. */

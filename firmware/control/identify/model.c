@@ -12,9 +12,9 @@ static int32_t flux_of_current(const identify_config_t *config, int32_t l, int32
 }
 
 /* i/max(|i|, i_smooth), Q30 (ID-6). */
-static int32_t direction(int32_t i_q15, q15_t magnitude)
+static int32_t direction(int32_t i_q15, int32_t magnitude)
 {
-    return (int32_t)fx_div_q15((q15_t)i_q15, magnitude) * 32768;
+    return fx_div_q15(i_q15, magnitude) * 32768;
 }
 
 static void flux_derivatives(const identify_config_t *config, const identify_tables_t *tables,
@@ -47,23 +47,23 @@ static void jacobian_rows(const identify_config_t *config, const identify_point_
 {
     const int32_t w = point->omega >> 1; /* Q30 */
     const dq_q15_t i = {fx_q15_from_q31(point->i.d), fx_q15_from_q31(point->i.q)};
-    const q15_t magnitude = fx_magnitude((q15_t)i.d, (q15_t)i.q);
-    const q15_t length = (q15_t)fx_max_s32(magnitude, config->i_smooth);
+    const int32_t magnitude = fx_magnitude(i.d, i.q);
+    const int32_t length = fx_max_s32(magnitude, config->i_smooth);
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        m->d.h_q30[j] = -identify_mul(w, m->psi_q.h_q30[j]);
-        m->q.h_q30[j] = identify_mul(w, m->psi_d.h_q30[j]);
+        m->now.d.h_q30[j] = -identify_mul(w, m->psi_q.h_q30[j]);
+        m->now.q.h_q30[j] = identify_mul(w, m->psi_d.h_q30[j]);
     }
-    const int32_t d = fx_sub_q31(fx_sub_q31(point->u.d, m->d.h_q30[IDENTIFY_LQ]), point->rate.d);
+    const int32_t d = fx_sub_q31(fx_sub_q31(point->u.d, m->now.d.h_q30[IDENTIFY_LQ]), point->rate.d);
     const int32_t q = fx_sub_q31(fx_sub_q31(point->u.q, identify_mul(w, m->psi.d)), point->rate.q);
-    m->y = (dq_q30_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
+    m->now.e = (dq_q30_t){fx_mulhi_sub(d, r_prior, point->i.d), fx_mulhi_sub(q, r_prior, point->i.q)};
     m->current = magnitude >= config->i_min;
-    m->d.h_q30[IDENTIFY_R] = point->i.d >> 1;
-    m->d.h_q30[IDENTIFY_DROP] = direction(i.d, length);
-    m->q.h_q30[IDENTIFY_R] = point->i.q >> 1;
-    m->q.h_q30[IDENTIFY_DROP] = direction(i.q, length);
-    m->q.h_q30[IDENTIFY_FLUX] = w;
-    per_sigma(config, &m->d);
-    per_sigma(config, &m->q);
+    m->now.d.h_q30[IDENTIFY_R] = point->i.d >> 1;
+    m->now.d.h_q30[IDENTIFY_DROP] = direction(i.d, length);
+    m->now.q.h_q30[IDENTIFY_R] = point->i.q >> 1;
+    m->now.q.h_q30[IDENTIFY_DROP] = direction(i.q, length);
+    m->now.q.h_q30[IDENTIFY_FLUX] = w;
+    per_sigma(config, &m->now.d);
+    per_sigma(config, &m->now.q);
 }
 
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
@@ -74,24 +74,22 @@ void identify_model(const identify_config_t *config, const identify_point_t *poi
     jacobian_rows(config, point, r_prior, model);
 }
 
-jacobian_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *m)
+void identify_torque_row(const identify_config_t *config, const identify_model_t *m, jacobian_row_t *row)
 {
-    jacobian_row_t row;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
-        row.h_q30[j] = identify_mul(m->psi_d.h_q30[j], m->i_m.q) - identify_mul(m->psi_q.h_q30[j], m->i_m.d);
+        row->h_q30[j] = identify_mul(m->psi_d.h_q30[j], m->i_m.q) - identify_mul(m->psi_q.h_q30[j], m->i_m.d);
     }
-    row.h_q30[IDENTIFY_FLUX] = m->i_m.q;
-    row.h_q30[IDENTIFY_IRON] += identify_mul(m->psi.d, m->iron_i.q) - identify_mul(m->psi.q, m->iron_i.d);
-    per_sigma(config, &row);
-    return row;
+    row->h_q30[IDENTIFY_FLUX] = m->i_m.q;
+    row->h_q30[IDENTIFY_IRON] += identify_mul(m->psi.d, m->iron_i.q) - identify_mul(m->psi.q, m->iron_i.d);
+    per_sigma(config, row);
 }
 
-int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_q30_t psi,
-                             dq_q30_t i_m)
+int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord,
+                             const identify_flux_t *at)
 {
-    const int32_t torque_at_ends = fx_sub_q31(identify_mul(psi.d, i_m.q), identify_mul(psi.q, i_m.d));
+    const int32_t torque_at_ends = fx_sub_q31(identify_mul(at->psi.d, at->i_m.q), identify_mul(at->psi.q, at->i_m.d));
     /* Q30/Q15 = Q15, with l in q15 of 2^l_shift; no table has an l below 1. */
-    const int32_t product = identify_mul(identify_mul(chord, psi.d), psi.q);
+    const int32_t product = identify_mul(identify_mul(chord, at->psi.d), at->psi.q);
     const int32_t salient_part = fx_sub_q31(product / fx_max_s32(l->l_qq, 1), product / fx_max_s32(l->l_d, 1));
     return fx_sub_q31(torque_at_ends,
                       fx_add_q31(identify_mul(chord, torque_at_ends), fx_shl_q31(salient_part, 15U - config->l_shift)));

@@ -24,22 +24,34 @@ typedef struct {
     int32_t h_q30[IDENTIFY_STATES];
 } jacobian_row_t;
 
+/** The voltage equations of both axes as a measurement of the states. Only words: identify_step() takes means of them
+ * one by one. */
 typedef struct {
-    dq_q30_t y;   /* residual with every state at its prior */
-    dq_q30_t psi; /* of the tables, at i_m */
-    dq_q30_t i_m;
-    dq_q30_t iron_i; /* change of i_m with the scale of the iron loss */
-    bool current;    /* the current is large enough to define the direction of the voltage drop */
     jacobian_row_t d, q;
+    dq_q30_t e;        /* residual */
+    int32_t noise_q30; /* standard deviation of the noise */
+} identify_measurement_t;
+
+typedef struct {
+    identify_measurement_t now; /* with every state at its prior, without noise */
+    dq_q30_t psi;               /* of the tables, at i_m */
+    dq_q30_t i_m;
+    dq_q30_t iron_i;             /* change of i_m with the scale of the iron loss */
+    bool current;                /* the current is large enough to define the direction of the voltage drop */
     jacobian_row_t psi_d, psi_q; /* change of psi with each state but the magnet's flux, for which it is 1 */
 } identify_model_t;
 
 void identify_model(const identify_config_t *config, const identify_point_t *point, const identify_tables_t *tables,
                     q31_t r_prior, identify_model_t *model);
-jacobian_row_t identify_torque_row(const identify_config_t *config, const identify_model_t *model);
+void identify_torque_row(const identify_config_t *config, const identify_model_t *model, jacobian_row_t *row);
 
-/** Torque over the period, from flux and magnetising current at its ends, Q30. */
-int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord, dq_q30_t psi,
-                             dq_q30_t i_m);
+/** Flux and magnetising current at both ends of the period. */
+typedef struct {
+    dq_q30_t psi, i_m;
+} identify_flux_t;
+
+/** Torque over the period, Q30. */
+int32_t identify_mean_torque(const identify_config_t *config, const flux_inductances_t *l, int32_t chord,
+                             const identify_flux_t *at);
 
 #endif

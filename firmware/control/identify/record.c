@@ -18,25 +18,24 @@ static bool is_torque_certain(const kalman_t *kalman)
            kalman->p_q30[kalman_p_index(IDENTIFY_LQ, IDENTIFY_LQ)] < level;
 }
 
-identify_record_t identify_record_get(const identify_state_t *state)
+void identify_record_get(const identify_state_t *state, identify_record_t *record)
 {
-    identify_record_t record; /* every field is written below */
-    record.version = IDENTIFY_RECORD_VERSION;
+    record->version = IDENTIFY_RECORD_VERSION;
     for (unsigned j = 0, p = 0; j < IDENTIFY_STATES; p += IDENTIFY_STATES - j, j++) {
-        record.x_q27[j] = state->kalman.x_q27[j];
-        record.variance_q30[j] = state->kalman.p_q30[p];
+        record->x_q27[j] = state->kalman.x_q27[j];
+        record->variance_q30[j] = state->kalman.p_q30[p];
     }
-    return record;
 }
 
 static bool is_plausible(const identify_record_t *record)
 {
-    bool good = record->version == IDENTIFY_RECORD_VERSION;
     for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
         const uint32_t above = (uint32_t)record->x_q27[j] + X_MAX_Q27; /* the lower end */
-        good = good && above <= 2U * X_MAX_Q27 && (uint32_t)record->variance_q30[j] - 1U < IDENTIFY_ONE_Q30;
+        if (above > 2U * X_MAX_Q27 || (uint32_t)record->variance_q30[j] - 1U >= IDENTIFY_ONE_Q30) {
+            return false;
+        }
     }
-    return good;
+    return record->version == IDENTIFY_RECORD_VERSION;
 }
 
 bool identify_record_restore(identify_state_t *state, const identify_record_t *record)

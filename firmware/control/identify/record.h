@@ -20,7 +20,7 @@ typedef struct {
     int32_t variance_q30[IDENTIFY_STATES];
 } identify_record_t;
 
-identify_record_t identify_record_get(const identify_state_t *state);
+void identify_record_get(const identify_state_t *state, identify_record_t *record);
 bool identify_record_restore(identify_state_t *state, const identify_record_t *record);
 
 #endif

@@ -454,15 +454,22 @@ void test_bad_configurations_are_rejected(void)
     BAD(leak[IDENTIFY_R] = Q31(0.3));
 }
 
+static identify_record_t record_of(const identify_state_t *from)
+{
+    identify_record_t record;
+    identify_record_get(from, &record);
+    return record;
+}
+
 void test_the_parameters_survive_a_power_cycle_with_a_larger_variance(void)
 {
     drive(deviating, 20);
-    const identify_record_t record = identify_record_get(&state);
+    const identify_record_t record = record_of(&state);
     const double magnet = value(IDENTIFY_FLUX);
     identify_state_t restored;
     identify_reset(&c, &restored);
     TEST_ASSERT_TRUE(identify_record_restore(&restored, &record));
-    const identify_record_t again = identify_record_get(&restored);
+    const identify_record_t again = record_of(&restored);
     for (int j = 0; j < IDENTIFY_STATES; j++) {
         TEST_ASSERT_EQUAL_INT32(record.x_q27[j], again.x_q27[j]);
         TEST_ASSERT_TRUE(again.variance_q30[j] > record.variance_q30[j] || record.variance_q30[j] == IDENTIFY_ONE_Q30);
@@ -479,7 +486,7 @@ void test_the_parameters_survive_a_power_cycle_with_a_larger_variance(void)
  * eighths. The q axis gets hardly any. */
 void test_a_record_with_a_large_variance_of_magnet_or_q_axis_starts_without_confidence(void)
 {
-    identify_record_t record = identify_record_get(&state);
+    identify_record_t record = record_of(&state);
     for (int n = 0; n < 4; n++) {
         record.variance_q30[IDENTIFY_FLUX] = IDENTIFY_ONE_Q30 / 8 - (n & 1);
         record.variance_q30[IDENTIFY_LQ] = (n & 2) ? IDENTIFY_ONE_Q30 / 3 : IDENTIFY_ONE_Q30 / 2;
@@ -491,7 +498,7 @@ void test_a_record_with_a_large_variance_of_magnet_or_q_axis_starts_without_conf
 void test_a_record_of_another_version_or_out_of_range_is_refused_and_changes_nothing(void)
 {
     drive(deviating, 1);
-    const identify_record_t good = identify_record_get(&state);
+    const identify_record_t good = record_of(&state);
     identify_record_t bad[5] = {good, good, good, good, good};
     bad[0].version++;
     bad[1].x_q27[0] = 4 * IDENTIFY_ONE_Q27 + 1;
@@ -500,7 +507,7 @@ void test_a_record_of_another_version_or_out_of_range_is_refused_and_changes_not
     bad[4].variance_q30[3] = IDENTIFY_ONE_Q30 + 1;
     for (int n = 0; n < 5; n++) {
         TEST_ASSERT_FALSE(identify_record_restore(&state, &bad[n]));
-        const identify_record_t after = identify_record_get(&state);
+        const identify_record_t after = record_of(&state);
         TEST_ASSERT_EQUAL_MEMORY(&good, &after, sizeof good);
     }
 }
