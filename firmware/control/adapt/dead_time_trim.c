@@ -3,13 +3,14 @@
 
 #include "fx/div.h"
 
-#define TIME_CONSTANT 16           /* periods until 1/e of the error is left */
+#define TIME_CONSTANT_SHIFT 4      /* 16 periods until 1/e of the error is left */
 #define VARIANCE_MAX_Q30 (1 << 28) /* a quarter of the prior's variance: half of its standard deviation */
-#define RANGE 4                    /* base +- base/4 */
+#define RANGE_SHIFT 2              /* base +- base/4 */
 
 static __attribute__((noinline)) int32_t limited(int32_t base, int32_t trim)
 {
-    return fx_clamp_q31(trim, -(base / RANGE), base / RANGE);
+    const int32_t max = base >> RANGE_SHIFT;
+    return fx_clamp_q31(trim, -max, max);
 }
 
 /* Voltage error that is not compensated yet (DT-1), in LSB of delta. */
@@ -40,9 +41,10 @@ dead_time_trim_t dead_time_trim_step(dead_time_trim_state_t *state, const dead_t
         return (dead_time_trim_t){in->dead_time, 0};
     }
     const int32_t w = uncompensated(in);
-    const int32_t round_up = (w > 0) ? TIME_CONSTANT - 1 : 1 - TIME_CONSTANT; /* at least 1 LSB unless w is 0 */
+    /* Away from 0: at least 1 LSB unless w is 0. */
+    const int32_t round_up = (w > 0) ? (1 << TIME_CONSTANT_SHIFT) - 1 : 0;
     const int32_t before = state->trim;
-    state->trim = (q15_t)limited(state->base, before + (w + round_up) / TIME_CONSTANT);
+    state->trim = (q15_t)limited(state->base, before + ((w + round_up) >> TIME_CONSTANT_SHIFT));
     return (dead_time_trim_t){(q15_t)(state->base + state->trim), x_shift(in, state->trim - before)};
 }
 

@@ -84,11 +84,14 @@ static void smooth(commission_curve_t *curve)
 
 bool commission_fit(const commission_data_t *data, commission_curve_t *curve)
 {
+    int32_t last = 0;
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
-        curve->knot[k] = mul_q30(data->cosine[0] * 32768, data->i[k]);
-        if (curve->knot[k] <= ((k > 0U) ? curve->knot[k - 1U] : 0)) {
+        const int32_t knot = mul_q30(data->cosine[0] * 32768, data->i[k]);
+        if (knot <= last) {
             return false;
         }
+        curve->knot[k] = knot;
+        last = knot;
     }
     curve->r = slope(data);
     for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {

@@ -54,22 +54,29 @@ angle_t angle_tracker_follow(const angle_tracker_config_t *config, angle_tracker
 __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *config, angle_tracker_state_t *state,
                                                  uint32_t theta_m)
 {
+    angle_t angle;
     if (state->samples >= 2U) {
-        angle_t angle = angle_tracker_follow(config, state, theta_m);
+        angle = angle_tracker_follow(config, state, theta_m);
         const uint32_t step = (uint32_t)angle.step << config->turn_shift;
         state->predicted += step - (uint32_t)angle.step;
         angle.step = (int32_t)step;
-        return angle;
+    } else {
+        const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
+        start(config, state, theta_e);
+        angle = result(theta_e, advance_at(config, state->omega_q30), state->omega_q30, false);
     }
-    const uint32_t theta_e = theta_m * config->pole_pairs + config->offset;
-    start(config, state, theta_e);
-    return result(theta_e, advance_at(config, state->omega_q30), state->omega_q30, false);
+    return angle;
 }
 
-/* By how much the sample was off its prediction, from what the loop has made of it: the new prediction is the old one +
- * step + k_p e with e = theta_e - the old one, so e = difference + k_p e; each round leaves the share k_p < 1/8 of its
- * error. */
-static int32_t error_of(const angle_tracker_config_t *config, const angle_tracker_state_t *state, uint32_t theta_e)
+/* The loop before a sample: by how much the sample was off its prediction, the speed, and the advance per period. */
+typedef struct {
+    int32_t error, omega_q30, step;
+} before_t;
+
+/* From what the loop has made of the sample: the new prediction is the old one + step + k_p e with e = theta_e - the
+ * old one, so e = difference + k_p e; each round leaves the share k_p < 1/8 of its error. */
+static __attribute__((noinline, cold)) before_t before(const angle_tracker_config_t *config,
+                                                       const angle_tracker_state_t *state, uint32_t theta_e)
 {
     const uint32_t step = (uint32_t)advance_at(config, state->omega_q30);
     const int32_t difference = (int32_t)(theta_e + step - state->predicted);
@@ -77,24 +84,17 @@ static int32_t error_of(const angle_tracker_config_t *config, const angle_tracke
     for (int n = 0; n < COAST_ROUNDS; n++) {
         error = (int32_t)((uint32_t)difference + 2U * (uint32_t)fx_mulhi(config->kp, error));
     }
-    return error;
-}
-
-/* The speed before a sample with this error. */
-static int32_t speed_before(const angle_tracker_config_t *config, const angle_tracker_state_t *state, int32_t error)
-{
-    const int32_t correction = fx_mulhi(config->ki_q29, error);
-    return fx_sat_q31((int64_t)state->omega_q30 - 2 * (int64_t)correction);
+    const int32_t omega_q30 = fx_add2_q31(state->omega_q30, -fx_mulhi(config->ki_q29, error));
+    return (before_t){error, omega_q30, advance_at(config, omega_q30)};
 }
 
 /* The step of the loop is undone. */
 __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
                                                   uint32_t theta_e)
 {
-    const int32_t error = error_of(config, state, theta_e);
-    state->omega_q30 = speed_before(config, state, error);
-    const int32_t now = advance_at(config, state->omega_q30);
-    const angle_t angle = result(theta_e - (uint32_t)error, now, state->omega_q30, true);
+    const before_t at = before(config, state, theta_e);
+    const angle_t angle = result(theta_e - (uint32_t)at.error, at.step, at.omega_q30, true);
+    state->omega_q30 = at.omega_q30;
     state->predicted = angle.theta_e + (uint32_t)angle.step;
     return angle;
 }
@@ -104,18 +104,18 @@ __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *
 static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
                                      const angle_t *angle)
 {
-    if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * state->repeats <= config->repeat_max) {
+    const int32_t repeats = (int32_t)state->repeats;
+    if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * repeats <= config->repeat_max) {
         return REPEATS_UNDECIDED; /* at rest: what follows would find the same, with a hundred instructions more */
     }
-    const int32_t error = error_of(config, state, angle->theta_e);
-    const int32_t signed_step = advance_at(config, speed_before(config, state, error));
-    const int64_t step = fx_abs_q31(signed_step);
-    const int64_t advance = step * state->repeats;
-    const int64_t behind = (signed_step < 0) ? (int64_t)error : -(int64_t)error;
+    const before_t at = before(config, state, angle->theta_e);
+    const int32_t step = fx_abs_q31(at.step);
+    const int64_t advance = (int64_t)step * repeats;
+    const int64_t behind = (at.step < 0) ? (int64_t)at.error : -(int64_t)at.error;
     if (advance <= config->repeat_max) {
         return REPEATS_UNDECIDED;
     }
-    return (behind - advance <= step * config->lag_steps) ? REPEATS_OF_SENSOR : REPEATS_OF_ROTOR;
+    return (behind - advance <= (int64_t)step * (int32_t)config->lag_steps) ? REPEATS_OF_SENSOR : REPEATS_OF_ROTOR;
 }
 
 __attribute__((cold)) angle_repeat_t angle_tracker_repeated(const angle_tracker_config_t *config,
@@ -149,7 +149,7 @@ __attribute__((cold)) bool angle_tracker_may_stick(const angle_tracker_config_t 
     return step * config->stop_periods > config->repeat_max;
 }
 
-bool angle_tracker_may_stop(const angle_tracker_state_t *state)
+__attribute__((noinline, cold)) bool angle_tracker_may_stop(const angle_tracker_state_t *state)
 {
-    return state->omega_q30 <= STOP_SPEED && state->omega_q30 >= -STOP_SPEED;
+    return fx_abs_q31(state->omega_q30) <= STOP_SPEED;
 }

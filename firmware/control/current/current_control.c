@@ -15,12 +15,13 @@ void current_control_reset(current_control_state_t *state)
 }
 
 /* f = psi* - (1 - b)(l i*) + (r/sigma) i*, where l i* is psi* minus the magnet's flux (CC-5). */
-static __attribute__((cold)) q15_t weighted_reference(const current_control_config_t *config, int32_t psi,
-                                                      int32_t psi_magnet, int32_t i_ref)
+static __attribute__((cold)) int32_t weighted_reference(const current_control_config_t *config, int32_t psi,
+                                                        int32_t psi_magnet, int32_t i_ref)
 {
-    const q15_t l_i = fx_sat_q15(psi - psi_magnet);
+    const int32_t l_i = fx_sat_q15_word(psi - psi_magnet);
     const int32_t reduction = l_i - fx_mul_q15(config->setpoint_weight, l_i);
-    return fx_sat_q15(psi - reduction + fx_mul_gain_q15(config->drop_gain, (q15_t)i_ref));
+    const int32_t drop = fx_sat_q15_word(fx_mulhi(config->drop_gain, i_ref * 65536)); /* Q16 * Q31 = Q15 */
+    return fx_sat_q15_word(psi - reduction + drop);
 }
 
 current_target_t current_control_target(const current_control_config_t *config, dq_q15_t i_ref,

@@ -22,7 +22,7 @@ static bool are_limits_valid(q31_t lo, q31_t hi)
     return lo < hi && lo >= Q31(-0.5) && hi <= Q31(0.5);
 }
 
-motor_check_t mrai_check(const mrai_config_t *c)
+__attribute__((cold)) motor_check_t mrai_check(const mrai_config_t *c)
 {
     if (c->r0 <= 0 || c->pole_gain <= 0 || c->period <= 0 || c->period > Q31(0.78) || c->flux_gain < 0 ||
         c->resistance_gain < 0 || c->flux_proportional_q24 < 0 || c->resistance_proportional_q24 < 0) {

@@ -41,14 +41,14 @@ static __attribute__((noinline)) q15_t drift_share(q31_t drift, q31_t full)
 static q15_t quality_step(q15_t quality, q15_t rate, bool adapting, q15_t drift_share_now)
 {
     const int32_t target = adapting ? Q15_MAX - drift_share_now : 0;
-    return fx_add_q15(quality, fx_mul_q15(rate, fx_sat_q15(target - quality)));
+    return fx_add_q15(quality, fx_mul_q15(rate, fx_sat_q15_word(target - quality)));
 }
 
 mrai_schedule_t mrai_schedule_step(const mrai_config_t *config, mrai_quality_t *quality, const mrai_schedule_in_t *in)
 {
     const q15_t omega = fx_q15_from_q31(in->sample->omega);
     const q15_t speed = fx_abs_q15(omega);
-    const q15_t current = fx_magnitude((q15_t)in->sample->i.d, (q15_t)in->sample->i.q);
+    const q15_t current = fx_magnitude(in->sample->i.d, in->sample->i.q);
     const mrai_state_t *identified = in->identifier;
     const bool adapt_flux = in->enabled && speed >= config->omega_min && current >= config->i_min;
     /* A flux error would drive the resistance to its limit, so it adapts only after the flux has settled. */
