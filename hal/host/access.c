@@ -11,12 +11,13 @@
 #include "hal/host/stations.h"
 
 /* Torque and current requests are bounded by what the motor data allow, which are floats. */
-static double bound_of(const parameter_t *p)
+static double bound_of(const fluxtrue_t *drive, const parameter_t *p)
 {
+    const motor_t *m = drive->drive.motor;
     if (p->set == stations_set_requested_Nm) {
-        return (double)motor.torque_max_Nm;
+        return (double)m->torque_max_Nm;
     }
-    return (double)((float)motor.current_reference.i_max / 32768.0f * motor.bases.current_A);
+    return (double)((float)m->current_reference.i_max / 32768.0f * m->bases.current_A);
 }
 
 /* Not isinf(): MinGW's macro converts its argument to a float. */
@@ -71,7 +72,7 @@ parameters_range_t parameters_range(const fluxtrue_t *drive, int handle)
         return (parameters_range_t){(double)range.lo, (double)range.hi, (double)range.least};
     }
     const parameter_t *p = &parameters[handle];
-    const double hi = is_number(p->hi) ? p->hi : bound_of(p);
+    const double hi = is_number(p->hi) ? p->hi : bound_of(drive, p);
     return (parameters_range_t){is_number(p->lo) ? p->lo : -hi, hi, 0.0};
 }
 

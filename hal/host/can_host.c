@@ -26,7 +26,7 @@ static bool take(can_queue_t *queue, can_frame_t *frame)
 
 void can_host_attach(fluxtrue_t *drive)
 {
-    drive->motor = motor;
+    drive->motor = *drive->data;
     ecu_init(&drive->ecu, &drive->motor);
     host_port_recall(drive);
     drive->on_bus = true;

@@ -22,13 +22,18 @@
 #define TEMPERATURE_MAX_C 500.0
 #define AMBIENT_C 20.0
 
-void fluxtrue_init(fluxtrue_t *instance)
+void fluxtrue_init_with(fluxtrue_t *instance, const motor_t *data)
 {
-    *instance = (fluxtrue_t){.winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
+    *instance = (fluxtrue_t){.data = data, .winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C}};
     external_watchdog_start(&instance->board.external_watchdog);
     nvm_host_erase(&instance->nvm);
-    instance->motor = motor;
+    instance->motor = *data;
     drive_init(&instance->drive, &instance->motor);
+}
+
+void fluxtrue_init(fluxtrue_t *instance)
+{
+    fluxtrue_init_with(instance, &motor);
 }
 
 const char *fluxtrue_version(void)
@@ -71,7 +76,7 @@ void fluxtrue_destroy(fluxtrue_t *drive)
 void fluxtrue_reset(fluxtrue_t *drive)
 {
     const bool on_bus = drive->on_bus;
-    fluxtrue_init(drive);
+    fluxtrue_init_with(drive, drive->data);
     if (on_bus) {
         can_host_attach(drive);
     }

@@ -46,8 +46,9 @@ struct fluxtrue {
         drive_t drive; /* also without a bus */
         ecu_t ecu;     /* begins with the drive */
     };
-    motor_t motor; /* the drive's: without a machine its slow monitors are disabled */
-    bool on_bus;   /* ecu_task_1khz() runs instead of task_1khz() */
+    const motor_t *data; /* of the machine, as generated */
+    motor_t motor;       /* the drive's: without a machine its slow monitors are disabled */
+    bool on_bus;         /* ecu_task_1khz() runs instead of task_1khz() */
     host_board_t board;
     nvm_host_t nvm;
     memory_t memory;
@@ -65,5 +66,7 @@ _Static_assert(offsetof(ecu_t, drive) == 0, "the drive must be where a port with
 
 /** As fluxtrue_create() leaves it, in memory of the caller's. */
 void fluxtrue_init(fluxtrue_t *instance);
+/** The same with other motor data than those compiled in; they outlive the instance. */
+void fluxtrue_init_with(fluxtrue_t *instance, const motor_t *data);
 
 #endif

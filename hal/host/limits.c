@@ -55,7 +55,7 @@ double limits_get_machine_monitors(const fluxtrue_t *drive)
 
 void limits_set_machine_monitors(fluxtrue_t *drive, double value)
 {
-    drive->motor = motor;
+    drive->motor = *drive->data;
     if (value == 0.0) {
         slow_monitors_without_machine(&drive->motor);
     }

@@ -40,6 +40,7 @@ static uint32_t library_checksum(void)
 /* The only members of an instance that hold addresses, except those of a bus. */
 static void remove_addresses(unsigned char *instance)
 {
+    memset(instance + offsetof(fluxtrue_t, data), 0, sizeof(const motor_t *));
     memset(instance + offsetof(fluxtrue_t, motor), 0, sizeof(motor_t));
     memset(instance + offsetof(fluxtrue_t, drive.period.flux_table), 0, sizeof(flux_table_config_t));
     memset(instance + offsetof(fluxtrue_t, drive.motor), 0, sizeof(const motor_t *));
@@ -50,6 +51,7 @@ static void remove_addresses(unsigned char *instance)
 
 static void add_addresses(fluxtrue_t *instance, bool machine_monitors)
 {
+    instance->data = &motor;
     limits_set_machine_monitors(instance, machine_monitors ? 1.0 : 0.0);
     instance->drive.period.flux_table = motor.flux_table;
     instance->drive.motor = &instance->motor;
@@ -73,7 +75,7 @@ int fluxtrue_state_save(const fluxtrue_t *drive, void *state, int size)
     if (size != fluxtrue_state_size()) {
         return FLUXTRUE_OUT_OF_RANGE;
     }
-    if (drive->on_bus) {
+    if (drive->on_bus || drive->data != &motor) {
         return FLUXTRUE_NO_STATE;
     }
     header_t header = {.mark = MARK,

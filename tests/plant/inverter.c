@@ -18,6 +18,8 @@ static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], 
         leg[x] = vdc_V * v->duty[x] - error_V[x];
     }
     from_phases(leg, u_s);
+    u_s[0] += v->series_V[0];
+    u_s[1] += v->series_V[1];
 }
 
 /* Whether the currents outside the zone keep the signs for which the errors were chosen. */

@@ -3,9 +3,10 @@
 #define PLANT_INVERTER_H
 /** Two-level inverter, averaged over the PWM period. Each leg's error opposes its current, as dry friction a motion:
  *   v_x = v_dc d_x - e_x,  e_x = hi_x for i_x > 0, -lo_x for i_x < 0, between: the value that holds i_x at 0
+ *   u_s = (2/3) sum v_x e^(j 2 pi x/3) + series_V
  *   switching:  hi, lo = dead-time loss + drop;   disabled:  d = 1/2, hi = lo = v_dc/2 + drop
  *   upper switch open:  hi = d v_dc + drop;   lower open: lo = (1 - d) v_dc + drop;   shorted: d = 1 or 0, hi = lo = 0
- * Source   docs/theory/plant.md (PL-11) ... (PL-14), (PL-23) ... (PL-25)
+ * Source   docs/theory/plant.md (PL-11) ... (PL-14), (PL-23) ... (PL-25), (PL-27)
  * Units    V, A, s
  * Rounding the polarity at a substep's end is used: first order at a zero crossing, second elsewhere
  * Context  simulation only */
@@ -17,6 +18,7 @@ typedef struct {
     double hi_d[3], lo_d[3]; /* part of the bound that is a duty error: dead time without drop */
     double zone_A[3];        /* below this magnitude the error is proportional to the current */
     double error_V[3];       /* of the last substep */
+    double series_V[2];      /* source behind the legs, stationary frame */
     int exact;               /* no leg has an error */
 } inverter_t;
 

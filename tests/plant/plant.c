@@ -253,6 +253,15 @@ static double short_circuit(plant_t *plant, bridge_t *bridge)
     return p->short_circuit_A * fmax(p->desaturation_s * p->pwm_hz, inverter_short_circuit(p, bridge->duty, 0));
 }
 
+/* Held for the period in the stationary frame, as the voltage of the duties is. */
+static void series_source(plant_t *plant, rotation_t rotor)
+{
+    const plant_params_t *p = &plant->params;
+    const double half_rad = 0.5 * p->pole_pairs * plant->mechanics.speed_rad_s / p->pwm_hz;
+    const double u_dq[2] = {p->series_d_V, p->series_q_V};
+    to_stationary(rotation_add(rotor, rotation_of(half_rad)), u_dq, plant->inverter.series_V);
+}
+
 void plant_advance(plant_t *plant, const double duty[3], int gates_on)
 {
     const plant_params_t *p = &plant->params;
@@ -264,6 +273,7 @@ void plant_advance(plant_t *plant, const double duty[3], int gates_on)
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};
     rotation_t rotor = update(plant);
+    series_source(plant, rotor);
     inverter_set(&plant->inverter, p, duty, bridge.switching, vdc_V);
     hardware_apply(plant, &bridge);
     for (int k = 0; k < n; k++) {

@@ -142,5 +142,11 @@ const char *plant_params_bad_field(const plant_params_t *params, int has_map)
     if (bad == NULL && !not_below_zero(params->hardware_safe_V)) {
         bad = "hardware_safe_V";
     }
+    if (bad == NULL && !isfinite(params->series_d_V)) {
+        bad = "series_d_V";
+    }
+    if (bad == NULL && !isfinite(params->series_q_V)) {
+        bad = "series_q_V";
+    }
     return bad != NULL ? bad : bad_electronics(params);
 }

@@ -30,7 +30,8 @@ typedef struct {
     double hardware_safe_V; /* the board shorts the phases above it while its safe state is requested; 0: it cannot */
     int substeps;           /* per PWM period, at least 10 */
     int ideal_inverter;     /* no dead time, no device drop */
-    int phase_open[3];      /* the motor lead is broken */
+    double series_d_V, series_q_V; /* source between inverter and machine: rotor frame, middle of the period (PL-27) */
+    int phase_open[3];             /* the motor lead is broken */
     /* switches: upper a, b, c, lower a, b, c */
     int switch_open[6];     /* never switched on; its diode remains */
     int switch_shorted[6];  /* always conducts, in both directions */

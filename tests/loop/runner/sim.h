@@ -34,6 +34,9 @@ struct fluxtrue; /* hal/host/instance.h */
 SIM_API sim_t *sim_create(int controller);
 /** The same with firmware that belongs to the caller and outlives the simulation. */
 SIM_API sim_t *sim_create_around(struct fluxtrue *firmware);
+/** The firmware with other motor data than those it was compiled with: a motor_t, which outlives the simulation. NULL
+ *  also if size is not that of this library's motor_t. */
+SIM_API sim_t *sim_create_for(const void *data, unsigned size);
 SIM_API void sim_destroy(sim_t *sim);
 /** The firmware of this simulation, for fluxtrue_memory_read() and _write(); NULL: another controller. */
 SIM_API struct fluxtrue *sim_firmware(sim_t *sim);

@@ -70,11 +70,16 @@ static void twin_destroy_(void *self)
     twin_destroy(self);
 }
 
+static sim_t *create_around(fluxtrue_t *firmware, void (*destroy)(void *self))
+{
+    return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, destroy,
+                                              firmware_switches, firmware_gate_fault, NULL});
+}
+
 sim_t *sim_create(int controller)
 {
     if (controller == SIM_FIRMWARE) {
-        return sim_create_with((sim_controller_t){fluxtrue_create(), firmware_step, firmware_set, firmware_get, NULL,
-                                                  firmware_destroy, firmware_switches, firmware_gate_fault, NULL});
+        return create_around(fluxtrue_create(), firmware_destroy);
     }
     if (controller == SIM_TWIN) {
         return sim_create_with(
@@ -85,8 +90,16 @@ sim_t *sim_create(int controller)
 
 sim_t *sim_create_around(fluxtrue_t *firmware)
 {
-    return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, firmware_keep,
-                                              firmware_switches, firmware_gate_fault, NULL});
+    return create_around(firmware, firmware_keep);
+}
+
+sim_t *sim_create_for(const void *data, unsigned size)
+{
+    fluxtrue_t *firmware = (size == sizeof firmware->motor) ? fluxtrue_create() : NULL;
+    if (firmware != NULL) {
+        fluxtrue_init_with(firmware, data);
+    }
+    return create_around(firmware, firmware_destroy);
 }
 
 fluxtrue_t *sim_firmware(sim_t *sim)

@@ -2,6 +2,7 @@
 """motor build: the files, their atomicity, and the C they contain."""
 
 import ctypes
+import html
 import json
 import shutil
 import subprocess
@@ -96,15 +97,33 @@ def test_a_file_in_place_of_the_output_folder_is_said(write, tmp_path):
 def test_the_report_has_its_plots_and_a_build_without_it_removes_the_old_ones(write, tmp_path):
     out = tmp_path / "out"
     build(write(), out, report=True)
-    assert len(PLOTS) == 8
-    assert names(out) == PLAIN | {*PLOTS} | {"report.html"}
+    assert len(PLOTS) == 9
+    drawn = {*PLOTS} - {"plot_inductances.png"}  # two constants
+    assert names(out) == PLAIN | drawn | {"report.html"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    for plot in PLOTS:
+    assert "measured by injection" in page and "not measured" not in page
+    assert (out / "report.txt").read_text(encoding="utf-8") in html.unescape(page)
+    for plot in drawn:
         assert f'src="{plot}"' in page
         assert (out / plot).read_bytes().startswith(b"\x89PNG")
     (out / "plot_of_the_user.png").write_bytes(b"")
     build(write(), out, report=False)
     assert names(out) == PLAIN | {"plot_of_the_user.png"}
+
+
+def test_without_a_simulation_the_report_says_why_and_draws_the_model_only(write, tmp_path, monkeypatch):
+    def fails(*_):
+        raise FluxtrueError("cc: not found")
+
+    monkeypatch.setattr("fluxtrue_tools.motor.measured.simulated", fails)
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "plot_steps.png").write_bytes(b"of an older build")
+    build(write(), out, report=True)
+    assert not (out / "plot_steps.png").exists() and (out / "plot_current_loop.png").exists()
+    text = (out / "report.txt").read_text(encoding="utf-8")
+    assert "not measured       current loop: cc: not found" in text and "measured by injection" not in text
+    assert "plot_steps.png" not in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_motor_json_is_complete_and_plain_json(tmp_path):
@@ -139,7 +158,7 @@ def test_check_refuses_what_build_refuses_and_both_name_the_file(write, tmp_path
 def test_check_writes_plots_only_when_asked(cli, write, tmp_path):
     result = cli("check", write(), "--plots", tmp_path / "plots")
     assert result.returncode == 0
-    assert {path.name for path in (tmp_path / "plots").iterdir()} == set(PLOTS)
+    assert {path.name for path in (tmp_path / "plots").iterdir()} == set(PLOTS) - {"plot_inductances.png"}
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang", "arm-none-eabi-gcc"])

@@ -8,7 +8,7 @@ import pytest
 from conftest import MOTORS
 
 from fluxtrue_tools.motor.config import ANGLE_PER_PERIOD_MAX, ANGLE_TURNING
-from fluxtrue_tools.motor.current_loop import SIGMA, current_loop, turning, usual
+from fluxtrue_tools.motor.current_loop import SIGMA, CurrentLoop, current_loop, turning, usual
 from fluxtrue_tools.motor.derived import LOOP_MISSING_PERIODS, TURNING_APPROACH, TURNING_FEEDBACK, TURNING_INTEGRAL
 from fluxtrue_tools.motor.motor import load_motor
 
@@ -60,8 +60,18 @@ def test_a_motor_has_the_law_that_its_firmware_has() -> None:
     hsm1 = load_motor(MOTORS / "hsm1")
     top = hsm1.config.omega_max_rad_s / hsm1.config.inverter.pwm_hz
     assert not hsm1.config.is_turning
-    assert current_loop(hsm1, hsm1.config.machine.speed_max_rpm).margins() == usual(top).margins()
+    at_top = current_loop(hsm1, hsm1.config.machine.speed_max_rpm).margins()
+    assert at_top == pytest.approx(usual(top).margins(), rel=0.1)  # the difference is the resistance
     assert current_loop(hsm1, 0.0, 0.75).margins()[0] < current_loop(hsm1, 0.0, 1.25).margins()[0]
+
+
+def test_the_resistance_damps_and_the_drop_that_is_added_undoes_it() -> None:
+    assert usual(0.0, loss=0.02).largest_pole() == pytest.approx(0.940, abs=0.001)  # (CC-9), rho = 0.06
+    lossy = CurrentLoop(0.3, SIGMA, 0.01, loss=0.05)
+    assert lossy.gain(np.array([1.0 + 1e-6])) == pytest.approx(
+        (1 - math.exp(-0.05)) / 0.05 * (SIGMA + 1e4) / (1.0 - np.exp(-0.3j - 0.05)), rel=1e-4
+    )
+    assert turning(0.3, loss=0.01).margins()[0] == pytest.approx(turning(0.3).margins()[0], abs=1.0)
 
 
 def overshoot(theta: float, slope: float) -> float:

@@ -210,3 +210,21 @@ void test_one_leg_at_its_error_bound_and_two_within_theirs_match_the_closed_form
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.067485, t->i_d_A);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.0, t->i_q_A);
 }
+
+/* Its voltage is constant in the stationary frame for a period: the mean in the turning frame is smaller by sinc. */
+void test_a_source_in_series_adds_its_voltage_to_that_of_the_legs(void)
+{
+    const double x = PI * 400.0 / p.pwm_hz;
+    p.ideal_inverter = 1;
+    p.speed_rad_s = TWO_PI * 400.0 / 3.0;
+    p.theta_m_rad = 0.4;
+    p.series_d_V = 3.0;
+    p.series_q_V = -4.0;
+    const plant_truth_t *t = start();
+    plant_advance(plant, (double[3]){0.5, 0.5, 0.5}, 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.0 * sin(x) / x, t->u_d_V);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -4.0 * sin(x) / x, t->u_q_V);
+    bench_drive(plant, 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 13.0 * sin(x) / x, t->u_d_V);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -4.0 * sin(x) / x, t->u_q_V);
+}

@@ -6,7 +6,7 @@ from pathlib import Path
 from fluxtrue_tools.motor.emit_c import motor_si_c, motor_tables_c
 from fluxtrue_tools.motor.emit_json import motor_json
 from fluxtrue_tools.motor.motor import Motor, load_motor, naming
-from fluxtrue_tools.motor.names import BUILT, DBC_NAME, HTML, PLOTS, source_files
+from fluxtrue_tools.motor.names import BUILT, DBC_NAME, HTML, PLOTS, TEXT, source_files
 from fluxtrue_tools.motor.report import report_text
 from fluxtrue_tools.outputs import Outputs
 
@@ -18,7 +18,7 @@ def generate(motor: Motor) -> dict[str, str]:
         "motor_si.c": motor_si_c(motor),
         "motor.json": motor_json(motor),
         DBC_NAME: motor.bus.dbc,
-        "report.txt": report_text(motor),
+        TEXT: report_text(motor),
     }
 
 
@@ -39,11 +39,11 @@ def build_into(folder: Path, outputs: Outputs, out: Path, report: bool) -> Motor
     staging = outputs.scratch(out)
     for name, text in files.items():
         (staging / name).write_text(text, encoding="utf-8")
+    drawn: list[str] = []
     if report:
         from fluxtrue_tools.motor.html import write_report
 
-        write_report(motor, files["report.txt"], staging)
-    else:
-        for name in (HTML, *PLOTS):  # a file of an older build would seem to belong to these tables
-            outputs.remove(out, name)
+        drawn = write_report(motor, files[TEXT], staging)
+    for name in {HTML, *PLOTS} - set(drawn):  # a file of an older build would seem to belong to these tables
+        outputs.remove(out, name)
     return motor

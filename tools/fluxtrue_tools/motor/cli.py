@@ -44,8 +44,9 @@ def check(folder: Path, plots: Path | None) -> None:
             files = generate(resolved)  # what build refuses, check must refuse
         if plots is not None:
             from fluxtrue_tools.motor.html import write_plots
+            from fluxtrue_tools.motor.measured import measure_loop
 
-            write_plots(resolved, outputs.scratch(plots))
+            write_plots(resolved, measure_loop(resolved), outputs.scratch(plots))
     _warn(resolved)
     click.echo(files["report.txt"], nl=False)
 

@@ -2,32 +2,42 @@
 """The sampled loop of current control as a linear model: docs/theory/current-control.md, sections 7 and 8."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fluxtrue_tools.motor.derived import CLOSED_LOOP_SHARE, DELAY_PERIODS, TURNING_FEEDBACK, TURNING_INTEGRAL
+from fluxtrue_tools.motor.envelope import available_flux
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.motor import Motor
 
 SIGMA = 1.0 / (2.0 * DELAY_PERIODS)  # per period
 INTEGRAL = CLOSED_LOOP_SHARE * (1.0 - CLOSED_LOOP_SHARE) * SIGMA
+POINT_FLUX, POINT_TORQUE = 0.85, 0.25  # shares of the available ones
+POINT_CURRENT = 0.95  # of i_max_A, at most
+POINTS = 400
 NEAR_ZERO = 1e-3  # |z - 1|, |z - pole|: there the loop has no finite gain
 
 
 class CurrentLoop:
-    """The loop at the machine's voltage in the rotor's frame, (CC-12), without resistance.
+    """The loop at the machine's voltage in the rotor's frame, (CC-12).
 
     theta: electrical angle per period, rad; k and i: feedback and integral part per period; slope: of the tables'
-    flux over the machine's, so that an inductance 25 % smaller than the tables' is 4/3.
+    flux over the machine's, so that an inductance 25 % smaller than the tables' is 4/3; loss: decay of the flux on the
+    resistance per period, R T_s/l; drop: what the law adds for the measured current, per period.
     """
 
-    def __init__(self, theta: float, k: complex, i: complex, slope: float = 1.0) -> None:
-        self.pole, self.k, self.i, self.slope = np.exp(-1j * theta), k, i, slope
+    def __init__(
+        self, theta: float, k: complex, i: complex, slope: float = 1.0, loss: float = 0.0, drop: complex = 0.0
+    ) -> None:
+        self.pole, self.k, self.i, self.slope, self.drop = np.exp(-1j * theta - loss), k, i, slope, drop
+        self.hold = -math.expm1(-loss) / loss if loss > 0.0 else 1.0
 
     def gain(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Open loop at z."""
-        return np.asarray(self.slope * (self.k + self.i / (z - 1.0)) / (z * (z - self.pole)))
+        feedback = self.slope * (self.k + self.i / (z - 1.0)) - self.drop
+        return np.asarray(self.hold * feedback / (z * (z - self.pole)))
 
     def margins(self, points: int = 20001) -> tuple[float, float]:
         """Phase margin in degrees over all frequencies of both signs, largest sensitivity."""
@@ -40,32 +50,74 @@ class CurrentLoop:
     def largest_pole(self) -> float:
         """Magnitude of the slowest eigenvalue."""
         plant = np.polymul([1.0, -self.pole], [1.0, -1.0, 0.0])
-        return float(np.abs(np.roots(np.polyadd(plant, self.slope * np.array([0, 0, self.k, self.i - self.k])))).max())
+        k, i = self.slope * self.k - self.drop, self.slope * self.i
+        return float(np.abs(np.roots(np.polyadd(plant, self.hold * np.array([0, 0, k, i - k])))).max())
 
 
 def usual(
-    theta: float, share: float = 1.0, advance: float = 0.0, sigma: float = SIGMA, slope: float = 1.0
+    theta: float,
+    share: float = 1.0,
+    advance: float = 0.0,
+    sigma: float = SIGMA,
+    slope: float = 1.0,
+    loss: float = 0.0,
 ) -> CurrentLoop:
     """Section 3, with a share of the feed-forward and an additional advance of the angle."""
     turn = np.exp(1j * (advance - 0.5) * theta)
-    return CurrentLoop(theta, turn * (sigma - 1j * share * theta), turn * sigma * INTEGRAL, slope)
+    return CurrentLoop(theta, turn * (sigma - 1j * share * theta), turn * sigma * INTEGRAL, slope, loss)
 
 
-def turning(theta: float, slope: float = 1.0) -> CurrentLoop:
+def turning(theta: float, slope: float = 1.0, loss: float = 0.0) -> CurrentLoop:
     """Section 8: the voltage is stated half a period before the end of the one in which it acts."""
     half = np.exp(-0.5j * theta)
     k = TURNING_FEEDBACK * np.exp(-1.5j * theta)
-    return CurrentLoop(theta, half * k, half * TURNING_INTEGRAL * (k + 2j * math.sin(0.5 * theta)), slope)
+    return CurrentLoop(
+        theta, half * k, half * TURNING_INTEGRAL * (k + 2j * math.sin(0.5 * theta)), slope, loss, half * loss
+    )
+
+
+def operating_point(motor: Motor, speed_rpm: float, inductance: float = 1.0) -> tuple[float, float]:
+    """i_d and i_q of the plots: part of the torque, with a reserve of voltage.
+
+    Smaller inductances weaken the field less: they take more i_d for it.
+    """
+    psi = POINT_FLUX * float(available_flux(motor, np.array([speed_rpm]))[0])
+    possible = min(float(motor.limits.torque_max(np.array([psi]))[0]), motor.config.machine.torque_max_Nm)
+    (contour,) = motor.solver.contours(np.array([POINT_TORQUE * max(possible, 0.0)]))
+    i_d, i_q = (float(x[0]) for x in contour.at(np.array([psi])))
+    largest = math.sqrt((POINT_CURRENT * motor.config.machine.i_max_A) ** 2 - i_q**2)
+    return max(i_d / min(inductance, 1.0), -largest), i_q
+
+
+def turn_per_period(motor: Motor, speed_rpm: float) -> float:
+    """Electrical angle, rad."""
+    return speed_rpm * motor.config.machine.pole_pairs * 2 * math.pi / 60 / motor.config.inverter.pwm_hz
 
 
 def current_loop(motor: Motor, speed_rpm: float, inductance: float = 1.0) -> CurrentLoop:
-    """The loop of a motor at a speed, with true inductances of so many times the tables'."""
-    theta = speed_rpm * motor.config.machine.pole_pairs * 2 * math.pi / 60 / motor.config.inverter.pwm_hz
-    slope = 1.0 / inductance
-    return turning(theta, slope) if motor.config.is_turning else usual(theta, slope=slope)
+    """The loop of a motor at a speed and its operating point, with so many times the tables' inductances.
+
+    Of the resistance the mean over both axes is taken: without it the axes are alike, whatever their inductances.
+    """
+    i_d, i_q = operating_point(motor, speed_rpm, inductance)
+    per_H = 0.5 / float(motor.model.psi_d(i_d, i_q, nd=1)) + 0.5 / float(motor.model.psi_q(i_d, i_q, nq=1))
+    loss = motor.config.machine.r_ohm * per_H / inductance / motor.config.inverter.pwm_hz
+    theta, slope = turn_per_period(motor, speed_rpm), 1.0 / inductance
+    return turning(theta, slope, loss) if motor.config.is_turning else usual(theta, slope=slope, loss=loss)
 
 
-def frequencies_Hz(motor: Motor, points: int) -> Array:
-    """Of the open loop's plot: up to half of the PWM frequency."""
+@dataclass(frozen=True)
+class Response:
+    """The open loop at frequencies in the rotor's frame, ascending; negative ones turn against the field."""
+
+    frequency_Hz: Array
+    gain: NDArray[np.complex128]
+
+
+def model_response(motor: Motor, speed_rpm: float, inductance: float = 1.0) -> Response:
+    """The model, up to half of the PWM frequency in both directions."""
     half = 0.5 * motor.config.inverter.pwm_hz
-    return np.geomspace(1e-3 * half, half, points)
+    positive = np.geomspace(1e-3 * half, half, POINTS)
+    frequency = np.concatenate([-positive[::-1], positive])
+    z = np.exp(2j * np.pi * frequency / motor.config.inverter.pwm_hz)
+    return Response(frequency, current_loop(motor, speed_rpm, inductance).gain(z))

@@ -6,10 +6,11 @@ from pathlib import Path
 
 FILE_NAME = "motor.toml"
 HTML = "report.html"
-_FIGURES = ("current_loop", "envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit")
+TEXT = "report.txt"
+_FIGURES = ("current_loop", "envelope", "error", "flux", "inductances", "loci", "losses", "short_circuit", "steps")
 PLOTS = tuple(f"plot_{what}.png" for what in _FIGURES)
 DBC_NAME = "fluxtrue.dbc"
-BUILT = ("motor_tables.c", "motor_si.c", "motor.json", DBC_NAME, "report.txt", HTML, *PLOTS)
+BUILT = ("motor_tables.c", "motor_si.c", "motor.json", DBC_NAME, TEXT, HTML, *PLOTS)
 
 
 def source_files(folder: Path) -> tuple[Path, ...]:

@@ -2,6 +2,7 @@
 """The report's figures, and those of them that lie over the current plane."""
 
 from collections.abc import Callable
+from functools import partial
 
 import matplotlib
 
@@ -10,16 +11,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
+from fluxtrue_tools.motor.envelope import available_flux
 from fluxtrue_tools.motor.flux_model import Array, flux, torque
 from fluxtrue_tools.motor.flux_tables import error_plane
-from fluxtrue_tools.motor.loop_plots import current_loop_figure
+from fluxtrue_tools.motor.loop_plots import current_loop_figure, step_figure
+from fluxtrue_tools.motor.measured import Measured
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE
 from fluxtrue_tools.motor.references import lookup_references
 from fluxtrue_tools.motor.speed_plots import envelope_figure, losses_figure, short_circuit_figure
 
 POINTS = 121
+LIMITS_SHOWN = 7
 
 
 def _plane(motor: Motor, both_halves: bool) -> tuple[Array, Array]:
@@ -90,6 +95,23 @@ def _lines(axes: Axes, d: Array, q: Array, z: Array, colour: str, label: str) ->
     axes.plot([], [], color=colour, linewidth=0.6, label=label)
 
 
+def _voltage_limits(axes: Axes, motor: Motor, d: Array, q: Array, psi: Array) -> None:
+    """Where the machine needs all of the planned voltage, at some speeds between the first that matters and the top."""
+    top_rpm = motor.config.machine.speed_max_rpm
+    speed = np.linspace(0.0, top_rpm, 401)[1:]
+    available = available_flux(motor, speed)
+    matters = speed[(available < np.nanmax(psi)) & (available > np.nanmin(psi))]
+    if len(matters) == 0:
+        return
+    ticks = MaxNLocator(LIMITS_SHOWN).tick_values(matters[0], matters[-1])
+    shown = np.unique([*ticks[(ticks >= matters[0]) & (ticks <= matters[-1])], matters[-1]])
+    level = available_flux(motor, shown)
+    lines = axes.contour(d, q, psi, levels=np.sort(level), colors="tab:blue", linewidths=0.8)
+    named = {float(x): f"{rpm:.0f} rpm" for x, rpm in zip(level, shown, strict=True)}
+    axes.clabel(lines, fontsize=7, fmt=lambda x: named[min(named, key=lambda known: abs(known - x))])
+    axes.plot([], [], color="tab:blue", linewidth=0.8, label="voltage limit at a speed")
+
+
 def _mtpv(motor: Motor) -> tuple[Array, Array]:
     """Contour ends that lie inside the circle: the voltage, not the current, limits the torque there."""
     torques = np.linspace(0.0, motor.solver.torque_top_Nm * 0.999, 60)
@@ -106,7 +128,7 @@ def loci_figure(motor: Motor) -> Figure:
     inside = np.hypot(d, q) <= motor.config.machine.i_max_A
     t = torque(motor.model, motor.config.machine.pole_pairs, d, q)
     _lines(axes, d, q, np.where(inside, t, np.nan), "tab:gray", "torque, N·m")
-    _lines(axes, d, q, np.where(inside, 1e3 * flux(motor.model, d, q), np.nan), "tab:blue", "|psi|, mVs")
+    _voltage_limits(axes, motor, d, q, np.where(inside, flux(motor.model, d, q), np.nan))
     angle = np.linspace(np.pi / 2, np.pi, 100)
     i_max = motor.config.machine.i_max_A
     axes.plot(i_max * np.cos(angle), i_max * np.sin(angle), "k", label="current limit")
@@ -162,13 +184,23 @@ def error_figure(motor: Motor) -> Figure:
     return figure
 
 
-FIGURES: dict[str, tuple[str, Callable[[Motor], Figure]]] = {
+Draw = Callable[[Motor], Figure]
+FIGURES: dict[str, tuple[str, Draw]] = {
     "plot_flux.png": ("Flux linkages (symmetrised)", flux_figure),
     "plot_inductances.png": ("Inductances", inductance_figure),
     "plot_loci.png": ("Current references: MTPA, field weakening, MTPV", loci_figure),
     "plot_envelope.png": ("Torque-speed envelope", envelope_figure),
     "plot_losses.png": ("Efficiency and losses", losses_figure),
     "plot_short_circuit.png": ("Active short circuit", short_circuit_figure),
-    "plot_current_loop.png": ("Current loop", current_loop_figure),
     "plot_error.png": ("Table error against the map", error_figure),
 }
+
+
+def figures(motor: Motor, measured: Measured) -> dict[str, tuple[str, Draw]]:
+    """All that there is to draw: constant inductances are two numbers, and no measurement is no figure."""
+    found = FIGURES | {"plot_current_loop.png": ("Current loop", partial(current_loop_figure, measured=measured))}
+    if measured.steps:
+        found["plot_steps.png"] = ("Steps of the current", partial(step_figure, measured=measured))
+    if motor.flux_map is None:
+        del found["plot_inductances.png"]
+    return found

@@ -8,6 +8,7 @@ import numpy as np
 from fluxtrue_tools.bus.scales import QUANTITIES, carriers, standard_factors
 from fluxtrue_tools.motor import doubts
 from fluxtrue_tools.motor.load import load_lines
+from fluxtrue_tools.motor.loop_report import model_lines
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.names import DBC_NAME
 from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
@@ -162,6 +163,7 @@ def report_text(motor: Motor) -> str:
         _tables(motor),
         _references(motor),
         _short_circuit(motor),
+        model_lines(motor),
         _bases(motor),
         _bus(motor),
         load_lines(motor),

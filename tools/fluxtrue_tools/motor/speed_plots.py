@@ -6,14 +6,38 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fluxtrue_tools.motor.envelope import torque_envelope
+from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.losses import losses
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
 
 SPEED, TORQUE = "speed, rpm", "torque, N·m"
+BATTERY_SHARES = ((0.25, ":"), (0.5, "--"))  # of the largest power that the machine can feed back
+
+
+def _allowed(torque_Nm: Array, fed_W: Array, limit_W: float) -> float:
+    """Largest generating torque at a speed; NaN beyond the envelope. Slow machines feed nothing back at all torque."""
+    possible = ~np.isnan(fed_W)
+    rising = np.maximum.accumulate(fed_W[possible])
+    return float(np.interp(limit_W, rising, torque_Nm[possible])) if rising.size else 0.0
+
+
+def _generating_limits(axes: Axes, motor: Motor) -> None:
+    """What remains of the generating torque if the battery takes only a share of the largest power, (LM-3)."""
+    found = losses(motor)
+    shaft_W = found.torque_Nm[:, None] * found.speed_rpm[None, :] * 2 * np.pi / 60
+    fed_W = shaft_W - found.total_W
+    largest_W = float(np.nanmax(fed_W))
+    if largest_W <= 0.0:
+        return
+    for share, style in BATTERY_SHARES:
+        allowed = [_allowed(found.torque_Nm, column, share * largest_W) for column in fed_W.T]
+        name = f"battery takes {share * largest_W / 1e3:.3g} kW"
+        axes.plot(found.speed_rpm, -np.array(allowed), "tab:red", lw=1, ls=style, label=name)
 
 
 def envelope_figure(motor: Motor) -> Figure:
@@ -30,6 +54,7 @@ def envelope_figure(motor: Motor) -> Figure:
         axes.plot(speed, sign * limited, "tab:green", lw=2, label="with torque_max_Nm" if named else None)
         shaft_kW = sign * limited * speed * 2 * np.pi / 60 / 1e3
         power.plot(speed, shaft_kW, "tab:blue", lw=1, label="shaft power" if named else None)
+    _generating_limits(axes, motor)
     axes.axhline(0.0, color="k", lw=0.6)
     axes.set(xlabel=SPEED, ylabel=f"{TORQUE} (generating below 0)", xlim=(0, machine.speed_max_rpm))
     power.set(ylabel="shaft power, kW")
@@ -38,7 +63,7 @@ def envelope_figure(motor: Motor) -> Figure:
         ax.set_ylim(-top, top)
     axes.set_title(
         f"Torque at {motor.config.inverter.vdc_V:g} V; the references plan {motor.derived.ref_v_ratio:.3f} of it as "
-        "phase peak\nThe limits of the battery, which the bus sends, are not drawn"
+        "phase peak\nRed: examples of a generating limit, which the bus sends; losses as in the figure of them"
     )
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     return figure

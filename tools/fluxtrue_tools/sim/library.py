@@ -28,6 +28,7 @@ REASONS: Final = {
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 _SIGNATURES = {
     "sim_create": (ctypes.c_void_p, [ctypes.c_int]),
+    "sim_create_for": (ctypes.c_void_p, [ctypes.c_void_p, ctypes.c_uint]),
     "sim_destroy": (None, [ctypes.c_void_p]),
     "sim_map": (
         ctypes.c_int,

@@ -55,16 +55,21 @@ def plant_parameters(machine: dict[str, Any], inverter: dict[str, Any]) -> dict[
     }
 
 
+def flux_map_of(data: dict[str, Any]) -> lib.FluxMap | None:
+    """The map of motor.json; None: constant inductances."""
+    flux_map, axes = data["map"], ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
+    return None if flux_map is None else lib.FluxMap(*(flux_map[axis] for axis in axes))
+
+
 def read(folder: MotorFolder) -> Motor:
     """What lies in a built motor's folder."""
     data = json.loads(folder.data.read_text(encoding="utf-8"))
-    machine, flux_map = data["machine"], data["map"]
-    axes = ("id_A", "iq_A", "psi_d_Vs", "psi_q_Vs")
+    machine = data["machine"]
     return Motor(
         name=folder.name,
         folder=folder,
         library=lib.load(folder.library),
-        flux_map=None if flux_map is None else lib.FluxMap(*(flux_map[axis] for axis in axes)),
+        flux_map=flux_map_of(data),
         plant=plant_parameters(machine, data["inverter"]),
         inertia_kgm2=machine["inertia_kgm2"],
         torque_max_Nm=machine["torque_max_Nm"],

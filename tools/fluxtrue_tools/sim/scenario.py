@@ -163,6 +163,8 @@ class Plant(Strict):
     short_circuit_A: Positive | None = None
     desaturation_s: NotNegative | None = None
     desaturation_open: bool | None = None
+    series_d_V: float | None = None
+    series_q_V: float | None = None
     current_full_scale_A: Positive | None = None
     adc_bits: Annotated[int, Field(ge=1, le=24)] | None = None
     current_gain: Three | None = None
