@@ -195,14 +195,16 @@ def test_every_output_of_every_command_is_refused_before_any_work(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "input").write_text("not what any command reads")
+    (tmp_path / "folder").mkdir()
     arguments = [*name.split(), max(option.opts, key=len), value]
     for param in ALL[name].params:
         if param.required and param is not option:
-            needed = "1" if isinstance(param.type, click.IntRange) else "input"
+            is_folder = isinstance(param.type, paths.InputFolder)
+            needed = "1" if isinstance(param.type, click.IntRange) else "folder" if is_folder else "input"
             needed = str(param.type.min) if isinstance(param.type, click.FloatRange) else needed
             needed = str(param.type.choices[0]) if isinstance(param.type, click.Choice) else needed
             arguments += [needed] if isinstance(param, click.Argument) else [param.opts[-1], needed]
     assert cli.run(arguments) == 2
     message = capsys.readouterr().err
     assert message.startswith(f"error: {max(option.opts, key=len)} ") and message.count("\n") == 1, message
-    assert names(tmp_path) == ["input", "loop"]
+    assert names(tmp_path) == ["folder", "input", "loop"]

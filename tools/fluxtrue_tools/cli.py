@@ -129,3 +129,8 @@ def run(arguments: Sequence[str]) -> int:
         return EXIT_INTERRUPTED
     except BrokenPipeError:
         return _broken_pipe()
+    except OSError as error:  # the system's word on a path that no command has foreseen
+        if error.filename is None:
+            raise
+        click.echo(f"error: {os.fsdecode(error.filename)}: {error.strerror}", err=True)
+        return EXIT_ERROR

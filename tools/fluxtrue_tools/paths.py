@@ -6,6 +6,7 @@ No command uses click's own Path: an input declared here is protected from every
 
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,11 @@ import click
 from click.core import ParameterSource
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.kinds import label
 from fluxtrue_tools.outputs import Outputs
 
 _KEY = "fluxtrue.outputs"
 PICTURES = (".png", ".svg", ".pdf")
-
-
-def _label(param: click.Parameter | None) -> str:
-    if isinstance(param, click.Option):
-        return max(param.opts, key=len)
-    return param.human_readable_name if param is not None else "path"
 
 
 class GivenPath(click.ParamType):
@@ -34,16 +30,16 @@ class GivenPath(click.ParamType):
         """Text to a path."""
         text = os.fspath(value)
         if not text:
-            raise FluxtrueError(f"{_label(param)} '': empty, allowed: the name of a {self.name}")
+            raise FluxtrueError(f"{label(param)} '': empty, allowed: the name of a {self.name}")
         if "\0" in text:
-            raise FluxtrueError(f"{_label(param)} {text!r}: allowed: a name without NUL")
+            raise FluxtrueError(f"{label(param)} {text!r}: allowed: a name without NUL")
         return Path(text)
 
 
-class InputFile(GivenPath):
-    """An existing file that is only read."""
+class _Existing(GivenPath):
+    """What is only read, and must be there before the command begins."""
 
-    name = "file"
+    is_kind: Callable[[int], bool]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """Text to a path that can be read."""
@@ -52,17 +48,25 @@ class InputFile(GivenPath):
             status = path.stat()
         except OSError as error:
             raise FluxtrueError(f"{path}: cannot be read ({error.strerror})") from None
-        if not stat.S_ISREG(status.st_mode):
-            raise FluxtrueError(f"{path}: cannot be read (not a file)")
+        if not type(self).is_kind(status.st_mode):
+            raise FluxtrueError(f"{path}: cannot be read (not a {self.name})")
         if not os.access(path, os.R_OK):
             raise FluxtrueError(f"{path}: cannot be read (Permission denied)")
         return path
 
 
-class InputFolder(GivenPath):
-    """A folder that is only read; the command itself checks its content."""
+class InputFile(_Existing):
+    """An existing file that is only read."""
+
+    name = "file"
+    is_kind = stat.S_ISREG
+
+
+class InputFolder(_Existing):
+    """An existing folder that is only read; the command itself checks its content."""
 
     name = "folder"
+    is_kind = stat.S_ISDIR
 
 
 class OutputFile(GivenPath):
@@ -126,14 +130,14 @@ def declared(ctx: click.Context) -> Outputs:
             outputs.reads(path)
     for param, path in _values(ctx):
         if isinstance(param.type, OutputFolder):
-            outputs.folder(_label(param), path, param.type.names)
+            outputs.folder(label(param), path, param.type.names)
         elif isinstance(param.type, BuildFolder):
-            outputs.folder(_label(param), path)
+            outputs.folder(label(param), path)
     for param, path in _values(ctx):
         if isinstance(param.type, OutputFile):
-            outputs.file(_label(param), path, param.type.suffixes)
+            outputs.file(label(param), path, param.type.suffixes)
         elif isinstance(param.type, StateFile):
-            outputs.file(_label(param), path)
+            outputs.file(label(param), path)
     return outputs
 
 

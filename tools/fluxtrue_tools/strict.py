@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from fluxtrue_tools.errors import FluxtrueError
 
 SIZE_MAX = 10_000_000  # bytes; the largest file of the project has two thousand
+LARGEST = 1e12  # of a number in any of the units: what is larger is a slip, and its square may overflow
 SHOWN_MAX = 60  # characters of a bad value in a message
 UNITS = {
     "Nm_per_s": "N·m/s", "rpm_per_s": "rpm/s", "A_per_K": "A/K", "N_per_m2_s2": "N/(m/s)²", "per_K": "1/K",
@@ -41,12 +42,15 @@ Model = TypeVar("Model", bound=BaseModel)
 
 def number(value: Any) -> Any:
     """TOML distinguishes 1 and 1.0, which means the same here."""
-    if not isinstance(value, int) or isinstance(value, bool):
+    if not isinstance(value, int | float) or isinstance(value, bool):
         return value
     try:
-        return float(value)
+        found = float(value)
     except OverflowError:
         return math.inf
+    if LARGEST < abs(found) < math.inf:
+        raise ValueError(f"allowed: from {-LARGEST:g} to {LARGEST:g}")
+    return found
 
 
 def flag(value: Any) -> Any:
@@ -66,8 +70,9 @@ def unit_of(key: str) -> str:
 
 def down(value: float) -> float:
     """Round a largest value down to four digits, so that the value in a message is accepted."""
-    step = 10.0 ** (math.floor(math.log10(abs(value))) - 3) if value else 1.0
-    return math.floor(value / step * (1.0 + 1e-12)) * step
+    places = 3 - math.floor(math.log10(abs(value))) if value else 0
+    step = 10.0**-places
+    return round(math.floor(value / step * (1.0 + 1e-12)) * step, places)  # not 304.40000000000003
 
 
 def quantity(key: str, value: Any) -> str:

@@ -107,7 +107,7 @@ def test_what_hurts_is_warned_of(tmp_path: Path, importer: Importer) -> None:
     """An offset of 15 mV·s (6 % of psi_q), a twist that no energy belongs to, losses like no iron's."""
     psi_d, psi_q = psi(*FULL)
     path = written(tmp_path / "map.csv", HEADER[:-7], *FULL, psi_d - 2e-7 * FULL[1] ** 2, psi_q + 0.015)
-    done, _ = importer(path, iron_loss_points=("10@1000", "10@3000", "300@6000"))
+    done, _ = importer(path, iron_loss_points=((10.0, 1000.0), (10.0, 3000.0), (300.0, 6000.0)))
     assert done.iron_loss is not None and done.iron_loss.share > 0.2
     warned = " | ".join(report.warnings(done))
     assert "the iron losses are not (k_h w + k_e w²)|psi|²: the fit leaves" in warned

@@ -5,11 +5,13 @@ import math
 import re
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from conftest import HALF, L_D, POLE_PAIRS, PSI_F, psi, written
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.kinds import LossPoint
 from fluxtrue_tools.motor.flux_model import ConstantModel
 from fluxtrue_tools.motor.map_import import iron_loss
 from fluxtrue_tools.motor.map_import.coenergy import Points, fit
@@ -55,7 +57,7 @@ def test_one_loss_without_current_is_shared_in_halves() -> None:
     """By hand: P = (k_h w + k_e w²) psi_f², so k_h = P/(2 w psi_f²), k_e = P/(2 w² psi_f²)."""
     model = ConstantModel(L_D, 2 * L_D, PSI_F)
     omega = 3000.0 * 2.0 * math.pi / 60.0 * POLE_PAIRS
-    found = iron_loss.fit(iron_loss.from_points("--iron-loss-point", ("120@3000",), POLE_PAIRS), model, I_MAX, "here")
+    found = iron_loss.fit(iron_loss.from_points(((120.0, 3000.0),), POLE_PAIRS), model, I_MAX, "here")
     assert found.assumed
     assert found.hysteresis == pytest.approx(60.0 / omega / PSI_F**2)
     assert found.eddy == pytest.approx(60.0 / omega**2 / PSI_F**2)
@@ -63,7 +65,7 @@ def test_one_loss_without_current_is_shared_in_halves() -> None:
 
 def test_losses_that_grow_slower_than_the_speed_give_no_negative_coefficient() -> None:
     model = ConstantModel(L_D, 2 * L_D, PSI_F)
-    points = iron_loss.from_points("--iron-loss-point", ("100@1000", "120@6000"), POLE_PAIRS)
+    points = iron_loss.from_points(((100.0, 1000.0), (120.0, 6000.0)), POLE_PAIRS)
     found = iron_loss.fit(points, model, I_MAX, "here")
     assert found.eddy == 0.0 and found.hysteresis > 0.0 and found.max_W > 20.0
 
@@ -86,7 +88,11 @@ def test_bad_losses_are_refused(tmp_path: Path, header: str, row: str, words: st
         iron_loss.fit(iron_loss.read(path, (), Convention(), 1.0, POLE_PAIRS), MODEL, I_MAX, str(path))
 
 
-@pytest.mark.parametrize("text", ["120", "120@", "a@b", "nan@3000", "1@2@3"])
+@pytest.mark.parametrize("text", ["120", "120@", "a@b", "nan@3000", "1@2@3", "-1@3000", "1@0", "1@-3000", "1@inf"])
 def test_a_bad_point_is_refused(text: str) -> None:
-    with pytest.raises(FluxtrueError, match="--iron-loss-point .*: allowed: "):
-        iron_loss.from_points("--iron-loss-point", (text,), POLE_PAIRS)
+    with pytest.raises(FluxtrueError, match="--iron-loss-point .*: allowed: LOSS@SPEED"):
+        LossPoint().convert(text, click.Option(["--iron-loss-point"]), None)
+
+
+def test_a_point_is_a_loss_at_a_speed() -> None:
+    assert LossPoint().meaning("120@3000") == (120.0, 3000.0)

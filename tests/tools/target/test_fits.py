@@ -31,7 +31,7 @@ def checked(tmp_path):
         cheap = {name: {"cycles": [1, 1, 1]} for name in COSTS}
         measured.write_text(json.dumps({"drives": {"a": {"runs": cheap}, "b": {"runs": dear}}}))
         pwm = "\n".join(f"{key} = {value}" for key, value in _port()["pwm"].items())
-        budget.write_text(f"core_Hz = {core_Hz}\nbusy_share_max = 0.75\n[pwm]\n{pwm}\n")
+        budget.write_text(f"core_Hz = {core_Hz}\nflash_bytes = 1\nram_bytes = 1\nbusy_share_max = 0.75\n[pwm]\n{pwm}\n")
         return fits.check(motor, budget, measured)
 
     return _checked

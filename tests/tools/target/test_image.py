@@ -73,7 +73,7 @@ def test_an_image_beyond_its_bounds_is_an_error(elf: Path) -> None:
 def test_what_is_no_image_is_refused_and_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "x.elf"
     path.write_bytes(b"something else")
-    with pytest.raises(FluxtrueError, match="no ELF file"):
+    with pytest.raises(FluxtrueError, match="not an ELF file"):
         image.seal(path)
     assert path.read_bytes() == b"something else"
     with pytest.raises(FluxtrueError, match="No such file"):

@@ -98,9 +98,9 @@ def test_a_name_that_is_not_known_is_one_message(
 def test_a_file_that_is_no_svd_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.svd"
     path.write_text("no XML")
-    with pytest.raises(FluxtrueError, match="no SVD file"):
+    with pytest.raises(FluxtrueError, match="not an SVD file"):
         Device(path)
-    with pytest.raises(FluxtrueError, match="no SVD file"):
+    with pytest.raises(FluxtrueError, match="missing.svd: cannot be read"):
         Device(tmp_path / "missing.svd")
 
 

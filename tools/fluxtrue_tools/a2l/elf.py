@@ -10,11 +10,11 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
-from elftools.common.exceptions import ELFError
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 
 SECTION = ".a2l"
 OBJECT = "ecu"
@@ -150,13 +150,8 @@ def _placed(value: Value, path: Path, address: int, base: Base | None) -> Value:
 
 def read(path: Path) -> Description:
     """Description of the firmware in an ELF file."""
-    try:
-        with path.open("rb") as stream:
-            return _describe(ELFFile(stream), path)
-    except OSError as error:
-        raise FluxtrueError(f"{path}: {error.strerror}") from error
-    except (ELFError, UnicodeDecodeError) as error:
-        raise FluxtrueError(f"{path}: not an ELF file of the firmware ({error})") from error
+    with reading(path, "an ELF file of the firmware"), path.open("rb") as stream:
+        return _describe(ELFFile(stream), path)
 
 
 def _scale(name: str, bases: dict[str, Base]) -> Base:

@@ -5,16 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import can
+import click
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.kinds import BusOption
 
 
 def parse_option(text: str) -> tuple[str, Any]:
     """NAME=VALUE of --can-option; digits are a number."""
-    name, equals, value = text.partition("=")
-    if not name or not equals:
-        raise FluxtrueError(f"--can-option {text}: allowed: NAME=VALUE")
-    return name, int(value) if value.isdigit() else value
+    found = BusOption().convert(text, click.Option(["--can-option"]), None)
+    assert isinstance(found, tuple)
+    return found
 
 
 @dataclass(frozen=True)

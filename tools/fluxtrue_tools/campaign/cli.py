@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.errors import FluxtrueError
 
 EXIT_BOUND_MISSED = 1
@@ -20,7 +20,9 @@ _FOLDER = paths.OutputFolder("campaign.json", "results.parquet", "summary.json",
 @click.option("--fresh", is_flag=True, help="Throw away the results that are there.")
 @click.option("--check/--no-check", default=True, help="Exit with 1 when a bound is missed.  [default: check]")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: a core each]")
-@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead.")
+@click.option(
+    "--scheduler", type=kinds.Scheduler(), metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead."
+)
 @click.option("--case", type=click.IntRange(min=0), help="Run one case and show its windows; nothing is stored.")
 @click.option("--plot", type=paths.OutputFile(*paths.PICTURES),
               help="The errors at a glance, or with --case its time series: PNG, SVG or PDF.")  # fmt: skip

@@ -40,20 +40,21 @@ def nameplate_of(folder: Path, motor: "Motor") -> "Nameplate":
 def commission(nameplate: Path, machine: str, seed: int, steps: str, out: Path | None, dry_run: bool) -> None:
     """Measure resistance and flux map of an unknown motor at standstill, by software in the loop."""
     from fluxtrue_tools.commission import folder, plot, report
-    from fluxtrue_tools.commission.hidden import make
+    from fluxtrue_tools.commission.hidden import folder_of, make
     from fluxtrue_tools.commission.steps import announcement, chosen, run
     from fluxtrue_tools.errors import FluxtrueError
     from fluxtrue_tools.sim import motor as motors
 
     wanted = chosen(tuple(steps.split(",")))
+    folder_of(machine)
+    if out is None and not dry_run:
+        raise FluxtrueError("--out: missing, wanted: a folder for the result, or --dry-run")
     motor = motors.load(str(nameplate), where="--motor")
     known = nameplate_of(nameplate, motor)
-    if dry_run:
+    if out is None or dry_run:
         for step in wanted:
             click.echo(f"{step.name}: {announcement(step, known)}")
         return
-    if out is None:
-        raise FluxtrueError("--out: missing, wanted: a folder for the result, or --dry-run")
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
         drive, _ = make(machine, seed, motor, known.i_max_A)

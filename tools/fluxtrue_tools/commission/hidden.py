@@ -47,7 +47,8 @@ class Truth:
         return float(self.psi(0.0, 0.0)[0])
 
 
-def _folder(name: str) -> Path:
+def folder_of(name: str) -> Path:
+    """The folder of one of the project's machines."""
     found = next((folder / name for folder in FOLDERS if (folder / name / "motor.toml").is_file()), None)
     if found is None:
         known = sorted(path.parent.name for folder in FOLDERS for path in folder.glob("*/motor.toml"))
@@ -77,7 +78,7 @@ def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
 def draw(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[Truth, FluxMap | None, dict[str, float]]:
     """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters."""
     rng = np.random.default_rng([seed, sum(name.encode())])
-    model, flux_map, source_i_max = _source(_folder(name))
+    model, flux_map, source_i_max = _source(folder_of(name))
     flux_scale, magnet = float(rng.uniform(0.85, 1.15)), float(rng.uniform(0.85, 1.15))
     current = i_max_A / source_i_max * float(rng.uniform(0.9, 1.1))
     base = motor.plant

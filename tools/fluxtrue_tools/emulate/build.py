@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from elftools.common.exceptions import ELFError
 from elftools.elf.elffile import ELFFile
 
 from fluxtrue_tools.emulate import library
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 from fluxtrue_tools.sim import build as sim_build
 from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.motor import Motor
@@ -49,12 +49,12 @@ class Parts:
 def _check_who_commands(elf: Path, flashed: bool) -> None:
     """Refuse the flashed image without a bus, on which it would wait for ever, and the other image with one."""
     try:
-        with elf.open("rb") as file:
+        with reading(f"--elf {elf}", "an ELF file"), elf.open("rb") as file:
             symbols = ELFFile(file).get_section_by_name(".symtab")
             ours = symbols is not None and bool(symbols.get_symbol_by_name("ecu"))
             direct = ours and bool(symbols.get_symbol_by_name("commanded_directly"))
-    except (ELFError, OSError):
-        return  # errors in it are reported when it is loaded
+    except FluxtrueError:
+        return  # the emulator's own loader, which comes next, says what it misses
     if ours and direct == flashed:
         raise FluxtrueError(
             f"--elf {elf}: takes no commands from the bus, allowed with --serve: the image that is flashed (s32k144)"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.errors import FluxtrueError
 
 EXIT_NOT_TRUE = 1
@@ -22,7 +22,9 @@ _FOLDER = paths.OutputFolder("campaign.json", "results.parquet", "summary.json",
 @click.option("--record", is_flag=True, help="Write status, witness and result of each line into the table.")
 @click.option("--lines", metavar="PATTERN", default="*", help="Only lines whose id fits, for example 'angle-*'.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes.  [default: a core each]")
-@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead.")
+@click.option(
+    "--scheduler", type=kinds.Scheduler(), metavar="tcp://HOST:PORT", help="Run on this Dask cluster instead."
+)
 @click.option("--line", metavar="ID", help="Run one line of the table and show its runs; nothing is stored.")
 @click.option("--run", "only", metavar="MOTOR/POINT/SIGN", help="With --line: this run only.")
 @click.option("--build-dir", type=paths.InputFolder(), help="Take the libraries from this build folder as they are.")

@@ -8,13 +8,14 @@ import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 from aiohttp import web
 
-from fluxtrue_tools import paths
-from fluxtrue_tools.a2l.elf import read
-from fluxtrue_tools.bus.address import BusAddress, parse_option
+from fluxtrue_tools import kinds, paths
+from fluxtrue_tools.a2l.elf import Description, read
+from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.bus_process import BusProcess, Setup
@@ -43,7 +44,7 @@ class Source:
     address: BusAddress | None = None
     channel: Channel | None = None
     recording: Recording | None = None
-    elf: Path | None = None
+    firmware: Description | None = None
     in_step: bool = False
 
     @property
@@ -61,10 +62,10 @@ def _connect(source: Source, torque_max_Nm: float, session: Session, stack: cont
     setup = Setup(source.address, interface.name, interface.text, torque_max_Nm, bench, is_stepped, source.in_step)
     session.link = link = BusProcess(setup, [session.samples, session.recorder], session.in_step)
     stack.callback(link.close)
-    if source.elf is not None:
+    if source.firmware is not None:
         answer_s = SIMULATED_ANSWER_S if is_stepped else BENCH_ANSWER_S
         held = link.standing_still if is_stepped else contextlib.nullcontext
-        session.tuning = Tuning(Xcp(source.address, answer_s, held), read(source.elf))
+        session.tuning = Tuning(Xcp(source.address, answer_s, held), source.firmware)
         stack.callback(session.tuning.close)
 
 
@@ -111,11 +112,18 @@ def _serve(session: Session, port: int) -> None:
 
 @click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
-@click.option("--can-interface", help="python-can interface of a bench; without it a virtual ECU is started.")
-@click.option("--can-channel", default="can0", show_default=True)
-@click.option("--can-option", multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus.")
+@click.option(
+    "--can-interface",
+    type=kinds.BusInterface(),
+    help="python-can interface of a bench; without it a virtual ECU is started.",
+)
+@click.option("--can-channel", type=kinds.Text(), default="can0", show_default=True)
+@click.option(
+    "--can-option", type=kinds.BusOption(), multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus."
+)
 @click.option(
     "--bench",
+    type=kinds.Address(),
     metavar="HOST:PORT",
     help="Bench channel of the virtual ECU behind that interface: its plant, and with --fast its time.",
 )
@@ -128,9 +136,9 @@ def _serve(session: Session, port: int) -> None:
               show_default=True, help="Where recordings go.")  # fmt: skip
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the virtual ECU from this build folder as it is.")  # fmt: skip
-def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[str, ...], bench: str | None,
-         in_step: bool, elf: Path | None, replay: Path | None, port: int, record_dir: Path,
-         build_dir: Path | None) -> None:  # fmt: skip
+def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[tuple[str, Any], ...],
+         bench: tuple[str, int] | None, in_step: bool, elf: Path | None, replay: Path | None, port: int,
+         record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
     """Serve a page that draws the drive live, commands torque, tunes and records. Loopback only."""
     if replay is not None and can_interface is not None:
         raise FluxtrueError("--replay and --can-interface exclude each other")
@@ -138,21 +146,24 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
         paths.refuse_given("with --replay", "elf", "record_dir")
     if can_interface is None:
         paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
+    # Files that are given are read before anything is built or started.
+    recording = None if replay is None else load(replay)
+    firmware = None if elf is None else read(elf)
     torque_max = load_config(locate(motor, Path.cwd(), "--motor")[1]).machine.torque_max_Nm
     machine = prepare(motor, build_dir, where="--motor")
     interface = read_interface(machine.dbc)
     with contextlib.ExitStack() as stack:
         if replay is not None:
-            source = Source(f"{replay.name} (replay)", attached_interface(replay), recording=load(replay))
+            source = Source(f"{replay.name} (replay)", attached_interface(replay), recording=recording)
         elif can_interface is not None:
-            address = BusAddress(can_interface, can_channel, dict(map(parse_option, can_option)))
-            channel = None if bench is None else Channel.at(bench, "--bench")
-            source = Source(f"{can_interface} {can_channel}", interface, address, channel, elf=elf)
+            address = BusAddress(can_interface, can_channel, dict(can_option))
+            channel = None if bench is None else Channel(*bench)
+            source = Source(f"{can_interface} {can_channel}", interface, address, channel, firmware=firmware)
         else:
             ecu = stack.enter_context(VirtualEcu(machine.vecu))
             options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
             address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
-            source = Source(f"{ecu.motor}, simulated", interface, address, channel, elf=machine.vecu)
+            source = Source(f"{ecu.motor}, simulated", interface, address, channel, firmware=read(machine.vecu))
         source.in_step = in_step
         if in_step and not source.is_stepped:
             raise FluxtrueError("--in-step: allowed before a virtual ECU with --fast only")

@@ -12,6 +12,7 @@ import can
 from asammdf import MDF
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.stand import TRUTH
 
@@ -38,11 +39,8 @@ def load(path: Path) -> Recording:
     """Everything in a log that a page can show."""
     if not path.is_file():
         raise FluxtrueError(f"--replay {path}: no such file")
-    try:
-        with can.LogReader(path) as reader:
-            frames = list(reader)
-    except Exception as error:  # every format's reader raises exceptions of its own
-        raise FluxtrueError(f"--replay {path}: not a readable log ({error})") from error
+    with reading(f"--replay {path}", "a readable log"), can.LogReader(path) as reader:
+        frames = list(reader)
     if not frames:
         raise FluxtrueError(f"--replay {path}: holds no frame")
     begin_s = frames[0].timestamp

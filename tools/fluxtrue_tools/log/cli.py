@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.log.decode import signals_of
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
@@ -107,7 +107,8 @@ def _tell(signals: Signals) -> None:
 @click.option("--plot", type=paths.OutputFile(*paths.PICTURES), help="Draw torque, currents, what was "
               "identified and speed: PNG, SVG or PDF.")  # fmt: skip
 @click.option("--export", type=paths.OutputFile(*EXPORTS), help="Write the signals: CSV or Parquet.")
-@click.option("--signal", "names", multiple=True, metavar="MESSAGE.SIGNAL", help="Tell and export only these.")
+@click.option("--signal", "names", type=kinds.Text(), multiple=True, metavar="MESSAGE.SIGNAL",
+              help="Tell and export only these.")  # fmt: skip
 def log(file: Path, plot: Path | None, export: Path | None, names: tuple[str, ...]) -> None:
     """Decode a recorded drive (MDF4): signals with their ranges; plot and export on request."""
     with paths.outputs() as outputs:

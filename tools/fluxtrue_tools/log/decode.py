@@ -11,6 +11,7 @@ from asammdf import MDF
 from fluxtrue_tools.bus.interface import CONFIGURATION, Interface, read_interface
 from fluxtrue_tools.bus.scales import HASH
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 
 FRAMES: Final = "CAN_DataFrame"
 FIELDS: Final = frozenset(f"{FRAMES}.{field}" for field in ("ID", "IDE", "DataLength", "DataBytes"))
@@ -27,16 +28,14 @@ def signals_of(path: Path) -> dict[str, pd.Series]:
     """
     if not path.is_file():
         raise FluxtrueError(f"{path}: no such file")
-    try:
-        with MDF(path) as recorded:
-            interface, frames = _attached(path, recorded), recorded.get(FRAMES)
-            beside = _beside(recorded, frames.timestamps[0] if len(frames.timestamps) else 0.0)
-    except Exception as error:  # for a bad file the reader raises many kinds of exceptions
-        raise FluxtrueError(f"{path}: not an MDF4 bus log ({error})") from error
-    missing = FIELDS - set(frames.samples.dtype.names or ())
-    if missing:
-        raise FluxtrueError(f"{path}: not an MDF4 bus log (no {min(missing)})")
-    found = _decode(frames.samples, frames.timestamps, interface)
+    with reading(path, "an MDF4 bus log"), MDF(path) as recorded:
+        interface, frames = _attached(path, recorded), recorded.get(FRAMES)
+        beside = _beside(recorded, frames.timestamps[0] if len(frames.timestamps) else 0.0)
+    with reading(path, "an MDF4 bus log"):
+        missing = FIELDS - set(frames.samples.dtype.names or ())
+        if missing:
+            raise FluxtrueError(f"{path}: not an MDF4 bus log (no {min(missing)})")
+        found = _decode(frames.samples, frames.timestamps, interface)
     if not found:
         raise FluxtrueError(f"{path}: holds no frame that {interface.name} describes")
     told = found.get(f"{CONFIGURATION}.{HASH}")

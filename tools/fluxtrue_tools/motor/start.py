@@ -13,7 +13,7 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.motor.names import FILE_NAME
 
 BASE_SPEED_SHARE = 1.0 / 3.0  # of the maximum speed
@@ -58,13 +58,13 @@ def text(name: str, i_max_A: float, vdc_V: float, pwm_hz: float, pole_pairs: int
 
 @click.command("start", cls=paths.Command)
 @click.option("--out", required=True, type=paths.OutputFolder(FILE_NAME), metavar="DIR", help="The motor's folder.")
-@click.option("--i-max", required=True, type=click.FloatRange(min=0.1, max=5000.0), metavar="A",
+@click.option("--i-max", required=True, type=kinds.Finite(min=0.1, max=5000.0), metavar="A",
               help="Largest phase current, peak.")  # fmt: skip
-@click.option("--vdc", required=True, type=click.FloatRange(min=5.0, max=2000.0), metavar="V", help="Dc voltage.")
-@click.option("--pwm", required=True, type=click.FloatRange(min=4.0, max=40.0), metavar="kHz", help="PWM frequency.")
+@click.option("--vdc", required=True, type=kinds.Finite(min=5.0, max=2000.0), metavar="V", help="Dc voltage.")
+@click.option("--pwm", required=True, type=kinds.Finite(min=4.0, max=40.0), metavar="kHz", help="PWM frequency.")
 @click.option("--pole-pairs", required=True, type=click.IntRange(1, 50), help="Not measured yet.")
-@click.option("--speed-max", type=click.FloatRange(min=1.0, max=200000.0), metavar="rpm", help="Largest speed.")
-@click.option("--full-scale", type=click.FloatRange(min=0.1, max=10000.0), metavar="A",
+@click.option("--speed-max", type=kinds.Finite(min=1.0, max=200000.0), metavar="rpm", help="Largest speed.")
+@click.option("--full-scale", type=kinds.Finite(min=0.1, max=10000.0), metavar="A",
               help="Range of the current measurement.  [default: 1.5 i_max]")  # fmt: skip
 def start(out: Path, i_max: float, vdc: float, pwm: float, pole_pairs: int, speed_max: float | None,
           full_scale: float | None) -> None:  # fmt: skip

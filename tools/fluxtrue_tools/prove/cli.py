@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.prove import page
 from fluxtrue_tools.prove.checker import CPU_S, Checker, NoVerdict, Verdict
@@ -49,8 +49,8 @@ def _proved(checker: Checker, proof: Proof, planted: bool) -> tuple[bool, Verdic
 
 
 @click.command(cls=paths.Command)
-@click.argument("names", nargs=-1)
-@click.option("--group", "groups", multiple=True, help="All proofs of one file of tests/proof.")
+@click.argument("names", nargs=-1, type=kinds.Text())
+@click.option("--group", "groups", type=kinds.Text(), multiple=True, help="All proofs of one file of tests/proof.")
 @click.option("--long", is_flag=True, help="Also those that take minutes.")
 @click.option("--fresh", is_flag=True, help="Run again what has a kept verdict.")
 @click.option("--planted/--no-planted", default=True, help="Also with the planted error of each, which must be found.")

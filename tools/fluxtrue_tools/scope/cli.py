@@ -3,15 +3,16 @@
 
 import contextlib
 from pathlib import Path
+from typing import Any
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.a2l.elf import Description, read
-from fluxtrue_tools.bus.address import BusAddress, parse_option
+from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope import export
-from fluxtrue_tools.scope.scope import LEVELS, TRIGGERS, Capture, Scope
+from fluxtrue_tools.scope.scope import DIVISOR_MAX, LEVELS, TRIGGERS, Capture, Scope, Setup, make_setup
 from fluxtrue_tools.scope.xcp import Line, SteppedLine, WallLine, XcpMaster
 from fluxtrue_tools.sim.build import prepare
 from fluxtrue_tools.vecu.channel import Channel
@@ -37,13 +38,12 @@ def _list(description: Description) -> None:
         click.echo(f"{signal.name:<{width}}  ±{signal.base.full:<8.5g} {signal.base.unit:<6} {signal.text}".rstrip())
 
 
-def _capture(scope: Scope, names: tuple[str, ...], trigger: str, on: str | None, level: float, before: float,
-             samples: int | None, divisor: int, seconds: float) -> Capture:  # fmt: skip
-    scope.configure(names or FREEZE_FRAME, trigger, on, level, before, samples, divisor)
+def _capture(scope: Scope, setup: Setup, seconds: float) -> Capture:
+    scope.take(setup)
     armed = scope.arm()
     try:
-        if trigger == "manual":
-            scope.pass_periods(armed.wanted * divisor)
+        if setup.trigger == "manual":
+            scope.pass_periods(armed.wanted * setup.divisor)
             scope.trigger()
         scope.until_complete(seconds)
     except (FluxtrueError, KeyboardInterrupt):
@@ -63,29 +63,46 @@ def _tell(capture: Capture) -> None:
 
 @click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
-@click.option("--can-interface", help="python-can interface of a bench; without it a virtual ECU is started.")
-@click.option("--can-channel", default="can0", show_default=True)
-@click.option("--can-option", multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus.")
-@click.option("--bench", metavar="HOST:PORT",
+@click.option(
+    "--can-interface",
+    type=kinds.BusInterface(),
+    help="python-can interface of a bench; without it a virtual ECU is started.",
+)
+@click.option("--can-channel", type=kinds.Text(), default="can0", show_default=True)
+@click.option(
+    "--can-option", type=kinds.BusOption(), multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus."
+)
+@click.option("--bench", type=kinds.Address(), metavar="HOST:PORT",
               help="Bench channel of the virtual ECU behind that interface, for its time with --fast.")  # fmt: skip
 @click.option("--elf", type=paths.InputFile(), help="The ECU's firmware image; default: the virtual ECU's program.")
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the virtual ECU from this build folder as it is.")  # fmt: skip
 @click.option("--list", "list_only", is_flag=True, help="List the signals with their range, then exit.")
 @click.option("--freeze-frame", is_flag=True, help="Read the freeze frame that a fault has left; arm nothing.")
-@click.option("--signal", "signals", multiple=True, metavar="NAME", help="To capture, up to eight.")
+@click.option("--signal", "signals", type=kinds.Text(), multiple=True, metavar="NAME", help="To capture, up to eight.")
 @click.option("--trigger", type=click.Choice(TRIGGERS), default="manual", show_default=True)
-@click.option("--on", metavar="NAME", help="Signal whose level triggers; default: the first captured.")
-@click.option("--level", type=float, default=0.0, show_default=True, help="In the unit of that signal.")
-@click.option("--before", type=float, default=0.25, show_default=True, help="Share of the samples before the trigger.")
-@click.option("--samples", type=int, help="Of each signal; default: as many as the memory holds.")
-@click.option("--divisor", type=int, default=1, show_default=True, help="PWM periods from one sample to the next.")
-@click.option("--wait", "seconds", type=float, default=10.0, show_default=True, help="For a complete capture, seconds.")
+@click.option(
+    "--on", type=kinds.Text(), metavar="NAME", help="Signal whose level triggers; default: the first captured."
+)
+@click.option("--level", type=kinds.Finite(), default=0.0, show_default=True, help="In the unit of that signal.")
+@click.option(
+    "--before",
+    type=kinds.Finite(0.0, 1.0, max_open=True),
+    default=0.25,
+    show_default=True,
+    help="Share of the samples before the trigger.",
+)
+@click.option("--samples", type=click.IntRange(min=1), help="Of each signal; default: as many as the memory holds.")
+@click.option("--divisor", type=click.IntRange(1, DIVISOR_MAX), default=1, show_default=True,
+              help="PWM periods from one sample to the next.")  # fmt: skip
+@click.option("--wait", "seconds", type=kinds.Finite(min=0.0), default=10.0, show_default=True,
+              help="For a complete capture, seconds.")  # fmt: skip
 @click.option("--csv", type=paths.OutputFile(".csv"), help="Write the samples as text.")
 @click.option("--mdf", type=paths.OutputFile(".mf4"), help="Write them as MDF4.")
 @click.option("--plot", type=paths.OutputFile(*paths.PICTURES), help="Draw them: PNG, SVG or PDF.")
-def scope(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[str, ...], bench: str | None,
-          elf: Path | None, build_dir: Path | None, list_only: bool, freeze_frame: bool, signals: tuple[str, ...],
+def scope(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[tuple[str, Any], ...],
+          bench: tuple[str, int] | None, elf: Path | None, build_dir: Path | None, list_only: bool,
+          freeze_frame: bool, signals: tuple[str, ...],
           trigger: str, on: str | None, level: float, before: float, samples: int | None, divisor: int,
           seconds: float, csv: Path | None, mdf: Path | None, plot: Path | None) -> None:  # fmt: skip
     """Capture up to eight signals of the drive at PWM rate around a trigger, over XCP on CAN."""
@@ -101,16 +118,18 @@ def scope(motor: str, can_interface: str | None, can_channel: str, can_option: t
         description = read(elf or program)
         if list_only:
             return _list(description)
+        known = {signal.name: signal for signal in description.signals}
+        setup = None if freeze_frame else make_setup(
+            known, signals or FREEZE_FRAME, trigger, on, level, before, samples, divisor)  # fmt: skip
         if can_interface is None:
             ecu = stack.enter_context(VirtualEcu(program))
             options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
             address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
         else:
-            address = BusAddress(can_interface, can_channel, dict(map(parse_option, can_option)))
-            channel = None if bench is None else Channel.at(bench, "--bench")
+            address = BusAddress(can_interface, can_channel, dict(can_option))
+            channel = None if bench is None else Channel(*bench)
         connected = Scope(XcpMaster(_line(address, channel, stack)), description)
-        capture = connected.read() if freeze_frame else _capture(
-            connected, signals, trigger, on, level, before, samples, divisor, seconds)  # fmt: skip
+        capture = connected.read() if setup is None else _capture(connected, setup, seconds)
         if csv is not None:
             export.write_csv(capture, outputs.scratch(csv))
         if mdf is not None:

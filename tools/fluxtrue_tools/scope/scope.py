@@ -3,14 +3,14 @@
 
 import struct
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.a2l.elf import Description, Signal
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope.xcp import Master, XcpRefused, checksum, upload
 
@@ -20,7 +20,7 @@ IDLE, ARMED, TRIGGERED, DONE = 0, 1, 2, 3
 STATES: Final = ("idle", "armed", "triggered", "done")
 TRIGGERS: Final = ("manual", "fault", "rising", "falling", "above", "below")
 LEVELS: Final = TRIGGERS[2:]
-SIGNALS_MAX, WORDS = 8, 6144
+SIGNALS_MAX, WORDS, DIVISOR_MAX = 8, 6144, 0xFFFF
 BLOCK, ATTEMPTS = 2048, 3  # bytes of one checksum; readings of a block before it is an error
 BUSY = 0x10
 FORMATS: Final = {"U8": "B", "U16": "H", "S16": "h", "U32": "I"}
@@ -62,6 +62,56 @@ class Capture:
     number: int
 
 
+@dataclass(frozen=True)
+class Setup:
+    """What a capture shall be, in the numbers of the firmware."""
+
+    signals: tuple[int, ...]
+    trigger: str
+    trigger_signal: int
+    level: int
+    divisor: int
+    samples: int
+    wanted: int  # samples before the trigger
+
+
+def _number(known: Mapping[str, Signal], name: str) -> int:
+    if name not in known:
+        raise FluxtrueError(f"no signal '{name}', allowed: {', '.join(known)}")
+    return known[name].number
+
+
+def _raw_level(signal: Signal, level: float) -> int:
+    base = signal.base
+    raw = round(level / base.factor) if np.isfinite(level) else 1 << 15
+    if not -(1 << 15) <= raw < 1 << 15:
+        raise FluxtrueError(f"level {level:g} {base.unit} of {signal.name}, allowed: {-base.full:g} to {base.full:g}")
+    return raw
+
+
+def make_setup(known: Mapping[str, Signal], signals: Sequence[str], trigger: str, on: str | None, level: float,
+               before: float, samples: int | None, divisor: int) -> Setup:  # fmt: skip
+    """Check what Scope.configure() is given; no connection is needed for that."""
+    if not 1 <= len(signals) <= SIGNALS_MAX:
+        raise FluxtrueError(f"{len(signals)} signals, allowed: 1 to {SIGNALS_MAX}")
+    capacity = WORDS // len(signals)
+    count = capacity if samples is None else samples
+    if not 1 <= count <= capacity:
+        many = "signal" if len(signals) == 1 else "signals"
+        raise FluxtrueError(f"{count} samples, allowed with {len(signals)} {many}: 1 to {capacity}")
+    if not 0.0 <= before < 1.0:
+        raise FluxtrueError(f"share {before:g} before the trigger, allowed: 0 to less than 1")
+    if not 1 <= divisor <= DIVISOR_MAX:
+        raise FluxtrueError(f"divisor {divisor}, allowed: 1 to {DIVISOR_MAX}")
+    if trigger not in TRIGGERS:
+        raise FluxtrueError(f"trigger '{trigger}', allowed: {', '.join(TRIGGERS)}")
+    numbers = tuple(_number(known, name) for name in signals)
+    source = on if on is not None else signals[0]
+    number = _number(known, source)
+    raw = _raw_level(known[source], level) if trigger in LEVELS else 0
+    return Setup(numbers, trigger, number, raw, divisor, count, int(before * count))
+
+
 class Scope:
     """The scope of one ECU, over an XCP connection that others may use between two calls."""
 
@@ -86,27 +136,17 @@ class Scope:
         samples   of each signal; by default as many as the memory holds
         divisor   PWM periods from one sample to the next
         """
-        if not 1 <= len(signals) <= SIGNALS_MAX:
-            raise FluxtrueError(f"{len(signals)} signals, allowed: 1 to {SIGNALS_MAX}")
-        capacity = WORDS // len(signals)
-        count = capacity if samples is None else samples
-        if not 1 <= count <= capacity:
-            many = "signal" if len(signals) == 1 else "signals"
-            raise FluxtrueError(f"{count} samples, allowed with {len(signals)} {many}: 1 to {capacity}")
-        if not 0.0 <= before < 1.0:
-            raise FluxtrueError(f"share {before:g} before the trigger, allowed: 0 to less than 1")
-        if not 1 <= divisor <= 0xFFFF:
-            raise FluxtrueError(f"divisor {divisor}, allowed: 1 to {0xFFFF}")
-        if trigger not in TRIGGERS:
-            raise FluxtrueError(f"trigger '{trigger}', allowed: {', '.join(TRIGGERS)}")
-        numbers = [self._number(name) for name in signals]
-        source = self._number(on or signals[0])
-        raw = self._raw_level(on or signals[0], level) if trigger in LEVELS else 0
-        for position, number in enumerate(numbers):
+        self.take(make_setup(self.signals, signals, trigger, on, level, before, samples, divisor))
+
+    def take(self, setup: "Setup") -> None:
+        """The same, with what has been checked before the connection."""
+        for position, number in enumerate(setup.signals):
             self._user(SELECT, position, number)
-        self._user(SETUP, len(numbers), *divisor.to_bytes(2, "little"), TRIGGERS.index(trigger), source)
-        self._user(SAMPLES, *struct.pack("<HHh", count, int(before * count), raw))
-        self._wanted = (tuple(numbers), trigger, source, raw, divisor, count, int(before * count))
+        self._user(SETUP, len(setup.signals), *setup.divisor.to_bytes(2, "little"), TRIGGERS.index(setup.trigger),
+                   setup.trigger_signal)  # fmt: skip
+        self._user(SAMPLES, *struct.pack("<HHh", setup.samples, setup.wanted, setup.level))
+        self._wanted = (setup.signals, setup.trigger, setup.trigger_signal, setup.level, setup.divisor, setup.samples,
+                        setup.wanted)  # fmt: skip
 
     def arm(self) -> Status:
         """Start to record and to wait for the trigger. Refused while another capture or a freeze frame is kept."""
@@ -191,18 +231,6 @@ class Scope:
 
     def _user(self, *command: int) -> None:
         self._master.command(USER, *command)
-
-    def _number(self, name: str) -> int:
-        if name not in self.signals:
-            raise FluxtrueError(f"no signal '{name}', allowed: {', '.join(self.signals)}")
-        return self.signals[name].number
-
-    def _raw_level(self, name: str, level: float) -> int:
-        base = self.signals[name].base
-        raw = round(level / base.factor) if np.isfinite(level) else 1 << 15
-        if not -(1 << 15) <= raw < 1 << 15:
-            raise FluxtrueError(f"level {level:g} {base.unit} of {name}, allowed: {-base.full:g} to {base.full:g}")
-        return raw
 
     def _header(self) -> dict[str, Any]:
         fields = [value for value in self._fields.values() if value.name != "scope_memory"]

@@ -152,7 +152,7 @@ def _make(name: str, build_dir: Path, folder: Path | None) -> MotorFolder:
 def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None, where: str = "motor") -> MotorFolder:
     """The built motor. A given build folder is used as it is; otherwise build/ is brought up to date."""
     name, folder = locate(motor, base or Path.cwd(), where)
-    is_shipped = folder == SHIPPED / name
+    is_shipped, given = folder == SHIPPED / name, build_dir
     if build_dir is None and "FLUXTRUE_BUILD_DIR" in os.environ:
         build_dir = Path(os.environ["FLUXTRUE_BUILD_DIR"])
     target = name if is_shipped or build_dir is None else _target(build_dir, folder)
@@ -161,6 +161,9 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None,
         if not built.library.is_file():
             raise FluxtrueError(f"{built.library} is missing: cmake --build {build_dir} --target fluxtrue_sim_{target}")
         return built
+    if given is not None:
+        raise FluxtrueError(f"--build-dir {given}: has no build of {folder}, allowed: a build folder configured with "
+                            f"-DFLUXTRUE_MOTOR={folder}")  # fmt: skip
     if is_shipped:
         return _make(name, ROOT / "build" / "host", None)
     tag = hashlib.sha256(str(folder).encode()).hexdigest()[:8]

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 
 import click
 
 from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 
 ELF = paths.InputFile()
 
@@ -31,8 +31,10 @@ def registers(svd: Path, wanted: Path, header_path: Path) -> None:
     with paths.outputs() as outputs:
         device = Device(svd)
         names = generator.load(wanted)
-        chosen = generator.choose(names, device, wanted)
-        outputs.text(header_path, generator.header(names, device, chosen, wanted))
+        with reading(svd, "an SVD file"):  # its numbers and names are read where they are needed
+            chosen = generator.choose(names, device, wanted)
+            text = generator.header(names, device, chosen, wanted)
+        outputs.text(header_path, text)
 
 
 @target.command(cls=paths.Command)
@@ -49,10 +51,11 @@ def seal(elf: Path) -> None:
 @click.option("--budget", type=paths.InputFile(), required=True, help="The port's limits (budget.toml).")
 def size(elf: Path, budget: Path) -> None:
     """Print what the image occupies; fails beyond the bounds."""
+    from fluxtrue_tools.target import budget as budgets
     from fluxtrue_tools.target import image
 
-    bounds = tomllib.loads(budget.read_text(encoding="utf-8"))
-    click.echo(image.size(elf, bounds["flash_bytes"], bounds["ram_bytes"]))
+    bounds = budgets.read(budget)
+    click.echo(image.size(elf, bounds.flash_bytes, bounds.ram_bytes))
 
 
 @target.command(cls=paths.Command)

@@ -8,18 +8,36 @@ the maxima of all interrupts are added up.
 from __future__ import annotations
 
 import json
-import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bases import periods_per_step
+from fluxtrue_tools.target import budget as budgets
+from fluxtrue_tools.target.budget import Pwm
 
 ROOT = Path(__file__).resolve().parents[3]
 MEASURED = ROOT / "docs" / "performance.json"
 COMMAND_HZ = 100
 WORK, TASK, CAN = "10 kHz work", "1 kHz task", "CAN ISR"  # rows of performance.json; the work is that of a period
 MAXIMUM = 2  # after minimum and average
+
+
+class Inverter(BaseModel):
+    """What is read of a motor.json."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+    pwm_hz: Annotated[float, Field(ge=1e3, le=1e6)]
+    dead_time_s: Annotated[float, Field(ge=0, le=1e-3)]
+
+
+class Built(BaseModel):
+    """motor.json, most of which does not matter here."""
+
+    inverter: Inverter
 
 
 def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any]) -> float:
@@ -33,25 +51,31 @@ def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any]) -> float
     return max(cycles_per_s(drive["runs"]) for drive in measured["drives"].values()) / core_hz
 
 
-def _check_timer(pwm_hz: float, dead_time_s: float, pwm: dict[str, Any], port: str) -> None:
-    ticks = round(pwm["timer_Hz"] / pwm_hz)
-    if ticks > pwm["period_ticks_max"]:
-        lowest_hz = pwm["timer_Hz"] / pwm["period_ticks_max"]
+def _check_timer(pwm_hz: float, dead_time_s: float, pwm: Pwm, port: str) -> None:
+    ticks = round(pwm.timer_Hz / pwm_hz)
+    if ticks > pwm.period_ticks_max:
+        lowest_hz = pwm.timer_Hz / pwm.period_ticks_max
         raise FluxtrueError(f"inverter.pwm_hz = {pwm_hz:g}, allowed on the {port}: from {lowest_hz:.0f}")
-    longest_s = min(pwm["dead_time_ticks_max"] / pwm["timer_Hz"], pwm["dead_time_share_max"] / pwm_hz)
+    longest_s = min(pwm.dead_time_ticks_max / pwm.timer_Hz, pwm.dead_time_share_max / pwm_hz)
     if not 0.0 < dead_time_s <= longest_s * (1.0 + 1e-9):
         raise FluxtrueError(f"inverter.dead_time_s = {dead_time_s:g}, allowed on the {port} at inverter.pwm_hz = "
                             f"{pwm_hz:g}: more than 0, up to {longest_s:.4g}")  # fmt: skip
 
 
+def _inverter(path: Path) -> Inverter:
+    try:
+        return Built.model_validate_json(strict.read_text(path)).inverter
+    except ValidationError as error:
+        raise FluxtrueError(f"{path}: not the motor.json of a build: {strict.explain(error, Built)}") from None
+
+
 def check(motor: Path, budget: Path, measured: Path = MEASURED) -> str:
     """One line that says how busy the processor will be; a machine that the port cannot carry is refused."""
-    inverter = json.loads(motor.read_text(encoding="utf-8"))["inverter"]
-    port, name = tomllib.loads(budget.read_text(encoding="utf-8")), budget.parent.name
-    pwm_hz = float(inverter["pwm_hz"])
-    _check_timer(pwm_hz, float(inverter["dead_time_s"]), port["pwm"], name)
+    inverter, port, name = _inverter(motor), budgets.read(budget), budget.absolute().parent.name
+    pwm_hz = inverter.pwm_hz
+    _check_timer(pwm_hz, inverter.dead_time_s, port.pwm, name)
     costs = json.loads(measured.read_text(encoding="utf-8"))
-    share, share_max = busy_share(pwm_hz, port["core_Hz"], costs), port["busy_share_max"]
+    share, share_max = busy_share(pwm_hz, port.core_Hz, costs), port.busy_share_max
     said = f"{100.0 * share:.0f} % of the time at inverter.pwm_hz = {pwm_hz:g}"
     if share > share_max:
         raise FluxtrueError(

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
-from elftools.common.exceptions import ELFError
 from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 from elftools.elf.segments import Segment
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
 from fluxtrue_tools.outputs import atomic
 
 AREAS = ("protected", "vectors", "program")  # a port must seal the first, the motor's data
@@ -27,7 +27,7 @@ class Image:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        try:
+        with reading(path, "an ELF file"):
             self.content = bytearray(path.read_bytes())
             elf = ELFFile(BytesIO(bytes(self.content)))
             self.segments: list[Segment] = list(elf.iter_segments("PT_LOAD"))
@@ -35,10 +35,6 @@ class Image:
             table = elf.get_section_by_name(".symtab")
             symbols = table.iter_symbols() if table is not None else ()
             self.symbols = {symbol.name: int(symbol["st_value"]) for symbol in symbols}
-        except OSError as error:
-            raise FluxtrueError(f"{path}: {error.strerror}") from error
-        except ELFError as error:
-            raise FluxtrueError(f"{path}: no ELF file: {error}") from error
 
     def symbol(self, name: str) -> int:
         if name not in self.symbols:
@@ -68,10 +64,8 @@ class Version:
 
 def version(path: Path) -> Version:
     """The version in an ELF file, a .bin or a dump of the flash: found by its mark, which must be there once."""
-    try:
+    with reading(path, "a readable file"):
         content = path.read_bytes()
-    except OSError as error:
-        raise FluxtrueError(f"{path}: {error.strerror}") from error
     places = [match.start() for match in re.finditer(re.escape(MARK), content)]
     if len(places) != 1 or places[0] + VERSION.size > len(content):
         raise FluxtrueError(f"{path}: the mark of a version was found {len(places)} times, allowed: once")

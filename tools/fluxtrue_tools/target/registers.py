@@ -6,29 +6,33 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target.svd import Device, Register
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]  # goes into the header as it is
+Pattern = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*\*?$")]
 
 
 class Block(BaseModel):
     """One kind of peripheral: its instances, and the fields used of each register."""
 
     model_config = ConfigDict(extra="forbid")
-    instances: list[str]
-    registers: dict[str, list[str]]
-    interrupts: list[str] = []
+    instances: Annotated[list[Name], Field(min_length=1)]
+    registers: dict[Pattern, list[Name]]
+    interrupts: list[Name] = []
 
 
 class Wanted(BaseModel):
     """The list a port keeps."""
 
     model_config = ConfigDict(extra="forbid")
-    device: str
-    guard: str
-    blocks: dict[str, Block]
+    device: Name
+    guard: Name
+    blocks: dict[Name, Block]
 
 
 @dataclass(frozen=True)

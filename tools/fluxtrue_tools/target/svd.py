@@ -9,6 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.foreign import reading
+
+ARRAY_MAX = 4096  # registers
+_NAME = re.compile(r"[A-Za-z_]\w*(\[?%s\]?\w*)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -46,10 +50,8 @@ class Device:
     """The peripherals of one SVD file."""
 
     def __init__(self, path: Path) -> None:
-        try:
+        with reading(path, "an SVD file"):
             self._root = ET.parse(path).getroot()
-        except (OSError, ET.ParseError) as error:
-            raise FluxtrueError(f"{path}: no SVD file: {error}") from error
         self.path = path
         self.name = self._root.findtext("name", "?")
         self.version = self._root.findtext("version", "?")
@@ -80,19 +82,30 @@ class Device:
         return _arrays(found) | found
 
 
-def _number(node: ET.Element, tag: str, default: str = "0") -> int:
-    return int(node.findtext(tag) or default, 0)
+def _number(node: ET.Element, tag: str, default: str = "0", largest: int = 0xFFFF_FFFF) -> int:
+    found = int(node.findtext(tag) or default, 0)
+    if not 0 <= found <= largest:
+        raise ValueError(f"{tag} = {found:#x}, allowed: 0 to {largest:#x}")
+    return found
+
+
+def _name(node: ET.Element) -> str:
+    """The name of a register or a field, which becomes a part of a C name; %s stands for a number."""
+    found = node.findtext("name", "")
+    if not _NAME.fullmatch(found):
+        raise ValueError(f"name = {found[:60]!r}, allowed: a C name")
+    return found
 
 
 def _expand(node: ET.Element) -> dict[str, Register]:
     fields = tuple(
-        Field(f.findtext("name", ""), _number(f, "bitOffset"), _number(f, "bitWidth"),
+        Field(_name(f), _number(f, "bitOffset", largest=63), _number(f, "bitWidth", largest=64),
               f.findtext("access", "read-write"))
         for f in node.iter("field")
     )  # fmt: skip
-    name, offset = node.findtext("name", ""), _number(node, "addressOffset")
-    count, step = _number(node, "dim", "1"), _number(node, "dimIncrement")
-    bits = _number(node, "size", "32")
+    name, offset = _name(node), _number(node, "addressOffset")
+    count, step = _number(node, "dim", "1", ARRAY_MAX), _number(node, "dimIncrement")
+    bits = _number(node, "size", "32", largest=64)
     access, reset = node.findtext("access", "read-write"), _number(node, "resetValue")
 
     def member(text: str, place: int, number: int = 1) -> Register:

@@ -5,7 +5,10 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import click
+
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.kinds import Address
 
 TIMEOUT_S = 600.0  # only ends a hang; the duration of a run is not limited
 
@@ -29,10 +32,7 @@ class Channel:
     @classmethod
     def at(cls, address: str, option: str) -> "Channel":
         """A connection to HOST:PORT, the value of a command line's option."""
-        host, colon, port = address.rpartition(":")
-        if not colon or not host or not port.isdigit():
-            raise FluxtrueError(f"{option} {address}: allowed: HOST:PORT")
-        return cls(host, int(port))
+        return cls(*Address().convert(address, click.Option([option]), None))
 
     def __init__(self, host: str, port: int, timeout_s: float = TIMEOUT_S) -> None:
         self._address = host, port

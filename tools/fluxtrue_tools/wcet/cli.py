@@ -7,17 +7,18 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.errors import FluxtrueError
 
 ROWS = 40
 
 
 @click.command(cls=paths.Command)
-@click.option("--elf", type=click.Path(exists=True, dir_okay=False, path_type=Path),
-              help="The image (default: s32k144, which is built).")  # fmt: skip
-@click.option("--mode", default="driving", show_default=True, help="Mode of operation, for --path.")
-@click.option("--path", "handler", help="Also: the longest path of this handler, by functions of the source.")
+@click.option("--elf", type=paths.InputFile(), help="The image (default: s32k144, which is built).")
+@click.option("--mode", type=kinds.Text(), default="driving", show_default=True, help="Mode of operation, for --path.")
+@click.option(
+    "--path", "handler", type=kinds.Text(), help="Also: the longest path of this handler, by functions of the source."
+)
 def wcet(elf: Path | None, mode: str, handler: str | None) -> None:
     """Worst-case execution time of each interrupt handler, from the control flow of the image."""
     from fluxtrue_tools.bench import figures

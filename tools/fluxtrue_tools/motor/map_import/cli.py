@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from fluxtrue_tools import paths
+from fluxtrue_tools import kinds, paths
 
 FORMATS = ("csv", "arrays", "syre", "motulator", "pyleecan")
 IMPORTED = ("motor.toml", "flux_map.csv", "import.txt", "import.png")
@@ -37,12 +37,12 @@ NODES = click.IntRange(8, 200)
 @click.option("--iron-loss", type=_FILE, metavar="CSV", help="Iron losses, to fit k_h and k_e.")
 @click.option("--iron-loss-column", "iron_loss_columns", multiple=True, metavar="NAME=HEADER", help="Where the losses "
               "have i_d, i_q, i_s, gamma, speed, frequency, loss.")  # fmt: skip
-@click.option("--iron-loss-point", "iron_loss_points", multiple=True, metavar="W@RPM", help="Instead: a loss without "
-              "current.")  # fmt: skip
+@click.option("--iron-loss-point", "iron_loss_points", type=kinds.LossPoint(), multiple=True, metavar="W@RPM",
+              help="Instead: a loss without current.")  # fmt: skip
 def import_(
     file: Path, kind: str, out: Path, motor: Path | None, given: tuple[str, ...], columns: tuple[str, ...],
     rows: str | None, nodes: int, iron_loss: Path | None, iron_loss_columns: tuple[str, ...],
-    iron_loss_points: tuple[str, ...], **convention: str | None,
+    iron_loss_points: tuple[tuple[float, float], ...], **convention: str | None,
 ) -> None:  # fmt: skip
     """Make a motor folder from the flux map in FILE."""
     from fluxtrue_tools.motor import doubts

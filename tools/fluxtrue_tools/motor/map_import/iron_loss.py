@@ -47,21 +47,11 @@ def read(path: Path, given: tuple[str, ...], convention: Convention, turn: compl
     return Losses(i.real, i.imag, omega, found["loss"])
 
 
-def from_points(path: str, given: tuple[str, ...], pole_pairs: int) -> Losses:
-    """LOSS@SPEED of a command line, without current."""
-    rows = []
-    for text in given:
-        parts = text.split("@")
-        try:
-            loss, rpm = (float(part) for part in parts)
-        except ValueError:
-            raise FluxtrueError(f"{path} {text[:60]!r}: allowed: LOSS@SPEED, W and rpm, as in 120@3000") from None
-        if not (math.isfinite(loss) and math.isfinite(rpm)):
-            raise FluxtrueError(f"{path} {text[:60]!r}: allowed: finite numbers")
-        rows.append((loss, 2.0 * math.pi * pole_pairs * abs(rpm) / 60.0))
-    loss_W, omega = np.array(rows).T
-    none = np.zeros(len(rows))
-    return Losses(none, none, omega, loss_W)
+def from_points(given: tuple[tuple[float, float], ...], pole_pairs: int) -> Losses:
+    """Losses in W at speeds in rpm, without current."""
+    loss_W, rpm = np.array(given).T
+    none = np.zeros(len(given))
+    return Losses(none, none, 2.0 * math.pi * pole_pairs * rpm / 60.0, loss_W)
 
 
 def fit(losses: Losses, model: FluxModel, i_max_A: float, where: str) -> IronLoss:

@@ -42,7 +42,7 @@ class Request:
     rows: str | None = None
     iron_loss: Path | None = None
     iron_loss_columns: tuple[str, ...] = ()
-    iron_loss_points: tuple[str, ...] = ()
+    iron_loss_points: tuple[tuple[float, float], ...] = ()  # W, rpm
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _losses(
         found = iron_loss.read(request.iron_loss, request.iron_loss_columns, convention, turn, pole_pairs)
         return iron_loss.fit(found, model, i_max_A, str(request.iron_loss))
     if request.iron_loss_points:
-        found = iron_loss.from_points("--iron-loss-point", request.iron_loss_points, pole_pairs)
+        found = iron_loss.from_points(request.iron_loss_points, pole_pairs)
         return iron_loss.fit(found, model, i_max_A, "--iron-loss-point")
     if raw.losses is not None:
         i = turn * convention.amperes * (raw.losses.i_d + 1j * raw.losses.i_q)

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Valid files of every kind that a command reads."""
+
+import io
+import json
+import os
+import subprocess
+import tempfile
+from functools import cache
+from pathlib import Path
+
+SCENARIO = """motor = "paper"
+duration_s = 0.01
+seed = 3
+record_every_s = 1e-3
+[controller]
+torque_loop = true
+[profile]
+torque_Nm = [[0, 0], [0.005, 20]]
+speed_rpm = 500
+vdc_V = 340
+[plant]
+current_gain = [1.0, 1.01, 1.0]
+dead_time_s = 1e-6
+[[event]]
+t = 0.005
+set = { identification = false, "plant.magnet_scale" = 0.9 }
+[window]
+from_s = 0.002
+to_s = 0.009
+"""
+CAMPAIGN = """motor = "paper"
+cases = 4
+seed = 7
+[nominal]
+device_drop_V = 1.0
+[spread]
+lq_scale = [0.9, 1.1]
+[plant]
+angle_bits = 12
+[drive]
+duration_s = 2
+[windows]
+speed_rpm = [[500, 5500, 1]]
+low_speed_rpm = [250]
+torque_min_Nm = 10
+[[controller]]
+name = "tables"
+set = { torque_loop = false, identification = false }
+[check]
+controllers = ["tables"]
+"""
+FAULTS = """fmea = "fmea.csv"
+points = [[0.2, 0.5], [0.8, -0.5]]
+signs = [1, -1]
+[[machine]]
+motor = "paper"
+current_A = 1000
+vdc_V = 500
+"""
+FMEA_HEAD = """id,element,failure,setup,injection,points,reaction,expected,detect_ms,torque_Nm,torque_ms,current_share,
+vdc_share,watch_ms,status,witness,result,reference"""
+FMEA = (
+    FMEA_HEAD.replace("\n", "")
+    + """
+open,sensor,input open,request=0,plant.current_open_a=1;plant.vdc_gain=x0.7@5..9,rpm>=500;torque!=0,safe_state,\
+over_current,5,,50,,,60,open,paper/0/+,measured,
+"""
+)
+SVD = """<device><name>CHIP</name><version>9</version><peripherals>
+<peripheral><name>TIM</name><baseAddress>0x40001000</baseAddress>
+  <interrupt><name>TIM_Overflow</name><value>7</value></interrupt>
+  <registers>
+    <register><name>SC</name><addressOffset>0x4</addressOffset><size>32</size><access>read-write</access>
+      <fields><field><name>CLK</name><bitOffset>3</bitOffset><bitWidth>2</bitWidth></field>
+              <field><name>EN</name><bitOffset>5</bitOffset><bitWidth>1</bitWidth></field></fields></register>
+    <register><name>R%s</name><dim>4</dim><dimIncrement>4</dimIncrement><addressOffset>0x10</addressOffset>
+      <size>32</size><access>read-only</access></register>
+  </registers></peripheral>
+</peripherals></device>
+"""
+LIST = """device = "CHIP"
+guard = "CHIP_REGISTERS_H"
+[blocks.tim]
+instances = ["TIM"]
+interrupts = ["TIM_Overflow"]
+[blocks.tim.registers]
+SC = ["CLK", "EN"]
+"R*" = []
+"""
+PORT = """core_Hz = 112_000_000
+flash_bytes = 98304
+ram_bytes = 28672
+busy_share_max = 0.75
+[pwm]
+timer_Hz = 112_000_000
+period_ticks_max = 65532
+dead_time_ticks_max = 4092
+dead_time_share_max = 0.125
+"""
+# An image with what `target seal` looks for.
+SOURCE = """
+__attribute__((section(".guarded"), used)) const unsigned char data[6] = {1, 2, 3, 4, 5, 6};
+__attribute__((section(".crc"), used)) const unsigned protected_crc = 0xFFFFFFFF;
+char big[1000] = {1};
+void start(void) { big[1]++; }
+"""
+SCRIPT = """
+ENTRY(start)
+SECTIONS {
+  .text 0x100 : { *(.text*) }
+  .guarded 0x1000 : { protected_start = .; *(.guarded) protected_end = .; . = ALIGN(4); KEEP(*(.crc)) }
+  .data 0x20000000 : { *(.data*) }
+  /DISCARD/ : { *(.note*) *(.comment) *(.eh_frame*) }
+}
+"""
+
+
+def motor_json() -> str:
+    """What `target fits` reads of a motor's build."""
+    return json.dumps({"inverter": {"pwm_hz": 10e3, "dead_time_s": 2e-6}}, indent=1)
+
+
+@cache
+def elf() -> bytes:
+    """A firmware that serves XCP: the virtual ECU, without what only a debugger reads."""
+    program = Path(os.environ["FLUXTRUE_BUILD_DIR"]) / "motors" / "hsm1" / "fluxtrue_vecu"
+    with tempfile.TemporaryDirectory() as folder:
+        short = Path(folder) / "elf"
+        subprocess.run(["objcopy", "--strip-debug", str(program), str(short)], check=True)
+        return short.read_bytes()
+
+
+@cache
+def image() -> bytes:
+    """A linked image of a port, for this computer's processor."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "a.c").write_text(SOURCE)
+        (Path(folder) / "a.ld").write_text(SCRIPT)
+        command = ["gcc", "-nostdlib", "-static", "-no-pie", "-fno-pie", "-fcf-protection=none", "-Wl,--build-id=none",
+                   "-T", "a.ld", "a.c", "-o", "a.elf"]  # fmt: skip
+        subprocess.run(command, cwd=folder, check=True)
+        return (Path(folder) / "a.elf").read_bytes()
+
+
+@cache
+def dbc() -> str:
+    """The DBC of the bus."""
+    from fluxtrue_tools.bus.interface import read_interface
+
+    return read_interface().text
+
+
+@cache
+def recording(text: str | None = None) -> bytes:
+    """A drive of a few frames with their DBC, or with another text in its place."""
+    import can
+
+    from fluxtrue_tools.bus.interface import Interface, read_interface
+    from fluxtrue_tools.vecu.mdf import BusLog, Group
+
+    interface, log, torque = read_interface(), BusLog(), Group({"truth.torque_Nm": "Nm"})
+    message = interface.message("INV_Status")
+    values = {"Crc": 0, "Counter": 0, "State": 4, "TorqueEstimated": 0.0, "TorqueCommanded": 40.0, "Speed": 2000.0}
+    for k in range(20):
+        data = message.encode(values | {"TorqueEstimated": k})
+        log(can.Message(timestamp=7.0 + 0.01 * k, arbitration_id=message.frame_id, data=data, is_extended_id=False))
+        torque.add(7.0 + 0.01 * k, float(k))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "drive.mf4"
+        log.write(path, Interface("a DBC", text if text is not None else interface.text), [torque])
+        return path.read_bytes()
+
+
+def arrays() -> dict[str, object]:
+    """A flux map by the names of every layout."""
+    import numpy as np
+    from abused import MAP
+
+    d, q, psi_d, psi_q = np.array([[float(cell) for cell in line.split(",")] for line in MAP.splitlines()[1:]]).T
+    return {"i_s": d + 1j * q, "psi_s": psi_d + 1j * psi_q, "Id": d, "Iq": q, "Fd": psi_d, "Fq": psi_q,
+            "OP_matrix": np.column_stack((d, d, q)) / 2**0.5,
+            "Phi_dqh_mean": np.column_stack((psi_d, psi_q, d))}  # fmt: skip
+
+
+@cache
+def npz() -> bytes:
+    """For NumPy."""
+    import numpy as np
+
+    file = io.BytesIO()
+    np.savez(file, **arrays())  # type: ignore[arg-type]
+    return file.getvalue()
+
+
+@cache
+def mat() -> bytes:
+    """For MATLAB, v5."""
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, arrays())
+    return file.getvalue()
