@@ -84,7 +84,8 @@ def test_a_map_in_millivolt_seconds_is_said_to_be_one(write: Write, iq_A: list[f
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"machine": {"speed_max_rpm": 628.0}}, "machine.speed_max_rpm = 628 rpm: .* as rad/s it would be 5997 rpm"),
+        ({"machine": {"speed_max_rpm": 628.0}},
+         r"machine.speed_max_rpm = 628 rpm: .* needs \d+ % .* as rad/s it would be 5997 rpm"),
         ({"machine": {"r_ohm": 2e-5}}, "machine.r_ohm = 2e-05 Ω drops 0.005 V at i_max_A: is it 0.02 Ω"),
         ({"machine": {"inertia_kgm2": 500.0}}, "machine.inertia_kgm2 = 500 kg·m²: .* wanted: kg·m²"),
         ({"identification": {"iron_loss_uncertainty": 0.3}}, "identification.iron_loss_uncertainty has no effect"),

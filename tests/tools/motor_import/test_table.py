@@ -46,6 +46,23 @@ def test_a_table_is_read_in_any_usual_form(tmp_path: Path, content: str) -> None
         assert found[name] == pytest.approx(wanted, rel=1e-8, abs=1e-12)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
+def test_a_table_is_read_in_the_encodings_of_windows(tmp_path: Path, encoding: str) -> None:
+    """Names of columns have letters beyond ASCII. UTF-16 begins with its mark."""
+    mark = "\ufeff" if encoding in ("utf-16-le", "utf-16-be") else ""
+    content = mark + text("Strom d [A],Strom q [A],Flußverkettung d [V·s],Flußverkettung q [V·s]", ";", comma=True)
+    (tmp_path / "map.csv").write_text(content, encoding=encoding)
+    given = ("i_d=Strom d [A]", "i_q=Strom q [A]", "psi_d=Flußverkettung d [V·s]", "psi_q=Flußverkettung q [V·s]")
+    found = read_map(tmp_path / "map.csv", given).quantities
+    assert found["psi_q"] == pytest.approx(PSI[1], rel=1e-8, abs=1e-12)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "map.csv").write_bytes(b"\x81\x8d" + text(USUAL).encode())
+    with pytest.raises(FluxtrueError, match="map.csv: not text in UTF-8, UTF-16 or Windows-1252"):
+        read_map(tmp_path / "map.csv", ())
+
+
 def test_columns_are_chosen_by_name(tmp_path: Path) -> None:
     """Two pairs of currents and two of fluxes: the command line says which."""
     path = tmp_path / "map.csv"

@@ -64,7 +64,7 @@ def _units(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
     used = config.omega_max_rad_s * whole / _reach_V(config)
     if used < EMF_MIN:
         rad_s = machine.speed_max_rpm * 60.0 / (2.0 * math.pi)
-        yield Doubt(f"machine.speed_max_rpm = {machine.speed_max_rpm:g} rpm: there all flux needs {100 * used:.1g} % "
+        yield Doubt(f"machine.speed_max_rpm = {machine.speed_max_rpm:g} rpm: there all flux needs {100 * used:.2g} % "
                     f"of vdc_V = {config.inverter.vdc_V:g} V; as rad/s it would be {rad_s:.0f} rpm")  # fmt: skip
 
 

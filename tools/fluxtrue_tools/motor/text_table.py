@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines and numbers of a table as text: what flux maps and imported tables have in common."""
 
+import codecs
 import csv
 import math
 import stat
+from collections.abc import Callable
 from pathlib import Path
 
 from fluxtrue_tools import strict
@@ -39,17 +41,32 @@ def check_size(path: Path) -> None:
         raise FluxtrueError(f"{path}: {status.st_size} bytes, allowed: up to {SIZE_MAX}")
 
 
-def numbered_lines(path: Path, wanted_by: str = "") -> list[tuple[int, str]]:
+def _own(data: bytes) -> str:
+    return data.decode("utf-8-sig")
+
+
+def of_windows(data: bytes) -> str:
+    """Text as programs for Windows export it: UTF-8, UTF-16 with its mark, or the Western European code page."""
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16")
+    try:
+        return _own(data)
+    except UnicodeDecodeError:
+        return data.decode("cp1252")
+
+
+def numbered_lines(path: Path, wanted_by: str = "", decoded: Callable[[bytes], str] = _own) -> list[tuple[int, str]]:
     """Every line of the file with its number; `wanted_by` is the key that names the file."""
     try:
         check_size(path)
-        text = path.read_text(encoding="utf-8-sig")
+        text = decoded(path.read_bytes())
     except FileNotFoundError:
         named = f", named by {wanted_by}" if wanted_by else ""
         raise FluxtrueError(f"{path}: no such file{named}") from None
     except ValueError as error:
         if isinstance(error, UnicodeDecodeError):
-            raise FluxtrueError(f"{path}: not UTF-8 text") from None
+            text = "UTF-8 text" if decoded is _own else "text in UTF-8, UTF-16 or Windows-1252"
+            raise FluxtrueError(f"{path}: not {text}") from None
         raise FluxtrueError(f"{wanted_by} = {path.name!r}: {error}") from None  # a NUL in the name
     except OSError as error:
         raise FluxtrueError(f"{path}: cannot be read: {error.strerror}") from None

@@ -10,7 +10,7 @@ import numpy as np
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.motor.map_import.source import FLUXES, PLACES, QUANTITIES, Raw, known_as, mapping, place_of
-from fluxtrue_tools.motor.text_table import ROWS_MAX, cells, number, numbered_lines
+from fluxtrue_tools.motor.text_table import ROWS_MAX, cells, number, numbered_lines, of_windows
 
 SEPARATORS = (";", "\t", ",")
 HEADER_LINES = 200  # in which the header is looked for
@@ -92,7 +92,7 @@ def read(
     path: Path, given: tuple[str, ...], quantities: tuple[str, ...], wanted: tuple[str, ...], option: str = OPTION
 ) -> dict[str, Array]:
     """The quantities that the table has."""
-    lines = [(n, text) for n, text in numbered_lines(path) if text.strip()]
+    lines = [(n, text) for n, text in numbered_lines(path, decoded=of_windows) if text.strip()]
     if len(lines) > ROWS_MAX:
         raise FluxtrueError(f"{path}: {len(lines)} rows, allowed: up to {ROWS_MAX}")
     chosen = mapping(given, option, quantities)
