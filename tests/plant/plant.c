@@ -262,12 +262,14 @@ static void series_source(plant_t *plant, rotation_t rotor)
     to_stationary(rotation_add(rotor, rotation_of(half_rad)), u_dq, plant->inverter.series_V);
 }
 
-void plant_advance(plant_t *plant, const double duty[3], int gates_on)
+void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
 {
     const plant_params_t *p = &plant->params;
     const double period_s = 1.0 / p->pwm_hz;
     const int n = p->substeps < 10 ? 10 : p->substeps;
     const double middle_s = plant->truth.time_s + 0.5 * period_s;
+    const double swapped[3] = {wanted[0], wanted[2], wanted[1]};
+    const double *duty = p->phases_swapped ? swapped : wanted;
     bridge_t bridge = {duty, gates_on && plant->on.gate_supply, vdc_at(p, middle_s), 0.0};
     bridge.short_circuit_A = short_circuit(plant, &bridge);
     double vdc_V = bridge_V(plant, middle_s);

@@ -11,6 +11,7 @@
 typedef struct {
     /* machine */
     double pole_pairs;
+    int phases_swapped; /* the motor's leads b and c are exchanged: its field turns the other way */
     double r_ohm_20, r_temp_coeff_per_K, winding_C;          /* (PL-5) */
     double ld_H, lq_H, psi_f_Vs;                             /* used when there is no map */
     double magnet_scale;                                     /* of psi_f = psi_d(0, 0), (PL-4) */
@@ -47,6 +48,7 @@ typedef struct {
     int current_open[3];  /* input pulled down: reads the negative full scale */
     double vdc_full_scale_V, vdc_gain;
     int vdc_quantise;
+    int angle_reversed;                  /* counts against the rotor */
     double angle_offset_rad;             /* electrical */
     double angle_h1_rad, angle_h1_phase; /* electrical amplitude, once per turn of the resolver */
     double angle_h2_rad, angle_h2_phase; /* the same, second harmonic */

@@ -65,7 +65,7 @@ static double angle_spike(sensors_t *s, const plant_params_t *p)
 static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_truth_t *truth)
 {
     const double theta = truth->theta_m_rad - truth->speed_rad_s * p->angle_delay_s;
-    const double resolver_rad = p->resolver_pole_pairs * theta;
+    const double resolver_rad = p->resolver_pole_pairs * theta, sign = p->angle_reversed ? -1.0 : 1.0;
     double error = p->angle_offset_rad + angle_spike(s, p);
     if (p->angle_h1_rad != 0.0) {
         error += p->angle_h1_rad * sin(resolver_rad + p->angle_h1_phase);
@@ -73,7 +73,7 @@ static void sample_angle(sensors_t *s, const plant_params_t *p, const plant_trut
     if (p->angle_h2_rad != 0.0) {
         error += p->angle_h2_rad * sin(2.0 * resolver_rad + p->angle_h2_phase);
     }
-    const double measured = wrap_angle(theta + error / p->pole_pairs);
+    const double measured = wrap_angle(sign * theta + error / p->pole_pairs);
     if (p->angle_bits > 0) {
         const double codes = ldexp(1.0, p->angle_bits);
         const double whole = fmod(floor(measured / TWO_PI * codes + 0.5), codes);
@@ -89,11 +89,11 @@ void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *
 {
     for (int x = 0; x < 3; x++) {
         sample_current(s, p, x, truth->i_abc_A[x]);
-        out->i_count[x] = s->current_count[x];
+        out->i_count[(p->phases_swapped && x > 0) ? 3 - x : x] = s->current_count[x];
     }
     out->ia_A = s->current_A[0];
-    out->ib_A = s->current_A[1];
-    out->ic_A = s->current_A[2];
+    out->ib_A = s->current_A[p->phases_swapped ? 2 : 1];
+    out->ic_A = s->current_A[p->phases_swapped ? 1 : 2];
     sample_vdc(p, truth->vdc_V, out);
     if (!p->angle_stuck) {
         sample_angle(s, p, truth);

@@ -29,7 +29,7 @@ typedef struct {
     FLAG6(f, 3u, "lower_a"), FLAG6(f, 4u, "lower_b"), FLAG6(f, 5u, "lower_c")
 
 static const field_t plant_fields[] = {
-    REAL(pole_pairs), REAL(r_ohm_20), REAL(r_temp_coeff_per_K), REAL(winding_C), REAL(ld_H),
+    REAL(pole_pairs), FLAG(phases_swapped), REAL(r_ohm_20), REAL(r_temp_coeff_per_K), REAL(winding_C), REAL(ld_H),
     REAL(lq_H), REAL(psi_f_Vs), REAL(magnet_scale), REAL(magnet_temp_coeff_per_K), REAL(rotor_C),
     REAL(lq_scale), REAL(ld_slope_scale), REAL(cross_saturation_scale), REAL(iron_k_h),
     REAL(iron_k_e), FLAG(magnet_step_keeps_current), REAL(vdc_V), REAL(vdc_ripple_V),
@@ -41,7 +41,7 @@ static const field_t plant_fields[] = {
     REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), REAL(current_full_scale_A), FLAG(adc_bits),
     REAL3(current_gain), REAL3(current_offset_A), REAL(current_noise_A_rms),
     FLAG(current_quantise), FLAG3(current_stuck), FLAG3(current_open), REAL(vdc_full_scale_V),
-    REAL(vdc_gain), FLAG(vdc_quantise), REAL(angle_offset_rad), REAL(angle_h1_rad),
+    REAL(vdc_gain), FLAG(vdc_quantise), FLAG(angle_reversed), REAL(angle_offset_rad), REAL(angle_h1_rad),
     REAL(angle_h1_phase), REAL(angle_h2_rad), REAL(angle_h2_phase), REAL(resolver_pole_pairs),
     FLAG(angle_bits), REAL(angle_delay_s), FLAG(angle_stuck), FLAG(angle_spike_every),
     FLAG(angle_spike_samples), REAL(angle_spike_rad), FLAG(imposed_speed),

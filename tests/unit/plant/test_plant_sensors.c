@@ -210,6 +210,47 @@ void test_the_angle_carries_its_offset_and_both_harmonics_of_the_turn(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0 + (0.03 + 0.02 * sin(3.5) + 0.01 * sin(5.0)) / 3.0, seen.theta_m_rad);
 }
 
+void test_a_reversed_angle_counts_against_the_rotor(void)
+{
+    p.angle_reversed = 1;
+    p.angle_offset_rad = 0.3;
+    start();
+    plant_set_state(plant, 0.0, 0.0, 1.0, 0.0);
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, TWO_PI - 1.0 + 0.3 / p.pole_pairs, seen.theta_m_rad);
+}
+
+void test_swapped_leads_exchange_the_samples_of_b_and_c(void)
+{
+    start();
+    sample_at(-70.0, 110.0);
+    const plant_sensors_t straight = seen;
+    plant_params(plant)->phases_swapped = 1;
+    sample_at(-70.0, 110.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, straight.ia_A, seen.ia_A);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, straight.ic_A, seen.ib_A);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, straight.ib_A, seen.ic_A);
+    TEST_ASSERT_EQUAL_INT32(straight.i_count[2], seen.i_count[1]);
+    TEST_ASSERT_EQUAL_INT32(straight.i_count[1], seen.i_count[2]);
+}
+
+/* At theta_e = 0 the q axis is along (b - c): with the leads swapped the same duties turn its current around. */
+void test_swapped_leads_exchange_the_duties_of_b_and_c(void)
+{
+    const double duty[3] = {0.5, 0.52, 0.48};
+    double i_q[2];
+    for (int swapped = 0; swapped < 2; swapped++) {
+        plant_destroy(plant);
+        p.phases_swapped = swapped;
+        start();
+        plant_set_state(plant, 0.0, 0.0, 0.0, 0.0);
+        plant_advance(plant, duty, 1);
+        i_q[swapped] = plant_truth(plant)->i_q_A;
+    }
+    TEST_ASSERT_TRUE(i_q[0] > 0.1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -i_q[0], i_q[1]);
+}
+
 void test_the_angle_stays_in_one_turn_at_its_ends(void)
 {
     p.angle_offset_rad = -0.03;

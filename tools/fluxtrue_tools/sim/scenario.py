@@ -176,6 +176,8 @@ class Plant(Strict):
     vdc_full_scale_V: Positive | None = None
     vdc_gain: Number | None = None
     vdc_quantise: bool | None = None
+    phases_swapped: bool | None = None
+    angle_reversed: bool | None = None
     angle_offset_rad: Number | None = None
     angle_h1_rad: Number | None = None
     angle_h1_phase: Number | None = None
