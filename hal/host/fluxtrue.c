@@ -101,6 +101,21 @@ static uint16_t to_count(double share, unsigned bits)
     return (uint16_t)fmin(fmax(floor(share * (top + 1.0) + 0.5), 0.0), top);
 }
 
+/* The tracker begins anew with another source of the angle. */
+static void take_angle(fluxtrue_t *d, double turns)
+{
+    const double period_s = (double)d->motor.bases.period_s;
+    const angle_source_in_t in = {(double)d->drive.motor->angle_tracker.pole_pairs, period_s, d->gates};
+    bool changed;
+    d->theta_m = angle_source_step(&d->angle_source, &in, turns, &changed);
+    if (changed) {
+        d->drive.fast.angle_tracker.samples = 0;
+    }
+    if (!spin_limit_step(&d->spin_limit, d->angle_source.turns, period_s)) {
+        d->drive.request.enable = false;
+    }
+}
+
 static void take_samples(fluxtrue_t *d, const double in[6])
 {
     const motor_t *m = d->drive.motor;
@@ -112,7 +127,7 @@ static void take_samples(fluxtrue_t *d, const double in[6])
         .i_c = to_count(in[2] / span_A + 0.5, m->adc_bits),
         .v_dc = to_count(in[3] / (double)m->v_dc_full_scale_V, m->adc_bits),
     };
-    d->theta_m = (uint32_t)((turns - floor(turns)) * 4294967295.0);
+    take_angle(d, turns);
     d->winding_C = in[5];
 }
 

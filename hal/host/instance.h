@@ -9,9 +9,11 @@
 
 #include "ecu/ecu.h"
 #include "hal/board.h"
+#include "hal/host/angle_source.h"
 #include "hal/host/external_watchdog.h"
 #include "hal/host/fluxtrue.h"
 #include "hal/host/nvm_host.h"
+#include "hal/host/spin_limit.h"
 #include "storage/memory.h"
 #include "types/samples.h"
 
@@ -54,6 +56,8 @@ struct fluxtrue {
     memory_t memory;
     adc_counts_t counts;
     uint32_t theta_m;
+    angle_source_t angle_source;
+    spin_limit_t spin_limit;
     double winding_C;
     duty_t duty;
     bool gates;

@@ -82,6 +82,15 @@
     X(pulses_reversals, "", COUNT, "Reversals of the voltage, in q if it has one, after which the pulses end.") \
     X(pulses_periods, "", COUNT, "Periods after which the pulses end in any case.") \
     X(theta_e_rad, "rad", NUMBER, "Electrical angle of the last sample.") \
+    X(sensor_turns, "", NUMBER, "Turns of the angle sensor since the start.") \
+    X(angle_pole_pairs, "", NUMBER, "Electrical turns for each turn of the angle sensor.") \
+    X(angle_reversed, "", SWITCH, "1: the angle sensor counts against the electrical direction.") \
+    X(angle_offset_rad, "rad", NUMBER, "Electrical angle at the sensor's zero.") \
+    X(angle_imposed, "", SWITCH, "1 imposes the electrical angle instead of following the sensor.") \
+    X(imposed_hz, "", NUMBER, "Electrical frequency of the imposed angle.") \
+    X(spin_periods, "", COUNT, "Periods until switching is disabled unless this is set again; 0: no limit.") \
+    X(spin_rpm, "rpm", NUMBER, "Speed of the sensor at which switching is disabled.") \
+    X(spin_failure, "", CHOICE, "Why the movement of the shaft was ended.") \
     X(memory_recalled, "", SWITCH, "1: this drive has started with a record of its flash.") \
     X(memory_saves, "", COUNT, "Records saved in the flash since the start.")
 

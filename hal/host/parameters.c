@@ -10,6 +10,7 @@
 #include "hal/host/limits.h"
 #include "hal/host/parameters.h"
 #include "hal/host/pulsed.h"
+#include "hal/host/spun.h"
 #include "hal/host/stations.h"
 
 static double pu15(int32_t x, float base)
@@ -212,6 +213,15 @@ const parameter_t parameters[] = {
     {"pulses_reversals", pulsed_reversals, pulsed_set_reversals, 0.0, 1000.0},
     {"pulses_periods", pulsed_periods, pulsed_set_periods, 0.0, 20000.0},
     {"theta_e_rad", pulsed_theta_rad, NULL, 0, 0},
+    {"sensor_turns", spun_turns, NULL, 0, 0},
+    {"angle_pole_pairs", spun_pole_pairs, spun_set_pole_pairs, 1.0, 50.0},
+    {"angle_reversed", spun_reversed, spun_set_reversed, 0.0, 1.0},
+    {"angle_offset_rad", spun_offset_rad, spun_set_offset_rad, -6.283185307179586, 6.283185307179586},
+    {"angle_imposed", spun_imposed, spun_set_imposed, 0.0, 1.0},
+    {"imposed_hz", spun_imposed_hz, spun_set_imposed_hz, -1000.0, 1000.0},
+    {"spin_periods", spun_periods, spun_set_periods, 0.0, 1000000.0},
+    {"spin_rpm", spun_rpm, spun_set_rpm, 0.0, 1000000.0},
+    {"spin_failure", spun_failure, NULL, 0, 0},
     COMMISSIONED_POINTS(POINT_NAME){"memory_recalled", get_memory_recalled, NULL, 0, 0},
     {"memory_saves", get_memory_saves, NULL, 0, 0},
 };

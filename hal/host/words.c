@@ -17,12 +17,13 @@ typedef struct {
 #define FAILURE_WORD(name, value, text) {"commission_failure", value, #name, text},
 #define PULSES_PHASE_WORD(name, value, text) {"pulses", value, #name, text},
 #define PULSES_FAILURE_WORD(name, value, text) {"pulses_failure", value, #name, text},
+#define SPIN_FAILURE_WORD(name, value, text) {"spin_failure", value, #name, text},
 #define MOTOR_CHECK_WORD(name, value, text) {"motor_check", value, #name, text},
 
 static const word_t words[] = {FAULT_LIST(FAULT_WORD) DERATING_LIST(DERATING_WORD) RUN_STATE_LIST(RUN_STATE_WORD)
                                    COMMISSION_PHASE_LIST(PHASE_WORD) COMMISSION_FAILURE_LIST(FAILURE_WORD)
                                        PULSES_PHASE_LIST(PULSES_PHASE_WORD) PULSES_FAILURE_LIST(PULSES_FAILURE_WORD)
-                                           MOTOR_CHECK_LIST(MOTOR_CHECK_WORD)};
+                                           SPIN_FAILURE_LIST(SPIN_FAILURE_WORD) MOTOR_CHECK_LIST(MOTOR_CHECK_WORD)};
 
 static const word_t *find(const char *of, int value)
 {

@@ -22,7 +22,7 @@ MOTOR = BUILD / "motors" / "hsm1"
 LIBRARY_LISTS = {"fault_word": "FAULT_LIST", "derating": "DERATING_LIST", "run_state": "RUN_STATE_LIST",
                  "commission": "COMMISSION_PHASE_LIST", "commission_failure": "COMMISSION_FAILURE_LIST",
                  "pulses": "PULSES_PHASE_LIST", "pulses_failure": "PULSES_FAILURE_LIST",
-                 "motor_check": "MOTOR_CHECK_LIST"}  # fmt: skip
+                 "spin_failure": "SPIN_FAILURE_LIST", "motor_check": "MOTOR_CHECK_LIST"}  # fmt: skip
 DESCRIBED = {
     "FAULT": "FAULT_LIST",
     "ECU_FAULT": "ECU_FAULT_LIST",

@@ -67,7 +67,7 @@ def test_a_dry_run_announces_movement_and_current(folder: Path, capsys: pytest.C
     assert "up to 250 A" in said and "up to 212 A" in said
 
 
-@pytest.mark.parametrize("options", [["--step", "spin"], []])
+@pytest.mark.parametrize("options", [["--step", "gains"], []])
 def test_a_wrong_call_is_refused(options: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["commission", "--motor", str(folder), *options]) == 2
     assert "wanted" in (said := capsys.readouterr().err) or "allowed" in said

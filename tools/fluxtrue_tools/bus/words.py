@@ -35,6 +35,7 @@ SOURCES: Final = {
     "RUN_STATE_LIST": "firmware/drive/drive.h",
     "PULSES_PHASE_LIST": "firmware/drive/pulses.h",
     "PULSES_FAILURE_LIST": "firmware/drive/pulses.h",
+    "SPIN_FAILURE_LIST": "hal/host/spin_limit.h",
     "COMMAND_MODE_LIST": "firmware/comm/can_rx.h",
     "DERATING_REASON_LIST": "firmware/comm/messages.h",
     "REQUEST_LIMIT_LIST": "firmware/comm/messages.h",

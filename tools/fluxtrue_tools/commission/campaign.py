@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many hidden machines: python -m fluxtrue_tools.commission.campaign [--machines 40]. Refusals are counted."""
+"""Many hidden machines: python -m fluxtrue_tools.commission.campaign [--machines 40] [--turning]. Refusals are counted.
+
+Without --turning the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
+with it pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are.
+"""
 
 from pathlib import Path
 
@@ -8,7 +12,7 @@ import numpy as np
 
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.cli import nameplate_of
-from fluxtrue_tools.commission.score import score
+from fluxtrue_tools.commission.score import score, turned
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import motor as motors
@@ -17,6 +21,8 @@ from fluxtrue_tools.sim.build import ROOT
 KINDS = ("hsm1", "saturated", "pmasynrm", "linear", "leaf")
 FOLDER = ROOT / "tests" / "motors" / "unknown"
 FIRST_SEED = 100
+MAP = ("map rms, % of psi_max", "R, %", "largest current, % of i_max", "movement, deg")
+TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %")
 
 
 def _one(name: str, seed: int, folder: Path) -> tuple[float, float, float, float] | None:
@@ -38,16 +44,36 @@ def _one(name: str, seed: int, folder: Path) -> tuple[float, float, float, float
     return reached.map_rms, abs(r_error), share, moved
 
 
+def _turning(name: str, seed: int, folder: Path) -> tuple[float, float, float, float, float] | None:
+    """1 for a wrong connection; offset in degrees; errors of magnet, inertia and drag; None after a refusal."""
+    motor = motors.load(str(folder))
+    known = nameplate_of(folder, motor)
+    drive, truth = hidden.make(name, seed, motor, known.i_max_A, connected=False)
+    try:
+        found = run(drive, chosen(("drag",)), known, lambda _: None)
+    except FluxtrueError as error:
+        click.echo(f"{name:10} {seed}  refused: {error}")
+        return None
+    errors = turned(found, truth)
+    word = "right" if errors.is_connected else "WRONG"
+    click.echo(f"{name:10} {seed}  {word}  offset {errors.offset_deg:+6.3f} deg  psi_f {100 * errors.psi_f:+6.2f} %  "
+               f"J {100 * errors.inertia:+6.2f} %  drag {100 * errors.drag:5.1f} %")  # fmt: skip
+    return (float(not errors.is_connected), abs(errors.offset_deg), abs(errors.psi_f), abs(errors.inertia),
+            errors.drag)  # fmt: skip
+
+
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
-def main(machines: int) -> None:
+@click.option("--turning", is_flag=True, help="The steps that turn the shaft, with an unknown connection.")
+def main(machines: int, turning: bool) -> None:
     """Score hidden machines one after the other."""
-    results = [_one(KINDS[k % len(KINDS)], FIRST_SEED + k, FOLDER) for k in range(machines)]
+    measure = _turning if turning else _one
+    results = [measure(KINDS[k % len(KINDS)], FIRST_SEED + k, FOLDER) for k in range(machines)]
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
+    names, scales = (TURNING, (1.0, 1.0, 100.0, 100.0, 100.0)) if turning else (MAP, (100.0, 100.0, 100.0, 1.0))
     if len(done):
-        names = ("map rms, % of psi_max", "R, %", "largest current, % of i_max", "movement, deg")
-        for name, values in zip(names, (done * (100.0, 100.0, 100.0, 1.0)).T, strict=True):
+        for name, values in zip(names, (done * scales).T, strict=True):
             click.echo(f"{name}: median {np.median(values):.2f}, 95 % within {np.percentile(values, 95):.2f}, "
                        f"worst {values.max():.2f}")  # fmt: skip
 

@@ -34,11 +34,15 @@ def nameplate_of(folder: Path, motor: "Motor") -> "Nameplate":
               help="The simulated machine at the terminals: one of the project's, changed at random.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of these changes.")
 @click.option("--step", "steps", default="map", show_default=True, metavar="STEP,...",
-              help="offsets, resistance, map; a step brings those that it needs.")  # fmt: skip
+              help="offsets, phases, spin, drag, resistance, map, or all; a step brings what it needs.")  # fmt: skip
 @click.option("--out", type=paths.OutputFolder(*WRITTEN), metavar="DIR", help="The motor's folder.")
 @click.option("--dry-run", is_flag=True, help="Only say what will move and how much current will flow.")
 def commission(nameplate: Path, machine: str, seed: int, steps: str, out: Path | None, dry_run: bool) -> None:
-    """Measure resistance and flux map of an unknown motor at standstill, by software in the loop."""
+    """Measure an unknown motor with an uncoupled shaft, by software in the loop.
+
+    The steps phases, spin and drag turn the shaft; the simulated machine's sensor and leads are then connected at
+    random. The others keep it at standstill and need the connection to be right.
+    """
     from fluxtrue_tools.commission import folder, plot, report
     from fluxtrue_tools.commission.hidden import folder_of, make
     from fluxtrue_tools.commission.steps import announcement, chosen, run
@@ -57,11 +61,14 @@ def commission(nameplate: Path, machine: str, seed: int, steps: str, out: Path |
         return
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
-        drive, _ = make(machine, seed, motor, known.i_max_A)
+        connected = all(step.name != "phases" for step in wanted)
+        drive, _ = make(machine, seed, motor, known.i_max_A, connected)
         found = run(drive, wanted, known, click.echo)
+        known = found.known(known)
         grid, _ = folder.write(found, known, nameplate, staging, out)
         text = report.text(found, known, grid)
         (staging / "commission.txt").write_text(text, encoding="utf-8")
-        plot.write(found, known, grid, staging / "commission.png")
+        if found.resistance is not None:
+            plot.write(found, known, grid, staging / "commission.png")
     click.echo(text, nl=False)
     click.echo(f"written to {out}")

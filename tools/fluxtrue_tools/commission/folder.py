@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fluxtrue_tools import strict
+from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.errors import FluxtrueError
@@ -21,6 +22,7 @@ from fluxtrue_tools.motor.names import FILE_NAME
 from fluxtrue_tools.motor.references import Solver
 
 NODES = 31
+TORQUE_GUESSED = 0.95  # of what the magnet gives
 TORQUE_SHARE = 0.98  # of what the map gives
 BY = "measured by fluxtrue commission"
 
@@ -44,15 +46,20 @@ def _of_the_map(found: Found, known: Nameplate, staging: Path, entries: dict[str
     surface, machine = found.surface, entries["machine"]
     model = surface.with_magnet(known.psi_f_Vs)
     grid = make_grid(model, _points(found), known.i_max_A, NODES, staging)
-    title = f"{BY}: one co-energy through voltage pulses; psi_d without current is that of the nameplate"
+    magnet = "coasting" if found.spun is not None else "the nameplate"
+    title = f"{BY}: one co-energy through voltage pulses; psi_d without current is that of {magnet}"
     (staging / MAP).write_text(flux_map_csv(grid, title), encoding="utf-8")
     for key in SOURCES:
         machine.pop(key, None)
     left = 1e3 * surface.left_Vs
     machine["flux_map"] = Entry(
         MAP,
-        f"{BY}: voltage pulses at standstill, ±{left:.2g} mV·s; the magnet's "
-        f"{known.psi_f_Vs:.4g} V·s is the nameplate's guess: standstill does not show it",
+        f"{BY}: voltage pulses at standstill, ±{left:.2g} mV·s; the magnet's {known.psi_f_Vs:.4g} V·s "
+        + (
+            f"by coasting, ±{found.spun.psi_f_sigma_Vs:.1g} V·s"
+            if found.spun is not None
+            else "is the nameplate's guess: standstill does not show it"
+        ),
     )
     top = Solver(model, known.pole_pairs, known.i_max_A).torque_top_Nm
     machine["torque_max_Nm"] = Entry(float(f"{strict.down(TORQUE_SHARE * top):.4g}"), "from this map")
@@ -81,16 +88,39 @@ def _text(entries: dict[str, dict[str, Entry]]) -> str:
 
 def write(found: Found, known: Nameplate, nameplate: Path, staging: Path, out: Path) -> tuple[Grid | None, Motor]:
     """motor.toml and flux_map.csv; what motor build would refuse is refused here."""
-    if found.resistance is None:
-        raise FluxtrueError("commission: nothing for a motor's folder was measured: wanted: --step resistance or map")
+    if found.resistance is None and found.followed is None:
+        raise FluxtrueError("commission: nothing for a motor's folder was measured: wanted: --step all, phases, "
+                            "resistance or map")  # fmt: skip
     entries = _entries(nameplate, out)
-    r = found.resistance
+    _of_the_turning(found, known, entries["machine"])
+    if found.resistance is not None:
+        _of_the_levels(found.resistance, entries)
+    grid = _of_the_map(found, known, staging, entries) if found.surface is not None else None
+    (staging / FILE_NAME).write_text(_text(entries), encoding="utf-8")
+    return grid, load_motor(staging)
+
+
+def _of_the_turning(found: Found, known: Nameplate, machine: dict[str, Entry]) -> None:
+    """Pole pairs, magnet, inertia; without a map the inductances stay guesses."""
+    if found.followed is not None:
+        machine["pole_pairs"] = Entry(found.followed.connection.pole_pairs, f"{BY}: the rotor followed a current that "
+                                      f"turned slowly, {abs(found.followed.pole_pairs):.2f} not rounded")  # fmt: skip
+    if found.spun is not None:
+        sigma = f"±{found.spun.psi_f_sigma_Vs:.1g} V·s; gain of the dc voltage not included"
+        machine["psi_f_Vs"] = Entry(float(f"{found.spun.psi_f_Vs:.4g}"), f"{BY}: coasting, {sigma}")
+    if found.followed is not None:  # replaced when a map is known
+        torque_Nm = TORQUE_GUESSED * 1.5 * known.pole_pairs * known.psi_f_Vs * known.i_max_A
+        machine["torque_max_Nm"] = Entry(float(f"{torque_Nm:.4g}"), "of the magnet alone")
+    if found.drag is not None:
+        machine["inertia_kgm2"] = Entry(float(f"{found.drag.inertia_kgm2:.4g}"), f"{BY}: acceleration and run-down, "
+                                        f"±{found.drag.inertia_sigma_kgm2:.1g} kg m^2; gains of the sensors not "
+                                        "included")  # fmt: skip
+
+
+def _of_the_levels(r: Resistance, entries: dict[str, dict[str, Entry]]) -> None:
     entries["machine"]["r_ohm"] = Entry(float(f"{r.r_ohm:.4g}"), f"{BY}: direct currents, ±{r.r_sigma_ohm:.1g} ohm; "
                                         "gains of the sensors not included")  # fmt: skip
     dead_time = r.dead_time_s(entries["inverter"]["vdc_V"].value, entries["inverter"]["pwm_hz"].value)
     entries["inverter"]["dead_time_s"] = Entry(float(f"{dead_time:.3g}"), f"{BY}: with the drop of a leg, "
                                                f"{r.total_V:.3g} V at this dc voltage")  # fmt: skip
     entries["inverter"].pop("device_drop_V", None)
-    grid = _of_the_map(found, known, staging, entries) if found.surface is not None else None
-    (staging / FILE_NAME).write_text(_text(entries), encoding="utf-8")
-    return grid, load_motor(staging)

@@ -42,6 +42,17 @@ class Truth:
         return self.flux_scale * self.source.psi_d(d, q) + more, self.flux_scale * self.source.psi_q(d, q)
 
     @property
+    def reversed(self) -> bool:
+        """The sensor counts against the electrical direction of the inverter's phases."""
+        return bool(self.plant.get("phases_swapped", 0.0)) != bool(self.plant.get("angle_reversed", 0.0))
+
+    @property
+    def offset_rad(self) -> float:
+        """Electrical angle, as the inverter's phases turn, at the sensor's zero."""
+        offset = self.plant.get("angle_offset_rad", 0.0)
+        return offset if self.reversed else -offset
+
+    @property
     def psi_f_Vs(self) -> float:
         """Of the magnet."""
         return float(self.psi(0.0, 0.0)[0])
@@ -75,7 +86,17 @@ def _sensors(rng: np.random.Generator, full_scale_A: float) -> dict[str, float]:
     return errors
 
 
-def draw(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[Truth, FluxMap | None, dict[str, float]]:
+def _connection(name: str, seed: int) -> dict[str, float]:
+    """Nothing of how sensor and leads are connected is known."""
+    rng = np.random.default_rng([seed, sum(name.encode()), 1])
+    return {"pole_pairs": float(rng.integers(2, 9)), "phases_swapped": float(rng.integers(0, 2)),
+            "angle_reversed": float(rng.integers(0, 2)), "angle_offset_rad": float(rng.uniform(-math.pi, math.pi)),
+            "angle_bits": 14.0}  # fmt: skip
+
+
+def draw(
+    name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True
+) -> tuple[Truth, FluxMap | None, dict[str, float]]:
     """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters."""
     rng = np.random.default_rng([seed, sum(name.encode())])
     model, flux_map, source_i_max = _source(folder_of(name))
@@ -92,6 +113,8 @@ def draw(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[Truth, Flu
         "viscous_Nms": 1e-4 * motor.torque_max_Nm * float(rng.uniform(0.5, 2.0)),
         "seed": float(rng.integers(1, 1 << 40)),
     }  # fmt: skip
+    if not connected:
+        plant |= _connection(name, seed)
     if flux_map is None:
         linear = model.psi_d(0.0, 0.0, nd=1), model.psi_q(0.0, 0.0, nq=1), model.psi_d(0.0, 0.0)
         plant |= {"ld_H": float(linear[0]) / current, "lq_H": float(linear[1]) / current, "psi_f_Vs": float(linear[2])}
@@ -100,7 +123,7 @@ def draw(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[Truth, Flu
     return Truth(model, source_i_max, flux_scale, current, magnet, plant), flux_map, plant
 
 
-def make(name: str, seed: int, motor: Motor, i_max_A: float) -> tuple[SoftwareInTheLoop, Truth]:
-    """A drive with a hidden machine at its terminals."""
-    truth, flux_map, plant = draw(name, seed, motor, i_max_A)
+def make(name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True) -> tuple[SoftwareInTheLoop, Truth]:
+    """A drive with a hidden machine at its terminals; connected: sensor and leads are as the firmware assumes."""
+    truth, flux_map, plant = draw(name, seed, motor, i_max_A, connected)
     return SoftwareInTheLoop(Loop(motor.library, plant, flux_map)), truth

@@ -3,22 +3,61 @@
 
 import math
 
+import numpy as np
+
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.map_import.grid import Grid
 
 
-def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
-    """The report."""
+def _turning(found: Found, known: Nameplate) -> list[str]:
+    lines = []
+    if found.followed is not None:
+        wiring = found.spun.connection if found.spun is not None else found.followed.connection
+        way = "against" if wiring.reversed else "with"
+        lines.append(f"connection: {wiring.pole_pairs} pole pairs; the angle sensor counts {way} the field; electrical "
+                     f"angle {math.degrees(wiring.offset_rad):.2f} degrees at its zero; the rotor followed "
+                     f"{found.followed.current_A:.3g} A")  # fmt: skip
+    if found.spun is not None:
+        spun, degrees = found.spun, math.degrees(found.spun.offset_sigma_rad)
+        lines.append(f"magnet: psi_f = {spun.psi_f_Vs:.4g} V·s, ±{spun.psi_f_sigma_Vs:.1g} V·s beyond the sensors' "
+                     f"gains; offset of the angle ±{degrees:.1g} degrees; the angle is late by "
+                     f"{1e6 * spun.lag_s:.1f} us")  # fmt: skip
+    if found.drag is not None:
+        drag = found.drag
+        ends = ", ".join(f"{drag.torque_Nm(np.array(w)):.3g} N·m at {30.0 * w / math.pi:.0f} rpm"
+                         for w in (0.4 * drag.to_rad_s, drag.to_rad_s))  # fmt: skip
+        lines.append(f"inertia: {drag.inertia_kgm2:.4g} kg m^2, ±{drag.inertia_sigma_kgm2:.1g}; drag {ends}")
+    return lines
+
+
+def _levels(found: Found, known: Nameplate) -> list[str]:
     r = found.resistance
-    assert r is not None and found.first is not None
-    lines = [
-        f"current sensors: offset {found.offset_A.real:+.3f} A along alpha, {found.offset_A.imag:+.3f} A along beta",
+    if r is None or found.first is None:
+        return []
+    return [
         f"resistance: {1e3 * r.r_ohm:.4g} mohm, ±{1e3 * r.r_sigma_ohm:.1g} mohm beyond the sensors' gains (guessed "
         f"{1e3 * known.r_ohm:.4g} mohm)",
         f"inverter: a leg loses {r.total_V:.3g} V, {r.level_V:+.3g} V more than is compensated",
         f"inductances at small currents: {1e3 * found.first.l_d_H:.4g} mH (d), {1e3 * found.first.l_q_H:.4g} mH (q)",
     ]
+
+
+def _magnet(found: Found, known: Nameplate) -> list[str]:
+    if found.spun is not None:
+        return []
+    return [
+        f"  psi_f = {known.psi_f_Vs:.4g} V·s is the nameplate's guess: it cannot be seen at standstill, and "
+        "the torque of this folder is as uncertain as this guess",
+    ]
+
+
+def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
+    """The report."""
+    lines = [
+        f"current sensors: offset {found.offset_A.real:+.3f} A along alpha, {found.offset_A.imag:+.3f} A along beta"
+    ]
+    lines += _turning(found, known) + _levels(found, known)
     if found.surface is not None and grid is not None:
         moved = sum(bool(raw.failure) for raw in found.bursts)
         lines += [
@@ -29,9 +68,8 @@ def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
             f"  left of the flux linkages: {1e3 * found.surface.left_Vs:.2g} mV·s; "
             f"{found.surface.unknowns:.0f} effective unknowns",
             f"  no samples in {100 * grid.circle_outside:.2g} % of the current circle: continued by the surface",
-            f"  psi_f = {known.psi_f_Vs:.4g} V·s is the nameplate's guess: it cannot be seen at standstill, and "
-            "the torque of this folder is as uncertain as this guess",
+            *_magnet(found, known),
         ]
     else:
-        lines.append("map: not measured; inductances and psi_f of motor.toml are the nameplate's guesses")
+        lines.append("map: not measured; the inductances of motor.toml are the nameplate's guesses")
     return "\n".join(lines) + "\n"

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a fitted map is from that of a simulated machine: for tests and campaigns, which know the machine."""
+"""How far what was found is from a simulated machine: for tests and campaigns, which know the machine."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.flux_model import FluxModel
 
 
@@ -32,3 +34,29 @@ def score(model: FluxModel, truth: Truth, i_max_A: float, psi_f_Vs: float) -> Sc
     error = np.hypot(error_d, error_q)
     return Score(float(np.sqrt(np.mean(error**2))) / largest, float(error.max()) / largest,
                  float(np.sqrt(np.mean((error_d * q - error_q * d) ** 2))) / float(np.abs(torque).max()))  # fmt: skip
+
+
+DRAG_FROM = 0.3  # of the largest speed of the run
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Errors of the steps that turn the shaft."""
+
+    is_connected: bool  # pole pairs and direction are right
+    offset_deg: float  # electrical
+    psi_f: float  # a share, beyond the gain of the dc voltage's sensor
+    inertia: float
+    drag: float  # rms of its relative error over the speeds
+
+
+def turned(found: Found, truth: Truth) -> Turned:
+    """All three steps have been run."""
+    assert found.spun is not None and found.drag is not None
+    at, drag, plant = found.spun.connection, found.drag, truth.plant
+    right = at.pole_pairs == plant["pole_pairs"] and at.reversed == truth.reversed
+    offset = math.degrees(math.remainder(at.offset_rad - truth.offset_rad, 2.0 * math.pi))
+    speeds = np.linspace(DRAG_FROM, 1.0, 15) * drag.to_rad_s
+    drags = drag.torque_Nm(speeds) / (plant["viscous_Nms"] * speeds) - 1.0
+    return Turned(right, offset, found.spun.psi_f_Vs / (truth.psi_f_Vs * plant["vdc_gain"]) - 1.0,
+                  drag.inertia_kgm2 / plant["inertia_kgm2"] - 1.0, float(np.sqrt(np.mean(drags**2))))  # fmt: skip

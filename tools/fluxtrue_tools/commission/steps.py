@@ -4,11 +4,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from fluxtrue_tools.commission import levels, plan, surface
+from fluxtrue_tools.commission import connection, drag, levels, plan, spin, surface, turning
 from fluxtrue_tools.commission.bursts import FAILURES, SIGNALS, Raw, integrate, offset
+from fluxtrue_tools.commission.connection import Followed
+from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import Capture
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.spin import Spun
 from fluxtrue_tools.commission.surface import Surface
 from fluxtrue_tools.errors import FluxtrueError
 
@@ -17,6 +20,7 @@ MOVED = FAILURES[3]
 KNEE_PER_NOISE = 2.0  # below twice the noise the sign of a phase current is not certain
 # Corrections that would act by the guesses of the nameplate; the voltages are evaluated without them.
 SWITCHED_OFF = ("trim",)
+CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
 
 
 @dataclass
@@ -25,10 +29,22 @@ class Found:
 
     offset_A: complex = 0.0  # of the current sensors, stationary frame
     knee_A: float = 0.0
+    followed: Followed | None = None
+    spun: Spun | None = None
+    drag: Drag | None = None
     resistance: Resistance | None = None
     first: plan.First | None = None
     bursts: list[Raw] = field(default_factory=list)
     surface: Surface | None = None
+
+    def known(self, known: Nameplate) -> Nameplate:
+        """The nameplate with what has been measured in its place."""
+        known = replace(known, offset_A=self.offset_A)
+        if self.followed is not None:
+            known = replace(known, pole_pairs=self.followed.connection.pole_pairs)
+        if self.spun is not None:
+            known = replace(known, psi_f_Vs=self.spun.psi_f_Vs)
+        return known
 
     @property
     def largest_A(self) -> float:
@@ -69,6 +85,24 @@ def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
     found.knee_A = KNEE_PER_NOISE * noise_A
 
 
+def _phases(drive: Capture, found: Found, known: Nameplate) -> None:
+    found.followed = connection.measure(drive, known)
+    turning.connect(drive, found.followed.connection, known, connection.NAME)
+    turning.release(drive)
+
+
+def _spin(drive: Capture, found: Found, known: Nameplate) -> None:
+    assert found.followed is not None
+    found.spun = spin.measure(drive, known, found.followed.connection)
+    turning.connect(drive, found.spun.connection, known, spin.NAME)
+    turning.release(drive)
+
+
+def _drag(drive: Capture, found: Found, known: Nameplate) -> None:
+    assert found.spun is not None
+    found.drag = drag.measure(drive, known, found.spun)
+
+
 def _losses(found: Found, known: Nameplate) -> plan.Losses:
     if found.resistance is None:
         return plan.Losses(known.r_ohm, known.level_V, found.knee_A)
@@ -102,19 +136,29 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
 
 STEPS = (
     Step("offsets", "switching is disabled, nothing moves, no current", _offsets),
+    Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
+         "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases),
+    Step(spin.NAME, "the shaft turns at up to {speed:.0f} rpm in both directions, with up to {torque:.3g} A of current "
+         "that makes torque", _spin),
+    Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, runs down and is braked, with up to {torque:.3g} A",
+         _drag),
     Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",
          _resistance),
     Step("map", "voltage pulses with currents up to {reach:.3g} A; alternating torque: the rotor swings; beyond "
          "{angle:.0f} electrical degrees a burst ends", _map),
 )  # fmt: skip
-NEEDS = {"offsets": ("offsets",), "resistance": ("offsets", "resistance"), "map": ("offsets", "resistance", "map")}
+NEEDS = {"offsets": ("offsets",), "phases": ("offsets", "phases"), "spin": ("offsets", "phases", "spin"),
+         "drag": ("offsets", "phases", "spin", "drag"), "resistance": ("offsets", "resistance"),
+         "map": ("offsets", "resistance", "map")}  # fmt: skip
+ALL = "all"
 
 
 def chosen(names: tuple[str, ...]) -> list[Step]:
     """The named steps with those that they need."""
+    names = tuple(NEEDS) if names == (ALL,) else names
     unknown = [name for name in names if name not in NEEDS]
     if unknown:
-        raise FluxtrueError(f"--step {unknown[0]!r}: allowed: {', '.join(NEEDS)}, separated by commas")
+        raise FluxtrueError(f"--step {unknown[0]!r}: allowed: {ALL}, or {', '.join(NEEDS)}, separated by commas")
     wanted = {needed for name in names for needed in NEEDS[name]}
     return [step for step in STEPS if step.name in wanted]
 
@@ -122,19 +166,21 @@ def chosen(names: tuple[str, ...]) -> list[Step]:
 def announcement(step: Step, known: Nameplate) -> str:
     """What will move and how much current flows."""
     return step.does.format(reach=known.i_max_A, level=levels.LEVELS[-1] * known.i_max_A, level_s=levels.duration_s(),
-                            angle=plan.ANGLE_DEG)  # fmt: skip
+                            angle=plan.ANGLE_DEG, vector=connection.SHARES[-1] * known.i_max_A, turns=connection.TURNS,
+                            speed=turning.SPEED_SHARE * known.speed_max_rpm,
+                            torque=spin.Q_SHARES[-1] * known.i_max_A)  # fmt: skip
 
 
 def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None]) -> Found:
     """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before."""
     found = Found()
-    before = {name: drive.get(name) for name in SWITCHED_OFF}
+    before = {name: drive.get(name) for name in SWITCHED_OFF + CONNECTION}
     try:
         for name in SWITCHED_OFF:
             drive.set(name, 0.0)
         for step in steps:
             say(f"{step.name}: {announcement(step, known)}")
-            step.run(drive, found, replace(known, offset_A=found.offset_A))
+            step.run(drive, found, found.known(known))
     finally:
         _disable(drive)
         for name, value in before.items():

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The steps that turn the shaft: hidden machines with an unknown connection, refusals, the limits of a movement."""
+
+from pathlib import Path
+
+import pytest
+
+from fluxtrue_tools.cli import run as command
+from fluxtrue_tools.commission import connection, hidden, turning
+from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.score import turned
+from fluxtrue_tools.commission.steps import CONNECTION, chosen, run
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.library import Loop
+from fluxtrue_tools.sim.motor import Motor
+
+MACHINES = [("saturated", 101), ("pmasynrm", 107), ("hsm1", 110)]
+OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1
+SILENT, FAST = 1.0, 2.0
+RUN = 1.0
+
+
+@pytest.mark.parametrize(("name", "seed"), MACHINES)
+def test_an_unknown_connection_magnet_inertia_and_drag(name: str, seed: int, unknown: Motor, known: Nameplate) -> None:
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A, connected=False)
+    before = {each: drive.get(each) for each in CONNECTION}
+    found = run(drive, chosen(("drag",)), known, lambda _: None)
+    errors = turned(found, truth)
+    print(f"{name} {seed}: {errors}")
+    assert errors.is_connected
+    assert abs(errors.offset_deg) <= OFFSET_DEG
+    assert abs(errors.psi_f) <= PSI_F
+    assert abs(errors.inertia) <= INERTIA
+    assert errors.drag <= DRAG
+    assert {each: drive.get(each) for each in CONNECTION} == before
+    assert drive.get("enable") == 0.0 and drive.get("fault_word") == 0.0
+    assert drive.get("machine_monitors") == 1.0 and drive.get("current_mode") == 0.0
+
+
+def changed(unknown: Motor, known: Nameplate, **plant: float) -> SoftwareInTheLoop:
+    """A hidden machine with a defect."""
+    _, flux_map, parameters = hidden.draw("saturated", 101, unknown, known.i_max_A, connected=False)
+    return SoftwareInTheLoop(Loop(unknown.library, parameters | plant, flux_map))
+
+
+@pytest.mark.parametrize(
+    ("plant", "message"),
+    [({"imposed_speed": 1.0, "speed_rad_s": 0.0}, "did not move"), ({"angle_stuck": 1.0}, "did not move"),
+     ({"inertia_kgm2": 100.0}, "the rotor did not (follow|move)")],
+)  # fmt: skip
+def test_a_rotor_that_does_not_follow_is_refused(
+    plant: dict[str, float], message: str, unknown: Motor, known: Nameplate
+) -> None:
+    drive = changed(unknown, known, **plant)
+    with pytest.raises(FluxtrueError, match=message):
+        run(drive, chosen(("phases",)), known, lambda _: None)
+    assert drive.get("enable") == 0.0 and drive.get("run_state") != RUN
+
+
+def agreed(unknown: Motor, known: Nameplate) -> SoftwareInTheLoop:
+    """The angle is imposed, the currents are zero, the movement is agreed for CONSENT_S."""
+    drive = changed(unknown, known)
+    turning.connect(drive, None, known, "test")
+    return drive
+
+
+def test_a_movement_ends_when_the_commands_stop(unknown: Motor, known: Nameplate) -> None:
+    drive = agreed(unknown, known)
+    turning.currents(drive, 10.0, 0.0)
+    turning.advance(drive, turning.STEP_S, "test")
+    drive.capture(("run_state",), round(1.5 * turning.CONSENT_S / drive.period_s))
+    assert drive.get("run_state") != RUN
+    assert drive.get("spin_failure") == SILENT
+    with pytest.raises(FluxtrueError, match="test: switching was disabled"):
+        turning.advance(drive, turning.STEP_S, "test")
+
+
+def test_a_movement_ends_at_the_agreed_speed(unknown: Motor, known: Nameplate) -> None:
+    truth = hidden.make("saturated", 101, unknown, known.i_max_A, connected=False)[1]
+    drive = changed(unknown, known)
+    wired = turning.Connection(int(truth.plant["pole_pairs"]), truth.reversed, truth.offset_rad)
+    turning.connect(drive, wired, known, "test")
+    turning.currents(drive, 0.0, 0.25 * known.i_max_A)
+    fastest = 0.0
+    with pytest.raises(FluxtrueError, match="faster than 30 %"):
+        for _ in range(500):
+            rows = turning.advance(drive, turning.STEP_S, "test")
+            fastest = max(fastest, abs(turning.speed_rad_s(rows, drive.period_s)))
+    assert drive.get("spin_failure") == FAST
+    assert fastest <= 1.05 * turning.LIMIT_SHARE * known.speed_max_rpm * turning.TURN / 60.0
+    assert drive.get("run_state") != RUN
+
+
+def test_the_source_of_the_angle_changes_only_while_switching_is_disabled(unknown: Motor, known: Nameplate) -> None:
+    drive = agreed(unknown, known)
+    before = drive.get("theta_e_rad")
+    drive.set("angle_offset_rad", 2.0)
+    drive.set("angle_imposed", 0.0)
+    turning.advance(drive, turning.STEP_S, "test")
+    assert drive.get("theta_e_rad") == pytest.approx(before, abs=1e-6)
+    turning.release(drive)
+    assert drive.get("theta_e_rad") != pytest.approx(before, abs=0.01)
+    assert drive.get("fault_word") == 0.0
+
+
+def test_the_smallest_current_that_the_rotor_follows_is_used(unknown: Motor, known: Nameplate) -> None:
+    drive, truth = hidden.make("hsm1", 110, unknown, known.i_max_A, connected=False)
+    found = connection.measure(drive, known)
+    assert found.current_A == pytest.approx(connection.SHARES[0] * known.i_max_A)
+    assert found.connection.pole_pairs == truth.plant["pole_pairs"]
+
+
+def test_a_folder_of_the_turning_steps_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "found"
+    options = ["--motor", str(folder), "--machine", "saturated", "--seed", "101", "--step", "drag", "--out", str(out)]
+    assert command(["commission", *options]) == 0
+    text = (out / "motor.toml").read_text(encoding="utf-8")
+    for key in ("pole_pairs", "psi_f_Vs", "inertia_kgm2"):
+        line = next(line for line in text.splitlines() if line.startswith(f"{key} = "))
+        assert "measured by fluxtrue commission" in line and ("±" in line or "followed" in line)
+    assert "counts against the field" in capsys.readouterr().out
+    assert command(["motor", "check", str(out)]) == 0

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inertia and drag over speed from an acceleration, a run-down and a braking: (CM-20) ... (CM-22)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxtrue_tools.commission import spin, turning
+from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.spin import Spun
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+
+NAME = "drag"
+WINDOW_S = 0.02  # over which a speed and a mean torque are formed
+COAST_S, COASTS = 0.25, 16  # the run-down ends at COAST_END of its speed
+COAST_END = 0.4
+SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
+REACH_S = 0.8
+LEAST_SHARE = 0.2  # of the largest current of the run
+STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
+
+
+@dataclass(frozen=True)
+class Drag:
+    """Torque against the rotation: constant + linear |w| + square w^2, mechanical speed."""
+
+    inertia_kgm2: float
+    inertia_sigma_kgm2: float
+    constant_Nm: float
+    linear_Nms: float
+    square_Nms2: float
+    from_rad_s: float
+    to_rad_s: float
+
+    def torque_Nm(self, speed_rad_s: Array) -> Array:
+        """At speeds between the two."""
+        w = np.abs(np.asarray(speed_rad_s, float))
+        return self.constant_Nm + self.linear_Nms * w + self.square_Nms2 * w**2
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One run in windows: at the middle of each, and what happened from one middle to the next."""
+
+    speed: Array  # mechanical, in the electrical direction
+    i: Array
+    psi: Array  # u / (j w)
+    is_steady: Array  # the current of a window did not change
+    times: Array  # of the middles
+    rows: Array
+    middles: Array
+
+
+def _run(rows: Array, period_s: float, pole_pairs: int) -> _Run:
+    size = round(WINDOW_S / period_s)
+    starts = np.arange(0, len(rows) - size, size)
+    taken = []
+    for start in starts:
+        i, psi, omega = spin.voltages(rows[start : start + size + 1], period_s)
+        half = size // 2
+        change = abs(float(i.imag[:half].mean() - i.imag[half:].mean()))
+        taken.append((omega / pole_pairs, i.mean(), psi.mean(), change))
+    speed, current, flux, change = np.array(taken).T
+    middles = starts + 1 + size // 2
+    steady = change.real < STEADY_SHARE * np.abs(current)
+    return _Run(speed.real, current, flux, steady, period_s * middles, rows, middles)
+
+
+@dataclass(frozen=True)
+class Flux:
+    """Of small currents: psi_d = psi_f + l_d i_d + bend i_q^2, psi_q = l_q i_q."""
+
+    psi_f_Vs: float
+    l_d_H: float
+    bend: float
+    l_q_H: float
+
+    def torque_Nm(self, i: Array, pole_pairs: int) -> Array:
+        """1.5 p (psi_d i_q - psi_q i_d)."""
+        psi_d = self.psi_f_Vs + self.l_d_H * i.real + self.bend * i.imag**2
+        return 1.5 * pole_pairs * (psi_d * i.imag - self.l_q_H * i.imag * i.real)
+
+
+def flux_under_current(runs: list[_Run], psi_f_Vs: float) -> Flux:
+    """(CM-20): what is neither proportional to the speed nor constant with it is no flux."""
+    speed, i, psi, steady = (np.concatenate([getattr(run, name) for run in runs])
+                             for name in ("speed", "i", "psi", "is_steady"))  # fmt: skip
+    used = steady & (np.abs(i.imag) > LEAST_SHARE * np.abs(i.imag).max()) & (speed > SLOWEST * speed.max())
+    w, d, q = speed[used], i[used].real, i[used].imag
+    along = np.column_stack((d * w, q**2 * w, q, np.sign(q)))
+    l_d, bend, *_ = _solve(along, (psi[used].real - psi_f_Vs) * w)
+    l_q, *_ = _solve(np.column_stack((q * w, d, np.ones(len(w)))), psi[used].imag * w)
+    return Flux(psi_f_Vs, l_d, bend, l_q)
+
+
+def _solve(matrix: Array, values: Array) -> list[float]:
+    scale = np.linalg.norm(matrix, axis=0)
+    x, *_ = np.linalg.lstsq(matrix / scale, values, rcond=1e-4)
+    return [float(each) for each in x / scale]
+
+
+def _changes(run: _Run, torque: Array, period_s: float, slowest: float) -> tuple[Array, Array]:
+    """From middle to middle: change of speed, time, angle, integral of the squared speed; the impulse of the torque."""
+    impulse = np.concatenate(([0.0], np.cumsum(period_s * torque)))[run.middles]
+    time, w = np.diff(run.times), run.speed
+    angle, square = 0.5 * time * (w[1:] + w[:-1]), time * (w[1:] ** 2 + w[1:] * w[:-1] + w[:-1] ** 2) / 3.0
+    used = np.minimum(w[1:], w[:-1]) > slowest
+    return np.column_stack((np.diff(w), time, angle, square))[used], np.diff(impulse)[used]
+
+
+def evaluate(parts: list[Array], period_s: float, pole_pairs: int, psi_f_Vs: float) -> Drag:
+    """(CM-21), (CM-22) over all windows."""
+    runs = [_run(rows, period_s, pole_pairs) for rows in parts if len(rows) > 2 * WINDOW_S / period_s]
+    top = max(float(run.speed.max()) for run in runs)
+    flux = flux_under_current(runs, psi_f_Vs)
+    changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), period_s, SLOWEST * top)
+               for run in runs]  # fmt: skip
+    matrix, impulse = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
+    x, sigma = _least_squares(matrix, impulse)
+    return Drag(float(x[0]), sigma, float(x[1]), float(x[2]), float(x[3]), SLOWEST * top, top)
+
+
+def _least_squares(matrix: Array, values: Array) -> tuple[Array, float]:
+    """The solution, and the standard deviation of its first unknown."""
+    scale = np.linalg.norm(matrix, axis=0)
+    x, *_ = np.linalg.lstsq(matrix / scale, values, rcond=None)
+    left = values - matrix / scale @ x
+    variance = float(left @ left) / max(len(values) - len(x), 1)
+    inverse = np.linalg.inv((matrix / scale).T @ (matrix / scale))
+    return x / scale, math.sqrt(variance * inverse[0, 0]) / float(scale[0])
+
+
+def _coast(drive: Capture, wanted_rad_s: float) -> Array:
+    """Without current, until much of the speed is gone."""
+    rows: list[Array] = []
+    for _ in range(COASTS):
+        rows.append(turning.advance(drive, COAST_S, NAME))
+        if abs(turning.speed_rad_s(rows[-1], drive.period_s)) < COAST_END * wanted_rad_s:
+            break
+    return np.vstack(rows)
+
+
+def measure(drive: Capture, known: Nameplate, spun: Spun) -> Drag:
+    """Accelerated, without current, and braked with the current of the acceleration."""
+    wanted = turning.SPEED_SHARE * known.speed_max_rpm * math.pi / 30.0
+    try:
+        turning.connect(drive, spun.connection, known, NAME)
+        driven = spin.accelerate(drive, known, wanted, NAME, REACH_S)
+        turning.currents(drive, 0.0, 0.0)
+        coasting = _coast(drive, wanted)
+        braked = spin.brake(drive, known, wanted, NAME)
+    finally:
+        turning.release(drive)
+    found = evaluate([driven, coasting, braked], drive.period_s, spun.connection.pole_pairs, spun.psi_f_Vs)
+    if not found.inertia_kgm2 > 0.0:
+        raise FluxtrueError(f"commission: {NAME}: an inertia of {found.inertia_kgm2:.3g} kg m^2: the shaft is driven "
+                            "from outside")  # fmt: skip
+    return found

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Angle offset and magnet's flux linkage of a turning machine: (CM-18), (CM-19).
+
+The machine is accelerated to a part of its speed in both directions and coasts there with small currents along d, in
+both polarities. The voltage that does not change its sign with the current is that of the magnet.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fluxtrue_tools.commission import turning
+from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.turning import Connection
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+
+NAME = "spin"
+D_SHARE = 0.06  # of i_max: the larger of the two currents along d
+LEVELS = (1.0, -1.0, 0.5, -0.5, -0.5, 0.5, -1.0, 1.0)  # of it: what drifts evenly is no odd part
+LEVEL_S, LEVEL_SETTLE_S = 0.2, 0.1
+Q_SHARES = (0.02, 0.04, 0.08, 0.16, 0.25, 0.4)  # of i_max: more while the machine does not accelerate
+TRY_S, REACH_S, LONGEST_S = 0.05, 1.5, 10.0
+BRAKE_STEPS = 40  # with each of the currents
+ROUGH_RAD = math.radians(4.0)  # beyond, the currents along d make torque
+STANDING_SHARE = 0.01  # of the wanted speed
+ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Magnet:
+    """One direction: flux linkage in the frame of the assumed angle."""
+
+    psi_Vs: complex
+    omega_rad_s: float  # electrical
+
+    @property
+    def error_rad(self) -> float:
+        """By which the rotor is ahead of the assumed angle."""
+        return float(np.angle(self.psi_Vs))
+
+
+@dataclass(frozen=True)
+class Spun:
+    """Both directions."""
+
+    connection: Connection
+    psi_f_Vs: float
+    psi_f_sigma_Vs: float
+    offset_sigma_rad: float
+    lag_s: float  # by which the angle is late; iron losses seem to be one
+
+
+def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float = REACH_S) -> Array:
+    """With as little current as reaches the speed in about this time; all rows are kept."""
+    rows: list[Array] = []
+    speed, seconds, level = 0.0, 0.0, 0
+    sign = math.copysign(1.0, wanted_rad_s)
+    while sign * speed < abs(wanted_rad_s):
+        i_q_A = sign * Q_SHARES[level] * known.i_max_A
+        turning.currents(drive, 0.0, i_q_A)
+        before = speed
+        rows.append(turning.advance(drive, TRY_S, step))
+        speed = turning.speed_rad_s(rows[-1][len(rows[-1]) // 2 :], drive.period_s) * _electrical_sign(drive)
+        seconds += TRY_S
+        gained = sign * (speed - before)
+        late = gained * slowly_s < 0.5 * TRY_S * abs(wanted_rad_s)
+        level = min(level + 1, len(Q_SHARES) - 1) if late and len(rows) % 2 == 0 else level
+        if seconds > LONGEST_S:
+            raise FluxtrueError(f"commission: {step}: the shaft reached {abs(speed) * 30 / math.pi:.0f} rpm of "
+                                f"{abs(wanted_rad_s) * 30 / math.pi:.0f} rpm with {abs(i_q_A):.3g} A: it is coupled or "
+                                "blocked, or the angle is wrong")  # fmt: skip
+    return np.vstack(rows)
+
+
+def _electrical_sign(drive: Capture) -> float:
+    return -1.0 if drive.get("angle_reversed") else 1.0
+
+
+def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> Array:
+    """Back to a standstill, with more current while that takes long; all rows are kept."""
+    rows = [turning.advance(drive, turning.STEP_S, step)]
+    towards = math.copysign(1.0, wanted_rad_s) * _electrical_sign(drive)
+    for n in range(round(LONGEST_S / turning.STEP_S)):
+        if towards * turning.speed_rad_s(rows[-1], drive.period_s) < STANDING_SHARE * abs(wanted_rad_s):
+            break
+        share = Q_SHARES[min(n // BRAKE_STEPS, len(Q_SHARES) - 3)]
+        turning.currents(drive, 0.0, -math.copysign(share, wanted_rad_s) * known.i_max_A)
+        rows.append(turning.advance(drive, turning.STEP_S, step))
+    turning.currents(drive, 0.0, 0.0)
+    return np.vstack(rows)
+
+
+def _coast(drive: Capture, known: Nameplate) -> list[Array]:
+    """The levels of the current along d, each when it has settled."""
+    taken = []
+    for level in LEVELS:
+        turning.currents(drive, level * D_SHARE * known.i_max_A, 0.0)
+        turning.advance(drive, LEVEL_SETTLE_S, NAME)
+        taken.append(turning.advance(drive, LEVEL_S, NAME))
+    turning.currents(drive, 0.0, 0.0)
+    return taken
+
+
+def voltages(rows: Array, period_s: float) -> tuple[Array, Array, float]:
+    """Current, voltage over j times the effective speed, in each period; the mean speed: (CM-18)."""
+    theta = np.unwrap(rows[1:, 4])
+    times = period_s * np.arange(len(theta))
+    omega = np.polyval(np.polyder(np.polyfit(times, theta, 2)), times + 0.5 * period_s)
+    i = rows[1:, 0] + 1j * rows[1:, 1]
+    u = rows[:-1, 2] + 1j * rows[:-1, 3]
+    return i, u / (1j * omega * np.sinc(0.5 * omega * period_s / np.pi)), float(omega.mean())
+
+
+def magnet(taken: list[Array], period_s: float) -> Magnet:
+    """(CM-19): what neither changes its sign with the current nor grows with its square."""
+    levels = np.array(LEVELS)
+    means = [voltages(rows, period_s) for rows in taken]
+    psi, omega = np.array([flux.mean() for _, flux, _ in means]), np.array([speed for _, _, speed in means])
+    matrix = np.column_stack((np.ones(len(levels)), levels, levels / omega, levels**2))
+    scale = np.linalg.norm(matrix, axis=0)
+    inverse = np.linalg.pinv(matrix / scale)
+    return Magnet(complex((inverse @ psi)[0] / scale[0]), float(omega.mean()))
+
+
+def _direction(drive: Capture, known: Nameplate, wanted_rad_s: float) -> Magnet:
+    accelerate(drive, known, wanted_rad_s, NAME)
+    found = magnet(_coast(drive, known), drive.period_s)
+    brake(drive, known, wanted_rad_s, NAME)
+    return found
+
+
+def measure(drive: Capture, known: Nameplate, rough: Connection) -> Spun:
+    """Both directions, with the angle that the alignment has found, then with the corrected one."""
+    wanted = turning.SPEED_SHARE * known.speed_max_rpm * math.pi / 30.0
+    rounds: list[tuple[Connection, list[Magnet]]] = []
+    connection = rough
+    try:
+        for _ in range(ROUNDS):
+            turning.connect(drive, connection, known, NAME)
+            ways = [_direction(drive, known, sign * wanted) for sign in (1.0, -1.0)]
+            rounds.append((connection, ways))
+            connection = connection.turned(_error_rad(ways))
+    finally:
+        turning.release(drive)
+    if abs(_error_rad(ways)) > ROUGH_RAD:
+        raise FluxtrueError(
+            f"commission: {NAME}: the offset of the angle still changes by "
+            f"{math.degrees(_error_rad(ways)):.2g} electrical degrees: the angle sensor is not reliable"
+        )
+    return _together(rounds)
+
+
+def _error_rad(ways: list[Magnet]) -> float:
+    """The mean of both directions: a lag of the sensor turns with the speed."""
+    return 0.5 * (ways[0].error_rad + ways[1].error_rad)
+
+
+def _together(rounds: list[tuple[Connection, list[Magnet]]]) -> Spun:
+    """The last round, with those before whose angle was right enough."""
+    used = [(connection, ways) for connection, ways in rounds if abs(_error_rad(ways)) < ROUGH_RAD]
+    last, _ = used[-1]
+    errors = [math.remainder(connection.offset_rad - last.offset_rad, turning.TURN) + _error_rad(ways)
+              for connection, ways in used]  # fmt: skip
+    magnets = [way for _, ways in used for way in ways]
+    psi_f = float(np.mean([abs(way.psi_Vs) for way in magnets]))
+    sigma = float(np.std([abs(way.psi_Vs) for way in magnets], ddof=1) / math.sqrt(len(magnets)))
+    apart = [0.5 * (ways[0].error_rad - ways[1].error_rad) for _, ways in used]
+    lag = float(np.mean([half / ways[0].omega_rad_s for half, (_, ways) in zip(apart, used, strict=True)]))
+    # Mean and half of the difference of two directions have the same noise, and only the latter repeats itself.
+    offset_sigma = float(np.std(apart, ddof=1) / math.sqrt(len(apart))) if len(apart) > 1 else sigma / psi_f
+    return Spun(last.turned(float(np.mean(errors))), psi_f, sigma, offset_sigma, lag)
