@@ -23,7 +23,8 @@ voltage_reserve_t voltage_reserve_step(const voltage_reserve_config_t *config, v
     }
     /* Q15 * Q15 = Q30, twice: Q31. */
     const q31_t moved = fx_add2_q31(state->trim, config->gain * fx_sat_q15_word(error));
-    state->trim = fx_clamp_q31(moved, fx_q31_from_q15(config->trim_min), fx_q31_from_q15(config->trim_max));
+    const q31_t trim_max = 2 * config->trim_max * in->v_dc;
+    state->trim = fx_clamp_q31(moved, fx_q31_from_q15(config->trim_min), trim_max);
     return (voltage_reserve_t){
         .v_trim = fx_q15_from_q31(state->trim),
         .shift = (q15_t)(with_magnet - psi),

@@ -8,12 +8,12 @@
  *   e      = v_ratio v_dc - |u|
  *   v_trim += k e        if e < 0, or while the references use the planned flux
  *   v_trim -= k v_trim   otherwise, because away from the limit e says nothing about the trim
- *   trim_min <= v_trim <= trim_max
+ *   trim_min <= v_trim <= trim_max v_dc: what the trim adds must exist where its cause is gone
  * Source   docs/theory/current-reference.md (CR-9), (CR-12) ... (CR-14)
  * Units    per unit
- * Range    k < 1; trim_min <= 0 <= trim_max
+ * Range    k < 1; trim_min <= 0 <= trim_max < 1; v_dc >= 0
  * Rounding half up, 1/2 LSB q31 per step in v_trim, 1 LSB q15 in shift
- * Errors   saturates at trim_min and trim_max, the authority of the trim
+ * Errors   saturates at both bounds, the authority of the trim
  * Context  1 kHz task; three square roots, no division */
 #include <stdbool.h>
 
@@ -23,7 +23,7 @@ typedef struct {
     q15_t v_ratio; /* the references' planned share of v_dc */
     q15_t gain;    /* k per task period */
     q15_t trim_min;
-    q15_t trim_max;
+    q15_t trim_max; /* share of v_dc */
 } voltage_reserve_config_t;
 
 typedef struct {

@@ -48,7 +48,7 @@ typedef struct {
     const double *ref_torque_max_Nm; /* [ref_npsi] */
     double ref_v_ratio, i_max_A;
     /* voltage reserve, gain per 1 kHz step */
-    double trim_gain, trim_min_V, trim_max_V;
+    double trim_gain, trim_min_V, trim_max_ratio;
     /* torque limits, rates per 1 kHz step; derating lines: no torque at _end, full torque at _start */
     double torque_slew_weak_Nm, psi_weak_Vs, loss_rate, loss_drop_V;
     double moving_end_rad_s, moving_start_rad_s, speed_end_rad_s, speed_start_rad_s;

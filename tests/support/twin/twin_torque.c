@@ -82,6 +82,6 @@ double twin_voltage_reserve(const motor_si_t *motor, double *trim, const twin_re
     const double e = motor->ref_v_ratio * in->v_dc - hypot(in->u.d, in->u.q);
     const bool on_limit = psi > in->psi_plan * 31.0 / 32.0;
     *trim += motor->trim_gain * ((in->acting && (e < 0.0 || on_limit)) ? e : -*trim);
-    *trim = twin_clamp(*trim, motor->trim_min_V, motor->trim_max_V);
+    *trim = twin_clamp(*trim, motor->trim_min_V, motor->trim_max_ratio * in->v_dc);
     return hypot(in->psi.d + in->psi_delta, in->psi.q) - psi;
 }

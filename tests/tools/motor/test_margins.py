@@ -95,6 +95,11 @@ def test_inductances_20_percent_too_small_overshoot_by_less_than_10_percent() ->
         assert overshoot(theta, 1.25) < 0.09, theta
 
 
+def test_planned_voltage_and_trim_stay_in_the_linear_range(write) -> None:
+    derived = load_motor(write()).derived
+    assert derived.ref_v_ratio + derived.trim_max_ratio == pytest.approx(1 / math.sqrt(3))
+
+
 def test_the_torque_loop_and_the_monitor_of_the_current_know_the_slower_answer(write) -> None:
     usual_motor = load_motor(write())
     turning_motor = load_motor(write(machine={"speed_max_rpm": 0.5 * 10000.0 * 60 / (2 * math.pi * 4)}))

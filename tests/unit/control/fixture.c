@@ -137,11 +137,11 @@ static void reference_tables(fixture_t *f)
         .v_ratio = q15_of(0.55),
         .gain = q15_of(0.05),
         .trim_min = q15_of(-0.09),
-        .trim_max = q15_of(0.05),
+        .trim_max = q15_of(0.075),
     };
     f->si.trim_gain = from_q15(q15_of(0.05));
     f->si.trim_min_V = from_q15(q15_of(-0.09)) * f->v;
-    f->si.trim_max_V = from_q15(q15_of(0.05)) * f->v;
+    f->si.trim_max_ratio = from_q15(q15_of(0.075));
 }
 
 static void inputs(fixture_t *f)

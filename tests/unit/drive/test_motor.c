@@ -139,7 +139,7 @@ void test_torque_loop_references_and_monitors_are_the_si_values(void)
     HELD(motor_si.ref_v_ratio, q15(motor.voltage_reserve.v_ratio), q15(1));
     HELD(motor_si.trim_gain, q15(motor.voltage_reserve.gain), q15(1));
     HELD(motor_si.trim_min_V / v_b, q15(motor.voltage_reserve.trim_min), q15(1));
-    HELD(motor_si.trim_max_V / v_b, q15(motor.voltage_reserve.trim_max), q15(1));
+    HELD(motor_si.trim_max_ratio, q15(motor.voltage_reserve.trim_max), q15(1));
     HELD(motor_si.i_trip_A / i_b, q15(motor.monitor.i_trip), q15(1));
     HELD(motor_si.v_max_V / v_b, q15(motor.monitor.v_max), q15(1));
     HELD(motor_si.v_min_V / v_b, q15(motor.monitor.v_min), q15(1));

@@ -19,7 +19,8 @@ V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
 V_CLEAR_MARGIN = 0.999  # of the roundings on the way from command to duty
 V_RATIO_REFERENCE = 0.92 / math.sqrt(3.0)
 TRIM_RATE_RAD_S = 50.0
-TRIM_MIN_SHARE, TRIM_MAX_SHARE = -0.25, 0.15  # of the planned voltage at vdc_V
+TRIM_MIN_SHARE = -0.25  # of the planned voltage at vdc_V
+TRIM_MAX = 1.0 / math.sqrt(3.0) - V_RATIO_REFERENCE  # of v_dc: up to the linear limit (CR-14)
 
 TRACKER_BANDWIDTH_RAD_S = 300.0  # or as much as the rotor's own acceleration needs, up to ...: (AT-19)
 TRACKER_BANDWIDTH_PER_PWM = 1 / 16
@@ -121,7 +122,7 @@ class Derived:
     ref_v_ratio: float
     trim_gain: float
     trim_min_V: float
-    trim_max_V: float
+    trim_max_ratio: float
     torque_slew_weak_Nm: float
     psi_weak_Vs: float
     loss_rate: float
@@ -254,7 +255,7 @@ def _voltage_reserve(config: MotorConfig, step_s: float) -> dict[str, float]:
         "ref_v_ratio": V_RATIO_REFERENCE,
         "trim_gain": TRIM_RATE_RAD_S * step_s,
         "trim_min_V": TRIM_MIN_SHARE * planned,
-        "trim_max_V": TRIM_MAX_SHARE * planned,
+        "trim_max_ratio": TRIM_MAX,
     }
 
 

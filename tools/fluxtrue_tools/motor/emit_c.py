@@ -331,7 +331,7 @@ def _voltage_reserve(motor: Motor) -> list[Row]:
         ("v_ratio", q15(d.ref_v_ratio, "ref v_ratio"), f"{d.ref_v_ratio:.6g}"),
         ("gain", q15(d.trim_gain, "trim gain"), f"{d.trim_gain:g} per task"),
         ("trim_min", q15(d.trim_min_V / b.voltage_V, "trim_min"), f"{d.trim_min_V:.6g} V"),
-        ("trim_max", q15(d.trim_max_V / b.voltage_V, "trim_max"), f"{d.trim_max_V:.6g} V"),
+        ("trim_max", q15(d.trim_max_ratio, "trim_max"), f"{d.trim_max_ratio:.6g} of v_dc"),
     ]
 
 
@@ -680,7 +680,7 @@ _SI_DERIVED = (
     "ref_v_ratio",
     "trim_gain",
     "trim_min_V",
-    "trim_max_V",
+    "trim_max_ratio",
     "i_trip_A",
     "v_max_V",
     "v_min_V",
