@@ -93,6 +93,14 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
 }
 
+/* The field turns by more than a quarter of a turn in a step. Whether the angle stands still is told from the angles at
+ * the steps, which are alike, too, where a step has a whole number of turns. */
+static bool is_fast(const drive_t *drive, q31_t omega)
+{
+    const uint64_t turns_q60 = (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;
+    return turns_q60 > (1ULL << 58);
+}
+
 /* With a broken lead the currents are not those of the reference, and neither is the power. */
 static bool is_controlled(const drive_t *drive, dq_q15_t i)
 {
@@ -120,7 +128,7 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
     const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
-    const bool acting = !is_compensation_new(drive) && is_window_new;
+    const bool acting = !is_compensation_new(drive) && is_window_new && !is_fast(drive, snapshot->sample.point.omega);
     uint32_t faults = check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) | shorted;
     faults |= check_angle(drive, snapshot, phases_ref, acting);
     faults |= check_launch(drive, snapshot, acting);

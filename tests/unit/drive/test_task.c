@@ -262,6 +262,30 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
 }
 
+/* Steps in a row of which the monitor of a frozen angle says that the angle stands still. The angles at all of them are
+ * alike: so they are at standstill, and where the field makes whole turns in a step. */
+static int steps_of_a_standing_angle(double omega_pu)
+{
+    const snapshot_t snapshot = {
+        .sample = {.acting = true, .point = {.omega = (q31_t)(omega_pu * 2147483648.0)}},
+        .window = {.acting = true},
+    };
+    for (int n = 0; n < 8; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    return drive.task.frozen_angle.standing;
+}
+
+void test_equal_angles_of_whole_turns_are_no_standstill(void)
+{
+    seam.motor.identify.window_turns_q29 = 4U << 29; /* at the speed base */
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_GREATER_THAN_INT(4, steps_of_a_standing_angle(sign * 0.06)); /* below a quarter of a turn */
+        TEST_ASSERT_EQUAL_INT(0, steps_of_a_standing_angle(sign * 0.25));
+        TEST_ASSERT_EQUAL_INT(0, steps_of_a_standing_angle(sign * 0.999)); /* four turns */
+    }
+}
+
 /* Leaving torque at speed. */
 
 /* hsm1: the short circuit is the safe state above 0.77 of the speed base, which is 10 500 rpm. */
