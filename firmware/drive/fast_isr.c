@@ -7,8 +7,7 @@
  * Three routes lead through it. The usual one (the bridge runs, nothing is latched, counted or out of its limits) skips
  * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions.
  *   usual        fast_isr(): the order of the block diagram, written here once
- *   not settled  run_period_not_settled(): the bridge is disabled or has just been enabled, or a fault or a counter is
- *                pending
+ *   not settled  run_period_not_settled(): the bridge is or was just disabled, or a fault or a counter is pending
  *   checked      run_period_checked(): a sample is out of its limits; also the second part of the route above
  * A motor whose field turns far in a period (current_control_turning.h) always takes the second one.
  * tests/unit/drive/test_fast_isr.c shows that the routes agree. */
@@ -17,6 +16,7 @@
 #include "drive/drive.h"
 #include "drive/publish.h"
 #include "drive/short_circuit.h"
+#include "drive/turning_modulate.h"
 #include "hal/pwm.h"
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
@@ -55,14 +55,21 @@ static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
 }
 
 /* The voltage circle or a pulse limit is active: the voltage of the next period follows from the duties. */
-static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
-                                                                   modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
+static inline __attribute__((always_inline)) void voltage_by(drive_t *drive, sample_t *sample,
+                                                             const modulate_config_t *config, modulate_out_t made,
+                                                             fx_pair_t i, fx_pair_t advanced)
 {
     if (made.limited != 0U) {
         sample->pulses_clamped = true;
         identify_window_count_limited(&drive->fast.window);
     }
-    drive->fast.u_next = modulate_applied(&drive->parameters.modulate, made.duty, i, advanced, sample->v_dc);
+    drive->fast.u_next = modulate_applied(config, made.duty, i, advanced, sample->v_dc);
+}
+
+static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,
+                                                                   modulate_out_t made, fx_pair_t i, fx_pair_t advanced)
+{
+    voltage_by(drive, sample, &drive->parameters.modulate, made, i, advanced);
 }
 
 /* The duties of the first period act in the second; the third sample ends a period of which they are known. */
@@ -80,13 +87,7 @@ static void count_since_enable(fast_state_t *fast, sample_t *sample)
 static current_control_in_t control_inputs(const drive_t *drive, const sample_t *sample, const rotor_frame_t *now,
                                            const current_target_t *target)
 {
-    return (current_control_in_t){
-        .target = target,
-        .flux = &sample->point.flux,
-        .omega = now->omega,
-        .psi_delta = drive->psi_d_error,
-        .v_dc = now->v_dc,
-    };
+    return (current_control_in_t){target, &sample->point.flux, now->omega, drive->psi_d_error, now->v_dc};
 }
 
 /* The law of a motor whose field turns far in a period. */
@@ -94,19 +95,16 @@ static __attribute__((noinline, cold)) current_control_out_t control_turning(dri
                                                                              const rotor_frame_t *now,
                                                                              const current_target_t *target)
 {
-    turning_control_in_t in = {
-        .control = control_inputs(drive, sample, now, target),
-        .i = sample->point.i,
-        .angle_step = now->angle_step,
-    };
+    turning_control_in_t in = {control_inputs(drive, sample, now, target), sample->point.i, now->angle_step};
     in.control.omega = now->omega >> 31;
     return turning_control_step(&drive->motor->turning_control, &drive->parameters.current_control,
                                 &drive->fast.turning_control, &in);
 }
 
-/* Modulation -> duties. The voltage that acts now is the one computed a period ago. */
+/* Modulation -> duties. The voltage that acts now was computed a period ago. turning: NULL on the usual route. */
 static inline __attribute__((always_inline)) void write_duties(drive_t *drive, sample_t *sample,
-                                                               const rotor_frame_t *now, current_control_out_t wanted)
+                                                               const rotor_frame_t *now, current_control_out_t wanted,
+                                                               const modulate_config_t *turning)
 {
     fast_state_t *fast = &drive->fast;
     const motor_parameters_t *p = &drive->parameters;
@@ -120,16 +118,29 @@ static inline __attribute__((always_inline)) void write_duties(drive_t *drive, s
     fast->u_next.q = wanted.u.q;
     duty_t duty;
     if (__builtin_expect(wanted.clear, 1)) {
-        duty = modulate_clear(&p->modulate, wanted.v, now->i_dq, now->advanced);
+        duty = modulate_clear((turning != NULL) ? turning : &p->modulate, wanted.v, now->i_dq, now->advanced);
     } else {
-        const modulate_out_t made = modulate_step(&p->modulate, wanted.v, now->i_dq, now->advanced);
+        const modulate_out_t made = modulate_step((turning != NULL) ? turning : &p->modulate, wanted.v, now->i_dq,
+                                                  now->advanced);
         duty = made.duty;
         if ((made.limited | wanted.limited) != 0U) {
             sample->voltage_limited = wanted.limited != 0U;
-            voltage_from_duties(drive, sample, made, now->i_dq, now->advanced);
+            if (turning != NULL) {
+                voltage_by(drive, sample, turning, made, now->i_dq, now->advanced);
+            } else {
+                voltage_from_duties(drive, sample, made, now->i_dq, now->advanced);
+            }
         }
     }
     hal_pwm_write(duty);
+}
+
+static __attribute__((noinline, cold)) void
+write_duties_turning(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_control_out_t *wanted)
+{
+    const modulate_config_t modulate = turning_modulate(&drive->parameters.modulate,
+                                                        drive->motor->turning_control.knee_gain, now->angle_step);
+    write_duties(drive, sample, now, *wanted, &modulate);
 }
 
 /* Current control -> modulation -> duties. */
@@ -138,7 +149,7 @@ control_currents(drive_t *drive, sample_t *sample, const rotor_frame_t *now, con
 {
     const current_control_in_t in = control_inputs(drive, sample, now, target);
     write_duties(drive, sample, now,
-                 current_control_step(&drive->parameters.current_control, &drive->fast.current_control, &in));
+                 current_control_step(&drive->parameters.current_control, &drive->fast.current_control, &in), NULL);
 }
 
 /* Called before the monitors of this period, which latch a fault again at once if its cause persists. The task never
@@ -167,7 +178,7 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
 static __attribute__((noinline, cold)) void apply_pulses(drive_t *drive, sample_t *sample, const rotor_frame_t *now)
 {
     const dq_q15_t v = pulses_step(&drive->pulses, &drive->pulses_state, sample->point.i, sample->theta_e);
-    write_duties(drive, sample, now, pulses_voltage(v, drive->parameters.modulate.alpha_q31, now->v_dc));
+    write_duties(drive, sample, now, pulses_voltage(v, drive->parameters.modulate.alpha_q31, now->v_dc), NULL);
     reset_control(drive, sample);
 }
 
@@ -175,7 +186,8 @@ static __attribute__((noinline, cold)) void control_checked(drive_t *drive, samp
                                                             const current_target_t *target)
 {
     if (turning_control_used(&drive->motor->turning_control)) {
-        write_duties(drive, sample, now, control_turning(drive, sample, now, target));
+        const current_control_out_t wanted = control_turning(drive, sample, now, target);
+        write_duties_turning(drive, sample, now, &wanted);
     } else {
         control_currents(drive, sample, now, target);
     }

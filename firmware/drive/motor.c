@@ -80,6 +80,12 @@ static motor_check_t modulate_check(const motor_t *m)
     return (m->parameters.current_control.clear_q30 <= clear_max_q30) ? MOTOR_CHECK_OK : MOTOR_CHECK_CLEAR_VOLTAGE;
 }
 
+static bool turning_gains_valid(const turning_control_config_t *c)
+{
+    return c->per_period_q29 > 0 && c->approach_q32 > 0 && c->feedback_q32 > 0 && c->integral_q32 > 0 &&
+           c->drop_q29 >= 0 && c->knee_gain > 0;
+}
+
 /* Only the law for a field that turns far takes the route on which a tracker with a shift may run, and only without
  * gains is the usual law the limit of its voltage. */
 static bool turning_valid(const motor_t *m)
@@ -89,8 +95,7 @@ static bool turning_valid(const motor_t *m)
     if (!turning_control_used(c)) {
         return m->angle_tracker.turn_shift == 0U && limits->sigma_q24 > 0;
     }
-    return c->per_period_q29 > 0 && c->approach_q32 > 0 && c->feedback_q32 > 0 && c->integral_q32 > 0 &&
-           c->drop_q29 >= 0 && limits->sigma_q24 == 0 && limits->integral_gain == 0 &&
+    return turning_gains_valid(c) && limits->sigma_q24 == 0 && limits->integral_gain == 0 &&
            m->angle_tracker.turn_shift <= 1U;
 }
 

@@ -16,7 +16,6 @@ SHARES = (0.0, 0.02, 0.1, 0.3, 0.6, 1.0)  # of top speed
 MACHINES = ("hsm1", "prius", "leaf", "pmasynrm", "pmsyrm", "ebike", "spm_12V", "compressor", "servo", "truck",
             "saturated", "linear", "gem")  # fmt: skip
 TRIP_C, DERATE_C = 180.0, 155.0  # where motor.toml gives none
-TOP = {"compressor": 0.8}  # of top speed; beyond, it oscillates about zero current: tests/motors/README.md
 NOISE = 0.002  # of the current converter's full scale, as in the campaigns
 
 
@@ -30,7 +29,7 @@ def windings(folder: Path) -> tuple[float, ...]:
 def test_a_perfect_drive_with_any_winding_trips_at_no_speed(name: str) -> None:
     folder = ROOT / "firmware" / "motors" / name if name == "hsm1" else MOTORS / name
     motor = load(str(folder) if name != "hsm1" else name)
-    top, most = TOP.get(name, 1.0) * motor.speed_max_rpm * 2.0 * math.pi / 60.0, 0.999 * motor.torque_max_Nm
+    top, most = motor.speed_max_rpm * 2.0 * math.pi / 60.0, 0.999 * motor.torque_max_Nm
     noise_A = NOISE * motor.plant["current_full_scale_A"]
     for winding_C in windings(folder):
         plant = {"imposed_speed": 1.0, "winding_C": winding_C, "current_noise_A_rms": noise_A}

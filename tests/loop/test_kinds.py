@@ -15,9 +15,6 @@ from fluxtrue_tools.sim.build import prepare
 from fluxtrue_tools.sim.library import Loop
 
 MACHINES = tuple(KINDS)
-# Known defects (tests/motors/README.md): the bound is missed. A test here that passes is an error, so that the list is
-# true.
-STEPS_MISSED = ("prius", "compressor", "linear")
 
 
 def machine_of(name: str) -> Machine:
@@ -30,15 +27,7 @@ def test_overshoot_is_what_exceeds_the_final_value_in_the_direction_of_the_step(
     assert overshoot(np.array([0.0, 5.0, 10.0]), 0.0, 10.0) == 0.0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.xfail(strict=True, raises=AssertionError))
-        if name in STEPS_MISSED
-        else name
-        for name in MACHINES
-    ],
-)
+@pytest.mark.parametrize("name", MACHINES)
 def test_torque_overshoots_by_10_percent_at_most_with_inductances_20_percent_too_small(name: str) -> None:
     missed = [str(step) for step in steps(machine_of(name)) if not step.met]
     assert not missed, f"allowed: {100 * OVERSHOOT_MAX:g} %, no fault"

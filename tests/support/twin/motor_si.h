@@ -21,6 +21,7 @@ typedef struct {
     /* current control */
     double sigma_rad_s, setpoint_weight, integral_ratio, v_ratio;
     double turning_approach, turning_feedback, turning_integral; /* per period; 0: the field does not turn far */
+    double turning_knee_A_per_rad;
     /* modulation */
     double dead_time_duty, knee_A, min_pulse_duty;
     /* identification */

@@ -204,6 +204,7 @@ static void bridge_on(twin_t *twin, const twin_angle_t *angle, double out[4])
     motor_si_t motor = twin->motor;
     motor.dead_time_duty *= twin->compensation;
     if (motor.turning_feedback > 0.0) {
+        motor.knee_A = fmax(motor.knee_A, motor.turning_knee_A_per_rad * fabs(angle->step));
         const twin_turning_in_t far = {request, now->i, angle->step};
         twin->u = twin_turning_control(&motor, &twin->turning, &far);
     } else {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
 #include "drive/slow_monitors.h"
+#include "drive/turning_modulate.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -387,8 +388,11 @@ void test_a_slow_angle_that_freezes_is_replaced_for_5_ms_and_then_that_of_a_roto
 /* Its own law on the checked route, which is never left. */
 void test_a_motor_whose_field_turns_far_runs_on_its_own_law(void)
 {
-    seam.motor.turning_control = (turning_control_config_t){
-        .per_period_q29 = Q31(0.5), .approach_q32 = Q31(0.72), .feedback_q32 = Q31(0.56), .integral_q32 = Q31(0.09)};
+    seam.motor.turning_control = (turning_control_config_t){.per_period_q29 = Q31(0.5),
+                                                            .approach_q32 = Q31(0.72),
+                                                            .feedback_q32 = Q31(0.56),
+                                                            .integral_q32 = Q31(0.09),
+                                                            .knee_gain = INT32_MAX};
     seam.motor.parameters.current_control.sigma_q24 = 0;
     seam.motor.parameters.current_control.integral_gain = 0;
     drive.parameters.current_control = seam.motor.parameters.current_control;
@@ -406,6 +410,22 @@ void test_a_motor_whose_field_turns_far_runs_on_its_own_law(void)
     TEST_ASSERT_FALSE(seam.gates);
     TEST_ASSERT_EQUAL_INT32(0, drive.fast.turning_control.s.d);
     TEST_ASSERT_EQUAL_INT32(published()->point.flux.psi_d * 16384, drive.fast.turning_control.next.d);
+}
+
+/* (MO-12): 2^-10 turns divide the gain, and the knee is never narrower than the given one. */
+void test_where_the_field_turns_far_the_knee_widens_with_speed(void)
+{
+    const modulate_config_t given = {.knee_q17 = 1 << 20, .knee_side_q17 = 908093, .dead_time_q16 = 77};
+    const modulate_config_t at_rest = turning_modulate(&given, 10 << 20, 0);
+    TEST_ASSERT_EQUAL_MEMORY(&given, &at_rest, sizeof given);
+    const modulate_config_t slow = turning_modulate(&given, 10 << 20, 9 << 22);
+    TEST_ASSERT_EQUAL_MEMORY(&given, &slow, sizeof given);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const modulate_config_t fast = turning_modulate(&given, 10 << 20, sign * (101 << 22));
+        TEST_ASSERT_EQUAL_INT32((10 << 20) / 101, fast.knee_q17);
+        TEST_ASSERT_INT32_WITHIN(1, (int32_t)(0.8660254 * (10 << 20) / 101), fast.knee_side_q17);
+        TEST_ASSERT_EQUAL_INT32(77, fast.dead_time_q16);
+    }
 }
 
 /* The voltage computed in period k acts in period k + 1, so the published one was computed in the previous period. */

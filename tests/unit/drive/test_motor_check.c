@@ -101,6 +101,7 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.feedback_q32 = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.integral_q32 = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.drop_q29 = -1; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.knee_gain = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; limit_only(&m); m.angle_tracker.turn_shift = 2) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.sigma_q24 = 0) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.integral_gain = 0) \
@@ -177,7 +178,8 @@ static const turning_control_config_t turning = {.per_period_q29 = Q31(0.16),
                                                  .approach_q32 = Q31(0.72),
                                                  .feedback_q32 = Q31(0.56),
                                                  .integral_q32 = Q31(0.09),
-                                                 .drop_q29 = Q31(0.01)};
+                                                 .drop_q29 = Q31(0.01),
+                                                 .knee_gain = 1};
 
 /* The usual law as the limit of the other one's voltage. */
 static void limit_only(motor_t *m)

@@ -12,7 +12,7 @@ from fluxtrue_tools.motor.flux_model import FluxModel
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
 TURNING_FEEDBACK, TURNING_INTEGRAL = 0.28, 0.045  # per period (CC-18), (CC-19)
-TURNING_APPROACH = 0.1  # per period: inductances 20 % too small overshoot by less than 10 % (CC-21)
+TURNING_APPROACH = 0.08  # per period: inductances 20 % too small overshoot by less than 10 % (CC-21)
 SINC_SERIES_MAX = 0.6  # rad: up to here 1 + theta^2/24 is 1/sinc(theta/2), (MR-5); beyond it is fitted at maximum speed
 PAPER_TURN_MAX = 0.78  # rad at omega_b: the end of the formats of the paper's law
 V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
@@ -179,6 +179,16 @@ def _current_control(period_s: float) -> dict[str, float]:
     }
 
 
+def turning_knee_A_per_rad(config: MotorConfig, model: FluxModel) -> float:
+    """Per angle of the field in a period: the knee with which the part of the compensation's answer to a deviation that
+    the dead time does not cancel stays below the answer of the law for a field that turns far (MO-12)."""
+    inverter = config.inverter
+    duty = inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V / inverter.vdc_V
+    l_min = min(float(model.psi_d(0.0, 0.0, nd=1)), float(model.psi_q(0.0, 0.0, nq=1)))
+    flux_Vs = duty * config.control.dead_time_compensation * inverter.vdc_V / inverter.pwm_hz
+    return DELAY_PERIODS * flux_Vs / (TURNING_FEEDBACK * l_min)
+
+
 def _modulation(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     # A device drop acts like dead time: a leg voltage against its current.
@@ -230,6 +240,12 @@ def missing_periods(config: MotorConfig) -> float:
 def _answer_rate(config: MotorConfig, bases: Bases) -> float:
     """Share of a change of the reference that the current follows in a step (CC-21); all with the usual law."""
     return 1.0 - (1.0 - TURNING_APPROACH) ** bases.periods_per_step if config.is_turning else 1.0
+
+
+def frozen_settle_s(config: MotorConfig) -> float:
+    """Until the voltage that moves the currents is no part of the mean any more: a share of e^-5 is left (MN-22)."""
+    answer_s = 5.0 / (TURNING_APPROACH * config.inverter.pwm_hz)
+    return max(FROZEN_SETTLE_S, answer_s) if config.is_turning else FROZEN_SETTLE_S
 
 
 def steps(seconds: float, step_s: float) -> int:

@@ -19,7 +19,6 @@ from fluxtrue_tools.motor.derived import (
     DEVIATION_S,
     EQUAL_S,
     FAST_S,
-    FROZEN_SETTLE_S,
     HOT_S,
     LAG_SHARE,
     LAUNCH_ANGLE,
@@ -38,8 +37,10 @@ from fluxtrue_tools.motor.derived import (
     TURNING_FEEDBACK,
     TURNING_INTEGRAL,
     WINDING_MIN_C,
+    frozen_settle_s,
     sinc_gain,
     steps,
+    turning_knee_A_per_rad,
 )
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE, Unfit, q15, q16, q31, u16
@@ -48,6 +49,7 @@ from fluxtrue_tools.motor.second_level import make_second_level
 Row = tuple[str, object, str]  # member, literal, comment
 
 COLUMNS = 100
+INT32_MAX = 2**31 - 1
 GATE_FAULT_FLUX = 1.5  # psi_b: more than any current of the machine links
 INDENT = "    "
 
@@ -213,6 +215,13 @@ def _current_control(motor: Motor) -> list[Row]:
     ]
 
 
+def knee_gain(motor: Motor) -> int:
+    """2^17 over the knee per 2^-10 turn; a smaller number is a wider knee."""
+    per_count_A = turning_knee_A_per_rad(motor.config, motor.model) * 2.0 * math.pi / 1024.0
+    wanted = 2.0**17 * motor.bases.current_A
+    return INT32_MAX if wanted >= INT32_MAX * per_count_A else max(1, round(wanted / per_count_A))
+
+
 def _turning_control(motor: Motor) -> list[Row]:
     b = motor.bases
     turn = b.omega_rad_s * b.period_s
@@ -224,6 +233,7 @@ def _turning_control(motor: Motor) -> list[Row]:
         ("feedback_q32", q31(2 * TURNING_FEEDBACK, "feedback"), f"{TURNING_FEEDBACK:g} per period"),
         ("integral_q32", q31(2 * TURNING_INTEGRAL, "integral"), f"{TURNING_INTEGRAL:g} per period"),
         ("drop_q29", q31(turn * motor.config.machine.r_ohm / b.resistance_ohm / 4, "drop"), "omega_b T_s R at 20 C"),
+        ("knee_gain", str(knee_gain(motor)), f"{turning_knee_A_per_rad(motor.config, motor.model):.6g} A per rad"),
     ]
 
 
@@ -463,7 +473,7 @@ def _frozen_angle(motor: Motor) -> list[Row]:
         ("v_0", str(v_0), f"{d.frozen_V:g} V in each of {b.periods_per_step} periods"),
         ("rate_gain", q16(rate, "rate_gain"), f"{b.periods_per_step}/(omega_b T)"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
-        *_counts(b, settle=FROZEN_SETTLE_S, fault=ANGLE_S),
+        *_counts(b, settle=frozen_settle_s(motor.config), fault=ANGLE_S),
     ]
 
 
@@ -479,7 +489,7 @@ def _launch_power(motor: Motor) -> list[Row]:
         ("psi_share", q15(LAUNCH_FLUX_SHARE * d.psi_f_Vs / b.flux_Vs, "psi_share"), f"{LAUNCH_FLUX_SHARE:g} psi_f"),
         ("i_0", q15(d.launch_A / b.current_A, "i_0"), f"{d.launch_A:g} A"),
         ("i_min", q15(d.monitor_A / b.current_A, "i_min"), f"{d.monitor_A:g} A"),
-        *_counts(b, settle=FROZEN_SETTLE_S, fault=ANGLE_S),
+        *_counts(b, settle=frozen_settle_s(motor.config), fault=ANGLE_S),
     ]
 
 
@@ -740,6 +750,7 @@ def _si_rows(motor: Motor) -> list[Row]:
             "turning_approach": TURNING_APPROACH,
             "turning_feedback": TURNING_FEEDBACK,
             "turning_integral": TURNING_INTEGRAL,
+            "turning_knee_A_per_rad": turning_knee_A_per_rad(motor.config, motor.model),
         }
     counts = {
         "pole_pairs": machine.pole_pairs,

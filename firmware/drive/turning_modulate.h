@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef DRIVE_TURNING_MODULATE_H
+#define DRIVE_TURNING_MODULATE_H
+/** The modulation of current_control_turning.h: a knee of the dead-time compensation that widens with speed.
+ *   i_knee >= 1.5 |theta| c T_s/(k_0 l_min): a deviation of the current keeps its direction in the stationary frame
+ *   while the rotor turns, and the compensation answers it turned by a period and a half.
+ * Source   docs/theory/modulation.md (MO-12)
+ * Units    knee_gain: knee_q17 times theta in 2^-10 turns; angle_step 2^32 = one turn
+ * Range    knee_gain > 0
+ * Rounding theta down to 2^-10 turns
+ * Errors   none
+ * Context  fast ISR, not its usual route; one hardware division */
+#include "control/current/modulate.h"
+
+modulate_config_t turning_modulate(const modulate_config_t *given, int32_t knee_gain, int32_t angle_step);
+
+#endif
