@@ -1,13 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_ADC_H
 #define HAL_ADC_H
-/** Phase currents and dc voltage, all sampled at the same instant: the start of the PWM period.
- * Source   docs/howto/port.md
- * Units    right-aligned counts of the converter that motor.toml names (adc_bits)
- * Errors   none here; a value at the end of the range is returned as it is, and the monitors evaluate it
- * Context  fast ISR, once per period, after the conversion has finished */
+/** The converters of phase currents and dc voltage.
+ *   read            all of them, sampled at the same instant: the start of the PWM period
+ *   known_permille  what the converters read of a voltage that does not come from their reference, as thousandths of
+ *                   what they should read: 1000 while the reference is right. A wrong reference changes all currents
+ *                   alike, which nothing in them shows
+ * Source   docs/howto/port.md; docs/theory/monitors.md (MN-37)
+ * Units    right-aligned counts of the converter that motor.toml names (adc_bits); thousandths
+ * Errors   a value at the end of the range is returned as it is, and the monitors evaluate it; HAL_ADC_NOTHING_KNOWN:
+ *          the port has no such voltage, and the integrator supervises the reference
+ * Context  hal_adc_read(): fast ISR, once per period, after the conversion has finished; the
+ *          other: 1 kHz task */
+#include <stdint.h>
+
 #include "types/samples.h"
 
+#define HAL_ADC_NOTHING_KNOWN ((int16_t)-1)
+
 void hal_adc_read(adc_counts_t *counts);
+int16_t hal_adc_known_permille(void);
 
 #endif

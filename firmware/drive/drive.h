@@ -193,7 +193,8 @@ typedef struct {
     q15_t psi_d_error;
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
-    bool gates; /* as read back: the switches follow the duties */
+    int16_t known_permille; /* hal_adc_known_permille() */
+    bool gates;             /* as read back: the switches follow the duties */
     bool angle_absolute;
 } snapshot_t;
 

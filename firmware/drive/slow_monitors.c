@@ -4,6 +4,8 @@
 #include "control/current/transform.h"
 #include "drive/mrai/mrai_seam.h"
 
+#define STANDSTILL Q31(0.002) /* of the speed base */
+
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
     const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
@@ -28,12 +30,20 @@ static uint8_t contradicted_steps(const drive_t *drive)
     return mrai_is_chosen(drive) ? 0U : (uint8_t)(IDENTIFY_STEPS * drive->task.identify.contradicted_updates);
 }
 
+/* A rotor that stands induces nothing, and a bridge that does not switch makes no voltage. */
+static bool is_at_rest(const snapshot_t *snapshot)
+{
+    const q31_t omega = snapshot->sample.point.omega;
+    return !snapshot->sample.acting && !snapshot->gates && omega <= STANDSTILL && omega >= -STANDSTILL;
+}
+
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
     const plausibility_in_t in = {
         .acting = sample->acting,
+        .at_rest = is_at_rest(snapshot),
         .voltage_limited = sample->voltage_limited,
         .i = sample->point.i,
         .i_ref = task->i_ref,
@@ -43,6 +53,7 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .omega = fx_q15_from_q31(sample->point.omega),
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
+        .known_permille = snapshot->known_permille,
         .contradicted_steps = contradicted_steps(drive),
     };
     return plausibility_step(&drive->motor->plausibility, &task->plausibility, &in);

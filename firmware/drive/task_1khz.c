@@ -6,6 +6,7 @@
 #include "drive/slow_monitors.h"
 #include "drive/switch_off.h"
 #include "fx/vec.h"
+#include "hal/adc.h"
 #include "hal/angle.h"
 #include "hal/pwm.h"
 #include "hal/temperature.h"
@@ -209,6 +210,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
     snapshot->angle_absolute = hal_angle_is_absolute();
     snapshot->inverter_dC = hal_temperature_inverter_dC();
     snapshot->winding_dC = hal_temperature_winding_dC();
+    snapshot->known_permille = hal_adc_known_permille();
 }
 
 void task_1khz(drive_t *drive)

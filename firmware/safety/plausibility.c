@@ -6,6 +6,10 @@
 #include "signal/debounce.h"
 #include "types/faults.h"
 
+#define RIGHT_PERMILLE 1000
+#define REFERENCE_ERROR_PERMILLE 60
+#define REFERENCE_STEPS 10U
+#define ZERO_STEPS 50
 #define DEVIATION_UNLIMITED 5 /* per step while the voltage is not limited: confirmed in a fifth of the time */
 
 /* (MN-1); samples without a deviation decrease the count. */
@@ -109,15 +113,41 @@ static plausibility_in_t against_the_answer(const plausibility_config_t *config,
     return answer;
 }
 
+/* (MN-37), whether the bridge acts or not: with a wrong reference it must not begin to. */
+static uint32_t wrong_reference(plausibility_state_t *state, const plausibility_in_t *in)
+{
+    const bool wrong = in->known_permille >= 0 &&
+                       fx_abs_q31(in->known_permille - RIGHT_PERMILLE) > REFERENCE_ERROR_PERMILLE;
+    return debounce_step(&state->reference, wrong, REFERENCE_STEPS, FAULT_INPUT);
+}
+
+/* (MN-38): the zero of a current is known whenever none can flow, hence before every start. */
+static uint32_t wrong_zero(const plausibility_config_t *config, plausibility_state_t *state,
+                           const plausibility_in_t *in)
+{
+    const abc_q15_t i = in->phases;
+    const int32_t largest = fx_max_s32(fx_max_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
+    const int32_t step = (in->at_rest && largest > config->zero_max) ? 1 : -1;
+    state->not_zero = (uint8_t)fx_clamp_q31(state->not_zero + step, 0, ZERO_STEPS);
+    return (state->not_zero >= ZERO_STEPS) ? FAULT_INPUT : 0U;
+}
+
 uint32_t plausibility_step(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in)
 {
     const bool hot = in->inverter_dC >= config->inverter_trip_dC || in->winding_dC >= config->winding_trip_dC;
     const bool fast = fx_abs_q15(in->omega) > config->omega_trip;
     uint32_t faults = debounce_step(&state->hot, hot, config->hot_steps, FAULT_TEMPERATURE);
-    faults |= debounce_step(&state->fast, fast, config->fast_steps, FAULT_OVER_SPEED);
+    faults |= debounce_step(&state->fast, fast, config->fast_steps, FAULT_OVER_SPEED) | wrong_reference(state, in) |
+              wrong_zero(config, state, in);
     if (!in->acting) {
-        *state = (plausibility_state_t){.fast = state->fast, .hot = state->hot, .last = state->last};
+        *state = (plausibility_state_t){
+            .fast = state->fast,
+            .hot = state->hot,
+            .reference = state->reference,
+            .not_zero = state->not_zero,
+            .last = state->last,
+        };
         return faults;
     }
     faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;

@@ -11,8 +11,10 @@
  *   mismatch           the d-axis voltage contradicts the currents, the speed and the identified machine for 70 ms
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
+ *   zero               at rest with switching disabled, a phase current above zero_max in 50 more steps than below it
+ *   reference          a known voltage is read more than 6 % wrong in 10 steps
  *   These times are counted in steps of the task, rounded up.
- * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12)
+ * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12), (MN-37), (MN-38)
  * Units    per unit; temperatures in tenths of a degree C, or TEMPERATURE_UNKNOWN
  * Range    every argument
  * Errors   returns the set of faults that are confirmed now; the fast ISR latches them
@@ -27,6 +29,7 @@ typedef struct {
     q15_t i_dead;  /* a phase current up to this counts as none */
     q15_t i_alive; /* a phase whose reference exceeds this must carry current */
     q15_t ripple_max;
+    q15_t zero_max;    /* of a phase current that cannot flow */
     q15_t answer_rate; /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
@@ -42,12 +45,14 @@ typedef struct {
     int32_t ripple_x16;          /* mean distance from it over 16 steps, times 16 */
     int8_t lost[3][2];           /* of each phase, in the positive and in the negative direction */
     uint8_t equal[3];
+    uint8_t not_zero;
     abc_q15_t last;
-    uint8_t oscillating, fast, hot;
+    uint8_t oscillating, fast, hot, reference;
 } plausibility_state_t;
 
 typedef struct {
-    bool acting; /* the bridge follows its references */
+    bool acting;  /* the bridge follows its references */
+    bool at_rest; /* switching is disabled and the rotor stands: no current can flow */
     bool voltage_limited;
     dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
     dq_q15_t i_mean;      /* of the last step; the sample if there is none */
@@ -55,6 +60,7 @@ typedef struct {
     abc_q15_t phases_ref; /* i_ref as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;
+    int16_t known_permille;     /* of a known voltage, as the converters read it; negative: there is none */
     uint8_t contradicted_steps; /* in a row, told by the identification */
 } plausibility_in_t;
 

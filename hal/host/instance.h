@@ -35,6 +35,7 @@ typedef struct {
     bool gate_fault_for_board;            /* not read yet */
     bool winding_broken, inverter_broken; /* sensor defective */
     double inverter_C;
+    double known_share; /* what the converters read of a known voltage; 1: right */
     bool watchdog_started;
     uint32_t watchdog_services;
     external_watchdog_t external_watchdog;

@@ -32,6 +32,16 @@ void limits_set_inverter(fluxtrue_t *drive, double value)
     drive->board.inverter_C = value;
 }
 
+double limits_get_known_share(const fluxtrue_t *drive)
+{
+    return drive->board.known_share;
+}
+
+void limits_set_known_share(fluxtrue_t *drive, double value)
+{
+    drive->board.known_share = value;
+}
+
 /* A limit of the request, by its name there. */
 #define LIMIT(name, base) \
     double limits_get_##name(const fluxtrue_t *drive) \

@@ -21,6 +21,7 @@
     X(id_ref_A, "A", NUMBER, "Current reference in d; can be set for current mode.") \
     X(iq_ref_A, "A", NUMBER, "Current reference in q; can be set for current mode.") \
     X(inverter_C, "degC", NUMBER, "Temperature of the inverter.") \
+    X(known_voltage_share, "", NUMBER, "Reading of a known voltage; 1: the converters' reference is right.") \
     X(machine_monitors, "", SWITCH, "0 disables the monitors that need a machine at the terminals.") \
     X(torque_limit_drive_Nm, "Nm", NUMBER, "Largest torque that may drive.") \
     X(torque_limit_regen_Nm, "Nm", NUMBER, "Largest torque that may regenerate.") \

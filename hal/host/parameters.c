@@ -152,6 +152,7 @@ const parameter_t parameters[] = {
     {"id_ref_A", get_id_ref, set_id_ref, -INFINITY, INFINITY},
     {"iq_ref_A", get_iq_ref, set_iq_ref, -INFINITY, INFINITY},
     {"inverter_C", limits_get_inverter, limits_set_inverter, -100.0, 500.0},
+    {"known_voltage_share", limits_get_known_share, limits_set_known_share, 0.0, 5.0},
     {"machine_monitors", limits_get_machine_monitors, limits_set_machine_monitors, 0.0, 1.0},
     {"torque_limit_drive_Nm", limits_get_torque_drive, limits_set_torque_drive, 0.0, 1e9},
     {"torque_limit_regen_Nm", limits_get_torque_regen, limits_set_torque_regen, 0.0, 1e9},

@@ -23,6 +23,11 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = script_adc(&script);
 }
 
+int16_t hal_adc_known_permille(void)
+{
+    return HAL_ADC_NOTHING_KNOWN;
+}
+
 uint32_t hal_angle_read(void)
 {
     return script.angle;

@@ -3,6 +3,7 @@
 
 #include "fx/codegen.h"
 #include "hal/adc.h"
+#include "hal/s32k144/reference.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/startup.h"
 
@@ -12,13 +13,14 @@
 #define AVERAGE_32 3U
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U
+#define BANDGAP 27U
 #define PULSE_OUTPUT_0 1U
 #define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
 #define APART_STEPS 10U  /* a longer interval between errors restarts the count */
 
 /* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). */
 enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3, ADC0_CONVERSIONS = 4 };
-enum { I_B = 0, V_DC = 1, INVERTER = 2, ADC1_CONVERSIONS = 3 };
+enum { I_B = 0, V_DC = 1, INVERTER = 2, KNOWN = 3, ADC1_CONVERSIONS = 4 };
 enum {
     FIRST = 0,
     SLOW = 2
@@ -87,6 +89,7 @@ void sampling_init(uint32_t period_ticks)
     ADC1->SC1[I_B] = ADC_SC1_ADCH(0);
     ADC1->SC1[V_DC] = ADC_SC1_ADCH(1);
     ADC1->SC1[INVERTER] = ADC_SC1_ADCH(2);
+    ADC1->SC1[KNOWN] = ADC_SC1_ADCH(BANDGAP);
     TRGMUX->TRGMUX_PDB0 = TRGMUX_PDB0_SEL0(FTM0_INIT_TRIGGER);
     TRGMUX->TRGMUX_PDB1 = TRGMUX_PDB1_SEL0(FTM0_INIT_TRIGGER);
     chain(PDB0, ADC0_CONVERSIONS, period_ticks);
@@ -116,7 +119,7 @@ void hal_adc_read(adc_counts_t *counts)
     const fx_two_words_t from_adc0 = fx_read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
     const fx_two_words_t from_adc1 = fx_read_two(&ADC1->R[I_B]);
     (void)fx_read_two(&ADC0->R[WINDING]);
-    (void)ADC1->R[INVERTER];
+    (void)fx_read_two(&ADC1->R[INVERTER]);
     counts->i_a = (uint32_t)from_adc0.first;
     counts->i_c = (uint32_t)from_adc0.second;
     counts->i_b = (uint32_t)from_adc1.first;
@@ -167,4 +170,9 @@ uint16_t sampling_inverter(void)
 uint16_t sampling_die(void)
 {
     return (uint16_t)ADC0->R[DIE];
+}
+
+int16_t hal_adc_known_permille(void)
+{
+    return reference_permille((uint16_t)ADC1->R[KNOWN]);
 }

@@ -2,7 +2,7 @@
 #ifndef HAL_S32K144_SAMPLING_H
 #define HAL_S32K144_SAMPLING_H
 /** Both converters, started by the PWM's period through the delay blocks: phase currents and dc voltage at the start of
- * the period, temperatures in its middle.
+ * the period, temperatures and the bandgap in its middle.
  * Source   README.md, sampling
  * Units    12-bit counts; period_ticks: ticks of 112 MHz
  * Range    period_ticks up to 65535

@@ -24,6 +24,7 @@ typedef struct {
     int32_t vdc_count;
     double theta_m_rad; /* [0, 2 pi) */
     int32_t theta_count;
+    double known_share; /* what the converter reads of a voltage that does not come from its reference; 1: right */
     double t_winding_C;
     int gate_fault; /* the gate drivers blocked a short circuit in the last period */
 } plant_sensors_t;

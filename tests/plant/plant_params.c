@@ -25,6 +25,8 @@ void plant_params_default(plant_params_t *params)
         params->current_gain[x] = 1.0;
     }
     params->vdc_gain = 1.0;
+    params->converter_reference = 1.0;
+    params->known_voltage_gain = 1.0;
     params->resolver_pole_pairs = 1.0;
     params->imposed_speed = 1;
     params->inertia_kgm2 = 1.0;
@@ -85,6 +87,12 @@ static const char *bad_sensor(const plant_params_t *p)
         if (!isfinite(p->current_offset_A[x])) {
             return "current_offset_A";
         }
+    }
+    if (!above_zero(p->converter_reference)) {
+        return "converter_reference";
+    }
+    if (!not_below_zero(p->known_voltage_gain)) {
+        return "known_voltage_gain";
     }
     if (p->angle_spike_every < 0) {
         return "angle_spike_every";

@@ -44,8 +44,10 @@ typedef struct {
     int adc_bits;
     double current_gain[3], current_offset_A[3], current_noise_A_rms;
     int current_quantise;
-    int current_stuck[3]; /* repeats its last sample */
-    int current_open[3];  /* input pulled down: reads the negative full scale */
+    int current_stuck[3];       /* repeats its last sample */
+    int current_open[3];        /* input pulled down: reads the negative full scale */
+    double converter_reference; /* share of the nominal one: everything is read as if it were larger by its inverse */
+    double known_voltage_gain;  /* error of the voltage that does not come from the reference */
     double vdc_full_scale_V, vdc_gain;
     int vdc_quantise;
     int angle_reversed;                  /* counts against the rotor */

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#define KNOWN_SHARE_MAX 5.0 /* a volt, where the reference is five */
 #define TWO_PI 6.28318530717958647693
 
 static double clamp(double x, double lo, double hi)
@@ -23,12 +24,13 @@ void sensors_create(sensors_t *s, const plant_params_t *p)
     s->theta_m_rad = wrap_angle(p->theta_m_rad);
 }
 
-/* (PL-17): the top code is one step below the full scale, as in a converter. */
+/* (PL-17): the top code is one step below the full scale, as in a converter. Mid scale is half of the reference, to
+ * which the sensors refer, too. */
 static void sample_current(sensors_t *s, const plant_params_t *p, int x, double i_A)
 {
     const double mid = ldexp(1.0, p->adc_bits - 1), step = p->current_full_scale_A / mid;
     const double noise = random_normal(&s->rng) * p->current_noise_A_rms;
-    double code = (i_A * p->current_gain[x] + p->current_offset_A[x] + noise) / step;
+    double code = (i_A * p->current_gain[x] + p->current_offset_A[x] + noise) / step / p->converter_reference;
     if (p->current_open[x]) {
         code = -mid;
     }
@@ -43,7 +45,7 @@ static void sample_current(sensors_t *s, const plant_params_t *p, int x, double 
 static void sample_vdc(const plant_params_t *p, double vdc_V, plant_sensors_t *out)
 {
     const double codes = ldexp(1.0, p->adc_bits), step = p->vdc_full_scale_V / codes;
-    const double code = clamp(vdc_V * p->vdc_gain / step, 0.0, codes - 1.0);
+    const double code = clamp(vdc_V * p->vdc_gain / step / p->converter_reference, 0.0, codes - 1.0);
     const double whole = floor(code + 0.5);
     out->vdc_V = (p->vdc_quantise ? whole : code) * step;
     out->vdc_count = (int32_t)whole;
@@ -95,6 +97,7 @@ void sensors_sample(sensors_t *s, const plant_params_t *p, const plant_truth_t *
     out->ib_A = s->current_A[p->phases_swapped ? 2 : 1];
     out->ic_A = s->current_A[p->phases_swapped ? 1 : 2];
     sample_vdc(p, truth->vdc_V, out);
+    out->known_share = clamp(p->known_voltage_gain / p->converter_reference, 0.0, KNOWN_SHARE_MAX);
     if (!p->angle_stuck) {
         sample_angle(s, p, truth);
     }

@@ -3,6 +3,7 @@
 #define PLANT_SENSORS_H
 /** Current, dc-voltage and angle sensors with their converters.
  *   current: gain, offset, noise, saturation at the full scale, quantisation
+ *   both:    converter reference, which also changes what is read of a known voltage
  *   angle:   delay, offset, first and second harmonic per resolver turn, spikes, quantisation
  * Source   docs/theory/plant.md (PL-17) ... (PL-19)
  * Units    A, V, rad; counts of a converter whose mid-scale is zero current

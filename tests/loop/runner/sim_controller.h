@@ -7,6 +7,7 @@
  *   switches(): the switches of the board; NULL or false: the controller has no board and the battery stays connected
  *   outputs_lost(): the controller was reset in this period, so that no gate is on from here on; may be NULL
  *   gate_fault(): tells before each step whether the gate drivers have blocked a short circuit; may be NULL
+ *   known_voltage(): tells before each step what the converters read of a known voltage, 1: right; may be NULL
  * Errors   set() returns a SIM_ code; get() of an unknown name returns NaN; failure() returns NULL, or the reason why
  *          no further step can be run, and may itself be NULL
  * Context  host; owned by the runner, which destroys it */
@@ -25,6 +26,7 @@ typedef struct {
     bool (*switches)(const void *self, plant_switches_t *on);
     void (*gate_fault)(void *self, bool reported);
     bool (*outputs_lost)(const void *self);
+    void (*known_voltage)(void *self, double share);
 } sim_controller_t;
 
 /** Takes ownership of the controller, also if it returns NULL (out of memory). */

@@ -44,6 +44,11 @@ static void firmware_gate_fault(void *self, bool reported)
     ((fluxtrue_t *)self)->board.short_circuit_blocked = reported;
 }
 
+static void firmware_known_voltage(void *self, double share)
+{
+    ((fluxtrue_t *)self)->board.known_share = share;
+}
+
 /* The caller owns the firmware. */
 static void firmware_keep(void *self)
 {
@@ -73,7 +78,7 @@ static void twin_destroy_(void *self)
 static sim_t *create_around(fluxtrue_t *firmware, void (*destroy)(void *self))
 {
     return sim_create_with((sim_controller_t){firmware, firmware_step, firmware_set, firmware_get, NULL, destroy,
-                                              firmware_switches, firmware_gate_fault, NULL});
+                                              firmware_switches, firmware_gate_fault, NULL, firmware_known_voltage});
 }
 
 sim_t *sim_create(int controller)
@@ -82,8 +87,8 @@ sim_t *sim_create(int controller)
         return create_around(fluxtrue_create(), firmware_destroy);
     }
     if (controller == SIM_TWIN) {
-        return sim_create_with(
-            (sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_, NULL, NULL, NULL});
+        return sim_create_with((sim_controller_t){twin_create(), twin_step_, twin_set_, twin_get_, NULL, twin_destroy_,
+                                                  NULL, NULL, NULL, NULL});
     }
     return NULL;
 }

@@ -98,6 +98,9 @@ static void period_run(sim_t *sim)
         sim->controller.gate_fault(sim->controller.self, sensors.gate_fault != 0);
         sim->gates_on = sim->gates_on && !sensors.gate_fault; /* the timer disables switching without the processor */
     }
+    if (sim->controller.known_voltage != NULL) {
+        sim->controller.known_voltage(sim->controller.self, sensors.known_share);
+    }
     double out[4] = {0.5, 0.5, 0.5, 0.0};
     sim->controller.step(sim->controller.self, in, out);
     if (sim->controller.outputs_lost != NULL && sim->controller.outputs_lost(sim->controller.self)) {

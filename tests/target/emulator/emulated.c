@@ -37,6 +37,12 @@ static uint16_t die_count(double celsius)
     return to_count((0.7405 - 0.001564 * (celsius - 25.0)) / 5.0, 12);
 }
 
+/* The bandgap, 1 V at a reference of 5 V (hal/s32k144/sampling.c). */
+static uint16_t bandgap_count(double share)
+{
+    return to_count(share / 5.0, 12);
+}
+
 static uint32_t angle_of(double rad)
 {
     const double turns = rad / TURN_RAD;
@@ -64,6 +70,7 @@ static void samples_to_pins(emulated_t *e, const double in[6])
     pins->adc[0][2] = ntc_count(in[5]);
     pins->adc[1][2] = ntc_count(e->inverter_C);
     pins->adc[0][26] = die_count(e->processor_C);
+    pins->adc[1][27] = bandgap_count(e->known_share);
     angle_to_pins(e, pins, angle_of(in[4]));
     e->mirror.host->winding_C = in[5];
 }
@@ -136,6 +143,11 @@ static void gate_report(void *self, bool reported)
 {
     emulated_t *e = self;
     emu_board_pins(e->emu, e->pins_of_board.gate_fault || reported, e->pins_of_board.resolver_fault);
+}
+
+static void known_voltage(void *self, double share)
+{
+    ((emulated_t *)self)->known_share = share;
 }
 
 static const char *failure(const void *self)
@@ -288,6 +300,7 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
     }
     e->inverter_C = 40.0;
     e->processor_C = 60.0;
+    e->known_share = 1.0;
     e->period_ticks = (double)motor.bases.period_s * (double)EMU_TICKS_PER_S;
     const char *bad = mirror_open(&e->mirror, e->emu, layout);
     const double at_rest[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 20.0}; /* the shaft at angle zero, no current */
@@ -304,7 +317,7 @@ sim_t *sim_create_emulated(const char *elf, const char *layout, int mode, char *
         return NULL;
     }
     return sim_create_with(
-        (sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report, outputs_lost});
+        (sim_controller_t){e, step, set, get, failure, destroy, switches, gate_report, outputs_lost, known_voltage});
 }
 
 emu_t *sim_emulator(sim_t *sim)

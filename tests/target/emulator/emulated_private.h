@@ -13,6 +13,7 @@ typedef struct {
     double period_ticks;
     uint64_t steps;
     double inverter_C, processor_C;
+    double known_share;  /* what the converters read of the bandgap; 1: right */
     bool board;          /* the image's outputs control contactor, precharge, discharge and gate-driver supply */
     fluxtrue_t *shadow;  /* NULL: there is none */
     drive_t task_result; /* result of the shadow's task, while the image's task still runs */

@@ -10,6 +10,7 @@
 #include "fx/q.h"
 #include "hal/host/port.h"
 #include "hal/s32k144/ntc.h"
+#include "hal/s32k144/reference.h"
 #include "hal/temperature.h"
 
 enum { FAST_VECTOR = 16 + 39, MRAI_VECTOR = 16 + 69, TASK_VECTOR = 16 + 48, GATE_VECTOR = 16 + 103 };
@@ -61,6 +62,7 @@ void temperatures_take(const emulated_t *e, fluxtrue_t *host)
 {
     host->winding_C = temperature((uint32_t)emu_register(e->emu, "ADC0.R2"), &host->board.winding_broken);
     host->board.inverter_C = temperature((uint32_t)emu_register(e->emu, "ADC1.R2"), &host->board.inverter_broken);
+    host->board.known_share = reference_permille((uint16_t)emu_register(e->emu, "ADC1.R3")) / 1000.0;
 }
 
 /* The task reads all its inputs when it begins, long before the next interrupt, so the shadow computes the whole task

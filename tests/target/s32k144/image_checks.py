@@ -19,7 +19,7 @@ SLACK_S = 1 / 112e6
 ALL_OUTPUTS, NO_OUTPUTS = 0x3F, 0
 DRIVING_NM = 80.0
 WINDING_TRIP_C = 230.0  # firmware/motors/hsm1/motor.toml
-TEMPERATURE, GATE = 1 << 14, 1 << 15
+INPUT, TEMPERATURE, GATE = 1 << 5, 1 << 14, 1 << 15
 FAULTF = 0x80
 ENCACHE = 1
 ADC0_IRQ, PDB0_IRQ, PDB1_IRQ = 39, 52, 68
@@ -144,6 +144,18 @@ def a_winding_at_the_end_of_its_line_trips(parts: Parts) -> None:
         assert abs(loop.get("truth.torque_Nm")) < 1.0
 
 
+def a_wrong_reference_of_the_converters_is_found(parts: Parts) -> None:
+    """By the count of the bandgap; 10 ms are the confirmation."""
+    with driving(parts) as (loop, core):
+        loop.set("plant.converter_reference", 1.0 / 1.03)
+        loop.run(300)
+        assert loop.get("fault_word") == 0
+        loop.set("plant.converter_reference", 1.0 / 1.1)
+        loop.run(120)
+        assert int(loop.get("fault_word")) == INPUT
+        assert core.outputs == NO_OUTPUTS
+
+
 def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None:
     """At the port: the three switches of that side on throughout the period, the others off."""
     for switch, duty in (("upper_a", 1.0), ("lower_b", 0.0)):
@@ -178,6 +190,7 @@ CHECKS = (
     a_stack_that_uses_its_reserve_resets,
     the_code_cache_is_on,
     a_winding_at_the_end_of_its_line_trips,
+    a_wrong_reference_of_the_converters_is_found,
     a_shorted_switch_ends_in_the_short_circuit_on_its_side,
 )
 

@@ -71,6 +71,10 @@ PLANTED_ERRORS: dict[str, tuple[Callable[[Parts], None], PlantedError]] = {
         checks.a_winding_at_the_end_of_its_line_trips,
         PlantedError("ntc.c", "count < node[NODES - 1]", "count < node[19]"),
     ),
+    "the bandgap is not read": (
+        checks.a_wrong_reference_of_the_converters_is_found,
+        PlantedError("sampling.c", "reference_permille((uint16_t)ADC1->R[KNOWN])", "1000"),
+    ),
     "the latch of the fault input is never ended": (
         checks.a_shorted_switch_ends_in_the_short_circuit_on_its_side,
         PlantedError("pwm.c", "again = on && ended_by_fault", "again = !on && ended_by_fault"),

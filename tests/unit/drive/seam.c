@@ -82,6 +82,12 @@ static int16_t inverter(int calls)
     return seam.inverter_dC;
 }
 
+static int16_t known_permille(int calls)
+{
+    (void)calls;
+    return seam.known_permille;
+}
+
 void seam_start(void)
 {
     memset(&seam, 0, sizeof seam);
@@ -95,6 +101,8 @@ void seam_start(void)
     hal_pwm_gates_Stub(pwm_gates);
     hal_temperature_winding_dC_Stub(winding);
     hal_temperature_inverter_dC_Stub(inverter);
+    hal_adc_known_permille_Stub(known_permille);
+    seam.known_permille = 1000;
     seam.motor = motor;
     drive_init(&drive, &seam.motor);
     seam_current(0.0, 0.0, 0.0);

@@ -10,7 +10,7 @@ typedef struct {
     adc_counts_t counts;
     uint32_t theta_m;
     bool angle_unknown; /* an encoder before its index */
-    int16_t winding_dC, inverter_dC;
+    int16_t winding_dC, inverter_dC, known_permille;
     duty_t duty;
     bool gates;
     bool gates_blocked; /* the gate drivers block: the bridge does not switch although it is enabled */

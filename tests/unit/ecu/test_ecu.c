@@ -152,6 +152,7 @@ void setUp(void)
     hal_temperature_winding_dC_IgnoreAndReturn(250);
     hal_temperature_inverter_dC_IgnoreAndReturn(250);
     hal_temperature_processor_dC_IgnoreAndReturn(250);
+    hal_adc_known_permille_IgnoreAndReturn(1000);
     hal_watchdog_start_Stub(watchdog_start);
     hal_watchdog_service_Stub(watchdog_service);
     ecu_init(&ecu, &motor);

@@ -189,6 +189,23 @@ void test_the_dc_voltage_is_quantised_and_limited_to_full_scale(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 398.0, seen.vdc_V);
 }
 
+/* Everything but the zero of the currents moves with the reference, and so does what is read of a known voltage. */
+void test_a_reference_that_is_too_small_makes_all_readings_larger(void)
+{
+    start();
+    sample_at(-100.0, 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, seen.known_share);
+    plant_params(plant)->converter_reference = 0.9;
+    plant_params(plant)->known_voltage_gain = 1.03;
+    sample_at(-100.0, 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 400.0 / 0.9, seen.vdc_V);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -100.0 / 0.9, seen.ia_A);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.03 / 0.9, seen.known_share);
+    plant_params(plant)->converter_reference = 0.01;
+    plant_sample(plant, &seen);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5.0, seen.known_share);
+}
+
 /* With three pole pairs an electrical error is a third of it mechanically. */
 void test_the_angle_carries_its_offset_and_both_harmonics_of_the_turn(void)
 {

@@ -12,6 +12,7 @@ static const plausibility_config_t config = {.answer_rate = Q15_MAX,
                                              .i_dead = 400,
                                              .i_alive = 2400,
                                              .ripple_max = 1600,
+                                             .zero_max = 492,
                                              .omega_trip = 32000,
                                              .inverter_trip_dC = 1050,
                                              .winding_trip_dC = 1800,
@@ -30,8 +31,12 @@ void setUp(void)
 {
     state = (plausibility_state_t){0};
     now = 0;
-    in = (plausibility_in_t){
-        .acting = true, .i = {-8000, 8000}, .i_ref = {-8000, 8000}, .i_mean = {-8000, 8000}, .omega = 10000};
+    in = (plausibility_in_t){.acting = true,
+                             .i = {-8000, 8000},
+                             .i_ref = {-8000, 8000},
+                             .i_mean = {-8000, 8000},
+                             .omega = 10000,
+                             .known_permille = 1000};
 }
 
 void tearDown(void)
@@ -317,4 +322,69 @@ void test_while_the_bridge_does_not_act_nothing_is_checked(void)
     in.acting = false;
     in.i = (dq_q15_t){0, 0};
     TEST_ASSERT_EQUAL_INT(-1, steps_until(UINT32_MAX, 0));
+}
+
+void test_a_reference_that_is_6_percent_wrong_is_found_in_ten_steps_whether_the_bridge_acts_or_not(void)
+{
+    static const int16_t wrong[] = {0, 939, 1061, 1429, 4998};
+    for (int n = 0; n < 5; n++) {
+        setUp();
+        in.known_permille = wrong[n];
+        TEST_ASSERT_EQUAL_INT(10, steps_until(FAULT_INPUT, -1));
+        setUp();
+        in.acting = false;
+        in.known_permille = wrong[n];
+        TEST_ASSERT_EQUAL_INT(10, steps_until(FAULT_INPUT, -1));
+    }
+}
+
+void test_a_reference_within_6_percent_is_right_and_so_is_none(void)
+{
+    static const int16_t right[] = {-1, 940, 970, 1030, 1060};
+    for (int n = 0; n < 5; n++) {
+        setUp();
+        in.known_permille = right[n];
+        TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_INPUT, -1));
+    }
+}
+
+void test_single_wrong_readings_of_the_reference_are_no_fault(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        in.known_permille = (n % 10 == 0) ? 1000 : 1200;
+        TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1) & FAULT_INPUT);
+    }
+}
+
+void test_a_current_that_cannot_flow_is_found_in_50_steps_in_each_phase_and_direction(void)
+{
+    for (int n = 0; n < 6; n++) {
+        const int32_t wrong = (n & 1) ? 493 : -493;
+        setUp();
+        in.acting = false;
+        in.at_rest = true;
+        in.phases = (abc_q15_t){(n / 2 == 0) ? wrong : 0, (n / 2 == 1) ? wrong : 0, (n / 2 == 2) ? wrong : 0};
+        TEST_ASSERT_EQUAL_INT(50, steps_until_the_same(FAULT_INPUT));
+    }
+}
+
+void test_a_zero_within_its_tolerance_and_a_current_that_can_flow_are_no_fault(void)
+{
+    in.acting = false;
+    in.at_rest = true;
+    in.phases = (abc_q15_t){492, -492, 492};
+    TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_INPUT));
+    in.at_rest = false;
+    in.phases = (abc_q15_t){9000, -9000, 0};
+    TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_INPUT));
+}
+
+void test_noise_beyond_the_tolerance_of_zero_in_half_of_the_samples_is_no_fault(void)
+{
+    in.acting = false;
+    in.at_rest = true;
+    for (int n = 0; n < 1000; n++) {
+        in.phases = (abc_q15_t){(n & 1) ? 2000 : 0, 0, 0};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in));
+    }
 }

@@ -52,6 +52,7 @@ COLUMNS = 100
 INT32_MAX = 2**31 - 1
 GATE_FAULT_FLUX = 1.5  # psi_b: more than any current of the machine links
 INDENT = "    "
+ZERO_SHARE = 0.015  # of full scale: the largest zero error of a phase current (MN-38)
 
 
 def _float(value: float) -> str:
@@ -426,6 +427,7 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
         ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
         ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
+        ("zero_max", q15(ZERO_SHARE, "zero_max"), "of the converter's full scale"),
         ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),

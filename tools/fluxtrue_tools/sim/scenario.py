@@ -173,6 +173,8 @@ class Plant(Strict):
     current_quantise: bool | None = None
     current_stuck: ThreeFlags | None = None
     current_open: ThreeFlags | None = None
+    converter_reference: Positive | None = None
+    known_voltage_gain: Number | None = None
     vdc_full_scale_V: Positive | None = None
     vdc_gain: Number | None = None
     vdc_quantise: bool | None = None
