@@ -3,6 +3,8 @@
 #define HAL_ADC_H
 /** The converters of phase currents and dc voltage.
  *   read            all of them, sampled at the same instant: the start of the PWM period
+ *   latest          the same counts again, for the second level: a function of its own, so that read() remains a part
+ *                   of the fast ISR
  *   known_permille  what the converters read of a voltage that does not come from their reference, as thousandths of
  *                   what they should read: 1000 while the reference is right. A wrong reference changes all currents
  *                   alike, which nothing in them shows
@@ -10,8 +12,8 @@
  * Units    right-aligned counts of the converter that motor.toml names (adc_bits); thousandths
  * Errors   a value at the end of the range is returned as it is, and the monitors evaluate it; HAL_ADC_NOTHING_KNOWN:
  *          the port has no such voltage, and the integrator supervises the reference
- * Context  hal_adc_read(): fast ISR, once per period, after the conversion has finished; the
- *          other: 1 kHz task */
+ * Context  hal_adc_read(): fast ISR, once per period, after the conversion has finished; hal_adc_latest():
+ *          1 kHz task with a bus, when it begins; hal_adc_known_permille(): 1 kHz task */
 #include <stdint.h>
 
 #include "types/samples.h"
@@ -19,6 +21,7 @@
 #define HAL_ADC_NOTHING_KNOWN ((int16_t)-1)
 
 void hal_adc_read(adc_counts_t *counts);
+void hal_adc_latest(adc_counts_t *counts);
 int16_t hal_adc_known_permille(void);
 
 #endif

@@ -4,6 +4,7 @@
 #include "drive/data_check.h"
 #include "ecu/ecu_private.h"
 #include "ecu/telemetry.h"
+#include "hal/adc.h"
 #include "hal/board.h"
 #include "hal/can.h"
 #include "hal/pwm.h"
@@ -129,17 +130,41 @@ static void command_drive(ecu_t *ecu)
     request->fault_resets = ecu->supervisor.resets;
 }
 
+/* What a step of the second level starts from. */
+typedef struct {
+    adc_counts_t counts;
+    uint32_t theta_m;
+    bool acting;
+} raw_sample_t;
+
+/* The converters' counts, which the first level has not scaled, and the angle of the same period. */
+static raw_sample_t read_raw_sample(const drive_t *drive)
+{
+    raw_sample_t raw;
+    uint32_t generation;
+    do {
+        generation = drive->samples.generation;
+        exchange_barrier();
+        const sample_t *sample = sample_box_at(&drive->samples, generation);
+        hal_adc_latest(&raw.counts);
+        raw.theta_m = sample->theta_m;
+        raw.acting = sample->acting;
+        exchange_barrier();
+    } while (drive->samples.generation != generation);
+    return raw;
+}
+
 /* The second level uses the samples and its own constants; what it finds, the drive latches in its next step. */
-static void check_by_second_level(ecu_t *ecu)
+static void check_by_second_level(ecu_t *ecu, const raw_sample_t *raw)
 {
     drive_t *drive = &ecu->drive;
-    const sample_t sample = sample_box_read(&drive->samples);
-    const fx_pair_t i_ab = sample.i_ab;
     const second_level_in_t in = {
-        .sample = {.alpha = (int16_t)i_ab, .beta = (int16_t)(i_ab >> 16), .theta_m = sample.theta_m},
-        .acting = sample.acting,
+        .sample = {.counts = raw->counts,
+                   .theta_m = raw->theta_m,
+                   .psi_d_error = drive->psi_d_error,
+                   .lq_error = fx_q15_from_q31(drive->task.identification.lq_error)},
+        .acting = raw->acting,
         .slew = drive->parameters.torque_slew,
-        .correction = fx_q15_from_q31(drive->task.torque_loop.correction),
         .elapsed_us = ecu->clock.elapsed_us,
         .question = ecu->question,
     };
@@ -192,6 +217,7 @@ static void send_xcp(ecu_t *ecu)
 void ecu_task_1khz(ecu_t *ecu)
 {
     data_check_restore_pointer(&ecu->drive);
+    const raw_sample_t raw = read_raw_sample(&ecu->drive); /* first: the next period's conversions are far */
     ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
     begin_step(ecu);
@@ -207,7 +233,7 @@ void ecu_task_1khz(ecu_t *ecu)
     ecu_pass(ecu, FLOW_ARBITRATED);
     task_1khz(&ecu->drive);
     scope_step(&ecu->scope, &ecu->drive, ecu->supervisor.faults != 0U);
-    check_by_second_level(ecu);
+    check_by_second_level(ecu, &raw);
     ecu_pass(ecu, FLOW_CHECKED);
     service_watchdog(ecu);
     answer(ecu);

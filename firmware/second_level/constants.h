@@ -19,12 +19,14 @@
 
 typedef struct {
     uint32_t checksum;
-    q16_t torque_per_count;                 /* of the bus, in the motor's scale */
-    int32_t torque_max;                     /* rated */
-    int32_t fall;                           /* slowest legal decrease of the torque, per step */
-    int32_t tolerance;                      /* of the torque from currents, at no torque */
-    q16_t tolerance_share;                  /* and per permitted torque */
-    int32_t correction_min, correction_max; /* plausible deviation of the tables, q15 */
+    q16_t torque_per_count;                /* of the bus, in the motor's scale */
+    int32_t torque_max;                    /* rated */
+    int32_t fall;                          /* slowest legal decrease of the torque, per step */
+    int32_t tolerance;                     /* of the torque from currents, at no torque */
+    q16_t tolerance_share;                 /* and per permitted torque */
+    q16_t alpha_per_count, beta_per_count; /* current of a count of (2 i_a - i_b - i_c) and of (i_b - i_c) */
+    int32_t psi_f;                         /* nominal magnet */
+    q16_t l_d;                             /* change of psi_d with i_d, without i_q */
     uint32_t pole_pairs;
     uint32_t angle_offset;   /* electrical, 2^32 = one turn */
     int32_t turn_standstill; /* change of the mechanical angle in one step, 2^32 = one turn: below it the direction of

@@ -5,17 +5,49 @@
 #include "fx/trig.h"
 
 #define SPACING_SHIFT 11 /* a sixteenth */
+#define BELIEVED_SHARE 5 /* a healthy machine may make a fifth less torque than the table */
+
+typedef struct {
+    int32_t d, q;
+} current_t;
+
+static int32_t times_q16(q16_t gain, int32_t x)
+{
+    return (int32_t)(((int64_t)gain * x + 0x8000) >> 16);
+}
+
+/* In the rotor frame (SL-3). Counts beyond the converter's width are impossible; they would saturate. */
+static current_t rotor_current(const second_level_constants_t *constants, const second_level_sample_t *sample)
+{
+    const int32_t a = (int32_t)(sample->counts.i_a & 0xFFFFU);
+    const int32_t b = (int32_t)(sample->counts.i_b & 0xFFFFU);
+    const int32_t c = (int32_t)(sample->counts.i_c & 0xFFFFU);
+    const q15_t alpha = fx_sat_q15(times_q16(constants->alpha_per_count, 2 * a - b - c));
+    const q15_t beta = fx_sat_q15(times_q16(constants->beta_per_count, b - c));
+    const uint32_t theta_e = constants->pole_pairs * sample->theta_m + constants->angle_offset;
+    const fx_sincos_t at = fx_sincos((uint16_t)((theta_e + 0x8000U) >> 16));
+    return (current_t){(fx_mul_q30(alpha, at.cos) + fx_mul_q30(beta, at.sin)) >> 15,
+                       (fx_mul_q30(beta, at.cos) - fx_mul_q30(alpha, at.sin)) >> 15};
+}
+
+/* What the identified deviations of magnet and q axis take from the table's torque (SL-8). */
+static int32_t believed_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
+                             current_t i, int32_t table)
+{
+    const q15_t i_q = fx_sat_q15(fx_abs_q31(i.q));
+    const q15_t psi_d = fx_sat_q15(constants->psi_f + times_q16(constants->l_d, i.d));
+    const q15_t q_axis = fx_sat_q15(table - fx_mul_q15(psi_d, i_q));
+    const int32_t change = fx_mul_q15(fx_sat_q15(sample->psi_d_error), i_q) +
+                           fx_mul_q15(fx_sat_q15(sample->lq_error), q_axis);
+    return fx_clamp_q31(change, -fx_max_s32(table, 0) / BELIEVED_SHARE, 0);
+}
 
 int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample)
 {
     static const fx_grid_t grid = {-32768, 0, SPACING_SHIFT, SPACING_SHIFT, SECOND_LEVEL_ROWS, SECOND_LEVEL_COLUMNS};
-    const uint32_t theta_e = constants->pole_pairs * sample->theta_m + constants->angle_offset;
-    const fx_sincos_t at = fx_sincos((uint16_t)((theta_e + 0x8000U) >> 16));
-    const q15_t alpha = fx_sat_q15(sample->alpha);
-    const q15_t beta = fx_sat_q15(sample->beta);
-    const int32_t i_d = (fx_mul_q30(alpha, at.cos) + fx_mul_q30(beta, at.sin)) >> 15;
-    const int32_t i_q = (fx_mul_q30(beta, at.cos) - fx_mul_q30(alpha, at.sin)) >> 15;
-    const fx_cell_t cell = fx_cell(&grid, i_d, fx_abs_q31(i_q));
-    const int32_t magnitude = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
-    return (i_q < 0) ? -magnitude : magnitude;
+    const current_t i = rotor_current(constants, sample);
+    const fx_cell_t cell = fx_cell(&grid, i.d, fx_abs_q31(i.q));
+    const int32_t table = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
+    const int32_t magnitude = table + believed_loss(constants, sample, i, table);
+    return (i.q < 0) ? -magnitude : magnitude;
 }

@@ -13,12 +13,11 @@ static void pass(second_level_t *level, passed_t part)
 }
 
 /* The torque is beyond what is permitted (SL-6). */
-static bool is_excessive(const second_level_constants_t *constants, const second_level_t *level, int32_t correction)
+static bool is_excessive(const second_level_constants_t *constants, const second_level_t *level)
 {
     const int32_t mean = level->mean_q8 >> MEAN_BITS;
     const int32_t bound = (mean < 0) ? level->permitted.negative.bound : level->permitted.positive.bound;
-    const int32_t believed = fx_clamp_q31(correction, constants->correction_min, constants->correction_max);
-    const int32_t share = (int32_t)(((int64_t)(constants->tolerance_share + 2 * believed) * bound) >> 16);
+    const int32_t share = (int32_t)(((int64_t)constants->tolerance_share * bound) >> 16);
     return fx_abs_q31(mean) > bound + constants->tolerance + share;
 }
 
@@ -39,7 +38,7 @@ bool second_level_step(const second_level_constants_t *constants, second_level_t
     }
     const int32_t torque_q8 = second_level_own_torque(constants, &in->sample) * (1 << MEAN_BITS);
     level->mean_q8 += (torque_q8 - level->mean_q8) >> constants->mean_shift;
-    level->confirmed_steps = is_excessive(constants, level, in->correction) ? level->confirmed_steps + 1 : 0;
+    level->confirmed_steps = is_excessive(constants, level) ? level->confirmed_steps + 1 : 0;
     pass(level, PASSED_COMPARISON);
     if (level->confirmed_steps < constants->confirm_steps) {
         return false;

@@ -4,9 +4,8 @@
 /** The independent second level: compares the torque that it computes from the currents with the torque that it
  * permits from the received frames. It shares with the first level the fixed-point library and the measured samples,
  * nothing else: neither code, nor tables, nor references, nor limits.
- *   |mean of the own torque over some milliseconds| > (1 + x) bound + t_0 + share bound for `confirm_steps`: fault
- *   bound is that of the permitted torque in the same direction; x is the first level's correction of its tables
- *   (positive: a weak magnet needs more current), believed as far as a healthy machine can need it
+ *   |mean of the own torque over some milliseconds| > bound + t_0 + share bound for `confirm_steps`: fault
+ *   bound is that of the permitted torque in the same direction
  * Source   docs/theory/second-level.md (SL-6); docs/decisions/017-second-level.md
  * Units    per unit of the motor's bases
  * Errors   true: confirmed now; the caller latches it
@@ -27,9 +26,8 @@ typedef struct {
 
 typedef struct {
     second_level_sample_t sample;
-    bool acting;        /* the bridge switches: otherwise the torque is the safe state's */
-    int32_t slew;       /* calibrated limit of the torque's change, per step */
-    int32_t correction; /* x, q15 */
+    bool acting;  /* the bridge switches: otherwise the torque is the safe state's */
+    int32_t slew; /* calibrated limit of the torque's change, per step */
     uint32_t elapsed_us;
     uint8_t question; /* of the external watchdog: the signature begins with it */
 } second_level_in_t;

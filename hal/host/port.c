@@ -36,6 +36,11 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = active->counts;
 }
 
+void hal_adc_latest(adc_counts_t *counts)
+{
+    *counts = active->counts;
+}
+
 int16_t hal_adc_known_permille(void)
 {
     return (int16_t)lrint(active->board.known_share * 1000.0);

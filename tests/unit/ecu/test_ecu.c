@@ -29,10 +29,26 @@ static bool fitted, supply, switching;
 static uint8_t question;
 static uint32_t answered;
 
+static adc_counts_t converted;
+static bool period_passes; /* while the counts are read */
+
 static void adc_read(adc_counts_t *counts, int calls)
 {
     (void)calls;
     *counts = (adc_counts_t){2048, 2048, 2048, 0};
+}
+
+static void adc_latest(adc_counts_t *counts, int calls)
+{
+    (void)calls;
+    *counts = converted;
+    if (period_passes) {
+        const sample_t same = ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
+        ecu.drive.samples.generation++;
+        ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS] = same;
+        ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS].acting = true;
+        period_passes = false;
+    }
 }
 
 static void pend(int calls)
@@ -131,10 +147,13 @@ void setUp(void)
     hal_shut_off_question_Stub(ask);
     hal_shut_off_answer_Stub(take_answer);
     hal_shut_off_supply_Stub(read_supply);
+    converted = (adc_counts_t){2048, 2048, 2048, 0};
+    period_passes = false;
     gate_fault = mailboxes_full = mrai_hangs = false;
     watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
     arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an unknown identifier */
     hal_adc_read_Stub(adc_read);
+    hal_adc_latest_Stub(adc_latest);
     hal_angle_read_IgnoreAndReturn(0);
     hal_angle_is_absolute_IgnoreAndReturn(true);
     hal_irq_pend_mrai_Stub(pend);
@@ -615,13 +634,24 @@ void test_the_first_fault_freezes_the_values_before_it(void)
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, frame.state);
 }
 
-/* 0.37 of full scale in the q axis without any request: 19 steps for the mean and the confirmation, and one step until
- * the drive has latched the fault. */
+/* A period that passes while the counts are read: they and the angle are taken from the next one. */
+void test_the_second_level_takes_counts_and_angle_of_the_same_period(void)
+{
+    converted = (adc_counts_t){2048, 2048 + 650, 2048 - 650, 0};
+    ecu_task_1khz(&ecu);
+    TEST_ASSERT_EQUAL_INT32(0, ecu.second_level.mean_q8); /* the bridge does not switch */
+    period_passes = true;
+    ecu_task_1khz(&ecu);
+    TEST_ASSERT_GREATER_THAN_INT32(0, ecu.second_level.mean_q8);
+}
+
+/* 0.37 of full scale in the q axis without any request, of which the first level's scaling knows nothing: 19 steps for
+ * the mean and the confirmation, and one step until the drive has latched the fault. */
 void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
     sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
     sample->acting = true;
-    sample->i_ab = fx_pair(0, 12000);
+    converted = (adc_counts_t){2048, 2048 + 650, 2048 - 650, 0};
     for (int n = 0; n < 20; n++) {
         ecu_task_1khz(&ecu);
     }

@@ -9,6 +9,7 @@
 
 #define ONE 32768.0
 #define PI 3.14159265358979323846
+#define THIRD (2.0 * PI / 3.0)
 
 static second_level_constants_t constants;
 static second_level_t level;
@@ -26,8 +27,10 @@ void setUp(void)
                                            .fall = 100,
                                            .tolerance = 600,
                                            .tolerance_share = 1024,
-                                           .correction_min = -1966,
-                                           .correction_max = 8192,
+                                           .alpha_per_count = 21845, /* a converter of 16 bits */
+                                           .beta_per_count = 37837,
+                                           .psi_f = 6554,
+                                           .l_d = 6554, /* l_q = 0.4 */
                                            .pole_pairs = 3,
                                            .turn_standstill = 1000,
                                            .mean_shift = 2,
@@ -46,12 +49,18 @@ void tearDown(void)
 {
 }
 
+static uint32_t count(double i)
+{
+    return (uint32_t)lrint(ONE * (1.0 + i));
+}
+
 /* The sample of a current in the rotor frame at a mechanical angle. */
 static second_level_sample_t sample(double i_d, double i_q, double theta_m)
 {
     const double e = 3.0 * theta_m + (double)constants.angle_offset / 4294967296.0 * 2.0 * PI;
-    return (second_level_sample_t){.alpha = (int32_t)lrint(ONE * (i_d * cos(e) - i_q * sin(e))),
-                                   .beta = (int32_t)lrint(ONE * (i_d * sin(e) + i_q * cos(e))),
+    return (second_level_sample_t){.counts = {.i_a = count(i_d * cos(e) - i_q * sin(e)),
+                                              .i_b = count(i_d * cos(e - THIRD) - i_q * sin(e - THIRD)),
+                                              .i_c = count(i_d * cos(e + THIRD) - i_q * sin(e + THIRD))},
                                    .theta_m = (uint32_t)(int64_t)lrint(theta_m / (2.0 * PI) * 4294967296.0)};
 }
 
@@ -124,16 +133,53 @@ void test_too_little_torque_is_not_reported(void)
     TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
 }
 
-/* 1966 counts for a request of 1100: permitted with a correction of 25 %, 1100 x 1.25 + 600 + 17 = 1992. */
-void test_a_correction_of_the_tables_is_accepted_up_to_its_plausible_limits(void)
+/* 1966 counts; a magnet that has lost a sixth of its flux makes 1638, less than 1030 + 600 + 16 are permitted. */
+void test_an_identified_loss_of_the_magnet_is_believed(void)
 {
-    request(110);
+    request(103);
     in.sample = sample(0.0, 0.3, 0.0);
-    in.correction = 8192;
-    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
-    in.correction = 32767;
-    request(105);
     TEST_ASSERT_GREATER_THAN_INT(0, steps_to_fault(500));
+    level.confirmed_steps = 0;
+    in.sample.psi_d_error = -1092;
+    TEST_ASSERT_EQUAL_INT(0, steps_to_fault(500));
+}
+
+static int32_t torque_with(double i_d, double i_q, int32_t psi_d_error, int32_t lq_error)
+{
+    second_level_sample_t at = sample(i_d, i_q, 1.0);
+    at.psi_d_error = psi_d_error;
+    at.lq_error = lq_error;
+    return second_level_own_torque(&constants, &at);
+}
+
+/* psi_q = 0.4 i_q, psi_d = 0.2 + 0.1 i_d: 10 % less of psi_q are 0.04 i_q |i_d| less torque, in both directions. */
+void test_the_identified_deviations_change_the_torque_as_in_the_machine(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const double i_q = sign * 0.5;
+        TEST_ASSERT_INT32_WITHIN(6, (int32_t)lrint(ONE * (torque(-0.4, i_q) - 0.04 * i_q * 0.4)),
+                                 torque_with(-0.4, i_q, 0, -3277));
+        TEST_ASSERT_INT32_WITHIN(6, (int32_t)lrint(ONE * (torque(-0.4, i_q) - 0.02 * i_q)),
+                                 torque_with(-0.4, i_q, -655, 0));
+    }
+}
+
+/* A healthy machine makes no more than the table's torque for the monitor, and at least four fifths of it. */
+void test_the_deviations_are_believed_only_as_far_as_a_healthy_machine_can_have_them(void)
+{
+    const int32_t table = torque_with(-0.3, 0.5, 0, 0);
+    TEST_ASSERT_EQUAL_INT32(table, torque_with(-0.3, 0.5, 3000, 3000));
+    TEST_ASSERT_EQUAL_INT32(table - table / 5, torque_with(-0.3, 0.5, -32768, 0));
+    TEST_ASSERT_INT32_WITHIN(2, -(table - table / 5), torque_with(-0.3, -0.5, -32768, -32768));
+}
+
+/* Against the direction of i_q: with more reluctance torque than magnet torque, as a table may say at its edge. */
+void test_nothing_is_taken_from_a_torque_against_its_current(void)
+{
+    for (int n = 0; n < SECOND_LEVEL_ROWS * SECOND_LEVEL_COLUMNS; n++) {
+        constants.torque[n] = -3000;
+    }
+    TEST_ASSERT_EQUAL_INT32(-3000, torque_with(-0.3, 0.5, -2000, -2000));
 }
 
 void test_while_the_bridge_does_not_switch_nothing_is_reported(void)

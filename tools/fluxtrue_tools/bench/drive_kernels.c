@@ -69,6 +69,11 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = port.counts;
 }
 
+void hal_adc_latest(adc_counts_t *counts)
+{
+    *counts = port.counts;
+}
+
 int16_t hal_adc_known_permille(void)
 {
     return 1000;

@@ -8,6 +8,7 @@
 #include "ecu/arbitration.h"
 #include "ecu/supervisor.h"
 #include "fx/vec.h"
+#include "hal/adc.h"
 #include "hal/temperature.h"
 #include "scope/scope.h"
 #include "second_level/second_level.h"
@@ -254,14 +255,15 @@ CALLED void task_arbitrate(void)
 CALLED void task_second_level(void)
 {
     const drive_t *d = the_copy();
-    const fx_pair_t i_ab = snapshot.sample.i_ab;
-    const second_level_in_t in = {
-        .sample = {.alpha = (int16_t)i_ab, .beta = (int16_t)(i_ab >> 16), .theta_m = snapshot.sample.theta_m},
+    second_level_in_t in = {
+        .sample = {.theta_m = snapshot.sample.theta_m,
+                   .psi_d_error = snapshot.psi_d_error,
+                   .lq_error = fx_q15_from_q31(d->task.identification.lq_error)},
         .acting = snapshot.sample.acting,
         .slew = d->parameters.torque_slew,
-        .correction = fx_q15_from_q31(d->task.torque_loop.correction),
         .elapsed_us = 1000,
     };
+    hal_adc_latest(&in.sample.counts);
     result = second_level_step(d->motor->second_level, &second_level, &in);
 }
 

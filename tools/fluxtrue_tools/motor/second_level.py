@@ -19,7 +19,6 @@ SLOWEST_S = 0.04  # zero to full torque, by the arbitration of the first level
 HOLD_S, HOLDS = 0.02, 4  # jerk 10 ms, a cycle of the task, the answer of the currents, the mean
 CONFIRM_S, MEAN_SHIFT = 0.015, 2
 TOLERANCE_SHARE_OF_MONITOR, TOLERANCE_SHARE = 0.6, 1 / 64
-CORRECTION_MIN, CORRECTION_MAX = -0.06, 0.25  # torque of the tables that a healthy machine can need for a torque
 STANDSTILL_SHARE = 0.025  # of maximum speed
 
 
@@ -52,14 +51,19 @@ def make_second_level(motor: Motor) -> SecondLevel:
     rated = machine.torque_max_Nm / bases.torque_Nm * Q15_ONE
     slew = min(machine.torque_max_Nm / SLOWEST_S * bases.step_s, derived.torque_slew_Nm or np.inf)
     turns = config.omega_max_rad_s / machine.pole_pairs / (2.0 * np.pi) * bases.step_s
+    per_count = 2.0 ** (16 - config.inverter.adc_bits)  # q15 of the full scale, which is I_b
+    psi_f_Vs = float(motor.model.psi_d(0.0, 0.0))
+    psi_d_Vs = float(motor.model.psi_d(-bases.current_A / 2.0, 0.0))
     words = {
         "torque_per_count": round(float(motor.bus.factors["torque_Nm"]) / bases.torque_Nm * Q15_ONE * Q16_ONE),
         "torque_max": round(rated),
         "fall": max(int(slew / bases.torque_Nm * Q15_ONE), 1),
         "tolerance": round(TOLERANCE_SHARE_OF_MONITOR * derived.monitor_torque_Nm / bases.torque_Nm * Q15_ONE),
         "tolerance_share": round(TOLERANCE_SHARE * Q16_ONE),
-        "correction_min": round(CORRECTION_MIN * Q15_ONE),
-        "correction_max": round(CORRECTION_MAX * Q15_ONE),
+        "alpha_per_count": round(per_count / 3.0 * Q16_ONE),
+        "beta_per_count": round(per_count / np.sqrt(3.0) * Q16_ONE),
+        "psi_f": round(psi_f_Vs / bases.flux_Vs * Q15_ONE),
+        "l_d": round((psi_f_Vs - psi_d_Vs) / (bases.current_A / 2.0) / bases.inductance_H * Q16_ONE),
         "pole_pairs": machine.pole_pairs,
         "angle_offset": 0,
         "turn_standstill": min(round(STANDSTILL_SHARE * turns * 2.0**32), 2**31 - 1),
