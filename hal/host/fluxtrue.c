@@ -24,8 +24,8 @@
 
 void fluxtrue_init_with(fluxtrue_t *instance, const motor_t *data)
 {
-    *instance = (fluxtrue_t){
-        .data = data, .winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C, .known_share = 1.0}};
+    *instance =
+        (fluxtrue_t){.data = data, .winding_C = AMBIENT_C, .board = {.inverter_C = AMBIENT_C, .known_share = 1.0}};
     external_watchdog_start(&instance->board.external_watchdog);
     nvm_host_erase(&instance->nvm);
     instance->motor = *data;
