@@ -9,6 +9,8 @@
 #include "ecu/supervisor.c"
 
 #include "ecu/observe.c"
+#include "fx/format.c"
+#include "fx/q.c"
 
 #define STEP_MAX_US 10000U
 
