@@ -95,11 +95,11 @@ static void update_confidence(const identify_config_t *config, identify_state_t 
     state->torque_variance_q30 = fx_sat_q31(variance >> 30);
     const int64_t well_below = 3 * (kalman_output_variance_prior(&row) >> 3);
     const int32_t size = fx_abs_q15(torque);
-    const int64_t full = size * config->confidence_full; /* Q30 */
-    const int64_t none = fx_max_s32(size, config->torque_min) * config->confidence_none;
-    if (state->kept.mismatch_share > MISMATCH_MAX || (variance > 2 * well_below && variance > none * none)) {
+    const int32_t full = size * config->confidence_full; /* Q30 */
+    const int32_t none = fx_max_s32(size, config->torque_min) * config->confidence_none;
+    if (state->kept.mismatch_share > MISMATCH_MAX || (variance > 2 * well_below && variance > (int64_t)none * none)) {
         state->kept.torque_certain = false;
-    } else if (variance < well_below || variance < full * full) {
+    } else if (variance < well_below || variance < (int64_t)full * full) {
         state->kept.torque_certain = true;
     }
     const int32_t step = state->kept.torque_certain ? config->confidence_rate : -config->confidence_rate;
