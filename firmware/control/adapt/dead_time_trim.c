@@ -3,7 +3,7 @@
 
 #include "fx/div.h"
 
-#define TIME_CONSTANT_SHIFT 4      /* 16 periods until 1/e of the error is left */
+#define TIME_CONSTANT_SHIFT 4      /* 16 moves of the trim until 1/e of the error is left */
 #define VARIANCE_MAX_Q30 (1 << 28) /* a quarter of the prior's variance: half of its standard deviation */
 #define RANGE_SHIFT 2              /* base +- base/4 */
 
