@@ -196,6 +196,7 @@ typedef struct {
     int16_t known_permille; /* hal_adc_known_permille() */
     bool gates;             /* as read back: the switches follow the duties */
     bool angle_absolute;
+    bool shorted; /* drive_is_shorted() */
 } snapshot_t;
 
 /** The motor's constants that every PWM period reads, copied: in RAM they need neither a pointer nor an access to

@@ -7,7 +7,7 @@
  * Three routes lead through it. The usual one (the bridge runs, nothing is latched, counted or out of its limits) skips
  * the monitors' counters, the start of the angle tracker and the enabling of the outputs: about 60 instructions.
  *   usual        fast_isr(): the order of the block diagram, written here once
- *   not settled  run_period_not_settled(): the bridge is or was just disabled, or a fault or a counter is pending
+ *   not settled  run_period_not_settled(): the bridge is disabled or was just enabled, or a fault or counter is pending
  *   checked      run_period_checked(): a sample is out of its limits; also the second part of the route above
  * A motor whose field turns far in a period (current_control_turning.h) always takes the second one.
  * tests/unit/drive/test_fast_isr.c shows that the routes agree. */

@@ -45,7 +45,7 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
         .i = point->i,
         .i_last_period = snapshot->i_last_period,
         .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
-        .shorted = drive_is_shorted(drive),
+        .shorted = snapshot->shorted,
         .currents_valid = currents_valid(drive, snapshot),
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
         .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,

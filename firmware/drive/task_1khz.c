@@ -204,6 +204,7 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
 #endif
         snapshot->psi_d_error = drive->psi_d_error;
         snapshot->faults = drive->fast.faults;
+        snapshot->shorted = drive_is_shorted(drive);
         exchange_barrier();
     } while (drive->samples.generation != generation);
     snapshot->gates = hal_pwm_gates();

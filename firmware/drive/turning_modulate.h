@@ -7,7 +7,7 @@
  * Source   docs/theory/modulation.md (MO-12)
  * Units    knee_gain: knee_q17 times theta in 2^-10 turns; angle_step 2^32 = one turn
  * Range    knee_gain > 0
- * Rounding theta down to 2^-10 turns
+ * Rounding theta to an odd number of 2^-10 turns
  * Errors   none
  * Context  fast ISR, not its usual route; one hardware division */
 #include "control/current/modulate.h"

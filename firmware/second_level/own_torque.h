@@ -5,7 +5,8 @@
  * own.
  *   i_alpha = (2 i_a - i_b - i_c)/3, i_beta = (i_b - i_c)/sqrt(3), in counts: mid scale cancels
  *   theta_e = p theta_m + offset;  i_d = i_alpha cos + i_beta sin,  i_q = i_beta cos - i_alpha sin
- *   t = table(i_d, |i_q|) + c;     c = psi_d_error |i_q| + lq_error (table - (psi_f + l_d i_d) |i_q|), -table/5 ... 0
+ *   t = sgn(i_q) (table(i_d, |i_q|) + c)
+ *   c = psi_d_error |i_q| + lq_error (table - (psi_f + l_d i_d) |i_q|), -table/5 ... 0
  *   c is what the identified deviation of magnet and q axis takes from it: believed only where it makes the torque
  *   smaller, and as far as a healthy machine may deviate. The sign of i_q is that of the torque
  * Source   docs/theory/second-level.md (SL-3), (SL-4), (SL-8)

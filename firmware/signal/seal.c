@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "signal/seal.h"
 
+/* A word of what is sealed, of whatever type its members are. */
+typedef uint32_t __attribute__((may_alias)) sealed_word_t;
+
 uint32_t seal_of(const void *data, uint32_t size)
 {
-    const uint32_t *word = data;
+    const sealed_word_t *word = data;
     uint32_t seal = SEAL_START;
     for (uint32_t k = 0; k < size / sizeof *word; k++) {
         seal = seal_add(seal, word[k]);

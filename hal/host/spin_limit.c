@@ -16,7 +16,7 @@ bool spin_limit_step(spin_limit_t *limit, double sensor_turns, double period_s)
 {
     follow(limit, sensor_turns, period_s);
     if (limit->periods == 0U) {
-        return true;
+        return limit->failure == SPIN_GOOD;
     }
     limit->periods--;
     if (fabs(limit->rpm) > limit->rpm_max) {

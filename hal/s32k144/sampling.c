@@ -126,8 +126,9 @@ void hal_adc_read(adc_counts_t *counts)
     counts->v_dc = (uint32_t)from_adc1.second;
 }
 
-/* The conversions of the next period are far when the task begins; one that ends meanwhile repeats the reading, because
- * the fast ISR follows it (ecu.c). */
+/* The task begins 25 us after the start of a period: its conversions have ended, and the next are 75 us away. A task
+ * that begins late may read i_a and i_b of the next period with i_c of this one, because the fast ISR, after which the
+ * reading is repeated (ecu.c), follows the second conversion only. Such a sample is one of four in the mean (SL-5). */
 void hal_adc_latest(adc_counts_t *counts)
 {
     counts->i_a = ADC0->R[I_A];

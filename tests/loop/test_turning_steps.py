@@ -56,12 +56,14 @@ def test_a_step_within_one_period_overshoots_by_5_percent_at_most(prius: Motor, 
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("theta", [0.6, 1.0])
-def test_with_the_inverters_errors_it_overshoots_by_10_percent_at_most(prius: Motor, theta: float, sign: float) -> None:
+@pytest.mark.parametrize(("theta", "most"), [(0.6, 0.10), (1.0, 0.10), (1.2, 0.12)])
+def test_with_the_inverters_errors_it_overshoots_by_no_more_than_the_page_says(
+    prius: Motor, theta: float, most: float, sign: float
+) -> None:
     """Dead time, device drop and the converters' resolution; ripple included."""
     answers = steps(prius, sign * theta, SMALL)
     print(f"{sign * theta:+.1f} rad: overshoot {100 * (answers.max() - 1):.1f} %")
-    assert answers.max() <= 1.1
+    assert answers.max() <= 1.0 + most
 
 
 @pytest.mark.parametrize("theta", [0.6, 1.2])

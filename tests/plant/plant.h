@@ -69,8 +69,8 @@ void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 /** Sets the board's switches; at creation the battery is connected and the gates have their supply. */
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 
-/** One PWM period; wanted: duties 0..1 (clamped, NaN counts as 0.5). Only the diodes conduct while switching is disabled, while
- * the gates have no supply, and in a period in which the gate drivers block a short circuit. */
+/** One PWM period; wanted: duties 0..1 (clamped, NaN counts as 0.5). Only the diodes conduct while switching is
+ * disabled, while the gates have no supply, and in a period in which the gate drivers block a short circuit. */
 void plant_advance(plant_t *plant, const double wanted[3], int gates_on);
 
 const plant_truth_t *plant_truth(const plant_t *plant);

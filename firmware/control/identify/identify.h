@@ -31,6 +31,7 @@ typedef struct {
     bool clamped;        /* a state reached its limit in the last update */
     bool r_known;        /* the winding temperature is measured */
 } identify_kept_t;
+_Static_assert(sizeof(identify_kept_t) == 20U, "no bytes between the fields");
 
 typedef struct {
     uint8_t steps;

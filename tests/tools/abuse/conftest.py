@@ -62,8 +62,10 @@ def _picture(_: object, path: Path) -> None:
     path.write_bytes(b"a picture")
 
 
-def _pictures(_: object, folder: Path) -> None:
-    """Those of a motor's report take five."""
+def _pictures(*given: object) -> None:
+    """Those of a motor's report take five; the last argument is the folder."""
+    folder = given[-1]
+    assert isinstance(folder, Path)
     for name in PLOTS:
         (folder / name).write_bytes(b"a picture")
 
@@ -86,5 +88,6 @@ def stubs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         patch.setattr(os, "execve", accepted)
         patch.setattr("fluxtrue_tools.motor.map_import.plot.write", _picture)
         patch.setattr("fluxtrue_tools.motor.html.write_plots", _pictures)
+        patch.setattr("fluxtrue_tools.motor.measured.measure_loop", lambda _: None)
         patch.setattr("fluxtrue_tools.motor.html.write_report", lambda *given: _pictures(*given[::2]))
         yield

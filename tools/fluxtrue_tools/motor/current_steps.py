@@ -13,7 +13,7 @@ from fluxtrue_tools.motor.simulated import DataLoop, Simulated
 
 AXES = ("d", "q")
 STEP = 0.1  # of i_max
-BEFORE, AFTER = 10, 70  # periods shown; the slower law needs 11 periods, and the integrator 22
+BEFORE, AFTER = 10, 70  # periods shown; the slower law needs 13.5 periods, and the integrator 22
 READ = ("truth.i_d_A", "truth.i_q_A", "voltage_limited")
 
 

@@ -12,7 +12,7 @@ from fluxtrue_tools.motor.flux_model import FluxModel
 DELAY_PERIODS = 1.5  # one of computation, a half of the PWM's hold
 CLOSED_LOOP_SHARE = 0.8
 TURNING_FEEDBACK, TURNING_INTEGRAL = 0.28, 0.045  # per period (CC-18), (CC-19)
-TURNING_APPROACH = 0.08  # per period: inductances 20 % too small overshoot by less than 10 % (CC-21)
+TURNING_APPROACH = 0.08  # per period: L 20 % too small overshoots by less than 5 % with an ideal inverter (CC-21)
 SINC_SERIES_MAX = 0.6  # rad: up to here 1 + theta^2/24 is 1/sinc(theta/2), (MR-5); beyond it is fitted at maximum speed
 PAPER_TURN_MAX = 0.78  # rad at omega_b: the end of the formats of the paper's law
 V_RATIO_CONTROL = 1.04 / math.sqrt(3.0)
