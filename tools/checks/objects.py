@@ -29,6 +29,7 @@ DIVISIONS = {
     "current_control.c": 1,  # reciprocal of the measured dc voltage
     "e2e.c": 2,  # 1 kHz: the counter's turn
     "frames.c": 1,  # the same in the second level
+    "own_torque.c": 1,  # 1 kHz, second level: a fifth of the torque
     "kalman.c": 1,  # 100 Hz and axis
     "model.c": 2,  # 1 kHz: torque of the period
     "torque_estimate.c": 1,  # 1 kHz: the mean over the periods since

@@ -45,7 +45,7 @@ void kalman_predict(const identify_config_t *config, kalman_t *kalman, bool r_kn
         int32_t prior = (j == IDENTIFY_R && r_known) ? config->r_known_q30 : IDENTIFY_ONE_Q30;
         kalman->x_q27[j] -= fx_mul_q31(config->leak[j], kalman->x_q27[j]);
         for (unsigned l = j; l < IDENTIFY_STATES; l++) {
-            *p += fx_mul_q31(config->leak[j] + config->leak[l], prior - *p);
+            *p += fx_mul_q31(config->leak[j] + config->leak[l], fx_sub_q31(prior, *p));
             prior = 0;
             p++;
         }
