@@ -70,9 +70,14 @@ static inline int32_t fx_mac_q31_word(int32_t acc, q31_t a, int32_t b)
 }
 
 /* Q16 * Q15 = Q31 -> Q15. Shifting x up by 16 lets SMMULR round: (g x 2^16 + 2^31) / 2^32. */
+static inline int32_t fx_mul_gain_q15_word(q16_t gain, int32_t x)
+{
+    return fx_sat_q15_word(fx_mulhi(gain, x * 65536));
+}
+
 static inline q15_t fx_mul_gain_q15(q16_t gain, q15_t x)
 {
-    return fx_sat_q15(fx_mulhi(gain, (int32_t)x * 65536));
+    return (q15_t)fx_mul_gain_q15_word(gain, x);
 }
 
 /* Q16 * Q31 = Q47 -> Q31. */

@@ -20,7 +20,7 @@ static __attribute__((cold)) int32_t weighted_reference(const current_control_co
 {
     const int32_t l_i = fx_sat_q15_word(psi - psi_magnet);
     const int32_t reduction = l_i - fx_mul_q15(config->setpoint_weight, l_i);
-    const int32_t drop = fx_sat_q15_word(fx_mulhi(config->drop_gain, i_ref * 65536)); /* Q16 * Q31 = Q15 */
+    const int32_t drop = fx_mul_gain_q15_word(config->drop_gain, i_ref);
     return fx_sat_q15_word(psi - reduction + drop);
 }
 

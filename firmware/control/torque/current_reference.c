@@ -29,7 +29,7 @@ motor_check_t current_reference_check(const current_reference_config_t *config)
  * effect at low speed, where the voltage does not limit the flux. */
 static int32_t planned_flux(const current_reference_config_t *config, const current_reference_in_t *in)
 {
-    const int32_t drop = fx_sat_q15_word(fx_mulhi(config->r_pu, in->i_magnitude * 65536)); /* Q16 * Q31 = Q15 */
+    const int32_t drop = fx_mul_gain_q15_word(config->r_pu, in->i_magnitude);
     const int32_t voltage = fx_mul_q15(config->v_ratio, in->v_dc) - drop + in->v_trim;
     const int32_t flux = fx_usat_q15_word(voltage) * 32768 / fx_max_s32(fx_abs_q15(in->omega), 1);
     return fx_max_s32(flux - in->shift, 0);
