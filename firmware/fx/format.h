@@ -121,9 +121,14 @@ q31_t fx_abs_q31(q31_t a);
 
 /* Narrows a Q30 accumulator. The rounding half is added with saturation, so that every int32_t is allowed: the caller
  * has to show only that its sum stays in -2 ... 2 per unit. */
+static inline int32_t fx_round_q15_word(int32_t q30)
+{
+    return fx_sat_q15_word(fx_arch_qadd(q30, 0x4000) >> 15);
+}
+
 static inline q15_t fx_round_q15(int32_t q30)
 {
-    return fx_sat_q15(fx_arch_qadd(q30, 0x4000) >> 15);
+    return (q15_t)fx_round_q15_word(q30);
 }
 
 q15_t fx_q15_from_q31(q31_t x);

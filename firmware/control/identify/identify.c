@@ -156,11 +156,6 @@ static corrected_t correct(const identify_config_t *config, const identify_state
     };
 }
 
-static int32_t rounded_q15(int32_t q30)
-{
-    return fx_sat_q15_word(fx_add_q31(q30, 0x4000) >> 15);
-}
-
 identify_out_t identify_step(const identify_config_t *config, identify_state_t *state, const identify_in_t *in)
 {
     identify_check_kept(state);
@@ -173,7 +168,7 @@ identify_out_t identify_step(const identify_config_t *config, identify_state_t *
     average_step(config, state, in, &model);
     const corrected_t now = correct(config, state, &model);
     const int32_t torque = identify_mean_torque(config, &in->tables->inductances, in->point->chord_q30, &now.at);
-    const identify_out_t out = {rounded_q15(torque), rounded_q15(now.magnet_q30)};
+    const identify_out_t out = {fx_round_q15_word(torque), fx_round_q15_word(now.magnet_q30)};
     if (state->steps >= IDENTIFY_STEPS) {
         kalman_step(config, state, &model, out.torque);
     }
