@@ -306,6 +306,12 @@ static inline bool drive_is_shorted(const drive_t *drive)
 {
     return drive->fast.short_circuit.holds;
 }
+/** Below it the rotor counts as standing, of the speed base. */
+#define DRIVE_STANDSTILL Q31(0.002)
+static inline bool drive_stands_still(q31_t omega)
+{
+    return omega <= DRIVE_STANDSTILL && omega >= -DRIVE_STANDSTILL;
+}
 /** From the next step on a request to enable switching waits, while the drive is held. From the background. */
 static inline void drive_hold(drive_t *drive, bool held)
 {

@@ -4,8 +4,6 @@
 #include "control/current/transform.h"
 #include "drive/mrai/mrai_seam.h"
 
-#define STANDSTILL Q31(0.002) /* of the speed base */
-
 static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
     const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
@@ -33,8 +31,7 @@ static uint8_t contradicted_steps(const drive_t *drive)
 /* A rotor that stands induces nothing, and a bridge that does not switch makes no voltage. */
 static bool is_at_rest(const snapshot_t *snapshot)
 {
-    const q31_t omega = snapshot->sample.point.omega;
-    return !snapshot->sample.acting && !snapshot->gates && omega <= STANDSTILL && omega >= -STANDSTILL;
+    return !snapshot->sample.acting && !snapshot->gates && drive_stands_still(snapshot->sample.point.omega);
 }
 
 static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)

@@ -20,7 +20,6 @@
 #define RAMP_OUT_MS 15     /* from full torque to zero, after the time-out of 30 ms */
 #define ONE_Q30 1073741824.0F
 #define DEAD_BAND 2.5F /* counts of the requested torque on the bus */
-#define STANDSTILL Q31(0.002)
 
 /* A change per millisecond as a change per step. */
 static q31_t per_step(const step_clock_t *clock, q31_t per_ms)
@@ -42,7 +41,7 @@ void ecu_init(ecu_t *ecu, const motor_t *source)
         .jerk = per_step(&ecu->clock, slew / JERK_MS),
         .ramp_out = per_step(&ecu->clock, full / RAMP_OUT_MS) + 1,
         .dead_band = q15_from_si(DEAD_BAND * source->bus_scales.torque_Nm, source->bases.torque_Nm),
-        .omega_standstill = STANDSTILL,
+        .omega_standstill = DRIVE_STANDSTILL,
     };
     ecu_seal_rates(ecu);
     ecu_seal_flags(ecu);

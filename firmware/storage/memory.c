@@ -9,7 +9,6 @@
 #define DISTANCE_MAX_Q26 1610612736   /* 24: of chi square with 7 degrees of freedom one in a thousand */
 #define DUTY_MARGIN 0.0078125F               /* of the period */
 #define LSB_Q15 3.0517578125e-5F
-#define STANDSTILL Q31(0.002)  /* of the speed base */
 
 /* No padding: the store's checksum runs over its bytes. */
 typedef struct {
@@ -80,16 +79,11 @@ static uint32_t in_steps(const drive_t *drive, uint32_t ms)
     return (uint32_t)((float)ms * 1e-3F / drive->motor->bases.step_s + 0.5F);
 }
 
-static bool stands_still(const drive_t *drive)
-{
-    const q31_t omega = sample_box_read(&drive->samples).point.omega;
-    return omega <= STANDSTILL && omega >= -STANDSTILL;
-}
-
 static bool at_rest(const drive_t *drive)
 {
     return drive->task.run_state == RUN_STATE_OFF && drive->fast.faults == 0U &&
-           command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT && stands_still(drive);
+           command_box_read(&drive->commands)->safe != SAFE_SHORT_CIRCUIT &&
+           drive_stands_still(sample_box_read(&drive->samples).point.omega);
 }
 
 /* A save is wanted as soon as the drive has rested for long enough. */
