@@ -11,19 +11,14 @@ typedef struct {
     int32_t d, q;
 } current_t;
 
-static int32_t times_q16(q16_t gain, int32_t x)
-{
-    return (int32_t)(((int64_t)gain * x + 0x8000) >> 16);
-}
-
 /* In the rotor frame (SL-3). Counts beyond the converter's width are impossible; they would saturate. */
 static current_t rotor_current(const second_level_constants_t *constants, const second_level_sample_t *sample)
 {
     const int32_t a = (int32_t)(sample->counts.i_a & 0xFFFFU);
     const int32_t b = (int32_t)(sample->counts.i_b & 0xFFFFU);
     const int32_t c = (int32_t)(sample->counts.i_c & 0xFFFFU);
-    const q15_t alpha = fx_sat_q15(times_q16(constants->alpha_per_count, 2 * a - b - c));
-    const q15_t beta = fx_sat_q15(times_q16(constants->beta_per_count, b - c));
+    const q15_t alpha = fx_sat_q15(fx_mul_gain_q31(constants->alpha_per_count, 2 * a - b - c));
+    const q15_t beta = fx_sat_q15(fx_mul_gain_q31(constants->beta_per_count, b - c));
     const uint32_t theta_e = constants->pole_pairs * sample->theta_m + constants->angle_offset;
     const fx_sincos_t at = fx_sincos((uint16_t)((theta_e + 0x8000U) >> 16));
     return (current_t){(fx_mul_q30(alpha, at.cos) + fx_mul_q30(beta, at.sin)) >> 15,
@@ -35,7 +30,7 @@ static int32_t believed_loss(const second_level_constants_t *constants, const se
                              current_t i, int32_t table)
 {
     const q15_t i_q = fx_sat_q15(fx_abs_q31(i.q));
-    const q15_t psi_d = fx_sat_q15(constants->psi_f + times_q16(constants->l_d, i.d));
+    const q15_t psi_d = fx_sat_q15(constants->psi_f + fx_mul_gain_q31(constants->l_d, i.d));
     const q15_t q_axis = fx_sat_q15(table - fx_mul_q15(psi_d, i_q));
     const int32_t change = fx_mul_q15(fx_sat_q15(sample->psi_d_error), i_q) +
                            fx_mul_q15(fx_sat_q15(sample->lq_error), q_axis);
