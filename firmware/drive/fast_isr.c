@@ -116,12 +116,12 @@ static inline __attribute__((always_inline)) void write_duties(drive_t *drive, s
     sample->unused = false;
     fast->u_next.d = wanted.u.d;
     fast->u_next.q = wanted.u.q;
+    const modulate_config_t *modulate = (turning != NULL) ? turning : &p->modulate;
     duty_t duty;
     if (__builtin_expect(wanted.clear, 1)) {
-        duty = modulate_clear((turning != NULL) ? turning : &p->modulate, wanted.v, now->i_dq, now->advanced);
+        duty = modulate_clear(modulate, wanted.v, now->i_dq, now->advanced);
     } else {
-        const modulate_out_t made = modulate_step((turning != NULL) ? turning : &p->modulate, wanted.v, now->i_dq,
-                                                  now->advanced);
+        const modulate_out_t made = modulate_step(modulate, wanted.v, now->i_dq, now->advanced);
         duty = made.duty;
         if ((made.limited | wanted.limited) != 0U) {
             sample->voltage_limited = wanted.limited != 0U;
