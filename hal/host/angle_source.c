@@ -17,10 +17,8 @@ static bool is_same(const angle_connection_t *a, const angle_connection_t *b)
            a->imposed == b->imposed;
 }
 
-static bool is_plain(const angle_connection_t *c)
-{
-    return c->pole_pairs == 0.0 && c->offset_rad == 0.0 && !c->reversed && !c->imposed;
-}
+/* Nothing has been set. */
+static const angle_connection_t plain;
 
 static double electrical_turns(const angle_source_t *source, double pole_pairs)
 {
@@ -40,7 +38,7 @@ uint32_t angle_source_step(angle_source_t *source, const angle_source_in_t *in, 
     if (*changed) {
         source->acting = source->asked;
     }
-    if (is_plain(&source->acting)) {
+    if (is_same(&source->acting, &plain)) {
         return (uint32_t)(fraction(sensor_turns) * (TURN - 1.0));
     }
     return (uint32_t)(fraction(electrical_turns(source, in->pole_pairs) / in->pole_pairs) * (TURN - 1.0));
