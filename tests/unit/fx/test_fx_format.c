@@ -224,6 +224,7 @@ void test_narrowing_rounds_half_up_and_never_wraps_over_all_of_int32(void)
         const long double q15 = clip(half_up(x / 32768.0L), -32768.0L, 32767.0L);
         const long double q31 = clip(half_up(x / 65536.0L), -32768.0L, 32767.0L);
         expect_equal("fx_round_q15", x, 0, fx_round_q15(x), (int64_t)q15);
+        expect_equal("fx_round_q15_word", x, 0, fx_round_q15_word(x), (int64_t)q15);
         expect_equal("fx_q15_from_q31", x, 0, fx_q15_from_q31(x), (int64_t)q31);
     }
 }

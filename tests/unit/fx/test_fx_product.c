@@ -114,6 +114,7 @@ static void gain_q15(int32_t a, int32_t b)
     const long double product = (long double)a * x;
     const int64_t gain = (int64_t)clip(half_up(product / 65536.0L), -32768.0L, 32767.0L);
     expect_equal("fx_mul_gain_q15", a, x, fx_mul_gain_q15(a, x), gain);
+    expect_equal("fx_mul_gain_q15_word", a, x, fx_mul_gain_q15_word(a, x), gain);
 }
 
 void test_gains_of_q15_round_half_up_and_saturate(void)
