@@ -53,7 +53,7 @@ def movement(instruction: Instruction) -> int | None:
     return None
 
 
-def _leaves(instruction: Instruction, name: str) -> bool:
+def ends_function(instruction: Instruction, name: str) -> bool:
     """Whether the instruction ends the function: a return, or a jump through a register."""
     into_pc = name in ("pop", "ldm", "ldmia") and "pc" in instruction.operands
     return name == "bx" or into_pc or (name in ("ldr", "mov") and instruction.operands.startswith("pc"))
@@ -116,7 +116,7 @@ class _Walk:
             node.unknown.append(f"{instruction.address:#x}: sets the stack pointer")
         if self._goes_away(instruction, name, conditional, after):
             return
-        leaves = _leaves(instruction, name)
+        leaves = ends_function(instruction, name)
         if not leaves or conditional:
             # A conditional return that is not taken leaves the stack as it was.
             self.work.append((instruction.address + instruction.size, depth if leaves else after))

@@ -100,7 +100,7 @@ def table_targets(instruction: Instruction, code: Mapping[int, Instruction], mem
     return sorted(targets)
 
 
-def _leaves(instruction: Instruction, name: str) -> tuple[list[Edge], list[Call]]:
+def _return(instruction: Instruction, name: str) -> tuple[list[Edge], list[Call]]:
     through_pointer = name == "bx" and instruction.operands != "lr"
     return [Edge(None, True)], [Call(instruction.address, None)] if through_pointer else []
 
@@ -130,8 +130,8 @@ class _Builder:
         if name in ("b", "cbz", "cbnz"):
             edges, calls = self._jump(instruction)
             return edges + (follows if name != "b" or conditional else []), calls
-        if stack._leaves(instruction, name):
-            edges, calls = _leaves(instruction, name)
+        if stack.ends_function(instruction, name):
+            edges, calls = _return(instruction, name)
             return edges + (follows if conditional else []), calls
         return follows, []
 

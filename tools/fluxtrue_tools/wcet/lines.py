@@ -159,22 +159,22 @@ def statements(file: str, source: str) -> list[Statement]:
     return found
 
 
+def _source(file: str) -> str:
+    """The text of a C file; nothing of what is none, the compiler's own code for example."""
+    path = Path(file)
+    return path.read_text(encoding="utf-8") if path.is_file() and path.suffix in (".c", ".h") else ""
+
+
 @functools.cache
 def _heads(file: str) -> tuple[tuple[int, str], ...]:
     """Line and name of each function of a file."""
-    path = Path(file)
-    if not path.is_file() or path.suffix not in (".c", ".h"):
-        return ()
-    text = _plain(path.read_text(encoding="utf-8"))
+    text = _plain(_source(file))
     return tuple((text.count("\n", 0, head.start()) + 1, head.group(1)) for head in _HEAD.finditer(text))
 
 
 @functools.cache
 def _of_file(file: str) -> tuple[Statement, ...]:
-    path = Path(file)
-    if not path.is_file() or path.suffix not in (".c", ".h"):
-        return ()
-    return tuple(statements(file, path.read_text(encoding="utf-8")))
+    return tuple(statements(file, _source(file)))
 
 
 def function_at(line: Line) -> str:
