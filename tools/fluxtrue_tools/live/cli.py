@@ -17,6 +17,7 @@ from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.bus.interface import Interface, read_interface
+from fluxtrue_tools.bus.options import can_bus
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.bus_process import BusProcess, Setup
 from fluxtrue_tools.live.pace import InStep
@@ -112,15 +113,7 @@ def _serve(session: Session, port: int) -> None:
 
 @click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
-@click.option(
-    "--can-interface",
-    type=kinds.BusInterface(),
-    help="python-can interface of a bench; without it a virtual ECU is started.",
-)
-@click.option("--can-channel", type=kinds.Text(), default="can0", show_default=True)
-@click.option(
-    "--can-option", type=kinds.BusOption(), multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus."
-)
+@can_bus
 @click.option(
     "--bench",
     type=kinds.Address(),

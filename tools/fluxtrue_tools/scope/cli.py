@@ -10,6 +10,7 @@ import click
 from fluxtrue_tools import kinds, paths
 from fluxtrue_tools.a2l.elf import Description, read
 from fluxtrue_tools.bus.address import BusAddress
+from fluxtrue_tools.bus.options import can_bus
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope import export
 from fluxtrue_tools.scope.scope import DIVISOR_MAX, LEVELS, TRIGGERS, Capture, Scope, Setup, make_setup
@@ -63,15 +64,7 @@ def _tell(capture: Capture) -> None:
 
 @click.command(cls=paths.Command)
 @click.option("--motor", default="hsm1", show_default=True, help="A shipped name or a folder with a motor.toml.")
-@click.option(
-    "--can-interface",
-    type=kinds.BusInterface(),
-    help="python-can interface of a bench; without it a virtual ECU is started.",
-)
-@click.option("--can-channel", type=kinds.Text(), default="can0", show_default=True)
-@click.option(
-    "--can-option", type=kinds.BusOption(), multiple=True, metavar="NAME=VALUE", help="Further argument of can.Bus."
-)
+@can_bus
 @click.option("--bench", type=kinds.Address(), metavar="HOST:PORT",
               help="Bench channel of the virtual ECU behind that interface, for its time with --fast.")  # fmt: skip
 @click.option("--elf", type=paths.InputFile(), help="The ECU's firmware image; default: the virtual ECU's program.")
