@@ -40,11 +40,15 @@ class Text(click.ParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The text, or what it stands for."""
+        return self.read(str(value), label(param))
+
+    def read(self, text: str, name: str) -> Any:
+        """The same for a text from elsewhere; a message calls it `name`."""
         try:
-            return self.meaning(str(value))
+            return self.meaning(text)
         except ValueError:
-            shown = str(value)[:60] or "''"
-            raise FluxtrueError(f"{label(param)} {shown}: allowed: {self.wanted}") from None
+            shown = text[:60] or "''"
+            raise FluxtrueError(f"{name} {shown}: allowed: {self.wanted}") from None
 
     def meaning(self, text: str) -> Any:
         """What the text stands for; ValueError if it does not."""

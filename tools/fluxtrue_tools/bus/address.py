@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import can
-import click
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.kinds import BusOption
@@ -13,9 +12,8 @@ from fluxtrue_tools.kinds import BusOption
 
 def parse_option(text: str) -> tuple[str, Any]:
     """NAME=VALUE of --can-option; digits are a number."""
-    found = BusOption().convert(text, click.Option(["--can-option"]), None)
-    assert isinstance(found, tuple)
-    return found
+    name, value = BusOption().read(text, "--can-option")
+    return name, value
 
 
 @dataclass(frozen=True)

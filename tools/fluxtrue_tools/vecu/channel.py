@@ -5,8 +5,6 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import click
-
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.kinds import Address
 
@@ -32,7 +30,7 @@ class Channel:
     @classmethod
     def at(cls, address: str, option: str) -> "Channel":
         """A connection to HOST:PORT, the value of a command line's option."""
-        return cls(*Address().convert(address, click.Option([option]), None))
+        return cls(*Address().read(address, option))
 
     def __init__(self, host: str, port: int, timeout_s: float = TIMEOUT_S) -> None:
         self._address = host, port
