@@ -8,7 +8,7 @@ import click
 
 from fluxtrue_tools import paths
 from fluxtrue_tools.motor.map_import.cli import import_
-from fluxtrue_tools.motor.names import BUILT, PLOTS, source_files
+from fluxtrue_tools.motor.names import BUILT, PLOTS, TEXT, source_files
 from fluxtrue_tools.motor.start import start
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def check(folder: Path, plots: Path | None) -> None:
 
             write_plots(resolved, measure_loop(resolved), outputs.scratch(plots))
     _warn(resolved)
-    click.echo(files["report.txt"], nl=False)
+    click.echo(files[TEXT], nl=False)
 
 
 @motor.command(cls=paths.Command)

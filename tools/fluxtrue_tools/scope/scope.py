@@ -138,7 +138,7 @@ class Scope:
         """
         self.take(make_setup(self.signals, signals, trigger, on, level, before, samples, divisor))
 
-    def take(self, setup: "Setup") -> None:
+    def take(self, setup: Setup) -> None:
         """The same, with what has been checked before the connection."""
         for position, number in enumerate(setup.signals):
             self._user(SELECT, position, number)
