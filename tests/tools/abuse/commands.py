@@ -11,7 +11,8 @@ from functools import cache
 
 import click
 from abused import MAP, MOTOR, Content
-from samples import CAMPAIGN, FAULTS, FMEA, LIST, PORT, SCENARIO, SVD, elf, image, motor_json, recording
+from port_samples import SVD
+from samples import CAMPAIGN, FAULTS, FMEA, LIST, PORT, SCENARIO, elf, image, motor_json, recording
 
 from fluxtrue_tools import cli, paths
 

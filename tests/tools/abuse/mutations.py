@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+import port_samples
 import samples
 from abused import (
     LINES,
@@ -109,7 +110,7 @@ FILES: dict[str, dict[str, Changed]] = {
     "scope": {"image.elf": ELF}, "a2l": {"image.elf": ELF}, "target version": {"image.elf": ELF},
     "wcet": {"image.elf": unsure(IMAGES.map(lambda changed: changed[0]))},
     "log": {"drive.mf4": RECORDINGS},
-    "target registers": {"chip.svd": unsure(mutated_words(samples.SVD)), "list.toml": mutated(samples.LIST)},
+    "target registers": {"chip.svd": unsure(mutated_words(port_samples.SVD)), "list.toml": mutated(samples.LIST)},
     "target seal": {"image.elf": IMAGES},
     "target size": {"image.elf": IMAGES, "port/budget.toml": BOUNDS},
     "target fits": {"motor.json": unsure(mutated_words(samples.motor_json())), "port/budget.toml": BOUNDS},

@@ -9,6 +9,8 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+from port_samples import SCRIPT, SOURCE
+
 SCENARIO = """motor = "paper"
 duration_s = 0.01
 seed = 3
@@ -67,18 +69,6 @@ open,sensor,input open,request=0,plant.current_open_a=1;plant.vdc_gain=x0.7@5..9
 over_current,5,,50,,,60,open,paper/0/+,measured,
 """
 )
-SVD = """<device><name>CHIP</name><version>9</version><peripherals>
-<peripheral><name>TIM</name><baseAddress>0x40001000</baseAddress>
-  <interrupt><name>TIM_Overflow</name><value>7</value></interrupt>
-  <registers>
-    <register><name>SC</name><addressOffset>0x4</addressOffset><size>32</size><access>read-write</access>
-      <fields><field><name>CLK</name><bitOffset>3</bitOffset><bitWidth>2</bitWidth></field>
-              <field><name>EN</name><bitOffset>5</bitOffset><bitWidth>1</bitWidth></field></fields></register>
-    <register><name>R%s</name><dim>4</dim><dimIncrement>4</dimIncrement><addressOffset>0x10</addressOffset>
-      <size>32</size><access>read-only</access></register>
-  </registers></peripheral>
-</peripherals></device>
-"""
 LIST = """device = "CHIP"
 guard = "CHIP_REGISTERS_H"
 [blocks.tim]
@@ -97,22 +87,6 @@ timer_Hz = 112_000_000
 period_ticks_max = 65532
 dead_time_ticks_max = 4092
 dead_time_share_max = 0.125
-"""
-# An image with what `target seal` looks for.
-SOURCE = """
-__attribute__((section(".guarded"), used)) const unsigned char data[6] = {1, 2, 3, 4, 5, 6};
-__attribute__((section(".crc"), used)) const unsigned protected_crc = 0xFFFFFFFF;
-char big[1000] = {1};
-void start(void) { big[1]++; }
-"""
-SCRIPT = """
-ENTRY(start)
-SECTIONS {
-  .text 0x100 : { *(.text*) }
-  .guarded 0x1000 : { protected_start = .; *(.guarded) protected_end = .; . = ALIGN(4); KEEP(*(.crc)) }
-  .data 0x20000000 : { *(.data*) }
-  /DISCARD/ : { *(.note*) *(.comment) *(.eh_frame*) }
-}
 """
 
 

@@ -9,26 +9,11 @@ import zlib
 from pathlib import Path
 
 import pytest
+from port_samples import SCRIPT, SOURCE
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import image
 from fluxtrue_tools.target.build import ARM_CC
-
-SOURCE = """
-__attribute__((section(".guarded"), used)) const unsigned char data[6] = {1, 2, 3, 4, 5, 6};
-__attribute__((section(".crc"), used)) const unsigned protected_crc = 0xFFFFFFFF;
-char big[1000] = {1};
-void start(void) { big[1]++; }
-"""
-SCRIPT = """
-ENTRY(start)
-SECTIONS {
-  .text 0x100 : { *(.text*) }
-  .guarded 0x1000 : { protected_start = .; *(.guarded) protected_end = .; . = ALIGN(4); KEEP(*(.crc)) }
-  .data 0x20000000 : AT(0x2000) { *(.data*) }
-  /DISCARD/ : { *(.ARM*) *(.comment) }
-}
-"""
 
 
 @pytest.fixture

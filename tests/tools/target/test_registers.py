@@ -9,26 +9,13 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from port_samples import SVD
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.target import registers
 from fluxtrue_tools.target.svd import Device
 
 PORT = Path(__file__).resolve().parents[3] / "hal" / "s32k144"
-
-SVD = """<device><name>CHIP</name><version>9</version><peripherals>
-<peripheral><name>TIM</name><baseAddress>0x40001000</baseAddress>
-  <interrupt><name>TIM_Overflow</name><value>7</value></interrupt>
-  <registers>
-    <register><name>SC</name><addressOffset>0x4</addressOffset><size>32</size><access>read-write</access>
-      <fields><field><name>CLK</name><bitOffset>3</bitOffset><bitWidth>2</bitWidth></field>
-              <field><name>EN</name><bitOffset>5</bitOffset><bitWidth>1</bitWidth></field></fields></register>
-    <register><name>R%s</name><dim>4</dim><dimIncrement>4</dimIncrement><addressOffset>0x10</addressOffset>
-      <size>32</size><access>read-only</access></register>
-    <register><name>C0</name><addressOffset>0x30</addressOffset><size>32</size></register>
-    <register><name>C1</name><addressOffset>0x34</addressOffset><size>32</size></register>
-  </registers></peripheral>
-</peripherals></device>"""
 
 LIST = """
 device = "CHIP"
