@@ -66,7 +66,7 @@ double identified_clamped(const fluxtrue_t *d)
 
 double identified_confidence(const fluxtrue_t *d)
 {
-    return is_robust(d) ? (double)d->drive.task.identify.kept.confidence / 32767.0 : 1.0;
+    return is_robust(d) ? (double)d->drive.task.identification.confidence / 32767.0 : 1.0;
 }
 
 double identified_mismatch_share(const fluxtrue_t *d)

@@ -96,3 +96,15 @@ def test_the_memory_is_given_whole_and_before_the_first_period(hsm1: Motor, memo
         loop.run(1)
         with pytest.raises(FluxtrueError, match="read only"):
             loop.remember(memory)
+
+
+def test_the_torque_loop_has_no_confidence_in_recalled_values_before_they_are_confirmed(
+    hsm1: Motor, memory: bytes
+) -> None:
+    with power_on(hsm1, memory) as loop:
+        to(loop, (0.0, 0.0), (SPEED_RPM, 0.0), 0.5)
+        assert loop.get("torque_confidence") == 0.0
+        loop.set("enable", 1.0)
+        to(loop, (SPEED_RPM, 0.0), (SPEED_RPM, COMMAND_NM), 0.05)
+        to(loop, (SPEED_RPM, COMMAND_NM), (SPEED_RPM, COMMAND_NM), 0.5)
+        assert loop.get("torque_confidence") > 0.9
