@@ -14,18 +14,20 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
 
+/* What acts on the torque is zero until recalled values have been confirmed. */
 static identification_t robust_identification(const drive_t *drive, const identify_out_t *out)
 {
     const identify_config_t *config = &drive->motor->identify;
     const identify_state_t *state = &drive->task.identify;
+    const bool acts = !drive->task.recall.unconfirmed;
     return (identification_t){
         .psi_delta = identify_value(config, state, IDENTIFY_FLUX),
         .r_delta = fx_add_q31(state->kept.r_prior - config->r0, identify_value(config, state, IDENTIFY_R)),
-        .lq_error = identify_value(config, state, IDENTIFY_LQ),
+        .lq_error = acts ? identify_value(config, state, IDENTIFY_LQ) : 0,
         .torque_variance_q30 = state->torque_variance_q30,
-        .psi_d_error = (q15_t)out->psi_delta,
+        .psi_d_error = acts ? (q15_t)out->psi_delta : (q15_t)0,
         .torque_estimated = (q15_t)out->torque,
-        .confidence = drive->task.recall.unconfirmed ? (q15_t)0 : state->kept.confidence,
+        .confidence = acts ? state->kept.confidence : (q15_t)0,
         .psi_quality = variance_reduction(state, IDENTIFY_FLUX),
         .r_quality = variance_reduction(state, IDENTIFY_R),
         .psi_clamped = is_at_limit(state, IDENTIFY_FLUX),
@@ -52,7 +54,7 @@ static void robust_step(drive_t *drive, const snapshot_t *snapshot)
     drive_trim(drive, (q15_t)snapshot->sample.v_dc);
     task->identifications = task->identifications + 1U;
     task->identification = robust_identification(drive, &out);
-    task->psi_d_error = task->recall.unconfirmed ? (q15_t)0 : (q15_t)out.psi_delta;
+    task->psi_d_error = task->identification.psi_d_error;
 }
 
 void drive_identify(drive_t *drive, const snapshot_t *snapshot)

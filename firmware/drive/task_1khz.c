@@ -106,9 +106,6 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
 /* Identified |psi_q| minus the tables'. */
 static q15_t psi_q_delta(const drive_t *drive)
 {
-    if (drive->task.recall.unconfirmed) {
-        return 0;
-    }
     return fx_mul_q15(fx_q15_from_q31(drive->task.identification.lq_error), fx_abs_q15(drive->task.psi_ref.q));
 }
 

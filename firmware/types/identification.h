@@ -6,6 +6,7 @@
  *   psi_d_error  d-axis flux minus the tables' at the present current: what current control feeds forward
  *   torque_estimated  air-gap torque, mean over the last step;  torque_variance_q30  of it
  *   lq_error  scale of psi_q minus one, which the torque path adds to the tables
+ *   What acts, psi_d_error, lq_error and confidence, is 0 until recalled values have been confirmed (drive/recall.h).
  *   The paper's law identifies psi_delta and r_delta alone. Of the rest it says that the tables hold: lq_error is 0,
  *   which means not identified, psi_d_error is psi_delta, and the confidence is 1 without a variance.
  * Source   docs/theory/identification.md (ID-15) ... (ID-18); docs/theory/mrai.md

@@ -662,3 +662,39 @@ void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
                             ecu.drive.commands.slot[ecu.drive.commands.generation & 1U].faults & FAULT_TORQUE);
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
 }
+
+#define MID_SCALE 2048
+#define D_COUNTS 600 /* 0.29 of full scale against the d axis, 0.32 in the q axis */
+#define Q_COUNTS 560
+
+/* The second level's torque of one step, with these currents, after a start that has recalled this value. */
+static int32_t own_torque_after_recall(identify_index_t index, int32_t x_q27, bool confirmed)
+{
+    ecu_init(&ecu, &motor);
+    identify_record_t record = drive_identified_record(&ecu.drive);
+    record.x_q27[index] = x_q27;
+    TEST_ASSERT_TRUE(drive_recall(&ecu.drive, &record));
+    ecu.drive.task.recall.unconfirmed = !confirmed;
+    converted = (adc_counts_t){MID_SCALE - D_COUNTS, MID_SCALE + D_COUNTS / 2 + Q_COUNTS,
+                               MID_SCALE + D_COUNTS / 2 - Q_COUNTS, 0};
+    tasks(1); /* the fast ISR copies the deviation of the d axis in the periods of the next step */
+    for (int n = 0; n < NOMINAL_PERIODS; n++) {
+        fast_isr(&ecu.drive);
+    }
+    ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS].acting = true;
+    ecu_task_1khz(&ecu);
+    return ecu.second_level.mean_q8;
+}
+
+/* A machine of another record: what it says would take a fifth of the torque from the second level's. */
+void test_the_second_level_believes_recalled_values_when_they_are_confirmed(void)
+{
+    static const identify_index_t believed[] = {IDENTIFY_FLUX, IDENTIFY_LQ};
+    for (unsigned n = 0; n < sizeof believed / sizeof *believed; n++) {
+        const int32_t of_tables = own_torque_after_recall(believed[n], 0, true);
+        TEST_ASSERT_GREATER_THAN_INT32(0, of_tables);
+        const int32_t low = -3 * (int32_t)IDENTIFY_ONE_Q27;
+        TEST_ASSERT_EQUAL_INT32(of_tables, own_torque_after_recall(believed[n], low, false));
+        TEST_ASSERT_LESS_THAN_INT32(of_tables - of_tables / 20, own_torque_after_recall(believed[n], low, true));
+    }
+}
