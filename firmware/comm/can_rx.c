@@ -24,7 +24,7 @@ static bool has_crc_of_another_message(const can_frame_t *frame)
     return false;
 }
 
-static rx_result_t check(uint16_t data_id, rx_channel_t *channel, const can_frame_t *frame)
+static rx_result_t check_protection(uint16_t data_id, rx_channel_t *channel, const can_frame_t *frame)
 {
     switch (e2e_check(data_id, &channel->e2e, frame)) {
     case E2E_OK:
@@ -111,8 +111,8 @@ static rx_result_t receive(can_rx_t *rx, const bus_scales_t *scales, const can_f
     }
     rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
     const uint8_t before = channel->e2e.counter;
-    rx_result_t result = check(is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID, channel,
-                               frame);
+    const uint16_t data_id = is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID;
+    rx_result_t result = check_protection(data_id, channel, frame);
     if (result == RX_ACCEPTED) {
         const bool taken = is_command ? take_command(rx, scales, frame) : take_limits(rx, scales, frame);
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;

@@ -24,13 +24,13 @@ static void add_compensated(const modulate_config_t *config, q15_t v_dc, commiss
 }
 
 /* (CM-5): slope of the straight line that, followed by a constant, approximates the curve. */
-static int32_t knee_gain(const modulate_config_t *config, const commission_curve_t *curve)
+static int32_t fitted_knee_q17(const modulate_config_t *config, const commission_curve_t *curve)
 {
-    const int32_t gain = fx_div_q31(2, commission_knee(curve) >> 15); /* 2^17 over q15: 2^32 over counts */
-    if (gain >= fx_mul_q31(config->knee_q17, KNEE_CHANGED)) {
+    const int32_t knee_q17 = fx_div_q31(2, commission_knee(curve) >> 15); /* 2^17 over q15: 2^32 over counts */
+    if (knee_q17 >= fx_mul_q31(config->knee_q17, KNEE_CHANGED)) {
         return config->knee_q17;
     }
-    return fx_max_s32(gain, config->knee_q17 / COMPENSATION_KNEE_RANGE);
+    return fx_max_s32(knee_q17, config->knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
 static bool is_plausible(const drive_t *drive, const commission_curve_t *curve)
@@ -47,7 +47,7 @@ static bool evaluate(drive_t *drive, q15_t v_dc)
     const bool fits = commission_fit(&task->commission.data, curve);
     add_compensated(config, v_dc, curve);
     const q31_t dead_time = fx_div_q31(curve->level, v_dc * 32768);
-    const compensation_t found = {fx_round_q15(dead_time / 2), knee_gain(config, curve), true};
+    const compensation_t found = {fx_round_q15(dead_time / 2), fitted_knee_q17(config, curve), true};
     return fits && is_plausible(drive, curve) && drive_compensate(drive, &found);
 }
 

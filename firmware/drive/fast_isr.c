@@ -139,7 +139,7 @@ static __attribute__((noinline, cold)) void
 write_duties_turning(drive_t *drive, sample_t *sample, const rotor_frame_t *now, const current_control_out_t *wanted)
 {
     const modulate_config_t modulate = turning_modulate(&drive->parameters.modulate,
-                                                        drive->motor->turning_control.knee_gain, now->angle_step);
+                                                        drive->motor->turning_control.knee_turns_q27, now->angle_step);
     write_duties(drive, sample, now, *wanted, &modulate);
 }
 

@@ -24,7 +24,7 @@ static bool ratio_valid(const motor_t *m)
 /* A sample that the short check accepts must not exceed any trip level: i_normal + sum_max/3 <= i_trip. */
 static bool normal_current_valid(const monitor_config_t *c)
 {
-    const int32_t max = c->i_trip - c->zero_max - 1;
+    const int32_t max = c->i_trip - c->zero_sequence_max - 1;
     return max >= 0 && c->i_normal_squared_q30 >= 0 && c->i_normal_squared_q30 <= max * max;
 }
 
@@ -37,7 +37,7 @@ static motor_check_t monitors_check(const motor_t *m)
     if (c->v_min >= c->v_max) {
         return MOTOR_CHECK_DC_VOLTAGE_LEVELS;
     }
-    if (c->zero_max <= 0 || c->zero_max > c->sum_max / 3 || c->sum_max > 3 * Q15_MAX) {
+    if (c->zero_sequence_max <= 0 || c->zero_sequence_max > c->sum_max / 3 || c->sum_max > 3 * Q15_MAX) {
         return MOTOR_CHECK_CURRENT_SUM_LEVEL;
     }
     if (!normal_current_valid(c)) {
@@ -83,7 +83,7 @@ static motor_check_t modulate_check(const motor_t *m)
 static bool turning_gains_valid(const turning_control_config_t *c)
 {
     return c->per_period_q29 > 0 && c->approach_q32 > 0 && c->feedback_q32 > 0 && c->integral_q32 > 0 &&
-           c->drop_q29 >= 0 && c->knee_gain > 0;
+           c->drop_q29 >= 0 && c->knee_turns_q27 > 0;
 }
 
 /* Only the law for a field that turns far takes the route on which a tracker with a shift may run, and only without

@@ -30,7 +30,7 @@ static bool is_explained(const drive_t *drive, q31_t omega)
     return fx_abs_q31(e.d) <= averaged && fx_abs_q31(e.q) <= averaged;
 }
 
-static void count(const drive_t *drive, recall_t *recall, q31_t omega)
+static void count_update(const drive_t *drive, recall_t *recall, q31_t omega)
 {
     const q15_t corner = drive->motor->identify.local_corner;
     recall->agreed = is_explained(drive, omega) ? (uint8_t)(recall->agreed + 1U) : 0U;
@@ -46,7 +46,7 @@ void recall_step(drive_t *drive, q31_t omega)
         return;
     }
     if (is_telling(drive)) {
-        count(drive, recall, omega);
+        count_update(drive, recall, omega);
     }
     const bool rejected = recall->trials >= RECALL_TRIALS ||
                           drive->task.identify.contradicted_updates >= RECALL_CONTRADICTED;

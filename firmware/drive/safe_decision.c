@@ -7,7 +7,7 @@ static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 {
     const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
     return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
-           sum <= drive->motor->monitor.zero_max;
+           sum <= drive->motor->monitor.zero_sequence_max;
 }
 
 /* With the known speed of the last step. */

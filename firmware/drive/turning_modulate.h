@@ -5,13 +5,13 @@
  *   i_knee >= 1.5 |theta| c T_s/(k_0 l_min): a deviation of the current keeps its direction in the stationary frame
  *   while the rotor turns, and the compensation answers it turned by a period and a half.
  * Source   docs/theory/modulation.md (MO-12)
- * Units    knee_gain: knee_q17 times theta in 2^-10 turns; angle_step 2^32 = one turn
- * Range    knee_gain > 0
+ * Units    knee_turns_q27: knee_q17 times theta in turns; angle_step 2^32 = one turn
+ * Range    knee_turns_q27 > 0
  * Rounding theta to an odd number of 2^-10 turns
  * Errors   none
  * Context  fast ISR, not its usual route; one hardware division */
 #include "control/current/modulate.h"
 
-modulate_config_t turning_modulate(const modulate_config_t *given, int32_t knee_gain, int32_t angle_step);
+modulate_config_t turning_modulate(const modulate_config_t *given, int32_t knee_turns_q27, int32_t angle_step);
 
 #endif

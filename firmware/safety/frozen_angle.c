@@ -36,7 +36,7 @@ static dq_q15_t standing_voltage(const frozen_angle_config_t *config, frozen_ang
 }
 
 /* (MN-22); true while there is a voltage to compare with. */
-static bool follow(const frozen_angle_config_t *config, frozen_angle_state_t *state, const frozen_angle_in_t *in)
+static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_t *state, const frozen_angle_in_t *in)
 {
     const dq_q15_t u_sum = standing_voltage(config, state, in);
     state->u_standing = u_sum;
@@ -78,6 +78,6 @@ uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_sta
         *state = (frozen_angle_state_t){0};
         return 0;
     }
-    const bool changed = follow(config, state, in) && has_changed(config, state, in);
+    const bool changed = update_mean(config, state, in) && has_changed(config, state, in);
     return debounce_step(&state->frozen, changed, config->fault_steps, FAULT_ANGLE_OFFSET);
 }

@@ -39,7 +39,7 @@ static int32_t other_power(const launch_power_in_t *in, int32_t omega)
 }
 
 /* True while there is a power to compare with. */
-static bool follow(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
+static bool update_means(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
 {
     const bool moved = has_moved(config, state, in);
     const int32_t omega = moved ? 0 : fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
@@ -81,6 +81,6 @@ uint32_t launch_power_step(const launch_power_config_t *config, launch_power_sta
         *state = (launch_power_state_t){.theta_e = in->theta_e};
         return 0;
     }
-    const bool wrong = follow(config, state, in) && is_wrong(config, state, in);
+    const bool wrong = update_means(config, state, in) && is_wrong(config, state, in);
     return debounce_step(&state->wrong, wrong, config->fault_steps, FAULT_ANGLE_OFFSET);
 }

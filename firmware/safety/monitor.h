@@ -24,7 +24,7 @@ enum { MONITOR_COUNTING = 1, MONITOR_ANGLE_JUMP = 2, MONITOR_ANGLE_LOST = 4 /* t
 /** q15 in a word each unless the name says otherwise. */
 typedef struct {
     int32_t i_normal_squared_q30; /* (i_trip - sum_max/3)^2: no phase of a shorter vector exceeds i_trip */
-    int32_t zero_max;             /* a third of sum_max */
+    int32_t zero_sequence_max;    /* a third of sum_max */
     int32_t v_min, v_max;
     int32_t i_trip;
     int32_t sum_max;
@@ -46,9 +46,9 @@ typedef struct {
  * current is its projection of the vector plus a third of the phases' sum, so |i_x| <= |i| + |sum|/3. */
 static inline bool monitor_is_sample_normal(const monitor_config_t *config, fx_pair_t i, int32_t zero_q28, int32_t v_dc)
 {
-    const fx_two_words_t current = FX_LOAD_TWO(config, i_normal_squared_q30, zero_max);
-    const uint32_t zero_max = (uint32_t)current.second;
-    if ((uint32_t)fx_dot2(i, i) >= (uint32_t)current.first || (uint32_t)(zero_q28 >> 13) + zero_max >= 2U * zero_max) {
+    const fx_two_words_t current = FX_LOAD_TWO(config, i_normal_squared_q30, zero_sequence_max);
+    const uint32_t largest = (uint32_t)current.second;
+    if ((uint32_t)fx_dot2(i, i) >= (uint32_t)current.first || (uint32_t)(zero_q28 >> 13) + largest >= 2U * largest) {
         return false;
     }
     const fx_two_words_t v = FX_LOAD_TWO(config, v_min, v_max);

@@ -127,7 +127,7 @@ static uint32_t wrong_zero(const plausibility_config_t *config, plausibility_sta
 {
     const abc_q15_t i = in->phases;
     const int32_t largest = fx_max_s32(fx_max_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
-    const int32_t step = (in->at_rest && largest > config->zero_max) ? 1 : -1;
+    const int32_t step = (in->at_rest && largest > config->zero_error_max) ? 1 : -1;
     state->not_zero = (uint8_t)fx_clamp_q31(state->not_zero + step, 0, ZERO_STEPS);
     return (state->not_zero >= ZERO_STEPS) ? FAULT_INPUT : 0U;
 }

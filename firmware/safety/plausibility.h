@@ -11,7 +11,8 @@
  *   mismatch           the d-axis voltage contradicts the currents, the speed and the identified machine for 70 ms
  *   over-speed         |w| > w_trip for 5 ms
  *   over-temperature   110 ms beyond the end of a derating line
- *   zero               at rest with switching disabled, a phase current above zero_max in 50 more steps than below it
+ *   zero               at rest with switching disabled, a phase current above zero_error_max in 50 more steps than
+ *                      below it
  *   reference          a known voltage is read more than 6 % wrong in 10 steps
  *   These times are counted in steps of the task, rounded up.
  * Source   docs/theory/monitors.md (MN-1) ... (MN-5), (MN-11), (MN-12), (MN-37), (MN-38)
@@ -29,8 +30,8 @@ typedef struct {
     q15_t i_dead;  /* a phase current up to this counts as none */
     q15_t i_alive; /* a phase whose reference exceeds this must carry current */
     q15_t ripple_max;
-    q15_t zero_max;    /* of a phase current that cannot flow */
-    q15_t answer_rate; /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
+    q15_t zero_error_max; /* of a phase current that cannot flow */
+    q15_t answer_rate;    /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
     int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is cut, else five times */

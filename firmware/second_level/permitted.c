@@ -25,7 +25,7 @@ static int32_t target_of(const second_level_constants_t *constants, const second
     return battery_lost ? 0 : fx_clamp_q31(request, 0, limit_of(constants, frames, turn, sign));
 }
 
-static void follow(second_level_side_t *side, int32_t target, int32_t fall, bool next)
+static void follow_target(second_level_side_t *side, int32_t target, int32_t fall, bool next)
 {
     int32_t largest = target;
     if (next) {
@@ -50,6 +50,6 @@ void second_level_permitted_step(const second_level_constants_t *constants, seco
     if (next) {
         permitted->steps = 0;
     }
-    follow(&permitted->positive, target_of(constants, frames, turn, 1), fall, next);
-    follow(&permitted->negative, target_of(constants, frames, turn, -1), fall, next);
+    follow_target(&permitted->positive, target_of(constants, frames, turn, 1), fall, next);
+    follow_target(&permitted->negative, target_of(constants, frames, turn, -1), fall, next);
 }

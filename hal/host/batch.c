@@ -25,7 +25,7 @@ static int check_sets(const fluxtrue_t *drive, const fluxtrue_batch_t *b)
     return FLUXTRUE_OK;
 }
 
-static int check(const fluxtrue_t *drive, const fluxtrue_batch_t *b)
+static int check_batch(const fluxtrue_t *drive, const fluxtrue_batch_t *b)
 {
     if (b->periods < 0 || b->sets < 0 || b->gets < 0) {
         return FLUXTRUE_OUT_OF_RANGE;
@@ -49,7 +49,7 @@ static void set_row(fluxtrue_t *drive, const fluxtrue_batch_t *b, int row)
 
 int fluxtrue_run(fluxtrue_t *drive, const fluxtrue_batch_t *batch)
 {
-    const int code = check(drive, batch);
+    const int code = check_batch(drive, batch);
     for (int row = 0; code == FLUXTRUE_OK && row < batch->periods; row++) {
         double out[4];
         set_row(drive, batch, row);

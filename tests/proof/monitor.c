@@ -8,8 +8,8 @@
 /* The harnesses below assume this of the data; the first one shows that motor_check() guarantees it. */
 static bool is_guaranteed(const monitor_config_t *c)
 {
-    return WITHIN(c->i_trip, 1, Q15(0.8) - 1) && c->v_min < c->v_max && WITHIN(c->zero_max, 1, c->sum_max / 3) &&
-           WITHIN(c->sum_max, 3, 3 * Q15_MAX);
+    return WITHIN(c->i_trip, 1, Q15(0.8) - 1) && c->v_min < c->v_max &&
+           WITHIN(c->zero_sequence_max, 1, c->sum_max / 3) && WITHIN(c->sum_max, 3, 3 * Q15_MAX);
 }
 
 static monitor_config_t accepted_config(void)

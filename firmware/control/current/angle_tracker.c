@@ -71,12 +71,13 @@ __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *c
 /* The loop before a sample: by how much the sample was off its prediction, the speed, and the advance per period. */
 typedef struct {
     int32_t error, omega_q30, step;
-} before_t;
+} before_sample_t;
 
 /* From what the loop has made of the sample: the new prediction is the old one + step + k_p e with e = theta_e - the
  * old one, so e = difference + k_p e; each round leaves the share k_p < 1/8 of its error. */
-static __attribute__((noinline, cold)) before_t before(const angle_tracker_config_t *config,
-                                                       const angle_tracker_state_t *state, uint32_t theta_e)
+static __attribute__((noinline, cold)) before_sample_t state_before_sample(const angle_tracker_config_t *config,
+                                                                           const angle_tracker_state_t *state,
+                                                                           uint32_t theta_e)
 {
     const uint32_t step = (uint32_t)advance_at(config, state->omega_q30);
     const int32_t difference = (int32_t)(theta_e + step - state->predicted);
@@ -85,14 +86,14 @@ static __attribute__((noinline, cold)) before_t before(const angle_tracker_confi
         error = (int32_t)((uint32_t)difference + 2U * (uint32_t)fx_mulhi(config->kp, error));
     }
     const int32_t omega_q30 = fx_add2_q31(state->omega_q30, -fx_mulhi(config->ki_q29, error));
-    return (before_t){error, omega_q30, advance_at(config, omega_q30)};
+    return (before_sample_t){error, omega_q30, advance_at(config, omega_q30)};
 }
 
 /* The step of the loop is undone. */
 __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
                                                   uint32_t theta_e)
 {
-    const before_t at = before(config, state, theta_e);
+    const before_sample_t at = state_before_sample(config, state, theta_e);
     const angle_t angle = result(theta_e - (uint32_t)at.error, at.step, at.omega_q30, true);
     state->omega_q30 = at.omega_q30;
     state->predicted = angle.theta_e + (uint32_t)angle.step;
@@ -108,7 +109,7 @@ static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const
     if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * repeats <= config->repeat_max) {
         return REPEATS_UNDECIDED; /* at rest: what follows would find the same, with a hundred instructions more */
     }
-    const before_t at = before(config, state, angle->theta_e);
+    const before_sample_t at = state_before_sample(config, state, angle->theta_e);
     const int32_t step = fx_abs_q31(at.step);
     const int64_t advance = (int64_t)step * repeats;
     const int64_t behind = (at.step < 0) ? (int64_t)at.error : -(int64_t)at.error;

@@ -27,7 +27,7 @@ typedef struct {
     int32_t feedback_q32;   /* k_0 < 1/2 */
     int32_t integral_q32;   /* epsilon */
     int32_t drop_q29;       /* w_b T_s R_0 */
-    int32_t knee_gain;      /* knee_q17 of modulate.h times theta in 2^-10 turns (MO-12) */
+    int32_t knee_turns_q27; /* knee_q17 of modulate.h times theta in turns (MO-12) */
 } turning_control_config_t;
 
 typedef struct {

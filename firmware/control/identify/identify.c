@@ -48,7 +48,7 @@ static int32_t measurement_noise(const identify_config_t *config, const identify
 }
 
 /* Adds the step's share of each word of a measurement. */
-static void average(void *mean, const void *now)
+static void add_to_mean(void *mean, const void *now)
 {
     int32_t *to = mean;
     const int32_t *from = now;
@@ -63,7 +63,7 @@ static void average_step(const identify_config_t *config, identify_state_t *stat
     const bool step_valid = in->point->valid && model->current && in->enabled;
     state->kept.update_valid = (state->kept.update_valid || state->steps == 0U) && step_valid;
     model->now.noise_q30 = measurement_noise(config, in->point);
-    average(&state->mean, &model->now);
+    add_to_mean(&state->mean, &model->now);
     state->steps++;
 }
 

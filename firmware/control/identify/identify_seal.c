@@ -3,7 +3,7 @@
 #include "signal/seal.h"
 
 /* size in bytes */
-static void check(identify_state_t *state, const void *data, uint32_t size, uint32_t seal)
+static void check_seal(identify_state_t *state, const void *data, uint32_t size, uint32_t seal)
 {
     if (seal_of(data, size) != seal) {
         state->damaged = true;
@@ -12,12 +12,12 @@ static void check(identify_state_t *state, const void *data, uint32_t size, uint
 
 void identify_check_kept(identify_state_t *state)
 {
-    check(state, &state->kept, sizeof state->kept, state->seal);
+    check_seal(state, &state->kept, sizeof state->kept, state->seal);
 }
 
 void identify_check_parameters(identify_state_t *state)
 {
-    check(state, &state->kalman, sizeof state->kalman, state->kalman_seal);
+    check_seal(state, &state->kalman, sizeof state->kalman, state->kalman_seal);
 }
 
 void identify_seal_kept(identify_state_t *state)

@@ -16,7 +16,7 @@ from fluxtrue_tools.motor.derived import (
     TURNING_INTEGRAL,
     frozen_settle_s,
 )
-from fluxtrue_tools.motor.emit_c import knee_gain
+from fluxtrue_tools.motor.emit_c import knee_turns_q27
 from fluxtrue_tools.motor.motor import load_motor
 
 PHASE_MARGIN_MIN_DEG = 40.0
@@ -108,7 +108,7 @@ def test_where_the_field_turns_far_the_compensation_feeds_a_deviation_back_by_le
     motor = load_motor(write(machine={"speed_max_rpm": TURNING_RPM}, inverter={"device_drop_V": 1.0}))
     assert motor.config.is_turning
     assert motor.derived.knee_A == pytest.approx(4 * 800.0 / 4096)
-    gain = knee_gain(motor)
+    gain = knee_turns_q27(motor)
     for theta in (0.1, 0.35, 0.5):
         knee_A = 2**17 * motor.bases.current_A / (gain / (theta / (2 * math.pi) * 1024))
         assert 1.5 * theta * 8.0 * 1e-4 / (knee_A * 0.2e-3) == pytest.approx(TURNING_FEEDBACK, rel=1e-6)
@@ -116,7 +116,7 @@ def test_where_the_field_turns_far_the_compensation_feeds_a_deviation_back_by_le
 
 def test_without_an_error_of_the_inverter_the_knee_stays_as_it_is(write) -> None:
     motor = load_motor(write(machine={"speed_max_rpm": TURNING_RPM}, inverter={"dead_time_s": 0.0}))
-    assert knee_gain(motor) == 2**31 - 1
+    assert knee_turns_q27(motor) == 2**31 - 1
 
 
 def test_the_monitor_of_a_frozen_angle_waits_for_the_slower_answer(write) -> None:

@@ -392,7 +392,7 @@ void test_a_motor_whose_field_turns_far_runs_on_its_own_law(void)
                                                             .approach_q32 = Q31(0.72),
                                                             .feedback_q32 = Q31(0.56),
                                                             .integral_q32 = Q31(0.09),
-                                                            .knee_gain = INT32_MAX};
+                                                            .knee_turns_q27 = INT32_MAX};
     seam.motor.parameters.current_control.sigma_q24 = 0;
     seam.motor.parameters.current_control.integral_gain = 0;
     drive.parameters.current_control = seam.motor.parameters.current_control;

@@ -144,7 +144,7 @@ void test_torque_loop_references_and_monitors_are_the_si_values(void)
     HELD(motor_si.v_max_V / v_b, q15(motor.monitor.v_max), q15(1));
     HELD(motor_si.v_min_V / v_b, q15(motor.monitor.v_min), q15(1));
     HELD(motor_si.sum_max_A / i_b, q15(motor.monitor.sum_max), q15(1));
-    TEST_ASSERT_EQUAL_INT(motor.monitor.sum_max / 3, motor.monitor.zero_max);
+    TEST_ASSERT_EQUAL_INT(motor.monitor.sum_max / 3, motor.monitor.zero_sequence_max);
     TEST_ASSERT_TRUE(motor_si.i_trip_A < 0.8 * motor_si.current_full_scale_A);
     TEST_ASSERT_TRUE(motor_si.i_max_A < motor_si.i_trip_A);
 }

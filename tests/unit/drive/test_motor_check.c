@@ -79,13 +79,13 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(OVER_CURRENT_LEVEL, m.monitor.i_trip = Q15(0.8)) \
     X(DC_VOLTAGE_LEVELS, m.monitor.v_min = m.monitor.v_max) \
     X(UNDER_VOLTAGE_LEVEL, m.monitor.v_min = 800) /* 1/v_ratio in Q31 over 2^22 is 853 */ \
-    X(CURRENT_SUM_LEVEL, m.monitor.zero_max = 0) \
-    X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * m.monitor.zero_max - 1) \
+    X(CURRENT_SUM_LEVEL, m.monitor.zero_sequence_max = 0) \
+    X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * m.monitor.zero_sequence_max - 1) \
     X(CURRENT_SUM_LEVEL, m.monitor.sum_max = 3 * Q15_MAX + 1) \
-    X(CURRENT_SUM_LEVEL, m.monitor.zero_max = INT32_MAX; m.monitor.sum_max = INT32_MAX) \
+    X(CURRENT_SUM_LEVEL, m.monitor.zero_sequence_max = INT32_MAX; m.monitor.sum_max = INT32_MAX) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = m.monitor.i_trip * m.monitor.i_trip) \
     X(NORMAL_CURRENT_LEVEL, m.monitor.i_normal_squared_q30 = -1) \
-    X(NORMAL_CURRENT_LEVEL, m.monitor.zero_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.zero_max) \
+    X(NORMAL_CURRENT_LEVEL, m.monitor.zero_sequence_max = m.monitor.i_trip; m.monitor.sum_max = 3 * m.monitor.i_trip) \
     X(SAFE_STATE_FLUX, m.safe_state.psi_f = 0) \
     X(SAFE_STATE_LEVELS, m.safe_state.share_open = m.safe_state.share_short)
 
@@ -101,7 +101,7 @@ static const int16_t *reference(const int16_t *good, int16_t last)
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.feedback_q32 = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.integral_q32 = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.drop_q29 = -1; limit_only(&m)) \
-    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.knee_gain = 0; limit_only(&m)) \
+    X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.turning_control.knee_turns_q27 = 0; limit_only(&m)) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; limit_only(&m); m.angle_tracker.turn_shift = 2) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.sigma_q24 = 0) \
     X(CURRENT_CONTROL_GAINS, m.turning_control = turning; m.parameters.current_control.integral_gain = 0) \
@@ -179,7 +179,7 @@ static const turning_control_config_t turning = {.per_period_q29 = Q31(0.16),
                                                  .feedback_q32 = Q31(0.56),
                                                  .integral_q32 = Q31(0.09),
                                                  .drop_q29 = Q31(0.01),
-                                                 .knee_gain = 1};
+                                                 .knee_turns_q27 = 1};
 
 /* The usual law as the limit of the other one's voltage. */
 static void limit_only(motor_t *m)

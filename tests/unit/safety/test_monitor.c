@@ -3,7 +3,7 @@
 #include "unity.h"
 
 static const monitor_config_t config = {
-    .i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_max = 300, .angle_count_max = 300};
+    .i_trip = 25000, .v_max = 28000, .v_min = 10000, .sum_max = 900, .zero_sequence_max = 300, .angle_count_max = 300};
 static monitor_state_t state;
 static monitor_in_t in;
 static bool jumped;
@@ -56,12 +56,12 @@ void test_a_sample_is_normal_only_inside_every_limit(void)
     c.i_normal_squared_q30 = 10000 * 10000;
     const fx_pair_t below = fx_pair(9999, 0);
     const fx_pair_t beyond = fx_pair(0, -10000);
-    const int32_t sum = (c.zero_max - 1) * 8192;
+    const int32_t sum = (c.zero_sequence_max - 1) * 8192;
     TEST_ASSERT_TRUE(monitor_is_sample_normal(&c, below, sum, c.v_min));
     TEST_ASSERT_TRUE(monitor_is_sample_normal(&c, below, -sum, c.v_max));
     TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, beyond, 0, c.v_min));
-    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, c.zero_max * 8192, c.v_min));
-    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, -(c.zero_max + 1) * 8192, c.v_min));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, c.zero_sequence_max * 8192, c.v_min));
+    TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, -(c.zero_sequence_max + 1) * 8192, c.v_min));
     TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, 0, c.v_min - 1));
     TEST_ASSERT_FALSE(monitor_is_sample_normal(&c, below, 0, c.v_max + 1));
 }

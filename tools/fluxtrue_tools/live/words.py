@@ -68,7 +68,7 @@ TO_DO: Final[dict[str, dict[str, str]]] = {
         "under_voltage": "Check the dc supply, its contactor and its cables.",
         "current_sum": "Check the insulation of the phases and the gains of the current sensors.",
         "angle": WIRING,
-        "input": "Check the converters, their trigger and their supply.",
+        "input": "Check the converters, their trigger, reference and supply, and the zero of the current sensors.",
         "overrun": "Reset once. If it comes again, the processor has too much to do.",
         "config": REBUILD,
         "control": "Check the phases and whether the motor data belong to this machine.",

@@ -52,7 +52,7 @@ COLUMNS = 100
 INT32_MAX = 2**31 - 1
 GATE_FAULT_FLUX = 1.5  # psi_b: more than any current of the machine links
 INDENT = "    "
-ZERO_SHARE = 0.015  # of full scale: the largest zero error of a phase current (MN-38)
+ZERO_ERROR_SHARE = 0.015  # of full scale: the largest zero error of a phase current (MN-38)
 
 
 def _float(value: float) -> str:
@@ -216,8 +216,8 @@ def _current_control(motor: Motor) -> list[Row]:
     ]
 
 
-def knee_gain(motor: Motor) -> int:
-    """2^17 over the knee per 2^-10 turn; a smaller number is a wider knee."""
+def knee_turns_q27(motor: Motor) -> int:
+    """Inverse of the knee times the angle of a period in turns, Q17 times Q10; a smaller number is a wider knee."""
     per_count_A = turning_knee_A_per_rad(motor.config, motor.model) * 2.0 * math.pi / 1024.0
     wanted = 2.0**17 * motor.bases.current_A
     return INT32_MAX if wanted >= INT32_MAX * per_count_A else max(1, round(wanted / per_count_A))
@@ -234,7 +234,11 @@ def _turning_control(motor: Motor) -> list[Row]:
         ("feedback_q32", q31(2 * TURNING_FEEDBACK, "feedback"), f"{TURNING_FEEDBACK:g} per period"),
         ("integral_q32", q31(2 * TURNING_INTEGRAL, "integral"), f"{TURNING_INTEGRAL:g} per period"),
         ("drop_q29", q31(turn * motor.config.machine.r_ohm / b.resistance_ohm / 4, "drop"), "omega_b T_s R at 20 C"),
-        ("knee_gain", str(knee_gain(motor)), f"{turning_knee_A_per_rad(motor.config, motor.model):.6g} A per rad"),
+        (
+            "knee_turns_q27",
+            str(knee_turns_q27(motor)),
+            f"{turning_knee_A_per_rad(motor.config, motor.model):.6g} A per rad",
+        ),
     ]
 
 
@@ -246,8 +250,8 @@ def _modulate(motor: Motor) -> list[Row]:
     return [
         ("alpha_q31", q31(d.v_ratio, "v_ratio"), f"{d.v_ratio:.6g}"),
         ("side_q31", q31(math.sqrt(0.75) * d.v_ratio, "v_ratio"), "times sqrt(3)/2"),
-        ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_gain"), f"1/({d.knee_A:g} A)"),
-        ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_gain"), "times sqrt(3)/2"),
+        ("knee_q17", q16(2 * b.current_A / d.knee_A, "knee_q17"), f"1/({d.knee_A:g} A)"),
+        ("knee_side_q17", q16(math.sqrt(3) * b.current_A / d.knee_A, "knee_side_q17"), "times sqrt(3)/2"),
         ("dead_time_q16", dead_time, f"{d.dead_time_duty:.6g} duty"),
         ("longest_q31", (1 << 30) - 65536 * min_pulse, f"half a duty less {d.min_pulse_duty:.6g}"),
         ("nearer_rail_q31", (1 << 30) - 32768 * min_pulse, "less half of that"),
@@ -394,7 +398,7 @@ def _monitor(motor: Motor) -> list[Row]:
     sum_max = q15(d.sum_max_A / b.current_A, "sum_max")
     return [
         ("i_normal_squared_q30", q31(quiet**2 / 2, "i_normal_squared"), f"({quiet * b.current_A:.6g} A)^2"),
-        ("zero_max", sum_max // 3, "a third of sum_max"),
+        ("zero_sequence_max", sum_max // 3, "a third of sum_max"),
         ("v_min", q15(d.v_min_V / b.voltage_V, "v_min"), f"{d.v_min_V:g} V"),
         ("v_max", q15(d.v_max_V / b.voltage_V, "v_max"), f"{d.v_max_V:g} V"),
         ("i_trip", q15(d.i_trip_A / b.current_A, "i_trip"), f"{d.i_trip_A:g} A"),
@@ -427,7 +431,7 @@ def _plausibility(motor: Motor) -> list[Row]:
         ("i_dead", q15(d.phase_dead_A / b.current_A, "i_dead"), f"{d.phase_dead_A:g} A"),
         ("i_alive", q15(d.phase_alive_A / b.current_A, "i_alive"), f"{d.phase_alive_A:g} A"),
         ("ripple_max", q15(d.ripple_A / b.current_A, "ripple_max"), f"{d.ripple_A:.4g} A"),
-        ("zero_max", q15(ZERO_SHARE, "zero_max"), "of the converter's full scale"),
+        ("zero_error_max", q15(ZERO_ERROR_SHARE, "zero_error_max"), "of the converter's full scale"),
         ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
         ("omega_trip", q15(d.speed_trip_rad_s / b.omega_rad_s, "omega_trip"), f"{d.speed_trip_rad_s:.6g} rad/s"),
         ("inverter_trip_dC", str(round(10 * thermal.inverter_trip_C)), ""),
