@@ -3,8 +3,8 @@
 #define HAL_ADC_H
 /** The converters of phase currents and dc voltage.
  *   read            all of them, sampled at the same instant: the start of the PWM period
- *   latest          the same counts again, for the second level: a function of its own, so that read() remains a part
- *                   of the fast ISR
+ *   latest          the counts of the currents again, for the second level: a function of its own, so that read()
+ *                   remains a part of the fast ISR
  *   known_permille  what the converters read of a voltage that does not come from their reference, as thousandths of
  *                   what they should read: 1000 while the reference is right. A wrong reference changes all currents
  *                   alike, which nothing in them shows
@@ -21,7 +21,7 @@
 #define HAL_ADC_NOTHING_KNOWN ((int16_t)-1)
 
 void hal_adc_read(adc_counts_t *counts);
-void hal_adc_latest(adc_counts_t *counts);
+void hal_adc_latest(current_counts_t *counts);
 int16_t hal_adc_known_permille(void);
 
 #endif

@@ -131,12 +131,12 @@ static void command_drive(ecu_t *ecu)
 
 /* What a step of the second level starts from. */
 typedef struct {
-    adc_counts_t counts;
+    current_counts_t counts;
     uint32_t theta_m;
     bool acting;
 } raw_sample_t;
 
-/* The converters' counts, which the first level has not scaled, and the angle of the same period. */
+/* The currents' counts, which the first level has not scaled, and the angle of the same period. */
 static raw_sample_t read_raw_sample(const drive_t *drive)
 {
     raw_sample_t raw;

@@ -15,8 +15,9 @@
 /* (MN-1); samples without a deviation decrease the count. */
 static uint32_t deviation(const plausibility_config_t *config, plausibility_state_t *state, const plausibility_in_t *in)
 {
-    const q15_t error = fx_magnitude(fx_sat_q15(in->i.d - in->i_ref.d), fx_sat_q15(in->i.q - in->i_ref.q));
-    const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
+    const dq_q15_t i_ref = state->expected;
+    const q15_t error = fx_magnitude(fx_sat_q15(in->i.d - i_ref.d), fx_sat_q15(in->i.q - i_ref.q));
+    const q15_t current = fx_magnitude(i_ref.d, i_ref.q);
     const bool bad = error > config->e_0 + (current >> 3);
     const int32_t step = bad ? (in->voltage_limited ? 1 : DEVIATION_UNLIMITED) : -DEVIATION_UNLIMITED;
     state->deviation = (int16_t)fx_clamp_q31(state->deviation + step, 0, config->deviation_steps);
@@ -64,8 +65,8 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
                             const plausibility_in_t *in)
 {
     const int32_t e_max = config->ripple_max * 4;
-    const int32_t of_sample = distance_from_mean(&state->sample_x8, in->i, in->i_ref, e_max);
-    const int32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, in->i_ref, e_max);
+    const int32_t of_sample = distance_from_mean(&state->sample_x8, in->i, state->expected, e_max);
+    const int32_t of_step = distance_from_mean(&state->step_x8, in->i_mean, state->expected, e_max);
     state->ripple_x16 += fx_max_s32(of_sample, of_step) - (state->ripple_x16 >> 4);
     const bool bad = (state->ripple_x16 >> 4) > config->ripple_max;
     return debounce_step(&state->oscillating, bad, config->ripple_steps, FAULT_CONTROL);
@@ -103,14 +104,10 @@ static q15_t followed(q15_t from, int32_t to, q15_t rate)
 
 /* Where the field turns far in a period, current control answers so slowly that a slope of the torque would look like
  * a deviation (CC-21). */
-static plausibility_in_t against_the_answer(const plausibility_config_t *config, plausibility_state_t *state,
-                                            const plausibility_in_t *in)
+static void update_expected(const plausibility_config_t *config, dq_q15_t *expected, dq_q15_t i_ref)
 {
-    plausibility_in_t answer = *in;
-    answer.i_ref.d = followed((q15_t)state->expected.d, in->i_ref.d, config->answer_rate);
-    answer.i_ref.q = followed((q15_t)state->expected.q, in->i_ref.q, config->answer_rate);
-    state->expected = answer.i_ref;
-    return answer;
+    expected->d = followed((q15_t)expected->d, i_ref.d, config->answer_rate);
+    expected->q = followed((q15_t)expected->q, i_ref.q, config->answer_rate);
 }
 
 /* (MN-37), whether the bridge acts or not: with a wrong reference it must not begin to. */
@@ -151,7 +148,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         return faults;
     }
     faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;
-    const plausibility_in_t answer = against_the_answer(config, state, in);
-    return faults | deviation(config, state, &answer) | oscillation(config, state, &answer) |
-           stuck_sensors(config, state, in) | lost_phases(config, state, in);
+    update_expected(config, &state->expected, in->i_ref);
+    return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
+           lost_phases(config, state, in);
 }

@@ -19,7 +19,7 @@
 #include "types/samples.h"
 
 typedef struct {
-    adc_counts_t counts;
+    current_counts_t counts;
     uint32_t theta_m;    /* mechanical angle of the same instant, 2^32 = one turn */
     int32_t psi_d_error; /* identified psi_d minus the tables', q15 */
     int32_t lq_error;    /* identified scale of psi_q minus one, q15 */

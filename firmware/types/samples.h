@@ -13,6 +13,11 @@ typedef struct {
     uint32_t v_dc;
 } adc_counts_t;
 
+/** The part of them that the second level uses. */
+typedef struct {
+    uint32_t i_a, i_b, i_c;
+} current_counts_t;
+
 typedef struct {
     uint32_t a, b, c; /* 32768: upper switch on for the whole period */
 } duty_t;

@@ -36,9 +36,9 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = active->counts;
 }
 
-void hal_adc_latest(adc_counts_t *counts)
+void hal_adc_latest(current_counts_t *counts)
 {
-    *counts = active->counts;
+    *counts = (current_counts_t){active->counts.i_a, active->counts.i_b, active->counts.i_c};
 }
 
 int16_t hal_adc_known_permille(void)

@@ -129,12 +129,11 @@ void hal_adc_read(adc_counts_t *counts)
 /* The task begins 25 us after the start of a period: its conversions have ended, and the next are 75 us away. A task
  * that begins late may read i_a and i_b of the next period with i_c of this one, because the fast ISR, after which the
  * reading is repeated (ecu.c), follows the second conversion only. Such a sample is one of four in the mean (SL-5). */
-void hal_adc_latest(adc_counts_t *counts)
+void hal_adc_latest(current_counts_t *counts)
 {
     counts->i_a = ADC0->R[I_A];
     counts->i_c = ADC0->R[I_C];
     counts->i_b = ADC1->R[I_B];
-    counts->v_dc = ADC1->R[V_DC];
 }
 
 /* Disabling the block releases its locks; reading the results lets every conversion complete again. The block then

@@ -9,10 +9,10 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = (adc_counts_t){0};
 }
 
-/* Write: the same four results again, without waiting for new ones. */
-void hal_adc_latest(adc_counts_t *counts)
+/* Write: the results of the three currents again, without waiting for new ones. */
+void hal_adc_latest(current_counts_t *counts)
 {
-    *counts = (adc_counts_t){0};
+    *counts = (current_counts_t){0};
 }
 
 /* Write: a thousand times what a conversion of a known voltage gave, divided by what it should have given. The voltage

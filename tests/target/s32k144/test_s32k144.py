@@ -12,8 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from fluxtrue_tools.bench import disassembly
 from fluxtrue_tools.bench.build import have_arm_compiler
-from fluxtrue_tools.bench.figures import budget
+from fluxtrue_tools.bench.figures import budget, stack_use
+from fluxtrue_tools.bench.page import STACK_MAX
 from fluxtrue_tools.target import image
 from fluxtrue_tools.target.build import image as build_image
 
@@ -58,6 +60,13 @@ def test_the_stack_begins_at_its_top_and_ends_at_the_first_byte_of_the_ram(elf: 
     symbols = image.Image(elf).symbols
     assert struct.unpack("<I", _read(elf, 0, 4))[0] == symbols["stack_top"]
     assert symbols["stack_bottom"] == 0x1FFF_8000  # an access below this address is a fault
+
+
+def test_the_deepest_nesting_takes_at_most_half_of_the_stack(elf: Path) -> None:
+    symbols = image.Image(elf).symbols
+    uses, problems = stack_use(disassembly.read(elf), budget())
+    assert problems == []
+    assert sum(use.frame + use.stack for use in uses) <= STACK_MAX * (symbols["stack_top"] - symbols["stack_bottom"])
 
 
 def test_the_flash_configuration_leaves_the_processor_unsecured(elf: Path) -> None:

@@ -29,7 +29,7 @@ static bool fitted, supply, switching;
 static uint8_t question;
 static uint32_t answered;
 
-static adc_counts_t converted;
+static current_counts_t converted;
 static bool period_passes; /* while the counts are read */
 
 static void adc_read(adc_counts_t *counts, int calls)
@@ -38,7 +38,7 @@ static void adc_read(adc_counts_t *counts, int calls)
     *counts = (adc_counts_t){2048, 2048, 2048, 0};
 }
 
-static void adc_latest(adc_counts_t *counts, int calls)
+static void adc_latest(current_counts_t *counts, int calls)
 {
     (void)calls;
     *counts = converted;
@@ -147,7 +147,7 @@ void setUp(void)
     hal_shut_off_question_Stub(ask);
     hal_shut_off_answer_Stub(take_answer);
     hal_shut_off_supply_Stub(read_supply);
-    converted = (adc_counts_t){2048, 2048, 2048, 0};
+    converted = (current_counts_t){2048, 2048, 2048};
     period_passes = false;
     gate_fault = mailboxes_full = mrai_hangs = false;
     watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
@@ -637,7 +637,7 @@ void test_the_first_fault_freezes_the_values_before_it(void)
 /* A period that passes while the counts are read: they and the angle are taken from the next one. */
 void test_the_second_level_takes_counts_and_angle_of_the_same_period(void)
 {
-    converted = (adc_counts_t){2048, 2048 + 650, 2048 - 650, 0};
+    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
     ecu_task_1khz(&ecu);
     TEST_ASSERT_EQUAL_INT32(0, ecu.second_level.mean_q8); /* the bridge does not switch */
     period_passes = true;
@@ -651,7 +651,7 @@ void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
     sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
     sample->acting = true;
-    converted = (adc_counts_t){2048, 2048 + 650, 2048 - 650, 0};
+    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
     for (int n = 0; n < 20; n++) {
         ecu_task_1khz(&ecu);
     }
@@ -675,8 +675,8 @@ static int32_t own_torque_after_recall(identify_index_t index, int32_t x_q27, bo
     record.x_q27[index] = x_q27;
     TEST_ASSERT_TRUE(drive_recall(&ecu.drive, &record));
     ecu.drive.task.recall.unconfirmed = !confirmed;
-    converted = (adc_counts_t){MID_SCALE - D_COUNTS, MID_SCALE + D_COUNTS / 2 + Q_COUNTS,
-                               MID_SCALE + D_COUNTS / 2 - Q_COUNTS, 0};
+    converted = (current_counts_t){MID_SCALE - D_COUNTS, MID_SCALE + D_COUNTS / 2 + Q_COUNTS,
+                                   MID_SCALE + D_COUNTS / 2 - Q_COUNTS};
     tasks(1); /* the fast ISR copies the deviation of the d axis in the periods of the next step */
     for (int n = 0; n < NOMINAL_PERIODS; n++) {
         fast_isr(&ecu.drive);

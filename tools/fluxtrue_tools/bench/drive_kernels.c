@@ -69,9 +69,9 @@ void hal_adc_read(adc_counts_t *counts)
     *counts = port.counts;
 }
 
-void hal_adc_latest(adc_counts_t *counts)
+void hal_adc_latest(current_counts_t *counts)
 {
-    *counts = port.counts;
+    *counts = (current_counts_t){port.counts.i_a, port.counts.i_b, port.counts.i_c};
 }
 
 int16_t hal_adc_known_permille(void)
