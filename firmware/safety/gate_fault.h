@@ -7,8 +7,8 @@
  *   A current above i_alive although switching is disabled, while the sum of (v_dc - e) T over the steps exceeds
  *   1.5 sqrt(3) psi_b: no flux of the windings lasts that long against the dc link, so a switch is shorted. That is a
  *   gate fault, too, and needs the short circuit until the faults are reset.
- *   Contactor and gate supply may be switched off with a gate fault when the machine has no current for 50 steps with
- *   switching disabled, or is at rest (e <= v_dc/64).
+ *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
+ *   no switch is shorted and no current has flown for 50 steps with switching disabled.
  * Source   docs/theory/safe-state.md (SS-9), (SS-10)
  * Units    per unit
  * Range    every argument

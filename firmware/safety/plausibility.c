@@ -118,7 +118,8 @@ static uint32_t wrong_reference(plausibility_state_t *state, const plausibility_
     return debounce_step(&state->reference, wrong, REFERENCE_STEPS, FAULT_INPUT);
 }
 
-/* (MN-38): the zero of a current is known whenever none can flow, hence before every start. */
+/* (MN-38): the zero of a current is known whenever none can flow, hence before the first start, but not where the drive
+ * is enabled again while the machine turns. */
 static uint32_t wrong_zero(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in)
 {
