@@ -4,6 +4,7 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 #include "signal/debounce.h"
+#include "signal/mean.h"
 #include "types/faults.h"
 
 #define STANDING_ANGLE (1U << 25) /* 1/128 of a turn, 2.8 degrees */
@@ -18,11 +19,6 @@ static bool has_moved(const frozen_angle_config_t *config, const frozen_angle_st
     return in->theta_e - state->theta_e + STANDING_ANGLE > 2U * STANDING_ANGLE ||
            fx_abs_q31(in->i_ref.d - state->i_ref.d) > config->i_0 ||
            fx_abs_q31(in->i_ref.q - state->i_ref.q) > config->i_0;
-}
-
-static int32_t approach(int32_t mean, int32_t x, int shift)
-{
-    return mean + ((x - mean) >> shift);
 }
 
 /* Without the voltage that changes the flux (MN-27): references that creep by less than i_0 are no movement. */
@@ -46,15 +42,15 @@ static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_
         state->standing = 0;
     }
     const int shift = (state->standing < MOVING_STEPS) ? 0 : MEAN_SHIFT;
-    state->mean_q8.d = approach(state->mean_q8.d, u_sum.d * 256, shift);
-    state->mean_q8.q = approach(state->mean_q8.q, u_sum.q * 256, shift);
+    state->mean_q8.d = mean_step(state->mean_q8.d, u_sum.d * 256, shift);
+    state->mean_q8.q = mean_step(state->mean_q8.q, u_sum.q * 256, shift);
     if (state->standing < config->settle_steps) {
         state->standing++;
         state->first_q8 = state->mean_q8;
         return false;
     }
-    state->first_q8.d = approach(state->first_q8.d, state->mean_q8.d, FIRST_SHIFT);
-    state->first_q8.q = approach(state->first_q8.q, state->mean_q8.q, FIRST_SHIFT);
+    state->first_q8.d = mean_step(state->first_q8.d, state->mean_q8.d, FIRST_SHIFT);
+    state->first_q8.q = mean_step(state->first_q8.q, state->mean_q8.q, FIRST_SHIFT);
     return true;
 }
 

@@ -4,17 +4,13 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 #include "signal/debounce.h"
+#include "signal/mean.h"
 #include "types/faults.h"
 
 #define FAST_ANGLE (1U << 26) /* 1/64 of a turn in a step: above, the monitor of the back-EMF follows */
 #define MOVING_STEPS 4      /* the voltage that moved the currents is no part of the mean */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
-
-static int32_t approach(int32_t mean, int32_t x, int shift)
-{
-    return mean + ((x - mean) >> shift);
-}
 
 /* Products of a sum and a q15: half their size. */
 static int32_t times(int32_t sum, int32_t x)
@@ -49,16 +45,16 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
         state->steady = 0;
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
-    state->power_q8 = approach(state->power_q8, other_power(in, omega) * 256, shift);
-    state->omega_q8 = approach(state->omega_q8, omega * 256, shift);
+    state->power_q8 = mean_step(state->power_q8, other_power(in, omega) * 256, shift);
+    state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);
     if (state->steady < config->settle_steps) {
         state->steady++;
         state->first_power_q8 = state->power_q8;
         state->first_omega_q8 = state->omega_q8;
         return false;
     }
-    state->first_power_q8 = approach(state->first_power_q8, state->power_q8, FIRST_SHIFT);
-    state->first_omega_q8 = approach(state->first_omega_q8, state->omega_q8, FIRST_SHIFT);
+    state->first_power_q8 = mean_step(state->first_power_q8, state->power_q8, FIRST_SHIFT);
+    state->first_omega_q8 = mean_step(state->first_omega_q8, state->omega_q8, FIRST_SHIFT);
     return true;
 }
 
