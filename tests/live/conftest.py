@@ -74,23 +74,24 @@ def end(server: Server) -> None:
 @pytest.fixture
 def server(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
     """A server connected to a virtual ECU that has just been started."""
-    yield from _connected(Path(request.config.getoption("--vecu")), tmp_path)
+    yield from connected(Path(request.config.getoption("--vecu")), tmp_path)
 
 
 @pytest.fixture
 def refused(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
     """A server connected to a virtual ECU whose motor data fail a check."""
     program = Path(request.config.getoption("--vecu"))
-    yield from _connected(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
+    yield from connected(damaged(program, tmp_path / "refused", *BAD_FLUX), tmp_path)
 
 
 @pytest.fixture
 def free_running(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Server]:
     """A server whose simulated time does not wait for the pages."""
-    yield from _connected(Path(request.config.getoption("--vecu")), tmp_path, ())
+    yield from connected(Path(request.config.getoption("--vecu")), tmp_path, ())
 
 
-def _connected(program: Path, tmp_path: Path, further: tuple[str, ...] = ("--in-step",)) -> Iterator[Server]:
+def connected(program: Path, tmp_path: Path, further: tuple[str, ...] = ("--in-step",)) -> Iterator[Server]:
+    """A virtual ECU and a server before it."""
     with VirtualEcu(program) as ecu:
         options = (f"host={HOST}", f"port={ecu.can_port}", "tcp_tune=1")
         records = tmp_path / "records"

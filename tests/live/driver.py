@@ -61,6 +61,11 @@ class Page:
         script = "arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'));"
         self.run(script, self.find(name), value)
 
+    def press(self, name: str) -> None:
+        """Scroll a button to the middle, where the header does not cover it, and click it."""
+        self.run("arguments[0].scrollIntoView({block: 'center'})", self.find(name))
+        self.find(name).click()
+
     def drive(self, torque_Nm: float) -> None:
         """Move the slider once and wait for the torque."""
         assert self.find("torque").is_enabled()
@@ -96,6 +101,6 @@ class Page:
 
     def enabled(self) -> set[str]:
         """The visible controls that act."""
-        controls = self.browser.find_elements(By.CSS_SELECTOR, "button:enabled, input:enabled")
+        controls = self.browser.find_elements(By.CSS_SELECTOR, "button:enabled, input:enabled, select:enabled")
         return {control.get_attribute("id") or control.get_attribute("name") or "" for control in controls
                 if control.is_displayed()}  # fmt: skip

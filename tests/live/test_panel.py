@@ -17,6 +17,9 @@ from selenium.webdriver.common.keys import Keys
 from fluxtrue_tools.live.words import TO_DO, words
 
 ALWAYS = {"theme"}  # acts without a connection
+CHARTS = {"charts-pause", "charts-in", "charts-out", "charts-earlier", "charts-later"}  # change what is seen only
+SCOPE = {"type": "scope_arm", "signals": ["i_q_A"], "trigger": "manual", "on": "i_q_A", "level": 0, "before": 0.5,
+         "samples": 64, "divisor": 1}  # fmt: skip
 
 
 def test_every_word_of_the_bus_has_advice() -> None:
@@ -54,9 +57,10 @@ def test_a_page_without_control_changes_nothing_but_can_stop(page: Page) -> None
     page.browser.get(page.server.url)
     page.until(lambda: page.text("control") == "control elsewhere", "the state of control")
     assert page.text("speed-value") == "2000 rpm"
-    assert page.enabled() <= {"stop", "theme", "tune-read", "freeze"}
+    assert page.enabled() <= {"stop", "theme", "tune-read", "freeze", *CHARTS}
     for message in ({"type": "knob", "name": "speed_rpm", "value": 0}, {"type": "record", "on": True},
-                    {"type": "tune", "name": "observer_m", "value": 3}, {"type": "tune_restore"}):  # fmt: skip
+                    {"type": "tune", "name": "observer_m", "value": 3}, {"type": "tune_restore"},
+                    SCOPE, {"type": "scope_trigger"}, {"type": "scope_end"}):  # fmt: skip
         page.run("fluxtrue.say(''); fluxtrue.send(arguments[0])", message)
         page.until(lambda: page.text("message") == "another page has control", f"a refusal of {message}")
     page.find("stop").click()

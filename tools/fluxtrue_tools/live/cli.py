@@ -20,6 +20,7 @@ from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.options import can_bus
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.bus_process import BusProcess, Setup
+from fluxtrue_tools.live.oscilloscope import Oscilloscope
 from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.recorder import Recorder
 from fluxtrue_tools.live.replay import Recording, Replay, load
@@ -66,7 +67,9 @@ def _connect(source: Source, torque_max_Nm: float, session: Session, stack: cont
     if source.firmware is not None:
         answer_s = SIMULATED_ANSWER_S if is_stepped else BENCH_ANSWER_S
         held = link.standing_still if is_stepped else contextlib.nullcontext
-        session.tuning = Tuning(Xcp(source.address, answer_s, held), source.firmware)
+        xcp = Xcp(source.address, answer_s, held)
+        session.tuning = Tuning(xcp, source.firmware)
+        session.oscilloscope = Oscilloscope(xcp, source.firmware) if source.firmware.signals else None
         stack.callback(session.tuning.close)
 
 

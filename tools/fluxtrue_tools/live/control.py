@@ -11,9 +11,11 @@ from aiohttp import web
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.commander import RUNNING
+from fluxtrue_tools.live.oscilloscope import Oscilloscope, content
 from fluxtrue_tools.live.session import Session
 from fluxtrue_tools.live.stand import KNOBS
 from fluxtrue_tools.live.tuning import Tuning
+from fluxtrue_tools.scope.scope import Setup, make_setup
 
 OTHER: Final = "another page has control"
 STOPPED: Final = {True: "Stop was pressed.", False: "Stop was pressed on another page."}
@@ -44,6 +46,8 @@ def give_up(session: Session, socket: web.WebSocketResponse) -> None:
         session.hand = None
         if session.link is not None:
             session.link.act("let_go")
+        if session.oscilloscope is not None:
+            session.oscilloscope.repeats = False
 
 
 def _drive(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
@@ -151,6 +155,64 @@ async def _record(session: Session, on: bool) -> Answer:
     return {"type": "recording", "on": session.recorder.running, "file": session.last_file}
 
 
+def _wanted(scope: Oscilloscope, message: dict[str, Any]) -> Setup:
+    """What a page wants to capture, in the numbers of the firmware."""
+    names = message.get("signals")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise FluxtrueError("signals: not a list of names")
+    whole = {}
+    for name in ("samples", "divisor"):
+        whole[name] = int(value := number(message.get(name), name))
+        if whole[name] != value:
+            raise FluxtrueError(f"{name} {value:g}: not a whole number")
+    trigger, on = str(message.get("trigger")), str(message.get("on") or names[0] if names else "")
+    return make_setup(scope.signals, names, trigger, on, number(message.get("level"), "level"),
+                      number(message.get("before"), "before"), whole["samples"], whole["divisor"])  # fmt: skip
+
+
+async def _told(text: str) -> Answer:
+    """An answer that the page shows where its oscilloscope is operated."""
+    return {"type": "scope", "text": text}
+
+
+async def _scoped(scope: Oscilloscope, call: Any, *values: Any) -> Answer:
+    try:
+        await asyncio.get_running_loop().run_in_executor(scope.thread, call, *values)
+    except FluxtrueError as error:
+        return await _told(str(error))
+    return await _told("")
+
+
+def _capture(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer]:
+    scope = session.oscilloscope
+    if scope is None:
+        raise FluxtrueError("no oscilloscope: the ECU's ELF file is not known (--elf)")
+    match message["type"]:
+        case "scope_arm":
+            try:
+                wanted = _wanted(scope, message)
+            except FluxtrueError as error:
+                return _told(str(error))
+            take(session, socket)
+            return _scoped(scope, scope.arm, wanted, bool(message.get("repeat")))
+        case "scope_trigger":
+            take(session, socket)
+            return _scoped(scope, scope.trigger)
+        case "scope_end":
+            take(session, socket)
+            return _scoped(scope, scope.end)
+        case _:
+            return _newest(scope)
+
+
+async def _newest(scope: Oscilloscope) -> Answer:
+    """The newest capture: any page may see it."""
+    told, newest = scope.told, scope.newest
+    if newest is None:
+        raise FluxtrueError("no capture has been read")
+    return {"type": "capture", "number": told.capture, **await asyncio.to_thread(content, newest)}
+
+
 def _replay(session: Session, message: dict[str, Any]) -> None:
     if session.replay is None:
         raise FluxtrueError("not a replay")
@@ -173,6 +235,8 @@ def obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any
             return _tune(session, socket, message)
         case "tune_list" | "freeze":
             return _read(session, message)
+        case "scope_arm" | "scope_trigger" | "scope_end" | "capture":
+            return _capture(session, socket, message)
         case "record":
             if session.link is None:
                 raise FluxtrueError("a replay is not recorded")

@@ -19,8 +19,10 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.control import give_up, obey
+from fluxtrue_tools.live.downloads import capture_file
+from fluxtrue_tools.live.oscilloscope import watch
 from fluxtrue_tools.live.pace import InStep
-from fluxtrue_tools.live.session import Session
+from fluxtrue_tools.live.session import SESSION, Session
 from fluxtrue_tools.live.stand import KNOBS
 
 HOST: Final = "127.0.0.1"
@@ -34,7 +36,6 @@ PAGE: Final = Path(__file__).parent / "static"
 REFUSED: Final = (FluxtrueError, ValueError, RecursionError, OSError)  # bad JSON and a full disk among them
 POLICY: Final = ("default-src 'self'; img-src 'self' data:; style-src 'self' 'unsafe-inline'; "
                  "frame-ancestors 'none'")  # fmt: skip
-SESSION: Final = web.AppKey("session", Session)
 
 
 @web.middleware
@@ -63,7 +64,8 @@ async def _page(request: web.Request) -> web.FileResponse:
 def _hello(session: Session) -> dict[str, Any]:
     knobs = session.link.status().knobs if session.link is not None else ()
     stand = {name: [KNOBS[name].lo, KNOBS[name].hi] for name, _ in knobs}
-    return {"type": "hello", "title": session.title, "torque_max_Nm": session.torque_max_Nm,
+    offer = session.oscilloscope.offer() if session.oscilloscope is not None else None
+    return {"type": "hello", "title": session.title, "torque_max_Nm": session.torque_max_Nm, "scope": offer,
             "factors": session.samples.factors(), "replay": session.link is None,
             "tuning": session.tuning is not None, "stand": stand, "words": session.words,
             "stale_s": session.wall_s(STALE_S)}  # fmt: skip
@@ -123,6 +125,7 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
     if number % SLOW_EVERY == 0 or status != session.told:
         session.told = status
         batch["last"] = session.samples.last()
+        batch["scope"] = asdict(session.oscilloscope.told) if session.oscilloscope is not None else None
         batch["status"] = {**asdict(status), "knobs": dict(status.knobs), "recording": session.recorder.running}
     if session.replay is not None:
         batch["replay"] = session.replay.state()
@@ -186,15 +189,18 @@ async def _change(session: Session) -> None:
 async def _background(app: web.Application) -> Any:
     session = app[SESSION]
     in_step = session.in_step
-    task = asyncio.create_task(_broadcast_in_step(session, in_step) if in_step else _broadcast(session))
+    tasks = [asyncio.create_task(_broadcast_in_step(session, in_step) if in_step else _broadcast(session))]
+    if session.oscilloscope is not None:
+        tasks.append(asyncio.create_task(watch(session.oscilloscope, lambda: not session.status().state)))
     yield
     if in_step is not None:
         in_step.release()
     for sent in session.sending.values():
         sent.cancel()
-    task.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await task
+    for task in tasks:
+        task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await task
 
 
 async def _farewell(app: web.Application) -> None:
@@ -210,6 +216,7 @@ def make_app(session: Session) -> web.Application:
     plotter = importlib.resources.files("uplot") / "static"
     app.router.add_get("/", _page)
     app.router.add_get("/ws", _viewer)
+    app.router.add_get("/capture.{kind:csv|mf4}", capture_file)
     app.router.add_static("/uplot", Path(str(plotter)))
     app.router.add_static("/static", PAGE)
     app.cleanup_ctx.append(_background)

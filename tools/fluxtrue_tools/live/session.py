@@ -4,11 +4,12 @@
 import asyncio
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from aiohttp import web
 
 from fluxtrue_tools.live.link import Status
+from fluxtrue_tools.live.oscilloscope import Oscilloscope
 from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.recorder import Recorder
 from fluxtrue_tools.live.replay import Replay
@@ -38,6 +39,7 @@ class Session:
     link: BusSide | None = None  # None in a replay, where nothing can be commanded
     replay: Replay | None = None
     tuning: Tuning | None = None
+    oscilloscope: Oscilloscope | None = None
     in_step: InStep | None = None  # simulated time waits for the pages
     viewers: list[web.WebSocketResponse] = field(default_factory=list)
     drawn: dict[web.WebSocketResponse, int] = field(default_factory=dict)  # number of the last batch, page by page
@@ -58,3 +60,6 @@ class Session:
     def wall_s(self, seconds: float) -> float | None:
         """A time-out by the wall clock: none where simulated time waits for the pages."""
         return None if self.in_step is not None else seconds
+
+
+SESSION: Final = web.AppKey("session", Session)

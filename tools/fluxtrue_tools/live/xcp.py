@@ -3,13 +3,13 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from typing import Final
 
 from pyxcp.config import create_application_from_config
 from pyxcp.master import Master
-from pyxcp.types import XcpResponseError, XcpTimeoutError
+from pyxcp.types import Command, XcpResponseError, XcpTimeoutError
 
 from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
 from fluxtrue_tools.bus.address import BusAddress
@@ -17,7 +17,10 @@ from fluxtrue_tools.errors import FluxtrueError
 
 BENCH_ANSWER_S: Final = 2.0
 SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, independent of simulated time: it only ends a hang
+CLOSE_S: Final = 1.0  # for the call that is in progress when the session ends
 CHUNK: Final = 7  # bytes of an answer
+NEGATIVE: Final = bytes((0xFE, 0x00))  # put into the queue of answers to end a wait
+SILENT: Final = "the inverter does not answer any more"
 
 
 def _key(resource: int, seed: bytes) -> bytes:
@@ -50,14 +53,17 @@ class Xcp:
                  standing_still: Callable[[], AbstractContextManager[None]] = nullcontext) -> None:  # fmt: skip
         self._address, self._answer_s, self._standing_still = address, answer_s, standing_still
         self._master: Master | None = None
+        self._made: Master | None = None  # the same, from before it is connected
+        self.is_abandoned = False
         self._stack = ExitStack()  # closes the connection
+        self.is_busy = False  # a call is in progress
         self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="xcp")
 
     def master(self) -> Master:
         """The connected, unlocked master."""
         if self._master is None:
             with self._standing_still():
-                master = self._stack.enter_context(_connect(self._address, self._answer_s))
+                self._made = master = self._stack.enter_context(_connect(self._address, self._answer_s))
             master.connect()
             master.cond_unlock()
             self._master = master
@@ -67,15 +73,38 @@ class Xcp:
     def reported(self) -> Iterator[None]:
         """What goes wrong becomes one message. After an ECU that did not answer, which may have been reset, the next
         call connects again."""
+        self.is_busy = True
         try:
             yield
         except XcpResponseError as error:
-            raise FluxtrueError(f"XCP: {error}") from error
+            if not self.is_abandoned:
+                raise FluxtrueError(f"XCP: {error}") from error
+            self._disconnect()
+            raise FluxtrueError(f"XCP: {SILENT}") from error
         except (XcpTimeoutError, OSError, RuntimeError) as error:
-            self._master = None
-            with suppress(XcpTimeoutError, OSError, RuntimeError):
-                self._stack.close()
+            self._disconnect()
             raise FluxtrueError(f"XCP: {error}") from error
+        finally:
+            self.is_busy = False
+
+    def _disconnect(self) -> None:
+        self._master, self._made, self.is_abandoned = None, None, False
+        with suppress(XcpTimeoutError, OSError, RuntimeError):
+            self._stack.close()
+
+    def abandon(self) -> None:
+        """End the wait of a call for an inverter that is silent; before a virtual ECU that has ended it would be
+        without end. Any thread."""
+        made = self._made
+        if made is not None and self.is_busy:
+            self.is_abandoned = True
+            with made.transport.resQueue_condition:
+                made.transport.resQueue.append(NEGATIVE)
+                made.transport.resQueue_condition.notify()
+
+    def command(self, *data: int) -> bytes:
+        """One command as its bytes; the positive answer without its first byte."""
+        return bytes(self.master().transport.request(Command(data[0]), *data[1:]))
 
     def read(self, address: int, size: int) -> bytes:
         """Some bytes of the ECU."""
@@ -85,6 +114,8 @@ class Xcp:
         return data
 
     def close(self) -> None:
-        """End the session."""
-        self.thread.submit(self._stack.close).result()
+        """End the session, and a call that may wait for an ECU that has ended."""
+        closed = self.thread.submit(self._stack.close)
+        while not wait((closed,), CLOSE_S).done:
+            self.abandon()
         self.thread.shutdown()

@@ -191,16 +191,22 @@ class Scope:
             got["trigger_period"],
         )  # fmt: skip
 
+    def progress(self) -> Status:
+        """How far the capture is that was armed. FluxtrueError if it was given up: a fault may have left a freeze frame
+        in its place."""
+        status = self.status()
+        if self._armed is not None and status.number != self._armed.number:
+            self._armed = None
+            what = "a fault has come first: read() has its freeze frame" if status.is_freeze_frame else (
+                "another XCP master has armed the scope")  # fmt: skip
+            raise FluxtrueError(f"the capture was given up: {what}")
+        return status
+
     def until_complete(self, seconds: float) -> Status:
-        """Wait until the capture that was armed is complete. A fault may leave a freeze frame in its place."""
+        """Wait until the capture that was armed is complete."""
         waited_s = 0.0
         while True:
-            status = self.status()
-            if self._armed is not None and status.number != self._armed.number:
-                self._armed = None
-                what = "a fault has come first: read() has its freeze frame" if status.is_freeze_frame else (
-                    "another XCP master has armed the scope")  # fmt: skip
-                raise FluxtrueError(f"the capture was given up: {what}")
+            status = self.progress()
             if status.state in ("done", "idle"):
                 return status
             if waited_s >= seconds:

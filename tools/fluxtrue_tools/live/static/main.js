@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the parts of the page together: one view of what the server has said, shown by every part.
-import { chartsChanged, startCharts, stats } from "./charts.js";
+import { onCapture } from "./capture.js";
+import { chartsChanged, showCharts, startCharts, stats } from "./charts.js";
 import { arrived, connect, isStale, send, sendText, setStale, showConnection, tellDrawn, watch } from "./connection.js";
 import { showControl } from "./control.js";
 import { showFaults, startFaults } from "./faults.js";
 import { showFreezeFrame } from "./freeze.js";
 import { showNumbers, startNumbers } from "./numbers.js";
+import { offerScope, onScope, showScope, startScope } from "./oscilloscope.js";
 import { say, show } from "./page.js";
 import { onParameters, showParameters, startParameters } from "./parameters.js";
-import { recolor } from "./plot.js";
+import { ranges, recolor } from "./plot.js";
 import { onRecording, showRecording, startRecording } from "./recording.js";
 import { showReasons } from "./reasons.js";
 import { showReplay, startReplay } from "./replay.js";
@@ -17,9 +19,10 @@ import { setStandRange, showStand, startStand } from "./stand.js";
 import { startTheme } from "./theme.js";
 import { setTorqueRange, showTorque, startTorque } from "./torque.js";
 
-const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, showParameters, showRecording, showControl];
-const NONE = { replay: false, tuning: false, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
-const said = { hello: NONE, status: null, last: null, control: "free" };
+const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, showParameters, showRecording, showControl,
+  showCharts, showScope];
+const NONE = { replay: false, scope: null, tuning: false, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
+const said = { hello: NONE, status: null, last: null, scope: null, control: "free" };
 
 // What the parts show. A page to which the server speaks is present. If the inverter does, too, it is live; otherwise
 // it shows no values, and none of its controls acts but the end of a recording.
@@ -38,11 +41,12 @@ function showAll() {
 }
 
 function onHello(hello) {
-  Object.assign(said, { hello, status: null, last: null, control: "free" });
+  Object.assign(said, { hello, status: null, last: null, scope: null, control: "free" });
   show("title", hello.title);
   setStale(hello.stale_s);
   setTorqueRange(hello);
   setStandRange(hello);
+  offerScope(hello);
   startCharts();
 }
 
@@ -52,10 +56,10 @@ function onRows(message) {
   stats.batches++;
   arrived(message.batch);
   said.control = message.control;
-  if (message.status) Object.assign(said, { status: message.status, last: message.last });
+  if (message.status) Object.assign(said, { status: message.status, last: message.last, scope: message.scope });
   if (message.status || control !== said.control) showAll();
   showReplay(message.replay);
-  chartsChanged();
+  chartsChanged(message.run);
   if (document.hidden) tellDrawn();
 }
 
@@ -65,12 +69,14 @@ const HANDLERS = {
   refused: (message) => say(message.text),
   recording: onRecording,
   parameters: onParameters,
+  scope: onScope,
+  capture: onCapture,
   freeze: (message) => showFreezeFrame(said.hello, message),
 };
 
-[startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay].forEach((start) => start());
+[startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay, startScope].forEach((start) => start());
 startTheme(recolor);
 document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
 connect((message) => HANDLERS[message.type](message), showAll);
 watch(showAll);
-window.fluxtrue = { rings, stats, send, sendText, say }; // read by the browser tests
+window.fluxtrue = { ranges, rings, stats, send, sendText, say }; // read by the browser tests

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page's oscilloscope: one capture at a time, over the XCP session that also tunes."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pyxcp.types import XcpResponseError
+
+from fluxtrue_tools.a2l.elf import Description
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.live.xcp import Xcp
+from fluxtrue_tools.scope.scope import LEVELS, SIGNALS_MAX, TRIGGERS, WORDS, Capture, Scope, Setup
+from fluxtrue_tools.scope.spectrum import SAMPLES_MIN, spectrum_of
+from fluxtrue_tools.scope.xcp import XcpRefused
+
+POLL_S: Final = 0.1  # between two readings of the capture's state
+WAITING: Final = ("armed", "triggered")
+DIGITS: Final = 6  # of a sample; the converter has fewer
+HELD: Final = ("Nothing was armed: the inverter still holds a freeze frame or the capture of another tool. "
+               "Press End to discard it.")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Told:
+    """What every page shows of the oscilloscope."""
+
+    state: str = "idle"  # idle, armed, triggered, reading
+    capture: int = 0  # how many captures have been read: a page asks for the newest when this has changed
+    text: str = ""
+
+
+class _Commands:
+    """The session as the scope's XCP master."""
+
+    def __init__(self, xcp: Xcp) -> None:
+        self._xcp = xcp
+
+    def command(self, *data: int) -> bytes:
+        """One command and its answer."""
+        try:
+            return self._xcp.command(*data)
+        except XcpResponseError as error:
+            if self._xcp.is_abandoned:
+                raise
+            raise XcpRefused(data[0], int(error.args[0])) from error
+
+    def pass_time(self, seconds: float) -> None:
+        """Time passes on the bench, or by the process that commands."""
+        time.sleep(seconds)
+
+
+def _rounded(column: NDArray[np.float64]) -> list[float]:
+    return [float(f"{value:.{DIGITS}g}") for value in column]
+
+
+def content(capture: Capture) -> dict[str, Any]:
+    """A capture and its spectrum as the pages draw them."""
+    step_s = float(capture.time_s[1] - capture.time_s[0]) if len(capture.time_s) > 1 else 0.0
+    answer = {"trigger": capture.trigger, "step_s": step_s, "is_freeze_frame": capture.is_freeze_frame,
+              "units": capture.units, "spectrum": None,
+              "columns": {name: _rounded(column) for name, column in capture.columns.items()}}  # fmt: skip
+    if len(capture.time_s) >= SAMPLES_MIN:
+        spectrum = spectrum_of(capture)
+        columns = {name: _rounded(column) for name, column in spectrum.columns.items()}
+        answer["spectrum"] = {"step_Hz": spectrum.step_Hz, "columns": columns}
+    return answer
+
+
+class Oscilloscope:
+    """Arms, follows and reads captures. The calls that need the ECU run in `thread`."""
+
+    def __init__(self, xcp: Xcp, description: Description) -> None:
+        self._xcp = xcp
+        self._scope = Scope(_Commands(xcp), description)
+        self._period_s = description.period_s
+        self._setup: Setup | None = None
+        self.repeats = False
+        self.told = Told()
+        self.newest: Capture | None = None
+
+    @property
+    def thread(self) -> ThreadPoolExecutor:
+        """Where the calls run."""
+        return self._xcp.thread
+
+    @property
+    def signals(self) -> dict[str, Any]:
+        """What can be captured, by name."""
+        return self._scope.signals
+
+    def offer(self) -> dict[str, Any]:
+        """What the page lets the user choose from."""
+        signals = [{"name": signal.name, "text": signal.text, "unit": signal.base.unit}
+                   for signal in self._scope.signals.values()]  # fmt: skip
+        return {"signals": signals, "signals_max": SIGNALS_MAX, "words": WORDS, "triggers": TRIGGERS,
+                "levels": LEVELS, "period_s": self._period_s}  # fmt: skip
+
+    def arm(self, setup: Setup, repeats: bool) -> None:
+        """Start a capture, in place of one that still waits for its trigger."""
+        self.repeats = False
+        with self._xcp.reported():
+            if self.told.state in WAITING:
+                self._scope.give_up()
+                self.told = replace(self.told, state="idle")
+            self._arm(setup)
+        self._setup, self.repeats = setup, repeats
+
+    def _arm(self, setup: Setup) -> None:
+        self._scope.take(setup)
+        try:
+            self._scope.arm()
+        except FluxtrueError as error:
+            raise FluxtrueError(HELD) if isinstance(error.__cause__, XcpRefused) else error from error
+        self.told = replace(self.told, state="armed", text="")
+
+    def trigger(self) -> None:
+        """Trigger now."""
+        with self._xcp.reported():
+            self._scope.trigger()
+
+    def end(self) -> None:
+        """Give the capture up, also one that another tool or a fault has left in the ECU."""
+        self.repeats = False
+        with self._xcp.reported():
+            self._scope.stop()
+        self.told = replace(self.told, state="idle", text="The inverter holds no capture any more.")
+
+    def abandon(self) -> None:
+        """No call waits for an inverter that is silent. Any thread."""
+        self._xcp.abandon()
+
+    def follow(self) -> None:
+        """Read the state of the capture that was armed, and the capture when it is complete."""
+        if self.told.state not in WAITING:
+            return
+        try:
+            with self._xcp.reported():
+                self._follow()
+        except FluxtrueError as error:
+            self.repeats = False
+            self.told = replace(self.told, state="idle", text=str(error))
+
+    def _follow(self) -> None:
+        try:
+            status = self._scope.progress()
+        except FluxtrueError:
+            status = self._scope.status()
+            if not status.is_freeze_frame:
+                raise
+            self.repeats = False  # a fault has come first; its freeze frame is read in place of the capture
+        if status.state == "idle":
+            raise FluxtrueError("another tool has ended the capture")
+        if status.state != "done":
+            self.told = replace(self.told, state=status.state)
+            return
+        self.told = replace(self.told, state="reading")
+        self.newest = self._scope.read()
+        text = "A fault came first: these are the periods around it." if self.newest.is_freeze_frame else ""
+        self.told = Told("idle", self.told.capture + 1, text)
+        if self.repeats and self._setup is not None:
+            self._arm(self._setup)
+
+
+async def watch(oscilloscope: Oscilloscope, is_silent: Callable[[], bool]) -> None:
+    """Follow the captures; no call waits for an inverter that is silent."""
+    run = asyncio.get_running_loop().run_in_executor
+    following: asyncio.Future[None] | None = None
+    while True:
+        await asyncio.sleep(POLL_S)
+        if is_silent():
+            oscilloscope.abandon()
+        elif following is None or following.done():
+            following = run(oscilloscope.thread, oscilloscope.follow)
