@@ -9,6 +9,7 @@ import numpy as np
 from fluxtrue_tools.motor.envelope import available_flux
 from fluxtrue_tools.motor.flux_model import Array, flux
 from fluxtrue_tools.motor.motor import Motor
+from fluxtrue_tools.motor.references import at_flux
 
 SPEEDS, TORQUES = 100, 80
 SPEED_MIN_SHARE = 0.02  # of top speed: at standstill every efficiency is zero
@@ -46,7 +47,7 @@ def losses(motor: Motor) -> Losses:
     torque = np.linspace(machine.torque_max_Nm / TORQUES, machine.torque_max_Nm * (1 - 1e-6), TORQUES)
     omega = speed * machine.pole_pairs * 2 * math.pi / 60
     psi = available_flux(motor, speed)
-    i_d, i_q = np.array([contour.at(psi) for contour in motor.solver.contours(torque)]).transpose(1, 0, 2)
+    i_d, i_q = at_flux(motor.solver.contours(torque), psi)
     possible = torque[:, None] <= motor.limits.torque_max(psi)[None, :]
     i = np.where(possible, np.hypot(i_d, i_q), np.nan)
     iron = machine.iron_loss_hysteresis * omega + machine.iron_loss_eddy * omega**2

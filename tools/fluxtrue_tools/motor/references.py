@@ -2,10 +2,10 @@
 """MTPA, field weakening and MTPV over (torque, available flux), docs/theory/current-reference.md."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.sparse import coo_matrix, identity
 from scipy.sparse.linalg import spsolve
 
@@ -13,6 +13,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bases import Bases
 from fluxtrue_tools.motor.flux_model import Array, FluxModel, flux, torque
 from fluxtrue_tools.motor.flux_tables import IntTable, bilinear
+from fluxtrue_tools.motor.pchip import pchips
 from fluxtrue_tools.motor.quantise import Q15_ONE, q15_table
 
 SHIFT_COARSE, SHIFT_FINE = 10, 8  # node spacing 2^shift q15 counts on both axes
@@ -32,12 +33,22 @@ class Contour:
     psi_Vs: Array  # falling
 
     def at(self, psi_Vs: Array) -> tuple[Array, Array]:
-        """The point with the smallest current whose flux is psi or less (clamped to the ends)."""
-        if len(self.id_A) < 2:
-            return np.full_like(psi_Vs, self.id_A[0]), np.full_like(psi_Vs, self.iq_A[0])
-        psi = np.clip(psi_Vs, self.psi_Vs[-1], self.psi_Vs[0])
-        currents = PchipInterpolator(self.psi_Vs[::-1], np.array([self.id_A[::-1], self.iq_A[::-1]]), axis=1)(psi)
-        return currents[0], currents[1]
+        """Its currents at each flux."""
+        i_d, i_q = at_flux([self], psi_Vs)
+        return i_d[0], i_q[0]
+
+
+def at_flux(contours: Sequence[Contour], psi_Vs: Array) -> tuple[Array, Array]:
+    """Currents [contour][psi]: the point with the smallest current whose flux is psi or less (clamped to the ends)."""
+    currents = np.empty((len(contours), len(psi_Vs), 2))
+    lines = {k: c for k, c in enumerate(contours) if len(c.id_A) > 1}
+    curves = [(c.psi_Vs[::-1], np.column_stack((c.id_A, c.iq_A))[::-1]) for c in lines.values()]
+    for (k, contour), curve in zip(lines.items(), pchips(curves), strict=True):
+        currents[k] = curve(np.clip(psi_Vs, contour.psi_Vs[-1], contour.psi_Vs[0]))
+    for k, contour in enumerate(contours):
+        if k not in lines:
+            currents[k] = contour.id_A[0], contour.iq_A[0]
+    return currents[..., 0], currents[..., 1]
 
 
 class Solver:
@@ -108,19 +119,19 @@ class Solver:
             left, mid, right = (current[best + k] ** 2 for k in (-1, 0, 1))
             d_best += 0.5 * (left - right) / (left - 2 * mid + right) * (self.id_A[1] - self.id_A[0])
         first = int(np.argmax(inside))
-        ids = [d_best, *self.id_A[:best][inside[:best]][::-1]]
-        if ids[0] - ids[min(1, len(ids) - 1)] < 1e-6 and len(ids) > 1:
-            ids.pop(1)
-        ids = [d for d in ids if d <= d_best]
-        qs = list(np.interp(ids, self.id_A[np.isfinite(q)], q[np.isfinite(q)]))
-        if first > 0 and np.isfinite(q[first - 1]):
+        ids = np.concatenate(([d_best], self.id_A[:best][inside[:best]][::-1]))
+        if len(ids) > 1 and ids[0] - ids[1] < 1e-6:
+            ids = np.delete(ids, 1)
+        ids = ids[ids <= d_best]
+        known = np.isfinite(q)
+        qs = np.interp(ids, self.id_A[known], q[known])
+        if first > 0 and known[first - 1]:
             inner, outer = current[first] - self.i_max_A, current[first - 1] - self.i_max_A
             share = inner / (inner - outer)
             d_rim = self.id_A[first] + share * (self.id_A[first - 1] - self.id_A[first])
             if d_rim < ids[-1] - 1e-6:
-                ids.append(d_rim)
-                qs.append(q[first] + share * (q[first - 1] - q[first]))
-        return np.array(ids), np.array(qs)
+                ids, qs = np.append(ids, d_rim), np.append(qs, q[first] + share * (q[first - 1] - q[first]))
+        return ids, qs
 
     def _solved(self, torques: Array, near: list[tuple[Array, Array]]) -> list[Contour]:
         """Contours through the given currents; all are solved at once, because each call of the model is dear."""
@@ -237,10 +248,11 @@ def _sample(solver: Solver, limits: Limits, torque_Nm: Array, psi_Vs: Array) -> 
     i_d, i_q = np.full(shape, np.nan), np.full(shape, np.nan)
     mtpa, end = np.zeros(len(fine_t)), np.zeros(len(fine_t))
     possible = limits.torque_max(fine_p)
-    for k, contour in enumerate(solver.contours(fine_t)):
-        d, q = contour.at(fine_p)
+    contours = solver.contours(fine_t)
+    d, q = at_flux(contours, fine_p)
+    for k, contour in enumerate(contours):
         inside = contour.torque_Nm <= possible
-        i_d[k, inside], i_q[k, inside] = d[inside], q[inside]
+        i_d[k, inside], i_q[k, inside] = d[k, inside], q[k, inside]
         mtpa[k], end[k] = contour.psi_Vs[0], contour.psi_Vs[-1]
     return _Samples(fine_t, fine_p, i_d, i_q, mtpa, end)
 
