@@ -59,6 +59,12 @@ def build_target(
     return _run([ARM_CC, *ARM_FLAGS, *COMMON, *flags, *map(str, compiled), *link, "-o", str(output)], output)
 
 
+def build_constants(output: Path, source: Path, address: int) -> Path:
+    """An ELF file with nothing but the constants of one file, for the address."""
+    place = ("-nostdlib", f"-Wl,--section-start=.rodata={address:#x},-e,0")
+    return _run([ARM_CC, *ARM_FLAGS, *COMMON, f"-I{ROOT}", str(source), *place, "-o", str(output)], output)
+
+
 def build_host(output: Path, sources: Sequence[Path], flags: Sequence[str] = ()) -> Path:
     """The same functions in a shared library."""
     compiler = shutil.which("gcc") or shutil.which("cc")

@@ -21,7 +21,7 @@ from fluxtrue_tools.bench.build import FIRMWARE, ROOT, build_host, build_target
 from fluxtrue_tools.bench.machine import Machine
 from fluxtrue_tools.motor.build import build as build_motor
 from fluxtrue_tools.motor.flux_model import FluxModel
-from fluxtrue_tools.motor.motor import load_motor
+from fluxtrue_tools.motor.motor import Motor, load_motor
 
 LTO = ("-flto",)
 OUTPUTS = 24
@@ -31,6 +31,7 @@ TORQUES = (TORQUE, -TORQUE // 2, TORQUE // 3, TORQUE)
 PERIODS, RUN_UP_FROM, WARM_UP, STEP_PERIODS = 2400, 1600, 100, 200
 RPM, RPM_TOP = 3000.0, 6500.0
 PAPER, ROBUST = 0, 1  # identification_mode
+HSM1 = FIRMWARE / "motors" / "hsm1"
 
 
 class Processor(Protocol):
@@ -72,7 +73,7 @@ class Host:
 
 def sources(folder: Path) -> list[Path]:
     """All of the firmware with the tables of hsm1, which are generated into the folder."""
-    build_motor(FIRMWARE / "motors" / "hsm1", folder, report=False)
+    build_motor(HSM1, folder, report=False)
     layers = ("fx", "types", "signal", "control", "safety", "drive")
     firmware = [path for layer in layers for path in (FIRMWARE / layer).rglob("*.c")]
     return [Path(__file__).with_name("drive_kernels.c"), *sorted(firmware), folder / "motor_tables.c"]
@@ -156,20 +157,36 @@ def _counts(amperes: float, noise: float) -> int:
     return min(max(round(((amperes + noise) / 800.0 + 0.5) * 4096), 0), 4095)
 
 
-def periods(drive: Processor, mode: int = ROBUST, task: Callable[[], object] | None = None) -> Iterator[int]:
+@dataclass(frozen=True)
+class Given:
+    """Other data for the drive than those of hsm1 in its program: hsm1's machine at another PWM frequency."""
+
+    motor: Motor
+    address: int
+
+
+def periods(
+    drive: Processor, mode: int = ROBUST, task: Callable[[], object] | None = None, given: Given | None = None
+) -> Iterator[int]:
     """Run the drive against the machine: after each yield the ISRs of that period are wanted. task: the 1 kHz task."""
     rng = np.random.default_rng(1)
-    load = Load(load_motor(FIRMWARE / "motors" / "hsm1").model)
+    hsm1 = load_motor(HSM1)
+    motor = hsm1 if given is None else given.motor
+    torques = [round(t * hsm1.bases.torque_Nm / motor.bases.torque_Nm) for t in TORQUES]
+    load = Load(motor.model, period_s=1.0 / motor.config.inverter.pwm_hz)
     duty, gates = [16384] * 3, False
-    drive.call("drive_start", mode)
+    if given is None:
+        drive.call("drive_start", mode)
+    else:
+        drive.call("drive_start_for", mode, given.address)
     for k in range(PERIODS):
         rpm = RPM + (RPM_TOP - RPM) * max(k - RUN_UP_FROM, 0) / (PERIODS - RUN_UP_FROM)
         a, b, c = (_counts(i, rng.normal(0.0, 0.5)) for i in load.phases())
-        drive.call("drive_request", TORQUES[(k // STEP_PERIODS) % len(TORQUES)], 1)
+        drive.call("drive_request", torques[(k // STEP_PERIODS) % len(torques)], 1)
         drive.call("drive_sample", a | b << 16, c | int(load.v_dc / 525.0 * 4096) << 16, load.theta_m())
         yield k
         acting = duty, gates
-        if k % 10 == 9:
+        if (k + 1) % motor.bases.periods_per_step == 0:
             (task or (lambda: drive.call("bench_task")))()
         state = drive.outputs()
         duty, gates = state[:3], bool(state[3])

@@ -18,6 +18,7 @@
 enum { OUTPUTS = 24, CORE_V_DC = 21845 };
 
 void drive_start(uint32_t mode);
+void drive_start_for(uint32_t mode, const motor_t *data);
 void drive_request(int32_t torque, uint32_t enable);
 void drive_sample(uint32_t i_ab, uint32_t i_c_v_dc, uint32_t theta_m);
 void drive_copy(void);
@@ -121,6 +122,13 @@ int16_t hal_temperature_inverter_dC(void)
 CALLED void drive_start(uint32_t mode)
 {
     drive_init(&drive, &motor);
+    drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
+}
+
+/* With other motor data, which lie in memory. */
+CALLED void drive_start_for(uint32_t mode, const motor_t *data)
+{
+    drive_init(&drive, data);
     drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
 }
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fluxtrue_tools.bench import disassembly, image, sizes, stack
 from fluxtrue_tools.bench.build import ROOT
 from fluxtrue_tools.bench.drive import Stage, build_drive, build_task, measure_drive, measure_task
+from fluxtrue_tools.bench.laws import measure_laws
 from fluxtrue_tools.emulate import build as emulation
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.wcet import bound as wcet
@@ -149,7 +150,8 @@ def measure(folder: Path) -> FIGURES:
     if deepest > total:
         raise FluxtrueError(f"the emulated drive used {deepest} bytes of stack, more than the worst case of {total}")
     whole = sizes.whole(parts.image)
-    stages, counted, limited = measure_drive(build_drive(folder / "bench"))
+    program = build_drive(folder / "bench")
+    stages, counted, limited = measure_drive(program)
     return {
         "compiler": sizes.compiler(),
         "drives": drives,
@@ -159,6 +161,7 @@ def measure(folder: Path) -> FIGURES:
         "kernels": {
             "periods": counted, "limited": limited,
             "stages": _spreads(stages),
+            "laws": measure_laws(program),
             "task stages": _spreads(measure_task(build_task(folder / "bench"))),
         },
         "image": {"flash": whole.flash, "RAM": whole.ram, "stack reserved": whole.stack},

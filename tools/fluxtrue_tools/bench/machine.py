@@ -2,12 +2,13 @@
 """An emulated Cortex-M4 (unicorn) that calls functions of an ELF file and counts instructions.
 
 Counted is what is issued: every instruction of a basic block that is entered, skipped IT slots
-included. Instructions are not cycles, and an emulator is not silicon.
+included. Instructions are not cycles, and an emulator is not silicon. Cycles are estimated from them (cycles.py).
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,9 +24,13 @@ from unicorn.arm_const import (
     UC_CPU_ARM_CORTEX_M4,
 )
 
+from fluxtrue_tools.bench.cycles import PIPELINE, cycles
+from fluxtrue_tools.bench.disassembly import Function, Instruction
+
 CODE = (0x0000_0000, 0x0020_0000)  # where the linker puts code and constants
 DATA = (0x2000_0000, 0x0080_0000)  # variables first, then blobs, the stack at the end
 RETURN = 0x001F_FFF0  # where a called function returns to
+SECOND = 0x0010_0000  # constants that are linked apart from the program
 STACK_SIZE = 0x1_0000
 ARGUMENTS = (UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3)
 PT_LOAD, SHT_SYMTAB = 1, 2
@@ -78,6 +83,10 @@ class Machine:
                 self._free = max(self._free, address + size)
         self._lengths: dict[tuple[int, int], int] = {}
         self._issued = 0
+        self.cycles = 0  # of the last call that was counted; 0 without charge()
+        self._listing: dict[int, Instruction] = {}
+        self._costs: dict[tuple[int, int], int] = {}
+        self._end = 0
         self._hook: int | None = None
 
     def place(self, content: bytes) -> int:
@@ -88,6 +97,17 @@ class Machine:
             raise MemoryError(f"{len(content)} bytes do not fit the emulated memory")
         self.uc.mem_write(address, content)
         return address
+
+    def charge(self, functions: Iterable[Function]) -> None:
+        """Estimate the cycles of counted calls, too, from the program's instructions."""
+        self._listing = {i.address: i for function in functions for i in function.instructions}
+
+    def add(self, path: Path) -> Elf:
+        """Load the constants of another file beside the program."""
+        elf = Elf.read(path)
+        for address, content, _ in elf.segments:
+            self.uc.mem_write(address, content)
+        return elf
 
     def read(self, address: int, size: int) -> bytes:
         """The bytes at the address."""
@@ -112,7 +132,7 @@ class Machine:
         """As call(), with the number of instructions issued."""
         if self._hook is None:
             self._hook = self.uc.hook_add(UC_HOOK_BLOCK, self._on_block)
-        self._issued = 0
+        self._issued = self.cycles = self._end = 0
         result = self.call(symbol, *arguments)
         return result, self._issued
 
@@ -123,6 +143,20 @@ class Machine:
         if key not in self._lengths:
             self._lengths[key] = instructions(self.read(address, size))
         self._issued += self._lengths[key]
+        if self._listing:
+            self.cycles += self._cost(key) + (PIPELINE if self._end not in (0, address) else 0)
+            self._end = address + size
+
+    def _cost(self, block: tuple[int, int]) -> int:
+        """Cycles of a basic block whose instructions follow one another."""
+        if block not in self._costs:
+            at, end = block[0], sum(block)
+            total = 0
+            while at < end:
+                total += cycles(self._listing[at])
+                at += self._listing[at].size
+            self._costs[block] = total
+        return self._costs[block]
 
 
 def instructions(code: bytes) -> int:

@@ -125,6 +125,16 @@ def _kernels(figures: Figures) -> list[str]:
     return table("kernel|  min |  avg |  max |bound", rows)
 
 
+LAWS = {"usual": "current_control.c, hsm1 at 10 kHz", "turning": "current_control_turning.c, hsm1 at 5 kHz"}
+
+
+def _laws(figures: Figures) -> list[str]:
+    """The fast ISR by the law of current control."""
+    laws = figures["kernels"]["laws"]
+    rows = ((title, *laws[name]["instructions"], *laws[name]["cycles"]) for name, title in LAWS.items())
+    return table("law of current control|  min |  avg |  max |  cycles min |  avg |  max ", rows)
+
+
 def _contents(rows: Iterable[str], titles: dict[str, str], contains: dict[str, str]) -> list[str]:
     """What the rows of a table stand for, as a list below it."""
     return [*(f"- *{titles.get(name, name)}*: {contains[name]}." for name in rows if name in contains), ""]
@@ -277,6 +287,7 @@ def page(figures: Figures) -> str:
         "task_contents": _contents(kernels["task stages"], TASK_TITLES, TASK_CONTAINS),
         "waiting": _waiting(figures), "worst": _worst(figures), "assumptions": _assumptions(),
         "interrupts": _interrupts(figures), "utilisation": _utilisation(figures), "kernels": _kernels(figures),
+        "laws": _laws(figures),
         "task_stages": _task_stages(figures),
         "peers": _peers(figures), "memory": _memory(figures), "modules": _modules(figures), "stack": _stack(figures),
     }  # fmt: skip

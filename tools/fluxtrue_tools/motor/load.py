@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from fluxtrue_tools.bus import DBC
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.loop_report import law_of
 from fluxtrue_tools.motor.motor import Motor
 
 PERFORMANCE: Final = Path(__file__).resolve().parents[3] / "docs" / "performance.json"
@@ -39,17 +41,31 @@ class Cycles:
     """Mean cycles of the emulated image with the robust identification."""
 
     fast_isr: float
+    turning: float | None  # what the fast ISR takes longer with the law for a field that turns far
     task: float
+
+    def of_fast_isr(self, motor: Motor) -> float:
+        """With the motor's law of current control."""
+        if not motor.config.is_turning:
+            return self.fast_isr
+        if self.turning is None:
+            raise FluxtrueError(
+                f"{PERFORMANCE}: kernels, laws: the cycles of {law_of(motor)} are missing, from which the processor "
+                "load follows; write them with: tools/fluxtrue bench --update"
+            )
+        return self.fast_isr + self.turning
 
 
 @cache
 def cycles() -> Cycles | None:
     """As the bench has written them down; None in an installation without its results."""
     try:
-        runs = json.loads(PERFORMANCE.read_text(encoding="utf-8"))["drives"]["robust"]["runs"]
+        figures = json.loads(PERFORMANCE.read_text(encoding="utf-8"))
     except OSError:
         return None
-    return Cycles(runs["fast ISR"]["cycles"][1], runs["1 kHz task"]["cycles"][1])
+    runs, laws = figures["drives"]["robust"]["runs"], figures["kernels"].get("laws")
+    turning = laws["turning"]["cycles"][1] - laws["usual"]["cycles"][1] if laws else None
+    return Cycles(runs["fast ISR"]["cycles"][1], turning, runs["1 kHz task"]["cycles"][1])
 
 
 def load_lines(motor: Motor) -> list[str]:
@@ -61,13 +77,11 @@ def load_lines(motor: Motor) -> list[str]:
     used, pwm_hz = cycles(), motor.config.inverter.pwm_hz
     if used is None:
         return lines
-    isr, task = used.fast_isr * pwm_hz / CLOCK_HZ, used.task / motor.bases.step_s / CLOCK_HZ
+    isr, task = used.of_fast_isr(motor) * pwm_hz / CLOCK_HZ, used.task / motor.bases.step_s / CLOCK_HZ
     lines += [
         f"processor load: {100 * (isr + task):.1f} % of an S32K144 at {CLOCK_HZ / 1e6:g} MHz (emulated cycles, without "
         "the wait states of its flash)",
-        f"  fast ISR           {100 * isr:.1f} % at {pwm_hz:g} Hz",
+        f"  fast ISR           {100 * isr:.1f} % at {pwm_hz:g} Hz, with {law_of(motor)}",
         f"  1 kHz task         {100 * task:.1f} % at {1.0 / motor.bases.step_s:.4g} Hz",
     ]
-    if motor.config.is_turning:
-        lines.append("  note               the usual current control; the one for a field that turns far takes longer")
     return lines
