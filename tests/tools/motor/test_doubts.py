@@ -93,6 +93,8 @@ def test_a_map_in_millivolt_seconds_is_said_to_be_one(write: Write, iq_A: list[f
          "identification.dead_time_uncertainty has no effect"),
         ({"control": {"dead_time_compensation": 0.9}, "inverter": {"dead_time_s": 0.0}},
          "control.dead_time_compensation has no effect"),
+        ({"magnet": {"i_d_demag_A": 0.6}}, "magnet.i_d_demag_A = 0.6 A, .* at 150 °C withstand 0.6 A of i_d"),
+        ({"magnet": {"i_d_demag_A": 280.0, "i_d_demag_A_per_K": 3.0}}, "magnets at 150 °C withstand 0 A of i_d"),
     ],
 )  # fmt: skip
 def test_a_value_that_is_hardly_meant_is_warned_of(write: Write, changes: dict[str, Any], words: str) -> None:

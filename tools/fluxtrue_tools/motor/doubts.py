@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fluxtrue_tools.motor.config import MotorConfig
+from fluxtrue_tools.motor.demagnetisation import limit_A
 from fluxtrue_tools.motor.flux_map import FluxMap
 from fluxtrue_tools.motor.flux_model import FluxModel
 from fluxtrue_tools.motor.flux_tables import ERROR_WANTED as TABLE_WANTED
@@ -29,6 +30,7 @@ DEAD_TIME_MOST = 0.03  # of i_max, in one PWM period by dead time and device dro
 RUN_UP_MOST_S, RUN_UP_LEAST_S = 200.0, 2e-4  # to top speed with all torque
 OFFSET_MAX = 0.05  # of the largest psi_q
 CURL_MAX = 0.05  # of the mean inductance
+DEMAGNETISATION_MIN = 0.05  # of i_max, at the assumed temperature: less hardly weakens a field
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ def _values(config: MotorConfig) -> Iterator[Doubt]:
     run_up = machine.inertia_kgm2 * config.omega_max_rad_s / machine.pole_pairs / machine.torque_max_Nm
     if not RUN_UP_LEAST_S <= run_up <= RUN_UP_MOST_S:
         yield Doubt(f"machine.inertia_kgm2 = {machine.inertia_kgm2:g} kg·m²: torque_max_Nm brings it to speed_max_rpm "
-                    f"in {run_up:.2g} s; wanted: kg·m²")  # fmt: skip
+                    f"in {run_up:.3g} s; wanted: kg·m²")  # fmt: skip
 
 
 def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
@@ -91,6 +93,18 @@ def _dead_time(config: MotorConfig, model: FluxModel) -> Iterator[Doubt]:
                     f"{inverter.device_drop_V:g} V move the current by {share:.2g} % of i_max_A in one PWM period "
                     f"(allowed without a warning: {100 * DEAD_TIME_MOST:g} %): near zero current it may oscillate; "
                     "shorten the dead time")  # fmt: skip
+
+
+def _magnets(config: MotorConfig) -> Iterator[Doubt]:
+    if config.magnet.i_d_demag_A is None:
+        return
+    i_max_A, celsius = config.machine.i_max_A, config.magnet.assumed_C
+    left_A = limit_A(config, celsius)
+    if left_A < DEMAGNETISATION_MIN * i_max_A:
+        yield Doubt(f"magnet.i_d_demag_A = {config.magnet.i_d_demag_A:g} A, i_d_demag_A_per_K = "
+                    f"{config.magnet.i_d_demag_A_per_K:g} A/K: magnets at {celsius:g} °C withstand {left_A:.3g} A "
+                    f"of i_d, {100 * left_A / i_max_A:.2g} % of i_max_A (allowed without a warning: "
+                    f"{100 * DEMAGNETISATION_MIN:g} %): the field can hardly be weakened")  # fmt: skip
 
 
 def _no_effect(config: MotorConfig) -> Iterator[Doubt]:
@@ -155,6 +169,6 @@ def explaining(config: MotorConfig, model: FluxModel) -> Doubt | None:
 def of_motor(motor: "Motor") -> list[str]:
     """Every warning about a motor that is accepted."""
     config = motor.config
-    found = [*_units(config, motor.model), *_values(config), *_dead_time(config, motor.model),
+    found = [*_units(config, motor.model), *_values(config), *_dead_time(config, motor.model), *_magnets(config),
              *_map(config, motor.flux_map, motor.model), *_accuracy(motor), *_no_effect(config)]  # fmt: skip
     return [doubt.text for doubt in found]

@@ -7,6 +7,7 @@ import numpy as np
 
 from fluxtrue_tools.bus.scales import QUANTITIES, carriers, standard_factors
 from fluxtrue_tools.motor import doubts
+from fluxtrue_tools.motor.demagnetisation import demagnetisation_lines
 from fluxtrue_tools.motor.load import load_lines
 from fluxtrue_tools.motor.loop_report import model_lines
 from fluxtrue_tools.motor.motor import Motor
@@ -162,6 +163,7 @@ def report_text(motor: Motor) -> str:
         _map(motor),
         _tables(motor),
         _references(motor),
+        demagnetisation_lines(motor.config),
         _short_circuit(motor),
         model_lines(motor),
         _bases(motor),
