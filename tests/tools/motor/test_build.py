@@ -139,7 +139,7 @@ def test_motor_json_is_complete_and_plain_json(tmp_path):
 def test_check_prints_the_report_and_what_symmetrising_removed(cli):
     result = cli("check", MOTORS / "hsm1")
     assert (result.returncode, result.stderr) == (0, "")
-    for words in ("psi_d max 0.919 mVs", "psi_q max 10.649 mVs", "error against map", "flash: ", "MTPA"):
+    for words in ("psi_d max 0.919 mV·s", "psi_q max 10.649 mV·s", "error against map", "flash: ", "MTPA"):
         assert words in result.stdout
 
 

@@ -43,7 +43,7 @@ def test_a_short_circuit_that_brakes_harder_than_the_drive_is_said_with_its_spee
     found = short_circuit(motor)
     harder = found.speed_rpm[found.torque_Nm < -28.0]
     assert len(harder) > 10
-    assert f"between {harder[0]:.3g} and {harder[-1]:.3g} rpm" in report_text(motor)
+    assert f"between {harder[0]:.0f} and {harder[-1]:.0f} rpm" in report_text(motor)
     assert "brakes harder" not in report_text(load_motor(write()))
 
 

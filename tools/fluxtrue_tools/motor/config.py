@@ -238,7 +238,7 @@ def _check_drop(config: MotorConfig) -> None:
     if drop > limit:
         slip = f"; as mΩ it would be {machine.r_ohm / 1000:g} Ω" if drop / 1000 <= limit else ""
         _fail(
-            f"machine.r_ohm = {machine.r_ohm:g} Ω drops {drop:.3g} V at i_max_A, allowed: up to "
+            f"machine.r_ohm = {machine.r_ohm:g} Ω drops {drop:.4g} V at i_max_A, allowed: up to "
             f"{limit:.3g} V (30 % of vdc_V), here {strict.down(limit / machine.i_max_A):g} Ω{slip}"
         )
 

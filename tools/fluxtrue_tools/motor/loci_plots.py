@@ -46,7 +46,7 @@ def _label(axes: Axes, lines: QuadContourSet, named: dict[float, str]) -> None:
         text.set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 0.5})
 
 
-def _round_speeds(low: float, high: float, apart: float) -> Array:
+def round_speeds(low: float, high: float, apart: float) -> Array:
     """The highest speed, and round ones below it that are at least so far apart."""
     ticks = MaxNLocator(max(min(LIMITS_SHOWN, int((high - low) / apart)), 1)).tick_values(low, high)
     return np.array([*ticks[(ticks >= low) & (ticks <= high - apart)], high])
@@ -60,7 +60,7 @@ def _voltage_limits(axes: Axes, motor: Motor, d: Array, q: Array, psi: Array) ->
     matters = speed[(available < np.nanmax(psi)) & (available > np.nanmin(psi))]
     if len(matters) == 0:
         return
-    shown = _round_speeds(matters[0], matters[-1], SPEEDS_APART * top_rpm)
+    shown = round_speeds(matters[0], matters[-1], SPEEDS_APART * top_rpm)
     level = available_flux(motor, shown)
     lines = axes.contour(d, q, psi, levels=np.sort(level), colors="tab:blue", linewidths=0.8)
     named = {float(x): f"{rpm:.0f} rpm" for x, rpm in zip(level, shown, strict=True)}

@@ -26,6 +26,7 @@ from fluxtrue_tools.motor.motor import Motor
 
 COLOURS = ("tab:red", "tab:green", "tab:blue")
 GAIN_DB = (-40.0, 40.0)
+BELOW = -0.12  # of a panel's height: its legend lies outside, because the currents may be anywhere
 
 
 def _label(motor: Motor, share: float, inductance: float, measured: Response | None) -> str:
@@ -108,12 +109,12 @@ def _step_panel(ax: Axes, motor: Motor, measured: Measured, share: float, axis: 
         ax.plot([], [], color="tab:gray", ls=":", lw=1, label=f"i_{other}")
     ax.set(title=f"Step of i_{axis}, {speed_named(motor, share)}", ylabel="change of the current, A")
     ax.grid(alpha=0.3)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=8, ncols=2, loc="upper center", bbox_to_anchor=(0.5, BELOW))
 
 
 def step_figure(motor: Motor, measured: Measured) -> Figure:
     """Both axes at standstill and at half of the top speed."""
-    figure, axes = plt.subplots(2, 2, figsize=(12, 8), layout="constrained", sharex=True)
+    figure, axes = plt.subplots(2, 2, figsize=(12, 9.5), layout="constrained", sharex=True)
     for row, axis in enumerate(AXES):
         for column, share in enumerate(STEP_SPEEDS):
             _step_panel(axes[row, column], motor, measured, share, axis)

@@ -27,12 +27,12 @@ def _machine(motor: Motor) -> Lines:
     l_d, l_q = float(motor.model.psi_d(0.0, 0.0, nd=1)), float(motor.model.psi_q(0.0, 0.0, nq=1))
     return [
         f"motor {machine.name}: {machine.pole_pairs} pole pairs, {flux}",
-        f"  at no current      psi_f {1e3 * motor.derived.psi_f_Vs:.2f} mVs, L_d {1e6 * l_d:.0f} uH, "
-        f"L_q {1e6 * l_q:.0f} uH, R {1e3 * machine.r_ohm:g} mohm (20 C)",
-        f"  limits             {machine.i_max_A:g} A, {machine.torque_max_Nm:g} N·m of "
-        f"{motor.solver.torque_top_Nm:.1f} on the circle, {machine.speed_max_rpm:g} rpm",
+        f"  at no current      psi_f {1e3 * motor.derived.psi_f_Vs:.2f} mV·s, L_d {1e6 * l_d:.0f} µH, "
+        f"L_q {1e6 * l_q:.0f} µH, R {1e3 * machine.r_ohm:g} mΩ (20 °C)",
+        f"  limits             {machine.i_max_A:g} A, {machine.torque_max_Nm:g} N·m "
+        f"({motor.solver.torque_top_Nm:.4g} N·m possible at this current), {machine.speed_max_rpm:g} rpm",
         f"  inverter           {inverter.vdc_V:g} V, {inverter.pwm_hz:g} Hz, "
-        f"dead time {1e6 * inverter.dead_time_s:g} us, "
+        f"dead time {1e6 * inverter.dead_time_s:g} µs, "
         f"current full scale {inverter.current_full_scale_A:g} A, {inverter.adc_bits} bits, "
         f"over-current trip {motor.derived.i_trip_A:g} A",
     ]
@@ -53,9 +53,9 @@ def _map(motor: Motor) -> Lines:
         f"flux map: {len(flux_map.id_A)} x {len(flux_map.iq_A)} nodes after symmetrising, id {flux_map.id_A[0]:g} ... "
         f"{flux_map.id_A[-1]:g} A, iq {flux_map.iq_A[0]:g} ... {flux_map.iq_A[-1]:g} A",
         f"  covered            {s.source}",
-        f"  removed            psi_d max {1e3 * s.psi_d_max_Vs:.3f} mVs, rms {1e3 * s.psi_d_rms_Vs:.3f} mVs "
+        f"  removed            psi_d max {1e3 * s.psi_d_max_Vs:.3f} mV·s, rms {1e3 * s.psi_d_rms_Vs:.3f} mV·s "
         "(odd part in i_q)",
-        f"                     psi_q max {1e3 * s.psi_q_max_Vs:.3f} mVs, rms {1e3 * s.psi_q_rms_Vs:.3f} mVs "
+        f"                     psi_q max {1e3 * s.psi_q_max_Vs:.3f} mV·s, rms {1e3 * s.psi_q_rms_Vs:.3f} mV·s "
         f"({'even part in i_q' if s.source.startswith('both') else 'its value at i_q = 0, per i_d'})",
         f"  interpolation      {how}",
     ]
@@ -75,10 +75,10 @@ def _tables(motor: Motor) -> Lines:
     return [
         f"flux tables: {len(t.stored)} of {len(t.id_A)} x {len(t.iq_A)} nodes every {t.iq_A[1]:g} A, "
         f"inductances to 2^{t.l_shift} L_b",
-        f"  error against map  torque max {e.torque_max_Nm:.3f} N·m "
+        f"  error against map  torque max {e.torque_max_Nm:.3g} N·m "
         f"({_percent(e.torque_max_Nm / torque_max)} of torque_max), "
-        f"rms {e.torque_rms_Nm:.3f} N·m (firmware look-up, i_max circle)",
-        f"                     psi_d max {1e3 * e.psi_d_max_Vs:.3f} mVs, psi_q max {1e3 * e.psi_q_max_Vs:.3f} mVs",
+        f"rms {e.torque_rms_Nm:.3g} N·m (firmware look-up, i_max circle)",
+        f"                     psi_d max {1e3 * e.psi_d_max_Vs:.3f} mV·s, psi_q max {1e3 * e.psi_q_max_Vs:.3f} mV·s",
     ]
 
 
@@ -87,16 +87,16 @@ def _references(motor: Motor) -> Lines:
     reach = float(motor.limits.psi_min_Vs[0])
     lines = [
         f"current references: {len(r.torque_Nm)} x {len(r.psi_Vs)} nodes, every {r.torque_Nm[1]:.3g} N·m and "
-        f"{1e3 * (r.psi_Vs[1] - r.psi_Vs[0]):.3g} mVs from {1e3 * r.psi_Vs[0]:.3g} mVs",
-        f"  error, MTPA        torque max {e.torque_mtpa_max_Nm:.3f} N·m "
+        f"{1e3 * (r.psi_Vs[1] - r.psi_Vs[0]):.3g} mV·s from {1e3 * r.psi_Vs[0]:.3g} mV·s",
+        f"  error, MTPA        torque max {e.torque_mtpa_max_Nm:.3g} N·m "
         f"({_percent(e.torque_mtpa_max_Nm / torque_max)} of torque_max)",
-        f"  error, weakening   torque max {e.torque_weak_max_Nm:.3f} N·m, rms {e.torque_weak_rms_Nm:.3f} N·m; flux "
+        f"  error, weakening   torque max {e.torque_weak_max_Nm:.3g} N·m, rms {e.torque_weak_rms_Nm:.3g} N·m; flux "
         f"{_percent(e.flux_excess)} beyond the available at worst",
         f"  current            {_percent(max(e.current_excess, 0.0))} beyond i_max at worst",
     ]
     if reach > r.psi_Vs[0]:
         lines.append(
-            f"  note               this machine cannot go below {1e3 * reach:.3g} mVs within i_max: at top "
+            f"  note               this machine cannot go below {1e3 * reach:.3g} mV·s within i_max: at top "
             "speed and a low dc voltage its back-EMF exceeds what the references can weaken"
         )
     return lines
@@ -108,12 +108,12 @@ def _short_circuit(motor: Motor) -> Lines:
     harder = found.speed_rpm[found.torque_Nm < -machine.torque_max_Nm]
     lines = [
         f"active short circuit: {found.current_A[-1]:.4g} A at {machine.speed_max_rpm:g} rpm (steady state, "
-        "windings at 20 C)",
-        f"  brakes most        {-found.torque_Nm[most]:.4g} N·m at {found.speed_rpm[most]:.3g} rpm",
+        "windings at 20 °C)",
+        f"  brakes most        {-found.torque_Nm[most]:.4g} N·m at {found.speed_rpm[most]:.0f} rpm",
     ]
     if len(harder):
         lines.append(
-            f"  note               brakes harder than torque_max_Nm between {harder[0]:.3g} and {harder[-1]:.3g} rpm: "
+            f"  note               brakes harder than torque_max_Nm between {harder[0]:.0f} and {harder[-1]:.0f} rpm: "
             "there only disabled switching is safe"
         )
     if used < machine.speed_max_rpm:
@@ -139,7 +139,8 @@ def _bases(motor: Motor) -> Lines:
 def _bus(motor: Motor) -> Lines:
     """The resolution and the range of each quantity on the bus."""
     carried = carriers(motor.bus.dbc)
-    units = {name: unit.replace("Nm", "N·m").replace("mOhm", "mohm") for unit, name in QUANTITIES.items()}
+    signs = {"Nm": "N·m", "mOhm": "mΩ", "mVs": "mV·s"}
+    units = {name: signs.get(unit, unit) for unit, name in QUANTITIES.items()}
     own = "the standard" if motor.bus.factors == standard_factors() else "its own"
     return [
         f"bus: {own} scale, {DBC_NAME}, interface hash 0x{motor.bus.interface_hash:08X}",

@@ -16,7 +16,13 @@ from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
 
 SPEED, TORQUE = "speed, rpm", "torque, N·m"
+KILOWATTS_FROM = 2e3  # W
 BATTERY_SHARES = ((0.25, ":"), (0.5, "--"))  # of the largest power that the machine can feed back
+
+
+def power_unit(largest_W: float) -> tuple[float, str]:
+    """Watts per unit, and its name: a small machine's power in watts."""
+    return (1e3, "kW") if largest_W >= KILOWATTS_FROM else (1.0, "W")
 
 
 def _allowed(torque_Nm: Array, fed_W: Array, limit_W: float) -> float:
@@ -34,9 +40,10 @@ def _generating_limits(axes: Axes, motor: Motor) -> None:
     largest_W = float(np.nanmax(fed_W))
     if largest_W <= 0.0:
         return
+    watts, unit = power_unit(largest_W)
     for share, style in BATTERY_SHARES:
         allowed = [_allowed(found.torque_Nm, column, share * largest_W) for column in fed_W.T]
-        name = f"battery takes {share * largest_W / 1e3:.3g} kW"
+        name = f"generating, battery takes at most {share * largest_W / watts:.3g} {unit}"
         axes.plot(found.speed_rpm, -np.array(allowed), "tab:red", lw=1, ls=style, label=name)
 
 
@@ -48,22 +55,25 @@ def envelope_figure(motor: Motor) -> Figure:
     possible = torque_envelope(motor, speed)
     limited = np.minimum(possible, machine.torque_max_Nm)
     power = axes.twinx()
+    watts, unit = power_unit(float(np.max(limited * speed)) * 2 * np.pi / 60)
     for sign in (1.0, -1.0):
         named = sign > 0
-        axes.plot(speed, sign * possible, "tab:gray", ls=":", label="current and voltage" if named else None)
-        axes.plot(speed, sign * limited, "tab:green", lw=2, label="with torque_max_Nm" if named else None)
-        shaft_kW = sign * limited * speed * 2 * np.pi / 60 / 1e3
-        power.plot(speed, shaft_kW, "tab:blue", lw=1, label="shaft power" if named else None)
+        axes.plot(speed, sign * possible, "tab:gray", ls=":", label="limited by current and voltage" if named else None)
+        axes.plot(speed, sign * limited, "tab:green", lw=2, label="also limited by torque_max_Nm" if named else None)
+        shaft_W = sign * limited * speed * 2 * np.pi / 60
+        power.plot(speed, shaft_W / watts, "tab:blue", lw=1, label="shaft power" if named else None)
     _generating_limits(axes, motor)
     axes.axhline(0.0, color="k", lw=0.6)
     axes.set(xlabel=SPEED, ylabel=f"{TORQUE} (generating below 0)", xlim=(0, machine.speed_max_rpm))
-    power.set(ylabel="shaft power, kW")
+    power.set(ylabel=f"shaft power, {unit}")
     for ax in (axes, power):
         top = max(abs(y) for y in ax.get_ylim())
         ax.set_ylim(-top, top)
     axes.set_title(
-        f"Torque at {motor.config.inverter.vdc_V:g} V; the references plan {motor.derived.ref_v_ratio:.3f} of it as "
-        "phase peak\nRed: examples of a generating limit, which the bus sends; losses as in the figure of them"
+        f"Torque and power at {motor.config.inverter.vdc_V:g} V dc, of which the references plan "
+        f"{motor.derived.ref_v_ratio:.3f} as phase voltage (peak)\nRed: examples of what remains when the bus limits "
+        "the power that the battery takes",
+        fontsize=10,
     )
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     return figure
@@ -72,22 +82,27 @@ def envelope_figure(motor: Motor) -> Figure:
 def losses_figure(motor: Motor) -> Figure:
     """Efficiency while driving, and the losses it follows from."""
     found = losses(motor)
+    watts, unit = power_unit(float(np.nanmax(found.total_W)))
     figure, axes = plt.subplots(1, 2, figsize=(13, 5), layout="constrained", sharey=True)
     panels = (
         (axes[0], 100 * found.efficiency, [50, 70, 80, 85, 88, 90, 92, 94, 95, 96, 97, 98, 99], "efficiency, %"),
-        (axes[1], found.total_W / 1e3, 10, "losses, kW"),
+        (axes[1], found.total_W / watts, 10, f"losses, {unit}"),
     )
     for ax, z, levels, title in panels:
         shown = ax.contourf(found.speed_rpm, found.torque_Nm, z, levels=levels, cmap="viridis", extend="both")
-        figure.colorbar(shown, ax=ax)
+        figure.colorbar(shown, ax=ax, ticks=shown.levels)
         envelope = np.minimum(torque_envelope(motor, found.speed_rpm), motor.config.machine.torque_max_Nm)
-        ax.plot(found.speed_rpm, envelope, "k", lw=1.5, label="envelope")
-        ax.set(title=title, xlabel=SPEED)
-        ax.legend(fontsize=8, loc="upper right")
+        (border,) = ax.plot(found.speed_rpm, envelope, "k", lw=1.5)
+        ax.set(title=title, xlabel=SPEED, ylim=(0.0, 1.06 * motor.config.machine.torque_max_Nm))
     axes[0].set_ylabel(TORQUE)
+    figure.legend([border], ["envelope"], loc="outside lower center", fontsize=8)
     parts = {"iron": found.iron_W, "device drop of the inverter": found.inverter_W}
     known = ["copper at 20 °C", *(name for name, power_W in parts.items() if np.nanmax(power_W) > 0.0)]
-    figure.suptitle(f"Computed from motor.toml: {', '.join(known)}; nothing else, no switching losses")
+    missing = [name for name in parts if name not in known]
+    figure.suptitle(
+        f"Losses contained: {', '.join(known)}. Not contained: {', '.join([*missing, 'switching, friction'])}",
+        fontsize=11,
+    )
     return figure
 
 
@@ -105,6 +120,11 @@ def short_circuit_figure(motor: Motor) -> Figure:
     used = used_from_rpm(motor)
     for ax in (upper, lower):
         if used < machine.speed_max_rpm:
-            ax.axvspan(used, machine.speed_max_rpm, color="tab:blue", alpha=0.12, label="safe state of a fault")
-        ax.legend(fontsize=8, loc="center right")
+            ax.axvspan(
+                used, machine.speed_max_rpm, color="tab:blue", alpha=0.12, label="safe state: a fault shorts the phases"
+            )
+    named = {
+        label: handle for ax in (upper, lower) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=3, fontsize=8)
     return figure
