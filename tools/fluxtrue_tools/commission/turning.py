@@ -48,25 +48,27 @@ def advance(drive: Capture, seconds: float, step: str, signals: tuple[str, ...] 
     return rows
 
 
+def _settle(drive: Capture) -> None:
+    """After a change that needs no agreement to a movement."""
+    drive.capture(("run_state",), round(SETTLE_S / drive.period_s))
+
+
 def connect(drive: Capture, connection: Connection | None, known: Nameplate, step: str) -> None:
     """Disable, take another source of the angle (none: the angle is imposed), enable with currents of zero."""
     currents(drive, 0.0, 0.0)
     drive.set("enable", 0.0)
-    drive.capture(("run_state",), round(SETTLE_S / drive.period_s))
+    _settle(drive)
     drive.set("angle_imposed", float(connection is None))
     drive.set("machine_monitors", 0.0)  # they compare with the nameplate's guesses
     if connection is not None:
         drive.set("angle_pole_pairs", connection.pole_pairs)
         drive.set("angle_reversed", float(connection.reversed))
         drive.set("angle_offset_rad", connection.offset_rad)
-    drive.capture(("run_state",), round(SETTLE_S / drive.period_s))
+    _settle(drive)
     drive.set("spin_rpm", LIMIT_SHARE * known.speed_max_rpm)
     drive.set("current_mode", 1.0)
     drive.set("enable", 1.0)
-    drive.set("spin_periods", round((SETTLE_S + CONSENT_S) / drive.period_s))
-    drive.capture(("run_state",), round(SETTLE_S / drive.period_s))
-    if drive.get("run_state") != 1.0:
-        raise FluxtrueError(f"commission: {step}: {_stopped(drive)}")
+    advance(drive, SETTLE_S, step, ("run_state",))
 
 
 def currents(drive: Capture, i_d_A: float, i_q_A: float) -> None:
@@ -83,7 +85,7 @@ def release(drive: Capture) -> None:
     drive.set("enable", 0.0)
     drive.set("spin_periods", 0.0)
     drive.set("machine_monitors", 1.0)
-    drive.capture(("run_state",), round(SETTLE_S / drive.period_s))
+    _settle(drive)
 
 
 def speed_rad_s(rows: Array, period_s: float) -> float:
