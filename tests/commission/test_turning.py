@@ -21,7 +21,7 @@ LEAVES_THE_CURRENT = pytest.mark.xfail(
     reason="""phases refuses it: with the current
 that overcomes friction, reluctance is stronger than the magnets, and the rotor rests 64 degrees from the current""",
 )
-MACHINES = [("saturated", 101), pytest.param("pmasynrm", 107, marks=LEAVES_THE_CURRENT), ("hsm1", 110)]
+MACHINES = [("saturated", 101), pytest.param("pmasynrm", 107, marks=LEAVES_THE_CURRENT), ("hsm1", 135)]
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1
 SILENT, FAST = 1.0, 2.0
 RUN = 1.0

@@ -20,7 +20,11 @@ from fluxtrue_tools.motor.flux_model import Array
 NAME = "spin"
 D_SHARE = 0.06  # of i_max: the larger of the two currents along d
 LEVELS = (1.0, -1.0, 0.5, -0.5, -0.5, 0.5, -1.0, 1.0)  # of it: what drifts evenly is no odd part
-LEVEL_S, LEVEL_SETTLE_S = 0.2, 0.1
+LEVEL_S, WINDOW_S = 0.2, 0.05
+SETTLED_SHARE = 1e-3  # of i_max: the mean current of a window is the wanted one
+WINDOWS = 20  # to settle a level
+LARGE = 0.75  # between the magnitudes of both levels
+COMPENSATION = "dead_time_compensation"
 Q_SHARES = (0.02, 0.04, 0.08, 0.16, 0.25, 0.4)  # of i_max: more while the machine does not accelerate
 TRY_S, REACH_S, LONGEST_S = 0.05, 1.5, 10.0
 BRAKE_STEPS = 40  # with each of the currents
@@ -94,14 +98,50 @@ def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> A
 
 
 def _coast(drive: Capture, known: Nameplate) -> list[Array]:
-    """The levels of the current along d, each when it has settled."""
-    taken = []
-    for level in LEVELS:
-        turning.currents(drive, level * D_SHARE * known.i_max_A, 0.0)
-        turning.advance(drive, LEVEL_SETTLE_S, NAME)
-        taken.append(turning.advance(drive, LEVEL_S, NAME))
+    """The levels of the current along d, each when it has settled.
+
+    Without the drive's own compensation of the dead time: it acts by the sign of a measured current, turned with the
+    rotor by a period and a half, so that what it leaves is not along the current.
+    """
+    taken, q_A = [], 0.0
+    compensation = drive.get(COMPENSATION)
+    drive.set(COMPENSATION, 0.0)
+    try:
+        for level in LEVELS:
+            _settle(drive, known, level * D_SHARE * known.i_max_A, q_A)
+            taken.append(turning.advance(drive, LEVEL_S, NAME))
+            q_A -= mean_current(taken[-1], known.offset_A).imag
+    finally:
+        drive.set(COMPENSATION, compensation)
     turning.currents(drive, 0.0, 0.0)
     return taken
+
+
+def _settle(drive: Capture, known: Nameplate, i_d_A: float, q_A: float) -> None:
+    """Until the mean current is the wanted one, along d.
+
+    While the machine becomes slower, its voltage falls, and current control follows it by a constant current along q,
+    for which the reference makes up with q_A.
+    """
+    turning.currents(drive, i_d_A, q_A)
+    for _ in range(WINDOWS):
+        left_A = i_d_A - mean_current(turning.advance(drive, WINDOW_S, NAME), known.offset_A)
+        if abs(left_A) < SETTLED_SHARE * known.i_max_A:
+            return
+    raise FluxtrueError(f"commission: {NAME}: {i_d_A:.3g} A along d did not settle: {abs(left_A):.2g} A are left")
+
+
+def whole_turns(rows: Array) -> Array:
+    """The rows of whole electrical turns: there the errors of sensors and inverter that turn have no mean."""
+    theta = np.unwrap(rows[:, 4])
+    turns = math.floor(abs(theta[-1] - theta[0]) / turning.TURN)
+    return rows[: int(np.searchsorted(np.abs(theta - theta[0]), turns * turning.TURN)) + 1] if turns else rows
+
+
+def mean_current(rows: Array, offset_A: complex) -> complex:
+    """Over whole turns, in the rotor frame."""
+    used = whole_turns(rows)
+    return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_A * np.exp(-1j * used[:, 4])))
 
 
 def voltages(rows: Array, period_s: float) -> tuple[Array, Array, float]:
@@ -114,12 +154,15 @@ def voltages(rows: Array, period_s: float) -> tuple[Array, Array, float]:
     return i, u / (1j * omega * np.sinc(0.5 * omega * period_s / np.pi)), float(omega.mean())
 
 
-def magnet(taken: list[Array], period_s: float) -> Magnet:
-    """(CM-19): what neither changes its sign with the current nor grows with its square."""
+def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
+    """(CM-19): what neither changes its sign with the current, nor grows with its square, nor lies along it."""
     levels = np.array(LEVELS)
-    means = [voltages(rows, period_s) for rows in taken]
+    means = [voltages(whole_turns(rows), period_s) for rows in taken]
     psi, omega = np.array([flux.mean() for _, flux, _ in means]), np.array([speed for _, _, speed in means])
-    matrix = np.column_stack((np.ones(len(levels)), levels, levels / omega, levels**2))
+    i_A = np.array([mean_current(rows, offset_A) for rows in taken])
+    along = np.sign(levels) + 1j * i_A.imag / np.abs(i_A.real)
+    large = np.abs(levels) > LARGE
+    matrix = np.column_stack((np.ones(len(levels)), levels, levels**2, large * along / omega, ~large * along / omega))
     scale = np.linalg.norm(matrix, axis=0)
     inverse = np.linalg.pinv(matrix / scale)
     return Magnet(complex((inverse @ psi)[0] / scale[0]), float(omega.mean()))
@@ -127,7 +170,7 @@ def magnet(taken: list[Array], period_s: float) -> Magnet:
 
 def _direction(drive: Capture, known: Nameplate, wanted_rad_s: float) -> Magnet:
     accelerate(drive, known, wanted_rad_s, NAME)
-    found = magnet(_coast(drive, known), drive.period_s)
+    found = magnet(_coast(drive, known), drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
     return found
 
