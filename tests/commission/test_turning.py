@@ -15,13 +15,7 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
-LEAVES_THE_CURRENT = pytest.mark.xfail(
-    strict=True,
-    raises=FluxtrueError,
-    reason="""phases refuses it: with the current
-that overcomes friction, reluctance is stronger than the magnets, and the rotor rests 64 degrees from the current""",
-)
-MACHINES = [("saturated", 101), pytest.param("pmasynrm", 107, marks=LEAVES_THE_CURRENT), ("hsm1", 135)]
+MACHINES = [("saturated", 101), ("pmasynrm", 107), ("hsm1", 135)]
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1
 SILENT, FAST = 1.0, 2.0
 RUN = 1.0

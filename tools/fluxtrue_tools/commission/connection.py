@@ -22,6 +22,7 @@ SHARES = (0.03, 0.06, 0.12, 0.25)  # of i_max: the smallest that the rotor follo
 TURNS = 3.0  # electrical, in each direction
 HZ = 1.0
 RISE_S, SPEED_UP_S = 0.8, 0.5
+SWING_S, SWING_SHARE = 2.0, 0.2  # the second: of the current while it accelerates the rotor
 WHOLE = 0.08  # distance of the pole pairs from a whole number
 BEHIND_RAD = math.radians(60.0)  # rms, of the rotor about the current
 STILL_TURNS = 0.1  # of the electrical turns that were imposed: less is a rotor that stands
@@ -38,12 +39,24 @@ class Followed:
     connection: Connection
 
 
+def _brake_swing(drive: Capture, current_A: float) -> None:
+    """Take the swing about the current away: its torque accelerates the rotor with less current than it brakes it."""
+    before = 0.0
+    for _ in range(round(SWING_S / turning.STEP_S)):
+        taken = turning.advance(drive, turning.STEP_S, NAME, ("theta_e_rad", "sensor_turns"))
+        speed = abs(float(taken[-1, 1] - taken[0, 1]))
+        turning.currents(drive, current_A * (SWING_SHARE if speed > before else 1.0), 0.0)
+        before = speed
+    turning.currents(drive, current_A, 0.0)
+
+
 def _rotate(drive: Capture, current_A: float) -> tuple[Array, Array]:
     """Imposed angle and sensor's angle on the way there and back, both continuous, in turns."""
     steps = round(RISE_S / turning.STEP_S)
     for k in range(steps):
         turning.currents(drive, current_A * (k + 1) / steps, 0.0)
         turning.advance(drive, turning.STEP_S, NAME)
+    _brake_swing(drive, current_A)
     rows = []
     for direction in (1.0, -1.0):
         rows += [_at(drive, direction * HZ * share) for share in _shares()]
