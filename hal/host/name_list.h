@@ -53,6 +53,7 @@
     X(r_clamped, "", SWITCH, "1 while the identified resistance is at its limit.") \
     X(id_A, "A", NUMBER, "Measured current in d.") \
     X(iq_A, "A", NUMBER, "Measured current in q.") \
+    X(i_zero_A, "A", NUMBER, "Mean of the measured phase currents; without errors of the sensors it is zero.") \
     X(ud_V, "V", NUMBER, "Voltage in d that acts in the next period.") \
     X(uq_V, "V", NUMBER, "Voltage in q that acts in the next period.") \
     X(vdc_V, "V", NUMBER, "Measured dc voltage.") \

@@ -62,6 +62,7 @@ GETTER(psi_clamped, d->drive.task.identification.psi_clamped)
 GETTER(r_clamped, d->drive.task.identification.r_clamped)
 GETTER(id, pu15(sample(d)->point.i.d, bases(d)->current_A))
 GETTER(iq, pu15(sample(d)->point.i.q, bases(d)->current_A))
+GETTER(i_zero, (double)sample(d)->zero_q28 / 268435456.0 * (double)bases(d)->current_A)
 GETTER(ud, pu15(d->drive.fast.u_next.d, bases(d)->voltage_V))
 GETTER(uq, pu15(d->drive.fast.u_next.q, bases(d)->voltage_V))
 GETTER(v_dc, pu15(sample(d)->v_dc, bases(d)->voltage_V))
@@ -184,6 +185,7 @@ const parameter_t parameters[] = {
     {"r_clamped", get_r_clamped, NULL, 0, 0},
     {"id_A", get_id, NULL, 0, 0},
     {"iq_A", get_iq, NULL, 0, 0},
+    {"i_zero_A", get_i_zero, NULL, 0, 0},
     {"ud_V", get_ud, NULL, 0, 0},
     {"uq_V", get_uq, NULL, 0, 0},
     {"vdc_V", get_v_dc, NULL, 0, 0},

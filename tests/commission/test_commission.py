@@ -10,7 +10,7 @@ import pytest
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.score import score
+from fluxtrue_tools.commission.score import balance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_map import load_flux_map
@@ -18,14 +18,14 @@ from fluxtrue_tools.motor.flux_model import SplineModel
 from fluxtrue_tools.sim.motor import Motor
 
 MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
-MAP_RMS, R_SHARE, OFFSET_SHARE = 0.01, 0.01, 0.001
+MAP_RMS, R_SHARE, OFFSET_SHARE, BALANCE = 0.01, 0.01, 0.001, 0.002
 
 
 @pytest.mark.parametrize(("name", "seed"), MACHINES)
 def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: Motor, known: Nameplate) -> None:
     drive, truth = hidden.make(name, seed, unknown, known.i_max_A)
     found = run(drive, chosen(("map",)), known, lambda _: None)
-    assert found.surface is not None and found.resistance is not None
+    assert found.surface is not None and found.resistance is not None and found.balance is not None
     reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
     error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
     print(f"{name} {seed}: map {reached}, R {100 * error:+.2f} %, largest current {found.largest_A:.1f} A")
@@ -34,6 +34,7 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     assert abs(found.offset_A - offset_A) <= OFFSET_SHARE * truth.plant["current_full_scale_A"]
     assert reached.map_rms <= MAP_RMS
     assert abs(error) <= R_SHARE
+    assert balance_error(found.balance, truth) <= BALANCE
     assert found.largest_A <= known.i_max_A
     assert drive.get("run_state") != 1.0
     assert drive.get("fault_word") == 0.0

@@ -11,7 +11,7 @@ from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
-SIGNALS = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "pulses")
+SIGNALS = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A", "pulses")
 DONE, FAILED = 3.0, 4.0
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
             5: "the current exceeded the machine's largest"}  # fmt: skip
@@ -65,6 +65,7 @@ class Raw:
     i: Array  # complex, rotor frame
     u: Array  # complex, in the frame of the middle of its period
     theta: Array  # electrical, continuous
+    zero: Array  # mean of the three phase currents: not zero only by errors of the sensors
     period_s: float
     axes: tuple[float, float] = (1.0, 1.0)  # weights of psi_d and psi_q
     failure: str = ""
@@ -78,7 +79,7 @@ class Raw:
         """From the first sample on whose current along d is between the two."""
         inside = (self.i.real > low_A) & (self.i.real < high_A)
         kept = slice(int(np.argmax(inside)), None)
-        return replace(self, i=self.i[kept], u=self.u[kept], theta=self.theta[kept])
+        return replace(self, i=self.i[kept], u=self.u[kept], theta=self.theta[kept], zero=self.zero[kept])
 
     def without(self, offset: complex) -> "Raw":
         """Without the offsets of the current sensors, which are constant in the stationary frame."""
@@ -89,7 +90,7 @@ def _aligned(rows: Array, period_s: float, burst: Burst, failure: str) -> Raw:
     """The voltage of a row acts in the period after its sample."""
     i = rows[1:, 0] + 1j * rows[1:, 1]
     u = rows[:-1, 2] + 1j * rows[:-1, 3]
-    return Raw(i, u, np.unwrap(rows[1:, 4]), period_s, burst.axes, failure)
+    return Raw(i, u, np.unwrap(rows[1:, 4]), rows[1:, 5], period_s, burst.axes, failure)
 
 
 def _phase_word(drive: Capture) -> str:

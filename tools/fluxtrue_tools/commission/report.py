@@ -43,6 +43,13 @@ def _levels(found: Found, known: Nameplate) -> list[str]:
     ]
 
 
+def _balance(found: Found) -> list[str]:
+    if found.balance is None:
+        return []
+    gains = ", ".join(f"{phase} {100 * gain:+.2f} %" for phase, gain in zip("abc", found.balance.gains, strict=True))
+    return [f"  gains of the current sensors against their mean: {gains}, ±{100 * found.balance.sigma:.1g} %"]
+
+
 def _magnet(found: Found, known: Nameplate) -> list[str]:
     if found.spun is not None:
         return []
@@ -68,6 +75,7 @@ def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
             f"  left of the flux linkages: {1e3 * found.surface.left_Vs:.2g} mV·s; "
             f"{found.surface.unknowns:.0f} effective unknowns",
             f"  no samples in {100 * grid.circle_outside:.2g} % of the current circle: continued by the surface",
+            *_balance(found),
             *_magnet(found, known),
         ]
     else:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.flux_model import FluxModel
@@ -34,6 +35,11 @@ def score(model: FluxModel, truth: Truth, i_max_A: float, psi_f_Vs: float) -> Sc
     error = np.hypot(error_d, error_q)
     return Score(float(np.sqrt(np.mean(error**2))) / largest, float(error.max()) / largest,
                  float(np.sqrt(np.mean((error_d * q - error_q * d) ** 2))) / float(np.abs(torque).max()))  # fmt: skip
+
+
+def balance_error(balance: Balance, truth: Truth) -> float:
+    """The largest error of the difference between two sensors' gains."""
+    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in "abc"]))
 
 
 DRAG_FROM = 0.3  # of the largest speed of the run

@@ -4,7 +4,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from fluxtrue_tools.commission import connection, drag, levels, plan, spin, surface, turning
+from fluxtrue_tools.commission import balance, connection, drag, levels, plan, spin, surface, turning
+from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.bursts import FAILURES, SIGNALS, Raw, integrate, offset
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
@@ -35,6 +36,7 @@ class Found:
     resistance: Resistance | None = None
     first: plan.First | None = None
     bursts: list[Raw] = field(default_factory=list)
+    balance: Balance | None = None
     surface: Surface | None = None
 
     def known(self, known: Nameplate) -> Nameplate:
@@ -129,7 +131,8 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     lost = [raw.failure for raw in found.bursts if raw.failure not in ("", MOVED)]
     if len(lost) > plan.LOST_MAX:
         raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
-    linkages = [integrate(raw, found.resistance.r_ohm, found.knee_A) for raw in used]
+    found.balance = balance.measure(used)
+    linkages = [integrate(found.balance.corrected(raw), found.resistance.r_ohm, found.knee_A) for raw in used]
     found.surface = surface.fit(linkages, known.i_max_A, found.resistance.r_ohm, known.psi_f_Vs,
                                 found.resistance.total_V)  # fmt: skip
 
