@@ -1,13 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/safe_decision.h"
 
+static int32_t mean_of_phases(const snapshot_t *snapshot)
+{
+    return fx_abs_q31(snapshot->sample.zero_q28 >> 13);
+}
+
 /* Whether the measured currents are the machine's. The sum counts in this sample, not as a latched fault: in the first
  * milliseconds of a short circuit the converters saturate, which is one. */
 static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 {
-    const int32_t sum = fx_abs_q31(snapshot->sample.zero_q28 >> 13);
     return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
-           sum <= drive->motor->monitor.zero_sequence_max;
+           mean_of_phases(snapshot) <= drive->motor->monitor.zero_sequence_max;
 }
 
 /* With the known speed of the last step. */
@@ -21,6 +25,7 @@ static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *sna
         .currents_valid = are_currents_valid,
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,
+        .zero = mean_of_phases(snapshot),
         .i = snapshot->sample.point.i,
     };
     return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);

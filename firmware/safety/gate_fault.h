@@ -4,9 +4,10 @@
 /** What a gate-driver fault needs. Its usual cause is a shorted switch: with switching disabled a turning machine is
  * then braked by half waves, at any speed.
  *   e > v_dc/8: short circuit at once; e < v_dc/16: switching disabled; between: as before
- *   A current above i_alive although switching is disabled, while the sum of (v_dc - e) T over the steps exceeds
- *   1.5 sqrt(3) psi_b: no flux of the windings lasts that long against the dc link, so a switch is shorted. That is a
- *   gate fault, too, and needs the short circuit until the faults are reset.
+ *   A current above i_alive + 2 |i_0| although switching is disabled, while the sum of (v_dc - e) T over the steps
+ *   exceeds 1.5 sqrt(3) psi_b: no flux of the windings lasts that long against the dc link, so a switch is shorted.
+ *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
+ *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|.
  *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
  *   no switch is shorted and no current has flown for 50 steps with switching disabled.
  * Source   docs/theory/safe-state.md (SS-9), (SS-10)
@@ -39,6 +40,7 @@ typedef struct {
     bool rectifies; /* the diodes of a sound bridge may conduct (safety/safe_state.h) */
     bool currents_valid;
     q15_t line_emf, v_dc;
+    int32_t zero; /* mean of the three phases, magnitude */
     dq_q15_t i;
 } gate_fault_in_t;
 

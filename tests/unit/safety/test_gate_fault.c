@@ -78,6 +78,18 @@ void test_other_causes_of_a_current_are_no_shorted_switch(void)
     }
 }
 
+/* An offset of one sensor makes a vector of twice the mean of the phases. 2000 on top of it are a current. */
+void test_the_offset_of_a_current_sensor_is_no_shorted_switch(void)
+{
+    in.i = (dq_q15_t){0, 3000};
+    in.zero = 1500;
+    (void)steps(1000);
+    TEST_ASSERT_FALSE(state.switch_shorted);
+    in.i = (dq_q15_t){0, 5000};
+    (void)steps(1);
+    TEST_ASSERT_TRUE(state.switch_shorted);
+}
+
 void test_a_gap_in_the_current_restarts_the_sum(void)
 {
     in.line_emf = 10923; /* 0.333 V_b T per step: 2 steps suffice */
