@@ -56,8 +56,9 @@ typedef struct {
 typedef enum {
     SAFE_FREEWHEEL = 0,             /* switching disabled */
     SAFE_SHORT_ON_OVER_VOLTAGE = 1, /* short circuit if the fault is an over-voltage, else disabled */
-    SAFE_SHORT_ON_GATE_FAULT = 2,   /* short circuit if it is an over-voltage or a gate-driver fault, else disabled */
-    SAFE_SHORT_CIRCUIT = 3          /* short circuit */
+    SAFE_SHORT_ON_GATE_FAULT = 2,   /* short circuit if it is a gate-driver fault, else disabled */
+    SAFE_SHORT_ON_EITHER = 3,       /* short circuit if it is one of the two, else disabled */
+    SAFE_SHORT_CIRCUIT = 4          /* short circuit */
 } safe_t;
 
 /** What the bridge does: command_t.run. */

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/safe_decision.h"
 
+#define QUARTER_PER_PHASES Q15(0.25 / 1.5) /* a quarter of i_max in the dc link, as power of the three phases */
+
 static int32_t mean_of_phases(const snapshot_t *snapshot)
 {
     return fx_abs_q31(snapshot->sample.zero_q28 >> 13);
@@ -31,6 +33,18 @@ static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *sna
     return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);
 }
 
+/* The machine feeds more than a quarter of i_max into the dc link: an over-voltage would be its work, and the voltage
+ * would rise further while the diodes end the currents (SS-18). */
+static bool charges_link(const drive_t *drive, const snapshot_t *snapshot)
+{
+    const operating_point_t *point = &snapshot->sample.point;
+    const int32_t torque = fx_mul_q15((q15_t)point->flux.psi_d, (q15_t)point->i.q) -
+                           fx_mul_q15((q15_t)point->flux.psi_q, (q15_t)point->i.d);
+    const int32_t power = fx_mul_q15(fx_sat_q15(torque), fx_q15_from_q31(point->omega));
+    const int32_t power_max = fx_mul_q15((q15_t)snapshot->sample.v_dc, drive->motor->current_reference.i_max);
+    return power < -fx_mul_q15(QUARTER_PER_PHASES, (q15_t)power_max);
+}
+
 /* A bridge that switches off below the level of the short circuit, in the step in which the speed exceeds it, stays
  * off: only a decision of an earlier step holds the permission. */
 static bool is_armed(const task_state_t *task, bool holds_short_circuit, uint32_t faults)
@@ -38,10 +52,20 @@ static bool is_armed(const task_state_t *task, bool holds_short_circuit, uint32_
     return task->run_state == RUN_STATE_RUN || (task->armed && (holds_short_circuit || faults != 0U));
 }
 
+/* What would bring the short circuit, in the period in which it occurs. */
+static safe_t on_faults(bool gate_fault, bool over_voltage)
+{
+    if (over_voltage) {
+        return gate_fault ? SAFE_SHORT_ON_EITHER : SAFE_SHORT_ON_OVER_VOLTAGE;
+    }
+    return gate_fault ? SAFE_SHORT_ON_GATE_FAULT : SAFE_FREEWHEEL;
+}
+
 safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const uint32_t faults = snapshot->faults;
+    const bool over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U;
     const operating_point_t *point = &snapshot->sample.point;
     const safe_state_in_t in = {
         .omega = fx_q15_from_q31(point->omega),
@@ -53,7 +77,7 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
         .shorted = snapshot->shorted,
         .currents_valid = currents_valid(drive, snapshot),
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
-        .over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U,
+        .over_voltage = over_voltage && snapshot->shorted,
     };
     const bool was_short_circuit = task->safe_state.short_circuit;
     const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot, in.currents_valid);
@@ -66,8 +90,5 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     if (short_circuit) {
         return SAFE_SHORT_CIRCUIT;
     }
-    if (in.over_voltage) {
-        return SAFE_FREEWHEEL;
-    }
-    return by_gate ? SAFE_SHORT_ON_GATE_FAULT : SAFE_SHORT_ON_OVER_VOLTAGE;
+    return on_faults(by_gate, !over_voltage && charges_link(drive, snapshot));
 }

@@ -6,7 +6,7 @@
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
  *   valid speed 0.8 v_dc is the only level
- *   Short circuit also while an over-voltage is latched and v_dc is above v_release.
+ *   A short circuit that is on with a latched over-voltage lasts until v_dc is below v_release.
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
@@ -46,7 +46,7 @@ typedef struct {
     bool shorted;              /* the phases have been shorted for at least a step */
     bool currents_valid;
     bool speed_valid;
-    bool over_voltage; /* latched */
+    bool over_voltage; /* latched, and the phases are shorted */
 } safe_state_in_t;
 
 bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in);

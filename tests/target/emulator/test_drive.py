@@ -93,7 +93,7 @@ def test_ten_seconds_of_driving_leave_the_same_bits_as_on_the_host(drive: Loop, 
     derating, faults = drive_with_shadow(drive, 10.0)
     check_shadow(drive, 100_000)
     assert derating & EVERY_LIMIT == EVERY_LIMIT
-    # The short circuit against the over-voltage starts with a current above the over-current level.
+    # The short circuit starts with a current above the over-current level.
     assert faults == OVER_VOLTAGE | OVER_CURRENT | GATE
     assert drive.get("fault_word") == 0
     assert drive.get("truth.torque_Nm") == pytest.approx(5.0, abs=1.0)  # it makes torque again

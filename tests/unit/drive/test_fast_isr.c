@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/mrai/mrai_seam.h"
+#include "drive/short_circuit.h"
 #include "drive/slow_monitors.h"
 #include "drive/turning_modulate.h"
 #include "hal/mock_adc.h"
@@ -242,11 +243,11 @@ void test_single_samples_of_over_voltage_with_good_ones_between_are_no_fault(voi
     TEST_ASSERT_TRUE(published()->acting);
 }
 
-void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
+void test_an_over_voltage_shorts_the_phases_if_the_task_has_decided_so(void)
 {
     seam_run();
     seam_periods(3);
-    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_OVER_VOLTAGE, command_box_read(&drive.commands)->safe);
+    write_command(SAFE_SHORT_ON_OVER_VOLTAGE, 0);
     seam_voltage(450.0);
     seam_periods(2);
     TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
@@ -256,6 +257,37 @@ void test_an_over_voltage_shorts_the_phases_of_a_bridge_that_runs(void)
     seam_voltage(350.0);
     seam_periods(30);
     expect_shorted(false);
+}
+
+/* The machine stands: the voltage is not its work. */
+void test_an_over_voltage_of_the_battery_disables_switching(void)
+{
+    seam_run();
+    seam_periods(3);
+    seam_voltage(450.0);
+    seam_periods(2);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_OVER_VOLTAGE, drive.fast.faults);
+    expect_shorted(false);
+    seam_periods(30);
+    expect_shorted(false);
+}
+
+void test_each_decision_shorts_the_phases_on_its_own_faults_only(void)
+{
+    static const struct {
+        safe_t safe;
+        bool on_over_voltage, on_gate_fault, on_other;
+    } expected[] = {
+        {SAFE_FREEWHEEL, false, false, false},          {SAFE_SHORT_ON_OVER_VOLTAGE, true, false, false},
+        {SAFE_SHORT_ON_GATE_FAULT, false, true, false}, {SAFE_SHORT_ON_EITHER, true, true, false},
+        {SAFE_SHORT_CIRCUIT, true, true, true},
+    };
+    for (unsigned n = 0; n < sizeof expected / sizeof expected[0]; n++) {
+        const safe_t safe = expected[n].safe;
+        TEST_ASSERT_EQUAL(expected[n].on_over_voltage, short_circuit_is_needed(FAULT_OVER_VOLTAGE, safe));
+        TEST_ASSERT_EQUAL(expected[n].on_gate_fault, short_circuit_is_needed(FAULT_GATE, safe));
+        TEST_ASSERT_EQUAL(expected[n].on_other, short_circuit_is_needed(FAULT_ANGLE, safe));
+    }
 }
 
 void test_an_over_voltage_never_enables_a_bridge_that_has_not_run(void)

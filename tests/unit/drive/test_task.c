@@ -359,6 +359,36 @@ void test_a_level_that_is_exceeded_in_the_step_of_switching_off_closes_no_short_
     TEST_ASSERT_EQUAL_INT(SAFE_FREEWHEEL, command()->safe);
 }
 
+/* What a fault would bring now, with this i_q at this speed; after 120 steps it is the known one. */
+static safe_t safe_with(int32_t i_q, double omega_pu)
+{
+    sample_at(omega_pu, true, false);
+    sample_t *s = sample_box_begin(&drive.samples);
+    *s = *sample_box_at(&drive.samples, drive.samples.generation);
+    s->point.i = (dq_q15_t){0, i_q};
+    s->point.flux = flux_table_step(&motor.flux_table, s->point.i);
+    sample_box_publish(&drive.samples);
+    for (int k = 0; k < 120; k++) {
+        task_1khz(&drive);
+    }
+    return command()->safe;
+}
+
+/* At 0.4 of the speed base 50 N·m feed a quarter of i_max into the dc link; i_q = -20000 makes 80 N·m. */
+void test_an_over_voltage_would_short_a_machine_that_charges_the_link_and_no_other(void)
+{
+    seam_run();
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_EITHER, safe_with(-20000 * sign, 0.4 * sign));
+        TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_GATE_FAULT, safe_with(-2000 * sign, 0.4 * sign));
+        TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_GATE_FAULT, safe_with(0, 0.4 * sign));
+        TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_GATE_FAULT, safe_with(20000 * sign, 0.4 * sign));
+        TEST_ASSERT_EQUAL_INT(SAFE_FREEWHEEL, safe_with(-20000 * sign, 0.02 * sign));
+    }
+    seam.motor.safe_state.psi_f = 100; /* a gate fault of a machine with so weak a magnet needs no short circuit */
+    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_ON_OVER_VOLTAGE, safe_with(-20000, 0.4));
+}
+
 void test_the_torque_comes_back_when_enable_does(void)
 {
     run_at(0.9, 0.1);

@@ -237,7 +237,7 @@ void test_no_failure_of_the_angle_releases_a_machine_that_turns(void)
     }
 }
 
-void test_an_over_voltage_needs_the_short_circuit_at_any_speed_until_the_voltage_is_low(void)
+void test_a_short_circuit_after_an_over_voltage_lasts_at_any_speed_until_the_voltage_is_low(void)
 {
     in.over_voltage = true;
     in.v_dc = 28000;
