@@ -25,11 +25,12 @@ static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bo
 
 bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in)
 {
-    const bool carries = fx_magnitude(in->i.d, in->i.q) > config->i_alive + 2 * in->zero;
+    const int32_t magnitude = fx_magnitude(in->i.d, in->i.q);
+    const bool carries = magnitude > config->i_alive + 2 * in->zero;
     const bool disabled = !in->gates && in->currents_valid;
     state->switch_shorted = is_switch_shorted(config, state, in, disabled && carries);
     state->above = in->line_emf > in->v_dc >> (state->above ? 4 : 3);
-    const bool released = may_release(state, in, disabled && !carries);
+    const bool released = may_release(state, in, disabled && magnitude <= config->i_alive);
     state->holds_supply = in->latched && !released;
     return state->above || state->switch_shorted;
 }

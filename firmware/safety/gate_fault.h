@@ -9,7 +9,7 @@
  *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
  *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|.
  *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
- *   no switch is shorted and no current has flown for 50 steps with switching disabled.
+ *   no switch is shorted and no current above i_alive was measured for 50 steps with switching disabled.
  * Source   docs/theory/safe-state.md (SS-9), (SS-10)
  * Units    per unit
  * Range    every argument

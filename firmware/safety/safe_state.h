@@ -6,7 +6,8 @@
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
  *   valid speed 0.8 v_dc is the only level
- *   A short circuit that is on with a latched over-voltage lasts until v_dc is below v_release.
+ *   A short circuit that is on with a latched over-voltage lasts until v_dc is below v_release, and is then not closed
+ *   again for the same over-voltage.
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
@@ -43,7 +44,7 @@ typedef struct {
     q15_t v_dc;
     dq_q15_t i, i_last_period; /* measured in this period and in the one before it */
     dq_q15_t psi_current;      /* tables' flux at i, less that at no current */
-    bool shorted;              /* the phases have been shorted for at least a step */
+    bool shorted;              /* the phases are shorted, as read back */
     bool currents_valid;
     bool speed_valid;
     bool over_voltage; /* latched, and the phases are shorted */

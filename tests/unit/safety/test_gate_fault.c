@@ -164,3 +164,15 @@ void test_a_shorted_switch_holds_the_supply_however_long_no_current_flows(void)
     (void)steps(1000);
     TEST_ASSERT_TRUE(state.holds_supply);
 }
+
+/* What may be the offset of a sensor is no shorted switch, but it may as well be a current. */
+void test_an_offset_delays_the_release_of_the_supply(void)
+{
+    in.latched = true;
+    in.line_emf = 1000;
+    in.i = (dq_q15_t){0, 3000};
+    in.zero = 1500;
+    (void)steps(1000);
+    TEST_ASSERT_FALSE(state.switch_shorted);
+    TEST_ASSERT_TRUE(state.holds_supply);
+}
