@@ -55,6 +55,12 @@ def test_a_spectrum_has_the_amplitudes_of_a_sine_and_the_mean() -> None:
     assert amplitudes[frequencies > SINE_Hz + 3.0 * spectrum.step_Hz].max() < 1e-3 * SINE_A
 
 
+def test_a_ripple_from_sample_to_sample_has_its_amplitude_in_the_spectrum() -> None:
+    whole = captured()
+    ripple = replace(whole, columns={"i_d_A": SINE_A * (-1.0) ** np.arange(SAMPLES)})
+    assert spectrum_of(ripple).columns["i_d_A"][-1] == pytest.approx(SINE_A)
+
+
 def test_a_capture_of_a_few_samples_has_no_spectrum() -> None:
     whole = captured()
     few = replace(whole, time_s=whole.time_s[:7], columns={"i_d_A": whole.columns["i_d_A"][:7]})
@@ -199,7 +205,7 @@ def test_a_fault_that_comes_first_leaves_its_freeze_frame_and_ends_the_repetitio
     scope.arm(SETUP, True)
     ecu.is_freeze_frame, ecu.state = True, "done"
     scope.follow()
-    assert scope.newest is not None and scope.newest.is_freeze_frame
+    assert scope.newest is not None and scope.newest[1].is_freeze_frame
     assert (scope.told.state, ecu.armed) == ("idle", 1)
     assert scope.told.text == "A fault came first: these are the periods around it."
 

@@ -170,7 +170,7 @@ def _wanted(scope: Oscilloscope, message: dict[str, Any]) -> Setup:
                       number(message.get("before"), "before"), whole["samples"], whole["divisor"])  # fmt: skip
 
 
-async def _told(text: str) -> Answer:
+async def _scope_answer(text: str) -> Answer:
     """An answer that the page shows where its oscilloscope is operated."""
     return {"type": "scope", "text": text}
 
@@ -179,8 +179,8 @@ async def _scoped(scope: Oscilloscope, call: Any, *values: Any) -> Answer:
     try:
         await asyncio.get_running_loop().run_in_executor(scope.thread, call, *values)
     except FluxtrueError as error:
-        return await _told(str(error))
-    return await _told("")
+        return await _scope_answer(str(error))
+    return await _scope_answer("")
 
 
 def _capture(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer]:
@@ -192,7 +192,7 @@ def _capture(session: Session, socket: web.WebSocketResponse, message: dict[str,
             try:
                 wanted = _wanted(scope, message)
             except FluxtrueError as error:
-                return _told(str(error))
+                return _scope_answer(str(error))
             take(session, socket)
             return _scoped(scope, scope.arm, wanted, bool(message.get("repeat")))
         case "scope_trigger":
@@ -207,10 +207,10 @@ def _capture(session: Session, socket: web.WebSocketResponse, message: dict[str,
 
 async def _newest(scope: Oscilloscope) -> Answer:
     """The newest capture: any page may see it."""
-    told, newest = scope.told, scope.newest
-    if newest is None:
+    if scope.newest is None:
         raise FluxtrueError("no capture has been read")
-    return {"type": "capture", "number": told.capture, **await asyncio.to_thread(content, newest)}
+    number, capture = scope.newest
+    return {"type": "capture", "number": number, **await asyncio.to_thread(content, capture)}
 
 
 def _replay(session: Session, message: dict[str, Any]) -> None:

@@ -28,7 +28,10 @@ async def capture_file(request: web.Request) -> web.Response:
     oscilloscope, kind = request.app[SESSION].oscilloscope, request.match_info["kind"]
     if oscilloscope is None or oscilloscope.newest is None:
         raise web.HTTPNotFound(text="no capture has been read")
-    body = await asyncio.to_thread(_written, oscilloscope.newest, kind)
-    name = f"capture-{oscilloscope.told.capture}.{kind}"
+    number, capture = oscilloscope.newest
+    if request.query.get("number", str(number)) != str(number):
+        raise web.HTTPNotFound(text=f"capture {number} is newer, and only the newest is kept")
+    body = await asyncio.to_thread(_written, capture, kind)
+    name = f"capture-{number}.{kind}"
     return web.Response(body=body, content_type=TYPES[kind],
                         headers={"Content-Disposition": f'attachment; filename="{name}"'})  # fmt: skip

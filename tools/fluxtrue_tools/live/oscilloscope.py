@@ -14,7 +14,7 @@ from pyxcp.types import XcpResponseError
 
 from fluxtrue_tools.a2l.elf import Description
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.live.xcp import Xcp
+from fluxtrue_tools.live.xcp import BENCH_ANSWER_S, Xcp
 from fluxtrue_tools.scope.scope import LEVELS, SIGNALS_MAX, TRIGGERS, WORDS, Capture, Scope, Setup
 from fluxtrue_tools.scope.spectrum import SAMPLES_MIN, spectrum_of
 from fluxtrue_tools.scope.xcp import XcpRefused
@@ -82,7 +82,7 @@ class Oscilloscope:
         self._setup: Setup | None = None
         self.repeats = False
         self.told = Told()
-        self.newest: Capture | None = None
+        self.newest: tuple[int, Capture] | None = None  # with its number
 
     @property
     def thread(self) -> ThreadPoolExecutor:
@@ -103,13 +103,16 @@ class Oscilloscope:
 
     def arm(self, setup: Setup, repeats: bool) -> None:
         """Start a capture, in place of one that still waits for its trigger."""
-        self.repeats = False
-        with self._xcp.reported():
-            if self.told.state in WAITING:
-                self._scope.give_up()
-                self.told = replace(self.told, state="idle")
-            self._arm(setup)
-        self._setup, self.repeats = setup, repeats
+        self._setup, self.repeats = setup, repeats  # the page that closes meanwhile may end the repetition
+        try:
+            with self._xcp.reported():
+                if self.told.state in WAITING:
+                    self._scope.give_up()
+                    self.told = replace(self.told, state="idle")
+                self._arm(setup)
+        except FluxtrueError:
+            self.repeats = False
+            raise
 
     def _arm(self, setup: Setup) -> None:
         self._scope.take(setup)
@@ -142,7 +145,7 @@ class Oscilloscope:
         try:
             with self._xcp.reported():
                 self._follow()
-        except FluxtrueError as error:
+        except Exception as error:  # this call has no caller that waits: the pages show how it ended
             self.repeats = False
             self.told = replace(self.told, state="idle", text=str(error))
 
@@ -160,20 +163,23 @@ class Oscilloscope:
             self.told = replace(self.told, state=status.state)
             return
         self.told = replace(self.told, state="reading")
-        self.newest = self._scope.read()
-        text = "A fault came first: these are the periods around it." if self.newest.is_freeze_frame else ""
-        self.told = Told("idle", self.told.capture + 1, text)
+        capture = self._scope.read()
+        text = "A fault came first: these are the periods around it." if capture.is_freeze_frame else ""
+        self.newest = (self.told.capture + 1, capture)
+        self.told = Told("idle", self.newest[0], text)
         if self.repeats and self._setup is not None:
             self._arm(self._setup)
 
 
 async def watch(oscilloscope: Oscilloscope, is_silent: Callable[[], bool]) -> None:
-    """Follow the captures; no call waits for an inverter that is silent."""
+    """Follow the captures; no call waits for an inverter that has been silent for longer than an answer may take."""
     run = asyncio.get_running_loop().run_in_executor
     following: asyncio.Future[None] | None = None
+    silent = 0
     while True:
         await asyncio.sleep(POLL_S)
-        if is_silent():
+        silent = silent + 1 if is_silent() else 0
+        if silent * POLL_S >= BENCH_ANSWER_S:
             oscilloscope.abandon()
-        elif following is None or following.done():
+        elif not silent and (following is None or following.done()):
             following = run(oscilloscope.thread, oscilloscope.follow)

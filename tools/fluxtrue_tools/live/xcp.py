@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from typing import Final
 
+import can
 from pyxcp.config import create_application_from_config
 from pyxcp.master import Master
 from pyxcp.types import Command, XcpResponseError, XcpTimeoutError
@@ -31,13 +32,13 @@ def _key(resource: int, seed: bytes) -> bytes:
 
 def _connect(address: BusAddress, answer_s: float) -> Master:
     application = create_application_from_config({}, log_level=logging.CRITICAL)
-    can = application.transport.can
-    can.interface, can.channel = address.interface, address.channel
-    can.can_id_master, can.can_id_slave = COMMAND_ID, ANSWER_ID
-    section = getattr(can, address.interface, None)
+    bus = application.transport.can
+    bus.interface, bus.channel = address.interface, address.channel
+    bus.can_id_master, bus.can_id_slave = COMMAND_ID, ANSWER_ID
+    section = getattr(bus, address.interface, None)
     for name, value in address.options.items():
         if name == "bitrate":
-            can.bitrate = value
+            bus.bitrate = value
         elif section is not None and hasattr(section, name):
             setattr(section, name, value)
     application.transport.timeout = answer_s
@@ -54,10 +55,15 @@ class Xcp:
         self._address, self._answer_s, self._standing_still = address, answer_s, standing_still
         self._master: Master | None = None
         self._made: Master | None = None  # the same, from before it is connected
-        self.is_abandoned = False
+        self._abandoned: Master | None = None  # whose call waits no longer
         self._stack = ExitStack()  # closes the connection
         self.is_busy = False  # a call is in progress
         self.thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="xcp")
+
+    @property
+    def is_abandoned(self) -> bool:
+        """The call over this connection waits no longer for an inverter that is silent."""
+        return self._abandoned is not None and self._abandoned is self._made
 
     def master(self) -> Master:
         """The connected, unlocked master."""
@@ -73,6 +79,8 @@ class Xcp:
     def reported(self) -> Iterator[None]:
         """What goes wrong becomes one message. After an ECU that did not answer, which may have been reset, the next
         call connects again."""
+        if self.is_abandoned:  # the call before ended by itself in that moment
+            self._disconnect()
         self.is_busy = True
         try:
             yield
@@ -81,15 +89,15 @@ class Xcp:
                 raise FluxtrueError(f"XCP: {error}") from error
             self._disconnect()
             raise FluxtrueError(f"XCP: {SILENT}") from error
-        except (XcpTimeoutError, OSError, RuntimeError) as error:
+        except (XcpTimeoutError, can.CanError, OSError, RuntimeError) as error:
             self._disconnect()
             raise FluxtrueError(f"XCP: {error}") from error
         finally:
             self.is_busy = False
 
     def _disconnect(self) -> None:
-        self._master, self._made, self.is_abandoned = None, None, False
-        with suppress(XcpTimeoutError, OSError, RuntimeError):
+        self._master = self._made = self._abandoned = None
+        with suppress(XcpTimeoutError, can.CanError, OSError, RuntimeError):
             self._stack.close()
 
     def abandon(self) -> None:
@@ -97,7 +105,7 @@ class Xcp:
         without end. Any thread."""
         made = self._made
         if made is not None and self.is_busy:
-            self.is_abandoned = True
+            self._abandoned = made
             with made.transport.resQueue_condition:
                 made.transport.resQueue.append(NEGATIVE)
                 made.transport.resQueue_condition.notify()

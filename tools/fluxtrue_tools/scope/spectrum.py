@@ -25,6 +25,8 @@ def _amplitudes(column: NDArray[np.float64], window: NDArray[np.float64]) -> NDA
     mean = column.mean()
     spectrum: NDArray[np.float64] = 2.0 * np.abs(np.fft.rfft((column - mean) * window)) / window.sum()
     spectrum[0] = abs(mean)
+    if len(column) % 2 == 0:
+        spectrum[-1] /= 2.0  # half of the sampling rate has no mirror image
     return spectrum
 
 

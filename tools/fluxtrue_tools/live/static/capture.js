@@ -2,13 +2,13 @@
 // The captured signals: one chart for each unit, two cursors, zoom, spectrum, export.
 import { send } from "./connection.js";
 import { $, element, show } from "./page.js";
-import { line, plot } from "./plot.js";
+import { discard, line, plot } from "./plot.js";
 import { color } from "./theme.js";
 
 const HUES = ["blue", "orange", "green", "violet", "red", "quiet"];
 const SHOWN = { deg: "°", Nm: "N·m", "rad_s": "rad/s" };
 const TRIGGER = "T";
-const BUTTONS = ["scope-pause", "scope-spectrum", "scope-zoom", "scope-whole", "scope-a", "scope-b"];
+const CONTROLS = ["scope-pause", "scope-spectrum", "scope-zoom", "scope-whole", "scope-a", "scope-b"];
 
 let capture = null; // the one that is drawn
 let newest = 0; // number of the newest that the server has
@@ -110,11 +110,17 @@ function chart(unit, names) {
   return drawn;
 }
 
+function removeCharts() {
+  discard($("scope-charts"));
+  $("scope-charts").replaceChildren();
+  charts = [];
+}
+
 function draw() {
   shown = isSpectrum ? frequencies() : samples();
   const units = {};
   for (const name of Object.keys(shown.columns)) (units[unitOf(name)] ??= []).push(name);
-  $("scope-charts").replaceChildren();
+  removeCharts();
   const last = shown.x.length - 1;
   cursors = [isSpectrum ? 0 : Math.min(capture.trigger, last), last];
   for (const id of ["scope-a", "scope-b"]) $(id).max = last;
@@ -123,7 +129,7 @@ function draw() {
 }
 
 function download(kind) {
-  Object.assign(document.createElement("a"), { href: `/capture.${kind}`, download: "" }).click();
+  Object.assign(document.createElement("a"), { href: `/capture.${kind}?number=${capture.number}`, download: "" }).click();
 }
 
 export function onCapture(message) {
@@ -141,7 +147,7 @@ export function onCapture(message) {
 // The server has another capture: it is fetched, unless the picture is paused.
 export function newestCapture(number) {
   newest = number;
-  if (!number || number === asked || (isPaused && capture)) return;
+  if (!number || number === asked || number === capture?.number || (isPaused && capture)) return;
   asked = number;
   send({ type: "capture" });
 }
@@ -161,15 +167,14 @@ export function clearCapture() {
   capture = shown = null;
   newest = asked = 0;
   isPaused = isSpectrum = false;
-  charts = [];
+  removeCharts();
   $("scope-result").hidden = true;
-  $("scope-charts").replaceChildren();
   $("scope-values").tBodies[0].replaceChildren();
 }
 
 export function showCapture(known) {
   const drawn = known && capture !== null;
-  for (const id of BUTTONS) $(id).disabled = !drawn;
+  for (const id of CONTROLS) $(id).disabled = !drawn;
   $("scope-spectrum").disabled ||= capture?.spectrum === null;
   // The server keeps the newest capture only: an older one that is still drawn cannot be exported.
   $("scope-csv").disabled = $("scope-mf4").disabled = !(drawn && capture.number === newest);

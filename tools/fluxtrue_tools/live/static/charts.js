@@ -9,7 +9,7 @@ export const stats = { batches: 0, draws: 0, rows: 0 };
 const SPAN_MIN = 0.05; // seconds
 let charts = [];
 let dirty = false;
-let held = null; // { data, from, to }: what paused charts show
+let held = null; // { data, from, to, ends }: what paused charts show
 let isDragged = false; // a range is being chosen with the mouse
 let run = null;
 
@@ -20,7 +20,7 @@ function torque() {
 
 function chart(id, lines, range, data) {
   const made = plot($(id), lines, range, undefined, { zoom });
-  made.over.addEventListener("mousedown", () => { isDragged = true; });
+  made.over.addEventListener("mousedown", (event) => { isDragged = event.button === 0; });
   return { made, data };
 }
 
@@ -96,6 +96,7 @@ export function startCharts() {
   if (charts.length) return;
   makeCharts();
   document.addEventListener("mouseup", () => { isDragged = false; });
+  window.addEventListener("blur", () => { isDragged = false; });
   $("charts-pause").onclick = () => (held ? release() : move(0, 1));
   $("charts-in").onclick = () => move(0, 0.5);
   $("charts-out").onclick = () => move(0, 2);

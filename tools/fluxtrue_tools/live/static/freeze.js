@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The freeze frame: charts of the last steps before the first fault.
 import { $, element } from "./page.js";
-import { atLeast, line, plot } from "./plot.js";
+import { atLeast, discard, line, plot } from "./plot.js";
 import { wordsOf } from "./reasons.js";
 
 const CHARTS = [
@@ -24,6 +24,7 @@ function drawChart({ t_ms, signals }, [title, unit, span, lines]) {
 
 export function showFreezeFrame(hello, message) {
   $("freeze-frame").hidden = !message.frozen;
+  discard($("freeze-charts"));
   $("freeze-charts").replaceChildren();
   if (!message.frozen) return;
   const { time_ms: time, state } = message.values;

@@ -96,13 +96,12 @@ export function offerScope(hello) {
 
 export function showScope({ live, mayAct, scope }) {
   const known = live && Boolean(offer && scope);
-  const isWaiting = known && ["armed", "triggered"].includes(scope.state);
   mayArm = known && mayAct;
   $("scope-arm").disabled = !mayArm || scope.state === "reading";
   $("scope-trigger").disabled = !(mayArm && scope.state === "armed");
   $("scope-end").disabled = !mayArm || scope.state === "reading";
   showForm();
-  if (offer) show("scope-text", known ? (isWaiting ? STATES[scope.state] : STATES[scope.state] || answer || scope.text) : "");
+  if (offer) show("scope-text", known ? STATES[scope.state] || answer || scope.text : "");
   if (known) newestCapture(scope.capture);
   else clearCapture();
   showCapture(known);

@@ -4,7 +4,7 @@
 import { element } from "./page.js";
 import { color } from "./theme.js";
 
-const made = new Map(); // plots by the box that they fill
+const made = new Map(); // { drawn, observer } by the box that they fill
 const NEAR = 60; // rows
 const DRAG_MIN = 6, STEP = 10; // pixels
 const DASHES = { solid: undefined, dashed: [8, 5], dotted: [2, 3] };
@@ -102,28 +102,36 @@ export function plot(figure, lines, range, seconds = (s) => `${+s.toFixed(3)} s`
       axis({ size: 48, space: 24, gap: 4 })],
     scales: { x: { time: false }, y: { range } },
   }, [[], ...lines.map(() => [])], box);
-  new ResizeObserver(() => drawn.setSize(size())).observe(box);
+  const observer = new ResizeObserver(() => drawn.setSize(size()));
+  observer.observe(box);
   followKeys(box, drawn, title);
   let pressed = 0;
   drawn.over.addEventListener("mousedown", (event) => { pressed = event.clientX; });
   drawn.over.addEventListener("click", (event) => {
     if (pick && Math.abs(event.clientX - pressed) < DRAG_MIN) pick(drawn.posToVal(drawn.cursor.left, "x"));
   });
-  made.set(box, drawn);
+  made.set(box, { drawn, observer });
   return drawn;
+}
+
+// Removes the plots inside an element, with what uPlot keeps of them.
+export function discard(inside) {
+  for (const [box, { drawn, observer }] of made) {
+    if (!inside.contains(box)) continue;
+    observer.disconnect();
+    drawn.destroy();
+    made.delete(box);
+  }
 }
 
 // The range that each plot on the page shows.
 export function ranges() {
-  return [...made].filter(([box]) => box.isConnected).map(([, { scales: { x } }]) => [x.min, x.max]);
+  return [...made].filter(([box]) => box.isConnected).map(([, { drawn: { scales: { x } } }]) => [x.min, x.max]);
 }
 
-// Draws every plot that is still on the page with the colours of the present theme.
+// Draws every plot with the colours of the present theme.
 export function recolor() {
-  for (const [box, drawn] of made) {
-    if (box.isConnected) drawn.redraw(false, true);
-    else made.delete(box);
-  }
+  for (const [, { drawn }] of made) drawn.redraw(false, true);
 }
 
 // At least so wide: noise of a resting value must not fill the picture.
