@@ -56,6 +56,13 @@ def test_the_contours_are_where_the_firmware_limits_i_d(write: Write) -> None:
     plt.close(figure)
 
 
+def test_an_assumed_temperature_of_20_degrees_has_its_contour_where_the_limit_lies_inside_the_circle(
+    write: Write,
+) -> None:
+    magnets = {"i_d_demag_A": 200.0, "i_d_demag_A_per_K": 0.5, "assumed_C": 20.0}
+    assert demagnetisation_limits(load_motor(write(magnet=magnets)).config)[200.0] == "20 °C"
+
+
 def test_without_a_coefficient_there_is_one_contour(write: Write) -> None:
     motor = load_motor(write(magnet={"i_d_demag_A": 200.0}))
     figure = loci_figure(motor)
@@ -76,7 +83,7 @@ def test_without_a_limit_inside_the_circle_there_is_no_contour(write: Write, mag
 def test_a_limit_that_hot_magnets_do_not_have_at_all_ends_at_zero(write: Write) -> None:
     """300 A less 3 A/K: nothing is left at 120 °C, so no contour is hotter."""
     limits = demagnetisation_limits(load_motor(write(magnet={"i_d_demag_A": 300.0, "i_d_demag_A_per_K": 3.0})).config)
-    assert min(limits) >= 0.0 and max(float(name.split()[0]) for name in limits.values()) <= 120.0
+    assert 100.0 <= max(float(name.split()[0]) for name in limits.values()) <= 120.0
 
 
 def test_the_text_says_how_much_is_left(write: Write) -> None:

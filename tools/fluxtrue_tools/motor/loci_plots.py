@@ -122,8 +122,8 @@ def demagnetisation_limits(config: MotorConfig) -> dict[float, str]:
     low, high = max(first, COLD_C), min(hottest_C(config), withstands_C(config, 0.0) or COLD_C)
     ticks = MaxNLocator(LIMITS_SHOWN).tick_values(low, high) if low < high else np.empty(0)
     apart = 0.5 * float(np.diff(ticks[:2])[0]) if len(ticks) > 1 else 0.0
-    shown = {float(c) for c in ticks if low < c <= high and abs(c - assumed) > apart}
-    shown |= {assumed} if low < assumed <= high else set()
+    shown = {float(c) for c in ticks if abs(c - assumed) > apart} | {assumed}
+    shown = {c for c in shown if low <= c <= high and limit_A(config, c) < i_max}
     return {limit_A(config, celsius): f"{celsius:g} °C" for celsius in sorted(shown)}
 
 

@@ -123,7 +123,8 @@ def _short_circuit(motor: Motor) -> Lines:
         )
     else:
         lines.append(
-            "  safe state         only after an over-voltage: up to speed_max_rpm the back-EMF stays below "
+            "  safe state         only after a gate-driver fault, or an over-voltage while the machine charges the "
+            "link: up to speed_max_rpm the back-EMF stays below "
             f"{motor.derived.share_short:g} vdc_V"
         )
     return lines
