@@ -108,7 +108,7 @@ def _coast(drive: Capture, known: Nameplate) -> list[Array]:
     drive.set(COMPENSATION, 0.0)
     try:
         for level in LEVELS:
-            _settle(drive, known, level * D_SHARE * known.i_max_A, q_A)
+            _settle_current(drive, known, level * D_SHARE * known.i_max_A, q_A)
             taken.append(turning.advance(drive, LEVEL_S, NAME))
             q_A -= mean_current(taken[-1], known.offset_A).imag
     finally:
@@ -117,7 +117,7 @@ def _coast(drive: Capture, known: Nameplate) -> list[Array]:
     return taken
 
 
-def _settle(drive: Capture, known: Nameplate, i_d_A: float, q_A: float) -> None:
+def _settle_current(drive: Capture, known: Nameplate, i_d_A: float, q_A: float) -> None:
     """Until the mean current is the wanted one, along d.
 
     While the machine becomes slower, its voltage falls, and current control follows it by a constant current along q,
@@ -132,7 +132,8 @@ def _settle(drive: Capture, known: Nameplate, i_d_A: float, q_A: float) -> None:
 
 
 def whole_turns(rows: Array) -> Array:
-    """The rows of whole electrical turns: there the errors of sensors and inverter that turn have no mean."""
+    """The rows of whole electrical turns, and the first of the next: over them the errors of sensors and inverter that
+    turn have no mean."""
     theta = np.unwrap(rows[:, 4])
     turns = math.floor(abs(theta[-1] - theta[0]) / turning.TURN)
     return rows[: int(np.searchsorted(np.abs(theta - theta[0]), turns * turning.TURN)) + 1] if turns else rows
