@@ -119,17 +119,16 @@ int16_t hal_temperature_inverter_dC(void)
     return 200;
 }
 
-CALLED void drive_start(uint32_t mode)
-{
-    drive_init(&drive, &motor);
-    drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
-}
-
 /* With other motor data, which lie in memory. */
 CALLED void drive_start_for(uint32_t mode, const motor_t *data)
 {
     drive_init(&drive, data);
     drive.request.identification_mode = (mode == 0U) ? IDENTIFICATION_PAPER : IDENTIFICATION_ROBUST;
+}
+
+CALLED void drive_start(uint32_t mode)
+{
+    drive_start_for(mode, &motor);
 }
 
 CALLED void drive_request(int32_t torque, uint32_t enable)
