@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report's figure of the current references over the current plane, with all that limits them."""
 
+from collections.abc import Sequence
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -17,7 +19,7 @@ from fluxtrue_tools.motor.envelope import available_flux
 from fluxtrue_tools.motor.flux_model import Array, flux, torque
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.quantise import Q15_ONE
-from fluxtrue_tools.motor.references import lookup_references
+from fluxtrue_tools.motor.references import Contour, lookup_references
 
 POINTS = 121
 LIMITS_SHOWN = 7
@@ -68,11 +70,10 @@ def _voltage_limits(axes: Axes, motor: Motor, d: Array, q: Array, psi: Array) ->
     axes.plot([], [], color="tab:blue", linewidth=0.8, label=f"voltage limit at a speed, up to {top_rpm:g} rpm")
 
 
-def _mtpv(motor: Motor) -> tuple[Array, Array]:
+def _mtpv(contours: Sequence[Contour], i_max_A: float) -> tuple[Array, Array]:
     """Contour ends that lie inside the circle: the voltage, not the current, limits the torque there."""
-    torques = np.linspace(0.0, motor.solver.torque_top_Nm * 0.999, 60)
-    ends = [(c.id_A[-1], c.iq_A[-1]) for c in motor.solver.contours(torques)]
-    inside = [(d, q) for d, q in ends if np.hypot(d, q) < 0.995 * motor.config.machine.i_max_A]
+    ends = [(c.id_A[-1], c.iq_A[-1]) for c in contours]
+    inside = [(d, q) for d, q in ends if np.hypot(d, q) < 0.995 * i_max_A]
     d, q = zip(*inside, strict=True) if inside else ((), ())
     return np.array(d), np.array(q)
 
@@ -89,7 +90,7 @@ def loci_figure(motor: Motor) -> Figure:
     axes.plot(i_max * np.cos(angle), i_max * np.sin(angle), "k", label="current limit i_max_A")
     contours = motor.solver.contours(np.linspace(0, motor.solver.torque_top_Nm * 0.999, 60))
     axes.plot([c.id_A[0] for c in contours], [c.iq_A[0] for c in contours], "tab:green", lw=2.5, label="MTPA")
-    weakest = _mtpv(motor)
+    weakest = _mtpv(contours, i_max)
     if len(weakest[0]):
         axes.plot(*weakest, "tab:red", lw=2.5, label="MTPV")
     _stored_loci(axes, motor)
