@@ -119,7 +119,9 @@ class Oscilloscope:
         try:
             self._scope.arm()
         except FluxtrueError as error:
-            raise FluxtrueError(HELD) if isinstance(error.__cause__, XcpRefused) else error from error
+            if isinstance(error.__cause__, XcpRefused):
+                raise FluxtrueError(HELD) from error
+            raise
         self.told = replace(self.told, state="armed", text="")
 
     def trigger(self) -> None:
