@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 from aiohttp.test_utils import TestClient
+from masters import ConnectedMaster
 from progress import polled
 from pyxcp.types import Command, XcpResponseError
 from test_server import Drive, page, serve
@@ -87,23 +88,12 @@ class Transport:
         raise XcpResponseError("ERR_CMD_SYNCH")
 
 
-class Master:
+class Master(ConnectedMaster):
     """A master before an ECU that answers nothing after it has been connected."""
 
     def __init__(self) -> None:
-        self.transport, self.is_closed = Transport(), False
-
-    def __enter__(self) -> "Master":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.is_closed = True
-
-    def connect(self) -> None:
-        """Begin the session."""
-
-    def cond_unlock(self) -> None:
-        """Give the key."""
+        super().__init__()
+        self.transport = Transport()
 
 
 @pytest.fixture

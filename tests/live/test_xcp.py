@@ -4,6 +4,7 @@
 from typing import ClassVar
 
 import pytest
+from masters import ConnectedMaster
 from pyxcp.types import XcpTimeoutError
 
 from fluxtrue_tools.a2l.elf import Description, Value
@@ -16,26 +17,15 @@ OBSERVER = Value("observer_m", "", "", "F32", "", 2.0, 4.0, 0x1000)
 DESCRIPTION = Description("hsm1", (OBSERVER,), (), (), (), 1e-3)
 
 
-class Master:
+class Master(ConnectedMaster):
     """A session that ends when the ECU is reset: afterwards nothing is answered."""
 
     made: ClassVar[list["Master"]] = []
 
     def __init__(self) -> None:
-        self.is_reset, self.closed = False, False
+        super().__init__()
+        self.is_reset = False
         Master.made.append(self)
-
-    def __enter__(self) -> "Master":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.closed = True
-
-    def connect(self) -> None:
-        """Begin the session."""
-
-    def cond_unlock(self) -> None:
-        """Give the key."""
 
     def setMta(self, address: int) -> None:
         """Say where the next data go."""
@@ -59,7 +49,7 @@ def test_after_an_ecu_that_did_not_answer_the_next_call_connects_again(tuning: T
     Master.made[0].is_reset = True
     with pytest.raises(FluxtrueError, match="XCP: no answer"):
         tuning.write("observer_m", 3.0)
-    assert Master.made[0].closed
+    assert Master.made[0].is_closed
     tuning.write("observer_m", 3.0)
-    assert len(Master.made) == 2 and not Master.made[1].closed
+    assert len(Master.made) == 2 and not Master.made[1].is_closed
     tuning.close()
