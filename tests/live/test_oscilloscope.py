@@ -118,12 +118,12 @@ def session(made: list[Master]) -> xcp.Xcp:
 def test_no_call_waits_for_an_inverter_that_is_silent(session: xcp.Xcp, made: list[Master]) -> None:
     scope = Oscilloscope(session, DESCRIPTION)
     for count in (1, 2):
-        scope.told = replace(scope.told, state="armed")
+        scope.status = replace(scope.status, state="armed")
         call = scope.thread.submit(scope.follow)
         polled(lambda count=count: len(made) == count and made[-1].transport.is_waiting)  # type: ignore[misc]
         scope.abandon()
         call.result()
-        assert scope.told.state == "idle" and scope.told.text == "XCP: the inverter does not answer any more"
+        assert scope.status.state == "idle" and scope.status.text == "XCP: the inverter does not answer any more"
         assert made[-1].is_closed
     scope.abandon()  # nothing waits
     session.close()
@@ -131,7 +131,7 @@ def test_no_call_waits_for_an_inverter_that_is_silent(session: xcp.Xcp, made: li
 
 def test_a_session_ends_although_a_call_waits(session: xcp.Xcp, made: list[Master]) -> None:
     scope = Oscilloscope(session, DESCRIPTION)
-    scope.told = replace(scope.told, state="armed")
+    scope.status = replace(scope.status, state="armed")
     call = scope.thread.submit(scope.follow)
     polled(lambda: bool(made) and made[-1].transport.is_waiting)
     session.close()
@@ -182,11 +182,11 @@ def test_after_a_capture_it_is_armed_again_only_if_wanted(scope: Oscilloscope, e
     for state in STATES[1:3]:
         ecu.state = state
         scope.follow()
-        assert (scope.told.state, scope.told.capture) == (state, 0)
+        assert (scope.status.state, scope.status.capture) == (state, 0)
     ecu.state = "done"
     scope.follow()
-    assert scope.told.capture == 1 and scope.newest is not None
-    assert (scope.told.state, ecu.armed) == (("armed", 2) if repeats else ("idle", 1))
+    assert scope.status.capture == 1 and scope.newest is not None
+    assert (scope.status.state, ecu.armed) == (("armed", 2) if repeats else ("idle", 1))
 
 
 def test_a_fault_that_comes_first_leaves_its_freeze_frame_and_ends_the_repetition(
@@ -196,15 +196,15 @@ def test_a_fault_that_comes_first_leaves_its_freeze_frame_and_ends_the_repetitio
     ecu.is_freeze_frame, ecu.state = True, "done"
     scope.follow()
     assert scope.newest is not None and scope.newest[1].is_freeze_frame
-    assert (scope.told.state, ecu.armed) == ("idle", 1)
-    assert scope.told.text == "A fault came first: these are the periods around it."
+    assert (scope.status.state, ecu.armed) == ("idle", 1)
+    assert scope.status.text == "A fault came first: these are the periods around it."
 
 
 def test_a_capture_that_another_tool_has_ended_is_told(scope: Oscilloscope, ecu: Ecu) -> None:
     scope.arm(SETUP, True)
     ecu.state = "idle"
     scope.follow()
-    assert (scope.told.state, scope.told.text) == ("idle", "another tool has ended the capture")
+    assert (scope.status.state, scope.status.text) == ("idle", "another tool has ended the capture")
 
 
 async def answer(socket: Any, message: dict[str, Any]) -> dict[str, Any]:

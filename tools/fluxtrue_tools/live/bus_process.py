@@ -107,7 +107,7 @@ class _Reporter(Observer):
 
     def __init__(self, outbox: _Outbox) -> None:
         self._outbox = outbox
-        self._told: Status | None = None
+        self._sent: Status | None = None
 
     def sent(self, frame: can.Message) -> None:
         """A command goes into recordings."""
@@ -123,9 +123,9 @@ class _Reporter(Observer):
         self._outbox.put("truth", time_s, torque_Nm)
 
     def period(self, status: Status) -> None:
-        """Only what has changed is told."""
-        if status != self._told and self._outbox.put("status", status):
-            self._told = status
+        """Only what has changed is sent."""
+        if status != self._sent and self._outbox.put("status", status):
+            self._sent = status
 
     def ended(self, status: Status) -> None:
         """The pages need not wait for the next batch."""

@@ -27,7 +27,7 @@ HELD: Final = ("Nothing was armed: the inverter still holds a freeze frame or th
 
 
 @dataclass(frozen=True)
-class Told:
+class ScopeStatus:
     """What every page shows of the oscilloscope."""
 
     state: str = "idle"  # idle, armed, triggered, reading
@@ -81,7 +81,7 @@ class Oscilloscope:
         self._period_s = description.period_s
         self._setup: Setup | None = None
         self.repeats = False
-        self.told = Told()
+        self.status = ScopeStatus()
         self.newest: tuple[int, Capture] | None = None  # with its number
 
     @property
@@ -106,9 +106,9 @@ class Oscilloscope:
         self._setup, self.repeats = setup, repeats  # the page that closes meanwhile may end the repetition
         try:
             with self._xcp.reported():
-                if self.told.state in WAITING:
+                if self.status.state in WAITING:
                     self._scope.give_up()
-                    self.told = replace(self.told, state="idle")
+                    self.status = replace(self.status, state="idle")
                 self._arm(setup)
         except FluxtrueError:
             self.repeats = False
@@ -122,7 +122,7 @@ class Oscilloscope:
             if isinstance(error.__cause__, XcpRefused):
                 raise FluxtrueError(HELD) from error
             raise
-        self.told = replace(self.told, state="armed", text="")
+        self.status = replace(self.status, state="armed", text="")
 
     def trigger(self) -> None:
         """Trigger now."""
@@ -134,7 +134,7 @@ class Oscilloscope:
         self.repeats = False
         with self._xcp.reported():
             self._scope.stop()
-        self.told = replace(self.told, state="idle", text="The inverter holds no capture any more.")
+        self.status = replace(self.status, state="idle", text="The inverter holds no capture any more.")
 
     def abandon(self) -> None:
         """No call waits for an inverter that is silent. Any thread."""
@@ -142,14 +142,14 @@ class Oscilloscope:
 
     def follow(self) -> None:
         """Read the state of the capture that was armed, and the capture when it is complete."""
-        if self.told.state not in WAITING:
+        if self.status.state not in WAITING:
             return
         try:
             with self._xcp.reported():
                 self._follow()
         except Exception as error:  # this call has no caller that waits: the pages show how it ended
             self.repeats = False
-            self.told = replace(self.told, state="idle", text=str(error))
+            self.status = replace(self.status, state="idle", text=str(error))
 
     def _follow(self) -> None:
         try:
@@ -162,13 +162,13 @@ class Oscilloscope:
         if status.state == "idle":
             raise FluxtrueError("another tool has ended the capture")
         if status.state != "done":
-            self.told = replace(self.told, state=status.state)
+            self.status = replace(self.status, state=status.state)
             return
-        self.told = replace(self.told, state="reading")
+        self.status = replace(self.status, state="reading")
         capture = self._scope.read()
         text = "A fault came first: these are the periods around it." if capture.is_freeze_frame else ""
-        self.newest = (self.told.capture + 1, capture)
-        self.told = Told("idle", self.newest[0], text)
+        self.newest = (self.status.capture + 1, capture)
+        self.status = ScopeStatus("idle", self.newest[0], text)
         if self.repeats and self._setup is not None:
             self._arm(self._setup)
 

@@ -122,10 +122,10 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
     run, groups = session.samples.take()
     batch: dict[str, Any] = {"type": "rows", "batch": number, "run": run, "groups": groups}
     status = session.status()
-    if number % SLOW_EVERY == 0 or status != session.told:
-        session.told = status
+    if number % SLOW_EVERY == 0 or status != session.status_sent:
+        session.status_sent = status
         batch["last"] = session.samples.last()
-        batch["scope"] = asdict(session.oscilloscope.told) if session.oscilloscope is not None else None
+        batch["scope"] = asdict(session.oscilloscope.status) if session.oscilloscope is not None else None
         batch["status"] = {**asdict(status), "knobs": dict(status.knobs), "recording": session.recorder.running}
     if session.replay is not None:
         batch["replay"] = session.replay.state()

@@ -46,7 +46,7 @@ class Session:
     sending: dict[web.WebSocketResponse, asyncio.Task[bool]] = field(default_factory=dict)  # under way, page by page
     changed: asyncio.Event = field(default_factory=asyncio.Event)  # a page has connected, drawn or disconnected
     hand: web.WebSocketResponse | None = None  # the page that has control
-    told: Status | None = None  # what the pages know
+    status_sent: Status | None = None  # what the pages know
     last_file: str = ""
 
     def status(self) -> Status:
