@@ -176,6 +176,20 @@ def test_what_is_not_complete_cannot_be_read_and_a_bad_set_up_is_refused(scope: 
 
 
 @pytest.mark.plant
+def test_a_capture_with_the_settings_of_another_tool_is_ended(
+    line: RigLine, scope: Scope, description: Description
+) -> None:
+    scope.configure(CURRENTS, samples=50)
+    Scope(XcpMaster(line), description).configure(CURRENTS, samples=60)
+    with pytest.raises(FluxtrueError, match="another XCP master has changed what the scope captures"):
+        scope.arm()
+    assert scope.status().state == "idle"
+    scope.configure(CURRENTS, samples=50)
+    assert scope.arm().state == "armed"
+    scope.stop()
+
+
+@pytest.mark.plant
 def test_a_block_that_was_damaged_on_the_way_is_read_again(
     line: RigLine, scope: Scope, description: Description
 ) -> None:

@@ -241,6 +241,10 @@ def test_an_inverter_that_falls_silent_leaves_no_value_and_no_control_while_the_
     """The 1 kHz task of the inverter stands still; the page is connected, its time passes."""
     arm(view, "rising", "90")
     view.until(lambda: view.text("scope-text").startswith("Armed"), "armed")
+    view.run("return import('/static/oscilloscope.js').then((module) => module.onScope({ text: 'refused' }))")
+    drawn = count(view, DRAWS)
+    view.until(lambda: count(view, DRAWS) > drawn + 2, "later states")
+    assert view.text("scope-text") == "refused", "the answer to a command stays although the capture is still armed"
     assert isinstance(view.server, Server) and view.server.stand is not None
     draws = count(view, DRAWS)
     view.server.stand.set(board_task_stuck=1, board_watchdog_stuck=1)

@@ -157,9 +157,10 @@ class Scope:
                 raise FluxtrueError(f"the scope is in use ({self.status().state}): read it or stop() it") from error
             raise
         self._armed = armed = self.status()
-        told = (armed.signals, armed.trigger, armed.trigger_signal, armed.level, armed.divisor, armed.samples,
-                armed.wanted)  # fmt: skip
-        if told != self._wanted:
+        captured = (armed.signals, armed.trigger, armed.trigger_signal, armed.level, armed.divisor, armed.samples,
+                    armed.wanted)  # fmt: skip
+        if captured != self._wanted:
+            self.stop()  # else the next attempt would find the scope in use
             raise FluxtrueError("another XCP master has changed what the scope captures")
         return armed
 

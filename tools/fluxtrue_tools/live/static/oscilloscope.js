@@ -18,6 +18,7 @@ const NUMBERS = { "scope-level": "Level", "scope-before": "Before the trigger", 
 let offer = null; // what can be captured
 let mayArm = false;
 let answer = ""; // to what was asked last
+let state = ""; // of the capture, at the last showing
 
 const boxes = () => [...$("scope-signals").querySelectorAll("input")];
 const chosen = () => boxes().filter((box) => box.checked).map((box) => box.name);
@@ -72,7 +73,7 @@ export function onScope(message) {
 
 export function startScope() {
   $("scope-arm").onclick = arm;
-  $("scope-trigger").onclick = () => send({ type: "scope_trigger" });
+  $("scope-trigger").onclick = () => { tell(""); send({ type: "scope_trigger" }); };
   $("scope-end").onclick = () => { tell(""); send({ type: "scope_end" }); };
   $("scope-form").oninput = showForm;
   $("scope-form").onsubmit = (event) => { event.preventDefault(); if (mayArm) arm(); };
@@ -101,7 +102,11 @@ export function showScope({ live, mayAct, scope }) {
   $("scope-trigger").disabled = !(mayArm && scope.state === "armed");
   $("scope-end").disabled = !mayArm || scope.state === "reading";
   showForm();
-  if (offer) show("scope-text", known ? STATES[scope.state] || answer || scope.text : "");
+  if (known && scope.state !== state) {
+    state = scope.state;
+    if (STATES[state]) answer = ""; // it was about the capture before
+  }
+  if (offer) show("scope-text", known ? answer || STATES[state] || scope.text : "");
   if (known) newestCapture(scope.capture);
   else clearCapture();
   showCapture(known);
