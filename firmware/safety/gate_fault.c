@@ -15,7 +15,7 @@ static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_stat
     return state->opposed == config->volt_steps || (state->switch_shorted && in->latched);
 }
 
-/* At rest, or sound: the machine turns without a current. */
+/* At rest, or no switch is shorted: the machine turns without a current. */
 static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bool none)
 {
     state->quiet = none ? (uint8_t)fx_min_s32(state->quiet + 1, QUIET_STEPS) : (uint8_t)0;

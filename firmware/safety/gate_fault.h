@@ -37,7 +37,7 @@ typedef struct {
 typedef struct {
     bool latched;   /* a gate fault */
     bool gates;     /* as read back: the switches follow the duties */
-    bool rectifies; /* the diodes of a sound bridge may conduct (safety/safe_state.h) */
+    bool rectifies; /* the diodes of an intact bridge may conduct (safety/safe_state.h) */
     bool currents_valid;
     q15_t line_emf, v_dc;
     int32_t zero; /* mean of the three phases, magnitude */

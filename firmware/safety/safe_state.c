@@ -31,7 +31,7 @@ static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *st
     return confirmed(&state->without_current, in->shorted && in->currents_valid && none);
 }
 
-/* Whether the measured speed may be believed now. In the short circuit the currents must stand still in the rotor's
+/* Whether the measured speed may be used now. In the short circuit the currents must stand still in the rotor's
  * frame (SS-6): from step to step, and within a period, without which a frozen angle at 1 kHz would pass. */
 static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
 {

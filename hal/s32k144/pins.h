@@ -17,11 +17,11 @@ enum {
     PIN_INDEX = 12
 };
 
-/** All lines off but the safe state's: it stays released, so that the board's hardware keeps the bridge. */
+/** All lines off but the safe state's: it stays released, so that the board's hardware controls the bridge. */
 void pins_init(void);
 /** The PWM is set up: from here on the line may be driven low. */
 void pins_offer_bridge(void);
-/** Drives the line low, so that the bridge is the processor's, or releases it; without an effect before
+/** Drives the line low, so that the processor controls the bridge, or releases it; without an effect before
  * pins_offer_bridge(). Start-up, 1 kHz task. */
 void pins_keep_bridge(bool keep);
 
