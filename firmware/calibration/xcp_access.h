@@ -4,7 +4,7 @@
 /** Connects the calibration protocol with the drive: readable memory, writable values, and when they take effect.
  * Source   docs/howto/xcp.md
  * Range    calibration/calibration_list.h, calibration/measurement_list.h
- * Errors   the protocol's own; seed and key keep out mistakes, not attackers: the key is a published function
+ * Errors   the protocol's own; seed and key protect against mistakes, not attacks: the key is a published function
  * Context  1 kHz task, after the drive's step */
 #include "calibration/calibration.h"
 #include "calibration/freeze_frame.h"

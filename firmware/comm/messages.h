@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef COMM_MESSAGES_H
 #define COMM_MESSAGES_H
-/** What the drive tells the bus, in physical units, and its encoding.
- *   Every value is clamped to the DBC's range of its signal; one that is no number refuses the whole frame.
+/** The values that the drive transmits on the bus, in physical units, and their encoding.
+ *   Every value is clamped to the DBC's range of its signal; for one that is NaN or infinity no frame is sent.
  * Source   firmware/comm/fluxtrue.dbc; docs/decisions/018-bus-scales.md
  * Units    SI or as the names say; signs as in the DBC
  * Rounding to nearest in the motor's scale
@@ -16,7 +16,7 @@
 #define MESSAGE_LENGTH 8U
 #define INTERFACE_VERSION 3U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
 
-/* Why the torque is limited, as the bus tells it; X(NAME, value, explanation): named and explained here only. */
+/* Why the torque is limited, as transmitted; X(NAME, value, explanation): named and explained here only. */
 #define DERATING_REASON_LIST(X) \
     X(NONE, 0, "The torque is not limited.") \
     X(INVERTER_TEMPERATURE, 1, "The inverter is too warm.") \

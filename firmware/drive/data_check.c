@@ -108,8 +108,8 @@ static bool words_match(drive_t *drive)
     return differing_bits == UINT32_MAX;
 }
 
-/* The fast ISR notes the command at the end of each step. If it runs and does not, the end of the step that it waits
- * for is damaged: the identification would use the last window for ever, and nothing would check the task. */
+/* The fast ISR notes the command at the end of each step. If it runs without doing so, the stored end of the step is
+ * damaged: the identification would use the last window permanently, and nothing would check the task. */
 static bool windows_complete(drive_t *drive)
 {
     data_check_t *data_check = &drive->data_check;

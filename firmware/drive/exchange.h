@@ -20,7 +20,7 @@
 #include "types/operating_point.h"
 #include "types/samples.h"
 
-/** One period as the fast ISR saw it. Writer: fast ISR. Reader: 1 kHz task. */
+/** One period as the fast ISR measured it. Writer: fast ISR. Reader: 1 kHz task. */
 typedef struct {
     operating_point_t point;
     uint32_t theta_e; /* of the samples, 2^32 = one turn */
@@ -37,7 +37,7 @@ typedef struct {
 
 FX_POWER_OF_TWO_SIZE(sample_t);
 
-/** Periods that stay readable. A power of two; more than a step of the task has, by what the scope's freeze frame wants
+/** Periods that stay readable. A power of two; more than a step of the task has, by what the scope's freeze frame needs
  * from before a fault. */
 #define SAMPLE_SLOTS 64U
 

@@ -21,7 +21,7 @@
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
 
-/* Currents and the angle at which the duties will act, as current control and modulation want them. */
+/* Currents and the angle at which the duties will act, in the form that current control and modulation use. */
 typedef struct {
     fx_pair_t i_dq, advanced;
     int32_t v_dc;
@@ -29,7 +29,7 @@ typedef struct {
     int32_t angle_step;
 } rotor_frame_t;
 
-/* No control acts: to the task and the identification, the drive does not act. */
+/* Current control starts anew; task and identification are informed that no voltage of the drive acts. */
 static void reset_control(drive_t *drive, sample_t *sample)
 {
     current_control_reset(&drive->fast.current_control);
@@ -174,7 +174,7 @@ static rotor_frame_t to_rotor_frame(drive_t *drive, sample_t *sample, int32_t an
     return (rotor_frame_t){fx_pair(measured.d, measured.q), advanced, sample->v_dc, sample->point.omega, angle_step};
 }
 
-/* Nothing identifies or monitors a machine during the pulses but the monitors of the samples. */
+/* During the pulses only the monitors of the samples act: there is no identification and no slow monitor. */
 static __attribute__((noinline, cold)) void apply_pulses(drive_t *drive, sample_t *sample, const rotor_frame_t *now)
 {
     const dq_q15_t v = pulses_step(&drive->pulses, &drive->pulses_state, sample->point.i, sample->theta_e);

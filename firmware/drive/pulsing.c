@@ -44,7 +44,7 @@ static void start_or_refuse(drive_t *drive, const snapshot_t *snapshot)
     const pulses_config_t *wanted = &drive->request.pulses.config;
     pulsing->starts = drive->request.pulses.starts;
     if (drive_pulses(drive)) {
-        return; /* they go on */
+        return; /* they continue */
     }
     if (!may_start(drive, snapshot) || !is_in_range(drive, wanted)) {
         pulsing->phase = PULSES_FAILED;

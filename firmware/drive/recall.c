@@ -12,7 +12,7 @@ void recall_begin(drive_t *drive)
     drive->task.recall = (recall_t){.unconfirmed = true};
 }
 
-/* All steps of this update but the last one are averaged, and they tell enough. */
+/* All steps of this update but the last one are averaged, and the torque is large enough to decide. */
 static bool is_telling(const drive_t *drive)
 {
     const identify_state_t *state = &drive->task.identify;

@@ -33,8 +33,8 @@ static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *sna
     return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);
 }
 
-/* The machine feeds more than a quarter of i_max into the dc link: an over-voltage would be its work, and the voltage
- * would rise further while the diodes end the currents (SS-18). */
+/* The machine feeds more than a quarter of i_max into the dc link: it would be the cause of an over-voltage, and the
+ * voltage would rise further while the diodes end the currents (SS-18). */
 static bool charges_link(const drive_t *drive, const snapshot_t *snapshot)
 {
     const operating_point_t *point = &snapshot->sample.point;

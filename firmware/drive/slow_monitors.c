@@ -101,8 +101,8 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
 }
 
-/* The field turns by more than a quarter of a turn in a step. Whether the angle stands still is told from the angles at
- * the steps, which are alike, too, where a step has a whole number of turns. */
+/* The field turns by more than a quarter of a turn in a step. Whether the angle stands still follows from the angles at
+ * the steps, which are also equal where a step has a whole number of turns. */
 static bool is_fast(const drive_t *drive, q31_t omega)
 {
     const uint64_t turns_q60 = (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;

@@ -66,7 +66,7 @@ static uint16_t absent(shut_off_t *state, const shut_off_in_t *in)
 
 void shut_off_step(shut_off_t *state, const shut_off_in_t *in)
 {
-    if (!in->fitted && state->stage == 0U && state->failed == 0U) { /* a device that was once there is still wanted */
+    if (!in->fitted && state->stage == 0U && state->failed == 0U) { /* once found, it is required */
         state->tested = true;
         return;
     }

@@ -4,7 +4,7 @@
 /** The paths that can shut off the torque: their test after start-up, and the gate supply while it is needed.
  *   In the test switching stays disabled and must read back so; the gate supply must follow first its switch and then
  *   the external watchdog, which is given wrong answers. A path that fails stays failed until the next start.
- *   While the state machine wants the supply, it must be there.
+ *   While the state machine requires the supply, it must be present.
  * Source   docs/theory/third-level.md
  * Units    us of true time
  * Errors   a bit of ecu_fault_t in faults
@@ -16,7 +16,7 @@ typedef struct {
     bool fitted;    /* there is an external watchdog: without it nothing is tested */
     bool supply;    /* read back */
     bool switching; /* read back */
-    bool wanted;    /* the state machine wants the gate supply */
+    bool wanted;    /* the state machine requires the gate supply */
     bool idle;      /* contactor and precharge are off */
     uint32_t elapsed_us;
 } shut_off_in_t;
@@ -24,8 +24,8 @@ typedef struct {
 typedef struct {
     uint8_t stage;
     bool tested;     /* every path works, or there is none to be tested */
-    bool supply_on;  /* the test wants the gate supply */
-    bool wrong;      /* the test wants a wrong answer */
+    bool supply_on;  /* the test requires the gate supply */
+    bool wrong;      /* the test requires a wrong answer */
     uint16_t failed; /* in the test */
     uint16_t faults; /* of this step */
     uint32_t us;     /* in the present stage, or for which the supply has been absent */

@@ -62,7 +62,7 @@ typedef struct {
     q15_t omega;
     int16_t inverter_dC, winding_dC;
     int16_t known_permille;     /* of a known voltage, as the converters read it; negative: there is none */
-    uint8_t contradicted_steps; /* in a row, told by the identification */
+    uint8_t contradicted_steps; /* in a row, as the identification reports them */
 } plausibility_in_t;
 
 uint32_t plausibility_step(const plausibility_config_t *config, plausibility_state_t *state,

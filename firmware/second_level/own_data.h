@@ -14,7 +14,7 @@
 #define SECOND_LEVEL_SLICE 4U
 
 typedef struct {
-    uint32_t at;  /* bytes of this pass that are done */
+    uint32_t at;  /* bytes of this pass that have been added */
     uint32_t sum; /* inverted, so that a pass begins with zeros */
 } second_level_own_data_t;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SIGNAL_COUNTER_H
 #define SIGNAL_COUNTER_H
-/** Counters of events that stop at their largest value: a counter that wrapped to 0 would hide what it counted.
+/** Counters of events that stop at their largest value: a counter that wrapped to 0 would report too few events.
  *   count_up_to(count, max) = min(count + 1, max)
  * Source   docs/howto/can.md, diagnostics
  * Units    events

@@ -31,7 +31,8 @@ bool is_intact(uint32_t slot, const header_t *header)
     return ~sum == header->crc;
 }
 
-/* 528 bytes with 128 slots, too many for the stack. Only the start and the background use the store, never at once. */
+/* 528 bytes with 128 slots, too many for the stack. Only the start and the background use the store, one after the
+ * other. */
 static struct {
     uint32_t sequence[HAL_NVM_SLOTS];
     uint32_t passed[(HAL_NVM_SLOTS + 31U) / 32U]; /* a bit for each slot that cannot be a record, or is damaged */

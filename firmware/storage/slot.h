@@ -5,8 +5,8 @@
  *
  * Format   header_t, of STORE_HEADER_SIZE bytes, then `size` bytes of the record
  * Range    slot numbers below HAL_NVM_SLOTS; sequence numbers wrap
- * Errors   a slot that cannot be read, or whose CRC-32 differs, is passed over and told as damaged
- * Context  start-up and background, never at once: the search keeps its state in static memory
+ * Errors   a slot that cannot be read, or whose CRC-32 differs, is passed over and reported as damaged
+ * Context  start-up and background, never at the same time: the search keeps its state in static memory
  */
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`tools/fluxtrue fuzz`, with few frames; what it finds is the campaign's business."""
+"""The command `tools/fluxtrue fuzz`, with few frames. The long run is the test fuzz-bus-campaign."""
 
 import subprocess
 import sys

@@ -5,8 +5,8 @@
  *   theta_e = p theta_m + offset;  e = theta_e - theta~;  w += k_i e;  theta~ += w + k_p e
  *   k_p = 2 w_n T_s, k_i = (w_n T_s)^2: both poles at -w_n (critical damping).
  *   |e| > max_step: the sample is implausible; the prediction replaces it and continues at the tracked speed
- *   A sensor that repeats one angle although the rotor turns is told from a rotor that stops by the prediction: a rotor
- *   lags behind it before it stands.
+ *   A sensor that repeats one angle although the rotor turns is distinguished from a rotor that stops: a rotor that
+ *   stops lags behind the prediction before it stands.
  * Source   docs/theory/angle-tracker.md (AT-1) ... (AT-4), (AT-14), (AT-16) ... (AT-18)
  * Units    angles in turns times 2^32, so that they wrap as an angle does; speed per unit of omega_b
  * Range    tracks up to |omega| < 2, omega_q31 saturates at 1; omega_b T_s < 0.78, with turn_shift 1 < 1.57

@@ -13,7 +13,7 @@
  * Errors   what is kept from step to step is sealed at the end of each and compared at the next, parameters and their
  *          variances at each update: damage by the memory is reported until the reset of the processor
  *          without valid windows the parameters only return to their priors; clamped states and innovations beyond the
- *          gate take the confidence to 0, the torque estimate goes on
+ *          gate reduce the confidence to 0, the torque estimate continues
  * Context  1 kHz task; five divisions per step, one more per update and axis */
 #include "control/identify/kalman.h"
 #include "types/temperature.h"

@@ -27,8 +27,8 @@ class Case:
     places: tuple[str, ...] = ()  # values of the arguments without a name
     options: tuple[str, ...] = ()
     files: dict[str, Content] = field(default_factory=dict)
-    outputs: tuple[str, ...] = ()  # where it does its work here, too
-    beside: dict[str, tuple[str, ...]] = field(default_factory=dict)  # option: further ones, without which it is idle
+    outputs: tuple[str, ...] = ()  # files that this call writes
+    beside: dict[str, tuple[str, ...]] = field(default_factory=dict)  # option: further ones that it needs
 
 
 BENCH = ("--can-interface", "virtual")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A whole campaign: what is missing is run, then everything is scored and reported. And a single line."""
+"""A whole campaign: missing cases are run, then all are scored and reported. Also the runs of a single line."""
 
 import hashlib
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from fluxtrue_tools.sim.output import json_text
 
 @dataclass(frozen=True)
 class Record:
-    """The table to write what was found to, with all its lines."""
+    """The table of faults into which the results are written, with all its lines."""
 
     path: Path
     rows: tuple[Row, ...]
