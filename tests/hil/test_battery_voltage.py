@@ -21,7 +21,7 @@ def ecu_faults(rig: Rig) -> int:
 
 
 def tell(rig: Rig, battery_V: float) -> None:
-    """The bus knows the battery's voltage, and no limit of its power."""
+    """The bus transmits the battery's voltage, and no limit of its power."""
     rig.power_limits_kW, rig.battery_V = (600.0, 600.0), battery_V
     rig.advance(0.3)
 
@@ -117,7 +117,7 @@ def test_a_wrong_dc_voltage_sensor_ends_the_torque(
 
 @pytest.mark.plant
 def test_a_battery_that_gives_way_under_load_is_no_mismatch(rig: Rig) -> None:
-    """12 % within 20 ms, which the bus tells up to a cycle later, and 5 % that it does not tell."""
+    """12 % within 20 ms, transmitted up to a cycle later, and 5 % that are not transmitted."""
     tell(rig, BATTERY_V)
     rig.turn(3000.0)
     rig.start(60.0)

@@ -40,7 +40,7 @@ class Drive:
         assert self.in_step.due()
 
     def pass_batch(self, alive: bool = True) -> None:
-        """Advance time by 40 ms. If alive, the page gives a sign of life at the beginning."""
+        """Advance time by 40 ms. If alive, the page reports at the beginning."""
         if alive:
             self.link.act("hand")
         self.in_step.done()

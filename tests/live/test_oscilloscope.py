@@ -139,7 +139,7 @@ def test_a_session_ends_although_a_call_waits(session: xcp.Xcp, made: list[Maste
 
 
 class Ecu:
-    """In place of a Scope: says what the test wants."""
+    """In place of a Scope: gives the answers of the test."""
 
     def __init__(self) -> None:
         self.state, self.is_freeze_frame, self.armed = "idle", False, 0

@@ -87,7 +87,7 @@ def test_a_silent_page_loses_its_torque_after_300_ms_and_one_press_on_enable_con
     latest_s = HAND_TIMEOUT_S + STOP_S + 3 * BATCH_S
     page.until(lambda: page.text("state") == "ready" and page.newest_s() > silent_s + latest_s, "ready")
     after = [(t - silent_s, torque) for t, torque in page.drawn("INV_Status", "TorqueCommanded") if t > silent_s]
-    # The page gave its last sign of life with this batch or the one before.
+    # The last report of the page came with this batch or the one before.
     assert all(abs(torque - 60.0) < 0.1 for t, torque in after if t < HAND_TIMEOUT_S - 2 * BATCH_S)
     assert all(abs(torque) < 0.2 for t, torque in after if t > latest_s)
     assert "closed or silent for 0.3 s" in page.text("stopped")

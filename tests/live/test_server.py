@@ -85,7 +85,7 @@ class Drive:
 
 @pytest.fixture
 def driving() -> Drive:
-    """A drive at 60 N·m, whose page has just given a sign of life."""
+    """A drive at 60 N·m, whose page has just reported."""
     drive = Drive()
     drive.act("ask", Wish.READY)
     drive.run(0.1, alive=True)
@@ -119,7 +119,7 @@ def test_a_page_silent_for_300_ms_loses_the_torque_by_a_ramp_and_must_press_enab
 
 
 def press(drive: Drive, wish: Wish) -> None:
-    """Press a button once, and give signs of life for 0.1 s."""
+    """Press a button once, and let the page report for 0.1 s."""
     drive.act("ask", wish)
     drive.run(0.1, alive=True)
 
@@ -177,7 +177,7 @@ Talk = Callable[[TestClient[Any, Any], Session], Awaitable[None]]
 
 
 def serve(drive: Drive, folder: Path, talk: Talk, in_step: InStep | None = None) -> None:
-    """Run a server while talk() runs."""
+    """Run a server as long as talk() takes."""
 
     async def conversation() -> None:
         samples = Samples(read_interface().database)
@@ -288,7 +288,7 @@ def test_a_page_that_does_not_read_does_not_delay_the_others(tmp_path: Path, mon
 
 
 def test_signs_of_life_are_received_during_a_long_answer(driving: Drive, tmp_path: Path) -> None:
-    """To read all calibration values takes longer than a page may be silent."""
+    """Reading all calibration values takes longer than a page may go without a report."""
     read = threading.Event()
 
     class Slow:

@@ -115,7 +115,7 @@ def test_a_range_that_is_dragged_over_is_shown_while_the_time_goes_on(view: Page
     assert view.text("charts-text").startswith(f"Paused: {begin:.2f} … {end:.2f} s")
     view.pass_time(0.5)
     assert ranges(view) == shown, "the picture stays"
-    assert count(view, DRAWS) > draws, "the page still gives signs of life"
+    assert count(view, DRAWS) > draws, "the page still reports"
     view.press("charts-in")
     assert np.diff(ranges(view)[0]) == pytest.approx((end - begin) / 2.0)
     view.press("charts-earlier")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strict TOML files: every complaint is one line that names file, key, value, unit and what is allowed."""
+"""Strict TOML files: every error is one line that names file, key, value, unit and what is allowed."""
 
 import math
 import re
@@ -155,7 +155,7 @@ def _keys(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
 
 
 def explain(error: ValidationError, model: type[BaseModel], words: dict[str, str] | None = None) -> str:
-    """The first complaint as one line. `words` says in its own way what a key takes."""
+    """The first error as one line. `words` replaces the description of the values that a key takes."""
     first = error.errors()[0]
     location = tuple(part for part in first["loc"] if not str(part).startswith("function-"))
     where = ".".join(map(str, location))

@@ -169,7 +169,7 @@ def a_shorted_switch_ends_in_the_short_circuit_on_its_side(parts: Parts) -> None
 
 
 def the_gates_are_read_back_at_their_pins(parts: Parts) -> None:
-    """A lower output that no longer reaches its pin ends the short circuit on this side, although the timer goes on."""
+    """A lower output that no longer reaches its pin ends the short circuit on this side, although the timer runs."""
     with driving(parts) as (loop, core):
         loop.set("plant.switch_shorted_lower_b", 1)
         loop.run(2000)

@@ -93,7 +93,7 @@ def reset(loop: Loop, stand: Stand, kind: str, torque: float, share: float, hard
     return Outcome(kind, torque, share, hardware, max(row[0] for row in rows) / BATTERY_V, without, held, peak)
 
 
-# What tells that a part of the start is over: register, bits, value.
+# The end of each part of the start: register, bits, value.
 STEPS = (
     ("RAM written, watchdog set, .data copied", "PCC.PCC_PORTA", 1 << 30, 1 << 30),
     ("pins and PWM set up", "FTM0.SC", 0x3F << 16, 0x3F << 16),

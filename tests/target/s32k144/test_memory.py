@@ -94,7 +94,7 @@ def _drive_on_the_bus(stand: Stand) -> None:
 
 
 def test_the_bus_image_saves_without_a_late_task() -> None:
-    """While it writes, the processor runs at half its speed and the frames of the bus go on."""
+    """While it writes, the processor runs at half its speed and the frames of the bus continue."""
     if not have_arm_compiler():
         pytest.skip("no cross compiler: there is no image to emulate")
     motor = (bus := build.prepare("hsm1", angle="resolver", flashed=True)).emulated()

@@ -121,7 +121,7 @@ def test_a_reset_by_the_processor_itself(parts: Parts, how: str) -> None:
 
 @pytest.mark.parametrize("damaged", [(0,), (1,), (0, 1)], ids=["first copy", "second copy", "both"])
 def test_a_damaged_copy_is_not_used(parts: Parts, damaged: tuple[int, ...]) -> None:
-    """Every bit is covered by its complement. With one copy left the drive goes on, without any it does not."""
+    """Every bit is covered by its complement. With one copy left the drive continues, without any it does not."""
     random = Random(7)
     loop, stand = resets.powered_up(parts)
     with loop:

@@ -22,7 +22,7 @@ def refused(case: int) -> None:
 
 
 def ended(case: int) -> None:
-    """Case 0 ends its process; the others go on for ever."""
+    """Case 0 ends its process; the others never end."""
     if case == 0:
         os.kill(os.getpid(), signal.SIGKILL)
     while True:

@@ -82,7 +82,7 @@ def test_an_offset_of_psi_q_is_found_and_taken_away(places: tuple[Array, Array])
 
 
 def test_the_torque_of_a_map_without_energy_is_kept() -> None:
-    """psi_d falls by another 1e-7 V·s/A² i_q² that psi_q knows nothing of: a curl above the 5 % that are warned of."""
+    """psi_d falls by another 1e-7 V·s/A² i_q² without a counterpart in psi_q: a curl above the 5 % of the warning."""
     psi_d, psi_q = psi(*FULL)
     twisted = Points(*FULL, psi_d - 1e-7 * FULL[1] ** 2, psi_q)
     assert doubts.curl(fit_separately(twisted, I_MAX), I_MAX) > 0.05

@@ -91,7 +91,7 @@ def get(message: Message, signal: Signal) -> str:
 
 
 def poison(message: Message, signal: Signal) -> str:
-    """What cantools writes for such a signal knows no factor: its use must not compile."""
+    """The function that cantools writes for such a signal has no factor: its use must not compile."""
     struct = f"{PREFIX}_{snake(message.name)}_{snake(signal.name)}"
     return f"#pragma GCC poison {struct}_encode {struct}_decode\n"
 

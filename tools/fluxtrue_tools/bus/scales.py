@@ -44,7 +44,7 @@ Factors = dict[str, Decimal]
 
 @dataclass(frozen=True)
 class Need:
-    """What one quantity of a motor wants of its signals."""
+    """Requirements of one quantity of a motor on its signals."""
 
     rated: float
     largest: float

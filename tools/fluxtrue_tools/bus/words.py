@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names and explanations of everything that is told as a number: faults, states, reasons, results.
+"""Names and explanations of everything that is transmitted as a number: faults, states, reasons, results.
 
 Each is written down once, in a list of the firmware: X(NAME, value or bit, "explanation"). From these lists come the C
 enumerations, the words of the library and of the description file (by the compiler), and, by this program, the value

@@ -51,7 +51,7 @@ class Physics:
         return i, i_m, self._flux(s, i_m)
 
     def voltage(self, x: Array, i_seen: Complex, omega: Array) -> Complex:
-        """(IB-3): what the controller has to command, in its frame, for the currents it sees."""
+        """(IB-3): the voltage that the controller must command, in its frame, for the currents that it measures."""
         s = self.split(x)
         i, _, psi = self._inside(s, i_seen, omega)
         lost = 4.0 / np.pi * (s["dead_time"] * self.dead_V + s["device_drop"])
@@ -59,7 +59,7 @@ class Physics:
         return np.asarray(s["vdc_gain"] * u * np.exp(-1j * s["angle"]))
 
     def torque(self, x: Array, i_seen: Complex, omega: Array) -> Array:
-        """(IB-4): air-gap torque at the currents the controller sees."""
+        """(IB-4): air-gap torque at the currents that the controller measures."""
         _, i_m, psi = self._inside(self.split(x), i_seen, omega)
         return np.asarray(1.5 * self.machine.pole_pairs * (np.conj(psi) * i_m).imag)
 

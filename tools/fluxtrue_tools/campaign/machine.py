@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a campaign knows of the motor: its library, its flux map as functions, the nominal values of the spread."""
+"""The motor of a campaign: its library, its flux map as functions, the nominal values of the spread."""
 
 import json
 from dataclasses import dataclass

@@ -67,7 +67,7 @@ def dask(task: Task, cases: list[int], address: str) -> Iterator[tuple[int, Any]
 
 
 def missing(task: Task, store: Store, cases: range, scheduler: str | None, workers: int | None) -> None:
-    """Run what a folder does not have yet; each result is stored as it comes, so that a later call goes on."""
+    """Run the cases that a folder does not have yet. Each result is stored at once, so that a later call continues."""
     todo = store.missing(cases)
     results = dask(task, todo, scheduler) if scheduler else local(task, todo, workers)
     with tqdm(total=len(cases), initial=len(cases) - len(todo), unit="case",

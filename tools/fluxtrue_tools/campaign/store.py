@@ -41,7 +41,7 @@ class Store:
             raise
 
     def open(self, manifest: dict[str, Any], fresh: bool) -> None:
-        """Make the folder or go on with it; results of another campaign or another firmware are not mixed in."""
+        """Make the folder or continue with it; results of another campaign or another firmware are not mixed in."""
         path = self.folder / MANIFEST
         if fresh and path.is_file():
             shutil.rmtree(self._cases, ignore_errors=True)

@@ -85,7 +85,7 @@ class Flux:
 
 
 def flux_under_current(runs: list[_Run], psi_f_Vs: float) -> Flux:
-    """(CM-20): what is neither proportional to the speed nor constant with it is no flux."""
+    """(CM-20): a part that is neither proportional to the speed nor independent of it is no flux."""
     speed, i, psi, steady = (np.concatenate([getattr(run, name) for run in runs])
                              for name in ("speed", "i", "psi", "is_steady"))  # fmt: skip
     used = steady & (np.abs(i.imag) > LEAST_SHARE * np.abs(i.imag).max()) & (speed > SLOWEST * speed.max())

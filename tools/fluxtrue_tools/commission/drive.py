@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a commissioning knows of a drive: names to set and get, and signals recorded in each PWM period.
+"""The interface of a commissioning to a drive: names to set and get, and signals recorded in each PWM period.
 
 There is one implementation: software in the loop, where the firmware runs as a library in this process beside a
 simulated machine. It records by reading the names after each period. On a bus, a capture buffer in the firmware takes

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far what was found is from a simulated machine: for tests and campaigns, which know the machine."""
+"""Errors of the results against a simulated machine: for tests and campaigns, which know the machine."""
 
 import math
 from dataclasses import dataclass

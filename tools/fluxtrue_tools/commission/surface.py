@@ -62,7 +62,7 @@ class Surface:
         return 1.48 * float(np.median(np.abs(np.concatenate(used))))
 
     def with_magnet(self, psi_f_Vs: float) -> WithMagnet:
-        """The bursts say little about the magnet: as much as the rotor's swing shows."""
+        """The bursts contain little information on the magnet: only what the swing of the rotor adds."""
         return WithMagnet(self.model, psi_f_Vs - float(self.model.psi_d(0.0, 0.0)))
 
 
@@ -117,7 +117,7 @@ class _Fit:
 
 
 def fit(bursts: Sequence[Linkage], i_max_A: float, r_ohm: float, psi_f_Vs: float, level_V: float) -> Surface:
-    """Everything at once; psi_f is what the nameplate guesses or the spin has measured."""
+    """All unknowns at once; psi_f is that of the nameplate, or the one that the step spin has measured."""
     work = _Fit(bursts, i_max_A, r_ohm)
     others = work.others
     system = System(work.basis.count + others)

@@ -54,7 +54,7 @@ def _null_for_nan(data: Any) -> Any:
 
 
 def demonstrate(bench: Bench, say: Say, grid_done: Callable[[], None]) -> Demonstration:
-    """Run them all; `say` hears what comes next, `grid_done` each finished run of the grid."""
+    """Run them all; `say` is called with the name of the next one, `grid_done` after each run of the grid."""
     demonstration = Demonstration()
     say("the paper's figures 3 and 4: three sets of adaptation gains")
     demonstration.results += [paper.fig3_4(bench, gains) for gains in paper.GAIN_SETS]

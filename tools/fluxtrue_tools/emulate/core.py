@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emulated processor by itself: any ELF file for the S32K144, run, read, snapshot."""
+"""The emulated processor alone: any ELF file for the S32K144, run, read, snapshot."""
 
 import ctypes
 from enum import Enum

@@ -36,7 +36,7 @@ class Score:
 
     @property
     def is_true(self) -> bool:
-        """The table says what was found."""
+        """Whether the table agrees with the results."""
         return self.row.status == self.status
 
     @property

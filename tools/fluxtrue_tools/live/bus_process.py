@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bus side in a process of its own: what the page's server does can delay no command.
+"""The bus side in a process of its own, so that the work of the page's server delays no command.
 
 The child has the bus, the commander and the test stand; it passes what it receives on to the server. When the server
 ends, even by a crash, the child ramps the torque out and ends, too.
@@ -35,7 +35,7 @@ END_S: Final = 10.0
 
 @dataclass(frozen=True)
 class Setup:
-    """What the child needs to know."""
+    """The data that the child process needs."""
 
     address: BusAddress
     interface_name: str
@@ -103,7 +103,7 @@ class _Turns:
 
 
 class _Reporter(Observer):
-    """Tells the server what happens on the bus side."""
+    """Reports to the server what happens on the bus side."""
 
     def __init__(self, outbox: _Outbox) -> None:
         self._outbox = outbox
@@ -123,7 +123,7 @@ class _Reporter(Observer):
         self._outbox.put("truth", time_s, torque_Nm)
 
     def period(self, status: Status) -> None:
-        """Only what has changed is sent."""
+        """Only a changed status is sent."""
         if status != self._sent and self._outbox.put("status", status):
             self._sent = status
 

@@ -12,7 +12,7 @@ HAND_TIMEOUT_S: Final = 0.3  # longer than this is a page that is closed, suspen
 START_S: Final = 0.5  # the inverter answers an enable within milliseconds
 GAP_S: Final = 0.03  # between two commands: the inverter's time-out, docs/howto/can.md
 RAMP_S: Final = 0.88  # from zero to the machine's torque
-STOP_S: Final = 0.08  # from the machine's torque to zero once the wish to drive has ended
+STOP_S: Final = 0.08  # from the machine's torque to zero once the request to drive has ended
 RUNNING: Final = ("run", "derate")
 FAULTED: Final = ("fault", "safe_state")
 AGAIN: Final = "Press Enable to go on."
@@ -40,26 +40,26 @@ class Order:
 class Commander:
     """Slider and buttons in, command frames out.
 
-    The wish to drive ends when the user ends it, when the page with control is not heard of any more, and when the
+    The request to drive ends when the user ends it, when the page with control reports nothing any more, and when the
     inverter does not drive or no longer does. In the last two cases `stopped` says why, and one more press on Enable
-    goes on: the inverter wants to see enable off before it accepts it again, and it has been off since. Torque that is
-    left when the wish ends is ramped out in STOP_S or less.
+    continues: the inverter must receive enable off before it accepts it again, and it has been off since. Torque that
+    is left when the request ends is ramped out in STOP_S or less.
     """
 
     torque_max_Nm: float
     wish: Wish = Wish.OFF
     target_Nm: float = 0.0
     torque_requested_Nm: float = 0.0
-    stopped: str = ""  # why the wish to drive was taken back; empty since the last press on a button
+    stopped: str = ""  # why the request to drive was withdrawn; empty since the last press on a button
     _seen_s: float = float("-inf")
     _stepped_s: float | None = None
     _reset: bool = False
-    _running: bool = False  # the inverter has followed the wish to drive
+    _running: bool = False  # the inverter has followed the request to drive
     _enabled_s: float = 0.0  # how long enable has been sent without that
     _gap_s: float = 0.0  # longest time between two commands since the last press on a button
 
     def hand(self, now_s: float) -> None:
-        """Record a sign of life from the page that has control."""
+        """Record a report from the page that has control."""
         self._seen_s = now_s
 
     def ask(self, wished: str, now_s: float) -> None:
@@ -72,8 +72,8 @@ class Commander:
         self.wish, self.stopped = wish, ""
 
     def slide(self, torque_requested_Nm: float, now_s: float) -> None:
-        """The slider was moved; a value beyond the machine's torque is limited to it. Without the wish to drive it
-        counts for nothing: the message may have been on its way when the wish ended."""
+        """The slider was moved; a value beyond the machine's torque is limited to it. Without the request to
+        drive it is ignored: the message may have been on its way when the request ended."""
         self.hand(now_s)
         if self.wish is not Wish.DRIVE:
             return
@@ -118,7 +118,7 @@ class Commander:
         return Order(mode, enable, reset, self.torque_requested_Nm)
 
     def _follow(self, state: str, refused: str, step_s: float) -> None:
-        """Take the wish to drive back when the inverter does not follow it."""
+        """Withdraw the request to drive when the inverter does not follow it."""
         if self.wish is not Wish.DRIVE:
             return
         if state in RUNNING:

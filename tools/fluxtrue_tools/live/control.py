@@ -79,7 +79,7 @@ def _knob(session: Session, socket: web.WebSocketResponse, message: dict[str, An
 
 
 def drawn(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
-    """A page has drawn a batch, which is also a sign of life."""
+    """A page reports that it has drawn a batch: it is still there."""
     session.drawn[socket] = int(number(message.get("batch"), "batch"))
     session.changed.set()
     if message.get("visible") and session.hand is socket and session.link is not None:

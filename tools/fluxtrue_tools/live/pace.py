@@ -48,7 +48,7 @@ class WallClock:
 
     @property
     def now_s(self) -> float:
-        """The time of commands and signs of life."""
+        """The time of commands and of the reports of the pages."""
         return time.monotonic()
 
     def send(self, frame: can.Message) -> None:
@@ -117,7 +117,7 @@ class SimulatedTime:
 
     @property
     def now_s(self) -> float:
-        """The time of commands and signs of life."""
+        """The time of commands and of the reports of the pages."""
         return self._bus.now_s
 
     def send(self, frame: can.Message) -> None:

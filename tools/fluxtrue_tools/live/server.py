@@ -76,7 +76,7 @@ def _refusal(error: Exception) -> dict[str, Any]:
 
 
 async def _answer_later(socket: web.WebSocketResponse, answer: Awaitable[dict[str, Any]]) -> None:
-    """Send the answer of a slow action, while the page keeps sending signs of life."""
+    """Send the answer of a slow action, while the page keeps reporting."""
     with contextlib.suppress(ConnectionError, RuntimeError):  # the page has disconnected meanwhile
         try:
             await socket.send_json(await answer)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a motor wants of the bus: the rated and the largest value of each quantity, and the DBC that carries them."""
+"""Requirements of a motor on the bus: rated and largest value of each quantity, and the DBC that carries them."""
 
 import math
 from dataclasses import dataclass

@@ -38,7 +38,7 @@ class ConstantModel:
 
 
 class _Surface:
-    """One bicubic spline; outside its rectangle it goes on with the edge's slope."""
+    """One bicubic spline; outside its rectangle it continues with the slope of the edge."""
 
     def __init__(self, x: Array, y: Array, z: Array) -> None:
         self.spline = RectBivariateSpline(x, y, z, kx=3, ky=3, s=0)

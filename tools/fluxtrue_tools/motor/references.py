@@ -134,7 +134,7 @@ class Solver:
         return ids, qs
 
     def _solved(self, torques: Array, near: list[tuple[Array, Array]]) -> list[Contour]:
-        """Contours through the given currents; all are solved at once, because each call of the model is dear."""
+        """Contours through the given currents; all are solved at once, because each call of the model takes long."""
         lengths = [len(d) for d, _ in near]
         t = np.repeat(torques, lengths)
         d = np.concatenate([d for d, _ in near])

@@ -33,7 +33,7 @@ def number(path: Path, line: int, column: str, text: str, limit: float = VALUE_M
 
 
 def check_size(path: Path) -> None:
-    """Refuse what is no file, or a file that is too large to be a map."""
+    """Refuse a path that is no file, or a file that is too large to be a map."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise FluxtrueError(f"{path}: cannot be read: not a file")

@@ -185,7 +185,7 @@ def simulate(
     channels: Sequence[str] | None = None,
     progress: Callable[[float], Any] | None = None,
 ) -> Recording:
-    """Run a scenario. `progress` is told the simulated seconds of every chunk."""
+    """Run a scenario. `progress` is called with the simulated seconds of every chunk."""
     scenario = scenario.resolved(motor.torque_max_Nm, motor.speed_max_rpm)
     check.effective(scenario, motor, where)
     if channels is None:

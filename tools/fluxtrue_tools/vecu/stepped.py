@@ -48,7 +48,7 @@ class SteppedBus:
         return self._now_s
 
     def send(self, message: can.Message) -> None:
-        """One frame, before time goes on."""
+        """One frame, before time continues."""
         self._bus.send(message)
         self._sent += 1
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the code alone does not tell: bounds of loops, lengths of copies, modes of operation (hal/s32k144/wcet.toml).
+"""Facts beside the code: bounds of loops, lengths of copies, modes of operation (hal/s32k144/wcet.toml).
 
 Every loop that a handler reaches must have a bound. tests/target/s32k144/test_wcet.py compares the bounds with what the
 emulated drive executes.

@@ -160,7 +160,7 @@ def statements(file: str, source: str) -> list[Statement]:
 
 
 def _source(file: str) -> str:
-    """The text of a C file; nothing of what is none, the compiler's own code for example."""
+    """The text of a C file; empty if there is no such file, for example for code of the compiler itself."""
     path = Path(file)
     return path.read_text(encoding="utf-8") if path.is_file() and path.suffix in (".c", ".h") else ""
 

@@ -40,7 +40,7 @@ class Plan:
 
 
 def plan(image: Image, reached: Iterable[str]) -> Plan:
-    """Regions in the order that emu_profile_passes() wants."""
+    """Regions in the order that emu_profile_passes() expects."""
     regions = [Region(0, 0, 0)]
     of = np.zeros(CODE_SIZE // 2, dtype=np.uint16)
     headers: dict[int, int] = {}

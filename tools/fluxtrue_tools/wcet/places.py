@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which memory each load and store of a function goes to, as far as its own code tells.
+"""The memory that each load and store of a function accesses, as far as it follows from its code.
 
 Followed are addresses that the code contains: literals, MOVW with MOVT, the stack pointer, and what is computed from
 them. Assumed is that an address plus or minus anything stays in its memory. All else is not known.

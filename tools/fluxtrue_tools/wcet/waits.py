@@ -70,7 +70,7 @@ def _steady(flow: Flow, loops: Iterable[Loop]) -> dict[int, set[int]]:
 
 
 def _fetch(block: Block, cache: Cache) -> tuple[int, Cache]:
-    """What fetching the instructions of a block waits, and what is known to be in the cache behind it."""
+    """Waiting time of fetching the instructions of a block, and the lines known to be in the cache after it."""
     now = dict(cache)
     calls = {call.site for call in block.calls}
     waited = 0

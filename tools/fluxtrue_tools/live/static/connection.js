@@ -18,7 +18,7 @@ export function sendText(text) {
   socket.send(text);
 }
 
-// The page's sign of life: what has arrived has been drawn. A page in the background draws nothing and says so.
+// The page reports that it has drawn what has arrived. A page in the background draws nothing and reports that.
 export function tellDrawn() {
   if (batch >= 0) send({ type: "drawn", batch, visible: !document.hidden });
 }

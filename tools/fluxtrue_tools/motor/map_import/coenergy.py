@@ -175,7 +175,7 @@ class CoEnergy:
 
 
 class Separate:
-    """psi_d and psi_q as two surfaces of their own (a FluxModel): what the points themselves say of reciprocity."""
+    """psi_d and psi_q as two separate surfaces (a FluxModel), from which the reciprocity of the points follows."""
 
     def __init__(self, surfaces: tuple[tuple[Basis, Array], tuple[Basis, Array]], i_max_A: float) -> None:
         self._surfaces, self._i_max = surfaces, i_max_A

@@ -150,7 +150,7 @@ def _scale(found: folder.Settings, model: FluxModel, i_max_A: float) -> None:
 
 @contextmanager
 def _naming(path: Path, staging: Path) -> Iterator[None]:
-    """Complaints about what is not written yet name the file that it comes from."""
+    """Errors in data that are not written yet name the file from which the data come."""
     try:
         yield
     except FluxtrueError as error:
