@@ -121,7 +121,7 @@ typedef struct {
 /** Leaving torque at speed (drive/switch_off.h). */
 typedef struct {
     dq_q15_t from; /* reference when the currents began to move to those of the short circuit */
-    int32_t i_d;   /* of the short circuit */
+    int32_t i_d;   /* of the short circuit, q15 */
     uint8_t steps; /* of that movement; 0: not active */
     bool holds;    /* enable is off, the torque is held at zero */
 } switch_off_t;
@@ -146,7 +146,7 @@ typedef struct {
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
     angle_harmonics_state_t angle_harmonics;
-    volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* the fast ISR reads one word */
+    volatile int32_t angle_correction[ANGLE_HARMONICS_PARTS]; /* 2^32 = one turn; the fast ISR reads one word */
     plausibility_state_t plausibility;
     torque_monitor_state_t torque_monitor;
     frozen_angle_state_t frozen_angle;

@@ -23,10 +23,10 @@
 /** One period as the fast ISR measured it. Writer: fast ISR. Reader: 1 kHz task. */
 typedef struct {
     operating_point_t point;
-    uint32_t theta_e; /* of the samples, 2^32 = one turn */
-    fx_pair_t i_ab;   /* alpha, beta */
-    int32_t zero_q28; /* mean of the phases */
-    int32_t v_dc;
+    uint32_t theta_e;     /* of the samples, 2^32 = one turn */
+    fx_pair_t i_ab;       /* alpha, beta */
+    int32_t zero_q28;     /* mean of the phases */
+    int32_t v_dc;         /* q15 */
     uint32_t theta_m;     /* mechanical, after correction of the sensor's known error */
     bool acting;          /* the bridge switched throughout the last period and is switching now */
     bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */

@@ -21,7 +21,7 @@
 
 #define PERIODS_TO_ACT 3 /* from enabling until the voltage of the whole last period is known */
 
-/* Currents and the angle at which the duties will act, in the form that current control and modulation use. */
+/* For current control and modulation. advanced: where the duties will act; angle_step: 2^32 = one turn; v_dc: q15. */
 typedef struct {
     fx_pair_t i_dq, advanced;
     int32_t v_dc;

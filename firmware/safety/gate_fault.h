@@ -40,7 +40,7 @@ typedef struct {
     bool rectifies; /* the diodes of an intact bridge may conduct (safety/safe_state.h) */
     bool currents_valid;
     q15_t line_emf, v_dc;
-    int32_t zero; /* mean of the three phases, magnitude */
+    int32_t zero; /* mean of the three phases, magnitude, q15 */
     dq_q15_t i;
 } gate_fault_in_t;
 

@@ -39,7 +39,7 @@ typedef struct {
 
 typedef struct {
     abc_q15_t i;
-    int32_t v_dc;
+    int32_t v_dc; /* q15 */
 } monitor_in_t;
 
 /** True if monitor_step() would find nothing in this sample; unless a count is pending it need not be called. A phase

@@ -47,7 +47,7 @@ typedef struct {
 
 typedef struct {
     uint32_t theta_e; /* measured electrical angle (not the tracked one: no lag) */
-    int32_t step;     /* electrical advance per period */
+    int32_t step;     /* electrical advance per period, 2^32 = one turn */
     q31_t omega_q31;
     bool jumped;
 } angle_t;

@@ -55,7 +55,7 @@ typedef struct {
     const flux_point_t *flux; /* at the measured current */
     q31_t omega;              /* its upper half is used; the integrators compensate the rest of the feed-forward */
     q15_t psi_delta;          /* identified flux minus the table's */
-    int32_t v_dc;             /* not negative */
+    int32_t v_dc;             /* q15, not negative */
 } current_control_in_t;
 
 typedef struct {
