@@ -2,6 +2,7 @@
 #include "hal/host/commissioned.h"
 
 #include "hal/host/instance.h"
+#include "hal/host/per_unit.h"
 
 #define ONE_Q30 1073741824.0
 
@@ -38,8 +39,8 @@ void commissioned_set_trim(fluxtrue_t *d, double value)
 /* The compensation in effect, at the present dc voltage. */
 double commissioned_level_V(const fluxtrue_t *d)
 {
-    const double v_dc_V = (double)d->drive.samples.slot[d->drive.samples.generation % SAMPLE_SLOTS].v_dc / 32768.0 *
-                          (double)d->drive.motor->bases.voltage_V;
+    const double v_dc_V = per_unit_si_from_q15(d->drive.samples.slot[d->drive.samples.generation % SAMPLE_SLOTS].v_dc,
+                                               (double)d->drive.motor->bases.voltage_V);
     return (double)d->drive.parameters.modulate.dead_time_q16 / 65536.0 * v_dc_V;
 }
 

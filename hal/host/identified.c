@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "hal/host/instance.h"
+#include "hal/host/per_unit.h"
 
 static bool is_robust(const fluxtrue_t *d)
 {
@@ -71,7 +72,7 @@ double identified_confidence(const fluxtrue_t *d)
 
 double identified_mismatch_share(const fluxtrue_t *d)
 {
-    return is_robust(d) ? (double)d->drive.task.identify.kept.mismatch_share / 32768.0 : 0.0;
+    return is_robust(d) ? per_unit_si_from_q15(d->drive.task.identify.kept.mismatch_share, 1.0) : 0.0;
 }
 
 double identified_local_Vs(const fluxtrue_t *d)

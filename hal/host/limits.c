@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/host/limits.h"
 
-#include <math.h>
-
 #include "drive/slow_monitors.h"
 #include "hal/host/instance.h"
+#include "hal/host/per_unit.h"
 
 static double torque_base(const fluxtrue_t *d)
 {
@@ -15,11 +14,6 @@ static double torque_base(const fluxtrue_t *d)
 static double power_base(const fluxtrue_t *d)
 {
     return 1.5 * (double)d->drive.motor->bases.voltage_V * (double)d->drive.motor->bases.current_A;
-}
-
-static q15_t to_limit(double x, double base)
-{
-    return (q15_t)lrint(fmin(x / base * 32768.0, 32767.0));
 }
 
 double limits_get_inverter(const fluxtrue_t *drive)
@@ -46,11 +40,11 @@ void limits_set_known_share(fluxtrue_t *drive, double value)
 #define LIMIT(name, base) \
     double limits_get_##name(const fluxtrue_t *drive) \
     { \
-        return drive->drive.request.limits.name / 32768.0 * base(drive); \
+        return per_unit_si_from_q15(drive->drive.request.limits.name, base(drive)); \
     } \
     void limits_set_##name(fluxtrue_t *drive, double value) \
     { \
-        drive->drive.request.limits.name = to_limit(value, base(drive)); \
+        drive->drive.request.limits.name = per_unit_q15_from_si(value, base(drive)); \
     }
 
 LIMIT(torque_drive, torque_base)

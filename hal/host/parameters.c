@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -9,23 +8,25 @@
 #include "hal/host/instance.h"
 #include "hal/host/limits.h"
 #include "hal/host/parameters.h"
+#include "hal/host/per_unit.h"
 #include "hal/host/pulsed.h"
 #include "hal/host/spun.h"
 #include "hal/host/stations.h"
 
+/* The bases are floats. */
 static double pu15(int32_t x, float base)
 {
-    return (double)x / 32768.0 * (double)base;
+    return per_unit_si_from_q15(x, (double)base);
 }
 
 static double pu31(q31_t x, float base)
 {
-    return (double)x / 2147483648.0 * (double)base;
+    return per_unit_si_from_q31(x, (double)base);
 }
 
 static q15_t to_pu15(double x, float base)
 {
-    return fx_sat_q15((int32_t)lrint(fmin(fmax(x / (double)base, -1.0), 1.0) * 32768.0));
+    return per_unit_q15_from_si(x, (double)base);
 }
 
 static const bases_t *bases(const fluxtrue_t *d)

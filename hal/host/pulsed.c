@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "hal/host/instance.h"
+#include "hal/host/per_unit.h"
 
 #define TURN_RAD 6.283185307179586
 #define TURN 4294967296.0
@@ -23,11 +24,11 @@ static double share(const fluxtrue_t *d)
 #define Q15_VALUE(name, member, base) \
     double pulsed_##name(const fluxtrue_t *d) \
     { \
-        return d->drive.request.pulses.config.member / 32768.0 * base(d); \
+        return per_unit_si_from_q15(d->drive.request.pulses.config.member, base(d)); \
     } \
     void pulsed_set_##name(fluxtrue_t *d, double value) \
     { \
-        d->drive.request.pulses.config.member = fx_sat_q15((int32_t)lrint(value / base(d) * 32768.0)); \
+        d->drive.request.pulses.config.member = per_unit_q15_from_si(value, base(d)); \
     }
 
 #define COUNT_VALUE(name, member) \

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "hal/host/stations.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "hal/host/instance.h"
+#include "hal/host/per_unit.h"
 
 static double base_Nm(const fluxtrue_t *d)
 {
@@ -13,7 +13,7 @@ static double base_Nm(const fluxtrue_t *d)
 
 static double in_Nm(const fluxtrue_t *d, q15_t torque)
 {
-    return torque / 32768.0 * base_Nm(d);
+    return per_unit_si_from_q15(torque, base_Nm(d));
 }
 
 double stations_requested_Nm(const fluxtrue_t *drive)
@@ -23,9 +23,8 @@ double stations_requested_Nm(const fluxtrue_t *drive)
 
 void stations_set_requested_Nm(fluxtrue_t *drive, double value)
 {
-    const double share = fmin(fmax(value / base_Nm(drive), -1.0), 1.0);
     drive->torque_requested_Nm = value;
-    drive->drive.request.torque_arbitrated = fx_sat_q15((int32_t)lrint(share * 32768.0));
+    drive->drive.request.torque_arbitrated = per_unit_q15_from_si(value, base_Nm(drive));
 }
 
 double stations_arbitrated_Nm(const fluxtrue_t *drive)
