@@ -83,6 +83,15 @@ def test_the_tick_meets_its_bounds_and_the_peers_stand_beside_the_one_with_the_l
     assert ours.endswith(f"| {with_tables[1]} | {with_tables[2]} |")
 
 
+def test_the_fast_interrupt_and_the_control_library_meet_their_bounds() -> None:
+    figures = baseline.load()
+    for drive in figures["drives"].values():
+        assert drive["runs"]["fast ISR"]["instructions"][1] <= 360
+    library = figures["control library"]
+    assert library["code"] + library["constants"] <= 11.5 * 1024
+    assert (page.FAST_ISR_MAX, page.CODE_MAX) == (360, 11776)
+
+
 def test_the_maxima_contain_what_only_the_reactions_to_faults_have() -> None:
     runs = np.array([[100, 200, 210, 300], [300, 500, 520, 900]])
     row = figures._row(runs, np.array([[625, 450, 460, 800]]))
