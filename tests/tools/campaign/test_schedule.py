@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Worker processes that fail or end, and the errors that they hand over."""
 
+import multiprocessing
 import os
 import pickle
 import signal
@@ -53,3 +54,16 @@ def test_every_error_for_the_user_passes_between_processes(kind: type[FluxtrueEr
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is kind
     assert str(again) == str(error) != ""
+
+
+def only_the_first_ends(case: int) -> int:
+    if case:
+        signal.pause()
+    return case
+
+
+def test_an_interrupted_campaign_does_not_wait_for_the_cases_that_run() -> None:
+    results = schedule.local(only_the_first_ends, [0, 1], 2)
+    assert next(results) == (0, 0)
+    results.close()  # type: ignore[attr-defined]
+    assert multiprocessing.active_children() == []

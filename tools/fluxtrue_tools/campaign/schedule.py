@@ -22,7 +22,7 @@ SCHEDULER_S = 60  # long enough for a busy scheduler
 
 
 def _worker() -> None:
-    """The parent alone handles the signals of a process group: it waits for the cases that run, or it is killed.
+    """The parent alone handles the signals of a process group; a worker ends with it.
 
     A pool whose workers have ended by themselves cannot always be shut down.
     """
@@ -40,12 +40,15 @@ def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[i
         waiting = {pool.submit(task, case): case for case in cases}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
-    except BrokenProcessPool as error:
-        # The pool sends its workers SIGTERM, which they ignore, and would wait for them without end.
+    except BaseException as error:
+        # The results of the cases that run would be lost. A pool that has lost a worker would wait without end for the
+        # others, which ignore its SIGTERM; one that a signal has interrupted may, too.
         for worker in set(multiprocessing.active_children()) - others:
             worker.kill()
-        raise FluxtrueError("a process with a case has ended (killed, or out of memory); what is finished is stored, "
-                            "and the same command continues") from error  # fmt: skip
+        if isinstance(error, BrokenProcessPool):
+            raise FluxtrueError("a process with a case has ended (killed, or out of memory); what is finished is "
+                                "stored, and the same command continues") from error  # fmt: skip
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
