@@ -9,6 +9,7 @@
  *   FX_LOAD_TWO       angle tracker, state and gains      2
  *                     current control, integrators        1
  *                     window of the identification                     3
+ *                     monitor.h: currents, dc voltage                  1 each
  *                     hal/s32k144/angle_quadrature.c                   1
  *   fx_both_loaded    window, sums stored together                     2
  *                     modulation: slopes, gains           1 each       1, 0
