@@ -12,9 +12,10 @@ from fluxtrue_tools.motor.load import load_lines
 from fluxtrue_tools.motor.loop_report import model_lines
 from fluxtrue_tools.motor.motor import Motor
 from fluxtrue_tools.motor.names import DBC_NAME
-from fluxtrue_tools.motor.short_circuit import short_circuit, used_from_rpm
+from fluxtrue_tools.motor.short_circuit import ShortCircuit, short_circuit, used_from_rpm
 
 Lines = list[str]
+SHORTED_AT = (0.05, 0.1, 0.25, 0.5, 0.75, 1.0)  # of top speed
 
 
 def _percent(value: float) -> str:
@@ -102,6 +103,11 @@ def _references(motor: Motor) -> Lines:
     return lines
 
 
+def _shorted_at(found: ShortCircuit, top_rpm: float, share: float) -> str:
+    speed_rpm = share * top_rpm
+    return f"{-found.torque_at(speed_rpm):.3g} N·m at {speed_rpm:.0f} rpm"
+
+
 def _short_circuit(motor: Motor) -> Lines:
     found, machine = short_circuit(motor), motor.config.machine
     most, used = int(np.argmin(found.torque_Nm)), used_from_rpm(motor)
@@ -110,12 +116,15 @@ def _short_circuit(motor: Motor) -> Lines:
         f"active short circuit: {found.current_A[-1]:.4g} A at {machine.speed_max_rpm:g} rpm (steady state, "
         "windings at 20 °C)",
         f"  brakes most        {-found.torque_Nm[most]:.4g} N·m at {found.speed_rpm[most]:.0f} rpm",
+        f"  over speed         {', '.join(_shorted_at(found, machine.speed_max_rpm, share) for share in SHORTED_AT)}",
     ]
     if len(harder):
-        lines.append(
-            f"  note               brakes harder than torque_max_Nm between {harder[0]:.0f} and {harder[-1]:.0f} rpm: "
-            "there only disabled switching is safe"
-        )
+        between = f"between {harder[0]:.0f} and {harder[-1]:.0f} rpm"
+        why = "there only disabled switching is safe"
+        if harder[-1] > used:
+            why = (f"above {used:.0f} rpm a fault shorts the phases all the same, because with switching disabled the "
+                   "back-EMF would charge the dc link")  # fmt: skip
+        lines.append(f"  note               brakes harder than torque_max_Nm {between}: {why}")
     if used < machine.speed_max_rpm:
         lines.append(
             f"  safe state         above {used:.0f} rpm, where it brakes with {-found.torque_at(used):.3g} N·m; "
