@@ -11,7 +11,9 @@ import pytest
 from conftest import toml
 from random_motors import random_motors
 
+from fluxtrue_tools.bus.scales import carriers, standard
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.bus import needs
 from fluxtrue_tools.motor.config import MotorConfig, check_config
 from fluxtrue_tools.motor.emit_c import check_numbers
 from fluxtrue_tools.motor.flux_model import ConstantModel
@@ -19,6 +21,7 @@ from fluxtrue_tools.motor.flux_tables import OBSERVER_M_MAX
 from fluxtrue_tools.motor.motor import Motor, load_motor, resolve
 
 SEED, COUNT, PARTS, ACCEPTED = 12, 1000, 4, 0.99
+COUNTS = carriers(standard())
 Values = dict[str, dict[str, object]]
 Write = Callable[..., Path]
 
@@ -50,6 +53,11 @@ def assert_in_range(motor: Motor) -> None:
     wanted = b.period_s / 2 * (1 / tables.l_dd_H + 1 / tables.l_qq_H) * b.resistance_ohm
     assert np.all((np.abs(g / wanted - 1.0) < 0.01) | ((tables.stored["g"] == 2**15 - 1) & (g < wanted)))
     assert tables.stored["g"].min() > 100
+    # What its bus asks of the DBC: resolution of the rated value, reserve above the largest one.
+    for name, need in needs(config, motor.derived).items():
+        factor, counts = float(motor.bus.factors[name]), COUNTS[name].counts
+        assert factor <= 1e-3 * need.rated * (1 + 1e-9), name
+        assert factor * counts >= 1.2 * need.largest * (1 - 1e-9), name
 
 
 @pytest.mark.parametrize("part", range(PARTS))

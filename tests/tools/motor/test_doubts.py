@@ -20,7 +20,8 @@ HALF = [0.0, 100.0, 200.0, 300.0]
 Write = Callable[..., Path]
 Psi = Callable[[float, float], tuple[float, float]]
 
-MEANT = ("linear", "saturated", "gem", "prius", "leaf", "pmasynrm", "spm_12V", "compressor", "hsm1_5kHz", "hsm1_8kHz")
+MEANT = ("linear", "saturated", "gem", "prius", "leaf", "pmasynrm", "pmsyrm", "ebike", "spm_12V", "compressor", "servo",
+         "truck", "hsm1_5kHz", "hsm1_8kHz", "hsm1_20kHz", "hsm1_40kHz")  # fmt: skip
 
 # A 12 V motor of 30 µH: at any full scale one period of V_b moves the current by more than it.
 SMALL: dict[str, dict[str, Any]] = {
@@ -123,7 +124,16 @@ def test_a_map_that_no_energy_belongs_to_is_warned_of(write: Write) -> None:
     assert doubts.curl(load_motor(MOTORS / "hsm1").model, 250.0) < 0.05
 
 
+@pytest.mark.parametrize(("percent", "is_warned"), [(4.5, False), (5.5, True)])
+def test_reciprocity_is_warned_of_from_5_percent_on(write: Write, percent: float, is_warned: bool) -> None:
+    """The curl of the test above, 23.7 % at 3e-7, is proportional to the twist."""
+    twisted = plane(ID, IQ, scaled(straight, twist=-3e-7 * percent / 23.7))
+    warned = doubts.of_motor(load_motor(write(flux_map=twisted, machine={"torque_max_Nm": 100.0})))
+    assert bool(warned) == is_warned and all("not reciprocal" in text for text in warned), warned
+
+
 def test_tables_that_are_too_coarse_are_warned_of(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert (doubts.TABLE_WANTED, doubts.ERROR_WANTED, doubts.ERROR_WANTED_WEAK) == (0.002, 0.0025, 0.005)
     monkeypatch.setattr(doubts, "ERROR_WANTED", 1e-4)
     warned = doubts.of_motor(load_motor(write()))
     assert len(warned) == 1

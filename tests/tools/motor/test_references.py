@@ -96,8 +96,8 @@ def test_hsm1_largest_torque_at_a_flux_is_what_an_exhaustive_search_finds(hsm1, 
 def test_stored_references_keep_torque_current_and_flux(name):
     motor = load_motor(MOTORS / name)
     e, torque_max = motor.reference_errors, motor.config.machine.torque_max_Nm
-    assert e.torque_mtpa_max_Nm <= 0.01 * torque_max
-    assert e.torque_weak_max_Nm <= 0.01 * torque_max
+    assert e.torque_mtpa_max_Nm <= 0.0025 * torque_max
+    assert e.torque_weak_max_Nm <= 0.005 * torque_max
     assert e.current_excess <= 0.005
     assert e.flux_excess <= 0.01
 
