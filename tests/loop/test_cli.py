@@ -7,13 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.sim.run import simulate
-from fluxtrue_tools.sim.scenario import read
+from fluxtrue_tools.sim.scenario import Window, read
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENARIOS = ROOT / "docs" / "howto" / "scenarios"
@@ -153,6 +154,16 @@ def test_an_older_file_survives_a_failed_run(tmp_path: Path) -> None:
 
 
 SHIPPED = sorted(SCENARIOS.glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=[path.stem for path in SHIPPED])
+def test_a_shipped_scenario_gives_torque_and_speed_as_shares(path: Path, paper: Motor, hsm1: Motor) -> None:
+    """And other motors than its own take its values."""
+    profile = tomllib.loads(path.read_text(encoding="utf-8"))["profile"]
+    assert "torque_share" in profile and not {"torque_Nm", "speed_rpm"} & set(profile)
+    short = read(path).model_copy(update={"duration_s": 0.1, "event": (), "expect_fault": None, "window": Window()})
+    for motor in (paper, hsm1):
+        assert simulate(short, motor, where=path.name).fault_word == 0
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=[path.stem for path in SHIPPED])
