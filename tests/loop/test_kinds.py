@@ -15,6 +15,7 @@ from fluxtrue_tools.sim.build import prepare
 from fluxtrue_tools.sim.library import Loop
 
 MACHINES = tuple(KINDS)
+MORE_LQ = {"lq_scale": 1.25}
 
 
 def machine_of(name: str) -> Machine:
@@ -31,6 +32,13 @@ def test_overshoot_is_what_exceeds_the_final_value_in_the_direction_of_the_step(
 def test_torque_overshoots_by_10_percent_at_most_with_inductances_20_percent_too_small(name: str) -> None:
     missed = [str(step) for step in steps(machine_of(name)) if not step.met]
     assert not missed, f"allowed: {100 * OVERSHOOT_MAX:g} %, no fault"
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_no_step_trips_a_machine_whose_q_axis_has_25_percent_more_inductance(name: str) -> None:
+    """Its flux is turned against the tables': no monitor may take that for a wrong angle."""
+    tripped = [str(step) for step in steps(machine_of(name), MORE_LQ) if step.fault_word]
+    assert not tripped
 
 
 @pytest.mark.parametrize("name", MACHINES)
