@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TOOLS = Path(__file__).resolve().parents[2] / "tools"
-SCRIPTS = ("setup", "test", "demo", "hil", "format", "fluxtrue", "common.sh")
+SCRIPTS = ("setup", "test", "mcdc", "demo", "hil", "format", "fluxtrue", "common.sh")
 # What the scripts use besides the programs they look for.
 BASICS = (
     "bash", "sh", "env", "dirname", "readlink", "mkdir", "cat", "sha256sum", "flock", "sed", "grep",

@@ -30,3 +30,8 @@ if(FLUXTRUE_COVERAGE)
     target_compile_options(fluxtrue_covered INTERFACE --coverage)
     add_link_options(--coverage)
 endif()
+if(FLUXTRUE_MCDC)
+    target_compile_options(fluxtrue_covered INTERFACE
+        -fprofile-instr-generate -fcoverage-mapping -fcoverage-mcdc)
+    add_link_options(-fprofile-instr-generate)
+endif()

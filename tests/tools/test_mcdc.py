@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report of MC/DC finds a condition whose effect no test shows, and refuses an exclusion without a reason.
+
+The programs are compiled with the clang that measures the firmware, and run.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROJECT = Path(__file__).resolve().parents[2]
+CHECKER = PROJECT / "tools" / "checks" / "mcdc.py"
+REASON = "the caller has checked this already"
+BOTH = ["int both(int a, int b);", "int both(int a, int b)", "{", "    return a > 0 && b > 0;", "}"]
+GAP = "firmware/safety/both.c:4: C2 not shown: b > 0"
+
+
+def check(root: Path, *arguments: str | Path) -> tuple[int, str, list[str]]:
+    """Exit code, standard output, lines of the error output."""
+    done = subprocess.run([sys.executable, CHECKER, "--root", root, *arguments], capture_output=True, text=True,
+                          check=False)  # fmt: skip
+    assert "Traceback" not in done.stderr
+    return done.returncode, done.stdout, done.stderr.splitlines()
+
+
+def write(root: Path, name: str, *text: str) -> None:
+    """A source file."""
+    (root / name).parent.mkdir(parents=True, exist_ok=True)
+    (root / name).write_text("\n".join(text) + "\n")
+
+
+def run(root: Path, *programs: str, sources: tuple[str, ...] = ("firmware/safety/both.c",)) -> Path:
+    """Build programs with these bodies of main as the preset host-mcdc does, run them, and return the build folder."""
+    build = root / "build"
+    (build / "mcdc").mkdir(parents=True)
+    write(root, "firmware/fx/second.c", "int second(int x);", "int second(int x) { return x; }")
+    sources += ("firmware/fx/second.c",)  # llvm-cov does not print the name of a single file
+    (build / "clang").symlink_to(PROJECT / "build" / "clang")
+    flags = ["-fprofile-instr-generate", "-fcoverage-mapping", "-fcoverage-mcdc", f"-I{root}"]
+    tests = []
+    for number, body in enumerate(programs):
+        write(root, f"main{number}.c", '#include "main.h"', "int main(void)", "{", f"    {body}", "    return 0;", "}")
+        program = build / f"program{number}"
+        subprocess.run([build / "clang" / "bin" / "clang", *flags, f"main{number}.c", *sources, "-o", program],
+                       cwd=root, check=True)  # fmt: skip
+        subprocess.run([program], check=True, env={**os.environ, "LLVM_PROFILE_FILE": f"{build}/mcdc/%p.profraw"})
+        tests += [f'add_test(t{number} "{program}")', f"set_tests_properties(t{number} PROPERTIES LABELS coverage)"]
+    write(build, "CTestTestfile.cmake", *tests)
+    return build
+
+
+@pytest.fixture
+def both(tmp_path: Path) -> Path:
+    """A checkout with one function of safety, in which one decision has two conditions."""
+    write(tmp_path, "firmware/safety/both.c", *BOTH)
+    write(tmp_path, "main.h", "int both(int a, int b);")
+    return tmp_path
+
+
+def test_a_condition_without_a_test_is_found_although_each_outcome_was_executed(both: Path) -> None:
+    code, printed, complaints = check(both, "--build", run(both, "both(1, 1); both(0, 1);"))
+    assert (code, complaints) == (1, [GAP])
+    assert "safety             1 of          2     50.0     100" in printed
+
+
+def test_three_combinations_show_two_conditions(both: Path) -> None:
+    code, printed, complaints = check(both, "--build", run(both, "both(1, 1); both(0, 1); both(1, 0);"))
+    assert (code, complaints) == (0, [])
+    assert "safety             2 of          2    100.0     100" in printed
+
+
+def test_the_combinations_of_several_programs_count_together(both: Path) -> None:
+    assert check(both, "--build", run(both, "both(1, 1);", "both(0, 1); both(1, 0);"))[0] == 0
+
+
+def test_the_combinations_of_an_inline_function_count_over_all_objects(tmp_path: Path) -> None:
+    write(tmp_path, "firmware/fx/both.h", "static inline int both(int a, int b)", *BOTH[2:])
+    write(tmp_path, "main.h", '#include "firmware/fx/both.h"')
+    build = run(tmp_path, "both(1, 1);", "both(0, 1); both(1, 0);", sources=())
+    assert check(tmp_path, "--build", build)[0] == 0
+
+
+def test_the_report_of_a_part_says_what_was_executed(both: Path) -> None:
+    build = run(both, "both(1, 1); both(0, 1);")
+    assert check(both, "--build", build, "--part", "safety")[2] == [f"{GAP}; executed: F-=F, TT=T"]
+    assert check(both, "--build", build, "--part", "ecu")[2] == []
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_an_exclusion_takes_its_condition_out_of_the_count_and_is_listed(both: Path, alone: bool) -> None:
+    marker = f"/* MCDC_EXCL C2: {REASON} */"
+    changed = [marker, BOTH[3]] if alone else [f"{BOTH[3]} {marker}"]
+    write(both, "firmware/safety/both.c", *BOTH[:3], *changed, BOTH[4])
+    code, printed, _ = check(both, "--build", run(both, "both(1, 1); both(0, 1);"))
+    assert code == 0
+    assert f"C2 {REASON}" in printed
+    assert "safety             1 of          1    100.0     100         1" in printed
+
+
+@pytest.mark.parametrize(
+    ("condition", "complaint"), [("C1", "C1 is excluded, but a test shows it"), ("C3", "C3 is excluded, but there is")]
+)
+def test_an_exclusion_that_is_not_needed_is_refused(both: Path, condition: str, complaint: str) -> None:
+    write(both, "firmware/safety/both.c", *BOTH[:3], f"{BOTH[3]} /* MCDC_EXCL {condition}: {REASON} */", BOTH[4])
+    code, _, complaints = check(both, "--build", run(both, "both(1, 1); both(0, 1); both(1, 0);"))
+    assert code == 1
+    assert complaint in complaints[0]
+
+
+def test_a_decision_that_clang_does_not_measure_is_found(both: Path) -> None:
+    write(both, "firmware/safety/both.c", *BOTH[:3], "    return a > 0 && both(-1, a > 1 || b > 1);", BOTH[4])
+    code, _, complaints = check(both, "--build", run(both, "both(1, 1);"))
+    assert code == 1
+    assert complaints == ["firmware/safety/both.c:4: &&: no decision that clang measures has it",
+                          "firmware/safety/both.c:4: ||: no decision that clang measures has it"]  # fmt: skip
+
+
+def test_a_file_that_no_program_is_built_from_is_found(both: Path) -> None:
+    write(both, "firmware/ecu/other.c", "#if A && B /* a && b */", "#endif", "int c(int a)", "{",
+          "    return a < 0 || a > 3; // a || b", "}")  # fmt: skip
+    code, _, complaints = check(both, "--build", run(both, "both(1, 1); both(0, 1); both(1, 0);"))
+    assert (code, complaints) == (1, ["firmware/ecu/other.c:5: ||: no decision that clang measures has it"])
+
+
+@pytest.mark.parametrize(
+    "marker",
+    ["/* MCDC_EXCL */", "/* MCDC_EXCL C1: */", "/* MCDC_EXCL C1: cannot be shown */", f"/* MCDC_EXCL 1: {REASON} */",
+     f"// MCDC_EXCL C1: {REASON}"],
+)  # fmt: skip
+def test_an_exclusion_without_a_reason_or_in_another_form_is_refused(tmp_path: Path, marker: str) -> None:
+    write(tmp_path, "firmware/safety/a.c", f"int x; {marker}")
+    code, printed, complaints = check(tmp_path)
+    assert code == 1
+    assert "0 exclusions" in printed
+    assert complaints[0].startswith("firmware/safety/a.c:1: ")
+
+
+def test_without_counts_the_report_says_what_writes_them(both: Path) -> None:
+    build = run(both)
+    code, _, complaints = check(both, "--build", build)
+    assert code == 1
+    assert "tools/mcdc runs the tests that write them" in complaints[0]
