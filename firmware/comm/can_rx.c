@@ -47,6 +47,7 @@ static rx_result_t check_protection(uint16_t data_id, rx_channel_t *channel, con
 static bool take_command(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     struct bus_vcu_torque_request_t m;
+    /* MCDC_EXCL C1: unpack refuses only a short frame, which check_protection() has refused before */
     if (bus_vcu_torque_request_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_request_in_range(&m)) {
         return false;
     }
@@ -65,6 +66,7 @@ static bool take_command(can_rx_t *rx, const bus_scales_t *scales, const can_fra
 static bool take_limits(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
     struct bus_vcu_battery_limits_t m;
+    /* MCDC_EXCL C1: unpack refuses only a short frame, which check_protection() has refused before */
     if (bus_vcu_battery_limits_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_battery_limits_in_range(&m)) {
         return false;
     }

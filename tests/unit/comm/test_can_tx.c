@@ -148,3 +148,53 @@ void test_a_frame_with_nan_or_infinity_is_left_out_and_the_others_are_sent(void)
     TEST_ASSERT_EQUAL_INT(2, refused);
     TEST_ASSERT_GREATER_OR_EQUAL_INT(2, frames);
 }
+
+/* Frames of each message in a second. */
+static void count_frames(int count[MESSAGES])
+{
+    for (int n = 0; n < MESSAGES; n++) {
+        count[n] = 0;
+    }
+    tx = (can_tx_t){0};
+    for (int ms = 0; ms < 1000; ms++) {
+        can_tx_begin(&tx, 1);
+        for (tx_result_t r = can_tx_next(&tx, &telemetry, &frame); r != TX_NONE;
+             r = can_tx_next(&tx, &telemetry, &frame)) {
+            count[place(frame.id)] += (r == TX_FRAME) ? 1 : 0;
+        }
+    }
+}
+
+void test_each_value_that_is_not_a_number_leaves_out_its_own_message_only(void)
+{
+    float *const value[] = {
+        &telemetry.torque_estimated_Nm,
+        &telemetry.torque_commanded_Nm,
+        &telemetry.speed_rpm,
+        &telemetry.v_dc_V,
+        &telemetry.i_dc_A,
+        &telemetry.id_A,
+        &telemetry.iq_A,
+        &telemetry.id_ref_A,
+        &telemetry.iq_ref_A,
+        &telemetry.psi_f_mVs,
+        &telemetry.r_mohm,
+        &telemetry.psi_quality_percent,
+        &telemetry.r_quality_percent,
+        &telemetry.table_scale_percent,
+        &telemetry.winding_C,
+        &telemetry.inverter_C,
+        &telemetry.torque_max_Nm,
+    };
+    static const uint32_t id[] = {0x210, 0x210, 0x210, 0x211, 0x211, 0x212, 0x212, 0x212, 0x212,
+                                  0x213, 0x213, 0x213, 0x213, 0x213, 0x214, 0x214, 0x215};
+    int count[MESSAGES];
+    for (unsigned k = 0; k < sizeof id / sizeof id[0]; k++) {
+        *value[k] = NAN;
+        count_frames(count);
+        *value[k] = 0.0F;
+        for (int n = 0; n < MESSAGES; n++) {
+            TEST_ASSERT_EQUAL_INT((wanted[n].id == id[k]) ? 0 : 1000 / wanted[n].cycle_ms, count[n]);
+        }
+    }
+}

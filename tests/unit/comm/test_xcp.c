@@ -34,6 +34,18 @@ void test_before_connect_the_slave_is_silent(void)
     TEST_ASSERT_EQUAL_UINT32(2, slave.counts.ignored);
 }
 
+void test_a_frame_without_data_or_longer_than_a_packet_is_ignored(void)
+{
+    can_frame_t command = {.id = 0x650, .length = 9, .data = {0xFD}};
+    master_connect();
+    TEST_ASSERT_FALSE(xcp_command(&slave, &slave_config, &command, &last_answer));
+    command.length = 0;
+    TEST_ASSERT_FALSE(xcp_command(&slave, &slave_config, &command, &last_answer));
+    TEST_ASSERT_EQUAL_UINT32(2, slave.counts.ignored);
+    command.length = 8;
+    TEST_ASSERT_TRUE(xcp_command(&slave, &slave_config, &command, &last_answer));
+}
+
 void test_connect_reports_resources_and_packet_sizes(void)
 {
     SEND(0xFF, 0);
@@ -96,6 +108,8 @@ void test_upload_goes_on_where_it_stopped(void)
     TEST_ASSERT_EQUAL_UINT8(3, last_answer.length);
     SEND(0xF5, 8);
     EXPECT_ERROR(0x22);
+    SEND(0xF5, 0);
+    EXPECT_ERROR(0x22);
 }
 
 void test_a_write_needs_the_key(void)
@@ -137,6 +151,25 @@ void test_a_key_needs_a_seed_and_each_seed_is_different(void)
     const uint8_t first = last_answer.data[2];
     SEND(0xF8, 0, 1);
     TEST_ASSERT_NOT_EQUAL(first, last_answer.data[2]);
+}
+
+void test_a_seed_is_given_whole_and_for_calibration_only(void)
+{
+    master_connect();
+    SEND(0xF8, 1, 1); /* the rest of a longer seed */
+    EXPECT_ERROR(0x22);
+    SEND(0xF8, 0, 4); /* measurement lists, which need no key */
+    EXPECT_ERROR(0x22);
+}
+
+void test_a_key_of_another_length_is_wrong_even_if_its_bytes_are_right(void)
+{
+    master_connect();
+    SEND(0xF8, 0, 1);
+    const uint8_t *seed = &last_answer.data[2];
+    SEND(0xF7, 3, (uint8_t)~seed[0], (uint8_t)~seed[1], (uint8_t)~seed[2], (uint8_t)~seed[3]);
+    EXPECT_ERROR(0x25);
+    TEST_ASSERT_EQUAL_UINT8(1, slave.wrong_keys);
 }
 
 /* Locks the slave again and sends the key of this seed, which is the seed's complement. */
@@ -316,6 +349,19 @@ void test_pages_and_segments_that_do_not_exist_are_refused(void)
     EXPECT_ERROR(0x23);
     SEND(0xE4, 1, 0, 0, 1);
     EXPECT_ERROR(0x28);
+    SEND(0xE4, 0, 0, 1, 1);
+    EXPECT_ERROR(0x28);
+    SEND(0xE4, 0, 0, 0, 2);
+    EXPECT_ERROR(0x26);
+}
+
+void test_all_segments_at_once_are_the_one_there_is(void)
+{
+    ready();
+    SEND(0xEB, 0x83, 7, 0);
+    EXPECT(0xFF);
+    SEND(0xEA, 1, 0);
+    EXPECT(0xFF, 0, 0, 0);
 }
 
 void test_copying_the_reference_page_restores_the_built_in_values(void)
@@ -338,6 +384,8 @@ void test_the_checksum_is_that_of_the_bytes(void)
     EXPECT(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB); /* the published check value of CRC-32 */
     SEND(0xF6, 0, 0, 0, AT(measured));
     SEND(0xF3, 0, 0, 0, 0, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xF3, 0, 0, 0, 0, 0, 0, 0);
     EXPECT_ERROR(0x22);
     SEND(0xF3, 0, 0, 0, 17, 0, 0, 0);
     EXPECT_ERROR(0x24);

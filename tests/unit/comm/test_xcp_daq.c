@@ -145,8 +145,12 @@ void test_allocation_has_a_fixed_order_and_limits(void)
     EXPECT_ERROR(0x30);
     SEND(0xD4, 0, 0, 0, XCP_DAQ_ODTS);
     EXPECT(0xFF);
+    SEND(0xD4, 0, 0, 0, 1);
+    EXPECT_ERROR(0x22); /* the list has its frames */
     SEND(0xD4, 0, 1, 0, 1);
     EXPECT_ERROR(0x30);
+    SEND(0xD3, 0, 2, 0, 0, 1);
+    EXPECT_ERROR(0x22);
     SEND(0xD3, 0, 0, 0, 0, 8);
     EXPECT_ERROR(0x30);
     SEND(0xD3, 0, 0, 0, XCP_DAQ_ODTS, 1);
@@ -180,6 +184,88 @@ void test_a_list_with_an_empty_entry_or_a_frame_that_is_too_long_does_not_start(
     EXPECT_ERROR(0x2A);
 }
 
+/* Two lists of one frame with one byte: measured[3] and measured[4]. */
+static void two_lists(void)
+{
+    SEND(0xD6);
+    SEND(0xD5, 0, 2, 0);
+    for (uint8_t list = 0; list < 2; list++) {
+        SEND(0xD4, 0, list, 0, 1);
+    }
+    for (uint8_t list = 0; list < 2; list++) {
+        SEND(0xD3, 0, list, 0, 0, 1);
+        SEND(0xE2, 0, list, 0, 0, 0);
+        SEND(0xE1, 0xFF, 1, 0, AT(&measured[3 + list]));
+        EXPECT(0xFF);
+    }
+}
+
+void test_only_the_selected_lists_are_started(void)
+{
+    for (uint8_t list = 0; list < 2; list++) {
+        two_lists();
+        SEND(0xDE, 2, list, 0);
+        SEND(0xDD, 1);
+        EXPECT(0xFF);
+        SEND(0xFD);
+        EXPECT(0xFF, 0x40);
+        event();
+        TEST_ASSERT_TRUE(next());
+        TEST_ASSERT_EQUAL_HEX8(list, dto.data[0]);
+        TEST_ASSERT_EQUAL_HEX8(0xA3 + list, dto.data[1]);
+        TEST_ASSERT_FALSE(next());
+    }
+}
+
+void test_a_list_that_is_not_selected_may_be_incomplete_and_may_be_stopped(void)
+{
+    two_lists();
+    SEND(0xE3, 0, 0, 0);
+    SEND(0xDE, 2, 1, 0);
+    SEND(0xDD, 1);
+    EXPECT(0xFF);
+    SEND(0xDE, 0, 0, 0);
+    EXPECT(0xFF, 0);
+}
+
+/* The first frame has the time stamp and 2 bytes, the second one 7 bytes, which fill it. */
+void test_the_time_stamp_is_in_the_first_frame_of_a_list_only(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 2);
+    for (uint8_t odt = 0; odt < 2; odt++) {
+        SEND(0xD3, 0, 0, 0, odt, 1);
+        SEND(0xE2, 0, 0, 0, odt, 0);
+        SEND(0xE1, 0xFF, (odt == 0) ? 2 : 7, 0, AT(measured));
+        EXPECT(0xFF);
+    }
+    SEND(0xE0, 0x10, 0, 0, 0, 0, 1, 0);
+    start();
+    event();
+    const uint8_t expected[2][8] = {{0, 1, 0, 0xA0, 0xA1}, {1, 0xA0, 0xA1, 0xA2, 0xA3, 0xA4, 0xA5, 0xA6}};
+    for (unsigned odt = 0; odt < 2; odt++) {
+        TEST_ASSERT_TRUE(next());
+        TEST_ASSERT_EQUAL_UINT8((odt == 0) ? 5 : 8, dto.length);
+        TEST_ASSERT_EQUAL_HEX8_ARRAY(expected[odt], dto.data, dto.length);
+    }
+    TEST_ASSERT_FALSE(next());
+}
+
+void test_a_list_with_a_frame_that_has_no_entry_does_not_start(void)
+{
+    for (uint8_t without = 0; without < 2; without++) {
+        SEND(0xD6);
+        SEND(0xD5, 0, 1, 0);
+        SEND(0xD4, 0, 0, 0, 2);
+        SEND(0xD3, 0, 0, 0, 1U - without, 1);
+        SEND(0xE2, 0, 0, 0, 1U - without, 0);
+        SEND(0xE1, 0xFF, 1, 0, AT(measured));
+        EXPECT(0xFF);
+        SEND(0xDE, 1, 0, 0);
+        EXPECT_ERROR(0x2A);
+    }
+}
+
 void test_the_time_stamp_counts_against_the_frame(void)
 {
     SEND(0xD5, 0, 1, 0);
@@ -208,6 +294,10 @@ void test_an_entry_reads_only_what_may_be_read(void)
     SEND(0xE1, 0x03, 1, 0, AT(measured));
     EXPECT_ERROR(0x22);
     SEND(0xE1, 0xFF, 8, 0, AT(measured));
+    EXPECT_ERROR(0x22);
+    SEND(0xE1, 0xFF, 0, 0, AT(measured));
+    EXPECT_ERROR(0x22);
+    SEND(0xE1, 0xFF, 1, 1, AT(measured)); /* another address space */
     EXPECT_ERROR(0x22);
     SEND(0xE1, 0xFF, 1, 0, AT(measured));
     EXPECT(0xFF);
@@ -273,6 +363,12 @@ void test_numbers_that_do_not_exist_are_refused(void)
 {
     one_list(0, 1, 0);
     SEND(0xE2, 0, 1, 0, 0, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE2, 0, 0, 0, 1, 0);
+    EXPECT_ERROR(0x22);
+    SEND(0xE2, 0, 0, 0, 0, 2);
+    EXPECT_ERROR(0x22);
+    SEND(0xE0, 0, 1, 0, 0, 0, 1, 0);
     EXPECT_ERROR(0x22);
     SEND(0xE0, 0, 0, 0, XCP_DAQ_EVENTS, 0, 1, 0);
     EXPECT_ERROR(0x22);
