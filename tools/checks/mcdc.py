@@ -22,7 +22,6 @@ An exclusion stands in the line in which the decision begins, or alone in the li
 
 import argparse
 import json
-import os
 import re
 import subprocess
 import sys
@@ -116,16 +115,18 @@ def _shows(index: int, one: tuple[str, str], other: tuple[str, str]) -> bool:
     return result_a != result_b and changed == [index]
 
 
-def parsed(text: str, root: Path) -> dict[tuple[Path, Place, Place], Decision]:
-    """The decisions of `llvm-cov show --show-mcdc`, each once."""
-    found: dict[tuple[Path, Place, Place], Decision] = {}
+def parse(text: str, root: Path, found: dict[tuple[Path, Place, Place], Decision]) -> None:
+    """Add the decisions of the firmware in what `llvm-cov show --show-mcdc` printed."""
     path, decision = Path(), None
     for line in text.splitlines():
         if match := FILE.match(line):
-            path, decision = Path(match[1]).resolve().relative_to(root), None
+            path, decision = Path(match[1]).resolve(), None
+        elif not path.is_relative_to(root / "firmware"):
+            continue
         elif match := DECISION.search(line):
             first, last = (int(match[1]), int(match[2])), (int(match[3]), int(match[4]))
-            decision = found.setdefault((path, first, last), Decision(path, first, last))
+            key = (path.relative_to(root), first, last)
+            decision = found.setdefault(key, Decision(*key))
         elif decision is None:
             continue
         elif match := CONDITION.search(line):
@@ -134,7 +135,6 @@ def parsed(text: str, root: Path) -> dict[tuple[Path, Place, Place], Decision]:
             decision.constant.add(int(match[1]))
         elif match := EXECUTED.search(line):
             decision.executed.add(("".join(match[1].replace(",", " ").split()), match[2]))
-    return found
 
 
 def _programs(build: Path) -> list[str]:
@@ -145,19 +145,24 @@ def _programs(build: Path) -> list[str]:
 
 
 def measured(root: Path, build: Path) -> list[Decision]:
-    """The decisions of the firmware as the tests of a build executed them."""
+    """The decisions of the firmware as the tests of a build executed them.
+
+    llvm-cov is asked about each program alone: of a function that two programs have in two forms, because a constant of
+    the build differs, it would take the first form only.
+    """
     counts = sorted((build / "mcdc").glob("*.profraw"))
     if not counts:
         raise SystemExit(f"no counts in {build / 'mcdc'}: tools/mcdc runs the tests that write them")
-    programs = _programs(build)
+    found: dict[tuple[Path, Place, Place], Decision] = {}
     with tempfile.TemporaryDirectory() as scratch:
         merged = f"{scratch}/merged.profdata"
         subprocess.run([root / LLVM / "llvm-profdata", "merge", "-sparse", *counts, "-o", merged], check=True)
-        shown = subprocess.run(
-            [root / LLVM / "llvm-cov", "show", "--show-mcdc", "--show-instantiations=false", f"-instr-profile={merged}",
-             programs[0], *(f"-object={name}" for name in programs[1:]), "-sources", str(root / "firmware")],
-            stdout=subprocess.PIPE, text=True, check=True, env={**os.environ, "NO_COLOR": "1"})  # fmt: skip
-    return list(parsed(shown.stdout, root).values())
+        for program in _programs(build):
+            command = [root / LLVM / "llvm-cov", "show", "--show-mcdc", "--show-instantiations=false",
+                       f"-instr-profile={merged}", program]  # fmt: skip
+            shown = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
+            parse(shown.stdout, root, found)
+    return list(found.values())
 
 
 def part_of(path: Path) -> str:
