@@ -101,6 +101,7 @@ static bool words_match(drive_t *drive)
     const uint8_t *complements = (const uint8_t *)drive + COMPLEMENTS;
     const uint32_t first = (data_check->at < WORDS) ? data_check->at : 0U;
     uint32_t differing_bits = UINT32_MAX; /* of word and complement: all of them */
+    /* MCDC_EXCL C2: with these types a round is a whole number of steps; the bound is for others */
     for (uint32_t n = first; n < first + WORDS_PER_STEP && n < WORDS; n++) {
         differing_bits &= word_at(live, n) ^ word_at(complements, n);
     }

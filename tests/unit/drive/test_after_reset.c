@@ -81,6 +81,10 @@ void test_what_is_kept_is_what_the_drive_knows(void)
     drive.fast.faults = FAULT_CONFIG;
     before_reset(&drive, &kept);
     TEST_ASSERT_FALSE(kept.armed);
+    drive.fast.faults = 0;
+    drive.task.armed = false;
+    before_reset(&drive, &kept);
+    TEST_ASSERT_FALSE(kept.armed);
 }
 
 void test_the_drive_goes_on_with_the_short_circuit(void)

@@ -205,3 +205,14 @@ void test_without_trim_the_compensation_does_not_change(void)
     TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_DROP]);
 }
+
+/* What is identified does not explain the voltages: it may be another error than the inverter's. */
+void test_while_the_residuals_contradict_the_model_the_compensation_does_not_change(void)
+{
+    at_low_speed();
+    for (int n = 0; n < 20000; n++) {
+        drive.task.identify.kept.mismatch_share = Q15(0.26);
+        milliseconds(1);
+    }
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
+}

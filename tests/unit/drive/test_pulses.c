@@ -167,3 +167,47 @@ void test_a_number_is_carried_out_once(void)
     periods(50);
     TEST_ASSERT_TRUE(largest_d < 0.03 * TOP);
 }
+
+/* The first half wave ends at its share of the bound, 14 142; nothing has to be balanced yet. */
+void test_a_single_reversal_of_q_ends_at_the_share_of_the_bound(void)
+{
+    config.d.v = 0;
+    config.q.v = 4000;
+    config.reversals = 1;
+    periods(PERIODS);
+    assert_ended(PULSES_GOOD);
+    TEST_ASSERT_TRUE(largest_q > 13000.0 && largest_q < 14800.0);
+}
+
+/* The second half wave is too small to balance the first: the last one would have to be negative, too, and ends as soon
+ * as the current is positive, which the two periods from the sample to the voltage delay. */
+void test_a_last_half_wave_that_cannot_balance_the_others_ends_at_once(void)
+{
+    config.d.v = 0;
+    config.q = (pulses_axis_config_t){.v = 4000, .low = -2000, .high = TOP};
+    config.reversals = 3;
+    while (state.number != config.number || state.reversals < 2U) {
+        period();
+    }
+    largest_q = 0.0;
+    periods(PERIODS);
+    assert_ended(PULSES_GOOD);
+    TEST_ASSERT_TRUE(largest_q < 2500.0);
+}
+
+/* It has no current, and the voltage of one period changes that by a tenth of it. */
+void test_an_axis_that_has_not_begun_gets_the_voltage_of_one_period_at_most_on_the_way_back(void)
+{
+    config.q.v = 4000;
+    config.delay = 60;
+    periods(10);
+    theta += 1000002U;
+    period();
+    for (int n = 0; n < 60; n++) {
+        period();
+        TEST_ASSERT_EQUAL_INT32(0, acting.q);
+    }
+    TEST_ASSERT_EQUAL_INT(PULSES_FAILED, state.phase);
+    TEST_ASSERT_EQUAL_INT(PULSES_MOVED, state.failure);
+    TEST_ASSERT_TRUE(largest_q < 401.0);
+}

@@ -286,6 +286,20 @@ void test_equal_angles_of_whole_turns_are_no_standstill(void)
     }
 }
 
+/* Switching has been enabled, and the sample is from before. */
+void test_a_sample_from_before_the_bridge_acted_is_no_part_of_a_standing_angle(void)
+{
+    snapshot_t snapshot = {.sample = {.acting = true}, .window = {.acting = true}};
+    seam.motor.identify.window_turns_q29 = 4U << 29;
+    for (int n = 0; n < 8; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(4, drive.task.frozen_angle.standing);
+    snapshot.sample.acting = false;
+    (void)slow_monitors_step(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.frozen_angle.standing);
+}
+
 /* Leaving torque at speed. */
 
 /* hsm1: the short circuit is the safe state above 0.77 of the speed base, which is 10 500 rpm. */
@@ -300,6 +314,17 @@ static void run_at(double omega_pu, double torque_pu)
         sample_at(omega_pu, true, false);
         task_1khz(&drive);
     }
+}
+
+/* The record of what was identified is being written. */
+void test_switching_waits_while_the_drive_is_held(void)
+{
+    drive_hold(&drive, true);
+    seam_run();
+    TEST_ASSERT_FALSE(command()->run);
+    drive_hold(&drive, false);
+    task_1khz(&drive);
+    TEST_ASSERT_TRUE(command()->run);
 }
 
 /* Without the absolute angle the torque could have any sign. */
@@ -440,6 +465,31 @@ void test_over_temperature_at_speed_is_latched_after_the_currents_have_become_th
         const flux_point_t at = flux_table_step(&motor.flux_table, (dq_q15_t){last, 0});
         TEST_ASSERT_INT_WITHIN((unsigned)motor.torque_monitor.psi_f / 20U, 0, at.psi_d);
     }
+}
+
+/* A fault that may concern the control itself leaves no time for the ramp. */
+void test_another_fault_together_with_an_over_temperature_is_latched_at_once(void)
+{
+    run_at(0.9, 0.1);
+    drive.task.gate_fault.switch_shorted = true; /* found in the last step */
+    drive.task.plausibility.hot = (uint8_t)(seam.motor.plausibility.hot_steps - 1U);
+    seam.winding_dC = 2400;
+    sample_at(0.9, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_HEX32(FAULT_TEMPERATURE | FAULT_GATE, command()->faults);
+    TEST_ASSERT_FALSE(command()->run);
+}
+
+/* The references of the current mode are not those of a torque: nothing may hold or move them. */
+void test_enable_off_in_the_current_mode_disables_switching_at_any_speed(void)
+{
+    run_at(0.9, 0.0);
+    drive.request.current_mode = true;
+    drive.request.enable = false;
+    sample_at(0.9, true, false);
+    task_1khz(&drive);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_OFF, drive.task.run_state);
+    TEST_ASSERT_FALSE(command()->run);
 }
 
 /* The exchange boxes. */

@@ -299,6 +299,62 @@ void test_a_record_whose_values_are_refused_leaves_the_compensation(void)
     TEST_ASSERT_EQUAL_INT32(0, drive.task.compensation.measured);
 }
 
+/* Seven values at 1.85 standard deviations are 23.96 away, at 1.86 they are 24.22; the bound is 24. */
+void test_a_record_that_no_machine_in_a_thousand_would_have_is_not_used(void)
+{
+    for (int far = 0; far < 2; far++) {
+        setUp();
+        identify();
+        for (unsigned j = 0; j < IDENTIFY_STATES; j++) {
+            drive.task.identify.kalman.x_q27[j] = IDENTIFY_ONE_Q27 / 100 * ((j % 2U == 0U) ? 185 + far : -185 - far);
+        }
+        TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
+        power_on(&motor);
+        TEST_ASSERT_EQUAL_INT(far == 0, memory.recalled);
+    }
+}
+
+/* A record with this compensation on a machine whose inverter loses 2 % of the period: allowed are 0.22 % to 4.78 %,
+ * which are 72 to 1566 counts. */
+static bool recalls(int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
+{
+    static motor_t m;
+    m = motor;
+    m.bridge_duty = 0.02F;
+    setUp();
+    drive.task.compensation = (compensation_t){dead_time_q15, knee_q17, measured};
+    identify_and_save();
+    power_on(&m);
+    return memory.recalled;
+}
+
+void test_a_measured_compensation_far_from_the_motor_data_is_not_used(void)
+{
+    const q31_t knee = motor.parameters.modulate.knee_q17;
+    TEST_ASSERT_TRUE(recalls(1566, knee, 1));
+    TEST_ASSERT_FALSE(recalls(1567, knee, 1));
+    TEST_ASSERT_TRUE(recalls(72, knee, 1));
+    TEST_ASSERT_FALSE(recalls(71, knee, 1));
+    TEST_ASSERT_FALSE(recalls(700, knee + 1, 1));
+    TEST_ASSERT_TRUE(recalls(700, knee / COMPENSATION_KNEE_RANGE, 1));
+    TEST_ASSERT_FALSE(recalls(700, knee / COMPENSATION_KNEE_RANGE - 1, 1));
+    TEST_ASSERT_TRUE(recalls(1567, knee + 1, 0)); /* not measured: the motor data remain */
+    TEST_ASSERT_EQUAL_INT(dead_time(&motor.parameters), dead_time(&drive.parameters));
+}
+
+void test_a_fault_does_not_count_as_a_run_and_does_not_end_one(void)
+{
+    drive.task.run_state = RUN_STATE_FAULT;
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    drive.task.run_state = RUN_STATE_OFF;
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(10000));
+    identify();
+    drive.task.run_state = RUN_STATE_FAULT;
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
+    drive.task.run_state = RUN_STATE_OFF;
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
+}
+
 void test_a_record_whose_compensation_is_refused_leaves_the_priors(void)
 {
     static motor_t m;

@@ -13,7 +13,9 @@ static uint8_t memory[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int32_t energy;
 static bool erase_fails;
 static uint32_t failed_sectors;
-static int stuck_offset; /* this byte of every slot is stored with one wrong bit; -1: none */
+static int stuck_offset;        /* this byte of every slot is stored with one wrong bit; -1: none */
+static int reads, failing_read; /* the read with this number reports a failure, although the data are right; -1: none */
+static bool reads_blank;        /* it returns blank flash instead, and reports nothing */
 
 typedef struct {
     uint32_t number;
@@ -33,7 +35,13 @@ bool hal_nvm_read(uint32_t slot, uint32_t offset, void *data, uint32_t size)
 {
     TEST_ASSERT_TRUE(slot < HAL_NVM_SLOTS && offset + size <= HAL_NVM_SLOT_SIZE);
     memcpy(data, &memory[slot][offset], size);
-    return true;
+    if (reads++ != failing_read) {
+        return true;
+    }
+    if (reads_blank) {
+        memset(data, 0xFF, size);
+    }
+    return reads_blank;
 }
 
 bool hal_nvm_erase(uint32_t slot)
@@ -72,7 +80,9 @@ void setUp(void)
     energy = NEVER;
     erase_fails = false;
     failed_sectors = 0;
-    stuck_offset = -1;
+    stuck_offset = failing_read = -1;
+    reads = 0;
+    reads_blank = false;
 }
 
 void tearDown(void)
@@ -164,6 +174,31 @@ void test_any_flipped_bit_of_the_newest_record_gives_the_one_before(void)
         TEST_ASSERT_EQUAL_UINT32(1, loaded());
         memory[1][bit / 8U] ^= (uint8_t)(1U << (bit % 8U));
     }
+}
+
+/* The headers of both slots, that of the newest again, and its record in chunks to check it. */
+void test_a_read_that_fails_or_returns_blank_flash_gives_the_record_before(void)
+{
+    TEST_ASSERT_TRUE(save(1));
+    TEST_ASSERT_TRUE(save(2));
+    reads = 0;
+    TEST_ASSERT_EQUAL_UINT32(2, loaded());
+    const int last = reads - 1; /* of the checked record to the caller */
+    for (int n = 0; n < 2 * last; n++) {
+        failing_read = n / 2;
+        reads_blank = n % 2 != 0;
+        reads = 0;
+        TEST_ASSERT_EQUAL_UINT32((failing_read == 0) ? 2 : 1, loaded());
+    }
+}
+
+void test_a_memory_that_cannot_be_read_is_reported_as_damaged_and_a_blank_one_as_empty(void)
+{
+    record_t r;
+    failing_read = 0;
+    TEST_ASSERT_EQUAL(STORE_DAMAGED, store_load(LAYOUT, &r, sizeof r));
+    setUp();
+    TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT, &r, sizeof r));
 }
 
 void test_two_damaged_slots_are_reported_and_not_used(void)

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Whether recalled values describe this machine: what counts as an update, what confirms and what rejects them. */
+#include "drive/recall.h"
+
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+#define RECALLED 1234567 /* Q27, of the magnet flux */
+#define FAST Q31(0.5)
+#define SLOW Q31(0.001)
+
+static identify_state_t *const state = &drive.task.identify;
+
+/* In the step before the update's last one, with enough torque and no residual. */
+void setUp(void)
+{
+    seam_start();
+    recall_begin(&drive);
+    state->kalman.x_q27[IDENTIFY_FLUX] = RECALLED;
+    state->steps = 9;
+    state->kept.update_valid = true;
+    state->mean.e = (dq_q30_t){0, 0};
+    drive.task.identification.torque_estimated = motor.identify.torque_min;
+}
+
+void tearDown(void)
+{
+}
+
+static void updates(unsigned count, q31_t omega)
+{
+    for (unsigned n = 0; n < count; n++) {
+        recall_step(&drive, omega);
+    }
+}
+
+static void assert_undecided(void)
+{
+    TEST_ASSERT_TRUE(drive.task.recall.unconfirmed);
+    TEST_ASSERT_EQUAL_INT32(RECALLED, state->kalman.x_q27[IDENTIFY_FLUX]);
+}
+
+static void assert_rejected(void)
+{
+    TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+    TEST_ASSERT_EQUAL_INT32(0, state->kalman.x_q27[IDENTIFY_FLUX]);
+}
+
+void test_three_updates_without_a_residual_confirm_the_values(void)
+{
+    for (int negative = 0; negative <= 1; negative++) {
+        const q31_t omega = negative ? -FAST : FAST;
+        setUp();
+        drive.task.identification.torque_estimated = (q15_t)(negative ? -motor.identify.torque_min
+                                                                      : motor.identify.torque_min);
+        updates(2, omega);
+        assert_undecided();
+        updates(1, omega);
+        TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+        TEST_ASSERT_EQUAL_INT32(RECALLED, state->kalman.x_q27[IDENTIFY_FLUX]);
+    }
+}
+
+void test_an_update_that_tells_too_little_does_not_count(void)
+{
+    state->steps = 8;
+    updates(200, FAST);
+    assert_undecided();
+    setUp();
+    state->kept.update_valid = false;
+    updates(200, FAST);
+    assert_undecided();
+    setUp();
+    drive.task.identification.torque_estimated = (q15_t)(motor.identify.torque_min - 1);
+    updates(200, FAST);
+    assert_undecided();
+}
+
+/* A residual of the whole voltage base; agreement must begin anew after it. */
+void test_a_residual_of_either_axis_ends_the_agreement(void)
+{
+    for (int axis = 0; axis < 2; axis++) {
+        setUp();
+        updates(2, FAST);
+        *(axis == 0 ? &state->mean.e.d : &state->mean.e.q) = -Q31(0.5);
+        updates(1, FAST);
+        state->mean.e = (dq_q30_t){0, 0};
+        updates(2, FAST);
+        assert_undecided();
+        updates(1, FAST);
+        TEST_ASSERT_FALSE(drive.task.recall.unconfirmed);
+    }
+}
+
+void test_fifty_updates_with_a_residual_at_speed_reject_the_values_and_at_low_speed_none_does(void)
+{
+    state->mean.e.d = Q31(0.5);
+    updates(200, SLOW);
+    assert_undecided();
+    updates(49, FAST);
+    assert_undecided();
+    updates(1, FAST);
+    assert_rejected();
+}
+
+void test_three_contradicted_updates_reject_the_values_at_any_time(void)
+{
+    state->steps = 0;
+    state->contradicted_updates = 2;
+    updates(1, FAST);
+    assert_undecided();
+    state->contradicted_updates = 3;
+    updates(1, FAST);
+    assert_rejected();
+}
