@@ -25,6 +25,7 @@ COMMANDS = {
     "emulate": ("fluxtrue_tools.emulate.cli", "emulate", "Run a scenario on the emulated microcontroller."),
     "fuzz": ("fluxtrue_tools.fuzz.cli", "fuzz", "Random and mutated frames through the receive path."),
     "prove": ("fluxtrue_tools.prove.cli", "prove", "Prove properties of the firmware with a model checker."),
+    "mutate": ("fluxtrue_tools.mutate.cli", "mutate", "Make small errors in the firmware: do the unit tests notice?"),
     "motor": ("fluxtrue_tools.motor.cli", "motor", "Check machine data, generate its tables."),
     "commission": (
         "fluxtrue_tools.commission.cli",

@@ -50,6 +50,8 @@ def cases() -> dict[str, Case]:
                         beside={"--port": ("--serve",), "--bench-port": ("--serve",)}),
         "fuzz": Case(),
         "prove": Case(("arbitration_rate",)),
+        "mutate": Case(("firmware/safety/monitor.c",), (), {},
+                       beside={"--base": ("--changed",), "--seed": ("--sample=1",)}),
         "motor check": Case(("m",), (), MACHINE),
         "motor build": Case(("m",), ("--out", "o", "--no-report"), MACHINE, ("o/motor_tables.c", "o/motor.json")),
         "motor import": Case(("map.csv",), IMPORT_OPTIONS, {"m/motor.toml": MOTOR, "map.csv": MAP},
@@ -91,7 +93,8 @@ WRONG_TEXTS: dict[str, tuple[str, ...]] = {
               "machine.r_ohm=-1", "machine.r_ohm"), "--iron-loss-column": (*NO_OPTION, "loss=nosuch"),
     "--iron-loss-point": ("", "x", "1@x", "@3000", "nan@3000", "1@inf", "-1@3000", "1@-1", "1@1@1"),
     "--line": ("", "nosuch"), "--run": ("", "x", "paper/9/+"), "--lines": ("", "nosuch*"), "--group": ("", "nosuch"),
-    "prove names": ("", "nosuch"), "--scheduler": ("", "x", "tcp://", "tcp://host", "tcp://host:x", "tcp://h:99999"),
+    "prove names": ("", "nosuch"), "mutate names": ("", "nosuch"),
+    "--base": ("", "nosuch"), "--scheduler": ("", "x", "tcp://", "tcp://host", "tcp://host:x", "tcp://h:99999"),
 }  # fmt: skip
 
 NO_NUMBER = ("", "x", "nan", "inf", "-inf", "1,5", "0x10", "1e999", "١x")

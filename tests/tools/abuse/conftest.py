@@ -21,7 +21,7 @@ from fluxtrue_tools.motor.names import PLOTS, source_files
 # All of it comes after everything that a command can know of its input.
 WORK = (
     "sim.build._make", "emulate.build.image", "emulate.build.sim_build.run_logged", "emulate.library.load",
-    "fuzz.cli.run_logged", "fuzz.cli.configure_build", "prove.cli.Checker", "wcet.bound.Image.read",
+    "fuzz.cli.run_logged", "fuzz.cli.configure_build", "prove.cli.Checker", "mutate.cli.Build", "wcet.bound.Image.read",
     "bench.run", "bench.figures.measure",
     "campaign.run.run_case", "campaign.run._simulate", "campaign.schedule.dask",
     "fault_campaign.run.schedule.missing", "fault_campaign.run.run_one", "demo.all.demonstrate",

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from mutations import FILES, MORE_FILES
 
 # Inputs of the work of these commands do not exist here.
-IDLE = {"demo", "fuzz", "prove", "bench", "motor start", "target sbom"}
+IDLE = {"demo", "fuzz", "prove", "mutate", "bench", "motor start", "target sbom"}
 ODD_WORDS = ("", "-", ".", "/", "..", "loop", "folder", "missing/x", "/dev/null", "/dev/zero", "/proc/x", "a" * 300,
              "in.toml", "in.toml/x", "m", "link", "new.csv", "new.png", "new.json", "~", "~nosuch/x", "a;b", "a\nb",
              "🙂.csv", "--out", "--nonsense", "-x", "1", "-1", "x", "1e9", "nan")  # fmt: skip
