@@ -256,6 +256,99 @@ void test_a_rotor_that_turns_below_the_angle_is_found_when_the_twin_finds_it(voi
     TEST_ASSERT_GREATER_OR_EQUAL_INT(390, agreed);
 }
 
+/* The threshold is 1060 counts. The reference of the mean follows by 265/256 in the step: 271625/1024. */
+void test_a_change_of_just_the_threshold_is_none(void)
+{
+    for (int beyond = 0; beyond <= 1; beyond++) {
+        setUp();
+        in.u_sum = (dq_q15_t){0, 0};
+        state = (frozen_angle_state_t){
+            .first_q8 = {-271625 - 256 * beyond, 0}, .i_ref = in.i_ref, .theta_e = in.theta_e, .standing = SETTLED};
+        TEST_ASSERT_EQUAL_HEX32(0, step());
+        TEST_ASSERT_EQUAL_UINT8(beyond, state.frozen);
+    }
+}
+
+/* (MN-22), (MN-23) and (MN-27) in double precision with everything that moves; rate_gain is 3. */
+typedef struct {
+    double m[2], first[2], psi[2], i[2];
+    uint32_t theta;
+    int standing;
+} mover_t;
+
+static bool has_twin_moved(mover_t *t)
+{
+    const double turned = (double)(int32_t)(in.theta_e - t->theta);
+    if (fabs(turned) <= 33554432.0 && fabs(in.i_ref.d - t->i[0]) <= 819.0 && fabs(in.i_ref.q - t->i[1]) <= 819.0) {
+        return false;
+    }
+    t->theta = in.theta_e;
+    t->i[0] = in.i_ref.d;
+    t->i[1] = in.i_ref.q;
+    return true;
+}
+
+/* Returns the change beyond its threshold; negative while nothing is compared. */
+static double mover_step(mover_t *t)
+{
+    const double u[2] = {in.u_sum.d - 3.0 * (in.psi_ref.d - t->psi[0]), in.u_sum.q - 3.0 * (in.psi_ref.q - t->psi[1])};
+    t->standing = has_twin_moved(t) ? 0 : t->standing;
+    for (int x = 0; x < 2; x++) {
+        t->m[x] += (u[x] - t->m[x]) / ((t->standing < 4) ? 1.0 : 4.0);
+        t->first[x] = (t->standing < SETTLED) ? t->m[x] : t->first[x] + (t->m[x] - t->first[x]) / 1024.0;
+    }
+    t->psi[0] = in.psi_ref.d;
+    t->psi[1] = in.psi_ref.q;
+    TEST_ASSERT_INT32_WITHIN(0, (int32_t)u[0], state.u_standing.d);
+    TEST_ASSERT_INT32_WITHIN(0, (int32_t)u[1], state.u_standing.q);
+    if (t->standing < SETTLED) {
+        t->standing++;
+        return -100.0;
+    }
+    return hypot(t->m[0] - t->first[0], t->m[1] - t->first[1]) - ((in.i_least > 1638) ? 1060.0 : 8480.0);
+}
+
+static int32_t uniform(int32_t lo, int32_t hi)
+{
+    static uint32_t x = 1;
+    x = 1664525U * x + 1013904223U;
+    return lo + (int32_t)(((uint64_t)x * (uint32_t)(hi - lo + 1)) >> 32);
+}
+
+/* Means are rounded down by 3/256 at most, their references by 4 counts. */
+void test_means_and_decisions_are_those_of_the_twin(void)
+{
+    static const int32_t turns[] = {1 << 25, -(1 << 25), (1 << 25) + 1, -(1 << 25) - 1};
+    mover_t twin = {0};
+    dq_q15_t u = {0, 0};
+    int compared[2] = {0, 0};
+    for (int n = 0; n < 60000; n++) {
+        if (n % 60 == 0) {
+            in.i_ref = (dq_q15_t){uniform(-20000, -4000), uniform(-20000, 20000)};
+            in.theta_e = (uint32_t)uniform(-2000000000, 2000000000);
+            in.i_least = (q15_t)((n % 120 == 0) ? 1638 : 1639);
+            u = (dq_q15_t){uniform(-30000, 30000), uniform(-30000, 30000)};
+        }
+        in.theta_e += (n % 60 == 25) ? (uint32_t)turns[n / 60 % 4] : 0U;
+        in.i_ref.q += (n % 60 == 45) ? ((n & 64) ? 819 : -820) : 0;
+        const int32_t noise = (n % 180 < 60) ? 20000 : 1500;
+        in.u_sum = (dq_q15_t){u.d + uniform(-noise, noise), u.q + uniform(-noise, noise)};
+        in.psi_ref = (n % 7 == 0) ? (dq_q15_t){uniform(0, 15000), uniform(-15000, 15000)} : in.psi_ref;
+        (void)step();
+        const double beyond = mover_step(&twin);
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[0], state.mean_q8.d / 256.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.05, twin.m[1], state.mean_q8.q / 256.0);
+        TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[0], state.first_q8.d / 256.0);
+        TEST_ASSERT_DOUBLE_WITHIN(4.5, twin.first[1], state.first_q8.q / 256.0);
+        TEST_ASSERT_EQUAL_INT(twin.standing, state.standing);
+        if (fabs(beyond) > 12.0) {
+            TEST_ASSERT_EQUAL_INT(beyond > 0.0, state.frozen > 0);
+            compared[beyond > 0.0]++;
+        }
+    }
+    TEST_ASSERT_TRUE(compared[0] > 10000 && compared[1] > 10000);
+}
+
 void test_no_argument_wraps(void)
 {
     static const int32_t ends[] = {-40 * 32768, 40 * 32767};

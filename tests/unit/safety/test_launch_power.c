@@ -164,6 +164,124 @@ void test_a_bridge_that_is_off_is_not_checked_and_starts_again(void)
     TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
     TEST_ASSERT_EQUAL_UINT8(0, state.steady);
     TEST_ASSERT_EQUAL_UINT8(0, state.wrong);
+    in.theta_e = 60000000;
+    in.i_ref = (dq_q15_t){0, 100};
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    in.acting = true;
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_INT32(0, state.omega_q8); /* from the angle of the last step */
+}
+
+/* (MN-28) and (MN-29) in double precision, written from the equations; counts of the sums. */
+typedef struct {
+    double p, p_0, w, w_0, i_d, i_q, theta; /* theta: turns 2^32 */
+    int steady, wrong;
+} twin_t;
+
+static void follow(double *mean, double *first, double x, int steady)
+{
+    *mean += (x - *mean) / ((steady < 4) ? 1.0 : 4.0);
+    *first = (steady < SETTLED) ? *mean : *first + (*mean - *first) / 4096.0;
+}
+
+/* Returns by how much the power has changed beyond its threshold; negative while nothing is compared. */
+static double twin_step(twin_t *t)
+{
+    const double i_d = in.i_ref.d, i_q = in.i_ref.q, change = (double)(int32_t)(in.theta_e - (uint32_t)t->theta);
+    const bool moved = fabs(change) > 67108864.0 || fabs(i_d - t->i_d) > 205.0 || fabs(i_q - t->i_q) > 205.0;
+    const double w = moved ? 0.0 : change * 623900.0 / 4294967296.0;
+    const double torque = (in.psi_ref.d * i_q - in.psi_ref.q * i_d) / 32768.0;
+    const double p = (in.u_standing.d * i_d + in.u_standing.q * i_q - w * torque) / 65536.0;
+    t->theta = in.theta_e;
+    if (moved) {
+        t->i_d = i_d;
+        t->i_q = i_q;
+        t->steady = 0;
+    }
+    follow(&t->p, &t->p_0, p, t->steady);
+    follow(&t->w, &t->w_0, w, t->steady);
+    const double v_max = 530.0 + 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
+    const double beyond = fabs(t->p - t->p_0) - v_max * hypot(i_d, i_q) / 65536.0;
+    if (t->steady < SETTLED) {
+        t->steady++;
+        return -100.0;
+    }
+    return beyond;
+}
+
+static int32_t uniform(int32_t lo, int32_t hi)
+{
+    static uint32_t x = 1;
+    x = 1664525U * x + 1013904223U;
+    return lo + (int32_t)(((uint64_t)x * (uint32_t)(hi - lo + 1)) >> 32);
+}
+
+/* A new operating point: voltages up to 15 per unit, or one about which the power stays near its threshold. */
+static void new_point(dq_q15_t *u, uint32_t *turn, int point)
+{
+    static const int32_t turns[] = {67108864, -67108864, 67108865, -67108865, 0, 134217728};
+    const int32_t u_max = (point & 1) ? 500000 : 2000;
+    in.i_ref = (dq_q15_t){uniform(-20000, -2000), uniform(-20000, 20000)};
+    in.psi_ref = (dq_q15_t){uniform(0, 15000), uniform(-15000, 15000)};
+    *u = (dq_q15_t){uniform(-u_max, u_max), uniform(-u_max, u_max)};
+    *turn = (uint32_t)((point % 5 == 0) ? turns[point / 5 % 6] : uniform(-60000000, 60000000));
+}
+
+/* The rounding of four products, always down, is below 3 counts of the power, that of the speed below 2. */
+static void compare(const twin_t *twin, double beyond, int compared[2])
+{
+    TEST_ASSERT_DOUBLE_WITHIN(3.0, twin->p, state.power_q8 / 256.0);
+    TEST_ASSERT_DOUBLE_WITHIN(3.0, twin->p_0, state.first_power_q8 / 256.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1.5, twin->w, state.omega_q8 / 256.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1.5, twin->w_0, state.first_omega_q8 / 256.0);
+    TEST_ASSERT_EQUAL_INT(twin->steady, state.steady);
+    if (twin->w == 0.0) {
+        TEST_ASSERT_EQUAL_INT32(0, state.omega_q8);
+    }
+    if (fabs(beyond) > 8.0) {
+        TEST_ASSERT_EQUAL_INT(beyond > 0.0, state.wrong > 0);
+        compared[beyond > 0.0]++;
+    }
+}
+
+void test_means_and_decisions_are_those_of_the_twin(void)
+{
+    dq_q15_t u = {0, 0};
+    uint32_t turn = 0;
+    int compared[2] = {0, 0};
+    twin_t twin = {0};
+    for (int n = 0; n < 60000; n++) {
+        if (n % 60 == 0) {
+            new_point(&u, &turn, n / 60);
+        }
+        in.acting = n % 600 != 0;
+        in.u_standing = (dq_q15_t){u.d + uniform(-2000, 2000), u.q + uniform(-2000, 2000)};
+        in.i_ref.q += (n % 60 == 20) ? ((in.i_ref.q < 0) ? 205 : -205) : 0; /* no movement, and one */
+        in.i_ref.d += (n % 60 == 40) ? ((in.i_ref.d < -10000) ? 205 : -205) : 0;
+        if (n / 60 % 5 != 0) { /* elsewhere the angle moves as far as it may */
+            turn = (n % 60 == 30) ? (uint32_t)uniform(-60000000, 60000000) : turn + (uint32_t)uniform(-1000, 1000);
+        }
+        in.theta_e += turn;
+        (void)launch_power_step(&config, &state, &in);
+        if (!in.acting) {
+            twin = (twin_t){.theta = in.theta_e};
+            continue;
+        }
+        compare(&twin, twin_step(&twin), compared);
+    }
+    TEST_ASSERT_TRUE(compared[0] > 10000 && compared[1] > 10000);
+}
+
+/* The threshold is 530/65536 of a current of 13107: 106 counts. The reference of the mean follows by 6/256 in the step:
+ * 27142/4096. */
+void test_a_change_of_just_the_threshold_is_none(void)
+{
+    for (int beyond = 0; beyond <= 1; beyond++) {
+        in.i_ref = (dq_q15_t){0, 13107};
+        state = (launch_power_state_t){.first_power_q8 = -27142 - 256 * beyond, .i_ref = in.i_ref, .steady = SETTLED};
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
+    }
 }
 
 void test_no_argument_wraps(void)

@@ -84,14 +84,15 @@ void test_currents_that_follow_their_references_raise_nothing(void)
 /* The threshold is e_0 + |i_ref|/8 = 2000 + 1414. */
 void test_a_current_off_its_reference_is_found_in_20_ms_and_in_100_at_the_voltage_limit(void)
 {
-    in.i.q = in.i_ref.q - 3500;
+    in.i.q = in.i_ref.q - 3415;
     TEST_ASSERT_EQUAL_INT(20, steps_until(FAULT_CONTROL, -1));
     setUp();
-    in.i.q = in.i_ref.q - 3500;
+    (void)run_one_turn(-1); /* a good step: nothing is counted before */
+    in.i.q = in.i_ref.q - 3415;
     in.voltage_limited = true;
     TEST_ASSERT_EQUAL_INT(100, steps_until(FAULT_CONTROL, -1));
     setUp();
-    in.i.q = in.i_ref.q - 3300;
+    in.i.q = in.i_ref.q - 3414;
     TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_CONTROL, -1));
 }
 
@@ -121,14 +122,15 @@ static int steps_of_the_twin(double size)
     return -1;
 }
 
-static void find_oscillations(bool of_sample)
+static void find_oscillations(bool of_sample, bool of_d)
 {
     for (int32_t size = 2900; size <= 8000; size += 100) {
         setUp();
         int found = -1;
         for (int n = 1; n <= 1000 && found < 0; n++) {
-            in.i.d = in.i_ref.d + (((n & 1) && of_sample) ? size : 0);
-            in.i_mean.d = in.i_ref.d + (((n & 1) && !of_sample) ? size : 0);
+            const int32_t change = (n & 1) ? size : 0;
+            dq_q15_t *i = of_sample ? &in.i : &in.i_mean;
+            *i = (dq_q15_t){in.i_ref.d + (of_d ? change : 0), in.i_ref.q + (of_d ? 0 : change)};
             found = (run_one_turn(-1) & FAULT_CONTROL) ? n : -1;
         }
         const int expected = steps_of_the_twin(size);
@@ -139,12 +141,14 @@ static void find_oscillations(bool of_sample)
 
 void test_a_deviation_every_other_sample_is_found_by_its_oscillation(void)
 {
-    find_oscillations(true);
+    find_oscillations(true, true);
+    find_oscillations(true, false);
 }
 
 void test_an_oscillation_that_only_the_means_of_the_steps_show_is_found(void)
 {
-    find_oscillations(false);
+    find_oscillations(false, true);
+    find_oscillations(false, false);
 }
 
 void test_a_lasting_deviation_is_no_oscillation(void)
@@ -171,6 +175,21 @@ void test_a_current_that_follows_as_slowly_as_expected_is_no_deviation(void)
             found |= plausibility_step(&slow, &state, &in);
         }
         TEST_ASSERT_EQUAL_HEX32(known ? 0 : FAULT_CONTROL, found);
+    }
+}
+
+/* One sample beyond its threshold, which is e_0 + |i_ref|/8 = 4000 of the reference of this step, is a fault here. */
+void test_the_reference_counts_at_once_where_current_control_answers_at_once(void)
+{
+    plausibility_config_t strict = config;
+    strict.deviation_steps = 5;
+    for (int32_t beyond = 0; beyond <= 1; beyond++) {
+        setUp();
+        in.i_ref = in.i = in.i_mean = (dq_q15_t){0, -16000};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&strict, &state, &in));
+        in.i_ref = in.i_mean = (dq_q15_t){0, 16000};
+        in.i = (dq_q15_t){0, 20000 + beyond};
+        TEST_ASSERT_EQUAL_HEX32(beyond ? FAULT_CONTROL : 0U, plausibility_step(&strict, &state, &in));
     }
 }
 
@@ -207,14 +226,21 @@ void test_a_phase_without_current_in_one_direction_is_found_within_50_ms(void)
 void test_a_phase_is_lost_only_if_its_reference_is_large_enough(void)
 {
     in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
-    in.phases_ref = in.phases = (abc_q15_t){2999, -5999, 3000};
+    in.phases_ref = in.phases = (abc_q15_t){3000, -6000, 3000};
     in.phases.a = -2999;
     TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_PHASE_LOST));
     setUp();
     in.i_ref = in.i = in.i_mean = (dq_q15_t){0, 24000};
     in.phases_ref = in.phases = (abc_q15_t){3001, -6001, 3000};
+    TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in)); /* nothing is counted before */
     in.phases.a = -2999;
     TEST_ASSERT_EQUAL_INT(10, steps_until_the_same(FAULT_PHASE_LOST));
+    state = (plausibility_state_t){0};
+    in.phases.a = config.i_dead;
+    TEST_ASSERT_EQUAL_INT(10, steps_until_the_same(FAULT_PHASE_LOST));
+    state = (plausibility_state_t){0};
+    in.phases.a = config.i_dead + 1;
+    TEST_ASSERT_EQUAL_INT(-1, steps_until_the_same(FAULT_PHASE_LOST));
 }
 
 /* A phase without current is not lost if its reference is zero at this angle. */
@@ -250,6 +276,26 @@ void test_a_sensor_that_repeats_itself_20_times_while_the_others_sum_moves_is_st
         setUp();
         TEST_ASSERT_EQUAL_INT(-1, steps_until_stuck(x, 100));
     }
+}
+
+void test_a_sensor_that_changes_after_19_equal_samples_is_not_stuck(void)
+{
+    for (int n = 0; n < 1000; n++) {
+        const int32_t moves = (n & 1) ? 3000 : 3101, repeated = 5000 + n / 20;
+        in.phases = in.phases_ref = (abc_q15_t){repeated, -2 * moves, 3 * moves};
+        TEST_ASSERT_EQUAL_HEX32(0, plausibility_step(&config, &state, &in) & FAULT_CURRENT_STUCK);
+    }
+}
+
+/* The last sample before the bridge was off is the one before the first. */
+void test_a_sensor_that_repeats_itself_since_before_the_bridge_was_off_is_found_a_step_earlier(void)
+{
+    in.phases = (abc_q15_t){5000, -6202, 9303};
+    (void)plausibility_step(&config, &state, &in);
+    in.acting = false;
+    (void)plausibility_step(&config, &state, &in);
+    in.acting = true;
+    TEST_ASSERT_EQUAL_INT(20, steps_until_stuck(0, 101));
 }
 
 /* Surface magnets at rest where one phase carries nothing: quiet sensors repeat its value while the torque changes. */
@@ -317,6 +363,27 @@ void test_over_temperature_is_confirmed_after_110_ms_also_at_rest(void)
     TEST_ASSERT_EQUAL_INT(-1, steps_until(FAULT_TEMPERATURE, -1));
 }
 
+void test_over_speed_is_found_while_the_bridge_does_not_act(void)
+{
+    in.acting = false;
+    in.omega = 32001;
+    TEST_ASSERT_EQUAL_INT(5, steps_until(FAULT_OVER_SPEED, -1));
+}
+
+/* 19 of 20 steps of a deviation, then the bridge is off for a step. */
+void test_what_was_counted_before_the_bridge_was_off_does_not_count_afterwards(void)
+{
+    for (int round = 0; round < 3; round++) {
+        in.acting = true;
+        in.i.q = in.i_ref.q - 3500;
+        for (int n = 0; n < 19; n++) {
+            TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
+        }
+        in.acting = false;
+        TEST_ASSERT_EQUAL_HEX32(0, run_one_turn(-1));
+    }
+}
+
 void test_while_the_bridge_does_not_act_nothing_is_checked(void)
 {
     in.acting = false;
@@ -363,6 +430,7 @@ void test_a_current_that_cannot_flow_is_found_in_50_steps_in_each_phase_and_dire
         setUp();
         in.acting = false;
         in.at_rest = true;
+        (void)plausibility_step(&config, &state, &in); /* a good step: nothing is counted before */
         in.phases = (abc_q15_t){(n / 2 == 0) ? wrong : 0, (n / 2 == 1) ? wrong : 0, (n / 2 == 2) ? wrong : 0};
         TEST_ASSERT_EQUAL_INT(50, steps_until_the_same(FAULT_INPUT));
     }

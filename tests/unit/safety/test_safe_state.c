@@ -62,6 +62,16 @@ void test_at_low_speed_switching_is_disabled_and_at_high_speed_the_phases_are_sh
     TEST_ASSERT_FALSE(at(-0.5));
 }
 
+/* 32767/32768 of 18000 is 17999, and sqrt(3) times that 31175.2. */
+void test_the_line_back_emf_is_that_of_speed_and_flux_to_the_nearest_count(void)
+{
+    safe_state_config_t c = config;
+    c.psi_f = 18000;
+    in.omega = 32767;
+    (void)safe_state_step(&c, &state, &in);
+    TEST_ASSERT_EQUAL_INT16(31175, state.line_emf);
+}
+
 void test_between_the_thresholds_the_decision_stays(void)
 {
     TEST_ASSERT_FALSE(at(0.778));
@@ -144,6 +154,63 @@ void test_constant_currents_confirm_the_speed(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.5, known());
 }
 
+/* Between two periods the currents may differ by less than an eighth, here 1000 of 8000. */
+void test_currents_that_differ_by_an_eighth_within_a_period_confirm_nothing(void)
+{
+    for (int32_t change = 999; change <= 1000; change++) {
+        setUp();
+        TEST_ASSERT_TRUE(at(0.9));
+        in.shorted = true;
+        short_circuit_currents(1.0, 0.0, 0.0);
+        in.i = (dq_q15_t){8000, 0};
+        in.i_last_period = (dq_q15_t){8000 - change, 0};
+        (void)at(0.5);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3, (change == 999) ? 0.5 : 0.9, known());
+    }
+}
+
+/* From step to step the currents may differ by less than a quarter: they rise by 1.3 here. */
+void test_currents_that_differ_by_less_than_a_quarter_between_steps_confirm_the_speed(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.shorted = true;
+    in.omega = 0;
+    short_circuit_currents(1.0, 0.0, 0.0);
+    double current = 80.0;
+    for (int k = 0; k < 21; k++) {
+        current *= 1.3;
+        in.i = in.i_last_period = (dq_q15_t){(int32_t)current, 0};
+        (void)steps(1);
+    }
+    TEST_ASSERT_TRUE(known() < 0.897);
+}
+
+/* Constant currents before the short circuit show nothing: the 20 steps begin with it. */
+void test_the_speed_is_confirmed_after_20_steps_of_the_short_circuit(void)
+{
+    short_circuit_currents(1.0, 0.3, 0.3);
+    TEST_ASSERT_TRUE(at(0.9));
+    in.shorted = true;
+    in.omega = 0;
+    (void)steps(19);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.9, known());
+    (void)steps(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.896, known());
+}
+
+/* The currents contradict the angle: a higher speed counts, a lower one does not. */
+void test_in_the_short_circuit_an_unconfirmed_speed_counts_only_if_it_is_higher(void)
+{
+    TEST_ASSERT_FALSE(at(0.5));
+    in.shorted = true;
+    in.omega = (q15_t)(0.7 * 32768.0);
+    short_circuit_currents(1.0, 0.3, 2.0);
+    (void)steps(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.7, known());
+    (void)at(0.2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.7, known());
+}
+
 /* The bridge is shorted below the speed that requires it: the currents turn, so the rotor turns. */
 void test_without_an_angle_the_speed_does_not_fall_while_the_phases_are_shorted(void)
 {
@@ -162,7 +229,7 @@ void test_without_an_angle_the_speed_does_not_fall_while_the_phases_are_shorted(
 void test_without_an_angle_the_short_circuit_lasts_until_its_currents_have_vanished(void)
 {
     TEST_ASSERT_TRUE(at(0.9));
-    in.omega = 0;
+    in.omega = 29000; /* invalid: it does not count */
     in.shorted = true;
     in.speed_valid = false;
     short_circuit_currents(0.5, 0.3, 0.3);
@@ -173,6 +240,51 @@ void test_without_an_angle_the_short_circuit_lasts_until_its_currents_have_vanis
     TEST_ASSERT_EQUAL_INT16(0, state.speed);
 }
 
+/* An eighth of psi_f is 1638. */
+void test_currents_of_an_eighth_of_the_magnets_flux_are_no_standstill(void)
+{
+    for (int32_t psi = 1637; psi <= 1638; psi++) {
+        setUp();
+        TEST_ASSERT_TRUE(at(0.9));
+        in.shorted = true;
+        in.speed_valid = false;
+        in.psi_current = (dq_q15_t){-psi, 0};
+        TEST_ASSERT_EQUAL(psi == 1638, steps(1000));
+    }
+}
+
+void test_wrong_currents_are_no_standstill(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.shorted = true;
+    in.speed_valid = in.currents_valid = false;
+    TEST_ASSERT_TRUE(steps(30000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.9, known());
+}
+
+/* Not yet or no longer shorted although it is decided: an unknown speed that needs the short circuit does not fall. */
+void test_an_unknown_speed_does_not_fall_while_the_short_circuit_is_needed(void)
+{
+    TEST_ASSERT_TRUE(at(0.9));
+    in.speed_valid = false;
+    TEST_ASSERT_TRUE(steps(30000));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.9, known());
+}
+
+/* A valid speed begins the 20 s anew; their count does not wrap. */
+void test_the_time_of_an_unknown_speed_begins_with_the_last_valid_one(void)
+{
+    for (int round = 0; round < 2; round++) {
+        in.speed_valid = true;
+        TEST_ASSERT_FALSE(at(0.6));
+        in.speed_valid = false;
+        (void)steps(19000);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.6, known());
+    }
+    (void)steps(70000);
+    TEST_ASSERT_EQUAL_UINT16(20000, state.unknown_steps);
+}
+
 void test_with_switching_disabled_an_unknown_speed_falls_after_20_s(void)
 {
     TEST_ASSERT_FALSE(at(0.6));
@@ -180,7 +292,9 @@ void test_with_switching_disabled_an_unknown_speed_falls_after_20_s(void)
     in.speed_valid = false;
     (void)steps(20000);
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.6, known());
-    (void)steps(200);
+    (void)steps(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.596, known());
+    (void)steps(199);
     TEST_ASSERT_EQUAL_INT16(0, state.speed);
 }
 

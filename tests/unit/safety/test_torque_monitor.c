@@ -342,6 +342,135 @@ void test_the_resistance_is_that_of_the_windings_temperature_or_of_any_that_it_m
     }
 }
 
+/* A monitor without tolerances of its own, which decides in one step, at half of the speed base. */
+static const torque_monitor_config_t exact = {.winding_min_dC = -400,
+                                              .winding_max_dC = 1800,
+                                              .mean_rate = 8192,
+                                              .torque_steps = 1,
+                                              .angle_steps = 1,
+                                              .settle_steps = SETTLING};
+
+/* Faults where the mean of the deviation has settled at this value, and nothing changes. */
+static uint32_t faults_at(const torque_monitor_config_t *c, int32_t deviation)
+{
+    in.acting = true;
+    state = (torque_monitor_state_t){
+        .psi = in.psi, .omega = in.omega, .deviation = deviation * 65536, .settling = SETTLING};
+    return torque_monitor_step(c, &state, &in);
+}
+
+/* Whether the torque is a fault with i_q = 0.5 and this voltage without resistance: the power is half of it, that of
+ * the command half of the torque, and the limit half of t_0 + |T|/8. */
+static bool torque_found(q15_t t_0, int32_t torque, int32_t u_q)
+{
+    torque_monitor_config_t c = exact;
+    c.t_0 = t_0;
+    in = (torque_monitor_in_t){.u = {0, u_q}, .i = {0, 16384}, .omega = 16384, .torque = (q15_t)torque};
+    return (faults_at(&c, (u_q - torque) / 2) & FAULT_TORQUE) != 0U;
+}
+
+/* A command of 16000 has the power 8000 and the limit 1000, one of 0 with t_0 = 1000 the limit 500. */
+void test_the_limits_of_the_power_are_exact(void)
+{
+    static const struct {
+        int16_t torque, inside, beyond;
+    } cases[] = {{16000, 18000, 18002}, {16000, -2000, -2002}, {-16000, -18000, -18002}, {-16000, 2000, 2002}};
+    for (unsigned k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        TEST_ASSERT_FALSE(torque_found(0, cases[k].torque, cases[k].inside));
+        TEST_ASSERT_TRUE(torque_found(0, cases[k].torque, cases[k].beyond));
+    }
+    TEST_ASSERT_FALSE(torque_found(0, 0, 0));
+    TEST_ASSERT_FALSE(torque_found(1000, 0, 1000) || torque_found(1000, 0, -1000));
+    TEST_ASSERT_TRUE(torque_found(1000, 0, 1002) && torque_found(1000, 0, -1002));
+}
+
+/* With 900 the command is below t_0, and the limit (1000 + 112)/2 = 556 holds in both directions; with 1000 it is not,
+ * and power up to 562 beyond zero in the other direction is allowed. The deviations are -600. */
+void test_below_the_least_torque_both_directions_count(void)
+{
+    TEST_ASSERT_TRUE(torque_found(1000, 900, -300));
+    TEST_ASSERT_FALSE(torque_found(1000, 1000, -200));
+}
+
+/* Half a per unit of resistance: 8192 drop at i_q = 0.5. An eighth of it is 1024, of which the limit takes half. */
+void test_the_tolerance_of_the_resistance_is_an_eighth_at_every_temperature(void)
+{
+    torque_monitor_config_t cold = exact, warm = exact;
+    cold.r = 1 << 30;
+    warm.r_per_dC = 1 << 21;
+    for (int k = 0; k < 2; k++) {
+        const torque_monitor_config_t *c = k ? &warm : &cold;
+        for (int beyond = 0; beyond <= 2; beyond += 2) {
+            in = (torque_monitor_in_t){
+                .u = {0, 8192 + 1024 + beyond}, .i = {0, 16384}, .omega = 16384, .winding_dC = k ? 712 : 200};
+            const bool found = (faults_at(c, (1024 + beyond) / 2) & FAULT_TORQUE) != 0U;
+            TEST_ASSERT_EQUAL(beyond > 0, found);
+        }
+    }
+}
+
+/* r rises by 2^-12 for each 0.1 K from 0.5 at 20 C: 0.622 in the middle of -40 and 180 C. It may differ by the 0.2686
+ * to the ends and by an eighth, 0.3463: the drop at i_q = 0.5 is 10192, and half of 5674 is allowed. */
+void test_without_a_temperature_the_resistance_may_be_that_of_any(void)
+{
+    torque_monitor_config_t c = exact;
+    c.r = 1 << 30;
+    c.r_per_dC = 1 << 19;
+    for (int beyond = 0; beyond <= 2; beyond += 2) {
+        in = (torque_monitor_in_t){
+            .u = {0, 10192 + 5674 + beyond}, .i = {0, 16384}, .omega = 16384, .winding_dC = TEMPERATURE_UNKNOWN};
+        TEST_ASSERT_EQUAL(beyond > 0, (faults_at(&c, (5674 + beyond) / 2) & FAULT_TORQUE) != 0U);
+    }
+}
+
+static bool angle_found(const torque_monitor_config_t *c, int32_t u_d, int32_t u_q, int32_t i_d)
+{
+    in = (torque_monitor_in_t){.u = {u_d, u_q}, .i = {i_d, 0}, .omega = 16384, .winding_dC = 200};
+    return (faults_at(c, 0) & FAULT_ANGLE_OFFSET) != 0U;
+}
+
+/* The nominal back-EMF is 10000: 2000 across it are allowed, 3500 more along it, and 5000 in the opposite direction. */
+void test_the_limits_of_the_back_emf_are_exact(void)
+{
+    torque_monitor_config_t c = exact;
+    c.psi_f = 20000;
+    TEST_ASSERT_FALSE(angle_found(&c, 2000, 0, 0) || angle_found(&c, -2000, 0, 0));
+    TEST_ASSERT_TRUE(angle_found(&c, 2001, 0, 0) && angle_found(&c, -2001, 0, 0));
+    TEST_ASSERT_FALSE(angle_found(&c, 0, 3500, 0) || angle_found(&c, 0, -5000, 0));
+    TEST_ASSERT_TRUE(angle_found(&c, 0, 3501, 0) && angle_found(&c, 0, -5001, 0));
+    c.v_0 = 4000; /* half of it is just not more than the 2000, and is allowed beyond them */
+    TEST_ASSERT_TRUE(angle_found(&c, 4001, 0, 0));
+    TEST_ASSERT_FALSE(angle_found(&c, 4000, 0, 0));
+    c.v_0 = 4002;
+    TEST_ASSERT_FALSE(angle_found(&c, 30000, 0, 0));
+}
+
+/* 0.1 of resistance at i_d = 0.5 drop 1638: e_d = 3362 is beyond 2000 and within 3638. */
+void test_the_drop_of_the_whole_resistance_is_allowed_across_the_back_emf(void)
+{
+    torque_monitor_config_t c = exact;
+    c.psi_f = 20000;
+    c.r = 6554 << 15;
+    TEST_ASSERT_FALSE(angle_found(&c, 5000, 0, 16384));
+    TEST_ASSERT_TRUE(angle_found(&c, 5300, 0, 16384));
+}
+
+/* Settling begins when the bridge begins to act, whatever was before. */
+void test_the_first_decision_is_that_of_the_step_after_settling(void)
+{
+    in = (torque_monitor_in_t){.u = {0, 20000}, .i = {0, 16384}, .omega = 16384};
+    for (int round = 0; round < 2; round++) {
+        in.acting = false;
+        TEST_ASSERT_EQUAL_HEX32(0, torque_monitor_step(&exact, &state, &in));
+        TEST_ASSERT_EQUAL_HEX32(0, torque_monitor_step(&exact, &state, &in));
+        in.acting = true;
+        for (int n = 0; n < SETTLING; n++) {
+            TEST_ASSERT_EQUAL_HEX32(0, torque_monitor_step(&exact, &state, &in));
+        }
+        TEST_ASSERT_EQUAL_HEX32(FAULT_TORQUE, torque_monitor_step(&exact, &state, &in) & FAULT_TORQUE);
+    }
+}
+
 /* The value as the monitor can represent it. */
 static double saturated(double x)
 {
