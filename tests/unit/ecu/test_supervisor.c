@@ -172,6 +172,12 @@ void test_the_time_in_a_state_does_not_wrap(void)
     TEST_ASSERT_UINT32_WITHIN(1111, 60000000U, us);
     stays(STATE_STANDBY, 1000);
     TEST_ASSERT_EQUAL_UINT32(us, s.us);
+    s.us = 59999999U;
+    stays(STATE_STANDBY, 1);
+    TEST_ASSERT_EQUAL_UINT32(60001110U, s.us);
+    s.us = 60000000U;
+    stays(STATE_STANDBY, 1);
+    TEST_ASSERT_EQUAL_UINT32(60000000U, s.us);
 }
 
 void test_without_a_test_of_the_shut_off_paths_there_is_neither_standby_nor_precharge(void)
@@ -228,6 +234,30 @@ void test_precharge_that_takes_longer_than_2_s_is_a_fault(void)
 {
     to_precharge();
     TEST_ASSERT_EQUAL_INT(STATE_PRECHARGE, steps(2000));
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PRECHARGE, s.faults);
+}
+
+void test_bad_commands_end_ready_at_once_and_derate_when_no_torque_is_left(void)
+{
+    to_ready();
+    in.failed = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
+    setUp();
+    to_derate();
+    in.failed = true;
+    in.torque_arbitrated_is_zero = false;
+    stays(STATE_DERATE, 10);
+    in.torque_arbitrated_is_zero = true;
+    TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, step());
+}
+
+/* The battery's voltage comes in the step in which the time ends. */
+void test_a_precharge_that_ends_too_late_is_the_fault_of_the_precharge(void)
+{
+    to_precharge();
+    stays(STATE_PRECHARGE, 2000);
+    voltage(true);
     TEST_ASSERT_EQUAL_INT(STATE_FAULT, step());
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_PRECHARGE, s.faults);
 }
@@ -398,7 +428,7 @@ void test_mode_off_in_fault_discharges_and_comes_back_to_fault(void)
     in.torque_mode = false;
     in.enable = false;
     TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
-    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, steps(100));
+    stays(STATE_DISCHARGE, 100);
     voltage(false);
     stays(STATE_FAULT, 100);
 }
@@ -420,6 +450,30 @@ void test_a_time_out_leads_from_run_to_ready_and_enable_must_be_off_before_on(vo
     TEST_ASSERT_EQUAL_INT(STATE_READY, step());
     in.enable = true;
     TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
+void test_after_a_time_out_while_disabled_enable_must_be_off_first_and_nothing_is_refused(void)
+{
+    to_ready();
+    in.alive = false;
+    stays(STATE_READY, 5);
+    TEST_ASSERT_EQUAL_INT(REFUSED_NONE, s.refused);
+    TEST_ASSERT_EQUAL_UINT8(0, s.refused_count);
+    in.alive = true;
+    in.enable = true;
+    stays(STATE_READY, 5);
+    in.enable = false;
+    stays(STATE_READY, 1);
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
+void test_mode_off_disables_although_enable_is_held(void)
+{
+    to_run();
+    in.torque_mode = false;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    TEST_ASSERT_EQUAL_INT(STATE_DISCHARGE, step());
 }
 
 static void refused(refused_t why)
@@ -472,6 +526,7 @@ void test_enable_without_an_absolute_angle_is_refused(void)
     (void)step();
     in.enable = true;
     TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+    TEST_ASSERT_EQUAL_INT(REFUSED_NONE, s.refused);
 }
 
 void test_enable_in_the_locked_current_mode_is_refused(void)
@@ -499,6 +554,13 @@ void test_enable_before_ready_is_refused(void)
 void test_enable_in_fault_is_refused(void)
 {
     to_fault();
+    in.enable = false;
+    (void)step();
+    refused(REFUSED_FAULT);
+    setUp();
+    to_run();
+    in.gate_fault = true; /* none of the drive */
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(2));
     in.enable = false;
     (void)step();
     refused(REFUSED_FAULT);
@@ -539,9 +601,11 @@ void test_a_reset_does_not_clear_a_fault_that_persists(void)
     in.enable = false;
     (void)step();
     reset();
+    (void)steps(2);
     TEST_ASSERT_EQUAL_UINT8(0, s.first_fault);
-    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
+    (void)step();
     TEST_ASSERT_EQUAL_UINT8(1, s.first_fault); /* the fault of the drive persists and is reported again */
+    TEST_ASSERT_EQUAL_INT(STATE_FAULT, steps(10));
 }
 
 void test_a_reset_while_enabled_or_outside_fault_is_refused(void)
@@ -692,4 +756,58 @@ void test_no_two_outputs_conflict(void)
         TEST_ASSERT_FALSE(o->precharge && o->contactor);
         TEST_ASSERT_TRUE(!o->run || (o->contactor && o->gate_driver));
     }
+}
+
+void test_the_first_fault_stays_and_a_lasting_one_counts_once(void)
+{
+    to_run();
+    in.gate_fault = true;
+    (void)step();
+    in.drive_faults = 1;
+    (void)steps(10);
+    TEST_ASSERT_EQUAL_UINT8(33 + 3, s.first_fault);
+    TEST_ASSERT_EQUAL_UINT8(2, s.fault_count);
+}
+
+void test_a_reset_that_began_without_commands_counts_with_the_first_one(void)
+{
+    to_fault();
+    in.enable = false;
+    in.alive = false;
+    in.reset = true;
+    (void)step();
+    TEST_ASSERT_EQUAL_UINT32(0, s.resets);
+    in.alive = true;
+    (void)step();
+    TEST_ASSERT_EQUAL_UINT32(1, s.resets);
+}
+
+void test_init_ends_with_the_first_microsecond_beyond_50_ms(void)
+{
+    s.us = 49000;
+    TEST_ASSERT_EQUAL_INT(STATE_INIT, step());
+    s.us = 49001;
+    TEST_ASSERT_EQUAL_INT(STATE_STANDBY, step());
+}
+
+void test_without_commands_the_dc_link_is_not_charged(void)
+{
+    to_standby();
+    in.torque_mode = true;
+    in.alive = false;
+    stays(STATE_STANDBY, 10);
+}
+
+void test_the_locked_current_mode_is_not_off(void)
+{
+    to_ready();
+    in.torque_mode = false;
+    in.current_mode = true;
+    stays(STATE_READY, 10);
+}
+
+void test_outside_ready_and_run_nothing_stays_enabled(void)
+{
+    to_safe();
+    TEST_ASSERT_FALSE(s.enabled);
 }
