@@ -64,6 +64,57 @@ void test_the_limited_torque_does_not_exceed_the_rated_one(void)
     TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, step().derating);
 }
 
+/* Measured losses are kept between 0 and a quarter of the base. */
+void test_the_measured_loss_stays_within_its_range(void)
+{
+    in.u = in.i = (dq_q15_t){32767, 0};
+    for (int n = 0; n < 100000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(1 << 29, state.loss);
+    in.u.d = -32767;
+    for (int n = 0; n < 100000; n++) {
+        (void)step();
+    }
+    TEST_ASSERT_EQUAL_INT32(0, state.loss);
+}
+
+/* With losses of 0.25 a limit of 1 would leave 0.77 of the torque at this speed. */
+void test_without_a_power_limit_the_losses_do_not_limit(void)
+{
+    torque_limit_config_t c = f.torque_limit;
+    c.torque_max = INT16_MAX;
+    c.speed = (derating_line_t){.end = INT16_MAX, .gain = -(1 << 30)};
+    state.loss = 1 << 29;
+    in.omega = in.torque_arbitrated = 32000;
+    const torque_limit_t y = torque_limit_step(&c, &state, &in);
+    TEST_ASSERT_EQUAL_INT(32000, y.torque_limited);
+    TEST_ASSERT_EQUAL_HEX16(0, y.derating);
+}
+
+/* Any power permits any torque where nothing turns, and no power permits none. */
+void test_at_standstill_the_least_power_does_not_limit_and_none_allows_no_torque(void)
+{
+    in.omega = 0;
+    limits.power_drive = 1;
+    TEST_ASSERT_EQUAL_INT(RATED, step().drive);
+    limits.power_drive = 0;
+    TEST_ASSERT_EQUAL_INT(0, step().drive);
+}
+
+/* There both signs are driving torque, and so are the reasons. */
+void test_at_standstill_the_reason_is_that_of_the_driving_limit_for_both_signs(void)
+{
+    in.omega = 0;
+    limits.torque_drive = 5000;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        in.torque_arbitrated = (q15_t)(sign * 8000);
+        const torque_limit_t y = step();
+        TEST_ASSERT_EQUAL_INT(sign * 5000, y.torque_limited);
+        TEST_ASSERT_EQUAL_HEX16(DERATING_REQUEST, y.derating);
+    }
+}
+
 /* Driving torque acts in the direction of rotation, regenerating torque against it: four quadrants. */
 void test_driving_and_regenerating_are_limited_separately_in_both_directions_of_rotation(void)
 {
@@ -282,6 +333,20 @@ void test_derating_lines_with_the_wrong_sign_and_other_bad_configurations_are_re
 {
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&f.torque_limit));
     torque_limit_config_t c = f.torque_limit;
+    c.torque_max = 1;
+    c.drop = 0;
+    c.loss_rate = 1;
+    c.moving.gain = c.dc_low.gain = 1;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c)); /* the least of each */
+    c.drop = -1;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_TORQUE_LIMIT, torque_limit_check(&c));
+    c = f.torque_limit;
+    c.moving.gain = 0;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_DERATING_STANDSTILL, torque_limit_check(&c));
+    c = f.torque_limit;
+    c.dc_low.gain = 0;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_DERATING_DC_LOW, torque_limit_check(&c));
+    c = f.torque_limit;
     c.winding.gain = 1;
     TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, torque_limit_check(&c));
     c = f.torque_limit;

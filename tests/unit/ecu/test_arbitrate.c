@@ -235,3 +235,69 @@ void test_a_limit_that_does_not_limit_changes_nothing(void)
         TEST_ASSERT_EQUAL_INT32(alone.torque_arbitrated, state.torque_arbitrated);
     }
 }
+
+/* Braking begins above the speed of standstill. */
+void test_at_the_speed_of_standstill_nothing_brakes(void)
+{
+    TEST_ASSERT_FALSE(arbitrate_is_braking(&config, 1000000, true));
+    TEST_ASSERT_TRUE(arbitrate_is_braking(&config, 1000001, true));
+    TEST_ASSERT_FALSE(arbitrate_is_braking(&config, -1000000, false));
+    TEST_ASSERT_TRUE(arbitrate_is_braking(&config, -1000001, false));
+}
+
+static q15_t step_from(int32_t torque, int32_t rate, int32_t requested)
+{
+    state = (arbitrate_state_t){.torque_arbitrated = torque * COUNT, .rate = rate * COUNT};
+    in.torque_requested = (q15_t)requested;
+    return step();
+}
+
+/* With the jerk of 40 a rate of 80 stops within 80 + 40 = 120, a rate of 120 within 240. */
+void test_the_rate_is_the_largest_that_still_stops_at_the_target(void)
+{
+    TEST_ASSERT_EQUAL_INT(1080, step_from(1000, 40, 1120));
+    TEST_ASSERT_EQUAL_INT(1040, step_from(1000, 40, 1119));
+    TEST_ASSERT_EQUAL_INT(1080, step_from(1000, 80, 1200));
+    TEST_ASSERT_EQUAL_INT(1120, step_from(1000, 80, 1240));
+    TEST_ASSERT_EQUAL_INT(-1080, step_from(-1000, -80, -1200));
+}
+
+void test_a_step_that_reaches_the_target_exactly_ends_the_rate(void)
+{
+    TEST_ASSERT_EQUAL_INT(1040, step_from(1000, 40, 1040));
+    TEST_ASSERT_EQUAL_INT32(0, state.rate);
+}
+
+void test_a_rate_in_the_other_direction_counts_as_none(void)
+{
+    TEST_ASSERT_EQUAL_INT(1040, step_from(1000, -400, 8000));
+    TEST_ASSERT_EQUAL_INT(960, step_from(1000, 400, -8000));
+}
+
+void test_after_ramp_out_and_off_nothing_is_left(void)
+{
+    in.ramp_out = true;
+    (void)step_from(8000, 400, 8000);
+    TEST_ASSERT_EQUAL_INT32(0, state.rate);
+    in.run = false;
+    (void)step_from(8000, 400, 8000);
+    TEST_ASSERT_EQUAL_INT32(0, state.torque_arbitrated);
+    TEST_ASSERT_EQUAL_INT32(0, state.rate);
+}
+
+/* A limit of 5000 leaves one jerk more, with either sign. A rate outwards ends with it, one towards zero does not. */
+void test_a_limit_holds_the_torque_of_either_sign(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        for (int direction = -1; direction <= 1; direction += 2) {
+            const q31_t rate = direction * sign * 80 * COUNT;
+            state = (arbitrate_state_t){.torque_arbitrated = sign * 9000 * COUNT, .rate = rate};
+            arbitrate_hold(&config, &state, (q15_t)(sign * 5000));
+            TEST_ASSERT_EQUAL_INT32(sign * 5040 * COUNT, state.torque_arbitrated);
+            TEST_ASSERT_EQUAL_INT32(direction > 0 ? 0 : rate, state.rate);
+        }
+        state = (arbitrate_state_t){.torque_arbitrated = sign * 5040 * COUNT, .rate = sign * 80 * COUNT};
+        arbitrate_hold(&config, &state, (q15_t)(sign * 5000)); /* just not held */
+        TEST_ASSERT_EQUAL_INT32(sign * 80 * COUNT, state.rate);
+    }
+}
