@@ -10,7 +10,7 @@ import pytest
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.commission.score import balance_error, score
+from fluxtrue_tools.commission.score import balance_error, resistance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_map import load_flux_map
@@ -19,6 +19,9 @@ from fluxtrue_tools.sim.motor import Motor
 
 MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
 MAP_RMS, R_SHARE, OFFSET_SHARE, BALANCE = 0.01, 0.01, 0.001, 0.002
+# The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
+LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
+R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
 
 
 @pytest.mark.parametrize(("name", "seed"), MACHINES)
@@ -27,17 +30,34 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     found = run(drive, chosen(("map",)), known, lambda _: None)
     assert found.surface is not None and found.resistance is not None and found.balance is not None
     reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
-    error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
+    error, left = resistance_error(found.resistance.r_ohm, truth)
     print(f"{name} {seed}: map {reached}, R {100 * error:+.2f} %, largest current {found.largest_A:.1f} A")
     offset_A = sum(truth.plant[f"current_offset_A_{phase}"] * cmath.exp(2j * cmath.pi * k / 3.0) * 2.0 / 3.0
                    for k, phase in enumerate("abc"))  # fmt: skip
     assert abs(found.offset_A - offset_A) <= OFFSET_SHARE * truth.plant["current_full_scale_A"]
     assert reached.map_rms <= MAP_RMS
     assert abs(error) <= R_SHARE
+    assert abs(left) <= R_LEFT
     assert balance_error(found.balance, truth) <= BALANCE
     assert found.largest_A <= known.i_max_A
     assert drive.get("run_state") != 1.0
     assert drive.get("fault_word") == 0.0
+
+
+@pytest.mark.parametrize(("name", "seed"), LITTLE_VOLTAGE)
+def test_resistance_where_little_voltage_shows_it(name: str, seed: int, unknown: Motor, known: Nameplate) -> None:
+    """With the legs' signs at the samples, one inductance for a level or the drive's compensation as it should be in
+    place of as it is, these machines are missed by up to 3 %."""
+    drive, truth = hidden.make(name, seed, unknown, known.i_max_A)
+    found = run(drive, chosen(("resistance",)), known, lambda _: None).resistance
+    assert found is not None
+    error, left = resistance_error(found.r_ohm, truth)
+    plant = truth.plant
+    leg_V = plant["dead_time_s"] * plant["pwm_hz"] * plant["vdc_V"] + plant["device_drop_V"]
+    print(f"{name} {seed}: R {100 * error:+.2f} % ({100 * left:+.2f} %), leg {found.total_V - leg_V:+.3f} V")
+    assert abs(error) <= R_SHARE
+    assert abs(left) <= R_LEFT
+    assert abs(found.total_V - leg_V * plant["vdc_gain"]) <= LEG_V
 
 
 def test_the_truth_cannot_be_read(unknown: Motor, known: Nameplate) -> None:

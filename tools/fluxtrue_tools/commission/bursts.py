@@ -85,6 +85,13 @@ class Raw:
         """Without the offsets of the current sensors, which are constant in the stationary frame."""
         return replace(self, i=self.i - offset * np.exp(-1j * self.theta))
 
+    def compensated(self, offset: complex, level_V: float, knee_A: float) -> "Raw":
+        """With the voltage that the drive's compensation of the dead time has added, from the second sample on: it goes
+        by the currents that the sensors have shown, with their offset, one sample before the voltage acts."""
+        shown = self.i * np.exp(1j * self.theta) + offset
+        added = level_V * _legs(shown[:-1], knee_A) * np.exp(-1j * self.theta[1:])
+        return replace(self, i=self.i[1:], u=self.u[1:] + added, theta=self.theta[1:], zero=self.zero[1:])
+
 
 def _aligned(rows: Array, period_s: float, burst: Burst, failure: str) -> Raw:
     """The voltage of a row acts in the period after its sample."""
@@ -140,11 +147,11 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     return _aligned(rows, drive.period_s, burst, failure).without(known.offset_A)
 
 
-def offset(drive: Capture, seconds: float = 0.1) -> tuple[complex, float]:
-    """Mean current with switching disabled, in the stationary frame, and the rms noise of a component."""
+def offset(drive: Capture, seconds: float = 0.1) -> complex:
+    """Mean current with switching disabled, in the stationary frame."""
     rows = drive.capture(SIGNALS, round(seconds / drive.period_s))
     i_s = (rows[:, 0] + 1j * rows[:, 1]) * np.exp(1j * rows[:, 4])
-    return complex(i_s.mean()), float(i_s.std() / math.sqrt(2.0))
+    return complex(i_s.mean())
 
 
 @dataclass(frozen=True)
@@ -168,19 +175,31 @@ def _legs(i_s: Array, knee_A: float) -> Array:
     return total
 
 
-def _integral(values: Array, period_s: float) -> Array:
-    """Trapezoids from the first sample on."""
-    steps = 0.5 * period_s * (values[1:] + values[:-1])
-    return np.concatenate(([0.0], np.cumsum(steps)))
+def _signs(i_s: Array) -> Array:
+    """The vector of three legs whose voltages are the signs of their currents: means over each period, in which the
+    currents change along straight lines. The mean of a sign from a to b is (|b| - |a|)/(b - a)."""
+    total = np.zeros(len(i_s) - 1, complex)
+    for k in range(3):
+        axis = np.exp(2j * np.pi * k / 3.0)
+        i = (i_s * np.conj(axis)).real
+        change = np.diff(i)
+        means = np.where(change == 0.0, np.sign(i[1:]), np.diff(np.abs(i)) / np.where(change == 0.0, 1.0, change))
+        total += 2.0 / 3.0 * axis * means
+    return total
 
 
-def integrate(raw: Raw, r_ohm: float, knee_A: float) -> Linkage:
+def _sum(means: Array, period_s: float) -> Array:
+    """The integral from the first sample on, of what is constant in each period."""
+    return period_s * np.concatenate(([0.0], np.cumsum(means)))
+
+
+def integrate(raw: Raw, r_ohm: float) -> Linkage:
     """(CM-11): in the stationary frame, so that a movement of the rotor is part of the model."""
     turn = np.exp(1j * raw.theta)
     middle = np.exp(0.5j * (raw.theta[1:] + raw.theta[:-1]))
     i_s = raw.i * turn
-    volts = np.concatenate(([0.0], np.cumsum(raw.period_s * raw.u[:-1] * middle)))
-    r_part = _integral(i_s, raw.period_s)
+    volts = _sum(raw.u[:-1] * middle, raw.period_s)
+    r_part = _sum(0.5 * (i_s[1:] + i_s[:-1]), raw.period_s)
     back = np.exp(-1j * raw.theta)
-    level_part = _integral(_legs(i_s, knee_A), raw.period_s)
+    level_part = _sum(_signs(i_s), raw.period_s)
     return Linkage(raw.i, (volts - r_ohm * r_part) * back, back * turn[0], -r_part * back, -level_part * back, raw.axes)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.cli import nameplate_of
-from fluxtrue_tools.commission.score import balance_error, score, turned
+from fluxtrue_tools.commission.score import balance_error, resistance_error, score, turned
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import motor as motors
@@ -21,12 +21,13 @@ from fluxtrue_tools.sim.build import ROOT
 KINDS = ("hsm1", "saturated", "pmasynrm", "linear", "leaf")
 FOLDER = ROOT / "tests" / "motors" / "unknown"
 FIRST_SEED = 100
-MAP = ("map rms, % of psi_max", "R, %", "gain balance, %", "largest current, % of i_max", "movement, deg")
+MAP = ("map rms, % of psi_max", "R, %", "R beyond the sensors' gains, %", "gain balance, %",
+       "largest current, % of i_max", "movement, deg")  # fmt: skip
 TURNING = ("wrong connections", "offset, deg", "psi_f, %", "inertia, %", "drag, %")
 
 
-def _one(name: str, seed: int, folder: Path) -> tuple[float, float, float, float, float] | None:
-    """Errors of map, resistance and balance, share of i_max, movement in degrees; None after a refusal."""
+def _one(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
+    """Errors in the order of MAP, share of i_max, movement in degrees; None after a refusal."""
     motor = motors.load(str(folder))
     known = nameplate_of(folder, motor)
     drive, truth = hidden.make(name, seed, motor, known.i_max_A)
@@ -37,17 +38,17 @@ def _one(name: str, seed: int, folder: Path) -> tuple[float, float, float, float
         return None
     assert found.surface is not None and found.resistance is not None and found.balance is not None
     reached = score(found.surface.model, truth, known.i_max_A, truth.psi_f_Vs)
-    r_error = found.resistance.r_ohm / truth.plant["r_ohm_20"] - 1.0
+    r_error, r_left = resistance_error(found.resistance.r_ohm, truth)
     balance = balance_error(found.balance, truth)
     share, moved = found.largest_A / known.i_max_A, float(np.degrees(found.moved_rad))
     click.echo(f"{name:10} {seed}  map {100 * reached.map_rms:5.2f} % (worst {100 * reached.map_worst:5.2f} %)  "
-               f"R {100 * r_error:+6.2f} %  balance {100 * balance:.3f} %  {share:.3f} i_max  "
+               f"R {100 * r_error:+6.2f} % ({100 * r_left:+.2f} %)  balance {100 * balance:.3f} %  {share:.3f} i_max  "
                f"{moved:4.1f} deg")  # fmt: skip
-    return reached.map_rms, abs(r_error), balance, share, moved
+    return reached.map_rms, abs(r_error), abs(r_left), balance, share, moved
 
 
-def _turning(name: str, seed: int, folder: Path) -> tuple[float, float, float, float, float] | None:
-    """1 for a wrong connection; offset in degrees; errors of magnet, inertia and drag; None after a refusal."""
+def _turning(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
+    """In the order of TURNING: 1 for a wrong connection; offset in degrees; errors; None after a refusal."""
     motor = motors.load(str(folder))
     known = nameplate_of(folder, motor)
     drive, truth = hidden.make(name, seed, motor, known.i_max_A, connected=False)
@@ -73,7 +74,7 @@ def main(machines: int, turning: bool) -> None:
     results = [measure(KINDS[k % len(KINDS)], FIRST_SEED + k, FOLDER) for k in range(machines)]
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
-    names, scales = (TURNING, (1.0, 1.0, 100.0, 100.0, 100.0)) if turning else (MAP, (100.0, 100.0, 100.0, 100.0, 1.0))
+    names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3)) if turning else (MAP, (*(100.0,) * 5, 1.0))
     if len(done):
         for name, values in zip(names, (done * scales).T, strict=True):
             click.echo(f"{name}: median {np.median(values):.2f}, 95 % within {np.percentile(values, 95):.2f}, "

@@ -6,7 +6,7 @@ currents between two bounds instead, for a time that is too short for the rotor 
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,8 +22,9 @@ BAND = 0.05  # of i_max: half the width of a level
 STEP = 0.015  # of i_max: change of the current in a period
 SECONDS = 0.05  # of a level
 LEAST_D, LEAST_Q, MOST = 0.08, 0.1, 0.5  # of the largest voltage: more than the drop of R, more than a leg loses
-RESOLUTION = 1.5e-4  # of the largest voltage: what a mean voltage is certain to
+RESOLUTION_V = 0.005  # rms: what a mean voltage is certain to beyond the noise
 TRIES = 3
+QUIET_RAD = 0.07  # electrical: a level that moved the rotor further is repeated, (CM-26) has the guess of psi_f
 LEAST_PERIODS = 100  # at a level
 UNLIMITED = 1000  # reversals: the time ends a level
 TIME = FAILURES[4]
@@ -56,42 +57,84 @@ def duration_s() -> float:
     return 2 * REPEATS * len(LEVELS) * SECONDS
 
 
-def _equations(linkages: list[Linkage]) -> tuple[Array, Array]:
-    """(CM-12): unknown are resistance, voltage of a leg, and for each level an inductance and a flux linkage."""
+def _inductance(linkage: Linkage, seconds: Array, of_q: bool) -> float:
+    """Slope of a flux linkage over its current, beside what errors of the voltages and a movement change slowly."""
+    one = np.imag if of_q else np.real
+    slow = (np.ones(len(seconds)), seconds, one(linkage.of_level), one(linkage.turned))
+    matrix = np.column_stack((one(linkage.i), *slow))
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
+    return float(np.linalg.lstsq(matrix / scale, one(linkage.psi), rcond=None)[0][0] / scale[0])
+
+
+def _of_movement(linkage: Linkage, seconds: Array, psi_f_Vs: float) -> Array:
+    """What the integral of u_d contains because the flux linkages of the start stay where they were, V·s: (CM-26)."""
+    i = linkage.i
+    psi_d = psi_f_Vs + float(i.real.mean()) * _inductance(linkage, seconds, of_q=False)
+    psi_q = float(i[0].imag) * _inductance(linkage, seconds, of_q=True)
+    return psi_d * (1.0 - linkage.turned.real) + psi_q * linkage.turned.imag
+
+
+def _local(i: Array) -> Array:
+    """Columns of a level's own unknowns: psi_d is a quadratic of both currents there, as ripple and saturation need."""
+    x, y = i.real - i.real.mean(), i.imag
+    return np.column_stack((np.ones(len(i)), x, y, x * x, x * y, y * y))
+
+
+def _equations(linkages: list[Linkage], period_s: float, psi_f_Vs: float) -> tuple[Array, Array]:
+    """(CM-12): unknown are resistance, voltage of a leg, error of the mean voltage, and those of each level."""
     blocks, right = [], []
     for n, linkage in enumerate(linkages):
-        block = np.zeros((len(linkage.i), 2 + 2 * len(linkages)))
-        block[:, 0], block[:, 1] = -linkage.of_r.real, -linkage.of_level.real
-        block[:, 2 + 2 * n], block[:, 3 + 2 * n] = linkage.i.real, 1.0
+        seconds, local = period_s * np.arange(len(linkage.i)), _local(linkage.i)
+        block = np.zeros((len(seconds), 3 + local.shape[1] * len(linkages)))
+        block[:, :3] = np.column_stack((-linkage.of_r.real, -linkage.of_level.real, seconds))
+        first = 3 + local.shape[1] * n
+        block[:, first : first + local.shape[1]] = local
         blocks.append(block)
-        right.append(linkage.psi.real)
+        right.append(linkage.psi.real - _of_movement(linkage, seconds, psi_f_Vs))
     return np.vstack(blocks), np.concatenate(right)
 
 
-def solve(raws: list[Raw], knee_A: float, compensated_V: float = 0.0) -> Resistance:
-    """All levels at once."""
-    rows, values = _equations([integrate(raw, 0.0, knee_A) for raw in raws])
+def solve(raws: list[Raw], psi_f_Vs: float, compensated_V: float = 0.0) -> Resistance:
+    """All levels at once; compensated_V: by the drive, contained in the voltages."""
+    rows, values = _equations([integrate(raw, 0.0) for raw in raws], raws[0].period_s, psi_f_Vs)
     scale = np.linalg.norm(rows, axis=0)
     x, *_ = np.linalg.lstsq(rows / scale, values, rcond=None)
     left = values - (rows / scale) @ x
     x = x / scale
     variance = float(left @ left) / (len(values) - len(x))
-    sigma = float(np.sqrt(variance * np.linalg.inv((rows / scale).T @ (rows / scale))[0, 0])) / float(scale[0])
+    noise = float(np.sqrt(variance * np.linalg.inv((rows / scale).T @ (rows / scale))[0, 0])) / float(scale[0])
     means = np.array([(raw.i.real.mean(), raw.u.real.mean()) for raw in raws])
-    return Resistance(float(x[0]), sigma, float(x[1]), compensated_V, means[:, 0], means[:, 1])
+    resolution = RESOLUTION_V / float(np.abs(means[:, 0]).max())
+    if not x[0] > 0.0:
+        raise FluxtrueError(f"commission: resistance: {x[0]:.3g} ohm found: the voltage does not grow with the current")
+    return Resistance(float(x[0]), math.hypot(noise, resolution), float(x[1]) - compensated_V, compensated_V,
+                      means[:, 0], means[:, 1])  # fmt: skip
 
 
-def measure(drive: Capture, known: Nameplate, first: First, knee_A: float) -> Resistance:
-    """Both polarities of each level."""
+def _record(drive: Capture, burst: Burst, known: Nameplate) -> Raw | None:
+    """The one of the first tries that moved the rotor least; None: none has lasted as long as it should."""
+    best: Raw | None = None
+    for _ in range(TRIES):
+        raw = record(drive, burst, known)
+        if raw.failure == TIME and (best is None or raw.moved_rad < best.moved_rad):
+            best = raw
+        if best is not None and best.moved_rad < QUIET_RAD:
+            break
+    return best
+
+
+def measure(drive: Capture, known: Nameplate, first: First) -> list[Raw]:
+    """Both polarities of each level; the voltages contain the drive's compensation."""
     i_max_A = known.i_max_A
     per_period = STEP * i_max_A / (drive.period_s * first.volts)
     v_d = min(max(per_period * first.l_d_H, LEAST_D), MOST)
     v_q = min(max(per_period * first.l_q_H, LEAST_Q), MOST)
+    compensation = known.offset_A, drive.get("compensation_V"), drive.get("compensation_knee_A")
     band, raws = BAND * i_max_A, []
     for level in (sign * level * i_max_A for _ in range(REPEATS) for level in LEVELS for sign in (1.0, -1.0)):
         burst = Burst(v_d, v_q, (level - band, level + band), (-band, band), UNLIMITED,
                       periods=round(SECONDS / drive.period_s))  # fmt: skip
-        raw = next((raw for raw in (record(drive, burst, known) for _ in range(TRIES)) if raw.failure == TIME), None)
+        raw = _record(drive, burst, known)
         if raw is None:
             raise FluxtrueError(
                 f"commission: resistance: at {level:.3g} A: the rotor moved, or the current was too large"
@@ -99,9 +142,5 @@ def measure(drive: Capture, known: Nameplate, first: First, knee_A: float) -> Re
         raws.append(raw.within(level - band, level + band))
         if len(raws[-1].i) < LEAST_PERIODS:
             raise FluxtrueError(f"commission: resistance: {level:.3g} A was not reached in time")
-    found = solve(raws, knee_A, drive.get("compensation_V"))
-    if not found.r_ohm > 0.0:
-        raise FluxtrueError(f"commission: resistance: {found.r_ohm:.3g} ohm found: the voltage does not grow with the "
-                            "current")  # fmt: skip
-    resolution = RESOLUTION * first.volts / float(np.abs(found.currents_A).max())
-    return replace(found, r_sigma_ohm=math.hypot(found.r_sigma_ohm, resolution))
+        raws[-1] = raws[-1].compensated(*compensation)
+    return raws

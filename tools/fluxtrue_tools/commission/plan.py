@@ -42,12 +42,11 @@ class Losses:
 
     r_ohm: float
     level_V: float
-    knee_A: float
 
 
 def _inductance(raw: Raw, losses: Losses, of_q: bool) -> float:
     """Slope of the flux linkage over the current of one axis."""
-    linkage = integrate(raw, losses.r_ohm, losses.knee_A)
+    linkage = integrate(raw, losses.r_ohm)
     psi = linkage.psi + losses.level_V * linkage.of_level
     slope = float(np.polyfit(*((linkage.i.imag, psi.imag) if of_q else (linkage.i.real, psi.real)), 1)[0])
     if not slope > 0.0:

@@ -37,6 +37,15 @@ def score(model: FluxModel, truth: Truth, i_max_A: float, psi_f_Vs: float) -> Sc
                  float(np.sqrt(np.mean((error_d * q - error_q * d) ** 2))) / float(np.abs(torque).max()))  # fmt: skip
 
 
+def resistance_error(r_ohm: float, truth: Truth) -> tuple[float, float]:
+    """Shares: the whole error, and what is left beyond the gain of the dc voltage and the mean gain of the currents,
+    which no measurement with these sensors can show."""
+    plant = truth.plant
+    gain = plant["vdc_gain"] / float(np.mean([plant[f"current_gain_{phase}"] for phase in "abc"]))
+    share = r_ohm / plant["r_ohm_20"]
+    return share - 1.0, share / gain - 1.0
+
+
 def balance_error(balance: Balance, truth: Truth) -> float:
     """The largest error of the difference between two sensors' gains."""
     return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in "abc"]))

@@ -18,7 +18,6 @@ from fluxtrue_tools.errors import FluxtrueError
 
 SETTLE_S = 0.05
 MOVED = FAILURES[3]
-KNEE_PER_NOISE = 2.0  # below twice the noise the sign of a phase current is not certain
 # Corrections that would act by the guesses of the nameplate; the voltages are evaluated without them.
 SWITCHED_OFF = ("trim",)
 CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
@@ -29,12 +28,12 @@ class Found:
     """What the steps have found so far."""
 
     offset_A: complex = 0.0  # of the current sensors, stationary frame
-    knee_A: float = 0.0
     followed: Followed | None = None
     spun: Spun | None = None
     drag: Drag | None = None
     resistance: Resistance | None = None
     first: plan.First | None = None
+    levels: list[Raw] = field(default_factory=list)
     bursts: list[Raw] = field(default_factory=list)
     balance: Balance | None = None
     surface: Surface | None = None
@@ -83,8 +82,7 @@ def _disable(drive: Capture) -> None:
 
 def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
     _disable(drive)
-    found.offset_A, noise_A = offset(drive)
-    found.knee_A = KNEE_PER_NOISE * noise_A
+    found.offset_A = offset(drive)
 
 
 def _phases(drive: Capture, found: Found, known: Nameplate) -> None:
@@ -107,14 +105,17 @@ def _drag(drive: Capture, found: Found, known: Nameplate) -> None:
 
 def _losses(found: Found, known: Nameplate) -> plan.Losses:
     if found.resistance is None:
-        return plan.Losses(known.r_ohm, known.level_V, found.knee_A)
-    return plan.Losses(found.resistance.r_ohm, found.resistance.level_V, found.knee_A)
+        return plan.Losses(known.r_ohm, known.level_V)
+    return plan.Losses(found.resistance.r_ohm, found.resistance.level_V)
 
 
 def _resistance(drive: Capture, found: Found, known: Nameplate) -> None:
     _enable(drive)
     found.first = plan.first(drive, known, _losses(found, known))
-    found.resistance = levels.measure(drive, known, found.first, found.knee_A)
+    found.levels = levels.measure(drive, known, found.first)
+    found.balance = balance.measure(found.levels)
+    alike = [found.balance.corrected(raw) for raw in found.levels]
+    found.resistance = levels.solve(alike, known.psi_f_Vs, drive.get("compensation_V"))
     found.first = plan.first(drive, known, _losses(found, known))
 
 
@@ -131,8 +132,8 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
     lost = [raw.failure for raw in found.bursts if raw.failure not in ("", MOVED)]
     if len(lost) > plan.LOST_MAX:
         raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
-    found.balance = balance.measure(used)
-    linkages = [integrate(found.balance.corrected(raw), found.resistance.r_ohm, found.knee_A) for raw in used]
+    found.balance = balance.measure([*found.levels, *used])
+    linkages = [integrate(found.balance.corrected(raw), found.resistance.r_ohm) for raw in used]
     found.surface = surface.fit(linkages, known.i_max_A, found.resistance.r_ohm, known.psi_f_Vs,
                                 found.resistance.total_V)  # fmt: skip
 
