@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The evaluation of direct currents, on recordings that are computed here from a machine's equations."""
+"""The evaluation of direct currents and of bursts, on recordings that are computed here from a machine's equations."""
 
 import cmath
 import math
@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fluxtrue_tools.commission import levels
+from fluxtrue_tools.commission import levels, plan
 from fluxtrue_tools.commission.bursts import Raw, integrate
 from fluxtrue_tools.motor.flux_model import Array
 
@@ -76,3 +76,19 @@ def test_the_leg_of_a_current_that_changes_its_sign_is_counted_in_parts() -> Non
     raw = Raw(i, np.zeros(2, complex), np.zeros(2), np.zeros(2), PERIOD_S)
     others = 2.0 / 3.0 * (AXES[1] + AXES[2]) * -0.5  # b and c change theirs at the same time
     assert integrate(raw, 0.0).of_level[1] == pytest.approx(-PERIOD_S * (2.0 / 3.0 * 0.5 + others))
+
+
+@pytest.mark.parametrize(
+    ("first", "wanted"),
+    [(math.sqrt(0.5), 0.6), (0.9, 0.6 * math.sqrt(0.5) / 0.9), (0.5, 0.6 * math.sqrt(2.0)), (0.4, 0.9)],
+)
+def test_the_first_half_wave_gets_half_of_the_impulse(first: float, wanted: float) -> None:
+    """Triangles: the impulse is the square of the amplitude; a share of 0.6 is to be corrected by that."""
+
+    def triangle(top: float) -> Array:
+        n = round(100 * abs(top))
+        return math.copysign(1.0, top) * np.concatenate((np.arange(n), n - np.arange(n))) / 100.0
+
+    i_q = np.concatenate((np.zeros(30), triangle(first), triangle(-1.0), triangle(1.0)))
+    raw = Raw(1j * i_q, np.zeros(len(i_q), complex), np.zeros(len(i_q)), np.zeros(len(i_q)), PERIOD_S)
+    assert plan._balanced(0.6, raw) == pytest.approx(wanted, rel=0.03)

@@ -25,6 +25,8 @@ ANGLE_DEG = 15.0  # electrical, by which the rotor may move in a burst
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
 REVERSALS_D, REVERSALS_Q = 6, 5
+FIRST = (0.4, 0.9)  # share of its bound at which the first half wave may end
+BEGUN = 0.1  # of the range of the impulse: beyond the noise
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,16 @@ def _steepest(raw: Raw, share: float, of_q: bool) -> float:
     return float(np.abs(np.diff(i)).max()) / share
 
 
+def _balanced(share: float, raw: Raw) -> float:
+    """The share of its bound at which the first half wave of q should have ended: (CM-27). The impulse is about the
+    sum of i_q, and that of a half wave grows with about the square of its largest current."""
+    impulse = np.cumsum(raw.i.imag)
+    both = float(np.ptp(impulse))  # the second half wave
+    begins = np.sign(impulse[np.argmax(np.abs(impulse) > BEGUN * both)])
+    first_one = max(float((begins * impulse).max()), BEGUN * both)
+    return float(np.clip(share * math.sqrt(0.5 * both / first_one), *FIRST))
+
+
 def _ladder(drive: Capture, known: Nameplate, steepest_A: float, of_q: bool) -> tuple[list[Raw], float]:
     """Larger and larger currents along one axis: each level's steepest change limits the voltage of the next."""
     raws: list[Raw] = []
@@ -107,9 +119,11 @@ def sweep(drive: Capture, found: First, known: Nameplate) -> list[Raw]:
     v_d, v_q = _voltage(BIAS_SLOWER * steep_d, i_max_A), _voltage(steep_q, i_max_A)
     per_period = v_d * found.volts * period_s / found.l_d_H
     band = BAND * i_max_A
+    share = _balanced(Burst.first, along_q[-1])
     for bias in BIASES:
-        centre = -bias * i_max_A
+        centre, delay = -bias * i_max_A, math.ceil(TRAVEL * bias * i_max_A / per_period)
         top = math.sqrt((LEVELS[-1] * i_max_A) ** 2 - (abs(centre) + band) ** 2)
-        raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q,
-                                  math.ceil(TRAVEL * bias * i_max_A / per_period)), known))  # fmt: skip
+        raws.append(record(drive, Burst(v_d, v_q, (centre - band, centre + band), (-top, top), REVERSALS_Q, delay,
+                                        share), known))  # fmt: skip
+        share = _balanced(share, raws[-1])
     return raws
