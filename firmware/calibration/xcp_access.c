@@ -3,6 +3,8 @@
 
 #include <stddef.h>
 
+#include "calibration/pulse_access.h"
+
 /* Protects against accidental writes only. A product that needs protection against attacks must replace it. */
 static uint32_t compute_key(uint32_t seed)
 {
@@ -50,12 +52,32 @@ static xcp_result_t scope_answer(scope_t *scope, const drive_t *drive, const can
     return results[scope_command(scope, drive, &frame->data[1], (uint8_t)(frame->length - 1U))];
 }
 
-void xcp_access_receive(xcp_access_t *access, const drive_t *drive, scope_t *scope, const can_frame_t *frame)
+static void pulse_answer(xcp_access_t *access, drive_t *drive, const can_frame_t *frame)
+{
+    const uint8_t *command = &frame->data[1];
+    const xcp_result_t result = pulse_access_command(drive, access->xcp.unlocked, command,
+                                                     (uint8_t)(frame->length - 1U));
+    xcp_answer(&access->xcp, result, &access->answer);
+    if (command[0] == PULSE_STATE) {
+        pulse_access_state(drive, &access->answer);
+    }
+}
+
+static void user_answer(xcp_access_t *access, drive_t *drive, scope_t *scope, const can_frame_t *frame)
+{
+    if (frame->length > 1U && pulse_access_is_command(frame->data[1])) {
+        pulse_answer(access, drive, frame);
+    } else {
+        xcp_answer(&access->xcp, scope_answer(scope, drive, frame), &access->answer);
+    }
+}
+
+void xcp_access_receive(xcp_access_t *access, drive_t *drive, scope_t *scope, const can_frame_t *frame)
 {
     const xcp_config_t config = protocol_config(access);
     if (access->xcp.connected && frame->length > 0U && frame->length <= XCP_PACKET_MAX &&
         frame->data[0] == XCP_USER_CMD) {
-        xcp_answer(&access->xcp, scope_answer(scope, drive, frame), &access->answer);
+        user_answer(access, drive, scope, frame);
         access->answer_waits = true;
     } else {
         access->answer_waits = xcp_command(&access->xcp, &config, frame, &access->answer);

@@ -36,9 +36,9 @@ typedef struct {
 /** frame, scope: readable besides the measurements. */
 void xcp_access_init(xcp_access_t *access, const drive_t *drive, const freeze_frame_t *frame, const scope_t *scope,
                      uint32_t seed);
-/** A frame with id XCP_ID_COMMAND. XCP_USER_CMD holds a command for the scope; it needs no key, as it changes nothing
- * that the drive runs on. */
-void xcp_access_receive(xcp_access_t *access, const drive_t *drive, scope_t *scope, const can_frame_t *frame);
+/** A frame with id XCP_ID_COMMAND. XCP_USER_CMD holds a command for the voltage pulses (calibration/pulse_access.h) or
+ * for the scope; the scope's need no key, as they change nothing that the drive runs on. */
+void xcp_access_receive(xcp_access_t *access, drive_t *drive, scope_t *scope, const can_frame_t *frame);
 /** Once per step: takes over changed values and samples the measurement lists. passed_ms: milliseconds that passed in
  * this step. */
 void xcp_access_step(xcp_access_t *access, drive_t *drive, uint32_t passed_ms);
