@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The virtual ECU: fluxtrue_vecu [--fast] [--port N] [--bench-port N] [--bit-rate N] [--seed N] [--nvm FILE]
+ *                               [--machine FILE]
  * Prints the address on which it listens in one line on standard output. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
@@ -12,6 +13,7 @@
 #include "bench.h"
 #include "hub.h"
 #include "machine_data.h"
+#include "machine_file.h"
 #include "nvm_file.h"
 #include "vecu.h"
 
@@ -28,7 +30,7 @@ static volatile sig_atomic_t stop;
 typedef struct {
     bool realtime;
     uint64_t port, bench_port, bit_rate, seed;
-    const char *nvm;
+    const char *nvm, *machine;
 } options_t;
 
 static void on_signal(int number)
@@ -58,6 +60,24 @@ static bool parse_number(const char *option, const char *text, uint64_t min, uin
     return true;
 }
 
+/* An option with a file, or one that is not known. */
+static bool parse_file(const char *option, const char *value, options_t *o)
+{
+    if (value != NULL && strcmp(option, "--nvm") == 0) {
+        o->nvm = value;
+        return true;
+    }
+    if (value != NULL && strcmp(option, "--machine") == 0) {
+        o->machine = value;
+        return true;
+    }
+    (void)fprintf(stderr,
+                  "error: unknown option '%s', allowed: --fast --realtime --port --bench-port "
+                  "--bit-rate --seed --nvm --machine\n",
+                  option);
+    return false;
+}
+
 static bool parse(int count, char **words, options_t *o)
 {
     for (int i = 1; i < count; i++) {
@@ -76,14 +96,8 @@ static bool parse(int count, char **words, options_t *o)
             good = parse_number(word, value, 10000, 1000000, &o->bit_rate);
         } else if (strcmp(word, "--seed") == 0) {
             good = parse_number(word, value, 0, 1ULL << 52, &o->seed);
-        } else if (strcmp(word, "--nvm") == 0 && value != NULL) {
-            o->nvm = value;
         } else {
-            (void)fprintf(stderr,
-                          "error: unknown option '%s', allowed: --fast --realtime --port --bench-port "
-                          "--bit-rate --seed --nvm\n",
-                          word);
-            good = false;
+            good = parse_file(word, value, o);
         }
         if (!good) {
             return false;
@@ -172,6 +186,26 @@ static int serve(const options_t *o, vecu_t *vecu)
     return EXIT_SUCCESS;
 }
 
+/* Firmware and plant before the first period. */
+static bool start(const options_t *o, vecu_t *vecu)
+{
+    vecu->nvm_path = o->nvm;
+    vecu->machine = (o->machine != NULL) ? machine_file_load(o->machine) : NULL;
+    if (o->machine != NULL && vecu->machine == NULL) {
+        (void)fprintf(stderr, "error: --machine %s: no machine, allowed: a file as tests/vecu/machine_file.h says\n",
+                      o->machine);
+        return false;
+    }
+    const char *bad = vecu_reset(vecu, o->seed);
+    if (bad != NULL && bad == o->nvm) {
+        (void)fprintf(stderr, "error: --nvm %s: no flash contents, allowed: a file of %u bytes, or none yet\n", bad,
+                      NVM_HOST_SIZE);
+    } else if (bad != NULL) {
+        (void)fprintf(stderr, "error: motor %s: %s\n", machine_data.motor, bad);
+    }
+    return bad == NULL;
+}
+
 int main(int count, char **words)
 {
     options_t options = {.realtime = true, .port = 29536, .bench_port = 29537, .bit_rate = 500000, .seed = 1};
@@ -184,15 +218,7 @@ int main(int count, char **words)
     (void)sigaction(SIGTERM, &act, NULL);
     act.sa_handler = SIG_IGN;
     (void)sigaction(SIGPIPE, &act, NULL);
-    vecu.nvm_path = options.nvm;
-    const char *bad = vecu_reset(&vecu, options.seed);
-    if (bad != NULL && bad == options.nvm) {
-        (void)fprintf(stderr, "error: --nvm %s: no flash contents, allowed: a file of %u bytes, or none yet\n", bad,
-                      NVM_HOST_SIZE);
-        return EXIT_USAGE;
-    }
-    if (bad != NULL) {
-        (void)fprintf(stderr, "error: motor %s: %s\n", machine_data.motor, bad);
+    if (!start(&options, &vecu)) {
         return EXIT_USAGE;
     }
     const int status = serve(&options, &vecu);

@@ -16,9 +16,8 @@
 /* Not on the heap: a calibration tool finds it by its name, at the address in the ELF file. */
 static fluxtrue_t ecu;
 
-static const char *plant_set_up(sim_t *sim, uint64_t seed)
+static const char *plant_set_up(sim_t *sim, const machine_data_t *m, uint64_t seed)
 {
-    const machine_data_t *m = &machine_data;
     for (const machine_value_t *v = m->values; v->name != NULL; v++) {
         if (sim_set(sim, v->name, v->value) != SIM_OK) {
             return v->name;
@@ -60,7 +59,7 @@ const char *vecu_reset(vecu_t *vecu, uint64_t seed)
     if (vecu->sim == NULL) {
         return "out of memory";
     }
-    const char *bad = plant_set_up(vecu->sim, seed);
+    const char *bad = plant_set_up(vecu->sim, (vecu->machine != NULL) ? vecu->machine : &machine_data, seed);
     if (bad == NULL) {
         stand_default(&vecu->stand);
         vecu->period_ns = (uint64_t)llround(1e9 / sim_get(vecu->sim, "plant.pwm_hz"));

@@ -12,6 +12,7 @@
 
 #include "hub.h"
 #include "loop/runner/sim.h"
+#include "machine_data.h"
 #include "stand.h"
 
 typedef struct {
@@ -22,8 +23,9 @@ typedef struct {
     uint64_t seed;
     uint64_t duty_hash; /* FNV-1a of all duties and gate states since the last vecu_take_hash() */
     uint64_t resets;
-    const char *nvm_path; /* file that holds the flash over power cycles; NULL: a power cycle erases it */
-    uint32_t nvm_changes; /* number of changes of the flash that the file contains */
+    const char *nvm_path;          /* file that holds the flash over power cycles; NULL: a power cycle erases it */
+    const machine_data_t *machine; /* at the terminals; NULL: that of the firmware's motor data */
+    uint32_t nvm_changes;          /* number of changes of the flash that the file contains */
 } vecu_t;
 
 /** A power cycle of ECU and plant: everything as at the start, with the plant's random numbers from `seed`. */

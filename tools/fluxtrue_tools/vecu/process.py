@@ -16,10 +16,12 @@ STOP_S = 10.0
 class VirtualEcu:
     """Starts the virtual ECU on free ports, gives their numbers, and stops it."""
 
-    def __init__(self, program: Path, fast: bool = True, seed: int = 1, nvm: Path | None = None) -> None:
+    def __init__(self, program: Path, fast: bool = True, seed: int = 1, nvm: Path | None = None,
+                 machine: Path | None = None) -> None:  # fmt: skip
         command = [str(program), "--fast" if fast else "--realtime", "--port", "0", "--bench-port", "0",
                    "--seed", str(seed)]  # fmt: skip
         command += ["--nvm", str(nvm)] if nvm is not None else []
+        command += ["--machine", str(machine)] if machine is not None else []
         try:
             self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         except OSError as error:
