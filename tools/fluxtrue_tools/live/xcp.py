@@ -15,6 +15,7 @@ from pyxcp.types import Command, XcpResponseError, XcpTimeoutError
 from fluxtrue_tools.a2l.cli import ANSWER_ID, COMMAND_ID
 from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.scope.xcp import key
 
 BENCH_ANSWER_S: Final = 2.0
 SIMULATED_ANSWER_S: Final = 3600.0  # by the wall clock, independent of simulated time: it only ends a hang
@@ -25,9 +26,7 @@ SILENT: Final = "the inverter does not answer any more"
 
 
 def _key(resource: int, seed: bytes) -> bytes:
-    """The published function of firmware/calibration/xcp_access.c."""
-    value = int.from_bytes(seed, "little")
-    return (((value << 7 | value >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C).to_bytes(4, "little")
+    return key(int.from_bytes(seed, "little")).to_bytes(4, "little")
 
 
 def _connect(address: BusAddress, answer_s: float) -> Master:

@@ -215,23 +215,26 @@ class Scope:
             self._master.pass_time(POLL_S)
             waited_s += POLL_S
 
-    def read(self, release: bool = True) -> Capture:
-        """The complete capture or freeze frame; every block is compared with the checksum that the ECU computes."""
+    def read(self, release: bool = True, most: int | None = None) -> Capture:
+        """The complete capture or freeze frame; every block is compared with the checksum that the ECU computes.
+
+        most   samples to read at most, the oldest; by default all
+        """
         status = self.status()
         if status.state != "done":
             raise FluxtrueError(f"the scope is {status.state}: there is no capture to read")
-        data = self._memory(2 * status.samples * len(status.signals))
+        taken = status.taken if most is None else min(most, status.taken)
+        data = self._rows(status, taken)
         if self.status() != status:
             raise FluxtrueError("the capture has changed while it was read")
         if release:
             self.stop()
-        arrays = np.frombuffer(data, dtype="<i2").reshape(status.samples, len(status.signals)).T
-        rows = (status.first + np.arange(status.taken)) % status.samples
+        arrays = np.frombuffer(data, dtype="<i2").reshape(taken, len(status.signals)).T
         chosen = [self.signals[self._names[number]] for number in status.signals]
-        index = np.arange(status.taken, dtype=np.float64) - status.before
+        index = np.arange(taken, dtype=np.float64) - status.before
         return Capture(
             index * status.divisor * self._period_s,
-            {signal.name: array[rows] * signal.base.factor for signal, array in zip(chosen, arrays, strict=True)},
+            {signal.name: array * signal.base.factor for signal, array in zip(chosen, arrays, strict=True)},
             {signal.name: signal.base.unit for signal in chosen}, {signal.name: signal.text for signal in chosen},
             status.before, status.trigger_period, status.is_freeze_frame, status.number,
         )  # fmt: skip
@@ -251,8 +254,17 @@ class Scope:
         got["signal"] = content[at : at + SIGNALS_MAX]
         return got
 
-    def _memory(self, size: int) -> bytes:
-        start, content = self._fields["memory"].address, b""
+    def _rows(self, status: Status, count: int) -> bytes:
+        """The oldest rows; all of them lie in a circle."""
+        row = 2 * len(status.signals)
+        if count == status.taken:
+            whole = self._memory(0, row * status.samples)
+            return (whole[row * status.first :] + whole[: row * status.first])[: row * count]
+        to_end = min(count, status.samples - status.first)
+        return self._memory(row * status.first, row * to_end) + self._memory(0, row * (count - to_end))
+
+    def _memory(self, offset: int, size: int) -> bytes:
+        start, content = self._fields["memory"].address + offset, b""
         while len(content) < size:
             content += self._block(start + len(content), min(BLOCK, size - len(content)))
         return content

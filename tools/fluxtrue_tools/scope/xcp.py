@@ -12,6 +12,8 @@ from fluxtrue_tools.vecu.stepped import SteppedBus
 
 POSITIVE, NEGATIVE = 0xFF, 0xFE
 CONNECT, SET_MTA, UPLOAD, BUILD_CHECKSUM = 0xFF, 0xF6, 0xF5, 0xF3
+GET_SEED, UNLOCK, DOWNLOAD = 0xF8, 0xF7, 0xF0
+CALIBRATION: Final = 0x01
 UPLOAD_MAX: Final = 7
 ANSWER_S: Final = 2.0  # on a bench
 ANSWER_MS: Final = 50  # of simulated time
@@ -42,7 +44,8 @@ class Line(Protocol):
     def pass_time(self, seconds: float) -> None: ...
 
 
-def _is_answer(message: can.Message) -> bool:
+def is_answer(message: can.Message) -> bool:
+    """A positive or negative answer of the slave, not a measurement."""
     return (
         message.arbitration_id == ANSWER_ID and not message.is_extended_id and message.data[0] in (POSITIVE, NEGATIVE)
     )
@@ -60,7 +63,7 @@ class WallLine:
         end_s = time.monotonic() + ANSWER_S
         while (left_s := end_s - time.monotonic()) > 0.0:
             message = self._bus.recv(left_s)
-            if message is not None and _is_answer(message):
+            if message is not None and is_answer(message):
                 return bytes(message.data)
         raise FluxtrueError(f"XCP: no answer within {ANSWER_S:g} s: is the ECU on this bus?")
 
@@ -80,7 +83,7 @@ class SteppedLine:
         self._bus.send(frame)
         for _ in range(ANSWER_MS):
             for message in self._bus.run(1.0)[0]:
-                if _is_answer(message):
+                if is_answer(message):
                     return bytes(message.data)
         raise FluxtrueError(f"XCP: no answer within {ANSWER_MS} ms of simulated time")
 
@@ -122,3 +125,14 @@ def checksum(master: Master, address: int, size: int) -> int:
     """CRC-32 of memory of the ECU, as the ECU computes it."""
     master.command(SET_MTA, 0, 0, 0, *address.to_bytes(4, "little"))
     return int.from_bytes(master.command(BUILD_CHECKSUM, 0, 0, 0, *size.to_bytes(4, "little"))[3:7], "little")
+
+
+def key(seed: int) -> int:
+    """The published function of firmware/calibration/xcp_access.c."""
+    return ((seed << 7 | seed >> 25) & 0xFFFFFFFF) ^ 0x5A17F10C
+
+
+def unlock(master: Master) -> None:
+    """Seed and key for calibration."""
+    seed = int.from_bytes(master.command(GET_SEED, 0, CALIBRATION)[1:5], "little")
+    master.command(UNLOCK, 4, *key(seed).to_bytes(4, "little"))
