@@ -4,8 +4,8 @@
 import pytest
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.bursts import SIGNALS, Burst
-from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.commission.bursts import Burst
+from fluxtrue_tools.commission.drive import SIGNALS, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.sim.motor import Motor
 

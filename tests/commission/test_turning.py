@@ -7,10 +7,10 @@ import pytest
 
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import connection, hidden, turning
-from fluxtrue_tools.commission.drive import SoftwareInTheLoop
+from fluxtrue_tools.commission.drive import CONNECTION, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import turned
-from fluxtrue_tools.commission.steps import CONNECTION, chosen, run
+from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor

@@ -59,7 +59,7 @@ def cases() -> dict[str, Case]:
                              {"--iron-loss-column": ("--iron-loss", "map.csv"), "--rows": ("--format", "arrays")}),
         "motor start": Case((), ("--out", "o", "--i-max", "200", "--vdc", "350", "--pwm", "10", "--pole-pairs", "4"),
                             {}, ("o/motor.toml",)),
-        "commission": Case((), (*motor, "--out", "o"), MACHINE),
+        "commission": Case((), (*motor, "--out", "o"), MACHINE, beside=ON_A_BENCH | {"--elf": BENCH}),
         "live": Case((), motor, MACHINE, beside=ON_A_BENCH | {"--elf": BENCH}),
         "scope": Case((), (), {"image.elf": elf()},
                       beside=ON_A_BENCH | {"--on": ("--trigger", "above"), "--level": ("--trigger", "above")}),

@@ -25,8 +25,9 @@ WORK = (
     "bench.run", "bench.figures.measure",
     "campaign.run.run_case", "campaign.run._simulate", "campaign.schedule.dask",
     "fault_campaign.run.schedule.missing", "fault_campaign.run.run_one", "demo.all.demonstrate",
-    "commission.steps.run", "live.cli._session", "live.cli.VirtualEcu", "live.cli.Channel", "scope.cli.VirtualEcu",
-    "scope.cli.Channel", "scope.cli._line",
+    "commission.steps.run", "commission.on_the_bus.VirtualEcu", "commission.on_the_bus.connected",
+    "live.cli._session", "live.cli.VirtualEcu", "live.cli.Channel", "scope.cli.VirtualEcu", "scope.cli.Channel",
+    "scope.cli._line",
 )  # fmt: skip
 
 

@@ -6,19 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
-SIGNALS = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A", "pulses")
-DONE, FAILED = 3.0, 4.0
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
             5: "the current exceeded the machine's largest"}  # fmt: skip
 BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
 REST_S = 0.02  # after a burst: the drive controls the currents to zero
-CHUNK = 200  # periods recorded at once
-PERIODS_MAX = 4000
 TURN = 2.0 * math.pi
 
 
@@ -46,16 +42,19 @@ class Burst:
         d, q = by_A.real, by_A.imag
         return replace(self, d=(self.d[0] + d, self.d[1] + d), q=(self.q[0] + q, self.q[1] + q))
 
+    def values(self) -> dict[str, float]:
+        """By the names of the firmware."""
+        return {"pulses_vd": self.v_d, "pulses_vq": self.v_q, "pulses_first": self.first,
+                "pulses_id_low_A": self.d[0], "pulses_id_high_A": self.d[1],
+                "pulses_iq_low_A": self.q[0], "pulses_iq_high_A": self.q[1],
+                "pulses_angle_rad": math.radians(self.angle_deg), "pulses_delay": float(self.delay),
+                "pulses_reversals": float(self.reversals), "pulses_periods": float(self.periods)}  # fmt: skip
+
     def command(self, drive: Capture) -> None:
         """Set all values and start."""
-        values = {"pulses_vd": self.v_d, "pulses_vq": self.v_q, "pulses_first": self.first,
-                  "pulses_id_low_A": self.d[0], "pulses_id_high_A": self.d[1],
-                  "pulses_iq_low_A": self.q[0], "pulses_iq_high_A": self.q[1],
-                  "pulses_angle_rad": math.radians(self.angle_deg), "pulses_delay": self.delay,
-                  "pulses_reversals": self.reversals, "pulses_periods": self.periods}  # fmt: skip
-        for name, value in values.items():
-            drive.set(name, float(value))
-        drive.set("pulses", 1.0)
+        for name, value in self.values().items():
+            drive.set(name, value)
+        drive.set("pulses", PULSE)
 
 
 @dataclass(frozen=True)
@@ -111,45 +110,35 @@ def _shift(drive: Capture, known: Nameplate) -> complex:
 
 def _brake(drive: Capture, known: Nameplate) -> None:
     """The alternating torque leaves some speed: a small current along q takes it away."""
-    drive.set("current_mode", 1.0)
+    drive.push(0j)
     for _ in range(BRAKE_STEPS):
-        speed = float(np.mean(drive.capture(("speed_rpm",), round(BRAKE_S / drive.period_s))[-10:]))
+        speed = drive.speed_rpm(BRAKE_S)
         if abs(speed) < STANDING_RPM:
             break
-        wanted = 1j * known.brake_A(speed) + _shift(drive, known)
-        drive.set("id_ref_A", wanted.real)
-        drive.set("iq_ref_A", wanted.imag)
-    drive.set("id_ref_A", 0.0)
-    drive.set("iq_ref_A", 0.0)
-    drive.set("current_mode", 0.0)
+        drive.push(1j * known.brake_A(speed), known.offset_A)
+    drive.let_go()
 
 
 def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     """One burst, from zero current to zero current."""
     _brake(drive, known)
-    drive.capture(SIGNALS, round(REST_S / drive.period_s))
-    burst.shifted(_shift(drive, known)).command(drive)
-    parts = [drive.capture(SIGNALS, CHUNK)]
-    while parts[-1][-1, -1] not in (DONE, FAILED):
-        parts.append(drive.capture(SIGNALS, CHUNK))
-        if len(parts) * CHUNK > 2 * PERIODS_MAX:
-            raise FluxtrueError("commission: the voltage pulses do not end")
+    drive.rest(REST_S)
+    rows = drive.pulse(burst.shifted(_shift(drive, known)).values())
     fault = int(drive.get("fault_word"))
     if fault:
         raise FluxtrueError(f"commission: a fault ended the voltage pulses (fault word 0x{fault:x})")
-    rows = np.vstack(parts)
     active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
     failure = _phase_word(drive)
     if failure == FAILURES[1] or not len(active):
         raise FluxtrueError(f"commission: voltage pulses {failure or 'had no voltage'}")
-    running = np.nonzero(rows[:, -1] == 1.0)[0]
+    running = np.nonzero(rows[:, -1] == PULSE)[0]
     rows = rows[max(running[0] - 1, 0) : running[-1] + 1]
     return _aligned(rows, drive.period_s, burst, failure).without(known.offset_A)
 
 
 def offset(drive: Capture, seconds: float = 0.1) -> complex:
     """Mean current with switching disabled, in the stationary frame."""
-    rows = drive.capture(SIGNALS, round(seconds / drive.period_s))
+    rows = drive.capture(MEASURED, round(seconds / drive.period_s))
     i_s = (rows[:, 0] + 1j * rows[:, 1]) * np.exp(1j * rows[:, 4])
     return complex(i_s.mean())
 

@@ -1,24 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of a commissioning to a drive: names to set and get, and signals recorded in each PWM period.
+"""The interface of a commissioning to a drive: names, signals recorded in each PWM period, voltage pulses.
 
-There is one implementation: software in the loop, where the firmware runs as a library in this process beside a
-simulated machine. It records by reading the names after each period. On a bus, a capture buffer in the firmware takes
-its place.
+There are two implementations. In software in the loop the firmware runs as a library in this process beside a simulated
+machine; it is recorded by reading the names after each period. An ECU on a bus (bus.py) is commanded by protected
+frames and recorded by the scope of its firmware.
 """
 
+import cmath
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
+
+import numpy as np
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 from fluxtrue_tools.sim.library import Loop
 
 HIDDEN = ("plant.", "truth.")  # what belongs to the simulated machine, not to the drive
+MEASURED = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A")
+SIGNALS = (*MEASURED, "pulses")
+PULSE, DONE, FAILED = 1.0, 3.0, 4.0  # of the name pulses
+CHUNK = 200  # periods recorded at once
+PERIODS_MAX = 4000
+SPEED_PERIODS = 10  # over which a speed is averaged
+CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
+
+
+def nothing(_: float) -> None:
+    """The time that has passed is not shown."""
 
 
 class Capture(Protocol):
     """A drive that can be commanded and recorded."""
+
+    settings: tuple[str, ...]  # names that a commissioning changes, and sets back at its end
+    switched_off: tuple[str, ...]  # those of them that would act by the guesses of the nameplate
+    passed: Callable[[float], None]  # called with the seconds for which the drive has run
+    slower: float  # how many times longer it runs than software in the loop
 
     @property
     def period_s(self) -> float:
@@ -33,13 +52,34 @@ class Capture(Protocol):
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """Let the drive run; one row for each period, a column for each name."""
 
+    def rest(self, seconds: float) -> None:
+        """Let the drive run."""
+
+    def speed_rpm(self, seconds: float) -> float:
+        """Let the drive run; the speed at the end."""
+
+    def push(self, current_A: complex, offset_A: complex = 0j) -> None:
+        """A small current in the rotor frame, until let_go(); the offsets of the sensors, in the stationary frame, are
+        what they show without any."""
+
+    def let_go(self) -> None:
+        """No current and no torque is requested any more."""
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        """Set the values of voltage pulses, start them and wait for their end; one row of SIGNALS for each period."""
+
 
 class SoftwareInTheLoop:
     """The firmware as a library, on a simulated machine of which nothing but the drive's names can be read."""
 
+    switched_off: tuple[str, ...] = ("trim",)
+    settings: tuple[str, ...] = switched_off + CONNECTION
+    slower: float = 1.0
+
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
         self.period_s = loop.period_s
+        self.passed: Callable[[float], None] = nothing
 
     @staticmethod
     def _allowed(name: str) -> str:
@@ -61,4 +101,39 @@ class SoftwareInTheLoop:
     def capture(self, names: Sequence[str], periods: int) -> Array:
         """Every period, by reading the names after it."""
         self._loop.record([self._allowed(name) for name in names])
-        return self._loop.run(periods)
+        rows = self._loop.run(periods)
+        self.passed(periods * self.period_s)
+        return rows
+
+    def rest(self, seconds: float) -> None:
+        """Let the drive run."""
+        self.capture(("run_state",), round(seconds / self.period_s))
+
+    def speed_rpm(self, seconds: float) -> float:
+        """Let the drive run; the speed at the end."""
+        return float(np.mean(self.capture(("speed_rpm",), round(seconds / self.period_s))[-SPEED_PERIODS:]))
+
+    def push(self, current_A: complex, offset_A: complex = 0j) -> None:
+        """References of the current control."""
+        shown_A = current_A + (offset_A * cmath.exp(-1j * self.get("theta_e_rad")) if offset_A else 0j)
+        self.set("current_mode", 1.0)
+        self.set("id_ref_A", shown_A.real)
+        self.set("iq_ref_A", shown_A.imag)
+
+    def let_go(self) -> None:
+        """Without references."""
+        self.set("id_ref_A", 0.0)
+        self.set("iq_ref_A", 0.0)
+        self.set("current_mode", 0.0)
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        """Recorded from before their start to after their end."""
+        for name, value in values.items():
+            self.set(name, value)
+        self.set("pulses", PULSE)
+        parts = [self.capture(SIGNALS, CHUNK)]
+        while parts[-1][-1, -1] not in (DONE, FAILED):
+            parts.append(self.capture(SIGNALS, CHUNK))
+            if len(parts) * CHUNK > 2 * PERIODS_MAX:
+                raise FluxtrueError("commission: the voltage pulses do not end")
+        return np.vstack(parts)

@@ -123,6 +123,16 @@ def draw(
     return Truth(model, source_i_max, flux_scale, current, magnet, plant), flux_map, plant
 
 
+def machine_text(plant: dict[str, float], flux_map: FluxMap | None) -> str:
+    """A machine for the virtual ECU: tests/vecu/machine_file.h."""
+    lines = [f"plant.{name} {value!r}" for name, value in plant.items() if value is not None]
+    if flux_map is not None:
+        tables = (flux_map.id_A, flux_map.iq_A, flux_map.psi_d_Vs, flux_map.psi_q_Vs)
+        lines.append(f"map {flux_map.id_A.size} {flux_map.iq_A.size}")
+        lines += [" ".join(repr(float(value)) for value in np.ravel(table)) for table in tables]
+    return "\n".join(lines) + "\n"
+
+
 def make(name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True) -> tuple[SoftwareInTheLoop, Truth]:
     """A drive with a hidden machine at its terminals; connected: sensor and leads are as the firmware assumes."""
     truth, flux_map, plant = draw(name, seed, motor, i_max_A, connected)

@@ -19,6 +19,7 @@ class Nameplate:
     pole_pairs: int
     inertia_kgm2: float
     level_V: float  # lost by a leg of the inverter
+    knee_A: float  # from which the drive compensates all of it
     offset_A: complex = 0.0  # of the current sensors in the stationary frame, as soon as it is measured
 
     def brake_A(self, speed_rpm: float) -> float:

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The steps of a commissioning in their order: what each does to the machine, and what it finds."""
 
-from collections.abc import Callable
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from tqdm import tqdm
 
 from fluxtrue_tools.commission import balance, connection, drag, levels, plan, spin, surface, turning
 from fluxtrue_tools.commission.balance import Balance
-from fluxtrue_tools.commission.bursts import FAILURES, SIGNALS, Raw, integrate, offset
+from fluxtrue_tools.commission.bursts import FAILURES, Raw, integrate, offset
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
-from fluxtrue_tools.commission.drive import Capture
+from fluxtrue_tools.commission.drive import Capture, nothing
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.spin import Spun
@@ -18,9 +23,6 @@ from fluxtrue_tools.errors import FluxtrueError
 
 SETTLE_S = 0.05
 MOVED = FAILURES[3]
-# Corrections that would act by the guesses of the nameplate; the voltages are evaluated without them.
-SWITCHED_OFF = ("trim",)
-CONNECTION = ("angle_pole_pairs", "angle_reversed", "angle_offset_rad", "angle_imposed")
 
 
 @dataclass
@@ -65,19 +67,27 @@ class Step:
     name: str
     does: str
     run: Callable[[Capture, Found, Nameplate], None]
+    seconds: float  # about as long does the drive run, in software in the loop
+
+
+class Kept(Protocol):
+    """Where finished steps are kept: work.py."""
+
+    def save(self, steps: tuple[str, ...], found: Found) -> None: ...
+    def load(self) -> tuple[tuple[str, ...], Found]: ...
 
 
 def _enable(drive: Capture) -> None:
     drive.set("torque_requested_Nm", 0.0)
     drive.set("enable", 1.0)
-    drive.capture(SIGNALS, round(SETTLE_S / drive.period_s))
+    drive.rest(SETTLE_S)
     if drive.get("run_state") != 1.0:
         raise FluxtrueError(f"commission: switching cannot be enabled (fault word 0x{int(drive.get('fault_word')):x})")
 
 
 def _disable(drive: Capture) -> None:
     drive.set("enable", 0.0)
-    drive.capture(SIGNALS, round(SETTLE_S / drive.period_s))
+    drive.rest(SETTLE_S)
 
 
 def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
@@ -139,17 +149,17 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
 
 
 STEPS = (
-    Step("offsets", "switching is disabled, nothing moves, no current", _offsets),
+    Step("offsets", "switching is disabled, nothing moves, no current", _offsets, 0.15),
     Step(connection.NAME, "a current of up to {vector:.3g} A that does not turn with the rotor: the shaft turns "
-         "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases),
+         "slowly, by up to {turns:g} turns divided by the pole pairs, and back", _phases, 10.0),
     Step(spin.NAME, "the shaft turns at up to {speed:.0f} rpm in both directions, with up to {torque:.3g} A of current "
-         "that makes torque", _spin),
+         "that makes torque", _spin, 30.0),
     Step(drag.NAME, "the shaft is accelerated to {speed:.0f} rpm, runs down and is braked, with up to {torque:.3g} A",
-         _drag),
+         _drag, 10.0),
     Step("resistance", "direct currents up to {level:.3g} A along the magnet for {level_s:.1f} s; no torque",
-         _resistance),
+         _resistance, 4.0),
     Step("map", "voltage pulses with currents up to {reach:.3g} A; alternating torque: the rotor swings; beyond "
-         "{angle:.0f} electrical degrees a burst ends", _map),
+         "{angle:.0f} electrical degrees a burst ends", _map, 4.0),
 )  # fmt: skip
 NEEDS = {"offsets": ("offsets",), "phases": ("offsets", "phases"), "spin": ("offsets", "phases", "spin"),
          "drag": ("offsets", "phases", "spin", "drag"), "resistance": ("offsets", "resistance"),
@@ -175,18 +185,58 @@ def announcement(step: Step, known: Nameplate) -> str:
                             torque=spin.Q_SHARES[-1] * known.i_max_A)  # fmt: skip
 
 
-def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None]) -> Found:
-    """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before."""
-    found = Found()
-    before = {name: drive.get(name) for name in SWITCHED_OFF + CONNECTION}
-    try:
-        for name in SWITCHED_OFF:
-            drive.set(name, 0.0)
-        for step in steps:
-            say(f"{step.name}: {announcement(step, known)}")
+@contextlib.contextmanager
+def _shown(drive: Capture, step: Step) -> Iterator[None]:
+    """A bar on a terminal."""
+    with tqdm(total=step.seconds, desc=step.name, bar_format="{desc} {percentage:3.0f} %|{bar}|", leave=False,
+              disable=not sys.stderr.isatty()) as bar:  # fmt: skip
+        drive.passed = lambda seconds: bar.update(min(seconds / drive.slower, bar.total - bar.n))
+        try:
+            yield
+        finally:
+            drive.passed = nothing
+
+
+def _connect(drive: Capture, found: Found, known: Nameplate) -> None:
+    """The connection that an earlier run has found."""
+    connection = found.spun.connection if found.spun is not None else found.followed and found.followed.connection
+    if connection is not None:
+        turning.connect(drive, connection, known, "connection")
+        turning.release(drive)
+
+
+def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None,
+        earlier: tuple[tuple[str, ...], Found]) -> Found:  # fmt: skip
+    done, found = earlier
+    if done:
+        _connect(drive, found, found.known(known))
+    for step in steps:
+        if step.name in done:
+            say(f"{step.name}: kept from an earlier run")
+            continue
+        say(f"{step.name}: {announcement(step, known)}")
+        with _shown(drive, step):
             step.run(drive, found, found.known(known))
+        done = (*done, step.name)
+        if kept is not None:
+            kept.save(done, found)
+    return found
+
+
+def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None = None,
+        resume: bool = False) -> Found:  # fmt: skip
+    """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before.
+
+    kept     where finished steps are kept
+    resume   those that are there are not repeated
+    """
+    earlier = kept.load() if kept is not None and resume else ((), Found())
+    before = {name: drive.get(name) for name in drive.settings}
+    try:
+        for name in drive.switched_off:  # the voltages are evaluated without them
+            drive.set(name, 0.0)
+        return _go(drive, steps, known, say, kept, earlier)
     finally:
         _disable(drive)
         for name, value in before.items():
             drive.set(name, value)
-    return found

@@ -189,18 +189,23 @@ def turning_knee_A_per_rad(config: MotorConfig, model: FluxModel) -> float:
     return DELAY_PERIODS * flux_Vs / (TURNING_FEEDBACK * l_min)
 
 
+def knee_A(config: MotorConfig) -> float:
+    """The current from which the dead-time compensation is whole."""
+    inverter = config.inverter
+    return KNEE_LSB * 2.0 * inverter.current_full_scale_A / (1 << inverter.adc_bits)
+
+
 def _modulation(config: MotorConfig) -> dict[str, float]:
     inverter = config.inverter
     # A device drop acts like dead time: a leg voltage against its current.
     duty = inverter.dead_time_s * inverter.pwm_hz + inverter.device_drop_V / inverter.vdc_V
-    lsb_A = 2.0 * inverter.current_full_scale_A / (1 << inverter.adc_bits)
     min_pulse = config.min_pulse_s * inverter.pwm_hz
     # Inside this circle no pulse can be too short, with the whole dead time on top: (MO-11).
     clear = (1.0 - 2.0 * (min_pulse + duty * max(1.0, config.control.dead_time_compensation))) / math.sqrt(3.0)
     return {
         "bridge_duty": duty,
         "dead_time_duty": duty * config.control.dead_time_compensation,
-        "knee_A": KNEE_LSB * lsb_A,
+        "knee_A": knee_A(config),
         "min_pulse_duty": min_pulse,
         "v_clear": V_CLEAR_MARGIN * max(min(31 / 32 * V_RATIO_CONTROL, clear), 0.0),
     }

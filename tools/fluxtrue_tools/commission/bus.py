@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An ECU on CAN as the drive of a commissioning.
+
+Protected commands keep it enabled with a request of zero; only between two bursts a small torque brakes the rotor. The
+values of the voltage pulses are set, and the pulses started, by commands of XCP (firmware/calibration/pulse_access.h),
+and their currents and voltages are captured by the scope. The shaft cannot be turned: no port of a controller has the
+imposed angle and the limits of the shaft.
+"""
+
+import contextlib
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from fluxtrue_tools import faults
+from fluxtrue_tools.a2l.elf import Description, Value
+from fluxtrue_tools.commission.bus_line import RUNNING, Line
+from fluxtrue_tools.commission.drive import DONE, FAILED, PERIODS_MAX, PULSE
+from fluxtrue_tools.commission.nameplate import BRAKE_SHARE, Nameplate
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.scope.scope import SIGNALS_MAX, WORDS, Scope, make_setup
+from fluxtrue_tools.scope.xcp import DOWNLOAD, SET_MTA, XcpMaster, XcpRefused, unlock, upload
+
+USER: Final = 0xF1
+PULSE_SET, PULSE_START, PULSE_STATE = 0x10, 0x11, 0x12  # firmware/calibration/pulse_access.h
+FIELDS: Final = ("pulses_vd", "pulses_id_low_A", "pulses_id_high_A", "pulses_vq", "pulses_iq_low_A", "pulses_iq_high_A",
+                 "pulses_first", "pulses_angle_rad", "pulses_delay", "pulses_reversals", "pulses_periods")  # fmt: skip
+UNKNOWN: Final = 0x20
+Q15: Final = 32768.0
+CAPTURED: Final = {"id_A": "i_d_A", "iq_A": "i_q_A", "ud_V": "u_d_V", "uq_V": "u_q_V", "theta_e_rad": "theta_e_deg",
+                   "i_zero_A": "i_zero_A"}  # fmt: skip
+FORMATS: Final = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
+MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start them take some milliseconds
+POLL_S: Final = 0.005
+STOPPED: Final = 2.0  # of pulses_failure
+TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
+READY_S, RUN_S, OFF_S = 5.0, 0.5, 0.05
+LISTEN_S: Final = 0.15
+STEADY, SMALL = 0.05, 0.5  # of the largest voltage
+ANGLE_PERIODS: Final = 8
+
+
+def _steady(magnitude: Array) -> tuple[int, int]:
+    """First and last row of the longest stretch of one voltage: current control never holds one."""
+    same = np.abs(np.diff(magnitude)) < STEADY * magnitude[1:]
+    same &= magnitude[1:] > SMALL * magnitude.max(initial=0.0)
+    ends = np.flatnonzero(np.diff(np.concatenate(([False], same, [False])).astype(int)))
+    if not len(ends):
+        return 0, 0
+    begins, ends = ends[::2], ends[1::2]
+    longest = int(np.argmax(ends - begins))
+    return int(begins[longest]), int(ends[longest])
+
+
+def pulsing(u_d: Array, u_q: Array, v_d: float, v_q: float) -> Array:
+    """In which rows the pulses act, on their way back to zero current too: each voltage has one magnitude."""
+    axes = [np.abs(u) for u, v in ((u_d, v_d), (u_q, v_q)) if v > 0.0]
+    first, last = _steady(axes[0])
+    acts = np.zeros(len(u_d), bool)
+    if last <= first:
+        return acts
+    levels = [np.median(axis[(first + last) // 2 : last + 1]) for axis in axes]
+    while last + 1 < len(u_d) and any(abs(axis[last + 1] - level) < STEADY * level
+                                      for axis, level in zip(axes, levels, strict=True)):  # fmt: skip
+        last += 1
+    last += 1  # the last voltage is a share of it
+    while last + 1 < len(u_d) and u_d[last + 1] == 0.0 == u_q[last + 1]:  # until current control goes on
+        last += 1
+    acts[first : last + 1] = True
+    return acts
+
+
+class OverTheBus:
+    """The drive's names, as far as a commissioning without a turning shaft needs them."""
+
+    switched_off: tuple[str, ...] = ()  # the trim acts while the shaft turns
+    settings: tuple[str, ...] = ("dead_time_compensation",)
+    slower: float = 12.0
+
+    def __init__(self, line: Line, description: Description, known: Nameplate, vdc_V: float) -> None:
+        self._line, self._known, self._description = line, known, description
+        self.period_s = description.period_s
+        self._level_share = known.level_V / vdc_V
+        self._values = {value.name: value for value in description.values + description.measurements}
+        self._factors = {base.name: base.factor for base in description.bases}
+        self._enabled = False
+        self._failure = 0.0
+        line.pass_time(LISTEN_S)
+        self._master = XcpMaster(line)
+        unlock(self._master)
+        self._scope = Scope(self._master, description)
+        self._state()
+        line.ask(limit_Nm=self._torque_Nm(BRAKE_SHARE * known.i_max_A))
+
+    @property
+    def passed(self) -> Callable[[float], None]:
+        """Called with the seconds for which the drive has run."""
+        return self._line.passed
+
+    @passed.setter
+    def passed(self, passed: Callable[[float], None]) -> None:
+        self._line.passed = passed
+
+    def _torque_Nm(self, i_q_A: float) -> float:
+        """By the nameplate."""
+        return 1.5 * self._known.pole_pairs * self._known.psi_f_Vs * i_q_A
+
+    # Names.
+
+    def set(self, name: str, value: float) -> None:
+        """A value of the drive; nothing once the connection is lost, when the drive stops by itself."""
+        if self._line.is_lost:
+            return
+        if name == "enable":
+            self._enable() if value else self._disable()
+        elif name == "torque_requested_Nm":
+            self._line.ask(torque_Nm=value)
+        else:
+            self._write(self._known_value(name), value)
+
+    def get(self, name: str) -> float:
+        """The value now."""
+        if name == "run_state":
+            return float(self._line.state in RUNNING)
+        if name == "pulses":
+            return self._state()
+        if name == "pulses_failure":
+            self._state()
+            return self._failure
+        if name == "theta_e_rad":
+            return float(np.angle(np.exp(1j * self.capture((name,), ANGLE_PERIODS)[:, 0]).mean()))
+        if name == "compensation_V":
+            return self.get("dead_time_compensation") * self._level_share * self.get("v_dc_V")
+        if name == "compensation_knee_A":
+            return self._known.knee_A
+        return self._read(self._known_value(name))
+
+    def _known_value(self, name: str) -> Value:
+        if name not in self._values:
+            raise FluxtrueError(f"{name}: an ECU on the bus has no such value")
+        return self._values[name]
+
+    def _read(self, value: Value) -> float:
+        content = upload(self._master, value.address, struct.calcsize(FORMATS[value.type]))
+        return float(struct.unpack(FORMATS[value.type], content)[0]) * self._factors.get(value.base, 1.0)
+
+    def _write(self, value: Value, to: float) -> None:
+        self._master.command(SET_MTA, 0, 0, 0, *value.address.to_bytes(4, "little"))
+        self._master.command(DOWNLOAD, 4, *struct.pack("<f", to))
+
+    # The state of the inverter.
+
+    def _enable(self) -> None:
+        self._line.ask(mode="torque", enable=False, torque_Nm=0.0)
+        self._line.wait_for(("ready", *RUNNING), READY_S, "the dc link cannot be charged")
+        self._line.ask(enable=True)
+        self._line.wait_for(RUNNING, RUN_S, "switching cannot be enabled")
+        self._enabled = True
+
+    def _disable(self) -> None:
+        self._enabled = False
+        self._line.ask(enable=False, torque_Nm=0.0)
+
+    def _check(self) -> None:
+        """It still runs if it should."""
+        if not self._enabled or self._line.state in RUNNING:
+            return
+        self._enabled = False
+        named = faults.named(int(self._read(self._values["fault_word"])))
+        why = ", ".join(named) or self._line.refused
+        raise FluxtrueError(f"commission: the inverter has stopped (state {self._line.state}): {why}")
+
+    def rest(self, seconds: float) -> None:
+        """Let the drive run."""
+        if not self._line.is_lost:
+            self._line.pass_time(seconds)
+            self._check()
+
+    def switch_off(self) -> None:
+        """Switching disabled, the dc link discharged."""
+        self._enabled = False
+        self._line.ask(mode="off", enable=False, torque_Nm=0.0, limit_Nm=0.0)
+        with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
+            self.rest(OFF_S)
+
+    # Movements and captures.
+
+    def speed_rpm(self, seconds: float) -> float:
+        """Let the drive run; the speed at the end."""
+        self.rest(seconds)
+        return self.get("speed_rpm")
+
+    def push(self, current_A: complex, offset_A: complex = 0j) -> None:
+        """A torque in its place: references of the current cannot be commanded on a bus."""
+        self._line.ask(torque_Nm=self._torque_Nm(current_A.imag))
+
+    def let_go(self) -> None:
+        """No torque."""
+        self._line.ask(torque_Nm=0.0)
+
+    def capture(self, names: Sequence[str], periods: int) -> Array:
+        """As many rows as the scope holds."""
+        signals = [CAPTURED[name] for name in names]
+        self._arm(signals, periods)
+        self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
+        self._check()
+        columns = self._scope.read().columns
+        return np.column_stack([self._column(columns, name) for name in names])
+
+    @staticmethod
+    def _column(columns: Mapping[str, Array], name: str) -> Array:
+        column = columns[CAPTURED[name]]
+        return np.radians(column) if name == "theta_e_rad" else column
+
+    def _arm(self, signals: Sequence[str], periods: int) -> None:
+        assert len(signals) <= SIGNALS_MAX
+        setup = make_setup(
+            self._scope.signals, signals, "manual", None, 0.0, 0.0, min(periods, WORDS // len(signals)), 1
+        )
+        self._scope.stop()
+        self._scope.take(setup)
+        self._scope.arm()
+        self._scope.trigger()
+
+    def _state(self) -> float:
+        """Phase of the pulses."""
+        try:
+            phase, self._failure, *_ = map(float, self._master.command(USER, PULSE_STATE))
+        except XcpRefused as error:
+            if error.code == UNKNOWN:
+                raise FluxtrueError("commission: this firmware has no commands for voltage pulses") from error
+            raise
+        return phase
+
+    def _raw(self, name: str, value: float) -> int:
+        if name.endswith("_A"):
+            return round(value / self._factors["CURRENT"])
+        if name == "pulses_angle_rad":
+            return round(value / (2.0 * np.pi) * 65536.0)
+        return round(Q15 * value) if name in ("pulses_vd", "pulses_vq", "pulses_first") else round(value)
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        """Captured from before their start to after their end, or as far as the scope's memory reaches."""
+        for field, name in enumerate(FIELDS):
+            self._master.command(
+                USER, PULSE_SET, field, *(self._raw(name, values[name]) & 0xFFFF).to_bytes(2, "little")
+            )
+        begun_s, periods = self._line.now_s, round(values["pulses_periods"] + MARGIN_S / self.period_s)
+        self._arm(list(CAPTURED.values()), periods)
+        self._master.command(USER, PULSE_START)
+        phase = self._until_ended()
+        most = math.ceil((self._line.now_s - begun_s) / self.period_s)
+        if self._failure == STOPPED:
+            self.rest(TOLD_S)
+        self._scope.until_complete(periods * self.period_s + 1.0)
+        columns = self._scope.read(most=most).columns
+        rows = np.column_stack([self._column(columns, name) for name in CAPTURED])
+        acts = pulsing(rows[:, 2], rows[:, 3], values["pulses_vd"], values["pulses_vq"])
+        if acts[-1] and phase == DONE:
+            raise FluxtrueError(f"commission: the voltage pulses last longer than the {len(rows)} periods of the scope")
+        # The scope has the voltage that acts in a period, SIGNALS that of the next one.
+        state = np.where(acts[1:], PULSE, phase)
+        return np.column_stack((rows[:-1, :2], rows[1:, 2:4], rows[:-1, 4:], state))
+
+    def _until_ended(self) -> float:
+        waited_s = 0.0
+        while (phase := self._state()) not in (DONE, FAILED):
+            if waited_s > 2.0 * PERIODS_MAX * self.period_s:
+                raise FluxtrueError("commission: the voltage pulses do not end")
+            self.rest(POLL_S)
+            waited_s += POLL_S
+        return phase
