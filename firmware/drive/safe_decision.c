@@ -17,20 +17,19 @@ static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 }
 
 /* With the known speed of the last step. */
-static bool gate_fault_needs_short_circuit(drive_t *drive, const snapshot_t *snapshot, bool are_currents_valid)
+static gate_fault_in_t gate_fault_inputs(const drive_t *drive, const snapshot_t *snapshot)
 {
     const safe_state_state_t *safe = &drive->task.safe_state;
-    const gate_fault_in_t in = {
+    return (gate_fault_in_t){
         .latched = (snapshot->faults & FAULT_GATE) != 0U,
         .gates = snapshot->gates,
         .rectifies = safe->short_circuit,
-        .currents_valid = are_currents_valid,
+        .currents_valid = currents_valid(drive, snapshot),
         .line_emf = safe->line_emf,
         .v_dc = (q15_t)snapshot->sample.v_dc,
         .zero = mean_of_phases(snapshot),
         .i = snapshot->sample.point.i,
     };
-    return gate_fault_step(&drive->motor->gate_fault, &drive->task.gate_fault, &in);
 }
 
 /* The machine feeds more than a quarter of i_max into the dc link: it would be the cause of an over-voltage, and the
@@ -67,6 +66,8 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     const uint32_t faults = snapshot->faults;
     const bool over_voltage = (faults & FAULT_OVER_VOLTAGE) != 0U;
     const operating_point_t *point = &snapshot->sample.point;
+    const gate_fault_config_t *gate_config = &drive->motor->gate_fault;
+    const gate_fault_in_t gate = gate_fault_inputs(drive, snapshot);
     const safe_state_in_t in = {
         .omega = fx_q15_from_q31(point->omega),
         .psi_delta = snapshot->psi_d_error,
@@ -75,12 +76,14 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
         .i_last_period = snapshot->i_last_period,
         .psi_current = {point->flux.psi_d - point->flux.psi_f0, point->flux.psi_q},
         .shorted = snapshot->shorted,
-        .currents_valid = currents_valid(drive, snapshot),
+        .currents_valid = gate.currents_valid,
         .speed_valid = (faults & (FAULT_ANGLE | FAULT_INPUT)) == 0U,
+        .doubtful = faults != 0U || task->plausibility.reference != 0U,
+        .rectifying = gate_fault_current_flows(gate_config, &gate),
         .over_voltage = over_voltage && snapshot->shorted,
     };
     const bool was_short_circuit = task->safe_state.short_circuit;
-    const bool by_gate = gate_fault_needs_short_circuit(drive, snapshot, in.currents_valid);
+    const bool by_gate = gate_fault_step(gate_config, &task->gate_fault, &gate);
     const bool by_speed = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
     const bool short_circuit = by_speed || (by_gate && (faults & FAULT_GATE) != 0U);
     task->armed = is_armed(task, short_circuit && was_short_circuit, faults);

@@ -23,14 +23,17 @@ static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bo
     return at_rest || (state->quiet == QUIET_STEPS && !state->switch_shorted);
 }
 
+bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in)
+{
+    return !in->gates && in->currents_valid && fx_magnitude(in->i.d, in->i.q) > config->i_alive + 2 * in->zero;
+}
+
 bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in)
 {
-    const int32_t magnitude = fx_magnitude(in->i.d, in->i.q);
-    const bool carries = magnitude > config->i_alive + 2 * in->zero;
-    const bool disabled = !in->gates && in->currents_valid;
-    state->switch_shorted = is_switch_shorted(config, state, in, disabled && carries);
+    const bool none = !in->gates && in->currents_valid && fx_magnitude(in->i.d, in->i.q) <= config->i_alive;
+    state->switch_shorted = is_switch_shorted(config, state, in, gate_fault_current_flows(config, in));
     state->above = in->line_emf > in->v_dc >> (state->above ? 4 : 3);
-    const bool released = may_release(state, in, disabled && magnitude <= config->i_alive);
+    const bool released = may_release(state, in, none);
     state->holds_supply = in->latched && !released;
     return state->above || state->switch_shorted;
 }

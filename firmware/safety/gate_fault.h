@@ -44,6 +44,9 @@ typedef struct {
     dq_q15_t i;
 } gate_fault_in_t;
 
+/** A current that is no measuring error flows although switching is disabled. */
+bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in);
+
 /** Whether a gate fault needs the short circuit now, or would need it. */
 bool gate_fault_step(const gate_fault_config_t *config, gate_fault_state_t *state, const gate_fault_in_t *in);
 

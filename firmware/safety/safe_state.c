@@ -4,6 +4,7 @@
 #define SQRT3 113512            /* Q15.16 */
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
+#define FALL_SHIFT 6 /* of the known dc voltage: 64 steps */
 #define UNKNOWN_STEPS 20000U /* 18 to 22.5 s: a step is 0.89 to 1.125 ms */
 
 /* Q30; below 2^31 + 1 for every argument. */
@@ -61,14 +62,27 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
     }
 }
 
+/* (SS-19). A sensor that reads too little ends the drive within milliseconds, in which the known voltage falls little.
+ * Afterwards the diodes decide: a link whose voltage is really below the back-EMF draws a current. */
+static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
+{
+    const bool rectifies = confirmed(&state->rectifying, in->rectifying);
+    if (in->v_dc >= state->v_dc || rectifies) {
+        state->v_dc = in->v_dc;
+    } else if (!in->doubtful) {
+        state->v_dc = (q15_t)(state->v_dc + ((in->v_dc - state->v_dc) >> FALL_SHIFT));
+    }
+}
+
 bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
     follow_speed(config, state, in);
+    follow_voltage(state, in);
     const q15_t psi = fx_sat_q15(config->psi_f + fx_max_s32(in->psi_delta, 0));
     state->line_emf = fx_mul_gain_q15(SQRT3, fx_mul_q15(state->speed, psi));
     const bool lower_level = state->short_circuit || !in->speed_valid;
     const q15_t share = lower_level ? config->share_open : config->share_short;
-    const bool rectifies = state->line_emf > fx_mul_q15(share, in->v_dc);
+    const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);
     state->short_circuit = rectifies;
     return rectifies || (in->over_voltage && in->v_dc > config->v_release);
 }

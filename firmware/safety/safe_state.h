@@ -6,13 +6,16 @@
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
  *   valid speed 0.8 v_dc is the only level
+ *   v_dc is the known dc voltage: it rises with the measured one and falls in 64 steps; while a fault is latched or
+ *   the converters' reference reads wrong, only if a current has flowed for 20 steps although switching is disabled.
+ *   A sensor that has failed looks like a link that is empty; the diodes tell them apart.
  *   A short circuit that is on with a latched over-voltage lasts until v_dc is below v_release, and is then not closed
  *   again for the same over-voltage.
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
  *   says. Without a valid speed the last one holds; with switching disabled it falls after 20,000 steps of the task.
- * Source   docs/theory/safe-state.md (SS-1) ... (SS-7)
+ * Source   docs/theory/safe-state.md (SS-1) ... (SS-7), (SS-19)
  * Units    per unit; speeds are magnitudes
  * Range    every argument; e saturates at 1
  * Rounding 1 LSB q15, well inside the hysteresis
@@ -32,7 +35,9 @@ typedef struct {
 typedef struct {
     q15_t speed;    /* known: the measured one, or what is left of the last valid one */
     q15_t line_emf; /* at the known speed */
+    q15_t v_dc;     /* known */
     bool short_circuit;
+    uint8_t rectifying; /* steps in which a current flowed with switching disabled; saturates */
     uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */
     uint16_t unknown_steps;          /* steps without a valid speed and with switching disabled; saturates */
     dq_q15_t i_before;               /* of the last step */
@@ -47,6 +52,8 @@ typedef struct {
     bool shorted;              /* the phases are shorted, as read back */
     bool currents_valid;
     bool speed_valid;
+    bool doubtful;   /* of v_dc: a fault is latched, or the converters' reference reads wrong */
+    bool rectifying; /* a current flows although switching is disabled, as read back */
     bool over_voltage; /* latched, and the phases are shorted */
 } safe_state_in_t;
 

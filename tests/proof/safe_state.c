@@ -18,6 +18,7 @@ static safe_state_state_t any_state(void)
     safe_state_state_t s;
     s.short_circuit = nondet_bool();
     ASSUME(s.speed >= 0 && s.steady <= CONFIRMED_STEPS && s.without_current <= CONFIRMED_STEPS);
+    ASSUME(s.rectifying <= CONFIRMED_STEPS);
     ASSUME(IS_Q15(s.i_before.d) && IS_Q15(s.i_before.q));
     return s;
 }
@@ -29,6 +30,8 @@ static safe_state_in_t any_input(void)
     in.currents_valid = nondet_bool();
     in.speed_valid = nondet_bool();
     in.over_voltage = nondet_bool();
+    in.doubtful = nondet_bool();
+    in.rectifying = nondet_bool();
     ASSUME(IS_Q15(in.i.d) && IS_Q15(in.i.q) && IS_Q15(in.i_last_period.d) && IS_Q15(in.i_last_period.q));
     ASSUME(IS_Q15(in.psi_current.d) && IS_Q15(in.psi_current.q));
     return in;
@@ -77,4 +80,17 @@ void proof_known_speed_state_stays_in_range(void)
     PROVE(s.steady <= CONFIRMED_STEPS && s.without_current <= CONFIRMED_STEPS && s.unknown_steps <= UNKNOWN_STEPS);
     PROVE(s.speed >= 0);
     PROVE(IS_Q15(s.i_before.d) && IS_Q15(s.i_before.q));
+}
+
+void proof_known_voltage_is_kept_with_a_fault(void)
+{
+    safe_state_state_t s = any_state();
+    const safe_state_in_t in = any_input();
+    const q15_t before = s.v_dc;
+    const uint8_t rectified = s.rectifying;
+    follow_voltage(&s, &in);
+    const bool by_diodes = in.rectifying && rectified + 1 >= CONFIRMED_STEPS;
+    PROVE(s.v_dc >= in.v_dc);
+    PROVE(!in.doubtful || by_diodes || s.v_dc >= before);
+    PROVE(s.rectifying <= CONFIRMED_STEPS);
 }

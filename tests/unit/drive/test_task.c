@@ -384,6 +384,55 @@ void test_a_level_that_is_exceeded_in_the_step_of_switching_off_closes_no_short_
     TEST_ASSERT_EQUAL_INT(SAFE_FREEWHEEL, command()->safe);
 }
 
+/* Steps of the task with a sensor of the dc voltage that reads nothing, and a current that flows with this i_q. */
+static safe_t safe_without_dc_reading(int32_t i_q, int steps)
+{
+    for (int k = 0; k < steps; k++) {
+        sample_t *s = sample_box_begin(&drive.samples);
+        *s = *sample_box_at(&drive.samples, drive.samples.generation);
+        s->v_dc = 0;
+        s->point.i = (dq_q15_t){0, i_q};
+        sample_box_publish(&drive.samples);
+        task_1khz(&drive);
+    }
+    return command()->safe;
+}
+
+/* A link that is really empty draws a current through the diodes, with switching disabled; a sensor that has failed
+ * shows none. */
+void test_a_dc_sensor_that_fails_closes_no_short_circuit_unless_the_diodes_conduct(void)
+{
+    run_at(0.4, 0.0);
+    seam.motor.gate_fault.i_alive = motor.gate_fault.i_alive;
+    TEST_ASSERT_NOT_EQUAL_INT(SAFE_SHORT_CIRCUIT, safe_without_dc_reading(5000, 1));
+    drive_raise_fault(&drive, FAULT_UNDER_VOLTAGE);
+    TEST_ASSERT_NOT_EQUAL_INT(SAFE_SHORT_CIRCUIT, safe_without_dc_reading(5000, 100)); /* still switching */
+    seam.gates = false;
+    TEST_ASSERT_NOT_EQUAL_INT(SAFE_SHORT_CIRCUIT, safe_without_dc_reading(0, 1000));
+    TEST_ASSERT_NOT_EQUAL_INT(SAFE_SHORT_CIRCUIT, safe_without_dc_reading(5000, 19));
+    TEST_ASSERT_EQUAL_INT(SAFE_SHORT_CIRCUIT, safe_without_dc_reading(5000, 1));
+}
+
+/* A wrong reference of the converters makes every reading too small; ten steps confirm it. */
+void test_the_known_dc_voltage_does_not_fall_while_the_reference_reads_wrong(void)
+{
+    run_at(0.4, 0.0);
+    const q15_t before = drive.task.safe_state.v_dc;
+    (void)safe_without_dc_reading(0, 1);
+    const q15_t fallen = drive.task.safe_state.v_dc;
+    TEST_ASSERT_LESS_THAN_INT(before, fallen);
+    seam.known_permille = 1400;
+    (void)safe_without_dc_reading(0, 1);
+    seam.known_permille = 1000;
+    (void)safe_without_dc_reading(0, 1);
+    TEST_ASSERT_LESS_THAN_INT(fallen, drive.task.safe_state.v_dc);
+    seam.known_permille = 1400;
+    (void)safe_without_dc_reading(0, 1);
+    const q15_t kept = drive.task.safe_state.v_dc;
+    (void)safe_without_dc_reading(0, 5);
+    TEST_ASSERT_EQUAL_INT(kept, drive.task.safe_state.v_dc);
+}
+
 /* What a fault would bring now, with this i_q at this speed; after 120 steps it is the known one. */
 static safe_t safe_with(int32_t i_q, double omega_pu)
 {

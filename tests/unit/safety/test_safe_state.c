@@ -99,6 +99,50 @@ void test_without_dc_voltage_any_rotation_is_shorted(void)
     TEST_ASSERT_TRUE(at(0.01));
 }
 
+/* e = 0.346 is the short circuit's level of v_dc = 0.385. The sensor fails, and the drive ends within a step. */
+void test_a_dc_sensor_that_fails_does_not_short_a_machine_that_cannot_rectify(void)
+{
+    TEST_ASSERT_FALSE(at(0.5));
+    in.v_dc = 0;
+    TEST_ASSERT_FALSE(steps(1));
+    in.doubtful = true;
+    TEST_ASSERT_FALSE(steps(60000));
+}
+
+/* The link is really empty: with switching disabled the machine feeds it through the diodes, in 20 steps in a row. */
+void test_a_current_through_the_diodes_confirms_a_low_dc_voltage(void)
+{
+    TEST_ASSERT_FALSE(at(0.5));
+    in.v_dc = 9830;
+    in.doubtful = true;
+    in.rectifying = true;
+    TEST_ASSERT_FALSE(steps(19));
+    in.rectifying = false;
+    TEST_ASSERT_FALSE(steps(1));
+    in.rectifying = true;
+    TEST_ASSERT_FALSE(steps(19));
+    TEST_ASSERT_TRUE(steps(1));
+}
+
+/* From 0.6 to 0.4: the level of e = 0.416 is v_dc = 0.462, reached after 64 ln(0.2/0.062) = 75 steps. */
+void test_without_a_fault_the_known_dc_voltage_falls_in_64_steps_and_rises_at_once(void)
+{
+    TEST_ASSERT_FALSE(at(0.6));
+    in.v_dc = 13107;
+    TEST_ASSERT_FALSE(steps(73));
+    TEST_ASSERT_TRUE(steps(4));
+    TEST_ASSERT_TRUE(steps(1000));
+    TEST_ASSERT_EQUAL_INT16(13107, state.v_dc);
+    in.v_dc = 19661;
+    TEST_ASSERT_FALSE(steps(1));
+    in.v_dc = 0;
+    TEST_ASSERT_FALSE(steps(1));
+    in.doubtful = true;
+    in.v_dc = 22000;
+    TEST_ASSERT_FALSE(steps(1));
+    TEST_ASSERT_EQUAL_INT16(22000, state.v_dc);
+}
+
 void test_without_a_valid_speed_the_last_one_counts_and_the_lower_threshold_decides(void)
 {
     TEST_ASSERT_FALSE(at(0.72)); /* between the thresholds */
