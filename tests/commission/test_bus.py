@@ -109,7 +109,6 @@ def during(drive: OverTheBus, action: Callable[[], None]) -> None:
 
 
 def test_a_hidden_machine_is_measured_over_can(stand: Stand, unknown: Motor, known: Nameplate) -> None:
-    """Within docs/howto/commission.md's figures for software in the loop; the wanted 1 % of R is missed here."""
     found = run(stand.drive, chosen(("map",)), known, lambda _: None)
     assert found.surface is not None and found.resistance is not None and found.balance is not None
     reached = score(found.surface.model, stand.truth, known.i_max_A, stand.truth.psi_f_Vs)
