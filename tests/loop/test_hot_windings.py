@@ -16,7 +16,7 @@ SHARES = (0.0, 0.02, 0.1, 0.3, 0.6, 1.0)  # of top speed
 SLOW = 0.1  # of top speed: up to here every machine has the voltage for all its torque
 FULL = 0.97  # of the requested torque
 MACHINES = ("hsm1", "prius", "leaf", "pmasynrm", "pmsyrm", "ebike", "spm_12V", "compressor", "servo", "truck",
-            "saturated", "linear", "gem", "ipmsm_2kW", "estun", "anaheim", "teknic", "hub", "racing")  # fmt: skip
+            "saturated", "linear", "gem")  # fmt: skip
 TRIP_C, DERATE_C = 180.0, 155.0  # where motor.toml gives none
 NOISE = 0.002  # of the current converter's full scale, as in the campaigns
 

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commissioning over CAN, on the virtual ECU with hidden machines."""
+
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+
+from fluxtrue_tools.a2l.elf import read
+from fluxtrue_tools.bus.interface import COMMAND, read_interface
+from fluxtrue_tools.cli import run as command
+from fluxtrue_tools.commission import hidden, on_the_bus
+from fluxtrue_tools.commission.bursts import Burst, record
+from fluxtrue_tools.commission.bus import (
+    FIELDS,
+    PULSE_SET,
+    PULSE_START,
+    PULSE_STATE,
+    STOPPED,
+    USER,
+    OverTheBus,
+    pulsing,
+)
+from fluxtrue_tools.commission.bus_line import Line, SimulatedTime
+from fluxtrue_tools.commission.drive import DONE, FAILED
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.score import balance_error, score
+from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.scope.xcp import XcpMaster, XcpRefused
+from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.process import VirtualEcu
+from fluxtrue_tools.vecu.stepped import SteppedBus, connect
+
+NAME, SEED = "saturated", 12
+R_SHARE, MAP_RMS, BALANCE = 0.01, 0.01, 0.002
+SMALL = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4)
+LONG = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=1000, periods=2000)
+REFUSED = 1.0
+LOCKED, OUT_OF_RANGE, SYNTAX = 0x25, 0x22, 0x21
+OFF_S = 0.2  # command time-out 30 ms, ramp 15 ms
+
+
+@dataclass
+class Stand:
+    """A virtual ECU with a hidden machine, and its drive over CAN."""
+
+    ecu: VirtualEcu
+    channel: Channel
+    stepped: SteppedBus
+    line: Line
+    drive: OverTheBus
+    truth: Truth
+    is_silent: bool = False  # no commands are sent
+
+    def current_A(self) -> float:
+        """Of the plant."""
+        return float(np.hypot(*self.channel.get("truth.i_d_A", "truth.i_q_A")))
+
+
+class Switched(SimulatedTime):
+    """Commands that can stop, as those of a tool that has stalled."""
+
+    is_silent = False
+
+    def send(self, frame: can.Message) -> None:
+        if not (self.is_silent and frame.arbitration_id != 0x650):
+            super().send(frame)
+
+
+@pytest.fixture
+def stand(unknown: Motor, known: Nameplate, tmp_path: Path) -> Iterator[Stand]:
+    truth, flux_map, plant = hidden.draw(NAME, SEED, unknown, known.i_max_A)
+    machine = tmp_path / "machine.txt"
+    machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
+    with ExitStack() as stack:
+        ecu = stack.enter_context(VirtualEcu(unknown.folder.vecu, machine=machine))
+        bus = connect(ecu.can_port)
+        stack.callback(bus.shutdown)
+        channel = Channel("127.0.0.1", ecu.bench_port)
+        stack.callback(channel.close)
+        stepped = SteppedBus(bus, channel)
+        line = Line(lambda beat: Switched(stepped, beat), read_interface(unknown.folder.dbc))
+        drive = OverTheBus(line, read(unknown.folder.vecu), known, unknown.plant["vdc_V"])
+        yield Stand(ecu, channel, stepped, line, drive, truth)
+
+
+def silence(stand: Stand) -> None:
+    """The commands end, XCP goes on."""
+    stand.line._clock.is_silent = True  # type: ignore[attr-defined]
+
+
+def during(drive: OverTheBus, action: Callable[[], None]) -> None:
+    """Something happens when the pulses have begun."""
+    ended = drive._until_ended
+
+    def until_ended() -> float:
+        action()
+        return ended()
+
+    drive._until_ended = until_ended  # type: ignore[method-assign]
+
+
+def test_a_hidden_machine_is_measured_over_can(stand: Stand, unknown: Motor, known: Nameplate) -> None:
+    found = run(stand.drive, chosen(("map",)), known, lambda _: None)
+    assert found.surface is not None and found.resistance is not None and found.balance is not None
+    reached = score(found.surface.model, stand.truth, known.i_max_A, stand.truth.psi_f_Vs)
+    error = found.resistance.r_ohm / stand.truth.plant["r_ohm_20"] - 1.0
+    print(f"map {reached}, R {100 * error:+.2f} %, largest current {found.largest_A:.1f} A, "
+          f"{stand.stepped.now_s:.0f} s simulated")  # fmt: skip
+    assert abs(error) <= R_SHARE
+    assert reached.map_rms <= MAP_RMS
+    assert balance_error(found.balance, stand.truth) <= BALANCE
+    assert found.largest_A <= known.i_max_A
+    stand.drive.switch_off()
+    stand.line.pass_time(OFF_S)
+    assert stand.line.state in ("standby", "discharge") and stand.drive.get("fault_word") == 0.0
+    assert stand.drive.get("dead_time_compensation") == pytest.approx(1.0, abs=1e-3)
+
+
+def test_lost_commands_end_the_pulses_in_the_safe_state(stand: Stand, known: Nameplate) -> None:
+    stand.drive.set("enable", 1.0)
+    during(stand.drive, lambda: silence(stand))
+    with pytest.raises(FluxtrueError, match="the inverter has stopped .state ready.: command timed out"):
+        record(stand.drive, LONG, known)
+    stand.line.pass_time(OFF_S)
+    assert stand.drive.get("run_state") == 0.0 and stand.current_A() < 1.0
+
+
+def test_a_closed_connection_is_one_message(stand: Stand, known: Nameplate) -> None:
+    during(stand.drive, lambda: (stand.ecu.stop(), None)[1])
+    with pytest.raises(FluxtrueError, match="the connection to the inverter is closed"):
+        run(stand.drive, chosen(("resistance",)), known, lambda _: None)
+
+
+def test_pulses_with_a_torque_request_are_refused(stand: Stand) -> None:
+    stand.channel.set(imposed_speed=1.0, speed_rad_s=0.0)  # standing, so that only the request is refused
+    stand.drive.set("enable", 1.0)
+    stand.drive.push(5j)
+    stand.drive.rest(0.05)
+    stand.drive.pulse(SMALL.values())
+    assert (stand.drive.get("pulses"), stand.drive.get("pulses_failure")) == (FAILED, REFUSED)
+    stand.drive.let_go()
+    stand.drive.rest(0.05)
+    stand.drive.pulse(SMALL.values())
+    assert (stand.drive.get("pulses"), stand.drive.get("pulses_failure")) == (DONE, 0.0)
+
+
+def test_a_torque_request_ends_the_pulses(stand: Stand) -> None:
+    stand.channel.set(imposed_speed=1.0, speed_rad_s=0.0)
+    stand.drive.set("enable", 1.0)
+    during(stand.drive, lambda: stand.drive.push(5j))
+    stand.drive.pulse(LONG.values())
+    assert (stand.drive.get("pulses"), stand.drive.get("pulses_failure")) == (FAILED, STOPPED)
+
+
+def test_another_commander_on_the_bus_is_refused(stand: Stand) -> None:
+    frame = read_interface().message(COMMAND).frame_id
+    other = connect(stand.ecu.can_port)
+    try:
+        other.send(can.Message(arbitration_id=frame, data=bytes(8), is_extended_id=False))
+        with pytest.raises(FluxtrueError, match="something else on this bus commands the inverter"):
+            for _ in range(100):
+                stand.drive.rest(0.01)
+    finally:
+        other.shutdown()
+
+
+@pytest.mark.parametrize(("bytes_", "code"), [
+    ((PULSE_SET, 0, 0, 0), LOCKED), ((PULSE_START,), LOCKED),
+])  # fmt: skip
+def test_pulses_need_the_key(stand: Stand, bytes_: tuple[int, ...], code: int) -> None:
+    locked = XcpMaster(stand.line)  # a new session
+    with pytest.raises(XcpRefused) as refused:
+        locked.command(USER, *bytes_)
+    assert refused.value.code == code
+    assert locked.command(USER, PULSE_STATE)[:2] == bytes((0, 0))
+
+
+@pytest.mark.parametrize(("bytes_", "code"), [
+    ((PULSE_SET, len(FIELDS), 0, 0), OUT_OF_RANGE), ((PULSE_SET, 0, 0), SYNTAX), ((PULSE_SET,), SYNTAX),
+])  # fmt: skip
+def test_wrong_values_of_pulses_are_refused(stand: Stand, bytes_: tuple[int, ...], code: int) -> None:
+    with pytest.raises(XcpRefused) as refused:
+        stand.drive._master.command(USER, *bytes_)
+    assert refused.value.code == code
+
+
+def test_pulses_are_found_among_the_voltages_of_current_control() -> None:
+    rng = np.random.default_rng(1)
+    u_d, u_q = rng.normal(0.0, 4.0, 300), rng.normal(0.0, 4.0, 300)
+    u_d[100:180] = np.where(np.arange(80) // 10 % 2, -30.0, 30.0) * rng.normal(1.0, 0.002, 80)
+    u_q[100:190] = 0.0
+    u_q[120:190] = 50.0
+    u_d[181:200] = u_q[191:200] = 0.0
+    acts = pulsing(u_d, u_q, 0.1, 0.2)
+    assert np.flatnonzero(acts)[[0, -1]].tolist() == [100, 199]
+    assert pulsing(u_d, u_q, 0.1, 0.0)[100:180].all()
+
+
+@pytest.mark.parametrize("text", [
+    "", "plant.r_ohm_20", "plant.r_ohm_20 x", "plant.r_ohm_20 0.01\nmap 2", "plant.r_ohm_20 0.01\nmap 2 2 0 1 0 1 1",
+    "plant.r_ohm_20 0.01\nmap 1 2 0 0 1 0 0 0 0",
+])  # fmt: skip
+def test_the_virtual_ecu_refuses_what_is_no_machine(text: str, unknown: Motor, tmp_path: Path) -> None:
+    machine = tmp_path / "machine.txt"
+    machine.write_text(text)
+    done = subprocess.run([unknown.folder.vecu, "--fast", "--port", "0", "--bench-port", "0", "--machine", machine],
+                          capture_output=True, text=True, check=False)  # fmt: skip
+    assert done.returncode == 2 and done.stderr.startswith(f"error: --machine {machine}: no machine")
+
+
+@pytest.mark.parametrize("step", ["phases", "spin", "drag", "all"])
+def test_the_shaft_is_not_turned_over_can(
+    step: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "found"
+    options = ["commission", "--motor", str(folder), "--virtual-ecu", "--step", step, "--out", str(out)]
+    assert command(options) == 2
+    assert "allowed over CAN: offsets, resistance, map" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_the_command_writes_a_folder(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "found"
+    options = ["--motor", str(folder), "--virtual-ecu", "--machine", NAME, "--seed", str(SEED), "--step",
+               "offsets,resistance", "--out", str(out)]  # fmt: skip
+    assert command(["commission", *options]) == 0, capsys.readouterr().err
+    assert "resistance:" in (out / "commission.txt").read_text(encoding="utf-8")
+    assert command(["motor", "check", str(out)]) == 0
+
+
+def test_after_a_lost_connection_nothing_is_written(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[VirtualEcu] = []
+
+    class Noted(VirtualEcu):
+        def __init__(self, program: Path, machine: Path | None = None) -> None:
+            super().__init__(program, machine=machine)
+            started.append(self)
+
+    monkeypatch.setattr(on_the_bus, "VirtualEcu", Noted)
+    monkeypatch.setattr(OverTheBus, "_until_ended", lambda drive: (started[0].stop(), drive._state())[1])
+    out = tmp_path / "found"
+    options = ["--motor", str(folder), "--virtual-ecu", "--step", "resistance", "--out", str(out)]
+    assert command(["commission", *options]) == 2
+    said = capsys.readouterr().err
+    assert said.count("error: ") == 1 and "the connection to the inverter is closed" in said
+    assert not list(tmp_path.iterdir())
