@@ -11,6 +11,7 @@
 #define MOVING_STEPS 4      /* the voltage that moved the currents is no part of the mean */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
+#define NOISE_SHIFT 4
 
 /* Products of a sum and a q15: half their size. */
 static int32_t times(int32_t sum, int32_t x)
@@ -34,6 +35,17 @@ static int32_t other_power(const launch_power_in_t *in, int32_t omega)
     return times(in->u_standing.d, in->i_ref.d) + times(in->u_standing.q, in->i_ref.q) - times(omega, torque);
 }
 
+/* (MN-39) */
+static void update_noise(launch_power_state_t *state, int32_t power, bool settled)
+{
+    if (state->steady < MOVING_STEPS) {
+        return; /* a voltage that moves the currents is no noise */
+    }
+    const int32_t noise = fx_min_s32(fx_abs_q31(power - (state->power_q8 >> 8)), UINT16_MAX);
+    state->noise = (uint16_t)mean_step(state->noise, noise, settled ? NOISE_SHIFT : MEAN_SHIFT);
+    state->first_noise = settled ? (uint16_t)mean_step(state->first_noise, state->noise, FIRST_SHIFT) : state->noise;
+}
+
 /* True while there is a power to compare with. */
 static bool update_means(const launch_power_config_t *config, launch_power_state_t *state, const launch_power_in_t *in)
 {
@@ -41,11 +53,13 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     const int32_t omega = moved ? 0 : fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
     state->theta_e = in->theta_e;
     if (moved) {
-        state->i_ref = in->i_ref;
+        state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
         state->steady = 0;
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
-    state->power_q8 = mean_step(state->power_q8, other_power(in, omega) * 256, shift);
+    const int32_t power = other_power(in, omega);
+    update_noise(state, power, state->steady >= config->settle_steps);
+    state->power_q8 = mean_step(state->power_q8, power * 256, shift);
     state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);
     if (state->steady < config->settle_steps) {
         state->steady++;
@@ -65,9 +79,10 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
-    const int32_t v_max = config->v_1 + 2 * times(omega, psi);
+    const int32_t noise = fx_max_s32(state->noise, state->first_noise);
+    const int32_t loss_max = fx_max_s32(times(config->v_1, current), noise * 3 / 2);
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
-    return current > config->i_min && fx_abs_q31(change) > times(v_max, current);
+    return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
 }
 
 uint32_t launch_power_step(const launch_power_config_t *config, launch_power_state_t *state,

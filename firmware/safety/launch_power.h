@@ -6,14 +6,16 @@
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
  *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
- *   |m - m_0| > |i*| (v_1 + |n - n_0|(psi_f/5 + |psi_q|/8)) in a row of steps; no check below |i*| = i_min
- * Source   docs/theory/monitors.md (MN-28), (MN-29)
+ *   r: mean of |p - m|, 16 steps: the noise of the current sensors; r_0 follows it as m_0 follows m
+ *   |m - m_0| > max(|i*| v_1, 3/2 r, 3/2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
+ *   |i*| = i_min
+ * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
  * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; every other argument
  *          begins anew when the angle moves by 1/64 of a turn in a step
  * Rounding 2^-8 of a count of the sum
  * Errors   returns FAULT_ANGLE_OFFSET while it is confirmed; the fast ISR latches it
- * Context  1 kHz task; one square root, no division */
+ * Context  1 kHz task; one square root for each vector length, no division */
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -32,9 +34,10 @@ typedef struct {
 typedef struct {
     int32_t power_q8, first_power_q8;
     int32_t omega_q8, first_omega_q8;
-    dq_q15_t i_ref;
-    uint32_t theta_e;      /* of the last step */
-    uint8_t steady, wrong; /* steps, saturate */
+    dq_q15_halfword_t i_ref;
+    uint32_t theta_e;            /* of the last step */
+    uint16_t noise, first_noise; /* of the power; saturate */
+    uint8_t steady, wrong;       /* steps, saturate */
 } launch_power_state_t;
 
 typedef struct {

@@ -37,7 +37,7 @@ typedef struct {
     q15_t line_emf; /* at the known speed */
     q15_t v_dc;     /* known */
     bool short_circuit;
-    uint8_t rectifying; /* steps in which a current flowed with switching disabled; saturates */
+    uint8_t rectifying;              /* steps in which a current flowed with switching disabled; saturates */
     uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */
     uint16_t unknown_steps;          /* steps without a valid speed and with switching disabled; saturates */
     dq_q15_t i_before;               /* of the last step */
@@ -52,8 +52,8 @@ typedef struct {
     bool shorted;              /* the phases are shorted, as read back */
     bool currents_valid;
     bool speed_valid;
-    bool doubtful;   /* of v_dc: a fault is latched, or the converters' reference reads wrong */
-    bool rectifying; /* a current flows although switching is disabled, as read back */
+    bool doubtful;     /* of v_dc: a fault is latched, or the converters' reference reads wrong */
+    bool rectifying;   /* a current flows although switching is disabled, as read back */
     bool over_voltage; /* latched, and the phases are shorted */
 } safe_state_in_t;
 

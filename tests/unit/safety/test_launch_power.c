@@ -131,6 +131,34 @@ void test_the_voltage_along_the_current_may_change_by_v_1(void)
     TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(-1060));
 }
 
+/* Noise of the sensors as the voltage answers it, the difference of two samples: uniform within +-limit each. */
+static int32_t answered_noise(int32_t limit)
+{
+    static int32_t before;
+    const int32_t now = (rand() % (2 * limit + 1)) - limit, answer = now - before;
+    before = now;
+    return answer;
+}
+
+/* Its mean over 4 steps and m_0 differ by up to 3 v_1. Without noise, and when m_0 has followed, a change of twice v_1
+ * is found again. */
+void test_noise_of_the_current_sensors_is_no_fault_and_hides_nothing_when_it_ends(void)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    in.psi_ref = (dq_q15_t){14418, 20971};
+    for (int n = 0; n < 20000; n++) {
+        in.u_standing.q = answered_noise(3000);
+        in.i_ref.d = (n % 50 == 0) ? 300 : 0; /* begins again now and then */
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    in.u_standing.q = 0;
+    in.i_ref.d = 0;
+    for (int n = 0; n < 20000; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(1060));
+}
+
 void test_a_small_current_is_not_checked(void)
 {
     in.i_ref = (dq_q15_t){0, 819};
