@@ -109,7 +109,8 @@ static bool is_fast(const drive_t *drive, q31_t omega)
     return turns_q60 > (1ULL << 58);
 }
 
-/* With a broken lead the currents are not those of the reference, and neither is the power. */
+/* With a broken lead the currents are not those of the reference, and neither is the power. It is the mean of the step
+ * that counts, because with a wrong angle the currents may oscillate about their reference. */
 static bool is_controlled(const drive_t *drive, dq_q15_t i)
 {
     const dq_q15_t i_ref = drive->task.i_ref;
@@ -122,7 +123,7 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
-        .acting = acting && is_controlled(drive, snapshot->sample.point.i),
+        .acting = acting && is_controlled(drive, mean_current(drive, snapshot)),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,

@@ -68,7 +68,7 @@ def test_the_report_prints_what_is_not_met(out: Path, summary: Any) -> None:
 # One fault that the drive detects at once, at one point: the tests below change what the table says about it.
 ONE = 'fmea = "fmea.csv"\npoints = [[0.2, 0.5]]\n[[machine]]\nmotor = "hsm1"\ncurrent_A = 600\nvdc_V = 500\n'
 DETECTED = (
-    "open,sensor,input open,,plant.current_open_a=1,,{reaction},{expected},{detect},,50,,,60,{status},{witness},,\n"
+    "open,sensor,input open,,plant.current_open_a=1,,{reaction},{expected},{detect},,50,,,,60,{status},{witness},,\n"
 )
 
 

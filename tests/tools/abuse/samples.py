@@ -60,13 +60,13 @@ motor = "paper"
 current_A = 1000
 vdc_V = 500
 """
-FMEA_HEAD = """id,element,failure,setup,injection,points,reaction,expected,detect_ms,torque_Nm,torque_ms,current_share,
-vdc_share,watch_ms,status,witness,result,reference"""
+FMEA_HEAD = """id,element,failure,setup,injection,points,reaction,expected,detect_ms,torque_Nm,torque_ms,against_cm,
+current_share,vdc_share,watch_ms,status,witness,result,reference"""
 FMEA = (
     FMEA_HEAD.replace("\n", "")
     + """
 open,sensor,input open,request=0,plant.current_open_a=1;plant.vdc_gain=x0.7@5..9,rpm>=500;torque!=0,safe_state,\
-over_current,5,,50,,,60,open,paper/0/+,measured,
+over_current,5,,50,,,,60,open,paper/0/+,measured,
 """
 )
 LIST = """device = "CHIP"

@@ -15,8 +15,8 @@ from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 
 COLUMNS: Final = ("id", "element", "failure", "setup", "injection", "points", "reaction", "expected", "detect_ms",
-                  "torque_Nm", "torque_ms", "current_share", "vdc_share", "watch_ms", "status", "witness", "result",
-                  "reference")  # fmt: skip
+                  "torque_Nm", "torque_ms", "against_cm", "current_share", "vdc_share", "watch_ms", "status", "witness",
+                  "result", "reference")  # fmt: skip
 RECORDED: Final = ("status", "witness", "result")  # written by --record
 SAFE_STATE, BOUNDED, KEEP, RAMP = "safe_state", "bounded", "keep", "ramp"
 REACTIONS: Final = (SAFE_STATE, BOUNDED, KEEP, RAMP)
@@ -88,6 +88,7 @@ class Row:
     detect_ms: float
     torque_Nm: float
     torque_ms: float
+    against_cm: float
     current_share: float
     vdc_share: float
     watch_ms: int
@@ -159,8 +160,8 @@ class _Line:
         return Row(
             self.cells["id"], self.cells["element"], self.cells["failure"], self.steps("setup"),
             self.steps("injection"), self.conditions(), reaction, expected, self.number("detect_ms", math.inf),
-            self.number("torque_Nm", math.nan), self.number("torque_ms", 0.0), self.number("current_share", 1.0),
-            self.number("vdc_share", 1.0), int(self.number("watch_ms", 0.0)),
+            self.number("torque_Nm", math.nan), self.number("torque_ms", 0.0), self.number("against_cm", math.nan),
+            self.number("current_share", 1.0), self.number("vdc_share", 1.0), int(self.number("watch_ms", 0.0)),
             self.one_of("status", (MET, OPEN)), self.cells["witness"], self.cells,
         )  # fmt: skip
 

@@ -2,7 +2,8 @@
 """What a run must have done: the simulated machine's torque, current and dc voltage, and the time of the reaction.
 
 Torque is safe between zero and what is requested, widened by max(10 N·m, 5 % of the largest torque); what counts is its
-mean over 5 ms. Losing torque is therefore no harm, too much torque or torque of the wrong sign is.
+mean over 5 ms. Losing torque is therefore no harm, too much torque or torque of the wrong sign is. Where a line bounds
+the movement of the vehicle against the request, wrong torque may last until the fault.
 """
 
 import math
@@ -22,6 +23,7 @@ MEAN_MS: Final = 5.0
 TOLERANCE_NM, TOLERANCE_SHARE = 10.0, 0.05
 CHANGE_MS: Final = 70.0  # a changed request has been followed: slew 40 ms, jerk 10 ms, arrival of the frame 10 ms
 DERATE: Final = 5
+CM_PER_RAD: Final = 32.0 / 9.0  # the assumed vehicle: wheels of 0.32 m behind a gear of 9:1
 Array = NDArray[np.float64]
 
 
@@ -33,6 +35,7 @@ class Verdict:
     detect_ms: float
     harm_ms: float  # end of the last time in which the torque was not safe
     beyond_Nm: float  # largest distance from the safe range
+    against_cm: float  # largest movement of the vehicle against the request until the fault
     current_A: float
     vdc_V: float
     state: int
@@ -79,6 +82,24 @@ def _beyond(trace: Trace, row: Row, tolerance: float, rated_Nm: float) -> Array:
     return np.asarray(outside)
 
 
+def _against_cm(trace: Trace, detect_ms: float) -> float:
+    """The largest movement of the vehicle against the request, from the injection to the fault or the end."""
+    time, angle = trace.time_ms, np.unwrap(trace["truth.theta_m_rad"])
+    until = (time > 0.0) & (time <= (math.inf if math.isnan(detect_ms) else detect_ms))
+    moved = np.sign(trace.requested_Nm[1]) * (angle[until] - angle[time <= 0.0][-1])
+    return float(CM_PER_RAD * max(0.0, -moved.min(initial=0.0)))
+
+
+def _departs(trace: Trace, row: Row, v: dict[str, Any], tolerance: float, beyond: Array) -> bool:
+    """Whether the torque leaves its tolerance before the fault: of the present torque, of a changed request."""
+    before_fault = trace.time_ms < (math.inf if math.isnan(v["detect_ms"]) else v["detect_ms"])
+    if trace.requested_Nm[0] != trace.requested_Nm[1]:
+        return bool((beyond[before_fault] > 0.0).any())
+    torque = trace["truth.torque_shaft_mean_Nm"]
+    error = np.abs(_mean(torque, trace.period_s) - float(torque[trace.time_ms <= 0.0].mean()))
+    return bool((error[before_fault & (trace.time_ms > row.torque_ms)] > tolerance).any())
+
+
 def _about_fault(row: Row, v: dict[str, Any], departs: bool) -> str:
     """What is wrong with the detection; empty: nothing."""
     said = f"{v['first_fault']} after {v['detect_ms']:.1f} ms" if v["first_fault"] else "no fault"
@@ -92,7 +113,10 @@ def _about_fault(row: Row, v: dict[str, Any], departs: bool) -> str:
 
 def _complaints(row: Row, bounds: Bounded, v: dict[str, Any], departs: bool) -> list[str]:
     found = [said] if (said := _about_fault(row, v, departs)) else []
-    if v["harm_ms"] > row.torque_ms:
+    if v["against_cm"] > row.against_cm:
+        found.append(f"{v['against_cm']:.1f} cm against the request")
+    until_ms = row.torque_ms if math.isnan(row.against_cm) else v["detect_ms"] + MEAN_MS
+    if v["harm_ms"] > until_ms:
         found.append(f"torque {v['beyond_Nm']:.1f} N·m beyond its safe range until {v['harm_ms']:.0f} ms")
     if row.reaction == KEEP and not v["first_fault"] and v["state"] not in (RUN, DERATE):
         found.append(f"left state run for state {v['state']}")
@@ -116,15 +140,12 @@ def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Tr
         "detect_ms": detect_ms,
         "harm_ms": float(trace.time_ms[hits[-1]]) if hits.size else 0.0,
         "beyond_Nm": float(beyond.max()),
+        "against_cm": _against_cm(trace, detect_ms),
         "current_A": float(current.max()),
         "vdc_V": float(trace["truth.vdc_V"][after].max()),
         "state": trace.ecu[-1][2],
     }
-    mean = _mean(trace["truth.torque_shaft_mean_Nm"], trace.period_s)
-    before = float(trace["truth.torque_shaft_mean_Nm"][~after].mean())
-    unnoticed = (trace.time_ms > row.torque_ms) & (trace.time_ms < (math.inf if math.isnan(detect_ms) else detect_ms))
-    departs = bool((np.abs(mean - before)[unnoticed] > tolerance).any())
-    why = _complaints(row, bounds, measured, departs)
+    why = _complaints(row, bounds, measured, _departs(trace, row, measured, tolerance, beyond))
     if not np.isfinite(trace.rows).all():
         why.append("the simulation lost its numbers")
     verdict = Verdict(**measured, met=not why, why="; ".join(why))
