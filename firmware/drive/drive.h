@@ -72,9 +72,11 @@ typedef enum { RUN_STATE_LIST(RUN_STATE_VALUE) } run_state_t;
 
 /** The active short circuit at the bridge (drive/short_circuit.h). */
 typedef enum {
-    SHORT_CIRCUIT_LOWER = 0, /* by the lower switches, */
-    SHORT_CIRCUIT_UPPER = 1, /* by the upper ones, because the gate drivers ended the first, */
-    SHORT_CIRCUIT_NONE = 2   /* or by none, because they ended both */
+    SHORT_CIRCUIT_LOWER = 0,      /* by the lower switches, */
+    SHORT_CIRCUIT_UPPER = 1,      /* by the upper ones, because the currents want it (safety/short_side.h), */
+    SHORT_CIRCUIT_LAST_LOWER = 2, /* by either because the gate drivers ended the other, */
+    SHORT_CIRCUIT_LAST_UPPER = 3,
+    SHORT_CIRCUIT_NONE = 4 /* or by none, because they ended both */
 } short_circuit_side_t;
 
 typedef struct {
@@ -166,6 +168,7 @@ typedef struct {
     pulsing_t pulsing;
     safe_state_state_t safe_state;
     gate_fault_state_t gate_fault;
+    short_side_state_t short_side;
     switch_off_t switch_off;
     recall_t recall;
     bool armed;                     /* has run since the safe state was last freewheel: the bridge is powered */

@@ -73,6 +73,7 @@ typedef struct {
     current_target_t target;
     uint8_t run; /* BRIDGE_... */
     safe_t safe;
+    bool upper;            /* the short circuit is made by the upper switches */
     uint32_t faults;       /* found by the task; latched by the fast ISR, which alone writes the fault word */
     uint32_t fault_resets; /* counts up: the fast ISR clears its faults once for each count */
     FX_PADDING_WORD;

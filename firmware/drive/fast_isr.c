@@ -40,10 +40,10 @@ static void reset_control(drive_t *drive, sample_t *sample)
 }
 
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
-static void apply_safe_state(drive_t *drive, sample_t *sample, safe_t safe)
+static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command)
 {
-    if (short_circuit_is_needed(drive->fast.faults, safe)) {
-        short_circuit_apply(&drive->fast);
+    if (short_circuit_is_needed(drive->fast.faults, command->safe)) {
+        short_circuit_apply(&drive->fast, command->upper);
     } else {
         short_circuit_end(&drive->fast);
     }
@@ -213,7 +213,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
         }
-        apply_safe_state(drive, sample, command->safe);
+        apply_safe_state(drive, sample, command);
     }
     fast->is_settled = !turning && fast->periods_since_enable >= PERIODS_TO_ACT && fast->monitor.pending == 0U;
     publish_sample(drive, sample);

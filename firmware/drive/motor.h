@@ -25,6 +25,7 @@
 #include "safety/monitor.h"
 #include "safety/plausibility.h"
 #include "safety/safe_state.h"
+#include "safety/short_side.h"
 #include "safety/torque_monitor.h"
 #include "second_level/constants.h"
 #include "types/bases.h"

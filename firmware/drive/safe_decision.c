@@ -95,3 +95,8 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     }
     return on_faults(by_gate, !over_voltage && charges_link(drive, snapshot));
 }
+
+bool safe_decision_is_upper(const drive_t *drive)
+{
+    return short_side_is_upper(&drive->task.short_side, drive->motor->plausibility.i_dead);
+}

@@ -10,4 +10,7 @@
 
 safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot);
 
+/** Whether the short circuit would be made by the upper switches. */
+bool safe_decision_is_upper(const drive_t *drive);
+
 #endif

@@ -6,17 +6,31 @@
 #define DUTY_MIDDLE 16384U
 #define DUTY_UPPER 32768U
 
-void short_circuit_apply(fast_state_t *fast)
+/* The gate drivers have ended the short circuit by this side. */
+static short_circuit_side_t side_after(short_circuit_side_t side)
+{
+    if (side == SHORT_CIRCUIT_LOWER) {
+        return SHORT_CIRCUIT_LAST_UPPER;
+    }
+    return (side == SHORT_CIRCUIT_UPPER) ? SHORT_CIRCUIT_LAST_LOWER : SHORT_CIRCUIT_NONE;
+}
+
+void short_circuit_apply(fast_state_t *fast, bool upper)
 {
     short_circuit_t *state = &fast->short_circuit;
     if (state->holds && !hal_pwm_gates()) {
-        state->side = (state->side == SHORT_CIRCUIT_LOWER) ? SHORT_CIRCUIT_UPPER : SHORT_CIRCUIT_NONE;
+        state->side = side_after(state->side);
+    } else if (upper && state->side == SHORT_CIRCUIT_LOWER) {
+        state->side = SHORT_CIRCUIT_UPPER;
+    } else {
+        /* as before */
     }
     if (state->side == SHORT_CIRCUIT_NONE) {
         short_circuit_end(fast);
         return;
     }
-    const uint16_t duty = (state->side == SHORT_CIRCUIT_UPPER) ? DUTY_UPPER : 0U;
+    const bool by_upper = state->side == SHORT_CIRCUIT_UPPER || state->side == SHORT_CIRCUIT_LAST_UPPER;
+    const uint16_t duty = by_upper ? DUTY_UPPER : 0U;
     hal_pwm_write((duty_t){duty, duty, duty});
     hal_pwm_enable(true); /* with the duties, not before them */
     state->holds = hal_pwm_gates();

@@ -5,13 +5,14 @@
  *   The gates are read back. If those that were on are off a period later, the gate drivers have ended the short
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
- *   disabled.
+ *   disabled. The task may want the upper switches from the first, or while the lower ones are on: its wish counts as
+ *   long as no side has been ended.
  *   While the fault line is active nothing can be switched on: that is no failure of a side.
- * Source   docs/theory/safe-state.md (SS-11)
+ * Source   docs/theory/safe-state.md (SS-11), (SS-20)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
-void short_circuit_apply(fast_state_t *fast);
+void short_circuit_apply(fast_state_t *fast, bool upper);
 
 /** No short circuit any more: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);

@@ -103,10 +103,15 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
 
 /* The field turns by more than a quarter of a turn in a step. Whether the angle stands still follows from the angles at
  * the steps, which are also equal where a step has a whole number of turns. */
-static bool is_fast(const drive_t *drive, q31_t omega)
+static bool is_fast(uint64_t turns_q60)
 {
-    const uint64_t turns_q60 = (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;
     return turns_q60 > (1ULL << 58);
+}
+
+/* Of the field in a step. */
+static uint64_t turns_of_step_q60(const drive_t *drive, q31_t omega)
+{
+    return (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;
 }
 
 /* With a broken lead the currents are not those of the reference, and neither is the power. It is the mean of the step
@@ -132,14 +137,36 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }
 
+/* The second harmonic of a half wave turns by almost a whole number of turns in a step: it would look constant. */
+static bool is_second_harmonic_constant(uint64_t turns_q60)
+{
+    const uint64_t part = (2U * turns_q60 + (1ULL << 55)) & ((1ULL << 60) - 1U);
+    return part < 1ULL << 56; /* within 1/32 of a turn */
+}
+
+/* Not a monitor: what a fault would need. In the short circuit the decision of the last step before it holds. */
+static void watch_sides(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+{
+    const sample_t *sample = &snapshot->sample;
+    const short_side_in_t in = {
+        .acting = sample->acting && !is_second_harmonic_constant(turns_of_step_q60(drive, sample->point.omega)),
+        .shorted = snapshot->shorted,
+        .i = measure_phases(sample->i_ab, sample->zero_q28),
+        .i_ref = phases_ref,
+    };
+    short_side_step(&drive->task.short_side, &in);
+}
+
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
     const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
     const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
-    const bool acting = !is_compensation_new(drive) && is_window_new && !is_fast(drive, snapshot->sample.point.omega);
+    const bool acting = !is_compensation_new(drive) && is_window_new &&
+                        !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     uint32_t faults = check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) | shorted;
     faults |= check_angle(drive, snapshot, phases_ref, acting);
     faults |= check_launch(drive, snapshot, acting);
+    watch_sides(drive, snapshot, phases_ref);
     return faults;
 }

@@ -182,6 +182,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
         reset_torque_path(drive);
     }
     command.safe = safe_decision_step(drive, snapshot);
+    command.upper = safe_decision_is_upper(drive);
     command_box_write(&drive->commands, command);
 }
 

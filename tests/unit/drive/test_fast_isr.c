@@ -141,6 +141,42 @@ void test_a_fault_shorts_the_phases_in_the_same_period_if_the_task_has_decided_s
     expect_shorted(true);
 }
 
+static void want_upper_switches(bool upper)
+{
+    command_t command = *command_box_read(&drive.commands);
+    command.upper = upper;
+    command_box_write(&drive.commands, command);
+}
+
+/* The task has found a constant current: by the upper switches at once, or from the lower ones to the upper ones. There
+ * is no way back, and what the gate drivers end counts for more. */
+void test_the_task_may_want_the_short_circuit_by_the_upper_switches(void)
+{
+    seam_run();
+    seam_periods(3);
+    write_command(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
+    seam_period();
+    expect_shorted(true);
+    want_upper_switches(true);
+    seam_period();
+    expect_shorted_by_the_upper_switches();
+    TEST_ASSERT_TRUE(drive_is_shorted(&drive));
+    want_upper_switches(false);
+    seam_period();
+    expect_shorted_by_the_upper_switches();
+    want_upper_switches(true);
+    seam.gates_blocked = true;
+    seam_period();
+    expect_shorted(true);
+    seam.gates_blocked = false;
+    seam_period();
+    expect_shorted(true);
+    seam.gates_blocked = true;
+    seam_period();
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(16384, seam.duty.a);
+}
+
 /* The gate drivers block the short circuit by the lower switches one period after it was on, because one of the upper
  * switches is shorted. They block that by the upper switches, too, so that switching is disabled. After a reset both
  * sides are tried again. */

@@ -300,6 +300,35 @@ void test_a_sample_from_before_the_bridge_acted_is_no_part_of_a_standing_angle(v
     TEST_ASSERT_EQUAL_INT(0, drive.task.frozen_angle.standing);
 }
 
+/* A constant current out of phase a, for 60 steps at this speed; whether the upper switches are commanded then. */
+static bool upper_after_constant_current(double omega_pu, bool acting, bool shorted)
+{
+    const snapshot_t snapshot = {
+        .sample = {.acting = acting, .i_ab = fx_pair(3000, 0), .point = {.omega = (q31_t)(omega_pu * 2147483648.0)}},
+        .shorted = shorted,
+    };
+    for (int n = 0; n < 60; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    task_1khz(&drive);
+    return command()->upper;
+}
+
+/* Half a turn in a step makes the second harmonic of a half wave constant. */
+void test_a_constant_current_commands_the_upper_switches_unless_it_may_be_a_harmonic(void)
+{
+    seam_run();
+    seam.motor.identify.window_turns_q29 = 1U << 29; /* at the speed base */
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_TRUE(upper_after_constant_current(0.1 * sign, true, false));
+        TEST_ASSERT_FALSE(upper_after_constant_current(0.01 * sign, true, false));
+        TEST_ASSERT_TRUE(upper_after_constant_current(0.48 * sign, true, false));
+        TEST_ASSERT_FALSE(upper_after_constant_current(0.49 * sign, true, false));
+        TEST_ASSERT_FALSE(upper_after_constant_current(0.51 * sign, true, false));
+        TEST_ASSERT_TRUE(upper_after_constant_current(0.52 * sign, true, false));
+    }
+}
+
 /* Leaving torque at speed. */
 
 /* hsm1: the short circuit is the safe state above 0.77 of the speed base, which is 10 500 rpm. */
