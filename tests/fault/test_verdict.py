@@ -34,7 +34,7 @@ def row(**cells: str) -> Row:
 
 
 def trace(fault_ms: float = 5.0, torque: Any = None, amperes: float = 200.0, volts: float = 350.0,
-          requested: tuple[float, float] = (60.0, 60.0), state: int = 6) -> Trace:  # fmt: skip
+          requested: tuple[float, float] = (60.0, 60.0), state: int = 6, rad_s: float = 0.0) -> Trace:  # fmt: skip
     """A recorded run: 60 N·m until fault_ms, then no torque; from there on the fault over_current."""
     count = round((BEFORE_MS + AFTER_MS) / STEP_MS)
     time = (np.arange(count) + 1) * STEP_MS - BEFORE_MS
@@ -42,6 +42,7 @@ def trace(fault_ms: float = 5.0, torque: Any = None, amperes: float = 200.0, vol
     made = np.where(time < fault_ms, 60.0, 0.0) if torque is None else torque(time)
     columns = {"truth.torque_shaft_mean_Nm": made, "truth.i_d_A": -amperes, "truth.vdc_V": volts,
                "fault_word": np.where(time >= fault_ms, 1.0, 0.0)}  # fmt: skip
+    columns["truth.theta_m_rad"] = (rad_s * 1e-3 * time + math.pi) % (2.0 * math.pi)
     for name, values in columns.items():
         rows[:, CHANNELS.index(name)] = values
     return Trace(STEP_MS * 1e-3, rows, requested, [(ms + 1.0, 0, state) for ms in range(AFTER_MS)])
@@ -104,6 +105,33 @@ def test_an_error_of_torque_may_be_bounded_instead_of_detected() -> None:
     assert verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 52.0)))["met"]
     assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 45.0)))["met"]
     assert verdict(line, trace(fault_ms=8.0, torque=lambda t: np.where(t < 0, 60.0, 0.0)))["met"]
+
+
+def launch(torque_Nm: float, rad_s: float, fault_ms: float = math.inf) -> Trace:
+    """60 N·m are requested of a machine without torque; this torque follows, until the fault."""
+    return trace(fault_ms, lambda t: torque_Nm * ((t > 0.0) & (t < fault_ms)), requested=(0.0, 60.0), rad_s=rad_s)
+
+
+def test_torque_between_zero_and_a_new_request_needs_no_fault() -> None:
+    line = row(reaction="bounded", detect_ms="", torque_ms="200")
+    assert verdict(line, launch(20.0, 0.0))["met"]
+    assert verdict(line, launch(69.0, 0.0))["met"]
+    assert "no fault" in verdict(line, launch(71.0, 0.0))["why"]
+    assert "no fault" in verdict(line, launch(-11.0, 0.0))["why"]
+    assert verdict(line, launch(-11.0, 0.0, 150.0))["met"]
+
+
+def test_a_movement_against_the_request_is_bounded_until_the_fault() -> None:
+    """3.556 cm per radian: -10 rad/s is 5 cm after 140.6 ms. 20 rad/s are one and a half turns of the rotor."""
+    line = row(reaction="bounded", detect_ms="", torque_ms="", against_cm="5")
+    assert verdict(line, launch(-30.0, -10.0, 140.0))["met"]
+    assert verdict(line, launch(-30.0, -10.0, 142.0))["why"] == "5.0 cm against the request"
+    assert verdict(line, launch(-5.0, -10.0))["why"] == "7.1 cm against the request"
+    assert verdict(line, launch(-5.0, -50.0))["against_cm"] == pytest.approx(35.6, abs=0.1)
+    assert verdict(line, launch(20.0, 50.0))["met"]
+    assert (
+        "torque" in verdict(line, trace(100.0, lambda t: np.where(t > 0.0, -30.0, 0.0), requested=(0.0, 60.0)))["why"]
+    )
 
 
 def test_a_lost_command_must_end_in_no_torque_without_a_fault() -> None:
