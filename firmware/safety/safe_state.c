@@ -5,6 +5,7 @@
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
 #define FALL_SHIFT 6 /* of the known dc voltage: 64 steps */
+#define RELEASE_STEPS 200 /* several time constants of a shorted machine */
 #define UNKNOWN_STEPS 20000U /* 18 to 22.5 s: a step is 0.89 to 1.125 ms */
 
 /* Q30; below 2^31 + 1 for every argument. */
@@ -19,10 +20,15 @@ static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
     return squared(fx_sat_q15(now.d - before.d), fx_sat_q15(now.q - before.q)) < squared(now.d / part, now.q / part);
 }
 
+static bool lasts(uint8_t *steps, bool again, int32_t wanted)
+{
+    *steps = again ? (uint8_t)fx_min_s32(*steps + 1, wanted) : (uint8_t)0;
+    return *steps == wanted;
+}
+
 static bool confirmed(uint8_t *steps, bool again)
 {
-    *steps = again ? (uint8_t)fx_min_s32(*steps + 1, CONFIRMED_STEPS) : (uint8_t)0;
-    return *steps == CONFIRMED_STEPS;
+    return lasts(steps, again, CONFIRMED_STEPS);
 }
 
 /* The short circuit's currents are too small for a machine that turns (SS-7), whatever the angle says. */
@@ -37,9 +43,10 @@ static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *st
 static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool checked = in->shorted && in->currents_valid;
-    const bool steady = is_steady(in->i, state->i_before, 4) && is_steady(in->i, in->i_last_period, 8);
+    const bool steady = is_steady(in->i, (dq_q15_t){state->i_before.d, state->i_before.q}, 4) &&
+                        is_steady(in->i, in->i_last_period, 8);
     const bool agreed = confirmed(&state->steady, checked && steady);
-    state->i_before = in->i;
+    state->i_before = (dq_q15_halfword_t){(q15_t)in->i.d, (q15_t)in->i.q};
     return in->speed_valid && (!checked || agreed);
 }
 
@@ -84,5 +91,6 @@ bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *stat
     const q15_t share = lower_level ? config->share_open : config->share_short;
     const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);
     state->short_circuit = rectifies;
-    return rectifies || (in->over_voltage && in->v_dc > config->v_release);
+    const bool released = lasts(&state->low, in->over_voltage && in->v_dc <= config->v_release, RELEASE_STEPS);
+    return rectifies || (in->over_voltage && !released);
 }

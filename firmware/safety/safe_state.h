@@ -9,8 +9,9 @@
  *   v_dc is the known dc voltage: it rises with the measured one and falls in 64 steps; while a fault is latched or
  *   the converters' reference reads wrong, only if a current has flowed for 20 steps although switching is disabled.
  *   A sensor that has failed looks like a link that is empty; the diodes tell them apart.
- *   A short circuit that is on with a latched over-voltage lasts until v_dc is below v_release, and is then not closed
- *   again for the same over-voltage.
+ *   A short circuit that is on with a latched over-voltage lasts until the measured v_dc has been below v_release for
+ *   200 steps, in which the first currents decay that would charge the link again, and is then not closed again for the
+ *   same over-voltage.
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle
@@ -37,10 +38,11 @@ typedef struct {
     q15_t line_emf; /* at the known speed */
     q15_t v_dc;     /* known */
     bool short_circuit;
-    uint8_t rectifying;              /* steps in which a current flowed with switching disabled; saturates */
+    uint8_t rectifying; /* steps in which a current flowed with switching disabled; saturates */
+    uint8_t low; /* steps in which v_dc was below v_release in a short circuit after an over-voltage; saturates */
     uint8_t steady, without_current; /* steps in which the short circuit's currents were so; saturate */
     uint16_t unknown_steps;          /* steps without a valid speed and with switching disabled; saturates */
-    dq_q15_t i_before;               /* of the last step */
+    dq_q15_halfword_t i_before;      /* of the last step */
 } safe_state_state_t;
 
 typedef struct {

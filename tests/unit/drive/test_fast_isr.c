@@ -291,7 +291,9 @@ void test_an_over_voltage_shorts_the_phases_if_the_task_has_decided_so(void)
     seam_periods(30); /* the task keeps the short circuit while the voltage is high */
     expect_shorted(true);
     seam_voltage(350.0);
-    seam_periods(30);
+    seam_periods(1950); /* for 200 steps with a low voltage, too */
+    expect_shorted(true);
+    seam_periods(80);
     expect_shorted(false);
 }
 

@@ -403,7 +403,13 @@ void test_a_short_circuit_after_an_over_voltage_lasts_at_any_speed_until_the_vol
     in.v_dc = 24001;
     TEST_ASSERT_TRUE(at(0.0));
     in.v_dc = 24000;
-    TEST_ASSERT_FALSE(at(0.0));
+    TEST_ASSERT_TRUE(steps(199));
+    in.v_dc = 24001;
+    TEST_ASSERT_TRUE(steps(1));
+    in.v_dc = 24000;
+    TEST_ASSERT_TRUE(steps(199));
+    TEST_ASSERT_FALSE(steps(1));
+    TEST_ASSERT_FALSE(steps(1000));
 }
 
 void test_no_argument_wraps(void)
