@@ -12,6 +12,7 @@
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
 #define NOISE_SHIFT 4
+#define NOISE_MAX 8 /* times v_1: of one step, in which the currents may change without the reference */
 
 /* Products of a sum and a q15: half their size. */
 static int32_t times(int32_t sum, int32_t x)
@@ -36,12 +37,13 @@ static int32_t other_power(const launch_power_in_t *in, int32_t omega)
 }
 
 /* (MN-39) */
-static void update_noise(launch_power_state_t *state, int32_t power, bool settled)
+static void update_noise(const launch_power_config_t *config, launch_power_state_t *state, int32_t power, bool settled)
 {
     if (state->steady < MOVING_STEPS) {
         return; /* a voltage that moves the currents is no noise */
     }
-    const int32_t noise = fx_min_s32(fx_abs_q31(power - (state->power_q8 >> 8)), UINT16_MAX);
+    const int32_t largest = NOISE_MAX * times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
+    const int32_t noise = fx_min_s32(fx_abs_q31(power - (state->power_q8 >> 8)), fx_min_s32(largest, UINT16_MAX));
     state->noise = (uint16_t)mean_step(state->noise, noise, settled ? NOISE_SHIFT : MEAN_SHIFT);
     state->first_noise = settled ? (uint16_t)mean_step(state->first_noise, state->noise, FIRST_SHIFT) : state->noise;
 }
@@ -58,7 +60,7 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     }
     const int shift = (state->steady < MOVING_STEPS) ? 0 : MEAN_SHIFT;
     const int32_t power = other_power(in, omega);
-    update_noise(state, power, state->steady >= config->settle_steps);
+    update_noise(config, state, power, state->steady >= config->settle_steps);
     state->power_q8 = mean_step(state->power_q8, power * 256, shift);
     state->omega_q8 = mean_step(state->omega_q8, omega * 256, shift);
     if (state->steady < config->settle_steps) {

@@ -6,7 +6,8 @@
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
  *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
- *   r: mean of |p - m|, 16 steps: the noise of the current sensors; r_0 follows it as m_0 follows m
+ *   r: mean of |p - m|, 16 steps, of each step at most 8 |i*| v_1: the noise of the current sensors; r_0 follows it as
+ *   m_0 follows m
  *   |m - m_0| > max(|i*| v_1, 3/2 r, 3/2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
  *   |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39)

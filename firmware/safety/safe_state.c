@@ -5,6 +5,7 @@
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
 #define FALL_SHIFT 6 /* of the known dc voltage: 64 steps */
+#define RECTIFYING_STEPS 10 /* longer than the currents last that the dc link opposes (SS-10) */
 #define RELEASE_STEPS 200 /* several time constants of a shorted machine */
 #define UNKNOWN_STEPS 20000U /* 18 to 22.5 s: a step is 0.89 to 1.125 ms */
 
@@ -73,7 +74,7 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
  * Afterwards the diodes decide: a link whose voltage is really below the back-EMF draws a current. */
 static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
 {
-    const bool rectifies = confirmed(&state->rectifying, in->rectifying);
+    const bool rectifies = lasts(&state->rectifying, in->rectifying, RECTIFYING_STEPS);
     if (in->v_dc >= state->v_dc || rectifies) {
         state->v_dc = in->v_dc;
     } else if (!in->doubtful) {

@@ -7,7 +7,7 @@
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
  *   valid speed 0.8 v_dc is the only level
  *   v_dc is the known dc voltage: it rises with the measured one and falls in 64 steps; while a fault is latched or
- *   the converters' reference reads wrong, only if a current has flowed for 20 steps although switching is disabled.
+ *   the converters' reference reads wrong, only if a current has flowed for 10 steps although switching is disabled.
  *   A sensor that has failed looks like a link that is empty; the diodes tell them apart.
  *   A short circuit that is on with a latched over-voltage lasts until the measured v_dc has been below v_release for
  *   200 steps, in which the first currents decay that would charge the link again, and is then not closed again for the

@@ -18,7 +18,7 @@ static safe_state_state_t any_state(void)
     safe_state_state_t s;
     s.short_circuit = nondet_bool();
     ASSUME(s.speed >= 0 && s.steady <= CONFIRMED_STEPS && s.without_current <= CONFIRMED_STEPS);
-    ASSUME(s.rectifying <= CONFIRMED_STEPS);
+    ASSUME(s.rectifying <= RECTIFYING_STEPS);
     ASSUME(IS_Q15(s.i_before.d) && IS_Q15(s.i_before.q));
     return s;
 }
@@ -89,8 +89,8 @@ void proof_known_voltage_is_kept_with_a_fault(void)
     const q15_t before = s.v_dc;
     const uint8_t rectified = s.rectifying;
     follow_voltage(&s, &in);
-    const bool by_diodes = in.rectifying && rectified + 1 >= CONFIRMED_STEPS;
+    const bool by_diodes = in.rectifying && rectified + 1 >= RECTIFYING_STEPS;
     PROVE(s.v_dc >= in.v_dc);
     PROVE(!in.doubtful || by_diodes || s.v_dc >= before);
-    PROVE(s.rectifying <= CONFIRMED_STEPS);
+    PROVE(s.rectifying <= RECTIFYING_STEPS);
 }
