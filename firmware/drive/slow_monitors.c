@@ -114,13 +114,20 @@ static uint64_t turns_of_step_q60(const drive_t *drive, q31_t omega)
     return (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;
 }
 
-/* With a broken lead the currents are not those of the reference, and neither is the power. It is the mean of the step
- * that counts, because with a wrong angle the currents may oscillate about their reference. */
-static bool is_controlled(const drive_t *drive, dq_q15_t i)
+static bool is_near_reference(const drive_t *drive, dq_q15_t i)
 {
     const dq_q15_t i_ref = drive->task.i_ref;
     const int32_t i_0 = drive->motor->torque_monitor.i_0;
     return fx_abs_q31(i.d - i_ref.d) < i_0 && fx_abs_q31(i.q - i_ref.q) < i_0;
+}
+
+/* With a broken lead the currents are not those of the reference, and neither is the power: the sample and the mean of
+ * the step are off. With a wrong angle single samples may be, because the currents oscillate about their reference;
+ * after a jump of the sensors' gain the mean of one step is. */
+static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
+{
+    return is_near_reference(drive, snapshot->sample.point.i) ||
+           is_near_reference(drive, mean_current(drive, snapshot));
 }
 
 /* After check_angle(), which takes the flux out of the voltage. */
@@ -128,7 +135,7 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
-        .acting = acting && is_controlled(drive, mean_current(drive, snapshot)),
+        .acting = acting && is_controlled(drive, snapshot),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,

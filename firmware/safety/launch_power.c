@@ -42,8 +42,12 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     if (state->steady < MOVING_STEPS) {
         return; /* a voltage that moves the currents is no noise */
     }
+    const int32_t deviation = power - (state->power_q8 >> 8);
+    const bool above = deviation > 0;
     const int32_t largest = NOISE_MAX * times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
-    const int32_t noise = fx_min_s32(fx_abs_q31(power - (state->power_q8 >> 8)), fx_min_s32(largest, UINT16_MAX));
+    const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(largest, UINT16_MAX));
+    const int32_t noise = (above != state->above) ? limited : 0; /* behind a change the mean is on one side of it */
+    state->above = above;
     state->noise = (uint16_t)mean_step(state->noise, noise, settled ? NOISE_SHIFT : MEAN_SHIFT);
     state->first_noise = settled ? (uint16_t)mean_step(state->first_noise, state->noise, FIRST_SHIFT) : state->noise;
 }
@@ -82,7 +86,7 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
     const int32_t noise = fx_max_s32(state->noise, state->first_noise);
-    const int32_t loss_max = fx_max_s32(times(config->v_1, current), noise * 3 / 2);
+    const int32_t loss_max = fx_max_s32(times(config->v_1, current), 2 * noise);
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
     return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
 }

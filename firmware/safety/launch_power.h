@@ -6,9 +6,9 @@
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
  *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
- *   r: mean of |p - m|, 16 steps, of each step at most 8 |i*| v_1: the noise of the current sensors; r_0 follows it as
- *   m_0 follows m
- *   |m - m_0| > max(|i*| v_1, 3/2 r, 3/2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
+ *   r: mean over 16 steps of |p - m| where p - m has changed its sign, else 0, of each step at most 8 |i*| v_1: the
+ *   noise of the current sensors; r_0 follows it as m_0 follows m
+ *   |m - m_0| > max(|i*| v_1, 2 r, 2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
  *   |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
@@ -38,6 +38,7 @@ typedef struct {
     dq_q15_halfword_t i_ref;
     uint32_t theta_e;            /* of the last step */
     uint16_t noise, first_noise; /* of the power; saturate */
+    bool above;                  /* p - m was positive in the last step */
     uint8_t steady, wrong;       /* steps, saturate */
 } launch_power_state_t;
 

@@ -310,6 +310,7 @@ static bool upper_after_constant_current(double omega_pu, bool acting, bool shor
     for (int n = 0; n < 60; n++) {
         (void)slow_monitors_step(&drive, &snapshot);
     }
+    sample_at(omega_pu, acting, false);
     task_1khz(&drive);
     return command()->upper;
 }
