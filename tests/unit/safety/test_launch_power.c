@@ -228,8 +228,10 @@ static double twin_step(twin_t *t)
     }
     follow(&t->p, &t->p_0, p, t->steady);
     follow(&t->w, &t->w_0, w, t->steady);
-    const double v_max = 530.0 + 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
-    const double beyond = fabs(t->p - t->p_0) - v_max * hypot(i_d, i_q) / 65536.0;
+    const double v_turning = 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
+    const double noise = fmax(state.noise, state.first_noise); /* of the firmware: it has tests of its own above */
+    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, 2.0 * noise);
+    const double beyond = fabs(t->p - t->p_0) - loss_max - v_turning * hypot(i_d, i_q) / 65536.0;
     if (t->steady < SETTLED) {
         t->steady++;
         return -100.0;
@@ -306,7 +308,7 @@ void test_a_change_of_just_the_threshold_is_none(void)
 {
     for (int beyond = 0; beyond <= 1; beyond++) {
         in.i_ref = (dq_q15_t){0, 13107};
-        state = (launch_power_state_t){.first_power_q8 = -27142 - 256 * beyond, .i_ref = in.i_ref, .steady = SETTLED};
+        state = (launch_power_state_t){.first_power_q8 = -27142 - 256 * beyond, .i_ref = {0, 13107}, .steady = SETTLED};
         TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
         TEST_ASSERT_EQUAL_UINT8(beyond, state.wrong);
     }
