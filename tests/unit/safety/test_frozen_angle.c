@@ -312,7 +312,8 @@ static int32_t uniform(int32_t lo, int32_t hi)
 {
     static uint32_t x = 1;
     x = 1664525U * x + 1013904223U;
-    return lo + (int32_t)(((uint64_t)x * (uint32_t)(hi - lo + 1)) >> 32);
+    const uint32_t values = (uint32_t)hi - (uint32_t)lo + 1U;
+    return (int32_t)((uint32_t)lo + (uint32_t)(((uint64_t)x * values) >> 32));
 }
 
 /* Means are rounded down by 3/256 at most, their references by 4 counts. */
