@@ -50,7 +50,7 @@ def test_the_losses_are_those_of_the_machine(hsm1: Motor, reported: Losses, spee
     assert at(reported, reported.iron_W, torque_Nm, speed_rpm) == pytest.approx(iron_W, rel=0.08)
 
 
-@pytest.mark.parametrize("speed_rpm", [8500, 10000])
+@pytest.mark.parametrize("speed_rpm", [9500, 10000])
 def test_the_short_circuit_is_that_of_the_machine(hsm1: Motor, speed_rpm: float) -> None:
     found = short_circuit(load_motor(FOLDER))
     with driving(hsm1, speed_rpm, 20.0) as loop:
