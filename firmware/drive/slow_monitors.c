@@ -130,10 +130,21 @@ static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
            is_near_reference(drive, mean_current(drive, snapshot));
 }
 
+/* A prediction replaces a sample that no rotor can have (AT-14), and a rotor that stops within milliseconds may look
+ * like one (AT-17): while the currents follow the prediction, their power says nothing about the sensor. */
+static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
+{
+    const angle_tracker_config_t *tracker = &drive->period.angle_tracker;
+    return sample->theta_e == sample->theta_m * tracker->pole_pairs + tracker->offset;
+}
+
 /* After check_angle(), which takes the flux out of the voltage. */
 static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting)
 {
     task_state_t *task = &drive->task;
+    if (acting && !is_angle_measured(drive, &snapshot->sample)) {
+        return 0; /* the comparison waits, for 5 ms at most */
+    }
     const launch_power_in_t in = {
         .acting = acting && is_controlled(drive, snapshot),
         .u_standing = task->frozen_angle.u_standing,

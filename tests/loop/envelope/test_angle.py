@@ -81,6 +81,19 @@ def test_a_rotor_that_is_blocked_within_milliseconds_keeps_its_torque(hsm1: Moto
     assert np.abs(np.concatenate([stop.torque, after.torque]) - before).max() <= 5.0
 
 
+@pytest.mark.parametrize("later_ms", [0.0, 3.0])
+@pytest.mark.parametrize("torque", [-120.0, 30.0, 100.0])
+@pytest.mark.parametrize("rpm", [60.0, -100.0, 120.0, -140.0, 160.0])
+def test_a_rotor_that_looks_like_a_stuck_sensor_for_5_ms_is_no_fault(
+    hsm1: Motor, rpm: float, torque: float, later_ms: float
+) -> None:
+    """The same stop from the speeds at which the predicted angle replaces the rotor's for a while: (AT-18)."""
+    rig = Rig(hsm1, rpm, torque, angle_bits=12)
+    rig.run(0.25 + later_ms * 1e-3)
+    rig.run(abs(rpm) / 40000.0, plant_speed_rad_s=(rpm * math.pi / 30.0, 0.0))
+    assert rig.run(0.2).faults == 0
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_glitch_in_a_fast_acceleration_changes_no_torque(hsm1: Motor, sign: float) -> None:
     """The predicted angle deviates by 2.1 degrees electrical after 5 ms at 2000 rpm/s (AT-15)."""

@@ -300,6 +300,28 @@ void test_a_sample_from_before_the_bridge_acted_is_no_part_of_a_standing_angle(v
     TEST_ASSERT_EQUAL_INT(0, drive.task.frozen_angle.standing);
 }
 
+/* The comparison of a launch is kept as it is until the angle is that of the sensor again, or the bridge is off. */
+void test_the_power_of_a_launch_is_not_compared_while_a_prediction_replaces_the_angle(void)
+{
+    snapshot_t snapshot = {.sample = {.acting = true, .theta_m = 1000000U}, .window = {.acting = true}};
+    snapshot.sample.theta_e = 3U * snapshot.sample.theta_m + seam.motor.angle_tracker.offset;
+    for (int n = 0; n < 4; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    const launch_power_state_t before = drive.task.launch_power;
+    TEST_ASSERT_EQUAL_INT(3, before.steady);
+    snapshot.sample.theta_e += 1U;
+    (void)slow_monitors_step(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.task.launch_power, sizeof before);
+    snapshot.sample.theta_e -= 1U;
+    (void)slow_monitors_step(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(4, drive.task.launch_power.steady);
+    snapshot.sample.theta_e += 1U;
+    snapshot.sample.acting = false;
+    (void)slow_monitors_step(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.launch_power.steady);
+}
+
 /* A constant current out of phase a, for 60 steps at this speed; whether the upper switches are commanded then. */
 static bool upper_after_constant_current(double omega_pu, bool acting, bool shorted)
 {
