@@ -16,20 +16,24 @@ from fluxtrue_tools.target import fits
 PORT = Path(__file__).resolve().parents[3] / "hal" / "s32k144"
 # Cycles (minimum, mean, maximum) of a period's interrupts, a task, a received command.
 COSTS = {"10 kHz work": [1, 1, 1000], "1 kHz task": [1, 1, 20000], "CAN ISR": [1, 1, 300]}
+LAWS = {"usual": {"cycles": [1, 1, 100]}, "turning": {"cycles": [1, 1, 350]}}
+SLOW = {"pole_pairs": 3, "speed_max_rpm": 1000.0}
 
 
 @pytest.fixture
 def checked(tmp_path):
     """fits.check() for a PWM frequency, a dead time and a clock of the core, with the known costs above."""
 
-    def _checked(pwm_hz, dead_time_s=1e-6, core_Hz=112e6):
+    def _checked(pwm_hz, dead_time_s=1e-6, core_Hz=112e6, machine=SLOW):
         folder = tmp_path / "aport"
         folder.mkdir(exist_ok=True)
         motor, measured, budget = tmp_path / "motor.json", tmp_path / "performance.json", folder / "budget.toml"
-        motor.write_text(json.dumps({"inverter": {"pwm_hz": pwm_hz, "dead_time_s": dead_time_s}}))
+        motor.write_text(json.dumps({"machine": machine, "inverter": {"pwm_hz": pwm_hz, "dead_time_s": dead_time_s}}))
         dear = {name: {"cycles": cycles} for name, cycles in COSTS.items()}
         cheap = {name: {"cycles": [1, 1, 1]} for name in COSTS}
-        measured.write_text(json.dumps({"drives": {"a": {"runs": cheap}, "b": {"runs": dear}}}))
+        measured.write_text(
+            json.dumps({"drives": {"a": {"runs": cheap}, "b": {"runs": dear}}, "kernels": {"laws": LAWS}})
+        )
         pwm = "\n".join(f"{key} = {value}" for key, value in _port()["pwm"].items())
         budget.write_text(f"core_Hz = {core_Hz}\nflash_bytes = 1\nram_bytes = 1\nbusy_share_max = 0.75\n[pwm]\n{pwm}\n")
         return fits.check(motor, budget, measured)
@@ -46,6 +50,12 @@ def test_the_share_is_periods_tasks_and_commands_of_the_dearer_identification(ch
     assert checked(40e3) == "busy for at most 54 % of the time at inverter.pwm_hz = 40000, without wait states"
     # 4.5 kHz: five periods a step, 900 steps a second: 4.5e6 + 18e6 + 0.03e6: 20.1 %
     assert "20 %" in checked(4.5e3)
+
+
+def test_a_field_that_turns_far_pays_for_its_law(checked):
+    """0.35 rad per period are 13,369 rpm with ten pole pairs at 40 kHz: beyond, 40e3 * 250 more of 112e6, 8.9 %."""
+    assert "54 %" in checked(40e3, machine={"pole_pairs": 10, "speed_max_rpm": 13300.0})
+    assert "63 %" in checked(40e3, machine={"pole_pairs": 10, "speed_max_rpm": 13400.0})
 
 
 def test_a_processor_that_would_be_busy_too_long_is_named_with_the_bound(checked):
@@ -88,13 +98,13 @@ def test_the_limits_are_those_of_the_port_s_timer():
 def test_the_s32k144_carries_every_frequency_that_a_motor_may_have(tmp_path, pwm_hz):
     """With the measured costs; at 40 kHz the interrupts and the task need half of the processor."""
     motor = tmp_path / "motor.json"
-    motor.write_text(json.dumps({"inverter": {"pwm_hz": pwm_hz, "dead_time_s": 2e-6}}))
+    motor.write_text(json.dumps({"machine": SLOW, "inverter": {"pwm_hz": pwm_hz, "dead_time_s": 2e-6}}))
     assert "busy for at most" in fits.check(motor, PORT / "budget.toml")
 
 
 def test_on_the_command_line_a_refusal_is_one_message(tmp_path):
     motor = tmp_path / "motor.json"
-    motor.write_text(json.dumps({"inverter": {"pwm_hz": 40e3, "dead_time_s": 4e-6}}))
+    motor.write_text(json.dumps({"machine": SLOW, "inverter": {"pwm_hz": 40e3, "dead_time_s": 4e-6}}))
     done = CliRunner().invoke(main, ["target", "fits", str(motor), "--budget", str(PORT / "budget.toml")])
     assert isinstance(done.exception, FluxtrueError)
     assert "allowed on the s32k144 at inverter.pwm_hz = 40000" in str(done.exception)

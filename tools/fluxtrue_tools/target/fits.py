@@ -8,6 +8,7 @@ the maxima of all interrupts are added up.
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bases import periods_per_step
+from fluxtrue_tools.motor.config import ANGLE_TURNING
 from fluxtrue_tools.target import budget as budgets
 from fluxtrue_tools.target.budget import Pwm
 
@@ -34,19 +36,41 @@ class Inverter(BaseModel):
     dead_time_s: Annotated[float, Field(ge=0, le=1e-3)]
 
 
+class Machine(BaseModel):
+    """What is read of its machine."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+    pole_pairs: Annotated[int, Field(ge=1, le=64)]
+    speed_max_rpm: Annotated[float, Field(gt=0, le=1e6)]
+
+
 class Built(BaseModel):
     """motor.json, most of which does not matter here."""
 
+    machine: Machine
     inverter: Inverter
 
+    @property
+    def is_turning(self) -> bool:
+        """The field turns so far in a PWM period that the motor has the law for it, as in its configuration."""
+        omega_rad_s = 2.0 * math.pi / 60.0 * self.machine.speed_max_rpm * self.machine.pole_pairs
+        return omega_rad_s > ANGLE_TURNING * self.inverter.pwm_hz
 
-def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any]) -> float:
+
+def _cycles_of_turning_law(measured: dict[str, Any]) -> float:
+    """What a period takes longer with the law for a field that turns far."""
+    laws = measured["kernels"]["laws"]
+    return float(laws["turning"]["cycles"][MAXIMUM] - laws["usual"]["cycles"][MAXIMUM])
+
+
+def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any], is_turning: bool = False) -> float:
     """Share of the processor that is busy, with the identification that takes longer."""
     tasks_hz = pwm_hz / periods_per_step(pwm_hz)
+    law = _cycles_of_turning_law(measured) if is_turning else 0.0
 
     def cycles_per_s(runs: dict[str, Any]) -> float:
         cycles = {name: float(runs[name]["cycles"][MAXIMUM]) for name in (WORK, TASK, CAN)}
-        return pwm_hz * cycles[WORK] + tasks_hz * cycles[TASK] + COMMAND_HZ * cycles[CAN]
+        return pwm_hz * (cycles[WORK] + law) + tasks_hz * cycles[TASK] + COMMAND_HZ * cycles[CAN]
 
     return max(cycles_per_s(drive["runs"]) for drive in measured["drives"].values()) / core_hz
 
@@ -62,20 +86,20 @@ def _check_timer(pwm_hz: float, dead_time_s: float, pwm: Pwm, port: str) -> None
                             f"{pwm_hz:g}: more than 0, up to {longest_s:.4g}")  # fmt: skip
 
 
-def _inverter(path: Path) -> Inverter:
+def _built(path: Path) -> Built:
     try:
-        return Built.model_validate_json(strict.read_text(path)).inverter
+        return Built.model_validate_json(strict.read_text(path))
     except ValidationError as error:
         raise FluxtrueError(f"{path}: not the motor.json of a build: {strict.explain(error, Built)}") from None
 
 
 def check(motor: Path, budget: Path, measured: Path = MEASURED) -> str:
     """One line that says how busy the processor will be; a machine that the port cannot carry is refused."""
-    inverter, port, name = _inverter(motor), budgets.read(budget), budget.absolute().parent.name
-    pwm_hz = inverter.pwm_hz
+    built, port, name = _built(motor), budgets.read(budget), budget.absolute().parent.name
+    inverter, pwm_hz = built.inverter, built.inverter.pwm_hz
     _check_timer(pwm_hz, inverter.dead_time_s, port.pwm, name)
     costs = json.loads(measured.read_text(encoding="utf-8"))
-    share, share_max = busy_share(pwm_hz, port.core_Hz, costs), port.busy_share_max
+    share, share_max = busy_share(pwm_hz, port.core_Hz, costs, built.is_turning), port.busy_share_max
     said = f"{100.0 * share:.0f} % of the time at inverter.pwm_hz = {pwm_hz:g}"
     if share > share_max:
         raise FluxtrueError(
