@@ -13,7 +13,7 @@ void recall_begin(drive_t *drive)
 }
 
 /* All steps of this update but the last one are averaged, and the torque is large enough to decide. */
-static bool is_telling(const drive_t *drive)
+static bool is_conclusive(const drive_t *drive)
 {
     const identify_state_t *state = &drive->task.identify;
     return state->steps == LAST_BUT_ONE && state->kept.update_valid &&
@@ -45,7 +45,7 @@ void recall_step(drive_t *drive, q31_t omega)
     if (!recall->unconfirmed) {
         return;
     }
-    if (is_telling(drive)) {
+    if (is_conclusive(drive)) {
         count_update(drive, recall, omega);
     }
     const bool rejected = recall->trials >= RECALL_TRIALS ||

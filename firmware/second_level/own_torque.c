@@ -5,7 +5,7 @@
 #include "fx/trig.h"
 
 #define SPACING_SHIFT 11 /* a sixteenth */
-#define BELIEVED_SHARE 5 /* a healthy machine may make a fifth less torque than the table */
+#define LOSS_PART_MAX 5 /* a healthy machine may make a fifth less torque than the table */
 
 typedef struct {
     int32_t d, q;
@@ -26,7 +26,7 @@ static current_t rotor_current(const second_level_constants_t *constants, const 
 }
 
 /* What the identified deviations of magnet and q axis take from the table's torque (SL-8). */
-static int32_t believed_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
+static int32_t identified_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
                              current_t i, int32_t table)
 {
     const q15_t i_q = fx_sat_q15(fx_abs_q31(i.q));
@@ -34,7 +34,7 @@ static int32_t believed_loss(const second_level_constants_t *constants, const se
     const q15_t q_axis = fx_sat_q15(table - fx_mul_q15(psi_d, i_q));
     const int32_t change = fx_mul_q15(fx_sat_q15(sample->psi_d_error), i_q) +
                            fx_mul_q15(fx_sat_q15(sample->lq_error), q_axis);
-    return fx_clamp_q31(change, -fx_max_s32(table, 0) / BELIEVED_SHARE, 0);
+    return fx_clamp_q31(change, -fx_max_s32(table, 0) / LOSS_PART_MAX, 0);
 }
 
 int32_t second_level_own_torque(const second_level_constants_t *constants, const second_level_sample_t *sample)
@@ -43,6 +43,6 @@ int32_t second_level_own_torque(const second_level_constants_t *constants, const
     const current_t i = rotor_current(constants, sample);
     const fx_cell_t cell = fx_cell(&grid, i.d, fx_abs_q31(i.q));
     const int32_t table = fx_cell_interp(constants->torque, SECOND_LEVEL_COLUMNS, cell);
-    const int32_t magnitude = table + believed_loss(constants, sample, i, table);
+    const int32_t magnitude = table + identified_loss(constants, sample, i, table);
     return (i.q < 0) ? -magnitude : magnitude;
 }
