@@ -27,7 +27,7 @@ static current_t rotor_current(const second_level_constants_t *constants, const 
 
 /* What the identified deviations of magnet and q axis take from the table's torque (SL-8). */
 static int32_t identified_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
-                             current_t i, int32_t table)
+                               current_t i, int32_t table)
 {
     const q15_t i_q = fx_sat_q15(fx_abs_q31(i.q));
     const q15_t psi_d = fx_sat_q15(constants->psi_f + fx_mul_gain_q31(constants->l_d, i.d));

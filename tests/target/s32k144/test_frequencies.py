@@ -133,10 +133,10 @@ def test_the_processor_load_is_below_the_share_that_the_build_assumes(parts: Par
     """The load while 80 N·m are requested and the machine accelerates: estimated cycles, without wait states
     (docs/performance.md)."""
     motor, functions = parts.emulated(COUNTING), disassembly.read(parts.image)
-    pwm_hz = motor.plant["pwm_hz"]
+    built = fits.read(motor.folder.folder / "motor.json")
     plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 1.0, "current_noise_A_rms": 0.5}
     with Loop(motor.library, plant, motor.flux_map) as loop:
-        stand = Stand(loop, periods_per_ms=round(pwm_hz / 1000.0))
+        stand = Stand(loop, periods_per_ms=round(built.inverter.pwm_hz / 1000.0))
         loop.set("identification_mode", figures.MODES[identification])
         stand.power_up()
         stand.command.values["TorqueRequested"] = 80.0
@@ -149,8 +149,10 @@ def test_the_processor_load_is_below_the_share_that_the_build_assumes(parts: Par
         assert loop.get("truth.torque_Nm") > 50.0
     port = figures.budget()
     load = sum(run_cycles) / (1e-3 * LOADED_MS * port["core_Hz"])
-    max_load = fits.busy_share(pwm_hz, port["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
-    print(f"{pwm_hz:g} Hz, {identification}: {100 * load:.1f} % of the processor, at most {100 * max_load:.1f} %")
+    max_load = fits.busy_share(built, port["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
+    print(
+        f"{built.inverter.pwm_hz:g} Hz, {identification}: {100 * load:.1f} % of the processor, at most {100 * max_load:.1f} %"
+    )
     assert 0.3 * max_load < load < max_load <= port["busy_share_max"]
 
 

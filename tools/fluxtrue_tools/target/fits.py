@@ -63,10 +63,11 @@ def _cycles_of_turning_law(measured: dict[str, Any]) -> float:
     return float(laws["turning"]["cycles"][MAXIMUM] - laws["usual"]["cycles"][MAXIMUM])
 
 
-def busy_share(pwm_hz: float, core_hz: float, measured: dict[str, Any], is_turning: bool = False) -> float:
+def busy_share(built: Built, core_hz: float, measured: dict[str, Any]) -> float:
     """Share of the processor that is busy, with the identification that takes longer."""
+    pwm_hz = built.inverter.pwm_hz
     tasks_hz = pwm_hz / periods_per_step(pwm_hz)
-    law = _cycles_of_turning_law(measured) if is_turning else 0.0
+    law = _cycles_of_turning_law(measured) if built.is_turning else 0.0
 
     def cycles_per_s(runs: dict[str, Any]) -> float:
         cycles = {name: float(runs[name]["cycles"][MAXIMUM]) for name in (WORK, TASK, CAN)}
@@ -86,7 +87,8 @@ def _check_timer(pwm_hz: float, dead_time_s: float, pwm: Pwm, port: str) -> None
                             f"{pwm_hz:g}: more than 0, up to {longest_s:.4g}")  # fmt: skip
 
 
-def _built(path: Path) -> Built:
+def read(path: Path) -> Built:
+    """A motor.json; what is not one is refused."""
     try:
         return Built.model_validate_json(strict.read_text(path))
     except ValidationError as error:
@@ -95,11 +97,11 @@ def _built(path: Path) -> Built:
 
 def check(motor: Path, budget: Path, measured: Path = MEASURED) -> str:
     """One line that says how busy the processor will be; a machine that the port cannot carry is refused."""
-    built, port, name = _built(motor), budgets.read(budget), budget.absolute().parent.name
+    built, port, name = read(motor), budgets.read(budget), budget.absolute().parent.name
     inverter, pwm_hz = built.inverter, built.inverter.pwm_hz
     _check_timer(pwm_hz, inverter.dead_time_s, port.pwm, name)
     costs = json.loads(measured.read_text(encoding="utf-8"))
-    share, share_max = busy_share(pwm_hz, port.core_Hz, costs, built.is_turning), port.busy_share_max
+    share, share_max = busy_share(built, port.core_Hz, costs), port.busy_share_max
     said = f"{100.0 * share:.0f} % of the time at inverter.pwm_hz = {pwm_hz:g}"
     if share > share_max:
         raise FluxtrueError(
