@@ -16,8 +16,10 @@ from fluxtrue_tools.sim.build import prepare
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
 CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2, "prius": 2, "leaf": 2, "pmasynrm": 2,
-         "spm_12V": 1, "compressor": 1, "ebike": 1, "pmsyrm": 1, "servo": 1, "truck": 1}  # fmt: skip
-ERROR_WITHOUT_MIN = {"spm_12V": 1.5, "ebike": 1.5}  # percent: the first plant's magnet is only 2 % weak
+         "spm_12V": 1, "compressor": 1, "ebike": 1, "pmsyrm": 1, "servo": 1, "truck": 1,
+         "ipmsm_2kW": 1, "estun": 1, "anaheim": 1, "teknic": 1, "hub": 1, "racing": 1}  # fmt: skip
+# Percent: the magnet of the first plant is only 2 % weak.
+ERROR_WITHOUT_MIN = dict.fromkeys(("spm_12V", "ebike", "anaheim", "racing"), 1.5)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -68,5 +70,11 @@ def test_the_machines_are_part_of_the_tests_build() -> None:
         "pmsyrm",
         "servo",
         "truck",
+        "ipmsm_2kW",
+        "estun",
+        "anaheim",
+        "teknic",
+        "hub",
+        "racing",
     ):
         assert prepare(str(MOTORS / name)).folder == built / "motors" / name

@@ -21,7 +21,8 @@ Write = Callable[..., Path]
 Psi = Callable[[float, float], tuple[float, float]]
 
 MEANT = ("linear", "saturated", "gem", "prius", "leaf", "pmasynrm", "pmsyrm", "ebike", "spm_12V", "compressor", "servo",
-         "truck", "hsm1_5kHz", "hsm1_8kHz", "hsm1_20kHz", "hsm1_40kHz")  # fmt: skip
+         "truck", "ipmsm_2kW", "estun", "anaheim", "teknic", "hub", "racing", "hsm1_5kHz", "hsm1_8kHz", "hsm1_20kHz",
+         "hsm1_40kHz")  # fmt: skip
 
 # A 12 V motor of 30 µH: at any full scale one period of V_b moves the current by more than it.
 SMALL: dict[str, dict[str, Any]] = {

@@ -40,6 +40,12 @@ KINDS: Final = {
     "truck": "truck, 800 V",
     "saturated": "strong saturation",
     "linear": "hardly any saturation",
+    "ipmsm_2kW": "interior magnets, 2.2 kW",
+    "estun": "servo, 400 W",
+    "anaheim": "surface magnets, 48 V",
+    "teknic": "servo, 24 V",
+    "hub": "hub motor, 8 pole pairs",
+    "racing": "wheel motor, 20,000 rpm",
 }
 """The machines of the page, by the names of their campaigns."""
 
