@@ -12,6 +12,7 @@ from fluxtrue_tools.motor.emit_c import motor_tables_c
 from fluxtrue_tools.motor.motor import Motor, load_motor
 
 ROOT = Path(__file__).resolve().parents[3]
+CREEPING_DROP_V = {"ebike": 0.2006, "anaheim": 0.8382}
 
 
 @cache
@@ -44,7 +45,7 @@ def test_a_faster_rotor_has_a_tracker_of_a_sixteenth_of_the_pwm_and_a_wider_jump
     assert motor.derived.tracker_jump_turns == pytest.approx(jump_turns, rel=1e-9)
 
 
-@pytest.mark.parametrize(("name", "v_theta", "v_inverter"), [("hsm1", 0.0, 0.7), ("ebike", 0.192, 0.096)])
+@pytest.mark.parametrize(("name", "v_theta", "v_inverter"), [("hsm1", 0.0, 0.7), ("ebike", 0.192, 0.096 + 0.1003)])
 def test_the_launch_monitor_allows_for_the_resolution_of_the_angle(
     name: str, v_theta: float, v_inverter: float
 ) -> None:
@@ -55,16 +56,27 @@ def test_the_launch_monitor_allows_for_the_resolution_of_the_angle(
     volts = emitted / motor.bases.periods_per_step / 2**15 * motor.bases.voltage_V
     half_a_count = 0.5 * motor.bases.voltage_V / 2**15
     assert volts - motor.derived.launch_V == pytest.approx(v_theta, abs=half_a_count + 0.001)
-    assert motor.derived.launch_V == pytest.approx(v_inverter, rel=1e-6)
+    assert motor.derived.launch_V == pytest.approx(v_inverter, abs=1e-3)
 
 
 @pytest.mark.parametrize(("name", "noise_V"), [("hsm1", 0.0), ("pmsyrm", 1.08 * 9.34 - 2.7), ("ebike", 0.0)])
 def test_the_monitors_of_a_slow_rotor_allow_for_noise_that_the_current_follows(name: str, noise_V: float) -> None:
     """(MN-35) by hand: 156 mH·0.002·30 A/1 ms = 9.34 V; V_0/4 = 0.5 % of 540 V."""
     derived = named(name).derived
+    drop_V = CREEPING_DROP_V.get(name, 0.0)
     assert derived.monitor_noise_V == pytest.approx(noise_V, abs=0.02)
-    assert derived.launch_V == pytest.approx(derived.monitor_V / 10.0 + noise_V, abs=0.02)
-    assert derived.frozen_V == pytest.approx(derived.monitor_V / 4.0 + noise_V, abs=0.02)
+    assert derived.launch_V == pytest.approx(derived.monitor_V / 10.0 + noise_V + drop_V / 2.0, abs=0.02)
+    assert derived.frozen_V == pytest.approx(derived.monitor_V / 4.0 + noise_V + drop_V, abs=0.02)
+
+
+@pytest.mark.parametrize(("name", "drop_V"), [("hsm1", 0.0), ("servo", 0.0), *CREEPING_DROP_V.items()])
+def test_the_monitors_of_a_slow_rotor_allow_for_a_reference_that_creeps(name: str, drop_V: float) -> None:
+    """(MN-40) by hand, windings at their trip: sqrt(2)·60 mΩ·1.6288·2.32 A - 0.12 V, sqrt(2)·464 mΩ·1.8253·0.8 A -
+    0.12 V."""
+    derived = named(name).derived
+    noise_V = derived.monitor_noise_V
+    assert derived.frozen_V - derived.monitor_V / 4.0 - noise_V == pytest.approx(drop_V, abs=0.003)
+    assert derived.launch_V - derived.monitor_V / 10.0 - noise_V == pytest.approx(drop_V / 2.0, abs=0.003)
 
 
 @pytest.mark.parametrize(("name", "noise_V"), [("hsm1", 0.0), ("pmsyrm", 4.0 / 3.0 * 24.9 - 10.8), ("ebike", 0.0)])

@@ -75,6 +75,7 @@ MONITOR_NOISE_SHARE = 0.04  # of i_max: the bridge's zero crossing and noise loo
 SHARE_SHORT, SHARE_OPEN = 0.9, 0.8  # of v_dc, by the line back-EMF
 V_RELEASE_PER_VDC = 1.15
 
+COLD_C = 20.0  # temperature of machine.r_ohm
 WINDING_MIN_C = -40.0  # the coldest winding that the torque monitor allows for
 SLEW_WEAK_PER_TORQUE_MAX = 100.0  # 1/s: a full reversal at top speed keeps its currents below the trip
 PSI_WEAK_PER_PSI_F = 1.0 / 0.6  # the magnet alone takes 60 % of the planned voltage
@@ -331,9 +332,18 @@ def _period_noise(config: MotorConfig, model: FluxModel, bases: Bases) -> float:
     return max(0.0, noise_V - inverter_error_V(config.inverter))
 
 
+def _creeping_drop(config: MotorConfig) -> float:
+    """How the resistive drop changes while both axes of the reference creep by I_0, beyond V_0/8 (MN-40)."""
+    machine = config.machine
+    hottest = 1.0 + machine.r_temp_coeff_per_K * (config.thermal.winding_trip_C - COLD_C)
+    drop_V = math.sqrt(2.0) * machine.r_ohm * hottest * MONITOR_NOISE_SHARE * machine.i_max_A
+    return max(0.0, drop_V - inverter_error_V(config.inverter) / 8.0)
+
+
 def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[str, float]:
     machine, omega = config.machine, config.omega_max_rad_s
     error_V, noise_V = inverter_error_V(config.inverter), _voltage_noise(config, model, bases)
+    drop_V = _creeping_drop(config)
     reserve = min(bases.omega_rad_s / omega - 1.0, SPEED_RESERVE_MAX)
     return {
         "deviation_A": DEVIATION_SHARE * machine.i_max_A,
@@ -349,8 +359,8 @@ def _slow_monitors(config: MotorConfig, model: FluxModel, bases: Bases) -> dict[
         "monitor_V": error_V,
         "monitor_noise_V": noise_V,
         "period_noise_V": _period_noise(config, model, bases),
-        "frozen_V": FROZEN_SHARE * error_V + noise_V,
-        "launch_V": LAUNCH_SHARE * error_V + noise_V,
+        "frozen_V": FROZEN_SHARE * error_V + noise_V + drop_V,
+        "launch_V": LAUNCH_SHARE * error_V + noise_V + drop_V / 2.0,
         "launch_A": MONITOR_NOISE_SHARE / 4.0 * machine.i_max_A,
         "monitor_A": MONITOR_NOISE_SHARE * machine.i_max_A,
         "monitor_mean_rate": 1.0 - math.exp(-bases.step_s / MONITOR_MEAN_S),
