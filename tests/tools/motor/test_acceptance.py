@@ -9,34 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import toml
-from random_motors import random_motors
+from random_motors import DROP, PUBLISHED, REACTANCES, made, random_motors
 
 from fluxtrue_tools.bus.scales import carriers, standard
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.bus import needs
-from fluxtrue_tools.motor.config import MotorConfig, check_config
-from fluxtrue_tools.motor.emit_c import check_numbers
-from fluxtrue_tools.motor.flux_model import ConstantModel
+from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.flux_tables import OBSERVER_M_MAX
-from fluxtrue_tools.motor.motor import Motor, load_motor, resolve
+from fluxtrue_tools.motor.motor import Motor, load_motor
 
 SEED, COUNT, PARTS, ACCEPTED = 12, 1000, 4, 0.99
 COUNTS = carriers(standard())
-Values = dict[str, dict[str, object]]
+TESTED = Path(__file__).resolve().parents[2] / "motors"
 Write = Callable[..., Path]
-
-
-def made(values: Values) -> Motor:
-    """All that motor build refuses for, without the advice that follows a refusal."""
-    machine = values["machine"] | {"name": str(values["machine"]["name"]).strip('"')}
-    config = MotorConfig.model_validate(values | {"machine": machine})
-    check_config(config)
-    constants = config.machine.ld_H, config.machine.lq_H, config.machine.psi_f_Vs
-    assert None not in constants
-    with np.errstate(all="ignore"):
-        motor = resolve(config, None, ConstantModel(*constants))  # type: ignore[arg-type]
-    check_numbers(motor)
-    return motor
 
 
 def assert_in_range(motor: Motor) -> None:
@@ -76,6 +61,17 @@ def test_of_1000_random_sensible_motors_99_percent_are_accepted(part: int) -> No
     assert max(angles) > 1.15
 
 
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_published_machines_lie_in_the_ranges_that_are_drawn_from(name: str) -> None:
+    config = load_config(TESTED / name)
+    machine = config.machine
+    assert machine.ld_H is not None and machine.lq_H is not None and machine.psi_f_Vs is not None
+    x, ratio = machine.ld_H * machine.i_max_A / machine.psi_f_Vs, machine.lq_H / machine.ld_H
+    assert any(low <= x <= high and a <= ratio <= b for (low, high), (a, b) in REACTANCES.values()), (x, ratio)
+    drop = machine.r_ohm * machine.i_max_A / (config.inverter.vdc_V / math.sqrt(3.0))
+    assert DROP[0] <= drop <= DROP[1]
+
+
 def test_some_of_them_as_files_are_what_the_tool_accepts(tmp_path: Path) -> None:
     for k, drawn in enumerate(random_motors(10, SEED + 1)):
         folder = tmp_path / str(k)
@@ -92,11 +88,10 @@ def test_what_turns_too_far_is_refused_with_the_speed_that_is_accepted(write: Wr
 
 
 def test_at_5_kHz_the_measured_machine_needs_a_shift() -> None:
-    tested = Path(__file__).resolve().parents[2] / "motors"
-    motor = load_motor(tested / "hsm1_5kHz")
+    motor = load_motor(TESTED / "hsm1_5kHz")
     assert motor.tables.g_shift == 1
     assert motor.bases.omega_rad_s == pytest.approx(1.25 * motor.config.omega_max_rad_s, rel=1e-12)
-    assert load_motor(tested / "hsm1_20kHz").tables.g_shift == 0
+    assert load_motor(TESTED / "hsm1_20kHz").tables.g_shift == 0
 
 
 def test_a_resistance_too_large_for_its_format_shifts_the_other_way(write: Write) -> None:
