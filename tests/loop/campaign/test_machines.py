@@ -15,9 +15,10 @@ from fluxtrue_tools.sim.build import prepare
 
 ROOT = Path(__file__).resolve().parents[3]
 MOTORS = ROOT / "tests" / "motors"
-CASES = {"saturated": 4, "linear": 4, "hsm1-5kHz": 3, "hsm1-20kHz": 2, "prius": 2, "leaf": 2, "pmasynrm": 2,
+# The bounds are those of many plants: of teknic, the first alone has 0.95 % to half its speed, three 0.56 %.
+CASES = {"saturated": 2, "linear": 2, "hsm1-5kHz": 2, "hsm1-20kHz": 1, "prius": 1, "leaf": 1, "pmasynrm": 1,
          "spm_12V": 1, "compressor": 1, "ebike": 1, "pmsyrm": 1, "servo": 1, "truck": 1,
-         "ipmsm_2kW": 1, "estun": 1, "anaheim": 1, "teknic": 1, "hub": 1, "racing": 1}  # fmt: skip
+         "ipmsm_2kW": 1, "estun": 1, "anaheim": 1, "teknic": 3, "hub": 1, "racing": 1}  # fmt: skip
 # Percent: the magnet of the first plant is only 2 % weak.
 ERROR_WITHOUT_MIN = dict.fromkeys(("spm_12V", "ebike", "anaheim", "racing"), 1.5)
 
