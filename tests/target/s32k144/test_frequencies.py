@@ -150,9 +150,8 @@ def test_the_processor_load_is_below_the_share_that_the_build_assumes(parts: Par
     port = figures.budget()
     load = sum(run_cycles) / (1e-3 * LOADED_MS * port["core_Hz"])
     max_load = fits.busy_share(built, port["core_Hz"], json.loads(fits.MEASURED.read_text(encoding="utf-8")))
-    print(
-        f"{built.inverter.pwm_hz:g} Hz, {identification}: {100 * load:.1f} % of the processor, at most {100 * max_load:.1f} %"
-    )
+    shares = f"{100 * load:.1f} % of the processor, at most {100 * max_load:.1f} %"
+    print(f"{built.inverter.pwm_hz:g} Hz, {identification}: {shares}")
     assert 0.3 * max_load < load < max_load <= port["busy_share_max"]
 
 
