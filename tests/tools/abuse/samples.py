@@ -92,7 +92,8 @@ dead_time_share_max = 0.125
 
 def motor_json() -> str:
     """What `target fits` reads of a motor's build."""
-    return json.dumps({"inverter": {"pwm_hz": 10e3, "dead_time_s": 2e-6}}, indent=1)
+    machine = {"pole_pairs": 3, "speed_max_rpm": 10e3}
+    return json.dumps({"machine": machine, "inverter": {"pwm_hz": 10e3, "dead_time_s": 2e-6}}, indent=1)
 
 
 @cache
