@@ -180,5 +180,6 @@ def test_changed_files_are_those_that_differ_from_the_merge_base(tmp_path: Path)
     (tmp_path / "a.c").write_text("2\n", encoding="utf-8")
     git("commit", "-q", "-a", "-m", "second")
     (tmp_path / "b.c").write_text("2\n", encoding="utf-8")
-    assert changed(tmp_path, "main", files) == ["a.c", "b.c"]
+    (tmp_path / "new.c").write_text("1\n", encoding="utf-8")
+    assert changed(tmp_path, "main", [*files, "new.c"]) == ["a.c", "b.c", "new.c"]
     assert changed(tmp_path, "no-such-branch", files) is None

@@ -22,7 +22,9 @@ def changed(root: Path, base: str, files: Sequence[str]) -> list[str] | None:
         commit = _git(root, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
         if commit and (found := _git(root, "merge-base", "HEAD", commit)):
             differing = _git(root, "diff", "--name-only", "--relative", found)
-            if differing is None:
+            untracked = _git(root, "ls-files", "--others", "--exclude-standard")
+            if differing is None or untracked is None:
                 raise FluxtrueError(f"{root}: git cannot compare with {found}")
-            return [file for file in files if file in set(differing.splitlines())]
+            present = set(differing.splitlines()) | set(untracked.splitlines())
+            return [file for file in files if file in present]
     return None
