@@ -131,7 +131,8 @@ static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
 }
 
 /* A prediction replaces a sample that no rotor can have (AT-14), and a rotor that stops within milliseconds may look
- * like one (AT-17): while the currents follow the prediction, their power says nothing about the sensor. */
+ * like one (AT-17), until (AT-18) or the fault of (MN-21): while the currents follow the prediction, their power says
+ * nothing about the sensor. */
 static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
 {
     const angle_tracker_config_t *tracker = &drive->period.angle_tracker;
@@ -142,11 +143,9 @@ static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
 static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting)
 {
     task_state_t *task = &drive->task;
-    if (acting && !is_angle_measured(drive, &snapshot->sample)) {
-        return 0; /* the comparison waits, for 5 ms at most */
-    }
     const launch_power_in_t in = {
         .acting = acting && is_controlled(drive, snapshot),
+        .measured = is_angle_measured(drive, &snapshot->sample),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
@@ -155,14 +154,16 @@ static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool ac
     return launch_power_step(&drive->motor->launch_power, &task->launch_power, &in);
 }
 
-/* The second harmonic of a half wave turns by almost a whole number of turns in a step: it would look constant. */
+/* The second harmonic of a half wave turns by almost a whole number of turns in a step, or hardly at all: it would look
+ * constant. */
 static bool is_second_harmonic_constant(uint64_t turns_q60)
 {
     const uint64_t part = (2U * turns_q60 + (1ULL << 55)) & ((1ULL << 60) - 1U);
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-/* Not a monitor: what a fault would need. In the short circuit the decision of the last step before it holds. */
+/* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While the short
+ * circuit is on, the decision of the last step before it is kept. */
 static void watch_sides(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;

@@ -46,10 +46,10 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     const bool above = deviation > 0;
     const int32_t largest = NOISE_MAX * times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
     const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(largest, UINT16_MAX));
-    const int32_t noise = (above != state->above) ? limited : 0; /* behind a change the mean is on one side of it */
+    const int32_t noise_q8 = (above != state->above) ? limited * 256 : 0; /* after a lasting change it keeps one sign */
     state->above = above;
-    state->noise = (uint16_t)mean_step(state->noise, noise, settled ? NOISE_SHIFT : MEAN_SHIFT);
-    state->first_noise = settled ? (uint16_t)mean_step(state->first_noise, state->noise, FIRST_SHIFT) : state->noise;
+    state->noise_q8 = mean_step(state->noise_q8, noise_q8, settled ? NOISE_SHIFT : MEAN_SHIFT);
+    state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, state->noise_q8, FIRST_SHIFT) : state->noise_q8;
 }
 
 /* True while there is a power to compare with. */
@@ -85,7 +85,7 @@ static bool is_wrong(const launch_power_config_t *config, const launch_power_sta
     const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
     const int32_t omega = fx_abs_q31(state->omega_q8 - state->first_omega_q8) >> 8;
     const int32_t psi = config->psi_share + (fx_abs_q15(in->psi_ref.q) >> 3);
-    const int32_t noise = fx_max_s32(state->noise, state->first_noise);
+    const int32_t noise = fx_max_s32(state->noise_q8, state->first_noise_q8) >> 8;
     const int32_t loss_max = fx_max_s32(times(config->v_1, current), 2 * noise);
     const int32_t change = (state->power_q8 - state->first_power_q8) >> 8;
     return current > config->i_min && fx_abs_q31(change) > loss_max + times(2 * times(omega, psi), current);
@@ -96,6 +96,11 @@ uint32_t launch_power_step(const launch_power_config_t *config, launch_power_sta
 {
     if (!in->acting) {
         *state = (launch_power_state_t){.theta_e = in->theta_e};
+        return 0;
+    }
+    if (!in->measured || state->waited) {
+        state->waited = !in->measured;
+        state->theta_e = in->theta_e;
         return 0;
     }
     const bool wrong = update_means(config, state, in) && is_wrong(config, state, in);

@@ -7,14 +7,15 @@
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
  *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps
  *   r: mean over 16 steps of |p - m| where p - m has changed its sign, else 0, of each step at most 8 |i*| v_1: the
- *   noise of the current sensors; r_0 follows it as m_0 follows m
+ *   noise of the current sensors; r_0 follows it as m_0 follows m. Until the means have settled r is a mean over 4
+ *   steps and r_0 = r; the first 4 steps after a movement are not counted
  *   |m - m_0| > max(|i*| v_1, 2 r, 2 r_0) + |i*| |n - n_0|(psi_f/5 + |psi_q|/8) in a row of steps; no check below
  *   |i*| = i_min
  * Source   docs/theory/monitors.md (MN-28), (MN-29), (MN-39)
  * Units    voltages and speeds per unit times the periods of a step, angle 2^32 = one turn
  * Range    |u| <= 43 * 2^15, as of 40 periods and 1/(w_b T_s) = 3; every other argument
  *          begins anew when the angle moves by 1/64 of a turn in a step
- * Rounding 2^-8 of a count of the sum
+ * Rounding 2^-8 of a count of the sum; m_0, n_0 and r_0 up to 16 counts below (signal/mean.h)
  * Errors   returns FAULT_ANGLE_OFFSET while it is confirmed; the fast ISR latches it
  * Context  1 kHz task; one square root for each vector length, no division */
 #include <stdbool.h>
@@ -36,14 +37,16 @@ typedef struct {
     int32_t power_q8, first_power_q8;
     int32_t omega_q8, first_omega_q8;
     dq_q15_halfword_t i_ref;
-    uint32_t theta_e;            /* of the last step */
-    uint16_t noise, first_noise; /* of the power; saturate */
-    bool above;                  /* p - m was positive in the last step */
-    uint8_t steady, wrong;       /* steps, saturate */
+    int32_t noise_q8, first_noise_q8; /* of the power */
+    uint32_t theta_e;                 /* of the last step */
+    bool above;                       /* p - m was positive in the last step */
+    bool waited;                      /* theta_e is older than a step */
+    uint8_t steady, wrong;            /* steps, saturate */
 } launch_power_state_t;
 
 typedef struct {
     bool acting;
+    bool measured;           /* the angle is the sensor's; else the comparison waits */
     dq_q15_t u_standing;     /* acting voltage without that of the flux, summed over the periods of a step */
     dq_q15_t i_ref, psi_ref; /* in effect during that step, and the tables' flux there */
     uint32_t theta_e;        /* at its end */

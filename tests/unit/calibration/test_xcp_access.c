@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which frames of the calibration protocol are commands for the scope. */
+/* Which frames of the calibration protocol are commands for the scope, and which for the voltage pulses. */
 #include "calibration/xcp_access.h"
 
 #include <string.h>
 
+#include "calibration/pulse_access.h"
 #include "unity.h"
 
 #define USER_CMD 0xF1
@@ -84,4 +85,24 @@ void test_a_command_of_the_scope_that_is_unknown_or_too_short_has_the_protocols_
     TEST_ASSERT_TRUE(send(1, USER_CMD, STOP));
     TEST_ASSERT_EQUAL_HEX8(0xFE, answer.data[0]);
     TEST_ASSERT_EQUAL_HEX8(0x21, answer.data[1]);
+}
+
+/* The commands of the pulses are 0x10 ... 0x12; the neighbours are the scope's, which knows neither. */
+void test_the_commands_of_the_voltage_pulses_are_theirs(void)
+{
+    connect();
+    drive.task.pulsing.failure = PULSES_MOVED;
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_STATE));
+    TEST_ASSERT_EQUAL_UINT8(3, answer.length);
+    TEST_ASSERT_EQUAL_HEX8(0xFF, answer.data[0]);
+    TEST_ASSERT_EQUAL_UINT8(PULSES_MOVED, answer.data[2]);
+    for (uint8_t command = PULSE_SET; command <= PULSE_START; command++) {
+        TEST_ASSERT_TRUE(send(2, USER_CMD, command));
+        TEST_ASSERT_EQUAL_HEX8(0xFE, answer.data[0]);
+        TEST_ASSERT_EQUAL_HEX8(0x25, answer.data[1]); /* they need the key */
+    }
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_SET - 1));
+    TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
+    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_STATE + 1));
+    TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
 }

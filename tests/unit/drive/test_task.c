@@ -308,16 +308,31 @@ void test_the_power_of_a_launch_is_not_compared_while_a_prediction_replaces_the_
     for (int n = 0; n < 4; n++) {
         (void)slow_monitors_step(&drive, &snapshot);
     }
-    const launch_power_state_t before = drive.task.launch_power;
-    TEST_ASSERT_EQUAL_INT(3, before.steady);
+    TEST_ASSERT_EQUAL_INT(3, drive.task.launch_power.steady);
     snapshot.sample.theta_e += 1U;
     (void)slow_monitors_step(&drive, &snapshot);
-    TEST_ASSERT_EQUAL_MEMORY(&before, &drive.task.launch_power, sizeof before);
     snapshot.sample.theta_e -= 1U;
+    (void)slow_monitors_step(&drive, &snapshot); /* its change of the angle is not that of one step */
+    TEST_ASSERT_EQUAL_INT(3, drive.task.launch_power.steady);
     (void)slow_monitors_step(&drive, &snapshot);
     TEST_ASSERT_EQUAL_INT(4, drive.task.launch_power.steady);
     snapshot.sample.theta_e += 1U;
     snapshot.sample.acting = false;
+    (void)slow_monitors_step(&drive, &snapshot);
+    TEST_ASSERT_EQUAL_INT(0, drive.task.launch_power.steady);
+}
+
+/* A sample off its reference is none of a broken lead while the mean of the step is near it. */
+void test_the_power_of_a_launch_is_compared_while_sample_or_mean_of_the_current_follow_the_reference(void)
+{
+    const q15_t off = (q15_t)(2 * seam.motor.torque_monitor.i_0);
+    snapshot_t snapshot = {.sample = {.acting = true, .point = {.i = {off, 0}}}, .window = {.acting = true}};
+    snapshot.sample.theta_e = seam.motor.angle_tracker.offset;
+    for (int n = 0; n < 4; n++) {
+        (void)slow_monitors_step(&drive, &snapshot);
+    }
+    TEST_ASSERT_EQUAL_INT(3, drive.task.launch_power.steady);
+    snapshot.window.sum_i.d = 10 * off;
     (void)slow_monitors_step(&drive, &snapshot);
     TEST_ASSERT_EQUAL_INT(0, drive.task.launch_power.steady);
 }

@@ -63,7 +63,7 @@ static int launch(double i_d, double i_q, double delta, int steps)
 void setUp(void)
 {
     state = (launch_power_state_t){0};
-    in = (launch_power_in_t){.acting = true};
+    in = (launch_power_in_t){.acting = true, .measured = true};
     rotor.omega = rotor.angle = 0.0;
 }
 
@@ -159,6 +159,44 @@ void test_noise_of_the_current_sensors_is_no_fault_and_hides_nothing_when_it_end
     TEST_ASSERT_EQUAL_INT(3 + CONFIRMED - 1, found_after_change(1060));
 }
 
+/* r_0 follows the noise upwards, too: by 1 - exp(-1/2) of it in 2048 steps. */
+void test_the_reference_of_the_noise_follows_it_in_4096_steps(void)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    state = (launch_power_state_t){.i_ref = {0, 13107}, .steady = SETTLED};
+    double sum = 0.0;
+    for (int n = 0; n < 2048; n++) {
+        in.u_standing.q = answered_noise(600);
+        (void)launch_power_step(&config, &state, &in);
+        sum += state.noise_q8;
+    }
+    const double followed = (sum / 2048.0) * (1.0 - exp(-0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(0.15 * followed + 4096.0, followed, state.first_noise_q8);
+    TEST_ASSERT_GREATER_THAN_INT32(256, state.first_noise_q8);
+}
+
+/* Three steps of prediction, and the step in which the angle's change is one of several steps. */
+void test_the_comparison_waits_while_the_angle_is_predicted_and_for_one_step_more(void)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    for (int n = 0; n < 40; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    const launch_power_state_t before = state;
+    for (int n = 0; n < 4; n++) {
+        in.measured = n == 3;
+        in.theta_e += 50000000U;
+        in.u_standing.q = 200000;
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+        TEST_ASSERT_EQUAL_INT32(before.power_q8, state.power_q8);
+        TEST_ASSERT_EQUAL_INT32(before.omega_q8, state.omega_q8);
+        TEST_ASSERT_EQUAL_UINT8(before.steady, state.steady);
+    }
+    in.u_standing.q = 0;
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_INT32(0, state.omega_q8); /* of one step */
+}
+
 void test_a_small_current_is_not_checked(void)
 {
     in.i_ref = (dq_q15_t){0, 819};
@@ -203,6 +241,8 @@ void test_a_bridge_that_is_off_is_not_checked_and_starts_again(void)
 /* (MN-28) and (MN-29) in double precision, written from the equations; counts of the sums. */
 typedef struct {
     double p, p_0, w, w_0, i_d, i_q, theta; /* theta: turns 2^32 */
+    double r, r_0;
+    bool above;
     int steady, wrong;
 } twin_t;
 
@@ -210,6 +250,19 @@ static void follow(double *mean, double *first, double x, int steady)
 {
     *mean += (x - *mean) / ((steady < 4) ? 1.0 : 4.0);
     *first = (steady < SETTLED) ? *mean : *first + (*mean - *first) / 4096.0;
+}
+
+/* (MN-39) */
+static void follow_noise(twin_t *t, double p, double i)
+{
+    if (t->steady < 4) {
+        return;
+    }
+    const bool above = (fabs(p - t->p) > 6.0) ? p > t->p : state.above; /* of less, rounding decides */
+    const double x = (above != t->above) ? fmin(fabs(p - t->p), 8.0 * 530.0 * i / 65536.0) : 0.0;
+    t->above = above;
+    t->r += (x - t->r) / ((t->steady < SETTLED) ? 4.0 : 16.0);
+    t->r_0 = (t->steady < SETTLED) ? t->r : t->r_0 + (t->r - t->r_0) / 4096.0;
 }
 
 /* Returns by how much the power has changed beyond its threshold; negative while nothing is compared. */
@@ -226,11 +279,11 @@ static double twin_step(twin_t *t)
         t->i_q = i_q;
         t->steady = 0;
     }
+    follow_noise(t, p, hypot(i_d, i_q));
     follow(&t->p, &t->p_0, p, t->steady);
     follow(&t->w, &t->w_0, w, t->steady);
     const double v_turning = 2.0 * fabs(t->w - t->w_0) * (2884.0 + abs(in.psi_ref.q) / 8.0) / 65536.0;
-    const double noise = fmax(state.noise, state.first_noise); /* of the firmware: it has tests of its own above */
-    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, 2.0 * noise);
+    const double loss_max = fmax(530.0 * hypot(i_d, i_q) / 65536.0, 2.0 * fmax(t->r, t->r_0));
     const double beyond = fabs(t->p - t->p_0) - loss_max - v_turning * hypot(i_d, i_q) / 65536.0;
     if (t->steady < SETTLED) {
         t->steady++;
@@ -269,7 +322,9 @@ static void compare(const twin_t *twin, double beyond, int compared[2])
     if (twin->w == 0.0) {
         TEST_ASSERT_EQUAL_INT32(0, state.omega_q8);
     }
-    if (fabs(beyond) > 8.0) {
+    TEST_ASSERT_DOUBLE_WITHIN(3.0, twin->r, state.noise_q8 / 256.0);
+    TEST_ASSERT_DOUBLE_WITHIN(19.0, twin->r_0, state.first_noise_q8 / 256.0);
+    if (fabs(beyond) > 40.0) {
         TEST_ASSERT_EQUAL_INT(beyond > 0.0, state.wrong > 0);
         compared[beyond > 0.0]++;
     }
@@ -322,6 +377,7 @@ void test_no_argument_wraps(void)
         const int32_t d = (n >> 2 & 1U) ? 32767 : -32768, q = (n >> 3 & 1U) ? 32767 : -32768;
         const int32_t psi_d = (n >> 4 & 1U) ? 32767 : -32768, psi_q = (n >> 5 & 1U) ? 32767 : -32768;
         in = (launch_power_in_t){.acting = true,
+                                 .measured = true,
                                  .u_standing = {ends[n & 1U], ends[n >> 1 & 1U]},
                                  .i_ref = {d, q},
                                  .psi_ref = {psi_d, psi_q},
