@@ -5,7 +5,7 @@
  * Source   docs/howto/xcp.md
  * Range    calibration/calibration_list.h, calibration/measurement_list.h
  * Errors   the protocol's own; seed and key protect against mistakes, not attacks: the key is a published function
- * Context  1 kHz task, after the drive's step */
+ * Context  1 kHz task; xcp_access_receive() before the drive's step, the rest after it */
 #include "calibration/calibration.h"
 #include "calibration/freeze_frame.h"
 #include "calibration/measurements.h"

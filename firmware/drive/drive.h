@@ -73,7 +73,7 @@ typedef enum { RUN_STATE_LIST(RUN_STATE_VALUE) } run_state_t;
 /** The active short circuit at the bridge (drive/short_circuit.h). */
 typedef enum {
     SHORT_CIRCUIT_LOWER = 0,      /* by the lower switches, */
-    SHORT_CIRCUIT_UPPER = 1,      /* by the upper ones, because the currents want it (safety/short_side.h), */
+    SHORT_CIRCUIT_UPPER = 1,      /* by the upper ones, because the currents show a defect (safety/short_side.h), */
     SHORT_CIRCUIT_LAST_LOWER = 2, /* by either because the gate drivers ended the other, */
     SHORT_CIRCUIT_LAST_UPPER = 3,
     SHORT_CIRCUIT_NONE = 4 /* or by none, because they ended both */

@@ -5,8 +5,9 @@
  *   The gates are read back. If those that were on are off a period later, the gate drivers have ended the short
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
- *   disabled. The task may want the upper switches from the first, or while the lower ones are on: its wish counts as
- *   long as no side has been ended.
+ *   disabled. The task may request the upper switches (safety/short_side.h), before the short circuit or while the
+ *   lower ones are on. The request acts only while the lower switches are used and no side has been ended; the upper
+ *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on: that is no failure of a side.
  * Source   docs/theory/safe-state.md (SS-11), (SS-20)
  * Context  fast ISR, in every period of the short circuit */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_SAFE_STATE_H
 #define SAFETY_SAFE_STATE_H
-/** Safe state that a fault would need now: active short circuit by the low-side switches, or switching disabled.
+/** Safe state that a fault would need now: active short circuit, or switching disabled.
  *   e = sqrt(3) w max(psi_f, psi_f + dpsi), the line back-EMF's peak at the known speed w
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
