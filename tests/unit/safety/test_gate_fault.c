@@ -192,3 +192,16 @@ void test_an_offset_delays_the_release_of_the_supply(void)
     TEST_ASSERT_FALSE(state.switch_shorted);
     TEST_ASSERT_TRUE(state.holds_supply);
 }
+
+/* A converter that measures nothing says nothing about the current. */
+void test_the_supply_is_held_while_the_currents_are_not_valid(void)
+{
+    in.latched = true;
+    in.line_emf = V_DC / 4;
+    in.currents_valid = false;
+    (void)steps(250);
+    TEST_ASSERT_TRUE(state.holds_supply);
+    in.currents_valid = true;
+    (void)steps(250);
+    TEST_ASSERT_FALSE(state.holds_supply);
+}

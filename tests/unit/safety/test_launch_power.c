@@ -175,6 +175,26 @@ void test_the_reference_of_the_noise_follows_it_in_4096_steps(void)
     TEST_ASSERT_GREATER_THAN_INT32(256, state.first_noise_q8);
 }
 
+/* A power of one count above its mean is above it, and without any noise r ends at zero. */
+void test_one_count_is_noise_and_none_is_none(void)
+{
+    in.i_ref = (dq_q15_t){0, 13107};
+    in.u_standing.q = 6; /* 1.2 of the power */
+    state = (launch_power_state_t){.i_ref = {0, 13107}, .steady = SETTLED};
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_TRUE(state.above);
+    TEST_ASSERT_EQUAL_INT32(256 / 16, state.noise_q8);
+    in.u_standing.q = 0;
+    for (int n = 0; n < 300; n++) {
+        TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    }
+    TEST_ASSERT_EQUAL_INT32(0, state.noise_q8);
+    TEST_ASSERT_FALSE(state.above);
+    in.u_standing.q = 4000; /* 800 of the power */
+    TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
+    TEST_ASSERT_EQUAL_INT32(800 * 256 / 16, state.noise_q8);
+}
+
 /* Three steps of prediction, and the step in which the angle's change is one of several steps. */
 void test_the_comparison_waits_while_the_angle_is_predicted_and_for_one_step_more(void)
 {
@@ -185,7 +205,7 @@ void test_the_comparison_waits_while_the_angle_is_predicted_and_for_one_step_mor
     const launch_power_state_t before = state;
     for (int n = 0; n < 4; n++) {
         in.measured = n == 3;
-        in.theta_e += 50000000U;
+        in.theta_e += 10000000U; /* of all four less than 1/64 of a turn */
         in.u_standing.q = 200000;
         TEST_ASSERT_EQUAL_HEX32(0, launch_power_step(&config, &state, &in));
         TEST_ASSERT_EQUAL_INT32(before.power_q8, state.power_q8);

@@ -419,3 +419,11 @@ void test_no_argument_wraps(void)
     in.v_dc = INT16_MAX;
     TEST_ASSERT_TRUE(safe_state_step(&config, &state, &in));
 }
+
+/* The low voltage of the time before an over-voltage ends no short circuit after it. */
+void test_only_a_voltage_that_is_low_after_the_over_voltage_releases(void)
+{
+    TEST_ASSERT_FALSE(steps(300));
+    in.over_voltage = true;
+    TEST_ASSERT_TRUE(steps(1));
+}

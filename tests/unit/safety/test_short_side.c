@@ -107,3 +107,22 @@ void test_the_short_circuit_keeps_the_side_and_switching_disabled_clears_it(void
     TEST_ASSERT_EQUAL_INT32(0, state.a_q8);
     TEST_ASSERT_EQUAL_INT32(0, state.b_q8);
 }
+
+/* A sixteenth of the difference, in 1/256 of a count. */
+void test_the_mean_is_of_the_current_beyond_its_reference(void)
+{
+    const short_side_in_t in = {.acting = true, .i = {1600, -800, -800}, .i_ref = {320, 160, -480}};
+    short_side_step(&state, &in);
+    TEST_ASSERT_EQUAL_INT32(1280 * 256 / 16, state.a_q8);
+    TEST_ASSERT_EQUAL_INT32(-960 * 256 / 16, state.b_q8);
+}
+
+void test_just_i_least_or_as_much_of_either_sign_decides_for_the_lower_side(void)
+{
+    for (int beyond = 0; beyond <= 1; beyond++) {
+        const short_side_state_t least = {.a_q8 = I_LEAST * 256 + beyond, .b_q8 = -I_LEAST * 128};
+        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&least, I_LEAST));
+        const short_side_state_t uneven = {.a_q8 = 2000 * 256, .b_q8 = -2000 * 256 + beyond};
+        TEST_ASSERT_EQUAL(beyond == 1, short_side_is_upper(&uneven, I_LEAST));
+    }
+}
