@@ -21,7 +21,7 @@ from pathlib import Path
 
 import lizard
 
-from tree import PROJECT, Violation, files, lines, report
+from tree import PROJECT, REASON_WORDS, Violation, files, lines, listed, report
 
 MEASURED = tuple(
     Path("firmware") / layer for layer in ("fx", "signal", "control", "safety", "second_level", "scope", "ecu")
@@ -29,7 +29,6 @@ MEASURED = tuple(
 MARKER = re.compile(r"\b[GL]COVR?_EXCL_\w*")
 EXCLUSION = re.compile(r"/\* GCOVR_EXCL_(LINE|BR_LINE|START): (.+?) \*/")
 STOP = re.compile(r"/\* GCOVR_EXCL_STOP \*/")
-REASON_WORDS = 4  # fewer say no more than the code
 GCOV_FILES = 50  # in one call
 
 
@@ -155,12 +154,7 @@ def main() -> int:
     parser.add_argument("--report", type=Path, help="what gcovr --json has written")
     parser.add_argument("--build", type=Path, help="the build folder with the tests' counts")
     args = parser.parse_args()
-    found = all_exclusions(args.root)
-    exclusions = [e for e in found if isinstance(e, Exclusion)]
-    violations = [e for e in found if isinstance(e, Violation)]
-    print(f"{len(exclusions)} exclusions from coverage")
-    for exclusion in exclusions:
-        print(f"    {exclusion}")
+    exclusions, violations = listed(all_exclusions(args.root), "coverage")
     if args.report:
         covered = json.loads(args.report.read_text(encoding="utf-8"))
         _table(covered)

@@ -31,7 +31,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
 
-from tree import PROJECT, Violation, files, lines, report
+from tree import PROJECT, REASON_WORDS, Violation, files, lines, listed, report
 
 LLVM = Path("build", "clang", "bin")
 LABEL = "^coverage$"
@@ -59,7 +59,6 @@ PARTS = (
     ("ecu", r"firmware/ecu/", 95),
 )
 EXCLUSION = re.compile(r"/\* MCDC_EXCL(?: (C\d+(?:,C\d+)*))?: (.+?) \*/")
-REASON_WORDS = 4  # fewer say no more than the code
 NOT_CODE = re.compile(r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\\n])*\"|^[ \t]*#(?:\\\n|[^\n])*|_Static_assert\([^;]*;",
                       re.DOTALL | re.MULTILINE)  # fmt: skip
 UNMEASURED = re.compile(r"/\* GCOVR_EXCL_START.*?GCOVR_EXCL_STOP \*/", re.DOTALL)
@@ -281,12 +280,7 @@ def main() -> int:
     parser.add_argument("--part", default="", choices=["all", *(name for name, _, _ in PARTS)], metavar="PART",
                         help="all conditions that are not shown, of one part or of all")  # fmt: skip
     args = parser.parse_args()
-    found = all_exclusions(args.root)
-    exclusions = [e for e in found if isinstance(e, Exclusion)]
-    violations = [e for e in found if isinstance(e, Violation)]
-    print(f"{len(exclusions)} exclusions from MC/DC")
-    for exclusion in exclusions:
-        print(f"    {exclusion}")
+    exclusions, violations = listed(all_exclusions(args.root), "MC/DC")
     if args.build:
         violations += evaluate(args.root.resolve(), args.build.resolve(), exclusions, args.part)
     return report(violations, "mcdc")

@@ -6,8 +6,11 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 PROJECT = Path(__file__).resolve().parents[2]
+REASON_WORDS = 4  # of an exclusion: fewer say no more than the code
+T = TypeVar("T")
 SKIPPED = {"build", ".git", "__pycache__", ".pytest_cache", ".venv"}
 
 
@@ -46,6 +49,21 @@ def report(violations: Iterable[Violation], done: str) -> int:
         print(violation, file=sys.stderr)
     print(f"{done}: {len(found)} violations" if found else f"{done}: ok")
     return 1 if found else 0
+
+
+def listed(found: Iterable[T | Violation], what: str) -> tuple[list[T], list[Violation]]:
+    """Print the exclusions from what; return them, and the violations that were among them."""
+    exclusions: list[T] = []
+    violations: list[Violation] = []
+    for one in found:
+        if isinstance(one, Violation):
+            violations.append(one)
+        else:
+            exclusions.append(one)
+    print(f"{len(exclusions)} exclusions from {what}")
+    for exclusion in exclusions:
+        print(f"    {exclusion}")
+    return exclusions, violations
 
 
 def run(check: Callable[[Path], Iterable[Violation]], description: str) -> int:
