@@ -35,7 +35,7 @@ static struct {
     uint32_t last;       /* reading of the period before */
     int32_t travel;      /* from one period to the next */
     int32_t sampled_q32; /* instant of the sample in its period, as a share of the period: 2^32 = 1 */
-    uint32_t invalid;    /* in a row */
+    uint16_t invalid;    /* in a row */
     bool healthy;        /* at the start */
 } encoder;
 
@@ -96,7 +96,7 @@ static void take(uint32_t frame, uint32_t frames)
 static __attribute__((noinline, cold)) void predict(void)
 {
     encoder.last += (uint32_t)encoder.travel;
-    encoder.invalid++;
+    count_up(&encoder.invalid);
     count_up(&angle_errors.invalid);
 }
 
@@ -105,7 +105,7 @@ static __attribute__((noinline, cold)) void predict(void)
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
-    const uint32_t frames = serial_angle_read(&frame);
+    const uint32_t frames = serial_angle_read(AS5047_READ_ANGLE, &frame);
     if (__builtin_expect(frames != 0U && as5047_is_valid(frame), 1)) {
         take(frame, frames);
     } else {

@@ -12,6 +12,7 @@
 #define VELOCITY_TURNS_PER_S (500.0F / 32768.0F) /* of one bit: resolution of 14 bits, 8.192 MHz */
 #define READY_TICKS 85U /* 0.759 us after SAMPLE falls: 6 periods of 8.192 MHz and 20 ns */
 #define MISSING_MAX 3U  /* a restart of the sampling may lose two */
+#define ANY_WORD 0U     /* sent with each frame: the converter has no data input in normal mode */
 #define FRAME(bits) (LPSPI_TCR_FRAMESZ((bits) - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0))
 
 static const serial_angle_timing_t timing = {.bit = 2, .select = 4, .gap = 5}; /* 14 MHz, 143 ns */
@@ -37,7 +38,7 @@ void angle_init(uint32_t period_ticks)
     serial_angle_init(&timing);
     clear_faults();
     PTC->PCOR = (1U << PIN_RESOLVER_A0) | (1U << PIN_RESOLVER_A1); /* normal mode, position */
-    serial_angle_start(&(serial_angle_t){.command = FRAME(AD2S1210_BITS), .word = 0, .start = READY_TICKS});
+    serial_angle_start(&(serial_angle_t){.command = FRAME(AD2S1210_BITS), .word = ANY_WORD, .start = READY_TICKS});
 }
 
 /* The velocity that the converter has measured: a reset of the processor does not affect it. */
@@ -54,7 +55,7 @@ float angle_first_speed(void)
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
-    if (__builtin_expect(serial_angle_read(&frame) != 0U, 1)) {
+    if (__builtin_expect(serial_angle_read(ANY_WORD, &frame) != 0U, 1)) {
         position = ad2s1210_decode(frame);
         missing = 0;
     } else {

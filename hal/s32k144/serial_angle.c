@@ -11,8 +11,6 @@
 #define PULSE_TICKS 56U    /* 0.5 us: longer than a clock of the LPSPI, shorter than a frame */
 #define ONE_RECEIVED LPSPI_FSR_RXCOUNT(1U)
 
-static uint32_t word;
-
 void serial_angle_init(const serial_angle_timing_t *timing)
 {
     LPSPI0->CR = 0;
@@ -37,21 +35,20 @@ uint32_t serial_angle_exchange(uint32_t word_sent)
 /* The command passes through the transmit FIFO and must have left it before the request holds the FIFO back. */
 void serial_angle_start(const serial_angle_t *config)
 {
-    word = config->word;
     LPSPI0->TCR = config->command;
     await(&LPSPI0->FSR, LPSPI_FSR_TXCOUNT_MASK, 0);
     LPSPI0->CR = 0;
     LPSPI0->CFGR0 = LPSPI_CFGR0_HREN | LPSPI_CFGR0_HRPOL | LPSPI_CFGR0_HRSEL;
     LPSPI0->CR = LPSPI_CR_MEN | LPSPI_CR_RRF;
     for (uint32_t k = 0; k < FIFO_WORDS; k++) {
-        LPSPI0->TDR = word;
+        LPSPI0->TDR = config->word;
     }
     TRGMUX->TRGMUX_LPSPI0 = TRGMUX_LPSPI0_SEL0(PDB0_PULSE);
     sampling_pulse(config->start, config->start + PULSE_TICKS);
 }
 
 /* Each frame that is taken is replaced by a word to send, so that the FIFO stays full. */
-uint32_t serial_angle_read(uint32_t *frame)
+uint32_t serial_angle_read(uint32_t word, uint32_t *frame)
 {
     const uint32_t state = LPSPI0->FSR;
     const uint32_t received = state & LPSPI_FSR_RXCOUNT_MASK;

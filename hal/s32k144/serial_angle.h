@@ -33,7 +33,8 @@ void serial_angle_init(const serial_angle_timing_t *timing);
 uint32_t serial_angle_exchange(uint32_t word);
 /** From the next period on the hardware starts the frames. The module must be idle. */
 void serial_angle_start(const serial_angle_t *config);
-/** Number of frames since the last reading, and the newest in *frame; 0: there is none of this period. */
-uint32_t serial_angle_read(uint32_t *frame);
+/** Number of frames since the last reading, and the newest in *frame; 0: there is none of this period. word: the one
+ * that serial_angle_start() was given. */
+uint32_t serial_angle_read(uint32_t word, uint32_t *frame);
 
 #endif
