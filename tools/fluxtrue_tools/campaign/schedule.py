@@ -13,6 +13,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from fluxtrue_tools import interrupts
 from fluxtrue_tools.campaign.store import Store
 from fluxtrue_tools.errors import FluxtrueError
 
@@ -39,6 +40,7 @@ def local(task: Task, cases: list[int], workers: int | None) -> Iterator[tuple[i
     try:
         waiting = {pool.submit(task, case): case for case in cases}
         for future in as_completed(waiting):
+            interrupts.raise_if_received()
             yield waiting[future], future.result()
     except BaseException as error:
         # The results of the cases that run would be lost. A pool that has lost a worker would wait without end for the
@@ -66,6 +68,7 @@ def dask(task: Task, cases: list[int], address: str) -> Iterator[tuple[int, Any]
         futures = client.map(task, cases, pure=False)
         case_of = {future.key: case for future, case in zip(futures, cases, strict=True)}
         for future, result in dask_completed(futures, with_results=True):
+            interrupts.raise_if_received()
             yield case_of[future.key], result
 
 
