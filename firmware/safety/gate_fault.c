@@ -19,7 +19,7 @@ static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_stat
 /* At rest, or no switch is shorted: the machine turns without a current. */
 static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bool none)
 {
-    const bool quiet = debounce_step(&state->quiet, none, QUIET_STEPS, 1U) != 0U;
+    const bool quiet = debounce_holds(&state->quiet, none, QUIET_STEPS);
     const bool at_rest = in->line_emf <= fx_max_s32(in->v_dc >> 6, REST);
     return at_rest || (quiet && !state->switch_shorted);
 }

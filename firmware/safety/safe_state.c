@@ -27,7 +27,7 @@ static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
 static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool none = squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
-    return debounce_step(&state->without_current, in->shorted && in->currents_valid && none, CONFIRMED_STEPS, 1U) != 0U;
+    return debounce_holds(&state->without_current, in->shorted && in->currents_valid && none, CONFIRMED_STEPS);
 }
 
 /* Whether the measured speed may be used now. In the short circuit the currents must stand still in the rotor's
@@ -37,7 +37,7 @@ static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
     const bool checked = in->shorted && in->currents_valid;
     const bool steady = is_steady(in->i, (dq_q15_t){state->i_before.d, state->i_before.q}, 4) &&
                         is_steady(in->i, in->i_last_period, 8);
-    const bool agreed = debounce_step(&state->steady, checked && steady, CONFIRMED_STEPS, 1U) != 0U;
+    const bool agreed = debounce_holds(&state->steady, checked && steady, CONFIRMED_STEPS);
     state->i_before = (dq_q15_halfword_t){(q15_t)in->i.d, (q15_t)in->i.q};
     return in->speed_valid && (!checked || agreed);
 }
@@ -66,7 +66,7 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
  * fault the diodes decide: a link whose voltage is really below the back-EMF draws a current. */
 static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
 {
-    const bool rectifies = debounce_step(&state->rectifying, in->rectifying, RECTIFYING_STEPS, 1U) != 0U;
+    const bool rectifies = debounce_holds(&state->rectifying, in->rectifying, RECTIFYING_STEPS);
     if (in->v_dc >= state->v_dc || rectifies) {
         state->v_dc = in->v_dc;
     } else if (!in->doubtful) {
@@ -85,6 +85,6 @@ bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *stat
     const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);
     state->short_circuit = rectifies;
     const bool low = in->over_voltage && in->v_dc <= config->v_release;
-    const bool released = debounce_step(&state->low, low, RELEASE_STEPS, 1U) != 0U;
+    const bool released = debounce_holds(&state->low, low, RELEASE_STEPS);
     return rectifies || (in->over_voltage && !released);
 }
