@@ -24,7 +24,7 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     }
 }
 
-/* What one step of the format is. */
+/* The value of one step of the format. */
 static float least(const drive_t *drive, calibration_id_t id)
 {
     const motor_t *m = drive->motor;

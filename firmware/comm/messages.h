@@ -28,7 +28,7 @@
     X(BATTERY_LIMITS_LOST, 7, "The battery's limits were received once and are lost.") \
     X(SPEED, 8, "The speed is near its limit.")
 
-/* What the requested torque is beyond; X(NAME, value, explanation): named and explained here only. */
+/* The limit that the requested torque exceeds; X(NAME, value, explanation): named and explained here only. */
 #define REQUEST_LIMIT_LIST(X) \
     X(NONE, 0, "The requested torque is within every limit.") \
     X(RATED_TORQUE, 1, "The requested torque is beyond the rated torque of the machine.") \

@@ -79,7 +79,7 @@ void acquire_check(drive_t *drive, const sample_t *sample, bool run)
     }
     /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
     if ((faults & FAULT_ANGLE) != 0U) {
-        drive->fast.angle_tracker.samples = 0; /* what it predicts has long been contradicted: it starts again */
+        drive->fast.angle_tracker.samples = 0; /* its prediction has been wrong for long: it starts again */
     }
     if (faults != 0U) {
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);

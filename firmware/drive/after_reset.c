@@ -13,7 +13,7 @@ void before_reset(const drive_t *drive, before_reset_t *before)
     };
 }
 
-/* (SS-14). A rotor does not lose half of its speed within the time of a reset, but a broken sensor reads none. */
+/* (SS-14). A rotor does not lose half of its speed during a reset, but a broken sensor may read a standstill. */
 static q15_t present_speed(const before_reset_t *before, q15_t speed)
 {
     return (before->speed_valid && speed >= before->speed / 2) ? speed : before->speed;
@@ -39,7 +39,7 @@ bool after_reset_needs_short_circuit(const motor_t *m, const before_reset_t *bef
     return before->armed && decide(m, &state, before, speed, v_dc);
 }
 
-/* With the speed goes the back-EMF, for which contactor and gate supply stay on from the first step. */
+/* The back-EMF follows from the speed; contactor and gate supply stay on for it from the first step. */
 void after_reset_hold(drive_t *drive, const before_reset_t *before, q15_t speed)
 {
     drive->task.armed = true;

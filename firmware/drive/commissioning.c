@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "control/current/transform.h"
 #include "drive/data_check.h"
 #include "drive/mrai/mrai_seam.h"
 #include "fx/div.h"
 
 #define DEAD_TIME_MAX Q15(0.125) /* a larger share of the dc voltage is not a plausible voltage error */
-#define KNEE_CHANGED Q31(0.8)    /* a measured knee counts from a quarter wider on; smaller differences are noise */
+#define KNEE_CHANGED Q31(0.8)    /* a measured knee counts if it is wider by a quarter; smaller differences are noise */
 #define MISMATCH_MAX Q15(0.25) /* half of the share that makes the confidence fall */
 
 static int32_t product_q30(int32_t a_q30, q15_t b)
@@ -79,7 +80,7 @@ bool drive_compensate(drive_t *drive, const compensation_t *compensation)
     }
     const motor_parameters_t before = *p;
     drive_set_dead_time(p, (q15_t)dead_time);
-    p->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(0.86602540378443865));
+    p->modulate.knee_side_q17 = fx_mul_q31(compensation->knee_q17, Q31(SQRT3_HALF));
     p->modulate.knee_q17 = compensation->knee_q17;
     data_check_accept(drive, &before);
     drive->task.compensation = *compensation;

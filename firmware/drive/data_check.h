@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_DATA_CHECK_H
 #define DRIVE_DATA_CHECK_H
-/** Finds what the memory has changed by itself in the data that nothing, or only few functions, may write.
+/** Finds changes by errors of the memory in data that no function, or only a few, may write.
  *   drive->motor           three copies, one of them complemented; the majority is restored before each step
  *   period, parameters,    each word has its complement; a few words are compared in each step, all of them within
  *   mrai_parameters        DATA_CHECK_ROUND_MAX steps
@@ -9,9 +9,9 @@
  *   options of the request one word, for an owner that alone writes them: the ECU
  *   window                 the fast ISR must complete windows while it runs
  * A function that changes the parameters takes a copy of them first and passes it to data_check_accept(), which renews
- * the complements of the words that differ: damage elsewhere stays visible.
+ * the complements of the words that differ: damage in other words is still found.
  * Source   docs/theory/data-integrity.md (DI-1), (DI-2)
- * Errors   FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA, until the next start: what else the memory changed is not known
+ * Errors   FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA, until the next start, because other data may have changed, too
  * Context  1 kHz task, and before the interrupts start */
 #include "drive/drive.h"
 
@@ -24,9 +24,9 @@ void data_check_accept_mrai(drive_t *drive, const mrai_config_t *before);
 #endif
 /** The options of the request have been changed on purpose. */
 void data_check_accept_options(drive_t *drive);
-/** Each step of an owner of the request; a difference is a fault in this step's data_check_step(). */
+/** In each step of the owner of the request; a difference is a fault in this step's data_check_step(). */
 void data_check_check_options(drive_t *drive);
-/** First of all in each step: the pointer to the motor data. */
+/** Restores the pointer to the motor data; first in each step. */
 void data_check_restore_pointer(drive_t *drive);
 /** The faults of this step. */
 uint32_t data_check_step(drive_t *drive);

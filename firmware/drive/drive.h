@@ -72,16 +72,16 @@ typedef enum { RUN_STATE_LIST(RUN_STATE_VALUE) } run_state_t;
 
 /** The active short circuit at the bridge (drive/short_circuit.h). */
 typedef enum {
-    SHORT_CIRCUIT_LOWER = 0,      /* by the lower switches, */
-    SHORT_CIRCUIT_UPPER = 1,      /* by the upper ones, because the currents show a defect (safety/short_side.h), */
-    SHORT_CIRCUIT_LAST_LOWER = 2, /* by either because the gate drivers ended the other, */
-    SHORT_CIRCUIT_LAST_UPPER = 3,
-    SHORT_CIRCUIT_NONE = 4 /* or by none, because they ended both */
+    SHORT_CIRCUIT_LOWER = 0,      /* by the lower switches */
+    SHORT_CIRCUIT_UPPER = 1,      /* by the upper ones: the currents show a defect (safety/short_side.h) */
+    SHORT_CIRCUIT_LAST_LOWER = 2, /* by the lower ones: the gate drivers have ended it on the upper side */
+    SHORT_CIRCUIT_LAST_UPPER = 3, /* by the upper ones: the gate drivers have ended it on the lower side */
+    SHORT_CIRCUIT_NONE = 4        /* not possible: the gate drivers have ended it on both sides */
 } short_circuit_side_t;
 
 typedef struct {
     short_circuit_side_t side;
-    bool holds; /* as read back */
+    bool holds; /* the short circuit is on, as read back */
 } short_circuit_t;
 
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */
@@ -104,7 +104,7 @@ typedef struct {
     turning_control_state_t turning_control; /* of a motor that needs it, in place of current_control */
 } fast_state_t;
 
-#define COMPENSATION_KNEE_RANGE 16 /* a measured knee is at most so many times as wide as the nominal one */
+#define COMPENSATION_KNEE_RANGE 16 /* largest ratio of a measured knee to the nominal one */
 
 /** What the modulation adds against dead time and device drop, if it has been measured. */
 typedef struct {
@@ -115,8 +115,8 @@ typedef struct {
 
 /** Values that a start has recalled (drive/recall.h). */
 typedef struct {
-    uint8_t agreed; /* updates in a row */
-    uint8_t trials;
+    uint8_t agreed; /* updates in a row that agree with the values */
+    uint8_t trials; /* updates that could have confirmed them */
     bool unconfirmed;
 } recall_t;
 
@@ -222,8 +222,9 @@ typedef struct {
 
 /** What drive/data_check.h compares the motor data with. Written by the 1 kHz task, and before it starts. */
 typedef struct {
-    uint32_t period[DATA_CHECK_PERIOD_WORDS];         /* complements, */
-    uint32_t parameters[DATA_CHECK_PARAMETERS_WORDS]; /* one after the other as the data themselves */
+    /* Complements, in the order of the data in drive_t. */
+    uint32_t period[DATA_CHECK_PERIOD_WORDS];
+    uint32_t parameters[DATA_CHECK_PARAMETERS_WORDS];
 #if FLUXTRUE_MRAI
     uint32_t mrai_parameters[DATA_CHECK_MRAI_WORDS];
 #endif
@@ -257,32 +258,32 @@ typedef struct {
     pulses_config_t pulses;      /* in effect: written by the 1 kHz task while no pulses are active */
     pulses_state_t pulses_state; /* written by the fast ISR alone */
     volatile bool held;   /* switching stays disabled: written in the background, which writes the flash meanwhile */
-    sample_box_t samples; /* last: with its slots in front, the offsets of the rest would be too large for a load */
+    sample_box_t samples; /* last: behind its slots the offsets of other members would be too large for a load */
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);
-/** All complements of drive/data_check.h; at the end of a change of everything. */
+/** Computes all complements of drive/data_check.h, after the data have been set as a whole. */
 void data_check_start(drive_t *drive);
 void drive_raise_fault(drive_t *drive, uint32_t fault);
-/** FAULT_CONFIG, and why: the first check that failed is kept until the next start. Nothing for MOTOR_CHECK_OK. From
- * the fast ISR's priority, or before the interrupts start. */
+/** Raises FAULT_CONFIG and records its reason: the first check that failed is kept until the next start. MOTOR_CHECK_OK
+ * has no effect. From the fast ISR's priority, or before the interrupts start. */
 void drive_refuse(drive_t *drive, motor_check_t check);
-/** What FAULT_CONFIG stands for; MOTOR_CHECK_OK while there is none. From any priority. */
+/** The reason of FAULT_CONFIG; MOTOR_CHECK_OK while there is no such fault. From any priority. */
 static inline motor_check_t drive_motor_check(const drive_t *drive)
 {
     const motor_check_t check = (motor_check_t)drive->fast.motor_check;
     return (check == MOTOR_CHECK_OK && drive->data_check.damaged) ? MOTOR_CHECK_LIVE_DATA : check;
 }
 
-/** Since the last call. Once per step, from the task or what calls it. */
+/** What the interrupts have done since the last call. Once per step, from the task or its caller. */
 progress_t drive_progress(drive_t *drive);
 
 /** The identified values, for the store that survives a power cycle. Called in the background. */
 identify_record_t drive_identified_record(const drive_t *drive);
-/** After drive_init(), before the first task; false: the record is refused, nothing changed. What is recalled acts when
- * measured windows have confirmed it (drive/recall.h). */
+/** After drive_init(), before the first task; false: the record is refused and nothing has changed. The recalled values
+ * act once measured windows have confirmed them (drive/recall.h). */
 bool drive_recall(drive_t *drive, const identify_record_t *record);
-/** The identification begins again with its priors. */
+/** Restarts the identification from its priors. */
 void drive_reset_identification(drive_t *drive);
 
 /** The identification's share of the 1 kHz task. */
@@ -309,19 +310,19 @@ static inline bool drive_is_shorted(const drive_t *drive)
 {
     return drive->fast.short_circuit.holds;
 }
-/** Below it the rotor counts as standing, of the speed base. */
+/** Share of the speed base below which the rotor counts as standing. */
 #define DRIVE_STANDSTILL Q31(0.002)
 static inline bool drive_stands_still(q31_t omega)
 {
     return omega <= DRIVE_STANDSTILL && omega >= -DRIVE_STANDSTILL;
 }
-/** From the next step on a request to enable switching waits, while the drive is held. From the background. */
+/** While the drive is held, a request to enable switching waits. Acts from the next step on; from the background. */
 static inline void drive_hold(drive_t *drive, bool held)
 {
     drive->held = held;
 }
-/** The angle sensor's readings are larger by this part of a turn from the next one on, because it has found its zero;
- * the rotor has not moved. With switching disabled; from the fast ISR's priority. */
+/** The angle sensor has found its zero: from the next reading on its angle is larger by this part of a turn, although
+ * the rotor has not moved. Only with switching disabled; from the fast ISR's priority. */
 static inline void drive_move_angle(drive_t *drive, uint32_t by)
 {
     angle_tracker_move(&drive->period.angle_tracker, &drive->fast.angle_tracker, by);

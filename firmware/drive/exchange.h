@@ -31,14 +31,14 @@ typedef struct {
     bool acting;          /* the bridge switched throughout the last period and is switching now */
     bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
-    bool unused;          /* false: the four are written by one instruction */
+    bool unused;          /* always false: the four flags are written by one instruction */
     FX_PADDING_WORD;
 } sample_t;
 
 FX_POWER_OF_TWO_SIZE(sample_t);
 
-/** Periods that stay readable. A power of two; more than a step of the task has, by what the scope's freeze frame needs
- * from before a fault. */
+/** Number of periods that remain readable: a power of two, and at least those of one step of the task plus those before
+ * a fault that the scope's freeze frame needs. */
 #define SAMPLE_SLOTS 64U
 
 typedef struct {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "drive/motor.h"
 
+#include "control/current/transform.h"
 #include "drive/mrai/mrai_seam.h"
 
 #define CIRCLE_CLEAR_Q30 1007681536 /* (31/32)^2 */
@@ -16,7 +17,7 @@ static bool ratio_valid(const motor_t *m)
 {
     const int32_t ratio_q31 = m->parameters.modulate.alpha_q31;
     const uint32_t one_q31 = (uint32_t)(ratio_q31 >> 16) * (m->parameters.current_control.per_ratio_q31 >> 15);
-    const int32_t error = m->parameters.modulate.side_q31 - fx_mul_q31(ratio_q31, Q31(0.86602540378443865));
+    const int32_t error = m->parameters.modulate.side_q31 - fx_mul_q31(ratio_q31, Q31(SQRT3_HALF));
     return ratio_q31 > Q31(0.5) && ratio_q31 < Q31(0.7) && one_q31 - 0x7FF80000U < 0x100000U && error > -16 &&
            error < 16;
 }

@@ -47,7 +47,7 @@ static int32_t bound_q(const pulses_config_t *config, const pulses_state_t *stat
     return (state->reversals == 0U) ? fx_mul_q15(config->first, bound) : bound;
 }
 
-/* The last half wave ends where the way back to zero, as long as that to here, brings the sum to zero. */
+/* The last half wave ends where its return to zero, which takes as long as its rise, brings the sum to zero. */
 static bool ends_in_balance(const pulses_config_t *config, const pulses_state_t *state)
 {
     const int32_t sign = state->q.sign;
@@ -136,7 +136,7 @@ static dq_q15_t pulse(const pulses_config_t *config, pulses_state_t *state, uint
 }
 
 /* One axis on its way to zero: the last period has the share of the voltage that ends there. */
-static int32_t back_axis(pulses_axis_t *axis, int32_t v)
+static int32_t axis_to_zero(pulses_axis_t *axis, int32_t v)
 {
     if (axis->sign == 0 || v == 0 || axis->sign * axis->i_next >= 0) {
         axis->sign = 0;
@@ -151,9 +151,9 @@ static int32_t back_axis(pulses_axis_t *axis, int32_t v)
     return fx_mul_q31(fx_div_q31(left, axis->slope), voltage);
 }
 
-static dq_q15_t go_on_back(const pulses_config_t *config, pulses_state_t *state)
+static dq_q15_t return_to_zero(const pulses_config_t *config, pulses_state_t *state)
 {
-    const dq_q15_t v = {back_axis(&state->d, config->d.v), back_axis(&state->q, config->q.v)};
+    const dq_q15_t v = {axis_to_zero(&state->d, config->d.v), axis_to_zero(&state->q, config->q.v)};
     if (state->d.sign == 0 && state->q.sign == 0 && v.d == 0 && v.q == 0) {
         state->phase = (state->failure == PULSES_GOOD) ? PULSES_DONE : PULSES_FAILED;
     }
@@ -170,7 +170,7 @@ dq_q15_t pulses_step(const pulses_config_t *config, pulses_state_t *state, dq_q1
     if (state->phase == PULSES_PULSE) {
         return pulse(config, state, theta);
     }
-    return (state->phase == PULSES_BACK) ? go_on_back(config, state) : (dq_q15_t){0, 0};
+    return (state->phase == PULSES_BACK) ? return_to_zero(config, state) : (dq_q15_t){0, 0};
 }
 
 current_control_out_t pulses_voltage(dq_q15_t v, q31_t ratio, int32_t v_dc)

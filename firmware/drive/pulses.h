@@ -12,7 +12,8 @@
  *     the last ends where the sum of all i_q, which is about the impulse, will be zero after its way back to zero.
  *   Then both currents are brought to zero.
  * Source   docs/theory/commissioning.md (CM-9), (CM-10)
- * Units    v as a share of v_ratio v_dc, currents per unit; angles in turns times 2^32
+ * Units    v as a share of v_ratio v_dc, currents per unit, both in q15 and their sums in counts of it; angles in turns
+ *          times 2^32
  * Range    v up to 0.7 in each axis: both stay inside the voltage circle
  * Errors   failure: the current is larger than square_max, the rotor has moved by more than angle_max, or the reversals
  *          were not reached in periods_max; the currents are brought to zero then, too
@@ -54,7 +55,7 @@ typedef struct {
     pulses_axis_config_t d, q;
     q15_t first;          /* share of its bound at which the first half wave of q ends */
     uint32_t angle_max;   /* electrical, from where the rotor stood at the start */
-    uint32_t square_max;  /* of the current: set by the drive */
+    uint32_t square_max;  /* of the current, Q30: set by the drive */
     uint16_t delay;       /* periods before the q axis begins */
     uint16_t reversals;   /* that end the pulses */
     uint16_t periods_max; /* in which they must have happened */

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_RECALL_H
 #define DRIVE_RECALL_H
-/** Whether the values that a start has recalled describe this machine: until measured windows have confirmed them they
- * are identified with, but neither the torque loop nor the references use them.
+/** Checks whether the values that a start has recalled describe this machine. The identification begins with them, but
+ * neither the torque loop nor the references use them before measured windows have confirmed them.
  *   confirmed  in RECALL_AGREED updates in a row the residuals of both axes are those of a flux error of at most a
  *              quarter of noise_flux, |e| <= |w| noise_flux/4, at torque_min (identify/config.h) or more
- *   rejected   after RECALL_TRIALS such updates at half of the local corner or faster without that, or after
- *              RECALL_CONTRADICTED updates in a row beyond the innovation gate, earlier than (MN-12) takes them for a
- *              wrong angle: the identification starts from its priors
+ *   rejected   if RECALL_TRIALS updates at half of the local corner's speed or more have not confirmed them, or after
+ *              RECALL_CONTRADICTED updates in a row beyond the innovation gate, which is before (MN-12) reports a wrong
+ *              angle: the identification restarts from its priors
  * Source   docs/theory/identification.md (ID-22)
  * Units    residuals per unit of voltage, Q30
  * Errors   none
@@ -18,7 +18,7 @@
 #define RECALL_TRIALS 50U
 #define RECALL_CONTRADICTED 3U
 
-/** The values recalled have to be confirmed. */
+/** The recalled values have to be confirmed from now on. */
 void recall_begin(drive_t *drive);
 /** omega: of the window, q31. */
 void recall_step(drive_t *drive, q31_t omega);

@@ -1,24 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_SHORT_CIRCUIT_H
 #define DRIVE_SHORT_CIRCUIT_H
-/** The active short circuit at the bridge: all lower switches on, or all upper ones where the lower cannot be.
+/** The active short circuit at the bridge: all lower switches on, or all upper ones where the lower ones cannot serve.
  *   The gates are read back. If those that were on are off a period later, the gate drivers have ended the short
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
  *   disabled. The task may request the upper switches (safety/short_side.h), before the short circuit or while the
  *   lower ones are on. The request acts only while the lower switches are used and no side has been ended; the upper
  *   ones are then kept until the faults are reset.
- *   While the fault line is active nothing can be switched on: that is no failure of a side.
+ *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
  * Source   docs/theory/safe-state.md (SS-11), (SS-20)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
 void short_circuit_apply(fast_state_t *fast, bool upper);
 
-/** No short circuit any more: switching is disabled, and the duties are one half. */
+/** Ends the short circuit: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);
 
-/** Both sides may be tried again: the faults are reset. */
+/** Permits both sides again, after the faults have been reset. */
 void short_circuit_reset(fast_state_t *fast);
 
 /** Whether the fault that is latched needs the short circuit. */

@@ -8,11 +8,11 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
 {
     const ab_q30_t q30 = inverse_park_q30(i, fx_rotation(theta_e));
     const int32_t alpha = transform_round(q30.alpha);
-    const abc_t x = inverse_clarke(alpha, fx_mul_q15((q15_t)transform_round(q30.beta), Q15(0.86602540378443865)));
+    const abc_t x = inverse_clarke(alpha, fx_mul_q15((q15_t)transform_round(q30.beta), Q15(SQRT3_HALF)));
     return (abc_q15_t){x.a, x.b, x.c};
 }
 
-/* Of the last step; the paper's identification takes no sums. */
+/* Over the last step; with the paper's identification, which takes no sums, the sample. */
 static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
 {
     if (mrai_is_chosen(drive) || !snapshot->window.acting) {
@@ -77,7 +77,7 @@ static q15_t least_of(abc_q15_t i)
     return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
 }
 
-/* The voltages move with the compensation, whatever the rotor does: comparisons with earlier ones begin anew. */
+/* A new compensation changes the voltages, whatever the rotor does: comparisons with earlier voltages begin anew. */
 static bool is_compensation_new(drive_t *drive)
 {
     const int32_t dead_time_q16 = drive->parameters.modulate.dead_time_q16;
@@ -108,7 +108,7 @@ static bool is_fast(uint64_t turns_q60)
     return turns_q60 > (1ULL << 58);
 }
 
-/* Of the field in a step. */
+/* Turns of the field in a step. */
 static uint64_t turns_of_step_q60(const drive_t *drive, q31_t omega)
 {
     return (uint64_t)fx_abs_q31(omega) * drive->motor->identify.window_turns_q29;
@@ -139,7 +139,7 @@ static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
     return sample->theta_e == sample->theta_m * tracker->pole_pairs + tracker->offset;
 }
 
-/* After check_angle(), which takes the flux out of the voltage. */
+/* Called after check_angle(), which removes the voltage of the changing flux. */
 static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting)
 {
     task_state_t *task = &drive->task;
@@ -164,7 +164,7 @@ static bool is_second_harmonic_constant(uint64_t turns_q60)
 
 /* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While the short
  * circuit is on, the decision of the last step before it is kept. */
-static void watch_sides(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
+static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;
     const short_side_in_t in = {
@@ -186,6 +186,6 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     uint32_t faults = check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) | shorted;
     faults |= check_angle(drive, snapshot, phases_ref, acting);
     faults |= check_launch(drive, snapshot, acting);
-    watch_sides(drive, snapshot, phases_ref);
+    update_short_side(drive, snapshot, phases_ref);
     return faults;
 }

@@ -5,8 +5,9 @@
  *   Enable off: the torque goes to zero at the fastest slew rate, and the current control holds it there until
  *     switching can be disabled. The currents are those of field weakening without torque: far below those of the short
  *     circuit, which some machines cannot withstand.
- *   Over-temperature and over-speed leave the control intact, but must be latched, which ends it: before, i* goes in 8
- *     steps from where it is to the short circuit's i_d with psi_d(i_d, 0) + dpsi = 0, i_q = 0, and stays there for 2.
+ *   Over-temperature and over-speed leave the control intact, but latching the fault ends it. Before it is latched, i*
+ *     moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0, and stays
+ *     there for 2 steps.
  *   Every other fault brings the short circuit at once.
  * Source   docs/theory/safe-state.md (SS-8), (SS-12)
  * Range    i_d down to the demagnetisation limit at the present temperature

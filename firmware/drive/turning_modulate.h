@@ -3,7 +3,7 @@
 #define DRIVE_TURNING_MODULATE_H
 /** The modulation of current_control_turning.h: a knee of the dead-time compensation that widens with speed.
  *   i_knee >= 1.5 |theta| c T_s/(k_0 l_min): a deviation of the current keeps its direction in the stationary frame
- *   while the rotor turns, and the compensation answers it turned by a period and a half.
+ *   while the rotor turns, so that the compensation acts on it rotated by the angle of one and a half periods.
  * Source   docs/theory/modulation.md (MO-12)
  * Units    knee_turns_q27: knee_q17 times theta in turns; angle_step 2^32 = one turn
  * Range    knee_turns_q27 > 0

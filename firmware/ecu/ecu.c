@@ -107,9 +107,9 @@ static void answer(ecu_t *ecu)
     hal_shut_off_answer(ecu->shut_off.wrong ? ~right : right);
 }
 
-/* A limit of the vehicle that closes, and a ramp to zero, do not wait for the calibrated slew: the torque may be beyond
- * the limit only for as long as the arbitrated torque is on its way there. */
-static void close_limits(torque_limits_t *limits, const arbitrate_in_t *in, q15_t arbitrated)
+/* A falling limit of the vehicle and a ramp to zero do not wait for the calibrated slew: the torque may exceed the
+ * limit only until the arbitrated torque has reached it. */
+static void lower_limits(torque_limits_t *limits, const arbitrate_in_t *in, q15_t arbitrated)
 {
     const q15_t magnitude = fx_abs_q15(arbitrated);
     limits->torque_drive = (q15_t)fx_max_s32(in->ramp_out ? (q15_t)0 : in->limit_drive, magnitude);
@@ -123,13 +123,13 @@ static void command_drive(ecu_t *ecu)
     arbitrate_hold(&ecu->arbitration_config, &ecu->arbitration_state, ecu->drive.task.allowed.torque_limited);
     request->torque_arbitrated = arbitrate_step(&ecu->arbitration_config, &ecu->arbitration_state, &in);
     torque_limits_t limits = ecu_limits(ecu);
-    close_limits(&limits, &in, request->torque_arbitrated);
+    lower_limits(&limits, &in, request->torque_arbitrated);
     request->limits = limits;
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
 }
 
-/* What a step of the second level starts from. */
+/* The samples that a step of the second level uses. */
 typedef struct {
     current_counts_t counts;
     uint32_t theta_m;
@@ -153,7 +153,7 @@ static raw_sample_t read_raw_sample(const drive_t *drive)
     return raw;
 }
 
-/* The second level uses the samples and its own constants; what it finds, the drive latches in its next step. */
+/* The second level uses the samples and its own constants; the drive latches its fault in the next step. */
 static void check_by_second_level(ecu_t *ecu, const raw_sample_t *raw)
 {
     drive_t *drive = &ecu->drive;
@@ -216,7 +216,7 @@ static void send_xcp(ecu_t *ecu)
 void ecu_task_1khz(ecu_t *ecu)
 {
     data_check_restore_pointer(&ecu->drive);
-    const raw_sample_t raw = read_raw_sample(&ecu->drive); /* first: the next period's conversions are far */
+    const raw_sample_t raw = read_raw_sample(&ecu->drive); /* first, long before the next period's conversions */
     ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
     begin_step(ecu);

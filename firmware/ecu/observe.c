@@ -126,7 +126,7 @@ torque_limits_t ecu_limits(const ecu_t *ecu)
     return limits;
 }
 
-/* What the bus says about the battery, beside the dc voltage that the inverter measures. */
+/* The battery's voltage of the bus, and the dc voltage that the inverter measures. */
 static battery_voltage_in_t battery_voltage(const ecu_t *ecu, float v_dc_V)
 {
     return (battery_voltage_in_t){.battery_V = ecu->rx.battery_V,
@@ -189,7 +189,8 @@ arbitrate_in_t ecu_arbitration(const ecu_t *ecu)
     };
 }
 
-/* What the request is beyond. Of a frame out of the DBC's ranges nothing is used: RangeErrors counts it. */
+/* The limit that the request exceeds. A frame with a value out of the DBC's ranges is counted in RangeErrors and not
+ * used. */
 static request_limit_t request_limit(const ecu_t *ecu)
 {
     const bus_command_t *command = &ecu->rx.command;

@@ -3,8 +3,8 @@
 
 #include "ecu/supervisor.h"
 
-#define GONE_US 20000U   /* longest time until a supply that is not wanted must have gone */
-#define ABSENT_US 10000U /* longest time without supply although it is wanted; its start included */
+#define GONE_US 20000U   /* longest time until a supply that is not required must be absent */
+#define ABSENT_US 10000U /* longest time without a supply that is required; its start included */
 
 typedef struct {
     bool on, wrong; /* what the stage does */

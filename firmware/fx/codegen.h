@@ -33,7 +33,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The same value in a register, of which the compiler knows nothing: it neither recomputes it nor folds it into other
+/* The same value in a register, opaque to the compiler: it neither recomputes the value nor folds it into other
  * operations, and a branch that computes it stays a branch. */
 static inline int32_t fx_in_register(int32_t x)
 {

@@ -72,11 +72,6 @@ static inline q15_t fx_add_q15(q15_t a, q15_t b)
     return fx_sat_q15((int32_t)a + b);
 }
 
-static inline q15_t fx_sub_q15(q15_t a, q15_t b)
-{
-    return fx_sat_q15((int32_t)a - b);
-}
-
 static inline q15_t fx_neg_q15(q15_t a)
 {
     return fx_sat_q15(-(int32_t)a);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_FROZEN_ANGLE_H
 #define SAFETY_FROZEN_ANGLE_H
-/** Finds a rotor that turns below a measured angle that stands still. While angle and current reference stand still,
+/** Finds a rotor that turns although its measured angle stands still. While angle and current reference stand still,
  * so must the voltage: the drop of the resistance and the inverter's error belong to the currents, and only a turning
  * rotor induces another voltage.
  *   m: first-order mean of u, four steps, begun anew when either moves

@@ -2,6 +2,7 @@
 #include "safety/gate_fault.h"
 
 #include "fx/vec.h"
+#include "signal/debounce.h"
 
 #define QUIET_STEPS 50
 #define REST 16 /* q15: e at rest without dc voltage, 0.25 V where V_b is 500 V */
@@ -18,9 +19,9 @@ static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_stat
 /* At rest, or no switch is shorted: the machine turns without a current. */
 static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bool none)
 {
-    state->quiet = none ? (uint8_t)fx_min_s32(state->quiet + 1, QUIET_STEPS) : (uint8_t)0;
+    const bool quiet = debounce_holds(&state->quiet, none, QUIET_STEPS);
     const bool at_rest = in->line_emf <= fx_max_s32(in->v_dc >> 6, REST);
-    return at_rest || (state->quiet == QUIET_STEPS && !state->switch_shorted);
+    return at_rest || (quiet && !state->switch_shorted);
 }
 
 bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in)

@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     int32_t opposed;     /* sum of v_dc - e, q15, while a current flows with switching disabled; saturates */
     uint8_t quiet;       /* steps without current with switching disabled; saturates */
-    bool above;          /* a gate fault needs the short circuit now, or would need it */
+    bool above;          /* of e: a gate fault needs the short circuit now, or would need it */
     bool switch_shorted; /* found by its current; until the gate fault is reset */
     bool holds_supply;   /* contactor and gate supply must stay on for a gate fault */
 } gate_fault_state_t;

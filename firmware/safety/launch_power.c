@@ -12,7 +12,7 @@
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
 #define NOISE_SHIFT 4
-#define NOISE_MAX 8 /* times v_1: of one step, in which the currents may change without the reference */
+#define NOISE_MAX 8 /* times v_1: largest noise of one step, as the currents may change without the reference */
 
 /* Products of a sum and a q15: half their size. */
 static int32_t times(int32_t sum, int32_t x)
@@ -40,7 +40,7 @@ static int32_t other_power(const launch_power_in_t *in, int32_t omega)
 static void update_noise(const launch_power_config_t *config, launch_power_state_t *state, int32_t power, bool settled)
 {
     if (state->steady < MOVING_STEPS) {
-        return; /* a voltage that moves the currents is no noise */
+        return; /* a voltage that changes the currents is not noise */
     }
     const int32_t deviation = power - (state->power_q8 >> 8);
     const bool above = deviation > 0;

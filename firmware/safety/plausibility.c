@@ -110,7 +110,7 @@ static void update_expected(const plausibility_config_t *config, dq_q15_t *expec
     expected->q = followed((q15_t)expected->q, i_ref.q, config->answer_rate);
 }
 
-/* (MN-37), whether the bridge acts or not: with a wrong reference it must not begin to. */
+/* (MN-37), whether the bridge acts or not, because the drive must not start with a wrong reference. */
 static uint32_t wrong_reference(plausibility_state_t *state, const plausibility_in_t *in)
 {
     const bool wrong = in->known_permille >= 0 &&

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "safety/safe_state.h"
 
+#include "signal/debounce.h"
+
 #define SQRT3 113512            /* Q15.16 */
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
@@ -21,22 +23,11 @@ static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
     return squared(fx_sat_q15(now.d - before.d), fx_sat_q15(now.q - before.q)) < squared(now.d / part, now.q / part);
 }
 
-static bool lasts(uint8_t *steps, bool again, int32_t wanted)
-{
-    *steps = again ? (uint8_t)fx_min_s32(*steps + 1, wanted) : (uint8_t)0;
-    return *steps == wanted;
-}
-
-static bool confirmed(uint8_t *steps, bool again)
-{
-    return lasts(steps, again, CONFIRMED_STEPS);
-}
-
 /* The short circuit's currents are too small for a machine that turns (SS-7), whatever the angle says. */
 static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool none = squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
-    return confirmed(&state->without_current, in->shorted && in->currents_valid && none);
+    return debounce_holds(&state->without_current, in->shorted && in->currents_valid && none, CONFIRMED_STEPS);
 }
 
 /* Whether the measured speed may be used now. In the short circuit the currents must stand still in the rotor's
@@ -46,7 +37,7 @@ static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
     const bool checked = in->shorted && in->currents_valid;
     const bool steady = is_steady(in->i, (dq_q15_t){state->i_before.d, state->i_before.q}, 4) &&
                         is_steady(in->i, in->i_last_period, 8);
-    const bool agreed = confirmed(&state->steady, checked && steady);
+    const bool agreed = debounce_holds(&state->steady, checked && steady, CONFIRMED_STEPS);
     state->i_before = (dq_q15_halfword_t){(q15_t)in->i.d, (q15_t)in->i.q};
     return in->speed_valid && (!checked || agreed);
 }
@@ -75,7 +66,7 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
  * fault the diodes decide: a link whose voltage is really below the back-EMF draws a current. */
 static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
 {
-    const bool rectifies = lasts(&state->rectifying, in->rectifying, RECTIFYING_STEPS);
+    const bool rectifies = debounce_holds(&state->rectifying, in->rectifying, RECTIFYING_STEPS);
     if (in->v_dc >= state->v_dc || rectifies) {
         state->v_dc = in->v_dc;
     } else if (!in->doubtful) {
@@ -93,6 +84,7 @@ bool safe_state_step(const safe_state_config_t *config, safe_state_state_t *stat
     const q15_t share = lower_level ? config->share_open : config->share_short;
     const bool rectifies = state->line_emf > fx_mul_q15(share, state->v_dc);
     state->short_circuit = rectifies;
-    const bool released = lasts(&state->low, in->over_voltage && in->v_dc <= config->v_release, RELEASE_STEPS);
+    const bool low = in->over_voltage && in->v_dc <= config->v_release;
+    const bool released = debounce_holds(&state->low, low, RELEASE_STEPS);
     return rectifies || (in->over_voltage && !released);
 }

@@ -6,12 +6,13 @@
  *   e > 0.9 v_dc: short circuit, because the diodes would otherwise rectify the back-EMF into the battery and brake;
  *   e < 0.8 v_dc: switching disabled; between both levels the last decision holds; without a
  *   valid speed 0.8 v_dc is the only level
- *   v_dc is the known dc voltage: it rises with the measured one and falls in 64 steps; while a fault is latched or
- *   the converters' reference reads wrong, only if a current has flowed for 10 steps although switching is disabled.
- *   A sensor that has failed looks like a link that is empty; the diodes tell them apart.
+ *   v_dc is the known dc voltage. It rises with the measured one and falls with a time constant of 64 steps. While a
+ *   fault is latched or the converters' reference reads wrong, it falls only if a current has flowed for 10 steps
+ *   although switching is disabled: a failed sensor reads as an empty dc link does, but only the empty link draws a
+ *   current through the diodes.
  *   A short circuit that is on with a latched over-voltage lasts until the measured v_dc has been below v_release for
- *   200 steps, in which the first currents decay that would charge the link again, and is then not closed again for the
- *   same over-voltage.
+ *   200 steps. In this time the first currents decay, which would charge the link again. Afterwards the short circuit
+ *   is not applied again for the same over-voltage.
  *   The known speed is the measured one, but falls no faster than a rotor can: an angle that freezes would otherwise
  *   look like a standstill. In the short circuit the measurement counts only if the currents agree with it. They stand
  *   still in the rotor's frame if the angle turns with the rotor, and they vanish at standstill, whatever the angle

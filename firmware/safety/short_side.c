@@ -15,10 +15,10 @@ void short_side_step(short_side_state_t *state, const short_side_in_t *in)
     state->b_q8 = mean_step(state->b_q8, (in->i.b - in->i_ref.b) * 256, MEAN_SHIFT);
 }
 
-bool short_side_is_upper(const short_side_state_t *state, q15_t i_least)
+bool short_side_is_upper(const short_side_state_t *state, q15_t i_min)
 {
     const int32_t c_q8 = -state->a_q8 - state->b_q8;
     const int32_t highest = fx_max_s32(fx_max_s32(state->a_q8, state->b_q8), c_q8);
     const int32_t lowest = fx_min_s32(fx_min_s32(state->a_q8, state->b_q8), c_q8);
-    return highest > i_least * 256 && highest > -lowest;
+    return highest > i_min * 256 && highest > -lowest;
 }

@@ -40,7 +40,7 @@ column_t column_of(const capture_t *capture, const capture_source_t *source, uin
     return (column_t){(const uint8_t *)slot + place, capture->config.divisor * sizeof(sample_t)};
 }
 
-/* At least one row. The compiler knows the number of signals: their places stay in registers, and a value takes two
+/* At least one row. The number of signals is a constant: their places stay in registers, and a value takes two
  * instructions. */
 static inline __attribute__((always_inline)) void copy_each(int16_t *first, rows_t rows, const uint8_t *places_in_row,
                                                             const uint32_t signals)
@@ -69,7 +69,7 @@ static inline __attribute__((always_inline)) void copy_each(int16_t *first, rows
         copy_each(to, rows, place, (signals)); \
         break;
 
-/* By itself: within another function the registers would not be enough. */
+/* Not inlined: within another function there would be too few registers. */
 static __attribute__((noinline)) void copy_rows(int16_t *to, rows_t rows, const uint8_t *place, uint32_t signals)
 {
     switch (signals) {
@@ -86,7 +86,7 @@ static __attribute__((noinline)) void copy_rows(int16_t *to, rows_t rows, const 
     }
 }
 
-/* The values of the step, constant, over what the rows have put in their place. */
+/* Replaces what the rows have put in the place of the step's values, which are constant during the step. */
 static void fill_step(const capture_t *capture, int16_t *to, const scope_step_values_t *step, uint32_t count)
 {
     const uint32_t signals = capture->config.signals;

@@ -3,8 +3,8 @@
 #define SCOPE_SCOPE_H
 /** The drive's scope: one memory for what a tool captures and for the freeze frame around a fault.
  *   Without a tool's capture each first fault leaves a freeze frame: 32 samples before it and 32 from it on, one in
- *   each PWM period, of eight signals. A tool's capture that still waits for its trigger gives way to it, unless a
- *   fault is what it waits for. A capture that has been triggered is kept until it is released. The freeze frame is
+ *   each PWM period, of eight signals. It replaces a tool's capture that still waits for its trigger, unless that
+ *   trigger is a fault. A capture that has been triggered is kept until it is released. The freeze frame is
  *   released by a command, or when all faults have been reset.
  * Source   docs/howto/scope.md; docs/decisions/020-scope.md
  * Range    commands of scope_command_t; a refused command changes nothing

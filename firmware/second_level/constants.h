@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SECOND_LEVEL_CONSTANTS_H
 #define SECOND_LEVEL_CONSTANTS_H
-/** Everything about the machine that the second level knows: its own constant, generated from motor.toml and the flux
- * map beside the motor data of the first level, and under a checksum of its own.
+/** All data of the machine that the second level uses: a constant of its own, generated from motor.toml and the flux
+ * map beside the motor data of the first level, with a checksum of its own.
  *   torque[d][q]  torque at i_d = (d - 16)/16 I_b, |i_q| = q/16 I_b, with the nominal magnet: two entries differ by a
  *                 sixteenth of the full scale of the current, because torque is almost bilinear in the currents (SL-4)
  *   checksum      CRC-32 (IEEE 802.3) of all bytes behind it, in the processor's (little-endian) order
  * Source   docs/theory/second-level.md; written by `tools/fluxtrue motor build`
- * Units    per unit of the motor's bases
+ * Units    per unit of the motor's bases, q15 unless the type says otherwise; torque[][] q15
  * Range    no pointers and no padding, so that the checksum covers what is used
  * Context  const data in flash */
 #include <stdint.h>

@@ -14,11 +14,17 @@
 
 #include "fx/q.h"
 
-/** Returns the flag while the condition has held in this and the (samples - 1) calls before, else 0. */
-static inline uint32_t debounce_step(uint8_t *count, bool condition, uint8_t samples, uint32_t flag)
+/** True while the condition has held in this and the (samples - 1) calls before. */
+static inline bool debounce_holds(uint8_t *count, bool condition, uint8_t samples)
 {
     *count = condition ? (uint8_t)fx_min_s32(*count + 1, samples) : 0;
-    return (*count >= samples) ? flag : 0U;
+    return *count >= samples;
+}
+
+/** The flag while debounce_holds() is true, else 0. */
+static inline uint32_t debounce_step(uint8_t *count, bool condition, uint8_t samples, uint32_t flag)
+{
+    return debounce_holds(count, condition, samples) ? flag : 0U;
 }
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef SIGNAL_SEAL_H
 #define SIGNAL_SEAL_H
 /** A checksum of a few words that only their owner writes: it seals them when it has written them, and compares before
- * it uses them again. What the memory has changed meanwhile is found.
+ * it uses them again. Errors of the memory in between are found.
  *   s <- word xor (s rotated right by one bit), over all words
  * Source   docs/theory/data-integrity.md (DI-3)
  * Range    any number of aligned words; size in bytes

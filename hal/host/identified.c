@@ -11,28 +11,24 @@ static bool is_robust(const fluxtrue_t *d)
     return d->drive.request.identification_mode == IDENTIFICATION_ROBUST;
 }
 
-static double pu(int32_t x, double one, float base)
-{
-    return (double)x / one * (double)base;
-}
-
 static double value(const fluxtrue_t *d, identify_index_t index, float base)
 {
     const drive_t *drive = &d->drive;
     const q31_t identified = identify_value(&drive->motor->identify, &drive->task.identify, index);
-    return is_robust(d) ? pu(identified, 2147483648.0, base) : 0.0;
+    return is_robust(d) ? per_unit_si_from_q31(identified, (double)base) : 0.0;
 }
 
 double identified_psi_f_Vs(const fluxtrue_t *d)
 {
     const motor_t *m = d->drive.motor;
-    return (double)m->psi_f_Vs + pu(d->drive.task.identification.psi_delta, 2147483648.0, m->bases.flux_Vs);
+    return (double)m->psi_f_Vs + per_unit_si_from_q31(d->drive.task.identification.psi_delta, (double)m->bases.flux_Vs);
 }
 
 double identified_r_ohm(const fluxtrue_t *d)
 {
     const motor_t *m = d->drive.motor;
-    return (double)m->r_ohm_20 + pu(d->drive.task.identification.r_delta, 2147483648.0, m->bases.resistance_ohm);
+    return (double)m->r_ohm_20 +
+           per_unit_si_from_q31(d->drive.task.identification.r_delta, (double)m->bases.resistance_ohm);
 }
 
 double identified_drop_V(const fluxtrue_t *d)

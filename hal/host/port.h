@@ -6,7 +6,8 @@
 #include "hal/host/instance.h"
 
 void host_port_select(fluxtrue_t *instance);
-/** The gate drivers' line before a period; true: the drive is to be told, once until switching is enabled again. */
+/** Reads the gate drivers' line before a period; true: report the fault to the drive, once until switching is enabled
+ * again. */
 bool host_port_fault_line(fluxtrue_t *instance);
 /** Restores the identified values from the flash at start-up. */
 void host_port_recall(fluxtrue_t *instance);

@@ -5,7 +5,7 @@
  *   |w_s| > w_max, w_s a first-order mean of 16 periods, or periods without a new consent
  * Source   docs/theory/commissioning.md, section 11
  * Units    turns of the sensor, rpm
- * Context  host port; the drive's own monitors work as ever */
+ * Context  host port; the drive's own monitors work as usual */
 #include <stdbool.h>
 #include <stdint.h>
 

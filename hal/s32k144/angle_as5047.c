@@ -39,8 +39,8 @@ static struct {
     bool healthy;        /* at the start */
 } encoder;
 
-/* The answers come one frame after their commands. The last two frames have the distance of a period from each other
- * and from the first of the PWM, so that the angle is right from the first period on, whatever the speed. */
+/* The answers come one frame after their commands. The last two frames here and the first one of the PWM are one period
+ * apart, so that the angle is right from the first period on, at any speed. */
 static void read_state_and_angle(uint32_t period_ticks)
 {
     LPSPI0->TCR = COMMAND;
@@ -92,7 +92,7 @@ static void take(uint32_t frame, uint32_t frames)
     encoder.invalid = 0;
 }
 
-/* In place of a frame that cannot be used: the rotor has moved on as before. */
+/* In place of a frame that cannot be used: the rotor is assumed to have moved as in the period before. */
 static __attribute__((noinline, cold)) void predict(void)
 {
     encoder.last += (uint32_t)encoder.travel;

@@ -190,7 +190,7 @@ static void start(const pwm_config_t *pwm, bool drivable)
     __asm__ volatile("cpsie i" ::: "memory");
 }
 
-/* The drive goes on as after a fault at speed. */
+/* The drive continues as after a fault at speed. */
 static void continue_short_circuit(void)
 {
     after_reset_continue(&ecu.drive);

@@ -93,7 +93,7 @@ void hal_nvm_end(void)
 }
 
 /* A phrase that a power cut left half programmed may be uncorrectable: reading it is a bus fault, which the core
- * ignores in between, and the controller's flag tells it. */
+ * ignores in between; the controller's flag reports it. */
 static void read_phrase(const volatile uint8_t *from, uint8_t *to, uint32_t size)
 {
     core_ignore_bus_faults(true);

@@ -9,7 +9,7 @@
 
 #define FTM0_INIT_TRIGGER 22U
 #define BITS_12 1U
-#define SAMPLE_CLOCKS 7U /* 8 ADC clocks, 286 ns: the data sheet wants 275 */
+#define SAMPLE_CLOCKS 7U /* 8 ADC clocks, 286 ns: the data sheet requires 275 */
 #define AVERAGE_32 3U
 #define HALF_CLOCK 1U
 #define DIE_SENSOR 26U

@@ -34,7 +34,7 @@ def physical(messages: list[Message]) -> list[tuple[Message, int]]:
 
 
 def names(case: tuple[Message, int]) -> str:
-    """For the test's report."""
+    """The name of a case in the test's report."""
     return f"{case[0].name}.{case[0].signals[case[1]].name}"
 
 

@@ -61,7 +61,7 @@ class Stand:
     is_silent: bool = False  # no commands are sent
 
     def current_A(self) -> float:
-        """Of the plant."""
+        """A current of the plant."""
         return float(np.hypot(*self.channel.get("truth.i_d_A", "truth.i_q_A")))
 
 

@@ -98,7 +98,7 @@ class Master:
         self.command(0xF0, 4, *struct.pack("<f", value))
 
     def checksum(self) -> int:
-        """Of the whole page."""
+        """The checksum of the whole page."""
         self._point(min(value.address for value in self.values.values()))
         return int.from_bytes(self.command(0xF3, 0, 0, 0, *(4 * len(self.values)).to_bytes(4, "little"))[3:7], "little")
 

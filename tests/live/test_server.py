@@ -50,11 +50,11 @@ class Drive:
         self._enable_seen = self._enabled = False
 
     def act(self, action: str, *values: Any) -> None:
-        """As Link.act(), with the clock of the test."""
+        """Replaces Link.act(), with the clock of the test."""
         getattr(self.commander, action)(*values, self.now_s)
 
     def status(self) -> Status:
-        """As Link.status()."""
+        """Replaces Link.status()."""
         return Status(self.state, self.commander.wish.value, self.commander.target_Nm, self.commander.stopped)
 
     def run(self, seconds: float, alive: bool = False) -> list[float]:

@@ -158,7 +158,7 @@ SHIPPED = sorted(SCENARIOS.glob("*.toml"))
 
 @pytest.mark.parametrize("path", SHIPPED, ids=[path.stem for path in SHIPPED])
 def test_a_shipped_scenario_gives_torque_and_speed_as_shares(path: Path, paper: Motor, hsm1: Motor) -> None:
-    """And other motors than its own take its values."""
+    """Motors other than the scenario's own use its values, too."""
     profile = tomllib.loads(path.read_text(encoding="utf-8"))["profile"]
     assert "torque_share" in profile and not {"torque_Nm", "speed_rpm"} & set(profile)
     short = read(path).model_copy(update={"duration_s": 0.1, "event": (), "expect_fault": None, "window": Window()})

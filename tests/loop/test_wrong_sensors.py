@@ -47,7 +47,7 @@ def test_a_wrong_dc_voltage_is_found_or_does_not_change_the_torque(hsm1: Motor, 
 
 
 def faults_at_rest(motor: Motor, offset_A: tuple[float, float, float], seconds: float) -> list[str]:
-    """With switching disabled and the current sensors' noise."""
+    """The faults at rest, with switching disabled and noise of the current sensors."""
     offsets = {f"current_offset_A_{x}": value for x, value in zip("abc", offset_A, strict=True)}
     parameters = motor.plant | {"imposed_speed": 1.0, "current_noise_A_rms": 0.002 * FULL_SCALE_A} | offsets
     with Loop(motor.library, parameters, motor.flux_map) as loop:

@@ -110,7 +110,7 @@ class Drive:
         return tuple(out)
 
     def reset(self) -> None:
-        """As created."""
+        """Reset the drive to the state after fluxtrue_create()."""
         self.library.fluxtrue_reset(self.handle)
 
     def run(
@@ -148,7 +148,7 @@ class Drive:
 
 
 def pointer(values: NDArray[Any]) -> Any:
-    """To the first element."""
+    """A pointer to the first element."""
     return values.ctypes.data_as(INTS if values.dtype == np.int32 else DOUBLES)
 
 
@@ -160,7 +160,7 @@ def info(library: ctypes.CDLL, handle: int) -> Info:
 
 
 def names(library: ctypes.CDLL) -> list[str]:
-    """As fluxtrue_name() enumerates them."""
+    """All names, as fluxtrue_name() enumerates them."""
     found: list[str] = []
     while (name := library.fluxtrue_name(len(found))) is not None:
         found.append(name.decode())

@@ -30,7 +30,7 @@ def run(*command: str | Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def dll() -> Path:
-    """For the machine of the example."""
+    """The DLL for the machine of the example."""
     run("cmake", "--preset", "windows", "-B", FOLDER, f"-DFLUXTRUE_MOTOR={ROOT / 'firmware' / 'motors' / 'paper'}")
     run("cmake", "--build", FOLDER, "--target", "fluxtrue_sil")
     return FOLDER / "fluxtrue_sil.dll"
@@ -62,7 +62,7 @@ def test_the_c_program_of_the_howto_links(program: Path) -> None:
 
 @pytest.fixture
 def wine() -> Iterator[dict[str, str]]:
-    """Its environment; its server ends with the test."""
+    """Wine's environment; its server ends with the test."""
     if WINE is None:
         pytest.skip("Wine is not installed: the library for Windows is linked, but not run")
     environment = {"WINEPREFIX": str(FOLDER / "wine"), "WINEDEBUG": "-all", "DISPLAY": ""}

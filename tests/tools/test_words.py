@@ -40,6 +40,7 @@ def write(root: Path, name: str, text: str) -> Path:
         ("A calm drive.", "calm", "smooth, idle"),
         ("The rooms of the firmware.", "rooms", "free space, margin, limit, folder"),
         ("The task looks at the sample.", "looks at", "check, read, evaluate"),
+        ("The angle is believed.", "believed", "use, rely on, count"),
         ("Down there the voltage is unknown.", "Down there", "the condition, for example: below v_min"),
         ("A number that is none is refused.", "number that is none", "NaN or infinity"),
         ("It is an identify_pair_t.", "identify_pair_t", "the vector's type with its format, for example dq_q30_t"),

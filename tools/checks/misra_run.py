@@ -50,7 +50,7 @@ class Analysis:
 
     @property
     def options(self) -> list[str]:
-        """For Cppcheck."""
+        """The options of Cppcheck."""
         return [*OPTIONS, *(f"-I{path}" for path in self.include), *(f"-D{macro}" for macro in self.macros)]
 
 

@@ -22,6 +22,7 @@ WORDS = (
     (r"calm\w*", "smooth, idle"),
     (r"rooms?", "free space, margin, limit, folder"),
     (r"look(?:s|ed|ing)?[ _](?:at|after|into)", "check, read, evaluate"),
+    (r"believ\w+", "use, rely on, count"),
     (r"down there", "the condition, for example: below v_min"),
     (r"numbers? that (?:is|are) none", "NaN or infinity"),
     (r"identify_pair(?:_t)?", "the vector's type with its format, for example dq_q30_t"),

@@ -38,7 +38,7 @@ static void store_cosines(commission_data_t *data, uint32_t theta)
     const fx_pair_t cos_sin = fx_unit_vector(theta);
     const int32_t alpha = (int16_t)(cos_sin & 0xFFFFU) * Q15_MAX >> 15;
     const int32_t beta_q30 = ((int32_t)cos_sin >> 16) * Q15_MAX;
-    const abc_t phases = inverse_clarke(alpha, fx_mulhi(beta_q30, Q31(0.86602540378443865)) >> 14);
+    const abc_t phases = inverse_clarke(alpha, fx_mulhi(beta_q30, Q31(SQRT3_HALF)) >> 14);
     int32_t c[3] = {fx_abs_q31(phases.a), fx_abs_q31(phases.b), fx_abs_q31(phases.c)};
     for (unsigned k = 2; k-- > 0U;) {
         const int32_t larger = fx_max_s32(c[k], c[k + 1U]);

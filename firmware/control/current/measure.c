@@ -34,6 +34,6 @@ abc_q15_t measure_phases(fx_pair_t i_ab, int32_t zero_q28)
 {
     const ab_q15_t i = {(int16_t)(i_ab & 0xFFFFU), (int16_t)(i_ab >> 16)};
     const int32_t zero = fx_add_wrap(zero_q28, QUARTER_LSB_Q28) >> 13; /* rounds with the quarter LSB of phase a */
-    const abc_t x = inverse_clarke(i.alpha, fx_mulhi(i.beta * 65536, Q16(0.86602540378443865))); /* Q31 * Q16 = Q15 */
+    const abc_t x = inverse_clarke(i.alpha, fx_mulhi(i.beta * 65536, Q16(SQRT3_HALF))); /* Q31 * Q16 = Q15 */
     return (abc_q15_t){fx_sat_q15_word(x.a + zero), fx_sat_q15_word(x.b + zero), fx_sat_q15_word(x.c + zero)};
 }

@@ -15,6 +15,8 @@
 #include "fx/trig.h"
 #include "types/frames.h"
 
+#define SQRT3_HALF 0.86602540378443865 /* for Q15(), Q16() and Q31() */
+
 /* Q30 to Q15, half up. */
 static inline int32_t transform_round(int32_t q30)
 {
@@ -39,7 +41,7 @@ static inline ab_q30_t inverse_park_q30(dq_q15_t x, fx_pair_t at)
     return (ab_q30_t){fx_difference2(v, at), fx_dot2_cross(v, at)};
 }
 
-/* In the scale of both arguments. Their caller multiplies by sqrt(3)/2, each with another factor of its own. */
+/* In the scale of both arguments. Their caller multiplies by SQRT3_HALF, each with another factor of its own. */
 static inline abc_t inverse_clarke(int32_t alpha, int32_t side)
 {
     const int32_t b = side - (alpha >> 1);

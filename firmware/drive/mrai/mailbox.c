@@ -9,7 +9,7 @@ static __attribute__((noinline, cold)) void count_overrun(drive_t *drive, uint32
 {
     mrai_mailbox_t *mailbox = &drive->mrai.mailbox;
     mailbox->overruns++;
-    identify_window_invalidate(&drive->fast.window); /* mrai_had_one_of() does not know of this period */
+    identify_window_invalidate(&drive->fast.window); /* mrai_had_one_of() does not count this period */
     if (generation - mailbox->generation >= OVERRUNS_TO_FAULT) {
         drive_raise_fault(drive, FAULT_OVERRUN);
     }

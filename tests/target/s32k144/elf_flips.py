@@ -122,7 +122,7 @@ def in_a_copy(run: Callable[[], Trace]) -> Trace:
 
 
 def verdict(golden: Trace, trace: Trace) -> str:
-    """As tests/memory/verdict.h has them."""
+    """The verdict, one of those of tests/memory/verdict.h."""
     if trace.stopped:
         return "stopped"
     apart = [ms for ms, torque in enumerate(trace.torque_Nm) if abs(torque - golden.torque_Nm[ms]) > APART_NM]

@@ -72,7 +72,7 @@ def with_motor(built: Path, tables: Path) -> dict[Path, Path]:
 
 
 def with_error(error: PlantedError, folder: Path) -> dict[Path, Path]:
-    """For relinked(): the file with the planted error."""
+    """The file with the planted error, for relinked()."""
     original = PORT / error.file
     source = folder / error.file
     text = original.read_text(encoding="utf-8").replace(error.text, error.replacement)

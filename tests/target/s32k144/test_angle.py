@@ -113,7 +113,7 @@ def test_a_planted_error_of_the_angle_is_found(resolver: Parts, name: str, tmp_p
 
 
 def test_the_frame_is_there_before_it_is_read(resolver: Parts, tmp_path: Path) -> None:
-    """With 0.2 µs less the angle is still complete."""
+    """The angle is still complete with 0.2 µs less."""
     later = PlantedError("angle_resolver.c", "#define READY_TICKS 85U", f"#define READY_TICKS {85 + MARGIN_TICKS}U")
     the_angle_is_that_of_the_sampling_instant(
         replace(resolver, image=image_with_error(resolver.image, later, tmp_path))

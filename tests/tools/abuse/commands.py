@@ -37,7 +37,7 @@ ON_A_BENCH = {"--can-channel": BENCH, "--can-option": BENCH, "--bench": BENCH}
 
 @cache
 def cases() -> dict[str, Case]:
-    """By the name of the command."""
+    """The cases by the name of the command."""
     motor = ("--motor", "m")
     return {
         "demo": Case(options=("--out", "o")),

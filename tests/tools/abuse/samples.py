@@ -160,7 +160,7 @@ def arrays() -> dict[str, object]:
 
 @cache
 def npz() -> bytes:
-    """For NumPy."""
+    """A map in NumPy's format."""
     import numpy as np
 
     file = io.BytesIO()
@@ -170,7 +170,7 @@ def npz() -> bytes:
 
 @cache
 def mat() -> bytes:
-    """For MATLAB, v5."""
+    """A map in MATLAB's format, version 5."""
     from scipy.io import savemat
 
     file = io.BytesIO()

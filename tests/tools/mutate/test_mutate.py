@@ -111,7 +111,7 @@ def write_list(project: Path, after: str) -> None:
 
 
 def outcomes(campaign: cli.Campaign) -> dict[str, str]:
-    """By the line after the error."""
+    """The outcomes by the line after the error."""
     return {result.mutant.after: outcome for result, outcome in campaign.classified()}
 
 

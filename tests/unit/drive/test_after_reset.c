@@ -48,7 +48,7 @@ void test_a_voltage_that_has_risen_meanwhile_does_not_count(void)
     TEST_ASSERT_TRUE(needs(7000.0F, 300.0F));
 }
 
-void test_a_sensor_that_shows_no_speed_is_not_believed(void)
+void test_a_sensor_that_shows_no_speed_is_not_used(void)
 {
     TEST_ASSERT_TRUE(needs(0.0F, 350.0F));
     TEST_ASSERT_TRUE(after_reset_needs_short_circuit(&motor, &before, -1, volts(350.0F)));

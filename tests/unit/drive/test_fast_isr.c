@@ -150,7 +150,7 @@ static void want_upper_switches(bool upper)
 
 /* The task has found a constant current: by the upper switches at once, or from the lower ones to the upper ones. There
  * is no way back, and what the gate drivers end counts for more. */
-void test_the_task_may_want_the_short_circuit_by_the_upper_switches(void)
+void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
 {
     seam_run();
     seam_periods(3);

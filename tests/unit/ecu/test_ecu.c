@@ -687,14 +687,14 @@ static int32_t own_torque_after_recall(identify_index_t index, int32_t x_q27, bo
 }
 
 /* A machine of another record: what it says would take a fifth of the torque from the second level's. */
-void test_the_second_level_believes_recalled_values_when_they_are_confirmed(void)
+void test_the_second_level_uses_recalled_values_when_they_are_confirmed(void)
 {
-    static const identify_index_t believed[] = {IDENTIFY_FLUX, IDENTIFY_LQ};
-    for (unsigned n = 0; n < sizeof believed / sizeof *believed; n++) {
-        const int32_t of_tables = own_torque_after_recall(believed[n], 0, true);
+    static const identify_index_t identified[] = {IDENTIFY_FLUX, IDENTIFY_LQ};
+    for (unsigned n = 0; n < sizeof identified / sizeof *identified; n++) {
+        const int32_t of_tables = own_torque_after_recall(identified[n], 0, true);
         TEST_ASSERT_GREATER_THAN_INT32(0, of_tables);
         const int32_t low = -3 * (int32_t)IDENTIFY_ONE_Q27;
-        TEST_ASSERT_EQUAL_INT32(of_tables, own_torque_after_recall(believed[n], low, false));
-        TEST_ASSERT_LESS_THAN_INT32(of_tables - of_tables / 20, own_torque_after_recall(believed[n], low, true));
+        TEST_ASSERT_EQUAL_INT32(of_tables, own_torque_after_recall(identified[n], low, false));
+        TEST_ASSERT_LESS_THAN_INT32(of_tables - of_tables / 20, own_torque_after_recall(identified[n], low, true));
     }
 }

@@ -52,20 +52,6 @@ void test_adding_is_exact_or_saturated_for_every_pair_of_q15(void)
     }
 }
 
-void test_subtracting_is_exact_or_saturated_for_every_pair_of_q15(void)
-{
-    const int32_t stride = exhaustive_is_affordable() ? 1 : 251;
-    for (int32_t a = -32768; a <= 32767; a += stride) {
-        const int32_t first = larger(a - 32767, -32768);
-        const int32_t last = smaller(a + 32768, 32767);
-        int32_t wrong = 0;
-        COUNT_WRONG(fx_sub_q15, a, -32768, first - 1, 32767);
-        COUNT_WRONG(fx_sub_q15, a, first, last, a - b);
-        COUNT_WRONG(fx_sub_q15, a, last + 1, 32767, -32768);
-        TEST_ASSERT_EQUAL_INT32_MESSAGE(0, wrong, "wrong differences");
-    }
-}
-
 void test_negation_and_magnitude_of_every_q15_saturate_only_at_minus_one(void)
 {
     TEST_ASSERT_EQUAL_INT16(32767, fx_neg_q15(Q15_MIN));

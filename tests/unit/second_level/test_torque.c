@@ -134,7 +134,7 @@ void test_too_little_torque_is_not_reported(void)
 }
 
 /* 1966 counts; a magnet that has lost a sixth of its flux makes 1638, less than 1030 + 600 + 16 are permitted. */
-void test_an_identified_loss_of_the_magnet_is_believed(void)
+void test_an_identified_loss_of_the_magnet_counts(void)
 {
     request(103);
     in.sample = sample(0.0, 0.3, 0.0);
@@ -165,7 +165,7 @@ void test_the_identified_deviations_change_the_torque_as_in_the_machine(void)
 }
 
 /* A healthy machine makes no more than the table's torque for the monitor, and at least four fifths of it. */
-void test_the_deviations_are_believed_only_as_far_as_a_healthy_machine_can_have_them(void)
+void test_the_deviations_count_only_as_far_as_a_healthy_machine_can_have_them(void)
 {
     const int32_t table = torque_with(-0.3, 0.5, 0, 0);
     TEST_ASSERT_EQUAL_INT32(table, torque_with(-0.3, 0.5, 3000, 3000));

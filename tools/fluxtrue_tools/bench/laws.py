@@ -61,7 +61,7 @@ def _spread(target: Target, given: Given | None) -> Spread:
 
 
 def measure_laws(path: Path) -> dict[str, Spread]:
-    """Of the program that build_drive() makes."""
+    """The figures of the laws in the program that build_drive() makes."""
     target = Target(path)
     target.machine.charge(disassembly.read(path))
     return {USUAL: _spread(target, None), TURNING: _spread(target, _given(target, path.parent))}

@@ -129,7 +129,7 @@ class Machine:
         return uc.reg_read(UC_ARM_REG_R0) | (uc.reg_read(UC_ARM_REG_R1) << 32)
 
     def count(self, symbol: str, *arguments: int) -> tuple[int, int]:
-        """As call(), with the number of instructions issued."""
+        """Do what call() does and return the number of instructions issued."""
         if self._hook is None:
             self._hook = self.uc.hook_add(UC_HOOK_BLOCK, self._on_block)
         self._issued = self.cycles = self._end = 0

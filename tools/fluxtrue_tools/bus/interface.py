@@ -33,7 +33,7 @@ class Interface:
 
     @cached_property
     def database(self) -> Database:
-        """Its messages."""
+        """The messages of the DBC."""
         try:
             database = cantools.database.load_string(self.text, "dbc")
         except (cantools.database.Error, ValueError) as error:

@@ -110,7 +110,7 @@ def factors_for(needs: dict[str, Need]) -> Factors:
 
 
 def standard_factors() -> Factors:
-    """Those of the standard DBC."""
+    """The factors of the standard DBC."""
     carried = carriers(standard())
     return {name: carried[name].factor for name in QUANTITIES.values()}
 

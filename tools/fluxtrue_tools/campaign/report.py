@@ -44,7 +44,7 @@ def _image(svg: str) -> str:
 
 def summary(campaign: Campaign, table: pd.DataFrame, scores: list[Score],
             promised: list[tuple[str, Bound]]) -> dict[str, Any]:  # fmt: skip
-    """For scripts; null where there is no figure."""
+    """The summary for scripts; null where there is no figure."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, dict):

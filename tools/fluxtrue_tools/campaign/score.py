@@ -51,7 +51,7 @@ class Figures:
 
 
 def figures(rows: pd.DataFrame) -> Figures:
-    """Of the windows of one controller and band."""
+    """The figures of the windows of one controller and band."""
     error = rows["error_percent"]
     worst = float(error.abs().max()) if len(error) else float("nan")
     return Figures(len(rows), rms(error), p99(error), worst, rms(rows["bound_percent"]))

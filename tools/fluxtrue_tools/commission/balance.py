@@ -29,7 +29,7 @@ class Balance:
         return 2.0 * (self.vector * np.conj(PHASES)).real
 
     def corrected(self, raw: Raw) -> Raw:
-        """With currents of sensors that are alike."""
+        """The currents that sensors of equal gains would show."""
         turn = np.exp(1j * raw.theta)
         return replace(raw, i=raw.i - np.conj(self.vector * raw.i * turn) / turn)
 

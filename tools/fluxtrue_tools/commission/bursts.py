@@ -38,12 +38,12 @@ class Burst:
         return float(self.v_d > 0.0), float(self.v_q > 0.0)
 
     def shifted(self, by_A: complex) -> "Burst":
-        """With bounds for what the sensors will show."""
+        """The same pulses with bounds for the currents that the sensors will show."""
         d, q = by_A.real, by_A.imag
         return replace(self, d=(self.d[0] + d, self.d[1] + d), q=(self.q[0] + q, self.q[1] + q))
 
     def values(self) -> dict[str, float]:
-        """By the names of the firmware."""
+        """The values by their names in the firmware."""
         return {"pulses_vd": self.v_d, "pulses_vq": self.v_q, "pulses_first": self.first,
                 "pulses_id_low_A": self.d[0], "pulses_id_high_A": self.d[1],
                 "pulses_iq_low_A": self.q[0], "pulses_iq_high_A": self.q[1],

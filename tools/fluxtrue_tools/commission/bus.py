@@ -45,7 +45,7 @@ ANGLE_PERIODS: Final = 8
 
 
 def _steady(magnitude: Array) -> tuple[int, int]:
-    """First and last row of the longest stretch of one voltage: current control never holds one."""
+    """First and last row of the longest stretch of one voltage, which current control never holds constant."""
     same = np.abs(np.diff(magnitude)) < STEADY * magnitude[1:]
     same &= magnitude[1:] > SMALL * magnitude.max(initial=0.0)
     ends = np.flatnonzero(np.diff(np.concatenate(([False], same, [False])).astype(int)))
@@ -57,7 +57,7 @@ def _steady(magnitude: Array) -> tuple[int, int]:
 
 
 def pulsing(u_d: Array, u_q: Array, v_d: float, v_q: float) -> Array:
-    """In which rows the pulses act, on their way back to zero current too: each voltage has one magnitude."""
+    """The rows in which the pulses act, including the return to zero current: each voltage has one magnitude."""
     axes = [np.abs(u) for u, v in ((u_d, v_d), (u_q, v_q)) if v > 0.0]
     first, last = _steady(axes[0])
     acts = np.zeros(len(u_d), bool)
@@ -75,7 +75,7 @@ def pulsing(u_d: Array, u_q: Array, v_d: float, v_q: float) -> Array:
 
 
 class OverTheBus:
-    """The drive's names, as far as a commissioning without a turning shaft needs them."""
+    """The drive with the names that a commissioning without a turning shaft needs."""
 
     switched_off: tuple[str, ...] = ()  # the trim acts while the shaft turns
     settings: tuple[str, ...] = ("dead_time_compensation",)
@@ -106,13 +106,13 @@ class OverTheBus:
         self._line.passed = passed
 
     def _torque_Nm(self, i_q_A: float) -> float:
-        """By the nameplate."""
+        """The torque of a current by the nameplate."""
         return 1.5 * self._known.pole_pairs * self._known.psi_f_Vs * i_q_A
 
     # Names.
 
     def set(self, name: str, value: float) -> None:
-        """A value of the drive; nothing once the connection is lost, when the drive stops by itself."""
+        """Set a value of the drive; without effect once the connection is lost: the drive then stops by itself."""
         if self._line.is_lost:
             return
         if name == "enable":
@@ -123,7 +123,7 @@ class OverTheBus:
             self._write(self._known_value(name), value)
 
     def get(self, name: str) -> float:
-        """The value now."""
+        """The present value."""
         if name == "run_state":
             return float(self._line.state in RUNNING)
         if name == "pulses":
@@ -166,7 +166,7 @@ class OverTheBus:
         self._line.ask(enable=False, torque_Nm=0.0)
 
     def _check(self) -> None:
-        """It still runs if it should."""
+        """Check that the drive still runs if it should."""
         if not self._enabled or self._line.state in RUNNING:
             return
         self._enabled = False
@@ -181,7 +181,7 @@ class OverTheBus:
             self._check()
 
     def switch_off(self) -> None:
-        """Switching disabled, the dc link discharged."""
+        """Disable switching and discharge the dc link."""
         self._enabled = False
         self._line.ask(mode="off", enable=False, torque_Nm=0.0, limit_Nm=0.0)
         with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
@@ -190,20 +190,20 @@ class OverTheBus:
     # Movements and captures.
 
     def speed_rpm(self, seconds: float) -> float:
-        """Let the drive run; the speed at the end."""
+        """Let the drive run; return the speed at the end."""
         self.rest(seconds)
         return self.get("speed_rpm")
 
     def push(self, current_A: complex, offset_A: complex = 0j) -> None:
-        """A torque in its place: references of the current cannot be commanded on a bus."""
+        """Request a torque instead of a current, which cannot be commanded on the bus."""
         self._line.ask(torque_Nm=self._torque_Nm(current_A.imag))
 
     def let_go(self) -> None:
-        """No torque."""
+        """Request no torque."""
         self._line.ask(torque_Nm=0.0)
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
-        """As many rows as the scope holds."""
+        """Capture as many rows as the scope holds."""
         signals = [CAPTURED[name] for name in names]
         self._arm(signals, periods)
         self._scope.until_complete(2.0 * periods * self.period_s + 1.0)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bus under a commissioning: the protected command every 10 ms, XCP between, and what the inverter reports.
+"""The bus during a commissioning: the protected command every 10 ms, XCP between the commands, and the reports of the
+inverter.
 
-Before a virtual ECU with a bench channel time passes only here, so that no command can be late. On a bench a thread
-sends the commands while the results are evaluated; it ends switching if the evaluation has not been heard of for a
-second.
+With a virtual ECU that has a bench channel, time passes only here, so that no command can be late. On a bench a thread
+sends the commands while the results are evaluated; it ends switching if the evaluation has not responded for a second.
 """
 
 import threading
@@ -33,7 +33,7 @@ CLOSED: Final = "the connection to the inverter is closed"
 
 @dataclass(frozen=True)
 class Order:
-    """What the command frame says."""
+    """The content of the command frame."""
 
     mode: str = "off"
     enable: bool = False
@@ -59,11 +59,11 @@ class SimulatedTime:
 
     @property
     def now_s(self) -> float:
-        """Of the virtual ECU."""
+        """The time of the virtual ECU."""
         return self._bus.now_s
 
     def send(self, frame: can.Message) -> None:
-        """Before time goes on."""
+        """Send the frame; time does not pass."""
         self._bus.send(frame)
 
     def receive(self, seconds: float) -> list[can.Message]:
@@ -78,7 +78,7 @@ class SimulatedTime:
         return frames
 
     def close(self) -> None:
-        """Nothing goes on by itself."""
+        """Nothing has to be ended: time passes only in receive()."""
 
 
 class WallTime:
@@ -93,18 +93,18 @@ class WallTime:
 
     @property
     def now_s(self) -> float:
-        """Of this computer."""
+        """The time of this computer."""
         return time.monotonic()
 
     def send(self, frame: can.Message) -> None:
-        """One frame."""
+        """Send one frame."""
         if self._lost is not None:
             raise self._lost
         with self._sending:
             self._bus.send(frame)
 
     def receive(self, seconds: float) -> list[can.Message]:
-        """What arrives in this time."""
+        """The frames that arrive in this time."""
         end_s, frames = time.monotonic() + seconds, []
         while (left_s := end_s - time.monotonic()) > 0.0:
             frame = self._bus.recv(left_s)
@@ -124,7 +124,7 @@ class WallTime:
             self._stop.wait(due_s - time.monotonic())
 
     def close(self) -> None:
-        """The last command has been sent."""
+        """Stop the commands and wait until the last one has been sent."""
         self._stop.set()
         self._thread.join()
 
@@ -150,7 +150,7 @@ class Line:
 
     @property
     def state(self) -> str:
-        """Of the inverter, by name."""
+        """The name of the inverter's state."""
         return self._values.state()
 
     @property
@@ -179,7 +179,7 @@ class Line:
         self._values(frame)
 
     def pass_time(self, seconds: float) -> None:
-        """Let the inverter run, and hear what it says."""
+        """Let the inverter run, and receive its frames."""
         self._heard_s = time.monotonic()
         try:
             frames = self._clock.receive(seconds)
@@ -193,7 +193,7 @@ class Line:
         self.passed(seconds)
 
     def exchange(self, frame: can.Message) -> bytes:
-        """One XCP command and its answer."""
+        """Send one XCP command and return its answer."""
         self._answers.clear()
         try:
             self._clock.send(frame)
@@ -212,7 +212,7 @@ class Line:
         raise FluxtrueError(f"commission: {CLOSED} ({error}); without commands it stops by itself") from error
 
     def wait_for(self, wanted: tuple[str, ...], seconds: float, what: str) -> None:
-        """Until the inverter is in one of the states."""
+        """Let time pass until the inverter is in one of the states."""
         waited_s = 0.0
         while self.state not in wanted:
             if waited_s > seconds:
@@ -222,5 +222,5 @@ class Line:
             waited_s += PERIOD_S
 
     def close(self) -> None:
-        """No command any more."""
+        """Stop the commands."""
         self._clock.close()

@@ -66,7 +66,7 @@ def _rotate(drive: Capture, current_A: float) -> tuple[Array, Array]:
 
 
 def _shares() -> list[float]:
-    """Of the frequency in each step: up, on, down."""
+    """The shares of the frequency in each step: up, constant, down."""
     up = round(SPEED_UP_S / turning.STEP_S)
     on = round(TURNS / HZ / turning.STEP_S) - up
     rise = [(k + 0.5) / up for k in range(up)]
@@ -102,7 +102,7 @@ def _is_right(found: Followed) -> bool:
 
 
 def measure(drive: Capture, known: Nameplate) -> Followed:
-    """With the smallest current that the rotor follows."""
+    """Measure with the smallest current that the rotor follows."""
     turning.connect(drive, None, known, NAME)
     try:
         for share in SHARES:

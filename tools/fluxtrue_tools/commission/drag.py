@@ -36,7 +36,7 @@ class Drag:
     to_rad_s: float
 
     def torque_Nm(self, speed_rad_s: Array) -> Array:
-        """At speeds between the two."""
+        """The torque at speeds between the two."""
         w = np.abs(np.asarray(speed_rad_s, float))
         return self.constant_Nm + self.linear_Nms * w + self.square_Nms2 * w**2
 
@@ -134,7 +134,7 @@ def _least_squares(matrix: Array, values: Array) -> tuple[Array, float]:
 
 
 def _coast(drive: Capture, wanted_rad_s: float) -> Array:
-    """Without current, until much of the speed is gone."""
+    """Run down without current until much of the speed is gone."""
     rows: list[Array] = []
     for _ in range(COASTS):
         rows.append(turning.advance(drive, COAST_S, NAME))

@@ -41,7 +41,7 @@ class Capture(Protocol):
 
     @property
     def period_s(self) -> float:
-        """Of the PWM."""
+        """The PWM period."""
 
     def set(self, name: str, value: float) -> None:
         """A value of the drive."""
@@ -121,7 +121,7 @@ class SoftwareInTheLoop:
         self.set("iq_ref_A", shown_A.imag)
 
     def let_go(self) -> None:
-        """Without references."""
+        """Remove all references."""
         self.set("id_ref_A", 0.0)
         self.set("iq_ref_A", 0.0)
         self.set("current_mode", 0.0)

@@ -54,7 +54,7 @@ class Truth:
 
     @property
     def psi_f_Vs(self) -> float:
-        """Of the magnet."""
+        """The flux linkage of the magnet."""
         return float(self.psi(0.0, 0.0)[0])
 
 

@@ -53,7 +53,7 @@ class Resistance:
 
 
 def duration_s() -> float:
-    """Of all currents."""
+    """The duration of all currents."""
     return 2 * REPEATS * len(LEVELS) * SECONDS
 
 

@@ -51,7 +51,7 @@ class Found:
 
     @property
     def largest_A(self) -> float:
-        """Of all bursts."""
+        """The largest current of all bursts."""
         return max((float(abs(raw.i).max()) for raw in self.bursts), default=0.0)
 
     @property

@@ -30,7 +30,7 @@ class Connection:
     offset_rad: float  # electrical angle at the sensor's zero
 
     def turned(self, by_rad: float) -> "Connection":
-        """With an offset that is larger by this angle."""
+        """The same with an offset that is larger by this angle."""
         return Connection(self.pole_pairs, self.reversed, math.remainder(self.offset_rad + by_rad, TURN))
 
 

@@ -64,7 +64,7 @@ class Point:
 
     @property
     def name(self) -> str:
-        """For commands and messages."""
+        """The name for commands and messages."""
         return f"{self.motor}/{self.index}/{'+' if self.sign > 0 else '-'}"
 
     def value(self, name: str) -> float | str:

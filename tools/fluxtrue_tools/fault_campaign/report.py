@@ -45,7 +45,7 @@ def runs_table(table: pd.DataFrame) -> str:
 
 
 def summary_data(plan: Plan, scores: list[Score], summary: Summary) -> dict[str, Any]:
-    """For scripts; null where there is no figure."""
+    """The summary for scripts; null where there is no figure."""
 
     def plain(value: float) -> float | None:
         return None if value != value else round(value, 6)

@@ -42,7 +42,7 @@ class Trace:
 
     @property
     def time_ms(self) -> Array:
-        """At the end of each period."""
+        """The times at the end of each period."""
         first = round(BEFORE_MS * 1e-3 / self.period_s)
         return (np.arange(len(self.rows)) - first + 1) * self.period_s * 1e3
 
@@ -137,7 +137,7 @@ def _start(campaign: Faults, motor: Motor, row: Row, point: Point) -> _Drive:
 
 
 def _watch(drive: _Drive, row: Row, watch_ms: int) -> tuple[list[Array], list[tuple[float, int, int]]]:
-    """From the injection on, millisecond by millisecond."""
+    """Run from the injection on, millisecond by millisecond."""
     starts: dict[Step, float] = {}
     rows, ecu = [], []
     for now in range(watch_ms):

@@ -31,7 +31,7 @@ class Score:
 
     @property
     def status(self) -> str:
-        """As it ought to stand in the table."""
+        """The status that the table should have."""
         return MET if self.is_met else OPEN
 
     @property
@@ -88,7 +88,7 @@ class Summary:
 
     @property
     def share(self) -> float:
-        """Of the runs, percent."""
+        """The share of the runs in percent."""
         return 100.0 * self.runs_met / self.runs if self.runs else math.nan
 
 

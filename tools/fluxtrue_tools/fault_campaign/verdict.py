@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of one run; NaN: did not happen."""
+    """The verdict of one run; NaN: it did not happen."""
 
     first_fault: str
     detect_ms: float

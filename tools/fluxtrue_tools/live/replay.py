@@ -31,7 +31,7 @@ class Recording:
 
     @property
     def length_s(self) -> float:
-        """From the first to the last frame."""
+        """The time from the first to the last frame."""
         return self.times_s[-1]
 
 

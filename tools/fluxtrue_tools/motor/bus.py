@@ -48,7 +48,7 @@ class BusScales:
 
     @cached_property
     def interface_hash(self) -> int:
-        """That of its DBC, which the inverter transmits."""
+        """The hash of its DBC, which the inverter transmits."""
         return interface_hash(self.dbc)
 
 

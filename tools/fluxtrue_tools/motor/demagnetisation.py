@@ -30,7 +30,7 @@ def withstands_C(config: MotorConfig, current_A: float) -> float | None:
 
 
 def demagnetisation_lines(config: MotorConfig) -> list[str]:
-    """Of report.txt."""
+    """The lines of report.txt."""
     magnet, i_max = config.magnet, config.machine.i_max_A
     if magnet.i_d_demag_A is None:
         return ["demagnetisation limit: magnet.i_d_demag_A is not given, only i_max_A limits i_d"]

@@ -132,7 +132,7 @@ def _check_cover(path: Path, grid: _Grid, i_max_A: float) -> None:
 
 
 def _mirror(iq: Array, psi_d: Array, psi_q: Array) -> tuple[Array, Array, Array]:
-    """From i_q >= 0 to the full plane."""
+    """Extend the map from i_q >= 0 to the full plane."""
     full_iq = np.concatenate((-iq[:0:-1], iq))
     full_d = np.concatenate((psi_d[:, :0:-1], psi_d), axis=1)
     full_q = np.concatenate((-psi_q[:, :0:-1], psi_q), axis=1)

@@ -50,7 +50,7 @@ class Identify:
 
 
 def derive(config: MotorConfig, bases: Bases, psi_f_Vs: float) -> Identify:
-    """From the uncertainties in motor.toml."""
+    """Compute the numbers from the uncertainties in motor.toml."""
     machine, inverter, prior = config.machine, config.inverter, config.identification
     update_s = UPDATE_STEPS * bases.step_s
     dead_V = prior.dead_time_uncertainty * inverter.vdc_V * inverter.dead_time_s * inverter.pwm_hz

@@ -45,7 +45,7 @@ class Cycles:
     task: float
 
     def of_fast_isr(self, motor: Motor) -> float:
-        """With the motor's law of current control."""
+        """The load of the fast ISR with the motor's law of current control."""
         if not motor.config.is_turning:
             return self.fast_isr
         if self.turning is None:

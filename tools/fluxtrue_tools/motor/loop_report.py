@@ -52,7 +52,7 @@ def law_of(motor: Motor) -> str:
 
 
 def model_lines(motor: Motor) -> Lines:
-    """Of report.txt, whatever can be simulated."""
+    """The lines of report.txt that need no simulation."""
     head = f"current loop: phase and gain margin of {law_of(motor)}, sampled linear model"
     return [head, *_margin_lines(motor, lambda share, inductance: model_margins(motor, share, inductance))]
 

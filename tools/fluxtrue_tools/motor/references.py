@@ -33,7 +33,7 @@ class Contour:
     psi_Vs: Array  # falling
 
     def at(self, psi_Vs: Array) -> tuple[Array, Array]:
-        """Its currents at each flux."""
+        """The currents of a torque at each flux."""
         i_d, i_q = at_flux([self], psi_Vs)
         return i_d[0], i_q[0]
 

@@ -41,7 +41,7 @@ class Mutant:
         return self.file, self.function, self.before, self.after, self.order
 
     def text(self) -> str:
-        """For a report."""
+        """The description for a report."""
         where = f"{self.file}:{self.line} {self.function}".rstrip()
         return f"{where} ({self.edit.operator})\n    - {self.before}\n    + {self.after}"
 
@@ -78,5 +78,5 @@ def named(file: str, source: bytes, edits: Iterable[tuple[str, Edit]]) -> list[M
 
 
 def of_lines(mutants: Sequence[Mutant], lines: set[int]) -> list[Mutant]:
-    """Those that begin in one of these lines."""
+    """The mutants that begin in one of these lines."""
     return [mutant for mutant in mutants if mutant.line in lines]

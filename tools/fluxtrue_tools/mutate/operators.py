@@ -72,7 +72,7 @@ def _part(node: Node, name: str) -> Node:
 
 
 def _bare(node: Node) -> Node:
-    """Without parentheses around it."""
+    """The expression without the parentheses around it."""
     while node.type == "parenthesized_expression" and node.named_child_count == 1:
         node = node.named_children[0]
     return node

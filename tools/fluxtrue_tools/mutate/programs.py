@@ -65,7 +65,7 @@ class Program:
 
     @cached_property
     def defined(self) -> set[str]:
-        """Its symbols."""
+        """The symbols that the program defines."""
         return set(_SYMBOL.findall(self._symbols))
 
 

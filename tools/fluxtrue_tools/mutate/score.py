@@ -50,7 +50,7 @@ def classified(result: Result, listed: Listed, equal: set[tuple[str, str]]) -> s
 
 
 def scores(results: Iterable[tuple[Result, str]], listed: Listed) -> dict[str, Score]:
-    """By part, in the order of the files."""
+    """The scores by part, in the order of the files."""
     found: dict[str, Score] = {}
     for result, outcome in results:
         score = found.setdefault(listed.part(result.mutant.file), Score())

@@ -88,7 +88,7 @@ class EcuLoop(Loop):
         return created
 
     def close(self) -> None:
-        """Also the firmware, which is ours."""
+        """Close the loop and the firmware, which belongs to it."""
         super().close()
         if self._handle:
             self._library.fluxtrue_destroy(self._handle)
@@ -104,7 +104,7 @@ class EcuLoop(Loop):
 
     @property
     def state(self) -> int:
-        """Of the state machine."""
+        """The state of the state machine."""
         return int(self.read("ecu.supervisor.state"))
 
     def step_ms(self, ramps: Mapping[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
@@ -124,7 +124,7 @@ class EcuLoop(Loop):
             self.step_ms()
 
     def power_up(self) -> None:
-        """To state run without torque."""
+        """Bring the ECU to state run without torque."""
         self.steps(60, Enable=0, Mode="off", TorqueRequested=0.0)
         self.steps(20, Mode="torque")
         for _ in range(500):

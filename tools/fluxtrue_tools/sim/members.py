@@ -31,7 +31,7 @@ def _name(die: DIE) -> str:
 
 
 def _bare(die: DIE) -> DIE:
-    """Without typedef, const and volatile."""
+    """The type without typedef, const and volatile."""
     while die.tag in ("DW_TAG_typedef", "DW_TAG_const_type", "DW_TAG_volatile_type"):
         die = die.get_DIE_from_attribute("DW_AT_type")
     return die
@@ -136,7 +136,7 @@ def _found(path: str, member: str) -> tuple[int, Any]:
 
 @cache
 def members(path: str) -> Members:
-    """Of a library built with debug information."""
+    """The members of a library built with debug information."""
     file = Path(path).open("rb")  # noqa: SIM115 (pyelftools reads when it is asked)
     elf = ELFFile(file)
     if not elf.has_dwarf_info():

@@ -38,7 +38,7 @@ class Group:
             column.append(value)
 
     def signals(self) -> list[Signal]:
-        """For asammdf."""
+        """The signals for asammdf."""
         times = np.maximum.accumulate(np.asarray(self._times, dtype=np.float64))
         return [Signal(name=name, unit=unit, samples=np.asarray(column, dtype=np.float64), timestamps=times)
                 for (name, unit), column in zip(self._units.items(), self._columns, strict=True)]  # fmt: skip

@@ -57,7 +57,7 @@ class Flow:
         return [edge.to for edge in self.blocks[at].edges if edge.to is not None]
 
     def before(self) -> dict[int, list[int]]:
-        """For each block those that it may follow."""
+        """The blocks that each block may follow."""
         found: dict[int, list[int]] = {at: [] for at in self.blocks}
         for at in self.blocks:
             for follower in self.after(at):

@@ -72,7 +72,7 @@ class Watch:
         self._ran = np.zeros(CODE_SIZE // 2, dtype=bool)
 
     def begin(self, stand: Stand) -> None:
-        """After Stand.profile()."""
+        """Start the observation after Stand.profile()."""
         library = stand.library
         library.emu_profile_passes.restype = ctypes.c_bool
         library.emu_profile_passes.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_uint32,

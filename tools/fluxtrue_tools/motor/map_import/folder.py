@@ -90,7 +90,7 @@ def _given(text: str) -> tuple[str, Any]:
 
 
 def settings(path: Path, facts: dict[str, Any], motor: Path | None, given: tuple[str, ...]) -> Settings:
-    """From the file, replaced by --motor, replaced by --set."""
+    """The settings of the file, replaced by --motor, then by --set."""
     found = Settings()
     for key, value in facts.items():
         found.put(key, value, str(path))
