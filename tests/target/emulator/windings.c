@@ -7,7 +7,7 @@
  * -------------------------------------------------- | -------- | ---------------------------------------------
  * channel 6: high from C6V to C7V (combined)         | yes      | test_the_windings_image_passes_each_check
  * channel 6 forced by SWOCTRL                        | yes      | test_the_windings_image_passes_each_check
- * settling, lag and amplitude of the filter          | yes      | test_the_windings_image_passes_each_check    
+ * settling, lag and amplitude of the filter          | yes      | test_a_planted_error_of_the_windings_is_found
  * voltage induced by the rotor's speed               | no       | -
  * other resonances, saturation, temperature          | no       | -
  */
