@@ -169,11 +169,6 @@ PLANTED: dict[str, tuple[Check, PlantedError]] = {
             "ADC_SC1_ADCH(1) | ADC_SC1_AIEN;\n    ADC0->SC1[SAMPLING_ANGLE] = ADC_SC1_ADCH(SINE_INPUT);\n",
         ),
     ),
-    "one track is not read": (
-        the_angle_is_that_of_the_sampling_instant,
-        PlantedError(PORT, "const angle_counts_t counts = sampling_angle();",
-                     "const angle_counts_t counts = {ADC0->R[SAMPLING_ANGLE], 2048};"),
-    ),
 }  # fmt: skip
 OF_WINDINGS: dict[str, tuple[Check, PlantedError]] = {
     "the windings have not settled when the drive starts": (
