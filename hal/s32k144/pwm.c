@@ -144,14 +144,30 @@ static void pass_a_microsecond(void)
     }
 }
 
+static uint32_t forced_outputs(void)
+{
+    return (held != 0U) ? HELD : SIX_OUTPUTS;
+}
+
+void pwm_hold_pulse(bool high)
+{
+    FTM0->SWOCTRL = forced_outputs() | SAMPLE_HELD | (high ? SAMPLE_HIGH : 0U);
+}
+
 void pwm_sample_by_hand(void)
 {
-    const uint32_t outputs = (held != 0U) ? HELD : SIX_OUTPUTS;
-    FTM0->SWOCTRL = outputs | SAMPLE_HELD | SAMPLE_HIGH;
+    pwm_hold_pulse(true);
     pass_a_microsecond();
-    FTM0->SWOCTRL = outputs | SAMPLE_HELD;
+    pwm_hold_pulse(false);
     pass_a_microsecond();
-    FTM0->SWOCTRL = outputs;
+    FTM0->SWOCTRL = forced_outputs();
+}
+
+void pwm_pulse(uint32_t from, uint32_t until)
+{
+    FTM0->C6V = from;
+    FTM0->C7V = until;
+    FTM0->SWOCTRL = forced_outputs();
 }
 
 /* The mask, which would override the level set by software, is written without SYNCHOM and therefore at once. A fault

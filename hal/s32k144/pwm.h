@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_PWM_H
 #define HAL_S32K144_PWM_H
-/** FTM0: three complementary pairs with dead time, and the pulse that makes the resolver converter sample.
+/** FTM0: three complementary pairs with dead time, and a pulse that makes the resolver converter sample,
+ * or excites a resolver.
  * Source   README.md, PWM
  * Units    ticks of 112 MHz
  * Range    pwm_possible(): period_ticks a multiple of 4 up to 65532, dead_time_ticks from 1 to 4092 and an eighth of it
@@ -26,6 +27,10 @@ void pwm_hold_short_circuit(void);
 void pwm_start(void);
 /** A falling edge of SAMPLE, and a low microsecond after it; only before pwm_start(). */
 void pwm_sample_by_hand(void);
+/** The level of the pulse's output at once, by software; only before pwm_start(). */
+void pwm_hold_pulse(bool high);
+/** Instead of the pulse of SAMPLE: high between these ticks of each period, by the timer; only before pwm_start(). */
+void pwm_pulse(uint32_t from, uint32_t until);
 /** Ticks since the start of the period. */
 uint32_t pwm_elapsed(void);
 void pwm_gate_fault_isr(void);

@@ -413,7 +413,8 @@ typedef struct {
     volatile uint32_t CH0DLY0;
     uint8_t reserved1[0x4];
     volatile uint32_t CH0DLY2;
-    uint8_t reserved2[0x16c];
+    volatile uint32_t CH0DLY3;
+    uint8_t reserved2[0x168];
     volatile uint32_t POEN;
     volatile uint32_t PODLY;
 } pdb_t;
@@ -423,6 +424,7 @@ _Static_assert(offsetof(pdb_t, CH0C1) == 0x10, "CH0C1");
 _Static_assert(offsetof(pdb_t, CH0S) == 0x14, "CH0S");
 _Static_assert(offsetof(pdb_t, CH0DLY0) == 0x18, "CH0DLY0");
 _Static_assert(offsetof(pdb_t, CH0DLY2) == 0x20, "CH0DLY2");
+_Static_assert(offsetof(pdb_t, CH0DLY3) == 0x24, "CH0DLY3");
 _Static_assert(offsetof(pdb_t, POEN) == 0x190, "POEN");
 _Static_assert(offsetof(pdb_t, PODLY) == 0x194, "PODLY");
 #define PDB_SC_LDOK 0x1U

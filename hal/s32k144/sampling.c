@@ -18,13 +18,23 @@
 #define ERRORS_MAX 5U /* sequence errors in a row that are a fault */
 #define APART_STEPS 10U  /* a longer interval between errors restarts the count */
 
-/* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). */
-enum { I_A = 0, I_C = 1, WINDING = 2, DIE = 3, ADC0_CONVERSIONS = 4 };
-enum { I_B = 0, V_DC = 1, INVERTER = 2, KNOWN = 3, ADC1_CONVERSIONS = 4 };
+/* ADC0: PTA0, PTA1, PTA6 (channels 0, 1, 2); ADC1: PTA2, PTA3, PTD2 (channels 0, 1, 2). An analogue angle sensor:
+ * sine on PTA7 (channel 3 of ADC0), cosine on PTC7 (channel 5 of ADC1). */
+enum { SINE_INPUT = 3, COSINE_INPUT = 5 };
+enum { I_A = 0, I_C = 1, WINDING = 2 + ANGLE_BY_ADC, DIE, ADC0_CONVERSIONS };
+enum { I_B = 0, V_DC = 1, INVERTER = 2 + ANGLE_BY_ADC, KNOWN, ADC1_CONVERSIONS };
 enum {
     FIRST = 0,
-    SLOW = 2
+    SLOW = WINDING
 }; /* conversions that are started by a delay; each other one follows the end of the one before */
+
+#if ANGLE_BY_ADC
+#define SLOW_DELAY CH0DLY3
+_Static_assert(SLOW == 3 && SAMPLING_ANGLE == 2, "sine and cosine lie between the currents and the slow channels");
+#else
+#define SLOW_DELAY CH0DLY2
+_Static_assert(SLOW == 2, "the slow channels follow the currents");
+#endif
 
 static struct {
     uint32_t in_a_row;
@@ -64,7 +74,7 @@ static void load(pdb_t *pdb)
     pdb->SC = PDB_SC_PDBEN | PDB_SC_PDBEIE | PDB_SC_LDOK;
 }
 
-/* The trigger starts the first conversion, the end of the first one the second. The slow channels are converted in the
+/* The trigger starts the first conversion, the end of each one the next. The slow channels are converted in the
  * middle of the period, after the fast ISR has read all results of the previous one: a result that is still unread when
  * its next conversion ends leaves the pre-trigger locked, and a lock stops the whole sequence. */
 static void chain(pdb_t *pdb, uint32_t conversions, uint32_t period_ticks)
@@ -73,23 +83,35 @@ static void chain(pdb_t *pdb, uint32_t conversions, uint32_t period_ticks)
     const uint32_t delayed = 1U << FIRST | 1U << SLOW;
     pdb->MOD = period_ticks / 2U;
     pdb->CH0DLY0 = 0;
-    pdb->CH0DLY2 = period_ticks / 2U;
+    pdb->SLOW_DELAY = period_ticks / 2U;
     pdb->CH0C1 = PDB_CH0C1_EN(all) | PDB_CH0C1_TOS(delayed) | PDB_CH0C1_BB(all & ~delayed);
     load(pdb);
 }
 
-void sampling_init(uint32_t period_ticks)
+/* The end of the last conversion before the slow ones is the fast ISR's request. */
+static void choose_inputs(void)
 {
-    calibrate(ADC0);
-    calibrate(ADC1);
     ADC0->SC1[I_A] = ADC_SC1_ADCH(0);
+#if ANGLE_BY_ADC
+    ADC0->SC1[I_C] = ADC_SC1_ADCH(1);
+    ADC0->SC1[SAMPLING_ANGLE] = ADC_SC1_ADCH(SINE_INPUT) | ADC_SC1_AIEN;
+    ADC1->SC1[SAMPLING_ANGLE] = ADC_SC1_ADCH(COSINE_INPUT);
+#else
     ADC0->SC1[I_C] = ADC_SC1_ADCH(1) | ADC_SC1_AIEN;
+#endif
     ADC0->SC1[WINDING] = ADC_SC1_ADCH(2);
     ADC0->SC1[DIE] = ADC_SC1_ADCH(DIE_SENSOR);
     ADC1->SC1[I_B] = ADC_SC1_ADCH(0);
     ADC1->SC1[V_DC] = ADC_SC1_ADCH(1);
     ADC1->SC1[INVERTER] = ADC_SC1_ADCH(2);
     ADC1->SC1[KNOWN] = ADC_SC1_ADCH(BANDGAP);
+}
+
+void sampling_init(uint32_t period_ticks)
+{
+    calibrate(ADC0);
+    calibrate(ADC1);
+    choose_inputs();
     TRGMUX->TRGMUX_PDB0 = TRGMUX_PDB0_SEL0(FTM0_INIT_TRIGGER);
     TRGMUX->TRGMUX_PDB1 = TRGMUX_PDB1_SEL0(FTM0_INIT_TRIGGER);
     chain(PDB0, ADC0_CONVERSIONS, period_ticks);
@@ -103,17 +125,42 @@ void sampling_pulse(uint32_t from, uint32_t until)
     load(PDB0);
 }
 
+/* A conversion that is started by the write of SC1. */
+static void start_at_once(adc_t *adc, uint32_t input)
+{
+    adc->SC2 = 0;
+    adc->SC1[0] = ADC_SC1_ADCH(input);
+}
+
+static uint16_t converted(const adc_t *adc)
+{
+    await(&adc->SC1[0], ADC_SC1_COCO, ADC_SC1_COCO);
+    return (uint16_t)adc->R[0];
+}
+
 uint16_t sampling_first_v_dc(void)
 {
     calibrate(ADC1);
-    ADC1->SC2 = 0; /* started by the write of SC1 */
-    ADC1->SC1[0] = ADC_SC1_ADCH(V_DC);
-    await(&ADC1->SC1[0], ADC_SC1_COCO, ADC_SC1_COCO);
-    return (uint16_t)ADC1->R[0];
+    start_at_once(ADC1, V_DC);
+    return converted(ADC1);
+}
+
+void sampling_first_calibrate(void)
+{
+    calibrate(ADC0);
+    calibrate(ADC1);
+}
+
+angle_counts_t sampling_first_angle(void)
+{
+    start_at_once(ADC0, SINE_INPUT);
+    start_at_once(ADC1, COSINE_INPUT);
+    const uint32_t sine = converted(ADC0);
+    return (angle_counts_t){sine, converted(ADC1)};
 }
 
 /* Reads all results of the sequence, also those of the slow channels, so that no pre-trigger stays locked. The slow
- * results stay in their registers for the 1 kHz task. */
+ * results stay in their registers for the 1 kHz task. Sine and cosine are read by sampling_angle(). */
 void hal_adc_read(adc_counts_t *counts)
 {
     const fx_two_words_t from_adc0 = fx_read_two(&ADC0->R[I_A]); /* the second ends the interrupt's request */
@@ -128,7 +175,8 @@ void hal_adc_read(adc_counts_t *counts)
 
 /* The task begins 25 us after the start of a period: its conversions have ended, and the next are 75 us away. A task
  * that begins late may read i_a and i_b of the next period with i_c of this one, because the fast ISR, after which the
- * reading is repeated (ecu.c), follows the second conversion only. Such a sample is one of four in the mean (SL-5). */
+ * reading is repeated (ecu.c), follows the second conversion or the third. Such a sample is one of four in the mean
+ * (SL-5). */
 void hal_adc_latest(current_counts_t *counts)
 {
     counts->i_a = ADC0->R[I_A];

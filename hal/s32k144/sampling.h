@@ -2,7 +2,8 @@
 #ifndef HAL_S32K144_SAMPLING_H
 #define HAL_S32K144_SAMPLING_H
 /** Both converters, started by the PWM's period through the delay blocks: phase currents and dc voltage at the start of
- * the period, temperatures and the bandgap in its middle.
+ * the period, temperatures and the bandgap in its middle. With ANGLE_BY_ADC sine and cosine of an analogue angle sensor
+ * follow the currents, both at the same instant.
  * Source   README.md, sampling
  * Units    12-bit counts; period_ticks: ticks of 112 MHz
  * Range    period_ticks up to 65535
@@ -10,13 +11,33 @@
  *          three periods; its interrupt restarts the delay block
  * Context  sampling_init(), sampling_pulse(): start-up, before the PWM starts; sampling_error_isr(): both delay blocks'
  *          interrupts, at the fast ISR's priority; sampling_tick() and the slow channels, as converted last: 1 kHz
- *          task */
+ *          task; sampling_angle(): fast ISR, in every period, or its pre-triggers stay locked;
+ *          sampling_first_calibrate(), sampling_first_angle(): start-up, before sampling_init() */
 #include <stdbool.h>
 #include <stdint.h>
+
+#include "hal/s32k144/registers.h"
+
+typedef struct {
+    uint32_t sine, cosine;
+} angle_counts_t;
+
+enum { SAMPLING_ANGLE = 2 }; /* conversion of sine and cosine in the sequence of each converter */
+/* When they are sampled, in ticks of 112 MHz from the start of the period: each of the three conversions is started 3
+ * ticks after its cause, the first two take 38 clocks of 4 ticks, and the third samples for 8. */
+#define SAMPLING_ANGLE_TICKS (3U * 3U + 2U * 38U * 4U + 8U * 4U)
 
 void sampling_init(uint32_t period_ticks);
 /** The dc voltage, converted at once; start-up, before sampling_init(). */
 uint16_t sampling_first_v_dc(void);
+/** Sine and cosine, converted at once and together, any number of times after the calibration. */
+void sampling_first_calibrate(void);
+angle_counts_t sampling_first_angle(void);
+/** Those of this period. */
+static inline angle_counts_t sampling_angle(void)
+{
+    return (angle_counts_t){ADC0->R[SAMPLING_ANGLE], ADC1->R[SAMPLING_ANGLE]};
+}
 /** From the next period on: a level for the trigger multiplexer, from and until these ticks of each period; both lie in
  * its first half. */
 void sampling_pulse(uint32_t from, uint32_t until);

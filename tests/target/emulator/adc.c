@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Analogue-to-digital converters. A result is the value at the pin when the conversion ends; the values at the pins
- * change once per PWM period, at its start. A conversion takes SMPLTS + 1 + 30 converter clocks, about as long as in
- * the data sheet.
+ * change once per PWM period, at its start, but for those of an analogue angle sensor (analogue.c). A conversion takes
+ * SMPLTS + 1 + 30 converter clocks, about as long as in the data sheet.
  *
  * documented behaviour                               | modelled | test
  * -------------------------------------------------- | -------- | --------------------------------------------
@@ -70,10 +70,15 @@ uint32_t adc_read(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_
     return stored;
 }
 
+static uint32_t conversion_clock(const emu_t *emu, const peripheral_t *self)
+{
+    return clocks_peripheral_ticks(emu, self->gate) << (bus_get(emu, self, CFG1) >> 5 & 3U);
+}
+
 static uint64_t conversion_ticks(emu_t *emu, const peripheral_t *self)
 {
     const uint32_t cfg1 = bus_get(emu, self, CFG1), sc3 = bus_get(emu, self, SC3);
-    const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (cfg1 >> 5 & 3U);
+    const uint32_t clock = conversion_clock(emu, self);
     if (clock == 0 || (cfg1 & 3U) != 0) {
         emu_fail(emu, "%s converts without a clock (PCC, SCG divider 2, CFG1.ADICLK)", self->name);
         return 1;
@@ -115,7 +120,7 @@ static void calibrate(emu_t *emu, const peripheral_t *self)
     for (uint32_t at = CLPS; at <= CLP9; at += 4U) {
         clear = clear && bus_get(emu, self, at) == 0U;
     }
-    const uint32_t clock = clocks_peripheral_ticks(emu, self->gate) << (bus_get(emu, self, CFG1) >> 5 & 3U);
+    const uint32_t clock = conversion_clock(emu, self);
     if ((bus_get(emu, self, SC2) & 0x40U) != 0 || (bus_get(emu, self, SC3) & 7U) != 7U || clock < 2U * 67U) {
         emu_fail(emu, "write of %s.SC3: calibration requires ADTRG = 0, average 32, at most 25 MHz", self->name);
     } else if (!clear) {
@@ -160,7 +165,10 @@ void adc_fire(emu_t *emu, int instance)
     const uint32_t input = bus_get(emu, self, control) & 31U;
     const bool read_before = (bus_get(emu, self, control) & COCO) == 0;
     a->current = 0;
-    bus_put(emu, self, R + control, emu->s.pins.adc[instance][input] & 0xFFFU);
+    const uint64_t sampled = a->done - (uint64_t)CONVERSION * conversion_clock(emu, self);
+    bus_put(emu, self, R + control,
+            analogue_is_at(emu, instance, input) ? analogue_count(emu, instance, sampled)
+                                                 : emu->s.pins.adc[instance][input] & 0xFFFU);
     bus_put(emu, self, control, bus_get(emu, self, control) | COCO);
     line_update(emu, self);
     if ((bus_get(emu, self, SC2) & 0x40U) != 0 && read_before) { /* COCO has risen: the last result was read */

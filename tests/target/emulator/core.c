@@ -395,6 +395,8 @@ void emu_reset(emu_t *emu, uint32_t cause)
     s->core_ticks = FIRC_TICKS;
     s->rdc = old.rdc; /* devices of their own */
     s->as5047 = old.as5047;
+    s->analogue = old.analogue;
+    s->windings.at = old.now;
     if (cause == 0U) {
         rdc_power_on(emu);
         as5047_power_on(emu);
@@ -504,6 +506,9 @@ emu_t *emu_create(const char *elf, int mode, char *error, size_t size)
         return NULL;
     }
     emu->as5047 = emu_symbol(emu, "angle_sensor_as5047") != 0U;
+    emu->analogue = emu_symbol(emu, "angle_sensor_analogue") != 0U;
+    emu->excited = emu_symbol(emu, "angle_sensor_analogue") == 2U;
+    analogue_power_on(emu);
     data_flash_create(emu);
     emu_reset(emu, 0);
     return emu;

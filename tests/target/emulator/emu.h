@@ -69,6 +69,10 @@ typedef enum {
     EMU_ENCODER_WEAK_FIELD = 5
 } emu_encoder_fault_t;
 EMU_API void emu_encoder_fault(emu_t *emu, emu_encoder_fault_t fault);
+/** Errors of an analogue angle sensor by name: sine_ or cosine_ with offset and noise (counts), amplitude (share of the
+ * nominal one) and fault (1 open, 2 at the reference, 3 at its middle). They outlast a reset and a power cycle. */
+typedef enum { EMU_SETTING_TAKEN = 0, EMU_SETTING_UNKNOWN = 1, EMU_SETTING_OUT_OF_RANGE = 2 } emu_setting_t;
+EMU_API emu_setting_t emu_analogue_set(emu_t *emu, const char *name, double value);
 EMU_API void emu_bridge(const emu_t *emu, emu_bridge_t *bridge);
 EMU_API uint32_t emu_outputs(const emu_t *emu);
 EMU_API void emu_core_state(emu_t *emu, emu_core_state_t state);

@@ -132,6 +132,25 @@ typedef struct {
     emu_encoder_fault_t fault;
 } as5047_t;
 
+/* fault: 0 none, 1 open (the board pulls it down), 2 at the reference, 3 at its middle */
+typedef struct {
+    double offset, amplitude, noise, fault; /* counts, share of the nominal one, counts */
+} track_t;
+
+typedef struct {
+    track_t track[2];  /* sine, cosine */
+    double excitation; /* amplitude, as a share of the nominal one */
+    uint32_t random;
+} analogue_t;
+
+/* The filter between the output of FTM0's channel 6 and a resolver's windings. */
+typedef struct {
+    double value, slope; /* of the voltage: 1 = nominal peak; per radian of the resonance */
+    uint64_t at;
+    uint32_t forced; /* SWOCTRL as it was until then */
+    bool enabled;    /* SC.PWMEN6 the same */
+} windings_t;
+
 typedef struct {
     bool unlocked, configured;
     uint64_t start;
@@ -158,6 +177,8 @@ typedef struct {
     spi_t spi[3];
     rdc_t rdc;
     as5047_t as5047;
+    analogue_t analogue;
+    windings_t windings;
     wdog_t wdog;
     ftfc_t ftfc;
     uint64_t lpit_ready;                  /* from then on the registers of LPIT0 may be written */
@@ -213,7 +234,9 @@ struct emu {
     uc_engine *uc;
     elf_t elf;
     emu_mode_t mode;
-    bool as5047; /* the image was built for this encoder at LPSPI0 */
+    bool as5047;   /* the image was built for this encoder at LPSPI0 */
+    bool analogue; /* for a sine and a cosine at the converters, */
+    bool excited;  /* of a resolver */
     const facts_t *facts_of[PERIPHERALS_MAX];
     int16_t *index_of[PERIPHERALS_MAX]; /* by offset: register of facts_of, -1 none */
     int16_t page[256];
@@ -338,6 +361,13 @@ uint32_t rdc_transfer(emu_t *emu, uint64_t begin, uint32_t sent, uint32_t bits);
 void rdc_power_on(emu_t *emu);
 uint32_t as5047_transfer(emu_t *emu, uint64_t end, uint32_t sent, uint32_t bits);
 void as5047_power_on(emu_t *emu);
+void analogue_power_on(emu_t *emu);
+/** Whether this input of a converter is a track of the analogue angle sensor; its count. */
+bool analogue_is_at(const emu_t *emu, int instance, uint32_t input);
+uint16_t analogue_count(emu_t *emu, int instance, uint64_t when);
+/** Follows the output of channel 6 up to this time; before anything that may change it, and after. */
+void windings_follow(emu_t *emu, uint64_t when);
+void windings_changed(emu_t *emu);
 /** The timer's outputs 0 ... 5 at this instant, one bit each. */
 uint32_t ftm_levels(const emu_t *emu);
 void rdc_sample(emu_t *emu);

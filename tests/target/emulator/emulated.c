@@ -179,6 +179,16 @@ static bool power_cycle(emulated_t *e)
 
 /* ---- names ---- */
 
+static int sensor_set(emulated_t *e, const char *name, double value)
+{
+    if (strcmp(name, "emulator.encoder_fault") == 0) {
+        emu_encoder_fault(e->emu, (emu_encoder_fault_t)value);
+        return value >= 0.0 && value <= EMU_ENCODER_WEAK_FIELD ? SIM_OK : SIM_OUT_OF_RANGE;
+    }
+    const emu_setting_t done = emu_analogue_set(e->emu, name + strlen("emulator."), value);
+    return done == EMU_SETTING_UNKNOWN ? SIM_UNKNOWN_NAME : done == EMU_SETTING_TAKEN ? SIM_OK : SIM_OUT_OF_RANGE;
+}
+
 static int pin_set(emulated_t *e, const char *name, double value)
 {
     assert(e != NULL);
@@ -188,10 +198,6 @@ static int pin_set(emulated_t *e, const char *name, double value)
                                                                : NULL;
     if (strcmp(name, "emulator.power_cycle") == 0) {
         return value == 1.0 && power_cycle(e) ? SIM_OK : SIM_OUT_OF_RANGE;
-    }
-    if (strcmp(name, "emulator.encoder_fault") == 0) {
-        emu_encoder_fault(e->emu, (emu_encoder_fault_t)value);
-        return value >= 0.0 && value <= EMU_ENCODER_WEAK_FIELD ? SIM_OK : SIM_OUT_OF_RANGE;
     }
     if (strcmp(name, "emulator.reset_share") == 0) {
         e->reset_share = value;
@@ -217,7 +223,7 @@ static int pin_set(emulated_t *e, const char *name, double value)
         return SIM_OK;
     }
     if (pin == NULL) {
-        return isnan(emulated_get(e, name)) ? SIM_UNKNOWN_NAME : SIM_READ_ONLY;
+        return isnan(emulated_get(e, name)) ? sensor_set(e, name, value) : SIM_READ_ONLY;
     }
     if (value != 0.0 && value != 1.0) {
         return SIM_OUT_OF_RANGE;

@@ -318,6 +318,7 @@ static bool sets_fault_control(uint32_t offset)
 void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t old, uint32_t value)
 {
     const bool ran = emu->s.ftm[self->instance].running;
+    windings_follow(emu, emu->s.now);
     check_protection(emu, self, offset, old, value);
     apply_write(emu, self, offset, value);
     if (offset == QDCTRL && (value & ~old & 1U) != 0) {
@@ -330,6 +331,7 @@ void ftm_written(emu_t *emu, const peripheral_t *self, uint32_t offset, uint32_t
         ftm_outputs_written(emu, offset, value);
         ftm_outputs_check(emu, emu->s.ftm[0].running && !ran);
     }
+    windings_changed(emu);
 }
 
 /* ---- events ---- */
@@ -361,6 +363,7 @@ void ftm_fire(emu_t *emu, int instance)
     const peripheral_t *self = of(instance);
     ftm_t *f = &emu->s.ftm[instance];
     const uint32_t sync = bus_get(emu, self, SYNC);
+    windings_follow(emu, emu_instant(emu));
     f->start = emu_instant(emu);
     f->tof = true;
     buffers_load(emu, self, f->software_trigger && (sync & 2U) != 0);

@@ -156,7 +156,7 @@ def main() -> int:
     parser.add_argument("--points", type=int, default=60)
     parser.add_argument("--csv", type=Path)
     parser.add_argument("--times", action="store_true", help="where the time of the start goes, and nothing else")
-    parser.add_argument("--angle", choices=("encoder", "resolver", "as5047"), default="encoder")
+    parser.add_argument("--angle", choices=build.FLASHED, default="encoder")
     arguments = parser.parse_args()
     parts = build.prepare("hsm1", angle=arguments.angle, flashed=True)
     if arguments.times:

@@ -19,8 +19,10 @@ from fluxtrue_tools.target.build import image
 ROOT: Final = sim_build.ROOT
 # The image without the bus: scenarios write the requests into its memory themselves.
 PRESETS: Final = {"encoder": "s32k144-direct", "resolver": "s32k144-resolver-direct",
-                  "as5047": "s32k144-as5047-direct"}  # fmt: skip
-FLASHED: Final = {"encoder": "s32k144", "resolver": "s32k144-resolver", "as5047": "s32k144-as5047"}
+                  "as5047": "s32k144-as5047-direct", "sincos": "s32k144-sincos-direct",
+                  "windings": "s32k144-windings-direct"}  # fmt: skip
+FLASHED: Final = {"encoder": "s32k144", "resolver": "s32k144-resolver", "as5047": "s32k144-as5047",
+                  "sincos": "s32k144-sincos", "windings": "s32k144-windings"}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from fluxtrue_tools import paths
 from fluxtrue_tools.errors import FluxtrueError
 
 DEFAULT = Path(__file__).resolve().parents[3] / "docs" / "howto" / "scenarios" / "warm-up.toml"
+SENSORS = ["encoder", "resolver", "as5047", "sincos", "windings"]
 RUN_ONLY = ("scenario", "out", "json_path", "plot")
 SERVE_ONLY = ("port", "bench_port", "realtime")
 
@@ -17,9 +18,7 @@ SERVE_ONLY = ("port", "bench_port", "realtime")
 @click.command(cls=paths.Command)
 @click.option("--scenario", type=paths.InputFile(), default=DEFAULT, help="What to run (TOML); left out: warm-up.toml.")
 @click.option("--elf", type=paths.InputFile(), help="The image; left out: it is built for the S32K144.")
-@click.option(
-    "--angle", type=click.Choice(["encoder", "resolver", "as5047"]), default="encoder", help="Which image to build."
-)
+@click.option("--angle", type=click.Choice(SENSORS), default="encoder", help="Which image to build.")
 @click.option("--serve", is_flag=True, help="Instead: the flashed image on the bus, with a bench channel.")
 @click.option("--port", type=click.IntRange(0, 65535), default=29536, show_default=True, help="--serve: socketcand.")
 @click.option("--bench-port", type=click.IntRange(0, 65535), default=29537, show_default=True, help="--serve: bench.")

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The S32K144's images with an analogue sine and cosine, and with a resolver's windings, at the converters on the
+emulated processor: the angle is the one of the currents' sampling instant, a sample outside the band is an invalid
+sample, and planted errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planting import PORT as PORT_FOLDER
+from planting import PlantedError, image_with_error, relinked
+from rotor_frame import error_A
+
+from fluxtrue_tools.bench.build import have_arm_compiler
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.library import Loop
+
+FAST_RPM = 6500.0
+TURN_PERIODS = 92  # at FAST_RPM
+RAD_S = 0.10471975511965977
+TORQUE = 40.0
+ANGLE = 1 << 4
+OPEN, HIGH, MIDDLE = 1.0, 2.0, 3.0  # track_t of the emulator
+TRACKS = ("sine", "cosine")
+RAMP_PERIODS = 200
+CURRENT_A = 0.3
+
+
+@pytest.fixture(scope="module")
+def sincos() -> Parts:
+    if not have_arm_compiler():
+        pytest.skip("the Arm compiler is not installed: no image is built")
+    return build.prepare("hsm1", angle="sincos")
+
+
+def windings_image(built: Path, folder: Path, error: PlantedError | None = None) -> Path:
+    """The image of the preset s32k144-windings: these two files of the other one with a resolver's excitation."""
+    replacements = {}
+    for name in ("angle_sincos.c", "excitation.c"):
+        text = (PORT_FOLDER / name).read_text(encoding="utf-8")
+        if error is not None and error.file == name:
+            text = text.replace(error.text, error.replacement)
+        replacements[PORT_FOLDER / name] = folder / name
+        (folder / name).write_text("#undef ANGLE_EXCITED\n#define ANGLE_EXCITED 1\n" + text, encoding="utf-8")
+    return relinked(built, replacements, folder)
+
+
+@pytest.fixture(scope="module")
+def windings(sincos: Parts, tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    return replace(sincos, image=windings_image(sincos.image, tmp_path_factory.mktemp("windings")))
+
+
+@contextmanager
+def driving(parts: Parts, rpm: float = FAST_RPM, **errors: float) -> Iterator[Loop]:
+    motor = parts.emulated()
+    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
+    with Loop(motor.library, plant, motor.flux_map) as loop:
+        for name, value in errors.items():
+            loop.set(f"emulator.{name}", value)
+        loop.run(3000, {"plant.speed_rad_s": (0.0, rpm * RAD_S)})
+        loop.set("enable", 1)
+        loop.set("torque_requested_Nm", TORQUE)
+        loop.run(1000)
+        yield loop
+
+
+def is_right(loop: Loop) -> bool:
+    near = error_A(loop) < CURRENT_A
+    return near and loop.get("fault_word") == 0 and abs(loop.get("truth.torque_Nm") - TORQUE) < 1.0
+
+
+def faults_after(loop: Loop, periods: int) -> int:
+    loop.run(periods)
+    return int(loop.get("fault_word"))
+
+
+def the_angle_is_that_of_the_sampling_instant(parts: Parts) -> None:
+    with driving(parts) as loop:
+        assert is_right(loop)
+        loop.run(RAMP_PERIODS, {"plant.speed_rad_s": (FAST_RPM * RAD_S, 0.98 * FAST_RPM * RAD_S)})
+        assert is_right(loop)
+
+
+def errors_within_the_tolerances_leave_the_torque_true(parts: Parts) -> None:
+    """Offsets of 0.7 % and amplitudes that differ by 1 % move the angle by up to 15 mrad of the shaft, which the angle
+    correction identifies in 0.1 s; the noise is 4 counts. A common error of the amplitudes of 12 % changes nothing."""
+    errors = {"sine_offset": 10.0, "cosine_offset": -10.0, "sine_amplitude": 0.885, "cosine_amplitude": 0.875,
+              "sine_noise": 4.0, "cosine_noise": 4.0}  # fmt: skip
+    with driving(parts, **errors) as loop:
+        loop.run(1000)
+        loop.record(("truth.torque_Nm",), 1)
+        assert np.mean(loop.run(5 * TURN_PERIODS)) == pytest.approx(TORQUE, abs=0.2)
+        assert loop.get("fault_word") == 0
+
+
+def a_glitch_is_an_invalid_sample(parts: Parts) -> None:
+    """One or two periods cost nothing, at speed: the rotor's movement replaces them. The third is the angle fault."""
+    for track, fault in zip(TRACKS, (OPEN, HIGH), strict=True):
+        with driving(parts) as loop:
+            for periods in (1, 2):
+                loop.set(f"emulator.{track}_fault", fault)
+                loop.run(periods)
+                loop.set(f"emulator.{track}_fault", 0.0)
+                loop.run(50)
+                assert is_right(loop)
+            loop.set(f"emulator.{track}_fault", fault)
+            assert faults_after(loop, 2) == 0
+            assert faults_after(loop, 2) == ANGLE
+
+
+def a_sensor_that_fails_is_found(parts: Parts) -> None:
+    """An amplitude of 75 % of both tracks in three periods, whatever the angle; of one track, and a track that stays in
+    the middle of its range, within half a turn: the other track alone is outside the band at its zero."""
+    with driving(parts) as loop:
+        for track in TRACKS:
+            loop.set(f"emulator.{track}_amplitude", 0.75)
+        assert faults_after(loop, 4) == ANGLE
+    for track in TRACKS:
+        for name, value in (("amplitude", 0.75), ("fault", MIDDLE)):
+            with driving(parts) as loop:
+                loop.set(f"emulator.{track}_{name}", value)
+                assert faults_after(loop, TURN_PERIODS // 2) & ANGLE, (track, name)
+
+
+def a_start_without_a_sensor_is_refused(parts: Parts) -> None:
+    """No magnet, or an open wire, before the processor starts; the same with the sensor drives."""
+    for name, value in (("fault", OPEN), ("fault", MIDDLE), ("fault", 0.0)):
+        motor = parts.emulated()
+        plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
+        with Loop(motor.library, plant, motor.flux_map) as loop:
+            loop.run(10)
+            for track in TRACKS:
+                loop.set(f"emulator.{track}_{name}", value)
+            loop.set("emulator.power_cycle", 1)
+            loop.set("enable", 1)
+            loop.run(100)
+            assert loop.get("emulator.gates") == (value == 0.0)
+            assert int(loop.get("fault_word")) == (ANGLE if value != 0.0 else 0)
+
+
+def a_lost_excitation_is_found(parts: Parts) -> None:
+    """In three periods: neither track has a voltage. 75 % of it too."""
+    for share in (0.0, 0.75):
+        with driving(parts) as loop:
+            loop.set("emulator.excitation", share)
+            assert faults_after(loop, 2) == 0
+            assert faults_after(loop, 2) == ANGLE
+
+
+Check = Callable[[Parts], None]
+PORT = "angle_sincos.c"
+PLANTED: dict[str, tuple[Check, PlantedError]] = {
+    "the age of the sample is left out": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(PORT, " - (uint32_t)fx_mulhi(sensor.travel, sensor.sampled_q32);", ";"),
+    ),
+    "the fast ISR comes before the tracks": (
+        the_angle_is_that_of_the_sampling_instant,
+        PlantedError(
+            "sampling.c",
+            "ADC_SC1_ADCH(1);\n    ADC0->SC1[SAMPLING_ANGLE] = ADC_SC1_ADCH(SINE_INPUT) | ADC_SC1_AIEN;\n",
+            "ADC_SC1_ADCH(1) | ADC_SC1_AIEN;\n    ADC0->SC1[SAMPLING_ANGLE] = ADC_SC1_ADCH(SINE_INPUT);\n",
+        ),
+    ),
+}  # fmt: skip
+OF_WINDINGS: dict[str, tuple[Check, PlantedError]] = {
+    "the windings have not settled when the drive starts": (
+        a_start_without_a_sensor_is_refused,
+        PlantedError(
+            "excitation.c",
+            "    for (uint32_t k = 1; k < SETTLING_PERIODS; k++) {\n        pulse(half, half);\n    }\n"
+            "    pulse(half, half - SAMPLING_ANGLE_TICKS);\n",
+            "",
+        ),
+    ),
+}  # fmt: skip
+CHECKS = (the_angle_is_that_of_the_sampling_instant, errors_within_the_tolerances_leave_the_torque_true,
+          a_glitch_is_an_invalid_sample, a_sensor_that_fails_is_found, a_start_without_a_sensor_is_refused)  # fmt: skip
+
+
+@pytest.mark.parametrize("check", CHECKS, ids=lambda c: c.__name__)
+def test_the_sincos_image_passes_each_check(sincos: Parts, check: Check) -> None:
+    check(sincos)
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_error_of_the_sincos_is_found(sincos: Parts, name: str, tmp_path: Path) -> None:
+    check, error = PLANTED[name]
+    planted = replace(sincos, image=image_with_error(sincos.image, error, tmp_path))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)
+
+
+WINDINGS_CHECKS = (the_angle_is_that_of_the_sampling_instant, a_lost_excitation_is_found,
+                   a_start_without_a_sensor_is_refused)  # fmt: skip
+
+
+@pytest.mark.parametrize("check", WINDINGS_CHECKS, ids=lambda c: c.__name__)
+def test_the_windings_image_passes_each_check(windings: Parts, check: Check) -> None:
+    check(windings)
+
+
+@pytest.mark.parametrize("name", OF_WINDINGS)
+def test_a_planted_error_of_the_windings_is_found(sincos: Parts, name: str, tmp_path: Path) -> None:
+    check, error = OF_WINDINGS[name]
+    planted = replace(sincos, image=windings_image(sincos.image, tmp_path, error))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)
