@@ -30,6 +30,7 @@ void plant_params_default(plant_params_t *params)
     params->resolver_pole_pairs = 1.0;
     params->imposed_speed = 1;
     params->inertia_kgm2 = 1.0;
+    params->stribeck_rad_s = 1.0;
     params->seed = 1;
 }
 
@@ -64,11 +65,15 @@ static const char *bad_machine(const plant_params_t *p, int has_map)
         {"cross_saturation_scale", isfinite(p->cross_saturation_scale)},
         {"iron_k_h", not_below_zero(p->iron_k_h)},
         {"iron_k_e", not_below_zero(p->iron_k_e)},
+        {"iron_k_excess", not_below_zero(p->iron_k_excess)},
         {"speed_rad_s", isfinite(p->speed_rad_s)},
         {"theta_m_rad", isfinite(p->theta_m_rad)},
         {"inertia_kgm2", p->imposed_speed || above_zero(p->inertia_kgm2)},
         {"load_Nm", isfinite(p->load_Nm)},
         {"viscous_Nms", not_below_zero(p->viscous_Nms)},
+        {"coulomb_Nm", not_below_zero(p->coulomb_Nm)},
+        {"stiction_Nm", not_below_zero(p->stiction_Nm)},
+        {"stribeck_rad_s", above_zero(p->stribeck_rad_s)},
     };
     for (size_t k = 0; k < sizeof check / sizeof check[0]; k++) {
         if (!check[k].ok) {
@@ -121,6 +126,7 @@ static const char *bad_electronics(const plant_params_t *p)
         {"pwm_hz", above_zero(p->pwm_hz)},
         {"dead_time_s", not_below_zero(p->dead_time_s) && p->dead_time_s * p->pwm_hz < 0.5},
         {"device_drop_V", not_below_zero(p->device_drop_V)},
+        {"leg_knee_A", not_below_zero(p->leg_knee_A)},
         {"short_circuit_A", above_zero(p->short_circuit_A)},
         {"desaturation_s", not_below_zero(p->desaturation_s)},
         {"substeps", p->substeps >= 10 && p->substeps <= 100000},
