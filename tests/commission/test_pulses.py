@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware's voltage pulses: when they are refused, and how they end."""
 
+from collections.abc import Mapping
+
 import pytest
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.bursts import Burst
+from fluxtrue_tools.commission.bursts import STARTS, Burst, record
 from fluxtrue_tools.commission.drive import SIGNALS, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 PULSE, DONE, FAILED = 1.0, 3.0, 4.0
@@ -99,3 +104,41 @@ def test_a_current_beyond_the_largest_ends_it(unknown: Motor, known: Nameplate) 
     drive.capture(SIGNALS, 100)
     assert drive.get("pulses") != DONE
     assert drive.get("pulses_failure") == CURRENT or drive.get("fault_word") != 0.0
+
+
+class Hesitant(SoftwareInTheLoop):
+    """Refuses so many starts, as for a speed that seems not to be zero."""
+
+    refusals = 0
+    starts = 0
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        self.starts += 1
+        self.set("torque_requested_Nm", float(self.starts <= self.refusals))
+        self.rest(0.005)
+        rows = super().pulse(values)
+        self.set("torque_requested_Nm", 0.0)
+        return rows
+
+
+@pytest.fixture
+def hesitant(unknown: Motor, known: Nameplate) -> Hesitant:
+    _, flux_map, plant = hidden.draw("saturated", 1, unknown, known.i_max_A)
+    made = Hesitant(Loop(unknown.library, plant, flux_map))
+    made.set("enable", 1.0)
+    made.rest(0.05)
+    return made
+
+
+def test_a_start_that_is_refused_is_tried_again(hesitant: Hesitant, known: Nameplate) -> None:
+    hesitant.refusals = STARTS - 1
+    raw = record(hesitant, Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4), known)
+    assert hesitant.starts == STARTS
+    assert raw.failure == "" and abs(raw.i.real).max() > 35.0
+
+
+def test_a_start_that_is_always_refused_ends_the_step(hesitant: Hesitant, known: Nameplate) -> None:
+    hesitant.refusals = 1000
+    with pytest.raises(FluxtrueError, match="voltage pulses refused"):
+        record(hesitant, Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4), known)
+    assert hesitant.starts == STARTS
