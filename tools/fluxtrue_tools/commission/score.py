@@ -49,7 +49,8 @@ def resistance_error(r_ohm: float, truth: Truth) -> tuple[float, float]:
 
 def balance_error(balance: Balance, truth: Truth) -> float:
     """The largest error of the difference between two sensors' gains."""
-    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in "abc"]))
+    order = "acb" if truth.plant.get("phases_swapped", 0.0) else "abc"  # the sensors are exchanged with the leads
+    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in order]))
 
 
 def iron_error(found: Iron | None, truth: Truth) -> float:
