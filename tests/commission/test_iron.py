@@ -2,11 +2,15 @@
 """The iron's current from the angle by which the flux linkage of a coasting machine is behind its magnet."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission import iron, report
+from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.spin import Spun
+from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.commission.turning import Connection
 from fluxtrue_tools.motor.flux_model import Array, ConstantModel
 
@@ -65,3 +69,11 @@ def test_a_current_beyond_that_of_any_iron_ends_at_the_limit() -> None:
     found = iron.measure(spun(1.2), ConstantModel(2e-4, L_Q_H, PSI_VS), I_MAX_A)
     assert found is not None
     assert found.per_flux == pytest.approx(1.5 * iron.LIMIT_SHARE * I_MAX_A / PSI_VS)
+
+
+@pytest.mark.parametrize(("per_flux", "said"), [(20.0, "k_h + k_e w = 20 W"), (0.0, "none seen")])
+def test_the_report_says_what_was_seen_of_the_iron(per_flux: float, said: str, known: Nameplate) -> None:
+    surface: Any = SimpleNamespace(with_magnet=lambda psi_f_Vs: ConstantModel(2e-4, L_Q_H, PSI_VS))
+    (line,) = report._iron(Found(spun=spun(behind(per_flux)), surface=surface), known)
+    assert said in line
+    assert report._iron(Found(surface=surface), known) == []

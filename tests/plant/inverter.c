@@ -22,8 +22,8 @@ static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], 
     u_s[1] += v->series_V[1];
 }
 
-/* (PL-29) at the start of a substep: up to the knee the error is proportional to the current, and reaches half of its full
- * value there; above it the value of this current acts up to the current at which the straight line reaches it. */
+/* (PL-29) at the start of a substep: up to the knee the error is proportional to the current, and reaches half of its
+ * full value there; above it the value of this current acts up to the current at which the straight line reaches it. */
 static void soften(inverter_t *v, const double i_abc[3])
 {
     for (int x = 0; x < 3; x++) {

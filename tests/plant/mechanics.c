@@ -22,8 +22,8 @@ static double dry_friction(const plant_params_t *p, double speed_rad_s)
     return p->coulomb_Nm + fmax(p->stiction_Nm - p->coulomb_Nm, 0.0) * exp(-x * x);
 }
 
-/* The speed after h. Dry friction (PL-30) takes speed away down to zero and holds the rotor there; it is implicit in the
- * sign of the speed, so that a rotor at rest does not oscillate about zero from step to step. */
+/* The speed after h. Dry friction (PL-30) takes speed away down to zero and holds the rotor there; it is implicit in
+ * the sign of the speed, so that a rotor at rest does not oscillate about zero from step to step. */
 static double speed_after(const plant_params_t *p, double from_rad_s, double torque_Nm, double at_rad_s, double h)
 {
     const double free_rad_s = from_rad_s + h * acceleration(p, torque_Nm, at_rad_s);

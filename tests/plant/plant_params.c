@@ -93,6 +93,9 @@ static const char *bad_sensor(const plant_params_t *p)
             return "current_offset_A";
         }
     }
+    if (!isfinite(p->vdc_gain)) {
+        return "vdc_gain";
+    }
     if (!above_zero(p->converter_reference)) {
         return "converter_reference";
     }
@@ -134,7 +137,6 @@ static const char *bad_electronics(const plant_params_t *p)
         {"adc_bits", p->adc_bits >= 1 && p->adc_bits <= 24},
         {"current_noise_A_rms", not_below_zero(p->current_noise_A_rms)},
         {"vdc_full_scale_V", above_zero(p->vdc_full_scale_V)},
-        {"vdc_gain", isfinite(p->vdc_gain)},
         {"angle_offset_rad", isfinite(p->angle_offset_rad)},
         {"angle_h1_rad", isfinite(p->angle_h1_rad) && isfinite(p->angle_h1_phase)},
         {"angle_h2_rad", isfinite(p->angle_h2_rad) && isfinite(p->angle_h2_phase)},

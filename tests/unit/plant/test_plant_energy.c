@@ -136,8 +136,8 @@ static void driven_by(double load_Nm, int periods)
     }
 }
 
-/* 1 N m hold a rotor at rest, 0.5 N m brake one that turns: 0.9 N m do not move it, 1.1 N m do, and then the 0.6 N m that
- * are left accelerate 0.01 kg m^2 by 60 rad/s^2, up to the speed that the Stribeck range of 0.1 rad/s costs. */
+/* 1 N m hold a rotor at rest, 0.5 N m brake one that turns: 0.9 N m do not move it, 1.1 N m do, and then the 0.6 N m
+ * that are left accelerate 0.01 kg m^2 by 60 rad/s^2, up to the speed that the Stribeck range of 0.1 rad/s costs. */
 void test_stiction_holds_a_rotor_until_more_acts_on_it(void)
 {
     p.imposed_speed = 0;
