@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware's voltage pulses: when they are refused, and how they end."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -111,9 +113,11 @@ class Hesitant(SoftwareInTheLoop):
 
     refusals = 0
     starts = 0
+    allowed_rad = 0.0
 
     def pulse(self, values: Mapping[str, float]) -> Array:
         self.starts += 1
+        self.allowed_rad = values["pulses_angle_rad"]
         self.set("torque_requested_Nm", float(self.starts <= self.refusals))
         self.rest(0.005)
         rows = super().pulse(values)
@@ -142,3 +146,13 @@ def test_a_start_that_is_always_refused_ends_the_step(hesitant: Hesitant, known:
     with pytest.raises(FluxtrueError, match="voltage pulses refused"):
         record(hesitant, Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4), known)
     assert hesitant.starts == STARTS
+
+
+@pytest.mark.parametrize(("pole_pairs", "degrees"), [(2, 15.0), (4, 15.0), (8, 30.0), (50, 44.0)])
+def test_with_many_pole_pairs_the_rotor_may_move_by_more_electrical_degrees(
+    pole_pairs: int, degrees: float, hesitant: Hesitant, known: Nameplate
+) -> None:
+    """3.75 degrees of the shaft; the firmware takes up to 45 electrical degrees."""
+    burst = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4)
+    assert record(hesitant, burst, replace(known, pole_pairs=pole_pairs)).failure == ""
+    assert math.degrees(hesitant.allowed_rad) == pytest.approx(degrees)

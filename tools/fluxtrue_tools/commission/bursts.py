@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
-from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.nameplate import SWING_DEG, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
@@ -31,7 +31,7 @@ class Burst:
     reversals: int
     delay: int = 0
     first: float = 0.7071  # without saturation: half of the impulse
-    angle_deg: float = 15.0
+    angle_deg: float = SWING_DEG
     periods: int = PERIODS_MAX
 
     @property
@@ -127,7 +127,8 @@ def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
     for _ in range(STARTS):
         _brake(drive, known)
         drive.rest(REST_S)
-        rows = drive.pulse(burst.shifted(_shift(drive, known)).values())
+        allowed = replace(burst, angle_deg=known.swing_deg)
+        rows = drive.pulse(allowed.shifted(_shift(drive, known)).values())
         if _phase_word(drive) != REFUSED or drive.get("fault_word"):
             break
     return rows
