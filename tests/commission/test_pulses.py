@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The firmware's voltage pulses: when they are refused, and how they end."""
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
 import pytest
 
 from fluxtrue_tools.commission import hidden
-from fluxtrue_tools.commission.bursts import Burst
+from fluxtrue_tools.commission.bursts import STARTS, Burst, record
 from fluxtrue_tools.commission.drive import SIGNALS, SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 PULSE, DONE, FAILED = 1.0, 3.0, 4.0
@@ -99,3 +106,53 @@ def test_a_current_beyond_the_largest_ends_it(unknown: Motor, known: Nameplate) 
     drive.capture(SIGNALS, 100)
     assert drive.get("pulses") != DONE
     assert drive.get("pulses_failure") == CURRENT or drive.get("fault_word") != 0.0
+
+
+class Hesitant(SoftwareInTheLoop):
+    """Refuses so many starts, as for a speed that seems not to be zero."""
+
+    refusals = 0
+    starts = 0
+    allowed_rad = 0.0
+
+    def pulse(self, values: Mapping[str, float]) -> Array:
+        self.starts += 1
+        self.allowed_rad = values["pulses_angle_rad"]
+        self.set("torque_requested_Nm", float(self.starts <= self.refusals))
+        self.rest(0.005)
+        rows = super().pulse(values)
+        self.set("torque_requested_Nm", 0.0)
+        return rows
+
+
+@pytest.fixture
+def hesitant(unknown: Motor, known: Nameplate) -> Hesitant:
+    _, flux_map, plant = hidden.draw("saturated", 1, unknown, known.i_max_A)
+    made = Hesitant(Loop(unknown.library, plant, flux_map))
+    made.set("enable", 1.0)
+    made.rest(0.05)
+    return made
+
+
+def test_a_start_that_is_refused_is_tried_again(hesitant: Hesitant, known: Nameplate) -> None:
+    hesitant.refusals = STARTS - 1
+    raw = record(hesitant, Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4), known)
+    assert hesitant.starts == STARTS
+    assert raw.failure == "" and abs(raw.i.real).max() > 35.0
+
+
+def test_a_start_that_is_always_refused_ends_the_step(hesitant: Hesitant, known: Nameplate) -> None:
+    hesitant.refusals = 1000
+    with pytest.raises(FluxtrueError, match="voltage pulses refused"):
+        record(hesitant, Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4), known)
+    assert hesitant.starts == STARTS
+
+
+@pytest.mark.parametrize(("pole_pairs", "degrees"), [(2, 15.0), (4, 15.0), (8, 30.0), (50, 44.0)])
+def test_with_many_pole_pairs_the_rotor_may_move_by_more_electrical_degrees(
+    pole_pairs: int, degrees: float, hesitant: Hesitant, known: Nameplate
+) -> None:
+    """3.75 degrees of the shaft; the firmware takes up to 45 electrical degrees."""
+    burst = Burst(0.2, 0.0, (-50.0, 50.0), (-50.0, 50.0), reversals=4)
+    assert record(hesitant, burst, replace(known, pole_pairs=pole_pairs)).failure == ""
+    assert math.degrees(hesitant.allowed_rad) == pytest.approx(degrees)

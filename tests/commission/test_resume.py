@@ -79,7 +79,7 @@ def test_resume_wants_a_work_folder(folder: Path, tmp_path: Path, capsys: pytest
 
 def test_what_is_kept_is_what_was_found(tmp_path: Path) -> None:
     wiring = Connection(3, True, 0.25)
-    found = Found(1.5 - 0.5j, 2.0, Followed(7.5, -3.01, 0.1, wiring), spin.Spun(wiring, 0.16, 1e-4, 2e-4, 1e-5),
+    found = Found(1.5 - 0.5j, 2.0, Followed(7.5, -3.01, 0.1, wiring), spin.Spun(wiring, 0.16, 1e-4, 2e-4, 1e-5, 400.0),
                   drag.Drag(0.06, 1e-4, 0.1, 2e-3, 3e-6, 10.0, 100.0))  # fmt: skip
     work = Work(tmp_path, {"--motor": "a"})
     work.save(("offsets", "phases", "spin", "drag"), found)

@@ -15,10 +15,10 @@ void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, con
     e->iron += 0.75 * m->iron_A_per_Vs * swept;
 }
 
-void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms, double h)
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double friction_Nm, double h)
 {
     e->torque += h * torque_Nm;
-    e->torque_shaft += h * (torque_Nm - viscous_Nms * speed_rad_s);
+    e->torque_shaft += h * (torque_Nm - friction_Nm);
     e->mechanical += h * torque_Nm * speed_rad_s;
 }
 

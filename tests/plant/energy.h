@@ -32,7 +32,7 @@ void energy_electric(energy_t *e, const machine_t *m, const instant_t *from, con
                      const double i_s[2], double h);
 
 /** The mechanical part: mean torque of the substep, speed in its middle. */
-void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double viscous_Nms, double h);
+void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double friction_Nm, double h);
 
 /** Adds u_s, which is constant, as seen from the rotor, which turns by 2 half_rad in the substep. */
 void energy_voltage(energy_t *e, const double u_s[2], rotation_t mid, double half_rad, double h);

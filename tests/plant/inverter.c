@@ -22,6 +22,20 @@ static void voltage(const inverter_t *v, double vdc_V, const double error_V[3], 
     u_s[1] += v->series_V[1];
 }
 
+/* (PL-29) at the start of a substep: up to the knee the error is proportional to the current, and reaches half of its
+ * full value there; above it the value of this current acts up to the current at which the straight line reaches it. */
+static void soften(inverter_t *v, const double i_abc[3])
+{
+    for (int x = 0; x < 3; x++) {
+        if (v->knee_A[x] > 0.0) {
+            const double share = 1.0 - 0.5 / fmax(fabs(i_abc[x]) / v->knee_A[x], 1.0);
+            v->hi_V[x] = share * v->full_hi_V[x];
+            v->lo_V[x] = share * v->full_lo_V[x];
+            v->zone_A[x] = 2.0 * share * v->knee_A[x];
+        }
+    }
+}
+
 /* Whether the currents outside the zone keep the signs for which the errors were chosen. */
 static int consistent(const inverter_t *v, const double error_V[3], const double i_abc[3])
 {
@@ -108,6 +122,7 @@ void inverter_voltage(inverter_t *v, const machine_t *m, double vdc_V, double h,
         machine_current(m, i);
         to_stationary(start, i, i_s);
         to_phases(i_s, i_abc);
+        soften(v, i_abc);
         for (int x = 0; x < 3; x++) {
             error_V[x] = i_abc[x] > 0.0 ? v->hi_V[x] : -v->lo_V[x];
         }
@@ -139,7 +154,7 @@ double inverter_dc_current(const inverter_t *v, const double i_abc[3])
 {
     double sum = 0.0;
     for (int x = 0; x < 3; x++) {
-        const double e = v->error_V[x], bound = e > 0.0 ? v->hi_V[x] : v->lo_V[x];
+        const double e = v->error_V[x], bound = e > 0.0 ? v->full_hi_V[x] : v->full_lo_V[x];
         const double loss = e > 0.0 ? v->hi_d[x] : v->lo_d[x];
         sum += (v->duty[x] - (bound > 0.0 ? e / bound * loss : 0.0)) * i_abc[x];
     }

@@ -29,7 +29,7 @@ static void leg_off(inverter_t *v, int x)
 {
     v->duty[x] = 0.5;
     v->hi_d[x] = v->lo_d[x] = 0.5;
-    v->zone_A[x] = 0.0;
+    v->zone_A[x] = v->knee_A[x] = 0.0;
 }
 
 /* A pulse shorter than the dead time disappears: the loss is never larger than the pulse. */
@@ -49,6 +49,7 @@ static void leg_open(inverter_t *v, const plant_params_t *p, int x)
     v->hi_d[x] = p->switch_open[UPPER(x)] ? v->duty[x] : v->hi_d[x];
     v->lo_d[x] = p->switch_open[LOWER(x)] ? 1.0 - v->duty[x] : v->lo_d[x];
     v->zone_A[x] = p->switch_open[UPPER(x)] && p->switch_open[LOWER(x)] ? 0.0 : v->zone_A[x];
+    v->knee_A[x] = p->switch_open[UPPER(x)] || p->switch_open[LOWER(x)] ? 0.0 : p->leg_knee_A;
 }
 
 /* A shorted switch holds the terminal at its rail for any gate signal and any current (PL-24). */
@@ -67,7 +68,7 @@ static void leg_lead(inverter_t *v, const plant_params_t *p, int x)
         v->duty[x] = 0.5;
         v->hi_d[x] = v->lo_d[x] = 0.0;
         v->hi_V[x] = v->lo_V[x] = OPEN_LEAD_V;
-        v->zone_A[x] = 0.0;
+        v->zone_A[x] = v->knee_A[x] = 0.0;
     }
 }
 
@@ -99,6 +100,8 @@ void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], 
         v->lo_V[x] = v->lo_d[x] * vdc_V + drop;
         leg_shorted(v, p, x);
         leg_lead(v, p, x);
+        v->full_hi_V[x] = v->hi_V[x];
+        v->full_lo_V[x] = v->lo_V[x];
         v->error_V[x] = clamp(v->error_V[x], -v->lo_V[x], v->hi_V[x]);
         v->exact &= v->hi_V[x] == 0.0 && v->lo_V[x] == 0.0;
     }

@@ -105,12 +105,22 @@ static int same_model(const flux_model_t *a, const flux_model_t *b)
            a->offset_Vs == b->offset_Vs && a->psi_f_Vs == b->psi_f_Vs;
 }
 
+/* (PL-8), (PL-28) */
+static double iron_of(const plant_params_t *p, double w)
+{
+    const double length = sqrt(w * w + IRON_SIGN_RAD_S * IRON_SIGN_RAD_S);
+    double per_flux = p->iron_k_h * w / length + p->iron_k_e * w;
+    if (p->iron_k_excess != 0.0) {
+        per_flux += p->iron_k_excess * w / sqrt(length);
+    }
+    return per_flux / 1.5;
+}
+
 void machine_update(machine_t *m, const plant_params_t *p, rotation_t rotor, double omega_e)
 {
-    const double w = omega_e;
     m->pole_pairs = p->pole_pairs;
     m->r_ohm = p->r_ohm_20 * (1.0 + p->r_temp_coeff_per_K * (p->winding_C - 20.0));
-    m->iron_A_per_Vs = (p->iron_k_h * w / sqrt(w * w + IRON_SIGN_RAD_S * IRON_SIGN_RAD_S) + p->iron_k_e * w) / 1.5;
+    m->iron_A_per_Vs = iron_of(p, omega_e);
     const flux_model_t now = model_of(m, p, m->flux.map);
     if (same_model(&now, &m->flux)) {
         return;

@@ -25,7 +25,7 @@ typedef struct {
     flux_model_t flux;
     double psi_nominal_Vs; /* psi_d(0, 0) of the map */
     double pole_pairs, r_ohm;
-    double iron_A_per_Vs; /* i_fe = j psi times this (PL-8) */
+    double iron_A_per_Vs; /* i_fe = j psi times this (PL-8), (PL-28) */
     double psi_s[2];
     double psi_dq[2], im_dq[2], jac[4]; /* at the present instant; jac at the last iterate of the inversion */
     long failures;

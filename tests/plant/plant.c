@@ -169,7 +169,7 @@ static void substep(plant_t *plant, rotation_t *rotor, double vdc_V, double shor
     mechanics_step(&plant->mechanics, p, mid_rad_s, torque_Nm, h);
     energy_voltage(sum, u_s, mid, half_rad, h);
     energy_electric(sum, m, &from, &to, u_s, i_s, h);
-    energy_mechanic(sum, torque_Nm, mid_rad_s, p->viscous_Nms, h);
+    energy_mechanic(sum, torque_Nm, mid_rad_s, mechanics_friction(p, mid_rad_s), h);
     const double charge_As = h * (inverter_dc_current(&plant->inverter, i_abc) + short_circuit_A);
     sum->dc += vdc_V * charge_As;
     sum->charge += charge_As;

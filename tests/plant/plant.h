@@ -3,7 +3,7 @@
 #define PLANT_PLANT_H
 /** The simulated traction drive: inverter, machine, mechanics, sensors; the reference of every closed-loop test.
  *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
- * Source   docs/theory/plant.md (PL-1) ... (PL-27)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-30)
  * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
  * Errors   plant_create() returns NULL for bad parameters or no memory
  * Context  simulation only, double precision; one instance per drive, no global state.
@@ -41,7 +41,7 @@ typedef struct {
     long inversion_failures; /* substeps whose currents were not found within the tolerance; a valid run has 0 */
     /* mean over the last period */
     double u_d_V, u_q_V;                         /* terminal voltage in the rotor frame */
-    double torque_mean_Nm, torque_shaft_mean_Nm; /* shaft: minus the viscous friction */
+    double torque_mean_Nm, torque_shaft_mean_Nm; /* shaft: minus the friction */
     double idc_A;
     double copper_W, iron_W, mechanical_W, electrical_W, inverter_W;
     /* integrals since creation or plant_set_state() */

@@ -30,6 +30,7 @@ void plant_params_default(plant_params_t *params)
     params->resolver_pole_pairs = 1.0;
     params->imposed_speed = 1;
     params->inertia_kgm2 = 1.0;
+    params->stribeck_rad_s = 1.0;
     params->seed = 1;
 }
 
@@ -64,11 +65,15 @@ static const char *bad_machine(const plant_params_t *p, int has_map)
         {"cross_saturation_scale", isfinite(p->cross_saturation_scale)},
         {"iron_k_h", not_below_zero(p->iron_k_h)},
         {"iron_k_e", not_below_zero(p->iron_k_e)},
+        {"iron_k_excess", not_below_zero(p->iron_k_excess)},
         {"speed_rad_s", isfinite(p->speed_rad_s)},
         {"theta_m_rad", isfinite(p->theta_m_rad)},
         {"inertia_kgm2", p->imposed_speed || above_zero(p->inertia_kgm2)},
         {"load_Nm", isfinite(p->load_Nm)},
         {"viscous_Nms", not_below_zero(p->viscous_Nms)},
+        {"coulomb_Nm", not_below_zero(p->coulomb_Nm)},
+        {"stiction_Nm", not_below_zero(p->stiction_Nm)},
+        {"stribeck_rad_s", above_zero(p->stribeck_rad_s)},
     };
     for (size_t k = 0; k < sizeof check / sizeof check[0]; k++) {
         if (!check[k].ok) {
@@ -87,6 +92,9 @@ static const char *bad_sensor(const plant_params_t *p)
         if (!isfinite(p->current_offset_A[x])) {
             return "current_offset_A";
         }
+    }
+    if (!isfinite(p->vdc_gain)) {
+        return "vdc_gain";
     }
     if (!above_zero(p->converter_reference)) {
         return "converter_reference";
@@ -121,6 +129,7 @@ static const char *bad_electronics(const plant_params_t *p)
         {"pwm_hz", above_zero(p->pwm_hz)},
         {"dead_time_s", not_below_zero(p->dead_time_s) && p->dead_time_s * p->pwm_hz < 0.5},
         {"device_drop_V", not_below_zero(p->device_drop_V)},
+        {"leg_knee_A", not_below_zero(p->leg_knee_A)},
         {"short_circuit_A", above_zero(p->short_circuit_A)},
         {"desaturation_s", not_below_zero(p->desaturation_s)},
         {"substeps", p->substeps >= 10 && p->substeps <= 100000},
@@ -128,7 +137,6 @@ static const char *bad_electronics(const plant_params_t *p)
         {"adc_bits", p->adc_bits >= 1 && p->adc_bits <= 24},
         {"current_noise_A_rms", not_below_zero(p->current_noise_A_rms)},
         {"vdc_full_scale_V", above_zero(p->vdc_full_scale_V)},
-        {"vdc_gain", isfinite(p->vdc_gain)},
         {"angle_offset_rad", isfinite(p->angle_offset_rad)},
         {"angle_h1_rad", isfinite(p->angle_h1_rad) && isfinite(p->angle_h1_phase)},
         {"angle_h2_rad", isfinite(p->angle_h2_rad) && isfinite(p->angle_h2_phase)},

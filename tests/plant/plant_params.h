@@ -18,10 +18,12 @@ typedef struct {
     double magnet_temp_coeff_per_K, rotor_C;                 /* further factor on psi_f, (PL-4) */
     double lq_scale, ld_slope_scale, cross_saturation_scale; /* (PL-4) */
     double iron_k_h, iron_k_e;                               /* W/(rad/s Vs^2), W/(rad/s Vs)^2, (PL-8) */
+    double iron_k_excess;                                    /* W/((rad/s)^1.5 Vs^2), (PL-28) */
     int magnet_step_keeps_current;                           /* 0: flux linkage is continuous; 1: current is, (PL-6) */
     /* inverter */
     double vdc_V, vdc_ripple_V, vdc_ripple_hz; /* of the battery */
     double pwm_hz, dead_time_s, device_drop_V;
+    double leg_knee_A;               /* current at which a leg loses half of its error, (PL-29); 0: (PL-12) */
     double vdc_start_V;              /* of the dc link's capacitor, taken at creation */
     double dc_link_F;                /* 0: no capacitor, the bridge is always connected to the battery */
     double precharge_s, discharge_s; /* time constants of the capacitor with the resistor of each */
@@ -65,6 +67,8 @@ typedef struct {
     double speed_rad_s;                        /* mechanical: the imposed speed, or the initial one */
     double theta_m_rad;                        /* initial rotor angle */
     double inertia_kgm2, load_Nm, viscous_Nms; /* load_Nm > 0 brakes a positive speed */
+    double coulomb_Nm, stiction_Nm;            /* dry friction: at speed and at standstill, (PL-30) */
+    double stribeck_rad_s;                     /* speed at which the former has replaced most of the latter */
     uint64_t seed;                             /* taken at creation */
 } plant_params_t;
 

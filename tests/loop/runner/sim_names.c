@@ -32,10 +32,10 @@ static const field_t plant_fields[] = {
     REAL(pole_pairs), FLAG(phases_swapped), REAL(r_ohm_20), REAL(r_temp_coeff_per_K), REAL(winding_C), REAL(ld_H),
     REAL(lq_H), REAL(psi_f_Vs), REAL(magnet_scale), REAL(magnet_temp_coeff_per_K), REAL(rotor_C),
     REAL(lq_scale), REAL(ld_slope_scale), REAL(cross_saturation_scale), REAL(iron_k_h),
-    REAL(iron_k_e), FLAG(magnet_step_keeps_current), REAL(vdc_V), REAL(vdc_ripple_V),
+    REAL(iron_k_e), REAL(iron_k_excess), FLAG(magnet_step_keeps_current), REAL(vdc_V), REAL(vdc_ripple_V),
     REAL(vdc_ripple_hz), REAL(vdc_start_V), REAL(dc_link_F), REAL(precharge_s), REAL(discharge_s), REAL(dc_load_ohm),
     REAL(avalanche_V), FLAG(precharge_open), FLAG(discharge_open), FLAG(contactor_open), REAL(hardware_safe_V),
-    REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), FLAG(substeps),
+    REAL(pwm_hz), REAL(dead_time_s), REAL(device_drop_V), REAL(leg_knee_A), FLAG(substeps),
     FLAG(ideal_inverter), REAL(series_d_V), REAL(series_q_V),
     FLAG3(phase_open), SWITCHES(switch_open), SWITCHES(switch_shorted),
     REAL(short_circuit_A), REAL(desaturation_s), FLAG(desaturation_open), REAL(current_full_scale_A), FLAG(adc_bits),
@@ -47,6 +47,7 @@ static const field_t plant_fields[] = {
     FLAG(angle_bits), REAL(angle_delay_s), FLAG(angle_stuck), FLAG(angle_spike_every),
     FLAG(angle_spike_samples), REAL(angle_spike_rad), FLAG(imposed_speed),
     REAL(speed_rad_s), REAL(theta_m_rad), REAL(inertia_kgm2), REAL(load_Nm), REAL(viscous_Nms),
+    REAL(coulomb_Nm), REAL(stiction_Nm), REAL(stribeck_rad_s),
     {"plant.seed", offsetof(plant_params_t, seed), KIND_U64},
 };
 /* clang-format on */

@@ -127,6 +127,65 @@ void test_the_speed_of_a_coasting_rotor_decays_exponentially(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, t->speed_rad_s * 30.0 / PI, t->speed_rpm);
 }
 
+static void driven_by(double load_Nm, int periods)
+{
+    const double off[3] = {0.5, 0.5, 0.5};
+    plant_params(plant)->load_Nm = load_Nm;
+    for (int k = 0; k < periods; k++) {
+        plant_advance(plant, off, 0);
+    }
+}
+
+/* 1 N m hold a rotor at rest, 0.5 N m brake one that turns: 0.9 N m do not move it, 1.1 N m do, and then the 0.6 N m
+ * that are left accelerate 0.01 kg m^2 by 60 rad/s^2, up to the speed that the Stribeck range of 0.1 rad/s costs. */
+void test_stiction_holds_a_rotor_until_more_acts_on_it(void)
+{
+    p.imposed_speed = 0;
+    p.speed_rad_s = 0.0;
+    p.inertia_kgm2 = 0.01;
+    p.coulomb_Nm = 0.5;
+    p.stiction_Nm = 1.0;
+    p.stribeck_rad_s = 0.1;
+    p.psi_f_Vs = 0.0;
+    plant = plant_create(&p, NULL);
+    const plant_truth_t *t = plant_truth(plant);
+    driven_by(-0.9, 1000);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, t->speed_rad_s);
+    driven_by(0.9, 1000);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, t->speed_rad_s);
+    driven_by(-1.1, 1000);
+    TEST_ASSERT_DOUBLE_WITHIN(0.5, 6.0, t->speed_rad_s);
+}
+
+/* 0.5 N m on 0.01 kg m^2: 50 rad/s^2 less, then a rotor at rest, to the last bit. */
+void test_dry_friction_brakes_a_rotor_evenly_and_does_not_turn_it_back(void)
+{
+    p.imposed_speed = 0;
+    p.speed_rad_s = -10.0;
+    p.inertia_kgm2 = 0.01;
+    p.coulomb_Nm = 0.5;
+    p.psi_f_Vs = 0.0;
+    plant = plant_create(&p, NULL);
+    const plant_truth_t *t = plant_truth(plant);
+    driven_by(0.0, 1000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, -5.0, t->speed_rad_s);
+    driven_by(0.0, 1100);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, t->speed_rad_s);
+}
+
+/* At the Stribeck speed 1/e of the difference is left: 0.5 + 1/e = 0.8679 N m. */
+void test_dry_friction_reduces_the_shaft_torque_by_stribecks_curve(void)
+{
+    p.speed_rad_s = -2.0;
+    p.coulomb_Nm = 0.5;
+    p.stiction_Nm = 1.5;
+    p.stribeck_rad_s = 2.0;
+    plant = plant_create(&p, NULL);
+    driven_by(0.0, 1);
+    const plant_truth_t *t = plant_truth(plant);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, t->torque_mean_Nm + 0.5 + exp(-1.0), t->torque_shaft_mean_Nm);
+}
+
 /* Friction belongs to the machine: at an imposed speed it reduces the shaft torque. */
 void test_shaft_torque_is_air_gap_torque_less_friction(void)
 {

@@ -85,6 +85,44 @@ void test_the_voltage_error_of_every_leg_opposes_its_current(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-10, 32.0 / 3.0, t->u_d_V);
 }
 
+/* A knee at 10 A: 50 A lose 1 - 10/100 of 8 V, 25 A lose 1 - 10/50 of it; 4 and 2 A lose 4/20 and 2/20. The inductance
+ * keeps the currents. Dead time dissipates nothing with a knee either. */
+void test_a_soft_knee_reduces_the_error_of_small_currents(void)
+{
+    p.dead_time_s = 2e-6;
+    p.leg_knee_A = 10.0;
+    p.ld_H = p.lq_H = 50.0;
+    p.r_ohm_20 = 0.0;
+    const plant_truth_t *t = one_period(50.0, 0.5, 0.5, 0.5);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, -2.0 / 3.0 * 8.0 * (0.9 + 0.8), t->u_d_V);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, t->inverter_W);
+    plant_destroy(plant);
+    t = one_period(-50.0, 0.5, 0.5, 0.5);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 2.0 / 3.0 * 8.0 * (0.9 + 0.8), t->u_d_V);
+    plant_destroy(plant);
+    t = one_period(4.0, 0.5, 0.5, 0.5);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, -2.0 / 3.0 * 8.0 * (0.2 + 0.1), t->u_d_V);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, t->inverter_W);
+}
+
+/* The diodes alone block the whole dc voltage. */
+void test_a_soft_knee_belongs_to_switching_legs_alone(void)
+{
+    const double duty[3] = {0.5, 0.5, 0.5};
+    double seen[2];
+    p.dead_time_s = 2e-6;
+    for (int n = 0; n < 2; n++) {
+        p.leg_knee_A = n == 0 ? 0.0 : 10.0;
+        start();
+        plant_set_state(plant, 50.0, 0.0, 0.0, 0.0);
+        plant_advance(plant, duty, 0);
+        seen[n] = plant_truth(plant)->u_d_V;
+        plant_destroy(plant);
+    }
+    plant = NULL;
+    TEST_ASSERT_EQUAL_DOUBLE(seen[0], seen[1]);
+}
+
 /* Legs at 0 or 1 do not switch. If leg a alone switches, its error of 8 V changes u_d by 16/3 V. */
 void test_a_leg_that_does_not_switch_has_no_dead_time(void)
 {

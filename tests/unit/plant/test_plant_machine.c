@@ -299,6 +299,29 @@ void test_iron_loss_at_no_load_is_the_stated_power(void)
     TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0, t->torque_mean_Nm);
 }
 
+/* As above: k_x |w|^1.5 |psi|^2, here 1.0 x 41569 x 0.084^2 = 293 W. */
+void test_the_excess_iron_loss_grows_with_the_power_of_three_halves(void)
+{
+    double watts[2];
+    p.pwm_hz = 1e5;
+    p.iron_k_excess = 1.0;
+    for (int n = 0; n < 2; n++) {
+        p.speed_rad_s = n == 0 ? 400.0 : -100.0;
+        const double w = 3.0 * p.speed_rad_s, size = fabs(w);
+        const double power = size * sqrt(size) * p.psi_f_Vs * p.psi_f_Vs, i_fe = power / (1.5 * size * p.psi_f_Vs);
+        const double x = 0.5 * w / p.pwm_hz;
+        const plant_truth_t *t = start();
+        for (int k = 0; k < 8000; k++) {
+            bench_drive(plant, I * (w * p.psi_f_Vs + copysign(p.r_ohm_20 * i_fe, w)) * x / sin(x));
+        }
+        watts[n] = t->iron_W;
+        TEST_ASSERT_DOUBLE_WITHIN(2e-3 * power, power, t->iron_W);
+        plant_destroy(plant);
+    }
+    plant = NULL;
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 8.0, watts[0] / watts[1]);
+}
+
 void test_iron_loss_is_equal_in_both_directions_of_rotation(void)
 {
     double seen[2];

@@ -66,10 +66,14 @@ void test_impossible_machines_are_refused_by_name(void)
     REFUSE(cross_saturation_scale, nan);
     REFUSE(iron_k_h, -1.0);
     REFUSE(iron_k_e, -1.0);
+    REFUSE(iron_k_excess, -1.0);
     REFUSE(speed_rad_s, nan);
     REFUSE(theta_m_rad, inf);
     REFUSE(load_Nm, nan);
     REFUSE(viscous_Nms, -1e-3);
+    REFUSE(coulomb_Nm, -1e-3);
+    REFUSE(stiction_Nm, -1e-3);
+    REFUSE(stribeck_rad_s, 0.0);
     p.imposed_speed = 0;
     p.inertia_kgm2 = 0.0;
     refused("inertia_kgm2");
@@ -85,6 +89,7 @@ void test_impossible_electronics_are_refused_by_name(void)
     REFUSE(dead_time_s, 50e-6);
     REFUSE(dead_time_s, -1e-6);
     REFUSE(device_drop_V, -0.1);
+    REFUSE(leg_knee_A, -0.1);
     REFUSE(short_circuit_A, 0.0);
     REFUSE(desaturation_s, -1e-6);
     REFUSE(substeps, 9);

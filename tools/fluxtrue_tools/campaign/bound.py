@@ -15,7 +15,7 @@ from fluxtrue_tools.campaign.sample import Sample
 from fluxtrue_tools.campaign.spec import Campaign
 
 if TYPE_CHECKING:
-    from fluxtrue_tools.campaign.case import Trace
+    from fluxtrue_tools.campaign.tour import Trace
 
 Array = NDArray[np.float64]
 STEP: Final = 1e-4  # of every state, for the differences

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fluxtrue_tools.campaign.machine import Machine
 from fluxtrue_tools.motor.derived import V_RATIO_REFERENCE
+from fluxtrue_tools.motor.flux_model import FluxModel
 
 Array = NDArray[np.float64]
 NODES: Final = 121
@@ -33,7 +34,18 @@ class Envelope:
         return float(np.interp(abs(speed_rpm), self.speed_rpm, self.torque_Nm))
 
 
-def _largest(machine: Machine, factors: dict[str, float], omega: Array) -> Array:
+@dataclass(frozen=True)
+class Capability:
+    """What decides the torque of a machine at a speed."""
+
+    model: FluxModel
+    pole_pairs: int
+    r_ohm: float
+    i_max_A: float
+    vdc_V: float
+
+
+def largest(machine: Capability, factors: dict[str, float], omega: Array) -> Array:
     """Largest torque of one plant at every speed, within the current circle and the voltage circle."""
     i = np.linspace(0.0, machine.i_max_A, NODES)
     i_d, i_q = (x[np.hypot(*np.meshgrid(i, i)) <= machine.i_max_A] for x in np.meshgrid(-i, i, indexing="ij"))
@@ -42,7 +54,7 @@ def _largest(machine: Machine, factors: dict[str, float], omega: Array) -> Array
              + factors["ld_slope_scale"] * (machine.model.psi_d(i_d, i_q) - axis))  # fmt: skip
     psi_q = factors["lq_scale"] * machine.model.psi_q(i_d, i_q)
     torque = 1.5 * machine.pole_pairs * (psi_d * i_q - psi_q * i_d)
-    r_ohm, limit = machine.motor.r_ohm * factors["resistance_scale"], V_RATIO_REFERENCE * machine.vdc_V
+    r_ohm, limit = machine.r_ohm * factors["resistance_scale"], V_RATIO_REFERENCE * machine.vdc_V
     w = omega[:, None]
     volts = np.hypot(r_ohm * i_d - w * psi_q, r_ohm * i_q + w * psi_d)
     return np.asarray(np.max(np.where(volts <= limit, torque, 0.0), axis=1))
@@ -52,5 +64,6 @@ def make_envelope(machine: Machine, factors: dict[str, float]) -> Envelope:
     """Torque that plant and firmware both allow; computed for motoring, where less is possible than in braking."""
     speed = np.linspace(0.0, machine.speed_max_rpm, SPEEDS)
     omega = machine.pole_pairs * speed * 2.0 * np.pi / 60.0
-    torque = np.minimum(_largest(machine, NOTHING_WRONG, omega), _largest(machine, factors, omega))
+    able = Capability(machine.model, machine.pole_pairs, machine.motor.r_ohm, machine.i_max_A, machine.vdc_V)
+    torque = np.minimum(largest(able, NOTHING_WRONG, omega), largest(able, factors, omega))
     return Envelope(speed, np.minimum(MARGIN * torque, machine.rated_Nm))

@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from fluxtrue_tools.campaign.case import Trace
 from fluxtrue_tools.campaign.score import BANDS, CRAWL, band_of, rms
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.campaign.terminal import band_name
+from fluxtrue_tools.campaign.tour import Trace
 from fluxtrue_tools.sim.plot import COMMAND, ESTIMATE, SECOND, STYLE, TRUTH
 
 COLOURS: Final = (SECOND, ESTIMATE, TRUTH, "#6a994e", "#7b2d8b", "#4f4f4f", "#00798c", "#9c6644")

@@ -10,12 +10,13 @@ from typing import Any
 import pandas as pd
 
 from fluxtrue_tools.campaign import figures, report, schedule, terminal
-from fluxtrue_tools.campaign.case import Trace, check_names, run_case
+from fluxtrue_tools.campaign.case import check_names, run_case
 from fluxtrue_tools.campaign.check import check
 from fluxtrue_tools.campaign.machine import machine_of, make_machine
 from fluxtrue_tools.campaign.score import score
 from fluxtrue_tools.campaign.spec import Campaign
 from fluxtrue_tools.campaign.store import Store
+from fluxtrue_tools.campaign.tour import Trace
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.outputs import Outputs, write_text
 from fluxtrue_tools.sim.build import MotorFolder

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
-from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.nameplate import SWING_DEG, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
 
 FAILURES = {1: "refused", 2: "switching was disabled", 3: "the rotor moved", 4: "the current did not reach its bound",
             5: "the current exceeded the machine's largest"}  # fmt: skip
+REFUSED = FAILURES[1]
+STARTS = 6  # of one burst
 BRAKE_S, BRAKE_STEPS, STANDING_RPM = 0.005, 60, 0.5
 REST_S = 0.02  # after a burst: the drive controls the currents to zero
 TURN = 2.0 * math.pi
@@ -29,7 +31,7 @@ class Burst:
     reversals: int
     delay: int = 0
     first: float = 0.7071  # without saturation: half of the impulse
-    angle_deg: float = 15.0
+    angle_deg: float = SWING_DEG
     periods: int = PERIODS_MAX
 
     @property
@@ -119,17 +121,28 @@ def _brake(drive: Capture, known: Nameplate) -> None:
     drive.let_go()
 
 
+def _started(drive: Capture, burst: Burst, known: Nameplate) -> Array:
+    """The rows of a burst. A step of the angle sensor is a jump of the measured speed, with which the firmware refuses
+    a start even at a standstill: it is tried again."""
+    for _ in range(STARTS):
+        _brake(drive, known)
+        drive.rest(REST_S)
+        allowed = replace(burst, angle_deg=known.swing_deg)
+        rows = drive.pulse(allowed.shifted(_shift(drive, known)).values())
+        if _phase_word(drive) != REFUSED or drive.get("fault_word"):
+            break
+    return rows
+
+
 def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     """One burst, from zero current to zero current."""
-    _brake(drive, known)
-    drive.rest(REST_S)
-    rows = drive.pulse(burst.shifted(_shift(drive, known)).values())
+    rows = _started(drive, burst, known)
     fault = int(drive.get("fault_word"))
     if fault:
         raise FluxtrueError(f"commission: a fault ended the voltage pulses (fault word 0x{fault:x})")
     active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
     failure = _phase_word(drive)
-    if failure == FAILURES[1] or not len(active):
+    if failure == REFUSED or not len(active):
         raise FluxtrueError(f"commission: voltage pulses {failure or 'had no voltage'}")
     running = np.nonzero(rows[:, -1] == PULSE)[0]
     rows = rows[max(running[0] - 1, 0) : running[-1] + 1]

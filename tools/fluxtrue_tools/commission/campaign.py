@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many hidden machines: python -m fluxtrue_tools.commission.campaign [--machines 40] [--turning]. Refusals are counted.
+"""Many hidden machines: python -m fluxtrue_tools.commission.campaign [--machines 40] [--turning|--drive]. Refusals are
+counted.
 
-Without --turning the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
-with it pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are.
+Without an option the sensor and the leads are connected as the firmware assumes, and resistance and map are measured;
+with --turning pole pairs, leads, direction and offset of the sensor are random, and phases, spin and drag are. With
+--drive all steps are run with an unknown connection, and each machine is driven with the folder that was written.
 """
 
+import sys
 from pathlib import Path
 
 import click
 import numpy as np
 
-from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission import hidden, proof
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.score import balance_error, resistance_error, score, turned
 from fluxtrue_tools.commission.steps import chosen, run
@@ -68,10 +71,33 @@ def _turning(name: str, seed: int, folder: Path) -> tuple[float, ...] | None:
 @click.command()
 @click.option("--machines", type=click.IntRange(min=1), default=40, show_default=True)
 @click.option("--turning", is_flag=True, help="The steps that turn the shaft, with an unknown connection.")
-def main(machines: int, turning: bool) -> None:
+@click.option("--drive", is_flag=True, help="All steps; then the folder is built and driven.")
+@click.option("--other-errors", is_flag=True, help="With --drive: also errors of kinds that the tool does not know.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), help="With --drive: folder of the results.")
+@click.option("--fresh", is_flag=True, help="With --drive: throw away the results that are there.")
+def main(machines: int, turning: bool, drive: bool, other_errors: bool, out: Path | None, fresh: bool) -> None:
     """Score hidden machines one after the other."""
-    measure = _turning if turning else _one
-    results = [measure(KINDS[k % len(KINDS)], FIRST_SEED + k, FOLDER) for k in range(machines)]
+    if (turning and drive) or (not drive and (other_errors or out is not None or fresh)):
+        raise click.UsageError("--other-errors, --out and --fresh belong to --drive, which --turning excludes")
+    drawn = [(KINDS[k % len(KINDS)], FIRST_SEED + k) for k in range(machines)]
+    if drive:
+        sys.exit(0 if _driven(drawn, other_errors, out, fresh) else 1)
+    _scored(drawn, turning)
+
+
+def _driven(drawn: list[tuple[str, int]], other_errors: bool, out: Path | None, fresh: bool) -> bool:
+    """Whether every bound is met."""
+    job = proof.Job(FOLDER, other_errors)
+    place = out or ROOT / "build" / "commission" / ("other-errors" if other_errors else "driven")
+    table = proof.campaign(job, drawn, place, fresh, click.echo)
+    text, met = proof.report(job, table, place)
+    click.echo(text, nl=False)
+    return met
+
+
+def _scored(drawn: list[tuple[str, int]], turning: bool) -> None:
+    measure, machines = _turning if turning else _one, len(drawn)
+    results = [measure(name, seed, FOLDER) for name, seed in drawn]
     done = np.array([result for result in results if result is not None])
     click.echo(f"{len(done)} of {machines} machines; {machines - len(done)} refused")
     names, scales = (TURNING, (1.0, 1.0, *(100.0,) * 3)) if turning else (MAP, (*(100.0,) * 5, 1.0))

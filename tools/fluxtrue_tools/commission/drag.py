@@ -103,24 +103,27 @@ def _solve(matrix: Array, values: Array) -> list[float]:
 
 
 def _changes(run: _Run, torque: Array, period_s: float, slowest: float) -> tuple[Array, Array]:
-    """From middle to middle: change of speed, time, angle, integral of the squared speed; the impulse of the torque."""
+    """From middle to middle: impulse of the torque, time, angle, integral of the squared speed; the change of speed."""
     impulse = np.concatenate(([0.0], np.cumsum(period_s * torque)))[run.middles]
     time, w = np.diff(run.times), run.speed
     angle, square = 0.5 * time * (w[1:] + w[:-1]), time * (w[1:] ** 2 + w[1:] * w[:-1] + w[:-1] ** 2) / 3.0
     used = np.minimum(w[1:], w[:-1]) > slowest
-    return np.column_stack((np.diff(w), time, angle, square))[used], np.diff(impulse)[used]
+    return np.column_stack((np.diff(impulse), -time, -angle, -square))[used], np.diff(w)[used]
 
 
 def evaluate(parts: list[Array], period_s: float, pole_pairs: int, psi_f_Vs: float) -> Drag:
-    """(CM-21), (CM-22) over all windows."""
+    """(CM-21), (CM-22) over all windows. What is noisy is the change of the speed, by errors of the angle sensor: it
+    is the side that least squares take the noise on. As a factor of J it would make J smaller the noisier it is."""
     runs = [_run(rows, period_s, pole_pairs) for rows in parts if len(rows) > 2 * WINDOW_S / period_s]
     top = max(float(run.speed.max()) for run in runs)
     flux = flux_under_current(runs, psi_f_Vs)
     changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), period_s, SLOWEST * top)
                for run in runs]  # fmt: skip
-    matrix, impulse = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
-    x, sigma = _least_squares(matrix, impulse)
-    return Drag(float(x[0]), sigma, float(x[1]), float(x[2]), float(x[3]), SLOWEST * top, top)
+    matrix, change = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
+    x, sigma = _least_squares(matrix, change)
+    inertia = 1.0 / float(x[0])
+    constant, linear, square = (float(inertia * each) for each in x[1:])
+    return Drag(inertia, sigma * inertia**2, constant, linear, square, SLOWEST * top, top)
 
 
 def _least_squares(matrix: Array, values: Array) -> tuple[Array, float]:

@@ -2,6 +2,7 @@
 """The motor's folder: what was measured with its source, everything else as the nameplate's folder has it."""
 
 import json
+import math
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from fluxtrue_tools import strict
+from fluxtrue_tools.commission import iron
+from fluxtrue_tools.commission.iron import Iron
 from fluxtrue_tools.commission.levels import Resistance
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
@@ -96,6 +99,8 @@ def write(found: Found, known: Nameplate, nameplate: Path, staging: Path, out: P
     if found.resistance is not None:
         _of_the_levels(found.resistance, entries)
     grid = _of_the_map(found, known, staging, entries) if found.surface is not None else None
+    if found.spun is not None and found.surface is not None:
+        _of_the_iron(iron.measure(found.spun, found.surface.with_magnet(known.psi_f_Vs), known.i_max_A), entries)
     (staging / FILE_NAME).write_text(_text(entries), encoding="utf-8")
     return grid, load_motor(staging)
 
@@ -115,6 +120,18 @@ def _of_the_turning(found: Found, known: Nameplate, machine: dict[str, Entry]) -
         machine["inertia_kgm2"] = Entry(float(f"{found.drag.inertia_kgm2:.4g}"), f"{BY}: acceleration and run-down, "
                                         f"±{found.drag.inertia_sigma_kgm2:.1g} kg m^2; gains of the sensors not "
                                         "included")  # fmt: skip
+
+
+def _of_the_iron(found: Iron | None, entries: dict[str, dict[str, Entry]]) -> None:
+    if found is None:
+        return
+    rpm = found.omega_rad_s * 30.0 / math.pi / entries["machine"]["pole_pairs"].value
+    share = found.sigma / found.per_flux
+    source = f"{BY}: coasting at {rpm:.0f} rpm, ±{100 * share:.1g} %, half of the loss there, assumed"
+    entries["machine"]["iron_loss_hysteresis"] = Entry(float(f"{found.hysteresis:.4g}"), source)
+    entries["machine"]["iron_loss_eddy"] = Entry(float(f"{found.eddy:.4g}"), "the other half")
+    entries.setdefault("identification", {})["iron_loss_uncertainty"] = Entry(
+        iron.UNCERTAINTY, "one speed does not show how much of the loss is hysteresis")  # fmt: skip
 
 
 def _of_the_levels(r: Resistance, entries: dict[str, dict[str, Entry]]) -> None:

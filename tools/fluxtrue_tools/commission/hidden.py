@@ -6,6 +6,7 @@ the currents, and a magnet of its own. Resistance, inverter, sensors, inertia an
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from fluxtrue_tools.sim.build import ROOT
 from fluxtrue_tools.sim.library import FluxMap, Loop
 from fluxtrue_tools.sim.motor import Motor
 
+IRON_RPM = 4000.0
 FOLDERS = (ROOT / "firmware" / "motors", ROOT / "tests" / "motors")
 
 
@@ -35,11 +37,29 @@ class Truth:
     magnet_scale: float
     plant: dict[str, float]
 
-    def psi(self, i_d: ArrayLike, i_q: ArrayLike) -> tuple[Array, Array]:
-        """Flux linkages of the plant (PL-4)."""
+    def _scaled(self, of: Callable[..., Array], i_d: ArrayLike, i_q: ArrayLike, nd: int, nq: int) -> Array:
         d, q = np.asarray(i_d, float) / self.current_scale, np.asarray(i_q, float) / self.current_scale
+        return np.asarray(self.flux_scale * of(d, q, nd=nd, nq=nq) / self.current_scale ** (nd + nq))
+
+    def psi_d(self, i_d: ArrayLike, i_q: ArrayLike, nd: int = 0, nq: int = 0) -> Array:
+        """Flux linkage of the plant (PL-4) and its derivatives."""
         more = (self.magnet_scale - self.flux_scale) * float(self.source.psi_d(0.0, 0.0))
-        return self.flux_scale * self.source.psi_d(d, q) + more, self.flux_scale * self.source.psi_q(d, q)
+        return self._scaled(self.source.psi_d, i_d, i_q, nd, nq) + (more if nd == nq == 0 else 0.0)
+
+    def psi_q(self, i_d: ArrayLike, i_q: ArrayLike, nd: int = 0, nq: int = 0) -> Array:
+        """The same of the q axis."""
+        return self._scaled(self.source.psi_q, i_d, i_q, nd, nq)
+
+    def psi(self, i_d: ArrayLike, i_q: ArrayLike) -> tuple[Array, Array]:
+        """Both flux linkages."""
+        return self.psi_d(i_d, i_q), self.psi_q(i_d, i_q)
+
+    def drag_Nm(self, speed_rad_s: ArrayLike) -> Array:
+        """Friction far above the Stribeck speed, and the excess iron loss of the magnet alone, at mechanical speeds."""
+        plant, w = self.plant, np.asarray(speed_rad_s, float)
+        omega = plant["pole_pairs"] * w
+        excess_W = plant.get("iron_k_excess", 0.0) * omega**1.5 * self.psi_f_Vs**2
+        return np.asarray(plant["viscous_Nms"] * w + plant.get("coulomb_Nm", 0.0) + excess_W / w)
 
     @property
     def reversed(self) -> bool:
@@ -94,10 +114,36 @@ def _connection(name: str, seed: int) -> dict[str, float]:
             "angle_bits": 14.0}  # fmt: skip
 
 
+def _other_errors(name: str, seed: int, truth: Truth, motor: Motor, i_max_A: float) -> dict[str, float]:
+    """Errors of kinds that no step of the commissioning knows; of a size that machines and inverters of this size have.
+
+    The iron loss is 0.5 to 1.5 % of the machine's power at IRON_RPM, with the largest current half along -d and half
+    along q, and all of it is excess loss.
+    """
+    rng = np.random.default_rng([seed, sum(name.encode()), 2])
+    i_A, w = math.sqrt(0.5) * i_max_A, IRON_RPM * math.pi / 30.0
+    psi_d, psi_q = (float(psi) for psi in truth.psi(-i_A, i_A))
+    lost_W = float(rng.uniform(0.005, 0.015)) * 1.5 * truth.plant["pole_pairs"] * (psi_d + psi_q) * i_A * w
+    coulomb = motor.torque_max_Nm * float(rng.uniform(0.001, 0.004))
+    errors = {
+        "iron_k_excess": lost_W / ((truth.plant["pole_pairs"] * w) ** 1.5 * (psi_d**2 + psi_q**2)),
+        "leg_knee_A": i_max_A * float(rng.uniform(0.001, 0.004)),
+        "coulomb_Nm": coulomb, "stiction_Nm": coulomb * float(rng.uniform(1.2, 2.0)),
+        "stribeck_rad_s": float(rng.uniform(0.5, 3.0)),
+    }  # fmt: skip
+    for order in (1, 2):
+        errors[f"angle_h{order}_rad"] = math.radians(float(rng.uniform(0.0, 1.0)))
+        errors[f"angle_h{order}_phase"] = float(rng.uniform(0.0, 2.0 * math.pi))
+    return errors
+
+
 def draw(
-    name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True
+    name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True, other_errors: bool = False
 ) -> tuple[Truth, FluxMap | None, dict[str, float]]:
-    """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters."""
+    """A machine for the firmware of a nameplate: its truth, its map, and the plant's parameters.
+
+    other_errors   with errors of kinds that the commissioning does not know, beside those that every machine has
+    """
     rng = np.random.default_rng([seed, sum(name.encode())])
     model, flux_map, source_i_max = _source(folder_of(name))
     flux_scale, magnet = float(rng.uniform(0.85, 1.15)), float(rng.uniform(0.85, 1.15))
@@ -120,7 +166,10 @@ def draw(
         plant |= {"ld_H": float(linear[0]) / current, "lq_H": float(linear[1]) / current, "psi_f_Vs": float(linear[2])}
     else:
         flux_map = FluxMap(current * flux_map.id_A, current * flux_map.iq_A, flux_map.psi_d_Vs, flux_map.psi_q_Vs)
-    return Truth(model, source_i_max, flux_scale, current, magnet, plant), flux_map, plant
+    truth = Truth(model, source_i_max, flux_scale, current, magnet, plant)
+    if other_errors:
+        plant |= _other_errors(name, seed, truth, motor, i_max_A)
+    return truth, flux_map, plant
 
 
 def machine_text(plant: dict[str, float], flux_map: FluxMap | None) -> str:
@@ -133,7 +182,9 @@ def machine_text(plant: dict[str, float], flux_map: FluxMap | None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def make(name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True) -> tuple[SoftwareInTheLoop, Truth]:
+def make(
+    name: str, seed: int, motor: Motor, i_max_A: float, connected: bool = True, other_errors: bool = False
+) -> tuple[SoftwareInTheLoop, Truth]:
     """A drive with a hidden machine at its terminals; connected: sensor and leads are as the firmware assumes."""
-    truth, flux_map, plant = draw(name, seed, motor, i_max_A, connected)
+    truth, flux_map, plant = draw(name, seed, motor, i_max_A, connected, other_errors)
     return SoftwareInTheLoop(Loop(motor.library, plant, flux_map)), truth

@@ -5,6 +5,7 @@ import math
 from dataclasses import dataclass
 
 BRAKE_S = 0.02  # in which braking takes the speed away, with the guessed inertia
+SWING_DEG, SWING_SHAFT_DEG, SWING_MOST_DEG = 15.0, 3.75, 44.0  # electrical, of the shaft, and what the firmware takes
 BRAKE_SHARE = 0.02  # of i_max: small enough for the monitors of a current that follows slowly
 
 
@@ -21,6 +22,12 @@ class Nameplate:
     level_V: float  # lost by a leg of the inverter
     knee_A: float  # from which the drive compensates all of it
     offset_A: complex = 0.0  # of the current sensors in the stationary frame, as soon as it is measured
+
+    @property
+    def swing_deg(self) -> float:
+        """Electrical degrees by which the rotor may move in a burst. With many pole pairs the same torque moves it by
+        more of them, while the shaft moves less."""
+        return min(max(SWING_DEG, SWING_SHAFT_DEG * self.pole_pairs), SWING_MOST_DEG)
 
     def brake_A(self, speed_rpm: float) -> float:
         """A current in q that reduces the speed."""

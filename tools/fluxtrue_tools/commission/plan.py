@@ -21,7 +21,6 @@ TOP_D = 0.1  # of i_max: the magnetising side
 BAND = 0.05  # of i_max: half the width of the bias
 BIASES = (0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.85)  # of -i_max
 BIAS_SLOWER = 3.5  # the current in d changes more slowly than that in q, and stays in its band
-ANGLE_DEG = 15.0  # electrical, by which the rotor may move in a burst
 LOST_MAX = 2  # bursts of all that may fail
 TRAVEL = 1.5  # of the time to the bias without saturation
 REVERSALS_D, REVERSALS_Q = 6, 5

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from fluxtrue_tools.commission import iron
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.map_import.grid import Grid
@@ -59,6 +60,17 @@ def _magnet(found: Found, known: Nameplate) -> list[str]:
     ]
 
 
+def _iron(found: Found, known: Nameplate) -> list[str]:
+    if found.spun is None or found.surface is None:
+        return []
+    loss = iron.measure(found.spun, found.surface.with_magnet(known.psi_f_Vs), known.i_max_A)
+    if loss is None:
+        return ["  iron loss: none seen, or hidden by a lag of the angle sensor"]
+    rpm = loss.omega_rad_s * 30.0 / math.pi / known.pole_pairs
+    return [f"  iron loss: k_h + k_e w = {loss.per_flux:.3g} W/(rad/s V^2 s^2) at {rpm:.0f} rpm, ±{loss.sigma:.1g}; "
+            "half of it is assumed to be hysteresis"]  # fmt: skip
+
+
 def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
     """The report."""
     lines = [
@@ -75,6 +87,7 @@ def text(found: Found, known: Nameplate, grid: Grid | None) -> str:
             f"  left of the flux linkages: {1e3 * found.surface.left_Vs:.2g} mV·s; "
             f"{found.surface.unknowns:.0f} effective unknowns",
             f"  no samples in {100 * grid.circle_outside:.2g} % of the current circle: continued by the surface",
+            *_iron(found, known),
             *_balance(found),
             *_magnet(found, known),
         ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.iron import Iron
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.motor.flux_model import FluxModel
 
@@ -48,7 +49,17 @@ def resistance_error(r_ohm: float, truth: Truth) -> tuple[float, float]:
 
 def balance_error(balance: Balance, truth: Truth) -> float:
     """The largest error of the difference between two sensors' gains."""
-    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in "abc"]))
+    order = "acb" if truth.plant.get("phases_swapped", 0.0) else "abc"  # the sensors are exchanged with the leads
+    return float(np.ptp(balance.gains - [truth.plant[f"current_gain_{phase}"] for phase in order]))
+
+
+def iron_error(found: Iron | None, truth: Truth) -> float:
+    """The error of the iron's current as a share of the true one at the speed of the measurement; a loss that is found
+    where there is none, and none where there is one, are an error of 1."""
+    true = truth.plant.get("iron_k_excess", 0.0)
+    if found is None or true == 0.0:
+        return float((found is None) != (true == 0.0))
+    return found.per_flux / (true * math.sqrt(found.omega_rad_s)) - 1.0
 
 
 DRAG_FROM = 0.3  # of the largest speed of the run
@@ -72,6 +83,6 @@ def turned(found: Found, truth: Truth) -> Turned:
     right = at.pole_pairs == plant["pole_pairs"] and at.reversed == truth.reversed
     offset = math.degrees(math.remainder(at.offset_rad - truth.offset_rad, 2.0 * math.pi))
     speeds = np.linspace(DRAG_FROM, 1.0, 15) * drag.to_rad_s
-    drags = drag.torque_Nm(speeds) / (plant["viscous_Nms"] * speeds) - 1.0
+    drags = drag.torque_Nm(speeds) / truth.drag_Nm(speeds) - 1.0
     return Turned(right, offset, found.spun.psi_f_Vs / (truth.psi_f_Vs * plant["vdc_gain"]) - 1.0,
                   drag.inertia_kgm2 / plant["inertia_kgm2"] - 1.0, float(np.sqrt(np.mean(drags**2))))  # fmt: skip

@@ -54,7 +54,8 @@ class Spun:
     psi_f_Vs: float
     psi_f_sigma_Vs: float
     offset_sigma_rad: float
-    lag_s: float  # by which the angle is late; iron losses seem to be one
+    lag_s: float  # by which the angle is late; iron losses seem to be a negative one
+    omega_rad_s: float  # electrical, at which that was seen
 
 
 def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float = REACH_S) -> Array:
@@ -215,4 +216,5 @@ def _together(rounds: list[tuple[Connection, list[Magnet]]]) -> Spun:
     lag = float(np.mean([half / ways[0].omega_rad_s for half, (_, ways) in zip(apart, used, strict=True)]))
     # Mean and half of the difference of two directions have the same noise, and only the latter repeats itself.
     offset_sigma = float(np.std(apart, ddof=1) / math.sqrt(len(apart))) if len(apart) > 1 else sigma / psi_f
-    return Spun(last.turned(float(np.mean(errors))), psi_f, sigma, offset_sigma, lag)
+    omega = float(np.mean([abs(way.omega_rad_s) for way in magnets]))
+    return Spun(last.turned(float(np.mean(errors))), psi_f, sigma, offset_sigma, lag, omega)

@@ -180,7 +180,7 @@ def chosen(names: tuple[str, ...]) -> list[Step]:
 def announcement(step: Step, known: Nameplate) -> str:
     """What will move and how much current flows."""
     return step.does.format(reach=known.i_max_A, level=levels.LEVELS[-1] * known.i_max_A, level_s=levels.duration_s(),
-                            angle=plan.ANGLE_DEG, vector=connection.SHARES[-1] * known.i_max_A, turns=connection.TURNS,
+                            angle=known.swing_deg, vector=connection.SHARES[-1] * known.i_max_A, turns=connection.TURNS,
                             speed=turning.SPEED_SHARE * known.speed_max_rpm,
                             torque=spin.Q_SHARES[-1] * known.i_max_A)  # fmt: skip
 
@@ -214,7 +214,7 @@ def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str]
         if step.name in done:
             say(f"{step.name}: kept from an earlier run")
             continue
-        say(f"{step.name}: {announcement(step, known)}")
+        say(f"{step.name}: {announcement(step, found.known(known))}")
         with _shown(drive, step):
             step.run(drive, found, found.known(known))
         done = (*done, step.name)

@@ -57,7 +57,7 @@ def _mechanics(scenario: "Scenario", plant: _Plant) -> Iterator[Found]:
 
 def _inverter(plant: _Plant) -> Iterator[Found]:
     if plant.is_on("ideal_inverter"):
-        for name in ("dead_time_s", "device_drop_V"):
+        for name in ("dead_time_s", "device_drop_V", "leg_knee_A"):
             yield f"plant.{name}", "plant.ideal_inverter = true has neither dead time nor device drop"
     if plant.always("vdc_ripple_V", 0.0):
         yield "plant.vdc_ripple_hz", "plant.vdc_ripple_V is 0"
@@ -71,6 +71,11 @@ def _sensors(plant: _Plant) -> Iterator[Found]:
         yield f"plant.angle_h{k}_phase", f"plant.angle_h{k}_rad is 0"
     if len(silent) == 2:
         yield "plant.resolver_pole_pairs", "plant.angle_h1_rad and plant.angle_h2_rad are 0"
+
+
+def _friction(plant: _Plant) -> Iterator[Found]:
+    if plant.always("stiction_Nm", 0.0):
+        yield "plant.stribeck_rad_s", "plant.stiction_Nm is 0"
 
 
 def _magnet(plant: _Plant) -> Iterator[Found]:
@@ -115,7 +120,7 @@ def _found(scenario: "Scenario") -> Iterator[Found]:
     yield from _mechanics(scenario, plant)
     yield from _controller(scenario, plant)
     yield from _events(scenario, plant)
-    for key, why in (*_inverter(plant), *_sensors(plant), *_machine(scenario, plant)):
+    for key, why in (*_inverter(plant), *_sensors(plant), *_friction(plant), *_machine(scenario, plant)):
         if key.removeprefix("plant.") in plant.given:
             yield key, why
 

@@ -148,11 +148,13 @@ class Plant(Strict):
     cross_saturation_scale: Number | None = None
     iron_k_h: NotNegative | None = None
     iron_k_e: NotNegative | None = None
+    iron_k_excess: NotNegative | None = None
     magnet_step_keeps_current: bool | None = None
     vdc_ripple_V: NotNegative | None = None
     vdc_ripple_hz: NotNegative | None = None
     dead_time_s: NotNegative | None = None
     device_drop_V: NotNegative | None = None
+    leg_knee_A: NotNegative | None = None
     substeps: Annotated[int, Field(ge=10, le=1000)] | None = None
     ideal_inverter: bool | None = None
     phase_open: ThreeFlags | None = None
@@ -193,6 +195,9 @@ class Plant(Strict):
     angle_spike_samples: Annotated[int, Field(ge=0)] | None = None
     angle_spike_rad: Number | None = None
     theta_m_rad: Number | None = None
+    coulomb_Nm: NotNegative | None = None
+    stiction_Nm: NotNegative | None = None
+    stribeck_rad_s: Positive | None = None
 
     def values(self) -> dict[str, float]:
         """Names as the simulation has them: arrays end in _a, _b, _c."""
