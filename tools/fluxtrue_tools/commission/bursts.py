@@ -136,11 +136,12 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     return _aligned(rows, drive.period_s, burst, failure).without(known.offset_A)
 
 
-def offset(drive: Capture, seconds: float = 0.1) -> complex:
-    """Mean current with switching disabled, in the stationary frame."""
+def offset(drive: Capture, seconds: float = 0.1) -> tuple[complex, float]:
+    """Mean current with switching disabled, in the stationary frame, and the standard deviation of its components."""
     rows = drive.capture(MEASURED, round(seconds / drive.period_s))
     i_s = (rows[:, 0] + 1j * rows[:, 1]) * np.exp(1j * rows[:, 4])
-    return complex(i_s.mean())
+    spread = math.sqrt(0.5 * float(np.var(i_s)))  # np.var() of complex values adds both components
+    return complex(i_s.mean()), spread / math.sqrt(len(i_s))
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start the
 POLL_S: Final = 0.005
 STOPPED: Final = 2.0  # of pulses_failure
 TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
-READY_S, RUN_S, OFF_S = 5.0, 0.5, 0.05
+READY_S, RUN_S, OFF_S, RESET_S = 5.0, 0.5, 0.05, 0.05
 LISTEN_S: Final = 0.15
 STEADY, SMALL = 0.05, 0.5  # of the largest voltage
 ANGLE_PERIODS: Final = 8
@@ -94,7 +94,11 @@ class OverTheBus:
         unlock(self._master)
         self._scope = Scope(self._master, description)
         self._state()
-        line.ask(limit_Nm=self._torque_Nm(BRAKE_SHARE * known.i_max_A))
+
+    @property
+    def line(self) -> Line:
+        """Commands and state."""
+        return self._line
 
     @property
     def passed(self) -> Callable[[float], None]:
@@ -155,7 +159,8 @@ class OverTheBus:
     # The state of the inverter.
 
     def _enable(self) -> None:
-        self._line.ask(mode="torque", enable=False, torque_Nm=0.0)
+        limit_Nm = self._torque_Nm(BRAKE_SHARE * self._known.i_max_A)  # of the torque that brakes the rotor
+        self._line.ask(mode="torque", enable=False, torque_Nm=0.0, limit_Nm=limit_Nm)
         self._line.wait_for(("ready", *RUNNING), READY_S, "the dc link cannot be charged")
         self._line.ask(enable=True)
         self._line.wait_for(RUNNING, RUN_S, "switching cannot be enabled")
@@ -186,6 +191,12 @@ class OverTheBus:
         self._line.ask(mode="off", enable=False, torque_Nm=0.0, limit_Nm=0.0)
         with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
             self.rest(OFF_S)
+
+    def reset_faults(self) -> None:
+        """One edge of the reset, after switch_off(). The ECU grants it in state fault."""
+        self._line.ask(fault_reset=True)
+        self.rest(RESET_S)
+        self._line.ask(fault_reset=False)
 
     # Movements and captures.
 
