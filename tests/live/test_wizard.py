@@ -138,6 +138,11 @@ def bench(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         server.stand.close()
 
 
+def test_without_an_interface_a_hidden_machine_is_started(tmp_path: Path) -> None:
+    """The address is printed when the process that measures has been answered by the virtual ECU."""
+    end(launch(tmp_path, "--motor", str(NAMEPLATE), "--commission", "--machine", NAME, "--seed", str(SEED)))
+
+
 def test_the_cards_say_what_happens_and_only_the_first_step_can_be_done(bench: Bench) -> None:
     page, known = bench.page, nameplate_of(NAMEPLATE, motors.load(str(NAMEPLATE)))
     for step in chosen(("map",)):

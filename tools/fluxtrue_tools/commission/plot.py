@@ -119,44 +119,31 @@ def _offset(axes: Axes, found: Found, _: Nameplate) -> None:
     axes.legend(fontsize=8)
 
 
-def _lost_V(found: Found) -> float:
-    """Mean voltage beyond the drop of the resistance."""
+def _levels(axes: Axes, found: Found, _: Nameplate) -> None:
+    """The voltages of the points contain what ripple and movement add; (CM-12) takes that away."""
     r = found.resistance
     assert r is not None
-    return float((np.abs(r.volts) - r.r_ohm * np.abs(r.currents_A)).mean())
-
-
-def _levels(axes: Axes, found: Found, _: Nameplate) -> None:
-    r, lost_V = found.resistance, _lost_V(found)
-    assert r is not None
-    for sign, label in ((1.0, f"{1e3 * r.r_ohm:.4g} mohm"), (-1.0, None)):
+    lost_V = float((np.abs(r.volts) - r.r_ohm * np.abs(r.currents_A)).mean())
+    for sign, label in ((1.0, f"slope {1e3 * r.r_ohm:.4g} mohm"), (-1.0, None)):
         line = sign * np.array([0.0, float(np.abs(r.currents_A).max())])
         axes.plot(line, r.r_ohm * line + sign * lost_V, "C1", lw=1.2, label=label)
-    axes.plot(r.currents_A, r.volts, "o", ms=4, color="C0", label="levels")
+    axes.plot(r.currents_A, r.volts, "o", ms=4, color="C0", label="levels, with ripple and movement")
     axes.set(title="Direct currents", xlabel="mean i_d, A", ylabel="mean u_d, V")
     axes.legend(fontsize=8)
-
-
-def _levels_left(axes: Axes, found: Found, _: Nameplate) -> None:
-    r, lost_V = found.resistance, _lost_V(found)
-    assert r is not None
-    left = np.abs(r.volts) - r.r_ohm * np.abs(r.currents_A) - lost_V
-    axes.axhline(0.0, color=plt.rcParams["text.color"], lw=0.8)
-    axes.plot(r.currents_A, 1e3 * left, "o", ms=4)
-    axes.set(title="Levels minus line", xlabel="mean i_d, A", ylabel="mV")
 
 
 Panel = Callable[[Axes, Found, Nameplate], None]
 # Of each step, in the order of live/wizard/files.py, which has their titles.
 PANELS: Final[dict[str, tuple[Panel, ...]]] = {
     "offsets": (_offset,),
-    "resistance": (_levels, _levels_left),
+    "resistance": (_levels,),
     "map": (_places, lambda axes, found, _: _left(axes, found), partial(_curves, of_d=True),
             partial(_curves, of_d=False)),
 }  # fmt: skip
 _DARK = {"figure.facecolor": "#18202a", "axes.facecolor": "#18202a", "savefig.facecolor": "#18202a",
          "axes.edgecolor": "#5c6c80", "xtick.color": "#9dabba", "ytick.color": "#9dabba", "text.color": "#e8edf3",
-         "axes.labelcolor": "#e8edf3", "grid.color": "#222c38", "legend.edgecolor": "#2a3543"}  # fmt: skip
+         "axes.labelcolor": "#e8edf3", "grid.color": "#222c38", "legend.edgecolor": "#2a3543",
+         "image.cmap": "cool"}  # fmt: skip
 THEMES: Final[dict[str, dict[str, Any]]] = {"light": {}, "dark": _DARK}  # dark: the colours of the live page
 PANEL_IN, PANEL_DPI = (5.2, 4.0), 160
 

@@ -16,8 +16,7 @@ FINISH: Final = "finish"
 # What the pictures of each card show, for commission/plot.py.
 PICTURES: Final = {
     "offsets": ("Currents that the sensors show without current",),
-    "resistance": ("Mean voltages over mean currents, with the line of the resistance",
-                   "What the line leaves of each level"),
+    "resistance": ("Mean voltages over mean currents, with the slope of the resistance",),
     "map": ("Currents of all bursts in the circle of the largest current", "What the surface leaves of the samples",
             "Flux linkage of the d axis: samples on the surface", "Flux linkage of the q axis: samples on the surface"),
     FINISH: ("Torque of the map over the currents, with the line of largest torque per ampere",),

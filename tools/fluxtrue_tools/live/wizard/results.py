@@ -59,7 +59,7 @@ def _map(found: Found, known: Nameplate, _: float) -> list[Row]:
     failed = [raw.failure for raw in found.bursts if raw.failure]
     largest_Vs = _largest_Vs(found)
     return [
-        ("Flux linkages, samples against the surface", f"{1e3 * largest_Vs:.4g} mV·s at most",
+        ("Largest flux linkage; ± of the samples", f"{1e3 * largest_Vs:.4g} mV·s",
          f"{1e3 * surface.left_Vs:.2g} mV·s", f"± at most {1e3 * MAP_SHARE * largest_Vs:.2g} mV·s"),
         ("Largest current", f"{found.largest_A:.4g} A", "", f"at most {known.i_max_A:g} A"),
         ("Movement of the rotor, electrical", f"{math.degrees(found.moved_rad):.1f}°", "",
