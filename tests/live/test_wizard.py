@@ -6,10 +6,12 @@ One page serves all tests of this file, in their order. Simulated time waits for
 
 import io
 import os
+import socket
 import tomllib
 import urllib.request
 import zipfile
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,11 +25,19 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.hidden import Truth
-from fluxtrue_tools.commission.steps import announcement, chosen
+from fluxtrue_tools.commission.on_the_bus import Bench as Terminals
+from fluxtrue_tools.commission.score import score
+from fluxtrue_tools.commission.steps import Found, announcement, chosen
+from fluxtrue_tools.live.pace import InStep
+from fluxtrue_tools.live.wizard.link import Measuring
+from fluxtrue_tools.live.wizard.process import Job, Setup
+from fluxtrue_tools.motor.flux_map import load_flux_map
+from fluxtrue_tools.motor.flux_model import SplineModel
 from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.build import MotorFolder
 from fluxtrue_tools.sim.library import FluxMap, Loop
@@ -36,7 +46,7 @@ from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 
 NAMEPLATE = ROOT / "tests" / "motors" / "unknown"
 NAME, SEED = "saturated", 12
-R_SHARE = 0.01
+R_SHARE, MAP_RMS = 0.01, 0.01
 STEP_S = 300.0  # of simulated time, for a step and its repetitions
 TORQUE_NM, TORQUE_SHARE = 40.0, 0.03  # the bound of 95 % of the points after a commissioning without a dynamometer
 SPEEDS_RPM = (300.0, 1000.0, 2000.0)
@@ -265,6 +275,20 @@ def test_a_refusal_is_one_message_and_the_step_can_be_done_again(bench: Bench) -
     bench.channel.set(imposed_speed=0.0)
 
 
+def test_a_fault_ends_the_step_by_its_name_and_can_be_reset(bench: Bench) -> None:
+    page = bench.page
+    bench.begin("resistance")
+    bench.channel.set(board_gate_fault=1)
+    bench.wait("resistance", "no result")
+    said = page.text("resistance-refused")
+    assert "gate" in said and ("the inverter has stopped" in said or "a fault ended the voltage pulses" in said)
+    bench.is_off()
+    bench.channel.set(board_gate_fault=0)
+    page.until(lambda: page.find("reset").is_enabled(), "the reset")
+    page.press("reset")
+    page.until(lambda: page.text("state") == "standby" and page.text("faults") == "none", "no fault")
+
+
 def test_the_resistance_is_found_with_its_bound(bench: Bench) -> None:
     bench.press("resistance", "do")
     bench.wait("resistance", "measuring")
@@ -319,6 +343,12 @@ def test_the_downloaded_folder_names_its_sources(folder: Path, bench: Bench) -> 
     for key in ("r_ohm", "flux_map"):
         assert "measured by fluxtrue commission" in next(line for line in text.splitlines() if line.startswith(key))
     assert "given (data sheet)" in text
+    known = nameplate_of(NAMEPLATE, motors.load(str(NAMEPLATE)))
+    grid = load_flux_map(folder / "flux_map.csv", known.i_max_A)
+    model = SplineModel(grid.id_A, grid.iq_A, grid.psi_d_Vs, grid.psi_q_Vs)
+    reached = score(model, bench.truth, known.i_max_A, float(model.psi_d(0.0, 0.0)))
+    print(f"map against the machine: {reached}")
+    assert reached.map_rms <= MAP_RMS
 
 
 def test_the_built_firmware_makes_40_newton_metres_true(folder: Path, bench: Bench, tmp_path: Path) -> None:
@@ -338,3 +368,35 @@ def test_the_built_firmware_makes_40_newton_metres_true(folder: Path, bench: Ben
                 assert loop.get("fault_word") == 0.0
     print({key: f"{100 * error:+.2f} %" for key, error in errors.items()})
     assert max(map(abs, errors.values())) <= TORQUE_SHARE
+
+
+class Nobody:
+    """Whoever would be told how a step goes."""
+
+    def progressed(self, step_s: float) -> None: ...
+    def found(self, step: str, found: Found) -> None: ...
+    def refused(self, step: str, why: str) -> None: ...
+
+
+def test_when_the_server_crashes_the_process_that_measures_disables_switching_and_ends() -> None:
+    """No page is there for which simulated time could wait; the server ends while currents flow."""
+    unknown = motors.load(str(NAMEPLATE))
+    known = nameplate_of(NAMEPLATE, unknown)
+    (step,) = (step for step in chosen(("resistance",)) if step.name == "resistance")
+    with VirtualEcu(unknown.folder.vecu) as ecu, closing(Channel(HOST, ecu.bench_port)) as channel:
+        address = BusAddress("socketcand", "can0", {"host": HOST, "port": ecu.can_port, "tcp_tune": True})
+        setup = Setup(Terminals(address, unknown.folder.vecu, (HOST, ecu.bench_port)), unknown.folder, known, True)
+        in_step = InStep()
+        measuring = Measuring(setup, [], in_step, Nobody())
+        measuring.do(Job(step, ("offsets",), Found(), known))
+        while measuring.status().state != "run":
+            in_step.due()
+            measuring.act("hand")
+            in_step.done()
+        assert channel.get("run_state") == [1.0]
+        with socket.socket(fileno=os.dup(measuring._connection.fileno())) as pipe:
+            pipe.shutdown(socket.SHUT_RDWR)
+        measuring._process.join()
+        assert channel.get("run_state") == [0.0]
+        assert float(np.hypot(*channel.get("truth.i_d_A", "truth.i_q_A"))) < 1.0
+        in_step.release()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.errors import FluxtrueError
@@ -126,7 +127,7 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     rows = drive.pulse(burst.shifted(_shift(drive, known)).values())
     fault = int(drive.get("fault_word"))
     if fault:
-        raise FluxtrueError(f"commission: a fault ended the voltage pulses (fault word 0x{fault:x})")
+        raise FluxtrueError(f"commission: a fault ended the voltage pulses: {', '.join(faults.named(fault))}")
     active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
     failure = _phase_word(drive)
     if failure == FAILURES[1] or not len(active):

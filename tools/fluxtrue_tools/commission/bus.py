@@ -10,7 +10,7 @@ imposed angle and the limits of the shaft.
 import contextlib
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -217,9 +217,10 @@ class OverTheBus:
         """As many rows as the scope holds."""
         signals = [CAPTURED[name] for name in names]
         self._arm(signals, periods)
-        self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
-        self._check()
-        columns = self._scope.read().columns
+        with self._fault_first():
+            self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
+            self._check()
+            columns = self._scope.read().columns
         return np.column_stack([self._column(columns, name) for name in names])
 
     @staticmethod
@@ -232,10 +233,20 @@ class OverTheBus:
         setup = make_setup(
             self._scope.signals, signals, "manual", None, 0.0, 0.0, min(periods, WORDS // len(signals)), 1
         )
-        self._scope.stop()
-        self._scope.take(setup)
-        self._scope.arm()
-        self._scope.trigger()
+        with self._fault_first():
+            self._scope.stop()
+            self._scope.take(setup)
+            self._scope.arm()
+            self._scope.trigger()
+
+    @contextlib.contextmanager
+    def _fault_first(self) -> Iterator[None]:
+        """A fault takes the scope for its freeze frame: then the fault is the reason, not what the scope refuses."""
+        try:
+            yield
+        except FluxtrueError:
+            self.rest(TOLD_S)
+            raise
 
     def _state(self) -> float:
         """Phase of the pulses."""
@@ -267,8 +278,9 @@ class OverTheBus:
         most = math.ceil((self._line.now_s - begun_s) / self.period_s)
         if self._failure == STOPPED:
             self.rest(TOLD_S)
-        self._scope.until_complete(periods * self.period_s + 1.0)
-        columns = self._scope.read(most=most).columns
+        with self._fault_first():
+            self._scope.until_complete(periods * self.period_s + 1.0)
+            columns = self._scope.read(most=most).columns
         rows = np.column_stack([self._column(columns, name) for name in CAPTURED])
         acts = pulsing(rows[:, 2], rows[:, 3], values["pulses_vd"], values["pulses_vq"])
         if acts[-1] and phase == DONE:
