@@ -83,6 +83,12 @@ class Bench:
         until(lambda: self.state(step) in ends, self.page.server.now_s, STEP_S, f"{step}: {state}")
         assert self.state(step) == state, self.page.text(f"{step}-refused")
 
+    def progress_s(self, step: str) -> float:
+        """How far its bar is."""
+        value = self.page.run("return document.getElementById(arguments[0]).value", f"{step}-bar")
+        assert isinstance(value, int | float)
+        return float(value)
+
     def begin(self, step: str) -> None:
         """Press the button, and wait until currents flow."""
         self.press(step, "do")
@@ -227,8 +233,7 @@ def test_a_step_is_done_repeated_and_accepted_by_the_keyboard(bench: Bench) -> N
 def test_stop_in_the_middle_of_a_step_ends_it_with_switching_disabled(bench: Bench) -> None:
     page = bench.page
     bench.begin("resistance")
-    until(lambda: float(page.run("return document.getElementById('resistance-bar').value")) > 3.0,  # type: ignore[arg-type]
-          page.server.now_s, STEP_S, "progress")  # fmt: skip
+    until(lambda: bench.progress_s("resistance") > 3.0, page.server.now_s, STEP_S, "progress")
     page.find("stop").click()
     page.until(lambda: bench.state("resistance") == "no result", "the end of the step")
     assert page.text("resistance-refused") == "Stop was pressed."
@@ -307,8 +312,7 @@ def test_the_map_is_found_and_the_folder_is_written(bench: Bench) -> None:
     page = bench.page
     bench.press("map", "do")
     bench.wait("map", "measuring")
-    until(lambda: float(page.run("return document.getElementById('map-bar').value")) > 10.0,  # type: ignore[arg-type]
-          page.server.now_s, STEP_S, "progress")  # fmt: skip
+    until(lambda: bench.progress_s("map") > 10.0, page.server.now_s, STEP_S, "progress")
     bench.wait("map", FOUND)
     print(f"map at {page.server.now_s():.0f} s simulated: {bench.rows('map')}")
     bench.shoot("map", "step-map")
@@ -370,8 +374,8 @@ def test_the_built_firmware_makes_40_newton_metres_true(folder: Path, bench: Ben
     assert max(map(abs, errors.values())) <= TORQUE_SHARE
 
 
-class Nobody:
-    """Whoever would be told how a step goes."""
+class Deaf:
+    """In place of the wizard that is told how a step goes."""
 
     def progressed(self, step_s: float) -> None: ...
     def found(self, step: str, found: Found) -> None: ...
@@ -387,7 +391,7 @@ def test_when_the_server_crashes_the_process_that_measures_disables_switching_an
         address = BusAddress("socketcand", "can0", {"host": HOST, "port": ecu.can_port, "tcp_tune": True})
         setup = Setup(Terminals(address, unknown.folder.vecu, (HOST, ecu.bench_port)), unknown.folder, known, True)
         in_step = InStep()
-        measuring = Measuring(setup, [], in_step, Nobody())
+        measuring = Measuring(setup, [], in_step, Deaf())
         measuring.do(Job(step, ("offsets",), Found(), known))
         while measuring.status().state != "run":
             in_step.due()

@@ -66,8 +66,8 @@ class Bench:
 def bench(tmp_path: Path) -> Bench:
     interface = read_interface()
     wizard, bus = Wizard(chosen(("map",)), tmp_path, KNOWN, 375.0, 12.0), Bus()
-    session = Session("", 100.0, Samples(interface.database), Recorder(tmp_path, interface), {}, link=bus,  # type: ignore[arg-type]
-                      wizard=wizard)  # fmt: skip
+    samples, recorder = Samples(interface.database), Recorder(tmp_path, interface)
+    session = Session("", 100.0, samples, recorder, {}, link=bus, wizard=wizard)  # type: ignore[arg-type]
     made = Bench(wizard, session, bus)
 
     def begin(step: Step, done: tuple[str, ...], found: Found, known: Nameplate) -> None:

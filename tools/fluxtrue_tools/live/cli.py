@@ -104,10 +104,10 @@ def _serve(session: Session, port: int) -> None:
         runner = web.AppRunner(make_app(session), access_log=None)
         await runner.setup()
         await web.SockSite(runner, listener).start()
-        click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")
         stop = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):  # the torque is ramped out, the virtual ECU ended
             asyncio.get_running_loop().add_signal_handler(number, stop.set)
+        click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")  # it can be ended from here on
         await stop.wait()
         await runner.cleanup()
 
