@@ -22,8 +22,10 @@ from conftest import ROOT, Server, end, launch
 from driver import Page
 from progress import HANG_S, polled, until
 from selenium import webdriver
+from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from test_views import CONTRAST, FOCUSED, REACHED
 
 from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.cli import run as command
@@ -51,8 +53,7 @@ STEP_S = 300.0  # of simulated time, for a step and its repetitions
 TORQUE_NM, TORQUE_SHARE = 40.0, 0.03  # the bound of 95 % of the points after a commissioning without a dynamometer
 SPEEDS_RPM = (300.0, 1000.0, 2000.0)
 FOUND = "accept or repeat"
-HAND_TIMEOUT_S, BATCH_S, OFF_S = 0.3, 0.2, 0.2
-CONTRAST = Path(__file__).with_name("contrast.js").read_text()
+OFF_S = 0.2
 
 
 @dataclass
@@ -184,6 +185,19 @@ def test_text_and_lines_have_the_contrast_of_wcag_aa(bench: Bench, theme: str) -
     bench.page.size(1440, 900, "light")
 
 
+def test_every_active_control_is_reached_by_tab(bench: Bench) -> None:
+    page = bench.page
+    page.browser.get(page.server.url)
+    page.until(lambda: page.text("state") == "standby" and page.find("offsets-do").is_enabled(), "standby")
+    expected, reached = page.run(REACHED), []
+    assert expected == ["theme", "stop", "known-name", "known-psi", "known-source", "known-use", "offsets-do"]
+    for _ in expected:
+        ActionChains(page.browser).send_keys(Keys.TAB).perform()
+        reached.append(page.run(FOCUSED))
+    assert [focused[0] for focused in reached] == expected  # type: ignore[index]
+    assert all(focused[4] for focused in reached), "each focus is seen"  # type: ignore[index]
+
+
 def test_the_magnet_is_given_with_its_source_and_a_wrong_value_is_refused(bench: Bench) -> None:
     page, magnet = bench.page, f"{1e3 * bench.truth.psi_f_Vs:.5g}"
     for name, text in (("known-psi", "-1"), ("known-source", "data sheet")):
@@ -241,14 +255,13 @@ def test_stop_in_the_middle_of_a_step_ends_it_with_switching_disabled(bench: Ben
     assert bench.state("map") == "later" and not bench.rows("resistance"), "nothing was changed"
 
 
-def test_a_hidden_page_loses_the_step_after_300_ms(bench: Bench) -> None:
+def test_a_hidden_page_loses_the_step(bench: Bench) -> None:
+    """After 300 ms, which test_wizard_rules.py checks to the microsecond; here simulated time goes on afterwards."""
     page = bench.page
     bench.begin("resistance")
-    hidden_s = page.server.now_s()
     page.run("Object.defineProperty(document, 'hidden', {value: true, configurable: true});"
              "document.dispatchEvent(new Event('visibilitychange'));")  # fmt: skip
     page.until(lambda: bench.state("resistance") == "no result", "the end of the step")
-    assert page.server.now_s() < hidden_s + HAND_TIMEOUT_S + 3 * BATCH_S + 3 * OFF_S
     assert "closed or silent for 0.3 s" in page.text("resistance-refused")
     bench.is_off()
     page.run("Object.defineProperty(document, 'hidden', {value: false, configurable: true});"
