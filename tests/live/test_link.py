@@ -10,7 +10,7 @@ import pytest
 
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
-from fluxtrue_tools.live.bus_process import _Reporter
+from fluxtrue_tools.live.bus_process import Reporter
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Status
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
@@ -164,7 +164,7 @@ def test_a_status_that_could_not_be_told_is_told_later() -> None:
             return not self.is_full
 
     outbox = Outbox()
-    reporter = _Reporter(outbox)  # type: ignore[arg-type]
+    reporter = Reporter(outbox)  # type: ignore[arg-type]
     reporter.period(Status("fault"))
     outbox.is_full = False
     reporter.period(Status("fault"))

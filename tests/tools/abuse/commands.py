@@ -60,7 +60,8 @@ def cases() -> dict[str, Case]:
         "motor start": Case((), ("--out", "o", "--i-max", "200", "--vdc", "350", "--pwm", "10", "--pole-pairs", "4"),
                             {}, ("o/motor.toml",)),
         "commission": Case((), (*motor, "--out", "o"), MACHINE, beside=ON_A_BENCH | {"--elf": BENCH}),
-        "live": Case((), motor, MACHINE, beside=ON_A_BENCH | {"--elf": BENCH}),
+        "live": Case((), motor, MACHINE, beside=ON_A_BENCH | {
+            "--elf": BENCH, "--machine": ("--commission",), "--seed": ("--commission",)}),
         "scope": Case((), (), {"image.elf": elf()},
                       beside=ON_A_BENCH | {"--on": ("--trigger", "above"), "--level": ("--trigger", "above")}),
         "log": Case(("drive.mf4",), ("--export", "o.csv"), {"drive.mf4": recording()}, ("o.csv",)),

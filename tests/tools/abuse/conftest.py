@@ -26,8 +26,8 @@ WORK = (
     "campaign.run.run_case", "campaign.run._simulate", "campaign.schedule.dask",
     "fault_campaign.run.schedule.missing", "fault_campaign.run.run_one", "demo.all.demonstrate",
     "commission.steps.run", "commission.on_the_bus.VirtualEcu", "commission.on_the_bus.connected",
-    "live.cli._session", "live.cli.VirtualEcu", "live.cli.Channel", "scope.cli.VirtualEcu", "scope.cli.Channel",
-    "scope.cli._line",
+    "live.cli._session", "live.cli.VirtualEcu", "live.cli.Channel", "live.wizard.start.session",
+    "scope.cli.VirtualEcu", "scope.cli.Channel", "scope.cli._line",
 )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fluxtrue_tools import faults
 from fluxtrue_tools.commission.drive import FAILED, MEASURED, PERIODS_MAX, PULSE, Capture
 from fluxtrue_tools.commission.nameplate import SWING_DEG, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
@@ -139,7 +140,7 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     rows = _started(drive, burst, known)
     fault = int(drive.get("fault_word"))
     if fault:
-        raise FluxtrueError(f"commission: a fault ended the voltage pulses (fault word 0x{fault:x})")
+        raise FluxtrueError(f"commission: a fault ended the voltage pulses: {', '.join(faults.named(fault))}")
     active = np.nonzero(np.abs(rows[:, 2] + 1j * rows[:, 3]) > 0.0)[0]
     failure = _phase_word(drive)
     if failure == REFUSED or not len(active):
@@ -149,11 +150,12 @@ def record(drive: Capture, burst: Burst, known: Nameplate) -> Raw:
     return _aligned(rows, drive.period_s, burst, failure).without(known.offset_A)
 
 
-def offset(drive: Capture, seconds: float = 0.1) -> complex:
-    """Mean current with switching disabled, in the stationary frame."""
+def offset(drive: Capture, seconds: float = 0.1) -> tuple[complex, float]:
+    """Mean current with switching disabled, in the stationary frame, and the standard deviation of its components."""
     rows = drive.capture(MEASURED, round(seconds / drive.period_s))
     i_s = (rows[:, 0] + 1j * rows[:, 1]) * np.exp(1j * rows[:, 4])
-    return complex(i_s.mean())
+    spread = math.sqrt(0.5 * float(np.var(i_s)))  # np.var() of complex values adds both components
+    return complex(i_s.mean()), spread / math.sqrt(len(i_s))
 
 
 @dataclass(frozen=True)

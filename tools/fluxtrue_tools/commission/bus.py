@@ -10,7 +10,7 @@ imposed angle and the limits of the shaft.
 import contextlib
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -38,7 +38,7 @@ MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start the
 POLL_S: Final = 0.005
 STOPPED: Final = 2.0  # of pulses_failure
 TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
-READY_S, RUN_S, OFF_S = 5.0, 0.5, 0.05
+READY_S, RUN_S, OFF_S, RESET_S = 5.0, 0.5, 0.05, 0.05
 LISTEN_S: Final = 0.15
 STEADY, SMALL = 0.05, 0.5  # of the largest voltage
 ANGLE_PERIODS: Final = 8
@@ -94,7 +94,11 @@ class OverTheBus:
         unlock(self._master)
         self._scope = Scope(self._master, description)
         self._state()
-        line.ask(limit_Nm=self._torque_Nm(BRAKE_SHARE * known.i_max_A))
+
+    @property
+    def line(self) -> Line:
+        """Commands and state."""
+        return self._line
 
     @property
     def passed(self) -> Callable[[float], None]:
@@ -155,7 +159,8 @@ class OverTheBus:
     # The state of the inverter.
 
     def _enable(self) -> None:
-        self._line.ask(mode="torque", enable=False, torque_Nm=0.0)
+        limit_Nm = self._torque_Nm(BRAKE_SHARE * self._known.i_max_A)  # of the torque that brakes the rotor
+        self._line.ask(mode="torque", enable=False, torque_Nm=0.0, limit_Nm=limit_Nm)
         self._line.wait_for(("ready", *RUNNING), READY_S, "the dc link cannot be charged")
         self._line.ask(enable=True)
         self._line.wait_for(RUNNING, RUN_S, "switching cannot be enabled")
@@ -187,6 +192,12 @@ class OverTheBus:
         with contextlib.suppress(FluxtrueError):  # without commands the drive stops by itself
             self.rest(OFF_S)
 
+    def reset_faults(self) -> None:
+        """One edge of the reset, after switch_off(). The ECU grants it in state fault."""
+        self._line.ask(fault_reset=True)
+        self.rest(RESET_S)
+        self._line.ask(fault_reset=False)
+
     # Movements and captures.
 
     def speed_rpm(self, seconds: float) -> float:
@@ -206,9 +217,10 @@ class OverTheBus:
         """Capture as many rows as the scope holds."""
         signals = [CAPTURED[name] for name in names]
         self._arm(signals, periods)
-        self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
-        self._check()
-        columns = self._scope.read().columns
+        with self._fault_first():
+            self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
+            self._check()
+            columns = self._scope.read().columns
         return np.column_stack([self._column(columns, name) for name in names])
 
     @staticmethod
@@ -221,10 +233,20 @@ class OverTheBus:
         setup = make_setup(
             self._scope.signals, signals, "manual", None, 0.0, 0.0, min(periods, WORDS // len(signals)), 1
         )
-        self._scope.stop()
-        self._scope.take(setup)
-        self._scope.arm()
-        self._scope.trigger()
+        with self._fault_first():
+            self._scope.stop()
+            self._scope.take(setup)
+            self._scope.arm()
+            self._scope.trigger()
+
+    @contextlib.contextmanager
+    def _fault_first(self) -> Iterator[None]:
+        """A fault takes the scope for its freeze frame: then the fault is the reason, not what the scope refuses."""
+        try:
+            yield
+        except FluxtrueError:
+            self.rest(TOLD_S)
+            raise
 
     def _state(self) -> float:
         """Phase of the pulses."""
@@ -256,8 +278,9 @@ class OverTheBus:
         most = math.ceil((self._line.now_s - begun_s) / self.period_s)
         if self._failure == STOPPED:
             self.rest(TOLD_S)
-        self._scope.until_complete(periods * self.period_s + 1.0)
-        columns = self._scope.read(most=most).columns
+        with self._fault_first():
+            self._scope.until_complete(periods * self.period_s + 1.0)
+            columns = self._scope.read(most=most).columns
         rows = np.column_stack([self._column(columns, name) for name in CAPTURED])
         acts = pulsing(rows[:, 2], rows[:, 3], values["pulses_vd"], values["pulses_vq"])
         if acts[-1] and phase == DONE:

@@ -39,6 +39,7 @@ class Order:
     enable: bool = False
     torque_Nm: float = 0.0
     limit_Nm: float = 0.0
+    fault_reset: bool = False
 
 
 class Clock(Protocol):
@@ -140,7 +141,9 @@ class Line:
         self._heard_s = time.monotonic()
         self.order = Order()
         self.is_lost = False
+        self.is_barred = False  # the user has stopped: whatever is asked for, switching stays disabled
         self.passed: Callable[[float], None] = lambda _: None
+        self.heard: Callable[[can.Message], None] = lambda _: None
         self._clock = make_clock(self._beat)
 
     @property
@@ -164,10 +167,12 @@ class Line:
 
     def _beat(self) -> can.Message:
         """The next command; without a sign of life from the evaluation it no longer enables."""
-        order = self.order if time.monotonic() - self._heard_s < HEARD_S else Order()
+        is_alive = time.monotonic() - self._heard_s < HEARD_S
+        order = self.order if is_alive and not self.is_barred else Order()
         limits = {name: min(order.limit_Nm, self._interface.largest(COMMAND, name)) for name in LIMITS}
-        data = self._message.encode({"Crc": 0, "Counter": 0, "Enable": int(order.enable), "FaultReset": 0,
-                                     "Mode": order.mode, REQUEST: order.torque_Nm, **limits})  # fmt: skip
+        data = self._message.encode({"Crc": 0, "Counter": 0, "Enable": int(order.enable),
+                                     "FaultReset": int(order.fault_reset), "Mode": order.mode,
+                                     REQUEST: order.torque_Nm, **limits})  # fmt: skip
         return can.Message(arbitration_id=self._message.frame_id, is_extended_id=False,
                            data=self._protector.protect(data))  # fmt: skip
 
@@ -177,6 +182,7 @@ class Line:
         elif frame.arbitration_id == self._message.frame_id and not frame.is_extended_id:
             raise FluxtrueError("commission: something else on this bus commands the inverter, too")
         self._values(frame)
+        self.heard(frame)
 
     def pass_time(self, seconds: float) -> None:
         """Let the inverter run, and receive its frames."""

@@ -124,7 +124,7 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
     The steps phases, spin and drag turn the shaft; the simulated machine's sensor and leads are then connected at
     random. The others keep it at standstill and need the connection to be right. Over CAN only those are possible.
     """
-    from fluxtrue_tools.commission import folder, plot, report
+    from fluxtrue_tools.commission import result
     from fluxtrue_tools.commission.hidden import folder_of
     from fluxtrue_tools.commission.steps import announcement, chosen, run
     from fluxtrue_tools.errors import FluxtrueError
@@ -150,11 +150,6 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
         kept = None if work is None else target.work(work, nameplate, connected)
         with target.drive(motor, known, connected) as drive:
             found = run(drive, wanted, known, click.echo, kept, resume)
-        known = found.known(known)
-        grid, _ = folder.write(found, known, nameplate, staging, out)
-        text = report.text(found, known, grid)
-        (staging / "commission.txt").write_text(text, encoding="utf-8")
-        if found.resistance is not None:
-            plot.write(found, known, grid, staging / "commission.png")
+        text, _ = result.write(found, known, nameplate, staging, out)
     click.echo(text, nl=False)
     click.echo(f"written to {out}")

@@ -49,7 +49,7 @@ def _of_the_map(found: Found, known: Nameplate, staging: Path, entries: dict[str
     surface, machine = found.surface, entries["machine"]
     model = surface.with_magnet(known.psi_f_Vs)
     grid = make_grid(model, _points(found), known.i_max_A, NODES, staging)
-    magnet = "coasting" if found.spun is not None else "the nameplate"
+    magnet = "coasting" if found.spun is not None else known.psi_f_source or "the nameplate"
     title = f"{BY}: one co-energy through voltage pulses; psi_d without current is that of {magnet}"
     (staging / MAP).write_text(flux_map_csv(grid, title), encoding="utf-8")
     for key in SOURCES:
@@ -61,6 +61,8 @@ def _of_the_map(found: Found, known: Nameplate, staging: Path, entries: dict[str
         + (
             f"by coasting, ±{found.spun.psi_f_sigma_Vs:.1g} V·s"
             if found.spun is not None
+            else f"is given ({known.psi_f_source}): standstill does not show it"
+            if known.psi_f_source
             else "is the nameplate's guess: standstill does not show it"
         ),
     )

@@ -21,6 +21,7 @@ class Nameplate:
     inertia_kgm2: float
     level_V: float  # lost by a leg of the inverter
     knee_A: float  # from which the drive compensates all of it
+    psi_f_source: str = ""  # of psi_f_Vs, when the user has given a better value than the guess
     offset_A: complex = 0.0  # of the current sensors in the stationary frame, as soon as it is measured
 
     @property

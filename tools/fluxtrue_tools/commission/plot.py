@@ -1,7 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""commission.png: the currents of all bursts, the surface with its samples, what is left, and the MTPA line."""
+"""commission.png: the currents of all bursts, the surface with its samples, what is left, and the MTPA line. The same
+panels, and those of the other steps, are drawn one by one for the live page.
+"""
 
+import io
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any, Final
 
 import matplotlib
 
@@ -24,7 +30,8 @@ def _places(axes: Axes, found: Found, known: Nameplate) -> None:
     for raw in found.bursts:
         axes.plot(raw.i.real, raw.i.imag, ".-", ms=2, lw=0.4)
     angle = np.linspace(0.0, 2.0 * np.pi, 200)
-    axes.plot(known.i_max_A * np.cos(angle), known.i_max_A * np.sin(angle), "k", lw=1.0, label="i_max")
+    axes.plot(known.i_max_A * np.cos(angle), known.i_max_A * np.sin(angle),
+              color=plt.rcParams["text.color"], lw=1.0, label="i_max")  # fmt: skip
     axes.set(title="Currents of all bursts", xlabel="i_d, A", ylabel="i_q, A", aspect="equal")
     axes.legend(fontsize=8)
 
@@ -96,8 +103,70 @@ def _mtpa(axes: Axes, grid: Grid, known: Nameplate) -> None:
     amplitudes = np.linspace(0.02, 1.0, 40) * known.i_max_A
     best = [angles[int(np.argmax(at.ev(a * np.cos(angles), a * np.sin(angles))))] for a in amplitudes]
     axes.plot(amplitudes * np.cos(best), amplitudes * np.sin(best), "r", lw=1.5, label="MTPA")
-    axes.set(title="Torque of this map, with the nameplate's psi_f", xlabel="i_d, A", ylabel="i_q, A")
+    magnet = "a given" if known.psi_f_source else "the nameplate's"
+    axes.set(title=f"Torque of this map, with {magnet} psi_f", xlabel="i_d, A", ylabel="i_q, A")
     axes.legend(fontsize=8)
+
+
+def _offset(axes: Axes, found: Found, _: Nameplate) -> None:
+    reach = 1.3 * max(abs(found.offset_A), 3.0 * found.offset_sigma_A)
+    axes.axhline(0.0, color=plt.rcParams["text.color"], lw=0.8)
+    axes.axvline(0.0, color=plt.rcParams["text.color"], lw=0.8)
+    axes.errorbar(found.offset_A.real, found.offset_A.imag, 3.0 * found.offset_sigma_A, 3.0 * found.offset_sigma_A, "o",
+                  label="offset, ±3 sigma of the noise")  # fmt: skip
+    axes.set(title="Current shown without current", xlabel="alpha, A", ylabel="beta, A", aspect="equal",
+             xlim=(-reach, reach), ylim=(-reach, reach))  # fmt: skip
+    axes.legend(fontsize=8)
+
+
+def _levels(axes: Axes, found: Found, _: Nameplate) -> None:
+    """The voltages of the points contain what ripple and movement add; (CM-12) takes that away."""
+    r = found.resistance
+    assert r is not None
+    lost_V = float((np.abs(r.volts) - r.r_ohm * np.abs(r.currents_A)).mean())
+    for sign, label in ((1.0, f"slope {1e3 * r.r_ohm:.4g} mohm"), (-1.0, None)):
+        line = sign * np.array([0.0, float(np.abs(r.currents_A).max())])
+        axes.plot(line, r.r_ohm * line + sign * lost_V, "C1", lw=1.2, label=label)
+    axes.plot(r.currents_A, r.volts, "o", ms=4, color="C0", label="levels, with ripple and movement")
+    axes.set(title="Direct currents", xlabel="mean i_d, A", ylabel="mean u_d, V")
+    axes.legend(fontsize=8)
+
+
+Panel = Callable[[Axes, Found, Nameplate], None]
+# Of each step, in the order of live/wizard/files.py, which has their titles.
+PANELS: Final[dict[str, tuple[Panel, ...]]] = {
+    "offsets": (_offset,),
+    "resistance": (_levels,),
+    "map": (_places, lambda axes, found, _: _left(axes, found), partial(_curves, of_d=True),
+            partial(_curves, of_d=False)),
+}  # fmt: skip
+_DARK = {"figure.facecolor": "#18202a", "axes.facecolor": "#18202a", "savefig.facecolor": "#18202a",
+         "axes.edgecolor": "#5c6c80", "xtick.color": "#9dabba", "ytick.color": "#9dabba", "text.color": "#e8edf3",
+         "axes.labelcolor": "#e8edf3", "grid.color": "#222c38", "legend.edgecolor": "#2a3543",
+         "image.cmap": "cool"}  # fmt: skip
+THEMES: Final[dict[str, dict[str, Any]]] = {"light": {}, "dark": _DARK}  # dark: the colours of the live page
+PANEL_IN, PANEL_DPI = (5.2, 4.0), 160
+
+
+def _png(draw: Callable[[Axes], None], theme: str) -> bytes:
+    with plt.rc_context(THEMES[theme]):
+        figure, axes = plt.subplots(figsize=PANEL_IN, layout="constrained")
+        draw(axes)
+        content = io.BytesIO()
+        figure.savefig(content, format="png", dpi=PANEL_DPI, metadata={"Software": None})
+        plt.close(figure)
+    return content.getvalue()
+
+
+def of_step(step: str, number: int, found: Found, known: Nameplate, theme: str) -> bytes:
+    """One panel of a step as PNG."""
+    draw = PANELS[step][number]
+    return _png(lambda axes: draw(axes, found, known), theme)
+
+
+def of_torque(grid: Grid, known: Nameplate, theme: str) -> bytes:
+    """Torque and MTPA line of the finished map as PNG."""
+    return _png(lambda axes: _mtpa(axes, grid, known), theme)
 
 
 def write(found: Found, known: Nameplate, grid: Grid | None, path: Path) -> None:
@@ -108,8 +177,7 @@ def write(found: Found, known: Nameplate, grid: Grid | None, path: Path) -> None
     if found.surface is None or grid is None:
         for each in axes.flat[1:]:
             each.set_visible(False)
-        axes[0, 0].plot(r.currents_A, r.volts, "o")
-        axes[0, 0].set(title="Direct currents", xlabel="mean i_d, A", ylabel="mean u_d, V")
+        _levels(axes[0, 0], found, known)
     else:
         _places(axes[0, 0], found, known)
         _curves(axes[0, 1], found, known, of_d=True)

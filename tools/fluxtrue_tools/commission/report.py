@@ -54,9 +54,10 @@ def _balance(found: Found) -> list[str]:
 def _magnet(found: Found, known: Nameplate) -> list[str]:
     if found.spun is not None:
         return []
+    said = f"given ({known.psi_f_source})" if known.psi_f_source else "the nameplate's guess"
     return [
-        f"  psi_f = {known.psi_f_Vs:.4g} V·s is the nameplate's guess: it cannot be seen at standstill, and "
-        "the torque of this folder is as uncertain as this guess",
+        f"  psi_f = {known.psi_f_Vs:.4g} V·s is {said}: it cannot be seen at standstill, and "
+        "the torque of this folder is as uncertain as this value",
     ]
 
 

@@ -4,6 +4,7 @@
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -30,6 +31,7 @@ class Found:
     """What the steps have found so far."""
 
     offset_A: complex = 0.0  # of the current sensors, stationary frame
+    offset_sigma_A: float = 0.0  # of each component, by the noise
     followed: Followed | None = None
     spun: Spun | None = None
     drag: Drag | None = None
@@ -92,7 +94,7 @@ def _disable(drive: Capture) -> None:
 
 def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
     _disable(drive)
-    found.offset_A = offset(drive)
+    found.offset_A, found.offset_sigma_A = offset(drive)
 
 
 def _phases(drive: Capture, found: Found, known: Nameplate) -> None:
@@ -185,8 +187,11 @@ def announcement(step: Step, known: Nameplate) -> str:
                             torque=spin.Q_SHARES[-1] * known.i_max_A)  # fmt: skip
 
 
+Shown = Callable[[Capture, Step], AbstractContextManager[None]]
+
+
 @contextlib.contextmanager
-def _shown(drive: Capture, step: Step) -> Iterator[None]:
+def on_terminal(drive: Capture, step: Step) -> Iterator[None]:
     """A bar on a terminal."""
     with tqdm(total=step.seconds, desc=step.name, bar_format="{desc} {percentage:3.0f} %|{bar}|", leave=False,
               disable=not sys.stderr.isatty()) as bar:  # fmt: skip
@@ -206,7 +211,7 @@ def _connect(drive: Capture, found: Found, known: Nameplate) -> None:
 
 
 def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None,
-        earlier: tuple[tuple[str, ...], Found]) -> Found:  # fmt: skip
+        earlier: tuple[tuple[str, ...], Found], shown: Shown) -> Found:  # fmt: skip
     done, found = earlier
     if done:
         _connect(drive, found, found.known(known))
@@ -215,7 +220,7 @@ def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str]
             say(f"{step.name}: kept from an earlier run")
             continue
         say(f"{step.name}: {announcement(step, found.known(known))}")
-        with _shown(drive, step):
+        with shown(drive, step):
             step.run(drive, found, found.known(known))
         done = (*done, step.name)
         if kept is not None:
@@ -224,18 +229,19 @@ def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str]
 
 
 def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None = None,
-        resume: bool = False) -> Found:  # fmt: skip
+        resume: bool = False, shown: Shown = on_terminal) -> Found:  # fmt: skip
     """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before.
 
     kept     where finished steps are kept
     resume   those that are there are not repeated
+    shown    context of each step, which shows how far it is
     """
     earlier = kept.load() if kept is not None and resume else ((), Found())
     before = {name: drive.get(name) for name in drive.settings}
     try:
         for name in drive.switched_off:  # the voltages are evaluated without them
             drive.set(name, 0.0)
-        return _go(drive, steps, known, say, kept, earlier)
+        return _go(drive, steps, known, say, kept, earlier, shown)
     finally:
         _disable(drive)
         for name, value in before.items():

@@ -25,7 +25,7 @@ from fluxtrue_tools.outputs import atomic
 
 NAME: Final = "steps.json"
 TYPES: Final = {kind.__name__: kind for kind in (Connection, Followed, Spun, Drag, Resistance, First, Raw)}
-KEPT: Final = ("offset_A", "followed", "spun", "drag", "resistance", "first", "levels")  # of Found
+KEPT: Final = ("offset_A", "offset_sigma_A", "followed", "spun", "drag", "resistance", "first", "levels")  # of Found
 LAST: Final = "map"
 
 

@@ -9,7 +9,7 @@ import multiprocessing
 import queue
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -46,7 +46,7 @@ class Setup:
     in_step: bool = False
 
 
-class _Outbox:
+class Outbox:
     """Messages to the server, sent by a thread of their own: a server that does not read delays no command."""
 
     def __init__(self, connection: Connection) -> None:
@@ -79,7 +79,7 @@ class _Outbox:
 class _Turns:
     """The child's end of InStep."""
 
-    def __init__(self, outbox: _Outbox) -> None:
+    def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
         self._done = threading.Event()
         self._released = False
@@ -102,10 +102,10 @@ class _Turns:
         self._done.set()
 
 
-class _Reporter(Observer):
+class Reporter(Observer):
     """Reports to the server what happens on the bus side."""
 
-    def __init__(self, outbox: _Outbox) -> None:
+    def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
         self._sent: Status | None = None
 
@@ -132,7 +132,7 @@ class _Reporter(Observer):
         self._outbox.put("ended", status)
 
 
-def _link(setup: Setup, reporter: _Reporter, turns: _Turns, stack: ExitStack) -> Link:
+def _link(setup: Setup, reporter: Reporter, turns: _Turns, stack: ExitStack) -> Link:
     """Bus, time and test stand of the child."""
     interface = Interface(setup.interface_name, setup.interface_text)
     values = LastValues(interface.database, NEEDED)
@@ -150,7 +150,7 @@ def _link(setup: Setup, reporter: _Reporter, turns: _Turns, stack: ExitStack) ->
     return link
 
 
-def _obey(link: Link, turns: _Turns, connection: Connection, outbox: _Outbox) -> None:
+def _obey(link: Link, turns: _Turns, connection: Connection, outbox: Outbox) -> None:
     """Carry out what the server asks for, until it closes."""
     with ExitStack() as held:  # simulated time, while the server makes another connection
         while (message := connection.recv()) is not None:
@@ -172,12 +172,12 @@ def _run(setup: Setup, connection: Connection) -> None:
     """The child's process."""
     for number in (signal.SIGINT, signal.SIGTERM):  # the server ends the child, after the torque
         signal.signal(number, signal.SIG_IGN)
-    outbox = _Outbox(connection)
+    outbox = Outbox(connection)
     turns = _Turns(outbox)
     with ExitStack() as stack:
         stack.callback(outbox.close)
         try:
-            link = _link(setup, _Reporter(outbox), turns, stack)
+            link = _link(setup, Reporter(outbox), turns, stack)
         except FluxtrueError as error:
             outbox.put("failed", str(error))
             return
@@ -195,15 +195,16 @@ class Receiver(Protocol):
 
 
 class BusProcess:
-    """The server's end: the same calls as a Link."""
+    """The server's end: the same calls as a Link. `run` is what the child does; it first reports a status."""
 
-    def __init__(self, setup: Setup, receivers: list[Receiver], in_step: InStep | None) -> None:
+    def __init__(self, setup: Any, receivers: list[Receiver], in_step: InStep | None,
+                 run: Callable[[Any, Connection], None] = _run) -> None:  # fmt: skip
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         self._receivers, self._in_step = receivers, in_step
         self._status = Status()
         self._sending, self._held = threading.Lock(), threading.Event()
-        self._process = context.Process(target=_run, args=(setup, theirs), name="fluxtrue-bus", daemon=True)
+        self._process = context.Process(target=run, args=(setup, theirs), name="fluxtrue-bus", daemon=True)
         self._process.start()
         theirs.close()
         self._begin()
@@ -222,11 +223,11 @@ class BusProcess:
 
     def act(self, action: str, *values: Any) -> None:
         """An action of a user."""
-        self._send("act", action, *values)
+        self.send("act", action, *values)
 
     def turn(self, knob: str, value: float) -> None:
         """Change one parameter of the test stand."""
-        self._send("turn", knob, value)
+        self.send("turn", knob, value)
 
     def status(self) -> Status:
         """What the pages show."""
@@ -236,12 +237,12 @@ class BusProcess:
     def standing_still(self) -> Iterator[None]:
         """Time does not pass while another connection is made."""
         self._held.clear()
-        self._send("hold")
+        self.send("hold")
         self._held.wait(END_S)
         try:
             yield
         finally:
-            self._send("go")
+            self.send("go")
 
     def close(self) -> None:
         """Ramp the torque to zero, then end the child."""
@@ -252,20 +253,22 @@ class BusProcess:
         self._thread.join()
         self._process.join(END_S)
 
-    def _send(self, *message: Any) -> None:
+    def send(self, *message: Any) -> None:
+        """One message to the child."""
         with self._sending, suppress(OSError):  # the child has ended: the status says so
             self._connection.send(message)
 
     def _receive(self) -> None:
         try:
             while True:
-                self._take(self._connection.recv())
+                self.take(self._connection.recv())
         except (EOFError, OSError):
             self._status = Status(stopped=self._status.stopped if not self._status.state else ENDED)
         if self._in_step is not None:
             self._in_step.release()
 
-    def _take(self, message: tuple[Any, ...]) -> None:
+    def take(self, message: tuple[Any, ...]) -> None:
+        """One message of the child."""
         match message:
             case "frame", time_s, number, data, extended, error, remote, received:
                 frame = can.Message(time_s, number, extended, remote, error, data=data, is_rx=received)
@@ -285,4 +288,4 @@ class BusProcess:
             case ("turn",):
                 if self._in_step is not None:
                     self._in_step.turn()
-                self._send("done")
+                self.send("done")

@@ -104,14 +104,46 @@ def _serve(session: Session, port: int) -> None:
         runner = web.AppRunner(make_app(session), access_log=None)
         await runner.setup()
         await web.SockSite(runner, listener).start()
-        click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")
         stop = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):  # the torque is ramped out, the virtual ECU ended
             asyncio.get_running_loop().add_signal_handler(number, stop.set)
+        click.echo(f"http://{HOST}:{listener.getsockname()[1]}/")  # it can be ended from here on
         await stop.wait()
         await runner.cleanup()
 
     asyncio.run(_run())
+
+
+def _refuse_without_effect(commission: bool, can_interface: str | None, replay: Path | None) -> None:
+    """Options that the rest of the command line leaves without effect."""
+    if replay is not None and can_interface is not None:
+        raise FluxtrueError("--replay and --can-interface exclude each other")
+    if replay is not None:
+        paths.refuse_given("with --replay", "elf", "record_dir", "commission", "machine", "seed")
+    if can_interface is None:
+        paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
+    if not commission:
+        paths.refuse_given("without --commission", "machine", "seed")
+        return
+    paths.refuse_given("with --commission", "in_step", "record_dir")
+    if can_interface is not None:
+        paths.refuse_given("with --can-interface", "machine", "seed")
+
+
+def _commission(motor: str, machine: str, seed: int, address: BusAddress | None, bench: tuple[str, int] | None,
+                elf: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
+    """The wizard for an unknown motor."""
+    from fluxtrue_tools.commission.hidden import folder_of  # scipy: only when it is needed
+    from fluxtrue_tools.live.wizard import start
+    from fluxtrue_tools.sim import motor as motors
+
+    if elf is not None:
+        read(elf)  # a file that is given is read before anything is built or started
+    folder_of(machine)
+    nameplate = locate(motor, Path.cwd(), "--motor")[1]
+    built = motors.load(motor, build_dir, where="--motor")
+    with start.session(nameplate, built, start.Terminals(machine, seed, address, bench, elf), record_dir) as session:
+        _serve(session, port)
 
 
 @click.command(cls=paths.Command)
@@ -126,6 +158,11 @@ def _serve(session: Session, port: int) -> None:
 @click.option("--in-step", is_flag=True, help="Simulated time waits until the pages have drawn it, for tests.")
 @click.option("--elf", type=paths.InputFile(),
               help="The bench's firmware image: its calibration values can then be tuned.")  # fmt: skip
+@click.option("--commission", is_flag=True,
+              help="Measure an unknown motor, step by step; --motor is the folder of its nameplate.")  # fmt: skip
+@click.option("--machine", default="hsm1", show_default=True, metavar="NAME",
+              help="With --commission: the simulated machine, one of the project's, changed at random.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of these changes.")
 @click.option("--replay", type=paths.InputFile(), help="Show a recorded drive (MF4, BLF, ASC ...).")
 @click.option("--port", type=click.IntRange(0, 65535), default=8137, show_default=True, help="Of the page; 0: any.")
 @click.option("--record-dir", type=paths.BuildFolder(), default=Path("build/live"),
@@ -133,21 +170,20 @@ def _serve(session: Session, port: int) -> None:
 @click.option("--build-dir", type=paths.InputFolder(),
               help="Take the virtual ECU from this build folder as it is.")  # fmt: skip
 def live(motor: str, can_interface: str | None, can_channel: str, can_option: tuple[tuple[str, Any], ...],
-         bench: tuple[str, int] | None, in_step: bool, elf: Path | None, replay: Path | None, port: int,
-         record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
+         bench: tuple[str, int] | None, in_step: bool, elf: Path | None, commission: bool, machine: str, seed: int,
+         replay: Path | None, port: int, record_dir: Path, build_dir: Path | None) -> None:  # fmt: skip
     """Serve a page that draws the drive live, commands torque, tunes and records. Loopback only."""
-    if replay is not None and can_interface is not None:
-        raise FluxtrueError("--replay and --can-interface exclude each other")
-    if replay is not None:
-        paths.refuse_given("with --replay", "elf", "record_dir")
-    if can_interface is None:
-        paths.refuse_given("without --can-interface", "elf", "can_channel", "can_option", "bench")
+    _refuse_without_effect(commission, can_interface, replay)
+    if commission:
+        address = None if can_interface is None else BusAddress(can_interface, can_channel, dict(can_option))
+        _commission(motor, machine, seed, address, bench, elf, port, record_dir, build_dir)
+        return
     # Files that are given are read before anything is built or started.
     recording = None if replay is None else load(replay)
     firmware = None if elf is None else read(elf)
     torque_max = load_config(locate(motor, Path.cwd(), "--motor")[1]).machine.torque_max_Nm
-    machine = prepare(motor, build_dir, where="--motor")
-    interface = read_interface(machine.dbc)
+    built = prepare(motor, build_dir, where="--motor")
+    interface = read_interface(built.dbc)
     with contextlib.ExitStack() as stack:
         if replay is not None:
             source = Source(f"{replay.name} (replay)", attached_interface(replay), recording=recording)
@@ -156,10 +192,10 @@ def live(motor: str, can_interface: str | None, can_channel: str, can_option: tu
             channel = None if bench is None else Channel(*bench)
             source = Source(f"{can_interface} {can_channel}", interface, address, channel, firmware=firmware)
         else:
-            ecu = stack.enter_context(VirtualEcu(machine.vecu))
+            ecu = stack.enter_context(VirtualEcu(built.vecu))
             options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
             address, channel = BusAddress("socketcand", "can0", options), Channel(HOST, ecu.bench_port)
-            source = Source(f"{ecu.motor}, simulated", interface, address, channel, firmware=read(machine.vecu))
+            source = Source(f"{ecu.motor}, simulated", interface, address, channel, firmware=read(built.vecu))
         source.in_step = in_step
         if in_step and not source.is_stepped:
             raise FluxtrueError("--in-step: allowed before a virtual ECU with --fast only")

@@ -5,7 +5,7 @@ import asyncio
 import contextlib
 import math
 from collections.abc import Awaitable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from aiohttp import web
 
@@ -17,8 +17,12 @@ from fluxtrue_tools.live.stand import KNOBS
 from fluxtrue_tools.live.tuning import Tuning
 from fluxtrue_tools.scope.scope import Setup, make_setup
 
+if TYPE_CHECKING:
+    from fluxtrue_tools.live.wizard.wizard import Wizard
+
 OTHER: Final = "another page has control"
 STOPPED: Final = {True: "Stop was pressed.", False: "Stop was pressed on another page."}
+NO_COMMANDS: Final = "an unknown motor is measured here: no torque is commanded, nothing is tuned or recorded"
 Answer = dict[str, Any]
 
 
@@ -222,11 +226,37 @@ def _replay(session: Session, message: dict[str, Any]) -> None:
         session.replay.paused = bool(message.get("on"))
 
 
+def _commission(session: Session, socket: web.WebSocketResponse, wizard: "Wizard",
+                message: dict[str, Any]) -> None:  # fmt: skip
+    """The wizard's buttons. Everything else but Stop and the reset of faults belongs to a motor that is known."""
+    kind, step = message.get("type"), str(message.get("step"))
+    if kind == "stop":
+        _drive(session, socket, message)
+        return
+    if kind == "reset":
+        take(session, socket)
+        assert session.link is not None
+        session.link.act("reset_faults")
+        return
+    if kind not in ("commission_do", "commission_accept", "commission_know"):
+        raise FluxtrueError(NO_COMMANDS)
+    take(session, socket)
+    if kind == "commission_do":
+        wizard.do(step)
+    elif kind == "commission_accept":
+        wizard.accept(step)
+    else:
+        psi_f_mVs = number(message.get("psi_f_mVs"), "psi_f")
+        wizard.know(str(message.get("name")), psi_f_mVs, str(message.get("source")))
+
+
 def obey(session: Session, socket: web.WebSocketResponse, message: dict[str, Any]) -> Awaitable[Answer] | None:
     """Carry out one message of a page. A slow action is returned, to be awaited for its answer."""
     match message.get("type"):
         case "drawn":
             drawn(session, socket, message)
+        case _ if session.wizard is not None:
+            _commission(session, socket, session.wizard, message)
         case "torque" | "reset" | "off" | "ready" | "drive" | "stop":
             _drive(session, socket, message)
         case "knob":

@@ -24,6 +24,7 @@ from fluxtrue_tools.live.oscilloscope import watch
 from fluxtrue_tools.live.pace import InStep
 from fluxtrue_tools.live.session import SESSION, Session
 from fluxtrue_tools.live.stand import KNOBS
+from fluxtrue_tools.live.wizard.files import PICTURES, folder_file, picture
 
 HOST: Final = "127.0.0.1"
 BATCH_S: Final = 0.04  # 25 per second
@@ -68,6 +69,7 @@ def _hello(session: Session) -> dict[str, Any]:
     return {"type": "hello", "title": session.title, "torque_max_Nm": session.torque_max_Nm, "scope": offer,
             "factors": session.samples.factors(), "replay": session.link is None,
             "tuning": session.tuning is not None, "stand": stand, "words": session.words,
+            "commission": {"steps": session.wizard.offer(), "pictures": PICTURES} if session.wizard else None,
             "stale_s": session.wall_s(STALE_S)}  # fmt: skip
 
 
@@ -129,6 +131,8 @@ def _batch(session: Session, number: int) -> dict[str, Any]:
         batch["status"] = {**asdict(status), "knobs": dict(status.knobs), "recording": session.recorder.running}
     if session.replay is not None:
         batch["replay"] = session.replay.state()
+    if session.wizard is not None:
+        batch["commission"] = session.wizard.shown()
     return batch
 
 
@@ -217,6 +221,8 @@ def make_app(session: Session) -> web.Application:
     app.router.add_get("/", _page)
     app.router.add_get("/ws", _viewer)
     app.router.add_get("/capture.{kind:csv|mf4}", capture_file)
+    app.router.add_get("/commission.zip", folder_file)
+    app.router.add_get(r"/commission/{step:[a-z]+}-{panel:\d}.png", picture)
     app.router.add_static("/uplot", Path(str(plotter)))
     app.router.add_static("/static", PAGE)
     app.cleanup_ctx.append(_background)

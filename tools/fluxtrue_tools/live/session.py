@@ -4,7 +4,7 @@
 import asyncio
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from aiohttp import web
 
@@ -16,6 +16,9 @@ from fluxtrue_tools.live.replay import Replay
 from fluxtrue_tools.live.samples import Samples
 from fluxtrue_tools.live.tuning import Tuning
 from fluxtrue_tools.live.words import Words
+
+if TYPE_CHECKING:
+    from fluxtrue_tools.live.wizard.wizard import Wizard
 
 
 class BusSide(Protocol):
@@ -40,6 +43,7 @@ class Session:
     replay: Replay | None = None
     tuning: Tuning | None = None
     oscilloscope: Oscilloscope | None = None
+    wizard: "Wizard | None" = None  # for an unknown motor, in place of torque and tuning
     in_step: InStep | None = None  # simulated time waits for the pages
     viewers: list[web.WebSocketResponse] = field(default_factory=list)
     drawn: dict[web.WebSocketResponse, int] = field(default_factory=dict)  # number of the last batch, page by page

@@ -8,6 +8,7 @@ import { columns, rings, WINDOW_S } from "./rings.js";
 export const stats = { batches: 0, draws: 0, rows: 0 };
 const SPAN_MIN = 0.05; // seconds
 let charts = [];
+let isStarted = false;
 let dirty = false;
 let held = null; // { data, from, to, ends }: what paused charts show
 let isDragged = false; // a range is being chosen with the mouse
@@ -92,9 +93,11 @@ function draw() {
   requestAnimationFrame(draw);
 }
 
-export function startCharts() {
-  if (charts.length) return;
-  makeCharts();
+// A page that measures an unknown motor has no charts; it reports that it has drawn all the same.
+export function startCharts(hasCharts) {
+  if (isStarted) return;
+  isStarted = true;
+  if (hasCharts) makeCharts();
   document.addEventListener("mouseup", () => { isDragged = false; });
   window.addEventListener("blur", () => { isDragged = false; });
   $("charts-pause").onclick = () => (held ? release() : move(0, 1));

@@ -18,11 +18,12 @@ import { addGroups, rings } from "./rings.js";
 import { setStandRange, showStand, startStand } from "./stand.js";
 import { startTheme } from "./theme.js";
 import { setTorqueRange, showTorque, startTorque } from "./torque.js";
+import { offerWizard, showWizard, startWizard } from "./wizard.js";
 
 const PARTS = [showTorque, showReasons, showNumbers, showFaults, showStand, showParameters, showRecording, showControl,
-  showCharts, showScope];
-const NONE = { replay: false, scope: null, tuning: false, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
-const said = { hello: NONE, status: null, last: null, scope: null, control: "free" };
+  showCharts, showScope, showWizard];
+const NONE = { replay: false, scope: null, tuning: false, commission: null, title: "", words: {}, factors: {}, stand: {} }; // before the greeting
+const said = { hello: NONE, status: null, last: null, scope: null, commission: null, control: "free" };
 
 // What the parts show. A page to which the server speaks is present. If the inverter does, too, it is live; otherwise
 // it shows no values, and none of its controls acts but the end of a recording.
@@ -41,13 +42,14 @@ function showAll() {
 }
 
 function onHello(hello) {
-  Object.assign(said, { hello, status: null, last: null, scope: null, control: "free" });
+  Object.assign(said, { hello, status: null, last: null, scope: null, commission: null, control: "free" });
   show("title", hello.title);
   setStale(hello.stale_s);
   setTorqueRange(hello);
   setStandRange(hello);
   offerScope(hello);
-  startCharts();
+  offerWizard(hello);
+  startCharts(!hello.commission);
 }
 
 function onRows(message) {
@@ -57,7 +59,9 @@ function onRows(message) {
   arrived(message.batch);
   said.control = message.control;
   if (message.status) Object.assign(said, { status: message.status, last: message.last, scope: message.scope });
+  if (message.commission) said.commission = message.commission;
   if (message.status || control !== said.control) showAll();
+  else if (message.commission) showWizard(view());
   showReplay(message.replay);
   chartsChanged(message.run);
   if (document.hidden) tellDrawn();
@@ -74,8 +78,8 @@ const HANDLERS = {
   freeze: (message) => showFreezeFrame(said.hello, message),
 };
 
-[startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay, startScope].forEach((start) => start());
-startTheme(recolor);
+[startTorque, startNumbers, startFaults, startStand, startParameters, startRecording, startReplay, startScope, startWizard].forEach((start) => start());
+startTheme(() => { recolor(); showWizard(view()); });
 document.addEventListener("visibilitychange", () => { if (document.hidden) tellDrawn(); });
 connect((message) => HANDLERS[message.type](message), showAll);
 watch(showAll);

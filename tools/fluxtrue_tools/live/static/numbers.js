@@ -11,12 +11,14 @@ const NUMBERS = [
   ["Winding", "INV_Temperatures", "Winding", "°C", "WindingValid"],
   ["Inverter", "INV_Temperatures", "Inverter", "°C", "InverterValid"],
 ];
+const IDENTIFIED = "INV_Identification"; // not shown while the motor is unknown
 const cells = [];
 
 export function startNumbers() {
-  const rows = NUMBERS.flatMap(([label, , , unit]) => {
-    cells.push(element("dd", DASH));
-    return [element("dt", label), cells.at(-1), element("dd", unit)];
+  const rows = NUMBERS.flatMap(([label, message, , unit]) => {
+    const kind = message === IDENTIFIED ? "identified" : "";
+    cells.push(element("dd", DASH, kind));
+    return [element("dt", label, kind), cells.at(-1), element("dd", unit, kind)];
   });
   $("numbers").replaceChildren(...rows);
 }

@@ -43,5 +43,5 @@ export function showReasons(view) {
   if (!live) show("hint", "No values: this page is not connected to the inverter. Check server, bus and supply.");
   else if (hello.replay) show("hint", "A recorded drive: nothing is commanded.");
   else if (control === "other") show("hint", "Another page has control. This page shows values; Stop acts from here, too.");
-  else show("hint", state === undefined ? "" : wordsOf(hello, STATE, state).slice(1).join(" "));
+  else show("hint", state === undefined ? "" : wordsOf(hello, STATE, state).slice(1, hello.commission ? 2 : 3).join(" "));
 }
