@@ -51,8 +51,8 @@ def _samples(samples: Sequence[Sample]) -> list[str]:
     """Random samples as they were found, because those of the table above have been mended since."""
     parts = list(dict.fromkeys(part for sample in samples for part in sample.found))
     seeds = " | ".join(f"seed {sample.seed}" for sample in samples)
-    text = ["The survivors of the random samples have been evaluated: tests were written for gaps, and what is no error",
-            "is listed. What the samples had shown before that, found of all errors, without those listed now:", "",
+    text = ["The survivors of the random samples have been evaluated: tests were written for gaps, and what is no",
+            "error is listed. Before that, the samples had shown, found of all errors without what is listed now:", "",
             f"| part | {seeds} |", "|---" + "|---" * len(samples) + "|"]  # fmt: skip
     for part in parts:
         cells = [_share(*sample.found[part]) if part in sample.found else "" for sample in samples]
