@@ -78,7 +78,7 @@ def test_a_finished_set_up_is_silent_and_uses_no_package_manager(checkout: Path,
 def test_an_unknown_part_is_one_line(checkout: Path) -> None:
     done = run(checkout, "setup", "everything")
     assert done.returncode == 2
-    assert done.stderr == "error: tools/setup: unknown part 'everything', allowed: demo, test\n"
+    assert done.stderr == "error: tools/setup: unknown part 'everything', allowed: demo, test, mcdc\n"
 
 
 def test_without_network_the_missing_package_is_named(checkout: Path, bare_path: Path) -> None:
@@ -89,6 +89,49 @@ def test_without_network_the_missing_package_is_named(checkout: Path, bare_path:
     assert progress == "installing Debian packages: ninja-build"
     assert error.startswith("error: cannot install the Debian packages ninja-build")
     assert "E: Unable to fetch some archives" in error
+
+
+def install(checkout: Path, bare_path: Path) -> Path:
+    """Put all in place that tools/test needs; the list of what apt is asked."""
+    asked = checkout / "asked"
+    for name in ("ninja", "ruby", "clang", "chromium", "chromedriver", "gcc", "arm-none-eabi-gcc", "qemu-system-arm",
+                 "riscv64-unknown-elf-gcc", "x86_64-w64-mingw32-gcc"):  # fmt: skip
+        stub(bare_path, name, "cat >/dev/null")  # what is compiled to see whether a compiler has its library
+    stub(bare_path, "dpkg", "echo amd64")
+    stub(bare_path, "apt-get", f'echo "$@" >> "{asked}"; exit 100')
+    for name in ("cmock", "cbmc"):
+        (checkout / "build" / name).mkdir()
+        stamp = TOOLS.parent / "build" / name / "stamp"
+        (checkout / "build" / name / "stamp").write_bytes(stamp.read_bytes())
+    return asked
+
+
+def test_the_gate_does_without_the_clang_that_measures_mcdc(checkout: Path, bare_path: Path) -> None:
+    asked = install(checkout, bare_path)
+    done = run(checkout, "setup", "test", env={"PATH": str(bare_path)})
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert not asked.exists()
+
+
+@pytest.mark.parametrize("command", [("setup", "mcdc"), ("mcdc",)])
+def test_the_measurement_of_mcdc_names_the_clang_that_it_cannot_get(
+    checkout: Path, bare_path: Path, command: tuple[str, ...]
+) -> None:
+    asked = install(checkout, bare_path)
+    done = run(checkout, *command, env={"PATH": str(bare_path)})
+    assert done.returncode == 2
+    progress, error = done.stderr.splitlines()
+    assert progress.startswith("fetching clang 1:19.")
+    assert error.startswith("error: cannot get clang-19=1:19.")
+    assert asked.exists()
+
+
+def test_the_measurement_of_mcdc_is_refused_where_its_clang_is_not_pinned(checkout: Path, bare_path: Path) -> None:
+    install(checkout, bare_path)
+    stub(bare_path, "dpkg", "echo arm64")
+    done = run(checkout, "setup", "mcdc", env={"PATH": str(bare_path)})
+    assert done.returncode == 2
+    assert done.stderr == "error: no clang 19 for this machine: its packages are pinned for amd64 only\n"
 
 
 def test_without_root_the_missing_package_is_named(checkout: Path, bare_path: Path) -> None:

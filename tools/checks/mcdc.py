@@ -26,7 +26,7 @@ import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -143,6 +143,16 @@ def _programs(build: Path) -> list[str]:
     return sorted(name for name in commands if MAPPING in Path(name).read_bytes())
 
 
+def reports(root: Path, counts: Sequence[Path], programs: Sequence[str | Path], scratch: Path) -> Iterator[str]:
+    """What llvm-cov prints of each program, after the tests have written these counts."""
+    merged = scratch / "merged.profdata"
+    subprocess.run([root / LLVM / "llvm-profdata", "merge", "-sparse", *counts, "-o", merged], check=True)
+    for program in programs:
+        command = [root / LLVM / "llvm-cov", "show", "--show-mcdc", "--show-instantiations=false",
+                   f"-instr-profile={merged}", program]  # fmt: skip
+        yield subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
 def measured(root: Path, build: Path) -> list[Decision]:
     """The decisions of the firmware as the tests of a build executed them.
 
@@ -154,13 +164,8 @@ def measured(root: Path, build: Path) -> list[Decision]:
         raise SystemExit(f"no counts in {build / 'mcdc'}: tools/mcdc runs the tests that write them")
     found: dict[tuple[Path, Place, Place], Decision] = {}
     with tempfile.TemporaryDirectory() as scratch:
-        merged = f"{scratch}/merged.profdata"
-        subprocess.run([root / LLVM / "llvm-profdata", "merge", "-sparse", *counts, "-o", merged], check=True)
-        for program in _programs(build):
-            command = [root / LLVM / "llvm-cov", "show", "--show-mcdc", "--show-instantiations=false",
-                       f"-instr-profile={merged}", program]  # fmt: skip
-            shown = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-            parse(shown.stdout, root, found)
+        for text in reports(root, counts, _programs(build), Path(scratch)):
+            parse(text, root, found)
     return list(found.values())
 
 

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "dice.h"
 #include "hal/host/fluxtrue.h"
 #include "vecu/machine_data.h"
 #include "vehicle.h"
@@ -33,20 +34,16 @@ typedef struct {
 static vehicle_t vehicle;
 static compared_t compared; /* before the last millisecond: a fault clears it */
 static result_t result;
-static uint64_t state;
+static dice_t dice;
 
-/* xorshift64*, 0 ... 1 */
 static double chance(void)
 {
-    state ^= state >> 12;
-    state ^= state << 25;
-    state ^= state >> 27;
-    return (double)((state * 0x2545F4914F6CDD1DULL) >> 11) / 9007199254740992.0;
+    return dice_chance(&dice);
 }
 
 static double between(double low, double high)
 {
-    return low + (high - low) * chance();
+    return dice_between(&dice, low, high);
 }
 
 static void scale(const char *name, double low, double high)
@@ -161,7 +158,7 @@ static void note_faults(uint64_t drive, int ms)
 static void drive(uint64_t seed)
 {
     int ms = 0;
-    state = seed * 0x9E3779B97F4A7C15ULL + 1ULL;
+    dice = dice_start(seed);
     vehicle_start(&vehicle, 0.0);
     draw_plant();
     torque_max_Nm = (double)vehicle.ecu.motor.torque_max_Nm;

@@ -15,6 +15,7 @@
 #define MODE_TORQUE 0x40U
 #define CYCLE_MS 10U
 #define CAPACITANCE_F 500e-6
+#define COUNTS_MAX 10000.0
 #define RPM 0.10471975511965977
 #define READY_MS 1200
 #define RPM_PER_MS 20.0
@@ -33,9 +34,11 @@ void vehicle_set(vehicle_t *vehicle, const char *name, double value)
     check(sim_set(vehicle->sim, name, value) == SIM_OK, name);
 }
 
-static void put16(can_frame_t *frame, unsigned at, double value)
+/* In counts of the machine's bus, at most the largest that the DBC allows. */
+static void put_torque(vehicle_t *vehicle, can_frame_t *frame, unsigned at, double torque_Nm)
 {
-    const int count = (int)lrint(10.0 * value);
+    const double counts = torque_Nm / (double)vehicle->ecu.motor.bus_scales.torque_Nm;
+    const int count = (int)lrint(fmax(-COUNTS_MAX, fmin(COUNTS_MAX, counts)));
     frame->data[at] = (uint8_t)((unsigned)count & 0xFFU);
     frame->data[at + 1U] = (uint8_t)((unsigned)count >> 8 & 0xFFU);
 }
@@ -45,9 +48,9 @@ static void send(vehicle_t *vehicle)
     const vehicle_command_t *command = &vehicle->command;
     can_frame_t frame = {.id = COMMAND_ID, .length = 8};
     frame.data[1] = (uint8_t)(MODE_TORQUE | (command->enable ? ENABLE : 0U));
-    put16(&frame, 2, command->torque_Nm);
-    put16(&frame, 4, command->limit_drive_Nm);
-    put16(&frame, 6, command->limit_regen_Nm);
+    put_torque(vehicle, &frame, 2, command->torque_Nm);
+    put_torque(vehicle, &frame, 4, command->limit_drive_Nm);
+    put_torque(vehicle, &frame, 6, command->limit_regen_Nm);
     e2e_protect(COMMAND_DATA_ID, &vehicle->counter, &frame);
     check(can_host_put(&vehicle->ecu, &frame), "the queue is full");
 }

@@ -2,13 +2,14 @@
 """A test that leaves a hole: its mutants are found, and the list accepts only what is true."""
 
 import subprocess
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.mutate import cli, listed, score
+from fluxtrue_tools.mutate import cli, listed, page, score
 from fluxtrue_tools.mutate.changed import changed
 from fluxtrue_tools.mutate.operators import mutants
 from fluxtrue_tools.mutate.programs import Build
@@ -163,6 +164,36 @@ def test_a_test_that_fails_without_a_mutant_measures_nothing(project: Path, meas
             measure()
     finally:
         (project / "test.c").write_text(TEST, encoding="utf-8")
+
+
+def test_a_sample_of_each_part_does_not_depend_on_the_other_parts(project: Path) -> None:
+    every, _ = mutants(project, FILE)
+    known = listed.Listed(listed.List())
+    others = {"firmware/other/a.c": every, "firmware/part/hole.c": every}
+    together = cli._sample_each(others, 5, 3, known)
+    assert [len(chosen) for chosen in together.values()] == [5, 5]
+    assert together[FILE] == cli._sample_each({FILE: every}, 5, 3, known)[FILE]
+    assert together[FILE] != cli._sample_each({FILE: every}, 5, 4, known)[FILE]
+
+
+def test_an_estimate_weighs_each_part_by_its_errors() -> None:
+    """By hand: 80 and 25 errors, 8 of 8 and 4 of 5 found; variances 0.9 * 0.1 / 8 * 0.9 and 5/7 * 2/7 / 5 * 0.8."""
+    found = {"a": score.Score(Counter({KILLED: 8, EQUIVALENT: 2})),
+             "b": score.Score(Counter({KILLED: 3, TIMED_OUT: 1, SURVIVED: 1, score.DUPLICATE: 5})),
+             "none": score.Score(Counter({EQUIVALENT: 1}))}  # fmt: skip
+    estimate = score.estimate(found, {"a": 100, "b": 50, "none": 9})
+    assert estimate.share == pytest.approx(100 / 105)
+    assert estimate.half_width == pytest.approx(0.1723, abs=1e-4)
+    assert str(estimate) == "95.2% found, with a confidence of 95 % between 78.0% and 100.0%"
+
+
+def test_the_page_shows_each_sample_as_it_was_measured_first() -> None:
+    samples = [listed.Sample(seed=1, found={"a": (3, 4), "b": (5, 5)}), listed.Sample(seed=2, found={"a": (4, 4)})]
+    text = page.write({}, {}, Counter(), listed.Listed(listed.List(sample=samples)))
+    assert "| part | seed 1 | seed 2 |" in text
+    assert "| `a` | 3 of 4, 75.0 % | 4 of 4, 100.0 % |" in text
+    assert "| `b` | 5 of 5, 100.0 % |  |" in text
+    assert "| all of these | 8 of 9, 88.9 % | 4 of 4, 100.0 % |" in text
 
 
 def test_changed_files_are_those_that_differ_from_the_merge_base(tmp_path: Path) -> None:

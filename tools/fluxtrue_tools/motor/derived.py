@@ -249,9 +249,15 @@ def _answer_rate(config: MotorConfig, bases: Bases) -> float:
 
 
 def frozen_settle_s(config: MotorConfig) -> float:
-    """Until the voltage that moves the currents is no part of the mean any more: a share of e^-5 is left (MN-22)."""
+    """Until the voltage that moves the currents is no part of the mean any more: a share of e^-5 is left (MN-22).
+
+    Current control that answers slowly leaves a deviation while the tracked speed is behind that of a rotor which has
+    just stopped: the voltage that removes it follows both.
+    """
     answer_s = 5.0 / (TURNING_APPROACH * config.inverter.pwm_hz)
-    return max(FROZEN_SETTLE_S, answer_s) if config.is_turning else FROZEN_SETTLE_S
+    if not config.is_turning or answer_s <= FROZEN_SETTLE_S:
+        return FROZEN_SETTLE_S
+    return answer_s + 5.0 / _tracker(config)["tracker_bandwidth_rad_s"]
 
 
 def steps(seconds: float, step_s: float) -> int:

@@ -87,7 +87,26 @@ def _sample(found: dict[str, list[Mutant]], number: int | None, seed: int) -> di
     return {file: [one for one in of_file if one.name in names] for file, of_file in found.items()}
 
 
-def _report(campaign: Campaign, excluded: Counter[str], whole: bool) -> int:
+def _sample_each(found: dict[str, list[Mutant]], number: int, seed: int, listed: Listed) -> dict[str, list[Mutant]]:
+    """So many of each part: the same ones whichever other parts are measured."""
+    parts: dict[str, dict[str, list[Mutant]]] = {}
+    for file, of_file in found.items():
+        parts.setdefault(listed.part(file), {})[file] = of_file
+    chosen: dict[str, list[Mutant]] = {}
+    for part in parts.values():
+        chosen |= _sample(part, number, seed)
+    return chosen
+
+
+def _made(every: dict[str, list[Mutant]], listed: Listed) -> Counter[str]:
+    """Numbers of mutants by part."""
+    made: Counter[str] = Counter()
+    for file, found in every.items():
+        made[listed.part(file)] += len(found)
+    return made
+
+
+def _report(campaign: Campaign, every: dict[str, list[Mutant]], excluded: Counter[str], whole: bool) -> int:
     rows = campaign.classified()
     missed = [(result, outcome) for result, outcome in rows if outcome in (SURVIVED, UNTESTED)]
     for result, outcome in missed:
@@ -97,6 +116,8 @@ def _report(campaign: Campaign, excluded: Counter[str], whole: bool) -> int:
         click.echo(f"LISTED AS EQUIVALENT: {text}")
     found = score.scores(rows, campaign.listed)
     click.echo("\n".join(score.table(found)))
+    if not whole:
+        click.echo(f"estimate: {score.estimate(found, _made(every, campaign.listed))}")
     for reason, number in excluded.most_common():
         click.echo(f"left out: {number:6} {reason}")
     score.write_csv(campaign.folder / "mutants.csv", rows)
@@ -112,12 +133,11 @@ def _report(campaign: Campaign, excluded: Counter[str], whole: bool) -> int:
 
 def _write_page(campaign: Campaign, every: dict[str, list[Mutant]], excluded: Counter[str]) -> int:
     """What is known of all files."""
-    made: Counter[str] = Counter()
     for file, found in every.items():
-        made[campaign.listed.part(file)] += len(found)
         if campaign.kept(file).is_file():
             campaign.measure(file, found, found, only_known=True)
-    text = page.write(score.scores(campaign.classified(), campaign.listed), made, excluded, campaign.listed)
+    text = page.write(score.scores(campaign.classified(), campaign.listed), _made(every, campaign.listed), excluded,
+                      campaign.listed)  # fmt: skip
     (ROOT / page.PAGE).write_text(text, encoding="utf-8")
     return 0
 
@@ -135,8 +155,8 @@ def _print(every: dict[str, list[Mutant]]) -> int:
     return 0
 
 
-def _measure(campaign: Campaign, every: dict[str, list[Mutant]], sample: int | None, seed: int) -> None:
-    for file, chosen in _sample(every, sample, seed).items():
+def _measure(campaign: Campaign, every: dict[str, list[Mutant]], sampled: dict[str, list[Mutant]]) -> None:
+    for file, chosen in sampled.items():
         if chosen:
             results = campaign.measure(file, chosen, every[file])
             missed = sum(result.outcome in (SURVIVED, UNTESTED) for result in results)
@@ -150,6 +170,7 @@ def _measure(campaign: Campaign, every: dict[str, list[Mutant]], sample: int | N
               help="Only files that differ from --base; with --strict, if there are none, those parts.")  # fmt: skip
 @click.option("--base", type=kinds.Text(), default="main", show_default=True, help="The branch to compare with.")
 @click.option("--sample", type=click.IntRange(1, 1_000_000), help="So many mutants only, chosen at random.")
+@click.option("--each", is_flag=True, help="The --sample is that of each part, not of all together.")
 @click.option("--seed", type=click.IntRange(0, 2**31), default=1, show_default=True, help="Of the choice.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=1, show_default=True, help="Mutants at the same time.")
 @click.option("--fresh", is_flag=True, help="Measure again what is known.")
@@ -157,8 +178,8 @@ def _measure(campaign: Campaign, every: dict[str, list[Mutant]], sample: int | N
 @click.option("--list", "only_list", is_flag=True,
               help="Print the mutants, and check that the listed ones are among them.")  # fmt: skip
 @click.option("--page", "only_page", is_flag=True, help="Write docs/safety/mutation.md from what is known.")
-def mutate(names: tuple[str, ...], strict: bool, changes: bool, base: str, sample: int | None, seed: int, jobs: int,
-           fresh: bool, as_built: bool, only_list: bool, only_page: bool) -> int:  # fmt: skip
+def mutate(names: tuple[str, ...], strict: bool, changes: bool, base: str, sample: int | None, each: bool, seed: int,
+           jobs: int, fresh: bool, as_built: bool, only_list: bool, only_page: bool) -> int:  # fmt: skip
     """Make small errors in C sources of the firmware, one at a time, and see which of them no unit test notices.
 
     NAMES: sources, folders or globs; all of the firmware if there are none. Outcomes are kept below build/mutate by the
@@ -168,7 +189,7 @@ def mutate(names: tuple[str, ...], strict: bool, changes: bool, base: str, sampl
     if not changes:
         paths.refuse_given("without --changed", "base")
     if sample is None:
-        paths.refuse_given("without --sample", "seed")
+        paths.refuse_given("without --sample", "seed", "each")
     listed = lists.load(ROOT)
     files = _chosen(listed, names, strict, changes, base)
     build = None if only_list else Build(ROOT, build_folder(ROOT))
@@ -183,5 +204,6 @@ def mutate(names: tuple[str, ...], strict: bool, changes: bool, base: str, sampl
     campaign = Campaign(ROOT, build, listed, fresh, jobs)
     if only_page:
         return _write_page(campaign, every, excluded)
-    _measure(campaign, every, sample, seed)
-    return _report(campaign, excluded, whole=sample is None)
+    sampled = _sample_each(every, sample, seed, listed) if each and sample else _sample(every, sample, seed)
+    _measure(campaign, every, sampled)
+    return _report(campaign, every, excluded, whole=sample is None)

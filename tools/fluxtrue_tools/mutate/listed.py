@@ -39,11 +39,19 @@ class Entry(Strict):
     reason: ShortText
 
 
+class Sample(Strict):
+    """What a random sample has shown when it was measured first, before its survivors were evaluated."""
+
+    seed: int
+    found: dict[ShortText, tuple[int, int]]  # part: found errors, errors
+
+
 class List(Strict):
     """The file."""
 
     strict: list[Part] = Field(default_factory=list)
     equivalent: list[Entry] = Field(default_factory=list)
+    sample: list[Sample] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)

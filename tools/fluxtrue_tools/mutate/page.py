@@ -2,11 +2,11 @@
 """docs/safety/mutation.md: what has been measured, written from the kept outcomes."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from fluxtrue_tools.mutate.listed import Listed
+from fluxtrue_tools.mutate.listed import Listed, Sample
 from fluxtrue_tools.mutate.run import DUPLICATE, EQUIVALENT, INVALID, KILLED, SURVIVED, TIMED_OUT, UNTESTED
 from fluxtrue_tools.mutate.score import LISTED, Score
 
@@ -39,10 +39,30 @@ def write(scores: Mapping[str, Score], made: Mapping[str, int], excluded: Counte
     rest = sum(number for name, number in made.items() if name not in scores)
     text += [f"| all others | {rest} | 0 |{'  |' * (len(COLUMNS) + 1)}"] if rest else []
     text += ["", "*Found* is the share of those that are errors: not of equivalent, duplicate, listed and invalid ones",
-             "(which do not compile). What is not measured completely is a random sample. Bold: none may survive.", "",
-             "Left out of the sources, by places:", ""]  # fmt: skip
+             "(which do not compile). What is not measured completely is a random sample. Bold: none may survive.",
+             ""]  # fmt: skip
+    text += _samples(listed.content.sample) if listed.content.sample else []
+    text += ["Left out of the sources, by places:", ""]
     text += [f"- {number}: {reason}" for reason, number in excluded.most_common()]
     return "\n".join(text) + "\n"
+
+
+def _samples(samples: Sequence[Sample]) -> list[str]:
+    """Random samples as they were found, because those of the table above have been mended since."""
+    parts = list(dict.fromkeys(part for sample in samples for part in sample.found))
+    seeds = " | ".join(f"seed {sample.seed}" for sample in samples)
+    text = ["The survivors of the random samples have been evaluated: tests were written for gaps, and what is no",
+            "error is listed. Before that, the samples had shown, found of all errors without what is listed now:", "",
+            f"| part | {seeds} |", "|---" + "|---" * len(samples) + "|"]  # fmt: skip
+    for part in parts:
+        cells = [_share(*sample.found[part]) if part in sample.found else "" for sample in samples]
+        text.append(f"| `{part}` | {' | '.join(cells)} |")
+    totals = [_share(*map(sum, zip(*sample.found.values(), strict=True))) for sample in samples]
+    return [*text, f"| all of these | {' | '.join(totals)} |", ""]
+
+
+def _share(found: int, errors: int) -> str:
+    return f"{found} of {errors}, {100.0 * found / errors:.1f} %"
 
 
 def _row(name: str, score: Score, made: int, strict: bool) -> str:

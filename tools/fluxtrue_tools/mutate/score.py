@@ -2,8 +2,9 @@
 """Numbers of mutants by outcome, for each part of the firmware, and what is wrong with them."""
 
 import csv
+import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from fluxtrue_tools.mutate.run import (
     Result,
 )
 
+NORMAL_95 = 1.96  # standard deviations
 LISTED = "listed"  # survived, and the list says why that is no error
 COLUMNS = (KILLED, TIMED_OUT, LISTED, SURVIVED, UNTESTED, EQUIVALENT, DUPLICATE, INVALID)
 
@@ -57,6 +59,39 @@ def scores(results: Iterable[tuple[Result, str]], listed: Listed) -> dict[str, S
         score.numbers[outcome] += 1
         score.cpu_s += result.cpu_s
     return found
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Found share of all errors, from random samples of the parts, with a confidence of 95 %."""
+
+    share: float
+    half_width: float
+
+    def __str__(self) -> str:
+        low, high = max(0.0, self.share - self.half_width), min(1.0, self.share + self.half_width)
+        return f"{self.share:.1%} found, with a confidence of 95 % between {low:.1%} and {high:.1%}"
+
+
+def estimate(found: Mapping[str, Score], made: Mapping[str, int]) -> Estimate:
+    """Each part weighs what it has of errors: its mutants times the share of them that are errors in its sample.
+
+    The variance is that of a stratified sample without replacement. A part without a survivor is given one of two more
+    errors, because a sample in which all were found does not show that all are.
+    """
+    measured = {name: score for name, score in found.items() if score.errors}
+    weights = {name: made[name] * score.errors / sum(score.numbers.values()) for name, score in measured.items()}
+    whole = sum(weights.values())
+    if not whole:
+        return Estimate(1.0, 0.0)
+    share, variance = 0.0, 0.0
+    for name, score in measured.items():
+        weight, errors = weights[name] / whole, score.errors
+        assumed = (score.share * errors + 1.0) / (errors + 2.0)
+        rest = 1.0 - sum(score.numbers.values()) / made[name]
+        share += weight * score.share
+        variance += weight**2 * rest * assumed * (1.0 - assumed) / errors
+    return Estimate(share, NORMAL_95 * math.sqrt(variance))
 
 
 def table(found: dict[str, Score]) -> list[str]:
