@@ -3,7 +3,7 @@
 #define PLANT_PLANT_H
 /** The simulated traction drive: inverter, machine, mechanics, sensors; the reference of every closed-loop test.
  *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
- * Source   docs/theory/plant.md (PL-1) ... (PL-27)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-28)
  * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
  * Errors   plant_create() returns NULL for bad parameters or no memory
  * Context  simulation only, double precision; one instance per drive, no global state.
@@ -66,7 +66,8 @@ void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_ra
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 
-/** Sets the board's switches; at creation the battery is connected and the gates have their supply. */
+/** Sets the board's switches; at creation the battery is connected and the gates have their supply. Without effect while
+ * a state of the bridge is imposed. */
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 
 /** One PWM period; wanted: duties 0..1 (clamped, NaN counts as 0.5). Only the diodes conduct while switching is
