@@ -167,10 +167,10 @@ def test_the_drive_is_as_good_as_the_best_state_with_a_shorted_switch_and_a_wron
     assert "1 (100.00 %) as demanded, of these 1 beyond a limit and as good as physics allows" in done.stdout
     (run,) = pd.read_parquet(tmp_path / "out" / "results.parquet").to_dict("records")
     assert run["reference"] == "short circuit above"
-    assert run["outside_Nm"] <= 1.1 * run["reference_upper_Nm"]
+    assert run["after_Nm"] <= 1.1 * run["reference_upper_Nm"]
     assert run["reference_off_Nm"] > 2.0 * run["reference_upper_Nm"]
     done = faults(shorted(tmp_path / "wrong", OPEN, ";plant.imposed_bridge=1"), "--out", tmp_path / "out-wrong")
     assert done.returncode == 0, done.stdout + done.stderr
     (run,) = pd.read_parquet(tmp_path / "out-wrong" / "results.parquet").to_dict("records")
     assert (run["verdict"], run["reference"]) == (OPEN, "short circuit above")
-    assert run["outside_Nm"] > 2.0 * run["reference_upper_Nm"]
+    assert run["after_Nm"] > 2.0 * run["reference_upper_Nm"]

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 class Outcome:
     """What a safe state is judged by; also the limits of these."""
 
-    outside_Nm: float  # largest distance from the safe range, once the torque must be safe
+    torque_Nm: float  # largest, once the torque must be safe: a safe state has none, whatever is requested
     current_A: float
     vdc_V: float
 
@@ -88,12 +88,10 @@ def against_cm(trace: Trace, detect_ms: float) -> float:
     return float(CM_PER_RAD * max(0.0, -moved.min(initial=0.0)))
 
 
-def largest(trace: Trace, distance: Array, from_ms: float, safe_ms: float) -> Outcome:
-    """Current and dc voltage after a time, torque outside its safe range after another one."""
+def outcome(trace: Trace, from_ms: float, safe_ms: float) -> Outcome:
+    """Current and dc voltage after a time, torque after another one."""
     time = trace.time_ms
+    torque = np.abs(mean(trace["truth.torque_shaft_mean_Nm"], trace.period_s))[time > safe_ms]
     current = np.hypot(trace["truth.i_d_A"], trace["truth.i_q_A"])[time > from_ms]
-    return Outcome(
-        float(distance[time > safe_ms].max(initial=0.0)),
-        float(current.max(initial=0.0)),
-        float(trace["truth.vdc_V"][time > from_ms].max(initial=0.0)),
-    )
+    voltage = trace["truth.vdc_V"][time > from_ms]
+    return Outcome(float(torque.max(initial=0.0)), float(current.max(initial=0.0)), float(voltage.max(initial=0.0)))

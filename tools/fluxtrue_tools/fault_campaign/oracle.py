@@ -13,8 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from fluxtrue_tools.fault_campaign.fmea import Row
-from fluxtrue_tools.fault_campaign.measure import Outcome, largest, outside
+from fluxtrue_tools.fault_campaign.measure import Outcome, outcome
 from fluxtrue_tools.fault_campaign.run_point import CHANNELS, Trace
 
 OFF, LOWER, UPPER = "switching disabled", "short circuit below", "short circuit above"
@@ -48,7 +47,7 @@ class Reference:
     def _share(self, state: str) -> float:
         """Of the limit that is exceeded most."""
         one = self.states[state]
-        return max(one.outside_Nm / self.limits.outside_Nm, one.current_A / self.limits.current_A)
+        return max(one.torque_Nm / self.limits.torque_Nm, one.current_A / self.limits.current_A)
 
     @property
     def best(self) -> str:
@@ -59,15 +58,15 @@ class Reference:
     def allows(self, run: Outcome) -> bool:
         """Whether torque and current are within their limits, or at most the margin above those of the best state."""
         best, limits = self.states[self.best], self.limits
-        torque_Nm = max(limits.outside_Nm, MARGIN * best.outside_Nm)
+        torque_Nm = max(limits.torque_Nm, MARGIN * best.torque_Nm)
         current_A = max(limits.current_A, MARGIN * best.current_A)
-        return run.outside_Nm <= torque_Nm and run.current_A <= current_A
+        return run.torque_Nm <= torque_Nm and run.current_A <= current_A
 
     @property
     def text(self) -> str:
         """The reference in words."""
         best = self.states[self.best]
-        return f"best: {self.best} at {self.entry_ms:.1f} ms, {best.outside_Nm:.1f} N·m, {best.current_A:.0f} A"
+        return f"best: {self.best} at {self.entry_ms:.1f} ms, {best.torque_Nm:.1f} N·m, {best.current_A:.0f} A"
 
     @property
     def cells(self) -> dict[str, float | str]:
@@ -75,7 +74,7 @@ class Reference:
         found: dict[str, float | str] = NO_CELLS | {"reference": self.best, "reference_ms": self.entry_ms}
         for state, one in self.states.items():
             name = f"reference_{SHORT[state]}"
-            found |= {f"{name}_Nm": one.outside_Nm, f"{name}_A": one.current_A, f"{name}_V": one.vdc_V}
+            found |= {f"{name}_Nm": one.torque_Nm, f"{name}_A": one.current_A, f"{name}_V": one.vdc_V}
         return found
 
 
@@ -86,11 +85,7 @@ def effect_ms(trace: Trace, healthy: Trace) -> float:
     return max(0.0, float(trace.time_ms[differs.argmax()]) - 1e3 * trace.period_s) if differs.any() else math.inf
 
 
-def reference(row: Row, entry_ms: float, safe_ms: float, limits: Outcome, rated_Nm: float,
-              imposed: Callable[[int, float], Trace]) -> Reference:  # fmt: skip
+def reference(entry_ms: float, safe_ms: float, limits: Outcome, imposed: Callable[[int, float], Trace]) -> Reference:
     """The three states from a time on."""
-    states = {}
-    for state, bridge in BRIDGE.items():
-        trace = imposed(bridge, entry_ms)
-        states[state] = largest(trace, outside(trace, row, rated_Nm), entry_ms, safe_ms)
+    states = {state: outcome(imposed(bridge, entry_ms), entry_ms, safe_ms) for state, bridge in BRIDGE.items()}
     return Reference(entry_ms, states, limits)

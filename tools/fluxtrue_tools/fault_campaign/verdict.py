@@ -34,7 +34,7 @@ class Verdict:
     detect_ms: float
     harm_ms: float  # end of the last time in which the torque was not safe
     beyond_Nm: float  # largest distance from the safe range with its tolerance
-    outside_Nm: float  # largest distance from the safe range once the torque must be safe
+    after_Nm: float  # largest torque once it must be safe
     against_cm: float  # largest movement of the vehicle against the request until the fault
     current_A: float
     vdc_V: float
@@ -59,21 +59,21 @@ class _Run:
     """One run while it is evaluated."""
 
     def __init__(self, row: Row, bounds: Bounded, rated_Nm: float, trace: Trace) -> None:
-        self.row, self.rated_Nm, self.trace = row, rated_Nm, trace
+        self.row, self.trace = row, trace
         tolerance = max(TOLERANCE_NM, TOLERANCE_SHARE * rated_Nm) if math.isnan(row.torque_Nm) else row.torque_Nm
         self.limits = Outcome(tolerance, row.current_share * bounds.current_A, row.vdc_share * bounds.vdc_V)
         name, detect_ms = measure.first_fault(trace)
-        self.distance = measure.outside(trace, row, rated_Nm)
-        self.departs = measure.departs(trace, row, detect_ms, tolerance, self.distance)
+        distance = measure.outside(trace, row, rated_Nm)
+        self.departs = measure.departs(trace, row, detect_ms, tolerance, distance)
         self.safe_ms = row.torque_ms if math.isnan(row.against_cm) else detect_ms + MEAN_MS
-        whole = measure.largest(trace, self.distance, 0.0, self.safe_ms)
-        hits = np.flatnonzero(self.distance > tolerance)
+        whole = measure.outcome(trace, 0.0, self.safe_ms)
+        hits = np.flatnonzero(distance > tolerance)
         self.v: dict[str, Any] = {
             "first_fault": name,
             "detect_ms": detect_ms,
             "harm_ms": float(trace.time_ms[hits[-1]]) if hits.size else 0.0,
-            "beyond_Nm": max(0.0, float(self.distance.max()) - tolerance),
-            "outside_Nm": whole.outside_Nm,
+            "beyond_Nm": max(0.0, float(distance.max()) - tolerance),
+            "after_Nm": whole.torque_Nm,
             "against_cm": measure.against_cm(trace, detect_ms),
             "current_A": whole.current_A,
             "vdc_V": whole.vdc_V,
@@ -114,10 +114,10 @@ class _Run:
         if not set(found) <= {TORQUE, CURRENT} or not self.v["first_fault"]:
             return OPEN, cells, why
         entry_ms, safe_ms = min(self.v["detect_ms"], self.row.detect_ms + effect_ms), self.safe_ms + effect_ms
-        best = oracle.reference(self.row, entry_ms, safe_ms, self.limits, self.rated_Nm, reruns.imposed)
-        run = measure.largest(self.trace, self.distance, 0.0, safe_ms)
+        best = oracle.reference(entry_ms, safe_ms, self.limits, reruns.imposed)
+        run = measure.outcome(self.trace, 0.0, safe_ms)
         cells = best.cells | ({"effect_ms": effect_ms} if effect_ms > 0.0 else {})
-        return PHYSICS if best.allows(run) else OPEN, cells, f"{why}; safe state {run.outside_Nm:.1f} N·m, {run.current_A:.0f} A, {best.text}"
+        return PHYSICS if best.allows(run) else OPEN, cells, f"{why}; safe state {run.torque_Nm:.1f} N·m, {run.current_A:.0f} A, {best.text}"
 
 
 def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Trace,
