@@ -81,7 +81,8 @@ typedef enum {
 
 typedef struct {
     short_circuit_side_t side;
-    bool holds; /* as read back */
+    bool holds;    /* as read back */
+    uint8_t waits; /* periods with switching disabled that come first, (SS-21) */
 } short_circuit_t;
 
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */

@@ -9,11 +9,20 @@
  *   lower ones are on. The request acts only while the lower switches are used and no side has been ended; the upper
  *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on: that is no failure of a side.
- * Source   docs/theory/safe-state.md (SS-11), (SS-20)
+ *   After a fault the currents may be any; the short circuit would turn them about its own. For one step of the task
+ *   switching is therefore disabled first, and the dc link ends them. Not after an over-voltage, which their energy
+ *   would raise, after a gate fault, nor after what leaves control intact, which has moved the currents before.
+ * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
 void short_circuit_apply(fast_state_t *fast, bool upper);
+
+/** The bridge runs: what a short circuit after the next fault begins with. */
+void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
+
+/** Whether switching is disabled first in this period, the bridge having run before; called once in each. */
+bool short_circuit_waits(fast_state_t *fast);
 
 /** No short circuit any more: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);

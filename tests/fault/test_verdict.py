@@ -206,7 +206,9 @@ def test_less_torque_is_no_excuse_for_a_voltage_that_destroys_the_inverter() -> 
     """Switching disabled would be best, but leaves 600 V of 450: the short circuit with 48 N·m is the reference."""
     destroyed = braking(15.0, volts=600.0)
     assert compared(braking(50.0), destroyed, braking(48.0), braking(90.0))["reference"] == LOWER
-    assert compared(braking(50.0), destroyed, braking(48.0, volts=500.0), braking(90.0, volts=500.0))["reference"] == OFF
+    assert (
+        compared(braking(50.0), destroyed, braking(48.0, volts=500.0), braking(90.0, volts=500.0))["reference"] == OFF
+    )
 
 
 @pytest.mark.parametrize(

@@ -318,8 +318,7 @@ void test_an_imposed_state_of_the_bridge_is_that_of_a_controller_that_wants_it(v
             TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(n, other, gates_on) - wanted[n]));
         }
     }
-    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0,
-                              cabs(without_supply(PLANT_BRIDGE_OBEYS, other, 1) - wanted[PLANT_BRIDGE_OFF]));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(PLANT_BRIDGE_OBEYS, other, 1) - wanted[PLANT_BRIDGE_OFF]));
 }
 
 /* The board's switches stay as they were when the state was imposed. */

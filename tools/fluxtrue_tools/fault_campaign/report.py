@@ -15,7 +15,6 @@ from fluxtrue_tools.fault_campaign.oracle import MARGIN
 from fluxtrue_tools.fault_campaign.plan import Plan
 from fluxtrue_tools.fault_campaign.score import Score, Summary
 
-
 PLAIN: Final = {MET: "met", PHYSICS: "as good as physics allows", OPEN: "not met"}
 
 
@@ -78,6 +77,11 @@ def html(plan: Plan, scores: list[Score], summary: Summary, command: str) -> str
     for s in scores:
         elements.setdefault(s.row.element, []).append(s)
     return environment.from_string(template).render(
-        plan=plan, summary=summary, elements=elements, opened=[s for s in scores if not s.is_met],
-        physics=[s for s in scores if s.by_physics], margin=100.0 * (MARGIN - 1.0), command=command
+        plan=plan,
+        summary=summary,
+        elements=elements,
+        opened=[s for s in scores if not s.is_met],
+        physics=[s for s in scores if s.by_physics],
+        margin=100.0 * (MARGIN - 1.0),
+        command=command,
     )

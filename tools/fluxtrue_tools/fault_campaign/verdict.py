@@ -117,7 +117,11 @@ class _Run:
         best = oracle.reference(entry_ms, safe_ms, self.limits, reruns.imposed)
         run = measure.outcome(self.trace, 0.0, safe_ms)
         cells = best.cells | ({"effect_ms": effect_ms} if effect_ms > 0.0 else {})
-        return PHYSICS if best.allows(run) else OPEN, cells, f"{why}; safe state {run.torque_Nm:.1f} N·m, {run.current_A:.0f} A, {best.text}"
+        return (
+            PHYSICS if best.allows(run) else OPEN,
+            cells,
+            f"{why}; safe state {run.torque_Nm:.1f} N·m, {run.current_A:.0f} A, {best.text}",
+        )
 
 
 def evaluate(row: Row, bounds: Bounded, rated_Nm: float, point: Point, trace: Trace,
