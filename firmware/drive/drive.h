@@ -81,7 +81,8 @@ typedef enum {
 
 typedef struct {
     short_circuit_side_t side;
-    bool holds; /* the short circuit is on, as read back */
+    bool holds;    /* the short circuit is on, as read back */
+    uint8_t waits; /* periods with switching disabled that come before it, (SS-21) */
 } short_circuit_t;
 
 /** Written by the fast ISR alone (drive_raise_fault() is called from its priority). */

@@ -42,7 +42,8 @@ static void reset_control(drive_t *drive, sample_t *sample)
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
 static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command)
 {
-    if (short_circuit_is_needed(drive->fast.faults, command->safe)) {
+    const bool waits = short_circuit_waits(&drive->fast);
+    if (!waits && short_circuit_is_needed(drive->fast.faults, command->safe)) {
         short_circuit_apply(&drive->fast, command->upper);
     } else {
         short_circuit_end(&drive->fast);
@@ -208,7 +209,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
             control_checked(drive, sample, &now, &command->target);
         }
         hal_pwm_enable(true);
-        fast->short_circuit.holds = false;
+        short_circuit_prepare(fast, drive->period.periods_per_step);
     } else {
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);

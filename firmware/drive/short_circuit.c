@@ -2,7 +2,10 @@
 #include "drive/short_circuit.h"
 
 #include "hal/pwm.h"
+#include "types/faults.h"
 
+#define AT_ONCE (FAULT_OVER_VOLTAGE | FAULT_GATE)
+#define MOVED_FIRST (FAULT_TEMPERATURE | FAULT_OVER_SPEED) /* drive/switch_off.h */
 #define DUTY_MIDDLE 16384U
 #define DUTY_UPPER 32768U
 
@@ -43,9 +46,27 @@ void short_circuit_end(fast_state_t *fast)
     hal_pwm_write((duty_t){DUTY_MIDDLE, DUTY_MIDDLE, DUTY_MIDDLE});
 }
 
+void short_circuit_prepare(fast_state_t *fast, uint32_t periods)
+{
+    fast->short_circuit.holds = false;
+    fast->short_circuit.waits = (uint8_t)periods;
+}
+
+bool short_circuit_waits(fast_state_t *fast)
+{
+    const uint32_t faults = fast->faults;
+    const bool at_once = (faults & AT_ONCE) != 0U || (faults & ~(uint32_t)MOVED_FIRST) == 0U;
+    if (at_once || fast->short_circuit.waits == 0U) {
+        fast->short_circuit.waits = 0;
+        return false;
+    }
+    fast->short_circuit.waits--;
+    return true;
+}
+
 void short_circuit_reset(fast_state_t *fast)
 {
-    fast->short_circuit = (short_circuit_t){SHORT_CIRCUIT_LOWER, false};
+    fast->short_circuit = (short_circuit_t){.side = SHORT_CIRCUIT_LOWER};
 }
 
 bool short_circuit_is_needed(uint32_t faults, safe_t safe)

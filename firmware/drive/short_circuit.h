@@ -9,11 +9,21 @@
  *   lower ones are on. The request acts only while the lower switches are used and no side has been ended; the upper
  *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
- * Source   docs/theory/safe-state.md (SS-11), (SS-20)
+ *   After a fault the currents may have any value, and the short circuit would turn their flux about the origin. For
+ *   one step of the task switching is therefore disabled first, and the dc link opposes the currents. This step is left
+ *   out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults that
+ *   leave control intact: then the currents have been moved before.
+ * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 
 void short_circuit_apply(fast_state_t *fast, bool upper);
+
+/** While the bridge runs: after the next fault switching is disabled for so many periods before a short circuit. */
+void short_circuit_prepare(fast_state_t *fast, uint32_t periods);
+
+/** Whether switching stays disabled in this period, before the short circuit; called once per period. */
+bool short_circuit_waits(fast_state_t *fast);
 
 /** Ends the short circuit: switching is disabled, and the duties are one half. */
 void short_circuit_end(fast_state_t *fast);

@@ -9,7 +9,8 @@ import pytest
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea
-from fluxtrue_tools.fault_campaign.fmea import COLUMNS, Point, Row
+from fluxtrue_tools.fault_campaign.fmea import COLUMNS, MET, OPEN, PHYSICS, Point, Row
+from fluxtrue_tools.fault_campaign.oracle import BRIDGE, LOWER, OFF, UPPER, Reruns
 from fluxtrue_tools.fault_campaign.run_point import BEFORE_MS, CHANNELS, Trace
 from fluxtrue_tools.fault_campaign.spec import Bounded
 from fluxtrue_tools.fault_campaign.verdict import evaluate
@@ -140,16 +141,142 @@ def test_a_lost_command_must_end_in_no_torque_without_a_fault() -> None:
     assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.full(t.shape, 60.0)))["met"]
 
 
+def braking(torque_Nm: float, amperes: float = 200.0, volts: float = 350.0, **more: Any) -> Trace:
+    """60 N·m, then a safe state that brakes for good."""
+    made = {"torque": lambda t: np.where(t < 5.0, 60.0, -torque_Nm), "amperes": amperes, "volts": volts} | more
+    return trace(**made)
+
+
+class States:
+    """Stands for the runs with an imposed state; remembers when each was entered."""
+
+    def __init__(self, off: Trace, lower: Trace, upper: Trace, healthy: Trace | None = None) -> None:
+        self.traces = {BRIDGE[OFF]: off, BRIDGE[LOWER]: lower, BRIDGE[UPPER]: upper}
+        self.without_fault = healthy
+        self.entered: list[float] = []
+
+    def imposed(self, bridge: int, at_ms: float) -> Trace:
+        self.entered.append(at_ms)
+        return self.traces[bridge]
+
+    def healthy(self) -> Trace:
+        return self.without_fault or trace(fault_ms=math.inf, torque=lambda t: np.full(t.shape, 60.5))
+
+    @property
+    def reruns(self) -> Reruns:
+        return Reruns(self.imposed, self.healthy)
+
+
+def compared(run: Trace, off: Trace, lower: Trace, upper: Trace, **cells: str) -> dict[str, Any]:
+    return evaluate(row(**cells), BOUNDS, 132.0, POINT, run, States(off, lower, upper).reruns)
+
+
+def test_a_run_as_good_as_the_best_safe_state_is_met_and_says_so() -> None:
+    """50 N·m brake where 10 are allowed and the best state brakes with 48."""
+    found = compared(braking(50.0), braking(120.0), braking(48.0), braking(90.0))
+    assert (found["verdict"], found["met"], found["reference"]) == (PHYSICS, True, LOWER)
+    assert "torque 40.0 N·m beyond its safe range" in found["why"]
+    assert "safe state 50.0 N·m, 200 A, best: short circuit below at 5.0 ms, 48.0 N·m, 200 A" in found["why"]
+    assert (found["reference_off_Nm"], found["reference_upper_Nm"]) == (120.0, 90.0)
+
+
+def test_a_wrong_reaction_is_not_met_although_no_state_is_within_the_limits() -> None:
+    """The drive disables switching where the short circuit is best."""
+    found = compared(braking(120.0), braking(120.0), braking(48.0), braking(90.0))
+    assert (found["verdict"], found["met"]) == (OPEN, False)
+
+
+@pytest.mark.parametrize(("torque_Nm", "verdict"), [(10.0, MET), (52.7, PHYSICS), (52.9, OPEN)])
+def test_the_torque_may_exceed_that_of_the_best_state_by_a_tenth(torque_Nm: float, verdict: str) -> None:
+    found = compared(braking(torque_Nm), braking(120.0), braking(48.0), braking(90.0))
+    assert found["verdict"] == verdict
+
+
+@pytest.mark.parametrize(("amperes", "verdict"), [(500.0, MET), (659.0, PHYSICS), (661.0, OPEN)])
+def test_the_current_may_exceed_that_of_the_best_state_by_a_tenth(amperes: float, verdict: str) -> None:
+    found = compared(braking(0.0, amperes), braking(120.0), braking(0.0, 600.0), braking(0.0, 700.0))
+    assert found["verdict"] == verdict
+
+
+def test_where_a_state_holds_the_limits_with_the_margin_the_run_must_hold_them() -> None:
+    assert compared(braking(10.5), braking(9.0), braking(48.0), braking(48.0))["verdict"] == OPEN
+
+
+def test_less_torque_is_no_excuse_for_a_voltage_that_destroys_the_inverter() -> None:
+    """Switching disabled would be best, but leaves 600 V of 450: the short circuit with 48 N·m is the reference."""
+    destroyed = braking(15.0, volts=600.0)
+    assert compared(braking(50.0), destroyed, braking(48.0), braking(90.0))["reference"] == LOWER
+    assert (
+        compared(braking(50.0), destroyed, braking(48.0, volts=500.0), braking(90.0, volts=500.0))["reference"] == OFF
+    )
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        braking(50.0, fault_ms=12.0),
+        braking(50.0, fault_ms=math.inf),
+        braking(50.0, volts=451.0),
+        trace(torque=lambda t: np.where(t < 150, 0.0, np.nan), amperes=501.0),
+    ],
+)
+def test_a_late_fault_or_too_much_voltage_is_never_excused(run: Trace) -> None:
+    states = States(*[braking(100.0, 900.0)] * 3)
+    found = evaluate(row(), BOUNDS, 132.0, POINT, run, states.reruns)
+    assert (found["verdict"], found["reference"], states.entered) == (OPEN, "", [])
+
+
+def test_a_healthy_drive_that_must_keep_its_torque_is_never_excused() -> None:
+    steady = trace(fault_ms=math.inf, state=RUN, torque=lambda t: np.where(t < 0, 60.0, 80.0))
+    line = {"reaction": "keep", "expected": "", "torque_Nm": "3", "torque_ms": "0"}
+    assert compared(steady, *[braking(100.0, 900.0)] * 3, **line)["verdict"] == OPEN
+
+
+def test_the_states_begin_with_the_drives_reaction_at_the_latest_when_the_line_demands_it() -> None:
+    states = States(*[braking(100.0, 900.0)] * 3)
+    evaluate(row(), BOUNDS, 132.0, POINT, braking(50.0), states.reruns)
+    assert states.entered == [pytest.approx(5.0, abs=0.2)] * 3
+    late = braking(0.0, 600.0, fault_ms=20.0, torque=lambda t: np.where(t < 20.0, 60.0, 0.0))
+    states.entered.clear()
+    evaluate(row(reaction="bounded"), BOUNDS, 132.0, POINT, late, states.reruns)
+    assert states.entered == [10.0] * 3
+
+
+def late(effect_ms: float, **cells: str) -> dict[str, Any]:
+    """A fault after 100 ms; until its effect the run is the healthy one."""
+    healthy = trace(fault_ms=math.inf, torque=lambda t: 60.0 + np.sin(t))
+    run = trace(100.0, lambda t: np.where(t < 100.0, 60.0 + np.sin(t) - 30.0 * (t > effect_ms), 0.0))
+    return evaluate(row(**cells), BOUNDS, 132.0, POINT, run, States(*[run] * 3, healthy).reruns)
+
+
+def test_a_fault_without_effect_cannot_be_found_before_it_has_one() -> None:
+    """Demanded within 10 ms."""
+    found = late(92.0)
+    assert (found["verdict"], found["effect_ms"]) == (PHYSICS, pytest.approx(92.0, abs=0.15))
+    assert "no effect before 92.0 ms" in found["why"]
+    assert late(88.0)["verdict"] == OPEN
+    assert late(0.0)["verdict"] == OPEN
+    assert late(math.inf, expected="over_speed")["verdict"] == OPEN
+
+
+def test_too_little_torque_is_allowed_where_the_line_says_so_and_too_much_is_not() -> None:
+    line = row(reaction="less", expected="any", detect_ms="", torque_ms="")
+    assert verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 20.0)))["met"]
+    assert verdict(line, trace())["met"]
+    assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, 71.0)))["met"]
+    assert not verdict(line, trace(fault_ms=math.inf, torque=lambda t: np.where(t < 0, 60.0, -11.0)))["met"]
+
+
 @pytest.mark.parametrize(
     ("cells", "said"),
     [
         ({"id": "A line"}, "id = 'A line', allowed: lower-case words joined by -"),
-        ({"reaction": "hope"}, "reaction = 'hope', allowed: safe_state, bounded, keep, ramp"),
+        ({"reaction": "hope"}, "reaction = 'hope', allowed: safe_state, bounded, less, keep, ramp"),
         ({"expected": ""}, "expected = '', allowed: names of faults"),
         ({"injection": "plant.vdc_gain"}, "injection = 'plant.vdc_gain', allowed: name=value"),
         ({"points": "rpm=5"}, "points = 'rpm=5', allowed: conditions such as"),
         ({"detect_ms": "-1"}, "detect_ms = '-1', allowed: a number from 0"),
-        ({"status": "fine"}, "status = 'fine', allowed: met, open"),
+        ({"status": "fine"}, "status = 'fine', allowed: met, physics, open"),
     ],
 )
 def test_a_bad_cell_is_named_with_its_line(cells: dict[str, str], said: str) -> None:

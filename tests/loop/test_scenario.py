@@ -24,6 +24,8 @@ ELSEWHERE = {  # plant fields that a scenario gives in another section, or that 
     # connected.
     "dc_link_F", "precharge_s", "discharge_s", "dc_load_ohm", "avalanche_V", "vdc_start_V", "precharge_open",
     "discharge_open", "contactor_open", "hardware_safe_V",
+    # A state of the bridge that no drive chose: the reference of the fault campaign.
+    "imposed_bridge",
 }  # fmt: skip
 
 

@@ -235,8 +235,22 @@ static void mean_truth(plant_truth_t *t, const energy_t *sum, double period_s)
 
 void plant_switch(plant_t *plant, const plant_switches_t *on)
 {
+    if (plant->params.imposed_bridge != PLANT_BRIDGE_OBEYS) {
+        return; /* contactor and supply stay as they are, too */
+    }
     plant->on = *on;
     plant->truth.gate_supply = on->gate_supply ? 1.0 : 0.0;
+}
+
+/* What the gates of the period are to do: what the controller wants, or the imposed state (PL-28). */
+static int gates_of(const plant_t *plant, int gates_on, double duty[3])
+{
+    const int imposed = plant->params.imposed_bridge;
+    if (imposed == PLANT_BRIDGE_OBEYS) {
+        return gates_on && plant->on.gate_supply;
+    }
+    duty[0] = duty[1] = duty[2] = imposed == PLANT_BRIDGE_UPPER_ON ? 1.0 : 0.0;
+    return imposed != PLANT_BRIDGE_OFF;
 }
 
 /* One switch of a leg is shorted and the other is switched on (PL-25). If the pulse lasts longer than desaturation_s,
@@ -268,9 +282,9 @@ void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
     const double period_s = 1.0 / p->pwm_hz;
     const int n = p->substeps < 10 ? 10 : p->substeps;
     const double middle_s = plant->truth.time_s + 0.5 * period_s;
-    const double swapped[3] = {wanted[0], wanted[2], wanted[1]};
-    const double *duty = p->phases_swapped ? swapped : wanted;
-    bridge_t bridge = {duty, gates_on && plant->on.gate_supply, vdc_at(p, middle_s), 0.0};
+    const int b = p->phases_swapped ? 2 : 1;
+    double duty[3] = {wanted[0], wanted[b], wanted[3 - b]};
+    bridge_t bridge = {duty, gates_of(plant, gates_on, duty), vdc_at(p, middle_s), 0.0};
     bridge.short_circuit_A = short_circuit(plant, &bridge);
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};

@@ -132,6 +132,7 @@ static const char *bad_electronics(const plant_params_t *p)
         {"leg_knee_A", not_below_zero(p->leg_knee_A)},
         {"short_circuit_A", above_zero(p->short_circuit_A)},
         {"desaturation_s", not_below_zero(p->desaturation_s)},
+        {"imposed_bridge", p->imposed_bridge >= PLANT_BRIDGE_OBEYS && p->imposed_bridge <= PLANT_BRIDGE_UPPER_ON},
         {"substeps", p->substeps >= 10 && p->substeps <= 100000},
         {"current_full_scale_A", above_zero(p->current_full_scale_A)},
         {"adc_bits", p->adc_bits >= 1 && p->adc_bits <= 24},

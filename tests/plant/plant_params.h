@@ -8,6 +8,9 @@
  * Context  simulation only */
 #include <stdint.h>
 
+/* What the gates do: imposed_bridge. */
+enum { PLANT_BRIDGE_OBEYS = 0, PLANT_BRIDGE_OFF = 1, PLANT_BRIDGE_LOWER_ON = 2, PLANT_BRIDGE_UPPER_ON = 3 };
+
 typedef struct {
     /* machine */
     double pole_pairs;
@@ -41,6 +44,7 @@ typedef struct {
     double short_circuit_A; /* current of a leg with one switch shorted and the other switched on */
     double desaturation_s;  /* time until the gate drivers block and report this current */
     int desaturation_open;  /* the gate drivers neither block nor report it */
+    int imposed_bridge;     /* PLANT_BRIDGE_..: whatever the controller wants, (PL-28) */
     /* sensors */
     double current_full_scale_A; /* the converter spans -full scale ... +full scale */
     int adc_bits;

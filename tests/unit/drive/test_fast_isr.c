@@ -129,16 +129,54 @@ static void write_command(safe_t safe, uint32_t faults)
     command_box_write(&drive.commands, command);
 }
 
-/* The duties of the short circuit are written before switching is enabled. */
-void test_a_fault_shorts_the_phases_in_the_same_period_if_the_task_has_decided_so(void)
+/* Switching is disabled in the period of the fault, and for one step; then the duties of the short circuit are written
+ * before switching is enabled. */
+void test_a_fault_shorts_the_phases_a_step_later_if_the_task_has_decided_so(void)
 {
     seam_run();
     seam_periods(3);
     write_command(SAFE_SHORT_CIRCUIT, 0);
     seam_current(310.0, -155.0, -155.0);
+    for (uint32_t k = 0; k < motor.bases.periods_per_step; k++) {
+        write_command(SAFE_SHORT_CIRCUIT, 0);
+        seam_period();
+        expect_shorted(false);
+        TEST_ASSERT_FALSE(seam.gates);
+    }
+    write_command(SAFE_SHORT_CIRCUIT, 0);
     seam_period();
     TEST_ASSERT_EQUAL_STRING("arw+", seam.log);
     expect_shorted(true);
+}
+
+/* An over-voltage or a gate fault cannot wait, and over-temperature and over-speed have moved the currents. Nothing
+ * waits a second time, and nothing without a bridge that has run. */
+void test_only_a_fault_that_leaves_unknown_currents_waits_and_only_once(void)
+{
+    static const struct {
+        uint32_t faults;
+        bool waits;
+    } expected[] = {
+        {FAULT_OVER_CURRENT, true},
+        {FAULT_OVER_CURRENT | FAULT_TEMPERATURE, true},
+        {FAULT_OVER_CURRENT | FAULT_OVER_VOLTAGE, false},
+        {FAULT_TORQUE | FAULT_GATE, false},
+        {FAULT_TEMPERATURE | FAULT_OVER_SPEED, false},
+        {0, false},
+    };
+    for (unsigned n = 0; n < sizeof expected / sizeof expected[0]; n++) {
+        fast_state_t fast = {.faults = expected[n].faults};
+        TEST_ASSERT_FALSE(short_circuit_waits(&fast));
+        short_circuit_prepare(&fast, 2);
+        TEST_ASSERT_EQUAL(expected[n].waits, short_circuit_waits(&fast));
+        TEST_ASSERT_EQUAL(expected[n].waits, short_circuit_waits(&fast));
+        TEST_ASSERT_FALSE(short_circuit_waits(&fast));
+    }
+    fast_state_t later = {.faults = FAULT_OVER_CURRENT};
+    short_circuit_prepare(&later, 2);
+    TEST_ASSERT_TRUE(short_circuit_waits(&later));
+    later.faults |= FAULT_OVER_VOLTAGE;
+    TEST_ASSERT_FALSE(short_circuit_waits(&later));
 }
 
 static void want_upper_switches(bool upper)
@@ -154,7 +192,7 @@ void test_the_task_may_request_the_short_circuit_by_the_upper_switches(void)
 {
     seam_run();
     seam_periods(3);
-    write_command(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
+    write_command(SAFE_SHORT_CIRCUIT, FAULT_TEMPERATURE);
     seam_period();
     expect_shorted(true);
     want_upper_switches(true);
@@ -184,7 +222,7 @@ void test_a_short_circuit_that_the_gate_drivers_block_is_made_on_the_other_side(
 {
     seam_run();
     seam_periods(3);
-    write_command(SAFE_SHORT_CIRCUIT, FAULT_TORQUE);
+    write_command(SAFE_SHORT_CIRCUIT, FAULT_TEMPERATURE);
     seam_period();
     expect_shorted(true);
     TEST_ASSERT_TRUE(drive_is_shorted(&drive));

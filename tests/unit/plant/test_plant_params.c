@@ -92,6 +92,8 @@ void test_impossible_electronics_are_refused_by_name(void)
     REFUSE(leg_knee_A, -0.1);
     REFUSE(short_circuit_A, 0.0);
     REFUSE(desaturation_s, -1e-6);
+    REFUSE(imposed_bridge, -1);
+    REFUSE(imposed_bridge, 4);
     REFUSE(substeps, 9);
     REFUSE(substeps, 100001);
     REFUSE(current_full_scale_A, 0.0);

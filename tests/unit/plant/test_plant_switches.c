@@ -282,3 +282,61 @@ void test_a_broken_lead_has_no_current_even_with_a_shorted_switch(void)
         TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.0, t->i_abc_A[0]);
     }
 }
+
+/* The current after some periods with these wishes of the controller, the supply of its gates lost. */
+static double complex without_supply(int imposed, const double duty[3], int gates_on)
+{
+    plant_destroy(plant);
+    const plant_truth_t *t = start();
+    plant_switch(plant, &(plant_switches_t){.contactor = 1});
+    plant_params(plant)->imposed_bridge = imposed;
+    plant_set_state(plant, -80.0, 60.0, 0.4, 400.0);
+    for (int k = 0; k < 50; k++) {
+        plant_advance(plant, duty, gates_on);
+    }
+    return t->i_d_A + I * t->i_q_A;
+}
+
+void test_an_imposed_state_of_the_bridge_is_that_of_a_controller_that_wants_it(void)
+{
+    const double lower[3] = {0.0, 0.0, 0.0}, upper[3] = {1.0, 1.0, 1.0}, other[3] = {0.3, 0.6, 0.8};
+    p.switch_open[UPPER_A] = 1; /* so that the two short circuits differ */
+    p.speed_rad_s = 400.0;
+    double complex wanted[4];
+    for (int n = 1; n < 4; n++) {
+        plant_destroy(plant);
+        const plant_truth_t *t = start();
+        plant_set_state(plant, -80.0, 60.0, 0.4, 400.0);
+        for (int k = 0; k < 50; k++) {
+            plant_advance(plant, n == PLANT_BRIDGE_UPPER_ON ? upper : lower, n != PLANT_BRIDGE_OFF);
+        }
+        wanted[n] = t->i_d_A + I * t->i_q_A;
+    }
+    TEST_ASSERT_TRUE(cabs(wanted[PLANT_BRIDGE_LOWER_ON] - wanted[PLANT_BRIDGE_UPPER_ON]) > 10.0);
+    for (int n = 1; n < 4; n++) {
+        for (int gates_on = 0; gates_on < 2; gates_on++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(n, other, gates_on) - wanted[n]));
+        }
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, cabs(without_supply(PLANT_BRIDGE_OBEYS, other, 1) - wanted[PLANT_BRIDGE_OFF]));
+}
+
+/* The board's switches stay as they were when the state was imposed. */
+void test_with_an_imposed_state_of_the_bridge_the_contactor_does_not_move(void)
+{
+    p.dc_link_F = 500e-6;
+    p.dc_load_ohm = 100.0;
+    p.imposed_bridge = PLANT_BRIDGE_OFF;
+    const plant_truth_t *t = start();
+    plant_switch(plant, &(plant_switches_t){.contactor = 0});
+    for (int k = 0; k < 1000; k++) {
+        plant_advance(plant, half, 0);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, p.vdc_V, t->vdc_V);
+    plant_params(plant)->imposed_bridge = PLANT_BRIDGE_OBEYS;
+    plant_switch(plant, &(plant_switches_t){.contactor = 0});
+    for (int k = 0; k < 1000; k++) { /* two time constants of 50 ms */
+        plant_advance(plant, half, 0);
+    }
+    TEST_ASSERT_TRUE(t->vdc_V < 0.5 * p.vdc_V);
+}

@@ -18,9 +18,10 @@ COLUMNS: Final = ("id", "element", "failure", "setup", "injection", "points", "r
                   "torque_Nm", "torque_ms", "against_cm", "current_share", "vdc_share", "watch_ms", "status", "witness",
                   "result", "reference")  # fmt: skip
 RECORDED: Final = ("status", "witness", "result")  # written by --record
-SAFE_STATE, BOUNDED, KEEP, RAMP = "safe_state", "bounded", "keep", "ramp"
-REACTIONS: Final = (SAFE_STATE, BOUNDED, KEEP, RAMP)
-MET, OPEN = "met", "open"
+SAFE_STATE, BOUNDED, LESS, KEEP, RAMP = "safe_state", "bounded", "less", "keep", "ramp"
+REACTIONS: Final = (SAFE_STATE, BOUNDED, LESS, KEEP, RAMP)
+MET, PHYSICS, OPEN = "met", "physics", "open"
+STATUSES: Final = (MET, PHYSICS, OPEN)  # physics: met, in some runs only as well as the best safe state
 _ID: Final = re.compile(r"[a-z0-9]+(?:-[a-z0-9]+)*")
 _STEP: Final = re.compile(
     r"(?P<name>[A-Za-z_][\w.\[\]]*)=(?P<how>[x+^]?)(?P<value>point|-?\d+(?:\.\d+)?(?:e-?\d+)?)"
@@ -155,14 +156,15 @@ class _Line:
             raise self.wrong("id", "lower-case words joined by -")
         reaction = self.one_of("reaction", REACTIONS)
         expected = tuple(filter(None, self.cells["expected"].split("|")))
-        if (reaction in (SAFE_STATE, BOUNDED)) != bool(expected):
-            raise self.wrong("expected", f"names of faults separated by | with {SAFE_STATE} and {BOUNDED}, else empty")
+        if (reaction in (SAFE_STATE, BOUNDED, LESS)) != bool(expected):
+            raise self.wrong("expected", f"names of faults separated by | with {SAFE_STATE}, {BOUNDED} and {LESS}, "
+                                         "else empty")  # fmt: skip
         return Row(
             self.cells["id"], self.cells["element"], self.cells["failure"], self.steps("setup"),
             self.steps("injection"), self.conditions(), reaction, expected, self.number("detect_ms", math.inf),
             self.number("torque_Nm", math.nan), self.number("torque_ms", 0.0), self.number("against_cm", math.nan),
             self.number("current_share", 1.0), self.number("vdc_share", 1.0), int(self.number("watch_ms", 0.0)),
-            self.one_of("status", (MET, OPEN)), self.cells["witness"], self.cells,
+            self.one_of("status", STATUSES), self.cells["witness"], self.cells,
         )  # fmt: skip
 
 

@@ -3,18 +3,21 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from fluxtrue_tools.campaign.envelope import NOTHING_WRONG, Envelope, make_envelope
 from fluxtrue_tools.campaign.machine import Machine, data_sheet
 from fluxtrue_tools.campaign.spec import Nominal
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign import fmea
-from fluxtrue_tools.fault_campaign.fmea import OPEN, RECORDED, Point, Row
-from fluxtrue_tools.fault_campaign.run_point import run_point
+from fluxtrue_tools.fault_campaign.fmea import MET, OPEN, RECORDED, Point, Row
+from fluxtrue_tools.fault_campaign.oracle import Reruns
+from fluxtrue_tools.fault_campaign.run_point import Imposed, Trace, run_point
 from fluxtrue_tools.fault_campaign.spec import Faults
 from fluxtrue_tools.fault_campaign.verdict import evaluate
 from fluxtrue_tools.sim.build import MotorFolder
@@ -74,14 +77,16 @@ def points_of(plan: Plan, index: int) -> tuple[Point, ...]:
 
 
 def chosen(plan: Plan, row: Row, number: int, index: int) -> list[Point]:
-    """The points of a case; in the slice a few of them, and where an open line is known not to be met."""
+    """The points of a case; in the slice a few of them, and the witness of a line that is not simply met: of an open one
+    nothing else."""
     held = [point for point in points_of(plan, index) if row.holds_at(point)]
     if not plan.is_slice:
         return held
     count = min(plan.campaign.slice_points, len(held))
     some = [held[(5 * number + STRIDE * index + k * len(held) // count) % len(held)] for k in range(count)]
-    if row.status == OPEN:
-        some = [point for point in held if point.name == row.witness]
+    if row.status != MET:
+        witness = [point for point in held if point.name == row.witness]
+        some = witness if row.status == OPEN else some + witness
     return sorted(set(some), key=lambda point: (point.index, -point.sign))
 
 
@@ -89,8 +94,17 @@ def run_one(plan: Plan, row: Row, index: int, point: Point) -> dict[str, Any]:
     """A run and its verdict."""
     machine = machine_of(*plan.folders[index])
     try:
-        trace = run_point(plan.campaign, machine.motor, row, point)
-        return evaluate(row, plan.campaign.machine[index], machine.rated_Nm, point, trace)
+        trace, healthy = run_point(plan.campaign, machine.motor, row, point), replace(row, injection=())
+
+        def imposed(bridge: int, at_ms: float) -> Trace:
+            other = run_point(plan.campaign, machine.motor, row, point, Imposed(bridge, at_ms))
+            same = trace.time_ms <= at_ms
+            if not np.array_equal(trace.rows[same], other.rows[same], equal_nan=True):
+                raise FluxtrueError("the run does not repeat itself up to the imposed state")
+            return other
+
+        return evaluate(row, plan.campaign.machine[index], machine.rated_Nm, point, trace,
+                        Reruns(imposed, partial(run_point, plan.campaign, machine.motor, healthy, point)))  # fmt: skip
     except (FluxtrueError, LoopError) as error:
         raise FluxtrueError(f"{row.id} at {point.name}: {error}") from error
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.fault_campaign.fmea import Point, Row, Step
 from fluxtrue_tools.fault_campaign.spec import Faults
-from fluxtrue_tools.sim.ecu_loop import WRONG, EcuLoop
+from fluxtrue_tools.sim.ecu_loop import WRONG, Change, EcuLoop
 from fluxtrue_tools.sim.motor import Motor
 
 Array = NDArray[np.float64]
@@ -26,6 +26,14 @@ CHANNELS: Final = ("truth.torque_shaft_mean_Nm", "truth.i_d_A", "truth.i_q_A", "
                    "truth.theta_m_rad")  # fmt: skip
 # Lost below this size of the current to quantisation alone, as in the shipped scenarios: 0.5 A of noise, 12-bit angle.
 SENSORS: Final = {"current_noise_A_rms": 0.5, "angle_bits": 12.0, "vdc_quantise": 1.0}
+
+
+@dataclass(frozen=True)
+class Imposed:
+    """A state of the bridge that begins so long after the injection, whatever the firmware wants."""
+
+    bridge: int
+    at_ms: float
 
 
 @dataclass
@@ -136,7 +144,16 @@ def _start(campaign: Faults, motor: Motor, row: Row, point: Point) -> _Drive:
     return drive
 
 
-def _watch(drive: _Drive, row: Row, watch_ms: int) -> tuple[list[Array], list[tuple[float, int, int]]]:
+def _change(loop: EcuLoop, now_ms: int, imposed: Imposed | None) -> Change | None:
+    """What is imposed in this millisecond."""
+    if imposed is None:
+        return None
+    after = round(imposed.at_ms * 1e-3 / loop.period_s) - now_ms * loop.periods_per_ms
+    return Change(after, "plant.imposed_bridge", imposed.bridge) if 0 <= after < loop.periods_per_ms else None
+
+
+def _watch(drive: _Drive, row: Row, watch_ms: int,
+           imposed: Imposed | None) -> tuple[list[Array], list[tuple[float, int, int]]]:  # fmt: skip
     """Run from the injection on, millisecond by millisecond."""
     starts: dict[Step, float] = {}
     rows, ecu = [], []
@@ -147,14 +164,14 @@ def _watch(drive: _Drive, row: Row, watch_ms: int) -> tuple[list[Array], list[tu
                 ramps |= drive.ramps(step, now, starts)
             elif step.at_ms == now and step.until_ms == step.at_ms:
                 drive.apply(step)
-        rows.append(drive.loop.step_ms(ramps))
         loop = drive.loop
+        rows.append(loop.step_ms(ramps, _change(loop, now, imposed)))
         ecu.append((now + 1.0, int(loop.read("ecu.supervisor.faults")), loop.state))
     return rows, ecu
 
 
-def run_point(campaign: Faults, motor: Motor, row: Row, point: Point) -> Trace:
-    """The same numbers wherever and whenever it runs."""
+def run_point(campaign: Faults, motor: Motor, row: Row, point: Point, imposed: Imposed | None = None) -> Trace:
+    """The same numbers wherever and whenever it runs, with `imposed` up to its beginning."""
     drive = _start(campaign, motor, row, point)
     loop = drive.loop
     with loop:
@@ -165,5 +182,5 @@ def run_point(campaign: Faults, motor: Motor, row: Row, point: Point) -> Trace:
         requested = drive.get(REQUEST)
         loop.record(CHANNELS)
         before = [loop.step_ms() for _ in range(BEFORE_MS)]
-        after, ecu = _watch(drive, row, row.watch_ms or campaign.watch_ms)
+        after, ecu = _watch(drive, row, row.watch_ms or campaign.watch_ms, imposed)
         return Trace(loop.period_s, np.concatenate(before + after), (requested, drive.get(REQUEST)), ecu)

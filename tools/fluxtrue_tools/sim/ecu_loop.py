@@ -3,6 +3,7 @@
 
 import ctypes
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -69,6 +70,15 @@ class Sender:
         return [frame for frame in due if frame is not None]
 
 
+@dataclass(frozen=True)
+class Change:
+    """A name that gets a value after so many periods of a millisecond."""
+
+    after: int
+    name: str
+    value: float
+
+
 class EcuLoop(Loop):
     """The firmware with state machine and bus, around the plant with battery, contactor and dc link."""
 
@@ -107,11 +117,21 @@ class EcuLoop(Loop):
         """The state of the state machine."""
         return int(self.read("ecu.supervisor.state"))
 
-    def step_ms(self, ramps: Mapping[str, tuple[float, float]] | None = None) -> NDArray[np.float64]:
+    def _changed(self, ramps: Mapping[str, tuple[float, float]], change: Change) -> NDArray[np.float64]:
+        """A millisecond in two parts; straight lines go on in the second one."""
+        share = change.after / self.periods_per_ms
+        middle = {name: start + share * (stop - start) for name, (start, stop) in ramps.items()}
+        first = self.run(change.after, {name: (ends[0], middle[name]) for name, ends in ramps.items()})
+        self.set(change.name, change.value)
+        rest = {name: (middle[name], ends[1]) for name, ends in ramps.items()}
+        return np.concatenate([first, self.run(self.periods_per_ms - change.after, rest)])
+
+    def step_ms(self, ramps: Mapping[str, tuple[float, float]] | None = None,
+                change: Change | None = None) -> NDArray[np.float64]:  # fmt: skip
         """One millisecond with the frames that are due in it."""
         for frame in self.sender.frames(self.time_ms):
             self._library.can_host_put(self._handle, ctypes.byref(frame))
-        rows = self.run(self.periods_per_ms, ramps)
+        rows = self.run(self.periods_per_ms, ramps) if change is None else self._changed(ramps or {}, change)
         while self._library.can_host_take(self._handle, ctypes.byref(Frame())):
             pass
         self.time_ms += 1
