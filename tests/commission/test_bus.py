@@ -161,6 +161,20 @@ def test_a_torque_request_ends_the_pulses(stand: Stand) -> None:
     assert (stand.drive.get("pulses"), stand.drive.get("pulses_failure")) == (FAILED, STOPPED)
 
 
+def test_the_rotor_can_be_braked_again_after_switching_off(stand: Stand) -> None:
+    """The limits of the command allow the brake's torque, 2 % of the largest current, in every step."""
+    for _ in range(2):
+        stand.drive.set("enable", 1.0)
+        stand.channel.set(imposed_speed=1.0, speed_rad_s=0.0)
+        stand.drive.push(5j)
+        stand.drive.rest(0.1)
+        status = stand.line._values.message("INV_Status")
+        assert status is not None and status["TorqueCommanded"] > 4.0
+        stand.drive.let_go()
+        stand.drive.rest(0.1)
+        stand.drive.switch_off()
+
+
 def test_another_commander_on_the_bus_is_refused(stand: Stand) -> None:
     frame = read_interface().message(COMMAND).frame_id
     other = connect(stand.ecu.can_port)
