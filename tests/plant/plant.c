@@ -242,7 +242,7 @@ void plant_switch(plant_t *plant, const plant_switches_t *on)
     plant->truth.gate_supply = on->gate_supply ? 1.0 : 0.0;
 }
 
-/* What the gates of the period are to do: what the controller wants, or the imposed state (PL-28). */
+/* What the gates of the period are to do: what the controller wants, or the imposed state (PL-31). */
 static int gates_of(const plant_t *plant, int gates_on, double duty[3])
 {
     const int imposed = plant->params.imposed_bridge;

@@ -3,7 +3,7 @@
 #define PLANT_PLANT_H
 /** The simulated traction drive: inverter, machine, mechanics, sensors; the reference of every closed-loop test.
  *   dpsi_s/dt = u_s - R i_s,  i = map^-1(psi),  T = 1.5 p (psi_d i_q - psi_q i_d)
- * Source   docs/theory/plant.md (PL-1) ... (PL-30)
+ * Source   docs/theory/plant.md (PL-1) ... (PL-31)
  * Units    SI; phase peak quantities, amplitude-invariant dq frame, motor convention
  * Errors   plant_create() returns NULL for bad parameters or no memory
  * Context  simulation only, double precision; one instance per drive, no global state.

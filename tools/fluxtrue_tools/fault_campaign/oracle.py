@@ -17,7 +17,7 @@ from fluxtrue_tools.fault_campaign.measure import Outcome, outcome
 from fluxtrue_tools.fault_campaign.run_point import CHANNELS, Trace
 
 OFF, LOWER, UPPER = "switching disabled", "short circuit below", "short circuit above"
-BRIDGE: Final = {OFF: 1, LOWER: 2, UPPER: 3}  # plant.imposed_bridge (PL-28)
+BRIDGE: Final = {OFF: 1, LOWER: 2, UPPER: 3}  # plant.imposed_bridge (PL-31)
 SHORT: Final = {OFF: "off", LOWER: "lower", UPPER: "upper"}  # in the names of the results' columns
 MARGIN: Final = 1.1
 
