@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_ANGLE_H
 #define HAL_S32K144_ANGLE_H
-/** The angle sensor behind hal/angle.h; one of angle_quadrature.c, angle_resolver.c and angle_as5047.c is linked.
+/** The angle sensor behind hal/angle.h; one of angle_quadrature.c, angle_resolver.c, angle_as5047.c and angle_sincos.c
+ * is linked.
  * Source   README.md, angle
  * Units    period_ticks: one PWM period in ticks of FTM0
  * Errors   angle_fault(): the sensor reports that its angle cannot be trusted; always false for an
@@ -13,7 +14,8 @@
 
 void angle_init(uint32_t period_ticks);
 /** Magnitude of the mechanical speed in turns per second, on the clock of clock_first(); negative: the sensor reports a
- * fault. Start-up, after pwm_init() and before angle_init(); takes up to 0.1 ms. */
+ * fault. Start-up, after pwm_init() and before angle_init(); takes up to 0.1 ms, with a resolver at the converters 11
+ * periods of its excitation. */
 float angle_first_speed(void);
 bool angle_fault(void);
 /** While hal_angle_is_absolute() is false. Once the encoder's index has passed, the next angle is absolute; the result
