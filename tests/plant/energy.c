@@ -30,3 +30,23 @@ void energy_voltage(energy_t *e, const double u_s[2], rotation_t mid, double hal
     e->u_dq[0] += h * sinc * u_dq[0];
     e->u_dq[1] += h * sinc * u_dq[1];
 }
+
+void energy_mean(const energy_t *sum, double period_s, plant_truth_t *t)
+{
+    t->u_d_V = sum->u_dq[0] / period_s;
+    t->u_q_V = sum->u_dq[1] / period_s;
+    t->torque_mean_Nm = sum->torque / period_s;
+    t->torque_shaft_mean_Nm = sum->torque_shaft / period_s;
+    t->idc_A = sum->charge / period_s;
+    t->copper_W = sum->copper / period_s;
+    t->iron_W = sum->iron / period_s;
+    t->mechanical_W = sum->mechanical / period_s;
+    t->electrical_W = sum->electrical / period_s;
+    t->inverter_W = (sum->dc - sum->electrical) / period_s;
+    t->e_dc_J += sum->dc;
+    t->e_electrical_J += sum->electrical;
+    t->e_copper_J += sum->copper;
+    t->e_iron_J += sum->iron;
+    t->e_mechanical_J += sum->mechanical;
+    t->e_field_J += sum->field;
+}

@@ -8,6 +8,7 @@
  * Rounding each term is integrated by its own rule to second order; the balance is therefore a test, not an identity
  * Context  simulation only */
 #include "machine.h"
+#include "plant.h"
 
 typedef struct {
     double psi_s[2], psi_dq[2], im_dq[2], torque_Nm;
@@ -36,5 +37,8 @@ void energy_mechanic(energy_t *e, double torque_Nm, double speed_rad_s, double f
 
 /** Adds u_s, which is constant, as seen from the rotor, which turns by 2 half_rad in the substep. */
 void energy_voltage(energy_t *e, const double u_s[2], rotation_t mid, double half_rad, double h);
+
+/** Mean values of a period, and its energies added to those since the start. */
+void energy_mean(const energy_t *sum, double period_s, plant_truth_t *t);
 
 #endif

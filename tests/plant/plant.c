@@ -213,26 +213,6 @@ static double link_substep(plant_t *plant, const bridge_t *bridge, double vdc_V,
     return plant->link_V;
 }
 
-static void mean_truth(plant_truth_t *t, const energy_t *sum, double period_s)
-{
-    t->u_d_V = sum->u_dq[0] / period_s;
-    t->u_q_V = sum->u_dq[1] / period_s;
-    t->torque_mean_Nm = sum->torque / period_s;
-    t->torque_shaft_mean_Nm = sum->torque_shaft / period_s;
-    t->idc_A = sum->charge / period_s;
-    t->copper_W = sum->copper / period_s;
-    t->iron_W = sum->iron / period_s;
-    t->mechanical_W = sum->mechanical / period_s;
-    t->electrical_W = sum->electrical / period_s;
-    t->inverter_W = (sum->dc - sum->electrical) / period_s;
-    t->e_dc_J += sum->dc;
-    t->e_electrical_J += sum->electrical;
-    t->e_copper_J += sum->copper;
-    t->e_iron_J += sum->iron;
-    t->e_mechanical_J += sum->mechanical;
-    t->e_field_J += sum->field;
-}
-
 void plant_switch(plant_t *plant, const plant_switches_t *on)
 {
     if (plant->params.imposed_bridge != PLANT_BRIDGE_OBEYS) {
@@ -298,7 +278,7 @@ void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
         vdc_V = link_substep(plant, &bridge, vdc_V, sum.charge - before_As, period_s / n);
         hardware_apply(plant, &bridge);
     }
-    mean_truth(&plant->truth, &sum, period_s);
+    energy_mean(&sum, period_s, &plant->truth);
     plant->truth.time_s += period_s;
     instant_truth(plant, rotor_angle(plant));
 }

@@ -66,8 +66,8 @@ void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_ra
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 
-/** Sets the board's switches; at creation the battery is connected and the gates have their supply. Without effect while
- * a state of the bridge is imposed. */
+/** Sets the board's switches; at creation the battery is connected and the gates have their supply. Without effect
+ * while a state of the bridge is imposed. */
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 
 /** One PWM period; wanted: duties 0..1 (clamped, NaN counts as 0.5). Only the diodes conduct while switching is

@@ -102,6 +102,9 @@ static const char *bad_sensor(const plant_params_t *p)
     if (!not_below_zero(p->known_voltage_gain)) {
         return "known_voltage_gain";
     }
+    if (!isfinite(p->angle_delay_s)) {
+        return "angle_delay_s";
+    }
     if (p->angle_spike_every < 0) {
         return "angle_spike_every";
     }
@@ -143,7 +146,6 @@ static const char *bad_electronics(const plant_params_t *p)
         {"angle_h2_rad", isfinite(p->angle_h2_rad) && isfinite(p->angle_h2_phase)},
         {"resolver_pole_pairs", above_zero(p->resolver_pole_pairs)},
         {"angle_bits", p->angle_bits >= 0 && p->angle_bits <= 24},
-        {"angle_delay_s", isfinite(p->angle_delay_s)},
     };
     for (size_t k = 0; k < sizeof check / sizeof check[0]; k++) {
         if (!check[k].ok) {
