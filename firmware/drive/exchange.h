@@ -31,10 +31,11 @@ typedef struct {
     bool acting;          /* the bridge switched throughout the last period and is switching now */
     bool voltage_limited; /* the voltage circle limited the voltage; clamped pulses do not count */
     bool pulses_clamped;  /* the bridge cannot make these pulses: the acting voltage is less well known */
-    bool unused;          /* always false: the four flags are written by one instruction */
+    FX_PADDING_FLAG;
     FX_PADDING_WORD;
 } sample_t;
 
+FX_WORD_OF_FLAGS(sample_t, acting);
 FX_POWER_OF_TWO_SIZE(sample_t);
 
 /** Number of periods that remain readable: a power of two, and at least those of one step of the task plus those before

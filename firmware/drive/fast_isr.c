@@ -114,7 +114,7 @@ static inline __attribute__((always_inline)) void write_duties(drive_t *drive, s
     sample->acting = true;
     sample->voltage_limited = false;
     sample->pulses_clamped = false;
-    sample->unused = false;
+    sample->fx_padding_flag = false;
     fast->u_next.d = wanted.u.d;
     fast->u_next.q = wanted.u.q;
     const modulate_config_t *modulate = (turning != NULL) ? turning : &p->modulate;

@@ -23,13 +23,15 @@
  *                     slot of the command                              2
  *                     point of the sine table             2            2 (1 kHz task: 11)
  *   FX_PADDING_WORD   sample and command                               9 to 11
+ *   FX_PADDING_FLAG   sample                                           2
  * Source   our own measurement; Arm v7-M ARM A7.7.50 (LDRD needs word alignment only)
  * Units    none
  * Range    every value and every address of two words
  * Rounding none
- * Errors   FX_LOAD_TWO and FX_POWER_OF_TWO_SIZE do not compile where their assumption does not hold
+ * Errors   FX_LOAD_TWO, FX_POWER_OF_TWO_SIZE and FX_WORD_OF_FLAGS do not compile where their assumption does not hold
  * Context  any */
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -102,6 +104,15 @@ static inline fx_two_words_t fx_read_two(const volatile uint32_t *from)
 
 /* An unused word. With it a structure has a size that is a power of two, and the address of a slot is a shift. */
 #define FX_PADDING_WORD uint32_t fx_padding
+
+/* An unused flag, always false. It is the fourth flag of a word, and all four are then written by one instruction. */
+#define FX_PADDING_FLAG bool fx_padding_flag
+
+/* After a structure with FX_PADDING_FLAG; first: the first of the four flags. */
+#define FX_WORD_OF_FLAGS(type, first) \
+    _Static_assert(offsetof(type, first) % sizeof(uint32_t) == 0U && \
+                       offsetof(type, fx_padding_flag) == offsetof(type, first) + 3U, \
+                   "the flags of " #type " are not one word")
 
 /* After a structure with FX_PADDING_WORD. Only the target's layout counts: other compilers have larger enumerations. */
 #ifdef __arm__
