@@ -188,7 +188,7 @@ def test_an_estimate_weighs_each_part_by_its_errors() -> None:
 
 
 def test_the_page_shows_each_sample_as_it_was_measured_first() -> None:
-    samples = [listed.Sample(seed=1, found={"a": (3, 4), "b": (5, 5)}), listed.Sample(seed=2, found={"a": (4, 4)})]
+    samples = [listed.Sample(seed=1, found={"a": [3, 4], "b": [5, 5]}), listed.Sample(seed=2, found={"a": [4, 4]})]
     text = page.write({}, {}, Counter(), listed.Listed(listed.List(sample=samples)))
     assert "| part | seed 1 | seed 2 |" in text
     assert "| `a` | 3 of 4, 75.0 % | 4 of 4, 100.0 % |" in text

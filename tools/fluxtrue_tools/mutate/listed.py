@@ -43,7 +43,7 @@ class Sample(Strict):
     """What a random sample has shown when it was measured first, before its survivors were evaluated."""
 
     seed: int
-    found: dict[ShortText, tuple[int, int]]  # part: found errors, errors
+    found: dict[ShortText, Annotated[list[int], Field(min_length=2, max_length=2)]]  # part: found errors, errors
 
 
 class List(Strict):

@@ -51,8 +51,9 @@ def _samples(samples: Sequence[Sample]) -> list[str]:
     """Random samples as they were found, because those of the table above have been mended since."""
     parts = list(dict.fromkeys(part for sample in samples for part in sample.found))
     seeds = " | ".join(f"seed {sample.seed}" for sample in samples)
-    text = ["The survivors of the random samples have been evaluated: tests were written for gaps, and what is no",
-            "error is listed. Before that, the samples had shown, found of all errors without what is listed now:", "",
+    text = ["For some survivors of the random samples tests have been written since, and some are listed: the table",
+            "above is therefore better than the firmware as a whole. What each sample showed when it was measured",
+            "first, found of all errors without what is listed now:", "",
             f"| part | {seeds} |", "|---" + "|---" * len(samples) + "|"]  # fmt: skip
     for part in parts:
         cells = [_share(*sample.found[part]) if part in sample.found else "" for sample in samples]
