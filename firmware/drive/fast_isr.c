@@ -209,7 +209,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
             control_checked(drive, sample, &now, &command->target);
         }
         hal_pwm_enable(true);
-        short_circuit_prepare(fast, drive->period.periods_per_step);
+        short_circuit_prepare(fast, drive->period.periods_per_step / 2U);
     } else {
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);
