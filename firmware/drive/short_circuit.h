@@ -10,8 +10,8 @@
  *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on: that is no failure of a side.
  *   After a fault the currents may be any; the short circuit would turn them about its own. For half a step of the
- *   task switching is therefore disabled first, and the dc link ends them. Not after an over-voltage, which their energy
- *   would raise, after a gate fault, nor after what leaves control intact, which has moved the currents before.
+ *   task switching is therefore disabled first, and the dc link ends them. Not after an over-voltage, which their
+ *   energy would raise, after a gate fault, nor after what leaves control intact, which has moved the currents before.
  * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"

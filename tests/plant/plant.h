@@ -66,7 +66,7 @@ void plant_set_state(plant_t *plant, double id_A, double iq_A, double theta_m_ra
 
 void plant_sample(plant_t *plant, plant_sensors_t *sensors);
 
-/** Sets the board's switches; at creation the battery is connected and the gates have their supply. Without effect while
+/** Sets the board's switches; at creation the battery is connected and the gates have their supply. Nothing moves while
  * a state of the bridge is imposed. */
 void plant_switch(plant_t *plant, const plant_switches_t *on);
 

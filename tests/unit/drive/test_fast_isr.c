@@ -129,8 +129,8 @@ static void write_command(safe_t safe, uint32_t faults)
     command_box_write(&drive.commands, command);
 }
 
-/* Switching is disabled in the period of the fault, and for half a step; then the duties of the short circuit are written
- * before switching is enabled. */
+/* Switching is disabled in the period of the fault, and for half a step; then the duties of the short circuit are
+ * written before switching is enabled. */
 void test_a_fault_shorts_the_phases_half_a_step_later_if_the_task_has_decided_so(void)
 {
     seam_run();
