@@ -42,8 +42,7 @@ static void reset_control(drive_t *drive, sample_t *sample)
 /* The safe state: all switches of one side on (short circuit), or switching disabled (freewheel). */
 static void apply_safe_state(drive_t *drive, sample_t *sample, const command_t *command)
 {
-    const bool waits = short_circuit_waits(&drive->fast);
-    if (!waits && short_circuit_is_needed(drive->fast.faults, command->safe)) {
+    if (!short_circuit_waits(&drive->fast) && short_circuit_is_needed(drive->fast.faults, command->safe)) {
         short_circuit_apply(&drive->fast, command->upper);
     } else {
         short_circuit_end(&drive->fast);
@@ -209,7 +208,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
             control_checked(drive, sample, &now, &command->target);
         }
         hal_pwm_enable(true);
-        short_circuit_prepare(fast, drive->period.periods_per_step);
+        short_circuit_prepare(fast, drive->period.periods_per_step / 2U);
     } else {
         if (command->faults != 0U) {
             drive_raise_fault(drive, command->faults);

@@ -10,9 +10,9 @@
  *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
  *   After a fault the currents may have any value, and the short circuit would turn their flux about the origin. For
- *   one step of the task switching is therefore disabled first, and the dc link opposes the currents. This step is left
- *   out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults that
- *   leave control intact: then the currents have been moved before.
+ *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
+ *   left out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults
+ *   that leave control intact: then the currents have been moved before.
  * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"

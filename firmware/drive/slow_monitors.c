@@ -162,14 +162,14 @@ static bool is_second_harmonic_constant(uint64_t turns_q60)
     return part < 1ULL << 56; /* within 1/32 of a turn */
 }
 
-/* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While the short
- * circuit is on, the decision of the last step before it is kept. */
+/* Finds no fault: it decides by which side a short circuit would be made if a fault occurred now. While a fault is
+ * latched or the short circuit is on, the decision of the last step before it is kept: switching is disabled first. */
 static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref)
 {
     const sample_t *sample = &snapshot->sample;
     const short_side_in_t in = {
         .acting = sample->acting && !is_second_harmonic_constant(turns_of_step_q60(drive, sample->point.omega)),
-        .shorted = snapshot->shorted,
+        .shorted = snapshot->shorted || snapshot->faults != 0U,
         .i = measure_phases(sample->i_ab, sample->zero_q28),
         .i_ref = phases_ref,
     };

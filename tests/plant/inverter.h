@@ -7,7 +7,7 @@
  *   switching:  hi, lo = dead-time loss + drop;   disabled:  d = 1/2, hi = lo = v_dc/2 + drop
  *   with a knee: hi and lo times 1 - I_k/(2 max(|i_x|, I_k)), and proportional to i_x below I_k
  *   upper switch open:  hi = d v_dc + drop;   lower open: lo = (1 - d) v_dc + drop;   shorted: d = 1 or 0, hi = lo = 0
- * Source   docs/theory/plant.md (PL-11) ... (PL-14), (PL-23) ... (PL-25), (PL-27), (PL-29)
+ * Source   docs/theory/plant.md (PL-11) ... (PL-14), (PL-23) ... (PL-25), (PL-27), (PL-29), (PL-31)
  * Units    V, A, s
  * Rounding the polarity at a substep's end is used: first order at a zero crossing, second elsewhere
  * Context  simulation only */
@@ -27,6 +27,10 @@ typedef struct {
 
 /** Share of the period in which a leg short-circuits the dc link: one switch is shorted and the other conducts. */
 double inverter_short_circuit(const plant_params_t *p, const double duty[3], int gates_on);
+
+/** Whether the gates of a period switch: as the controller wants, or by the imposed state of the bridge (PL-31), which
+ * also sets the duties. */
+int inverter_gates(const plant_params_t *p, int gates_on, double duty[3]);
 
 /** Sets the legs for one period. */
 void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V);

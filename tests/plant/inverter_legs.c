@@ -85,6 +85,16 @@ double inverter_short_circuit(const plant_params_t *p, const double duty[3], int
     return share;
 }
 
+int inverter_gates(const plant_params_t *p, int gates_on, double duty[3])
+{
+    const int imposed = p->imposed_bridge;
+    if (imposed == PLANT_BRIDGE_OBEYS) {
+        return gates_on;
+    }
+    duty[0] = duty[1] = duty[2] = imposed == PLANT_BRIDGE_UPPER_ON ? 1.0 : 0.0;
+    return imposed != PLANT_BRIDGE_OFF;
+}
+
 void inverter_set(inverter_t *v, const plant_params_t *p, const double duty[3], int gates_on, double vdc_V)
 {
     const double dead = dead_share(p), drop = p->ideal_inverter ? 0.0 : p->device_drop_V;

@@ -222,17 +222,6 @@ void plant_switch(plant_t *plant, const plant_switches_t *on)
     plant->truth.gate_supply = on->gate_supply ? 1.0 : 0.0;
 }
 
-/* What the gates of the period are to do: what the controller wants, or the imposed state (PL-31). */
-static int gates_of(const plant_t *plant, int gates_on, double duty[3])
-{
-    const int imposed = plant->params.imposed_bridge;
-    if (imposed == PLANT_BRIDGE_OBEYS) {
-        return gates_on && plant->on.gate_supply;
-    }
-    duty[0] = duty[1] = duty[2] = imposed == PLANT_BRIDGE_UPPER_ON ? 1.0 : 0.0;
-    return imposed != PLANT_BRIDGE_OFF;
-}
-
 /* One switch of a leg is shorted and the other is switched on (PL-25). If the pulse lasts longer than desaturation_s,
  * the gate driver detects the desaturation and the timer's fault input switches all six off. */
 static double short_circuit(plant_t *plant, bridge_t *bridge)
@@ -264,7 +253,7 @@ void plant_advance(plant_t *plant, const double wanted[3], int gates_on)
     const double middle_s = plant->truth.time_s + 0.5 * period_s;
     const int b = p->phases_swapped ? 2 : 1;
     double duty[3] = {wanted[0], wanted[b], wanted[3 - b]};
-    bridge_t bridge = {duty, gates_of(plant, gates_on, duty), vdc_at(p, middle_s), 0.0};
+    bridge_t bridge = {duty, inverter_gates(p, gates_on && plant->on.gate_supply, duty), vdc_at(p, middle_s), 0.0};
     bridge.short_circuit_A = short_circuit(plant, &bridge);
     double vdc_V = bridge_V(plant, middle_s);
     energy_t sum = {0};

@@ -135,7 +135,6 @@ static const char *bad_electronics(const plant_params_t *p)
         {"leg_knee_A", not_below_zero(p->leg_knee_A)},
         {"short_circuit_A", above_zero(p->short_circuit_A)},
         {"desaturation_s", not_below_zero(p->desaturation_s)},
-        {"imposed_bridge", p->imposed_bridge >= PLANT_BRIDGE_OBEYS && p->imposed_bridge <= PLANT_BRIDGE_UPPER_ON},
         {"substeps", p->substeps >= 10 && p->substeps <= 100000},
         {"current_full_scale_A", above_zero(p->current_full_scale_A)},
         {"adc_bits", p->adc_bits >= 1 && p->adc_bits <= 24},
@@ -160,6 +159,10 @@ const char *plant_params_bad_field(const plant_params_t *params, int has_map)
     const char *bad = bad_machine(params, has_map);
     if (bad == NULL && !not_below_zero(params->hardware_safe_V)) {
         bad = "hardware_safe_V";
+    }
+    const int bridge = params->imposed_bridge;
+    if (bad == NULL && (bridge < PLANT_BRIDGE_OBEYS || bridge > PLANT_BRIDGE_UPPER_ON)) {
+        bad = "imposed_bridge";
     }
     if (bad == NULL && !isfinite(params->series_d_V)) {
         bad = "series_d_V";

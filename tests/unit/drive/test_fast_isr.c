@@ -129,15 +129,15 @@ static void write_command(safe_t safe, uint32_t faults)
     command_box_write(&drive.commands, command);
 }
 
-/* Switching is disabled in the period of the fault, and for one step; then the duties of the short circuit are written
- * before switching is enabled. */
-void test_a_fault_shorts_the_phases_a_step_later_if_the_task_has_decided_so(void)
+/* Switching is disabled in the period of the fault, and for half a step; then the duties of the short circuit are
+ * written before switching is enabled. */
+void test_a_fault_shorts_the_phases_half_a_step_later_if_the_task_has_decided_so(void)
 {
     seam_run();
     seam_periods(3);
     write_command(SAFE_SHORT_CIRCUIT, 0);
     seam_current(310.0, -155.0, -155.0);
-    for (uint32_t k = 0; k < motor.bases.periods_per_step; k++) {
+    for (uint32_t k = 0; k < motor.bases.periods_per_step / 2U; k++) {
         write_command(SAFE_SHORT_CIRCUIT, 0);
         seam_period();
         expect_shorted(false);

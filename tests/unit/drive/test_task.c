@@ -2,6 +2,7 @@
 #include "drive/data_check.h"
 #include "drive/mrai/mrai_seam.h"
 #include "drive/mrai/schedule_box.h"
+#include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
@@ -365,6 +366,19 @@ void test_a_constant_current_commands_the_upper_switches_unless_it_may_be_a_harm
         TEST_ASSERT_FALSE(upper_after_constant_current(0.51 * sign, true, false));
         TEST_ASSERT_TRUE(upper_after_constant_current(0.52 * sign, true, false));
     }
+}
+
+/* Switching is disabled before the short circuit begins: what was decided before the fault counts. */
+void test_the_side_of_the_short_circuit_is_kept_while_a_fault_is_latched(void)
+{
+    seam_run();
+    seam.motor.identify.window_turns_q29 = 1U << 29;
+    TEST_ASSERT_TRUE(upper_after_constant_current(0.1, true, false));
+    const snapshot_t off = {.faults = FAULT_CONTROL}, reset = {.faults = 0};
+    (void)slow_monitors_step(&drive, &off);
+    TEST_ASSERT_TRUE(safe_decision_is_upper(&drive));
+    (void)slow_monitors_step(&drive, &reset);
+    TEST_ASSERT_FALSE(safe_decision_is_upper(&drive));
 }
 
 /* Leaving torque at speed. */

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a safe state is judged by; also the limits of these."""
+    """Figures of a safe state; also their limits."""
 
     torque_Nm: float  # largest, once the torque must be safe: a safe state has none, whatever is requested
     current_A: float

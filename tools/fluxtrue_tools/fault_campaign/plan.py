@@ -77,8 +77,8 @@ def points_of(plan: Plan, index: int) -> tuple[Point, ...]:
 
 
 def chosen(plan: Plan, row: Row, number: int, index: int) -> list[Point]:
-    """The points of a case; in the slice a few of them, and the witness of a line that is not simply met: of an open one
-    nothing else."""
+    """The points of a case; in the slice a few of them and the witness of a line of status physics, of an open one the
+    witness alone."""
     held = [point for point in points_of(plan, index) if row.holds_at(point)]
     if not plan.is_slice:
         return held

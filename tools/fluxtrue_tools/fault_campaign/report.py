@@ -34,7 +34,8 @@ def terminal(scores: list[Score], summary: Summary) -> str:
                           said if s.is_true else f"status {s.row.status} is NOT TRUE. {said}"))  # fmt: skip
     sums = (f"{summary.kinds} kinds of fault, {summary.lines} lines, {summary.runs} runs: {summary.runs_met} "
             f"({summary.share:.2f} %) as demanded, of these {summary.runs_by_physics} beyond a limit and as good as "
-            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); {summary.lines_met} lines met, {summary.lines_by_physics} met with such runs, "
+            f"physics allows (in {summary.runs_by_effect} the fault had no effect at first); "
+            f"{summary.lines_met} lines met, {summary.lines_by_physics} met with such runs, "
             f"{summary.lines_open} open, {summary.false_trips} false trips")  # fmt: skip
     return (columns(cells) + "\n\n" if len(cells) > 1 else "") + sums
 
@@ -45,9 +46,10 @@ def runs_table(table: pd.DataFrame) -> str:
                                      "V", "")]  # fmt: skip
     for _, run in table.iterrows():
         name = f"{run['motor']}/{run['point']}/{'+' if run['sign'] > 0 else '-'}"
+        said = "; ".join(filter(None, (PLAIN[run["verdict"]], run["why"])))
         cells.append((name, f"{run['speed_rpm']:.0f}", f"{run['torque_Nm']:.1f}", run["first_fault"],
                       _text(run["detect_ms"]), _text(run["harm_ms"], 0), _text(run["beyond_Nm"]),
-                      _text(run["current_A"], 0), _text(run["vdc_V"], 0), "; ".join(filter(None, (PLAIN[run["verdict"]], run["why"])))))  # fmt: skip
+                      _text(run["current_A"], 0), _text(run["vdc_V"], 0), said))  # fmt: skip
     return columns(cells)
 
 

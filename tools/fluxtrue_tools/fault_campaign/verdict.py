@@ -103,7 +103,7 @@ class _Run:
         return self.row.reaction not in (KEEP, RAMP) and self.v["detect_ms"] > self.row.detect_ms
 
     def compared(self, found: dict[str, str], reruns: oracle.Reruns) -> tuple[str, dict[str, float | str], str]:
-        """Verdict, cells and words of a run with complaints, after a look at what physics allows."""
+        """Verdict, cells and words of a run with complaints, compared with what physics allows."""
         why, effect_ms, cells = "; ".join(found.values()), 0.0, dict(oracle.NO_CELLS)
         if self.is_late():
             effect_ms = oracle.effect_ms(self.trace, reruns.healthy())
