@@ -9,7 +9,7 @@ import pytest
 
 from fluxtrue_tools.cli import EXIT_INTERRUPTED
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import drag, levels, spin
+from fluxtrue_tools.commission import drag, hidden, levels, spin
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.steps import Found
 from fluxtrue_tools.commission.turning import Connection
@@ -88,11 +88,29 @@ def test_what_is_kept_is_what_was_found(tmp_path: Path) -> None:
         Work(tmp_path, {"--motor": "b"}).load()
 
 
-@pytest.mark.parametrize("content", ["", "{}", "[1]", '{"belongs": {}, "steps": [], "found": {}}', "{"])
+@pytest.mark.parametrize("content", ["", "{}", "[1]", '{"belongs": {}, "steps": [], "found": {}}', "{", "[" * 99999])
 def test_a_damaged_work_file_is_refused(content: str, tmp_path: Path) -> None:
     (tmp_path / "steps.json").write_text(content)
     with pytest.raises(FluxtrueError, match="not the steps of a commissioning"):
         Work(tmp_path, {}).load()
+
+
+def test_a_number_that_was_changed_by_hand_is_no_measured_one(tmp_path: Path) -> None:
+    work = Work(tmp_path, {})
+    work.save(("offsets",), Found(0.5 + 0.25j))
+    path = tmp_path / "steps.json"
+    path.write_text(path.read_text().replace("0.25", "-0.25"))
+    with pytest.raises(FluxtrueError, match="changed after it had been written"):
+        work.load()
+
+
+def test_damaged_steps_are_refused_before_anything_is_started(
+    folder: Path, begun: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (begun / "work" / "steps.json").write_text("{}")
+    monkeypatch.setattr(hidden, "make", interrupted)  # is not called
+    assert commission(folder, begun, *MACHINE, "--step", "resistance", "--resume") == 2
+    assert "steps.json: not the steps of a commissioning" in capsys.readouterr().err
 
 
 def test_an_interrupted_save_leaves_the_steps_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,9 @@ import pytest
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim import library as lib
 from fluxtrue_tools.sim.build import locate
+from fluxtrue_tools.sim.cli import table
 from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.sim.output import summary
 from fluxtrue_tools.sim.run import check_finite, simulate, value_at
 from fluxtrue_tools.sim.scenario import Plant, Profile, Scenario, parse
 
@@ -259,3 +261,12 @@ def test_a_window_of_one_row_has_a_mean(hsm1: Motor, text: str) -> None:
 def test_a_motor_that_is_not_a_path_is_refused(motor: str, tmp_path: Path) -> None:
     with pytest.raises(FluxtrueError, match="^motor "):
         locate(motor, tmp_path)
+
+
+def test_a_mean_over_a_reversal_is_told(paper: Motor) -> None:
+    profile = "[profile]\nspeed_rpm = 500\ntorque_Nm = [[0, 20], [0.15, 20], [0.16, -20]]\n"
+    head = f'motor = "paper"\nduration_s = 0.2\n{profile}'
+    for window, told in (("", True), ("[window]\nfrom_s = 0.05\nto_s = 0.14\n", False)):
+        data = summary(simulate(parse(head + window, "s.toml"), paper))
+        assert data["window"]["request_reverses"] is told
+        assert ("in which the requested torque reverses" in table(data)) is told

@@ -119,6 +119,15 @@ def test_an_elf_file_without_the_declarations_is_refused() -> None:
         read(Path("/bin/true"))
 
 
+def test_an_elf_file_with_empty_declarations_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "nothing").write_bytes(b"")
+    emptied = tmp_path / "bad.elf"
+    update = f"--update-section=.a2l={tmp_path / 'nothing'}"
+    subprocess.run(["objcopy", "--strip-debug", update, PROGRAM, emptied], check=True)
+    with pytest.raises(FluxtrueError, match=r"bad.elf: section '.a2l' has no value to calibrate"):
+        read(emptied)
+
+
 def test_the_command_writes_the_file_or_nothing(tmp_path: Path) -> None:
     out = tmp_path / "x.a2l"
     done = CliRunner().invoke(a2l, [str(PROGRAM), "--out", str(out)], catch_exceptions=False)

@@ -128,7 +128,7 @@ def workplace(files: dict[str, Content]) -> Iterator[Path]:
     try:
         for name, content in files.items():
             data = content.encode("utf-8", "surrogateescape") if isinstance(content, str) else content
-            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(data)
         (folder / "loop").symlink_to("loop")
         (folder / "link").symlink_to("in.toml")

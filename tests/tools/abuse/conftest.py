@@ -1,22 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """Functions that would start a program, a server or a long run are replaced by one that says that it was reached.
 
-The calculation of a motor is done once for each motor.
+What is calculated for a motor is calculated once for everything on which it depends: most mutations of a motor.toml
+that are accepted change neither its tables nor its current references.
 """
 
+import io
 import os
 import pickle
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from abused import accepted
 
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.bases import Bases
+from fluxtrue_tools.motor.config import Machine
+from fluxtrue_tools.motor.flux_model import FluxModel
+from fluxtrue_tools.motor.map_import import readers
 from fluxtrue_tools.motor.motor import load_motor
 from fluxtrue_tools.motor.names import PLOTS, source_files
+from fluxtrue_tools.motor.references import Solver
 
 # All of it comes after everything that a command can know of its input.
 WORK = (
@@ -32,30 +44,74 @@ WORK = (
 
 
 # What these find for an input depends on nothing else, so that it is computed once for each input that they accept.
-CALCULATIONS = {
-    "motor.map_import.run.fit": pickle.dumps, "motor.map_import.run.fit_separately": pickle.dumps,
-    "motor.build.generate": id,
-}  # fmt: skip
-MOTORS = ("motor.motor.load_motor", "motor.build.load_motor", "motor.map_import.run.load_motor")
 Function = Callable[..., Any]
 
 
-def _content(folder: Path) -> tuple[bytes, ...]:
-    """What load_motor reads."""
-    return tuple(path.read_bytes() for path in source_files(folder) if path.is_file())
+def _whole(*arguments: Any) -> bytes:
+    return pickle.dumps(arguments)
+
+
+def _of_tables(model: FluxModel, bases: Bases, machine: Machine) -> bytes:
+    """Of the machine, make_flux_tables reads these values only."""
+    return _whole(model, bases, machine.i_max_A, machine.pole_pairs, machine.torque_max_Nm, machine.r_ohm)
+
+
+def _of_references(solver: Solver, *others: Any) -> bytes:
+    """What a solver is made from."""
+    return _whole(solver.model, solver.pole_pairs, solver.i_max_A, *others)
+
+
+CALCULATIONS: dict[str, Function] = {
+    "motor.map_import.run.fit": _whole, "motor.map_import.run.fit_separately": _whole,
+    "motor.map_import.run.make_grid": _whole, "motor.map_import.run.changes": _whole,
+    "motor.motor.make_flux_tables": _of_tables, "motor.motor.make_references": _of_references,
+    "motor.build.generate": id,
+}  # fmt: skip
+MOTORS = ("motor.motor.load_motor", "motor.build.load_motor", "motor.map_import.run.load_motor")
+
+
+def _content(folder: Path) -> tuple[str, tuple[bytes, ...]]:
+    """What load_motor reads, and the folder that it names in a message."""
+    return str(folder), tuple(path.read_bytes() for path in source_files(folder) if path.is_file())
 
 
 def remembered(function: Function, key: Function) -> Function:
-    """The function with the results that it has had; what it refuses is worked out again."""
+    """The function with the results and the refusals that it has had."""
     known: dict[Any, tuple[Any, Any]] = {}
 
     def call(*arguments: Any) -> Any:
-        what = key(arguments) if key is pickle.dumps else key(*arguments)
+        what = key(*arguments)
         if what not in known:
-            known[what] = function(*arguments), arguments
-        return known[what][0]
+            try:
+                known[what] = function(*arguments), arguments  # kept, because of id()
+            except FluxtrueError as error:
+                known[what] = error, arguments
+        found = known[what][0]
+        if isinstance(found, FluxtrueError):
+            raise type(found)(*found.args)
+        return found
 
     return call
+
+
+def _read_apart(command: list[str], **_: object) -> subprocess.CompletedProcess[bytes]:
+    """The reader of a .mat or .h5 in a process of its own, as arrays.py starts it, but with its packages loaded."""
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        child = os.fork()
+        if child == 0:
+            code = 1
+            try:
+                sys.stdout = io.TextIOWrapper(out)
+                readers.main(Path(command[-1]))
+                sys.stdout.flush()
+                code = 0
+            except Exception as error:
+                err.write(f"{type(error).__name__}: {error}".encode())
+                err.flush()
+            finally:
+                os._exit(code)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        return subprocess.CompletedProcess(command, code, *(file.seek(0) or file.read() for file in (out, err)))
 
 
 def _picture(_: object, path: Path) -> None:
@@ -87,6 +143,7 @@ def stubs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             patch.setattr(f"fluxtrue_tools.{place}", load)
         patch.setattr(os, "execv", accepted)
         patch.setattr(os, "execve", accepted)
+        patch.setattr("fluxtrue_tools.motor.map_import.arrays.subprocess", SimpleNamespace(run=_read_apart))
         patch.setattr("fluxtrue_tools.motor.map_import.plot.write", _picture)
         patch.setattr("fluxtrue_tools.motor.html.write_plots", _pictures)
         patch.setattr("fluxtrue_tools.motor.measured.measure_loop", lambda _: None)

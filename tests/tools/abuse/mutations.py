@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How each file of each command is mutated: its content, and whether the command must refuse it."""
 
+import json
 import re
 from collections.abc import Callable
 from typing import Any
@@ -88,6 +89,19 @@ def mutated_bytes(draw: Callable[..., Any], good: Callable[[], bytes]) -> tuple[
     return Blob(data), False
 
 
+def means_another(content: Content, good: str) -> bool:
+    """Whether a JSON file does not say what the good one says."""
+    try:
+        return bool(json.loads(content if isinstance(content, str) else content.decode()) != json.loads(good))
+    except (ValueError, RecursionError):
+        return True
+
+
+def mutated_json(good: str) -> Changed:
+    """A JSON file with a checksum: whatever changes its meaning must be refused."""
+    return mutated_words(good).map(lambda content: (content, means_another(content, good)))
+
+
 NOISE = mutated_words(samples.dbc()).map(lambda text: text if isinstance(text, str) else text.decode("latin-1"))
 RECORDINGS = mutated_bytes(samples.recording) | unsure(
     NOISE.map(lambda text: Blob(samples.recording.__wrapped__(text)))
@@ -120,6 +134,7 @@ MORE_FILES: dict[tuple[str, str], tuple[tuple[str, ...], Changed]] = {
     ("live", "drive.mf4"): (("--motor", "hsm1", "--replay", "drive.mf4"), RECORDINGS),
     ("live", "image.elf"): (("--motor", "hsm1", "--can-interface", "virtual", "--elf", "image.elf"), ELF),
     ("scope", "image.elf"): (("--can-interface", "virtual", "--elf", "image.elf"), ELF),
+    ("commission", "w/steps.json"): (("--work", "w", "--resume"), mutated_json(samples.steps())),
     ("motor import", "loss.csv"): (
         ("--iron-loss", "loss.csv"),
         unsure(mutated_table("speed,loss\n1000,24\n2000,56\n3000,96\n")),

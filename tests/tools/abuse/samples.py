@@ -98,11 +98,15 @@ def motor_json() -> str:
 
 @cache
 def elf() -> bytes:
-    """A firmware that serves XCP: the virtual ECU, without what only a debugger reads."""
+    """A firmware that serves XCP: the virtual ECU, with those of its symbols alone that the tools look for."""
+    from fluxtrue_tools.a2l.elf import MOTOR as MOTOR_OBJECT
+    from fluxtrue_tools.a2l.elf import OBJECT
+
     program = Path(os.environ["FLUXTRUE_BUILD_DIR"]) / "motors" / "hsm1" / "fluxtrue_vecu"
     with tempfile.TemporaryDirectory() as folder:
         short = Path(folder) / "elf"
-        subprocess.run(["objcopy", "--strip-debug", str(program), str(short)], check=True)
+        kept = [f"--keep-symbol={name}" for name in (OBJECT, MOTOR_OBJECT)]
+        subprocess.run(["objcopy", "--strip-all", *kept, str(program), str(short)], check=True)
         return short.read_bytes()
 
 
@@ -145,6 +149,30 @@ def recording(text: str | None = None) -> bytes:
         path = Path(folder) / "drive.mf4"
         log.write(path, Interface("a DBC", text if text is not None else interface.text), [torque])
         return path.read_bytes()
+
+
+@cache
+def steps() -> str:
+    """The finished steps of a commissioning, as its work folder keeps them for the valid call."""
+    from hashlib import sha256
+
+    import numpy as np
+    from abused import MAP, MOTOR
+
+    from fluxtrue_tools.commission import bursts, connection, drag, levels, plan, spin, turning, work
+    from fluxtrue_tools.commission.steps import Found
+
+    wiring = turning.Connection(4, True, 0.25)
+    raw = bursts.Raw(np.array([0j, 1.5 - 2j]), np.array([3j, 4.0 + 0j]), np.array([0.1, 0.2]), np.zeros(2), 1e-4)
+    found = Found(0.5 - 0.25j, connection.Followed(7.5, -4.01, 0.1, wiring), spin.Spun(wiring, 0.08, 1e-4, 2e-4, 1e-5),
+                  drag.Drag(0.06, 1e-4, 0.1, 2e-3, 3e-6, 10.0, 100.0),
+                  levels.Resistance(0.02, 1e-5, 1.5, 0.5, np.array([10.0, 20.0]), np.array([0.2, 0.4])),
+                  plan.First(2e-4, 5e-4, 200.0), [raw])  # fmt: skip
+    belongs = {"--motor": sha256((MOTOR + MAP).encode()).hexdigest(), "--machine": "hsm1", "--seed": "1",
+               "connection": "True", "bus": "none"}  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder:
+        work.Work(Path(folder), belongs).save(("offsets", "resistance"), found)
+        return (Path(folder) / work.NAME).read_text()
 
 
 def arrays() -> dict[str, object]:

@@ -101,6 +101,35 @@ def test_a_value_in_another_unit_beside_a_map_is_refused_or_warned_of(text: str)
     abuse(files, ["motor", "build", "m", "--out", "o", "--no-report"], ["o/motor.json"], inspect=told)
 
 
+# A motor of 24 V and one of 800 V beside the one of 350 V: pole pairs, ohm, A, N·m, rpm, kg·m², V·s, H, V, Hz, s, A.
+NUMBERS = ("pole_pairs", "r_ohm", "i_max_A", "torque_max_Nm", "speed_max_rpm", "inertia_kgm2", "psi_f_Vs", "ld_H",
+           "lq_H", "vdc_V", "pwm_hz", "dead_time_s", "current_full_scale_A")  # fmt: skip
+MACHINES = ((4, 0.02, 250.0, 100.0, 6000.0, 0.05, PSI_F, L_D, L_Q, 350.0, 1e4, 2e-6, 400.0),
+            (21, 0.105, 40.0, 3.0, 2400.0, 6e-5, 2.4e-3, 30e-6, 30e-6, 24.0, 4e4, 5e-7, 60.0),
+            (10, 0.016, 353.0, 500.0, 4500.0, 0.09, 0.0993, 292e-6, 315e-6, 800.0, 1e4, 2e-6, 500.0))  # fmt: skip
+
+
+@st.composite
+def far_from_a_machine(draw: Callable[..., Any]) -> str:
+    """Up to four values of a machine moved by up to three decades, and as often a value of another key."""
+    values = dict(zip(NUMBERS, draw(st.sampled_from(MACHINES)), strict=True))
+    for key in draw(st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=4, unique=True)):
+        moved = values[key] * 10.0 ** draw(st.floats(-3.0, 3.0))
+        values[key] = max(1, round(moved)) if key == "pole_pairs" else float(f"{moved:.4g}")
+    more = draw(st.sampled_from(["", "", "iron_loss_eddy = 500.0", "iron_loss_hysteresis = 5000.0"]))
+    lines = [f"{key} = {value!r}" for key, value in values.items()]
+    at = NUMBERS.index("vdc_V")
+    machine = ['name = "far"', "r_temp_coeff_per_K = 0.00393", *lines[:at], more]
+    return "\n".join(["[machine]", *machine, "[inverter]", "adc_bits = 12", *lines[at:]]) + "\n"
+
+
+@ABUSED_LESS
+@given(far_from_a_machine())
+def test_values_far_from_those_of_a_machine(text: str) -> None:
+    """Most are refused, and for many of them the advice tries machines that are further away still."""
+    abuse({"m/motor.toml": text}, ["motor", "check", "m"])
+
+
 @st.composite
 def wrong_rows(draw: Callable[..., Any], good: Rows) -> Rows:
     """One error in a table of currents and flux linkages."""

@@ -11,7 +11,27 @@ from fluxtrue_tools.motor.config import load_config
 from fluxtrue_tools.motor.motor import load_motor
 
 # change, words that the message must contain
+# A motor of 24 V and 2.4 mV·s: keys that are tried for the advice make its flux small against the voltage.
+SMALL = {"pole_pairs": 21, "r_ohm": 0.105, "i_max_A": 40.0, "torque_max_Nm": 3.0, "inertia_kgm2": 6e-5,
+         "ld_H": 30e-6, "lq_H": 30e-6, "psi_f_Vs": 2.4e-3}  # fmt: skip
+SMALL_INVERTER = {"vdc_V": 24.0, "pwm_hz": 40000.0, "dead_time_s": 5e-7, "current_full_scale_A": 60.0}
 BAD = [
+    (
+        {"machine": SMALL | {"speed_max_rpm": 1.0}, "inverter": SMALL_INVERTER},
+        ["machine.speed_max_rpm = 1 rpm, allowed: from 6.99 rpm"],
+    ),
+    (
+        {"machine": SMALL | {"speed_max_rpm": 2400.0, "iron_loss_eddy": 500.0}, "inverter": SMALL_INVERTER},
+        ["machine.iron_loss_eddy = 500, allowed: up to 2.49"],
+    ),
+    (
+        {
+            "machine": SMALL
+            | {"speed_max_rpm": 12000.0, "psi_f_Vs": 3e-4, "ld_H": 3e-6, "lq_H": 3e-6, "torque_max_Nm": 0.3},
+            "inverter": SMALL_INVERTER | {"vdc_V": 60.0},
+        },
+        ["inverter.vdc_V = 60 V, allowed: up to 36 V", "0.323 mV·s, is so small for vdc_V", "up to 5.02e+04 rad/s"],
+    ),
     ({"machine": {"pole_pairs": None}}, ["machine.pole_pairs", "missing", "whole number from 1 to 50"]),
     ({"machine": {"pole_pairs": 0}}, ["machine.pole_pairs = 0", "from 1 to 50"]),
     ({"machine": {"pole_pairs": 2.5}}, ["machine.pole_pairs = 2.5", "whole number"]),

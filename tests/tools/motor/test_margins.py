@@ -26,7 +26,7 @@ TABLE = {0.0: (52, 57, 1.50, 3.5), 0.2: (30, 48, 1.57, 3.3), 0.4: (17, 44, 1.63,
          0.8: (4, 57, 1.68, 2.5), 1.0: (None, 56, 1.76, 2.3), 1.2: (None, 57, 1.77, 2.3)}  # fmt: skip
 
 
-def test_the_phase_margin_is_40_degrees_and_more_at_every_speed_that_is_accepted() -> None:
+def test_the_phase_margin_of_the_law_for_turning_fields_is_40_degrees_and_more_at_every_speed() -> None:
     for theta in np.arange(-ANGLE_PER_PERIOD_MAX, ANGLE_PER_PERIOD_MAX + 0.01, 0.02):
         margin, sensitivity = turning(theta).margins()
         assert margin >= PHASE_MARGIN_MIN_DEG, theta

@@ -62,6 +62,31 @@ def test_a_polar_half_map_becomes_a_motor_that_builds(tmp_path: Path) -> None:
     assert built.returncode == 0 and built.stderr == "", built.stderr
 
 
+@pytest.mark.parametrize(("line", "said"), [
+    ("[machine]\nflux_map = 1979-05-27", "machine.flux_map = datetime.date"),
+    ("[machine]\nflux_map = ''", "machine.flux_map = ''"),
+    ("[machine]\nld_H = nan", "machine.ld_H = nan"), ("flux_map = 'map.csv'\n[machine]", "'flux_map': unknown key"),
+    ("[machine]\n'a b' = 1", "'machine.a b': unknown key"),
+    ("[machine.r_ohm]\nx = 1", "machine.r_ohm = {'x': 1}, allowed"),
+    ("[machine]\nname = 1979-05-27", "machine.name = datetime.date(1979, 5, 27), allowed: a number or text"),
+])  # fmt: skip
+def test_a_motor_toml_that_cannot_be_meant_is_refused_by_its_key(
+    tmp_path: Path, importer: Importer, line: str, said: str
+) -> None:
+    path = written(tmp_path / "map.csv", HEADER, *HALF, *psi(*HALF), torque(*HALF))
+    (tmp_path / "motor.toml").write_text(line + "\n", encoding="utf-8")
+    with pytest.raises(FluxtrueError) as error:
+        importer(path, motor=tmp_path / "motor.toml")
+    assert str(error.value).startswith(str(tmp_path / "motor.toml")) and said in str(error.value)
+
+
+def test_an_option_that_contradicts_the_header_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "map.csv", "i_d,i_q,Psi_d [Vs],Psi_q [Vs],torque", *HALF, *psi(*HALF), torque(*HALF))
+    done = command("import", path, "--format", "csv", "--flux-unit", "mVs", "--out", tmp_path / "o", *given())
+    assert done.returncode == 2 and not (tmp_path / "o").exists()
+    assert "--flux-unit mVs: the header of" in done.stderr and "says Vs, allowed: the same" in done.stderr
+
+
 @pytest.mark.parametrize("places", [HALF, FULL], ids=["half", "full"])
 def test_the_map_has_the_machines_torque(tmp_path: Path, importer: Importer, places: tuple) -> None:
     """As motor build reads it, on currents that are not its nodes; the curl is that of its bicubic interpolation."""

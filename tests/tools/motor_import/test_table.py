@@ -57,6 +57,35 @@ def test_a_table_is_read_in_the_encodings_of_windows(tmp_path: Path, encoding: s
     assert found["psi_q"] == pytest.approx(PSI[1], rel=1e-8, abs=1e-12)
 
 
+@pytest.mark.parametrize("header", [
+    "Id [A],Iq [A],Psi_d [mVs],Psi_q [mVs]", "i_d (A),i_q (A),psi_d (mWb),psi_q (mWb)", "Id / A,Iq / A,ψ,psi_q",
+    "Id in A,Iq in A,Flux D / mV·s,Flux Q / mV·s",
+])  # fmt: skip
+def test_units_in_the_header_are_understood(tmp_path: Path, header: str) -> None:
+    (tmp_path / "map.csv").write_text(text(header.replace("ψ", "Psi_d [ mVs ]"), ";", comma=True), encoding="utf-8")
+    found = read_map(tmp_path / "map.csv", ())
+    assert set(found.quantities) == {"i_d", "i_q", "psi_d", "psi_q"}
+    assert found.stated == {"flux_unit": "mVs"}
+
+
+def test_a_unit_in_a_chosen_header_counts_too(tmp_path: Path) -> None:
+    (tmp_path / "map.csv").write_text(text("a,b,Fluss längs [mVs],Fluss quer [mVs]"), encoding="utf-8")
+    given = ("i_d=a", "i_q=b", "psi_d=Fluss längs [mVs]", "psi_q=Fluss quer [mVs]")
+    assert read_map(tmp_path / "map.csv", given).stated == {"flux_unit": "mVs"}
+
+
+def test_a_unit_that_is_no_unit_of_the_quantity_does_not_make_it_known(tmp_path: Path) -> None:
+    (tmp_path / "map.csv").write_text(text("Id [kA],Iq [kA],psi_d,psi_q"), encoding="utf-8")
+    with pytest.raises(FluxtrueError, match="no header line"):
+        read_map(tmp_path / "map.csv", ())
+
+
+def test_two_units_of_flux_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "map.csv").write_text(text("Id [A],Iq [A],Psi_d [Vs],Psi_q [mVs]"), encoding="utf-8")
+    with pytest.raises(FluxtrueError, match=r"columns in Vs and in mVs \('Psi_q \[mVs\]'\), allowed: one unit"):
+        read_map(tmp_path / "map.csv", ())
+
+
 def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     (tmp_path / "map.csv").write_bytes(b"\x81\x8d" + text(USUAL).encode())
     with pytest.raises(FluxtrueError, match="map.csv: not text in UTF-8, UTF-16 or Windows-1252"):

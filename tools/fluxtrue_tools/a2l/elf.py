@@ -180,6 +180,9 @@ def _describe(elf: ELFFile, path: Path) -> Description:
         )
         for wanted in ("value", "measure", "frozen", "scope")
     }  # fmt: skip
+    for kind, what in (("value", "value to calibrate"), ("measure", "measurement")):
+        if not placed[kind]:
+            raise FluxtrueError(f"{path}: section '{SECTION}' has no {what}: not a firmware that serves XCP")
     words = tuple(Word(value.base, kind == "bit", number, value.name.lower(), value.text)
                   for kind, value, number in records if kind in ("word", "bit"))  # fmt: skip
     signals = tuple(Signal(value.name, value.text, _scale(value.base, bases), number)

@@ -55,8 +55,9 @@ class Store:
         if not path.is_file():
             write_text(path, json.dumps(manifest, indent=1) + "\n")
             return
-        for key, was in self._manifest(path).items():
-            if manifest.get(key) != was:
+        was = self._manifest(path)
+        for key in manifest | was:
+            if manifest.get(key) != was.get(key):
                 raise FluxtrueError(
                     f"{path}: these results were made with another {key}, allowed: the same one, another --out, or "
                     "--fresh to throw them away"
@@ -66,7 +67,7 @@ class Store:
     def _manifest(path: Path) -> dict[str, Any]:
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise FluxtrueError(f"{path}: not a campaign's manifest ({error})") from error
         if not isinstance(data, dict):
             raise FluxtrueError(f"{path}: not a campaign's manifest")
@@ -84,11 +85,21 @@ class Store:
         if not rows:
             return
         with atomic(self._path(case)) as scratch:
-            pd.DataFrame(rows).to_parquet(scratch, index=False)
+            pd.DataFrame(rows).to_parquet(scratch, index=False, write_page_checksum=True)
+
+    def _case(self, case: int) -> pd.DataFrame:
+        """A finished case; one whose file was damaged would change the figures of all."""
+        path = self._path(case)
+        try:
+            return pd.read_parquet(path, page_checksum_verification=True)
+        except Exception as error:  # what the reader raises on damaged files is not documented
+            said = " ".join(str(error).split())[:120] or type(error).__name__
+            raise FluxtrueError(f"{path}: not the results of a case ({said}), allowed: the file as the campaign has "
+                                "written it; without it the same command runs the case again") from None  # fmt: skip
 
     def load(self, cases: range) -> pd.DataFrame:
         """Every finished case of the range, and the same as one file."""
-        frames = [pd.read_parquet(self._path(case)) for case in cases if self._path(case).is_file()]
+        frames = [self._case(case) for case in cases if self._path(case).is_file()]
         if not frames:
             raise FluxtrueError(f"{self.folder}: no case has a window: no plant reaches windows.torque_min_Nm at any "
                                 "speed drawn, allowed: less torque, lower speeds or a smaller spread")  # fmt: skip

@@ -69,7 +69,8 @@ class Target:
         from fluxtrue_tools.commission.work import Work
         from fluxtrue_tools.motor.names import source_files
 
-        content = b"".join(path.read_bytes() for path in source_files(nameplate))
+        # A file that is missing is reported when the motor is loaded.
+        content = b"".join(path.read_bytes() for path in source_files(nameplate) if path.is_file())
         if self.interface is not None:
             where = {"bus": f"{self.interface} {self.channel} {sorted(self.options.items())}"}
         else:
@@ -138,6 +139,9 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
         raise FluxtrueError("--out: missing, wanted: a folder for the result, or --dry-run")
     if resume and work is None:
         raise FluxtrueError("--resume: wanted: --work with the folder that has the finished steps")
+    connected = all(step.name != "phases" for step in wanted)
+    kept = None if work is None or dry_run else target.work(work, nameplate, connected)
+    earlier = kept.load() if kept is not None and resume else None  # refused before anything is built or started
     motor = motors.load(str(nameplate), where="--motor")
     known = nameplate_of(nameplate, motor)
     if out is None or dry_run:
@@ -146,10 +150,8 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
         return
     with paths.outputs() as outputs:
         staging = outputs.scratch(out)
-        connected = all(step.name != "phases" for step in wanted)
-        kept = None if work is None else target.work(work, nameplate, connected)
         with target.drive(motor, known, connected) as drive:
-            found = run(drive, wanted, known, click.echo, kept, resume)
+            found = run(drive, wanted, known, click.echo, kept, earlier)
         text, _ = result.write(found, known, nameplate, staging, out)
     click.echo(text, nl=False)
     click.echo(f"written to {out}")

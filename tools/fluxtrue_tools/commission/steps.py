@@ -72,11 +72,13 @@ class Step:
     seconds: float  # about as long does the drive run, in software in the loop
 
 
+Earlier = tuple[tuple[str, ...], Found]  # finished steps, and what they have found
+
+
 class Kept(Protocol):
     """Where finished steps are kept: work.py."""
 
     def save(self, steps: tuple[str, ...], found: Found) -> None: ...
-    def load(self) -> tuple[tuple[str, ...], Found]: ...
 
 
 def _enable(drive: Capture) -> None:
@@ -211,7 +213,7 @@ def _connect(drive: Capture, found: Found, known: Nameplate) -> None:
 
 
 def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None,
-        earlier: tuple[tuple[str, ...], Found], shown: Shown) -> Found:  # fmt: skip
+        earlier: Earlier, shown: Shown) -> Found:  # fmt: skip
     done, found = earlier
     if done:
         _connect(drive, found, found.known(known))
@@ -229,14 +231,14 @@ def _go(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str]
 
 
 def run(drive: Capture, steps: list[Step], known: Nameplate, say: Callable[[str], None], kept: Kept | None = None,
-        resume: bool = False, shown: Shown = on_terminal) -> Found:  # fmt: skip
+        earlier: Earlier | None = None, shown: Shown = on_terminal) -> Found:  # fmt: skip
     """All steps; at the end, also after a failure, switching is disabled and the drive's settings are as before.
 
-    kept     where finished steps are kept
-    resume   those that are there are not repeated
-    shown    context of each step, which shows how far it is
+    kept      where finished steps are kept
+    earlier   those of a run before, which are not repeated
+    shown     context of each step, which shows how far it is
     """
-    earlier = kept.load() if kept is not None and resume else ((), Found())
+    earlier = earlier if earlier is not None else ((), Found())
     before = {name: drive.get(name) for name in drive.settings}
     try:
         for name in drive.switched_off:  # the voltages are evaluated without them

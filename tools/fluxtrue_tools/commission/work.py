@@ -2,11 +2,13 @@
 """The work folder of a commissioning: the finished steps, so that a run that was interrupted can go on.
 
 A step is kept when it has ended well, in one file that is replaced as a whole. The map is not: it is the last step, and
-without it nothing is left to be done.
+without it nothing is left to be done. The file has a checksum, because a number that was changed in it would become a
+current or an angle of the machine on the bench, and nothing else could tell it from a measured one.
 """
 
 import json
 from dataclasses import fields, is_dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
@@ -55,6 +57,11 @@ def _decoded(value: Any) -> Any:
     return TYPES[value["type"]](**{name: _decoded(part) for name, part in value.items() if name != "type"})
 
 
+def _checksum(content: dict[str, Any]) -> str:
+    """Of everything else in the file."""
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 class Work:
     """Finished steps in a folder.
 
@@ -69,7 +76,8 @@ class Work:
         if LAST in steps:
             return
         kept = {name: _encoded(getattr(found, name)) for name in KEPT}
-        text = json.dumps({"belongs": self._belongs, "steps": steps, "found": kept}, indent=1)
+        content = {"belongs": self._belongs, "steps": steps, "found": kept}
+        text = json.dumps({"checksum": _checksum(content), **content}, indent=1)
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -81,12 +89,16 @@ class Work:
         """The finished steps and what they have found."""
         try:
             data = json.loads(self._path.read_text(encoding="utf-8"))
+            if data.pop("checksum") != _checksum(data):
+                raise ValueError("it was changed after it had been written")
             belongs, steps = dict(data["belongs"]), tuple(map(str, data["steps"]))
             found = Found(**{name: _decoded(data["found"][name]) for name in KEPT})
         except FileNotFoundError:
             return (), Found()
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise FluxtrueError(f"{self._path}: not the steps of a commissioning ({error})") from error
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            said = " ".join(str(error).split())
+            raise FluxtrueError(f"{self._path}: not the steps of a commissioning ({said}), allowed: the file as "
+                                "commission has written it, or no --resume to begin again") from error  # fmt: skip
         other = [name for name, value in self._belongs.items() if belongs.get(name) != value]
         if other:
             raise FluxtrueError(f"{self._path}: measured with another {' and another '.join(other)}, allowed: the "

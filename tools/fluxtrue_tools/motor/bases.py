@@ -8,6 +8,7 @@ import numpy as np
 
 from fluxtrue_tools.motor.config import MotorConfig
 from fluxtrue_tools.motor.flux_model import FluxModel, flux
+from fluxtrue_tools.motor.quantise import Unfit
 
 VOLTAGE_PER_VDC = 1.5
 VOLTAGE_STEP_V = 10.0
@@ -75,6 +76,11 @@ def _omega_and_voltage(config: MotorConfig, model: FluxModel) -> tuple[float, fl
     omega_turns = TURNS_PER_STEP_MAX * 2.0 * math.pi * pwm_hz / periods_per_step(pwm_hz)
     omegas = [max(ratio * config.omega_max_rad_s, omega_min) for ratio in OMEGA_PER_OMEGA_MAX]
     omegas = [omega for omega in omegas if omega <= omega_turns]
+    if not omegas:
+        raise Unfit(
+            f"the largest flux linkage, {1e3 * psi_max:.3g} mV·s, is so small for vdc_V that its speed base would be "
+            f"{max(omega_min, config.omega_max_rad_s):.4g} rad/s electrical, allowed: up to {omega_turns:.4g} rad/s"
+        )
     choices = [(omega, _voltage(config, psi_max, omega)) for omega in omegas]
     l_min = inductance_min(model, config.machine.i_max_A)
     wanted = STEP_USE_WANTED * l_min * config.inverter.current_full_scale_A * pwm_hz

@@ -98,11 +98,13 @@ def _line(label: str, values: list[tuple[Any, str]]) -> str:
 def table(data: dict[str, Any]) -> str:
     """Summary of the results."""
     mean, window = data["mean"], data["window"]
+    reverses = window["request_reverses"]
     return "\n".join(
         [
             f"{data['motor']}, {data['controller']}: {data['duration_s']:g} s simulated, "
             f"{data['realtime_factor']:.3g} times real time",
-            f"means from {window['from_s']:g} to {window['to_s']:g} s",
+            f"means from {window['from_s']:g} to {window['to_s']:g} s"
+            + (", in which the requested torque reverses: % of its mean; choose a [window]" if reverses else ""),
             _line("  torque requested", [(mean["torque_requested_Nm"], "N·m")]),
             _line(
                 "  shaft torque",

@@ -35,7 +35,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "controller": scenario.controller.kind,
         "duration_s": scenario.duration_s,
         "seed": scenario.seed,
-        "window": {"from_s": first, "to_s": last},
+        "window": {"from_s": first, "to_s": last, "request_reverses": recording.request_reverses},
         "torque_error_Nm": _rounded(error),
         "torque_error_percent": _rounded(recording.torque_error_percent),
         "estimate_error_percent": _rounded(recording.error_percent("torque_estimated_Nm", "true_torque_Nm")),

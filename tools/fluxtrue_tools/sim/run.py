@@ -102,6 +102,12 @@ class Recording:
         return self.error_percent("true_torque_Nm", "torque_requested_Nm")
 
     @property
+    def request_reverses(self) -> bool:
+        """Whether the requested torque has both signs in the window: a share of its mean then says little."""
+        requested = self["torque_requested_Nm"][self.window(*self.scenario.averaged())]
+        return bool(requested.min() < 0.0 < requested.max())
+
+    @property
     def fault_word(self) -> int:
         """Every fault bit that was ever set."""
         return int(np.bitwise_or.reduce(self["fault_word"].astype(np.int64)))

@@ -59,20 +59,6 @@ class EndedByUser(FluxtrueError):
     """Stop, or the page is gone."""
 
 
-class _Earlier:
-    """The accepted steps, as steps.run() takes them; what it finds is kept by the server when it is accepted."""
-
-    def __init__(self, job: Job) -> None:
-        self._job = job
-
-    def save(self, steps: tuple[str, ...], found: Found) -> None:
-        """Nothing is kept before it has been accepted."""
-
-    def load(self) -> tuple[tuple[str, ...], Found]:
-        """What has been accepted. It came through a pipe: what a step changes in it is this step's own."""
-        return self._job.done, self._job.found
-
-
 class _Turns:
     """The child's end of InStep. A turn that is not waited for is answered, too: they are counted."""
 
@@ -208,7 +194,8 @@ class _Child:
         self._step_s, self._is_measuring = 0.0, True
         self._consent.give(self._line.now_s)
         try:
-            found = steps.run(self._drive, [job.step], job.known, lambda _: None, _Earlier(job), resume=True,
+            # The accepted steps came through a pipe: what this step changes in them is its own.
+            found = steps.run(self._drive, [job.step], job.known, lambda _: None, earlier=(job.done, job.found),
                               shown=self._watched)  # fmt: skip
             answer: tuple[Any, ...] = ("found", job.step.name, found)
         except FluxtrueError as error:

@@ -8,14 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
 from fluxtrue_tools import strict
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.motor.config import FULL_SCALE_PER_I_MAX, MotorConfig, complaint
+from fluxtrue_tools.motor.config import FULL_SCALE_PER_I_MAX, Machine, MotorConfig, complaint
 from fluxtrue_tools.motor.map_import.grid import Grid
 from fluxtrue_tools.motor.names import FILE_NAME
 
 MAP = "flux_map.csv"
 SOURCES = ("flux_map", "ld_H", "lq_H", "psi_f_Vs")
+KEY = re.compile(r"[a-z]+\.[A-Za-z0-9_]+")
+LEFT_OUT = tuple(f"machine.{name}" for name in SOURCES)  # of --motor: the imported map takes their place
 ASSUMED: dict[str, Any] = {
     "machine.r_temp_coeff_per_K": 0.00393,  # copper
     "inverter.dead_time_s": 2e-6,
@@ -81,12 +85,32 @@ def _given(text: str) -> tuple[str, Any]:
     """KEY=VALUE of --set."""
     key, sign, value = text.partition("=")
     allowed = "allowed: SECTION.KEY=VALUE of motor.toml, as in machine.pole_pairs=4"
-    if not sign or not re.fullmatch(r"[a-z]+\.[A-Za-z0-9_]+", key.strip()):
+    if not sign or not KEY.fullmatch(key.strip()):
         raise FluxtrueError(f"--set {text[:60]!r}: {allowed}")
     try:
         return key.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
     except (ValueError, RecursionError):
         raise FluxtrueError(f"--set {text[:60]!r}: not a TOML value; {allowed}, text in quotation marks") from None
+
+
+def _check_form(origin: Path | str, key: str, value: Any) -> None:
+    """Whether motor.toml can have the key and the value at all; what they mean is checked with all of them."""
+    if not KEY.fullmatch(key):
+        raise FluxtrueError(f"{origin}: {key[:60]!r}: unknown key, allowed: keys of the sections "
+                            f"{', '.join(MotorConfig.model_fields)}")  # fmt: skip
+    if not isinstance(value, str | int | float):
+        raise FluxtrueError(f"{origin}: {strict.quantity(key, value)}, allowed: a number or text")
+
+
+def _check_left_out(motor: Path, key: str, value: Any) -> None:
+    """A value that the imported map replaces must be possible all the same: a typing error is one anywhere."""
+    field = Machine.model_fields[key.removeprefix("machine.")]
+    try:
+        TypeAdapter(field.annotation, config=ConfigDict(strict=True, allow_inf_nan=False)).validate_python(value)
+    except ValidationError as error:
+        said = error.errors()[0]["msg"]
+        raise FluxtrueError(f"{motor}: {strict.quantity(key, value)}: {said[0].lower()}{said[1:]}; or leave it out, "
+                            "the imported map gives the flux") from None  # fmt: skip
 
 
 def settings(path: Path, facts: dict[str, Any], motor: Path | None, given: tuple[str, ...]) -> Settings:
@@ -100,12 +124,16 @@ def settings(path: Path, facts: dict[str, Any], motor: Path | None, given: tuple
         except (ValueError, RecursionError) as error:
             raise FluxtrueError(f"{motor}: not valid TOML: {error}") from None
         for key, value in _keys(data).items():
-            if key.removeprefix("machine.") not in SOURCES:  # the imported map takes their place
+            _check_form(motor, key, value)
+            if key in LEFT_OUT:
+                _check_left_out(motor, key, value)
+            else:
                 found.put(key, value, str(motor))
     for text in given:
         key, value = _given(text)
-        if key.removeprefix("machine.") in SOURCES:
+        if key in LEFT_OUT:
             raise FluxtrueError(f"--set {key}: has no effect, the imported map gives the flux")
+        _check_form("--set", key, value)
         found.put(key, value, "--set")
     for key, value in ASSUMED.items():
         found.default(key, value)

@@ -34,7 +34,9 @@ class IronLoss:
 
 def read(path: Path, given: tuple[str, ...], convention: Convention, turn: complex, pole_pairs: int) -> Losses:
     """A table of losses over speed or frequency, and over currents if it has them."""
-    found = table.read(path, given, LOSS_QUANTITIES, ("loss",), OPTION)
+    found, said = table.read(path, given, LOSS_QUANTITIES, ("loss",), OPTION)
+    if "angle_unit" in said and said["angle_unit"] != convention.angle_unit:
+        raise FluxtrueError(f"{path}: gamma in {said['angle_unit']}, allowed: {convention.angle_unit}, as in the map")
     clock = [name for name in ("speed", "frequency") if name in found]
     if len(clock) != 1:
         what = "both speed and frequency" if clock else "neither speed nor frequency"

@@ -20,7 +20,7 @@ from fluxtrue_tools.motor.map_import.changes import Changes, changes
 from fluxtrue_tools.motor.map_import.coenergy import Fit, Points, fit, fit_separately
 from fluxtrue_tools.motor.map_import.frame import Convention
 from fluxtrue_tools.motor.map_import.grid import Grid, chosen, default_i_max, make_grid
-from fluxtrue_tools.motor.map_import.source import Raw
+from fluxtrue_tools.motor.map_import.source import Losses, Raw
 from fluxtrue_tools.motor.motor import Motor, load_motor
 from fluxtrue_tools.motor.references import Solver
 
@@ -78,13 +78,17 @@ def _convention(request: Request, raw: Raw) -> Convention:
         if name in raw.fixed:
             raise FluxtrueError(f"{OPTIONS[name]}: has no effect with --format {request.format}, which fixes it: "
                                 f"{raw.fixed[name]}")  # fmt: skip
+    for name, value in raw.stated.items():
+        if request.convention.get(name, value) != value:
+            raise FluxtrueError(f"{OPTIONS[name]} {request.convention[name]}: the header of {request.path} says "
+                                f"{value}, allowed: the same, or without this option")  # fmt: skip
     polar = "gamma" in raw.quantities
     for name in ("angle_from", "angle_unit"):
         if name in request.convention and not polar:
             raise FluxtrueError(f"{OPTIONS[name]}: has no effect on points given by i_d and i_q")
     if polar and "angle_from" not in request.convention:
         raise FluxtrueError(f"{request.path}: i_s and gamma: wanted: --angle-from d or q, the axis where gamma is 0")
-    return Convention(**(raw.fixed | request.convention))
+    return Convention(**(raw.fixed | raw.stated | request.convention))
 
 
 def _settings(request: Request, raw: Raw, out: Path) -> folder.Settings:
@@ -102,23 +106,17 @@ def _model(staging: Path, i_max_A: float) -> SplineModel:
 
 
 def _losses(
-    request: Request,
-    raw: Raw,
-    convention: Convention,
-    turn: complex,
-    pole_pairs: int,
-    model: FluxModel,
-    i_max_A: float,
-) -> iron_loss.IronLoss | None:
+    request: Request, raw: Raw, convention: Convention, turn: complex, pole_pairs: int
+) -> tuple[Losses, str] | None:
+    """Iron losses, and what gave them for messages."""
     if request.iron_loss is not None:
-        found = iron_loss.read(request.iron_loss, request.iron_loss_columns, convention, turn, pole_pairs)
-        return iron_loss.fit(found, model, i_max_A, str(request.iron_loss))
+        path, columns = request.iron_loss, request.iron_loss_columns
+        return iron_loss.read(path, columns, convention, turn, pole_pairs), str(path)
     if request.iron_loss_points:
-        found = iron_loss.from_points(request.iron_loss_points, pole_pairs)
-        return iron_loss.fit(found, model, i_max_A, "--iron-loss-point")
+        return iron_loss.from_points(request.iron_loss_points, pole_pairs), "--iron-loss-point"
     if raw.losses is not None:
         i = turn * convention.amperes * (raw.losses.i_d + 1j * raw.losses.i_q)
-        return iron_loss.fit(replace(raw.losses, i_d=i.real, i_q=i.imag), model, i_max_A, str(raw.path))
+        return replace(raw.losses, i_d=i.real, i_q=i.imag), str(raw.path)
     return None
 
 
@@ -171,12 +169,13 @@ def run(request: Request, staging: Path, out: Path) -> tuple[Imported, Motor]:
         found.default("machine.i_max_A", default_i_max(points, path))
         i_max = found.number("machine.i_max_A", 1e-3)
         used = chosen(points, i_max, path)
+        losses = _losses(request, raw, convention, framed.turn, pole_pairs)  # a bad table is refused before the fit
         fitted = fit(used, i_max)
         grid = make_grid(fitted.model, used, i_max, request.nodes, path)
         (staging / folder.MAP).write_text(folder.flux_map_csv(grid, f"imported from {path.name}"), encoding="utf-8")
         with _naming(path, staging):
             model = _model(staging, i_max)
-        loss = _losses(request, raw, convention, framed.turn, pole_pairs, model, i_max)
+        loss = None if losses is None else iron_loss.fit(losses[0], model, i_max, losses[1])
         _complete(found, model, loss, request.iron_loss or path)
         (staging / folder.FILE_NAME).write_text(folder.motor_toml(found), encoding="utf-8")
         with _naming(path, staging):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a file gives: quantities by name, values for motor.toml, and what its format fixes."""
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,11 +35,23 @@ ALIASES = {
     "gamma": ("gamma", "gammadeg", "beta", "betadeg", "phaseadvance", "phaseadvancedeg", "currentangle"),
     "psi_d": ("psid", "psidvs", "psidwb", "psidmap", "fd", "fluxd", "fluxlinkaged", "lambdad", "phid"),
     "psi_q": ("psiq", "psiqvs", "psiqwb", "psiqmap", "fq", "fluxq", "fluxlinkageq", "lambdaq", "phiq"),
-    "torque": ("torque", "torquenm", "t", "tnm", "tem", "taum", "electromagnetictorque"),
+    "torque": ("torque", "torquenm", "t", "tnm", "mnm", "tem", "taum", "electromagnetictorque", "drehmoment"),
     "speed": ("speed", "speedrpm", "n", "nrpm", "rpm"),
     "frequency": ("frequency", "frequencyhz", "f", "fhz", "hz"),
     "loss": ("loss", "lossw", "ironloss", "ironlossw", "pfe", "pfew", "coreloss"),
 }
+
+# A name with its unit: Psi_d [mVs], Psi_d (mVs), Psi_d / mVs, Psi_d in mVs.
+WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^]]*)\]|\(([^)]*)\)|/\s*(\S+)|\sin\s(\S+))")
+# Units that a header may have, and what the unit says about the source (the options of the command line).
+FLUX_UNITS = {"vs": {"flux_unit": "Vs"}, "wb": {"flux_unit": "Vs"}, "mvs": {"flux_unit": "mVs"},
+              "mwb": {"flux_unit": "mVs"}}  # fmt: skip
+UNITS: dict[str, dict[str, dict[str, str]]] = {
+    "i_d": {"a": {}}, "i_q": {"a": {}}, "i_s": {"a": {}},
+    "gamma": {"deg": {"angle_unit": "deg"}, "°": {"angle_unit": "deg"}, "rad": {"angle_unit": "rad"}},
+    "psi_d": FLUX_UNITS, "psi_q": FLUX_UNITS,
+    "torque": {"nm": {}}, "speed": {"rpm": {}, "1/min": {}}, "frequency": {"hz": {}}, "loss": {"w": {}},
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -61,6 +74,7 @@ class Raw:
     facts: dict[str, Any] = field(default_factory=dict)  # "machine.pole_pairs" and so on
     notes: list[str] = field(default_factory=list)
     losses: Losses | None = None
+    stated: dict[str, str] = field(default_factory=dict)  # options that the file's own units answer
 
 
 def plain(name: str) -> str:
@@ -68,9 +82,30 @@ def plain(name: str) -> str:
     return "".join(character for character in name.lower() if character.isalnum())
 
 
+def _parts(quantity: str, header: str) -> tuple[str, dict[str, str] | None]:
+    """The name in a header, and what its unit says; None without a unit of this quantity."""
+    found = WITH_UNIT.fullmatch(header.strip())
+    if found is None:
+        return header, None
+    unit = next(part for part in found.groups()[1:] if part is not None).lower()
+    return found[1], UNITS[quantity].get(re.sub("[ ·*]", "", unit))
+
+
 def known_as(quantity: str, name: str) -> bool:
-    """Whether a name is one of the usual ones of a quantity."""
-    return plain(name) in ALIASES[quantity]
+    """Whether a name, without or with a unit, is one of the usual ones of a quantity."""
+    bare, said = _parts(quantity, name)
+    return plain(name) in ALIASES[quantity] or (said is not None and plain(bare) in ALIASES[quantity])
+
+
+def stated(path: Path, headers: dict[str, str]) -> dict[str, str]:
+    """What the units of these columns, by their quantities, say about the source."""
+    found: dict[str, str] = {}
+    for quantity, header in headers.items():
+        for option, value in (_parts(quantity, header)[1] or {}).items():
+            if found.setdefault(option, value) != value:
+                raise FluxtrueError(f"{path}: columns in {found[option]} and in {value} ({header!r}), allowed: one "
+                                    "unit for both")  # fmt: skip
+    return found
 
 
 def mapping(given: tuple[str, ...], option: str, quantities: tuple[str, ...]) -> dict[str, str]:

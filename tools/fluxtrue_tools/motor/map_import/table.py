@@ -9,7 +9,7 @@ import numpy as np
 
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
-from fluxtrue_tools.motor.map_import.source import FLUXES, PLACES, QUANTITIES, Raw, known_as, mapping, place_of
+from fluxtrue_tools.motor.map_import.source import FLUXES, PLACES, QUANTITIES, Raw, known_as, mapping, place_of, stated
 from fluxtrue_tools.motor.text_table import ROWS_MAX, cells, number, numbered_lines, of_windows
 
 SEPARATORS = (";", "\t", ",")
@@ -39,8 +39,8 @@ def _is_header(places: dict[str, int], chosen: dict[str, str], wanted: tuple[str
 
 def _header(
     path: Path, lines: Lines, chosen: dict[str, str], quantities: tuple[str, ...], wanted: tuple[str, ...], option: str
-) -> tuple[int, str, dict[str, int], int]:
-    """Index of the header line, separator, columns, number of cells."""
+) -> tuple[int, str, dict[str, int], list[str]]:
+    """Index of the header line, separator, columns, all of its cells."""
     for index, (line, text) in enumerate(lines[:HEADER_LINES]):
         for separator in SEPARATORS:
             if separator not in text:
@@ -48,7 +48,7 @@ def _header(
             header = cells(path, line, text.lstrip("#% "), separator)
             places = _found(header, chosen, quantities)
             if _is_header(places, chosen, wanted):
-                return index, separator, places, len(header)
+                return index, separator, places, header
     first = lines[0][1].strip()[:100] if lines else ""
     named = "".join(f", {name} = {header!r}" for name, header in chosen.items())
     place = "" if "loss" in wanted else "i_d and i_q (or i_s and gamma), "
@@ -90,22 +90,24 @@ def _rows(path: Path, lines: Lines, separator: str, places: dict[str, int], widt
 
 def read(
     path: Path, given: tuple[str, ...], quantities: tuple[str, ...], wanted: tuple[str, ...], option: str = OPTION
-) -> dict[str, Array]:
-    """The quantities that the table has."""
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """The quantities that the table has, and what the units in its header say."""
     lines = [(n, text) for n, text in numbered_lines(path, decoded=of_windows) if text.strip()]
     if len(lines) > ROWS_MAX:
         raise FluxtrueError(f"{path}: {len(lines)} rows, allowed: up to {ROWS_MAX}")
     chosen = mapping(given, option, quantities)
-    top, separator, places, width = _header(path, lines, chosen, quantities, wanted, option)
+    top, separator, places, header = _header(path, lines, chosen, quantities, wanted, option)
     if any({*pair} <= {*places} for pair in PLACES):
         pair = place_of(set(places), chosen, path, option)
         spare = {name for other in PLACES for name in other} - {*pair}
         places = {name: place for name, place in places.items() if name not in spare}
-    rows = list(_rows(path, lines[top + 1 :], separator, places, width))
+    rows = list(_rows(path, lines[top + 1 :], separator, places, len(header)))
     values = np.array(rows, dtype=float).reshape(len(rows), len(places)).T
-    return dict(zip(places, values, strict=True))
+    said = stated(path, {name: header[place] for name, place in places.items()})
+    return dict(zip(places, values, strict=True)), said
 
 
 def read_map(path: Path, given: tuple[str, ...]) -> Raw:
     """A flux map as a list of points."""
-    return Raw(path, read(path, given, QUANTITIES, FLUXES))
+    found, said = read(path, given, QUANTITIES, FLUXES)
+    return Raw(path, found, stated=said)
