@@ -130,6 +130,8 @@ COUNTS = {
     "WINDOW_TICKS": "ticks of the watchdog",
     "READY_TICKS": "ticks of the timer", "PULSE_TICKS": "ticks of the timer",
     "START_TICKS": "ticks of the timer", "UNTIL_PWM_TICKS": "ticks of the timer",
+    "SAMPLING_ANGLE_TICKS": "ticks of the timer", "EXCITATION_FIRST_PER_S": "a rate by the core's clock, at the start",
+    "SETTLING_PERIODS": "periods of the excitation, whose filter follows the PWM frequency",
     "LAST_BUT_ONE": "steps of an update, whose rates are generated for its true time",
     "ATTEMPTS": "of a save",
 }  # fmt: skip
