@@ -5,7 +5,6 @@
 #include "types/faults.h"
 
 #define AT_ONCE (FAULT_OVER_VOLTAGE | FAULT_GATE)
-#define MOVED_FIRST (FAULT_TEMPERATURE | FAULT_OVER_SPEED) /* drive/switch_off.h */
 #define DUTY_MIDDLE 16384U
 #define DUTY_UPPER 32768U
 
@@ -55,7 +54,7 @@ void short_circuit_prepare(fast_state_t *fast, uint32_t periods)
 bool short_circuit_waits(fast_state_t *fast)
 {
     const uint32_t faults = fast->faults;
-    const bool at_once = (faults & AT_ONCE) != 0U || (faults & ~(uint32_t)MOVED_FIRST) == 0U;
+    const bool at_once = (faults & AT_ONCE) != 0U || (faults & ~FAULTS_CONTROLLED) == 0U;
     if (at_once || fast->short_circuit.waits == 0U) {
         fast->short_circuit.waits = 0;
         return false;

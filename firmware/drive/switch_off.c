@@ -4,8 +4,6 @@
 #define RAMP_STEPS 8U
 #define STEPS 10U /* with those in which the currents settle */
 #define BISECTIONS 15
-/* With these the currents are still controlled. */
-#define CONTROLLED (FAULT_TEMPERATURE | FAULT_OVER_SPEED)
 
 /* The current at which it cancels the flux of the magnets, by bisection: psi_d rises with i_d. */
 static int32_t short_circuit_i_d(const drive_t *drive, const snapshot_t *snapshot)
@@ -35,7 +33,7 @@ run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_stat
     switch_off_t *off = &task->switch_off;
     const bool controls = controls_at_speed(drive, wanted);
     off->holds = controls && wanted == RUN_STATE_OFF && *faults == 0U; /* (SS-12) */
-    const bool moves = controls && *faults != 0U && (*faults & ~(uint32_t)CONTROLLED) == 0U;
+    const bool moves = controls && *faults != 0U && (*faults & ~FAULTS_CONTROLLED) == 0U;
     if (!moves || off->steps == STEPS) {
         off->steps = 0;
         return off->holds ? RUN_STATE_RUN : wanted;

@@ -7,6 +7,7 @@
  *   X(NAME, bit, explanation): FAULT_NAME in C, the name in lower case everywhere else
  * Source   docs/theory/monitors.md, docs/architecture.md
  * Context  values only */
+#include <stdint.h>
 
 #define FAULT_LIST(X) \
     X(OVER_CURRENT, 0, "A phase current exceeds the trip level in one sample.") \
@@ -29,5 +30,9 @@
 #define FAULT_BIT(name, bit, text) FAULT_##name = 1u << (bit),
 enum { FAULT_LIST(FAULT_BIT) };
 #undef FAULT_BIT
+
+/** Faults after which the currents are still controlled: the drive moves them before it ends the control
+ * (drive/switch_off.h). */
+#define FAULTS_CONTROLLED ((uint32_t)FAULT_TEMPERATURE | (uint32_t)FAULT_OVER_SPEED)
 
 #endif
