@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus side of the page with the virtual ECU, without a browser. The test advances time, 40 ms at a time."""
 
+import multiprocessing
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from decimal import Decimal
+from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
-from fluxtrue_tools.live.bus_process import Reporter
+from fluxtrue_tools.live.bus_process import ENDED, BusProcess, Reporter
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Status
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
@@ -181,3 +185,30 @@ def test_the_end_of_the_virtual_ecu_is_reported_and_nothing_hangs(
     drive.link._thread.join()
     assert "bench" in drive.link.lost
     drive.close()
+
+
+class Strange(BusProcess):
+    """A server's end that fails at a message of its child."""
+
+    def take(self, message: tuple[Any, ...]) -> None:
+        """Fails always."""
+        raise ValueError(message)
+
+
+def waits_for_a_page(_: Any, connection: Connection) -> None:
+    """A child whose time stands until an answer comes; it ends when its connection does."""
+    connection.send(("status", Status(state="standby")))
+    connection.send(("turn",))
+    with suppress(EOFError):
+        connection.recv()
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_an_error_of_the_server_ends_the_child_and_lets_the_pages_go_on() -> None:
+    """Otherwise the child would wait for an answer without end, with switching enabled."""
+    in_step = InStep()
+    process = Strange(None, [], in_step, waits_for_a_page)
+    assert not in_step.due()  # waits until it has been released
+    process.close()
+    assert process.status().stopped == ENDED
+    assert multiprocessing.active_children() == []

@@ -260,12 +260,16 @@ class BusProcess:
 
     def _receive(self) -> None:
         try:
-            while True:
-                self.take(self._connection.recv())
-        except (EOFError, OSError):
+            with suppress(EOFError, OSError):
+                while True:
+                    self.take(self._connection.recv())
+        finally:
+            # Also after an error in take(): the child switches off when its connection ends, and no page waits for it.
             self._status = Status(stopped=self._status.stopped if not self._status.state else ENDED)
-        if self._in_step is not None:
-            self._in_step.release()
+            if self._in_step is not None:
+                self._in_step.release()
+            with self._sending:
+                self._connection.close()
 
     def take(self, message: tuple[Any, ...]) -> None:
         """One message of the child."""

@@ -63,7 +63,7 @@ def _map(found: Found, known: Nameplate, _: float) -> list[Row]:
          f"{1e3 * surface.left_Vs:.2g} mV·s", f"± at most {1e3 * MAP_SHARE * largest_Vs:.2g} mV·s"),
         ("Largest current", f"{found.largest_A:.4g} A", "", f"at most {known.i_max_A:g} A"),
         ("Movement of the rotor, electrical", f"{math.degrees(found.moved_rad):.1f}°", "",
-         f"a burst ends beyond {plan.ANGLE_DEG:g}°"),
+         f"a burst ends beyond {known.swing_deg:g}°"),
         ("Bursts that ended early", f"{len(failed)} of {len(found.bursts)}", "", f"at most {plan.LOST_MAX} lost"),
         *_gains(found),
     ]  # fmt: skip
