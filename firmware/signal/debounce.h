@@ -14,9 +14,16 @@
 
 #include "fx/q.h"
 
-/** True while the condition has held in this and the (samples - 1) calls before. Always inlined: as a function it would
- * add some 100 instructions to a step of the 1 kHz task. */
-__attribute__((always_inline)) static inline bool debounce_holds(uint8_t *count, bool condition, uint8_t samples)
+/* A call would add some 100 instructions to a step of the 1 kHz task. Without optimisation, as in the build that
+ * measures coverage, it is a function, because otherwise the branches of each caller would count with it. */
+#ifdef __OPTIMIZE__
+#define DEBOUNCE_INLINE __attribute__((always_inline)) static inline
+#else
+#define DEBOUNCE_INLINE static inline
+#endif
+
+/** True while the condition has held in this and the (samples - 1) calls before. */
+DEBOUNCE_INLINE bool debounce_holds(uint8_t *count, bool condition, uint8_t samples)
 {
     *count = condition ? (uint8_t)fx_min_s32(*count + 1, samples) : 0;
     return *count >= samples;
