@@ -4,14 +4,13 @@ instant, a disturbed frame is an invalid sample, and planted errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from planting import PlantedError, image_with_error
-from rotor_frame import error_A
+from sensor_drive import ANGLE, driving, is_right, the_angle_is_that_of_the_sampling_instant
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
@@ -19,13 +18,7 @@ from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
-FAST_RPM = 6500.0
-RAD_S = 0.10471975511965977
-TORQUE = 40.0
-ANGLE = 1 << 4
 PARITY, ERROR_FLAG, LOW, HIGH, WEAK_FIELD = 1.0, 2.0, 3.0, 4.0, 5.0  # emu_encoder_fault_t
-RAMP_PERIODS = 200
-CURRENT_A = 0.3
 
 
 @pytest.fixture(scope="module")
@@ -33,30 +26,6 @@ def as5047() -> Parts:
     if not have_arm_compiler():
         pytest.skip("the Arm compiler is not installed: no image is built")
     return build.prepare("hsm1", angle="as5047")
-
-
-@contextmanager
-def driving(parts: Parts, rpm: float = FAST_RPM) -> Iterator[Loop]:
-    motor = parts.emulated()
-    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
-    with Loop(motor.library, plant, motor.flux_map) as loop:
-        loop.run(3000, {"plant.speed_rad_s": (0.0, rpm * RAD_S)})
-        loop.set("enable", 1)
-        loop.set("torque_requested_Nm", TORQUE)
-        loop.run(1000)
-        yield loop
-
-
-def is_right(loop: Loop) -> bool:
-    near = error_A(loop) < CURRENT_A
-    return near and loop.get("fault_word") == 0 and abs(loop.get("truth.torque_Nm") - TORQUE) < 1.0
-
-
-def the_angle_is_that_of_the_sampling_instant(parts: Parts) -> None:
-    with driving(parts) as loop:
-        assert is_right(loop)
-        loop.run(RAMP_PERIODS, {"plant.speed_rad_s": (FAST_RPM * RAD_S, 0.98 * FAST_RPM * RAD_S)})
-        assert is_right(loop)
 
 
 def a_disturbed_frame_is_an_invalid_sample(parts: Parts) -> None:

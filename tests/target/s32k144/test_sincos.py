@@ -5,8 +5,7 @@ sample, and planted errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 from planting import PORT as PORT_FOLDER
 from planting import PlantedError, image_with_error, relinked
-from rotor_frame import error_A
+from sensor_drive import ANGLE, TORQUE, driving, is_right, the_angle_is_that_of_the_sampling_instant
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
@@ -22,15 +21,9 @@ from fluxtrue_tools.emulate.build import Parts
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
-FAST_RPM = 6500.0
 TURN_PERIODS = 92  # at FAST_RPM
-RAD_S = 0.10471975511965977
-TORQUE = 40.0
-ANGLE = 1 << 4
 OPEN, HIGH, MIDDLE = 1.0, 2.0, 3.0  # track_t of the emulator
 TRACKS = ("sine", "cosine")
-RAMP_PERIODS = 200
-CURRENT_A = 0.3
 
 
 @pytest.fixture(scope="module")
@@ -57,35 +50,9 @@ def windings(sincos: Parts, tmp_path_factory: pytest.TempPathFactory) -> Parts:
     return replace(sincos, image=windings_image(sincos.image, tmp_path_factory.mktemp("windings")))
 
 
-@contextmanager
-def driving(parts: Parts, rpm: float = FAST_RPM, **errors: float) -> Iterator[Loop]:
-    motor = parts.emulated()
-    plant = motor.plant | {"imposed_speed": 1.0, "speed_rad_s": 0.0, "vdc_V": 350.0}
-    with Loop(motor.library, plant, motor.flux_map) as loop:
-        for name, value in errors.items():
-            loop.set(f"emulator.{name}", value)
-        loop.run(3000, {"plant.speed_rad_s": (0.0, rpm * RAD_S)})
-        loop.set("enable", 1)
-        loop.set("torque_requested_Nm", TORQUE)
-        loop.run(1000)
-        yield loop
-
-
-def is_right(loop: Loop) -> bool:
-    near = error_A(loop) < CURRENT_A
-    return near and loop.get("fault_word") == 0 and abs(loop.get("truth.torque_Nm") - TORQUE) < 1.0
-
-
 def faults_after(loop: Loop, periods: int) -> int:
     loop.run(periods)
     return int(loop.get("fault_word"))
-
-
-def the_angle_is_that_of_the_sampling_instant(parts: Parts) -> None:
-    with driving(parts) as loop:
-        assert is_right(loop)
-        loop.run(RAMP_PERIODS, {"plant.speed_rad_s": (FAST_RPM * RAD_S, 0.98 * FAST_RPM * RAD_S)})
-        assert is_right(loop)
 
 
 def errors_within_the_tolerances_leave_the_torque_true(parts: Parts) -> None:
