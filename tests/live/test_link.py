@@ -14,7 +14,7 @@ import pytest
 
 from fluxtrue_tools.bus.interface import Interface, read_interface
 from fluxtrue_tools.bus.scales import dbc_of, standard_factors
-from fluxtrue_tools.live.bus_process import ENDED, BusProcess, Reporter
+from fluxtrue_tools.live.bus_process import ENDED, BusProcess, Reporter, Turns
 from fluxtrue_tools.live.commander import Commander, Wish
 from fluxtrue_tools.live.link import Link, Status
 from fluxtrue_tools.live.pace import InStep, SimulatedTime
@@ -212,3 +212,15 @@ def test_an_error_of_the_server_ends_the_child_and_lets_the_pages_go_on() -> Non
     process.close()
     assert process.status().stopped == ENDED
     assert multiprocessing.active_children() == []
+
+
+class Full:
+    """The messages of a child whose server has stood still for minutes."""
+
+    def put(self, _kind: str, *_content: Any) -> bool:
+        """Nothing more can wait."""
+        return False
+
+
+def test_time_does_not_wait_for_an_answer_to_a_message_that_was_dropped() -> None:
+    Turns(Full()).turn()  # type: ignore[arg-type]

@@ -76,30 +76,40 @@ class Outbox:
             return  # the server has ended
 
 
-class _Turns:
-    """The child's end of InStep."""
+class Turns:
+    """The child's end of InStep. A turn that is not waited for is answered, too: they are counted."""
 
-    def __init__(self, outbox: Outbox) -> None:
+    def __init__(self, outbox: Outbox, is_used: bool = True) -> None:
         self._outbox = outbox
-        self._done = threading.Event()
-        self._released = False
+        self._changed = threading.Condition()
+        self._asked = self._drawn = 0
+        self._is_free = self._is_released = not is_used
 
     def turn(self) -> None:
         """A batch is due; returns when the pages have drawn it."""
-        if self._released:
-            return
-        self._done.clear()
-        self._outbox.put("turn")
-        self._done.wait()
+        with self._changed:
+            if self._is_free or not self._outbox.put("turn"):
+                return
+            self._asked += 1
+            self._changed.wait_for(lambda: self._is_free or self._drawn == self._asked)
 
     def done(self) -> None:
-        """The pages have drawn it."""
-        self._done.set()
+        """The pages have drawn a batch."""
+        with self._changed:
+            self._drawn += 1
+            self._changed.notify_all()
+
+    def free(self, on: bool) -> None:
+        """Whether time continues without pages: a step that has to end must not wait for one."""
+        with self._changed:
+            self._is_free = on or self._is_released
+            self._changed.notify_all()
 
     def release(self) -> None:
-        """Let time continue without pages."""
-        self._released = True
-        self._done.set()
+        """Time never waits for pages any more."""
+        with self._changed:
+            self._is_free = self._is_released = True
+            self._changed.notify_all()
 
 
 class Reporter(Observer):
@@ -132,7 +142,7 @@ class Reporter(Observer):
         self._outbox.put("ended", status)
 
 
-def _link(setup: Setup, reporter: Reporter, turns: _Turns, stack: ExitStack) -> Link:
+def _link(setup: Setup, reporter: Reporter, turns: Turns, stack: ExitStack) -> Link:
     """Bus, time and test stand of the child."""
     interface = Interface(setup.interface_name, setup.interface_text)
     values = LastValues(interface.database, NEEDED)
@@ -150,7 +160,7 @@ def _link(setup: Setup, reporter: Reporter, turns: _Turns, stack: ExitStack) -> 
     return link
 
 
-def _obey(link: Link, turns: _Turns, connection: Connection, outbox: Outbox) -> None:
+def _obey(link: Link, turns: Turns, connection: Connection, outbox: Outbox) -> None:
     """Carry out what the server asks for, until it closes."""
     with ExitStack() as held:  # simulated time, while the server makes another connection
         while (message := connection.recv()) is not None:
@@ -173,7 +183,7 @@ def _run(setup: Setup, connection: Connection) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):  # the server ends the child, after the torque
         signal.signal(number, signal.SIG_IGN)
     outbox = Outbox(connection)
-    turns = _Turns(outbox)
+    turns = Turns(outbox)
     with ExitStack() as stack:
         stack.callback(outbox.close)
         try:

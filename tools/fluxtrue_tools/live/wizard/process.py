@@ -23,7 +23,7 @@ from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.on_the_bus import Bench, connected
 from fluxtrue_tools.commission.steps import Found, Step
 from fluxtrue_tools.errors import FluxtrueError
-from fluxtrue_tools.live.bus_process import Outbox, Reporter
+from fluxtrue_tools.live.bus_process import Outbox, Reporter, Turns
 from fluxtrue_tools.live.link import SILENT_S, Status
 from fluxtrue_tools.live.pace import BATCH_PERIODS, PERIOD_S
 from fluxtrue_tools.live.wizard.consent import GONE, Consent
@@ -59,49 +59,12 @@ class EndedByUser(FluxtrueError):
     """Stop, or the page is gone."""
 
 
-class _Turns:
-    """The child's end of InStep. A turn that is not waited for is answered, too: they are counted."""
-
-    def __init__(self, outbox: Outbox, is_used: bool) -> None:
-        self._outbox = outbox
-        self._changed = threading.Condition()
-        self._asked = self._drawn = 0
-        self._is_free = self._is_released = not is_used
-
-    def turn(self) -> None:
-        """A batch is due; returns when the pages have drawn it."""
-        with self._changed:
-            if self._is_free:
-                return
-            self._asked += 1
-            self._outbox.put("turn")
-            self._changed.wait_for(lambda: self._is_free or self._drawn == self._asked)
-
-    def done(self) -> None:
-        """The pages have drawn a batch."""
-        with self._changed:
-            self._drawn += 1
-            self._changed.notify_all()
-
-    def free(self, on: bool) -> None:
-        """Whether time continues without pages: a step that has to end must not wait for one."""
-        with self._changed:
-            self._is_free = on or self._is_released
-            self._changed.notify_all()
-
-    def release(self) -> None:
-        """Time never waits for pages any more."""
-        with self._changed:
-            self._is_free = self._is_released = True
-            self._changed.notify_all()
-
-
 class _Child:
     """The drive and what is done with it, in the main thread; hear() belongs to the thread that receives."""
 
     def __init__(self, drive: OverTheBus, outbox: Outbox, in_step: bool) -> None:
         self._drive, self._line = drive, drive.line
-        self._outbox, self._reporter, self._turns = outbox, Reporter(outbox), _Turns(outbox, in_step)
+        self._outbox, self._reporter, self._turns = outbox, Reporter(outbox), Turns(outbox, in_step)
         self._batch_s = MEASURING_BATCH_S if in_step else BATCH_S
         self._consent, self._ending = Consent(), threading.Lock()
         self._jobs: queue.Queue[Job | None] = queue.Queue()  # None: reset the faults
