@@ -7,14 +7,13 @@
 #include "hal/s32k144/core.h"
 #include "hal/s32k144/registers.h"
 #include "hal/s32k144/serial_angle.h"
-#include "signal/counter.h"
+#include "hal/s32k144/travel.h"
 
 #define START_TICKS 1U     /* of the frame, from the start of the period */
 #define REQUEST_CLOCKS 3U  /* of 28 MHz: until the module has seen the request */
 #define TICKS_PER_CLOCK 4U /* 112 MHz/28 MHz */
 #define COMMAND (LPSPI_TCR_FRAMESZ(AS5047_BITS - 1U) | LPSPI_TCR_CPHA | LPSPI_TCR_PRESCALE(0))
 #define UNTIL_PWM_TICKS 200U /* from the end of the start's last wait to the first period */
-#define INVALID_MAX 3U     /* periods in a row without a valid frame that are the angle fault */
 #define FIRST_PER_S 10000U /* length of the first measurement of the speed */
 #define TURN_COUNTS 16384.0F
 #define COUNT_SHIFT 18
@@ -26,18 +25,8 @@ static const serial_angle_timing_t timing = {.bit = 4, .select = 10, .gap = 10};
 #define FRAME_CLOCKS (timing.select + AS5047_BITS * timing.bit + SERIAL_ANGLE_RELEASE)
 #define SAMPLED_TICKS (START_TICKS + TICKS_PER_CLOCK * (REQUEST_CLOCKS + FRAME_CLOCKS))
 
-/* Debuggers find the counter by its name. */
-struct {
-    uint16_t invalid; /* frames that were disturbed, reported an error or were missing */
-} angle_errors;
-
-static struct {
-    uint32_t last;       /* reading of the period before */
-    int32_t travel;      /* from one period to the next */
-    int32_t sampled_q32; /* instant of the sample in its period, as a share of the period: 2^32 = 1 */
-    uint16_t invalid;    /* in a row */
-    bool healthy;        /* at the start */
-} encoder;
+static travel_t encoder;
+static bool healthy; /* the encoder's diagnostics at the start */
 
 /* The answers come one frame after their commands. The last two frames here and the first one of the PWM are one period
  * apart, so that the angle is right from the first period on, at any speed. */
@@ -50,7 +39,7 @@ static void read_state_and_angle(uint32_t period_ticks)
     core_pass(period_ticks - TICKS_PER_CLOCK * FRAME_CLOCKS);
     const uint32_t angle = serial_angle_exchange(AS5047_READ_ANGLE);
     core_pass(period_ticks - SAMPLED_TICKS - UNTIL_PWM_TICKS);
-    encoder.healthy = as5047_is_healthy(diagnostics) && as5047_is_valid(angle);
+    healthy = as5047_is_healthy(diagnostics) && as5047_is_valid(angle);
     encoder.last = as5047_angle(angle);
 }
 
@@ -81,42 +70,24 @@ float angle_first_speed(void)
     return (float)fx_abs_q31(counts) * ((float)FIRST_PER_S / TURN_COUNTS);
 }
 
-/* Of several frames, after lost periods, the travel of one period is not known: it is taken to be as before. */
-static void take(uint32_t frame, uint32_t frames)
-{
-    const uint32_t now = as5047_angle(frame);
-    if (frames == 1U && encoder.invalid == 0U) {
-        encoder.travel = (int32_t)(now - encoder.last);
-    }
-    encoder.last = now;
-    encoder.invalid = 0;
-}
-
-/* In place of a frame that cannot be used: the rotor is assumed to have moved as in the period before. */
-static __attribute__((noinline, cold)) void predict(void)
-{
-    encoder.last += (uint32_t)encoder.travel;
-    count_up(&encoder.invalid);
-    count_up(&angle_errors.invalid);
-}
-
 /* The frame of this period has brought the angle that was sampled at the end of the last one, that is, one period less
- * sampled_q32 before the currents. The rotor has moved on since then by that share of the travel of a period. */
+ * sampled_q32 before the currents. The rotor has moved on since then by that share of the travel of a period. After
+ * lost periods several frames have come: the travel of one period is then unknown and is taken to be as before. */
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;
     const uint32_t frames = serial_angle_read(AS5047_READ_ANGLE, &frame);
     if (__builtin_expect(frames != 0U && as5047_is_valid(frame), 1)) {
-        take(frame, frames);
+        travel_take(&encoder, as5047_angle(frame), frames == 1U);
     } else {
-        predict();
+        travel_predict(&encoder);
     }
-    return encoder.last + (uint32_t)encoder.travel - (uint32_t)fx_mulhi(encoder.travel, encoder.sampled_q32);
+    return encoder.last + (uint32_t)encoder.travel - travel_share(&encoder);
 }
 
 bool hal_angle_is_absolute(void)
 {
-    return encoder.healthy;
+    return healthy;
 }
 
 uint32_t angle_follow_index(void)
@@ -126,5 +97,5 @@ uint32_t angle_follow_index(void)
 
 bool angle_fault(void)
 {
-    return encoder.invalid >= INVALID_MAX || !encoder.healthy;
+    return travel_is_lost(&encoder) || !healthy;
 }

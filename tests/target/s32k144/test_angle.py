@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from planting import PlantedError, image_with_error
+from sensor_drive import ANGLE, FAST_RPM, RAD_S
 
 from fluxtrue_tools.bench.build import have_arm_compiler
 from fluxtrue_tools.emulate import build
@@ -20,11 +21,8 @@ from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.library import Loop
 
 FAST_VECTOR = 16 + 39
-ANGLE = 1 << 4
-FAST_RPM = 6500.0
 SLOW_RPM = 500.0  # at which the tracker follows after lost periods
 WORDS_TO_SEND = 4
-RAD_S = 0.10471975511965977
 MARGIN_TICKS = 22  # 0.2 µs
 
 

@@ -77,7 +77,7 @@ PLANTED: dict[str, tuple[Check, PlantedError]] = {
     ),
     "the age of the sample is left out": (
         the_angle_is_that_of_the_sampling_instant,
-        PlantedError(PORT, " - (uint32_t)fx_mulhi(encoder.travel, encoder.sampled_q32);", ";"),
+        PlantedError(PORT, " - travel_share(&encoder);", ";"),
     ),
     "faster than the encoder allows": (
         the_angle_is_that_of_the_sampling_instant,

@@ -126,7 +126,7 @@ PORT = "angle_sincos.c"
 PLANTED: dict[str, tuple[Check, PlantedError]] = {
     "the age of the sample is left out": (
         the_angle_is_that_of_the_sampling_instant,
-        PlantedError(PORT, " - (uint32_t)fx_mulhi(sensor.travel, sensor.sampled_q32);", ";"),
+        PlantedError(PORT, " - travel_share(&sensor);", ";"),
     ),
     "the fast ISR comes before the tracks": (
         the_angle_is_that_of_the_sampling_instant,
