@@ -3,128 +3,9 @@
 
 #include "calibration/calibration.h"
 #include "drive/data_check.h"
-#include "ecu/ecu.h"
 #include "ecu/ecu_private.h"
-#include "hal/mock_adc.h"
-#include "hal/mock_angle.h"
-#include "hal/mock_board.h"
-#include "hal/mock_can.h"
-#include "hal/mock_irq.h"
-#include "hal/mock_pwm.h"
-#include "hal/mock_shut_off.h"
-#include "hal/mock_system.h"
-#include "hal/mock_temperature.h"
-#include "hal/mock_watchdog.h"
+#include "ecu_bench.h"
 #include "unity.h"
-
-#define NOMINAL_PERIODS 10
-
-static ecu_t ecu;
-static bool outputs[BOARD_OUTPUTS];
-static bool gate_fault, mailboxes_full, mrai_hangs;
-static int watchdog_starts, watchdog_services, sent, pended, waiting;
-static can_frame_t arriving, last_answer;
-static int answers;
-static bool fitted, supply, switching;
-static uint8_t question;
-static uint32_t answered;
-
-static current_counts_t converted;
-static bool period_passes; /* while the counts are read */
-
-static void adc_read(adc_counts_t *counts, int calls)
-{
-    (void)calls;
-    *counts = (adc_counts_t){2048, 2048, 2048, 0};
-}
-
-static void adc_latest(current_counts_t *counts, int calls)
-{
-    (void)calls;
-    *counts = converted;
-    if (period_passes) {
-        const sample_t same = ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
-        ecu.drive.samples.generation++;
-        ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS] = same;
-        ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS].acting = true;
-        period_passes = false;
-    }
-}
-
-static void pend(int calls)
-{
-    (void)calls;
-    pended++;
-}
-
-static void board_set(board_output_t output, bool on, int calls)
-{
-    (void)calls;
-    outputs[output] = on;
-}
-
-static bool board_gate_fault(int calls)
-{
-    (void)calls;
-    return gate_fault;
-}
-
-/* Delivers the same frame `waiting` times. */
-static bool can_receive(can_frame_t *frame, int calls)
-{
-    (void)calls;
-    *frame = arriving;
-    return waiting-- > 0;
-}
-
-static bool can_send(const can_frame_t *frame, int calls)
-{
-    (void)calls;
-    if (frame->id == XCP_ID_ANSWER && !mailboxes_full) {
-        last_answer = *frame;
-        answers++;
-    } else {
-        sent += mailboxes_full ? 0 : 1;
-    }
-    return !mailboxes_full;
-}
-
-static void watchdog_start(int calls)
-{
-    (void)calls;
-    watchdog_starts++;
-}
-
-static void watchdog_service(int calls)
-{
-    (void)calls;
-    watchdog_services++;
-}
-
-static bool ask(uint8_t *now, int calls)
-{
-    (void)calls;
-    *now = question;
-    return fitted;
-}
-
-static void take_answer(uint32_t answer, int calls)
-{
-    (void)calls;
-    answered = answer;
-}
-
-static bool read_supply(int calls)
-{
-    (void)calls;
-    return supply;
-}
-
-static bool read_gates(int calls)
-{
-    (void)calls;
-    return switching;
-}
 
 /* The signatures of docs/theory/third-level.md, (QA-1) and (QA-2), in another arithmetic. */
 static uint32_t right_answer(uint64_t asked)
@@ -141,73 +22,21 @@ static uint32_t right_answer(uint64_t asked)
 
 void setUp(void)
 {
-    fitted = false;
-    supply = switching = true;
-    question = 0;
-    hal_shut_off_question_Stub(ask);
-    hal_shut_off_answer_Stub(take_answer);
-    hal_shut_off_supply_Stub(read_supply);
-    converted = (current_counts_t){2048, 2048, 2048};
-    period_passes = false;
-    gate_fault = mailboxes_full = mrai_hangs = false;
-    watchdog_starts = watchdog_services = sent = pended = waiting = answers = 0;
-    arriving = (can_frame_t){.id = 0x7FF, .length = 8}; /* an unknown identifier */
-    hal_adc_read_Stub(adc_read);
-    hal_adc_latest_Stub(adc_latest);
-    hal_angle_read_IgnoreAndReturn(0);
-    hal_angle_is_absolute_IgnoreAndReturn(true);
-    hal_irq_pend_mrai_Stub(pend);
-    hal_pwm_write_Ignore();
-    hal_pwm_enable_Ignore();
-    hal_pwm_gates_Stub(read_gates);
-    hal_board_set_Stub(board_set);
-    hal_board_gate_fault_Stub(board_gate_fault);
-    hal_can_receive_Stub(can_receive);
-    hal_can_send_Stub(can_send);
-    hal_can_lost_IgnoreAndReturn(0);
-    hal_can_bus_off_IgnoreAndReturn(0);
-    hal_system_stack_unused_IgnoreAndReturn(100);
-    hal_system_reset_cause_IgnoreAndReturn(RESET_PIN);
-    hal_temperature_winding_dC_IgnoreAndReturn(250);
-    hal_temperature_inverter_dC_IgnoreAndReturn(250);
-    hal_temperature_processor_dC_IgnoreAndReturn(250);
-    hal_adc_known_permille_IgnoreAndReturn(1000);
-    hal_watchdog_start_Stub(watchdog_start);
-    hal_watchdog_service_Stub(watchdog_service);
-    ecu_init(&ecu, &motor);
+    board_start();
 }
 
 void tearDown(void)
 {
 }
 
-/* This number of periods, then the task. */
-static void task_after(int periods)
-{
-    for (int n = 0; n < periods; n++) {
-        fast_isr(&ecu.drive);
-        if (!mrai_hangs) {
-            mrai_isr(&ecu.drive);
-        }
-    }
-    ecu_task_1khz(&ecu);
-}
-
-static void tasks(int count)
-{
-    for (int n = 0; n < count; n++) {
-        task_after(NOMINAL_PERIODS);
-    }
-}
-
 void test_each_question_has_the_answer_of_the_documented_signatures(void)
 {
-    fitted = true;
-    switching = false;
-    for (question = 0; question < 16U; question++) {
+    board.fitted = true;
+    board.switching = false;
+    for (board.question = 0; board.question < 16U; board.question++) {
         ecu.shut_off.tested = true; /* the test would want wrong answers */
         tasks(1);
-        TEST_ASSERT_EQUAL_HEX32(right_answer(question), answered);
+        TEST_ASSERT_EQUAL_HEX32(right_answer(board.question), board.answered);
     }
 }
 
@@ -218,37 +47,37 @@ void test_an_interrupt_that_stands_still_or_runs_away_makes_the_answer_wrong(voi
         int periods;
         bool right;
     } cases[] = {{10, true}, {0, false}, {1, true}, {39, true}, {40, false}, {10, true}};
-    fitted = true;
-    question = 5;
+    board.fitted = true;
+    board.question = 5;
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         task_after(cases[n].periods);
-        TEST_ASSERT_EQUAL(cases[n].right, answered == right_answer(5));
+        TEST_ASSERT_EQUAL(cases[n].right, board.answered == right_answer(5));
     }
 }
 
 void test_the_test_at_start_gives_wrong_answers_and_switches_the_supply(void)
 {
-    fitted = true;
-    switching = false;
-    supply = false;
+    board.fitted = true;
+    board.switching = false;
+    board.supply = false;
     tasks(1);
-    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
-    supply = true;
+    TEST_ASSERT_TRUE(board.outputs[BOARD_GATE_DRIVER]);
+    board.supply = true;
     tasks(2);
-    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
-    supply = false;
+    TEST_ASSERT_FALSE(board.outputs[BOARD_GATE_DRIVER]);
+    board.supply = false;
     tasks(2);
-    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
-    supply = true;
+    TEST_ASSERT_TRUE(board.outputs[BOARD_GATE_DRIVER]);
+    board.supply = true;
     tasks(2);
-    TEST_ASSERT_EQUAL_HEX32(~right_answer(0), answered);
-    supply = false;
+    TEST_ASSERT_EQUAL_HEX32(~right_answer(0), board.answered);
+    board.supply = false;
     tasks(2);
-    TEST_ASSERT_EQUAL_HEX32(right_answer(0), answered);
-    supply = true;
+    TEST_ASSERT_EQUAL_HEX32(right_answer(0), board.answered);
+    board.supply = true;
     tasks(2);
     TEST_ASSERT_TRUE(ecu.shut_off.tested);
-    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_GATE_DRIVER]);
 }
 
 static void enter(ecu_state_t state)
@@ -262,15 +91,15 @@ static void enter(ecu_state_t state)
 /* With the dc link connected the test would switch a supply that the bridge may need. */
 void test_the_test_waits_where_the_dc_link_is_connected_and_the_supply_follows_the_state(void)
 {
-    fitted = true;
-    switching = supply = false;
+    board.fitted = true;
+    board.switching = board.supply = false;
     enter(STATE_PRECHARGE);
-    TEST_ASSERT_FALSE(outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_GATE_DRIVER]);
     enter(STATE_READY);
-    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_GATE_DRIVER]);
     TEST_ASSERT_FALSE(ecu.shut_off.supply_on);
     enter(STATE_STANDBY);
-    TEST_ASSERT_TRUE(ecu.shut_off.supply_on && outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_TRUE(ecu.shut_off.supply_on && board.outputs[BOARD_GATE_DRIVER]);
 }
 
 /* A tenth and a fifth of T_b; without a valid command both are zero. */
@@ -317,33 +146,33 @@ void test_the_rates_hold_in_true_time_for_a_step_that_is_not_a_millisecond(void)
 void test_the_watchdog_is_started_once_and_then_served_by_every_task(void)
 {
     tasks(100);
-    TEST_ASSERT_EQUAL_INT(1, watchdog_starts);
-    TEST_ASSERT_EQUAL_INT(99, watchdog_services);
+    TEST_ASSERT_EQUAL_INT(1, board.watchdog_starts);
+    TEST_ASSERT_EQUAL_INT(99, board.watchdog_services);
     TEST_ASSERT_EQUAL_UINT16(0, ecu.liveness.held);
 }
 
 void test_the_watchdog_is_not_served_while_the_fast_interrupt_is_stalled(void)
 {
     tasks(10);
-    const int before = watchdog_services;
+    const int before = board.watchdog_services;
     for (int n = 0; n < 5; n++) {
         task_after(0);
     }
-    TEST_ASSERT_EQUAL_INT(before, watchdog_services);
+    TEST_ASSERT_EQUAL_INT(before, board.watchdog_services);
     TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.held);
-    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_SAFE_STATE]);
     TEST_ASSERT_TRUE((ecu.supervisor.faults & ECU_FAULT_STALL) != 0U);
 }
 
 void test_the_watchdog_is_not_served_while_the_identification_is_stalled(void)
 {
     tasks(10);
-    const int before = watchdog_services;
+    const int before = board.watchdog_services;
     ecu.drive.request.identification_mode = IDENTIFICATION_PAPER;
     data_check_accept_options(&ecu.drive);
-    mrai_hangs = true;
+    board.mrai_hangs = true;
     tasks(5);
-    TEST_ASSERT_EQUAL_INT(before, watchdog_services);
+    TEST_ASSERT_EQUAL_INT(before, board.watchdog_services);
     TEST_ASSERT_EQUAL_UINT16(5, ecu.liveness.held);
 }
 
@@ -392,24 +221,24 @@ void test_a_damaged_flag_of_bus_or_state_machine_is_a_fault_in_the_next_step(voi
 void test_without_gate_supply_the_hardware_holds_the_bridge_of_a_fast_machine(void)
 {
     tasks(10);
-    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
     ecu.drive.task.safe_state.short_circuit = true;
     task_after(10);
-    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_SAFE_STATE]);
     ecu.supervisor.state = STATE_SAFE_STATE;
     ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
     ecu_seal_flags(&ecu);
     task_after(10);
-    TEST_ASSERT_TRUE(outputs[BOARD_GATE_DRIVER]);
-    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
 }
 
 void test_until_the_speed_is_known_the_hardware_holds_the_bridge(void)
 {
     task_after(10);
-    TEST_ASSERT_TRUE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_SAFE_STATE]);
     task_after(10);
-    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
 }
 
 /* The speed is still known, by what has outlasted the reset. */
@@ -418,9 +247,10 @@ void test_after_a_reset_at_speed_contactor_and_gate_supply_stay_on_from_the_firs
     ecu.drive.task.safe_state = (safe_state_state_t){.short_circuit = true, .line_emf = Q15_MAX, .speed = Q15_MAX};
     ecu_continue(&ecu);
     task_after(10);
-    TEST_ASSERT_TRUE(outputs[BOARD_MAIN_CONTACTOR] && outputs[BOARD_GATE_DRIVER]);
-    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_TRUE(board.outputs[BOARD_MAIN_CONTACTOR] && board.outputs[BOARD_GATE_DRIVER]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
     TEST_ASSERT_EQUAL_INT(STATE_SAFE_STATE, ecu.supervisor.state);
+    task_after(10);
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.fast.faults);
 }
 
@@ -432,7 +262,7 @@ void test_one_millisecond_without_interrupts_is_no_fault_yet(void)
     task_after(0);
     tasks(10);
     TEST_ASSERT_EQUAL_HEX16(0, ecu.supervisor.faults);
-    TEST_ASSERT_FALSE(outputs[BOARD_SAFE_STATE]);
+    TEST_ASSERT_FALSE(board.outputs[BOARD_SAFE_STATE]);
 }
 
 void test_a_late_task_is_counted_and_three_in_a_row_are_a_fault(void)
@@ -462,7 +292,7 @@ void test_a_task_with_some_jitter_is_in_time(void)
 void test_a_gate_driver_fault_reaches_the_fault_word(void)
 {
     tasks(100);
-    gate_fault = true;
+    board.gate_fault = true;
     tasks(1);
     TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, ecu.supervisor.faults);
 }
@@ -471,15 +301,15 @@ void test_a_gate_driver_fault_reaches_the_fault_word(void)
 void test_frames_that_find_no_mailbox_are_counted_and_not_kept(void)
 {
     tasks(100);
-    const int before = sent;
+    const int before = board.sent;
     TEST_ASSERT_EQUAL_INT(5 * 10 + 7 + 1, before);
-    mailboxes_full = true;
+    board.mailboxes_full = true;
     tasks(100);
     TEST_ASSERT_EQUAL_UINT16(5 * 10 + 7, ecu.not_sent);
-    TEST_ASSERT_EQUAL_INT(before, sent);
-    mailboxes_full = false;
+    TEST_ASSERT_EQUAL_INT(before, board.sent);
+    board.mailboxes_full = false;
     tasks(1);
-    TEST_ASSERT_LESS_OR_EQUAL_INT(before + 1, sent);
+    TEST_ASSERT_LESS_OR_EQUAL_INT(before + 1, board.sent);
 }
 
 /* Only INV_Identification, every 10 ms, contains the resistance. */
@@ -491,48 +321,48 @@ void test_a_frame_with_nan_is_counted_and_not_sent(void)
     ecu_init(&ecu, &broken);
     tasks(100);
     TEST_ASSERT_EQUAL_UINT16(10, ecu.not_sent);
-    TEST_ASSERT_EQUAL_INT(4 * 10 + 7 + 1, sent);
+    TEST_ASSERT_EQUAL_INT(4 * 10 + 7 + 1, board.sent);
 }
 
 /* CONNECT with two bytes; the answer begins with 0xFF. */
 void test_a_command_of_the_calibration_tool_is_answered_in_the_same_task(void)
 {
-    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
-    waiting = 1;
+    board.arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
+    board.waiting = 1;
     tasks(1);
-    TEST_ASSERT_EQUAL_INT(1, answers);
-    TEST_ASSERT_EQUAL_HEX8(0xFF, last_answer.data[0]);
+    TEST_ASSERT_EQUAL_INT(1, board.answers);
+    TEST_ASSERT_EQUAL_HEX8(0xFF, board.last_answer.data[0]);
     TEST_ASSERT_EQUAL_UINT16(0, ecu.rx.count[RX_IGNORED]);
     tasks(5);
-    TEST_ASSERT_EQUAL_INT(1, answers);
+    TEST_ASSERT_EQUAL_INT(1, board.answers);
 }
 
 void test_an_answer_that_finds_no_mailbox_waits_for_one(void)
 {
-    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
-    waiting = 1;
-    mailboxes_full = true;
+    board.arriving = (can_frame_t){.id = XCP_ID_COMMAND, .length = 2, .data = {0xFF, 0}};
+    board.waiting = 1;
+    board.mailboxes_full = true;
     tasks(5);
-    TEST_ASSERT_EQUAL_INT(0, answers);
-    mailboxes_full = false;
+    TEST_ASSERT_EQUAL_INT(0, board.answers);
+    board.mailboxes_full = false;
     tasks(2);
-    TEST_ASSERT_EQUAL_INT(1, answers);
+    TEST_ASSERT_EQUAL_INT(1, board.answers);
 }
 
 /* The same number as an extended identifier of 29 bits belongs to another sender. */
 void test_an_extended_identifier_is_no_command_of_the_calibration_tool(void)
 {
-    arriving = (can_frame_t){.id = XCP_ID_COMMAND, .extended = true, .length = 2, .data = {0xFF, 0}};
-    waiting = 1;
+    board.arriving = (can_frame_t){.id = XCP_ID_COMMAND, .extended = true, .length = 2, .data = {0xFF, 0}};
+    board.waiting = 1;
     tasks(2);
-    TEST_ASSERT_EQUAL_INT(0, answers);
+    TEST_ASSERT_EQUAL_INT(0, board.answers);
     TEST_ASSERT_EQUAL_UINT16(1, ecu.rx.count[RX_IGNORED]);
 }
 
 /* 32 frames are more than a bus of 1 Mbit/s can transmit in a millisecond. The limit bounds the time of the task. */
 void test_a_task_takes_a_bounded_number_of_frames(void)
 {
-    waiting = 100;
+    board.waiting = 100;
     tasks(1);
     TEST_ASSERT_EQUAL_UINT16(32, ecu.rx.count[RX_IGNORED]);
 }
@@ -542,7 +372,7 @@ void test_without_a_bus_nothing_is_switched_on(void)
     tasks(1000);
     TEST_ASSERT_EQUAL_INT(STATE_STANDBY, ecu.supervisor.state);
     for (int n = 0; n < BOARD_OUTPUTS; n++) {
-        TEST_ASSERT_FALSE(outputs[n]);
+        TEST_ASSERT_FALSE(board.outputs[n]);
     }
     TEST_ASSERT_FALSE(ecu.drive.request.enable);
 }
@@ -637,10 +467,10 @@ void test_the_first_fault_freezes_the_values_before_it(void)
 /* A period that passes while the counts are read: they and the angle are taken from the next one. */
 void test_the_second_level_takes_counts_and_angle_of_the_same_period(void)
 {
-    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
+    board.converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
     ecu_task_1khz(&ecu);
     TEST_ASSERT_EQUAL_INT32(0, ecu.second_level.mean_q8); /* the bridge does not switch */
-    period_passes = true;
+    board.period_passes = true;
     ecu_task_1khz(&ecu);
     TEST_ASSERT_GREATER_THAN_INT32(0, ecu.second_level.mean_q8);
 }
@@ -651,7 +481,7 @@ void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
 {
     sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
     sample->acting = true;
-    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
+    board.converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
     for (int n = 0; n < 20; n++) {
         ecu_task_1khz(&ecu);
     }
@@ -675,8 +505,8 @@ static int32_t own_torque_after_recall(identify_index_t index, int32_t x_q27, bo
     record.x_q27[index] = x_q27;
     TEST_ASSERT_TRUE(drive_recall(&ecu.drive, &record));
     ecu.drive.task.recall.unconfirmed = !confirmed;
-    converted = (current_counts_t){MID_SCALE - D_COUNTS, MID_SCALE + D_COUNTS / 2 + Q_COUNTS,
-                                   MID_SCALE + D_COUNTS / 2 - Q_COUNTS};
+    board.converted = (current_counts_t){MID_SCALE - D_COUNTS, MID_SCALE + D_COUNTS / 2 + Q_COUNTS,
+                                         MID_SCALE + D_COUNTS / 2 - Q_COUNTS};
     tasks(1); /* the fast ISR copies the deviation of the d axis in the periods of the next step */
     for (int n = 0; n < NOMINAL_PERIODS; n++) {
         fast_isr(&ecu.drive);
