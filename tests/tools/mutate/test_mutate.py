@@ -166,6 +166,40 @@ def test_a_test_that_fails_without_a_mutant_measures_nothing(project: Path, meas
         (project / "test.c").write_text(TEST, encoding="utf-8")
 
 
+OWN = """add_executable(unit_part_own own.c firmware/part/hole.c)
+target_compile_definitions(unit_part_own PRIVATE OFFSET=1)
+add_test(NAME unit_part_own COMMAND unit_part_own)
+set_tests_properties(unit_part_own PROPERTIES LABELS unit)
+"""
+OWN_SOURCE = """#ifndef OFFSET
+#define OFFSET 0
+#endif
+int moved(int x);
+int moved(int x)
+{
+    return x + 2 * OFFSET;
+}
+"""
+
+
+def test_a_test_that_compiles_the_source_with_other_definitions_finds_what_only_they_show(tmp_path: Path) -> None:
+    root = tmp_path.resolve()
+    (root / "firmware" / "part").mkdir(parents=True)
+    (root / FILE).write_text(OWN_SOURCE, encoding="utf-8")
+    call = "int moved(int x);\nint main(void) {{ return moved(3) == {} ? 0 : 1; }}\n"
+    (root / "test.c").write_text(call.format(3), encoding="utf-8")
+    (root / "own.c").write_text(call.format(5), encoding="utf-8")
+    (root / "CMakeLists.txt").write_text(CMAKE + OWN, encoding="utf-8")
+    subprocess.run(["cmake", "-G", "Ninja", "-S", root, "-B", root / "out"], check=True, capture_output=True)
+    subprocess.run(["ninja", "-C", root / "out"], check=True, capture_output=True)
+    campaign = cli.Campaign(root, Build(root, root / "out"), listed.load(root), fresh=False, jobs=1)
+    every, _ = mutants(root, FILE)
+    found = {result.mutant.after: result for result in campaign.measure(FILE, every, every)}
+    assert found["return x + 3 * OFFSET;"].outcome == KILLED, "not an equal object: the other program's differs"
+    assert found["return x + 3 * OFFSET;"].by == "unit_part_own"
+    assert found["return (__typeof__(x + 2 * OFFSET)){0};"].by == "unit_part_hole"
+
+
 def test_a_sample_of_each_part_does_not_depend_on_the_other_parts(project: Path) -> None:
     every, _ = mutants(project, FILE)
     known = listed.Listed(listed.List())

@@ -22,6 +22,7 @@ from elftools.elf.elffile import ELFFile
 from fluxtrue_tools.errors import FluxtrueError
 
 LABEL: Final = "unit"
+UNITY: Final = "unit_"  # names of tests of single parts
 DEPENDENCIES: Final = {"-MD": 1, "-MMD": 1, "-MT": 2, "-MF": 2, "-MQ": 2}  # options and how many words they take
 _GLOBAL: Final = re.compile(r"^[0-9a-f]+ [A-Z] (\S+)$", re.MULTILINE)  # of an object
 _SYMBOL: Final = re.compile(r"^[0-9a-f]+ [A-Za-z] (\S+)$", re.MULTILINE)  # a hidden one is local in a program
@@ -69,6 +70,15 @@ class Program:
         return set(_SYMBOL.findall(self._symbols))
 
 
+@dataclass(frozen=True)
+class Variant:
+    """A way in which the build compiles a source, and the tests that contain this object."""
+
+    compiler: tuple[str, ...]
+    tests: tuple[Program, ...]
+    own: str  # the object in a test's link command; empty: it is in the firmware's library
+
+
 class Build:
     """A build folder of CMake and Ninja, with its tests."""
 
@@ -97,31 +107,32 @@ class Build:
         _output(["ninja", "-j", str(jobs), *targets], self.folder)
 
     @cached_property
+    def _entries(self) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = json.loads((self.folder / "compile_commands.json").read_text(encoding="utf-8"))
+        return entries
+
+    @cached_property
     def _commands(self) -> dict[Path, dict[str, Any]]:
         """The compiler's call for each source of the firmware's own libraries, or of the only target that has it."""
         found: dict[Path, dict[str, Any]] = {}
-        for entry in json.loads((self.folder / "compile_commands.json").read_text(encoding="utf-8")):
+        for entry in self._entries:
             file = Path(entry["file"])
             own = file.is_relative_to(self.root) and f" -o {file.relative_to(self.root).parts[0]}/" in entry["command"]
             if own or file not in found:
                 found[file] = entry
         return found
 
-    def compiler(self, file: str) -> list[str]:
-        """The call that compiles a source, without source, output and dependencies, and without a cache."""
+    def variants(self, file: str) -> list[Variant]:
+        """The firmware's own way first, then those of unit tests that compile the source with other definitions."""
         entry = self._entry(file)
-        words, left = [], shlex.split(entry["command"])
-        if Path(left[0]).name == "ccache":
-            left.pop(0)
-        while left:
-            word = left.pop(0)
-            if word in ("-o", "-c"):
-                left.pop(0)
-            elif word in DEPENDENCIES:
-                del left[: DEPENDENCIES[word] - 1]
-            else:
-                words.append(word)
-        return words
+        found = [Variant(_compiler(entry), tuple(self.tests_of(file)), "")]
+        by_target = {one.path.name: one for one in self.programs if one.name.startswith(UNITY)}
+        for other in self._entries:
+            made = _output_of(other)
+            target = by_target.get(_target(made)) if other["file"] == entry["file"] and other is not entry else None
+            if target is not None:
+                found.append(Variant(_compiler(other), (target,), str(made)))
+        return found
 
     def _entry(self, file: str) -> dict[str, Any]:
         entry = self._commands.get(self.root / file)
@@ -132,8 +143,7 @@ class Build:
     def tests_of(self, file: str) -> list[Program]:
         """The programs that contain the object of a source, the nearest by name first."""
         entry = self._entry(file)
-        words = shlex.split(entry["command"])
-        made = self.folder / words[words.index("-o") + 1]
+        made = self.folder / _output_of(entry)
         exported = set(_GLOBAL.findall(_output(["nm", made], self.folder)))
         basename, parts = Path(file).name, set(Path(file).with_suffix("").as_posix().replace("/", "_").split("_"))
 
@@ -159,18 +169,46 @@ class Build:
         return words[:at] + words[at + 2 :]
 
 
+def _compiler(entry: dict[str, Any]) -> tuple[str, ...]:
+    """The call that compiles a source, without source, output and dependencies, and without a cache."""
+    words, left = [], shlex.split(entry["command"])
+    if Path(left[0]).name == "ccache":
+        left.pop(0)
+    while left:
+        word = left.pop(0)
+        if word in ("-o", "-c"):
+            left.pop(0)
+        elif word in DEPENDENCIES:
+            del left[: DEPENDENCIES[word] - 1]
+        else:
+            words.append(word)
+    return tuple(words)
+
+
+def _output_of(entry: dict[str, Any]) -> Path:
+    words = shlex.split(entry["command"])
+    return Path(words[words.index("-o") + 1])
+
+
+def _target(made: Path) -> str:
+    """The target of CMake that an object belongs to."""
+    return next((part for part in made.parts if part.endswith(".dir")), "").removesuffix(".dir")
+
+
 def _library(made: Path) -> str:
     """The library that CMake makes of an object. A program without it may compile the source otherwise."""
-    target = next(part for part in made.parts if part.endswith(".dir"))
-    return f"lib{target.removesuffix('.dir')}.a"
+    return f"lib{_target(made)}.a"
 
 
 def _name(word: str) -> str:
     return word.rpartition("/")[2]
 
 
-def with_object(linker: Sequence[str], made: Path) -> list[str]:
-    """A linker's call with one more object before all others: what it defines is not taken from a library."""
+def with_object(linker: Sequence[str], made: Path, own: str = "") -> list[str]:
+    """A linker's call with one more object before all others: what it defines is not taken from a library. A test's own
+    object is replaced."""
+    if own:
+        return [str(made) if word == own else word for word in linker]
     first = next(n for n, word in enumerate(linker) if word.endswith((".o", ".a")))
     return [*linker[:first], str(made), *linker[first:]]
 

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What becomes of each mutant of a source: compiled, linked into each unit test that contains the source, and run.
 
+A unit test that compiles the source with other definitions, for example the store's with a port's number of slots, gets
+an object of its own.
+
 A mutant whose object equals that of the source, or of an earlier mutant, is none (trivial compiler equivalence, with
 the options of the build, which optimise). The time-out is in seconds of a processor, so that a busy computer kills
 nothing. Outcomes are kept by the content of object and tests.
@@ -156,8 +159,8 @@ class Source:
     def __init__(self, build: Build, file: str, work: Path, baseline: Baseline) -> None:
         self.build, self.file, self.work, self.baseline = build, file, work, baseline
         self.text = (build.root / file).read_bytes()
-        self.compiler = [*build.compiler(file), *QUIETLY, "-iquote", str((build.root / file).parent)]
-        self.tests = build.tests_of(file)
+        self.variants = build.variants(file)
+        self.tests = [program for variant in self.variants for program in variant.tests]
         made = self.compile(self.text, work / "unchanged")
         if made is None:
             raise FluxtrueError(f"{file}: does not compile")
@@ -165,31 +168,41 @@ class Source:
         self.kills: Counter[str] = Counter()
 
     def compile(self, text: bytes, folder: Path) -> tuple[Path, str, float] | None:
-        """The object of a text, its hash and the time of a processor; None if it does not compile."""
+        """The folder of a text's objects, their hash and the time of a processor; None if one does not compile."""
         folder.mkdir(parents=True, exist_ok=True)
-        source, made = folder / Path(self.file).name, folder / "mutant.o"
+        source = folder / Path(self.file).name
         source.write_bytes(text)
-        # The folder's name must not be in the object, nor in its hash.
-        command = [*self.compiler, f"-ffile-prefix-map={folder}=", "-c", str(source), "-o", str(made)]
-        good, _, used = _run(command, self.build.folder)
-        return (made, hashlib.sha256(made.read_bytes()).hexdigest(), used) if good else None
+        hashes, used = [], 0.0
+        for number, variant in enumerate(self.variants):
+            made = folder / f"mutant{number}.o"
+            # The folder's name must not be in the object, nor in its hash.
+            command = [*variant.compiler, *QUIETLY, "-iquote", str((self.build.root / self.file).parent),
+                       f"-ffile-prefix-map={folder}=", "-c", str(source), "-o", str(made)]  # fmt: skip
+            good, _, more = _run(command, self.build.folder)
+            used += more
+            if not good:
+                return None
+            hashes.append(hashlib.sha256(made.read_bytes()).hexdigest())
+        return folder, hashes[0] if len(hashes) == 1 else _hash(*hashes), used
 
     def ordered(self) -> list[Program]:
         """The tests, those first that have killed most so far, then by name and time."""
         return sorted(self.tests, key=lambda one: (-self.kills[one.name], self.tests.index(one)))
 
-    def link(self, program: Program, made: Path) -> tuple[Path, float]:
+    def link(self, program: Program, folder: Path) -> tuple[Path, float]:
         """A test with the mutant."""
-        target = made.parent / "program"
-        command = [*with_object(self.build.linker(program), made), "-Wl,-s", "-o", str(target)]
+        target = folder / "program"
+        number = next(n for n, variant in enumerate(self.variants) if program in variant.tests)
+        objects = with_object(self.build.linker(program), folder / f"mutant{number}.o", self.variants[number].own)
+        command = [*objects, "-Wl,-s", "-o", str(target)]
         good, said, used = _run(command, self.build.folder)
         if not good:
             raise FluxtrueError(f"{program.name} cannot be linked with a mutant of {self.file}: {said.strip()[-300:]}")
         return target, used
 
-    def execute(self, program: Program, made: Path) -> tuple[str, float]:
+    def execute(self, program: Program, folder: Path) -> tuple[str, float]:
         """The outcome of one test."""
-        target, linked_s = self.link(program, made)
+        target, linked_s = self.link(program, folder)
         cpu_max_s = max(CPU_LEAST_S, math.ceil(CPU_FACTOR * self.baseline.cpu_s(program)))
         outcome, used = execute([str(target), *program.command[1:]], program.folder, cpu_max_s)
         return outcome, used + linked_s
