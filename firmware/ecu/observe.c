@@ -32,8 +32,8 @@ void ecu_watch(ecu_t *ecu)
     const progress_t progress = drive_progress(&ecu->drive);
     const uint32_t in_step = ecu->drive.motor->bases.periods_per_step;
     const bool late = liveness->started && progress.periods >= in_step + in_step / 2U;
-    (void)debounce_step(&liveness->late_in_a_row, late, CONSECUTIVE_MAX, 1U);
-    (void)debounce_step(&liveness->stalled_in_a_row, progress.stalled, CONSECUTIVE_MAX, 1U);
+    (void)debounce_holds(&liveness->late_in_a_row, late, CONSECUTIVE_MAX);
+    (void)debounce_holds(&liveness->stalled_in_a_row, progress.stalled, CONSECUTIVE_MAX);
     if (progress.periods != 0U && progress.periods < PERIODS_MAX_STEPS * in_step) {
         ecu_pass(ecu, FLOW_INTERRUPTS);
     }

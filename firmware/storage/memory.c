@@ -130,7 +130,7 @@ bool memory_background(memory_t *memory, drive_t *drive)
         drive_hold(drive, true);
         memory->held_since = now;
     }
-    if (rested < needed || now - memory->held_since < MEMORY_HOLD_STEPS) {
+    if (now - memory->held_since < MEMORY_HOLD_STEPS) {
         return false;
     }
     const bool saved = save_record(memory, drive, now);

@@ -42,7 +42,7 @@ static q31_t integrate(const torque_loop_config_t *config, const torque_loop_in_
     const int32_t relative = relative_error(config, in, magnitude, error);
     const q31_t moved = fx_add_q31(correction, product_q31(config->ki, relative));
     /* At a limit the correction must not rise above 0 or above its present value (TL-7). */
-    return (in->limited && relative >= 0) ? fx_min_s32(moved, fx_max_s32(correction, 0)) : moved;
+    return in->limited ? fx_min_s32(moved, fx_max_s32(correction, 0)) : moved;
 }
 
 q15_t torque_loop_step(const torque_loop_config_t *config, torque_loop_state_t *state, const torque_loop_in_t *in)

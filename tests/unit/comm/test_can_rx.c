@@ -121,6 +121,18 @@ void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
     refused(RX_IGNORED, &frame);
 }
 
+/* Also those that the inverter itself sends: a gateway may have sent one of them with another identifier. */
+void test_the_data_id_of_any_other_protected_message_shows_a_wrong_identifier(void)
+{
+    static const uint16_t others[] = {0x2101U, 0x2151U, 0x1111U};
+    (void)send(0);
+    for (unsigned n = 0; n < sizeof others / sizeof others[0]; n++) {
+        can_frame_t frame = command(0);
+        frame.data[0] = e2e_crc(others[n], &frame);
+        refused(RX_ID, &frame);
+    }
+}
+
 /* 1000.0 N·m are 10000 counts. Both ends of the requested torque, and the upper ends of mode and limit. */
 void test_the_ends_of_the_ranges_are_accepted_and_one_count_beyond_is_not(void)
 {
@@ -152,6 +164,20 @@ void test_one_lost_frame_is_tolerated_and_counted_two_are_a_jump(void)
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(20));
 }
 
+void test_of_frames_in_a_row_none_counts_as_skipped_and_a_lost_one_at_any_count_does(void)
+{
+    (void)send(0);
+    for (int n = 0; n < 30; n++) {
+        TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(0));
+    }
+    TEST_ASSERT_EQUAL_UINT16(0, rx.skipped);
+    for (uint16_t n = 1; n <= 15; n++) {
+        (void)command(0);
+        TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(0));
+        TEST_ASSERT_EQUAL_UINT16(n, rx.skipped);
+    }
+}
+
 /* 30 ms after the last good frame, and not a millisecond earlier, torque and enable are cleared; the mode stays. */
 void test_a_command_times_out_after_30_ms_and_clears_torque_and_enable(void)
 {
@@ -169,6 +195,16 @@ void test_a_command_times_out_after_30_ms_and_clears_torque_and_enable(void)
     TEST_ASSERT_EQUAL_UINT16(1, rx.time_outs);
     TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(500)); /* the next frame synchronises again */
     TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(500));
+}
+
+void test_the_age_of_a_command_begins_with_its_frame(void)
+{
+    (void)send(0);
+    (void)send(0);
+    can_rx_tick(&rx, 29999);
+    TEST_ASSERT_TRUE(rx.command_channel.alive);
+    can_rx_tick(&rx, 1);
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
 }
 
 /* 22 periods at 22.5 kHz are a step of 977.8 us: 30 steps are 29.33 ms, 31 are 30.31 ms. The time-out is never early
@@ -226,6 +262,17 @@ void test_three_bad_frames_of_the_last_ten_fail_the_channel_until_they_have_pass
         (void)send(0);
     }
     TEST_ASSERT_FALSE(rx.command_channel.failed);
+}
+
+/* The first frame after each time-out only synchronises: it is neither good nor bad. */
+void test_frames_that_synchronise_do_not_fail_the_channel(void)
+{
+    for (int n = 0; n < 5; n++) {
+        TEST_ASSERT_EQUAL_INT(RX_SYNCED, send(0));
+        TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, send(0));
+        TEST_ASSERT_FALSE(rx.command_channel.failed);
+        milliseconds(30);
+    }
 }
 
 static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)

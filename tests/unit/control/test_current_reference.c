@@ -93,6 +93,13 @@ void test_flux_below_the_table_is_flagged_and_uses_its_edge(void)
     in.torque_corrected = 100;
     const current_reference_t y = step();
     TEST_ASSERT_TRUE(y.limited);
+    int on_edge = 0;
+    for (; in.v_dc < 30000; in.v_dc = (q15_t)(in.v_dc + 1)) {
+        const current_reference_t above = step();
+        on_edge += (above.psi_plan == f.current_reference.grid.y0) ? 1 : 0;
+        TEST_ASSERT_EQUAL(above.psi_plan < f.current_reference.grid.y0, above.limited);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(0, on_edge);
     in.v_dc = 0;
     TEST_ASSERT_EQUAL_INT(y.i_ref.d, step().i_ref.d);
     in.v_dc = 100; /* less than the resistive drop: no negative flux */
@@ -163,6 +170,8 @@ void test_i_d_is_limited_to_the_demagnetisation_limit_and_reported(void)
     TEST_ASSERT_EQUAL_INT(unlimited.i_ref.d + 10, limited.i_ref.d);
     TEST_ASSERT_EQUAL_INT(unlimited.i_ref.q, limited.i_ref.q);
     TEST_ASSERT_TRUE(limited.i_d_limited);
+    in.i_d_max = (q15_t)-unlimited.i_ref.d;
+    TEST_ASSERT_FALSE(step().i_d_limited);
 }
 
 void test_at_standstill_there_is_no_division_by_zero(void)
@@ -172,6 +181,8 @@ void test_at_standstill_there_is_no_division_by_zero(void)
     in.omega = 1;
     TEST_ASSERT_EQUAL_INT(step().i_ref.q, standstill.i_ref.q);
     TEST_ASSERT_FALSE(standstill.limited);
+    in.v_dc = 2; /* v_ratio makes it one count of voltage, which is the whole flux at one count of speed */
+    TEST_ASSERT_EQUAL_INT(INT16_MAX, step().psi_plan);
     in.v_dc = 0;
     TEST_ASSERT_TRUE(step().limited);
     in.omega = INT16_MIN;
@@ -227,7 +238,7 @@ void test_the_current_circle_limits_i_q_and_keeps_i_d(void)
 
 void test_a_complete_table_is_accepted_and_a_broken_one_rejected(void)
 {
-    static int16_t bad[81];
+    static int16_t bad[82]; /* the last one is behind the table of 81 values */
     current_reference_config_t c = f.current_reference;
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
     c.i_d = 0;
@@ -253,13 +264,21 @@ void test_a_complete_table_is_accepted_and_a_broken_one_rejected(void)
     c = f.current_reference;
     c.i_max = 0;
     TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
+    c.i_max = 1;
+    TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
     c = f.current_reference;
     c.i_d = bad;
+    bad[81] = 1;
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
     bad[80] = 1;
     TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
+    bad[80] = 0;
+    bad[0] = 1;
+    TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
+    bad[0] = 0;
     c = f.current_reference;
     c.i_q = bad;
+    bad[81] = -1;
     TEST_ASSERT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));
     bad[80] = -1;
     TEST_ASSERT_NOT_EQUAL_INT(MOTOR_CHECK_OK, current_reference_check(&c));

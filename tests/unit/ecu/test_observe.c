@@ -159,6 +159,8 @@ void test_current_at_a_speed_at_which_the_diodes_conduct_is_plausible(void)
     TEST_ASSERT_TRUE(observe()->sensors_plausible);
     sample.v_dc = 8494;
     TEST_ASSERT_FALSE(observe()->sensors_plausible);
+    sample.v_dc = 8495;
+    TEST_ASSERT_TRUE(observe()->sensors_plausible);
 }
 
 /* The magnets drive a current through a short circuit of the windings. */
@@ -201,6 +203,21 @@ void test_the_machine_is_not_slow_while_a_gate_fault_needs_contactor_and_supply(
     TEST_ASSERT_TRUE(slow_at(0.0));
 }
 
+/* Of 480 V, 60 V are an eighth, 4096 counts exactly. */
+void test_at_60_V_the_dc_link_is_not_safe_to_touch_and_the_machine_not_slow(void)
+{
+    static motor_t other;
+    other = motor;
+    other.bases.voltage_V = 480.0F;
+    ecu.drive.motor = &other;
+    for (int below = 0; below < 2; below++) {
+        sample.v_dc = 4096 - below;
+        ecu.drive.task.safe_state.line_emf = (q15_t)(4096 - below);
+        TEST_ASSERT_EQUAL(below == 1, observe()->dc_safe);
+        TEST_ASSERT_EQUAL(below == 1, seen.slow);
+    }
+}
+
 /* A drive for a low voltage never reaches 60 V. Its limit is 0.8 of the lowest dc voltage at which it runs: 20 V. */
 void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_link(void)
 {
@@ -210,6 +227,12 @@ void test_at_a_low_dc_voltage_the_machine_is_slow_below_what_could_charge_the_li
     ecu.drive.motor = &low;
     TEST_ASSERT_TRUE(slow_at(15.9));
     TEST_ASSERT_FALSE(slow_at(16.1));
+    low.monitor.v_min = 1000;
+    low.safe_state.share_open = Q15(0.5);
+    ecu.drive.task.safe_state.line_emf = 500;
+    TEST_ASSERT_FALSE(observe()->slow);
+    ecu.drive.task.safe_state.line_emf = 499;
+    TEST_ASSERT_TRUE(observe()->slow);
 }
 
 void test_the_command_of_the_bus_is_passed_on(void)
@@ -230,6 +253,24 @@ void test_the_command_of_the_bus_is_passed_on(void)
     TEST_ASSERT_TRUE(out->current_mode && out->reset);
     TEST_ASSERT_FALSE(out->torque_mode || out->enable);
     TEST_ASSERT_TRUE(ecu_observe(&ecu, true).gate_fault);
+}
+
+/* An encoder before its index does not know the angle. */
+void test_the_state_machine_is_told_whether_the_angle_is_absolute_and_the_shut_off_paths_work(void)
+{
+    TEST_ASSERT_TRUE(observe()->angle_absolute);
+    TEST_ASSERT_FALSE(seen.shut_off_tested);
+    TEST_ASSERT_EQUAL_HEX16(0, seen.shut_off_faults);
+    ecu.shut_off = (shut_off_t){.tested = true, .faults = ECU_FAULT_WATCHDOG};
+    TEST_ASSERT_TRUE(observe()->shut_off_tested);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_WATCHDOG, seen.shut_off_faults);
+}
+
+void test_an_angle_that_is_not_absolute_yet_is_reported(void)
+{
+    hal_angle_is_absolute_StopIgnore();
+    hal_angle_is_absolute_ExpectAndReturn(false);
+    TEST_ASSERT_FALSE(observe()->angle_absolute);
 }
 
 /* The dead band of 0.25 N·m is rounded to 28 counts of 0.009 N·m: 0.256 N·m are 28 counts, 0.257 N·m are 29. */
@@ -305,9 +346,11 @@ void test_state_enable_command_and_faults_decide_whether_torque_runs_stops_or_ra
 void test_the_batterys_power_limits_act_while_they_arrive(void)
 {
     ecu.rx.limits = (bus_power_limits_t){.drive_kW = 32.4F, .regen_kW = 16.2F};
+    ecu.drive.request.limits = (torque_limits_t){.torque_drive = 1, .power_drive = 2, .power_regen = 3}; /* of before */
     torque_limits_t limits = ecu_limits(&ecu);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_drive);
     TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.power_regen);
+    TEST_ASSERT_EQUAL_INT(Q15_MAX, limits.torque_drive);
     ecu.rx.limits_channel = (rx_channel_t){.alive = true, .seen = true};
     limits = ecu_limits(&ecu);
     TEST_ASSERT_INT_WITHIN(1, 3276, limits.power_drive);
@@ -346,6 +389,7 @@ void test_the_first_derating_reason_is_reported_by_its_number_in_the_dbc(void)
         {DERATING_REQUEST | DERATING_REACH, 0},
         {DERATING_INVERTER, 1},
         {DERATING_WINDING, 2},
+        {DERATING_SENSOR, 6},
         {DERATING_DC_LOW, 3},
         {DERATING_DC_HIGH, 3},
         {DERATING_POWER, 4},
@@ -380,7 +424,9 @@ void test_the_limit_that_a_request_exceeds_is_reported_in_all_four_quadrants(voi
         {-132.1F, 1 << 28, REQUEST_LIMIT_RATED_TORQUE},
         {131.9F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT},
         {0.0F, 0, REQUEST_LIMIT_NONE},
-        {132.04F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT}, /* less than half a count: the rated torque, rounded */
+        {132.048F, 1 << 28, REQUEST_LIMIT_VEHICLE_LIMIT}, /* less than half a count: the rated torque, rounded */
+        {-50.0F, DRIVE_STANDSTILL, REQUEST_LIMIT_NONE},   /* at standstill every torque counts as driving */
+        {-50.0F, DRIVE_STANDSTILL + 1, REQUEST_LIMIT_VEHICLE_LIMIT},
     };
     ecu.rx.command.limit_drive_Nm = 60.0F;
     ecu.rx.command.limit_regen_Nm = 40.0F;
@@ -388,6 +434,24 @@ void test_the_limit_that_a_request_exceeds_is_reported_in_all_four_quadrants(voi
         ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
         sample.point.omega = cases[n].omega;
         (void)observe();
+        telemetry_t telemetry = {0};
+        ecu_telemetry(&ecu, &telemetry);
+        TEST_ASSERT_EQUAL_UINT32(cases[n].reported, telemetry.request_limit);
+    }
+}
+
+void test_also_a_small_request_is_compared_with_the_limit_of_its_direction(void)
+{
+    ecu.rx.command.limit_drive_Nm = 0.7F;
+    ecu.rx.command.limit_regen_Nm = 0.2F;
+    static const struct {
+        float torque_Nm;
+        request_limit_t reported;
+    } cases[] = {{0.8F, REQUEST_LIMIT_VEHICLE_LIMIT}, {0.5F, REQUEST_LIMIT_NONE}, {-0.5F, REQUEST_LIMIT_VEHICLE_LIMIT}};
+    sample.point.omega = 1 << 28;
+    (void)observe();
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        ecu.rx.command.torque_requested_Nm = cases[n].torque_Nm;
         telemetry_t telemetry = {0};
         ecu_telemetry(&ecu, &telemetry);
         TEST_ASSERT_EQUAL_UINT32(cases[n].reported, telemetry.request_limit);
@@ -425,6 +489,49 @@ void test_an_identification_is_stalled_when_it_finishes_nothing_in_three_steps(v
     ecu.drive.samples.generation += 10U;
     ecu_watch(&ecu);
     TEST_ASSERT_FALSE(ecu_observe(&ecu, false).stalled);
+}
+
+/* The interrupts may have run for any time before the first step. */
+void test_the_first_step_is_never_late(void)
+{
+    ecu.drive.samples.generation += 100U;
+    ecu_watch(&ecu);
+    TEST_ASSERT_EQUAL_UINT16(0, ecu.liveness.task_overruns);
+    ecu.liveness.started = true;
+    ecu.drive.samples.generation += 100U;
+    ecu_watch(&ecu);
+    TEST_ASSERT_EQUAL_UINT16(1, ecu.liveness.task_overruns);
+}
+
+/* All flags set, so that one which shares its bits with another would be hidden by it. Of a bool only the lowest bit is
+ * flipped: the sanitizers do not permit another value. */
+void test_every_flipped_bit_of_the_flags_of_bus_states_and_shut_off_is_damage(void)
+{
+    bool *const of_bool[] = {&ecu.rx.limits_channel.alive,  &ecu.rx.limits_channel.seen,
+                             &ecu.rx.command_channel.alive, &ecu.rx.command_channel.failed,
+                             &ecu.supervisor.enabled,       &ecu.supervisor.enable_seen,
+                             &ecu.supervisor.reset_seen,    &ecu.shut_off.tested,
+                             &ecu.shut_off.supply_on,       &ecu.shut_off.wrong};
+    uint8_t *const of_byte[] = {(uint8_t *)&ecu.supervisor.state, &ecu.shut_off.stage, (uint8_t *)&ecu.shut_off.failed,
+                                (uint8_t *)&ecu.shut_off.failed + 1};
+    for (unsigned n = 0; n < sizeof of_bool / sizeof of_bool[0]; n++) {
+        *of_bool[n] = true;
+    }
+    ecu.supervisor.state = STATE_FAULT;
+    ecu.shut_off.stage = 5;
+    ecu_seal_flags(&ecu);
+    ecu_check_integrity(&ecu);
+    TEST_ASSERT_FALSE(ecu.drive.data_check.damaged);
+    for (unsigned n = 0; n < sizeof of_bool / sizeof of_bool[0] + 8U * sizeof of_byte / sizeof of_byte[0]; n++) {
+        const unsigned bit = n - (unsigned)(sizeof of_bool / sizeof of_bool[0]);
+        uint8_t *byte = (n < sizeof of_bool / sizeof of_bool[0]) ? (uint8_t *)of_bool[n] : of_byte[bit / 8U];
+        const uint8_t flip = (n < sizeof of_bool / sizeof of_bool[0]) ? 1U : (uint8_t)(1U << (bit % 8U));
+        *byte ^= flip;
+        ecu_check_integrity(&ecu);
+        TEST_ASSERT_TRUE(ecu.drive.data_check.damaged);
+        ecu.drive.data_check.damaged = false;
+        *byte ^= flip;
+    }
 }
 
 /* Every counter has a different value, so that two exchanged ones are found. */

@@ -110,6 +110,84 @@ void test_a_supply_that_does_not_come_is_a_fault_of_the_supply(void)
     fails_with(ECU_FAULT_GATE_SUPPLY);
 }
 
+static void until_stage(uint8_t stage)
+{
+    while (state.stage < stage) {
+        step();
+    }
+}
+
+/* On, off, on, off by the watchdog, on: what has worked once must work again. */
+void test_the_supply_is_switched_off_by_its_switch_then_by_the_watchdog_and_returns_each_time(void)
+{
+    static const struct {
+        bool supply_on, wrong;
+    } wanted[] = {{true, false}, {false, false}, {true, false}, {true, true}, {true, false}};
+    step();
+    for (uint8_t stage = 0; stage < 5U; stage++) {
+        TEST_ASSERT_EQUAL_UINT8(stage, state.stage);
+        TEST_ASSERT_EQUAL(wanted[stage].supply_on, state.supply_on);
+        TEST_ASSERT_EQUAL(wanted[stage].wrong, state.wrong);
+        while (state.stage == stage) {
+            step();
+        }
+    }
+    TEST_ASSERT_TRUE(state.tested);
+    TEST_ASSERT_FALSE(state.supply_on || state.wrong);
+}
+
+/* The third stage switches it on by its switch, the fifth after the watchdog's cut. */
+void test_a_supply_that_does_not_return_is_a_fault_of_what_has_switched_it_off(void)
+{
+    static const struct {
+        uint8_t stage;
+        uint16_t fault;
+    } cases[] = {{2, ECU_FAULT_GATE_SUPPLY}, {4, ECU_FAULT_WATCHDOG}};
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        setUp();
+        until_stage(cases[n].stage);
+        switch_open = true;
+        in.supply = false;
+        steps(30);
+        TEST_ASSERT_FALSE(state.tested);
+        TEST_ASSERT_EQUAL_HEX16(cases[n].fault, state.faults);
+    }
+}
+
+/* A supply from before the test is no answer to the switch: that can be seen in the next step at the earliest. */
+void test_no_stage_ends_in_the_step_in_which_it_begins(void)
+{
+    in.supply = true;
+    shut_off_step(&state, &in);
+    TEST_ASSERT_EQUAL_UINT8(0, state.stage);
+    shut_off_step(&state, &in);
+    TEST_ASSERT_EQUAL_UINT8(1, state.stage);
+    in.supply = false;
+    shut_off_step(&state, &in);
+    TEST_ASSERT_EQUAL_UINT8(1, state.stage);
+}
+
+/* Each stage has its own time: 10 ms until the supply is there, 20 ms until it is gone. */
+static uint16_t fault_of_stage_that_takes(uint8_t stage, uint32_t us)
+{
+    setUp();
+    until_stage(stage);
+    in.supply = !state.supply_on;
+    in.elapsed_us = us / 2U;
+    shut_off_step(&state, &in);
+    in.elapsed_us = us - us / 2U;
+    shut_off_step(&state, &in);
+    return state.faults;
+}
+
+void test_each_stage_may_take_its_whole_time_and_no_more(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0, fault_of_stage_that_takes(1, 20000));
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_SUPPLY, fault_of_stage_that_takes(1, 20001));
+    TEST_ASSERT_EQUAL_HEX16(0, fault_of_stage_that_takes(2, 10000));
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_SUPPLY, fault_of_stage_that_takes(2, 10001));
+}
+
 void test_a_supply_that_does_not_stop_is_a_fault_of_the_supply(void)
 {
     switch_stuck = true;
@@ -136,6 +214,26 @@ void test_the_test_waits_while_the_contactor_is_closed_or_the_link_is_charged(vo
     in.idle = true;
     steps(20);
     TEST_ASSERT_TRUE(state.tested);
+}
+
+void test_a_supply_that_is_not_wanted_may_be_absent_and_one_that_is_wanted_for_10_ms(void)
+{
+    steps(20);
+    steps(100);
+    TEST_ASSERT_EQUAL_HEX16(0, state.faults);
+    in.wanted = true;
+    in.supply = false;
+    in.elapsed_us = 10000;
+    shut_off_step(&state, &in);
+    TEST_ASSERT_EQUAL_HEX16(0, state.faults);
+    in.elapsed_us = 1;
+    shut_off_step(&state, &in);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_SUPPLY, state.faults);
+    in.elapsed_us = 0x80000000U; /* more than an hour */
+    for (int n = 0; n < 3; n++) {
+        shut_off_step(&state, &in);
+        TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE_SUPPLY, state.faults);
+    }
 }
 
 /* Steps are 1 ms; up to 10 ms the supply may be absent, for example while it comes. */

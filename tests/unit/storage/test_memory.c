@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "hal/mock_nvm.h"
+#include "signal/crc32.h"
 #include "storage/memory.h"
 #include "unity.h"
 
@@ -86,11 +87,13 @@ void tearDown(void)
 static uint32_t milliseconds(uint32_t n)
 {
     const uint32_t before = memory.saves;
+    uint32_t returned = 0;
     for (uint32_t k = 0; k < n; k++) {
         drive.task.identifications = drive.task.identifications + 1U;
-        (void)memory_background(&memory, &drive);
+        returned += memory_background(&memory, &drive) ? 1U : 0U;
     }
-    return memory.saves - before;
+    TEST_ASSERT_EQUAL_UINT32(memory.saves - before, returned);
+    return returned;
 }
 
 static void run(uint32_t ms)
@@ -128,6 +131,7 @@ void test_identified_values_are_recalled_at_power_on_with_a_larger_uncertainty(v
 void test_an_empty_memory_leaves_the_priors(void)
 {
     TEST_ASSERT_FALSE(memory.recalled);
+    TEST_ASSERT_EQUAL_UINT32(0, memory.saves);
     TEST_ASSERT_EQUAL_INT32(0, drive.task.identify.kalman.x_q27[IDENTIFY_FLUX]);
     TEST_ASSERT_EQUAL_INT32(IDENTIFY_ONE_Q30,
                             drive.task.identify.kalman.p_q30[kalman_p_index(IDENTIFY_FLUX, IDENTIFY_FLUX)]);
@@ -164,6 +168,25 @@ void test_a_record_of_another_motor_or_of_other_priors_is_not_used(void)
     FOREIGN(m.identify.sigma[IDENTIFY_LQ]++);
     power_on(&motor);
     TEST_ASSERT_TRUE(memory.recalled);
+}
+
+/* Version 3 of the record. A layout that changes by itself would lose the values of every machine in the field. */
+void test_the_layout_is_the_checksum_of_version_size_name_bases_and_priors(void)
+{
+    const uint32_t version[2] = {3, (uint32_t)(sizeof(identify_record_t) + sizeof(compensation_t) + sizeof(int32_t))};
+    uint8_t all[256];
+    size_t size = 0;
+    TEST_ASSERT_TRUE(sizeof version + strlen(motor.name) + sizeof motor.bases + sizeof motor.identify.sigma <
+                     sizeof all);
+    memcpy(all, version, sizeof version);
+    size += sizeof version;
+    memcpy(&all[size], motor.name, strlen(motor.name));
+    size += strlen(motor.name);
+    memcpy(&all[size], &motor.bases, sizeof motor.bases);
+    size += sizeof motor.bases;
+    memcpy(&all[size], motor.identify.sigma, sizeof motor.identify.sigma);
+    size += sizeof motor.identify.sigma;
+    TEST_ASSERT_EQUAL_HEX32(crc32(all, (uint32_t)size), memory_layout(&motor));
 }
 
 void test_nothing_is_written_without_a_run(void)
@@ -225,6 +248,29 @@ void test_a_request_to_enable_switching_waits_only_while_the_record_is_written(v
     TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_HOLD_STEPS));
     TEST_ASSERT_FALSE(drive.held);
     TEST_ASSERT_EQUAL_INT(0, open);
+    TEST_ASSERT_EQUAL_UINT32(0, memory.failures);
+}
+
+void test_a_drive_is_not_held_for_a_save_that_is_not_wanted_any_more(void)
+{
+    identify();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(MEMORY_REST_MS - 1U));
+    TEST_ASSERT_TRUE(drive.held);
+    drive.task.identify.kept.mismatch_share = Q15(0.3);
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1));
+    TEST_ASSERT_FALSE(drive.held);
+}
+
+/* 0.1 s are 112.52 steps of 888.73 us. */
+void test_the_time_at_rest_is_rounded_to_whole_steps(void)
+{
+    static motor_t m;
+    m = motor;
+    m.bases.step_s = 0.1F / 112.52F;
+    power_on(&m);
+    identify();
+    TEST_ASSERT_EQUAL_UINT32(0, milliseconds(112));
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1));
 }
 
 /* The drive was enabled by a step that began before it was held. */
@@ -253,9 +299,11 @@ void test_a_memory_that_cannot_be_written_now_is_tried_again(void)
 void test_parameters_with_a_large_mismatch_are_not_kept(void)
 {
     identify();
-    drive.task.identify.kept.mismatch_share = Q15(0.3);
+    drive.task.identify.kept.mismatch_share = Q15(0.25) + 1;
     TEST_ASSERT_EQUAL_UINT32(0, milliseconds(1000));
     TEST_ASSERT_EQUAL_INT(0, erases);
+    drive.task.identify.kept.mismatch_share = Q15(0.25);
+    TEST_ASSERT_EQUAL_UINT32(1, milliseconds(1U + MEMORY_HOLD_STEPS));
 }
 
 void test_a_failed_write_is_counted_and_tried_again_after_the_interval(void)
@@ -314,18 +362,51 @@ void test_a_record_that_no_machine_in_a_thousand_would_have_is_not_used(void)
     }
 }
 
+/* Four, two and two standard deviations are 24 exactly, and one count of the format in another value is too much. */
+void test_the_bound_of_the_distance_is_exact(void)
+{
+    for (int far = 0; far < 2; far++) {
+        power_on(&motor);
+        identify();
+        int32_t *x = drive.task.identify.kalman.x_q27;
+        memset(x, 0, IDENTIFY_STATES * sizeof *x);
+        x[IDENTIFY_FLUX] = 4 * IDENTIFY_ONE_Q27;
+        x[IDENTIFY_LQ] = -2 * IDENTIFY_ONE_Q27;
+        x[IDENTIFY_R] = 2 * IDENTIFY_ONE_Q27;
+        x[IDENTIFY_LQ + 1] = far * 16384;
+        TEST_ASSERT_EQUAL_UINT32(1, milliseconds(MEMORY_REST_MS));
+        power_on(&motor);
+        TEST_ASSERT_EQUAL_INT(far == 0, memory.recalled);
+    }
+}
+
 /* A record with this compensation on a machine whose inverter loses 2 % of the period: allowed are 0.22 % to 4.78 %,
  * which are 72 to 1566 counts. */
-static bool recalls(int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
+static bool recalls_with(float bridge_duty, int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
 {
     static motor_t m;
     m = motor;
-    m.bridge_duty = 0.02F;
+    m.bridge_duty = bridge_duty;
     setUp();
     drive.task.compensation = (compensation_t){dead_time_q15, knee_q17, measured};
     identify_and_save();
     power_on(&m);
     return memory.recalled;
+}
+
+static bool recalls(int32_t dead_time_q15, q31_t knee_q17, int32_t measured)
+{
+    return recalls_with(0.02F, dead_time_q15, knee_q17, measured);
+}
+
+/* Of 3.125 % of the period: 1/16 + 1/128 and 1/64 - 1/128, which are 2304 and 256 counts exactly. */
+void test_the_bounds_of_a_measured_compensation_belong_to_what_is_used(void)
+{
+    const q31_t knee = motor.parameters.modulate.knee_q17;
+    TEST_ASSERT_TRUE(recalls_with(0.03125F, 2304, knee, 1));
+    TEST_ASSERT_FALSE(recalls_with(0.03125F, 2305, knee, 1));
+    TEST_ASSERT_TRUE(recalls_with(0.03125F, 256, knee, 1));
+    TEST_ASSERT_FALSE(recalls_with(0.03125F, 255, knee, 1));
 }
 
 void test_a_measured_compensation_far_from_the_motor_data_is_not_used(void)

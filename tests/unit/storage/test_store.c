@@ -201,6 +201,17 @@ void test_a_memory_that_cannot_be_read_is_reported_as_damaged_and_a_blank_one_as
     TEST_ASSERT_EQUAL(STORE_EMPTY, store_load(LAYOUT, &r, sizeof r));
 }
 
+/* Each word in turn; the size of the others is that of blank flash, and this one's is too large, too. */
+void test_a_header_with_one_word_that_is_not_blank_is_reported_as_damaged(void)
+{
+    record_t r;
+    for (unsigned word = 0; word < STORE_HEADER_SIZE / sizeof(uint32_t); word++) {
+        setUp();
+        memory[0][word * sizeof(uint32_t)] = 0x7F;
+        TEST_ASSERT_EQUAL(STORE_DAMAGED, store_load(LAYOUT, &r, sizeof r));
+    }
+}
+
 void test_two_damaged_slots_are_reported_and_not_used(void)
 {
     TEST_ASSERT_TRUE(save(1) && save(2));
