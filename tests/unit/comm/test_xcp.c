@@ -384,11 +384,41 @@ void test_the_checksum_is_that_of_the_bytes(void)
     EXPECT(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB); /* the published check value of CRC-32 */
     SEND(0xF6, 0, 0, 0, AT(measured));
     SEND(0xF3, 0, 0, 0, 0, 0, 1, 0);
-    EXPECT_ERROR(0x22);
+    EXPECT_WHOLE(0xFE, 0x22, 0, 0, 0, 0x10, 0, 0); /* with the largest size, 4096 */
     SEND(0xF3, 0, 0, 0, 0, 0, 0, 0);
-    EXPECT_ERROR(0x22);
+    EXPECT_WHOLE(0xFE, 0x22, 0, 0, 0, 0x10, 0, 0);
+    SEND(0xF3, 0, 0, 0, 1, 0x10, 0, 0);
+    EXPECT_WHOLE(0xFE, 0x22, 0, 0, 0, 0x10, 0, 0);
+    SEND(0xF3, 0, 0, 0, 0, 0x10, 0, 0);
+    EXPECT_ERROR(0x24);
     SEND(0xF3, 0, 0, 0, 17, 0, 0, 0);
     EXPECT_ERROR(0x24);
+}
+
+void test_the_checksum_of_the_next_block_follows_without_another_address(void)
+{
+    master_connect();
+    memcpy(&measured[3], "123456789", 9);
+    SEND(0xF6, 0, 0, 0, AT(measured));
+    SEND(0xF3, 0, 0, 0, 3, 0, 0, 0);
+    EXPECT(0xFF, 0x09);
+    SEND(0xF3, 0, 0, 0, 9, 0, 0, 0);
+    EXPECT_WHOLE(0xFF, 0x09, 0, 0, 0x26, 0x39, 0xF4, 0xCB);
+}
+
+/* Blocks of four bytes; what is refused does not move the address. */
+void test_a_download_goes_on_where_the_last_one_stopped(void)
+{
+    ready();
+    write_float(0, 5.0F);
+    SEND(0xF0, 4, 0, 0, 0x60, 0x40); /* 3.5 */
+    EXPECT_WHOLE(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(3.5F, working[1]);
+    SEND(0xF0, 4, 0, 0, 0xC8, 0x42); /* 100, out of range */
+    EXPECT_ERROR(0x22);
+    SEND(0xF0, 4, 0, 0, 0x80, 0x40); /* 4 */
+    EXPECT_WHOLE(0xFF);
+    TEST_ASSERT_EQUAL_FLOAT(4.0F, working[2]);
 }
 
 void test_waiting_bytes_are_discarded_with_the_session(void)

@@ -53,6 +53,12 @@ void master_expect(const uint8_t *data, unsigned length, int line)
     UNITY_TEST_ASSERT_EQUAL_HEX8_ARRAY(data, last_answer.data, length, (unsigned)line, "a different answer");
 }
 
+void master_expect_whole(const uint8_t *data, unsigned length, int line)
+{
+    master_expect(data, length, line);
+    UNITY_TEST_ASSERT_EQUAL_UINT8(length, last_answer.length, (unsigned)line, "an answer of another length");
+}
+
 void master_connect(void)
 {
     SEND(0xFF, 0x00);

@@ -7,7 +7,9 @@
 
 #define SEND(...) master_send((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}))
 #define EXPECT(...) master_expect((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}), __LINE__)
-#define EXPECT_ERROR(code) EXPECT(0xFE, (code))
+#define EXPECT_WHOLE(...) \
+    master_expect_whole((const uint8_t[]){__VA_ARGS__}, sizeof((const uint8_t[]){__VA_ARGS__}), __LINE__)
+#define EXPECT_ERROR(code) EXPECT_WHOLE(0xFE, (code))
 /* An address as four bytes, the lowest first. */
 #define AT(pointer) BYTE_OF(pointer, 0), BYTE_OF(pointer, 8), BYTE_OF(pointer, 16), BYTE_OF(pointer, 24)
 #define BYTE_OF(pointer, shift) (uint8_t)(xcp_address(pointer) >> (shift))
@@ -25,6 +27,8 @@ void master_reset(void);
 void master_send(const uint8_t *data, unsigned length);
 /* Checks that the answer begins with these bytes. */
 void master_expect(const uint8_t *data, unsigned length, int line);
+/* Checks that the answer consists of them. */
+void master_expect_whole(const uint8_t *data, unsigned length, int line);
 void master_connect(void);
 void master_unlock(void);
 void master_download(uint32_t address, const void *data, uint8_t size);
