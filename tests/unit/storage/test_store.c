@@ -11,7 +11,8 @@
 /* A simulated flash. Writing can only clear bits; the power fails when `energy` bytes have been written or erased. */
 static uint8_t memory[HAL_NVM_SLOTS][HAL_NVM_SLOT_SIZE];
 static int32_t energy;
-static bool erase_fails;
+static bool erase_fails, program_fails;
+static int programs; /* calls */
 static uint32_t failed_sectors;
 static int stuck_offset;        /* this byte of every slot is stored with one wrong bit; -1: none */
 static int reads, failing_read; /* the read with this number reports a failure, although the data are right; -1: none */
@@ -60,6 +61,10 @@ bool hal_nvm_erase(uint32_t slot)
 bool hal_nvm_program(uint32_t slot, uint32_t offset, const void *data, uint32_t size)
 {
     const uint8_t *byte = data;
+    programs++;
+    if (program_fails) {
+        return false;
+    }
     TEST_ASSERT_TRUE(offset % HAL_NVM_UNIT == 0 && size % HAL_NVM_UNIT == 0 && offset + size <= HAL_NVM_SLOT_SIZE);
     for (uint32_t k = 0; k < size; k++) {
         if (energy <= 0) {
@@ -78,7 +83,8 @@ void setUp(void)
 {
     memset(memory, 0xFF, sizeof memory);
     energy = NEVER;
-    erase_fails = false;
+    erase_fails = program_fails = false;
+    programs = 0;
     failed_sectors = 0;
     stuck_offset = failing_read = -1;
     reads = 0;
@@ -249,6 +255,40 @@ void test_a_record_larger_than_a_slot_is_refused_before_anything_is_erased(void)
     TEST_ASSERT_TRUE(save(1) && save(2));
     TEST_ASSERT_FALSE(store_save(LAYOUT, large, STORE_RECORD_MAX + 1U, &failed_sectors));
     memory[1][40] ^= 1;
+    TEST_ASSERT_EQUAL_UINT32(1, loaded());
+}
+
+void test_records_of_every_length_are_stored_whole(void)
+{
+    uint8_t bytes[200], back[200];
+    for (uint32_t k = 0; k < sizeof bytes; k++) {
+        bytes[k] = (uint8_t)(k * 7U);
+    }
+    for (uint32_t size = 1; size <= sizeof bytes; size++) {
+        TEST_ASSERT_TRUE(store_save(LAYOUT, bytes, size, &failed_sectors));
+        memset(back, 0xEE, sizeof back);
+        TEST_ASSERT_EQUAL(STORE_OK, store_load(LAYOUT, back, size));
+        TEST_ASSERT_EQUAL_MEMORY(bytes, back, size);
+    }
+}
+
+/* What follows the caller's record in memory is not his. */
+void test_the_rest_of_the_last_unit_stays_blank(void)
+{
+    static const uint8_t bytes[16] = {1, 2, 3, 4, 5, 6, 7, 8, 9};
+    TEST_ASSERT_TRUE(store_save(LAYOUT, bytes, 9, &failed_sectors));
+    TEST_ASSERT_EACH_EQUAL_HEX8(0xFF, &memory[0][STORE_HEADER_SIZE + 9U], 7);
+}
+
+/* One attempt, as there is one sector besides that of the newest record. */
+void test_after_a_part_that_cannot_be_programmed_nothing_more_is_programmed(void)
+{
+    TEST_ASSERT_TRUE(save(1));
+    programs = 0;
+    program_fails = true;
+    TEST_ASSERT_FALSE(save(2));
+    TEST_ASSERT_EQUAL_INT(1, programs);
+    TEST_ASSERT_EQUAL_UINT32(1, failed_sectors);
     TEST_ASSERT_EQUAL_UINT32(1, loaded());
 }
 
