@@ -54,6 +54,22 @@ static void start(void)
     EXPECT(0xFF);
 }
 
+/* Two lists of one frame with one byte: measured[3] and measured[4]. */
+static void two_lists(void)
+{
+    SEND(0xD6);
+    SEND(0xD5, 0, 2, 0);
+    for (uint8_t list = 0; list < 2; list++) {
+        SEND(0xD4, 0, list, 0, 1);
+    }
+    for (uint8_t list = 0; list < 2; list++) {
+        SEND(0xD3, 0, list, 0, 0, 1);
+        SEND(0xE2, 0, list, 0, 0, 0);
+        SEND(0xE1, 0xFF, 1, 0, AT(&measured[3 + list]));
+        EXPECT(0xFF);
+    }
+}
+
 void test_a_running_list_sends_its_bytes_each_millisecond(void)
 {
     one_list(0, 1, 0x10);
@@ -164,6 +180,93 @@ void test_allocation_has_a_fixed_order_and_limits(void)
     EXPECT_ERROR(0x22);
 }
 
+/* 10 frames of 7 entries, then a frame of the last two; a third one would be too many. */
+void test_the_pool_of_entries_can_be_used_up_to_its_last_entry(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 12);
+    for (uint8_t odt = 0; odt < 10; odt++) {
+        SEND(0xD3, 0, 0, 0, odt, 7);
+        EXPECT_WHOLE(0xFF);
+    }
+    SEND(0xD3, 0, 0, 0, 10, 3);
+    EXPECT_ERROR(0x30);
+    SEND(0xD3, 0, 0, 0, 10, 2);
+    EXPECT_WHOLE(0xFF);
+    SEND(0xD3, 0, 0, 0, 11, 1);
+    EXPECT_ERROR(0x30);
+}
+
+void test_a_frame_takes_its_entries_once_also_a_single_one(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xD4, 0, 0, 0, 1);
+    SEND(0xD4, 0, 0, 0, 1);
+    EXPECT_ERROR(0x22);
+    SEND(0xD3, 0, 0, 0, 0, 1);
+    EXPECT_WHOLE(0xFF);
+    SEND(0xD3, 0, 0, 0, 0, 1);
+    EXPECT_ERROR(0x22);
+    SEND(0xD4, 0, 0, 0, 1); /* entries were allocated: no more frames */
+    EXPECT_ERROR(0x29);
+}
+
+/* WRITE_DAQ would write to the entry that was selected before. */
+void test_a_pointer_that_was_refused_selects_nothing(void)
+{
+    static const uint8_t wrong[][3] = {{2, 0, 0}, {3, 0, 0}, {0, 1, 0}, {0, 2, 0}, {0, 0, 1}, {1, 1, 0}};
+    for (unsigned n = 0; n < sizeof wrong / sizeof wrong[0]; n++) {
+        two_lists();
+        SEND(0xE2, 0, 0, 0, 0, 0);
+        EXPECT_WHOLE(0xFF);
+        SEND(0xE2, 0, wrong[n][0], 0, wrong[n][1], wrong[n][2]);
+        EXPECT_ERROR(0x22);
+        SEND(0xE1, 0xFF, 1, 0, AT(measured));
+        EXPECT_ERROR(0x29);
+    }
+}
+
+/* The first list has three frames. */
+void test_clearing_a_list_clears_all_of_its_frames_and_no_others(void)
+{
+    SEND(0xD5, 0, 2, 0);
+    SEND(0xD4, 0, 0, 0, 3);
+    SEND(0xD4, 0, 1, 0, 1);
+    for (uint8_t odt = 0; odt < 4; odt++) {
+        SEND(0xD3, 0, odt / 3U, 0, odt % 3U, 1);
+        SEND(0xE2, 0, odt / 3U, 0, odt % 3U, 0);
+        SEND(0xE1, 0xFF, 1, 0, AT(measured));
+        EXPECT_WHOLE(0xFF);
+    }
+    SEND(0xDE, 2, 0, 0);
+    EXPECT_WHOLE(0xFF, 0);
+    SEND(0xE3, 0, 0, 0);
+    EXPECT_WHOLE(0xFF);
+    SEND(0xDF, 0, 0, 0);
+    EXPECT(0xFF, 0x00);                     /* not selected any more */
+    for (uint8_t odt = 0; odt < 2; odt++) { /* written again, but for the last frame */
+        SEND(0xE2, 0, 0, 0, odt, 0);
+        SEND(0xE1, 0xFF, 1, 0, AT(measured));
+    }
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+    SEND(0xDE, 1, 1, 0);
+    EXPECT_WHOLE(0xFF, 3);
+}
+
+void test_freeing_the_lists_keeps_the_count_of_dropped_ones(void)
+{
+    one_list(0, 1, 0);
+    start();
+    for (int ms = 0; ms < 200; ms++) {
+        event();
+    }
+    const uint32_t dropped = slave.daq.overloads;
+    TEST_ASSERT_GREATER_THAN_UINT32(0, dropped);
+    SEND(0xD6);
+    TEST_ASSERT_EQUAL_UINT32(dropped, slave.daq.overloads);
+}
+
 void test_more_entries_than_the_pool_has_are_refused(void)
 {
     SEND(0xD5, 0, 1, 0);
@@ -189,22 +292,6 @@ void test_a_list_with_an_empty_entry_or_a_frame_that_is_too_long_does_not_start(
     SEND(0xE1, 0xFF, 4, 0, AT(measured));
     SEND(0xDE, 1, 0, 0);
     EXPECT_ERROR(0x2A);
-}
-
-/* Two lists of one frame with one byte: measured[3] and measured[4]. */
-static void two_lists(void)
-{
-    SEND(0xD6);
-    SEND(0xD5, 0, 2, 0);
-    for (uint8_t list = 0; list < 2; list++) {
-        SEND(0xD4, 0, list, 0, 1);
-    }
-    for (uint8_t list = 0; list < 2; list++) {
-        SEND(0xD3, 0, list, 0, 0, 1);
-        SEND(0xE2, 0, list, 0, 0, 0);
-        SEND(0xE1, 0xFF, 1, 0, AT(&measured[3 + list]));
-        EXPECT(0xFF);
-    }
 }
 
 void test_only_the_selected_lists_are_started(void)
@@ -364,6 +451,65 @@ void test_lists_that_changed_after_they_were_selected_start_together_or_not_at_a
         event();
         TEST_ASSERT_FALSE(next());
     }
+}
+
+void test_a_list_is_started_and_stopped_by_its_number(void)
+{
+    one_list(0, 1, 0);
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_WHOLE(0xFF, 0);
+    SEND(0xDF, 0, 0, 0);
+    EXPECT(0xFF, 0x40);
+    event();
+    TEST_ASSERT_TRUE(next());
+    SEND(0xDE, 0, 0, 0);
+    EXPECT_WHOLE(0xFF, 0);
+    SEND(0xDF, 0, 0, 0);
+    EXPECT(0xFF, 0x00);
+    event();
+    TEST_ASSERT_FALSE(next());
+}
+
+void test_a_list_without_frames_does_not_start(void)
+{
+    SEND(0xD5, 0, 1, 0);
+    SEND(0xDE, 1, 0, 0);
+    EXPECT_ERROR(0x2A);
+}
+
+void test_a_list_that_is_started_again_is_sampled_in_the_next_step_whatever_its_prescaler(void)
+{
+    one_list(0, 5, 0);
+    for (int n = 0; n < 3; n++) {
+        SEND(0xDE, 1, 0, 0);
+        event();
+        TEST_ASSERT_TRUE(next());
+        event();
+        TEST_ASSERT_FALSE(next());
+        SEND(0xDE, 0, 0, 0);
+    }
+}
+
+/* All lists that there are, and the frames behind them in memory. */
+void test_with_all_lists_in_use_none_runs_by_itself(void)
+{
+    SEND(0xD5, 0, XCP_DAQ_LISTS, 0);
+    for (uint8_t list = 0; list < XCP_DAQ_LISTS; list++) {
+        SEND(0xD4, 0, list, 0, 2);
+        EXPECT(0xFF);
+    }
+    for (uint8_t odt = 0; odt < 2U * XCP_DAQ_LISTS; odt++) {
+        SEND(0xD3, 0, odt / 2U, 0, odt % 2U, 3);
+        EXPECT(0xFF);
+    }
+    SEND(0xFD);
+    EXPECT(0xFF, 0x00);
+    event();
+    TEST_ASSERT_FALSE(next());
+    SEND(0xD3, 0, XCP_DAQ_LISTS, 0, 0, 1);
+    EXPECT_ERROR(0x22);
+    SEND(0xE2, 0, XCP_DAQ_LISTS, 0, 0, 0);
+    EXPECT_ERROR(0x22);
 }
 
 void test_numbers_that_do_not_exist_are_refused(void)
