@@ -186,6 +186,33 @@ void test_a_command_that_the_caller_has_carried_out_is_answered_and_counted(void
     TEST_ASSERT_EQUAL_UINT32(before.refused + 1U, slave.counts.refused);
 }
 
+/* 0 would mean that no seed was given. Before the first seed the counter is at its end here. */
+void test_a_seed_is_never_zero(void)
+{
+    xcp_reset(&slave, &slave_config, UINT32_MAX);
+    master_connect();
+    master_unlock();
+}
+
+static void send_wrong_key(void)
+{
+    master_connect();
+    SEND(0xF8, 0, 1);
+    EXPECT(0xFF, 4);
+    SEND(0xF7, 4, 1, 2, 3, 4);
+    EXPECT_ERROR(0x25);
+}
+
+void test_a_right_key_ends_the_count_of_wrong_ones(void)
+{
+    for (int round = 0; round < 3; round++) {
+        send_wrong_key();
+        send_wrong_key();
+        master_connect();
+        master_unlock();
+    }
+}
+
 /* A key that was recorded after one start must not be right after the next. */
 void test_the_first_seed_depends_on_the_seed_of_the_start(void)
 {

@@ -348,6 +348,115 @@ void test_commissioning_fails_if_the_rotor_moves_switching_stops_the_voltage_is_
     TEST_ASSERT_EQUAL_INT(COMMISSION_CURRENT, failure_after(50, in));
 }
 
+/* The first current is measured with an error. 0.6 * 512 counts are 307; an eighth of it and 256 counts are allowed,
+ * here as sums of ten periods. */
+static bool accepts(int32_t error_d, int32_t error_q)
+{
+    commission_start(&config, &state);
+    for (int k = 0; k < 50; k++) {
+        const commission_in_t in = response();
+        commission_step(&config, &state, &in);
+    }
+    commission_in_t in = response();
+    in.sum_i.d += error_d;
+    in.sum_i.q = error_q;
+    commission_step(&config, &state, &in);
+    return commission_runs(&state);
+}
+
+void test_the_current_may_differ_from_its_reference_by_an_eighth_and_256_counts(void)
+{
+    static const int32_t allowed = 10 * (307 / 8 + 256);
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_TRUE(accepts(sign * allowed, 0));
+        TEST_ASSERT_FALSE(accepts(sign * (allowed + 1), 0));
+        TEST_ASSERT_TRUE(accepts(0, sign * allowed));
+        TEST_ASSERT_FALSE(accepts(0, sign * (allowed + 1)));
+    }
+}
+
+void test_the_rotor_may_turn_as_fast_as_the_limit_in_either_direction(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        commission_in_t in = response();
+        in.omega = sign * OMEGA_MAX;
+        commission_step(&config, &state, &in);
+        TEST_ASSERT_TRUE(commission_runs(&state));
+    }
+}
+
+/* Of the whole range, so that every level is exact: 2^(-6 + k/2). 40 steps settle, 64 are measured. */
+void test_ten_levels_in_both_polarities_last_104_steps_each(void)
+{
+    commission_config_t full = config;
+    full.i_max = Q15_MAX;
+    commission_start(&full, &state);
+    for (int index = 0; index < 20; index++) {
+        const int32_t level = (int32_t)lround(32768.0 * pow(2.0, -6.0 + 0.5 * (index / 2)));
+        for (int k = 0; k < 104; k++) {
+            TEST_ASSERT_EQUAL_INT32((index % 2 == 0) ? level : -level, state.i_ref.d);
+            TEST_ASSERT_EQUAL_INT(0, state.i_ref.q);
+            TEST_ASSERT_EQUAL_INT((k < 40) ? COMMISSION_SETTLE : COMMISSION_MEASURE, state.phase);
+            const commission_in_t in = response();
+            commission_step(&full, &state, &in);
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(COMMISSION_DONE, state.phase);
+    TEST_ASSERT_EQUAL_INT(COMMISSION_GOOD, state.failure);
+}
+
+/* Only the measured steps count: while a current settles it may be another one. 640 periods are averaged; the gain and
+ * the rounding of the sums make less than a tenth of a count. */
+void test_the_data_are_the_means_of_current_and_voltage_over_the_measured_steps(void)
+{
+    while (commission_runs(&state)) {
+        commission_in_t in = response();
+        if (state.phase == COMMISSION_SETTLE) {
+            in.sum_i.d += 1000;
+            in.sum_u.d += 1000;
+        }
+        commission_step(&config, &state, &in);
+    }
+    for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+        const double i = round(0.6 * round(32768.0 * pow(2.0, -6.0 + 0.5 * k)));
+        TEST_ASSERT_DOUBLE_WITHIN(0.1, i, state.data.i[k] / 32768.0);
+        TEST_ASSERT_DOUBLE_WITHIN(0.1, R * i + 4.0 / 3.0 * LEVEL * 32768.0, state.data.u[k] / 32768.0);
+    }
+}
+
+/* In all sectors, to a few counts. */
+void test_the_angle_of_the_last_step_gives_the_cosines_of_the_phases(void)
+{
+    for (double theta = 0.0; theta < 6.3; theta += 0.1) {
+        double c[3];
+        twin_cosines(theta, c);
+        commission_start(&config, &state);
+        while (commission_runs(&state)) {
+            commission_in_t in = response();
+            in.theta = (uint32_t)(int64_t)llround(theta / 6.283185307179586 * 4294967296.0);
+            commission_step(&config, &state, &in);
+        }
+        const q15_t *found = state.data.cosine; /* the largest first, the others in any order */
+        TEST_ASSERT_DOUBLE_WITHIN(4.0, c[0] * 32768.0, found[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(4.0, c[1] * 32768.0, fmax(found[1], found[2]));
+        TEST_ASSERT_DOUBLE_WITHIN(4.0, c[2] * 32768.0, fmin(found[1], found[2]));
+    }
+}
+
+void test_after_the_end_nothing_changes_any_more(void)
+{
+    commission_in_t in = response();
+    in.acting = false;
+    commission_step(&config, &state, &in);
+    const commission_state_t failed = state;
+    in = response();
+    for (int k = 0; k < 200; k++) {
+        commission_step(&config, &state, &in);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&failed, &state, sizeof state);
+    TEST_ASSERT_EQUAL_INT(COMMISSION_STOPPED, state.failure);
+}
+
 void test_while_a_current_settles_the_voltage_may_be_limited(void)
 {
     commission_in_t in = response();
