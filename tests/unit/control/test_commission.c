@@ -234,6 +234,22 @@ void test_the_knee_is_limited_to_between_zero_and_one(void)
     TEST_ASSERT_EQUAL_INT32(q30(1.0) - 1, commission_knee(&curve));
 }
 
+/* A knot is the current of the phase with the largest cosine, rounded to nearest: for both a remainder above and one
+ * below a half. */
+void test_the_knots_are_the_currents_of_the_first_phase_to_half_a_count(void)
+{
+    for (int cosine = 28378; cosine <= 32767; cosine += 133) {
+        twin_curve_t twin;
+        commission_curve_t curve;
+        commission_data_t data = measured(0.3, 1e-6, &twin);
+        data.cosine[0] = (q15_t)cosine;
+        TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(0.5, cosine / 32768.0 * data.i[k], curve.knot[k]);
+        }
+    }
+}
+
 /* The resistance is below Z_b in every machine; its format cannot represent more. */
 void test_a_slope_of_one_or_more_is_refused(void)
 {
@@ -266,6 +282,7 @@ void test_currents_that_do_not_rise_and_a_falling_voltage_are_refused(void)
         data.u[k] = -data.u[k];
     }
     TEST_ASSERT_FALSE(commission_fit(&data, &curve));
+    TEST_ASSERT_EQUAL_INT32(0, curve.r);
 }
 
 /* A step of ten periods of a machine at standstill, with offsets of current and voltage. */
@@ -324,6 +341,7 @@ static commission_failure_t failure_after(int ms, commission_in_t bad)
     }
     commission_step(&config, &state, &bad);
     TEST_ASSERT_EQUAL_INT32(0, state.i_ref.d);
+    TEST_ASSERT_EQUAL_INT32(0, state.i_ref.q);
     TEST_ASSERT_FALSE(commission_runs(&state));
     return state.failure;
 }

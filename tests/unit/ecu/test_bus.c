@@ -24,6 +24,7 @@
 
 #define CYCLE_MS 10
 #define PER_UNIT_1 65536 /* of q15 in q31 */
+#define COUNT_PER_V (32768.0 / 540.0)
 
 static uint8_t command_counter, battery_counter;
 
@@ -310,13 +311,25 @@ void test_a_supply_that_goes_missing_while_the_drive_needs_it_is_a_fault(void)
 }
 
 /* Without a tool's capture each first fault leaves one, also a fault outside of the drive. */
-void test_a_fault_of_the_state_machine_freezes_the_scope(void)
+void test_a_fault_of_the_state_machine_freezes_scope_and_freeze_frame(void)
 {
     tasks(100);
     TEST_ASSERT_EQUAL_UINT8(0, ecu.scope.capture.frozen);
+    TEST_ASSERT_EQUAL_UINT8(0, ecu.freeze.frozen);
     board.gate_fault = true;
     tasks(2);
     TEST_ASSERT_EQUAL_UINT8(1, ecu.scope.capture.frozen);
+    TEST_ASSERT_EQUAL_UINT8(1, ecu.freeze.frozen);
+    TEST_ASSERT_EQUAL_HEX16(ECU_FAULT_GATE, ecu.freeze.ecu_faults);
+}
+
+void test_the_measurements_for_the_calibration_tool_are_taken_in_each_step(void)
+{
+    tasks(1);
+    TEST_ASSERT_INT_WITHIN(60, (int)(350.0 * COUNT_PER_V), ecu.xcp.measurements.v_dc_V);
+    board.counts.v_dc /= 2U;
+    tasks(1);
+    TEST_ASSERT_INT_WITHIN(60, (int)(175.0 * COUNT_PER_V), ecu.xcp.measurements.v_dc_V);
 }
 
 void test_the_step_is_rounded_to_the_nearest_nanosecond(void)
