@@ -88,6 +88,38 @@ void test_the_result_for_a_smooth_curve_is_that_of_the_twin(void)
     }
 }
 
+/* With cosines, currents and voltages that their formats hold exactly, only the fit's own rounding is left: a few times
+ * 2^-30. */
+void test_the_result_differs_from_that_of_the_twin_by_the_rounding_of_the_fit_only(void)
+{
+    double r = 0.0, level = 0.0, v = 0.0, knee = 0.0;
+    for (double theta = 0.0; theta < 6.3; theta += 0.05) {
+        twin_curve_t unused;
+        commission_curve_t curve;
+        double c[3], i[COMMISSION_LEVELS], u[COMMISSION_LEVELS];
+        const commission_data_t data = measured(theta, 0.02, &unused);
+        for (int x = 0; x < 3; x++) {
+            c[x] = data.cosine[x] / 32768.0;
+        }
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            i[k] = data.i[k] / ONE;
+            u[k] = data.u[k] / ONE;
+        }
+        const twin_curve_t twin = twin_commission(i, u, c);
+        TEST_ASSERT_TRUE(commission_fit(&data, &curve));
+        r = fmax(r, fabs(twin.r - curve.r / ONE));
+        level = fmax(level, fabs(twin.level - curve.level / ONE));
+        knee = fmax(knee, fabs(twin_knee(&twin) - commission_knee(&curve) / ONE));
+        for (unsigned k = 0; k < COMMISSION_LEVELS; k++) {
+            v = fmax(v, fabs(twin.v[k] - curve.v[k] / ONE));
+        }
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(2.0 / ONE, 0.0, r);
+    TEST_ASSERT_DOUBLE_WITHIN(4.0 / ONE, 0.0, level);
+    TEST_ASSERT_DOUBLE_WITHIN(15.0 / ONE, 0.0, v);
+    TEST_ASSERT_DOUBLE_WITHIN(60.0 / ONE, 0.0, knee); /* divided by the level */
+}
+
 /* The current at which tanh() bends is half of the first knot. Below that knot the fit takes the curve as constant,
  * which affects the first knots most. */
 void test_the_curve_is_that_of_the_leg_within_a_few_percent(void)
