@@ -48,6 +48,16 @@ void test_without_a_known_voltage_every_dc_voltage_is_near_and_none_contradicts(
     TEST_ASSERT_FALSE(contradicts_after(1000));
 }
 
+/* A battery of a fraction of a volt is a broken one: its voltage is known, too. */
+void test_every_voltage_above_zero_is_compared(void)
+{
+    in.battery_V = 0.1F;
+    in.v_dc_V = 100.0F;
+    TEST_ASSERT_FALSE(battery_voltage_is_near(&in));
+    TEST_ASSERT_FALSE(contradicts_after(250));
+    TEST_ASSERT_TRUE(contradicts_after(1));
+}
+
 void test_a_voltage_that_was_known_and_is_lost_is_not_near_and_contradicts_nothing(void)
 {
     in.alive = false;
