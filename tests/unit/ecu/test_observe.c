@@ -503,8 +503,8 @@ void test_the_first_step_is_never_late(void)
     TEST_ASSERT_EQUAL_UINT16(1, ecu.liveness.task_overruns);
 }
 
-/* The compiler of the firmware reads all bits of a bool's byte; clang reads the lowest, and the sanitizers permit no other
- * value than 0 and 1. */
+/* GCC, which compiles the firmware, reads all bits of a bool's byte. Clang reads the lowest one, and the sanitizers
+ * permit no other value than 0 and 1. */
 #if defined(__clang__) || defined(SANITIZED)
 #define BOOL_BITS 1U
 #else

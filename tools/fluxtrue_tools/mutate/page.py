@@ -20,9 +20,10 @@ sources of the firmware, one at a time: another relation (`<` to `<=` and `>=`, 
 of a conjunction or disjunction alone, a negation left out, other arithmetic, shifts and bit operations, a constant one
 larger or 0 (a fraction nine tenths, or 0), a condition that is always or never true, a statement deleted, a returned or
 initial value 0, an element of a structure 0, a row of a table left out. Each mutant is compiled as the build compiles
-its source, linked into each unit test that contains the source, and run. It is found if a test fails, or needs four
-times its time of a processor. A mutant whose object equals that of the source is no error (equivalent); one that equals
-another mutant counts once. Header files are not mutated, nor are closed loops used to find mutants.
+its source, linked into each unit test that contains the source, and run; a unit test that compiles the source with
+other definitions gets an object of its own. It is found if a test fails, or needs four times its time of a processor. A
+mutant whose objects equal those of the source is no error (equivalent); one that equals another mutant counts once.
+Header files are not mutated, nor are closed loops used to find mutants.
 
 The parts in which every mutant must be found, and the survivors that are no errors, one by one with the reason, are in
 [mutation.toml](mutation.toml).
