@@ -117,5 +117,5 @@ int32_t commission_knee(const commission_curve_t *curve)
     if (twice_area <= 0) {
         return 0;
     }
-    return (twice_area >= curve->level) ? INT32_MAX / 2 : fx_div_q31(twice_area, curve->level) >> 1;
+    return fx_div_q31(twice_area, curve->level) >> 1; /* saturates: a knee is at most 1 */
 }

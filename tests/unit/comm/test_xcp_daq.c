@@ -506,6 +506,10 @@ void test_with_all_lists_in_use_none_runs_by_itself(void)
     EXPECT(0xFF, 0x00);
     event();
     TEST_ASSERT_FALSE(next());
+    SEND(0xDD, 0); /* stops all lists, and only them: the fourth frame keeps its entries */
+    EXPECT_WHOLE(0xFF);
+    SEND(0xD3, 0, 1, 0, 1, 1);
+    EXPECT_ERROR(0x22);
     SEND(0xD3, 0, XCP_DAQ_LISTS, 0, 0, 1);
     EXPECT_ERROR(0x22);
     SEND(0xE2, 0, XCP_DAQ_LISTS, 0, 0, 0);

@@ -31,7 +31,8 @@ void test_near_is_within_5_percent_of_the_battery(void)
     static const struct {
         float v_dc_V;
         bool near;
-    } cases[] = {{379.9F, false}, {380.1F, true}, {419.9F, true}, {420.1F, false}, {0.0F, false}};
+    } cases[] = {{379.9F, false}, {380.0F, true},  {380.1F, true}, {419.9F, true},
+                 {420.0F, true},  {420.1F, false}, {0.0F, false}};
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         in.v_dc_V = cases[n].v_dc_V;
         TEST_ASSERT_EQUAL(cases[n].near, battery_voltage_is_near(&in));
@@ -43,6 +44,7 @@ void test_without_a_known_voltage_every_dc_voltage_is_near_and_none_contradicts(
     in.battery_V = 0.0F;
     in.v_dc_V = 100.0F;
     TEST_ASSERT_TRUE(battery_voltage_is_near(&in));
+    TEST_ASSERT_FALSE(contradicts_after(1000));
     in.alive = false;
     TEST_ASSERT_TRUE(battery_voltage_is_near(&in));
     TEST_ASSERT_FALSE(contradicts_after(1000));
