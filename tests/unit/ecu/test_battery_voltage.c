@@ -83,6 +83,18 @@ void test_a_mismatch_is_more_than_8_percent_for_more_than_250_ms(void)
     }
 }
 
+/* The time does not wrap either, after more than an hour. */
+void test_a_mismatch_of_250_ms_is_allowed_to_the_microsecond_and_a_longer_one_stays(void)
+{
+    in.v_dc_V = 300.0F;
+    in.elapsed_us = 250000;
+    TEST_ASSERT_FALSE(contradicts_after(1));
+    in.elapsed_us = 1;
+    TEST_ASSERT_TRUE(contradicts_after(1));
+    in.elapsed_us = UINT32_MAX - 5000U;
+    TEST_ASSERT_TRUE(contradicts_after(1));
+}
+
 void test_a_mismatch_must_last_without_a_break(void)
 {
     in.v_dc_V = 300.0F;

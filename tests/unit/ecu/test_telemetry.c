@@ -135,9 +135,11 @@ void test_a_temperature_without_a_sensor_is_reported_as_invalid(void)
 void test_faults_overruns_and_the_motor_id_are_reported(void)
 {
     drive.fast.faults = 0x1004;
+    drive.fast.motor_check = MOTOR_CHECK_TORQUE_MAX;
     drive.mrai.mailbox.overruns = 9;
     const telemetry_t *t = read_back();
     TEST_ASSERT_EQUAL_HEX32(0x1004, t->drive_faults);
+    TEST_ASSERT_EQUAL_UINT32(MOTOR_CHECK_TORQUE_MAX, t->motor_check);
     TEST_ASSERT_EQUAL_UINT32(9, t->diagnostics.isr_overruns);
     TEST_ASSERT_EQUAL_HEX32(0x6CAE75C6, t->motor_id);
 }
