@@ -14,7 +14,7 @@
 #include "types/bus_scales.h"
 
 #define MESSAGE_LENGTH 8U
-#define INTERFACE_VERSION 4U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
+#define INTERFACE_VERSION 3U /* VERSION of the DBC: counted up when a signal changes its name, meaning or place */
 
 /* Why the torque is limited, as transmitted; X(NAME, value, explanation): named and explained here only. */
 #define DERATING_REASON_LIST(X) \

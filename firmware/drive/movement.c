@@ -79,7 +79,7 @@ static movement_failure_t failure_of(const movement_config_t *config, movement_s
     if (!request->alive) {
         return MOVEMENT_FAILURE_SILENT;
     }
-    if (in->has_failed || (in->has_request && movement_moves(state))) {
+    if (in->has_failed || in->has_request) {
         return MOVEMENT_FAILURE_STOPPED;
     }
     if (request->movement != state->movement) {

@@ -126,7 +126,7 @@ typedef struct {
 typedef struct {
     bool runs;        /* switching is enabled */
     bool has_failed;  /* a fault is latched, or the identification is not the robust one */
-    bool has_request; /* torque */
+    bool has_request; /* more torque than the movement allows */
     uint32_t theta_m;
     q31_t omega; /* of the sensor */
 } movement_in_t;

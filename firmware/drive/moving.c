@@ -2,13 +2,20 @@
 /* A movement of the shaft in the drive: its frame in the fast ISR, and its step in the 1 kHz task. */
 #include "drive/mrai/mrai_seam.h"
 
+/* With a connection alone a small torque may brake the rotor: the second level does not limit it meanwhile. */
+static bool has_request(const drive_t *drive)
+{
+    const int32_t largest = drive_moves(drive) ? 0 : drive->motor->torque_max / 8;
+    return fx_abs_q31(drive->request.torque_arbitrated) > largest;
+}
+
 void drive_move(drive_t *drive, const snapshot_t *snapshot)
 {
     task_state_t *task = &drive->task;
     const movement_in_t in = {
         .runs = task->run_state == RUN_STATE_RUN,
         .has_failed = task->run_state == RUN_STATE_FAULT || mrai_is_chosen(drive),
-        .has_request = drive->request.torque_arbitrated != 0,
+        .has_request = has_request(drive),
         .theta_m = snapshot->sample.theta_m,
         .omega = drive->frame_angle.omega_sensor,
     };

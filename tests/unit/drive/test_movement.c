@@ -231,7 +231,7 @@ void test_another_movement_or_none_ends_one_that_runs(void)
     ended_by(MOVEMENT_FAILURE_REFUSED);
 }
 
-void test_a_torque_request_ends_what_moves_but_not_a_connection(void)
+void test_a_torque_request_and_a_fault_end_a_movement(void)
 {
     begun(MOVEMENT_SPIN);
     TEST_ASSERT_TRUE(movement_moves(&state));
@@ -240,8 +240,7 @@ void test_a_torque_request_ends_what_moves_but_not_a_connection(void)
     ended_by(MOVEMENT_FAILURE_STOPPED);
     begun(MOVEMENT_CONNECTED);
     TEST_ASSERT_FALSE(movement_moves(&state));
-    in.has_request = true;
-    steps(100); /* longer than a movement may take, too */
+    steps(100); /* longer than a movement may take */
     TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_AGREED, state.phase);
     in.has_failed = true;
     steps(1);

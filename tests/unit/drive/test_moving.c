@@ -85,6 +85,25 @@ void test_silence_disables_switching_in_the_next_step(void)
     TEST_ASSERT_EQUAL_UINT32(0, drive.fast.faults);
 }
 
+/* An eighth of the largest torque: without a second level a larger one needs a connection that is known. */
+void test_a_connection_allows_a_small_torque_request_and_currents_none(void)
+{
+    wanted->movement = MOVEMENT_CONNECTED;
+    run();
+    drive.request.torque_arbitrated = (q15_t)(-motor.torque_max / 8);
+    seam_periods(20);
+    TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+    drive.request.torque_arbitrated--;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_STOPPED, drive.task.movement.failure);
+    TEST_ASSERT_FALSE(seam.gates);
+    setUp();
+    run();
+    drive.request.torque_arbitrated = 1;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_STOPPED, drive.task.movement.failure);
+}
+
 /* The magnet's flux is a guess, by which the machine would be fast enough for a short circuit. */
 void test_a_movement_that_ends_at_speed_leaves_the_bridge_off(void)
 {

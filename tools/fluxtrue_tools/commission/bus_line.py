@@ -25,6 +25,7 @@ from fluxtrue_tools.vecu.stepped import SteppedBus
 PERIOD_S: Final = 0.010  # of the command
 STEP_S: Final = 0.001  # what is waited for at once
 ANSWER_S: Final = 2.0
+BATCH_S: Final = 0.1  # received at once
 HEARD_S: Final = 1.0  # without a sign of life from the evaluation switching ends
 LIMITS: Final = ("TorqueLimitDrive", "TorqueLimitRegen")
 NEEDED: Final = ("INV_Status", "INV_DcLink", CONFIGURATION)
@@ -229,7 +230,15 @@ class Line:
         self.heard(frame)
 
     def pass_time(self, seconds: float) -> None:
-        """Let the inverter run, and receive its frames."""
+        """Let the inverter run, and receive its frames. A long time is no silence of the evaluation, which an emulated
+        processor makes longer still."""
+        left_s = seconds
+        while left_s > BATCH_S:
+            self._pass(BATCH_S)
+            left_s -= BATCH_S
+        self._pass(left_s)
+
+    def _pass(self, seconds: float) -> None:
         self._heard_s = time.monotonic()
         try:
             frames = self._clock.receive(seconds)

@@ -31,6 +31,11 @@ class Bench:
     channel: tuple[str, int] | None = None
 
 
+def address_of(ecu: VirtualEcu) -> BusAddress:
+    """The bus of a virtual ECU of its own."""
+    return BusAddress("socketcand", "can0", {"host": HOST, "port": ecu.can_port, "tcp_tune": True})
+
+
 @contextlib.contextmanager
 def hidden_machine(motor: Motor, name: str, seed: int, i_max_A: float, connected: bool = True) -> Iterator[Bench]:
     """A virtual ECU with this machine; connected: sensor and leads are as the firmware assumes."""
@@ -39,8 +44,7 @@ def hidden_machine(motor: Motor, name: str, seed: int, i_max_A: float, connected
         machine = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "machine.txt"
         machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
         ecu = stack.enter_context(VirtualEcu(motor.folder.vecu, machine=machine))
-        options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
-        yield Bench(BusAddress("socketcand", "can0", options), motor.folder.vecu, (HOST, ecu.bench_port))
+        yield Bench(address_of(ecu), motor.folder.vecu, (HOST, ecu.bench_port))
 
 
 def _clock(bus: can.BusABC, channel: Channel | None) -> Callable[[Beat], Clock]:
