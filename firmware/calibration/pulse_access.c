@@ -72,7 +72,8 @@ void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answ
         answer->data[1] = (uint8_t)pulsing->phase;
         answer->data[2] = (uint8_t)pulsing->failure;
         answer->length = 3;
-    } else if (command == MOVEMENT_STATE) {
+    }
+    if (command == MOVEMENT_STATE) {
         answer->data[1] = (uint8_t)movement->phase;
         answer->data[2] = (uint8_t)movement->failure;
         answer->length = 3;

@@ -144,14 +144,19 @@ void movement_step(const movement_config_t *config, uint32_t pole_pairs, movemen
     const bool asked = request->alive && request->movement != (uint8_t)MOVEMENT_NONE;
     if (request->alive && !asked && !in->runs) {
         *state = (movement_state_t){.phase = MOVEMENT_PHASE_IDLE, .failure = state->failure};
-    } else if (movement_is_agreed(state)) {
-        const movement_failure_t failure = failure_of(config, state, request, in);
-        if (failure != MOVEMENT_FAILURE_GOOD) {
-            end(state, failure);
-            return;
-        }
-        follow(config, state, frame, request, in);
-    } else if (asked && state->phase == MOVEMENT_PHASE_IDLE) {
-        begin(pole_pairs, state, frame, request, in);
+        return;
     }
+    if (asked && state->phase == MOVEMENT_PHASE_IDLE) {
+        begin(pole_pairs, state, frame, request, in);
+        return;
+    }
+    if (!movement_is_agreed(state)) {
+        return;
+    }
+    const movement_failure_t failure = failure_of(config, state, request, in);
+    if (failure != MOVEMENT_FAILURE_GOOD) {
+        end(state, failure);
+        return;
+    }
+    follow(config, state, frame, request, in);
 }

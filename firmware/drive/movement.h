@@ -50,8 +50,8 @@
 #define MOVEMENT_VALUE(name, value, text) MOVEMENT_##name = (value),
 #define MOVEMENT_PHASE_VALUE(name, value, text) MOVEMENT_PHASE_##name = (value),
 #define MOVEMENT_FAILURE_VALUE(name, value, text) MOVEMENT_FAILURE_##name = (value),
-typedef enum { MOVEMENT_LIST(MOVEMENT_VALUE) } movement_t;
-typedef enum { MOVEMENT_DIRECTION_LIST(MOVEMENT_VALUE) } movement_direction_t;
+enum { MOVEMENT_LIST(MOVEMENT_VALUE) };           /* the kind, kept in one byte */
+enum { MOVEMENT_DIRECTION_LIST(MOVEMENT_VALUE) }; /* of the imposed angle, kept in one byte */
 typedef enum { MOVEMENT_PHASE_LIST(MOVEMENT_PHASE_VALUE) } movement_phase_t;
 typedef enum { MOVEMENT_FAILURE_LIST(MOVEMENT_FAILURE_VALUE) } movement_failure_t;
 #undef MOVEMENT_VALUE
@@ -60,9 +60,9 @@ typedef enum { MOVEMENT_FAILURE_LIST(MOVEMENT_FAILURE_VALUE) } movement_failure_
 
 /** What is asked for. */
 typedef struct {
-    uint8_t movement;   /* movement_t */
+    uint8_t movement;   /* the kind */
     uint8_t pole_pairs; /* electrical turns of a turn of the sensor, from 1 */
-    uint8_t direction;  /* movement_direction_t */
+    uint8_t direction;  /* of the imposed angle */
     bool reversed;      /* the sensor counts against the electrical direction */
     bool damped;
     bool alive;      /* the sender has prolonged the movement in time */
@@ -113,7 +113,7 @@ typedef struct {
 typedef struct {
     movement_phase_t phase;
     movement_failure_t failure; /* of the last movement, until the next one begins */
-    uint8_t movement;           /* movement_t that is agreed */
+    uint8_t movement;           /* that is agreed */
     uint8_t swing_steps;        /* of the present interval of the damping */
     bool weak;                  /* a fifth of the current flows */
     uint16_t blocked;           /* steps in a row */

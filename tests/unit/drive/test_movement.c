@@ -42,10 +42,10 @@ static void steps(int count)
     }
 }
 
-static void begun(movement_t movement)
+static void begun(uint8_t movement)
 {
     setUp();
-    request.movement = (uint8_t)movement;
+    request.movement = movement;
     steps(1);
     TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_AGREED, state.phase);
     in.runs = true;
