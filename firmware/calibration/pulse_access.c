@@ -50,7 +50,7 @@ static xcp_result_t set_field(pulses_config_t *config, uint8_t field, uint16_t r
 xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *command, uint8_t length)
 {
     pulses_request_t *request = &drive->request.pulses;
-    if (command[0] == PULSE_STATE) {
+    if (command[0] == PULSE_STATE || command[0] == MOVEMENT_STATE) {
         return XCP_OK;
     }
     if (!unlocked) {
@@ -64,9 +64,18 @@ xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *
                                  : set_field(&request->config, command[1], xcp_get_u16(&command[2]));
 }
 
-void pulse_access_state(const drive_t *drive, can_frame_t *answer)
+void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answer)
 {
-    answer->data[1] = (uint8_t)drive->task.pulsing.phase;
-    answer->data[2] = (uint8_t)drive->task.pulsing.failure;
-    answer->length = 3;
+    const pulsing_t *pulsing = &drive->task.pulsing;
+    const movement_state_t *movement = &drive->task.movement;
+    if (command == PULSE_STATE) {
+        answer->data[1] = (uint8_t)pulsing->phase;
+        answer->data[2] = (uint8_t)pulsing->failure;
+        answer->length = 3;
+    }
+    if (command == MOVEMENT_STATE) {
+        answer->data[1] = (uint8_t)movement->phase;
+        answer->data[2] = (uint8_t)movement->failure;
+        answer->length = 3;
+    }
 }

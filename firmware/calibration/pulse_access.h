@@ -5,6 +5,7 @@
  *   PULSE_SET    field (1), value (2, little endian): one value of the next pulses
  *   PULSE_START  starts them once; the drive refuses them unless it runs, stands and has no request (drive/pulsing.c)
  *   PULSE_STATE  answers pulses_phase_t and pulses_failure_t, one byte each
+ *   MOVEMENT_STATE  the same of the movement: movement_phase_t, movement_failure_t (drive/movement.h)
  * Source   docs/howto/commission.md
  * Units    voltages and the share of the first half wave in q15, currents in q15 of the current's base, the angle in
  *          turns times 2^16, delay and time in PWM periods
@@ -18,7 +19,7 @@
 #include "types/can_frame.h"
 
 /** First byte of a command. */
-enum { PULSE_SET = 0x10, PULSE_START = 0x11, PULSE_STATE = 0x12 };
+enum { PULSE_SET = 0x10, PULSE_START = 0x11, PULSE_STATE = 0x12, MOVEMENT_STATE = 0x13 };
 
 /** The fields of PULSE_SET, in the order of pulses_config_t. */
 enum {
@@ -37,12 +38,12 @@ enum {
 
 static inline bool pulse_access_is_command(uint8_t command)
 {
-    return command >= PULSE_SET && command <= PULSE_STATE;
+    return command >= PULSE_SET && command <= MOVEMENT_STATE;
 }
 
 /** command: without the protocol's own code, at least one byte. */
 xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *command, uint8_t length);
-/** What PULSE_STATE answers, behind the answer's first byte. */
-void pulse_access_state(const drive_t *drive, can_frame_t *answer);
+/** What such a command answers behind the answer's first byte: nothing but for PULSE_STATE and MOVEMENT_STATE. */
+void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answer);
 
 #endif

@@ -58,9 +58,7 @@ static void pulse_answer(xcp_access_t *access, drive_t *drive, const can_frame_t
     const xcp_result_t result = pulse_access_command(drive, access->xcp.unlocked, command,
                                                      (uint8_t)(frame->length - 1U));
     xcp_answer(&access->xcp, result, &access->answer);
-    if (command[0] == PULSE_STATE) {
-        pulse_access_state(drive, &access->answer);
-    }
+    pulse_access_state(drive, command[0], &access->answer);
 }
 
 static void user_answer(xcp_access_t *access, drive_t *drive, scope_t *scope, const can_frame_t *frame)

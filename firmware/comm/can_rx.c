@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "comm/can_rx.h"
 
+#include <stddef.h>
+
 #include "bus/signals.h"
+#include "comm/can_take.h"
 #include "signal/counter.h"
 
 #define WINDOW_MASK 0x3FFU /* ten frames */
@@ -44,40 +47,6 @@ static rx_result_t check_protection(uint16_t data_id, rx_channel_t *channel, con
     }
 }
 
-static bool take_command(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
-{
-    struct bus_vcu_torque_request_t m;
-    /* MCDC_EXCL C1: unpack refuses only a short frame, which check_protection() has refused before */
-    if (bus_vcu_torque_request_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_torque_request_in_range(&m)) {
-        return false;
-    }
-    rx->command = (bus_command_t){
-        .enable = m.enable != 0U,
-        .fault_reset = m.fault_reset != 0U,
-        .mode = (command_mode_t)m.mode,
-        .torque_requested_Nm = bus_vcu_torque_request_get_torque_requested(&m, scales),
-        .limit_drive_Nm = bus_vcu_torque_request_get_torque_limit_drive(&m, scales),
-        .limit_regen_Nm = bus_vcu_torque_request_get_torque_limit_regen(&m, scales),
-    };
-    rx->accepted++;
-    return true;
-}
-
-static bool take_limits(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
-{
-    struct bus_vcu_battery_limits_t m;
-    /* MCDC_EXCL C1: unpack refuses only a short frame, which check_protection() has refused before */
-    if (bus_vcu_battery_limits_unpack(&m, frame->data, frame->length) != 0 || !bus_vcu_battery_limits_in_range(&m)) {
-        return false;
-    }
-    rx->limits = (bus_power_limits_t){
-        .drive_kW = bus_vcu_battery_limits_get_power_limit_drive(&m, scales),
-        .regen_kW = bus_vcu_battery_limits_get_power_limit_regen(&m, scales),
-    };
-    rx->battery_V = bus_vcu_battery_limits_get_battery_voltage(&m, scales);
-    return true;
-}
-
 static unsigned count_ones(unsigned bits)
 {
     unsigned sum = 0;
@@ -102,23 +71,39 @@ static void record_result(rx_channel_t *channel, rx_result_t result)
     }
 }
 
+/* NULL: another identifier. */
+static rx_channel_t *channel_of(can_rx_t *rx, uint32_t id, uint16_t *data_id)
+{
+    switch (id) {
+    case BUS_VCU_TORQUE_REQUEST_FRAME_ID:
+        *data_id = BUS_VCU_TORQUE_REQUEST_DATA_ID;
+        return &rx->command_channel;
+    case BUS_VCU_BATTERY_LIMITS_FRAME_ID:
+        *data_id = BUS_VCU_BATTERY_LIMITS_DATA_ID;
+        return &rx->limits_channel;
+    case BUS_VCU_COMMISSION_FRAME_ID:
+        *data_id = BUS_VCU_COMMISSION_DATA_ID;
+        return &rx->commission_channel;
+    default:
+        return NULL;
+    }
+}
+
 static rx_result_t receive(can_rx_t *rx, const bus_scales_t *scales, const can_frame_t *frame)
 {
-    const bool is_command = frame->id == BUS_VCU_TORQUE_REQUEST_FRAME_ID;
-    if (!is_command && frame->id != BUS_VCU_BATTERY_LIMITS_FRAME_ID) {
+    uint16_t data_id;
+    rx_channel_t *channel = channel_of(rx, frame->id, &data_id);
+    if (channel == NULL) {
         return RX_IGNORED;
     }
     if (frame->extended) {
         return RX_ID; /* a frame of another sender */
     }
-    rx_channel_t *channel = is_command ? &rx->command_channel : &rx->limits_channel;
     const uint8_t before = channel->e2e.counter;
-    const uint16_t data_id = is_command ? BUS_VCU_TORQUE_REQUEST_DATA_ID : BUS_VCU_BATTERY_LIMITS_DATA_ID;
     rx_result_t result = check_protection(data_id, channel, frame);
     if (result == RX_ACCEPTED) {
-        const bool taken = is_command ? take_command(rx, scales, frame) : take_limits(rx, scales, frame);
         const bool next = (before + 1U) % E2E_COUNTERS == channel->e2e.counter;
-        result = taken ? RX_ACCEPTED : RX_RANGE;
+        result = can_take(rx, scales, frame) ? RX_ACCEPTED : RX_RANGE;
         if (!next) {
             count_up(&rx->skipped);
         }
@@ -155,6 +140,7 @@ void can_rx_tick(can_rx_t *rx, uint32_t elapsed_us)
         rx->command = (bus_command_t){.mode = rx->command.mode};
         count_up(&rx->time_outs);
     }
+    (void)advance_age(&rx->commission_channel, elapsed_us, BUS_VCU_COMMISSION_TIME_OUT_MS);
     if (advance_age(&rx->limits_channel, elapsed_us, BUS_VCU_BATTERY_LIMITS_TIME_OUT_MS)) {
         rx->limits = (bus_power_limits_t){0};
     }

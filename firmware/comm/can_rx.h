@@ -36,6 +36,14 @@ typedef struct {
     float drive_kW, regen_kW; /* magnitudes, at the dc terminals */
 } bus_power_limits_t;
 
+/** A movement of the shaft for commissioning, in the raw values of the bus. */
+typedef struct {
+    uint8_t movement, direction, pole_pairs;
+    bool reversed, damped;
+    uint16_t offset;                                /* 2^16 = one electrical turn */
+    int16_t current_d_permille, current_q_permille; /* of the largest current */
+} bus_commission_t;
+
 typedef enum {
     RX_ACCEPTED = 0,
     RX_SYNCED, /* the first frame: valid, but not used */
@@ -60,10 +68,11 @@ typedef struct {
 } rx_channel_t;
 
 typedef struct {
-    rx_channel_t command_channel, limits_channel;
-    bus_command_t command;     /* after a time-out: disabled, no torque, the mode stays */
-    bus_power_limits_t limits; /* after a time-out: zero */
-    float battery_V;           /* 0: not known; after a time-out the last one */
+    rx_channel_t command_channel, limits_channel, commission_channel;
+    bus_command_t command;       /* after a time-out: disabled, no torque, the mode stays */
+    bus_power_limits_t limits;   /* after a time-out: zero */
+    bus_commission_t commission; /* after a time-out: the last one, and its channel is not alive */
+    float battery_V;             /* 0: not known; after a time-out the last one */
     uint16_t count[RX_RESULTS];
     uint16_t accepted; /* torque commands, wraps */
     uint16_t skipped;  /* accepted frames of either message before which one was lost */

@@ -19,6 +19,7 @@
 #include "control/identify/record.h"
 #include "drive/exchange.h"
 #include "drive/motor.h"
+#include "drive/movement.h"
 #include "drive/pulses.h"
 #include "types/features.h"
 #include "types/identification.h"
@@ -58,6 +59,7 @@ typedef struct {
     uint32_t identification_resets; /* counts up: each count resets the identification once */
     uint32_t commissionings; /* counts up: each count measures the inverter's voltage error once, at standstill */
     pulses_request_t pulses;
+    movement_request_t movement;
 } request_t;
 
 /* X(NAME, value, explanation): named and explained here only. */
@@ -167,6 +169,7 @@ typedef struct {
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
     pulsing_t pulsing;
+    movement_state_t movement;
     safe_state_state_t safe_state;
     gate_fault_state_t gate_fault;
     short_side_state_t short_side;
@@ -258,6 +261,8 @@ typedef struct {
 #endif
     pulses_config_t pulses;      /* in effect: written by the 1 kHz task while no pulses are active */
     pulses_state_t pulses_state; /* written by the fast ISR alone */
+    movement_frame_t frame;      /* of a movement: written by the 1 kHz task */
+    movement_angle_t frame_angle;
     volatile bool held;   /* switching stays disabled: written in the background, which writes the flash meanwhile */
     sample_box_t samples; /* last: behind its slots the offsets of other members would be too large for a load */
 } drive_t;
@@ -298,6 +303,21 @@ static inline bool drive_pulses(const drive_t *drive)
 {
     return drive->task.pulsing.phase == PULSES_PULSE;
 }
+/** The movement's share of the 1 kHz task. */
+void drive_move(drive_t *drive, const snapshot_t *snapshot);
+/** If the command is one in the frame of a movement, changes angle and speed of the sample to it; the advance per
+ * period. Fast ISR, outside the usual route. */
+int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sample, int32_t own_step);
+/** The currents of a movement act. */
+static inline bool drive_moves(const drive_t *drive)
+{
+    return movement_moves(&drive->task.movement);
+}
+/** A movement has ended early: switching stays disabled until it is no longer asked for. */
+static inline bool drive_has_ended_movement(const drive_t *drive)
+{
+    return drive->task.movement.phase == MOVEMENT_PHASE_ENDED;
+}
 /** Sets the compensation; false: out of range, nothing changed. From the task, or before it starts. */
 bool drive_compensate(drive_t *drive, const compensation_t *compensation);
 /** The compensated dead time, a share of the period, with the bound that follows from it (MO-11). */
@@ -331,7 +351,7 @@ static inline void drive_move_angle(drive_t *drive, uint32_t by)
 /** Current references come from outside the torque path. */
 static inline bool drive_bypasses_torque_path(const drive_t *drive)
 {
-    return drive->request.current_mode || commission_runs(&drive->task.commission);
+    return drive->request.current_mode || commission_runs(&drive->task.commission) || drive_moves(drive);
 }
 
 void fast_isr(drive_t *drive);

@@ -66,7 +66,9 @@ typedef enum {
 enum {
     BRIDGE_OFF = 0,     /* switching is disabled */
     BRIDGE_CONTROL = 1, /* current control */
-    BRIDGE_PULSES = 2   /* voltage pulses: an even number, for which fast_isr() leaves the usual route */
+    BRIDGE_PULSES = 2,  /* voltage pulses: an even number, for which fast_isr() leaves the usual route */
+    BRIDGE_MOVED = 4,   /* current control in the frame of a movement (drive/movement.h): even, too */
+    BRIDGE_MOVED_PULSES = BRIDGE_MOVED | BRIDGE_PULSES
 };
 
 /** Command of the task to the fast ISR. Writer: 1 kHz task. Reader: fast ISR. */

@@ -202,7 +202,7 @@ static __attribute__((noinline, cold)) void run_period_checked(drive_t *drive, s
     acquire_check(drive, sample, command->run != (uint8_t)BRIDGE_OFF);
     const rotor_frame_t now = to_rotor_frame(drive, sample, angle_step);
     if (command->run != (uint8_t)BRIDGE_OFF && fast->faults == 0U) {
-        if (command->run == (uint8_t)BRIDGE_PULSES) {
+        if ((command->run & (uint8_t)BRIDGE_PULSES) != 0U) {
             apply_pulses(drive, sample, &now);
         } else {
             control_checked(drive, sample, &now, &command->target);
@@ -226,8 +226,8 @@ static __attribute__((noinline, cold)) void run_period_not_settled(drive_t *driv
         reset_faults(drive, command->fault_resets);
     }
     sample_t *sample = sample_box_begin(&drive->samples);
-    const acquired_t acquired = acquire_sample(drive, sample, false);
-    run_period_checked(drive, sample, acquired.angle_step);
+    const int32_t own_step = acquire_sample(drive, sample, false).angle_step;
+    run_period_checked(drive, sample, drive_take_frame(drive, command, sample, own_step));
 }
 
 /* The usual period. With link-time optimisation all of its stages are compiled into this function. */

@@ -19,6 +19,7 @@
 #include "control/torque/limit.h"
 #include "control/torque/loop.h"
 #include "control/torque/voltage_reserve.h"
+#include "drive/movement.h"
 #include "safety/frozen_angle.h"
 #include "safety/gate_fault.h"
 #include "safety/launch_power.h"
@@ -82,6 +83,7 @@ typedef struct {
     frozen_angle_config_t frozen_angle;
     launch_power_config_t launch_power;
     commission_config_t commission;
+    movement_config_t movement;
     turning_control_config_t turning_control;     /* in place of current_control where the field turns far */
     motor_parameters_t parameters;                /* to start with */
     const second_level_constants_t *second_level; /* of the second level alone */

@@ -27,7 +27,7 @@ static bool has_no_request(const request_t *request)
 static bool may_start(const drive_t *drive, const snapshot_t *snapshot)
 {
     return drive->task.run_state == RUN_STATE_RUN && !mrai_is_chosen(drive) &&
-           !commission_runs(&drive->task.commission) && has_no_request(&drive->request) &&
+           !commission_runs(&drive->task.commission) && !drive_moves(drive) && has_no_request(&drive->request) &&
            fx_abs_q31(snapshot->sample.point.omega) <= drive->motor->commission.omega_max;
 }
 

@@ -51,6 +51,13 @@ static bool is_armed(const task_state_t *task, bool holds_short_circuit, uint32_
     return task->run_state == RUN_STATE_RUN || (task->armed && (holds_short_circuit || faults != 0U));
 }
 
+/* During a movement the magnet's flux is a guess: a short circuit by a guess that is too large would bring a current
+ * that a slow machine never needs. 30 % of the largest speed are below the speed at which the diodes conduct. */
+static bool is_magnet_unknown(const task_state_t *task)
+{
+    return task->movement.phase != MOVEMENT_PHASE_IDLE;
+}
+
 /* What would bring the short circuit, in the period in which it occurs. */
 static safe_t on_faults(bool gate_fault, bool over_voltage)
 {
@@ -84,7 +91,8 @@ safe_t safe_decision_step(drive_t *drive, const snapshot_t *snapshot)
     };
     const bool was_short_circuit = task->safe_state.short_circuit;
     const bool by_gate = gate_fault_step(gate_config, &task->gate_fault, &gate);
-    const bool by_speed = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
+    const bool fast = safe_state_step(&drive->motor->safe_state, &task->safe_state, &in);
+    const bool by_speed = fast && !is_magnet_unknown(task);
     const bool short_circuit = by_speed || (by_gate && (faults & FAULT_GATE) != 0U);
     task->armed = is_armed(task, short_circuit && was_short_circuit, faults);
     if (!task->armed) {

@@ -183,7 +183,11 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
-    uint32_t faults = check_currents(drive, snapshot, phases_ref) | check_torque(drive, snapshot) | shorted;
+    const uint32_t of_currents = check_currents(drive, snapshot, phases_ref);
+    if (drive_moves(drive)) { /* what compares with the motor data has no meaning with another angle */
+        return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
+    }
+    uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
     faults |= check_angle(drive, snapshot, phases_ref, acting);
     faults |= check_launch(drive, snapshot, acting);
     update_short_side(drive, snapshot, phases_ref);

@@ -31,7 +31,8 @@ static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
     if (snapshot->faults != 0U) {
         return RUN_STATE_FAULT;
     }
-    return (enable && !drive->held && snapshot->angle_absolute) ? RUN_STATE_RUN : RUN_STATE_OFF;
+    const bool may_run = !drive->held && snapshot->angle_absolute && !drive_has_ended_movement(drive);
+    return (enable && may_run) ? RUN_STATE_RUN : RUN_STATE_OFF;
 }
 
 /* Compares the acting voltage with the plan of the last step. */
@@ -129,6 +130,9 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
     if (commission_runs(&task->commission)) {
         return task->commission.i_ref;
     }
+    if (drive_moves(drive)) {
+        return task->movement.i_ref;
+    }
     return drive->request.current_mode ? drive->request.i_ref : task->reference.i_ref;
 }
 
@@ -159,6 +163,9 @@ static uint8_t bridge_mode(const drive_t *drive, bool runs)
     if (!runs) {
         return (uint8_t)BRIDGE_OFF;
     }
+    if (movement_is_agreed(&drive->task.movement)) {
+        return drive_pulses(drive) ? (uint8_t)BRIDGE_MOVED_PULSES : (uint8_t)BRIDGE_MOVED;
+    }
     return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
 }
 
@@ -166,7 +173,7 @@ static uint8_t bridge_mode(const drive_t *drive, bool runs)
 static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_t faults, operating_point_t *commanded)
 {
     task_state_t *task = &drive->task;
-    const bool runs = task->run_state == RUN_STATE_RUN && faults == 0U;
+    const bool runs = task->run_state == RUN_STATE_RUN && faults == 0U && !drive_has_ended_movement(drive);
     command_t command = {
         .run = bridge_mode(drive, runs),
         .faults = faults,
@@ -226,6 +233,7 @@ void task_1khz(drive_t *drive)
     task->flow = flow_pass(task->flow, FLOW_DECIDED);
     drive_identify(drive, &snapshot);
     drive_commission(drive, &snapshot);
+    drive_move(drive, &snapshot);
     drive_pulse(drive, &snapshot);
     operating_point_t commanded = snapshot.sample.point;
     command_fast_isr(drive, &snapshot, faults, &commanded);

@@ -127,6 +127,7 @@ static void command_drive(ecu_t *ecu)
     request->limits = limits;
     request->enable = in.run;
     request->fault_resets = ecu->supervisor.resets;
+    request->movement = ecu_movement(ecu);
 }
 
 /* The samples that a step of the second level uses. */
@@ -162,7 +163,7 @@ static void check_by_second_level(ecu_t *ecu, const raw_sample_t *raw)
                    .theta_m = raw->theta_m,
                    .psi_d_error = drive->psi_d_error,
                    .lq_error = fx_q15_from_q31(drive->task.identification.lq_error)},
-        .acting = raw->acting,
+        .acting = raw->acting && !movement_is_agreed(&drive->task.movement), /* its angle is not that of the data */
         .slew = drive->parameters.torque_slew,
         .elapsed_us = ecu->clock.elapsed_us,
         .question = ecu->question,

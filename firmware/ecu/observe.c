@@ -163,6 +163,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .angle_absolute = hal_angle_is_absolute(),
         .slow = is_slow(drive),
         .derated = derating_reason(ecu) != DERATING_REASON_NONE,
+        .movement_ended = drive_has_ended_movement(drive),
         .gate_fault = gate_fault,
         .task_late = ecu->liveness.late_in_a_row >= CONSECUTIVE_MAX,
         .stalled = ecu->liveness.stalled_in_a_row >= CONSECUTIVE_MAX,

@@ -20,6 +20,28 @@ static bool refuse(supervisor_t *s, refused_t reason)
     return false;
 }
 
+/* The measured values, and what is asked for. */
+static bool grant_by_values(supervisor_t *s, const supervisor_in_t *in)
+{
+    if (!in->dc_in_range) {
+        return refuse(s, REFUSED_DC_VOLTAGE_OUT_OF_RANGE);
+    }
+    if (!in->sensors_plausible) {
+        return refuse(s, REFUSED_SENSOR_IMPLAUSIBLE);
+    }
+    if (!in->angle_absolute) {
+        return refuse(s, REFUSED_ANGLE_NOT_ABSOLUTE);
+    }
+    if (in->movement_ended) {
+        return refuse(s, REFUSED_MOVEMENT_ENDED);
+    }
+    if (!in->torque_requested_is_zero) {
+        return refuse(s, REFUSED_TORQUE_REQUEST_NOT_ZERO);
+    }
+    s->refused = REFUSED_NONE;
+    return true;
+}
+
 /* Whether a rising edge of enable enables switching; if not, the reason is recorded. */
 static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
 {
@@ -32,20 +54,7 @@ static bool grant_enable(supervisor_t *s, const supervisor_in_t *in)
     if (s->state != STATE_READY || !in->torque_mode) {
         return refuse(s, REFUSED_NOT_READY);
     }
-    if (!in->dc_in_range) {
-        return refuse(s, REFUSED_DC_VOLTAGE_OUT_OF_RANGE);
-    }
-    if (!in->sensors_plausible) {
-        return refuse(s, REFUSED_SENSOR_IMPLAUSIBLE);
-    }
-    if (!in->angle_absolute) {
-        return refuse(s, REFUSED_ANGLE_NOT_ABSOLUTE);
-    }
-    if (!in->torque_requested_is_zero) {
-        return refuse(s, REFUSED_TORQUE_REQUEST_NOT_ZERO);
-    }
-    s->refused = REFUSED_NONE;
-    return true;
+    return grant_by_values(s, in);
 }
 
 static void follow_enable(supervisor_t *s, const supervisor_in_t *in)
@@ -57,6 +66,9 @@ static void follow_enable(supervisor_t *s, const supervisor_in_t *in)
         s->enabled = false;
         s->enable_seen = true; /* after a time-out a command with enable off must come first */
         return;
+    }
+    if (in->movement_ended && s->enabled) {
+        s->enabled = refuse(s, REFUSED_MOVEMENT_ENDED);
     }
     if (in->enable && !s->enable_seen) {
         s->enabled = grant_enable(s, in);

@@ -51,7 +51,8 @@
     X(MODE_LOCKED, 6, "Enable in the current mode for commissioning, which is locked on the bus.") \
     X(COMMAND_TIMED_OUT, 7, "The command was lost while the drive was enabled.") \
     X(RESET_WHILE_ENABLED, 8, "Reset while enable was on, or in another state than fault.") \
-    X(ANGLE_NOT_ABSOLUTE, 9, "Enable before the angle sensor has found the absolute angle.")
+    X(ANGLE_NOT_ABSOLUTE, 9, "Enable before the angle sensor has found the absolute angle.") \
+    X(MOVEMENT_ENDED, 10, "A movement for commissioning has ended early; Movement none must come first.")
 
 #define STATE_VALUE(name, value, text) STATE_##name = (value),
 #define ECU_FAULT_BIT(name, bit, text) ECU_FAULT_##name = 1U << (bit),
@@ -106,6 +107,7 @@ typedef struct {
     bool sensors_plausible, angle_absolute;
     bool slow;
     bool derated;
+    bool movement_ended; /* drive/movement.h: early */
     bool gate_fault, task_late, stalled;
     bool shut_off_tested;     /* every path that shuts off the torque has been tested */
     uint16_t shut_off_faults; /* ecu/shut_off.h */

@@ -231,17 +231,6 @@ def test_the_virtual_ecu_refuses_what_is_no_machine(text: str, unknown: Motor, t
     assert done.returncode == 2 and done.stderr.startswith(f"error: --machine {machine}: no machine")
 
 
-@pytest.mark.parametrize("step", ["phases", "spin", "drag", "all"])
-def test_the_shaft_is_not_turned_over_can(
-    step: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "found"
-    options = ["commission", "--motor", str(folder), "--virtual-ecu", "--step", step, "--out", str(out)]
-    assert command(options) == 2
-    assert "allowed over CAN: offsets, resistance, map" in capsys.readouterr().err
-    assert not out.exists()
-
-
 def test_the_command_writes_a_folder(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "found"
     options = ["--motor", str(folder), "--virtual-ecu", "--machine", NAME, "--seed", str(SEED), "--step",

@@ -106,7 +106,7 @@ def test_the_source_of_the_angle_changes_only_while_switching_is_disabled(unknow
 
 def test_the_smallest_current_that_the_rotor_follows_is_used(unknown: Motor, known: Nameplate) -> None:
     drive, truth = hidden.make("hsm1", 110, unknown, known.i_max_A, connected=False)
-    found = connection.measure(drive, known)
+    found = connection.measure(drive, known, connection.rotate)
     assert found.current_A == pytest.approx(connection.SHARES[0] * known.i_max_A)
     assert found.connection.pole_pairs == truth.plant["pole_pairs"]
 

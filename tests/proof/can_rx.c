@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Reception of the protected messages: comm/e2e and comm/can_rx. */
+/* Reception of the protected messages: comm/e2e, comm/can_take and comm/can_rx. */
 #include "proof.h"
 
 #include "bus/bus.c" /* before the file that forbids its conversions */
 
 #include "comm/e2e.c"
+
+#include "comm/can_take.c"
 
 #include "comm/can_rx.c"
 

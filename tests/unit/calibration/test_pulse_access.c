@@ -70,12 +70,27 @@ void test_without_the_key_nothing_is_set_or_started(void)
     TEST_ASSERT_EQUAL_UINT32(0, drive.request.pulses.starts);
 }
 
+void test_the_state_of_the_movement_needs_no_key(void)
+{
+    const uint8_t command[1] = {MOVEMENT_STATE}, start[1] = {PULSE_START};
+    can_frame_t answer = {.length = 1};
+    drive.task.movement.phase = MOVEMENT_PHASE_ENDED;
+    drive.task.movement.failure = MOVEMENT_FAILURE_FAST;
+    TEST_ASSERT_EQUAL_INT(XCP_OK, pulse_access_command(&drive, false, command, 1));
+    pulse_access_state(&drive, start[0], &answer);
+    TEST_ASSERT_EQUAL_UINT8(1, answer.length);
+    pulse_access_state(&drive, command[0], &answer);
+    TEST_ASSERT_EQUAL_UINT8(3, answer.length);
+    TEST_ASSERT_EQUAL_UINT8(MOVEMENT_PHASE_ENDED, answer.data[1]);
+    TEST_ASSERT_EQUAL_UINT8(MOVEMENT_FAILURE_FAST, answer.data[2]);
+}
+
 void test_the_state_is_phase_and_failure(void)
 {
     can_frame_t answer = {.length = 8};
     drive.task.pulsing.phase = PULSES_FAILED;
     drive.task.pulsing.failure = PULSES_CURRENT;
-    pulse_access_state(&drive, &answer);
+    pulse_access_state(&drive, PULSE_STATE, &answer);
     TEST_ASSERT_EQUAL_UINT8(3, answer.length);
     TEST_ASSERT_EQUAL_UINT8(PULSES_FAILED, answer.data[1]);
     TEST_ASSERT_EQUAL_UINT8(PULSES_CURRENT, answer.data[2]);

@@ -140,7 +140,7 @@ void test_new_values_act_with_the_next_step_and_once(void)
     TEST_ASSERT_EQUAL_UINT32(access.xcp.generation, access.applied);
 }
 
-/* The commands of the pulses are 0x10 ... 0x12; the neighbours are the scope's, which knows neither. */
+/* The commands of pulses and movement are 0x10 ... 0x13; the neighbours are the scope's, which knows neither. */
 void test_the_commands_of_the_voltage_pulses_are_theirs(void)
 {
     connect();
@@ -149,6 +149,10 @@ void test_the_commands_of_the_voltage_pulses_are_theirs(void)
     TEST_ASSERT_EQUAL_UINT8(3, answer.length);
     TEST_ASSERT_EQUAL_HEX8(0xFF, answer.data[0]);
     TEST_ASSERT_EQUAL_UINT8(PULSES_MOVED, answer.data[2]);
+    drive.task.movement.failure = MOVEMENT_FAILURE_LONG;
+    TEST_ASSERT_TRUE(send(2, USER_CMD, MOVEMENT_STATE));
+    TEST_ASSERT_EQUAL_UINT8(3, answer.length);
+    TEST_ASSERT_EQUAL_UINT8(MOVEMENT_FAILURE_LONG, answer.data[2]);
     for (uint8_t command = PULSE_SET; command <= PULSE_START; command++) {
         TEST_ASSERT_TRUE(send(2, USER_CMD, command));
         TEST_ASSERT_EQUAL_HEX8(0xFE, answer.data[0]);
@@ -156,6 +160,6 @@ void test_the_commands_of_the_voltage_pulses_are_theirs(void)
     }
     TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_SET - 1));
     TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
-    TEST_ASSERT_TRUE(send(2, USER_CMD, PULSE_STATE + 1));
+    TEST_ASSERT_TRUE(send(2, USER_CMD, MOVEMENT_STATE + 1));
     TEST_ASSERT_EQUAL_HEX8(0x20, answer.data[1]);
 }

@@ -8,6 +8,8 @@
 #define COMMAND_DATA_ID 0x1101U
 #define LIMITS_ID 0x111U
 #define LIMITS_DATA_ID 0x1111U
+#define COMMISSION_ID 0x112U
+#define COMMISSION_DATA_ID 0x1121U
 
 static bus_scales_t scales;
 static can_rx_t rx;
@@ -117,7 +119,7 @@ void test_each_kind_of_violation_has_its_counter_and_changes_no_command(void)
     frame.extended = false;
     frame.data[0] = e2e_crc(LIMITS_DATA_ID, &frame); /* the data id of another message */
     refused(RX_ID, &frame);
-    frame.id = 0x112;
+    frame.id = 0x113;
     refused(RX_IGNORED, &frame);
 }
 
@@ -283,6 +285,49 @@ static rx_result_t send_limits(uint8_t *count, unsigned drive, unsigned regen)
                                   (uint8_t)(regen >> 8), 0xA7, 0x0D}};
     e2e_protect(LIMITS_DATA_ID, count, &frame);
     return can_rx_frame(&rx, &scales, &frame);
+}
+
+/* Movement 2, reversed, damped; -400 and 123 of 11 bits from bit 16; 5 pole pairs from bit 38; direction 1 from bit 44;
+ * offset 0xBEEF. */
+static can_frame_t commission_frame(uint8_t *count, int current_d)
+{
+    const uint64_t raw = (uint64_t)2 << 12 | (uint64_t)1 << 14 | (uint64_t)1 << 15 |
+                         (uint64_t)((unsigned)current_d & 0x7FFU) << 16 | (uint64_t)123 << 27 | (uint64_t)5 << 38 |
+                         (uint64_t)1 << 44 | (uint64_t)0xBEEF << 48;
+    can_frame_t frame = {.id = COMMISSION_ID, .length = 8};
+    for (unsigned n = 0; n < 8; n++) {
+        frame.data[n] = (uint8_t)(raw >> (8U * n));
+    }
+    e2e_protect(COMMISSION_DATA_ID, count, &frame);
+    return frame;
+}
+
+void test_a_movement_has_its_own_channel_and_is_not_alive_when_lost(void)
+{
+    uint8_t count = 0;
+    can_frame_t frame = commission_frame(&count, -400);
+    TEST_ASSERT_EQUAL_INT(RX_SYNCED, can_rx_frame(&rx, &scales, &frame));
+    TEST_ASSERT_EQUAL_UINT8(0, rx.commission.movement);
+    frame = commission_frame(&count, -400);
+    TEST_ASSERT_EQUAL_INT(RX_ACCEPTED, can_rx_frame(&rx, &scales, &frame));
+    TEST_ASSERT_TRUE(rx.commission_channel.alive);
+    TEST_ASSERT_EQUAL_UINT8(2, rx.commission.movement);
+    TEST_ASSERT_TRUE(rx.commission.reversed);
+    TEST_ASSERT_TRUE(rx.commission.damped);
+    TEST_ASSERT_EQUAL_INT16(-400, rx.commission.current_d_permille);
+    TEST_ASSERT_EQUAL_INT16(123, rx.commission.current_q_permille);
+    TEST_ASSERT_EQUAL_UINT8(5, rx.commission.pole_pairs);
+    TEST_ASSERT_EQUAL_UINT8(1, rx.commission.direction);
+    TEST_ASSERT_EQUAL_HEX16(0xBEEF, rx.commission.offset);
+    frame = commission_frame(&count, -401);
+    TEST_ASSERT_EQUAL_INT(RX_RANGE, can_rx_frame(&rx, &scales, &frame));
+    TEST_ASSERT_EQUAL_INT16(-400, rx.commission.current_d_permille);
+    milliseconds(29);
+    TEST_ASSERT_TRUE(rx.commission_channel.alive);
+    milliseconds(1);
+    TEST_ASSERT_FALSE(rx.commission_channel.alive);
+    TEST_ASSERT_FALSE(rx.command_channel.alive);
+    TEST_ASSERT_EQUAL_UINT16(0, rx.time_outs); /* of torque commands */
 }
 
 /* 45.00 kW are 4500 counts, 600.01 kW are 60001; all frames have 349.5 V, 0x0DA7; the time-out is 300 ms. */

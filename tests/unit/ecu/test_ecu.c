@@ -493,6 +493,25 @@ void test_torque_that_no_frame_permits_is_a_fault_of_the_drive(void)
     TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
 }
 
+/* The angle is not that of the second level's data, and the currents are those of a protected message. */
+void test_the_second_level_compares_nothing_while_a_movement_is_agreed(void)
+{
+    sample_t *sample = &ecu.drive.samples.slot[ecu.drive.samples.generation % SAMPLE_SLOTS];
+    sample->acting = true;
+    ecu.supervisor.state = STATE_READY;
+    ecu_seal_flags(&ecu);
+    ecu.rx.commission = (bus_commission_t){.movement = MOVEMENT_SPIN, .pole_pairs = 3};
+    ecu.rx.commission_channel.alive = true;
+    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
+    for (int n = 0; n < 25; n++) {
+        ecu.rx.commission_channel.age_us = 0;
+        ecu_task_1khz(&ecu);
+    }
+    TEST_ASSERT_TRUE(movement_is_agreed(&ecu.drive.task.movement));
+    TEST_ASSERT_EQUAL_INT32(0, ecu.second_level.mean_q8);
+    TEST_ASSERT_EQUAL_HEX32(0, ecu.drive.request.faults);
+}
+
 #define MID_SCALE 2048
 #define D_COUNTS 600 /* 0.29 of full scale against the d axis, 0.32 in the q axis */
 #define Q_COUNTS 560

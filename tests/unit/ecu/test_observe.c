@@ -588,3 +588,49 @@ void test_every_counter_of_the_bus_reaches_its_place_in_the_telemetry(void)
     TEST_ASSERT_EQUAL_UINT32(REFUSED_SENSOR_IMPLAUSIBLE, t.refused_reason);
     TEST_ASSERT_EQUAL_UINT32(7, t.refused_count);
 }
+
+/* 40 % of the largest current; a state in which a movement may begin, with and without a torque request. */
+void test_the_movement_of_the_bus_reaches_the_drive_in_its_units(void)
+{
+    ecu.rx.commission = (bus_commission_t){.movement = 2,
+                                           .direction = 1,
+                                           .pole_pairs = 5,
+                                           .reversed = true,
+                                           .damped = true,
+                                           .offset = 0xBEEF,
+                                           .current_d_permille = -400,
+                                           .current_q_permille = 200};
+    movement_request_t wanted = ecu_movement(&ecu);
+    TEST_ASSERT_FALSE(wanted.alive);
+    ecu.rx.commission_channel.alive = true;
+    wanted = ecu_movement(&ecu);
+    TEST_ASSERT_TRUE(wanted.alive);
+    TEST_ASSERT_EQUAL_UINT8(2, wanted.movement);
+    TEST_ASSERT_EQUAL_UINT8(1, wanted.direction);
+    TEST_ASSERT_EQUAL_UINT8(5, wanted.pole_pairs);
+    TEST_ASSERT_TRUE(wanted.reversed);
+    TEST_ASSERT_TRUE(wanted.damped);
+    TEST_ASSERT_EQUAL_HEX16(0xBEEF, wanted.offset);
+    TEST_ASSERT_INT32_WITHIN(1, -2 * motor.commission.i_max / 5, wanted.i.d);
+    TEST_ASSERT_INT32_WITHIN(1, motor.commission.i_max / 5, wanted.i.q);
+}
+
+void test_a_movement_may_begin_in_standby_and_ready_without_a_torque_request(void)
+{
+    for (int state = STATE_INIT; state < STATES; state++) {
+        ecu.supervisor.state = (ecu_state_t)state;
+        ecu.rx.command.torque_requested_Nm = 0.0F;
+        TEST_ASSERT_EQUAL(state == STATE_STANDBY || state == STATE_READY, ecu_movement(&ecu).may_begin);
+        ecu.rx.command.torque_requested_Nm = -1.0F;
+        TEST_ASSERT_FALSE(ecu_movement(&ecu).may_begin);
+    }
+}
+
+void test_the_early_end_of_a_movement_is_seen(void)
+{
+    TEST_ASSERT_FALSE(observe()->movement_ended);
+    ecu.drive.task.movement.phase = MOVEMENT_PHASE_AGREED;
+    TEST_ASSERT_FALSE(observe()->movement_ended);
+    ecu.drive.task.movement.phase = MOVEMENT_PHASE_ENDED;
+    TEST_ASSERT_TRUE(observe()->movement_ended);
+}

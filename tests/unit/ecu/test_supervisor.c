@@ -529,6 +529,30 @@ void test_enable_without_an_absolute_angle_is_refused(void)
     TEST_ASSERT_EQUAL_INT(REFUSED_NONE, s.refused);
 }
 
+void test_enable_after_an_early_end_of_a_movement_is_refused(void)
+{
+    to_ready();
+    in.movement_ended = true;
+    refused(REFUSED_MOVEMENT_ENDED);
+}
+
+void test_the_early_end_of_a_movement_leaves_run_and_is_named(void)
+{
+    to_run();
+    in.movement_ended = true;
+    TEST_ASSERT_EQUAL_INT(STATE_READY, step());
+    TEST_ASSERT_EQUAL_INT(REFUSED_MOVEMENT_ENDED, s.refused);
+    const uint8_t before = s.refused_count;
+    stays(STATE_READY, 5); /* enable is still on: one message */
+    TEST_ASSERT_EQUAL_UINT8(before, s.refused_count);
+    in.movement_ended = false;
+    stays(STATE_READY, 5);
+    in.enable = false;
+    (void)step();
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+}
+
 void test_enable_in_the_locked_current_mode_is_refused(void)
 {
     to_ready();

@@ -19,6 +19,7 @@ from fluxtrue_tools.errors import FluxtrueError
 
 COMMAND: Final = "VCU_TorqueRequest"
 LIMITS: Final = "VCU_BatteryLimits"
+COMMISSION: Final = "VCU_Commission"
 CONFIGURATION: Final = "INV_Configuration"
 REQUEST: Final = "TorqueRequested"
 DATA_ID: Final = "E2EDataId"

@@ -35,6 +35,10 @@ SOURCES: Final = {
     "RUN_STATE_LIST": "firmware/drive/drive.h",
     "PULSES_PHASE_LIST": "firmware/drive/pulses.h",
     "PULSES_FAILURE_LIST": "firmware/drive/pulses.h",
+    "MOVEMENT_LIST": "firmware/drive/movement.h",
+    "MOVEMENT_DIRECTION_LIST": "firmware/drive/movement.h",
+    "MOVEMENT_PHASE_LIST": "firmware/drive/movement.h",
+    "MOVEMENT_FAILURE_LIST": "firmware/drive/movement.h",
     "SPIN_FAILURE_LIST": "hal/host/spin_limit.h",
     "COMMAND_MODE_LIST": "firmware/comm/can_rx.h",
     "DERATING_REASON_LIST": "firmware/comm/messages.h",
@@ -53,6 +57,8 @@ PREFIX: Final = {"ECU_FAULT_LIST": "ecu_"}
 """What sets names of a list apart from those of another that is told by the same signal."""
 
 CHOICES: Final = {
+    "VCU_Commission.Movement": (("MOVEMENT_LIST", 0),),
+    "VCU_Commission.Direction": (("MOVEMENT_DIRECTION_LIST", 0),),
     "VCU_TorqueRequest.Mode": (("COMMAND_MODE_LIST", 0),),
     "INV_Status.State": (("ECU_STATE_LIST", 0),),
     "INV_DcLink.DeratingReason": (("DERATING_REASON_LIST", 0),),
@@ -65,6 +71,8 @@ CHOICES: Final = {
 """Signals with a value table, and what is added to the values of each list."""
 
 EXPLAINED: Final = {
+    "VCU_Commission.Movement": "MOVEMENT_LIST",
+    "VCU_Commission.Direction": "MOVEMENT_DIRECTION_LIST",
     "VCU_TorqueRequest.Mode": "COMMAND_MODE_LIST",
     "INV_Status.State": "ECU_STATE_LIST",
     "INV_DcLink.DeratingReason": "DERATING_REASON_LIST",

@@ -3,22 +3,23 @@
 
 Protected commands keep it enabled with a request of zero; only between two bursts a small torque brakes the rotor. The
 values of the voltage pulses are set, and the pulses started, by commands of XCP (firmware/calibration/pulse_access.h),
-and their currents and voltages are captured by the scope. The shaft cannot be turned: no port of a controller has the
-imposed angle and the limits of the shaft.
+and their currents and voltages are captured by the scope. A movement of the shaft is commanded by a protected frame of
+its own; its bounds are in the firmware (firmware/drive/movement.h).
 """
 
 import contextlib
 import math
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from fluxtrue_tools import faults
 from fluxtrue_tools.a2l.elf import Description, Value
-from fluxtrue_tools.commission.bus_line import RUNNING, Line
-from fluxtrue_tools.commission.drive import DONE, FAILED, PERIODS_MAX, PULSE
+from fluxtrue_tools.commission.bus_line import RUNNING, Line, Movement
+from fluxtrue_tools.commission.drive import DONE, FAILED, PERIODS_MAX, PULSE, nothing
 from fluxtrue_tools.commission.nameplate import BRAKE_SHARE, Nameplate
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_model import Array
@@ -26,13 +27,14 @@ from fluxtrue_tools.scope.scope import SIGNALS_MAX, WORDS, Scope, make_setup
 from fluxtrue_tools.scope.xcp import DOWNLOAD, SET_MTA, XcpMaster, XcpRefused, unlock, upload
 
 USER: Final = 0xF1
-PULSE_SET, PULSE_START, PULSE_STATE = 0x10, 0x11, 0x12  # firmware/calibration/pulse_access.h
+PULSE_SET, PULSE_START, PULSE_STATE, MOVEMENT_STATE = 0x10, 0x11, 0x12, 0x13  # firmware/calibration/pulse_access.h
 FIELDS: Final = ("pulses_vd", "pulses_id_low_A", "pulses_id_high_A", "pulses_vq", "pulses_iq_low_A", "pulses_iq_high_A",
                  "pulses_first", "pulses_angle_rad", "pulses_delay", "pulses_reversals", "pulses_periods")  # fmt: skip
 UNKNOWN: Final = 0x20
 Q15: Final = 32768.0
 CAPTURED: Final = {"id_A": "i_d_A", "iq_A": "i_q_A", "ud_V": "u_d_V", "uq_V": "u_q_V", "theta_e_rad": "theta_e_deg",
-                   "i_zero_A": "i_zero_A"}  # fmt: skip
+                   "i_zero_A": "i_zero_A", "sensor_turns": "theta_m_deg"}  # fmt: skip
+PULSE_SIGNALS: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad", "i_zero_A")
 FORMATS: Final = {"S16": "<h", "U32": "<I", "F32": "<f", "U8": "<B"}
 MARGIN_S: Final = 0.015  # captured beside the pulses: the commands to start them take some milliseconds
 POLL_S: Final = 0.005
@@ -40,8 +42,23 @@ STOPPED: Final = 2.0  # of pulses_failure
 TOLD_S: Final = 0.03  # in which the bus says that switching is disabled, and why
 READY_S, RUN_S, OFF_S, RESET_S = 5.0, 0.5, 0.05, 0.05
 LISTEN_S: Final = 0.15
+DEGREES: Final = 360.0
+ENDED: Final = "movement ended"  # why enable was refused
+MOVED: Final = ("id_ref_A", "iq_ref_A", "imposed_hz", "current_mode", "angle_imposed", "angle_pole_pairs",
+                "angle_reversed", "angle_offset_rad")  # fmt: skip
+IN_FIRMWARE: Final = ("spin_periods", "spin_rpm", "machine_monitors")  # what the movement itself brings
 STEADY, SMALL = 0.05, 0.5  # of the largest voltage
 ANGLE_PERIODS: Final = 8
+RELEASED_S: Final = 0.05  # in which a movement is no longer asked for, or has been agreed
+AGREED: Final = 1.0  # of the movement's phase
+MOVEMENT_ENDED: Final = {
+    1: "the inverter has refused it: switching was enabled, or there was a torque request",
+    2: "the commands stopped", 3: "the shaft turned faster than 30 % of the largest speed",
+    4: "the shaft did not turn although a current makes torque: it is blocked or coupled, or the angle is wrong",
+    5: "it took longer than a minute", 6: "a fault has disabled switching, or a torque was requested",
+}  # fmt: skip
+PERCENT: Final = 100.0
+MOST_PERCENT: Final = 40.0
 
 
 def _steady(magnitude: Array) -> tuple[int, int]:
@@ -88,6 +105,8 @@ class OverTheBus:
         self._values = {value.name: value for value in description.values + description.measurements}
         self._factors = {base.name: base.factor for base in description.bases}
         self._enabled = False
+        self._is_moving = self._is_imposed = False
+        self._connection = Movement()
         self._failure = 0.0
         line.pass_time(LISTEN_S)
         self._master = XcpMaster(line)
@@ -123,13 +142,17 @@ class OverTheBus:
             self._enable() if value else self._disable()
         elif name == "torque_requested_Nm":
             self._line.ask(torque_Nm=value)
-        else:
+        elif name in MOVED:
+            self._move(name, value)
+        elif name not in IN_FIRMWARE:
             self._write(self._known_value(name), value)
 
     def get(self, name: str) -> float:
         """The present value."""
         if name == "run_state":
             return float(self._line.state in RUNNING)
+        if name == "angle_reversed":
+            return float(self._connection.is_reversed)
         if name == "pulses":
             return self._state()
         if name == "pulses_failure":
@@ -162,6 +185,8 @@ class OverTheBus:
         limit_Nm = self._torque_Nm(BRAKE_SHARE * self._known.i_max_A)  # of the torque that brakes the rotor
         self._line.ask(mode="torque", enable=False, torque_Nm=0.0, limit_Nm=limit_Nm)
         self._line.wait_for(("ready", *RUNNING), READY_S, "the dc link cannot be charged")
+        if not self._enabled:
+            self._agree()
         self._line.ask(enable=True)
         self._line.wait_for(RUNNING, RUN_S, "switching cannot be enabled")
         self._enabled = True
@@ -169,6 +194,63 @@ class OverTheBus:
     def _disable(self) -> None:
         self._enabled = False
         self._line.ask(enable=False, torque_Nm=0.0)
+        if self._line.movement is None:
+            return
+        self._line.move(d_percent=0.0, q_percent=0.0, direction="stand", is_damped=False)
+        self._line.pass_time(OFF_S)
+        self._line.move(kind="none")
+        self._line.pass_time(RELEASED_S)
+
+    # Movements of the shaft.
+
+    def _move(self, name: str, value: float) -> None:
+        """The names of software in the loop; what connects the angle acts when switching is enabled again."""
+        if name in ("id_ref_A", "iq_ref_A"):
+            percent = min(max(PERCENT * value / self._known.i_max_A, -MOST_PERCENT), MOST_PERCENT)
+            self._line.move(**{f"{name[1]}_percent": percent})
+        elif name == "imposed_hz":
+            self._line.move(direction="stand" if value == 0.0 else "forward" if value > 0.0 else "backward")
+        elif name == "current_mode":
+            self._is_moving = value != 0.0
+        elif name == "angle_imposed":
+            self._is_imposed = value != 0.0
+        elif name == "angle_pole_pairs":
+            self._connection = replace(self._connection, kind="connected", pole_pairs=round(value))
+        elif name == "angle_reversed":
+            self._connection = replace(self._connection, is_reversed=value != 0.0)
+        else:
+            self._connection = replace(self._connection, offset_rad=value)
+
+    def _kind(self) -> str:
+        """The movement that is needed: without a known connection, and without currents, none."""
+        if self._is_moving:
+            return "imposed" if self._is_imposed else "spin"
+        return self._connection.kind
+
+    def _agree(self) -> None:
+        """The consent to a movement, before switching is enabled; none is left of an earlier one."""
+        if self._kind() == "none":
+            return
+        self._line.movement = self._line.movement or Movement()
+        self._line.pass_time(RELEASED_S)
+        self._line.movement = replace(self._connection, kind=self._kind())
+        self._line.pass_time(RELEASED_S)
+        phase, failure = self._movement_state()
+        if phase != AGREED:
+            raise FluxtrueError(f"commission: the movement has not begun: {MOVEMENT_ENDED.get(failure, 'no answer')}")
+
+    def _movement_state(self) -> tuple[float, int]:
+        phase, failure, *_ = self._master.command(USER, MOVEMENT_STATE)
+        return float(phase), failure
+
+    def shaft_rad_s(self) -> float:
+        """The mechanical speed, positive in the electrical direction: the drive reports it with its own pole pairs."""
+        share = self._known.pole_pairs / self._connection.pole_pairs
+        return self.get("speed_rpm") * share * math.pi / 30.0
+
+    def damp(self, is_damped: bool) -> None:
+        """Brake the swing of the rotor about the current, in the firmware."""
+        self._line.move(is_damped=is_damped)
 
     def _check(self) -> None:
         """Check that the drive still runs if it should."""
@@ -176,7 +258,8 @@ class OverTheBus:
             return
         self._enabled = False
         named = faults.named(int(self._read(self._values["fault_word"])))
-        why = ", ".join(named) or self._line.refused
+        ended = MOVEMENT_ENDED.get(self._movement_state()[1]) if self._line.refused == ENDED else None
+        why = ", ".join(named) or ended or self._line.refused
         raise FluxtrueError(f"commission: the inverter has stopped (state {self._line.state}): {why}")
 
     def rest(self, seconds: float) -> None:
@@ -214,10 +297,20 @@ class OverTheBus:
         self._line.ask(torque_Nm=0.0)
 
     def capture(self, names: Sequence[str], periods: int) -> Array:
-        """Capture as many rows as the scope holds."""
+        """Capture as many rows as the scope holds; without a signal of the scope, let the drive run."""
+        if not set(names) <= set(CAPTURED):
+            self.rest(periods * self.period_s)
+            return np.zeros((1, len(names)))
+        return self.capture_during(names, periods, 1, nothing)
+
+    def capture_during(
+        self, names: Sequence[str], periods: int, divisor: int, action: Callable[[float], None]
+    ) -> Array:
+        """Capture every so many periods; the action is given the time that the capture takes, and may let time pass."""
         signals = [CAPTURED[name] for name in names]
-        self._arm(signals, periods)
+        self._arm(signals, periods // divisor, divisor)
         with self._fault_first():
+            action(periods * self.period_s)
             self._scope.until_complete(2.0 * periods * self.period_s + 1.0)
             self._check()
             columns = self._scope.read().columns
@@ -226,12 +319,14 @@ class OverTheBus:
     @staticmethod
     def _column(columns: Mapping[str, Array], name: str) -> Array:
         column = columns[CAPTURED[name]]
+        if name == "sensor_turns":
+            return np.unwrap(column, period=DEGREES) / DEGREES
         return np.radians(column) if name == "theta_e_rad" else column
 
-    def _arm(self, signals: Sequence[str], periods: int) -> None:
+    def _arm(self, signals: Sequence[str], samples: int, divisor: int = 1) -> None:
         assert len(signals) <= SIGNALS_MAX
         setup = make_setup(
-            self._scope.signals, signals, "manual", None, 0.0, 0.0, min(periods, WORDS // len(signals)), 1
+            self._scope.signals, signals, "manual", None, 0.0, 0.0, min(samples, WORDS // len(signals)), divisor
         )
         with self._fault_first():
             self._scope.stop()
@@ -272,7 +367,7 @@ class OverTheBus:
                 USER, PULSE_SET, field, *(self._raw(name, values[name]) & 0xFFFF).to_bytes(2, "little")
             )
         begun_s, periods = self._line.now_s, round(values["pulses_periods"] + MARGIN_S / self.period_s)
-        self._arm(list(CAPTURED.values()), periods)
+        self._arm([CAPTURED[name] for name in PULSE_SIGNALS], periods)
         self._master.command(USER, PULSE_START)
         phase = self._until_ended()
         most = math.ceil((self._line.now_s - begun_s) / self.period_s)
@@ -281,7 +376,7 @@ class OverTheBus:
         with self._fault_first():
             self._scope.until_complete(periods * self.period_s + 1.0)
             columns = self._scope.read(most=most).columns
-        rows = np.column_stack([self._column(columns, name) for name in CAPTURED])
+        rows = np.column_stack([self._column(columns, name) for name in PULSE_SIGNALS])
         acts = pulsing(rows[:, 2], rows[:, 3], values["pulses_vd"], values["pulses_vq"])
         if acts[-1] and phase == DONE:
             raise FluxtrueError(f"commission: the voltage pulses last longer than the {len(rows)} periods of the scope")

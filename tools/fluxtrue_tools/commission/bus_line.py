@@ -6,6 +6,7 @@ With a virtual ECU that has a bench channel, time passes only here, so that no c
 sends the commands while the results are evaluated; it ends switching if the evaluation has not responded for a second.
 """
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from typing import Final, Protocol
 
 import can
 
-from fluxtrue_tools.bus.interface import COMMAND, CONFIGURATION, REQUEST, Interface
+from fluxtrue_tools.bus.interface import COMMAND, COMMISSION, CONFIGURATION, REQUEST, Interface
 from fluxtrue_tools.bus.protect import Protector
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.live.last import LastValues
@@ -24,10 +25,13 @@ from fluxtrue_tools.vecu.stepped import SteppedBus
 PERIOD_S: Final = 0.010  # of the command
 STEP_S: Final = 0.001  # what is waited for at once
 ANSWER_S: Final = 2.0
+BATCH_S: Final = 0.1  # received at once
 HEARD_S: Final = 1.0  # without a sign of life from the evaluation switching ends
 LIMITS: Final = ("TorqueLimitDrive", "TorqueLimitRegen")
 NEEDED: Final = ("INV_Status", "INV_DcLink", CONFIGURATION)
 RUNNING: Final = ("run", "derate")
+TURN_RAD: Final = 2.0 * math.pi
+OFFSETS: Final = 65536  # steps of the offset in a turn
 CLOSED: Final = "the connection to the inverter is closed"
 
 
@@ -42,6 +46,20 @@ class Order:
     fault_reset: bool = False
 
 
+@dataclass(frozen=True)
+class Movement:
+    """The content of the frame that commands a movement of the shaft."""
+
+    kind: str = "none"
+    pole_pairs: int = 1
+    is_reversed: bool = False
+    is_damped: bool = False
+    offset_rad: float = 0.0
+    d_percent: float = 0.0  # of the largest current
+    q_percent: float = 0.0
+    direction: str = "stand"
+
+
 class Clock(Protocol):
     """A bus with its own time."""
 
@@ -52,10 +70,13 @@ class Clock(Protocol):
     def close(self) -> None: ...
 
 
+Beat = Callable[[], list[can.Message]]  # what is sent every PERIOD_S
+
+
 class SimulatedTime:
     """A virtual ECU whose time passes only in receive()."""
 
-    def __init__(self, bus: SteppedBus, beat: Callable[[], can.Message]) -> None:
+    def __init__(self, bus: SteppedBus, beat: Beat) -> None:
         self._bus, self._beat, self._due_s = bus, beat, bus.now_s
 
     @property
@@ -72,7 +93,8 @@ class SimulatedTime:
         end_s, frames = self._bus.now_s + seconds, []
         while end_s - self._bus.now_s > 0.5 * STEP_S:
             if self._bus.now_s >= self._due_s - 0.5 * STEP_S:
-                self.send(self._beat())
+                for frame in self._beat():
+                    self.send(frame)
                 self._due_s += PERIOD_S
             step_s = min(end_s, max(self._due_s, self._bus.now_s + STEP_S)) - self._bus.now_s
             frames += self._bus.run(round(1e3 * step_s, 6))[0]
@@ -85,7 +107,7 @@ class SimulatedTime:
 class WallTime:
     """A bench, or a virtual ECU that keeps pace with the wall clock."""
 
-    def __init__(self, bus: can.BusABC, beat: Callable[[], can.Message]) -> None:
+    def __init__(self, bus: can.BusABC, beat: Beat) -> None:
         self._bus, self._beat = bus, beat
         self._sending, self._stop = threading.Lock(), threading.Event()
         self._lost: Exception | None = None
@@ -117,7 +139,8 @@ class WallTime:
         due_s = time.monotonic()
         while not self._stop.is_set():
             try:
-                self.send(self._beat())
+                for frame in self._beat():
+                    self.send(frame)
             except (can.CanError, OSError) as error:
                 self._lost = error
                 return
@@ -133,13 +156,17 @@ class WallTime:
 class Line:
     """Commands, XCP and state of one inverter; scope/xcp.py's Line."""
 
-    def __init__(self, make_clock: Callable[[Callable[[], can.Message]], Clock], interface: Interface) -> None:
+    def __init__(self, make_clock: Callable[[Beat], Clock], interface: Interface) -> None:
         self._interface, self._message = interface, interface.message(COMMAND)
         self._protector = Protector(interface.data_id(COMMAND))
+        self._moving = interface.message(COMMISSION)
+        self._moving_protector = Protector(interface.data_id(COMMISSION))
         self._values = LastValues(interface.database, NEEDED)
         self._answers: list[bytes] = []
         self._heard_s = time.monotonic()
+        self._evaluator = threading.get_ident()
         self.order = Order()
+        self.movement: Movement | None = None  # none: its frame is not sent
         self.is_lost = False
         self.is_barred = False  # the user has stopped: whatever is asked for, switching stays disabled
         self.passed: Callable[[float], None] = lambda _: None
@@ -165,10 +192,34 @@ class Line:
         """Change the command."""
         self.order = replace(self.order, **changed)  # type: ignore[arg-type]
 
-    def _beat(self) -> can.Message:
-        """The next command; without a sign of life from the evaluation it no longer enables."""
-        is_alive = time.monotonic() - self._heard_s < HEARD_S
-        order = self.order if is_alive and not self.is_barred else Order()
+    def move(self, **changed: float | str | bool) -> None:
+        """Change the movement; its frame is sent from now on."""
+        self.movement = replace(self.movement or Movement(), **changed)  # type: ignore[arg-type]
+
+    def _beat(self) -> list[can.Message]:
+        """The next commands; without a sign of life from the evaluation they no longer enable or move anything."""
+        obeys = self._is_evaluating() and not self.is_barred
+        frames = [self._command(self.order if obeys else Order())]
+        if self.movement is not None and obeys:
+            frames.insert(0, self._movement(self.movement))
+        return frames
+
+    def _is_evaluating(self) -> bool:
+        """In simulated time the evaluation itself sends the commands, however long that takes."""
+        is_own = threading.get_ident() == self._evaluator
+        return is_own or time.monotonic() - self._heard_s < HEARD_S
+
+    def _movement(self, movement: Movement) -> can.Message:
+        data = self._moving.encode({"Crc": 0, "Counter": 0, "Movement": movement.kind,
+                                    "Reversed": int(movement.is_reversed), "Damped": int(movement.is_damped),
+                                    "CurrentD": movement.d_percent, "CurrentQ": movement.q_percent,
+                                    "PolePairs": movement.pole_pairs, "Direction": movement.direction,
+                                    "Offset": round(movement.offset_rad / TURN_RAD * OFFSETS) % OFFSETS
+                                    * (360.0 / OFFSETS)})  # fmt: skip
+        return can.Message(arbitration_id=self._moving.frame_id, is_extended_id=False,
+                           data=self._moving_protector.protect(data))  # fmt: skip
+
+    def _command(self, order: Order) -> can.Message:
         limits = {name: min(order.limit_Nm, self._interface.largest(COMMAND, name)) for name in LIMITS}
         data = self._message.encode({"Crc": 0, "Counter": 0, "Enable": int(order.enable),
                                      "FaultReset": int(order.fault_reset), "Mode": order.mode,
@@ -185,7 +236,14 @@ class Line:
         self.heard(frame)
 
     def pass_time(self, seconds: float) -> None:
-        """Let the inverter run, and receive its frames."""
+        """Let the inverter run, and receive its frames. A long time is no silence of the evaluation."""
+        left_s = seconds
+        while left_s > BATCH_S:
+            self._pass(BATCH_S)
+            left_s -= BATCH_S
+        self._pass(left_s)
+
+    def _pass(self, seconds: float) -> None:
         self._heard_s = time.monotonic()
         try:
             frames = self._clock.receive(seconds)

@@ -47,16 +47,12 @@ class Target:
     bench: tuple[str, int] | None
     elf: Path | None
 
-    def check(self, steps: list[str]) -> None:
-        """Refuse options and steps that this target does not have."""
+    def check(self) -> None:
+        """Refuse options that this target does not have."""
         if self.interface is None:
             paths.refuse_given("without --can-interface", "can_channel", "can_option", "bench", "elf")
         else:
             paths.refuse_given("with --can-interface", "machine", "seed", "virtual_ecu")
-        if self.interface is not None or self.virtual_ecu:
-            from fluxtrue_tools.commission.on_the_bus import refuse_turning
-
-            refuse_turning(steps)
         if self.elf is not None:
             from fluxtrue_tools.a2l.elf import read
 
@@ -91,7 +87,9 @@ class Target:
 
         with contextlib.ExitStack() as stack:
             if self.interface is None:
-                bench = stack.enter_context(on_the_bus.hidden_machine(motor, self.machine, self.seed, known.i_max_A))
+                bench = stack.enter_context(
+                    on_the_bus.hidden_machine(motor, self.machine, self.seed, known.i_max_A, connected)
+                )
             else:
                 address = BusAddress(self.interface, self.channel, self.options)
                 bench = on_the_bus.Bench(address, self.elf or motor.folder.vecu, self.bench)
@@ -123,7 +121,7 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
     """Measure an unknown motor with an uncoupled shaft, by software in the loop or over CAN.
 
     The steps phases, spin and drag turn the shaft; the simulated machine's sensor and leads are then connected at
-    random. The others keep it at standstill and need the connection to be right. Over CAN only those are possible.
+    random. The others keep it at standstill and need the connection to be right.
     """
     from fluxtrue_tools.commission import result
     from fluxtrue_tools.commission.hidden import folder_of
@@ -133,7 +131,7 @@ def commission(nameplate: Path, machine: str, seed: int, virtual_ecu: bool, can_
 
     wanted = chosen(tuple(steps.split(",")))
     target = Target(machine, seed, virtual_ecu, can_interface, can_channel, dict(can_option), bench, elf)
-    target.check([step.name for step in wanted])
+    target.check()
     folder_of(machine)
     if out is None and not dry_run:
         raise FluxtrueError("--out: missing, wanted: a folder for the result, or --dry-run")

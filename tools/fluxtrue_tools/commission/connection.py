@@ -6,7 +6,9 @@ its magnet points to the current; how far the sensor turns meanwhile gives pole 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +32,9 @@ STILL_TURNS = 0.1  # of the electrical turns that were imposed: less is a rotor 
 PAIRS_MAX = 50
 
 
+D = TypeVar("D", bound=Capture)
+
+
 @dataclass(frozen=True)
 class Followed:
     """How the rotor followed one current."""
@@ -51,7 +56,7 @@ def _brake_swing(drive: Capture, current_A: float) -> None:
     turning.currents(drive, current_A, 0.0)
 
 
-def _rotate(drive: Capture, current_A: float) -> tuple[Array, Array]:
+def rotate(drive: Capture, current_A: float) -> tuple[Array, Array]:
     """Imposed angle and sensor's angle on the way there and back, both continuous, in turns."""
     steps = round(RISE_S / turning.STEP_S)
     for k in range(steps):
@@ -101,13 +106,16 @@ def _is_right(found: Followed) -> bool:
     return abs(found.pole_pairs - round(found.pole_pairs)) < WHOLE and 0.0 < found.behind_rad < BEHIND_RAD
 
 
-def measure(drive: Capture, known: Nameplate) -> Followed:
-    """Measure with the smallest current that the rotor follows."""
+def measure(drive: D, known: Nameplate, turn: Callable[[D, float], tuple[Array, Array]]) -> Followed:
+    """Measure with the smallest current that the rotor follows.
+
+    turn   rotate(), or that of a drive over CAN
+    """
     turning.connect(drive, None, known, NAME)
     try:
         for share in SHARES:
             current_A = share * known.i_max_A
-            found = followed(*_rotate(drive, current_A), current_A)
+            found = followed(*turn(drive, current_A), current_A)
             if _is_right(found):
                 return found
     finally:

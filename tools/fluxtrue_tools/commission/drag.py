@@ -2,7 +2,9 @@
 """Inertia and drag over speed from an acceleration, a run-down and a braking: (CM-20) ... (CM-22)."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -20,6 +22,7 @@ COAST_END = 0.4
 SLOWEST = 0.1  # of the largest speed of the run: below it the drag is not evaluated
 REACH_S = 0.8
 LEAST_SHARE = 0.2  # of the largest current of the run
+D = TypeVar("D", bound=Capture)
 STEADY_SHARE = 0.05  # change of a current within a window in which it counts as steady
 
 
@@ -54,19 +57,19 @@ class _Run:
     middles: Array
 
 
-def _run(rows: Array, period_s: float, pole_pairs: int) -> _Run:
-    size = round(WINDOW_S / period_s)
+def _run(rows: Array, period_s: float, pole_pairs: int, periods: int) -> _Run:
+    size = round(WINDOW_S / (periods * period_s))
     starts = np.arange(0, len(rows) - size, size)
     taken = []
     for start in starts:
-        i, psi, omega = spin.voltages(rows[start : start + size + 1], period_s)
+        i, psi, omega = spin.voltages(rows[start : start + size + 1], period_s, periods)
         half = size // 2
         change = abs(float(i.imag[:half].mean() - i.imag[half:].mean()))
         taken.append((omega / pole_pairs, i.mean(), psi.mean(), change))
     speed, current, flux, change = np.array(taken).T
     middles = starts + 1 + size // 2
     steady = change.real < STEADY_SHARE * np.abs(current)
-    return _Run(speed.real, current, flux, steady, period_s * middles, rows, middles)
+    return _Run(speed.real, current, flux, steady, periods * period_s * middles, rows, middles)
 
 
 @dataclass(frozen=True)
@@ -102,22 +105,23 @@ def _solve(matrix: Array, values: Array) -> list[float]:
     return [float(each) for each in x / scale]
 
 
-def _changes(run: _Run, torque: Array, period_s: float, slowest: float) -> tuple[Array, Array]:
+def _changes(run: _Run, torque: Array, spacing_s: float, slowest: float) -> tuple[Array, Array]:
     """From middle to middle: impulse of the torque, time, angle, integral of the squared speed; the change of speed."""
-    impulse = np.concatenate(([0.0], np.cumsum(period_s * torque)))[run.middles]
+    impulse = np.concatenate(([0.0], np.cumsum(spacing_s * torque)))[run.middles]
     time, w = np.diff(run.times), run.speed
     angle, square = 0.5 * time * (w[1:] + w[:-1]), time * (w[1:] ** 2 + w[1:] * w[:-1] + w[:-1] ** 2) / 3.0
     used = np.minimum(w[1:], w[:-1]) > slowest
     return np.column_stack((np.diff(impulse), -time, -angle, -square))[used], np.diff(w)[used]
 
 
-def evaluate(parts: list[Array], period_s: float, pole_pairs: int, psi_f_Vs: float) -> Drag:
+def evaluate(parts: list[Array], period_s: float, pole_pairs: int, psi_f_Vs: float, periods: int = 1) -> Drag:
     """(CM-21), (CM-22) over all windows. What is noisy is the change of the speed, by errors of the angle sensor: it
     is the side that least squares take the noise on. As a factor of J it would make J smaller the noisier it is."""
-    runs = [_run(rows, period_s, pole_pairs) for rows in parts if len(rows) > 2 * WINDOW_S / period_s]
+    spacing_s = periods * period_s
+    runs = [_run(rows, period_s, pole_pairs, periods) for rows in parts if len(rows) > 2 * WINDOW_S / spacing_s]
     top = max(float(run.speed.max()) for run in runs)
     flux = flux_under_current(runs, psi_f_Vs)
-    changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), period_s, SLOWEST * top)
+    changes = [_changes(run, flux.torque_Nm(run.rows[:, 0] + 1j * run.rows[:, 1], pole_pairs), spacing_s, SLOWEST * top)
                for run in runs]  # fmt: skip
     matrix, change = np.vstack([part for part, _ in changes]), np.concatenate([part for _, part in changes])
     x, sigma = _least_squares(matrix, change)
@@ -146,18 +150,27 @@ def _coast(drive: Capture, wanted_rad_s: float) -> Array:
     return np.vstack(rows)
 
 
-def measure(drive: Capture, known: Nameplate, spun: Spun) -> Drag:
-    """Accelerated, without current, and braked with the current of the acceleration."""
+def runs(drive: Capture, known: Nameplate, wanted_rad_s: float) -> tuple[list[Array], int]:
+    """Accelerated, without current, and braked with the current of the acceleration; PWM periods from row to row."""
+    driven = spin.accelerate(drive, known, wanted_rad_s, NAME, REACH_S)
+    turning.currents(drive, 0.0, 0.0)
+    coasting = _coast(drive, wanted_rad_s)
+    return [driven, coasting, spin.brake(drive, known, wanted_rad_s, NAME)], 1
+
+
+def measure(drive: D, known: Nameplate, spun: Spun,
+            run: Callable[[D, Nameplate, float], tuple[list[Array], int]]) -> Drag:  # fmt: skip
+    """The balance of torque and acceleration.
+
+    run   runs(), or that of a drive over CAN
+    """
     wanted = turning.SPEED_SHARE * known.speed_max_rpm * math.pi / 30.0
     try:
         turning.connect(drive, spun.connection, known, NAME)
-        driven = spin.accelerate(drive, known, wanted, NAME, REACH_S)
-        turning.currents(drive, 0.0, 0.0)
-        coasting = _coast(drive, wanted)
-        braked = spin.brake(drive, known, wanted, NAME)
+        parts, periods = run(drive, known, wanted)
     finally:
         turning.release(drive)
-    found = evaluate([driven, coasting, braked], drive.period_s, spun.connection.pole_pairs, spun.psi_f_Vs)
+    found = evaluate(parts, drive.period_s, spun.connection.pole_pairs, spun.psi_f_Vs, periods)
     if not found.inertia_kgm2 > 0.0:
         raise FluxtrueError(f"commission: {NAME}: an inertia of {found.inertia_kgm2:.3g} kg m^2: the shaft is driven "
                             "from outside")  # fmt: skip

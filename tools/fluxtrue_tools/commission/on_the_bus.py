@@ -14,15 +14,12 @@ from fluxtrue_tools.bus.address import BusAddress
 from fluxtrue_tools.bus.interface import read_interface
 from fluxtrue_tools.commission import hidden
 from fluxtrue_tools.commission.bus import OverTheBus
-from fluxtrue_tools.commission.bus_line import Clock, Line, SimulatedTime, WallTime
+from fluxtrue_tools.commission.bus_line import Beat, Clock, Line, SimulatedTime, WallTime
 from fluxtrue_tools.commission.nameplate import Nameplate
-from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import HOST, VirtualEcu
 from fluxtrue_tools.vecu.stepped import SteppedBus
-
-TURNING = ("phases", "spin", "drag")
 
 
 @dataclass(frozen=True)
@@ -34,27 +31,23 @@ class Bench:
     channel: tuple[str, int] | None = None
 
 
-def refuse_turning(steps: list[str]) -> None:
-    """Steps for which only the port for this computer has what is needed."""
-    turning = [name for name in steps if name in TURNING]
-    if turning:
-        raise FluxtrueError(f"--step {turning[0]}: allowed over CAN: offsets, resistance, map; steps that turn the "
-                            "shaft run by software in the loop only")  # fmt: skip
+def address_of(ecu: VirtualEcu) -> BusAddress:
+    """The bus of a virtual ECU of its own."""
+    return BusAddress("socketcand", "can0", {"host": HOST, "port": ecu.can_port, "tcp_tune": True})
 
 
 @contextlib.contextmanager
-def hidden_machine(motor: Motor, name: str, seed: int, i_max_A: float) -> Iterator[Bench]:
-    """A virtual ECU with this machine, whose sensor and leads are connected as the firmware assumes."""
-    _, flux_map, plant = hidden.draw(name, seed, motor, i_max_A)
+def hidden_machine(motor: Motor, name: str, seed: int, i_max_A: float, connected: bool = True) -> Iterator[Bench]:
+    """A virtual ECU with this machine; connected: sensor and leads are as the firmware assumes."""
+    _, flux_map, plant = hidden.draw(name, seed, motor, i_max_A, connected)
     with contextlib.ExitStack() as stack:
         machine = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "machine.txt"
         machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
         ecu = stack.enter_context(VirtualEcu(motor.folder.vecu, machine=machine))
-        options = {"host": HOST, "port": ecu.can_port, "tcp_tune": True}
-        yield Bench(BusAddress("socketcand", "can0", options), motor.folder.vecu, (HOST, ecu.bench_port))
+        yield Bench(address_of(ecu), motor.folder.vecu, (HOST, ecu.bench_port))
 
 
-def _clock(bus: can.BusABC, channel: Channel | None) -> Callable[[Callable[[], can.Message]], Clock]:
+def _clock(bus: can.BusABC, channel: Channel | None) -> Callable[[Beat], Clock]:
     if channel is not None and channel.is_fast():
         return lambda beat: SimulatedTime(SteppedBus(bus, channel), beat)
     return lambda beat: WallTime(bus, beat)

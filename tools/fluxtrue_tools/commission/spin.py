@@ -6,7 +6,9 @@ both polarities. The voltage that does not change its sign with the current is t
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +33,7 @@ BRAKE_STEPS = 40  # with each of the currents
 ROUGH_RAD = math.radians(4.0)  # beyond, the currents along d make torque
 STANDING_SHARE = 0.01  # of the wanted speed
 ROUNDS = 2
+D = TypeVar("D", bound=Capture)
 
 
 @dataclass(frozen=True)
@@ -146,10 +149,13 @@ def mean_current(rows: Array, offset_A: complex) -> complex:
     return complex(np.mean(used[:, 0] + 1j * used[:, 1] - offset_A * np.exp(-1j * used[:, 4])))
 
 
-def voltages(rows: Array, period_s: float) -> tuple[Array, Array, float]:
-    """Current, voltage over j times the effective speed, in each period; the mean speed: (CM-18)."""
+def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Array, float]:
+    """Current, voltage over j times the effective speed, in each row; the mean speed: (CM-18).
+
+    periods   from one row to the next
+    """
     theta = np.unwrap(rows[1:, 4])
-    times = period_s * np.arange(len(theta))
+    times = periods * period_s * np.arange(len(theta))
     omega = np.polyval(np.polyder(np.polyfit(times, theta, 2)), times + 0.5 * period_s)
     i = rows[1:, 0] + 1j * rows[1:, 1]
     u = rows[:-1, 2] + 1j * rows[:-1, 3]
@@ -170,22 +176,27 @@ def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
     return Magnet(complex((inverse @ psi)[0] / scale[0]), float(omega.mean()))
 
 
-def _direction(drive: Capture, known: Nameplate, wanted_rad_s: float) -> Magnet:
+def direction(drive: Capture, known: Nameplate, wanted_rad_s: float, _: Connection) -> Magnet:
+    """One direction: accelerated, coasting with all levels of the current, and braked."""
     accelerate(drive, known, wanted_rad_s, NAME)
     found = magnet(_coast(drive, known), drive.period_s, known.offset_A)
     brake(drive, known, wanted_rad_s, NAME)
     return found
 
 
-def measure(drive: Capture, known: Nameplate, rough: Connection) -> Spun:
-    """Both directions, with the angle that the alignment has found, then with the corrected one."""
+def measure(drive: D, known: Nameplate, rough: Connection,
+            way: Callable[[D, Nameplate, float, Connection], Magnet]) -> Spun:  # fmt: skip
+    """Both directions, with the angle that the alignment has found, then with the corrected one.
+
+    way   direction(), or that of a drive over CAN
+    """
     wanted = turning.SPEED_SHARE * known.speed_max_rpm * math.pi / 30.0
     rounds: list[tuple[Connection, list[Magnet]]] = []
     connection = rough
     try:
         for _ in range(ROUNDS):
             turning.connect(drive, connection, known, NAME)
-            ways = [_direction(drive, known, sign * wanted) for sign in (1.0, -1.0)]
+            ways = [way(drive, known, sign * wanted, connection) for sign in (1.0, -1.0)]
             rounds.append((connection, ways))
             connection = connection.turned(_error_rad(ways))
     finally:

@@ -10,9 +10,10 @@ from typing import Protocol
 
 from tqdm import tqdm
 
-from fluxtrue_tools.commission import balance, connection, drag, levels, plan, spin, surface, turning
+from fluxtrue_tools.commission import balance, bus_turning, connection, drag, levels, plan, spin, surface, turning
 from fluxtrue_tools.commission.balance import Balance
 from fluxtrue_tools.commission.bursts import FAILURES, Raw, integrate, offset
+from fluxtrue_tools.commission.bus import OverTheBus
 from fluxtrue_tools.commission.connection import Followed
 from fluxtrue_tools.commission.drag import Drag
 from fluxtrue_tools.commission.drive import Capture, nothing
@@ -100,21 +101,30 @@ def _offsets(drive: Capture, found: Found, _: Nameplate) -> None:
 
 
 def _phases(drive: Capture, found: Found, known: Nameplate) -> None:
-    found.followed = connection.measure(drive, known)
+    if isinstance(drive, OverTheBus):
+        found.followed = connection.measure(drive, known, bus_turning.rotate)
+    else:
+        found.followed = connection.measure(drive, known, connection.rotate)
     turning.connect(drive, found.followed.connection, known, connection.NAME)
     turning.release(drive)
 
 
 def _spin(drive: Capture, found: Found, known: Nameplate) -> None:
     assert found.followed is not None
-    found.spun = spin.measure(drive, known, found.followed.connection)
+    if isinstance(drive, OverTheBus):
+        found.spun = spin.measure(drive, known, found.followed.connection, bus_turning.direction)
+    else:
+        found.spun = spin.measure(drive, known, found.followed.connection, spin.direction)
     turning.connect(drive, found.spun.connection, known, spin.NAME)
     turning.release(drive)
 
 
 def _drag(drive: Capture, found: Found, known: Nameplate) -> None:
     assert found.spun is not None
-    found.drag = drag.measure(drive, known, found.spun)
+    if isinstance(drive, OverTheBus):
+        found.drag = drag.measure(drive, known, found.spun, bus_turning.runs)
+    else:
+        found.drag = drag.measure(drive, known, found.spun, drag.runs)
 
 
 def _losses(found: Found, known: Nameplate) -> plan.Losses:

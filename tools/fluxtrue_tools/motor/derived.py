@@ -67,6 +67,11 @@ LAUNCH_FLUX_SHARE = 0.2  # of psi_f: deviation of the magnet
 TORQUE_S, ANGLE_S, SETTLE_S, CONTRADICTED_S = 0.02, 0.005, 0.005, 0.07
 TRIM_S = 1.0  # of identification between two moves of the dead-time compensation
 COMMISSION_SETTLE_S, COMMISSION_MEASURE_S = 0.04, 0.064
+# Of a movement of the shaft for commissioning: shares of i_max and of the largest speed.
+MOVEMENT_CURRENT_SHARE, MOVEMENT_BLOCKED_SHARE = 0.4, 0.15
+MOVEMENT_SPEED_SHARE, MOVEMENT_STILL_SHARE = 0.3, 0.01
+MOVEMENT_HZ, MOVEMENT_SPEED_UP_S, MOVEMENT_RISE_S = 1.0, 0.5, 0.01
+MOVEMENT_BLOCKED_S, MOVEMENT_S = 1.0, 60.0
 STANDSTILL_SHARE = 0.002  # of the speed base
 NOISE_SHARE = 0.002  # of a current converter's full scale, rms
 NOISE_CREST = 4.0 * 0.27  # 4 times the rms of a mean of four steps: (MN-35)

@@ -25,6 +25,15 @@ from fluxtrue_tools.motor.derived import (
     LAUNCH_FLUX_SHARE,
     LAUNCH_SPARE,
     LOST_S,
+    MOVEMENT_BLOCKED_S,
+    MOVEMENT_BLOCKED_SHARE,
+    MOVEMENT_CURRENT_SHARE,
+    MOVEMENT_HZ,
+    MOVEMENT_RISE_S,
+    MOVEMENT_S,
+    MOVEMENT_SPEED_SHARE,
+    MOVEMENT_SPEED_UP_S,
+    MOVEMENT_STILL_SHARE,
     PAPER_TURN_MAX,
     REPEAT_TURNS,
     RIPPLE_S,
@@ -424,6 +433,30 @@ def _commission(motor: Motor) -> list[Row]:
     ]
 
 
+def _movement(motor: Motor) -> list[Row]:
+    b, machine = motor.bases, motor.config.machine
+    top = motor.config.omega_max_rad_s / b.omega_rad_s
+    largest_A = MOVEMENT_CURRENT_SHARE * machine.i_max_A
+    blocked_A = MOVEMENT_BLOCKED_SHARE * machine.i_max_A
+    rise_steps, up_steps = steps(MOVEMENT_RISE_S, b.step_s), steps(MOVEMENT_SPEED_UP_S, b.step_s)
+    rate = round(MOVEMENT_HZ * b.period_s * 2**32)
+    return [
+        ("i_max", q15(largest_A / b.current_A, "movement.i_max"), f"{largest_A:g} A"),
+        (
+            "i_slew",
+            q15(largest_A / b.current_A / rise_steps, "movement.i_slew"),
+            f"i_max in {1e3 * MOVEMENT_RISE_S:g} ms",
+        ),
+        ("i_blocked", q15(blocked_A / b.current_A, "movement.i_blocked"), f"{blocked_A:g} A"),
+        ("omega_max", q31(MOVEMENT_SPEED_SHARE * top, "movement.omega_max"), "30 % of the largest speed"),
+        ("omega_still", q31(MOVEMENT_STILL_SHARE * top, "movement.omega_still"), "1 % of it"),
+        ("rate_max", str(rate), f"{MOVEMENT_HZ:g} electrical turns in a second"),
+        ("rate_slew", str(round(rate / up_steps)), f"rate_max in {MOVEMENT_SPEED_UP_S:g} s"),
+        ("blocked_steps", f"{steps(MOVEMENT_BLOCKED_S, b.step_s)}", f"{MOVEMENT_BLOCKED_S:g} s"),
+        ("steps_max", f"{steps(MOVEMENT_S, b.step_s)}", f"{MOVEMENT_S:g} s"),
+    ]
+
+
 def _plausibility(motor: Motor) -> list[Row]:
     d, b, thermal = motor.derived, motor.bases, motor.config.thermal
     return [
@@ -576,6 +609,7 @@ def _motor(motor: Motor) -> list[Row]:
         ("frozen_angle", _frozen_angle(motor), ""),
         ("launch_power", _launch_power(motor), ""),
         ("commission", _commission(motor), ""),
+        ("movement", _movement(motor), ""),
         ("turning_control", _turning_control(motor), ""),
         ("parameters", _parameters(motor), ""),
         ("second_level", "&second_level", ""),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The virtual ECU as a child process."""
 
+import os
 import re
 import subprocess
 from pathlib import Path
@@ -17,13 +18,15 @@ class VirtualEcu:
     """Starts the virtual ECU on free ports, gives their numbers, and stops it."""
 
     def __init__(self, program: Path, fast: bool = True, seed: int = 1, nvm: Path | None = None,
-                 machine: Path | None = None) -> None:  # fmt: skip
+                 machine: Path | None = None, environment: dict[str, str] | None = None) -> None:  # fmt: skip
         command = [str(program), "--fast" if fast else "--realtime", "--port", "0", "--bench-port", "0",
                    "--seed", str(seed)]  # fmt: skip
         command += ["--nvm", str(nvm)] if nvm is not None else []
         command += ["--machine", str(machine)] if machine is not None else []
         try:
-            self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            self._process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, text=True, env=os.environ | (environment or {})
+            )
         except OSError as error:
             raise FluxtrueError(f"virtual ECU {program}: {error.strerror}") from error
         assert self._process.stdout is not None

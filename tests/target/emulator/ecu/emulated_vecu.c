@@ -28,9 +28,8 @@ static void on_sent(void *user, const can_port_frame_t *sent, uint64_t now)
     (void)hub_send(vecu->hub, &frame, vecu->now_ns);
 }
 
-static const char *plant_set_up(sim_t *sim, uint64_t seed)
+static const char *plant_set_up(sim_t *sim, const machine_data_t *m, uint64_t seed)
 {
-    const machine_data_t *m = &machine_data;
     for (const machine_value_t *v = m->values; v->name != NULL; v++) {
         if (sim_set(sim, v->name, v->value) != SIM_OK) {
             return v->name;
@@ -59,7 +58,7 @@ static const char *processor_start(vecu_t *vecu)
     port = (can_port_t){on_sent, vecu};
     emu_can_port(sim_emulator(vecu->sim), &port);
     (void)sim_set(vecu->sim, "emulator.board", 1.0);
-    return plant_set_up(vecu->sim, vecu->seed);
+    return plant_set_up(vecu->sim, (vecu->machine != NULL) ? vecu->machine : &machine_data, vecu->seed);
 }
 
 const char *vecu_reset(vecu_t *vecu, uint64_t seed)

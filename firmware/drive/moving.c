@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A movement of the shaft in the drive: its frame in the fast ISR, and its step in the 1 kHz task. */
+#include "drive/mrai/mrai_seam.h"
+
+/* With a connection alone a small torque may brake the rotor: the second level does not limit it meanwhile. */
+static bool has_request(const drive_t *drive)
+{
+    const int32_t largest = drive_moves(drive) ? 0 : drive->motor->torque_max / 8;
+    return fx_abs_q31(drive->request.torque_arbitrated) > largest;
+}
+
+void drive_move(drive_t *drive, const snapshot_t *snapshot)
+{
+    task_state_t *task = &drive->task;
+    const movement_in_t in = {
+        .runs = task->run_state == RUN_STATE_RUN,
+        .has_failed = task->run_state == RUN_STATE_FAULT || mrai_is_chosen(drive),
+        .has_request = has_request(drive),
+        .theta_m = snapshot->sample.theta_m,
+        .omega = drive->frame_angle.omega_sensor,
+    };
+    movement_step(&drive->motor->movement, drive->motor->angle_tracker.pole_pairs, &task->movement, &drive->frame,
+                  &drive->request.movement, &in);
+}
+
+/* Nothing is identified, because the angle is not that of the motor data. */
+int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sample, int32_t own_step)
+{
+    if ((command->run & (uint8_t)BRIDGE_MOVED) == 0U) {
+        return own_step;
+    }
+    const movement_sensor_t sensor = {sample->theta_m, own_step, sample->point.omega};
+    const movement_turn_t turn = movement_frame_step(&drive->frame, &drive->frame_angle, &sensor);
+    sample->theta_e = turn.theta_e;
+    sample->point.omega = turn.omega;
+    identify_window_invalidate(&drive->fast.window);
+    return turn.step;
+}

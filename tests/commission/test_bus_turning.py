@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The steps that turn the shaft over CAN, on the virtual ECU: a hidden machine, refusals, and what ends a movement."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import can
+import pytest
+
+from fluxtrue_tools.a2l.elf import read
+from fluxtrue_tools.bus.interface import COMMISSION, read_interface
+from fluxtrue_tools.cli import run as command
+from fluxtrue_tools.commission import hidden, turning
+from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.bus_line import Line, SimulatedTime
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.score import turned
+from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.commission.turning import Connection
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim.motor import Motor
+from fluxtrue_tools.vecu.channel import Channel
+from fluxtrue_tools.vecu.process import VirtualEcu
+from fluxtrue_tools.vecu.stepped import SteppedBus, connect
+
+NAME, SEED = "saturated", 101
+OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of test_turning.py
+LIMIT_S = 2.0  # of acceleration without an end by the tool
+SMALL_S = 0.2
+STOPPED_S = 0.05  # time-out of 30 ms and one step of the tool
+
+
+class Choosing(SimulatedTime):
+    """Frames that can be kept from the bus."""
+
+    kept_back: frozenset[int] = frozenset()
+
+    def send(self, frame: can.Message) -> None:
+        if frame.arbitration_id not in self.kept_back:
+            super().send(frame)
+
+
+@dataclass
+class Stand:
+    """A virtual ECU with a hidden machine whose connection is unknown, and its drive over CAN."""
+
+    ecu: VirtualEcu
+    channel: Channel
+    line: Line
+    drive: OverTheBus
+    truth: Truth
+    clock: Choosing
+
+    @property
+    def wired(self) -> Connection:
+        """The connection as it is."""
+        return Connection(int(self.truth.plant["pole_pairs"]), self.truth.reversed, self.truth.offset_rad)
+
+    def speed_rad_s(self) -> float:
+        return abs(self.channel.get("truth.speed_rad_s")[0])
+
+
+@pytest.fixture
+def stand(unknown: Motor, known: Nameplate, tmp_path: Path) -> Iterator[Stand]:
+    truth, flux_map, plant = hidden.draw(NAME, SEED, unknown, known.i_max_A, connected=False)
+    machine = tmp_path / "machine.txt"
+    machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
+    with ExitStack() as stack:
+        ecu = stack.enter_context(VirtualEcu(unknown.folder.vecu, machine=machine))
+        bus = connect(ecu.can_port)
+        stack.callback(bus.shutdown)
+        channel = Channel("127.0.0.1", ecu.bench_port)
+        stack.callback(channel.close)
+        stepped = SteppedBus(bus, channel)
+        clocks: list[Choosing] = []
+        line = Line(
+            lambda beat: clocks.append(Choosing(stepped, beat)) or clocks[0], read_interface(unknown.folder.dbc)
+        )
+        drive = OverTheBus(line, read(unknown.folder.vecu), known, unknown.plant["vdc_V"])
+        yield Stand(ecu, channel, line, drive, truth, clocks[0])
+
+
+def test_an_unknown_connection_magnet_inertia_and_drag_over_can(stand: Stand, known: Nameplate) -> None:
+    found = run(stand.drive, chosen(("drag",)), known, lambda _: None)
+    errors = turned(found, stand.truth)
+    print(f"{NAME} {SEED}: {errors}, {stand.line.now_s:.0f} s simulated")
+    assert errors.is_connected
+    assert abs(errors.offset_deg) <= OFFSET_DEG
+    assert abs(errors.psi_f) <= PSI_F
+    assert abs(errors.inertia) <= INERTIA
+    assert errors.drag <= DRAG
+    assert stand.drive.get("run_state") == 0.0 and stand.drive.get("fault_word") == 0.0
+    assert stand.drive.get("dead_time_compensation") == pytest.approx(1.0, abs=1e-3)
+
+
+def spinning(stand: Stand, known: Nameplate) -> None:
+    """The shaft is being accelerated by a sixth of the largest current."""
+    turning.connect(stand.drive, stand.wired, known, "test")
+    turning.currents(stand.drive, 0.0, 0.16 * known.i_max_A)
+    stand.drive.rest(SMALL_S)
+    assert stand.speed_rad_s() > 1.0
+
+
+def is_off(stand: Stand) -> bool:
+    stand.line.pass_time(STOPPED_S)
+    return stand.line.state == "ready" and stand.drive.get("run_state") == 0.0 and stand.drive.get("fault_word") == 0.0
+
+
+def silent(stand: Stand, _: Nameplate) -> None:
+    stand.clock.kept_back = frozenset({read_interface().message(COMMISSION).frame_id})
+
+
+def without_request(stand: Stand, _: Nameplate) -> None:
+    stand.clock.kept_back = frozenset({read_interface().message(COMMISSION).frame_id, 0x110})
+
+
+def other_movement(stand: Stand, _: Nameplate) -> None:
+    stand.line.move(kind="imposed")
+
+
+def withdrawn(stand: Stand, _: Nameplate) -> None:
+    stand.line.move(kind="none")
+
+
+def torque(stand: Stand, _: Nameplate) -> None:
+    stand.line.ask(torque_Nm=5.0)
+
+
+@pytest.mark.parametrize(("action", "message"), [
+    (silent, "the commands stopped"), (without_request, "the commands stopped|command timed out"),
+    (other_movement, "the inverter has refused it"), (withdrawn, "the inverter has refused it"),
+    (torque, "a torque was requested"),
+])  # fmt: skip
+def test_what_is_not_the_agreed_movement_ends_it_with_one_message(
+    action: Callable[[Stand, Nameplate], None], message: str, stand: Stand, known: Nameplate
+) -> None:
+    spinning(stand, known)
+    action(stand, known)
+    with pytest.raises(FluxtrueError, match=message):
+        stand.drive.rest(STOPPED_S)
+    assert is_off(stand)
+
+
+def test_a_movement_ends_at_the_agreed_speed_over_can(stand: Stand, known: Nameplate) -> None:
+    spinning(stand, known)
+    fastest = 0.0
+    with pytest.raises(FluxtrueError, match="faster than 30 %"):
+        for _ in range(round(LIMIT_S / turning.STEP_S)):
+            stand.drive.rest(turning.STEP_S)
+            fastest = max(fastest, stand.speed_rad_s())
+    limit = turning.LIMIT_SHARE * known.speed_max_rpm * turning.TURN / 60.0
+    assert 0.9 * limit < fastest <= 1.05 * limit
+    assert is_off(stand)
+
+
+@pytest.mark.parametrize("plant", [{"imposed_speed": 1.0, "speed_rad_s": 0.0}, {"inertia_kgm2": 100.0}])
+def test_a_blocked_or_coupled_shaft_ends_the_movement(plant: dict[str, float], stand: Stand, known: Nameplate) -> None:
+    stand.channel.set(**plant)
+    turning.connect(stand.drive, stand.wired, known, "test")
+    turning.currents(stand.drive, 0.0, 0.16 * known.i_max_A)
+    with pytest.raises(FluxtrueError, match="blocked or coupled"):
+        for _ in range(150):
+            stand.drive.rest(turning.STEP_S)
+    assert is_off(stand)
+
+
+def test_a_rotor_that_does_not_follow_is_refused_over_can(stand: Stand, known: Nameplate) -> None:
+    stand.channel.set(imposed_speed=1.0, speed_rad_s=0.0)
+    with pytest.raises(FluxtrueError, match="the rotor did not move"):
+        run(stand.drive, chosen(("phases",)), known, lambda _: None)
+    assert stand.drive.get("run_state") == 0.0
+
+
+def test_a_movement_is_refused_while_switching_is_enabled(stand: Stand) -> None:
+    stand.drive.set("enable", 1.0)
+    stand.line.move()
+    stand.line.pass_time(STOPPED_S)
+    stand.line.move(kind="imposed")
+    with pytest.raises(FluxtrueError, match="the inverter has refused it"):
+        stand.drive.rest(STOPPED_S)
+    assert is_off(stand)
+
+
+def test_after_an_early_end_enable_needs_a_new_consent(stand: Stand, known: Nameplate) -> None:
+    spinning(stand, known)
+    silent(stand, known)
+    with pytest.raises(FluxtrueError, match="the commands stopped"):
+        stand.drive.rest(STOPPED_S)
+    stand.clock.kept_back = frozenset()
+    stand.line.ask(enable=False)
+    stand.line.pass_time(STOPPED_S)
+    stand.line.ask(enable=True)
+    stand.line.pass_time(STOPPED_S)
+    assert stand.line.state == "ready" and stand.line.refused == "movement ended"
+    turning.release(stand.drive)
+    spinning(stand, known)
+
+
+def test_the_map_s_steps_keep_the_connection_that_was_found(stand: Stand, known: Nameplate) -> None:
+    """The firmware's motor data have another connection."""
+    turning.connect(stand.drive, stand.wired, known, "test")
+    turning.release(stand.drive)
+    found = run(stand.drive, chosen(("resistance",)), known, lambda _: None)
+    assert found.resistance is not None
+    assert abs(found.resistance.r_ohm / stand.truth.plant["r_ohm_20"] - 1.0) <= 0.01
+
+
+def test_the_command_turns_the_shaft_and_writes_a_folder(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "found"
+    options = ["--motor", str(folder), "--virtual-ecu", "--machine", NAME, "--seed", str(SEED), "--step", "phases",
+               "--out", str(out)]  # fmt: skip
+    assert command(["commission", *options]) == 0, capsys.readouterr().err
+    assert "counts against the field" in capsys.readouterr().out
+    assert command(["motor", "check", str(out)]) == 0

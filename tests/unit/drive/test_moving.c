@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A movement in the drive: its frame in the fast ISR, its currents in place of the torque path, its end at once. */
+#include "drive/slow_monitors.h"
+#include "hal/mock_adc.h"
+#include "hal/mock_angle.h"
+#include "hal/mock_irq.h"
+#include "hal/mock_pwm.h"
+#include "hal/mock_temperature.h"
+#include "seam.h"
+#include "unity.h"
+
+static movement_request_t *const wanted = &drive.request.movement;
+
+/* The rotor stands at a quarter of a turn of the sensor. */
+void setUp(void)
+{
+    seam_start();
+    slow_monitors_without_machine(&seam.motor); /* the currents of the seam do not follow the voltage */
+    seam.theta_m = 0x40000000U;
+    seam_periods(20);
+    *wanted = (movement_request_t){.movement = MOVEMENT_SPIN, .pole_pairs = 3, .alive = true, .may_begin = true};
+}
+
+void tearDown(void)
+{
+}
+
+static const sample_t *sample(void)
+{
+    return sample_box_at(&drive.samples, drive.samples.generation);
+}
+
+static void run(void)
+{
+    seam_periods(20);
+    TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+    drive.request.enable = true;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_INT(RUN_STATE_RUN, drive.task.run_state);
+}
+
+void test_the_connection_acts_while_switching_is_enabled(void)
+{
+    run();
+    TEST_ASSERT_EQUAL_HEX32(0xC0000000U, sample()->theta_e);
+    TEST_ASSERT_TRUE(seam.gates);
+    drive.request.enable = false;
+    seam_periods(20);
+    const uint32_t own = motor.angle_tracker.pole_pairs * 0x40000000U + motor.angle_tracker.offset;
+    TEST_ASSERT_EQUAL_HEX32(own, sample()->theta_e);
+    TEST_ASSERT_EQUAL_UINT32(0, drive.fast.faults);
+}
+
+void test_the_currents_of_the_movement_are_the_references(void)
+{
+    run();
+    wanted->i = (dq_q15_t){100, -200};
+    seam_periods(200);
+    TEST_ASSERT_EQUAL_INT32(100, drive.task.i_ref.d);
+    TEST_ASSERT_EQUAL_INT32(-200, drive.task.i_ref.q);
+    TEST_ASSERT_FALSE(window_box_at(&drive.windows)->acting); /* nothing is identified */
+}
+
+void test_the_imposed_angle_turns_whatever_the_rotor_does(void)
+{
+    wanted->movement = MOVEMENT_IMPOSED;
+    wanted->direction = MOVEMENT_FORWARD;
+    run();
+    const uint32_t before = sample()->theta_e;
+    seam_periods(10000); /* a second at 10 kHz: 0.5 s of slope, then one turn per second */
+    TEST_ASSERT_UINT32_WITHIN(0x04000000U, 0xC0000000U, sample()->theta_e - before);
+    TEST_ASSERT_EQUAL_UINT32(0, drive.fast.faults);
+}
+
+void test_silence_disables_switching_in_the_next_step(void)
+{
+    run();
+    wanted->alive = false;
+    seam_periods(11);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_SILENT, drive.task.movement.failure);
+    wanted->alive = true;
+    seam_periods(100); /* enable is still on */
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_EQUAL_UINT32(0, drive.fast.faults);
+}
+
+/* An eighth of the largest torque: without a second level a larger one needs a connection that is known. */
+void test_a_connection_allows_a_small_torque_request_and_currents_none(void)
+{
+    wanted->movement = MOVEMENT_CONNECTED;
+    run();
+    drive.request.torque_arbitrated = (q15_t)(-motor.torque_max / 8);
+    seam_periods(20);
+    TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+    drive.request.torque_arbitrated--;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_STOPPED, drive.task.movement.failure);
+    TEST_ASSERT_FALSE(seam.gates);
+    setUp();
+    run();
+    drive.request.torque_arbitrated = 1;
+    seam_periods(20);
+    TEST_ASSERT_EQUAL_INT(MOVEMENT_FAILURE_STOPPED, drive.task.movement.failure);
+}
+
+/* The magnet's flux is a guess, by which the machine would be fast enough for a short circuit. */
+void test_a_movement_that_ends_at_speed_leaves_the_bridge_off(void)
+{
+    run();
+    drive.task.safe_state.speed = Q15_MAX;
+    wanted->alive = false;
+    seam_periods(11);
+    TEST_ASSERT_FALSE(seam.gates);
+    TEST_ASSERT_FALSE(drive_is_shorted(&drive));
+    TEST_ASSERT_TRUE(drive.task.safe_state.short_circuit);
+}
+
+void test_pulses_need_a_connection_without_currents(void)
+{
+    run();
+    drive.request.pulses.config = (pulses_config_t){
+        .d = {.v = 1000, .low = -1000, .high = 1000}, .q = {.low = -1, .high = 1}, .reversals = 2, .periods_max = 5};
+    drive.request.pulses.starts++;
+    seam_periods(10);
+    TEST_ASSERT_EQUAL_INT(PULSES_REFUSED, drive.task.pulsing.failure);
+    drive.request.enable = false;
+    wanted->movement = MOVEMENT_NONE;
+    seam_periods(20);
+    wanted->movement = MOVEMENT_CONNECTED;
+    run();
+    drive.request.pulses.starts++;
+    seam_periods(12);
+    TEST_ASSERT_EQUAL_INT(PULSES_GOOD, drive.task.pulsing.failure);
+    TEST_ASSERT_EQUAL_INT(PULSES_PULSE, drive.pulses_state.phase);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000000U, sample()->theta_e);
+}

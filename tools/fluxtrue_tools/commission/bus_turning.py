@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The movements of the shaft over CAN: what the scope of the firmware captures in place of a record of every period.
+
+The scope's memory lasts for 0.12 s of five signals in every period, and reading it takes longer than the shaft turns by
+itself: each window is captured, the currents are brought to zero, and the shaft is accelerated again. The evaluation is
+that of software in the loop (connection.py, spin.py, drag.py).
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+
+from fluxtrue_tools.commission import connection, drag, spin, turning
+from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.spin import Magnet
+from fluxtrue_tools.commission.turning import Connection
+from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.motor.flux_model import Array
+from fluxtrue_tools.scope.scope import WORDS
+
+ROTATED: Final = ("theta_e_rad", "sensor_turns")
+DIVISOR_SLOW: Final = 100  # 10 ms: of the slow turn
+MARGIN_S: Final = 0.1  # beside the movement
+TAKEN: Final = ("id_A", "iq_A", "ud_V", "uq_V", "theta_e_rad")
+ROWS: Final = WORDS // len(TAKEN)
+LEVEL_SETTLE_S: Final = 0.3
+OFF_SHARE: Final = 0.01  # of i_max: a mean current so far from the wanted one has not settled
+DIVISOR_DRAG: Final = 10  # 1 ms: the electrical angle may turn by less than half a turn between two samples
+
+
+def rotate(drive: OverTheBus, current_A: float) -> tuple[Array, Array]:
+    """Imposed angle and sensor's angle on the way there and back, both continuous, in turns."""
+    steps = round(connection.RISE_S / turning.STEP_S)
+    for k in range(steps):
+        turning.currents(drive, current_A * (k + 1) / steps, 0.0)
+        drive.rest(turning.STEP_S)
+    drive.damp(True)
+    drive.rest(connection.SWING_S)
+    drive.damp(False)
+    way_s = connection.TURNS / connection.HZ + connection.SPEED_UP_S
+
+    def there_and_back(seconds: float) -> None:
+        begun_s = drive.line.now_s
+        for hz in (connection.HZ, -connection.HZ):
+            drive.set("imposed_hz", hz)
+            drive.rest(way_s - connection.SPEED_UP_S)
+            drive.set("imposed_hz", 0.0)
+            drive.rest(connection.SPEED_UP_S)
+        drive.rest(max(seconds - (drive.line.now_s - begun_s), 0.0))
+
+    periods = round((2.0 * way_s + MARGIN_S) / drive.period_s)
+    taken = drive.capture_during(ROTATED, periods, DIVISOR_SLOW, there_and_back)
+    imposed = np.unwrap(taken[:, 0]) / turning.TURN
+    turn = int(np.argmax(imposed))
+    half = min(turn, len(imposed) - turn)
+    return imposed[turn - half : turn + half], taken[turn - half : turn + half, 1]
+
+
+def _accelerate(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, step: str, reach_s: float) -> None:
+    """As spin.accelerate(), with the speed that the drive reports."""
+    sign = math.copysign(1.0, wanted_rad_s)
+    speed, seconds, tries, level = sign * drive.shaft_rad_s(), 0.0, 0, 0
+    while speed < abs(wanted_rad_s):
+        if seconds > spin.LONGEST_S:
+            reached, wanted = (each * 30.0 / math.pi for each in (speed, abs(wanted_rad_s)))
+            raise FluxtrueError(f"commission: {step}: the shaft reached {reached:.0f} rpm of {wanted:.0f} rpm: it is "
+                                "coupled, or the angle is wrong")  # fmt: skip
+        turning.currents(drive, 0.0, sign * spin.Q_SHARES[level] * known.i_max_A)
+        drive.rest(spin.TRY_S)
+        before, speed = speed, sign * drive.shaft_rad_s()
+        seconds, tries = seconds + spin.TRY_S, tries + 1
+        if (speed - before) * reach_s < 0.5 * spin.TRY_S * abs(wanted_rad_s) and tries % 2 == 0:
+            level = min(level + 1, len(spin.Q_SHARES) - 1)
+
+
+def _brake(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> None:
+    """As spin.brake()."""
+    sign = math.copysign(1.0, wanted_rad_s)
+    for n in range(round(spin.LONGEST_S / turning.STEP_S)):
+        if sign * drive.shaft_rad_s() < spin.STANDING_SHARE * abs(wanted_rad_s):
+            break
+        share = spin.Q_SHARES[min(n // spin.BRAKE_STEPS, len(spin.Q_SHARES) - 3)]
+        turning.currents(drive, 0.0, -sign * share * known.i_max_A)
+        drive.rest(turning.STEP_S)
+    turning.currents(drive, 0.0, 0.0)
+
+
+def _window(drive: OverTheBus, divisor: int, action: Callable[[float], None]) -> Array:
+    """Rows as those of software in the loop: with each sample the voltage of the next one."""
+    rows = drive.capture_during(TAKEN, ROWS * divisor, divisor, action)
+    return np.column_stack((rows[:-1, :2], rows[1:, 2:4], rows[:-1, 4]))
+
+
+def direction(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, rough: Connection) -> Magnet:
+    """One direction with all levels of the current along d, each after an acceleration of its own."""
+    turning.connect(drive, rough, known, spin.NAME)
+    compensation, q_A, taken = drive.get(spin.COMPENSATION), 0.0, []
+    drive.set(spin.COMPENSATION, 0.0)
+    try:
+        for level in spin.LEVELS:
+            i_d_A = level * spin.D_SHARE * known.i_max_A
+            _accelerate(drive, known, wanted_rad_s, spin.NAME, spin.REACH_S)
+            turning.currents(drive, i_d_A, q_A)
+            drive.rest(LEVEL_SETTLE_S)
+            taken.append(_window(drive, 1, lambda seconds: _and_none(drive, seconds)))
+            mean_A = spin.mean_current(taken[-1], known.offset_A)
+            if abs(mean_A.real - i_d_A) > OFF_SHARE * known.i_max_A:
+                raise FluxtrueError(f"commission: {spin.NAME}: {i_d_A:.3g} A along d did not settle: "
+                                    f"{mean_A.real:.3g} A flow")  # fmt: skip
+            q_A -= mean_A.imag
+        _brake(drive, known, wanted_rad_s)
+    finally:
+        drive.set(spin.COMPENSATION, compensation)
+    return spin.magnet(taken, drive.period_s, known.offset_A)
+
+
+def _and_none(drive: OverTheBus, seconds: float) -> None:
+    """Let the window pass; without current while it is read."""
+    drive.rest(seconds)
+    turning.currents(drive, 0.0, 0.0)
+
+
+def runs(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> tuple[list[Array], int]:
+    """Accelerated, without current, and braked; PWM periods from one row to the next."""
+
+    def driven(seconds: float) -> None:
+        begun_s = drive.line.now_s
+        _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+        turning.currents(drive, 0.0, 0.0)
+        drive.rest(max(seconds - (drive.line.now_s - begun_s), 0.0))
+
+    def braked(seconds: float) -> None:
+        begun_s = drive.line.now_s
+        _brake(drive, known, wanted_rad_s)
+        drive.rest(max(seconds - (drive.line.now_s - begun_s), 0.0))
+
+    parts = [_window(drive, DIVISOR_DRAG, driven)]
+    _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+    turning.currents(drive, 0.0, 0.0)
+    for _ in range(drag.COASTS):
+        parts.append(_window(drive, DIVISOR_DRAG, drive.rest))
+        if drive.shaft_rad_s() < drag.COAST_END * wanted_rad_s:
+            break
+    _accelerate(drive, known, wanted_rad_s, drag.NAME, drag.REACH_S)
+    parts.append(_window(drive, DIVISOR_DRAG, braked))
+    return parts, DIVISOR_DRAG

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commissioning of the image that would be flashed, on the emulated processor, with a hidden machine.
+
+python -m fluxtrue_tools.commission.emulated --machine saturated --seed 101 --step all
+
+The image is that of hsm1 with an AS5047P, not that of a nameplate: on the virtual ECU its offset of saturated 101 is
+wrong by 0.6 degrees, where the nameplate's is wrong by 0.01. A second of its time takes about a second of a processor.
+"""
+
+import contextlib
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+
+from fluxtrue_tools.commission import hidden, on_the_bus
+from fluxtrue_tools.commission.bus import OverTheBus
+from fluxtrue_tools.commission.cli import nameplate_of
+from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission.nameplate import Nameplate
+from fluxtrue_tools.commission.on_the_bus import Bench
+from fluxtrue_tools.commission.score import resistance_error, score, turned
+from fluxtrue_tools.commission.steps import chosen, run
+from fluxtrue_tools.emulate import build
+from fluxtrue_tools.emulate.build import Parts
+from fluxtrue_tools.vecu.process import HOST, VirtualEcu
+
+MOTOR = "hsm1"
+START_S, OFF_S = 0.2, 0.1
+
+
+def parts() -> Parts:
+    """The image and its emulation, built if needed."""
+    return build.prepare(MOTOR, angle="as5047", flashed=True)
+
+
+@contextlib.contextmanager
+def connected(made: Parts, name: str, seed: int) -> Iterator[tuple[OverTheBus, Truth, Nameplate]]:
+    """The image with this machine, whose sensor and leads are connected at random; its bus; the nameplate."""
+    motor = made.motor
+    known = nameplate_of(hidden.folder_of(MOTOR), motor)
+    truth, flux_map, plant = hidden.draw(name, seed, motor, known.i_max_A, connected=False)
+    with contextlib.ExitStack() as stack:
+        machine = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "machine.txt"
+        machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
+        ecu = stack.enter_context(VirtualEcu(made.program, machine=machine, environment=made.environment))
+        bench = Bench(on_the_bus.address_of(ecu), made.image, (HOST, ecu.bench_port))
+        drive = stack.enter_context(on_the_bus.connected(bench, motor, known))
+        drive.rest(START_S)
+        # The model of the sensor is at zero until the first period: the rotor seems to jump.
+        drive.switch_off()
+        drive.reset_faults()
+        drive.rest(OFF_S)
+        yield drive, truth, known
+
+
+@click.command()
+@click.option("--machine", default="saturated", show_default=True, help="One of the project's, changed at random.")
+@click.option("--seed", default=101, show_default=True, help="Of these changes.")
+@click.option("--step", "steps", default="all", show_default=True, help="As of `tools/fluxtrue commission`.")
+def main(machine: str, seed: int, steps: str) -> None:
+    """Measure the machine and print the errors."""
+    begun = time.process_time()
+    with connected(parts(), machine, seed) as (drive, truth, known):
+        found = run(drive, chosen(tuple(steps.split(","))), known, click.echo)
+        click.echo(f"{drive.line.now_s:.0f} s of the bus, {time.process_time() - begun:.0f} s of the evaluation")
+    if found.followed is not None:
+        click.echo(f"connection: {found.followed.connection}, true: {truth.plant['pole_pairs']:.0f} pole pairs, "
+                   f"reversed {truth.reversed}, {truth.offset_rad:.4f} rad")  # fmt: skip
+    if found.drag is not None:
+        click.echo(str(turned(found, truth)))
+    if found.resistance is not None:
+        whole, beyond = resistance_error(found.resistance.r_ohm, truth)
+        click.echo(f"resistance: {100.0 * whole:+.2f} %, beyond the sensors' gains {100.0 * beyond:+.2f} %")
+    if found.surface is not None:
+        psi_f_Vs = found.spun.psi_f_Vs if found.spun is not None else truth.psi_f_Vs
+        click.echo(str(score(found.surface.model, truth, known.i_max_A, psi_f_Vs)))
+
+
+if __name__ == "__main__":
+    main()
