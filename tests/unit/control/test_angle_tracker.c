@@ -301,6 +301,65 @@ void test_a_rotor_that_is_stopped_is_followed(void)
 }
 
 /* 6 291 456 in 50 periods: 125 829 per period. */
+/* The loop of a machine of so many pole pairs at 8 kHz, 300 rad/s, base 942 rad/s, and a sensor of 12 bits. The rotor
+ * turns at a speed (share of the base) until it stops as (SS-5) assumes, or its sensor repeats itself. Returns how
+ * often that counts as a failure of the sensor within 5 ms. */
+static int failures_at(double share, int phase, bool frozen, unsigned pole_pairs)
+{
+    f.angle_tracker = (angle_tracker_config_t){.pole_pairs = pole_pairs,
+                                               .kp = 161061274,
+                                               .ki_q29 = 40265318,
+                                               .pu_to_turn = 322122547,
+                                               .turn_to_pu = 1747627,
+                                               .max_step = 214748364,
+                                               .repeat_max = pole_pairs << 21,
+                                               .lag_steps = 5,
+                                               .stop_periods = 40};
+    const double base = turn * 942.5 / 8000.0 / two_pi / pole_pairs, slower = base / 250.0 / 8.0, count = turn / 4096.0;
+    double advance = share * base, theta = phase * count / 32.0;
+    angle_t y;
+    state = (angle_tracker_state_t){0};
+    for (int n = 0; n < 2000; n++, theta += advance) {
+        (void)read_angle((uint32_t)(int64_t)(floor(theta / count) * count), &y);
+    }
+    const uint32_t last = last_read;
+    int failures = 0, standing = 0;
+    while (standing < 40) {
+        const uint32_t read = frozen ? last : (uint32_t)(int64_t)(floor(theta / count) * count);
+        const bool stuck = read_angle(read, &y) == ANGLE_STUCK;
+        failures += (stuck && !angle_tracker_may_stop(&state)) ? 1 : 0;
+        standing += (frozen || advance == 0.0) ? 1 : 0;
+        advance = (advance > slower) ? advance - slower : 0.0;
+        theta += advance;
+    }
+    return failures;
+}
+
+/* The lag is measured to a count (AT-17). A fault needs more than 40 failures. */
+void test_a_rotor_that_stops_is_followed_with_the_resolution_of_12_bits(void)
+{
+    for (int share = 20; share <= 60; share++) {
+        for (int phase = 0; phase < 32; phase++) {
+            TEST_ASSERT_LESS_THAN_INT(20, failures_at(0.001 * share, phase, false, 2));
+        }
+    }
+}
+
+void test_a_sensor_of_12_bits_that_repeats_itself_above_the_speed_of_a_stop_is_found(void)
+{
+    for (int share = 21; share <= 100; share++) {
+        for (int phase = 0; phase < 32; phase++) {
+            TEST_ASSERT_GREATER_THAN_INT(30, failures_at(0.001 * share, phase, true, 2));
+        }
+    }
+    /* Also where a count is a large part of the lag that shows a stop. */
+    for (unsigned pole_pairs = 15; pole_pairs <= 45; pole_pairs += 15) {
+        for (int phase = 0; phase < 32; phase++) {
+            TEST_ASSERT_GREATER_THAN_INT(0, failures_at(0.1, phase, true, pole_pairs));
+        }
+    }
+}
+
 void test_a_rotor_that_turns_by_less_than_two_counts_in_5_ms_cannot_stick(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {

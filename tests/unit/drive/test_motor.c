@@ -72,7 +72,7 @@ void test_measurement_and_angle_are_the_si_values(void)
     HELD(8.0 * turns_at_base, q31(motor.angle_tracker.pu_to_turn), q31(1));
     HELD(0.5 / turns_at_base, motor.angle_tracker.turn_to_pu / 65536.0, 1.0 / 65536.0);
     TEST_ASSERT_EQUAL_UINT32((uint32_t)motor_si.pole_pairs << 21, motor.angle_tracker.repeat_max);
-    HELD(0.25 / wn, motor.angle_tracker.lag_steps, 1.0);
+    HELD(0.1875 / wn, motor.angle_tracker.lag_steps, 1.0);
     HELD(0.005 / motor_si.period_s, motor.angle_tracker.stop_periods, 1.0);
 }
 

@@ -28,7 +28,7 @@ TRACKER_JUMP_TURNS, TRACKER_JUMP_MAX_TURNS = 1 / 20, 1 / 8
 TRACKER_LAG_SHARE = 0.6  # of a jump, by the rotor alone with all torque
 ANGLE_JUMPS_S = 0.03  # of implausible samples: (MN-21)
 REPEAT_TURNS = 2 / 4096  # mechanical: two counts of the coarsest sensor, (AT-16)
-LAG_SHARE = 0.25  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
+LAG_SHARE = 0.1875  # of the lag that a rotor which stops leaves behind the prediction: (AT-17)
 STOP_S = 0.005  # in which a slow rotor can stop: (AT-18)
 ANGLE_HARMONIC_MAX_TURNS = 2 / 360  # electrical, of each harmonic's cosine and sine: a good sensor stays below half
 
