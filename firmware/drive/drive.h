@@ -168,6 +168,7 @@ typedef struct {
     q15_t torque_commanded;      /* the limited torque after slew */
     q15_t torque_corrected;      /* after the torque loop: input of the current reference */
     run_state_t run_state;
+    uint8_t excessive; /* steps in a row with too much torque after a fast change of speed; saturates */
     pulsing_t pulsing;
     movement_state_t movement;
     safe_state_state_t safe_state;
@@ -201,6 +202,7 @@ typedef struct {
     uint32_t faults;
     int16_t inverter_dC, winding_dC;
     int16_t known_permille; /* hal_adc_known_permille() */
+    q15_t lag;              /* of the tracked speed, torque_monitor_lag() */
     bool gates;             /* as read back: the switches follow the duties */
     bool angle_absolute;
     bool shorted; /* drive_is_shorted() */

@@ -38,6 +38,9 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
 {
     const sample_t *sample = &snapshot->sample;
     task_state_t *task = &drive->task;
+    const plausibility_config_t *config = &drive->motor->plausibility;
+    const bool at_once = config->answer_rate == Q15_MAX;
+    const dq_q15_t expected = plausibility_expected(config, &task->plausibility, task->i_ref);
     const plausibility_in_t in = {
         .acting = sample->acting,
         .at_rest = is_at_rest(snapshot),
@@ -46,14 +49,14 @@ static uint32_t check_currents(drive_t *drive, const snapshot_t *snapshot, abc_q
         .i_ref = task->i_ref,
         .i_mean = mean_current(drive, snapshot),
         .phases = measure_phases(sample->i_ab, sample->zero_q28),
-        .phases_ref = phases_ref,
+        .phases_ref = at_once ? phases_ref : in_phases(expected, sample->theta_e),
         .omega = fx_q15_from_q31(sample->point.omega),
         .inverter_dC = snapshot->inverter_dC,
         .winding_dC = snapshot->winding_dC,
         .known_permille = snapshot->known_permille,
         .contradicted_steps = contradicted_steps(drive),
     };
-    return plausibility_step(&drive->motor->plausibility, &task->plausibility, &in);
+    return plausibility_step(config, &task->plausibility, &in);
 }
 
 static uint32_t check_torque(drive_t *drive, const snapshot_t *snapshot)
@@ -86,12 +89,13 @@ static bool is_compensation_new(drive_t *drive)
     return is_new;
 }
 
-static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref, bool acting)
+static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_t phases_ref, bool acting, bool behind)
 {
     const identify_window_t *window = &snapshot->window;
     task_state_t *task = &drive->task;
     const frozen_angle_in_t in = {
         .acting = acting,
+        .behind = behind,
         .u_sum = window->sum_u,
         .i_ref = task->i_ref,
         .psi_ref = task->psi_ref,
@@ -140,11 +144,12 @@ static bool is_angle_measured(const drive_t *drive, const sample_t *sample)
 }
 
 /* Called after check_angle(), which removes the voltage of the changing flux. */
-static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting)
+static uint32_t check_launch(drive_t *drive, const snapshot_t *snapshot, bool acting, bool behind)
 {
     task_state_t *task = &drive->task;
     const launch_power_in_t in = {
         .acting = acting && is_controlled(drive, snapshot),
+        .behind = behind,
         .measured = is_angle_measured(drive, &snapshot->sample),
         .u_standing = task->frozen_angle.u_standing,
         .i_ref = task->i_ref,
@@ -187,9 +192,10 @@ uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
     if (drive_moves(drive)) { /* what compares with the motor data has no meaning with another angle */
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
+    const bool behind = torque_monitor_is_behind(&drive->motor->torque_monitor, snapshot->lag, drive->task.psi_ref);
     uint32_t faults = of_currents | check_torque(drive, snapshot) | shorted;
-    faults |= check_angle(drive, snapshot, phases_ref, acting);
-    faults |= check_launch(drive, snapshot, acting);
+    faults |= check_angle(drive, snapshot, phases_ref, acting, behind);
+    faults |= check_launch(drive, snapshot, acting, behind);
     update_short_side(drive, snapshot, phases_ref);
     return faults;
 }

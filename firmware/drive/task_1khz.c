@@ -5,6 +5,7 @@
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
 #include "drive/switch_off.h"
+#include "drive/tracked_speed.h"
 #include "fx/vec.h"
 #include "hal/adc.h"
 #include "hal/angle.h"
@@ -96,7 +97,7 @@ static q15_t torque_path(drive_t *drive, const snapshot_t *snapshot)
     task->torque_commanded = rate_limit_step(inside, limited, (q15_t)fx_max_s32(slew_limit(drive) - moved, 0));
     const torque_loop_in_t loop = {
         .torque_commanded = task->torque_commanded,
-        .torque_estimated = task->identification.torque_estimated,
+        .torque_estimated = tracked_speed_estimate(drive, snapshot),
         .confidence = task->identification.confidence,
         .enabled = drive->request.torque_loop && !drive_bypasses_torque_path(drive),
         .limited = task->reference.limited || snapshot->sample.voltage_limited,
@@ -118,7 +119,7 @@ static dq_q15_t compute_references(drive_t *drive, const snapshot_t *snapshot)
     const current_reference_in_t in = {
         .torque_corrected = task->torque_corrected,
         .v_dc = (q15_t)snapshot->sample.v_dc,
-        .omega = fx_q15_from_q31(snapshot->sample.point.omega),
+        .omega = tracked_speed_planned(snapshot),
         .i_magnitude = fx_magnitude(task->reference.i_ref.d, task->reference.i_ref.q),
         .v_trim = trim.v_trim,
         .shift = trim.shift,
@@ -217,6 +218,8 @@ static void take_snapshot(const drive_t *drive, snapshot_t *snapshot)
     snapshot->inverter_dC = hal_temperature_inverter_dC();
     snapshot->winding_dC = hal_temperature_winding_dC();
     snapshot->known_permille = hal_adc_known_permille();
+    snapshot->lag = torque_monitor_lag(&drive->motor->torque_monitor, &drive->task.torque_monitor,
+                                       fx_q15_from_q31(snapshot->sample.point.omega));
 }
 
 void task_1khz(drive_t *drive)

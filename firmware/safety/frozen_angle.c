@@ -25,8 +25,10 @@ static bool has_moved(const frozen_angle_config_t *config, const frozen_angle_st
 static dq_q15_t standing_voltage(const frozen_angle_config_t *config, frozen_angle_state_t *state,
                                  const frozen_angle_in_t *in)
 {
-    const q15_t d = fx_sat_q15(in->psi_ref.d - state->psi_ref.d), q = fx_sat_q15(in->psi_ref.q - state->psi_ref.q);
-    state->psi_ref = in->psi_ref;
+    const dq_q15_t psi = {mean_follow((q15_t)state->psi.d, in->psi_ref.d, config->answer_rate),
+                          mean_follow((q15_t)state->psi.q, in->psi_ref.q, config->answer_rate)};
+    const q15_t d = fx_sat_q15(psi.d - state->psi.d), q = fx_sat_q15(psi.q - state->psi.q);
+    state->psi = psi;
     return (dq_q15_t){in->u_sum.d - fx_mulhi(config->rate_gain, d * 65536),
                       in->u_sum.q - fx_mulhi(config->rate_gain, q * 65536)};
 }
@@ -36,7 +38,7 @@ static bool update_mean(const frozen_angle_config_t *config, frozen_angle_state_
 {
     const dq_q15_t u_sum = standing_voltage(config, state, in);
     state->u_standing = u_sum;
-    if (has_moved(config, state, in)) {
+    if (in->behind || has_moved(config, state, in)) {
         state->i_ref = in->i_ref;
         state->theta_e = in->theta_e;
         state->standing = 0;
@@ -71,7 +73,7 @@ uint32_t frozen_angle_step(const frozen_angle_config_t *config, frozen_angle_sta
                            const frozen_angle_in_t *in)
 {
     if (!in->acting) {
-        *state = (frozen_angle_state_t){0};
+        *state = (frozen_angle_state_t){.psi = in->psi_ref}; /* a new compensation begins anew at the same flux */
         return 0;
     }
     const bool changed = update_mean(config, state, in) && has_changed(config, state, in);

@@ -4,10 +4,10 @@
 /** Finds a rotor that turns although its measured angle stands still. While angle and current reference stand still,
  * so must the voltage: the drop of the resistance and the inverter's error belong to the currents, and only a turning
  * rotor induces another voltage.
- *   m: first-order mean of u, four steps, begun anew when either moves
+ *   m: first-order mean of u, four steps, begun anew when either moves or the speed lags
  *   m_0: m when angle and reference came to a standstill; follows in 1024 steps
  *   |m - m_0| > v_0 in a row of steps, 8 v_0 while a phase current is below 2 i_0; no check below |i*| = 4 i_0
- * Source   docs/theory/monitors.md (MN-22), (MN-23)
+ * Source   docs/theory/monitors.md (MN-22), (MN-23), (MN-27)
  * Units    voltages per unit times the periods of a step, currents per unit, angle 2^32 = one turn
  * Range    |u| <= 40 * 2^15; every other argument
  * Rounding 2^-8 of a count of the sum
@@ -21,6 +21,7 @@
 typedef struct {
     int32_t v_0;          /* voltage change without a turning rotor, times the periods of a step */
     q16_t rate_gain;      /* change of flux to voltage, times the periods of a step */
+    q15_t answer_rate;    /* share of a change of the reference that the flux follows in a step; Q15_MAX: all */
     q15_t i_0;            /* change of the reference that starts again; phase current that fixes its leg's voltage */
     uint8_t settle_steps; /* until the mean has settled */
     uint8_t fault_steps;
@@ -29,7 +30,7 @@ typedef struct {
 typedef struct {
     dq_q15_t mean_q8, first_q8; /* of the sums */
     dq_q15_t i_ref;
-    dq_q15_t psi_ref;    /* of the last step */
+    dq_q15_t psi;        /* of the last step: psi_ref as current control follows it */
     dq_q15_t u_standing; /* of this step: u_sum without the voltage that changes the flux */
     uint32_t theta_e;
     uint8_t standing, frozen; /* steps, saturate */
@@ -37,6 +38,7 @@ typedef struct {
 
 typedef struct {
     bool acting;
+    bool behind;      /* the tracked speed is behind the rotor's: the comparison begins anew */
     dq_q15_t u_sum;   /* acting voltage, summed over the periods of a step */
     dq_q15_t i_ref;   /* in effect during that step */
     dq_q15_t psi_ref; /* tables' flux there */

@@ -58,7 +58,7 @@ static bool update_means(const launch_power_config_t *config, launch_power_state
     const bool moved = has_moved(config, state, in);
     const int32_t omega = moved ? 0 : fx_mulhi((int32_t)(in->theta_e - state->theta_e), config->turn_gain);
     state->theta_e = in->theta_e;
-    if (moved) {
+    if (moved || in->behind) {
         state->i_ref = (dq_q15_halfword_t){(q15_t)in->i_ref.d, (q15_t)in->i_ref.q};
         state->steady = 0;
     }
@@ -100,6 +100,7 @@ uint32_t launch_power_step(const launch_power_config_t *config, launch_power_sta
     }
     if (!in->measured || state->waited) {
         state->waited = !in->measured;
+        state->steady = in->behind ? 0U : state->steady; /* as after (AT-18): the currents followed the prediction */
         state->theta_e = in->theta_e;
         return 0;
     }

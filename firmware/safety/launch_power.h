@@ -46,6 +46,7 @@ typedef struct {
 
 typedef struct {
     bool acting;
+    bool behind;             /* the tracked speed is: the comparison begins anew */
     bool measured;           /* the angle is the sensor's; else the comparison waits */
     dq_q15_t u_standing;     /* acting voltage without that of the flux, summed over the periods of a step */
     dq_q15_t i_ref, psi_ref; /* in effect during that step, and the tables' flux there */

@@ -4,6 +4,7 @@
 #include "fx/q.h"
 #include "fx/vec.h"
 #include "signal/debounce.h"
+#include "signal/mean.h"
 #include "types/faults.h"
 
 #define RIGHT_PERMILLE 1000
@@ -41,7 +42,7 @@ static bool is_phase_lost(const plausibility_config_t *config, int8_t count[2], 
 static uint32_t lost_phases(const plausibility_config_t *config, plausibility_state_t *state,
                             const plausibility_in_t *in)
 {
-    const q15_t current = fx_magnitude(in->i_ref.d, in->i_ref.q);
+    const q15_t current = fx_magnitude(state->expected.d, state->expected.q);
     const int32_t alive = fx_max_s32(config->i_alive, current >> 3);
     const bool a_lost = is_phase_lost(config, state->lost[0], alive, in->phases_ref.a, in->phases.a);
     const bool b_lost = is_phase_lost(config, state->lost[1], alive, in->phases_ref.b, in->phases.b);
@@ -97,17 +98,10 @@ static uint32_t stuck_sensors(const plausibility_config_t *config, plausibility_
     return (a_stuck || b_stuck || c_stuck) ? FAULT_CURRENT_STUCK : 0;
 }
 
-static q15_t followed(q15_t from, int32_t to, q15_t rate)
+dq_q15_t plausibility_expected(const plausibility_config_t *config, const plausibility_state_t *state, dq_q15_t i_ref)
 {
-    return (rate == Q15_MAX) ? (q15_t)to : fx_sat_q15(from + fx_mul_q15(rate, fx_sat_q15(to - from)));
-}
-
-/* Where the field turns far in a period, current control answers so slowly that a slope of the torque would look like
- * a deviation (CC-21). */
-static void update_expected(const plausibility_config_t *config, dq_q15_t *expected, dq_q15_t i_ref)
-{
-    expected->d = followed((q15_t)expected->d, i_ref.d, config->answer_rate);
-    expected->q = followed((q15_t)expected->q, i_ref.q, config->answer_rate);
+    return (dq_q15_t){mean_follow((q15_t)state->expected.d, i_ref.d, config->answer_rate),
+                      mean_follow((q15_t)state->expected.q, i_ref.q, config->answer_rate)};
 }
 
 /* (MN-37), whether the bridge acts or not, because the drive must not start with a wrong reference. */
@@ -149,7 +143,7 @@ uint32_t plausibility_step(const plausibility_config_t *config, plausibility_sta
         return faults;
     }
     faults |= (in->contradicted_steps >= config->contradicted_steps) ? FAULT_TORQUE : 0U;
-    update_expected(config, &state->expected, in->i_ref);
+    state->expected = plausibility_expected(config, state, in->i_ref);
     return faults | deviation(config, state, in) | oscillation(config, state, in) | stuck_sensors(config, state, in) |
            lost_phases(config, state, in);
 }

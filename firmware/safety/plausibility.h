@@ -58,13 +58,17 @@ typedef struct {
     dq_q15_t i, i_ref;    /* measured, and the reference in effect until now */
     dq_q15_t i_mean;      /* of the last step; the sample if there is none */
     abc_q15_t phases;     /* measured */
-    abc_q15_t phases_ref; /* i_ref as phase currents at the instant of the samples */
+    abc_q15_t phases_ref; /* plausibility_expected() as phase currents at the instant of the samples */
     q15_t omega;
     int16_t inverter_dC, winding_dC;
     int16_t known_permille;     /* of a known voltage, as the converters read it; negative: there is none */
     uint8_t contradicted_steps; /* in a row, as the identification reports them */
 } plausibility_in_t;
 
+/** The reference as the current follows it in this step. Where the field turns far in a period, current control answers
+ * so slowly (CC-21) that a slope of the torque would look like a deviation, and near zero like a phase without current.
+ * Before plausibility_step(). */
+dq_q15_t plausibility_expected(const plausibility_config_t *config, const plausibility_state_t *state, dq_q15_t i_ref);
 uint32_t plausibility_step(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in);
 

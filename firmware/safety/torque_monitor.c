@@ -21,10 +21,26 @@ typedef struct {
     q15_t omega, doubt;
 } speed_t;
 
+static q15_t lag_of(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked)
+{
+    return fx_mul_gain_q15(config->lag_gain, fx_sat_q15(tracked - state->omega));
+}
+
 static speed_t follow_speed(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked)
 {
-    const q15_t lag = fx_mul_gain_q15(config->lag_gain, fx_sat_q15(tracked - state->omega));
+    const q15_t lag = lag_of(config, state, tracked);
     return (speed_t){fx_add_q15(tracked, lag), fx_abs_q15(lag)};
+}
+
+q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked)
+{
+    const int32_t lag = lag_of(config, state, tracked);
+    return (q15_t)(lag - fx_clamp_q31(lag, -config->lag_noise, config->lag_noise));
+}
+
+bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, dq_q15_t psi)
+{
+    return fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q)) > config->v_lag;
 }
 
 /* Resistance that the winding has, and by how much it may differ. */

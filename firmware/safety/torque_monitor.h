@@ -14,7 +14,7 @@
  *   r     at the winding's temperature; without one, of the middle of its range; r_error, an eighth of it and half of
  *         that range, allows r_error |i| more
  *   confirmed by 20 ms in a row for the torque, 5 ms for the angle
- * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26), (MN-32)
+ * Source   docs/theory/monitors.md (MN-6) ... (MN-10), (MN-26), (MN-32), (MN-41)
  * Units    per unit
  * Range    every argument; saturates
  * Rounding 1 LSB q15, against thresholds of hundreds
@@ -37,6 +37,8 @@ typedef struct {
     q15_t i_0;                                       /* current error of noise and of the current's zero crossings */
     q16_t rate_gain;                                 /* 1/(omega_b task period): flux step to voltage */
     q16_t lag_gain;                                  /* lag of the tracked speed, in steps */
+    q15_t lag_noise;                                 /* lag that one count of the sensor feigns */
+    q15_t v_lag;                                     /* rotational voltage that may be missing */
     q15_t mean_rate;                                 /* of the first-order mean, per step */
     uint8_t torque_steps, angle_steps, settle_steps; /* 20, 5, 5 ms */
 } torque_monitor_config_t;
@@ -56,6 +58,12 @@ typedef struct {
     int16_t winding_dC; /* or one of types/temperature.h */
 } torque_monitor_in_t;
 
+/** By how much the tracked speed is behind the rotor's, less what one count of the sensor feigns; 0 while it is not
+ * (MN-41). Before torque_monitor_step() with the same speed. */
+q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked);
+/** Whether the voltage of flux psi that this lag leaves out matters to the monitors of a standing angle and of a
+ * launch. */
+bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, dq_q15_t psi);
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,
                              const torque_monitor_in_t *in);
 

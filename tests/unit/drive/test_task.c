@@ -4,6 +4,7 @@
 #include "drive/mrai/schedule_box.h"
 #include "drive/safe_decision.h"
 #include "drive/slow_monitors.h"
+#include "drive/tracked_speed.h"
 #include "hal/mock_adc.h"
 #include "hal/mock_angle.h"
 #include "hal/mock_irq.h"
@@ -261,6 +262,56 @@ void test_the_voltage_limit_holds_the_torque_loop(void)
     sample_at(0.3, true, false);
     task_1khz(&drive);
     TEST_ASSERT_GREATER_THAN_INT32(0, drive.task.torque_loop.correction);
+}
+
+/* Planned at a tracked speed that has changed by so much since the last step. */
+static q15_t planned_flux(double omega_pu, double change_pu)
+{
+    setUp();
+    drive.request.torque_arbitrated = 5000;
+    seam_run();
+    sample_at(omega_pu, true, false);
+    drive.task.torque_monitor.omega = (q15_t)((omega_pu - change_pu) * 32768.0);
+    task_1khz(&drive);
+    return drive.task.reference.psi_plan;
+}
+
+/* At 0.5 of the speed base: a lag of 1/64 does not matter, and more than 1/16 is no rotor's. 6.6 steps. */
+void test_the_voltage_is_planned_for_the_speed_of_the_rotor_where_the_tracked_one_is_far_behind(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const q15_t steady = planned_flux(sign * 0.5, 0.0);
+        TEST_ASSERT_EQUAL_INT(steady, planned_flux(sign * 0.5, sign * 0.0015));
+        TEST_ASSERT_EQUAL_INT(steady, planned_flux(sign * 0.5, sign * -0.006));
+        TEST_ASSERT_EQUAL_INT(steady, planned_flux(sign * 0.5, sign * 0.02));
+        const double more = 0.006 * 6.6 - 0.5 / 32.0;
+        TEST_ASSERT_INT_WITHIN(100, (int)(steady * 0.5 / (0.5 + more)), planned_flux(sign * 0.5, sign * 0.006));
+    }
+}
+
+/* 10 % too much: counted once, and from the fifth step of a fast change of speed on 7 % of it three times more. */
+void test_too_much_torque_counts_more_from_a_fast_change_of_speed_until_it_ends(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        snapshot_t snapshot = {.sample = {.point = {.omega = 1 << 30}}};
+        drive.task.torque_commanded = (q15_t)(sign * 10000);
+        drive.task.torque_loop.model = sign * 10000 * 65536;
+        drive.task.identification.torque_estimated = (q15_t)(sign * 11000);
+        for (int n = 0; n < 20; n++) { /* at a steady speed */
+            TEST_ASSERT_EQUAL_INT(sign * 11000, tracked_speed_estimate(&drive, &snapshot));
+        }
+        snapshot.lag = (q15_t)(sign * 1500);
+        for (int n = 1; n <= 20; n++) {
+            const int expected = (n < 5) ? 11000 : 13100;
+            TEST_ASSERT_INT_WITHIN(3, sign * expected, tracked_speed_estimate(&drive, &snapshot));
+            snapshot.lag = 0; /* once begun it lasts */
+        }
+        drive.task.identification.torque_estimated = (q15_t)(sign * 10200);
+        TEST_ASSERT_EQUAL_INT(sign * 10200, tracked_speed_estimate(&drive, &snapshot));
+        drive.task.identification.torque_estimated = (q15_t)(sign * 11000);
+        TEST_ASSERT_EQUAL_INT(sign * 11000, tracked_speed_estimate(&drive, &snapshot));
+        TEST_ASSERT_EQUAL_UINT8(0, drive.task.excessive);
+    }
 }
 
 /* Steps in a row of which the monitor of a frozen angle says that the angle stands still. The angles at all of them are

@@ -9,7 +9,7 @@
 
 /* Ten periods per step, in each a threshold of 0.00325 per unit: 1.75 V on hsm1. */
 static const frozen_angle_config_t config = {
-    .v_0 = 1060, .rate_gain = 3 * 65536, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
+    .v_0 = 1060, .rate_gain = 3 * 65536, .answer_rate = Q15_MAX, .i_0 = 819, .settle_steps = 10, .fault_steps = 5};
 static frozen_angle_state_t state;
 static frozen_angle_in_t in;
 
@@ -124,6 +124,59 @@ void test_the_voltage_of_a_reference_that_creeps_is_no_change_when_it_ends(void)
     TEST_ASSERT_EQUAL_UINT8(SETTLED, state.standing);
     in.u_sum.q -= 3 * 700;
     TEST_ASSERT_EQUAL_INT(0, found());
+}
+
+/* Up to full torque and back as limits allow, with a law that follows a third of the way in each step: the voltage is
+ * that of the flux which follows, and comes and goes later than the reference's. */
+static int steps_while_the_torque_comes_and_goes(q15_t answer_rate)
+{
+    frozen_angle_config_t slow = config;
+    slow.answer_rate = answer_rate;
+    dq_q15_t followed = in.psi_ref;
+    setUp();
+    for (int n = 1; n <= 200; n++) {
+        const int32_t before = followed.q;
+        in.psi_ref.q += (n % 60 < 15) ? 500 : ((n % 60 >= 30 && n % 60 < 45) ? -500 : 0);
+        followed.q += (in.psi_ref.q - followed.q) / 3;
+        in.u_sum.q = 2500 + 3 * (followed.q - before);
+        if (frozen_angle_step(&slow, &state, &in) != 0U) {
+            return n;
+        }
+    }
+    return 0;
+}
+
+void test_the_flux_of_a_law_that_answers_slowly_changes_later_than_its_reference(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, steps_while_the_torque_comes_and_goes(Q15(1.0 / 3.0)));
+    TEST_ASSERT_NOT_EQUAL_INT(0, steps_while_the_torque_comes_and_goes(Q15_MAX));
+}
+
+/* A new compensation of the dead time begins the comparison anew, and the flux of the references is there already. */
+void test_a_comparison_that_begins_anew_takes_the_flux_as_it_is(void)
+{
+    frozen_angle_config_t slow = config;
+    slow.answer_rate = Q15(0.25);
+    in.psi_ref = (dq_q15_t){3000, -9000};
+    in.acting = false;
+    (void)frozen_angle_step(&slow, &state, &in);
+    in.acting = true;
+    (void)frozen_angle_step(&slow, &state, &in);
+    TEST_ASSERT_EQUAL_INT32(in.u_sum.d, state.u_standing.d);
+    TEST_ASSERT_EQUAL_INT32(in.u_sum.q, state.u_standing.q);
+}
+
+/* Current control follows the tracked speed: what changes until that is the rotor's is no comparison. */
+void test_while_the_tracked_speed_is_behind_nothing_is_compared(void)
+{
+    settle();
+    in.behind = true;
+    in.u_sum.d += 5000;
+    steps(50);
+    in.behind = false;
+    TEST_ASSERT_EQUAL_INT(0, found());
+    in.u_sum.d -= 5000;
+    TEST_ASSERT_NOT_EQUAL_INT(0, found());
 }
 
 /* What is measured without the creeping reference is a turning rotor. */

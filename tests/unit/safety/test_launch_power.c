@@ -217,6 +217,34 @@ void test_the_comparison_waits_while_the_angle_is_predicted_and_for_one_step_mor
     TEST_ASSERT_EQUAL_INT32(0, state.omega_q8); /* of one step */
 }
 
+/* Current control follows the tracked speed: what changes until that is the rotor's is no comparison. */
+void test_while_the_tracked_speed_is_behind_nothing_is_compared(void)
+{
+    for (int behind = 1; behind >= 0; behind--) {
+        setUp();
+        turn(-0.2, 0.2, 0.0);
+        uint32_t faults = 0;
+        for (int n = 0; n < 100; n++) {
+            in.behind = behind != 0 && n >= 50;
+            in.u_standing.q += (n == 50) ? 4000 : 0;
+            faults |= launch_power_step(&config, &state, &in);
+        }
+        TEST_ASSERT_EQUAL_HEX32(behind != 0 ? 0U : FAULT_ANGLE_OFFSET, faults);
+    }
+    in.behind = true;
+    (void)launch_power_step(&config, &state, &in);
+    TEST_ASSERT_EQUAL_UINT8(1, state.steady);
+    in.behind = false;
+    for (int n = 0; n < 5; n++) {
+        (void)launch_power_step(&config, &state, &in);
+    }
+    TEST_ASSERT_EQUAL_UINT8(6, state.steady);
+    in.measured = false; /* also while the comparison waits */
+    in.behind = true;
+    (void)launch_power_step(&config, &state, &in);
+    TEST_ASSERT_EQUAL_UINT8(0, state.steady);
+}
+
 void test_a_small_current_is_not_checked(void)
 {
     in.i_ref = (dq_q15_t){0, 819};

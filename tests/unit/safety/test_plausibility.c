@@ -178,6 +178,31 @@ void test_a_current_that_follows_as_slowly_as_expected_is_no_deviation(void)
     }
 }
 
+/* The torque passes through zero as a slow law does it: a phase in which the reference has changed its sign, but not
+ * yet the current, carries the current that is expected of it. */
+void test_a_phase_whose_current_follows_slowly_is_not_lost(void)
+{
+    plausibility_config_t slow = config;
+    for (int known = 0; known <= 1; known++) {
+        slow.answer_rate = known ? (q15_t)1024 : Q15_MAX;
+        setUp();
+        double current = 12000.0;
+        state.expected = (dq_q15_t){0, 12000};
+        uint32_t found = 0;
+        for (int n = 0; n < 60; n++) {
+            in.i_ref = (dq_q15_t){0, (n < 40) ? 12000 - 600 * n : -12000};
+            current += 0.03125 * (in.i_ref.q - current);
+            const int32_t now_i = (int32_t)lround(current), half = now_i / 2;
+            const dq_q15_t expected = plausibility_expected(&slow, &state, in.i_ref);
+            in.i = in.i_mean = (dq_q15_t){0, now_i};
+            in.phases = (abc_q15_t){now_i, -half, -half};
+            in.phases_ref = (abc_q15_t){expected.q, -expected.q / 2, -expected.q / 2};
+            found |= plausibility_step(&slow, &state, &in);
+        }
+        TEST_ASSERT_EQUAL_HEX32(known ? 0 : FAULT_PHASE_LOST, found & FAULT_PHASE_LOST);
+    }
+}
+
 /* One sample beyond its threshold, which is e_0 + |i_ref|/8 = 4000 of the reference of this step, is a fault here. */
 void test_the_reference_counts_at_once_where_current_control_answers_at_once(void)
 {

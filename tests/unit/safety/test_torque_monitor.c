@@ -17,6 +17,8 @@ static const torque_monitor_config_t config = {.r = 898 << 15,
                                                .i_0 = 0,
                                                .rate_gain = 19867,
                                                .lag_gain = 433000, /* 6.6 steps */
+                                               .lag_noise = 20,
+                                               .v_lag = 53,
                                                .mean_rate = 8192,
                                                .torque_steps = 20,
                                                .angle_steps = 5,
@@ -291,6 +293,26 @@ void test_an_angle_that_is_30_degrees_off_is_found_while_the_speed_rises(void)
         found = (torque_monitor_step(&config, &state, &in) & FAULT_ANGLE_OFFSET) ? n : 0;
     }
     TEST_ASSERT_EQUAL_INT(SETTLING + 5, found);
+}
+
+/* By how much a step of the tracked speed shows that it is behind: all but what one count feigns. */
+void test_the_lag_of_the_tracked_speed_is_known_beyond_a_count(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        state.omega = (q15_t)(sign * 1000);
+        const int change[3] = {0, 3, 30};
+        for (int n = 0; n < 3; n++) {
+            const int tracked = sign * 1000 + sign * change[n];
+            const int lag = (int)lround(change[n] * config.lag_gain / 65536.0);
+            const int beyond = sign * (lag > config.lag_noise ? lag - config.lag_noise : 0);
+            TEST_ASSERT_EQUAL_INT(beyond, torque_monitor_lag(&config, &state, (q15_t)tracked));
+        }
+    }
+    /* 0.44 of the flux base: 120/32768 of the speed base are 52.8 of 53. */
+    const dq_q15_t psi = {14418, 0};
+    TEST_ASSERT_FALSE(torque_monitor_is_behind(&config, 120, psi));
+    TEST_ASSERT_TRUE(torque_monitor_is_behind(&config, 124, psi));
+    TEST_ASSERT_TRUE(torque_monitor_is_behind(&config, -124, psi));
 }
 
 void test_nothing_is_checked_while_the_bridge_is_off_or_has_just_been_switched_on(void)

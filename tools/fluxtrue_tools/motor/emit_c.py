@@ -482,10 +482,20 @@ def _plausibility(motor: Motor) -> list[Row]:
     ]
 
 
+def _launch_V(motor: Motor) -> float:
+    """(MN-29) with (MN-34)."""
+    d = motor.derived
+    resolution_V = LAUNCH_ANGLE * motor.config.machine.pole_pairs / motor.bases.step_s * d.psi_f_Vs
+    return d.launch_V + max(0.0, resolution_V - LAUNCH_SPARE * d.monitor_V)
+
+
 def _torque_monitor(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
     rate = 1.0 / (b.omega_rad_s * b.step_s)
-    lag = (2.0 / d.tracker_bandwidth_rad_s - b.period_s / 2.0) / b.step_s  # (AT-7)
+    lag_s = 2.0 / d.tracker_bandwidth_rad_s - b.period_s / 2.0  # (AT-7)
+    count_rad = 2.0 * math.pi * motor.config.machine.pole_pairs / 4096
+    lag_noise = lag_s * d.tracker_bandwidth_rad_s**2 * count_rad  # (MN-41)
+    launch_V = _launch_V(motor)
     r = motor.config.machine.r_ohm / b.resistance_ohm
     return [
         ("r", q31(r, "r"), "R at 20 C"),
@@ -498,7 +508,9 @@ def _torque_monitor(motor: Motor) -> list[Row]:
         ("v_noise", q15(d.period_noise_V / b.voltage_V, "v_noise"), f"{d.period_noise_V:.4g} V"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
         ("rate_gain", q16(rate, "rate_gain"), "1/(omega_b T)"),
-        ("lag_gain", q16(lag, "lag_gain"), f"{lag:.4g} steps"),
+        ("lag_gain", q16(lag_s / b.step_s, "lag_gain"), f"{lag_s / b.step_s:.4g} steps"),
+        ("lag_noise", q15(lag_noise / b.omega_rad_s, "lag_noise"), f"{lag_noise:.4g} rad/s"),
+        ("v_lag", q15(launch_V / b.voltage_V, "v_lag"), f"{launch_V:.4g} V"),
         ("mean_rate", q15(d.monitor_mean_rate, "mean_rate"), f"{d.monitor_mean_rate:.6g}"),
         *_counts(b, torque=TORQUE_S, angle=ANGLE_S, settle=SETTLE_S),
     ]
@@ -511,6 +523,7 @@ def _frozen_angle(motor: Motor) -> list[Row]:
     return [
         ("v_0", str(v_0), f"{d.frozen_V:g} V in each of {b.periods_per_step} periods"),
         ("rate_gain", q16(rate, "rate_gain"), f"{b.periods_per_step}/(omega_b T)"),
+        ("answer_rate", q15(min(d.answer_rate, 1 - 1 / Q15_ONE), "answer_rate"), f"{d.answer_rate:.4g} per step"),
         ("i_0", q15(d.monitor_A / b.current_A, "i_0"), f"{d.monitor_A:g} A"),
         *_counts(b, settle=frozen_settle_s(motor.config), fault=ANGLE_S),
     ]
@@ -518,8 +531,7 @@ def _frozen_angle(motor: Motor) -> list[Row]:
 
 def _launch_power(motor: Motor) -> list[Row]:
     d, b = motor.derived, motor.bases
-    resolution_V = LAUNCH_ANGLE * motor.config.machine.pole_pairs / b.step_s * d.psi_f_Vs
-    launch_V = d.launch_V + max(0.0, resolution_V - LAUNCH_SPARE * d.monitor_V)  # (MN-34)
+    launch_V = _launch_V(motor)
     v_1 = q15(launch_V / b.voltage_V, "launch_V") * b.periods_per_step
     turn_gain = round(2 * math.pi * b.periods_per_step * Q15_ONE / (b.omega_rad_s * b.step_s))
     return [
