@@ -2,7 +2,7 @@
 /* Driving without any error, harsh but legal, with the spread of a production; one program for each machine:
  *   healthy_<machine> <seconds> <seed> [<share of the largest change of speed>]
  * Each drive of 10 s has a machine of its own, which its number repeats. The result is a line of JSON. Exit code 1: a
- * monitor has ended a drive, there was hardly any torque, or a kind was not driven. */
+ * monitor has ended a drive, or in several drives there was hardly any torque, or a kind was not driven. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -88,5 +88,6 @@ int main(int argc, char **argv)
         every_kind &= result.kind_ms[kind] > 0;
     }
     printf("}}\n");
-    return (result.trips == 0 && every_kind && result.loaded_ms > LOADED_TIME_MIN * result.driven_ms) ? 0 : 1;
+    const bool enough = every_kind && result.loaded_ms > LOADED_TIME_MIN * result.driven_ms;
+    return (result.trips == 0 && (enough || result.drives == 1)) ? 0 : 1;
 }
