@@ -169,8 +169,7 @@ static uint8_t bridge_mode(const drive_t *drive, bool runs)
     return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
 }
 
-/* Of the rotational voltage, 21/32 is made from the target (CC-24), but all of that of the flux which the tables do not
- * contain. */
+/* The target makes 21/32 of the rotational voltage (CC-24), but all of what the tables do not contain. */
 static int32_t turning_flux(const snapshot_t *snapshot)
 {
     return 32 * snapshot->psi_d_error / 21;
