@@ -315,6 +315,8 @@ static inline bool drive_moves(const drive_t *drive)
 {
     return movement_moves(&drive->task.movement);
 }
+/** BRIDGE_OFF ... of the next command. */
+uint8_t drive_bridge_mode(const drive_t *drive, bool runs);
 /** A movement has ended early: switching stays disabled until it is no longer asked for. */
 static inline bool drive_has_ended_movement(const drive_t *drive)
 {

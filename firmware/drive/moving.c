@@ -23,6 +23,17 @@ void drive_move(drive_t *drive, const snapshot_t *snapshot)
                   &drive->request.movement, &in);
 }
 
+uint8_t drive_bridge_mode(const drive_t *drive, bool runs)
+{
+    if (!runs) {
+        return (uint8_t)BRIDGE_OFF;
+    }
+    if (movement_is_agreed(&drive->task.movement)) {
+        return drive_pulses(drive) ? (uint8_t)BRIDGE_MOVED_PULSES : (uint8_t)BRIDGE_MOVED;
+    }
+    return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
+}
+
 /* Nothing is identified, because the angle is not that of the motor data. */
 int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sample, int32_t own_step)
 {

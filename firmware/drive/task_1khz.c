@@ -159,17 +159,6 @@ static dq_q15_t next_references(drive_t *drive, const snapshot_t *snapshot)
     return compute_references(drive, snapshot);
 }
 
-static uint8_t bridge_mode(const drive_t *drive, bool runs)
-{
-    if (!runs) {
-        return (uint8_t)BRIDGE_OFF;
-    }
-    if (movement_is_agreed(&drive->task.movement)) {
-        return drive_pulses(drive) ? (uint8_t)BRIDGE_MOVED_PULSES : (uint8_t)BRIDGE_MOVED;
-    }
-    return drive_pulses(drive) ? (uint8_t)BRIDGE_PULSES : (uint8_t)BRIDGE_CONTROL;
-}
-
 /* The target makes 21/32 of the rotational voltage (CC-24), but all of what the tables do not contain. */
 static int32_t turning_flux(const snapshot_t *snapshot)
 {
@@ -182,7 +171,7 @@ static void command_fast_isr(drive_t *drive, const snapshot_t *snapshot, uint32_
     task_state_t *task = &drive->task;
     const bool runs = task->run_state == RUN_STATE_RUN && faults == 0U && !drive_has_ended_movement(drive);
     command_t command = {
-        .run = bridge_mode(drive, runs),
+        .run = drive_bridge_mode(drive, runs),
         .faults = faults,
         .fault_resets = task->fault_resets,
     };

@@ -502,7 +502,7 @@ void test_the_second_level_compares_nothing_while_a_movement_is_agreed(void)
     ecu_seal_flags(&ecu);
     ecu.rx.commission = (bus_commission_t){.movement = MOVEMENT_SPIN, .pole_pairs = 3};
     ecu.rx.commission_channel.alive = true;
-    converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
+    board.converted = (current_counts_t){2048, 2048 + 650, 2048 - 650};
     for (int n = 0; n < 25; n++) {
         ecu.rx.commission_channel.age_us = 0;
         ecu_task_1khz(&ecu);
