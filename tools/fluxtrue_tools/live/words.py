@@ -44,6 +44,7 @@ TO_DO: Final[dict[str, dict[str, str]]] = {
         "command_timed_out": "Check the bus and the load of this computer, then press Enable.",
         "reset_while_enabled": "Press Stop and wait for state fault, then press Reset.",
         "angle_not_absolute": "Turn the shaft until the encoder's index has passed, then press Enable.",
+        "movement_ended": "A tool turns the shaft for commissioning: let it end the movement, then press Enable.",
     },
     DERATING: {
         "none": "",
