@@ -63,7 +63,7 @@ static inline __attribute__((always_inline)) void voltage_by(drive_t *drive, sam
         sample->pulses_clamped = true;
         identify_window_count_limited(&drive->fast.window);
     }
-    drive->fast.u_next = modulate_applied(config, made.duty, i, advanced, sample->v_dc);
+    drive->fast.u_next = modulate_applied(config, &made.duty, i, advanced, sample->v_dc);
 }
 
 static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *drive, sample_t *sample,

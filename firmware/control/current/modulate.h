@@ -43,6 +43,7 @@ modulate_out_t modulate_step(const modulate_config_t *config, fx_pair_t v, fx_pa
 duty_t modulate_clear(const modulate_config_t *config, fx_pair_t v, fx_pair_t i, fx_pair_t advanced);
 
 /** Voltage that limited duties apply, per unit of V_b. Duties that are not limited apply the commanded voltage. */
-dq_q15_t modulate_applied(const modulate_config_t *config, duty_t duty, fx_pair_t i, fx_pair_t advanced, int32_t v_dc);
+dq_q15_t modulate_applied(const modulate_config_t *config, const duty_t *duty, fx_pair_t i, fx_pair_t advanced,
+                          int32_t v_dc);
 
 #endif

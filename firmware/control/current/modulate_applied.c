@@ -11,12 +11,13 @@ static int32_t effective_duty(const modulate_config_t *config, uint32_t duty, in
     return (int32_t)duty - (switches ? ((config->dead_time_q16 * sign + 0x8000) >> 16) : 0);
 }
 
-dq_q15_t modulate_applied(const modulate_config_t *config, duty_t duty, fx_pair_t i, fx_pair_t advanced, int32_t v_dc)
+dq_q15_t modulate_applied(const modulate_config_t *config, const duty_t *duty, fx_pair_t i, fx_pair_t advanced,
+                          int32_t v_dc)
 {
     const abc_q15_t sign = polarity(config, i, advanced);
-    const int32_t a = effective_duty(config, duty.a, sign.a);
-    const int32_t b = effective_duty(config, duty.b, sign.b);
-    const int32_t c = effective_duty(config, duty.c, sign.c);
+    const int32_t a = effective_duty(config, duty->a, sign.a);
+    const int32_t b = effective_duty(config, duty->b, sign.b);
+    const int32_t c = effective_duty(config, duty->c, sign.c);
     /* Clarke of the duties, in units of v_dc; |2a - b - c| <= 2^16 so that Q15 * Q15 stays below 2^31. */
     const ab_q15_t v = {transform_round((2 * a - b - c) * 10923), transform_round((b - c) * 18919)};
     return park((ab_q15_t){transform_round(v.alpha * v_dc), transform_round(v.beta * v_dc)}, advanced);

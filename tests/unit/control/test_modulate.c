@@ -68,7 +68,7 @@ static modulated_t step(void)
         TEST_ASSERT_EQUAL_UINT32(duty.c, out.duty.c);
         TEST_ASSERT_EQUAL_UINT32(0, out.limited);
     }
-    return (modulated_t){out.duty, modulate_applied(&f.modulate, out.duty, pair(in.i), in.advanced, in.v_dc),
+    return (modulated_t){out.duty, modulate_applied(&f.modulate, &out.duty, pair(in.i), in.advanced, in.v_dc),
                          out.limited != 0U};
 }
 
