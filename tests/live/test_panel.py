@@ -95,6 +95,20 @@ def saved_parameters(page: Page, folder: Path) -> dict[str, Any]:
     return content
 
 
+def test_a_saved_file_keeps_its_url_until_the_next_one_is_saved(page: Page) -> None:
+    """The browser may begin with a download after the page's function has returned."""
+    page.find("tune-read").click()
+    page.until(lambda: page.text("tuning") != "", "the values")
+    page.run("window.revoked = []; URL.revokeObjectURL = (url) => { window.revoked.push(url); };"
+             "HTMLAnchorElement.prototype.click = function () { window.clicked = this.href; };")  # fmt: skip
+    page.find("tune-save").click()
+    first = page.run("return window.clicked")
+    assert str(first).startswith("blob:")
+    assert first not in page.run("return window.revoked")  # type: ignore[operator]
+    page.find("tune-save").click()
+    assert first in page.run("return window.revoked")  # type: ignore[operator]
+
+
 def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_path: Path) -> None:
     page.find("tune-read").click()
     page.until(lambda: "those of the build" in page.text("tune-text") and page.text("tuning") != "", "the values")

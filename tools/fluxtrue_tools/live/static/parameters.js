@@ -63,13 +63,15 @@ export function onParameters(message) {
     : "All values are those of the build.";
 }
 
+// The browser reads a download after the click has returned: its URL must stay until the next one.
+let saved = "";
+
 function save() {
   const held = Object.fromEntries(values.map(({ name, value }) => [name, value]));
   const text = JSON.stringify({ format: FORMAT, inverter: title, values: held }, null, 2);
-  const link = Object.assign(document.createElement("a"), {
-    href: URL.createObjectURL(new Blob([text], { type: "application/json" })), download: "parameters.json" });
-  link.click();
-  URL.revokeObjectURL(link.href);
+  URL.revokeObjectURL(saved);
+  saved = URL.createObjectURL(new Blob([text], { type: "application/json" }));
+  Object.assign(document.createElement("a"), { href: saved, download: "parameters.json" }).click();
 }
 
 async function load() {
