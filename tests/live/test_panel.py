@@ -82,14 +82,24 @@ def test_a_disconnected_page_shows_no_value_and_no_active_control(page: Page) ->
     assert page.text("state") == "no bus"
 
 
-def saved_parameters(page: Page, folder: Path) -> dict[str, Any]:
-    """What Save puts into the browser's folder of downloads."""
-    page.browser.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
-    file = folder / "parameters.json"
-    file.unlink(missing_ok=True)
-    page.find("tune-save").click()
-    polled(file.exists)
-    content = json.loads(file.read_text())
+def press_save(page: Page, effect: str) -> None:
+    """Until it has an effect: a press misses a button that the page moves in this moment, because values arrive."""
+
+    def pressed() -> bool:
+        page.find("tune-save").click()
+        return bool(page.run(effect))
+
+    page.until(pressed, "an effect of Save")
+
+
+def saved_parameters(page: Page) -> dict[str, Any]:
+    """What Save hands to the browser as a download."""
+    page.run("window.saved = null;"
+             "URL.createObjectURL = (blob) => { blob.text().then((text) => { window.saved = text; }); return ''; };"
+             "HTMLAnchorElement.prototype.click = function () { window.savedName = this.download; };")  # fmt: skip
+    press_save(page, "return window.saved !== null")
+    assert page.run("return window.savedName") == "parameters.json"
+    content = json.loads(str(page.run("return window.saved")))
     assert content["format"] == "fluxtrue-parameters"
     assert isinstance(content, dict)
     return content
@@ -99,20 +109,21 @@ def test_a_saved_file_keeps_its_url_until_the_next_one_is_saved(page: Page) -> N
     """The browser may begin with a download after the page's function has returned."""
     page.find("tune-read").click()
     page.until(lambda: page.text("tuning") != "", "the values")
-    page.run("window.revoked = []; URL.revokeObjectURL = (url) => { window.revoked.push(url); };"
+    page.run("window.revoked = []; window.clicked = undefined;"
+             "URL.revokeObjectURL = (url) => { window.revoked.push(url); };"
              "HTMLAnchorElement.prototype.click = function () { window.clicked = this.href; };")  # fmt: skip
-    page.find("tune-save").click()
-    first = page.run("return window.clicked")
-    assert str(first).startswith("blob:")
-    assert first not in page.run("return window.revoked")  # type: ignore[operator]
-    page.find("tune-save").click()
-    assert first in page.run("return window.revoked")  # type: ignore[operator]
+    press_save(page, "return window.clicked !== undefined")
+    assert str(page.run("return window.clicked")).startswith("blob:")
+    assert not page.run("return window.revoked.includes(window.clicked)")
+    page.run("window.first = window.clicked;")
+    press_save(page, "return window.clicked !== window.first")
+    assert page.run("return window.revoked.includes(window.first)")
 
 
 def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_path: Path) -> None:
     page.find("tune-read").click()
     page.until(lambda: "those of the build" in page.text("tune-text") and page.text("tuning") != "", "the values")
-    saved = saved_parameters(page, tmp_path)
+    saved = saved_parameters(page)
     assert page.run("return document.querySelectorAll('#tuning input').length") == len(saved["values"]) > 1
     file = tmp_path / "written.json"
     file.write_text(json.dumps(saved))
@@ -126,7 +137,7 @@ def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_p
     page.find("tune-file").send_keys(str(file))
     page.until(lambda: page.text("message") == "Written: observer_m = 3.5", "the file")
     assert page.text("tune-text").startswith("1 of ")
-    assert saved_parameters(page, tmp_path)["values"]["observer_m"] == 3.5
+    assert saved_parameters(page)["values"]["observer_m"] == 3.5
     file.write_text(json.dumps({"format": "fluxtrue-parameters", "values": {"observer_m": 2.5, "nothing": 1}}))
     page.find("tune-file").send_keys(str(file))
     page.until(lambda: "no calibration value 'nothing'" in page.text("message"), "a refusal")
