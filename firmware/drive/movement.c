@@ -16,13 +16,10 @@ movement_turn_t movement_frame_step(const movement_frame_t *frame, movement_angl
         angle->imposed += (uint32_t)frame->rate;
         return (movement_turn_t){angle->imposed, frame->rate, 0}; /* so slow a speed needs no voltage */
     }
-    const int64_t omega = ((int64_t)sensor->omega * frame->ratio_q25) >> 25;
     return (movement_turn_t){
         .theta_e = (uint32_t)frame->pole_pairs * sensor->theta_m + frame->offset,
         .step = (int32_t)(((int64_t)sensor->step * frame->ratio_q25) >> 25),
-        .omega = (omega > INT32_MAX)   ? INT32_MAX
-                 : (omega < INT32_MIN) ? INT32_MIN
-                                       : (int32_t)omega,
+        .omega = fx_sat_q31(((int64_t)sensor->omega * frame->ratio_q25) >> 25),
     };
 }
 

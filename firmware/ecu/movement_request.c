@@ -10,6 +10,9 @@ static int32_t share_of_i_max(const ecu_t *ecu, int16_t permille)
 
 movement_request_t ecu_movement(const ecu_t *ecu)
 {
+    if (!ecu->rx.commission_channel.alive) {
+        return (movement_request_t){.alive = false}; /* the usual case: nothing is converted */
+    }
     const bus_commission_t *wanted = &ecu->rx.commission;
     const ecu_state_t state = ecu->supervisor.state;
     const float torque_Nm = ecu->rx.command.torque_requested_Nm;
@@ -21,7 +24,7 @@ movement_request_t ecu_movement(const ecu_t *ecu)
         .direction = wanted->direction,
         .reversed = wanted->reversed,
         .damped = wanted->damped,
-        .alive = ecu->rx.commission_channel.alive,
+        .alive = true,
         .may_begin = is_zero && (state == STATE_STANDBY || state == STATE_READY),
         .offset = wanted->offset,
         .i = {share_of_i_max(ecu, wanted->current_d_permille), share_of_i_max(ecu, wanted->current_q_permille)},

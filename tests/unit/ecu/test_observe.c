@@ -617,6 +617,7 @@ void test_the_movement_of_the_bus_reaches_the_drive_in_its_units(void)
 
 void test_a_movement_may_begin_in_standby_and_ready_without_a_torque_request(void)
 {
+    ecu.rx.commission_channel.alive = true;
     for (int state = STATE_INIT; state < STATES; state++) {
         ecu.supervisor.state = (ecu_state_t)state;
         ecu.rx.command.torque_requested_Nm = 0.0F;
