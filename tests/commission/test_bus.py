@@ -3,18 +3,16 @@
 
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import can
 import numpy as np
 import pytest
+from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
-from fluxtrue_tools.a2l.elf import read
 from fluxtrue_tools.bus.interface import COMMAND, read_interface
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import hidden, on_the_bus
+from fluxtrue_tools.commission import on_the_bus
 from fluxtrue_tools.commission.bursts import Burst, record
 from fluxtrue_tools.commission.bus import (
     FIELDS,
@@ -26,18 +24,15 @@ from fluxtrue_tools.commission.bus import (
     OverTheBus,
     pulsing,
 )
-from fluxtrue_tools.commission.bus_line import Line, SimulatedTime
 from fluxtrue_tools.commission.drive import DONE, FAILED
-from fluxtrue_tools.commission.hidden import Truth
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.scope.xcp import XcpMaster, XcpRefused
 from fluxtrue_tools.sim.motor import Motor
-from fluxtrue_tools.vecu.channel import Channel
 from fluxtrue_tools.vecu.process import VirtualEcu
-from fluxtrue_tools.vecu.stepped import SteppedBus, connect
+from fluxtrue_tools.vecu.stepped import connect
 
 NAME, SEED = "saturated", 12
 R_SHARE, MAP_RMS, BALANCE = 0.01, 0.01, 0.002
@@ -48,53 +43,15 @@ LOCKED, OUT_OF_RANGE, SYNTAX = 0x25, 0x22, 0x21
 OFF_S = 0.2  # command time-out 30 ms, ramp 15 ms
 
 
-@dataclass
-class Stand:
-    """A virtual ECU with a hidden machine, and its drive over CAN."""
-
-    ecu: VirtualEcu
-    channel: Channel
-    stepped: SteppedBus
-    line: Line
-    drive: OverTheBus
-    truth: Truth
-    is_silent: bool = False  # no commands are sent
-
-    def current_A(self) -> float:
-        """A current of the plant."""
-        return float(np.hypot(*self.channel.get("truth.i_d_A", "truth.i_q_A")))
-
-
-class Switched(SimulatedTime):
-    """Commands that can stop, as those of a tool that has stalled."""
-
-    is_silent = False
-
-    def send(self, frame: can.Message) -> None:
-        if not (self.is_silent and frame.arbitration_id != 0x650):
-            super().send(frame)
-
-
 @pytest.fixture
 def stand(unknown: Motor, known: Nameplate, tmp_path: Path) -> Iterator[Stand]:
-    truth, flux_map, plant = hidden.draw(NAME, SEED, unknown, known.i_max_A)
-    machine = tmp_path / "machine.txt"
-    machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
-    with ExitStack() as stack:
-        ecu = stack.enter_context(VirtualEcu(unknown.folder.vecu, machine=machine))
-        bus = connect(ecu.can_port)
-        stack.callback(bus.shutdown)
-        channel = Channel("127.0.0.1", ecu.bench_port)
-        stack.callback(channel.close)
-        stepped = SteppedBus(bus, channel)
-        line = Line(lambda beat: Switched(stepped, beat), read_interface(unknown.folder.dbc))
-        drive = OverTheBus(line, read(unknown.folder.vecu), known, unknown.plant["vdc_V"])
-        yield Stand(ecu, channel, stepped, line, drive, truth)
+    with bus_stand(unknown, known, tmp_path, (NAME, SEED), connected=True) as made:
+        yield made
 
 
 def silence(stand: Stand) -> None:
     """The commands end, XCP goes on."""
-    stand.line._clock.is_silent = True  # type: ignore[attr-defined]
+    stand.clock.kept_back = frozenset({COMMAND_ID, COMMISSION_ID})
 
 
 def during(drive: OverTheBus, action: Callable[[], None]) -> None:

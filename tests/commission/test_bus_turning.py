@@ -2,29 +2,18 @@
 """The steps that turn the shaft over CAN, on the virtual ECU: a hidden machine, refusals, and what ends a movement."""
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
-import can
 import pytest
+from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
-from fluxtrue_tools.a2l.elf import read
-from fluxtrue_tools.bus.interface import COMMISSION, read_interface
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import hidden, turning
-from fluxtrue_tools.commission.bus import OverTheBus
-from fluxtrue_tools.commission.bus_line import Line, SimulatedTime
-from fluxtrue_tools.commission.hidden import Truth
+from fluxtrue_tools.commission import turning
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import turned
 from fluxtrue_tools.commission.steps import chosen, run
-from fluxtrue_tools.commission.turning import Connection
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.sim.motor import Motor
-from fluxtrue_tools.vecu.channel import Channel
-from fluxtrue_tools.vecu.process import VirtualEcu
-from fluxtrue_tools.vecu.stepped import SteppedBus, connect
 
 NAME, SEED = "saturated", 101
 OFFSET_DEG, PSI_F, INERTIA, DRAG = 0.2, 0.005, 0.03, 0.1  # the bounds of test_turning.py
@@ -33,54 +22,10 @@ SMALL_S = 0.2
 STOPPED_S = 0.05  # time-out of 30 ms and one step of the tool
 
 
-class Choosing(SimulatedTime):
-    """Frames that can be kept from the bus."""
-
-    kept_back: frozenset[int] = frozenset()
-
-    def send(self, frame: can.Message) -> None:
-        if frame.arbitration_id not in self.kept_back:
-            super().send(frame)
-
-
-@dataclass
-class Stand:
-    """A virtual ECU with a hidden machine whose connection is unknown, and its drive over CAN."""
-
-    ecu: VirtualEcu
-    channel: Channel
-    line: Line
-    drive: OverTheBus
-    truth: Truth
-    clock: Choosing
-
-    @property
-    def wired(self) -> Connection:
-        """The connection as it is."""
-        return Connection(int(self.truth.plant["pole_pairs"]), self.truth.reversed, self.truth.offset_rad)
-
-    def speed_rad_s(self) -> float:
-        return abs(self.channel.get("truth.speed_rad_s")[0])
-
-
 @pytest.fixture
 def stand(unknown: Motor, known: Nameplate, tmp_path: Path) -> Iterator[Stand]:
-    truth, flux_map, plant = hidden.draw(NAME, SEED, unknown, known.i_max_A, connected=False)
-    machine = tmp_path / "machine.txt"
-    machine.write_text(hidden.machine_text(plant, flux_map), encoding="utf-8")
-    with ExitStack() as stack:
-        ecu = stack.enter_context(VirtualEcu(unknown.folder.vecu, machine=machine))
-        bus = connect(ecu.can_port)
-        stack.callback(bus.shutdown)
-        channel = Channel("127.0.0.1", ecu.bench_port)
-        stack.callback(channel.close)
-        stepped = SteppedBus(bus, channel)
-        clocks: list[Choosing] = []
-        line = Line(
-            lambda beat: clocks.append(Choosing(stepped, beat)) or clocks[0], read_interface(unknown.folder.dbc)
-        )
-        drive = OverTheBus(line, read(unknown.folder.vecu), known, unknown.plant["vdc_V"])
-        yield Stand(ecu, channel, line, drive, truth, clocks[0])
+    with bus_stand(unknown, known, tmp_path, (NAME, SEED), connected=False) as made:
+        yield made
 
 
 def test_an_unknown_connection_magnet_inertia_and_drag_over_can(stand: Stand, known: Nameplate) -> None:
@@ -110,11 +55,11 @@ def is_off(stand: Stand) -> bool:
 
 
 def silent(stand: Stand, _: Nameplate) -> None:
-    stand.clock.kept_back = frozenset({read_interface().message(COMMISSION).frame_id})
+    stand.clock.kept_back = frozenset({COMMISSION_ID})
 
 
 def without_request(stand: Stand, _: Nameplate) -> None:
-    stand.clock.kept_back = frozenset({read_interface().message(COMMISSION).frame_id, 0x110})
+    stand.clock.kept_back = frozenset({COMMISSION_ID, COMMAND_ID})
 
 
 def other_movement(stand: Stand, _: Nameplate) -> None:

@@ -6,7 +6,6 @@ itself: each window is captured, the currents are brought to zero, and the shaft
 that of software in the loop (connection.py, spin.py, drag.py).
 """
 
-import math
 from collections.abc import Callable
 from typing import Final
 
@@ -60,32 +59,17 @@ def rotate(drive: OverTheBus, current_A: float) -> tuple[Array, Array]:
 
 
 def _accelerate(drive: OverTheBus, known: Nameplate, wanted_rad_s: float, step: str, reach_s: float) -> None:
-    """As spin.accelerate(), with the speed that the drive reports."""
-    sign = math.copysign(1.0, wanted_rad_s)
-    speed, seconds, tries, level = sign * drive.shaft_rad_s(), 0.0, 0, 0
-    while speed < abs(wanted_rad_s):
-        if seconds > spin.LONGEST_S:
-            reached, wanted = (each * 30.0 / math.pi for each in (speed, abs(wanted_rad_s)))
-            raise FluxtrueError(f"commission: {step}: the shaft reached {reached:.0f} rpm of {wanted:.0f} rpm: it is "
-                                "coupled, or the angle is wrong")  # fmt: skip
-        turning.currents(drive, 0.0, sign * spin.Q_SHARES[level] * known.i_max_A)
+    """From any speed, which the drive reports."""
+
+    def advance() -> float:
         drive.rest(spin.TRY_S)
-        before, speed = speed, sign * drive.shaft_rad_s()
-        seconds, tries = seconds + spin.TRY_S, tries + 1
-        if (speed - before) * reach_s < 0.5 * spin.TRY_S * abs(wanted_rad_s) and tries % 2 == 0:
-            level = min(level + 1, len(spin.Q_SHARES) - 1)
+        return drive.shaft_rad_s()
+
+    spin.reach(drive, known, wanted_rad_s, step, reach_s, drive.shaft_rad_s(), advance)
 
 
 def _brake(drive: OverTheBus, known: Nameplate, wanted_rad_s: float) -> None:
-    """As spin.brake()."""
-    sign = math.copysign(1.0, wanted_rad_s)
-    for n in range(round(spin.LONGEST_S / turning.STEP_S)):
-        if sign * drive.shaft_rad_s() < spin.STANDING_SHARE * abs(wanted_rad_s):
-            break
-        share = spin.Q_SHARES[min(n // spin.BRAKE_STEPS, len(spin.Q_SHARES) - 3)]
-        turning.currents(drive, 0.0, -sign * share * known.i_max_A)
-        drive.rest(turning.STEP_S)
-    turning.currents(drive, 0.0, 0.0)
+    spin.stop(drive, known, wanted_rad_s, drive.shaft_rad_s, lambda: drive.rest(turning.STEP_S))
 
 
 def _window(drive: OverTheBus, divisor: int, action: Callable[[float], None]) -> Array:

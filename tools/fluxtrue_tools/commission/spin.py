@@ -61,25 +61,37 @@ class Spun:
     omega_rad_s: float  # electrical, at which that was seen
 
 
-def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float = REACH_S) -> Array:
-    """With as little current as reaches the speed in about this time; all rows are kept."""
-    rows: list[Array] = []
-    speed, seconds, level = 0.0, 0.0, 0
+def reach(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float, speed: float,
+          advance: Callable[[], float]) -> None:  # fmt: skip
+    """Accelerate with as little current as reaches the speed in about this time.
+
+    speed     mechanical, positive in the electrical direction
+    advance   lets TRY_S pass, and returns the speed then
+    """
+    seconds, tries, level, i_q_A = 0.0, 0, 0, 0.0
     sign = math.copysign(1.0, wanted_rad_s)
     while sign * speed < abs(wanted_rad_s):
-        i_q_A = sign * Q_SHARES[level] * known.i_max_A
-        turning.currents(drive, 0.0, i_q_A)
-        before = speed
-        rows.append(turning.advance(drive, TRY_S, step))
-        speed = turning.speed_rad_s(rows[-1][len(rows[-1]) // 2 :], drive.period_s) * _electrical_sign(drive)
-        seconds += TRY_S
-        gained = sign * (speed - before)
-        late = gained * slowly_s < 0.5 * TRY_S * abs(wanted_rad_s)
-        level = min(level + 1, len(Q_SHARES) - 1) if late and len(rows) % 2 == 0 else level
         if seconds > LONGEST_S:
             raise FluxtrueError(f"commission: {step}: the shaft reached {abs(speed) * 30 / math.pi:.0f} rpm of "
                                 f"{abs(wanted_rad_s) * 30 / math.pi:.0f} rpm with {abs(i_q_A):.3g} A: it is coupled or "
                                 "blocked, or the angle is wrong")  # fmt: skip
+        i_q_A = sign * Q_SHARES[level] * known.i_max_A
+        turning.currents(drive, 0.0, i_q_A)
+        before, speed = speed, advance()
+        seconds, tries = seconds + TRY_S, tries + 1
+        late = sign * (speed - before) * slowly_s < 0.5 * TRY_S * abs(wanted_rad_s)
+        level = min(level + 1, len(Q_SHARES) - 1) if late and tries % 2 == 0 else level
+
+
+def accelerate(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str, slowly_s: float = REACH_S) -> Array:
+    """From a standstill; all rows are kept."""
+    rows: list[Array] = []
+
+    def advance() -> float:
+        rows.append(turning.advance(drive, TRY_S, step))
+        return turning.speed_rad_s(rows[-1][len(rows[-1]) // 2 :], drive.period_s) * _electrical_sign(drive)
+
+    reach(drive, known, wanted_rad_s, step, slowly_s, 0.0, advance)
     return np.vstack(rows)
 
 
@@ -87,17 +99,31 @@ def _electrical_sign(drive: Capture) -> float:
     return -1.0 if drive.get("angle_reversed") else 1.0
 
 
-def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> Array:
-    """Back to a standstill, with more current while that takes long; all rows are kept."""
-    rows = [turning.advance(drive, turning.STEP_S, step)]
-    towards = math.copysign(1.0, wanted_rad_s) * _electrical_sign(drive)
+def stop(drive: Capture, known: Nameplate, wanted_rad_s: float, speed: Callable[[], float],
+         advance: Callable[[], None]) -> None:  # fmt: skip
+    """Brake to a standstill, with more current while that takes long.
+
+    speed     mechanical, positive in the electrical direction
+    advance   lets a step of the tool pass
+    """
+    sign = math.copysign(1.0, wanted_rad_s)
     for n in range(round(LONGEST_S / turning.STEP_S)):
-        if towards * turning.speed_rad_s(rows[-1], drive.period_s) < STANDING_SHARE * abs(wanted_rad_s):
+        if sign * speed() < STANDING_SHARE * abs(wanted_rad_s):
             break
         share = Q_SHARES[min(n // BRAKE_STEPS, len(Q_SHARES) - 3)]
-        turning.currents(drive, 0.0, -math.copysign(share, wanted_rad_s) * known.i_max_A)
-        rows.append(turning.advance(drive, turning.STEP_S, step))
+        turning.currents(drive, 0.0, -sign * share * known.i_max_A)
+        advance()
     turning.currents(drive, 0.0, 0.0)
+
+
+def brake(drive: Capture, known: Nameplate, wanted_rad_s: float, step: str) -> Array:
+    """Back to a standstill; all rows are kept."""
+    rows = [turning.advance(drive, turning.STEP_S, step)]
+
+    def speed() -> float:
+        return turning.speed_rad_s(rows[-1], drive.period_s) * _electrical_sign(drive)
+
+    stop(drive, known, wanted_rad_s, speed, lambda: rows.append(turning.advance(drive, turning.STEP_S, step)))
     return np.vstack(rows)
 
 
