@@ -6,7 +6,7 @@
  * Source   IEEE 802.3; the same as zlib's crc32(), which the tools use
  * Range    any size; a long area can be checked in pieces: start with CRC32_START, invert the last result
  * Errors   none
- * Context  start-up and background; 16-word table, two look-ups per byte */
+ * Context  start-up and background; two tables of 16 words, a look-up in each per byte */
 #include <stdint.h>
 
 #define CRC32_START 0xFFFFFFFFU

@@ -5,7 +5,9 @@
 
 #include "signal/crc32.h"
 
-#define SLICE 64U
+/* Bytes in a call. The background loop does other work after each slice, which takes as long as some 400 bytes: larger
+ * slices make a pass shorter, smaller ones let a request to save wait less. */
+#define SLICE 2048U
 #define SEALED(name) \
     extern const uint8_t name##_start[], name##_end[]; /* from the linker script */ \
     __attribute__((section(".protected_crc"), used)) const volatile uint32_t name##_crc = 0xFFFFFFFFU
@@ -17,46 +19,40 @@ SEALED(program);
 typedef struct {
     const uint8_t *start, *end;
     const volatile uint32_t *crc;
-    const uint8_t *at;
-    uint32_t running;
 } area_t;
 
-#define AREA(name) {name##_start, name##_end, &name##_crc, name##_start, CRC32_START}
+#define AREA(name) {name##_start, name##_end, &name##_crc}
+#define AREAS 3U
 
-/* Background only. */
-static area_t data = AREA(protected);
-static area_t vectors = AREA(vectors);
-static area_t program = AREA(program);
+static const area_t areas[AREAS] = {AREA(protected), AREA(vectors), AREA(program)};
 
-/* False once the end is reached and the whole does not match. */
-static bool area_step(area_t *area)
-{
-    const uint32_t left = (uint32_t)(area->end - area->at);
-    const uint32_t now = (left < SLICE) ? left : SLICE;
-    area->running = crc32_update(area->running, area->at, now);
-    area->at += now;
-    if (area->at < area->end) {
-        return true;
-    }
-    const bool good = ~area->running == *area->crc;
-    area->at = area->start;
-    area->running = CRC32_START;
-    return good;
-}
+/* Background only: where the pass over all areas stands. */
+static uint32_t area;
+static uint32_t checked; /* bytes of that area */
+static uint32_t running = CRC32_START;
 
 bool image_step(void)
 {
-    const bool good_data = area_step(&data);
-    const bool good_vectors = area_step(&vectors);
-    const bool good_program = area_step(&program);
-    return good_data && good_vectors && good_program;
+    const area_t *now = &areas[area];
+    const uint32_t left = (uint32_t)(now->end - now->start) - checked;
+    const uint32_t size = (left < SLICE) ? left : SLICE;
+    running = crc32_update(running, &now->start[checked], size);
+    checked += size;
+    if (size < left) {
+        return true;
+    }
+    const bool good = ~running == *now->crc;
+    area = (area + 1U) % AREAS;
+    checked = 0;
+    running = CRC32_START;
+    return good;
 }
 
 bool image_valid(void)
 {
-    bool good = area_step(&data);
-    while (data.at != data.start) {
-        good = area_step(&data);
+    bool good = image_step();
+    while (area == 0U) {
+        good = image_step();
     }
     return good;
 }

@@ -6,8 +6,8 @@
  *   program_end; protected_crc, vectors_crc and program_crc are written after linking by `tools/fluxtrue target seal`,
  *   and an image that was never sealed does not match
  * Source   README.md, memory
- * Context  image_valid(): start-up, the data only, because code takes too long there; image_step(): background, a slice
- *          of each per call, false once one of them does not match as a whole */
+ * Context  image_valid(): start-up, the data only, because code takes too long there; image_step(): background, the
+ *          next slice of the pass over all three, false when it ends an area that does not match */
 #include <stdbool.h>
 
 bool image_valid(void);

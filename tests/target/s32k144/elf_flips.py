@@ -2,7 +2,8 @@
 """Single bit flips in the RAM and the flash of the image on the bus, on the emulated processor in closed loop.
 
 Each flip is a copy of this process (fork): it flips one bit at a random moment and drives on. The shaft torque of the
-simulated machine, in means of a millisecond, is compared with that of a copy without a flip.
+simulated machine, in means of a millisecond, is compared with that of a copy without a flip. A flip in code or data is
+late, too, if the checksums have not found it 50 ms after it happened, whatever the torque did.
 
     source tools/common.sh
     build/venv/bin/python tests/target/s32k144/elf_flips.py 2000 [--seed 1]
@@ -30,6 +31,7 @@ from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.target.image import Image
 
 APART_NM, APART_MS, RUN_MS, HANG_S = 5.0, 50, 350, 120
+CHECKSUM_MS: Final = 50  # from a flip in the flash to its fault; two passes over the whole flash take less
 RAMP_RPM_PER_MS: Final = 30.0
 POINTS: Final = ((300.0, 90.0), (3000.0, 70.0), (9000.0, -25.0))  # rpm, N·m
 SHARES: Final = {"RAM": 0.5, "code": 0.3, "data": 0.2}
@@ -121,10 +123,12 @@ def in_a_copy(run: Callable[[], Trace]) -> Trace:
     return Trace(**json.loads(text)) if status == 0 else Trace([], stopped=f"process ended with {status}")
 
 
-def verdict(golden: Trace, trace: Trace) -> str:
+def verdict(golden: Trace, trace: Trace, place: Place) -> str:
     """The verdict, one of those of tests/memory/verdict.h."""
     if trace.stopped:
         return "stopped"
+    if place.area != "RAM" and trace.detected_ms is not None and trace.detected_ms - place.moment_ms > CHECKSUM_MS:
+        return "late"
     apart = [ms for ms, torque in enumerate(trace.torque_Nm) if abs(torque - golden.torque_Nm[ms]) > APART_NM]
     if trace.detected_ms is not None:
         return "late" if apart and trace.detected_ms - apart[0] > APART_MS else "detected"
@@ -147,7 +151,7 @@ def campaign(parts: Parts, flips: int, seed: int) -> dict[str, Counter[str]]:
             for _ in range(flips * (k + 1) // len(POINTS) - flips * k // len(POINTS)):
                 place = draw(dice, where)
                 trace = in_a_copy(lambda s=stand, t=torque, p=place: drive_on(s, t, p))
-                result = verdict(golden, trace)
+                result = verdict(golden, trace, place)
                 found[place.area][result] += 1
                 if result in ("silent", "late", "passed"):
                     print(f"{result}: {place.area} {place.address:#x} bit {place.bit} at {rpm:.0f} rpm", flush=True)
