@@ -3,22 +3,27 @@
 
 import cmath
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fluxtrue_tools.cli import run as command
 from fluxtrue_tools.commission import hidden
+from fluxtrue_tools.commission.drive import SoftwareInTheLoop
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import balance_error, resistance_error, score
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
 from fluxtrue_tools.motor.flux_map import load_flux_map
 from fluxtrue_tools.motor.flux_model import SplineModel
+from fluxtrue_tools.sim.library import Loop
 from fluxtrue_tools.sim.motor import Motor
 
 MACHINES = [("saturated", 12), ("pmasynrm", 13), ("hsm1", 16)]
 MAP_RMS, R_SHARE, OFFSET_SHARE, BALANCE = 0.01, 0.01, 0.001, 0.002
+DRAWS, DRAW_RMS = (72, 240, 294), 0.005  # the worst of 300 positions of the rotor and noises of the first machine
 # The winding drops 1.2 V at the largest current; a phase current is near zero at every level; large swings.
 LITTLE_VOLTAGE = [("saturated", 126), ("linear", 138), ("hsm1", 105)]
 R_LEFT, LEG_V = 0.004, 0.05  # beyond the sensors' gains; 5 mV of 1.2 V; a half per cent of what a leg loses
@@ -42,6 +47,22 @@ def test_map_and_resistance_of_a_hidden_machine(name: str, seed: int, unknown: M
     assert found.largest_A <= known.i_max_A
     assert drive.get("run_state") != 1.0
     assert drive.get("fault_word") == 0.0
+
+
+@pytest.mark.parametrize("number", DRAWS)
+def test_noise_does_not_choose_the_smoothing_of_the_map(number: int, unknown: Motor, known: Nameplate) -> None:
+    """With weights that grow towards small currents, where a sample's error is largest, the score of the smoothing is
+    flat, the noise chooses among its candidates, and these three maps are wrong by 0.76 to 0.78 %."""
+    truth, flux_map, plant = hidden.draw(*MACHINES[0], unknown, known.i_max_A)
+    rng = np.random.default_rng([number, 77])
+    drawn = {"seed": float(rng.integers(1, 1 << 40)), "theta_m_rad": float(rng.uniform(0.0, 2.0 * np.pi))}
+    drive = SoftwareInTheLoop(Loop(unknown.library, plant | drawn, flux_map))
+    known = replace(known, psi_f_Vs=truth.psi_f_Vs, psi_f_source="data sheet")
+    surface = run(drive, chosen(("map",)), known, lambda _: None).surface
+    assert surface is not None
+    reached = score(surface.model, truth, known.i_max_A, truth.psi_f_Vs)
+    print(f"{number}: {reached}, {surface.unknowns:.0f} unknowns")
+    assert reached.map_rms <= DRAW_RMS
 
 
 @pytest.mark.parametrize(("name", "seed"), LITTLE_VOLTAGE)

@@ -16,11 +16,12 @@ from scipy import sparse
 
 from fluxtrue_tools.commission.bursts import Linkage
 from fluxtrue_tools.motor.flux_model import Array, FluxModel
-from fluxtrue_tools.motor.map_import.coenergy import SMALL, Basis, CoEnergy, System
+from fluxtrue_tools.motor.map_import.coenergy import Basis, CoEnergy, System
 
 INTERVALS = 16  # over the longer side of the plane
 MARGIN_D = 0.15  # of i_max on the magnetising side
 KNOWN = 0.1  # weight of what the voltages cannot show: the energy without current, the magnet's flux linkage
+STEADY = 0.5  # of i_max: a sample's error falls with the current as 1/(STEADY + i)
 ERROR = 0.05  # of psi, rms: a weighted sample's, against which the other errors are weighed
 R_PRIOR, LEVEL_PRIOR_V, START_PRIOR = 0.005, 0.1, 0.05  # of R; volts; of the scale of psi
 
@@ -110,8 +111,8 @@ class _Fit:
         return sparse.hstack((self._energy(self.bursts[n]), sparse.csr_matrix(self._errors(n))), format="csr")
 
     def weights(self, n: int) -> Array:
-        """As for an imported map: errors at small currents weigh more."""
-        one = 1.0 / (SMALL + np.abs(self.bursts[n].i) / self.i_max)
+        """The inverse of a sample's error, which is largest where the legs' voltages are unknown: at small currents."""
+        one = STEADY + np.abs(self.bursts[n].i) / self.i_max
         of_d, of_q = self.bursts[n].axes
         return np.concatenate((of_d * one, of_q * one))
 
