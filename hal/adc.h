@@ -5,9 +5,9 @@
  *   read            all of them, sampled at the same instant: the start of the PWM period
  *   latest          the counts of the currents again, for the second level: a function of its own, so that read()
  *                   remains a part of the fast ISR
- *   known_permille  what the converters read of a voltage that does not come from their reference, as thousandths of
- *                   what they should read: 1000 while the reference is right. A wrong reference changes all currents
- *                   alike, which nothing in them shows
+ *   known_permille  reading of a known voltage that does not come from the converters' reference, as thousandths of the
+ *                   correct reading: 1000 while the reference is right. A wrong reference scales all currents by the
+ *                   same factor, which the currents themselves do not show
  * Source   docs/howto/port.md; docs/theory/monitors.md (MN-37)
  * Units    right-aligned counts of the converter that motor.toml names (adc_bits); thousandths
  * Errors   a value at the end of the range is returned as it is, and the monitors evaluate it; HAL_ADC_NOTHING_KNOWN:

@@ -10,8 +10,8 @@
 #include <stdint.h>
 
 uint32_t hal_angle_read(void);
-/** Whether the angle is that of the shaft. An incremental encoder counts from an unknown angle until its index has
- * passed: speed and direction are right from the start, and torque is refused. Once true it stays true. */
+/** Whether the angle is absolute, that is, relative to the shaft's zero. An incremental encoder counts from an unknown
+ * angle until its index has passed: speed and direction are right, but torque is refused. Once true it stays true. */
 bool hal_angle_is_absolute(void);
 
 #endif

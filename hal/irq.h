@@ -3,7 +3,7 @@
 #define HAL_IRQ_H
 /** Pends the identification interrupt, which runs below the fast ISR and above the 1 kHz task.
  * Source   docs/architecture.md, priorities
- * Errors   none; pending an interrupt that is already pending is one interrupt
+ * Errors   none; an interrupt that is pended twice before it starts runs once
  * Context  fast ISR, once per period while the paper's identification is chosen */
 
 void hal_irq_pend_mrai(void);

@@ -9,8 +9,8 @@
  *   drive keeps switching disabled in between, and the rotor stands still.
  * Source   docs/howto/port.md, docs/decisions/007-store.md
  * Units    bytes; program() writes whole multiples of HAL_NVM_UNIT at multiples of it, once after each erase
- * Errors   false: out of the slot's range, not erased, an uncorrectable content, or the hardware reported a failure;
- *          begin(): it cannot be written now
+ * Errors   false: out of the slot's range, not erased, uncorrectable content, or the hardware reported a failure;
+ *          begin(): the flash cannot be written now
  * Context  background, below every interrupt: erase and program may take milliseconds but must not stop the
  *          interrupts. read() also before the interrupts start */
 #include <stdbool.h>

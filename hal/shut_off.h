@@ -5,7 +5,7 @@
  * answers, and the read-back of this supply.
  *   question()  the present question, 0 ... 15, never the same twice in a row; false: no such device is fitted
  *   answer()    to the present question; a right one brings the next question
- *   supply()    the gate drivers have supply: read back behind every switch of the supply; within 10 ms of its request
+ *   supply()    whether the gate drivers have supply, read back behind all its switches; true within 10 ms of a request
  * Source   docs/howto/port.md; docs/theory/third-level.md
  * Errors   none; a device that does not respond any more must not return false but its last question
  * Context  1 kHz task: question() at the start of each step, answer() once at its end */

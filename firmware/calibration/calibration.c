@@ -24,7 +24,7 @@ float calibration_get(const drive_t *drive, calibration_id_t id)
     }
 }
 
-/* The value of one step of the format. */
+/* The value in SI of one step of the fixed-point format. */
 static float least(const drive_t *drive, calibration_id_t id)
 {
     const motor_t *m = drive->motor;

@@ -43,7 +43,7 @@ static inline bool pulse_access_is_command(uint8_t command)
 
 /** command: without the protocol's own code, at least one byte. */
 xcp_result_t pulse_access_command(drive_t *drive, bool unlocked, const uint8_t *command, uint8_t length);
-/** What such a command answers behind the answer's first byte: nothing but for PULSE_STATE and MOVEMENT_STATE. */
+/** Writes the bytes of the answer after its first one: only PULSE_STATE and MOVEMENT_STATE have any. */
 void pulse_access_state(const drive_t *drive, uint8_t command, can_frame_t *answer);
 
 #endif

@@ -75,7 +75,7 @@ typedef struct {
     float battery_V;             /* 0: not known; after a time-out the last one */
     uint16_t count[RX_RESULTS];
     uint16_t accepted; /* torque commands, wraps */
-    uint16_t skipped;  /* accepted frames of either message before which one was lost */
+    uint16_t skipped;  /* frames of any message that were accepted although the frame before them was lost */
     uint16_t time_outs;
 } can_rx_t;
 

@@ -4,8 +4,8 @@
 /** Measurement lists of the XCP slave: dynamic lists, one frame (ODT) of up to 7 bytes each, two rasters.
  *   An event samples every running list that is due. A list that does not fit into the send queue completely is not
  *   sampled; this is counted and reported by the protocol's overload event.
- * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
  *   Event 0 comes in each step of the 1 kHz task, event 1 in the step in which a multiple of 10 ms has passed.
+ * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
  * Units    time stamps of 1 ms of true time, 16 bits, in the first frame of a list
  * Range    sizes below; absolute ODT numbers as packet identifiers
  * Errors   the protocol's codes

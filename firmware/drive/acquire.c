@@ -11,8 +11,8 @@ static uint32_t angle_correction(const drive_t *drive, uint32_t theta_m)
     return (uint32_t)*correction;
 }
 
-/* A sample of the angle that no rotor can have: the prediction replaces it. Only the advance per period is still the
- * one of the sample, by at most k_i/2 of a turn, 0.2 degrees. */
+/* The prediction replaces a sample of the angle that no rotor can have. Only the advance per period still contains the
+ * sample: by at most k_i/2 of a turn, 0.2 degrees. */
 static void replace_angle(drive_t *drive, sample_t *sample)
 {
     const angle_t angle = angle_tracker_coast(&drive->period.angle_tracker, &drive->fast.angle_tracker,
@@ -77,11 +77,11 @@ void acquire_check(drive_t *drive, const sample_t *sample, bool run)
         /* Below v_min the applied voltage is unknown; the three-period count starts again. */
         drive->fast.periods_since_enable = 0;
     }
-    /* An unpowered bridge may measure no dc voltage; every other fault counts at any time. */
     if ((faults & FAULT_ANGLE) != 0U) {
-        drive->fast.angle_tracker.samples = 0; /* its prediction has been wrong for long: it starts again */
+        drive->fast.angle_tracker.samples = 0; /* the prediction has been wrong for milliseconds: start again */
     }
     if (faults != 0U) {
+        /* A bridge that is off may have no dc voltage: under-voltage counts only while it runs. */
         drive_raise_fault(drive, run ? faults : faults & ~(uint32_t)FAULT_UNDER_VOLTAGE);
     }
 }

@@ -19,8 +19,8 @@ static q15_t present_speed(const before_reset_t *before, q15_t speed)
     return (before->speed_valid && speed >= before->speed / 2) ? speed : before->speed;
 }
 
-/* By the lower level of (SS-2), and by the lower of both voltages: the rectified back-EMF may have raised the present
- * one. */
+/* Uses the lower threshold of (SS-2), and the lower of the dc voltages before and after the reset: the rectified
+ * back-EMF may have raised the present one. */
 static bool decide(const motor_t *m, safe_state_state_t *state, const before_reset_t *before, q15_t speed, q15_t v_dc)
 {
     const safe_state_in_t in = {

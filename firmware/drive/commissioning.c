@@ -13,7 +13,7 @@ static int32_t product_q30(int32_t a_q30, q15_t b)
     return (int32_t)(((int64_t)a_q30 * b) >> 15);
 }
 
-/* The measurement contains what the compensation left over; with the compensation it is the inverter's error (CM-2). */
+/* The curve was measured with the compensation active. The compensated part is added: the inverter's error (CM-2). */
 static void add_compensated(const modulate_config_t *config, q15_t v_dc, commission_curve_t *curve)
 {
     const int32_t full = config->dead_time_q16 / 2 * v_dc;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define WORDS_PER_STEP 4U
-#define STEPS_WITHOUT_WINDOW 4U /* whole ones; the fast ISR completes one in each */
+#define STEPS_WITHOUT_WINDOW 4U /* whole steps without a window; the fast ISR completes one window in each step */
 
 #define WORDS (DATA_CHECK_PERIOD_WORDS + DATA_CHECK_PARAMETERS_WORDS + DATA_CHECK_MRAI_WORDS)
 #define LIVE offsetof(drive_t, period)
@@ -109,8 +109,8 @@ static bool words_match(drive_t *drive)
     return differing_bits == UINT32_MAX;
 }
 
-/* The fast ISR notes the command at the end of each step. If it runs without doing so, the stored end of the step is
- * damaged: the identification would use the last window permanently, and nothing would check the task. */
+/* The fast ISR records at the end of each step which command it has seen. If it runs without doing so, the stored end
+ * of the step is damaged: the identification would keep using the last window, and the task would not be monitored. */
 static bool windows_complete(drive_t *drive)
 {
     data_check_t *data_check = &drive->data_check;

@@ -3,8 +3,8 @@
 #define DRIVE_DRIVE_H
 /** One drive: configuration, the state of every stage, and the three activities that run it.
  *   fast_isr  each PWM period: samples to duties (measure, tables, current control, modulation), windows of the
- *     robust identification; for the paper's it pends mrai_isr
- *   mrai_isr  below the fast ISR, while it is chosen: the paper's identification and torque estimate
+ *     robust identification; with the paper's identification it pends mrai_isr
+ *   mrai_isr  below the fast ISR, while the paper's identification is chosen: its law and its torque estimate
  *   task_1khz every bases.periods_per_step periods, below both: torque path, current reference, identification,
  *     supervision
  * Source   docs/architecture.md
@@ -36,7 +36,7 @@ typedef enum {
     IDENTIFICATION_ROBUST = 1 /* seven parameters with their uncertainty, each millisecond */
 } identification_mode_t;
 
-/** Voltage pulses at standstill, as asked for. */
+/** Requested voltage pulses at standstill. */
 typedef struct {
     pulses_config_t config;
     uint32_t starts; /* counts up: each count starts these pulses once, or refuses them */
@@ -125,9 +125,9 @@ typedef struct {
 
 /** Leaving torque at speed (drive/switch_off.h). */
 typedef struct {
-    dq_q15_t from; /* reference when the currents began to move to those of the short circuit */
+    dq_q15_t from; /* current reference at the start of the transition to the short circuit's currents */
     int32_t i_d;   /* of the short circuit, q15 */
-    uint8_t steps; /* of that movement; 0: not active */
+    uint8_t steps; /* of that transition; 0: not active */
     bool holds;    /* enable is off, the torque is held at zero */
 } switch_off_t;
 
@@ -144,10 +144,9 @@ typedef struct {
     torque_limit_t allowed;
     torque_loop_state_t torque_loop;
     identify_state_t identify;
-    identification_t identification; /* of the law that is chosen */
-    volatile q15_t psi_d_error;      /* of the robust one: the fast ISR copies one half word */
-    volatile uint32_t
-        identifications; /* number of steps: a lower priority detects by it that its copy is inconsistent */
+    identification_t identification;   /* of the law that is chosen */
+    volatile q15_t psi_d_error;        /* of the robust one: the fast ISR copies one half word */
+    volatile uint32_t identifications; /* number of steps, by which a lower priority detects an inconsistent copy */
     current_reference_t reference;
     voltage_reserve_state_t voltage_reserve;
     angle_harmonics_state_t angle_harmonics;
@@ -209,7 +208,7 @@ typedef struct {
 } snapshot_t;
 
 /** The motor's constants that every PWM period reads, copied: in RAM they need neither a pointer nor an access to
- * flash, and the look-up stays inside its tables when the flash is damaged later. Nothing changes them. */
+ * flash, and the look-up stays inside its tables if the flash is damaged later. Nothing writes to them. */
 typedef struct {
     measure_config_t measure;
     angle_tracker_config_t angle_tracker;
@@ -265,8 +264,8 @@ typedef struct {
     pulses_state_t pulses_state; /* written by the fast ISR alone */
     movement_frame_t frame;      /* of a movement: written by the 1 kHz task */
     movement_angle_t frame_angle;
-    volatile bool held;   /* switching stays disabled: written in the background, which writes the flash meanwhile */
-    sample_box_t samples; /* last: behind its slots the offsets of other members would be too large for a load */
+    volatile bool held;   /* switching stays disabled while the background, which sets this flag, writes the flash */
+    sample_box_t samples; /* last: the offset of a member behind its slots would not fit a load instruction */
 } drive_t;
 
 void drive_init(drive_t *drive, const motor_t *source);
@@ -307,8 +306,8 @@ static inline bool drive_pulses(const drive_t *drive)
 }
 /** The movement's share of the 1 kHz task. */
 void drive_move(drive_t *drive, const snapshot_t *snapshot);
-/** If the command is one in the frame of a movement, changes angle and speed of the sample to it; the advance per
- * period. Fast ISR, outside the usual route. */
+/** If the command is one in the frame of a movement, changes angle and speed of the sample to those of that frame.
+ * Returns the advance per period. Fast ISR, outside the usual route. */
 int32_t drive_take_frame(drive_t *drive, const command_t *command, sample_t *sample, int32_t own_step);
 /** The currents of a movement act. */
 static inline bool drive_moves(const drive_t *drive)
@@ -317,7 +316,7 @@ static inline bool drive_moves(const drive_t *drive)
 }
 /** BRIDGE_OFF ... of the next command. */
 uint8_t drive_bridge_mode(const drive_t *drive, bool runs);
-/** A movement has ended early: switching stays disabled until it is no longer asked for. */
+/** A movement has ended early: switching stays disabled until the movement is no longer requested. */
 static inline bool drive_has_ended_movement(const drive_t *drive)
 {
     return drive->task.movement.phase == MOVEMENT_PHASE_ENDED;

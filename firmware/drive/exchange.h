@@ -5,7 +5,7 @@
  *   slot[generation & 1] is complete, the writer fills the other one and then advances generation. The box of the
  *   samples has more slots: it is the history that the scope captures from.
  *   From task to ISR, the writer cannot interrupt the reader: one read is enough.
- *   From fast ISR to task, it can: the task copies all it needs, and copies again if a period came in between.
+ *   From fast ISR to task, it can: the task copies all it needs, and repeats the copy if a period has interrupted it.
  *   The paper's identification has a box of its own (drive/mrai).
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
  * Errors   none
@@ -95,7 +95,7 @@ static inline void exchange_barrier(void)
     fx_compiler_barrier();
 }
 
-/* The slot that publishing will complete. */
+/* The slot that sample_box_publish() will complete. */
 static inline sample_t *sample_box_begin(sample_box_t *box)
 {
     sample_t *slot = &box->slot[(box->generation + 1U) % SAMPLE_SLOTS];

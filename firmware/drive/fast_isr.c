@@ -72,7 +72,7 @@ static __attribute__((noinline, flatten)) void voltage_from_duties(drive_t *driv
     voltage_by(drive, sample, &drive->parameters.modulate, made, i, advanced);
 }
 
-/* The duties of the first period act in the second; the third sample ends a period of which they are known. */
+/* The duties of the first period act in the second; the third sample ends a period whose duties are known. */
 static void count_since_enable(fast_state_t *fast, sample_t *sample)
 {
     if (fast->periods_since_enable < PERIODS_TO_ACT) {
@@ -90,7 +90,7 @@ static current_control_in_t control_inputs(const drive_t *drive, const sample_t 
     return (current_control_in_t){target, &sample->point.flux, now->omega, drive->psi_d_error, now->v_dc};
 }
 
-/* The law of a motor whose field turns far in a period. */
+/* Current control of a motor whose field turns far in a period. */
 static __attribute__((noinline, cold)) current_control_out_t control_turning(drive_t *drive, const sample_t *sample,
                                                                              const rotor_frame_t *now,
                                                                              const current_target_t *target)

@@ -14,7 +14,7 @@ static q15_t variance_reduction(const identify_state_t *state, identify_index_t 
     return (q15_t)fx_max_s32(Q15_MAX - (state->kalman.p_q30[kalman_p_index(index, index)] >> 15), 0);
 }
 
-/* What acts on the torque is zero until recalled values have been confirmed. */
+/* The values that act on the torque are zero until recalled values have been confirmed (drive/recall.h). */
 static identification_t robust_identification(const drive_t *drive, const identify_out_t *out)
 {
     const identify_config_t *config = &drive->motor->identify;

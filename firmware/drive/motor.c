@@ -6,7 +6,7 @@
 
 #define CIRCLE_CLEAR_Q30 1007681536 /* (31/32)^2 */
 
-/* (SC-10). The sums of a window fit for these periods per step. */
+/* (SC-10). With so many periods per step the sums of a window do not overflow. */
 static bool step_valid(const bases_t *b)
 {
     return b->periods_per_step >= 4U && b->periods_per_step <= 40U && b->step_s > 0.8e-3F && b->step_s < 1.25e-3F;
@@ -87,8 +87,8 @@ static bool turning_gains_valid(const turning_control_config_t *c)
            c->drop_q29 >= 0 && c->knee_turns_q27 > 0;
 }
 
-/* Only the law for a field that turns far takes the route on which a tracker with a shift may run, and only without
- * gains is the usual law the limit of its voltage. */
+/* A tracker with a turn_shift may run only on the route of the law for a field that turns far. That law uses the usual
+ * one as its voltage limit, which must then have no gains. */
 static bool turning_valid(const motor_t *m)
 {
     const turning_control_config_t *c = &m->turning_control;

@@ -38,9 +38,9 @@
 #include "control/mrai/mrai.h"
 #endif
 
-/** What calibration, commissioning and the trim change while the drive runs: the blocks that contain such a value. A
- * drive has its own; the motor data hold the values it starts with. What the paper's law has of this kind lies apart,
- * so that a build without the law carries none of it. */
+/** The blocks that contain a value which calibration, commissioning or the trim change while the drive runs. Each drive
+ * has its own copy; the motor data hold the initial values. Those of the paper's law are separate, so that a build
+ * without the law does not contain them. */
 typedef struct {
     q15_t torque_slew; /* per 1 kHz step; Q15_MAX: no limit */
     current_control_config_t current_control;
@@ -48,7 +48,7 @@ typedef struct {
     torque_loop_config_t torque_loop;
 } motor_parameters_t;
 
-/** What nothing changes: drives point at it in flash, where its checksum is. */
+/** Constant motor data: drives point to them in flash, where a checksum protects them. */
 typedef struct {
     const char *name;
     bases_t bases;

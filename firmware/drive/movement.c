@@ -14,7 +14,7 @@ movement_turn_t movement_frame_step(const movement_frame_t *frame, movement_angl
     angle->omega_sensor = sensor->omega;
     if (frame->pole_pairs == 0) {
         angle->imposed += (uint32_t)frame->rate;
-        return (movement_turn_t){angle->imposed, frame->rate, 0}; /* so slow a speed needs no voltage */
+        return (movement_turn_t){angle->imposed, frame->rate, 0}; /* the back-EMF of 1 Hz is negligible */
     }
     return (movement_turn_t){
         .theta_e = (uint32_t)frame->pole_pairs * sensor->theta_m + frame->offset,
@@ -55,7 +55,7 @@ static bool is_blocked(const movement_config_t *config, movement_state_t *state,
     return state->blocked >= config->blocked_steps;
 }
 
-/* What ends a movement that acts. */
+/* Whether speed or position of the sensor end a movement that acts. */
 static movement_failure_t failure_by_sensor(const movement_config_t *config, movement_state_t *state,
                                             const movement_in_t *in)
 {
@@ -69,7 +69,7 @@ static movement_failure_t failure_by_sensor(const movement_config_t *config, mov
     return (state->steps > config->steps_max) ? MOVEMENT_FAILURE_LONG : MOVEMENT_FAILURE_GOOD;
 }
 
-/* What ends the movement now. */
+/* The reason for which the movement must end now, if there is one. */
 static movement_failure_t failure_of(const movement_config_t *config, movement_state_t *state,
                                      const movement_request_t *request, const movement_in_t *in)
 {

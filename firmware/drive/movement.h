@@ -5,8 +5,8 @@
  * the currents, and what ends the movement.
  *   imposed     theta_e += f T_s: the currents do not turn with the rotor; f is -1, 0 or 1 Hz, reached with a slope
  *   spin        theta_e = +-p theta_m + offset, with currents instead of a torque
- *   connected   the same angle with the torque path: for the steps at standstill of a motor whose sensor is connected
- *               in another way than the motor data say
+ *   connected   the same angle with the torque path: for the steps at standstill of a motor whose sensor is not
+ *               connected as the motor data say
  * A damped current brakes the swing of a rotor about it: a fifth of it flows while the rotor becomes faster.
  * Source   docs/theory/commissioning.md (CM-15), section 11
  * Units    angles in turns times 2^32, currents per unit in q15, sensor speed per unit of the speed base in Q31
@@ -58,7 +58,7 @@ typedef enum { MOVEMENT_FAILURE_LIST(MOVEMENT_FAILURE_VALUE) } movement_failure_
 #undef MOVEMENT_PHASE_VALUE
 #undef MOVEMENT_FAILURE_VALUE
 
-/** What is asked for. */
+/** The requested movement. */
 typedef struct {
     uint8_t movement;   /* the kind */
     uint8_t pole_pairs; /* electrical turns of a turn of the sensor, from 1 */
@@ -134,7 +134,7 @@ typedef struct {
 movement_turn_t movement_frame_step(const movement_frame_t *frame, movement_angle_t *angle,
                                     const movement_sensor_t *sensor);
 
-/** Begins, continues or ends what is asked for, and computes the frame and state->i_ref. */
+/** Begins, continues or ends the requested movement, and computes the frame and state->i_ref. */
 void movement_step(const movement_config_t *config, uint32_t pole_pairs, movement_state_t *state,
                    movement_frame_t *frame, const movement_request_t *request, const movement_in_t *in);
 

@@ -2,7 +2,7 @@
 /* A movement of the shaft in the drive: its frame in the fast ISR, and its step in the 1 kHz task. */
 #include "drive/mrai/mrai_seam.h"
 
-/* With a connection alone a small torque may brake the rotor: the second level does not limit it meanwhile. */
+/* With MOVEMENT_CONNECTED alone a small torque may brake the rotor; the second level does not check it meanwhile. */
 static bool has_request(const drive_t *drive)
 {
     const int32_t largest = drive_moves(drive) ? 0 : drive->motor->torque_max / 8;

@@ -20,7 +20,7 @@ static void begin(const pulses_config_t *config, pulses_state_t *state, dq_q15_t
     };
 }
 
-/* i_next: when the voltage that is computed now begins to act; the one computed a period ago acts until then. */
+/* i_next: current at the time when the voltage computed now begins to act; until then the previous one acts. */
 static void predict(pulses_axis_t *axis, int32_t i)
 {
     const int32_t slope = axis->sign_before * (i - axis->i);
@@ -135,7 +135,7 @@ static dq_q15_t pulse(const pulses_config_t *config, pulses_state_t *state, uint
     return (dq_q15_t){state->d.sign * config->d.v, state->q.sign * config->q.v};
 }
 
-/* One axis on its way to zero: the last period has the share of the voltage that ends there. */
+/* One axis on its way to zero: in the last period the voltage is reduced so that the current ends at zero. */
 static int32_t axis_to_zero(pulses_axis_t *axis, int32_t v)
 {
     if (axis->sign == 0 || v == 0 || axis->sign * axis->i_next >= 0) {

@@ -15,8 +15,8 @@
  * Units    v as a share of v_ratio v_dc, currents per unit, both in q15 and their sums in counts of it; angles in turns
  *          times 2^32
  * Range    v up to 0.7 in each axis: both stay inside the voltage circle
- * Errors   failure: the current is larger than square_max, the rotor has moved by more than angle_max, or the reversals
- *          were not reached in periods_max; the currents are brought to zero then, too
+ * Errors   failure: the current is larger than square_max allows, the rotor has moved by more than angle_max, or the
+ *          reversals have not occurred within periods_max; the currents are then brought to zero, too
  * Context  fast ISR, outside the usual route */
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The 1 kHz task's part of the voltage pulses: it starts or refuses them, and ends them with the run state. */
+/* The 1 kHz task's part of the voltage pulses: it starts or refuses them, and ends them when the drive stops. */
 #include "drive/mrai/mrai_seam.h"
 
 #define V_MAX Q15(0.7)         /* of both axes at once: inside the voltage circle */
@@ -44,7 +44,7 @@ static void start_or_refuse(drive_t *drive, const snapshot_t *snapshot)
     const pulses_config_t *wanted = &drive->request.pulses.config;
     pulsing->starts = drive->request.pulses.starts;
     if (drive_pulses(drive)) {
-        return; /* they continue */
+        return; /* the pulses continue */
     }
     if (!may_start(drive, snapshot) || !is_in_range(drive, wanted)) {
         pulsing->phase = PULSES_FAILED;

@@ -20,7 +20,7 @@ static bool is_conclusive(const drive_t *drive)
            fx_abs_q15(drive->task.identification.torque_estimated) >= drive->motor->identify.torque_min;
 }
 
-/* The mean contains nine of ten steps, and so does the bound. */
+/* The mean so far contains nine of an update's ten steps, and the bound is reduced in the same ratio. */
 static bool is_explained(const drive_t *drive, q31_t omega)
 {
     const dq_q30_t e = drive->task.identify.mean.e;
@@ -55,6 +55,6 @@ void recall_step(drive_t *drive, q31_t omega)
     } else if (rejected) {
         drive_reset_identification(drive);
     } else {
-        /* not decided yet */
+        /* neither confirmed nor rejected yet */
     }
 }

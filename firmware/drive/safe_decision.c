@@ -8,8 +8,8 @@ static int32_t mean_of_phases(const snapshot_t *snapshot)
     return fx_abs_q31(snapshot->sample.zero_q28 >> 13);
 }
 
-/* Whether the measured currents are the machine's. The sum counts in this sample, not as a latched fault: in the first
- * milliseconds of a short circuit the converters saturate, which is one. */
+/* Whether the measured currents are the machine's. The current sum of this sample counts, not the latched fault: in the
+ * first milliseconds of a short circuit the converters saturate, which latches that fault. */
 static bool currents_valid(const drive_t *drive, const snapshot_t *snapshot)
 {
     return (snapshot->faults & (FAULT_CURRENT_STUCK | FAULT_PHASE_LOST | FAULT_INPUT)) == 0U &&
@@ -44,21 +44,21 @@ static bool charges_link(const drive_t *drive, const snapshot_t *snapshot)
     return power < -fx_mul_q15(QUARTER_PER_PHASES, (q15_t)power_max);
 }
 
-/* A bridge that switches off below the level of the short circuit, in the step in which the speed exceeds it, stays
- * off: only a decision of an earlier step holds the permission. */
+/* Switching that is disabled below the speed level of the short circuit stays disabled, even if the speed exceeds that
+ * level in the same step: only a short circuit that an earlier step decided keeps the permission. */
 static bool is_armed(const task_state_t *task, bool holds_short_circuit, uint32_t faults)
 {
     return task->run_state == RUN_STATE_RUN || (task->armed && (holds_short_circuit || faults != 0U));
 }
 
-/* During a movement the magnet's flux is a guess: a short circuit by a guess that is too large would bring a current
- * that a slow machine never needs. 30 % of the largest speed are below the speed at which the diodes conduct. */
+/* During a movement the magnet's flux is only estimated roughly. With too large an estimate a slow machine would be
+ * short-circuited without need. 30 % of the largest speed are below the speed at which the diodes conduct. */
 static bool is_magnet_unknown(const task_state_t *task)
 {
     return task->movement.phase != MOVEMENT_PHASE_IDLE;
 }
 
-/* What would bring the short circuit, in the period in which it occurs. */
+/* The faults that would bring the short circuit, in the period in which they occur. */
 static safe_t on_faults(bool gate_fault, bool over_voltage)
 {
     if (over_voltage) {

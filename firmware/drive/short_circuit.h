@@ -2,14 +2,14 @@
 #ifndef DRIVE_SHORT_CIRCUIT_H
 #define DRIVE_SHORT_CIRCUIT_H
 /** The active short circuit at the bridge: all lower switches on, or all upper ones where the lower ones cannot serve.
- *   The gates are read back. If those that were on are off a period later, the gate drivers have ended the short
+ *   The gate signals are read back. If those that were on are off a period later, the gate drivers have ended the short
  *   circuit: a switch of the other side is shorted, and switching on against it short-circuits the dc link. The other
  *   side is then tried, on which the shorted switch does no harm. If the drivers end that one, too, switching stays
  *   disabled. The task may request the upper switches (safety/short_side.h), before the short circuit or while the
  *   lower ones are on. The request acts only while the lower switches are used and no side has been ended; the upper
  *   ones are then kept until the faults are reset.
  *   While the fault line is active nothing can be switched on; this does not count as a failure of a side.
- *   After a fault the currents may have any value, and the short circuit would turn their flux about the origin. For
+ *   After a fault the currents may have any value, and a short circuit would rotate their flux about the origin. For
  *   half a step of the task switching is therefore disabled first, and the dc link opposes the currents. This wait is
  *   left out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults
  *   that leave control intact: then the currents have been moved before.

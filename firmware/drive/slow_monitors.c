@@ -12,7 +12,7 @@ static abc_q15_t in_phases(dq_q15_t i, uint32_t theta_e)
     return (abc_q15_t){x.a, x.b, x.c};
 }
 
-/* Over the last step; with the paper's identification, which takes no sums, the sample. */
+/* Mean current of the last step; with the paper's identification, which sums no window, the current of the sample. */
 static dq_q15_t mean_current(const drive_t *drive, const snapshot_t *snapshot)
 {
     if (mrai_is_chosen(drive) || !snapshot->window.acting) {
@@ -105,8 +105,8 @@ static uint32_t check_angle(drive_t *drive, const snapshot_t *snapshot, abc_q15_
     return frozen_angle_step(&drive->motor->frozen_angle, &task->frozen_angle, &in);
 }
 
-/* The field turns by more than a quarter of a turn in a step. Whether the angle stands still follows from the angles at
- * the steps, which are also equal where a step has a whole number of turns. */
+/* The field turns by more than a quarter of a turn in a step. Then the angles at the steps do not show whether the
+ * angle stands still: they are also equal if it advances by a whole number of turns per step. */
 static bool is_fast(uint64_t turns_q60)
 {
     return turns_q60 > (1ULL << 58);
@@ -125,9 +125,9 @@ static bool is_near_reference(const drive_t *drive, dq_q15_t i)
     return fx_abs_q31(i.d - i_ref.d) < i_0 && fx_abs_q31(i.q - i_ref.q) < i_0;
 }
 
-/* With a broken lead the currents are not those of the reference, and neither is the power: the sample and the mean of
- * the step are off. With a wrong angle single samples may be, because the currents oscillate about their reference;
- * after a jump of the sensors' gain the mean of one step is. */
+/* With a broken lead both the sample and the mean of the step deviate from the current reference, and the power is not
+ * that of the reference either. With a wrong angle only single samples may deviate, because the currents oscillate
+ * about their reference; after a jump of a sensor's gain only the mean of one step does. */
 static bool is_controlled(const drive_t *drive, const snapshot_t *snapshot)
 {
     return is_near_reference(drive, snapshot->sample.point.i) ||
@@ -183,13 +183,13 @@ static void update_short_side(drive_t *drive, const snapshot_t *snapshot, abc_q1
 
 uint32_t slow_monitors_step(drive_t *drive, const snapshot_t *snapshot)
 {
-    const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* of the last step */
+    const uint32_t shorted = drive->task.gate_fault.switch_shorted ? (uint32_t)FAULT_GATE : 0U; /* found last step */
     const abc_q15_t phases_ref = in_phases(drive->task.i_ref, snapshot->sample.theta_e);
     const bool is_window_new = !mrai_is_chosen(drive) && snapshot->window.acting && snapshot->sample.acting;
     const bool acting = !is_compensation_new(drive) && is_window_new &&
                         !is_fast(turns_of_step_q60(drive, snapshot->sample.point.omega));
     const uint32_t of_currents = check_currents(drive, snapshot, phases_ref);
-    if (drive_moves(drive)) { /* what compares with the motor data has no meaning with another angle */
+    if (drive_moves(drive)) { /* with the angle of a movement, comparisons with the motor data have no meaning */
         return (of_currents & (FAULT_TEMPERATURE | FAULT_OVER_SPEED | FAULT_INPUT | FAULT_CURRENT_STUCK)) | shorted;
     }
     const bool behind = torque_monitor_is_behind(&drive->motor->torque_monitor, snapshot->lag, drive->task.psi_ref);

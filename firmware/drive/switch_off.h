@@ -5,17 +5,17 @@
  *   Enable off: the torque goes to zero at the fastest slew rate, and the current control holds it there until
  *     switching can be disabled. The currents are those of field weakening without torque: far below those of the short
  *     circuit, which some machines cannot withstand.
- *   Over-temperature and over-speed leave the control intact, but latching the fault ends it. Before it is latched, i*
- *     moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0, and stays
- *     there for 2 steps.
+ *   Over-temperature and over-speed leave current control intact, but latching the fault ends it. Before the fault is
+ *     latched, i* moves in 8 steps to the steady current of the short circuit, psi_d(i_d, 0) + dpsi = 0 and i_q = 0,
+ *     and stays there for 2 steps.
  *   Every other fault brings the short circuit at once.
  * Source   docs/theory/safe-state.md (SS-8), (SS-12)
  * Range    i_d down to the demagnetisation limit at the present temperature
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 
-/** The run state of this step. While the torque is held at zero it stays RUN; while the currents are being moved to
- * those of the short circuit it does, too, and *faults becomes 0. */
+/** The run state of this step. It stays RUN while the torque is held at zero, and while the currents are being moved to
+ * those of the short circuit; in the latter case *faults becomes 0. */
 run_state_t switch_off_step(drive_t *drive, const snapshot_t *snapshot, run_state_t wanted, uint32_t *faults);
 
 /** Enable is off, and the torque is held at zero. */

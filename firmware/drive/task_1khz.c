@@ -20,7 +20,7 @@ static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
     task_state_t *task = &drive->task;
     const bool enable = request->enable; /* read once, so that a reset is never sent together with the command to run */
     if (request->fault_resets != task->fault_resets_asked) {
-        task->fault_resets_asked = request->fault_resets; /* refused while running, and not carried out later */
+        task->fault_resets_asked = request->fault_resets; /* a reset while running is refused for good */
         task->fault_resets += (enable || switch_off_holds(drive)) ? 0U : 1U;
     }
     if (request->identification_resets != task->identification_resets) {

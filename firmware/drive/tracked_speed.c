@@ -4,11 +4,11 @@
 #include "fx/q.h"
 
 #define LAG_SHIFT 5          /* a thirty-second of the speed: within the planned reserve of voltage */
-#define LAG_SPEED Q15(0.125) /* of the base: below, the voltage limits no reference */
+#define LAG_SPEED Q15(0.125) /* of the base: at lower speed the voltage limits no reference */
 #define EXCESS Q15(0.03)     /* of the commanded torque: what the second level allows at the largest one (SL-6) */
-#define EXCESS_STEPS 5       /* longer than a step of the torque differs from the loop's model */
-#define EXCESS_GAIN 3        /* besides once */
-#define LAG_MAX Q15(0.0625)  /* more than twice that of the rotors of (SS-5): the tracker has started */
+#define EXCESS_STEPS 5       /* a torque step differs from the loop's model for less than this */
+#define EXCESS_GAIN 3        /* added to the excess itself, which then counts fourfold (TL-13) */
+#define LAG_MAX Q15(0.0625)  /* twice the largest lag of a rotor of (SS-5); more is a tracker that has just started */
 
 int32_t tracked_speed_far_behind(const snapshot_t *snapshot)
 {

@@ -4,20 +4,20 @@
 /** What follows from a tracked speed that is far behind the rotor's, at tens of thousands of rpm/s.
  * Source   docs/theory/current-reference.md (CR-15), docs/theory/torque-loop.md (TL-13)
  * Units    per unit
- * Range    every snapshot; a lag that no rotor can cause is none
+ * Range    every snapshot; a lag that no rotor can cause counts as 0
  * Errors   none
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 
-/** By how much the rotor's speed is beyond the tracked one, less what does not matter; 0 in usual driving. */
+/** Lag of the tracked speed behind the rotor's beyond a tolerance of 1/32 of the speed; 0 in usual driving. */
 int32_t tracked_speed_far_behind(const snapshot_t *snapshot);
-/** For the plan of the voltage: the references need that of the rotor's speed, or at the corner of the voltage limit
- * the currents leave them. Where the tracked speed is ahead there is voltage to spare. */
+/** Speed for planning the voltage. The references must leave the voltage that the rotor's speed needs, or the currents
+ * deviate from them near the voltage limit. A tracked speed that is too high only leaves voltage unused. */
 q15_t tracked_speed_planned(const snapshot_t *snapshot);
 
-/** Of the torque, for the torque loop: a correction that belongs to an operating point which a fast change of speed
- * has left is too large for as long as the loop needs. Too much torque, beyond what a step of it causes, counts
- * fourfold. */
+/** Torque estimate for the torque loop. After a fast change of speed the correction of the previous operating point may
+ * be too large until the loop has followed. Therefore torque in excess of the model counts fourfold, if it lasts longer
+ * than after a torque step (TL-13). */
 q15_t tracked_speed_estimate(drive_t *drive, const snapshot_t *snapshot);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_TURNING_MODULATE_H
 #define DRIVE_TURNING_MODULATE_H
-/** The modulation of current_control_turning.h: a knee of the dead-time compensation that widens with speed.
+/** Modulation for current_control_turning.h: the knee of the dead-time compensation widens with speed.
  *   i_knee >= 1.5 |theta| c T_s/(k_0 l_min): a deviation of the current keeps its direction in the stationary frame
  *   while the rotor turns, so that the compensation acts on it rotated by the angle of one and a half periods.
  * Source   docs/theory/modulation.md (MO-12)

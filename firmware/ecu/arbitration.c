@@ -63,7 +63,7 @@ void arbitrate_hold(const arbitrate_config_t *config, arbitrate_state_t *state, 
     const q31_t max = fx_add_q31(fx_abs_q15(torque_limited) * Q31_PER_Q15, config->jerk);
     if (fx_abs_q31(state->torque_arbitrated) > max) {
         const bool outwards = (state->rate < 0) == (state->torque_arbitrated < 0);
-        /* A rate towards zero follows a smaller request: it is kept, whatever the limit does. */
+        /* A rate towards zero follows a smaller request: a change of the limit does not reset it. */
         *state = (arbitrate_state_t){.torque_arbitrated = fx_clamp_q31(state->torque_arbitrated, -max, max),
                                      .rate = outwards ? 0 : state->rate};
     }

@@ -12,7 +12,7 @@ static bool is_within(const battery_voltage_in_t *in, float share)
     return difference_V <= bound_V && difference_V >= -bound_V;
 }
 
-/* A battery whose voltage was known and is lost may have any voltage now. */
+/* If the battery's voltage was known and its message is lost, the battery may have any voltage now. */
 bool battery_voltage_is_near(const battery_voltage_in_t *in)
 {
     return !(in->battery_V > 0.0F) || (in->alive && is_within(in, NEAR_SHARE));

@@ -85,7 +85,7 @@ static void set_outputs(const ecu_t *ecu)
     hal_board_set(BOARD_SAFE_STATE, needs_hardware(ecu, on));
 }
 
-/* The question is answered at the end of the step, by what has been passed in it. */
+/* The watchdog's question is answered at the end of the step, by the signature of the parts that have run. */
 static void begin_step(ecu_t *ecu)
 {
     const state_outputs_t *on = &supervisor_outputs[ecu->supervisor.state];
@@ -217,7 +217,7 @@ static void send_xcp(ecu_t *ecu)
 void ecu_task_1khz(ecu_t *ecu)
 {
     data_check_restore_pointer(&ecu->drive);
-    const raw_sample_t raw = read_raw_sample(&ecu->drive); /* first, long before the next period's conversions */
+    const raw_sample_t raw = read_raw_sample(&ecu->drive); /* first: before the next period's conversions end */
     ecu_check_integrity(ecu);
     step_clock_step(&ecu->clock);
     begin_step(ecu);

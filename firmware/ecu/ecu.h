@@ -8,7 +8,7 @@
  * Source   docs/howto/can.md; docs/architecture.md
  * Units    per unit inside, the DBC's units on the bus
  * Errors   latched faults of drive and supervisor, transmitted on the bus
- * Context  ecu_init() once, then ecu_continue() if a reset has interrupted a drive; ecu_task_1khz() every
+ * Context  ecu_init() once, then ecu_continue() if a reset has interrupted driving; ecu_task_1khz() every
  *          bases.periods_per_step periods */
 #include "calibration/xcp_access.h"
 #include "comm/can_rx.h"

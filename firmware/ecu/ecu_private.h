@@ -15,12 +15,12 @@ void ecu_watch(ecu_t *ecu);
 supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault);
 arbitrate_in_t ecu_arbitration(const ecu_t *ecu);
 torque_limits_t ecu_limits(const ecu_t *ecu);
-/* The movement that the bus asks for. */
+/* The movement that the bus requests. */
 movement_request_t ecu_movement(const ecu_t *ecu);
 /* The part of the telemetry that comes from the bus and the state machine. */
 void ecu_telemetry(const ecu_t *ecu, telemetry_t *telemetry);
 
-/* A part of the step has been passed. */
+/* Adds a part of the step that has run to the signature (signal/program_flow.h). */
 static inline void ecu_pass(ecu_t *ecu, flow_point_t point)
 {
     ecu->drive.task.flow = flow_pass(ecu->drive.task.flow, point);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The movement that the bus asks for, in the units of the drive. */
+/* The movement that the bus requests, in the units of the drive. */
 #include "ecu/ecu_private.h"
 #include "types/si.h"
 

@@ -6,7 +6,7 @@
 #include "types/si.h"
 
 #define CONSECUTIVE_MAX 3U
-#define PERIODS_MAX_STEPS 4U    /* a task that is later has a fault of its own */
+#define PERIODS_MAX_STEPS 4U    /* a task that is later than this has latched another fault */
 #define TOUCH_SAFE_V 60.0F      /* ISO 6469-3, dc */
 #define SETTLED_BAND Q15(0.01)  /* of V_b */
 #define SETTLED_US 50000U
@@ -42,8 +42,8 @@ void ecu_watch(ecu_t *ecu)
     }
 }
 
-/* Counted from the start of the precharge: before it a turning machine may hold the dc link at another voltage than the
- * battery's, through the diodes. */
+/* Counted from the start of the precharge: before it a turning machine may keep the dc link, through the diodes, at a
+ * voltage that is not the battery's. */
 static bool is_dc_settled(ecu_t *ecu, int32_t v_dc)
 {
     settling_t *settling = &ecu->settling;
@@ -72,10 +72,10 @@ static bool are_sensors_plausible(const drive_t *drive, const sample_t *sample)
     return drive->samples.generation != 0U && (idle || switches || may_rectify(drive, sample));
 }
 
-/* Whether contactor and gate supply may be switched off. At the known speed (safety/safe_state.h) the magnets make less
- * than what may be touched, and less than 0.8 of the lowest dc voltage at which the drive runs: without them the diodes
- * would charge the dc link, beyond what the inverter withstands at high speed. A gate fault may need them for longer
- * (safety/gate_fault.h). */
+/* Whether contactor and gate supply may be switched off: at the known speed (safety/safe_state.h) the line back-EMF is
+ * below the voltage that is safe to touch, and below 0.8 of the lowest dc voltage at which the drive runs. At higher
+ * speed and without contactor and gate supply the diodes would charge the dc link, at high speed beyond what the
+ * inverter withstands. A gate fault may need both for longer (safety/gate_fault.h). */
 static bool is_slow(const drive_t *drive)
 {
     const q15_t least = fx_mul_q15(drive->motor->safe_state.share_open, drive->motor->monitor.v_min);

@@ -7,9 +7,9 @@
 #define ABSENT_US 10000U /* longest time without a supply that is required; its start included */
 
 typedef struct {
-    bool on, wrong; /* what the stage does */
-    bool supply;    /* what must follow */
-    uint16_t fault; /* of the path if it does not */
+    bool on, wrong; /* this stage switches the supply on; gives wrong answers */
+    bool supply;    /* the supply that must then be read back */
+    uint16_t fault; /* the path's fault if it is not */
 } stage_t;
 
 static const stage_t stages[] = {
@@ -53,7 +53,7 @@ static void test_step(shut_off_t *state, const shut_off_in_t *in)
     }
 }
 
-/* A supply that returns by itself must not bring back the torque: its absence is latched. */
+/* The torque must not return when an absent supply comes back: the absence is latched. */
 static uint16_t absent(shut_off_t *state, const shut_off_in_t *in)
 {
     const bool missing = in->wanted && !in->supply;
@@ -66,7 +66,7 @@ static uint16_t absent(shut_off_t *state, const shut_off_in_t *in)
 
 void shut_off_step(shut_off_t *state, const shut_off_in_t *in)
 {
-    if (!in->fitted && state->stage == 0U && state->failed == 0U) { /* once found, it is required */
+    if (!in->fitted && state->stage == 0U && state->failed == 0U) { /* once it was found, it stays required */
         state->tested = true;
         return;
     }

@@ -3,7 +3,7 @@
 
 #include "signal/counter.h"
 
-#define SELF_TEST_MS 50U         /* the least time in init */
+#define SELF_TEST_MS 50U         /* minimum time in init */
 #define SELF_TEST_TIME_OUT_MS 500U
 #define PRECHARGE_TIME_OUT_MS 2000U
 #define DISCHARGE_TIME_OUT_MS 5000U
@@ -20,7 +20,7 @@ static bool refuse(supervisor_t *s, refused_t reason)
     return false;
 }
 
-/* The measured values, and what is asked for. */
+/* The conditions of enable that depend on measured values and on the request. */
 static bool grant_by_values(supervisor_t *s, const supervisor_in_t *in)
 {
     if (!in->dc_in_range) {
@@ -93,7 +93,7 @@ static bool is_settled_in_range(const supervisor_in_t *in)
     return in->dc_in_range && in->dc_settled;
 }
 
-/* A dc link that has settled at another voltage than the battery's is not a precharge that takes long. */
+/* A dc link that has settled at a voltage that is not the battery's is reported as such, not as a slow precharge. */
 static uint32_t precharge_fault(const supervisor_t *s, const supervisor_in_t *in)
 {
     const bool elsewhere = is_settled_in_range(in) && !in->dc_near_battery;
@@ -165,7 +165,7 @@ static bool has_passed_self_test(const supervisor_t *s, const supervisor_in_t *i
     return in->sensors_plausible && in->shut_off_tested && s->us > SELF_TEST_MS * 1000U;
 }
 
-/* Without tested shut-off paths the dc link is not charged, also not after a fault that ended the start. */
+/* The dc link is charged only after the shut-off paths have been tested, also if a fault has ended the start. */
 static bool is_on(const supervisor_in_t *in)
 {
     return in->alive && in->torque_mode && in->shut_off_tested;

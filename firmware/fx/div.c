@@ -19,7 +19,7 @@ q31_t fx_div_q31(int32_t num, int32_t den)
     if (n >= d) {
         return (n == 0U) ? 0 : (sign ^ INT32_MAX);
     }
-    /* n < d keeps its order under the common shift; n / d * 2^32 is halved when rounded. */
+    /* The common shift keeps n < d. The quotient n / d * 2^32 is halved when it is rounded. */
     const unsigned shift = (unsigned)__builtin_clz(d);
     const uint32_t d_high = (d << shift) >> 16;
     const uint32_t d_low = (d << shift) & 0xFFFFU;

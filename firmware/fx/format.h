@@ -9,8 +9,8 @@
  * Range    every argument of every function, unless its comment says otherwise
  * Rounding half up (towards plus infinity); saturation to the nearest end of the format
  * Errors   none: saturation is the defined result, detect it by comparison where it matters
- * Context  any; 1 to 4 instructions each, no loop, no division. What is not inline is used by no settled period, and
- *          one copy takes less memory than many */
+ * Context  any; 1 to 4 instructions each, no loop, no division. Functions that are not inline are not used in a settled
+ *          period; one copy of them takes less memory than many */
 
 #include <stdint.h>
 
@@ -26,7 +26,7 @@ typedef int32_t q16_t;
 #define Q31_MIN ((q31_t)INT32_MIN)
 #define Q16_ONE ((q16_t)65536)
 
-/* For constants of compile time only, rounded half away from zero, saturated. With a variable the firmware would
+/* For compile-time constants only: rounded half away from zero, saturated. With a variable argument the firmware would
  * compute in floating point at run time. */
 #define FX_CONST(x, one, lo, hi) \
     (((x) * (one) >= (hi)) ? (hi) \

@@ -8,8 +8,8 @@
 #include "types/faults.h"
 
 #define STANDING_ANGLE (1U << 25) /* 1/128 of a turn, 2.8 degrees */
-#define UNCERTAIN 8 /* times v_0: a leg without current may be off by the whole dead time, either way */
-#define MOVING_STEPS 4 /* the voltage that moved the currents is no part of the mean */
+#define UNCERTAIN 8 /* times v_0: the voltage of a leg without current is uncertain by +- the whole dead time */
+#define MOVING_STEPS 4 /* after a change: the mean is the present value, without the voltage of the transient */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 10
 
@@ -21,7 +21,7 @@ static bool has_moved(const frozen_angle_config_t *config, const frozen_angle_st
            fx_abs_q31(in->i_ref.q - state->i_ref.q) > config->i_0;
 }
 
-/* Without the voltage that changes the flux (MN-27): references that creep by less than i_0 are no movement. */
+/* Acting voltage without the part that changes the flux (MN-27): a reference may drift slowly without exceeding i_0. */
 static dq_q15_t standing_voltage(const frozen_angle_config_t *config, frozen_angle_state_t *state,
                                  const frozen_angle_in_t *in)
 {
@@ -62,7 +62,7 @@ static bool has_changed(const frozen_angle_config_t *config, const frozen_angle_
 {
     const int32_t i_held = 2 * config->i_0;
     if (fx_magnitude(in->i_ref.d, in->i_ref.q) <= 2 * i_held) {
-        return false; /* two legs may be without current */
+        return false; /* at so small a current two legs may carry none */
     }
     const q15_t d = fx_sat_q15((state->mean_q8.d - state->first_q8.d) >> 8);
     const q15_t q = fx_sat_q15((state->mean_q8.q - state->first_q8.q) >> 8);

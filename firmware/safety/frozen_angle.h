@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_FROZEN_ANGLE_H
 #define SAFETY_FROZEN_ANGLE_H
-/** Finds a rotor that turns although its measured angle stands still. While angle and current reference stand still,
- * so must the voltage: the drop of the resistance and the inverter's error belong to the currents, and only a turning
- * rotor induces another voltage.
+/** Finds a rotor that turns although its measured angle stands still. While angle and current reference are constant,
+ * the voltage must be constant, too: resistive drop and inverter error depend on the currents only, and any other
+ * change of the voltage is induced by a turning rotor.
  *   m: first-order mean of u, four steps, begun anew when either moves or the speed lags
  *   m_0: m when angle and reference came to a standstill; follows in 1024 steps
  *   |m - m_0| > v_0 in a row of steps, 8 v_0 while a phase current is below 2 i_0; no check below |i*| = 4 i_0

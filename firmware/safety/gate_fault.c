@@ -16,7 +16,8 @@ static bool is_switch_shorted(const gate_fault_config_t *config, gate_fault_stat
     return state->opposed == config->volt_steps || (state->switch_shorted && in->latched);
 }
 
-/* At rest, or no switch is shorted: the machine turns without a current. */
+/* Contactor and gate supply may be switched off: at rest, or if no switch is shorted, which a turning machine without
+ * current shows. */
 static bool may_release(gate_fault_state_t *state, const gate_fault_in_t *in, bool none)
 {
     const bool quiet = debounce_holds(&state->quiet, none, QUIET_STEPS);

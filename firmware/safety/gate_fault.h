@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_GATE_FAULT_H
 #define SAFETY_GATE_FAULT_H
-/** What a gate-driver fault needs. Its usual cause is a shorted switch: with switching disabled a turning machine is
- * then braked by half waves, at any speed.
+/** The safe state that a gate-driver fault needs. Its usual cause is a shorted switch: with switching disabled,
+ * half-wave currents then brake a turning machine at any speed.
  *   e > v_dc/8: short circuit at once; e < v_dc/16: switching disabled; between: as before
  *   A current above i_alive + 2 |i_0| although switching is disabled, while the sum of (v_dc - e) T over the steps
- *   exceeds 1.5 sqrt(3) psi_b: no flux of the windings lasts that long against the dc link, so a switch is shorted.
+ *   exceeds 1.5 sqrt(3) psi_b: the dc link ends any current of the windings sooner, so a switch is shorted.
  *   That is a gate fault, too, and needs the short circuit until the faults are reset. i_0, the mean of the measured
  *   phases, excludes the offset of one sensor, which looks like a current of 2 |i_0|.
  *   Contactor and gate supply may be switched off with a gate fault when the machine is at rest (e <= v_dc/64), or when
@@ -22,7 +22,7 @@
 #include "types/frames.h"
 
 typedef struct {
-    q15_t i_alive;      /* a phase current above it is no measuring error */
+    q15_t i_alive;      /* a phase current above this is not a measuring error */
     int32_t volt_steps; /* 1.5 sqrt(3) psi_b in V_b times a step */
 } gate_fault_config_t;
 
@@ -44,7 +44,7 @@ typedef struct {
     dq_q15_t i;
 } gate_fault_in_t;
 
-/** A current that is no measuring error flows although switching is disabled. */
+/** Whether a current above the measuring error flows although switching is disabled. */
 bool gate_fault_current_flows(const gate_fault_config_t *config, const gate_fault_in_t *in);
 
 /** Whether a gate fault needs the short circuit now, or would need it. */

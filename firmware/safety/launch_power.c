@@ -7,14 +7,14 @@
 #include "signal/mean.h"
 #include "types/faults.h"
 
-#define FAST_ANGLE (1U << 26) /* 1/64 of a turn in a step: above, the monitor of the back-EMF follows */
-#define MOVING_STEPS 4      /* the voltage that moved the currents is no part of the mean */
+#define FAST_ANGLE (1U << 26) /* 1/64 of a turn in a step: above this the monitor of the back-EMF takes over */
+#define MOVING_STEPS 4      /* after a change: the mean is the present value, without the voltage of the transient */
 #define MEAN_SHIFT 2
 #define FIRST_SHIFT 12
 #define NOISE_SHIFT 4
 #define NOISE_MAX 8 /* times v_1: largest noise of one step, as the currents may change without the reference */
 
-/* Products of a sum and a q15: half their size. */
+/* Half the product of a sum and a q15 number. */
 static int32_t times(int32_t sum, int32_t x)
 {
     return fx_mulhi(sum, x * 65536);
@@ -46,7 +46,7 @@ static void update_noise(const launch_power_config_t *config, launch_power_state
     const bool above = deviation > 0;
     const int32_t largest = NOISE_MAX * times(config->v_1, fx_magnitude(state->i_ref.d, state->i_ref.q));
     const int32_t limited = fx_min_s32(fx_abs_q31(deviation), fx_min_s32(largest, UINT16_MAX));
-    const int32_t noise_q8 = (above != state->above) ? limited * 256 : 0; /* after a lasting change it keeps one sign */
+    const int32_t noise_q8 = (above != state->above) ? limited * 256 : 0; /* noise changes its sign, a fault does not */
     state->above = above;
     state->noise_q8 = mean_step(state->noise_q8, noise_q8, settled ? NOISE_SHIFT : MEAN_SHIFT);
     state->first_noise_q8 = settled ? mean_step(state->first_noise_q8, state->noise_q8, FIRST_SHIFT) : state->noise_q8;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SAFETY_LAUNCH_POWER_H
 #define SAFETY_LAUNCH_POWER_H
-/** Finds a wrong angle when the rotor begins to turn. At standstill all electrical power is loss, and the loss belongs
- * to the currents. While the current reference stands still, the power may change only by that of the tables' torque.
+/** Finds a wrong angle when the rotor begins to turn. At standstill all electrical power is loss, and the loss depends
+ * on the currents only. While the current reference is constant, the power may change only by that of the torque that
+ * the tables give.
  *   p = u.i* - w t, u without the voltage that changes the flux, w from the angles at both ends of the step
  *   m, n: first-order means of p and w, four steps, begun anew when the reference moves
  *   m_0, n_0: m and n when the reference came to a standstill; follow in 4096 steps

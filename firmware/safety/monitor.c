@@ -5,7 +5,7 @@
 #include "signal/debounce.h"
 
 enum { OVER_VOLTAGE_SAMPLES = 2, UNDER_VOLTAGE_SAMPLES = 10, CURRENT_SUM_SAMPLES = 5 };
-/* Of the angle's count: glitches may last 5 ms, single spikes may not be frequent (MN-21). */
+/* Added to the angle's count for an implausible sample: a disturbance may last 5 ms, single samples be rare (MN-21). */
 enum { ANGLE_JUMP = 4, ANGLE_FIRST_JUMP = 40 };
 
 /* |x| > limit by one unsigned comparison. */

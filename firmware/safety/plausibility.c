@@ -73,8 +73,8 @@ static uint32_t oscillation(const plausibility_config_t *config, plausibility_st
     return debounce_step(&state->oscillating, bad, config->ripple_steps, FAULT_CONTROL);
 }
 
-/* (MN-3): the sum of the phase currents does not change, so that a phase must change by as much as the other two
- * together. It may well repeat itself while they change against each other, for example in a machine at rest. */
+/* (MN-3): the phase currents sum to zero, so a phase must change by as much as the other two together. It may stay the
+ * same while these change in opposite directions, for example in a machine at rest. */
 static bool is_sensor_stuck(const plausibility_config_t *config, uint8_t *count, int32_t change, int32_t of_others)
 {
     const int32_t change_min = config->i_dead >> 2; /* several converter counts: more than noise between two of them */
@@ -112,8 +112,8 @@ static uint32_t wrong_reference(plausibility_state_t *state, const plausibility_
     return debounce_step(&state->reference, wrong, REFERENCE_STEPS, FAULT_INPUT);
 }
 
-/* (MN-38): the zero of a current is known whenever none can flow, hence before the first start, but not where the drive
- * is enabled again while the machine turns. */
+/* (MN-38): the zero of a current sensor can be checked only while no current can flow: before the first start, but not
+ * when the drive is enabled again while the machine turns. */
 static uint32_t wrong_zero(const plausibility_config_t *config, plausibility_state_t *state,
                            const plausibility_in_t *in)
 {

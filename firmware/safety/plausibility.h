@@ -34,7 +34,7 @@ typedef struct {
     q15_t answer_rate;    /* share of a change of the reference that the current follows in a step; Q15_MAX: all */
     q15_t omega_trip;
     int16_t inverter_trip_dC, winding_trip_dC;
-    int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is cut, else five times */
+    int16_t deviation_steps;    /* 100 ms: a step counts once while the voltage is limited, else five times */
     uint8_t contradicted_steps; /* 70 ms */
     uint8_t ripple_steps, lost_steps, equal_steps, fast_steps, hot_steps; /* 20, 8, 20, 5, 110 ms */
 } plausibility_config_t;

@@ -7,7 +7,7 @@
 #define FALL_PER_STEP Q15(0.004) /* of the speed base: from there to standstill in 250 steps */
 #define CONFIRMED_STEPS 20
 #define FALL_SHIFT 6 /* of the known dc voltage: 64 steps */
-#define RECTIFYING_STEPS 10 /* longer than the currents last that the dc link opposes (SS-10) */
+#define RECTIFYING_STEPS 10 /* the dc link ends every current of the windings sooner (SS-10) */
 #define RELEASE_STEPS 200 /* several time constants of a shorted machine */
 #define UNKNOWN_STEPS 20000U /* 18 to 22.5 s: a step is 0.89 to 1.125 ms */
 
@@ -23,7 +23,7 @@ static bool is_steady(dq_q15_t now, dq_q15_t before, int32_t part)
     return squared(fx_sat_q15(now.d - before.d), fx_sat_q15(now.q - before.q)) < squared(now.d / part, now.q / part);
 }
 
-/* The short circuit's currents are too small for a machine that turns (SS-7), whatever the angle says. */
+/* The currents of the short circuit are too small for a machine that turns (SS-7), whatever angle is measured. */
 static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool none = squared(in->psi_current.d, in->psi_current.q) < squared(config->psi_f / 8, 0);
@@ -31,7 +31,8 @@ static bool is_at_rest(const safe_state_config_t *config, safe_state_state_t *st
 }
 
 /* Whether the measured speed may be used now. In the short circuit the currents must stand still in the rotor's
- * frame (SS-6): from step to step, and within a period, without which a frozen angle at 1 kHz would pass. */
+ * frame (SS-6): from step to step, and within a period. Without the latter, an angle that is frozen would not be found
+ * at an electrical frequency of 1 kHz. */
 static bool is_speed_known(safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool checked = in->shorted && in->currents_valid;
@@ -61,9 +62,9 @@ static void follow_speed(const safe_state_config_t *config, safe_state_state_t *
     }
 }
 
-/* (SS-19). A sensor that reads almost nothing is an under-voltage within 1 ms, in which the known voltage falls by 2 %.
- * One that reads 20 or 30 % too little is found after up to 91 ms or not at all: the known voltage follows it. After a
- * fault the diodes decide: a link whose voltage is really below the back-EMF draws a current. */
+/* (SS-19). A sensor that reads almost nothing causes an under-voltage fault within 1 ms; the known voltage falls by 2 %
+ * until then. One that reads 20 or 30 % too little is found after up to 91 ms or not at all: the known voltage follows.
+ * After a fault the diodes show the truth: a link whose voltage is really below the back-EMF draws a current. */
 static void follow_voltage(safe_state_state_t *state, const safe_state_in_t *in)
 {
     const bool rectifies = debounce_holds(&state->rectifying, in->rectifying, RECTIFYING_STEPS);

@@ -16,7 +16,7 @@ static q15_t dot(dq_q15_t a, dq_q15_t b)
     return fx_sat_q15((fx_mul_q30((q15_t)a.d, (q15_t)b.d) >> 15) + (fx_mul_q30((q15_t)a.q, (q15_t)b.q) >> 15));
 }
 
-/* The speed without the tracker's lag, and how far it may still be off (MN-26). */
+/* The speed without the tracker's lag, and its remaining error (MN-26). */
 typedef struct {
     q15_t omega, doubt;
 } speed_t;
@@ -43,7 +43,7 @@ bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, 
     return fx_mul_q15(fx_abs_q15(lag), fx_magnitude(psi.d, psi.q)) > config->v_lag;
 }
 
-/* Resistance that the winding has, and by how much it may differ. */
+/* Resistance at the winding's temperature, and its largest error. */
 typedef struct {
     q16_t r, error;
 } resistance_t;
@@ -67,7 +67,7 @@ static resistance_t resistance(const torque_monitor_config_t *config, int16_t wi
     return (resistance_t){middle >> 15, (half_range + middle / TOLERANCE) >> 15};
 }
 
-/* Speed and resistance that the machine has now, and how far each may be off. */
+/* Present speed and resistance of the machine, each with its largest error. */
 typedef struct {
     speed_t speed;
     resistance_t r;

@@ -29,7 +29,7 @@
 typedef struct {
     q31_t r;                                /* at 20 C, < 1/4 */
     q31_t r_per_dC;                         /* per 0.1 K */
-    int16_t winding_min_dC, winding_max_dC; /* what a winding may have: -40 C to its trip */
+    int16_t winding_min_dC, winding_max_dC; /* range of the winding's temperature: -40 C to its trip */
     q15_t psi_f;
     q15_t t_0;                                       /* torque error allowed at no torque */
     q15_t v_0;                                       /* voltage error of the inverter */
@@ -37,7 +37,7 @@ typedef struct {
     q15_t i_0;                                       /* current error of noise and of the current's zero crossings */
     q16_t rate_gain;                                 /* 1/(omega_b task period): flux step to voltage */
     q16_t lag_gain;                                  /* lag of the tracked speed, in steps */
-    q15_t lag_noise;                                 /* lag that one count of the sensor feigns */
+    q15_t lag_noise;                                 /* apparent lag that one count of the sensor causes */
     q15_t v_lag;                                     /* rotational voltage that may be missing */
     q15_t mean_rate;                                 /* of the first-order mean, per step */
     uint8_t torque_steps, angle_steps, settle_steps; /* 20, 5, 5 ms */
@@ -58,11 +58,11 @@ typedef struct {
     int16_t winding_dC; /* or one of types/temperature.h */
 } torque_monitor_in_t;
 
-/** By how much the tracked speed is behind the rotor's, less what one count of the sensor feigns; 0 while it is not
+/** Lag of the tracked speed behind the rotor's beyond the apparent lag that one count of the sensor causes, else 0
  * (MN-41). Before torque_monitor_step() with the same speed. */
 q15_t torque_monitor_lag(const torque_monitor_config_t *config, const torque_monitor_state_t *state, q15_t tracked);
-/** Whether the voltage of flux psi that this lag leaves out matters to the monitors of a standing angle and of a
- * launch. */
+/** Whether the rotational voltage of flux psi that this lag omits is large enough to disturb the monitors
+ * frozen_angle.h and launch_power.h. */
 bool torque_monitor_is_behind(const torque_monitor_config_t *config, q15_t lag, dq_q15_t psi);
 uint32_t torque_monitor_step(const torque_monitor_config_t *config, torque_monitor_state_t *state,
                              const torque_monitor_in_t *in);

@@ -4,7 +4,7 @@
 #include "scope/columns.h"
 #include "scope/trigger.h"
 
-#define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete so many periods while a step copies */
+#define USABLE (SAMPLE_SLOTS - 4U) /* the fast ISR may complete 4 periods while a step copies */
 
 bool capture_config_is_valid(const capture_config_t *config)
 {
@@ -117,7 +117,7 @@ static void record(capture_t *capture, int16_t *memory, const capture_source_t *
     }
 }
 
-/* The ring no longer has the next period. */
+/* The ring no longer contains the next period: the capture ends early, or the search begins again. */
 static void lose(capture_t *capture, uint32_t newest)
 {
     capture->lost++;

@@ -86,7 +86,7 @@ static __attribute__((noinline)) void copy_rows(int16_t *to, rows_t rows, const 
     }
 }
 
-/* Replaces what the rows have put in the place of the step's values, which are constant during the step. */
+/* Writes the step's values, which are constant during the step, over what the rows contain in their places. */
 static void fill_step(const capture_t *capture, int16_t *to, const scope_step_values_t *step, uint32_t count)
 {
     const uint32_t signals = capture->config.signals;

@@ -31,8 +31,8 @@ static inline uint32_t lesser(uint32_t a, uint32_t b)
 /** The places of the captured signals, for columns_copy(): once, when a capture begins. */
 void columns_find(capture_t *capture);
 column_t column_of(const capture_t *capture, const capture_source_t *source, uint8_t signal);
-/** So many samples, at least one, of all captured signals, from the next period on, which lie side by side in the
- * ring. */
+/** Copies `count` samples, at least one, of all captured signals, from the next period on. The samples must be
+ * contiguous in the ring. */
 void columns_copy(const capture_t *capture, int16_t *to, const capture_source_t *source, uint32_t count);
 
 #endif

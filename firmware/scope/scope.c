@@ -117,7 +117,7 @@ scope_result_t scope_command(scope_t *scope, const drive_t *drive, const uint8_t
     }
 }
 
-/* What has been triggered is kept. */
+/* A capture that has been triggered is kept. */
 static void begin_fault(capture_t *capture, uint32_t period, uint32_t newest)
 {
     if (capture->state == CAPTURE_ARMED && capture->config.trigger == TRIGGER_FAULT) {
@@ -146,8 +146,8 @@ static void follow_faults(scope_t *scope, const drive_t *drive, bool ecu_fault, 
     scope->fault = fault;
 }
 
-/* The periods that are copied here have used the last command but one of the task, whose values are kept for them; the
- * last one, which it has just written, acts from the next period on. */
+/* The periods copied here ran with the task's last command but one, whose values are kept for them. The command that
+ * the task has just written acts from the next period on. */
 void scope_record(scope_t *scope, const drive_t *drive, bool ecu_fault)
 {
     const uint32_t newest = drive->samples.generation; /* read once: a freeze frame may use the whole ring */

@@ -41,7 +41,7 @@ typedef struct {
 
 /** command: without the protocol's own code. */
 scope_result_t scope_command(scope_t *scope, const drive_t *drive, const uint8_t *command, uint8_t length);
-/** A step while the scope records or a fault has come or gone. */
+/** A step of the scope while it records, or when a fault has occurred or has been reset. */
 void scope_record(scope_t *scope, const drive_t *drive, bool ecu_fault);
 
 /** Once per step. ecu_fault: outside of the drive. */

@@ -56,7 +56,7 @@ static uint32_t search(capture_t *capture, const capture_source_t *source, uint3
     return count_until(&reached, from, count);
 }
 
-/* Of samples that are not searched: an edge may follow the last of them. */
+/* Passes over samples without searching them; the last one is kept, because an edge may follow it. */
 static void skip(capture_t *capture, const capture_source_t *source, uint32_t count)
 {
     if (is_edge(capture)) {
@@ -65,7 +65,7 @@ static void skip(capture_t *capture, const capture_source_t *source, uint32_t co
     }
 }
 
-/* The samples that a command or a fault leaves before the trigger. */
+/* Number of samples from the next one until the trigger that a command or a fault has requested. */
 static uint32_t until_asked(const capture_t *capture)
 {
     const uint32_t divisor = capture->config.divisor;

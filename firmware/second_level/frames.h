@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SECOND_LEVEL_FRAMES_H
 #define SECOND_LEVEL_FRAMES_H
-/** The commands of the bus as they were received, checked and decoded by the second level for itself.
+/** The commands received from the bus, checked and decoded by the second level's own code.
  *   CRC-8 0x1D over the data id and bytes 1 ... 7, from a table of 16 entries; counter 0 ... 14, advancing by 1 or 2;
  *   the first frame, and the first after a jump or a time-out, only synchronises
  * Source   firmware/comm/fluxtrue.dbc: frames 0x110 and 0x111; AUTOSAR profile 11

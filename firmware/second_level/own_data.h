@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SECOND_LEVEL_OWN_DATA_H
 #define SECOND_LEVEL_OWN_DATA_H
-/** Whether the second level's constants are those that were generated, checked in slices while the drive runs.
- *   CRC-32 (IEEE 802.3) of all bytes behind `checksum`, SECOND_LEVEL_SLICE of them in each step; damage is found at the
- *   end of the pass after the one in which it happened at the latest: in fewer steps than two passes have
+/** Checks in slices, while the drive runs, whether the second level's constants are those that were generated.
+ *   CRC-32 (IEEE 802.3) of all bytes behind `checksum`, SECOND_LEVEL_SLICE of them in each step. Damage is found at the
+ *   latest at the end of the pass after the one in which it occurred, that is, in fewer steps than two passes take
  * Source   docs/theory/second-level.md (SL-7)
  * Errors   false at the end of a pass that does not match; the caller latches it
  * Context  1 kHz task */

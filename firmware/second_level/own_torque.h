@@ -7,8 +7,8 @@
  *   theta_e = p theta_m + offset;  i_d = i_alpha cos + i_beta sin,  i_q = i_beta cos - i_alpha sin
  *   t = sgn(i_q) (table(i_d, |i_q|) + c)
  *   c = psi_d_error |i_q| + lq_error (table - (psi_f + l_d i_d) |i_q|), -table/5 ... 0
- *   c is what the identified deviation of magnet and q axis takes from it: it counts only where it makes the torque
- *   smaller, and at most as far as a healthy machine may deviate. The sign of i_q is that of the torque
+ *   c corrects the table by the identified deviation of magnet and q axis: only towards a smaller torque, and at most
+ *   as far as a healthy machine may deviate. The torque has the sign of i_q
  * Source   docs/theory/second-level.md (SL-3), (SL-4), (SL-8)
  * Units    per unit of T_b
  * Range    every argument; outside the table its edge

@@ -2,9 +2,9 @@
 #ifndef SECOND_LEVEL_SECOND_LEVEL_H
 #define SECOND_LEVEL_SECOND_LEVEL_H
 /** The independent second level: compares the torque that it computes from the currents with the torque that it
- * permits from the received frames. It shares with the first level the fixed-point library and the measured samples:
- * neither code, nor tables, nor references, nor limits. What it takes from the first level is in second_level_in_t:
- * whether the bridge switches, the calibrated slew, and the identified deviations of magnet and q axis.
+ * permits from the received frames. It shares with the first level only the fixed-point library and the measured
+ * samples, but no other code, no tables, references or limits. second_level_in_t holds what it takes from the first
+ * level: whether the bridge switches, the calibrated slew, and the identified deviations of magnet and q axis.
  *   |mean of the own torque over some milliseconds| > bound + t_0 + share bound for `confirm_steps`: fault
  *   bound is that of the permitted torque in the same direction
  * Source   docs/theory/second-level.md (SL-6); docs/decisions/017-second-level.md

@@ -14,8 +14,8 @@
 
 #include "fx/q.h"
 
-/* A call would add some 100 instructions to a step of the 1 kHz task. Without optimisation, as in the build that
- * measures coverage, it is a function, because otherwise the branches of each caller would count with it. */
+/* Inlined: calls would add some 100 instructions to a step of the 1 kHz task. Without optimisation, as in the build
+ * that measures coverage, it is a function; otherwise its branches would be counted in every caller. */
 #ifdef __OPTIMIZE__
 #define DEBOUNCE_INLINE __attribute__((always_inline)) static inline
 #else

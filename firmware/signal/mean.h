@@ -2,7 +2,7 @@
 #ifndef SIGNAL_MEAN_H
 #define SIGNAL_MEAN_H
 /** First-order means.
- *   mean_step()   in a word: mean + (x - mean)/2^shift, a step of x is followed to 1 - 1/e in 2^shift steps
+ *   mean_step()   in a word: mean + (x - mean)/2^shift, follows a step of x to 1 - 1/e in 2^shift calls
  *   mean_follow() from + rate (to - from)
  * Source   docs/theory/monitors.md (MN-22), (MN-28); (MN-1), (MN-27)
  * Units    those of x

@@ -12,7 +12,7 @@
 #define FLOW_FACTOR 0x9E3779B1U
 
 typedef enum {
-    FLOW_INTEGRITY = 1,  /* what the memory may have changed is checked */
+    FLOW_INTEGRITY = 1,  /* the data are checked for changes by errors of the memory */
     FLOW_RECEIVED = 2,   /* frames are received, their ages advanced */
     FLOW_INTERRUPTS = 3, /* the fast ISR has completed periods since the last step, and not too many */
     FLOW_STATES = 4,     /* the state machine, and with it the board's outputs */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "signal/seal.h"
 
-/* A word of what is sealed, of whatever type its members are. */
+/* A word of the sealed data, whose members may have any type. */
 typedef uint32_t __attribute__((may_alias)) sealed_word_t;
 
 uint32_t seal_of(const void *data, uint32_t size)

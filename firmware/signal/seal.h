@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef SIGNAL_SEAL_H
 #define SIGNAL_SEAL_H
-/** A checksum of a few words that only their owner writes: it seals them when it has written them, and compares before
- * it uses them again. Errors of the memory in between are found.
+/** A checksum (seal) of a few words that only their owner writes. The owner computes it after each write and compares
+ * it before the next use, which finds errors of the memory in between.
  *   s <- word xor (s rotated right by one bit), over all words
  * Source   docs/theory/data-integrity.md (DI-3)
  * Range    any number of aligned words; size in bytes
- * Errors   none; every single flipped bit changes the seal, and so do two, unless bit plus word are equal modulo 32
+ * Errors   none; every single flipped bit changes the seal. So do two flipped bits, unless the sum of bit number and
+ *          word number is the same for both modulo 32
  * Context  any; about three instructions for each word, a CRC would take some fifty */
 #include <stdint.h>
 

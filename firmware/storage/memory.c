@@ -28,7 +28,7 @@ uint32_t memory_layout(const motor_t *m)
     return ~crc32_update(crc, m->identify.sigma, sizeof m->identify.sigma);
 }
 
-/* The seven values together are no further from the motor data than one machine in a thousand is (ID-22). */
+/* Chi-square test: only one machine in a thousand has seven values that are further from the motor data (ID-22). */
 static bool is_near_priors(const identify_record_t *identified)
 {
     int64_t distance_q26 = 0;
@@ -39,7 +39,7 @@ static bool is_near_priors(const identify_record_t *identified)
     return distance_q26 <= DISTANCE_MAX_Q26;
 }
 
-/* From half to twice what motor.toml gives for dead time and device drop, and a knee that commissioning could find. */
+/* Accepts half to twice the dead time and device drop of motor.toml, and a knee that commissioning could have found. */
 static bool is_near_bridge(const motor_t *m, const compensation_t *compensation)
 {
     const float duty = (float)compensation->dead_time * LSB_Q15;
@@ -49,7 +49,7 @@ static bool is_near_bridge(const motor_t *m, const compensation_t *compensation)
             compensation->knee_q17 <= knee_q17 && compensation->knee_q17 >= knee_q17 / COMPENSATION_KNEE_RANGE);
 }
 
-/* All of the record or, where the drive refuses a part of it, nothing. */
+/* Takes all of the record or, if the drive refuses a part of it, nothing. */
 static bool take(drive_t *drive, const record_t *record)
 {
     if (!drive_recall(drive, &record->identified)) {

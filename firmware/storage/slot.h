@@ -25,7 +25,7 @@ typedef struct {
     bool damaged; /* a slot is neither blank nor intact */
 } newest_t;
 
-/** The bytes of a chunk of which `left` bytes are left. */
+/** Size of the next chunk when `left` bytes are left. */
 static inline uint32_t slot_chunk(uint32_t left)
 {
     return (left < CHUNK) ? left : CHUNK;

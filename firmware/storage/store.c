@@ -78,9 +78,9 @@ static bool prepare(uint32_t slot)
     return slot % HAL_NVM_SECTOR_SLOTS != 0U || hal_nvm_erase(slot);
 }
 
-/* From the slot after the newest record on, as far as the sector before that of the newest record. Where a slot fails
- * the rest of its sector is passed over: it would fail again at each save. The sequence number advances with the place:
- * it shows how often the sectors were erased. */
+/* Tries the slots after the newest record, as far as the sector before that of the newest record. If a slot fails, the
+ * rest of its sector is skipped, because it would fail again at each save. The sequence number advances with the slot
+ * number, so that it shows how often the sectors were erased. */
 bool store_save(uint32_t layout, const void *record, uint32_t size, uint32_t *failed_sectors)
 {
     const newest_t newest = find_newest();

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef TYPES_FAULTS_H
 #define TYPES_FAULTS_H
-/** The fault word's bits: the one place that names and explains them. The value tables and comments of the DBC, the
- *   description file for calibration tools, the words of the library and the pages follow from it (bus.words of the
- *   tools).
+/** The fault word's bits, named and explained here only. From this list the tools (bus.words) write the value tables
+ *   and comments of the DBC, the description file for calibration tools, the words of the library and the pages.
  *   X(NAME, bit, explanation): FAULT_NAME in C, the name in lower case everywhere else
  * Source   docs/theory/monitors.md, docs/architecture.md
  * Context  values only */

@@ -6,9 +6,9 @@
  *   psi_d_error  d-axis flux minus the tables' at the present current: what current control feeds forward
  *   torque_estimated  air-gap torque, mean over the last step;  torque_variance_q30  of it
  *   lq_error  scale of psi_q minus one, which the torque path adds to the tables
- *   What acts on the torque (psi_d_error, lq_error, confidence) is 0 until recalled values have been confirmed
- *   (drive/recall.h). The paper's law identifies psi_delta and r_delta alone and takes the tables for right otherwise:
- *   lq_error is 0, which means not identified, psi_d_error is psi_delta, and the confidence is 1 without a variance.
+ *   The values that act on the torque (psi_d_error, lq_error, confidence) are 0 until recalled values have been
+ *   confirmed (drive/recall.h). The paper's law identifies psi_delta and r_delta only and assumes that the tables are
+ *   right: lq_error is 0, psi_d_error is psi_delta, and the confidence is 1 although no variance is known.
  * Source   docs/theory/identification.md (ID-15) ... (ID-18); docs/theory/mrai.md
  * Units    per unit of the bases in types/bases.h
  * Range    confidence and qualities 0 ... 1; torque_variance_q30 Q30, Q31_MAX: the law does not state one

@@ -2,8 +2,8 @@
 #ifndef TYPES_MOTOR_CHECK_H
 #define TYPES_MOTOR_CHECK_H
 /** The checks that a drive makes before it can run, each with a name: the reason of FAULT_CONFIG.
- *   X(NAME, value, explanation): MOTOR_CHECK_NAME in C. A value is transmitted and stored: a new check gets a new one,
- *   and none is used again
+ *   X(NAME, value, explanation): MOTOR_CHECK_NAME in C. A value is transmitted and stored: a new check gets a new
+ *   value, and no value is used again
  * Source   docs/architecture.md, faults
  * Context  each control block checks its own data (flux_table_check() and the like); drive/motor.c checks what lies
  *          between them and puts the checks in order; a port adds its own, IMAGE_CHECKSUM and PWM_TIMER */

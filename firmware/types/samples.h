@@ -13,7 +13,7 @@ typedef struct {
     uint32_t v_dc;
 } adc_counts_t;
 
-/** The part of them that the second level uses. */
+/** The part of the converter counts that the second level uses. */
 typedef struct {
     uint32_t i_a, i_b, i_c;
 } current_counts_t;

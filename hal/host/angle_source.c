@@ -17,7 +17,7 @@ static bool is_same(const angle_connection_t *a, const angle_connection_t *b)
            a->imposed == b->imposed;
 }
 
-/* Nothing has been set. */
+/* The connection of a new drive, with nothing set. */
 static const angle_connection_t plain;
 
 static double electrical_turns(const angle_source_t *source, double pole_pairs)

@@ -4,7 +4,7 @@
 
 #include "hal/host/parameters.h"
 
-/* The value of a row; -1 is no row. */
+/* Whether a value differs from that of the row before; before row 0 there is none (-1). */
 static bool differs(const fluxtrue_batch_t *b, int row, int column)
 {
     const double *value = &b->set_values[(size_t)row * (size_t)b->sets + (size_t)column];

@@ -2,8 +2,9 @@
 #ifndef HAL_HOST_EXTERNAL_WATCHDOG_H
 #define HAL_HOST_EXTERNAL_WATCHDOG_H
 /** Simulated external watchdog with questions and answers, and the gate supply that it switches.
- *   A wrong answer, one less than 0.4 ms after the last, and 3 ms without one count up an error, a right one counts it
- *   down. The supply is off from 3 errors on until none is left, and before the first right answer.
+ *   A wrong answer, an answer less than 0.4 ms after the last one, and 3 ms without an answer each increment an error
+ *   counter; a right answer decrements it. The supply is off from 3 errors on until the counter is 0 again, and before
+ *   the first right answer.
  * Source   docs/theory/third-level.md, from which the expected answers were written anew
  * Units    us of simulated time
  * Context  hal/host */

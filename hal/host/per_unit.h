@@ -5,7 +5,7 @@
  *   SI = x base,  x = SI/base, with x = count/2^15 (q15) or count/2^31 (q31)
  * Source   docs/scaling.md (SC-1) ... (SC-5)
  * Units    those of the base: see bases.h
- * Range    every count; every number for the way back, beyond one per unit it saturates at the largest count
+ * Range    to SI: every count; from SI: every number, saturated at the largest count beyond one per unit
  * Rounding to the nearest count, halves to the even one
  * Errors   NaN must have been refused before
  * Context  any */

@@ -2,7 +2,7 @@
 #ifndef HAL_HOST_SPIN_LIMIT_H
 #define HAL_HOST_SPIN_LIMIT_H
 /** Ends a commissioning that turns the shaft: when its commands stop, and when the sensor turns too fast.
- *   |w_s| > w_max, w_s a first-order mean of 16 periods, or periods without a new consent
+ *   |w_s| > w_max, w_s a first-order mean over 16 periods, or too many periods without a renewed command
  * Source   docs/theory/commissioning.md, section 11
  * Units    turns of the sensor, rpm
  * Context  host port; the drive's own monitors work as usual */
@@ -20,7 +20,7 @@ typedef enum { SPIN_FAILURE_LIST(SPIN_VALUE) } spin_failure_t;
 #undef SPIN_VALUE
 
 typedef struct {
-    uint32_t periods; /* for which a movement is agreed; 0: there are no limits */
+    uint32_t periods; /* for which the movement is still permitted; 0: there are no limits */
     double rpm_max;
     double turns, rpm; /* of the sensor */
     spin_failure_t failure;

@@ -8,8 +8,8 @@
 
 #define MARK "fluxtrue-state" /* 15 bytes with its end */
 
-/* Before the instance. The data of the motor are not in a state, because they contain addresses; of them only whether
- * the monitors of the machine are enabled is. */
+/* Header of a state, before the instance. The motor data are not part of a state, because they contain addresses; only
+ * the flag whether the monitors of the machine are enabled is. */
 typedef struct {
     char mark[16];
     uint32_t library; /* checksum of what a state depends on */
@@ -23,7 +23,7 @@ typedef struct {
     fluxtrue_t instance;
 } state_t;
 
-/* Version, motor and layout. Not the code: two builds with the same sizes of all parts are taken for the same. */
+/* Checksum of version, motor and layout, not of the code: two builds whose parts have the same sizes count as equal. */
 static uint32_t library_checksum(void)
 {
     const uint32_t sizes[] = {

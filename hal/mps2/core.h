@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_MPS2_CORE_H
 #define HAL_MPS2_CORE_H
-/** The few registers of Armv7-M and Armv8-M that this port uses: it touches no peripheral of the board.
+/** The few registers of Armv7-M and Armv8-M that this port uses; it uses no peripheral of the board.
  * Source   Armv7-M Architecture Reference Manual, B3.2 ... B3.4
  * Context  private to the port */
 #include <stdint.h>

@@ -53,7 +53,7 @@ void angle_init(uint32_t period_ticks)
     serial_angle_start(&(serial_angle_t){.command = COMMAND, .word = AS5047_READ_ANGLE, .start = START_TICKS});
 }
 
-/* The frame before the measurement's time asks for the first angle, the one after it for the second. */
+/* The frame before the measuring time requests the first angle, the frame after it the second. */
 float angle_first_speed(void)
 {
     serial_angle_init(&timing);
@@ -71,8 +71,8 @@ float angle_first_speed(void)
 }
 
 /* The frame of this period has brought the angle that was sampled at the end of the last one, that is, one period less
- * sampled_q32 before the currents. The rotor has moved on since then by that share of the travel of a period. After
- * lost periods several frames have come: the travel of one period is then unknown and is taken to be as before. */
+ * sampled_q32 before the currents. Since then the rotor has moved by that share of its travel per period. After lost
+ * periods several frames have arrived: the travel per period is then unknown, and the last known one is used. */
 uint32_t hal_angle_read(void)
 {
     uint32_t frame;

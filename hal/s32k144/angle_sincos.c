@@ -18,7 +18,7 @@ __asm__(".global angle_sensor_analogue\n.set angle_sensor_analogue, 1");
 
 static travel_t sensor;
 
-/* No angle is known before the first valid sample: a first one outside the band is the fault at once. */
+/* No angle is known before the first valid sample: if the first sample is outside the band, that is a fault at once. */
 void angle_init(uint32_t period_ticks)
 {
     sensor.sampled_q32 = (int32_t)((UINT32_MAX / period_ticks) * SAMPLING_ANGLE_TICKS);
@@ -27,7 +27,7 @@ void angle_init(uint32_t period_ticks)
     excitation_start(period_ticks);
 }
 
-/* Two angles; the offsets' and amplitudes' errors falsify the speed by as much as their share of the amplitude. */
+/* Speed from two angles. An offset or amplitude error of x % of the amplitude falsifies the speed by x %. */
 float angle_first_speed(void)
 {
     sampling_first_calibrate();

@@ -16,7 +16,7 @@ static void pulse(uint32_t high, uint32_t low)
     core_pass(low);
 }
 
-/* The counter starts as long before the next rise as in each of its periods. */
+/* The last low time is shorter: the counter starts as long before the next rise as in each of its own periods. */
 void excitation_start(uint32_t period_ticks)
 {
     const uint32_t half = period_ticks / 2U;

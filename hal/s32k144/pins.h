@@ -17,7 +17,7 @@ enum {
     PIN_INDEX = 12
 };
 
-/** All lines off but the safe state's: it stays released, so that the board's hardware controls the bridge. */
+/** All lines off except that of the safe state, which stays released: the board's hardware controls the bridge. */
 void pins_init(void);
 /** The PWM is set up: from here on the line may be driven low. */
 void pins_offer_bridge(void);

@@ -174,7 +174,7 @@ void pwm_pulse(uint32_t from, uint32_t until)
  * overrides both. */
 void pwm_hold_short_circuit(void)
 {
-    hal_pwm_write((duty_t){0, 0, 0}); /* what follows once the counter runs */
+    hal_pwm_write((duty_t){0, 0, 0}); /* the duties that act once the counter runs */
     FTM0->SYNC = FTM_SYNC_CNTMAX;
     FTM0->OUTMASK = 0;
     FTM0->SWOCTRL = HELD;

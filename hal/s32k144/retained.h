@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef HAL_S32K144_RETAINED_H
 #define HAL_S32K144_RETAINED_H
-/** What outlasts a reset, in SRAM_U, which holds nothing else. Two copies are written in turn, each with a magic word,
- * a sequence number and the complement of every word: a reset during a write leaves the previous copy.
+/** Data that outlast a reset, in SRAM_U, which holds nothing else. Two copies are written in turn, each with a magic
+ * word, a sequence number and the complement of every word: a reset during a write leaves the previous copy.
  *   SIM_CHIPCTL.SRAMU_RETEN = 0 makes the RAM keep its content through a reset; meanwhile nothing may access it.
  *   Therefore it is 1 only while a copy is written. A reset sets it to 1 itself.
  * Source   README.md, reset; reference manual, SRAM retention

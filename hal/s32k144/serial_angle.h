@@ -4,8 +4,8 @@
 /** LPSPI0 with an angle sensor: one frame in each PWM period, which the hardware starts. The frame is complete before
  * the fast ISR needs it, so that the ISR never waits.
  *   Four words wait in the transmit FIFO; each pulse of PDB0 lets the module send one. The newest received frame
- *   belongs to the present period as long as a word is left: only then each period since the last reading had one to
- *   send.
+ *   belongs to the present period as long as a word is left in the FIFO: only then every period since the last reading
+ *   has sent one.
  * Source   README.md, angle
  * Units    start: ticks of 112 MHz from the start of the period; the others: clocks of 28 MHz
  * Errors   serial_angle_read(): 0 if no frame was received, or if more than three periods have passed since the last

@@ -29,7 +29,7 @@ typedef struct {
 /** One invalid sample; angle_errors.invalid counts them. */
 void travel_predict(travel_t *sensor);
 
-/** One valid sample. It tells the travel of a period only if now and last are one period apart (`consecutive`). */
+/** One valid sample. It gives the travel per period only if now and last are one period apart (`consecutive`). */
 static inline void travel_take(travel_t *sensor, uint32_t now, bool consecutive)
 {
     if (__builtin_expect(consecutive && sensor->invalid == 0U, 1)) {

@@ -3,7 +3,7 @@
 #define MRAI_MRAI_CALIBRATION_LIST_H
 /** The values of the 2014 paper's law among those of calibration/calibration_list.h, in the same form.
  * Source   docs/howto/xcp.md; docs/theory/mrai.md
- * Range    as stated there
+ * Range    as in calibration/calibration_list.h
  * Context  a build without FLUXTRUE_MRAI has none */
 #include "types/features.h"
 

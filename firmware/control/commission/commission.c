@@ -53,7 +53,7 @@ static void store_cosines(commission_data_t *data, uint32_t theta)
 static commission_failure_t check_step(const commission_config_t *config, const commission_state_t *state,
                                        const commission_in_t *in)
 {
-    const int32_t periods = config->periods_per_step; /* all of it as sums over a step */
+    const int32_t periods = config->periods_per_step; /* all quantities below are sums over a step */
     const int32_t error_d = fx_abs_q31(in->sum_i.d - periods * state->i_ref.d);
     const int32_t error_q = fx_abs_q31(in->sum_i.q);
     const int32_t allowed = periods * ((fx_abs_q31(state->i_ref.d) >> 3) + CURRENT_TOLERANCE);

@@ -21,8 +21,7 @@ static int32_t mean_upper(const int32_t *x)
     return sum;
 }
 
-/* Least-squares slope of u over i, Q30; 0 if it is not positive. The sums, Q60, are shifted until they fit a division.
- * */
+/* Least-squares slope of u over i, Q30; 0 if it is not positive. The Q60 sums are shifted until a division fits. */
 static int32_t slope(const commission_data_t *data)
 {
     const int32_t i_mean = mean_upper(data->i);

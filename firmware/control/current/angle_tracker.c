@@ -24,8 +24,7 @@ static angle_t result(uint32_t theta_e, int32_t step, int32_t omega_q30, bool ju
 }
 
 /* The first two samples set angle and speed directly, so that the loop locks without a cycle slip if the machine
- * already turns: the first sample is the prediction for the second one, and the difference is the advance per period.
- * */
+ * already turns: the first sample is the prediction for the second, and their difference is the advance per period. */
 static void start(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e)
 {
     const int32_t advance = (state->samples == 1U) ? (int32_t)(theta_e - state->predicted) : 0;
@@ -68,13 +67,13 @@ __attribute__((cold)) angle_t angle_tracker_step(const angle_tracker_config_t *c
     return angle;
 }
 
-/* The loop before a sample: by how much the sample was off its prediction, the speed, and the advance per period. */
+/* State of the loop before a sample: the sample's deviation from its prediction, the speed, the advance per period. */
 typedef struct {
     int32_t error, omega_q30, step;
 } before_sample_t;
 
-/* From what the loop has made of the sample: the new prediction is the old one + step + k_p e with e = theta_e - the
- * old one, so e = difference + k_p e; each round leaves the share k_p < 1/8 of its error. */
+/* Recovers the state before a sample from the state after it. The new prediction is theta~ + step + k_p e, where theta~
+ * is the old one and e = theta_e - theta~. Hence e = difference + k_p e; an iteration leaves k_p < 1/8 of the error. */
 static __attribute__((noinline, cold)) before_sample_t state_before_sample(const angle_tracker_config_t *config,
                                                                            const angle_tracker_state_t *state,
                                                                            uint32_t theta_e)
@@ -89,7 +88,7 @@ static __attribute__((noinline, cold)) before_sample_t state_before_sample(const
     return (before_sample_t){error, omega_q30, advance_at(config, omega_q30)};
 }
 
-/* The step of the loop is undone. */
+/* Undoes the loop's step for this sample. */
 __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state,
                                                   uint32_t theta_e)
 {
@@ -100,14 +99,14 @@ __attribute__((cold)) angle_t angle_tracker_coast(const angle_tracker_config_t *
     return angle;
 }
 
-/* An angle that is repeated for longer than the sensor's resolution explains (AT-16) is the sensor's, unless the lag of
- * a rotor that is being stopped came first (AT-17). */
+/* Whether the sensor has failed or the rotor stands. A reading that repeats for longer than the sensor's resolution
+ * explains (AT-16) is a sensor failure, unless the rotor lagged behind the prediction before: then it stops (AT-17). */
 static angle_repeats_t whose_repeats(const angle_tracker_config_t *config, const angle_tracker_state_t *state,
                                      const angle_t *angle)
 {
     const int32_t repeats = (int32_t)state->repeats;
     if (!angle->jumped && (int64_t)fx_abs_q31(angle->step) * repeats <= config->repeat_max) {
-        return REPEATS_UNDECIDED; /* at rest: what follows would find the same, with a hundred instructions more */
+        return REPEATS_UNDECIDED; /* at rest: the rest of this function gives the same, in 100 more instructions */
     }
     const before_sample_t at = state_before_sample(config, state, angle->theta_e);
     const int32_t step = fx_abs_q31(at.step);

@@ -32,7 +32,7 @@ typedef struct {
     uint16_t turn_shift;   /* pu_to_turn is 2^turn_shift smaller; not 0: only angle_tracker_step() may be used */
 } angle_tracker_config_t;
 
-/** Whose standstill the repeats of an angle show. */
+/** What repeated readings of an angle show: not decided yet, a failed sensor, or a rotor at standstill. */
 typedef enum { REPEATS_UNDECIDED, REPEATS_OF_SENSOR, REPEATS_OF_ROTOR } angle_repeats_t;
 
 typedef struct {
@@ -64,8 +64,8 @@ static inline void angle_tracker_move(const angle_tracker_config_t *config, angl
     state->predicted += config->pole_pairs * by;
 }
 
-/** After a sample that jumped, in place of its result: what was predicted for it. The step of the loop is undone, and
- * the tracker continues at the speed before. theta_e: of the sample. */
+/** After a sample that jumped: returns the prediction in its place. The loop's step for this sample is undone, and the
+ * tracker continues at the speed before it. theta_e: electrical angle of the sample. */
 angle_t angle_tracker_coast(const angle_tracker_config_t *config, angle_tracker_state_t *state, uint32_t theta_e);
 
 /** What a repeated reading of the sensor means. */

@@ -76,7 +76,7 @@ static dq_q15_t limit_to_circle(dq_q15_t v, int32_t error_d, int32_t omega)
         return (dq_q15_t){clamp_symmetric(clipped.d, fx_max_s32(remaining_voltage(clipped.q), V_D_MIN)), clipped.q};
     }
     const int32_t excess = fx_sat_q15_word(v.d - clipped.d);
-    const int32_t sign = omega >> 31; /* two's complement: an excess of 0 must change nothing */
+    const int32_t sign = omega >> 31; /* 0 or -1: with two's complement an excess of 0 changes nothing */
     const int32_t reduced_q = v.q + (excess ^ sign) - sign;
     return (dq_q15_t){clipped.d, clamp_symmetric(reduced_q, remaining_voltage(clipped.d))};
 }

@@ -38,7 +38,7 @@ static __attribute__((noinline)) int32_t voltage(const turning_control_config_t 
     return fx_sat_bits(fx_mulhi(config->per_period_q29, wanted), 26) * 32;
 }
 
-/* One axis of the model's flux plus the flux that the cut voltage will not make. Half of a sixteenth of Q30 is Q25. */
+/* One axis: the model's flux plus the flux of u_limited - u, which the limit removes. Q30/16/2 = Q25. */
 static int32_t reachable(int32_t r_q29, int32_t cut_q25)
 {
     return fx_sat_bits((r_q29 >> 4) + cut_q25, 26) * 16;

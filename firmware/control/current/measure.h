@@ -31,7 +31,7 @@ typedef struct {
 
 typedef struct {
     ab_q15_t i;
-    int32_t zero_q28; /* mean of the phases plus a quarter LSB of q15; not zero only by sensor errors */
+    int32_t zero_q28; /* mean of the phases plus a quarter LSB of q15; only sensor errors make it differ from that */
     int32_t v_dc;     /* 0 ... Q15_MAX */
 } measure_t;
 

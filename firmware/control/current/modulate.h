@@ -26,7 +26,7 @@ typedef struct {
     q31_t side_q31;          /* sqrt(3)/2 of it */
     int32_t knee_q17;        /* 1/i_knee < 2^13: slope of the linear part */
     int32_t knee_side_q17;   /* sqrt(3)/2 of it */
-    int32_t dead_time_q16;   /* compensated duty error of one phase */
+    int32_t dead_time_q16;   /* duty error of one phase that is compensated */
     int32_t longest_q31;     /* half a duty minus the shortest pulse that the bridge can make */
     int32_t nearer_rail_q31; /* half a duty minus half of that pulse */
 } modulate_config_t;

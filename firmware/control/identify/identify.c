@@ -84,8 +84,8 @@ static void update_parameters(const identify_config_t *config, identify_state_t 
 }
 
 /* The torque's variance is compared with two levels: well below the variance of the tables alone, or small against the
- * torque; between the levels the last decision holds (ID-18). At no torque the relative test is not used to switch on:
- * a torque of zero is certain whatever the parameters are. */
+ * torque; between the levels the last decision holds (ID-18). At zero torque the relative test does not raise the
+ * confidence: the variance of zero torque is small whatever the parameters are. */
 static void update_confidence(const identify_config_t *config, identify_state_t *state, const identify_model_t *model,
                               int32_t torque)
 {

@@ -4,7 +4,7 @@
 /** Robust identification: seven slow parameters and a local flux error from the two voltage equations, and the torque.
  *   each step  residuals of the operating point, local flux error, torque
  *     psi^ = psi(i_m) + parameters + local,  t^ = psi^_d i^_mq - psi^_q i^_md, over the period
- *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the voltage model, as far as speed makes it better
+ *     local  += rate ((w e_q, -w e_d)/(w^2 + w_x^2) - local): the flux of the voltage model, weighted by the speed
  *   each tenth step  Kalman update with the mean residuals, Kalman prediction, confidence
  * Source   docs/theory/identification.md (ID-5) ... (ID-21)
  * Units    per unit
@@ -57,12 +57,12 @@ typedef struct {
     int32_t psi_delta; /* q15: identified minus table's flux in the d axis, here */
 } identify_out_t;
 
-/* The seals of what is kept from step to step, and of parameters with covariance. */
+/* Check the two seals: of what is kept from step to step, and of the parameters with their covariance. */
 void identify_check_kept(identify_state_t *state);
 void identify_check_parameters(identify_state_t *state);
 void identify_seal_kept(identify_state_t *state);
 void identify_seal_parameters(identify_state_t *state);
-/** Both, after the state was set from outside as a whole. */
+/** Renews both seals, after the state was set from outside as a whole. */
 void identify_seal(identify_state_t *state);
 /** Sets one parameter, in standard deviations of its prior. */
 void identify_set(identify_state_t *state, identify_index_t index, int32_t x_q27);

@@ -4,7 +4,7 @@
 #define X_MAX_Q27 (4 * IDENTIFY_ONE_Q27)
 #define INNOVATION_MAX_Q30 (1 << 26)
 #define S_MIN_Q60 (INT64_C(1) << 38) /* the square of the smallest noise that identify_check() accepts */
-#define GATE_SHIFT 3                 /* e^2 > 8 h P h' + r; r counts one error many times over (ID-14) */
+#define GATE_SHIFT 3                 /* e^2 > 8 h P h' + r; r already allows for errors that persist (ID-14) */
 #define DIVISOR_BITS 16
 
 /* 1/s = inverse 2^-(32 + shift), rounded down. */
@@ -83,8 +83,8 @@ int64_t kalman_output_variance_prior(const jacobian_row_t *row)
     return dot(row->h_q30, row->h_q30);
 }
 
-/* Of a variance, at least S_MIN_Q60. Its first 16 bits, rounded up: the gain is never larger than the optimum, which
- * keeps P positive definite (ID-11). Its upper word is not zero. */
+/* 1/s of a variance s >= S_MIN_Q60, whose upper word is therefore not zero. Only the leading 16 bits of s are used,
+ * rounded up: the gain is never larger than the optimum, which keeps P positive definite (ID-11). */
 static reciprocal_t reciprocal(int64_t s_q60)
 {
     const int64_t limited_q60 = (s_q60 < S_MIN_Q60) ? S_MIN_Q60 : s_q60;

@@ -3,8 +3,8 @@
 #define MRAI_MRAI_H
 /** Model reference adaptive identification of stator resistance and magnet flux.
  *   Full-order observer in flux linkage, poles at -S/2 +- jS/2, S = m R_0 (1/L_d + 1/L_q), carried as its error
- *   e = (2 (psi_d(i) - psi_d~), psi_q(i) - psi_q~): the derivative enters as the change of the table's flux, exact
- *   through saturation, cross coupling included, and no inductance is left in the equations but that of S.
+ *   e = (2 (psi_d(i) - psi_d~), psi_q(i) - psi_q~). The derivative enters as the change of the tables' flux, which is
+ *   exact with saturation and cross coupling. The only inductances in the equations are those of S.
  *     e_d += 2 (dpsi_d - T_s (u_d + w psi_q - R^ i_d)) + s2 (e_q - e_d)
  *     e_q += dpsi_q - T_s (u_q - w (psi_d + dpsi) - R^ i_q) - s2 (e_d + e_q),   s2 = S T_s/2
  *   with the means over the period's two ends in the bracket.

@@ -21,8 +21,8 @@ typedef struct {
 
 typedef struct {
     const operating_point_t *sample; /* latest operating point */
-    /* The one just commanded: i and flux are used. The smaller gain of both points is taken, because the currents move
-     * from one to the other within a step. */
+    /* Operating point just commanded; only i and flux are used. The smaller gain of both points is taken, because the
+     * currents move from one to the other within a step. */
     const operating_point_t *next;
     const mrai_state_t *identifier;
     bool enabled; /* identification wanted and the bridge on */

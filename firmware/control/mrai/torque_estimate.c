@@ -10,7 +10,7 @@
 void torque_estimate_add(torque_sum_t *sum, const dq_q15_t *i, const flux_point_t *flux, int32_t psi_delta)
 {
     const int32_t psi_d = fx_sat_q15_word(flux->psi_d + psi_delta);
-    /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, but nothing below -2^30 + 2^15 is subtracted from it. */
+    /* Q15 * Q15 = Q30. Cannot overflow: -1 * -1 is 2^30, and the product subtracted from it is above -2^30. */
     const int32_t t_q30 = psi_d * i->q - flux->psi_q * i->d;
     sum->sum_q24 = fx_add_wrap(sum->sum_q24, t_q30 >> 6);
     sum->count = fx_add_wrap(sum->count, 1);

@@ -8,7 +8,7 @@
  *   e      = v_ratio v_dc - |u|
  *   v_trim += k e        if e < 0, or while the references use the planned flux
  *   v_trim -= k v_trim   otherwise, because away from the limit e says nothing about the trim
- *   trim_min <= v_trim <= trim_max v_dc: what the trim adds must exist where its cause is gone
+ *   trim_min <= v_trim <= trim_max v_dc: the added voltage must be available also when the cause of the trim is gone
  * Source   docs/theory/current-reference.md (CR-9), (CR-12) ... (CR-14)
  * Units    per unit
  * Range    k < 1; trim_min <= 0 <= trim_max < 1; v_dc >= 0
