@@ -129,6 +129,20 @@ def test_a_movement_is_refused_while_switching_is_enabled(stand: Stand) -> None:
     assert is_off(stand)
 
 
+def test_before_the_index_has_passed_only_the_imposed_movement_runs(stand: Stand, known: Nameplate) -> None:
+    stand.channel.set(board_angle_unknown=1.0)
+    with pytest.raises(FluxtrueError, match="switching cannot be enabled.*angle not absolute"):
+        turning.connect(stand.drive, stand.wired, known, "test")
+    assert is_off(stand)
+    turning.connect(stand.drive, None, known, "test")
+    turning.currents(stand.drive, 0.06 * known.i_max_A, 0.0)
+    stand.drive.rest(SMALL_S)
+    assert stand.current_A() > 0.03 * known.i_max_A
+    turning.release(stand.drive)
+    stand.channel.set(board_angle_unknown=0.0)
+    spinning(stand, known)
+
+
 def test_after_an_early_end_enable_needs_a_new_consent(stand: Stand, known: Nameplate) -> None:
     spinning(stand, known)
     silent(stand, known)
