@@ -314,6 +314,11 @@ static inline bool drive_moves(const drive_t *drive)
 {
     return movement_moves(&drive->task.movement);
 }
+/** A movement is agreed that needs no absolute angle: an encoder's shaft gets past its index by it. */
+static inline bool drive_imposes_angle(const drive_t *drive)
+{
+    return movement_imposes_angle(&drive->task.movement);
+}
 /** BRIDGE_OFF ... of the next command. */
 uint8_t drive_bridge_mode(const drive_t *drive, bool runs);
 /** A movement has ended early: switching stays disabled until the movement is no longer requested. */

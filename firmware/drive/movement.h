@@ -143,6 +143,12 @@ static inline bool movement_is_agreed(const movement_state_t *state)
     return state->phase == MOVEMENT_PHASE_AGREED;
 }
 
+/** The currents do not turn with the sensor's angle, which may be unknown. */
+static inline bool movement_imposes_angle(const movement_state_t *state)
+{
+    return movement_is_agreed(state) && state->movement == (uint8_t)MOVEMENT_IMPOSED;
+}
+
 /** Currents act in place of a torque request. */
 static inline bool movement_moves(const movement_state_t *state)
 {

@@ -161,6 +161,7 @@ supervisor_in_t ecu_observe(ecu_t *ecu, bool gate_fault)
         .dc_contradicts = battery_voltage_contradicts(&ecu->battery_voltage, &voltages),
         .sensors_plausible = are_sensors_plausible(drive, &sample),
         .angle_absolute = hal_angle_is_absolute(),
+        .angle_imposed = drive_imposes_angle(drive),
         .slow = is_slow(drive),
         .derated = derating_reason(ecu) != DERATING_REASON_NONE,
         .movement_ended = drive_has_ended_movement(drive),

@@ -29,7 +29,7 @@ static bool grant_by_values(supervisor_t *s, const supervisor_in_t *in)
     if (!in->sensors_plausible) {
         return refuse(s, REFUSED_SENSOR_IMPLAUSIBLE);
     }
-    if (!in->angle_absolute) {
+    if (!in->angle_absolute && !in->angle_imposed) {
         return refuse(s, REFUSED_ANGLE_NOT_ABSOLUTE);
     }
     if (in->movement_ended) {

@@ -6,8 +6,8 @@
  *   the present state and whose conditions all hold is taken. Outputs depend on the state alone.
  *   Except for a trip, run and derate end only when a ramp has brought the torque to zero.
  *   Enable is accepted at a rising edge in a frame of the bus, in state ready, with no torque requested, no fault,
- *   plausible sensors, an absolute angle and the dc voltage in range; otherwise it is refused and the reason is
- *   transmitted.
+ *   plausible sensors, an absolute angle or an imposed one, and the dc voltage in range; otherwise it is refused and
+ *   the reason is transmitted.
  * Source   docs/howto/can.md, whose drawing is made from the same table
  * Units    us of true time; the longest time-out is 5 s
  * Errors   its own faults are latched in faults (ecu_fault_t) until a reset after their cause has gone
@@ -105,6 +105,7 @@ typedef struct {
     bool dc_in_range, dc_settled, dc_safe; /* safe: below the voltage that is safe to touch */
     bool dc_near_battery, dc_contradicts;  /* ecu/battery_voltage.h; near also while the battery's is not known */
     bool sensors_plausible, angle_absolute;
+    bool angle_imposed; /* by a movement for commissioning, which needs no absolute angle */
     bool slow;
     bool derated;
     bool movement_ended; /* drive/movement.h: early */

@@ -8,11 +8,13 @@ import pytest
 from bus_stand import COMMAND_ID, COMMISSION_ID, Stand, bus_stand
 
 from fluxtrue_tools.cli import run as command
-from fluxtrue_tools.commission import turning
+from fluxtrue_tools.commission import bus_turning, hidden, turning
+from fluxtrue_tools.commission.cli import nameplate_of
 from fluxtrue_tools.commission.nameplate import Nameplate
 from fluxtrue_tools.commission.score import turned
 from fluxtrue_tools.commission.steps import chosen, run
 from fluxtrue_tools.errors import FluxtrueError
+from fluxtrue_tools.sim import motor as motors
 from fluxtrue_tools.sim.motor import Motor
 
 NAME, SEED = "saturated", 101
@@ -127,6 +129,32 @@ def test_a_movement_is_refused_while_switching_is_enabled(stand: Stand) -> None:
     with pytest.raises(FluxtrueError, match="the inverter has refused it"):
         stand.drive.rest(STOPPED_S)
     assert is_off(stand)
+
+
+def test_before_the_index_has_passed_only_the_imposed_movement_runs(stand: Stand, known: Nameplate) -> None:
+    stand.channel.set(board_angle_unknown=1.0)
+    with pytest.raises(FluxtrueError, match="switching cannot be enabled.*angle not absolute"):
+        turning.connect(stand.drive, stand.wired, known, "test")
+    assert is_off(stand)
+    turning.connect(stand.drive, None, known, "test")
+    turning.currents(stand.drive, 0.06 * known.i_max_A, 0.0)
+    stand.drive.rest(SMALL_S)
+    assert stand.current_A() > 0.03 * known.i_max_A
+    turning.release(stand.drive)
+    stand.channel.set(board_angle_unknown=0.0)
+    spinning(stand, known)
+
+
+def test_the_gains_of_another_machine_are_refused(tmp_path: Path) -> None:
+    """Along d the inductance of hsm1 is 2.6 times that of this machine: its currents oscillate by 60 A rms."""
+    motor = motors.load("hsm1")
+    known = nameplate_of(hidden.folder_of("hsm1"), motor)
+    with bus_stand(motor, known, tmp_path, (NAME, SEED), connected=False) as stand:
+        wanted = turning.SPEED_SHARE * known.speed_max_rpm * turning.TURN / 60.0
+        with pytest.raises(FluxtrueError, match="the current oscillates .* for the nameplate"):
+            bus_turning.direction(stand.drive, known, wanted, stand.wired)
+        turning.release(stand.drive)
+        assert is_off(stand)
 
 
 def test_after_an_early_end_enable_needs_a_new_consent(stand: Stand, known: Nameplate) -> None:

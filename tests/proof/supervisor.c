@@ -118,7 +118,8 @@ void proof_enable_is_granted_only_when_ready(void)
     supervisor_step(&s, &in);
     if (!before.enabled && s.enabled) {
         PROVE(before.state == STATE_READY && in.alive && in.enable && !before.enable_seen);
-        PROVE(in.torque_mode && !in.current_mode && in.dc_in_range && in.sensors_plausible && in.angle_absolute);
+        PROVE(in.torque_mode && !in.current_mode && in.dc_in_range && in.sensors_plausible);
+        PROVE(in.angle_absolute || in.angle_imposed);
         PROVE(in.torque_requested_is_zero && in.drive_faults == 0U && s.faults == 0U);
     }
     if (!supervisor_outputs[before.state].run && supervisor_outputs[s.state].run) {

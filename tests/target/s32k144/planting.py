@@ -15,18 +15,20 @@ from fluxtrue_tools.emulate.build import ROOT
 from fluxtrue_tools.target import image
 
 PORT = ROOT / "hal" / "s32k144"
+FIRMWARE = ROOT / "firmware"
 
 
 @dataclass(frozen=True)
 class PlantedError:
-    """A text of a file of the port, which must occur exactly once, and the text that replaces it."""
+    """A text of a file of the port or of the firmware, which must occur exactly once, and what replaces it."""
 
     file: str
     text: str
     replacement: str
+    within: Path = PORT
 
     def __post_init__(self) -> None:
-        count = (PORT / self.file).read_text(encoding="utf-8").count(self.text)
+        count = (self.within / self.file).read_text(encoding="utf-8").count(self.text)
         assert count == 1, f"{self.file} must contain this text once, not {count} times: {self.text}"
 
 
@@ -73,8 +75,8 @@ def with_motor(built: Path, tables: Path) -> dict[Path, Path]:
 
 def with_error(error: PlantedError, folder: Path) -> dict[Path, Path]:
     """The file with the planted error, for relinked()."""
-    original = PORT / error.file
-    source = folder / error.file
+    original = error.within / error.file
+    source = folder / original.name
     text = original.read_text(encoding="utf-8").replace(error.text, error.replacement)
     source.write_text(text, encoding="utf-8")
     return {original: source}

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The incremental encoder of the S32K144's image on the emulated processor: no torque before its index has passed, the
-absolute angle afterwards, and planted errors."""
+movement that carries a free shaft past it, the absolute angle afterwards, and planted errors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from listener import Listener
-from planting import PlantedError, image_with_error
+from mover import Mover
+from planting import FIRMWARE, PlantedError, image_with_error
 from rotor_frame import error_A
 
 from fluxtrue_tools.bench.build import have_arm_compiler
@@ -25,6 +26,9 @@ from fluxtrue_tools.sim.library import Loop
 RAD_S = 0.10471975511965977
 TORQUE = 40.0
 TURN_PERIODS = 400  # at 1500 rpm
+SMALL_NM = 5.0
+FRICTION_NM = 0.3
+CURRENT_PERCENT = 10.0  # of the largest current: it turns the shaft against its friction
 LAG_RPM = 250.0  # of the tracked speed at 30,000 rpm per second; a jump of the angle makes it 377
 
 
@@ -33,6 +37,11 @@ def encoder() -> Parts:
     if not have_arm_compiler():
         pytest.skip("the Arm compiler is not installed: no image is built")
     return build.prepare("hsm1", angle="encoder")
+
+
+@pytest.fixture(scope="module")
+def flashed(encoder: Parts) -> Parts:
+    return build.prepare("hsm1", angle="encoder", flashed=True)
 
 
 @contextmanager
@@ -89,6 +98,72 @@ def the_angle_keeps_its_speed_when_the_index_passes(parts: Parts) -> None:
         assert loop.get("truth.torque_Nm") == pytest.approx(TORQUE, abs=1.0)
 
 
+@dataclass
+class Vehicle:
+    """The bus of a flashed image whose shaft is free."""
+
+    loop: Loop
+    stand: Stand
+    bus: Listener
+    mover: Mover
+
+    @property
+    def state(self) -> str:
+        return str(self.bus.last["INV_Status"]["State"])
+
+    @property
+    def refused(self) -> str:
+        return str(self.bus.last["INV_DcLink"]["RefusedReason"])
+
+
+@contextmanager
+def free_beside_the_index(parts: Parts) -> Iterator[Vehicle]:
+    """A shaft without a load, 0.3 turns beyond the index; enable has been refused."""
+    with started_beside_the_index(parts) as loop:
+        for name, value in (("imposed_speed", 0.0), ("coulomb_Nm", FRICTION_NM), ("stiction_Nm", FRICTION_NM)):
+            loop.set(f"plant.{name}", value)
+        stand = Stand(loop)
+        vehicle = Vehicle(loop, stand, Listener(stand.core), Mover(stand))
+        stand.power_up()
+        assert (vehicle.state, vehicle.refused) == ("ready", "angle_not_absolute")
+        yield vehicle
+
+
+def the_imposed_movement_alone_needs_no_angle(parts: Parts) -> None:
+    """The spin and the torque with a connection are refused, by the same name as torque without a movement."""
+    with free_beside_the_index(parts) as vehicle:
+        for movement in ("spin", "connected"):
+            vehicle.mover.agree(movement)
+            vehicle.mover.run(50, Enable=1)
+            assert (vehicle.state, vehicle.refused) == ("ready", "angle_not_absolute")
+            assert vehicle.loop.get("emulator.gates") == 0
+        vehicle.mover.agree("imposed")
+        vehicle.mover.run(50, Enable=1)
+        assert vehicle.state == "run" and vehicle.loop.get("emulator.gates") == 1
+        vehicle.stand.run(50)  # without its message
+        assert (vehicle.state, vehicle.refused) == ("ready", "movement_ended")
+        assert vehicle.loop.get("emulator.gates") == 0
+
+
+def the_movement_carries_the_shaft_past_its_index(parts: Parts) -> None:
+    """Then the drive enables as usual, and its torque is right."""
+    with free_beside_the_index(parts) as vehicle:
+        vehicle.mover.agree("imposed")
+        vehicle.mover.values |= {"CurrentD": CURRENT_PERCENT, "Damped": 1}
+        vehicle.mover.run(700, Enable=1)
+        vehicle.mover.values |= {"Damped": 0, "Direction": "backward"}
+        vehicle.mover.run(2000)
+        assert vehicle.state == "run" and vehicle.loop.get("fault_word") == 0
+        vehicle.mover.agree("none")
+        assert vehicle.loop.get("emulator.gates") == 0
+        vehicle.stand.run(50, Enable=1)
+        assert (vehicle.state, vehicle.refused) == ("run", "none")
+        for torque in (SMALL_NM, -SMALL_NM):
+            vehicle.stand.run(100, TorqueRequested=torque)
+            assert vehicle.loop.get("truth.torque_Nm") == pytest.approx(torque, abs=0.5)
+        assert vehicle.loop.get("fault_word") == 0
+
+
 Check = Callable[[Parts], None]
 QUADRATURE = "angle_quadrature.c"
 PLANTED: dict[str, tuple[Check, PlantedError]] = {
@@ -119,6 +194,27 @@ PLANTED: dict[str, tuple[Check, PlantedError]] = {
 }  # fmt: skip
 
 
+MOVEMENT: dict[str, tuple[Check, PlantedError]] = {
+    "the imposed movement needs the angle": (
+        the_movement_carries_the_shaft_past_its_index,
+        PlantedError(
+            "drive/task_1khz.c", "snapshot->angle_absolute || drive_imposes_angle(drive)", "snapshot->angle_absolute",
+            FIRMWARE,
+        ),
+    ),
+    "the state machine is not told of the imposed angle": (
+        the_movement_carries_the_shaft_past_its_index,
+        PlantedError("ecu/observe.c", "drive_imposes_angle(drive)", "false", FIRMWARE),
+    ),
+    "every movement imposes its angle": (
+        the_imposed_movement_alone_needs_no_angle,
+        PlantedError(
+            "ecu/observe.c", "drive_imposes_angle(drive)", "movement_is_agreed(&drive->task.movement)", FIRMWARE,
+        ),
+    ),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     "check", [torque_waits_for_the_index, the_angle_keeps_its_speed_when_the_index_passes], ids=lambda c: c.__name__
 )
@@ -134,9 +230,25 @@ def test_a_planted_error_of_the_index_is_found(encoder: Parts, name: str, tmp_pa
         check(planted)
 
 
-def test_the_bus_names_the_reason(encoder: Parts) -> None:
+@pytest.mark.parametrize(
+    "check",
+    [the_imposed_movement_alone_needs_no_angle, the_movement_carries_the_shaft_past_its_index],
+    ids=lambda c: c.__name__,
+)
+def test_the_flashed_encoder_image_passes_each_check(flashed: Parts, check: Check) -> None:
+    check(flashed)
+
+
+@pytest.mark.parametrize("name", MOVEMENT)
+def test_a_planted_error_of_the_movement_is_found(flashed: Parts, name: str, tmp_path: Path) -> None:
+    check, error = MOVEMENT[name]
+    planted = replace(flashed, image=image_with_error(flashed.image, error, tmp_path))
+    with pytest.raises((AssertionError, FluxtrueError)):
+        check(planted)
+
+
+def test_the_bus_names_the_reason(flashed: Parts) -> None:
     """The flashed image charges the dc link, waits in ready and refuses to enable."""
-    flashed = build.prepare("hsm1", angle="encoder", flashed=True)
     with started_beside_the_index(flashed) as loop:
         stand = Stand(loop)
         bus = Listener(stand.core)

@@ -72,6 +72,50 @@ void test_the_imposed_angle_turns_whatever_the_rotor_does(void)
     TEST_ASSERT_EQUAL_UINT32(0, drive.fast.faults);
 }
 
+/* The encoder's index has not passed: only the imposed angle does without the sensor's. */
+void test_the_imposed_movement_alone_runs_without_an_absolute_angle(void)
+{
+    for (unsigned kind = MOVEMENT_IMPOSED; kind <= MOVEMENT_CONNECTED; kind++) {
+        setUp();
+        seam.angle_unknown = true;
+        wanted->movement = (uint8_t)kind;
+        seam_periods(20);
+        TEST_ASSERT_TRUE(movement_is_agreed(&drive.task.movement));
+        drive.request.enable = true;
+        for (int n = 0; n < 20; n++) {
+            seam_periods(10);
+            TEST_ASSERT_EQUAL(kind == MOVEMENT_IMPOSED && n > 0, seam.gates);
+        }
+    }
+}
+
+/* When it is no longer agreed, the missing angle forbids switching again. */
+void test_the_end_of_an_imposed_movement_without_an_absolute_angle_disables_switching(void)
+{
+    for (int late = 0; late <= 1; late++) {
+        setUp();
+        seam.angle_unknown = true;
+        wanted->movement = MOVEMENT_IMPOSED;
+        run();
+        wanted->alive = late == 0;
+        wanted->movement = MOVEMENT_NONE;
+        for (int n = 0; n < 20; n++) {
+            seam_periods(11);
+            TEST_ASSERT_FALSE(seam.gates);
+        }
+        drive.request.enable = false;
+        wanted->alive = true;
+        seam_periods(20);
+        TEST_ASSERT_EQUAL_INT(MOVEMENT_PHASE_IDLE, drive.task.movement.phase);
+        drive.request.enable = true;
+        seam_periods(20);
+        TEST_ASSERT_FALSE(seam.gates);
+        seam.angle_unknown = false;
+        seam_periods(20);
+        TEST_ASSERT_TRUE(seam.gates);
+    }
+}
+
 void test_silence_disables_switching_in_the_next_step(void)
 {
     run();

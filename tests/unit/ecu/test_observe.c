@@ -273,6 +273,19 @@ void test_an_angle_that_is_not_absolute_yet_is_reported(void)
     TEST_ASSERT_FALSE(observe()->angle_absolute);
 }
 
+/* Only the imposed movement does without the angle, and only while it is agreed. */
+void test_an_agreed_imposed_movement_is_reported(void)
+{
+    TEST_ASSERT_FALSE(observe()->angle_imposed);
+    for (unsigned kind = MOVEMENT_NONE; kind <= MOVEMENT_CONNECTED; kind++) {
+        for (unsigned phase = MOVEMENT_PHASE_IDLE; phase <= MOVEMENT_PHASE_ENDED; phase++) {
+            ecu.drive.task.movement = (movement_state_t){.phase = (movement_phase_t)phase, .movement = (uint8_t)kind};
+            const bool imposed = kind == MOVEMENT_IMPOSED && phase == MOVEMENT_PHASE_AGREED;
+            TEST_ASSERT_EQUAL(imposed, observe()->angle_imposed);
+        }
+    }
+}
+
 /* The dead band of 0.25 N·m is rounded to 28 counts of 0.009 N·m: 0.256 N·m are 28 counts, 0.257 N·m are 29. */
 void test_a_requested_torque_within_the_dead_band_is_zero(void)
 {

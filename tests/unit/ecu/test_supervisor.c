@@ -529,6 +529,17 @@ void test_enable_without_an_absolute_angle_is_refused(void)
     TEST_ASSERT_EQUAL_INT(REFUSED_NONE, s.refused);
 }
 
+/* The agreed movement turns the shaft past the encoder's index. */
+void test_enable_without_an_absolute_angle_is_granted_to_an_imposed_one(void)
+{
+    to_ready();
+    in.angle_absolute = false;
+    in.angle_imposed = true;
+    in.enable = true;
+    TEST_ASSERT_EQUAL_INT(STATE_RUN, step());
+    TEST_ASSERT_EQUAL_INT(REFUSED_NONE, s.refused);
+}
+
 void test_enable_after_an_early_end_of_a_movement_is_refused(void)
 {
     to_ready();
@@ -708,6 +719,7 @@ static supervisor_in_t inputs_of(unsigned bits)
         .slow = (bits >> 13 & 1U) != 0U,
         .derated = (bits >> 14 & 1U) != 0U,
         .angle_absolute = (bits >> 13 & 3U) != 1U, /* whatever the other conditions of enable are */
+        .angle_imposed = (bits >> 14 & 3U) == 2U,
         .gate_fault = (bits >> 15 & 1U) != 0U,
         .task_late = (bits >> 16 & 1U) != 0U,
         .stalled = (bits >> 17 & 1U) != 0U,
@@ -724,8 +736,9 @@ static void check_transition(const supervisor_t *before, const supervisor_in_t *
     TEST_ASSERT_TRUE(s.state == before->state || (allowed[before->state] >> s.state & 1U) != 0U);
     if (runs && !ran) {
         TEST_ASSERT_TRUE(before->state == STATE_READY && now->alive && now->torque_mode);
-        TEST_ASSERT_TRUE(before->enabled || (now->enable && !before->enable_seen && now->torque_requested_is_zero &&
-                                             now->dc_in_range && now->sensors_plausible && now->angle_absolute));
+        TEST_ASSERT_TRUE(before->enabled ||
+                         (now->enable && !before->enable_seen && now->torque_requested_is_zero && now->dc_in_range &&
+                          now->sensors_plausible && (now->angle_absolute || now->angle_imposed)));
         TEST_ASSERT_TRUE(s.faults == 0U && now->drive_faults == 0U);
     }
     if (now->drive_faults != 0U || now->gate_fault || now->stalled) {

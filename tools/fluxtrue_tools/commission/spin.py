@@ -188,12 +188,25 @@ def voltages(rows: Array, period_s: float, periods: int = 1) -> tuple[Array, Arr
     return i, u / (1j * omega * np.sinc(0.5 * omega * period_s / np.pi)), float(omega.mean())
 
 
+def _refuse_oscillation(taken: list[Array], largest_A: float) -> None:
+    """The voltage of the dead time lies along the mean current only while the current keeps its direction.
+
+    Gains for larger inductances than the machine's make it swing by more, about a mean that looks settled.
+    """
+    swing_A = max(float(np.std(rows[:, 0] + 1j * rows[:, 1])) for rows in taken)
+    if swing_A > largest_A:
+        raise FluxtrueError(f"commission: {NAME}: the current oscillates by {swing_A:.2g} A rms about {largest_A:.2g} "
+                            "A: the firmware's gains are for larger inductances; build the firmware for the nameplate "
+                            "(tools/fluxtrue motor start)")  # fmt: skip
+
+
 def magnet(taken: list[Array], period_s: float, offset_A: complex) -> Magnet:
     """(CM-19): what neither changes its sign with the current, nor grows with its square, nor lies along it."""
     levels = np.array(LEVELS)
     means = [voltages(whole_turns(rows), period_s) for rows in taken]
     psi, omega = np.array([flux.mean() for _, flux, _ in means]), np.array([speed for _, _, speed in means])
     i_A = np.array([mean_current(rows, offset_A) for rows in taken])
+    _refuse_oscillation(taken, float(np.abs(i_A).max()))
     along = np.sign(levels) + 1j * i_A.imag / np.abs(i_A.real)
     large = np.abs(levels) > LARGE
     matrix = np.column_stack((np.ones(len(levels)), levels, levels**2, large * along / omega, ~large * along / omega))

@@ -17,6 +17,7 @@ from fluxtrue_tools.sim.motor import Motor
 from fluxtrue_tools.target.build import image
 
 ROOT: Final = sim_build.ROOT
+MOTOR: Final = "hsm1"  # FLUXTRUE_MOTOR's default
 # The image without the bus: scenarios write the requests into its memory themselves.
 PRESETS: Final = {"encoder": "s32k144-direct", "resolver": "s32k144-resolver-direct",
                   "as5047": "s32k144-as5047-direct", "sincos": "s32k144-sincos-direct",
@@ -65,6 +66,14 @@ def _check_who_commands(elf: Path, flashed: bool) -> None:
         )
 
 
+def _image(preset: str, name: str, folder: Path) -> Path:
+    """The image for a motor; that of another motor than the presets' in a build folder of its own."""
+    build = ROOT / "build" / "emulated"
+    if folder == sim_build.SHIPPED / MOTOR:
+        return image(preset, build / preset)
+    return image(preset, build / f"{preset}-{name}-{sim_build.tag(folder)}", folder)
+
+
 def prepare(
     motor: str,
     elf: Path | None = None,
@@ -74,7 +83,7 @@ def prepare(
     flashed: bool = False,
     where: str = "motor",
 ) -> Parts:
-    """Build what is missing. Without `elf` the image is built, for FLUXTRUE_MOTOR's default.
+    """Build what is missing, without `elf` the image for this motor, too.
 
     `flashed` chooses the image that the bus commands.
     """
@@ -91,7 +100,7 @@ def prepare(
             )
     if elf is None:
         preset = (FLASHED if flashed else PRESETS)[angle]
-        elf = image(preset, ROOT / "build" / "emulated" / preset)
+        elf = _image(preset, *sim_build.locate(motor, base or Path.cwd(), where))
     elif not elf.is_file():
         raise FluxtrueError(f"--elf {elf}: no such file")
     else:

@@ -166,8 +166,12 @@ def prepare(motor: str, build_dir: Path | None = None, base: Path | None = None,
                             f"-DFLUXTRUE_MOTOR={folder}")  # fmt: skip
     if is_shipped:
         return _make(name, ROOT / "build" / "host", None)
-    tag = hashlib.sha256(str(folder).encode()).hexdigest()[:8]
-    return _make_from(name, ROOT / "build" / "sim" / f"{name}-{tag}", folder)
+    return _make_from(name, ROOT / "build" / "sim" / f"{name}-{tag(folder)}", folder)
+
+
+def tag(folder: Path) -> str:
+    """What tells folders of the same name apart in build/."""
+    return hashlib.sha256(str(folder).encode()).hexdigest()[:8]
 
 
 def _make_from(name: str, build_dir: Path, folder: Path) -> MotorFolder:

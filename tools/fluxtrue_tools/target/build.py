@@ -14,12 +14,16 @@ ROOT = Path(__file__).resolve().parents[3]
 ARM_CC = "arm-none-eabi-gcc"
 
 
-def image(preset: str, folder: Path) -> Path:
-    """Configure and build the preset in the folder (quick when nothing changed); its ELF file."""
+def image(preset: str, folder: Path, motor: Path | None = None) -> Path:
+    """Configure and build the preset in the folder (quick when nothing changed); its ELF file.
+
+    motor   folder of the motor's data; none: those of the preset
+    """
+    options = [] if motor is None else [f"-DFLUXTRUE_MOTOR={motor}"]
     if shutil.which(ARM_CC) is None:
         raise FluxtrueError(f"{ARM_CC} not found: install gcc-arm-none-eabi or run tools/setup")
     with build_lock():
-        _run(["cmake", "--preset", preset, "-B", str(folder)], preset)
+        _run(["cmake", "--preset", preset, "-B", str(folder), *options], preset)
         _run(["cmake", "--build", str(folder), "-j", "2"], preset)
     return folder / "fluxtrue.elf"
 
