@@ -7,6 +7,7 @@
  *   While the state machine requires the supply, it must be present.
  * Source   docs/theory/third-level.md
  * Units    us of true time
+ * Range    every combination of inputs
  * Errors   a bit of ecu_fault_t in faults
  * Context  1 kHz task; pure */
 #include <stdbool.h>

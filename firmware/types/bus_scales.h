@@ -6,6 +6,7 @@
  * Source   docs/decisions/018-bus-scales.md; tools/fluxtrue_tools/bus/scales.py
  * Units    as the names say: the units of the signals
  * Range    1, 2 or 5 times a power of ten
+ * Errors   none: constant data
  * Context  const data in flash, read by the 1 kHz task */
 typedef struct {
     float torque_Nm;
