@@ -10,6 +10,7 @@
  *                   same factor, which the currents themselves do not show
  * Source   docs/howto/port.md; docs/theory/monitors.md (MN-37)
  * Units    right-aligned counts of the converter that motor.toml names (adc_bits); thousandths
+ * Range    counts 0 ... 2^adc_bits - 1; thousandths 0 ... 32767
  * Errors   a value at the end of the range is returned as it is, and the monitors evaluate it; HAL_ADC_NOTHING_KNOWN:
  *          the port has no such voltage, and the integrator supervises the reference
  * Context  hal_adc_read(): fast ISR, once per period, after the conversion has finished; hal_adc_latest():

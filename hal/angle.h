@@ -4,6 +4,7 @@
 /** Mechanical rotor angle at the instant of the current samples.
  * Source   docs/howto/port.md
  * Units    fraction of a mechanical turn, 2^32 = one turn; wraps
+ * Range    every angle
  * Errors   none here; implausible steps are found by the angle tracker
  * Context  hal_angle_read(): fast ISR, once per period; hal_angle_is_absolute(): 1 kHz task */
 #include <stdbool.h>

@@ -3,6 +3,7 @@
 #define HAL_BOARD_H
 /** Digital lines of the inverter board: contactors, supplies, safe state, gate fault.
  * Source   docs/howto/port.md
+ * Units    none: lines that are on or off
  * Errors   hal_board_gate_fault(): true while the gate driver reports a fault; the timer's fault input has already
  *          disabled switching
  * Context  1 kHz task */

@@ -3,6 +3,8 @@
 #define HAL_CAN_H
 /** One classic CAN channel. The port's receive interrupt only queues frames; it does not interpret them.
  * Source   docs/howto/port.md
+ * Units    frames
+ * Range    every classic frame
  * Errors   hal_can_receive(): false, nothing waits. hal_can_send(): false, all mailboxes are busy and the frame was
  *          not taken. hal_can_lost(): received frames that found the queue full, and hal_can_bus_off(): times the
  *          controller left the bus, both since start-up; the port recovers by itself

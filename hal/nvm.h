@@ -4,7 +4,7 @@
 /** Flash slots that survive a power cycle. The store writes them in turn, so that a power cut at any byte leaves the
  * previous or the new record intact.
  *   A port with more slots than two, or with several in a sector that is erased as a whole, defines the three numbers
- *   for the layers that include this header (hal/s32k144/CMakeLists.txt).
+ *   for the layers that include this header (hal/s32k144/nvm_layout.cmake).
  *   begin() and end() enclose every erase and program. A port whose flash needs other clocks changes them there: the
  *   drive keeps switching disabled in between, and the rotor stands still.
  * Source   docs/howto/port.md, docs/decisions/007-store.md

@@ -4,6 +4,7 @@
 /** Three-phase bridge: duties for the next period; switching enabled or disabled.
  * Source   docs/howto/port.md
  * Units    duty with 2^15 = 1.0 (0 ... 32768); the port turns it into timer ticks and takes it over synchronously
+ * Range    duties 0 ... 32768
  * Errors   none; duties are always in range
  * Context  fast ISR; write() once per period; enable() at a change, and possibly repeatedly: true takes effect
  *          together with the duties written in the same period, false at once.

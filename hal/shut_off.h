@@ -7,6 +7,8 @@
  *   answer()    to the present question; a right one brings the next question
  *   supply()    whether the gate drivers have supply, read back behind all its switches; true within 10 ms of a request
  * Source   docs/howto/port.md; docs/theory/third-level.md
+ * Units    none: a question, an answer of 32 bits
+ * Range    questions 0 ... 15
  * Errors   none; a device that does not respond any more must not return false but its last question
  * Context  1 kHz task: question() at the start of each step, answer() once at its end */
 #include <stdbool.h>

@@ -6,6 +6,7 @@
  *   reset_cause   why the processor started; noted by the port before it clears the register
  * Source   docs/howto/port.md
  * Units    bytes
+ * Range    0 ... size of the stack; RESET_CAUSE_LIST
  * Errors   a port without this information returns 0 and RESET_UNKNOWN
  * Context  1 kHz task; stack_unused may check a bounded number of words per call */
 #include <stdint.h>

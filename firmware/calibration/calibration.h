@@ -7,6 +7,7 @@
  * Units    as named
  * Range    calibration/calibration_list.h; calibration_set() expects a value of calibration_range()
  * Rounding to the nearest step of the configuration's format
+ * Errors   none: the callers refuse a value outside calibration_range()
  * Context  1 kHz task, or before it starts; never at a lower priority, because the task compares each word with its
  *          complement (drive/data_check.h) */
 #include "calibration/calibration_list.h"

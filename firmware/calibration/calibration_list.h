@@ -5,6 +5,7 @@
  *   range checks, the names in software in the loop and the A2L file are generated from this list.
  *   X(name, lowest, highest, unit, text); optional values come last, so that leaving them out moves no other
  * Source   docs/howto/xcp.md
+ * Units    in each line
  * Range    a write access refuses a value outside its range
  * Context  calibration/calibration.c connects each value with the motor data */
 

@@ -4,6 +4,7 @@
 /** The snapshot that measurement tools read.
  * Source   calibration/measurement_list.h
  * Units    per unit of motor.bases or SI, as the list says
+ * Errors   none
  * Context  1 kHz task; floating point, hence in no interrupt above it */
 #include <stdint.h>
 

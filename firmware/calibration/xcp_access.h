@@ -3,6 +3,7 @@
 #define CALIBRATION_XCP_ACCESS_H
 /** Connects the calibration protocol with the drive: readable memory, writable values, and when they take effect.
  * Source   docs/howto/xcp.md
+ * Units    SI, as calibration/calibration_list.h says
  * Range    calibration/calibration_list.h, calibration/measurement_list.h
  * Errors   the protocol's own; seed and key protect against mistakes, not attacks: the key is a published function
  * Context  1 kHz task; xcp_access_receive() before the drive's step, the rest after it */

@@ -71,7 +71,7 @@ static void record_result(rx_channel_t *channel, rx_result_t result)
     }
 }
 
-/* NULL: another identifier. */
+/* The channel of an identifier; NULL: it is not one of the protected messages. */
 static rx_channel_t *channel_of(can_rx_t *rx, uint32_t id, uint16_t *data_id)
 {
     switch (id) {
@@ -119,7 +119,7 @@ rx_result_t can_rx_frame(can_rx_t *rx, const bus_scales_t *scales, const can_fra
     return result;
 }
 
-/* True in the step in which the message times out. */
+/* Adds the time since the last step to the age; true in the step in which the message times out. */
 static bool advance_age(rx_channel_t *channel, uint32_t elapsed_us, uint32_t time_out_ms)
 {
     if (!channel->alive) {

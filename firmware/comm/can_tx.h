@@ -7,6 +7,7 @@
  *   task zero, one or two milliseconds pass; it sends the messages that were due in them.
  * Source   firmware/comm/fluxtrue.dbc, GenMsgCycleTime; docs/howto/can.md
  * Units    ms
+ * Range    0 to 2 ms passed in a step
  * Errors   a frame with NaN or infinity is not sent; can_tx_next() then returns TX_NOT_A_NUMBER
  * Context  1 kHz task: can_tx_begin() once, then can_tx_next() until it returns TX_NONE */
 #include "comm/messages.h"

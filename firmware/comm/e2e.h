@@ -8,6 +8,7 @@
  *   The counter must advance by 1; an advance by 2 means one lost frame and is accepted, by more it is a jump, by 0 a
  *   repetition. After a jump the next frame must follow the new counter. The first frame only synchronises the counter.
  * Source   AUTOSAR PRS_E2EProtocol, profile 11, data-id mode BOTH; docs/howto/can.md
+ * Units    bytes
  * Range    counter 15 is never valid
  * Errors   one status for each kind of error; no error is corrected
  * Context  1 kHz task */

@@ -5,6 +5,7 @@
  *   Every value is clamped to the DBC's range of its signal; for one that is NaN or infinity no frame is sent.
  * Source   firmware/comm/fluxtrue.dbc; docs/decisions/018-bus-scales.md
  * Units    SI or as the names say; signs as in the DBC
+ * Range    every float: clamped to the range of its signal
  * Rounding to nearest in the motor's scale
  * Errors   encoders answer false for a value that is not finite: the frame must not be sent
  * Context  1 kHz task */

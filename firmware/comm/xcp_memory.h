@@ -4,6 +4,7 @@
 /** The memory areas that a master may read.
  * Source   docs/howto/xcp.md
  * Units    32-bit addresses; on a host they fit because the program is linked at a fixed address
+ * Range    every address and size
  * Errors   NULL: the range does not lie inside one area
  * Context  1 kHz task */
 #include <stddef.h>

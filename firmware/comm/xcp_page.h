@@ -5,6 +5,8 @@
  *   Bytes wait until their parameter is complete. It is then compared with its limits (NaN is out of range) and stored
  *   as one word.
  * Source   docs/howto/xcp.md
+ * Units    bytes; a parameter is a float
+ * Range    the addresses of the segment
  * Errors   the protocol's codes; a refused write leaves page and waiting bytes as they were, a value out of its range
  *          also drops the bytes that had waited for it
  * Context  comm/xcp.c only */

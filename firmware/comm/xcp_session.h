@@ -4,6 +4,7 @@
 /** Connection, status, seed and key of the XCP slave. A wrong key ends the session; after three wrong
  *   keys the slave gives no seed before its next reset.
  * Source   ASAM MCD-1 XCP 1.x; docs/howto/xcp.md
+ * Units    bytes and numbers of the protocol
  * Errors   the protocol's codes
  * Context  comm/xcp.c only */
 #include "comm/xcp.h"

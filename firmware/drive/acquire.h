@@ -3,6 +3,8 @@
 #define DRIVE_ACQUIRE_H
 /** The first part of a period: samples of converters and angle sensor in per unit, checked against their limits.
  * Source   docs/architecture.md
+ * Units    counts of the converters in, per unit of motor.bases out; angles in turns times 2^32
+ * Range    every count and every angle
  * Errors   an implausible step of the angle is replaced by the prediction and reported to the monitors
  * Context  fast ISR */
 #include "drive/drive.h"

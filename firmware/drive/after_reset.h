@@ -8,6 +8,7 @@
  *     speed allows disabled switching, as after a fault
  * Source   docs/theory/safe-state.md, section 6
  * Units    per unit of motor.bases
+ * Range    speed -1 ... 1: negative if it cannot be measured; v_dc 0 ... 1
  * Errors   after_reset_needs_short_circuit(): false also where it is not permitted, because the bridge had no supply or
  *          the motor data were refused
  * Context  1 kHz task; start-up */

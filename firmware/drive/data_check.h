@@ -11,6 +11,7 @@
  * A function that changes the parameters takes a copy of them first and passes it to data_check_accept(), which renews
  * the complements of the words that differ: damage in other words is still found.
  * Source   docs/theory/data-integrity.md (DI-1), (DI-2)
+ * Units    words of 32 bits; steps of the task
  * Errors   FAULT_CONFIG with MOTOR_CHECK_LIVE_DATA, until the next start, because other data may have changed, too
  * Context  1 kHz task, and before the interrupts start */
 #include "drive/drive.h"

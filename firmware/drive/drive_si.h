@@ -4,6 +4,8 @@
 /** Values of a drive in physical units, the same for the bus and for calibration tools.
  * Source   docs/scaling.md
  * Units    as named
+ * Range    every state of a drive
+ * Errors   none
  * Context  1 kHz task or below; floating point, hence in no interrupt above it */
 #include "drive/drive.h"
 

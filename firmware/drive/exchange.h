@@ -8,6 +8,8 @@
  *   From fast ISR to task, it can: the task copies all it needs, and repeats the copy if a period has interrupted it.
  *   The paper's identification has a box of its own (drive/mrai).
  * Source   docs/architecture.md, shared data; one core, the writer always completes before a lower priority resumes
+ * Units    per unit of motor.bases; angles in turns times 2^32
+ * Range    a generation wraps after 2^32 periods or steps; only differences and remainders are used
  * Errors   none
  * Context  stated per box */
 #include <stdbool.h>

@@ -3,6 +3,8 @@
 #define DRIVE_MOTOR_H
 /** Everything that depends on the machine and its inverter: one constant, generated from motor.toml and the flux map.
  * Source   docs/scaling.md, docs/theory; written by `tools/fluxtrue motor build`
+ * Units    per unit of bases, unless a name ends in a unit
+ * Range    what motor_check() accepts
  * Errors   motor_check() names the first of tables, gains and limits that no drive may run with
  * Context  const data in flash; what changes while driving is motor_parameters_t, of which each drive has its own */
 #include "control/adapt/angle_harmonics.h"

@@ -7,7 +7,7 @@
  *   spin        theta_e = +-p theta_m + offset, with currents instead of a torque
  *   connected   the same angle with the torque path: for the steps at standstill of a motor whose sensor is not
  *               connected as the motor data say
- * A damped current brakes the swing of a rotor about it: a fifth of it flows while the rotor becomes faster.
+ * Damping: the rotor swings about the imposed current. While it accelerates, only a fifth of the current flows.
  * Source   docs/theory/commissioning.md (CM-15), section 11
  * Units    angles in turns times 2^32, currents per unit in q15, sensor speed per unit of the speed base in Q31
  * Range    pole pairs up to MOVEMENT_PAIRS_MAX; currents are cut at i_max, and change by at most i_slew in a step
@@ -65,7 +65,7 @@ typedef struct {
     uint8_t direction;  /* of the imposed angle */
     bool reversed;      /* the sensor counts against the electrical direction */
     bool damped;
-    bool alive;      /* the sender has prolonged the movement in time */
+    bool alive;      /* the message of the movement has not timed out */
     bool may_begin;  /* the state machine allows a movement to begin */
     uint16_t offset; /* electrical angle at the sensor's zero, 2^16 = one turn */
     dq_q15_t i;

@@ -6,6 +6,8 @@
  *   Once per step it also checks that the task has written a command since the last step. Without a command in two
  *   whole steps while the bridge runs, the safe state follows, within 3 ms of the last command.
  * Source   docs/architecture.md, shared data
+ * Units    per unit of motor.bases
+ * Range    every sample
  * Errors   FAULT_OVERRUN
  * Context  fast ISR */
 #include "drive/drive.h"

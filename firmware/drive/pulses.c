@@ -3,7 +3,8 @@
 
 #include "fx/div.h"
 
-/* The pulses begin towards the bound that is further away: a band on one side of zero is entered at once. */
+/* The pulses begin towards the bound that is further from zero: then the current enters a band that lies on one side of
+ * zero at once. */
 static int32_t first_sign(const pulses_axis_config_t *config)
 {
     return (config->v == 0) ? 0 : (config->high >= -config->low) ? 1 : -1;
@@ -47,7 +48,7 @@ static int32_t bound_q(const pulses_config_t *config, const pulses_state_t *stat
     return (state->reversals == 0U) ? fx_mul_q15(config->first, bound) : bound;
 }
 
-/* The last half wave ends where its return to zero, which takes as long as its rise, brings the sum to zero. */
+/* The last half wave ends when the sum of i_q will be zero after the return to zero, as long as the rise. */
 static bool ends_in_balance(const pulses_config_t *config, const pulses_state_t *state)
 {
     const int32_t sign = state->q.sign;

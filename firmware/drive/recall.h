@@ -10,6 +10,7 @@
  *              angle: the identification restarts from its priors
  * Source   docs/theory/identification.md (ID-22)
  * Units    residuals per unit of voltage, Q30
+ * Range    every speed and residual
  * Errors   none
  * Context  1 kHz task, before the step of the identification; recall_begin() before the task starts */
 #include "drive/drive.h"

@@ -5,6 +5,9 @@
  * by a gate fault. The short circuit is commanded only if the bridge has been switching before; otherwise it may not be
  * powered.
  * Source   docs/theory/safe-state.md
+ * Units    per unit of motor.bases
+ * Range    every snapshot
+ * Errors   none: without a valid speed the last known one counts
  * Context  1 kHz task; the fast ISR applies the decision */
 #include "drive/drive.h"
 

@@ -14,6 +14,9 @@
  *   left out after an over-voltage, which the energy of the currents would raise, after a gate fault, and after faults
  *   that leave control intact: then the currents have been moved before.
  * Source   docs/theory/safe-state.md (SS-11), (SS-20), (SS-21)
+ * Units    PWM periods
+ * Range    up to 255 periods of waiting
+ * Errors   none: if the drivers end the short circuit on both sides, switching stays disabled
  * Context  fast ISR, in every period of the short circuit */
 #include "drive/drive.h"
 

@@ -80,7 +80,7 @@ static q15_t least_of(abc_q15_t i)
     return (q15_t)fx_min_s32(fx_min_s32(fx_abs_q31(i.a), fx_abs_q31(i.b)), fx_abs_q31(i.c));
 }
 
-/* A new compensation changes the voltages, whatever the rotor does: comparisons with earlier voltages begin anew. */
+/* A new compensation changes the voltages even if the rotor does not move: comparisons with earlier ones restart. */
 static bool is_compensation_new(drive_t *drive)
 {
     const int32_t dead_time_q16 = drive->parameters.modulate.dead_time_q16;

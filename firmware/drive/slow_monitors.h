@@ -3,6 +3,8 @@
 #define DRIVE_SLOW_MONITORS_H
 /** The monitors of the 1 kHz task, with the last sample and the references that were in effect.
  * Source   docs/theory/monitors.md, docs/architecture.md
+ * Units    per unit of motor.bases
+ * Range    every snapshot
  * Errors   returns the confirmed faults; the fast ISR latches them, as it alone writes the fault word
  * Context  1 kHz task, before this step's references */
 #include "drive/drive.h"

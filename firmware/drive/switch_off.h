@@ -10,7 +10,9 @@
  *     and stays there for 2 steps.
  *   Every other fault brings the short circuit at once.
  * Source   docs/theory/safe-state.md (SS-8), (SS-12)
+ * Units    per unit of motor.bases
  * Range    i_d down to the demagnetisation limit at the present temperature
+ * Errors   none: every other fault stays in *faults
  * Context  1 kHz task; no division */
 #include "drive/drive.h"
 

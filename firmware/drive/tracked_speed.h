@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #ifndef DRIVE_TRACKED_SPEED_H
 #define DRIVE_TRACKED_SPEED_H
-/** What follows from a tracked speed that is far behind the rotor's, at tens of thousands of rpm/s.
+/** Corrects speed and torque estimate while the tracked speed lags far behind the rotor's: at tens of thousands of
+ * rpm/s.
  * Source   docs/theory/current-reference.md (CR-15), docs/theory/torque-loop.md (TL-13)
  * Units    per unit
  * Range    every snapshot; a lag that no rotor can cause counts as 0

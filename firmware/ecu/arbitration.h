@@ -4,10 +4,10 @@
 /** Arbitration of the requested torque: limits of the vehicle, dead band, slew and jerk.
  *   target = clamp(requested, -limit, +limit), limit = drive or regen by the sign of requested x speed;
  *            0 if |requested| <= dead_band, so that a vehicle at rest does not creep
- *   The torque approaches the target with |dT/dt| <= slew and |d2T/dt2| <= jerk, also while the rate is reduced ahead
- *   of a constant target (the last step may take two jerks). If the rate leads away from the target, or would pass a
- *   target that has changed, it is set to zero at once: the torque does not continue to rise after the request was
- *   reduced, and it never overshoots.
+ *   The torque approaches the target with |dT/dt| <= slew and |d2T/dt2| <= jerk, also while the rate is reduced before
+ *   a constant target is reached (the last step may take two jerks). If the rate leads away from the target, or the
+ *   torque would pass a target that has changed, the rate is set to zero at once: the torque does not continue to rise
+ *   after the request was reduced, and it never overshoots.
  *   ramp_out ends the torque with the rate ramp_out, without a limit of jerk
  * arbitrate_hold(): limits the arbitrated torque to the drive's limited torque plus one jerk. When the drive's limits
  *   rise again, the torque then rises from its present value, with slew and jerk. The one jerk keeps the arbitrated

@@ -7,6 +7,7 @@
  *   contradicts  |V_bat - v_dc| > 8 % of V_bat for more than 250 ms of a live message with the contactor closed (MN-31)
  * Source   docs/theory/monitors.md (MN-30), (MN-31)
  * Units    V; us
+ * Range    every voltage; a battery_V of 0 is not known
  * Errors   none; the caller latches the mismatch
  * Context  1 kHz task; pure */
 #include <stdbool.h>

@@ -7,6 +7,7 @@
  *   The watchdog is served only while both interrupts advance.
  * Source   docs/howto/can.md; docs/architecture.md
  * Units    per unit inside, the DBC's units on the bus
+ * Range    steps of 0.8 to 1.25 ms (signal/step_clock.h)
  * Errors   latched faults of drive and supervisor, transmitted on the bus
  * Context  ecu_init() once, then ecu_continue() if a reset has interrupted driving; ecu_task_1khz() every
  *          bases.periods_per_step periods */

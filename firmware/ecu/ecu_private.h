@@ -4,6 +4,8 @@
 /** Inputs of supervisor, arbitration and telemetry, computed from the state of drive and bus; checks of what the ECU
  * keeps from step to step.
  * Source   docs/howto/can.md, docs/theory/data-integrity.md
+ * Units    as in the headers of supervisor, arbitration and telemetry
+ * Errors   FAULT_CONFIG by ecu_check_integrity(); the others none
  * Context  1 kHz task; ecu.c only */
 #include "comm/messages.h"
 #include "ecu/ecu.h"

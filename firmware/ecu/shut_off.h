@@ -2,11 +2,12 @@
 #ifndef ECU_SHUT_OFF_H
 #define ECU_SHUT_OFF_H
 /** The paths that can shut off the torque: their test after start-up, and the gate supply while it is needed.
- *   In the test switching stays disabled and must read back so; the gate supply must follow first its switch and then
- *   the external watchdog, which is given wrong answers. A path that fails stays failed until the next start.
+ *   During the test switching is disabled, and this must be read back. The gate supply must follow first its switch and
+ *   then the external watchdog, which is given wrong answers. A path that fails stays failed until the next start.
  *   While the state machine requires the supply, it must be present.
  * Source   docs/theory/third-level.md
  * Units    us of true time
+ * Range    every combination of inputs
  * Errors   a bit of ecu_fault_t in faults
  * Context  1 kHz task; pure */
 #include <stdbool.h>

@@ -10,6 +10,7 @@
  *   the reason is transmitted.
  * Source   docs/howto/can.md, whose drawing is made from the same table
  * Units    us of true time; the longest time-out is 5 s
+ * Range    every combination of inputs
  * Errors   its own faults are latched in faults (ecu_fault_t) until a reset after their cause has gone
  * Context  1 kHz task; pure decisions */
 #include <stdbool.h>

@@ -5,6 +5,7 @@
  *   i_dc = 1.5 (u_d i_d + u_q i_q)/v_dc: computed from power, because there is no sensor; without the bridge's losses
  * Source   docs/scaling.md (SC-1) ... (SC-5)
  * Units    SI or as the names of telemetry_t say
+ * Range    every state of a drive
  * Errors   i_dc is 0 below 1 V
  * Context  1 kHz task; single precision, never in an interrupt */
 #include "comm/messages.h"

@@ -53,7 +53,7 @@ static inline int32_t fx_arch_qsub(int32_t a, int32_t b)
 __attribute__((always_inline)) static inline int16_t fx_arch_ssat16(int32_t x)
 {
     const int32_t y = __ssat(x, 16);
-    /* The range that this states to the compiler saves the SXTH after every narrowing. */
+    /* States the range to the compiler, which saves the SXTH after every narrowing. */
     if ((y < INT16_MIN) || (y > INT16_MAX)) {
         __builtin_unreachable();
     }

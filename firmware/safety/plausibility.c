@@ -50,7 +50,7 @@ static uint32_t lost_phases(const plausibility_config_t *config, plausibility_st
     return (a_lost || b_lost || c_lost) ? FAULT_PHASE_LOST : 0U;
 }
 
-/* Distance of a deviation from its own mean over 8 steps; a single large one counts as e_max on each axis. */
+/* Distance of a deviation from its own mean over 8 steps. Each axis of the deviation is limited to e_max. */
 static int32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref, int32_t e_max)
 {
     const int32_t d = fx_clamp_q31(i.d - i_ref.d, -e_max, e_max), q = fx_clamp_q31(i.q - i_ref.q, -e_max, e_max);
@@ -59,9 +59,9 @@ static int32_t distance_from_mean(dq_q15_t *mean_x8, dq_q15_t i, dq_q15_t i_ref,
     return fx_magnitude(fx_sat_q15(ripple.d), fx_sat_q15(ripple.q));
 }
 
-/* (MN-11): an open switch removes half a wave of one phase. In the rotor frame that is an oscillation about the
- * reference, of which every other sample may be small: (MN-1) does not confirm it. Where the steps are half a turn
- * apart the samples or the means of the steps may show a constant, but not both. */
+/* (MN-11): an open switch removes one half wave of a phase current. In the rotor frame that is an oscillation about the
+ * reference. Every other sample of it may be small, so that (MN-1) does not confirm it. If the field turns by half a
+ * turn in a step, the samples or the means of the steps may be constant, but not both. */
 static uint32_t oscillation(const plausibility_config_t *config, plausibility_state_t *state,
                             const plausibility_in_t *in)
 {

@@ -35,7 +35,7 @@ typedef struct {
 } safe_state_config_t;
 
 typedef struct {
-    q15_t speed;    /* known: the measured one, or what is left of the last valid one */
+    q15_t speed;    /* known: the measured one, or the last valid one, which falls at a limited rate */
     q15_t line_emf; /* at the known speed */
     q15_t v_dc;     /* known */
     bool short_circuit;

@@ -53,7 +53,7 @@ static q31_t resistance_at(const torque_monitor_config_t *config, int32_t dC)
     return config->r + config->r_per_dC * (dC - 200); /* 20 C */
 }
 
-/* (MN-32). A reading of the sensor beyond the range counts as its end. */
+/* (MN-32). A reading beyond the range of the winding's temperature counts as the end of the range. */
 static resistance_t resistance(const torque_monitor_config_t *config, int16_t winding_dC)
 {
     int32_t min_dC = config->winding_min_dC;

@@ -5,6 +5,7 @@
  * Source   docs/howto/scope.md
  * Units    raw half words, scope/signal_list.h
  * Range    capture_config_is_valid()
+ * Errors   none: values only
  * Context  1 kHz task; the first part of capture_t is read by tools */
 #include <stdbool.h>
 #include <stdint.h>

@@ -3,6 +3,7 @@
 #define SCOPE_COLUMNS_H
 /** Where a captured signal is found: one column of the ring's slots, or a value of the task's step.
  * Source   the list in scope/signal_list.h
+ * Units    raw half words, scope/signal_list.h
  * Range    signals below CAPTURE_SIGNALS
  * Errors   none
  * Context  1 kHz task; the fast ISR may write other slots of the ring meanwhile */

@@ -7,6 +7,7 @@
  *   trigger is a fault. A capture that has been triggered is kept until it is released. The freeze frame is
  *   released by a command, or when all faults have been reset.
  * Source   docs/howto/scope.md; docs/decisions/020-scope.md
+ * Units    raw half words, scope/signal_list.h; PWM periods
  * Range    commands of scope_command_t; a refused command changes nothing
  * Errors   scope_result_t
  * Context  1 kHz task, after the drive's step */

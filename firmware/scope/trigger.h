@@ -3,6 +3,7 @@
 #define SCOPE_TRIGGER_H
 /** What an armed capture waits for: a signal's level or edge, a command, a fault.
  * Source   docs/howto/scope.md
+ * Units    raw half words, samples
  * Range    a valid configuration
  * Errors   none
  * Context  1 kHz task */

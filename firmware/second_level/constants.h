@@ -9,6 +9,7 @@
  * Source   docs/theory/second-level.md; written by `tools/fluxtrue motor build`
  * Units    per unit of the motor's bases, q15 unless the type says otherwise; torque[][] q15
  * Range    no pointers and no padding, so that the checksum covers what is used
+ * Errors   none here: second_level/own_data.h checks the checksum
  * Context  const data in flash */
 #include <stdint.h>
 

@@ -38,7 +38,7 @@ static bool is_crc_right(const can_frame_t *frame, unsigned data_id)
     return crc == frame->data[0];
 }
 
-/* Whether the frame is the next one of its channel, or the one after it. */
+/* Whether the counter of the frame has advanced by 1 or 2 since the last frame of its channel. */
 static bool follows(second_level_channel_t *channel, unsigned counter)
 {
     if (counter >= COUNTERS) {

@@ -5,6 +5,7 @@
  *   CRC-32 (IEEE 802.3) of all bytes behind `checksum`, SECOND_LEVEL_SLICE of them in each step. Damage is found at the
  *   latest at the end of the pass after the one in which it occurred, that is, in fewer steps than two passes take
  * Source   docs/theory/second-level.md (SL-7)
+ * Units    bytes
  * Errors   false at the end of a pass that does not match; the caller latches it
  * Context  1 kHz task */
 #include <stdbool.h>

@@ -25,7 +25,7 @@ static current_t rotor_current(const second_level_constants_t *constants, const 
                        (fx_mul_q30(beta, at.cos) - fx_mul_q30(alpha, at.sin)) >> 15};
 }
 
-/* What the identified deviations of magnet and q axis take from the table's torque (SL-8). */
+/* The torque by which the identified deviations of magnet and q axis reduce that of the table (SL-8). */
 static int32_t identified_loss(const second_level_constants_t *constants, const second_level_sample_t *sample,
                                current_t i, int32_t table)
 {

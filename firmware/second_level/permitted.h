@@ -9,6 +9,7 @@
  *   Near standstill, where the direction of rotation is uncertain, the larger of both directions' limits counts.
  * Source   docs/theory/second-level.md (SL-1), (SL-2)
  * Units    per unit of T_b
+ * Range    every frame that the DBC allows; every turn
  * Rounding 1 LSB q15
  * Errors   none
  * Context  1 kHz task */

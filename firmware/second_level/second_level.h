@@ -9,6 +9,7 @@
  *   bound is that of the permitted torque in the same direction
  * Source   docs/theory/second-level.md (SL-6); docs/decisions/017-second-level.md
  * Units    per unit of the motor's bases
+ * Range    every sample and every frame
  * Errors   true: confirmed now; the caller latches it
  * Context  1 kHz task, after the frames of the step */
 #include "second_level/own_data.h"

@@ -4,6 +4,7 @@
 /** CRC-32 of stored records and of the tables in flash.
  *   polynomial 0x04C11DB7, bits reflected, start value and final inversion 0xFFFFFFFF; "123456789" gives 0xCBF43926
  * Source   IEEE 802.3; the same as zlib's crc32(), which the tools use
+ * Units    bytes
  * Range    any size; a long area can be checked in pieces: start with CRC32_START, invert the last result
  * Errors   none
  * Context  start-up and background; two tables of 16 words, a look-up in each per byte */

@@ -5,6 +5,8 @@
  *   s <- ror(s, 1) xor n * 0x9E3779B1, for the points n in the order in which they are passed
  * It begins with the question of the external watchdog, so that a signature of an earlier step is wrong.
  * Source   docs/theory/third-level.md (QA-1)
+ * Units    none: a signature of 32 bits
+ * Range    every question and every point
  * Errors   none
  * Context  any; pure */
 #include <stdint.h>

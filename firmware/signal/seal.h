@@ -5,6 +5,7 @@
  * it before the next use, which finds errors of the memory in between.
  *   s <- word xor (s rotated right by one bit), over all words
  * Source   docs/theory/data-integrity.md (DI-3)
+ * Units    none: words of 32 bits
  * Range    any number of aligned words; size in bytes
  * Errors   none; every single flipped bit changes the seal. So do two flipped bits, unless the sum of bit number and
  *          word number is the same for both modulo 32

@@ -10,6 +10,7 @@
  *     switching waits: a port may slow its processor down to write the flash.
  * Source   docs/decisions/007-store.md
  * Units    ms are counted in steps of the robust identification, whose values are stored
+ * Range    the counts wrap after 49 days; only differences are used
  * Errors   if the memory is empty, damaged or of another layout, the priors are used; a save that fails is counted and
  *          repeated after the interval, and the previous record stays valid
  * Context  memory_recall(): after drive_init(), before the interrupts. memory_background(): the port's idle loop, below

@@ -4,6 +4,8 @@
 /** One slot of the store: a header, then a record. The newest slot that is intact.
  *
  * Format   header_t, of STORE_HEADER_SIZE bytes, then `size` bytes of the record
+ * Source   docs/decisions/007-store.md
+ * Units    bytes
  * Range    slot numbers below HAL_NVM_SLOTS; sequence numbers wrap
  * Errors   a slot that cannot be read, or whose CRC-32 differs, is passed over and reported as damaged
  * Context  start-up and background, never at the same time: the search keeps its state in static memory

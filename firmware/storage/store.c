@@ -44,7 +44,7 @@ static bool write_slot(uint32_t slot, const header_t *header, const void *record
 }
 
 #if HAL_NVM_SECTOR_SLOTS > 1U
-/* Nothing has been programmed since the sector was erased. */
+/* Whether nothing has been programmed since the sector was erased. */
 static bool is_blank(uint32_t slot)
 {
     uint8_t chunk[CHUNK];

@@ -8,6 +8,7 @@
  *   is not blank, for example because a cut left it half written, is passed over, and so is the rest of a sector that
  *   cannot be erased or programmed, up to four of them in a save.
  * Source   docs/decisions/007-store.md
+ * Units    bytes
  * Range    size <= STORE_RECORD_MAX; layout names the record's meaning: a record of another layout is not found
  * Errors   store_load(): STORE_EMPTY, no record was saved with this layout; STORE_DAMAGED, there are records but none
  *          is intact; the caller's record changes only with STORE_OK. store_save(): false, the memory failed to erase,

@@ -6,6 +6,7 @@
  *   so that torque is psi_d i_q - psi_q i_d with no constant.
  * Source   docs/scaling.md (SC-1) ... (SC-5), (SC-10)
  * Units    SI, peak phase quantities, electrical angular frequency
+ * Range    finite and positive; periods_per_step 4 ... 40
  * Errors   the generator refuses bases that are not finite and positive; a test recomputes the derived ones
  * Context  start-up, configuration and telemetry only: no interrupt converts to SI */
 #include <stdint.h>

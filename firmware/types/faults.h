@@ -5,6 +5,9 @@
  *   and comments of the DBC, the description file for calibration tools, the words of the library and the pages.
  *   X(NAME, bit, explanation): FAULT_NAME in C, the name in lower case everywhere else
  * Source   docs/theory/monitors.md, docs/architecture.md
+ * Units    none: one bit for each fault
+ * Range    bits 0 ... 15 of a 32-bit word
+ * Errors   none: values only
  * Context  values only */
 #include <stdint.h>
 

@@ -9,6 +9,7 @@
  * Range    a measured or applied vector stays inside [-1, 1): the over-current trip and the voltage circle keep its
  *          magnitude below 1. Sums over several periods and limits that are not yet applied may exceed 1; every
  *          component is a word, so that they fit and no halfword has to be sign-extended.
+ * Errors   none: values only
  * Context  values only, passed by copy; a component never changes its format without changing the type */
 #include "fx/q.h"
 

@@ -5,6 +5,8 @@
  *   X(NAME, value, explanation): MOTOR_CHECK_NAME in C. A value is transmitted and stored: a new check gets a new
  *   value, and no value is used again
  * Source   docs/architecture.md, faults
+ * Units    none: a number for each check
+ * Errors   none: values only
  * Context  each control block checks its own data (flux_table_check() and the like); drive/motor.c checks what lies
  *          between them and puts the checks in order; a port adds its own, IMAGE_CHECKSUM and PWM_TIMER */
 

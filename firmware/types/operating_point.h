@@ -5,6 +5,7 @@
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6) for the flux; docs/theory/current-control.md for the voltage
  * Units    per unit of the bases in types/bases.h; g = omega_b T_s/l per unit of 2^g_shift, below 1
  * Range    each q15 field is a word, because a halfword would have to be sign-extended at every use
+ * Errors   none: values only
  * Context  values only */
 #include "types/frames.h"
 

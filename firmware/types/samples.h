@@ -5,6 +5,7 @@
  * Source   docs/architecture.md, the HAL seam
  * Units    counts of an adc_bits converter, right-aligned; duties with 2^15 = 1.0
  * Range    duties 0 ... 32768. Each value is a word, because halfwords would have to be zero-extended at every use
+ * Errors   none: values only; the monitors evaluate them
  * Context  values only */
 #include <stdint.h>
 

@@ -5,6 +5,7 @@
  * Source   docs/theory/limits.md (LM-1)
  * Units    torque per unit of T_b; power, on the dc side, per unit of P_b = 1.5 V_b I_b
  * Range    0 ... Q15_MAX; Q15_MAX does not limit, negative values count as 0
+ * Errors   none: values only
  * Context  values only */
 #include "fx/q.h"
 

@@ -3,6 +3,7 @@
 #define TYPES_VALUE_RANGE_H
 /** The range of a value in SI that is kept in a fixed-point format.
  * Source   docs/howto/xcp.md
+ * Units    SI, those of the value
  * Range    lo ... hi; a magnitude below `least`, except 0, is refused: the format would make it zero
  * Errors   NaN is in no range
  * Context  values only */

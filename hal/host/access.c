@@ -84,7 +84,7 @@ int parameters_check(const fluxtrue_t *drive, int handle, double value)
     if (!parameters_writable(handle)) {
         return FLUXTRUE_READ_ONLY;
     }
-    /* What is bounded by a float is compared as one: 1.8 as a double exceeds 1.8f. */
+    /* A value whose bound is a float is compared as a float: 1.8 as a double exceeds 1.8f. */
     const bool of_floats = is_calibration(handle) || !is_number(parameters[handle].hi);
     const double compared = of_floats ? (double)(float)value : value;
     const parameters_range_t range = parameters_range(drive, handle);

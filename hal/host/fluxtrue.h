@@ -38,7 +38,7 @@ enum {
 
 enum { FLUXTRUE_MEMORY_SIZE = 4096 };
 
-/** What the value of a name is. */
+/** Kind of a name's value. */
 enum {
     FLUXTRUE_NUMBER = 0,
     FLUXTRUE_SWITCH = 1, /* 0 or 1 */

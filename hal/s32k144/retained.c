@@ -31,8 +31,8 @@ static bool read_copy(const volatile copy_t *from, uint32_t word[WORDS])
     return differing == 0U && word[MAGIC_WORD] == MAGIC;
 }
 
-/* RAM may keep its content without a supply for a while. What does not count now must not count after the next reset,
- * either. */
+/* RAM may keep its content for a while without a supply. Copies that do not count now must not count after the next
+ * reset, either. */
 static void discard(void)
 {
     copies[0].word[MAGIC_WORD] = 0;

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """No test waits by the clock: below tests/ there are no clocks, pauses and time-outs outside tests/support/progress.py.
 
-A test that waits for a second, or gives a process ten, fails on a busy computer although nothing is wrong. Waits follow
-progress instead, most of all simulated time.
+A test that waits for a second, or allows a process ten, fails on a busy computer although nothing is wrong. Tests wait
+for progress instead, usually of simulated time.
 """
 
 import ast

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kinds of value a command line takes beside paths: a wrong one is refused before the command begins.
+"""Types of command-line values other than paths: a wrong value is refused before the command begins.
 
 click's own float takes NaN and infinity, and a text is checked only where it is used, often after minutes of work.
 """

@@ -5,6 +5,7 @@
  * Source   docs/theory/flux-tables.md (FT-1) ... (FT-6)
  * Units    inductances per unit of 2^l_shift L_b; flux per unit of psi_b; g = omega_b T_s/(2^g_shift l)
  * Range    each q15 value is a word, because a halfword would have to be sign-extended at every use
+ * Errors   none: values only
  * Context  values only */
 #include "types/operating_point.h"
 

@@ -5,6 +5,7 @@
  * Source   docs/theory/identification.md; written by `tools/fluxtrue motor build` from [identification]
  * Units    per unit; sigma[k] is one standard deviation of the prior of state k
  * Range    identify_check() checks it at start-up
+ * Errors   identify_check() names the first value that is not allowed
  * Context  const data */
 #include <stdbool.h>
 

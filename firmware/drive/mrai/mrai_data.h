@@ -4,6 +4,7 @@
 /** All data of a drive that only the 2014 paper's identification needs, by writer.
  * Source   docs/architecture.md, shared data; docs/theory/mrai.md
  * Units    as in control/mrai
+ * Errors   none: values only
  * Context  part of drive_t; a build without FLUXTRUE_MRAI has none of it */
 #include "control/mrai/schedule.h"
 #include "control/mrai/torque_estimate.h"

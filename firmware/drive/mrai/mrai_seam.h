@@ -6,6 +6,7 @@
  *   mrai_identify() and mrai_reschedule(); the second interrupt is mrai_isr() (drive/drive.h). While the law is not
  *   chosen, none of them runs.
  * Source   docs/architecture.md, shared data; docs/decisions/012-seam-of-the-papers-law.md
+ * Units    as in control/mrai
  * Errors   a point that comes before the last one is finished is dropped and counted; three in a row are FAULT_OVERRUN
  * Context  stated per function. Without FLUXTRUE_MRAI the law cannot be chosen and the functions are empty */
 #include "drive/drive.h"

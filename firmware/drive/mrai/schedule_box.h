@@ -3,6 +3,8 @@
 #define MRAI_SCHEDULE_BOX_H
 /** Gains from the 1 kHz task to the MRAI interrupt: two slots; the generation selects the complete one.
  * Source   docs/architecture.md, shared data
+ * Units    as in control/mrai
+ * Errors   none
  * Context  written by the 1 kHz task, read by the MRAI interrupt, which the task never interrupts: one read suffices */
 #include "drive/exchange.h"
 #include "drive/mrai/mrai_data.h"

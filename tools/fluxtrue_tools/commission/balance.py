@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gain balance of the three current sensors: (CM-23), (CM-24).
 
-The currents of the three phases have no sum, so that what the sensors' sum shows beside its offset are the
-differences of their gains. The gain that all three have in common does not show.
+The three phase currents sum to zero. Apart from its offset, the sum of the sensors therefore shows only the differences
+of their gains, not the gain that all three have in common.
 """
 
 from collections.abc import Sequence

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The movements of the shaft over CAN: what the scope of the firmware captures in place of a record of every period.
 
-The scope's memory lasts for 0.12 s of five signals in every period, and reading it takes longer than the shaft turns by
-itself: each window is captured, the currents are brought to zero, and the shaft is accelerated again. The evaluation is
-that of software in the loop (connection.py, spin.py, drag.py).
+The scope's memory holds 0.12 s of five signals in every period, and reading it takes longer than the shaft coasts.
+Therefore each window is captured, the currents are brought to zero, and the shaft is accelerated again. The evaluation
+is that of software in the loop (connection.py, spin.py, drag.py).
 """
 
 from collections.abc import Callable

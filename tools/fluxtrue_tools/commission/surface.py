@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One co-energy through all bursts, together with what the voltages lack: (CM-13), (CM-14).
+"""One co-energy through all bursts, together with the errors of the integrated voltages: (CM-13), (CM-14).
 
 The same splines, penalty and choice of the smoothing as for an imported map (motor/map_import/coenergy.py). Besides the
 coefficients of the energy, the least squares have an error of the resistance, of the level of the voltage that a

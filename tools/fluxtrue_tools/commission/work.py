@@ -3,7 +3,7 @@
 
 A step is kept when it has ended well, in one file that is replaced as a whole. The map is not: it is the last step, and
 without it nothing is left to be done. The file has a checksum, because a number that was changed in it would become a
-current or an angle of the machine on the bench, and nothing else could tell it from a measured one.
+current or an angle of the machine on the bench, and could not be distinguished from a measured one.
 """
 
 import json

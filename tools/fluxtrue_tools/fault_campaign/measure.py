@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is measured in a run: the first fault, the torque outside its safe range, movement, current and dc voltage.
 
-Torque is safe between zero and what is requested; what counts is its mean over 5 ms.
+Torque is safe between zero and the requested torque; its mean over 5 ms counts.
 """
 
 import math

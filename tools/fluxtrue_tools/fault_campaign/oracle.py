@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the three safe states themselves would have given: the reference where no drive could meet the plain limits.
 
-A shorted machine brakes and its first current is larger than the last one, a machine that feeds its diodes brakes, too:
-no firmware changes that. The run is repeated in the same plant up to the drive's own reaction, which may not be later
-than the line allows; from there on each of the three states is imposed on the bridge. The best of them is the
+A shorted machine brakes, and its first current is larger than its steady one; a machine that feeds its diodes brakes,
+too. No firmware can change that. The run is repeated in the same plant up to the drive's own reaction, which may not be
+later than the line allows; from there on each of the three states is imposed on the bridge. The best of them is the
 reference. A fault that has no effect at first cannot be found before it has one: there the times count from the effect.
 docs/decisions/023-physical-reference.md argues for both.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which runs make up a campaign: every line of the table at every operating point of which it speaks."""
+"""The runs of a campaign: every line of the table at every operating point to which it applies."""
 
 import hashlib
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Per line of the table: its runs, how many went as demanded, the worst figures, and whether its status is true."""
+"""Per line of the table: its runs, how many meet the requirement, the worst figures, and whether its status is true."""
 
 import math
 from dataclasses import dataclass

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run must have done: the simulated machine's torque, current and dc voltage, and the time of the reaction.
 
-Torque is safe between zero and what is requested, widened by max(10 N·m, 5 % of the largest torque). Losing torque is
-therefore no harm, too much torque or torque of the wrong sign is. Where a line bounds the movement of the vehicle
-against the request, wrong torque may last until the fault. A run whose fault came in time, but whose torque or current
-exceeds its limit in the safe state, is compared with the three safe states themselves; if it is as good as the best of
-them, its verdict says so.
+Torque is safe between zero and the requested torque, widened by max(10 N·m, 5 % of the largest torque). A loss of
+torque is therefore safe; too much torque or torque of the wrong sign is not. Where a line bounds the movement of the
+vehicle against the request, wrong torque may last until the fault. A run whose fault came in time, but whose torque or
+current exceeds its limit in the safe state, is compared with the three safe states themselves; if it is as good as the
+best of them, its verdict says so.
 """
 
 import math

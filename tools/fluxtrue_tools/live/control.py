@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pages may ask for. At most one page has control, and only that page changes anything."""
+"""Requests that pages may send. At most one page has control, and only that page changes anything."""
 
 import asyncio
 import contextlib

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The clock that the commands follow: the wall clock on a bench, simulated time with a virtual ECU.
 
-Before a virtual ECU time passes only between two commands. A computer that stalls stalls the inverter and its machine
-with it: no command is late, whatever else runs. On a bench nothing waits, and a late command is late.
+With a virtual ECU time passes only between two commands. If the computer stalls, the simulated inverter and machine
+stall with it, so that no command is late. On a bench nothing waits, and a command may be late.
 """
 
 import threading

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The words that the page shows for numbers of the bus: name and explanation as the DBC has them, and what to do.
 
-The DBC takes names and explanations from the firmware's lists (fluxtrue_tools.bus.words). What a user of the page can
-do is written here, under the names of the DBC; a test compares the two.
+The DBC takes names and explanations from the firmware's lists (fluxtrue_tools.bus.words). The advice to the user of the
+page is written here, under the names of the DBC; a test compares the two.
 """
 
 from typing import Final

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values that are possible but probably not intended: a unit that is off by 1000, an impossible map, coarse tables.
 
-A doubt is a warning of motor check and build. Where a motor is refused for any reason, a doubt about its units goes
+A doubt is a warning of motor check and build. If a motor is refused for any reason, a doubt about its units is printed
 first, because a consequence of a wrong unit does not tell the user its cause.
 """
 

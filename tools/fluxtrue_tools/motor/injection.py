@@ -2,7 +2,7 @@
 """The current loop measured in simulation: a small voltage between inverter and machine, and what the firmware adds.
 
 With the source's voltage d, the inverter's voltage u and the machine's voltage u + d the loop opened at the machine's
-voltage is L = -u/(u + d): the firmware is as in the car, only the simulated machine has a source in series (PL-27).
+voltage is L = -u/(u + d). The firmware is unchanged; only the simulated machine has a source in series (PL-27).
 d is a sum of sines of both directions of rotation, in the rotor's frame, with a whole number of turns in the time of
 the measurement. So is the rotor's angle, so that the inverter's harmonics lie on frequencies of their own.
 """

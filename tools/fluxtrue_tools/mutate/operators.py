@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The errors that are made in a C source, found in its syntax tree (tree-sitter).
 
-The tree is that of the text before the preprocessor. What is left out is counted by its reason (EXCLUDED).
+The tree is that of the text before the preprocessor. Places that are left out are counted by their reason (EXCLUDED).
 """
 
 import re

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of each mutant of a source: compiled, linked into each unit test that contains the source, and run.
+"""The outcome of each mutant of a source: it is compiled, linked into each unit test that contains the source, and run.
 
 A unit test that compiles the source with other definitions, for example the store's with a port's number of slots, gets
 an object of its own.
 
-A mutant whose object equals that of the source, or of an earlier mutant, is none (trivial compiler equivalence, with
-the options of the build, which optimise). The time-out is in seconds of a processor, so that a busy computer kills
-nothing. Outcomes are kept by the content of object and tests.
+A mutant whose object equals that of the source, or of an earlier mutant, does not count (trivial compiler equivalence,
+with the options of the build, which optimise). The time-out is in processor seconds, so that it does not depend on the
+load of the computer. Outcomes are kept by the content of object and tests.
 """
 
 import hashlib

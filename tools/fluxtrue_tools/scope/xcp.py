@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small XCP master: one command, one answer; before a bench, or in the time of a virtual ECU."""
+"""A small XCP master: one command, one answer; on a bench, or in the time of a virtual ECU."""
 
 import time
 from typing import Final, Protocol

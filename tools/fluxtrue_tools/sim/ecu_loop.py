@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The application on its bus in closed loop: frames go in, the state machine decides, the plant obeys."""
+"""The application on its bus in closed loop with the plant: frames in, state machine, duties to the plant."""
 
 import ctypes
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A CAN connection in the virtual ECU's own time, however fast this computer is.
 
-Simulated time passes in run() only. What was sent before it is heard before time goes on, and what the ECU has sent
-meanwhile has arrived when it returns.
+Simulated time passes in run() only. Frames sent before it are received before time advances, and the frames that the
+ECU has sent meanwhile have arrived when it returns.
 """
 
 import socket

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a step may go on: the page that has started it is there, and Stop has not been pressed.
+"""Whether a step may continue: the page that has started it still responds, and Stop has not been pressed.
 
 Pure decisions on a clock that the caller brings. Any thread.
 """

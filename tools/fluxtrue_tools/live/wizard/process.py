@@ -2,7 +2,7 @@
 """The child process of the wizard: it has the bus and measures, one step at a time, as `fluxtrue commission` does.
 
 The server may stall or crash. The commands do not depend on it, except that a step ends without reports from the page
-that has started it. Before a virtual ECU simulated time waits for the pages, so that no page is late.
+that has started it. With a virtual ECU simulated time waits for the pages, so that no page is late.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a .mat or .h5 in a process of its own and writes its arrays to standard output, as numpy's .npz.
 
-scipy's and h5py's readers are compiled code; some damaged files make them crash instead of complain.
+scipy's and h5py's readers are compiled code; some damaged files make them crash instead of raising an exception.
 """
 
 import io
