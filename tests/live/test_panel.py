@@ -82,22 +82,13 @@ def test_a_disconnected_page_shows_no_value_and_no_active_control(page: Page) ->
     assert page.text("state") == "no bus"
 
 
-def press_save(page: Page, effect: str) -> None:
-    """Until it has an effect: a press misses a button that the page moves in this moment, because values arrive."""
-
-    def pressed() -> bool:
-        page.find("tune-save").click()
-        return bool(page.run(effect))
-
-    page.until(pressed, "an effect of Save")
-
-
 def saved_parameters(page: Page) -> dict[str, Any]:
     """What Save hands to the browser as a download."""
     page.run("window.saved = null;"
              "URL.createObjectURL = (blob) => { blob.text().then((text) => { window.saved = text; }); return ''; };"
              "HTMLAnchorElement.prototype.click = function () { window.savedName = this.download; };")  # fmt: skip
-    press_save(page, "return window.saved !== null")
+    page.find("tune-save").click()
+    page.until(lambda: bool(page.run("return window.saved !== null")), "the file's content")
     assert page.run("return window.savedName") == "parameters.json"
     content = json.loads(str(page.run("return window.saved")))
     assert content["format"] == "fluxtrue-parameters"
@@ -112,12 +103,23 @@ def test_a_saved_file_keeps_its_url_until_the_next_one_is_saved(page: Page) -> N
     page.run("window.revoked = []; window.clicked = undefined;"
              "URL.revokeObjectURL = (url) => { window.revoked.push(url); };"
              "HTMLAnchorElement.prototype.click = function () { window.clicked = this.href; };")  # fmt: skip
-    press_save(page, "return window.clicked !== undefined")
+    page.find("tune-save").click()
     assert str(page.run("return window.clicked")).startswith("blob:")
     assert not page.run("return window.revoked.includes(window.clicked)")
     page.run("window.first = window.clicked;")
-    press_save(page, "return window.clicked !== window.first")
+    page.find("tune-save").click()
+    assert page.run("return window.clicked !== window.first")
     assert page.run("return window.revoked.includes(window.first)")
+
+
+def test_save_acts_as_soon_as_the_values_are_shown(page: Page) -> None:
+    """Not only from the next batch on: the press before it would be lost."""
+    page.run("new MutationObserver((_, watch) => {"
+             "  window.unsaved = document.getElementById('tune-save').disabled; watch.disconnect();"
+             "}).observe(document.querySelector('#tuning tbody'), {childList: true});")  # fmt: skip
+    page.find("tune-read").click()
+    page.until(lambda: page.text("tuning") != "", "the values")
+    assert page.run("return window.unsaved") is False
 
 
 def test_parameters_are_written_back_saved_loaded_and_restored(page: Page, tmp_path: Path) -> None:

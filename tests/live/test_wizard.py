@@ -11,7 +11,7 @@ import tomllib
 import urllib.request
 import zipfile
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from selenium import webdriver
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from test_still import WIDTHS, arrive, begin, moved, shown, watch
 from test_views import CONTRAST, FOCUSED, REACHED
 
 from fluxtrue_tools.bus.address import BusAddress
@@ -53,6 +54,8 @@ STEP_S = 300.0  # of simulated time, for a step and its repetitions
 TORQUE_NM, TORQUE_SHARE = 40.0, 0.03  # the bound of 95 % of the points after a commissioning without a dynamometer
 SPEEDS_RPM = (300.0, 1000.0, 2000.0)
 FOUND = "accept or repeat"
+BATCHES = 36  # six times all that can arrive during a step
+ARRIVALS = Path(__file__).with_name("arrivals_wizard.js").read_text()
 OFF_S = 0.2
 
 
@@ -196,6 +199,31 @@ def test_every_active_control_is_reached_by_tab(bench: Bench) -> None:
         reached.append(page.run(FOCUSED))
     assert [focused[0] for focused in reached] == expected  # type: ignore[index]
     assert all(focused[4] for focused in reached), "each focus is seen"  # type: ignore[index]
+
+
+@pytest.mark.parametrize(("width", "height"), WIDTHS)
+def test_no_control_moves_while_a_step_reports_and_its_result_arrives(bench: Bench, width: int, height: int) -> None:
+    """Of the first step, of the last one, and of the folder."""
+    page, count = bench.page, len(chosen(("map",)))
+    with contextmanager(watch)(page.browser):
+        for active in (0, count - 1, count):
+            page.browser.get("about:blank")
+            page.browser.get(page.server.url)
+            page.until(lambda: page.text("state") == "standby", "standby")
+            shown(page, width, height)
+            arrive(page, False, f"const ACTIVE = {active};\n{ARRIVALS}")
+            begin(page)
+            assert not moved(page, page.until, BATCHES), f"step {active}"
+            if active == 0:
+                page.run("for (const bar of document.querySelectorAll('.step .bar')) bar.closest('.step').append(bar);")
+                begin(page)
+                assert any(one.startswith("offsets-do") for one in moved(page, page.until, 12)), (
+                    "planted: below results"
+                )
+    page.size(1440, 900, "light")
+    page.browser.get("about:blank")
+    page.browser.get_log("browser")  # the pictures of results that were none
+    page.browser.get(page.server.url)
 
 
 def test_the_magnet_is_given_with_its_source_and_a_wrong_value_is_refused(bench: Bench) -> None:

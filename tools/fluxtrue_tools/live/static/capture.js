@@ -14,6 +14,7 @@ let capture = null; // the one that is drawn
 let newest = 0; // number of the newest that the server has
 let asked = 0; // number of the one that was asked for
 let shown = null; // { x, unit, columns }: samples or spectrum
+let grouped = ""; // the units and signals that have a chart
 let isSpectrum = false;
 let isPaused = false;
 let charts = [];
@@ -103,28 +104,50 @@ function chart(unit, names) {
   figure.append(caption);
   $("scope-charts").append(figure);
   const lines = names.map((name, k) => line(name, HUES[k % HUES.length], k < HUES.length ? "solid" : "dashed"));
-  const drawn = plot(figure, lines, range, (x) => `${short(x)} ${shown?.unit ?? ""}`, { zoom, pick, paint });
-  // The mean is in the table only: drawn, it would hide the amplitudes.
-  const drawnColumn = (column) => (isSpectrum ? [null, ...column.slice(1)] : column);
-  drawn.setData([shown.x, ...names.map((name) => drawnColumn(shown.columns[name]))]);
-  return drawn;
+  return plot(figure, lines, range, (x) => `${short(x)} ${shown?.unit ?? ""}`, { zoom, pick, paint });
+}
+
+// The mean is in the table only: drawn, it would hide the amplitudes.
+function columnsOf(names) {
+  return [shown.x, ...names.map((name) => (isSpectrum ? [null, ...shown.columns[name].slice(1)] : shown.columns[name]))];
+}
+
+function fill(drawn, names, staysZoomed) {
+  const { min, max } = drawn.scales.x;
+  drawn.batch(() => {
+    drawn.setData(columnsOf(names), !staysZoomed);
+    if (staysZoomed) drawn.setScale("x", { min, max });
+  });
 }
 
 function removeCharts() {
   discard($("scope-charts"));
   $("scope-charts").replaceChildren();
   charts = [];
+  grouped = "";
 }
 
-function draw() {
-  shown = isSpectrum ? frequencies() : samples();
-  const units = {};
-  for (const name of Object.keys(shown.columns)) (units[unitOf(name)] ??= []).push(name);
-  removeCharts();
+function placeCursors() {
   const last = shown.x.length - 1;
   cursors = [isSpectrum ? 0 : Math.min(capture.trigger, last), last];
   for (const id of ["scope-a", "scope-b"]) $(id).max = last;
-  charts = Object.entries(units).map(([unit, names]) => chart(unit, names));
+}
+
+// A capture of the same signals is drawn into the same charts, and one over the same times leaves zoom and cursors: a
+// repeated capture interrupts neither a press nor a drag.
+function draw() {
+  const before = shown?.x, units = {};
+  shown = isSpectrum ? frequencies() : samples();
+  for (const name of Object.keys(shown.columns)) (units[unitOf(name)] ??= []).push(name);
+  const groups = Object.entries(units), key = JSON.stringify([isSpectrum, groups]), isNew = key !== grouped;
+  const staysZoomed = !isNew && [0, shown.x.length - 1].every((row) => before[row] === shown.x[row]) && before.length === shown.x.length;
+  if (isNew) {
+    removeCharts();
+    grouped = key;
+    charts = groups.map(([unit, names]) => chart(unit, names));
+  }
+  if (!staysZoomed) placeCursors();
+  groups.forEach(([, names], k) => fill(charts[k], names, staysZoomed));
   showCursors();
 }
 

@@ -5,6 +5,6 @@ import { badge, $ } from "./page.js";
 const TEXTS = { mine: ["control here", "good"], free: ["control free", ""], other: ["control elsewhere", "warn"] };
 
 export function showControl({ hello, live, control }) {
-  $("control").hidden = !live || hello.replay;
-  if (!$("control").hidden) badge("control", ...TEXTS[control]);
+  badge("control", ...TEXTS[control]);
+  $("control").classList.toggle("unseen", !live || hello.replay);
 }

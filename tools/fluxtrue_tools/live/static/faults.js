@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Latched faults with explanation and advice, their reset, and the freeze frame of the first one.
 import { send } from "./connection.js";
-import { showFreezeFrame } from "./freeze.js";
+import { frameIsPast, showFreezeFrame } from "./freeze.js";
 import { $, element } from "./page.js";
 import { reason, wordsOf } from "./reasons.js";
 
@@ -25,6 +25,7 @@ function active({ hello, last }) {
 export function startFaults() {
   $("reset").onclick = () => send({ type: "reset" });
   $("freeze").onclick = () => send({ type: "freeze" });
+  $("freeze-close").onclick = () => showFreezeFrame(null, { frozen: false });
 }
 
 export function showFaults(view) {
@@ -39,5 +40,6 @@ export function showFaults(view) {
   }
   $("reset").disabled = !(mayAct && status.state === "fault");
   $("freeze").disabled = !(live && hello.tuning && found.length);
-  if (live && known && !found.length) showFreezeFrame(hello, { frozen: false });
+  $("freeze-close").disabled = !live;
+  if (known && !found.length) frameIsPast();
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The freeze frame: charts of the last steps before the first fault.
-import { $, element } from "./page.js";
+import { $, element, show } from "./page.js";
 import { atLeast, discard, line, plot } from "./plot.js";
 import { wordsOf } from "./reasons.js";
 
@@ -22,8 +22,14 @@ function drawChart({ t_ms, signals }, [title, unit, span, lines]) {
   plot(figure, styles, atLeast(span), (ms) => `${ms} ms`).setData([t_ms, ...lines.map(([, , name]) => signals[name])]);
 }
 
+// A frame stays until it is closed, also when its fault is reset: what is below it does not move by itself.
+export function frameIsPast() {
+  show("freeze-title", "Before a fault that has been reset");
+}
+
 export function showFreezeFrame(hello, message) {
   $("freeze-frame").hidden = !message.frozen;
+  show("freeze-title", "Before the first fault");
   discard($("freeze-charts"));
   $("freeze-charts").replaceChildren();
   if (!message.frozen) return;

@@ -13,7 +13,7 @@ import { onParameters, showParameters, startParameters } from "./parameters.js";
 import { ranges, recolor } from "./plot.js";
 import { onRecording, showRecording, startRecording } from "./recording.js";
 import { showReasons } from "./reasons.js";
-import { showReplay, startReplay } from "./replay.js";
+import { offerReplay, showReplay, startReplay } from "./replay.js";
 import { addGroups, rings } from "./rings.js";
 import { setStandRange, showStand, startStand } from "./stand.js";
 import { startTheme } from "./theme.js";
@@ -47,6 +47,8 @@ function onHello(hello) {
   setStale(hello.stale_s);
   setTorqueRange(hello);
   setStandRange(hello);
+  offerReplay(hello);
+  showFreezeFrame(hello, { frozen: false });
   offerScope(hello);
   offerWizard(hello);
   startCharts(!hello.commission);
@@ -67,12 +69,17 @@ function onRows(message) {
   if (document.hidden) tellDrawn();
 }
 
+// A control that an answer enables acts from the answer on, not only from the next state on.
+function answered(show) {
+  return (message) => { show(message); showAll(); };
+}
+
 const HANDLERS = {
   hello: onHello,
   rows: onRows,
   refused: (message) => say(message.text),
   recording: onRecording,
-  parameters: onParameters,
+  parameters: answered(onParameters),
   scope: onScope,
   capture: onCapture,
   freeze: (message) => showFreezeFrame(said.hello, message),

@@ -27,35 +27,52 @@ function write(shown) {
 
 // A field in which the user has begun to enter the next value keeps it.
 function fill(shown, info) {
-  const { made, input } = shown;
+  const { made, input, cells } = shown, { default: built, lo, hi, unit } = info;
   const isEdited = document.activeElement === input && input.value !== shown.entered;
   shown.info = info;
   made.className = differs(info) ? "differs" : "";
+  [written(built), `${written(lo)} … ${written(hi)}`, UNITS[unit] || unit].forEach((text, k) => { cells[k].textContent = text; });
   input.defaultValue = written(info.value);
   if (!isEdited) input.value = shown.entered = input.defaultValue;
 }
 
 function row(info) {
-  const { name, text, unit, lo, hi, default: built } = info;
+  const { name, text, unit } = info, cells = [element("td"), element("td"), element("td")];
   const made = document.createElement("tr");
   const input = Object.assign(document.createElement("input"), {
     type: "number", step: "any", name, disabled: !mayWrite, ariaLabel: `${text}, ${unit || "no unit"}` });
-  const shown = { made, input, info, entered: "" };
+  const shown = { made, input, info, cells, entered: "" };
   rows.set(name, shown);
   input.addEventListener("change", () => write(shown));
   const label = element("td", name.replace(/_(rad|Nm)_.*$/, "").replaceAll("_", " "));
   label.title = text;
   const field = document.createElement("td");
   field.append(input);
-  made.append(label, field, element("td", written(built)), element("td", `${written(lo)} … ${written(hi)}`),
-    element("td", UNITS[unit] || unit));
+  made.append(label, field, ...cells);
   return made;
+}
+
+// Fields that are on the page stay: a press is lost with the element on which it began.
+function makeRows() {
+  if (values.length === rows.size && values.every(({ name }) => rows.has(name))) return;
+  rows.clear();
+  $("tuning").tBodies[0].replaceChildren(...values.map(row));
+}
+
+// No value without an inverter; the fields keep their places.
+function empty() {
+  values = [];
+  for (const shown of rows.values()) {
+    shown.made.className = "";
+    shown.input.value = shown.input.defaultValue = shown.entered = "";
+  }
+  $("tune-text").textContent = "Read shows the values of the inverter and how they differ from those of the build.";
 }
 
 export function onParameters(message) {
   values = message.values;
   $("tuning").hidden = false;
-  if (!rows.size) $("tuning").tBodies[0].append(...values.map(row));
+  makeRows();
   values.forEach((info) => fill(rows.get(info.name), info));
   say(message.told);
   const count = values.filter(differs).length;
@@ -102,11 +119,5 @@ export function showParameters({ hello, live, mayAct }) {
   $("tune-save").disabled = !(known && values.length);
   $("tune-load").disabled = $("tune-restore").disabled = !mayWrite;
   for (const input of $("tuning").querySelectorAll("input")) input.disabled = !mayWrite;
-  if (!live) {
-    values = [];
-    rows.clear();
-    $("tuning").hidden = true;
-    $("tuning").tBodies[0].replaceChildren();
-    $("tune-text").textContent = "Read shows the values of the inverter and how they differ from those of the build.";
-  }
+  if (!live) empty();
 }

@@ -10,8 +10,11 @@ export function startReplay() {
   $("position").oninput = () => send({ type: "seek", position_s: Number($("position").value) });
 }
 
+export function offerReplay(hello) {
+  $("replay").hidden = !hello.replay;
+}
+
 export function showReplay(replay) {
-  $("replay").hidden = !replay;
   if (!replay) return;
   paused = replay.paused;
   $("position").max = replay.length_s;

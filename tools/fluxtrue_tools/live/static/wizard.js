@@ -47,12 +47,14 @@ function makeCard({ name, title, does, seconds }, k) {
   progress.append(bar, Object.assign(element("span", "", "quiet"), { id: `${name}-time` }));
   const refused = Object.assign(element("p", "", "warning"), { id: `${name}-refused` });
   refused.setAttribute("role", "alert");
-  const actions = element("div", "", "bar");
-  actions.append(button(`${name}-accept`, "Accept", "primary", () => ask("commission_accept", name)),
-    button(`${name}-do`, "Do this step", "primary", () => ask("commission_do", name)));
+  // The buttons and the progress have one place, above everything that grows.
+  const actions = element("div", "", "bar"), stage = Object.assign(element("div", "", "stage"), { id: `${name}-stage` });
+  actions.append(button(`${name}-do`, "Do this step", "primary", () => ask("commission_do", name)),
+    button(`${name}-accept`, "Accept", "primary", () => ask("commission_accept", name)));
+  stage.append(actions, progress);
   card.append(heading(name, `${k + 1} ${title}`), element("p", `${does[0].toUpperCase()}${does.slice(1)}.`, "does"),
     element("p", `About ${Math.ceil(seconds)} s on the bus. Nothing is changed before the result is accepted.`, "quiet"),
-    progress, refused, results(name), Object.assign(element("div", "", "pictures"), { id: `${name}-pictures` }), actions);
+    stage, refused, results(name), Object.assign(element("div", "", "pictures"), { id: `${name}-pictures` }));
   return card;
 }
 
@@ -138,6 +140,7 @@ function showCard(name, card, mayAct, isFree) {
   show(`${name}-do`, state === NOW ? "Do this step" : "Repeat");
   $(`${name}-do`).classList.toggle("primary", state === NOW);
   $(`${name}-progress`).hidden = state !== "running";
+  $(`${name}-stage`).hidden = state === "waiting" || state === "accepted";
   const { max } = $(`${name}-bar`), late = step_s > max;
   $(`${name}-bar`).value = Math.min(step_s, max);
   show(`${name}-time`, late ? `${step_s.toFixed(0)} s: takes longer than usual.` : `${step_s.toFixed(0)} s of about ${Math.ceil(max)} s on the bus. `
