@@ -14,11 +14,10 @@
 #include "signal/program_flow.h"
 #include "signal/rate_limit.h"
 
-static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
+static void take_resets(drive_t *drive, bool enable)
 {
     const request_t *request = &drive->request;
     task_state_t *task = &drive->task;
-    const bool enable = request->enable; /* read once, so that a reset is never sent together with the command to run */
     if (request->fault_resets != task->fault_resets_asked) {
         task->fault_resets_asked = request->fault_resets; /* a reset while running is refused for good */
         task->fault_resets += (enable || switch_off_holds(drive)) ? 0U : 1U;
@@ -29,6 +28,12 @@ static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
         drive_reset_identification(drive);
         drive_restore_trim(drive, 0);
     }
+}
+
+static run_state_t next_run_state(drive_t *drive, const snapshot_t *snapshot)
+{
+    const bool enable = drive->request.enable; /* read once: a reset is never sent together with the command to run */
+    take_resets(drive, enable);
     if (snapshot->faults != 0U) {
         return RUN_STATE_FAULT;
     }
