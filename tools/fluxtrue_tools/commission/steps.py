@@ -158,8 +158,9 @@ def _map(drive: Capture, found: Found, known: Nameplate) -> None:
         raise FluxtrueError(f"commission: map: {len(lost)} of {len(found.bursts)} bursts failed: {lost[0]}")
     found.balance = balance.measure([*found.levels, *used])
     alike = [found.balance.corrected(raw) for raw in used]
-    found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm, known.psi_f_Vs,
-                                found.resistance.total_V)  # fmt: skip
+    error = surface.MEASURED if found.spun is not None else surface.GIVEN if known.psi_f_source else surface.GUESSED
+    found.surface = surface.fit(alike, found.balance.noise_A, known.i_max_A, found.resistance.r_ohm,
+                                (known.psi_f_Vs, error), found.resistance.total_V)  # fmt: skip
 
 
 STEPS = (

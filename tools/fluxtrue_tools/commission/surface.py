@@ -21,7 +21,7 @@ from fluxtrue_tools.motor.map_import.coenergy import Basis, CoEnergy, System
 
 INTERVALS = 16  # over the longer side of the plane
 MARGIN_D = 0.15  # of i_max on the magnetising side
-KNOWN = 0.5  # of psi, rms: error of what the voltages hardly show, the magnet's flux linkage
+MEASURED, GIVEN, GUESSED = 0.01, 0.1, 0.5  # errors of the magnet's flux linkage, by where it comes from
 ERROR, STEADY = 0.05, 0.5  # of psi, rms, and of i_max: until there is a map, a sample's error is ERROR/(STEADY + i)
 RESOLUTION = 0.001  # of psi, rms: error of a sample beside its noise
 R_PRIOR, LEVEL_PRIOR_V, START_PRIOR = 0.002, 0.1, 0.05  # of R; volts; of psi, rms
@@ -139,15 +139,16 @@ class _Fit:
         of_legs = of_signs(self.raws[n], noise_A) * level_V / self.scale
         return Noise(np.hypot(sigma, RESOLUTION) * self._unused(n), np.vstack((of_legs.real, of_legs.imag)))
 
-    def solve(self, noises: Iterable[Noise], psi_f_Vs: float, level_V: float) -> tuple[float, Array]:
-        """Effective number of unknowns, and all of them."""
+    def solve(self, noises: Iterable[Noise], magnet: tuple[float, float], level_V: float) -> tuple[float, Array]:
+        """Effective number of unknowns, and all of them; magnet: its flux linkage and the relative error of it."""
         count = self.basis.count
         system = System(count + self.others)
         for n, noise in enumerate(noises):
             system.add(noise.whitened(self.rows(n)), noise.whitened(self.values(n)[:, None])[:, 0])
-        for row, value in ((self.magnet, psi_f_Vs / self.scale), (self.zero, 0.0)):
-            known = sparse.hstack((row, sparse.csr_matrix((1, self.others))), format="csr") / KNOWN
-            system.add(sparse.csr_matrix(known), np.array([value / KNOWN]), counted=False)
+        psi_f, error = magnet[0] / self.scale, magnet[0] * magnet[1] / self.scale
+        for row, value in ((self.magnet, psi_f), (self.zero, 0.0)):
+            known = sparse.hstack((row, sparse.csr_matrix((1, self.others))), format="csr") / error
+            system.add(sparse.csr_matrix(known), np.array([value / error]), counted=False)
         prior = sparse.hstack((sparse.csr_matrix((self.others, count)), sparse.eye(self.others)), format="csr")
         centre = np.zeros(self.others)
         centre[1] = level_V / LEVEL_PRIOR_V
@@ -157,17 +158,18 @@ class _Fit:
         return system.solve(penalty, slack=1.0, price=PRICE, least=LEAST)
 
 
-def fit(raws: Sequence[Raw], noise_A: float, i_max_A: float, r_ohm: float, psi_f_Vs: float, level_V: float) -> Surface:
+def fit(raws: Sequence[Raw], noise_A: float, i_max_A: float, r_ohm: float, magnet: tuple[float, float],
+        level_V: float) -> Surface:  # fmt: skip
     """All unknowns at once, twice: the first map says how much flux linkage the noise of a current is.
 
-    noise_A    of one component of a sample's current
-    psi_f_Vs   that of the nameplate, or the one that the step spin has measured
+    noise_A   of one component of a sample's current
+    magnet    its flux linkage, V·s, and the relative error of it
     """
     work = _Fit(raws, i_max_A, r_ohm)
     bursts = range(len(raws))
-    _, x = work.solve((work.guessed_noise(n) for n in bursts), psi_f_Vs, level_V)
+    _, x = work.solve((work.guessed_noise(n) for n in bursts), magnet, level_V)
     model = work.energy(x)
-    unknowns, x = work.solve((work.noise(n, model, level_V, noise_A) for n in bursts), psi_f_Vs, level_V)
+    unknowns, x = work.solve((work.noise(n, model, level_V, noise_A) for n in bursts), magnet, level_V)
     return _surface(work, x, unknowns)
 
 
